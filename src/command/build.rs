@@ -6,6 +6,7 @@ use crate::command::intake::{Intake, Next, RayNeeds, Taken};
 use crate::command::map_at::whole_map;
 use crate::command::progress::Progress;
 use crate::command::read_options::read_options;
+use crate::command::scan_input::is_standard_input;
 use crate::command::scan_queue::{ScanQueue, WhenBehind};
 use crate::command::scan_reader::{Marking, ScanReader};
 use crate::command::stop_signal;
@@ -21,6 +22,12 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::Instant;
+
+/// The share of the limit of memory that reading may take, beside the points of scans: chunks and messages of
+/// recordings, poses, the sorting of LAS.
+const PARTS_FOR_READING: usize = 32;
+/// Reading has so much at least. What it has beyond that is taken from the map.
+const LEAST_FOR_READING: usize = 4 << 20;
 
 /// The share of the limit of memory that the points of scans may take, as they are read and as they are mapped.
 const PARTS_OF_MEMORY: usize = 32;
@@ -56,6 +63,7 @@ pub fn build(args: &BuildArgs, watch: &Watch) -> anyhow::Result<Option<Summary>>
     let most_together = most_together(args, &config);
     let opened = ScanReader::open(args.scans.clone(), options_of(args, &config)?, room, mark, stop.clone())?;
     let Some((reader, input)) = opened else { return Ok(None) };
+    let config = config_of_map(args, &config);
     let needs = RayNeeds { grid: config.grid, sensor_model: config.sensor_model };
     let mut intake = Intake::new(reader, args.scans.clone(), args.skip_bad, (!args.no_rays).then_some(needs));
     let mut mapper = match exists {
@@ -202,6 +210,9 @@ impl Build<'_> {
 fn options_of(args: &BuildArgs, config: &MapConfig) -> crate::Result<ReadOptions> {
     let mut options = read_options(&args.read)?;
     options.open.scratch = Some(folder_beside(args).to_owned());
+    if let MemoryLimit::Bytes(bytes) = config.memory {
+        options.open.memory_bytes = for_reading(bytes);
+    }
     options.clouds.has_no_returns = config.rays.no_return_range_m.is_some();
     if args.no_rays && options.poses.is_none() {
         options.clouds.may_lack_poses = true;
@@ -392,6 +403,23 @@ fn taken_before(args: &BuildArgs, name: &str, scans: u64) -> anyhow::Error {
 /// may keep its own in memory.
 fn folder_beside(args: &BuildArgs) -> &Path {
     args.output.ancestors().find(|folder| folder.is_dir()).unwrap_or(Path::new("."))
+}
+
+/// The memory for reading, of a limit of so many bytes.
+fn for_reading(bytes: usize) -> usize {
+    (bytes / PARTS_FOR_READING).max(LEAST_FOR_READING)
+}
+
+/// The configuration of the map, which leaves the memory for reading alone.
+fn config_of_map(args: &BuildArgs, config: &MapConfig) -> MapConfig {
+    let mut config = config.clone();
+    if let MemoryLimit::Bytes(bytes) = config.memory
+        && !is_standard_input(&args.scans)
+    {
+        let least = MemoryLimit::least_bytes(&config.grid).min(bytes);
+        config.memory = MemoryLimit::Bytes((bytes - (for_reading(bytes) - LEAST_FOR_READING)).max(least));
+    }
+    config
 }
 
 /// Points of a scan that the limit of memory has no room for go to a file.

@@ -27,6 +27,8 @@ mod las_record;
 #[cfg(feature = "las")]
 mod las_scans;
 #[cfg(feature = "las")]
+mod las_trimmed;
+#[cfg(feature = "las")]
 mod las_units;
 #[cfg(feature = "las")]
 mod laz_chunks;

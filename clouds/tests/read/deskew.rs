@@ -205,7 +205,7 @@ mod recordings {
         });
         read.unwrap();
         let pose_at = source.poses().unwrap();
-        assert_deskews(&points, pose_at, of);
+        assert_deskews(&points, |stamp_ns| pose_at(stamp_ns).unwrap(), of);
     }
 
     /// A field, and its bytes for so many nanoseconds after the stamp.
