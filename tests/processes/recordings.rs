@@ -191,7 +191,7 @@ fn many_transforms_are_sorted_in_a_file() {
 
 #[test]
 fn many_poses_are_in_a_file() {
-    const POSES: usize = 1_000_000;
+    const POSES: usize = 1_500_000;
     let (folder, _) = folder_for_maps();
     let cloud = folder.path().join(format!("{STAMP_S}.000000.xyz"));
     fs::write(&cloud, "1 2 3\n4 5 6\n").unwrap();
@@ -210,7 +210,7 @@ fn many_poses_are_in_a_file() {
 
 #[test]
 fn records_of_las_are_passed_over() {
-    const RECORDS: u64 = 2000;
+    const RECORDS: u64 = 1000;
     const RECORD_BYTES: u64 = 54 + 0xffff;
     let (folder, _) = folder_for_maps();
     let path = folder.path().join("a.las");

@@ -22,9 +22,11 @@ impl Budget {
     pub const DEFAULT_BYTES: usize = 64 << 20;
 
     /// Bytes that a message, or another part of a file that cannot be read piece by piece, may take on top.
+    #[cfg(any(feature = "las", feature = "e57", feature = "ros"))]
     const WHOLE_BYTES: u64 = 12 << 20;
 
     /// The largest part of a file that is held in memory whole.
+    #[cfg(any(feature = "las", feature = "e57", feature = "ros"))]
     pub(crate) fn whole_bytes(&self) -> u64 {
         Self::WHOLE_BYTES.saturating_add(self.bytes as u64)
     }

@@ -156,7 +156,7 @@ fn recording(data: &[u8], name: &str) -> bool {
             if let Ok(mut clouds) = open_bag(&paths, &options) {
                 let stamp_ns = clouds.next_cloud().ok().flatten().and_then(|head| head.stamp_ns);
                 if let Some(pose_at) = clouds.poses() {
-                    pose_at(stamp_ns.unwrap_or(0).saturating_add(1));
+                    pose_at(stamp_ns.unwrap_or(0).saturating_add(1)).unwrap();
                 }
                 while let Ok(Some(_)) = clouds.next_cloud() {
                     let _ = clouds.read_points(&mut |_| Ok(()));

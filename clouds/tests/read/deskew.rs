@@ -87,7 +87,7 @@ fn trajectory(folder: &Path) -> Trajectory {
 }
 
 fn in_file(trajectory: &Trajectory, at_ns: i64) -> Option<RigidPose> {
-    match trajectory.at(at_ns, 10_000_000) {
+    match trajectory.at(at_ns, 10_000_000).unwrap() {
         Found::Exact(pose) | Found::Between(pose) => Some(pose),
         _ => None,
     }
