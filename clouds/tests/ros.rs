@@ -260,7 +260,7 @@ fn little_memory_gives_the_same_clouds() {
     let large = folder.path().join("large.bag");
     std::fs::write(&large, large_bag()).unwrap();
     let options = |poses| BagOptions { poses, ..topic("/points") };
-    for path in recordings().into_iter().map(data).chain([large]) {
+    for path in recordings().map(data).chain([large]) {
         for poses in [PoseSource::Tf, PoseSource::None] {
             let much = read(std::slice::from_ref(&path), &options(poses));
             let little = BagOptions { memory_bytes: 0, ..options(poses) };

@@ -37,6 +37,7 @@ impl PoseTrack {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::pose::RigidPose;
     use crate::ros::messages::Header;
 
     fn pose(stamp_ns: i64, parent: &str, x_m: f64) -> StampedPose {
@@ -52,7 +53,8 @@ mod tests {
             (0..message).for_each(|stamp_ns| track.insert(pose(stamp_ns, "odom", f64::from(message as i32))));
         }
         assert_eq!((track.poses.len(), track.odd), (100, 0));
-        assert_eq!(track.poses[&0].position_m[0], 100.0, "what is told last counts");
+        let (_, first) = track.poses.around(0).unwrap();
+        assert_eq!(first.map(|first| first.pose.position_m[0]), Some(100.0), "what is told last counts");
     }
 
     #[test]
