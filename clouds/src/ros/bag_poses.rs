@@ -4,6 +4,7 @@ use super::messages::{MessageKind, StampedPose, decode_poses};
 use super::pose_lookup::PoseLookup;
 use super::pose_track::PoseTrack;
 use super::recording::{Recording, Topic};
+use super::second_parent::SecondParent;
 use super::transforms::{Transforms, WhyNot};
 use crate::error::{Error, Result};
 use crate::pose::RigidPose;
@@ -26,6 +27,10 @@ pub(super) struct BagPoses {
 
 /// The frames that a robot moves by, if a pose does not name its own.
 const BASE_FRAMES: [&str; 2] = ["base_link", "base_footprint"];
+/// Second parents of frames that are reported, and links among which they are looked for.
+const MOST_SECONDS: usize = 8;
+const MOST_CHECKED: usize = 2000;
+const WHICH_COUNTS: &str = "a parent that a single transform names, or that makes a loop, does not count";
 
 impl BagPoses {
     /// Reads all transforms, and the poses of a topic if these are asked for.
@@ -79,7 +84,8 @@ impl BagPoses {
         wanted: &[usize],
         odometry: Option<usize>,
     ) -> Result<()> {
-        let (mut bad, mut invalid) = (Vec::new(), 0_u64);
+        let (mut bad, mut invalid, mut first_invalid) = (Vec::new(), 0_u64, None);
+        let (mut links, mut seconds): (usize, Vec<SecondParent>) = (0, Vec::new());
         let transforms = Arc::make_mut(&mut self.transforms);
         recording.begin(wanted)?;
         loop {
@@ -105,9 +111,20 @@ impl BagPoses {
                     let is_static = topic.name.ends_with("tf_static");
                     for StampedPose { header, child_frame, parent_from_child } in poses {
                         let (parent, stamp_ns) = (header.frame_id.as_str(), header.stamp_ns);
-                        let is_taken =
-                            transforms.insert(parent, &child_frame, stamp_ns, parent_from_child, is_static);
-                        invalid += u64::from(!is_taken);
+                        match transforms.insert(parent, &child_frame, stamp_ns, parent_from_child, is_static)
+                        {
+                            Ok(false) => {}
+                            Ok(true) => {
+                                links += 1;
+                                if links <= MOST_CHECKED && seconds.len() < MOST_SECONDS {
+                                    seconds.extend(transforms.second_parent(parent, &child_frame));
+                                }
+                            }
+                            Err(why) => {
+                                invalid += 1;
+                                first_invalid.get_or_insert(why);
+                            }
+                        }
                     }
                 }
                 Err(error) => bad.push(format!("{}: {error}", topic.name)),
@@ -119,11 +136,10 @@ impl BagPoses {
                 bad.len()
             ));
         }
-        if invalid > 0 {
-            let remark =
-                "transforms are not valid (numbers, frames without a name or in themselves) and left out";
-            self.remarks.push(format!("{invalid} {remark}"));
+        if let Some(first) = first_invalid {
+            self.remarks.push(format!("{invalid} transforms are not valid and left out; the first: {first}"));
         }
+        self.remarks.extend(seconds.into_iter().map(|second| format!("{second}; {WHICH_COUNTS}")));
         Ok(())
     }
 
@@ -161,7 +177,7 @@ impl BagPoses {
         if !self.transforms.knows(sensor_frame) {
             return Err(WhyNot::UnknownFrame(sensor_frame.to_owned()));
         }
-        let chain = self.transforms.ancestors(sensor_frame)?;
+        let chain = self.transforms.ancestors(sensor_frame);
         if let Some(known) =
             ["map", "odom"].into_iter().find(|known| chain.iter().any(|frame| frame == known))
         {
@@ -171,7 +187,7 @@ impl BagPoses {
         if !chain.iter().any(|frame| self.transforms.is_moving(frame)) {
             return Err(WhyNot::NothingMoves(sensor_frame.to_owned()));
         }
-        chain.last().cloned().ok_or_else(|| WhyNot::UnknownFrame(sensor_frame.to_owned()))
+        Ok(self.transforms.root_of(sensor_frame))
     }
 
     /// Puts the poses of a topic among the transforms, in the place of those of the same frame.
@@ -186,7 +202,7 @@ impl BagPoses {
             self.fixed_frame = Some(parent.clone());
         }
         for (stamp_ns, pose) in poses {
-            odd += u64::from(!transforms.insert(&parent, &child, stamp_ns, pose, false));
+            odd += u64::from(transforms.insert(&parent, &child, stamp_ns, pose, false).is_err());
         }
         if odd > 0 {
             let remark = format!(
@@ -203,7 +219,7 @@ impl BagPoses {
 
     /// The frame that poses without a name are of: the base of the robot that carries the sensor, or the sensor.
     fn base_of(&self, sensor_frame: &str) -> String {
-        let chain = self.transforms.ancestors(sensor_frame).unwrap_or_default();
+        let chain = self.transforms.ancestors(sensor_frame);
         let base = BASE_FRAMES.into_iter().find(|base| chain.iter().any(|frame| frame == base));
         base.unwrap_or(sensor_frame).to_owned()
     }
