@@ -172,11 +172,11 @@ fn trust_of(samples: &Samples, last: u64, stamp_ns: Option<i64>, most_gap_ns: Op
     let Some(stamp_ns) = stamp_ns else { return Trust::Moving(Reverse(last)) };
     let is_near = |gap_ns: i64| most_gap_ns.is_none_or(|most| gap_ns <= most);
     match around(samples, stamp_ns) {
-        (Some((before_ns, _)), Some((after_ns, _))) if is_near(after_ns.saturating_sub(before_ns)) => {
+        [Some((before_ns, _)), Some((after_ns, _))] if is_near(after_ns.saturating_sub(before_ns)) => {
             Trust::Between(Reverse(before_ns))
         }
-        (Some((before_ns, _)), Some(_)) => Trust::Held(Reverse(before_ns)),
-        (Some((before_ns, _)), None) if stamp_ns.saturating_sub(before_ns) <= HOLD_NS => {
+        [Some((before_ns, _)), Some(_)] => Trust::Held(Reverse(before_ns)),
+        [Some((before_ns, _)), None] if stamp_ns.saturating_sub(before_ns) <= HOLD_NS => {
             Trust::Held(Reverse(before_ns))
         }
         _ => Trust::Doubtful(Reverse(last)),
@@ -184,9 +184,9 @@ fn trust_of(samples: &Samples, last: u64, stamp_ns: Option<i64>, most_gap_ns: Op
 }
 
 /// The last sample up to a stamp, and the first one from it on.
-fn around(samples: &Samples, stamp_ns: i64) -> (Option<(i64, RigidPose)>, Option<(i64, RigidPose)>) {
+fn around(samples: &Samples, stamp_ns: i64) -> [Option<(i64, RigidPose)>; 2] {
     let owned = |(stamp_ns, pose): (&i64, &RigidPose)| (*stamp_ns, *pose);
-    (samples.range(..=stamp_ns).next_back().map(owned), samples.range(stamp_ns..).next().map(owned))
+    [samples.range(..=stamp_ns).next_back().map(owned), samples.range(stamp_ns..).next().map(owned)]
 }
 
 impl Step<'_> {
@@ -202,7 +202,7 @@ impl Step<'_> {
             Place::Moving(samples) => samples,
         };
         let child = || self.child.to_owned();
-        let (before, after) = around(samples, stamp_ns);
+        let [before, after] = around(samples, stamp_ns);
         let Some((before_ns, before)) = before else { return Err(WhyNot::Before(child())) };
         if before_ns == stamp_ns {
             return Ok(before);

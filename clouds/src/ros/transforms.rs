@@ -6,7 +6,8 @@ use std::collections::{HashMap, HashSet};
 
 /// The tree of frames of a recording or a robot: where each frame was in its parents, over time.
 ///
-/// At a time a frame has one parent: the first of these that leads to the frame that is asked for, and to no frame twice.
+/// At a time a frame has one parent: the first of these that leads to the frame that is asked for, and to no frame
+/// twice.
 ///
 /// 1. One with transforms before and after the stamp, or at it: of several the one with the latest before.
 /// 2. One with transforms up to 10 s before the stamp, which give no pose, or not yet.
@@ -188,8 +189,8 @@ impl Transforms {
         self.frames.is_empty()
     }
 
-    /// The frame and what is above it, at whatever time. Parents that a single transform names are left out if something
-    /// moves without them.
+    /// The frame and what is above it, at whatever time. Parents that a single transform names are left out if
+    /// something moves without them.
     pub fn ancestors(&self, frame: &str) -> Vec<String> {
         self.above(bare(frame)).frames.into_iter().map(str::to_owned).collect()
     }
@@ -230,8 +231,8 @@ impl Transforms {
         Ok(common_from_target.inverse().then(&common_from_source))
     }
 
-    /// The frames whose place in their parents leads from one frame to another at a time: up to what is above both, from
-    /// each.
+    /// The frames whose place in their parents leads from one frame to another at a time: up to what is above both,
+    /// from each.
     ///
     /// # Errors
     ///
