@@ -89,7 +89,8 @@ fn layout(header: &str) -> std::result::Result<(usize, u64, usize), String> {
         return Err("its header names no type ('descr'); save it again with numpy.save".into());
     };
     if descr.starts_with('[') {
-        let reason = "is a structured array; save a plain one: numpy.lib.recfunctions.structured_to_unstructured(poses)";
+        let reason = "is a structured array; save a plain one: \
+                      numpy.lib.recfunctions.structured_to_unstructured(poses)";
         return Err(reason.into());
     }
     let kind = descr.split('\'').nth(1).unwrap_or_default();
