@@ -30,11 +30,11 @@ pub(super) fn read(path: &Path) -> Result<Vec<Row>> {
     let mut input = BufReader::new(File::open(path).map_err(fail)?);
     let mut start = Vec::new();
     (&mut input).take(8).read_to_end(&mut start).map_err(fail)?;
-    let &[.., version, _] = start.as_slice() else { return Err(wrong(0, NO_ARRAY.into())) };
-    if !start.starts_with(MAGIC) {
-        return Err(wrong(0, NO_ARRAY.into()));
-    }
-    if !(1..=3).contains(&version) || start.len() < 8 {
+    let version = match *start.as_slice() {
+        [.., version, _] if start.len() == 8 && start.starts_with(MAGIC) => version,
+        _ => return Err(wrong(0, NO_ARRAY.into())),
+    };
+    if !(1..=3).contains(&version) {
         let reason = "its version is none of 1, 2 and 3; save it again with numpy.save";
         return Err(wrong(6, reason.into()));
     }
