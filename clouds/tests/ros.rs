@@ -466,6 +466,70 @@ fn a_split_bag_is_one_recording() {
 }
 
 #[test]
+fn a_transform_that_makes_a_loop_costs_a_recording_no_pose() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("loop.bag");
+    let (start_ns, still) = (1_700_000_000_000_000_000, [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]);
+    let at = |tick: i64| start_ns + tick * 20_000_000;
+    let tf = |stamp_ns, parent: &str, child: &str| MessageWriter::ros1().tf(stamp_ns, parent, child, &still);
+    let fields = [("x", 0, F32), ("y", 4, F32), ("z", 8, F32)];
+    let point = [[1.0_f32, 1.0, 2.0].map(f32::to_le_bytes).concat()];
+    let write = |wrong: &[(&str, &str)]| {
+        let mut messages = vec![(2, at(0), tf(0, "base", "lidar"))];
+        for tick in 0..50 {
+            messages.push((1, at(tick), tf(at(tick), "map", "base")));
+            if tick == 25 {
+                messages.extend(wrong.iter().map(|(parent, child)| (1, at(25), tf(at(25), parent, child))));
+            }
+            if tick < 49 {
+                let cloud =
+                    MessageWriter::ros1().point_cloud2(at(tick) + 7_000_000, "lidar", &fields, &point);
+                messages.push((0, at(tick), cloud));
+            }
+        }
+        let tf = "tf2_msgs/TFMessage";
+        let topics = [("/points", "sensor_msgs/PointCloud2"), ("/tf", tf), ("/tf_static", tf)];
+        std::fs::write(&path, bag1(&topics, &messages)).unwrap();
+        let (clouds, errors, remarks) = read(from_ref(&path), &BagOptions::default());
+        let little = read(from_ref(&path), &BagOptions { memory_bytes: 0, ..BagOptions::default() });
+        assert!(format!("{little:?}") == format!("{:?}", (&clouds, &errors, &remarks)), "{:?}", little.2);
+        let posed = clouds.iter().filter(|(head, _)| head.world_from_sensor.is_some()).count();
+        (posed, errors, remarks)
+    };
+    assert_eq!(write(&[]), (49, Vec::new(), Vec::new()));
+    for wrong in [[("lidar", "map"), ("base", "map")], [("lidar", "base"), ("elsewhere", "lidar")]] {
+        let (posed, errors, remarks) = write(&wrong);
+        assert_eq!((posed, errors), (49, Vec::new()), "{remarks:?}");
+        assert!(remarks.iter().any(|remark| remark.contains("which makes a loop")), "{remarks:?}");
+    }
+    let (posed, _, remarks) = write(&[("", "base"), ("base", "/base")]);
+    assert_eq!(posed, 49);
+    assert_eq!(remarks, ["2 transforms are not valid and left out; the first: a frame has no name"]);
+}
+
+#[test]
+fn a_frame_with_ever_other_parents_leaves_room_for_others() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("parents.bag");
+    let tf = |at_ns, parent: &str, child: &str| {
+        MessageWriter::ros1().tf(at_ns, parent, child, &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+    };
+    let mut messages: Vec<_> = (0..12_000).map(|k| (1, k, tf(k, &format!("p{}", k % 40), "flag"))).collect();
+    messages.extend((0..2).map(|k| (1, 20_000 + k, tf(20_000 + k, "map", "lidar"))));
+    let fields = [("x", 0, F32), ("y", 4, F32), ("z", 8, F32)];
+    let point = [[1.0_f32, 1.0, 2.0].map(f32::to_le_bytes).concat()];
+    messages.push((0, 20_001, MessageWriter::ros1().point_cloud2(20_001, "lidar", &fields, &point)));
+    let topics = [("/points", "sensor_msgs/PointCloud2"), ("/tf", "tf2_msgs/TFMessage")];
+    std::fs::write(&path, bag1(&topics, &messages)).unwrap();
+    for memory_bytes in [0, 64 << 20] {
+        let (clouds, _, remarks) =
+            read(from_ref(&path), &BagOptions { memory_bytes, ..BagOptions::default() });
+        assert!(clouds[0].0.world_from_sensor.is_some(), "{remarks:?}");
+        assert!(!remarks.iter().any(|remark| remark.contains("are left out")), "{remarks:?}");
+    }
+}
+
+#[test]
 fn the_last_part_of_a_split_bag_may_be_cut_off() {
     let folder = tempfile::tempdir().unwrap();
     let (first, second) = (part(0, true), part(1, false));

@@ -13,6 +13,7 @@ use crate::command::stop_signal;
 use crate::command::summary::Summary;
 use crate::command::watch::Watch;
 use crate::command::{INTERRUPTED, say};
+use crate::error::beginning_or_difference;
 use crate::io::{PointRoom, ReadOptions, ScanMark};
 use crate::mapper::{MapReader, MapView, Mapper, OutOfCoreTileMapper};
 use crate::scan::{ScanPoints, ScanReport};
@@ -354,14 +355,45 @@ fn begin(
     // A map that was merged of others has tiles, and knows of no scans.
     let is_empty = mapper.scan_number() == 0 && mapper.tile_bounds().is_none();
     if args.resume && !args.append && !is_empty {
-        let found = inputs.last().map_or("that it does not know".to_owned(), |last| last.name.clone());
-        let (path, what, wanted) = (args.output.clone(), "been built from input", name.to_owned());
-        return Err(Error::Mismatch { path, what, found, wanted }.into());
+        let same = inputs.iter().rfind(|input| input.is_named(name) && input.content.is_some());
+        let (found, wanted) = match same.or(inputs.last()) {
+            None => ("that it does not know".to_owned(), name.to_owned()),
+            Some(known) => match known.content {
+                // Its name is a fingerprint.
+                None => {
+                    let Some(fingerprint) = intake.fingerprint()? else { return Ok(None) };
+                    (known.name.clone(), fingerprint.map_or(name.to_owned(), |of| format!("{of} ({name})")))
+                }
+                Some(_) if known.is_named(name) => (
+                    beginning(&known.name, known.begins_with()),
+                    format!(
+                        "{}: the input was replaced or its beginning has changed",
+                        beginning(name, intake.begins_with())
+                    ),
+                ),
+                Some(_) => (known.name.clone(), name.to_owned()),
+            },
+        };
+        let (path, what) = (args.output.clone(), "been built from input");
+        let error = anyhow::Error::from(Error::Mismatch { path, what, found, wanted });
+        return Err(error.context(
+            "--resume takes what came since of an input that the map has; --append adds another one",
+        ));
     }
     let content = args.piece_of.is_none().then(|| intake.content());
     let (rays, is_hits_alone) = (Some(mapper.config().rays), Some(args.no_rays));
     mapper.begin_input(InputRecord { content, rays, is_hits_alone, ..InputRecord::from(name) })?;
     Ok(Some(0))
+}
+
+/// An input by what tells it from others of its name.
+fn beginning(name: &str, begins_with: Option<&str>) -> String {
+    match begins_with {
+        Some(fingerprint) => {
+            format!("{name} whose first scan with points has the fingerprint {fingerprint:.12}")
+        }
+        None => format!("{name} without points in its first scans"),
+    }
 }
 
 /// An input goes on as it was begun.
@@ -382,8 +414,9 @@ fn check_crs(args: &BuildArgs, found: Option<&String>, own: Option<&String>) -> 
     match (found, own) {
         (Some(found), Some(own)) if found != own => {
             let reason = format!(
-                "its coordinates are in {found:.80}, those of the map in {own:.80}; convert them first, for \
-                 instance with pdal"
+                "its coordinates are in {}, those of the map in {}; convert them first, for instance with pdal",
+                beginning_or_difference(found, own),
+                beginning_or_difference(own, found)
             );
             Err(Error::argument(args.scans.display().to_string(), reason))
         }

@@ -1,5 +1,6 @@
 //! Files of poses: [`Trajectory`] reads them and tells the pose at a time.
 
+mod binary;
 mod calib;
 mod gap;
 mod header;

@@ -1,3 +1,4 @@
+use super::binary::check_text;
 use super::header::Roles;
 use super::matrix::matrix_of;
 use super::pose_rows::{PoseRows, Row};
@@ -24,6 +25,7 @@ enum Layout {
 
 /// Reads the poses of a text.
 pub(super) fn read(path: &Path, poses: &mut PoseRows) -> error::Result<()> {
+    check_text(path)?;
     let mut lines = Lines::open(path)?;
     let mut names: Option<Roles> = None;
     let mut text = TextPoses::default();

@@ -5,6 +5,7 @@ use super::pose_lookup::PoseLookup;
 use super::pose_track::PoseTrack;
 use super::recording::{Recording, Topic};
 use super::sample_spool::SampleSpool;
+use super::second_parent::SecondParent;
 use super::transforms::{Transforms, WhyNot};
 use crate::error::{Error, Result};
 use crate::pose::RigidPose;
@@ -36,6 +37,9 @@ const MAX_NAME_BYTES: usize = 256;
 const MAX_REASONS: usize = 100;
 /// The frames that a robot moves by, if a pose does not name its own.
 const BASE_FRAMES: [&str; 2] = ["base_link", "base_footprint"];
+/// Second parents of frames that are reported, and links among which they are looked for.
+const MOST_SECONDS: usize = 8;
+const MOST_CHECKED: usize = 2000;
 
 impl BagPoses {
     /// Reads all transforms, and the poses of a topic if these are asked for.
@@ -90,13 +94,15 @@ impl BagPoses {
         odometry: Option<usize>,
         budget: &Budget,
     ) -> Result<()> {
-        let (mut bad, mut first_bad, mut invalid, mut beyond) = (0_u64, None, 0_u64, 0_u64);
+        let (mut bad, mut first_bad, mut beyond) = (0_u64, None, 0_u64);
         let mut note = |what: String| {
             bad += 1;
             first_bad.get_or_insert(what);
         };
+        let (mut invalid, mut first_invalid) = (0_u64, None);
+        let (mut checked, mut seconds): (usize, Vec<SecondParent>) = (0, Vec::new());
         let share = budget.bytes / 2;
-        let (mut links, mut in_memory, mut spool) = (0, 0, None);
+        let (mut links, mut in_memory, mut spool) = (0_usize, 0, None);
         let transforms = Arc::make_mut(&mut self.transforms);
         recording.begin(wanted)?;
         loop {
@@ -135,15 +141,27 @@ impl BagPoses {
                 }
                 let StampedPose { header, child_frame, parent_from_child } = pose;
                 let (parent, stamp_ns) = (header.frame_id.as_str(), header.stamp_ns);
+                // A frame that has many parents loses one for the next.
+                let parents = transforms.parents_of(&child_frame);
                 let is_new = !transforms.has_link(parent, &child_frame);
                 if is_new && (links >= MAX_LINKS || parent.len().max(child_frame.len()) > MAX_NAME_BYTES) {
                     beyond += 1;
                     return;
                 }
-                let is_taken =
-                    transforms.insert(parent, &child_frame, stamp_ns, parent_from_child, is_static);
-                links += usize::from(is_new && is_taken);
-                invalid += u64::from(!is_taken);
+                match transforms.insert(parent, &child_frame, stamp_ns, parent_from_child, is_static) {
+                    Ok(false) => {}
+                    Ok(true) => {
+                        links += transforms.parents_of(&child_frame).saturating_sub(parents);
+                        checked += 1;
+                        if checked <= MOST_CHECKED && seconds.len() < MOST_SECONDS {
+                            seconds.extend(transforms.second_parent(parent, &child_frame));
+                        }
+                    }
+                    Err(why) => {
+                        invalid += 1;
+                        first_invalid.get_or_insert(why);
+                    }
+                }
             });
             if let Err(error) = decoded {
                 note(format!("{}: {error}", topic.name));
@@ -162,11 +180,10 @@ impl BagPoses {
                  {MAX_NAME_BYTES} bytes"
             ));
         }
-        if invalid > 0 {
-            let remark =
-                "transforms are not valid (numbers, frames without a name or in themselves) and left out";
-            self.remarks.push(format!("{invalid} {remark}"));
+        if let Some(first) = first_invalid {
+            self.remarks.push(format!("{invalid} transforms are not valid and left out; the first: {first}"));
         }
+        self.remarks.extend(seconds.into_iter().map(told));
         Ok(())
     }
 
@@ -219,7 +236,7 @@ impl BagPoses {
         if !self.transforms.knows(sensor_frame) {
             return Err(WhyNot::UnknownFrame(sensor_frame.to_owned()));
         }
-        let chain = self.transforms.ancestors(sensor_frame)?;
+        let chain = self.transforms.ancestors(sensor_frame);
         if let Some(known) =
             ["map", "odom"].into_iter().find(|known| chain.iter().any(|frame| frame == known))
         {
@@ -229,7 +246,7 @@ impl BagPoses {
         if !chain.iter().any(|frame| self.transforms.is_moving(frame)) {
             return Err(WhyNot::NothingMoves(sensor_frame.to_owned()));
         }
-        chain.last().cloned().ok_or_else(|| WhyNot::UnknownFrame(sensor_frame.to_owned()))
+        Ok(self.transforms.root_of(sensor_frame))
     }
 
     /// Puts the poses of a topic among the transforms, in the place of those of the same frame.
@@ -244,8 +261,9 @@ impl BagPoses {
             self.fixed_frame = Some(parent.clone());
         }
         let count = poses.len() as u64;
-        if !transforms.attach(&parent, &child, poses) {
-            odd += count;
+        match transforms.attach(&parent, &child, poses) {
+            Ok(_) => self.remarks.extend(transforms.second_parent(&parent, &child).map(told)),
+            Err(_) => odd += count,
         }
         if odd > 0 {
             let remark = format!(
@@ -262,7 +280,7 @@ impl BagPoses {
 
     /// The frame that poses without a name are of: the base of the robot that carries the sensor, or the sensor.
     fn base_of(&self, sensor_frame: &str) -> String {
-        let chain = self.transforms.ancestors(sensor_frame).unwrap_or_default();
+        let chain = self.transforms.ancestors(sensor_frame);
         let base = BASE_FRAMES.into_iter().find(|base| chain.iter().any(|frame| frame == base));
         base.unwrap_or(sensor_frame).to_owned()
     }
@@ -272,4 +290,8 @@ impl BagPoses {
         let without = self.without.iter().map(|(why, count)| format!("{count} clouds have no pose: {why}"));
         self.remarks.iter().cloned().chain(without)
     }
+}
+
+fn told(second: SecondParent) -> String {
+    format!("{second}; a parent that a single transform names, or that makes a loop, does not count")
 }

@@ -1,5 +1,6 @@
 use super::messages::StampedPose;
 use super::samples::Samples;
+use super::transforms::is_pose;
 
 /// The poses of a topic, all of one frame in another. Every message of a path tells all the way so far: a pose is kept
 /// once for each stamp, whatever the number of messages that tell it.
@@ -20,7 +21,7 @@ impl PoseTrack {
     pub(super) fn insert(&mut self, pose: StampedPose) {
         let StampedPose { header, child_frame, parent_from_child } = pose;
         let parent = header.frame_id;
-        if parent.is_empty() || parent == child_frame || !parent_from_child.is_valid() {
+        if parent.is_empty() || parent == child_frame || !is_pose(&parent_from_child) {
             self.odd += 1;
             return;
         }
@@ -64,5 +65,20 @@ mod tests {
             track.insert(pose(track.odd as i64, parent, x_m));
         }
         assert_eq!((track.parent.as_str(), track.poses.len(), track.odd), ("odom", 2, 3));
+        // As if memory were full.
+        assert_eq!(track.poses.drain().len(), 2);
+        track.insert(pose(9, "map", 5.0));
+        assert_eq!((track.parent.as_str(), track.odd), ("odom", 4));
+    }
+
+    #[test]
+    fn a_pose_is_one_as_those_of_transforms_are() {
+        let mut track = PoseTrack::default();
+        for length in [1.0, 0.95, 0.5, 0.0, f64::INFINITY] {
+            let mut pose = pose(0, "odom", 1.0);
+            pose.parent_from_child.quaternion = [0.0, 0.0, 0.0, length];
+            track.insert(pose);
+        }
+        assert_eq!((track.poses.len(), track.odd), (1, 3));
     }
 }

@@ -54,11 +54,15 @@ impl SampleSpool {
 
     /// Takes samples out of memory.
     pub(super) fn take<'s>(&mut self, all: impl Iterator<Item = &'s mut Samples>) -> Result<()> {
-        for samples in all.filter(|samples| !samples.is_empty()) {
+        for samples in all {
+            let mut drained = samples.drain();
+            if drained.len() == 0 {
+                continue;
+            }
             let number = *samples.number.get_or_insert(self.numbers);
             self.numbers = self.numbers.max(number.saturating_add(1));
             let round = self.rounds;
-            samples.drain().try_for_each(|sample| self.sorter.push(Spooled { number, round, sample }))?;
+            drained.try_for_each(|sample| self.sorter.push(Spooled { number, round, sample }))?;
         }
         self.rounds += 1;
         Ok(())
@@ -116,6 +120,8 @@ mod tests {
             if k % 37 == 0 {
                 spool.take(filed.iter_mut()).unwrap();
             }
+            assert_eq!(memory[which].has_several(), filed[which].has_several());
+            assert_eq!(memory[which].is_empty(), filed[which].is_empty());
         }
         spool.finish(filed.iter_mut()).unwrap();
         for (memory, filed) in memory.iter().zip(&filed) {

@@ -9,6 +9,8 @@ pub(super) struct Samples {
     memory: BTreeMap<i64, RigidPose>,
     /// In strict order of time. Samples are here or in memory.
     filed: PoseList,
+    /// The first and the last stamp of samples that wait to be sorted.
+    waiting: Option<(i64, i64)>,
     /// Its number among the samples that wait to be sorted.
     pub(super) number: Option<u32>,
 }
@@ -22,12 +24,19 @@ impl Samples {
         self.memory.insert(stamp_ns, pose);
     }
 
+    /// Number of samples; those that wait to be sorted are not counted.
     pub(super) fn len(&self) -> usize {
         self.memory.len() + self.filed.len()
     }
 
     pub(super) fn is_empty(&self) -> bool {
-        self.len() == 0
+        self.len() == 0 && self.waiting.is_none()
+    }
+
+    /// Whether there are samples of more than one stamp.
+    pub(super) fn has_several(&self) -> bool {
+        let all = joined(ends(&self.memory), self.waiting);
+        self.filed.len() > 1 || all.is_some_and(|(first_ns, last_ns)| first_ns < last_ns)
     }
 
     pub(super) fn around(&self, stamp_ns: i64) -> Result<Around> {
@@ -52,21 +61,35 @@ impl Samples {
         }
     }
 
-    /// Forgets the older half of the samples in memory.
+    /// Forgets the older half of the samples in memory, and one alone.
     pub(super) fn forget_older_half(&mut self) {
-        if let Some(&middle_ns) = self.memory.keys().nth(self.memory.len() / 2) {
-            self.memory = self.memory.split_off(&middle_ns);
-        }
+        let middle = self.memory.len().div_ceil(2);
+        self.memory = match self.memory.keys().nth(middle) {
+            Some(&middle_ns) => self.memory.split_off(&middle_ns),
+            None => BTreeMap::new(),
+        };
     }
 
-    /// Takes the samples out of memory.
-    pub(super) fn drain(&mut self) -> impl Iterator<Item = TimedPose> + use<> {
-        let samples = std::mem::take(&mut self.memory).into_iter();
-        samples.map(|(stamp_ns, pose)| TimedPose { stamp_ns, pose })
+    /// Takes the samples out of memory, to be sorted.
+    pub(super) fn drain(&mut self) -> impl ExactSizeIterator<Item = TimedPose> + use<> {
+        let samples = std::mem::take(&mut self.memory);
+        self.waiting = joined(self.waiting, ends(&samples));
+        samples.into_iter().map(|(stamp_ns, pose)| TimedPose { stamp_ns, pose })
     }
 
     /// Takes the samples that were sorted in a file.
     pub(super) fn file(&mut self, sorted: PoseList) {
-        self.filed = sorted;
+        (self.filed, self.waiting) = (sorted, None);
     }
+}
+
+/// The first and the last stamp.
+fn ends(samples: &BTreeMap<i64, RigidPose>) -> Option<(i64, i64)> {
+    Some((*samples.first_key_value()?.0, *samples.last_key_value()?.0))
+}
+
+/// The first and the last stamp of both.
+fn joined(one: Option<(i64, i64)>, other: Option<(i64, i64)>) -> Option<(i64, i64)> {
+    let Some(((first_ns, last_ns), other)) = one.zip(other) else { return one.or(other) };
+    Some((first_ns.min(other.0), last_ns.max(other.1)))
 }

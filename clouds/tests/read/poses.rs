@@ -202,3 +202,72 @@ fn real_poses_of_two_forms_agree() {
         assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-3), "{number}: {a:?} {b:?}");
     }
 }
+
+/// A file of NumPy with this header, of a version, and so many bytes.
+fn npy(version: u8, header: &str, bytes: usize) -> Vec<u8> {
+    let length = header.len() as u32;
+    let length =
+        if version == 1 { length.to_le_bytes()[..2].to_vec() } else { length.to_le_bytes().to_vec() };
+    [b"\x93NUMPY".to_vec(), vec![version, 0], length, header.as_bytes().to_vec(), vec![0; bytes]].concat()
+}
+
+#[test]
+fn an_array_that_holds_no_poses_says_what_is_expected() {
+    let folder = tempfile::tempdir().unwrap();
+    let fail = |name: &str, bytes: &[u8]| {
+        let path = folder.path().join(name);
+        fs::write(&path, bytes).unwrap();
+        Trajectory::read(&path, None).unwrap_err().to_string()
+    };
+    let header = |kind: &str, order: &str, shape: &str| {
+        format!("{{'descr': {kind}, 'fortran_order': {order}, 'shape': ({shape}), }}\n")
+    };
+    let plain = header("'<f8'", "False", "2, 8");
+    for (bytes, wanted) in [
+        (
+            npy(1, &header("'<i8'", "False", "2, 8"), 128),
+            "numbers of type `<i8`; poses are little-endian floats",
+        ),
+        (npy(2, &header("'>f8'", "False", "2, 8"), 128), "numbers of type `>f8`"),
+        (npy(1, &header("'|O'", "False", "2, 8"), 128), "numbers of type `|O`"),
+        (npy(3, &header("[('t', '<f8'), ('x', '<f8')]", "False", "2,"), 32), "is a structured array"),
+        (npy(1, &header("'<f8'", "True", "2, 8"), 128), "is in Fortran order"),
+        (npy(1, &header("'<f8'", "False", "2, 9"), 144), "has the shape (2, 9); poses are N x 8"),
+        (npy(1, &header("'<f8'", "False", ""), 8), "has the shape ()"),
+        (npy(1, &header("'<f8'", "False", "18446744073709551615, 8"), 0), "the file ends after 0 of"),
+        (npy(1, &plain, 40), "the file ends after 0 of 2 poses"),
+        (npy(1, &plain, 128), "record 0: the quaternion 0 0 0 0 has length 0.000, not 1"),
+        (npy(4, &plain, 128), "its version is none of 1, 2 and 3"),
+        (npy(1, "{}", 0), "its header names no type"),
+        (npy(1, &plain, 0)[..40].to_vec(), "the file ends within its header"),
+        (npy(2, &plain, 0)[..9].to_vec(), "the file ends within its header"),
+        (npy(1, &plain, 0)[..7].to_vec(), "is no array of NumPy, which its name says"),
+        (Vec::new(), "is no array of NumPy"),
+        (TUM.as_bytes().to_vec(), "is no array of NumPy"),
+        (b"\x80\x04\x95numpy".to_vec(), "is no array of NumPy"),
+    ] {
+        let error = fail("poses.NPY", &bytes);
+        assert!(error.contains("poses.NPY") && error.contains(wanted), "{error}\n{wanted}");
+    }
+    for (name, bytes, wanted) in [
+        (
+            "poses.npz",
+            &b"PK\x03\x04rest"[..],
+            "is an archive (.zip, .npz), not a text of poses: save one array",
+        ),
+        ("poses.csv.gz", b"\x1f\x8b\x08\x00", "is packed (gzip), not a text of poses: unpack it first"),
+        (
+            "drive.bag",
+            b"#ROSBAG V2.0\n",
+            "is a recording (.bag), not a text of poses: give the recording itself",
+        ),
+        ("drive.mcap", b"\x89MCAP0\r\n", "is a recording (.mcap)"),
+        ("drive.db3", b"SQLite format 3\0", "is a database"),
+        ("poses.csv", b"\xff\xfe1\0 \0", "is text in UTF-16"),
+        ("poses.bin", &1.5_f64.to_le_bytes(), "is binary, not a text of poses: save the poses as text"),
+    ] {
+        let error = fail(name, bytes);
+        assert!(error.contains(wanted), "{error}");
+    }
+    assert_eq!(read(&format!("\u{feff}{TUM}")).unwrap().len(), 3, "a mark of UTF-8 is none of UTF-16");
+}
