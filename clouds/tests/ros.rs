@@ -514,11 +514,11 @@ fn a_frame_with_ever_other_parents_leaves_room_for_others() {
     let tf = |at_ns, parent: &str, child: &str| {
         MessageWriter::ros1().tf(at_ns, parent, child, &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
     };
-    let mut messages: Vec<_> = (0..12_000).map(|k| (1, k, tf(k, &format!("p{}", k % 40), "flag"))).collect();
-    messages.extend((0..2).map(|k| (1, 20_000 + k, tf(20_000 + k, "map", "lidar"))));
+    let mut messages: Vec<_> = (0..20_000).map(|k| (1, k, tf(k, &format!("p{}", k % 40), "flag"))).collect();
+    messages.extend((0..2).map(|k| (1, 30_000 + k, tf(30_000 + k, "map", "lidar"))));
     let fields = [("x", 0, F32), ("y", 4, F32), ("z", 8, F32)];
     let point = [[1.0_f32, 1.0, 2.0].map(f32::to_le_bytes).concat()];
-    messages.push((0, 20_001, MessageWriter::ros1().point_cloud2(20_001, "lidar", &fields, &point)));
+    messages.push((0, 30_001, MessageWriter::ros1().point_cloud2(30_001, "lidar", &fields, &point)));
     let topics = [("/points", "sensor_msgs/PointCloud2"), ("/tf", "tf2_msgs/TFMessage")];
     std::fs::write(&path, bag1(&topics, &messages)).unwrap();
     for memory_bytes in [0, 64 << 20] {
