@@ -287,3 +287,28 @@ pub(crate) fn is_of_medium(error: &io::Error) -> bool {
     const OF_MEDIUM: [i32; 6] = [23, 27, 30, 1117, 1392, 1393];
     error.raw_os_error().is_some_and(|code| OF_MEDIUM.contains(&code))
 }
+/// The beginning of a text that is not another one; where both begin alike, the part that differs.
+pub(crate) fn beginning_or_difference(text: &str, other: &str) -> String {
+    const MAX_CHARS: usize = 80;
+    let common = text.chars().zip(other.chars()).take_while(|(a, b)| a == b).count();
+    if common < MAX_CHARS {
+        return text.chars().take(MAX_CHARS).collect();
+    }
+    let from = common - MAX_CHARS / 2;
+    let part: String = text.chars().skip(from).take(MAX_CHARS).collect();
+    format!("..{part} (from character {} on)", from + 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_long_texts_that_begin_alike_are_shown_where_they_differ() {
+        let [a, b] = ["a", "b"].map(|end| "x".repeat(200) + end);
+        let parts = [beginning_or_difference(&a, &b), beginning_or_difference(&b, &a)];
+        assert!(parts[0] != parts[1] && parts[0].ends_with("xa (from character 161 on)"), "{parts:?}");
+        assert_ne!(beginning_or_difference(&a, &a[..200]), beginning_or_difference(&a[..200], &a));
+        assert_eq!(beginning_or_difference("EPSG:25832", "EPSG:25833"), "EPSG:25832");
+    }
+}

@@ -42,8 +42,8 @@ impl CloudPoint {
     }
 }
 
-/// Where a sensor was at a time in nanoseconds, if that is known.
-pub type PoseAt = Box<dyn Fn(i64) -> Option<RigidPose> + Send>;
+/// Where a sensor was at a time in nanoseconds, if that is known. It may have to read a file.
+pub type PoseAt = Box<dyn Fn(i64) -> Result<Option<RigidPose>> + Send>;
 
 /// Clouds one at a time, in order. Memory does not grow with their number, nor with the points of a cloud where the
 /// format allows it.

@@ -20,6 +20,7 @@ pub mod poses;
 pub mod read;
 #[cfg(feature = "ros")]
 pub mod ros;
+mod spill;
 mod stamp;
 pub mod write;
 
@@ -27,4 +28,5 @@ pub use cloud::{CloudHead, CloudPoint, CloudSource, PoseAt};
 pub use deskew::Deskew;
 pub use error::{Error, Place, Result};
 pub use pose::RigidPose;
+pub use spill::Budget;
 pub use stamp::in_name as stamp_of_name;

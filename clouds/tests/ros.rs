@@ -253,6 +253,48 @@ fn messages_come_in_the_order_in_which_they_were_recorded() {
     }
 }
 
+/// What does not fit in memory is read from temporary files, and is the same.
+#[test]
+fn little_memory_gives_the_same_clouds() {
+    let folder = tempfile::tempdir().unwrap();
+    let large = folder.path().join("large.bag");
+    std::fs::write(&large, large_bag()).unwrap();
+    let options = |poses| BagOptions { poses, ..topic("/points") };
+    for path in recordings().map(data).chain([large]) {
+        for poses in [PoseSource::Tf, PoseSource::None] {
+            let much = read(std::slice::from_ref(&path), &options(poses));
+            let little = BagOptions { memory_bytes: 0, ..options(poses) };
+            let found = read(std::slice::from_ref(&path), &little);
+            // As text, in which NaN is NaN.
+            assert!(format!("{found:?}") == format!("{much:?}"), "{}", path.display());
+            assert!(much.0.len() > 1, "{}", path.display());
+        }
+    }
+}
+
+/// Clouds of many points, in rows with bytes between them and without, and one that is cut off; transforms.
+fn large_bag() -> Vec<u8> {
+    const POINT_BYTES: usize = 23;
+    let cloud = |height: u32, row_bytes: usize, data_bytes: usize| {
+        let message = MessageWriter::ros1().header(1_000_000_000, "lidar").u32(height).u32(5000).u32(4);
+        let fields = [("x", 0, F32), ("y", 4, F32), ("z", 8, F32), ("intensity", 15, F32)];
+        let message = fields.iter().fold(message, |message, &(name, offset, kind)| {
+            message.text(name).u32(offset).number([kind]).u32(1)
+        });
+        let data: Vec<u8> =
+            (0..data_bytes).map(|k| if k % 4 == 3 { 64 } else { (k * 7919 / 13) as u8 }).collect();
+        message.number([0]).u32(POINT_BYTES as u32).u32(row_bytes as u32).sized(&data).number([1]).done()
+    };
+    let row = 5000 * POINT_BYTES;
+    let tf =
+        |at_ns: i64| MessageWriter::ros1().tf(at_ns, "map", "lidar", &[1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]);
+    let mut messages: Vec<_> = (0..3000).map(|k| (1, k, tf(999_998_000 + 7919 * k % 3000))).collect();
+    messages.push((0, 10, cloud(2, row, 2 * row)));
+    messages.push((0, 11, cloud(3, row + 5, 3 * row + 10)));
+    messages.push((0, 12, cloud(3, row, 2 * row + 77)));
+    bag1(&[("/points", "sensor_msgs/PointCloud2"), ("/tf", "tf2_msgs/TFMessage")], &messages)
+}
+
 #[test]
 fn parts_of_a_split_recording_are_one() {
     let (clouds, errors, _) = read(&[data("none.bag"), data("bz2.bag")], &topic("/points"));
@@ -420,6 +462,70 @@ fn a_split_bag_is_one_recording() {
             }
         }
         assert_eq!(remarks, ["1 clouds have no pose: the stamp is after the last transform of base_link"]);
+    }
+}
+
+#[test]
+fn a_transform_that_makes_a_loop_costs_a_recording_no_pose() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("loop.bag");
+    let (start_ns, still) = (1_700_000_000_000_000_000, [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]);
+    let at = |tick: i64| start_ns + tick * 20_000_000;
+    let tf = |stamp_ns, parent: &str, child: &str| MessageWriter::ros1().tf(stamp_ns, parent, child, &still);
+    let fields = [("x", 0, F32), ("y", 4, F32), ("z", 8, F32)];
+    let point = [[1.0_f32, 1.0, 2.0].map(f32::to_le_bytes).concat()];
+    let write = |wrong: &[(&str, &str)]| {
+        let mut messages = vec![(2, at(0), tf(0, "base", "lidar"))];
+        for tick in 0..50 {
+            messages.push((1, at(tick), tf(at(tick), "map", "base")));
+            if tick == 25 {
+                messages.extend(wrong.iter().map(|(parent, child)| (1, at(25), tf(at(25), parent, child))));
+            }
+            if tick < 49 {
+                let cloud =
+                    MessageWriter::ros1().point_cloud2(at(tick) + 7_000_000, "lidar", &fields, &point);
+                messages.push((0, at(tick), cloud));
+            }
+        }
+        let tf = "tf2_msgs/TFMessage";
+        let topics = [("/points", "sensor_msgs/PointCloud2"), ("/tf", tf), ("/tf_static", tf)];
+        std::fs::write(&path, bag1(&topics, &messages)).unwrap();
+        let (clouds, errors, remarks) = read(from_ref(&path), &BagOptions::default());
+        let little = read(from_ref(&path), &BagOptions { memory_bytes: 0, ..BagOptions::default() });
+        assert!(format!("{little:?}") == format!("{:?}", (&clouds, &errors, &remarks)), "{:?}", little.2);
+        let posed = clouds.iter().filter(|(head, _)| head.world_from_sensor.is_some()).count();
+        (posed, errors, remarks)
+    };
+    assert_eq!(write(&[]), (49, Vec::new(), Vec::new()));
+    for wrong in [[("lidar", "map"), ("base", "map")], [("lidar", "base"), ("elsewhere", "lidar")]] {
+        let (posed, errors, remarks) = write(&wrong);
+        assert_eq!((posed, errors), (49, Vec::new()), "{remarks:?}");
+        assert!(remarks.iter().any(|remark| remark.contains("which makes a loop")), "{remarks:?}");
+    }
+    let (posed, _, remarks) = write(&[("", "base"), ("base", "/base")]);
+    assert_eq!(posed, 49);
+    assert_eq!(remarks, ["2 transforms are not valid and left out; the first: a frame has no name"]);
+}
+
+#[test]
+fn a_frame_with_ever_other_parents_leaves_room_for_others() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("parents.bag");
+    let tf = |at_ns, parent: &str, child: &str| {
+        MessageWriter::ros1().tf(at_ns, parent, child, &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+    };
+    let mut messages: Vec<_> = (0..20_000).map(|k| (1, k, tf(k, &format!("p{}", k % 40), "flag"))).collect();
+    messages.extend((0..2).map(|k| (1, 30_000 + k, tf(30_000 + k, "map", "lidar"))));
+    let fields = [("x", 0, F32), ("y", 4, F32), ("z", 8, F32)];
+    let point = [[1.0_f32, 1.0, 2.0].map(f32::to_le_bytes).concat()];
+    messages.push((0, 30_001, MessageWriter::ros1().point_cloud2(30_001, "lidar", &fields, &point)));
+    let topics = [("/points", "sensor_msgs/PointCloud2"), ("/tf", "tf2_msgs/TFMessage")];
+    std::fs::write(&path, bag1(&topics, &messages)).unwrap();
+    for memory_bytes in [0, 64 << 20] {
+        let (clouds, _, remarks) =
+            read(from_ref(&path), &BagOptions { memory_bytes, ..BagOptions::default() });
+        assert!(clouds[0].0.world_from_sensor.is_some(), "{remarks:?}");
+        assert!(!remarks.iter().any(|remark| remark.contains("are left out")), "{remarks:?}");
     }
 }
 

@@ -6,12 +6,14 @@ use crate::command::intake::{Intake, Next, RayNeeds, Taken};
 use crate::command::map_at::whole_map;
 use crate::command::progress::Progress;
 use crate::command::read_options::read_options;
+use crate::command::scan_input::is_standard_input;
 use crate::command::scan_queue::{ScanQueue, WhenBehind};
 use crate::command::scan_reader::{Marking, ScanReader};
 use crate::command::stop_signal;
 use crate::command::summary::Summary;
 use crate::command::watch::Watch;
 use crate::command::{INTERRUPTED, say};
+use crate::error::beginning_or_difference;
 use crate::io::{PointRoom, ReadOptions, ScanMark};
 use crate::mapper::{MapReader, MapView, Mapper, OutOfCoreTileMapper};
 use crate::scan::{ScanPoints, ScanReport};
@@ -21,6 +23,12 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::Instant;
+
+/// The share of the limit of memory that reading may take, beside the points of scans: chunks and messages of
+/// recordings, poses, the sorting of LAS.
+const PARTS_FOR_READING: usize = 32;
+/// Reading has so much at least. What it has beyond that is taken from the map.
+const LEAST_FOR_READING: usize = 4 << 20;
 
 /// The share of the limit of memory that the points of scans may take, as they are read and as they are mapped.
 const PARTS_OF_MEMORY: usize = 32;
@@ -56,6 +64,7 @@ pub fn build(args: &BuildArgs, watch: &Watch) -> anyhow::Result<Option<Summary>>
     let most_together = most_together(args, &config);
     let opened = ScanReader::open(args.scans.clone(), options_of(args, &config)?, room, mark, stop.clone())?;
     let Some((reader, input)) = opened else { return Ok(None) };
+    let config = config_of_map(args, &config);
     let needs = RayNeeds { grid: config.grid, sensor_model: config.sensor_model };
     let mut intake = Intake::new(reader, args.scans.clone(), args.skip_bad, (!args.no_rays).then_some(needs));
     let mut mapper = match exists {
@@ -202,6 +211,9 @@ impl Build<'_> {
 fn options_of(args: &BuildArgs, config: &MapConfig) -> crate::Result<ReadOptions> {
     let mut options = read_options(&args.read)?;
     options.open.scratch = Some(folder_beside(args).to_owned());
+    if let MemoryLimit::Bytes(bytes) = config.memory {
+        options.open.memory_bytes = for_reading(bytes);
+    }
     options.clouds.has_no_returns = config.rays.no_return_range_m.is_some();
     if args.no_rays && options.poses.is_none() {
         options.clouds.may_lack_poses = true;
@@ -343,14 +355,45 @@ fn begin(
     // A map that was merged of others has tiles, and knows of no scans.
     let is_empty = mapper.scan_number() == 0 && mapper.tile_bounds().is_none();
     if args.resume && !args.append && !is_empty {
-        let found = inputs.last().map_or("that it does not know".to_owned(), |last| last.name.clone());
-        let (path, what, wanted) = (args.output.clone(), "been built from input", name.to_owned());
-        return Err(Error::Mismatch { path, what, found, wanted }.into());
+        let same = inputs.iter().rfind(|input| input.is_named(name) && input.content.is_some());
+        let (found, wanted) = match same.or(inputs.last()) {
+            None => ("that it does not know".to_owned(), name.to_owned()),
+            Some(known) => match known.content {
+                // Its name is a fingerprint.
+                None => {
+                    let Some(fingerprint) = intake.fingerprint()? else { return Ok(None) };
+                    (known.name.clone(), fingerprint.map_or(name.to_owned(), |of| format!("{of} ({name})")))
+                }
+                Some(_) if known.is_named(name) => (
+                    beginning(&known.name, known.begins_with()),
+                    format!(
+                        "{}: the input was replaced or its beginning has changed",
+                        beginning(name, intake.begins_with())
+                    ),
+                ),
+                Some(_) => (known.name.clone(), name.to_owned()),
+            },
+        };
+        let (path, what) = (args.output.clone(), "been built from input");
+        let error = anyhow::Error::from(Error::Mismatch { path, what, found, wanted });
+        return Err(error.context(
+            "--resume takes what came since of an input that the map has; --append adds another one",
+        ));
     }
     let content = args.piece_of.is_none().then(|| intake.content());
     let (rays, is_hits_alone) = (Some(mapper.config().rays), Some(args.no_rays));
     mapper.begin_input(InputRecord { content, rays, is_hits_alone, ..InputRecord::from(name) })?;
     Ok(Some(0))
+}
+
+/// An input by what tells it from others of its name.
+fn beginning(name: &str, begins_with: Option<&str>) -> String {
+    match begins_with {
+        Some(fingerprint) => {
+            format!("{name} whose first scan with points has the fingerprint {fingerprint:.12}")
+        }
+        None => format!("{name} without points in its first scans"),
+    }
 }
 
 /// An input goes on as it was begun.
@@ -371,8 +414,9 @@ fn check_crs(args: &BuildArgs, found: Option<&String>, own: Option<&String>) -> 
     match (found, own) {
         (Some(found), Some(own)) if found != own => {
             let reason = format!(
-                "its coordinates are in {found:.80}, those of the map in {own:.80}; convert them first, for \
-                 instance with pdal"
+                "its coordinates are in {}, those of the map in {}; convert them first, for instance with pdal",
+                beginning_or_difference(found, own),
+                beginning_or_difference(own, found)
             );
             Err(Error::argument(args.scans.display().to_string(), reason))
         }
@@ -392,6 +436,23 @@ fn taken_before(args: &BuildArgs, name: &str, scans: u64) -> anyhow::Error {
 /// may keep its own in memory.
 fn folder_beside(args: &BuildArgs) -> &Path {
     args.output.ancestors().find(|folder| folder.is_dir()).unwrap_or(Path::new("."))
+}
+
+/// The memory for reading, of a limit of so many bytes.
+fn for_reading(bytes: usize) -> usize {
+    (bytes / PARTS_FOR_READING).max(LEAST_FOR_READING)
+}
+
+/// The configuration of the map, which leaves the memory for reading alone.
+fn config_of_map(args: &BuildArgs, config: &MapConfig) -> MapConfig {
+    let mut config = config.clone();
+    if let MemoryLimit::Bytes(bytes) = config.memory
+        && !is_standard_input(&args.scans)
+    {
+        let least = MemoryLimit::least_bytes(&config.grid).min(bytes);
+        config.memory = MemoryLimit::Bytes((bytes - (for_reading(bytes) - LEAST_FOR_READING)).max(least));
+    }
+    config
 }
 
 /// Points of a scan that the limit of memory has no room for go to a file.

@@ -59,10 +59,10 @@ pub fn poses_for(from: &PoseFile<'_>, scans: &[KeptRecord]) -> Result<NewPoses> 
     let is_plain = calib.is_none() && body_from_sensor.is_none();
     let trajectory = Trajectory::read(file, calib)?;
     // Stamps that mean nothing are all the same.
-    if trajectory.span_ns().is_none_or(|[first, last]| first < last) {
+    if trajectory.span_ns()?.is_none_or(|[first, last]| first < last) {
         trajectory.remarks().iter().for_each(|remark| log::warn!("{}: {remark}", file.display()));
     }
-    if trajectory.len() == scans.len() && is_in_step(&trajectory, scans, tolerance_ns) {
+    if trajectory.len() == scans.len() && is_in_step(&trajectory, scans, tolerance_ns)? {
         // As a folder of PCD takes them, to the bit.
         if is_plain
             && let Ok(poses) = read_poses(file)
@@ -70,11 +70,15 @@ pub fn poses_for(from: &PoseFile<'_>, scans: &[KeptRecord]) -> Result<NewPoses> 
         {
             return Ok(NewPoses::InOrder(poses));
         }
-        let poses = (0..scans.len()).filter_map(|number| trajectory.by_number(number));
-        let poses = poses.map(|pose| sensor_pose(&pose, body_from_sensor.as_ref()));
-        return Ok(NewPoses::InOrder(poses.collect::<Result<_>>()?));
+        let mut poses = Vec::with_capacity(scans.len());
+        for number in 0..scans.len() {
+            if let Some(pose) = trajectory.by_number(number)? {
+                poses.push(sensor_pose(&pose, body_from_sensor.as_ref())?);
+            }
+        }
+        return Ok(NewPoses::InOrder(poses));
     }
-    if trajectory.span_ns().is_none() || scans.iter().any(|scan| scan.stamp_ns.is_none()) {
+    if !trajectory.has_stamps() || scans.iter().any(|scan| scan.stamp_ns.is_none()) {
         let reason = other_number(trajectory.len(), scans);
         return Err(Error::argument(file.display().to_string(), reason));
     }
@@ -82,10 +86,15 @@ pub fn poses_for(from: &PoseFile<'_>, scans: &[KeptRecord]) -> Result<NewPoses> 
 }
 
 /// Whether the poses are those of the scans in order, as far as time stamps tell.
-fn is_in_step(trajectory: &Trajectory, scans: &[KeptRecord], tolerance_ns: i64) -> bool {
-    let (stamps, most) = (trajectory.stamps_ns(), u64::try_from(tolerance_ns).unwrap_or(0));
-    let mut pairs = stamps.zip(scans).filter_map(|(stamp_ns, scan)| Some((stamp_ns, scan.stamp_ns?)));
-    pairs.all(|(of_pose, of_scan)| of_pose.abs_diff(of_scan) <= most)
+fn is_in_step(trajectory: &Trajectory, scans: &[KeptRecord], tolerance_ns: i64) -> Result<bool> {
+    let most = u64::try_from(tolerance_ns).unwrap_or(0);
+    for (of_pose, scan) in trajectory.stamps_ns().zip(scans) {
+        let of_pose = of_pose?;
+        if scan.stamp_ns.is_some_and(|of_scan| of_pose.abs_diff(of_scan) > most) {
+            return Ok(false);
+        }
+    }
+    Ok(true)
 }
 
 fn other_number(poses: usize, scans: &[KeptRecord]) -> String {
@@ -114,7 +123,7 @@ fn by_time(
     let (mut poses, mut missing) = (Vec::with_capacity(scans.len()), Vec::new());
     for scan in scans {
         let stamp_ns = scan.stamp_ns.unwrap_or_default();
-        match trajectory.at(stamp_ns, tolerance_ns) {
+        match trajectory.at(stamp_ns, tolerance_ns)? {
             Found::Exact(pose) | Found::Between(pose) => {
                 poses.push((scan.number, sensor_pose(&pose, body_from_sensor)?));
             }

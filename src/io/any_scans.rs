@@ -102,7 +102,10 @@ fn open_pcd(path: &Path, options: &ReadOptions) -> Result<Box<dyn ScanSource + S
     let have_own = !are_named && (count == 1 || files.iter().any(|file| is_placed(file)));
     let are_missing = !are_named && !have_own && options.clouds.may_lack_poses;
     let is_plain = options.calib.is_none() && options.clouds.is_plain() && origin_m.is_none();
-    let are_by_line = pose_file.as_deref().is_none_or(|poses| are_line_by_line(poses, &files));
+    let are_by_line = match pose_file.as_deref() {
+        Some(poses) => are_line_by_line(poses, &files, options)?,
+        None => true,
+    };
     if is_plain && are_by_line && !are_missing {
         let poses = options.poses.as_deref();
         return match path.is_dir() {
@@ -111,7 +114,7 @@ fn open_pcd(path: &Path, options: &ReadOptions) -> Result<Box<dyn ScanSource + S
         };
     }
     let poses = poses_for(path, options, have_own || origin_m.is_some(), Some(count))?;
-    let clouds = Box::new(PcdClouds::new(files, options.open.scratch.as_deref(), origin_m.is_none()));
+    let clouds = Box::new(PcdClouds::new(files, &options.open, origin_m.is_none()));
     let clouds: Box<dyn CloudSource> = match origin_m {
         Some(origin_m) => Box::new(FromOrigin::new(clouds, origin_m)?),
         None => clouds,
@@ -121,18 +124,18 @@ fn open_pcd(path: &Path, options: &ReadOptions) -> Result<Box<dyn ScanSource + S
 
 /// Whether the lines of a file of poses are those of the files, one by one. They are not where stamps tell otherwise,
 /// and where the file is of a form that only [`Trajectory`] reads.
-fn are_line_by_line(poses: &Path, files: &[PathBuf]) -> bool {
-    let trajectory = Trajectory::read(poses, None);
-    let Ok(lines) = Poses::read(poses) else {
+fn are_line_by_line(poses: &Path, files: &[PathBuf], options: &ReadOptions) -> Result<bool> {
+    let trajectory = Trajectory::read_within(poses, None, &options.open.budget());
+    let Ok(lines) = Poses::read(poses, files.len()) else {
         // What is wrong with a file that is no text of poses, is told line by line.
-        return trajectory.is_err();
+        return Ok(trajectory.is_err());
     };
     let names: Option<Vec<i64>> = files.iter().map(|file| stamp_of_name(file)).collect();
-    let span_ns = trajectory.ok().and_then(|trajectory| trajectory.span_ns());
-    let (Some(names), Some([first_ns, last_ns])) = (names, span_ns) else { return true };
+    let span_ns = trajectory.map_or(Ok(None), |trajectory| trajectory.span_ns())?;
+    let (Some(names), Some([first_ns, last_ns])) = (names, span_ns) else { return Ok(true) };
     // Clocks of which neither knows the other tell nothing.
     let are_apart = !names.iter().any(|name| (first_ns..=last_ns).contains(name));
-    lines.len() == files.len() && (are_apart || lines.have_stamps(&names))
+    Ok(lines.len() == files.len() && (are_apart || lines.have_stamps(&names)))
 }
 
 /// Where the poses of an input come from; some formats bring their own.
@@ -145,7 +148,8 @@ fn poses_for(path: &Path, options: &ReadOptions, has_own: bool, clouds: Option<u
     };
     match file {
         Some(file) => {
-            let trajectory = Trajectory::read(&file, options.calib.as_deref())?;
+            let trajectory =
+                Trajectory::read_within(&file, options.calib.as_deref(), &options.open.budget())?;
             Ok(CloudPoses::File(file, trajectory))
         }
         None if clouds == Some(1) => Ok(CloudPoses::Identity),
@@ -177,6 +181,7 @@ fn open_recording(path: &Path, options: &ReadOptions) -> Result<Box<dyn CloudSou
         fixed_frame: recording.fixed_frame.clone(),
         poses,
         most_gap_ns: Some(most_gap_ns(options.clouds.pose_tolerance_ns)),
+        memory_bytes: options.open.memory_bytes,
         scratch: options.open.scratch.clone(),
     };
     Ok(Box::new(open_bag(&[path.to_owned()], &bag)?))

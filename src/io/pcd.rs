@@ -173,6 +173,9 @@ fn read_ascii(
 /// Bytes that are read at a time.
 const BYTES_AT_A_TIME: usize = 1 << 16;
 
+/// Bytes of one field that are read at a time.
+const MAX_FIELD_BYTES: usize = 1 << 20;
+
 /// Points one after the other.
 fn read_binary(
     header: &Header,
@@ -249,8 +252,9 @@ fn read_compressed(
         return Err(wrong("the packed data is damaged".into()));
     }
     points.reserve(header.points);
-    let at_a_time = BYTES_AT_A_TIME / 8;
     let wanted: Vec<usize> = columns.xyz.into_iter().chain(columns.intensity).collect();
+    let strides = wanted.iter().map(|&column| header.fields[column].size * header.fields[column].count);
+    let at_a_time = (MAX_FIELD_BYTES / strides.max().unwrap_or(1)).clamp(1, BYTES_AT_A_TIME / 8);
     let mut values = vec![Vec::new(); wanted.len()];
     for first in (0..header.points).step_by(at_a_time) {
         let count = at_a_time.min(header.points - first);

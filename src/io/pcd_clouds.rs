@@ -2,7 +2,8 @@ use super::file_order::name_of;
 use super::pcd::read_pcd_file;
 use super::pcd_viewpoint::viewpoint_of_file;
 use super::point_store::{PointRoom, PointStore};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
+use voxtile_clouds::read::OpenOptions;
 use voxtile_clouds::{CloudHead, CloudPoint, CloudSource, RigidPose, stamp_of_name};
 
 /// PCD files as clouds, for poses and options that [`PcdFolder`](super::pcd_folder::PcdFolder) does not know.
@@ -14,14 +15,11 @@ pub(super) struct PcdClouds {
     points: PointStore,
 }
 
-/// Bytes of memory for the points of a file; more go to a temporary file.
-const ROOM_BYTES: usize = 64 << 20;
-
 impl PcdClouds {
-    /// Points beyond the room go to a file in `scratch`; `None` is the system's folder for temporary files.
-    pub(super) fn new(files: Vec<PathBuf>, scratch: Option<&Path>, takes_identity: bool) -> Self {
-        let folder = scratch.map_or_else(std::env::temp_dir, Path::to_owned);
-        let points = PointStore::new(PointRoom::new(ROOM_BYTES, &folder));
+    /// Points beyond the memory for reading go to a temporary file.
+    pub(super) fn new(files: Vec<PathBuf>, open: &OpenOptions, takes_identity: bool) -> Self {
+        let folder = open.scratch.clone().unwrap_or_else(std::env::temp_dir);
+        let points = PointStore::new(PointRoom::new(open.memory_bytes, &folder));
         Self { files, takes_identity, next: 0, points }
     }
 }

@@ -38,6 +38,9 @@ pub(super) struct Header {
 /// A longer header is an error.
 pub(super) const MOST_HEADER_BYTES: usize = 1 << 16;
 
+/// A larger point is an error: as many bytes are read at a time.
+const MAX_POINT_BYTES: usize = 1 << 20;
+
 const KEYS: [&str; 11] = [
     "VERSION",
     "FIELDS",
@@ -118,6 +121,10 @@ impl Header {
             }
             fields.push(Field { name: name.clone(), size, kind, count, offset, first_value });
             (offset, first_value) = (offset + size * count, first_value + count);
+            if offset > MAX_POINT_BYTES {
+                let reason = format!("a point has more than {MAX_POINT_BYTES} bytes up to field {name}");
+                return Err(FormatError::at_line(sizes_line, reason));
+            }
         }
         let points = number_of_points(&find, data_line)?;
         let world_from_sensor = match find("VIEWPOINT") {

@@ -1,6 +1,9 @@
 use crate::error::FormatError;
 use crate::space::Point;
-use std::io::{self, BufRead};
+use std::io::{self, BufRead, Read};
+
+/// A longer line is an error.
+const MAX_LINE_BYTES: u64 = 1 << 16;
 
 /// Reads points, one per line: x y z in metres, separated by blanks or commas; more columns are ignored. Empty lines,
 /// lines that start with `#` and a first line of words are skipped.
@@ -8,11 +11,21 @@ use std::io::{self, BufRead};
 /// # Errors
 ///
 /// A line without three numbers; the outer error is the stream's.
-pub fn read_points(input: impl BufRead) -> io::Result<Result<Vec<Point>, FormatError>> {
-    let mut points = Vec::new();
-    for (number, line) in (1..).zip(input.lines()) {
-        let line = line?;
-        let line = line.trim();
+pub fn read_points(mut input: impl BufRead) -> io::Result<Result<Vec<Point>, FormatError>> {
+    let (mut points, mut bytes) = (Vec::new(), Vec::new());
+    for number in 1.. {
+        bytes.clear();
+        let read = (&mut input).take(MAX_LINE_BYTES).read_until(b'\n', &mut bytes)?;
+        if read == 0 {
+            break;
+        }
+        if read as u64 == MAX_LINE_BYTES {
+            let reason = format!("the line is longer than {} KiB", MAX_LINE_BYTES >> 10);
+            return Ok(Err(FormatError::at_line(number, reason)));
+        }
+        let text =
+            str::from_utf8(&bytes).map_err(|error| io::Error::new(io::ErrorKind::InvalidData, error))?;
+        let line = text.trim();
         if line.is_empty() || line.starts_with('#') {
             continue;
         }

@@ -60,7 +60,7 @@ pub(super) fn poses_of(
         None => folder.and_then(pose_file_for),
     };
     if let Some(path) = path {
-        let poses = Poses::read(&path)?;
+        let poses = Poses::read(&path, files.len())?;
         poses.check(&path, files)?;
         return Ok((PoseSource::File(path), Some(poses.into_poses())));
     }

@@ -4,6 +4,7 @@ use super::source::{ScanHead, ScanSource};
 use crate::error::{Error, FormatError, Result};
 use crate::scan::{Pose, no_return};
 use crate::space::Point;
+use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 use voxtile_clouds::poses::{Found, Trajectory};
 use voxtile_clouds::{CloudHead, CloudPoint, CloudSource, Deskew, Place, PoseAt, RigidPose};
@@ -98,7 +99,7 @@ impl PosedClouds {
             return Err(Error::argument("--deskew, --world-frame", reason));
         }
         if let CloudPoses::File(_, trajectory) = &poses
-            && trajectory.span_ns().is_none()
+            && !trajectory.has_stamps()
         {
             trajectory.check_clouds(&*source)?;
         }
@@ -131,8 +132,8 @@ impl PosedClouds {
             (CloudPoses::Source, _) => {
                 head.world_from_sensor.ok_or_else(|| "the input has none for it".to_owned())
             }
-            (CloudPoses::File(_, trajectory), Some(stamp_ns)) if trajectory.span_ns().is_some() => {
-                match trajectory.at(stamp_ns, tolerance_ns) {
+            (CloudPoses::File(_, trajectory), Some(stamp_ns)) if trajectory.has_stamps() => {
+                match trajectory.at(stamp_ns, tolerance_ns)? {
                     Found::Exact(pose) | Found::Between(pose) => Ok(pose),
                     Found::Gap { gap_ns } => {
                         let gap_s = gap_ns as f64 * 1e-9;
@@ -161,7 +162,7 @@ impl PosedClouds {
     fn poses_left(&self) -> Option<u64> {
         let CloudPoses::File(_, trajectory) = &self.poses else { return None };
         let left = (trajectory.len() as u64).saturating_sub(self.number);
-        (self.is_at_end && trajectory.span_ns().is_none() && left > 0).then_some(left)
+        (self.is_at_end && !trajectory.has_stamps() && left > 0).then_some(left)
     }
 
     fn note_without_pose(&mut self, head: &CloudHead, why: &str) {
@@ -200,9 +201,15 @@ impl PosedClouds {
         let stamp_ns = head.stamp_ns.filter(|_| options.is_deskewed && head.has_times);
         let own = stamp_ns.and_then(|_| source.poses());
         self.without_times += u64::from(options.is_deskewed && stamp_ns.is_none());
+        let unreadable = RefCell::new(None);
         let mut deskew = stamp_ns.map(|stamp_ns| {
-            let pose_at =
-                |at_ns| Some(body_at(poses, own.as_ref(), options, at_ns)?.then(&options.body_from_sensor));
+            let pose_at = |at_ns| match body_at(poses, own.as_ref(), options, at_ns) {
+                Ok(body) => Some(body?.then(&options.body_from_sensor)),
+                Err(error) => {
+                    unreadable.borrow_mut().get_or_insert(error);
+                    None
+                }
+            };
             Deskew::new(stamp_ns, &sensor, pose_at)
         });
         points.begin(head.has_intensities);
@@ -230,6 +237,9 @@ impl PosedClouds {
         });
         self.stayed += deskew.map_or(0, |deskew| deskew.stayed());
         read?;
+        if let Some(error) = unreadable.into_inner() {
+            return Err(error.into());
+        }
         Ok(world_from_sensor)
     }
 }
@@ -240,14 +250,14 @@ fn body_at(
     own: Option<&PoseAt>,
     options: &CloudOptions,
     at_ns: i64,
-) -> Option<RigidPose> {
+) -> voxtile_clouds::Result<Option<RigidPose>> {
     match poses {
-        CloudPoses::File(_, trajectory) => match trajectory.at(at_ns, options.pose_tolerance_ns) {
-            Found::Exact(body) | Found::Between(body) => Some(body),
-            _ => None,
+        CloudPoses::File(_, trajectory) => match trajectory.at(at_ns, options.pose_tolerance_ns)? {
+            Found::Exact(body) | Found::Between(body) => Ok(Some(body)),
+            _ => Ok(None),
         },
-        CloudPoses::Source => own?(at_ns),
-        CloudPoses::Identity | CloudPoses::Missing => None,
+        CloudPoses::Source => own.map_or(Ok(None), |own| own(at_ns)),
+        CloudPoses::Identity | CloudPoses::Missing => Ok(None),
     }
 }
 

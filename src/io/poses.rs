@@ -1,11 +1,14 @@
 use crate::error::{Error, FormatError, Result};
 use crate::scan::Pose;
 use std::fs::File;
-use std::io::Read;
+use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
 /// The poses of a file, with their time stamps if it has any.
+#[derive(Default)]
 pub(super) struct Poses {
+    /// How many there are. As many are kept as are wanted.
+    count: usize,
     poses: Vec<Pose>,
     /// Seconds, each with its line number; TUM files only.
     stamps: Vec<(u64, f64)>,
@@ -13,20 +16,23 @@ pub(super) struct Poses {
 
 /// How much of a file is read to identify it.
 const GLANCE_BYTES: u64 = 1 << 14;
+/// A longer line is an error.
+const MAX_LINE_BYTES: u64 = 1 << 16;
 /// Numbers in file names are compared with time stamps if both exceed this many seconds: counters do not.
 const LEAST_STAMP_S: f64 = 1e6;
 
 impl Poses {
-    pub(super) fn read(path: &Path) -> Result<Self> {
-        let text = std::fs::read(path).map_err(|error| Error::io(path, "read", error))?;
-        let text = String::from_utf8_lossy(&text);
-        let lines: std::result::Result<Vec<_>, _> = lines(&text).collect();
-        let lines = lines.map_err(|error| error.in_input(path))?;
-        let stamps = lines.iter().filter_map(|(line, pose)| pose.stamp_s.map(|stamp_s| (*line, stamp_s)));
-        Ok(Self {
-            stamps: stamps.collect(),
-            poses: lines.iter().map(|(_, pose)| pose.world_from_sensor).collect(),
-        })
+    /// Reads a file, and keeps as many of its poses.
+    pub(super) fn read(path: &Path, wanted: usize) -> Result<Self> {
+        let mut poses = Self::default();
+        for_each_line(path, &mut |number, pose| {
+            poses.count += 1;
+            if poses.count <= wanted {
+                poses.stamps.extend(pose.stamp_s.map(|stamp_s| (number, stamp_s)));
+                poses.poses.push(pose.world_from_sensor);
+            }
+        })?;
+        Ok(poses)
     }
 
     /// Checks that these are the poses of these files: equal in number, and in the same order of time.
@@ -36,8 +42,8 @@ impl Poses {
     /// Another number of poses, time stamps that go back.
     pub(super) fn check(&self, path: &Path, files: &[PathBuf]) -> Result<()> {
         let wrong = |reason: String| Err(Error::argument(path.display().to_string(), reason));
-        if self.poses.len() != files.len() {
-            let (poses, files) = (self.poses.len(), files.len());
+        if self.count != files.len() {
+            let (poses, files) = (self.count, files.len());
             return wrong(format!(
                 "{poses} poses for {files} scan files; there must be one line a file, in the natural order of their names \
                  (scan2 before scan10)"
@@ -88,7 +94,7 @@ impl Poses {
 #[cfg(feature = "clouds")]
 impl Poses {
     pub(super) fn len(&self) -> usize {
-        self.poses.len()
+        self.count
     }
 
     /// Whether each line has the stamp, in nanoseconds, in its place, up to the milliseconds that some programs write.
@@ -129,8 +135,9 @@ fn number_in(path: &Path) -> Option<f64> {
 ///
 /// An invalid line, numbers that are not finite, a zero quaternion, a matrix that is not a rotation.
 pub fn read_poses(path: &Path) -> Result<Vec<Pose>> {
-    let text = std::fs::read(path).map_err(|error| Error::io(path, "read", error))?;
-    parse_poses(&String::from_utf8_lossy(&text)).map_err(|error| error.in_input(path))
+    let mut poses = Vec::new();
+    for_each_line(path, &mut |_, pose| poses.push(pose.world_from_sensor))?;
+    Ok(poses)
 }
 
 /// Parses the text of a pose file, see [`read_poses`].
@@ -147,6 +154,32 @@ struct StampedPose {
     /// Seconds, in a TUM file.
     stamp_s: Option<f64>,
     world_from_sensor: Pose,
+}
+
+/// Visits the poses of a file, each with its line number.
+fn for_each_line(path: &Path, take: &mut dyn FnMut(u64, StampedPose)) -> Result<()> {
+    let fail = |error| Error::io(path, "read", error);
+    let mut input = BufReader::with_capacity(1 << 16, File::open(path).map_err(fail)?);
+    let mut line = Vec::new();
+    for number in 1.. {
+        line.clear();
+        let read = (&mut input).take(MAX_LINE_BYTES).read_until(b'\n', &mut line).map_err(fail)?;
+        if read == 0 {
+            break;
+        }
+        let wrong = |reason: String| FormatError::at_line(number, reason).in_input(path);
+        if read as u64 == MAX_LINE_BYTES {
+            let reason =
+                format!("the line is longer than {} KiB: this is no file of poses", MAX_LINE_BYTES >> 10);
+            return Err(wrong(reason));
+        }
+        let text = String::from_utf8_lossy(&line);
+        let text = text.trim();
+        if !text.is_empty() && !text.starts_with('#') {
+            take(number, parse(text).map_err(wrong)?);
+        }
+    }
+    Ok(())
 }
 
 /// The poses of a text, each with its line number.

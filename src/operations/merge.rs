@@ -3,7 +3,7 @@ use super::merge_rule::{MergeRule, Prefer};
 use super::regions::OneBuild;
 use super::table_merge::TableMerge;
 use crate::config::MapConfig;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, beginning_or_difference};
 use crate::mapper::{MapReader, MapView, TileRef};
 use crate::persistence::{new_map_id, new_metadata};
 use crate::space::TileIndex;
@@ -147,7 +147,8 @@ pub(super) fn common_crs<'a>(maps: impl IntoIterator<Item = &'a MapReader>) -> R
 pub(super) fn with_crs_of(common: Option<String>, map: &MapReader) -> Result<Option<String>> {
     match (common, &map.config().crs) {
         (Some(wanted), Some(found)) if *found != wanted => {
-            let (found, wanted) = (format!("{found:.80}"), format!("{wanted:.80}"));
+            let (found, wanted) =
+                (beginning_or_difference(found, &wanted), beginning_or_difference(&wanted, found));
             let what = "the coordinate reference system";
             Err(Error::Mismatch { path: map.folder().to_owned(), what, found, wanted })
         }

@@ -203,6 +203,16 @@ fn what_was_added_can_be_resumed_too() {
     numbered(&third, 2, 0..2);
     let (code, stderr) = failure(&["build", text(&third), "-o", map, "--resume"]);
     assert!(code == 2 && stderr.contains("been built from input"), "{stderr}");
+    // Another input of the same name.
+    for file in fs::read_dir(&third).unwrap().map(|file| file.unwrap().path()) {
+        fs::copy(&file, second.join(file.file_name().unwrap())).unwrap();
+    }
+    let (code, stderr) = failure(&["build", text(&second), "-o", map, "--resume"]);
+    let differs = "the input was replaced or its beginning has changed";
+    assert!(code == 2 && stderr.contains(differs), "{stderr}");
+    let fingerprints: Vec<&str> =
+        stderr.split("has the fingerprint ").skip(1).map(|rest| &rest[..12]).collect();
+    assert!(matches!(fingerprints[..], [found, wanted] if found != wanted), "{stderr}");
     for wrong in ["0", "-1", "x", "5m", "s"] {
         let (code, stderr) = failure(&["build", text(&first), "-o", map, "--resume", "--flush-every", wrong]);
         assert!(code == 2 && stderr.contains("flush-every"), "{stderr}");

@@ -29,6 +29,9 @@ mod octree_worker;
 mod random;
 /// Readers beside a writer see one flush whole.
 mod readers;
+/// What inputs of other programs take of memory, whatever they claim.
+#[cfg(target_os = "linux")]
+mod recordings;
 /// A disk that is full or only for reading, and too many open files.
 mod refused;
 /// Snapshots and reverts that are killed.

@@ -1,10 +1,12 @@
 //! Files of poses: [`Trajectory`] reads them and tells the pose at a time.
 
+mod binary;
 mod calib;
 mod gap;
 mod header;
 mod matrix;
 mod npy;
+mod pose_rows;
 mod text;
 mod time_unit;
 mod trajectory;

@@ -1,47 +1,57 @@
 use super::matrix::matrix_of;
+use super::pose_rows::{PoseRows, Row};
 use super::text::pose;
 use super::time_unit::{digits_of_value, stamp_of_value};
-use super::trajectory::Row;
 use crate::error::{Error, Place, Result};
 use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::Path;
 
 const MAGIC: &[u8] = b"\x93NUMPY";
+const NO_ARRAY: &str = "is no array of NumPy, which its name says: save it with numpy.save, or give a text of poses a \
+                        name that ends with .txt or .csv";
+const CUT_HEADER: &str = "the file ends within its header; copy or save it again";
 /// A longer header is an error.
 const MOST_HEADER_BYTES: usize = 1 << 16;
 
-/// Whether a file is an array of NumPy.
+/// Whether a file is an array of NumPy, or is named as one.
 pub(super) fn is_npy(path: &Path) -> Result<bool> {
     let mut start = Vec::new();
     File::open(path)
         .and_then(|file| file.take(MAGIC.len() as u64).read_to_end(&mut start))
         .map_err(|error| Error::io(path, "read", error))?;
-    Ok(start == MAGIC)
+    Ok(start == MAGIC || path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("npy")))
 }
 
-/// Reads an array of poses: N x 8 of TUM, N x 12, N x 16, N x 3 x 4 or N x 4 x 4.
-pub(super) fn read(path: &Path) -> Result<Vec<Row>> {
+/// Takes the poses of an array: N x 8 of TUM, N x 12, N x 16, N x 3 x 4 or N x 4 x 4.
+pub(super) fn read(path: &Path, poses: &mut PoseRows) -> Result<()> {
     let fail = |error| Error::io(path, "read", error);
     let wrong = |at: u64, reason: String| Error::format(path, Place::Byte(at), reason);
     let mut input = BufReader::new(File::open(path).map_err(fail)?);
-    let mut start = [0; 8];
-    input.read_exact(&mut start).map_err(fail)?;
-    let is_long = start[6] >= 2;
+    let mut start = Vec::new();
+    (&mut input).take(8).read_to_end(&mut start).map_err(fail)?;
+    let version = match *start.as_slice() {
+        [.., version, _] if start.len() == 8 && start.starts_with(MAGIC) => version,
+        _ => return Err(wrong(0, NO_ARRAY.into())),
+    };
+    if !(1..=3).contains(&version) {
+        let reason = "its version is none of 1, 2 and 3; save it again with numpy.save";
+        return Err(wrong(6, reason.into()));
+    }
+    let is_long = version >= 2;
     let mut length = [0; 4];
     let length_bytes = if is_long { &mut length[..] } else { &mut length[..2] };
-    input.read_exact(length_bytes).map_err(fail)?;
+    input.read_exact(length_bytes).map_err(|_| wrong(8, CUT_HEADER.into()))?;
     let header_bytes = u32::from_le_bytes(length) as usize;
     if header_bytes > MOST_HEADER_BYTES {
         return Err(wrong(8, format!("a header of {header_bytes} bytes is no header")));
     }
     let mut header = vec![0; header_bytes];
-    input.read_exact(&mut header).map_err(|_| wrong(8, "the file ends within its header".into()))?;
+    input.read_exact(&mut header).map_err(|_| wrong(8, CUT_HEADER.into()))?;
     let header = String::from_utf8_lossy(&header).into_owned();
     let (width, rows, columns) = layout(&header).map_err(|reason| wrong(10, reason))?;
     let data_at = 8 + if is_long { 4 } else { 2 } + header_bytes as u64;
     let (mut record, mut numbers, mut digits) = (vec![0; columns * width], Vec::new(), None);
-    let mut poses = Vec::new();
     for row in 0..rows {
         let at = data_at.saturating_add(row.saturating_mul((columns * width) as u64));
         input
@@ -66,15 +76,23 @@ pub(super) fn read(path: &Path) -> Result<Vec<Row>> {
             }
             _ => Row { stamp_ns: None, pose: matrix_of(&numbers).map_err(bad)? },
         };
-        poses.push(row);
+        poses.push(row)?;
     }
-    Ok(poses)
+    Ok(())
 }
 
 /// Bytes of a number, rows, numbers in a row.
 fn layout(header: &str) -> std::result::Result<(usize, u64, usize), String> {
     let value = |key: &str| header.split_once(key).map(|(_, rest)| rest.trim_start_matches([':', ' ']));
-    let kind = value("'descr'").and_then(|rest| rest.split('\'').nth(1)).unwrap_or_default();
+    let Some(descr) = value("'descr'") else {
+        return Err("its header names no type ('descr'); save it again with numpy.save".into());
+    };
+    if descr.starts_with('[') {
+        let reason = "is a structured array; save a plain one: \
+                      numpy.lib.recfunctions.structured_to_unstructured(poses)";
+        return Err(reason.into());
+    }
+    let kind = descr.split('\'').nth(1).unwrap_or_default();
     let width = match kind {
         "<f8" => 8,
         "<f4" => 4,

@@ -1,7 +1,8 @@
+use super::binary::check_text;
 use super::header::Roles;
 use super::matrix::matrix_of;
+use super::pose_rows::{PoseRows, Row};
 use super::time_unit::{digits_of, stamp_of};
-use super::trajectory::Row;
 use crate::error;
 use crate::lines::Lines;
 use crate::pose::RigidPose;
@@ -23,11 +24,11 @@ enum Layout {
 }
 
 /// Reads the poses of a text.
-pub(super) fn read(path: &Path) -> error::Result<Vec<Row>> {
+pub(super) fn read(path: &Path, poses: &mut PoseRows) -> error::Result<()> {
+    check_text(path)?;
     let mut lines = Lines::open(path)?;
     let mut names: Option<Roles> = None;
     let mut text = TextPoses::default();
-    let mut poses = Vec::new();
     while let Some((_, line)) = lines.next()? {
         let line = line.trim();
         if line.is_empty() {
@@ -53,14 +54,14 @@ pub(super) fn read(path: &Path) -> error::Result<Vec<Row>> {
             continue;
         }
         let row = text.take(line, &mut names).map_err(|reason| lines.error(reason))?;
-        poses.extend(row);
+        row.map_or(Ok(()), |row| poses.push(row))?;
     }
     if !text.rows.is_empty() {
         return Err(
             lines.error(format!("the file ends within a matrix of 4x4, after {} numbers", text.rows.len()))
         );
     }
-    Ok(poses)
+    Ok(())
 }
 
 /// Whether the first word is a number; `nan` is none, which is told later.

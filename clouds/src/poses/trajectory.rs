@@ -1,18 +1,23 @@
 use super::gap::most_gap_ns;
+use super::pose_rows::{PoseRows, Stamps};
 use super::{npy, text};
 use crate::cloud::CloudSource;
 use crate::error::{Error, Result};
 use crate::pose::RigidPose;
+use crate::spill::{Budget, PoseList};
 use std::path::{Path, PathBuf};
 
-/// Poses of a sensor, sensor to world, in the order of their file and by time.
+/// Poses of a sensor, sensor to world, in the order of their file and by time. Many are in a temporary file.
 #[derive(Clone, Debug, Default)]
 pub struct Trajectory {
     path: PathBuf,
     /// In the order of the file.
-    poses: Vec<RigidPose>,
-    /// Strictly increasing stamps, each with the number of its pose; empty where the file has none.
-    stamps: Vec<(i64, usize)>,
+    poses: PoseList,
+    /// In strict order of time, where that is another order.
+    by_time: Option<PoseList>,
+    has_stamps: bool,
+    /// Poses are of a camera; those of the lidar are `[0] * pose * [1]`.
+    lidar: Option<[RigidPose; 2]>,
     /// How far a stamp may be from the time that it was rounded from.
     rounding_ns: u64,
     remarks: Vec<String>,
@@ -44,12 +49,6 @@ pub enum Found {
     WithoutStamps,
 }
 
-/// A line or a row of a file of poses.
-pub(super) struct Row {
-    pub(super) stamp_ns: Option<i64>,
-    pub(super) pose: RigidPose,
-}
-
 impl Trajectory {
     /// Reads a file of poses: TUM (`t x y z qx qy qz qw`), KITTI (12 numbers of a 3x4 matrix), matrices of 4x4, tables
     /// with names of columns (EuRoC, exports of ROS), arrays of NumPy (`.npy`) of N x 8, N x 3 x 4 or N x 4 x 4.
@@ -61,90 +60,94 @@ impl Trajectory {
     ///
     /// It cannot be read; a line that is no pose, with its number; no pose at all.
     pub fn read(path: &Path, calib: Option<&Path>) -> Result<Self> {
-        let rows = if npy::is_npy(path)? { npy::read(path)? } else { text::read(path)? };
-        if rows.is_empty() {
-            return Err(Error::argument(path.display().to_string(), "holds no pose"));
+        Self::read_within(path, calib, &Budget::default())
+    }
+
+    /// As [`Trajectory::read`], in so much memory. Each pose takes 64 bytes, of memory or of a temporary file.
+    ///
+    /// # Errors
+    ///
+    /// As for [`Trajectory::read`]; a temporary file that cannot be written.
+    pub fn read_within(path: &Path, calib: Option<&Path>, budget: &Budget) -> Result<Self> {
+        let mut rows = PoseRows::new(budget);
+        if npy::is_npy(path)? {
+            npy::read(path, &mut rows)?
+        } else {
+            text::read(path, &mut rows)?
         }
-        let mut trajectory = Self::of_rows(path, rows);
+        let Some(mut trajectory) = rows.finish(path)? else {
+            return Err(Error::argument(path.display().to_string(), "holds no pose"));
+        };
         if let Some(calib) = calib {
             let camera_from_lidar = super::calib::read(calib)?;
-            let lidar_from_camera = camera_from_lidar.inverse();
-            for pose in &mut trajectory.poses {
-                *pose = lidar_from_camera.then(pose).then(&camera_from_lidar);
-            }
+            trajectory.lidar = Some([camera_from_lidar.inverse(), camera_from_lidar]);
         }
         Ok(trajectory)
     }
 
-    fn of_rows(path: &Path, rows: Vec<Row>) -> Self {
-        let mut remarks = Vec::new();
-        let are_stamped = rows.iter().all(|row| row.stamp_ns.is_some());
-        let mut stamps: Vec<(i64, usize)> =
-            rows.iter().enumerate().filter_map(|(number, row)| Some((row.stamp_ns?, number))).collect();
-        let back = stamps.windows(2).filter(|pair| matches!(pair, [a, b] if b.0 < a.0)).count();
-        if back > 0 {
-            remarks.push(format!("{back} time stamps of poses go back; the poses were sorted by time"));
-            stamps.sort_unstable();
-        }
-        let all = stamps.len();
-        // Of equal stamps the last stays.
-        stamps.reverse();
-        stamps.dedup_by_key(|(stamp_ns, _)| *stamp_ns);
-        stamps.reverse();
-        if stamps.len() < all {
-            let twice = all - stamps.len();
-            remarks.push(format!("{twice} time stamps of poses occur again; the last pose of each is taken"));
-        }
-        if !are_stamped {
-            stamps.clear();
-        }
-        let poses = rows.into_iter().map(|row| row.pose).collect();
-        let rounding_ns = rounding_of(&stamps);
-        Self { path: path.to_owned(), poses, stamps, rounding_ns, remarks }
+    pub(super) fn new(path: &Path, poses: PoseList, by_time: Option<PoseList>, stamps: Stamps) -> Self {
+        let Stamps { has_stamps, rounding_ns, remarks } = stamps;
+        Self { path: path.to_owned(), poses, by_time, has_stamps, lidar: None, rounding_ns, remarks }
     }
 
     /// The pose at a time. Between two poses there is one if they are at most twice the tolerance apart, see
     /// [`most_gap_ns`]; none is ever extrapolated.
     /// A time that is before the first stamp or after the last one only because that was rounded has the pose there.
-    pub fn at(&self, stamp_ns: i64, tolerance_ns: i64) -> Found {
-        let after = self.stamps.partition_point(|&(stamp, _)| stamp < stamp_ns);
-        let later = self.stamps.get(after).copied();
-        let earlier = after.checked_sub(1).and_then(|before| self.stamps.get(before)).copied();
-        let pose = |number: usize| self.poses.get(number).copied().unwrap_or(RigidPose::IDENTITY);
-        match (earlier, later) {
-            (_, Some((stamp, number))) if stamp == stamp_ns => Found::Exact(pose(number)),
-            (Some((before_ns, before)), Some((after_ns, after))) => {
-                let gap_ns = before_ns.abs_diff(after_ns);
+    ///
+    /// # Errors
+    ///
+    /// A temporary file that cannot be read.
+    pub fn at(&self, stamp_ns: i64, tolerance_ns: i64) -> Result<Found> {
+        let Some(poses) = self.stamped() else { return Ok(Found::WithoutStamps) };
+        let after = poses.before(stamp_ns)?;
+        let later = poses.get(after)?;
+        let earlier = after.checked_sub(1).map(|before| poses.get(before)).transpose()?.flatten();
+        Ok(match (earlier, later) {
+            (_, Some(same)) if same.stamp_ns == stamp_ns => Found::Exact(self.of_lidar(same.pose)),
+            (Some(before), Some(after)) => {
+                let gap_ns = before.stamp_ns.abs_diff(after.stamp_ns);
                 if gap_ns > most_gap_ns(tolerance_ns).unsigned_abs() {
-                    return Found::Gap { gap_ns };
+                    return Ok(Found::Gap { gap_ns });
                 }
-                let share = before_ns.abs_diff(stamp_ns) as f64 / gap_ns as f64;
-                Found::Between(pose(before).towards(&pose(after), share))
+                let share = before.stamp_ns.abs_diff(stamp_ns) as f64 / gap_ns as f64;
+                let [before, after] = [before, after].map(|timed| self.of_lidar(timed.pose));
+                Found::Between(before.towards(&after, share))
             }
-            (None, Some((end_ns, number))) | (Some((end_ns, number)), None)
-                if end_ns.abs_diff(stamp_ns) <= self.rounding_ns =>
-            {
-                Found::Exact(pose(number))
+            (None, Some(end)) | (Some(end), None) if end.stamp_ns.abs_diff(stamp_ns) <= self.rounding_ns => {
+                Found::Exact(self.of_lidar(end.pose))
             }
-            (None, Some((first_ns, _))) => Found::Before { first_ns },
-            (Some((last_ns, _)), None) => Found::After { last_ns },
+            (None, Some(first)) => Found::Before { first_ns: first.stamp_ns },
+            (Some(last), None) => Found::After { last_ns: last.stamp_ns },
             (None, None) => Found::WithoutStamps,
-        }
+        })
+    }
+
+    /// The poses in strict order of time, if they have stamps.
+    fn stamped(&self) -> Option<&PoseList> {
+        self.has_stamps.then(|| self.by_time.as_ref().unwrap_or(&self.poses))
+    }
+
+    fn of_lidar(&self, pose: RigidPose) -> RigidPose {
+        self.lidar.map_or(pose, |[before, after]| before.then(&pose).then(&after))
     }
 
     /// The pose of a number, from 0, in the order of the file.
-    pub fn by_number(&self, number: usize) -> Option<RigidPose> {
-        self.poses.get(number).copied()
+    ///
+    /// # Errors
+    ///
+    /// A temporary file that cannot be read.
+    pub fn by_number(&self, number: usize) -> Result<Option<RigidPose>> {
+        Ok(self.poses.get(number)?.map(|timed| self.of_lidar(timed.pose)))
     }
 
     /// The pose of a cloud by its number, from 0, where stamps do not tell it.
     ///
     /// # Errors
     ///
-    /// Not as many poses as clouds: which belong together is not known then.
+    /// Not as many poses as clouds: which belong together is not known then; a temporary file that cannot be read.
     pub fn of_cloud(&self, number: u64, source: &dyn CloudSource) -> Result<RigidPose> {
         self.check_clouds(source)?;
-        let pose = usize::try_from(number).ok().and_then(|number| self.by_number(number));
+        let pose = usize::try_from(number).ok().map(|number| self.by_number(number)).transpose()?.flatten();
         pose.ok_or_else(|| self.other_number(&format!("at least {} clouds", number.saturating_add(1))))
     }
 
@@ -178,32 +181,35 @@ impl Trajectory {
 
     /// Whether there is no pose.
     pub fn is_empty(&self) -> bool {
-        self.poses.is_empty()
+        self.len() == 0
     }
 
     /// First and last time stamp, if poses have stamps.
-    pub fn span_ns(&self) -> Option<[i64; 2]> {
-        Some([self.stamps.first()?.0, self.stamps.last()?.0])
+    ///
+    /// # Errors
+    ///
+    /// A temporary file that cannot be read.
+    pub fn span_ns(&self) -> Result<Option<[i64; 2]>> {
+        let Some(poses) = self.stamped() else { return Ok(None) };
+        let (first, last) = (poses.get(0)?, poses.get(poses.len().saturating_sub(1))?);
+        Ok(first.zip(last).map(|(first, last)| [first.stamp_ns, last.stamp_ns]))
+    }
+
+    /// Whether poses have stamps; they are known by number only otherwise.
+    pub fn has_stamps(&self) -> bool {
+        self.has_stamps
     }
 
     /// The different stamps, in order.
-    pub fn stamps_ns(&self) -> impl Iterator<Item = i64> + '_ {
-        self.stamps.iter().map(|&(stamp_ns, _)| stamp_ns)
+    pub fn stamps_ns(&self) -> impl Iterator<Item = Result<i64>> + '_ {
+        let poses = self.stamped();
+        let count = poses.map_or(0, PoseList::len);
+        let stamps = poses.map(move |poses| (0..count).map(|number| poses.get(number)));
+        stamps.into_iter().flatten().filter_map(|timed| timed.map(|timed| Some(timed?.stamp_ns)).transpose())
     }
 
     /// What a person should know of the file.
     pub fn remarks(&self) -> &[String] {
         &self.remarks
     }
-}
-
-/// Half of the digit that all stamps end with: programs write them with a few decimals. At most half a millisecond,
-/// for stamps of whole seconds need not be rounded.
-fn rounding_of(stamps: &[(i64, usize)]) -> u64 {
-    const MOST_NS: i64 = 1_000_000;
-    let mut digit_ns = 1;
-    while digit_ns < MOST_NS && stamps.iter().all(|(stamp_ns, _)| stamp_ns % (10 * digit_ns) == 0) {
-        digit_ns *= 10;
-    }
-    if stamps.is_empty() { 0 } else { digit_ns.unsigned_abs() / 2 }
 }

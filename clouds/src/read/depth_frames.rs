@@ -81,6 +81,9 @@ impl CloudSource for DepthFrames {
     }
 }
 
+/// Memory of the decoder, which holds a few rows: images may be a million pixels wide.
+const MAX_DECODER_BYTES: usize = 8 << 20;
+
 type Reader = png::Reader<BufReader<File>>;
 
 fn size(reader: &Reader) -> (u32, u32) {
@@ -89,7 +92,10 @@ fn size(reader: &Reader) -> (u32, u32) {
 
 fn open(path: &Path) -> Result<Reader> {
     let file = File::open(path).map_err(|error| Error::io(path, "read", error))?;
-    let mut decoder = png::Decoder::new(BufReader::with_capacity(1 << 16, file));
+    let limits = png::Limits { bytes: MAX_DECODER_BYTES };
+    let mut decoder = png::Decoder::new_with_limits(BufReader::with_capacity(1 << 16, file), limits);
+    decoder.set_ignore_text_chunk(true);
+    decoder.set_ignore_iccp_chunk(true);
     decoder.set_transformations(png::Transformations::IDENTITY);
     let reader = decoder.read_info().map_err(|error| wrong(path, &error))?;
     let info = reader.info();

@@ -4,9 +4,10 @@ use crate::cloud::{CloudHead, CloudPoint, CloudSource};
 use crate::error::{Error, Place, Result};
 use crate::guard::guarded;
 use crate::pose::RigidPose;
+use crate::spill::Budget;
 use e57::{CartesianCoordinate, E57Reader, PointCloud, RecordDataType, RecordName, SphericalCoordinate};
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 /// The scans of an E57 file.
@@ -24,8 +25,9 @@ struct E57 {
 
 /// Opens an E57 file: each scan is a cloud in the frame of its scanner, with its pose. A scan without a pose is in the
 /// frame of the file, and its sensor at the origin of that, if `has_origin` does not say that another one is known.
-pub(super) fn open(path: &Path, has_origin: bool) -> Result<Box<dyn CloudSource>> {
-    let file = File::open(path).map_err(|error| Error::io(path, "read", error))?;
+pub(super) fn open(path: &Path, has_origin: bool, budget: &Budget) -> Result<Box<dyn CloudSource>> {
+    let mut file = File::open(path).map_err(|error| Error::io(path, "read", error))?;
+    check_xml(path, &mut file, budget)?;
     let reader = guarded(|| E57Reader::new(BufReader::new(file)))
         .map_err(|reason| Error::format(path, Place::Byte(0), reason))?;
     let scans = reader.pointclouds();
@@ -51,6 +53,48 @@ pub(super) fn open(path: &Path, has_origin: bool) -> Result<Box<dyn CloudSource>
     let (next, is_read) = (0, true);
     Ok(Box::new(E57 { path: path.to_owned(), reader, scans, next, is_read, has_origin, crs, remarks }))
 }
+
+/// Checks that the description of the scans fits in memory. The library holds all of it, as text and as a tree.
+fn check_xml(path: &Path, file: &mut File, budget: &Budget) -> Result<()> {
+    let fail = |error| Error::io(path, "read", error);
+    let mut header = Vec::new();
+    file.take(48).read_to_end(&mut header).map_err(fail)?;
+    let number = |at: usize| {
+        let bytes = header.get(at..).and_then(|bytes| bytes.first_chunk()).copied();
+        bytes.map_or(0, u64::from_le_bytes)
+    };
+    let [start, bytes, page_bytes] = [24, 32, 40].map(number);
+    let wrong = |at: u64, reason: String| Err(Error::format(path, Place::Byte(at), reason));
+    if page_bytes > MAX_PAGE_BYTES {
+        return wrong(40, format!("pages of {page_bytes} bytes; those of E57 have 1024"));
+    }
+    file.seek(SeekFrom::Start(start)).map_err(fail)?;
+    let (mut text, mut buffer, mut needed) = (file.take(bytes), vec![0; 1 << 16], bytes.saturating_mul(3));
+    loop {
+        let count = text.read(&mut buffer).map_err(fail)?;
+        let read = buffer.get(..count).unwrap_or_default();
+        // Checksums of pages among them change nothing.
+        let nodes = read.iter().filter(|byte| matches!(byte, b'<' | b'=')).count();
+        needed = needed.saturating_add(nodes as u64 * NODE_BYTES);
+        if needed > budget.whole_bytes() {
+            let reason = format!(
+                "its description of {bytes} bytes would take more than {} bytes of memory: raise --memory, or split \
+                 the file",
+                budget.whole_bytes()
+            );
+            return wrong(start, reason);
+        }
+        if count == 0 {
+            break;
+        }
+    }
+    file.seek(SeekFrom::Start(0)).map(drop).map_err(fail)
+}
+
+/// Pages of E57 have 1024 bytes.
+const MAX_PAGE_BYTES: u64 = 1 << 20;
+/// What a tag or an attribute takes in the library's tree.
+const NODE_BYTES: u64 = 100;
 
 /// The name of a field, as the library spells it.
 fn name_of(name: &RecordName) -> String {

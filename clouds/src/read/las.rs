@@ -19,12 +19,13 @@ use std::path::Path;
 pub(super) fn open(path: &Path, options: &OpenOptions) -> Result<Box<dyn CloudSource>> {
     let mut file = File::open(path).map_err(|error| Error::io(path, "read", error))?;
     let layout = Layout::read(path, &mut file)?;
-    if layout.is_compressed {
-        super::laz_chunks::check(path, &file, &layout)?;
-    }
+    let table_at = match layout.is_compressed {
+        true => super::laz_chunks::check(path, &file, &layout, &options.budget())?,
+        false => None,
+    };
     let mut units = Units::of(&layout);
     units.remarks.extend(layout.remark.clone());
-    let points = LasPoints::open(path, &layout, &units)?;
+    let points = LasPoints::open(path, &layout, table_at, &units)?;
     let format = if layout.is_compressed { "LAZ" } else { "LAS" }.to_owned();
     let is_cut = points.has_times && options.scan_period_s > 0.0 && options.sensor_origin_m.is_none();
     if is_cut {

@@ -1,11 +1,11 @@
 use crate::error::{Error, Place, Result};
 use std::fs::File;
-use std::io::{self, Cursor, Read, Seek, SeekFrom};
+use std::io::{self, Read, Seek, SeekFrom};
 use std::path::Path;
 
 /// What the header of a LAS file says, checked against the size of the file.
 pub(super) struct Layout {
-    /// The header, with what would mislead the library taken out.
+    /// The header, and what follows a short one.
     pub(super) header: Vec<u8>,
     pub(super) file_bytes: u64,
     pub(super) points_at: u64,
@@ -32,8 +32,11 @@ pub(super) struct Record {
 
 /// Who records of coordinates are of, and the one of the compression.
 const PROJECTION: &str = "LASF_Projection";
-const LASZIP: &str = "laszip encoded";
-const LASZIP_ID: u16 = 22204;
+pub(super) const LASZIP: &str = "laszip encoded";
+pub(super) const LASZIP_ID: u16 = 22204;
+/// The coordinate system, as text and as keys of GeoTIFF.
+pub(super) const WKT_ID: u16 = 2112;
+pub(super) const KEYS_ID: u16 = 34735;
 /// A header is at most so long in LAS 1.4.
 const HEADER_BYTES: usize = 375;
 /// Three scales and three offsets.
@@ -43,8 +46,6 @@ const MOST_COORDINATE: f64 = 1e13;
 /// Records of more bytes, and more of them, have nothing to do with coordinates.
 const MOST_RECORD_BYTES: u64 = 1 << 20;
 const MOST_RECORDS: u32 = 10_000;
-/// Bytes between the records and the points that the library would hold in memory.
-const MOST_GAP_BYTES: u64 = 64 << 20;
 
 impl Layout {
     pub(super) fn read(path: &Path, file: &mut File) -> Result<Self> {
@@ -69,9 +70,6 @@ impl Layout {
         if points_at < header_bytes || points_at > file_bytes {
             let reason = format!("points begin at byte {points_at} of a file of {file_bytes} bytes");
             return Err(wrong(96, reason));
-        }
-        if points_at - header_bytes > MOST_GAP_BYTES {
-            return Err(wrong(96, format!("{points_at} bytes before the points are no records of LAS")));
         }
         if record_bytes == 0
             || points.checked_mul(record_bytes).and_then(|all| all.checked_add(points_at)).is_none()
@@ -99,10 +97,6 @@ impl Layout {
             let (start, count) = (number(&layout.header, 235, 8), number(&layout.header, 243, 4));
             if start >= points_at {
                 layout.read_records(file, start, count, file_bytes, 8).map_err(fail)?;
-            }
-            // The library reads the first of them whole, however long it says to be. They are known by now.
-            for byte in layout.header.iter_mut().skip(235).take(12) {
-                *byte = 0;
             }
         }
         Ok(layout)
@@ -133,8 +127,13 @@ impl Layout {
             let data_at = at + head_bytes;
             let Some(next) = data_at.checked_add(bytes).filter(|next| *next <= end) else { break };
             let user = String::from_utf8_lossy(&user).into_owned();
-            let is_wanted = user == PROJECTION || (user == LASZIP && id == LASZIP_ID);
-            if is_wanted && bytes <= MOST_RECORD_BYTES {
+            let is_wanted = match user.as_str() {
+                PROJECTION => matches!(id, WKT_ID | KEYS_ID),
+                LASZIP => id == LASZIP_ID,
+                _ => false,
+            };
+            // Of equal records the first counts.
+            if is_wanted && bytes <= MOST_RECORD_BYTES && self.record_of(&user, id).is_none() {
                 let mut data = Vec::new();
                 (&mut *file).take(bytes).read_to_end(&mut data)?;
                 self.records.push(Record { user, id, data });
@@ -226,37 +225,4 @@ fn check_scales(header: &[u8]) -> std::result::Result<(), (u64, String)> {
 pub(super) fn number(bytes: &[u8], at: usize, width: usize) -> u64 {
     let bytes = bytes.iter().skip(at).take(width);
     bytes.enumerate().fold(0, |sum, (k, byte)| sum | u64::from(*byte) << (8 * k.min(7)))
-}
-
-/// A file whose first bytes are others.
-pub(super) struct Patched {
-    header: Cursor<Vec<u8>>,
-    file: File,
-}
-
-impl Patched {
-    pub(super) fn new(header: Vec<u8>, mut file: File) -> io::Result<Self> {
-        file.seek(SeekFrom::Start(0))?;
-        Ok(Self { header: Cursor::new(header), file })
-    }
-}
-
-impl Read for Patched {
-    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        let read = self.header.read(buffer)?;
-        if read > 0 {
-            // Both stand at the same place.
-            self.file.seek(SeekFrom::Current(read as i64))?;
-            return Ok(read);
-        }
-        self.file.read(buffer)
-    }
-}
-
-impl Seek for Patched {
-    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
-        let at = self.file.seek(to)?;
-        self.header.set_position(at);
-        Ok(at)
-    }
 }

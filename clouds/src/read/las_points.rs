@@ -1,4 +1,5 @@
-use super::las_layout::{Layout, Patched};
+use super::las_layout::Layout;
+use super::las_trimmed::{Start, Trimmed};
 use super::las_units::Units;
 use crate::error::{Error, Place, Result};
 use crate::guard::guarded;
@@ -7,8 +8,9 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
-/// Points that are decoded at a time.
+/// Points that are decoded at a time, and most bytes of them.
 const AT_A_TIME: u64 = 4096;
+const MAX_BATCH_BYTES: u64 = 1 << 20;
 
 /// A point of a LAS file, in metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,7 +24,8 @@ pub(super) struct LasPoint {
 /// The points of a LAS or LAZ file, in order.
 pub(super) struct LasPoints {
     path: PathBuf,
-    header: Vec<u8>,
+    start: Start,
+    at_a_time: u64,
     metres: [f64; 2],
     /// Points that are announced, that are there, and that were read.
     announced: u64,
@@ -33,12 +36,14 @@ pub(super) struct LasPoints {
 }
 
 impl LasPoints {
-    pub(super) fn open(path: &Path, layout: &Layout, units: &Units) -> Result<Self> {
+    pub(super) fn open(path: &Path, layout: &Layout, table_at: Option<u64>, units: &Units) -> Result<Self> {
+        let start = Start::of(layout, table_at);
         // The library's reader must stay in its thread: this one is only asked whether it takes the file.
-        let has_times = Decoder::open(path, &layout.header)?.reader.header().point_format().has_gps_time;
+        let has_times = Decoder::open(path, &start)?.reader.header().point_format().has_gps_time;
         Ok(Self {
             path: path.to_owned(),
-            header: layout.header.clone(),
+            start,
+            at_a_time: (MAX_BATCH_BYTES / layout.record_bytes.max(1)).clamp(1, AT_A_TIME),
             metres: units.metres,
             announced: layout.points,
             whole: layout.whole_points(),
@@ -50,9 +55,9 @@ impl LasPoints {
 
     /// Visits the points, without those that are marked as deleted ("withheld").
     pub(super) fn visit(&mut self, visit: &mut dyn FnMut(LasPoint) -> Result<()>) -> Result<()> {
-        let mut decoder = Decoder::open(&self.path, &self.header)?;
+        let mut decoder = Decoder::open(&self.path, &self.start)?;
         while self.done < self.whole {
-            let wanted = AT_A_TIME.min(self.whole - self.done);
+            let wanted = self.at_a_time.min(self.whole - self.done);
             if let Err(reason) = decoder.fill(wanted) {
                 return self.one_by_one(decoder, &reason, visit);
             }
@@ -79,7 +84,7 @@ impl LasPoints {
     ) -> Result<()> {
         let done = self.done;
         if guarded(|| decoder.reader.seek(done)).is_ok() {
-            for _ in 0..AT_A_TIME {
+            for _ in 0..self.at_a_time {
                 if decoder.fill(1).is_err() || decoder.batch.is_empty() {
                     break;
                 }
@@ -100,11 +105,10 @@ struct Decoder {
 }
 
 impl Decoder {
-    fn open(path: &Path, header: &[u8]) -> Result<Self> {
+    fn open(path: &Path, start: &Start) -> Result<Self> {
         let fail = |error| Error::io(path, "read", error);
         let file = File::open(path).map_err(fail)?;
-        let patched = Patched::new(header.to_vec(), file).map_err(fail)?;
-        let input = BufReader::with_capacity(1 << 16, patched);
+        let input = BufReader::with_capacity(1 << 16, Trimmed::new(start, file));
         let reader = guarded(|| Reader::new(input)).map_err(|reason| {
             Error::format(path, Place::Byte(0), format!("the header is invalid: {reason}"))
         })?;

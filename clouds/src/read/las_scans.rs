@@ -1,11 +1,11 @@
 use super::las_layout::Layout;
 use super::las_points::{LasPoint, LasPoints};
-use super::las_runs::{Sorted, Sorter};
 use super::las_units::Units;
 use super::one::Visit;
 use super::options::OpenOptions;
 use crate::cloud::{CloudHead, CloudPoint, CloudSource};
 use crate::error::{Error, Place, Result};
+use crate::spill::{Sorted, Sorter};
 use std::path::{Path, PathBuf};
 
 /// The zero of adjusted standard GPS time, in nanoseconds of GPS time.
@@ -17,8 +17,8 @@ pub(super) struct LasScans {
     path: PathBuf,
     units: Units,
     /// Until the first scan is asked for.
-    unsorted: Option<(LasPoints, Sorter)>,
-    sorted: Option<Sorted>,
+    unsorted: Option<(LasPoints, Sorter<LasPoint>)>,
+    sorted: Option<Sorted<LasPoint>>,
     period_s: f64,
     zero_ns: i64,
     first_s: f64,
@@ -41,7 +41,7 @@ impl LasScans {
         points: LasPoints,
         options: &OpenOptions,
     ) -> Self {
-        let sorter = Sorter::new(options.sort_memory_bytes, options.scratch.as_deref());
+        let sorter = Sorter::new(&options.budget(), options.memory_bytes);
         Self {
             format,
             path: path.to_owned(),

@@ -1,8 +1,5 @@
-use super::las_layout::{Layout, number};
+use super::las_layout::{KEYS_ID, Layout, WKT_ID, number};
 use super::wkt::WktUnits;
-
-const WKT: u16 = 2112;
-const KEYS: u16 = 34735;
 
 /// What a LAS file says of its coordinates.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,11 +31,11 @@ impl Units {
     pub(super) fn of(layout: &Layout) -> Self {
         let mut units = Self { metres: [1.0; 2], crs: None, remarks: Vec::new() };
         let text = layout
-            .record(WKT)
+            .record(WKT_ID)
             .map(|data| String::from_utf8_lossy(data).trim_end_matches('\0').trim().to_owned());
         let text = text.filter(|text| !text.is_empty());
         // Both may be there: the header says which one counts.
-        let keys = layout.record(KEYS).filter(|_| text.is_none() || !layout.has_wkt);
+        let keys = layout.record(KEYS_ID).filter(|_| text.is_none() || !layout.has_wkt);
         if let Some(keys) = keys {
             units.take_keys(keys);
         } else if let Some(wkt) = &text {

@@ -4,8 +4,9 @@
 use super::las_layout::{Layout, number};
 use crate::error::{Error, Place, Result};
 use crate::guard::guarded;
+use crate::spill::Budget;
 use laz::LazVlr;
-use laz::laszip::ChunkTable;
+use laz::laszip::{ChunkTable, ChunkTableEntry};
 use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
@@ -19,11 +20,14 @@ const MOST_ITEMS: usize = 5;
 const POINT_WISE: u64 = 1;
 /// Points in chunks, whose fields are apart: each chunk says how many bytes every field takes.
 const LAYERED: u64 = 3;
+/// The library has the table twice, and so has this check.
+const TABLE_COPIES: u64 = 4;
 /// Bytes of the place of the chunk table, in front of the points.
 const TABLE_PLACE_BYTES: u64 = 8;
 
-/// Refuses a file whose chunks cannot be where it says.
-pub(super) fn check(path: &Path, file: &File, layout: &Layout) -> Result<()> {
+/// Refuses a file whose chunks cannot be where it says, or do not fit in memory. Returns where the chunk table is, if
+/// there is one.
+pub(super) fn check(path: &Path, file: &File, layout: &Layout, budget: &Budget) -> Result<Option<u64>> {
     let wrong = |at: u64, reason: String| Error::format(path, Place::Byte(at), reason);
     let points_at = layout.points_at;
     let Some(description) = layout.laszip() else {
@@ -62,7 +66,7 @@ pub(super) fn check(path: &Path, file: &File, layout: &Layout) -> Result<()> {
         Err(wrong(if layout.has_large_count { 247 } else { 107 }, reason))
     };
     if compressor == POINT_WISE {
-        return check_count(layout.file_bytes - points_at);
+        return check_count(layout.file_bytes - points_at).map(|()| None);
     }
     let mut input = BufReader::new(file);
     let table_at = table_place(path, &mut input, layout)?;
@@ -73,6 +77,13 @@ pub(super) fn check(path: &Path, file: &File, layout: &Layout) -> Result<()> {
     let most_chunks = (table_at - data_at.min(table_at)) / point_bytes.max(1) + 1;
     if chunks > most_chunks {
         let reason = format!("the chunk table promises {chunks} chunks; before it is room for {most_chunks}");
+        return Err(wrong(table_at + 4, reason));
+    }
+    if chunks.saturating_mul(size_of::<ChunkTableEntry>() as u64) > budget.whole_bytes() / TABLE_COPIES {
+        let reason = format!(
+            "a table of {chunks} chunks exceeds its share of the memory for reading: raise --memory, or write the file \
+             with larger chunks"
+        );
         return Err(wrong(table_at + 4, reason));
     }
     input.seek(SeekFrom::Start(points_at)).map_err(|error| Error::io(path, "read", error))?;
@@ -89,6 +100,15 @@ pub(super) fn check(path: &Path, file: &File, layout: &Layout) -> Result<()> {
             return Err(wrong(table_at, reason));
         };
         // A chunk behind all points may be empty.
+        if compressor == LAYERED && entry.byte_count > budget.whole_bytes() {
+            let reason = format!(
+                "chunk {chunk} has {} bytes, and at most {} of a chunk are held in memory: raise --memory, or write the \
+                 file with smaller chunks",
+                entry.byte_count,
+                budget.whole_bytes()
+            );
+            return Err(wrong(at, reason));
+        }
         if compressor == LAYERED && room < layout.points && entry.point_count > 0 {
             check_layers(path, &mut input, &laz, at, end)?;
         }
@@ -99,7 +119,7 @@ pub(super) fn check(path: &Path, file: &File, layout: &Layout) -> Result<()> {
         let reason = format!("{} points are announced; the chunk table has room for {room}", layout.points);
         return Err(wrong(if layout.has_large_count { 247 } else { 107 }, reason));
     }
-    Ok(())
+    Ok(Some(table_at))
 }
 
 /// Where the chunk table is: said in front of the points, or in the last bytes of the file if the writer could not go

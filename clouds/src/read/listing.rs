@@ -3,7 +3,8 @@ use super::format::{Format, extension_of};
 use super::intrinsics::Intrinsics;
 use crate::error::{Error, Result};
 use std::collections::BTreeMap;
-use std::fs::DirEntry;
+use std::fs::{DirEntry, File};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// What a folder holds, in the natural order of names: `scan2` before `scan10`.
@@ -29,6 +30,8 @@ const BESIDE_CLOUDS: [&str; 12] = [
 ];
 
 /// How much of a `metadata.yaml` is read to see whether it is rosbag2's.
+const MARK_WITHIN_BYTES: u64 = 1 << 20;
+/// The key of all others in it.
 const BAG2_MARK: &[u8] = b"rosbag2_bagfile_information";
 
 impl Listing {
@@ -77,7 +80,7 @@ impl Listing {
     pub(super) fn format(&self, folder: &Path) -> Result<Format> {
         let what = || folder.display().to_string();
         if let Some(metadata) = self.has("metadata.yaml")
-            && std::fs::read(metadata)
+            && start_of(metadata)
                 .is_ok_and(|text| text.windows(BAG2_MARK.len()).any(|window| window == BAG2_MARK))
         {
             return Ok(Format::Bag2Folder);
@@ -139,6 +142,13 @@ impl Listing {
         };
         format!("no file of a known format ({}){hint}", Format::names())
     }
+}
+
+/// The first bytes of a file, among which the mark of rosbag2 is.
+fn start_of(path: &Path) -> std::io::Result<Vec<u8>> {
+    let mut start = Vec::new();
+    File::open(path)?.take(MARK_WITHIN_BYTES).read_to_end(&mut start)?;
+    Ok(start)
 }
 
 /// What an entry of a folder is called elsewhere, too. Only links are looked up: a folder may have a million files.

@@ -23,9 +23,11 @@ mod las_layout;
 #[cfg(feature = "las")]
 mod las_points;
 #[cfg(feature = "las")]
-mod las_runs;
+mod las_record;
 #[cfg(feature = "las")]
 mod las_scans;
+#[cfg(feature = "las")]
+mod las_trimmed;
 #[cfg(feature = "las")]
 mod las_units;
 #[cfg(feature = "las")]

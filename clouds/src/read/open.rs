@@ -78,7 +78,7 @@ fn open_file(path: &Path, format: Format, options: &OpenOptions) -> Result<Box<d
         #[cfg(feature = "las")]
         Format::Las | Format::Laz | Format::Copc => return super::las::open(path, options),
         #[cfg(feature = "e57")]
-        Format::E57 => return super::e57::open(path, options.sensor_origin_m.is_some()),
+        Format::E57 => return super::e57::open(path, options.sensor_origin_m.is_some(), &options.budget()),
         other => {
             check_is_read_here(path, other)?;
             let reason = format!("is a file; {other} needs a folder");

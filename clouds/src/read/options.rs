@@ -1,5 +1,6 @@
 use super::format::Format;
 use super::intrinsics::Intrinsics;
+use crate::spill::Budget;
 use std::path::PathBuf;
 
 /// How clouds are read where their files do not say it.
@@ -23,13 +24,18 @@ pub struct OpenOptions {
     pub intrinsics_path: Option<PathBuf>,
     /// Files that are no clouds, though they may lie among them: poses, calibrations. The camera above is one anyway.
     pub not_clouds: Vec<PathBuf>,
-    /// Bytes of memory that sorting may take; beyond them it goes to temporary files.
-    pub sort_memory_bytes: usize,
+    /// Bytes of memory for what grows with the input; beyond them it goes to temporary files.
+    pub memory_bytes: usize,
     /// Folder of temporary files; the system's own if `None`.
     pub scratch: Option<PathBuf>,
 }
 
 impl OpenOptions {
+    /// How much memory reading may take, and where the rest goes.
+    pub fn budget(&self) -> Budget {
+        Budget { bytes: self.memory_bytes, scratch: self.scratch.clone() }
+    }
+
     /// The files that are no clouds.
     pub(super) fn beside(&self) -> Vec<PathBuf> {
         self.not_clouds.iter().chain(&self.intrinsics_path).cloned().collect()
@@ -47,7 +53,7 @@ impl Default for OpenOptions {
             intrinsics: None,
             intrinsics_path: None,
             not_clouds: Vec::new(),
-            sort_memory_bytes: 64 << 20,
+            memory_bytes: Budget::DEFAULT_BYTES,
             scratch: None,
         }
     }

@@ -59,20 +59,24 @@ impl PlyPoints {
                 continue;
             }
             for done in 0..element.count {
+                let (name, count) = (&element.name, element.count);
+                let cut =
+                    |lines: &Lines| lines.error(format!("the file ends after {done} of {count} {name}"));
+                if number != self.vertices {
+                    if !lines.pass()? {
+                        return Err(cut(&lines));
+                    }
+                    continue;
+                }
                 let line = loop {
                     match lines.next()? {
                         Some((_, line)) if line.trim().is_empty() => {}
                         Some((_, line)) => break line,
-                        None => {
-                            let (name, count) = (&element.name, element.count);
-                            return Err(lines.error(format!("the file ends after {done} of {count} {name}")));
-                        }
+                        None => return Err(cut(&lines)),
                     }
                 };
-                if number == self.vertices {
-                    values_of(element, &line, &mut values).map_err(|reason| lines.error(reason))?;
-                    visit(self.clock.point(&self.meaning, |at| values.get(at).copied().unwrap_or(f64::NAN)))?;
-                }
+                values_of(element, &line, &mut values).map_err(|reason| lines.error(reason))?;
+                visit(self.clock.point(&self.meaning, |at| values.get(at).copied().unwrap_or(f64::NAN)))?;
             }
         }
         Ok(())

@@ -1,13 +1,15 @@
 use super::bag1_record::{Record, RecordKind};
-use super::chunk::{ChunkPlace, MOST_CHUNK_BYTES, MessagePlace, OpenChunk, decompress};
-use super::chunk_file::ChunkFile;
-use super::chunk_order::ChunkOrder;
+use super::chunk::{ChunkPlace, MOST_CHUNK_BYTES, MessagePlace, OpenChunk, decompress, plain};
+use super::chunk_file::{ChunkFile, Shares, TakeMessage, check_chunks};
+use super::chunk_order::{ChunkOrder, Step};
 use super::file_bytes::FileBytes;
 use super::recording::{Message, Recording, Topic, TopicList};
 use super::wire::Wire;
 use crate::error::{Error, Place, Result};
-use std::collections::HashMap;
+use crate::spill::{Budget, SpillFile, StreamSize, Window};
+use std::collections::{HashMap, HashSet};
 use std::path::Path;
+use std::sync::Arc;
 
 /// A `.bag` of ROS 1, version 2.0. Its index is read if there is one; otherwise the file is read once before.
 #[derive(Debug)]
@@ -18,12 +20,17 @@ pub struct Bag1 {
     connections: HashMap<u32, usize>,
     chunks: Vec<ChunkPlace>,
     order: ChunkOrder,
+    spill: SpillFile,
     remarks: Vec<String>,
 }
 
 const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
-/// A longer record outside of chunks is not read.
-const MOST_RECORD_BYTES: u64 = 64 << 20;
+/// A longer header of a record is damage.
+const MAX_HEADER_BYTES: u64 = 1 << 16;
+/// A longer connection, which has the definition of a message, or place of a chunk is damage.
+const MOST_RECORD_BYTES: u64 = 4 << 20;
+/// Most connections of a recording: publishers of topics. Messages of others are damage.
+const MAX_CONNECTIONS: usize = 1 << 16;
 
 impl Bag1 {
     /// Opens a file.
@@ -32,6 +39,15 @@ impl Bag1 {
     ///
     /// A file that cannot be read or is no such bag.
     pub fn open(path: &Path) -> Result<Self> {
+        Self::open_within(path, &Budget::default())
+    }
+
+    /// As [`Bag1::open`], in so much memory.
+    ///
+    /// # Errors
+    ///
+    /// As for [`Bag1::open`].
+    pub fn open_within(path: &Path, budget: &Budget) -> Result<Self> {
         let mut file = FileBytes::open(path)?;
         let magic = file.read_at(0, MAGIC.len() as u64)?;
         if magic != MAGIC {
@@ -47,7 +63,8 @@ impl Bag1 {
             topics: TopicList::default(),
             connections: HashMap::new(),
             chunks: Vec::new(),
-            order: ChunkOrder::default(),
+            order: ChunkOrder::new(budget),
+            spill: SpillFile::new(budget),
             remarks: Vec::new(),
         };
         let first = bag.record(MAGIC.len() as u64)?;
@@ -67,7 +84,7 @@ impl Bag1 {
         else {
             return Ok(None);
         };
-        let header = self.file.read_at(offset + 4, (header_bytes + 4).min(MOST_RECORD_BYTES))?;
+        let header = self.file.read_at(offset + 4, (header_bytes + 4).min(MAX_HEADER_BYTES))?;
         let Some((fields, data_bytes)) =
             header.split_last_chunk().filter(|_| header.len() as u64 == header_bytes + 4)
         else {
@@ -90,6 +107,8 @@ impl Bag1 {
 
     /// Reads connections and places of chunks from the end of the file; `false` if they are not all there.
     fn read_index(&mut self, index_at: u64) -> Result<bool> {
+        let shares = Shares::of(self.spill.budget());
+        let mut lists: HashSet<Arc<[usize]>> = HashSet::new();
         let mut at = index_at;
         while at < self.file.len {
             let Some((record, next)) = self.record(at)? else { return Ok(self.forget()) };
@@ -109,10 +128,19 @@ impl Bag1 {
                             return Ok(self.forget());
                         };
                         self.topics.count(topic, u64::from(count));
-                        topics.push(topic);
+                        if topics.last() != Some(&topic) {
+                            topics.push(topic);
+                        }
                     }
+                    topics.sort_unstable();
+                    topics.dedup();
+                    let topics: Arc<[usize]> = topics.into();
+                    let topics = Some(lists.get(&topics).cloned().unwrap_or_else(|| {
+                        lists.insert(Arc::clone(&topics));
+                        topics
+                    }));
                     let bytes = self.file.len.saturating_sub(offset);
-                    let topics = Some(topics);
+                    check_chunks(self.chunks.len(), shares, self.file.path())?;
                     self.chunks.push(ChunkPlace { offset, bytes, start_ns, topics, is_bare: false });
                 }
                 _ => return Ok(self.forget()),
@@ -134,6 +162,7 @@ impl Bag1 {
     fn scan(&mut self) -> Result<()> {
         let mut at = MAGIC.len() as u64;
         let mut start_ns = i64::MIN;
+        let shares = Shares::of(self.spill.budget());
         let mut messages = 0_u64;
         while let Some((record, next)) = self.record(at)? {
             if record.op == Some(RecordKind::Connection) {
@@ -142,13 +171,18 @@ impl Bag1 {
             if record.op == Some(RecordKind::Chunk) {
                 let place =
                     ChunkPlace { offset: at, bytes: next - at, start_ns, topics: None, is_bare: false };
+                let (mut earliest, mut count, mut counts) = (None, 0, HashMap::new());
                 // A bad chunk is told of when it is its turn; others come behind it.
-                let chunk = self.load(&place, None).unwrap_or_default();
-                for message in &chunk.messages {
-                    self.topics.count(message.topic, 1);
-                }
-                messages += chunk.messages.len() as u64;
-                start_ns = chunk.messages.iter().map(|message| message.log_ns).min().unwrap_or(start_ns);
+                let _ = self.load(&place, &mut |MessagePlace { log_ns, topic, .. }| {
+                    *counts.entry(topic).or_default() += 1;
+                    earliest = Some(earliest.map_or(log_ns, |earliest: i64| earliest.min(log_ns)));
+                    count += 1;
+                    Ok(())
+                });
+                counts.into_iter().for_each(|(topic, messages)| self.topics.count(topic, messages));
+                messages += count;
+                start_ns = earliest.unwrap_or(start_ns);
+                check_chunks(self.chunks.len(), shares, self.file.path())?;
                 self.chunks.push(ChunkPlace { start_ns, ..place });
             }
             at = next;
@@ -164,38 +198,63 @@ impl Bag1 {
 
     fn connect(&mut self, record: &Record, data: &[u8]) {
         let Some(id) = record.u32("conn") else { return };
-        let type_name = Record::fields_of(data).and_then(|fields| fields.text("type")).unwrap_or_default();
+        if self.connections.len() >= MAX_CONNECTIONS && !self.connections.contains_key(&id) {
+            return;
+        }
+        let type_name = Record::text_of(data, "type").unwrap_or_default();
         let name = record.text("topic").unwrap_or_default();
-        let topic = self.topics.index(&name, &type_name, Some(Wire::Ros1));
-        self.connections.insert(id, topic);
+        if let Some(topic) = self.topics.index(&name, &type_name, Some(Wire::Ros1)) {
+            self.connections.insert(id, topic);
+        }
     }
 
     /// Walks over the records of a chunk.
-    fn find_messages(&mut self, chunk: &mut OpenChunk, wanted: Option<&[usize]>) {
-        let mut at = 0;
-        while at < chunk.bytes.len() {
-            let Some((record, data, next)) = Record::in_chunk(&chunk.bytes, at) else {
-                chunk.complaint.get_or_insert_with(|| format!("byte {at} of its contents starts no record"));
-                return;
+    fn find_messages(&mut self, chunk: &mut OpenChunk, take: &mut TakeMessage<'_>) -> Result<()> {
+        let OpenChunk { bytes, complaint } = chunk;
+        let (mut window, mut at) = (Window::default(), 0);
+        while at < bytes.len() {
+            let header_bytes =
+                u32_of(bytes.piece(at, 4, &mut window)?).filter(|bytes| *bytes <= MAX_HEADER_BYTES);
+            let head = match header_bytes {
+                Some(header_bytes) => bytes.piece(at + 4, header_bytes as usize + 4, &mut window)?,
+                None => None,
             };
+            let head = head.and_then(|head| {
+                let (header, data_bytes) = head.split_last_chunk()?;
+                Some((Record::of(header)?, u64::from(u32::from_le_bytes(*data_bytes))))
+            });
+            let whole = head.and_then(|(record, data_bytes)| {
+                let data_at = at + 8 + record.header_bytes;
+                let end = data_at.checked_add(data_bytes).filter(|end| *end <= bytes.len())?;
+                Some((record, data_at, end))
+            });
+            let Some((record, data_at, end)) = whole else {
+                complaint.get_or_insert_with(|| format!("byte {at} of its contents starts no record"));
+                return Ok(());
+            };
+            let len = end - data_at;
             if record.op == Some(RecordKind::Connection) {
-                let data = chunk.bytes.get(data).unwrap_or_default();
+                let data_bytes = if len > MOST_RECORD_BYTES { 0 } else { len as usize };
+                let data = bytes.piece(data_at, data_bytes, &mut window)?.unwrap_or_default();
                 self.connect(&record, data);
             } else if record.op == Some(RecordKind::Message) {
                 let topic = record.u32("conn").and_then(|id| self.connections.get(&id).copied());
                 let Some((topic, log_ns)) = topic.zip(record.time_ns("time")) else {
-                    chunk
-                        .complaint
+                    complaint
                         .get_or_insert_with(|| format!("byte {at}: a message without connection or time"));
-                    return;
+                    return Ok(());
                 };
-                if wanted.is_none_or(|wanted| wanted.contains(&topic)) {
-                    chunk.messages.push(MessagePlace { log_ns, topic, range: data });
-                }
+                take(MessagePlace { log_ns, start: data_at, len, topic })?;
             }
-            at = next;
+            at = end;
         }
+        Ok(())
     }
+}
+
+/// The number that four bytes are.
+fn u32_of(bytes: Option<&[u8]>) -> Option<u64> {
+    bytes?.first_chunk().map(|bytes| u64::from(u32::from_le_bytes(*bytes)))
 }
 
 impl ChunkFile for Bag1 {
@@ -207,7 +266,11 @@ impl ChunkFile for Bag1 {
         &mut self.order
     }
 
-    fn load(&mut self, place: &ChunkPlace, wanted: Option<&[usize]>) -> Result<OpenChunk> {
+    fn step(&mut self) -> Result<Step> {
+        self.order.step(&self.chunks)
+    }
+
+    fn load(&mut self, place: &ChunkPlace, take: &mut TakeMessage<'_>) -> Result<OpenChunk> {
         let path = self.file.path().to_owned();
         let wrong = |reason: String| Error::format(&path, Place::Byte(place.offset), reason);
         let head = self.record(place.offset)?;
@@ -225,12 +288,20 @@ impl ChunkFile for Bag1 {
                 "a chunk of more than 1 GiB is not read; record smaller ones (rosbag record --chunksize)";
             return Err(wrong(reason.into()));
         }
-        let data = self.file.read_at(data_at, data_bytes)?;
-        let is_cut = (data.len() as u64) < data_bytes;
-        let (bytes, complaint) = decompress(&compression, data, claimed);
+        let there = data_bytes.min(self.file.len.saturating_sub(data_at));
+        let is_packed = !matches!(compression.as_str(), "" | "none");
+        let (memory_bytes, spill) = (self.order.chunk_bytes(), &mut self.spill);
+        let (bytes, complaint) = self.file.stream(data_at, there, |input| match is_packed {
+            true => {
+                let size = StreamSize::Claimed(claimed);
+                decompress(&compression, input, size, spill, memory_bytes, &mut |_| {})
+            }
+            false => plain(&path, data_at, there, memory_bytes, input, &mut |_| {}),
+        })?;
+        let is_cut = there < data_bytes;
         let complaint = if is_cut { Some("the file ends in the midst of it".to_owned()) } else { complaint };
-        let mut chunk = OpenChunk { bytes, messages: Vec::new(), complaint };
-        self.find_messages(&mut chunk, wanted);
+        let mut chunk = OpenChunk { bytes, complaint };
+        self.find_messages(&mut chunk, take)?;
         Ok(chunk)
     }
 }
@@ -245,7 +316,7 @@ impl Recording for Bag1 {
     }
 
     fn begin(&mut self, topics: &[usize]) -> Result<()> {
-        self.order = ChunkOrder::new(&self.chunks, topics);
+        self.order.begin(&self.chunks, topics);
         Ok(())
     }
 

@@ -1,5 +1,4 @@
 use super::file_bytes::Pieces;
-use std::ops::Range;
 
 /// What a record of a bag is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,22 +45,18 @@ impl Record {
         Some(record)
     }
 
-    /// Fields without an `op`: the data of a connection.
-    pub(super) fn fields_of(data: &[u8]) -> Option<Self> {
-        // An operation is put before them, so that they are a header.
-        let mut header = b"\x04\0\0\0op=\x07".to_vec();
-        header.extend_from_slice(data);
-        Self::of(&header)
-    }
-
-    /// The record at a place of a chunk, where its data are, and the place behind it.
-    pub(super) fn in_chunk(bytes: &[u8], at: usize) -> Option<(Self, Range<usize>, usize)> {
-        let mut pieces = Pieces { bytes, at };
-        let record = Self::of(pieces.sized()?)?;
-        let count = pieces.u32()? as usize;
-        let start = pieces.at;
-        pieces.take(count)?;
-        Some((record, start..pieces.at, pieces.at))
+    /// The text of a field among fields without an `op`: the data of a connection. `None` if any of them is damaged.
+    pub(super) fn text_of(data: &[u8], name: &str) -> Option<String> {
+        let (mut pieces, mut found) = (Pieces::new(data), None);
+        while !pieces.is_empty() {
+            let field = pieces.sized()?;
+            let equals = field.iter().position(|&byte| byte == b'=')?;
+            let (known, value) = field.split_at_checked(equals)?;
+            if known == name.as_bytes() && found.is_none() {
+                found = value.strip_prefix(b"=");
+            }
+        }
+        found.map(|value| String::from_utf8_lossy(value).into_owned())
     }
 
     fn value(&self, name: &str) -> Option<&[u8]> {

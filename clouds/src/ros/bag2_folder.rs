@@ -1,10 +1,12 @@
 use super::bag2_metadata::Bag2Metadata;
-use super::chunk::{MOST_CHUNK_BYTES, read_all};
+use super::chunk::{MOST_CHUNK_BYTES, decompress, unpacker};
+use super::message_data::MessageData;
 use super::open::open_file;
 use super::recording::{Message, Recording, Topic};
 use super::sequence::Sequence;
 use crate::error::{Error, Place, Result};
 use crate::inside::is_inside;
+use crate::spill::{Budget, Bytes, SpillFile, StreamSize};
 use std::fs::File;
 use std::io::{BufReader, Read, Write};
 use std::path::{Path, PathBuf};
@@ -18,12 +20,13 @@ pub struct Bag2Folder {
     path: PathBuf,
     files: Sequence,
     has_compressed_messages: bool,
+    spill: SpillFile,
     remarks: Vec<String>,
     _unpacked: Option<TempDir>,
 }
 
-/// A longer `metadata.yaml` is none.
-const MOST_METADATA_BYTES: u64 = 64 << 20;
+/// A longer `metadata.yaml` is an error.
+const MOST_METADATA_BYTES: u64 = 8 << 20;
 
 impl Bag2Folder {
     /// Opens a folder.
@@ -32,22 +35,28 @@ impl Bag2Folder {
     ///
     /// A folder without files of a recording; a file that cannot be read or is invalid.
     pub fn open(path: &Path) -> Result<Self> {
-        Self::open_with(path, None)
+        Self::open_within(path, &Budget::default())
     }
 
-    /// As [`Bag2Folder::open`]. Compressed files are unpacked into a folder in `scratch`; `None` is the system's for
-    /// temporary files.
+    /// As [`Bag2Folder::open`], in so much memory. Compressed files are unpacked into its folder for temporary files.
     ///
     /// # Errors
     ///
     /// As for [`Bag2Folder::open`].
-    pub fn open_with(path: &Path, scratch: Option<&Path>) -> Result<Self> {
+    pub fn open_within(path: &Path, budget: &Budget) -> Result<Self> {
+        let scratch = budget.scratch.as_deref();
         let mut remarks = Vec::new();
         let metadata_path = path.join("metadata.yaml");
         let (metadata, files) = if metadata_path.is_file() {
             let file =
                 File::open(&metadata_path).map_err(|error| Error::io(&metadata_path, "read", error))?;
-            let (text, _) = read_all(file, MOST_METADATA_BYTES);
+            let mut text = Vec::new();
+            let read = file.take(MOST_METADATA_BYTES + 1).read_to_end(&mut text);
+            read.map_err(|error| Error::io(&metadata_path, "read", error))?;
+            if text.len() as u64 > MOST_METADATA_BYTES {
+                let reason = format!("it is longer than {MOST_METADATA_BYTES} bytes; name the files instead");
+                return Err(Error::format(&metadata_path, Place::Byte(MOST_METADATA_BYTES), reason));
+            }
             let metadata = Bag2Metadata::of(&String::from_utf8_lossy(&text));
             let files = metadata.files.iter().map(|name| find(path, name)).collect::<Result<Vec<_>>>()?;
             (metadata, files)
@@ -70,7 +79,7 @@ impl Bag2Folder {
             let reason = format!("compression_format `{format}` is not read; known: zstd");
             return Err(Error::format(&metadata_path, Place::Byte(0), reason));
         }
-        let mut unpacked = None;
+        let (mut unpacked, spill) = (None, SpillFile::new(budget));
         let mut recordings = Sequence::default();
         for (number, file) in files.iter().enumerate() {
             if is_packed(file) {
@@ -78,10 +87,10 @@ impl Bag2Folder {
                     Some(folder) => folder,
                     none => none.insert(temporary_folder(scratch)?),
                 };
-                let (plain, damage) = unpack(file, folder.path(), number)?;
+                let (plain, damage) = unpack(file, folder.path(), number, &spill)?;
                 // The name of the temporary file would tell nobody anything.
                 let damaged = damage.map(|damage| format!("it is cut off or damaged ({damage})"));
-                let opened = open_file(&plain).map_err(|error| {
+                let opened = open_file(&plain, budget).map_err(|error| {
                     let damaged = damaged.as_deref().unwrap_or("it was unpacked");
                     Error::format(
                         file,
@@ -94,13 +103,14 @@ impl Bag2Folder {
                 remarks.extend(remark);
                 recordings.push(opened);
             } else {
-                recordings.push(open_file(file)?);
+                recordings.push(open_file(file, budget)?);
             }
         }
         Ok(Self {
             path: path.to_owned(),
             files: recordings,
             has_compressed_messages: metadata.compression_mode.eq_ignore_ascii_case("message"),
+            spill,
             remarks,
             _unpacked: unpacked,
         })
@@ -164,13 +174,13 @@ fn files_of(folder: &Path) -> Result<Vec<PathBuf>> {
 
 /// Unpacks a compressed file; as much of it as is whole, and why not more, if it is cut off. Files of other folders, or
 /// `a.mcap.zst` beside `a.mcap.zstd`, may have the same name without its end: the number of the file tells them apart.
-fn unpack(file: &Path, folder: &Path, number: usize) -> Result<(PathBuf, Option<String>)> {
+fn unpack(file: &Path, folder: &Path, number: usize, spill: &SpillFile) -> Result<(PathBuf, Option<String>)> {
     let stem = file.file_stem().unwrap_or_default().to_string_lossy();
     let target = folder.join(format!("{number}_{stem}"));
     let input = File::open(file).map_err(|error| Error::io(file, "read", error))?;
     let mut output = File::create(&target).map_err(|error| Error::io(&target, "write", error))?;
-    let mut decoder = zstd::stream::read::Decoder::new(BufReader::new(input))
-        .map_err(|error| Error::io(file, "unpack", error))?;
+    let mut decoder =
+        unpacker(BufReader::new(input), spill).map_err(|error| Error::io(file, "unpack", error))?;
     let mut bytes = vec![0; 1 << 16];
     loop {
         match decoder.read(&mut bytes) {
@@ -200,13 +210,25 @@ impl Recording for Bag2Folder {
     fn next_message(&mut self) -> Result<Option<Message>> {
         let Some(mut message) = self.files.next_message()? else { return Ok(None) };
         if self.has_compressed_messages {
-            let (data, complaint) = unpack_message(message.data);
+            let input = match &message.data.0 {
+                Bytes::Memory(bytes) => Ok(bytes.as_slice()),
+                Bytes::File(part) => Err(part.reader()),
+            };
+            let memory_bytes = self.spill.budget().bytes / 2;
+            let size = StreamSize::AtMost(MOST_CHUNK_BYTES);
+            let mut unpacked = |input: &mut dyn Read| {
+                decompress("zstd", input, size, &mut self.spill, memory_bytes, &mut |_| {})
+            };
+            let (data, complaint) = match input {
+                Ok(mut bytes) => unpacked(&mut bytes)?,
+                Err(mut reader) => unpacked(&mut reader)?,
+            };
             if let Some(complaint) = complaint {
                 let reason =
                     format!("a message recorded at {} ns cannot be unpacked: {complaint}", message.log_ns);
                 return Err(Error::argument(self.path.display().to_string(), reason));
             }
-            message.data = data;
+            message.data = MessageData(data);
         }
         Ok(Some(message))
     }
@@ -217,12 +239,5 @@ impl Recording for Bag2Folder {
 
     fn remarks(&self) -> Vec<String> {
         self.remarks.iter().cloned().chain(self.files.remarks()).collect()
-    }
-}
-
-fn unpack_message(data: Vec<u8>) -> (Vec<u8>, Option<String>) {
-    match zstd::stream::read::Decoder::new(data.as_slice()) {
-        Ok(decoder) => read_all(decoder, MOST_CHUNK_BYTES),
-        Err(error) => (Vec::new(), Some(error.to_string())),
     }
 }

@@ -1,7 +1,8 @@
+use crate::spill::Budget;
 use std::path::PathBuf;
 
 /// Which clouds of a recording are read, and where their poses come from.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BagOptions {
     /// The topic of the clouds; needed if there are several.
     pub topic: Option<String>,
@@ -14,8 +15,31 @@ pub struct BagOptions {
     pub poses: PoseSource,
     /// Between two poses further apart in time there is none; see [`most_gap_ns`](crate::poses::most_gap_ns).
     pub most_gap_ns: Option<i64>,
-    /// Folder that compressed files are unpacked into; the system's own for temporary files if `None`.
+    /// Bytes of memory for chunks, messages and poses; beyond them they go to temporary files.
+    pub memory_bytes: usize,
+    /// Folder that compressed files are unpacked into, and of other temporary files; the system's own if `None`.
     pub scratch: Option<PathBuf>,
+}
+
+impl BagOptions {
+    /// How much memory reading may take, and where the rest goes.
+    pub fn budget(&self) -> Budget {
+        Budget { bytes: self.memory_bytes, scratch: self.scratch.clone() }
+    }
+}
+
+impl Default for BagOptions {
+    fn default() -> Self {
+        Self {
+            topic: None,
+            odometry_topic: None,
+            fixed_frame: None,
+            poses: PoseSource::default(),
+            most_gap_ns: None,
+            memory_bytes: Budget::DEFAULT_BYTES,
+            scratch: None,
+        }
+    }
 }
 
 /// Where the poses of the sensor come from.

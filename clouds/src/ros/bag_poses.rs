@@ -1,12 +1,15 @@
 use super::bag_options::{BagOptions, PoseSource};
 use super::bag_topic::{choose_poses, kind_of};
-use super::messages::{MessageKind, StampedPose, decode_poses};
+use super::messages::{MessageKind, StampedPose, visit_poses};
 use super::pose_lookup::PoseLookup;
 use super::pose_track::PoseTrack;
 use super::recording::{Recording, Topic};
+use super::sample_spool::SampleSpool;
+use super::second_parent::SecondParent;
 use super::transforms::{Transforms, WhyNot};
 use crate::error::{Error, Result};
 use crate::pose::RigidPose;
+use crate::spill::Budget;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -24,8 +27,19 @@ pub(super) struct BagPoses {
     remarks: Vec<String>,
 }
 
+/// Memory that a sample takes.
+const SAMPLE_BYTES: usize = 96;
+/// Most pairs of a frame and its parent; a robot has a hundred.
+const MAX_LINKS: usize = 10_000;
+/// A longer name of a frame is damage.
+const MAX_NAME_BYTES: usize = 256;
+/// Most reasons that are counted for clouds without a pose.
+const MAX_REASONS: usize = 100;
 /// The frames that a robot moves by, if a pose does not name its own.
 const BASE_FRAMES: [&str; 2] = ["base_link", "base_footprint"];
+/// Second parents of frames that are reported, and links among which they are looked for.
+const MOST_SECONDS: usize = 8;
+const MOST_CHECKED: usize = 2000;
 
 impl BagPoses {
     /// Reads all transforms, and the poses of a topic if these are asked for.
@@ -50,7 +64,7 @@ impl BagPoses {
             _ => None,
         };
         wanted.extend(odometry);
-        poses.read_topics(recording, &topics, &wanted, odometry)?;
+        poses.read_topics(recording, &topics, &wanted, odometry, &options.budget())?;
         match odometry.and_then(|index| topics.get(index)) {
             Some(topic) if poses.track.poses.is_empty() => Err(poses.without_track(topic)),
             _ => Ok(poses),
@@ -78,16 +92,30 @@ impl BagPoses {
         topics: &[Topic],
         wanted: &[usize],
         odometry: Option<usize>,
+        budget: &Budget,
     ) -> Result<()> {
-        let (mut bad, mut invalid) = (Vec::new(), 0_u64);
+        let (mut bad, mut first_bad, mut beyond) = (0_u64, None, 0_u64);
+        let mut note = |what: String| {
+            bad += 1;
+            first_bad.get_or_insert(what);
+        };
+        let (mut invalid, mut first_invalid) = (0_u64, None);
+        let (mut checked, mut seconds): (usize, Vec<SecondParent>) = (0, Vec::new());
+        let share = budget.bytes / 2;
+        let (mut links, mut in_memory, mut spool) = (0_usize, 0, None);
         let transforms = Arc::make_mut(&mut self.transforms);
         recording.begin(wanted)?;
         loop {
-            let message = match recording.next_message() {
+            if in_memory > share / SAMPLE_BYTES {
+                let spool = spool.get_or_insert_with(|| SampleSpool::new(budget, share));
+                spool.take(transforms.samples_mut().chain([&mut self.track.poses]))?;
+                in_memory = 0;
+            }
+            let mut message = match recording.next_message() {
                 Ok(Some(message)) => message,
                 Ok(None) => break,
                 Err(error) => {
-                    bad.push(error.to_string());
+                    note(error.to_string());
                     continue;
                 }
             };
@@ -97,47 +125,94 @@ impl BagPoses {
             else {
                 continue;
             };
-            match decode_poses(kind, wire, &message.data) {
-                Ok(poses) if Some(message.topic) == odometry => {
-                    poses.into_iter().for_each(|pose| self.track.insert(pose));
+            let data = match message.data.load(budget.whole_bytes()) {
+                Ok(data) => data,
+                Err(error) => {
+                    note(format!("{}: {error}", topic.name));
+                    continue;
                 }
-                Ok(poses) => {
-                    let is_static = topic.name.ends_with("tf_static");
-                    for StampedPose { header, child_frame, parent_from_child } in poses {
-                        let (parent, stamp_ns) = (header.frame_id.as_str(), header.stamp_ns);
-                        let is_taken =
-                            transforms.insert(parent, &child_frame, stamp_ns, parent_from_child, is_static);
-                        invalid += u64::from(!is_taken);
+            };
+            let is_track = Some(message.topic) == odometry;
+            let is_static = topic.name.ends_with("tf_static");
+            let decoded = visit_poses(kind, wire, data, &mut |pose| {
+                in_memory += 1;
+                if is_track {
+                    return self.track.insert(pose);
+                }
+                let StampedPose { header, child_frame, parent_from_child } = pose;
+                let (parent, stamp_ns) = (header.frame_id.as_str(), header.stamp_ns);
+                // A frame that has many parents loses one for the next.
+                let parents = transforms.parents_of(&child_frame);
+                let is_new = !transforms.has_link(parent, &child_frame);
+                if is_new && (links >= MAX_LINKS || parent.len().max(child_frame.len()) > MAX_NAME_BYTES) {
+                    beyond += 1;
+                    return;
+                }
+                match transforms.insert(parent, &child_frame, stamp_ns, parent_from_child, is_static) {
+                    Ok(false) => {}
+                    Ok(true) => {
+                        links += transforms.parents_of(&child_frame).saturating_sub(parents);
+                        checked += 1;
+                        if checked <= MOST_CHECKED && seconds.len() < MOST_SECONDS {
+                            seconds.extend(transforms.second_parent(parent, &child_frame));
+                        }
+                    }
+                    Err(why) => {
+                        invalid += 1;
+                        first_invalid.get_or_insert(why);
                     }
                 }
-                Err(error) => bad.push(format!("{}: {error}", topic.name)),
+            });
+            if let Err(error) = decoded {
+                note(format!("{}: {error}", topic.name));
             }
         }
-        if let Some(first) = bad.first() {
+        if let Some(spool) = spool {
+            spool.finish(transforms.samples_mut().chain([&mut self.track.poses]))?;
+        }
+        if let Some(first) = first_bad {
+            self.remarks
+                .push(format!("{bad} messages or chunks with poses cannot be read; the first: {first}"));
+        }
+        if beyond > 0 {
             self.remarks.push(format!(
-                "{} messages or chunks with poses cannot be read; the first: {first}",
-                bad.len()
+                "{beyond} transforms are left out: their frames are more than {MAX_LINKS}, or have names of more than \
+                 {MAX_NAME_BYTES} bytes"
             ));
         }
-        if invalid > 0 {
-            let remark =
-                "transforms are not valid (numbers, frames without a name or in themselves) and left out";
-            self.remarks.push(format!("{invalid} {remark}"));
+        if let Some(first) = first_invalid {
+            self.remarks.push(format!("{invalid} transforms are not valid and left out; the first: {first}"));
         }
+        self.remarks.extend(seconds.into_iter().map(told));
         Ok(())
     }
 
     /// Where the sensor was; counts why not.
-    pub(super) fn world_from_sensor(&mut self, sensor_frame: &str, stamp_ns: i64) -> Option<RigidPose> {
+    pub(super) fn world_from_sensor(
+        &mut self,
+        sensor_frame: &str,
+        stamp_ns: i64,
+    ) -> Result<Option<RigidPose>> {
         let found = match self.source {
-            PoseSource::None => return None,
+            PoseSource::None => return Ok(None),
             PoseSource::Odometry if !self.track.poses.is_empty() => {
                 self.settle_track(sensor_frame);
                 self.find(sensor_frame, stamp_ns)
             }
             _ => self.find(sensor_frame, stamp_ns),
         };
-        found.map_err(|why| *self.without.entry(why.to_string()).or_default() += 1).ok()
+        match found {
+            Ok(pose) => Ok(Some(pose)),
+            Err(WhyNot::Unreadable(why)) => Err(Error::argument("poses of the recording", why)),
+            Err(why) => {
+                let mut why = why.to_string();
+                if self.without.len() >= MAX_REASONS && !self.without.contains_key(&why) {
+                    why = "other reasons".to_owned();
+                }
+                *self.without.entry(why).or_default() += 1;
+                Ok(None)
+            }
+        }
     }
 
     fn find(&self, sensor_frame: &str, stamp_ns: i64) -> std::result::Result<RigidPose, WhyNot> {
@@ -161,7 +236,7 @@ impl BagPoses {
         if !self.transforms.knows(sensor_frame) {
             return Err(WhyNot::UnknownFrame(sensor_frame.to_owned()));
         }
-        let chain = self.transforms.ancestors(sensor_frame)?;
+        let chain = self.transforms.ancestors(sensor_frame);
         if let Some(known) =
             ["map", "odom"].into_iter().find(|known| chain.iter().any(|frame| frame == known))
         {
@@ -171,7 +246,7 @@ impl BagPoses {
         if !chain.iter().any(|frame| self.transforms.is_moving(frame)) {
             return Err(WhyNot::NothingMoves(sensor_frame.to_owned()));
         }
-        chain.last().cloned().ok_or_else(|| WhyNot::UnknownFrame(sensor_frame.to_owned()))
+        Ok(self.transforms.root_of(sensor_frame))
     }
 
     /// Puts the poses of a topic among the transforms, in the place of those of the same frame.
@@ -185,8 +260,10 @@ impl BagPoses {
             transforms.detach(&parent);
             self.fixed_frame = Some(parent.clone());
         }
-        for (stamp_ns, pose) in poses {
-            odd += u64::from(!transforms.insert(&parent, &child, stamp_ns, pose, false));
+        let count = poses.len() as u64;
+        match transforms.attach(&parent, &child, poses) {
+            Ok(_) => self.remarks.extend(transforms.second_parent(&parent, &child).map(told)),
+            Err(_) => odd += count,
         }
         if odd > 0 {
             let remark = format!(
@@ -203,7 +280,7 @@ impl BagPoses {
 
     /// The frame that poses without a name are of: the base of the robot that carries the sensor, or the sensor.
     fn base_of(&self, sensor_frame: &str) -> String {
-        let chain = self.transforms.ancestors(sensor_frame).unwrap_or_default();
+        let chain = self.transforms.ancestors(sensor_frame);
         let base = BASE_FRAMES.into_iter().find(|base| chain.iter().any(|frame| frame == base));
         base.unwrap_or(sensor_frame).to_owned()
     }
@@ -213,4 +290,8 @@ impl BagPoses {
         let without = self.without.iter().map(|(why, count)| format!("{count} clouds have no pose: {why}"));
         self.remarks.iter().cloned().chain(without)
     }
+}
+
+fn told(second: SecondParent) -> String {
+    format!("{second}; a parent that a single transform names, or that makes a loop, does not count")
 }

@@ -17,7 +17,11 @@ pub(super) fn kind_of(topic: &Topic) -> Option<MessageKind> {
 }
 
 /// Finds the topic of the clouds.
-pub(super) fn choose_clouds(recording: &mut dyn Recording, name: Option<&str>) -> Result<Chosen> {
+pub(super) fn choose_clouds(
+    recording: &mut dyn Recording,
+    name: Option<&str>,
+    whole_bytes: u64,
+) -> Result<Chosen> {
     let topics = recording.topics().to_vec();
     if let Some(name) = name {
         let index = named(&topics, name, "--topic")?;
@@ -35,7 +39,7 @@ pub(super) fn choose_clouds(recording: &mut dyn Recording, name: Option<&str>) -
     for (index, topic) in topics.iter().enumerate().filter(|(_, topic)| topic.messages > 0) {
         let Some(kind) = kind_of(topic).filter(|kind| kind.is_cloud()) else { continue };
         let mut is_depth =
-            || Ok(camera_of(&topics, topic).is_some() && holds_depths(recording, index, topic)?);
+            || Ok(camera_of(&topics, topic).is_some() && holds_depths(recording, index, topic, whole_bytes)?);
         if kind != MessageKind::Image || is_depth()? {
             found.push((index, kind));
         }
@@ -138,13 +142,21 @@ fn camera_of(topics: &[Topic], image: &Topic) -> Option<usize> {
 }
 
 /// Whether the first image of a topic holds depths.
-fn holds_depths(recording: &mut dyn Recording, index: usize, topic: &Topic) -> Result<bool> {
+fn holds_depths(
+    recording: &mut dyn Recording,
+    index: usize,
+    topic: &Topic,
+    whole_bytes: u64,
+) -> Result<bool> {
     recording.begin(&[index])?;
     // Bad chunks are told of when clouds are read.
     let first = recording.next_message().unwrap_or_default();
-    let image =
-        first.as_ref().zip(topic.wire).and_then(|(message, wire)| Image::decode(wire, &message.data).ok());
-    Ok(image.is_some_and(|image| is_depth_encoding(&image.encoding)))
+    let Some((mut message, wire)) = first.zip(topic.wire) else { return Ok(false) };
+    if message.data.len() > whole_bytes {
+        return Ok(false);
+    }
+    let data = message.data.load(whole_bytes)?;
+    Ok(Image::decode(wire, data).is_ok_and(|image| is_depth_encoding(&image.encoding)))
 }
 
 /// `/points (sensor_msgs/msg/PointCloud2, 20 messages), ...`.

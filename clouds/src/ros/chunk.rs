@@ -1,4 +1,9 @@
-use std::ops::Range;
+use crate::error::{Error, Result};
+use crate::spill::{Bytes, FilePart, Record, SpillFile, StreamSize};
+use std::cmp::Ordering;
+use std::io::Read;
+use std::path::Path;
+use std::sync::Arc;
 
 /// A part of a file whose messages are read together.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -9,65 +14,125 @@ pub(super) struct ChunkPlace {
     pub(super) bytes: u64,
     /// No message of it is earlier.
     pub(super) start_ns: i64,
-    /// The topics that it has messages of; `None` if that is not known.
-    pub(super) topics: Option<Vec<usize>>,
+    /// The topics that it has messages of; `None` if that is not known. Chunks share their lists.
+    pub(super) topics: Option<Arc<[usize]>>,
     /// Its bytes are records of the file itself, not compressed and without a frame.
     pub(super) is_bare: bool,
 }
 
-/// A chunk in memory.
+/// A chunk of which messages are found.
 #[derive(Debug, Default)]
 pub(super) struct OpenChunk {
-    pub(super) bytes: Vec<u8>,
-    pub(super) messages: Vec<MessagePlace>,
+    pub(super) bytes: Bytes,
     /// What is wrong with it; its messages are those before the bad place.
     pub(super) complaint: Option<String>,
 }
 
 /// A message in a chunk.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct MessagePlace {
     pub(super) log_ns: i64,
+    pub(super) start: u64,
+    pub(super) len: u64,
     pub(super) topic: usize,
-    pub(super) range: Range<usize>,
 }
 
-/// A chunk that takes more bytes is not read.
+impl Record for MessagePlace {
+    const BYTES: usize = 32;
+
+    fn encode(&self, bytes: &mut [u8]) {
+        let numbers = [self.log_ns.cast_unsigned(), self.start, self.len, self.topic as u64];
+        for (to, from) in bytes.iter_mut().zip(numbers.into_iter().flat_map(u64::to_le_bytes)) {
+            *to = from;
+        }
+    }
+
+    fn decode(bytes: &[u8]) -> Self {
+        let (numbers, _) = bytes.as_chunks::<8>();
+        let number = |k: usize| numbers.get(k).copied().map_or(0, u64::from_le_bytes);
+        let topic = usize::try_from(number(3)).unwrap_or(usize::MAX);
+        Self { log_ns: number(0).cast_signed(), start: number(1), len: number(2), topic }
+    }
+
+    fn order(&self, other: &Self) -> Ordering {
+        (self.log_ns, self.start).cmp(&(other.log_ns, other.start))
+    }
+}
+
+/// A chunk that takes more bytes is not read, not even into a temporary file.
 pub(super) const MOST_CHUNK_BYTES: u64 = 1 << 30;
 
-/// Reads all of a stream, at most so many bytes; what came before an error is kept.
-pub(super) fn read_all(input: impl std::io::Read, most_bytes: u64) -> (Vec<u8>, Option<String>) {
-    use std::io::Read;
-    let mut bytes = Vec::new();
-    let result = input.take(most_bytes.saturating_add(1)).read_to_end(&mut bytes);
-    let complaint = match result {
-        Err(error) => Some(error.to_string()),
-        Ok(read) if read as u64 > most_bytes => {
-            Some(format!("it holds more than the {most_bytes} bytes that it claims"))
-        }
-        Ok(_) => None,
-    };
-    bytes.truncate(usize::try_from(most_bytes).unwrap_or(usize::MAX));
-    (bytes, complaint)
-}
+/// What to do about a window of zstd that is too large.
+const WINDOW_HINT: &str =
+    "raise --memory, or compress it with a smaller window (zstd without --long and --ultra)";
 
-/// The bytes of a compressed chunk, as far as they can be had, and why not all.
-pub(super) fn decompress(compression: &str, bytes: Vec<u8>, claimed: u64) -> (Vec<u8>, Option<String>) {
+/// Unpacks a compressed stream, as far as it goes, and says why not all of it. `see` gets the bytes in order.
+pub(super) fn decompress(
+    compression: &str,
+    input: impl Read,
+    size: StreamSize,
+    spill: &mut SpillFile,
+    memory_bytes: usize,
+    see: &mut dyn FnMut(&[u8]),
+) -> Result<(Bytes, Option<String>)> {
     let (plain, complaint) = match compression {
-        "" | "none" => return (bytes, None),
-        "bz2" => read_all(bzip2::read::BzDecoder::new(bytes.as_slice()), claimed),
-        "lz4" => read_all(lz4_flex::frame::FrameDecoder::new(bytes.as_slice()), claimed),
-        "zstd" => match zstd::stream::read::Decoder::new(bytes.as_slice()) {
-            Ok(decoder) => read_all(decoder, claimed),
-            Err(error) => (Vec::new(), Some(error.to_string())),
+        "bz2" => spill.take(bzip2::read::BzDecoder::new(input), size, memory_bytes, see)?,
+        "lz4" => spill.take(lz4_flex::frame::FrameDecoder::new(input), size, memory_bytes, see)?,
+        "zstd" => match unpacker(input, spill) {
+            Ok(decoder) => {
+                let (plain, complaint) = spill.take(decoder, size, memory_bytes, see)?;
+                // The library says so of a window.
+                let is_window = |text: &String| text.contains("too much memory");
+                let hint = complaint.as_ref().filter(|text| is_window(text));
+                let hinted = hint.map(|text| format!("{text}: {WINDOW_HINT}"));
+                (plain, hinted.or(complaint))
+            }
+            Err(error) => (Bytes::default(), Some(error.to_string())),
         },
         other => {
-            (Vec::new(), Some(format!("compression `{other}` is not known; known: none, bz2, lz4, zstd")))
+            let complaint = format!("compression `{other}` is not known; known: none, bz2, lz4, zstd");
+            (Bytes::default(), Some(complaint))
         }
     };
-    let complaint = complaint.or_else(|| {
-        let missing = claimed.saturating_sub(plain.len() as u64);
-        (missing > 0).then(|| format!("{missing} of {claimed} bytes are missing"))
+    let complaint = complaint.or_else(|| match size {
+        StreamSize::Claimed(claimed) => {
+            let missing = claimed.saturating_sub(plain.len());
+            (missing > 0).then(|| format!("{missing} of {claimed} bytes are missing"))
+        }
+        StreamSize::AtMost(_) => None,
     });
-    (plain, complaint)
+    Ok((plain, complaint))
+}
+
+/// The bytes of a chunk that is not compressed: in memory or, of a large one, where they are.
+pub(super) fn plain(
+    path: &Path,
+    offset: u64,
+    bytes: u64,
+    memory_bytes: usize,
+    input: &mut dyn Read,
+    see: &mut dyn FnMut(&[u8]),
+) -> Result<(Bytes, Option<String>)> {
+    let fail = |error| Error::io(path, "read", error);
+    if bytes <= memory_bytes as u64 {
+        let mut taken = Vec::with_capacity(usize::try_from(bytes).unwrap_or(0));
+        input.read_to_end(&mut taken).map_err(fail)?;
+        see(&taken);
+        return Ok((Bytes::Memory(taken), None));
+    }
+    let mut buffer = vec![0; 1 << 16];
+    loop {
+        let count = input.read(&mut buffer).map_err(fail)?;
+        if count == 0 {
+            return Ok((Bytes::File(FilePart::open(path, offset, bytes)?), None));
+        }
+        see(buffer.get(..count).unwrap_or_default());
+    }
+}
+
+/// Unpacks zstd. A frame says how much memory it needs, which is believed up to a bound.
+pub(super) fn unpacker<'i, R: Read + 'i>(input: R, spill: &SpillFile) -> std::io::Result<Box<dyn Read + 'i>> {
+    let mut decoder = zstd::stream::read::Decoder::new(input)?;
+    decoder.window_log_max(spill.budget().window_log())?;
+    Ok(Box::new(decoder))
 }

@@ -1,14 +1,19 @@
 use super::chunk::{ChunkPlace, MOST_CHUNK_BYTES, MessagePlace, OpenChunk};
+use super::chunk_file::Shares;
+use super::message_data::{MessageData, read};
 use super::recording::Message;
+use crate::error::Result;
+use crate::spill::{Budget, Bytes, Record, Sorted, Sorter};
 use std::path::Path;
 
-/// Puts the messages of chunks in order of time. Chunks overlap a little; those that do are in memory together.
-#[derive(Debug, Default)]
+/// Puts the messages of chunks in order of time. Chunks overlap a little; those that do are played together.
+#[derive(Debug)]
 pub(super) struct ChunkOrder {
     /// What messages are wanted of.
     pub(super) topics: Vec<usize>,
-    /// In order of their starts.
-    places: Vec<ChunkPlace>,
+    budget: Budget,
+    /// Numbers of chunks in order of their starts.
+    order: Vec<u32>,
     next: usize,
     open: Vec<Playing>,
     /// Messages may be out of order, because too many chunks overlap.
@@ -17,9 +22,12 @@ pub(super) struct ChunkOrder {
 
 #[derive(Debug)]
 struct Playing {
-    chunk: OpenChunk,
-    /// In order of time.
-    next: usize,
+    bytes: Bytes,
+    /// The next message.
+    head: MessagePlace,
+    /// The messages after it, in order of time, and how many all are.
+    rest: Sorted<MessagePlace>,
+    messages: u64,
     /// Number of the chunk in its file.
     number: usize,
 }
@@ -35,33 +43,60 @@ pub(super) enum Step {
     End,
 }
 
+/// Most chunks that are played together.
+const MAX_OPEN: usize = 1024;
+/// A message of so many bytes is taken into memory, from wherever it is.
+const SMALL_BYTES: u64 = 1 << 16;
+
 impl ChunkOrder {
+    pub(super) fn new(budget: &Budget) -> Self {
+        let (topics, order, open) = Default::default();
+        Self { topics, budget: budget.clone(), order, next: 0, open, has_given_up: false }
+    }
+
     /// Begins with these chunks.
-    pub(super) fn new(places: &[ChunkPlace], topics: &[usize]) -> Self {
-        let is_wanted = |place: &&ChunkPlace| {
+    pub(super) fn begin(&mut self, places: &[ChunkPlace], topics: &[usize]) {
+        let is_wanted = |place: &ChunkPlace| {
             place.topics.as_ref().is_none_or(|there| topics.iter().any(|topic| there.contains(topic)))
         };
-        let mut places: Vec<_> = places.iter().filter(is_wanted).cloned().collect();
-        places.sort_by_key(|place| (place.start_ns, place.offset));
-        Self { topics: topics.to_vec(), places, ..Self::default() }
+        let mut order: Vec<u32> =
+            (0..).zip(places).filter(|(_, place)| is_wanted(place)).map(|(number, _)| number).collect();
+        order.sort_by_key(|number| places.get(*number as usize).map(|place| (place.start_ns, place.offset)));
+        *self = Self { topics: topics.to_vec(), order, ..Self::new(&self.budget) };
+    }
+
+    /// Sorts the messages of a chunk that is to be loaded.
+    pub(super) fn sorter(&self) -> Sorter<MessagePlace> {
+        let share = Shares::of(&self.budget).messages as u64;
+        let held: u64 = self.open.iter().map(|playing| playing.messages * MessagePlace::BYTES as u64).sum();
+        Sorter::new(&self.budget, usize::try_from(share.saturating_sub(held)).unwrap_or(0))
+    }
+
+    /// Bytes of memory for a chunk that is to be loaded.
+    pub(super) fn chunk_bytes(&self) -> usize {
+        let held: usize = self.open.iter().map(|playing| playing.bytes.in_memory()).sum();
+        Shares::of(&self.budget).chunks.saturating_sub(held)
     }
 
     /// The next step.
-    pub(super) fn step(&mut self) -> Step {
+    pub(super) fn step(&mut self, places: &[ChunkPlace]) -> Result<Step> {
         let earliest = self.earliest();
-        if let Some(place) = self.places.get(self.next) {
+        let next = self.order.get(self.next).and_then(|number| places.get(*number as usize));
+        if let Some(place) = next {
             let is_due = earliest.is_none_or(|(_, log_ns)| place.start_ns <= log_ns);
-            let held: u64 = self.open.iter().map(|playing| playing.chunk.bytes.len() as u64).sum();
-            // A file whose chunks all overlap would be in memory as a whole.
-            let is_room = earliest.is_none() || held < MOST_CHUNK_BYTES;
+            let held: u64 = self.open.iter().map(|playing| playing.bytes.len()).sum();
+            // A file whose chunks all overlap would be open as a whole.
+            let is_room = earliest.is_none() || (held < MOST_CHUNK_BYTES && self.open.len() < MAX_OPEN);
             self.has_given_up |= is_due && !is_room;
             if is_due && is_room {
                 self.next += 1;
-                return Step::Load(place.clone());
+                return Ok(Step::Load(place.clone()));
             }
         }
-        let message = earliest.and_then(|(index, _)| self.take(index));
-        message.map_or(Step::End, Step::Message)
+        match earliest {
+            Some((index, _)) => Ok(self.take(index)?.map_or(Step::End, Step::Message)),
+            None => Ok(Step::End),
+        }
     }
 
     /// What a person should know of the order of a file's messages.
@@ -71,31 +106,42 @@ impl ChunkOrder {
         self.has_given_up.then(text)
     }
 
-    /// Takes a chunk that was asked for.
-    pub(super) fn open(&mut self, mut chunk: OpenChunk) {
-        chunk.messages.sort_by_key(|place| (place.log_ns, place.range.start));
-        if !chunk.messages.is_empty() {
-            self.open.push(Playing { chunk, next: 0, number: self.next });
+    /// Takes a chunk that was asked for, and its messages.
+    pub(super) fn open(
+        &mut self,
+        chunk: OpenChunk,
+        mut rest: Sorted<MessagePlace>,
+        messages: u64,
+    ) -> Result<()> {
+        if let Some(head) = rest.next()? {
+            self.open.push(Playing { bytes: chunk.bytes, head, rest, messages, number: self.next });
         }
+        Ok(())
     }
 
     /// The open chunk with the earliest message, and its time.
     fn earliest(&self) -> Option<(usize, i64)> {
-        let heads = self.open.iter().enumerate().filter_map(|(index, playing)| {
-            let place = playing.chunk.messages.get(playing.next)?;
-            Some((place.log_ns, playing.number, index))
-        });
+        let heads = self.open.iter().enumerate();
+        let heads = heads.map(|(index, playing)| (playing.head.log_ns, playing.number, index));
         heads.min().map(|(log_ns, _, index)| (index, log_ns))
     }
 
-    fn take(&mut self, index: usize) -> Option<Message> {
-        let playing = self.open.get_mut(index)?;
-        let MessagePlace { log_ns, topic, range } = playing.chunk.messages.get(playing.next)?.clone();
-        let data = playing.chunk.bytes.get(range).unwrap_or_default().to_vec();
-        playing.next += 1;
-        if playing.next >= playing.chunk.messages.len() {
-            self.open.swap_remove(index);
+    fn take(&mut self, index: usize) -> Result<Option<Message>> {
+        let Some(playing) = self.open.get_mut(index) else { return Ok(None) };
+        let MessagePlace { log_ns, topic, start, len } = playing.head;
+        let data = match &playing.bytes {
+            Bytes::Memory(bytes) => {
+                let range = usize::try_from(start).ok().zip(usize::try_from(len).ok());
+                let data = range.and_then(|(start, len)| bytes.get(start..start.checked_add(len)?));
+                Bytes::Memory(data.unwrap_or_default().to_vec())
+            }
+            Bytes::File(part) if len <= SMALL_BYTES => Bytes::Memory(read(&part.part(start, len), len)?),
+            Bytes::File(part) => Bytes::File(part.part(start, len)),
+        };
+        match playing.rest.next()? {
+            Some(next) => playing.head = next,
+            None => drop(self.open.swap_remove(index)),
         }
-        Some(Message { topic, log_ns, data })
+        Ok(Some(Message { topic, log_ns, data: MessageData(data) }))
     }
 }

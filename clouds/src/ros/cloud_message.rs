@@ -2,6 +2,7 @@ use super::messages::{CameraInfo, Header, Image, LaserScan, LivoxCustom, Message
 use super::wire::{Wire, WireError};
 use crate::cloud::CloudPoint;
 use crate::error::Result;
+use crate::spill::FilePart;
 
 /// A message that is a cloud.
 pub(super) enum CloudMessage<'a> {
@@ -25,6 +26,15 @@ impl<'a> CloudMessage<'a> {
             (MessageKind::Image, Some(camera)) => Self::Depth(Image::decode(wire, data)?, camera),
             _ => return Err(WireError { byte: 0, reason: "it is no cloud".to_owned() }),
         })
+    }
+
+    /// Decodes a `PointCloud2` of `len` bytes of which only the first are at hand.
+    pub(super) fn decode_start(
+        wire: Wire,
+        start: &'a [u8],
+        len: u64,
+    ) -> std::result::Result<Self, WireError> {
+        PointCloud2::decode_start(wire, start, len).map(Self::PointCloud2)
     }
 
     pub(super) fn header(&self) -> &Header {
@@ -85,10 +95,18 @@ impl<'a> CloudMessage<'a> {
         }
     }
 
-    /// Visits all points that are there; returns why there are not more.
-    pub(super) fn visit(&self, visit: &mut dyn FnMut(CloudPoint) -> Result<()>) -> Result<Option<WireError>> {
+    /// Visits all points that are there; returns why there are not more. `part` is a message of which the first bytes
+    /// were decoded.
+    pub(super) fn visit(
+        &self,
+        part: Option<&FilePart>,
+        visit: &mut dyn FnMut(CloudPoint) -> Result<()>,
+    ) -> Result<Option<WireError>> {
         match self {
             Self::PointCloud2(cloud) => {
+                if let Some(part) = part {
+                    return cloud.visit_part(part, visit);
+                }
                 cloud.points().try_for_each(visit)?;
                 Ok(cloud.shortage())
             }

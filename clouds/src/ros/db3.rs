@@ -1,21 +1,26 @@
+use super::message_data::MessageData;
 use super::recording::{Message, Recording, Topic, TopicList};
 use super::wire::Wire;
 use crate::error::{Error, Place, Result};
-use rusqlite::{Connection, OpenFlags};
+use crate::spill::{Budget, Record, Sorted, Sorter, SpillFile, StreamSize};
+use rusqlite::limits::Limit;
+use rusqlite::{Connection, MAIN_DB, OpenFlags};
+use std::cmp::Ordering;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 /// A `.db3` of ROS 2: a database of SQLite, which is opened for reading only.
 ///
-/// Messages come in order of the time at which they were recorded. Memory holds 24 bytes for each of them.
+/// Messages come in order of the time at which they were recorded. The places of many are in a temporary file.
 #[derive(Debug)]
 pub struct Db3 {
     database: Database,
     topics: TopicList,
     /// The topic of a number in the file.
     numbers: HashMap<i64, usize>,
-    places: Vec<RowPlace>,
-    next: usize,
+    /// Messages that are still to come.
+    places: Option<Sorted<RowPlace>>,
+    spill: SpillFile,
     remarks: Vec<String>,
 }
 
@@ -24,6 +29,8 @@ struct Database {
     path: PathBuf,
     /// `None` while it is closed.
     connection: Option<Connection>,
+    /// A longer value of a column is an error.
+    most_bytes: u64,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -33,6 +40,28 @@ struct RowPlace {
     topic: usize,
 }
 
+impl Record for RowPlace {
+    const BYTES: usize = 24;
+
+    fn encode(&self, bytes: &mut [u8]) {
+        let numbers = [self.log_ns.cast_unsigned(), self.id.cast_unsigned(), self.topic as u64];
+        for (to, from) in bytes.iter_mut().zip(numbers.into_iter().flat_map(u64::to_le_bytes)) {
+            *to = from;
+        }
+    }
+
+    fn decode(bytes: &[u8]) -> Self {
+        let (numbers, _) = bytes.as_chunks::<8>();
+        let number = |k: usize| numbers.get(k).copied().map_or(0, u64::from_le_bytes);
+        let topic = usize::try_from(number(2)).unwrap_or(usize::MAX);
+        Self { log_ns: number(0).cast_signed(), id: number(1).cast_signed(), topic }
+    }
+
+    fn order(&self, other: &Self) -> Ordering {
+        self.cmp(other)
+    }
+}
+
 impl Db3 {
     /// Opens a file.
     ///
@@ -40,14 +69,23 @@ impl Db3 {
     ///
     /// A file that cannot be read or is no such database.
     pub fn open(path: &Path) -> Result<Self> {
+        Self::open_within(path, &Budget::default())
+    }
+
+    /// As [`Db3::open`], in so much memory.
+    ///
+    /// # Errors
+    ///
+    /// As for [`Db3::open`].
+    pub fn open_within(path: &Path, budget: &Budget) -> Result<Self> {
         // SQLite would say the same of a file that is missing and of one that is no database.
         std::fs::File::open(path).map_err(|error| Error::io(path, "read", error))?;
         let mut db3 = Self {
-            database: Database { path: path.to_owned(), connection: None },
+            database: Database { path: path.to_owned(), connection: None, most_bytes: budget.whole_bytes() },
             topics: TopicList::default(),
             numbers: HashMap::new(),
-            places: Vec::new(),
-            next: 0,
+            places: None,
+            spill: SpillFile::new(budget),
             remarks: Vec::new(),
         };
         db3.read_topics().map_err(|error| wrong(path, 0, &error))?;
@@ -71,7 +109,9 @@ impl Db3 {
                 "ros1" => Some(Wire::Ros1),
                 _ => None,
             };
-            self.numbers.insert(row.get(0)?, self.topics.index(&name, &type_name, wire));
+            if let Some(topic) = self.topics.index(&name, &type_name, wire) {
+                self.numbers.insert(row.get(0)?, topic);
+            }
         }
         Ok(())
     }
@@ -89,20 +129,59 @@ impl Db3 {
         Ok(())
     }
 
-    /// Finds the rows of topics; those before an error stay.
-    fn find_rows(&mut self, topics: &[usize]) -> rusqlite::Result<()> {
+    /// Finds the rows of topics; those before an error stay. The inner error is that of a temporary file.
+    fn find_rows(
+        &mut self,
+        topics: &[usize],
+        places: &mut Sorter<RowPlace>,
+        found: &mut u64,
+    ) -> rusqlite::Result<Result<()>> {
         if topics.is_empty() {
-            return Ok(());
+            return Ok(Ok(()));
         }
         let mut statement = self.database.open()?.prepare("SELECT id, topic_id, timestamp FROM messages")?;
         let mut rows = statement.query([])?;
         while let Some(row) = rows.next()? {
             let (id, number, log_ns): (i64, i64, i64) = (row.get(0)?, row.get(1)?, row.get(2)?);
             if let Some(&topic) = self.numbers.get(&number).filter(|topic| topics.contains(topic)) {
-                self.places.push(RowPlace { log_ns, id, topic });
+                if let Err(error) = places.push(RowPlace { log_ns, id, topic }) {
+                    return Ok(Err(error));
+                }
+                *found += 1;
             }
         }
-        Ok(())
+        Ok(Ok(()))
+    }
+
+    /// The bytes of a message; a large one goes to a file.
+    fn data(&mut self, id: i64) -> Result<MessageData> {
+        let path = self.database.path.clone();
+        let fail = |error| wrong(&path, u64::try_from(id).unwrap_or(0), &error);
+        let database = self.database.open().map_err(fail)?;
+        let memory_bytes = self.spill.budget().bytes / 2;
+        const QUERY: &str =
+            "SELECT length(data), CASE WHEN length(data) <= ?2 THEN data END FROM messages WHERE id = ?1";
+        let row = database.prepare_cached(QUERY).and_then(|mut statement| {
+            let limits = [id, i64::try_from(memory_bytes).unwrap_or(i64::MAX)];
+            statement.query_row(limits, |row| {
+                let bytes: i64 = row.get(0)?;
+                let data: Option<Vec<u8>> = row.get(1)?;
+                Ok((bytes, data))
+            })
+        });
+        let bytes = match row.map_err(fail)? {
+            (_, Some(data)) => return Ok(MessageData::from(data)),
+            (bytes, None) => u64::try_from(bytes).unwrap_or(0),
+        };
+        let input = database.blob_open(MAIN_DB, "messages", "data", id, true).map_err(fail)?;
+        let (data, complaint) =
+            self.spill.take(input, StreamSize::Claimed(bytes), memory_bytes, &mut |_| {})?;
+        match complaint {
+            Some(complaint) => {
+                Err(Error::format(&path, Place::Record(u64::try_from(id).unwrap_or(0)), complaint))
+            }
+            None => Ok(MessageData(data)),
+        }
     }
 }
 
@@ -112,7 +191,10 @@ impl Database {
             Some(connection) => connection,
             None => {
                 let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
-                Connection::open_with_flags(&self.path, flags)?
+                let connection = Connection::open_with_flags(&self.path, flags)?;
+                let most_bytes = i32::try_from(self.most_bytes).unwrap_or(i32::MAX);
+                connection.set_limit(Limit::SQLITE_LIMIT_LENGTH, most_bytes)?;
+                connection
             }
         };
         Ok(self.connection.insert(connection))
@@ -129,30 +211,28 @@ impl Recording for Db3 {
     }
 
     fn begin(&mut self, topics: &[usize]) -> Result<()> {
-        self.next = 0;
-        self.places.clear();
-        let found = self.find_rows(topics);
-        self.places.sort_unstable();
-        if let Err(error) = found {
-            let (path, found) = (self.database.path.display(), self.places.len());
-            let remark = format!("{path} is damaged ({error}): {found} messages were found before that");
-            if !self.remarks.contains(&remark) {
-                self.remarks.push(remark);
+        self.places = None;
+        let budget = self.spill.budget().clone();
+        let mut places = Sorter::new(&budget, budget.bytes / 4);
+        let mut found = 0;
+        match self.find_rows(topics, &mut places, &mut found) {
+            Ok(kept) => kept?,
+            Err(error) => {
+                let path = self.database.path.display();
+                let remark = format!("{path} is damaged ({error}): {found} messages were found before that");
+                if !self.remarks.contains(&remark) {
+                    self.remarks.push(remark);
+                }
             }
         }
+        self.places = Some(places.finish()?);
         Ok(())
     }
 
     fn next_message(&mut self) -> Result<Option<Message>> {
-        let Some(&RowPlace { log_ns, id, topic }) = self.places.get(self.next) else { return Ok(None) };
-        self.next += 1;
-        let data = self
-            .database
-            .open()
-            .and_then(|database| database.prepare_cached("SELECT data FROM messages WHERE id = ?1"))
-            .and_then(|mut statement| statement.query_row([id], |row| row.get(0)));
-        let data =
-            data.map_err(|error| wrong(&self.database.path, u64::try_from(id).unwrap_or(0), &error))?;
+        let next = self.places.as_mut().map(Sorted::next).transpose()?.flatten();
+        let Some(RowPlace { log_ns, id, topic }) = next else { return Ok(None) };
+        let data = self.data(id)?;
         Ok(Some(Message { topic, log_ns, data }))
     }
 

@@ -39,6 +39,26 @@ impl FileBytes {
         &self.path
     }
 
+    /// Reads so many bytes from a place on as a stream: fewer at the end of the file.
+    pub(super) fn stream<T>(
+        &mut self,
+        offset: u64,
+        bytes: u64,
+        read: impl FnOnce(&mut dyn Read) -> Result<T>,
+    ) -> Result<T> {
+        let fail = |error| Error::io(&self.path, "read", error);
+        let mut input = match self.input.take() {
+            Some(input) => input,
+            None => Input::open(&self.path).map_err(fail)?,
+        };
+        input.go_to(offset).map_err(fail)?;
+        let mut stream = (&mut input.bytes).take(bytes);
+        let outcome = read(&mut stream)?;
+        input.at = offset.saturating_add(bytes - stream.limit());
+        self.input = Some(input);
+        Ok(outcome)
+    }
+
     /// Bytes from a place on: fewer than asked for at the end of the file. Memory grows with what is there only.
     pub(super) fn read_at(&mut self, offset: u64, bytes: u64) -> Result<Vec<u8>> {
         let there = bytes.min(self.len.saturating_sub(offset));
@@ -59,18 +79,27 @@ impl Input {
         Ok(Self { bytes: BufReader::with_capacity(1 << 16, File::open(path)?), at: 0 })
     }
 
-    fn read_at(&mut self, offset: u64, bytes: u64) -> io::Result<Vec<u8>> {
+    fn go_to(&mut self, offset: u64) -> io::Result<()> {
         match i64::try_from(i128::from(offset) - i128::from(self.at)) {
             // Keeps what is buffered already.
             Ok(ahead) => self.bytes.seek_relative(ahead)?,
             Err(_) => drop(self.bytes.seek(SeekFrom::Start(offset))?),
         }
+        self.at = offset;
+        Ok(())
+    }
+
+    fn read_at(&mut self, offset: u64, bytes: u64) -> io::Result<Vec<u8>> {
+        self.go_to(offset)?;
         let mut taken = Vec::new();
         (&mut self.bytes).take(bytes).read_to_end(&mut taken)?;
         self.at = offset.saturating_add(taken.len() as u64);
         Ok(taken)
     }
 }
+
+/// A longer name of a topic, a type or an encoding is damage.
+const MAX_NAME_BYTES: usize = 1 << 12;
 
 /// Reads little-endian numbers and pieces of a record.
 #[derive(Clone, Copy, Debug)]
@@ -117,9 +146,10 @@ impl<'a> Pieces<'a> {
         self.take(count)
     }
 
-    /// Text behind its length.
-    pub(super) fn text(&mut self) -> Option<String> {
-        Some(String::from_utf8_lossy(self.sized()?).into_owned())
+    /// A name behind its length.
+    pub(super) fn name(&mut self) -> Option<String> {
+        let name = self.sized().filter(|name| name.len() <= MAX_NAME_BYTES)?;
+        Some(String::from_utf8_lossy(name).into_owned())
     }
 }
 

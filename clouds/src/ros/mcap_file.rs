@@ -1,18 +1,22 @@
-use super::chunk::{ChunkPlace, MOST_CHUNK_BYTES, MessagePlace, OpenChunk, decompress};
-use super::chunk_file::ChunkFile;
-use super::chunk_order::ChunkOrder;
+use super::chunk::{ChunkPlace, MOST_CHUNK_BYTES, MessagePlace, OpenChunk, decompress, plain};
+use super::chunk_file::{ChunkFile, Shares, TakeMessage, check_chunks};
+use super::chunk_order::{ChunkOrder, Step};
 use super::file_bytes::{FileBytes, Pieces};
 use super::mcap_record::{
-    Channels, ChunkHead, ChunkIndex, MAGIC, MESSAGE_HEAD_BYTES, RECORD_HEAD_BYTES, Statistics, message_head,
-    op, record_at,
+    Channels, ChunkHead, ChunkIndex, MAGIC, MAX_NAMES_BYTES, MESSAGE_HEAD_BYTES, RECORD_HEAD_BYTES,
+    Statistics, message_head, op, record_at,
 };
 use super::recording::{Message, Recording, Topic, TopicList};
 use crate::error::{Error, Place, Result};
+use crate::spill::{Budget, SpillFile, StreamSize, Window};
+use std::collections::{HashMap, HashSet};
 use std::path::Path;
+use std::sync::Arc;
 
 /// An MCAP file, of ROS 1 or ROS 2. Its summary is read if there is one; otherwise the file is read once before.
 ///
-/// Messages come in order of the time at which they were recorded. Memory holds the chunks that overlap in time.
+/// Messages come in order of the time at which they were recorded. Chunks that overlap in time are in memory or, beyond
+/// its share, in a temporary file.
 #[derive(Debug)]
 pub struct McapFile {
     file: FileBytes,
@@ -20,6 +24,7 @@ pub struct McapFile {
     channels: Channels,
     chunks: Vec<ChunkPlace>,
     order: ChunkOrder,
+    spill: SpillFile,
     remarks: Vec<String>,
 }
 
@@ -27,8 +32,8 @@ pub struct McapFile {
 const END_BYTES: u64 = RECORD_HEAD_BYTES + 20 + 8;
 /// The magic at the end.
 const END_MAGIC_BYTES: u64 = 8;
-/// A longer record outside of chunks is not read, but stepped over.
-const MOST_RECORD_BYTES: u64 = 64 << 20;
+/// A longer record of the summary is damage.
+const MOST_RECORD_BYTES: u64 = 1 << 20;
 /// Messages outside of chunks are read together up to this size.
 const BARE_CHUNK_BYTES: u64 = 4 << 20;
 
@@ -39,6 +44,15 @@ impl McapFile {
     ///
     /// A file that cannot be read or is no MCAP file.
     pub fn open(path: &Path) -> Result<Self> {
+        Self::open_within(path, &Budget::default())
+    }
+
+    /// As [`McapFile::open`], in so much memory.
+    ///
+    /// # Errors
+    ///
+    /// As for [`McapFile::open`].
+    pub fn open_within(path: &Path, budget: &Budget) -> Result<Self> {
         let mut file = FileBytes::open(path)?;
         if file.read_at(0, MAGIC.len() as u64)? != MAGIC {
             return Err(Error::format(
@@ -52,7 +66,8 @@ impl McapFile {
             topics: TopicList::default(),
             channels: Channels::default(),
             chunks: Vec::new(),
-            order: ChunkOrder::default(),
+            order: ChunkOrder::new(budget),
+            spill: SpillFile::new(budget),
             remarks: Vec::new(),
         };
         if !mcap.read_summary()? {
@@ -78,21 +93,29 @@ impl McapFile {
         let footer = record_at(&end, 0).filter(|(kind, ..)| *kind == op::FOOTER && end.ends_with(MAGIC));
         let footer = footer.and_then(|(_, contents, _)| Pieces::new(end.get(contents)?).u64());
         let Some(mut at) = footer.filter(|&start| start != 0) else { return Ok(false) };
+        let shares = Shares::of(self.spill.budget());
         let mut statistics = None;
+        // Channels may come behind the places of chunks: lists are those of channels until all are known.
+        let mut lists = HashSet::new();
         let mut indices = Vec::new();
         while at < end_at {
             let Some((kind, bytes)) = self.head(at)? else { return Ok(false) };
             let next = at.checked_add(RECORD_HEAD_BYTES).and_then(|at| at.checked_add(bytes));
             let Some(next) = next.filter(|&next| next <= end_at) else { return Ok(false) };
             if matches!(kind, op::SCHEMA | op::CHANNEL | op::CHUNK_INDEX | op::STATISTICS) {
-                if bytes > MOST_RECORD_BYTES {
-                    return Ok(false);
-                }
-                let contents = self.file.read_at(at + RECORD_HEAD_BYTES, bytes)?;
+                let most_bytes = match kind {
+                    op::SCHEMA | op::CHANNEL => bytes.min(MAX_NAMES_BYTES),
+                    _ if bytes > MOST_RECORD_BYTES => return Ok(false),
+                    _ => bytes,
+                };
+                let contents = self.file.read_at(at + RECORD_HEAD_BYTES, most_bytes)?;
                 let taken = match kind {
                     op::SCHEMA => self.channels.add_schema(&contents),
                     op::CHANNEL => self.channels.add_channel(&contents, &mut self.topics),
-                    op::CHUNK_INDEX => ChunkIndex::of(&contents).map(|index| indices.push(index)),
+                    op::CHUNK_INDEX => {
+                        check_chunks(indices.len(), shares, self.file.path())?;
+                        ChunkIndex::of(&contents).map(|index| indices.push(index.shared(&mut lists)))
+                    }
                     _ => Statistics::of(&contents).map(|found| statistics = Some(found)),
                 };
                 if taken.is_none() {
@@ -116,10 +139,14 @@ impl McapFile {
                 self.topics.count(topic, messages);
             }
         }
-        for index in indices {
-            let topics = index.channels.iter().map(|&channel| self.channels.topic(channel)).collect();
-            let topics: Option<Vec<usize>> = if index.channels.is_empty() { None } else { topics };
-            let ChunkIndex { start_ns, offset, bytes, .. } = index;
+        let topics = lists.into_iter().map(|channels: Arc<[u16]>| {
+            let topics = channels.iter().map(|&channel| self.channels.topic(channel)).collect();
+            let topics: Option<Arc<[usize]>> = if channels.is_empty() { None } else { topics };
+            (channels, topics)
+        });
+        let topics: HashMap<Arc<[u16]>, Option<Arc<[usize]>>> = topics.collect();
+        for ChunkIndex { start_ns, offset, bytes, channels } in indices {
+            let topics = topics.get(&channels).cloned().flatten();
             self.chunks.push(ChunkPlace { offset, bytes, start_ns, topics, is_bare: false });
         }
         Ok(true)
@@ -129,6 +156,7 @@ impl McapFile {
     fn scan(&mut self) -> Result<()> {
         let mut at = MAGIC.len() as u64;
         let mut start_ns = i64::MIN;
+        let shares = Shares::of(self.spill.budget());
         let (mut messages, mut is_closed) = (0_u64, false);
         while let Some((kind, bytes)) = self.head(at)? {
             if matches!(kind, op::DATA_END | op::FOOTER) {
@@ -141,8 +169,8 @@ impl McapFile {
                 break;
             };
             match kind {
-                op::SCHEMA | op::CHANNEL if bytes <= MOST_RECORD_BYTES => {
-                    let contents = self.file.read_at(at + RECORD_HEAD_BYTES, bytes)?;
+                op::SCHEMA | op::CHANNEL => {
+                    let contents = self.file.read_at(at + RECORD_HEAD_BYTES, bytes.min(MAX_NAMES_BYTES))?;
                     match kind {
                         op::SCHEMA => self.channels.add_schema(&contents),
                         _ => self.channels.add_channel(&contents, &mut self.topics),
@@ -151,13 +179,19 @@ impl McapFile {
                 op::CHUNK => {
                     let place =
                         ChunkPlace { offset: at, bytes: next - at, start_ns, topics: None, is_bare: false };
+                    let (mut earliest, mut count) = (None, 0);
+                    let mut counts = HashMap::new();
                     // A bad chunk is told of when it is its turn; others come behind it.
-                    let chunk = self.load(&place, None).unwrap_or_default();
-                    for message in &chunk.messages {
-                        self.topics.count(message.topic, 1);
-                    }
-                    messages += chunk.messages.len() as u64;
-                    start_ns = chunk.messages.iter().map(|message| message.log_ns).min().unwrap_or(start_ns);
+                    let _ = self.load(&place, &mut |MessagePlace { log_ns, topic, .. }| {
+                        *counts.entry(topic).or_default() += 1;
+                        earliest = Some(earliest.map_or(log_ns, |earliest: i64| earliest.min(log_ns)));
+                        count += 1;
+                        Ok(())
+                    });
+                    counts.into_iter().for_each(|(topic, messages)| self.topics.count(topic, messages));
+                    messages += count;
+                    start_ns = earliest.unwrap_or(start_ns);
+                    check_chunks(self.chunks.len(), shares, self.file.path())?;
                     self.chunks.push(ChunkPlace { start_ns, ..place });
                 }
                 op::MESSAGE if next <= self.file.len => {
@@ -168,6 +202,7 @@ impl McapFile {
                     if let Some((topic, log_ns)) = known {
                         self.topics.count(topic, 1);
                         messages += 1;
+                        check_chunks(self.chunks.len(), shares, self.file.path())?;
                         self.append_bare(at, next, topic, log_ns);
                     }
                 }
@@ -192,27 +227,44 @@ impl McapFile {
             Some(place) => {
                 place.bytes = next - place.offset;
                 place.start_ns = place.start_ns.min(log_ns);
-                let topics = place.topics.get_or_insert_default();
+                let topics = place.topics.as_deref().unwrap_or_default();
                 if !topics.contains(&topic) {
-                    topics.push(topic);
+                    place.topics = Some(topics.iter().copied().chain([topic]).collect());
                 }
             }
             None => {
-                let (bytes, topics) = (next - at, Some(vec![topic]));
+                let (bytes, topics) = (next - at, Some(Arc::from([topic])));
                 self.chunks.push(ChunkPlace { offset: at, bytes, start_ns: log_ns, topics, is_bare: true });
             }
         }
     }
 
     /// Walks over the records of a chunk.
-    fn find_messages(&mut self, chunk: &mut OpenChunk, wanted: Option<&[usize]>) {
-        let mut at = 0;
-        while at < chunk.bytes.len() {
-            let Some((kind, range, next)) = record_at(&chunk.bytes, at) else {
-                chunk.complaint.get_or_insert_with(|| format!("byte {at} of its contents starts no record"));
-                return;
+    fn find_messages(&mut self, chunk: &mut OpenChunk, take: &mut TakeMessage<'_>) -> Result<()> {
+        let OpenChunk { bytes, complaint } = chunk;
+        let (mut window, mut at) = (Window::default(), 0);
+        while at < bytes.len() {
+            let head = bytes.piece(at, RECORD_HEAD_BYTES as usize, &mut window)?;
+            let head = head.and_then(|head| {
+                let mut pieces = Pieces::new(head);
+                pieces.u8().zip(pieces.u64())
+            });
+            let start = at + RECORD_HEAD_BYTES;
+            let whole = head.and_then(|(kind, count)| {
+                let end = start.checked_add(count).filter(|end| *end <= bytes.len())?;
+                Some((kind, count, end))
+            });
+            let Some((kind, count, end)) = whole else {
+                complaint.get_or_insert_with(|| format!("byte {at} of its contents starts no record"));
+                return Ok(());
             };
-            let contents = chunk.bytes.get(range.clone()).unwrap_or_default();
+            let most_bytes = match kind {
+                op::SCHEMA | op::CHANNEL => MAX_NAMES_BYTES,
+                op::MESSAGE => MESSAGE_HEAD_BYTES,
+                _ => 0,
+            };
+            let contents =
+                bytes.piece(start, count.min(most_bytes) as usize, &mut window)?.unwrap_or_default();
             match kind {
                 op::SCHEMA => drop(self.channels.add_schema(contents)),
                 op::CHANNEL => drop(self.channels.add_channel(contents, &mut self.topics)),
@@ -221,20 +273,62 @@ impl McapFile {
                     let known =
                         head.and_then(|(channel, log_ns)| Some((self.channels.topic(channel)?, log_ns)));
                     let Some((topic, log_ns)) = known else {
-                        chunk
-                            .complaint
-                            .get_or_insert_with(|| format!("byte {at}: a message without a channel"));
-                        return;
+                        complaint.get_or_insert_with(|| format!("byte {at}: a message without a channel"));
+                        return Ok(());
                     };
-                    if wanted.is_none_or(|wanted| wanted.contains(&topic)) {
-                        let start = range.start + MESSAGE_HEAD_BYTES as usize;
-                        chunk.messages.push(MessagePlace { log_ns, topic, range: start..range.end });
-                    }
+                    let start = start + MESSAGE_HEAD_BYTES;
+                    take(MessagePlace { log_ns, start, len: end - start, topic })?;
                 }
                 _ => {}
             }
-            at = next;
+            at = end;
         }
+        Ok(())
+    }
+
+    /// The bytes of a chunk that is not bare, unpacked.
+    fn unpacked(&mut self, place: &ChunkPlace) -> Result<OpenChunk> {
+        let path = self.file.path().to_owned();
+        let wrong = |reason: &str| Error::format(&path, Place::Byte(place.offset), reason);
+        let too_large =
+            || wrong("a chunk of more than 1 GiB is not read; record with smaller chunks (`mcap recover`)");
+        let head = self.head(place.offset)?;
+        let Some((_, bytes)) = head.filter(|(kind, _)| *kind == op::CHUNK) else {
+            return Err(wrong("there is no chunk where the index says so; `mcap recover` makes a new index"));
+        };
+        if bytes > MOST_CHUNK_BYTES {
+            return Err(too_large());
+        }
+        let contents_at = place.offset.saturating_add(RECORD_HEAD_BYTES);
+        let there = bytes.min(self.file.len.saturating_sub(contents_at));
+        let start = self.file.read_at(contents_at, there.min(ChunkHead::MAX_BYTES))?;
+        let head = ChunkHead::of(&start).ok_or_else(|| wrong("a chunk is cut off in its header"))?;
+        if head.plain_bytes > MOST_CHUNK_BYTES {
+            return Err(too_large());
+        }
+        let (records_at, room) = (contents_at + head.records_at, there.saturating_sub(head.records_at));
+        let records_bytes = head.records_bytes.min(room);
+        let is_cut = there < bytes || head.records_bytes > room;
+        let memory_bytes = self.order.chunk_bytes();
+        let mut crc = crc32fast::Hasher::new();
+        let mut see = |bytes: &[u8]| {
+            if head.crc != 0 {
+                crc.update(bytes);
+            }
+        };
+        let is_packed = !matches!(head.compression.as_str(), "" | "none");
+        let spill = &mut self.spill;
+        let (bytes, complaint) = self.file.stream(records_at, records_bytes, |input| match is_packed {
+            true => {
+                let size = StreamSize::Claimed(head.plain_bytes);
+                decompress(&head.compression, input, size, spill, memory_bytes, &mut see)
+            }
+            false => plain(&path, records_at, records_bytes, memory_bytes, input, &mut see),
+        })?;
+        let cut = is_cut.then(|| "the file ends in the midst of it".to_owned());
+        // What is missing explains a checksum that is wrong.
+        let complaint = cut.or(complaint).or_else(|| head.complaint(crc));
+        Ok(OpenChunk { bytes, complaint })
     }
 }
 
@@ -247,42 +341,23 @@ impl ChunkFile for McapFile {
         &mut self.order
     }
 
-    fn load(&mut self, place: &ChunkPlace, wanted: Option<&[usize]>) -> Result<OpenChunk> {
-        let path = self.file.path().to_owned();
-        let wrong = |reason: &str| Error::format(&path, Place::Byte(place.offset), reason);
-        let too_large =
-            || wrong("a chunk of more than 1 GiB is not read; record with smaller chunks (`mcap recover`)");
-        let mut chunk = OpenChunk::default();
-        if place.is_bare {
-            if place.bytes > MOST_CHUNK_BYTES {
-                return Err(too_large());
-            }
-            chunk.bytes = self.file.read_at(place.offset, place.bytes)?;
+    fn step(&mut self) -> Result<Step> {
+        self.order.step(&self.chunks)
+    }
+
+    fn load(&mut self, place: &ChunkPlace, take: &mut TakeMessage<'_>) -> Result<OpenChunk> {
+        let mut chunk = if place.is_bare {
+            let (path, memory_bytes) = (self.file.path().to_owned(), self.order.chunk_bytes());
+            let bytes = place.bytes.min(self.file.len.saturating_sub(place.offset));
+            let read = self.file.stream(place.offset, bytes, |input| {
+                plain(&path, place.offset, bytes, memory_bytes, input, &mut |_| {})
+            });
+            let (bytes, complaint) = read?;
+            OpenChunk { bytes, complaint }
         } else {
-            let head = self.head(place.offset)?;
-            let Some((_, bytes)) = head.filter(|(kind, _)| *kind == op::CHUNK) else {
-                return Err(wrong(
-                    "there is no chunk where the index says so; `mcap recover` makes a new index",
-                ));
-            };
-            if bytes > MOST_CHUNK_BYTES {
-                return Err(too_large());
-            }
-            let mut contents = self.file.read_at(place.offset.saturating_add(RECORD_HEAD_BYTES), bytes)?;
-            let is_cut = (contents.len() as u64) < bytes;
-            let head = ChunkHead::of(&contents).ok_or_else(|| wrong("a chunk is cut off in its header"))?;
-            if head.plain_bytes > MOST_CHUNK_BYTES {
-                return Err(too_large());
-            }
-            contents.truncate(head.records.end);
-            contents.drain(..head.records.start);
-            let (bytes, complaint) = decompress(&head.compression, contents, head.plain_bytes);
-            let cut = (is_cut || head.is_cut).then(|| "the file ends in the midst of it".to_owned());
-            // What is missing explains a checksum that is wrong.
-            let complaint = cut.or(complaint).or_else(|| head.complaint(&bytes));
-            chunk = OpenChunk { bytes, messages: Vec::new(), complaint };
-        }
-        self.find_messages(&mut chunk, wanted);
+            self.unpacked(place)?
+        };
+        self.find_messages(&mut chunk, take)?;
         Ok(chunk)
     }
 }
@@ -298,7 +373,7 @@ impl Recording for McapFile {
     }
 
     fn begin(&mut self, topics: &[usize]) -> Result<()> {
-        self.order = ChunkOrder::new(&self.chunks, topics);
+        self.order.begin(&self.chunks, topics);
         Ok(())
     }
 

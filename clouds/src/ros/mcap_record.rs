@@ -1,8 +1,9 @@
 use super::file_bytes::{Pieces, signed_ns};
 use super::recording::TopicList;
 use super::wire::Wire;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::ops::Range;
+use std::sync::Arc;
 
 /// The first and the last bytes of an MCAP file.
 pub(super) const MAGIC: &[u8] = b"\x89MCAP0\r\n";
@@ -30,6 +31,9 @@ pub(super) struct Channels {
     topics: HashMap<u16, usize>,
 }
 
+/// The bytes of a schema or a channel that are read: its names come first.
+pub(super) const MAX_NAMES_BYTES: u64 = 1 << 14;
+
 /// The record at a place of some bytes: its kind, its contents and the place behind it.
 pub(super) fn record_at(bytes: &[u8], at: usize) -> Option<(u8, Range<usize>, usize)> {
     let mut pieces = Pieces { bytes, at };
@@ -52,7 +56,7 @@ impl Channels {
     pub(super) fn add_schema(&mut self, contents: &[u8]) -> Option<()> {
         let mut pieces = Pieces::new(contents);
         let id = pieces.u16()?;
-        self.types.insert(id, pieces.text()?);
+        self.types.insert(id, pieces.name()?);
         Some(())
     }
 
@@ -60,14 +64,14 @@ impl Channels {
     pub(super) fn add_channel(&mut self, contents: &[u8], topics: &mut TopicList) -> Option<()> {
         let mut pieces = Pieces::new(contents);
         let (id, schema) = (pieces.u16()?, pieces.u16()?);
-        let (name, encoding) = (pieces.text()?, pieces.text()?);
+        let (name, encoding) = (pieces.name()?, pieces.name()?);
         let wire = match encoding.as_str() {
             "ros1" => Some(Wire::Ros1),
             "cdr" => Some(Wire::Cdr),
             _ => None,
         };
         let type_name = self.types.get(&schema).map_or("", String::as_str);
-        self.topics.insert(id, topics.index(&name, type_name, wire));
+        self.topics.insert(id, topics.index(&name, type_name, wire)?);
         Some(())
     }
 }
@@ -88,33 +92,28 @@ pub(super) struct ChunkHead {
     /// Of its records once they are unpacked; 0 if the recorder made none.
     pub(super) crc: u32,
     pub(super) compression: String,
-    /// Its compressed records, as many as are there.
-    pub(super) records: Range<usize>,
-    pub(super) is_cut: bool,
+    /// Bytes of the chunk before its compressed records, and how many these are.
+    pub(super) records_at: u64,
+    pub(super) records_bytes: u64,
 }
 
 impl ChunkHead {
+    /// The most bytes that it takes.
+    pub(super) const MAX_BYTES: u64 = 1 << 13;
+
     pub(super) fn of(contents: &[u8]) -> Option<Self> {
         let mut pieces = Pieces::new(contents);
         pieces.take(16)?;
         let plain_bytes = pieces.u64()?;
         let crc = pieces.u32()?;
-        let compression = pieces.text()?;
-        let claimed = pieces.u64()?;
-        let there = (contents.len() - pieces.at) as u64;
-        let count = usize::try_from(claimed.min(there)).ok()?;
-        Some(Self {
-            plain_bytes,
-            crc,
-            compression,
-            records: pieces.at..pieces.at + count,
-            is_cut: claimed > there,
-        })
+        let compression = pieces.name()?;
+        let records_bytes = pieces.u64()?;
+        Some(Self { plain_bytes, crc, compression, records_at: pieces.at as u64, records_bytes })
     }
 
     /// What is wrong with its unpacked records by their checksum.
-    pub(super) fn complaint(&self, plain: &[u8]) -> Option<String> {
-        let found = crc32fast::hash(plain);
+    pub(super) fn complaint(&self, plain: crc32fast::Hasher) -> Option<String> {
+        let found = plain.finalize();
         let reason = || {
             let wanted = self.crc;
             format!(
@@ -131,10 +130,21 @@ pub(super) struct ChunkIndex {
     pub(super) offset: u64,
     pub(super) bytes: u64,
     /// Empty if the file does not say.
-    pub(super) channels: Vec<u16>,
+    pub(super) channels: Arc<[u16]>,
 }
 
 impl ChunkIndex {
+    /// The same, with the list that an equal one has already.
+    pub(super) fn shared(self, lists: &mut HashSet<Arc<[u16]>>) -> Self {
+        match lists.get(&self.channels) {
+            Some(list) => Self { channels: Arc::clone(list), ..self },
+            None => {
+                lists.insert(Arc::clone(&self.channels));
+                self
+            }
+        }
+    }
+
     pub(super) fn of(contents: &[u8]) -> Option<Self> {
         let mut pieces = Pieces::new(contents);
         let start_ns = signed_ns(pieces.u64()?);

@@ -5,6 +5,7 @@ use super::recording::Recording;
 use super::sequence::Sequence;
 use crate::error::{Error, Result};
 use crate::read::Format;
+use crate::spill::Budget;
 use std::path::{Path, PathBuf};
 
 /// Opens a recording: a file, the folder of a bag of ROS 2, or several that follow one another in time.
@@ -13,13 +14,20 @@ use std::path::{Path, PathBuf};
 ///
 /// No path; a file that cannot be read or is no recording.
 pub fn open_recording(paths: &[PathBuf]) -> Result<Box<dyn Recording>> {
-    open_recording_with(paths, None)
+    open_recording_within(paths, &Budget::default())
 }
 
-/// As [`open_recording`], with the folder that compressed files are unpacked into.
-pub(super) fn open_recording_with(paths: &[PathBuf], scratch: Option<&Path>) -> Result<Box<dyn Recording>> {
+/// As [`open_recording`], in so much memory.
+///
+/// # Errors
+///
+/// As for [`open_recording`].
+pub fn open_recording_within(paths: &[PathBuf], budget: &Budget) -> Result<Box<dyn Recording>> {
     let open = |path: &PathBuf| -> Result<Box<dyn Recording>> {
-        if path.is_dir() { Ok(Box::new(Bag2Folder::open_with(path, scratch)?)) } else { open_file(path) }
+        match path.is_dir() {
+            true => Ok(Box::new(Bag2Folder::open_within(path, budget)?)),
+            false => open_file(path, budget),
+        }
     };
     match paths {
         [] => Err(Error::argument("recording", "no file is given")),
@@ -33,15 +41,15 @@ pub(super) fn open_recording_with(paths: &[PathBuf], scratch: Option<&Path>) -> 
 }
 
 /// Opens a file by how it starts; where that is damaged, by the end of its name.
-pub(super) fn open_file(path: &Path) -> Result<Box<dyn Recording>> {
+pub(super) fn open_file(path: &Path, budget: &Budget) -> Result<Box<dyn Recording>> {
     let format = match Format::of_content(path)? {
         Some(format @ (Format::Bag1 | Format::Mcap | Format::Db3)) => Some(format),
         _ => of_name(path),
     };
     match format {
-        Some(Format::Bag1) => Ok(Box::new(Bag1::open(path)?)),
-        Some(Format::Mcap) => Ok(Box::new(McapFile::open(path)?)),
-        Some(Format::Db3) => open_db3(path),
+        Some(Format::Bag1) => Ok(Box::new(Bag1::open_within(path, budget)?)),
+        Some(Format::Mcap) => Ok(Box::new(McapFile::open_within(path, budget)?)),
+        Some(Format::Db3) => open_db3(path, budget),
         _ => {
             let reason = "it is no recording by its content or its name; known: .bag, .mcap, .db3, a folder with \
                           metadata.yaml";
@@ -57,12 +65,12 @@ fn of_name(path: &Path) -> Option<Format> {
 }
 
 #[cfg(feature = "sqlite")]
-fn open_db3(path: &Path) -> Result<Box<dyn Recording>> {
-    Ok(Box::new(super::db3::Db3::open(path)?))
+fn open_db3(path: &Path, budget: &Budget) -> Result<Box<dyn Recording>> {
+    Ok(Box::new(super::db3::Db3::open_within(path, budget)?))
 }
 
 #[cfg(not(feature = "sqlite"))]
-fn open_db3(path: &Path) -> Result<Box<dyn Recording>> {
+fn open_db3(path: &Path, _: &Budget) -> Result<Box<dyn Recording>> {
     let reason =
         "this program was built without SQLite (feature `sqlite`); `ros2 bag convert` makes an .mcap of it";
     Err(Error::argument(path.display().to_string(), reason))

@@ -1,4 +1,5 @@
 use super::transforms::{Transforms, WhyNot};
+use crate::error::Error;
 use crate::pose::RigidPose;
 use std::sync::Arc;
 
@@ -12,6 +13,14 @@ pub(super) struct PoseLookup {
 impl PoseLookup {
     pub(super) fn new(transforms: Arc<Transforms>, fixed_frame: String, sensor_frame: String) -> Self {
         Self { transforms, fixed_frame, sensor_frame }
+    }
+
+    /// Where the sensor was, if that is known.
+    pub(super) fn pose(&self, stamp_ns: i64) -> crate::error::Result<Option<RigidPose>> {
+        match self.find(stamp_ns) {
+            Err(WhyNot::Unreadable(why)) => Err(Error::argument("poses of the recording", why)),
+            found => Ok(found.ok()),
+        }
     }
 
     pub(super) fn find(&self, stamp_ns: i64) -> Result<RigidPose, WhyNot> {

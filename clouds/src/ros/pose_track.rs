@@ -1,6 +1,6 @@
 use super::messages::StampedPose;
-use crate::pose::RigidPose;
-use std::collections::BTreeMap;
+use super::samples::Samples;
+use super::transforms::is_pose;
 
 /// The poses of a topic, all of one frame in another. Every message of a path tells all the way so far: a pose is kept
 /// once for each stamp, whatever the number of messages that tell it.
@@ -11,7 +11,7 @@ pub(super) struct PoseTrack {
     /// Empty if the poses do not say.
     pub(super) child: String,
     /// By stamp; of two poses of the same stamp the later one counts.
-    pub(super) poses: BTreeMap<i64, RigidPose>,
+    pub(super) poses: Samples,
     /// Number of poses that are not valid or of other frames.
     pub(super) odd: u64,
 }
@@ -21,7 +21,7 @@ impl PoseTrack {
     pub(super) fn insert(&mut self, pose: StampedPose) {
         let StampedPose { header, child_frame, parent_from_child } = pose;
         let parent = header.frame_id;
-        if parent.is_empty() || parent == child_frame || !parent_from_child.is_valid() {
+        if parent.is_empty() || parent == child_frame || !is_pose(&parent_from_child) {
             self.odd += 1;
             return;
         }
@@ -38,6 +38,7 @@ impl PoseTrack {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::pose::RigidPose;
     use crate::ros::messages::Header;
 
     fn pose(stamp_ns: i64, parent: &str, x_m: f64) -> StampedPose {
@@ -53,7 +54,8 @@ mod tests {
             (0..message).for_each(|stamp_ns| track.insert(pose(stamp_ns, "odom", f64::from(message as i32))));
         }
         assert_eq!((track.poses.len(), track.odd), (100, 0));
-        assert_eq!(track.poses[&0].position_m[0], 100.0, "what is told last counts");
+        let (_, first) = track.poses.around(0).unwrap();
+        assert_eq!(first.map(|first| first.pose.position_m[0]), Some(100.0), "what is told last counts");
     }
 
     #[test]
@@ -63,5 +65,20 @@ mod tests {
             track.insert(pose(track.odd as i64, parent, x_m));
         }
         assert_eq!((track.parent.as_str(), track.poses.len(), track.odd), ("odom", 2, 3));
+        // As if memory were full.
+        assert_eq!(track.poses.drain().len(), 2);
+        track.insert(pose(9, "map", 5.0));
+        assert_eq!((track.parent.as_str(), track.odd), ("odom", 4));
+    }
+
+    #[test]
+    fn a_pose_is_one_as_those_of_transforms_are() {
+        let mut track = PoseTrack::default();
+        for length in [1.0, 0.95, 0.5, 0.0, f64::INFINITY] {
+            let mut pose = pose(0, "odom", 1.0);
+            pose.parent_from_child.quaternion = [0.0, 0.0, 0.0, length];
+            track.insert(pose);
+        }
+        assert_eq!((track.poses.len(), track.odd), (1, 3));
     }
 }

@@ -1,3 +1,4 @@
+use super::message_data::MessageData;
 use super::wire::Wire;
 use crate::error::Result;
 
@@ -15,14 +16,14 @@ pub struct Topic {
 }
 
 /// A message of a recording.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug)]
 pub struct Message {
     /// Its topic: an index into [`Recording::topics`].
     pub topic: usize,
     /// When it was recorded, in nanoseconds.
     pub log_ns: i64,
     /// Its bytes.
-    pub data: Vec<u8>,
+    pub data: MessageData,
 }
 
 /// Messages one at a time, in the order in which they are played.
@@ -60,17 +61,26 @@ pub trait Recording: Send {
 #[derive(Debug, Default)]
 pub(super) struct TopicList {
     pub(super) topics: Vec<Topic>,
+    /// What they take.
+    bytes: usize,
 }
 
+/// Memory for topics: some ten thousand. Others are not read.
+const MAX_TOPIC_BYTES: usize = 1 << 20;
+
 impl TopicList {
-    /// The index of a topic, which is appended if it is new.
-    pub(super) fn index(&mut self, name: &str, type_name: &str, wire: Option<Wire>) -> usize {
+    /// The index of a topic, which is appended if it is new; `None` if there are too many.
+    pub(super) fn index(&mut self, name: &str, type_name: &str, wire: Option<Wire>) -> Option<usize> {
         let is_it = |topic: &Topic| topic.name == name && topic.type_name == type_name && topic.wire == wire;
         if let Some(index) = self.topics.iter().position(is_it) {
-            return index;
+            return Some(index);
+        }
+        self.bytes += size_of::<Topic>() + name.len() + type_name.len();
+        if self.bytes > MAX_TOPIC_BYTES {
+            return None;
         }
         self.topics.push(Topic { name: name.to_owned(), type_name: type_name.to_owned(), wire, messages: 0 });
-        self.topics.len() - 1
+        self.topics.len().checked_sub(1)
     }
 
     /// Counts messages of a topic.

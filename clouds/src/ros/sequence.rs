@@ -24,7 +24,8 @@ impl Sequence {
     pub fn push(&mut self, mut recording: Box<dyn Recording>) {
         recording.close_files();
         let topics = recording.topics().iter().map(|topic| {
-            let index = self.topics.index(&topic.name, &topic.type_name, topic.wire);
+            // Topics beyond the most are never asked for.
+            let index = self.topics.index(&topic.name, &topic.type_name, topic.wire).unwrap_or(usize::MAX);
             self.topics.count(index, topic.messages);
             index
         });

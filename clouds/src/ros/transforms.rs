@@ -1,43 +1,29 @@
+use super::frame_links::{FrameLinks, Step};
+use super::frame_search::Search;
+use super::samples::Samples;
+use super::second_parent::SecondParent;
 use crate::pose::RigidPose;
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::{HashMap, HashSet};
+use std::convert::Infallible;
 
-/// The tree of frames of a recording: where each frame was in its parent, over time.
+/// The tree of frames of a recording or a robot: where each frame was in its parents, over time.
+///
+/// At a time a frame has one parent: the first of these that leads to the frame that is asked for, and to no frame
+/// twice.
+///
+/// 1. One with transforms before and after the stamp, or at it: of several the one with the latest before.
+/// 2. One with transforms up to 10 s before the stamp, which give no pose, or not yet.
+/// 3. A static one: of several the newest.
+/// 4. One with a single transform, or with transforms at other times: of several the newest.
+///
+/// So a transform that makes a loop, or that names another parent once, changes no pose.
 #[derive(Clone, Debug, Default)]
 pub struct Transforms {
-    frames: HashMap<String, Frame>,
+    frames: HashMap<String, FrameLinks>,
+    /// Number of transforms taken.
+    taken: u64,
     /// Two samples further apart have nothing between them.
     most_gap_ns: Option<i64>,
-}
-
-/// What is known of a frame that has a parent.
-#[derive(Clone, Debug, Default)]
-struct Frame {
-    /// The parent that came last.
-    parent: String,
-    links: HashMap<String, Link>,
-}
-
-#[derive(Clone, Debug)]
-enum Link {
-    /// At any time.
-    Static(RigidPose),
-    /// By stamp.
-    Moving(BTreeMap<i64, RigidPose>),
-}
-
-impl Frame {
-    fn samples(&self) -> usize {
-        self.links.values().map(Link::samples).sum()
-    }
-}
-
-impl Link {
-    fn samples(&self) -> usize {
-        match self {
-            Self::Static(_) => 1,
-            Self::Moving(samples) => samples.len(),
-        }
-    }
 }
 
 /// Why the pose of a frame in another is not known at a time.
@@ -53,6 +39,9 @@ pub enum WhyNot {
     /// A frame is its own ancestor.
     #[error("the frame {0} is its own ancestor")]
     Loop(String),
+    /// More frames are above it than a robot has.
+    #[error("more than 10000 frames are above the frame {0}")]
+    TooManyFrames(String),
     /// The stamp is before the first transform of a frame.
     #[error("the stamp is before the first transform of {0}")]
     Before(String),
@@ -70,7 +59,28 @@ pub enum WhyNot {
     /// The points are in the fixed frame already, and where the sensor was is not known.
     #[error("the points are in the frame {0} already; nothing says where the sensor was")]
     AlreadyFixed(String),
+    /// A temporary file cannot be read.
+    #[error("{0}")]
+    Unreadable(String),
 }
+
+/// Why a transform is not taken.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum BadTransform {
+    /// The parent or the child has no name.
+    #[error("a frame has no name")]
+    NoName,
+    /// The parent is the child.
+    #[error("the frame {0} is in itself")]
+    InItself(String),
+    /// Numbers that are not finite, or a quaternion whose length is off by more than a tenth.
+    #[error("the pose of {0} has numbers that are not finite, or a quaternion whose length is not 1")]
+    Pose(String),
+}
+
+/// How far the length of a quaternion may be from 1, as in files of poses.
+const MOST_LENGTH_ERROR: f64 = 0.1;
 
 impl Transforms {
     /// Sets how far apart in time two samples may be that a pose is found between; see
@@ -79,9 +89,13 @@ impl Transforms {
         self.most_gap_ns = most_gap_ns;
     }
 
-    /// Adds where a child was in its parent. The parent that comes last is the one of the child; of two samples of the
-    /// same stamp the later one counts. Returns whether it was taken: poses that are not valid, and frames without a
-    /// name or in themselves, are not.
+    /// Adds where a child was in a parent, and returns whether the child gets a parent that it did not have. Of two
+    /// samples of the same stamp the later one counts. Of more than 16 parents of a frame the first ones and the last
+    /// are kept.
+    ///
+    /// # Errors
+    ///
+    /// The transform is not taken: a frame without a name or in itself, a pose that is not valid.
     pub fn insert(
         &mut self,
         parent: &str,
@@ -89,28 +103,74 @@ impl Transforms {
         stamp_ns: i64,
         parent_from_child: RigidPose,
         is_static: bool,
-    ) -> bool {
-        let (parent, child) = (bare(parent), bare(child));
-        if parent.is_empty() || child.is_empty() || parent == child || !parent_from_child.is_valid() {
-            return false;
+    ) -> Result<bool, BadTransform> {
+        let (parent, child) = names(parent, child)?;
+        if !is_pose(&parent_from_child) {
+            return Err(BadTransform::Pose(child.to_owned()));
         }
+        let (links, number) = self.links_of(child);
+        Ok(links.is_some_and(|links| links.insert(parent, stamp_ns, parent_from_child, is_static, number)))
+    }
+
+    /// Puts samples, all of them [poses](is_pose), in the place of those of a child in a parent, and returns whether
+    /// the child gets a parent that it did not have.
+    ///
+    /// # Errors
+    ///
+    /// The samples are not taken: a frame without a name or in itself.
+    pub(super) fn attach(
+        &mut self,
+        parent: &str,
+        child: &str,
+        samples: Samples,
+    ) -> Result<bool, BadTransform> {
+        let (parent, child) = names(parent, child)?;
+        if samples.is_empty() {
+            return Ok(false);
+        }
+        let (links, number) = self.links_of(child);
+        Ok(links.is_some_and(|links| links.attach(parent, samples, number)))
+    }
+
+    /// The links of a child, and the number of its next transform.
+    fn links_of(&mut self, child: &str) -> (Option<&mut FrameLinks>, u64) {
         if !self.frames.contains_key(child) {
-            self.frames.insert(child.to_owned(), Frame::default());
+            self.frames.insert(child.to_owned(), FrameLinks::default());
         }
-        let Some(frame) = self.frames.get_mut(child) else { return false };
-        if frame.parent != parent {
-            parent.clone_into(&mut frame.parent);
+        self.taken += 1;
+        (self.frames.get_mut(child), self.taken)
+    }
+
+    /// Whether a transform names this parent of a child.
+    pub(super) fn has_link(&self, parent: &str, child: &str) -> bool {
+        self.frames.get(bare(child)).is_some_and(|links| links.has_parent(bare(parent)))
+    }
+
+    /// Number of parents of a child.
+    pub(super) fn parents_of(&self, child: &str) -> usize {
+        self.frames.get(bare(child)).map_or(0, FrameLinks::parents)
+    }
+
+    /// All samples.
+    pub(super) fn samples_mut(&mut self) -> impl Iterator<Item = &mut Samples> {
+        self.frames.values_mut().flat_map(FrameLinks::samples_mut)
+    }
+
+    /// What is wrong with a parent of a child, if the child has another one, or if they are in a loop.
+    pub fn second_parent(&self, parent: &str, child: &str) -> Option<SecondParent> {
+        let (parent, child) = (bare(parent), bare(child));
+        let others = self.steps(child);
+        let before = others.iter().find(|step| step.parent != parent).map(|step| step.parent.to_owned());
+        let found = self.search(parent, |_| true, |frame| frame == child);
+        let above = found.route.into_iter().flatten().map(|step| step.parent.to_owned());
+        let mut loop_frames: Vec<String> = above.collect();
+        if !loop_frames.is_empty() {
+            loop_frames.insert(0, parent.to_owned());
         }
-        match frame.links.get_mut(parent) {
-            Some(Link::Moving(samples)) if !is_static => drop(samples.insert(stamp_ns, parent_from_child)),
-            Some(link) if is_static => *link = Link::Static(parent_from_child),
-            _ if is_static => drop(frame.links.insert(parent.to_owned(), Link::Static(parent_from_child))),
-            _ => {
-                let samples = BTreeMap::from([(stamp_ns, parent_from_child)]);
-                frame.links.insert(parent.to_owned(), Link::Moving(samples));
-            }
+        if before.is_none() && loop_frames.is_empty() {
+            return None;
         }
-        true
+        Some(SecondParent { child: child.to_owned(), parent: parent.to_owned(), before, loop_frames })
     }
 
     /// Forgets where a frame was in its parents.
@@ -118,36 +178,36 @@ impl Transforms {
         self.frames.remove(bare(child));
     }
 
+    /// Forgets how a frame moved in its parents; static transforms stay.
+    pub fn forget_samples(&mut self, child: &str) {
+        if let Some(links) = self.frames.get_mut(bare(child)) {
+            links.forget_samples();
+            if links.is_empty() {
+                self.detach(child);
+            }
+        }
+    }
+
     /// Forgets samples that are older than this before the last one of the same frames, and returns how many samples
     /// are left, with one for what is static: a buffer of tf keeps its last seconds.
     pub fn forget_older_than(&mut self, span_ns: i64) -> usize {
-        let mut left = 0;
-        for link in self.frames.values_mut().flat_map(|frame| frame.links.values_mut()) {
-            if let Link::Moving(samples) = link
-                && let Some((&last_ns, _)) = samples.last_key_value()
-            {
-                *samples = samples.split_off(&last_ns.saturating_sub(span_ns));
-            }
-            left += link.samples();
-        }
-        left
+        self.frames.values_mut().for_each(|links| links.forget_older_than(span_ns));
+        self.frames.values().map(FrameLinks::len).sum()
     }
 
-    /// Forgets the older half of the frame that has most samples, and returns how many those were: who sends too many
-    /// takes no room of others. What it was in other parents than the last one goes first.
+    /// Forgets older samples of the frame that has most, and returns how many those were: who sends too many takes no
+    /// room of others. Static transforms stay.
     pub fn shrink_largest(&mut self) -> usize {
-        let largest = self.frames.values_mut().max_by_key(|frame| frame.samples());
-        let Some(frame) = largest else { return 0 };
-        let before = frame.samples();
-        let Frame { parent, links } = &mut *frame;
-        links.retain(|of, _| *of == *parent);
-        if let Some(Link::Moving(samples)) = links.get_mut(parent.as_str())
-            && samples.len() == before
-            && let Some(&middle_ns) = samples.keys().nth(before / 2)
-        {
-            *samples = samples.split_off(&middle_ns);
+        let largest = self.frames.iter_mut().max_by_key(|(_, links)| links.samples());
+        let Some((child, links)) = largest else { return 0 };
+        let before = links.samples();
+        links.shrink();
+        let lost = before - links.samples();
+        if links.is_empty() {
+            let child = child.clone();
+            self.frames.remove(&child);
         }
-        before - frame.samples()
+        lost
     }
 
     /// Number of frames that have a parent.
@@ -158,7 +218,7 @@ impl Transforms {
     /// Whether a transform names a frame.
     pub fn knows(&self, frame: &str) -> bool {
         let frame = bare(frame);
-        self.frames.contains_key(frame) || self.frames.values().any(|known| known.parent == frame)
+        self.frames.contains_key(frame) || self.frames.values().any(|links| links.has_parent(frame))
     }
 
     /// Whether there are no transforms.
@@ -166,29 +226,41 @@ impl Transforms {
         self.frames.is_empty()
     }
 
-    /// The frame, its parent, and so on up to the root.
-    ///
-    /// # Errors
-    ///
-    /// A loop.
-    pub fn ancestors(&self, frame: &str) -> Result<Vec<String>, WhyNot> {
-        let mut chain = vec![bare(frame).to_owned()];
-        let mut seen: HashSet<&str> = HashSet::from([bare(frame)]);
-        let mut at = bare(frame);
-        while let Some(known) = self.frames.get(at) {
-            at = &known.parent;
-            if !seen.insert(at) {
-                return Err(WhyNot::Loop(at.to_owned()));
-            }
-            chain.push(at.to_owned());
-        }
-        Ok(chain)
+    /// The frame and what is above it, at whatever time. Parents that a single transform names are left out if
+    /// something moves without them.
+    pub fn ancestors(&self, frame: &str) -> Vec<String> {
+        self.above(bare(frame)).frames.into_iter().map(str::to_owned).collect()
     }
 
-    /// Whether the link of a frame to its parent changes over time.
+    /// The last of the parents above a frame, of the same ones.
+    pub fn root_of(&self, frame: &str) -> String {
+        let frame = bare(frame);
+        self.above(frame).end.unwrap_or(frame).to_owned()
+    }
+
+    fn above<'a>(&'a self, frame: &'a str) -> Search<'a> {
+        let trusted = self.search(frame, Step::is_trusted, |_| false);
+        if trusted.frames.iter().any(|at| self.is_moving(at)) {
+            return trusted;
+        }
+        self.search(frame, |_| true, |_| false)
+    }
+
+    /// A search at whatever time.
+    fn search<'a>(
+        &'a self,
+        frame: &'a str,
+        is_taken: impl Fn(&Step<'a>) -> bool,
+        is_wanted: impl Fn(&str) -> bool,
+    ) -> Search<'a> {
+        let steps = |at: &'a str| Ok(kept(self.steps(at), &is_taken));
+        let Ok(search) = Search::run::<Infallible>(frame, &steps, is_wanted);
+        search
+    }
+
+    /// Whether the link of a frame to a parent changes over time.
     pub fn is_moving(&self, child: &str) -> bool {
-        let link = self.frames.get(bare(child)).and_then(|frame| frame.links.get(&frame.parent));
-        matches!(link, Some(Link::Moving(_)))
+        self.frames.get(bare(child)).is_some_and(FrameLinks::is_moving)
     }
 
     /// The pose of the source frame in the target frame at a time: along the whole chain, each link between the samples
@@ -202,65 +274,117 @@ impl Transforms {
         if target == source {
             return Ok(RigidPose::IDENTITY);
         }
-        let [from_target, from_source] = self.links_between(target, source)?;
+        let [from_target, from_source] = self.route(target, source, stamp_ns)?;
         let common_from_source = self.along(&from_source, stamp_ns)?;
         let common_from_target = self.along(&from_target, stamp_ns)?;
         Ok(common_from_target.inverse().then(&common_from_source))
     }
 
-    /// The frames whose place in their parents leads from one frame to another: up to what is above both, from each.
+    /// The frames whose place in their parents leads from one frame to another at a time: up to what is above both,
+    /// from each.
     ///
     /// # Errors
     ///
     /// Why there is no such way.
-    pub fn links_between(&self, target_frame: &str, source_frame: &str) -> Result<[Vec<String>; 2], WhyNot> {
-        let (target, source) = (bare(target_frame), bare(source_frame));
-        for frame in [target, source] {
-            if !self.knows(frame) {
-                return Err(WhyNot::UnknownFrame(frame.to_owned()));
-            }
-        }
-        let (mut from_target, mut from_source) = (self.ancestors(target)?, self.ancestors(source)?);
-        let places: HashMap<&str, usize> = from_target.iter().map(String::as_str).zip(0..).collect();
-        let common = (0..).zip(&from_source).find_map(|(k, frame)| Some((k, *places.get(frame.as_str())?)));
-        let Some((source_links, target_links)) = common else {
-            return Err(WhyNot::NotConnected(target.to_owned(), source.to_owned()));
+    pub fn links_between(
+        &self,
+        target_frame: &str,
+        source_frame: &str,
+        stamp_ns: i64,
+    ) -> Result<[Vec<String>; 2], WhyNot> {
+        let route = self.route(bare(target_frame), bare(source_frame), stamp_ns)?;
+        Ok(route.map(|steps| steps.iter().map(|step| step.child.to_owned()).collect()))
+    }
+
+    /// The steps up to what is above both, from each. Doubtful ones are taken only where no others lead there: they do
+    /// not say where a frame was, but why that is not known.
+    fn route<'a>(
+        &'a self,
+        target: &'a str,
+        source: &'a str,
+        stamp_ns: i64,
+    ) -> Result<[Vec<Step<'a>>; 2], WhyNot> {
+        let all = |at: &'a str| self.steps_at(at, stamp_ns);
+        let trusted = |at: &'a str| all(at).map(|steps| kept(steps, Step::is_trusted));
+        let found = match route_by(target, source, &trusted) {
+            found @ (Ok(_) | Err(WhyNot::Unreadable(_))) => return found,
+            Err(_) => route_by(target, source, &all),
         };
-        from_source.truncate(source_links);
-        from_target.truncate(target_links);
-        Ok([from_target, from_source])
+        found.map_err(|why| match [target, source].into_iter().find(|frame| !self.knows(frame)) {
+            Some(frame) if !matches!(why, WhyNot::Unreadable(_)) => WhyNot::UnknownFrame(frame.to_owned()),
+            _ => why,
+        })
+    }
+
+    fn steps_at<'a>(&'a self, child: &'a str, stamp_ns: i64) -> Result<Vec<Step<'a>>, WhyNot> {
+        let links = self.frames.get(child);
+        links.map_or(Ok(Vec::new()), |links| links.steps_at(child, stamp_ns, self.most_gap_ns))
+    }
+
+    fn steps<'a>(&'a self, child: &'a str) -> Vec<Step<'a>> {
+        self.frames.get(child).map_or(Vec::new(), |links| links.steps(child))
     }
 
     /// The pose of the first frame in the parent of the last.
-    fn along(&self, frames: &[String], stamp_ns: i64) -> Result<RigidPose, WhyNot> {
+    fn along(&self, steps: &[Step<'_>], stamp_ns: i64) -> Result<RigidPose, WhyNot> {
         let mut pose = RigidPose::IDENTITY;
-        for child in frames {
-            pose = self.in_parent(child, stamp_ns)?.then(&pose);
+        for step in steps {
+            pose = step.pose(stamp_ns, self.most_gap_ns)?.then(&pose);
         }
         Ok(pose)
     }
+}
 
-    fn in_parent(&self, child: &str, stamp_ns: i64) -> Result<RigidPose, WhyNot> {
-        let link = self.frames.get(child).and_then(|frame| frame.links.get(&frame.parent));
-        let samples = match link {
-            Some(Link::Static(pose)) => return Ok(*pose),
-            Some(Link::Moving(samples)) => samples,
-            None => return Err(WhyNot::UnknownFrame(child.to_owned())),
-        };
-        let before = samples.range(..=stamp_ns).next_back();
-        let Some((&before_ns, before)) = before else { return Err(WhyNot::Before(child.to_owned())) };
-        if before_ns == stamp_ns {
-            return Ok(*before);
-        }
-        let Some((&after_ns, after)) = samples.range(stamp_ns..).next() else {
-            return Err(WhyNot::After(child.to_owned()));
-        };
-        let gap_ns = after_ns.saturating_sub(before_ns);
-        if self.most_gap_ns.is_some_and(|most| gap_ns > most) {
-            return Err(WhyNot::Gap(child.to_owned()));
-        }
-        Ok(before.towards(after, stamp_ns.saturating_sub(before_ns) as f64 / gap_ns as f64))
+/// A target above the source is found first, then a source above the target, then what is above both. In a tree there
+/// is one way; in a loop the first one is that of the robot: what is above the frame of the map does not matter.
+fn route_by<'a>(
+    target: &'a str,
+    source: &'a str,
+    steps: &dyn Fn(&'a str) -> Result<Vec<Step<'a>>, WhyNot>,
+) -> Result<[Vec<Step<'a>>; 2], WhyNot> {
+    let up = Search::run(source, steps, |frame| frame == target)?;
+    if let Some(route) = up.route {
+        return Ok([Vec::new(), route]);
     }
+    let down = Search::run(target, steps, |frame| frame == source)?;
+    if let Some(route) = down.route {
+        return Ok([route, Vec::new()]);
+    }
+    let above_target: HashSet<&str> = down.frames.into_iter().collect();
+    let to_common = Search::run(source, steps, |frame| above_target.contains(frame))?;
+    if let Some(from_source) = to_common.route {
+        let common = from_source.last().map_or(source, |step| step.parent);
+        let from_target = Search::run(target, steps, |frame| frame == common)?.route;
+        return Ok([from_target.unwrap_or_default(), from_source]);
+    }
+    Err(match up.looped.or(down.looped) {
+        _ if up.is_cut || down.is_cut => WhyNot::TooManyFrames(source.to_owned()),
+        Some(frame) => WhyNot::Loop(frame.to_owned()),
+        None => WhyNot::NotConnected(target.to_owned(), source.to_owned()),
+    })
+}
+
+fn kept<'a>(mut steps: Vec<Step<'a>>, is_kept: impl Fn(&Step<'a>) -> bool) -> Vec<Step<'a>> {
+    steps.retain(is_kept);
+    steps
+}
+
+/// The names of a parent and a child.
+fn names<'a>(parent: &'a str, child: &'a str) -> Result<(&'a str, &'a str), BadTransform> {
+    let (parent, child) = (bare(parent), bare(child));
+    if parent.is_empty() || child.is_empty() {
+        return Err(BadTransform::NoName);
+    }
+    if parent == child {
+        return Err(BadTransform::InItself(child.to_owned()));
+    }
+    Ok((parent, child))
+}
+
+/// Whether a pose may be one: finite numbers, and a quaternion whose length is about 1.
+pub(super) fn is_pose(pose: &RigidPose) -> bool {
+    let length = pose.quaternion.iter().map(|q| q * q).sum::<f64>().sqrt();
+    pose.is_valid() && (length - 1.0).abs() <= MOST_LENGTH_ERROR
 }
 
 /// tf 1 wrote slashes before names, tf 2 does not know them.
@@ -269,100 +393,4 @@ fn bare(frame: &str) -> &str {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn at(x: f64) -> RigidPose {
-        RigidPose { position_m: [x, 0.1, 0.2], quaternion: [0.0, 0.0, 0.6, 0.8] }
-    }
-
-    #[test]
-    fn a_stamp_that_is_there_keeps_every_bit() {
-        let mut tf = Transforms::default();
-        tf.insert("/odom", "base", 5, at(0.3), false);
-        tf.insert("odom", "base", 9, at(0.7), false);
-        tf.insert("base", "lidar", 0, RigidPose::IDENTITY, true);
-        assert_eq!(tf.lookup("odom", "/lidar", 5), Ok(at(0.3)));
-        assert_eq!(tf.lookup("odom", "lidar", 7).unwrap().position_m[0], 0.5);
-        assert_eq!(tf.lookup("base", "base", 1), Ok(RigidPose::IDENTITY));
-        let back = tf.lookup("lidar", "odom", 5).unwrap();
-        assert!(back.then(&at(0.3)).position_m.iter().all(|m| m.abs() < 1e-12));
-    }
-
-    #[test]
-    fn nothing_is_extrapolated_or_bridged() {
-        let mut tf = Transforms::default();
-        tf.insert("odom", "base", 5, at(0.3), false);
-        tf.insert("odom", "base", 9, at(0.7), false);
-        assert_eq!(tf.lookup("odom", "base", 4), Err(WhyNot::Before("base".into())));
-        assert_eq!(tf.lookup("odom", "base", 10), Err(WhyNot::After("base".into())));
-        tf.set_most_gap_ns(Some(3));
-        assert_eq!(tf.lookup("odom", "base", 7), Err(WhyNot::Gap("base".into())));
-        assert!(tf.lookup("odom", "base", 9).is_ok());
-        assert_eq!(tf.lookup("odom", "camera", 9), Err(WhyNot::UnknownFrame("camera".into())));
-        tf.insert("rig", "camera", 9, at(1.0), true);
-        assert!(matches!(tf.lookup("odom", "camera", 9), Err(WhyNot::NotConnected(..))));
-    }
-
-    #[test]
-    fn each_link_keeps_its_own_last_seconds() {
-        let mut tf = Transforms::default();
-        for stamp_ns in 0..10 {
-            tf.insert("odom", "base", stamp_ns, at(0.3), false);
-        }
-        tf.insert("map", "odom", 2, at(0.7), false);
-        tf.insert("base", "lidar", 0, RigidPose::IDENTITY, true);
-        assert_eq!((tf.forget_older_than(3), tf.frames()), (6, 3));
-        assert_eq!(tf.lookup("odom", "lidar", 5), Err(WhyNot::Before("base".into())));
-        assert_eq!(tf.lookup("odom", "lidar", 6), Ok(at(0.3)));
-        assert_eq!(tf.lookup("map", "odom", 2), Ok(at(0.7)));
-    }
-
-    #[test]
-    fn the_frame_with_most_samples_loses_the_older_half() {
-        let mut tf = Transforms::default();
-        for stamp_ns in 0..10 {
-            tf.insert("odom", "base", stamp_ns, at(0.3), false);
-        }
-        tf.insert("map", "odom", 2, at(0.7), false);
-        tf.insert("base", "lidar", 0, RigidPose::IDENTITY, true);
-        assert_eq!(tf.shrink_largest(), 5);
-        assert_eq!(tf.lookup("odom", "base", 4), Err(WhyNot::Before("base".into())));
-        assert_eq!(tf.lookup("odom", "lidar", 5), Ok(at(0.3)));
-        for parent in 0..20 {
-            tf.insert(&format!("p{parent}"), "lidar", 0, at(0.1), true);
-        }
-        assert_eq!((tf.shrink_largest(), tf.lookup("p19", "lidar", 7)), (20, Ok(at(0.1))));
-        assert_eq!((tf.shrink_largest(), tf.shrink_largest(), tf.shrink_largest()), (2, 1, 1));
-        assert_eq!((tf.shrink_largest(), tf.lookup("map", "odom", 2)), (0, Ok(at(0.7))));
-    }
-
-    #[test]
-    fn the_last_parent_wins_and_a_loop_is_an_error() {
-        let mut tf = Transforms::default();
-        tf.insert("odom", "base", 5, at(0.3), false);
-        tf.insert("map", "base", 5, at(0.9), false);
-        assert_eq!(tf.lookup("map", "base", 5), Ok(at(0.9)));
-        tf.insert("odom", "base", 6, at(0.4), false);
-        assert_eq!(tf.lookup("odom", "base", 5), Ok(at(0.3)));
-        tf.insert("base", "odom", 5, at(0.3), true);
-        assert!(matches!(tf.lookup("odom", "base", 5), Err(WhyNot::Loop(_))));
-        assert!(!tf.insert("base", "base", 5, at(0.3), true));
-        let broken = RigidPose { position_m: [f64::NAN; 3], ..RigidPose::IDENTITY };
-        assert!(!tf.insert("base", "wheel", 5, broken, true));
-    }
-
-    #[test]
-    fn two_branches_meet_at_their_common_ancestor() {
-        let mut tf = Transforms::default();
-        tf.insert("base", "left", 0, RigidPose { position_m: [1.0, 0.0, 0.0], ..RigidPose::IDENTITY }, true);
-        tf.insert(
-            "base",
-            "right",
-            0,
-            RigidPose { position_m: [-1.0, 0.0, 0.0], ..RigidPose::IDENTITY },
-            true,
-        );
-        assert_eq!(tf.lookup("left", "right", 77).unwrap().position_m, [-2.0, 0.0, 0.0]);
-    }
-}
+mod tests;

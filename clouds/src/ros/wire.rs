@@ -33,6 +33,8 @@ pub type Decoded<T> = std::result::Result<T, WireError>;
 #[derive(Clone, Debug)]
 pub struct WireReader<'a> {
     bytes: &'a [u8],
+    /// Bytes of the message, of which `bytes` may be the first only.
+    len: u64,
     at: usize,
     wire: Wire,
     /// Alignment counts from here.
@@ -68,7 +70,12 @@ impl<'a> WireReader<'a> {
     ///
     /// A header of CDR that is missing or of a kind that ROS 2 does not write.
     pub fn new(wire: Wire, bytes: &'a [u8]) -> Decoded<Self> {
-        let mut reader = Self { bytes, at: 0, wire, origin: 0, most_alignment: 1, is_big_endian: false };
+        Self::of_start(wire, bytes, bytes.len() as u64)
+    }
+
+    /// Begins with the first bytes of a message of `len` bytes.
+    pub(super) fn of_start(wire: Wire, bytes: &'a [u8], len: u64) -> Decoded<Self> {
+        let mut reader = Self { bytes, len, at: 0, wire, origin: 0, most_alignment: 1, is_big_endian: false };
         if wire == Wire::Ros1 {
             return Ok(reader);
         }
@@ -100,7 +107,7 @@ impl<'a> WireReader<'a> {
 
     /// Bytes that are left.
     pub fn remaining(&self) -> usize {
-        self.bytes.len().saturating_sub(self.at)
+        usize::try_from(self.len).unwrap_or(usize::MAX).saturating_sub(self.at)
     }
 
     /// The next bytes, as they are.
@@ -111,6 +118,9 @@ impl<'a> WireReader<'a> {
     pub fn bytes(&mut self, count: usize) -> Decoded<&'a [u8]> {
         let taken = self.at.checked_add(count).and_then(|end| self.bytes.get(self.at..end));
         let bytes = taken.ok_or_else(|| {
+            if count <= self.remaining() {
+                return self.error(format!("more than {} bytes before the points", self.bytes.len()));
+            }
             self.error(format!("{count} bytes are wanted, {} are left: it is cut off", self.remaining()))
         })?;
         self.at += count;
@@ -139,6 +149,15 @@ impl<'a> WireReader<'a> {
     pub fn byte_sequence(&mut self) -> Decoded<&'a [u8]> {
         let count = self.sequence(1)?;
         self.bytes(count)
+    }
+
+    /// A sequence of bytes, as many of them as are at hand: where it begins in the message, and its length.
+    pub(super) fn start_of_bytes(&mut self) -> Decoded<(&'a [u8], u64, usize)> {
+        let count = self.sequence(1)?;
+        let (at, there) = (self.at, count.min(self.bytes.len().saturating_sub(self.at)));
+        let bytes = self.bytes(there)?;
+        self.at = at.saturating_add(count);
+        Ok((bytes, at as u64, count))
     }
 
     /// A sequence of `f32`.

@@ -87,7 +87,7 @@ fn trajectory(folder: &Path) -> Trajectory {
 }
 
 fn in_file(trajectory: &Trajectory, at_ns: i64) -> Option<RigidPose> {
-    match trajectory.at(at_ns, 10_000_000) {
+    match trajectory.at(at_ns, 10_000_000).unwrap() {
         Found::Exact(pose) | Found::Between(pose) => Some(pose),
         _ => None,
     }
@@ -205,7 +205,7 @@ mod recordings {
         });
         read.unwrap();
         let pose_at = source.poses().unwrap();
-        assert_deskews(&points, pose_at, of);
+        assert_deskews(&points, |stamp_ns| pose_at(stamp_ns).unwrap(), of);
     }
 
     /// A field, and its bytes for so many nanoseconds after the stamp.

@@ -21,9 +21,8 @@ fn assert_near(found: &[CloudPoint], wanted: &[CloudPoint], what: &str) {
 #[test]
 fn a_file_is_cut_into_scans_by_its_times() {
     for name in ["timed.las", "timed.laz"] {
-        for sort_memory_bytes in [0, 1 << 20] {
-            let clouds =
-                clouds_with(&fixture(name), &OpenOptions { sort_memory_bytes, ..Default::default() });
+        for memory_bytes in [0, 1 << 20] {
+            let clouds = clouds_with(&fixture(name), &OpenOptions { memory_bytes, ..Default::default() });
             let names: Vec<&str> = clouds.iter().map(|(head, _)| head.name.as_str()).collect();
             assert_eq!(names, ["0", "1", "2", "3", "4", "5"], "{name}");
             // The first window ends at 0.1 s: times 0 and 0.0625. The whole number of the GPS time of today is 1.3e9.
@@ -272,10 +271,8 @@ fn real_files_are_what_laspy_reads() {
             assert!((found / unit / sum - 1.0).abs() < 1e-11, "{name}: axis {axis}: {found} {sum}");
         }
         assert_eq!(points.iter().map(|point| f64::from(point.intensity)).sum::<f64>(), intensities, "{name}");
-        let scans = clouds_with(
-            &folder.join(name),
-            &OpenOptions { sort_memory_bytes: 1 << 20, ..Default::default() },
-        );
+        let scans =
+            clouds_with(&folder.join(name), &OpenOptions { memory_bytes: 1 << 20, ..Default::default() });
         assert_eq!(scans.iter().map(|(_, points)| points.len()).sum::<usize>(), count, "{name}");
     }
     assert_eq!(clouds(&folder.join("loadersgl_indoor.laz")).len(), 1);

@@ -4,6 +4,7 @@ use crate::cloud_points::CloudPoints;
 use crate::cloud_queue::CloudQueue;
 use crate::counters::Counters;
 use crate::transform_buffer::TransformBuffer;
+use crate::transport::Message;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use voxtile_clouds::RigidPose;
@@ -62,14 +63,16 @@ impl Inbox {
         self.changed.notify_all();
     }
 
-    pub fn put_poses(&self, kind: MessageKind, cdr: &[u8], is_static: bool) {
-        let poses = decode_poses(kind, Wire::Cdr, cdr);
+    pub fn put_poses(&self, kind: MessageKind, message: &Message, is_static: bool) {
+        let poses = decode_poses(kind, Wire::Cdr, &message.cdr);
         let mut state = self.lock();
         let State { queue, transforms, counters, .. } = &mut *state;
         match poses {
             Ok(poses) => {
                 let now = Instant::now();
-                poses.iter().for_each(|pose| transforms.insert(pose, is_static, now, queue, counters));
+                let publisher = message.publisher;
+                let mut insert = |pose| transforms.insert(pose, is_static, publisher, now, queue, counters);
+                poses.iter().for_each(&mut insert);
             }
             Err(error) => {
                 log::debug!("transforms cannot be decoded: {error}");
@@ -134,13 +137,19 @@ impl Inbox {
         (state.counters, state.queue.len())
     }
 
+    /// Why no cloud gets a pose, if that lasts.
+    pub fn pose_trouble(&self) -> Option<String> {
+        self.lock().transforms.trouble()
+    }
+
     /// As if a sensor stood at the origin of the map.
     #[cfg(test)]
     pub fn put_mount(&self, frame: &str) {
         let header = crate::messages::Header { frame_id: "map".to_owned(), ..Default::default() };
         let mounts = vec![(header, frame, ([0.0; 3], [0.0, 0.0, 0.0, 1.0]))];
         let body = cdr_encoding::to_vec::<_, byteorder::LittleEndian>(&mounts).unwrap();
-        self.put_poses(MessageKind::Tf, &[vec![0, 1, 0, 0], body].concat(), true);
+        let cdr = [vec![0, 1, 0, 0], body].concat();
+        self.put_poses(MessageKind::Tf, &Message { cdr, publisher: None }, true);
     }
 
     /// Lets readers go that wait for room.

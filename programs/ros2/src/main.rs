@@ -26,6 +26,8 @@ mod messages;
 mod names;
 mod node;
 mod parameters;
+mod parent_warnings;
+mod pose_watch;
 mod publishers;
 mod refusal;
 mod remapping;

@@ -3,7 +3,7 @@ use crate::inbox::Inbox;
 use crate::live_map::LiveMap;
 use crate::publishers::Publishing;
 use crate::services::{self, Orders};
-use crate::transport::{Qos, Transport, TypeName};
+use crate::transport::{Message, Qos, Transport, TypeName};
 use anyhow::Context as _;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -43,12 +43,12 @@ pub fn start(
     let volatile = Qos::best_effort(5);
     for (number, topic) in args.cloud.iter().enumerate() {
         let to = inbox.clone();
-        let put = Box::new(move |cdr| to.put_cloud(number, cdr));
+        let put = Box::new(move |message: Message| to.put_cloud(number, message.cdr));
         transport.subscribe(topic, TypeName::new("sensor_msgs", "PointCloud2"), volatile, put)?;
     }
     let poses = |kind, is_static| {
         let to = inbox.clone();
-        Box::new(move |cdr: Vec<u8>| to.put_poses(kind, &cdr, is_static))
+        Box::new(move |message: Message| to.put_poses(kind, &message, is_static))
     };
     let tf = TypeName::new("tf2_msgs", "TFMessage");
     transport.subscribe("/tf_static", tf, Qos::latched(100), poses(MessageKind::Tf, true))?;
@@ -62,7 +62,12 @@ pub fn start(
     if let Some(topic) = &args.path {
         let to = inbox.clone();
         let path = TypeName::new("nav_msgs", "Path");
-        transport.subscribe(topic, path, Qos::reliable(1), Box::new(move |cdr| to.put_path(&cdr)))?;
+        transport.subscribe(
+            topic,
+            path,
+            Qos::reliable(1),
+            Box::new(move |message: Message| to.put_path(&message.cdr)),
+        )?;
     }
     let names = args.names()?;
     let clouds: Vec<String> = args.cloud.iter().map(|topic| names.full(topic)).collect();

@@ -2,12 +2,15 @@ use crate::args::Args;
 use crate::cloud::Cloud;
 use crate::cloud_queue::{CloudQueue, Verdict};
 use crate::counters::Counters;
+use crate::parent_warnings::ParentWarnings;
+use crate::pose_watch::PoseWatch;
 use crate::stamp_check::{StampCheck, StampVerdict};
+use crate::transport::Gid;
 use std::time::{Duration, Instant};
 use voxtile_clouds::RigidPose;
 use voxtile_clouds::poses::most_gap_ns;
 use voxtile_clouds::ros::messages::StampedPose;
-use voxtile_clouds::ros::{Transforms, WhyNot};
+use voxtile_clouds::ros::{BadTransform, Transforms, WhyNot};
 
 /// The last seconds of tf, and how long clouds wait for more of it.
 #[derive(Debug)]
@@ -18,8 +21,9 @@ pub struct TransformBuffer {
     most_wait: Duration,
     /// Samples since the last time that old ones were forgotten, and those left then.
     samples: (usize, usize),
-    /// Whether somebody was told that clouds in the frame of the map are of no use.
-    has_warned: bool,
+    parents: ParentWarnings,
+    watch: PoseWatch,
+    refused_at: Option<Instant>,
 }
 
 /// As long as the buffers of tf2 are.
@@ -30,6 +34,8 @@ const FORGET_EVERY: usize = 1000;
 const MOST_SAMPLES: usize = 200_000;
 const MOST_FRAMES: usize = 2000;
 const MOST_NAME_BYTES: usize = 256;
+/// How often transforms that are none are reported.
+const REFUSED_AGAIN: Duration = Duration::from_secs(30);
 
 impl TransformBuffer {
     pub fn new(args: &Args) -> Self {
@@ -42,7 +48,9 @@ impl TransformBuffer {
             fixed_frame: bare(&args.frame_id).to_owned(),
             most_wait: args.transform_wait,
             samples: (0, 0),
-            has_warned: false,
+            parents: ParentWarnings::default(),
+            watch: PoseWatch::default(),
+            refused_at: None,
         }
     }
 
@@ -51,6 +59,7 @@ impl TransformBuffer {
         &mut self,
         pose: &StampedPose,
         is_static: bool,
+        publisher: Option<Gid>,
         now: Instant,
         queue: &mut CloudQueue,
         counters: &mut Counters,
@@ -63,17 +72,24 @@ impl TransformBuffer {
         // Frames that are known stay in use, whoever floods the rest.
         let is_new = !self.transforms.knows(child);
         let is_full = new + kept >= MOST_SAMPLES || (is_new && self.transforms.frames() >= MOST_FRAMES);
-        let is_refused = parent.len().max(child.len()) > MOST_NAME_BYTES
+        if parent.len().max(child.len()) > MOST_NAME_BYTES
             || is_full
             || !(is_static || self.is_of_now(child, pose.header.stamp_ns, now, queue))
-            || !self.transforms.insert(
-                parent,
-                child,
-                pose.header.stamp_ns,
-                pose.parent_from_child,
-                is_static,
-            );
-        counters.transforms_refused += u64::from(is_refused);
+        {
+            counters.transforms_refused += 1;
+        } else {
+            let stamp_ns = pose.header.stamp_ns;
+            match self.transforms.insert(parent, child, stamp_ns, pose.parent_from_child, is_static) {
+                Ok(false) => {}
+                Ok(true) => {
+                    self.parents.check(&self.transforms, [parent, child].map(|of| bare(of)), publisher)
+                }
+                Err(why) => {
+                    counters.transforms_refused += 1;
+                    self.warn_of_refused(&why, publisher, now);
+                }
+            }
+        }
         self.samples.0 += 1;
     }
 
@@ -104,9 +120,7 @@ impl TransformBuffer {
                 );
                 queue.settle(|cloud| if cloud.arrived < since { self.look_up(cloud).ok() } else { None });
                 for child in children {
-                    if self.transforms.is_moving(&child) {
-                        self.transforms.detach(&child);
-                    }
+                    self.transforms.forget_samples(&child);
                 }
                 true
             }
@@ -115,27 +129,41 @@ impl TransformBuffer {
 
     /// Whether a cloud has its pose, may still get it, or never will.
     pub fn verdict(&mut self, cloud: &Cloud, now: Instant) -> Verdict<RigidPose> {
-        match cloud.pose.map_or_else(|| self.find(cloud), Ok) {
-            Ok(pose) => Verdict::Ready(pose),
-            Err(why @ WhyNot::AlreadyFixed(_)) => {
-                if !std::mem::replace(&mut self.has_warned, true) {
-                    log::warn!(
-                        "clouds are dropped: {why}. Publish them in the frame of the sensor, with its transforms, or \
-                         give with --frame-id a frame in which the sensor moves"
-                    );
-                }
-                Verdict::Hopeless
+        let why = match cloud.pose.map_or_else(|| self.find(cloud), Ok) {
+            Ok(pose) => {
+                self.watch.found(cloud.topic);
+                return Verdict::Ready(pose);
             }
-            // Transforms may come late and out of order.
-            Err(why) if now.saturating_duration_since(cloud.arrived) < self.most_wait => {
-                log::trace!("a cloud of {} waits: {why}", cloud.frame);
-                Verdict::Waits
-            }
-            Err(why) => {
-                self.tell(&why);
-                Verdict::Hopeless
-            }
+            Err(why) => why,
+        };
+        let may_pass = !matches!(why, WhyNot::AlreadyFixed(_));
+        let missed = || {
+            format!("{} (a cloud of {} in {})", printable(&why), cloud.frame.escape_debug(), self.fixed_frame)
+        };
+        if let Some(warning) = self.watch.missed(cloud.topic, now, may_pass, missed) {
+            log::warn!("{warning}{}", remedy(&why));
         }
+        // Transforms may come late and out of order.
+        if may_pass && now.saturating_duration_since(cloud.arrived) < self.most_wait {
+            log::trace!("a cloud of {} waits: {why}", cloud.frame);
+            return Verdict::Waits;
+        }
+        log::debug!("a cloud is dropped, it has no pose in {}: {why}", self.fixed_frame);
+        Verdict::Hopeless
+    }
+
+    /// Why no cloud gets a pose, if that lasts.
+    pub fn trouble(&self) -> Option<String> {
+        self.watch.trouble()
+    }
+
+    fn warn_of_refused(&mut self, why: &BadTransform, publisher: Option<Gid>, now: Instant) {
+        if self.refused_at.is_some_and(|at| now.saturating_duration_since(at) < REFUSED_AGAIN) {
+            return;
+        }
+        self.refused_at = Some(now);
+        let publisher = publisher.map(|gid| format!(" (publisher {gid})")).unwrap_or_default();
+        log::warn!("a transform is refused{publisher}: {}", printable(why));
     }
 
     /// The pose of a cloud, if its clock is known now.
@@ -144,7 +172,7 @@ impl TransformBuffer {
         // What came since then may be of another clock, which passes the same stamps again.
         let mut off = self.stamps.off().filter(|(_, since)| *since <= cloud.arrived).peekable();
         if off.peek().is_some() {
-            let links = self.transforms.links_between(&self.fixed_frame, &cloud.frame)?;
+            let links = self.transforms.links_between(&self.fixed_frame, &cloud.frame, cloud.stamp_ns)?;
             let is_between = |child: &str| links.iter().flatten().any(|link| link == bare(child));
             if let Some((child, _)) = off.find(|(child, _)| is_between(child)) {
                 return Err(WhyNot::After(bare(child).to_owned()));
@@ -160,9 +188,21 @@ impl TransformBuffer {
         }
         self.transforms.lookup(&self.fixed_frame, &cloud.frame, cloud.stamp_ns)
     }
+}
 
-    fn tell(&self, why: &WhyNot) {
-        log::debug!("a cloud is dropped, it has no pose in {}: {why}", self.fixed_frame);
+/// What others sent is printed without what a terminal obeys.
+fn printable(why: &dyn std::fmt::Display) -> String {
+    why.to_string().escape_debug().to_string()
+}
+
+/// What to do about clouds that get no pose, where that is not obvious.
+fn remedy(why: &WhyNot) -> &'static str {
+    match why {
+        WhyNot::AlreadyFixed(_) => {
+            ". Publish them in the frame of the sensor, with its transforms, or give with --frame-id a frame in which \
+             the sensor moves"
+        }
+        _ => "",
     }
 }
 
@@ -203,10 +243,18 @@ mod tests {
     fn a_cloud_waits_for_the_transform_behind_its_stamp_and_then_is_dropped() {
         let (mut buffer, mut counters) = (buffer(), Counters::default());
         let cloud = cloud(150_000_000);
-        buffer.insert(&pose("base", "lidar", 0, 1.0), true, Instant::now(), &mut queue(), &mut counters);
+        buffer.insert(
+            &pose("base", "lidar", 0, 1.0),
+            true,
+            None,
+            Instant::now(),
+            &mut queue(),
+            &mut counters,
+        );
         buffer.insert(
             &pose("map", "base", 100_000_000, 0.0),
             false,
+            None,
             Instant::now(),
             &mut queue(),
             &mut counters,
@@ -216,6 +264,7 @@ mod tests {
         buffer.insert(
             &pose("map", "base", 200_000_000, 2.0),
             false,
+            None,
             Instant::now(),
             &mut queue(),
             &mut counters,
@@ -229,10 +278,10 @@ mod tests {
     fn a_stamp_in_the_future_costs_no_history_and_a_restart_forgets_it() {
         const S: i64 = 1_000_000_000;
         let (mut buffer, mut counters, start) = (buffer(), Counters::default(), Instant::now());
-        buffer.insert(&pose("base", "lidar", 0, 1.0), true, start, &mut queue(), &mut counters);
+        buffer.insert(&pose("base", "lidar", 0, 1.0), true, None, start, &mut queue(), &mut counters);
         let mut tick = |buffer: &mut TransformBuffer, number: i64, stamp_ns: i64, x: f64| {
             let now = start + Duration::from_millis(20) * number as u32;
-            buffer.insert(&pose("map", "base", stamp_ns, x), false, now, &mut queue(), &mut counters);
+            buffer.insert(&pose("map", "base", stamp_ns, x), false, None, now, &mut queue(), &mut counters);
         };
         for number in 0..3000 {
             tick(&mut buffer, number, 5 * S + number * S / 50, 3.0);
@@ -259,13 +308,13 @@ mod tests {
     fn a_frame_whose_clock_falls_back_costs_the_others_no_history() {
         const S: i64 = 1_000_000_000;
         let (mut buffer, mut counters, start) = (buffer(), Counters::default(), Instant::now());
-        buffer.insert(&pose("base", "lidar", 0, 1.0), true, start, &mut queue(), &mut counters);
+        buffer.insert(&pose("base", "lidar", 0, 1.0), true, None, start, &mut queue(), &mut counters);
         for number in 0..500 {
             let now = start + Duration::from_millis(20) * number as u32;
             let stamp_ns = 1000 * S + number * S / 50;
             let of_arm = if number < 250 { stamp_ns } else { number * S / 50 };
-            buffer.insert(&pose("base", "arm", of_arm, 0.0), false, now, &mut queue(), &mut counters);
-            buffer.insert(&pose("map", "base", stamp_ns, 3.0), false, now, &mut queue(), &mut counters);
+            buffer.insert(&pose("base", "arm", of_arm, 0.0), false, None, now, &mut queue(), &mut counters);
+            buffer.insert(&pose("map", "base", stamp_ns, 3.0), false, None, now, &mut queue(), &mut counters);
             let found = buffer.verdict(&cloud(stamp_ns), now);
             assert!(
                 matches!(found, Verdict::Ready(pose) if pose.position_m[0] == 4.0),
@@ -282,13 +331,14 @@ mod tests {
             buffer.insert(
                 &pose("map", &format!("f{frame}"), 0, 0.0),
                 false,
+                None,
                 Instant::now(),
                 &mut queue(),
                 &mut counters,
             );
         }
         assert_eq!((buffer.transforms.frames(), counters.transforms_refused), (MOST_FRAMES, 7));
-        buffer.insert(&pose("map", "f3", 1, 0.0), false, Instant::now(), &mut queue(), &mut counters);
+        buffer.insert(&pose("map", "f3", 1, 0.0), false, None, Instant::now(), &mut queue(), &mut counters);
         assert_eq!(counters.transforms_refused, 7);
     }
 
@@ -296,15 +346,36 @@ mod tests {
     fn who_floods_the_buffer_loses_its_own_past_alone() {
         const S: i64 = 1_000_000_000;
         let (mut buffer, mut counters, now) = (buffer(), Counters::default(), Instant::now());
-        buffer.insert(&pose("base", "lidar", 0, 1.0), true, now, &mut queue(), &mut counters);
+        buffer.insert(&pose("base", "lidar", 0, 1.0), true, None, now, &mut queue(), &mut counters);
         for tick in 0..100 {
-            buffer.insert(&pose("map", "base", tick * S / 50, 2.0), false, now, &mut queue(), &mut counters);
+            buffer.insert(
+                &pose("map", "base", tick * S / 50, 2.0),
+                false,
+                None,
+                now,
+                &mut queue(),
+                &mut counters,
+            );
         }
         for stamp_ns in 0..2 * MOST_SAMPLES as i64 {
-            buffer.insert(&pose("map", "flood", stamp_ns, 0.0), false, now, &mut queue(), &mut counters);
+            buffer.insert(
+                &pose("map", "flood", stamp_ns, 0.0),
+                false,
+                None,
+                now,
+                &mut queue(),
+                &mut counters,
+            );
         }
         for tick in 100..200 {
-            buffer.insert(&pose("map", "base", tick * S / 50, 2.0), false, now, &mut queue(), &mut counters);
+            buffer.insert(
+                &pose("map", "base", tick * S / 50, 2.0),
+                false,
+                None,
+                now,
+                &mut queue(),
+                &mut counters,
+            );
         }
         for stamp_ns in [S / 100, 2 * S - S / 100, 3 * S + S / 100] {
             let found = buffer.verdict(&cloud(stamp_ns), now);
@@ -318,10 +389,62 @@ mod tests {
         // Parents are samples, too.
         for parent in 0..MOST_SAMPLES + 2 * FORGET_EVERY {
             let pose = pose(&format!("p{parent}"), "flood", 0, 0.0);
-            buffer.insert(&pose, true, now, &mut queue(), &mut counters);
+            buffer.insert(&pose, true, None, now, &mut queue(), &mut counters);
         }
         assert!(buffer.transforms.forget_older_than(SPAN_NS) <= MOST_SAMPLES);
         assert!(matches!(buffer.verdict(&cloud(S / 100), now), Verdict::Ready(_)));
+    }
+
+    #[test]
+    fn transforms_that_make_loops_cost_no_cloud_and_few_warnings() {
+        const S: i64 = 1_000_000_000;
+        let (mut buffer, mut counters, mut queue, start) =
+            (buffer(), Counters::default(), queue(), Instant::now());
+        // Before all others, between them, and a thousand times a second.
+        let wrong = [("lidar", "map"), ("base", "map"), ("lidar", "base"), ("lidar", "odom"), ("x", "lidar")];
+        let mut put = |buffer: &mut TransformBuffer, parent: &str, child: &str, stamp_ns: i64, is_static| {
+            let now = start + Duration::from_nanos(stamp_ns as u64);
+            let pose = pose(parent, child, stamp_ns, 1.0);
+            buffer.insert(&pose, is_static, None, now, &mut queue, &mut counters);
+        };
+        for (parent, child) in wrong {
+            put(&mut buffer, parent, child, 0, false);
+        }
+        put(&mut buffer, "base", "lidar", 0, true);
+        for tick in 0..150 {
+            put(&mut buffer, "map", "odom", tick * S / 50, false);
+            put(&mut buffer, "odom", "base", tick * S / 50, false);
+            for k in 0..20 {
+                let (parent, child) = wrong[k as usize % wrong.len()];
+                put(&mut buffer, parent, child, tick * S / 50 + k * S / 1000, false);
+            }
+            let stamp_ns = tick * S / 50 - S / 100;
+            if tick > 0 {
+                let now = start + Duration::from_nanos(stamp_ns as u64);
+                let found = buffer.verdict(&Cloud { arrived: now, ..cloud(stamp_ns) }, now);
+                assert!(
+                    matches!(found, Verdict::Ready(pose) if pose.position_m[0] == 3.0),
+                    "{tick}: {found:?}"
+                );
+            }
+        }
+        assert!((3..=6).contains(&buffer.parents.len()), "{}", buffer.parents.len());
+        assert_eq!(counters, Counters::default());
+    }
+
+    #[test]
+    fn what_keeps_all_clouds_from_their_poses_is_reported() {
+        let (mut buffer, mut counters) = (buffer(), Counters::default());
+        let now = Instant::now();
+        buffer.insert(&pose("base", "lidar", 0, 1.0), true, None, now, &mut queue(), &mut counters);
+        let mut lost = |seconds| {
+            let now = now + Duration::from_secs(seconds);
+            buffer.verdict(&Cloud { arrived: now, ..cloud(0) }, now);
+            buffer.trouble()
+        };
+        assert_eq!((lost(0), lost(2)), (None, None));
+        let why = "no cloud gets a pose: no transform names the frame map (a cloud of lidar in map)";
+        assert_eq!(lost(4).as_deref(), Some(why));
     }
 
     #[test]
@@ -330,6 +453,7 @@ mod tests {
         buffer.insert(
             &pose("map", &"x".repeat(1 << 20), 0, 0.0),
             true,
+            None,
             Instant::now(),
             &mut queue(),
             &mut counters,
@@ -345,7 +469,7 @@ mod tests {
         let mut tick = |buffer: &mut TransformBuffer, queue: &mut CloudQueue, number: i64| {
             let now = start + Duration::from_millis(20) * number as u32;
             let pose = pose("map", "lidar", number * S / 50, number as f64 / 50.0);
-            buffer.insert(&pose, false, now, queue, &mut counters);
+            buffer.insert(&pose, false, None, now, queue, &mut counters);
         };
         queue.push(cloud(2 * S), &mut Counters::default());
         queue.push(cloud(70 * S + S / 100), &mut Counters::default());
@@ -368,7 +492,7 @@ mod tests {
             (buffer(), Counters::default(), queue(), Instant::now());
         let at = |number: i64| start + Duration::from_millis(20) * number as u32;
         let mut tick = |buffer: &mut TransformBuffer, queue: &mut CloudQueue, number: i64, stamp_ns, x| {
-            buffer.insert(&pose("map", "lidar", stamp_ns, x), false, at(number), queue, &mut counters);
+            buffer.insert(&pose("map", "lidar", stamp_ns, x), false, None, at(number), queue, &mut counters);
         };
         (0..300).for_each(|number| tick(&mut buffer, &mut queue, number, number * S / 50, 1.0));
         let before = Cloud { arrived: at(299), ..cloud(5 * S + S / 100) };

@@ -3,7 +3,7 @@
 peer.py DOMAIN BAG CLOUDS [hostile | types | variants | odometry | sensors | path | real FOLDER]
 
 variants: the same points as organised clouds, big-endian, in double precision with fields in another order.
-hostile: clouds that lie, before each one.
+hostile: clouds that lie, and transforms that make loops, before each one.
 types: others offer and want the same topics with other types.
 odometry: poses come as nav_msgs/Odometry, and only the mount of the sensor by tf.
 sensors: two sensors with their mounts, so far apart that their clouds do not overlap.
@@ -152,6 +152,15 @@ TYPES = {
 }
 
 
+def loops(stamp_ns):
+    """Transforms that make loops with those of the robot, or with each other, or are none, among good ones."""
+    pairs = [("lidar", "map"), ("base", "map"), ("lidar", "base"), ("odom", "odom"), ("", "base"), ("lost", "lidar")]
+    wrong = [transform(stamp_ns, parent, child, 7.0, 1.0) for parent, child in pairs]
+    bent = transform(stamp_ns, "odom", "base", 0.0, 0.0)
+    bent.transform.rotation = Quaternion(float("nan"), 0.0, 0.0, 1.0)
+    return TFMessage([*wrong, bent])
+
+
 def corrected_path(clouds):
     """Poses of the sensor at its clouds, further and further from where tf had it; in between some that are of none."""
     poses = []
@@ -259,6 +268,8 @@ def main():
             writers[name].write(liar)
             liar.fields = []
             writers[name].write(liar)
+            stamp = message.header.stamp
+            writers["/tf"].write(loops((stamp.sec - START_S) * 10**9 + stamp.nanosec))
         if others and name == "/cloud_in":
             speak(others[1], message)
         writers[name].write(message)

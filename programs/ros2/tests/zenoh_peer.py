@@ -11,7 +11,7 @@ import pathlib
 import sys
 import time
 
-from peer import TYPES, cloud, messages, topics_of, write_bag
+from peer import START_S, TYPES, cloud, loops, messages, topics_of, write_bag
 from zenoh_graph import Graph, run
 
 
@@ -59,6 +59,9 @@ def main():
             liar.height = liar.width = liar.row_step = 2**32 - 1
             publishers[name](bytes(liar.serialize()))
             publishers["/tf"](bytes(liar.serialize()))
+            stamp = message.header.stamp
+            wrong = loops((stamp.sec - START_S) * 10**9 + stamp.nanosec)
+            publishers["/tf"](bytes(wrong.serialize()))
         publishers[name](bytes(message.serialize()))
         time.sleep(0.02)
     time.sleep(1.5)

@@ -66,6 +66,11 @@ impl InputRecord {
         self.name == name || self.name == beginning_of(name)
     }
 
+    /// What its first scan with points is, if that is known.
+    pub(crate) fn begins_with(&self) -> Option<&str> {
+        self.content.as_ref()?.begins_with.as_deref()
+    }
+
     /// Cuts a name that is too long for a map.
     pub(crate) fn cut_name(&mut self) {
         self.name.truncate(beginning_of(&self.name).len());

@@ -14,6 +14,8 @@ pub use image::{CameraInfo, Image, is_depth_encoding};
 pub use kind::MessageKind;
 pub use laser_scan::LaserScan;
 pub use livox::LivoxCustom;
+pub(super) use point_cloud2::MAX_HEAD_BYTES;
 pub use point_cloud2::PointCloud2;
 pub use point_field::{FieldType, PointField};
+pub(super) use poses::visit_poses;
 pub use poses::{StampedPose, decode_poses};

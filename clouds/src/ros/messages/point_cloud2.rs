@@ -1,7 +1,9 @@
 use super::header::Header;
 use super::point_field::{FieldType, PointField};
 use crate::cloud::CloudPoint;
+use crate::error::Result;
 use crate::ros::wire::{Decoded, Wire, WireError, WireReader};
+use crate::spill::FilePart;
 
 /// `sensor_msgs/PointCloud2`, with its points as the bytes that they are.
 #[derive(Clone, Debug)]
@@ -17,7 +19,11 @@ pub struct PointCloud2<'a> {
     is_big_endian: bool,
     point_bytes: usize,
     row_bytes: usize,
+    /// The points, or as many of them as are at hand.
     data: &'a [u8],
+    /// Where they begin in the message, and how many bytes they take.
+    data_at: u64,
+    data_bytes: usize,
     xyz: [Column; 3],
     intensity: Option<Column>,
     time: Option<TimeColumn>,
@@ -44,6 +50,14 @@ enum TimeColumn {
 const INTENSITY_NAMES: [&str; 5] = ["intensity", "Intensity", "i", "reflectivity", "reflectance"];
 const TIME_NAMES: [&str; 8] =
     ["t", "time", "time_stamp", "timestamp", "offset_time", "timeOffset", "time_offset", "stamps"];
+/// More fields of a point are damage.
+const MAX_FIELDS: usize = 1024;
+/// The bytes of a large message that must have all that is before its points.
+pub(crate) const MAX_HEAD_BYTES: u64 = 1 << 20;
+/// Bytes of a large message that are read at a time.
+const PIECE_BYTES: usize = 1 << 16;
+/// Points of a large message may have at most so many bytes.
+const MAX_POINT_BYTES: usize = 1 << 20;
 /// Times of type `f64` above this are nanoseconds: in seconds this is three million years.
 const LEAST_NANOSECONDS: f64 = 1e14;
 
@@ -54,14 +68,23 @@ impl<'a> PointCloud2<'a> {
     ///
     /// A message that is cut off; fields without x, y or z, or outside of a point.
     pub fn decode(wire: Wire, bytes: &'a [u8]) -> Decoded<Self> {
-        let mut reader = WireReader::new(wire, bytes)?;
+        Self::decode_start(wire, bytes, bytes.len() as u64)
+    }
+
+    /// Decodes a message of `len` bytes of which only the first are at hand; [`PointCloud2::visit_part`] visits its
+    /// points.
+    pub(crate) fn decode_start(wire: Wire, bytes: &'a [u8], len: u64) -> Decoded<Self> {
+        let mut reader = WireReader::of_start(wire, bytes, len)?;
         let header = Header::read(&mut reader)?;
         let (height, width) = (reader.u32()?, reader.u32()?);
         let count = reader.sequence(PointField::LEAST_BYTES)?;
+        if count > MAX_FIELDS {
+            return Err(reader.error(format!("points of {count} fields; at most {MAX_FIELDS} are possible")));
+        }
         let fields = (0..count).map(|_| PointField::read(&mut reader)).collect::<Decoded<Vec<_>>>()?;
         let is_big_endian = reader.u8()? != 0;
         let (point_bytes, row_bytes) = (reader.u32()? as usize, reader.u32()? as usize);
-        let data = reader.byte_sequence()?;
+        let (data, data_at, data_bytes) = reader.start_of_bytes()?;
         if point_bytes == 0 && width != 0 && height != 0 {
             return Err(reader.error("point_step is 0"));
         }
@@ -91,6 +114,8 @@ impl<'a> PointCloud2<'a> {
             point_bytes,
             row_bytes,
             data,
+            data_at,
+            data_bytes,
             xyz,
             intensity,
             time,
@@ -122,18 +147,58 @@ impl<'a> PointCloud2<'a> {
             .map(|point| self.point(point))
     }
 
+    /// Visits the points of a large message, of which [`PointCloud2::decode_start`] got the first bytes.
+    pub(crate) fn visit_part(
+        &self,
+        message: &FilePart,
+        visit: &mut dyn FnMut(CloudPoint) -> Result<()>,
+    ) -> Result<Option<WireError>> {
+        let point_bytes = self.point_bytes.max(1);
+        if point_bytes > MAX_POINT_BYTES {
+            let reason = format!("points of {point_bytes} bytes; at most {MAX_POINT_BYTES} are possible");
+            return Ok(Some(WireError { byte: 0, reason }));
+        }
+        let (mut height, mut width) = (self.height as usize, self.width as usize);
+        // Rows without anything between them are one.
+        if point_bytes.checked_mul(width) == Some(self.row_bytes)
+            && let Some(points) = height.checked_mul(width)
+        {
+            (height, width) = (1, points);
+        }
+        let at_a_time = (PIECE_BYTES / point_bytes).max(1);
+        let (mut bytes, mut there) = (Vec::new(), 0_u64);
+        for row in 0..if width == 0 { 0 } else { height } {
+            let start = row.checked_mul(self.row_bytes).filter(|start| *start <= self.data_bytes);
+            let Some(start) = start else { break };
+            let points = ((self.data_bytes - start) / point_bytes).min(width);
+            for first in (0..points).step_by(at_a_time) {
+                let count = at_a_time.min(points - first);
+                bytes.resize(count * point_bytes, 0);
+                message.read_at(self.data_at + (start + first * point_bytes) as u64, &mut bytes)?;
+                bytes.chunks_exact(point_bytes).try_for_each(|point| visit(self.point(point)))?;
+                there += count as u64;
+            }
+        }
+        Ok(self.is_short().then(|| self.shortage_of(there)))
+    }
+
     /// Why there are fewer points than the message claims, if there are.
     pub fn shortage(&self) -> Option<WireError> {
-        let claimed = self.points_claimed();
-        let last_row = (self.height as usize).checked_sub(1)?.checked_mul(self.row_bytes);
+        self.is_short().then(|| self.shortage_of(self.points().count() as u64))
+    }
+
+    fn is_short(&self) -> bool {
+        let rows_before = (self.height as usize).checked_sub(1);
+        let last_row = rows_before.and_then(|rows| rows.checked_mul(self.row_bytes));
         let last_row_bytes = self.point_bytes.checked_mul(self.width as usize);
         let needed = last_row.zip(last_row_bytes).and_then(|(rows, row)| rows.checked_add(row));
-        if claimed == 0 || needed.is_some_and(|needed| needed <= self.data.len()) {
-            return None;
-        }
-        let (there, bytes) = (self.points().count(), self.data.len());
+        self.points_claimed() > 0 && needed.is_none_or(|needed| needed > self.data_bytes)
+    }
+
+    fn shortage_of(&self, there: u64) -> WireError {
+        let (claimed, bytes) = (self.points_claimed(), self.data_bytes);
         let reason = format!("{claimed} points are announced; {bytes} bytes of data hold {there}");
-        Some(WireError { byte: 0, reason })
+        WireError { byte: 0, reason }
     }
 
     fn point(&self, point: &[u8]) -> CloudPoint {

@@ -14,6 +14,8 @@ pub struct StampedPose {
     pub parent_from_child: RigidPose,
 }
 
+/// The poses of a message of so many bytes are decoded together.
+const SMALL_BYTES: usize = 1 << 16;
 /// The fewest bytes of a transform, and of a pose, in a message.
 const LEAST_BYTES: usize = 7 * 8;
 
@@ -23,29 +25,58 @@ const LEAST_BYTES: usize = 7 * 8;
 ///
 /// The message is cut off.
 pub fn decode_poses(kind: MessageKind, wire: Wire, bytes: &[u8]) -> Decoded<Vec<StampedPose>> {
+    let mut poses = Vec::new();
+    visit(kind, wire, bytes, &mut |pose| poses.push(pose))?;
+    Ok(poses)
+}
+
+/// Visits the poses of a message, none of them if it is cut off. A large message is decoded twice for that, so that its
+/// poses are not in memory together.
+///
+/// # Errors
+///
+/// The message is cut off.
+pub(crate) fn visit_poses(
+    kind: MessageKind,
+    wire: Wire,
+    bytes: &[u8],
+    take: &mut dyn FnMut(StampedPose),
+) -> Decoded<()> {
+    if bytes.len() <= SMALL_BYTES {
+        decode_poses(kind, wire, bytes)?.into_iter().for_each(take);
+        return Ok(());
+    }
+    visit(kind, wire, bytes, &mut |_| {})?;
+    visit(kind, wire, bytes, take)
+}
+
+fn visit(kind: MessageKind, wire: Wire, bytes: &[u8], take: &mut dyn FnMut(StampedPose)) -> Decoded<()> {
     let reader = &mut WireReader::new(wire, bytes)?;
-    Ok(match kind {
+    match kind {
         MessageKind::Tf => {
-            let count = reader.sequence(LEAST_BYTES)?;
-            (0..count).map(|_| transform(reader)).collect::<Decoded<_>>()?
+            for _ in 0..reader.sequence(LEAST_BYTES)? {
+                take(transform(reader)?);
+            }
         }
-        MessageKind::TransformStamped => vec![transform(reader)?],
+        MessageKind::TransformStamped => take(transform(reader)?),
         MessageKind::Odometry => {
             let (header, child_frame) = (Header::read(reader)?, read_frame(reader)?);
-            vec![StampedPose { header, child_frame, parent_from_child: pose(reader)? }]
+            take(StampedPose { header, child_frame, parent_from_child: pose(reader)? });
         }
-        MessageKind::PoseStamped | MessageKind::PoseWithCovarianceStamped => vec![stamped(reader)?],
+        MessageKind::PoseStamped | MessageKind::PoseWithCovarianceStamped => take(stamped(reader)?),
         MessageKind::Path => {
             let whole = Header::read(reader)?;
-            let count = reader.sequence(LEAST_BYTES)?;
-            let mut poses = (0..count).map(|_| stamped(reader)).collect::<Decoded<Vec<_>>>()?;
-            for pose in poses.iter_mut().filter(|pose| pose.header.frame_id.is_empty()) {
-                pose.header.frame_id.clone_from(&whole.frame_id);
+            for _ in 0..reader.sequence(LEAST_BYTES)? {
+                let mut pose = stamped(reader)?;
+                if pose.header.frame_id.is_empty() {
+                    pose.header.frame_id.clone_from(&whole.frame_id);
+                }
+                take(pose);
             }
-            poses
         }
-        _ => Vec::new(),
-    })
+        _ => {}
+    }
+    Ok(())
 }
 
 /// `geometry_msgs/TransformStamped`.

@@ -34,7 +34,10 @@ impl Diagnosing {
             return;
         }
         let (now, waiting) = inbox.counters();
-        let message = diagnostics(&self.node_name, &map.health(), [&self.before, &now], waiting, since);
+        let trouble = inbox.pose_trouble();
+        let counters = [&self.before, &now];
+        let message =
+            diagnostics(&self.node_name, &map.health(), counters, waiting, since, trouble.as_deref());
         if let Err(error) = self.sender.send(message) {
             log::debug!("diagnostics: not sent: {error}");
         }

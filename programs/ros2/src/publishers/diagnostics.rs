@@ -10,6 +10,7 @@ pub fn diagnostics(
     [before, now]: [&Counters; 2],
     waiting: usize,
     since: Duration,
+    trouble: Option<&str>,
 ) -> DiagnosticArray {
     let dropped = [
         ("dropped_behind", now.dropped_behind, before.dropped_behind),
@@ -64,7 +65,7 @@ pub fn diagnostics(
         ("stalls", statistics.stalls.count.to_string()),
         ("worst_stall_ms", (statistics.stalls.worst_us / 1000).to_string()),
     ]);
-    let (level, message) = summary(&why, health.has_flush_failed);
+    let (level, message) = summary(&why, trouble, health.has_flush_failed);
     let values = values.into_iter().map(|(key, value)| KeyValue { key: key.to_owned(), value }).collect();
     let status = DiagnosticStatus {
         level,
@@ -79,17 +80,19 @@ pub fn diagnostics(
 }
 
 /// How bad it is, and what is to be done where the node cannot help itself.
-fn summary(losses: &[&str], has_flush_failed: bool) -> (u8, String) {
+fn summary(losses: &[&str], trouble: Option<&str>, has_flush_failed: bool) -> (u8, String) {
     let remedies = losses.iter().filter_map(|loss| remedy(loss));
     let remedies: Vec<&str> = remedies.chain(has_flush_failed.then_some(AFTER_FAILED_FLUSH)).collect();
     let level = match (losses, &*remedies) {
-        ([], []) => return (DiagnosticStatus::OK, "mapping".to_owned()),
+        ([], []) if trouble.is_none() => return (DiagnosticStatus::OK, "mapping".to_owned()),
         // Only some places are not mapped.
         (_, [] | [OF_DAMAGE]) => DiagnosticStatus::WARN,
         _ => DiagnosticStatus::ERROR,
     };
     let losses = if losses.is_empty() { None } else { Some(format!("losses: {}", losses.join(", "))) };
-    let parts: Vec<String> = losses.into_iter().chain(remedies.into_iter().map(str::to_owned)).collect();
+    let trouble = trouble.map(str::to_owned);
+    let parts = losses.into_iter().chain(trouble).chain(remedies.into_iter().map(str::to_owned));
+    let parts: Vec<String> = parts.collect();
     (level, parts.join("; "))
 }
 
@@ -118,7 +121,7 @@ mod tests {
         let before = Counters { malformed: 3, mapped: 10, ..Counters::default() };
         let now = Counters { dropped_behind: 1, mapped: 30, ..before };
         let told = |counters| {
-            let array = diagnostics("n", &Health::default(), counters, 0, Duration::from_secs(2));
+            let array = diagnostics("n", &Health::default(), counters, 0, Duration::from_secs(2), None);
             let [status] = array.status.try_into().unwrap();
             (status.level, status.message, status.values.first().unwrap().value.clone())
         };
@@ -128,10 +131,19 @@ mod tests {
     }
 
     #[test]
+    fn why_no_cloud_gets_a_pose_is_a_warning() {
+        let (health, none) = (Health::default(), Counters::default());
+        let array = diagnostics("n", &health, [&none; 2], 0, Duration::from_secs(1), Some("no pose: why"));
+        let [status] = array.status.try_into().unwrap();
+        assert_eq!((status.level, status.message.as_str()), (DiagnosticStatus::WARN, "no pose: why"));
+    }
+
+    #[test]
     fn what_the_node_cannot_mend_says_what_to_do() {
         let told = |now: Counters, has_flush_failed| {
             let health = Health { has_flush_failed, ..Health::default() };
-            let array = diagnostics("n", &health, [&Counters::default(), &now], 0, Duration::from_secs(1));
+            let array =
+                diagnostics("n", &health, [&Counters::default(), &now], 0, Duration::from_secs(1), None);
             let [status] = array.status.try_into().unwrap();
             (status.level, status.message)
         };

@@ -6,6 +6,7 @@
 //! ```
 
 mod dds;
+mod message;
 mod qos;
 mod sender;
 mod threads;
@@ -15,11 +16,12 @@ mod type_name;
 #[cfg(feature = "zenoh")]
 mod zenoh;
 
+pub use message::{Gid, Message};
 pub use qos::Qos;
 pub use sender::Sender;
 pub use transport_name::TransportName;
 pub use transport_node::Transport;
 pub use type_name::TypeName;
 
-/// Takes a message as its bytes, with the four bytes in front that say its encoding.
-pub type Put = Box<dyn Fn(Vec<u8>) + Send>;
+/// Takes a message.
+pub type Put = Box<dyn Fn(Message) + Send>;

@@ -6,7 +6,7 @@ use crate::inbox::Inbox;
 use crate::names::Names;
 use crate::services::Rmw;
 use crate::transport::threads::spawn;
-use crate::transport::{Put, Qos, TypeName};
+use crate::transport::{self, Gid, Put, Qos, TypeName};
 use anyhow::{Context as _, anyhow};
 use futures::StreamExt;
 use futures::executor::block_on;
@@ -89,7 +89,10 @@ impl DdsNode {
         spawn("reader", move || {
             block_on(reader.as_async_stream().for_each(|sample| {
                 match sample {
-                    Ok(sample) => put(sample.into_value().cdr),
+                    Ok(sample) => {
+                        let publisher = Some(Gid(sample.writer_guid().to_bytes()));
+                        put(transport::Message { cdr: sample.into_value().cdr, publisher });
+                    }
                     Err(error) => {
                         log::debug!("a sample is lost: {error:?}");
                         inbox.count(|counters| counters.transport_errors += 1);

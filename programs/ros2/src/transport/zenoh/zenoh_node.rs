@@ -1,3 +1,4 @@
+use super::attachment::Attachment;
 use super::configuration::configuration;
 use super::graph_name::{Channel, End, GraphName, gid_of};
 use super::listeners::Listeners;
@@ -8,7 +9,7 @@ use crate::args::Args;
 use crate::inbox::Inbox;
 use crate::names::Names;
 use crate::transport::threads::spawn;
-use crate::transport::{Put, Qos, TypeName};
+use crate::transport::{Gid, Message, Put, Qos, TypeName};
 use anyhow::anyhow;
 use serde::{Serialize, de::DeserializeOwned};
 use std::sync::Arc;
@@ -96,8 +97,8 @@ impl ZenohNode {
         declared.map_err(|error| anyhow!("{}: {error}", channel.name))?;
         let its_mailbox = mailbox.clone();
         spawn("reader", move || {
-            while let Some(cdr) = its_mailbox.take() {
-                put(cdr);
+            while let Some(message) = its_mailbox.take() {
+                put(message);
             }
         })?;
         self.closers.push(Box::new(move || mailbox.close()));
@@ -183,7 +184,7 @@ impl ZenohNode {
     }
 
     /// What Zenoh's threads do with a sample: they only put it where it waits.
-    fn receiver(&self, mailbox: &Arc<Mailbox<Vec<u8>>>) -> impl Fn(Sample) + Send + Sync + 'static {
+    fn receiver(&self, mailbox: &Arc<Mailbox<Message>>) -> impl Fn(Sample) + Send + Sync + 'static {
         let (mailbox, inbox, most_bytes) = (mailbox.clone(), self.inbox.clone(), self.most_bytes);
         move |sample| {
             let bytes = sample.payload().len();
@@ -192,7 +193,10 @@ impl ZenohNode {
                 inbox.count(|counters| counters.too_large += 1);
                 return;
             }
-            let lost = mailbox.put(sample.payload().to_bytes().into_owned(), bytes);
+            let attachment = sample.attachment().and_then(|bytes| Attachment::from_bytes(&bytes.to_bytes()));
+            let publisher = attachment.map(|attachment| Gid(attachment.gid));
+            let cdr = sample.payload().to_bytes().into_owned();
+            let lost = mailbox.put(Message { cdr, publisher }, bytes);
             if lost > 0 {
                 inbox.count(|counters| counters.transport_errors += lost as u64);
             }
