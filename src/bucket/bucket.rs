@@ -23,8 +23,8 @@ use std::time::Duration;
 /// Its calls wait for the network. What fails for a reason that may pass is tried again. A request that makes no progress
 /// for a [`timeout`](Bucket::with_timeout) fails with [`Error::NoAnswer`]: progress is 16 KiB more of an object, or the
 /// answer. An attempt without progress for half of the timeout is ended and begun again; an object that is fetched
-/// continues at the byte reached. 20 attempts in a row that get no farther are the last, 4 where the server was never
-/// reached. A wait of 8 seconds, or a quarter of the timeout, is reported as a warning of the crate `log`. Every error
+/// continues at the byte reached. An upload has twice as much time. 20 attempts in a row that get no further are the
+/// last, 4 where the server was never reached. A wait of 8 seconds, or a quarter of the timeout, is reported as a warning of the crate `log`. Every error
 /// names its object.
 #[derive(Clone, Debug)]
 pub struct Bucket {

@@ -84,7 +84,8 @@ impl HttpService for CountingClient {
         Box::pin(async move {
             let counted = REQUEST.try_with(Arc::clone).ok();
             if let (Some(counted), Some(server)) = (&counted, request.uri().authority()) {
-                counted.asks(server.to_string());
+                // Without the name and password that an address may have.
+                counted.asks(server.as_str().rsplit('@').next().unwrap_or_default().to_owned());
             }
             let for_body = counted.clone();
             let request = reqwest::Request::try_from(request.map(|body| body_of(body, for_body)));

@@ -13,9 +13,12 @@ use tokio::time::{sleep, timeout_at};
 
 /// One request to a store with all its attempts: how far it is, and how long it may remain without progress.
 ///
-/// An attempt in which fewer than [`PROGRESS_BYTES`] move for half of the limit is ended and begun again. The request fails
-/// if such idle times add up to the limit before an attempt gets farther than all before it: what is sent again is not
-/// idle time, and no progress either.
+/// An attempt in which fewer than [`PROGRESS_BYTES`] move for half of the limit is ended and begun again. The request
+/// fails if such idle times add up to the limit before an attempt gets further than all earlier ones: bytes that are sent
+/// again are neither idle time nor progress.
+///
+/// An upload has twice as much time, the whole limit for an attempt: bytes count as sent once the connection has taken
+/// them, and on a slow link they may wait in its buffers for long.
 #[derive(Debug)]
 pub(super) struct Request {
     verb: &'static str,
@@ -137,7 +140,7 @@ impl Request {
         if outcome.is_err() {
             let mut state = self.state.lock();
             let idle = state.mark.1.elapsed();
-            state.idle += idle;
+            state.idle += if self.is_upload() { idle / 2 } else { idle };
         }
         outcome
     }
@@ -243,7 +246,12 @@ impl Request {
     /// When this attempt ends unless there is progress before.
     fn deadline(&self) -> Instant {
         let state = self.state.lock();
-        state.mark.1 + (self.limit / 2).min(self.limit.saturating_sub(state.idle))
+        let most = (self.limit / 2).min(self.limit.saturating_sub(state.idle));
+        state.mark.1 + if self.is_upload() { 2 * most } else { most }
+    }
+
+    fn is_upload(&self) -> bool {
+        self.verb == "PUT"
     }
 
     /// Whether an error is the answer of a store, and not one of the way there.
@@ -303,7 +311,10 @@ impl fmt::Display for Request {
             write!(f, " of {address}")?;
         }
         let (since, limit) = (self.began.elapsed().as_secs_f64(), self.limit.as_secs_f64());
-        write!(f, ", begun {since:.1} s ago, attempt {}, {} bytes", state.attempts.max(1), state.moved)?;
+        write!(f, ", begun {since:.1} s ago, attempt {}", state.attempts.max(1))?;
+        if matches!(self.verb, "GET" | "PUT") {
+            write!(f, ", {} bytes", state.moved)?;
+        }
         write!(f, ", given up after {limit} s without progress")?;
         match &state.last_failure {
             Some(failure) => write!(f, "; the attempt before failed: {failure}"),

@@ -48,7 +48,8 @@ pub struct Cli {
     /// Say nothing but errors: no warnings, no progress bars
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     pub quiet: bool,
-    /// Give up a request to a bucket that makes no progress (16 KiB, or an answer) for so many seconds [default:
+    /// Fail a bucket request after this many seconds without progress (16 KiB transferred, or an answer); an upload
+    /// after twice as many [default:
     /// VOXTILE_BUCKET_TIMEOUT, or 60]
     #[cfg(feature = "bucket")]
     #[arg(long, global = true, value_name = "SECONDS", value_parser = bucket::timeout_of)]

@@ -39,6 +39,8 @@ pub enum Trouble {
     None,
     /// The request is read and not answered.
     Silent,
+    /// The request is done and answered after so many milliseconds.
+    Late(u64),
     /// The connection is reset before the request is read.
     Reset,
     /// The request is done, and the connection closed without an answer.
@@ -149,6 +151,9 @@ impl State {
         if trouble == Trouble::Silent {
             thread::sleep(LONG);
             return Ok(());
+        }
+        if let Trouble::Late(milliseconds) = trouble {
+            thread::sleep(Duration::from_millis(milliseconds));
         }
         let (status, content, range) = self.answer(&asked, &headers, body);
         if trouble == Trouble::AnswerLost {

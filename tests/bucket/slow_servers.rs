@@ -68,6 +68,21 @@ fn a_put_without_an_answer_is_reported_and_given_up() {
     assert_eq!(texts(&run(&server, &["digest", URL]).0)[0].trim(), digest(map.as_ref()));
 }
 
+/// Sent bytes may still be in the buffers of a slow link when the client counts them.
+#[test]
+fn an_upload_may_take_the_whole_timeout() {
+    let (server, folder) = (S3Server::new(), TempDir::new().unwrap());
+    let map = a_map(&folder);
+    server.trouble(|asked, _| if is_object(asked, "PUT") { Trouble::Late(1_400) } else { Trouble::None });
+    let (pushed, _) = run(&server, &["push", &map, URL, "--bucket-timeout", "2"]);
+    assert!(pushed.status.success(), "{}", texts(&pushed)[1]);
+    let mut sent: Vec<_> = server.asked().into_iter().filter(|asked| is_object(asked, "PUT")).collect();
+    let all = sent.len();
+    sent.sort_by(|a, b| a.key.cmp(&b.key));
+    sent.dedup_by(|a, b| a.key == b.key);
+    assert_eq!(sent.len(), all, "no object was sent twice");
+}
+
 /// What is sent again is no progress.
 #[test]
 fn a_long_object_without_an_answer_is_given_up() {

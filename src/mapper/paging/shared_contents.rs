@@ -24,8 +24,8 @@ impl SharedContents {
         Self { contents: Mutex::new(contents), closed: Condvar::new() }
     }
 
-    /// Locks the contents. Whoever holds the lock needs no thread of a pool that others use: all of its threads may wait
-    /// for the lock.
+    /// Locks the contents. The holder must not wait for a thread of a shared pool: all its threads may be waiting for this
+    /// lock.
     pub(in crate::mapper) fn lock(&self) -> ContentsGuard<'_> {
         self.contents.lock()
     }

@@ -13,8 +13,8 @@ pub(super) enum TileThreads {
     /// Those of the caller's rayon pool: no other thread waits for the lock.
     #[default]
     OfCaller,
-    /// Threads that take no other work. Readers wait for the lock in threads of any pool. If all threads of the
-    /// caller's pool waited for it, parallel work in that pool would never begin.
+    /// Threads that do no other work. If all threads of the caller's pool waited for the lock, work queued in that pool
+    /// would never start.
     Own(Arc<ThreadPool>),
 }
 

@@ -8,7 +8,7 @@ use crate::scan::spill::ScanParts;
 use crate::scan::trace::{Allowance, CollectorLimit};
 use crate::scan::updates::{
     BrickRuns, MappedTiles, Misses, Run, ScanUpdates, TileRuns, TileUpdates, brick_code, bricks_by_tile,
-    in_order_of_tiles, part_in_tile, small_tiles_of_brick,
+    in_order_of_tiles, mean_tiles_of_brick, part_in_tile,
 };
 use crate::space::{BRICK_VOXELS, BrickMask, Grid, TileIndex, VoxelIndex, is_in_mask};
 use rayon::prelude::*;
@@ -280,8 +280,8 @@ fn kept<T: Copy>(values: &mut [T], is_kept: impl Fn(&T) -> bool) -> usize {
     count
 }
 
-/// Tiles smaller than bricks whose updates are in memory at a time, on their way to parts.
-const SMALL_TILES_AT_A_TIME: usize = 4096;
+/// Tiles that divide bricks have their updates in memory so many at a time, on their way to parts.
+const TILES_AT_A_TIME: usize = 4096;
 
 /// Moves the updates of several collectors to `parts`; the first collector saw the first rays.
 pub(crate) fn drain_in_order(
@@ -289,9 +289,9 @@ pub(crate) fn drain_in_order(
     collectors: &mut [PerRayCollector],
     parts: &ScanParts<'_>,
 ) {
-    let bricks_at_a_time = match small_tiles_of_brick(mapped.grid) {
+    let bricks_at_a_time = match mean_tiles_of_brick(mapped.grid) {
         1 => usize::MAX,
-        tiles => SMALL_TILES_AT_A_TIME / tiles,
+        tiles => TILES_AT_A_TIME / tiles,
     };
     for collector in collectors {
         collector.for_each_tile(mapped, bricks_at_a_time, |tile, runs| {

@@ -4,7 +4,7 @@ use crate::scan::pages::MarkedBrick;
 use crate::scan::per_scan::{Intensities, hits_and_misses, merge_bricks, updates_by_tile};
 use crate::scan::stop::Stop;
 use crate::scan::updates::{
-    BrickUpdate, MappedTiles, ScanUpdates, TileUpdates, in_order_of_tiles, small_tiles_of_brick,
+    BrickUpdate, MappedTiles, ScanUpdates, TileUpdates, in_order_of_tiles, mean_tiles_of_brick,
 };
 use crate::scan::{PackedUpdates, ScanReport};
 use crate::space::{TileIndex, TileTable, TileValue, put_number, take_number};
@@ -70,7 +70,7 @@ impl TileValue for PartList {
     }
 }
 
-/// Bricks that are converted to updates at a time, each of one tile.
+/// Bricks that are converted to updates at a time, if each lies in one tile.
 const BRICKS_AT_A_TIME: usize = 4096;
 
 impl<'a> ScanParts<'a> {
@@ -111,7 +111,7 @@ impl<'a> ScanParts<'a> {
 
     /// Adds marked bricks, in insertion per scan.
     pub(crate) fn add_marked(&self, bricks: impl Iterator<Item = MarkedBrick>, intensities: &Intensities) {
-        let at_a_time = BRICKS_AT_A_TIME / small_tiles_of_brick(self.mapped.grid);
+        let at_a_time = BRICKS_AT_A_TIME / mean_tiles_of_brick(self.mapped.grid);
         let mut some = Vec::with_capacity(at_a_time);
         let mut bricks = bricks.peekable();
         while !self.stop.is_set() && bricks.peek().is_some() {

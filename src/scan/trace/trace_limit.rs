@@ -1,5 +1,5 @@
 use crate::scan::per_scan::PerScanCollector;
-use crate::scan::updates::small_tiles_of_brick;
+use crate::scan::updates::mean_tiles_of_brick;
 use crate::space::Grid;
 
 /// The memory limit for tracing a scan.
@@ -52,7 +52,7 @@ impl TraceLimit {
 
     /// Whether the updates of these collectors fit, by tile of `grid`.
     pub(crate) fn has_room_for(&self, collectors: &[PerScanCollector], grid: &Grid) -> bool {
-        let max_bricks = self.bytes / 2 / UPDATE_BYTES / small_tiles_of_brick(grid);
+        let max_bricks = self.bytes / 2 / UPDATE_BYTES / mean_tiles_of_brick(grid);
         let marks_bytes: usize = collectors.iter().map(PerScanCollector::marks_bytes).sum();
         // A page has at most 512 bricks; they are counted only if that might be too many.
         marks_bytes / FAST_PAGE_BYTES * 2 * 512 < max_bricks

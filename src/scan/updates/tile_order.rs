@@ -21,17 +21,16 @@ pub(crate) fn bricks_by_tile(mapped: MappedTiles<'_>, indices: &[VoxelIndex]) ->
     tiles.into_iter().map(in_order).collect()
 }
 
-/// Into how many tiles a brick is divided where tiles are smaller than bricks, at most; 1 where they are not.
+/// Into how many parts the tiles divide a brick, on average over the bricks of a map, rounded: 1 for tiles that are much
+/// larger than bricks.
 ///
-/// A list by tile takes so many times the memory of the bricks that it is made of.
-pub(crate) fn small_tiles_of_brick(grid: &Grid) -> usize {
+/// Lists by tile take so many times the memory of the bricks that they are made of.
+pub(crate) fn mean_tiles_of_brick(grid: &Grid) -> usize {
     let (tile, brick) = (grid.voxels_per_tile_edge() as usize, BRICK_EDGE as usize);
-    if tile >= brick {
-        return 1;
-    }
-    // Tiles whose edge divides that of a brick are aligned with it; others may begin before it.
-    let along_edge = if brick.is_multiple_of(tile) { brick / tile } else { (brick - 1).div_ceil(tile) + 1 };
-    along_edge.pow(3)
+    // Bricks begin in tiles at all multiples of this, equally often.
+    let step = 1 << tile.trailing_zeros().min(BRICK_EDGE.trailing_zeros());
+    let parts_by_tile = (tile + brick - step).pow(3);
+    (parts_by_tile as f64 / tile.pow(3) as f64).round() as usize
 }
 
 /// Code of the brick with this index.
@@ -74,17 +73,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn no_brick_overlaps_more_small_tiles_than_the_bound() {
-        for edge in 2..8 {
+    fn bricks_are_divided_by_tiles_as_often_as_is_expected() {
+        for edge in [2, 3, 4, 5, 6, 7, 8, 9, 12, 20, 31, 32, 100] {
             let grid = Grid::new(1.0, f64::from(edge)).unwrap();
-            let bricks = (-edge..edge).map(|k| [k, 0, k]);
-            let most = bricks.map(|brick| tiles_of_brick(&grid, brick).count()).max().unwrap();
-            assert!(most <= small_tiles_of_brick(&grid), "{most} tiles of {edge} voxels");
+            let along_axis: usize = (-edge..edge).map(|k| tiles_of_brick(&grid, [k, 0, 0]).count()).sum();
+            let aside = f64::from((BRICK_EDGE + edge - 1) / edge).powi(2);
+            let mean = along_axis as f64 / f64::from(2 * edge) / aside;
+            assert_eq!(mean_tiles_of_brick(&grid), mean.powi(3).round() as usize, "tiles of {edge} voxels");
         }
-        assert_eq!(
-            [2, 3, 4, 5, 7].map(|n| small_tiles_of_brick(&Grid::new(1.0, n.into()).unwrap())),
-            [64, 64, 8, 27, 8]
-        );
-        assert_eq!(small_tiles_of_brick(&Grid::new(1.0, 8.0).unwrap()), 1);
     }
 }
