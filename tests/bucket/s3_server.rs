@@ -94,7 +94,9 @@ impl S3Server {
 
     /// A command that finds its buckets here.
     pub fn voxtile(&self, arguments: &[&str]) -> Command {
-        let mut command = Command::new(assert_cmd::cargo::cargo_bin("voxtile"));
+        // A shell that runs tests in the background ignores SIGINT, and so would the command.
+        let mut command = Command::new("env");
+        command.arg("--default-signal=INT").arg(assert_cmd::cargo::cargo_bin("voxtile"));
         let endpoint = format!("http://{}", self.address);
         command.args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped());
         command.env("AWS_ENDPOINT_URL", endpoint).env("AWS_REGION", "test");

@@ -82,7 +82,7 @@ fn a_build_of_tiles_of_two_voxels_keeps_to_its_memory() {
     };
     let scan = Scan { origin: [0.0; 3], points: (0..200).map(on_sphere).collect(), intensities: None };
     let input = folder.path().join("sphere.scans");
-    let mut writer = ScanStreamWriter::new(File::create(&input).unwrap(), "sphere", true).unwrap();
+    let mut writer = ScanStreamWriter::new(File::create(&input).unwrap(), "sphere", false).unwrap();
     writer.write_world(&scan).unwrap();
     drop(writer);
     let how =
