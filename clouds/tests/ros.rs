@@ -507,6 +507,34 @@ fn a_transform_that_makes_a_loop_costs_a_recording_no_pose() {
     assert_eq!(remarks, ["2 transforms are not valid and left out; the first: a frame has no name"]);
 }
 
+/// It has no pose at other times, rather than that of its mount.
+#[test]
+fn a_single_transform_gives_a_pose_at_its_own_time_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("single.bag");
+    let tf = |at_ns, parent: &str, child: &str| {
+        MessageWriter::ros1().tf(at_ns, parent, child, &[1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+    };
+    let fields = [("x", 0, F32), ("y", 4, F32), ("z", 8, F32)];
+    let point = [[1.0_f32, 1.0, 2.0].map(f32::to_le_bytes).concat()];
+    let cloud = |at_ns, frame| MessageWriter::ros1().point_cloud2(at_ns, frame, &fields, &point);
+    let mut messages = vec![(2, 1, tf(0, "base", "lidar")), (1, 5, tf(5, "odom", "base"))];
+    for (stamp_ns, frame) in [(4, "lidar"), (5, "lidar"), (5, "base"), (6, "lidar")] {
+        messages.push((0, stamp_ns, cloud(stamp_ns, frame)));
+    }
+    let tf = "tf2_msgs/TFMessage";
+    let topics = [("/points", "sensor_msgs/PointCloud2"), ("/tf", tf), ("/tf_static", tf)];
+    std::fs::write(&path, bag1(&topics, &messages)).unwrap();
+    let (clouds, errors, remarks) = read(from_ref(&path), &BagOptions::default());
+    let found = |(head, _): &Cloud| head.world_from_sensor.map(|pose| pose.position_m[0]);
+    let found: Vec<_> = clouds.iter().map(found).collect();
+    assert_eq!((found, errors), (vec![None, Some(2.0), Some(1.0), None], Vec::new()), "{remarks:?}");
+    for why in ["before the first", "after the last"] {
+        let remark = format!("1 clouds have no pose: the stamp is {why} transform of base");
+        assert!(remarks.contains(&remark), "{remarks:?}");
+    }
+}
+
 #[test]
 fn a_frame_with_ever_other_parents_leaves_room_for_others() {
     let folder = tempfile::tempdir().unwrap();
