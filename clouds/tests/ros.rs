@@ -272,6 +272,21 @@ fn little_memory_gives_the_same_clouds() {
     }
 }
 
+/// A map without its poses would be built of a full disk.
+#[test]
+fn temporary_files_that_cannot_be_made_are_an_error() {
+    let options = BagOptions { memory_bytes: 0, scratch: Some(data("gone")), ..topic("/points") };
+    let active = tempfile::NamedTempFile::new().unwrap();
+    let whole = std::fs::read(data("bz2.bag")).unwrap();
+    // Without the end of its index.
+    std::fs::write(active.path(), &whole[..whole.len() - 10]).unwrap();
+    for path in [data("bz2.bag"), data("zstd.mcap"), active.path().to_owned()] {
+        let error = open_bag(from_ref(&path), &options).err().map(|error| error.to_string());
+        let wanted = format!("cannot make a temporary file in {}", data("gone").display());
+        assert_eq!(error, Some(wanted), "{}", path.display());
+    }
+}
+
 /// Clouds of many points, in rows with bytes between them and without, and one that is cut off; transforms.
 fn large_bag() -> Vec<u8> {
     const POINT_BYTES: usize = 23;

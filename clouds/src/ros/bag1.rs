@@ -172,13 +172,16 @@ impl Bag1 {
                 let place =
                     ChunkPlace { offset: at, bytes: next - at, start_ns, topics: None, is_bare: false };
                 let (mut earliest, mut count, mut counts) = (None, 0, HashMap::new());
-                // A bad chunk is told of when it is its turn; others come behind it.
-                let _ = self.load(&place, &mut |MessagePlace { log_ns, topic, .. }| {
+                let loaded = self.load(&place, &mut |MessagePlace { log_ns, topic, .. }| {
                     *counts.entry(topic).or_default() += 1;
                     earliest = Some(earliest.map_or(log_ns, |earliest: i64| earliest.min(log_ns)));
                     count += 1;
                     Ok(())
                 });
+                // A bad chunk is told of when it is its turn; others come behind it.
+                if let Err(error @ Error::Io { .. }) = loaded {
+                    return Err(error);
+                }
                 counts.into_iter().for_each(|(topic, messages)| self.topics.count(topic, messages));
                 messages += count;
                 start_ns = earliest.unwrap_or(start_ns);
