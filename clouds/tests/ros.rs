@@ -742,3 +742,49 @@ fn packed_files_are_unpacked_where_it_is_said() {
     assert!(error.contains("cannot unpack a recording into") && error.contains("gone"), "{error}");
     assert_eq!(read(&paths, &scratch(folder.path())).0.len(), 4);
 }
+
+/// Names of topics beyond the most that are kept, and messages of these topics before those that are wanted.
+#[test]
+fn topics_that_are_left_out_cost_no_others() {
+    let folder = tempfile::tempdir().unwrap();
+    let fields = [("x", 0, F32), ("y", 4, F32), ("z", 8, F32)];
+    let points = [[1.0_f32, 1.0, 2.0].map(f32::to_le_bytes).concat()];
+    let names = |count: usize, length: usize| -> Vec<String> {
+        (0..count).map(|k| format!("/{k}{}", "n".repeat(length))).collect()
+    };
+
+    let long = names(20, 60_000);
+    let mut topics: Vec<_> = long.iter().map(|name| (name.as_str(), "std_msgs/String")).collect();
+    topics.push(("/points", "sensor_msgs/PointCloud2"));
+    let mut messages: Vec<_> = (0..20).map(|k| (k, 1 + k as i64, vec![0; 4])).collect();
+    messages.push((20, 50, MessageWriter::ros1().point_cloud2(50, "lidar", &fields, &points)));
+    let bag = bag1(&topics, &messages);
+    std::fs::write(folder.path().join("a.bag"), &bag).unwrap();
+    std::fs::write(folder.path().join("cut.bag"), &bag[..bag.len() - 10]).unwrap();
+
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    let mut writer = mcap::Writer::new(&mut bytes).unwrap();
+    let none = std::collections::BTreeMap::new();
+    let schema = writer.add_schema("sensor_msgs/msg/PointCloud2", "ros2msg", b"").unwrap();
+    let long = names(280, 4000);
+    for (name, k) in long.iter().map(String::as_str).chain(["/points"]).zip(0..) {
+        let schema = if name == "/points" { schema } else { 0 };
+        let channel_id = writer.add_channel(schema, name, "cdr", &none).unwrap();
+        let header = mcap::records::MessageHeader { channel_id, sequence: 0, log_time: k, publish_time: k };
+        let cloud = MessageWriter::cdr().point_cloud2(50, "lidar", &fields, &points);
+        writer.write_to_known_channel(&header, &cloud).unwrap();
+    }
+    writer.finish().unwrap();
+    drop(writer);
+    let bytes = bytes.into_inner();
+    std::fs::write(folder.path().join("a.mcap"), &bytes).unwrap();
+    std::fs::write(folder.path().join("cut.mcap"), &bytes[..bytes.len() - 10]).unwrap();
+
+    for name in ["a.bag", "cut.bag", "a.mcap", "cut.mcap"] {
+        let (clouds, errors, remarks) = read(&[folder.path().join(name)], &BagOptions::default());
+        let positions: Vec<_> = clouds.iter().map(|(_, points)| points[0].position_m).collect();
+        assert_eq!((positions, errors), (vec![[1.0, 1.0, 2.0]], Vec::new()), "{name}");
+        let is_scanned = remarks.iter().any(|remark| remark.contains("reading it whole"));
+        assert_eq!(is_scanned, name.starts_with("cut"), "{name}: {remarks:?}");
+    }
+}
