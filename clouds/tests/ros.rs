@@ -272,6 +272,21 @@ fn little_memory_gives_the_same_clouds() {
     }
 }
 
+/// A map without its poses would be built of a full disk.
+#[test]
+fn temporary_files_that_cannot_be_made_are_an_error() {
+    let options = BagOptions { memory_bytes: 0, scratch: Some(data("gone")), ..topic("/points") };
+    let active = tempfile::NamedTempFile::new().unwrap();
+    let whole = std::fs::read(data("bz2.bag")).unwrap();
+    // Without the end of its index.
+    std::fs::write(active.path(), &whole[..whole.len() - 10]).unwrap();
+    for path in [data("bz2.bag"), data("zstd.mcap"), active.path().to_owned()] {
+        let error = open_bag(from_ref(&path), &options).err().map(|error| error.to_string());
+        let wanted = format!("cannot make a temporary file in {}", data("gone").display());
+        assert_eq!(error, Some(wanted), "{}", path.display());
+    }
+}
+
 /// Clouds of many points, in rows with bytes between them and without, and one that is cut off; transforms.
 fn large_bag() -> Vec<u8> {
     const POINT_BYTES: usize = 23;
@@ -507,6 +522,34 @@ fn a_transform_that_makes_a_loop_costs_a_recording_no_pose() {
     assert_eq!(remarks, ["2 transforms are not valid and left out; the first: a frame has no name"]);
 }
 
+/// It has no pose at other times, rather than that of its mount.
+#[test]
+fn a_single_transform_gives_a_pose_at_its_own_time_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("single.bag");
+    let tf = |at_ns, parent: &str, child: &str| {
+        MessageWriter::ros1().tf(at_ns, parent, child, &[1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+    };
+    let fields = [("x", 0, F32), ("y", 4, F32), ("z", 8, F32)];
+    let point = [[1.0_f32, 1.0, 2.0].map(f32::to_le_bytes).concat()];
+    let cloud = |at_ns, frame| MessageWriter::ros1().point_cloud2(at_ns, frame, &fields, &point);
+    let mut messages = vec![(2, 1, tf(0, "base", "lidar")), (1, 5, tf(5, "odom", "base"))];
+    for (stamp_ns, frame) in [(4, "lidar"), (5, "lidar"), (5, "base"), (6, "lidar")] {
+        messages.push((0, stamp_ns, cloud(stamp_ns, frame)));
+    }
+    let tf = "tf2_msgs/TFMessage";
+    let topics = [("/points", "sensor_msgs/PointCloud2"), ("/tf", tf), ("/tf_static", tf)];
+    std::fs::write(&path, bag1(&topics, &messages)).unwrap();
+    let (clouds, errors, remarks) = read(from_ref(&path), &BagOptions::default());
+    let found = |(head, _): &Cloud| head.world_from_sensor.map(|pose| pose.position_m[0]);
+    let found: Vec<_> = clouds.iter().map(found).collect();
+    assert_eq!((found, errors), (vec![None, Some(2.0), Some(1.0), None], Vec::new()), "{remarks:?}");
+    for why in ["before the first", "after the last"] {
+        let remark = format!("1 clouds have no pose: the stamp is {why} transform of base");
+        assert!(remarks.contains(&remark), "{remarks:?}");
+    }
+}
+
 #[test]
 fn a_frame_with_ever_other_parents_leaves_room_for_others() {
     let folder = tempfile::tempdir().unwrap();
@@ -698,4 +741,50 @@ fn packed_files_are_unpacked_where_it_is_said() {
     let error = open_bag(&paths, &scratch(&gone)).err().map(|error| error.to_string()).unwrap_or_default();
     assert!(error.contains("cannot unpack a recording into") && error.contains("gone"), "{error}");
     assert_eq!(read(&paths, &scratch(folder.path())).0.len(), 4);
+}
+
+/// Names of topics beyond the most that are kept, and messages of these topics before those that are wanted.
+#[test]
+fn topics_that_are_left_out_cost_no_others() {
+    let folder = tempfile::tempdir().unwrap();
+    let fields = [("x", 0, F32), ("y", 4, F32), ("z", 8, F32)];
+    let points = [[1.0_f32, 1.0, 2.0].map(f32::to_le_bytes).concat()];
+    let names = |count: usize, length: usize| -> Vec<String> {
+        (0..count).map(|k| format!("/{k}{}", "n".repeat(length))).collect()
+    };
+
+    let long = names(20, 60_000);
+    let mut topics: Vec<_> = long.iter().map(|name| (name.as_str(), "std_msgs/String")).collect();
+    topics.push(("/points", "sensor_msgs/PointCloud2"));
+    let mut messages: Vec<_> = (0..20).map(|k| (k, 1 + k as i64, vec![0; 4])).collect();
+    messages.push((20, 50, MessageWriter::ros1().point_cloud2(50, "lidar", &fields, &points)));
+    let bag = bag1(&topics, &messages);
+    std::fs::write(folder.path().join("a.bag"), &bag).unwrap();
+    std::fs::write(folder.path().join("cut.bag"), &bag[..bag.len() - 10]).unwrap();
+
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    let mut writer = mcap::Writer::new(&mut bytes).unwrap();
+    let none = std::collections::BTreeMap::new();
+    let schema = writer.add_schema("sensor_msgs/msg/PointCloud2", "ros2msg", b"").unwrap();
+    let long = names(280, 4000);
+    for (name, k) in long.iter().map(String::as_str).chain(["/points"]).zip(0..) {
+        let schema = if name == "/points" { schema } else { 0 };
+        let channel_id = writer.add_channel(schema, name, "cdr", &none).unwrap();
+        let header = mcap::records::MessageHeader { channel_id, sequence: 0, log_time: k, publish_time: k };
+        let cloud = MessageWriter::cdr().point_cloud2(50, "lidar", &fields, &points);
+        writer.write_to_known_channel(&header, &cloud).unwrap();
+    }
+    writer.finish().unwrap();
+    drop(writer);
+    let bytes = bytes.into_inner();
+    std::fs::write(folder.path().join("a.mcap"), &bytes).unwrap();
+    std::fs::write(folder.path().join("cut.mcap"), &bytes[..bytes.len() - 10]).unwrap();
+
+    for name in ["a.bag", "cut.bag", "a.mcap", "cut.mcap"] {
+        let (clouds, errors, remarks) = read(&[folder.path().join(name)], &BagOptions::default());
+        let positions: Vec<_> = clouds.iter().map(|(_, points)| points[0].position_m).collect();
+        assert_eq!((positions, errors), (vec![[1.0, 1.0, 2.0]], Vec::new()), "{name}");
+        let is_scanned = remarks.iter().any(|remark| remark.contains("reading it whole"));
+        assert_eq!(is_scanned, name.starts_with("cut"), "{name}: {remarks:?}");
+    }
 }

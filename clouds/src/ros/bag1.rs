@@ -16,8 +16,8 @@ use std::sync::Arc;
 pub struct Bag1 {
     file: FileBytes,
     topics: TopicList,
-    /// The topic of a connection.
-    connections: HashMap<u32, usize>,
+    /// The topic of a connection; `None` if it is left out, because there are too many.
+    connections: HashMap<u32, Option<usize>>,
     chunks: Vec<ChunkPlace>,
     order: ChunkOrder,
     spill: SpillFile,
@@ -29,7 +29,7 @@ const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
 const MAX_HEADER_BYTES: u64 = 1 << 16;
 /// A longer connection, which has the definition of a message, or place of a chunk is damage.
 const MOST_RECORD_BYTES: u64 = 4 << 20;
-/// Most connections of a recording: publishers of topics. Messages of others are damage.
+/// Most connections of a recording: publishers of topics. Others are left out.
 const MAX_CONNECTIONS: usize = 1 << 16;
 
 impl Bag1 {
@@ -124,9 +124,10 @@ impl Bag1 {
                         let [a, b, c, d, rest @ ..] = pair else { continue };
                         let count = rest.first_chunk().map_or(0, |bytes| u32::from_le_bytes(*bytes));
                         let connection = u32::from_le_bytes([*a, *b, *c, *d]);
-                        let Some(&topic) = self.connections.get(&connection) else {
+                        let Some(topic) = self.topic_of(connection) else {
                             return Ok(self.forget());
                         };
+                        let Some(topic) = topic else { continue };
                         self.topics.count(topic, u64::from(count));
                         if topics.last() != Some(&topic) {
                             topics.push(topic);
@@ -172,13 +173,16 @@ impl Bag1 {
                 let place =
                     ChunkPlace { offset: at, bytes: next - at, start_ns, topics: None, is_bare: false };
                 let (mut earliest, mut count, mut counts) = (None, 0, HashMap::new());
-                // A bad chunk is told of when it is its turn; others come behind it.
-                let _ = self.load(&place, &mut |MessagePlace { log_ns, topic, .. }| {
+                let loaded = self.load(&place, &mut |MessagePlace { log_ns, topic, .. }| {
                     *counts.entry(topic).or_default() += 1;
                     earliest = Some(earliest.map_or(log_ns, |earliest: i64| earliest.min(log_ns)));
                     count += 1;
                     Ok(())
                 });
+                // A bad chunk is told of when it is its turn; others come behind it.
+                if let Err(error @ Error::Io { .. }) = loaded {
+                    return Err(error);
+                }
                 counts.into_iter().for_each(|(topic, messages)| self.topics.count(topic, messages));
                 messages += count;
                 start_ns = earliest.unwrap_or(start_ns);
@@ -203,9 +207,14 @@ impl Bag1 {
         }
         let type_name = Record::text_of(data, "type").unwrap_or_default();
         let name = record.text("topic").unwrap_or_default();
-        if let Some(topic) = self.topics.index(&name, &type_name, Some(Wire::Ros1)) {
-            self.connections.insert(id, topic);
-        }
+        let topic = self.topics.index(&name, &type_name, Some(Wire::Ros1));
+        self.connections.insert(id, topic);
+    }
+
+    /// The topic of a connection, or that it is left out; `None` if it is not known.
+    fn topic_of(&self, connection: u32) -> Option<Option<usize>> {
+        let is_full = self.connections.len() >= MAX_CONNECTIONS;
+        self.connections.get(&connection).copied().or(is_full.then_some(None))
     }
 
     /// Walks over the records of a chunk.
@@ -238,13 +247,15 @@ impl Bag1 {
                 let data = bytes.piece(data_at, data_bytes, &mut window)?.unwrap_or_default();
                 self.connect(&record, data);
             } else if record.op == Some(RecordKind::Message) {
-                let topic = record.u32("conn").and_then(|id| self.connections.get(&id).copied());
+                let topic = record.u32("conn").and_then(|id| self.topic_of(id));
                 let Some((topic, log_ns)) = topic.zip(record.time_ns("time")) else {
                     complaint
                         .get_or_insert_with(|| format!("byte {at}: a message without connection or time"));
                     return Ok(());
                 };
-                take(MessagePlace { log_ns, start: data_at, len, topic })?;
+                if let Some(topic) = topic {
+                    take(MessagePlace { log_ns, start: data_at, len, topic })?;
+                }
             }
             at = end;
         }

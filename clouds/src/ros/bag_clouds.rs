@@ -103,6 +103,7 @@ fn read_camera(recording: &mut dyn Recording, index: usize, whole_bytes: u64) ->
                 }
             }
             Ok(None) => return Err(Error::argument("recording", last)),
+            Err(error @ Error::Io { .. }) => return Err(error),
             // Bad parts are told of when clouds are read.
             Err(_) => {}
         }

@@ -114,6 +114,8 @@ impl BagPoses {
             let mut message = match recording.next_message() {
                 Ok(Some(message)) => message,
                 Ok(None) => break,
+                // Damage costs a few poses; a disk that is full, or fails, might cost all.
+                Err(error @ Error::Io { .. }) => return Err(error),
                 Err(error) => {
                     note(error.to_string());
                     continue;
@@ -127,6 +129,7 @@ impl BagPoses {
             };
             let data = match message.data.load(budget.whole_bytes()) {
                 Ok(data) => data,
+                Err(error @ Error::Io { .. }) => return Err(error),
                 Err(error) => {
                     note(format!("{}: {error}", topic.name));
                     continue;

@@ -149,8 +149,11 @@ fn holds_depths(
     whole_bytes: u64,
 ) -> Result<bool> {
     recording.begin(&[index])?;
-    // Bad chunks are told of when clouds are read.
-    let first = recording.next_message().unwrap_or_default();
+    let first = match recording.next_message() {
+        Err(error @ Error::Io { .. }) => return Err(error),
+        // Bad chunks are told of when clouds are read.
+        first => first.unwrap_or_default(),
+    };
     let Some((mut message, wire)) = first.zip(topic.wire) else { return Ok(false) };
     if message.data.len() > whole_bytes {
         return Ok(false);

@@ -133,15 +133,38 @@ impl ChunkOrder {
             Bytes::Memory(bytes) => {
                 let range = usize::try_from(start).ok().zip(usize::try_from(len).ok());
                 let data = range.and_then(|(start, len)| bytes.get(start..start.checked_add(len)?));
-                Bytes::Memory(data.unwrap_or_default().to_vec())
+                Ok(Bytes::Memory(data.unwrap_or_default().to_vec()))
             }
-            Bytes::File(part) if len <= SMALL_BYTES => Bytes::Memory(read(&part.part(start, len), len)?),
-            Bytes::File(part) => Bytes::File(part.part(start, len)),
+            Bytes::File(part) if len <= SMALL_BYTES => read(&part.part(start, len), len).map(Bytes::Memory),
+            Bytes::File(part) => Ok(Bytes::File(part.part(start, len))),
         };
+        // A message that cannot be read is passed over, or it would come again for ever.
         match playing.rest.next()? {
             Some(next) => playing.head = next,
             None => drop(self.open.swap_remove(index)),
         }
-        Ok(Some(Message { topic, log_ns, data: MessageData(data) }))
+        Ok(Some(Message { topic, log_ns, data: MessageData(data?) }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::spill::FilePart;
+
+    #[test]
+    fn messages_that_cannot_be_read_are_told_of_once() {
+        let cut = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(cut.path(), [7; 10]).unwrap();
+        let mut order = ChunkOrder::new(&Budget::default());
+        let mut sorter = order.sorter();
+        for start in [0, 8, 16] {
+            sorter.push(MessagePlace { log_ns: 5, start, len: 8, topic: 0 }).unwrap();
+        }
+        let bytes = Bytes::File(FilePart::open(cut.path(), 0, 24).unwrap());
+        order.open(OpenChunk { bytes, complaint: None }, sorter.finish().unwrap(), 3).unwrap();
+        assert!(matches!(order.step(&[]), Ok(Step::Message(message)) if message.data.len() == 8));
+        assert!(order.step(&[]).is_err() && order.step(&[]).is_err());
+        assert!(matches!(order.step(&[]), Ok(Step::End)));
     }
 }

@@ -116,9 +116,14 @@ impl FrameLinks {
         self.links.iter().any(|link| link.parent == parent)
     }
 
-    /// Whether any link changes over time.
+    /// Whether any link has a time, and be it a single one.
     pub(super) fn is_moving(&self) -> bool {
         self.links.iter().any(|link| !link.samples.is_empty())
+    }
+
+    /// Whether any link has transforms at several times.
+    pub(super) fn moves(&self) -> bool {
+        self.links.iter().any(|link| link.samples.has_several())
     }
 
     pub(super) fn is_empty(&self) -> bool {

@@ -135,13 +135,15 @@ impl McapFile {
             return Ok(false);
         }
         for (channel, messages) in statistics.channels {
-            if let Some(topic) = self.channels.topic(channel) {
+            if let Some(Some(topic)) = self.channels.topic(channel) {
                 self.topics.count(topic, messages);
             }
         }
         let topics = lists.into_iter().map(|channels: Arc<[u16]>| {
-            let topics = channels.iter().map(|&channel| self.channels.topic(channel)).collect();
-            let topics: Option<Arc<[usize]>> = if channels.is_empty() { None } else { topics };
+            let topics = channels.iter().map(|&channel| self.channels.topic(channel));
+            let topics: Option<Vec<Option<usize>>> =
+                if channels.is_empty() { None } else { topics.collect() };
+            let topics = topics.map(|topics| topics.into_iter().flatten().collect::<Arc<[usize]>>());
             (channels, topics)
         });
         let topics: HashMap<Arc<[u16]>, Option<Arc<[usize]>>> = topics.collect();
@@ -181,13 +183,16 @@ impl McapFile {
                         ChunkPlace { offset: at, bytes: next - at, start_ns, topics: None, is_bare: false };
                     let (mut earliest, mut count) = (None, 0);
                     let mut counts = HashMap::new();
-                    // A bad chunk is told of when it is its turn; others come behind it.
-                    let _ = self.load(&place, &mut |MessagePlace { log_ns, topic, .. }| {
+                    let loaded = self.load(&place, &mut |MessagePlace { log_ns, topic, .. }| {
                         *counts.entry(topic).or_default() += 1;
                         earliest = Some(earliest.map_or(log_ns, |earliest: i64| earliest.min(log_ns)));
                         count += 1;
                         Ok(())
                     });
+                    // A bad chunk is told of when it is its turn; others come behind it.
+                    if let Err(error @ Error::Io { .. }) = loaded {
+                        return Err(error);
+                    }
                     counts.into_iter().for_each(|(topic, messages)| self.topics.count(topic, messages));
                     messages += count;
                     start_ns = earliest.unwrap_or(start_ns);
@@ -198,7 +203,7 @@ impl McapFile {
                     let head = self.file.read_at(at + RECORD_HEAD_BYTES, MESSAGE_HEAD_BYTES.min(bytes))?;
                     let head = message_head(&head);
                     let known =
-                        head.and_then(|(channel, log_ns)| Some((self.channels.topic(channel)?, log_ns)));
+                        head.and_then(|(channel, log_ns)| Some((self.channels.topic(channel)??, log_ns)));
                     if let Some((topic, log_ns)) = known {
                         self.topics.count(topic, 1);
                         messages += 1;
@@ -277,7 +282,9 @@ impl McapFile {
                         return Ok(());
                     };
                     let start = start + MESSAGE_HEAD_BYTES;
-                    take(MessagePlace { log_ns, start, len: end - start, topic })?;
+                    if let Some(topic) = topic {
+                        take(MessagePlace { log_ns, start, len: end - start, topic })?;
+                    }
                 }
                 _ => {}
             }

@@ -28,7 +28,8 @@ pub(super) mod op {
 #[derive(Debug, Default)]
 pub(super) struct Channels {
     types: HashMap<u16, String>,
-    topics: HashMap<u16, usize>,
+    /// `None` for a topic that is left out, because there are too many.
+    topics: HashMap<u16, Option<usize>>,
 }
 
 /// The bytes of a schema or a channel that are read: its names come first.
@@ -48,7 +49,8 @@ impl Channels {
         self.topics.is_empty()
     }
 
-    pub(super) fn topic(&self, channel: u16) -> Option<usize> {
+    /// The topic of a channel, or that it is left out; `None` if the channel is not known.
+    pub(super) fn topic(&self, channel: u16) -> Option<Option<usize>> {
         self.topics.get(&channel).copied()
     }
 
@@ -71,7 +73,7 @@ impl Channels {
             _ => None,
         };
         let type_name = self.types.get(&schema).map_or("", String::as_str);
-        self.topics.insert(id, topics.index(&name, type_name, wire)?);
+        self.topics.insert(id, topics.index(&name, type_name, wire));
         Some(())
     }
 }

@@ -75,10 +75,12 @@ impl TopicList {
         if let Some(index) = self.topics.iter().position(is_it) {
             return Some(index);
         }
-        self.bytes += size_of::<Topic>() + name.len() + type_name.len();
-        if self.bytes > MAX_TOPIC_BYTES {
+        let more = size_of::<Topic>().saturating_add(name.len()).saturating_add(type_name.len());
+        let bytes = self.bytes.saturating_add(more);
+        if bytes > MAX_TOPIC_BYTES {
             return None;
         }
+        self.bytes = bytes;
         self.topics.push(Topic { name: name.to_owned(), type_name: type_name.to_owned(), wire, messages: 0 });
         self.topics.len().checked_sub(1)
     }

@@ -240,7 +240,9 @@ impl Transforms {
 
     fn above<'a>(&'a self, frame: &'a str) -> Search<'a> {
         let trusted = self.search(frame, Step::is_trusted, |_| false);
-        if trusted.frames.iter().any(|at| self.is_moving(at)) {
+        // A single transform that is left out must not count as what moves.
+        let moves = |frame: &&str| self.frames.get(*frame).is_some_and(FrameLinks::moves);
+        if trusted.frames.iter().any(moves) {
             return trusted;
         }
         self.search(frame, |_| true, |_| false)
@@ -258,7 +260,7 @@ impl Transforms {
         search
     }
 
-    /// Whether the link of a frame to a parent changes over time.
+    /// Whether a link of a frame to a parent has transforms of `/tf`, be it a single one.
     pub fn is_moving(&self, child: &str) -> bool {
         self.frames.get(bare(child)).is_some_and(FrameLinks::is_moving)
     }

@@ -7,12 +7,15 @@ use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// A temporary file for what exceeds the memory of a reader. Its space is used again once no part of it is.
+/// A temporary file for what exceeds the memory of a reader. Its space is used again once no part of it is; where parts
+/// overlap in time for long, another file takes its place, and each is freed with its last part.
 #[derive(Debug)]
 pub(crate) struct SpillFile {
     budget: Budget,
     file: Option<Arc<Mutex<File>>>,
     end: u64,
+    /// A file of so many bytes takes no more.
+    most_bytes: u64,
 }
 
 /// How many bytes a stream has.
@@ -39,12 +42,13 @@ impl StreamSize {
     }
 }
 
+const MOST_FILE_BYTES: u64 = 256 << 20;
 /// Bytes that are copied at a time.
 const COPY_BYTES: usize = 1 << 16;
 
 impl SpillFile {
     pub(crate) fn new(budget: &Budget) -> Self {
-        Self { budget: budget.clone(), file: None, end: 0 }
+        Self { budget: budget.clone(), file: None, end: 0, most_bytes: MOST_FILE_BYTES }
     }
 
     pub(crate) fn budget(&self) -> &Budget {
@@ -84,8 +88,8 @@ impl SpillFile {
         }
         let cannot = |error| self.budget.cannot("write", error);
         let file = match self.file.take() {
-            Some(file) => file,
-            None => Arc::new(Mutex::new(self.budget.file()?)),
+            Some(file) if self.end < self.most_bytes || Arc::strong_count(&file) == 1 => file,
+            _ => Arc::new(Mutex::new(self.budget.file()?)),
         };
         if Arc::strong_count(&file) == 1 {
             self.end = 0;
@@ -124,5 +128,29 @@ impl SpillFile {
         let part = FilePart::new(Arc::clone(&file), Arc::<Path>::from(folder), begin, self.end - begin);
         self.file = Some(file);
         Ok((Bytes::File(part), complaint))
+    }
+}
+
+#[cfg(all(test, feature = "ros"))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_that_always_overlap_take_several_files() {
+        let mut spill = SpillFile { most_bytes: 1000, ..SpillFile::new(&Budget::default()) };
+        let mut held = Vec::new();
+        for k in 0..100_u8 {
+            let size = StreamSize::Claimed(100);
+            let (bytes, complaint) = spill.take(&[k; 100][..], size, 0, &mut |_| {}).unwrap();
+            assert_eq!(complaint, None);
+            held.push((k, bytes));
+            if held.len() > 3 {
+                held.remove(0);
+            }
+            assert!(spill.end <= 1000, "{}", spill.end);
+            for (k, bytes) in &held {
+                assert_eq!(bytes.piece(0, 100, &mut Default::default()).unwrap(), Some(&[*k; 100][..]));
+            }
+        }
     }
 }

@@ -293,3 +293,15 @@ fn samples_that_cannot_be_read_are_an_error_whatever_else_is_known() {
     }
     assert_eq!(tf.ancestors("lidar").len(), 5);
 }
+
+#[test]
+fn a_single_transform_counts_where_nothing_else_moves() {
+    let mut tf = Transforms::default();
+    fixed(&mut tf, "base", "lidar", at(0.2));
+    moving(&mut tf, "odom", "base", &[5 * S], 0.3);
+    assert_eq!(tf.ancestors("lidar"), ["lidar", "base", "odom"]);
+    assert_eq!((tf.root_of("lidar"), tf.root_of("base")), ("odom".to_owned(), "odom".to_owned()));
+    assert_eq!(tf.lookup("odom", "base", 5 * S), Ok(at(0.3)));
+    assert_eq!(tf.lookup("odom", "lidar", 4 * S), Err(WhyNot::Before("base".into())));
+    assert_eq!(tf.lookup("odom", "lidar", 6 * S), Err(WhyNot::After("base".into())));
+}
