@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 /// The poses of a file, with their time stamps if it has any.
 #[derive(Default)]
 pub(super) struct Poses {
-    /// How many there are. As many are kept as are wanted.
+    /// How many poses the file has; `poses` holds only the first ones.
     count: usize,
     poses: Vec<Pose>,
     /// Seconds, each with its line number; TUM files only.
@@ -22,7 +22,7 @@ const MAX_LINE_BYTES: u64 = 1 << 16;
 const LEAST_STAMP_S: f64 = 1e6;
 
 impl Poses {
-    /// Reads a file, and keeps as many of its poses.
+    /// Reads a file and keeps its first `wanted` poses.
     pub(super) fn read(path: &Path, wanted: usize) -> Result<Self> {
         let mut poses = Self::default();
         for_each_line(path, &mut |number, pose| {

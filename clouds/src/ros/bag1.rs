@@ -302,12 +302,13 @@ impl ChunkFile for Bag1 {
         let there = data_bytes.min(self.file.len.saturating_sub(data_at));
         let is_packed = !matches!(compression.as_str(), "" | "none");
         let (memory_bytes, spill) = (self.order.chunk_bytes(), &mut self.spill);
+        let part = self.file.whole()?.part(data_at, there);
         let (bytes, complaint) = self.file.stream(data_at, there, |input| match is_packed {
             true => {
                 let size = StreamSize::Claimed(claimed);
                 decompress(&compression, input, size, spill, memory_bytes, &mut |_| {})
             }
-            false => plain(&path, data_at, there, memory_bytes, input, &mut |_| {}),
+            false => plain(part, memory_bytes, input, &mut |_| {}),
         })?;
         let is_cut = there < data_bytes;
         let complaint = if is_cut { Some("the file ends in the midst of it".to_owned()) } else { complaint };

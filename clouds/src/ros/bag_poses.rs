@@ -296,5 +296,8 @@ impl BagPoses {
 }
 
 fn told(second: SecondParent) -> String {
-    format!("{second}; a parent that a single transform names, or that makes a loop, does not count")
+    format!(
+        "{second}; a parent named by one transform, or one that closes a loop, is used only if no other leads to the map \
+         frame"
+    )
 }

@@ -2,7 +2,6 @@ use crate::error::{Error, Result};
 use crate::spill::{Bytes, FilePart, Record, SpillFile, StreamSize};
 use std::cmp::Ordering;
 use std::io::Read;
-use std::path::Path;
 use std::sync::Arc;
 
 /// A part of a file whose messages are read together.
@@ -106,16 +105,14 @@ pub(super) fn decompress(
 
 /// The bytes of a chunk that is not compressed: in memory or, of a large one, where they are.
 pub(super) fn plain(
-    path: &Path,
-    offset: u64,
-    bytes: u64,
+    part: FilePart,
     memory_bytes: usize,
     input: &mut dyn Read,
     see: &mut dyn FnMut(&[u8]),
 ) -> Result<(Bytes, Option<String>)> {
-    let fail = |error| Error::io(path, "read", error);
-    if bytes <= memory_bytes as u64 {
-        let mut taken = Vec::with_capacity(usize::try_from(bytes).unwrap_or(0));
+    let fail = |error| Error::io(part.path(), "read", error);
+    if part.len() <= memory_bytes as u64 {
+        let mut taken = Vec::with_capacity(usize::try_from(part.len()).unwrap_or(0));
         input.read_to_end(&mut taken).map_err(fail)?;
         see(&taken);
         return Ok((Bytes::Memory(taken), None));
@@ -124,7 +121,7 @@ pub(super) fn plain(
     loop {
         let count = input.read(&mut buffer).map_err(fail)?;
         if count == 0 {
-            return Ok((Bytes::File(FilePart::open(path, offset, bytes)?), None));
+            return Ok((Bytes::File(part), None));
         }
         see(buffer.get(..count).unwrap_or_default());
     }

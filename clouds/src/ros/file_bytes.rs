@@ -1,4 +1,5 @@
 use crate::error::{Error, Result};
+use crate::spill::FilePart;
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
@@ -9,6 +10,8 @@ pub(super) struct FileBytes {
     path: PathBuf,
     /// `None` while it is closed.
     input: Option<Input>,
+    /// All of it, for the parts that are read in their own order; `None` until one is.
+    whole: Option<FilePart>,
     pub(super) len: u64,
 }
 
@@ -27,12 +30,21 @@ impl FileBytes {
             Ok((input, len))
         };
         let (input, len) = open().map_err(|error| Error::io(path, "read", error))?;
-        Ok(Self { path: path.to_owned(), input: Some(input), len })
+        Ok(Self { path: path.to_owned(), input: Some(input), whole: None, len })
     }
 
     /// Closes the file until something is read again.
     pub(super) fn close(&mut self) {
-        self.input = None;
+        (self.input, self.whole) = (None, None);
+    }
+
+    /// All of it. However many parts of it there are, they share one handle.
+    pub(super) fn whole(&mut self) -> Result<FilePart> {
+        let whole = match self.whole.take() {
+            Some(whole) => whole,
+            None => FilePart::open(&self.path, 0, self.len)?,
+        };
+        Ok(self.whole.insert(whole).clone())
     }
 
     pub(super) fn path(&self) -> &Path {
@@ -156,4 +168,26 @@ impl<'a> Pieces<'a> {
 /// Nanoseconds as files count them, which may be more than a signed number holds.
 pub(super) fn signed_ns(ns: u64) -> i64 {
     i64::try_from(ns).unwrap_or(i64::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_of_a_file_share_one_handle() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), b"0123456789").unwrap();
+        let mut bytes = FileBytes::open(file.path()).unwrap();
+        let parts: Vec<FilePart> = (0..10).map(|k| bytes.whole().unwrap().part(k, 1)).collect();
+        for (part, wanted) in parts.iter().zip(b"0123456789") {
+            let mut found = [0];
+            part.read_at(0, &mut found).unwrap();
+            assert_eq!(&found, &[*wanted]);
+        }
+        let whole = bytes.whole().unwrap();
+        assert!(parts.iter().all(|part| part.has_handle_of(&whole)));
+        bytes.close();
+        assert!(!bytes.whole().unwrap().has_handle_of(&whole));
+    }
 }

@@ -324,13 +324,13 @@ impl McapFile {
             }
         };
         let is_packed = !matches!(head.compression.as_str(), "" | "none");
-        let spill = &mut self.spill;
+        let (spill, part) = (&mut self.spill, self.file.whole()?.part(records_at, records_bytes));
         let (bytes, complaint) = self.file.stream(records_at, records_bytes, |input| match is_packed {
             true => {
                 let size = StreamSize::Claimed(head.plain_bytes);
                 decompress(&head.compression, input, size, spill, memory_bytes, &mut see)
             }
-            false => plain(&path, records_at, records_bytes, memory_bytes, input, &mut see),
+            false => plain(part, memory_bytes, input, &mut see),
         })?;
         let cut = is_cut.then(|| "the file ends in the midst of it".to_owned());
         // What is missing explains a checksum that is wrong.
@@ -354,11 +354,11 @@ impl ChunkFile for McapFile {
 
     fn load(&mut self, place: &ChunkPlace, take: &mut TakeMessage<'_>) -> Result<OpenChunk> {
         let mut chunk = if place.is_bare {
-            let (path, memory_bytes) = (self.file.path().to_owned(), self.order.chunk_bytes());
+            let memory_bytes = self.order.chunk_bytes();
             let bytes = place.bytes.min(self.file.len.saturating_sub(place.offset));
-            let read = self.file.stream(place.offset, bytes, |input| {
-                plain(&path, place.offset, bytes, memory_bytes, input, &mut |_| {})
-            });
+            let part = self.file.whole()?.part(place.offset, bytes);
+            let read =
+                self.file.stream(place.offset, bytes, |input| plain(part, memory_bytes, input, &mut |_| {}));
             let (bytes, complaint) = read?;
             OpenChunk { bytes, complaint }
         } else {

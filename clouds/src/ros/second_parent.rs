@@ -21,10 +21,8 @@ impl fmt::Display for SecondParent {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (child, parent) = (name(&self.child), name(&self.parent));
         match &self.before {
-            Some(before) => {
-                write!(f, "the frame {child} has the parent {} and a second one, {parent}", name(before))?
-            }
-            None => write!(f, "the frame {child} has the parent {parent}")?,
+            Some(before) => write!(f, "frame {child} has two parents: {} and {parent}", name(before))?,
+            None => write!(f, "frame {child} has the parent {parent}")?,
         }
         if !self.loop_frames.is_empty() {
             let cut = if self.loop_frames.len() > MOST_FRAMES { " .." } else { "" };

@@ -26,6 +26,16 @@ impl FilePart {
         Ok(Self::new(Arc::new(Mutex::new(file)), path.into(), start, len))
     }
 
+    #[cfg(feature = "ros")]
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    #[cfg(all(test, feature = "ros"))]
+    pub(crate) fn has_handle_of(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.file, &other.file)
+    }
+
     pub(crate) fn len(&self) -> u64 {
         self.len
     }

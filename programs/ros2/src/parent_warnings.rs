@@ -44,7 +44,8 @@ impl ParentWarnings {
             (_, None) => String::new(),
         };
         format!(
-            "{second}: a parent that makes a loop, or of which one transform came, does not count{publishers}"
+            "{second}; a parent named by one transform, or one that closes a loop, is used only if no other leads to the \
+             map frame{publishers}"
         )
     }
 
@@ -72,7 +73,7 @@ mod tests {
         assert_eq!(put("map", "base", Some(Gid([1; 16]))), (0, String::new()));
         let (count, text) = put("odom", "base", Some(Gid([0xab; 16])));
         assert_eq!(count, 1);
-        assert!(text.starts_with("the frame base has the parent map and a second one, odom: "), "{text}");
+        assert!(text.starts_with("frame base has two parents: map and odom; "), "{text}");
         assert!(text.contains("first: 01.01.") && text.contains("second: ab.ab."), "{text}");
         assert_eq!(put("odom", "base", None).0, 1);
         for parent in 0..2 * MAX_WARNINGS {
