@@ -82,8 +82,8 @@ fn print(args: &VerifyArgs, verification: &Verification, out: &mut impl Write) -
         let (leftovers, map) = (HumanCount(*leftovers), args.map.display());
         writeln!(
             out,
-            "leftovers: {leftovers} files that no flush needs, named above; the next process that writes to the map \
-             removes them or gives them their names, as does `voxtile repair {map}`"
+            "leftovers: {leftovers} files, named above, are waiting to be removed or to get their final names. The \
+             next process that opens the map for writing does that, and so does `voxtile repair {map}`."
         )?;
     }
     match (damage, verified) {

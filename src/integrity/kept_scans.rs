@@ -109,6 +109,20 @@ pub(super) fn whole_entries(
     Ok(whole)
 }
 
+/// Number of scans in the newest catalog of a map, whether a flush committed it or not.
+///
+/// # Errors
+///
+/// A disk that refuses more than single files.
+pub(super) fn count_kept(disk: &dyn Disk, layout: &Layout) -> Result<u64> {
+    let mut count = 0;
+    salvage_entries(disk, layout, KeptAsOf::NEWEST, &mut |entry| {
+        count += u64::from(matches!(entry, Salvaged::Whole(CatalogEntry::Kept(_))));
+        Ok(())
+    })?;
+    Ok(count)
+}
+
 /// The error, if it is about a file by itself.
 fn only_damage(error: Error) -> Result<Error> {
     match matches!(error, Error::Damaged { .. }) || Finding::is_of_file(&error) {

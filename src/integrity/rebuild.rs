@@ -25,6 +25,8 @@ pub(super) struct Index {
     pub damaged: Vec<(TileIndex, Error)>,
     /// Whether the tiles may be of different flushes, because no log says what belongs together.
     pub is_from_tiles: bool,
+    /// Whether neither file of the map can be read, so that nothing tells whether it keeps its scans.
+    pub are_scans_unknown: bool,
     /// How many inputs the map no longer knows, because nothing tells whether all their scans are in its tiles.
     pub inputs_forgotten: u64,
 }
@@ -52,9 +54,16 @@ pub(super) fn index_of(
     if let Some((map_id, mut metadata)) = told_by_log(disk, layout, remains)? {
         forget_scan_records(&mut metadata);
         let commits = remains.commits.clone();
-        let (waiting, damaged, is_from_tiles, inputs_forgotten) = Default::default();
-        let index = Index { map_id, metadata, commits, waiting, damaged, is_from_tiles, inputs_forgotten };
-        return Ok(Some(index));
+        return Ok(Some(Index {
+            map_id,
+            metadata,
+            commits,
+            waiting: BTreeMap::new(),
+            damaged: Vec::new(),
+            is_from_tiles: false,
+            are_scans_unknown: false,
+            inputs_forgotten: 0,
+        }));
     }
     if let Ok(metadata) = &remains.metadata
         && metadata.ext.is_none()
@@ -142,6 +151,7 @@ fn index_from_tiles(
         waiting: BTreeMap::new(),
         damaged: Vec::new(),
         is_from_tiles: true,
+        are_scans_unknown: false,
         inputs_forgotten: inputs.len() as u64,
     };
     index.join_snapshots(disk, layout, written);
@@ -155,6 +165,7 @@ fn index_from_tiles(
     {
         // Tiles do not say how much of their evidence has faded: rather too little of it fades than some of it twice.
         ext.decayed_scan = index.commits.scan_number;
+        index.are_scans_unknown = true;
     }
     Ok(index)
 }

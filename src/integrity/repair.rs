@@ -15,6 +15,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// One thing that a repair did.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -99,7 +100,7 @@ pub fn repair(
     repairer.repair_lock()?;
     let mut store = match TileStore::open(disk.clone(), folder) {
         Err(error) if matches!(error, Error::Damaged { tile: None, .. }) || Finding::is_of_file(&error) => {
-            repairer.repair_index()?;
+            repairer.repair_index(&disk)?;
             TileStore::open(disk.clone(), folder)?
         }
         store => store?,
@@ -202,17 +203,23 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
     }
 
     /// Writes `commits.log` and `metadata.json` anew from what is left of them and from the tiles.
-    fn repair_index(&mut self) -> Result<()> {
+    fn repair_index(&mut self, disk: &Arc<dyn Disk>) -> Result<()> {
         let _lock = WriterLock::take(self.disk, &self.layout)?;
         let remains = Salvage::read(self.disk, &self.layout)?;
         self.layout = remains.layout_of_tiles(self.disk, self.layout.folder());
         let index = rebuild::index_of(self.disk, &self.layout, &remains, &mut self.progress)?;
-        let Some(Index { map_id, metadata, commits, waiting, damaged, is_from_tiles, inputs_forgotten }) =
-            index
-        else {
+        let Some(index) = index else {
             // Of the original format, but with a log that cannot be read: the log is no part of it.
+            if self.kind(&self.layout.kept_scans())?.is_some() {
+                self.quarantine(&self.layout.kept_scans(), "metadata.json is of the original format")?;
+            }
             return self.quarantine(&self.layout.commit_log(), "metadata.json is of the original format");
         };
+        if index.are_scans_unknown {
+            self.quarantine_unlisted_scans(disk, &index)?;
+        }
+        let Index { map_id, metadata, commits, waiting, damaged, is_from_tiles, inputs_forgotten, .. } =
+            index;
         for (tile, error) in damaged {
             self.quarantine_tile(tile, &format!("{error:#}"))?;
             self.counts.tiles_lost += 1;

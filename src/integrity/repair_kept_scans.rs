@@ -1,10 +1,12 @@
 use super::finding::Finding;
-use super::kept_scans::whole_entries;
+use super::kept_scans::{count_kept, whole_entries};
+use super::rebuild::Index;
 use super::repair::{Action, ActionKind, Repairer};
 use crate::error::Result;
-use crate::store::{Quarantine, Snapshot, TileStore};
+use crate::store::{Disk, EntryKind, Quarantine, Snapshot, TileStore};
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::Arc;
 
 impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
     /// Lists scans whose points are damaged as scans without points, and those whose records are as unknown ones, so
@@ -75,15 +77,34 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         Ok(())
     }
 
+    /// Where nothing tells whether the map keeps its scans, moves those that no snapshot needs to quarantine. The next
+    /// writer would remove them; without a log nothing tells which of the catalogs the last flush committed.
+    pub(super) fn quarantine_unlisted_scans(&mut self, disk: &Arc<dyn Disk>, index: &Index) -> Result<()> {
+        let Index { map_id, metadata, commits, .. } = index;
+        let folder = self.layout.folder();
+        let store = TileStore::of_commits(disk.clone(), folder, *map_id, metadata.clone(), commits.clone());
+        if self.kind(&self.layout.kept_scans())? != Some(EntryKind::Folder) {
+            return Ok(());
+        }
+        let kept = count_kept(self.disk, &self.layout)?;
+        self.counts.scans_lost += kept;
+        // Where a snapshot cannot be read it may need any, and no writer removes any: they go with the snapshot.
+        let Some(snapshots) = known_snapshots(&store) else { return Ok(()) };
+        let unneeded = store.unneeded_scan_files(&snapshots, None)?;
+        for path in &unneeded {
+            self.quarantine(path, "neither metadata.json nor commits.log tells whether the map needs it")?;
+        }
+        // Segments without a catalog have an unknown number of scans.
+        self.counts.scans_lost += u64::from(kept == 0 && !unneeded.is_empty());
+        Ok(())
+    }
+
     /// Moves what was kept of scans for snapshots that are no more to quarantine.
     pub(super) fn quarantine_unneeded_scans(
         &mut self,
         store: &TileStore,
         snapshots: &[Snapshot],
     ) -> Result<()> {
-        if !store.keeps_scans() {
-            return Ok(());
-        }
         for path in store.unneeded_scan_files(snapshots, None)? {
             self.quarantine(&path, "only a snapshot that cannot be read may need it")?;
         }

@@ -162,16 +162,16 @@ struct Verifier<'a, F, P> {
 const LEFT: &str = "left behind by a process that was killed or that the disk refused, or being written";
 
 /// Of points and lists of scans that no flush needs.
-const IDLE_SCANS: &str = "of scans that neither the map nor a snapshot has: left behind by a process that was killed \
-                          or that the disk refused, perhaps with removed scans; or being written";
+const IDLE_SCANS: &str = "points or a list of scans that neither the map nor a snapshot uses. A killed process left \
+                          them, or a writer is about to commit them. They may hold removed scans.";
 
 /// Of `MAP.remapping`.
-const SECOND_MAP: &str = "a second map, of a remapping beside a mapper that is at work or was killed; the next one, \
-                          `remove-scans` and `remove-points` remove it";
+const SECOND_MAP: &str = "the second map of an online remap that is running or was killed. The next online remap \
+                          removes it, and so do `remove-scans` and `remove-points`.";
 
 /// Of `MAP.unfinished`.
-const UNFINISHED_MAP: &str = "a map that is being made to take this one's place, or the one that it replaced, left \
-                              behind; the next `voxtile pull --replace` removes it";
+const UNFINISHED_MAP: &str = "a map that `voxtile pull --replace` is making, or the old map that it replaced. The \
+                              next `voxtile pull --replace` removes it.";
 
 /// Length of a log, and its last bytes. The checksum of the last record is among them, so that no two states of a log
 /// have the same.
@@ -191,9 +191,15 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
 
     /// Reports a file that the next writer removes or renames; what has its name and is no file stays.
     fn leftover(&mut self, path: &Path, tile: Option<TileIndex>, reason: &str) {
-        let is_file = matches!(self.disk.kind(path), Ok(Some(EntryKind::File(_))));
-        self.counts.leftovers += u64::from(is_file);
-        self.report(Finding::note(path, tile, if is_file { reason } else { "no part of a map" }));
+        let reason = match self.disk.kind(path) {
+            // Renamed or removed since the folder was listed.
+            Ok(None) => return,
+            Ok(Some(EntryKind::File(_))) => reason.to_owned(),
+            Ok(Some(_)) => return self.report(Finding::note(path, tile, "no part of a map")),
+            Err(error) => format!("{reason} ({error})"),
+        };
+        self.counts.leftovers += 1;
+        self.report(Finding::note(path, tile, reason));
     }
 
     fn damage(&mut self, path: &Path, tile: Option<TileIndex>, reason: &str) {
@@ -394,8 +400,8 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
                 (KEPT_SCANS, _) => self.look_into_kept_scans(&path)?,
                 (SNAPSHOTS, _) => self.look_into_snapshots(&path)?,
                 (QUARANTINE, _) => {
-                    let reason = "taken out of the map by a repair, perhaps with scans that were removed since; \
-                                  delete it once nothing in it is wanted";
+                    let reason = "moved here by a repair. It may hold scans that were removed later. Delete it when \
+                                  you need nothing in it.";
                     self.report(Finding::note(&path, None, reason));
                 }
                 (_, Some(tile)) => {

@@ -33,9 +33,8 @@ pub struct Reverted {
 /// go on seeing what they see.
 ///
 /// What came after the snapshot is in no map any more, unless `keep_as` names a snapshot to be made of it before.
-/// A call that was killed can be repeated: a snapshot `keep_as` of the state that would be kept now is that of the
-/// first attempt, and where the map is as of the snapshot `name` already, nothing is done if the name `keep_as` is
-/// taken.
+/// A call that was killed can be repeated. If the snapshot `keep_as` already holds the current state, it is reused. If
+/// the map already equals `name` and the name `keep_as` is taken, nothing is done.
 ///
 /// `progress` is told the tiles done and all. Memory: the lists of tiles of the map and of the snapshot, and one tile.
 ///
@@ -73,6 +72,11 @@ pub fn revert(
         store.create_snapshot(keep_as)?;
     }
     let outcome = revert_to(&mut store, &past, progress);
+    if outcome.is_ok()
+        && let Err(error) = store.release_scans()
+    {
+        log::warn!("{}: kept scans that nothing needs remain: {error:#}", folder.display());
+    }
     drop(store);
     // What was written in vain gives its room back.
     if outcome.is_err()

@@ -393,3 +393,82 @@ fn a_repair_of_kept_scans_that_the_power_ends_loses_no_file() {
     }
     assert!(crashes > 10, "{crashes}");
 }
+
+/// A damaged file of the map's own, or a missing one.
+fn lose(disk: &FaultyDisk, is_missing: bool) {
+    for name in ["metadata.json", "commits.log"] {
+        match is_missing {
+            true => disk.take(&map().join(name)),
+            false => disk.put(&map().join(name), b"damaged"),
+        }
+    }
+}
+
+#[test]
+fn a_repair_without_metadata_and_log_keeps_all_kept_scans() {
+    for is_missing in [false, true] {
+        let disk = a_map();
+        let files = kept_files(&disk);
+        lose(&disk, is_missing);
+        assert_eq!(repaired(&disk, "").scans_lost, 4);
+        assert_eq!(in_quarantine(&disk, "kept_scans"), files.len());
+        assert!(kept_files(&disk).keys().all(|path| path.starts_with(map().join("quarantine"))));
+        go_on(&disk);
+        assert!(has_all(&disk, &files));
+        assert_eq!(kept_names(&disk), [8, 9]);
+    }
+}
+
+/// What a snapshot needs stays where it is.
+#[test]
+fn a_repair_without_metadata_and_log_keeps_the_kept_scans_of_snapshots() {
+    let disk = a_map_of(3);
+    let name = SnapshotName::new("s").unwrap();
+    snapshot(at(&disk), &name).unwrap();
+    let mut mapper = OutOfCoreTileMapper::open(at(&disk), config()).unwrap();
+    insert(&mut mapper, 4).and_then(|()| mapper.flush()).unwrap();
+    drop(mapper);
+    let files = kept_files(&disk);
+    lose(&disk, true);
+    // Whether the snapshot can be read or not.
+    for is_whole in [true, false] {
+        let disk = disk.copy();
+        if !is_whole {
+            flip(&disk, &map().join("snapshots/s"), 60);
+        }
+        assert_eq!(repaired(&disk, "").scans_lost, 4);
+        let moved = in_quarantine(&disk, "kept_scans");
+        assert_eq!(moved, if is_whole { 1 } else { files.len() });
+        go_on(&disk);
+        assert!(has_all(&disk, &files));
+        if is_whole {
+            let past = MapReader::open_snapshot(at(&disk), &name, 1).unwrap();
+            assert_eq!(past.kept_scans().unwrap().count(), 3);
+        }
+    }
+}
+
+#[test]
+fn a_repair_without_metadata_and_log_that_the_power_ends_loses_no_kept_scan() {
+    let damaged = a_map();
+    let files = kept_files(&damaged);
+    lose(&damaged, false);
+    let mut crashes = 0;
+    for change in 0.. {
+        let disk = damaged.copy();
+        disk.set_fault(Fault::Crashes(change));
+        let _ = repair(at(&disk), |_| (), |_, _| ());
+        if !disk.has_crashed() {
+            break;
+        }
+        crashes += 1;
+        for unsynced in [Unsynced::Dropped, Unsynced::Kept, Unsynced::Shuffled(change)] {
+            let (disk, what) = (disk.after_crash(unsynced), format!("change {change}, {unsynced:?}"));
+            drop(TileStore::open(disk.shared(), map()));
+            repaired(&disk, &what);
+            go_on(&disk);
+            assert!(has_all(&disk, &files), "{what}");
+        }
+    }
+    assert!(crashes > 10, "{crashes}");
+}

@@ -133,20 +133,12 @@ fn moved_beside(disk: &FaultyDisk) -> Result<()> {
 }
 
 fn removed(disk: &FaultyDisk) -> Result<()> {
-    let scans = ScanSelection::Numbers(2, 2);
-    match remove_scans(at(disk), &scans, false, &rework(), |_, _| ()) {
-        // Done by an attempt before, to its end.
-        Err(Error::InvalidArgument { .. }) => Ok(()),
-        removed => removed.map(drop),
-    }
+    remove_scans(at(disk), &ScanSelection::Numbers(2, 2), false, &rework(), |_, _| ()).map(drop)
 }
 
 fn removed_kept(disk: &FaultyDisk) -> Result<()> {
     let (scans, how) = (ScanSelection::Numbers(2, 2), rework().with_keep_as(name("before")));
-    match remove_scans(at(disk), &scans, false, &how, |_, _| ()) {
-        Err(Error::InvalidArgument { .. }) => Ok(()),
-        removed => removed.map(drop),
-    }
+    remove_scans(at(disk), &scans, false, &how, |_, _| ()).map(drop)
 }
 
 fn points_removed(disk: &FaultyDisk) -> Result<()> {
@@ -339,6 +331,13 @@ fn points_of_removed_scans_are_reported_and_gone_after_the_same_call() {
                 let other = disk.copy();
                 drop(TileStore::open(other.shared(), map()).unwrap());
                 assert!(!segments(&other).0.contains("segment.1"), "{what}");
+                removed(&other).unwrap_or_else(|error| panic!("{what}: after another writer: {error:#}"));
+                // Numbers that the map never had are refused, after the earlier removal is completed.
+                let other = disk.copy();
+                let scans = ScanSelection::Numbers(7, 9);
+                let refused = remove_scans(self::at(&other), &scans, false, &rework(), |_, _| ());
+                assert!(message_of(refused).contains("the map keeps none"), "{what}");
+                assert!(!segments(&other).0.contains("segment.1"), "{what}");
                 let again =
                     remove_scans(self::at(&disk), &ScanSelection::Numbers(2, 2), false, &rework(), |_, _| ());
                 assert!(again.unwrap().files_removed > 0, "{what}");
@@ -437,6 +436,73 @@ fn kept_scans_go_with_the_last_snapshot_that_has_them() {
     delete_snapshot(at(&disk), &name("with")).unwrap();
     assert!(!has_scans());
     assert_eq!(findings(&disk).0.notes, 0);
+}
+
+#[test]
+fn a_removal_of_removed_scans_succeeds_and_one_of_unknown_scans_is_refused() {
+    let disk = one_segment();
+    for (scans, how) in [(1, rework()), (0, rework()), (0, rework().with_keep_as(name("before")))] {
+        let removed = remove_scans(at(&disk), &ScanSelection::Numbers(2, 2), false, &how, |_, _| ()).unwrap();
+        assert_eq!((removed.scans_removed, removed.files_removed), (scans, 0));
+    }
+    assert_eq!(names(&disk), Vec::<String>::new());
+    for from_snapshots in [false, true] {
+        let scans = ScanSelection::Numbers(4, 9);
+        let refused = remove_scans(at(&disk), &scans, from_snapshots, &rework(), |_, _| ());
+        assert!(message_of(refused).contains("the map keeps none"));
+    }
+    // Beside another writer, where nothing is left to do.
+    let writer = TileStore::open(disk.shared(), map()).unwrap();
+    removed(&disk).unwrap();
+    drop(writer);
+    // Whatever has become of the map since.
+    cleared(&disk).unwrap();
+    removed(&disk).unwrap();
+}
+
+#[test]
+fn a_revert_leaves_no_kept_scans_that_nothing_needs() {
+    let disk = four_scans(Storage::Compact, true);
+    let before = segments(&disk).0;
+    revert(at(&disk), &name("third"), None, |_, _| ()).unwrap();
+    let (verification, found) = findings(&disk);
+    assert_eq!(verification.leftovers, 0, "{found:?}");
+    assert!(segments(&disk).0.len() < before.len());
+}
+
+/// A removal of the second map removes the files with its id first.
+#[test]
+fn a_removal_completes_the_removal_of_a_second_map() {
+    let start = four_scans(Storage::Compact, true);
+    let beside = RemapBeside::begin(at(&start), &new_poses(), &Remap::new(rework())).unwrap();
+    let start = start.after_kill();
+    drop(beside);
+    let second = Path::new("/city/map.remapping");
+    let has_second = |disk: &FaultyDisk| disk.files().keys().any(|path| path.starts_with(second));
+    let done = start.copy();
+    removed(&done).unwrap();
+    assert!(!has_second(&done));
+    for gone in [&["metadata.json"][..], &["commits.log"], &["metadata.json", "commits.log"]] {
+        for work in [removed as Work, points_removed] {
+            let disk = start.copy();
+            gone.iter().for_each(|name| disk.take(&second.join(name)));
+            work(&disk).unwrap();
+            assert!(!has_second(&disk), "{gone:?}");
+            // By a call that removes nothing itself.
+            let disk = done.copy();
+            let files = start.files().into_iter().filter(|(path, _)| path.starts_with(second));
+            files
+                .filter(|(path, _)| !gone.iter().any(|name| path.ends_with(name)))
+                .for_each(|(path, bytes)| disk.put(&path, &bytes));
+            removed(&disk).unwrap();
+            assert!(!has_second(&disk), "{gone:?}");
+        }
+    }
+    // Another folder of this name.
+    let disk = four_scans(Storage::Compact, true);
+    disk.put(&second.join("notes.txt"), b"mine");
+    removed(&disk).unwrap();
+    assert!(disk.files().contains_key(&second.join("notes.txt")));
 }
 
 /// A second map that a remapping beside a mapper left has evidence of all scans.

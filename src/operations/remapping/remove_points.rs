@@ -1,5 +1,5 @@
 use super::filtered_scan::FilteredScan;
-use super::revision::{Fate, MappedAgain, Rework, check_region, complete, rework};
+use super::revision::{Fate, MappedAgain, Rework, check_region, complete_earlier, rework};
 use crate::error::Result;
 use crate::mapper::MapReader;
 use crate::scan::ScanPoints;
@@ -57,7 +57,7 @@ pub fn remove_points(
     let mapped = rework(MapPath::on(disk.clone(), &folder), seen, how, fate, progress)?;
     if mapped.scans_changed == 0 && !how.is_dry_run {
         // An earlier call may have been killed after its commit.
-        complete(disk, &folder)?;
+        complete_earlier(disk, &folder)?;
     }
     Ok(PointsRemoved { mapped, points_removed })
 }

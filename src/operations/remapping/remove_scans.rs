@@ -1,8 +1,8 @@
-use super::revision::{Fate, MappedAgain, Rework, complete, rework};
+use super::revision::{Fate, MappedAgain, Rework, complete_earlier, rework};
 use crate::error::{Error, Result};
 use crate::mapper::{MapReader, MapView};
 use crate::operations::snapshot::delete_snapshot;
-use crate::store::{InputRecord, KeptRecord, MapPath, SnapshotName, TileStore};
+use crate::store::{CatalogEntry, InputRecord, KeptRecord, MapPath, SnapshotName, TileStore};
 use serde::Serialize;
 
 /// Scans of a map.
@@ -26,8 +26,8 @@ pub struct ScansRemoved {
     pub mapped: MappedAgain,
     /// Scans that are gone from the map.
     pub scans_removed: u64,
-    /// Files of scans that an earlier removal took out of the map and could not remove, because it was killed or the
-    /// disk refused, and that are gone now. Counted only where the map kept none of the scans any more.
+    /// Files with removed scans that an earlier, interrupted removal left and that this call removed. 0 if this call
+    /// removed scans itself.
     pub files_removed: u64,
     /// Snapshots that still hold some of them.
     pub snapshots_with_them: Vec<SnapshotName>,
@@ -39,7 +39,8 @@ pub struct ScansRemoved {
 /// numbers, which no other scan gets.
 ///
 /// A removal that was killed after it had changed the map is completed by the same call, as by the next process that
-/// opens the map for writing: the files of the removed scans go.
+/// opens the map for writing: the files of the removed scans go. A call whose scans were removed before succeeds and
+/// removes no scan; of times that the map has none of, nothing tells whether it had, unless files are left.
 ///
 /// Snapshots stay what they are, with what they hold of these scans, unless `from_snapshots`: then those that hold any
 /// are deleted, one by one after the scans are gone from the map. Where that was interrupted, or is asked for later, the
@@ -59,7 +60,7 @@ pub fn remove_scans(
 ) -> Result<ScansRemoved> {
     let (disk, folder) = map.into().into_parts();
     let path = || MapPath::on(disk.clone(), &folder);
-    let mut removed = remove_from_map(path, scans, from_snapshots, how, progress)?;
+    let (mut removed, is_repeated) = remove_from_map(path, scans, from_snapshots, how, progress)?;
     let (mut outcome, is_to_go) = (Ok(()), from_snapshots && !how.is_dry_run);
     for name in TileStore::open_read_only(disk.clone(), &folder)?.snapshot_names()? {
         // The one that was asked for keeps them.
@@ -70,34 +71,41 @@ pub fn remove_scans(
         }
     }
     outcome?;
-    if removed.scans_removed + removed.files_removed == 0 && !removed.has_found_snapshots() {
+    if removed.scans_removed == 0 && !is_repeated && !removed.has_found_snapshots() {
         return Err(none_selected(scans, &MapReader::open(path(), 1)?));
     }
     Ok(removed)
 }
 
-/// Takes the scans out of the map itself. Where only snapshots hold any, and these are to go, the map stays.
+/// Takes the scans out of the map itself. Where only snapshots hold any, and these are to go, the map stays. Also returns
+/// whether an earlier call did it.
 fn remove_from_map(
     path: impl Fn() -> MapPath,
     scans: &ScanSelection,
     from_snapshots: bool,
     how: &Rework,
     progress: impl FnMut(u64, u64),
-) -> Result<ScansRemoved> {
+) -> Result<(ScansRemoved, bool)> {
     let (selection, scans_removed, seen) = {
         let reader = MapReader::open(path(), 1)?;
         let selection = Selection::of(scans, &reader);
-        let scans_removed = selection.count(&reader)?;
+        let (scans_removed, were_removed) = selection.count(&reader)?;
         if scans_removed == 0 {
-            if !from_snapshots {
+            if !from_snapshots && !were_removed {
                 reader.check_keeps_all()?;
             }
             let refusal = none_selected(scans, &reader);
             // A reader would have the tables kept that the removal replaced.
             drop(reader);
-            let files_removed = if how.is_dry_run { 0 } else { complete_earlier(path())? };
-            return match from_snapshots || files_removed > 0 {
-                true => Ok(ScansRemoved { files_removed, ..ScansRemoved::default() }),
+            let (disk, folder) = path().into_parts();
+            let files_removed = if how.is_dry_run { 0 } else { complete_earlier(disk, &folder)? };
+            let is_repeated = match &selection {
+                Selection::Numbers(_) => were_removed,
+                // The catalog has no times of removed scans.
+                Selection::Time(..) => files_removed > 0,
+            };
+            return match from_snapshots || is_repeated {
+                true => Ok((ScansRemoved { files_removed, ..ScansRemoved::default() }, is_repeated)),
                 false => Err(refusal),
             };
         }
@@ -106,24 +114,7 @@ fn remove_from_map(
     };
     let fate = |record: &KeptRecord| if selection.has(record) { Fate::Goes } else { Fate::Stays };
     let mapped = rework(path(), seen, how, fate, progress)?;
-    Ok(ScansRemoved { mapped, scans_removed, ..ScansRemoved::default() })
-}
-
-/// Completes a removal that was committed and then killed, or that the disk kept from its end. Returns how many files
-/// of kept scans are gone by this.
-fn complete_earlier(map: MapPath) -> Result<u64> {
-    let (disk, folder) = map.into_parts();
-    let idle = TileStore::open_read_only(disk.clone(), &folder)?.idle_scan_files()?.unwrap_or_default();
-    match complete(disk.clone(), &folder) {
-        // The other writer has done it when it opened the map.
-        Err(Error::Locked { .. }) if idle.is_empty() => return Ok(0),
-        completed => completed?,
-    }
-    let mut removed = 0;
-    for path in idle {
-        removed += u64::from(disk.kind_at(&path)?.is_none());
-    }
-    Ok(removed)
+    Ok((ScansRemoved { mapped, scans_removed, ..ScansRemoved::default() }, false))
 }
 
 impl ScansRemoved {
@@ -178,16 +169,28 @@ impl Selection {
         }
     }
 
-    /// How many of the scans that are kept it has.
-    fn count(&self, reader: &MapReader) -> Result<u64> {
+    /// How many of the scans that are kept it has, and whether it has numbers of scans that were removed.
+    fn count(&self, reader: &MapReader) -> Result<(u64, bool)> {
         if !reader.keeps_scans() {
-            return Ok(0);
+            return Ok((0, false));
         }
-        let (mut records, mut count) = (reader.kept_records()?, 0);
-        while let Some(record) = records.next_kept()? {
-            count += u64::from(self.has(&record));
+        let (mut records, mut count, mut were_removed) = (reader.kept_records()?, 0, false);
+        while let Some(entry) = records.next_entry()? {
+            match entry {
+                CatalogEntry::Kept(record) => count += u64::from(self.has(&record)),
+                CatalogEntry::Removed(first, last) => were_removed |= self.has_any_number(first, last),
+                _ => {}
+            }
         }
-        Ok(count)
+        Ok((count, were_removed))
+    }
+
+    /// Whether it has one of these numbers; of times nothing tells.
+    fn has_any_number(&self, first: u64, last: u64) -> bool {
+        match self {
+            Self::Numbers(ranges) => ranges.iter().any(|&(from, to)| from <= last && first <= to),
+            Self::Time(..) => false,
+        }
     }
 }
 
@@ -222,7 +225,7 @@ fn none_selected(scans: &ScanSelection, reader: &MapReader) -> Error {
 /// Whether a snapshot keeps any of these scans.
 fn holds_any(map: MapPath, name: &SnapshotName, scans: &ScanSelection) -> Result<bool> {
     let past = MapReader::open_snapshot(map, name, 1)?;
-    Ok(Selection::of(scans, &past).count(&past)? > 0)
+    Ok(Selection::of(scans, &past).count(&past)?.0 > 0)
 }
 
 /// The error of a snapshot that cannot be read, with what to do about it.

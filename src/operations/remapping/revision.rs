@@ -6,8 +6,8 @@ use crate::persistence::config_from;
 use crate::scan::{Pose, ScanPoints, ScanReport, Stop};
 use crate::space::{Aabb, TileIndex, TileSelection};
 use crate::store::{
-    CatalogEntry, Disk, EntryKind, KeptFrame, KeptRecord, Layout, MapPath, SideFolder, SnapshotName,
-    TileStore,
+    CatalogEntry, Disk, EntryKind, KeptFrame, KeptRecord, Layout, MapPath, Metadata, Salvage, SideFolder,
+    SnapshotName, TileStore, id_from_hex,
 };
 use rustc_hash::FxHashSet;
 use serde::Serialize;
@@ -119,15 +119,14 @@ pub(super) fn rework(
     keep_as_it_is(&mut store, how)?;
     let takes_points = !touched.segments.is_empty();
     let (counts, released) = tidied(disk.clone(), &folder, revision.map(store, touched, &mut progress))?;
-    if takes_points {
-        remove_second_map(disk.clone(), &folder);
-    }
+    let second = if takes_points { remove_second_map(disk.clone(), &folder) } else { Ok(()) };
     match released {
         // Points that are to be gone must not remain: once more, by another opening of the map.
         Err(_) if takes_points => complete(disk, &folder)?,
         Err(error) => log::warn!("{}: committed, but not tidied up: {error:#}", folder.display()),
         Ok(()) => {}
     }
+    second?;
     Ok(counts)
 }
 
@@ -138,28 +137,68 @@ fn release(store: &mut TileStore) -> Result<()> {
 }
 
 /// Removes the second map that a remapping beside a mapper left when it was killed: it has the evidence of all scans.
-/// Another map that has this name by chance has another id, and stays.
-fn remove_second_map(disk: Arc<dyn Disk>, folder: &Path) {
+/// Another map that has this name by chance has another id, and stays. A killed removal leaves a folder without the files
+/// that have the id.
+///
+/// # Errors
+///
+/// A disk that refuses; a file in the second map that is of no map.
+fn remove_second_map(disk: Arc<dyn Disk>, folder: &Path) -> Result<()> {
     let second = folder.with_added_extension("remapping");
     if !matches!(disk.kind(&second), Ok(Some(EntryKind::Folder))) {
-        return;
+        return Ok(());
     }
-    let id_of = |folder: &Path| TileStore::open_read_only(disk.clone(), folder).ok()?.map_id();
-    let id = id_of(folder);
-    if id.is_none() || id_of(&second) != id {
-        return;
+    let Some(id) = TileStore::open_read_only(disk.clone(), folder)?.map_id() else { return Ok(()) };
+    let layout = Layout::new(&second);
+    let has_id = disk.kind_at(&layout.metadata())?.is_some() || disk.kind_at(&layout.commit_log())?.is_some();
+    if has_id {
+        let remains = Salvage::read(&*disk, &layout)?;
+        let id_in = |metadata: &Metadata| id_from_hex(&metadata.ext.as_ref()?.map_id);
+        let written = remains.metadata.as_ref().ok().and_then(id_in);
+        if remains.log_map_id.or(written) != Some(id) {
+            return Ok(());
+        }
     }
     match SideFolder::begin(disk, folder) {
         // At work, or a path without a name that none could be beside.
-        Ok(_) | Err(Error::Locked { .. } | Error::InvalidArgument { .. }) => {}
-        Err(error) => log::warn!("{error:#}"),
+        Ok(_) | Err(Error::Locked { .. } | Error::InvalidArgument { .. }) => Ok(()),
+        // A folder that has this name by chance: a removal begins only where all is of a map.
+        Err(Error::AlreadyExists { .. }) if !has_id => Ok(()),
+        Err(error) => Err(error),
     }
 }
 
-/// Completes a removal that was committed: what it took out of the map is in no file any more, except for snapshots.
-pub(super) fn complete(disk: Arc<dyn Disk>, folder: &Path) -> Result<()> {
-    remove_second_map(disk.clone(), folder);
-    TileStore::open(disk, folder).and_then(|mut store| release(&mut store)).map_err(|error| match error {
+/// Completes what an earlier call may have left of a removal: what it took out of the map is in no file any more, except
+/// for snapshots. Returns how many files with kept scans are gone by this. A map without such files need not be opened
+/// for writing, so another writer is no error there.
+///
+/// # Errors
+///
+/// Damage, a disk that refuses; with files that are to be gone, another writer.
+pub(super) fn complete_earlier(disk: Arc<dyn Disk>, folder: &Path) -> Result<u64> {
+    let second = remove_second_map(disk.clone(), folder);
+    let idle = TileStore::open_read_only(disk.clone(), folder)?.idle_scan_files()?.unwrap_or_default();
+    match TileStore::open(disk.clone(), folder) {
+        // The other writer has done it when it opened the map.
+        Err(_) if idle.is_empty() => {}
+        opened => opened.and_then(|mut store| release(&mut store)).map_err(with_hint)?,
+    }
+    second?;
+    let mut removed = 0;
+    for path in idle {
+        removed += u64::from(disk.kind_at(&path)?.is_none());
+    }
+    Ok(removed)
+}
+
+/// Completes a removal that was committed and could not remove its files durably.
+fn complete(disk: Arc<dyn Disk>, folder: &Path) -> Result<()> {
+    TileStore::open(disk, folder).and_then(|mut store| release(&mut store)).map_err(with_hint)
+}
+
+/// The error of a removal that was not completed, with what to do.
+fn with_hint(error: Error) -> Error {
+    match error {
         Error::Io { path, action, cause } => {
             let hint = "points that were removed from the map are still in its files; run this again";
             Error::Io { path, action, cause: io::Error::new(cause.kind(), format!("{cause}; {hint}")) }
@@ -171,7 +210,7 @@ pub(super) fn complete(disk: Arc<dyn Disk>, folder: &Path) -> Result<()> {
             Error::Damaged { path, tile, cause }
         }
         other => other,
-    })
+    }
 }
 
 /// Makes the snapshot of the map as it is, if there is to be one. One of this state that is there already counts.

@@ -2,6 +2,7 @@ use super::catalog_entry::{CatalogEntry, KeptRecord};
 use crate::error::{DecodeError, Error, FormatError, Result};
 use crate::store::disk::{Disk, DiskRead, DiskWrite};
 use crate::store::layout::Layout;
+use crate::store::tiles::tile_version::MAX_NUMBER;
 use std::io::{self, BufReader, BufWriter, Read, Write};
 use std::path::PathBuf;
 
@@ -231,6 +232,11 @@ pub(crate) struct KeptAsOf {
     pub(in crate::store) flush_number: u64,
     /// Number of its last scan.
     pub(crate) scan_number: u64,
+}
+
+impl KeptAsOf {
+    /// Later than every flush.
+    pub(crate) const NEWEST: Self = Self { flush_number: MAX_NUMBER, scan_number: MAX_NUMBER };
 }
 
 /// The kept scans of a map as of a flush, in order, without their points.

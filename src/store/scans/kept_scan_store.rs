@@ -7,6 +7,7 @@ use super::scan_keeper::{Catalog, unneeded};
 use super::scan_list::read_scans;
 use crate::error::{Error, Result};
 use crate::space::Point;
+use crate::store::disk::EntryKind;
 use crate::store::layout::Layout;
 use crate::store::map_files::MapFiles;
 use crate::store::snapshots::snapshot_file::Snapshot;
@@ -206,7 +207,7 @@ impl TileStore {
     }
 
     /// The segments and catalogs that neither the map nor one of its snapshots needs, as far as their catalogs can be
-    /// read; the map needs these segments, or if none are given, those of its catalog.
+    /// read; a map that keeps its scans needs these segments, or if none are given, those of its catalog.
     ///
     /// # Errors
     ///
@@ -218,16 +219,16 @@ impl TileStore {
     ) -> Result<Vec<PathBuf>> {
         let (disk, layout, last_commit) = (&**self.disk(), self.layout(), self.last_commit());
         let folder = layout.kept_scans();
-        if disk.kind_at(&folder)?.is_none() {
+        if disk.kind_at(&folder)? != Some(EntryKind::Folder) {
             return Ok(Vec::new());
         }
         let mut flushes: Vec<_> = snapshots.iter().filter_map(kept_as_of).collect();
         let mut needed = segments.cloned().unwrap_or_default();
-        if segments.is_none() {
-            flushes.push(last_commit);
-        }
         let mut generations = BTreeSet::new();
-        generations.extend(generation_of(disk, layout, last_commit.flush_number)?);
+        if self.keeps_scans() {
+            flushes.extend(segments.is_none().then_some(last_commit));
+            generations.extend(generation_of(disk, layout, last_commit.flush_number)?);
+        }
         for as_of in flushes {
             generations.extend(generation_of(disk, layout, as_of.flush_number)?);
             salvage_entries(disk, layout, as_of, &mut |entry| {
@@ -242,7 +243,8 @@ impl TileStore {
         names.retain(|name| match (Layout::generation_of(name), Layout::segment_of(name)) {
             // A later one is being written.
             (Some(generation), _) => {
-                generation <= last_commit.flush_number && !generations.contains(&generation)
+                let is_new = self.keeps_scans() && generation > last_commit.flush_number;
+                !is_new && !generations.contains(&generation)
             }
             (_, Some(segment)) => !needed.contains(&segment) && !self.keeper.is_writing(segment),
             // Not voxtile's.
