@@ -150,7 +150,7 @@ fn poses_for(path: &Path, options: &ReadOptions, has_own: bool, clouds: Option<u
         Some(file) => {
             let trajectory =
                 Trajectory::read_within(&file, options.calib.as_deref(), &options.open.budget())?;
-            Ok(CloudPoses::File(file, trajectory))
+            Ok(CloudPoses::File(file, Box::new(trajectory)))
         }
         None if clouds == Some(1) => Ok(CloudPoses::Identity),
         None if options.clouds.may_lack_poses => Ok(CloudPoses::Missing),

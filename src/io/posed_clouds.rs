@@ -54,7 +54,7 @@ impl Default for CloudOptions {
 /// From where poses come.
 pub(super) enum CloudPoses {
     /// A file, by time stamp or else by number.
-    File(PathBuf, Trajectory),
+    File(PathBuf, Box<Trajectory>),
     /// The source has them.
     Source,
     /// Every cloud is in the world frame.
