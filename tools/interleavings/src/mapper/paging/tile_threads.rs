@@ -3,11 +3,11 @@ use voxtile::Result;
 
 /// One thread: the scheduler knows none of rayon's.
 #[derive(Clone, Debug, Default)]
-pub(super) struct TileThreads;
+pub(super) struct TileThreads(());
 
 impl TileThreads {
     pub(super) fn own(_: &Path) -> Result<Self> {
-        Ok(Self)
+        Ok(Self(()))
     }
 
     pub(super) fn map<T, R>(&self, items: Vec<T>, work: impl Fn(T) -> R) -> Vec<R> {
