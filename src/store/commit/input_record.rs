@@ -67,6 +67,7 @@ impl InputRecord {
     }
 
     /// What its first scan with points is, if that is known.
+    #[cfg(feature = "cli")]
     pub(crate) fn begins_with(&self) -> Option<&str> {
         self.content.as_ref()?.begins_with.as_deref()
     }
