@@ -10,6 +10,10 @@ mod depth_images;
 mod depth_tum;
 #[cfg(feature = "e57")]
 mod e57;
+#[cfg(feature = "e57")]
+mod e57_packets;
+#[cfg(feature = "e57")]
+mod e57_pages;
 mod files;
 mod foreign;
 mod format;
@@ -43,6 +47,8 @@ mod text;
 mod text_line;
 #[cfg(any(feature = "las", feature = "e57"))]
 mod wkt;
+#[cfg(feature = "e57")]
+mod xml_check;
 
 pub use format::Format;
 pub use from_origin::FromOrigin;

@@ -224,8 +224,8 @@ impl Recording for Bag2Folder {
                 Err(mut reader) => unpacked(&mut reader)?,
             };
             if let Some(complaint) = complaint {
-                let reason =
-                    format!("a message recorded at {} ns cannot be unpacked: {complaint}", message.log_ns);
+                let (log_ns, why) = (message.log_ns, complaint.reason);
+                let reason = format!("a message recorded at {log_ns} ns cannot be unpacked: {why}");
                 return Err(Error::argument(self.path.display().to_string(), reason));
             }
             message.data = MessageData(data);

@@ -1,6 +1,7 @@
 use super::file_bytes::{Pieces, signed_ns};
 use super::recording::TopicList;
 use super::wire::Wire;
+use crate::spill::Complaint;
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 use std::sync::Arc;
@@ -114,15 +115,14 @@ impl ChunkHead {
     }
 
     /// What is wrong with its unpacked records by their checksum.
-    pub(super) fn complaint(&self, plain: crc32fast::Hasher) -> Option<String> {
-        let found = plain.finalize();
+    pub(super) fn complaint(&self, plain: crc32fast::Hasher) -> Option<Complaint> {
+        let (found, wanted) = (plain.finalize(), self.crc);
         let reason = || {
-            let wanted = self.crc;
             format!(
                 "its contents are damaged: their checksum is {found:08x}, that in its header {wanted:08x}"
             )
         };
-        (self.crc != 0 && found != self.crc).then(reason)
+        (wanted != 0 && found != wanted).then(|| Complaint { reason: reason(), is_broken: true })
     }
 }
 

@@ -1,6 +1,9 @@
 use super::message_data::MessageData;
 use super::wire::Wire;
 use crate::error::Result;
+use std::collections::HashMap;
+use std::collections::hash_map::DefaultHasher;
+use std::hash::{Hash, Hasher};
 
 /// A topic of a recording.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -63,6 +66,37 @@ pub(super) struct TopicList {
     pub(super) topics: Vec<Topic>,
     /// What they take.
     bytes: usize,
+    /// Indices of topics by the hash of what tells one from another. A file may name a topic in each of its connections.
+    by_hash: HashMap<u64, Vec<usize>>,
+}
+
+/// Some of the topics of a recording. A file may have as many topics as messages.
+#[derive(Clone, Debug, Default)]
+pub(super) struct TopicSet {
+    /// By topic; topics beyond the end are left out.
+    is_in: Vec<bool>,
+}
+
+impl TopicSet {
+    /// The set of these topics (indices); those that no list can hold are left out.
+    pub(super) fn of(topics: &[usize]) -> Self {
+        let last = topics.iter().filter(|topic| **topic < MAX_TOPIC_BYTES).max();
+        let mut is_in = vec![false; last.map_or(0, |last| last + 1)];
+        for &topic in topics {
+            if let Some(is_in) = is_in.get_mut(topic) {
+                *is_in = true;
+            }
+        }
+        Self { is_in }
+    }
+
+    pub(super) fn contains(&self, topic: usize) -> bool {
+        self.is_in.get(topic).copied().unwrap_or(false)
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.is_in.is_empty()
+    }
 }
 
 /// Memory for topics: some ten thousand. Others are not read.
@@ -71,8 +105,12 @@ const MAX_TOPIC_BYTES: usize = 1 << 20;
 impl TopicList {
     /// The index of a topic, which is appended if it is new; `None` if there are too many.
     pub(super) fn index(&mut self, name: &str, type_name: &str, wire: Option<Wire>) -> Option<usize> {
+        let mut hasher = DefaultHasher::new();
+        (name, type_name, wire).hash(&mut hasher);
+        let hash = hasher.finish();
         let is_it = |topic: &Topic| topic.name == name && topic.type_name == type_name && topic.wire == wire;
-        if let Some(index) = self.topics.iter().position(is_it) {
+        let mut same = self.by_hash.get(&hash).into_iter().flatten();
+        if let Some(&index) = same.find(|index| self.topics.get(**index).is_some_and(is_it)) {
             return Some(index);
         }
         let more = size_of::<Topic>().saturating_add(name.len()).saturating_add(type_name.len());
@@ -81,8 +119,10 @@ impl TopicList {
             return None;
         }
         self.bytes = bytes;
+        let index = self.topics.len();
+        self.by_hash.entry(hash).or_default().push(index);
         self.topics.push(Topic { name: name.to_owned(), type_name: type_name.to_owned(), wire, messages: 0 });
-        self.topics.len().checked_sub(1)
+        Some(index)
     }
 
     /// Counts messages of a topic.
