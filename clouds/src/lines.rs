@@ -11,7 +11,7 @@ pub(crate) const MAX_LINE_BYTES: u64 = 1 << 16;
 /// Lines of a file, one at a time.
 pub(crate) struct Lines {
     path: PathBuf,
-    input: BufReader<File>,
+    input: Box<dyn BufRead + Send>,
     line: Vec<u8>,
     number: u64,
 }
@@ -23,8 +23,8 @@ impl Lines {
     }
 
     /// The lines of what is left of an input, after so many lines.
-    pub(crate) fn new(path: &Path, input: BufReader<File>, lines_before: u64) -> Self {
-        Self { path: path.to_owned(), input, line: Vec::new(), number: lines_before }
+    pub(crate) fn new(path: &Path, input: impl BufRead + Send + 'static, lines_before: u64) -> Self {
+        Self { path: path.to_owned(), input: Box::new(input), line: Vec::new(), number: lines_before }
     }
 
     /// The next line without its end, and its number. Of a long comment only the start is read.

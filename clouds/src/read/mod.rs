@@ -42,6 +42,7 @@ mod open;
 mod options;
 mod ply;
 mod ply_header;
+mod regular;
 mod scalar;
 mod text;
 mod text_line;

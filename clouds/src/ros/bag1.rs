@@ -200,6 +200,7 @@ impl Bag1 {
 
     /// Walks over the records of a chunk.
     fn find_messages(&mut self, chunk: &mut OpenChunk, take: &mut TakeMessage<'_>) -> Result<()> {
+        let is_broken = chunk.is_broken();
         let OpenChunk { bytes, complaint } = chunk;
         let (mut window, mut at) = (Window::default(), 0);
         while at < bytes.len() {
@@ -226,7 +227,11 @@ impl Bag1 {
             if record.op == Some(RecordKind::Connection) {
                 let data_bytes = if len > MOST_RECORD_BYTES { 0 } else { len as usize };
                 let data = bytes.piece(data_at, data_bytes, &mut window)?.unwrap_or_default();
-                self.connect(&record, data);
+                // What a broken chunk says of a connection may be wrong.
+                let is_known = record.u32("conn").is_some_and(|id| self.connections.contains_key(&id));
+                if !(is_broken && is_known) {
+                    self.connect(&record, data);
+                }
             } else if record.op == Some(RecordKind::Message) {
                 let topic = record.u32("conn").and_then(|id| self.topic_of(id));
                 let Some((topic, log_ns)) = topic.zip(record.time_ns("time")) else {

@@ -229,6 +229,7 @@ impl McapFile {
 
     /// Walks over the records of a chunk.
     fn find_messages(&mut self, chunk: &mut OpenChunk, take: &mut TakeMessage<'_>) -> Result<()> {
+        let is_broken = chunk.is_broken();
         let OpenChunk { bytes, complaint } = chunk;
         let (mut window, mut at) = (Window::default(), 0);
         while at < bytes.len() {
@@ -254,6 +255,8 @@ impl McapFile {
             let contents =
                 bytes.piece(start, count.min(most_bytes) as usize, &mut window)?.unwrap_or_default();
             match kind {
+                // What a broken chunk says of them may be wrong.
+                op::SCHEMA | op::CHANNEL if is_broken && self.channels.knows(kind, contents) => {}
                 op::SCHEMA => drop(self.channels.add_schema(contents)),
                 op::CHANNEL => drop(self.channels.add_channel(contents, &mut self.topics)),
                 op::MESSAGE => {

@@ -55,6 +55,15 @@ impl Channels {
         self.topics.get(&channel).copied()
     }
 
+    /// Whether the contents of a schema or channel record have a number that is known already.
+    pub(super) fn knows(&self, kind: u8, contents: &[u8]) -> bool {
+        let id = Pieces::new(contents).u16();
+        id.is_some_and(|id| match kind {
+            op::SCHEMA => self.types.contains_key(&id),
+            _ => self.topics.contains_key(&id),
+        })
+    }
+
     /// Takes the contents of a schema record.
     pub(super) fn add_schema(&mut self, contents: &[u8]) -> Option<()> {
         let mut pieces = Pieces::new(contents);

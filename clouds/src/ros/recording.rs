@@ -93,10 +93,6 @@ impl TopicSet {
     pub(super) fn contains(&self, topic: usize) -> bool {
         self.is_in.get(topic).copied().unwrap_or(false)
     }
-
-    pub(super) fn is_empty(&self) -> bool {
-        self.is_in.is_empty()
-    }
 }
 
 /// Memory for topics: some ten thousand. Others are not read.
@@ -130,5 +126,33 @@ impl TopicList {
         if let Some(topic) = self.topics.get_mut(index) {
             topic.messages = topic.messages.saturating_add(messages);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::time::{Duration, Instant};
+
+    /// Each name was once compared with all that were kept.
+    #[test]
+    fn many_topics_take_time_as_their_number() {
+        let (mut topics, start) = (TopicList::default(), Instant::now());
+        let mut kept = 0;
+        for round in 0..2 {
+            for k in 0..100_000 {
+                let index = topics.index(&format!("/t{k}"), "std_msgs/String", Some(Wire::Ros1));
+                kept += usize::from(round == 0 && index.is_some());
+                assert_eq!(index, (k < kept).then_some(k));
+            }
+        }
+        assert!((5000..20_000).contains(&kept), "{kept}");
+        assert_ne!(topics.index("/t0", "std_msgs/Empty", Some(Wire::Ros1)), Some(0));
+        assert!(start.elapsed() < Duration::from_secs(3), "{:?}", start.elapsed());
+        let some = TopicSet::of(&[3, 1, usize::MAX]);
+        assert_eq!(
+            [0, 1, 2, 3, 4, usize::MAX].map(|topic| some.contains(topic)),
+            [false, true, false, true, false, false]
+        );
     }
 }

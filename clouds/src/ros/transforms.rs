@@ -304,7 +304,7 @@ impl Transforms {
     /// # Errors
     ///
     /// They are too many.
-    pub(super) fn frames_between(&self, target: &str, source: &str) -> Result<HashSet<String>, WhyNot> {
+    pub fn frames_between(&self, target: &str, source: &str) -> Result<HashSet<String>, WhyNot> {
         let (target, source) = (bare(target), bare(source));
         let up = self.children_above(source, target);
         let mut between: HashSet<String> = HashSet::new();

@@ -143,7 +143,9 @@ fn chunks_of_mcap_whose_checksum_is_wrong_are_damaged() {
                 left_out += errors.len();
                 errors.extend(remarks);
                 assert_eq!(!errors.is_empty(), is_damaged, "{name}: {errors:?}");
-                let is_told = errors.iter().all(|error| error.contains("that in its header 04030201"));
+                // Clouds may lose their poses with it, too.
+                let mut damages = errors.iter().filter(|error| error.contains("damaged"));
+                let is_told = damages.all(|error| error.contains("that in its header 04030201"));
                 assert!(is_told, "{name}: {errors:?}");
             }
             checked += usize::from(has_checksum);
@@ -163,8 +165,9 @@ fn damaged_chunks_of_a_file_without_an_index_are_left_out() {
         file[at] ^= 1;
         std::fs::write(&path, file).unwrap();
         let (clouds, errors, _) = read(from_ref(&path), &topic("/points"));
-        assert!(clouds.len() < 4 || errors.is_empty(), "{errors:?}");
-        assert!(clouds.len() + errors.len() >= 4, "{}: {errors:?}", clouds.len());
+        // A chunk without clouds is an error, too: where there is no index, its clouds may be what is damaged.
+        let all = clouds.len() + errors.len();
+        assert!(!errors.is_empty() && (4..=5).contains(&all), "{}: {errors:?}", clouds.len());
     }
 }
 

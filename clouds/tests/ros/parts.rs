@@ -132,3 +132,14 @@ fn packed_files_are_unpacked_where_it_is_said() {
     assert!(error.contains("cannot unpack a recording into") && error.contains("gone"), "{error}");
     assert_eq!(read(&paths, &scratch(folder.path())).0.len(), 4);
 }
+
+#[test]
+fn a_file_that_is_named_again_is_read_once() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::copy(data("only_points.mcap"), folder.path().join("a.mcap")).unwrap();
+    let metadata = format!("relative_file_paths:\n{}", "- a.mcap\n".repeat(100_000));
+    std::fs::write(folder.path().join("metadata.yaml"), metadata).unwrap();
+    let (clouds, errors, remarks) = read(&[folder.path().to_owned()], &BagOptions::default());
+    assert_eq!((clouds.len(), errors), (4, vec![]));
+    assert!(remarks[0].contains("names of files occur again (99999)"), "{remarks:?}");
+}

@@ -335,3 +335,27 @@ fn frames_that_do_not_lead_to_the_map_cost_a_cloud_nothing() {
         assert_eq!((found.is_ok(), found), (true, tf.lookup(target, source, MIDDLE)));
     }
 }
+
+/// The climb ends at the frame that is asked for.
+#[test]
+fn a_loop_above_the_frame_of_the_map_is_no_error() {
+    let wanted = robot().lookup("map", "lidar", MIDDLE).unwrap();
+    let links: [&[(&str, &str)]; 4] = [
+        &[("world", "map"), ("map", "world")],
+        &[("a", "map"), ("b", "a"), ("c", "b"), ("a", "c")],
+        &[("base", "map")],
+        &[("map", "odom"), ("odom", "map")],
+    ];
+    for links in links {
+        for is_static in [true, false] {
+            let mut tf = robot();
+            for (parent, child) in links.iter().filter(|link| **link != ("map", "odom")) {
+                tf.insert(parent, child, MIDDLE, at(4.0), is_static).unwrap();
+            }
+            assert_eq!(tf.lookup("map", "lidar", MIDDLE), Ok(wanted), "{links:?}");
+            let between = tf.links_between("map", "lidar", MIDDLE).unwrap();
+            assert_eq!(between, [vec![], vec!["lidar".to_owned(), "base".to_owned(), "odom".to_owned()]]);
+            assert!(tf.frames_between("map", "lidar").unwrap().contains("odom"));
+        }
+    }
+}
