@@ -212,7 +212,7 @@ fn nothing_waits_for_a_fifo_among_clouds() {
     fifo(&scans.join("2.pcd"));
     for options in [&["--poses", "identity"][..], &["--no-rays"]] {
         for (input, name) in [(&clouds, "1.xyz"), (&scans, "2.pcd")] {
-            let map = folder.path().join("map");
+            let map = folder.path().join(format!("{name}{}", options.len()));
             let message = refusal_in_time(&[&["build", text(input), "-o", text(&map)], options].concat());
             assert!(message.contains(name) && message.contains("is a FIFO"), "{options:?}: {message}");
         }
