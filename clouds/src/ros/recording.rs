@@ -93,6 +93,11 @@ impl TopicSet {
     pub(super) fn contains(&self, topic: usize) -> bool {
         self.is_in.get(topic).copied().unwrap_or(false)
     }
+
+    #[cfg(feature = "sqlite")]
+    pub(super) fn is_empty(&self) -> bool {
+        self.is_in.is_empty()
+    }
 }
 
 /// Memory for topics: some ten thousand. Others are not read.

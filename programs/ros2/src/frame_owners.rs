@@ -34,9 +34,10 @@ impl FrameOwners {
     pub fn note(&mut self, child: &str, publisher: Option<Gid>) {
         self.taken += 1;
         let owned = Owned { publisher, last: self.taken };
-        match self.frames.get_mut(child) {
-            Some(known) => *known = owned,
-            None => drop(self.frames.insert(child.to_owned(), owned)),
+        if let Some(known) = self.frames.get_mut(child) {
+            *known = owned;
+        } else {
+            self.frames.insert(child.to_owned(), owned);
         }
     }
 
@@ -56,7 +57,9 @@ impl FrameOwners {
         frames.sort_unstable();
         frames.truncate(count.div_ceil(PART));
         let frames: Vec<String> = frames.into_iter().map(|(_, child)| child).collect();
-        frames.iter().for_each(|child| drop(self.frames.remove(child)));
+        for child in &frames {
+            self.frames.remove(child);
+        }
         frames
     }
 }
