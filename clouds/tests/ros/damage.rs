@@ -171,7 +171,7 @@ fn damaged_chunks_of_a_file_without_an_index_are_left_out() {
     }
 }
 
-/// A block of bzip2 is given out before its checksum is compared.
+/// Whatever a decoder gives out before it fails.
 #[test]
 fn no_cloud_of_a_bag_comes_of_damaged_bytes() {
     let folder = tempfile::tempdir().unwrap();
