@@ -1,6 +1,7 @@
 use super::bucket::{refused, told};
 use super::store_health::StoreHealth;
 use crate::error::{Error, Unanswered};
+use object_store::client::HttpError;
 use object_store::path::Path as Key;
 use parking_lot::Mutex;
 use std::fmt;
@@ -262,6 +263,8 @@ impl Request {
     /// Whether the same request would be refused again.
     fn is_final(&self, error: &object_store::Error) -> bool {
         match error {
+            // The status was a refusal, and its text was cut off.
+            object_store::Error::Generic { source, .. } if is_cut_off(&**source) => false,
             object_store::Error::Generic { .. } => {
                 // 408 and 429 ask for another attempt. A store without HTTP says so of a range in words.
                 matches!(self.state.lock().status, Some(300..=407 | 409..=428 | 430..=499))
@@ -287,6 +290,11 @@ impl Request {
         };
         io::Error::new(io::ErrorKind::TimedOut, error)
     }
+}
+
+/// Whether a connection broke before an answer was complete.
+fn is_cut_off(error: &(dyn std::error::Error + 'static)) -> bool {
+    std::iter::successors(Some(error), |error| error.source()).any(|error| error.is::<HttpError>())
 }
 
 /// Makes attempts from the beginning until one succeeds, or another would not help.

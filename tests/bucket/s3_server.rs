@@ -208,7 +208,9 @@ impl State {
             objects.insert(asked.key.clone(), body);
             return (200, Vec::new(), String::new());
         }
-        let Some(content) = there else { return (404, Vec::new(), String::new()) };
+        let Some(content) = there else {
+            return (404, b"<Error><Code>NoSuchKey</Code></Error>".to_vec(), String::new());
+        };
         let Some(range) = headers.get("range").and_then(|range| range.strip_prefix("bytes=")) else {
             return (200, content, String::new());
         };

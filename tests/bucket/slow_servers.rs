@@ -127,6 +127,17 @@ fn a_third_of_the_connections_may_be_reset() {
 }
 
 #[test]
+fn an_answer_that_is_cut_off_refuses_nothing() {
+    let (server, folder) = (S3Server::new(), TempDir::new().unwrap());
+    let map = a_map(&folder);
+    // The first answer says that there is no manifest yet.
+    server.trouble(|_, number| if number == 0 { Trouble::CutOff } else { Trouble::None });
+    push_all(&server, &map);
+    let [first, second] = [0, 1].map(|number| server.asked()[number].clone());
+    assert_eq!((&first.method, &first.key), (&second.method, &second.key), "it was asked again");
+}
+
+#[test]
 fn an_object_that_drips_is_given_up_and_a_slow_one_is_not() {
     let (server, folder) = (S3Server::new(), TempDir::new().unwrap());
     let map = a_map(&folder);
