@@ -50,7 +50,9 @@ pub enum WhyNot {
     #[error("the frame {0} is its own ancestor")]
     Loop(String),
     /// More frames are above it than a robot has.
-    #[error("too many frames are above the frame {0}: name a nearer frame with --fixed-frame")]
+    #[error(
+        "too many frames are above the frame {0}: name a nearer frame with --fixed-frame (ROS 2 node: --frame-id)"
+    )]
     TooManyFrames(String),
     /// The stamp is before the first transform of a frame.
     #[error("the stamp is before the first transform of {0}")]
