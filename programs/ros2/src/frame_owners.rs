@@ -11,7 +11,7 @@ pub struct FrameOwners {
     taken: u64,
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 struct Owned {
     publisher: Option<Gid>,
     parent: String,
@@ -90,7 +90,7 @@ impl FrameOwners {
     }
 
     /// The static frames that needed frames carry, the fixed one aside.
-    fn mounted(&self, needed: &HashSet<String>, fixed: &str) -> HashSet<&str> {
+    fn mounted<'a>(&'a self, needed: &'a HashSet<String>, fixed: &str) -> HashSet<&'a str> {
         let mut children: HashMap<&str, Vec<&str>> = HashMap::new();
         for (child, owned) in self.frames.iter().filter(|(_, owned)| owned.is_static) {
             children.entry(&owned.parent).or_default().push(child);
