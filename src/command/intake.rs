@@ -1,18 +1,20 @@
 use crate::command::scan_queue::ScanQueue;
 use crate::command::scan_reader::{Read, ReadScan, ScanReader};
-use crate::error::{Error, FormatError};
+use crate::error::{Error, FormatError, Place};
 use crate::io::{ScanChain, ScanMark, StoredScan};
 use crate::scan::{ScanPoints, ScanTracer};
 use crate::sensor::SensorModel;
 use crate::space::Grid;
 use crate::store::InputContent;
-use std::collections::VecDeque;
+use std::collections::{HashSet, VecDeque};
 use std::path::{Path, PathBuf};
 
 /// Scans among which the first with points is looked for: it tells which input this is.
 const LEAD: usize = 16;
-/// Most scans of an input that may be skipped: a map keeps the number of each.
-const MOST_SKIPPED: usize = 1000;
+/// Most bad places of an input that may be skipped. All scans of a damaged chunk of a recording are at one place.
+const MAX_BAD_PLACES: usize = 1000;
+/// Most scans of an input that may be skipped: a map stores the number of each.
+const MAX_SKIPPED: usize = 10_000;
 
 /// The scans of an input in order, and what the map is to remember of those that it has taken.
 pub struct Intake {
@@ -25,6 +27,9 @@ pub struct Intake {
     chain: ScanChain,
     begins_with: Option<String>,
     skipped: Vec<u64>,
+    /// The bytes of files at which scans were skipped, and how many were skipped at no such place.
+    bad_places: HashSet<(PathBuf, u64)>,
+    skipped_alone: usize,
     skips_bad: bool,
     /// What a scan with rays needs. `None` for points alone.
     rays: Option<RayNeeds>,
@@ -58,7 +63,22 @@ impl Intake {
         let (lead, chain) = (VecDeque::new(), ScanChain::default());
         let (skipped, unread, left_out) = Default::default();
         let (behind, begins_with) = (None, None);
-        Self { reader, scans, lead, behind, chain, begins_with, skipped, skips_bad, rays, unread, left_out }
+        let (bad_places, skipped_alone) = Default::default();
+        Self {
+            reader,
+            scans,
+            lead,
+            behind,
+            chain,
+            begins_with,
+            skipped,
+            bad_places,
+            skipped_alone,
+            skips_bad,
+            rays,
+            unread,
+            left_out,
+        }
     }
 
     /// See [`ScanReader::read_ahead`].
@@ -133,11 +153,17 @@ impl Intake {
         let (Some(_), None) = (&self.begins_with, &content.begins_with) else {
             return content.begins_with == self.begins_with;
         };
-        // The map has but the scans without points that come first.
+        // The map has only the scans without points that come first; without any, nothing identifies the input.
+        if content.scans == 0 {
+            return false;
+        }
         let (mut chain, mut reads) = (ScanChain::default(), self.lead.iter());
         while chain.scans() < content.scans {
             match reads.next() {
-                Some(Read::Unread(_)) if content.skipped.contains(&chain.scans()) => chain.add_unread(),
+                // Skipped, whether it can be read or not.
+                Some(Read::Unread(_) | Read::Scan(_)) if content.skipped.contains(&chain.scans()) => {
+                    chain.add_unread();
+                }
                 Some(Read::LeftOut(mark) | Read::Scan(ReadScan { mark, .. })) => chain.add(mark),
                 _ => return false,
             }
@@ -210,9 +236,13 @@ impl Intake {
                 }
                 Read::Scan(_) if was_skipped => {
                     log::warn!("{}: scan {number} was skipped, and stays so", self.scans.display());
+                    self.skipped_alone += 1;
                     self.chain.add_unread();
                 }
-                Read::Unread(_) if was_skipped => self.chain.add_unread(),
+                Read::Unread(error) if was_skipped => {
+                    self.count_bad(&error);
+                    self.chain.add_unread();
+                }
                 Read::LeftOut(mark) => self.chain.add(&mark),
                 Read::Scan(ReadScan { mark, .. }) => self.chain.add(&mark),
                 Read::Unread(error) => {
@@ -265,8 +295,19 @@ impl Intake {
         if !self.skips_bad {
             return Err(error.into());
         }
-        if self.skipped.len() == MOST_SKIPPED {
-            let context = format!("more than {MOST_SKIPPED} scans of one input cannot be read");
+        self.count_bad(&error);
+        let excess = match () {
+            () if self.skipped.len() >= MAX_SKIPPED => Some(format!("{MAX_SKIPPED} scans")),
+            () if self.skipped_alone + self.bad_places.len() > MAX_BAD_PLACES => {
+                Some(format!("{MAX_BAD_PLACES} scans or damaged chunks"))
+            }
+            () => None,
+        };
+        if let Some(excess) = excess {
+            let context = format!(
+                "more than {excess} of one input cannot be read: copy or repair the input and go on with --resume, or \
+                 build from later scans with --first"
+            );
             return Err(anyhow::Error::new(error).context(context));
         }
         let number = self.chain.scans();
@@ -275,6 +316,16 @@ impl Intake {
         self.skipped.push(number);
         self.chain.add_unread();
         Ok(())
+    }
+
+    /// Counts a scan that is skipped, unless another one was skipped at the same place.
+    fn count_bad(&mut self, error: &Error) {
+        match error {
+            Error::Malformed { path, cause } if cause.place == Place::Offset => {
+                self.bad_places.insert((path.clone(), cause.at));
+            }
+            _ => self.skipped_alone += 1,
+        }
     }
 
     fn read(&mut self, idle: &mut dyn FnMut() -> crate::Result<()>) -> anyhow::Result<Read> {

@@ -73,6 +73,8 @@ pub(super) struct PosedClouds {
     number: u64,
     without_pose: u64,
     is_at_end: bool,
+    /// Whether the poses cannot be used: no other cloud would have one.
+    has_bad_poses: bool,
     /// Whether any had one.
     has_pose: bool,
     /// Why they have none, and the names of the first of each reason.
@@ -104,7 +106,7 @@ impl PosedClouds {
             trajectory.check_clouds(&*source)?;
         }
         let (number, without_pose, is_at_end, has_pose, reasons, fields) = Default::default();
-        let (stayed, without_times) = Default::default();
+        let (has_bad_poses, stayed, without_times) = Default::default();
         Ok(Self {
             source,
             path: path.to_owned(),
@@ -113,6 +115,7 @@ impl PosedClouds {
             number,
             without_pose,
             is_at_end,
+            has_bad_poses,
             has_pose,
             reasons,
             fields,
@@ -306,8 +309,9 @@ impl ScanSource for PosedClouds {
 
     fn read_scan(&mut self, points: &mut PointStore) -> Result<Option<ScanHead>> {
         while let Some((number, head)) = self.next_cloud()? {
-            let found = self.pose_of(&head, number)?;
-            let body = match found {
+            let found = self.pose_of(&head, number);
+            self.has_bad_poses |= found.is_err();
+            let body = match found? {
                 Ok(body) => body,
                 Err(why) => {
                     if self.options.are_poses_needed {
@@ -348,7 +352,9 @@ impl ScanSource for PosedClouds {
         while skipped < scans
             && let Some((number, head)) = self.next_cloud()?
         {
-            match self.pose_of(&head, number)? {
+            let found = self.pose_of(&head, number);
+            self.has_bad_poses |= found.is_err();
+            match found? {
                 Err(why) if !self.options.may_lack_poses => self.note_without_pose(&head, &why),
                 _ => {
                     self.has_pose = true;
@@ -360,8 +366,8 @@ impl ScanSource for PosedClouds {
     }
 
     fn pass_unread(&mut self) -> bool {
-        // Behind the end there is no scan that could be passed.
-        !self.is_at_end
+        // After the end there is no scan that could be passed.
+        !self.is_at_end && !self.has_bad_poses
     }
 
     fn pose_source(&self) -> PoseSource {

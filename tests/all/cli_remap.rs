@@ -301,7 +301,10 @@ fn poses_in_another_order_than_time_are_not_taken_line_by_line() {
         let name = |name: &str| clouds.join(format!("{name}{second}.ply"));
         fs::rename(clouds.join(format!("170000000{second}.000000.ply")), name("scan")).unwrap();
     }
-    let message =
-        fails(&["build", text(&clouds), "-o", &kept.path("x"), "--poses", &kept.path("back.txt")], 2);
-    assert!(message.contains("its time stamps go back"), "{message}");
+    let build = ["build", text(&clouds), "-o", &kept.path("x"), "--poses", &kept.path("back.txt")];
+    for more in [&[][..], &["--skip-bad"]] {
+        let message = fails(&[&build[..], more].concat(), 2);
+        assert!(message.contains("its time stamps go back (pose 2 is earlier"), "{message}");
+        assert!(!message.contains("is skipped"), "{message}");
+    }
 }

@@ -431,4 +431,16 @@ fn an_input_of_which_only_empty_scans_were_taken_is_resumed() {
     assert_eq!((&again["scans"], &again["resumed_after"]), (&0.into(), &5.into()));
     output(&["build", input, "-o", text(&whole)]);
     assert_eq!(digest(map), digest(text(&whole)));
+
+    // One of the empty scans is skipped; a later attempt that took nothing hides none of them.
+    let first = Path::new(input).join("scan0.pcd");
+    let far = fs::read_to_string(&first).unwrap().replacen("VIEWPOINT 0 ", "VIEWPOINT 1e12 ", 1);
+    fs::write(&first, far).unwrap();
+    let skipping = folder.path().join("skipping");
+    let build = ["build", input, "-o", text(&skipping), "--skip-bad", "--json"];
+    json(&[&build[..], &["--count", "2"]].concat());
+    json(&[&build[..], &["--append", "--again", "--first", "99"]].concat());
+    let resumed = json(&[&build[..], &["--resume"]].concat());
+    assert_eq!((&resumed["scans"], &resumed["resumed_after"]), (&3.into(), &1.into()));
+    assert_eq!(digest(text(&skipping)), digest(map));
 }

@@ -42,6 +42,9 @@ mod cli_snapshots;
 mod convert;
 /// Every byte of every file of a map, damaged: found, named, repaired.
 mod corruption;
+/// Recordings with damaged chunks.
+#[cfg(all(feature = "cli", feature = "ros"))]
+mod damaged_recordings;
 /// Errors: what they say, their causes, what they are about.
 #[cfg(feature = "cli")]
 mod errors;
@@ -75,6 +78,11 @@ mod low_memory;
 mod map_life;
 /// The same sentences about every mapper: equal to the naive one, to the bit.
 mod mapper_contract;
+/// Messages of ROS that tests make.
+#[cfg(all(feature = "cli", feature = "ros"))]
+#[allow(dead_code)]
+#[path = "../../clouds/tests/made/message.rs"]
+mod message;
 /// Random insert, query, eviction, flush, crash, reopen: always the naive map as of then.
 mod model;
 /// What the OctoCache paper says, where it can be tried.

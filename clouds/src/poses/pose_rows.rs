@@ -20,6 +20,8 @@ pub(super) struct PoseRows {
     last_ns: Option<i64>,
     /// How often the time goes back, and how often it stands still.
     back: u64,
+    /// Number of the first pose that is earlier than the one before, from 1.
+    first_back: Option<u64>,
     still: u64,
     digit_ns: i64,
 }
@@ -28,8 +30,8 @@ pub(super) struct PoseRows {
 #[derive(Default)]
 pub(super) struct Stamps {
     pub(super) has_stamps: bool,
-    /// A stamp is earlier than the one before.
-    pub(super) goes_back: bool,
+    /// Number of the first pose whose stamp is earlier than the one before, from 1.
+    pub(super) goes_back: Option<u64>,
     pub(super) rounding_ns: u64,
     pub(super) remarks: Vec<String>,
 }
@@ -77,6 +79,7 @@ impl PoseRows {
             are_stamped: true,
             last_ns: None,
             back: 0,
+            first_back: None,
             still: 0,
             digit_ns: MAX_DIGIT_NS,
         }
@@ -87,7 +90,10 @@ impl PoseRows {
         self.rows += 1;
         self.are_stamped &= stamp_ns.is_some();
         if let Some(stamp_ns) = stamp_ns {
-            self.back += u64::from(self.last_ns.is_some_and(|last| stamp_ns < last));
+            if self.last_ns.is_some_and(|last| stamp_ns < last) {
+                self.back += 1;
+                self.first_back.get_or_insert(self.rows as u64);
+            }
             self.still += u64::from(self.last_ns == Some(stamp_ns));
             self.last_ns = Some(stamp_ns);
             while stamp_ns % self.digit_ns != 0 {
@@ -103,7 +109,7 @@ impl PoseRows {
         if self.rows == 0 {
             return Ok(None);
         }
-        let goes_back = self.are_stamped && self.back > 0;
+        let goes_back = self.first_back.filter(|_| self.are_stamped);
         let mut stamps = Stamps { has_stamps: self.are_stamped, goes_back, ..Stamps::default() };
         if self.back > 0 {
             let back = self.back;

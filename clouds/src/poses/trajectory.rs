@@ -17,7 +17,8 @@ pub struct Trajectory {
     /// In strict order of time, where that is another order.
     by_time: Option<PoseList>,
     has_stamps: bool,
-    goes_back: bool,
+    /// Number of the first pose whose stamp is earlier than the one before, from 1.
+    goes_back: Option<u64>,
     /// Poses are of a camera; those of the lidar are `[0] * pose * [1]`.
     lidar: Option<[RigidPose; 2]>,
     /// How far a stamp may be from the time that it was rounded from.
@@ -185,18 +186,18 @@ impl Trajectory {
     ///
     /// A time stamp is earlier than the one before.
     pub fn check_order(&self) -> Result<()> {
-        if !self.goes_back {
-            return Ok(());
-        }
-        let reason = "its time stamps go back, but there are no time stamps of clouds to compare with, and line by line \
-                      these are the poses of the clouds in their order: put the lines in that order (stamps that mean \
-                      nothing may all be 0)";
+        let Some(number) = self.goes_back else { return Ok(()) };
+        let reason = format!(
+            "its time stamps go back (pose {number} is earlier than the one before), but there are no time stamps of \
+             clouds to compare with, and line by line these are the poses of the clouds in their order: put the lines \
+             in that order (stamps that mean nothing may all be 0)"
+        );
         Err(Error::argument(self.path.display().to_string(), reason))
     }
 
     /// Whether a time stamp is earlier than the one before.
     pub fn goes_back(&self) -> bool {
-        self.goes_back
+        self.goes_back.is_some()
     }
 
     fn other_number(&self, clouds: &str) -> Error {

@@ -3,6 +3,7 @@ use super::format::Format;
 use super::intrinsics::Intrinsics;
 use super::one::head_of;
 use super::options::OpenOptions;
+use super::regular::check_regular;
 use crate::cloud::CloudSource;
 use crate::error::{Error, Place, Result};
 use crate::pose::RigidPose;
@@ -45,6 +46,7 @@ impl Frames for ImageFrames {
         let mut head = head_of(&path);
         let stem = head.name.trim_end_matches(".png").trim_end_matches(".depth").to_owned();
         let beside = path.with_file_name(format!("{stem}.pose.txt"));
+        check_regular(&beside)?;
         if beside.is_file() {
             head.world_from_sensor = pose(&beside)?;
             self.lost += u64::from(head.world_from_sensor.is_none());

@@ -64,13 +64,16 @@ pub(super) fn open(path: &Path, has_origin: bool, budget: &Budget) -> Result<Box
 fn check_xml(path: &Path, file: &mut File, budget: &Budget) -> Result<()> {
     let fail = |error| Error::io(path, "read", error);
     let mut header = Vec::new();
-    file.take(48).read_to_end(&mut header).map_err(fail)?;
+    file.take(HEADER_BYTES as u64).read_to_end(&mut header).map_err(fail)?;
     let number = |at: usize| {
         let bytes = header.get(at..).and_then(|bytes| bytes.first_chunk()).copied();
         bytes.map_or(0, u64::from_le_bytes)
     };
     let [start, bytes, page_bytes] = [24, 32, 40].map(number);
     let wrong = |at: u64, reason: String| Err(Error::format(path, Place::Byte(at), reason));
+    if header.len() < HEADER_BYTES || !header.starts_with(SIGNATURE) {
+        return wrong(0, "it is no E57 file, or is cut off; copy it again".to_owned());
+    }
     if page_bytes != PAGE_BYTES {
         return wrong(40, format!("pages of {page_bytes} bytes; those of E57 have {PAGE_BYTES}"));
     }
@@ -98,6 +101,9 @@ fn check_xml(path: &Path, file: &mut File, budget: &Budget) -> Result<()> {
     file.seek(SeekFrom::Start(0)).map(drop).map_err(fail)
 }
 
+/// The first bytes of a file, and how many its header has.
+const SIGNATURE: &[u8] = b"ASTM-E57";
+const HEADER_BYTES: usize = 48;
 /// Each point takes the time of its fields, also of those that take no bytes of the file.
 const MAX_FIELDS: usize = 256;
 /// What a tag or an attribute takes in the library's tree.
@@ -170,7 +176,7 @@ impl CloudSource for E57 {
         }
         if scan.prototype.len() > MAX_FIELDS {
             let reason = format!(
-                "a point has {} fields; of more than {MAX_FIELDS}, points are not read",
+                "a point has {} fields, at most {MAX_FIELDS} are read: export the scan with fewer fields",
                 scan.prototype.len()
             );
             return Err(Error::format(&self.path, Place::Record(0), reason));

@@ -1,3 +1,4 @@
+use super::regular::check_regular;
 use crate::error::{Error, Place, Result};
 use crate::lines::Lines;
 use std::path::{Path, PathBuf};
@@ -78,8 +79,8 @@ impl Intrinsics {
         }
         let folders: Vec<PathBuf> =
             std::iter::once(folder.to_owned()).chain(folder.parent().map(Path::to_owned)).collect();
-        let found =
-            folders.iter().flat_map(|folder| NAMES.map(|name| folder.join(name))).find(|path| path.is_file());
+        let mut paths = folders.iter().flat_map(|folder| NAMES.map(|name| folder.join(name)));
+        let found = paths.find(|path| path.exists() && !path.is_dir());
         let Some(path) = found else {
             let reason = format!(
                 "depth images need the camera: name a file with fx fy cx cy in pixels, or with a matrix of 3x3, by \
@@ -88,6 +89,7 @@ impl Intrinsics {
             );
             return Err(Error::argument(folder.display().to_string(), reason));
         };
+        check_regular(&path)?;
         Self::read(&path)
     }
 

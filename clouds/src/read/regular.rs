@@ -1,3 +1,4 @@
+use super::format::{Format, extension_of};
 use crate::error::{Error, Result};
 use std::path::Path;
 
@@ -8,7 +9,14 @@ pub(crate) fn check_regular(path: &Path) -> Result<()> {
     if !is_special {
         return Ok(());
     }
-    let reason = "is a FIFO, a socket or a device, not a file: save what it gives to a file; or name it alone, with \
-                  --format ply or --format xyz, which are read as they come";
+    // Of these, a single cloud is read in one pass.
+    let extension = extension_of(path);
+    let mut extensions = [Format::Ply, Format::Text].into_iter().flat_map(Format::extensions);
+    let is_streamed = extension.is_empty() || extensions.any(|known| *known == extension);
+    let hint = "; or name it alone, with --format ply or --format xyz, which are read in one pass";
+    let reason = format!(
+        "is a FIFO, a socket or a device, not a file: save its contents to a file{}",
+        if is_streamed { hint } else { "" }
+    );
     Err(Error::argument(path.display().to_string(), reason))
 }

@@ -5,7 +5,7 @@ pub(super) struct XmlCheck {
     place: Place,
     /// The bytes since the last `<`, up to those that tell what it starts.
     start: Vec<u8>,
-    /// The last two bytes.
+    /// The last two bytes of this place: those that begin it count for none.
     last: [u8; 2],
     /// Attributes of the tag so far.
     attributes: usize,
@@ -43,8 +43,9 @@ impl XmlCheck {
     /// More of something than is read.
     pub(super) fn take(&mut self, bytes: &[u8]) -> Result<(), String> {
         bytes.iter().try_for_each(|&byte| {
+            let before = self.place;
             let taken = self.step(byte);
-            self.last = [self.last[1], byte];
+            self.last = if self.place == before { [self.last[1], byte] } else { [0; 2] };
             taken
         })
     }
@@ -122,6 +123,13 @@ mod tests {
         let many = |count: usize| (0..count).map(|k| format!(" a{k}='='")).collect::<String>();
         assert!(check(&format!("<a{}/>", many(256)).repeat(3)).is_ok());
         assert!(check(&format!("<a{}/>", many(257))).unwrap_err().contains("256 attributes of one tag"));
+        // A comment ends after the bytes that begin it, and so do others.
+        for start in ["<!-->", "<!--->", "<![CDATA[]>", "<?>"] {
+            let end =
+                ["-->", "]]>", "?>"][usize::from(start.contains('[')) + 2 * usize::from(start.contains('?'))];
+            let text = format!("<b>{start} <x \" {end}<a{}/></b>", many(257));
+            assert!(check(&text).is_err(), "{start}");
+        }
         let spaces = |count: usize| (0..count).map(|k| format!("<a xmlns:b{k}='c'/>")).collect::<String>();
         assert!(check(&spaces(1000)).is_ok());
         assert!(check(&spaces(1001)).unwrap_err().contains("1000 declarations"));

@@ -169,7 +169,15 @@ impl CloudSource for BagClouds {
 
     fn next_cloud(&mut self) -> Result<Option<CloudHead>> {
         self.current = None;
-        let Some(message) = self.recording.next_message()? else { return Ok(None) };
+        let message = match self.recording.next_message() {
+            Ok(Some(message)) => message,
+            Ok(None) => return Ok(None),
+            Err(error) => {
+                // One that is damaged has a number, too.
+                self.next += u64::from(!matches!(error, Error::Io { .. }));
+                return Err(error);
+            }
+        };
         let number = self.next;
         self.next += 1;
         let message = self.current(message, number)?;

@@ -35,8 +35,8 @@ const SAMPLE_BYTES: usize = 96;
 const MAX_LINKS: usize = 10_000;
 /// A longer name of a frame is damage.
 const MAX_NAME_BYTES: usize = 256;
-/// Most frames of sensors of one topic.
-const MAX_SENSORS: usize = 100;
+/// Most frames of sensors whose lookups are kept. A topic has few; those of more are made again.
+const MAX_LOOKUPS: usize = 32;
 /// Most reasons that are counted for clouds without a pose.
 const MAX_REASONS: usize = 100;
 /// The frames that a robot moves by, if a pose does not name its own.
@@ -225,8 +225,8 @@ impl BagPoses {
 
     fn find(&mut self, sensor_frame: &str, stamp_ns: i64) -> std::result::Result<RigidPose, WhyNot> {
         if !self.lookups.contains_key(sensor_frame) {
-            if self.lookups.len() >= MAX_SENSORS {
-                return Err(WhyNot::TooManySensors(MAX_SENSORS));
+            if self.lookups.len() >= MAX_LOOKUPS {
+                self.lookups.clear();
             }
             let lookup = self.new_lookup(sensor_frame);
             self.lookups.insert(sensor_frame.to_owned(), lookup);

@@ -33,11 +33,11 @@ pub(super) trait ChunkFile {
         });
         match loaded {
             Err(error @ Error::Io { .. }) => return Err(error),
-            Ok(chunk) if !chunk.is_broken() => {}
-            // It is reported when it is its turn, and so are its messages.
-            _ => (earliest, counts) = Default::default(),
+            Ok(chunk) if !chunk.is_broken() => walk.messages += counts.values().sum::<u64>(),
+            // Each of its messages is an error when it is its turn.
+            Ok(_) => earliest = None,
+            Err(_) => (earliest, counts) = Default::default(),
         }
-        walk.messages += counts.values().sum::<u64>();
         walk.start_ns = earliest.or(walk.start_ns);
         check_chunks(self.found().1.len(), self.order().shares(), self.path())?;
         let (topics, places) = self.found();

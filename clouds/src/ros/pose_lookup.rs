@@ -1,7 +1,6 @@
-use super::transforms::{Transforms, WhyNot};
+use super::transforms::{SearchFrames, Transforms, WhyNot};
 use crate::error::{Error, Result};
 use crate::pose::RigidPose;
-use std::collections::HashSet;
 use std::sync::Arc;
 
 /// Looks up where a sensor was in the world, for as long as anybody asks.
@@ -11,7 +10,7 @@ pub(super) struct PoseLookup {
     fixed_frame: String,
     sensor_frame: String,
     /// The frames that lead from the sensor to the world.
-    between: Arc<HashSet<String>>,
+    among: Arc<SearchFrames>,
 }
 
 impl PoseLookup {
@@ -23,8 +22,8 @@ impl PoseLookup {
         fixed_frame: String,
         sensor_frame: String,
     ) -> std::result::Result<Self, WhyNot> {
-        let between = Arc::new(transforms.frames_between(&fixed_frame, &sensor_frame)?);
-        Ok(Self { transforms, fixed_frame, sensor_frame, between })
+        let among = Arc::new(transforms.search_frames(&fixed_frame, &sensor_frame)?);
+        Ok(Self { transforms, fixed_frame, sensor_frame, among })
     }
 
     /// Where the sensor was, if that is known.
@@ -36,7 +35,7 @@ impl PoseLookup {
     }
 
     pub(super) fn find(&self, stamp_ns: i64) -> std::result::Result<RigidPose, WhyNot> {
-        let Self { transforms, fixed_frame, sensor_frame, between } = self;
-        transforms.lookup_among(fixed_frame, sensor_frame, stamp_ns, Some(between))
+        let Self { transforms, fixed_frame, sensor_frame, among } = self;
+        transforms.lookup_among(fixed_frame, sensor_frame, stamp_ns, Some(among))
     }
 }

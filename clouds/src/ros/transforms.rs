@@ -26,6 +26,16 @@ pub struct Transforms {
     most_gap_ns: Option<i64>,
 }
 
+/// The frames among which poses of a frame in another are searched, so that others cost nothing.
+#[derive(Debug)]
+pub(super) struct SearchFrames {
+    /// See [`Transforms::frames_between`].
+    between: HashSet<String>,
+    /// All frames above the source, where the target is one of them at some time: at other times, both may be connected
+    /// by a common ancestor. `None` if there are too many.
+    above: Option<HashSet<String>>,
+}
+
 /// Why the pose of a frame in another is not known at a time.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, thiserror::Error)]
 #[non_exhaustive]
@@ -40,11 +50,10 @@ pub enum WhyNot {
     #[error("the frame {0} is its own ancestor")]
     Loop(String),
     /// More frames are above it than a robot has.
-    #[error("too many frames are above the frame {0}")]
+    #[error(
+        "too many frames are above the frame {0}: name a nearer frame with --fixed-frame (ROS 2 node: --frame-id)"
+    )]
     TooManyFrames(String),
-    /// Clouds of one topic are in more frames than a robot has sensors.
-    #[error("the clouds are in more than {0} frames")]
-    TooManySensors(usize),
     /// The stamp is before the first transform of a frame.
     #[error("the stamp is before the first transform of {0}")]
     Before(String),
@@ -286,7 +295,7 @@ impl Transforms {
         target_frame: &str,
         source_frame: &str,
         stamp_ns: i64,
-        among: Option<&HashSet<String>>,
+        among: Option<&SearchFrames>,
     ) -> Result<RigidPose, WhyNot> {
         let (target, source) = (bare(target_frame), bare(source_frame));
         if target == source {
@@ -298,15 +307,28 @@ impl Transforms {
         Ok(common_from_target.inverse().then(&common_from_source))
     }
 
-    /// The frames among which all ways from a source to a target are, at whatever time: with them alone, a search costs
-    /// as much as the robot has frames, however many others there are.
+    /// The frames among which poses of a source in a target are searched.
     ///
     /// # Errors
     ///
-    /// They are too many.
+    /// There are too many.
+    pub(super) fn search_frames(&self, target: &str, source: &str) -> Result<SearchFrames, WhyNot> {
+        let between = self.frames_between(target, source)?;
+        let above = self.children_above(bare(source), None);
+        let is_small = above.contains_key(bare(target)) && above.len() <= MAX_FRAMES_BETWEEN;
+        let above = is_small.then(|| above.into_keys().map(str::to_owned).collect());
+        Ok(SearchFrames { between, above })
+    }
+
+    /// The frames on all upward paths from a source to a target, at whatever time; where there is no such path, the
+    /// frames above both.
+    ///
+    /// # Errors
+    ///
+    /// There are too many.
     pub fn frames_between(&self, target: &str, source: &str) -> Result<HashSet<String>, WhyNot> {
         let (target, source) = (bare(target), bare(source));
-        let up = self.children_above(source, target);
+        let up = self.children_above(source, Some(target));
         let mut between: HashSet<String> = HashSet::new();
         if up.contains_key(target) {
             let mut open = vec![target];
@@ -316,7 +338,7 @@ impl Transforms {
                 }
             }
         } else {
-            let down = self.children_above(target, source);
+            let down = self.children_above(target, Some(source));
             between.extend(up.into_keys().chain(down.into_keys()).map(str::to_owned));
         }
         match between.len() > MAX_FRAMES_BETWEEN {
@@ -326,14 +348,14 @@ impl Transforms {
     }
 
     /// The children of each frame above a frame, up to an end: what is above that does not matter.
-    fn children_above<'a>(&'a self, from: &'a str, end: &str) -> HashMap<&'a str, Vec<&'a str>> {
+    fn children_above<'a>(&'a self, from: &'a str, end: Option<&str>) -> HashMap<&'a str, Vec<&'a str>> {
         let mut children: HashMap<&str, Vec<&str>> = HashMap::from([(from, Vec::new())]);
         let mut open = vec![from];
         while let Some(child) = open.pop() {
             for step in self.steps(child) {
                 let is_new = !children.contains_key(step.parent);
                 children.entry(step.parent).or_default().push(child);
-                if is_new && step.parent != end {
+                if is_new && Some(step.parent) != end {
                     open.push(step.parent);
                 }
             }
@@ -360,6 +382,30 @@ impl Transforms {
     /// The steps up to what is above both, from each. Doubtful ones are taken only where no others lead there: they do
     /// not say where a frame was, but why that is not known.
     fn route<'a>(
+        &'a self,
+        target: &'a str,
+        source: &'a str,
+        stamp_ns: i64,
+        among: Option<&SearchFrames>,
+    ) -> Result<[Vec<Step<'a>>; 2], WhyNot> {
+        let Some(SearchFrames { between, above }) = among else {
+            return self.route_among(target, source, stamp_ns, None);
+        };
+        let Some(above) = above else {
+            return self.route_among(target, source, stamp_ns, Some(between));
+        };
+        // A trusted upward path is the result of the full search, too.
+        let trusted = |at: &'a str| {
+            let steps = self.steps_at(at, stamp_ns)?;
+            Ok(kept(steps, |step| step.is_trusted() && between.contains(step.parent)))
+        };
+        match Search::run(source, &trusted, |frame| frame == target)?.route {
+            Some(route) => Ok([Vec::new(), route]),
+            None => self.route_among(target, source, stamp_ns, Some(above)),
+        }
+    }
+
+    fn route_among<'a>(
         &'a self,
         target: &'a str,
         source: &'a str,

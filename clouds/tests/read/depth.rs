@@ -113,3 +113,28 @@ fn real_depth_images() {
         .unwrap();
     assert!(hits > 200_000 && far > 1.0 && far < 10.0, "{hits} {far}");
 }
+
+#[cfg(unix)]
+#[test]
+fn fifos_among_depth_images_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let fifo = |name: &str| {
+        assert!(std::process::Command::new("mkfifo").arg(at(name)).status().unwrap().success());
+    };
+    image(&at("frame-000000.depth.png"), 1, &[2000]);
+    fifo("camera-intrinsics.txt");
+    let (error, _) = failure(folder.path(), &OpenOptions::default());
+    assert!(error.contains("camera-intrinsics.txt: is a FIFO"), "{error}");
+    fs::remove_file(at("camera-intrinsics.txt")).unwrap();
+    fs::write(at("camera-intrinsics.txt"), "100 0 1\n0 200 0.5\n0 0 1\n").unwrap();
+    fifo("frame-000000.pose.txt");
+    let (error, _) = failure(folder.path(), &OpenOptions::default());
+    assert!(error.contains("frame-000000.pose.txt: is a FIFO"), "{error}");
+    // Only what is read in one pass may be named alone.
+    for (name, is_hinted) in [("a.ply", true), ("b.e57", false)] {
+        fifo(name);
+        let (error, _) = failure(&at(name), &OpenOptions::default());
+        assert!(error.contains("is a FIFO") && error.contains("--format") == is_hinted, "{error}");
+    }
+}

@@ -3,7 +3,7 @@ use crate::support::{clouds, failure, fixture, wanted};
 use std::fs;
 use std::path::Path;
 use voxtile_clouds::RigidPose;
-use voxtile_clouds::read::{OpenOptions, open};
+use voxtile_clouds::read::{Format, OpenOptions, open};
 use voxtile_clouds::write::VoxelFileFormat;
 
 /// Written by pye57 (libE57Format).
@@ -93,6 +93,19 @@ fn described(path: &Path, xml: &[u8]) {
     // Checksums are compared later than what is tested here.
     let file: Vec<u8> = content.chunks(1020).flat_map(|page| [page, &[0; 4]].concat()).collect();
     fs::write(path, file).unwrap();
+}
+
+#[test]
+fn a_file_that_is_no_e57_or_is_cut_off_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.e57");
+    let whole = fs::read(fixture("scans.e57")).unwrap();
+    let page = b"<!DOCTYPE html><html><body>The file has moved to another server.</body></html>";
+    for bytes in [&b""[..], &whole[..8], &whole[..47], page] {
+        fs::write(&path, bytes).unwrap();
+        let (error, _) = failure(&path, &OpenOptions { format: Some(Format::E57), ..OpenOptions::default() });
+        assert!(error.contains("byte 0: it is no E57 file, or is cut off; copy it again"), "{error}");
+    }
 }
 
 /// The library compares each attribute of a tag with those before it.

@@ -1,4 +1,4 @@
-use crate::support::{FILES, assert_clouds, data, read, topic};
+use crate::support::{Cloud, FILES, assert_clouds, data, read, topic};
 use std::slice::from_ref;
 use voxtile_clouds::CloudSource;
 use voxtile_clouds::ros::{BagOptions, PoseSource, open_bag, open_recording};
@@ -131,6 +131,7 @@ fn chunks_of_mcap_whose_checksum_is_wrong_are_damaged() {
     let (mut checked, mut left_out) = (0, 0);
     for name in ["none.mcap", "lz4.mcap", "zstd.mcap", "ros1.mcap"] {
         let whole = std::fs::read(data(name)).unwrap();
+        let (wanted, _, _) = read(&[data(name)], &topic("/points"));
         for at in checksums(&whole) {
             let has_checksum = whole[at..at + 4] != [0; 4];
             for (bytes, is_damaged) in [([1, 2, 3, 4], true), ([0; 4], false)] {
@@ -140,13 +141,15 @@ fn chunks_of_mcap_whose_checksum_is_wrong_are_damaged() {
                 let (clouds, mut errors, remarks) = read(from_ref(&path), &topic("/points"));
                 // No cloud comes of damaged bytes, and each that is left out has its error.
                 assert_eq!(clouds.len() + errors.len(), 4, "{name}: {errors:?}");
+                assert_same(&clouds, &wanted, true);
                 left_out += errors.len();
                 errors.extend(remarks);
                 assert_eq!(!errors.is_empty(), is_damaged, "{name}: {errors:?}");
                 // Clouds may lose their poses with it, too.
-                let mut damages = errors.iter().filter(|error| error.contains("damaged"));
-                let is_told = damages.all(|error| error.contains("that in its header 04030201"));
-                assert!(is_told, "{name}: {errors:?}");
+                let damages: Vec<_> = errors.iter().filter(|error| error.contains("damaged")).collect();
+                assert_eq!(!damages.is_empty(), is_damaged, "{name}: {errors:?}");
+                let is_named = damages.iter().all(|error| error.contains("that in its header 04030201"));
+                assert!(is_named, "{name}: {errors:?}");
             }
             checked += usize::from(has_checksum);
         }
@@ -160,6 +163,7 @@ fn damaged_chunks_of_a_file_without_an_index_are_left_out() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.mcap");
     let whole = std::fs::read(data("zstd.mcap")).unwrap();
+    let (wanted, _, _) = read(&[data("zstd.mcap")], &topic("/points"));
     for at in checksums(&whole) {
         let mut file = whole[..whole.len() - 1].to_vec();
         file[at] ^= 1;
@@ -168,7 +172,38 @@ fn damaged_chunks_of_a_file_without_an_index_are_left_out() {
         // A chunk without clouds is an error, too: where there is no index, its clouds may be what is damaged.
         let all = clouds.len() + errors.len();
         assert!(!errors.is_empty() && (4..=5).contains(&all), "{}: {errors:?}", clouds.len());
+        assert_same(&clouds, &wanted, all == 4);
     }
+}
+
+/// Checks that clouds are those of the same stamps of the whole file, with their names.
+fn assert_same(clouds: &[Cloud], whole: &[Cloud], have_names: bool) {
+    for (head, points) in clouds {
+        let (same, wanted) = whole.iter().find(|(same, _)| same.stamp_ns == head.stamp_ns).unwrap();
+        assert_eq!(format!("{points:?}"), format!("{wanted:?}"));
+        assert!(!have_names || head.name == same.name, "{} is {}", head.name, same.name);
+    }
+}
+
+/// The topic of a damaged chunk is known, and the number of its messages.
+#[test]
+fn a_file_without_an_index_whose_only_clouds_are_damaged_names_the_damage() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.mcap");
+    let mut file = std::fs::read(data("only_points.mcap")).unwrap();
+    let (clouds, _, _) = read(&[data("only_points.mcap")], &BagOptions::default());
+    file.pop();
+    let places = checksums(&file);
+    assert!(!places.is_empty() && !clouds.is_empty());
+    for at in places {
+        file[at..at + 4].copy_from_slice(&[1, 2, 3, 4]);
+    }
+    std::fs::write(&path, file).unwrap();
+    let source = open_bag(from_ref(&path), &BagOptions::default()).unwrap();
+    assert_eq!(source.len_hint(), Some(clouds.len() as u64));
+    let (found, errors, _) = read(&[path], &BagOptions::default());
+    assert_eq!((found.len(), errors.len()), (0, clouds.len()), "{errors:?}");
+    assert!(errors.iter().all(|error| error.contains("a chunk is damaged")), "{errors:?}");
 }
 
 /// Whatever a decoder gives out before it fails.

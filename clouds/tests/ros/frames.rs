@@ -120,3 +120,25 @@ fn frames_that_lead_nowhere_cost_each_cloud_nothing() {
     assert_eq!((clouds.len(), posed, errors.len()), (499, 499, 0));
     assert!(start.elapsed() < Duration::from_secs(8), "{:?}", start.elapsed());
 }
+
+#[test]
+fn clouds_of_many_frames_have_poses() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("sensors.bag");
+    let still = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0];
+    let tf = |at_ns, parent: &str, child: &str| MessageWriter::ros1().tf(at_ns, parent, child, &still);
+    let mut messages = vec![(1, 1, tf(1, "map", "base")), (1, 1, tf(10_000, "map", "base"))];
+    let fields = [("x", 0, F32), ("y", 4, F32), ("z", 8, F32)];
+    let point = [[1.0_f32, 1.0, 2.0].map(f32::to_le_bytes).concat()];
+    for k in 0..150 {
+        let sensor = format!("s{k}");
+        messages.push((2, 2, tf(0, "base", &sensor)));
+        messages.push((0, k + 3, MessageWriter::ros1().point_cloud2(k + 3, &sensor, &fields, &point)));
+    }
+    let tf = "tf2_msgs/TFMessage";
+    let topics = [("/points", "sensor_msgs/PointCloud2"), ("/tf", tf), ("/tf_static", tf)];
+    std::fs::write(&path, bag1(&topics, &messages)).unwrap();
+    let (clouds, _, remarks) = read(from_ref(&path), &BagOptions::default());
+    let posed = clouds.iter().filter(|(head, _)| head.world_from_sensor.is_some()).count();
+    assert_eq!((clouds.len(), posed), (150, 150), "{remarks:?}");
+}

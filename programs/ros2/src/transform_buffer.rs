@@ -7,7 +7,7 @@ use crate::parent_warnings::ParentWarnings;
 use crate::pose_watch::PoseWatch;
 use crate::stamp_check::{StampCheck, StampVerdict};
 use crate::transport::Gid;
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::time::{Duration, Instant};
 use voxtile_clouds::RigidPose;
 use voxtile_clouds::poses::most_gap_ns;
@@ -24,8 +24,8 @@ pub struct TransformBuffer {
     /// Samples since the last time that old ones were forgotten, and those left then.
     samples: (usize, usize),
     owners: FrameOwners,
-    /// Frames of clouds so far.
-    sensors: HashSet<String>,
+    /// Frames of clouds so far, each with the stamp of the last cloud that had a pose.
+    sensors: HashMap<String, Option<i64>>,
     parents: ParentWarnings,
     watch: PoseWatch,
     refused_at: Option<Instant>,
@@ -55,7 +55,7 @@ impl TransformBuffer {
             most_wait: args.transform_wait,
             samples: (0, 0),
             owners: FrameOwners::default(),
-            sensors: HashSet::new(),
+            sensors: HashMap::new(),
             parents: ParentWarnings::default(),
             watch: PoseWatch::default(),
             refused_at: None,
@@ -88,9 +88,9 @@ impl TransformBuffer {
         } else {
             let stamp_ns = pose.header.stamp_ns;
             match self.transforms.insert(parent, child, stamp_ns, pose.parent_from_child, is_static) {
-                Ok(false) => self.owners.note(bare(child), publisher),
+                Ok(false) => self.owners.note(bare(parent), bare(child), publisher, is_static),
                 Ok(true) => {
-                    self.owners.note(bare(child), publisher);
+                    self.owners.note(bare(parent), bare(child), publisher, is_static);
                     self.parents.check(&self.transforms, [parent, child].map(|of| bare(of)), publisher)
                 }
                 Err(why) => {
@@ -120,9 +120,14 @@ impl TransformBuffer {
     /// Forgets frames of who names most, so that there is room for others: those that lead from a sensor to the map stay.
     fn forget_frames(&mut self, counters: &mut Counters) {
         let fixed = self.fixed_frame.as_str();
-        let between = self.sensors.iter().map(|sensor| self.transforms.frames_between(fixed, sensor));
-        let needed: HashSet<String> = between.flatten().flatten().collect();
-        for child in self.owners.forget_some(&needed) {
+        let mut needed = HashSet::new();
+        for (sensor, stamp_ns) in &self.sensors {
+            needed.extend(self.transforms.frames_between(fixed, sensor).unwrap_or_default());
+            // These may be others, and a flood may lead to too many of those.
+            let last = stamp_ns.map(|stamp_ns| self.transforms.links_between(fixed, sensor, stamp_ns));
+            needed.extend(last.and_then(Result::ok).into_iter().flatten().flatten());
+        }
+        for child in self.owners.forget_some(&needed, fixed) {
             self.transforms.detach(&child);
             self.stamps.forget(&child);
             counters.transforms_refused += 1;
@@ -150,11 +155,14 @@ impl TransformBuffer {
 
     /// Whether a cloud has its pose, may still get it, or never will.
     pub fn verdict(&mut self, cloud: &Cloud, now: Instant) -> Verdict<RigidPose> {
-        if !self.sensors.contains(bare(&cloud.frame)) && self.sensors.len() < MAX_SENSORS {
-            self.sensors.insert(bare(&cloud.frame).to_owned());
+        if !self.sensors.contains_key(bare(&cloud.frame)) && self.sensors.len() < MAX_SENSORS {
+            self.sensors.insert(bare(&cloud.frame).to_owned(), None);
         }
         let why = match cloud.pose.map_or_else(|| self.find(cloud), Ok) {
             Ok(pose) => {
+                if let Some(stamp_ns) = self.sensors.get_mut(bare(&cloud.frame)) {
+                    *stamp_ns = Some(cloud.stamp_ns);
+                }
                 self.watch.found(cloud.topic);
                 return Verdict::Ready(pose);
             }
@@ -399,6 +407,30 @@ mod tests {
             assert!(matches!(found, Verdict::Ready(pose) if pose.position_m[0] == 3.0), "{found:?}");
             assert!(buffer.transforms.frames() <= MOST_FRAMES);
         }
+    }
+
+    /// The frames of the last pose are kept, however many others lead from the sensor to the map.
+    #[test]
+    fn a_flood_above_the_sensor_costs_no_pose() {
+        const S: i64 = 1_000_000_000;
+        let [flood, robot] = [1, 2].map(|k| Some(Gid([k; 16])));
+        let (mut buffer, mut counters, start) = (buffer(), Counters::default(), Instant::now());
+        let mut put = |buffer: &mut TransformBuffer, pose: &StampedPose, is_static, publisher| {
+            buffer.insert(pose, is_static, publisher, start, &mut queue(), &mut counters);
+        };
+        put(&mut buffer, &pose("base", "lidar", 0, 1.0), true, robot);
+        put(&mut buffer, &pose("odom", "base", 0, 1.0), true, robot);
+        for stamp_ns in [0, S] {
+            put(&mut buffer, &pose("map", "odom", stamp_ns, 1.0), false, robot);
+        }
+        assert!(matches!(buffer.verdict(&cloud(S / 2), start), Verdict::Ready(_)));
+        put(&mut buffer, &pose("g0", "lidar", 0, 0.0), false, flood);
+        for k in 0..3 * MOST_FRAMES {
+            put(&mut buffer, &pose("map", &format!("g{k}"), 0, 0.0), false, flood);
+            put(&mut buffer, &pose(&format!("g{}", k + 1), &format!("g{k}"), 0, 0.0), false, flood);
+        }
+        let found = buffer.verdict(&cloud(S / 2), start);
+        assert!(matches!(found, Verdict::Ready(pose) if pose.position_m[0] == 3.0), "{found:?}");
     }
 
     #[test]

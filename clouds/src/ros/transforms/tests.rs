@@ -322,7 +322,9 @@ fn frames_that_do_not_lead_to_the_map_cost_a_cloud_nothing() {
     let mut names: Vec<&str> = between.iter().map(String::as_str).collect();
     names.sort_unstable();
     assert_eq!(names, ["base", "lidar", "map", "odom"]);
-    assert_eq!(tf.lookup_among("map", "lidar", MIDDLE, Some(&between)), Ok(wanted));
+    let among = tf.search_frames("map", "lidar").unwrap();
+    assert!(among.above.is_none());
+    assert_eq!(tf.lookup_among("map", "lidar", MIDDLE, Some(&among)), Ok(wanted));
     assert_eq!(tf.frames_between("a2000", "lidar"), Err(WhyNot::TooManyFrames("lidar".into())));
     // The sensor above the map, and both below another frame.
     for (target, source) in [("lidar", "map"), ("side", "lidar")] {
@@ -330,9 +332,37 @@ fn frames_that_do_not_lead_to_the_map_cost_a_cloud_nothing() {
         tf.detach("b3000");
         tf.detach("a0");
         tf.detach("b0");
-        let between = tf.frames_between(target, source).unwrap();
-        let found = tf.lookup_among(target, source, MIDDLE, Some(&between));
+        let among = tf.search_frames(target, source).unwrap();
+        let found = tf.lookup_among(target, source, MIDDLE, Some(&among));
         assert_eq!((found.is_ok(), found), (true, tf.lookup(target, source, MIDDLE)));
+    }
+}
+
+/// An upward path at some time hides no common ancestor at other times.
+#[test]
+fn a_common_ancestor_gives_poses_before_the_map_frame_is_a_parent() {
+    let mut tf = Transforms::default();
+    fixed(&mut tf, "base", "lidar", at(0.2));
+    fixed(&mut tf, "world", "map", at(5.0));
+    let moves: Vec<i64> = (0..=60).map(|k| k * S).collect();
+    moving(&mut tf, "world", "base", &moves, 1.0);
+    let wanted = tf.lookup("map", "lidar", 30 * S).unwrap();
+    for stamps in [vec![30 * S], vec![61 * S, 62 * S, 63 * S]] {
+        let mut tf = tf.clone();
+        moving(&mut tf, "map", "base", &stamps, 2.0);
+        let among = tf.search_frames("map", "lidar").unwrap();
+        assert!(!among.between.contains("world"));
+        for stamp_ns in [S, 30 * S, 59 * S + 7] {
+            let found = tf.lookup_among("map", "lidar", stamp_ns, Some(&among));
+            assert_eq!(
+                (found.clone(), found),
+                (Ok(wanted), tf.lookup("map", "lidar", stamp_ns)),
+                "{stamps:?}"
+            );
+        }
+        let found = tf.lookup_among("map", "lidar", 62 * S, Some(&among));
+        assert_eq!(found.is_ok(), stamps.len() > 1, "{found:?}");
+        assert_eq!(found, tf.lookup("map", "lidar", 62 * S));
     }
 }
 
