@@ -122,7 +122,7 @@ impl Map {
     fn at_points<'py, T: Element + Send>(
         &self,
         points: &Bound<'py, PyAny>,
-        ask: impl Fn(&Source, &Stop, PointSlice<'_>) -> Result<Vec<T>> + Send,
+        mut ask: impl FnMut(&Source, &Stop, PointSlice<'_>) -> Result<Vec<T>> + Send,
     ) -> PyResult<Bound<'py, PyArray1<T>>> {
         let py = points.py();
         let points = Points::of("points", points)?;
