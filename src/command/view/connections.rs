@@ -8,10 +8,12 @@ use tokio::sync::Notify;
 
 /// Connections of all clients at once.
 const MAX_CONNECTIONS: usize = 512;
-/// Those of one client. A further one takes the place of the one that has been idle longest.
+/// Those of one client. A further one takes the place of the one without progress for longest.
 const MAX_OF_CLIENT: usize = 256;
 /// Streams of events of one client. A further one takes the place of the oldest: a browser asks again.
 const MAX_EVENTS_OF_CLIENT: usize = 32;
+/// One without progress for less is not idle: its request may be on its way.
+const IDLE: Duration = Duration::from_secs(1);
 /// Where memory for answers is short, those that take nothing for so long are closed.
 const STALLED: Duration = Duration::from_secs(5);
 
@@ -68,19 +70,20 @@ impl Connections {
         Self { open: Arc::default(), since: Instant::now() }
     }
 
-    /// A place for another connection. Where there are too many, one that is idle ends for it; `None` if all of the
-    /// client's are waiting for answers.
-    pub fn enter(&self, client: Client) -> Option<Connection> {
+    /// A place for another connection. Where there are too many, one ends for it: the client's own, or else one of the
+    /// client with most.
+    pub fn enter(&self, client: Client) -> Connection {
         let mut open = self.open.lock();
-        let of_client = open.of.get(&client).map_or(0, BTreeMap::len);
-        if of_client >= MAX_OF_CLIENT {
-            let idle = open.least_active(client).filter(|(_, state)| !state.is_busy());
-            let (number, _) = idle?;
-            open.end(client, number);
-        } else if open.count >= MAX_CONNECTIONS {
-            let largest = open.of.iter().max_by_key(|(_, of)| of.len()).map(|(client, _)| *client)?;
-            let (number, _) = open.least_active(largest)?;
-            open.end(largest, number);
+        let largest = || open.of.iter().max_by_key(|(_, of)| of.len()).map(|(client, _)| *client);
+        let gives = match open.of.get(&client).map_or(0, BTreeMap::len) {
+            MAX_OF_CLIENT.. => Some(client),
+            _ if open.count >= MAX_CONNECTIONS => largest(),
+            _ => None,
+        };
+        if let Some(gives) = gives
+            && let Some(number) = open.least_active(gives, self.now_ms())
+        {
+            open.end(gives, number);
         }
         open.last += 1;
         open.count += 1;
@@ -89,7 +92,7 @@ impl Connections {
         drop(open);
         let connection = Connection { connections: self.clone(), client, number, state };
         connection.note_progress();
-        Some(connection)
+        connection
     }
 
     fn now_ms(&self) -> u64 {
@@ -98,8 +101,10 @@ impl Connections {
 }
 
 impl State {
-    fn is_busy(&self) -> bool {
-        self.is_busy.load(Ordering::Relaxed)
+    /// Whether nothing was read or written for some time, although no answer is being computed.
+    fn is_stalled(&self, now_ms: u64, time: Duration) -> bool {
+        let since = Duration::from_millis(now_ms.saturating_sub(self.progress_ms()));
+        since >= time && !self.is_busy.load(Ordering::Relaxed)
     }
 
     fn progress_ms(&self) -> u64 {
@@ -108,13 +113,13 @@ impl State {
 }
 
 impl Open {
-    /// The connection of a client whose end matters least: the one without progress for longest, of those that wait
-    /// for no answer if there are any.
-    fn least_active(&self, client: Client) -> Option<(u64, Arc<State>)> {
+    /// The connection of a client whose end matters least: the one without progress for longest, of those that are idle
+    /// if there are any.
+    fn least_active(&self, client: Client, now_ms: u64) -> Option<u64> {
         let of_client = self.of.get(&client)?.iter();
-        let least =
-            of_client.min_by_key(|(number, state)| (state.is_busy(), state.progress_ms(), **number))?;
-        Some((*least.0, least.1.clone()))
+        let least = of_client
+            .min_by_key(|(number, state)| (!state.is_stalled(now_ms, IDLE), state.progress_ms(), **number));
+        least.map(|(number, _)| *number)
     }
 
     fn end(&mut self, client: Client, number: u64) {
@@ -168,12 +173,9 @@ impl Connection {
     pub fn end_stalled(&self) {
         let now_ms = self.connections.now_ms();
         let mut open = self.connections.open.lock();
-        let is_stalled = |state: &State| {
-            Duration::from_millis(now_ms.saturating_sub(state.progress_ms())) >= STALLED && !state.is_busy()
-        };
         let of_client = open.of.get(&self.client).into_iter().flatten();
-        let stalled: Vec<u64> =
-            of_client.filter(|(_, state)| is_stalled(state)).map(|(number, _)| *number).collect();
+        let stalled = of_client.filter(|(_, state)| state.is_stalled(now_ms, STALLED));
+        let stalled: Vec<u64> = stalled.map(|(number, _)| *number).collect();
         stalled.into_iter().for_each(|number| open.end(self.client, number));
     }
 
@@ -202,21 +204,27 @@ mod tests {
         open.of.get(&connection.client).is_some_and(|of| of.contains_key(&connection.number))
     }
 
+    /// Connections that were opened ten seconds ago.
+    fn long_ago() -> Connections {
+        let since = Instant::now().checked_sub(Duration::from_secs(10)).unwrap();
+        Connections { since, ..Connections::new() }
+    }
+
     fn set_progress(connection: &Connection, ms: u64) {
         connection.state.progress_ms.store(ms, Ordering::Relaxed);
     }
 
     #[test]
     fn a_client_with_too_many_connections_loses_its_own_idle_ones() {
-        let connections = Connections::new();
-        let other = connections.enter(client(2)).unwrap();
-        let of_client: Vec<_> = (0..MAX_OF_CLIENT).map(|_| connections.enter(client(1)).unwrap()).collect();
+        let connections = long_ago();
+        let other = connections.enter(client(2));
+        let of_client: Vec<_> = (0..MAX_OF_CLIENT).map(|_| connections.enter(client(1))).collect();
         of_client.iter().for_each(|connection| set_progress(connection, 1000));
         set_progress(&other, 0);
         set_progress(&of_client[7], 10);
         set_progress(&of_client[9], 5);
         of_client[9].set_busy(true);
-        let next = connections.enter(client(1)).unwrap();
+        let next = connections.enter(client(1));
         let closed: Vec<_> = (0..MAX_OF_CLIENT).filter(|&k| !is_open(&of_client[k])).collect();
         assert_eq!(closed, [7]);
         assert!(is_open(&other) && is_open(&next));
@@ -226,22 +234,27 @@ mod tests {
     }
 
     #[test]
-    fn a_client_whose_connections_all_wait_for_answers_gets_no_further_one() {
-        let connections = Connections::new();
-        let busy: Vec<_> = (0..MAX_OF_CLIENT).map(|_| connections.enter(client(1)).unwrap()).collect();
-        busy.iter().for_each(|connection| connection.set_busy(true));
-        assert!(connections.enter(client(1)).is_none());
-        assert!(connections.enter(client(2)).is_some());
+    fn a_client_whose_connections_all_wait_for_answers_loses_the_oldest() {
+        let connections = long_ago();
+        let busy: Vec<_> = (0..MAX_OF_CLIENT).map(|_| connections.enter(client(1))).collect();
+        for (number, connection) in busy.iter().enumerate() {
+            connection.set_busy(true);
+            set_progress(connection, 1000 + number as u64);
+        }
+        // One whose request has not been read yet is no idle one.
+        let (next, one_more) = (connections.enter(client(1)), connections.enter(client(1)));
+        assert!(is_open(&next) && is_open(&one_more));
+        assert!(!is_open(&busy[0]) && !is_open(&busy[1]) && busy[2..].iter().all(is_open));
     }
 
     #[test]
     fn where_all_places_are_taken_the_client_with_most_gives_one() {
         let connections = Connections::new();
-        let most: Vec<_> = (0..MAX_OF_CLIENT).map(|_| connections.enter(client(1)).unwrap()).collect();
+        let most: Vec<_> = (0..MAX_OF_CLIENT).map(|_| connections.enter(client(1))).collect();
         let others: Vec<_> = (0..MAX_CONNECTIONS - MAX_OF_CLIENT)
-            .map(|number| connections.enter(client(2 + (number % 200) as u8)).unwrap())
+            .map(|number| connections.enter(client(2 + (number % 200) as u8)))
             .collect();
-        let next = connections.enter(client(250)).unwrap();
+        let next = connections.enter(client(250));
         assert_eq!(most.iter().filter(|connection| !is_open(connection)).count(), 1);
         assert!(is_open(&next) && others.iter().all(is_open));
         assert_eq!(connections.open.lock().count, MAX_CONNECTIONS);
@@ -250,10 +263,10 @@ mod tests {
     #[test]
     fn the_oldest_stream_of_events_ends_for_another_one() {
         let connections = Connections::new();
-        let plain = connections.enter(client(1)).unwrap();
+        let plain = connections.enter(client(1));
         let streams: Vec<_> = (0..=MAX_EVENTS_OF_CLIENT)
             .map(|_| {
-                let connection = connections.enter(client(1)).unwrap();
+                let connection = connections.enter(client(1));
                 connection.begin_events();
                 connection
             })

@@ -92,11 +92,7 @@ impl Server {
                     continue;
                 }
             };
-            let Some(connection) = connections.enter(Client::of(address.ip())) else {
-                log::debug!("{address}: has too many connections");
-                continue;
-            };
-            let connection = Arc::new(connection);
+            let connection = Arc::new(connections.enter(Client::of(address.ip())));
             let mut stream = TimeoutStream::new(stream);
             stream.set_write_timeout(Some(PATIENCE));
             let stream = ClientStream::new(Box::pin(stream), connection.clone());
