@@ -9,7 +9,7 @@ use numpy::{PyArray1, PyArray2};
 use parking_lot::Mutex;
 use pyo3::prelude::*;
 use voxtile::local::{LocalParameters, LocalReader, LocalState, Obstacle};
-use voxtile::{Point, Queries, Result, UnknownAs};
+use voxtile::{Point, Queries, Result, Stop, UnknownAs};
 
 /// Points that take less time than anybody waits for Ctrl-C.
 const FEW: usize = 1 << 14;
@@ -88,14 +88,16 @@ impl LocalMap {
             LocalState::Inflated => 1,
             LocalState::Occupied => 2,
         };
-        let states = at_once(py, |_| {
+        let ask = |stop: &Stop| {
             let mut states = Vec::with_capacity(slice.len());
             slice.in_chunks(FEW, |chunk| {
+                stop.check()?;
                 states.extend(chunk.iter().map(code));
                 Ok::<(), voxtile::Error>(())
             })?;
             Ok(states)
-        })?;
+        };
+        let states = if slice.len() <= FEW { at_once(py, ask)? } else { watched(py, ask)? };
         Ok(column(py, states))
     }
 

@@ -9,7 +9,7 @@ use crate::scan::GivenScan;
 use crate::scan_iterator::ScanIterator;
 use crate::source::Source;
 use crate::tile_iterator::TileIterator;
-use crate::watched::{at_once, finished, watched};
+use crate::watched::{at_once, briefly, finished, watched};
 use numpy::{Element, PyArray1, PyArray2};
 use parking_lot::RwLock;
 use pyo3::prelude::*;
@@ -23,7 +23,7 @@ use voxtile::{
     ScanReport, SnapshotName, Stop, TileIndex, UnknownAs,
 };
 
-/// Questions and points that take less time than anybody waits for Ctrl-C. They are worth no thread of their own.
+/// So few questions, or points to insert, take a thread of their own only if they take long.
 const FEW: usize = 128;
 
 /// Most scans that are handed to the mapper together.
@@ -122,7 +122,7 @@ impl Map {
     fn at_points<'py, T: Element + Send>(
         &self,
         points: &Bound<'py, PyAny>,
-        ask: impl FnOnce(&Source, &Stop, PointSlice<'_>) -> Result<Vec<T>> + Send,
+        mut ask: impl FnMut(&Source, &Stop, PointSlice<'_>) -> Result<Vec<T>> + Send,
     ) -> PyResult<Bound<'py, PyArray1<T>>> {
         let py = points.py();
         let points = Points::of("points", points)?;
@@ -136,11 +136,17 @@ impl Map {
         &self,
         py: Python<'_>,
         questions: usize,
-        ask: impl FnOnce(&Source, &Stop) -> Result<T> + Send,
+        mut ask: impl FnMut(&Source, &Stop) -> Result<T> + Send,
     ) -> PyResult<T> {
         let source = self.source(py)?;
-        let work = |stop: &Stop| ask(&source, stop);
-        if questions <= FEW && source.is_free() { at_once(py, work) } else { watched(py, work) }
+        let mut work = |stop: &Stop| ask(&source, stop);
+        if questions <= FEW
+            && source.is_free()
+            && let Some(answer) = briefly(py, &mut work)?
+        {
+            return Ok(answer);
+        }
+        watched(py, work)
     }
 }
 
@@ -455,11 +461,9 @@ impl Map {
             let reason = format!("has {} points for {} directions", origins.len(), directions.len());
             return Err(wrong(py, "origins", reason));
         }
-        let hits = self.ask(py, directions.len(), |source, stop| {
-            let ray = |(origin, direction)| RayQuery { origin, direction, max_range_m: max_range, unknown };
-            let rays: Vec<RayQuery> = origins.into_iter().zip(directions).map(ray).collect();
-            questions::rays(source, stop, &rays)
-        })?;
+        let ray = |(origin, direction)| RayQuery { origin, direction, max_range_m: max_range, unknown };
+        let rays: Vec<RayQuery> = origins.into_iter().zip(directions).map(ray).collect();
+        let hits = self.ask(py, rays.len(), |source, stop| questions::rays(source, stop, &rays))?;
         let distances = hits.iter().map(|hit| hit.map_or(f64::INFINITY, |hit| hit.distance_m)).collect();
         let voxels = hits.iter().map(|hit| hit.map_or([i32::MIN; 3], |hit| hit.voxel)).collect();
         Ok((column(py, distances), rows(py, voxels)?))

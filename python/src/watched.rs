@@ -9,7 +9,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::thread;
 use std::time::{Duration, Instant};
-use voxtile::{Result, Stop};
+use voxtile::{Error, Result, Stop};
 
 /// How often signals are looked for.
 const BETWEEN_LOOKS: Duration = Duration::from_millis(50);
@@ -151,6 +151,15 @@ pub fn wait_for_all(py: Python<'_>) -> PyResult<()> {
 /// Short work on this thread: it takes less time than anybody would wait for Ctrl-C.
 pub fn at_once<T: Send>(py: Python<'_>, work: impl FnOnce(&Stop) -> Result<T> + Send) -> PyResult<T> {
     py.detach(|| work(&Stop::default())).map_err(|error| exception(py, &error))
+}
+
+/// Asks on this thread, which is cheaper than one of its own; `None` if that takes longer than [`BETWEEN_LOOKS`], for
+/// then somebody may wait for Ctrl-C.
+pub fn briefly<T: Send>(py: Python<'_>, ask: impl FnOnce(&Stop) -> Result<T> + Send) -> PyResult<Option<T>> {
+    match py.detach(|| ask(&Stop::after(BETWEEN_LOOKS))) {
+        Err(Error::Stopped) => Ok(None),
+        answer => answer.map(Some).map_err(|error| exception(py, &error)),
+    }
 }
 
 /// [`watched`] for work that says how far it is. A callback that raises ends the work, and so does Ctrl-C.

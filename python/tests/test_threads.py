@@ -328,3 +328,38 @@ def test_memory_of_many_maps_is_flat(tmp_path: Path) -> None:
         if number >= rounds // 3:
             sizes.append(resident())
     assert max(sizes) - sizes[0] < 16 << 20, sizes
+
+
+def test_ctrl_c_ends_a_few_questions_that_take_long(tmp_path: Path) -> None:
+    script = """
+        import sys
+        import numpy as np
+        import voxtile
+        with voxtile.Map.create(sys.argv[1], 0.1, tile_size=1.0, max_range=40.0) as found:
+            # Free space alone: the nearest voxel is looked for in every tile.
+            angles = np.linspace(0, 2 * np.pi, 2000)
+            ends = 50 * np.stack([np.cos(angles), np.sin(angles), np.zeros(2000)], axis=1)
+            found.insert(ends, np.eye(4))
+            print("begun", flush=True)
+            try:
+                found.nearest(np.zeros((128, 3)), max_distance=np.inf)
+                print("answered before", flush=True)
+            except KeyboardInterrupt:
+                print("interrupted", flush=True)
+        """
+    line, took = interrupted(script, tmp_path / "map")
+    assert line == "interrupted" and took < 1
+
+
+def test_rays_through_empty_space_are_short_work(tmp_path: Path) -> None:
+    with voxtile.Map.create(tmp_path / "map", 0.5, tile_size=10.0) as found:
+        far = np.eye(4)
+        far[:3, 3] = [4e8, 1e8, -3e7]
+        for pose in [np.eye(4), far]:
+            found.insert([[6.0, 0.0, 0.0]], pose)
+        began = time.monotonic()
+        directions = np.random.default_rng(1).normal(size=(100, 3))
+        directions[0] = [4e8 + 6.25, 1e8 + 0.25, -3e7 + 0.25]
+        distances, _ = found.cast_rays([0.0, 0.0, 0.0], directions)
+        assert time.monotonic() - began < 2
+        assert abs(distances[0] / np.linalg.norm(directions[0]) - 1) < 1e-6

@@ -90,6 +90,10 @@ impl MapView for AnyMap {
         whichever!(self, has_tile(index))
     }
 
+    fn empty_around(&self, index: TileIndex) -> Option<TileBox> {
+        whichever!(self, empty_around(index))
+    }
+
     fn cached_tile_indices(&self) -> Vec<TileIndex> {
         whichever!(self, cached_tile_indices())
     }

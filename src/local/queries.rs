@@ -27,8 +27,8 @@ impl OccupiedSet for LocalObstacles<'_> {
         self.view.empty_around(voxel)
     }
 
-    fn hull(&self) -> Option<VoxelBox> {
-        self.view.hull()
+    fn cells(&self) -> impl Iterator<Item = VoxelBox> {
+        self.view.cells_of_pages()
     }
 
     fn visit_in(&self, voxels: &VoxelBox, visit: &mut dyn FnMut(VoxelIndex) -> bool) {
@@ -50,8 +50,8 @@ impl OccupiedSet for LocalView {
         self.empty_around(voxel)
     }
 
-    fn hull(&self) -> Option<VoxelBox> {
-        self.hull()
+    fn cells(&self) -> impl Iterator<Item = VoxelBox> {
+        self.cells_of_pages()
     }
 
     fn visit_in(&self, voxels: &VoxelBox, visit: &mut dyn FnMut(VoxelIndex) -> bool) {
@@ -79,15 +79,11 @@ impl LocalView {
         if node.block(place(2)).is_none() { cell(2) } else { None }
     }
 
-    /// A box around all voxels.
-    fn hull(&self) -> Option<VoxelBox> {
-        let pages = self.pages.keys().map(|page| {
+    /// The voxels of each page.
+    fn cells_of_pages(&self) -> impl Iterator<Item = VoxelBox> {
+        self.pages.keys().map(|page| {
             let min = page.map(|k| k << 6);
             VoxelBox { min, end: min.map(|k| k.saturating_add(1 << 6)) }
-        });
-        pages.reduce(|a, b| VoxelBox {
-            min: std::array::from_fn(|k| a.min[k].min(b.min[k])),
-            end: std::array::from_fn(|k| a.end[k].max(b.end[k])),
         })
     }
 

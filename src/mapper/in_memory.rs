@@ -79,7 +79,11 @@ impl MapView for InMemoryMapper {
     }
 
     fn tile_bounds(&self) -> Option<TileBox> {
-        self.tiles.bounds()
+        self.tiles.space().bounds()
+    }
+
+    fn empty_around(&self, index: TileIndex) -> Option<TileBox> {
+        self.tiles.space().empty_around(index)
     }
 
     fn has_tile(&self, index: TileIndex) -> bool {

@@ -7,7 +7,7 @@ use crate::persistence::config_from;
 use crate::persistence::load::{self, ReadTable};
 use crate::persistence::one_voxel::read_voxel;
 use crate::sensor::Evidence;
-use crate::space::{TileBox, TileIndex, VoxelIndex};
+use crate::space::{TileBox, TileIndex, TileSpace, VoxelIndex};
 use crate::store::{
     CatalogEntry, Disk, KeptRecords, MapPath, Metadata, ScanRecord, SnapshotName, TileFile, TileStore,
     TileVersion, read_scans,
@@ -28,8 +28,8 @@ pub struct MapReader {
     config: MapConfig,
     octrees: OctreeFactory,
     store: TileStore,
-    /// Around all tiles that this reader sees.
-    bounds: Option<TileBox>,
+    /// Where the tiles are that this reader sees.
+    space: TileSpace,
     disk: Arc<dyn Disk>,
     /// The tiles in order, once a disk wants to know which come next.
     order: OnceLock<Vec<TileIndex>>,
@@ -141,8 +141,8 @@ impl MapReader {
     fn of_store(store: TileStore, disk: Arc<dyn Disk>, memory: MemoryLimit) -> Result<Self> {
         let config = config_of_store(&store, memory)?;
         let octrees = OctreeFactory::default();
-        let bounds = TileBox::of(store.tiles());
-        Ok(Self { config, octrees, store, bounds, disk, order: OnceLock::new(), cache: Mutex::default() })
+        let space = store.tiles().collect();
+        Ok(Self { config, octrees, store, space, disk, order: OnceLock::new(), cache: Mutex::default() })
     }
 
     /// Goes on to the last flush; whether there is a newer one than the one seen so far. Tiles in memory that have not
@@ -178,7 +178,7 @@ impl MapReader {
                 cache.remove(index);
             }
         }
-        self.bounds = TileBox::of(store.tiles());
+        self.space = store.tiles().collect();
         (self.store, self.config, self.disk, self.order) = (store, config, disk, OnceLock::new());
         Ok(is_newer)
     }
@@ -388,7 +388,11 @@ impl MapView for MapReader {
     }
 
     fn tile_bounds(&self) -> Option<TileBox> {
-        self.bounds
+        self.space.bounds()
+    }
+
+    fn empty_around(&self, index: TileIndex) -> Option<TileBox> {
+        self.space.empty_around(index)
     }
 
     fn has_tile(&self, index: TileIndex) -> bool {

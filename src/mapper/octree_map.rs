@@ -3,7 +3,7 @@ use crate::config::MapConfig;
 use crate::error::{Error, Result};
 use crate::octree::{Leaf, Octree, OctreeFile, OctreeFormat};
 use crate::sensor::Evidence;
-use crate::space::{BRICK_EDGE, BrickCode, MortonCode, TileBox, TileIndex, VoxelBox, VoxelIndex};
+use crate::space::{BRICK_EDGE, BrickCode, MortonCode, TileBox, TileIndex, TileSpace, VoxelBox, VoxelIndex};
 use crate::store::{Disk, FsDisk};
 use crate::tile::{Table, Tile};
 use lru::LruCache;
@@ -41,6 +41,7 @@ pub struct OctreeMap {
     id: String,
     /// In order.
     tiles: Vec<TileIndex>,
+    space: TileSpace,
     cache: Mutex<TileCache>,
 }
 
@@ -77,7 +78,8 @@ impl OctreeMap {
         let edge = (TILE_SIZE_M / resolution_m).round().clamp(2.0, MOST_TILE_EDGE);
         let config = MapConfig::new(resolution_m, edge * resolution_m)?;
         let tiles = tiles_of(&config, &tree)?;
-        Ok(Self { config, tree, format, id, tiles, cache: Mutex::default() })
+        let space = tiles.iter().copied().collect();
+        Ok(Self { config, tree, format, id, tiles, space, cache: Mutex::default() })
     }
 
     /// Which of OctoMap's formats the file has.
@@ -226,7 +228,11 @@ impl MapView for OctreeMap {
     }
 
     fn tile_bounds(&self) -> Option<TileBox> {
-        TileBox::of(self.tiles.iter().copied())
+        self.space.bounds()
+    }
+
+    fn empty_around(&self, index: TileIndex) -> Option<TileBox> {
+        self.space.empty_around(index)
     }
 
     fn has_tile(&self, index: TileIndex) -> bool {

@@ -471,7 +471,11 @@ impl MapView for OutOfCoreTileMapper {
     }
 
     fn tile_bounds(&self) -> Option<TileBox> {
-        self.pager().bounds()
+        self.pager().space().bounds()
+    }
+
+    fn empty_around(&self, index: TileIndex) -> Option<TileBox> {
+        self.pager().space().empty_around(index)
     }
 
     fn has_tile(&self, index: TileIndex) -> bool {

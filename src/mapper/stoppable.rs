@@ -43,6 +43,10 @@ impl<V: MapView + ?Sized> MapView for Stoppable<'_, V> {
         self.view.has_tile(index)
     }
 
+    fn empty_around(&self, index: TileIndex) -> Option<TileBox> {
+        self.view.empty_around(index)
+    }
+
     fn cached_tile_indices(&self) -> Vec<TileIndex> {
         self.view.cached_tile_indices()
     }

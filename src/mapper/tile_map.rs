@@ -1,4 +1,4 @@
-use crate::space::{Grid, TileBox, TileIndex, Torus};
+use crate::space::{Grid, TileIndex, TileSpace, Torus};
 use crate::tile::{OctreeFactory, Tile};
 
 /// The tiles of a map that lives in memory.
@@ -8,8 +8,8 @@ pub(super) struct TileMap {
     tiles: Vec<Tile>,
     /// The number of each, from 1.
     directory: Torus,
-    /// Around all tiles.
-    bounds: Option<TileBox>,
+    /// Where they are.
+    space: TileSpace,
     /// In place of a tile that is not there.
     nothing: Tile,
 }
@@ -17,7 +17,7 @@ pub(super) struct TileMap {
 impl TileMap {
     pub(super) fn new(grid: &Grid) -> Self {
         let nothing = Tile::empty(grid, &OctreeFactory::default(), TileIndex::default());
-        Self { tiles: Vec::new(), directory: Torus::default(), bounds: None, nothing }
+        Self { tiles: Vec::new(), directory: Torus::default(), space: TileSpace::default(), nothing }
     }
 
     #[inline]
@@ -36,17 +36,16 @@ impl TileMap {
         let mut number = self.directory.get(index.to_array());
         if number == Torus::NONE {
             self.tiles.push(Tile::empty(grid, octrees, index));
-            let own = TileBox::new(index, index);
-            self.bounds = Some(self.bounds.map_or(own, |bounds| bounds.union(own)));
+            self.space.insert(index);
             number = self.tiles.len() as u32;
             self.directory.insert(index.to_array(), number);
         }
         number as usize - 1
     }
 
-    /// The smallest box around all tiles; `None` if there are none.
-    pub(super) fn bounds(&self) -> Option<TileBox> {
-        self.bounds
+    /// Where the tiles are.
+    pub(super) fn space(&self) -> &TileSpace {
+        &self.space
     }
 
     /// The tiles.

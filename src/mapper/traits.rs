@@ -28,6 +28,14 @@ pub trait MapView: Sync {
     /// Whether something was observed in a tile. Its cost does not depend on the number of tiles.
     fn has_tile(&self, index: TileIndex) -> bool;
 
+    /// A box of tiles around this one in which nothing was observed, where the map knows one. Its cost does not depend
+    /// on the number of tiles.
+    #[doc(hidden)]
+    fn empty_around(&self, index: TileIndex) -> Option<TileBox> {
+        let _ = index;
+        None
+    }
+
     /// The tiles held in memory, ordered likewise.
     fn cached_tile_indices(&self) -> Vec<TileIndex>;
 

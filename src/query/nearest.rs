@@ -1,5 +1,5 @@
 use super::nearest_in_brick::Nearest;
-use super::region::{BrickPart, tiles_in, voxels_around};
+use super::region::{BrickPart, tiles_of_list_in, voxels_around};
 use super::{Hit, Occupancy};
 use crate::error::{Error, Result};
 use crate::mapper::MapView;
@@ -22,12 +22,13 @@ pub(super) fn nearest_occupied<V: MapView + ?Sized>(
     let Some(tiles) = view.tile_bounds() else { return Ok(None) };
     let max_distance_m = max_distance_m.min(distance_to_farthest_m(grid, &tiles, point));
     let radii_m = std::iter::successors(Some(FIRST_BRICKS * brick_m), |radius_m| Some(2.0 * radius_m));
+    let mut all_tiles = None;
     for radius_m in radii_m.take_while(|radius_m| *radius_m < max_distance_m) {
-        if let Some(nearest) = nearest_in_ball(view, point, radius_m)? {
+        if let Some(nearest) = nearest_in_ball(view, point, radius_m, &mut all_tiles)? {
             return Ok(Some(nearest));
         }
     }
-    nearest_in_ball(view, point, max_distance_m)
+    nearest_in_ball(view, point, max_distance_m, &mut all_tiles)
 }
 
 /// A distance within which all voxels of a box of tiles are.
@@ -52,11 +53,17 @@ pub(super) fn check(point: Point, max_distance_m: f64) -> Result<()> {
     Err(Error::argument("nearest occupied", "needs a finite point and a distance of at least 0 m"))
 }
 
-fn nearest_in_ball<V: MapView + ?Sized>(view: &V, point: Point, max_distance_m: f64) -> Result<Option<Hit>> {
+fn nearest_in_ball<V: MapView + ?Sized>(
+    view: &V,
+    point: Point,
+    max_distance_m: f64,
+    all_tiles: &mut Option<Vec<TileIndex>>,
+) -> Result<Option<Hit>> {
     let config = view.config();
     let (grid, threshold) = (config.grid, config.occupied_log_odds());
     let ball = |radius_m: f64| Aabb { min: point.map(|c| c - radius_m), max: point.map(|c| c + radius_m) };
-    let mut tiles: Vec<(f64, TileIndex)> = tiles_in(view, &voxels_around(&grid, &ball(max_distance_m)))
+    let around = voxels_around(&grid, &ball(max_distance_m));
+    let mut tiles: Vec<(f64, TileIndex)> = tiles_of_list_in(view, &around, all_tiles)
         .into_iter()
         .map(|index| (distance_to_voxels_m(&grid, &grid.voxels_of_tile(index), point), index))
         .collect();

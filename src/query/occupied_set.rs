@@ -1,10 +1,11 @@
 //! Queries of sets of voxels that are occupied, of which all others are unknown: local maps and layers.
 
 use super::collision::first_not_free;
-use super::ray::{Met, voxel_by_voxel, walk_ray, walk_segment};
+use super::ray::{Met, walk_ray, walk_segment};
 use super::region::voxels_around;
 use super::{Hit, Occupancy, RayQuery, Shape, UnknownAs, VoxelOccupancy};
 use crate::error::{Error, Result};
+use crate::scan::RayWalk;
 use crate::space::{Aabb, Grid, Point, VoxelBox, VoxelIndex};
 
 /// Probability of a voxel that is known to be occupied, and nothing more.
@@ -19,8 +20,8 @@ pub(crate) trait OccupiedSet: Sync {
     /// A box around a voxel in which there are none; `None` if it is not known of one.
     fn empty_around(&self, voxel: VoxelIndex) -> Option<VoxelBox>;
 
-    /// A box around all of them.
-    fn hull(&self) -> Option<VoxelBox>;
+    /// Boxes of one size that hold all of them.
+    fn cells(&self) -> impl Iterator<Item = VoxelBox>;
 
     /// Visits those in a box until `visit` returns false.
     fn visit_in(&self, voxels: &VoxelBox, visit: &mut dyn FnMut(VoxelIndex) -> bool);
@@ -41,19 +42,61 @@ pub(crate) fn voxels_in(set: &impl OccupiedSet, region: &Aabb) -> Vec<VoxelOccup
     found
 }
 
-fn meet(set: &impl OccupiedSet, unknown: UnknownAs) -> impl FnMut(VoxelIndex) -> Result<Met> {
-    move |voxel| {
-        Ok(match set.empty_around(voxel) {
-            _ if unknown == UnknownAs::Obstacle => Met::Obstacle(occupancy(set, voxel).probability()),
-            Some(empty) => Met::Empty(empty),
-            None if set.holds(voxel) => Met::Obstacle(Some(OCCUPIED)),
-            None => Met::Free,
+/// A box around all cells, and how many there are.
+fn hull_of(set: &impl OccupiedSet) -> (Option<VoxelBox>, usize) {
+    let mut count = 0;
+    let cells = set.cells().inspect(|_| count += 1);
+    let hull = cells.reduce(|a, b| VoxelBox {
+        min: std::array::from_fn(|k| a.min[k].min(b.min[k])),
+        end: std::array::from_fn(|k| a.end[k].max(b.end[k])),
+    });
+    (hull, count)
+}
+
+/// What a ray meets in the voxels of a set of so many cells.
+fn meet(
+    set: &impl OccupiedSet,
+    unknown: UnknownAs,
+    cells: usize,
+) -> impl FnMut(&mut RayWalk, f64) -> Result<Met> {
+    let mut empty_in_a_row = 0;
+    move |walk, _| {
+        let voxel = walk.voxel();
+        let empty = match set.empty_around(voxel) {
+            _ if unknown == UnknownAs::Obstacle => {
+                return Ok(Met::Obstacle(occupancy(set, voxel).probability()));
+            }
+            None if set.holds(voxel) => return Ok(Met::Obstacle(Some(OCCUPIED))),
+            None => {
+                empty_in_a_row = 0;
+                return Ok(Met::Free);
+            }
+            Some(empty) => empty,
+        };
+        empty_in_a_row += 1;
+        if empty_in_a_row <= cells {
+            return Ok(Met::Empty(empty));
+        }
+        // By now a look at all cells costs no more than the way here, however far away the next one is.
+        empty_in_a_row = 0;
+        walk.leave(&empty);
+        let ahead = set.cells().filter_map(|cell| {
+            let mut ahead = walk.clone();
+            ahead.enter(&cell).then_some(ahead)
+        });
+        Ok(match ahead.min_by_key(|ahead| walk.steps_to(ahead.voxel())) {
+            Some(ahead) => {
+                *walk = ahead;
+                Met::Passed
+            }
+            None => Met::End,
         })
     }
 }
 
 pub(crate) fn cast_ray(set: &impl OccupiedSet, query: &RayQuery) -> Result<Option<Hit>> {
-    walk_ray(&set.grid_of_set(), query, set.hull(), voxel_by_voxel(meet(set, query.unknown)))
+    let (hull, cells) = hull_of(set);
+    walk_ray(&set.grid_of_set(), query, hull, meet(set, query.unknown, cells))
 }
 
 pub(crate) fn cast_segment(
@@ -61,7 +104,8 @@ pub(crate) fn cast_segment(
     ends: [Point; 2],
     unknown: UnknownAs,
 ) -> Result<Option<Hit>> {
-    walk_segment(&set.grid_of_set(), ends, voxel_by_voxel(meet(set, unknown)))
+    // A segment meets no more than a million voxels.
+    walk_segment(&set.grid_of_set(), ends, meet(set, unknown, usize::MAX))
 }
 
 pub(crate) fn collision(set: &impl OccupiedSet, body: &Shape, unknown: UnknownAs) -> Result<Option<Hit>> {
@@ -86,7 +130,7 @@ pub(crate) fn nearest_occupied(
 ) -> Result<Option<Hit>> {
     super::nearest::check(point, max_distance_m)?;
     let grid = set.grid_of_set();
-    let Some(hull) = set.hull() else { return Ok(None) };
+    let (Some(hull), _) = hull_of(set) else { return Ok(None) };
     // All are in a ball around the point that reaches the corners of the hull.
     let farthest_m = (0..3)
         .map(|k| [hull.min[k], hull.end[k]].map(|index| (grid.corner_m(index) - point[k]).abs()))

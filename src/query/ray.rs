@@ -173,7 +173,7 @@ fn meet_map<V: MapView + ?Sized>(
     let mut tiles = TileCursor::new(view);
     move |walk, until| {
         if !stops_at_unknown && let Some(below) = tiles.below_around(walk.voxel(), occupied_from)? {
-            return Ok(match below.end[0] - below.min[0] > BRICK_EDGE {
+            return Ok(match below.end[0].saturating_sub(below.min[0]) > BRICK_EDGE {
                 true => Met::Empty(below),
                 // The few steps through a brick cost less than a jump.
                 false => met_nothing(walk.advance_in(&below, until, |_| true)),
@@ -217,9 +217,7 @@ fn of_usable_size(direction: Point) -> Point {
 /// The voxels of a box around all tiles; `None` for an empty map.
 fn hull_of_map<V: MapView + ?Sized>(view: &V) -> Option<VoxelBox> {
     let bounds = view.tile_bounds()?;
-    let grid = &view.config().grid;
-    let [low, high] = [bounds.min(), bounds.max()].map(|corner| grid.voxels_of_tile(corner));
-    Some(VoxelBox { min: low.min, end: high.end })
+    Some(view.config().grid.voxels_of_tiles(bounds))
 }
 
 /// The voxels of the brick that holds a voxel.

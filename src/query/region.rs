@@ -94,15 +94,23 @@ fn min_log_odds(config: &MapConfig, min_probability: Option<f64>) -> f64 {
 
 /// The tiles of the map that overlap a box of voxels, in order.
 pub(super) fn tiles_in<V: MapView + ?Sized>(view: &V, voxels: &VoxelBox) -> Vec<TileIndex> {
+    tiles_of_list_in(view, voxels, &mut None)
+}
+
+/// The same for several boxes: if the tiles of the map have to be listed, they are once, in `all`.
+pub(super) fn tiles_of_list_in<V: MapView + ?Sized>(
+    view: &V,
+    voxels: &VoxelBox,
+    all: &mut Option<Vec<TileIndex>>,
+) -> Vec<TileIndex> {
     /// Looking up so many is cheaper than listing all tiles of a large map.
     const MOST_LOOKED_UP: u64 = 4096;
     let Some(tiles) = tile_box_around(view, voxels) else { return Vec::new() };
     if tiles.count() <= MOST_LOOKED_UP {
         return tiles.tiles().filter(|&tile| view.has_tile(tile)).collect();
     }
-    let mut all = view.tile_indices();
-    all.retain(|&tile| tiles.contains(tile));
-    all
+    let all = all.get_or_insert_with(|| view.tile_indices());
+    all.iter().copied().filter(|&tile| tiles.contains(tile)).collect()
 }
 
 /// The tiles, there or not, that overlap a box of voxels within the bounds of the map.

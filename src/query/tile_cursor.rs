@@ -1,16 +1,22 @@
 use super::ray::brick_of;
 use crate::error::Result;
 use crate::mapper::{MapView, TileRef};
-use crate::space::{BrickCode, VoxelBox, VoxelIndex};
+use crate::space::{BrickCode, TileIndex, VoxelBox, VoxelIndex};
 use crate::tile::{BrickLook, Tile};
 
 /// Keeps the last tile, so that neighbouring voxels load it once.
 pub(super) struct TileCursor<'a, V: ?Sized> {
     view: &'a V,
     tile: Option<CurrentTile<'a>>,
+    /// So many absent tiles are passed one by one before the map is asked how far the empty space around one reaches.
+    one_by_one: u32,
 }
 
+/// Absent tiles between others are few, and looking one up is cheap.
+const FEW_ABSENT: u32 = 8;
+
 struct CurrentTile<'a> {
+    /// Its voxels; those of more tiles if nothing was observed in any of them.
     voxels: VoxelBox,
     /// `None` if nothing was observed in it.
     tile: Option<TileRef<'a>>,
@@ -26,7 +32,7 @@ pub(super) enum Around<'a> {
 
 impl<'a, V: MapView + ?Sized> TileCursor<'a, V> {
     pub(super) fn new(view: &'a V) -> Self {
-        Self { view, tile: None }
+        Self { view, tile: None, one_by_one: FEW_ABSENT }
     }
 
     /// The tile that holds a voxel; `None` if nothing was observed in it.
@@ -66,9 +72,30 @@ impl<'a, V: MapView + ?Sized> TileCursor<'a, V> {
             None => {
                 let grid = self.view.config().grid;
                 let index = grid.tile_of_voxel(voxel);
-                CurrentTile { voxels: grid.voxels_of_tile(index), tile: self.view.tile(index)? }
+                let tile = self.view.tile(index)?;
+                let voxels = match tile.is_some() {
+                    true => {
+                        self.one_by_one = FEW_ABSENT;
+                        None
+                    }
+                    false => self.empty_around(index),
+                };
+                CurrentTile { voxels: voxels.unwrap_or_else(|| grid.voxels_of_tile(index)), tile }
             }
         };
         Ok(self.tile.insert(current))
+    }
+
+    /// The voxels of a box without tiles around an absent one, if it is worth asking for.
+    fn empty_around(&mut self, absent: TileIndex) -> Option<VoxelBox> {
+        if self.one_by_one > 0 {
+            self.one_by_one -= 1;
+            return None;
+        }
+        let empty = self.view.empty_around(absent);
+        if empty.is_none() {
+            self.one_by_one = FEW_ABSENT;
+        }
+        empty.map(|tiles| self.view.config().grid.voxels_of_tiles(tiles))
     }
 }

@@ -1,7 +1,7 @@
 use super::set::VoxelSet;
 use crate::query::brick_of;
 use crate::query::occupied_set::{OccupiedSet, answer_as_occupied_set};
-use crate::space::{BrickCode, Grid, TileBox, VoxelBox, VoxelIndex};
+use crate::space::{BrickCode, Grid, VoxelBox, VoxelIndex};
 
 /// The voxels of a layer are occupied, and nothing is known of others. A robot's own map
 /// [`United`](crate::query::United) with the layers of other robots knows both.
@@ -24,10 +24,8 @@ impl OccupiedSet for VoxelSet {
         is_empty.then(|| brick_of(voxel).intersection(&voxels))
     }
 
-    fn hull(&self) -> Option<VoxelBox> {
-        let tiles = TileBox::of(self.tiles())?;
-        let [low, high] = [tiles.min(), tiles.max()].map(|tile| self.grid().voxels_of_tile(tile));
-        Some(VoxelBox { min: low.min, end: high.end })
+    fn cells(&self) -> impl Iterator<Item = VoxelBox> {
+        self.tiles().map(|tile| self.grid().voxels_of_tile(tile))
     }
 
     fn visit_in(&self, voxels: &VoxelBox, visit: &mut dyn FnMut(VoxelIndex) -> bool) {

@@ -1,4 +1,4 @@
-use super::{Aabb, Point, TileIndex, VoxelBox, VoxelIndex};
+use super::{Aabb, Point, TileBox, TileIndex, VoxelBox, VoxelIndex};
 use std::fmt;
 use thiserror::Error;
 
@@ -180,6 +180,12 @@ impl Grid {
         let min = tile.to_array().map(|index| clamp_to_i32(i64::from(index) * n));
         let end = tile.to_array().map(|index| clamp_to_i32((i64::from(index) + 1) * n));
         VoxelBox { min, end }
+    }
+
+    /// The voxels of a box of tiles; saturates like [`Grid::voxels_of_tile`].
+    pub fn voxels_of_tiles(&self, tiles: TileBox) -> VoxelBox {
+        let [low, high] = [tiles.min(), tiles.max()].map(|corner| self.voxels_of_tile(corner));
+        VoxelBox { min: low.min, end: high.end }
     }
 }
 

@@ -17,6 +17,7 @@ mod morton;
 mod tile_box;
 mod tile_index;
 mod tile_selection;
+mod tile_space;
 mod tile_table;
 mod torus;
 
@@ -34,6 +35,8 @@ pub use morton::MortonCode;
 pub use tile_box::TileBox;
 pub use tile_index::TileIndex;
 pub use tile_selection::TileSelection;
+#[doc(hidden)]
+pub use tile_space::TileSpace;
 pub(crate) use tile_table::take_u32;
 pub use tile_table::{TileTable, TileValue, put_number, take_number};
 pub use torus::Torus;

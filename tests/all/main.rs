@@ -48,6 +48,8 @@ mod damaged_recordings;
 /// Errors: what they say, their causes, what they are about.
 #[cfg(feature = "cli")]
 mod errors;
+/// Maps whose tiles are far from each other.
+mod far_tiles;
 /// Every operation of a life of a map fails once, and the power goes at every one of them.
 mod faults;
 /// The first voxel asked of a tile on disk.

@@ -349,7 +349,7 @@ fn many_at_once_and_those_who_stop_in_the_middle_are_no_harm() {
     let nodes = viewer.nodes("0");
     let alone = viewer.get(&nodes[0]).body;
     // Some send half a request, some ask and never read, some go away at once; all of them stay. They are more than the
-    // server takes at once, and hold it back for seconds only.
+    // server takes at once.
     let silent: Vec<TcpStream> = (0..560)
         .map(|number| {
             let mut stream = viewer.connect();
@@ -570,7 +570,8 @@ fn clients_that_read_nothing_hold_little_memory() {
     let before = viewer.resident_bytes();
     // More than the system's own buffers take.
     let request = format!("GET /{TOKEN}/page.js HTTP/1.1\r\nhost: {}\r\n\r\n", viewer.address).repeat(12);
-    let silent: Vec<TcpStream> = (0..400)
+    // A client has at most 256 connections.
+    let silent: Vec<TcpStream> = (0..250)
         .map(|_| {
             let mut stream = viewer.connect();
             stream.write_all(request.as_bytes()).unwrap();
@@ -585,6 +586,29 @@ fn clients_that_read_nothing_hold_little_memory() {
     let grown = viewer.resident_bytes().saturating_sub(before);
     assert!(grown < 64 << 20, "{grown} bytes more");
     assert_eq!(viewer.get("maps.json").status, 200);
+}
+
+#[test]
+fn streams_of_events_and_silent_connections_shut_nobody_out() {
+    let (folder, map) = a_map();
+    let viewer = Viewer::ready(&[&map], &folder.path().join("cache"));
+    let ask = |path: &str| {
+        let mut stream = viewer.connect();
+        let request = format!("GET /{TOKEN}/{path} HTTP/1.1\r\nhost: {}\r\n\r\n", viewer.address);
+        stream.write_all(request.as_bytes()).unwrap();
+        stream
+    };
+    let begun = Instant::now();
+    let mut open: Vec<TcpStream> = (0..520).map(|_| ask("events")).collect();
+    assert_eq!(viewer.get("maps.json").status, 200);
+    // The newest ones go on.
+    assert_eq!(open[519].peek(&mut [0; 12]).unwrap(), 12);
+    open.extend((0..520).map(|_| ask("page.js")));
+    open.extend((0..520).map(|_| viewer.connect()));
+    assert_eq!(viewer.get("maps.json").status, 200);
+    assert!(begun.elapsed() < Duration::from_secs(20), "{:?}", begun.elapsed());
+    let files = fs::read_dir(format!("/proc/{}/fd", viewer.process.id())).unwrap().count();
+    assert!(files < 320, "{files} open files");
 }
 
 #[test]

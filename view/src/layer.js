@@ -26,6 +26,8 @@ export class Layer {
     this.materials = { free: makeMaterial(KIND.free, viewer.shared), unknown: makeMaterial(KIND.unknown, viewer.shared) };
     if (hue) tintLayer(this.material, hue);
     this.extra = new Map();
+    // URLs of free and unknown voxels that were not loaded.
+    this.lostNear = new Set();
     this.retryMs = FIRST_RETRY_MS;
     this.generation = map.generation;
     this.tiles = this.open();
@@ -73,6 +75,10 @@ export class Layer {
       this.close(tiles);
       [this.next, this.again, this.isBehind] = [null, false, true];
     }
+    this.retryLater();
+  }
+
+  retryLater() {
     if (this.retryTimer) return;
     this.retryTimer = setTimeout(() => this.retry(), this.retryMs);
     this.retryMs = Math.min(2 * this.retryMs, LAST_RETRY_MS);
@@ -87,6 +93,8 @@ export class Layer {
       tiles.lost.clear();
       tiles.resetFailedTiles();
     }
+    for (const url of this.lostNear) if (this.extra.get(url) === null) this.extra.delete(url);
+    this.lostNear.clear();
     if (this.isBehind) this.refresh();
     this.viewer.wake();
   }
@@ -211,6 +219,7 @@ export class Layer {
 
   async loadNear(url, kind) {
     this.extra.set(url, null);
+    this.lostNear.delete(url);
     this.waits = (this.waits ?? 0) + 1;
     try {
       const response = await fetch(url);
@@ -220,7 +229,10 @@ export class Layer {
       this.extra.set(url, mesh);
       this.near.add(mesh);
     } catch (error) {
+      if (this.isGone) return;
       this.viewer.say(`Voxels of a tile were not loaded: ${error.message}`);
+      this.lostNear.add(url);
+      this.retryLater();
     } finally {
       this.waits--;
       this.viewer.wake();

@@ -1,21 +1,31 @@
+use super::connections::Client;
 use bytes::Bytes;
+use parking_lot::Mutex;
+use std::collections::HashMap;
 use std::sync::Arc;
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
 /// The memory of answers that are being sent: a client that reads nothing holds its answer until it is disconnected.
-pub struct AnswerMemory(Arc<Semaphore>);
+#[derive(Clone, Default)]
+pub struct AnswerMemory(Arc<Mutex<Taken>>);
 
 /// All large answers together.
 const MAX_BYTES: usize = 64 << 20;
+/// Those of one client.
+const MAX_BYTES_OF_CLIENT: usize = MAX_BYTES / 2;
 /// Smaller answers do not count: there is one a connection.
 const SMALL_BYTES: usize = 16 << 10;
-/// Permits are counted in 32 bits.
-const UNIT_BYTES: usize = 1 << 10;
+
+#[derive(Default)]
+struct Taken {
+    bytes: usize,
+    of: HashMap<Client, usize>,
+}
 
 /// An answer and its share of the memory, which is given back with the last slice.
 struct Held {
     bytes: Bytes,
-    _permit: OwnedSemaphorePermit,
+    client: Client,
+    memory: AnswerMemory,
 }
 
 impl AsRef<[u8]> for Held {
@@ -24,43 +34,76 @@ impl AsRef<[u8]> for Held {
     }
 }
 
-impl AnswerMemory {
-    pub fn new() -> Self {
-        Self(Arc::new(Semaphore::new(MAX_BYTES / UNIT_BYTES)))
+impl Drop for Held {
+    fn drop(&mut self) {
+        let mut taken = self.memory.0.lock();
+        taken.bytes -= self.bytes.len();
+        if let Some(of_client) = taken.of.get_mut(&self.client) {
+            *of_client -= self.bytes.len();
+            if *of_client == 0 {
+                taken.of.remove(&self.client);
+            }
+        }
     }
+}
 
-    /// Takes the share of an answer; `None` if other answers hold too much.
-    pub fn hold(&self, bytes: Bytes) -> Option<Bytes> {
-        if bytes.len() <= SMALL_BYTES {
+impl AnswerMemory {
+    /// Takes the share of an answer to a client; `None` if its other answers hold too much, or those of all clients.
+    /// An answer that is larger than that is sent where there is no other.
+    pub fn hold(&self, client: Client, bytes: Bytes) -> Option<Bytes> {
+        let length = bytes.len();
+        if length <= SMALL_BYTES {
             return Some(bytes);
         }
-        let units = bytes.len().div_ceil(UNIT_BYTES).min(MAX_BYTES / UNIT_BYTES);
-        let permit = self.0.clone().try_acquire_many_owned(u32::try_from(units).ok()?).ok()?;
-        Some(Bytes::from_owner(Held { bytes, _permit: permit }))
+        let mut taken = self.0.lock();
+        let of_client = taken.of.get(&client).copied().unwrap_or_default();
+        let fits = |held: usize, most: usize| held == 0 || held + length <= most;
+        if !fits(taken.bytes, MAX_BYTES) || !fits(of_client, MAX_BYTES_OF_CLIENT) {
+            return None;
+        }
+        taken.bytes += length;
+        taken.of.insert(client, of_client + length);
+        drop(taken);
+        Some(Bytes::from_owner(Held { bytes, client, memory: self.clone() }))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::net::IpAddr;
+
+    fn client(number: u8) -> Client {
+        Client::of(IpAddr::from([10, 0, 0, number]))
+    }
 
     #[test]
     fn the_share_of_an_answer_is_given_back_with_its_last_slice() {
-        let memory = AnswerMemory::new();
+        let memory = AnswerMemory::default();
         let answer = || Bytes::from(vec![1; MAX_BYTES / 2]);
-        let first = memory.hold(answer()).unwrap();
-        let mut second = memory.hold(answer()).unwrap();
-        assert!(memory.hold(answer()).is_none());
-        assert!(memory.hold(Bytes::from(vec![1; SMALL_BYTES])).is_some());
+        let first = memory.hold(client(1), answer()).unwrap();
+        let mut second = memory.hold(client(2), answer()).unwrap();
+        assert!(memory.hold(client(3), answer()).is_none());
+        assert!(memory.hold(client(3), Bytes::from(vec![1; SMALL_BYTES])).is_some());
         let slice = second.split_to(10);
         drop(second);
-        assert!(memory.hold(answer()).is_none());
+        assert!(memory.hold(client(3), answer()).is_none());
         drop(slice);
-        assert!(memory.hold(answer()).is_some());
+        assert!(memory.hold(client(3), answer()).is_some());
         drop(first);
-        // One that is larger than all waits for nothing and takes everything.
-        let largest = memory.hold(Bytes::from(vec![1; MAX_BYTES + 1])).unwrap();
-        assert!(memory.hold(answer()).is_none());
+        // One that is larger than all is sent alone.
+        let largest = memory.hold(client(1), Bytes::from(vec![1; MAX_BYTES + 1])).unwrap();
+        assert!(memory.hold(client(2), answer()).is_none());
         drop(largest);
+        assert!(memory.0.lock().of.is_empty() && memory.0.lock().bytes == 0);
+    }
+
+    #[test]
+    fn a_client_leaves_memory_to_others() {
+        let memory = AnswerMemory::default();
+        let answer = || Bytes::from(vec![1; MAX_BYTES / 8]);
+        let of_one: Vec<_> = (0..8).filter_map(|_| memory.hold(client(1), answer())).collect();
+        assert_eq!(of_one.len(), 4);
+        assert!(memory.hold(client(2), answer()).is_some());
     }
 }

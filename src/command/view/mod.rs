@@ -1,7 +1,8 @@
 //! `voxtile view`: maps in a browser.
 //!
 //! ```text
-//! request -> server    connections, their limits and timeouts       server, work
+//! request -> server    timeouts, threads                            server, work
+//!                      connections, and how many a client has       connections, client_stream
 //!                      what answers that are being sent hold        answer_memory
 //!         -> Route     what a path asks for, or nothing             route, token
 //!         -> answers   JSON of a query, a tileset, bytes of a node  answers
@@ -13,6 +14,8 @@
 
 mod answer_memory;
 mod answers;
+mod client_stream;
+mod connections;
 mod map_state;
 mod node_cache;
 mod page;

@@ -1,4 +1,5 @@
 use super::answer_memory::AnswerMemory;
+use super::connections::Connection;
 use bytes::Bytes;
 use flate2::Compression;
 use flate2::read::GzDecoder;
@@ -64,18 +65,25 @@ impl Answer {
         Self { status, ..Self::json(serde_json::json!({ "error": reason })) }
     }
 
-    /// The response; another one if the answers of other clients hold too much memory.
-    pub fn into_response(self, takes_gzip: bool, memory: &AnswerMemory) -> Response<Body> {
+    /// The response; another one if other answers hold too much memory.
+    pub fn into_response(
+        self,
+        takes_gzip: bool,
+        memory: &AnswerMemory,
+        connection: &Connection,
+    ) -> Response<Body> {
+        let hold = |bytes| memory.hold(connection.client(), bytes);
         let bytes = match (takes_gzip, self.shared) {
             (true, Some(_)) => Some(self.gzip),
             (false, Some(plain)) => Some(plain),
-            (true, None) => memory.hold(self.gzip),
-            (false, None) => memory.hold(plain(&self.gzip).into()),
+            (true, None) => hold(self.gzip),
+            (false, None) => hold(plain(&self.gzip).into()),
         };
         let Some(bytes) = bytes else {
+            connection.end_stalled();
             let reason = "clients that do not read hold the memory for answers; ask again in some seconds";
-            let mut response =
-                Self::error(StatusCode::SERVICE_UNAVAILABLE, reason).into_response(takes_gzip, memory);
+            let error = Self::error(StatusCode::SERVICE_UNAVAILABLE, reason);
+            let mut response = error.into_response(takes_gzip, memory, connection);
             response.headers_mut().insert(RETRY_AFTER, HeaderValue::from_static("5"));
             return response;
         };

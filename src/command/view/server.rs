@@ -1,4 +1,6 @@
 use super::answer_memory::AnswerMemory;
+use super::client_stream::ClientStream;
+use super::connections::{Client, Connection, Connections};
 use super::response::{Answer, Body, Keep, empty};
 use super::route::{Route, version_in};
 use super::served_map::{Makes, ServedMap};
@@ -21,11 +23,9 @@ use std::hash::{BuildHasher, Hasher, RandomState};
 use std::net::{SocketAddr, TcpListener};
 use std::sync::Arc;
 use std::time::Duration;
-use tokio::sync::{Semaphore, watch};
+use tokio::sync::watch;
 use tokio_io_timeout::TimeoutStream;
 
-/// Connections at once; others wait to be accepted.
-const CONNECTIONS: usize = 512;
 /// A connection that sends no request for so long is closed: whoever holds connections back holds them no longer.
 const SILENCE: Duration = Duration::from_secs(5);
 /// One that takes nothing of an answer for so long, too.
@@ -59,7 +59,7 @@ impl Server {
     ) -> Self {
         let threads = std::thread::available_parallelism().map_or(2, usize::from);
         let id = format!("{:016x}", RandomState::new().build_hasher().finish());
-        let (work, making, memory) = (Work::new(threads), Work::new(1), AnswerMemory::new());
+        let (work, making, memory) = (Work::new(threads), Work::new(1), AnswerMemory::default());
         Self { id, maps, token, address, changed, work, making, memory }
     }
 
@@ -81,11 +81,10 @@ impl Server {
     }
 
     async fn accept(self: Arc<Self>, listener: tokio::net::TcpListener) {
-        let connections = Arc::new(Semaphore::new(CONNECTIONS));
+        let connections = Connections::new();
         loop {
-            let Ok(permit) = connections.clone().acquire_owned().await else { return };
-            let stream = match listener.accept().await {
-                Ok((stream, _)) => stream,
+            let (stream, address) = match listener.accept().await {
+                Ok(accepted) => accepted,
                 // Too many open files, or a connection that is gone already.
                 Err(error) => {
                     log::warn!("a connection was not accepted: {error}");
@@ -93,28 +92,45 @@ impl Server {
                     continue;
                 }
             };
+            let connection = Arc::new(connections.enter(Client::of(address.ip())));
             let mut stream = TimeoutStream::new(stream);
             stream.set_write_timeout(Some(PATIENCE));
+            let stream = ClientStream::new(Box::pin(stream), connection.clone());
             let server = self.clone();
             tokio::spawn(async move {
+                let answering = connection.clone();
                 let service = service_fn(move |request| {
-                    let server = server.clone();
-                    async move { Ok::<_, Infallible>(server.answer(request).await) }
+                    let (server, connection) = (server.clone(), answering.clone());
+                    async move { Ok::<_, Infallible>(server.answer(request, &connection).await) }
                 });
-                let connection = http1::Builder::new()
+                let served = http1::Builder::new()
                     .timer(TokioTimer::new())
                     .header_read_timeout(SILENCE)
                     .max_buf_size(BUFFER_BYTES)
-                    .serve_connection(TokioIo::new(Box::pin(stream)), service);
-                if let Err(error) = connection.await {
-                    log::debug!("a connection ended: {error}");
+                    .serve_connection(TokioIo::new(stream), service);
+                tokio::select! {
+                    served = served => if let Err(error) = served {
+                        log::debug!("a connection ended: {error}");
+                    },
+                    () = connection.ended() => {}
                 }
-                drop(permit);
             });
         }
     }
 
-    async fn answer(self: Arc<Self>, request: Request<Incoming>) -> Response<Body> {
+    async fn answer(self: Arc<Self>, request: Request<Incoming>, connection: &Connection) -> Response<Body> {
+        connection.set_busy(true);
+        let response = self.response(request, connection).await;
+        connection.set_busy(false);
+        connection.note_progress();
+        response
+    }
+
+    async fn response(
+        self: Arc<Self>,
+        request: Request<Incoming>,
+        connection: &Connection,
+    ) -> Response<Body> {
         let is_head = request.method() == Method::HEAD;
         let takes_gzip = takes_gzip(&request);
         let mut response = match self.clone().route(&request) {
@@ -125,13 +141,17 @@ impl Server {
                 }
                 response
             }
-            Ok(Route::Events) if !is_head => self.events(),
+            Ok(Route::Events) if !is_head => {
+                connection.begin_events();
+                self.events()
+            }
             Ok(route) => {
-                self.compute(route, request.uri().query()).await.into_response(takes_gzip, &self.memory)
+                let answer = self.compute(route, request.uri().query()).await;
+                answer.into_response(takes_gzip, &self.memory, connection)
             }
             Err(answer) => {
                 let is_wrong_method = answer.status == StatusCode::METHOD_NOT_ALLOWED;
-                let mut response = answer.into_response(takes_gzip, &self.memory);
+                let mut response = answer.into_response(takes_gzip, &self.memory, connection);
                 // Strangers keep no connection.
                 response.headers_mut().insert(CONNECTION, HeaderValue::from_static("close"));
                 if is_wrong_method {

@@ -29,7 +29,8 @@ const ATTEMPTS: usize = 8;
 impl LiveView {
     pub(super) fn open(shared: Arc<Shared>) -> Self {
         let mut contents = shared.contents.lock();
-        let (id, scan_number, bounds) = (contents.open_view(), contents.scan_number(), contents.bounds());
+        let (id, scan_number, bounds) =
+            (contents.open_view(), contents.scan_number(), contents.space().bounds());
         drop(contents);
         Self { shared, id, scan_number, bounds }
     }
@@ -111,6 +112,11 @@ impl MapView for LiveView {
 
     fn tile_bounds(&self) -> Option<TileBox> {
         self.bounds
+    }
+
+    fn empty_around(&self, index: TileIndex) -> Option<TileBox> {
+        // Later tiles only make it smaller.
+        self.shared.contents.lock().space().empty_around(index)
     }
 
     fn has_tile(&self, index: TileIndex) -> bool {

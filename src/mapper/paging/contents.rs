@@ -8,7 +8,7 @@ use super::views::{ViewId, Views};
 use super::write_buffer::WriteBuffer;
 use crate::error::{Error, Result};
 use crate::persistence::Saved;
-use crate::space::{TileBox, TileIndex};
+use crate::space::{TileBox, TileIndex, TileSpace};
 use crate::store::{InputRecord, TileVersion};
 
 /// What a map holds after some scan: its tiles in memory and what is buffered for the others.
@@ -22,8 +22,8 @@ pub(in crate::mapper) struct TileContents {
     pub(super) last_scan: Option<TileBox>,
     /// How many.
     pub(super) last_touched: usize,
-    /// Around all tiles of the map, and perhaps some that it had.
-    pub(super) bounds: Option<TileBox>,
+    /// Where the tiles of the map are, and perhaps some that it had.
+    pub(super) space: TileSpace,
     /// What the map was built from and, last, is being built from; kept with it at the next flush.
     pub(super) inputs: Vec<InputRecord>,
     pub(super) views: Views,
@@ -47,9 +47,9 @@ impl TileContents {
         self.scan_number
     }
 
-    /// A box around all tiles in which something was observed.
-    pub(in crate::mapper) fn bounds(&self) -> Option<TileBox> {
-        self.bounds
+    /// Where something was observed.
+    pub(in crate::mapper) fn space(&self) -> &TileSpace {
+        &self.space
     }
 
     /// A tile as it is now.

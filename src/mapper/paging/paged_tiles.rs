@@ -9,7 +9,6 @@ use super::views::Views;
 use super::write_buffer::WriteBuffer;
 use crate::config::MapConfig;
 use crate::error::Result;
-use crate::space::TileBox;
 use crate::store::TileStore;
 use std::sync::Arc;
 use std::sync::mpsc::channel;
@@ -32,7 +31,7 @@ impl PagedTiles {
             scan_number: store.commits().scan_number,
             last_scan: None,
             last_touched: 0,
-            bounds: TileBox::of(store.tiles().chain(store.orphans())),
+            space: store.tiles().chain(store.orphans()).collect(),
             inputs: store.metadata().ext.as_ref().map_or(Vec::new(), |ext| ext.inputs.clone()),
             views: Views::default(),
             flight: None,

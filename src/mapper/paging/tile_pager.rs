@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::mapper::statistics::{MapStatistics, MemoryCounts};
 use crate::scan::{PackedUpdates, ScanPoints, ScanUpdates, TileUpdates};
 use crate::sensor::Evidence;
-use crate::space::{TileBox, TileIndex, VoxelIndex};
+use crate::space::{TileIndex, TileSpace, VoxelIndex};
 use crate::store::{
     CatalogEntry, InputRecord, KeptRecord, ScanRecord, SegmentPlace, SnapshotName, TileReader, TileStore,
 };
@@ -116,11 +116,7 @@ impl TilePager<'_> {
         self.shared.wait_for_views(&mut self.contents);
         self.contents.keep_for_views(touched.iter().copied());
         self.contents.leave_to_flush(touched.iter().copied());
-        let bounds = TileBox::of(touched.iter().copied())
-            .into_iter()
-            .chain(self.contents.bounds)
-            .reduce(TileBox::union);
-        self.contents.bounds = bounds;
+        self.contents.space.extend(touched.iter().copied());
         self.contents.buffer.accept_staged();
         let mut resident = FxHashMap::default();
         let mut others = Vec::new();
@@ -304,9 +300,9 @@ impl TilePager<'_> {
             || self.contents.cache.contains(index)
     }
 
-    /// A box around all tiles in which something was observed.
-    pub(in crate::mapper) fn bounds(&self) -> Option<TileBox> {
-        self.contents.bounds
+    /// Where something was observed.
+    pub(in crate::mapper) fn space(&self) -> &TileSpace {
+        self.contents.space()
     }
 
     /// A tile, brought into memory; `None` if nothing was observed in it.

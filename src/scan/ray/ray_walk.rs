@@ -216,9 +216,7 @@ impl RayWalk {
         let exit_axis = earliest(exits);
         let exit = exits[exit_axis];
         if exit == f64::INFINITY {
-            while !self.is_at_end() {
-                self.advance();
-            }
+            self.advance_to_end(border);
             return;
         }
         self.voxel = std::array::from_fn(|axis| match axis == exit_axis {
@@ -227,6 +225,21 @@ impl RayWalk {
         });
         self.next = std::array::from_fn(|axis| self.crossing(axis, self.voxel[axis]));
         self.entry = exit;
+    }
+
+    /// Jumps to the last voxel that single steps reach, which is none beyond `border`: what is crossed at no finite time
+    /// is never crossed.
+    fn advance_to_end(&mut self, border: VoxelIndex) {
+        let end: VoxelIndex =
+            std::array::from_fn(|axis| self.voxel_before(axis, border[axis], f64::INFINITY, false));
+        for axis in 0..3 {
+            if end[axis] != self.voxel[axis] {
+                // Times ascend: the latest of the last crossings is the last of all.
+                self.entry = self.entry.max(self.crossing(axis, end[axis] - self.step[axis]));
+            }
+        }
+        self.voxel = end;
+        self.next = std::array::from_fn(|axis| self.crossing(axis, self.voxel[axis]));
     }
 
     /// Jumps to the first voxel inside `region`, as single steps would; stays if the present one is inside. Returns
@@ -363,6 +376,23 @@ mod tests {
             assert_eq!(advanced, Advanced::Left, "{slow}");
             endless.leave(&region);
             assert_eq!(endless.voxel(), [4, -1, 0], "{slow}");
+        }
+    }
+
+    #[test]
+    fn a_box_that_reaches_the_last_voxels_is_walked_to_its_end() {
+        let region = VoxelBox { min: [i32::MAX - 50, -50, -50], end: [i32::MAX, 50, 50] };
+        for slow in [0.0, 1e-310, -1e-310, 1e-307, -3e-308, f64::from_bits(1)] {
+            let start = [i32::MAX - 40, 0, 0];
+            let origin = [f64::from(start[0]) + 0.5, 0.0, 0.5];
+            let mut stepped = RayWalk::along(origin, start, [1.0, slow, 0.0]);
+            for _ in 0..200 {
+                stepped.advance();
+            }
+            let mut jumped = RayWalk::along(origin, start, [1.0, slow, 0.0]);
+            jumped.leave(&region);
+            assert_eq!(jumped.voxel(), stepped.voxel(), "{slow}");
+            assert_eq!(jumped.entry_time().to_bits(), stepped.entry_time().to_bits(), "{slow}");
         }
     }
 

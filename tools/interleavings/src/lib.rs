@@ -41,8 +41,8 @@ mod sensor {
 
 mod space {
     pub(crate) use voxtile::space::{
-        Grid, MortonCode, Point, TileBox, TileIndex, TileTable, TileValue, VoxelIndex, hash_table_bytes,
-        put_number, take_number,
+        Grid, MortonCode, Point, TileBox, TileIndex, TileSpace, TileTable, TileValue, VoxelIndex,
+        hash_table_bytes, put_number, take_number,
     };
 }
 

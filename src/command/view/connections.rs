@@ -1,0 +1,285 @@
+use parking_lot::Mutex;
+use std::collections::{BTreeMap, HashMap};
+use std::net::{IpAddr, Ipv6Addr};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+use tokio::sync::Notify;
+
+/// Connections of all clients at once.
+const MAX_CONNECTIONS: usize = 512;
+/// Those of one client. A further one takes the place of the one without progress for longest.
+const MAX_OF_CLIENT: usize = 256;
+/// Streams of events of one client. A further one takes the place of the oldest: a browser asks again.
+const MAX_EVENTS_OF_CLIENT: usize = 32;
+/// One without progress for less is not idle: its request may be on its way.
+const IDLE: Duration = Duration::from_secs(1);
+/// Where memory for answers is short, those that take nothing for so long are closed.
+const STALLED: Duration = Duration::from_secs(5);
+
+/// Who connects: an IPv4 address, or the 64 bits of an IPv6 address that name a network.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Client(IpAddr);
+
+impl Client {
+    pub fn of(address: IpAddr) -> Self {
+        Self(match address.to_canonical() {
+            IpAddr::V6(address) if !address.is_loopback() => {
+                Ipv6Addr::from_bits(address.to_bits() >> 64 << 64).into()
+            }
+            other => other,
+        })
+    }
+}
+
+/// The open connections, so that one client does not keep others out.
+#[derive(Clone)]
+pub struct Connections {
+    open: Arc<Mutex<Open>>,
+    since: Instant,
+}
+
+#[derive(Default)]
+struct Open {
+    /// By their numbers, which ascend.
+    of: HashMap<Client, BTreeMap<u64, Arc<State>>>,
+    count: usize,
+    last: u64,
+}
+
+#[derive(Default)]
+struct State {
+    /// When bytes were last read or written, in milliseconds.
+    progress_ms: AtomicU64,
+    /// Whether an answer is being computed.
+    is_busy: AtomicBool,
+    is_events: AtomicBool,
+    end: Notify,
+}
+
+/// The place of one connection, which is given back with it.
+pub struct Connection {
+    connections: Connections,
+    client: Client,
+    number: u64,
+    state: Arc<State>,
+}
+
+impl Connections {
+    pub fn new() -> Self {
+        Self { open: Arc::default(), since: Instant::now() }
+    }
+
+    /// A place for another connection. Where there are too many, one ends for it: the client's own, or else one of the
+    /// client with most.
+    pub fn enter(&self, client: Client) -> Connection {
+        let mut open = self.open.lock();
+        let largest = || open.of.iter().max_by_key(|(_, of)| of.len()).map(|(client, _)| *client);
+        let gives = match open.of.get(&client).map_or(0, BTreeMap::len) {
+            MAX_OF_CLIENT.. => Some(client),
+            _ if open.count >= MAX_CONNECTIONS => largest(),
+            _ => None,
+        };
+        if let Some(gives) = gives
+            && let Some(number) = open.least_active(gives, self.now_ms())
+        {
+            open.end(gives, number);
+        }
+        open.last += 1;
+        open.count += 1;
+        let (number, state) = (open.last, Arc::new(State::default()));
+        open.of.entry(client).or_default().insert(number, state.clone());
+        drop(open);
+        let connection = Connection { connections: self.clone(), client, number, state };
+        connection.note_progress();
+        connection
+    }
+
+    fn now_ms(&self) -> u64 {
+        u64::try_from(self.since.elapsed().as_millis()).unwrap_or(u64::MAX)
+    }
+}
+
+impl State {
+    /// Whether nothing was read or written for some time, although no answer is being computed.
+    fn is_stalled(&self, now_ms: u64, time: Duration) -> bool {
+        let since = Duration::from_millis(now_ms.saturating_sub(self.progress_ms()));
+        since >= time && !self.is_busy.load(Ordering::Relaxed)
+    }
+
+    fn progress_ms(&self) -> u64 {
+        self.progress_ms.load(Ordering::Relaxed)
+    }
+}
+
+impl Open {
+    /// The connection of a client whose end matters least: the one without progress for longest, of those that are idle
+    /// if there are any.
+    fn least_active(&self, client: Client, now_ms: u64) -> Option<u64> {
+        let of_client = self.of.get(&client)?.iter();
+        let least = of_client
+            .min_by_key(|(number, state)| (!state.is_stalled(now_ms, IDLE), state.progress_ms(), **number));
+        least.map(|(number, _)| *number)
+    }
+
+    fn end(&mut self, client: Client, number: u64) {
+        if let Some(state) = self.remove(client, number) {
+            log::debug!("a connection is closed for another one");
+            state.end.notify_one();
+        }
+    }
+
+    fn remove(&mut self, client: Client, number: u64) -> Option<Arc<State>> {
+        let of_client = self.of.get_mut(&client)?;
+        let removed = of_client.remove(&number)?;
+        if of_client.is_empty() {
+            self.of.remove(&client);
+        }
+        self.count -= 1;
+        Some(removed)
+    }
+}
+
+impl Connection {
+    pub fn client(&self) -> Client {
+        self.client
+    }
+
+    /// Notes that bytes were read or written.
+    pub fn note_progress(&self) {
+        self.state.progress_ms.store(self.connections.now_ms(), Ordering::Relaxed);
+    }
+
+    /// Notes whether an answer is being computed.
+    pub fn set_busy(&self, is_busy: bool) {
+        self.state.is_busy.store(is_busy, Ordering::Relaxed);
+    }
+
+    /// Notes that the connection is a stream of events from now on.
+    pub fn begin_events(&self) {
+        let mut open = self.connections.open.lock();
+        self.state.is_events.store(true, Ordering::Relaxed);
+        let Some(of_client) = open.of.get(&self.client) else { return };
+        let mut streams = of_client.iter().filter(|(_, state)| state.is_events.load(Ordering::Relaxed));
+        let oldest = streams.next().map(|(number, _)| *number);
+        if let Some(oldest) = oldest
+            && streams.count() >= MAX_EVENTS_OF_CLIENT
+        {
+            open.end(self.client, oldest);
+        }
+    }
+
+    /// Ends the connections of this client that take nothing of their answers.
+    pub fn end_stalled(&self) {
+        let now_ms = self.connections.now_ms();
+        let mut open = self.connections.open.lock();
+        let of_client = open.of.get(&self.client).into_iter().flatten();
+        let stalled = of_client.filter(|(_, state)| state.is_stalled(now_ms, STALLED));
+        let stalled: Vec<u64> = stalled.map(|(number, _)| *number).collect();
+        stalled.into_iter().for_each(|number| open.end(self.client, number));
+    }
+
+    /// Waits until its place is taken.
+    pub async fn ended(&self) {
+        self.state.end.notified().await;
+    }
+}
+
+impl Drop for Connection {
+    fn drop(&mut self) {
+        self.connections.open.lock().remove(self.client, self.number);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn client(number: u8) -> Client {
+        Client::of(IpAddr::from([10, 0, 0, number]))
+    }
+
+    fn is_open(connection: &Connection) -> bool {
+        let open = connection.connections.open.lock();
+        open.of.get(&connection.client).is_some_and(|of| of.contains_key(&connection.number))
+    }
+
+    /// Connections that were opened ten seconds ago.
+    fn long_ago() -> Connections {
+        let since = Instant::now().checked_sub(Duration::from_secs(10)).unwrap();
+        Connections { since, ..Connections::new() }
+    }
+
+    fn set_progress(connection: &Connection, ms: u64) {
+        connection.state.progress_ms.store(ms, Ordering::Relaxed);
+    }
+
+    #[test]
+    fn a_client_with_too_many_connections_loses_its_own_idle_ones() {
+        let connections = long_ago();
+        let other = connections.enter(client(2));
+        let of_client: Vec<_> = (0..MAX_OF_CLIENT).map(|_| connections.enter(client(1))).collect();
+        of_client.iter().for_each(|connection| set_progress(connection, 1000));
+        set_progress(&other, 0);
+        set_progress(&of_client[7], 10);
+        set_progress(&of_client[9], 5);
+        of_client[9].set_busy(true);
+        let next = connections.enter(client(1));
+        let closed: Vec<_> = (0..MAX_OF_CLIENT).filter(|&k| !is_open(&of_client[k])).collect();
+        assert_eq!(closed, [7]);
+        assert!(is_open(&other) && is_open(&next));
+        // What was closed gives no second place back.
+        drop(of_client);
+        assert_eq!(connections.open.lock().count, 2);
+    }
+
+    #[test]
+    fn a_client_whose_connections_all_wait_for_answers_loses_the_oldest() {
+        let connections = long_ago();
+        let busy: Vec<_> = (0..MAX_OF_CLIENT).map(|_| connections.enter(client(1))).collect();
+        for (number, connection) in busy.iter().enumerate() {
+            connection.set_busy(true);
+            set_progress(connection, 1000 + number as u64);
+        }
+        // One whose request has not been read yet is no idle one.
+        let (next, one_more) = (connections.enter(client(1)), connections.enter(client(1)));
+        assert!(is_open(&next) && is_open(&one_more));
+        assert!(!is_open(&busy[0]) && !is_open(&busy[1]) && busy[2..].iter().all(is_open));
+    }
+
+    #[test]
+    fn where_all_places_are_taken_the_client_with_most_gives_one() {
+        let connections = Connections::new();
+        let most: Vec<_> = (0..MAX_OF_CLIENT).map(|_| connections.enter(client(1))).collect();
+        let others: Vec<_> = (0..MAX_CONNECTIONS - MAX_OF_CLIENT)
+            .map(|number| connections.enter(client(2 + (number % 200) as u8)))
+            .collect();
+        let next = connections.enter(client(250));
+        assert_eq!(most.iter().filter(|connection| !is_open(connection)).count(), 1);
+        assert!(is_open(&next) && others.iter().all(is_open));
+        assert_eq!(connections.open.lock().count, MAX_CONNECTIONS);
+    }
+
+    #[test]
+    fn the_oldest_stream_of_events_ends_for_another_one() {
+        let connections = Connections::new();
+        let plain = connections.enter(client(1));
+        let streams: Vec<_> = (0..=MAX_EVENTS_OF_CLIENT)
+            .map(|_| {
+                let connection = connections.enter(client(1));
+                connection.begin_events();
+                connection
+            })
+            .collect();
+        assert!(!is_open(&streams[0]) && streams[1..].iter().all(is_open) && is_open(&plain));
+    }
+
+    #[test]
+    fn a_network_is_one_client() {
+        let of = |address: &str| Client::of(address.parse().unwrap());
+        assert_eq!(of("2001:db8::1"), of("2001:db8::ffff:1"));
+        assert_ne!(of("2001:db8::1"), of("2001:db8:0:1::1"));
+        assert_eq!(of("::ffff:10.0.0.1"), of("10.0.0.1"));
+        assert_ne!(of("10.0.0.1"), of("10.0.0.2"));
+    }
+}

@@ -1,0 +1,126 @@
+use super::{TileBox, TileIndex};
+use rustc_hash::FxHashSet;
+
+/// Where the tiles of a map are, in little memory: a box around all of them, and aligned cubes of 16, 256, .. tiles
+/// along an edge that may hold one. A ray passes a cube without tiles in one step, so its cost depends on the number of
+/// tiles near it, not on the distance between them.
+///
+/// Tiles are added and never removed. At most 400 kB: a level of more than [`MAX_CUBES`] cubes is given up.
+#[derive(Clone, Debug, Default)]
+pub struct TileSpace {
+    bounds: Option<TileBox>,
+    /// From fine to coarse. A cube that may hold a tile lies in one of the next level that may, too.
+    levels: [Level; SHIFTS.len()],
+}
+
+/// Edges of the cubes of each level, in tiles, as powers of two.
+const SHIFTS: [u32; 7] = [4, 8, 12, 16, 20, 24, 28];
+
+/// Most cubes of a level.
+const MAX_CUBES: usize = 2048;
+
+#[derive(Clone, Debug, Default)]
+struct Level {
+    /// The cubes that may hold a tile.
+    cubes: FxHashSet<[i32; 3]>,
+    /// Whether there were too many: then every cube may hold one.
+    is_given_up: bool,
+}
+
+impl TileSpace {
+    /// Adds a tile.
+    pub fn insert(&mut self, tile: TileIndex) {
+        let own = TileBox::new(tile, tile);
+        self.bounds = Some(self.bounds.map_or(own, |bounds| bounds.union(own)));
+        for (level, shift) in self.levels.iter_mut().zip(SHIFTS) {
+            if level.is_given_up {
+                continue;
+            }
+            if !level.cubes.insert(cube_of(tile, shift)) {
+                // Coarser levels have its cubes as well.
+                return;
+            }
+            if level.cubes.len() > MAX_CUBES {
+                *level = Level { cubes: FxHashSet::default(), is_given_up: true };
+            }
+        }
+    }
+
+    /// The smallest box around all tiles; `None` if there are none.
+    pub fn bounds(&self) -> Option<TileBox> {
+        self.bounds
+    }
+
+    /// A large box around a tile that holds no tile; `None` if none is known.
+    pub fn empty_around(&self, tile: TileIndex) -> Option<TileBox> {
+        self.levels.iter().zip(SHIFTS).rev().find_map(|(level, shift)| {
+            let cube = cube_of(tile, shift);
+            let is_empty = !level.is_given_up && !level.cubes.contains(&cube);
+            let first = cube.map(|k| k << shift);
+            is_empty.then(|| TileBox::new(first.into(), first.map(|k| k + ((1 << shift) - 1)).into()))
+        })
+    }
+}
+
+fn cube_of(tile: TileIndex, shift: u32) -> [i32; 3] {
+    tile.to_array().map(|k| k >> shift)
+}
+
+impl Extend<TileIndex> for TileSpace {
+    fn extend<I: IntoIterator<Item = TileIndex>>(&mut self, tiles: I) {
+        tiles.into_iter().for_each(|tile| self.insert(tile));
+    }
+}
+
+impl FromIterator<TileIndex> for TileSpace {
+    fn from_iter<I: IntoIterator<Item = TileIndex>>(tiles: I) -> Self {
+        let mut space = Self::default();
+        space.extend(tiles);
+        space
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// Tiles near each other, and anywhere.
+    fn any_tile() -> impl Strategy<Value = TileIndex> {
+        let ends = prop_oneof![Just(i32::MIN), Just(i32::MAX), any::<i32>()];
+        prop::array::uniform3(prop_oneof![4 => -40..40_i32, 1 => -100_000..100_000_i32, 1 => ends])
+            .prop_map(TileIndex::from)
+    }
+
+    proptest! {
+        #[test]
+        fn no_tile_is_in_an_empty_box(
+            tiles in prop::collection::vec(any_tile(), 0..40),
+            asked in prop::collection::vec(any_tile(), 1..40),
+        ) {
+            let space: TileSpace = tiles.iter().copied().collect();
+            prop_assert_eq!(space.bounds(), TileBox::of(tiles.iter().copied()));
+            for tile in asked {
+                let Some(empty) = space.empty_around(tile) else {
+                    let cube = cube_of(tile, SHIFTS[0]);
+                    prop_assert!(tiles.iter().any(|&tile| cube_of(tile, SHIFTS[0]) == cube));
+                    continue;
+                };
+                prop_assert!(empty.contains(tile));
+                prop_assert!(!tiles.iter().any(|&tile| empty.contains(tile)));
+            }
+        }
+    }
+
+    #[test]
+    fn a_level_of_too_many_cubes_is_given_up_and_coarser_ones_remain() {
+        let mut space: TileSpace =
+            (0..3000).map(|k| TileIndex::new(16 * (k % 60), 16 * (k / 60), 0)).collect();
+        space.insert(TileIndex::new(1 << 30, 0, 0));
+        assert_eq!(space.empty_around(TileIndex::new(0, 0, 20)), None);
+        let empty = space.empty_around(TileIndex::new(0, 0, 300)).unwrap();
+        assert_eq!(empty, TileBox::new(TileIndex::new(0, 0, 256), TileIndex::new(255, 255, 511)));
+        assert!(space.empty_around(TileIndex::new(1 << 29, 0, 0)).unwrap().count() > 1 << 60);
+        assert!(space.levels.iter().all(|level| level.cubes.len() <= MAX_CUBES));
+    }
+}
