@@ -41,7 +41,7 @@ impl PageTable {
     fn place(&self, index: VoxelIndex) -> Option<usize> {
         let [x, y, z]: [u32; 3] = std::array::from_fn(|k| index[k].wrapping_sub(self.min[k]) as u32);
         let [width, height, depth] = self.size;
-        // Only of a box that is too large for a table does this wrap.
+        // Wraps only for boxes too large to tabulate; those use the tree.
         let place = x.wrapping_mul(height).wrapping_add(y).wrapping_mul(depth).wrapping_add(z);
         (x < width && y < height && z < depth).then_some(place as usize)
     }

@@ -40,7 +40,7 @@ impl<'a, V: MapView + ?Sized> TileCursor<'a, V> {
         Ok(self.current(voxel)?.tile.as_deref())
     }
 
-    /// A box around a voxel in which all log-odds, if there are any, are less than a threshold; `None` if nobody knows.
+    /// A box around a voxel in which all log-odds, if there are any, are less than a threshold; `None` if unknown.
     #[inline]
     pub(super) fn below_around(&mut self, voxel: VoxelIndex, threshold: f64) -> Result<Option<VoxelBox>> {
         let CurrentTile { voxels, tile } = self.current(voxel)?;

@@ -184,3 +184,18 @@ fn rays_end_at_the_last_voxels() {
     }
     assert!(begun.elapsed() < Duration::from_secs(3));
 }
+
+#[test]
+fn what_is_crossed_at_infinite_time_is_no_hit() {
+    let config = MapConfig::new(1.0, 4.0).unwrap();
+    let (mut map, mut set) = (InMemoryMapper::new(config.clone()).unwrap(), VoxelSet::new(config.grid));
+    let voxel = [LAST_VOXEL_INDEX - 1, 100, 0];
+    occupy(&mut map, &[config.grid.center_m(voxel)]);
+    set.put(voxel, true);
+    let direction = [1.0, 1e-310, 0.0];
+    let query = RayQuery { origin: [3.5, 0.5, 0.5], direction, max_range_m: None, unknown: UnknownAs::Free };
+    let maps: [&dyn Queries; 2] = [&map, &set];
+    for map in maps {
+        assert_eq!(map.cast_ray(&query).unwrap().map(|hit| hit.distance_m), None);
+    }
+}

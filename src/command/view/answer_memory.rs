@@ -1,4 +1,4 @@
-use super::connections::Client;
+use super::connections::{Client, Connection, HeldBytes};
 use bytes::Bytes;
 use parking_lot::Mutex;
 use std::collections::HashMap;
@@ -26,6 +26,8 @@ struct Held {
     bytes: Bytes,
     client: Client,
     memory: AnswerMemory,
+    /// For the connection.
+    _held: HeldBytes,
 }
 
 impl AsRef<[u8]> for Held {
@@ -48,9 +50,10 @@ impl Drop for Held {
 }
 
 impl AnswerMemory {
-    /// Takes the share of an answer to a client; `None` if its other answers hold too much, or those of all clients.
+    /// Takes the share of an answer on a connection; `None` if other answers to its client hold too much, or those of all clients.
     /// An answer that is larger than that is sent where there is no other.
-    pub fn hold(&self, client: Client, bytes: Bytes) -> Option<Bytes> {
+    pub fn hold(&self, connection: &Connection, bytes: Bytes) -> Option<Bytes> {
+        let client = connection.client();
         let length = bytes.len();
         if length <= SMALL_BYTES {
             return Some(bytes);
@@ -64,36 +67,37 @@ impl AnswerMemory {
         taken.bytes += length;
         taken.of.insert(client, of_client + length);
         drop(taken);
-        Some(Bytes::from_owner(Held { bytes, client, memory: self.clone() }))
+        Some(Bytes::from_owner(Held { bytes, client, memory: self.clone(), _held: connection.hold(length) }))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::command::view::connections::Connections;
     use std::net::IpAddr;
 
-    fn client(number: u8) -> Client {
-        Client::of(IpAddr::from([10, 0, 0, number]))
+    fn connection(number: u8) -> Connection {
+        Connections::new().enter(Client::of(IpAddr::from([10, 0, 0, number])))
     }
 
     #[test]
     fn the_share_of_an_answer_is_given_back_with_its_last_slice() {
         let memory = AnswerMemory::default();
         let answer = || Bytes::from(vec![1; MAX_BYTES / 2]);
-        let first = memory.hold(client(1), answer()).unwrap();
-        let mut second = memory.hold(client(2), answer()).unwrap();
-        assert!(memory.hold(client(3), answer()).is_none());
-        assert!(memory.hold(client(3), Bytes::from(vec![1; SMALL_BYTES])).is_some());
+        let first = memory.hold(&connection(1), answer()).unwrap();
+        let mut second = memory.hold(&connection(2), answer()).unwrap();
+        assert!(memory.hold(&connection(3), answer()).is_none());
+        assert!(memory.hold(&connection(3), Bytes::from(vec![1; SMALL_BYTES])).is_some());
         let slice = second.split_to(10);
         drop(second);
-        assert!(memory.hold(client(3), answer()).is_none());
+        assert!(memory.hold(&connection(3), answer()).is_none());
         drop(slice);
-        assert!(memory.hold(client(3), answer()).is_some());
+        assert!(memory.hold(&connection(3), answer()).is_some());
         drop(first);
         // One that is larger than all is sent alone.
-        let largest = memory.hold(client(1), Bytes::from(vec![1; MAX_BYTES + 1])).unwrap();
-        assert!(memory.hold(client(2), answer()).is_none());
+        let largest = memory.hold(&connection(1), Bytes::from(vec![1; MAX_BYTES + 1])).unwrap();
+        assert!(memory.hold(&connection(2), answer()).is_none());
         drop(largest);
         assert!(memory.0.lock().of.is_empty() && memory.0.lock().bytes == 0);
     }
@@ -102,8 +106,8 @@ mod tests {
     fn a_client_leaves_memory_to_others() {
         let memory = AnswerMemory::default();
         let answer = || Bytes::from(vec![1; MAX_BYTES / 8]);
-        let of_one: Vec<_> = (0..8).filter_map(|_| memory.hold(client(1), answer())).collect();
+        let of_one: Vec<_> = (0..8).filter_map(|_| memory.hold(&connection(1), answer())).collect();
         assert_eq!(of_one.len(), 4);
-        assert!(memory.hold(client(2), answer()).is_some());
+        assert!(memory.hold(&connection(2), answer()).is_some());
     }
 }

@@ -2,7 +2,7 @@ use parking_lot::Mutex;
 use std::collections::{BTreeMap, HashMap};
 use std::net::{IpAddr, Ipv6Addr};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 use tokio::sync::Notify;
 
@@ -10,21 +10,26 @@ use tokio::sync::Notify;
 const MAX_CONNECTIONS: usize = 512;
 /// Those of one client. A further one takes the place of the one without progress for longest.
 const MAX_OF_CLIENT: usize = 256;
-/// Streams of events of one client. A further one takes the place of the oldest: a browser asks again.
-const MAX_EVENTS_OF_CLIENT: usize = 32;
+/// Streams of events of one client, which may be a proxy. A further one takes the place of the oldest: a browser asks
+/// again.
+const MAX_EVENTS_OF_CLIENT: usize = MAX_OF_CLIENT / 2;
 /// One without progress for less is not idle: its request may be on its way.
 const IDLE: Duration = Duration::from_secs(1);
-/// Where memory for answers is short, those that take nothing for so long are closed.
+/// Where memory for answers is short, connections that take nothing of their answers for so long are closed.
 const STALLED: Duration = Duration::from_secs(5);
 
-/// Who connects: an IPv4 address, or the 64 bits of an IPv6 address that name a network.
+/// Who connects: an IPv4 address, an IPv6 address of a local network, or the 64 bits of another one that name a network.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Client(IpAddr);
 
 impl Client {
     pub fn of(address: IpAddr) -> Self {
         Self(match address.to_canonical() {
-            IpAddr::V6(address) if !address.is_loopback() => {
+            IpAddr::V6(address)
+                if !(address.is_loopback()
+                    || address.is_unicast_link_local()
+                    || address.is_unique_local()) =>
+            {
                 Ipv6Addr::from_bits(address.to_bits() >> 64 << 64).into()
             }
             other => other,
@@ -45,6 +50,7 @@ struct Open {
     of: HashMap<Client, BTreeMap<u64, Arc<State>>>,
     count: usize,
     last: u64,
+    last_stream: u64,
 }
 
 #[derive(Default)]
@@ -53,7 +59,10 @@ struct State {
     progress_ms: AtomicU64,
     /// Whether an answer is being computed.
     is_busy: AtomicBool,
-    is_events: AtomicBool,
+    /// Number of the stream of events that it is; 0 if it is none.
+    stream: AtomicU64,
+    /// Bytes of memory of its answers that were not taken yet.
+    held_bytes: AtomicUsize,
     end: Notify,
 }
 
@@ -158,30 +167,54 @@ impl Connection {
     /// Notes that the connection is a stream of events from now on.
     pub fn begin_events(&self) {
         let mut open = self.connections.open.lock();
-        self.state.is_events.store(true, Ordering::Relaxed);
-        let Some(of_client) = open.of.get(&self.client) else { return };
-        let mut streams = of_client.iter().filter(|(_, state)| state.is_events.load(Ordering::Relaxed));
-        let oldest = streams.next().map(|(number, _)| *number);
-        if let Some(oldest) = oldest
-            && streams.count() >= MAX_EVENTS_OF_CLIENT
+        open.last_stream += 1;
+        self.state.stream.store(open.last_stream, Ordering::Relaxed);
+        let streams = open.of.get(&self.client).into_iter().flatten();
+        let streams = streams.map(|(number, state)| (state.stream.load(Ordering::Relaxed), *number));
+        let streams: Vec<_> = streams.filter(|(stream, _)| *stream > 0).collect();
+        if streams.len() > MAX_EVENTS_OF_CLIENT
+            && let Some((_, oldest)) = streams.into_iter().min()
         {
             open.end(self.client, oldest);
         }
     }
 
-    /// Ends the connections of this client that take nothing of their answers.
+    /// Ends the connections, whosever they are, that take nothing of the answers that they hold in memory.
     pub fn end_stalled(&self) {
         let now_ms = self.connections.now_ms();
         let mut open = self.connections.open.lock();
-        let of_client = open.of.get(&self.client).into_iter().flatten();
-        let stalled = of_client.filter(|(_, state)| state.is_stalled(now_ms, STALLED));
-        let stalled: Vec<u64> = stalled.map(|(number, _)| *number).collect();
-        stalled.into_iter().for_each(|number| open.end(self.client, number));
+        let all = open
+            .of
+            .iter()
+            .flat_map(|(client, of)| of.iter().map(|(number, state)| (*client, *number, state)));
+        let is_stalled =
+            |state: &State| state.held_bytes.load(Ordering::Relaxed) > 0 && state.is_stalled(now_ms, STALLED);
+        let stalled: Vec<_> =
+            all.filter(|(.., state)| is_stalled(state)).map(|(client, number, _)| (client, number)).collect();
+        stalled.into_iter().for_each(|(client, number)| open.end(client, number));
+    }
+
+    /// Counts bytes of an answer as held by this connection, until what is returned is dropped.
+    pub fn hold(&self, bytes: usize) -> HeldBytes {
+        self.state.held_bytes.fetch_add(bytes, Ordering::Relaxed);
+        HeldBytes { state: self.state.clone(), bytes }
     }
 
     /// Waits until its place is taken.
     pub async fn ended(&self) {
         self.state.end.notified().await;
+    }
+}
+
+/// Bytes of an answer that a connection has not taken yet.
+pub struct HeldBytes {
+    state: Arc<State>,
+    bytes: usize,
+}
+
+impl Drop for HeldBytes {
+    fn drop(&mut self) {
+        self.state.held_bytes.fetch_sub(self.bytes, Ordering::Relaxed);
     }
 }
 
@@ -206,8 +239,8 @@ mod tests {
 
     /// Connections that were opened ten seconds ago.
     fn long_ago() -> Connections {
-        let since = Instant::now().checked_sub(Duration::from_secs(10)).unwrap();
-        Connections { since, ..Connections::new() }
+        let now = Instant::now();
+        Connections { since: now.checked_sub(Duration::from_secs(10)).unwrap_or(now), ..Connections::new() }
     }
 
     fn set_progress(connection: &Connection, ms: u64) {
@@ -272,6 +305,25 @@ mod tests {
             })
             .collect();
         assert!(!is_open(&streams[0]) && streams[1..].iter().all(is_open) && is_open(&plain));
+        // The age of a stream counts, not that of its connection.
+        plain.begin_events();
+        assert!(!is_open(&streams[1]) && streams[2..].iter().all(is_open) && is_open(&plain));
+    }
+
+    #[test]
+    fn where_memory_is_short_those_end_who_take_nothing_of_it() {
+        let connections = long_ago();
+        let [asks, idle, stream, takes, stalled] =
+            [1, 1, 1, 2, 3].map(|number| connections.enter(client(number)));
+        stream.begin_events();
+        let _held = [&takes, &stalled].map(|connection| connection.hold(1 << 20));
+        for connection in [&idle, &stream, &stalled] {
+            set_progress(connection, 0);
+        }
+        asks.end_stalled();
+        assert!(!is_open(&stalled) && [&asks, &idle, &stream, &takes].into_iter().all(is_open));
+        drop(stalled.hold(1));
+        assert_eq!(stalled.state.held_bytes.load(Ordering::Relaxed), 1 << 20);
     }
 
     #[test]
@@ -279,6 +331,9 @@ mod tests {
         let of = |address: &str| Client::of(address.parse().unwrap());
         assert_eq!(of("2001:db8::1"), of("2001:db8::ffff:1"));
         assert_ne!(of("2001:db8::1"), of("2001:db8:0:1::1"));
+        for local in ["fe80", "fd00"] {
+            assert_ne!(of(&format!("{local}::1")), of(&format!("{local}::2")));
+        }
         assert_eq!(of("::ffff:10.0.0.1"), of("10.0.0.1"));
         assert_ne!(of("10.0.0.1"), of("10.0.0.2"));
     }

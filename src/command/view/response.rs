@@ -72,7 +72,7 @@ impl Answer {
         memory: &AnswerMemory,
         connection: &Connection,
     ) -> Response<Body> {
-        let hold = |bytes| memory.hold(connection.client(), bytes);
+        let hold = |bytes| memory.hold(connection, bytes);
         let bytes = match (takes_gzip, self.shared) {
             (true, Some(_)) => Some(self.gzip),
             (false, Some(plain)) => Some(plain),

@@ -227,15 +227,15 @@ impl RayWalk {
         self.entry = exit;
     }
 
-    /// Jumps to the last voxel that single steps reach, which is none beyond `border`: what is crossed at no finite time
-    /// is never crossed.
+    /// Jumps to the last voxel that single steps reach, which is none beyond `border`: crossings at infinite time never
+    /// happen.
     fn advance_to_end(&mut self, border: VoxelIndex) {
         let end: VoxelIndex =
             std::array::from_fn(|axis| self.voxel_before(axis, border[axis], f64::INFINITY, false));
-        for axis in 0..3 {
-            if end[axis] != self.voxel[axis] {
+        for (axis, &last) in end.iter().enumerate() {
+            if last != self.voxel[axis] {
                 // Times ascend: the latest of the last crossings is the last of all.
-                self.entry = self.entry.max(self.crossing(axis, end[axis] - self.step[axis]));
+                self.entry = self.entry.max(self.crossing(axis, last - self.step[axis]));
             }
         }
         self.voxel = end;
@@ -265,6 +265,10 @@ impl RayWalk {
             }
         }
         let Some((time, entry_axis)) = entry else { return true };
+        // Crossings at infinite time never happen.
+        if time == f64::INFINITY {
+            return false;
+        }
         let voxel = std::array::from_fn(|axis| match axis == entry_axis {
             true if self.step[axis] > 0 => region.min[axis],
             true => region.end[axis] - 1,
