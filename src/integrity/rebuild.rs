@@ -6,8 +6,8 @@ use crate::error::{Error, FormatError, Result, is_of_medium};
 use crate::persistence::load::{ReadTable, read_stored_table};
 use crate::space::{Grid, TileIndex};
 use crate::store::{
-    Checksumming, Commits, Disk, Extension, FileChecksum, Layout, MAX_NUMBER, MapParameters, Metadata,
-    Salvage, Snapshot, StoredTile, TileFile, TileVersion, hex, id_from_hex, tile_of_folder,
+    CatalogVersion, Checksumming, Commits, Disk, Extension, FileChecksum, Layout, MAX_NUMBER, MapParameters,
+    Metadata, Salvage, Snapshot, StoredTile, TileFile, TileVersion, hex, id_from_hex, tile_of_folder,
 };
 use crate::tile::format::{Trailer, read_compact_front, read_trailer};
 use rustc_hash::FxHashMap;
@@ -146,6 +146,7 @@ fn index_from_tiles(
         commits: Commits {
             flush_number: known_flush.max(written_flush.unwrap_or(0)).max(logged_flush) + 1,
             scan_number: known_scan.unwrap_or(0).max(logged_scan),
+            catalog: catalog_of(written).or(logged.and_then(|commits| commits.catalog)),
             ..Commits::default()
         },
         waiting: BTreeMap::new(),
@@ -232,6 +233,11 @@ impl Index {
         self.commits.tiles.insert(tile, version);
         Ok(())
     }
+}
+
+/// The catalog of kept scans that `metadata.json` names.
+fn catalog_of(written: Option<&Metadata>) -> Option<CatalogVersion> {
+    written?.ext.as_ref()?.catalog
 }
 
 fn scan_number_of(table: &ReadTable) -> Option<u64> {
@@ -358,6 +364,7 @@ fn identity(layout: &Layout, remains: &Salvage, trailers: &Trailers) -> Result<(
         storage: layout.storage(),
         crs: None,
         keeps_scans: false,
+        catalog: None,
         scan_records: None,
         snapshots: None,
     };

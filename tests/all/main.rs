@@ -58,6 +58,8 @@ mod fuzz_corpus;
 /// Builds that are resumed, maps that are verified and repaired, from the command line.
 #[cfg(feature = "cli")]
 mod interrupted;
+/// Damage to the files of kept scans, of the map and of its snapshots.
+mod kept_damage;
 /// Files of kept scans under the hands of a writer.
 mod kept_scans;
 /// What each folder may know.

@@ -116,8 +116,11 @@ pub(super) fn rework(
     if how.is_dry_run || revision.counts.scans_changed == 0 {
         return Ok(revision.counts);
     }
-    keep_as_it_is(&mut store, how)?;
     let takes_points = !touched.segments.is_empty();
+    if takes_points {
+        store.check_catalogs_of_snapshots()?;
+    }
+    keep_as_it_is(&mut store, how)?;
     let (counts, released) = tidied(disk.clone(), &folder, revision.map(store, touched, &mut progress))?;
     let second = if takes_points { remove_second_map(disk.clone(), &folder) } else { Ok(()) };
     match released {

@@ -1,8 +1,9 @@
 //! The scans that a map keeps, as part of a [`TileStore`].
 
-use super::catalog::{KeptAsOf, KeptRecords, generation_of};
+use super::catalog::{CatalogWriter, KeptAsOf, KeptRecords};
 use super::catalog_entry::{CatalogEntry, SegmentPlace};
 use super::catalog_salvage::{Salvaged, salvage_entries};
+use super::catalog_version::CatalogVersion;
 use super::scan_keeper::{Catalog, unneeded};
 use super::scan_list::read_scans;
 use crate::error::{Error, Result};
@@ -107,7 +108,7 @@ impl TileStore {
     ///
     /// A folder that cannot be listed.
     pub(crate) fn catalog_generation(&self) -> Result<Option<u64>> {
-        generation_of(&**self.disk(), self.layout(), self.commits().flush_number)
+        self.last_commit().generation(&**self.disk(), self.layout())
     }
 
     /// Writes what belongs to the next commit, synced.
@@ -121,8 +122,7 @@ impl TileStore {
 
     /// The last commit, as far as kept scans go.
     pub(crate) fn last_commit(&self) -> KeptAsOf {
-        let commits = self.versions.commits();
-        KeptAsOf { flush_number: commits.flush_number, scan_number: commits.scan_number }
+        KeptAsOf::last_of(self.versions.commits())
     }
 
     /// Removes catalogs and segments that neither the map nor a snapshot needs. What the disk refuses remains until the
@@ -196,14 +196,80 @@ impl TileStore {
         unneeded(&**self.disk(), self.layout(), &flushes, is_new)
     }
 
-    /// The file of the catalog of the last commit, if there is one.
+    /// Checks that the catalogs of the snapshots are whole, before points are taken out of the map: if one is not, nothing
+    /// tells which files may go. A snapshot whose own file is damaged is passed over, and keeps all.
+    ///
+    /// # Errors
+    ///
+    /// A catalog that is damaged or missing, and what to do about it; a disk that refuses.
+    pub(crate) fn check_catalogs_of_snapshots(&self) -> Result<()> {
+        let (disk, layout) = (&**self.disk(), self.layout());
+        let read = |as_of| -> Result<()> {
+            let mut records = KeptRecords::open(disk, layout, as_of)?;
+            while records.next_entry()?.is_some() {}
+            Ok(())
+        };
+        let mut checked = BTreeSet::new();
+        for name in self.snapshot_names()? {
+            let as_of = match self.snapshot(&name) {
+                Ok(snapshot) => kept_as_of(&snapshot),
+                Err(Error::Damaged { .. }) => None,
+                Err(error) if error.is_of_medium() => None,
+                Err(error) => return Err(error),
+            };
+            let as_of = as_of.filter(|as_of| as_of.catalog.is_none_or(|catalog| checked.insert(catalog)));
+            match as_of.map_or(Ok(()), read) {
+                Err(Error::Damaged { path, tile, mut cause }) => {
+                    cause.reason.push_str(&format!(
+                        "; the snapshot {name} needs it; nothing was changed: repair the map or delete the snapshot, \
+                         and run this again"
+                    ));
+                    return Err(Error::Damaged { path, tile, cause });
+                }
+                read => read?,
+            }
+        }
+        Ok(())
+    }
+
+    /// The file of the catalog of a flush, if it has one.
     ///
     /// # Errors
     ///
     /// A folder that cannot be listed.
-    pub(crate) fn catalog_path(&self) -> Result<Option<PathBuf>> {
-        let generation = self.catalog_generation()?;
+    pub(crate) fn catalog_path(&self, as_of: KeptAsOf) -> Result<Option<PathBuf>> {
+        let generation = as_of.generation(&**self.disk(), self.layout())?;
         Ok(generation.map(|generation| self.layout().catalog(generation)))
+    }
+
+    /// Writes a catalog that a snapshot is to name in place of its own, in a commit of its own; as long as it is not
+    /// named, it is a leftover.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses; a damaged catalog of the map itself, in a map of a version that did not name it.
+    pub(crate) fn write_other_catalog(
+        &mut self,
+        write: impl FnOnce(&mut dyn FnMut(&CatalogEntry) -> Result<()>) -> Result<()>,
+    ) -> Result<CatalogVersion> {
+        self.finish_earlier_work()?;
+        if self.keeper.is_on() && self.commits().catalog.is_none() {
+            // From here on the newest is no longer the map's own.
+            let own = self.keeper.find_committed(&self.files, KeptAsOf::last_of(self.versions.commits()))?;
+            self.versions.set_catalog(own.map_or(CatalogVersion::NONE, Catalog::version));
+        }
+        let generation = self.commits().flush_number + 1;
+        let path = self.layout().catalog(generation);
+        let refused = |error| Error::io(&path, "write", error);
+        self.keeper.make_folder(&self.files)?;
+        let mut out = CatalogWriter::create(&**self.disk(), self.layout(), generation).map_err(refused)?;
+        write(&mut |entry| out.put(entry, generation).map_err(refused))?;
+        let catalog = out.finish().map_err(refused)?;
+        self.files.sync_folder(&self.layout().kept_scans())?;
+        let listed = self.snapshot_list().cloned().unwrap_or_default();
+        self.commit_snapshots(listed)?;
+        self.tidy_up();
+        Ok(catalog)
     }
 
     /// The segments and catalogs that neither the map nor one of its snapshots needs, as far as their catalogs can be
@@ -227,10 +293,10 @@ impl TileStore {
         let mut generations = BTreeSet::new();
         if self.keeps_scans() {
             flushes.extend(segments.is_none().then_some(last_commit));
-            generations.extend(generation_of(disk, layout, last_commit.flush_number)?);
+            generations.extend(last_commit.generation(disk, layout)?);
         }
         for as_of in flushes {
-            generations.extend(generation_of(disk, layout, as_of.flush_number)?);
+            generations.extend(as_of.generation(disk, layout)?);
             salvage_entries(disk, layout, as_of, &mut |entry| {
                 if let Salvaged::Whole(CatalogEntry::Kept(scan)) = entry {
                     needed.insert(scan.place.segment);
@@ -288,16 +354,15 @@ impl TileStore {
 }
 
 /// The flush of a snapshot, if it keeps its scans.
-fn kept_as_of(snapshot: &Snapshot) -> Option<KeptAsOf> {
+pub(crate) fn kept_as_of(snapshot: &Snapshot) -> Option<KeptAsOf> {
     let keeps_scans = snapshot.metadata.ext.as_ref().is_some_and(|ext| ext.keeps_scans);
-    let (flush_number, scan_number) = (snapshot.commits.flush_number, snapshot.commits.scan_number);
-    keeps_scans.then_some(KeptAsOf { flush_number, scan_number })
+    keeps_scans.then(|| KeptAsOf::last_of(&snapshot.commits))
 }
 
 /// What a map had before its scans were kept: its list of scans, and what is not in it.
 fn entries_before(
     files: &MapFiles,
-    KeptAsOf { flush_number, scan_number }: KeptAsOf,
+    KeptAsOf { flush_number, scan_number, .. }: KeptAsOf,
     has_tiles: bool,
 ) -> Result<Vec<CatalogEntry>> {
     let mut entries = Vec::new();

@@ -175,7 +175,7 @@ impl TileStore {
 
     /// Commits which snapshots the map has, and nothing else: what is written of tiles stays uncommitted. It is a flush
     /// of its own in the log, so that whatever ends the process is found like any other.
-    fn commit_snapshots(&mut self, listed: SnapshotList) -> Result<()> {
+    pub(in crate::store) fn commit_snapshots(&mut self, listed: SnapshotList) -> Result<()> {
         self.committer.check_lock()?;
         self.keep_for_late_readers();
         match self.committer.append_snapshots(&self.files, &self.versions, listed) {
@@ -219,7 +219,8 @@ impl TileStore {
     }
 
     /// Deletes a snapshot, and the tables that no other one sees. One that is damaged, cannot be read or is missing can
-    /// be deleted too: from then on nothing is kept for it.
+    /// be deleted too: from then on nothing is kept for it. One whose deletion was interrupted after its commit is gone
+    /// since the map was opened: that is no error.
     ///
     /// # Errors
     ///
@@ -235,6 +236,8 @@ impl TileStore {
                 return Err(FormatError::at_offset(0, reason).in_map(&path, None));
             }
             _ if is_listed => {}
+            // By an attempt that was killed after its commit.
+            Ok(_) if self.snapshots_removed.contains(name) => return Ok(()),
             // Says which ones there are.
             Ok(_) => return self.snapshot(name).map(drop),
             Err(error) => return Err(Error::io(&path, "look at", error)),
@@ -244,11 +247,13 @@ impl TileStore {
         if self.map_id().is_some() {
             self.commit_snapshots(listed)?;
         }
-        self.checkpoint.remove_snapshot(name);
         self.finish_snapshot_commit();
         if let Err(error) = self.release_unseen() {
             log::warn!("deleted, but its tables stay until the map is opened again: {error:#}");
         }
+        // Last: as long as the file is there, the same command completes a deletion that was killed.
+        self.checkpoint.remove_snapshot(name);
+        self.finish_snapshot_commit();
         Ok(())
     }
 
@@ -272,8 +277,13 @@ impl TileStore {
         Ok(())
     }
 
-    /// Removes the kept tables that no snapshot and no reader sees any more.
-    fn release_unseen(&mut self) -> Result<()> {
+    /// Looks at the snapshots anew, and removes the kept tables and kept scans that none of them and no reader needs any
+    /// more.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses.
+    pub fn release_unseen(&mut self) -> Result<()> {
         let Some(map_id) = self.map_id() else { return Ok(()) };
         let (listed, pinned) = (self.committer.snapshots(), self.kept.snapshots().pinned());
         let tiles: Vec<_> = pinned.keys().copied().collect();
