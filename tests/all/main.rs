@@ -42,6 +42,8 @@ mod cli_snapshots;
 mod convert;
 /// Every byte of every file of a map, damaged: found, named, repaired.
 mod corruption;
+/// Deletions of snapshots that are killed.
+mod deletions;
 /// Errors: what they say, their causes, what they are about.
 #[cfg(feature = "cli")]
 mod errors;

@@ -145,7 +145,9 @@ impl CatalogReader {
         let (flush, entry) =
             CatalogEntry::read(&self.payload).ok_or_else(|| wrong("a record of a newer version"))?;
         match self.named {
-            Some(named) if flush < named.generation => return Err(wrong(IS_EARLIER).into()),
+            Some(named) if !named.has_flush(flush, self.flush_number) => {
+                return Err(wrong(IS_OF_ANOTHER).into());
+            }
             None if flush > self.flush_number => return Ok(None),
             _ => {}
         }
@@ -283,7 +285,7 @@ pub(crate) fn whole_fronts(disk: &dyn Disk, layout: &Layout, fronts: &[CatalogVe
 /// What is wrong with a catalog that the log names.
 pub(super) const IS_MISSING: &str = "the file is missing";
 pub(super) const IS_ANOTHER: &str = "the file does not match its checksum in commits.log";
-pub(super) const IS_EARLIER: &str = "a record of an earlier catalog";
+pub(super) const IS_OF_ANOTHER: &str = "a record of another catalog";
 
 /// The newest generation up to a flush; `None` if there is none.
 fn newest_generation(disk: &dyn Disk, layout: &Layout, flush_number: u64) -> Result<Option<u64>> {

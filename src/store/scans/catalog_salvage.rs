@@ -1,6 +1,8 @@
 //! What can still be read of a catalog that is damaged.
 
-use super::catalog::{FRAME_BYTES, HEADER, IS_ANOTHER, IS_EARLIER, IS_MISSING, KeptAsOf, checksum_of_front};
+use super::catalog::{
+    FRAME_BYTES, HEADER, IS_ANOTHER, IS_MISSING, IS_OF_ANOTHER, KeptAsOf, checksum_of_front,
+};
 use super::catalog_entry::CatalogEntry;
 use crate::error::{Error, FormatError, Result, is_of_medium};
 use crate::store::disk::{Disk, DiskRead};
@@ -22,8 +24,8 @@ pub(crate) enum Salvaged {
 
 /// Passes on what can be read of the catalog as of a flush, in order. Records that are damaged are passed over, and
 /// where scans are missing for it, their numbers are passed on as those of unknown scans: numbers follow each other
-/// without a gap up to that of the flush. Of a file that is whole and not the one that the log names, nothing is passed
-/// on: it may have scans that were removed. Returns what is damaged.
+/// without a gap up to that of the flush. Of a file that is not the one that the log names, nothing is passed on: it may
+/// have scans that were removed. Returns what is damaged.
 ///
 /// # Errors
 ///
@@ -50,6 +52,7 @@ pub(crate) fn salvage_entries(
         last: 0,
         doubtful: None,
         has_hole: false,
+        is_another: false,
         damage: Vec::new(),
     };
     let mut salvage = begin();
@@ -58,7 +61,7 @@ pub(crate) fn salvage_entries(
     {
         salvage.read(&mut |_| Ok(()))?;
         salvage.end(&mut |_| Ok(()))?;
-        if salvage.damage.is_empty() {
+        if salvage.damage.is_empty() || salvage.is_another {
             put(Salvaged::Lost(if as_of.scan_number == 0 { lost_operation() } else { lost }))?;
             return Ok(vec![salvage.wrong(0, IS_ANOTHER)]);
         }
@@ -79,6 +82,8 @@ struct Salvage<'a> {
     doubtful: Option<Error>,
     /// Whether something is missing before the next entry.
     has_hole: bool,
+    /// Whether it has records of another catalog.
+    is_another: bool,
     damage: Vec<Error>,
 }
 
@@ -105,10 +110,12 @@ impl Salvage<'_> {
             let Some(found) = self.unless_unreadable(found, "read")? else { return Ok(()) };
             match found {
                 Found::Record(_, flush_number, next)
-                    if named.is_some_and(|named| flush_number < named.generation || next > named.bytes) =>
+                    if named.is_some_and(|named| {
+                        !named.has_flush(flush_number, last_flush) || next > named.bytes
+                    }) =>
                 {
-                    self.damage.push(self.wrong(at, IS_EARLIER));
-                    self.has_hole = true;
+                    self.damage.push(self.wrong(at, IS_OF_ANOTHER));
+                    (self.has_hole, self.is_another) = (true, true);
                     at = next;
                 }
                 Found::Record(entry, flush_number, next) if named.is_some() || flush_number <= last_flush => {

@@ -144,7 +144,8 @@ impl TileStore {
             return Ok(());
         };
         let is_new = |segment| self.keeper.is_writing(segment);
-        let files = self.unneeded_scans(flushes, is_new)?;
+        let (files, highest) = self.unneeded_scans(flushes, is_new)?;
+        self.keeper.note_segment(highest);
         for path in &files {
             self.files.remove_file(path)?;
             self.leftovers_removed += 1;
@@ -181,15 +182,17 @@ impl TileStore {
 
     /// The same where the snapshots are known.
     pub(in crate::store) fn idle_scan_files_beside(&self, snapshots: &[Snapshot]) -> Result<Vec<PathBuf>> {
-        self.unneeded_scans(snapshots.iter().filter_map(kept_as_of).collect(), |_| false)
+        let flushes = snapshots.iter().filter_map(kept_as_of).collect();
+        self.unneeded_scans(flushes, |_| false).map(|(files, _)| files)
     }
 
-    /// The catalogs and segments that neither the last commit needs nor one of these flushes.
+    /// The catalogs and segments that neither the last commit needs nor one of these flushes, and the highest segment
+    /// that one needs.
     fn unneeded_scans(
         &self,
         mut flushes: Vec<KeptAsOf>,
         is_new: impl Fn(u64) -> bool,
-    ) -> Result<Vec<PathBuf>> {
+    ) -> Result<(Vec<PathBuf>, u64)> {
         if self.is_keeping_scans() {
             flushes.push(self.last_commit());
         }

@@ -36,6 +36,8 @@ pub(in crate::store) struct ScanKeeper {
     /// Whether that came while a replacement was made.
     is_replacement_suspect: bool,
     has_new_names: bool,
+    /// The highest segment that a catalog names, as far as catalogs were read: one that is lost gets no other's scans.
+    highest_segment: u64,
     /// A catalog that was begun for a commit, which may not have come.
     begun: Option<u64>,
 }
@@ -114,6 +116,11 @@ impl ScanKeeper {
             || self.segment.as_ref().is_some_and(|open| open.segment == segment)
     }
 
+    /// Notes that a catalog names segments up to this one.
+    pub(in crate::store) fn note_segment(&mut self, segment: u64) {
+        self.highest_segment = self.highest_segment.max(segment);
+    }
+
     /// Whether there is something for the next commit.
     pub(in crate::store) fn has_news(&self) -> bool {
         !self.pending.is_empty() || self.replacement.is_some()
@@ -147,7 +154,9 @@ impl ScanKeeper {
         let (disk, layout) = (&**files.disk(), files.layout());
         if self.segment.as_ref().is_none_or(SegmentWriter::is_full) {
             self.make_folder(files)?;
-            let segment = segments_in(disk, layout)?.last().map_or(1, |last| last + 1);
+            let last = segments_in(disk, layout)?.last().copied().unwrap_or_default();
+            let segment = last.max(self.highest_segment) + 1;
+            self.highest_segment = segment;
             self.segment = Some(SegmentWriter::create(disk, layout, segment)?);
             self.has_new_names = true;
         }
@@ -383,7 +392,9 @@ impl ScanKeeper {
         remove_catalogs_after(files, last_commit.flush_number)?;
         let generation = last_commit.generation(disk, layout)?;
         let mut records = KeptRecords::open(disk, layout, last_commit)?;
-        while records.next_entry()?.is_some() {}
+        while let Some(scan) = records.next_kept()? {
+            self.highest_segment = self.highest_segment.max(scan.place.segment);
+        }
         let extent = generation.and_then(|generation| records.extent(generation));
         let found = extent.map(|(version, has_excess)| Catalog { version, has_excess });
         self.committed = Some(found);
@@ -442,7 +453,8 @@ impl ScanKeeper {
     }
 }
 
-/// The catalogs and segments that no flush in `flushes` needs, in order; new segments are left out.
+/// The catalogs and segments that no flush in `flushes` needs, in order; new segments are left out. Also returns the
+/// highest segment that one needs.
 ///
 /// # Errors
 ///
@@ -452,11 +464,13 @@ pub(in crate::store) fn unneeded(
     layout: &Layout,
     flushes: &[KeptAsOf],
     is_new: impl Fn(u64) -> bool,
-) -> Result<Vec<PathBuf>> {
+) -> Result<(Vec<PathBuf>, u64)> {
     let folder = layout.kept_scans();
     let mut names = match disk.list(&folder) {
         // A map that keeps scans and lacks the folder is damaged.
-        Err(error) if error.kind() == io::ErrorKind::NotFound && flushes.is_empty() => return Ok(Vec::new()),
+        Err(error) if error.kind() == io::ErrorKind::NotFound && flushes.is_empty() => {
+            return Ok((Vec::new(), 0));
+        }
         Err(error) if error.kind() == io::ErrorKind::NotFound => Vec::new(),
         names => names.map_err(|error| Error::io(&folder, "list", error))?,
     };
@@ -475,7 +489,8 @@ pub(in crate::store) fn unneeded(
         _ => false,
     });
     names.sort_unstable();
-    Ok(names.iter().map(|name| folder.join(name)).collect())
+    let highest = segments.last().copied().unwrap_or_default();
+    Ok((names.iter().map(|name| folder.join(name)).collect(), highest))
 }
 
 /// Those of some flushes whose catalogs have the records of all: where several see the beginning of one, the last.
