@@ -130,7 +130,10 @@ pub fn verify_scope(
     let Some(store) = verifier.open()? else { return Ok(verifier.counts) };
     if let Some(config) = verifier.config_of(&store)? {
         verifier.verify_map(&store, &config)?;
-        drop(store);
+        let first = verifier.opened.clone();
+        verifier.look_again()?;
+        (verifier.opened, verifier.before, verifier.is_again) = (first, None, false);
+        verifier.verify_surroundings(&store)?;
         verifier.look_again()?;
     }
     Ok(verifier.counts)
@@ -249,11 +252,19 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
             return Ok(());
         }
         self.verify_snapshots(store, config)?;
-        self.verify_kept_scans(store, None)?;
+        self.verify_kept_scans(store, None)
+    }
+
+    /// Looks for what is no part of the map.
+    fn verify_surroundings(&mut self, store: &TileStore) -> Result<()> {
+        if !self.scope.has_rest() {
+            return Ok(());
+        }
+        self.listed = store.snapshot_list().cloned();
         for path in find_idle(&self.disk, store)? {
             self.leftover(&path, None, IDLE_SCANS);
         }
-        self.look_around(store, |tile| tiles.binary_search(&tile).is_ok())
+        self.look_around(store, |tile| store.contains(tile))
     }
 
     /// Looks again at what seemed damaged, until each is damaged or whole as of one flush.
@@ -286,12 +297,12 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
             let Some(config) = self.config_of(&store)? else { return Ok(()) };
             self.verify_suspects(&store, &config, suspects)?;
         }
-        self.counts.unsettled = self.suspects.len();
-        if self.counts.unsettled > 0 {
+        let unsettled = std::mem::take(&mut self.suspects).len();
+        if unsettled > 0 {
+            self.counts.unsettled += unsettled;
             let reason = format!(
-                "other processes changed the map during each of {MOST_LOOKS} looks at what may be damaged ({} \
-                 findings); verify it while nothing changes it",
-                self.counts.unsettled
+                "other processes changed the map during each of {MOST_LOOKS} looks at what may be damaged \
+                 ({unsettled} findings); verify it while nothing changes it"
             );
             self.is_again = false;
             self.report(Finding::note(self.layout.folder(), None, reason));

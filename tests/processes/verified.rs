@@ -5,7 +5,7 @@ use std::process::Stdio;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
-use testkit::memory_folder;
+use testkit::memory_folder::memory_folder;
 use voxtile::MapReader;
 use voxtile::integrity::{Finding, Severity, verify};
 
