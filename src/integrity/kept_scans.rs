@@ -16,8 +16,8 @@ struct Needed {
     by: Option<SnapshotName>,
 }
 
-/// Reads every scan that a map and its snapshots keep, or those of them with points in some places. Each catalog and the
-/// points of each scan are read once, whoever needs them. `found` is told each finding, and of which points it is.
+/// Reads every scan that a map and its snapshots keep, or those of them with points in some places. Each catalog and
+/// the points of each scan are read once, whoever needs them. `found` is told each finding, and of which points it is.
 ///
 /// # Errors
 ///

@@ -82,8 +82,8 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         Ok(true)
     }
 
-    /// Gives snapshots whose kept scans are damaged other catalogs: as for the map itself, they list a scan with damaged
-    /// points as one without points, and one whose record is damaged as an unknown one.
+    /// Gives snapshots whose kept scans are damaged other catalogs: as for the map itself, they list a scan with
+    /// damaged points as one without points, and one whose record is damaged as an unknown one.
     pub(super) fn repair_scans_of_snapshots(
         &mut self,
         store: &mut TileStore,

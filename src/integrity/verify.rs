@@ -54,9 +54,9 @@ impl Verification {
     }
 }
 
-/// Checks every file of a map, beside a writer too. Takes no lock and writes nothing. What seems damaged is read a second
-/// time. It is damage if both looks find it as of the same flush; if the map was changed in between, it is looked at
-/// again as of the last flush.
+/// Checks every file of a map, beside a writer too. Takes no lock and writes nothing. What seems damaged is read a
+/// second time. It is damage if both looks find it as of the same flush; if the map was changed in between, it is looked
+/// at again as of the last flush.
 ///
 /// `found` is told each finding, `progress` the tiles done and all. Memory: the list of tiles, where there is damage a
 /// second one, and one tile.

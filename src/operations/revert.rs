@@ -46,7 +46,8 @@ pub struct Reverted {
 ///
 /// [`Error::InvalidArgument`] if there is no such snapshot, [`Error::AlreadyExists`] if there is one with the name
 /// `keep_as` and of another state; no map there, another writer, a damaged table, damaged kept scans of the snapshot, a
-/// disk that refuses. The map is as it was then; a snapshot `keep_as` may have been made, unless kept scans are damaged.
+/// disk that refuses. The map is as it was then; a snapshot `keep_as` may have been made, unless kept scans are
+/// damaged.
 pub fn revert(
     folder: impl Into<MapPath>,
     name: &SnapshotName,
@@ -140,8 +141,8 @@ fn check_is_of_map(store: &TileStore, past: &TileStore) -> Result<()> {
     Ok(())
 }
 
-/// Checks that the scans which a snapshot keeps are there. Those that the map keeps, too, are not read: they are as whole
-/// after a revert as before it.
+/// Checks that the scans which a snapshot keeps are there. Those that the map keeps, too, are not read: they are as
+/// whole after a revert as before it.
 fn check_kept_scans(store: &TileStore, past: &TileStore) -> Result<()> {
     let (disk, layout) = (&**past.disk(), past.layout());
     let mut own = store.keeps_scans().then(|| store.kept_records().ok()).flatten();

@@ -33,7 +33,8 @@ fn damage_in(map: &Path) -> (Vec<String>, u64) {
     (damage, verification.unsettled)
 }
 
-/// For `VOXTILE_READER_SECONDS`: processes change a map, each of which removes what the one before has kept for readers.
+/// For `VOXTILE_READER_SECONDS`: processes change a map, each of which removes what the one before has kept for
+/// readers.
 #[test]
 fn verify_finds_no_damage_in_a_map_that_is_remapped_and_reverted_meanwhile() {
     let scans = Scans::new(8, 1);

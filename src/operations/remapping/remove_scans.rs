@@ -55,8 +55,8 @@ pub struct SnapshotFailure {
 /// removes no scan; of times that the map has none of, nothing tells whether it had, unless files are left.
 ///
 /// Snapshots stay what they are, with what they hold of these scans, unless `from_snapshots`: then those that hold any
-/// are deleted, one by one after the scans are gone from the map. Where that was interrupted, or is asked for later, the
-/// same call deletes those that are left. `progress` is told the scans done and all.
+/// are deleted, one by one after the scans are gone from the map. Where that was interrupted, or is asked for later,
+/// the same call deletes those that are left. `progress` is told the scans done and all.
 ///
 /// # Errors
 ///
@@ -95,8 +95,8 @@ pub fn remove_scans(
     Ok(removed)
 }
 
-/// Takes the scans out of the map itself. Where only snapshots hold any, and these are to go, the map stays. Also returns
-/// whether an earlier call did it.
+/// Takes the scans out of the map itself. Where only snapshots hold any, and these are to go, the map stays. Also
+/// returns whether an earlier call did it.
 fn remove_from_map(
     path: impl Fn() -> MapPath,
     scans: &ScanSelection,

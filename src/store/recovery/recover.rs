@@ -133,8 +133,8 @@ fn settle_snapshots(
     tolerate(disk.sync_folder(&folder), &folder, "sync")
 }
 
-/// Whether a file of the folder of snapshots is what a deletion left that did not come to its end: it says itself that it
-/// is the snapshot, and the log does not list it. What somebody else put there stays.
+/// Whether a file of the folder of snapshots is what a deletion left that did not come to its end: it says itself that
+/// it is the snapshot, and the log does not list it. What somebody else put there stays.
 fn is_deleted_snapshot(
     disk: &dyn Disk,
     layout: &Layout,

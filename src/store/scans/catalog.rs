@@ -165,8 +165,8 @@ impl CatalogReader {
 
 impl CatalogReader {
     /// What a record is that is not whole, by what is left of it: the end, if a flush that did not come to its commit
-    /// has begun to write it (zeros where nothing reached the medium, or the number of a later flush), else damage. What
-    /// the log names was committed.
+    /// has begun to write it (zeros where nothing reached the medium, or the number of a later flush), else damage.
+    /// What the log names was committed.
     fn end_or_damage(&self, reason: &str) -> std::result::Result<Option<CatalogEntry>, DecodeError> {
         let number = self.payload.first_chunk().map_or(0, |bytes| u64::from_le_bytes(*bytes));
         if self.named.is_none() && (number == 0 || number > self.flush_number) {

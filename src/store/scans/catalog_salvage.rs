@@ -24,8 +24,8 @@ pub(crate) enum Salvaged {
 
 /// Passes on what can be read of the catalog as of a flush, in order. Records that are damaged are passed over, and
 /// where scans are missing for it, their numbers are passed on as those of unknown scans: numbers follow each other
-/// without a gap up to that of the flush. Of a file that is not the one that the log names, nothing is passed on: it may
-/// have scans that were removed. Returns what is damaged.
+/// without a gap up to that of the flush. Of a file that is not the one that the log names, nothing is passed on: it
+/// may have scans that were removed. Returns what is damaged.
 ///
 /// # Errors
 ///

@@ -18,8 +18,8 @@ impl CatalogVersion {
     /// Length in a record of the log.
     pub(in crate::store) const BYTES: usize = 20;
 
-    /// Whether a record of a flush can be among those that a flush sees: they are as old as the catalog at most. One that
-    /// a repair gave a snapshot is of one flush.
+    /// Whether a record of a flush can be among those that a flush sees: they are as old as the catalog at most. One
+    /// that a repair gave a snapshot is of one flush.
     pub(super) fn has_flush(self, flush_number: u64, last: u64) -> bool {
         (self.generation..=last.max(self.generation)).contains(&flush_number)
     }

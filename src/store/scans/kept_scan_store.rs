@@ -165,8 +165,8 @@ impl TileStore {
     }
 
     /// The catalogs and segments that neither the last commit nor a snapshot needs, in order: a writer that ended early
-    /// did not remove them, or one at work has not committed them yet. `None` where a snapshot cannot be read, which may
-    /// need any of them.
+    /// did not remove them, or one at work has not committed them yet. `None` where a snapshot cannot be read, which
+    /// may need any of them.
     ///
     /// # Errors
     ///
@@ -199,8 +199,8 @@ impl TileStore {
         unneeded(&**self.disk(), self.layout(), &flushes, is_new)
     }
 
-    /// Checks that the catalogs of the snapshots are whole, before points are taken out of the map: if one is not, nothing
-    /// tells which files may go. A snapshot whose own file is damaged is passed over, and keeps all.
+    /// Checks that the catalogs of the snapshots are whole, before points are taken out of the map: if one is not,
+    /// nothing tells which files may go. A snapshot whose own file is damaged is passed over, and keeps all.
     ///
     /// # Errors
     ///

@@ -277,8 +277,8 @@ impl TileStore {
         Ok(())
     }
 
-    /// Looks at the snapshots anew, and removes the kept tables and kept scans that none of them and no reader needs any
-    /// more.
+    /// Looks at the snapshots anew, and removes the kept tables and kept scans that none of them and no reader needs
+    /// any more.
     ///
     /// # Errors
     ///
