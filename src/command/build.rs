@@ -319,9 +319,15 @@ fn begin(
     name: &str,
 ) -> anyhow::Result<Option<u64>> {
     let inputs = mapper.inputs();
-    // Of inputs that begin with many scans without points nothing tells one from another but what comes later.
+    // Of inputs that begin with many scans without points nothing tells one from another but what comes later, and their
+    // names, where the map has nothing else.
     let is_this = |input: &InputRecord| {
-        input.content.as_ref().is_some_and(|content| content.begins_with.as_deref() == intake.begins_with())
+        let is_known = |content: &InputContent| content.begins_with.is_some() || input.is_named(name);
+        let is_same = |content: &InputContent| {
+            content.begins_with.as_deref() == intake.begins_with()
+                || (is_known(content) && intake.begins_as(content))
+        };
+        input.content.as_ref().is_some_and(is_same)
     };
     if let Some(at) = inputs.iter().rposition(is_this).filter(|_| !args.again) {
         let content = inputs[at].content.clone().unwrap_or_default();

@@ -128,6 +128,23 @@ impl Intake {
         self.begins_with.as_deref()
     }
 
+    /// Whether an input of which a map has this is as this one begins.
+    pub fn begins_as(&self, content: &InputContent) -> bool {
+        let (Some(_), None) = (&self.begins_with, &content.begins_with) else {
+            return content.begins_with == self.begins_with;
+        };
+        // The map has but the scans without points that come first.
+        let (mut chain, mut reads) = (ScanChain::default(), self.lead.iter());
+        while chain.scans() < content.scans {
+            match reads.next() {
+                Some(Read::Unread(_)) if content.skipped.contains(&chain.scans()) => chain.add_unread(),
+                Some(Read::LeftOut(mark) | Read::Scan(ReadScan { mark, .. })) => chain.add(mark),
+                _ => return false,
+            }
+        }
+        chain.scan_text() == content.scan_chain
+    }
+
     /// How maps of earlier versions know this input; `None` if it was asked to stop before that was known.
     pub fn fingerprint(&mut self) -> anyhow::Result<Option<crate::Result<String>>> {
         self.reader.fingerprint()

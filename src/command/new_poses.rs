@@ -1,5 +1,5 @@
 use crate::command::args::RemapArgs;
-use crate::command::read_options::pose_of;
+use crate::command::read_options::{pose_of, tolerance_ns};
 use crate::io::{ReadOptions, read_poses};
 use crate::mapper::MapReader;
 use crate::operations::NewPoses;
@@ -7,8 +7,8 @@ use crate::scan::Pose;
 use crate::store::KeptRecord;
 use crate::{Error, Result};
 use std::path::Path;
-use voxtile_clouds::RigidPose;
 use voxtile_clouds::poses::{Found, Trajectory};
+use voxtile_clouds::{Budget, RigidPose};
 
 /// Most scans that an error names.
 const MOST_NAMED: usize = 5;
@@ -21,13 +21,17 @@ pub struct PoseFile<'a> {
     /// Where the sensor is in the body that the poses are of.
     pub body_from_sensor: Option<RigidPose>,
     pub tolerance_ns: i64,
+    pub budget: Budget,
 }
 
 impl<'a> PoseFile<'a> {
     pub fn of_remap(args: &'a RemapArgs, path: &'a Path) -> Result<Self> {
         let body_from_sensor = args.extrinsic.as_deref().map(pose_of).transpose()?.map(|(rigid, _)| rigid);
-        let tolerance_ns = (args.pose_tolerance * 1e9).round() as i64;
-        Ok(Self { path, calib: args.calib.as_deref(), body_from_sensor, tolerance_ns })
+        let tolerance_ns = tolerance_ns(args.pose_tolerance)?;
+        // Where builds put what they cannot hold: the system's folder may be in memory.
+        let scratch = args.map.ancestors().skip(1).find(|folder| folder.is_dir()).unwrap_or(Path::new("."));
+        let budget = Budget { scratch: Some(scratch.to_owned()), ..Budget::default() };
+        Ok(Self { path, calib: args.calib.as_deref(), body_from_sensor, tolerance_ns, budget })
     }
 
     /// `None` if scans are to keep their own poses.
@@ -38,6 +42,7 @@ impl<'a> PoseFile<'a> {
             calib: options.calib.as_deref(),
             body_from_sensor: (body != RigidPose::IDENTITY).then_some(body),
             tolerance_ns: options.clouds.pose_tolerance_ns,
+            budget: options.open.budget(),
         })
     }
 }
@@ -55,14 +60,23 @@ pub fn records_of(reader: &MapReader) -> Result<Vec<KeptRecord>> {
 
 /// The poses of a file for the scans that a map keeps, as a build with that file would give them.
 pub fn poses_for(from: &PoseFile<'_>, scans: &[KeptRecord]) -> Result<NewPoses> {
-    let &PoseFile { path: file, calib, body_from_sensor, tolerance_ns } = from;
+    let &PoseFile { path: file, calib, body_from_sensor, tolerance_ns, ref budget } = from;
+    if std::fs::metadata(file).is_ok_and(|meta| !meta.is_file() && !meta.is_dir()) {
+        let reason =
+            "is a FIFO, a socket or a device, and new poses may be read twice: save what it gives to a file";
+        return Err(Error::argument(file.display().to_string(), reason));
+    }
     let is_plain = calib.is_none() && body_from_sensor.is_none();
-    let trajectory = Trajectory::read(file, calib)?;
+    let trajectory = Trajectory::read_within(file, calib, budget)?;
     // Stamps that mean nothing are all the same.
     if trajectory.span_ns()?.is_none_or(|[first, last]| first < last) {
         trajectory.remarks().iter().for_each(|remark| log::warn!("{}: {remark}", file.display()));
     }
-    if trajectory.len() == scans.len() && is_in_step(&trajectory, scans, tolerance_ns)? {
+    let have_stamps = scans.iter().all(|scan| scan.stamp_ns.is_some());
+    // Lines in another order than time belong to scans by their stamps alone.
+    let is_by_line = !(have_stamps && trajectory.goes_back());
+    if is_by_line && trajectory.len() == scans.len() && is_in_step(&trajectory, scans, tolerance_ns)? {
+        trajectory.check_order()?;
         // As a folder of PCD takes them, to the bit.
         if is_plain
             && let Ok(poses) = read_poses(file)
@@ -78,7 +92,7 @@ pub fn poses_for(from: &PoseFile<'_>, scans: &[KeptRecord]) -> Result<NewPoses> 
         }
         return Ok(NewPoses::InOrder(poses));
     }
-    if !trajectory.has_stamps() || scans.iter().any(|scan| scan.stamp_ns.is_none()) {
+    if !trajectory.has_stamps() || !have_stamps {
         let reason = other_number(trajectory.len(), scans);
         return Err(Error::argument(file.display().to_string(), reason));
     }

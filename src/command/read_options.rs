@@ -9,14 +9,19 @@ use voxtile_clouds::read::OpenOptions;
 /// Most seconds that a tolerance or a period may have.
 const MOST_S: f64 = 1e9;
 
+/// The nanoseconds of `--pose-tolerance`.
+pub fn tolerance_ns(seconds: f64) -> Result<i64> {
+    match (0.0..=MOST_S).contains(&seconds) {
+        true => Ok((seconds * 1e9).round() as i64),
+        false => {
+            let reason = format!("{seconds} is no time in seconds, from 0 to {MOST_S}");
+            Err(Error::argument("--pose-tolerance", reason))
+        }
+    }
+}
+
 /// What the command line says of the input.
 pub fn read_options(args: &ReadArgs) -> Result<ReadOptions> {
-    if !(0.0..=MOST_S).contains(&args.pose_tolerance) {
-        return Err(Error::argument(
-            "--pose-tolerance",
-            format!("{} is no time in seconds", args.pose_tolerance),
-        ));
-    }
     let extrinsic = args.extrinsic.as_deref().map(pose_of).transpose()?;
     let body_from_sensor = extrinsic.map_or(RigidPose::IDENTITY, |(rigid, _)| rigid);
     let open = OpenOptions {
@@ -29,7 +34,7 @@ pub fn read_options(args: &ReadArgs) -> Result<ReadOptions> {
         ..OpenOptions::default()
     };
     let clouds = CloudOptions {
-        pose_tolerance_ns: (args.pose_tolerance * 1e9).round() as i64,
+        pose_tolerance_ns: tolerance_ns(args.pose_tolerance)?,
         body_from_sensor,
         is_world_frame: args.world_frame,
         is_deskewed: args.deskew,

@@ -24,10 +24,11 @@ impl fmt::Display for Unanswered {
         }
         write!(
             f,
-            " in {:.1} s and {} attempts; check the network and the server and try again, or allow more than {} s \
+            " in {:.1} s and {} attempt{}; check the network and the server and try again, or allow more than {} s \
              without progress (--bucket-timeout, VOXTILE_BUCKET_TIMEOUT)",
             self.waited.as_secs_f64(),
             self.attempts,
+            if self.attempts == 1 { "" } else { "s" },
             self.limit.as_secs_f64()
         )
     }

@@ -1,3 +1,4 @@
+use super::pcd::is_special;
 use super::pcd_clouds::PcdClouds;
 use super::pcd_folder::{PcdFolder, pcd_files_of};
 use super::pose_source::{IDENTITY, is_placed, pose_file_for};
@@ -102,18 +103,26 @@ fn open_pcd(path: &Path, options: &ReadOptions) -> Result<Box<dyn ScanSource + S
     let have_own = !are_named && (count == 1 || files.iter().any(|file| is_placed(file)));
     let are_missing = !are_named && !have_own && options.clouds.may_lack_poses;
     let is_plain = options.calib.is_none() && options.clouds.is_plain() && origin_m.is_none();
-    let are_by_line = match pose_file.as_deref() {
-        Some(poses) => are_line_by_line(poses, &files, options)?,
-        None => true,
-    };
-    if is_plain && are_by_line && !are_missing {
-        let poses = options.poses.as_deref();
-        return match path.is_dir() {
-            true => Ok(Box::new(PcdFolder::open(path, poses)?)),
-            false => Ok(Box::new(PcdFolder::open_file(path, poses)?)),
+    let mut trajectory = None;
+    if is_plain && !are_missing {
+        let found = match pose_file {
+            Some(poses) => Some((lines_of(&poses, &files, options)?, poses)),
+            None => None,
         };
+        let poses = options.poses.as_deref();
+        match found {
+            Some((Lines::OnePerFile(lines), poses)) => {
+                return Ok(Box::new(PcdFolder::with_lines(files, poses, lines)?));
+            }
+            Some((Lines::Others(others), poses)) => trajectory = Some((poses, others)),
+            None if path.is_dir() => return Ok(Box::new(PcdFolder::open(path, poses)?)),
+            None => return Ok(Box::new(PcdFolder::open_file(path, poses)?)),
+        }
     }
-    let poses = poses_for(path, options, have_own || origin_m.is_some(), Some(count))?;
+    let poses = match trajectory {
+        Some((poses, trajectory)) => CloudPoses::File(poses, trajectory),
+        None => poses_for(path, options, have_own || origin_m.is_some(), Some(count))?,
+    };
     let clouds = Box::new(PcdClouds::new(files, &options.open, origin_m.is_none()));
     let clouds: Box<dyn CloudSource> = match origin_m {
         Some(origin_m) => Box::new(FromOrigin::new(clouds, origin_m)?),
@@ -122,20 +131,35 @@ fn open_pcd(path: &Path, options: &ReadOptions) -> Result<Box<dyn ScanSource + S
     Ok(Box::new(PosedClouds::new(clouds, path, poses, options.clouds.clone())?))
 }
 
-/// Whether the lines of a file of poses are those of the files, one by one. They are not where stamps tell otherwise,
-/// and where the file is of a form that only [`Trajectory`] reads.
-fn are_line_by_line(poses: &Path, files: &[PathBuf], options: &ReadOptions) -> Result<bool> {
-    let trajectory = Trajectory::read_within(poses, None, &options.open.budget());
-    let Ok(lines) = Poses::read(poses, files.len()) else {
+/// The poses of PCD files.
+enum Lines {
+    OnePerFile(Poses),
+    Others(Box<Trajectory>),
+}
+
+/// Reads a file of poses, as those of the files line by line. They are not where stamps tell otherwise, and where the
+/// file is of a form that only [`Trajectory`] reads.
+fn lines_of(poses: &Path, files: &[PathBuf], options: &ReadOptions) -> Result<Lines> {
+    if is_special(poses) {
+        let reason = "is a FIFO, a socket or a device, and poses of PCD files may be read twice: save what it gives to a \
+                      file";
+        return Err(Error::argument(poses.display().to_string(), reason));
+    }
+    let trajectory = || Trajectory::read_within(poses, None, &options.open.budget());
+    let lines = match Poses::read(poses, files.len()) {
+        Ok(lines) => lines,
         // What is wrong with a file that is no text of poses, is told line by line.
-        return Ok(trajectory.is_err());
+        Err(error) => return trajectory().map(|others| Lines::Others(Box::new(others))).map_err(|_| error),
     };
     let names: Option<Vec<i64>> = files.iter().map(|file| stamp_of_name(file)).collect();
-    let span_ns = trajectory.map_or(Ok(None), |trajectory| trajectory.span_ns())?;
-    let (Some(names), Some([first_ns, last_ns])) = (names, span_ns) else { return Ok(true) };
+    let Some((names, others)) = names.zip(trajectory().ok()) else { return Ok(Lines::OnePerFile(lines)) };
+    let Some([first_ns, last_ns]) = others.span_ns()? else { return Ok(Lines::OnePerFile(lines)) };
     // Clocks of which neither knows the other tell nothing.
     let are_apart = !names.iter().any(|name| (first_ns..=last_ns).contains(name));
-    Ok(lines.len() == files.len() && (are_apart || lines.have_stamps(&names)))
+    match lines.len() == files.len() && (are_apart || lines.have_stamps(&names)) {
+        true => Ok(Lines::OnePerFile(lines)),
+        false => Ok(Lines::Others(Box::new(others))),
+    }
 }
 
 /// Where the poses of an input come from; some formats bring their own.

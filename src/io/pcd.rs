@@ -4,7 +4,7 @@ use super::point_store::{PointRoom, PointStore};
 use crate::error::{Error, FormatError};
 use crate::scan::Pose;
 use crate::space::Point;
-use std::fs::File;
+use std::fs::{self, File};
 use std::io::{self, BufRead, BufReader, Cursor, Read, Seek, SeekFrom};
 use std::path::Path;
 
@@ -40,6 +40,10 @@ pub fn read_pcd(file: &[u8]) -> Result<PcdCloud, FormatError> {
 
 /// The same from a file of any size; returns the `VIEWPOINT`.
 pub(super) fn read_pcd_file(path: &Path, points: &mut PointStore) -> crate::error::Result<Pose> {
+    if is_special(path) {
+        let reason = "is a FIFO, a socket or a device, not a file: save what it gives to a file";
+        return Err(Error::argument(path.display().to_string(), reason));
+    }
     let open = || {
         let file = File::open(path)?;
         let bytes = file.metadata()?.len();
@@ -51,6 +55,11 @@ pub(super) fn read_pcd_file(path: &Path, points: &mut PointStore) -> crate::erro
         PcdError::Read(error) => Error::io(path, "read", error),
         PcdError::Store(error) => error,
     })
+}
+
+/// Whether a path is neither a file nor a folder: opening it may wait for ever, and its bytes come once.
+pub(super) fn is_special(path: &Path) -> bool {
+    fs::metadata(path).is_ok_and(|meta| !meta.is_file() && !meta.is_dir())
 }
 
 /// Why a file cannot be read.

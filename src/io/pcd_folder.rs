@@ -3,7 +3,11 @@ use super::fingerprint::Fingerprint;
 use super::pcd::read_pcd_file;
 use super::pcd_viewpoint::viewpoint_of_file;
 use super::point_store::PointStore;
+#[cfg(feature = "clouds")]
+use super::pose_source::of_lines;
 use super::pose_source::{PoseSource, poses_of};
+#[cfg(feature = "clouds")]
+use super::poses::Poses;
 use super::source::{ScanHead, ScanSource};
 use crate::error::{Error, FormatError, Result};
 use crate::scan::Pose;
@@ -37,6 +41,13 @@ impl PcdFolder {
     pub(super) fn open_file(path: &Path, poses: Option<&Path>) -> Result<Self> {
         // A pose file beside a single PCD file belongs to its whole folder.
         Self::new(vec![path.to_owned()], poses, None)
+    }
+
+    /// The files of a folder with poses that were read.
+    #[cfg(feature = "clouds")]
+    pub(super) fn with_lines(files: Vec<PathBuf>, path: PathBuf, lines: Poses) -> Result<Self> {
+        let (pose_source, poses) = of_lines(&files, path, lines)?;
+        Ok(Self { files, poses: Some(poses), pose_source, next: 0 })
     }
 
     fn new(files: Vec<PathBuf>, poses: Option<&Path>, folder: Option<&Path>) -> Result<Self> {

@@ -1,3 +1,4 @@
+use super::pcd::is_special;
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -19,6 +20,9 @@ impl Viewpoint {
 
 /// The `VIEWPOINT` of a PCD file, without reading its points; `None` if there is no valid one, or no file.
 pub(super) fn viewpoint_of_file(path: &Path) -> Option<Viewpoint> {
+    if is_special(path) {
+        return None;
+    }
     let mut header = Vec::new();
     File::open(path).ok()?.take(MOST_BYTES).read_to_end(&mut header).ok()?;
     viewpoint_of(&header)

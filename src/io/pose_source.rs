@@ -61,8 +61,7 @@ pub(super) fn poses_of(
     };
     if let Some(path) = path {
         let poses = Poses::read(&path, files.len())?;
-        poses.check(&path, files)?;
-        return Ok((PoseSource::File(path), Some(poses.into_poses())));
+        return of_lines(files, path, poses).map(|(source, poses)| (source, Some(poses)));
     }
     if files.iter().any(|path| is_placed(path)) {
         return Ok((PoseSource::Viewpoint, None));
@@ -71,6 +70,16 @@ pub(super) fn poses_of(
         return Err(no_poses(files, folder));
     }
     Ok((PoseSource::Identity, None))
+}
+
+/// Takes the poses of a file line by line.
+///
+/// # Errors
+///
+/// Poses that do not match the scans in number or order of time.
+pub(super) fn of_lines(files: &[PathBuf], path: PathBuf, poses: Poses) -> Result<(PoseSource, Vec<Pose>)> {
+    poses.check(&path, files)?;
+    Ok((PoseSource::File(path), poses.into_poses()))
 }
 
 /// Whether the `VIEWPOINT` of a PCD file tells where it was taken: writers without a pose write the identity.

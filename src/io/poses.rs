@@ -168,14 +168,18 @@ fn for_each_line(path: &Path, take: &mut dyn FnMut(u64, StampedPose)) -> Result<
             break;
         }
         let wrong = |reason: String| FormatError::at_line(number, reason).in_input(path);
-        if read as u64 == MAX_LINE_BYTES {
-            let reason =
-                format!("the line is longer than {} KiB: this is no file of poses", MAX_LINE_BYTES >> 10);
-            return Err(wrong(reason));
+        let is_comment = line.trim_ascii_start().starts_with(b"#");
+        if read as u64 == MAX_LINE_BYTES && line.last() != Some(&b'\n') {
+            if !is_comment {
+                let reason =
+                    format!("the line is longer than {} KiB: this is no file of poses", MAX_LINE_BYTES >> 10);
+                return Err(wrong(reason));
+            }
+            input.skip_until(b'\n').map_err(fail)?;
         }
         let text = String::from_utf8_lossy(&line);
         let text = text.trim();
-        if !text.is_empty() && !text.starts_with('#') {
+        if !text.is_empty() && !is_comment {
             take(number, parse(text).map_err(wrong)?);
         }
     }

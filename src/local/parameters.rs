@@ -110,6 +110,10 @@ impl LocalParameters {
             ("input range", self.input_range_m),
             ("inflation range", self.inflation_range_m),
         ];
+        // Nothing is farther away than this.
+        if self.min_input_range_m == f64::INFINITY {
+            return wrong("minimum input range", f64::INFINITY, "a finite length");
+        }
         if let Some((argument, value)) = lengths.into_iter().find(|(_, value)| value.is_nan() || *value < 0.0)
         {
             return wrong(argument, value, "a length of at least 0 m");

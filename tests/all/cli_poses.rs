@@ -185,3 +185,81 @@ fn an_input_without_any_pose_makes_no_map_of_bad_scans() {
     assert_eq!(told.matches("none of its 2 clouds has a pose").count(), 1, "{told}");
     assert!(!map.exists());
 }
+
+/// A FIFO that nothing writes to.
+#[cfg(unix)]
+fn fifo(path: &Path) {
+    assert!(std::process::Command::new("mkfifo").arg(path).status().unwrap().success());
+}
+
+/// A command that waits for a FIFO would be killed, and say nothing.
+#[cfg(unix)]
+fn refusal_in_time(arguments: &[&str]) -> String {
+    let output = voxtile(arguments).timeout(std::time::Duration::from_secs(30)).output().unwrap();
+    assert!(!output.status.success(), "{arguments:?}");
+    String::from_utf8(output.stderr).unwrap()
+}
+
+#[cfg(unix)]
+#[test]
+fn nothing_waits_for_a_fifo_among_clouds() {
+    let folder = TempDir::new().unwrap();
+    let scans = pcd_files(folder.path(), &[("0", 0.0), ("1", 1.0)]);
+    let clouds = folder.path().join("clouds");
+    fs::create_dir(&clouds).unwrap();
+    fs::write(clouds.join("0.xyz"), "1 2 3\n").unwrap();
+    fifo(&clouds.join("1.xyz"));
+    fifo(&scans.join("2.pcd"));
+    for options in [&["--poses", "identity"][..], &["--no-rays"]] {
+        for (input, name) in [(&clouds, "1.xyz"), (&scans, "2.pcd")] {
+            let map = folder.path().join(format!("{name}{}", options.len()));
+            let message = refusal_in_time(&[&["build", text(input), "-o", text(&map)], options].concat());
+            assert!(message.contains(name) && message.contains("is a FIFO"), "{options:?}: {message}");
+        }
+    }
+    // Alone, and as poses.
+    let message = refusal_in_time(&["scans", text(&clouds.join("1.xyz"))]);
+    assert!(message.contains("is a FIFO") && message.contains("--format"), "{message}");
+    fs::remove_file(scans.join("2.pcd")).unwrap();
+    let message = refusal_in_time(&["scans", text(&scans), "--poses", text(&clouds.join("1.xyz"))]);
+    assert!(message.contains("1.xyz: is a FIFO"), "{message}");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_fifo_that_is_named_is_read_as_it_comes() {
+    let folder = TempDir::new().unwrap();
+    let [clouds, poses, cloud] = ["clouds", "poses", "cloud"].map(|name| folder.path().join(name));
+    fs::create_dir(&clouds).unwrap();
+    for name in ["1700000001.0.xyz", "1700000002.0.xyz"] {
+        fs::write(clouds.join(name), "1 2 3\n").unwrap();
+    }
+    fifo(&poses);
+    fifo(&cloud);
+    let write = |path: &Path, text: &str| {
+        let (path, text) = (path.to_owned(), text.to_owned());
+        std::thread::spawn(move || fs::write(path, text).unwrap())
+    };
+    let written = write(&poses, "1700000001 5 0 0 0 0 0 1\n1700000002 6 0 0 0 0 0 1\n");
+    assert_eq!(origins_m(&folder, &clouds, &["--poses", text(&poses)]), [5.0, 6.0]);
+    written.join().unwrap();
+    let written = write(&cloud, "1 2 3\n4 5 6\n");
+    let listed = voxtile(&["scans", text(&cloud), "--format", "xyz"]).output().unwrap();
+    assert!(String::from_utf8(listed.stdout).unwrap().contains("1, 2 points"));
+    written.join().unwrap();
+}
+
+/// Some programs write what they did into one line.
+#[test]
+fn long_comments_in_a_file_of_poses_are_skipped() {
+    let folder = TempDir::new().unwrap();
+    let scans = pcd_files(folder.path(), &[("0", 0.0), ("1", 1.0)]);
+    let poses = folder.path().join("poses.txt");
+    let text_of_poses = format!("# {}\n1 5 0 0 0 0 0 1\n2 6 0 0 0 0 0 1\n", "x".repeat(200_000));
+    fs::write(&poses, text_of_poses).unwrap();
+    assert_eq!(origins_m(&folder, &scans, &["--poses", text(&poses)]), [5.0, 6.0]);
+    fs::write(&poses, format!("1 {}\n", "5 ".repeat(100_000))).unwrap();
+    assert!(
+        refusal(&["scans", text(&scans), "--poses", text(&poses)]).contains("line 1: the line is longer")
+    );
+}

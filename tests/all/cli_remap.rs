@@ -249,3 +249,59 @@ fn a_damaged_segment_is_named_and_repaired_around() {
     let message = fails(&["remap", &kept.map, "-o", &kept.path("fine"), "--resolution", "0.2"], 2);
     assert!(message.contains("scan 3, whose points are not kept"), "{message}");
 }
+
+#[test]
+fn a_tolerance_that_is_no_time_is_refused() {
+    let kept = Kept::new();
+    let poses = kept.poses("poses.txt", 0.1);
+    for tolerance in ["nan", "-1", "inf", "-inf", "1e300"] {
+        let option = format!("--pose-tolerance={tolerance}");
+        let message = fails(&["remap", &kept.map, "--poses", &poses, &option], 2);
+        assert!(message.contains("--pose-tolerance") && message.contains("no time in seconds"), "{message}");
+    }
+}
+
+/// Lines that go back in time belong to scans by their stamps; without stamps of scans nothing says to which.
+#[test]
+fn poses_in_another_order_than_time_are_not_taken_line_by_line() {
+    let kept = Kept::new();
+    let poses = kept.path("tum.txt");
+    let line = |stamp: i32| format!("{stamp} {stamp} 0 0 0 0 0 1\n");
+    fs::write(&poses, [3, 2, 1].map(line).concat()).unwrap();
+    let message = fails(&["remap", &kept.map, "--poses", &poses], 2);
+    assert!(message.contains("its time stamps go back"), "{message}");
+    assert_eq!(digest(&kept.map), kept.digest_with(&kept.poses("own.txt", 0.0), "same"));
+
+    // Clouds whose names are their stamps.
+    let clouds = kept.folder.path().join("clouds");
+    fs::create_dir(&clouds).unwrap();
+    for second in 1..4 {
+        let head =
+            "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n";
+        let cloud = format!("{head}end_header\n2 {second} 0\n");
+        fs::write(clouds.join(format!("170000000{second}.000000.ply")), cloud).unwrap();
+    }
+    let tum = |name: &str, order: [i32; 3], by_m: f64| {
+        let line = |k: i32| format!("{} {} 0 0 0 0 0 1\n", 1_700_000_000 + k, f64::from(k) + by_m);
+        fs::write(kept.path(name), order.map(line).concat()).unwrap();
+        kept.path(name)
+    };
+    let build = |poses: &str, map: &str| {
+        let map = kept.path(map);
+        let more = ["--poses", poses, "--keep-scans"];
+        output(&[&["build", text(&clouds), "-o", &map][..], &more, &TILES].concat());
+        map
+    };
+    let map = build(&tum("first.txt", [1, 2, 3], 0.0), "by_time");
+    let moved = build(&tum("moved.txt", [1, 2, 3], 0.5), "moved");
+    output(&["remap", &map, "--poses", &tum("back.txt", [3, 1, 2], 0.5)]);
+    assert_eq!(digest(&map), digest(&moved));
+    // Clouds without stamps take no such lines either.
+    for second in 1..4 {
+        let name = |name: &str| clouds.join(format!("{name}{second}.ply"));
+        fs::rename(clouds.join(format!("170000000{second}.000000.ply")), name("scan")).unwrap();
+    }
+    let message =
+        fails(&["build", text(&clouds), "-o", &kept.path("x"), "--poses", &kept.path("back.txt")], 2);
+    assert!(message.contains("its time stamps go back"), "{message}");
+}

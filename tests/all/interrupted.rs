@@ -403,3 +403,32 @@ fn points_alone_and_rays_of_one_input_do_not_mix() {
         assert_ne!(digest(text(&map)), before);
     }
 }
+
+#[test]
+fn an_input_of_which_only_empty_scans_were_taken_is_resumed() {
+    let folder = TempDir::new().unwrap();
+    let [input, map, whole] = ["a", "map", "whole"].map(|name| folder.path().join(name));
+    numbered(&input, 1, 2..5);
+    for number in 0..2 {
+        let head = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 0\nHEIGHT 1\n";
+        let empty = format!("{head}VIEWPOINT {number} 0 0.5 1 0 0 0\nDATA ascii\n");
+        fs::write(input.join(format!("scan{number}.pcd")), empty).unwrap();
+    }
+    let [input, map] = [text(&input), text(&map)];
+    output(&["build", input, "-o", map, "--count", "2"]);
+    // Another input that begins like it is another one.
+    let other = folder.path().join("b");
+    fs::create_dir(&other).unwrap();
+    for number in 0..5 {
+        let name = format!("scan{number}.pcd");
+        fs::copy(Path::new(input).join(&name), other.join(&name)).unwrap();
+    }
+    let (code, stderr) = failure(&["build", text(&other), "-o", map, "--resume"]);
+    assert!(code == 2 && stderr.contains("built from input a, not b"), "{stderr}");
+    let resumed = json(&["build", input, "-o", map, "--resume", "--json"]);
+    assert_eq!((&resumed["scans"], &resumed["resumed_after"]), (&3.into(), &2.into()));
+    let again = json(&["build", input, "-o", map, "--resume", "--json"]);
+    assert_eq!((&again["scans"], &again["resumed_after"]), (&0.into(), &5.into()));
+    output(&["build", input, "-o", text(&whole)]);
+    assert_eq!(digest(map), digest(text(&whole)));
+}

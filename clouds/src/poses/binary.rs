@@ -1,6 +1,4 @@
 use crate::error::{Error, Result};
-use std::fs::File;
-use std::io::Read;
 use std::path::Path;
 
 /// Starts of files that are no text, what they are, and the way to poses that are read.
@@ -24,19 +22,13 @@ const UNPACK: &str = "unpack it first";
 const SAVE: &str = "save the poses as text (TUM, KITTI, CSV) or as .npy";
 const RECORDING: &str =
     "give the recording itself as scans, with --odometry for a topic of poses, or save its poses as text";
-/// Text has no such byte; it is looked for at the start of a file.
-const HEAD_BYTES: u64 = 4096;
 
-/// Checks that a file of poses may be text.
+/// Checks that a file of poses that starts like this may be text, which has no zero bytes.
 ///
 /// # Errors
 ///
-/// It cannot be read; what it is instead, and what to do.
-pub(super) fn check_text(path: &Path) -> Result<()> {
-    let mut head = Vec::new();
-    File::open(path)
-        .and_then(|file| file.take(HEAD_BYTES).read_to_end(&mut head))
-        .map_err(|error| Error::io(path, "read", error))?;
+/// What it is instead, and what to do.
+pub(super) fn check_text(path: &Path, head: &[u8]) -> Result<()> {
     let known = KINDS.iter().find(|(start, ..)| head.starts_with(start));
     let (kind, way) = match known {
         Some((_, kind, way)) => (*kind, *way),

@@ -6,6 +6,7 @@ mod gap;
 mod header;
 mod matrix;
 mod npy;
+mod pose_input;
 mod pose_rows;
 mod text;
 mod time_unit;

@@ -1,10 +1,10 @@
 use super::matrix::matrix_of;
+use super::pose_input::PoseInput;
 use super::pose_rows::{PoseRows, Row};
 use super::text::pose;
 use super::time_unit::{digits_of_value, stamp_of_value};
 use crate::error::{Error, Place, Result};
-use std::fs::File;
-use std::io::{BufReader, Read};
+use std::io::Read;
 use std::path::Path;
 
 const MAGIC: &[u8] = b"\x93NUMPY";
@@ -14,20 +14,15 @@ const CUT_HEADER: &str = "the file ends within its header; copy or save it again
 /// A longer header is an error.
 const MOST_HEADER_BYTES: usize = 1 << 16;
 
-/// Whether a file is an array of NumPy, or is named as one.
-pub(super) fn is_npy(path: &Path) -> Result<bool> {
-    let mut start = Vec::new();
-    File::open(path)
-        .and_then(|file| file.take(MAGIC.len() as u64).read_to_end(&mut start))
-        .map_err(|error| Error::io(path, "read", error))?;
-    Ok(start == MAGIC || path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("npy")))
+/// Whether a file that starts like this is an array of NumPy, or is named as one.
+pub(super) fn is_npy(path: &Path, head: &[u8]) -> bool {
+    head.starts_with(MAGIC) || path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("npy"))
 }
 
 /// Takes the poses of an array: N x 8 of TUM, N x 12, N x 16, N x 3 x 4 or N x 4 x 4.
-pub(super) fn read(path: &Path, poses: &mut PoseRows) -> Result<()> {
+pub(super) fn read(path: &Path, mut input: PoseInput, poses: &mut PoseRows) -> Result<()> {
     let fail = |error| Error::io(path, "read", error);
     let wrong = |at: u64, reason: String| Error::format(path, Place::Byte(at), reason);
-    let mut input = BufReader::new(File::open(path).map_err(fail)?);
     let mut start = Vec::new();
     (&mut input).take(8).read_to_end(&mut start).map_err(fail)?;
     let version = match *start.as_slice() {

@@ -28,6 +28,8 @@ pub(super) struct PoseRows {
 #[derive(Default)]
 pub(super) struct Stamps {
     pub(super) has_stamps: bool,
+    /// A stamp is earlier than the one before.
+    pub(super) goes_back: bool,
     pub(super) rounding_ns: u64,
     pub(super) remarks: Vec<String>,
 }
@@ -101,7 +103,8 @@ impl PoseRows {
         if self.rows == 0 {
             return Ok(None);
         }
-        let mut stamps = Stamps { has_stamps: self.are_stamped, ..Stamps::default() };
+        let goes_back = self.are_stamped && self.back > 0;
+        let mut stamps = Stamps { has_stamps: self.are_stamped, goes_back, ..Stamps::default() };
         if self.back > 0 {
             let back = self.back;
             stamps

@@ -1,6 +1,7 @@
 use super::binary::check_text;
 use super::header::Roles;
 use super::matrix::matrix_of;
+use super::pose_input::PoseInput;
 use super::pose_rows::{PoseRows, Row};
 use super::time_unit::{digits_of, stamp_of};
 use crate::error;
@@ -24,9 +25,9 @@ enum Layout {
 }
 
 /// Reads the poses of a text.
-pub(super) fn read(path: &Path, poses: &mut PoseRows) -> error::Result<()> {
-    check_text(path)?;
-    let mut lines = Lines::open(path)?;
+pub(super) fn read(path: &Path, input: PoseInput, poses: &mut PoseRows) -> error::Result<()> {
+    check_text(path, input.head())?;
+    let mut lines = Lines::new(path, input, 0);
     let mut names: Option<Roles> = None;
     let mut text = TextPoses::default();
     while let Some((_, line)) = lines.next()? {

@@ -1,4 +1,5 @@
 use super::gap::most_gap_ns;
+use super::pose_input::PoseInput;
 use super::pose_rows::{PoseRows, Stamps};
 use super::{npy, text};
 use crate::cloud::CloudSource;
@@ -16,6 +17,7 @@ pub struct Trajectory {
     /// In strict order of time, where that is another order.
     by_time: Option<PoseList>,
     has_stamps: bool,
+    goes_back: bool,
     /// Poses are of a camera; those of the lidar are `[0] * pose * [1]`.
     lidar: Option<[RigidPose; 2]>,
     /// How far a stamp may be from the time that it was rounded from.
@@ -70,10 +72,11 @@ impl Trajectory {
     /// As for [`Trajectory::read`]; a temporary file that cannot be written.
     pub fn read_within(path: &Path, calib: Option<&Path>, budget: &Budget) -> Result<Self> {
         let mut rows = PoseRows::new(budget);
-        if npy::is_npy(path)? {
-            npy::read(path, &mut rows)?
+        let input = PoseInput::open(path)?;
+        if npy::is_npy(path, input.head()) {
+            npy::read(path, input, &mut rows)?
         } else {
-            text::read(path, &mut rows)?
+            text::read(path, input, &mut rows)?
         }
         let Some(mut trajectory) = rows.finish(path)? else {
             return Err(Error::argument(path.display().to_string(), "holds no pose"));
@@ -86,8 +89,17 @@ impl Trajectory {
     }
 
     pub(super) fn new(path: &Path, poses: PoseList, by_time: Option<PoseList>, stamps: Stamps) -> Self {
-        let Stamps { has_stamps, rounding_ns, remarks } = stamps;
-        Self { path: path.to_owned(), poses, by_time, has_stamps, lidar: None, rounding_ns, remarks }
+        let Stamps { has_stamps, goes_back, rounding_ns, remarks } = stamps;
+        Self {
+            path: path.to_owned(),
+            poses,
+            by_time,
+            has_stamps,
+            goes_back,
+            lidar: None,
+            rounding_ns,
+            remarks,
+        }
     }
 
     /// The pose at a time. Between two poses there is one if they are at most twice the tolerance apart, see
@@ -147,6 +159,7 @@ impl Trajectory {
     /// Not as many poses as clouds: which belong together is not known then; a temporary file that cannot be read.
     pub fn of_cloud(&self, number: u64, source: &dyn CloudSource) -> Result<RigidPose> {
         self.check_clouds(source)?;
+        self.check_order()?;
         let pose = usize::try_from(number).ok().map(|number| self.by_number(number)).transpose()?.flatten();
         pose.ok_or_else(|| self.other_number(&format!("at least {} clouds", number.saturating_add(1))))
     }
@@ -163,6 +176,27 @@ impl Trajectory {
         // A file that is no cloud is often at an end of the list.
         let named = source.ends().map(|[first, last]| format!(" ({first} to {last})")).unwrap_or_default();
         Err(self.other_number(&format!("{clouds} clouds{named}")))
+    }
+
+    /// Checks that the poses may be taken line by line, for clouds that have no time stamps: stamps that go back tell
+    /// that the lines are in another order than the clouds.
+    ///
+    /// # Errors
+    ///
+    /// A time stamp is earlier than the one before.
+    pub fn check_order(&self) -> Result<()> {
+        if !self.goes_back {
+            return Ok(());
+        }
+        let reason = "its time stamps go back, but there are no time stamps of clouds to compare with, and line by line \
+                      these are the poses of the clouds in their order: put the lines in that order (stamps that mean \
+                      nothing may all be 0)";
+        Err(Error::argument(self.path.display().to_string(), reason))
+    }
+
+    /// Whether a time stamp is earlier than the one before.
+    pub fn goes_back(&self) -> bool {
+        self.goes_back
     }
 
     fn other_number(&self, clouds: &str) -> Error {

@@ -1,5 +1,6 @@
 use super::intrinsics::Intrinsics;
 use super::one::Visit;
+use super::regular::check_regular;
 use crate::cloud::{CloudHead, CloudPoint, CloudSource};
 use crate::error::{Error, Place, Result};
 use std::fs::File;
@@ -91,6 +92,7 @@ fn size(reader: &Reader) -> (u32, u32) {
 }
 
 fn open(path: &Path) -> Result<Reader> {
+    check_regular(path)?;
     let file = File::open(path).map_err(|error| Error::io(path, "read", error))?;
     let limits = png::Limits { bytes: MAX_DECODER_BYTES };
     let mut decoder = png::Decoder::new_with_limits(BufReader::with_capacity(1 << 16, file), limits);

@@ -3,6 +3,7 @@ use super::format::Format;
 use super::intrinsics::Intrinsics;
 use super::one::head_of;
 use super::options::OpenOptions;
+use super::regular::check_regular;
 use crate::cloud::CloudSource;
 use crate::error::Result;
 use crate::inside::is_inside;
@@ -26,7 +27,9 @@ pub(super) fn open(folder: &Path, options: &OpenOptions) -> Result<Box<dyn Cloud
         None => Intrinsics::find(folder, options.intrinsics_path.as_deref())?,
     };
     let code = DepthCode { camera, scale: options.depth_scale.unwrap_or(SCALE), is_largest_invalid: false };
-    let frames = TumFrames { folder: folder.to_owned(), lines: Lines::open(&folder.join("depth.txt"))? };
+    let list = folder.join("depth.txt");
+    check_regular(&list)?;
+    let frames = TumFrames { folder: folder.to_owned(), lines: Lines::open(&list)? };
     Ok(Box::new(DepthFrames::new(Format::DepthTum.to_string(), Box::new(frames), code)))
 }
 

@@ -1,5 +1,8 @@
+use super::e57_packets::check_packets;
+use super::e57_pages::{PAGE_BYTES, Pages};
 use super::one::{Visit, head_of};
 use super::wkt::WktUnits;
+use super::xml_check::XmlCheck;
 use crate::cloud::{CloudHead, CloudPoint, CloudSource};
 use crate::error::{Error, Place, Result};
 use crate::guard::guarded;
@@ -21,6 +24,7 @@ struct E57 {
     has_origin: bool,
     crs: Option<String>,
     remarks: Vec<String>,
+    budget: Budget,
 }
 
 /// Opens an E57 file: each scan is a cloud in the frame of its scanner, with its pose. A scan without a pose is in the
@@ -51,10 +55,12 @@ pub(super) fn open(path: &Path, has_origin: bool, budget: &Budget) -> Result<Box
         ));
     }
     let (next, is_read) = (0, true);
-    Ok(Box::new(E57 { path: path.to_owned(), reader, scans, next, is_read, has_origin, crs, remarks }))
+    let (path, budget) = (path.to_owned(), budget.clone());
+    Ok(Box::new(E57 { path, reader, scans, next, is_read, has_origin, crs, remarks, budget }))
 }
 
-/// Checks that the description of the scans fits in memory. The library holds all of it, as text and as a tree.
+/// Checks that the description of the scans fits in memory, and takes no long time. The library holds all of it, as text
+/// and as a tree.
 fn check_xml(path: &Path, file: &mut File, budget: &Budget) -> Result<()> {
     let fail = |error| Error::io(path, "read", error);
     let mut header = Vec::new();
@@ -65,17 +71,18 @@ fn check_xml(path: &Path, file: &mut File, budget: &Budget) -> Result<()> {
     };
     let [start, bytes, page_bytes] = [24, 32, 40].map(number);
     let wrong = |at: u64, reason: String| Err(Error::format(path, Place::Byte(at), reason));
-    if page_bytes > MAX_PAGE_BYTES {
-        return wrong(40, format!("pages of {page_bytes} bytes; those of E57 have 1024"));
+    if page_bytes != PAGE_BYTES {
+        return wrong(40, format!("pages of {page_bytes} bytes; those of E57 have {PAGE_BYTES}"));
     }
-    file.seek(SeekFrom::Start(start)).map_err(fail)?;
-    let (mut text, mut buffer, mut needed) = (file.take(bytes), vec![0; 1 << 16], bytes.saturating_mul(3));
+    let mut text = Pages::new(&mut *file, start).map_err(fail)?.take(bytes);
+    let (mut check, mut buffer) = (XmlCheck::default(), vec![0; PAGE_BYTES as usize]);
     loop {
         let count = text.read(&mut buffer).map_err(fail)?;
         let read = buffer.get(..count).unwrap_or_default();
-        // Checksums of pages among them change nothing.
-        let nodes = read.iter().filter(|byte| matches!(byte, b'<' | b'=')).count();
-        needed = needed.saturating_add(nodes as u64 * NODE_BYTES);
+        if let Err(reason) = check.take(read) {
+            return wrong(start, format!("{reason}; write the file again with another program"));
+        }
+        let needed = check.nodes.saturating_mul(NODE_BYTES).saturating_add(bytes.saturating_mul(3));
         if needed > budget.whole_bytes() {
             let reason = format!(
                 "its description of {bytes} bytes would take more than {} bytes of memory: raise --memory, or split \
@@ -91,8 +98,8 @@ fn check_xml(path: &Path, file: &mut File, budget: &Budget) -> Result<()> {
     file.seek(SeekFrom::Start(0)).map(drop).map_err(fail)
 }
 
-/// Pages of E57 have 1024 bytes.
-const MAX_PAGE_BYTES: u64 = 1 << 20;
+/// Each point takes the time of its fields, also of those that take no bytes of the file.
+const MAX_FIELDS: usize = 256;
 /// What a tag or an attribute takes in the library's tree.
 const NODE_BYTES: u64 = 100;
 
@@ -161,6 +168,13 @@ impl CloudSource for E57 {
         if std::mem::replace(&mut self.is_read, true) {
             return Ok(());
         }
+        if scan.prototype.len() > MAX_FIELDS {
+            let reason = format!(
+                "a point has {} fields; of more than {MAX_FIELDS}, points are not read",
+                scan.prototype.len()
+            );
+            return Err(Error::format(&self.path, Place::Record(0), reason));
+        }
         let (path, mut done) = (&self.path, 0);
         let wrong = |done: u64, reason: String| {
             let reason = format!("{reason} (after {done} of {} points)", scan.records);
@@ -171,6 +185,7 @@ impl CloudSource for E57 {
                           and cannot be counted; write the scan again with a wider range of x, y or z";
             return Err(wrong(0, reason.into()));
         }
+        check_packets(path, scan, &self.budget)?;
         let mut points =
             guarded(|| self.reader.pointcloud_simple(scan)).map_err(|reason| wrong(0, reason))?;
         points.apply_pose(false);

@@ -1,3 +1,4 @@
+use super::regular::check_regular;
 use super::text_line::{Columns, Line};
 use crate::error::{Error, Result};
 use std::fs::File;
@@ -9,6 +10,7 @@ const GLANCE_BYTES: u64 = 1 << 13;
 
 /// The first bytes of a file.
 pub(super) fn first_bytes(path: &Path) -> Result<Vec<u8>> {
+    check_regular(path)?;
     let mut start = Vec::new();
     File::open(path)
         .and_then(|file| file.take(GLANCE_BYTES).read_to_end(&mut start))

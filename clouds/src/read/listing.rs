@@ -80,6 +80,7 @@ impl Listing {
     pub(super) fn format(&self, folder: &Path) -> Result<Format> {
         let what = || folder.display().to_string();
         if let Some(metadata) = self.has("metadata.yaml")
+            && metadata.is_file()
             && start_of(metadata)
                 .is_ok_and(|text| text.windows(BAG2_MARK.len()).any(|window| window == BAG2_MARK))
         {

@@ -10,6 +10,10 @@ mod depth_images;
 mod depth_tum;
 #[cfg(feature = "e57")]
 mod e57;
+#[cfg(feature = "e57")]
+mod e57_packets;
+#[cfg(feature = "e57")]
+mod e57_pages;
 mod files;
 mod foreign;
 mod format;
@@ -38,11 +42,14 @@ mod open;
 mod options;
 mod ply;
 mod ply_header;
+mod regular;
 mod scalar;
 mod text;
 mod text_line;
 #[cfg(any(feature = "las", feature = "e57"))]
 mod wkt;
+#[cfg(feature = "e57")]
+mod xml_check;
 
 pub use format::Format;
 pub use from_origin::FromOrigin;

@@ -4,6 +4,7 @@ use super::from_origin::FromOrigin;
 use super::listing::Listing;
 use super::one::{OneCloud, head_of};
 use super::options::OpenOptions;
+use super::regular::check_regular;
 use super::{bin, depth_images, depth_tum, ply, text};
 use crate::cloud::CloudSource;
 use crate::error::{Error, Result};
@@ -65,11 +66,17 @@ fn open_folder(path: &Path, format: Format, options: &OpenOptions) -> Result<Box
     let is_one_each = matches!(format, Format::Ply | Format::Text | Format::Bin);
     let name = format!("{format}, a folder");
     let options = options.clone();
-    let open = Box::new(move |path: &std::path::PathBuf| open_file(path, format, &options));
+    let open = Box::new(move |path: &std::path::PathBuf| {
+        check_regular(path)?;
+        open_file(path, format, &options)
+    });
     Ok(Box::new(Files::new(name, paths, is_one_each, open)))
 }
 
 fn open_file(path: &Path, format: Format, options: &OpenOptions) -> Result<Box<dyn CloudSource>> {
+    if !matches!(format, Format::Ply | Format::Text) {
+        check_regular(path)?;
+    }
     let head = head_of(path);
     let one = match format {
         Format::Ply => ply::open(path, head)?,

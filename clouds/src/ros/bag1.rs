@@ -1,12 +1,12 @@
 use super::bag1_record::{Record, RecordKind};
 use super::chunk::{ChunkPlace, MOST_CHUNK_BYTES, MessagePlace, OpenChunk, decompress, plain};
-use super::chunk_file::{ChunkFile, Shares, TakeMessage, check_chunks};
+use super::chunk_file::{ChunkFile, Shares, TakeMessage, Walk, check_chunks};
 use super::chunk_order::{ChunkOrder, Step};
 use super::file_bytes::FileBytes;
 use super::recording::{Message, Recording, Topic, TopicList};
 use super::wire::Wire;
 use crate::error::{Error, Place, Result};
-use crate::spill::{Budget, SpillFile, StreamSize, Window};
+use crate::spill::{Budget, Complaint, SpillFile, StreamSize, Window};
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 use std::sync::Arc;
@@ -162,36 +162,17 @@ impl Bag1 {
     /// Finds chunks one after the other and looks into each, where there is no index.
     fn scan(&mut self) -> Result<()> {
         let mut at = MAGIC.len() as u64;
-        let mut start_ns = i64::MIN;
-        let shares = Shares::of(self.spill.budget());
-        let mut messages = 0_u64;
+        let mut walk = Walk::default();
         while let Some((record, next)) = self.record(at)? {
             if record.op == Some(RecordKind::Connection) {
                 self.connect(&record, &record.data);
             }
             if record.op == Some(RecordKind::Chunk) {
-                let place =
-                    ChunkPlace { offset: at, bytes: next - at, start_ns, topics: None, is_bare: false };
-                let (mut earliest, mut count, mut counts) = (None, 0, HashMap::new());
-                let loaded = self.load(&place, &mut |MessagePlace { log_ns, topic, .. }| {
-                    *counts.entry(topic).or_default() += 1;
-                    earliest = Some(earliest.map_or(log_ns, |earliest: i64| earliest.min(log_ns)));
-                    count += 1;
-                    Ok(())
-                });
-                // A bad chunk is told of when it is its turn; others come behind it.
-                if let Err(error @ Error::Io { .. }) = loaded {
-                    return Err(error);
-                }
-                counts.into_iter().for_each(|(topic, messages)| self.topics.count(topic, messages));
-                messages += count;
-                start_ns = earliest.unwrap_or(start_ns);
-                check_chunks(self.chunks.len(), shares, self.file.path())?;
-                self.chunks.push(ChunkPlace { start_ns, ..place });
+                self.look_into(at, next - at, &mut walk)?;
             }
             at = next;
         }
-        let (path, len) = (self.file.path().display(), self.file.len);
+        let (path, len, messages) = (self.file.path().display(), self.file.len, walk.messages);
         let cut = if at == len { "" } else { ", which ends in the midst of a record (it was cut off)" };
         self.remarks.push(format!(
             "{path} has no index (the recorder did not close it){cut}: {messages} messages were found by reading it \
@@ -219,6 +200,7 @@ impl Bag1 {
 
     /// Walks over the records of a chunk.
     fn find_messages(&mut self, chunk: &mut OpenChunk, take: &mut TakeMessage<'_>) -> Result<()> {
+        let is_broken = chunk.is_broken();
         let OpenChunk { bytes, complaint } = chunk;
         let (mut window, mut at) = (Window::default(), 0);
         while at < bytes.len() {
@@ -238,19 +220,22 @@ impl Bag1 {
                 Some((record, data_at, end))
             });
             let Some((record, data_at, end)) = whole else {
-                complaint.get_or_insert_with(|| format!("byte {at} of its contents starts no record"));
+                OpenChunk::note(complaint, format!("byte {at} of its contents starts no record"));
                 return Ok(());
             };
             let len = end - data_at;
             if record.op == Some(RecordKind::Connection) {
                 let data_bytes = if len > MOST_RECORD_BYTES { 0 } else { len as usize };
                 let data = bytes.piece(data_at, data_bytes, &mut window)?.unwrap_or_default();
-                self.connect(&record, data);
+                // What a broken chunk says of a connection may be wrong.
+                let is_known = record.u32("conn").is_some_and(|id| self.connections.contains_key(&id));
+                if !(is_broken && is_known) {
+                    self.connect(&record, data);
+                }
             } else if record.op == Some(RecordKind::Message) {
                 let topic = record.u32("conn").and_then(|id| self.topic_of(id));
                 let Some((topic, log_ns)) = topic.zip(record.time_ns("time")) else {
-                    complaint
-                        .get_or_insert_with(|| format!("byte {at}: a message without connection or time"));
+                    OpenChunk::note(complaint, format!("byte {at}: a message without connection or time"));
                     return Ok(());
                 };
                 if let Some(topic) = topic {
@@ -279,6 +264,10 @@ impl ChunkFile for Bag1 {
 
     fn step(&mut self) -> Result<Step> {
         self.order.step(&self.chunks)
+    }
+
+    fn found(&mut self) -> (&mut TopicList, &mut Vec<ChunkPlace>) {
+        (&mut self.topics, &mut self.chunks)
     }
 
     fn load(&mut self, place: &ChunkPlace, take: &mut TakeMessage<'_>) -> Result<OpenChunk> {
@@ -311,7 +300,8 @@ impl ChunkFile for Bag1 {
             false => plain(part, memory_bytes, input, &mut |_| {}),
         })?;
         let is_cut = there < data_bytes;
-        let complaint = if is_cut { Some("the file ends in the midst of it".to_owned()) } else { complaint };
+        let cut = || Complaint { reason: "the file ends in the midst of it".to_owned(), is_broken: false };
+        let complaint = if is_cut { Some(cut()) } else { complaint };
         let mut chunk = OpenChunk { bytes, complaint };
         self.find_messages(&mut chunk, take)?;
         Ok(chunk)

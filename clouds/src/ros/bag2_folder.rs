@@ -7,6 +7,7 @@ use super::sequence::Sequence;
 use crate::error::{Error, Place, Result};
 use crate::inside::is_inside;
 use crate::spill::{Budget, Bytes, SpillFile, StreamSize};
+use std::collections::HashSet;
 use std::fs::File;
 use std::io::{BufReader, Read, Write};
 use std::path::{Path, PathBuf};
@@ -63,7 +64,17 @@ impl Bag2Folder {
         } else {
             (Bag2Metadata::default(), Vec::new())
         };
-        let files = if files.is_empty() { files_of(path)? } else { files };
+        let mut files = if files.is_empty() { files_of(path)? } else { files };
+        // Each of a million names of one file would be a file of its own.
+        let (named, mut seen) = (files.len(), HashSet::new());
+        files.retain(|file| seen.insert(file.clone()));
+        if files.len() < named {
+            let again = named - files.len();
+            remarks.push(format!(
+                "{}: names of files occur again ({again}); each file is read once",
+                metadata_path.display()
+            ));
+        }
         // Bags of ROS 1 have none.
         if !metadata_path.is_file() && !files.iter().all(|file| is_bag1(file)) {
             let path = path.display();
@@ -224,8 +235,8 @@ impl Recording for Bag2Folder {
                 Err(mut reader) => unpacked(&mut reader)?,
             };
             if let Some(complaint) = complaint {
-                let reason =
-                    format!("a message recorded at {} ns cannot be unpacked: {complaint}", message.log_ns);
+                let (log_ns, why) = (message.log_ns, complaint.reason);
+                let reason = format!("a message recorded at {log_ns} ns cannot be unpacked: {why}");
                 return Err(Error::argument(self.path.display().to_string(), reason));
             }
             message.data = MessageData(data);

@@ -10,7 +10,7 @@ use super::transforms::{Transforms, WhyNot};
 use crate::error::{Error, Result};
 use crate::pose::RigidPose;
 use crate::spill::Budget;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
 /// Where the sensor was at the stamp of each cloud.
@@ -22,6 +22,8 @@ pub(super) struct BagPoses {
     fixed_frame: Option<String>,
     /// Poses of a topic, until they are among the transforms.
     track: PoseTrack,
+    /// How the pose of a sensor is looked up, by its frame.
+    lookups: HashMap<String, std::result::Result<PoseLookup, WhyNot>>,
     /// Number of clouds without a pose, by reason.
     without: BTreeMap<String, u64>,
     remarks: Vec<String>,
@@ -33,6 +35,8 @@ const SAMPLE_BYTES: usize = 96;
 const MAX_LINKS: usize = 10_000;
 /// A longer name of a frame is damage.
 const MAX_NAME_BYTES: usize = 256;
+/// Most frames of sensors of one topic.
+const MAX_SENSORS: usize = 100;
 /// Most reasons that are counted for clouds without a pose.
 const MAX_REASONS: usize = 100;
 /// The frames that a robot moves by, if a pose does not name its own.
@@ -49,6 +53,7 @@ impl BagPoses {
             transforms: Arc::default(),
             fixed_frame: options.fixed_frame.as_ref().map(|frame| frame.trim_start_matches('/').to_owned()),
             track: PoseTrack::default(),
+            lookups: HashMap::new(),
             without: BTreeMap::new(),
             remarks: Vec::new(),
         };
@@ -218,12 +223,24 @@ impl BagPoses {
         }
     }
 
-    fn find(&self, sensor_frame: &str, stamp_ns: i64) -> std::result::Result<RigidPose, WhyNot> {
+    fn find(&mut self, sensor_frame: &str, stamp_ns: i64) -> std::result::Result<RigidPose, WhyNot> {
+        if !self.lookups.contains_key(sensor_frame) {
+            if self.lookups.len() >= MAX_SENSORS {
+                return Err(WhyNot::TooManySensors(MAX_SENSORS));
+            }
+            let lookup = self.new_lookup(sensor_frame);
+            self.lookups.insert(sensor_frame.to_owned(), lookup);
+        }
         self.lookup(sensor_frame)?.find(stamp_ns)
     }
 
-    /// Looks up where a sensor was at any time.
+    /// Looks up where a sensor was at any time, once its first pose was asked for.
     pub(super) fn lookup(&self, sensor_frame: &str) -> std::result::Result<PoseLookup, WhyNot> {
+        let unknown = || Err(WhyNot::UnknownFrame(sensor_frame.to_owned()));
+        self.lookups.get(sensor_frame).cloned().unwrap_or_else(unknown)
+    }
+
+    fn new_lookup(&self, sensor_frame: &str) -> std::result::Result<PoseLookup, WhyNot> {
         let fixed = match &self.fixed_frame {
             Some(frame) => frame.clone(),
             None => self.fixed_frame_of(sensor_frame)?,
@@ -231,7 +248,7 @@ impl BagPoses {
         if fixed == sensor_frame {
             return Err(WhyNot::AlreadyFixed(fixed));
         }
-        Ok(PoseLookup::new(Arc::clone(&self.transforms), fixed, sensor_frame.to_owned()))
+        PoseLookup::new(Arc::clone(&self.transforms), fixed, sensor_frame.to_owned())
     }
 
     /// The default frame of the map, above the frame of a sensor.

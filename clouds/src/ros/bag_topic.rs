@@ -1,6 +1,12 @@
 use super::messages::{Image, MessageKind, is_depth_encoding};
 use super::recording::{Recording, Topic};
 use crate::error::{Error, Result};
+use std::collections::HashSet;
+
+/// Most topics of images that are looked into. Of more, the user chooses.
+const MAX_LOOKED_INTO: usize = 100;
+/// Most topics that an error lists.
+const MAX_LISTED: usize = 100;
 
 /// A topic that was chosen.
 #[derive(Clone, Debug)]
@@ -35,12 +41,21 @@ pub(super) fn choose_clouds(
         };
         return chosen(&topics, index, kind);
     }
-    let mut found = Vec::new();
+    let (mut found, mut looked_into) = (Vec::new(), 0);
+    let is_camera = |topic: &&Topic| kind_of(topic) == Some(MessageKind::CameraInfo);
+    let cameras: HashSet<&str> = topics.iter().filter(is_camera).map(|topic| topic.name.as_str()).collect();
     for (index, topic) in topics.iter().enumerate().filter(|(_, topic)| topic.messages > 0) {
         let Some(kind) = kind_of(topic).filter(|kind| kind.is_cloud()) else { continue };
-        let mut is_depth =
-            || Ok(camera_of(&topics, topic).is_some() && holds_depths(recording, index, topic, whole_bytes)?);
-        if kind != MessageKind::Image || is_depth()? {
+        let is_found = if kind != MessageKind::Image {
+            true
+        } else if !cameras.contains(camera_name(&topic.name).as_str()) {
+            false
+        } else {
+            // Each look may read the recording up to the first image.
+            looked_into += 1;
+            looked_into > MAX_LOOKED_INTO || holds_depths(recording, index, topic, whole_bytes)?
+        };
+        if is_found {
             found.push((index, kind));
         }
     }
@@ -164,8 +179,15 @@ fn holds_depths(
 
 /// `/points (sensor_msgs/msg/PointCloud2, 20 messages), ...`.
 fn list<'t>(topics: impl Iterator<Item = &'t Topic>) -> String {
-    let text: Vec<String> = topics
+    let mut topics = topics.fuse();
+    let mut text: Vec<String> = topics
+        .by_ref()
+        .take(MAX_LISTED)
         .map(|topic| format!("{} ({}, {} messages)", topic.name, topic.type_name, topic.messages))
         .collect();
+    let more = topics.count();
+    if more > 0 {
+        text.push(format!("and {more} more"));
+    }
     text.join(", ")
 }

@@ -1,5 +1,5 @@
 use crate::error::{Error, Result};
-use crate::spill::{Bytes, FilePart, Record, SpillFile, StreamSize};
+use crate::spill::{Bytes, Complaint, FilePart, Record, SpillFile, StreamSize};
 use std::cmp::Ordering;
 use std::io::Read;
 use std::sync::Arc;
@@ -23,8 +23,20 @@ pub(super) struct ChunkPlace {
 #[derive(Debug, Default)]
 pub(super) struct OpenChunk {
     pub(super) bytes: Bytes,
-    /// What is wrong with it; its messages are those before the bad place.
-    pub(super) complaint: Option<String>,
+    /// What is wrong with it: its messages are those before the bad place. Where it is broken, no message is taken.
+    pub(super) complaint: Option<Complaint>,
+}
+
+impl OpenChunk {
+    /// Whether any byte of it may be wrong.
+    pub(super) fn is_broken(&self) -> bool {
+        self.complaint.as_ref().is_some_and(|complaint| complaint.is_broken)
+    }
+
+    /// Notes that no record starts where one should, unless something else is wrong already.
+    pub(super) fn note(complaint: &mut Option<Complaint>, reason: String) {
+        complaint.get_or_insert(Complaint { reason, is_broken: false });
+    }
 }
 
 /// A message in a chunk.
@@ -73,7 +85,8 @@ pub(super) fn decompress(
     spill: &mut SpillFile,
     memory_bytes: usize,
     see: &mut dyn FnMut(&[u8]),
-) -> Result<(Bytes, Option<String>)> {
+) -> Result<(Bytes, Option<Complaint>)> {
+    let bare = |reason: String| Complaint { reason, is_broken: false };
     let (plain, complaint) = match compression {
         "bz2" => spill.take(bzip2::read::BzDecoder::new(input), size, memory_bytes, see)?,
         "lz4" => spill.take(lz4_flex::frame::FrameDecoder::new(input), size, memory_bytes, see)?,
@@ -81,22 +94,23 @@ pub(super) fn decompress(
             Ok(decoder) => {
                 let (plain, complaint) = spill.take(decoder, size, memory_bytes, see)?;
                 // The library says so of a window.
-                let is_window = |text: &String| text.contains("too much memory");
-                let hint = complaint.as_ref().filter(|text| is_window(text));
-                let hinted = hint.map(|text| format!("{text}: {WINDOW_HINT}"));
-                (plain, hinted.or(complaint))
+                let hinted = complaint.map(|complaint| match complaint.reason.contains("too much memory") {
+                    true => Complaint { reason: format!("{}: {WINDOW_HINT}", complaint.reason), ..complaint },
+                    false => complaint,
+                });
+                (plain, hinted)
             }
-            Err(error) => (Bytes::default(), Some(error.to_string())),
+            Err(error) => (Bytes::default(), Some(bare(error.to_string()))),
         },
         other => {
-            let complaint = format!("compression `{other}` is not known; known: none, bz2, lz4, zstd");
-            (Bytes::default(), Some(complaint))
+            let reason = format!("compression `{other}` is not known; known: none, bz2, lz4, zstd");
+            (Bytes::default(), Some(bare(reason)))
         }
     };
     let complaint = complaint.or_else(|| match size {
         StreamSize::Claimed(claimed) => {
             let missing = claimed.saturating_sub(plain.len());
-            (missing > 0).then(|| format!("{missing} of {claimed} bytes are missing"))
+            (missing > 0).then(|| bare(format!("{missing} of {claimed} bytes are missing")))
         }
         StreamSize::AtMost(_) => None,
     });
@@ -109,7 +123,7 @@ pub(super) fn plain(
     memory_bytes: usize,
     input: &mut dyn Read,
     see: &mut dyn FnMut(&[u8]),
-) -> Result<(Bytes, Option<String>)> {
+) -> Result<(Bytes, Option<Complaint>)> {
     let fail = |error| Error::io(part.path(), "read", error);
     if part.len() <= memory_bytes as u64 {
         let mut taken = Vec::with_capacity(usize::try_from(part.len()).unwrap_or(0));

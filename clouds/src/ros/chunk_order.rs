@@ -1,16 +1,16 @@
-use super::chunk::{ChunkPlace, MOST_CHUNK_BYTES, MessagePlace, OpenChunk};
+use super::chunk::{ChunkPlace, MOST_CHUNK_BYTES, MessagePlace};
 use super::chunk_file::Shares;
 use super::message_data::{MessageData, read};
-use super::recording::Message;
-use crate::error::Result;
+use super::recording::{Message, TopicSet};
+use crate::error::{Error, Place, Result};
 use crate::spill::{Budget, Bytes, Record, Sorted, Sorter};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Puts the messages of chunks in order of time. Chunks overlap a little; those that do are played together.
 #[derive(Debug)]
 pub(super) struct ChunkOrder {
     /// What messages are wanted of.
-    pub(super) topics: Vec<usize>,
+    pub(super) topics: TopicSet,
     budget: Budget,
     /// Numbers of chunks in order of their starts.
     order: Vec<u32>,
@@ -22,7 +22,7 @@ pub(super) struct ChunkOrder {
 
 #[derive(Debug)]
 struct Playing {
-    bytes: Bytes,
+    bytes: std::result::Result<Bytes, BrokenChunk>,
     /// The next message.
     head: MessagePlace,
     /// The messages after it, in order of time, and how many all are.
@@ -30,6 +30,28 @@ struct Playing {
     messages: u64,
     /// Number of the chunk in its file.
     number: usize,
+}
+
+/// A chunk of which any byte may be wrong. Each of its messages is an error, so that those behind keep their numbers.
+#[derive(Debug)]
+pub(super) struct BrokenChunk {
+    pub(super) path: PathBuf,
+    pub(super) offset: u64,
+    pub(super) reason: String,
+}
+
+impl BrokenChunk {
+    fn error(&self, log_ns: i64) -> Error {
+        let reason =
+            format!("a chunk is damaged: {}; its message recorded at {log_ns} ns is left out", self.reason);
+        Error::format(&self.path, Place::Byte(self.offset), reason)
+    }
+}
+
+impl Playing {
+    fn bytes(&self) -> Option<&Bytes> {
+        self.bytes.as_ref().ok()
+    }
 }
 
 /// What to do next.
@@ -56,13 +78,19 @@ impl ChunkOrder {
 
     /// Begins with these chunks.
     pub(super) fn begin(&mut self, places: &[ChunkPlace], topics: &[usize]) {
+        let topics = TopicSet::of(topics);
         let is_wanted = |place: &ChunkPlace| {
-            place.topics.as_ref().is_none_or(|there| topics.iter().any(|topic| there.contains(topic)))
+            place.topics.as_ref().is_none_or(|there| there.iter().any(|topic| topics.contains(*topic)))
         };
         let mut order: Vec<u32> =
             (0..).zip(places).filter(|(_, place)| is_wanted(place)).map(|(number, _)| number).collect();
         order.sort_by_key(|number| places.get(*number as usize).map(|place| (place.start_ns, place.offset)));
-        *self = Self { topics: topics.to_vec(), order, ..Self::new(&self.budget) };
+        *self = Self { topics, order, ..Self::new(&self.budget) };
+    }
+
+    /// How the memory of the recording is divided.
+    pub(super) fn shares(&self) -> Shares {
+        Shares::of(&self.budget)
     }
 
     /// Sorts the messages of a chunk that is to be loaded.
@@ -74,7 +102,7 @@ impl ChunkOrder {
 
     /// Bytes of memory for a chunk that is to be loaded.
     pub(super) fn chunk_bytes(&self) -> usize {
-        let held: usize = self.open.iter().map(|playing| playing.bytes.in_memory()).sum();
+        let held: usize = self.open.iter().filter_map(Playing::bytes).map(Bytes::in_memory).sum();
         Shares::of(&self.budget).chunks.saturating_sub(held)
     }
 
@@ -84,7 +112,7 @@ impl ChunkOrder {
         let next = self.order.get(self.next).and_then(|number| places.get(*number as usize));
         if let Some(place) = next {
             let is_due = earliest.is_none_or(|(_, log_ns)| place.start_ns <= log_ns);
-            let held: u64 = self.open.iter().map(|playing| playing.bytes.len()).sum();
+            let held: u64 = self.open.iter().filter_map(Playing::bytes).map(Bytes::len).sum();
             // A file whose chunks all overlap would be open as a whole.
             let is_room = earliest.is_none() || (held < MOST_CHUNK_BYTES && self.open.len() < MAX_OPEN);
             self.has_given_up |= is_due && !is_room;
@@ -109,12 +137,12 @@ impl ChunkOrder {
     /// Takes a chunk that was asked for, and its messages.
     pub(super) fn open(
         &mut self,
-        chunk: OpenChunk,
+        bytes: std::result::Result<Bytes, BrokenChunk>,
         mut rest: Sorted<MessagePlace>,
         messages: u64,
     ) -> Result<()> {
         if let Some(head) = rest.next()? {
-            self.open.push(Playing { bytes: chunk.bytes, head, rest, messages, number: self.next });
+            self.open.push(Playing { bytes, head, rest, messages, number: self.next });
         }
         Ok(())
     }
@@ -130,13 +158,16 @@ impl ChunkOrder {
         let Some(playing) = self.open.get_mut(index) else { return Ok(None) };
         let MessagePlace { log_ns, topic, start, len } = playing.head;
         let data = match &playing.bytes {
-            Bytes::Memory(bytes) => {
+            Err(broken) => Err(broken.error(log_ns)),
+            Ok(Bytes::Memory(bytes)) => {
                 let range = usize::try_from(start).ok().zip(usize::try_from(len).ok());
                 let data = range.and_then(|(start, len)| bytes.get(start..start.checked_add(len)?));
                 Ok(Bytes::Memory(data.unwrap_or_default().to_vec()))
             }
-            Bytes::File(part) if len <= SMALL_BYTES => read(&part.part(start, len), len).map(Bytes::Memory),
-            Bytes::File(part) => Ok(Bytes::File(part.part(start, len))),
+            Ok(Bytes::File(part)) if len <= SMALL_BYTES => {
+                read(&part.part(start, len), len).map(Bytes::Memory)
+            }
+            Ok(Bytes::File(part)) => Ok(Bytes::File(part.part(start, len))),
         };
         // A message that cannot be read is passed over, or it would come again for ever.
         match playing.rest.next()? {
@@ -162,7 +193,7 @@ mod tests {
             sorter.push(MessagePlace { log_ns: 5, start, len: 8, topic: 0 }).unwrap();
         }
         let bytes = Bytes::File(FilePart::open(cut.path(), 0, 24).unwrap());
-        order.open(OpenChunk { bytes, complaint: None }, sorter.finish().unwrap(), 3).unwrap();
+        order.open(Ok(bytes), sorter.finish().unwrap(), 3).unwrap();
         assert!(matches!(order.step(&[]), Ok(Step::Message(message)) if message.data.len() == 8));
         assert!(order.step(&[]).is_err() && order.step(&[]).is_err());
         assert!(matches!(order.step(&[]), Ok(Step::End)));

@@ -1,5 +1,5 @@
 use super::message_data::MessageData;
-use super::recording::{Message, Recording, Topic, TopicList};
+use super::recording::{Message, Recording, Topic, TopicList, TopicSet};
 use super::wire::Wire;
 use crate::error::{Error, Place, Result};
 use crate::spill::{Budget, Record, Sorted, Sorter, SpillFile, StreamSize};
@@ -132,7 +132,7 @@ impl Db3 {
     /// Finds the rows of topics; those before an error stay. The inner error is that of a temporary file.
     fn find_rows(
         &mut self,
-        topics: &[usize],
+        topics: &TopicSet,
         places: &mut Sorter<RowPlace>,
         found: &mut u64,
     ) -> rusqlite::Result<Result<()>> {
@@ -143,7 +143,7 @@ impl Db3 {
         let mut rows = statement.query([])?;
         while let Some(row) = rows.next()? {
             let (id, number, log_ns): (i64, i64, i64) = (row.get(0)?, row.get(1)?, row.get(2)?);
-            if let Some(&topic) = self.numbers.get(&number).filter(|topic| topics.contains(topic)) {
+            if let Some(&topic) = self.numbers.get(&number).filter(|topic| topics.contains(**topic)) {
                 if let Err(error) = places.push(RowPlace { log_ns, id, topic }) {
                     return Ok(Err(error));
                 }
@@ -178,7 +178,7 @@ impl Db3 {
             self.spill.take(input, StreamSize::Claimed(bytes), memory_bytes, &mut |_| {})?;
         match complaint {
             Some(complaint) => {
-                Err(Error::format(&path, Place::Record(u64::try_from(id).unwrap_or(0)), complaint))
+                Err(Error::format(&path, Place::Record(u64::try_from(id).unwrap_or(0)), complaint.reason))
             }
             None => Ok(MessageData(data)),
         }
@@ -215,7 +215,7 @@ impl Recording for Db3 {
         let budget = self.spill.budget().clone();
         let mut places = Sorter::new(&budget, budget.bytes / 4);
         let mut found = 0;
-        match self.find_rows(topics, &mut places, &mut found) {
+        match self.find_rows(&TopicSet::of(topics), &mut places, &mut found) {
             Ok(kept) => kept?,
             Err(error) => {
                 let path = self.database.path.display();

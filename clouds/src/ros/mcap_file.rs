@@ -1,5 +1,5 @@
 use super::chunk::{ChunkPlace, MOST_CHUNK_BYTES, MessagePlace, OpenChunk, decompress, plain};
-use super::chunk_file::{ChunkFile, Shares, TakeMessage, check_chunks};
+use super::chunk_file::{ChunkFile, Shares, TakeMessage, Walk, check_chunks};
 use super::chunk_order::{ChunkOrder, Step};
 use super::file_bytes::{FileBytes, Pieces};
 use super::mcap_record::{
@@ -8,7 +8,7 @@ use super::mcap_record::{
 };
 use super::recording::{Message, Recording, Topic, TopicList};
 use crate::error::{Error, Place, Result};
-use crate::spill::{Budget, SpillFile, StreamSize, Window};
+use crate::spill::{Budget, Complaint, SpillFile, StreamSize, Window};
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 use std::sync::Arc;
@@ -36,6 +36,8 @@ const END_MAGIC_BYTES: u64 = 8;
 const MOST_RECORD_BYTES: u64 = 1 << 20;
 /// Messages outside of chunks are read together up to this size.
 const BARE_CHUNK_BYTES: u64 = 4 << 20;
+/// Such a part that has messages of more topics is read whatever topics are wanted.
+const MAX_BARE_TOPICS: usize = 64;
 
 impl McapFile {
     /// Opens a file.
@@ -157,9 +159,8 @@ impl McapFile {
     /// Steps over all records, and looks into each chunk.
     fn scan(&mut self) -> Result<()> {
         let mut at = MAGIC.len() as u64;
-        let mut start_ns = i64::MIN;
         let shares = Shares::of(self.spill.budget());
-        let (mut messages, mut is_closed) = (0_u64, false);
+        let (mut walk, mut is_closed) = (Walk::default(), false);
         while let Some((kind, bytes)) = self.head(at)? {
             if matches!(kind, op::DATA_END | op::FOOTER) {
                 is_closed =
@@ -178,27 +179,7 @@ impl McapFile {
                         _ => self.channels.add_channel(&contents, &mut self.topics),
                     };
                 }
-                op::CHUNK => {
-                    let place =
-                        ChunkPlace { offset: at, bytes: next - at, start_ns, topics: None, is_bare: false };
-                    let (mut earliest, mut count) = (None, 0);
-                    let mut counts = HashMap::new();
-                    let loaded = self.load(&place, &mut |MessagePlace { log_ns, topic, .. }| {
-                        *counts.entry(topic).or_default() += 1;
-                        earliest = Some(earliest.map_or(log_ns, |earliest: i64| earliest.min(log_ns)));
-                        count += 1;
-                        Ok(())
-                    });
-                    // A bad chunk is told of when it is its turn; others come behind it.
-                    if let Err(error @ Error::Io { .. }) = loaded {
-                        return Err(error);
-                    }
-                    counts.into_iter().for_each(|(topic, messages)| self.topics.count(topic, messages));
-                    messages += count;
-                    start_ns = earliest.unwrap_or(start_ns);
-                    check_chunks(self.chunks.len(), shares, self.file.path())?;
-                    self.chunks.push(ChunkPlace { start_ns, ..place });
-                }
+                op::CHUNK => self.look_into(at, next - at, &mut walk)?,
                 op::MESSAGE if next <= self.file.len => {
                     let head = self.file.read_at(at + RECORD_HEAD_BYTES, MESSAGE_HEAD_BYTES.min(bytes))?;
                     let head = message_head(&head);
@@ -206,7 +187,7 @@ impl McapFile {
                         head.and_then(|(channel, log_ns)| Some((self.channels.topic(channel)??, log_ns)));
                     if let Some((topic, log_ns)) = known {
                         self.topics.count(topic, 1);
-                        messages += 1;
+                        walk.messages += 1;
                         check_chunks(self.chunks.len(), shares, self.file.path())?;
                         self.append_bare(at, next, topic, log_ns);
                     }
@@ -216,6 +197,7 @@ impl McapFile {
             at = next;
         }
         if !is_closed {
+            let messages = walk.messages;
             self.remarks.push(format!(
                 "{} has no end (the recorder did not close it, or it was cut off): {messages} messages were found by \
                  reading it whole",
@@ -232,9 +214,10 @@ impl McapFile {
             Some(place) => {
                 place.bytes = next - place.offset;
                 place.start_ns = place.start_ns.min(log_ns);
-                let topics = place.topics.as_deref().unwrap_or_default();
+                let Some(topics) = place.topics.as_deref() else { return };
                 if !topics.contains(&topic) {
-                    place.topics = Some(topics.iter().copied().chain([topic]).collect());
+                    let is_room = topics.len() < MAX_BARE_TOPICS;
+                    place.topics = is_room.then(|| topics.iter().copied().chain([topic]).collect());
                 }
             }
             None => {
@@ -246,6 +229,7 @@ impl McapFile {
 
     /// Walks over the records of a chunk.
     fn find_messages(&mut self, chunk: &mut OpenChunk, take: &mut TakeMessage<'_>) -> Result<()> {
+        let is_broken = chunk.is_broken();
         let OpenChunk { bytes, complaint } = chunk;
         let (mut window, mut at) = (Window::default(), 0);
         while at < bytes.len() {
@@ -260,7 +244,7 @@ impl McapFile {
                 Some((kind, count, end))
             });
             let Some((kind, count, end)) = whole else {
-                complaint.get_or_insert_with(|| format!("byte {at} of its contents starts no record"));
+                OpenChunk::note(complaint, format!("byte {at} of its contents starts no record"));
                 return Ok(());
             };
             let most_bytes = match kind {
@@ -271,6 +255,8 @@ impl McapFile {
             let contents =
                 bytes.piece(start, count.min(most_bytes) as usize, &mut window)?.unwrap_or_default();
             match kind {
+                // What a broken chunk says of them may be wrong.
+                op::SCHEMA | op::CHANNEL if is_broken && self.channels.knows(kind, contents) => {}
                 op::SCHEMA => drop(self.channels.add_schema(contents)),
                 op::CHANNEL => drop(self.channels.add_channel(contents, &mut self.topics)),
                 op::MESSAGE => {
@@ -278,7 +264,7 @@ impl McapFile {
                     let known =
                         head.and_then(|(channel, log_ns)| Some((self.channels.topic(channel)?, log_ns)));
                     let Some((topic, log_ns)) = known else {
-                        complaint.get_or_insert_with(|| format!("byte {at}: a message without a channel"));
+                        OpenChunk::note(complaint, format!("byte {at}: a message without a channel"));
                         return Ok(());
                     };
                     let start = start + MESSAGE_HEAD_BYTES;
@@ -332,10 +318,19 @@ impl McapFile {
             }
             false => plain(part, memory_bytes, input, &mut see),
         })?;
-        let cut = is_cut.then(|| "the file ends in the midst of it".to_owned());
-        // What is missing explains a checksum that is wrong.
-        let complaint = cut.or(complaint).or_else(|| head.complaint(crc));
-        Ok(OpenChunk { bytes, complaint })
+        if is_cut {
+            // What is missing explains a checksum that is wrong.
+            let reason = "the file ends in the midst of it".to_owned();
+            return Ok(OpenChunk { bytes, complaint: Some(Complaint { reason, is_broken: false }) });
+        }
+        let has_checksum = head.crc != 0;
+        let wrong = head.complaint(crc);
+        let is_broken = wrong.is_some();
+        let complaint = complaint.map(|complaint| match has_checksum {
+            true => Complaint { is_broken, ..complaint },
+            false => complaint,
+        });
+        Ok(OpenChunk { bytes, complaint: complaint.or(wrong) })
     }
 }
 
@@ -350,6 +345,10 @@ impl ChunkFile for McapFile {
 
     fn step(&mut self) -> Result<Step> {
         self.order.step(&self.chunks)
+    }
+
+    fn found(&mut self) -> (&mut TopicList, &mut Vec<ChunkPlace>) {
+        (&mut self.topics, &mut self.chunks)
     }
 
     fn load(&mut self, place: &ChunkPlace, take: &mut TakeMessage<'_>) -> Result<OpenChunk> {

@@ -1,6 +1,7 @@
 use super::file_bytes::{Pieces, signed_ns};
 use super::recording::TopicList;
 use super::wire::Wire;
+use crate::spill::Complaint;
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 use std::sync::Arc;
@@ -52,6 +53,15 @@ impl Channels {
     /// The topic of a channel, or that it is left out; `None` if the channel is not known.
     pub(super) fn topic(&self, channel: u16) -> Option<Option<usize>> {
         self.topics.get(&channel).copied()
+    }
+
+    /// Whether the contents of a schema or channel record have a number that is known already.
+    pub(super) fn knows(&self, kind: u8, contents: &[u8]) -> bool {
+        let id = Pieces::new(contents).u16();
+        id.is_some_and(|id| match kind {
+            op::SCHEMA => self.types.contains_key(&id),
+            _ => self.topics.contains_key(&id),
+        })
     }
 
     /// Takes the contents of a schema record.
@@ -114,15 +124,14 @@ impl ChunkHead {
     }
 
     /// What is wrong with its unpacked records by their checksum.
-    pub(super) fn complaint(&self, plain: crc32fast::Hasher) -> Option<String> {
-        let found = plain.finalize();
+    pub(super) fn complaint(&self, plain: crc32fast::Hasher) -> Option<Complaint> {
+        let (found, wanted) = (plain.finalize(), self.crc);
         let reason = || {
-            let wanted = self.crc;
             format!(
                 "its contents are damaged: their checksum is {found:08x}, that in its header {wanted:08x}"
             )
         };
-        (self.crc != 0 && found != self.crc).then(reason)
+        (wanted != 0 && found != wanted).then(|| Complaint { reason: reason(), is_broken: true })
     }
 }
 

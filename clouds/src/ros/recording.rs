@@ -1,6 +1,9 @@
 use super::message_data::MessageData;
 use super::wire::Wire;
 use crate::error::Result;
+use std::collections::HashMap;
+use std::collections::hash_map::DefaultHasher;
+use std::hash::{Hash, Hasher};
 
 /// A topic of a recording.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -63,6 +66,38 @@ pub(super) struct TopicList {
     pub(super) topics: Vec<Topic>,
     /// What they take.
     bytes: usize,
+    /// Indices of topics by the hash of what tells one from another. A file may name a topic in each of its connections.
+    by_hash: HashMap<u64, Vec<usize>>,
+}
+
+/// Some of the topics of a recording. A file may have as many topics as messages.
+#[derive(Clone, Debug, Default)]
+pub(super) struct TopicSet {
+    /// By topic; topics beyond the end are left out.
+    is_in: Vec<bool>,
+}
+
+impl TopicSet {
+    /// The set of these topics (indices); those that no list can hold are left out.
+    pub(super) fn of(topics: &[usize]) -> Self {
+        let last = topics.iter().filter(|topic| **topic < MAX_TOPIC_BYTES).max();
+        let mut is_in = vec![false; last.map_or(0, |last| last + 1)];
+        for &topic in topics {
+            if let Some(is_in) = is_in.get_mut(topic) {
+                *is_in = true;
+            }
+        }
+        Self { is_in }
+    }
+
+    pub(super) fn contains(&self, topic: usize) -> bool {
+        self.is_in.get(topic).copied().unwrap_or(false)
+    }
+
+    #[cfg(feature = "sqlite")]
+    pub(super) fn is_empty(&self) -> bool {
+        self.is_in.is_empty()
+    }
 }
 
 /// Memory for topics: some ten thousand. Others are not read.
@@ -71,8 +106,12 @@ const MAX_TOPIC_BYTES: usize = 1 << 20;
 impl TopicList {
     /// The index of a topic, which is appended if it is new; `None` if there are too many.
     pub(super) fn index(&mut self, name: &str, type_name: &str, wire: Option<Wire>) -> Option<usize> {
+        let mut hasher = DefaultHasher::new();
+        (name, type_name, wire).hash(&mut hasher);
+        let hash = hasher.finish();
         let is_it = |topic: &Topic| topic.name == name && topic.type_name == type_name && topic.wire == wire;
-        if let Some(index) = self.topics.iter().position(is_it) {
+        let mut same = self.by_hash.get(&hash).into_iter().flatten();
+        if let Some(&index) = same.find(|index| self.topics.get(**index).is_some_and(is_it)) {
             return Some(index);
         }
         let more = size_of::<Topic>().saturating_add(name.len()).saturating_add(type_name.len());
@@ -81,8 +120,10 @@ impl TopicList {
             return None;
         }
         self.bytes = bytes;
+        let index = self.topics.len();
+        self.by_hash.entry(hash).or_default().push(index);
         self.topics.push(Topic { name: name.to_owned(), type_name: type_name.to_owned(), wire, messages: 0 });
-        self.topics.len().checked_sub(1)
+        Some(index)
     }
 
     /// Counts messages of a topic.
@@ -90,5 +131,33 @@ impl TopicList {
         if let Some(topic) = self.topics.get_mut(index) {
             topic.messages = topic.messages.saturating_add(messages);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::time::{Duration, Instant};
+
+    /// Each name was once compared with all that were kept.
+    #[test]
+    fn many_topics_take_time_as_their_number() {
+        let (mut topics, start) = (TopicList::default(), Instant::now());
+        let mut kept = 0;
+        for round in 0..2 {
+            for k in 0..100_000 {
+                let index = topics.index(&format!("/t{k}"), "std_msgs/String", Some(Wire::Ros1));
+                kept += usize::from(round == 0 && index.is_some());
+                assert_eq!(index, (k < kept).then_some(k));
+            }
+        }
+        assert!((5000..20_000).contains(&kept), "{kept}");
+        assert_ne!(topics.index("/t0", "std_msgs/Empty", Some(Wire::Ros1)), Some(0));
+        assert!(start.elapsed() < Duration::from_secs(3), "{:?}", start.elapsed());
+        let some = TopicSet::of(&[3, 1, usize::MAX]);
+        assert_eq!(
+            [0, 1, 2, 3, 4, usize::MAX].map(|topic| some.contains(topic)),
+            [false, true, false, true, false, false]
+        );
     }
 }

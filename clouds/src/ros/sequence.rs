@@ -1,4 +1,4 @@
-use super::recording::{Message, Recording, Topic, TopicList};
+use super::recording::{Message, Recording, Topic, TopicList, TopicSet};
 use crate::error::Result;
 
 /// Recordings one after the other, as one: the parts of a split bag.
@@ -8,7 +8,7 @@ use crate::error::Result;
 pub struct Sequence {
     parts: Vec<Part>,
     topics: TopicList,
-    wanted: Vec<usize>,
+    wanted: TopicSet,
     at: usize,
     has_begun: bool,
 }
@@ -44,7 +44,7 @@ impl Recording for Sequence {
     }
 
     fn begin(&mut self, topics: &[usize]) -> Result<()> {
-        self.wanted = topics.to_vec();
+        self.wanted = TopicSet::of(topics);
         self.at = 0;
         self.has_begun = false;
         Ok(())
@@ -54,7 +54,7 @@ impl Recording for Sequence {
         while let Some(part) = self.parts.get_mut(self.at) {
             if !self.has_begun {
                 let is_wanted =
-                    |index: &usize| part.topics.get(*index).is_some_and(|t| self.wanted.contains(t));
+                    |index: &usize| part.topics.get(*index).is_some_and(|topic| self.wanted.contains(*topic));
                 let own: Vec<usize> = (0..part.topics.len()).filter(is_wanted).collect();
                 self.has_begun = true;
                 part.recording.begin(&own)?;

@@ -40,8 +40,11 @@ pub enum WhyNot {
     #[error("the frame {0} is its own ancestor")]
     Loop(String),
     /// More frames are above it than a robot has.
-    #[error("more than 10000 frames are above the frame {0}")]
+    #[error("too many frames are above the frame {0}")]
     TooManyFrames(String),
+    /// Clouds of one topic are in more frames than a robot has sensors.
+    #[error("the clouds are in more than {0} frames")]
+    TooManySensors(usize),
     /// The stamp is before the first transform of a frame.
     #[error("the stamp is before the first transform of {0}")]
     Before(String),
@@ -81,6 +84,8 @@ pub enum BadTransform {
 
 /// How far the length of a quaternion may be from 1, as in files of poses.
 const MOST_LENGTH_ERROR: f64 = 0.1;
+/// Most frames among which ways are searched for each cloud of a recording.
+const MAX_FRAMES_BETWEEN: usize = 1000;
 
 impl Transforms {
     /// Sets how far apart in time two samples may be that a pose is found between; see
@@ -272,14 +277,68 @@ impl Transforms {
     ///
     /// Why it is not known.
     pub fn lookup(&self, target_frame: &str, source_frame: &str, stamp_ns: i64) -> Result<RigidPose, WhyNot> {
+        self.lookup_among(target_frame, source_frame, stamp_ns, None)
+    }
+
+    /// As [`Transforms::lookup`], with no other frames than these.
+    pub(super) fn lookup_among(
+        &self,
+        target_frame: &str,
+        source_frame: &str,
+        stamp_ns: i64,
+        among: Option<&HashSet<String>>,
+    ) -> Result<RigidPose, WhyNot> {
         let (target, source) = (bare(target_frame), bare(source_frame));
         if target == source {
             return Ok(RigidPose::IDENTITY);
         }
-        let [from_target, from_source] = self.route(target, source, stamp_ns)?;
+        let [from_target, from_source] = self.route(target, source, stamp_ns, among)?;
         let common_from_source = self.along(&from_source, stamp_ns)?;
         let common_from_target = self.along(&from_target, stamp_ns)?;
         Ok(common_from_target.inverse().then(&common_from_source))
+    }
+
+    /// The frames among which all ways from a source to a target are, at whatever time: with them alone, a search costs
+    /// as much as the robot has frames, however many others there are.
+    ///
+    /// # Errors
+    ///
+    /// They are too many.
+    pub fn frames_between(&self, target: &str, source: &str) -> Result<HashSet<String>, WhyNot> {
+        let (target, source) = (bare(target), bare(source));
+        let up = self.children_above(source, target);
+        let mut between: HashSet<String> = HashSet::new();
+        if up.contains_key(target) {
+            let mut open = vec![target];
+            while let Some(frame) = open.pop() {
+                if between.insert(frame.to_owned()) {
+                    open.extend(up.get(frame).into_iter().flatten());
+                }
+            }
+        } else {
+            let down = self.children_above(target, source);
+            between.extend(up.into_keys().chain(down.into_keys()).map(str::to_owned));
+        }
+        match between.len() > MAX_FRAMES_BETWEEN {
+            true => Err(WhyNot::TooManyFrames(source.to_owned())),
+            false => Ok(between),
+        }
+    }
+
+    /// The children of each frame above a frame, up to an end: what is above that does not matter.
+    fn children_above<'a>(&'a self, from: &'a str, end: &str) -> HashMap<&'a str, Vec<&'a str>> {
+        let mut children: HashMap<&str, Vec<&str>> = HashMap::from([(from, Vec::new())]);
+        let mut open = vec![from];
+        while let Some(child) = open.pop() {
+            for step in self.steps(child) {
+                let is_new = !children.contains_key(step.parent);
+                children.entry(step.parent).or_default().push(child);
+                if is_new && step.parent != end {
+                    open.push(step.parent);
+                }
+            }
+        }
+        children
     }
 
     /// The frames whose place in their parents leads from one frame to another at a time: up to what is above both,
@@ -294,7 +353,7 @@ impl Transforms {
         source_frame: &str,
         stamp_ns: i64,
     ) -> Result<[Vec<String>; 2], WhyNot> {
-        let route = self.route(bare(target_frame), bare(source_frame), stamp_ns)?;
+        let route = self.route(bare(target_frame), bare(source_frame), stamp_ns, None)?;
         Ok(route.map(|steps| steps.iter().map(|step| step.child.to_owned()).collect()))
     }
 
@@ -305,8 +364,10 @@ impl Transforms {
         target: &'a str,
         source: &'a str,
         stamp_ns: i64,
+        among: Option<&HashSet<String>>,
     ) -> Result<[Vec<Step<'a>>; 2], WhyNot> {
-        let all = |at: &'a str| self.steps_at(at, stamp_ns);
+        let is_among = |step: &Step<'a>| among.is_none_or(|among| among.contains(step.parent));
+        let all = |at: &'a str| self.steps_at(at, stamp_ns).map(|steps| kept(steps, is_among));
         let trusted = |at: &'a str| all(at).map(|steps| kept(steps, Step::is_trusted));
         let found = match route_by(target, source, &trusted) {
             found @ (Ok(_) | Err(WhyNot::Unreadable(_))) => return found,

@@ -1,7 +1,7 @@
 use std::fmt;
 
 /// How the messages of a topic are serialised.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Wire {
     /// ROS 1: little-endian, without padding.
     Ros1,

@@ -17,4 +17,4 @@ pub(crate) use file_part::FilePart;
 pub(crate) use pose_list::{PoseList, PoseWriter, TimedPose};
 pub(crate) use sorter::{Record, Sorted, Sorter};
 #[cfg(feature = "ros")]
-pub(crate) use spill_file::{SpillFile, StreamSize};
+pub(crate) use spill_file::{Complaint, SpillFile, StreamSize};

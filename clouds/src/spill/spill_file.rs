@@ -42,6 +42,14 @@ impl StreamSize {
     }
 }
 
+/// Why a stream is not whole.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Complaint {
+    pub(crate) reason: String,
+    /// The decoder failed: the bytes before that may be wrong, too, since many checksums come behind their data.
+    pub(crate) is_broken: bool,
+}
+
 const MOST_FILE_BYTES: u64 = 256 << 20;
 /// Bytes that are copied at a time.
 const COPY_BYTES: usize = 1 << 16;
@@ -63,10 +71,12 @@ impl SpillFile {
         size: StreamSize,
         memory_bytes: usize,
         see: &mut dyn FnMut(&[u8]),
-    ) -> Result<(Bytes, Option<String>)> {
+    ) -> Result<(Bytes, Option<Complaint>)> {
         let (mut start, mut complaint) = (Vec::new(), None);
+        let broken = |error: std::io::Error| Complaint { reason: error.to_string(), is_broken: true };
         let (most_bytes, limit) = (size.most(), size.most().saturating_add(1));
-        let too_many = format!("it holds more than the {most_bytes} bytes that it {}", size.word());
+        let reason = format!("it holds more than the {most_bytes} bytes that it {}", size.word());
+        let too_many = Complaint { reason, is_broken: false };
         // What is announced to be larger does not pass through memory.
         let first_bytes = match size {
             StreamSize::Claimed(claimed) if claimed >= memory_bytes as u64 => 0,
@@ -78,7 +88,7 @@ impl SpillFile {
                 start.reserve_exact(usize::try_from(first_bytes).unwrap_or(0));
             }
             let read = (&mut input).take(first_bytes).read_to_end(&mut start);
-            complaint = read.err().map(|error| error.to_string());
+            complaint = read.err().map(broken);
             let is_too_long = start.len() as u64 == limit;
             start.truncate(usize::try_from(most_bytes).unwrap_or(usize::MAX));
             see(&start);
@@ -119,7 +129,7 @@ impl SpillFile {
                         written += bytes.len() as u64;
                     }
                     Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
-                    Err(error) => complaint = Some(error.to_string()),
+                    Err(error) => complaint = Some(broken(error)),
                 }
             }
             self.end = begin + written;

@@ -13,11 +13,13 @@ pub fn bag1(topics: &[(&str, &str)], messages: &[BagMessage]) -> Vec<u8> {
     let size = field("size", &(contents.len() as u32).to_le_bytes());
     let chunk = record(&[field("op", &[5]), field("compression", b"none"), size], &contents);
     let times = || messages.iter().map(|message| message.1);
-    let mut counts = Vec::new();
-    for id in 0..topics.len() {
-        let count = messages.iter().filter(|message| message.0 == id).count() as u32;
-        counts.extend([(id as u32).to_le_bytes(), count.to_le_bytes()].concat());
-    }
+    let mut counts = vec![0_u32; topics.len()];
+    messages.iter().for_each(|message| counts[message.0] += 1);
+    let counts: Vec<u8> = counts
+        .iter()
+        .zip(0_u32..)
+        .flat_map(|(count, id)| [id.to_le_bytes(), count.to_le_bytes()].concat())
+        .collect();
     let head = |index_at: u64| {
         let [chunks, connections] = [1, topics.len() as u32].map(u32::to_le_bytes);
         let fields = [

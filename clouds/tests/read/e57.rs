@@ -79,3 +79,60 @@ fn points_that_take_no_bits_are_refused() {
     assert!(error.contains("constant.e57, record 0: every field of its points has"), "{error}");
     assert_eq!(points, 0);
 }
+
+/// A file whose description is this one.
+fn described(path: &Path, xml: &[u8]) {
+    let mut content = b"ASTM-E57".to_vec();
+    content.extend([1_u32, 0].iter().flat_map(|number| number.to_le_bytes()));
+    let pages = (48 + xml.len()).div_ceil(1020);
+    for number in [1024 * pages as u64, 48, xml.len() as u64, 1024] {
+        content.extend(number.to_le_bytes());
+    }
+    content.extend(xml);
+    content.resize(1020 * pages, 0);
+    // Checksums are compared later than what is tested here.
+    let file: Vec<u8> = content.chunks(1020).flat_map(|page| [page, &[0; 4]].concat()).collect();
+    fs::write(path, file).unwrap();
+}
+
+/// The library compares each attribute of a tag with those before it.
+#[test]
+fn a_tag_with_many_attributes_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("many.e57");
+    let attributes: String = (0..200_000).map(|k| format!(" a{k}=''")).collect();
+    described(&path, format!("<e57Root{attributes}/>").as_bytes());
+    let (error, _) = failure(&path, &OpenOptions::default());
+    assert!(error.contains("more than 256 attributes of one tag"), "{error}");
+}
+
+/// A packet is decoded as a whole.
+#[test]
+fn packets_that_exceed_the_memory_are_refused() {
+    use e57::{E57Writer, Record, RecordDataType, RecordName, RecordValue};
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("bits.e57");
+    let mut writer = E57Writer::from_file(&path, "{a}").unwrap();
+    let bit = RecordDataType::Integer { min: 0, max: 1 };
+    let names = [RecordName::CartesianX, RecordName::CartesianY, RecordName::CartesianZ];
+    let scaled = RecordDataType::ScaledInteger { min: 0, max: 1, scale: 1.0, offset: 0.0 };
+    let fields = names.map(|name| Record { name, data_type: scaled.clone() });
+    let row = Record { name: RecordName::RowIndex, data_type: bit };
+    let fields = fields.into_iter().chain([row]).collect();
+    let mut cloud = writer.add_pointcloud("{b}", fields).unwrap();
+    for k in 0..400_000 {
+        let value = RecordValue::ScaledInteger(k % 2);
+        cloud.add_point(vec![value.clone(), value.clone(), value, RecordValue::Integer(0)]).unwrap();
+    }
+    cloud.finalize().unwrap();
+    writer.finalize().unwrap();
+    let with = |memory_bytes| OpenOptions { memory_bytes, ..OpenOptions::default() };
+    let (error, points) = failure(&path, &with(0));
+    assert!(
+        error.contains("record 0: a packet of points would take") && error.contains("--memory"),
+        "{error}"
+    );
+    assert_eq!(points, 0);
+    let clouds = crate::support::clouds_with(&path, &with(128 << 20));
+    assert_eq!(clouds[0].1.len(), 400_000);
+}

@@ -15,6 +15,7 @@ mod cloud_points;
 mod cloud_queue;
 mod corrections;
 mod counters;
+mod frame_owners;
 mod health;
 mod inbox;
 mod latencies;

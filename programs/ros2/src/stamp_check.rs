@@ -65,6 +65,11 @@ impl StampCheck {
         self.children.iter().filter_map(|(child, known)| Some((child.as_str(), known.off_since?)))
     }
 
+    /// Forgets a frame.
+    pub fn forget(&mut self, child: &str) {
+        self.children.remove(child);
+    }
+
     /// Follows the clock of a child that has been off since then, and returns whose past is of no use.
     fn follow(&mut self, child: &str, stamp_ns: i64, since: Instant, now: Instant) -> Vec<String> {
         let jumped = if self.are_most_off(since) {

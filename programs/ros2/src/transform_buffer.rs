@@ -2,10 +2,12 @@ use crate::args::Args;
 use crate::cloud::Cloud;
 use crate::cloud_queue::{CloudQueue, Verdict};
 use crate::counters::Counters;
+use crate::frame_owners::FrameOwners;
 use crate::parent_warnings::ParentWarnings;
 use crate::pose_watch::PoseWatch;
 use crate::stamp_check::{StampCheck, StampVerdict};
 use crate::transport::Gid;
+use std::collections::HashSet;
 use std::time::{Duration, Instant};
 use voxtile_clouds::RigidPose;
 use voxtile_clouds::poses::most_gap_ns;
@@ -21,6 +23,9 @@ pub struct TransformBuffer {
     most_wait: Duration,
     /// Samples since the last time that old ones were forgotten, and those left then.
     samples: (usize, usize),
+    owners: FrameOwners,
+    /// Frames of clouds so far.
+    sensors: HashSet<String>,
     parents: ParentWarnings,
     watch: PoseWatch,
     refused_at: Option<Instant>,
@@ -33,6 +38,7 @@ const FORGET_EVERY: usize = 1000;
 /// Bounds of what a flood can fill.
 const MOST_SAMPLES: usize = 200_000;
 const MOST_FRAMES: usize = 2000;
+const MAX_SENSORS: usize = 100;
 const MOST_NAME_BYTES: usize = 256;
 /// How often transforms that are none are reported.
 const REFUSED_AGAIN: Duration = Duration::from_secs(30);
@@ -48,6 +54,8 @@ impl TransformBuffer {
             fixed_frame: bare(&args.frame_id).to_owned(),
             most_wait: args.transform_wait,
             samples: (0, 0),
+            owners: FrameOwners::default(),
+            sensors: HashSet::new(),
             parents: ParentWarnings::default(),
             watch: PoseWatch::default(),
             refused_at: None,
@@ -69,19 +77,20 @@ impl TransformBuffer {
         }
         let (new, kept) = self.samples;
         let (parent, child) = (&pose.header.frame_id, &pose.child_frame);
-        // Frames that are known stay in use, whoever floods the rest.
-        let is_new = !self.transforms.knows(child);
-        let is_full = new + kept >= MOST_SAMPLES || (is_new && self.transforms.frames() >= MOST_FRAMES);
-        if parent.len().max(child.len()) > MOST_NAME_BYTES
-            || is_full
-            || !(is_static || self.is_of_now(child, pose.header.stamp_ns, now, queue))
-        {
+        let is_long = parent.len().max(child.len()) > MOST_NAME_BYTES;
+        if !is_long && !self.owners.knows(bare(child)) && self.owners.len() >= MOST_FRAMES {
+            self.forget_frames(counters);
+        }
+        let is_new = !self.owners.knows(bare(child));
+        let is_full = new + kept >= MOST_SAMPLES || (is_new && self.owners.len() >= MOST_FRAMES);
+        if is_long || is_full || !(is_static || self.is_of_now(child, pose.header.stamp_ns, now, queue)) {
             counters.transforms_refused += 1;
         } else {
             let stamp_ns = pose.header.stamp_ns;
             match self.transforms.insert(parent, child, stamp_ns, pose.parent_from_child, is_static) {
-                Ok(false) => {}
+                Ok(false) => self.owners.note(bare(child), publisher),
                 Ok(true) => {
+                    self.owners.note(bare(child), publisher);
                     self.parents.check(&self.transforms, [parent, child].map(|of| bare(of)), publisher)
                 }
                 Err(why) => {
@@ -108,6 +117,18 @@ impl TransformBuffer {
         self.samples = (0, left);
     }
 
+    /// Forgets frames of who names most, so that there is room for others: those that lead from a sensor to the map stay.
+    fn forget_frames(&mut self, counters: &mut Counters) {
+        let fixed = self.fixed_frame.as_str();
+        let between = self.sensors.iter().map(|sensor| self.transforms.frames_between(fixed, sensor));
+        let needed: HashSet<String> = between.flatten().flatten().collect();
+        for child in self.owners.forget_some(&needed) {
+            self.transforms.detach(&child);
+            self.stamps.forget(&child);
+            counters.transforms_refused += 1;
+        }
+    }
+
     /// Whether a stamp is one of the robot's clock. If that of a frame has jumped, what was before it is forgotten.
     fn is_of_now(&mut self, child: &str, stamp_ns: i64, now: Instant, queue: &mut CloudQueue) -> bool {
         match self.stamps.verdict(child, stamp_ns, now) {
@@ -129,6 +150,9 @@ impl TransformBuffer {
 
     /// Whether a cloud has its pose, may still get it, or never will.
     pub fn verdict(&mut self, cloud: &Cloud, now: Instant) -> Verdict<RigidPose> {
+        if !self.sensors.contains(bare(&cloud.frame)) && self.sensors.len() < MAX_SENSORS {
+            self.sensors.insert(bare(&cloud.frame).to_owned());
+        }
         let why = match cloud.pose.map_or_else(|| self.find(cloud), Ok) {
             Ok(pose) => {
                 self.watch.found(cloud.topic);
@@ -337,9 +361,44 @@ mod tests {
                 &mut counters,
             );
         }
-        assert_eq!((buffer.transforms.frames(), counters.transforms_refused), (MOST_FRAMES, 7));
-        buffer.insert(&pose("map", "f3", 1, 0.0), false, None, Instant::now(), &mut queue(), &mut counters);
-        assert_eq!(counters.transforms_refused, 7);
+        assert_eq!((buffer.transforms.frames(), counters.transforms_refused), (1507, 500));
+        // What was named last is still known.
+        let last = format!("f{}", MOST_FRAMES + 6);
+        buffer.insert(&pose("map", &last, 1, 0.0), false, None, Instant::now(), &mut queue(), &mut counters);
+        assert_eq!((buffer.transforms.frames(), counters.transforms_refused), (1507, 500));
+    }
+
+    #[test]
+    fn unknown_frames_do_not_crowd_out_the_robots_own() {
+        const S: i64 = 1_000_000_000;
+        let [flood, robot, state] = [1, 2, 3].map(|k| Some(Gid([k; 16])));
+        // Before the robot's own, and after them, by publishers that are known and not.
+        for publishers in [[flood, robot, state], [None; 3]] {
+            let [flood, robot, state] = publishers;
+            let (mut buffer, mut counters, start) = (buffer(), Counters::default(), Instant::now());
+            let mut number = 0;
+            let mut put = |buffer: &mut TransformBuffer, pose: &StampedPose, is_static, publisher| {
+                number += 1;
+                let now = start + Duration::from_micros(number);
+                buffer.insert(pose, is_static, publisher, now, &mut queue(), &mut counters);
+            };
+            for k in 0..MOST_FRAMES + 500 {
+                put(&mut buffer, &pose("x", &format!("f{k}"), 0, 0.0), k % 2 == 0, flood);
+            }
+            put(&mut buffer, &pose("base", "lidar", 0, 1.0), true, state);
+            // A loop above the frame of the map, and a cloud that waits.
+            put(&mut buffer, &pose("world", "map", 0, 9.0), true, flood);
+            put(&mut buffer, &pose("map", "world", 0, 9.0), true, flood);
+            assert_eq!(buffer.verdict(&cloud(S / 2), start), Verdict::Waits);
+            put(&mut buffer, &pose("map", "base", 0, 2.0), false, robot);
+            for k in 0..3 * MOST_FRAMES {
+                put(&mut buffer, &pose("x", &format!("g{k}"), 0, 0.0), k % 2 == 0, flood);
+            }
+            put(&mut buffer, &pose("map", "base", S, 2.0), false, robot);
+            let found = buffer.verdict(&cloud(S / 2), start);
+            assert!(matches!(found, Verdict::Ready(pose) if pose.position_m[0] == 3.0), "{found:?}");
+            assert!(buffer.transforms.frames() <= MOST_FRAMES);
+        }
     }
 
     #[test]

@@ -38,7 +38,7 @@ end_router() {
 start() {
     # shellcheck disable=SC2086
     "$program" -o "$1" --transport zenoh --zenoh-router tcp/127.0.0.1:$port --domain-id $domain --resolution 0.1 \
-        --memory 128MiB --transform-wait 20 $outputs >"$1.log" 2>&1 &
+        --memory 128MiB --transform-wait 60 $outputs >"$1.log" 2>&1 &
     node=$!
 }
 
@@ -73,10 +73,12 @@ for kind in friendly hostile; do
         done
         start "$map"
     fi
-    "$python" zenoh_outputs.py $port $domain "$map.outputs" 17 &
+    "$python" zenoh_outputs.py $port $domain "$map.outputs" 120 &
     listener=$!
     wait $peer || fail "the peer has failed"
     peer=
+    sleep 3
+    kill $listener
     wait $listener || fail "no outputs"
     listener=
     peak_kib[$kind]=$(sed -n 's/^VmHWM:[^0-9]*\([0-9]*\) kB/\1/p' /proc/$node/status)

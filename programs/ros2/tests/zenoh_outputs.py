@@ -1,12 +1,13 @@
 """What the node publishes over Zenoh, as an independent peer gets it; outputs.py compares it.
 
-zenoh_outputs.py PORT DOMAIN FILE SECONDS   writes the last message of each topic, and how many there were
+zenoh_outputs.py PORT DOMAIN FILE SECONDS   writes the last message of each topic, and how many there were, after so
+                                            many seconds or at SIGTERM
 """
 
 import functools
+import signal
 import sys
 import threading
-import time
 
 from outputs import CHANGES, TYPES, Taken
 from zenoh_graph import Graph, run
@@ -14,6 +15,8 @@ from zenoh_graph import Graph, run
 
 def main():
     port, domain, file, seconds = int(sys.argv[1]), int(sys.argv[2]), sys.argv[3], float(sys.argv[4])
+    ended = threading.Event()
+    signal.signal(signal.SIGTERM, lambda *_: ended.set())
     graph, taken, lock, wrong = Graph(port, domain, "listener"), Taken(), threading.Lock(), []
 
     def take(name, kind, cdr):
@@ -27,7 +30,7 @@ def main():
         depth = 100 if name == CHANGES else 1
         own_take = functools.partial(take, name, kind)
         graph.subscription("/" + name, ros_name.replace("/msg/", "/"), own_take, latched=True, depth=depth)
-    time.sleep(seconds)
+    ended.wait(seconds)
     with lock:
         if wrong:
             sys.exit(f"wrong messages: {wrong}")

@@ -11,8 +11,10 @@ import pathlib
 import sys
 import time
 
+import zenoh
 from peer import START_S, TYPES, cloud, loops, messages, topics_of, write_bag
 from zenoh_graph import Graph, run
+from zenoh_services import client
 
 
 def hostilities(graph, key):
@@ -21,7 +23,8 @@ def hostilities(graph, key):
     for one in garbage:
         graph.session.put(key, one)
         graph.session.put(key, one, attachment=b"\xff" * 40)
-    graph.session.put(key, bytes(17 << 20), attachment=graph.attachment())
+    block = zenoh.CongestionControl.BLOCK
+    graph.session.put(key, bytes(17 << 20), attachment=graph.attachment(), congestion_control=block)
     graph.session.put(key.replace("PointCloud2", "Image"), bytes(1000))
     graph.session.put(key.rsplit("/", 1)[0] + "/RIHS01_" + "0" * 64, bytes(1000))
     graph.session.delete(key)
@@ -52,7 +55,9 @@ def main():
             # What waits is taken before: these push out what is older.
             time.sleep(0.3)
             hostilities(graph, key)
-            time.sleep(0.3)
+            # The router drops messages for a node that is busy for seconds: this call returns when all was taken.
+            get_octomap, _ = client(graph, "octomap_binary")
+            get_octomap()
         if is_hostile and name == "/cloud_in" and number > 20:
             liar = cloud(0, 1)
             liar.header.stamp = message.header.stamp

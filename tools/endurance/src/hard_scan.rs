@@ -25,13 +25,19 @@ pub struct HardScan {
     pub per_ray: bool,
     /// Whether a flush beside the mapper begins after each scan, in place of every minute.
     pub is_flushed: bool,
+    /// Whether the map has two files a tile, in place of one compact file.
+    pub is_octomap: bool,
+    /// Other options of `voxtile build`.
+    pub options: Vec<String>,
 }
 
 /// What is mapped.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub enum Points {
-    /// One scan of rays all around a sensor.
+    /// Scans of rays all around a sensor.
     Fan {
+        /// How many scans. The sensor moves on by a fifth of their reach.
+        scans: u32,
         /// How many.
         rays: u32,
         /// How far they reach, in metres.
@@ -77,14 +83,22 @@ impl HardScan {
     /// What is mapped, in words.
     pub fn description(&self) -> String {
         let points = match &self.points {
-            Points::Fan { rays, reach_m, is_sky: false, .. } => format!("{rays} rays of up to {reach_m} m"),
-            Points::Fan { rays, reach_m, .. } => format!("{rays} rays of {reach_m} m that hit nothing"),
+            Points::Fan { scans, rays, reach_m, is_sky, .. } => {
+                let of = if *scans > 1 { format!("{scans} scans of ") } else { String::new() };
+                let (up_to, hits) = if *is_sky { ("", " that hit nothing") } else { ("up to ", "") };
+                format!("{of}{rays} rays of {up_to}{reach_m} m{hits}")
+            }
             Points::Packed { points } => format!("a packed PCD file of {points} points"),
             Points::Survey { survey, scans } => format!("`{}`, {scans} scans", survey.name()),
         };
         let each = if self.per_ray { ", every ray" } else { "" };
         let flushed = if self.is_flushed { ", flushed after each scan" } else { "" };
-        format!("{points}{each}{flushed}; voxels of {} m, tiles of {} m", self.resolution_m, self.tile_size_m)
+        let form = if self.is_octomap { ", two files a tile" } else { "" };
+        let options: String = self.options.iter().map(|option| format!(" {option}")).collect();
+        format!(
+            "{points}{each}{flushed}{form}{options}; voxels of {} m, tiles of {} m",
+            self.resolution_m, self.tile_size_m
+        )
     }
 
     /// Writes the input; returns its file.
@@ -112,8 +126,11 @@ impl HardScan {
 
     fn scans(&self) -> Box<dyn Iterator<Item = Scan>> {
         match self.points {
-            Points::Fan { rays, reach_m, opening, is_sky } => {
-                Box::new(std::iter::once(fan(rays, if is_sky { 2.0 * reach_m } else { reach_m }, opening)))
+            Points::Fan { scans, rays, reach_m, opening, is_sky } => {
+                let length_m = if is_sky { 2.0 * reach_m } else { reach_m };
+                Box::new(
+                    (0..scans).map(move |scan| fan(rays, length_m, opening, f64::from(scan) * reach_m / 5.0)),
+                )
             }
             Points::Survey { survey, scans } => Box::new(survey.scans(1, 0, SURVEY_RAYS).take(scans)),
             Points::Packed { .. } => Box::new(std::iter::empty()),
@@ -134,7 +151,9 @@ impl HardScan {
         let number = |number: f64| number.to_string();
         let (resolution, tile, reach) =
             (number(self.resolution_m), number(self.tile_size_m), number(reach_m));
-        let mut arguments = vec!["build", "--json", "--storage", "compact", "--memory", &memory];
+        let mut arguments = vec!["build", "--json", "--memory", &memory];
+        arguments.extend(["--storage", if self.is_octomap { "octomap" } else { "compact" }]);
+        arguments.extend(self.options.iter().map(String::as_str));
         arguments.extend(["--resolution", &resolution, "--tile-size", &tile, "--max-range", &reach]);
         arguments.extend(["--insert", if self.per_ray { "per-ray" } else { "per-scan" }]);
         if self.is_flushed {
@@ -179,8 +198,8 @@ fn children_cpu_s() -> Result<f64> {
 }
 
 /// Rays in all directions of a band around a sensor, near and far as over a rough surface.
-fn fan(rays: u32, reach_m: f64, opening: f64) -> Scan {
-    let origin = [0.03, 0.04, 1.8];
+fn fan(rays: u32, reach_m: f64, opening: f64, ahead_m: f64) -> Scan {
+    let origin = [0.03 + ahead_m, 0.04, 1.8];
     let point = |k: u32| {
         let (azimuth, up) =
             (f64::from(k) * 2.399_963, opening * (2.0 * (f64::from(k) + 0.5) / f64::from(rays) - 1.0));

@@ -305,3 +305,57 @@ fn a_single_transform_counts_where_nothing_else_moves() {
     assert_eq!(tf.lookup("odom", "lidar", 4 * S), Err(WhyNot::Before("base".into())));
     assert_eq!(tf.lookup("odom", "lidar", 6 * S), Err(WhyNot::After("base".into())));
 }
+
+#[test]
+fn frames_that_do_not_lead_to_the_map_cost_a_cloud_nothing() {
+    let mut tf = robot();
+    let wanted = tf.lookup("map", "lidar", MIDDLE).unwrap();
+    // Chains above the sensor and above the map, one of which comes back.
+    for frame in 0..3000 {
+        fixed(&mut tf, &format!("a{}", frame + 1), &format!("a{frame}"), RigidPose::IDENTITY);
+        fixed(&mut tf, &format!("b{}", frame + 1), &format!("b{frame}"), RigidPose::IDENTITY);
+    }
+    fixed(&mut tf, "a0", "base", at(3.0));
+    fixed(&mut tf, "b0", "map", at(3.0));
+    fixed(&mut tf, "lidar", "b3000", at(3.0));
+    let between = tf.frames_between("/map", "/lidar").unwrap();
+    let mut names: Vec<&str> = between.iter().map(String::as_str).collect();
+    names.sort_unstable();
+    assert_eq!(names, ["base", "lidar", "map", "odom"]);
+    assert_eq!(tf.lookup_among("map", "lidar", MIDDLE, Some(&between)), Ok(wanted));
+    assert_eq!(tf.frames_between("a2000", "lidar"), Err(WhyNot::TooManyFrames("lidar".into())));
+    // The sensor above the map, and both below another frame.
+    for (target, source) in [("lidar", "map"), ("side", "lidar")] {
+        fixed(&mut tf, "base", "side", at(1.0));
+        tf.detach("b3000");
+        tf.detach("a0");
+        tf.detach("b0");
+        let between = tf.frames_between(target, source).unwrap();
+        let found = tf.lookup_among(target, source, MIDDLE, Some(&between));
+        assert_eq!((found.is_ok(), found), (true, tf.lookup(target, source, MIDDLE)));
+    }
+}
+
+/// The climb ends at the frame that is asked for.
+#[test]
+fn a_loop_above_the_frame_of_the_map_is_no_error() {
+    let wanted = robot().lookup("map", "lidar", MIDDLE).unwrap();
+    let links: [&[(&str, &str)]; 4] = [
+        &[("world", "map"), ("map", "world")],
+        &[("a", "map"), ("b", "a"), ("c", "b"), ("a", "c")],
+        &[("base", "map")],
+        &[("map", "odom"), ("odom", "map")],
+    ];
+    for links in links {
+        for is_static in [true, false] {
+            let mut tf = robot();
+            for (parent, child) in links.iter().filter(|link| **link != ("map", "odom")) {
+                tf.insert(parent, child, MIDDLE, at(4.0), is_static).unwrap();
+            }
+            assert_eq!(tf.lookup("map", "lidar", MIDDLE), Ok(wanted), "{links:?}");
+            let between = tf.links_between("map", "lidar", MIDDLE).unwrap();
+            assert_eq!(between, [vec![], vec!["lidar".to_owned(), "base".to_owned(), "odom".to_owned()]]);
+            assert!(tf.frames_between("map", "lidar").unwrap().contains("odom"));
+        }
+    }
+}

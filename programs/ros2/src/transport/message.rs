@@ -10,7 +10,7 @@ pub struct Message {
 }
 
 /// The number of a publisher, as `ros2 topic info --verbose` prints it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Gid(pub [u8; 16]);
 
 impl fmt::Display for Gid {

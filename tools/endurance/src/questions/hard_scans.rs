@@ -81,6 +81,7 @@ fn measured(setting: &Setting, hard: &HardScan) -> Result<[Taken; 2]> {
 /// Each once broke the limit. A short run has smaller ones of the same kinds.
 fn cases(setting: &Setting) -> Vec<HardScan> {
     let fan = |rays: [u32; 2], reach_m: [f64; 2], opening, is_sky| Points::Fan {
+        scans: 1,
         rays: setting.size(rays[0], rays[1]),
         reach_m: setting.size(reach_m[0], reach_m[1]),
         opening,
@@ -94,6 +95,8 @@ fn cases(setting: &Setting) -> Vec<HardScan> {
         limit_mib,
         per_ray: false,
         is_flushed: false,
+        is_octomap: false,
+        options: Vec::new(),
     };
     let teleports = Points::Survey { survey: SurveyName::Teleport, scans: setting.size(4, 2) };
     let mut cases = vec![

@@ -19,7 +19,7 @@ pub fn answer(setting: &Setting) -> Result<Findings> {
     let (mut worst_mib, mut worst, mut tried) = (f64::NEG_INFINITY, String::new(), 0);
     while Instant::now() < until {
         let resolution_m = [0.05, 0.1, 0.2, 0.5][random.below(4) as usize];
-        let tile_voxels = [4.0, 16.0, 50.0, 64.0][random.below(4) as usize];
+        let tile_voxels = [2.0, 3.0, 4.0, 9.0, 16.0, 31.0, 50.0, 64.0][random.below(8) as usize];
         let tile_size_m = tile_voxels * resolution_m;
         let least = MemoryLimit::least_bytes(&Grid::new(resolution_m, tile_size_m)?).div_ceil(1 << 20);
         // Voxels of all rays, so that each takes a second or two.
@@ -28,8 +28,10 @@ pub fn answer(setting: &Setting) -> Result<Findings> {
         let reach_m = (voxels / rays).clamp(10.0, 100_000.0) * resolution_m;
         // A folder a tile: of hundreds of thousands of small tiles the file system takes most of the time.
         let reach_m = reach_m.min(tile_size_m * 300_000.0 / rays).max(2.0 * resolution_m);
+        let scans = [1, 1, 2, 5][random.below(4) as usize];
         let points = Points::Fan {
-            rays: rays as u32,
+            scans,
+            rays: (rays / f64::from(scans)).ceil() as u32,
             reach_m,
             opening: random.between(0.0, 1.0),
             is_sky: random.below(4) == 0,
@@ -39,7 +41,23 @@ pub fn answer(setting: &Setting) -> Result<Findings> {
         let per_ray = random.below(3) == 0;
         // On a slow disk one begins anyway.
         let is_flushed = random.below(2) == 0;
-        let hard = HardScan { name, points, resolution_m, tile_size_m, limit_mib, per_ray, is_flushed };
+        let is_octomap = random.below(3) == 0;
+        let mut options = Vec::new();
+        for (option, one_in) in [("--keep-scans", 3), ("--threads=1", 4), ("--flush-every=2", 4)] {
+            let is_taken = random.below(one_in) == 0 && !(is_flushed && option.starts_with("--flush"));
+            options.extend(is_taken.then(|| option.to_owned()));
+        }
+        let hard = HardScan {
+            name,
+            points,
+            resolution_m,
+            tile_size_m,
+            limit_mib,
+            per_ray,
+            is_flushed,
+            is_octomap,
+            options,
+        };
         let input = hard.write(&setting.work)?;
         let taken = match hard.build(&input, &setting.work.join("hard"), true) {
             Ok(taken) => taken,

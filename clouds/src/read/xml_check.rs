@@ -1,0 +1,129 @@
+/// Follows a text of XML byte by byte, and counts what takes the memory and the time of its reader: it compares each
+/// attribute of a tag with those before it, and keeps the name spaces of a tag for all tags within.
+#[derive(Debug, Default)]
+pub(super) struct XmlCheck {
+    place: Place,
+    /// The bytes since the last `<`, up to those that tell what it starts.
+    start: Vec<u8>,
+    /// The last two bytes.
+    last: [u8; 2],
+    /// Attributes of the tag so far.
+    attributes: usize,
+    name_spaces: usize,
+    /// Tags and attributes.
+    pub(super) nodes: u64,
+}
+
+/// Where the next byte is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Place {
+    #[default]
+    Text,
+    Tag,
+    /// The value of an attribute, up to this quote.
+    Value(u8),
+    /// Up to these bytes.
+    Comment,
+    Data,
+    Instruction,
+}
+
+/// E57 has few attributes.
+const MAX_ATTRIBUTES: usize = 256;
+/// A file declares those of its extensions.
+const MAX_NAME_SPACES: usize = 1000;
+const COMMENT: &[u8] = b"!--";
+const DATA: &[u8] = b"![CDATA[";
+
+impl XmlCheck {
+    /// Takes the next bytes.
+    ///
+    /// # Errors
+    ///
+    /// More of something than is read.
+    pub(super) fn take(&mut self, bytes: &[u8]) -> Result<(), String> {
+        bytes.iter().try_for_each(|&byte| {
+            let taken = self.step(byte);
+            self.last = [self.last[1], byte];
+            taken
+        })
+    }
+
+    fn step(&mut self, byte: u8) -> Result<(), String> {
+        let [before, last] = self.last;
+        match (self.place, byte) {
+            (Place::Text, b'<') => {
+                self.place = Place::Tag;
+                self.start.clear();
+                self.attributes = 0;
+                self.nodes += 1;
+            }
+            (Place::Tag, b'>') => self.place = Place::Text,
+            (Place::Tag, b'"' | b'\'') => self.place = Place::Value(byte),
+            (Place::Tag, b'=') => {
+                self.nodes += 1;
+                self.attributes += 1;
+                return at_most(self.attributes, MAX_ATTRIBUTES, "attributes of one tag");
+            }
+            (Place::Tag, _) => return self.name(byte),
+            (Place::Value(quote), _) if byte == quote => self.place = Place::Tag,
+            (Place::Comment, b'>') if (before, last) == (b'-', b'-') => self.place = Place::Text,
+            (Place::Data, b'>') if (before, last) == (b']', b']') => self.place = Place::Text,
+            (Place::Instruction, b'>') if last == b'?' => self.place = Place::Text,
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// A byte of a tag outside of values.
+    fn name(&mut self, byte: u8) -> Result<(), String> {
+        if self.start.len() < DATA.len() {
+            self.start.push(byte);
+            self.place = match self.start.as_slice() {
+                COMMENT => Place::Comment,
+                DATA => Place::Data,
+                b"?" => Place::Instruction,
+                _ => Place::Tag,
+            };
+        }
+        // `xmlns`, and `xmlns:` before a name.
+        if byte == b'n' && self.last == *b"ml" {
+            self.name_spaces += 1;
+        }
+        at_most(self.name_spaces, MAX_NAME_SPACES, "declarations of name spaces")
+    }
+}
+
+fn at_most(count: usize, most: usize, what: &str) -> Result<(), String> {
+    match count <= most {
+        true => Ok(()),
+        false => Err(format!("its description has more than {most} {what}")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn check(text: &str) -> Result<u64, String> {
+        let mut check = XmlCheck::default();
+        text.as_bytes().chunks(7).try_for_each(|bytes| check.take(bytes))?;
+        Ok(check.nodes)
+    }
+
+    #[test]
+    fn tags_and_attributes_are_counted_and_texts_are_not() {
+        assert_eq!(check("<?xml version=\"1.0\"?><a b='<c d=\"1\">' e=\"2\"><f/></a>"), Ok(6));
+        assert_eq!(check("<a>x = y, \"<!-- <b c='1'> -- --><![CDATA[<d e=\"1\">]] >]]></a>"), Ok(4));
+    }
+
+    #[test]
+    fn more_than_is_read_is_refused() {
+        let many = |count: usize| (0..count).map(|k| format!(" a{k}='='")).collect::<String>();
+        assert!(check(&format!("<a{}/>", many(256)).repeat(3)).is_ok());
+        assert!(check(&format!("<a{}/>", many(257))).unwrap_err().contains("256 attributes of one tag"));
+        let spaces = |count: usize| (0..count).map(|k| format!("<a xmlns:b{k}='c'/>")).collect::<String>();
+        assert!(check(&spaces(1000)).is_ok());
+        assert!(check(&spaces(1001)).unwrap_err().contains("1000 declarations"));
+    }
+}
