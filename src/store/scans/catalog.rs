@@ -300,6 +300,15 @@ fn newest_generation(disk: &dyn Disk, layout: &Layout, flush_number: u64) -> Res
     }
 }
 
+/// The generations of the catalogs in a map's folder, in order; none where the folder cannot be listed.
+pub(crate) fn catalog_generations(disk: &dyn Disk, layout: &Layout) -> Vec<u64> {
+    let names = disk.list(&layout.kept_scans()).unwrap_or_default();
+    let generations = names.iter().filter_map(|name| Layout::generation_of(name));
+    let mut generations: Vec<_> = generations.filter(|&generation| generation < MAX_NUMBER).collect();
+    generations.sort_unstable();
+    generations
+}
+
 /// A flush of a map that keeps its scans.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct KeptAsOf {

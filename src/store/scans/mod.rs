@@ -20,7 +20,7 @@ mod scan_list;
 mod scan_record;
 mod segment;
 
-pub(crate) use catalog::{KeptAsOf, KeptRecords, whole_fronts};
+pub(crate) use catalog::{KeptAsOf, KeptRecords, catalog_generations, whole_fronts};
 pub use catalog_entry::{CatalogEntry, KeptFrame, KeptRecord, SegmentPlace};
 pub(crate) use catalog_salvage::{Salvaged, salvage_entries};
 pub use catalog_version::CatalogVersion;
