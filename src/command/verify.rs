@@ -90,7 +90,7 @@ fn print(args: &VerifyArgs, verification: &Verification, out: &mut impl Write) -
     match (damage, verified) {
         (0, _) if *unsettled > 0 => writeln!(
             out,
-            "no damage found, but {} findings could not be settled, because the map was changed all the while",
+            "undecided: {} possible faults; the map kept changing. Run verify while no process writes.",
             HumanCount(*unsettled)
         ),
         (0, true) => writeln!(out, "whole: every checksum matches"),

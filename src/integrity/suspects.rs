@@ -67,3 +67,11 @@ pub(super) fn log_end(disk: &dyn Disk, layout: &Layout) -> Option<LogEnd> {
     let offset = bytes.saturating_sub(LOG_END_BYTES as u64);
     Some((bytes, disk.read_at(&path, offset, LOG_END_BYTES).ok()?))
 }
+
+/// The beginning of `metadata.json`; `None` where it cannot be read.
+pub(super) fn metadata_text(disk: &dyn Disk, layout: &Layout) -> Option<Vec<u8>> {
+    disk.read_at(&layout.metadata(), 0, METADATA_BYTES).ok()
+}
+
+/// How many bytes of `metadata.json` are compared: its numbers are at its beginning.
+const METADATA_BYTES: usize = 1 << 16;

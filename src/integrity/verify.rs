@@ -4,7 +4,7 @@ use super::kept_scans::{check_kept_scans, find_idle};
 use super::rebuild::{self, Index};
 use super::snapshots::{WholeTables, lost_tiles};
 use super::surroundings::IDLE_SCANS;
-use super::suspects::{LogEnd, Suspect, Suspects, log_end};
+use super::suspects::{LogEnd, Suspect, Suspects, log_end, metadata_text};
 use super::tile_check::{check_tile, first_difference, write_octree};
 use crate::config::MapConfig;
 use crate::error::{Error, FormatError, Result};
@@ -48,9 +48,9 @@ pub struct Verification {
 }
 
 impl Verification {
-    /// Whether nothing is damaged.
+    /// Whether nothing is damaged, and every possible fault could be decided.
     pub fn is_whole(&self) -> bool {
-        self.damage == 0
+        self.damage == 0 && self.unsettled == 0
     }
 }
 
@@ -164,15 +164,17 @@ pub(super) struct Verifier<'a, F, P> {
     pub(super) is_again: bool,
 }
 
-/// How often suspects are looked at again. Each look takes as long as reading them.
-const MOST_LOOKS: usize = 30;
+/// Upper bound on the looks at possible faults. Each takes as long as reading the files concerned.
+const MAX_LOOKS: usize = 30;
+
+/// Upper bound on the pauses before such a look.
+const MAX_PAUSES: usize = 10;
 
 impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
     /// Opens the map; where metadata or log cannot be read, as far as its remains tell what it is.
     fn open(&mut self) -> Result<Option<TileStore>> {
-        let end = log_end(&*self.disk, &self.layout);
-        let store = match TileStore::open_read_only(self.disk.clone(), self.layout.folder()) {
-            Ok(store) => {
+        let store = match self.open_unchanged() {
+            Ok((store, end)) => {
                 self.opened = end;
                 store
             }
@@ -189,6 +191,31 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         self.layout = store.layout().clone();
         self.listed = store.snapshot_list().cloned();
         Ok(Some(store))
+    }
+
+    /// Opens the map, and returns how its log ended before. An error holds for a map that did not change
+    /// meanwhile: next to a pull that replaces the map, metadata and log may be of two folders.
+    ///
+    /// # Errors
+    ///
+    /// As for [`TileStore::open_read_only`].
+    fn open_unchanged(&self) -> Result<(TileStore, Option<LogEnd>)> {
+        let state = || (log_end(&*self.disk, &self.layout), metadata_text(&*self.disk, &self.layout));
+        let mut before = state();
+        for _ in 1..MAX_LOOKS {
+            let error = match TileStore::open_read_only(self.disk.clone(), self.layout.folder()) {
+                Ok(store) => return Ok((store, before.0)),
+                Err(error) => error,
+            };
+            let now = state();
+            if now == before {
+                return Err(error);
+            }
+            before = now;
+            self.disk.pause();
+        }
+        let opened = TileStore::open_read_only(self.disk.clone(), self.layout.folder());
+        opened.map(|store| (store, before.0))
     }
 
     fn config_of(&mut self, store: &TileStore) -> Result<Option<MapConfig>> {
@@ -270,19 +297,22 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
     /// Looks again at what seemed damaged, until each is damaged or whole as of one flush.
     fn look_again(&mut self) -> Result<()> {
         self.is_again = true;
-        for _ in 0..MOST_LOOKS {
+        for look in 0..MAX_LOOKS {
             if self.suspects.is_empty() {
                 return Ok(());
             }
+            // Longer each time: a writer at work may be between two flushes then.
+            (0..look.min(MAX_PAUSES)).for_each(|_| self.disk.pause());
             let suspects = std::mem::take(&mut self.suspects);
-            let end = log_end(&*self.disk, &self.layout);
-            let store = match TileStore::open_read_only(self.disk.clone(), self.layout.folder()) {
-                Ok(store) => store,
+            let (store, end) = match self.open_unchanged() {
+                Ok(opened) => opened,
                 Err(Error::Changed { .. }) => {
                     self.suspects = suspects;
                     continue;
                 }
                 Err(error) => {
+                    // Without the map's own files nothing decides the others.
+                    self.counts.unsettled += suspects.len();
                     let finding = Finding::of(error)?;
                     self.report(finding);
                     return Ok(());
@@ -301,8 +331,8 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         if unsettled > 0 {
             self.counts.unsettled += unsettled;
             let reason = format!(
-                "other processes changed the map during each of {MOST_LOOKS} looks at what may be damaged \
-                 ({unsettled} findings); verify it while nothing changes it"
+                "other processes changed the map during each of {MAX_LOOKS} looks at {unsettled} possible \
+                 faults; run verify while no process writes"
             );
             self.is_again = false;
             self.report(Finding::note(self.layout.folder(), None, reason));
