@@ -42,7 +42,7 @@ pub fn run(args: &RemoveScansArgs) -> anyhow::Result<ExitCode> {
             let names: Vec<_> = failed.iter().map(|failed| failed.name.as_str()).collect();
             let names = names.join(", ");
             say(format_args!(
-                "{}: done, except for snapshots that may hold some of the scans: {names}",
+                "{}: Scans removed from the map. These snapshots may still contain some: {names}",
                 map.display()
             ));
             ExitCode::FAILURE

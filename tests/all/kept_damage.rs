@@ -365,3 +365,92 @@ fn a_snapshot_that_cannot_be_read_is_part_of_the_answer_of_a_removal() {
     let message = crate::support::message_of(remove(2));
     assert!(message.contains("snapshots/t") && message.contains("may hold some"), "{message}");
 }
+
+/// Ways in which a log is damaged: lost, cut, or a bit of it changed.
+fn damaged_logs(bytes: &[u8]) -> Vec<Option<Vec<u8>>> {
+    let mut damages = vec![None];
+    for part in 1..8 {
+        let at = bytes.len() * part / 8;
+        damages.push(Some(bytes[..at].to_vec()));
+        let mut flipped = bytes.to_vec();
+        flipped[at] ^= 16;
+        damages.push(Some(flipped));
+    }
+    damages
+}
+
+/// The log is damaged, and `metadata.json` is lost or one of long ago: the newest catalog may be the only one without
+/// the removed scan.
+#[test]
+fn no_removed_scan_returns_where_log_and_metadata_are_damaged() {
+    let (log, metadata) = (map().join("commits.log"), map().join("metadata.json"));
+    let (mut from_tiles, mut repairs) = (0, 0);
+    for has_later_snapshot in [false, true] {
+        let disk = FaultyDisk::new(Fault::None);
+        (1..=4).for_each(|number| insert(&disk, number).unwrap());
+        snapshot(at(&disk), &name("s")).unwrap();
+        let old = disk.files()[&metadata].clone();
+        remove(&disk, REMOVED).unwrap();
+        if has_later_snapshot {
+            snapshot(at(&disk), &name("t")).unwrap();
+            insert(&disk, 5).unwrap();
+        }
+        let whole = disk.copy();
+        let (files, kept_scans) = (whole.files(), files_of_scans(&whole));
+        for (old_metadata, log_now) in [None, Some(&old), Some(&files[&metadata])]
+            .into_iter()
+            .flat_map(|metadata| damaged_logs(&files[&log]).into_iter().map(move |log| (metadata, log)))
+        {
+            let damaged = whole.copy();
+            match old_metadata {
+                Some(text) => damaged.put(&metadata, text),
+                None => damaged.take(&metadata),
+            }
+            match &log_now {
+                Some(bytes) => damaged.put(&log, bytes),
+                None => damaged.take(&log),
+            }
+            let length = log_now.map(|bytes| bytes.len());
+            let what = format!("{has_later_snapshot}, {}, {length:?}", old_metadata.is_some());
+            let Ok(repair) = repair(at(&damaged), |_| (), |_, _| ()) else { continue };
+            (repairs, from_tiles) = (repairs + 1, from_tiles + u64::from(repair.scans_lost > 0));
+            // Where the log is torn at the end of a record, it is that of an earlier flush.
+            let is_back = kept(&damaged).unwrap().contains(&REMOVED);
+            assert!(!is_back || flush_number(&damaged) < flush_number(&whole), "{what}: {repair:?}");
+            assert_eq!(damage_in(&damaged), BTreeSet::new(), "{what}");
+            let left = damaged.files();
+            let is_left = |bytes: &Vec<u8>| left.values().any(|other| other.starts_with(bytes));
+            assert!(is_back || kept_scans.values().all(is_left), "{what}: a file is gone");
+            let past = MapReader::open_snapshot(at(&damaged), &name("s"), 1).unwrap();
+            assert_eq!(past.kept_scans().unwrap().count(), 4, "{what}");
+            insert(&damaged, 6).unwrap();
+            assert_eq!(damage_in(&damaged), BTreeSet::new(), "{what}");
+        }
+    }
+    assert!(repairs > 60 && from_tiles > 20, "{repairs} repairs, {from_tiles} of them lost scans");
+}
+
+/// Points that a deleted snapshot alone kept are not left behind without an error.
+#[test]
+fn a_deletion_whose_points_the_disk_does_not_remove_fails_and_is_completed_by_another() {
+    let disk = a_map();
+    let catalog = map().join("kept_scans/catalog.1");
+    let segment = map().join("kept_scans/segment.3");
+    // Nothing tells whether the map needs the points.
+    let own = files_of_scans(&disk)
+        .into_keys()
+        .find(|path| path != &catalog && path.to_string_lossy().contains("catalog"));
+    let (own, snapshot_t) = (own.unwrap(), name("t"));
+    let bytes = disk.files()[&own].clone();
+    disk.take(&own);
+    let message = crate::support::message_of(delete_snapshot(at(&disk), &name("s")));
+    assert!(
+        message.contains("the snapshot s is deleted, but points") && disk.files().contains_key(&segment),
+        "{message}"
+    );
+    disk.put(&own, &bytes);
+    delete_snapshot(at(&disk), &name("s")).unwrap();
+    assert!([&catalog, &segment].iter().all(|path| !disk.files().contains_key(*path)));
+    delete_snapshot(at(&disk), &snapshot_t).unwrap();
+    assert_eq!(damage_in(&disk), BTreeSet::new());
+}

@@ -1,10 +1,10 @@
 //! The scans that a map keeps, as part of a [`TileStore`].
 
-use super::catalog::{CatalogWriter, KeptAsOf, KeptRecords};
+use super::catalog::{CatalogWriter, KeptAsOf, KeptRecords, whole_fronts};
 use super::catalog_entry::{CatalogEntry, SegmentPlace};
 use super::catalog_salvage::{Salvaged, salvage_entries};
 use super::catalog_version::CatalogVersion;
-use super::scan_keeper::{Catalog, unneeded};
+use super::scan_keeper::{Catalog, check_segment, unneeded, with_all_records};
 use super::scan_list::read_scans;
 use crate::error::{Error, Result};
 use crate::space::Point;
@@ -12,8 +12,9 @@ use crate::store::disk::EntryKind;
 use crate::store::layout::Layout;
 use crate::store::map_files::MapFiles;
 use crate::store::snapshots::snapshot_file::Snapshot;
+use crate::store::snapshots::snapshot_name::SnapshotName;
 use crate::store::tile_store::TileStore;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 impl TileStore {
@@ -173,17 +174,39 @@ impl TileStore {
     /// A disk that refuses; a catalog that cannot be read, which may need any.
     pub(crate) fn idle_scan_files(&self) -> Result<Option<Vec<PathBuf>>> {
         match self.read_snapshots() {
-            Ok(snapshots) => self.idle_scan_files_beside(&snapshots).map(Some),
+            Ok(snapshots) => {
+                let flushes = snapshots.iter().filter_map(kept_as_of).collect();
+                self.unneeded_scans(flushes, |_| false).map(|(files, _)| Some(files))
+            }
             Err(Error::Damaged { .. }) => Ok(None),
             Err(error) if error.is_of_medium() => Ok(None),
             Err(error) => Err(error),
         }
     }
 
-    /// The same where the snapshots are known.
-    pub(in crate::store) fn idle_scan_files_beside(&self, snapshots: &[Snapshot]) -> Result<Vec<PathBuf>> {
-        let flushes = snapshots.iter().filter_map(kept_as_of).collect();
-        self.unneeded_scans(flushes, |_| false).map(|(files, _)| files)
+    /// The catalogs and segments that the last commit or one of these snapshots needs, in order.
+    ///
+    /// # Errors
+    ///
+    /// A catalog that is damaged or missing, a segment that is missing or too short; a disk that refuses.
+    pub(in crate::store) fn needed_scan_files(&self, snapshots: &[Snapshot]) -> Result<Vec<PathBuf>> {
+        let (disk, layout) = (&**self.disk(), self.layout());
+        let mut flushes: Vec<_> = snapshots.iter().filter_map(kept_as_of).collect();
+        flushes.extend(self.is_keeping_scans().then(|| self.last_commit()));
+        let (mut files, mut ends) = (BTreeSet::new(), BTreeMap::new());
+        for as_of in with_all_records(disk, layout, &flushes)? {
+            files.extend(as_of.generation(disk, layout)?.map(|generation| layout.catalog(generation)));
+            let mut records = KeptRecords::open(disk, layout, as_of)?;
+            while let Some(scan) = records.next_kept()? {
+                let end = ends.entry(scan.place.segment).or_insert(0);
+                *end = scan.place.offset.saturating_add(scan.place.bytes).max(*end);
+            }
+        }
+        for (segment, end) in ends {
+            check_segment(disk, layout, segment, end)?;
+            files.insert(layout.segment(segment));
+        }
+        Ok(files.into_iter().collect())
     }
 
     /// The catalogs and segments that neither the last commit needs nor one of these flushes, and the highest segment
@@ -207,29 +230,33 @@ impl TileStore {
     /// A catalog that is damaged or missing, and what to do about it; a disk that refuses.
     pub(crate) fn check_catalogs_of_snapshots(&self) -> Result<()> {
         let (disk, layout) = (&**self.disk(), self.layout());
-        let read = |as_of| -> Result<()> {
-            let mut records = KeptRecords::open(disk, layout, as_of)?;
-            while records.next_entry()?.is_some() {}
-            Ok(())
-        };
-        let mut checked = BTreeSet::new();
+        let mut needed = Vec::new();
         for name in self.snapshot_names()? {
-            let as_of = match self.snapshot(&name) {
-                Ok(snapshot) => kept_as_of(&snapshot),
-                Err(Error::Damaged { .. }) => None,
-                Err(error) if error.is_of_medium() => None,
+            match self.snapshot(&name) {
+                Ok(snapshot) => needed.extend(kept_as_of(&snapshot).map(|as_of| (name, as_of))),
+                Err(Error::Damaged { .. }) => {}
+                Err(error) if error.is_of_medium() => {}
                 Err(error) => return Err(error),
-            };
-            let as_of = as_of.filter(|as_of| as_of.catalog.is_none_or(|catalog| checked.insert(catalog)));
-            match as_of.map_or(Ok(()), read) {
-                Err(Error::Damaged { path, tile, mut cause }) => {
-                    cause.reason.push_str(&format!(
-                        "; the snapshot {name} needs it; nothing was changed: repair the map or delete the snapshot, \
-                         and run this again"
-                    ));
-                    return Err(Error::Damaged { path, tile, cause });
+            }
+        }
+        // Of those that are the beginning of one catalog, the longest first: of the others the checksum says enough.
+        needed.sort_by_key(|(_, as_of)| std::cmp::Reverse(as_of.catalog));
+        for of_one in needed.chunk_by(|(_, a), (_, b)| {
+            a.catalog.map(|catalog| catalog.generation) == b.catalog.map(|catalog| catalog.generation)
+        }) {
+            let fronts: Vec<_> = of_one.iter().filter_map(|(_, as_of)| as_of.catalog).collect();
+            let (are_whole, mut is_read) = (whole_fronts(disk, layout, &fronts), false);
+            for (at, (name, as_of)) in of_one.iter().enumerate() {
+                if is_read && are_whole.get(at).copied().unwrap_or(false) {
+                    continue;
                 }
-                read => read?,
+                let read = || -> Result<()> {
+                    let mut records = KeptRecords::open(disk, layout, *as_of)?;
+                    while records.next_entry()?.is_some() {}
+                    Ok(())
+                };
+                read().map_err(|error| needed_by(error, name))?;
+                is_read = true;
             }
         }
         Ok(())
@@ -256,11 +283,8 @@ impl TileStore {
         write: impl FnOnce(&mut dyn FnMut(&CatalogEntry) -> Result<()>) -> Result<()>,
     ) -> Result<CatalogVersion> {
         self.finish_earlier_work()?;
-        if self.keeper.is_on() && self.commits().catalog.is_none() {
-            // From here on the newest is no longer the map's own.
-            let own = self.keeper.find_committed(&self.files, KeptAsOf::last_of(self.versions.commits()))?;
-            self.versions.set_catalog(own.map_or(CatalogVersion::NONE, Catalog::version));
-        }
+        // From here on the newest is no longer the map's own.
+        self.try_to_name_own_catalog()?;
         let generation = self.commits().flush_number + 1;
         let path = self.layout().catalog(generation);
         let refused = |error| Error::io(&path, "write", error);
@@ -273,6 +297,23 @@ impl TileStore {
         self.commit_snapshots(listed)?;
         self.tidy_up();
         Ok(catalog)
+    }
+
+    /// Notes the catalog of the last commit for the next record, if none is named yet: a later one must not be taken for
+    /// it.
+    fn try_to_name_own_catalog(&mut self) -> Result<()> {
+        if self.is_keeping_scans() && self.commits().catalog.is_none() {
+            let own = self.keeper.find_committed(&self.files, KeptAsOf::last_of(self.versions.commits()))?;
+            self.versions.set_catalog(own.map_or(CatalogVersion::NONE, Catalog::version));
+        }
+        Ok(())
+    }
+
+    /// The same; a damaged catalog remains unnamed.
+    pub(in crate::store) fn name_own_catalog(&mut self) {
+        if let Err(error) = self.try_to_name_own_catalog() {
+            log::warn!("the catalog of the kept scans is not named: {error:#}");
+        }
     }
 
     /// The segments and catalogs that neither the map nor one of its snapshots needs, as far as their catalogs can be
@@ -354,6 +395,15 @@ impl TileStore {
         }
         Ok(())
     }
+}
+
+/// The error of a catalog that a snapshot needs, with what to do.
+fn needed_by(error: Error, name: &SnapshotName) -> Error {
+    let Error::Damaged { path, tile, mut cause } = error else { return error };
+    cause.reason.push_str(&format!(
+        "; the snapshot {name} needs it; nothing was changed: repair the map or delete the snapshot, and run this again"
+    ));
+    Error::Damaged { path, tile, cause }
 }
 
 /// The flush of a snapshot, if it keeps its scans.

@@ -498,7 +498,11 @@ pub(in crate::store) fn unneeded(
 /// # Errors
 ///
 /// A catalog that is not whole as of one of the others.
-fn with_all_records(disk: &dyn Disk, layout: &Layout, flushes: &[KeptAsOf]) -> Result<Vec<KeptAsOf>> {
+pub(super) fn with_all_records(
+    disk: &dyn Disk,
+    layout: &Layout,
+    flushes: &[KeptAsOf],
+) -> Result<Vec<KeptAsOf>> {
     let (mut left, mut named) = (Vec::new(), BTreeMap::<u64, Vec<(CatalogVersion, KeptAsOf)>>::new());
     for &as_of in flushes {
         match as_of.catalog {

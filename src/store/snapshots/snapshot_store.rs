@@ -122,6 +122,7 @@ impl TileStore {
         self.files.sync_map_folder()?;
         let next = self.layout().snapshot_next();
         let flush_number = self.commits().flush_number;
+        self.name_own_catalog();
         self.write_next_snapshot(name, map_id, self.metadata(), self.commits())?;
         self.files.sync_folder(&folder)?;
         listed.insert(name.clone(), Some(flush_number));
@@ -177,6 +178,7 @@ impl TileStore {
     /// of its own in the log, so that whatever ends the process is found like any other.
     pub(in crate::store) fn commit_snapshots(&mut self, listed: SnapshotList) -> Result<()> {
         self.committer.check_lock()?;
+        self.name_own_catalog();
         self.keep_for_late_readers();
         match self.committer.append_snapshots(&self.files, &self.versions, listed) {
             Ok(number) => self.versions.committed_nothing(number),
@@ -224,7 +226,9 @@ impl TileStore {
     ///
     /// # Errors
     ///
-    /// [`Error::InvalidArgument`] if there is none of this name; a disk that refuses.
+    /// [`Error::InvalidArgument`] if there is none of this name; a disk that refuses. Where kept scans that nothing
+    /// needs could not be removed, as the disk refused or a catalog is damaged, the snapshot is deleted all the same, and
+    /// another call tries again to remove them.
     pub fn delete_snapshot(&mut self, name: &SnapshotName) -> Result<()> {
         self.finish_earlier_work()?;
         let path = self.layout().snapshot(name);
@@ -248,10 +252,11 @@ impl TileStore {
             self.commit_snapshots(listed)?;
         }
         self.finish_snapshot_commit();
-        if let Err(error) = self.release_unseen() {
+        // As long as the file is there, the same command completes a deletion that was killed or refused.
+        if let Err(error) = self.release_unseen_tables() {
             log::warn!("deleted, but its tables stay until the map is opened again: {error:#}");
         }
-        // Last: as long as the file is there, the same command completes a deletion that was killed.
+        self.release_scans().map_err(|error| scans_remain(error, name))?;
         self.checkpoint.remove_snapshot(name);
         self.finish_snapshot_commit();
         Ok(())
@@ -284,6 +289,12 @@ impl TileStore {
     ///
     /// A disk that refuses.
     pub fn release_unseen(&mut self) -> Result<()> {
+        self.release_unseen_tables()?;
+        self.remove_unneeded_scans();
+        Ok(())
+    }
+
+    fn release_unseen_tables(&mut self) -> Result<()> {
         let Some(map_id) = self.map_id() else { return Ok(()) };
         let (listed, pinned) = (self.committer.snapshots(), self.kept.snapshots().pinned());
         let tiles: Vec<_> = pinned.keys().copied().collect();
@@ -291,7 +302,6 @@ impl TileStore {
             SeenTables::read_all(&**self.disk(), self.layout(), map_id, self.commits(), listed, pinned)?;
         self.kept.set_snapshots(snapshots);
         self.kept.release(&self.files);
-        self.remove_unneeded_scans();
         for tile in tiles.into_iter().filter(|tile| !self.commits().tiles.contains(*tile)) {
             // Of a removed tile: it goes if that was all that was in it.
             let _ = self.disk().remove_folder(&self.layout().tile_folder(tile));
@@ -326,5 +336,21 @@ impl TileStore {
         }
         let mut input = self.disk().open(table).map_err(|error| Error::io(table, "open", error))?;
         self.write_next(tile, TileFile::Table, |out| io::copy(&mut input, out).map(drop)).map(drop)
+    }
+}
+
+/// The error of a deletion after which kept scans remain that nothing needs, with what to do.
+fn scans_remain(error: Error, name: &SnapshotName) -> Error {
+    let hint = format!("the snapshot {name} is deleted, but points of scans that only it kept may remain");
+    match error {
+        Error::Io { path, action, cause } => {
+            let cause = io::Error::new(cause.kind(), format!("{cause}; {hint}: delete it again"));
+            Error::Io { path, action, cause }
+        }
+        Error::Damaged { path, tile, mut cause } => {
+            cause.reason.push_str(&format!("; {hint}: repair the map"));
+            Error::Damaged { path, tile, cause }
+        }
+        other => other,
     }
 }
