@@ -415,7 +415,8 @@ fn no_removed_scan_returns_where_log_and_metadata_are_damaged() {
             let Ok(repair) = repair(at(&damaged), |_| (), |_, _| ()) else { continue };
             (repairs, from_tiles) = (repairs + 1, from_tiles + u64::from(repair.scans_lost > 0));
             // Where the log is torn at the end of a record, it is that of an earlier flush.
-            let is_back = kept(&damaged).unwrap().contains(&REMOVED);
+            // A map whose two files are lost keeps no scans.
+            let is_back = kept(&damaged).unwrap_or_default().contains(&REMOVED);
             assert!(!is_back || flush_number(&damaged) < flush_number(&whole), "{what}: {repair:?}");
             assert_eq!(damage_in(&damaged), BTreeSet::new(), "{what}");
             let left = damaged.files();
