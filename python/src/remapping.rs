@@ -121,7 +121,9 @@ pub fn remap_as<'py>(
 /// Takes scans out of a map that keeps them, as if they had never been: `scans`, a first and a last number; `time`, a
 /// first and a last time stamp in nanoseconds; or `input`, the name of what they came from.
 ///
-/// Snapshots that hold any of them are named in the answer, and deleted if `from_snapshots`.
+/// Snapshots that hold any of them are named in the answer (`snapshots_with_them`), and deleted if `from_snapshots`
+/// (`snapshots_deleted`). Check `snapshots_failed`: these could not be read or deleted, and may still contain some, each
+/// with a `name` and a `reason`. They raise an error only if nothing was removed.
 #[pyfunction]
 #[pyo3(signature = (map, *, scans=None, time=None, input=None, from_snapshots=false, keep_as=None, dry_run=false,
     memory=None, progress=None))]

@@ -162,7 +162,8 @@ impl<'a> Push<'a> {
             manifest.pages.insert(name, object);
         }
         self.sender.begin(None);
-        for file in store.committed_files(&snapshots)? {
+        let files = store.committed_files(&snapshots).map_err(|error| unless_changed(&store, error))?;
+        for file in files {
             let path = file.path.clone();
             let stored = self.send_file(&store, file, None)?;
             manifest.bytes += stored.bytes;
@@ -354,6 +355,17 @@ fn not_found(store: &TileStore, path: &str, tile: Option<TileIndex>) -> Error {
         return FormatError::at_offset(0, reason).in_map(&folder.join(path), tile);
     }
     Error::Changed { path: folder.to_owned() }
+}
+
+/// Why files of kept scans cannot be sent: a flush came in between, or they are damaged.
+fn unless_changed(store: &TileStore, error: Error) -> Error {
+    let Error::Damaged { path, tile, mut cause } = error else { return error };
+    let now = TileStore::open_read_only(store.disk().clone(), store.folder());
+    if now.is_ok_and(|now| now.commits().flush_number != store.commits().flush_number) {
+        return Error::Changed { path: store.folder().to_owned() };
+    }
+    cause.reason.push_str("; nothing was pushed: repair the map, and push again");
+    Error::Damaged { path, tile, cause }
 }
 
 /// The tiles that the map or a snapshot of it sees, by the pages that list their files.

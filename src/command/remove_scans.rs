@@ -4,6 +4,7 @@ use crate::command::json;
 use crate::command::map_at::whole_map;
 use crate::command::memory;
 use crate::command::rework::{self, Job};
+use crate::command::say;
 use crate::operations::{ScanSelection, ScansRemoved, remove_scans};
 use indicatif::HumanCount;
 use serde::Serialize;
@@ -35,6 +36,18 @@ pub fn run(args: &RemoveScansArgs) -> anyhow::Result<ExitCode> {
         Err(code) => return Ok(code),
     };
     drop(job);
+    let code = match &*removed.snapshots_failed {
+        [] => ExitCode::SUCCESS,
+        failed => {
+            let names: Vec<_> = failed.iter().map(|failed| failed.name.as_str()).collect();
+            let names = names.join(", ");
+            say(format_args!(
+                "{}: Scans removed from the map. These snapshots may still contain some: {names}",
+                map.display()
+            ));
+            ExitCode::FAILURE
+        }
+    };
     let mut out = std::io::stdout().lock();
     if args.rework.json {
         let summary = Summary {
@@ -46,7 +59,7 @@ pub fn run(args: &RemoveScansArgs) -> anyhow::Result<ExitCode> {
             peak_rss_bytes: memory::peak_bytes(),
         };
         json::print(&summary, &mut out)?;
-        return Ok(ExitCode::SUCCESS);
+        return Ok(code);
     }
     let would = if args.rework.dry_run { "would be " } else { "" };
     writeln!(out, "removed   {} scans {would}gone", HumanCount(removed.scans_removed))?;
@@ -63,7 +76,10 @@ pub fn run(args: &RemoveScansArgs) -> anyhow::Result<ExitCode> {
     for name in &removed.snapshots_with_them {
         writeln!(out, "snapshot  {name} still holds some of them; --from-snapshots deletes such")?;
     }
-    Ok(ExitCode::SUCCESS)
+    for failed in &removed.snapshots_failed {
+        writeln!(out, "snapshot  {} may hold some of them: {}", failed.name, failed.reason)?;
+    }
+    Ok(code)
 }
 
 fn selection_of(args: &RemoveScansArgs) -> crate::Result<ScanSelection> {

@@ -52,6 +52,15 @@ pub fn run(args: &RepairArgs) -> anyhow::Result<ExitCode> {
                 (HumanCount(repair.snapshots_lost), HumanCount(repair.snapshot_tiles_lost));
             writeln!(out, "snapshots: {snapshots} could not stay; others lost {tiles} tiles")?;
         }
+        if repair.scans_lost + repair.snapshot_scans_lost > 0 {
+            let (scans, of_snapshots) =
+                (HumanCount(repair.scans_lost), HumanCount(repair.snapshot_scans_lost));
+            writeln!(
+                out,
+                "kept scans: {scans} of the map and {of_snapshots} of snapshots are lost; what lost any cannot be mapped \
+                 again"
+            )?;
+        }
         if repair.inputs_forgotten > 0 {
             let inputs = HumanCount(repair.inputs_forgotten);
             writeln!(

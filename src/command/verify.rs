@@ -65,6 +65,7 @@ fn print(args: &VerifyArgs, verification: &Verification, out: &mut impl Write) -
         table_bytes,
         damage,
         leftovers,
+        unsettled,
         snapshots,
         ..
     } = verification;
@@ -87,6 +88,11 @@ fn print(args: &VerifyArgs, verification: &Verification, out: &mut impl Write) -
         )?;
     }
     match (damage, verified) {
+        (0, _) if *unsettled > 0 => writeln!(
+            out,
+            "undecided: {} possible faults; the map kept changing. Run verify while no process writes.",
+            HumanCount(*unsettled)
+        ),
         (0, true) => writeln!(out, "whole: every checksum matches"),
         (0, false) => writeln!(out, "unverified: the map has no checksums; the form of its tables is right"),
         (damage, _) => {

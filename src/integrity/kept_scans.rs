@@ -1,38 +1,121 @@
 use super::finding::Finding;
+use super::kept_points::{KeptPlaces, WholePoints};
 use crate::error::{Error, Result};
 use crate::store::{
-    CatalogEntry, Disk, KeptAsOf, Layout, Salvaged, ScanRecord, TileStore, check_points, salvage_entries,
+    CatalogEntry, Disk, KeptAsOf, KeptRecords, Layout, Salvaged, ScanRecord, SegmentPlace, SnapshotName,
+    TileStore, kept_as_of, salvage_entries, whole_fronts,
 };
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// Reads every scan that a map keeps; returns what is damaged.
+/// A catalog of kept scans as of a flush, and the snapshot that needs it; `None` for the map itself.
+#[derive(Debug)]
+struct Needed {
+    as_of: KeptAsOf,
+    by: Option<SnapshotName>,
+}
+
+/// Reads every scan that a map and its snapshots keep, or those of them with points in some places. Each catalog and
+/// the points of each scan are read once, whoever needs them. `found` is told each finding, and of which points it is.
 ///
 /// # Errors
 ///
 /// A disk that refuses more than single files.
-pub(super) fn check_kept_scans(disk: &Arc<dyn Disk>, store: &TileStore) -> Result<Vec<Finding>> {
-    let mut findings = Vec::new();
-    let mut records = match store.kept_records() {
-        Ok(records) => records,
-        Err(error) => return Ok(vec![Finding::of(error)?]),
+pub(super) fn check_kept_scans(
+    disk: &dyn Disk,
+    store: &TileStore,
+    only: Option<&KeptPlaces>,
+    whole: &mut WholePoints,
+    found: &mut dyn FnMut(Finding, Option<SegmentPlace>),
+) -> Result<()> {
+    let layout = store.layout();
+    let mut check = Check { disk, layout, only, whole, told: KeptPlaces::default(), found };
+    for needed in needed_catalogs(store)? {
+        check.read(needed)?;
+    }
+    Ok(())
+}
+
+/// The catalogs that a map and its snapshots need: those that are the beginning of one in a list, the longest first.
+fn needed_catalogs(store: &TileStore) -> Result<Vec<Vec<Needed>>> {
+    let (mut unnamed, mut named) = (Vec::new(), BTreeMap::<u64, Vec<Needed>>::new());
+    let mut add = |as_of: KeptAsOf, by: Option<SnapshotName>| match as_of.catalog {
+        Some(catalog) => named.entry(catalog.generation).or_default().push(Needed { as_of, by }),
+        None => unnamed.push(vec![Needed { as_of, by }]),
     };
-    loop {
-        match records.next_kept() {
-            Ok(Some(scan)) => {
-                if let Err(error) = check_points(&**disk, store.layout(), &scan) {
-                    let mut finding = Finding::of(error)?;
-                    finding.reason = format!("{} (scan {})", finding.reason, scan.number);
-                    findings.push(finding);
-                }
+    if store.keeps_scans() {
+        add(store.last_commit(), None);
+    }
+    for name in store.snapshot_names().unwrap_or_default() {
+        // One that cannot be read is told by the look at the snapshots.
+        if let Ok(snapshot) = store.snapshot(&name)
+            && let Some(as_of) = kept_as_of(&snapshot)
+        {
+            add(as_of, Some(name));
+        }
+    }
+    for catalogs in named.values_mut() {
+        catalogs.sort_by_key(|needed| std::cmp::Reverse(needed.as_of.catalog.map(|catalog| catalog.bytes)));
+    }
+    unnamed.extend(named.into_values());
+    Ok(unnamed)
+}
+
+struct Check<'a> {
+    disk: &'a dyn Disk,
+    layout: &'a Layout,
+    only: Option<&'a KeptPlaces>,
+    whole: &'a mut WholePoints,
+    /// Damaged points that have been told.
+    told: KeptPlaces,
+    found: &'a mut dyn FnMut(Finding, Option<SegmentPlace>),
+}
+
+impl Check<'_> {
+    /// Reads a catalog, as of several flushes.
+    fn read(&mut self, catalogs: Vec<Needed>) -> Result<()> {
+        let fronts: Vec<_> = catalogs.iter().filter_map(|needed| needed.as_of.catalog).collect();
+        let are_whole = whole_fronts(self.disk, self.layout, &fronts);
+        let mut is_read = false;
+        for (at, needed) in catalogs.iter().enumerate() {
+            let is_whole = are_whole.get(at).copied().unwrap_or(false);
+            // What is in the beginning was read with a longer one.
+            if is_whole && is_read {
+                continue;
             }
-            Ok(None) => return Ok(findings),
-            Err(error) => {
-                findings.push(Finding::of(error)?);
-                return Ok(findings);
+            match self.read_scans(needed) {
+                Ok(()) => is_read = is_whole,
+                Err(error) => self.report(error, needed, None)?,
             }
         }
+        Ok(())
+    }
+
+    fn read_scans(&mut self, needed: &Needed) -> Result<()> {
+        let mut records = KeptRecords::open(self.disk, self.layout, needed.as_of)?;
+        while let Some(scan) = records.next_kept()? {
+            if self.only.is_some_and(|only| !only.contains(scan.place)) || self.told.contains(scan.place) {
+                continue;
+            }
+            if let Err(error) = self.whole.check(self.disk, self.layout, &scan) {
+                self.told.insert(scan.place);
+                self.report(error, needed, Some((scan.number, scan.place)))?;
+            }
+        }
+        Ok(())
+    }
+
+    fn report(&mut self, error: Error, needed: &Needed, scan: Option<(u64, SegmentPlace)>) -> Result<()> {
+        let mut finding = Finding::of(error)?;
+        if let Some((number, _)) = scan {
+            finding.reason += &format!(" (scan {number})");
+        }
+        if let Some(name) = &needed.by {
+            finding.reason += &format!("; the snapshot {name} needs it");
+        }
+        (self.found)(finding, scan.map(|(_, place)| place));
+        Ok(())
     }
 }
 
@@ -71,7 +154,7 @@ pub(super) struct WholeEntries {
     pub segments: BTreeSet<u64>,
 }
 
-/// Passes on the entries of the catalog as it should be, where any of it is damaged: a scan with damaged points is one
+/// Passes on the entries of a catalog as it should be, where any of it is damaged: a scan with damaged points is one
 /// whose points are not kept, and one whose record is damaged an unknown one.
 ///
 /// # Errors
@@ -81,6 +164,7 @@ pub(super) fn whole_entries(
     disk: &dyn Disk,
     layout: &Layout,
     as_of: KeptAsOf,
+    points: &mut WholePoints,
     mut put: impl FnMut(&CatalogEntry) -> Result<()>,
 ) -> Result<WholeEntries> {
     let mut whole = WholeEntries::default();
@@ -90,7 +174,7 @@ pub(super) fn whole_entries(
                 whole.scans_lost += entry.numbers().map_or(0, |(first, last)| last - first + 1);
                 entry
             }
-            Salvaged::Whole(CatalogEntry::Kept(scan)) => match check_points(disk, layout, &scan) {
+            Salvaged::Whole(CatalogEntry::Kept(scan)) => match points.check(disk, layout, &scan) {
                 Ok(()) => {
                     whole.segments.insert(scan.place.segment);
                     CatalogEntry::Kept(scan)

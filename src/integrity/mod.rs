@@ -10,12 +10,15 @@
 //! Both need memory for the list of tiles and one tile. What is promised is in `docs/durability.md`.
 
 mod finding;
+mod kept_points;
 mod kept_scans;
 mod rebuild;
 mod repair;
 mod repair_kept_scans;
 mod repair_snapshots;
 mod snapshots;
+mod surroundings;
+mod suspects;
 mod tile_check;
 mod verify;
 

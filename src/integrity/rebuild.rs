@@ -6,12 +6,13 @@ use crate::error::{Error, FormatError, Result, is_of_medium};
 use crate::persistence::load::{ReadTable, read_stored_table};
 use crate::space::{Grid, TileIndex};
 use crate::store::{
-    Checksumming, Commits, Disk, Extension, FileChecksum, Layout, MAX_NUMBER, MapParameters, Metadata,
-    Salvage, Snapshot, StoredTile, TileFile, TileVersion, hex, id_from_hex, tile_of_folder,
+    CatalogVersion, Checksumming, Commits, Disk, Extension, FileChecksum, Layout, MAX_NUMBER, MapParameters,
+    Metadata, Salvage, Snapshot, StoredTile, TileFile, TileVersion, catalog_generations, hex, id_from_hex,
+    tile_of_folder,
 };
 use crate::tile::format::{Trailer, read_compact_front, read_trailer};
 use rustc_hash::FxHashMap;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 /// A map's index, put together again.
@@ -25,7 +26,8 @@ pub(super) struct Index {
     pub damaged: Vec<(TileIndex, Error)>,
     /// Whether the tiles may be of different flushes, because no log says what belongs together.
     pub is_from_tiles: bool,
-    /// Whether neither file of the map can be read, so that nothing tells whether it keeps its scans.
+    /// Whether nothing tells whether the map keeps its scans: neither of its files can be read, or there are catalogs
+    /// that neither the map nor a snapshot names.
     pub are_scans_unknown: bool,
     /// How many inputs the map no longer knows, because nothing tells whether all their scans are in its tiles.
     pub inputs_forgotten: u64,
@@ -155,6 +157,8 @@ fn index_from_tiles(
         inputs_forgotten: inputs.len() as u64,
     };
     index.join_snapshots(disk, layout, written);
+    let logged_catalog = logged.and_then(|commits| commits.catalog);
+    index.choose_catalog(disk, layout, [catalog_of(written), logged_catalog]);
     for (done, &tile) in (1..).zip(&tiles) {
         index.add(disk, layout, &config, tile, known_scan)?;
         progress(done, tiles.len() as u64);
@@ -183,6 +187,44 @@ impl Index {
             {
                 listed.insert(name, Some(snapshot.commits.flush_number));
             }
+        }
+    }
+
+    /// Chooses the catalog of kept scans: the newest that was committed for certain, by the files of the map or by a
+    /// snapshot. Where there is a newer one, scans may have been removed since: then all scans are unknown, and no
+    /// catalog is named.
+    fn choose_catalog(&mut self, disk: &dyn Disk, layout: &Layout, named: [Option<CatalogVersion>; 2]) {
+        let mut chosen = named.into_iter().flatten().max().map(|catalog| (catalog, 0));
+        let (mut of_snapshots, mut of_repairs) = (BTreeSet::new(), BTreeSet::new());
+        for name in Snapshot::list(disk, layout).unwrap_or_default() {
+            let Ok(snapshot) = Snapshot::read(disk, layout, &name, self.map_id, None) else { continue };
+            let Commits { flush_number, scan_number, catalog: Some(catalog), .. } = snapshot.commits else {
+                continue;
+            };
+            of_snapshots.insert(catalog.generation);
+            if catalog.generation > flush_number {
+                // A repair gave it to the snapshot: it was never the map's.
+                of_repairs.insert(catalog.generation);
+            } else if chosen.is_none_or(|(chosen, _)| chosen < catalog) {
+                chosen = Some((catalog, scan_number));
+            }
+        }
+        let generations = catalog_generations(disk, layout);
+        // No later catalog gets the name of one that is there.
+        let newest = generations.last().copied().unwrap_or_default();
+        self.commits.flush_number = self.commits.flush_number.max(newest + 1);
+        if !self.metadata.ext.as_ref().is_some_and(|ext| ext.keeps_scans) {
+            self.are_scans_unknown = generations.iter().any(|generation| !of_snapshots.contains(generation));
+            return;
+        }
+        let Some((catalog, scan_number)) = chosen else { return };
+        let is_newer =
+            |generation: &u64| *generation > catalog.generation && !of_repairs.contains(generation);
+        if generations.iter().any(is_newer) {
+            self.commits.catalog = Some(CatalogVersion::NONE);
+        } else {
+            self.commits.catalog = Some(catalog);
+            self.commits.scan_number = self.commits.scan_number.max(scan_number);
         }
     }
 
@@ -232,6 +274,11 @@ impl Index {
         self.commits.tiles.insert(tile, version);
         Ok(())
     }
+}
+
+/// The catalog of kept scans that `metadata.json` names.
+fn catalog_of(written: Option<&Metadata>) -> Option<CatalogVersion> {
+    written?.ext.as_ref()?.catalog
 }
 
 fn scan_number_of(table: &ReadTable) -> Option<u64> {
@@ -358,6 +405,7 @@ fn identity(layout: &Layout, remains: &Salvage, trailers: &Trailers) -> Result<(
         storage: layout.storage(),
         crs: None,
         keeps_scans: false,
+        catalog: None,
         scan_records: None,
         snapshots: None,
     };

@@ -1,4 +1,5 @@
 use super::finding::Finding;
+use super::kept_points::WholePoints;
 use super::rebuild::{self, Index, Replaced};
 use super::tile_check::{check_tile, checksum_of, write_octree};
 use crate::config::MapConfig;
@@ -12,7 +13,7 @@ use crate::store::{
 };
 use crate::tile::{OctreeFactory, Tile};
 use serde::Serialize;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -62,6 +63,8 @@ pub struct Repair {
     pub snapshots_lost: u64,
     /// Scans that the map kept and whose record or points are damaged: it cannot be mapped again from them.
     pub scans_lost: u64,
+    /// The same of snapshots.
+    pub snapshot_scans_lost: u64,
     /// Tiles that are no longer part of the map: their space is unknown again.
     pub tiles_lost: u64,
     /// Inputs that the map no longer knows, because nothing tells whether all their scans are in its tiles.
@@ -75,7 +78,8 @@ pub struct Repair {
 impl Repair {
     /// Whether all that the map and its snapshots held is there, and nothing is damaged any more.
     pub fn is_complete(&self) -> bool {
-        let lost = self.tiles_lost + self.scans_lost + self.snapshot_tiles_lost + self.snapshots_lost;
+        let scans_lost = self.scans_lost + self.snapshot_scans_lost;
+        let lost = self.tiles_lost + scans_lost + self.snapshot_tiles_lost + self.snapshots_lost;
         lost + self.inputs_forgotten + self.left == 0
     }
 }
@@ -96,7 +100,15 @@ pub fn repair(
     let (disk, folder) = folder.into().into_parts();
     let folder = &*folder;
     let layout = Layout::new(folder);
-    let mut repairer = Repairer { disk: &*disk, layout, done, progress, counts: Repair::default() };
+    let mut repairer = Repairer {
+        disk: &*disk,
+        layout,
+        done,
+        progress,
+        counts: Repair::default(),
+        points: WholePoints::default(),
+        catalogs_kept: BTreeSet::new(),
+    };
     repairer.repair_lock()?;
     let mut store = match TileStore::open(disk.clone(), folder) {
         Err(error) if matches!(error, Error::Damaged { tile: None, .. }) || Finding::is_of_file(&error) => {
@@ -119,6 +131,10 @@ pub(super) struct Repairer<'a, F, P> {
     done: F,
     progress: P,
     pub(super) counts: Repair,
+    /// Points of kept scans that were read and are whole.
+    pub(super) points: WholePoints,
+    /// Catalogs of kept scans of which quarantine has a copy.
+    pub(super) catalogs_kept: BTreeSet<PathBuf>,
 }
 
 impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {

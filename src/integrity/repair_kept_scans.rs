@@ -1,11 +1,11 @@
-use super::finding::Finding;
-use super::kept_scans::{count_kept, whole_entries};
+use super::kept_scans::{WholeEntries, count_kept, whole_entries};
 use super::rebuild::Index;
 use super::repair::{Action, ActionKind, Repairer};
-use crate::error::Result;
-use crate::store::{Disk, EntryKind, Quarantine, Snapshot, TileStore};
+use crate::error::{Error, Result, is_of_medium};
+use crate::store::{Disk, EntryKind, KeptAsOf, Quarantine, Snapshot, TileStore, kept_as_of};
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::io;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
@@ -16,50 +16,32 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         if !store.keeps_scans() {
             return Ok(());
         }
-        let folder = self.layout.kept_scans();
-        let replaced = match store.catalog_path() {
-            Err(error) if Finding::is_of_file(&error) => {
-                self.quarantine(&folder, &format!("{error:#}"))?;
-                None
-            }
-            replaced => replaced?,
-        };
-        let as_of = store.last_commit();
-        let found = whole_entries(self.disk, &self.layout, as_of, |_| Ok(()))?;
+        let (folder, as_of) = (self.layout.kept_scans(), store.last_commit());
+        self.repair_folder_of_scans(&folder)?;
+        let found = whole_entries(self.disk, &self.layout, as_of, &mut self.points, |_| Ok(()))?;
         if found.damage.is_empty() {
             return Ok(());
         }
-        let mut reasons = BTreeMap::new();
-        for error in &found.damage {
-            if let Some(path) = error.path() {
-                reasons.entry(path.to_owned()).or_insert_with(|| format!("{error:#}"));
-            }
-        }
-        let why = |path: &Path| reasons.get(path).map_or("no scan that can be read needs it", String::as_str);
-        let mut is_kept = false;
-        if let Some(catalog) = &replaced
-            && let Some(to) = Quarantine::new(self.disk, &self.layout).keep(catalog)?
-        {
-            is_kept = true;
-            let why = reasons.get(catalog).map_or("another takes its place", String::as_str);
-            self.note(ActionKind::Quarantined, catalog, format!("{why}; kept as {}", to.display()));
-        }
+        let reasons = Reasons::of(&found);
+        let replaced = store.catalog_path(as_of)?;
+        let is_kept = self.keep_catalog(replaced.as_deref(), &reasons)?;
         store.begin_catalog()?;
-        let left = whole_entries(self.disk, &self.layout, as_of, |entry| store.put_entry(entry))?;
+        let (disk, layout, points) = (self.disk, &self.layout, &mut self.points);
+        let left = whole_entries(disk, layout, as_of, points, |entry| store.put_entry(entry))?;
         // Where a snapshot cannot be read it may need any, and no writer removes any: they go with the snapshot.
         let snapshots = known_snapshots(store);
         if let Some(snapshots) = &snapshots {
             // Before the commit: as long as the catalog is the damaged one, nobody removes anything, and a repair that
             // begins again finds the same scans.
             for path in store.unneeded_scan_files(snapshots, Some(&left.segments))? {
-                self.quarantine(&path, why(&path))?;
+                self.quarantine(&path, reasons.of_file(&path))?;
             }
         }
         store.commit(store.metadata().clone(), as_of.scan_number)?;
         if let Some(snapshots) = &snapshots {
             for path in store.unneeded_scan_files(snapshots, Some(&left.segments))? {
                 if !is_kept || Some(&path) != replaced.as_ref() {
-                    self.quarantine(&path, why(&path))?;
+                    self.quarantine(&path, reasons.of_file(&path))?;
                 }
             }
             if let Err(error) = store.release_scans() {
@@ -74,6 +56,97 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
             }
         };
         self.note(ActionKind::Forgotten, &folder, reason);
+        Ok(())
+    }
+
+    /// Makes way for the folder of kept scans.
+    fn repair_folder_of_scans(&mut self, folder: &Path) -> Result<()> {
+        match self.disk.list(folder) {
+            Err(error) if is_of_medium(&error) || error.kind() == io::ErrorKind::NotADirectory => {
+                self.quarantine(folder, &format!("cannot list: {error}"))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Keeps a catalog in quarantine of which another takes the place; whether it is there.
+    fn keep_catalog(&mut self, catalog: Option<&Path>, reasons: &Reasons) -> Result<bool> {
+        let Some(catalog) = catalog else { return Ok(false) };
+        if self.catalogs_kept.contains(catalog) {
+            return Ok(true);
+        }
+        let Some(to) = Quarantine::new(self.disk, &self.layout).keep(catalog)? else { return Ok(false) };
+        self.catalogs_kept.insert(catalog.to_owned());
+        let why = reasons.0.get(catalog).map_or("another takes its place", String::as_str);
+        self.note(ActionKind::Quarantined, catalog, format!("{why}; kept as {}", to.display()));
+        Ok(true)
+    }
+
+    /// Gives snapshots whose kept scans are damaged other catalogs: as for the map itself, they list a scan with
+    /// damaged points as one without points, and one whose record is damaged as an unknown one.
+    pub(super) fn repair_scans_of_snapshots(
+        &mut self,
+        store: &mut TileStore,
+        snapshots: &mut [Snapshot],
+    ) -> Result<()> {
+        let (mut replaced, mut all_reasons, mut is_changed) = (Vec::new(), Reasons::default(), false);
+        for at in 0..snapshots.len() {
+            let Some(as_of) = kept_as_of(&snapshots[at]) else { continue };
+            let found = whole_entries(self.disk, &self.layout, as_of, &mut self.points, |_| Ok(()))?;
+            if found.damage.is_empty() {
+                continue;
+            }
+            all_reasons.add(&found);
+            let catalog = store.catalog_path(as_of)?;
+            let is_kept = self.keep_catalog(catalog.as_deref(), &all_reasons)?;
+            replaced.extend(catalog.map(|catalog| (catalog, is_kept)));
+            self.replace_catalog(store, snapshots, at, as_of, &all_reasons)?;
+            is_changed = true;
+        }
+        if !is_changed {
+            return Ok(());
+        }
+        for path in store.unneeded_scan_files(snapshots, None)? {
+            if !replaced.iter().any(|(catalog, is_kept)| *is_kept && *catalog == path) {
+                self.quarantine(&path, all_reasons.of_file(&path))?;
+            }
+        }
+        store.release_unseen()
+    }
+
+    /// Gives a snapshot another catalog of the scans that it keeps.
+    fn replace_catalog(
+        &mut self,
+        store: &mut TileStore,
+        snapshots: &mut [Snapshot],
+        at: usize,
+        as_of: KeptAsOf,
+        reasons: &Reasons,
+    ) -> Result<()> {
+        let mut lost = 0;
+        let (disk, layout, points) = (self.disk, &self.layout, &mut self.points);
+        let old = store.catalog_path(as_of)?;
+        let catalog = store.write_other_catalog(|put| {
+            lost = whole_entries(disk, layout, as_of, points, put)?.scans_lost;
+            Ok(())
+        })?;
+        snapshots[at].commits.catalog = Some(catalog);
+        // Before the snapshot names the new one: as long as it names the damaged one, no writer removes anything.
+        for path in store.unneeded_scan_files(snapshots, None)? {
+            if Some(&path) != old.as_ref() {
+                self.quarantine(&path, reasons.of_file(&path))?;
+            }
+        }
+        store.replace_snapshot(&snapshots[at])?;
+        self.counts.snapshot_scans_lost += lost;
+        let path = self.layout.snapshot(&snapshots[at].name);
+        let reason = match lost {
+            0 => "a record that is damaged is no longer in the catalog of its kept scans".to_owned(),
+            lost => {
+                format!("{lost} scans that are damaged are no longer kept; it cannot be mapped again")
+            }
+        };
+        self.note(ActionKind::Forgotten, &path, reason);
         Ok(())
     }
 
@@ -109,6 +182,30 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
             self.quarantine(&path, "only a snapshot that cannot be read may need it")?;
         }
         Ok(())
+    }
+}
+
+/// What is wrong with files of kept scans.
+#[derive(Default)]
+struct Reasons(BTreeMap<PathBuf, String>);
+
+impl Reasons {
+    fn of(found: &WholeEntries) -> Self {
+        let mut reasons = Self::default();
+        reasons.add(found);
+        reasons
+    }
+
+    fn add(&mut self, found: &WholeEntries) {
+        for error in &found.damage {
+            if let Some(path) = Error::path(error) {
+                self.0.entry(path.to_owned()).or_insert_with(|| format!("{error:#}"));
+            }
+        }
+    }
+
+    fn of_file(&self, path: &Path) -> &str {
+        self.0.get(path).map_or("no scan that can be read needs it", String::as_str)
     }
 }
 

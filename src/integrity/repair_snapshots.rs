@@ -41,12 +41,12 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         }
         // Before the log forgets them: from then on a writer removes what none of the others needs.
         self.quarantine_unneeded_scans(store, &snapshots)?;
-        if gone.is_empty() {
-            return Ok(());
+        if !gone.is_empty() {
+            self.counts.snapshots_lost += gone.len() as u64;
+            self.quarantine_unseen(store, &snapshots)?;
+            store.give_up_snapshots(&gone)?;
         }
-        self.counts.snapshots_lost += gone.len() as u64;
-        self.quarantine_unseen(store, &snapshots)?;
-        store.give_up_snapshots(&gone)
+        self.repair_scans_of_snapshots(store, &mut snapshots)
     }
 
     /// Puts snapshots that the log names and that lie under other names back under their own.

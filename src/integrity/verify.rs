@@ -1,20 +1,19 @@
 use super::finding::{Finding, Severity};
+use super::kept_points::{KeptPlaces, WholePoints};
 use super::kept_scans::{check_kept_scans, find_idle};
 use super::rebuild::{self, Index};
 use super::snapshots::{WholeTables, lost_tiles};
+use super::surroundings::IDLE_SCANS;
+use super::suspects::{LogEnd, Suspect, Suspects, log_end, metadata_text};
 use super::tile_check::{check_tile, first_difference, write_octree};
 use crate::config::MapConfig;
 use crate::error::{Error, FormatError, Result};
 use crate::persistence::config_from;
 use crate::space::TileIndex;
-use crate::store::{
-    Commits, Disk, EntryKind, KEPT_SCANS, Layout, MapPath, QUARANTINE, SNAPSHOT_NEXT, SNAPSHOTS, Salvage,
-    SnapshotList, SnapshotName, TileFile, TileStore, check_scans, read_log, tile_of_folder,
-};
+use crate::store::{Disk, Layout, MapPath, Salvage, SnapshotList, TileFile, TileStore, check_scans};
 use rustc_hash::FxHashSet;
 use serde::Serialize;
 use std::collections::BTreeSet;
-use std::path::Path;
 use std::sync::Arc;
 
 /// What a look at every byte of a map gave.
@@ -35,7 +34,7 @@ pub struct Verification {
     pub voxels: u64,
     /// Bytes of the tables that are whole.
     pub table_bytes: u64,
-    /// Findings that are damage.
+    /// Findings that are damage: each holds for one flush.
     pub damage: u64,
     /// Findings that are none.
     pub notes: u64,
@@ -43,16 +42,21 @@ pub struct Verification {
     /// refused, or of one at work. The next process that opens the map for writing removes them or gives them their
     /// names.
     pub leftovers: u64,
+    /// Findings of which nothing tells whether they are damage, because other processes changed the map faster than it
+    /// was looked at: one of the notes says so.
+    pub unsettled: u64,
 }
 
 impl Verification {
-    /// Whether nothing is damaged.
+    /// Whether nothing is damaged, and every possible fault could be decided.
     pub fn is_whole(&self) -> bool {
-        self.damage == 0
+        self.damage == 0 && self.unsettled == 0
     }
 }
 
-/// Checks every file of a map, beside a writer too. Takes no lock and writes nothing.
+/// Checks every file of a map, beside a writer too. Takes no lock and writes nothing. What seems damaged is read a
+/// second time. It is damage if both looks find it as of the same flush; if the map was changed in between, it is looked
+/// at again as of the last flush.
 ///
 /// `found` is told each finding, `progress` the tiles done and all. Memory: the list of tiles, where there is damage a
 /// second one, and one tile.
@@ -107,106 +111,145 @@ pub fn verify_scope(
     progress: impl FnMut(u64, u64),
 ) -> Result<Verification> {
     let (disk, folder) = folder.into().into_parts();
-    let folder = &*folder;
-    let layout = Layout::new(folder);
     let mut verifier = Verifier {
-        listed: None,
-        disk: &*disk,
-        layout,
+        layout: Layout::new(&*folder),
+        disk: disk.clone(),
         scope,
         found,
         progress,
         counts: Verification::default(),
+        listed: None,
         told: BTreeSet::new(),
-        now: None,
+        whole: WholeTables::new(),
+        points: WholePoints::default(),
+        opened: None,
+        before: None,
+        suspects: Suspects::default(),
+        is_again: false,
     };
-    let store = match TileStore::open_read_only(disk.clone(), folder) {
-        Ok(store) => Some(store),
-        Err(error) => {
-            let finding = Finding::of(error)?;
-            verifier.report(finding);
-            verifier.index_from_remains(&disk)?
-        }
-    };
-    if let Some(store) = store {
-        verifier.layout = store.layout().clone();
-        verifier.listed = store.snapshot_list().cloned();
-        let path = store.layout().metadata();
-        match config_from(store.metadata(), &path) {
-            Ok(config) => verifier.verify_map(&disk, &store, &config)?,
-            Err(error) => {
-                let finding = Finding::of(error)?;
-                verifier.report(finding);
-            }
-        }
+    let Some(store) = verifier.open()? else { return Ok(verifier.counts) };
+    if let Some(config) = verifier.config_of(&store)? {
+        verifier.verify_map(&store, &config)?;
+        let first = verifier.opened.clone();
+        verifier.look_again()?;
+        (verifier.opened, verifier.before, verifier.is_again) = (first, None, false);
+        verifier.verify_surroundings(&store)?;
+        verifier.look_again()?;
     }
     Ok(verifier.counts)
 }
 
-struct Verifier<'a, F, P> {
-    disk: &'a dyn Disk,
-    layout: Layout,
+pub(super) struct Verifier<'a, F, P> {
+    pub(super) disk: Arc<dyn Disk>,
+    pub(super) layout: Layout,
     scope: &'a VerifyScope,
     found: F,
     progress: P,
-    counts: Verification,
+    pub(super) counts: Verification,
     /// The snapshots that the log names; `None` if it names none.
-    listed: Option<SnapshotList>,
+    pub(super) listed: Option<SnapshotList>,
     /// Tiles that are no longer in the list of tiles because they are damaged, which has been told.
-    told: BTreeSet<TileIndex>,
-    /// What the log said when it was last read beside the store, if it could be, and how it ended then.
-    now: Option<(LogEnd, Option<Commits>)>,
+    pub(super) told: BTreeSet<TileIndex>,
+    /// Tables that only snapshots see and that are whole.
+    pub(super) whole: WholeTables,
+    /// Points of kept scans that are whole as of the flush that is looked at.
+    points: WholePoints,
+    /// How the log ended before the store was opened; `None` where nothing tells whether the map has changed since.
+    opened: Option<LogEnd>,
+    /// The same of the look before.
+    before: Option<LogEnd>,
+    /// What may be damaged, or was being changed when it was looked at.
+    suspects: Suspects,
+    /// Whether these are looked at again: notes have been told.
+    pub(super) is_again: bool,
 }
 
-/// Of a file that waits to take the place of another.
-const LEFT: &str = "left behind by a process that was killed or that the disk refused, or being written";
+/// Upper bound on the looks at possible faults. Each takes as long as reading the files concerned.
+const MAX_LOOKS: usize = 30;
 
-/// Of points and lists of scans that no flush needs.
-const IDLE_SCANS: &str = "points or a list of scans that neither the map nor a snapshot uses. A killed process left \
-                          them, or a writer is about to commit them. They may hold removed scans.";
-
-/// Of `MAP.remapping`.
-const SECOND_MAP: &str = "the second map of an online remap that is running or was killed. The next online remap \
-                          removes it, and so do `remove-scans` and `remove-points`.";
-
-/// Of `MAP.unfinished`.
-const UNFINISHED_MAP: &str = "a map that `voxtile pull --replace` is making, or the old map that it replaced. The \
-                              next `voxtile pull --replace` removes it.";
-
-/// Length of a log, and its last bytes. The checksum of the last record is among them, so that no two states of a log
-/// have the same.
-type LogEnd = (u64, Vec<u8>);
-
-/// How many bytes of its end tell that a log is the same.
-const LOG_END_BYTES: usize = 64;
+/// Upper bound on the pauses before such a look.
+const MAX_PAUSES: usize = 10;
 
 impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
-    fn report(&mut self, finding: Finding) {
+    /// Opens the map; where metadata or log cannot be read, as far as its remains tell what it is.
+    fn open(&mut self) -> Result<Option<TileStore>> {
+        let store = match self.open_unchanged() {
+            Ok((store, end)) => {
+                self.opened = end;
+                store
+            }
+            Err(error) => {
+                let finding = Finding::of(error)?;
+                self.opened = None;
+                self.report(finding);
+                match self.index_from_remains()? {
+                    Some(store) => store,
+                    None => return Ok(None),
+                }
+            }
+        };
+        self.layout = store.layout().clone();
+        self.listed = store.snapshot_list().cloned();
+        Ok(Some(store))
+    }
+
+    /// Opens the map, and returns how its log ended before. An error holds for a map that did not change
+    /// meanwhile: next to a pull that replaces the map, metadata and log may be of two folders.
+    ///
+    /// # Errors
+    ///
+    /// As for [`TileStore::open_read_only`].
+    fn open_unchanged(&self) -> Result<(TileStore, Option<LogEnd>)> {
+        let state = || (log_end(&*self.disk, &self.layout), metadata_text(&*self.disk, &self.layout));
+        let mut before = state();
+        for _ in 1..MAX_LOOKS {
+            let error = match TileStore::open_read_only(self.disk.clone(), self.layout.folder()) {
+                Ok(store) => return Ok((store, before.0)),
+                Err(error) => error,
+            };
+            let now = state();
+            if now == before {
+                return Err(error);
+            }
+            before = now;
+            self.disk.pause();
+        }
+        let opened = TileStore::open_read_only(self.disk.clone(), self.layout.folder());
+        opened.map(|store| (store, before.0))
+    }
+
+    fn config_of(&mut self, store: &TileStore) -> Result<Option<MapConfig>> {
+        match config_from(store.metadata(), &store.layout().metadata()) {
+            Ok(config) => Ok(Some(config)),
+            Err(error) => {
+                let finding = Finding::of(error)?;
+                self.report(finding);
+                Ok(None)
+            }
+        }
+    }
+
+    pub(super) fn report(&mut self, finding: Finding) {
         match finding.severity {
             Severity::Damage => self.counts.damage += 1,
+            Severity::Note if self.is_again => return,
             Severity::Note => self.counts.notes += 1,
         }
         (self.found)(&finding);
     }
 
-    /// Reports a file that the next writer removes or renames; what has its name and is no file stays.
-    fn leftover(&mut self, path: &Path, tile: Option<TileIndex>, reason: &str) {
-        let reason = match self.disk.kind(path) {
-            // Renamed or removed since the folder was listed.
-            Ok(None) => return,
-            Ok(Some(EntryKind::File(_))) => reason.to_owned(),
-            Ok(Some(_)) => return self.report(Finding::note(path, tile, "no part of a map")),
-            Err(error) => format!("{reason} ({error})"),
-        };
-        self.counts.leftovers += 1;
-        self.report(Finding::note(path, tile, reason));
+    /// Reports damage at the second look as of one flush. At the first, a writer may have been about to replace, rename
+    /// or remove what is missing or not as it should be.
+    pub(super) fn report_if_seen_twice(&mut self, finding: Finding, suspect: Suspect) {
+        let is_first = self.opened.is_some() && self.before != self.opened;
+        if is_first || self.opened.is_some() && log_end(&*self.disk, &self.layout) != self.opened {
+            self.suspects.add(suspect);
+        } else {
+            self.report(finding);
+        }
     }
 
-    fn damage(&mut self, path: &Path, tile: Option<TileIndex>, reason: &str) {
-        self.report(Finding::damage(path, tile, &FormatError::at_offset(0, reason)));
-    }
-
-    fn verify_map(&mut self, disk: &Arc<dyn Disk>, store: &TileStore, config: &MapConfig) -> Result<()> {
+    fn verify_map(&mut self, store: &TileStore, config: &MapConfig) -> Result<()> {
         self.counts.verified = store.map_id().is_some();
         self.counts.flush_number = store.commits().flush_number;
         self.counts.scan_number = store.commits().scan_number;
@@ -222,90 +265,170 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
             self.report(note);
         }
         if self.scope.has_rest() {
-            self.verify_scans(disk, store)?;
+            self.verify_list(store)?;
         }
         let mut tiles: Vec<_> = store.tiles().collect();
         tiles.sort_unstable();
         let chosen: Vec<_> = tiles.iter().copied().filter(|&tile| self.scope.has_tile(tile)).collect();
         self.counts.tiles = chosen.len() as u64;
         for (done, tile) in (1..).zip(&chosen) {
-            self.verify_tile(store, config, *tile)?;
+            self.verify_tile(store, config, *tile, false)?;
             (self.progress)(done, chosen.len() as u64);
         }
         if !self.scope.has_rest() {
             return Ok(());
         }
-        let seen = self.verify_snapshots(disk, store, config)?;
-        for path in find_idle(disk, store)? {
-            self.leftover(&path, None, IDLE_SCANS);
-        }
-        self.look_around(&seen, |tile| tiles.binary_search(&tile).is_ok())
+        self.verify_snapshots(store, config)?;
+        self.verify_kept_scans(store, None)
     }
 
-    fn verify_scans(&mut self, disk: &Arc<dyn Disk>, store: &TileStore) -> Result<()> {
-        let records = store.listed_records();
-        if let Err(error) = check_scans(self.disk, &self.layout, self.counts.flush_number, records) {
-            let finding = Finding::of(error)?;
-            self.report(finding);
+    /// Looks for what is no part of the map.
+    fn verify_surroundings(&mut self, store: &TileStore) -> Result<()> {
+        if !self.scope.has_rest() {
+            return Ok(());
         }
-        if store.keeps_scans() {
-            for error in check_kept_scans(disk, store)? {
-                self.report(error);
+        self.listed = store.snapshot_list().cloned();
+        for path in find_idle(&self.disk, store)? {
+            self.leftover(&path, None, IDLE_SCANS);
+        }
+        self.look_around(store, |tile| store.contains(tile))
+    }
+
+    /// Looks again at what seemed damaged, until each is damaged or whole as of one flush.
+    fn look_again(&mut self) -> Result<()> {
+        self.is_again = true;
+        for look in 0..MAX_LOOKS {
+            if self.suspects.is_empty() {
+                return Ok(());
             }
+            // Longer each time: a writer at work may be between two flushes then.
+            (0..look.min(MAX_PAUSES)).for_each(|_| self.disk.pause());
+            let suspects = std::mem::take(&mut self.suspects);
+            let (store, end) = match self.open_unchanged() {
+                Ok(opened) => opened,
+                Err(Error::Changed { .. }) => {
+                    self.suspects = suspects;
+                    continue;
+                }
+                Err(error) => {
+                    // Without the map's own files nothing decides the others.
+                    self.counts.unsettled += suspects.len();
+                    let finding = Finding::of(error)?;
+                    self.report(finding);
+                    return Ok(());
+                }
+            };
+            self.before = std::mem::replace(&mut self.opened, end);
+            if self.before != self.opened {
+                // Segments that were removed since may have others with their numbers.
+                self.points = WholePoints::default();
+            }
+            self.listed = store.snapshot_list().cloned();
+            let Some(config) = self.config_of(&store)? else { return Ok(()) };
+            self.verify_suspects(&store, &config, suspects)?;
+        }
+        let unsettled = std::mem::take(&mut self.suspects).len();
+        if unsettled > 0 {
+            self.counts.unsettled += unsettled;
+            let reason = format!(
+                "other processes changed the map during each of {MAX_LOOKS} looks at {unsettled} possible \
+                 faults; run verify while no process writes"
+            );
+            self.is_again = false;
+            self.report(Finding::note(self.layout.folder(), None, reason));
         }
         Ok(())
     }
 
-    fn verify_tile(&mut self, store: &TileStore, config: &MapConfig, tile: TileIndex) -> Result<()> {
-        let check = check_tile(self.disk, store, config, tile)?;
+    fn verify_suspects(&mut self, store: &TileStore, config: &MapConfig, suspects: Suspects) -> Result<()> {
+        let Suspects { list, snapshots, catalogs, points, tiles, folders } = suspects;
+        if list {
+            self.verify_list(store)?;
+        }
+        for (tile, is_counted) in tiles {
+            if store.version(tile).is_some() {
+                self.verify_tile(store, config, tile, is_counted)?;
+            }
+        }
+        if snapshots {
+            self.verify_snapshots(store, config)?;
+        }
+        if catalogs || !points.is_empty() {
+            self.verify_kept_scans(store, (!catalogs).then_some(&points))?;
+        }
+        for tile in folders {
+            let folder = self.layout.tile_folder(tile);
+            self.look_into(store, &folder, tile, store.version(tile).is_some())?;
+        }
+        Ok(())
+    }
+
+    fn verify_list(&mut self, store: &TileStore) -> Result<()> {
+        let (flush_number, records) = (store.commits().flush_number, store.listed_records());
+        if let Err(error) = check_scans(&*self.disk, &self.layout, flush_number, records) {
+            let finding = Finding::of(error)?;
+            self.report_if_seen_twice(finding, Suspect::List);
+        }
+        Ok(())
+    }
+
+    /// Looks at the scans that the map and its snapshots keep, or at the points of some of them.
+    fn verify_kept_scans(&mut self, store: &TileStore, only: Option<&KeptPlaces>) -> Result<()> {
+        let disk = self.disk.clone();
+        let mut whole = std::mem::take(&mut self.points);
+        let checked = check_kept_scans(&*disk, store, only, &mut whole, &mut |finding, place| {
+            self.report_if_seen_twice(finding, place.map_or(Suspect::Catalog, Suspect::Points));
+        });
+        self.points = whole;
+        checked
+    }
+
+    /// Looks at a tile; where `is_counted` its table has been counted.
+    fn verify_tile(
+        &mut self,
+        store: &TileStore,
+        config: &MapConfig,
+        tile: TileIndex,
+        is_counted: bool,
+    ) -> Result<()> {
+        let check = check_tile(&*self.disk, store, config, tile)?;
         let table = match check.table {
             Ok(table) => table,
-            Err(_) if self.has_changed_since(store, tile) => {
-                let folder = self.layout.tile_folder(tile);
-                self.report(Finding::note(&folder, Some(tile), "flushed anew while the map was verified"));
-                return Ok(());
-            }
             Err(error) => {
                 let finding = Finding::of(error)?;
-                self.report(finding.in_tile(tile));
+                self.report_if_seen_twice(finding.in_tile(tile), Suspect::Tile(tile, is_counted));
                 return Ok(());
             }
         };
-        self.counts.voxels += table.table.len() as u64;
-        self.counts.table_bytes += table.file.bytes;
-        if let Some(Err(mut cause)) = check.octree
-            && !self.has_changed_since(store, tile)
-        {
+        if !is_counted {
+            self.counts.voxels += table.table.len() as u64;
+            self.counts.table_bytes += table.file.bytes;
+        }
+        if let Some(Err(mut cause)) = check.octree {
             let path = self.layout.current(tile, TileFile::Octree);
             let mut expected = Vec::new();
             if write_octree(config, &table, &mut expected).is_ok() {
-                cause.at = first_difference(self.disk, &path, &expected).unwrap_or(cause.at);
+                cause.at = first_difference(&*self.disk, &path, &expected).unwrap_or(cause.at);
             }
-            self.report(Finding::damage(&path, Some(tile), &cause));
+            let finding = Finding::damage(&path, Some(tile), &cause);
+            self.report_if_seen_twice(finding, Suspect::Tile(tile, true));
         }
         Ok(())
     }
 
-    /// Whether a writer has flushed a tile since the store was opened. It keeps tables for readers, not octrees; and a
-    /// writer that was started since has not seen this reader.
-    fn has_changed_since(&mut self, store: &TileStore, tile: TileIndex) -> bool {
-        let now = self.commits_now().and_then(|now| now.tiles.get(tile));
-        now.is_some() && now != store.version(tile)
-    }
-
     /// Where metadata or log cannot be read, the tiles are checked against what else tells of them.
-    fn index_from_remains(&mut self, disk: &Arc<dyn Disk>) -> Result<Option<TileStore>> {
-        let remains = Salvage::read(self.disk, &self.layout)?;
-        self.layout = remains.layout_of_tiles(self.disk, self.layout.folder());
-        match rebuild::index_of(self.disk, &self.layout, &remains, &mut |_, _| ()) {
+    fn index_from_remains(&mut self) -> Result<Option<TileStore>> {
+        let remains = Salvage::read(&*self.disk, &self.layout)?;
+        self.layout = remains.layout_of_tiles(&*self.disk, self.layout.folder());
+        match rebuild::index_of(&*self.disk, &self.layout, &remains, &mut |_, _| ()) {
             Ok(Some(Index { map_id, metadata, commits, damaged, .. })) => {
                 for (tile, error) in damaged {
                     self.told.insert(tile);
                     let finding = Finding::of(error)?;
                     self.report(finding.in_tile(tile));
                 }
-                let folder = self.layout.folder();
-                Ok(Some(TileStore::of_commits(disk.clone(), folder, map_id, metadata, commits)))
+                let (disk, folder) = (self.disk.clone(), self.layout.folder());
+                Ok(Some(TileStore::of_commits(disk, folder, map_id, metadata, commits)))
             }
             Ok(None) => Ok(None),
             Err(error) => {
@@ -316,223 +439,37 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         }
     }
 
-    /// Looks at the snapshots, and at the tables that only they see. Returns those that are whole.
-    fn verify_snapshots(
-        &mut self,
-        disk: &Arc<dyn Disk>,
-        store: &TileStore,
-        config: &MapConfig,
-    ) -> Result<WholeTables> {
-        let mut whole = WholeTables::new();
+    /// Looks at the snapshots, and at the tables that only they see.
+    fn verify_snapshots(&mut self, store: &TileStore, config: &MapConfig) -> Result<()> {
+        self.counts.snapshots = 0;
         let names = match store.snapshot_names() {
             Err(error) => {
                 let finding = Finding::of(error)?;
-                self.report(finding);
-                return Ok(whole);
+                self.report_if_seen_twice(finding, Suspect::Snapshots);
+                return Ok(());
             }
             Ok(names) => names,
         };
         for name in names {
             self.counts.snapshots += 1;
-            let lost =
-                store.snapshot(&name).and_then(|snapshot| lost_tiles(store, config, &snapshot, &mut whole));
+            let snapshot = store.snapshot(&name);
+            let lost = snapshot.and_then(|snapshot| lost_tiles(store, config, &snapshot, &mut self.whole));
             let errors = match lost {
                 // Deleted meanwhile.
                 Err(Error::InvalidArgument { .. }) => continue,
                 Err(error) => vec![error],
                 Ok(lost) => lost.into_iter().map(|(_, error)| error).collect(),
             };
-            let is_deleted = |now: TileStore| now.snapshot_names().is_ok_and(|names| !names.contains(&name));
-            if !errors.is_empty()
-                && TileStore::open_read_only(disk.clone(), self.layout.folder()).is_ok_and(is_deleted)
-            {
-                continue;
-            }
             for error in errors {
                 let mut finding = Finding::of(error)?;
                 finding.reason += &format!("; the snapshot {name} needs it");
-                self.report(finding);
-            }
-        }
-        Ok(whole)
-    }
-
-    fn look_into_snapshots(&mut self, folder: &Path) -> Result<()> {
-        match self.kind(folder)? {
-            Some(EntryKind::Folder) => {}
-            Some(_) if self.listed.as_ref().is_some_and(SnapshotList::is_empty) => {
-                self.damage(folder, None, "something else has the name of the folder of snapshots");
-                return Ok(());
-            }
-            // Where the log lists snapshots, or nobody knows whether it does, that has been told.
-            _ => return Ok(()),
-        }
-        for name in self.list(folder)? {
-            let path = folder.join(&name);
-            let reason = match SnapshotName::new(&*name) {
-                Ok(name) if self.listed.as_ref().is_none_or(|listed| listed.contains(&name)) => continue,
-                Ok(_) => "no snapshot of the map: commits.log does not name it",
-                Err(_) if name == SNAPSHOT_NEXT => LEFT,
-                Err(_) => {
-                    self.report(Finding::note(&path, None, "no snapshot: it has no name of one"));
-                    continue;
-                }
-            };
-            self.leftover(&path, None, reason);
-        }
-        Ok(())
-    }
-
-    /// Looks for what is no part of the map.
-    fn look_around(&mut self, seen: &WholeTables, is_known: impl Fn(TileIndex) -> bool) -> Result<()> {
-        let folder = self.layout.folder().to_owned();
-        for name in self.list(&folder)? {
-            let path = folder.join(&name);
-            match (&*name, tile_of_folder(&name)) {
-                ("metadata.json" | "commits.log" | "scans.bin", _) => {}
-                ("writer.lock", _) => {
-                    if matches!(self.kind(&path)?, Some(EntryKind::Folder | EntryKind::Other)) {
-                        self.damage(&path, None, "no regular file: nobody can lock the map to write to it");
-                    }
-                }
-                // What was pushed or pulled (`bucket::known_states`).
-                ("bucket_states", _) => {}
-                (KEPT_SCANS, _) => self.look_into_kept_scans(&path)?,
-                (SNAPSHOTS, _) => self.look_into_snapshots(&path)?,
-                (QUARANTINE, _) => {
-                    let reason = "moved here by a repair. It may hold scans that were removed later. Delete it when \
-                                  you need nothing in it.";
-                    self.report(Finding::note(&path, None, reason));
-                }
-                (_, Some(tile)) => {
-                    let is_known = is_known(tile) || self.told.contains(&tile);
-                    self.look_into(&path, tile, seen, is_known)?;
-                }
-                (name, None) if Layout::is_next_of_map(name) => self.leftover(&path, None, LEFT),
-                ("bucket_states.next", None) => {
-                    let reason =
-                        "left behind by a push that was killed, or being written; the next push replaces it";
-                    self.report(Finding::note(&path, None, reason));
-                }
-                _ => self.report(Finding::note(&path, None, "no part of a map")),
-            }
-        }
-        self.look_beside(&folder);
-        Ok(())
-    }
-
-    /// Looks for a second map that a change of this one makes beside it. Where that cannot be told there is none.
-    fn look_beside(&mut self, folder: &Path) {
-        let reasons = [("remapping", SECOND_MAP), ("unfinished", UNFINISHED_MAP)];
-        for (extension, reason) in reasons.into_iter().filter(|_| folder.file_name().is_some()) {
-            let path = folder.with_added_extension(extension);
-            if let Ok(Some(EntryKind::Folder)) = self.disk.kind(&path) {
-                self.report(Finding::note(&path, None, reason));
-            }
-        }
-    }
-
-    fn look_into_kept_scans(&mut self, folder: &Path) -> Result<()> {
-        if self.kind(folder)? != Some(EntryKind::Folder) {
-            return Ok(());
-        }
-        for name in self.list(folder)? {
-            if !Layout::is_of_kept_scans(&name) {
-                self.report(Finding::note(&folder.join(&name), None, "no part of a map"));
+                self.report_if_seen_twice(finding, Suspect::Snapshots);
             }
         }
         Ok(())
     }
 
-    fn look_into(
-        &mut self,
-        folder: &Path,
-        tile: TileIndex,
-        seen: &WholeTables,
-        is_known: bool,
-    ) -> Result<()> {
-        let kind = self.kind(folder)?;
-        if kind != Some(EntryKind::Folder) {
-            if !is_known {
-                self.damage(folder, Some(tile), "something with a tile's name that is no folder");
-            }
-            return Ok(());
-        }
-        let mut is_orphan = false;
-        for name in self.list(folder)? {
-            let path = folder.join(&name);
-            let kept = self.layout.flush_of_kept(&name);
-            if kept.is_some_and(|flush_number| seen.contains_key(&(tile, flush_number))) {
-                continue;
-            }
-            if self.layout.is_next_of_tile(&name) {
-                self.leftover(&path, Some(tile), LEFT);
-            } else if kept.is_some() {
-                self.leftover(&path, Some(tile), "replaced; kept for a reader, or left behind");
-            } else if self.layout.files().iter().all(|file| file.name(self.layout.storage()) != name) {
-                self.report(Finding::note(&path, Some(tile), "no part of a map"));
-            } else {
-                is_orphan |= !is_known;
-            }
-        }
-        if !is_orphan {
-            return Ok(());
-        }
-        // A writer may have added it, or begun to remove it, since the log was read.
-        let now = self.commits_now();
-        let is_named = now.is_some_and(|now| now.tiles.contains(tile));
-        if now.is_some_and(|now| now.last_removed.contains(&tile)) {
-            let reason = "taken out of the map; its files go when the map is next opened for writing";
-            self.counts.leftovers += 1;
-            self.report(Finding::note(folder, Some(tile), reason));
-        } else if !is_named {
-            let path = self.layout.current(tile, TileFile::Table);
-            self.damage(&path, Some(tile), "commits.log does not name this tile");
-        }
-        Ok(())
-    }
-
-    /// What the log says now. It is read again only once it has changed: a map of many tiles may miss many.
-    fn commits_now(&mut self) -> Option<&Commits> {
-        let end = self.log_end()?;
-        if self.now.as_ref().is_none_or(|(of, _)| *of != end) {
-            // The end was looked at before, so what a writer appends meanwhile is seen as a change the next time.
-            let commits = read_log(self.disk, &self.layout).ok().flatten().map(|(_, commits)| commits);
-            self.now = Some((end, commits));
-        }
-        self.now.as_ref()?.1.as_ref()
-    }
-
-    /// How the log ends now; `None` if there is none or nobody can tell.
-    fn log_end(&self) -> Option<LogEnd> {
-        let path = self.layout.commit_log();
-        let Ok(Some(EntryKind::File(bytes))) = self.disk.kind(&path) else { return None };
-        let offset = bytes.saturating_sub(LOG_END_BYTES as u64);
-        Some((bytes, self.disk.read_at(&path, offset, LOG_END_BYTES).ok()?))
-    }
-
-    /// What has a name; nothing, and a finding, where the medium does not tell.
-    fn kind(&mut self, path: &Path) -> Result<Option<EntryKind>> {
-        let kind = self.disk.kind_at(path);
-        self.unless_unreadable(kind)
-    }
-
-    /// The names in a folder; none, and a finding, where it cannot be read.
-    fn list(&mut self, folder: &Path) -> Result<Vec<String>> {
-        let names = self.disk.list(folder).map_err(|error| Error::io(folder, "list", error));
-        let mut names = self.unless_unreadable(names)?;
-        names.sort_unstable();
-        Ok(names)
-    }
-
-    fn unless_unreadable<T: Default>(&mut self, result: Result<T>) -> Result<T> {
-        match result {
-            Err(error) if error.is_of_medium() => {
-                let finding = Finding::of(error)?;
-                self.report(finding);
-                Ok(T::default())
-            }
-            result => result,
-        }
+    pub(super) fn damage(&mut self, path: &std::path::Path, tile: Option<TileIndex>, reason: &str) {
+        self.report(Finding::damage(path, tile, &FormatError::at_offset(0, reason)));
     }
 }

@@ -55,7 +55,7 @@ pub use part::Part;
 pub use piece::{make_piece, move_piece};
 pub use remapping::{
     MappedAgain, MappedAnew, NewPoses, PointsRemoved, Remap, RemapBeside, Remapped, Rework, ScanSelection,
-    ScansRemoved, map_anew, remap, remove_points, remove_scans,
+    ScansRemoved, SnapshotFailure, map_anew, remap, remove_points, remove_scans,
 };
 pub use revert::{Reverted, revert};
 pub use snapshot::{SnapshotInfo, delete_snapshot, new_snapshot, snapshot, snapshots};

@@ -4,8 +4,12 @@ use crate::persistence::TileSaver;
 use crate::persistence::config_from;
 use crate::persistence::load::read_stored_table;
 use crate::space::TileIndex;
-use crate::store::{MapPath, Metadata, SnapshotName, TileFile, TileStore, TileVersion};
+use crate::store::{
+    KeptRecord, MapPath, Metadata, SnapshotName, TileFile, TileStore, TileVersion, check_points,
+    check_segment,
+};
 use serde::Serialize;
+use std::collections::BTreeMap;
 
 /// What a revert did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -41,8 +45,9 @@ pub struct Reverted {
 /// # Errors
 ///
 /// [`Error::InvalidArgument`] if there is no such snapshot, [`Error::AlreadyExists`] if there is one with the name
-/// `keep_as` and of another state; no map there, another writer, a damaged table, a disk that refuses. The map is as it
-/// was then; a snapshot `keep_as` may have been made.
+/// `keep_as` and of another state; no map there, another writer, a damaged table, damaged kept scans of the snapshot, a
+/// disk that refuses. The map is as it was then; a snapshot `keep_as` may have been made, unless kept scans are
+/// damaged.
 pub fn revert(
     folder: impl Into<MapPath>,
     name: &SnapshotName,
@@ -54,6 +59,9 @@ pub fn revert(
     let mut store = TileStore::open(disk.clone(), folder)?;
     let past = TileStore::open_snapshot(disk.clone(), folder, name)?;
     check_is_of_map(&store, &past)?;
+    if past.keeps_scans() {
+        check_kept_scans(&store, &past)?;
+    }
     if let Some(keep_as) = keep_as {
         if store.snapshot_names()?.contains(keep_as) && store.is_as(&past)? {
             let (scan_number, tiles) = (store.commits().scan_number, store.count_tiles() as u64);
@@ -131,6 +139,34 @@ fn check_is_of_map(store: &TileStore, past: &TileStore) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// Checks that the scans which a snapshot keeps are there. Those that the map keeps, too, are not read: they are as
+/// whole after a revert as before it.
+fn check_kept_scans(store: &TileStore, past: &TileStore) -> Result<()> {
+    let (disk, layout) = (&**past.disk(), past.layout());
+    let mut own = store.keeps_scans().then(|| store.kept_records().ok()).flatten();
+    let mut next_own: Option<KeptRecord> = None;
+    let mut ends = BTreeMap::new();
+    let mut records = past.kept_records()?;
+    while let Some(scan) = records.next_kept()? {
+        while let Some(some) = &mut own
+            && next_own.as_ref().is_none_or(|known| known.number < scan.number)
+        {
+            match some.next_kept() {
+                Ok(Some(known)) => next_own = Some(known),
+                // What is damaged of the map itself goes with the revert.
+                Ok(None) | Err(_) => own = None,
+            }
+        }
+        if next_own.as_ref().is_some_and(|known| known.place == scan.place && known.points == scan.points) {
+            let end = ends.entry(scan.place.segment).or_insert(0);
+            *end = scan.place.offset.saturating_add(scan.place.bytes).max(*end);
+        } else {
+            check_points(disk, layout, &scan)?;
+        }
+    }
+    ends.into_iter().try_for_each(|(segment, end)| check_segment(disk, layout, segment, end))
 }
 
 struct Reverter<'a> {

@@ -54,7 +54,8 @@ pub fn snapshot(folder: impl Into<MapPath>, name: &SnapshotName) -> Result<()> {
     OutOfCoreTileMapper::open(MapPath::on(disk, folder), config)?.snapshot(name)
 }
 
-/// Deletes a snapshot, and the tables that no other one and no reader sees.
+/// Deletes a snapshot, and the tables that no other one and no reader sees. A call that was killed can be repeated: it
+/// completes the deletion.
 ///
 /// # Errors
 ///

@@ -20,6 +20,7 @@ pub(crate) fn new_metadata(config: &MapConfig, map_id: [u8; 16], inputs: &[Input
         storage: config.storage,
         crs: config.crs.clone(),
         keeps_scans: config.keeps_scans,
+        catalog: None,
         scan_records: None,
         snapshots: None,
     };

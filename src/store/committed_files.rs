@@ -2,7 +2,7 @@
 
 use super::commit::commit_log::CommitLog;
 use super::disk::EntryKind;
-use super::layout::{Layout, TileFile};
+use super::layout::TileFile;
 use super::snapshots::seen_tables::seen_by;
 use super::snapshots::snapshot_file::Snapshot;
 use super::tile_store::TileStore;
@@ -61,25 +61,15 @@ impl TileStore {
     ///
     /// # Errors
     ///
-    /// A folder that cannot be listed.
+    /// A catalog of kept scans that is damaged or missing, a segment that is missing or too short; next to a writer also
+    /// because it removed them since the map was opened. A disk that refuses.
     pub fn committed_files(&self, snapshots: &[Snapshot]) -> Result<Vec<CommittedFile>> {
         let mut files = Vec::new();
         for snapshot in snapshots {
             files.push(self.stored(self.layout().snapshot(&snapshot.name), None));
         }
-        let kept = self.layout().kept_scans();
-        if self.keeps_scans() && self.disk().kind_at(&kept)? == Some(EntryKind::Folder) {
-            let mut names = self.disk().list(&kept).map_err(|error| Error::io(&kept, "list", error))?;
-            names.retain(|name| Layout::is_of_kept_scans(name));
-            names.sort_unstable();
-            // What is to be gone from the map is not copied. Where a catalog is damaged, any may be needed.
-            let idle = match self.idle_scan_files_beside(snapshots) {
-                Err(Error::Damaged { .. }) => Vec::new(),
-                idle => idle?,
-            };
-            let needed = names.into_iter().map(|name| kept.join(name)).filter(|path| !idle.contains(path));
-            files.extend(needed.map(|path| self.stored(path, None)));
-        }
+        // Removed scans are not copied.
+        files.extend(self.needed_scan_files(snapshots)?.into_iter().map(|path| self.stored(path, None)));
         let scans = self.layout().scans();
         if let Some(EntryKind::File(_)) = self.disk().kind_at(&scans)? {
             files.push(self.stored(scans, None));

@@ -55,9 +55,10 @@ pub use recovery::quarantine::Quarantine;
 pub use recovery::salvage::Salvage;
 pub use recovery::side_folder::SideFolder;
 pub use recovery::staged_map::{StagedMap, staging_folder};
-pub use scans::{CatalogEntry, KeptFrame, KeptRecord, ScanRecord, SegmentPlace};
+pub use scans::{CatalogEntry, CatalogVersion, KeptFrame, KeptRecord, ScanRecord, SegmentPlace};
 pub(crate) use scans::{
-    KeptAsOf, KeptRecords, Salvaged, SegmentScan, check_points, check_scans, read_scans, salvage_entries,
+    KeptAsOf, KeptRecords, Salvaged, SegmentScan, catalog_generations, check_points, check_scans,
+    check_segment, kept_as_of, read_scans, salvage_entries, whole_fronts,
 };
 pub use snapshots::snapshot_file::Snapshot;
 pub use snapshots::snapshot_list::SnapshotList;

@@ -8,7 +8,7 @@ use super::layout::{Layout, TileFile};
 use super::map_files::MapFiles;
 use super::map_folder;
 use super::place;
-use super::recovery::recover::{recover, remove_uncommitted, settle_own_files};
+use super::recovery::recover::{recover, remove_deleted_snapshots, remove_uncommitted, settle_own_files};
 use super::scans::{ScanKeeper, ScanList};
 use super::snapshots::kept_tables::KeptTables;
 use super::snapshots::seen_tables::seen_by;
@@ -48,6 +48,8 @@ pub struct TileStore {
     pub(super) kept: KeptTables,
     /// How many files of an earlier writer opening has removed.
     pub(super) leftovers_removed: u64,
+    /// The snapshots whose deletion by an earlier writer opening has completed.
+    pub(super) snapshots_removed: Vec<SnapshotName>,
     /// Whether opening has brought `metadata.json` up to the log.
     has_replaced_metadata: bool,
     /// The snapshot that was opened in place of the map as it is.
@@ -75,7 +77,7 @@ impl TileStore {
         let mut metadata = metadata;
         if let Some(ext) = &mut metadata.ext {
             // Of another map, perhaps.
-            (ext.snapshots, ext.scan_records) = (None, None);
+            (ext.snapshots, ext.scan_records, ext.catalog) = (None, None, None);
         }
         let commits = Commits::default();
         let log_path = layout.commit_log();
@@ -140,7 +142,14 @@ impl TileStore {
         let removed = &self.versions.commits().last_removed;
         self.checkpoint = Checkpoint::of_leftovers(found.unrenamed, found.renamed, removed);
         self.run_checkpoint()?;
-        self.remove_unneeded_scans();
+        if let Err(error) = self.release_scans() {
+            // The files of deleted snapshots remain: as long as one does, deleting it again completes its deletion.
+            log::warn!("kept scans that nothing needs remain: {error:#}");
+            return Ok(());
+        }
+        let listed = self.committer.snapshots();
+        self.snapshots_removed = remove_deleted_snapshots(&**self.disk(), self.layout(), map_id, listed)?;
+        self.leftovers_removed += self.snapshots_removed.len() as u64;
         Ok(())
     }
 
@@ -237,6 +246,7 @@ impl TileStore {
             keeper,
             kept: KeptTables::default(),
             leftovers_removed: 0,
+            snapshots_removed: Vec::new(),
             has_replaced_metadata: false,
             opened_snapshot: None,
             shared_metadata: None,

@@ -634,7 +634,7 @@ fn metadata_behind_the_log_is_brought_up_to_it_and_nothing_is_lost() {
 }
 
 #[test]
-fn verify_reads_a_log_that_stays_the_same_once_however_many_tiles_are_damaged() {
+fn verify_reads_a_log_that_stays_the_same_three_times_at_most_however_many_tiles_are_damaged() {
     let disk = FaultyDisk::new(Fault::None);
     let mut mapper = OutOfCoreTileMapper::create(MapPath::on(disk.shared(), map()), config()).unwrap();
     for seed in 0..10 {
@@ -657,7 +657,8 @@ fn verify_reads_a_log_that_stays_the_same_once_however_many_tiles_are_damaged() 
     assert!(tiles > 10);
     assert_eq!((verification.tiles, verification.damage), (tiles, 2 * tiles), "{found:?}");
     let opened = disk.times_opened(Path::new("/map/commits.log"));
-    assert!(opened <= 2, "{opened} times for {tiles} tiles");
+    // For the first look, the second one, and the one at what lies around.
+    assert!(opened <= 3, "{opened} times for {tiles} tiles");
 }
 
 #[test]

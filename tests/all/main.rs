@@ -45,6 +45,8 @@ mod corruption;
 /// Recordings with damaged chunks.
 #[cfg(all(feature = "cli", feature = "ros"))]
 mod damaged_recordings;
+/// Deletions of snapshots that are killed.
+mod deletions;
 /// Errors: what they say, their causes, what they are about.
 #[cfg(feature = "cli")]
 mod errors;
@@ -63,6 +65,8 @@ mod fuzz_corpus;
 /// Builds that are resumed, maps that are verified and repaired, from the command line.
 #[cfg(feature = "cli")]
 mod interrupted;
+/// Damage to the files of kept scans, of the map and of its snapshots.
+mod kept_damage;
 /// Files of kept scans under the hands of a writer.
 mod kept_scans;
 /// What each folder may know.

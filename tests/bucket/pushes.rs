@@ -11,7 +11,7 @@ use testkit::random_scans::Random;
 use voxtile::bucket::object_store::path::Path as Key;
 use voxtile::bucket::{Bucket, BucketDisk, pull, push};
 use voxtile::integrity::verify;
-use voxtile::operations::{snapshot, snapshots};
+use voxtile::operations::{revert, snapshot, snapshots};
 use voxtile::store::Disk;
 use voxtile::{Error, MapQueries, MapReader, MapView, Mapper, OutOfCoreTileMapper, SnapshotName, Storage};
 
@@ -440,4 +440,63 @@ fn a_map_in_a_bucket_is_not_written_to_and_a_web_server_not_pushed_to() {
     for url in ["maps/city", "ftp://a/b", "s3://", "s3:///x", "https://host/map?key=1"] {
         assert!(matches!(Bucket::open(url), Err(Error::InvalidArgument { .. })), "{url}");
     }
+}
+
+/// Kept scans that only a snapshot needs are part of the map.
+#[test]
+fn scans_that_only_a_snapshot_keeps_are_pushed() {
+    let (server, folder) = (Server::new(), TempDir::new().unwrap());
+    let (map, bucket) = (folder.path().join("map"), server.bucket());
+    drop(city(&map, Storage::Compact, false));
+    let [before, keeping] = ["before", "keeping"].map(|name| SnapshotName::new(name).unwrap());
+    snapshot(&map, &before).unwrap();
+    let mut mapper = OutOfCoreTileMapper::open(&map, config(Storage::Compact).with_kept_scans(true)).unwrap();
+    mapper.insert_scan(&scan_at(50, 2.0)).unwrap();
+    mapper.flush().unwrap();
+    drop(mapper);
+    snapshot(&map, &keeping).unwrap();
+    revert(&map, &before, None, |_, _| ()).unwrap();
+    push_now(&map, &bucket);
+    let pulled = folder.path().join("pulled");
+    pull(&bucket, &pulled, false, |_, _| {}).unwrap();
+    assert_whole(&pulled);
+    revert(&pulled, &keeping, None, |_, _| ()).unwrap();
+    let reader = MapReader::open(&pulled, 1).unwrap();
+    assert_eq!(reader.kept_scans().unwrap().filter(Result::is_ok).count(), 1);
+}
+
+/// What is in the bucket may be the only good copy.
+#[test]
+fn a_map_with_damaged_catalogs_or_lost_segments_is_not_pushed() {
+    let (server, folder) = (Server::new(), TempDir::new().unwrap());
+    let (map, bucket) = (folder.path().join("map"), server.bucket());
+    let mut mapper = city(&map, Storage::OctoMap, true);
+    push_now(&map, &bucket);
+    let before = digest_there(&bucket).unwrap();
+    mapper.insert_scan(&scan_at(99, 7.0)).unwrap();
+    mapper.flush().unwrap();
+    drop(mapper);
+    let mut damaged = 0;
+    for (name, bytes) in files_of(&map).into_iter().filter(|(name, _)| name.starts_with("kept_scans")) {
+        let path = map.join(&name);
+        let is_catalog = name.to_string_lossy().contains("catalog");
+        let mut flipped = bytes.clone();
+        flipped[bytes.len() / 2] ^= 1;
+        let cut = &bytes[..bytes.len() - 1];
+        for content in [None, Some(cut), is_catalog.then_some(&*flipped)] {
+            match content {
+                Some(content) => std::fs::write(&path, content).unwrap(),
+                None => std::fs::remove_file(&path).unwrap(),
+            }
+            let message = message_of(push(&map, &bucket, PRUNE, |_, _| {}));
+            assert!(message.contains("nothing was pushed"), "{}: {message}", name.display());
+            assert!(message.contains(&*name.to_string_lossy()), "{message}");
+            assert_eq!(digest_there(&bucket).unwrap(), before);
+            std::fs::write(&path, &bytes).unwrap();
+            damaged += 1;
+        }
+    }
+    assert!(damaged >= 5, "{damaged}");
+    push(&map, &bucket, PRUNE, |_, _| {}).unwrap();
+    assert_eq!(digest_there(&bucket).unwrap(), digest(&map));
 }

@@ -39,3 +39,5 @@ mod snapshots;
 /// SIGTERM and Ctrl-C: flushed and ended, whatever the input does.
 mod stopped;
 mod survey;
+/// Maps that are verified while other processes change them.
+mod verified;

@@ -22,5 +22,5 @@ pub use new_poses::NewPoses;
 pub use remap::{Remap, Remapped, remap};
 pub use remap_beside::RemapBeside;
 pub use remove_points::{PointsRemoved, remove_points};
-pub use remove_scans::{ScanSelection, ScansRemoved, remove_scans};
+pub use remove_scans::{ScanSelection, ScansRemoved, SnapshotFailure, remove_scans};
 pub use revision::{MappedAgain, Rework};

@@ -33,6 +33,18 @@ pub struct ScansRemoved {
     pub snapshots_with_them: Vec<SnapshotName>,
     /// Snapshots that held some of them and were deleted.
     pub snapshots_deleted: Vec<SnapshotName>,
+    /// Snapshots that may still hold some of them: they could not be read, or not be deleted.
+    pub snapshots_failed: Vec<SnapshotFailure>,
+}
+
+/// A snapshot that could not be read or deleted.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
+pub struct SnapshotFailure {
+    /// Its name.
+    pub name: SnapshotName,
+    /// Why, and what to do.
+    pub reason: String,
 }
 
 /// Takes scans out of a map, as if they had never been inserted, and their points out of its files. They keep their
@@ -43,14 +55,14 @@ pub struct ScansRemoved {
 /// removes no scan; of times that the map has none of, nothing tells whether it had, unless files are left.
 ///
 /// Snapshots stay what they are, with what they hold of these scans, unless `from_snapshots`: then those that hold any
-/// are deleted, one by one after the scans are gone from the map. Where that was interrupted, or is asked for later, the
-/// same call deletes those that are left. `progress` is told the scans done and all.
+/// are deleted, one by one after the scans are gone from the map. Where that was interrupted, or is asked for later,
+/// the same call deletes those that are left. `progress` is told the scans done and all.
 ///
 /// # Errors
 ///
 /// As for [`remap`](super::remap()); no scan that is selected; a disk that refuses to remove files of scans that are no
-/// longer in the map, which the same call tries again. What befalls a snapshot, which may hold some of the scans then,
-/// is told once the map and the other snapshots are done.
+/// longer in the map, which the same call tries again. A snapshot that cannot be read or deleted is an error only if
+/// nothing was done: else it is in [`ScansRemoved::snapshots_failed`].
 pub fn remove_scans(
     map: impl Into<MapPath>,
     scans: &ScanSelection,
@@ -61,24 +73,30 @@ pub fn remove_scans(
     let (disk, folder) = map.into().into_parts();
     let path = || MapPath::on(disk.clone(), &folder);
     let (mut removed, is_repeated) = remove_from_map(path, scans, from_snapshots, how, progress)?;
-    let (mut outcome, is_to_go) = (Ok(()), from_snapshots && !how.is_dry_run);
+    let (mut first_error, is_to_go) = (None, from_snapshots && !how.is_dry_run);
     for name in TileStore::open_read_only(disk.clone(), &folder)?.snapshot_names()? {
         // The one that was asked for keeps them.
         let is_to_go = is_to_go && how.keep_as.as_ref() != Some(&name);
-        if let Err(error) = removed.look_at_snapshot(path, name, scans, is_to_go) {
-            log::warn!("{error:#}");
-            outcome = outcome.and(Err(error));
+        if let Err(error) = removed.look_at_snapshot(path, name.clone(), scans, is_to_go) {
+            removed.snapshots_failed.push(SnapshotFailure { name, reason: format!("{error:#}") });
+            first_error.get_or_insert(error);
         }
     }
-    outcome?;
+    let has_done_any =
+        removed.scans_removed + removed.files_removed > 0 || !removed.snapshots_deleted.is_empty();
+    match first_error {
+        Some(error) if !has_done_any => return Err(error),
+        Some(_) => return Ok(removed),
+        None => {}
+    }
     if removed.scans_removed == 0 && !is_repeated && !removed.has_found_snapshots() {
         return Err(none_selected(scans, &MapReader::open(path(), 1)?));
     }
     Ok(removed)
 }
 
-/// Takes the scans out of the map itself. Where only snapshots hold any, and these are to go, the map stays. Also returns
-/// whether an earlier call did it.
+/// Takes the scans out of the map itself. Where only snapshots hold any, and these are to go, the map stays. Also
+/// returns whether an earlier call did it.
 fn remove_from_map(
     path: impl Fn() -> MapPath,
     scans: &ScanSelection,

@@ -112,12 +112,16 @@ pub(super) fn rework(
         return Err(Error::Changed { path: folder });
     }
     let mut revision = Revision::new(disk.clone(), how, fate);
+    // Before the look, which may take long.
+    if revision.takes_points(&store)? {
+        store.check_catalogs_of_snapshots()?;
+    }
     let touched = revision.look(&store)?;
     if how.is_dry_run || revision.counts.scans_changed == 0 {
         return Ok(revision.counts);
     }
-    keep_as_it_is(&mut store, how)?;
     let takes_points = !touched.segments.is_empty();
+    keep_as_it_is(&mut store, how)?;
     let (counts, released) = tidied(disk.clone(), &folder, revision.map(store, touched, &mut progress))?;
     let second = if takes_points { remove_second_map(disk.clone(), &folder) } else { Ok(()) };
     match released {
@@ -259,6 +263,20 @@ impl Touched {
 impl<F: Fn(&KeptRecord) -> Fate> Revision<F> {
     pub(super) fn new(disk: Arc<dyn Disk>, how: &Rework, fate: F) -> Self {
         Self { disk, how: how.clone(), fate, counts: MappedAgain::default() }
+    }
+
+    /// Whether points are to be taken out of the map.
+    fn takes_points(&self, store: &TileStore) -> Result<bool> {
+        if !store.keeps_scans() {
+            return Ok(false);
+        }
+        let mut records = store.kept_records()?;
+        while let Some(record) = records.next_kept()? {
+            if let Fate::Goes | Fate::Loses(_) = (self.fate)(&record) {
+                return Ok(true);
+            }
+        }
+        Ok(false)
     }
 
     /// Finds out what the change touches.

@@ -10,9 +10,11 @@ use std::path::Path;
 /// ```text
 /// header  32 bytes  magic "VXTCOMIT", version u32 1, map id 16 bytes, CRC-32 of these
 /// record            payload length u32, its complement u32, payload, CRC-32 of the payload
-/// payload           kind u32 (bit 0: whole map, else a change; bit 1: tiles were removed), tile count u32,
+/// payload           kind u32 (bit 0: whole map, else a change; bit 1: tiles were removed; bit 2: names a
+///                   catalog), tile count u32,
 ///                   flush number u64, scan number u64, a tile: index 3 x i32, version 48 bytes;
 ///                   where tiles were removed, their count u32 and the index of each, 3 x i32;
+///                   where the map keeps its scans, generation u64, bytes u64 and CRC-32 of its catalog;
 ///                   then, where it changed, the text of metadata.json
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -137,6 +139,7 @@ impl Commits {
             self.tiles.remove(tile);
         }
         self.last_removed = record.removed;
+        self.catalog = record.catalog;
         Ok(())
     }
 }
@@ -168,7 +171,7 @@ fn read_header(input: &mut impl Read, file_bytes: u64) -> Result<[u8; 16], Decod
 mod tests {
     use super::*;
     use crate::space::{TileIndex, TileTable};
-    use crate::store::{FileChecksum, FsDisk, TileVersion};
+    use crate::store::{CatalogVersion, FileChecksum, FsDisk, TileVersion};
     use std::fs;
 
     fn version(number: u64) -> TileVersion {
@@ -189,8 +192,15 @@ mod tests {
         let end_of_first = log.bytes();
         let changed = tiles(3000..5500);
         let removed: Vec<_> = first.tiles.tiles().step_by(3).collect();
-        let flush =
-            Flush { number: 4, scan_number: 9, changed: &changed, removed: &removed, metadata_text: None };
+        let catalog = Some(CatalogVersion { generation: 2, bytes: 77, crc32: 5 });
+        let flush = Flush {
+            number: 4,
+            scan_number: 9,
+            changed: &changed,
+            removed: &removed,
+            catalog,
+            metadata_text: None,
+        };
         log.append(&FsDisk, &path, &flush).unwrap();
 
         let mut second = first.tiles.clone();
@@ -200,7 +210,7 @@ mod tests {
         let read = |bytes: &[u8]| CommitLog::read(&mut &*bytes, bytes.len() as u64);
         let (again, commits) = read(&bytes).unwrap();
         assert_eq!((again, commits.flush_number, commits.torn.is_none()), (log, 4, true));
-        assert!(commits.tiles == second && commits.last_removed == removed);
+        assert!(commits.tiles == second && commits.last_removed == removed && commits.catalog == catalog);
         assert!(commits.last_changed.tiles().eq(changed.tiles()));
 
         for end in (end_of_first as usize..bytes.len()).step_by(7001) {

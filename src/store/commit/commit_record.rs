@@ -2,6 +2,7 @@ use super::commits::Commits;
 use super::metadata::Metadata;
 use crate::error::{DecodeError, FormatError};
 use crate::space::{TileIndex, TileTable};
+use crate::store::scans::CatalogVersion;
 use crate::store::tiles::file_checksum::Checksumming;
 use crate::store::tiles::tile_version::{MAX_NUMBER, TileVersion};
 use std::io::{self, Read, Write};
@@ -17,6 +18,8 @@ pub struct Flush<'a> {
     pub changed: &'a TileTable<TileVersion>,
     /// The tiles that are no part of the map any more.
     pub removed: &'a [TileIndex],
+    /// The catalog of the scans that the map keeps; `None` if it keeps none.
+    pub catalog: Option<CatalogVersion>,
     /// The text of `metadata.json`, if more of it changed than every flush changes.
     pub metadata_text: Option<&'a str>,
 }
@@ -30,6 +33,7 @@ pub(in crate::store) struct Record {
     pub(in crate::store) scan_number: u64,
     pub(in crate::store) changed: TileTable<TileVersion>,
     pub(in crate::store) removed: Vec<TileIndex>,
+    pub(in crate::store) catalog: Option<CatalogVersion>,
     pub(in crate::store) metadata: Option<Metadata>,
 }
 
@@ -51,6 +55,7 @@ const TILE_BYTES: usize = INDEX_BYTES + TileVersion::BYTES;
 /// Bits of a record's kind.
 const WHOLE_MAP: u32 = 1;
 const NAMES_REMOVED: u32 = 2;
+const NAMES_CATALOG: u32 = 4;
 /// So many bytes go to the file at once: a record of a large map is longer than anybody wants in memory.
 const CHUNK_BYTES: usize = 1 << 16;
 
@@ -67,6 +72,7 @@ impl<'a> Flush<'a> {
             scan_number: commits.scan_number,
             changed: &commits.tiles,
             removed: &commits.last_removed,
+            catalog: commits.catalog,
             metadata_text: Some(metadata_text),
         }
     }
@@ -84,6 +90,10 @@ impl<'a> Flush<'a> {
         if !self.removed.is_empty() {
             kind |= NAMES_REMOVED;
             payload_bytes += 4 + self.removed.len() * INDEX_BYTES;
+        }
+        if self.catalog.is_some() {
+            kind |= NAMES_CATALOG;
+            payload_bytes += CatalogVersion::BYTES;
         }
         let (Ok(payload_bytes), Ok(changed)) =
             (u32::try_from(payload_bytes), u32::try_from(self.changed.len()))
@@ -104,6 +114,9 @@ impl<'a> Flush<'a> {
         if !self.removed.is_empty() {
             out.put(&(self.removed.len() as u32).to_le_bytes())?;
             self.removed.iter().try_for_each(|tile| out.put(&index_bytes(*tile)))?;
+        }
+        if let Some(catalog) = self.catalog {
+            out.put(&catalog.to_bytes())?;
         }
         out.put(text.as_bytes())?;
         out.finish()?;
@@ -180,7 +193,7 @@ impl Record {
             return Err(payload.wrong(0, "the record is too short"));
         }
         let kind = u32::from_le_bytes(payload.take()?);
-        if kind & !(WHOLE_MAP | NAMES_REMOVED) != 0 {
+        if kind & !(WHOLE_MAP | NAMES_REMOVED | NAMES_CATALOG) != 0 {
             return Err(payload.wrong(4, "a record of unknown kind"));
         }
         let tiles = u64::from(u32::from_le_bytes(payload.take()?));
@@ -214,9 +227,21 @@ impl Record {
                 removed.push(index_from(payload.take()?));
             }
         }
+        let catalog = match kind & NAMES_CATALOG {
+            0 => None,
+            _ if payload.left < CatalogVersion::BYTES as u64 => {
+                return Err(payload.wrong(0, "the record is too short for the catalog that it names"));
+            }
+            _ => Some(CatalogVersion::from_bytes(payload.take()?)),
+        };
+        if catalog.is_some_and(|catalog| catalog.generation > MAX_NUMBER || catalog.bytes > MAX_NUMBER) {
+            return Err(
+                payload.wrong(CatalogVersion::BYTES as u64, "generation or length of a catalog exceeds 2^62")
+            );
+        }
         let metadata = payload.metadata()?;
         let is_whole_map = kind & WHOLE_MAP != 0;
-        Ok(Self { is_whole_map, flush_number, scan_number, changed, removed, metadata })
+        Ok(Self { is_whole_map, flush_number, scan_number, changed, removed, catalog, metadata })
     }
 }
 

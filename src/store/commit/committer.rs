@@ -123,6 +123,7 @@ impl Committer {
         if let Some(ext) = &mut metadata.ext {
             ext.storage = files.layout().storage();
             ext.snapshots = self.listed.clone();
+            ext.catalog = versions.commits().catalog;
             forget_earliest(&mut ext.inputs);
             ext.empty = metadata.bounds.is_none();
             (ext.flush_number, ext.scan_number) = (flush_number, scan_number);
@@ -196,7 +197,7 @@ impl Committer {
         let Some(log) = self.log else { return Ok(()) };
         let mut metadata = self.metadata.clone();
         if let Some(ext) = &mut metadata.ext {
-            ext.snapshots = self.listed.clone();
+            (ext.snapshots, ext.catalog) = (self.listed.clone(), commits.catalog);
         }
         let (disk, text) = (&**files.disk(), metadata.to_text());
         let compacted = map_folder::replace(disk, &files.layout().commit_log(), |next| {
@@ -250,8 +251,9 @@ impl Committer {
         let metadata = self.fill_in(self.metadata.clone(), files, versions, [number, scan_number]);
         let text = metadata.to_text();
         let changed = Default::default();
-        let flush =
-            Flush { number, scan_number, changed: &changed, removed: &[], metadata_text: Some(&text) };
+        let catalog = versions.commits().catalog;
+        let metadata_text = Some(&*text);
+        let flush = Flush { number, scan_number, changed: &changed, removed: &[], catalog, metadata_text };
         if let Err(error) = self.append(files, &flush, &metadata) {
             self.listed = before;
             return Err(error);

@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use crate::space::TileIndex;
 use crate::store::layout::TileFile;
 use crate::store::map_files::MapFiles;
-use crate::store::scans::{CatalogEntry, ScanRecord};
+use crate::store::scans::{Catalog, CatalogEntry, CatalogVersion, ScanRecord};
 use crate::store::tile_store::TileStore;
 use crate::store::tiles::file_checksum::FileChecksum;
 use crate::store::tiles::tile_version::TileVersion;
@@ -197,15 +197,17 @@ impl TileStore {
         let removed = self.versions.removed();
         let scans = self.scans.write(&self.files, number - 1, self.listed_records(), begun.listed_scans)?;
         let kept = self.write_kept()?;
+        let named = || kept.map_or(CatalogVersion::NONE, Catalog::version);
+        let catalog = self.keeper.is_on().then(named);
         if let Some(ext) = &mut metadata.ext {
-            ext.scan_records = Some(scans.records);
+            (ext.scan_records, ext.catalog) = (Some(scans.records), catalog);
         }
         // As late as can be: what another writer commits must not be cut off.
         self.committer.check_lock()?;
         let text = metadata.to_text();
         let metadata_text = is_new.then_some(&*text);
         let (changed, scan_number) = (self.versions.next(), begun.scan_number);
-        let flush = Flush { number, scan_number, changed, removed: &removed, metadata_text };
+        let flush = Flush { number, scan_number, changed, removed: &removed, catalog, metadata_text };
         if let Err(error) = self.committer.append(&self.files, &flush, &metadata) {
             // At once if it goes: another process may come next, and would see a record that is not on the medium.
             let _ = self.finish_earlier_work();
@@ -216,7 +218,7 @@ impl TileStore {
         self.note_added(number);
         self.scans.commit(scans, begun.listed_scans);
         self.keeper.commit(kept);
-        let changed = self.versions.committed(number, scan_number);
+        let changed = self.versions.committed(number, scan_number, catalog);
         log::info!(
             "{}: flush {number}, as of scan {scan_number}: {} tiles written, {} removed",
             self.files.folder().display(),

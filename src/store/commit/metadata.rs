@@ -4,6 +4,7 @@ use crate::config::{RayConfig, Storage};
 use crate::error::FormatError;
 use crate::sensor::SensorModel;
 use crate::space::TileIndex;
+use crate::store::scans::CatalogVersion;
 use crate::store::snapshots::snapshot_list::SnapshotList;
 use crate::store::tiles::tile_version::MAX_NUMBER;
 use serde::{Deserialize, Serialize};
@@ -62,6 +63,9 @@ pub struct Extension {
     /// Whether the map keeps its scans.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub keeps_scans: bool,
+    /// The catalog of these scans as of the last flush; `None` in maps of versions that did not name it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub catalog: Option<CatalogVersion>,
     /// Number of records in `scans.bin` as of the last flush; `None` if that is not known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scan_records: Option<u64>,
@@ -171,7 +175,7 @@ impl Metadata {
         if let Some(ext) = &mut metadata.ext {
             ext.empty = metadata.bounds.is_none();
             (ext.flush_number, ext.scan_number) = (commits.flush_number, commits.scan_number);
-            ext.scan_records = None;
+            (ext.scan_records, ext.catalog) = (None, commits.catalog);
         }
         metadata
     }
@@ -182,7 +186,7 @@ impl Metadata {
             let mut metadata = Self { bounds: None, ..metadata.clone() };
             if let Some(ext) = &mut metadata.ext {
                 (ext.empty, ext.flush_number, ext.scan_number) = (true, 0, 0);
-                ext.scan_records = None;
+                (ext.scan_records, ext.catalog) = (None, None);
             }
             metadata
         };
@@ -230,6 +234,7 @@ impl Metadata {
             && !([ext.flush_number, ext.scan_number, ext.decayed_scan]
                 .into_iter()
                 .chain(ext.snapshots.iter().flat_map(SnapshotList::flushes))
+                .chain(ext.catalog.iter().flat_map(|catalog| [catalog.generation, catalog.bytes]))
                 .all(|number| number <= MAX_NUMBER)
                 && ext.inputs.iter().all(InputRecord::is_sound))
         {
@@ -282,6 +287,7 @@ mod tests {
             storage: Storage::OctoMap,
             crs: None,
             keeps_scans: false,
+            catalog: None,
             scan_records: None,
             snapshots: None,
         };

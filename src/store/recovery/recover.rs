@@ -104,7 +104,7 @@ pub(in crate::store) fn settle_own_files(disk: &dyn Disk, layout: &Layout) -> Re
     Ok(removed)
 }
 
-/// Finishes what the log says of snapshots: one that was made gets its name, one that was deleted loses its file.
+/// Gives a snapshot that was made its name, as the log says.
 fn settle_snapshots(
     disk: &dyn Disk,
     layout: &Layout,
@@ -128,21 +128,45 @@ fn settle_snapshots(
             None => remove(disk, &next, removed)?,
         }
     }
-    if let Some(listed) = listed {
-        for name in Snapshot::list(disk, layout).unwrap_or_default() {
-            // What somebody else put there stays.
-            let is_deleted = || {
-                let file = Snapshot::read_file(disk, &layout.snapshot(&name), &name, map_id);
-                file.is_ok_and(|file| file.is_some_and(|file| file.has_own_name()))
-            };
-            if !listed.contains(&name) && is_deleted() {
-                remove(disk, &layout.snapshot(&name), removed)?;
-            }
-        }
-    }
     // In a map that lists none, a deletion that a killed writer could not make durable would come back and miss its
     // tables.
     tolerate(disk.sync_folder(&folder), &folder, "sync")
+}
+
+/// Whether a file of the folder of snapshots is what a deletion left that did not come to its end: it says itself that
+/// it is the snapshot, and the log does not list it. What somebody else put there stays.
+fn is_deleted_snapshot(
+    disk: &dyn Disk,
+    layout: &Layout,
+    map_id: [u8; 16],
+    listed: &SnapshotList,
+    name: &SnapshotName,
+) -> bool {
+    let file = || Snapshot::read_file(disk, &layout.snapshot(name), name, map_id);
+    !listed.contains(name) && file().is_ok_and(|file| file.is_some_and(|file| file.has_own_name()))
+}
+
+/// Removes the files of deleted snapshots, after all that was kept for them: as long as the file is there, the same
+/// command completes the deletion. Returns which.
+pub(in crate::store) fn remove_deleted_snapshots(
+    disk: &dyn Disk,
+    layout: &Layout,
+    map_id: [u8; 16],
+    listed: Option<&SnapshotList>,
+) -> Result<Vec<SnapshotName>> {
+    let folder = layout.snapshots();
+    let Some(listed) = listed.filter(|_| matches!(disk.kind(&folder), Ok(Some(EntryKind::Folder)))) else {
+        return Ok(Vec::new());
+    };
+    let mut names = Snapshot::list(disk, layout).unwrap_or_default();
+    names.retain(|name| is_deleted_snapshot(disk, layout, map_id, listed, name));
+    for name in &names {
+        remove(disk, &layout.snapshot(name), &mut 0)?;
+    }
+    if !names.is_empty() {
+        tolerate(disk.sync_folder(&folder), &folder, "sync")?;
+    }
+    Ok(names)
 }
 
 /// Removes what an attempt to give tiles of the original format their trailers left. Returns how many files.

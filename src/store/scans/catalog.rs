@@ -1,10 +1,13 @@
 use super::catalog_entry::{CatalogEntry, KeptRecord};
+use super::catalog_version::CatalogVersion;
 use crate::error::{DecodeError, Error, FormatError, Result};
+use crate::store::commit::commits::Commits;
 use crate::store::disk::{Disk, DiskRead, DiskWrite};
 use crate::store::layout::Layout;
+use crate::store::tiles::file_checksum::{Checksumming, FileChecksum};
 use crate::store::tiles::tile_version::MAX_NUMBER;
 use std::io::{self, BufReader, BufWriter, Read, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 const HEADER_BYTES: u64 = 16;
 /// Magic, version, zeros.
@@ -14,10 +17,14 @@ pub(super) const FRAME_BYTES: u64 = 12;
 
 /// Reads a catalog in order, up to a flush.
 #[derive(Debug)]
-pub(in crate::store) struct CatalogReader {
+struct CatalogReader {
     path: PathBuf,
     input: Input,
     flush_number: u64,
+    /// What the log names of the file, if it does.
+    named: Option<CatalogVersion>,
+    /// Checksum of the bytes before the next record.
+    crc: crc32fast::Hasher,
     /// Where the next record begins.
     at: u64,
     /// Number of the last scan so far.
@@ -32,26 +39,41 @@ struct Input {
 }
 
 impl CatalogReader {
-    /// Opens the catalog of a generation.
+    /// Opens the catalog of a generation. Where the log names it, it is checked as a whole before anything of it is
+    /// passed on.
     ///
     /// # Errors
     ///
-    /// None there, or a disk that refuses.
-    pub(in crate::store) fn open(
-        disk: &dyn Disk,
-        layout: &Layout,
-        generation: u64,
-        flush_number: u64,
-    ) -> Result<Self> {
+    /// None there, damage, or a disk that refuses.
+    fn open(disk: &dyn Disk, layout: &Layout, generation: u64, as_of: KeptAsOf) -> Result<Self> {
+        let mut reader = Self::begin(disk, layout, generation, as_of)?;
+        let Some(named) = as_of.catalog else { return Ok(reader) };
+        if checksum_of_front(disk, &reader.path, named.bytes)? == named.checksum() {
+            return Ok(reader);
+        }
+        // The first record that is damaged tells more than the checksum of the whole.
+        while reader.next()?.is_some() {}
+        let (found, wanted) = (reader.input.file_bytes, named.bytes);
+        let error = match found < wanted {
+            true => FormatError::at_offset(found, format!("{found} bytes, and commits.log names {wanted}")),
+            false => FormatError::at_offset(0, IS_ANOTHER),
+        };
+        Err(reader.wrong(error.into()))
+    }
+
+    fn begin(disk: &dyn Disk, layout: &Layout, generation: u64, as_of: KeptAsOf) -> Result<Self> {
         let path = layout.catalog(generation);
         let input = disk.open(&path).map_err(|error| match error.kind() {
-            io::ErrorKind::NotFound => FormatError::at_offset(0, "the file is missing").in_map(&path, None),
+            io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => {
+                FormatError::at_offset(0, IS_MISSING).in_map(&path, None)
+            }
             _ => Error::io(&path, "open", error),
         })?;
         let file_bytes = input.file_bytes();
         let file = std::sync::Mutex::new(BufReader::with_capacity(1 << 16, input));
-        let input = Input { file, file_bytes };
-        let mut reader = Self { path, input, flush_number, at: 0, last: 0, payload: Vec::new() };
+        let (input, payload, crc) = (Input { file, file_bytes }, Vec::new(), crc32fast::Hasher::new());
+        let KeptAsOf { flush_number, catalog: named, .. } = as_of;
+        let mut reader = Self { path, input, flush_number, named, crc, at: 0, last: 0, payload };
         reader.read_header().map_err(|error| reader.wrong(error))?;
         Ok(reader)
     }
@@ -66,6 +88,7 @@ impl CatalogReader {
             return Err(FormatError::at_offset(0, reason).into());
         }
         self.at = HEADER_BYTES;
+        self.crc.update(&HEADER);
         Ok(())
     }
 
@@ -74,7 +97,7 @@ impl CatalogReader {
     /// # Errors
     ///
     /// Damage, or a disk that refuses.
-    pub(in crate::store) fn next(&mut self) -> Result<Option<CatalogEntry>> {
+    fn next(&mut self) -> Result<Option<CatalogEntry>> {
         match self.read_entry() {
             Ok(entry) => Ok(entry),
             Err(error) => Err(self.wrong(error)),
@@ -95,7 +118,8 @@ impl CatalogReader {
     }
 
     fn read_entry(&mut self) -> std::result::Result<Option<CatalogEntry>, DecodeError> {
-        let left = self.input.file_bytes - self.at;
+        let end = self.named.map_or(self.input.file_bytes, |named| named.bytes.min(self.input.file_bytes));
+        let left = end.saturating_sub(self.at);
         if left < FRAME_BYTES {
             return Ok(None);
         }
@@ -120,8 +144,12 @@ impl CatalogReader {
         let wrong = |reason: &str| FormatError::at_offset(self.at, reason);
         let (flush, entry) =
             CatalogEntry::read(&self.payload).ok_or_else(|| wrong("a record of a newer version"))?;
-        if flush > self.flush_number {
-            return Ok(None);
+        match self.named {
+            Some(named) if !named.has_flush(flush, self.flush_number) => {
+                return Err(wrong(IS_OF_ANOTHER).into());
+            }
+            None if flush > self.flush_number => return Ok(None),
+            _ => {}
         }
         if let Some((first, last)) = entry.numbers() {
             if first != self.last + 1 || last < first {
@@ -130,6 +158,7 @@ impl CatalogReader {
             self.last = last;
         }
         self.at += FRAME_BYTES + u64::from(length);
+        [&lengths[..], &self.payload, &checksum].iter().for_each(|bytes| self.crc.update(bytes));
         Ok(Some(entry))
     }
 }
@@ -137,9 +166,10 @@ impl CatalogReader {
 impl CatalogReader {
     /// What a record is that is not whole, by what is left of it: the end, if a flush that did not come to its commit
     /// has begun to write it (zeros where nothing reached the medium, or the number of a later flush), else damage.
+    /// What the log names was committed.
     fn end_or_damage(&self, reason: &str) -> std::result::Result<Option<CatalogEntry>, DecodeError> {
         let number = self.payload.first_chunk().map_or(0, |bytes| u64::from_le_bytes(*bytes));
-        if number == 0 || number > self.flush_number {
+        if self.named.is_none() && (number == 0 || number > self.flush_number) {
             return Ok(None);
         }
         Err(FormatError::at_offset(self.at, reason).into())
@@ -166,7 +196,9 @@ impl std::fmt::Debug for Input {
 /// Writes records to a catalog.
 pub(super) struct CatalogWriter {
     out: BufWriter<Box<dyn DiskWrite>>,
+    generation: u64,
     bytes: u64,
+    crc: crc32fast::Hasher,
     payload: Vec<u8>,
 }
 
@@ -175,13 +207,17 @@ impl CatalogWriter {
     pub(super) fn create(disk: &dyn Disk, layout: &Layout, generation: u64) -> io::Result<Self> {
         let mut out = BufWriter::new(disk.create(&layout.catalog(generation))?);
         out.write_all(&HEADER)?;
-        Ok(Self { out, bytes: HEADER_BYTES, payload: Vec::new() })
+        let mut crc = crc32fast::Hasher::new();
+        crc.update(&HEADER);
+        Ok(Self { out, generation, bytes: HEADER_BYTES, crc, payload: Vec::new() })
     }
 
-    /// Goes on with a catalog behind its first `bytes` bytes.
-    pub(super) fn append(disk: &dyn Disk, layout: &Layout, generation: u64, bytes: u64) -> io::Result<Self> {
+    /// Goes on with a catalog; what is behind the bytes that count is cut off.
+    pub(super) fn append(disk: &dyn Disk, layout: &Layout, catalog: CatalogVersion) -> io::Result<Self> {
+        let CatalogVersion { generation, bytes, crc32 } = catalog;
         let out = BufWriter::new(disk.append(&layout.catalog(generation), bytes)?);
-        Ok(Self { out, bytes, payload: Vec::new() })
+        let crc = crc32fast::Hasher::new_with_initial_len(crc32, bytes);
+        Ok(Self { out, generation, bytes, crc, payload: Vec::new() })
     }
 
     /// Writes the record of an entry, as of a flush.
@@ -189,32 +225,70 @@ impl CatalogWriter {
         self.payload.clear();
         entry.write(flush_number, &mut self.payload);
         let length = u32::try_from(self.payload.len()).map_err(io::Error::other)?;
-        self.out.write_all(&length.to_le_bytes())?;
-        self.out.write_all(&(!length).to_le_bytes())?;
-        self.out.write_all(&self.payload)?;
-        self.out.write_all(&crc32fast::hash(&self.payload).to_le_bytes())?;
+        let checksum = crc32fast::hash(&self.payload).to_le_bytes();
+        for part in [&length.to_le_bytes()[..], &(!length).to_le_bytes(), &self.payload, &checksum] {
+            self.out.write_all(part)?;
+            self.crc.update(part);
+        }
         self.bytes += FRAME_BYTES + u64::from(length);
         Ok(())
     }
 
-    /// Makes all of it durable; returns the bytes of the file.
-    pub(super) fn finish(self) -> io::Result<u64> {
+    /// Makes all of it durable; returns what the log is to name.
+    pub(super) fn finish(self) -> io::Result<CatalogVersion> {
         let mut out = self.out.into_inner().map_err(io::IntoInnerError::into_error)?;
         out.sync()?;
-        Ok(self.bytes)
+        Ok(CatalogVersion { generation: self.generation, bytes: self.bytes, crc32: self.crc.finalize() })
     }
 }
 
-/// The newest generation up to a flush; `None` if there is none.
+/// Length, at most `bytes`, and checksum of the beginning of a file.
 ///
 /// # Errors
 ///
-/// A folder that cannot be listed.
-pub(in crate::store) fn generation_of(
-    disk: &dyn Disk,
-    layout: &Layout,
-    flush_number: u64,
-) -> Result<Option<u64>> {
+/// A disk that refuses.
+pub(super) fn checksum_of_front(disk: &dyn Disk, path: &Path, bytes: u64) -> Result<FileChecksum> {
+    let input = disk.open(path).map_err(|error| Error::io(path, "open", error))?;
+    let mut input = Checksumming::new(input.take(bytes));
+    io::copy(&mut input, &mut io::sink()).map_err(|error| Error::io(path, "read", error))?;
+    Ok(input.finish().0)
+}
+
+/// Which of these beginnings of one catalog are whole; the file is read once.
+pub(crate) fn whole_fronts(disk: &dyn Disk, layout: &Layout, fronts: &[CatalogVersion]) -> Vec<bool> {
+    let mut are_whole = vec![false; fronts.len()];
+    let mut order: Vec<_> = (0..fronts.len()).filter(|&at| fronts[at].is_there()).collect();
+    order.sort_unstable_by_key(|&at| fronts[at].bytes);
+    let Some(&first) = order.first() else { return are_whole };
+    // What cannot be read is told by whoever opens it.
+    let Ok(input) = disk.open(&layout.catalog(fronts[first].generation)) else { return are_whole };
+    let (mut input, mut read, mut crc) = (input, 0, crc32fast::Hasher::new());
+    let mut buffer = vec![0; 1 << 16];
+    for at in order {
+        while read < fronts[at].bytes {
+            let most = (fronts[at].bytes - read).min(buffer.len() as u64) as usize;
+            match input.read(&mut buffer[..most]) {
+                Ok(0) => return are_whole,
+                Ok(bytes) => {
+                    crc.update(&buffer[..bytes]);
+                    read += bytes as u64;
+                }
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                Err(_) => return are_whole,
+            }
+        }
+        are_whole[at] = crc.clone().finalize() == fronts[at].crc32;
+    }
+    are_whole
+}
+
+/// What is wrong with a catalog that the log names.
+pub(super) const IS_MISSING: &str = "the file is missing";
+pub(super) const IS_ANOTHER: &str = "the file does not match its checksum in commits.log";
+pub(super) const IS_OF_ANOTHER: &str = "a record of another catalog";
+
+/// The newest generation up to a flush; `None` if there is none.
+fn newest_generation(disk: &dyn Disk, layout: &Layout, flush_number: u64) -> Result<Option<u64>> {
     let folder = layout.kept_scans();
     match disk.list(&folder) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
@@ -226,17 +300,52 @@ pub(in crate::store) fn generation_of(
     }
 }
 
+/// The generations of the catalogs in a map's folder, in order; none where the folder cannot be listed.
+pub(crate) fn catalog_generations(disk: &dyn Disk, layout: &Layout) -> Vec<u64> {
+    let names = disk.list(&layout.kept_scans()).unwrap_or_default();
+    let generations = names.iter().filter_map(|name| Layout::generation_of(name));
+    let mut generations: Vec<_> = generations.filter(|&generation| generation < MAX_NUMBER).collect();
+    generations.sort_unstable();
+    generations
+}
+
 /// A flush of a map that keeps its scans.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct KeptAsOf {
     pub(in crate::store) flush_number: u64,
     /// Number of its last scan.
     pub(crate) scan_number: u64,
+    /// Its catalog; `None` where nothing names it.
+    pub(crate) catalog: Option<CatalogVersion>,
 }
 
 impl KeptAsOf {
     /// Later than every flush.
-    pub(crate) const NEWEST: Self = Self { flush_number: MAX_NUMBER, scan_number: MAX_NUMBER };
+    pub(crate) const NEWEST: Self = Self { flush_number: MAX_NUMBER, scan_number: MAX_NUMBER, catalog: None };
+
+    /// The flush that a log ends with.
+    pub(in crate::store) fn last_of(commits: &Commits) -> Self {
+        let Commits { flush_number, scan_number, catalog, .. } = *commits;
+        Self { flush_number, scan_number, catalog }
+    }
+
+    /// The generation of its catalog: the one that is named, or else the newest up to the flush. `None` if it has none.
+    ///
+    /// # Errors
+    ///
+    /// A folder that cannot be listed.
+    pub(in crate::store) fn generation(&self, disk: &dyn Disk, layout: &Layout) -> Result<Option<u64>> {
+        match self.catalog {
+            Some(catalog) => Ok(catalog.is_there().then_some(catalog.generation)),
+            None => newest_generation(disk, layout, self.flush_number),
+        }
+    }
+
+    /// The error of one that has no catalog, although it has scans.
+    pub(super) fn no_catalog(layout: &Layout) -> Error {
+        let reason = "the catalog of its kept scans is missing";
+        FormatError::at_offset(0, reason).in_map(&layout.kept_scans(), None)
+    }
 }
 
 /// The kept scans of a map as of a flush, in order, without their points.
@@ -245,24 +354,21 @@ pub(crate) struct KeptRecords(Option<(CatalogReader, u64)>);
 
 impl KeptRecords {
     /// Opens the list as of a flush.
-    pub(in crate::store) fn open(disk: &dyn Disk, layout: &Layout, as_of: KeptAsOf) -> Result<Self> {
-        let KeptAsOf { flush_number, scan_number } = as_of;
-        let Some(generation) = generation_of(disk, layout, flush_number)? else {
-            return match scan_number {
-                0 => Ok(Self(None)),
-                _ => {
-                    let reason = "the catalog of its kept scans is missing";
-                    Err(FormatError::at_offset(0, reason).in_map(&layout.kept_scans(), None))
-                }
-            };
+    pub(crate) fn open(disk: &dyn Disk, layout: &Layout, as_of: KeptAsOf) -> Result<Self> {
+        let Some(generation) = as_of.generation(disk, layout)? else {
+            return if as_of.scan_number == 0 { Ok(Self(None)) } else { Err(KeptAsOf::no_catalog(layout)) };
         };
-        let reader = CatalogReader::open(disk, layout, generation, flush_number)?;
-        Ok(Self(Some((reader, scan_number))))
+        let reader = CatalogReader::open(disk, layout, generation, as_of)?;
+        Ok(Self(Some((reader, as_of.scan_number))))
     }
 
-    /// What was read of the catalog so far: its bytes, and whether there is more in the file. `None` if there is none.
-    pub(super) fn extent(&self) -> Option<(u64, bool)> {
-        self.0.as_ref().map(|(reader, _)| (reader.at, reader.at != reader.input.file_bytes))
+    /// What was read so far of the catalog of a generation, and whether there is more in the file. `None` if there is
+    /// none.
+    pub(super) fn extent(&self, generation: u64) -> Option<(CatalogVersion, bool)> {
+        self.0.as_ref().map(|(reader, _)| {
+            let (bytes, crc32) = (reader.at, reader.crc.clone().finalize());
+            (CatalogVersion { generation, bytes, crc32 }, bytes != reader.input.file_bytes)
+        })
     }
 
     /// The next entry of the catalog, `None` after the last.

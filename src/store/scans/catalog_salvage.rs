@@ -1,6 +1,8 @@
 //! What can still be read of a catalog that is damaged.
 
-use super::catalog::{FRAME_BYTES, HEADER, KeptAsOf, generation_of};
+use super::catalog::{
+    FRAME_BYTES, HEADER, IS_ANOTHER, IS_MISSING, IS_OF_ANOTHER, KeptAsOf, checksum_of_front,
+};
 use super::catalog_entry::CatalogEntry;
 use crate::error::{Error, FormatError, Result, is_of_medium};
 use crate::store::disk::{Disk, DiskRead};
@@ -22,7 +24,8 @@ pub(crate) enum Salvaged {
 
 /// Passes on what can be read of the catalog as of a flush, in order. Records that are damaged are passed over, and
 /// where scans are missing for it, their numbers are passed on as those of unknown scans: numbers follow each other
-/// without a gap up to that of the flush. Returns what is damaged.
+/// without a gap up to that of the flush. Of a file that is not the one that the log names, nothing is passed on: it
+/// may have scans that were removed. Returns what is damaged.
 ///
 /// # Errors
 ///
@@ -33,18 +36,37 @@ pub(crate) fn salvage_entries(
     as_of: KeptAsOf,
     put: &mut dyn FnMut(Salvaged) -> Result<()>,
 ) -> Result<Vec<Error>> {
-    let KeptAsOf { flush_number, scan_number } = as_of;
-    let Some(generation) = generation_of(disk, layout, flush_number)? else {
-        if scan_number == 0 {
+    let lost = CatalogEntry::Unlisted(1, as_of.scan_number);
+    let Some(generation) = as_of.generation(disk, layout)? else {
+        if as_of.scan_number == 0 {
             return Ok(Vec::new());
         }
-        put(Salvaged::Lost(CatalogEntry::Unlisted(1, scan_number)))?;
-        let reason = "the catalog of its kept scans is missing";
-        return Ok(vec![FormatError::at_offset(0, reason).in_map(&layout.kept_scans(), None)]);
+        put(Salvaged::Lost(lost))?;
+        return Ok(vec![KeptAsOf::no_catalog(layout)]);
     };
     let path = layout.catalog(generation);
-    let mut salvage =
-        Salvage { disk, path, as_of, last: 0, doubtful: None, has_hole: false, damage: Vec::new() };
+    let begin = || Salvage {
+        disk,
+        path: path.clone(),
+        as_of,
+        last: 0,
+        doubtful: None,
+        has_hole: false,
+        is_another: false,
+        damage: Vec::new(),
+    };
+    let mut salvage = begin();
+    if let Some(named) = as_of.catalog
+        && !matches!(checksum_of_front(disk, &path, named.bytes), Ok(found) if found == named.checksum())
+    {
+        salvage.read(&mut |_| Ok(()))?;
+        salvage.end(&mut |_| Ok(()))?;
+        if salvage.damage.is_empty() || salvage.is_another {
+            put(Salvaged::Lost(if as_of.scan_number == 0 { lost_operation() } else { lost }))?;
+            return Ok(vec![salvage.wrong(0, IS_ANOTHER)]);
+        }
+        salvage = begin();
+    }
     salvage.read(put)?;
     salvage.end(put)?;
     Ok(salvage.damage)
@@ -60,6 +82,8 @@ struct Salvage<'a> {
     doubtful: Option<Error>,
     /// Whether something is missing before the next entry.
     has_hole: bool,
+    /// Whether it has records of another catalog.
+    is_another: bool,
     damage: Vec<Error>,
 }
 
@@ -76,17 +100,37 @@ impl Salvage<'_> {
     fn read(&mut self, put: &mut dyn FnMut(Salvaged) -> Result<()>) -> Result<()> {
         let mut at = HEADER.len() as u64;
         let Some(mut input) = self.begin()? else { return Ok(()) };
+        let (named, last_flush) = (self.as_of.catalog, self.as_of.flush_number);
         loop {
+            // What the log names was committed, and nothing behind it.
+            if named.is_some_and(|named| at >= named.bytes) {
+                return Ok(());
+            }
             let found = find_record(&mut input, at);
-            match self.unless_unreadable(found, "read")?.unwrap_or(Found::End) {
-                Found::Record(entry, flush_number, next) if flush_number <= self.as_of.flush_number => {
+            let Some(found) = self.unless_unreadable(found, "read")? else { return Ok(()) };
+            match found {
+                Found::Record(_, flush_number, next)
+                    if named.is_some_and(|named| {
+                        !named.has_flush(flush_number, last_flush) || next > named.bytes
+                    }) =>
+                {
+                    self.damage.push(self.wrong(at, IS_OF_ANOTHER));
+                    (self.has_hole, self.is_another) = (true, true);
+                    at = next;
+                }
+                Found::Record(entry, flush_number, next) if named.is_some() || flush_number <= last_flush => {
                     self.take(at, entry, put)?;
                     at = next;
+                }
+                Found::End if named.is_some() => {
+                    self.damage.push(self.wrong(at, "its end is missing"));
+                    self.has_hole = true;
+                    return Ok(());
                 }
                 Found::Record(..) | Found::End => return Ok(()),
                 Found::Damage(reason, flush_number, next) => {
                     let error = self.wrong(at, reason);
-                    if flush_number == 0 || flush_number > self.as_of.flush_number {
+                    if named.is_none() && (flush_number == 0 || flush_number > last_flush) {
                         self.doubtful.get_or_insert(error);
                     } else {
                         self.damage.push(error);
@@ -108,6 +152,13 @@ impl Salvage<'_> {
     /// Opens the catalog behind its header, which says nothing that its name does not say.
     fn begin(&mut self) -> Result<Option<BufReader<Box<dyn DiskRead>>>> {
         let opened = self.disk.open(&self.path).map(BufReader::new);
+        if let Err(error) = &opened
+            && matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory)
+        {
+            self.damage.push(self.wrong(0, IS_MISSING));
+            self.has_hole = true;
+            return Ok(None);
+        }
         let Some(mut input) = self.unless_unreadable(opened, "open")? else { return Ok(None) };
         let mut header = [0; HEADER.len()];
         let is_there = read_whole(&mut input, &mut header);

@@ -1,9 +1,10 @@
 //! The scans that a map keeps, as part of a [`TileStore`].
 
-use super::catalog::{KeptAsOf, KeptRecords, generation_of};
+use super::catalog::{CatalogWriter, KeptAsOf, KeptRecords, whole_fronts};
 use super::catalog_entry::{CatalogEntry, SegmentPlace};
 use super::catalog_salvage::{Salvaged, salvage_entries};
-use super::scan_keeper::{Catalog, unneeded};
+use super::catalog_version::CatalogVersion;
+use super::scan_keeper::{Catalog, check_segment, unneeded, with_all_records};
 use super::scan_list::read_scans;
 use crate::error::{Error, Result};
 use crate::space::Point;
@@ -11,8 +12,9 @@ use crate::store::disk::EntryKind;
 use crate::store::layout::Layout;
 use crate::store::map_files::MapFiles;
 use crate::store::snapshots::snapshot_file::Snapshot;
+use crate::store::snapshots::snapshot_name::SnapshotName;
 use crate::store::tile_store::TileStore;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 impl TileStore {
@@ -107,7 +109,7 @@ impl TileStore {
     ///
     /// A folder that cannot be listed.
     pub(crate) fn catalog_generation(&self) -> Result<Option<u64>> {
-        generation_of(&**self.disk(), self.layout(), self.commits().flush_number)
+        self.last_commit().generation(&**self.disk(), self.layout())
     }
 
     /// Writes what belongs to the next commit, synced.
@@ -121,8 +123,7 @@ impl TileStore {
 
     /// The last commit, as far as kept scans go.
     pub(crate) fn last_commit(&self) -> KeptAsOf {
-        let commits = self.versions.commits();
-        KeptAsOf { flush_number: commits.flush_number, scan_number: commits.scan_number }
+        KeptAsOf::last_of(self.versions.commits())
     }
 
     /// Removes catalogs and segments that neither the map nor a snapshot needs. What the disk refuses remains until the
@@ -144,7 +145,8 @@ impl TileStore {
             return Ok(());
         };
         let is_new = |segment| self.keeper.is_writing(segment);
-        let files = self.unneeded_scans(flushes, is_new)?;
+        let (files, highest) = self.unneeded_scans(flushes, is_new)?;
+        self.keeper.note_segment(highest);
         for path in &files {
             self.files.remove_file(path)?;
             self.leftovers_removed += 1;
@@ -164,46 +166,154 @@ impl TileStore {
     }
 
     /// The catalogs and segments that neither the last commit nor a snapshot needs, in order: a writer that ended early
-    /// did not remove them, or one at work has not committed them yet. `None` where a snapshot cannot be read, which may
-    /// need any of them.
+    /// did not remove them, or one at work has not committed them yet. `None` where a snapshot cannot be read, which
+    /// may need any of them.
     ///
     /// # Errors
     ///
     /// A disk that refuses; a catalog that cannot be read, which may need any.
     pub(crate) fn idle_scan_files(&self) -> Result<Option<Vec<PathBuf>>> {
         match self.read_snapshots() {
-            Ok(snapshots) => self.idle_scan_files_beside(&snapshots).map(Some),
+            Ok(snapshots) => {
+                let flushes = snapshots.iter().filter_map(kept_as_of).collect();
+                self.unneeded_scans(flushes, |_| false).map(|(files, _)| Some(files))
+            }
             Err(Error::Damaged { .. }) => Ok(None),
             Err(error) if error.is_of_medium() => Ok(None),
             Err(error) => Err(error),
         }
     }
 
-    /// The same where the snapshots are known.
-    pub(in crate::store) fn idle_scan_files_beside(&self, snapshots: &[Snapshot]) -> Result<Vec<PathBuf>> {
-        self.unneeded_scans(snapshots.iter().filter_map(kept_as_of).collect(), |_| false)
+    /// The catalogs and segments that the last commit or one of these snapshots needs, in order.
+    ///
+    /// # Errors
+    ///
+    /// A catalog that is damaged or missing, a segment that is missing or too short; a disk that refuses.
+    pub(in crate::store) fn needed_scan_files(&self, snapshots: &[Snapshot]) -> Result<Vec<PathBuf>> {
+        let (disk, layout) = (&**self.disk(), self.layout());
+        let mut flushes: Vec<_> = snapshots.iter().filter_map(kept_as_of).collect();
+        flushes.extend(self.is_keeping_scans().then(|| self.last_commit()));
+        let (mut files, mut ends) = (BTreeSet::new(), BTreeMap::new());
+        for as_of in with_all_records(disk, layout, &flushes)? {
+            files.extend(as_of.generation(disk, layout)?.map(|generation| layout.catalog(generation)));
+            let mut records = KeptRecords::open(disk, layout, as_of)?;
+            while let Some(scan) = records.next_kept()? {
+                let end = ends.entry(scan.place.segment).or_insert(0);
+                *end = scan.place.offset.saturating_add(scan.place.bytes).max(*end);
+            }
+        }
+        for (segment, end) in ends {
+            check_segment(disk, layout, segment, end)?;
+            files.insert(layout.segment(segment));
+        }
+        Ok(files.into_iter().collect())
     }
 
-    /// The catalogs and segments that neither the last commit needs nor one of these flushes.
+    /// The catalogs and segments that neither the last commit needs nor one of these flushes, and the highest segment
+    /// that one needs.
     fn unneeded_scans(
         &self,
         mut flushes: Vec<KeptAsOf>,
         is_new: impl Fn(u64) -> bool,
-    ) -> Result<Vec<PathBuf>> {
+    ) -> Result<(Vec<PathBuf>, u64)> {
         if self.is_keeping_scans() {
             flushes.push(self.last_commit());
         }
         unneeded(&**self.disk(), self.layout(), &flushes, is_new)
     }
 
-    /// The file of the catalog of the last commit, if there is one.
+    /// Checks that the catalogs of the snapshots are whole, before points are taken out of the map: if one is not,
+    /// nothing tells which files may go. A snapshot whose own file is damaged is passed over, and keeps all.
+    ///
+    /// # Errors
+    ///
+    /// A catalog that is damaged or missing, and what to do about it; a disk that refuses.
+    pub(crate) fn check_catalogs_of_snapshots(&self) -> Result<()> {
+        let (disk, layout) = (&**self.disk(), self.layout());
+        let mut needed = Vec::new();
+        for name in self.snapshot_names()? {
+            match self.snapshot(&name) {
+                Ok(snapshot) => needed.extend(kept_as_of(&snapshot).map(|as_of| (name, as_of))),
+                Err(Error::Damaged { .. }) => {}
+                Err(error) if error.is_of_medium() => {}
+                Err(error) => return Err(error),
+            }
+        }
+        // Of those that are the beginning of one catalog, the longest first: of the others the checksum says enough.
+        needed.sort_by_key(|(_, as_of)| std::cmp::Reverse(as_of.catalog));
+        for of_one in needed.chunk_by(|(_, a), (_, b)| {
+            a.catalog.map(|catalog| catalog.generation) == b.catalog.map(|catalog| catalog.generation)
+        }) {
+            let fronts: Vec<_> = of_one.iter().filter_map(|(_, as_of)| as_of.catalog).collect();
+            let (are_whole, mut is_read) = (whole_fronts(disk, layout, &fronts), false);
+            for (at, (name, as_of)) in of_one.iter().enumerate() {
+                if is_read && are_whole.get(at).copied().unwrap_or(false) {
+                    continue;
+                }
+                let read = || -> Result<()> {
+                    let mut records = KeptRecords::open(disk, layout, *as_of)?;
+                    while records.next_entry()?.is_some() {}
+                    Ok(())
+                };
+                read().map_err(|error| needed_by(error, name))?;
+                is_read = true;
+            }
+        }
+        Ok(())
+    }
+
+    /// The file of the catalog of a flush, if it has one.
     ///
     /// # Errors
     ///
     /// A folder that cannot be listed.
-    pub(crate) fn catalog_path(&self) -> Result<Option<PathBuf>> {
-        let generation = self.catalog_generation()?;
+    pub(crate) fn catalog_path(&self, as_of: KeptAsOf) -> Result<Option<PathBuf>> {
+        let generation = as_of.generation(&**self.disk(), self.layout())?;
         Ok(generation.map(|generation| self.layout().catalog(generation)))
+    }
+
+    /// Writes a catalog that a snapshot is to name in place of its own, in a commit of its own; as long as it is not
+    /// named, it is a leftover.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses; a damaged catalog of the map itself, in a map of a version that did not name it.
+    pub(crate) fn write_other_catalog(
+        &mut self,
+        write: impl FnOnce(&mut dyn FnMut(&CatalogEntry) -> Result<()>) -> Result<()>,
+    ) -> Result<CatalogVersion> {
+        self.finish_earlier_work()?;
+        // From here on the newest is no longer the map's own.
+        self.try_to_name_own_catalog()?;
+        let generation = self.commits().flush_number + 1;
+        let path = self.layout().catalog(generation);
+        let refused = |error| Error::io(&path, "write", error);
+        self.keeper.make_folder(&self.files)?;
+        let mut out = CatalogWriter::create(&**self.disk(), self.layout(), generation).map_err(refused)?;
+        write(&mut |entry| out.put(entry, generation).map_err(refused))?;
+        let catalog = out.finish().map_err(refused)?;
+        self.files.sync_folder(&self.layout().kept_scans())?;
+        let listed = self.snapshot_list().cloned().unwrap_or_default();
+        self.commit_snapshots(listed)?;
+        self.tidy_up();
+        Ok(catalog)
+    }
+
+    /// Notes the catalog of the last commit for the next record, if none is named yet: a later one must not be taken for
+    /// it.
+    fn try_to_name_own_catalog(&mut self) -> Result<()> {
+        if self.is_keeping_scans() && self.commits().catalog.is_none() {
+            let own = self.keeper.find_committed(&self.files, KeptAsOf::last_of(self.versions.commits()))?;
+            self.versions.set_catalog(own.map_or(CatalogVersion::NONE, Catalog::version));
+        }
+        Ok(())
+    }
+
+    /// The same; a damaged catalog remains unnamed.
+    pub(in crate::store) fn name_own_catalog(&mut self) {
+        if let Err(error) = self.try_to_name_own_catalog() {
+            log::warn!("the catalog of the kept scans is not named: {error:#}");
+        }
     }
 
     /// The segments and catalogs that neither the map nor one of its snapshots needs, as far as their catalogs can be
@@ -227,10 +337,10 @@ impl TileStore {
         let mut generations = BTreeSet::new();
         if self.keeps_scans() {
             flushes.extend(segments.is_none().then_some(last_commit));
-            generations.extend(generation_of(disk, layout, last_commit.flush_number)?);
+            generations.extend(last_commit.generation(disk, layout)?);
         }
         for as_of in flushes {
-            generations.extend(generation_of(disk, layout, as_of.flush_number)?);
+            generations.extend(as_of.generation(disk, layout)?);
             salvage_entries(disk, layout, as_of, &mut |entry| {
                 if let Salvaged::Whole(CatalogEntry::Kept(scan)) = entry {
                     needed.insert(scan.place.segment);
@@ -287,17 +397,25 @@ impl TileStore {
     }
 }
 
+/// The error of a catalog that a snapshot needs, with what to do.
+fn needed_by(error: Error, name: &SnapshotName) -> Error {
+    let Error::Damaged { path, tile, mut cause } = error else { return error };
+    cause.reason.push_str(&format!(
+        "; the snapshot {name} needs it; nothing was changed: repair the map or delete the snapshot, and run this again"
+    ));
+    Error::Damaged { path, tile, cause }
+}
+
 /// The flush of a snapshot, if it keeps its scans.
-fn kept_as_of(snapshot: &Snapshot) -> Option<KeptAsOf> {
+pub(crate) fn kept_as_of(snapshot: &Snapshot) -> Option<KeptAsOf> {
     let keeps_scans = snapshot.metadata.ext.as_ref().is_some_and(|ext| ext.keeps_scans);
-    let (flush_number, scan_number) = (snapshot.commits.flush_number, snapshot.commits.scan_number);
-    keeps_scans.then_some(KeptAsOf { flush_number, scan_number })
+    keeps_scans.then(|| KeptAsOf::last_of(&snapshot.commits))
 }
 
 /// What a map had before its scans were kept: its list of scans, and what is not in it.
 fn entries_before(
     files: &MapFiles,
-    KeptAsOf { flush_number, scan_number }: KeptAsOf,
+    KeptAsOf { flush_number, scan_number, .. }: KeptAsOf,
     has_tiles: bool,
 ) -> Result<Vec<CatalogEntry>> {
     let mut entries = Vec::new();

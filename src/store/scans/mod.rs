@@ -12,6 +12,7 @@
 mod catalog;
 mod catalog_entry;
 mod catalog_salvage;
+mod catalog_version;
 mod codec;
 mod kept_scan_store;
 mod scan_keeper;
@@ -19,11 +20,13 @@ mod scan_list;
 mod scan_record;
 mod segment;
 
-pub(crate) use catalog::{KeptAsOf, KeptRecords};
+pub(crate) use catalog::{KeptAsOf, KeptRecords, catalog_generations, whole_fronts};
 pub use catalog_entry::{CatalogEntry, KeptFrame, KeptRecord, SegmentPlace};
 pub(crate) use catalog_salvage::{Salvaged, salvage_entries};
-pub(super) use scan_keeper::ScanKeeper;
-pub(crate) use scan_keeper::check_points;
+pub use catalog_version::CatalogVersion;
+pub(crate) use kept_scan_store::kept_as_of;
+pub(super) use scan_keeper::{Catalog, ScanKeeper};
+pub(crate) use scan_keeper::{check_points, check_segment};
 pub(super) use scan_list::ScanList;
 pub(crate) use scan_list::{check_scans, read_scans};
 pub use scan_record::ScanRecord;

@@ -1,12 +1,13 @@
-use super::catalog::{CatalogWriter, KeptAsOf, KeptRecords, generation_of};
+use super::catalog::{CatalogWriter, KeptAsOf, KeptRecords, whole_fronts};
 use super::catalog_entry::{CatalogEntry, KeptRecord, SegmentPlace};
+use super::catalog_version::CatalogVersion;
 use super::segment::{SegmentScan, SegmentWriter};
-use crate::error::{Error, Result};
+use crate::error::{Error, FormatError, Result};
 use crate::space::Point;
-use crate::store::disk::Disk;
+use crate::store::disk::{Disk, EntryKind};
 use crate::store::layout::Layout;
 use crate::store::map_files::MapFiles;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::io;
 use std::path::PathBuf;
@@ -35,6 +36,8 @@ pub(in crate::store) struct ScanKeeper {
     /// Whether that came while a replacement was made.
     is_replacement_suspect: bool,
     has_new_names: bool,
+    /// The highest segment that a catalog names, as far as catalogs were read: one that is lost gets no other's scans.
+    highest_segment: u64,
     /// A catalog that was begun for a commit, which may not have come.
     begun: Option<u64>,
 }
@@ -42,10 +45,16 @@ pub(in crate::store) struct ScanKeeper {
 /// A catalog's file, up to where it counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::store) struct Catalog {
-    generation: u64,
-    bytes: u64,
+    version: CatalogVersion,
     /// Whether the file may go on behind that.
     has_excess: bool,
+}
+
+impl Catalog {
+    /// What the log names.
+    pub(in crate::store) fn version(self) -> CatalogVersion {
+        self.version
+    }
 }
 
 /// Where a scan begins among the segments.
@@ -107,6 +116,11 @@ impl ScanKeeper {
             || self.segment.as_ref().is_some_and(|open| open.segment == segment)
     }
 
+    /// Notes that a catalog names segments up to this one.
+    pub(in crate::store) fn note_segment(&mut self, segment: u64) {
+        self.highest_segment = self.highest_segment.max(segment);
+    }
+
     /// Whether there is something for the next commit.
     pub(in crate::store) fn has_news(&self) -> bool {
         !self.pending.is_empty() || self.replacement.is_some()
@@ -140,7 +154,9 @@ impl ScanKeeper {
         let (disk, layout) = (&**files.disk(), files.layout());
         if self.segment.as_ref().is_none_or(SegmentWriter::is_full) {
             self.make_folder(files)?;
-            let segment = segments_in(disk, layout)?.last().map_or(1, |last| last + 1);
+            let last = segments_in(disk, layout)?.last().copied().unwrap_or_default();
+            let segment = last.max(self.highest_segment) + 1;
+            self.highest_segment = segment;
             self.segment = Some(SegmentWriter::create(disk, layout, segment)?);
             self.has_new_names = true;
         }
@@ -302,9 +318,10 @@ impl ScanKeeper {
         let in_place = match self.replacement.take() {
             Some(Replacement::Open { generation, out }) => {
                 let out = out.into_inner().unwrap_or_else(PoisonError::into_inner);
-                let bytes = out.finish();
-                let bytes = bytes.map_err(|error| Error::io(&layout.catalog(generation), "write", error))?;
-                let whole = Catalog { generation, bytes, has_excess: false };
+                let version = out.finish();
+                let version =
+                    version.map_err(|error| Error::io(&layout.catalog(generation), "write", error))?;
+                let whole = Catalog { version, has_excess: false };
                 self.replacement = Some(Replacement::Whole(whole));
                 Some(whole)
             }
@@ -328,22 +345,22 @@ impl ScanKeeper {
             files.remove_file(&layout.catalog(begun))?;
         }
         self.begun = in_place.is_none().then_some(flush_number);
-        let generation = in_place.map_or(flush_number, |catalog| catalog.generation);
+        let generation = in_place.map_or(flush_number, |catalog| catalog.version.generation);
         self.has_new_names |= in_place.is_none();
-        let write = || -> io::Result<u64> {
+        let write = || -> io::Result<CatalogVersion> {
             let mut out = match in_place {
-                Some(catalog) => CatalogWriter::append(disk, layout, generation, catalog.bytes)?,
+                Some(catalog) => CatalogWriter::append(disk, layout, catalog.version)?,
                 None => CatalogWriter::create(disk, layout, generation)?,
             };
             let begun = self.pending.get(..self.begun_entries).unwrap_or(&self.pending);
             earlier.iter().chain(begun).try_for_each(|entry| out.put(entry, flush_number))?;
             out.finish()
         };
-        let bytes = write().map_err(|error| Error::io(&layout.catalog(generation), "write", error));
-        if let (Err(_), Some(Some(committed))) = (&bytes, &mut self.committed) {
+        let version = write().map_err(|error| Error::io(&layout.catalog(generation), "write", error));
+        if let (Err(_), Some(Some(committed))) = (&version, &mut self.committed) {
             committed.has_excess = true;
         }
-        Ok(Some(Catalog { generation, bytes: bytes?, has_excess: false }))
+        Ok(Some(Catalog { version: version?, has_excess: false }))
     }
 
     /// Notes that what was written is committed.
@@ -363,17 +380,23 @@ impl ScanKeeper {
     }
 
     /// The catalog as of the last commit. What is behind it in the file may be cut off; what is damaged may not.
-    fn find_committed(&mut self, files: &MapFiles, last_commit: KeptAsOf) -> Result<Option<Catalog>> {
+    pub(super) fn find_committed(
+        &mut self,
+        files: &MapFiles,
+        last_commit: KeptAsOf,
+    ) -> Result<Option<Catalog>> {
         if let Some(committed) = self.committed {
             return Ok(committed);
         }
         let (disk, layout) = (&**files.disk(), files.layout());
         remove_catalogs_after(files, last_commit.flush_number)?;
-        let generation = generation_of(disk, layout, last_commit.flush_number)?;
+        let generation = last_commit.generation(disk, layout)?;
         let mut records = KeptRecords::open(disk, layout, last_commit)?;
-        while records.next_entry()?.is_some() {}
-        let extent = generation.zip(records.extent());
-        let found = extent.map(|(generation, (bytes, has_excess))| Catalog { generation, bytes, has_excess });
+        while let Some(scan) = records.next_kept()? {
+            self.highest_segment = self.highest_segment.max(scan.place.segment);
+        }
+        let extent = generation.and_then(|generation| records.extent(generation));
+        let found = extent.map(|(version, has_excess)| Catalog { version, has_excess });
         self.committed = Some(found);
         Ok(found)
     }
@@ -420,7 +443,7 @@ impl ScanKeeper {
         moved
     }
 
-    fn make_folder(&mut self, files: &MapFiles) -> Result<()> {
+    pub(super) fn make_folder(&mut self, files: &MapFiles) -> Result<()> {
         let folder = files.layout().kept_scans();
         if files.kind(&folder)?.is_none() {
             files.disk().create_folder(&folder).map_err(|error| Error::io(&folder, "create", error))?;
@@ -430,7 +453,8 @@ impl ScanKeeper {
     }
 }
 
-/// The catalogs and segments that no flush in `flushes` needs, in order; new segments are left out.
+/// The catalogs and segments that no flush in `flushes` needs, in order; new segments are left out. Also returns the
+/// highest segment that one needs.
 ///
 /// # Errors
 ///
@@ -440,17 +464,19 @@ pub(in crate::store) fn unneeded(
     layout: &Layout,
     flushes: &[KeptAsOf],
     is_new: impl Fn(u64) -> bool,
-) -> Result<Vec<PathBuf>> {
+) -> Result<(Vec<PathBuf>, u64)> {
     let folder = layout.kept_scans();
     let mut names = match disk.list(&folder) {
         // A map that keeps scans and lacks the folder is damaged.
-        Err(error) if error.kind() == io::ErrorKind::NotFound && flushes.is_empty() => return Ok(Vec::new()),
+        Err(error) if error.kind() == io::ErrorKind::NotFound && flushes.is_empty() => {
+            return Ok((Vec::new(), 0));
+        }
         Err(error) if error.kind() == io::ErrorKind::NotFound => Vec::new(),
         names => names.map_err(|error| Error::io(&folder, "list", error))?,
     };
     let (mut generations, mut segments) = (BTreeSet::new(), BTreeSet::new());
-    for &as_of in flushes {
-        generations.extend(generation_of(disk, layout, as_of.flush_number)?);
+    for as_of in with_all_records(disk, layout, flushes)? {
+        generations.extend(as_of.generation(disk, layout)?);
         let mut records = KeptRecords::open(disk, layout, as_of)?;
         while let Some(scan) = records.next_kept()? {
             segments.insert(scan.place.segment);
@@ -463,7 +489,37 @@ pub(in crate::store) fn unneeded(
         _ => false,
     });
     names.sort_unstable();
-    Ok(names.iter().map(|name| folder.join(name)).collect())
+    let highest = segments.last().copied().unwrap_or_default();
+    Ok((names.iter().map(|name| folder.join(name)).collect(), highest))
+}
+
+/// Those of some flushes whose catalogs have the records of all: where several see the beginning of one, the last.
+///
+/// # Errors
+///
+/// A catalog that is not whole as of one of the others.
+pub(super) fn with_all_records(
+    disk: &dyn Disk,
+    layout: &Layout,
+    flushes: &[KeptAsOf],
+) -> Result<Vec<KeptAsOf>> {
+    let (mut left, mut named) = (Vec::new(), BTreeMap::<u64, Vec<(CatalogVersion, KeptAsOf)>>::new());
+    for &as_of in flushes {
+        match as_of.catalog {
+            Some(catalog) => named.entry(catalog.generation).or_default().push((catalog, as_of)),
+            None => left.push(as_of),
+        }
+    }
+    for mut of_one in named.into_values() {
+        of_one.sort_by_key(|(catalog, _)| catalog.bytes);
+        left.extend(of_one.pop().map(|(_, longest)| longest));
+        let fronts: Vec<_> = of_one.iter().map(|(catalog, _)| *catalog).collect();
+        let are_whole = whole_fronts(disk, layout, &fronts);
+        for ((_, as_of), _) in of_one.iter().zip(are_whole).filter(|(_, is_whole)| !is_whole) {
+            KeptRecords::open(disk, layout, *as_of)?;
+        }
+    }
+    Ok(left)
 }
 
 /// Removes catalogs of commits that never happened.
@@ -488,6 +544,22 @@ fn segments_in(disk: &dyn Disk, layout: &Layout) -> Result<Vec<u64>> {
     let mut segments: Vec<u64> = names.iter().filter_map(|name| Layout::segment_of(name)).collect();
     segments.sort_unstable();
     Ok(segments)
+}
+
+/// Checks that a segment is there and as long as the scans in it need.
+///
+/// # Errors
+///
+/// If it is not; a disk that refuses.
+pub(crate) fn check_segment(disk: &dyn Disk, layout: &Layout, segment: u64, end: u64) -> Result<()> {
+    let path = layout.segment(segment);
+    let error = match disk.kind_at(&path)? {
+        Some(EntryKind::File(bytes)) if bytes >= end => return Ok(()),
+        Some(EntryKind::File(bytes)) => FormatError::at_offset(bytes, "the segment ends early"),
+        Some(_) => FormatError::at_offset(0, "not a regular file"),
+        None => FormatError::at_offset(0, "the segment is missing"),
+    };
+    Err(error.in_map(&path, None))
 }
 
 /// Checks that the points of a kept scan are whole.

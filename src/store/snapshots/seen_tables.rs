@@ -1,11 +1,12 @@
 use super::snapshot_file::Snapshot;
 use super::snapshot_list::SnapshotList;
+use super::snapshot_name::SnapshotName;
 use crate::error::{Error, Result};
 use crate::space::{TileIndex, TileTable, hash_table_bytes};
 use crate::store::commit::commits::Commits;
 use crate::store::disk::Disk;
 use crate::store::layout::Layout;
-use crate::store::scans::KeptAsOf;
+use crate::store::scans::{KeptAsOf, kept_as_of};
 use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -26,8 +27,8 @@ pub(in crate::store) struct SeenTables {
     see_all: bool,
     /// The snapshots themselves.
     found: SnapshotList,
-    /// For each flush of which a snapshot was read, the scans that it keeps, if it keeps any.
-    kept_scans: BTreeMap<u64, Option<KeptAsOf>>,
+    /// For each snapshot that was read, the scans that it keeps, if it keeps any.
+    kept_scans: BTreeMap<SnapshotName, Option<KeptAsOf>>,
 }
 
 impl SeenTables {
@@ -109,17 +110,14 @@ impl SeenTables {
     }
 
     fn take(&mut self, snapshot: &Snapshot, kept: &KeptFlushes) {
-        let Commits { flush_number, scan_number, tiles, .. } = &snapshot.commits;
-        self.take_tiles(tiles.tiles(), *flush_number, kept);
-        let keeps_scans = snapshot.metadata.ext.as_ref().is_some_and(|ext| ext.keeps_scans);
-        let as_of = KeptAsOf { flush_number: *flush_number, scan_number: *scan_number };
-        self.kept_scans.insert(*flush_number, keeps_scans.then_some(as_of));
+        self.take_tiles(snapshot.commits.tiles.tiles(), snapshot.commits.flush_number, kept);
+        self.kept_scans.insert(snapshot.name.clone(), kept_as_of(snapshot));
     }
 
     /// The kept scans that the snapshots of this list need; `None` if that is not known of each.
     pub(in crate::store) fn kept_scans_of(&self, listed: Option<&SnapshotList>) -> Option<Vec<KeptAsOf>> {
-        let names = listed.into_iter().flat_map(|listed| listed.names().map(|name| listed.flush_of(name)));
-        let needed = names.map(|flush_number| self.kept_scans.get(&flush_number?).copied());
+        let names = listed.into_iter().flat_map(SnapshotList::names);
+        let needed = names.map(|name| self.kept_scans.get(name).copied());
         needed.collect::<Option<Vec<_>>>().map(|needed| needed.into_iter().flatten().collect())
     }
 

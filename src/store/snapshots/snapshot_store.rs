@@ -122,6 +122,7 @@ impl TileStore {
         self.files.sync_map_folder()?;
         let next = self.layout().snapshot_next();
         let flush_number = self.commits().flush_number;
+        self.name_own_catalog();
         self.write_next_snapshot(name, map_id, self.metadata(), self.commits())?;
         self.files.sync_folder(&folder)?;
         listed.insert(name.clone(), Some(flush_number));
@@ -175,8 +176,9 @@ impl TileStore {
 
     /// Commits which snapshots the map has, and nothing else: what is written of tiles stays uncommitted. It is a flush
     /// of its own in the log, so that whatever ends the process is found like any other.
-    fn commit_snapshots(&mut self, listed: SnapshotList) -> Result<()> {
+    pub(in crate::store) fn commit_snapshots(&mut self, listed: SnapshotList) -> Result<()> {
         self.committer.check_lock()?;
+        self.name_own_catalog();
         self.keep_for_late_readers();
         match self.committer.append_snapshots(&self.files, &self.versions, listed) {
             Ok(number) => self.versions.committed_nothing(number),
@@ -219,11 +221,14 @@ impl TileStore {
     }
 
     /// Deletes a snapshot, and the tables that no other one sees. One that is damaged, cannot be read or is missing can
-    /// be deleted too: from then on nothing is kept for it.
+    /// be deleted too: from then on nothing is kept for it. One whose deletion was interrupted after its commit is gone
+    /// since the map was opened: that is no error.
     ///
     /// # Errors
     ///
-    /// [`Error::InvalidArgument`] if there is none of this name; a disk that refuses.
+    /// [`Error::InvalidArgument`] if there is none of this name; a disk that refuses. Where kept scans that nothing
+    /// needs could not be removed, as the disk refused or a catalog is damaged, the snapshot is deleted all the same, and
+    /// another call tries again to remove them.
     pub fn delete_snapshot(&mut self, name: &SnapshotName) -> Result<()> {
         self.finish_earlier_work()?;
         let path = self.layout().snapshot(name);
@@ -235,6 +240,8 @@ impl TileStore {
                 return Err(FormatError::at_offset(0, reason).in_map(&path, None));
             }
             _ if is_listed => {}
+            // By an attempt that was killed after its commit.
+            Ok(_) if self.snapshots_removed.contains(name) => return Ok(()),
             // Says which ones there are.
             Ok(_) => return self.snapshot(name).map(drop),
             Err(error) => return Err(Error::io(&path, "look at", error)),
@@ -244,11 +251,14 @@ impl TileStore {
         if self.map_id().is_some() {
             self.commit_snapshots(listed)?;
         }
-        self.checkpoint.remove_snapshot(name);
         self.finish_snapshot_commit();
-        if let Err(error) = self.release_unseen() {
+        // As long as the file is there, the same command completes a deletion that was killed or refused.
+        if let Err(error) = self.release_unseen_tables() {
             log::warn!("deleted, but its tables stay until the map is opened again: {error:#}");
         }
+        self.release_scans().map_err(|error| scans_remain(error, name))?;
+        self.checkpoint.remove_snapshot(name);
+        self.finish_snapshot_commit();
         Ok(())
     }
 
@@ -272,8 +282,19 @@ impl TileStore {
         Ok(())
     }
 
-    /// Removes the kept tables that no snapshot and no reader sees any more.
-    fn release_unseen(&mut self) -> Result<()> {
+    /// Looks at the snapshots anew, and removes the kept tables and kept scans that none of them and no reader needs
+    /// any more.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses.
+    pub fn release_unseen(&mut self) -> Result<()> {
+        self.release_unseen_tables()?;
+        self.remove_unneeded_scans();
+        Ok(())
+    }
+
+    fn release_unseen_tables(&mut self) -> Result<()> {
         let Some(map_id) = self.map_id() else { return Ok(()) };
         let (listed, pinned) = (self.committer.snapshots(), self.kept.snapshots().pinned());
         let tiles: Vec<_> = pinned.keys().copied().collect();
@@ -281,7 +302,6 @@ impl TileStore {
             SeenTables::read_all(&**self.disk(), self.layout(), map_id, self.commits(), listed, pinned)?;
         self.kept.set_snapshots(snapshots);
         self.kept.release(&self.files);
-        self.remove_unneeded_scans();
         for tile in tiles.into_iter().filter(|tile| !self.commits().tiles.contains(*tile)) {
             // Of a removed tile: it goes if that was all that was in it.
             let _ = self.disk().remove_folder(&self.layout().tile_folder(tile));
@@ -316,5 +336,21 @@ impl TileStore {
         }
         let mut input = self.disk().open(table).map_err(|error| Error::io(table, "open", error))?;
         self.write_next(tile, TileFile::Table, |out| io::copy(&mut input, out).map(drop)).map(drop)
+    }
+}
+
+/// The error of a deletion after which kept scans remain that nothing needs, with what to do.
+fn scans_remain(error: Error, name: &SnapshotName) -> Error {
+    let hint = format!("the snapshot {name} is deleted, but points of scans that only it kept may remain");
+    match error {
+        Error::Io { path, action, cause } => {
+            let cause = io::Error::new(cause.kind(), format!("{cause}; {hint}: delete it again"));
+            Error::Io { path, action, cause }
+        }
+        Error::Damaged { path, tile, mut cause } => {
+            cause.reason.push_str(&format!("; {hint}: repair the map"));
+            Error::Damaged { path, tile, cause }
+        }
+        other => other,
     }
 }

@@ -1,6 +1,7 @@
 use super::tile_version::TileVersion;
 use crate::space::{TileIndex, TileTable, hash_table_bytes};
 use crate::store::commit::commits::Commits;
+use crate::store::scans::CatalogVersion;
 use rustc_hash::FxHashSet;
 
 /// Which tiles a map has on disk and which version of each is the latest: the last commit, and what was written or
@@ -155,7 +156,12 @@ impl TileVersions {
     // What is committed.
 
     /// Notes that all that was written and removed is committed. Returns what was written.
-    pub(in crate::store) fn committed(&mut self, number: u64, scan_number: u64) -> TileTable<TileVersion> {
+    pub(in crate::store) fn committed(
+        &mut self,
+        number: u64,
+        scan_number: u64,
+        catalog: Option<CatalogVersion>,
+    ) -> TileTable<TileVersion> {
         let changed = std::mem::take(&mut self.next);
         let removed = self.removed();
         self.removed.clear();
@@ -165,7 +171,7 @@ impl TileVersions {
         }
         self.commits.last_removed = removed;
         self.commits.flush_number = number;
-        self.commits.scan_number = scan_number;
+        (self.commits.scan_number, self.commits.catalog) = (scan_number, catalog);
         self.commits.tiles.extend(changed.iter());
         self.commits.last_changed = TileTable::default();
         changed
@@ -179,6 +185,11 @@ impl TileVersions {
     /// Notes a commit that changes no tile.
     pub(in crate::store) fn committed_nothing(&mut self, number: u64) {
         self.commits.flush_number = number;
+    }
+
+    /// Names the catalog of the last commit, where the log does not.
+    pub(in crate::store) fn set_catalog(&mut self, catalog: CatalogVersion) {
+        self.commits.catalog = Some(catalog);
     }
 
     /// Takes tiles out of the map, whatever the log says of them.

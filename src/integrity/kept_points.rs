@@ -1,0 +1,67 @@
+use crate::error::Result;
+use crate::store::{Disk, KeptRecord, Layout, SegmentPlace, check_points};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Segment, offset and bytes of points.
+type Place = (u64, u64, u64);
+
+fn place_of(place: SegmentPlace) -> Place {
+    (place.segment, place.offset, place.bytes)
+}
+
+/// Where the points of some kept scans are.
+#[derive(Debug, Default)]
+pub(super) struct KeptPlaces(BTreeSet<Place>);
+
+impl KeptPlaces {
+    pub(super) fn insert(&mut self, place: SegmentPlace) {
+        self.0.insert(place_of(place));
+    }
+
+    pub(super) fn contains(&self, place: SegmentPlace) -> bool {
+        self.0.contains(&place_of(place))
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+}
+
+/// Points that were read and are whole, so that those which a map and its snapshots share are read once. Scans lie
+/// behind each other, so there are few ranges.
+#[derive(Debug, Default)]
+pub(super) struct WholePoints {
+    /// Where each range ends, by segment and where it begins.
+    ranges: BTreeMap<(u64, u64), u64>,
+}
+
+impl WholePoints {
+    /// Checks the points of a scan, unless that was done.
+    ///
+    /// # Errors
+    ///
+    /// Damage, or a disk that refuses.
+    pub(super) fn check(&mut self, disk: &dyn Disk, layout: &Layout, scan: &KeptRecord) -> Result<()> {
+        let SegmentPlace { segment, offset, bytes } = scan.place;
+        let end = offset.saturating_add(bytes);
+        let before = self.ranges.range(..=(segment, offset)).next_back().map(|(&range, &end)| (range, end));
+        let before = before.filter(|&((of, _), _)| of == segment);
+        if bytes > 0 && before.is_some_and(|(_, known_end)| known_end >= end) {
+            return Ok(());
+        }
+        check_points(disk, layout, scan)?;
+        let begin = match before {
+            Some((range, known_end)) if known_end == offset => range,
+            _ => (segment, offset),
+        };
+        self.ranges.insert(begin, end);
+        if let Some(next_end) = self.ranges.remove(&(segment, end)) {
+            self.ranges.insert(begin, next_end);
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,219 @@
+use super::finding::Finding;
+use super::suspects::Suspect;
+use super::verify::Verifier;
+use crate::error::{Error, FormatError, Result};
+use crate::space::TileIndex;
+use crate::store::{
+    EntryKind, KEPT_SCANS, Layout, QUARANTINE, SNAPSHOT_NEXT, SNAPSHOTS, SnapshotList, SnapshotName,
+    TileFile, TileStore, tile_of_folder,
+};
+use std::io;
+use std::path::Path;
+
+/// Of a file that waits to take the place of another.
+const LEFT: &str = "left behind by a process that was killed or that the disk refused, or being written";
+
+/// Of points and lists of scans that no flush needs.
+pub(super) const IDLE_SCANS: &str = "points or a list of scans that neither the map nor a snapshot uses. A killed process left \
+                          them, or a writer is about to commit them. They may hold removed scans.";
+
+/// Of `MAP.remapping`.
+const SECOND_MAP: &str = "the second map of an online remap that is running or was killed. The next online remap \
+                          removes it, and so do `remove-scans` and `remove-points`.";
+
+/// Of `MAP.unfinished`.
+const UNFINISHED_MAP: &str = "a map that `voxtile pull --replace` is making, or the old map that it replaced. The \
+                              next `voxtile pull --replace` removes it.";
+
+/// What is no part of the map in its folder and beside it.
+impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
+    /// Reports a file that the next writer removes or renames; what has its name and is no file stays.
+    pub(super) fn leftover(&mut self, path: &Path, tile: Option<TileIndex>, reason: &str) {
+        if self.is_again {
+            return;
+        }
+        let reason = match self.disk.kind(path) {
+            // Renamed or removed since the folder was listed.
+            Ok(None) => return,
+            Ok(Some(EntryKind::File(_))) => reason.to_owned(),
+            Ok(Some(_)) => return self.report(Finding::note(path, tile, "no part of a map")),
+            Err(error) => format!("{reason} ({error})"),
+        };
+        self.counts.leftovers += 1;
+        self.report(Finding::note(path, tile, reason));
+    }
+
+    fn look_into_snapshots(&mut self, folder: &Path) -> Result<()> {
+        match self.kind(folder)? {
+            Some(EntryKind::Folder) => {}
+            Some(_) if self.listed.as_ref().is_some_and(SnapshotList::is_empty) => {
+                self.damage(folder, None, "something else has the name of the folder of snapshots");
+                return Ok(());
+            }
+            // Where the log lists snapshots, or nobody knows whether it does, that has been told.
+            _ => return Ok(()),
+        }
+        for name in self.list(folder)? {
+            let path = folder.join(&name);
+            let reason = match SnapshotName::new(&*name) {
+                Ok(name) if self.listed.as_ref().is_none_or(|listed| listed.contains(&name)) => continue,
+                Ok(_) => "no snapshot of the map: commits.log does not name it",
+                Err(_) if name == SNAPSHOT_NEXT => LEFT,
+                Err(_) => {
+                    self.report(Finding::note(&path, None, "no snapshot: it has no name of one"));
+                    continue;
+                }
+            };
+            self.leftover(&path, None, reason);
+        }
+        Ok(())
+    }
+
+    /// Looks for what is no part of the map.
+    pub(super) fn look_around(
+        &mut self,
+        store: &TileStore,
+        is_known: impl Fn(TileIndex) -> bool,
+    ) -> Result<()> {
+        let folder = self.layout.folder().to_owned();
+        for name in self.list(&folder)? {
+            let path = folder.join(&name);
+            match (&*name, tile_of_folder(&name)) {
+                ("metadata.json" | "commits.log" | "scans.bin", _) => {}
+                ("writer.lock", _) => {
+                    if matches!(self.kind(&path)?, Some(EntryKind::Folder | EntryKind::Other)) {
+                        self.damage(&path, None, "no regular file: nobody can lock the map to write to it");
+                    }
+                }
+                // What was pushed or pulled (`bucket::known_states`).
+                ("bucket_states", _) => {}
+                (KEPT_SCANS, _) => self.look_into_kept_scans(&path)?,
+                (SNAPSHOTS, _) => self.look_into_snapshots(&path)?,
+                (QUARANTINE, _) => {
+                    let reason = "moved here by a repair. It may hold scans that were removed later. Delete it when \
+                                  you need nothing in it.";
+                    self.report(Finding::note(&path, None, reason));
+                }
+                (_, Some(tile)) => {
+                    let is_known = is_known(tile) || self.told.contains(&tile);
+                    self.look_into(store, &path, tile, is_known)?;
+                }
+                (name, None) if Layout::is_next_of_map(name) => self.leftover(&path, None, LEFT),
+                ("bucket_states.next", None) => {
+                    let reason =
+                        "left behind by a push that was killed, or being written; the next push replaces it";
+                    self.report(Finding::note(&path, None, reason));
+                }
+                _ => self.report(Finding::note(&path, None, "no part of a map")),
+            }
+        }
+        self.look_beside(&folder);
+        Ok(())
+    }
+
+    /// Looks for a second map that a change of this one makes beside it. Where that cannot be told there is none.
+    fn look_beside(&mut self, folder: &Path) {
+        let reasons = [("remapping", SECOND_MAP), ("unfinished", UNFINISHED_MAP)];
+        for (extension, reason) in reasons.into_iter().filter(|_| folder.file_name().is_some()) {
+            let path = folder.with_added_extension(extension);
+            if let Ok(Some(EntryKind::Folder)) = self.disk.kind(&path) {
+                self.report(Finding::note(&path, None, reason));
+            }
+        }
+    }
+
+    fn look_into_kept_scans(&mut self, folder: &Path) -> Result<()> {
+        if self.kind(folder)? != Some(EntryKind::Folder) {
+            return Ok(());
+        }
+        for name in self.list(folder)? {
+            if !Layout::is_of_kept_scans(&name) {
+                self.report(Finding::note(&folder.join(&name), None, "no part of a map"));
+            }
+        }
+        Ok(())
+    }
+
+    /// Looks into the folder of a tile, which the map has or not.
+    pub(super) fn look_into(
+        &mut self,
+        store: &TileStore,
+        folder: &Path,
+        tile: TileIndex,
+        is_known: bool,
+    ) -> Result<()> {
+        let wrong =
+            |path: &Path, reason: &str| Finding::damage(path, Some(tile), &FormatError::at_offset(0, reason));
+        match self.kind(folder)? {
+            Some(EntryKind::Folder) => {}
+            Some(_) if !is_known => {
+                let finding = wrong(folder, "something with a tile's name that is no folder");
+                self.report_if_seen_twice(finding, Suspect::Folder(tile));
+                return Ok(());
+            }
+            // The look at the tile tells.
+            _ => return Ok(()),
+        }
+        let mut is_orphan = false;
+        for name in self.list(folder)? {
+            let path = folder.join(&name);
+            let kept = self.layout.flush_of_kept(&name);
+            if kept.is_some_and(|flush_number| self.whole.contains_key(&(tile, flush_number))) {
+                continue;
+            }
+            if self.layout.is_next_of_tile(&name) {
+                self.leftover(&path, Some(tile), LEFT);
+            } else if kept.is_some() {
+                self.leftover(&path, Some(tile), "replaced; kept for a reader, or left behind");
+            } else if self.layout.files().iter().all(|file| file.name(self.layout.storage()) != name) {
+                self.report(Finding::note(&path, Some(tile), "no part of a map"));
+            } else {
+                is_orphan |= !is_known;
+            }
+        }
+        if !is_orphan {
+            return Ok(());
+        }
+        if store.commits().last_removed.contains(&tile) {
+            if !self.is_again {
+                let reason = "taken out of the map; its files go when the map is next opened for writing";
+                self.counts.leftovers += 1;
+                self.report(Finding::note(folder, Some(tile), reason));
+            }
+            return Ok(());
+        }
+        let path = self.layout.current(tile, TileFile::Table);
+        let finding = wrong(&path, "commits.log does not name this tile");
+        self.report_if_seen_twice(finding, Suspect::Folder(tile));
+        Ok(())
+    }
+
+    /// What has a name; nothing, and a finding, where the medium does not tell.
+    fn kind(&mut self, path: &Path) -> Result<Option<EntryKind>> {
+        let kind = self.disk.kind_at(path);
+        self.unless_unreadable(kind)
+    }
+
+    /// The names in a folder; none, and a finding, where it cannot be read.
+    fn list(&mut self, folder: &Path) -> Result<Vec<String>> {
+        let names = match self.disk.list(folder) {
+            // Removed since it was seen.
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(Vec::new()),
+            names => names.map_err(|error| Error::io(folder, "list", error)),
+        };
+        let mut names = self.unless_unreadable(names)?;
+        names.sort_unstable();
+        Ok(names)
+    }
+
+    fn unless_unreadable<T: Default>(&mut self, result: Result<T>) -> Result<T> {
+        match result {
+            Err(error) if error.is_of_medium() => {
+                let finding = Finding::of(error)?;
+                self.report(finding);
+                Ok(T::default())
+            }
+            result => result,
+        }
+    }
+}

@@ -1,0 +1,457 @@
+//! Damage to each kind of file of kept scans, whether the map or only a snapshot needs it: found, repaired, and never a
+//! way back for scans that were removed.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
+use testkit::random_scans::{Random, random_scan};
+use voxtile::integrity::{Finding, Repair, Severity, repair, verify};
+use voxtile::operations::{
+    NewPoses, Remap, Rework, ScanSelection, delete_snapshot, remap, remove_scans, revert, snapshot,
+};
+use voxtile::store::{CommitLog, Layout, SnapshotName, TileStore, read_log};
+use voxtile::{
+    Error, MapConfig, MapPath, MapQueries, MapReader, Mapper, MemoryLimit, OutOfCoreTileMapper, Pose, Result,
+    ScanRef,
+};
+
+fn map() -> &'static Path {
+    Path::new("/city/map")
+}
+
+fn at(disk: &FaultyDisk) -> MapPath {
+    MapPath::on(disk.shared(), map())
+}
+
+fn name(name: &str) -> SnapshotName {
+    SnapshotName::new(name).unwrap()
+}
+
+fn config() -> MapConfig {
+    let config = MapConfig::new(0.4, 3.2).unwrap().with_range(0.3, 3.0).with_kept_scans(true);
+    config.with_cache_tiles(2).with_write_buffer_bytes(600)
+}
+
+fn rework() -> Rework {
+    Rework::default().with_memory_bytes(MemoryLimit::least_bytes(&config().grid))
+}
+
+fn pose(number: u64, by_m: f64) -> Pose {
+    Pose::from_quaternion([3.0 * (number % 4) as f64 + by_m, 0.0, 0.5], [0.0, 0.0, 0.0, 1.0]).unwrap()
+}
+
+/// Maps a scan, by a process of its own: it gets a segment of its own.
+fn insert(disk: &FaultyDisk, number: u64) -> Result<()> {
+    let mut mapper = match OutOfCoreTileMapper::open(at(disk), config()) {
+        Err(Error::NoMap { .. }) => OutOfCoreTileMapper::create(at(disk), config())?,
+        opened => opened?,
+    };
+    let scan = random_scan(&mut Random(number), [0.0; 3], 5);
+    mapper.insert_points(&ScanRef::in_sensor(pose(number, 0.0), &scan.points))?;
+    mapper.flush()
+}
+
+/// The scan that is private.
+const REMOVED: u64 = 3;
+
+/// Four scans, the snapshot `s`; the third is removed; the snapshot `t`; a fifth scan. `s` alone needs a catalog and a
+/// segment, `t` the beginning of the map's catalog.
+fn a_map() -> FaultyDisk {
+    let disk = FaultyDisk::new(Fault::None);
+    (1..=4).for_each(|number| insert(&disk, number).unwrap());
+    snapshot(at(&disk), &name("s")).unwrap();
+    remove(&disk, REMOVED).unwrap();
+    snapshot(at(&disk), &name("t")).unwrap();
+    insert(&disk, 5).unwrap();
+    disk.copy()
+}
+
+fn remove(disk: &FaultyDisk, number: u64) -> Result<()> {
+    remove_scans(at(disk), &ScanSelection::Numbers(number, number), false, &rework(), |_, _| ()).map(drop)
+}
+
+fn moved(disk: &FaultyDisk) -> Result<()> {
+    let poses = NewPoses::Numbered(vec![(1, pose(1, 0.7)), (4, pose(4, 0.7))]);
+    remap(at(disk), &poses, &Remap::new(rework()), |_, _| ()).map(drop)
+}
+
+fn reverted(disk: &FaultyDisk, to: &str) -> Result<()> {
+    revert(at(disk), &name(to), Some(&name("before")), |_, _| ()).map(drop)
+}
+
+/// What is done to a map, and whether it may bring the removed scan back.
+type Work = (&'static str, fn(&FaultyDisk) -> Result<()>, bool);
+
+const WORKS: [Work; 5] = [
+    ("remap", moved, false),
+    ("remove", |disk| remove(disk, 2), false),
+    ("insert", |disk| insert(disk, 6), false),
+    ("revert to s", |disk| reverted(disk, "s"), true),
+    ("revert to t", |disk| reverted(disk, "t"), false),
+];
+
+fn files_of_scans(disk: &FaultyDisk) -> BTreeMap<PathBuf, Vec<u8>> {
+    let folder = map().join("kept_scans");
+    disk.files().into_iter().filter(|(path, _)| path.starts_with(&folder)).collect()
+}
+
+fn digest(disk: &FaultyDisk) -> String {
+    MapReader::open(at(disk), 1).unwrap().digest().unwrap().to_string()
+}
+
+fn flush_number(disk: &FaultyDisk) -> u64 {
+    MapReader::open(at(disk), 1).unwrap().flush_number()
+}
+
+/// The numbers of the scans that can be read with their points.
+fn kept(disk: &FaultyDisk) -> Result<Vec<u64>> {
+    MapReader::open(at(disk), 1)?.kept_scans()?.map(|scan| scan.map(|scan| scan.number())).collect()
+}
+
+fn damage_in(disk: &FaultyDisk) -> BTreeSet<PathBuf> {
+    let mut found = BTreeSet::new();
+    let note = |finding: &Finding| {
+        if finding.severity == Severity::Damage {
+            found.insert(finding.path.clone());
+        }
+    };
+    verify(at(disk), note, |_, _| ()).unwrap();
+    found
+}
+
+fn repaired(disk: &FaultyDisk, what: &str) -> Repair {
+    let repair = repair(at(disk), |_| (), |_, _| ()).unwrap_or_else(|error| panic!("{what}: {error:#}"));
+    assert_eq!(damage_in(disk), BTreeSet::new(), "{what}");
+    repair
+}
+
+/// Ways in which a file is not as it was.
+fn damages(files: &BTreeMap<PathBuf, Vec<u8>>, path: &Path) -> Vec<(String, Option<Vec<u8>>)> {
+    let bytes = &files[path];
+    let mut damages = vec![("lost".to_owned(), None)];
+    for length in [0, bytes.len() / 2, bytes.len() - 1] {
+        damages.push((format!("cut to {length}"), Some(bytes[..length].to_vec())));
+    }
+    let is_catalog = path.to_string_lossy().contains("catalog");
+    let offsets = if is_catalog { vec![0, 14, 17, 21, 26, 40, bytes.len() / 2] } else { vec![9] };
+    for offset in offsets.into_iter().chain([bytes.len() - 1]) {
+        let mut flipped = bytes.clone();
+        flipped[offset] ^= 1 << (offset % 8);
+        damages.push((format!("a bit at {offset}"), Some(flipped)));
+    }
+    // The other catalog under its name, as from a copy of long ago.
+    let is_other = |other: &Path| other != path && other.to_string_lossy().contains("catalog");
+    for (other, content) in files.iter().filter(|(other, _)| is_catalog && is_other(other)) {
+        damages.push((format!("{} in its place", other.display()), Some(content.clone())));
+    }
+    damages
+}
+
+/// Does one thing with a map: it is what it would be without the damage, or an error and nothing was done.
+fn works(disk: &FaultyDisk, work: &Work, expected: &str, what: &str, is_repaired: bool) -> bool {
+    let (name, work, may_bring_back) = work;
+    let (before, flush) = (digest(disk), flush_number(disk));
+    let what = format!("{what}: {name}");
+    match work(disk) {
+        Ok(()) => assert_eq!(digest(disk), expected, "{what}"),
+        Err(error) => {
+            assert_eq!(digest(disk), before, "{what}: {error:#}");
+            assert_eq!(flush_number(disk), flush, "{what}: {error:#}");
+            return false;
+        }
+    }
+    if !is_repaired && *name == "insert" {
+        assert_ne!(damage_in(disk), BTreeSet::new(), "{what}: hidden");
+    }
+    let is_back = kept(disk).is_ok_and(|kept| kept.contains(&REMOVED));
+    assert!(!is_back || *may_bring_back, "{what}: the removed scan is back");
+    true
+}
+
+#[test]
+fn damage_to_any_file_of_kept_scans_is_found_and_repaired_and_brings_no_removed_scan_back() {
+    let whole = a_map();
+    assert_eq!(damage_in(&whole), BTreeSet::new());
+    let files = files_of_scans(&whole);
+    assert_eq!(files.len(), 7, "{:?}", files.keys());
+    assert_eq!(kept(&whole).unwrap(), [1, 2, 4, 5]);
+    let digests = WORKS.map(|(name, work, _)| {
+        let disk = whole.copy();
+        work(&disk).unwrap_or_else(|error| panic!("{name}: {error:#}"));
+        digest(&disk)
+    });
+    let (mut done, mut refused) = (0, 0);
+    for path in files.keys() {
+        for (how, content) in damages(&files, path) {
+            let (what, damaged) = (format!("{}: {how}", path.display()), whole.copy());
+            match &content {
+                Some(content) => damaged.put(path, content),
+                None => damaged.take(path),
+            }
+            assert!(damage_in(&damaged).contains(path), "{what}: {:?}", damage_in(&damaged));
+            if let Err(error) = kept(&damaged) {
+                assert!(format!("{error:#}").contains(&path.display().to_string()), "{what}: {error:#}");
+            }
+            let mut done_before = 0;
+            for (work, expected) in WORKS.iter().zip(&digests) {
+                done_before += usize::from(works(&damaged.copy(), work, expected, &what, false));
+            }
+            let before = files_of_scans(&damaged);
+            let repair = repaired(&damaged, &what);
+            // The header of a catalog says nothing that its name does not say.
+            let is_header = ["catalog", "a bit at 0", "a bit at 14"].map(|part| what.contains(part));
+            let is_complete = is_header[0] && (is_header[1] && how.ends_with(" 0") || is_header[2]);
+            assert_eq!((repair.is_complete(), repair.tiles_lost), (is_complete, 0), "{what}: {repair:?}");
+            let lost = repair.scans_lost + repair.snapshot_scans_lost;
+            assert!(is_complete == (lost == 0) && repair.actions > 0, "{what}: {repair:?}");
+            assert_eq!(digest(&damaged), digest(&whole), "{what}");
+            assert!(!kept(&damaged).unwrap().contains(&REMOVED), "{what}");
+            let left = damaged.files();
+            let is_left = |bytes: &Vec<u8>| left.values().any(|other| other == bytes);
+            assert!(before.values().all(is_left), "{what}: a file is gone");
+            let mut done_after = 0;
+            for (work, expected) in WORKS.iter().zip(&digests) {
+                let disk = damaged.copy();
+                done_after += usize::from(works(&disk, work, expected, &what, true));
+                assert_eq!(damage_in(&disk), BTreeSet::new(), "{what}");
+            }
+            // A repaired map takes scans, and goes back to its snapshots.
+            assert!(done_after >= 3, "{what}: {done_after}");
+            (done, refused) = (done + done_before + done_after, refused + 10 - done_before - done_after);
+        }
+    }
+    println!("{done} done, {refused} refused");
+    assert!(done > 200 && refused > 50, "{done} done, {refused} refused");
+}
+
+/// Of maps that share catalogs and points, each is read as often as of one.
+#[test]
+fn verify_reads_catalogs_and_points_once_for_all_snapshots() {
+    let opened = |snapshots: u64| {
+        let disk = FaultyDisk::new(Fault::None);
+        (1..=3).for_each(|number| insert(&disk, number).unwrap());
+        for number in 1..=snapshots {
+            snapshot(at(&disk), &name(&format!("s{number}"))).unwrap();
+            insert(&disk, 3 + number).unwrap();
+        }
+        (snapshots + 1..=4).for_each(|number| insert(&disk, 3 + number).unwrap());
+        let disk = disk.copy();
+        assert_eq!(damage_in(&disk), BTreeSet::new());
+        files_of_scans(&disk).into_keys().map(|path| disk.times_opened(&path)).collect::<Vec<_>>()
+    };
+    assert_eq!(opened(1), opened(4));
+}
+
+/// The power goes at every step of a repair of what a snapshot needs.
+#[test]
+fn a_repair_of_a_snapshots_scans_that_the_power_ends_is_completed_by_another() {
+    let damaged = a_map();
+    let mut files = files_of_scans(&damaged);
+    let only_snapshots = map().join("kept_scans/segment.3");
+    let shared = map().join("kept_scans/segment.2");
+    for path in [&only_snapshots, &shared] {
+        let bytes = files.get_mut(path).unwrap();
+        bytes[9] ^= 4;
+        damaged.put(path, bytes);
+    }
+    let mut crashes = 0;
+    for change in 0.. {
+        let disk = damaged.copy();
+        disk.set_fault(Fault::Crashes(change));
+        let _ = repair(at(&disk), |_| (), |_, _| ());
+        if !disk.has_crashed() {
+            break;
+        }
+        crashes += 1;
+        for unsynced in [Unsynced::Dropped, Unsynced::Kept] {
+            let (disk, what) = (disk.after_crash(unsynced), format!("change {change}, {unsynced:?}"));
+            drop(TileStore::open(disk.shared(), map()).unwrap());
+            repaired(&disk, &what);
+            assert_eq!(kept(&disk).unwrap(), [1, 4, 5], "{what}");
+            let past = MapReader::open_snapshot(at(&disk), &name("s"), 1).unwrap();
+            assert_eq!(past.kept_scans().unwrap().count(), 2, "{what}");
+            insert(&disk, 6).unwrap();
+            let left = disk.files();
+            assert!(files.values().all(|bytes| left.values().any(|other| other == bytes)), "{what}");
+        }
+    }
+    assert!(crashes > 10, "{crashes}");
+}
+
+/// Takes the names of catalogs out of a log of one record.
+fn forget_catalog(disk: &FaultyDisk, path: &Path) {
+    let bytes = disk.files()[path].clone();
+    let (log, mut commits) = CommitLog::read(&mut &*bytes, bytes.len() as u64).unwrap();
+    let mut metadata = commits.metadata.clone().unwrap();
+    assert!(commits.catalog.take().is_some());
+    metadata.ext.as_mut().unwrap().catalog = None;
+    let text = metadata.to_text();
+    CommitLog::write_whole(&*disk.shared(), path, log.map_id(), &commits, &text).unwrap();
+}
+
+/// A map as versions wrote it that did not name catalogs.
+#[test]
+fn a_map_whose_log_names_no_catalog_opens_and_names_it_from_the_next_flush_on() {
+    let whole = a_map();
+    let disk = whole.copy();
+    // One record, with the metadata as of now.
+    repair_index(&disk);
+    ["commits.log", "snapshots/s", "snapshots/t"]
+        .iter()
+        .for_each(|path| forget_catalog(&disk, &map().join(path)));
+    let mut metadata = MapReader::open(at(&disk), 1).unwrap().metadata().clone();
+    metadata.ext.as_mut().unwrap().catalog = None;
+    disk.put(&map().join("metadata.json"), metadata.to_text().as_bytes());
+    let disk = disk.copy();
+    let named =
+        |disk: &FaultyDisk| read_log(&*disk.shared(), &Layout::new(map())).unwrap().unwrap().1.catalog;
+    assert_eq!(named(&disk), None);
+    assert_eq!(damage_in(&disk), BTreeSet::new());
+    assert_eq!(kept(&disk).unwrap(), [1, 2, 4, 5]);
+    for (name, work, _) in WORKS {
+        let (disk, undisturbed) = (disk.copy(), whole.copy());
+        work(&disk).unwrap_or_else(|error| panic!("{name}: {error:#}"));
+        work(&undisturbed).unwrap();
+        assert_eq!(digest(&disk), digest(&undisturbed), "{name}");
+        assert!(named(&disk).is_some(), "{name}");
+        assert_eq!(damage_in(&disk), BTreeSet::new(), "{name}");
+    }
+    // A repair of what a snapshot needs leaves the map its own catalog.
+    let segment = map().join("kept_scans/segment.3");
+    disk.take(&segment);
+    assert_eq!(damage_in(&disk), BTreeSet::from([segment]));
+    assert_eq!(repaired(&disk, "").snapshot_scans_lost, 1);
+    assert_eq!(kept(&disk).unwrap(), [1, 2, 4, 5]);
+}
+
+/// Writes the log anew, as one record of the whole map.
+fn repair_index(disk: &FaultyDisk) {
+    disk.take(&map().join("metadata.json"));
+    repair(at(disk), |_| (), |_, _| ()).unwrap();
+    assert_eq!(damage_in(disk), BTreeSet::new());
+}
+
+/// While a snapshot's catalog is damaged nothing tells which files may go: the map stays as it is.
+#[test]
+fn a_removal_is_refused_before_it_changes_anything_while_the_catalog_of_a_snapshot_is_damaged() {
+    let disk = a_map();
+    let catalog = files_of_scans(&disk).into_keys().find(|path| path.ends_with("catalog.1")).unwrap();
+    disk.take(&catalog);
+    let (before, flush) = (digest(&disk), flush_number(&disk));
+    let how = rework().with_keep_as(name("before"));
+    let refused = remove_scans(at(&disk), &ScanSelection::Numbers(2, 2), true, &how, |_, _| ());
+    let message = crate::support::message_of(refused);
+    let parts = ["catalog.1: ", "the snapshot s needs it", "nothing was changed"];
+    assert!(parts.iter().all(|part| message.contains(part)), "{message}");
+    assert_eq!((digest(&disk), flush_number(&disk)), (before, flush));
+    delete_snapshot(at(&disk), &name("s")).unwrap();
+    remove(&disk, 2).unwrap();
+    assert_eq!(kept(&disk).unwrap(), [1, 4, 5]);
+}
+
+/// What was done is told, and what could not be done.
+#[test]
+fn a_snapshot_that_cannot_be_read_is_part_of_the_answer_of_a_removal() {
+    let disk = a_map();
+    disk.put(&map().join("snapshots/t"), b"nothing");
+    let remove =
+        |number| remove_scans(at(&disk), &ScanSelection::Numbers(number, number), true, &rework(), |_, _| ());
+    let removed = remove(2).unwrap();
+    assert_eq!((removed.scans_removed, removed.snapshots_deleted), (1, vec![name("s")]));
+    let [failed] = &*removed.snapshots_failed else { panic!("{:?}", removed.snapshots_failed) };
+    assert!(failed.name == name("t") && failed.reason.contains("may hold some"), "{failed:?}");
+    assert_eq!(kept(&disk).unwrap(), [1, 4, 5]);
+    // Nothing else is left to do.
+    let message = crate::support::message_of(remove(2));
+    assert!(message.contains("snapshots/t") && message.contains("may hold some"), "{message}");
+}
+
+/// Ways in which a log is damaged: lost, cut, or a bit of it changed.
+fn damaged_logs(bytes: &[u8]) -> Vec<Option<Vec<u8>>> {
+    let mut damages = vec![None];
+    for part in 1..8 {
+        let at = bytes.len() * part / 8;
+        damages.push(Some(bytes[..at].to_vec()));
+        let mut flipped = bytes.to_vec();
+        flipped[at] ^= 16;
+        damages.push(Some(flipped));
+    }
+    damages
+}
+
+/// The log is damaged, and `metadata.json` is lost or one of long ago: the newest catalog may be the only one without
+/// the removed scan.
+#[test]
+fn no_removed_scan_returns_where_log_and_metadata_are_damaged() {
+    let (log, metadata) = (map().join("commits.log"), map().join("metadata.json"));
+    let (mut from_tiles, mut repairs) = (0, 0);
+    for has_later_snapshot in [false, true] {
+        let disk = FaultyDisk::new(Fault::None);
+        (1..=4).for_each(|number| insert(&disk, number).unwrap());
+        snapshot(at(&disk), &name("s")).unwrap();
+        let old = disk.files()[&metadata].clone();
+        remove(&disk, REMOVED).unwrap();
+        if has_later_snapshot {
+            snapshot(at(&disk), &name("t")).unwrap();
+            insert(&disk, 5).unwrap();
+        }
+        let whole = disk.copy();
+        let (files, kept_scans) = (whole.files(), files_of_scans(&whole));
+        for (old_metadata, log_now) in [None, Some(&old), Some(&files[&metadata])]
+            .into_iter()
+            .flat_map(|metadata| damaged_logs(&files[&log]).into_iter().map(move |log| (metadata, log)))
+        {
+            let damaged = whole.copy();
+            match old_metadata {
+                Some(text) => damaged.put(&metadata, text),
+                None => damaged.take(&metadata),
+            }
+            match &log_now {
+                Some(bytes) => damaged.put(&log, bytes),
+                None => damaged.take(&log),
+            }
+            let length = log_now.map(|bytes| bytes.len());
+            let what = format!("{has_later_snapshot}, {}, {length:?}", old_metadata.is_some());
+            let Ok(repair) = repair(at(&damaged), |_| (), |_, _| ()) else { continue };
+            (repairs, from_tiles) = (repairs + 1, from_tiles + u64::from(repair.scans_lost > 0));
+            // Where the log is torn at the end of a record, it is that of an earlier flush.
+            // A map whose two files are lost keeps no scans.
+            let is_back = kept(&damaged).unwrap_or_default().contains(&REMOVED);
+            assert!(!is_back || flush_number(&damaged) < flush_number(&whole), "{what}: {repair:?}");
+            assert_eq!(damage_in(&damaged), BTreeSet::new(), "{what}");
+            let left = damaged.files();
+            let is_left = |bytes: &Vec<u8>| left.values().any(|other| other.starts_with(bytes));
+            assert!(is_back || kept_scans.values().all(is_left), "{what}: a file is gone");
+            let past = MapReader::open_snapshot(at(&damaged), &name("s"), 1).unwrap();
+            assert_eq!(past.kept_scans().unwrap().count(), 4, "{what}");
+            insert(&damaged, 6).unwrap();
+            assert_eq!(damage_in(&damaged), BTreeSet::new(), "{what}");
+        }
+    }
+    assert!(repairs > 60 && from_tiles > 20, "{repairs} repairs, {from_tiles} of them lost scans");
+}
+
+/// Points that a deleted snapshot alone kept are not left behind without an error.
+#[test]
+fn a_deletion_whose_points_the_disk_does_not_remove_fails_and_is_completed_by_another() {
+    let disk = a_map();
+    let catalog = map().join("kept_scans/catalog.1");
+    let segment = map().join("kept_scans/segment.3");
+    // Nothing tells whether the map needs the points.
+    let own = files_of_scans(&disk)
+        .into_keys()
+        .find(|path| path != &catalog && path.to_string_lossy().contains("catalog"));
+    let (own, snapshot_t) = (own.unwrap(), name("t"));
+    let bytes = disk.files()[&own].clone();
+    disk.take(&own);
+    let message = crate::support::message_of(delete_snapshot(at(&disk), &name("s")));
+    assert!(
+        message.contains("the snapshot s is deleted, but points") && disk.files().contains_key(&segment),
+        "{message}"
+    );
+    disk.put(&own, &bytes);
+    delete_snapshot(at(&disk), &name("s")).unwrap();
+    assert!([&catalog, &segment].iter().all(|path| !disk.files().contains_key(*path)));
+    delete_snapshot(at(&disk), &snapshot_t).unwrap();
+    assert_eq!(damage_in(&disk), BTreeSet::new());
+}
