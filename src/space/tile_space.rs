@@ -5,7 +5,7 @@ use rustc_hash::FxHashSet;
 /// along an edge that may hold one. A ray passes a cube without tiles in one step, so its cost depends on the number of
 /// tiles near it, not on the distance between them.
 ///
-/// Tiles are added and never removed. At most 400 kB: a level of more than [`MAX_CUBES`] cubes is given up.
+/// Tiles are added and never removed. At most 400 kB: a level of more than 2048 cubes is given up.
 #[derive(Clone, Debug, Default)]
 pub struct TileSpace {
     bounds: Option<TileBox>,
