@@ -60,7 +60,7 @@ pub(super) type LogEnd = (u64, Vec<u8>);
 /// How many bytes of its end tell that a log is the same.
 const LOG_END_BYTES: usize = 64;
 
-/// How the log ends now; `None` if there is none or nobody can tell.
+/// The current end of the log; `None` if there is no log or it cannot be read.
 pub(super) fn log_end(disk: &dyn Disk, layout: &Layout) -> Option<LogEnd> {
     let path = layout.commit_log();
     let Ok(Some(EntryKind::File(bytes))) = disk.kind(&path) else { return None };

@@ -15,7 +15,7 @@ const MAX_OF_CLIENT: usize = 256;
 const MAX_EVENTS_OF_CLIENT: usize = MAX_OF_CLIENT / 2;
 /// One without progress for less is not idle: its request may be on its way.
 const IDLE: Duration = Duration::from_secs(1);
-/// Where memory for answers is short, connections that take nothing of their answers for so long are closed.
+/// If memory for answers is short, connections whose answers have stalled this long are closed.
 const STALLED: Duration = Duration::from_secs(5);
 
 /// Who connects: an IPv4 address, an IPv6 address of a local network, or the 64 bits of another one that name a network.
@@ -59,7 +59,7 @@ struct State {
     progress_ms: AtomicU64,
     /// Whether an answer is being computed.
     is_busy: AtomicBool,
-    /// Number of the stream of events that it is; 0 if it is none.
+    /// Order in which its stream of events began, from 1; 0 for other connections.
     stream: AtomicU64,
     /// Bytes of memory of its answers that were not taken yet.
     held_bytes: AtomicUsize,
@@ -179,7 +179,7 @@ impl Connection {
         }
     }
 
-    /// Ends the connections, whosever they are, that take nothing of the answers that they hold in memory.
+    /// Closes stalled connections of all clients whose unsent answers are held in memory.
     pub fn end_stalled(&self) {
         let now_ms = self.connections.now_ms();
         let mut open = self.connections.open.lock();
