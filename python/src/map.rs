@@ -9,13 +9,15 @@ use crate::scan::GivenScan;
 use crate::scan_iterator::ScanIterator;
 use crate::source::Source;
 use crate::tile_iterator::TileIterator;
-use crate::watched::{at_once, briefly, finished, watched};
+use crate::watched::{BETWEEN_LOOKS, at_once, briefly, finished, watched};
 use numpy::{Element, PyArray1, PyArray2};
 use parking_lot::RwLock;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyTuple};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::time::Instant;
 use voxtile::mapper::{MapReader, MapView, Mapper, OctreeMap};
 use voxtile::sensor::Evidence;
 use voxtile::{
@@ -45,6 +47,8 @@ pub struct Map {
     path: PathBuf,
     /// Its name, if it is one.
     snapshot: Option<String>,
+    /// Whether the last few questions took long: the next ones take a thread of their own, so that none is asked twice.
+    is_slow: AtomicBool,
 }
 
 type Found<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<i32>>);
@@ -60,7 +64,13 @@ impl Map {
         let at = path.clone();
         let source = finished(py, move |_| open(&at))?;
         let config = source.config();
-        Ok(Self { source: Arc::new(RwLock::new(Some(Arc::new(source)))), config, path, snapshot: None })
+        Ok(Self {
+            source: Arc::new(RwLock::new(Some(Arc::new(source)))),
+            config,
+            path,
+            snapshot: None,
+            is_slow: AtomicBool::new(false),
+        })
     }
 
     fn source(&self, py: Python<'_>) -> PyResult<Arc<Source>> {
@@ -140,13 +150,19 @@ impl Map {
     ) -> PyResult<T> {
         let source = self.source(py)?;
         let mut work = |stop: &Stop| ask(&source, stop);
-        if questions <= FEW
-            && source.is_free()
-            && let Some(answer) = briefly(py, &mut work)?
-        {
-            return Ok(answer);
+        let are_few = questions <= FEW;
+        if are_few && source.is_free() && !self.is_slow.load(Relaxed) {
+            if let Some(answer) = briefly(py, &mut work)? {
+                return Ok(answer);
+            }
+            self.is_slow.store(true, Relaxed);
         }
-        watched(py, work)
+        let begun = Instant::now();
+        let answer = watched(py, work);
+        if are_few && begun.elapsed() < BETWEEN_LOOKS / 2 {
+            self.is_slow.store(false, Relaxed);
+        }
+        answer
     }
 }
 

@@ -1,7 +1,7 @@
 //! Maps that follow the scans that they keep: new poses, other parameters, removals.
 
 use crate::config::{bytes_of, storage_of};
-use crate::errors::{exception, wrong};
+use crate::errors::{exception, exception_of_kind, wrong};
 use crate::map::region_of;
 use crate::operations::{Callback, MapOrSnapshot, name_of, told};
 use crate::pose::pose_of;
@@ -122,8 +122,8 @@ pub fn remap_as<'py>(
 /// first and a last time stamp in nanoseconds; or `input`, the name of what they came from.
 ///
 /// Snapshots that hold any of them are named in the answer (`snapshots_with_them`), and deleted if `from_snapshots`
-/// (`snapshots_deleted`). Check `snapshots_failed`: these could not be read or deleted, and may still contain some, each
-/// with a `name` and a `reason`. They raise an error only if nothing was removed.
+/// (`snapshots_deleted`). Raises `SnapshotsFailedError` if scans were removed, but a snapshot could not be read or
+/// deleted and may still contain some; its `report` is the answer.
 #[pyfunction]
 #[pyo3(signature = (map, *, scans=None, time=None, input=None, from_snapshots=false, keep_as=None, dry_run=false,
     memory=None, progress=None))]
@@ -147,10 +147,20 @@ pub fn remove_scans<'py>(
         _ => return Err(wrong(py, "scans", "name one of scans, time and input")),
     };
     let how = rework_of(py, &map, keep_as, dry_run, memory.as_ref())?;
-    told(py, progress, |stop, progress| {
+    let report = told(py, progress, |stop, progress| {
         let how = how.with_stop(stop.clone());
         operations::remove_scans(&map, &selection, from_snapshots, &how, |done, all| progress.tell(done, all))
-    })
+    })?;
+    let failed: Vec<Bound<'py, PyAny>> = report.get_item("snapshots_failed")?.extract()?;
+    if failed.is_empty() {
+        return Ok(report);
+    }
+    let names = failed.iter().map(|failed| failed.get_item("name")?.extract::<String>());
+    let names = names.collect::<PyResult<Vec<_>>>()?.join(", ");
+    let message = format!("{}: these snapshots may still contain removed scans: {names}", map.display());
+    let raised = exception_of_kind(py, "snapshots_failed", &message);
+    raised.value(py).setattr("report", report)?;
+    Err(raised)
 }
 
 /// Takes all points in a box out of the scans that a map keeps, and maps again what their rays touched.

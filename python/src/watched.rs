@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 use voxtile::{Error, Result, Stop};
 
 /// How often signals are looked for.
-const BETWEEN_LOOKS: Duration = Duration::from_millis(50);
+pub const BETWEEN_LOOKS: Duration = Duration::from_millis(50);
 
 /// How long after Ctrl-C work may go on before it is left to itself.
 const PATIENCE: Duration = Duration::from_millis(500);

@@ -60,6 +60,20 @@ def test_scans_and_points_go(tmp_path: Path) -> None:
         assert coarse.resolution == 0.4 and len(coarse.occupied()[0]) > 0
 
 
+def test_a_removal_names_snapshots_that_may_still_have_the_scans(tmp_path: Path) -> None:
+    made = scans(4)
+    mapped(tmp_path / "kept", made, keep_scans=True)
+    for name in ["good", "bad"]:
+        voxtile.snapshot(tmp_path / "kept", name)
+    (tmp_path / "kept" / "snapshots" / "bad").write_bytes(b"nothing")
+    with pytest.raises(voxtile.errors.SnapshotsFailedError, match="may still contain removed scans: bad") as raised:
+        voxtile.remove_scans(tmp_path / "kept", scans=(2, 3), from_snapshots=True)
+    report = raised.value.report
+    assert report is not None and raised.value.kind == "snapshots_failed"
+    assert (report["scans_removed"], report["snapshots_deleted"]) == (2, ["good"])
+    assert voxtile.digest(tmp_path / "kept") == mapped(tmp_path / "left", [made[0], made[3]])
+
+
 def test_what_cannot_be_mapped_again_is_an_exception(tmp_path: Path) -> None:
     made = scans(2)
     mapped(tmp_path / "without", made)

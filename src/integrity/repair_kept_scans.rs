@@ -4,7 +4,6 @@ use super::repair::{Action, ActionKind, Repairer};
 use crate::error::{Error, Result, is_of_medium};
 use crate::store::{Disk, EntryKind, KeptAsOf, Quarantine, Snapshot, TileStore, kept_as_of};
 use std::collections::BTreeMap;
-use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -13,11 +12,11 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
     /// that the map can be mapped on. What neither the map nor a snapshot needs then goes to quarantine: the next
     /// writer would remove it.
     pub(super) fn repair_kept_scans(&mut self, store: &mut TileStore) -> Result<()> {
+        let (folder, as_of) = (self.layout.kept_scans(), store.last_commit());
+        self.repair_folder_of_scans(&folder)?;
         if !store.keeps_scans() {
             return Ok(());
         }
-        let (folder, as_of) = (self.layout.kept_scans(), store.last_commit());
-        self.repair_folder_of_scans(&folder)?;
         let found = whole_entries(self.disk, &self.layout, as_of, &mut self.points, |_| Ok(()))?;
         if found.damage.is_empty() {
             return Ok(());
@@ -61,10 +60,11 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
 
     /// Makes way for the folder of kept scans.
     fn repair_folder_of_scans(&mut self, folder: &Path) -> Result<()> {
+        if let Some(EntryKind::File(_) | EntryKind::Other) = self.kind(folder)? {
+            return self.quarantine(folder, "no folder");
+        }
         match self.disk.list(folder) {
-            Err(error) if is_of_medium(&error) || error.kind() == io::ErrorKind::NotADirectory => {
-                self.quarantine(folder, &format!("cannot list: {error}"))
-            }
+            Err(error) if is_of_medium(&error) => self.quarantine(folder, &format!("cannot list: {error}")),
             _ => Ok(()),
         }
     }
@@ -89,64 +89,80 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         store: &mut TileStore,
         snapshots: &mut [Snapshot],
     ) -> Result<()> {
-        let (mut replaced, mut all_reasons, mut is_changed) = (Vec::new(), Reasons::default(), false);
+        let mut reasons = Reasons::default();
+        let mut replaced = Vec::new();
         for at in 0..snapshots.len() {
             let Some(as_of) = kept_as_of(&snapshots[at]) else { continue };
             let found = whole_entries(self.disk, &self.layout, as_of, &mut self.points, |_| Ok(()))?;
             if found.damage.is_empty() {
                 continue;
             }
-            all_reasons.add(&found);
-            let catalog = store.catalog_path(as_of)?;
-            let is_kept = self.keep_catalog(catalog.as_deref(), &all_reasons)?;
-            replaced.extend(catalog.map(|catalog| (catalog, is_kept)));
-            self.replace_catalog(store, snapshots, at, as_of, &all_reasons)?;
-            is_changed = true;
+            reasons.add(&found);
+            let old = store.catalog_path(as_of)?;
+            let is_old_kept = self.keep_catalog(old.as_deref(), &reasons)?;
+            let scans_lost = self.write_other_catalog(store, &mut snapshots[at], as_of)?;
+            replaced.push(Replaced { at, old, is_old_kept, scans_lost });
         }
-        if !is_changed {
+        if replaced.is_empty() {
             return Ok(());
         }
-        for path in store.unneeded_scan_files(snapshots, None)? {
-            if !replaced.iter().any(|(catalog, is_kept)| *is_kept && *catalog == path) {
-                self.quarantine(&path, all_reasons.of_file(&path))?;
-            }
+        // Before the snapshots name the new catalogs: as long as one names a damaged one, no writer removes anything.
+        self.quarantine_unneeded(store, snapshots, &reasons, |path| {
+            replaced.iter().any(|replaced| replaced.old.as_deref() == Some(path))
+        })?;
+        for replaced in &replaced {
+            self.name_other_catalog(store, &snapshots[replaced.at], replaced.scans_lost)?;
         }
+        self.quarantine_unneeded(store, snapshots, &reasons, |path| {
+            replaced.iter().any(|replaced| replaced.is_old_kept && replaced.old.as_deref() == Some(path))
+        })?;
         store.release_unseen()
     }
 
-    /// Gives a snapshot another catalog of the scans that it keeps.
-    fn replace_catalog(
+    /// Moves files of kept scans that neither the map nor these snapshots need to quarantine, except some.
+    fn quarantine_unneeded(
         &mut self,
-        store: &mut TileStore,
-        snapshots: &mut [Snapshot],
-        at: usize,
-        as_of: KeptAsOf,
+        store: &TileStore,
+        snapshots: &[Snapshot],
         reasons: &Reasons,
+        is_excepted: impl Fn(&Path) -> bool,
     ) -> Result<()> {
-        let mut lost = 0;
-        let (disk, layout, points) = (self.disk, &self.layout, &mut self.points);
-        let old = store.catalog_path(as_of)?;
-        let catalog = store.write_other_catalog(|put| {
-            lost = whole_entries(disk, layout, as_of, points, put)?.scans_lost;
-            Ok(())
-        })?;
-        snapshots[at].commits.catalog = Some(catalog);
-        // Before the snapshot names the new one: as long as it names the damaged one, no writer removes anything.
         for path in store.unneeded_scan_files(snapshots, None)? {
-            if Some(&path) != old.as_ref() {
+            if !is_excepted(&path) {
                 self.quarantine(&path, reasons.of_file(&path))?;
             }
         }
-        store.replace_snapshot(&snapshots[at])?;
-        self.counts.snapshot_scans_lost += lost;
-        let path = self.layout.snapshot(&snapshots[at].name);
-        let reason = match lost {
+        Ok(())
+    }
+
+    /// Writes another catalog of the scans that a snapshot keeps. Its file does not name it yet. Returns the number of
+    /// scans that are not in it because they are damaged.
+    fn write_other_catalog(
+        &mut self,
+        store: &mut TileStore,
+        snapshot: &mut Snapshot,
+        as_of: KeptAsOf,
+    ) -> Result<u64> {
+        let mut scans_lost = 0;
+        let (disk, layout, points) = (self.disk, &self.layout, &mut self.points);
+        let catalog = store.write_other_catalog(|put| {
+            scans_lost = whole_entries(disk, layout, as_of, points, put)?.scans_lost;
+            Ok(())
+        })?;
+        snapshot.commits.catalog = Some(catalog);
+        Ok(scans_lost)
+    }
+
+    fn name_other_catalog(&mut self, store: &TileStore, snapshot: &Snapshot, scans_lost: u64) -> Result<()> {
+        store.replace_snapshot(snapshot)?;
+        self.counts.snapshot_scans_lost += scans_lost;
+        let reason = match scans_lost {
             0 => "a record that is damaged is no longer in the catalog of its kept scans".to_owned(),
             lost => {
                 format!("{lost} scans that are damaged are no longer kept; it cannot be mapped again")
             }
         };
-        self.note(ActionKind::Forgotten, &path, reason);
+        self.note(ActionKind::Forgotten, &self.layout.snapshot(&snapshot.name), reason);
         Ok(())
     }
 
@@ -183,6 +199,17 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         }
         Ok(())
     }
+}
+
+/// A snapshot whose damaged catalog of kept scans has been replaced.
+struct Replaced {
+    /// Its place in the list of snapshots.
+    at: usize,
+    /// The damaged catalog; `None` if it is missing.
+    old: Option<PathBuf>,
+    /// Whether quarantine has a copy of that.
+    is_old_kept: bool,
+    scans_lost: u64,
 }
 
 /// What is wrong with files of kept scans.

@@ -125,6 +125,7 @@ pub fn verify_scope(
         opened: None,
         before: None,
         suspects: Suspects::default(),
+        reported: FxHashSet::default(),
         is_again: false,
     };
     let Some(store) = verifier.open()? else { return Ok(verifier.counts) };
@@ -160,6 +161,8 @@ pub(super) struct Verifier<'a, F, P> {
     before: Option<LogEnd>,
     /// What may be damaged, or was being changed when it was looked at.
     suspects: Suspects,
+    /// Damage that was reported when these were looked at again.
+    reported: FxHashSet<String>,
     /// Whether these are looked at again: notes have been told.
     pub(super) is_again: bool,
 }
@@ -231,6 +234,8 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
 
     pub(super) fn report(&mut self, finding: Finding) {
         match finding.severity {
+            // A list of snapshots is looked at again as a whole, though parts of it are decided.
+            Severity::Damage if self.is_again && !self.reported.insert(finding.to_string()) => return,
             Severity::Damage => self.counts.damage += 1,
             Severity::Note if self.is_again => return,
             Severity::Note => self.counts.notes += 1,

@@ -5,7 +5,8 @@ use rustc_hash::FxHashSet;
 /// along an edge that may hold one. A ray passes a cube without tiles in one step, so its cost depends on the number of
 /// tiles near it, not on the distance between them.
 ///
-/// Tiles are added and never removed. At most 400 kB: a level of more than 2048 cubes is given up.
+/// Tiles are added and never removed. A level of too many cubes is given up: fine levels of a large map, which takes
+/// 200 kB then, and coarse ones where tens of thousands of tiles lie more than 40 km apart (10 MB).
 #[derive(Clone, Debug, Default)]
 pub struct TileSpace {
     bounds: Option<TileBox>,
@@ -16,8 +17,9 @@ pub struct TileSpace {
 /// Edges of the cubes of each level, in tiles, as powers of two.
 const SHIFTS: [u32; 7] = [4, 8, 12, 16, 20, 24, 28];
 
-/// Most cubes of a level.
-const MAX_CUBES: usize = 2048;
+/// Upper bound on the cubes of a level. Maps of one region have few cubes in the coarse levels, so that these may be
+/// many where tiles are scattered: to give one up would cost each ray thousands of steps.
+const MAX_CUBES: [usize; SHIFTS.len()] = [1 << 11, 1 << 11, 1 << 16, 1 << 16, 1 << 16, 1 << 16, 1 << 16];
 
 #[derive(Clone, Debug, Default)]
 struct Level {
@@ -32,7 +34,7 @@ impl TileSpace {
     pub fn insert(&mut self, tile: TileIndex) {
         let own = TileBox::new(tile, tile);
         self.bounds = Some(self.bounds.map_or(own, |bounds| bounds.union(own)));
-        for (level, shift) in self.levels.iter_mut().zip(SHIFTS) {
+        for ((level, shift), max_cubes) in self.levels.iter_mut().zip(SHIFTS).zip(MAX_CUBES) {
             if level.is_given_up {
                 continue;
             }
@@ -40,7 +42,7 @@ impl TileSpace {
                 // Coarser levels have its cubes as well.
                 return;
             }
-            if level.cubes.len() > MAX_CUBES {
+            if level.cubes.len() > max_cubes {
                 *level = Level { cubes: FxHashSet::default(), is_given_up: true };
             }
         }
@@ -121,6 +123,6 @@ mod tests {
         let empty = space.empty_around(TileIndex::new(0, 0, 300)).unwrap();
         assert_eq!(empty, TileBox::new(TileIndex::new(0, 0, 256), TileIndex::new(255, 255, 511)));
         assert!(space.empty_around(TileIndex::new(1 << 29, 0, 0)).unwrap().count() > 1 << 60);
-        assert!(space.levels.iter().all(|level| level.cubes.len() <= MAX_CUBES));
+        assert!(space.levels.iter().zip(MAX_CUBES).all(|(level, max_cubes)| level.cubes.len() <= max_cubes));
     }
 }

@@ -162,6 +162,18 @@ fn a_tile_at_the_end_of_the_world_costs_rays_little() {
     check_far(&*local.reader().view(), &wall);
 }
 
+/// So many tiles, so far apart, that fine levels of cubes are given up.
+#[test]
+fn thousands_of_tiles_anywhere_cost_rays_little() {
+    let mut random = Random(11);
+    let mut points: Vec<Point> = (0..5000).map(|_| random.point([0.0; 3], 4e8)).collect();
+    let wall: Vec<Point> = (0..10).map(|k| [4.2e8, 1.2e8 + 3.0 * f64::from(k), -3e7]).collect();
+    points.extend(&wall);
+    let mut map = InMemoryMapper::new(MapConfig::new(0.5, 10.0).unwrap()).unwrap();
+    occupy(&mut map, &points);
+    check_far(&map, &wall);
+}
+
 #[test]
 fn rays_end_at_the_last_voxels() {
     let grid = Grid::new(1.0, 4.0).unwrap();

@@ -278,6 +278,33 @@ fn a_repair_of_a_snapshots_scans_that_the_power_ends_is_completed_by_another() {
     assert!(crashes > 10, "{crashes}");
 }
 
+/// Only snapshots keep scans, and a file has the name of their folder.
+#[test]
+fn a_file_in_place_of_the_scans_that_only_snapshots_keep_is_moved_away() {
+    let disk = FaultyDisk::new(Fault::None);
+    let plain = config().with_kept_scans(false);
+    let mut mapper = OutOfCoreTileMapper::create(at(&disk), plain).unwrap();
+    mapper.insert_scan(&random_scan(&mut Random(1), [0.0; 3], 5)).unwrap();
+    mapper.flush().unwrap();
+    drop(mapper);
+    snapshot(at(&disk), &name("plain")).unwrap();
+    insert(&disk, 2).unwrap();
+    snapshot(at(&disk), &name("kept")).unwrap();
+    reverted(&disk, "plain").unwrap();
+    let digest_before = digest(&disk);
+    let scans = map().join("kept_scans");
+    assert!(!files_of_scans(&disk).is_empty());
+    disk.take(&scans);
+    disk.put(&scans, b"not a folder");
+    assert!(!damage_in(&disk).is_empty());
+    let report = repaired(&disk, "a file");
+    assert!(report.snapshot_scans_lost > 0, "{report:?}");
+    assert!(disk.files().iter().any(|(path, bytes)| path.starts_with(map()) && bytes == b"not a folder"));
+    assert_eq!(digest(&disk), digest_before);
+    insert(&disk, 3).unwrap();
+    revert(at(&disk), &name("kept"), None, |_, _| ()).unwrap();
+}
+
 /// Takes the names of catalogs out of a log of one record.
 fn forget_catalog(disk: &FaultyDisk, path: &Path) {
     let bytes = disk.files()[path].clone();

@@ -25,6 +25,7 @@ export class Layer {
     this.material = makeMaterial(kind, viewer.shared);
     this.materials = { free: makeMaterial(KIND.free, viewer.shared), unknown: makeMaterial(KIND.unknown, viewer.shared) };
     if (hue) tintLayer(this.material, hue);
+    // By URL: a mesh, or the load of it that is under way.
     this.extra = new Map();
     // URLs of free and unknown voxels that were not loaded.
     this.lostNear = new Set();
@@ -93,7 +94,7 @@ export class Layer {
       tiles.lost.clear();
       tiles.resetFailedTiles();
     }
-    for (const url of this.lostNear) if (this.extra.get(url) === null) this.extra.delete(url);
+    for (const url of this.lostNear) this.extra.delete(url);
     this.lostNear.clear();
     if (this.isBehind) this.refresh();
     this.viewer.wake();
@@ -206,11 +207,12 @@ export class Layer {
     }
     for (const [url, mesh] of this.extra) {
       if (wanted.has(url)) continue;
-      if (mesh) {
+      if (mesh.isMesh) {
         this.near.remove(mesh);
         mesh.geometry.dispose();
       }
       this.extra.delete(url);
+      this.lostNear.delete(url);
     }
     for (const url of wanted) {
       if (!this.extra.has(url)) this.loadNear(url, url.endsWith('free') ? 'free' : 'unknown');
@@ -218,18 +220,24 @@ export class Layer {
   }
 
   async loadNear(url, kind) {
-    this.extra.set(url, null);
-    this.lostNear.delete(url);
+    // What left the view and came back has another load by now, which this one must not replace.
+    const load = { isMesh: false };
+    const isCurrent = () => this.extra.get(url) === load;
+    this.extra.set(url, load);
     this.waits = (this.waits ?? 0) + 1;
     try {
       const response = await fetch(url);
       if (!response.ok) throw new Error(`${response.status}`);
       const mesh = meshOf(parseNode(await response.arrayBuffer()), this.materials[kind]);
-      if (!this.extra.has(url)) return;
+      if (!isCurrent() || this.isGone) {
+        mesh.geometry.dispose();
+        return;
+      }
       this.extra.set(url, mesh);
       this.near.add(mesh);
+      if (this.lostNear.size === 0 && this.tiles.lost.size === 0) this.retryMs = FIRST_RETRY_MS;
     } catch (error) {
-      if (this.isGone) return;
+      if (!isCurrent() || this.isGone) return;
       this.viewer.say(`Voxels of a tile were not loaded: ${error.message}`);
       this.lostNear.add(url);
       this.retryLater();
@@ -243,7 +251,7 @@ export class Layer {
     this.isGone = true;
     clearTimeout(this.retryTimer);
     for (const tiles of [this.tiles, this.next]) tiles?.dispose();
-    for (const mesh of this.extra.values()) mesh?.geometry.dispose();
+    for (const mesh of this.extra.values()) if (mesh.isMesh) mesh.geometry.dispose();
     this.group.removeFromParent();
   }
 }

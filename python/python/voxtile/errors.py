@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 
 class VoxtileError(Exception):
@@ -143,6 +144,16 @@ class PickleError(VoxtileError, TypeError):
     """A map cannot be pickled: open its path in the other process."""
 
     kind = "no_pickle"
+
+
+class SnapshotsFailedError(VoxtileError):
+    """Scans were removed, but these snapshots may still contain some: repair or delete them, then remove again.
+
+    ``report`` is what ``remove_scans`` returns otherwise; its ``snapshots_failed`` has a name and a reason each.
+    """
+
+    kind = "snapshots_failed"
+    report: dict[str, Any] | None = None
 
 
 def _classes(of: type[VoxtileError]) -> dict[str, type[VoxtileError]]:
