@@ -5,9 +5,9 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 use testkit::unsynced_disk::UnsyncedDisk;
-use voxtile::simulation::Survey;
 use voxtile::store::{Disk, FsDisk};
 use voxtile::{MapConfig, MapPath, MapView, Mapper, OutOfCoreTileMapper, Scan};
+use voxtile_simulation::Survey;
 
 fn disks() -> [(&'static str, Arc<dyn Disk>); 3] {
     [

@@ -3,8 +3,8 @@
 
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use voxtile::mapper::MapView;
-use voxtile::simulation::Survey;
 use voxtile::{InMemoryMapper, InsertMode, MapConfig, Mapper, OutOfCoreTileMapper, Scan, TileSelection};
+use voxtile_simulation::Survey;
 
 fn config() -> MapConfig {
     MapConfig::new(0.2, 10.0).expect("whole voxels").with_range(0.0, 60.0)

@@ -8,8 +8,8 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 use voxtile::mapper::LiveReader;
-use voxtile::simulation::Survey;
 use voxtile::{MapConfig, Mapper, OutOfCoreTileMapper, Queries, RayQuery, Scan, Shape, UnknownAs};
+use voxtile_simulation::Survey;
 
 /// Scans that are there before, and those that are measured.
 const SCANS: [usize; 2] = [20, 60];

@@ -5,9 +5,9 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
 use voxtile::query::{RayQuery, Shape, UnknownAs};
 use voxtile::scan::PointBatch;
-use voxtile::simulation::Survey;
 use voxtile::space::Point;
 use voxtile::{InMemoryMapper, MapConfig, Mapper, Queries};
+use voxtile_simulation::Survey;
 
 const TILE_M: f64 = 10.0;
 /// Tiles along each edge of the square that all others lie in, far from the scans.

@@ -5,11 +5,11 @@ use criterion::{BatchSize, BenchmarkGroup, Criterion, Throughput, criterion_grou
 use std::collections::BTreeMap;
 use voxtile::scan::{ScanTracer, ScanUpdates};
 use voxtile::sensor::{Iwlo, SensorModel};
-use voxtile::simulation::Survey;
 use voxtile::space::TileIndex;
 use voxtile::tile::Table;
 use voxtile::tile::format::{CompactEffort, CompactReader, CompactWriter};
 use voxtile::{InsertMode, MapConfig};
+use voxtile_simulation::Survey;
 
 type Tables = BTreeMap<TileIndex, Table>;
 

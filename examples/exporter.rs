@@ -7,8 +7,8 @@ use std::io::{BufWriter, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
-use voxtile::io::{VoxelFile, VoxelFormat, VoxelRecord, VoxelWriter};
 use voxtile::{MapOptions, MapView, Occupancy};
+use voxtile_formats::{VoxelFile, VoxelFormat, VoxelRecord, VoxelWriter};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();

@@ -1,8 +1,8 @@
 //! A path, checked against the archive, the local map and both as one: `cargo run --release --example planner`.
 
-use voxtile::local::{LocalMap, LocalParameters, Obstacle};
-use voxtile::simulation::Survey;
 use voxtile::{InMemoryMapper, MapConfig, Mapper, Queries, Shape, United, UnknownAs};
+use voxtile_local::{LocalMap, LocalParameters, Obstacle};
+use voxtile_simulation::Survey;
 
 const ROBOT_RADIUS_M: f64 = 0.4;
 

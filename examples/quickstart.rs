@@ -1,8 +1,8 @@
 //! Builds a map out of core, asks it, opens it again: `cargo run --release --example quickstart`.
 
 use voxtile::query::{RayQuery, UnknownAs};
-use voxtile::simulation::Survey;
 use voxtile::{MapConfig, MapQueries, MapReader, MapView, Mapper, OutOfCoreTileMapper, Queries};
+use voxtile_simulation::Survey;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let folder = std::env::temp_dir().join(format!("voxtile_quickstart_{}", std::process::id()));

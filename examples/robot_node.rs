@@ -3,8 +3,8 @@
 use std::sync::mpsc;
 use std::thread;
 use std::time::Duration;
-use voxtile::simulation::Survey;
 use voxtile::{MapConfig, MapOptions, Mapper, Queries, Scan, Shape, UnknownAs};
+use voxtile_simulation::Survey;
 
 const SCANS: usize = 40;
 

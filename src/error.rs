@@ -288,7 +288,8 @@ pub(crate) fn is_of_medium(error: &io::Error) -> bool {
     error.raw_os_error().is_some_and(|code| OF_MEDIUM.contains(&code))
 }
 /// The beginning of a text that is not another one; where both begin alike, the part that differs.
-pub(crate) fn beginning_or_difference(text: &str, other: &str) -> String {
+#[doc(hidden)]
+pub fn beginning_or_difference(text: &str, other: &str) -> String {
     const MAX_CHARS: usize = 80;
     let common = text.chars().zip(other.chars()).take_while(|(a, b)| a == b).count();
     if common < MAX_CHARS {

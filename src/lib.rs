@@ -26,15 +26,12 @@
 //! # The flow
 //!
 //! ```text
-//! Scan, ScanRef, io::StoredScan -> Mapper::insert_points   io, scan, mapper
+//! Scan, ScanRef -> Mapper::insert_points                   scan, mapper
 //!   -> rays -> updates by tile                             scan
 //!      -> resident tiles: table, octree                    tile, octree, sensor
 //!      -> pending updates for tiles on disk                mapper
 //!      -> eviction and flush: bytes, one commit            tile::format, store
 //! queries <- tile by tile <- memory or disk                query
-//!
-//! Scan -> LocalMap -> views for planners                   local, beside an archive or alone
-//! occupied voxels -> Sender -> packets -> Receiver         share
 //! ```
 //!
 //! # Words
@@ -54,23 +51,15 @@
 //! Tiles of 2 to 1024 voxels along an edge; voxel indices of 32 bits; rays of at most a million steps. One writer a
 //! map, any number of readers.
 //!
-//! # Features
+//! # Other crates
 //!
-//! - `render`: pictures of maps, numbers to go with them, and levels of detail for viewers.
-//! - `bucket`: maps in a bucket of an object store.
-//! - `cli` (default): the command `voxtile`, with argument parsing, progress bars and `render`. The library needs none
-//!   of it, and no feature changes a result.
+//! This is the engine. Above it: `voxtile-formats` reads scans from files and writes voxels to them, `voxtile-local` is
+//! the map around the robot, `voxtile-share` sends what is occupied to other robots, `voxtile-bucket` has maps in an
+//! object store, `voxtile-render` makes pictures and levels of detail, and `voxtile-cli` is the command `voxtile`.
 
-#[cfg(feature = "bucket")]
-pub mod bucket;
-#[cfg(feature = "cli")]
-#[doc(hidden)]
-pub mod command;
 mod config;
 mod error;
 pub mod integrity;
-pub mod io;
-pub mod local;
 pub mod mapper;
 #[doc(hidden)]
 pub mod maths;
@@ -82,13 +71,10 @@ pub mod operations;
 pub mod path_text;
 mod persistence;
 pub mod query;
-#[cfg(feature = "render")]
-pub mod render;
 pub mod scan;
-mod scratch;
+#[doc(hidden)]
+pub mod scratch;
 pub mod sensor;
-pub mod share;
-pub mod simulation;
 pub mod space;
 #[doc(hidden)]
 pub mod store;
@@ -98,6 +84,8 @@ pub mod tile;
 pub use config::{
     InsertMode, MapConfig, MemoryLimit, OctreeConfig, RayConfig, Storage, VoxelCacheConfig, VoxelCacheMode,
 };
+#[doc(hidden)]
+pub use error::beginning_or_difference;
 pub use error::{DecodeError, Error, FormatError, Place, Result, Unanswered};
 pub use mapper::{
     InMemoryMapper, LiveReader, LiveView, MapOptions, MapReader, MapView, Mapper, OutOfCoreTileMapper,

@@ -3,9 +3,9 @@ use super::forest::{Forest, GOAL, START};
 use std::fmt;
 use std::time::Instant;
 use testkit::planner::{distance_m, plan};
-use voxtile::local::{LocalView, Obstacle};
 use voxtile::space::Point;
 use voxtile::{Queries, Result, UnknownAs};
+use voxtile_local::{LocalView, Obstacle};
 
 /// The paper's limit.
 const MAX_SPEED_M_S: f64 = 9.3;

@@ -1,6 +1,6 @@
 use voxtile::Scan;
-use voxtile::simulation::{Random, Scene, Solid};
 use voxtile::space::Point;
+use voxtile_simulation::{Random, Scene, Solid};
 
 /// Trees and thickets on 200 m x 35 m, all from a seed.
 pub struct Forest {

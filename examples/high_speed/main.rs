@@ -17,8 +17,8 @@ use flight::{Flight, fly};
 use forest::Forest;
 use std::error::Error;
 use std::fs;
-use voxtile::local::{LocalMap, LocalParameters, LocalView};
 use voxtile::{Result, Scan};
+use voxtile_local::{LocalMap, LocalParameters, LocalView};
 use window::Window;
 
 /// Edge of a voxel.

@@ -1,8 +1,8 @@
 use super::{INFLATION_M, PlannersMap, RESOLUTION_M};
 use std::collections::HashSet;
-use voxtile::local::{LocalMap, LocalParameters, LocalView};
 use voxtile::space::{Grid, Point, VoxelIndex};
 use voxtile::{Result, Scan};
+use voxtile_local::{LocalMap, LocalParameters, LocalView};
 
 /// A fixed window around the robot, as array-based planners have it: what is outside is not there, and what leaves it
 /// is forgotten.

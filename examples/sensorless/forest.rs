@@ -1,7 +1,7 @@
 use crate::robots::Sensing;
 use voxtile::Scan;
-use voxtile::simulation::{Random, Scene, Solid};
 use voxtile::space::Point;
+use voxtile_simulation::{Random, Scene, Solid};
 
 /// Trees and walls of bushes on 120 m x 30 m, all from a seed; low enough to be looked at from above.
 pub struct Forest {

@@ -51,7 +51,7 @@ fn shared(sharing: &Sharing) -> String {
 }
 
 fn trees(forest: &Forest) -> String {
-    let tree = |tree: &voxtile::simulation::Solid| {
+    let tree = |tree: &voxtile_simulation::Solid| {
         let (min, max) = (tree.bounds.min, tree.bounds.max);
         let (left, top) = at(min[0], max[1]);
         let (width, height) = ((max[0] - min[0]) * SCALE, (max[1] - min[1]) * SCALE);

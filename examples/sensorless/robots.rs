@@ -3,10 +3,10 @@ use crate::{RESOLUTION_M, STEP};
 use std::time::{Duration, Instant};
 use testkit::lossy_link::LossyLink;
 use testkit::planner::{distance_m, is_free, plan};
-use voxtile::local::{LocalMap, LocalParameters};
-use voxtile::share::{MapWatch, Receiver, ReceiverConfig, Sender, SenderConfig, VoxelSet};
 use voxtile::space::{Grid, Point};
 use voxtile::{InMemoryMapper, MapConfig, Mapper, Result};
+use voxtile_local::{LocalMap, LocalParameters};
+use voxtile_share::{MapWatch, Receiver, ReceiverConfig, Sender, SenderConfig, VoxelSet};
 
 /// A sensor.
 #[derive(Clone, Copy)]

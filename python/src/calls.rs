@@ -9,7 +9,7 @@ use serde_json::Value;
 use std::ffi::OsString;
 use std::sync::Arc;
 use voxtile::Stop;
-use voxtile::command::{CallError, Listener, Watch, calls};
+use voxtile_cli::{CallError, Listener, Watch, calls};
 
 /// `voxtile build` with these arguments: a dict, what it prints with `--json`. With `piece_of`, 32 hexadecimal digits,
 /// it makes a piece of the map with this id, which is not durable until `move_piece` has moved it.

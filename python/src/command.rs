@@ -8,7 +8,7 @@ use std::process::ExitCode;
 #[pyfunction]
 pub fn run_command(py: Python<'_>, arguments: Vec<OsString>) {
     py.detach(|| {
-        let code = voxtile::command::run(arguments);
+        let code = voxtile_cli::run(arguments);
         // The only way to a code's number.
         let failed = (1..=u8::MAX).find(|&number| ExitCode::from(number) == code);
         std::process::exit(failed.map_or(0, i32::from))

@@ -4,7 +4,7 @@ use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::PyDict;
 use voxtile::Error;
-use voxtile::command::CallError;
+use voxtile_cli::CallError;
 
 /// The exception of an error, with path, tile and offset as attributes.
 pub fn exception(py: Python<'_>, error: &Error) -> PyErr {

@@ -8,8 +8,8 @@ use crate::watched::{at_once, watched};
 use numpy::{PyArray1, PyArray2};
 use parking_lot::Mutex;
 use pyo3::prelude::*;
-use voxtile::local::{LocalParameters, LocalReader, LocalState, Obstacle};
 use voxtile::{Point, Queries, Result, Stop, UnknownAs};
+use voxtile_local::{LocalParameters, LocalReader, LocalState, Obstacle};
 
 /// Points that take less time than anybody waits for Ctrl-C.
 const FEW: usize = 1 << 14;
@@ -21,7 +21,7 @@ const FEW: usize = 1 << 14;
 /// metres. Any thread may ask while another inserts: it sees whole updates.
 #[pyclass(frozen, module = "voxtile")]
 pub struct LocalMap {
-    map: Mutex<voxtile::local::LocalMap>,
+    map: Mutex<voxtile_local::LocalMap>,
     reader: LocalReader,
 }
 
@@ -59,7 +59,7 @@ impl LocalMap {
             *place = given.unwrap_or(*place);
         }
         let map =
-            voxtile::local::LocalMap::new(resolution, parameters).map_err(|error| exception(py, &error))?;
+            voxtile_local::LocalMap::new(resolution, parameters).map_err(|error| exception(py, &error))?;
         Ok(Self { reader: map.reader(), map: Mutex::new(map) })
     }
 

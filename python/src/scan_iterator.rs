@@ -11,11 +11,11 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use voxtile::command::{CallError, calls};
-use voxtile::io::{ScanReach, ScanSource, SensorScan};
 use voxtile::mapper::{KeptScan, KeptScans, MapReader};
 use voxtile::scan::ScanPoints;
 use voxtile::{Pose, Result as Fallible, Stop};
+use voxtile_cli::{CallError, calls};
+use voxtile_formats::{ScanReach, ScanSource, SensorScan};
 
 /// A scan that was read: points in the sensor's frame, and its pose.
 type ReadScan<'py> =

@@ -320,7 +320,8 @@ impl MapReader {
     }
 
     /// Where the map is.
-    pub(crate) fn disk(&self) -> Arc<dyn Disk> {
+    #[doc(hidden)]
+    pub fn disk(&self) -> Arc<dyn Disk> {
         self.disk.clone()
     }
 

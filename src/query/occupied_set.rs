@@ -1,4 +1,7 @@
-//! Queries of sets of voxels that are occupied, of which all others are unknown: local maps and layers.
+//! Queries of sets of voxels that are occupied, of which all others are unknown.
+//!
+//! A crate that has such a set says how it is walked ([`OccupiedSet`]) and calls
+//! [`answer_as_occupied_set`](crate::answer_as_occupied_set): then the set answers [`Queries`](crate::Queries) as maps do.
 
 use super::collision::first_not_free;
 use super::ray::{Met, walk_ray, walk_segment};
@@ -12,9 +15,11 @@ use crate::space::{Aabb, Grid, Point, VoxelBox, VoxelIndex};
 const OCCUPIED: f64 = 1.0;
 
 /// Voxels that are occupied; all others are unknown.
-pub(crate) trait OccupiedSet: Sync {
+pub trait OccupiedSet: Sync {
+    /// Its voxels and tiles.
     fn grid_of_set(&self) -> Grid;
 
+    /// Whether a voxel is occupied.
     fn holds(&self, voxel: VoxelIndex) -> bool;
 
     /// A box around a voxel in which there are none; `None` if it is not known of one.
@@ -27,11 +32,13 @@ pub(crate) trait OccupiedSet: Sync {
     fn visit_in(&self, voxels: &VoxelBox, visit: &mut dyn FnMut(VoxelIndex) -> bool);
 }
 
-pub(crate) fn occupancy(set: &impl OccupiedSet, voxel: VoxelIndex) -> Occupancy {
+/// What is known of a voxel.
+pub fn occupancy(set: &impl OccupiedSet, voxel: VoxelIndex) -> Occupancy {
     if set.holds(voxel) { Occupancy::Occupied(OCCUPIED) } else { Occupancy::Unknown }
 }
 
-pub(crate) fn voxels_in(set: &impl OccupiedSet, region: &Aabb) -> Vec<VoxelOccupancy> {
+/// The voxels whose centers are in a region.
+pub fn voxels_in(set: &impl OccupiedSet, region: &Aabb) -> Vec<VoxelOccupancy> {
     let (grid, mut found) = (set.grid_of_set(), Vec::new());
     set.visit_in(&voxels_around(&grid, region), &mut |voxel| {
         if region.contains(grid.center_m(voxel)) {
@@ -94,21 +101,32 @@ fn meet(
     }
 }
 
-pub(crate) fn cast_ray(set: &impl OccupiedSet, query: &RayQuery) -> Result<Option<Hit>> {
+/// The first that a ray meets.
+///
+/// # Errors
+///
+/// A ray without a direction, or that is not finite.
+pub fn cast_ray(set: &impl OccupiedSet, query: &RayQuery) -> Result<Option<Hit>> {
     let (hull, cells) = hull_of(set);
     walk_ray(&set.grid_of_set(), query, hull, meet(set, query.unknown, cells))
 }
 
-pub(crate) fn cast_segment(
-    set: &impl OccupiedSet,
-    ends: [Point; 2],
-    unknown: UnknownAs,
-) -> Result<Option<Hit>> {
+/// The first between two points.
+///
+/// # Errors
+///
+/// A segment that is not finite or too long.
+pub fn cast_segment(set: &impl OccupiedSet, ends: [Point; 2], unknown: UnknownAs) -> Result<Option<Hit>> {
     // A segment meets no more than a million voxels.
     walk_segment(&set.grid_of_set(), ends, meet(set, unknown, usize::MAX))
 }
 
-pub(crate) fn collision(set: &impl OccupiedSet, body: &Shape, unknown: UnknownAs) -> Result<Option<Hit>> {
+/// One that a body touches.
+///
+/// # Errors
+///
+/// A body that is not finite or too large.
+pub fn collision(set: &impl OccupiedSet, body: &Shape, unknown: UnknownAs) -> Result<Option<Hit>> {
     let grid = set.grid_of_set();
     if unknown == UnknownAs::Obstacle {
         return first_not_free(&grid, body, |voxel| Ok(occupancy(set, voxel)));
@@ -123,11 +141,12 @@ pub(crate) fn collision(set: &impl OccupiedSet, body: &Shape, unknown: UnknownAs
     Ok(found)
 }
 
-pub(crate) fn nearest_occupied(
-    set: &impl OccupiedSet,
-    point: Point,
-    max_distance_m: f64,
-) -> Result<Option<Hit>> {
+/// The one with the nearest center.
+///
+/// # Errors
+///
+/// A point that is not finite, a distance that is none.
+pub fn nearest_occupied(set: &impl OccupiedSet, point: Point, max_distance_m: f64) -> Result<Option<Hit>> {
     super::nearest::check(point, max_distance_m)?;
     let grid = set.grid_of_set();
     let (Some(hull), _) = hull_of(set) else { return Ok(None) };
@@ -176,7 +195,8 @@ pub(crate) fn check_resolutions(resolutions_m: impl Iterator<Item = f64>) -> Res
     Ok(())
 }
 
-/// Makes a set of occupied voxels answer [`Queries`](crate::query::Queries).
+/// Makes an [`OccupiedSet`](crate::query::occupied_set::OccupiedSet) answer [`Queries`](crate::query::Queries).
+#[macro_export]
 macro_rules! answer_as_occupied_set {
     ($set:ty) => {
         impl $crate::query::Queries for $set {
@@ -187,7 +207,7 @@ macro_rules! answer_as_occupied_set {
             fn occupancy(
                 &self,
                 voxel: $crate::space::VoxelIndex,
-            ) -> $crate::error::Result<$crate::query::Occupancy> {
+            ) -> $crate::Result<$crate::query::Occupancy> {
                 Ok($crate::query::occupied_set::occupancy(self, voxel))
             }
 
@@ -195,10 +215,7 @@ macro_rules! answer_as_occupied_set {
                 Box::new($crate::query::occupied_set::voxels_in(self, region).into_iter().map(Ok))
             }
 
-            fn cast_ray(
-                &self,
-                ray: &$crate::query::RayQuery,
-            ) -> $crate::error::Result<Option<$crate::query::Hit>> {
+            fn cast_ray(&self, ray: &$crate::query::RayQuery) -> $crate::Result<Option<$crate::query::Hit>> {
                 $crate::query::occupied_set::cast_ray(self, ray)
             }
 
@@ -207,7 +224,7 @@ macro_rules! answer_as_occupied_set {
                 from: $crate::space::Point,
                 to: $crate::space::Point,
                 unknown: $crate::query::UnknownAs,
-            ) -> $crate::error::Result<Option<$crate::query::Hit>> {
+            ) -> $crate::Result<Option<$crate::query::Hit>> {
                 $crate::query::occupied_set::cast_segment(self, [from, to], unknown)
             }
 
@@ -215,7 +232,7 @@ macro_rules! answer_as_occupied_set {
                 &self,
                 body: &$crate::query::Shape,
                 unknown: $crate::query::UnknownAs,
-            ) -> $crate::error::Result<Option<$crate::query::Hit>> {
+            ) -> $crate::Result<Option<$crate::query::Hit>> {
                 $crate::query::occupied_set::collision(self, body, unknown)
             }
 
@@ -223,10 +240,9 @@ macro_rules! answer_as_occupied_set {
                 &self,
                 point: $crate::space::Point,
                 max_distance_m: f64,
-            ) -> $crate::error::Result<Option<$crate::query::Hit>> {
+            ) -> $crate::Result<Option<$crate::query::Hit>> {
                 $crate::query::occupied_set::nearest_occupied(self, point, max_distance_m)
             }
         }
     };
 }
-pub(crate) use answer_as_occupied_set;

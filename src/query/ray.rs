@@ -221,7 +221,7 @@ fn hull_of_map<V: MapView + ?Sized>(view: &V) -> Option<VoxelBox> {
 }
 
 /// The voxels of the brick that holds a voxel.
-pub(crate) fn brick_of(voxel: VoxelIndex) -> VoxelBox {
+pub fn brick_of(voxel: VoxelIndex) -> VoxelBox {
     let min = voxel.map(|k| k & !(BRICK_EDGE - 1));
     VoxelBox { min, end: min.map(|k| k.saturating_add(BRICK_EDGE)) }
 }

@@ -208,7 +208,7 @@ pub(super) fn bricks_in(tile: &Tile, voxels: &VoxelBox) -> impl Iterator<Item = 
 }
 
 /// The voxels whose center may lie in a box, and a few around.
-pub(crate) fn voxels_around(grid: &Grid, region: &Aabb) -> VoxelBox {
+pub fn voxels_around(grid: &Grid, region: &Aabb) -> VoxelBox {
     // A margin for the few around; voxels have indices up to the ends.
     let to_index =
         |coordinate: f64| coordinate.floor().clamp(f64::from(i32::MIN + 1), f64::from(i32::MAX - 2)) as i32;

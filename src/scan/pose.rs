@@ -65,10 +65,11 @@ impl Pose {
     }
 
     /// [`Pose::from_quaternion`], whose error is only the reason.
-    pub(crate) fn of_quaternion(
-        position_m: Point,
-        [x, y, z, w]: [f64; 4],
-    ) -> std::result::Result<Self, String> {
+    ///
+    /// # Errors
+    ///
+    /// The reason.
+    pub fn of_quaternion(position_m: Point, [x, y, z, w]: [f64; 4]) -> std::result::Result<Self, String> {
         check_finite(position_m.iter().chain(&[x, y, z, w]))?;
         let quaternion = Quaternion::new(w, x, y, z);
         if !quaternion.norm_squared().is_finite() {
@@ -79,7 +80,11 @@ impl Pose {
     }
 
     /// [`Pose::from_matrix`], whose error is only the reason.
-    pub(crate) fn of_matrix(rows: &[[f64; 4]]) -> std::result::Result<Self, String> {
+    ///
+    /// # Errors
+    ///
+    /// The reason.
+    pub fn of_matrix(rows: &[[f64; 4]]) -> std::result::Result<Self, String> {
         check_finite(rows.iter().flatten())?;
         let ([[a, b, c, x], [d, e, f, y], [g, h, i, z]], last) = match *rows {
             [first, second, third] => ([first, second, third], None),

@@ -51,6 +51,14 @@ impl SensorModel {
         })
     }
 
+    /// Least and most log-odds that a voxel can have.
+    pub const fn limits(&self) -> [f64; 2] {
+        match self {
+            Self::LogOdds(model) => [model.min, model.max],
+            Self::Iwlo(model) => [model.min, model.max],
+        }
+    }
+
     /// The model's name in commands and metadata.
     pub const fn name(&self) -> &'static str {
         match self {

@@ -69,7 +69,7 @@ pub const fn add_to_mask(mask: &mut BrickMask, place: usize) {
 
 /// The places of the bits that are set, lowest first.
 #[inline]
-pub(crate) fn ones(mut mask: u64) -> impl Iterator<Item = usize> {
+pub fn ones(mut mask: u64) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {
         let place = mask.trailing_zeros() as usize;
         mask &= mask.wrapping_sub(1);

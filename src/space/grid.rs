@@ -121,7 +121,7 @@ impl Grid {
 
     /// The voxel of a point in units of voxels; `None` as for [`Grid::voxel_of`].
     #[inline]
-    pub(crate) fn voxel_of_units(point: Point) -> Option<VoxelIndex> {
+    pub fn voxel_of_units(point: Point) -> Option<VoxelIndex> {
         // Also false for NaN.
         let is_in_range = |x: f64| x >= f64::from(i32::MIN) && x < f64::from(i32::MAX);
         point.iter().all(|&x| is_in_range(x)).then(|| point.map(floor))

@@ -22,7 +22,7 @@ mod tile_table;
 mod torus;
 
 pub use aabb::{Aabb, VoxelBox};
-pub(crate) use brick::ones;
+pub use brick::ones;
 pub use brick::{
     BRICK_EDGE, BRICK_VOXELS, BrickCode, BrickMask, add_to_mask, is_in_mask, mask_of_box, place_of_voxel,
     places,

@@ -95,7 +95,7 @@ pub trait Disk: Debug + Send + Sync {
 
 impl dyn Disk + '_ {
     /// [`Disk::kind`], whose error names the path.
-    pub(crate) fn kind_at(&self, path: &Path) -> Result<Option<EntryKind>> {
+    pub fn kind_at(&self, path: &Path) -> Result<Option<EntryKind>> {
         self.kind(path).map_err(|error| Error::io(path, "look at", error))
     }
 }

@@ -35,7 +35,7 @@ impl MapPath {
     }
 
     /// The disk and the folder.
-    pub(crate) fn into_parts(self) -> (Arc<dyn Disk>, PathBuf) {
+    pub fn into_parts(self) -> (Arc<dyn Disk>, PathBuf) {
         (self.disk, self.folder)
     }
 }

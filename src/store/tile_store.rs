@@ -481,7 +481,7 @@ impl std::fmt::Debug for SharedMetadata {
 }
 
 /// An id's bytes as hexadecimal digits.
-pub(crate) fn hex(bytes: &[u8]) -> String {
+pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 

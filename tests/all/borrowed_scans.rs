@@ -2,8 +2,6 @@ use std::path::Path;
 use tempfile::TempDir;
 use testkit::random_scans::Random;
 use testkit::unsynced_disk::UnsyncedDisk;
-use voxtile::io::{PointRoom, ScanSource, ScanStreamWriter, SensorScan, StoredScan, read_scan_stream};
-use voxtile::local::{LocalMap, LocalParameters, WithLocalMap};
 use voxtile::nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use voxtile::scan::{ScanReport, TakePoints};
 use voxtile::sensor::{Iwlo, SensorModel};
@@ -12,6 +10,8 @@ use voxtile::{
     Error, InMemoryMapper, InsertMode, MapConfig, MapPath, MapQueries, Mapper, OutOfCoreTileMapper, Pose,
     Scan, ScanPoints, ScanRef,
 };
+use voxtile_formats::{PointRoom, ScanSource, ScanStreamWriter, SensorScan, StoredScan, read_scan_stream};
+use voxtile_local::{LocalMap, LocalParameters, WithLocalMap};
 
 /// What a driver hands out: `f32` in the sensor's frame, intensities, and a pose from elsewhere.
 struct Measured {

@@ -1,8 +1,8 @@
-use crate::support::{message_of, some_of};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
 use testkit::random_scans::{Random, random_scan};
+use testkit::support::{message_of, some_of};
 use voxtile::integrity::{self, Action, ActionKind, Finding, Repair, Severity, Verification, verify};
 use voxtile::space::TileIndex;
 use voxtile::store::{TileFile, TileStore, tile_of_folder};

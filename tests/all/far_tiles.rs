@@ -4,16 +4,16 @@ use std::time::{Duration, Instant};
 use tempfile::TempDir;
 use testkit::random_scans::Random;
 use testkit::unsynced_disk::UnsyncedDisk;
-use voxtile::local::{LocalMap, LocalParameters};
 use voxtile::mapper::{MapStatistics, TileRef};
 use voxtile::query::UnknownAs;
 use voxtile::scan::PointBatch;
-use voxtile::share::VoxelSet;
 use voxtile::space::{Grid, LAST_VOXEL_INDEX, TileBox, TileIndex};
 use voxtile::{
     InMemoryMapper, MapConfig, MapPath, MapReader, MapView, Mapper, OutOfCoreTileMapper, Point, Queries,
     RayQuery, Scan,
 };
+use voxtile_local::{LocalMap, LocalParameters};
+use voxtile_share::VoxelSet;
 
 /// Asks for one tile after another, as a map does that knows nothing about the space between them.
 struct TileByTile<'a>(&'a InMemoryMapper);

@@ -1,7 +1,7 @@
-use crate::support::some_of;
 use std::path::PathBuf;
 use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
 use testkit::random_scans::{Random, random_scan};
+use testkit::support::some_of;
 use voxtile::{
     Error, InMemoryMapper, MapConfig, MapPath, MapQueries, MapReader, MapView, Mapper, Occupancy,
     OutOfCoreTileMapper, Queries, Result, Scan, Storage,

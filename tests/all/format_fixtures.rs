@@ -12,15 +12,15 @@ use std::time::Duration;
 use tempfile::TempDir;
 use testkit::random_scans::{Random, random_scan};
 use voxtile::integrity::verify;
-use voxtile::io::{ScanStreamWriter, open_scans};
 use voxtile::operations::{Decay, Part, clear, decay};
 use voxtile::sensor::{Evidence, Iwlo, SensorModel};
-use voxtile::share::codec::Packet;
-use voxtile::share::{Sender, SenderConfig, VoxelSet, read_layer, write_layer};
 use voxtile::space::{Aabb, VoxelBox, VoxelKey};
 use voxtile::store::SnapshotName;
 use voxtile::tile::format::{CompactFileIndex, read_compact_file, read_compact_voxels_from};
 use voxtile::{MapConfig, MapQueries, MapReader, MapView, Mapper, OutOfCoreTileMapper, Scan, Storage};
+use voxtile_formats::{ScanStreamWriter, open_scans};
+use voxtile_share::codec::Packet;
+use voxtile_share::{Sender, SenderConfig, VoxelSet, read_layer, write_layer};
 
 const MAPS: [&str; 4] = ["plain", "killed", "compact", "seed"];
 

@@ -5,16 +5,16 @@ use std::collections::BTreeMap;
 use tempfile::TempDir;
 use testkit::random_scans::{Random, random_scan};
 use testkit::unsynced_disk::UnsyncedDisk;
-use voxtile::local::{LocalMap, LocalParameters, Obstacle};
 use voxtile::nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use voxtile::scan::RayWalk;
-use voxtile::share::VoxelSet;
 use voxtile::space::{Aabb, Grid, Point, VoxelIndex};
 use voxtile::store::SnapshotName;
 use voxtile::{
     InMemoryMapper, MapConfig, MapPath, MapQueries, MapReader, Mapper, Occupancy, OutOfCoreTileMapper,
     Queries, RayQuery, Shape, United, UnknownAs,
 };
+use voxtile_local::{LocalMap, LocalParameters, Obstacle};
+use voxtile_share::VoxelSet;
 
 type Voxels = BTreeMap<VoxelIndex, Occupancy>;
 

@@ -367,7 +367,7 @@ fn a_removal_is_refused_before_it_changes_anything_while_the_catalog_of_a_snapsh
     let (before, flush) = (digest(&disk), flush_number(&disk));
     let how = rework().with_keep_as(name("before"));
     let refused = remove_scans(at(&disk), &ScanSelection::Numbers(2, 2), true, &how, |_, _| ());
-    let message = crate::support::message_of(refused);
+    let message = testkit::support::message_of(refused);
     let parts = ["catalog.1: ", "the snapshot s needs it", "nothing was changed"];
     assert!(parts.iter().all(|part| message.contains(part)), "{message}");
     assert_eq!((digest(&disk), flush_number(&disk)), (before, flush));
@@ -389,7 +389,7 @@ fn a_snapshot_that_cannot_be_read_is_part_of_the_answer_of_a_removal() {
     assert!(failed.name == name("t") && failed.reason.contains("may hold some"), "{failed:?}");
     assert_eq!(kept(&disk).unwrap(), [1, 4, 5]);
     // Nothing else is left to do.
-    let message = crate::support::message_of(remove(2));
+    let message = testkit::support::message_of(remove(2));
     assert!(message.contains("snapshots/t") && message.contains("may hold some"), "{message}");
 }
 
@@ -475,7 +475,7 @@ fn a_deletion_whose_points_the_disk_does_not_remove_fails_and_is_completed_by_an
     let (own, snapshot_t) = (own.unwrap(), name("t"));
     let bytes = disk.files()[&own].clone();
     disk.take(&own);
-    let message = crate::support::message_of(delete_snapshot(at(&disk), &name("s")));
+    let message = testkit::support::message_of(delete_snapshot(at(&disk), &name("s")));
     assert!(
         message.contains("the snapshot s is deleted, but points") && disk.files().contains_key(&segment),
         "{message}"

@@ -1,11 +1,11 @@
 //! What a command that is killed, or that the disk refuses a rename, leaves in a map: reported by `verify`, completed by
 //! the next writer and by the same command.
 
-use crate::support::{message_of, some_of};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
 use testkit::random_scans::{Random, random_scan};
+use testkit::support::{message_of, some_of};
 use voxtile::integrity::{Verification, repair, verify};
 use voxtile::operations::{
     Decay, NewPoses, Part, Remap, RemapBeside, Rework, ScanSelection, clear, decay, delete_snapshot,

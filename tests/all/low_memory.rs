@@ -5,11 +5,11 @@ use std::thread;
 use std::time::Duration;
 use testkit::memory_folder::memory_folder;
 use testkit::unsynced_disk::UnsyncedDisk;
-use voxtile::simulation::Survey;
 use voxtile::{
     InMemoryMapper, MapConfig, MapPath, MapQueries, MapReader, MapView, Mapper, OutOfCoreTileMapper, Scan,
     ScanRef,
 };
+use voxtile_simulation::Survey;
 
 fn config() -> MapConfig {
     MapConfig::new(0.2, 6.4).unwrap().with_range(0.0, 20.0)

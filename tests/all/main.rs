@@ -1,54 +1,14 @@
-//! All integration tests in one binary, a module a subject.
+//! All integration tests of the engine in one binary, a module a subject.
 
 /// Scans as people have them: borrowed, narrow, in either frame; poses of every form.
 mod borrowed_scans;
-/// The command as a person types it.
-#[cfg(feature = "cli")]
-mod cli;
-/// The commands that merge, crop, clear and fade.
-#[cfg(feature = "cli")]
-mod cli_edit;
-/// Files that are exported: whole or not there, where they say, and no stranger's.
-#[cfg(feature = "cli")]
-mod cli_export;
-/// Files of other programs, in and out.
-#[cfg(feature = "cli")]
-mod cli_formats;
-/// Help, man pages and completion scripts.
-#[cfg(feature = "cli")]
-mod cli_help;
-/// What `--json` prints: the version, shapes of places and boxes, failures.
-#[cfg(feature = "cli")]
-mod cli_json;
-/// What `-q`, `-v` and `RUST_LOG` say beside the answer.
-#[cfg(feature = "cli")]
-mod cli_log;
-/// Pictures, in files and for terminals, and reports.
-#[cfg(feature = "cli")]
-mod cli_pictures;
-/// Poses that come with files, beside them or by options.
-#[cfg(feature = "cli")]
-mod cli_poses;
-/// Maps of a region from the command line.
-#[cfg(feature = "cli")]
-mod cli_region;
-/// Maps that follow new poses, by the command.
-#[cfg(feature = "cli")]
-mod cli_remap;
-/// Snapshots from the command line.
-#[cfg(feature = "cli")]
-mod cli_snapshots;
 /// Maps with another storage: the same content, and there and back the same files.
 mod convert;
 /// Every byte of every file of a map, damaged: found, named, repaired.
 mod corruption;
-/// Recordings with damaged chunks.
-#[cfg(all(feature = "cli", feature = "ros"))]
-mod damaged_recordings;
 /// Deletions of snapshots that are killed.
 mod deletions;
 /// Errors: what they say, their causes, what they are about.
-#[cfg(feature = "cli")]
 mod errors;
 /// Maps whose tiles are far from each other.
 mod far_tiles;
@@ -62,9 +22,6 @@ mod format_fixtures;
 mod front_door;
 /// Inputs that fuzzing found worth keeping, once more.
 mod fuzz_corpus;
-/// Builds that are resumed, maps that are verified and repaired, from the command line.
-#[cfg(feature = "cli")]
-mod interrupted;
 /// Damage to the files of kept scans, of the map and of its snapshots.
 mod kept_damage;
 /// Files of kept scans under the hands of a writer.
@@ -77,18 +34,11 @@ mod leftovers;
 mod live_arrays;
 /// Readers in other threads beside the mapper.
 mod live_readers;
-/// The local map against a naive one, after every update; what planners ask; archives beside it.
-mod local_map;
 mod low_memory;
 /// Lives of maps in commands of their own, against a naive life: removed tiles, and every operation as a fault.
 mod map_life;
 /// The same sentences about every mapper: equal to the naive one, to the bit.
 mod mapper_contract;
-/// Messages of ROS that tests make.
-#[cfg(all(feature = "cli", feature = "ros"))]
-#[allow(dead_code)]
-#[path = "../../clouds/tests/made/message.rs"]
-mod message;
 /// Random insert, query, eviction, flush, crash, reopen: always the naive map as of then.
 mod model;
 /// What the OctoCache paper says, where it can be tried.
@@ -101,9 +51,6 @@ mod octree_export;
 mod operations;
 /// Maps opened and created by options.
 mod options;
-/// Pictures of known maps, pixel by pixel, and counts of what a map holds.
-#[cfg(feature = "render")]
-mod pictures;
 /// Queries against brute force.
 mod queries;
 /// Scans from files, good and bad.
@@ -117,8 +64,6 @@ mod scan_list;
 /// The stream of scans, in files and from standard input.
 mod scan_stream;
 mod scans_together;
-/// Map sharing: codec, convergence over bad links, layers.
-mod sharing;
 /// The names of snapshots: in their files, and in the log.
 mod snapshot_names;
 /// Snapshots, reverts and diffs against naive ones; their damage and repair.
@@ -127,16 +72,12 @@ mod snapshots;
 mod space;
 /// Files of a map: what a flush leaves, what damage is told, what is never overwritten.
 mod store;
-mod support;
 /// Scans that count in some tiles only, and maps of a region.
 mod tile_selection;
 /// Drives that a cache of tiles likes and some that it does not.
 mod trajectories;
 /// Files that the medium does not give back.
 mod unreadable;
-/// Maps in a browser, by what the server sends.
-#[cfg(all(feature = "view", target_os = "linux"))]
-mod view;
 /// Voxel caches in every mode: the same map and coarse answers, and counts as a naive cache has them.
 mod voxel_cache;
 mod wide_scans;

@@ -1,9 +1,9 @@
-use crate::support::some_of;
 use std::collections::BTreeMap;
 use std::path::Path;
 use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
 use testkit::random_scans::{Random, random_scan};
 use testkit::reference_map::{ReferenceMap, Voxels, voxels_of};
+use testkit::support::some_of;
 use voxtile::integrity::{Finding, Severity, Verification, verify};
 use voxtile::operations::{delete_snapshot, revert, snapshot};
 use voxtile::space::TileIndex;

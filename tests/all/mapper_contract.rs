@@ -7,9 +7,9 @@ use voxtile::mapper::{InMemoryMapper, MapReader, MapView, Mapper, OutOfCoreTileM
 use voxtile::query::{MapQueries, Queries};
 use voxtile::scan::PointBatch;
 use voxtile::sensor::{Iwlo, SensorModel};
-use voxtile::simulation::Survey;
 use voxtile::space::{TileIndex, VoxelKey};
 use voxtile::{InsertMode, MapConfig, MapPath, Storage, VoxelCacheConfig, VoxelCacheMode};
+use voxtile_simulation::Survey;
 
 /// Small tiles, so that a scan of a few metres touches many.
 fn config() -> MapConfig {

@@ -1,8 +1,8 @@
 //! OctoMap's `.bt` and `.ot` files: real maps, bytes written by hand, and bytes that are no map.
 
-use crate::support::{fixtures, shared_data};
 use proptest::prelude::*;
 use std::path::PathBuf;
+use testkit::support::{fixtures, shared_data};
 use voxtile::DecodeError;
 use voxtile::octree::{
     Leaf, OCTOMAP_MAX_LOG_ODDS as OCCUPIED, OCTOMAP_MIN_LOG_ODDS as FREE, Octree, OctreeFormat, read,

@@ -1,9 +1,9 @@
-use crate::support::{fixtures, message_of, shared_data};
 use std::fs;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 use testkit::random_scans::Random;
-use voxtile::io::{SensorScan, open_scans, parse_poses, read_pcd, read_poses};
+use testkit::support::{fixtures, message_of, shared_data};
+use voxtile_formats::{SensorScan, open_scans, parse_poses, read_pcd, read_poses};
 
 const HEADER: &str =
     "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z intensity\nSIZE 4 4 4 4\nTYPE F F F F\nCOUNT 1 1 1 1\n";
@@ -176,7 +176,7 @@ fn unplaced(folder: &Path, names: &[&str]) {
 /// A caller of the library says what the command's arguments cannot.
 #[test]
 fn points_in_the_world_frame_are_not_deskewed() {
-    use voxtile::io::{ReadOptions, open_any_scans};
+    use voxtile_formats::{ReadOptions, open_any_scans};
     let folder = TempDir::new().unwrap();
     unplaced(folder.path(), &["0.pcd"]);
     let mut options = ReadOptions::default();
@@ -188,7 +188,7 @@ fn points_in_the_world_frame_are_not_deskewed() {
 
 #[test]
 fn files_come_in_natural_order_and_scans_without_poses_are_refused() {
-    use voxtile::io::PoseSource;
+    use voxtile_formats::PoseSource;
     let folder = TempDir::new().unwrap();
     let names: Vec<String> = (0..12).map(|number| format!("full{number}.pcd")).collect();
     unplaced(folder.path(), &names.iter().map(String::as_str).collect::<Vec<_>>());
@@ -224,7 +224,7 @@ fn a_file_without_the_viewpoint_that_others_have_is_an_error_of_its_own() {
     }
     unplaced(folder.path(), &["2.pcd"]);
     let mut source = open_scans(folder.path(), None).unwrap();
-    assert_eq!(source.pose_source(), voxtile::io::PoseSource::Viewpoint);
+    assert_eq!(source.pose_source(), voxtile_formats::PoseSource::Viewpoint);
     assert!(source.next_scan().unwrap().is_some() && source.next_scan().unwrap().is_some());
     assert!(message_of(source.next_scan()).contains("no VIEWPOINT in this file"));
     assert!(source.pass_unread() && source.next_scan().unwrap().is_none());

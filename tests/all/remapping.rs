@@ -1,12 +1,12 @@
 //! Maps that keep their scans: random lives against the naive map of the scans that are left, under the poses as of
 //! now; faults and power cuts in the middle.
 
-use crate::support::{message_of, some_of};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
 use testkit::random_scans::{Random, random_scan};
 use testkit::reference_map::{ReferenceMap, Voxels, voxels_of};
+use testkit::support::{message_of, some_of};
 use voxtile::integrity::{Finding, Severity, repair, verify};
 use voxtile::operations::{
     NewPoses, Part, Remap, RemapBeside, Rework, ScanSelection, clear, delete_snapshot, remap, remove_points,

@@ -1,9 +1,9 @@
 //! Remapping beside a mapper that goes on; what it makes of random lives is tested where the others are (`remapping`).
 
-use crate::support::message_of;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use testkit::random_scans::{Random, random_scan};
+use testkit::support::message_of;
 use voxtile::integrity::{Finding, Severity, verify};
 use voxtile::operations::{
     NewPoses, Part, Remap, RemapBeside, Rework, ScanSelection, clear, remap, remove_scans,

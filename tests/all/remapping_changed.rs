@@ -1,11 +1,11 @@
 //! A build that flushes between a look at a map and its lock: what is to be removed was decided without its scans.
 
-use crate::support::message_of;
 use std::fmt;
 use std::io;
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 use testkit::faulty_disk::{Fault, FaultyDisk};
+use testkit::support::message_of;
 use voxtile::operations::{NewPoses, Remap, Rework, ScanSelection, remap, remove_points, remove_scans};
 use voxtile::store::{Disk, DiskLock, DiskRead, DiskWrite, EntryKind, ReaderWatch, Scratch};
 use voxtile::{

@@ -4,12 +4,12 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use testkit::random_scans::{Random, random_scan};
 use testkit::unsynced_disk::UnsyncedDisk;
 use voxtile::sensor::{Iwlo, SensorModel};
-use voxtile::simulation::Survey;
 use voxtile::space::TileBox;
 use voxtile::{
     InMemoryMapper, InsertMode, MapConfig, MapPath, MapQueries, MapReader, MapView, Mapper,
     OutOfCoreTileMapper, Scan, ScanPoints, ScanReport, Storage,
 };
+use voxtile_simulation::Survey;
 
 /// Of many rays and of few, and one of none.
 fn scans() -> Vec<Scan> {

@@ -1,7 +1,7 @@
-use crate::support::message_of;
 use std::path::{Path, PathBuf};
 use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
 use testkit::random_scans::{Random, random_scan};
+use testkit::support::message_of;
 use voxtile::integrity::{Severity, repair, verify};
 use voxtile::operations::{delete_snapshot, revert, snapshots};
 use voxtile::store::{CommitLog, Layout, SnapshotName, TileStore, read_log};

@@ -1,15 +1,15 @@
-use crate::support::message_of;
 use std::fs;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 use testkit::random_scans::{Random, random_scan};
 use testkit::reference_map::voxels_of;
+use testkit::support::message_of;
 use testkit::unsynced_disk::UnsyncedDisk;
 use voxtile::integrity::verify;
-use voxtile::simulation::{City, Drive, Lidar, Survey};
 use voxtile::space::TileIndex;
 use voxtile::store::{InputContent, InputRecord, TileStore};
 use voxtile::{Error, MapConfig, MapPath, MapQueries, MapReader, MapView, Mapper, OutOfCoreTileMapper};
+use voxtile_simulation::{City, Drive, Lidar, Survey};
 
 fn config() -> MapConfig {
     MapConfig::new(0.1, 3.2).unwrap().with_cache_tiles(2).with_write_buffer_bytes(1000)

@@ -4,12 +4,12 @@ use testkit::random_scans::{Random, random_scan};
 use testkit::reference_map::{ReferenceMap, Voxels, voxels_of};
 use voxtile::query::MapQueries;
 use voxtile::sensor::{Iwlo, SensorModel};
-use voxtile::simulation::Survey;
 use voxtile::store::InputRecord;
 use voxtile::{
     Aabb, Error, InMemoryMapper, InsertMode, MapConfig, MapOptions, MapPath, MapReader, MapView, Mapper,
     OutOfCoreTileMapper, TileBox, TileIndex, TileSelection,
 };
+use voxtile_simulation::Survey;
 
 fn configs() -> Vec<MapConfig> {
     let mut configs = Vec::new();

@@ -1,7 +1,7 @@
 use tempfile::TempDir;
 use voxtile::mapper::{MapView, OutOfCoreTileMapper};
-use voxtile::simulation::Survey;
 use voxtile::{InMemoryMapper, MapConfig, MapQueries, Mapper, Scan};
+use voxtile_simulation::Survey;
 
 /// A map with room for few tiles and little that waits is the map in memory.
 fn check(name: &str, resolution_m: f64, scans: impl Iterator<Item = Scan>) -> u64 {

@@ -5,11 +5,11 @@ use testkit::reference_map::{ReferenceMap, voxels_of};
 use testkit::unsynced_disk::UnsyncedDisk;
 use voxtile::scan::PointBatch;
 use voxtile::sensor::{Iwlo, SensorModel};
-use voxtile::simulation::Survey;
 use voxtile::space::{MortonCode, TileIndex, VoxelIndex, VoxelKey};
 use voxtile::tile::{OctreeStatistics, VoxelCacheCounts};
 use voxtile::{InMemoryMapper, InsertMode, MapConfig, MapPath, MapView, Mapper, OutOfCoreTileMapper};
 use voxtile::{MapQueries, VoxelCacheConfig, VoxelCacheMode};
+use voxtile_simulation::Survey;
 
 /// Every mode, with caches that hold nothing, little, and what they like.
 fn modes() -> Vec<VoxelCacheMode> {

@@ -1,4 +1,5 @@
 use crate::error::{Error, Result};
+use crate::mapper::MapReader;
 use crate::scan::Pose;
 use crate::store::KeptRecords;
 use rustc_hash::FxHashMap;
@@ -29,7 +30,12 @@ impl NewPoses {
     /// # Errors
     ///
     /// A scan without a pose, a pose without a scan, numbers that are not finite: named.
-    pub(crate) fn by_number(&self, mut records: KeptRecords) -> Result<FxHashMap<u64, Pose>> {
+    pub fn of_scans(&self, map: &MapReader) -> Result<FxHashMap<u64, Pose>> {
+        self.by_number(map.kept_records()?)
+    }
+
+    /// The same, from the records of the scans.
+    pub(super) fn by_number(&self, mut records: KeptRecords) -> Result<FxHashMap<u64, Pose>> {
         let mut scans = Vec::new();
         while let Some(record) = records.next_kept()? {
             scans.push((record.number, record.stamp_ns));

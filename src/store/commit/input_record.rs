@@ -62,13 +62,12 @@ impl InputRecord {
     }
 
     /// Whether the input goes by this name in a map, which may have only the beginning of it.
-    pub(crate) fn is_named(&self, name: &str) -> bool {
+    pub fn is_named(&self, name: &str) -> bool {
         self.name == name || self.name == beginning_of(name)
     }
 
     /// What its first scan with points is, if that is known.
-    #[cfg(feature = "cli")]
-    pub(crate) fn begins_with(&self) -> Option<&str> {
+    pub fn begins_with(&self) -> Option<&str> {
         self.content.as_ref()?.begins_with.as_deref()
     }
 

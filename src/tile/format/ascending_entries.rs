@@ -119,10 +119,10 @@ mod tests {
     use super::super::any_order_entries::AnyOrderEntries;
     use super::super::gather::VoxelSieve;
     use super::*;
-    use crate::simulation::Random;
     use crate::tile::Table;
     use crate::tile::format::encode_entries;
     use std::collections::BTreeMap;
+    use voxtile_simulation::Random;
 
     const VOXELS: VoxelBox = VoxelBox { min: [-21, 65_530, 3], end: [0, 65_551, 24] };
 

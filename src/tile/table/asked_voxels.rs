@@ -86,8 +86,8 @@ impl<'a> Found<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simulation::Random;
     use crate::space::{BRICK_VOXELS, BrickCode};
+    use voxtile_simulation::Random;
 
     #[test]
     fn many_voxels_are_what_each_of_them_is() {

@@ -4,16 +4,16 @@ use super::targets::{TILES, compact_bytes, entries_end, grid};
 use crate::readers::{graph, pcd, points};
 use std::fs;
 use tempfile::TempDir;
-use voxtile::io::ScanStreamWriter;
 use voxtile::octree::{Octree, write_bt, write_bt_unpruned, write_ot};
 use voxtile::sensor::Evidence;
-use voxtile::share::codec::{DigestEntry, Header, Packet, Request, Status, Update};
-use voxtile::share::{SetRange, VoxelSet, write_layer};
 use voxtile::space::{BrickCode, Grid, MortonCode, TileIndex, VoxelKey};
 use voxtile::store::{Layout, TileFile};
 use voxtile::tile::Table;
 use voxtile::tile::format::{Trailer, write_compact_file};
 use voxtile::{MapConfig, Mapper, OutOfCoreTileMapper, Scan};
+use voxtile_formats::ScanStreamWriter;
+use voxtile_share::codec::{DigestEntry, Header, Packet, Request, Status, Update};
+use voxtile_share::{SetRange, VoxelSet, write_layer};
 
 /// Target, name and content of seeds.
 pub type Seeds = Vec<(&'static str, &'static str, Vec<u8>)>;

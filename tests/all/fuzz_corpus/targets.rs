@@ -7,15 +7,9 @@
 use std::path::Path;
 use std::time::Duration;
 use voxtile::Pose;
-use voxtile::io::{
-    PcdCloud, ScanSource, parse_poses, read_pcd, read_points, read_scan_graph, read_scan_log,
-    read_scan_stream,
-};
 use voxtile::octree::{
     OctreeFile, OctreeFormat, read, read_with_limit, write_bt, write_bt_unpruned, write_ot,
 };
-use voxtile::share::codec::{Packet, Request};
-use voxtile::share::{Receiver, ReceiverConfig, Sender, SenderConfig, read_layer};
 use voxtile::space::{Grid, TileIndex, VoxelBox, VoxelKey};
 use voxtile::store::{CommitLog, Metadata};
 use voxtile::tile::Table;
@@ -23,6 +17,12 @@ use voxtile::tile::format::{
     CompactEffort, CompactFileIndex, TRAILER_BYTES, Trailer, read_compact, read_compact_file,
     read_compact_front, read_table, write_compact, write_compact_file, write_table,
 };
+use voxtile_formats::{
+    PcdCloud, ScanSource, parse_poses, read_pcd, read_points, read_scan_graph, read_scan_log,
+    read_scan_stream,
+};
+use voxtile_share::codec::{Packet, Request};
+use voxtile_share::{Receiver, ReceiverConfig, Sender, SenderConfig, read_layer};
 
 pub type Target = fn(&[u8]) -> bool;
 

@@ -1,8 +1,8 @@
 use anyhow::{Context, Result};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
-use voxtile::io::open_scans;
 use voxtile::{MapConfig, MemoryLimit, Scan};
+use voxtile_formats::open_scans;
 use workload::SurveyName;
 
 /// Scans, and the map that is made of them.

@@ -6,10 +6,10 @@ use std::fs::{self, File};
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use voxtile::io::{VoxelFile, VoxelFormat, VoxelRecord, VoxelWriter};
 use voxtile::octree::OctreeFormat;
 use voxtile::query::OctreeExport;
 use voxtile::{MapQueries, MapReader, MapView};
+use voxtile_formats::{VoxelFile, VoxelFormat, VoxelRecord, VoxelWriter};
 
 /// A map to export in little memory.
 #[derive(Clone, Debug, Serialize, Deserialize)]

@@ -5,7 +5,7 @@ use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use voxtile::Scan;
-use voxtile::io::ScanStreamWriter;
+use voxtile_formats::ScanStreamWriter;
 use workload::SurveyName;
 
 /// An input that is hard on memory, and the map that the command makes of it.
@@ -250,7 +250,7 @@ mod tests {
         for points in [1, 2, 67, 68, 1000, 70_001] {
             let mut file = Vec::new();
             write_packed(points, &mut file).unwrap();
-            let cloud = voxtile::io::read_pcd(&file).unwrap();
+            let cloud = voxtile_formats::read_pcd(&file).unwrap();
             assert_eq!(cloud.points, vec![[3.0, 4.0, 5.0]; points as usize]);
         }
     }

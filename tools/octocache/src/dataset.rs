@@ -1,8 +1,8 @@
 use anyhow::{Context, Result};
 use std::path::{Path, PathBuf};
-use voxtile::io::open_scans;
 use voxtile::space::MAX_VOXELS_PER_TILE_EDGE;
 use voxtile::{MapConfig, Scan};
+use voxtile_formats::open_scans;
 use workload::SurveyName;
 
 /// Scans that the questions are put to.

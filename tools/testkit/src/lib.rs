@@ -3,7 +3,8 @@
 //! - what a clever part must equal: [`reference_map`], [`reference_local`];
 //! - what goes wrong: [`faulty_disk`], [`lossy_link`];
 //! - what they work on: [`random_scans`], [`unsynced_disk`], [`memory_folder`],
-//!   [`planner`].
+//!   [`planner`];
+//! - where files are, and what errors say: [`support`].
 
 #[allow(missing_docs)]
 pub mod faulty_disk;
@@ -19,6 +20,7 @@ pub mod random_scans;
 pub mod reference_local;
 #[allow(missing_docs)]
 pub mod reference_map;
+pub mod support;
 #[allow(missing_docs)]
 pub mod unsynced_disk;
 

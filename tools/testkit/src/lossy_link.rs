@@ -1,5 +1,5 @@
 use std::time::Duration;
-use voxtile::simulation::Random;
+use voxtile_simulation::Random;
 
 /// A link that loses, repeats, delays and reorders packets, or is cut.
 pub struct LossyLink {

@@ -1,8 +1,8 @@
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashMap};
-use voxtile::local::{LocalState, LocalView, Obstacle};
 use voxtile::space::Point;
 use voxtile::{Queries, UnknownAs};
+use voxtile_local::{LocalState, LocalView, Obstacle};
 
 /// Between the nodes of the search.
 const STEP_M: f64 = 0.4;

@@ -1,9 +1,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 use voxtile::Scan;
-use voxtile::local::{LocalParameters, LocalState, LocalView};
 use voxtile::maths::logit;
 use voxtile::scan::RayWalk;
 use voxtile::space::{Grid, Point, VoxelIndex};
+use voxtile_local::{LocalParameters, LocalState, LocalView};
 
 /// The naive local map that the real one must equal: a list for the history, everything else found anew every time.
 pub struct ReferenceLocal {

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 use voxtile::Scan;
-use voxtile::io::open_scans;
+use voxtile_formats::open_scans;
 use workload::{ScanWriter, SurveyName};
 
 /// Scans that are mapped, and how finely.

@@ -7,7 +7,7 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use voxtile::Scan;
-use voxtile::io::ScanStreamWriter;
+use voxtile_formats::ScanStreamWriter;
 use workload::{Length, ScanWriter, SurveyName};
 
 /// Writes the scans of a made-up survey, as a scan stream that `voxtile build` reads.

@@ -1,7 +1,7 @@
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 use voxtile::Scan;
-use voxtile::simulation::Survey;
+use voxtile_simulation::Survey;
 
 /// Which of the made-up surveys.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]

@@ -159,10 +159,9 @@ proptest! {
 /// Bytes a point and times on the real sets: `cargo test --release --lib codec -- --ignored --nocapture`.
 #[test]
 #[ignore = "a table, by hand"]
-#[cfg(feature = "clouds")]
 fn a_table_of_real_sets() {
-    use crate::io::{ReadOptions, open_any_scans};
     use std::time::Instant;
+    use voxtile_formats::{ReadOptions, open_any_scans};
     let root = std::env::var_os("VOXTILE_DATA").unwrap_or_else(|| "../shared/data".into());
     for set in [
         "balm_os0_hall",
@@ -173,8 +172,8 @@ fn a_table_of_real_sets() {
         "las_large_coords/lidR_Megaplot.laz",
         "las_large_coords/autzen_trim.laz",
     ] {
-        let poses = set.ends_with("laz").then(|| "identity".into());
-        let options = ReadOptions { poses, ..ReadOptions::default() };
+        let mut options = ReadOptions::default();
+        options.poses = set.ends_with("laz").then(|| "identity".into());
         let Ok(mut source) = open_any_scans(&std::path::Path::new(&root).join(set), &options) else {
             continue;
         };

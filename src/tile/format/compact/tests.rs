@@ -5,11 +5,11 @@ use super::{
 };
 use crate::error::{DecodeError, FormatError};
 use crate::sensor::Evidence;
-use crate::simulation::Random;
 use crate::space::{BrickCode, MortonCode, VoxelBox, VoxelKey};
 use crate::tile::Table;
 use crate::tile::table::{Palette, Storage};
 use std::collections::BTreeMap;
+use voxtile_simulation::Random;
 
 type Voxels = BTreeMap<MortonCode, Evidence>;
 

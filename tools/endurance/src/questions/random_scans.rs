@@ -9,8 +9,8 @@ use anyhow::Result;
 use std::fs;
 use std::time::{Duration, Instant};
 use voxtile::MemoryLimit;
-use voxtile::simulation::Random;
 use voxtile::space::Grid;
+use voxtile_simulation::Random;
 
 /// The worst peak of random inputs in random limits.
 pub fn answer(setting: &Setting) -> Result<Findings> {

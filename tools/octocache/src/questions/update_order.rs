@@ -13,8 +13,8 @@ use rustc_hash::FxHashSet;
 use std::hint::black_box;
 use voxtile::octree::Octree;
 use voxtile::sensor::SensorModel;
-use voxtile::simulation::Random;
 use voxtile::space::{MortonCode, VoxelKey};
+use voxtile_simulation::Random;
 
 const RESOLUTION_M: f64 = 0.1;
 

@@ -13,12 +13,12 @@ use clap::ValueEnum;
 use report::Stopwatch;
 use std::hint::black_box;
 use std::path::Path;
-use voxtile::io::open_scans;
-use voxtile::simulation::Random;
 use voxtile::{
     Aabb, InMemoryMapper, MapConfig, MapQueries, Mapper, Occupancy, Point, Queries, RayQuery, Scan, Shape,
     UnknownAs,
 };
+use voxtile_formats::open_scans;
+use voxtile_simulation::Random;
 use workload::SurveyName;
 
 const SEED: u64 = 1;

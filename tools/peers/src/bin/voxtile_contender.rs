@@ -14,11 +14,11 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 use voxtile::scan::ScanPoints;
 use voxtile::sensor::{Iwlo, SensorModel};
-use voxtile::simulation::Random;
 use voxtile::space::{Point, VoxelIndex};
 use voxtile::{
     InMemoryMapper, InsertMode, MapConfig, MapView, Mapper, Occupancy, OutOfCoreTileMapper, Queries, Scan,
 };
+use voxtile_simulation::Random;
 use workload::ScanReader;
 
 const TILE_SIZE_M: f64 = 10.0;

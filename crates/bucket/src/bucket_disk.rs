@@ -1,0 +1,251 @@
+use super::bucket::{Bucket, missing_object};
+use super::file_list::FileList;
+use super::manifest::{PART_BYTES, StoredFile};
+use super::part_reader::PartReader;
+use super::pending::Pending;
+use bytes::Bytes;
+use lru::LruCache;
+use object_store::UpdateVersion;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use voxtile::scratch::Scratch;
+use voxtile::store::{Disk, DiskLock, DiskRead, DiskWrite, EntryKind, MapPath, ReaderWatch};
+use voxtile::{Error, Result};
+
+/// A map in a bucket as files that can be read and not written, as of the push that was the last when it was opened.
+///
+/// Whoever walks over tiles gets the next ones fetched meanwhile, several at a time.
+#[derive(Debug)]
+pub struct BucketDisk {
+    bucket: Bucket,
+    /// What stands before every path.
+    root: PathBuf,
+    list: FileList,
+    /// Of the manifest.
+    version: UpdateVersion,
+    ahead: Mutex<Ahead>,
+}
+
+/// Files that were asked for and not opened yet.
+#[derive(Debug)]
+struct Ahead {
+    files: LruCache<String, (u64, Pending<Bytes>)>,
+    bytes: u64,
+}
+
+/// Files that may be asked for ahead, and their bytes.
+const FILES_AHEAD: usize = 16;
+const BYTES_AHEAD: u64 = 2 * PART_BYTES;
+
+impl BucketDisk {
+    /// Reads the manifest of the map in a bucket.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::NoMap`] if there is none; a store that refuses.
+    pub fn open(bucket: Bucket) -> Result<Self> {
+        let found = bucket.manifest()?.ok_or_else(|| Error::NoMap { path: bucket.path().to_owned() })?;
+        Ok(Self {
+            root: bucket.path().to_owned(),
+            list: FileList::new(bucket.clone(), found.manifest),
+            bucket,
+            version: found.version,
+            ahead: Mutex::new(Ahead { files: LruCache::unbounded(), bytes: 0 }),
+        })
+    }
+
+    /// Where the map is, for [`MapReader`](voxtile::MapReader) and all that takes a path of a map.
+    pub fn into_map_path(self) -> MapPath {
+        let root = self.root.clone();
+        MapPath::on(Arc::new(self), root)
+    }
+
+    /// The path of a file in the map, with `/` between names; `None` if it is no path below the map's.
+    fn path_in_map(&self, path: &Path) -> Option<String> {
+        let names = path.strip_prefix(&self.root).ok()?.iter();
+        names.map(|name| name.to_str()).collect::<Option<Vec<_>>>().map(|names| names.join("/"))
+    }
+
+    fn open_from(&self, path: &Path, offset: u64) -> io::Result<Box<dyn DiskRead>> {
+        let name = self.path_in_map(path).ok_or(io::ErrorKind::NotFound)?;
+        let file: StoredFile = self.list.file(&name)?.ok_or(io::ErrorKind::NotFound)?;
+        let first = if offset == 0 { self.ahead().take(&name) } else { None };
+        Ok(Box::new(PartReader::new(self.bucket.clone(), file, offset, first)?))
+    }
+
+    fn ahead(&self) -> MutexGuard<'_, Ahead> {
+        self.ahead.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Ahead {
+    fn take(&mut self, name: &str) -> Option<Pending<Bytes>> {
+        let (bytes, pending) = self.files.pop(name)?;
+        self.bytes -= bytes;
+        Some(pending)
+    }
+
+    /// Asks for a file, if another thread has not done so.
+    fn ask(&mut self, name: String, bytes: u64, fetch: impl FnOnce() -> Pending<Bytes>) {
+        if self.files.contains(&name) {
+            return;
+        }
+        self.make_room(bytes);
+        self.files.put(name, (bytes, fetch()));
+        self.bytes += bytes;
+    }
+
+    /// Makes room for a file; those asked for longest ago, which nobody wanted, go.
+    fn make_room(&mut self, bytes: u64) {
+        while (self.files.len() >= 2 * FILES_AHEAD || self.bytes + bytes > BYTES_AHEAD)
+            && let Some((_, (dropped, _))) = self.files.pop_lru()
+        {
+            self.bytes -= dropped;
+        }
+    }
+}
+
+fn read_only<T>() -> io::Result<T> {
+    let reason =
+        "a map in a bucket can be read and not changed; `voxtile pull` it, change it, `voxtile push` it";
+    Err(io::Error::new(io::ErrorKind::ReadOnlyFilesystem, reason))
+}
+
+impl Disk for BucketDisk {
+    fn open(&self, path: &Path) -> io::Result<Box<dyn DiskRead>> {
+        self.open_from(path, 0)
+    }
+
+    fn open_at(&self, path: &Path, offset: u64) -> io::Result<Box<dyn DiskRead>> {
+        self.open_from(path, offset)
+    }
+
+    fn read_at(&self, path: &Path, offset: u64, bytes: usize) -> io::Result<Vec<u8>> {
+        let name = self.path_in_map(path).ok_or(io::ErrorKind::NotFound)?;
+        let file = self.list.file(&name)?.ok_or(io::ErrorKind::NotFound)?;
+        let end = offset.saturating_add(bytes as u64).min(file.bytes);
+        let (mut read, mut at) = (Vec::new(), offset);
+        while at < end {
+            let part = usize::try_from(at / PART_BYTES).ok().and_then(|number| file.parts.get(number));
+            let part = *part.ok_or(io::ErrorKind::UnexpectedEof)?;
+            let begin = at % PART_BYTES;
+            let range = begin..(begin + (end - at)).min(PART_BYTES);
+            let wanted = range.end - range.start;
+            let content = self.bucket.fetch_bytes(part, range).wait().map_err(missing_object)?;
+            if content.len() as u64 != wanted {
+                return Err(io::ErrorKind::UnexpectedEof.into());
+            }
+            read.extend_from_slice(&content);
+            at += wanted;
+        }
+        Ok(read)
+    }
+
+    fn open_shared(&self, path: &Path) -> io::Result<Box<dyn DiskRead>> {
+        self.open_from(path, 0)
+    }
+
+    fn kind(&self, path: &Path) -> io::Result<Option<EntryKind>> {
+        let Some(name) = self.path_in_map(path) else { return Ok(None) };
+        if let Some(file) = self.list.file(&name)? {
+            return Ok(Some(EntryKind::File(file.bytes)));
+        }
+        let is_folder = name.is_empty() || !self.list.names_in(&name)?.is_empty();
+        Ok(is_folder.then_some(EntryKind::Folder))
+    }
+
+    fn list(&self, path: &Path) -> io::Result<Vec<String>> {
+        let name = self.path_in_map(path).ok_or(io::ErrorKind::NotFound)?;
+        let names = self.list.names_in(&name)?;
+        if names.is_empty() {
+            return Err(io::ErrorKind::NotFound.into());
+        }
+        Ok(names.into_iter().collect())
+    }
+
+    fn newer(&self) -> io::Result<Option<Arc<dyn Disk>>> {
+        // An `Error::NoAnswer` stays what it is: `Error::io` takes it out again.
+        let newer = Self::open(self.bucket.clone()).map_err(io::Error::other)?;
+        Ok((newer.version != self.version).then(|| Arc::new(newer) as Arc<dyn Disk>))
+    }
+
+    fn files_ahead(&self) -> usize {
+        FILES_AHEAD
+    }
+
+    fn read_ahead(&self, path: &Path) {
+        let Some(name) = self.path_in_map(path) else { return };
+        if self.ahead().files.contains(&name) {
+            return;
+        }
+        let Ok(Some(file)) = self.list.file(&name) else { return };
+        let &[part] = &file.parts[..] else { return };
+        self.ahead().ask(name, file.bytes, || self.bucket.fetch(part, PART_BYTES));
+    }
+
+    fn watch(&self, _: &Path) -> io::Result<Box<dyn ReaderWatch>> {
+        read_only()
+    }
+
+    fn create(&self, _: &Path) -> io::Result<Box<dyn DiskWrite>> {
+        read_only()
+    }
+
+    fn append(&self, _: &Path, _: u64) -> io::Result<Box<dyn DiskWrite>> {
+        read_only()
+    }
+
+    fn sync_file(&self, _: &Path) -> io::Result<()> {
+        read_only()
+    }
+
+    fn sync_folder(&self, _: &Path) -> io::Result<()> {
+        read_only()
+    }
+
+    fn rename(&self, _: &Path, _: &Path) -> io::Result<()> {
+        read_only()
+    }
+
+    fn remove_file(&self, _: &Path) -> io::Result<()> {
+        read_only()
+    }
+
+    fn create_folder(&self, _: &Path) -> io::Result<()> {
+        read_only()
+    }
+
+    fn remove_folder(&self, _: &Path) -> io::Result<()> {
+        read_only()
+    }
+
+    fn scratch(&self, _: &Path) -> io::Result<Box<dyn Scratch>> {
+        read_only()
+    }
+
+    fn lock(&self, _: &Path) -> io::Result<Option<Box<dyn DiskLock>>> {
+        read_only()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::object_name::ObjectName;
+    use object_store::memory::InMemory;
+
+    #[test]
+    fn a_file_that_two_threads_ask_for_is_counted_once() {
+        let bucket = Bucket::on(Arc::new(InMemory::new()), "map", "s3://test/map").unwrap();
+        let mut ahead = Ahead { files: LruCache::unbounded(), bytes: 0 };
+        for name in ["a", "b", "a"] {
+            ahead.ask(name.to_owned(), 10, || bucket.fetch(ObjectName::of(b""), 10));
+        }
+        assert_eq!((ahead.files.len(), ahead.bytes), (2, 20));
+        for name in ["a", "b"] {
+            assert!(ahead.take(name).is_some());
+        }
+        assert_eq!(ahead.bytes, 0);
+    }
+}

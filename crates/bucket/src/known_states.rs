@@ -1,0 +1,148 @@
+use super::manifest::Manifest;
+use super::object_name::ObjectName;
+use std::fmt::Write as _;
+use std::io::{self, Read, Write as _};
+use std::path::Path;
+use voxtile::store::{Disk, EntryKind};
+use voxtile::{Error, Result};
+
+/// The states of a map, by the checksums of their manifests, that were pushed from its folder or pulled into it: what
+/// the folder builds on. They are in a file there, which goes along wherever the folder is moved or copied.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct KnownStates(Vec<KnownState>);
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct KnownState {
+    flush_number: u64,
+    name: ObjectName,
+    /// Whether it was in a bucket; else a push was about to put it there.
+    was_there: bool,
+}
+
+/// The file's name in the folder of the map, and that of its successor.
+pub(super) const BUCKET_STATES: &str = "bucket_states";
+pub(super) const BUCKET_STATES_NEXT: &str = "bucket_states.next";
+
+/// The oldest go.
+const MOST_STATES: usize = 256;
+
+/// More than so many states have.
+const MOST_BYTES: u64 = 1 << 16;
+
+impl KnownStates {
+    /// The states that a folder knows; `None` if no voxtile that notes them has pushed or pulled it. A line that is
+    /// none counts for nothing.
+    pub(super) fn read(disk: &dyn Disk, folder: &Path) -> Result<Option<Self>> {
+        let path = folder.join(BUCKET_STATES);
+        let failed = |error| Error::io(&path, "read", error);
+        if !matches!(disk.kind(&path).map_err(failed)?, Some(EntryKind::File(_))) {
+            return Ok(None);
+        }
+        let mut bytes = Vec::new();
+        disk.open(&path).and_then(|input| input.take(MOST_BYTES).read_to_end(&mut bytes)).map_err(failed)?;
+        let text = String::from_utf8_lossy(&bytes);
+        Ok(Some(Self(text.lines().filter_map(KnownState::of_line).collect())))
+    }
+
+    /// Whether the folder builds on a state.
+    pub(super) fn name(&self, state: ObjectName) -> bool {
+        self.0.iter().any(|known| known.name == state)
+    }
+
+    /// Whether the state as of a flush was in a bucket.
+    pub(super) fn were_there(&self, flush_number: u64) -> bool {
+        self.0.iter().any(|known| known.was_there && known.flush_number == flush_number)
+    }
+
+    /// Notes a state as the newest.
+    pub(super) fn note(&mut self, manifest: &Manifest, name: ObjectName, was_there: bool) {
+        self.0.retain(|known| known.name != name);
+        self.0.push(KnownState { flush_number: manifest.flush_number, name, was_there });
+        self.0.drain(..self.0.len().saturating_sub(MOST_STATES));
+    }
+
+    /// Writes them, durably, as a whole.
+    pub(super) fn write(&self, disk: &dyn Disk, folder: &Path) -> Result<()> {
+        let [path, next] = [BUCKET_STATES, BUCKET_STATES_NEXT].map(|name| folder.join(name));
+        let write = || -> io::Result<()> {
+            let mut out = disk.create(&next)?;
+            out.write_all(self.to_text().as_bytes())?;
+            out.flush()?;
+            out.sync()?;
+            drop(out);
+            disk.rename(&next, &path)?;
+            disk.sync_folder(folder)
+        };
+        write().map_err(|error| {
+            // Written anew by the next attempt, which may never come.
+            let _ = disk.remove_file(&next);
+            Error::io(&path, "write", error)
+        })
+    }
+
+    fn to_text(&self) -> String {
+        let mut text = String::new();
+        for KnownState { flush_number, name, was_there } in &self.0 {
+            let how = if *was_there { THERE } else { OFFERED };
+            let _ = writeln!(text, "{how} {flush_number} {name}");
+        }
+        text
+    }
+}
+
+const THERE: &str = "there";
+const OFFERED: &str = "offered";
+
+impl KnownState {
+    fn of_line(line: &str) -> Option<Self> {
+        let mut words = line.split(' ');
+        let was_there = match words.next()? {
+            THERE => true,
+            OFFERED => false,
+            _ => return None,
+        };
+        let flush_number = words.next()?.parse().ok()?;
+        let name = ObjectName::from_digits(words.next()?)?;
+        words.next().is_none().then_some(Self { flush_number, name, was_there })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use voxtile::store::FsDisk;
+
+    fn state(flush_number: u64) -> (Manifest, ObjectName) {
+        (Manifest::new(None, flush_number, 0), ObjectName::of(&flush_number.to_le_bytes()))
+    }
+
+    #[test]
+    fn what_is_noted_is_read_again_and_the_newest_stay() {
+        let folder = tempfile::tempdir().unwrap();
+        assert_eq!(KnownStates::read(&FsDisk, folder.path()).unwrap(), None);
+        let mut states = KnownStates::default();
+        for number in 0..300 {
+            let (manifest, name) = state(number);
+            states.note(&manifest, name, number % 2 == 0);
+        }
+        states.write(&FsDisk, folder.path()).unwrap();
+        let read = KnownStates::read(&FsDisk, folder.path()).unwrap().unwrap();
+        assert_eq!(read, states);
+        assert!(!read.name(state(43).1) && read.name(state(44).1) && read.name(state(299).1));
+        assert!(read.were_there(298) && !read.were_there(299));
+    }
+
+    #[test]
+    fn a_line_that_is_none_counts_for_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let (manifest, name) = state(7);
+        let mut wanted = KnownStates::default();
+        wanted.note(&manifest, name, true);
+        let good = wanted.to_text();
+        let text = format!("there\nthere x {name}\nsomewhere 7 {name}\n{good}there 7 {name} 1\nthere 7 12\n");
+        std::fs::write(folder.path().join(BUCKET_STATES), text.as_bytes()).unwrap();
+        assert_eq!(KnownStates::read(&FsDisk, folder.path()).unwrap(), Some(wanted));
+        std::fs::write(folder.path().join(BUCKET_STATES), [0xff, 0, 10]).unwrap();
+        assert_eq!(KnownStates::read(&FsDisk, folder.path()).unwrap(), Some(KnownStates::default()));
+    }
+}

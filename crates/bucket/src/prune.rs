@@ -1,0 +1,50 @@
+use super::bucket::Bucket;
+use super::file_list::FileList;
+use super::manifest::Manifest;
+use super::object_name::ObjectName;
+use rustc_hash::FxHashSet;
+use std::collections::VecDeque;
+use std::io;
+use voxtile::{Error, Result};
+
+/// Objects that are removed at a time.
+const MOST_IN_FLIGHT: usize = 16;
+
+/// Removes the objects that a manifest does not name, which the caller has put; returns how many.
+///
+/// Objects that are newer than the manifest stay: another push may be about to name them. If it names older ones that
+/// go now, it has read an older manifest and loses to this one.
+pub(super) fn prune(bucket: &Bucket, manifest: Manifest) -> Result<u64> {
+    let failed = |error: io::Error| Error::io(bucket.path(), "prune", error);
+    let named = named_by(bucket, &manifest).map_err(failed)?;
+    let found = bucket.objects_before_manifest().map_err(failed)?;
+    // Only what this push has put is known: is it still there?
+    let now = bucket.manifest()?.map(|found| found.manifest);
+    if now.as_ref() != Some(&manifest) {
+        return Err(Error::Changed { path: bucket.path().to_owned() });
+    }
+    let (mut removed, mut in_flight) = (0, VecDeque::new());
+    for name in found.into_iter().filter(|name| !named.contains(name)) {
+        in_flight.push_back(bucket.remove(name));
+        removed += 1;
+        if in_flight.len() >= MOST_IN_FLIGHT
+            && let Some(pending) = in_flight.pop_front()
+        {
+            pending.wait().map_err(failed)?;
+        }
+    }
+    in_flight.into_iter().try_for_each(|pending| pending.wait().map_err(failed))?;
+    Ok(removed)
+}
+
+/// All objects that a manifest names.
+fn named_by(bucket: &Bucket, manifest: &Manifest) -> io::Result<FxHashSet<ObjectName>> {
+    let mut named: FxHashSet<_> = manifest.pages.values().copied().collect();
+    let list = FileList::new(bucket.clone(), manifest.clone());
+    named.extend(list.own_files().values().flat_map(|file| &file.parts));
+    for name in manifest.pages.keys() {
+        let page = list.page(name)?;
+        named.extend(page.iter().flat_map(|page| page.values()).flat_map(|file| &file.parts));
+    }
+    Ok(named)
+}

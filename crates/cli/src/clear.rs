@@ -1,0 +1,47 @@
+use crate::args::ClearArgs;
+use crate::json;
+use crate::memory;
+use crate::part::part_of;
+use crate::progress::Progress;
+use indicatif::HumanCount;
+use serde::Serialize;
+use std::io::Write;
+use std::path::Path;
+use std::process::ExitCode;
+use voxtile::operations::{Cleared, clear};
+use voxtile_pipeline::whole_map;
+
+#[derive(Serialize)]
+struct Summary<'a> {
+    #[serde(serialize_with = "voxtile::path_text::serialize")]
+    map: &'a Path,
+    #[serde(flatten)]
+    cleared: Cleared,
+    peak_rss_bytes: Option<u64>,
+}
+
+pub fn run(args: &ClearArgs) -> anyhow::Result<ExitCode> {
+    let progress = Progress::over_tiles(0);
+    let cleared = clear(whole_map(&args.map)?, &part_of(&args.part)?, |done, all| progress.set(done, all))?;
+    drop(progress);
+    let mut out = std::io::stdout().lock();
+    if args.json {
+        let summary = Summary { map: &args.map, cleared, peak_rss_bytes: memory::peak_bytes() };
+        json::print(&summary, &mut out)?;
+    } else {
+        let Cleared { voxels_cleared, tiles_changed, tiles_removed, tiles, .. } = cleared;
+        writeln!(
+            out,
+            "cleared   {} voxels in {} tiles",
+            HumanCount(voxels_cleared),
+            HumanCount(tiles_changed + tiles_removed)
+        )?;
+        writeln!(
+            out,
+            "tiles     {}; {} are empty now and gone",
+            HumanCount(tiles),
+            HumanCount(tiles_removed)
+        )?;
+    }
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,140 @@
+use crate::args::Command;
+use crate::json;
+use crate::output_file::is_standard_output;
+use crate::run::{INTERRUPTED, say};
+use serde::Serialize;
+use std::io;
+use std::process::ExitCode;
+use voxtile::{Error, Place};
+
+/// Where a command that fails says so for a program, beside the line for a person.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum JsonTo {
+    /// Nowhere: it was not asked for.
+    Nowhere,
+    /// Standard output, where the answer would be.
+    Output,
+    /// Standard error, because standard output is for a file.
+    Error,
+}
+
+/// What a program gets to know of a failure; what does not apply is missing.
+#[derive(Serialize)]
+struct Failure<'a> {
+    kind: &'a str,
+    message: &'a str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    argument: Option<&'a str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    path: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    tile: Option<[i32; 3]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    offset: Option<u64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    line: Option<u64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    record: Option<u64>,
+}
+
+impl JsonTo {
+    /// What the command line asks for.
+    pub fn of(command: &Command) -> Self {
+        match command {
+            Command::Export(args)
+                if args.json && args.scans.is_none() && is_standard_output(&args.output) =>
+            {
+                Self::Error
+            }
+            Command::Picture(args) if args.json && args.output.as_deref().is_some_and(is_standard_output) => {
+                Self::Error
+            }
+            Command::Report(args) if args.json && is_standard_output(&args.output) => Self::Error,
+            command => Self::output_if(command.is_json()),
+        }
+    }
+
+    /// Standard output, if it was asked for.
+    pub fn output_if(json: bool) -> Self {
+        if json { Self::Output } else { Self::Nowhere }
+    }
+
+    /// Says that a command failed, and returns its exit code.
+    pub fn tell(self, error: &anyhow::Error) -> ExitCode {
+        if is_closed_pipe(error) {
+            return ExitCode::SUCCESS;
+        }
+        let message = message_of(error);
+        say(format_args!("{message}"));
+        let known = error.downcast_ref::<Error>();
+        self.print(&Failure::of(known, &message));
+        exit_code_of(known)
+    }
+
+    /// Says that a command was stopped before it had anything to print.
+    pub fn tell_stopped(self, message: &str) {
+        say(format_args!("{message}"));
+        self.print(&Failure::of(Some(&Error::Stopped), message));
+    }
+
+    fn print(self, failure: &Failure) {
+        let object = serde_json::json!({ "error": failure });
+        // Where it is refused there is nobody to tell.
+        let _ = match self {
+            Self::Nowhere => Ok(()),
+            Self::Output => json::print(&object, &mut io::stdout().lock()),
+            Self::Error => json::print(&object, &mut io::stderr().lock()),
+        };
+    }
+}
+
+impl<'a> Failure<'a> {
+    fn of(error: Option<&'a Error>, message: &'a str) -> Self {
+        let place = error.and_then(Error::place);
+        let at = |wanted| place.filter(|&(place, _)| place == wanted).map(|(_, at)| at);
+        Self {
+            kind: error.map_or("other", Error::kind),
+            message,
+            argument: match error {
+                Some(Error::InvalidArgument { argument, .. }) => Some(argument),
+                _ => None,
+            },
+            path: error.and_then(Error::path).map(|path| path.display().to_string()),
+            tile: error.and_then(Error::tile).map(|tile| tile.to_array()),
+            offset: at(Place::Offset),
+            line: at(Place::Line),
+            record: at(Place::Record),
+        }
+    }
+}
+
+/// The error with its causes. Of files and programs, errors tell the name.
+pub fn message_of(error: &anyhow::Error) -> String {
+    match error.chain().next().and_then(|first| first.downcast_ref::<io::Error>()) {
+        Some(error) => format!("standard output: cannot write: {error}"),
+        None => format!("{error:#}"),
+    }
+}
+
+/// 2 for what the user can put right on the command line, 1 for everything else.
+fn exit_code_of(error: Option<&Error>) -> ExitCode {
+    match error {
+        Some(
+            Error::InvalidArgument { .. }
+            | Error::Grid(_)
+            | Error::AlreadyExists { .. }
+            | Error::Mismatch { .. },
+        ) => ExitCode::from(2),
+        Some(Error::Stopped) => ExitCode::from(INTERRUPTED),
+        _ => ExitCode::FAILURE,
+    }
+}
+
+/// `voxtile ... | head` is no error; a reader of another pipe, which the error names, is.
+fn is_closed_pipe(error: &anyhow::Error) -> bool {
+    error
+        .chain()
+        .take_while(|cause| !cause.is::<Error>())
+        .filter_map(|cause| cause.downcast_ref::<io::Error>())
+        .any(|cause| cause.kind() == io::ErrorKind::BrokenPipe)
+}

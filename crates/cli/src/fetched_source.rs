@@ -1,0 +1,75 @@
+use crate::progress::Progress;
+use voxtile::Result;
+use voxtile::scan::Stop;
+use voxtile_bucket::FetchedFiles;
+use voxtile_formats::{PointStore, PoseSource, ReadOptions, ScanHead, ScanSource, open_any_scans};
+use voxtile_pipeline::place::bucket_at;
+
+/// Scans of a bucket, from files that were fetched.
+pub struct FetchedSource {
+    source: Box<dyn ScanSource + Send>,
+    /// Behind the source, which has some of them open.
+    _files: FetchedFiles,
+}
+
+impl FetchedSource {
+    /// Fetches all files at a URL, then reads them as those of a folder.
+    pub fn open(url: &str, options: &ReadOptions, stop: &Stop) -> Result<Self> {
+        let files = fetch(url, stop)?;
+        Ok(Self { source: open_any_scans(files.path(), options)?, _files: files })
+    }
+}
+
+/// Fetches all files at a URL, until it is asked to stop.
+pub fn fetch(url: &str, stop: &Stop) -> Result<FetchedFiles> {
+    let bucket = bucket_at(url)?;
+    let progress = Progress::over_bytes();
+    let is_stopped = || stop.is_set();
+    let report = |done, all| progress.set(done, all);
+    let files = FetchedFiles::fetch(&bucket, &std::env::temp_dir(), &is_stopped, report)?;
+    drop(progress);
+    log::info!("{url}: fetched {} files, {} bytes", files.files(), files.bytes());
+    Ok(files)
+}
+
+impl ScanSource for FetchedSource {
+    fn len_hint(&self) -> Option<usize> {
+        self.source.len_hint()
+    }
+
+    fn read_scan(&mut self, points: &mut PointStore) -> Result<Option<ScanHead>> {
+        self.source.read_scan(points)
+    }
+
+    fn skip(&mut self, scans: usize) -> Result<usize> {
+        self.source.skip(scans)
+    }
+
+    fn pass_unread(&mut self) -> bool {
+        self.source.pass_unread()
+    }
+
+    fn format(&self) -> String {
+        self.source.format()
+    }
+
+    fn fields(&self) -> Vec<String> {
+        self.source.fields()
+    }
+
+    fn remarks(&self) -> Vec<String> {
+        self.source.remarks()
+    }
+
+    fn crs(&self) -> Option<String> {
+        self.source.crs()
+    }
+
+    fn pose_source(&self) -> PoseSource {
+        self.source.pose_source()
+    }
+
+    fn fingerprint(&self) -> Result<String> {
+        self.source.fingerprint()
+    }
+}

@@ -1,0 +1,194 @@
+use crate::args::InfoArgs;
+use crate::json;
+use voxtile_pipeline::{read_any_map, read_map};
+
+use crate::octree_info;
+use crate::picture::{is_quick, print_small};
+use crate::region_tiles;
+use indicatif::{HumanBytes, HumanCount};
+use serde::Serialize;
+use std::io::{IsTerminal, Write};
+use std::process::ExitCode;
+use voxtile::mapper::{MapReader, MapView, OctreeMap};
+use voxtile::operations::{KeptBytes, kept_bytes};
+use voxtile::sensor::SensorModel;
+use voxtile::space::{Aabb, Grid, TileBox};
+use voxtile::store::{Bounds, InputRecord, MapPath};
+use voxtile::{MapQueries, Result, Storage};
+
+/// Inputs that are shown to people; JSON has them all.
+const INPUTS_SHOWN: usize = 5;
+
+/// What the map knows of itself, without reading a tile.
+#[derive(Debug, Serialize)]
+pub struct Info {
+    pub map_id: Option<String>,
+    pub verified: bool,
+    pub resolution_m: f64,
+    pub tile_size_m: f64,
+    pub sensor_model: SensorModel,
+    pub occupancy_threshold: f64,
+    pub storage: Storage,
+    pub scan_number: u64,
+    pub flush_number: u64,
+    /// What it was built from, the latest last.
+    pub crs: Option<String>,
+    pub inputs: Vec<InputRecord>,
+    /// Number of the last scan when evidence last faded; 0 if it never has.
+    pub decayed_scan: u64,
+    pub tiles: u64,
+    /// The tiles that are mapped; missing where that is all of space.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub region_tiles: Option<TileBox>,
+    pub tile_bounds: Option<Bounds>,
+    pub bounds_m: Option<Aabb>,
+    pub voxels: u64,
+    pub occupied: u64,
+    pub table_bytes: u64,
+    pub octree_bytes: u64,
+    /// What is kept beside the map as it is; `None` for a snapshot.
+    pub kept: Option<KeptBytes>,
+}
+
+pub fn run(args: &InfoArgs) -> anyhow::Result<ExitCode> {
+    let mut out = std::io::stdout().lock();
+    if OctreeMap::is_named_by(&args.map) {
+        octree_info::print_info(&args.map, args.json, &mut out)?;
+        draw(args, &mut out)?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let info = read_map(&args.map, |reader| Ok(Info::of(reader)?))?;
+    if args.json {
+        json::print(&info, &mut out)?;
+    } else {
+        info.print(&mut out)?;
+        draw(args, &mut out)?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Whether a picture may follow the text: where a person looks at colors.
+pub fn may_draw(args: &InfoArgs) -> bool {
+    let set = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty());
+    !(args.json || args.no_picture || set("NO_COLOR").is_some())
+        && set("TERM").is_some_and(|term| term != "dumb")
+        && std::io::stdout().is_terminal()
+}
+
+fn draw(args: &InfoArgs, out: &mut impl Write) -> anyhow::Result<()> {
+    if !may_draw(args) {
+        return Ok(());
+    }
+    let drawn = read_any_map(&args.map, |map| if is_quick(map) { print_small(map, out) } else { Ok(()) });
+    // The text was the answer; what is wrong with a tile is for `verify` to say.
+    drawn.or_else(|error| {
+        log::warn!("no picture: {error:#}");
+        Ok(())
+    })
+}
+
+impl Info {
+    /// Asks a map.
+    pub fn of(reader: &MapReader) -> Result<Self> {
+        let config = reader.config();
+        let ext = reader.metadata().ext.as_ref();
+        let tile_bounds = Bounds::of(reader.tile_indices().into_iter());
+        let tile_size_m = config.grid.tile_size_m();
+        let corner = |index: [i32; 3], add: i64| index.map(|k| (i64::from(k) + add) as f64 * tile_size_m);
+        let (voxels, occupied) = match reader.voxel_counts() {
+            Some(counts) => counts,
+            None => count(reader)?,
+        };
+        let (table_bytes, octree_bytes) = reader.disk_bytes().unwrap_or_default();
+        Ok(Self {
+            map_id: ext.map(|ext| ext.map_id.clone()),
+            verified: reader.is_verified(),
+            resolution_m: config.grid.resolution_m(),
+            tile_size_m,
+            sensor_model: config.sensor_model,
+            occupancy_threshold: config.occupancy_threshold,
+            storage: config.storage,
+            scan_number: reader.scan_number(),
+            flush_number: reader.flush_number(),
+            crs: config.crs.clone(),
+            inputs: ext.map_or(Vec::new(), |ext| ext.inputs.clone()),
+            decayed_scan: ext.map_or(0, |ext| ext.decayed_scan),
+            tiles: reader.tile_indices().len() as u64,
+            region_tiles: config.rays.region,
+            tile_bounds,
+            bounds_m: tile_bounds
+                .map(|bounds| Aabb { min: corner(bounds.min, 0), max: corner(bounds.max, 1) }),
+            voxels,
+            occupied,
+            table_bytes,
+            octree_bytes,
+            kept: reader
+                .snapshot()
+                .is_none()
+                .then(|| kept_bytes(MapPath::on(reader.disk(), reader.folder())))
+                .transpose()?,
+        })
+    }
+
+    fn print(&self, out: &mut impl Write) -> std::io::Result<()> {
+        let id = self
+            .map_id
+            .as_deref()
+            .unwrap_or("none: the original format, without checksums, cannot be verified");
+        writeln!(out, "map id       {id}")?;
+        writeln!(out, "resolution   {} m, tiles of {} m", self.resolution_m, self.tile_size_m)?;
+        let model = self.sensor_model.name();
+        writeln!(out, "model        {model}, occupied from probability {}", self.occupancy_threshold)?;
+        if let Some(tiles) = self.region_tiles
+            && let Ok(grid) = Grid::new(self.resolution_m, self.tile_size_m)
+        {
+            writeln!(out, "region       {}", region_tiles::text(tiles, &grid))?;
+        }
+        writeln!(
+            out,
+            "scans        {} in {} flushes",
+            HumanCount(self.scan_number),
+            HumanCount(self.flush_number)
+        )?;
+        for input in self.inputs.iter().rev().take(INPUTS_SHOWN).rev() {
+            writeln!(out, "input        from scan {}: {}", HumanCount(input.first_scan), input.name)?;
+        }
+        if let Some(crs) = &self.crs {
+            writeln!(out, "crs          {crs:.100}")?;
+        }
+        if self.decayed_scan > 0 {
+            writeln!(out, "faded        last after scan {}", HumanCount(self.decayed_scan))?;
+        }
+        writeln!(out, "tiles        {}", HumanCount(self.tiles))?;
+        if let Some(Aabb { min, max }) = self.bounds_m {
+            writeln!(out, "bounds       {min:?} to {max:?} m")?;
+        }
+        writeln!(out, "voxels       {}, {} occupied", HumanCount(self.voxels), HumanCount(self.occupied))?;
+        let (table, octree) = (HumanBytes(self.table_bytes), HumanBytes(self.octree_bytes));
+        match self.storage {
+            Storage::OctoMap => writeln!(out, "on disk      {table} in tables, {octree} in octrees")?,
+            Storage::Compact => writeln!(out, "on disk      {table} in compact tables")?,
+        }
+        let Some(kept) = &self.kept else { return Ok(()) };
+        if kept.snapshot_tables > 0 {
+            let (bytes, tables) = (HumanBytes(kept.snapshot_bytes), HumanCount(kept.snapshot_tables));
+            writeln!(out, "snapshots    {bytes} in {tables} tables that only they see")?;
+        }
+        if kept.reader_tables > 0 {
+            let (bytes, tables) = (HumanBytes(kept.reader_bytes), HumanCount(kept.reader_tables));
+            writeln!(
+                out,
+                "readers      {bytes} in {tables} tables that were flushed anew while somebody reads"
+            )?;
+        }
+        Ok(())
+    }
+}
+
+/// Observed and occupied voxels, tile by tile.
+fn count(reader: &MapReader) -> Result<(u64, u64)> {
+    let (mut voxels, mut occupied) = (0, 0);
+    reader.for_each_occupied(Some(0.0), None, |_| voxels += 1)?;
+    reader.for_each_occupied(None, None, |_| occupied += 1)?;
+    Ok((voxels, occupied))
+}

@@ -1,0 +1,110 @@
+use crate::new_poses::{PoseFile, poses_for, records_of};
+use rustc_hash::FxHashMap;
+use std::path::{Path, PathBuf};
+use voxtile::mapper::KeptScans;
+use voxtile::scan::{Pose, ScanPoints, Stop};
+use voxtile::{Error, Result};
+use voxtile_formats::{PointStore, ScanHead, ScanSource};
+use voxtile_pipeline::MapAt;
+use voxtile_pipeline::place::{is_map_at, url_of};
+
+/// The scans that a map or a snapshot of one keeps, as an input like any other.
+pub struct KeptSource {
+    path: PathBuf,
+    scans: KeptScans,
+    /// Those that take the place of the scans' own, by their numbers.
+    new_poses: FxHashMap<u64, Pose>,
+    count: usize,
+    crs: Option<String>,
+    fingerprint: String,
+}
+
+/// Whether a path names a map that may keep scans, or a snapshot of one. Of a URL nobody knows before the store
+/// answers.
+pub fn is_map(path: &Path, stop: &Stop) -> Result<bool> {
+    let has_files =
+        |path: &Path| ["metadata.json", "commits.log"].iter().all(|name| path.join(name).is_file());
+    let text = path.to_str().and_then(|text| text.rsplit_once('@'));
+    let Some(url) = url_of(path) else {
+        return Ok(has_files(path) || text.is_some_and(|(map, _)| has_files(Path::new(map))));
+    };
+    if is_map_at(url, stop)? {
+        return Ok(true);
+    }
+    match text {
+        // Not the name of a user before that of a host.
+        Some((map, snapshot)) if !snapshot.contains('/') && map.contains("://") => is_map_at(map, stop),
+        _ => Ok(false),
+    }
+}
+
+impl KeptSource {
+    /// Opens them with their own poses, or with those of a file.
+    pub fn open(path: &Path, poses: Option<&PoseFile<'_>>) -> Result<Self> {
+        let reader = MapAt::of(path)?.open()?;
+        let new_poses = match poses {
+            Some(poses) => poses_for(poses, &records_of(&reader)?)?.of_scans(&reader)?,
+            None => FxHashMap::default(),
+        };
+        let (mut records, mut count) = (reader.kept_scans()?, 0);
+        while records.next_record()?.is_some() {
+            count += 1;
+        }
+        let ext = reader.metadata().ext.as_ref();
+        let id = ext.map_or("", |ext| &ext.map_id);
+        let fingerprint = format!("kept scans of map {id} as of flush {}", reader.flush_number());
+        let crs = ext.and_then(|ext| ext.crs.clone());
+        let scans = reader.kept_scans()?;
+        Ok(Self { path: path.to_owned(), scans, new_poses, count, crs, fingerprint })
+    }
+}
+
+impl ScanSource for KeptSource {
+    fn len_hint(&self) -> Option<usize> {
+        Some(self.count)
+    }
+
+    fn read_scan(&mut self, points: &mut PointStore) -> Result<Option<ScanHead>> {
+        let Some(scan) = self.scans.next().transpose()? else { return Ok(None) };
+        let Some(own) = scan.world_from_sensor() else {
+            let reason = format!(
+                "scan {} has its points in the world frame and no pose; `voxtile remap -o` maps it all the same",
+                scan.number()
+            );
+            return Err(Error::argument(self.path.display().to_string(), reason));
+        };
+        let world_from_sensor = self.new_poses.get(&scan.number()).copied().unwrap_or(own);
+        points.begin(scan.has_intensities());
+        let mut pushed = Ok(());
+        scan.for_each_own_chunk(0..scan.len(), &mut |some, intensities| {
+            pushed = some.iter().enumerate().try_for_each(|(at, &point)| {
+                points.push(point, intensities.map_or(0.0, |intensities| intensities[at]))
+            });
+            pushed.is_ok()
+        })?;
+        pushed?;
+        let (name, stamp_ns) = (scan.number().to_string(), scan.stamp_ns());
+        Ok(Some(ScanHead { name, stamp_ns, world_from_sensor }))
+    }
+
+    fn skip(&mut self, scans: usize) -> Result<usize> {
+        for skipped in 0..scans {
+            if self.scans.next_record()?.is_none() {
+                return Ok(skipped);
+            }
+        }
+        Ok(scans)
+    }
+
+    fn format(&self) -> String {
+        "kept scans of a map".to_owned()
+    }
+
+    fn crs(&self) -> Option<String> {
+        self.crs.clone()
+    }
+
+    fn fingerprint(&self) -> Result<String> {
+        Ok(self.fingerprint.clone())
+    }
+}

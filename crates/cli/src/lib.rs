@@ -1,0 +1,83 @@
+//! The command `voxtile`: parse, run one command, exit code.
+//!
+//! One file a subcommand. It is part of the library so that other programs can carry the command (the Python package
+//! does), or call what is more than a line of it, in `calls`; it uses the library as anybody else would, by its public
+//! items.
+
+mod args;
+mod build;
+mod build_config;
+mod call_error;
+pub mod calls;
+mod clear;
+mod completions;
+mod convert;
+mod crop;
+mod decay;
+mod demo;
+mod diff;
+mod digest;
+mod export;
+mod export_3d_tiles;
+mod export_origin;
+mod export_scans;
+mod export_voxels;
+mod exported;
+mod failure;
+#[cfg(feature = "bucket")]
+mod fetched_source;
+mod flush_schedule;
+mod import;
+mod info;
+mod intake;
+mod json;
+mod kept_source;
+mod local;
+mod local_table;
+mod man;
+mod memory;
+mod merge;
+mod new_poses;
+mod octree_choice;
+mod octree_info;
+mod output_file;
+mod part;
+mod picture;
+mod progress;
+#[cfg(feature = "bucket")]
+mod pull;
+#[cfg(feature = "bucket")]
+mod push;
+mod query;
+mod raycast;
+mod read_options;
+mod region_tiles;
+mod remap;
+mod remove_points;
+mod remove_scans;
+mod repair;
+mod report;
+mod revert;
+mod rework;
+mod run;
+mod scan_input;
+mod scan_place;
+mod scan_queue;
+mod scan_reader;
+mod scans;
+mod share;
+mod snapshot;
+mod snapshots;
+mod stop_signal;
+mod summary;
+mod terminal;
+mod threads;
+mod verify;
+#[cfg(feature = "view")]
+mod view;
+mod watch;
+mod written;
+
+pub use call_error::CallError;
+pub use run::{main, run};
+pub use watch::{Listener, Watch};

@@ -1,0 +1,5 @@
+//! The command `voxtile`.
+
+fn main() -> std::process::ExitCode {
+    voxtile_cli::main()
+}

@@ -1,0 +1,162 @@
+use crate::args::RemapArgs;
+use crate::read_options::{pose_of, tolerance_ns};
+use std::path::Path;
+use voxtile::mapper::MapReader;
+use voxtile::operations::NewPoses;
+use voxtile::scan::Pose;
+use voxtile::store::KeptRecord;
+use voxtile::{Error, Result};
+use voxtile_formats::clouds::poses::{Found, Trajectory};
+use voxtile_formats::clouds::{Budget, RigidPose};
+use voxtile_formats::{ReadOptions, read_poses};
+
+/// Most scans that an error names.
+const MOST_NAMED: usize = 5;
+
+/// How a file of poses is read.
+pub struct PoseFile<'a> {
+    pub path: &'a Path,
+    /// The `calib.txt` of KITTI.
+    pub calib: Option<&'a Path>,
+    /// Where the sensor is in the body that the poses are of.
+    pub body_from_sensor: Option<RigidPose>,
+    pub tolerance_ns: i64,
+    pub budget: Budget,
+}
+
+impl<'a> PoseFile<'a> {
+    pub fn of_remap(args: &'a RemapArgs, path: &'a Path) -> Result<Self> {
+        let body_from_sensor = args.extrinsic.as_deref().map(pose_of).transpose()?.map(|(rigid, _)| rigid);
+        let tolerance_ns = tolerance_ns(args.pose_tolerance)?;
+        // Where builds put what they cannot hold: the system's folder may be in memory.
+        let scratch = args.map.ancestors().skip(1).find(|folder| folder.is_dir()).unwrap_or(Path::new("."));
+        let budget = Budget { scratch: Some(scratch.to_owned()), ..Budget::default() };
+        Ok(Self { path, calib: args.calib.as_deref(), body_from_sensor, tolerance_ns, budget })
+    }
+
+    /// `None` if scans are to keep their own poses.
+    pub fn of_reading(options: &'a ReadOptions) -> Option<Self> {
+        let body = options.clouds.body_from_sensor;
+        Some(Self {
+            path: options.poses.as_deref()?,
+            calib: options.calib.as_deref(),
+            body_from_sensor: (body != RigidPose::IDENTITY).then_some(body),
+            tolerance_ns: options.clouds.pose_tolerance_ns,
+            budget: options.open.budget(),
+        })
+    }
+}
+
+/// The scans that a map keeps, without their tiles, of which a long drive has many.
+pub fn records_of(reader: &MapReader) -> Result<Vec<KeptRecord>> {
+    reader.check_keeps_all()?;
+    let (mut records, mut scans) = (reader.kept_scans()?, Vec::new());
+    while let Some(mut record) = records.next_record()? {
+        record.tiles = Vec::new();
+        scans.push(record);
+    }
+    Ok(scans)
+}
+
+/// The poses of a file for the scans that a map keeps, as a build with that file would give them.
+pub fn poses_for(from: &PoseFile<'_>, scans: &[KeptRecord]) -> Result<NewPoses> {
+    let &PoseFile { path: file, calib, body_from_sensor, tolerance_ns, ref budget } = from;
+    if std::fs::metadata(file).is_ok_and(|meta| !meta.is_file() && !meta.is_dir()) {
+        let reason =
+            "is a FIFO, a socket or a device, and new poses may be read twice: save what it gives to a file";
+        return Err(Error::argument(file.display().to_string(), reason));
+    }
+    let is_plain = calib.is_none() && body_from_sensor.is_none();
+    let trajectory = Trajectory::read_within(file, calib, budget)?;
+    // Stamps that mean nothing are all the same.
+    if trajectory.span_ns()?.is_none_or(|[first, last]| first < last) {
+        trajectory.remarks().iter().for_each(|remark| log::warn!("{}: {remark}", file.display()));
+    }
+    let have_stamps = scans.iter().all(|scan| scan.stamp_ns.is_some());
+    // Lines in another order than time belong to scans by their stamps alone.
+    let is_by_line = !(have_stamps && trajectory.goes_back());
+    if is_by_line && trajectory.len() == scans.len() && is_in_step(&trajectory, scans, tolerance_ns)? {
+        trajectory.check_order()?;
+        // As a folder of PCD takes them, to the bit.
+        if is_plain
+            && let Ok(poses) = read_poses(file)
+            && poses.len() == scans.len()
+        {
+            return Ok(NewPoses::InOrder(poses));
+        }
+        let mut poses = Vec::with_capacity(scans.len());
+        for number in 0..scans.len() {
+            if let Some(pose) = trajectory.by_number(number)? {
+                poses.push(sensor_pose(&pose, body_from_sensor.as_ref())?);
+            }
+        }
+        return Ok(NewPoses::InOrder(poses));
+    }
+    if !trajectory.has_stamps() || !have_stamps {
+        let reason = other_number(trajectory.len(), scans);
+        return Err(Error::argument(file.display().to_string(), reason));
+    }
+    by_time(&trajectory, file, scans, tolerance_ns, body_from_sensor.as_ref())
+}
+
+/// Whether the poses are those of the scans in order, as far as time stamps tell.
+fn is_in_step(trajectory: &Trajectory, scans: &[KeptRecord], tolerance_ns: i64) -> Result<bool> {
+    let most = u64::try_from(tolerance_ns).unwrap_or(0);
+    for (of_pose, scan) in trajectory.stamps_ns().zip(scans) {
+        let of_pose = of_pose?;
+        if scan.stamp_ns.is_some_and(|of_scan| of_pose.abs_diff(of_scan) > most) {
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
+
+fn other_number(poses: usize, scans: &[KeptRecord]) -> String {
+    let all = scans.len();
+    match scans.get(poses) {
+        Some(scan) => format!(
+            "{poses} poses for {all} scans that the map keeps: none from scan {} on, and there are no time stamps to tell \
+             which belong together",
+            scan.number
+        ),
+        None => format!(
+            "{poses} poses for {all} scans that the map keeps: {} too many, and there are no time stamps to tell which \
+             belong together",
+            poses - all
+        ),
+    }
+}
+
+fn by_time(
+    trajectory: &Trajectory,
+    file: &Path,
+    scans: &[KeptRecord],
+    tolerance_ns: i64,
+    body_from_sensor: Option<&RigidPose>,
+) -> Result<NewPoses> {
+    let (mut poses, mut missing) = (Vec::with_capacity(scans.len()), Vec::new());
+    for scan in scans {
+        let stamp_ns = scan.stamp_ns.unwrap_or_default();
+        match trajectory.at(stamp_ns, tolerance_ns)? {
+            Found::Exact(pose) | Found::Between(pose) => {
+                poses.push((scan.number, sensor_pose(&pose, body_from_sensor)?));
+            }
+            _ => missing.push(format!("{} at {:.6} s", scan.number, stamp_ns as f64 * 1e-9)),
+        }
+    }
+    if missing.is_empty() {
+        return Ok(NewPoses::Numbered(poses));
+    }
+    let named = missing[..missing.len().min(MOST_NAMED)].join(", ");
+    let more = match missing.len().saturating_sub(MOST_NAMED) {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
+    let reason = format!("has no pose near in time for scan {named}{more}; --pose-tolerance allows for more");
+    Err(Error::argument(file.display().to_string(), reason))
+}
+
+fn sensor_pose(body: &RigidPose, body_from_sensor: Option<&RigidPose>) -> Result<Pose> {
+    let sensor = body_from_sensor.map_or(*body, |sensor| body.then(sensor));
+    Pose::from_quaternion(sensor.position_m, sensor.quaternion)
+}

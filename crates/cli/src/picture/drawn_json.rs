@@ -1,0 +1,67 @@
+use crate::args::{ColorName, PictureArgs, ViewName};
+use crate::memory;
+use clap::ValueEnum;
+use serde::Serialize;
+use std::path::Path;
+use voxtile::space::Aabb;
+use voxtile_render::Drawn;
+
+/// What was drawn, for a program.
+#[derive(Serialize)]
+pub struct DrawnJson {
+    file: String,
+    from: String,
+    slice_m: Option<f64>,
+    /// `None` for a difference.
+    color: Option<String>,
+    since: Option<String>,
+    width_px: usize,
+    height_px: usize,
+    /// Where in the image the map is: left, top, width, height.
+    map_px: [usize; 4],
+    region_m: Option<Aabb>,
+    cell_m: f64,
+    cell_px: usize,
+    /// What the first and the last color stand for.
+    range: Option<[f64; 2]>,
+    known_cells: u64,
+    solid_cells: u64,
+    tiles: u64,
+    peak_rss_bytes: Option<u64>,
+}
+
+impl DrawnJson {
+    pub fn of(args: &PictureArgs, file: &Path, drawn: &Drawn) -> Self {
+        Self {
+            file: file.display().to_string(),
+            from: view_name(args.from),
+            slice_m: args.slice,
+            color: args.since.is_none().then(|| color_name(args.color)),
+            since: args.since.as_ref().map(|since| since.display().to_string()),
+            width_px: drawn.image.width_px(),
+            height_px: drawn.image.height_px(),
+            map_px: drawn.map_px,
+            region_m: drawn.region_m,
+            cell_m: drawn.cell_m,
+            cell_px: drawn.cell_px,
+            range: drawn.range,
+            known_cells: drawn.known_cells,
+            solid_cells: drawn.solid_cells,
+            tiles: drawn.tiles,
+            peak_rss_bytes: memory::peak_bytes(),
+        }
+    }
+}
+
+fn view_name(view: ViewName) -> String {
+    name(&view)
+}
+
+fn color_name(color: ColorName) -> String {
+    name(&color)
+}
+
+/// As it is typed.
+fn name(value: &impl ValueEnum) -> String {
+    value.to_possible_value().map_or(String::new(), |value| value.get_name().to_owned())
+}

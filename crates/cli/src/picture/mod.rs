@@ -1,0 +1,223 @@
+//! `voxtile picture`: a map as a PNG, or straight into the terminal.
+
+mod drawn_json;
+mod small;
+
+use crate::args::{ColorName, PictureArgs, ViewName};
+use crate::json;
+use voxtile_pipeline::{AnyMap, read_any_map};
+
+use crate::output_file::{OutputFile, is_standard_output};
+use crate::part::region_of;
+use crate::progress::Progress;
+use crate::terminal::{self, Protocol};
+use drawn_json::DrawnJson;
+pub use small::{is_quick, print_small};
+use std::ffi::OsString;
+use std::io::{self, IsTerminal, Write};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use voxtile::mapper::MapView;
+use voxtile::space::Point;
+use voxtile::{Error, Result};
+use voxtile_render::{ColorBy, Drawn, Picture, SideAxis, View};
+
+/// Where the picture goes.
+enum Target<'a> {
+    File(&'a Path),
+    Terminal(Protocol),
+}
+
+/// Draws a map; says what was drawn, on standard error unless `is_quiet` where standard output is the picture.
+pub fn run(args: &PictureArgs, is_quiet: bool) -> anyhow::Result<ExitCode> {
+    let target = Target::of(args)?;
+    let picture = picture_of(args, &target)?;
+    let drawn = match &args.since {
+        None => read_any_map(&args.map, |map| {
+            check_color(map, args.color)?;
+            let progress = Progress::over_tiles(0);
+            let picture = complete(&picture, args, map);
+            Ok((picture.draw(map, |done, all| progress.set(done, all))?, picture))
+        }),
+        Some(since) => {
+            let before = state_before(&args.map, since);
+            read_any_map(&args.map, |after| {
+                read_any_map(&before, |before| {
+                    let progress = Progress::over_tiles(0);
+                    let picture = complete(&picture, args, after);
+                    let tell = |done, all| progress.set(done, all);
+                    Ok((picture.draw_difference(before, after, tell)?, picture))
+                })
+            })
+        }
+    };
+    let (drawn, _) = drawn?;
+    match target {
+        Target::Terminal(protocol) => {
+            let mut out = io::stdout().lock();
+            terminal::write(&drawn.image, protocol, &mut out)?;
+            writeln!(out, "{}", caption(args, &drawn))?;
+        }
+        Target::File(path) => {
+            write_png(&drawn, path)?;
+            let is_stream = is_standard_output(path);
+            if args.json {
+                let of = DrawnJson::of(args, path, &drawn);
+                let out: &mut dyn Write = if is_stream { &mut io::stderr() } else { &mut io::stdout() };
+                json::print(&of, &mut { out })?;
+            } else if !is_stream {
+                writeln!(io::stdout(), "{}: {}", path.display(), caption(args, &drawn))?;
+            } else if !is_quiet {
+                writeln!(io::stderr(), "{}", caption(args, &drawn))?;
+            }
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Writes a picture, whole or not at all.
+pub fn write_png(drawn: &Drawn, path: &Path) -> anyhow::Result<()> {
+    let mut file = OutputFile::create(path)?;
+    let written = drawn.image.write_png(file.out());
+    file.written(written)?;
+    file.finish()
+}
+
+/// Where the sensor was, as far as the map knows it. A list that is damaged costs the line and not the picture.
+pub fn path_of(map: &AnyMap) -> Vec<Point> {
+    let AnyMap::Map(reader) = map else { return Vec::new() };
+    match reader.scans() {
+        Ok(scans) => scans.iter().map(|scan| scan.origin_m).collect(),
+        Err(error) => {
+            log::warn!("the way of the sensor is left out: {error:#}");
+            Vec::new()
+        }
+    }
+}
+
+/// The name of a map for a title: its last part.
+pub fn name_of(map: &Path) -> String {
+    let full = map.canonicalize().unwrap_or_else(|_| map.to_owned());
+    full.file_name().unwrap_or(full.as_os_str()).to_string_lossy().into_owned()
+}
+
+impl From<ColorName> for ColorBy {
+    fn from(name: ColorName) -> Self {
+        match name {
+            ColorName::Height => Self::Height,
+            ColorName::Probability => Self::Probability,
+            ColorName::Count => Self::Count,
+            ColorName::LastScan => Self::LastScan,
+        }
+    }
+}
+
+impl<'a> Target<'a> {
+    fn of(args: &'a PictureArgs) -> Result<Self> {
+        let is_terminal = io::stdout().is_terminal();
+        match &args.output {
+            Some(path) if is_standard_output(path) && is_terminal => {
+                let reason = "standard output is a terminal; leave the option out to draw into it";
+                Err(Error::argument("--output", reason))
+            }
+            Some(path) => Ok(Self::File(path)),
+            None => match Protocol::asked_for(&args.terminal) {
+                Some(protocol) => Ok(Self::Terminal(protocol)),
+                None if is_terminal => Ok(Self::Terminal(Protocol::of_environment())),
+                None => {
+                    let reason = "standard output is no terminal; name a file with -o map.png, or force --kitty, --sixel \
+                                  or --blocks";
+                    Err(Error::argument("--output", reason))
+                }
+            },
+        }
+    }
+}
+
+fn picture_of(args: &PictureArgs, target: &Target) -> Result<Picture> {
+    let view = match (args.slice, args.from) {
+        (Some(z_m), ViewName::Above) => View::Slice { z_m, thickness_m: args.thickness.unwrap_or(0.0) },
+        (Some(_), _) => {
+            return Err(Error::argument(
+                "--slice",
+                "is seen from above; leave --from out, or cut with --region",
+            ));
+        }
+        (None, ViewName::Above) => View::Above,
+        (None, ViewName::SideX) => View::Side(SideAxis::X),
+        (None, ViewName::SideY) => View::Side(SideAxis::Y),
+    };
+    let mut picture = Picture::new().with_view(view).with_color(args.color.into()).with_grid(!args.no_grid);
+    if let Target::Terminal(protocol) = target {
+        let room = protocol.room();
+        picture = picture.with_size_px(room.map_px).with_legend(room.has_legend);
+        picture = picture.with_grid(!args.no_grid && room.has_legend);
+    }
+    if let Some(size) = args.size {
+        picture = picture.with_size_px([usize::from(size); 2]);
+    }
+    if let Some(region) = &args.region {
+        picture = picture.with_region(region_of(region)?);
+    }
+    Ok(picture)
+}
+
+/// Adds what the map knows.
+fn complete(picture: &Picture, args: &PictureArgs, map: &AnyMap) -> Picture {
+    let path = if args.no_path { Vec::new() } else { path_of(map) };
+    let resolution_m = map.config().grid.resolution_m();
+    let mut title = format!("{}: {resolution_m} m voxels", name_of(&args.map));
+    if let Some(z_m) = args.slice {
+        title += &format!(", height {z_m} m");
+    }
+    if let Some(since) = &args.since {
+        title += &format!(", since {}", since.display());
+    }
+    picture.clone().with_path(path).with_title(title)
+}
+
+fn check_color(map: &AnyMap, color: ColorName) -> Result<()> {
+    match (map, color) {
+        (AnyMap::Octree(_), ColorName::Count | ColorName::LastScan) => {
+            let reason = "a file of OctoMap keeps no counts and no scans; choose height or probability";
+            Err(Error::argument("--color", reason))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// A snapshot of the map, unless something else has that name.
+fn state_before(map: &Path, since: &Path) -> PathBuf {
+    if since.exists() || since.to_string_lossy().contains(['@', std::path::MAIN_SEPARATOR]) {
+        return since.to_owned();
+    }
+    let map = map
+        .to_str()
+        .and_then(|text| text.rsplit_once('@'))
+        .filter(|_| !map.exists())
+        .map_or(map, |(map, _)| map.as_ref());
+    let mut name = OsString::from(map);
+    name.push("@");
+    name.push(since);
+    name.into()
+}
+
+/// One line for a person.
+fn caption(args: &PictureArgs, drawn: &Drawn) -> String {
+    let Some(region) = drawn.region_m else { return "nothing was observed here".to_owned() };
+    let axes = match args.from {
+        ViewName::Above => [0, 1],
+        ViewName::SideX => [0, 2],
+        ViewName::SideY => [1, 2],
+    };
+    let [across, up] = axes.map(|axis| region.max[axis] - region.min[axis]);
+    let scale = match (drawn.range, args.color) {
+        (None, _) => String::new(),
+        (Some([least, most]), ColorName::Height) => format!("; height {least:.1} m (dark) to {most:.1} m"),
+        (Some([least, most]), ColorName::Probability) => format!("; probability {least} (dark) to {most}"),
+        (Some([least, most]), ColorName::Count) => format!("; count {least:.0} (dark) to {most:.0}"),
+        (Some([least, most]), ColorName::LastScan) => format!("; last scan {least:.0} (dark) to {most:.0}"),
+    };
+    let changes = if args.since.is_some() { "; blue appeared, orange vanished, grey stayed" } else { "" };
+    format!("{across:.1} x {up:.1} m, {:.3} m a cell{scale}{changes}", drawn.cell_m)
+}

@@ -1,0 +1,139 @@
+use crate::memory::resident_bytes;
+use crate::watch::Listener;
+use indicatif::{HumanBytes, ProgressBar, ProgressDrawTarget, ProgressStyle};
+use parking_lot::Mutex;
+use std::io::{self, Write};
+use std::sync::atomic::{AtomicBool, Ordering};
+use voxtile::mapper::{MapStatistics, MapView};
+
+/// A bar on standard error for long work; nothing where that is no terminal. Or another program hears of each step.
+pub struct Progress {
+    bar: ProgressBar,
+    listener: Option<Listener>,
+}
+
+static ARE_HIDDEN: AtomicBool = AtomicBool::new(false);
+
+/// The bar that was made last, if it is still there.
+static SHOWN: Mutex<Option<ProgressBar>> = Mutex::new(None);
+
+/// Standard error for the log, whose lines go above the bar.
+pub struct AboveBar;
+
+impl Write for AboveBar {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let write = || io::stderr().write_all(bytes).map(|()| bytes.len());
+        let shown = SHOWN.lock().clone();
+        shown.map_or_else(write, |bar| bar.suspend(write))
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        io::stderr().flush()
+    }
+}
+
+/// Shows no bar from here on.
+pub fn hide_all() {
+    ARE_HIDDEN.store(true, Ordering::Relaxed);
+}
+
+impl Progress {
+    /// A bar over scans.
+    pub fn over_scans(scans: Option<usize>) -> Self {
+        let (bar, template) = match scans {
+            Some(scans) => (
+                ProgressBar::new(scans as u64),
+                "{bar:30} {pos}/{len} scans  {per_sec:.0}  {msg}  {eta} left",
+            ),
+            None => (ProgressBar::no_length(), "{spinner} {pos} scans  {per_sec:.0}  {msg}"),
+        };
+        Self::styled(bar, template)
+    }
+
+    /// A bar over tiles.
+    pub fn over_tiles(tiles: usize) -> Self {
+        Self::styled(ProgressBar::new(tiles as u64), "{bar:30} {pos}/{len} tiles  {eta} left")
+    }
+
+    /// A bar over bytes.
+    #[cfg(feature = "bucket")]
+    pub fn over_bytes() -> Self {
+        Self::styled(ProgressBar::new(0), "{bar:30} {bytes}/{total_bytes}  {bytes_per_sec}  {eta} left")
+    }
+
+    fn styled(bar: ProgressBar, template: &str) -> Self {
+        if ARE_HIDDEN.load(Ordering::Relaxed) {
+            bar.set_draw_target(ProgressDrawTarget::hidden());
+        }
+        bar.set_style(style(template));
+        *SHOWN.lock() = Some(bar.clone());
+        Self { bar, listener: None }
+    }
+
+    /// Tells a program, if there is one, in place of a person.
+    pub fn told_to(mut self, listener: Option<Listener>) -> Self {
+        self.bar.set_draw_target(ProgressDrawTarget::hidden());
+        self.listener = listener;
+        self
+    }
+
+    /// So many were done before.
+    pub fn pass(&self, done: u64) {
+        self.bar.set_position(done);
+        self.bar.reset_eta();
+    }
+
+    /// One more is done.
+    pub fn step(&self) {
+        self.bar.inc(1);
+        if let Some(listener) = &self.listener {
+            listener(self.bar.position(), self.bar.length().unwrap_or(0));
+        }
+    }
+
+    /// So many of all are done.
+    pub fn set(&self, done: u64, all: u64) {
+        self.bar.set_length(all);
+        self.bar.set_position(done);
+    }
+
+    /// Prints a line on standard output, above the bar.
+    pub fn print(&self, line: &str) {
+        // A reader that has gone away, as in `| head`, is no reason to stop.
+        self.bar.suspend(|| writeln!(std::io::stdout(), "{line}").unwrap_or_default());
+    }
+
+    /// Shows what a mapper holds. Asked for a few times a second at most.
+    pub fn show(&self, mapper: &impl MapView) {
+        if self.bar.is_hidden() || !self.bar.position().is_multiple_of(8) {
+            return;
+        }
+        let MapStatistics { tiles, cached_tiles, buffered_tiles, stalls, .. } = mapper.statistics();
+        let memory = resident_bytes().map_or(String::new(), |bytes| format!(", {}", HumanBytes(bytes)));
+        let waiting = match buffered_tiles {
+            0 => String::new(),
+            tiles => format!(", updates wait for {tiles}"),
+        };
+        let stalls = match stalls.count {
+            0 => String::new(),
+            count => format!(", {count} stalls up to {} ms", stalls.worst_us / 1000),
+        };
+        self.bar.set_message(format!("{tiles} tiles, {cached_tiles} in memory{memory}{waiting}{stalls}"));
+    }
+
+    /// Says what is going on when it is no step.
+    pub fn say(&self, message: &'static str) {
+        self.bar.set_message(message);
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
+        SHOWN.lock().take_if(|shown| shown.is_finished());
+    }
+}
+
+fn style(template: &str) -> ProgressStyle {
+    ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
+}

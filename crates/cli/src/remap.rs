@@ -1,0 +1,167 @@
+use crate::args::{InsertName, ModelName, RemapArgs};
+use crate::json;
+use voxtile_pipeline::{MapAt, whole_map};
+
+use crate::memory;
+use crate::new_poses::{PoseFile, poses_for, records_of};
+use crate::rework::{self, Job};
+use indicatif::HumanCount;
+use serde::Serialize;
+use std::io::Write;
+use std::path::Path;
+use std::process::ExitCode;
+use std::time::Instant;
+use voxtile::mapper::{MapReader, MapView};
+use voxtile::operations::{Remap, Remapped, map_anew, remap};
+use voxtile::sensor::{Iwlo, SensorModel};
+use voxtile::space::Grid;
+use voxtile::{Error, InsertMode, MapConfig, MemoryLimit, RayConfig};
+
+#[derive(Serialize)]
+struct Summary<'a> {
+    #[serde(serialize_with = "voxtile::path_text::serialize")]
+    map: &'a Path,
+    dry_run: bool,
+    kept_as: Option<&'a str>,
+    #[serde(flatten)]
+    remapped: Remapped,
+    seconds: f64,
+    peak_rss_bytes: Option<u64>,
+}
+
+pub fn run(args: &RemapArgs) -> anyhow::Result<ExitCode> {
+    let Some(file) = &args.poses else { return run_anew(args) };
+    let map = whole_map(&args.map)?;
+    let started = Instant::now();
+    let tolerance = args.tolerance.as_deref().map(tolerance_of).transpose()?;
+    let job = Job::of(&args.rework, map)?;
+    let poses = {
+        let scans = records_of(&MapReader::open(map, 1)?)?;
+        poses_for(&PoseFile::of_remap(args, file)?, &scans)?
+    };
+    let how = Remap::new(job.rework.clone()).with_tolerance(tolerance);
+    let outcome = remap(map, &poses, &how, |done, all| job.progress.set(done, all));
+    let remapped = match job.ended(outcome)? {
+        Ok(remapped) => remapped,
+        Err(code) => return Ok(code),
+    };
+    drop(job);
+    let mut out = std::io::stdout().lock();
+    if args.rework.json {
+        let summary = Summary {
+            map,
+            dry_run: args.rework.dry_run,
+            kept_as: args.rework.keep_as.as_ref().map(|name| name.as_str()),
+            remapped,
+            seconds: started.elapsed().as_secs_f64(),
+            peak_rss_bytes: memory::peak_bytes(),
+        };
+        json::print(&summary, &mut out)?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let Remapped { mapped, largest_move_m, largest_turn_deg, .. } = remapped;
+    let moved = if args.rework.dry_run { "would move" } else { "moved" };
+    writeln!(
+        out,
+        "poses     {} scans {moved}, by {largest_move_m:.3} m and {largest_turn_deg:.3} degrees at most",
+        HumanCount(mapped.scans_changed)
+    )?;
+    if remapped.scans_within_tolerance > 0 {
+        writeln!(
+            out,
+            "left      {} scans where they are: new poses differ by {:.3} m and {:.3} degrees at most",
+            HumanCount(remapped.scans_within_tolerance),
+            remapped.largest_move_left_m,
+            remapped.largest_turn_left_deg
+        )?;
+    }
+    rework::print(&mapped, args.rework.dry_run, &mut out)?;
+    if let Some(name) =
+        args.rework.keep_as.as_ref().filter(|_| mapped.scans_changed > 0 && !args.rework.dry_run)
+    {
+        writeln!(out, "before    kept as {name}")?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Two lengths such as `0.02m,0.1deg`: metres and, returned as radians, degrees.
+fn tolerance_of(text: &str) -> voxtile::Result<(f64, f64)> {
+    let number = |part: &str, unit: &str| -> Option<f64> {
+        part.trim().strip_suffix(unit)?.trim().parse().ok().filter(|&x: &f64| x >= 0.0 && x.is_finite())
+    };
+    let parts = text.split_once(',');
+    let tolerance = parts.and_then(|(moved, turned)| Some((number(moved, "m")?, number(turned, "deg")?)));
+    let (moved_m, turned_deg) = tolerance.ok_or_else(|| {
+        Error::argument("--tolerance", format!("{text:?} is no length and angle such as 0.02m,0.1deg"))
+    })?;
+    Ok((moved_m, turned_deg.to_radians()))
+}
+
+/// Makes another map of the same scans.
+fn run_anew(args: &RemapArgs) -> anyhow::Result<ExitCode> {
+    let Some(output) = &args.output else {
+        return Err(Error::argument("--poses", "name a file of new poses, or another map with -o").into());
+    };
+    if args.rework.keep_as.is_some() || args.rework.dry_run {
+        let reason = "go with --poses; with -o the map stays as it is";
+        return Err(Error::argument("--keep-as, --dry-run", reason).into());
+    }
+    let job = Job::of(&args.rework, &MapAt::of(&args.map)?.map)?;
+    let reader = MapAt::of(&args.map)?.open()?;
+    let config = config_of(args, reader.config(), job.rework.memory_bytes)?;
+    let rays = |rays: &RayConfig| rays_of(args, rays);
+    let outcome = map_anew(&reader, whole_map(output)?, config, rays, &job.rework.stop, |done, all| {
+        job.progress.set(done, all)
+    });
+    let mapped = match job.ended(outcome)? {
+        Ok(mapped) => mapped,
+        Err(code) => return Ok(code),
+    };
+    drop(job);
+    let mut out = std::io::stdout().lock();
+    if args.rework.json {
+        json::print(&mapped, &mut out)?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let (scans, points) = (HumanCount(mapped.scans), HumanCount(mapped.report.points));
+    writeln!(out, "mapped    {scans} scans, {points} points, into {}", output.display())?;
+    let (voxels, occupied) = MapReader::open(output, 1)?.voxel_counts().unwrap_or_default();
+    writeln!(out, "map       {} voxels, {} occupied", HumanCount(voxels), HumanCount(occupied))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn config_of(args: &RemapArgs, own: &MapConfig, memory_bytes: usize) -> anyhow::Result<MapConfig> {
+    let (resolution_m, tile_size_m) = (
+        args.resolution.unwrap_or(own.grid.resolution_m()),
+        args.tile_size.unwrap_or(own.grid.tile_size_m()),
+    );
+    let grid = Grid::new(resolution_m, tile_size_m).map_err(Error::from)?;
+    let mut config = own.clone().with_kept_scans(args.keep_scans);
+    config.grid = grid;
+    // What was asked for is kept to, or refused.
+    let least = if args.rework.memory.is_some() { 0 } else { MemoryLimit::least_bytes(&grid) };
+    config.memory = MemoryLimit::Bytes(memory_bytes.max(least));
+    if let Some(storage) = args.storage {
+        config.storage = storage.into();
+    }
+    config.sensor_model = match (args.sensor_model, own.sensor_model) {
+        (None, own) => own,
+        (Some(ModelName::LogOdds), SensorModel::LogOdds(own)) => SensorModel::LogOdds(own),
+        (Some(ModelName::Iwlo), SensorModel::Iwlo(own)) => SensorModel::Iwlo(own),
+        (Some(ModelName::LogOdds), _) => SensorModel::default(),
+        (Some(ModelName::Iwlo), _) => SensorModel::Iwlo(Iwlo::default()),
+    };
+    Ok(config.validated()?)
+}
+
+fn rays_of(args: &RemapArgs, own: &RayConfig) -> RayConfig {
+    let mut rays = *own;
+    rays.min_range_m = args.min_range.unwrap_or(rays.min_range_m);
+    rays.max_range_m = args.max_range.or(rays.max_range_m);
+    rays.insert_mode = match args.insert {
+        Some(InsertName::PerScan) => InsertMode::PerScan,
+        Some(InsertName::PerRay) => InsertMode::PerRay,
+        None => rays.insert_mode,
+    };
+    rays
+}

@@ -1,0 +1,56 @@
+use crate::args::RemovePointsArgs;
+use crate::json;
+use crate::memory;
+use crate::part::region_of;
+use crate::rework::{self, Job};
+use indicatif::HumanCount;
+use serde::Serialize;
+use std::io::Write;
+use std::path::Path;
+use std::process::ExitCode;
+use std::time::Instant;
+use voxtile::operations::{PointsRemoved, remove_points};
+use voxtile_pipeline::whole_map;
+
+#[derive(Serialize)]
+struct Summary<'a> {
+    #[serde(serialize_with = "voxtile::path_text::serialize")]
+    map: &'a Path,
+    dry_run: bool,
+    kept_as: Option<&'a str>,
+    #[serde(flatten)]
+    removed: PointsRemoved,
+    seconds: f64,
+    peak_rss_bytes: Option<u64>,
+}
+
+pub fn run(args: &RemovePointsArgs) -> anyhow::Result<ExitCode> {
+    let map = whole_map(&args.map)?;
+    let started = Instant::now();
+    let (job, region) = (Job::of(&args.rework, map)?, region_of(&args.region)?);
+    let outcome = remove_points(map, &region, &job.rework, |done, all| job.progress.set(done, all));
+    let removed = match job.ended(outcome)? {
+        Ok(removed) => removed,
+        Err(code) => return Ok(code),
+    };
+    drop(job);
+    let mut out = std::io::stdout().lock();
+    if args.rework.json {
+        let summary = Summary {
+            map,
+            dry_run: args.rework.dry_run,
+            kept_as: args.rework.keep_as.as_ref().map(|name| name.as_str()),
+            removed,
+            seconds: started.elapsed().as_secs_f64(),
+            peak_rss_bytes: memory::peak_bytes(),
+        };
+        json::print(&summary, &mut out)?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let would = if args.rework.dry_run { "would be " } else { "" };
+    let PointsRemoved { mapped, points_removed, .. } = removed;
+    let (points, scans) = (HumanCount(points_removed), HumanCount(mapped.scans_changed));
+    writeln!(out, "removed   {points} points of {scans} scans {would}gone")?;
+    rework::print(&mapped, args.rework.dry_run, &mut out)?;
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,112 @@
+use crate::args::RemoveScansArgs;
+use crate::json;
+use crate::memory;
+use crate::rework::{self, Job};
+use crate::run::say;
+use indicatif::HumanCount;
+use serde::Serialize;
+use std::io::Write;
+use std::path::Path;
+use std::process::ExitCode;
+use std::time::Instant;
+use voxtile::Error;
+use voxtile::operations::{ScanSelection, ScansRemoved, remove_scans};
+use voxtile_pipeline::whole_map;
+
+#[derive(Serialize)]
+struct Summary<'a> {
+    #[serde(serialize_with = "voxtile::path_text::serialize")]
+    map: &'a Path,
+    dry_run: bool,
+    kept_as: Option<&'a str>,
+    #[serde(flatten)]
+    removed: ScansRemoved,
+    seconds: f64,
+    peak_rss_bytes: Option<u64>,
+}
+
+pub fn run(args: &RemoveScansArgs) -> anyhow::Result<ExitCode> {
+    let map = whole_map(&args.map)?;
+    let started = Instant::now();
+    let (job, scans) = (Job::of(&args.rework, map)?, selection_of(args)?);
+    let progress = |done, all| job.progress.set(done, all);
+    let outcome = remove_scans(map, &scans, args.from_snapshots, &job.rework, progress);
+    let removed = match job.ended(outcome)? {
+        Ok(removed) => removed,
+        Err(code) => return Ok(code),
+    };
+    drop(job);
+    let code = match &*removed.snapshots_failed {
+        [] => ExitCode::SUCCESS,
+        failed => {
+            let names: Vec<_> = failed.iter().map(|failed| failed.name.as_str()).collect();
+            let names = names.join(", ");
+            say(format_args!(
+                "{}: Scans removed from the map. These snapshots may still contain some: {names}",
+                map.display()
+            ));
+            ExitCode::FAILURE
+        }
+    };
+    let mut out = std::io::stdout().lock();
+    if args.rework.json {
+        let summary = Summary {
+            map,
+            dry_run: args.rework.dry_run,
+            kept_as: args.rework.keep_as.as_ref().map(|name| name.as_str()),
+            removed,
+            seconds: started.elapsed().as_secs_f64(),
+            peak_rss_bytes: memory::peak_bytes(),
+        };
+        json::print(&summary, &mut out)?;
+        return Ok(code);
+    }
+    let would = if args.rework.dry_run { "would be " } else { "" };
+    writeln!(out, "removed   {} scans {would}gone", HumanCount(removed.scans_removed))?;
+    if removed.files_removed > 0 {
+        let files = HumanCount(removed.files_removed);
+        writeln!(out, "completed an earlier removal: {files} files with removed scans are gone")?;
+    }
+    if removed.scans_removed > 0 {
+        rework::print(&removed.mapped, args.rework.dry_run, &mut out)?;
+    }
+    for name in &removed.snapshots_deleted {
+        writeln!(out, "snapshot  {name} held some of them and is deleted")?;
+    }
+    for name in &removed.snapshots_with_them {
+        writeln!(out, "snapshot  {name} still holds some of them; --from-snapshots deletes such")?;
+    }
+    for failed in &removed.snapshots_failed {
+        writeln!(out, "snapshot  {} may hold some of them: {}", failed.name, failed.reason)?;
+    }
+    Ok(code)
+}
+
+fn selection_of(args: &RemoveScansArgs) -> voxtile::Result<ScanSelection> {
+    if let Some(name) = &args.input {
+        return Ok(ScanSelection::Input(name.clone()));
+    }
+    if let Some([first, last]) = args.time.as_deref() {
+        return Ok(ScanSelection::Time(stamp_of(first)?, stamp_of(last)?));
+    }
+    let text = args.scans.as_deref().unwrap_or_default();
+    let (first, last) = text.split_once("..").unwrap_or((text, text));
+    match (first.trim().parse(), last.trim().parse()) {
+        (Ok(first), Ok(last)) if first <= last => Ok(ScanSelection::Numbers(first, last)),
+        _ => Err(Error::argument("--scans", format!("{text:?} is no range of numbers such as 120..180"))),
+    }
+}
+
+/// Seconds as nanoseconds, exactly.
+fn stamp_of(text: &str) -> voxtile::Result<i64> {
+    let (whole, rest) = text.split_once('.').unwrap_or((text, ""));
+    let is_number = !rest.starts_with(['-', '+']) && rest.len() <= 9;
+    let digits = format!("{rest:0<9}");
+    let whole_s: Option<i64> = whole.parse().ok();
+    let rest_ns: Option<i64> = digits.parse().ok().filter(|_| is_number);
+    let stamp = whole_s.zip(rest_ns).and_then(|(whole_s, rest_ns)| {
+        let rest_ns = if whole.starts_with('-') { -rest_ns } else { rest_ns };
+        whole_s.checked_mul(1_000_000_000)?.checked_add(rest_ns)
+    });
+    stamp.ok_or_else(|| Error::argument("--time", format!("{text:?} is no time in seconds")))
+}

@@ -1,0 +1,81 @@
+use crate::args::RepairArgs;
+use crate::json;
+use crate::progress::Progress;
+use indicatif::HumanCount;
+use serde::Serialize;
+use std::io::Write;
+use std::process::ExitCode;
+use voxtile::integrity::{Action, Repair, repair};
+use voxtile_pipeline::whole_map;
+
+/// More actions than a person reads; the rest are counted.
+const MAX_ACTIONS: usize = 10_000;
+
+#[derive(Serialize)]
+struct Report<'a> {
+    #[serde(serialize_with = "voxtile::path_text::serialize")]
+    map: &'a std::path::Path,
+    #[serde(flatten)]
+    repair: Repair,
+    done: Vec<Action>,
+}
+
+pub fn run(args: &RepairArgs) -> anyhow::Result<ExitCode> {
+    let progress = Progress::over_tiles(0);
+    let mut done = Vec::new();
+    let repair = repair(
+        whole_map(&args.map)?,
+        |action| {
+            if !args.json {
+                progress.print(&action.to_string());
+            } else if done.len() < MAX_ACTIONS {
+                done.push(action.clone());
+            }
+        },
+        |tiles, all| progress.set(tiles, all),
+    )?;
+    drop(progress);
+    let is_complete = repair.is_complete();
+    let mut out = std::io::stdout().lock();
+    if args.json {
+        json::print(&Report { map: &args.map, repair, done }, &mut out)?;
+    } else if repair.actions == 0 {
+        writeln!(out, "nothing to repair in {} tiles", HumanCount(repair.tiles))?;
+    } else {
+        let (tiles, lost) = (HumanCount(repair.tiles), HumanCount(repair.tiles_lost));
+        writeln!(
+            out,
+            "repaired: the map has {tiles} tiles; {lost} could not stay, their space is unknown again"
+        )?;
+        if repair.snapshots_lost + repair.snapshot_tiles_lost > 0 {
+            let (snapshots, tiles) =
+                (HumanCount(repair.snapshots_lost), HumanCount(repair.snapshot_tiles_lost));
+            writeln!(out, "snapshots: {snapshots} could not stay; others lost {tiles} tiles")?;
+        }
+        if repair.scans_lost + repair.snapshot_scans_lost > 0 {
+            let (scans, of_snapshots) =
+                (HumanCount(repair.scans_lost), HumanCount(repair.snapshot_scans_lost));
+            writeln!(
+                out,
+                "kept scans: {scans} of the map and {of_snapshots} of snapshots are lost; what lost any cannot be mapped \
+                 again"
+            )?;
+        }
+        if repair.inputs_forgotten > 0 {
+            let inputs = HumanCount(repair.inputs_forgotten);
+            writeln!(
+                out,
+                "inputs: {inputs} forgotten; nothing tells how many of their scans are in the map"
+            )?;
+        }
+        if repair.left > 0 {
+            let left = HumanCount(repair.left);
+            writeln!(
+                out,
+                "still damaged: {left} tiles, because the disk refuses; copy the map to another one"
+            )?;
+        }
+    }
+    // A script must not take a map with holes for a whole one.
+    Ok(if is_complete { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}

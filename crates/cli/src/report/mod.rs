@@ -1,0 +1,190 @@
+//! `voxtile report`: a page about a map, in one file.
+
+mod html;
+mod page;
+mod svg;
+
+use crate::args::ReportArgs;
+use crate::info::Info;
+use crate::json;
+use voxtile_pipeline::{AnyMap, MapAt, read_any_map};
+
+use crate::memory;
+use crate::output_file::{OutputFile, is_standard_output};
+use crate::picture::{name_of, path_of};
+use crate::progress::Progress;
+use std::io::{self, Write};
+use std::path::Path;
+use std::process::ExitCode;
+use voxtile::integrity::{Finding, Verification, verify};
+use voxtile::mapper::{MapReader, MapView};
+use voxtile::operations::{SnapshotInfo, snapshots};
+use voxtile::store::ScanRecord;
+use voxtile::{Error, TileIndex};
+use voxtile_pipeline::place::place_of;
+use voxtile_render::{Drawn, Picture, SideAxis, Survey, View};
+
+/// All that the page tells.
+struct Report {
+    name: String,
+    /// Why the map could not be read at all, if so.
+    unreadable: Option<String>,
+    content: Option<Content>,
+    snapshots: std::result::Result<Vec<SnapshotInfo>, String>,
+    damage: Damage,
+}
+
+/// What can be told of a map that opens.
+struct Content {
+    info: Info,
+    survey: Survey,
+    above: Drawn,
+    side: Drawn,
+    scans: std::result::Result<Vec<ScanRecord>, String>,
+    sizes: Sizes,
+}
+
+/// Bytes of the tiles; empty for a map of the original format.
+struct Sizes {
+    largest: Vec<(TileIndex, u64, Option<u64>)>,
+    /// All of them, ascending.
+    bytes: Vec<u64>,
+}
+
+/// What `verify` says.
+enum Damage {
+    NotAsked,
+    /// Snapshots are checked with their map.
+    OfSnapshot,
+    Checked {
+        verification: Verification,
+        findings: Vec<Finding>,
+    },
+    Failed(String),
+}
+
+/// Pixels of the pictures: sharp on paper, and a page of a megabyte or two.
+const ABOVE_PX: [usize; 2] = [1400, 1400];
+const SIDE_PX: [usize; 2] = [1400, 500];
+/// Findings on the page; the others are counted.
+const MOST_FINDINGS: usize = 200;
+/// Tiles on the page.
+const MOST_TILES: usize = 10;
+
+/// Writes the page; says where it is, on standard error unless `is_quiet` where standard output is the page.
+pub fn run(args: &ReportArgs, is_quiet: bool) -> anyhow::Result<ExitCode> {
+    let report = Report::of(args)?;
+    let mut file = OutputFile::create(&args.output)?;
+    let written = report.write(file.out());
+    file.written(written)?;
+    file.finish()?;
+    let is_stream = is_standard_output(&args.output);
+    let out: &mut dyn Write = if is_stream { &mut io::stderr() } else { &mut io::stdout() };
+    if args.json {
+        json::print(&report.to_json(args), &mut { out })?;
+    } else if !(is_stream && is_quiet) {
+        let damage = report.damage_count().filter(|&count| count > 0);
+        let damage = damage.map_or(String::new(), |count| format!("; the map is damaged: {count} findings"));
+        writeln!(out, "{}: a report of {}{damage}", args.output.display(), args.map.display())?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+impl Report {
+    fn of(args: &ReportArgs) -> anyhow::Result<Self> {
+        let MapAt { map, snapshot } = MapAt::of(&args.map)?;
+        let (content, unreadable) = match read_any_map(&args.map, |map| Content::of(map, &args.map)) {
+            Ok(content) => (Some(content), None),
+            Err(error) => match error.downcast_ref::<Error>() {
+                Some(Error::Damaged { .. } | Error::Malformed { .. }) => (None, Some(format!("{error:#}"))),
+                _ => return Err(error),
+            },
+        };
+        let damage = match &snapshot {
+            _ if args.no_verify => Damage::NotAsked,
+            Some(_) => Damage::OfSnapshot,
+            None => Damage::of(&map),
+        };
+        let snapshots = place_of(&map).and_then(snapshots).map_err(|error| format!("{error:#}"));
+        Ok(Self { name: name_of(&args.map), unreadable, content, snapshots, damage })
+    }
+
+    fn damage_count(&self) -> Option<u64> {
+        match &self.damage {
+            Damage::Checked { verification, .. } => Some(verification.damage),
+            _ => None,
+        }
+    }
+
+    fn to_json(&self, args: &ReportArgs) -> serde_json::Value {
+        serde_json::json!({
+            "map": args.map.display().to_string(),
+            "file": args.output.display().to_string(),
+            "readable": self.content.is_some(),
+            "survey": self.content.as_ref().map(|content| &content.survey),
+            "damage": self.damage_count(),
+            "peak_rss_bytes": memory::peak_bytes(),
+        })
+    }
+}
+
+impl Content {
+    fn of(map: &AnyMap, path: &Path) -> anyhow::Result<Self> {
+        let AnyMap::Map(reader) = map else {
+            let reason =
+                "is a file of OctoMap; `voxtile import` makes a map of it, `voxtile picture` draws it";
+            return Err(Error::argument(path.display().to_string(), reason).into());
+        };
+        let progress = Progress::over_tiles(0);
+        let tell = |done, all| progress.set(done, all);
+        let info = Info::of(reader)?;
+        let resolution_m = info.resolution_m;
+        let picture = Picture::new().with_path(path_of(map)).skipping_unreadable();
+        let title = |what: &str| format!("{} {what}: {resolution_m} m voxels", name_of(path));
+        let above = picture.clone().with_size_px(ABOVE_PX).with_title(title("from above"));
+        // The longer side says more.
+        let is_long_in_y = info.bounds_m.is_some_and(|b| b.max[1] - b.min[1] > b.max[0] - b.min[0]);
+        let axis = if is_long_in_y { SideAxis::Y } else { SideAxis::X };
+        let side =
+            picture.with_view(View::Side(axis)).with_size_px(SIDE_PX).with_title(title("from the side"));
+        Ok(Self {
+            above: above.draw(reader.as_ref(), tell)?,
+            side: side.draw(reader.as_ref(), tell)?,
+            survey: Survey::of(reader.as_ref(), tell)?,
+            scans: reader.scans().map_err(|error| format!("{error:#}")),
+            sizes: Sizes::of(reader),
+            info,
+        })
+    }
+}
+
+impl Sizes {
+    fn of(reader: &MapReader) -> Self {
+        let tiles = reader.tile_indices();
+        let mut sizes: Vec<_> = tiles
+            .into_iter()
+            .filter_map(|tile| Some((tile, reader.tile_bytes(tile)?, reader.voxels_of_tile_hint(tile))))
+            .collect();
+        sizes.sort_by_key(|&(tile, bytes, _)| (std::cmp::Reverse(bytes), tile));
+        let bytes = sizes.iter().rev().map(|&(_, bytes, _)| bytes).collect();
+        sizes.truncate(MOST_TILES);
+        Self { largest: sizes, bytes }
+    }
+}
+
+impl Damage {
+    fn of(map: &Path) -> Self {
+        let progress = Progress::over_tiles(0);
+        let mut findings = Vec::new();
+        let found = |finding: &Finding| {
+            if findings.len() < MOST_FINDINGS {
+                findings.push(finding.clone());
+            }
+        };
+        let verified = place_of(map).and_then(|map| verify(map, found, |done, all| progress.set(done, all)));
+        match verified {
+            Ok(verification) => Self::Checked { verification, findings },
+            Err(error) => Self::Failed(format!("{error:#}")),
+        }
+    }
+}

@@ -1,0 +1,317 @@
+use super::html::Text;
+use super::svg::{Bar, histogram};
+use super::{Content, Damage, MOST_FINDINGS, Report, Sizes};
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use indicatif::{HumanBytes, HumanCount};
+use std::fmt::Display;
+use std::io::{self, Write};
+use voxtile::store::ScanRecord;
+use voxtile_render::{Drawn, Survey, colors};
+
+const STYLE: &str = include_str!("style.css");
+const SECONDS_A_NS: f64 = 1e-9;
+
+impl Report {
+    /// Writes the page: HTML that is XML, too, without a script and without a link.
+    pub fn write(&self, out: &mut impl Write) -> io::Result<()> {
+        let name = Text(&self.name);
+        write!(
+            out,
+            "<!DOCTYPE html>\n<html xmlns=\"http://www.w3.org/1999/xhtml\" lang=\"en\">\n<head>\n\
+             <meta charset=\"utf-8\"/>\n\
+             <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n\
+             <meta http-equiv=\"Content-Security-Policy\" \
+             content=\"default-src 'none'; img-src data:; style-src 'unsafe-inline'\"/>\n\
+             <title>{name}: map report</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n<h1>{name}</h1>\n\
+             <p class=\"faint\">A map of voxtile {}</p>\n",
+            env!("CARGO_PKG_VERSION")
+        )?;
+        self.write_state(out)?;
+        if let Some(content) = &self.content {
+            content.write(out)?;
+        }
+        self.write_snapshots(out)?;
+        self.write_findings(out)?;
+        writeln!(out, "</body>\n</html>")
+    }
+
+    /// One line: is the map whole?
+    fn write_state(&self, out: &mut impl Write) -> io::Result<()> {
+        if let Some(reason) = &self.unreadable {
+            writeln!(out, "<p class=\"bad\">The map cannot be read: {}</p>", Text(reason))?;
+        }
+        match &self.damage {
+            Damage::NotAsked => writeln!(out, "<p class=\"faint\">The files were not verified.</p>"),
+            Damage::OfSnapshot => {
+                writeln!(out, "<p class=\"faint\">A snapshot is verified with its map.</p>")
+            }
+            Damage::Failed(reason) => {
+                writeln!(out, "<p class=\"bad\">Verifying failed: {}</p>", Text(reason))
+            }
+            Damage::Checked { verification, .. } => match (verification.damage, verification.verified) {
+                (0, true) => writeln!(out, "<p class=\"good\">Whole: every checksum matches.</p>"),
+                (0, false) => writeln!(out, "<p>Unverified: the map has no checksums.</p>"),
+                (count, _) => {
+                    writeln!(out, "<p class=\"bad\">Damaged: {} findings, see below.</p>", HumanCount(count))
+                }
+            },
+        }
+    }
+
+    fn write_snapshots(&self, out: &mut impl Write) -> io::Result<()> {
+        let snapshots = match &self.snapshots {
+            Ok(snapshots) if snapshots.is_empty() => return Ok(()),
+            Ok(snapshots) => snapshots,
+            Err(reason) => {
+                return writeln!(out, "<h2>Snapshots</h2>\n<p class=\"bad\">{}</p>", Text(reason));
+            }
+        };
+        begin_table(out, "Snapshots", &["name", "#scan", "#tiles", "#voxels", "#its own bytes"])?;
+        for snapshot in snapshots {
+            write!(out, "<tr><td>{}</td>", Text(&snapshot.name))?;
+            match &snapshot.damage {
+                Some(damage) => write!(out, "<td colspan=\"4\" class=\"bad\">{}</td>", Text(damage))?,
+                None => {
+                    for number in [snapshot.scan_number, snapshot.tiles, snapshot.voxels] {
+                        number_cell(out, HumanCount(number))?;
+                    }
+                    number_cell(out, HumanBytes(snapshot.own_bytes))?;
+                }
+            }
+            writeln!(out, "</tr>")?;
+        }
+        end_table(out)
+    }
+
+    fn write_findings(&self, out: &mut impl Write) -> io::Result<()> {
+        let Damage::Checked { verification, findings } = &self.damage else { return Ok(()) };
+        if findings.is_empty() {
+            return Ok(());
+        }
+        begin_table(out, "Findings", &["file", "tile", "#offset", "what"])?;
+        for finding in findings {
+            let tile = finding.tile.map_or(String::new(), |[x, y, z]| format!("{x} {y} {z}"));
+            let offset = finding.offset.map_or(String::new(), |offset| offset.to_string());
+            let path = Text(finding.path.display());
+            write!(out, "<tr><td>{path}</td><td>{tile}</td>")?;
+            number_cell(out, offset)?;
+            writeln!(out, "<td>{}</td></tr>", Text(&finding.reason))?;
+        }
+        end_table(out)?;
+        let more = (verification.damage + verification.notes).saturating_sub(MOST_FINDINGS as u64);
+        if more > 0 {
+            let more = HumanCount(more);
+            writeln!(out, "<p class=\"faint\">{more} more; <code>voxtile verify</code> lists all.</p>")?;
+        }
+        Ok(())
+    }
+}
+
+impl Content {
+    fn write(&self, out: &mut impl Write) -> io::Result<()> {
+        let Self { info, survey, .. } = self;
+        let share = survey.occupied as f64 / survey.voxels.max(1) as f64;
+        writeln!(out, "<div class=\"big\">")?;
+        for (value, name) in [
+            (format!("{} m", info.resolution_m), "voxels of"),
+            (HumanCount(info.tiles).to_string(), "tiles"),
+            (area(survey.area_m2), "observed from above"),
+            (format!("{} m³", rounded(survey.volume_m3)), "observed"),
+            (format!("{:.1} %", 100.0 * share), "of the voxels occupied"),
+            (HumanCount(info.scan_number).to_string(), "scans"),
+        ] {
+            writeln!(out, "<div><b>{value}</b><span class=\"faint\">{name}</span></div>")?;
+        }
+        writeln!(out, "</div>")?;
+        write_picture(
+            out,
+            &self.above,
+            "From above: each column in the color of its topmost occupied voxel.",
+        )?;
+        write_picture(out, &self.side, "From the side.")?;
+        self.write_numbers(out)?;
+        write_histograms(out, survey)?;
+        self.sizes.write(out)
+    }
+
+    fn write_numbers(&self, out: &mut impl Write) -> io::Result<()> {
+        let Self { info, survey, .. } = self;
+        begin_table(out, "Numbers", &[])?;
+        row(out, "map id", Text(info.map_id.as_deref().unwrap_or("none: the original format")))?;
+        row(out, "resolution", format!("{} m", info.resolution_m))?;
+        row(out, "tile size", format!("{} m", info.tile_size_m))?;
+        row(out, "occupied from", format!("probability {}", info.occupancy_threshold))?;
+        row(out, "storage", Text(format!("{:?}", info.storage)))?;
+        row(out, "tiles", HumanCount(info.tiles))?;
+        if let Some(bounds) = info.bounds_m {
+            row(out, "lower corner", format!("{:?} m", bounds.min))?;
+            row(out, "upper corner", format!("{:?} m", bounds.max))?;
+        }
+        row(out, "voxels", HumanCount(info.voxels))?;
+        row(out, "occupied", HumanCount(info.occupied))?;
+        row(out, "columns observed", HumanCount(survey.columns))?;
+        row(out, "columns occupied", HumanCount(survey.occupied_columns))?;
+        row(out, "area observed", format!("{} m²", rounded(survey.area_m2)))?;
+        row(out, "volume observed", format!("{} m³", rounded(survey.volume_m3)))?;
+        row(out, "bytes of tables", HumanCount(info.table_bytes))?;
+        row(out, "bytes of octrees", HumanCount(info.octree_bytes))?;
+        row(out, "flushes", HumanCount(info.flush_number))?;
+        row(out, "scans", HumanCount(info.scan_number))?;
+        match &self.scans {
+            Ok(scans) => write_scans(out, scans)?,
+            Err(reason) => row(out, "list of scans", Text(reason))?,
+        }
+        for input in &info.inputs {
+            row(out, &format!("input from scan {}", HumanCount(input.first_scan)), Text(&input.name))?;
+        }
+        end_table(out)?;
+        if !survey.unread.is_empty() {
+            let count = survey.unread.len();
+            writeln!(
+                out,
+                "<p class=\"bad\">{count} tiles cannot be read: pictures, columns and histograms are without them.</p>"
+            )?;
+        }
+        Ok(())
+    }
+}
+
+fn write_scans(out: &mut impl Write, scans: &[ScanRecord]) -> io::Result<()> {
+    let (Some(first), Some(last)) = (scans.first(), scans.last()) else { return Ok(()) };
+    row(out, "scans listed", HumanCount(scans.len() as u64))?;
+    let step_m = |pair: &[ScanRecord]| {
+        let squares = (0..3).map(|k| (pair[1].origin_m[k] - pair[0].origin_m[k]).powi(2));
+        squares.sum::<f64>().sqrt()
+    };
+    let length_m: f64 = scans.windows(2).map(step_m).sum();
+    row(out, "way of the sensor", format!("{} m, from scan to scan", rounded(length_m)))?;
+    if let (Some(from_ns), Some(to_ns)) = (first.stamp_ns, last.stamp_ns) {
+        let seconds = (to_ns as f64 - from_ns as f64) * SECONDS_A_NS;
+        row(out, "time span", format!("{seconds:.1} s"))?;
+        let stamps = [from_ns, to_ns].map(|ns| format!("{:.3} s", ns as f64 * SECONDS_A_NS));
+        row(out, "time stamps", stamps.join(" to "))?;
+    }
+    Ok(())
+}
+
+fn write_picture(out: &mut impl Write, drawn: &Drawn, caption: &str) -> io::Result<()> {
+    let mut png = Vec::new();
+    drawn.image.write_png(&mut png)?;
+    let (width, height) = (drawn.image.width_px(), drawn.image.height_px());
+    let data = STANDARD.encode(png);
+    writeln!(
+        out,
+        "<figure><img width=\"{width}\" height=\"{height}\" alt=\"{caption}\" src=\"data:image/png;base64,{data}\"/>\
+         <figcaption>{caption}</figcaption></figure>"
+    )
+}
+
+fn write_histograms(out: &mut impl Write, survey: &Survey) -> io::Result<()> {
+    let bins = survey.probabilities.len();
+    let bars: Vec<Bar> = (0..bins)
+        .map(|bin| {
+            let border = |bin: usize| bin as f64 / bins as f64;
+            Bar {
+                from: format!("{:.2}", border(bin)),
+                to: format!("{:.2}", border(bin + 1)),
+                count: survey.probabilities[bin],
+                color: if bin < bins / 2 {
+                    [118, 134, 158]
+                } else {
+                    colors::color_of(border(bin) * 2.0 - 1.0)
+                },
+            }
+        })
+        .collect();
+    write_histogram(out, "Observed voxels by probability of being occupied", &bars)?;
+    let most = survey.heights.len().max(2) - 1;
+    let bars: Vec<Bar> = survey
+        .heights
+        .iter()
+        .enumerate()
+        .map(|(number, bin)| Bar {
+            from: format!("{} m", tenths(bin.from_m)),
+            to: format!("{} m", tenths(bin.to_m)),
+            count: bin.occupied,
+            color: colors::color_of(number as f64 / most as f64),
+        })
+        .collect();
+    if bars.is_empty() { Ok(()) } else { write_histogram(out, "Occupied voxels by height", &bars) }
+}
+
+fn write_histogram(out: &mut impl Write, what: &str, bars: &[Bar]) -> io::Result<()> {
+    let svg = histogram(bars, what).map_err(io::Error::other)?;
+    writeln!(out, "<h2>{what}</h2>\n<figure>{svg}</figure>")
+}
+
+impl Sizes {
+    fn write(&self, out: &mut impl Write) -> io::Result<()> {
+        if self.bytes.is_empty() {
+            return Ok(());
+        }
+        let (all, count) = (self.bytes.iter().sum::<u64>(), self.bytes.len());
+        begin_table(out, "Tiles by size", &["tile", "#bytes", "#voxels"])?;
+        for (tile, bytes, voxels) in &self.largest {
+            let [x, y, z] = tile.to_array();
+            write!(out, "<tr><td>{x} {y} {z}</td>")?;
+            number_cell(out, HumanCount(*bytes))?;
+            number_cell(out, voxels.map_or(String::new(), |voxels| HumanCount(voxels).to_string()))?;
+            writeln!(out, "</tr>")?;
+        }
+        end_table(out)?;
+        writeln!(
+            out,
+            "<p class=\"faint\">The largest of {}; {} in all, half of the tiles have at most {}.</p>",
+            HumanCount(count as u64),
+            HumanBytes(all),
+            HumanBytes(self.bytes[count / 2])
+        )
+    }
+}
+
+/// Begins a table below a heading. Columns that begin with # have numbers.
+fn begin_table(out: &mut impl Write, heading: &str, columns: &[&str]) -> io::Result<()> {
+    write!(out, "<h2>{heading}</h2>\n<div class=\"scroll\"><table>")?;
+    if !columns.is_empty() {
+        write!(out, "<thead><tr>")?;
+        for column in columns {
+            match column.strip_prefix('#') {
+                Some(name) => write!(out, "<th class=\"number\">{name}</th>")?,
+                None => write!(out, "<th>{column}</th>")?,
+            }
+        }
+        write!(out, "</tr></thead>")?;
+    }
+    writeln!(out, "<tbody>")
+}
+
+fn end_table(out: &mut impl Write) -> io::Result<()> {
+    writeln!(out, "</tbody></table></div>")
+}
+
+fn row(out: &mut impl Write, name: &str, value: impl Display) -> io::Result<()> {
+    writeln!(out, "<tr><th>{name}</th><td>{value}</td></tr>")
+}
+
+fn number_cell(out: &mut impl Write, value: impl Display) -> io::Result<()> {
+    write!(out, "<td class=\"number\">{value}</td>")
+}
+
+fn area(area_m2: f64) -> String {
+    if area_m2 >= 1e6 { format!("{:.2} km²", area_m2 / 1e6) } else { format!("{} m²", rounded(area_m2)) }
+}
+
+/// Whole numbers where they are large, and three digits where they are not.
+fn rounded(number: f64) -> String {
+    match number {
+        100.0.. => HumanCount(number.round() as u64).to_string(),
+        1.0..100.0 => format!("{number:.1}"),
+        _ => format!("{number:.3}"),
+    }
+}
+
+/// Without rounding noise, and without the sign of a zero.
+fn tenths(height_m: f64) -> f64 {
+    (height_m * 100.0).round() / 100.0 + 0.0
+}

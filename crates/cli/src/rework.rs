@@ -1,0 +1,77 @@
+//! What the commands share that map a part of a map again.
+
+use crate::args::ReworkArgs;
+use crate::progress::Progress;
+use crate::run::{INTERRUPTED, say};
+use crate::stop_signal;
+use indicatif::HumanCount;
+use std::io::Write;
+use std::path::Path;
+use std::process::ExitCode;
+use voxtile::MemoryLimit;
+use voxtile::mapper::MapReader;
+use voxtile::operations::{MappedAgain, Rework};
+use voxtile::scan::Stop;
+
+/// What a rework may use of memory unless something else is asked for.
+const DEFAULT_MEMORY_BYTES: usize = 512 << 20;
+
+/// How a map is mapped again, and its progress.
+pub struct Job {
+    pub rework: Rework,
+    pub progress: Progress,
+    stop: Stop,
+}
+
+impl Job {
+    pub fn of(args: &ReworkArgs, map: &Path) -> anyhow::Result<Self> {
+        let stop = stop_signal::catch_undone()?;
+        let config = MapReader::config_of(map)?;
+        let memory =
+            args.memory.map_or(DEFAULT_MEMORY_BYTES.max(MemoryLimit::least_bytes(&config.grid)), |memory| {
+                usize::try_from(memory.as_u64()).unwrap_or(usize::MAX)
+            });
+        let rework = Rework::default()
+            .with_memory_bytes(memory)
+            .with_keep_as(args.keep_as.clone())
+            .with_dry_run(args.dry_run)
+            .with_stop(stop.clone());
+        Ok(Self { rework, progress: Progress::over_scans(Some(0)), stop })
+    }
+
+    /// What a request to stop leads to: the map is as it was.
+    pub fn ended<T>(&self, outcome: voxtile::Result<T>) -> anyhow::Result<Result<T, ExitCode>> {
+        match outcome {
+            Err(voxtile::Error::Stopped) if self.stop.is_set() => {
+                say(format_args!("stopped; the map is as it was"));
+                Ok(Err(ExitCode::from(INTERRUPTED)))
+            }
+            outcome => Ok(Ok(outcome?)),
+        }
+    }
+}
+
+/// Two lines for people.
+pub fn print(mapped: &MappedAgain, is_dry_run: bool, out: &mut impl Write) -> std::io::Result<()> {
+    let MappedAgain {
+        scans, scans_changed, scans_mapped, tiles, tiles_mapped, updates, updates_mapped, ..
+    } = *mapped;
+    let would = if is_dry_run { "would be " } else { "" };
+    let share = 100.0 * updates_mapped as f64 / updates.max(1) as f64;
+    writeln!(
+        out,
+        "scans     {} of {}: {scans_changed} changed, {would}mapped again where that touches them",
+        HumanCount(scans_mapped),
+        HumanCount(scans)
+    )?;
+    writeln!(
+        out,
+        "tiles     {} of {} {would}mapped again, by {share:.1} % of the voxel updates of all scans",
+        HumanCount(tiles_mapped),
+        HumanCount(tiles)
+    )?;
+    match mapped.estimated_s {
+        Some(seconds) => writeln!(out, "time      about {seconds:.1} s"),
+        None => Ok(()),
+    }
+}

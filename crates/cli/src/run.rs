@@ -1,0 +1,155 @@
+//! From a command line to an exit code.
+
+use super::args::{Cli, Command};
+use super::failure::JsonTo;
+#[cfg(feature = "view")]
+use super::view;
+use super::{
+    build, clear, completions, convert, crop, decay, demo, diff, digest, export, import, info, local, man,
+    merge, picture, progress, query, raycast, remap, remove_points, remove_scans, repair, report, revert,
+    scans, share, snapshot, snapshots, threads, verify,
+};
+#[cfg(feature = "bucket")]
+use super::{pull, push};
+use clap::Parser;
+use std::ffi::OsString;
+use std::io::Write;
+use std::process::ExitCode;
+use voxtile::begin_with_one_heap;
+use voxtile_pipeline::place;
+
+/// The command with the arguments of this process.
+pub fn main() -> ExitCode {
+    run(std::env::args_os())
+}
+
+/// The command with `arguments`, the program's name first. It ends the process where they make no sense or ask for
+/// help, and it expects a process of its own: it sets up logging, threads and signals.
+pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let cli = Cli::parse_from(with_plain_numbers(arguments));
+    // The command line before the environment, where it says something.
+    let mut log = env_logger::Builder::new();
+    log.filter_level(cli.log_level()).format_timestamp(None);
+    log.target(env_logger::Target::Pipe(Box::new(progress::AboveBar)));
+    if !cli.quiet && cli.verbose == 0 {
+        log.parse_default_env();
+    }
+    log.init();
+    #[cfg(feature = "bucket")]
+    if let Some(timeout) = cli.bucket_timeout {
+        place::set_bucket_timeout(timeout);
+    }
+    let Cli { command, threads, quiet, .. } = cli;
+    let json_to = JsonTo::of(&command);
+    if quiet {
+        progress::hide_all();
+    }
+    if keeps_to_bytes(&command) {
+        // Before there is a second thread, and before anything is read from standard input.
+        begin_with_one_heap();
+    }
+    if is_parallel(&command)
+        && let Err(error) = threads::start(threads)
+    {
+        return json_to.tell(&error);
+    }
+    let outcome = match command {
+        Command::Build(args) => build::run(&args),
+        Command::Scans(args) => scans::run(&args),
+        Command::Import(args) => import::run(&args),
+        Command::Info(args) => info::run(&args),
+        Command::Query(args) => query::run(&args),
+        Command::Raycast(args) => raycast::run(&args),
+        Command::Export(args) => export::run(&args, quiet),
+        Command::Picture(args) => picture::run(&args, quiet),
+        Command::Report(args) => report::run(&args, quiet),
+        Command::Digest(args) => digest::run(&args),
+        Command::Snapshot(args) => snapshot::run(&args),
+        Command::Snapshots(args) => snapshots::run(&args),
+        Command::Diff(args) => diff::run(&args),
+        Command::Revert(args) => revert::run(&args),
+        Command::Merge(args) => merge::run(&args),
+        Command::Crop(args) => crop::run(&args),
+        Command::Clear(args) => clear::run(&args),
+        Command::Decay(args) => decay::run(&args),
+        Command::Convert(args) => convert::run(&args),
+        Command::Remap(args) => remap::run(&args),
+        Command::RemoveScans(args) => remove_scans::run(&args),
+        Command::RemovePoints(args) => remove_points::run(&args),
+        #[cfg(feature = "bucket")]
+        Command::Push(args) => push::run(&args),
+        #[cfg(feature = "bucket")]
+        Command::Pull(args) => pull::run(&args),
+        Command::Verify(args) => verify::run(&args),
+        Command::Repair(args) => repair::run(&args),
+        #[cfg(feature = "view")]
+        Command::View(args) => view::run(&args),
+        Command::Local(args) => local::run(&args),
+        Command::Share(args) => share::run(&args),
+        Command::Demo(args) => demo::run(&args),
+        Command::Completions(args) => completions::run(&args),
+        Command::Man(args) => man::run(&args),
+    };
+    outcome.unwrap_or_else(|error| json_to.tell(&error))
+}
+
+/// Negative numbers as programs print them (`-1e-05`, `-.5`, `-inf`), which would be taken for options.
+fn with_plain_numbers(arguments: impl IntoIterator<Item = OsString>) -> Vec<OsString> {
+    let mut are_options_over = false;
+    let plain = |argument: OsString| {
+        are_options_over |= argument == "--";
+        match argument.to_str().filter(|_| !are_options_over).and_then(plain_number) {
+            Some(plain) => plain.into(),
+            None => argument,
+        }
+    };
+    arguments.into_iter().map(plain).collect()
+}
+
+/// A negative number in digits alone, if it is one in another form.
+fn plain_number(text: &str) -> Option<String> {
+    let digits = text.strip_prefix('-')?;
+    if digits.bytes().all(|byte| byte.is_ascii_digit()) {
+        return None;
+    }
+    match text.parse::<f64>().ok()? {
+        f64::NEG_INFINITY => Some("-1e999".to_owned()),
+        number => Some(number.to_string()),
+    }
+}
+
+/// Whether the command maps within a limit of bytes.
+const fn keeps_to_bytes(command: &Command) -> bool {
+    match command {
+        Command::Build(args) => args.cache_tiles.is_none(),
+        Command::Remap(_) | Command::RemoveScans(_) | Command::RemovePoints(_) => true,
+        _ => false,
+    }
+}
+
+/// Whether a command works on several threads.
+fn is_parallel(command: &Command) -> bool {
+    match command {
+        Command::Build(_)
+        | Command::Remap(_)
+        | Command::RemoveScans(_)
+        | Command::RemovePoints(_)
+        | Command::Local(_)
+        | Command::Demo(_)
+        | Command::Export(_)
+        | Command::Picture(_)
+        | Command::Report(_) => true,
+        #[cfg(feature = "view")]
+        Command::View(_) => true,
+        Command::Info(args) => info::may_draw(args),
+        _ => false,
+    }
+}
+
+/// One line for a person. Where standard error refuses it there is nobody to tell.
+pub fn say(line: std::fmt::Arguments<'_>) {
+    let _ = writeln!(std::io::stderr().lock(), "voxtile: {line}");
+}
+
+/// Ended by Ctrl-C or SIGTERM, after everything so far was flushed.
+pub const INTERRUPTED: u8 = 130;

@@ -1,0 +1,58 @@
+use std::path::{Path, PathBuf};
+use voxtile::Result;
+use voxtile::scan::Stop;
+use voxtile_formats::{ReadOptions, ScanSource};
+use voxtile_pipeline::place::url_of;
+#[cfg(not(feature = "bucket"))]
+use voxtile_pipeline::place::without_buckets;
+
+/// Opens the scans at a URL that is none of a map.
+///
+/// # Errors
+///
+/// As for [`Bucket::open`](voxtile_bucket::Bucket::open) and
+/// [`FetchedFiles::fetch`](voxtile_bucket::FetchedFiles::fetch); a URL, where the command was built without buckets.
+#[cfg(feature = "bucket")]
+pub fn scans_at(url: &str, options: &ReadOptions, stop: &Stop) -> Result<Box<dyn ScanSource + Send>> {
+    Ok(Box::new(crate::fetched_source::FetchedSource::open(url, options, stop)?))
+}
+
+#[cfg(not(feature = "bucket"))]
+pub fn scans_at(url: &str, _: &ReadOptions, _: &Stop) -> Result<Box<dyn ScanSource + Send>> {
+    Err(without_buckets(url))
+}
+
+/// Scans as files, for as long as this lives.
+pub struct LocalScans {
+    path: PathBuf,
+    #[cfg(feature = "bucket")]
+    _fetched: Option<voxtile_bucket::FetchedFiles>,
+}
+
+impl LocalScans {
+    /// Fetches what lies at a URL that is none of a map, until it is asked to stop; takes all else as it is.
+    ///
+    /// # Errors
+    ///
+    /// As for [`scans_at`]; [`Error::Stopped`].
+    #[cfg(feature = "bucket")]
+    pub fn of(scans: &Path, stop: &Stop) -> Result<Self> {
+        let url = match url_of(scans) {
+            Some(url) if !crate::kept_source::is_map(scans, stop)? => Some(url),
+            _ => None,
+        };
+        let fetched = url.map(|url| crate::fetched_source::fetch(url, stop)).transpose()?;
+        let path = fetched.as_ref().map_or(scans, |files| files.path()).to_owned();
+        Ok(Self { path, _fetched: fetched })
+    }
+
+    #[cfg(not(feature = "bucket"))]
+    pub fn of(scans: &Path, _: &Stop) -> Result<Self> {
+        url_of(scans).map_or(Ok(Self { path: scans.to_owned() }), |url| Err(without_buckets(url)))
+    }
+
+    /// Where they are.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+}

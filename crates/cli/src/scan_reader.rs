@@ -1,0 +1,280 @@
+use crate::scan_input;
+use crate::scan_place::LocalScans;
+use crate::scan_queue::{ScanQueue, is_last};
+use anyhow::bail;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::thread;
+use std::time::Duration;
+use voxtile::Error;
+use voxtile::scan::Stop;
+use voxtile_formats::{PointRoom, PoseSource, ReadOptions, ScanMark, ScanSource, StoredScan};
+
+/// How long an input may keep us waiting before we look up.
+const PATIENCE: Duration = Duration::from_millis(100);
+
+/// Reads an input on a thread of its own, scan by scan: whoever asks can stop waiting, whatever the input does. Scans are
+/// read when they are asked for, or a few of them ahead. Where the system gives no thread, it reads here.
+pub struct ScanReader {
+    place: Place,
+    stop: Stop,
+    /// Where scans come from once they are read before anybody asks.
+    ahead: Option<Arc<ScanQueue>>,
+    /// Here and not in the thread, which nobody waits for: what was fetched is to go before the process does.
+    _scans: LocalScans,
+}
+
+/// What is known of an input once it is open.
+pub struct Opened {
+    pub name: String,
+    pub scans: Option<usize>,
+    pub poses: PoseSource,
+}
+
+/// How scans are told from each other.
+pub type Marking = fn(&StoredScan) -> voxtile::Result<ScanMark>;
+
+/// A scan, and what tells it from others.
+pub struct ReadScan {
+    pub scan: StoredScan,
+    pub mark: ScanMark,
+}
+
+/// What came of asking for a scan.
+pub enum Read {
+    Scan(ReadScan),
+    /// One that cannot be read; the next call gives the one behind it.
+    Unread(Error),
+    /// One that came while too many waited.
+    LeftOut(ScanMark),
+    End,
+    /// It was asked to stop before there was a scan.
+    Stopped,
+}
+
+enum Place {
+    Thread { requests: Sender<Request>, answers: Receiver<Answer> },
+    Here(Box<dyn ScanSource + Send>, PointRoom, Marking),
+}
+
+enum Request {
+    Scan,
+    Fingerprint,
+    Remarks,
+    Crs,
+    /// Read on into a queue until the input has come to its end.
+    Ahead(Arc<ScanQueue>),
+}
+
+enum Answer {
+    Opened(voxtile::Result<Opened>),
+    Read(voxtile::Result<Read>),
+    Fingerprint(voxtile::Result<String>),
+    Remarks(Vec<String>),
+    Crs(Option<String>),
+}
+
+impl ScanReader {
+    /// Opens an input; `None` if it was asked to stop before that had come to an end.
+    pub fn open(
+        scans: PathBuf,
+        options: ReadOptions,
+        room: PointRoom,
+        mark: Marking,
+        stop: Stop,
+    ) -> anyhow::Result<Option<(Self, Opened)>> {
+        let (requests, requests_in) = channel();
+        let (answers_out, answers) = channel();
+        let local = match LocalScans::of(&scans, &stop) {
+            Err(Error::Stopped) => return Ok(None),
+            local => local?,
+        };
+        let (path, own_options, here) = (local.path().to_owned(), options.clone(), room.clone());
+        let (named, own_stop) = (scans.clone(), stop.clone());
+        let read = move || {
+            let mut source = match scan_input::open(&path, &own_options, &own_stop) {
+                Ok(source) => source,
+                Err(error) => return drop(answers_out.send(Answer::Opened(Err(error)))),
+            };
+            let opened = Opened::of(&named, &*source);
+            let mut is_wanted = answers_out.send(Answer::Opened(Ok(opened))).is_ok();
+            while is_wanted && let Ok(request) = requests_in.recv() {
+                match request {
+                    Request::Ahead(queue) => read_ahead(&mut *source, &room, mark, &queue),
+                    request => {
+                        is_wanted = answers_out.send(answer(&mut *source, &request, &room, mark)).is_ok();
+                    }
+                }
+            }
+        };
+        match thread::Builder::new().name("voxtile-read".to_owned()).spawn(read) {
+            Ok(_) => {
+                let mut reader =
+                    Self { place: Place::Thread { requests, answers }, stop, ahead: None, _scans: local };
+                match reader.wait(&mut || Ok(()))? {
+                    Some(Answer::Opened(Err(Error::Stopped))) => Ok(None),
+                    Some(Answer::Opened(opened)) => Ok(Some((reader, opened?))),
+                    _ => Ok(None),
+                }
+            }
+            Err(error) => {
+                log::warn!("no thread for reading, so that requests to stop wait for the input: {error}");
+                let source = scan_input::open(local.path(), &options, &stop)?;
+                let opened = Opened::of(&scans, &*source);
+                Ok(Some((
+                    Self { place: Place::Here(source, here, mark), stop, ahead: None, _scans: local },
+                    opened,
+                )))
+            }
+        }
+    }
+
+    /// From here on scans are read as they come, before anybody asks for them. Where there is no thread to read, they are
+    /// not.
+    pub fn read_ahead(&mut self, queue: ScanQueue) {
+        if let Place::Thread { requests, .. } = &self.place {
+            let queue = Arc::new(queue);
+            // A thread that is gone is noticed by waiting for it.
+            drop(requests.send(Request::Ahead(queue.clone())));
+            self.ahead = Some(queue);
+        }
+    }
+
+    /// The next scan. While it does not come, `idle` is called ten times a second.
+    pub fn next(&mut self, idle: &mut dyn FnMut() -> voxtile::Result<()>) -> anyhow::Result<Read> {
+        if let Some(queue) = &self.ahead {
+            return take(queue, &self.stop, idle);
+        }
+        match self.ask(Request::Scan, idle)? {
+            Some(Answer::Read(read)) => Ok(read?),
+            _ => Ok(Read::Stopped),
+        }
+    }
+
+    /// The next scan if it has been read already.
+    pub fn next_at_hand(&mut self) -> Option<voxtile::Result<Read>> {
+        self.ahead.as_ref().and_then(|queue| queue.take(Duration::ZERO))
+    }
+
+    /// How maps of earlier versions know this input; `None` if it was asked to stop before that was known.
+    pub fn fingerprint(&mut self) -> anyhow::Result<Option<voxtile::Result<String>>> {
+        match self.ask(Request::Fingerprint, &mut || Ok(()))? {
+            Some(Answer::Fingerprint(fingerprint)) => Ok(Some(fingerprint)),
+            _ => Ok(None),
+        }
+    }
+
+    /// What a person should know of the input, of which no more is wanted. An input that is being waited for tells
+    /// nothing.
+    pub fn remarks(&mut self) -> anyhow::Result<Vec<String>> {
+        let is_ahead = self.ahead.as_ref().map(|queue| queue.close()).is_some();
+        let mut patience = 10;
+        let mut impatient = || {
+            patience -= 1;
+            if is_ahead && patience == 0 { Err(Error::Stopped) } else { Ok(()) }
+        };
+        match self.ask(Request::Remarks, &mut impatient)? {
+            Some(Answer::Remarks(remarks)) => Ok(remarks),
+            _ => Ok(Vec::new()),
+        }
+    }
+
+    /// The coordinate reference system that the input names so far.
+    pub fn crs(&mut self) -> anyhow::Result<Option<String>> {
+        match self.ask(Request::Crs, &mut || Ok(()))? {
+            Some(Answer::Crs(crs)) => Ok(crs),
+            _ => Ok(None),
+        }
+    }
+
+    fn ask(
+        &mut self,
+        request: Request,
+        idle: &mut dyn FnMut() -> voxtile::Result<()>,
+    ) -> anyhow::Result<Option<Answer>> {
+        match &mut self.place {
+            Place::Here(..) if self.stop.is_set() => return Ok(None),
+            Place::Here(source, room, mark) => {
+                return Ok(Some(answer(&mut **source, &request, room, *mark)));
+            }
+            // A thread that is gone is noticed by waiting for it.
+            Place::Thread { requests, .. } => drop(requests.send(request)),
+        }
+        self.wait(idle)
+    }
+
+    fn wait(&mut self, idle: &mut dyn FnMut() -> voxtile::Result<()>) -> anyhow::Result<Option<Answer>> {
+        let Place::Thread { answers, .. } = &self.place else { return Ok(None) };
+        loop {
+            if self.stop.is_set() {
+                return Ok(None);
+            }
+            match answers.recv_timeout(PATIENCE) {
+                Ok(answer) => return Ok(Some(answer)),
+                Err(RecvTimeoutError::Timeout) => idle()?,
+                Err(RecvTimeoutError::Disconnected) => bail!("the thread that reads the scans is gone"),
+            }
+        }
+    }
+}
+
+impl Drop for ScanReader {
+    fn drop(&mut self) {
+        self.ahead.iter().for_each(|queue| queue.close());
+    }
+}
+
+impl Opened {
+    fn of(scans: &std::path::Path, source: &dyn ScanSource) -> Self {
+        let name = scan_input::name_of(scans, source);
+        Self { name, scans: source.len_hint(), poses: source.pose_source() }
+    }
+}
+
+fn take(
+    queue: &ScanQueue,
+    stop: &Stop,
+    idle: &mut dyn FnMut() -> voxtile::Result<()>,
+) -> anyhow::Result<Read> {
+    while !stop.is_set() {
+        match queue.take(PATIENCE) {
+            Some(read) => return Ok(read?),
+            None => idle()?,
+        }
+    }
+    Ok(Read::Stopped)
+}
+
+/// Reads an input to its end, or until nobody wants more of it.
+fn read_ahead(source: &mut dyn ScanSource, room: &PointRoom, mark: Marking, queue: &ScanQueue) {
+    loop {
+        let read = read(source, room, mark);
+        let is_last = is_last(&read);
+        if !queue.push(read) || is_last {
+            return;
+        }
+    }
+}
+
+fn answer(source: &mut dyn ScanSource, request: &Request, room: &PointRoom, mark: Marking) -> Answer {
+    match request {
+        Request::Scan => Answer::Read(read(source, room, mark)),
+        Request::Fingerprint => Answer::Fingerprint(source.fingerprint()),
+        Request::Remarks => Answer::Remarks(source.remarks()),
+        Request::Crs | Request::Ahead(_) => Answer::Crs(source.crs()),
+    }
+}
+
+fn read(source: &mut dyn ScanSource, room: &PointRoom, mark: Marking) -> voxtile::Result<Read> {
+    match source.next_stored(room) {
+        Ok(Some(scan)) => {
+            let mark = mark(&scan)?;
+            Ok(Read::Scan(ReadScan { scan, mark }))
+        }
+        Ok(None) => Ok(Read::End),
+        Err(Error::Stopped) => Ok(Read::Stopped),
+        Err(error) if source.pass_unread() => Ok(Read::Unread(error)),
+        Err(error) => Err(error),
+    }
+}

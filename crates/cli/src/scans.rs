@@ -1,0 +1,220 @@
+use crate::args::ScansArgs;
+use crate::json;
+use crate::kept_source;
+use crate::progress::Progress;
+use crate::read_options::read_options;
+use crate::scan_input;
+use crate::scan_place::LocalScans;
+use crate::stop_signal;
+use anyhow::Context;
+use indicatif::{HumanBytes, HumanCount};
+use serde::Serialize;
+use std::io::{BufWriter, IntoInnerError, Seek, Write};
+use std::path::Path;
+use std::process::ExitCode;
+use tempfile::SpooledTempFile;
+use voxtile::mapper::MapReader;
+use voxtile::scan::Stop;
+use voxtile::space::Point;
+use voxtile::store::ScanRecord;
+use voxtile_formats::{PointRoom, ScanSource};
+use voxtile_pipeline::place::url_of;
+use voxtile_pipeline::read_map;
+
+/// Bytes of memory for the points of one scan; more go to a temporary file.
+const ROOM_BYTES: usize = 64 << 20;
+
+/// Bytes of memory for the rows of a map; more go to a temporary file.
+const ROWS_BYTES: usize = 4 << 20;
+
+/// What an input or a map has of scans.
+#[derive(Debug, Default, Serialize)]
+struct Overview {
+    format: String,
+    scans: u64,
+    /// `None` for a map that does not keep them.
+    points: Option<u64>,
+    /// Bytes on disk of the scans that a map keeps.
+    kept_bytes: Option<u64>,
+    first_stamp_ns: Option<i64>,
+    last_stamp_ns: Option<i64>,
+    fields: Vec<String>,
+    poses: Option<String>,
+    /// What a person should know beside.
+    remarks: Vec<String>,
+}
+
+/// One scan.
+#[derive(Debug, Serialize)]
+struct Row {
+    number: u64,
+    name: Option<String>,
+    stamp_ns: Option<i64>,
+    points: Option<u64>,
+    /// How many tiles it touched, if the map keeps it.
+    tiles: Option<u64>,
+    /// Bytes on disk, if the map keeps it.
+    kept_bytes: Option<u64>,
+    origin_m: Point,
+}
+
+pub fn run(args: &ScansArgs) -> anyhow::Result<ExitCode> {
+    let mut out = BufWriter::new(std::io::stdout().lock());
+    let overview = if is_map(&args.data)? { of_map(args, &mut out)? } else { of_input(args, &mut out)? };
+    if args.json {
+        json::print(&overview, &mut out)?;
+    } else {
+        overview.print(&args.data, &mut out)?;
+    }
+    out.flush()?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn is_map(path: &Path) -> voxtile::Result<bool> {
+    let has_metadata = |path: &Path| path.join("metadata.json").is_file();
+    let text = path.to_str().and_then(|text| text.rsplit_once('@'));
+    match url_of(path) {
+        // Nothing is to be removed yet: signals do what they always do.
+        Some(_) => kept_source::is_map(path, &Stop::default()),
+        None => Ok(has_metadata(path) || text.is_some_and(|(map, _)| has_metadata(Path::new(map)))),
+    }
+}
+
+fn of_map(args: &ScansArgs, out: &mut impl Write) -> anyhow::Result<Overview> {
+    // What an attempt lists is printed once it has come to its end.
+    let (overview, mut rows) = read_map(&args.data, |reader| {
+        let mut rows = BufWriter::new(SpooledTempFile::new(ROWS_BYTES));
+        let overview = listed(reader, args, &mut rows)?;
+        Ok((overview, rows.into_inner().map_err(IntoInnerError::into_error)?))
+    })?;
+    rows.rewind()?;
+    std::io::copy(&mut rows, out)?;
+    Ok(overview)
+}
+
+/// The scans of one state of a map.
+fn listed(reader: &MapReader, args: &ScansArgs, rows: &mut impl Write) -> anyhow::Result<Overview> {
+    let mut overview = Overview { format: "map".to_owned(), ..Overview::default() };
+    if !reader.keeps_scans() {
+        overview.remarks.push("it keeps no scans; build with --keep-scans to have them".to_owned());
+        reader.scans()?.iter().try_for_each(|scan| overview.add(&Row::of(scan), args, rows))?;
+        return Ok(overview);
+    }
+    overview.points = Some(0);
+    let mut scans = reader.kept_scans()?;
+    while let Some(scan) = scans.next_record()? {
+        let listed = ScanRecord::new(scan.number, scan.stamp_ns, scan.origin_m());
+        let (points, tiles) = (Some(scan.points), Some(scan.tiles.len() as u64));
+        let row = Row { points, tiles, kept_bytes: Some(scan.place.bytes), ..Row::of(&listed) };
+        overview.kept_bytes = Some(overview.kept_bytes.unwrap_or_default() + scan.place.bytes);
+        overview.add(&row, args, rows)?;
+    }
+    let not_kept = (reader.scans()?.len() as u64).saturating_sub(overview.scans);
+    if not_kept > 0 {
+        overview.remarks.push(format!("{not_kept} more scans are in the map, whose points are not kept"));
+    }
+    Ok(overview)
+}
+
+fn of_input(args: &ScansArgs, out: &mut impl Write) -> anyhow::Result<Overview> {
+    let mut options = read_options(&args.read)?;
+    // What a build would leave out is listed all the same, and said.
+    options.clouds.may_lack_poses = true;
+    let stop = stop_signal::catch_if_fetched(&args.data)?;
+    let local = LocalScans::of(&args.data, &stop)?;
+    let mut source: Box<dyn ScanSource + Send> = scan_input::open(local.path(), &options, &stop)?;
+    let progress = Progress::over_scans(source.len_hint());
+    let room = PointRoom::new(ROOM_BYTES, &std::env::temp_dir());
+    let mut overview = Overview { format: source.format(), points: Some(0), ..Overview::default() };
+    overview.poses = Some(source.pose_source().to_string());
+    while let Some(scan) =
+        source.next_stored(&room).with_context(|| format!("after {} scans", overview.scans))?
+    {
+        let row = Row {
+            number: overview.scans,
+            name: Some(scan.name.clone()),
+            stamp_ns: scan.stamp_ns,
+            points: Some(scan.points_in_sensor.len() as u64),
+            tiles: None,
+            kept_bytes: None,
+            origin_m: scan.world_from_sensor.position_m(),
+        };
+        overview.add(&row, args, out)?;
+        progress.step();
+        stop.check()?;
+    }
+    overview.fields = source.fields();
+    overview.remarks = source.remarks();
+    Ok(overview)
+}
+
+impl Overview {
+    fn add(&mut self, row: &Row, args: &ScansArgs, out: &mut impl Write) -> anyhow::Result<()> {
+        self.scans += 1;
+        self.points = self.points.map(|points| points + row.points.unwrap_or_default());
+        if let Some(stamp_ns) = row.stamp_ns {
+            self.first_stamp_ns = Some(self.first_stamp_ns.map_or(stamp_ns, |first| first.min(stamp_ns)));
+            self.last_stamp_ns = Some(self.last_stamp_ns.map_or(stamp_ns, |last| last.max(stamp_ns)));
+        }
+        match (args.each, args.json) {
+            (false, _) => {}
+            (true, true) => json::print(row, out)?,
+            (true, false) => row.print(out)?,
+        }
+        Ok(())
+    }
+
+    fn print(&self, data: &Path, out: &mut impl Write) -> std::io::Result<()> {
+        writeln!(out, "input     {}: {}", data.display(), self.format)?;
+        let points = self.points.map_or(String::new(), |points| format!(", {} points", HumanCount(points)));
+        writeln!(out, "scans     {}{points}", HumanCount(self.scans))?;
+        if let (Some(bytes), Some(points)) = (self.kept_bytes, self.points) {
+            let a_point = bytes as f64 / points.max(1) as f64;
+            writeln!(out, "kept      {}, {a_point:.2} bytes a point", HumanBytes(bytes))?;
+        }
+        if let (Some(first), Some(last)) = (self.first_stamp_ns, self.last_stamp_ns) {
+            let (first, span) = (seconds(first), last.saturating_sub(first));
+            writeln!(out, "time      {first} to {} s: {:.1} s", seconds(last), span as f64 * 1e-9)?;
+        }
+        if !self.fields.is_empty() {
+            writeln!(out, "fields    {}", self.fields.join(" "))?;
+        }
+        if let Some(poses) = &self.poses {
+            writeln!(out, "poses     {poses}")?;
+        }
+        self.remarks.iter().try_for_each(|remark| writeln!(out, "note      {remark}"))
+    }
+}
+
+impl Row {
+    fn of(scan: &ScanRecord) -> Self {
+        Self {
+            number: scan.number,
+            name: None,
+            stamp_ns: scan.stamp_ns,
+            points: None,
+            tiles: None,
+            kept_bytes: None,
+            origin_m: scan.origin_m,
+        }
+    }
+
+    fn print(&self, out: &mut impl Write) -> std::io::Result<()> {
+        let stamp = self.stamp_ns.map_or("-".to_owned(), seconds);
+        let [x, y, z] = self.origin_m;
+        write!(out, "{:>8}  {stamp:>20}  {x:.3} {y:.3} {z:.3}", self.number)?;
+        if let Some(points) = self.points {
+            write!(out, "  {points} points")?;
+        }
+        if let Some(tiles) = self.tiles {
+            write!(out, "  {tiles} tiles")?;
+        }
+        writeln!(out, "  {}", self.name.as_deref().unwrap_or_default())
+    }
+}
+
+/// Nanoseconds as seconds, exactly.
+fn seconds(stamp_ns: i64) -> String {
+    let (whole, rest) = (stamp_ns.div_euclid(1_000_000_000), stamp_ns.rem_euclid(1_000_000_000));
+    format!("{whole}.{rest:09}")
+}

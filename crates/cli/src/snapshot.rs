@@ -1,0 +1,33 @@
+use crate::args::SnapshotArgs;
+use crate::json;
+use std::io::Write;
+use std::process::ExitCode;
+use voxtile::operations::{SnapshotInfo, delete_snapshot, new_snapshot, snapshot, snapshots};
+use voxtile_pipeline::whole_map;
+
+pub fn run(args: &SnapshotArgs) -> anyhow::Result<ExitCode> {
+    let was_there = !args.delete && new_snapshot(&args.map, &args.name).is_ok();
+    let info = if args.delete {
+        // What it was, before it is gone.
+        let info = snapshots(&args.map)?.into_iter().find(|info| info.name == args.name.as_str());
+        delete_snapshot(whole_map(&args.map)?, &args.name)?;
+        info
+    } else {
+        snapshot(whole_map(&args.map)?, &args.name)?;
+        // It is there, whatever becomes of this.
+        new_snapshot(&args.map, &args.name).inspect_err(|error| log::warn!("{error:#}")).ok()
+    };
+    let mut out = std::io::stdout().lock();
+    if args.json {
+        let answer = serde_json::json!({ "map": args.map.display().to_string(), "deleted": args.delete, "snapshot": info });
+        json::print(&answer, &mut out)?;
+    } else if args.delete {
+        writeln!(out, "deleted   {}", args.name)?;
+    } else if info.is_none() {
+        writeln!(out, "kept      {}", args.name)?;
+    } else if let Some(SnapshotInfo { name, flush_number, scan_number, tiles, .. }) = info {
+        let before = if was_there { "; it was there already" } else { "" };
+        writeln!(out, "kept      {name}: flush {flush_number}, scan {scan_number}, {tiles} tiles{before}")?;
+    }
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,106 @@
+use crate::args::VerifyArgs;
+use crate::json;
+use crate::memory;
+use crate::progress::Progress;
+use indicatif::{HumanBytes, HumanCount};
+use serde::Serialize;
+use std::io::Write;
+use std::process::ExitCode;
+use voxtile::integrity::{Finding, Verification, verify};
+use voxtile_pipeline::place::{place_of, url_of};
+use voxtile_pipeline::whole_map;
+
+/// More findings than a person reads; the rest are counted.
+const MAX_FINDINGS: usize = 10_000;
+
+#[derive(Serialize)]
+struct Report<'a> {
+    #[serde(serialize_with = "voxtile::path_text::serialize")]
+    map: &'a std::path::Path,
+    whole: bool,
+    #[serde(flatten)]
+    verification: Verification,
+    findings: Vec<Finding>,
+    peak_rss_bytes: Option<u64>,
+}
+
+pub fn run(args: &VerifyArgs) -> anyhow::Result<ExitCode> {
+    let map = match url_of(&args.map) {
+        Some(_) => place_of(&args.map)?,
+        None => whole_map(&args.map)?.into(),
+    };
+    let progress = Progress::over_tiles(0);
+    let mut findings = Vec::new();
+    let verification = verify(
+        map,
+        |finding| {
+            if !args.json {
+                progress.print(&finding.to_string());
+            } else if findings.len() < MAX_FINDINGS {
+                findings.push(finding.clone());
+            }
+        },
+        |done, all| progress.set(done, all),
+    )?;
+    drop(progress);
+    let whole = verification.is_whole();
+    let mut out = std::io::stdout().lock();
+    if args.json {
+        let peak_rss_bytes = memory::peak_bytes();
+        let report = Report { map: &args.map, whole, verification, findings, peak_rss_bytes };
+        json::print(&report, &mut out)?;
+    } else {
+        print(args, &verification, &mut out)?;
+    }
+    Ok(if whole { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+fn print(args: &VerifyArgs, verification: &Verification, out: &mut impl Write) -> std::io::Result<()> {
+    let Verification {
+        verified,
+        flush_number,
+        scan_number,
+        tiles,
+        voxels,
+        table_bytes,
+        damage,
+        leftovers,
+        unsettled,
+        snapshots,
+        ..
+    } = verification;
+    writeln!(
+        out,
+        "{} tiles, {} voxels, {} of tables; flush {flush_number}, scan {scan_number}",
+        HumanCount(*tiles),
+        HumanCount(*voxels),
+        HumanBytes(*table_bytes)
+    )?;
+    if *snapshots > 0 {
+        writeln!(out, "{} snapshots", HumanCount(*snapshots))?;
+    }
+    if *leftovers > 0 {
+        let (leftovers, map) = (HumanCount(*leftovers), args.map.display());
+        writeln!(
+            out,
+            "leftovers: {leftovers} files, named above, are waiting to be removed or to get their final names. The \
+             next process that opens the map for writing does that, and so does `voxtile repair {map}`."
+        )?;
+    }
+    match (damage, verified) {
+        (0, _) if *unsettled > 0 => writeln!(
+            out,
+            "undecided: {} possible faults; the map kept changing. Run verify while no process writes.",
+            HumanCount(*unsettled)
+        ),
+        (0, true) => writeln!(out, "whole: every checksum matches"),
+        (0, false) => writeln!(out, "unverified: the map has no checksums; the form of its tables is right"),
+        (damage, _) => {
+            let map = args.map.display();
+            writeln!(
+                out,
+                "damaged: {damage} findings; put files back from a copy, or run `voxtile repair {map}`"
+            )
+        }
+    }
+}

@@ -1,0 +1,62 @@
+use crate::args::ViewArgs;
+use crate::json;
+use crate::progress::Progress;
+use parking_lot::Mutex;
+use std::io::{IsTerminal, Write};
+use std::process::ExitCode;
+use std::sync::Arc;
+use voxtile_view::{View, ViewOptions};
+
+pub fn run(args: &ViewArgs) -> anyhow::Result<ExitCode> {
+    let view = View::open(&ViewOptions {
+        maps: args.maps.clone(),
+        listen: args.listen,
+        token: args.token.clone(),
+        keeps_levels: !args.no_cache,
+        progress: bar(),
+    })?;
+    tell(args, &view)?;
+    if !args.no_browser && !args.json && std::io::stdout().is_terminal() && has_screen() {
+        // A browser that does not start is no reason to stop: the URL is on the screen.
+        if let Err(error) = open::that_detached(view.url()) {
+            log::info!("no browser: {error}");
+        }
+    }
+    view.serve()?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Shows a bar from the first tiles to the last.
+fn bar() -> voxtile_view::Progress {
+    let shown: Mutex<Option<Progress>> = Mutex::new(None);
+    Arc::new(move |done, all| {
+        let mut shown = shown.lock();
+        if done >= all {
+            *shown = None;
+            return;
+        }
+        let tiles = usize::try_from(all).unwrap_or(usize::MAX);
+        shown.get_or_insert_with(|| Progress::over_tiles(tiles)).set(done, all);
+    })
+}
+
+fn tell(args: &ViewArgs, view: &View) -> anyhow::Result<()> {
+    let (mut out, url, address) = (std::io::stdout().lock(), view.url(), view.address());
+    if args.json {
+        json::print(&serde_json::json!({ "url": url, "listen": address.to_string() }), &mut out)?;
+        return Ok(out.flush()?);
+    }
+    writeln!(out, "open {url}")?;
+    if address.ip().is_loopback() && std::env::var_os("SSH_CONNECTION").is_some() {
+        let port = address.port();
+        writeln!(out, "from another machine, after: ssh -L {port}:127.0.0.1:{port} THIS_MACHINE")?;
+    }
+    writeln!(out, "Ctrl-C ends it")?;
+    Ok(out.flush()?)
+}
+
+/// Whether there is a screen that a browser could use.
+fn has_screen() -> bool {
+    let is_set = |name| std::env::var_os(name).is_some_and(|value| !value.is_empty());
+    !cfg!(target_os = "linux") || is_set("DISPLAY") || is_set("WAYLAND_DISPLAY")
+}

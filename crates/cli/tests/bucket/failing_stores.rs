@@ -1,0 +1,186 @@
+//! Maps in stores that fail, refuse, lose answers or have lost objects.
+
+use crate::city::{KEEP, RESEND, city, config, digest, digest_there, go_on, message_of, push_now, scan_at};
+use crate::faulty_store::{Fault, FaultyStore, Kind};
+use crate::server::Server;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+use tempfile::TempDir;
+use voxtile::integrity::verify;
+use voxtile::{Error, Mapper, OutOfCoreTileMapper, Storage};
+use voxtile_bucket::object_store::ObjectStore;
+use voxtile_bucket::object_store::memory::InMemory;
+use voxtile_bucket::object_store::path::Path as Key;
+use voxtile_bucket::object_store::throttle::{ThrottleConfig, ThrottledStore};
+use voxtile_bucket::{Bucket, BucketDisk, pull, push};
+
+/// A store that does not answer does not say that there is no map.
+#[test]
+fn whether_there_is_a_map_is_known_or_an_error() {
+    let server = Server::new();
+    server.put(&Key::from("maps/city/manifest.json"), b"{}".to_vec());
+    server.put(&Key::from("drive/one.pcd"), b"points".to_vec());
+    let on = |store: Arc<dyn ObjectStore>, prefix: &str| {
+        Bucket::on(store, prefix, "s3://test").unwrap().with_timeout(Duration::from_secs(1))
+    };
+    assert!(server.bucket().has_map(&|| false).unwrap());
+    assert!(!on(server.store.clone(), "drive").has_map(&|| false).unwrap());
+    let fails = FaultyStore::new(server.store.clone(), |_, _| Fault::Fails);
+    for prefix in ["maps/city", "drive"] {
+        let error = message_of(on(fails.clone(), prefix).has_map(&|| false));
+        assert!(error.contains("manifest.json") && error.contains("connection broke"), "{error}");
+    }
+    // Who may not list is not told that an object is missing. What is a file is no map.
+    let refuses =
+        FaultyStore::new(server.store.clone(), |asked, _| match asked.key.ends_with("manifest.json") {
+            true => Fault::Refused,
+            false => Fault::None,
+        });
+    assert!(!on(refuses.clone(), "drive/one.pcd").has_map(&|| false).unwrap());
+    assert!(message_of(on(refuses, "maps/city").has_map(&|| false)).contains("not for you"));
+
+    let wait_get_per_call = Duration::from_secs(60);
+    let slow = ThrottleConfig { wait_get_per_call, ..ThrottleConfig::default() };
+    let slow = on(Arc::new(ThrottledStore::new(server.store.fork(), slow)), "maps/city");
+    let began = Instant::now();
+    let stopped = slow.has_map(&|| began.elapsed() > Duration::from_millis(300));
+    assert!(matches!(stopped, Err(Error::Stopped)), "{stopped:?}");
+    assert!(began.elapsed() < Duration::from_secs(10));
+}
+
+/// The manifest is there, and the answer that says so is not.
+#[test]
+fn a_push_whose_last_answer_is_lost_came_through() {
+    let (server, folder) = (Server::new(), TempDir::new().unwrap());
+    let map = folder.path().join("map");
+    drop(city(&map, Storage::OctoMap, false));
+    let store = FaultyStore::new(server.store.clone(), |asked, _| {
+        let is_last = asked.kind == Kind::Put && asked.key.ends_with("manifest.json");
+        if is_last { Fault::DoneBefore } else { Fault::None }
+    });
+    let bucket = Bucket::on(store, "maps/city", "s3://test/maps/city").unwrap();
+    push_now(&map, &bucket);
+    assert_eq!(digest_there(&bucket).unwrap(), digest(&map));
+    go_on(&map, 100, 1);
+    push_now(&map, &bucket);
+    assert_eq!(digest_there(&bucket).unwrap(), digest(&map));
+    assert!(std::fs::read_to_string(map.join("bucket_states")).unwrap().contains("there"));
+}
+
+/// What was lost or damaged there comes back, and the messages say how.
+#[test]
+fn a_map_that_was_damaged_there_is_sent_again() {
+    let (server, folder) = (Server::new(), TempDir::new().unwrap());
+    let (map, bucket) = (folder.path().join("map"), server.bucket());
+    drop(city(&map, Storage::OctoMap, true));
+    let first = push_now(&map, &bucket);
+    let resend = || push(map.as_path(), &bucket, RESEND, |_, _| {});
+    let check = |what: &str| {
+        let there = BucketDisk::open(bucket.clone()).unwrap().into_map_path();
+        assert!(verify(there, |finding| panic!("{what}: {finding}"), |_, _| {}).unwrap().is_whole());
+        assert_eq!(digest_there(&bucket).unwrap(), digest(&map), "{what}");
+    };
+    let manifest = Key::from("maps/city/manifest.json");
+    let listed: serde_json::Value = serde_json::from_slice(&server.get(&manifest)).unwrap();
+    let page = listed["pages"].as_object().unwrap().values().next().unwrap().as_str().unwrap().to_owned();
+    let pulled = folder.path().join("pulled");
+    for (number, key) in server.objects().into_iter().enumerate() {
+        let is_page = key.as_ref().ends_with(&page);
+        // Some are enough.
+        if number % 29 != 0 && !is_page {
+            continue;
+        }
+        for content in [None, Some(b"other".to_vec())] {
+            match content {
+                Some(content) => server.put(&key, content),
+                None => server.delete(&key),
+            }
+            let said = message_of(pull(&bucket, &pulled, false, |_, _| {}));
+            assert!(said.contains("push --resend"), "{said}");
+            let _ = std::fs::remove_dir_all(folder.path().join("pulled.unfinished"));
+            if is_page {
+                let said = message_of(push(map.as_path(), &bucket, KEEP, |_, _| {}));
+                assert!(said.contains("push --resend"), "{said}");
+            }
+            let sent = resend().unwrap();
+            assert_eq!((sent.objects_sent, sent.bytes_sent), (first.objects_sent, first.bytes_sent));
+            check(key.as_ref());
+        }
+    }
+    for content in [b"{".to_vec(), Vec::new(), server.get(&manifest)[1..].to_vec()] {
+        server.put(&manifest, content);
+        push(map.as_path(), &bucket, KEEP, |_, _| {}).unwrap_err();
+        resend().unwrap();
+        check("the manifest");
+    }
+    // What a later version wrote is not damaged, and another map is not this one.
+    let text = String::from_utf8(server.get(&manifest)).unwrap();
+    server.put(&manifest, text.replace("\"version\": 1", "\"version\": 2").into_bytes());
+    assert!(message_of(resend()).contains("version is 2"));
+    server.put(&manifest, text.into_bytes());
+    let other = folder.path().join("other");
+    drop(city(&other, Storage::OctoMap, false));
+    let refused = push(other.as_path(), &bucket, RESEND, |_, _| {});
+    assert!(matches!(refused, Err(Error::Mismatch { what: "the id", .. })));
+}
+
+/// What an interrupted push has sent is not sent again, and a push that goes on asks for little.
+#[test]
+fn an_interrupted_push_goes_on() {
+    let (server, folder) = (Server::new(), TempDir::new().unwrap());
+    let map = folder.path().join("map");
+    drop(city(&map, Storage::OctoMap, true));
+    let whole = {
+        let bucket = Bucket::on(Arc::new(InMemory::new()), "maps/city", "s3://test/maps/city").unwrap();
+        push_now(&map, &bucket).objects_sent
+    };
+    assert!(whole > 100, "{whole}");
+    let most = whole as usize / 2;
+    let puts = std::sync::atomic::AtomicUsize::new(0);
+    let breaks = FaultyStore::new(server.store.clone(), move |asked, _| match asked.kind {
+        Kind::Put if puts.fetch_add(1, std::sync::atomic::Ordering::Relaxed) >= most => Fault::Refused,
+        _ => Fault::None,
+    });
+    let at =
+        |store: &Arc<FaultyStore>| Bucket::on(store.clone(), "maps/city", "s3://test/maps/city").unwrap();
+    push(map.as_path(), &at(&breaks), KEEP, |_, _| {}).unwrap_err();
+    // Of a first push only the first objects are asked for.
+    assert!(breaks.asked(Kind::Head).len() < 48, "{}", breaks.asked(Kind::Head).len());
+    // What was on its way comes to its end.
+    std::thread::sleep(Duration::from_millis(200));
+    let there = server.objects().len();
+    assert_eq!(there, most);
+
+    let store = FaultyStore::new(server.store.clone(), |_, _| Fault::None);
+    let bucket = at(&store);
+    let again = push_now(&map, &bucket);
+    assert_eq!(again.objects_sent + there as u64, whole);
+    assert!(0 < again.tiles_sent && again.tiles_sent < again.tiles, "{again:?}");
+    assert_eq!(store.asked(Kind::Put).len() as u64, again.objects_sent + 1);
+    assert_eq!(digest_there(&bucket).unwrap(), digest(&map));
+    let asked = store.asked(Kind::Head).len();
+    let before = store.asked(Kind::Put).len();
+    let mut keeping = config(Storage::OctoMap);
+    keeping.keeps_scans = true;
+    let mut mapper = OutOfCoreTileMapper::open(&map, keeping).unwrap();
+    mapper.insert_scan(&scan_at(50, 30.0)).unwrap();
+    mapper.flush().unwrap();
+    push_now(&map, &bucket);
+    let [heads, puts] = [store.asked(Kind::Head).len() - asked, store.asked(Kind::Put).len() - before];
+    assert!(0 < puts && heads <= puts, "{heads} of {puts}");
+    assert_eq!(digest_there(&bucket).unwrap(), digest(&map));
+}
+
+/// An object of another length is not the one that is to be sent.
+#[test]
+fn an_object_of_another_length_is_sent() {
+    let (server, folder) = (Server::new(), TempDir::new().unwrap());
+    let (map, bucket) = (folder.path().join("map"), server.bucket());
+    drop(city(&map, Storage::OctoMap, false));
+    push_now(&map, &bucket);
+    server.delete(&Key::from("maps/city/manifest.json"));
+    let key = server.objects().remove(0);
+    server.put(&key, b"cut".to_vec());
+    assert_eq!(push_now(&map, &bucket).objects_sent, 1);
+    assert_eq!(digest_there(&bucket).unwrap(), digest(&map));
+}

@@ -1,0 +1,272 @@
+//! The command and the library against servers that do not answer, break off, drip or lose answers.
+
+use crate::city::{KEEP, city, digest, message_of};
+use crate::s3_server::{Asked, S3Server, Trouble};
+use crate::server::Server;
+use std::process::{Command, Output};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+use tempfile::TempDir;
+use testkit::random_scans::{Random, random_scan};
+use voxtile::{Error, MapConfig, Mapper, OutOfCoreTileMapper, Storage};
+use voxtile_bucket::object_store::throttle::{ThrottleConfig, ThrottledStore};
+use voxtile_bucket::{Bucket, FetchedFiles, push};
+
+const URL: &str = "s3://robots/maps/city";
+
+fn run(server: &S3Server, arguments: &[&str]) -> (Output, Duration) {
+    let began = Instant::now();
+    (server.voxtile(arguments).output().unwrap(), began.elapsed())
+}
+
+fn texts(output: &Output) -> [String; 2] {
+    [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes).into_owned())
+}
+
+fn a_map(folder: &TempDir) -> String {
+    let map = folder.path().join("map");
+    drop(city(&map, Storage::OctoMap, false));
+    map.to_str().unwrap().to_owned()
+}
+
+fn push_all(server: &S3Server, map: &str) {
+    let (pushed, _) = run(server, &["push", map, URL]);
+    assert!(pushed.status.success(), "{:?}", texts(&pushed));
+}
+
+fn is_object(asked: &Asked, method: &str) -> bool {
+    asked.method == method && asked.key.contains("/objects/")
+}
+
+#[test]
+fn a_put_without_an_answer_is_reported_and_given_up() {
+    let (server, folder) = (S3Server::new(), TempDir::new().unwrap());
+    let map = a_map(&folder);
+    server.trouble(|asked, _| if is_object(asked, "PUT") { Trouble::Silent } else { Trouble::None });
+    let (failed, took) = run(&server, &["push", &map, URL, "--bucket-timeout", "2", "--json"]);
+    let [out, said] = texts(&failed);
+    assert_eq!(failed.status.code(), Some(1), "{said}");
+    assert!(Duration::from_secs(2) <= took && took < Duration::from_secs(20), "{took:?}");
+    let waiting = said.lines().find(|line| line.contains("waiting for")).unwrap_or_else(|| panic!("{said}"));
+    for part in [URL, "PUT maps/city/objects/", &server.address.to_string(), "attempt 1", "begun"] {
+        assert!(waiting.contains(part), "{part}: {waiting}");
+    }
+    let error: serde_json::Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(error["error"]["kind"], "no_answer", "{out}");
+    let message = error["error"]["message"].as_str().unwrap();
+    for part in [URL, "PUT maps/city/objects/", "2 attempts", "check the network", "--bucket-timeout"] {
+        assert!(message.contains(part), "{part}: {message}");
+    }
+    assert!(!server.has_manifest());
+    // With -q only the error.
+    let (quiet, _) = run(&server, &["push", &map, URL, "--bucket-timeout", "1", "-q"]);
+    assert_eq!(texts(&quiet)[1].lines().count(), 1, "{:?}", texts(&quiet));
+
+    server.trouble(|_, _| Trouble::None);
+    push_all(&server, &map);
+    assert_eq!(texts(&run(&server, &["digest", URL]).0)[0].trim(), digest(map.as_ref()));
+}
+
+/// Sent bytes may still be in the buffers of a slow link when the client counts them.
+#[test]
+fn an_upload_may_take_the_whole_timeout() {
+    let (server, folder) = (S3Server::new(), TempDir::new().unwrap());
+    let map = a_map(&folder);
+    server.trouble(|asked, _| if is_object(asked, "PUT") { Trouble::Late(1_400) } else { Trouble::None });
+    let (pushed, _) = run(&server, &["push", &map, URL, "--bucket-timeout", "2"]);
+    assert!(pushed.status.success(), "{}", texts(&pushed)[1]);
+    let mut sent: Vec<_> = server.asked().into_iter().filter(|asked| is_object(asked, "PUT")).collect();
+    let all = sent.len();
+    sent.sort_by(|a, b| a.key.cmp(&b.key));
+    sent.dedup_by(|a, b| a.key == b.key);
+    assert_eq!(sent.len(), all, "no object was sent twice");
+}
+
+/// What is sent again is no progress.
+#[test]
+fn a_long_object_without_an_answer_is_given_up() {
+    let (server, folder) = (S3Server::new(), TempDir::new().unwrap());
+    let map = folder.path().join("map");
+    let config = MapConfig::new(0.05, 3.2).unwrap().with_range(0.0, 3.0);
+    let mut mapper = OutOfCoreTileMapper::create(&map, config).unwrap();
+    mapper.insert_scan(&random_scan(&mut Random(1), [0.0; 3], 3_000)).unwrap();
+    mapper.flush().unwrap();
+    drop(mapper);
+    let is_long = |asked: &Asked| asked.method == "PUT" && asked.bytes > 100_000;
+    server.trouble(move |asked, _| if is_long(asked) { Trouble::Silent } else { Trouble::None });
+    let (failed, took) = run(&server, &["push", map.to_str().unwrap(), URL, "--bucket-timeout", "2"]);
+    let said = texts(&failed)[1].clone();
+    assert!(server.asked().iter().any(is_long), "{:?}", server.asked());
+    assert!(said.contains("no answer to PUT") && said.contains("s and 2 attempts"), "{said}");
+    assert!(took < Duration::from_secs(20), "{took:?}");
+}
+
+#[test]
+fn a_third_of_the_connections_may_be_reset() {
+    let (server, folder) = (S3Server::new(), TempDir::new().unwrap());
+    let map = a_map(&folder);
+    server.trouble(|_, number| if number % 3 == 1 { Trouble::Reset } else { Trouble::None });
+    let began = Instant::now();
+    push_all(&server, &map);
+    let (found, _) = run(&server, &["digest", URL]);
+    let [out, said] = texts(&found);
+    assert_eq!(out.trim(), digest(map.as_ref()), "{said}");
+    assert!(began.elapsed() < Duration::from_secs(30), "{:?}", began.elapsed());
+    // Content that breaks off is continued.
+    server.trouble(|asked, _| if asked.from.is_none() { Trouble::CutOff } else { Trouble::None });
+    let (found, _) = run(&server, &["digest", URL, "--bucket-timeout", "1"]);
+    assert_ne!(found.status.code(), Some(0), "the manifest is never whole");
+    server.trouble(|asked, _| match is_object(asked, "GET") && asked.from.is_none() {
+        true => Trouble::CutOff,
+        false => Trouble::None,
+    });
+    let (found, _) = run(&server, &["digest", URL]);
+    assert_eq!(texts(&found)[0].trim(), digest(map.as_ref()));
+    assert!(server.asked().iter().any(|asked| asked.from.is_some_and(|from| from > 0)));
+}
+
+#[test]
+fn an_answer_that_is_cut_off_refuses_nothing() {
+    let (server, folder) = (S3Server::new(), TempDir::new().unwrap());
+    let map = a_map(&folder);
+    // The first answer says that there is no manifest yet.
+    server.trouble(|_, number| if number == 0 { Trouble::CutOff } else { Trouble::None });
+    push_all(&server, &map);
+    let [first, second] = [0, 1].map(|number| server.asked()[number].clone());
+    assert_eq!((&first.method, &first.key), (&second.method, &second.key), "it was asked again");
+}
+
+#[test]
+fn an_object_that_drips_is_given_up_and_a_slow_one_is_not() {
+    let (server, folder) = (S3Server::new(), TempDir::new().unwrap());
+    let map = a_map(&folder);
+    push_all(&server, &map);
+    server.trouble(|asked, _| if is_object(asked, "GET") { Trouble::Drips(1) } else { Trouble::None });
+    let (failed, took) = run(&server, &["digest", URL, "--bucket-timeout", "1"]);
+    let said = texts(&failed)[1].clone();
+    assert_eq!(failed.status.code(), Some(1), "{said}");
+    assert!(said.contains("no answer to GET maps/city/objects/") && said.contains("waiting for"), "{said}");
+    assert!(took < Duration::from_secs(20), "{took:?}");
+
+    // 200 kB at 8 kB each 20 ms, which takes longer than the bound; and once nothing comes after the half.
+    let place = TempDir::new().unwrap();
+    let content: Vec<u8> = (0..300_000_u32).map(|at| ((at * 31) >> 7) as u8).collect();
+    server.put("long.bin", content.clone());
+    server.trouble(|asked, _| match (&*asked.method, asked.from) {
+        ("GET", None) => Trouble::Stalls,
+        _ => Trouble::Drips(4_000),
+    });
+    let bucket = Bucket::open(&format!("http://{}/long.bin", server.address)).unwrap();
+    let bucket = bucket.with_timeout(Duration::from_millis(500));
+    let began = Instant::now();
+    let fetched = FetchedFiles::fetch(&bucket, place.path(), &|| false, |_, _| ()).unwrap();
+    assert!(began.elapsed() > Duration::from_millis(700), "{:?}", began.elapsed());
+    assert!(std::fs::read(fetched.path()).unwrap() == content);
+    let from: Vec<_> = server.asked().iter().filter_map(|asked| asked.from).collect();
+    assert_eq!(from, [content.len() / 2]);
+}
+
+/// The state there decides whether a push came through, and nothing is put twice over another push.
+#[test]
+fn a_manifest_whose_answer_is_lost_is_there_once() {
+    let (server, folder) = (S3Server::new(), TempDir::new().unwrap());
+    let map = a_map(&folder);
+    for lost in [Trouble::AnswerLost, Trouble::Reset, Trouble::Silent] {
+        let is_first = AtomicBool::new(true);
+        server.trouble(move |asked, _| {
+            let is_manifest = asked.method == "PUT" && asked.key.ends_with("manifest.json");
+            if is_manifest && is_first.swap(false, Ordering::Relaxed) { lost } else { Trouble::None }
+        });
+        crate::city::go_on(map.as_ref(), 100, 1);
+        let (pushed, _) = run(&server, &["push", &map, URL, "--bucket-timeout", "2"]);
+        assert!(pushed.status.success(), "{:?}", texts(&pushed));
+        server.trouble(|_, _| Trouble::None);
+        assert_eq!(texts(&run(&server, &["digest", URL]).0)[0].trim(), digest(map.as_ref()));
+        assert!(std::fs::read_to_string(folder.path().join("map/bucket_states")).unwrap().contains("there"));
+    }
+}
+
+/// Whatever hangs: commands that catch the signal, and those that do not.
+#[cfg(unix)]
+#[test]
+fn a_signal_ends_a_command_that_waits_for_a_bucket() {
+    use std::os::unix::process::ExitStatusExt;
+    let (server, folder) = (S3Server::new(), TempDir::new().unwrap());
+    let map = a_map(&folder);
+    server.trouble(|asked, _| if asked.method == "PUT" { Trouble::Silent } else { Trouble::None });
+    let out = folder.path().join("city.ply");
+    let out = out.to_str().unwrap();
+    let built = folder.path().join("built");
+    let built = built.to_str().unwrap();
+    let check = |arguments: &[&str], signal: &str, is_caught: bool, method: &str| {
+        let child = server.voxtile(arguments).spawn().unwrap();
+        let since = Instant::now();
+        while !server.asked().iter().any(|asked| is_object(asked, method)) {
+            assert!(since.elapsed() < Duration::from_secs(60), "{arguments:?}");
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        std::thread::sleep(Duration::from_millis(100));
+        let sent = Instant::now();
+        Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap();
+        let ended = child.wait_with_output().unwrap();
+        assert!(sent.elapsed() < Duration::from_secs(2), "{arguments:?}: {:?}", sent.elapsed());
+        let said = texts(&ended);
+        match is_caught {
+            true => assert_eq!(ended.status.code(), Some(130), "{arguments:?}: {said:?}"),
+            false => assert!(ended.status.signal().is_some(), "{arguments:?}: {said:?}"),
+        }
+    };
+    check(&["push", &map, URL], "-INT", false, "PUT");
+    assert!(!server.has_manifest());
+    server.trouble(|_, _| Trouble::None);
+    push_all(&server, &map);
+    for signal in ["-INT", "-TERM"] {
+        server.trouble(|asked, _| if is_object(asked, "GET") { Trouble::Silent } else { Trouble::None });
+        check(&["digest", URL], signal, false, "GET");
+        server.trouble(|asked, _| if is_object(asked, "GET") { Trouble::Silent } else { Trouble::None });
+        check(&["export", URL, "-o", out], signal, true, "GET");
+        server.trouble(|asked, _| if is_object(asked, "GET") { Trouble::Silent } else { Trouble::None });
+        check(&["build", URL, "-o", built, "--resolution", "0.4"], signal, true, "GET");
+    }
+    assert!(!folder.path().join("city.ply").exists() && !folder.path().join("built").exists());
+}
+
+/// A server that was never reached is not waited for.
+#[test]
+fn a_wrong_address_is_found_soon() {
+    let closed = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+    let bucket = Bucket::open(&format!("http://{closed}/city")).unwrap();
+    let began = Instant::now();
+    let said = message_of(bucket.has_map(&|| false));
+    assert!(said.contains("no answer to HEAD city/manifest.json") && said.contains("4 attempts"), "{said}");
+    assert!(said.contains(&closed.to_string()), "{said}");
+    assert!(began.elapsed() < Duration::from_secs(10), "{:?}", began.elapsed());
+}
+
+/// A store of a program's own is bounded as well, and can be stopped.
+#[test]
+fn a_store_that_hangs_is_given_up_or_stopped() {
+    let (server, folder) = (Server::new(), TempDir::new().unwrap());
+    let map = a_map(&folder);
+    let wait_put_per_call = Duration::from_secs(60);
+    let slow = ThrottleConfig { wait_put_per_call, ..ThrottleConfig::default() };
+    let store = Arc::new(ThrottledStore::new(server.store.fork(), slow));
+    let bucket = Bucket::on(store, "maps/city", "s3://test/maps/city").unwrap();
+    let began = Instant::now();
+    let hasty = bucket.clone().with_timeout(Duration::from_millis(400));
+    let failed = push(map.as_str(), &hasty, KEEP, |_, _| {});
+    assert!(
+        matches!(&failed, Err(Error::NoAnswer { unanswered, .. }) if unanswered.attempts == 2),
+        "{failed:?}"
+    );
+    let stop = Arc::new(AtomicBool::new(false));
+    let stopper = stop.clone();
+    std::thread::spawn(move || {
+        std::thread::sleep(Duration::from_millis(300));
+        stopper.store(true, Ordering::Relaxed);
+    });
+    let stopped = push(map.as_str(), &bucket.with_stop(stop), KEEP, |_, _| {});
+    assert!(matches!(stopped, Err(Error::Stopped)), "{stopped:?}");
+    assert!(began.elapsed() < Duration::from_secs(20), "{:?}", began.elapsed());
+}

@@ -1,0 +1,674 @@
+//! Files of other programs, in and out, by the command.
+
+use assert_cmd::Command;
+use std::fs;
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+fn voxtile(arguments: &[&str]) -> Command {
+    let mut command = Command::cargo_bin("voxtile").unwrap();
+    command.args(arguments);
+    command
+}
+
+fn output(arguments: &[&str]) -> String {
+    let output = voxtile(arguments).output().unwrap();
+    let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{arguments:?}: {stderr}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+fn refusal(arguments: &[&str]) -> String {
+    let output = voxtile(arguments).output().unwrap();
+    assert!(!output.status.success(), "{arguments:?}");
+    String::from_utf8(output.stderr).unwrap()
+}
+
+fn repository(path: &str) -> String {
+    testkit::support::repository(path).to_str().unwrap().to_owned()
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+/// Three scans of a wall, as float32, in folders of three formats with the same poses.
+fn make_inputs(folder: &Path) -> Vec<PathBuf> {
+    let clouds: Vec<Vec<[f32; 3]>> = (0..3)
+        .map(|scan| (0..60).map(|k| [4.0 + 0.01 * scan as f32, 0.1 * k as f32 - 3.0, 0.3]).collect())
+        .collect();
+    let poses = "1.5 0 0 1 0 0 0 1\n2.5 0.5 0 1 0 0 0.1 0.995\n3.5 1 0.25 1 0 0 0.2 0.98\n";
+    let folders: Vec<PathBuf> = ["bin", "xyz", "ply"].iter().map(|name| folder.join(name)).collect();
+    for path in &folders {
+        fs::create_dir(path).unwrap();
+        fs::write(path.join("poses_tum.txt"), poses).unwrap();
+    }
+    for (number, cloud) in clouds.iter().enumerate() {
+        let rows: Vec<String> =
+            cloud.iter().map(|[x, y, z]| [*x, *y, *z].map(|c| f64::from(c).to_string()).join(" ")).collect();
+        let floats = cloud.iter().flat_map(|[x, y, z]| [*x, *y, *z, 0.0]).flat_map(f32::to_le_bytes);
+        fs::write(folders[0].join(format!("{number}.bin")), floats.collect::<Vec<u8>>()).unwrap();
+        fs::write(folders[1].join(format!("{number}.xyz")), rows.join("\n")).unwrap();
+        let header = format!(
+            "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\nend_header\n",
+            rows.len()
+        );
+        fs::write(folders[2].join(format!("{number}.ply")), header + &rows.join("\n") + "\n").unwrap();
+    }
+    folders
+}
+
+fn digest_of(input: &str, map: &Path, options: &[&str]) -> String {
+    let mut arguments = vec!["build", input, "-o", text(map), "--resolution", "0.2"];
+    arguments.extend(options);
+    output(&arguments);
+    let digest = output(&["digest", text(map)]);
+    fs::remove_dir_all(map).unwrap();
+    digest
+}
+
+#[test]
+fn the_same_scans_in_other_formats_make_the_same_map() {
+    let folder = TempDir::new().unwrap();
+    let map = folder.path().join("map");
+    let digests: Vec<String> =
+        make_inputs(folder.path()).iter().map(|input| digest_of(text(input), &map, &[])).collect();
+    assert!(digests.iter().all(|digest| *digest == digests[0]), "{digests:?}");
+}
+
+#[cfg(feature = "ros")]
+#[test]
+fn recordings_of_either_ros_make_the_same_map() {
+    let folder = TempDir::new().unwrap();
+    let map = folder.path().join("map");
+    let data = |name: &str| repository(&format!("crates/formats/tests/data/ros/{name}"));
+    let digests: Vec<String> = ["none.bag", "bz2.bag", "lz4.bag", "none.mcap", "zstd.mcap", "ros1.mcap"]
+        .iter()
+        .map(|name| digest_of(&data(name), &map, &["--topic", "/points"]))
+        .collect();
+    assert!(digests.iter().all(|digest| *digest == digests[0]), "{digests:?}");
+    let refused = refusal(&["build", &data("none.bag"), "-o", text(&map)]);
+    assert!(refused.contains("--topic") && refused.contains("/scan"), "{refused}");
+    assert!(!map.exists());
+}
+
+/// A backup is still a recording; what it says itself is not asked of anybody.
+#[cfg(feature = "ros")]
+#[test]
+fn recordings_are_known_by_their_content() {
+    let folder = TempDir::new().unwrap();
+    let camera = folder.path().join("camera.txt");
+    fs::write(&camera, "500 500 320 240\n").unwrap();
+    for name in ["none.bag", "none.mcap"] {
+        let path = folder.path().join("drive.backup");
+        fs::copy(repository(&format!("crates/formats/tests/data/ros/{name}")), &path).unwrap();
+        let input = ["scans", text(&path), "--topic", "/points"];
+        assert!(output(&[&input[..], &["--json"]].concat()).contains("\"scans\":4,"), "{name}");
+        for option in [["--depth-scale", "1000"], ["--intrinsics", text(&camera)]] {
+            let refused = refusal(&[&input[..], &option].concat());
+            assert!(refused.contains(option[0]) && refused.contains("leave it out"), "{refused}");
+        }
+    }
+}
+
+/// Depth images without their camera.
+#[test]
+fn the_option_for_a_camera_is_named() {
+    let folder = TempDir::new().unwrap();
+    fs::write(folder.path().join("0.depth.png"), "").unwrap();
+    let refused = refusal(&["scans", text(folder.path())]);
+    assert!(refused.contains("--intrinsics FILE") && refused.contains("camera-intrinsics.txt"), "{refused}");
+}
+
+/// A recording and a file of poses go by one rule.
+#[cfg(feature = "ros")]
+#[test]
+fn gaps_between_poses_are_filled_up_to_twice_the_tolerance() {
+    let folder = TempDir::new().unwrap();
+    let (bag, poses) =
+        (repository("crates/formats/tests/data/ros/none.bag"), folder.path().join("poses.txt"));
+    // As its transforms: five a second, with the stamps of the clouds between them.
+    let rows = (0..4).map(|k| format!("1700000000.{:02} 0 0 1 0 0 0 1\n", 20 * k + 6));
+    fs::write(&poses, rows.collect::<String>()).unwrap();
+    for own in [&[][..], &["--poses", text(&poses)]] {
+        for (tolerance, is_filled) in [("0.1", true), ("0.09", false)] {
+            let input = ["scans", &bag, "--topic", "/points", "--pose-tolerance", tolerance, "--json"];
+            let told = output(&[&input, own].concat());
+            assert_eq!(told.contains("4 clouds have no pose"), !is_filled, "{own:?} {tolerance}: {told}");
+            assert_eq!(told.contains("apart; --pose-tolerance allows for more"), !is_filled, "{told}");
+        }
+        let map = folder.path().join("map");
+        let input = ["build", &bag, "--topic", "/points", "--pose-tolerance", "0.01", "-o", text(&map)];
+        let refused = refusal(&[&input, own].concat());
+        assert!(refused.contains("none of its 4 clouds has a pose"), "{refused}");
+        assert!(refused.contains("apart; --pose-tolerance allows for more"), "{refused}");
+    }
+}
+
+#[test]
+fn what_would_be_read_is_told_and_nothing_is_mapped() {
+    let folder = TempDir::new().unwrap();
+    let inputs = make_inputs(folder.path());
+    let told = output(&["scans", text(&inputs[0]), "--json"]);
+    let told: serde_json::Value = serde_json::from_str(&told).unwrap();
+    assert_eq!((&told["scans"], &told["points"]), (&3.into(), &180.into()), "{told}");
+    let each = output(&["scans", text(&inputs[1]), "--each", "--first", "1", "--every", "2"]);
+    assert!(each.contains("scans     1, 60 points"), "{each}");
+    let unknown = folder.path().join("file.pcap");
+    fs::write(&unknown, b"\xd4\xc3\xb2\xa1 and more of a capture").unwrap();
+    let refused = refusal(&["scans", text(&unknown)]);
+    assert!(refused.contains("pcap"), "{refused}");
+}
+
+#[test]
+fn a_map_lists_where_its_scans_were_taken() {
+    let folder = TempDir::new().unwrap();
+    let (inputs, map) = (make_inputs(folder.path()), folder.path().join("map"));
+    output(&["build", text(&inputs[2]), "-o", text(&map), "--resolution", "0.2"]);
+    let each = output(&["scans", text(&map), "--each", "--json"]);
+    let rows: Vec<serde_json::Value> = each.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let origins: Vec<&serde_json::Value> = rows[..3].iter().map(|row| &row["origin_m"]).collect();
+    assert_eq!(
+        serde_json::json!(origins),
+        serde_json::json!([[0.0, 0.0, 1.0], [0.5, 0.0, 1.0], [1.0, 0.25, 1.0]])
+    );
+    assert_eq!(rows[3]["scans"], 3);
+}
+
+#[test]
+fn points_are_left_out_and_taken_without_rays() {
+    let folder = TempDir::new().unwrap();
+    let (inputs, map) = (make_inputs(folder.path()), folder.path().join("map"));
+    let count = |options: &[&str], key: &str| {
+        let mut arguments = vec!["build", text(&inputs[0]), "-o", text(&map), "--resolution", "0.2"];
+        arguments.extend(options);
+        output(&arguments);
+        let info: serde_json::Value = serde_json::from_str(&output(&["info", text(&map), "--json"])).unwrap();
+        fs::remove_dir_all(&map).unwrap();
+        info[key].as_u64().unwrap()
+    };
+    let (all, occupied) = (count(&[], "voxels"), count(&[], "occupied"));
+    assert!(all > occupied);
+    assert_eq!(count(&["--no-rays"], "voxels"), count(&["--no-rays"], "occupied"));
+    let half = ["--ignore-box", "0", "-10", "-10", "10", "0", "10"];
+    assert!(count(&half, "occupied") < occupied);
+    assert_eq!(count(&["--ignore-box", "-99", "-99", "-99", "99", "99", "99"], "occupied"), 0);
+}
+
+#[test]
+fn a_file_of_octomap_is_imported_and_asked_as_it_is() {
+    let folder = TempDir::new().unwrap();
+    let place = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (bt, ot) = (place("map.bt"), place("map.ot"));
+    output(&["export", &repository("map_tiles_example"), "-o", &bt]);
+    output(&["export", &repository("map_tiles_example"), "-o", &ot]);
+    for (file, again) in [(&bt, "again.bt"), (&ot, "again.ot")] {
+        let map = place(&format!("{again} map"));
+        output(&["import", file, "-o", &map]);
+        output(&["export", &map, "-o", &place(again)]);
+        assert_eq!(fs::read(file).unwrap(), fs::read(place(again)).unwrap(), "{again}");
+        assert_eq!(output(&["digest", file]), output(&["digest", &map]));
+        let ray = ["--origin", "8", "-2", "1.8", "--direction", "1", "1", "0"];
+        let ask = |map: &str| output(&[&["raycast", map], &ray[..]].concat());
+        assert_eq!(ask(file), ask(&map));
+        assert!(ask(file).contains("hit at"), "{}", ask(file));
+        output(&["verify", &map]);
+    }
+    let refused = refusal(&["import", &bt, "-o", &place("none"), "--max-voxels", "3"]);
+    assert!(refused.contains("--max-voxels 3"), "{refused}");
+    let refused = refusal(&["crop", &bt, "-o", &place("none"), "--region", "0", "0", "0", "1", "1", "1"]);
+    assert!(refused.contains("voxtile import"), "{refused}");
+}
+
+#[test]
+fn voxels_are_written_for_other_programs_whole_or_not_at_all() {
+    let folder = TempDir::new().unwrap();
+    let place = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let map = repository("map_tiles_example");
+    output(&["export", &map, "-o", &place("map.csv")]);
+    let rows = fs::read_to_string(place("map.csv")).unwrap();
+    let mut wanted: Vec<String> =
+        rows.lines().skip(1).map(|row| row.split(',').take(3).collect::<Vec<_>>().join(" ")).collect();
+    output(&["export", &map, "-o", &place("map.xyz")]);
+    let lines = fs::read_to_string(place("map.xyz")).unwrap();
+    let mut found: Vec<String> =
+        lines.lines().map(|row| row.split(' ').take(3).collect::<Vec<_>>().join(" ")).collect();
+    wanted.sort_unstable();
+    found.sort_unstable();
+    assert_eq!(found, wanted);
+    for name in [
+        "map.npz",
+        "map.glb",
+        "map.png",
+        "map.pgm",
+        "map.las",
+        "map.laz",
+        "map.copc.laz",
+        "map.e57",
+        "map.mcap",
+    ] {
+        output(&["export", &map, "-o", &place(name)]);
+        assert!(fs::metadata(place(name)).unwrap().len() > 0, "{name}");
+        // Over itself, too.
+        output(&["export", &map, "-o", &place(name)]);
+    }
+    assert!(Path::new(&place("map.yaml")).exists() && Path::new(&place("map.pgw")).exists());
+    output(&["export", &map, "-o", &place("squares"), "--format", "autoware"]);
+    assert!(Path::new(&place("squares/pointcloud_map_metadata.yaml")).exists());
+    refusal(&["export", &map, "-o", &place("squares"), "--format", "autoware"]);
+    refusal(&["export", &map, "-o", "-", "--format", "laz"]);
+    let left = fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name());
+    assert!(left.into_iter().all(|name| !name.to_string_lossy().starts_with('.')));
+}
+
+/// A `.yaml` or a world file beside the output would replace an output of that name.
+#[test]
+fn outputs_named_as_what_lies_beside_them_are_refused() {
+    let folder = TempDir::new().unwrap();
+    let map = repository("map_tiles_example");
+    for (format, name, hint) in
+        [("nav2", "map.yaml", "map.pgm"), ("heightmap", "h.json", "h.png"), ("heightmap", "h.pgw", "h.png")]
+    {
+        let path = folder.path().join(name);
+        let told = refusal(&["export", &map, "-o", text(&path), "--format", format]);
+        assert!(told.contains(name) && told.contains(hint), "{told}");
+    }
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+}
+
+/// Only the output was named: what has the name of a file beside it may be of another program.
+#[test]
+fn what_lies_beside_an_output_is_replaced_with_it_alone() {
+    let folder = TempDir::new().unwrap();
+    let map = repository("map_tiles_example");
+    let path = |name: &str| folder.path().join(name);
+    let names = || {
+        let names = fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name());
+        let mut names: Vec<String> = names.map(|name| name.into_string().unwrap()).collect();
+        names.sort_unstable();
+        names
+    };
+    fs::write(path("package.json"), "{}").unwrap();
+    let told = refusal(&["export", &map, "-o", text(&path("package.png"))]);
+    assert!(told.contains("package.json") && told.contains("move or remove"), "{told}");
+    assert_eq!(
+        (names(), fs::read(path("package.json")).unwrap()),
+        (vec!["package.json".into()], b"{}".to_vec())
+    );
+    // The last name is refused before the first is taken.
+    fs::create_dir(path("h.pgw")).unwrap();
+    let told = refusal(&["export", &map, "-o", text(&path("h.png"))]);
+    assert!(told.contains("h.pgw"), "{told}");
+    assert_eq!(names(), ["h.pgw", "package.json"]);
+    fs::remove_dir(path("h.pgw")).unwrap();
+
+    output(&["export", &map, "-o", text(&path("h.png"))]);
+    let written = fs::read(path("h.json")).unwrap();
+    // As a killed export leaves it.
+    fs::remove_file(path("h.png")).unwrap();
+    output(&["export", &map, "-o", text(&path("h.png"))]);
+    // Of an earlier output.
+    fs::write(path("h.json"), "{}").unwrap();
+    output(&["export", &map, "-o", text(&path("h.png"))]);
+    assert_eq!(fs::read(path("h.json")).unwrap(), written);
+    assert_eq!(names(), ["h.json", "h.pgw", "h.png", "package.json"]);
+}
+
+/// A set as it is handed around: clouds in `scans`, what belongs to them beside it.
+#[test]
+fn texts_beside_clouds_are_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let scans = folder.path().join("set/scans");
+    fs::create_dir_all(&scans).unwrap();
+    fs::write(folder.path().join("set/README.md"), "1 2 3\n").unwrap();
+    fs::write(folder.path().join("set/camera-intrinsics.txt"), "585 0 320\n0 585 240\n0 0 1\n").unwrap();
+    fs::write(folder.path().join("set/poses_tum.txt"), "0 0 0 1 0 0 0 1\n1 0 0 1 0 0 0 1\n").unwrap();
+    for name in ["0.ply", "1.ply"] {
+        let header =
+            "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n";
+        fs::write(scans.join(name), format!("{header}end_header\n4 0 0\n")).unwrap();
+    }
+    let set = folder.path().join("set");
+    for arguments in [vec!["scans", text(&set)], vec!["scans", text(&set), "--format", "ply"]] {
+        let told = output(&arguments);
+        assert!(told.contains("PLY") && told.contains("set/poses_tum.txt"), "{told}");
+    }
+}
+
+/// The poses of texts lie among them under any name.
+#[test]
+fn a_file_of_poses_is_no_cloud() {
+    let folder = tempfile::tempdir().unwrap();
+    let scans = folder.path().join("scans");
+    fs::create_dir(&scans).unwrap();
+    for number in 0..2 {
+        fs::write(scans.join(format!("{number}.txt")), "4 0 0\n").unwrap();
+    }
+    let poses = scans.join("optimized.txt");
+    fs::write(&poses, "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 1 0 1 0 0 0 0 1 0\n").unwrap();
+    for format in [&[][..], &["--format", "xyz"]] {
+        let input = ["scans", text(&scans), "--poses", text(&poses), "--json"];
+        let told: serde_json::Value = serde_json::from_str(&output(&[&input, format].concat())).unwrap();
+        assert_eq!((&told["scans"], &told["points"]), (&2.into(), &2.into()), "{told}");
+    }
+    let other = folder.path().join("other.txt");
+    fs::copy(&poses, &other).unwrap();
+    let refused = refusal(&["scans", text(&scans), "--poses", text(&other)]);
+    assert!(refused.contains("2 poses for 3 clouds (0.txt to optimized.txt), "), "{refused}");
+}
+
+/// Clouds and poses by clocks that differ: a map of nothing would be no answer.
+#[test]
+fn clouds_of_which_none_has_a_pose_make_no_map() {
+    let folder = tempfile::tempdir().unwrap();
+    let scans = folder.path().join("scans");
+    fs::create_dir(&scans).unwrap();
+    for stamp in ["1600000000.000000000", "1600000001.000000000"] {
+        fs::write(scans.join(format!("{stamp}.xyz")), "4 0 0\n4 1 0\n").unwrap();
+    }
+    let poses = folder.path().join("gps.txt");
+    fs::write(&poses, "1284035200 0 0 1 0 0 0 1\n1284035210 0 0 1 0 0 0 1\n").unwrap();
+    let map = folder.path().join("map");
+    let told = refusal(&["build", text(&scans), "--poses", text(&poses), "-o", text(&map)]);
+    for part in ["none of its 2 clouds has a pose", "315964790.000 s after the last pose", "clocks differ"] {
+        assert!(told.contains(part), "{told}");
+    }
+    // One is enough.
+    fs::write(&poses, "1599999999.5 0 0 1 0 0 0 1\n1600000000.5 0 0 1 0 0 0 1\n").unwrap();
+    let map = folder.path().join("other");
+    output(&["build", text(&scans), "--poses", text(&poses), "-o", text(&map)]);
+    let told = output(&["scans", text(&scans), "--poses", text(&poses)]);
+    let named = "1 cloud has no pose, left out (1600000001.000000000.xyz: it is 0.500 s after the last pose)";
+    assert!(told.contains(named), "{told}");
+    assert!(output(&["scans", text(&map)]).contains("1600000000"), "{}", output(&["scans", text(&map)]));
+}
+
+/// A cloud that cannot be opened has a number and a pose as the others do; poses that are left at the end are told.
+#[test]
+fn poses_by_number_stay_with_their_clouds() {
+    let folder = tempfile::tempdir().unwrap();
+    let scans = folder.path().join("scans");
+    fs::create_dir(&scans).unwrap();
+    let cloud = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n4 0 0\n";
+    for (name, text) in [("0", cloud), ("1", "ply\nformat of no kind\n"), ("2", cloud)] {
+        fs::write(scans.join(format!("{name}.ply")), text).unwrap();
+    }
+    let poses = folder.path().join("poses.txt");
+    let rows: Vec<String> = (0..3).map(|k| format!("1 0 0 {} 0 1 0 0 0 0 1 0\n", 10 * k)).collect();
+    fs::write(&poses, rows.concat()).unwrap();
+    let map = folder.path().join("map");
+    output(&["build", text(&scans), "--poses", text(&poses), "-o", text(&map), "--skip-bad"]);
+    let told = output(&["scans", text(&map), "--each", "--json"]);
+    let scans = told.lines().map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap());
+    let origins: Vec<f64> = scans.filter_map(|scan| scan["origin_m"][0].as_f64()).collect();
+    assert_eq!(origins, [0.0, 20.0]);
+
+    // The scans of a folder of E57 are not counted before they are read.
+    let several = folder.path().join("several");
+    fs::create_dir(&several).unwrap();
+    fs::copy(repository("crates/formats/tests/data/scans.e57"), several.join("a.e57")).unwrap();
+    fs::copy(repository("crates/formats/tests/data/scans.e57"), several.join("b.e57")).unwrap();
+    fs::write(&poses, rows.concat().repeat(10)).unwrap();
+    let told = output(&["scans", text(&several), "--poses", text(&poses)]);
+    assert!(told.contains("more poses than clouds"), "{told}");
+}
+
+/// A recorder of ROS 1 that was killed leaves its file as `.bag.active`, perhaps as the only one.
+#[test]
+fn a_recording_that_was_not_closed_is_found_in_its_folder() {
+    let folder = tempfile::tempdir().unwrap();
+    let bag = PathBuf::from(repository("crates/formats/tests/data/ros/none.bag"));
+    let alone = output(&["scans", text(&bag), "--topic", "/points", "--each", "--json"]);
+    fs::copy(&bag, folder.path().join("drive.bag.active")).unwrap();
+    let told = output(&["scans", text(folder.path()), "--topic", "/points", "--each", "--json"]);
+    assert_eq!(told, alone);
+    assert_eq!(told.lines().count(), 4 + 1);
+}
+
+/// Far clouds with a coordinate reference system: the map keeps it, and files that can say it do.
+#[test]
+fn coordinate_reference_systems_are_kept_and_written_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let points = path("points.xyz");
+    fs::write(&points, "600000.25 5300000.25 400.5\n600001.25 5300000.75 401.5\n").unwrap();
+    let (plain, other) = (path("plain"), path("other"));
+    output(&["build", text(&points), "-o", text(&plain), "--no-rays", "--resolution", "0.5"]);
+    assert!(!output(&["info", text(&plain)]).contains("crs"));
+    // A map that names one, by a file that does.
+    let named = path("named.las");
+    output(&["export", text(&plain), "-o", text(&named), "-q"]);
+    name_crs(&named, "EPSG:25832");
+    output(&["build", text(&named), "-o", text(&other), "--no-rays", "--resolution", "0.5"]);
+    assert!(output(&["info", text(&other)]).contains("25832"), "{}", output(&["info", text(&other)]));
+    assert_eq!(output(&["digest", text(&other)]), output(&["digest", text(&plain)]));
+    let again = path("again.laz");
+    output(&["export", text(&other), "-o", text(&again), "-q"]);
+    let third = path("third");
+    output(&["build", text(&again), "-o", text(&third), "--no-rays", "--resolution", "0.5"]);
+    assert!(output(&["info", text(&third), "--json"]).contains("25832"));
+    // Points of another one are elsewhere.
+    let mixed = path("mixed.las");
+    output(&["export", text(&plain), "-o", text(&mixed), "-q"]);
+    name_crs(&mixed, "EPSG:25833");
+    let told = refusal(&["build", text(&mixed), "-o", text(&other), "--no-rays", "--append"]);
+    assert!(told.contains("25833") && told.contains("25832"), "{told}");
+    let fourth = path("fourth");
+    output(&["build", text(&mixed), "-o", text(&fourth), "--no-rays", "--resolution", "0.5"]);
+    let told = refusal(&["merge", text(&other), text(&fourth), "-o", text(&path("merged"))]);
+    assert!(told.contains("coordinate reference system") && told.contains("25833"), "{told}");
+    // A map that names none goes with any, and parts of a map keep it.
+    output(&["merge", text(&other), text(&plain), "-o", text(&path("merged"))]);
+    output(&[
+        "crop",
+        text(&other),
+        "-o",
+        text(&path("part")),
+        "--region",
+        "600000",
+        "5300000",
+        "0",
+        "600001",
+        "5300001",
+        "999",
+    ]);
+    for map in ["merged", "part"] {
+        assert!(output(&["info", text(&path(map))]).contains("25832"), "{map}");
+    }
+}
+
+/// Gives a LAS file that our writer made without a coordinate reference system one, as GeoTIFF keys.
+fn name_crs(file: &Path, crs: &str) {
+    let mut bytes = fs::read(file).unwrap();
+    let number: u16 = crs.strip_prefix("EPSG:").unwrap().parse().unwrap();
+    let mut record = vec![0_u8; 54];
+    record[2..2 + 16].copy_from_slice(b"LASF_Projection\0");
+    record[18..20].copy_from_slice(&34735_u16.to_le_bytes());
+    record[20..22].copy_from_slice(&24_u16.to_le_bytes());
+    let keys: [u16; 12] = [1, 1, 0, 2, 3072, 0, 1, number, 3076, 0, 1, 9001];
+    record.extend(keys.iter().flat_map(|key| key.to_le_bytes()));
+    let header = u16::from_le_bytes(bytes[94..96].try_into().unwrap()) as usize;
+    let extra = record.len() as u32;
+    let points = u32::from_le_bytes(bytes[96..100].try_into().unwrap()) + extra;
+    let records = u32::from_le_bytes(bytes[100..104].try_into().unwrap()) + 1;
+    bytes[96..100].copy_from_slice(&points.to_le_bytes());
+    bytes[100..104].copy_from_slice(&records.to_le_bytes());
+    bytes.splice(header..header, record);
+    // The flag that says WKT.
+    bytes[6] &= !16;
+    fs::write(file, bytes).unwrap();
+}
+
+/// Clouds of one point, by number; some of them damaged.
+fn numbered(folder: &Path, count: usize, bad: &[usize]) -> (PathBuf, PathBuf) {
+    let scans = folder.join("scans");
+    fs::create_dir(&scans).unwrap();
+    let head =
+        "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n";
+    for number in 0..count {
+        let text = match bad.contains(&number) {
+            true => "ply\nformat of no kind\n".to_owned(),
+            false => format!("{head}end_header\n4 0 0\n"),
+        };
+        fs::write(scans.join(format!("{number}.ply")), text).unwrap();
+    }
+    let poses = folder.join("poses.txt");
+    let rows: Vec<String> = (0..count).map(|k| format!("1 0 0 {k} 0 1 0 0 0 0 1 0\n")).collect();
+    fs::write(&poses, rows.concat()).unwrap();
+    (scans, poses)
+}
+
+fn origins_of(map: &Path) -> Vec<f64> {
+    let told = output(&["scans", text(map), "--each", "--json"]);
+    let scans = told.lines().map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap());
+    scans.filter_map(|scan| scan["origin_m"][0].as_f64()).collect()
+}
+
+/// One that is passed over has a number as the others do, and cannot end a build that never asked for it.
+#[test]
+fn damaged_clouds_shift_no_others_of_a_selection() {
+    let folder = tempfile::tempdir().unwrap();
+    let (scans, poses) = numbered(folder.path(), 40, &[5, 20]);
+    let build = |map: &Path, options: &[&str]| {
+        let input = ["build", text(&scans), "--poses", text(&poses), "-o", text(map)];
+        output(&[&input, options].concat());
+        origins_of(map)
+    };
+    let map = |name: &str| folder.path().join(name);
+    assert_eq!(build(&map("a"), &["--every", "10", "--skip-bad"]), [0.0, 10.0, 30.0]);
+    assert_eq!(build(&map("b"), &["--every", "12"]), [0.0, 12.0, 24.0, 36.0]);
+    assert_eq!(build(&map("c"), &["--first", "7", "--count", "2"]), [7.0, 8.0]);
+    let told = output(&["scans", text(&scans), "--poses", text(&poses), "--first", "7", "--count", "2"]);
+    assert!(told.contains("1 of the scans that were passed over cannot be read"), "{told}");
+}
+
+/// One that was cut off: LAS keeps what it has, and PLY is a bad cloud. Both say where.
+#[test]
+fn clouds_that_were_cut_off_say_where() {
+    let folder = tempfile::tempdir().unwrap();
+    let inputs = make_inputs(folder.path());
+    let path = |name: &str| folder.path().join(name);
+    output(&["build", text(&inputs[2]), "-o", text(&path("map")), "--resolution", "0.2"]);
+    for name in ["voxels.las", "voxels.ply"] {
+        let file = path(name);
+        output(&["export", text(&path("map")), "-o", text(&file)]);
+        let bytes = fs::read(&file).unwrap();
+        fs::write(&file, &bytes[..bytes.len() - 100]).unwrap();
+        let run = voxtile(&["scans", text(&file), "--json"]).assert().failure().code(1);
+        let told: serde_json::Value = serde_json::from_slice(&run.get_output().stdout).unwrap();
+        let error = &told["error"];
+        assert_eq!((&error["kind"], error["path"].as_str()), (&"malformed".into(), Some(text(&file))));
+        let (expected, other) =
+            if name.ends_with("las") { ("record", "offset") } else { ("offset", "record") };
+        assert!(error[expected].as_u64() > Some(0) && error[other].is_null(), "{error}");
+        let map = path(&format!("{name}.map"));
+        let build = ["build", text(&file), "-o", text(&map), "--no-rays", "--skip-bad", "--json"];
+        let told: serde_json::Value = serde_json::from_str(&output(&build)).unwrap();
+        let points = told["points"].as_u64();
+        assert_eq!(points, if name.ends_with("las") { error["record"].as_u64() } else { Some(0) }, "{told}");
+    }
+}
+
+/// Points that stay where they are, and clouds that know no times, are not passed over in silence.
+#[test]
+fn what_deskewing_does_not_move_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let scans = folder.path().join("scans");
+    fs::create_dir(&scans).unwrap();
+    let path = scans.join("1600000000.000000000.xyz");
+    fs::write(&path, "x y z time\n4 0 0 0\n4 1 0 0.5\n4 2 0 0.75\n4 3 0 0.8\n").unwrap();
+    fs::write(scans.join("1600000000.500000000.xyz"), "4 0 0\n").unwrap();
+    let poses = folder.path().join("poses.txt");
+    fs::write(&poses, "1599999999.9 0 0 1 0 0 0 1\n1600000000.6 7 0 1 0 0 0 1\n").unwrap();
+    let input = ["scans", text(&scans), "--poses", text(&poses), "--pose-tolerance", "2"];
+    let told = output(&[&input[..], &["--deskew"]].concat());
+    for part in [
+        "1 cloud has no times of points, or no stamp: --deskew moved nothing there",
+        "2 points stayed: no pose is known at their own times (--deskew)",
+    ] {
+        assert!(told.contains(part), "{told}");
+    }
+    assert!(!output(&input).contains("--deskew"));
+    let refused = refusal(&[&input[..], &["--deskew", "--world-frame"]].concat());
+    assert!(refused.contains("--deskew") && refused.contains("--world-frame"), "{refused}");
+}
+
+/// The system may keep its temporary files in memory: a build has a disk at hand.
+#[cfg(feature = "ros")]
+#[test]
+fn packed_recordings_are_unpacked_beside_the_map() {
+    let folder = tempfile::tempdir().unwrap();
+    let bag = folder.path().join("bag");
+    fs::create_dir(&bag).unwrap();
+    let plain = fs::read(repository("crates/formats/tests/data/ros/none.mcap")).unwrap();
+    fs::write(bag.join("a.mcap.zstd"), zstd::encode_all(plain.as_slice(), 3).unwrap()).unwrap();
+    let metadata = "rosbag2_bagfile_information:\n  relative_file_paths:\n  - a.mcap.zstd\n";
+    fs::write(bag.join("metadata.yaml"), metadata).unwrap();
+    // One whose folder is there, one whose folder is made, and one that is there itself.
+    let maps = ["map", "new/folder/map", "map"].map(|map| folder.path().join(map));
+    for (map, again) in maps.iter().zip([&[][..], &[], &["--append", "--again"]]) {
+        let build = ["build", text(&bag), "--topic", "/points", "-o", text(map)];
+        let how = if again.is_empty() { &["--resolution", "0.2"] } else { again };
+        let arguments = [&build, how].concat();
+        let built = voxtile(&arguments).env("TMPDIR", folder.path().join("gone")).output().unwrap();
+        assert!(built.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&built.stderr));
+    }
+}
+
+/// A day in parts of a minute is more files than a process may have open.
+#[cfg(all(feature = "ros", unix))]
+#[test]
+fn a_recording_may_have_more_parts_than_files_may_be_open() {
+    for extension in ["mcap", "bag"] {
+        let folder = tempfile::tempdir().unwrap();
+        let part = repository(&format!("crates/formats/tests/data/ros/none.{extension}"));
+        for number in 0..60 {
+            fs::copy(&part, folder.path().join(format!("{number}.{extension}"))).unwrap();
+        }
+        let mut limited = Command::new("sh");
+        limited
+            .args(["-c", "ulimit -n 40 && exec \"$@\"", "sh"])
+            .arg(assert_cmd::cargo::cargo_bin("voxtile"));
+        let told = limited.args(["scans", text(folder.path()), "--topic", "/points"]).output().unwrap();
+        let said = String::from_utf8_lossy(&told.stdout);
+        assert!(told.status.success(), "{extension}: {}", String::from_utf8_lossy(&told.stderr));
+        assert!(said.contains("240"), "{extension}: 4 scans a part: {said}");
+    }
+}
+
+/// Pixels without depth are rays without a return, also when the range comes from the map.
+#[test]
+fn a_resumed_build_takes_rays_without_a_return_as_it_did_before() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let depth = path("depth");
+    fs::create_dir(&depth).unwrap();
+    let add = |number: usize| {
+        let file = fs::File::create(depth.join(format!("{number}.png"))).unwrap();
+        let mut encoder = png::Encoder::new(file, 4, 2);
+        encoder.set_color(png::ColorType::Grayscale);
+        encoder.set_depth(png::BitDepth::Sixteen);
+        let depths = [2000_u16, 0, 2000, 0, 0, 2000, 0, 1000];
+        let bytes: Vec<u8> = depths.iter().flat_map(|depth| depth.to_be_bytes()).collect();
+        encoder.write_header().unwrap().write_image_data(&bytes).unwrap();
+        let rows: Vec<String> = (0..=number).map(|k| format!("1 0 0 {k} 0 1 0 0 0 0 1 0\n")).collect();
+        fs::write(path("poses.txt"), rows.concat()).unwrap();
+    };
+    fs::write(path("camera.txt"), "4 4 2 1\n").unwrap();
+    let build = |map: &Path, how: &[&str]| {
+        let poses = path("poses.txt");
+        let camera = path("camera.txt");
+        let input = ["build", text(&depth), "--poses", text(&poses), "--intrinsics", text(&camera)];
+        output(&[&input[..], &["-o", text(map), "--json"], how].concat())
+    };
+    (0..2).for_each(add);
+    build(&path("map"), &["--clear-no-return", "3"]);
+    add(2);
+    let told: serde_json::Value = serde_json::from_str(&build(&path("map"), &["--resume"])).unwrap();
+    assert_eq!((&told["resumed_after"], &told["scans"]), (&2.into(), &1.into()), "{told}");
+    build(&path("whole"), &["--clear-no-return", "3"]);
+    build(&path("without"), &[]);
+    let digest = |name: &str| output(&["digest", text(&path(name))]);
+    assert_eq!(digest("map"), digest("whole"));
+    assert_ne!(digest("whole"), digest("without"));
+}

@@ -1,0 +1,177 @@
+use crate::cli::{output, scans, text, voxtile};
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+use tempfile::TempDir;
+
+/// The objects that a run prints on standard output, which must succeed.
+fn objects(arguments: &[&str]) -> Vec<Value> {
+    output(arguments).lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+}
+
+/// What every object keeps to: a place is `[x, y, z]`, a box has `min` and `max`, and metres say so in their name.
+fn check(name: &str, value: &Value) {
+    let is_place = |value: &Value| {
+        value.as_array().is_some_and(|numbers| numbers.len() == 3 && numbers.iter().all(Value::is_number))
+    };
+    if let Some(object) = value.as_object() {
+        if let (Some(min), Some(max)) = (object.get("min"), object.get("max")) {
+            let is_statistic = min.is_number() && max.is_number();
+            assert!(object.len() == 2 && is_place(min) && is_place(max) || is_statistic, "{name}: {value}");
+        }
+        object.iter().for_each(|(name, value)| check(name, value));
+    } else if let Some(array) = value.as_array() {
+        assert!(!name.ends_with("_m") || is_place(value), "{name}: {value}");
+        let is_of_numbers = !array.is_empty() && array.iter().all(Value::is_number);
+        let is_index = ["tile", "voxel", "min", "max"].contains(&name) || name.ends_with("_voxel");
+        assert!(is_place(value) == (name.ends_with("_m") || is_index) || !is_of_numbers, "{name}: {value}");
+        array.iter().for_each(|value| check("", value));
+    }
+    assert!(!["x", "y", "z", "lower", "upper", "corner"].contains(&name), "{name}: {value}");
+}
+
+#[test]
+fn every_object_has_the_version_and_the_same_shapes() {
+    let folder = TempDir::new().unwrap();
+    let scans = scans(&folder);
+    let path = |name: &str| text(&folder.path().join(name)).to_owned();
+    let scans = text(&scans);
+    let (map, bt, csv) = (&*path("map"), &*path("a.bt"), &*path("a.csv"));
+    let (crop, merged, small, demo) = (&*path("crop"), &*path("merged"), &*path("small"), &*path("demo"));
+    let (picture, points) = (&*path("local.png"), &*path("points.txt"));
+    fs::write(points, "4.1 -0.5 0.6\n1 0 0.6\n99 99 99\n").unwrap();
+    let part = ["--region", "0", "-1", "0", "5", "1", "2"];
+    let ray = ["--origin", "0.05", "0.05", "0.6", "--direction"];
+    let runs: [&[&str]; 25] = [
+        &["build", scans, "-o", map],
+        &["info", map],
+        &["query", map, "--points", points],
+        &[&["raycast", map][..], &ray, &["1", "-0.01", "0"]].concat(),
+        &[&["raycast", map][..], &ray, &["-1", "0", "0"]].concat(),
+        &["export", map, "-o", bt],
+        &["export", map, "-o", csv, "--origin", "100", "0", "0"],
+        &["info", bt],
+        &["digest", map],
+        &["snapshot", map, "good"],
+        &["build", scans, "-o", map, "--append", "--again"],
+        &["snapshots", map],
+        &["diff", map, "good", "now"],
+        &[&["crop", map, "-o", crop][..], &part].concat(),
+        &["merge", map, crop, "-o", merged, "--prefer", "first"],
+        &["convert", map, "-o", small, "--storage", "compact"],
+        &[&["clear", merged][..], &part].concat(),
+        &["decay", merged, "--halflife", "3", "--scans", "3"],
+        &["info", &format!("{map}@good")],
+        &["revert", map, "good", "--keep-as", "late"],
+        &["snapshot", map, "late", "--delete"],
+        &["verify", map],
+        &["repair", map],
+        &["local", scans, "-o", picture],
+        &["demo", "--out", demo, "--length", "4"],
+    ];
+    for run in runs {
+        let objects = objects(&[run, &["--json"]].concat());
+        assert_eq!(objects.len(), if run.contains(&"--points") { 3 } else { 1 }, "{run:?}");
+        for object in objects {
+            assert_eq!(object["version"], 1, "{run:?}: {object}");
+            check("", &object);
+        }
+    }
+    let info = &objects(&["info", map, "--json"])[0];
+    assert!(info["bounds_m"]["min"][0].is_number() && info["tile_bounds"]["max"][2].is_number(), "{info}");
+}
+
+/// Exit code, the error on standard output and the line for a person of a run that must fail.
+fn failed(arguments: &[&str]) -> (i32, Value, String) {
+    let run = voxtile(arguments).assert().failure();
+    let run = run.get_output();
+    let said = String::from_utf8(run.stderr.clone()).unwrap();
+    let mut told: Value = serde_json::from_slice(&run.stdout).unwrap();
+    assert_eq!(told["version"], 1);
+    check("", &told);
+    let error = told["error"].take();
+    assert!(said.ends_with(&format!("voxtile: {}\n", error["message"].as_str().unwrap())), "{said}");
+    (run.status.code().unwrap(), error, said)
+}
+
+#[test]
+fn a_failure_is_an_object_beside_the_line_for_a_person() {
+    let folder = TempDir::new().unwrap();
+    let scans = scans(&folder);
+    let (map, none) = (folder.path().join("map"), folder.path().join("none"));
+    let (map, none) = (text(&map), text(&none));
+    output(&["build", text(&scans), "-o", map]);
+
+    let (code, error, _) = failed(&["info", none, "--json"]);
+    assert_eq!((code, &error["kind"], &error["path"]), (1, &"no_map".into(), &none.into()));
+    assert!(error.get("tile").is_none() && error.get("line").is_none(), "what does not apply is missing");
+
+    let upside_down = ["clear", map, "--json", "--region", "0", "0", "0", "1", "1", "-1"];
+    let (code, error, _) = failed(&upside_down);
+    assert_eq!((code, &error["kind"]), (2, &"invalid_argument".into()));
+    assert_eq!(error["argument"], "--region");
+
+    let (code, error, _) = failed(&["build", text(&scans), "-o", map, "--json"]);
+    assert_eq!((code, &error["kind"], &error["path"]), (2, &"already_exists".into(), &map.into()));
+    let (code, error, _) = failed(&["build", text(&scans), "-o", none, "--resolution", "0.3", "--json"]);
+    assert_eq!((code, &error["kind"]), (2, &"grid".into()));
+
+    let scan = scans.join("001.pcd");
+    let whole = fs::read_to_string(&scan).unwrap();
+    fs::write(&scan, whole.replacen("4.05", "four", 1)).unwrap();
+    let (code, error, said) = failed(&["build", text(&scans), "-o", none, "--json"]);
+    assert_eq!((code, &error["kind"], &error["path"]), (1, &"malformed".into(), &text(&scan).into()));
+    assert_eq!(error["line"], 10);
+    assert!(said.contains("after 1 scans") && said.contains("malformed: line 10: "), "{said}");
+    assert_eq!(said.matches("line 10").count(), 1, "{said}");
+
+    // One without --json says nothing on standard output; neither does a wrong command line.
+    for (arguments, code) in [(&["info", "/no/map"][..], 1), (&["info", map, "--json", "--never"], 2)] {
+        let run = voxtile(arguments).assert().failure();
+        let run = run.get_output();
+        assert_eq!((run.status.code(), run.stdout.len()), (Some(code), 0), "{arguments:?}");
+        assert!(!run.stderr.is_empty());
+    }
+    // Standard output is for the file.
+    let no_map = &format!("{none}/no_map");
+    let run = voxtile(&["export", no_map, "-o", "-", "--format", "csv", "--json"]).assert().failure();
+    let run = run.get_output();
+    let said = String::from_utf8(run.stderr.clone()).unwrap();
+    let error: Value = serde_json::from_str(said.lines().last().unwrap()).unwrap();
+    assert!(run.stdout.is_empty() && said.starts_with("voxtile: "), "{said}");
+    assert_eq!((&error["version"], &error["error"]["kind"]), (&1.into(), &"no_map".into()));
+}
+
+#[test]
+fn a_failure_names_file_tile_and_place_of_damage() {
+    let folder = TempDir::new().unwrap();
+    let scans = scans(&folder);
+    let map = folder.path().join("map");
+    output(&["build", text(&scans), "-o", text(&map)]);
+    let table = map.join("tile_0_0_0/iwlo_meta.bin");
+    fs::write(&table, b"OLWI").unwrap();
+    let (code, error, said) = failed(&["digest", text(&map), "--json"]);
+    assert_eq!((code, &error["kind"]), (1, &"damaged".into()));
+    assert_eq!(error["path"], text(&table));
+    assert_eq!(error["tile"], serde_json::json!([0, 0, 0]));
+    assert!(error["offset"].is_number());
+    assert!(said.contains("`voxtile repair`") && said.contains("offset "), "{said}");
+    // Damage is what verify looks for, and so its answer.
+    let run = voxtile(&["verify", text(&map), "--json"]).assert().code(1);
+    let report: Value = serde_json::from_slice(&run.get_output().stdout).unwrap();
+    assert_eq!((&report["whole"], report.get("error")), (&false.into(), None));
+}
+
+#[test]
+fn every_kind_of_error_is_explained() {
+    let page = testkit::support::repository("docs/json.md");
+    let page = fs::read_to_string(page).unwrap();
+    let source = testkit::support::repository("src/error.rs");
+    let source = fs::read_to_string(source).unwrap();
+    let kinds = source.split("pub fn kind").nth(1).unwrap().split("    }\n\n").next().unwrap();
+    let kinds: Vec<&str> = kinds.split('"').skip(1).step_by(2).collect();
+    assert!(kinds.len() > 10);
+    for kind in kinds.into_iter().chain(["other"]) {
+        assert!(page.contains(&format!("\n| `{kind}` |")), "docs/json.md has no {kind}");
+    }
+}

@@ -1,0 +1,364 @@
+use crate::cli::{failure, json, output, scans, text, voxtile};
+use std::fs;
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+/// A map of three scans of a wall.
+fn map(folder: &TempDir) -> PathBuf {
+    let map = folder.path().join("map");
+    output(&["build", text(&scans(folder)), "-o", text(&map)]);
+    map
+}
+
+/// Width, height and pixels of a PNG.
+fn decoded(png: &[u8]) -> (usize, usize, Vec<[u8; 3]>) {
+    let mut reader = png::Decoder::new(std::io::Cursor::new(png)).read_info().unwrap();
+    let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
+    let info = reader.next_frame(&mut bytes).unwrap();
+    let pixels = bytes.chunks_exact(3).map(|pixel| pixel.try_into().unwrap()).collect();
+    (info.width as usize, info.height as usize, pixels)
+}
+
+fn pixels_of(path: &Path) -> (usize, usize, Vec<[u8; 3]>) {
+    decoded(&fs::read(path).unwrap())
+}
+
+#[test]
+fn a_picture_is_what_its_json_says() {
+    let folder = TempDir::new().unwrap();
+    let (map, file) = (map(&folder), folder.path().join("map.png"));
+    let said = json(&["picture", text(&map), "-o", text(&file), "--json"]);
+    let (width, height, pixels) = pixels_of(&file);
+    assert_eq!(
+        (said["width_px"].as_u64(), said["height_px"].as_u64()),
+        (Some(width as u64), Some(height as u64))
+    );
+    assert_eq!((said["color"].as_str(), said["from"].as_str()), (Some("height"), Some("above")));
+    // The way of the sensor, which the map knows.
+    assert!(pixels.contains(&voxtile_render::colors::PATH));
+    let without = folder.path().join("without.png");
+    output(&["picture", text(&map), "-o", text(&without), "--no-path", "--no-grid"]);
+    assert!(!pixels_of(&without).2.contains(&voxtile_render::colors::PATH));
+    for more in [
+        &["--from", "side-x"][..],
+        &["--from", "side-y", "--color", "count"],
+        &["--slice", "0.55", "--color", "probability"],
+        &["--color", "last-scan", "--region", "-1", "-1", "-1", "9", "9", "9"],
+        &["--slice", "0.5", "--thickness", "1", "--size", "300"],
+    ] {
+        let said = json(&[&["picture", text(&map), "-o", text(&file), "--json"], more].concat());
+        assert!(said["known_cells"].as_u64() > Some(0), "{more:?}: {said}");
+        let [left, top, wide, high] = [0, 1, 2, 3].map(|k| said["map_px"][k].as_u64().unwrap() as usize);
+        let (width, height, _) = pixels_of(&file);
+        assert!(left + wide <= width && top + high <= height, "{said}");
+        assert!(wide.max(high) <= if more.contains(&"--size") { 300 } else { 2048 }, "{said}");
+    }
+    // On standard output, where what is said goes elsewhere.
+    let run = voxtile(&["picture", text(&map), "-o", "-", "--json"]).assert().success();
+    let bytes = run.get_output();
+    assert_eq!(decoded(&bytes.stdout).0, width);
+    assert!(String::from_utf8_lossy(&bytes.stderr).contains("\"width_px\""));
+}
+
+#[test]
+fn what_changed_since_a_snapshot_is_drawn() {
+    let folder = TempDir::new().unwrap();
+    let (map, file) = (map(&folder), folder.path().join("map.png"));
+    output(&["snapshot", text(&map), "before"]);
+    output(&["clear", text(&map), "--region", "3", "-9", "-9", "9", "0", "9"]);
+    let args =
+        |since: &str| output(&["picture", text(&map), "-o", text(&file), "--since", since, "--no-path"]);
+    args("before");
+    let (.., pixels) = pixels_of(&file);
+    let count = |color: [u8; 3], pixels: &[[u8; 3]]| pixels.iter().filter(|&&pixel| pixel == color).count();
+    use voxtile_render::colors::{APPEARED, SAME, VANISHED};
+    // The swatches of the legend have all three.
+    assert!(count(VANISHED, &pixels) > 10 * count(APPEARED, &pixels), "the cleared half of the wall");
+    assert!(count(SAME, &pixels) > 10 * count(APPEARED, &pixels), "the other half");
+    let snapshot = format!("{}@before", text(&map));
+    let said = json(&["picture", &snapshot, "-o", text(&file), "--since", text(&map), "--json"]);
+    assert!(said["color"].is_null());
+    let (.., pixels) = pixels_of(&file);
+    assert!(count(APPEARED, &pixels) > 10 * count(VANISHED, &pixels));
+    let (code, error) = failure(&["picture", text(&map), "-o", text(&file), "--since", "nothing"]);
+    assert!(code != 0 && error.contains("nothing"), "{error}");
+}
+
+#[test]
+fn a_picture_that_cannot_be_drawn_says_what_to_do() {
+    let folder = TempDir::new().unwrap();
+    let (map, file) = (map(&folder), folder.path().join("map.png"));
+    let (code, error) = failure(&["picture", text(&map)]);
+    assert!(code == 2 && error.contains("-o map.png") && error.contains("--blocks"), "{error}");
+    let (code, error) =
+        failure(&["picture", text(&map), "-o", text(&file), "--slice", "1", "--from", "side-x"]);
+    assert!(code == 2 && error.contains("--slice"), "{error}");
+    for wrong in [&["--slice", "nan"][..], &["--region", "1", "1", "1", "0", "2", "2"], &["--size", "9000"]] {
+        let (code, _) = failure(&[&["picture", text(&map), "-o", text(&file)], wrong].concat());
+        assert_eq!(code, 2, "{wrong:?}");
+    }
+    assert!(!file.exists());
+    let table = map.join("tile_0_0_0/iwlo_meta.bin");
+    let mut bytes = fs::read(&table).unwrap();
+    bytes[40] ^= 1;
+    fs::write(&table, bytes).unwrap();
+    let (code, error) = failure(&["picture", text(&map), "-o", text(&file)]);
+    assert!(code == 1 && error.contains("tile (0, 0, 0)"), "{error}");
+    assert!(!file.exists());
+    // The page has all the rest, and says what is missing.
+    let page = folder.path().join("page.html");
+    let said = json(&["report", text(&map), "-o", text(&page), "--json"]);
+    assert_eq!((said["readable"].as_bool(), said["damage"].as_u64()), (Some(true), Some(1)), "{said}");
+    let page = fs::read_to_string(&page).unwrap();
+    assert!(page.contains("Damaged: 1 findings") && page.contains("iwlo_meta.bin"), "{page}");
+    assert!(page.contains("1 tiles cannot be read"));
+}
+
+#[test]
+fn a_file_of_octomap_has_a_picture_and_no_counts() {
+    let folder = TempDir::new().unwrap();
+    let (map, tree, file) = (map(&folder), folder.path().join("a.bt"), folder.path().join("a.png"));
+    output(&["export", text(&map), "-o", text(&tree)]);
+    let said = json(&["picture", text(&tree), "-o", text(&file), "--json"]);
+    let of_map = json(&["picture", text(&map), "-o", text(&file), "--json"]);
+    assert_eq!(said["solid_cells"], of_map["solid_cells"]);
+    let (code, error) = failure(&["picture", text(&tree), "-o", text(&file), "--color", "count"]);
+    assert!(code == 2 && error.contains("counts"), "{error}");
+}
+
+/// The picture of a map as a terminal gets it, without a terminal.
+fn drawn_by(protocol: &str, map: &Path, variables: &[(&str, &str)]) -> Vec<u8> {
+    let mut command = voxtile(&["picture", text(map), protocol, "--size", "120"]);
+    command.env_remove("COLORTERM").envs(variables.iter().copied());
+    command.assert().success().get_output().stdout.clone()
+}
+
+#[test]
+fn kitty_and_sixels_carry_the_same_pixels() {
+    let folder = TempDir::new().unwrap();
+    let map = map(&folder);
+    let (width, height, pixels) = decoded(&of_kitty(&drawn_by("--kitty", &map, &[])));
+    let (sixel_width, sixel_height, sixels) = of_sixel(&drawn_by("--sixel", &map, &[]));
+    assert_eq!((width, height), (sixel_width, sixel_height));
+    for (at, (pixel, sixel)) in pixels.iter().zip(&sixels).enumerate() {
+        // A channel has a hundred levels in sixels, and few colors stand for many.
+        assert!((0..3).all(|k| pixel[k].abs_diff(sixel[k]) < 18), "pixel {at}: {pixel:?} {sixel:?}");
+    }
+}
+
+#[test]
+fn blocks_carry_two_pixels_each() {
+    let folder = TempDir::new().unwrap();
+    let map = map(&folder);
+    let full = String::from_utf8(drawn_by("--blocks", &map, &[("COLORTERM", "truecolor")])).unwrap();
+    let indexed = String::from_utf8(drawn_by("--blocks", &map, &[])).unwrap();
+    let widths =
+        |text: &str| -> Vec<usize> { text.lines().map(|line| line.matches('▀').count()).collect() };
+    assert_eq!(widths(&full), widths(&indexed));
+    let blocks = widths(&full);
+    assert!(
+        blocks[0] > 20 && blocks[..blocks.len() - 1].iter().all(|&width| width == blocks[0]),
+        "{blocks:?}"
+    );
+    let free = voxtile_render::colors::FREE;
+    assert!(full.contains(&format!("2;{};{};{}", free[0], free[1], free[2])));
+    assert!(indexed.contains("38;5;") && !indexed.contains("38;2;"));
+}
+
+/// The PNG in kitty's sequences.
+fn of_kitty(bytes: &[u8]) -> Vec<u8> {
+    let text = String::from_utf8_lossy(bytes);
+    let pieces = text.split("\x1b_G").skip(1).map(|piece| piece.split("\x1b\\").next().unwrap());
+    let mut bits = (0_u32, 0);
+    let mut png = Vec::new();
+    let mut more = true;
+    for piece in pieces {
+        assert!(more, "a piece after the last");
+        let (keys, data) = piece.split_once(';').unwrap();
+        assert!(data.len() <= 4096);
+        more = keys.contains("m=1");
+        for letter in data.bytes().filter(|&letter| letter != b'=') {
+            let alphabet = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+            let value = alphabet.iter().position(|&known| known == letter).unwrap() as u32;
+            bits = (bits.0 << 6 | value, bits.1 + 6);
+            if bits.1 >= 8 {
+                bits.1 -= 8;
+                png.push((bits.0 >> bits.1) as u8);
+            }
+        }
+    }
+    assert!(!more, "no last piece");
+    png
+}
+
+/// Width, height and pixels of sixels.
+fn of_sixel(bytes: &[u8]) -> (usize, usize, Vec<[u8; 3]>) {
+    let text = String::from_utf8_lossy(bytes);
+    let (_, rest) = text.split_once("\x1bP0;1;0q\"1;1;").unwrap();
+    let (data, _) = rest.split_once("\x1b\\").unwrap();
+    let numbers = |text: &str| -> Vec<usize> { text.split(';').map(|word| word.parse().unwrap()).collect() };
+    let end = data.find('#').unwrap();
+    let size = numbers(&data[..end]);
+    let mut pixels = vec![[1, 2, 3]; size[0] * size[1]];
+    let mut colors: Vec<[u8; 3]> = Vec::new();
+    let (mut x, mut top, mut color, mut repeat) = (0, 0, 0, 1);
+    let mut letters = data[end..].chars().peekable();
+    while let Some(letter) = letters.next() {
+        let mut number = String::new();
+        if letter == '#' || letter == '!' {
+            while let Some(&next) = letters.peek().filter(|next| next.is_ascii_digit() || **next == ';') {
+                number.push(next);
+                letters.next();
+            }
+        }
+        match letter {
+            '#' => {
+                let numbers = numbers(&number);
+                color = numbers[0];
+                if let [_, 2, red, green, blue] = numbers[..] {
+                    assert_eq!(colors.len(), color);
+                    colors.push([red, green, blue].map(|percent| (percent * 255 / 100) as u8));
+                }
+            }
+            '!' => repeat = number.parse().unwrap(),
+            '$' => x = 0,
+            '-' => (x, top) = (0, top + 6),
+            '?'..='~' => {
+                let rows = letter as u8 - 63;
+                for _ in 0..repeat {
+                    for row in (0..6).filter(|row| rows >> row & 1 == 1) {
+                        pixels[x + (top + row) * size[0]] = colors[color];
+                    }
+                    x += 1;
+                }
+                repeat = 1;
+            }
+            other => panic!("{other:?}"),
+        }
+    }
+    (size[0], size[1], pixels)
+}
+
+/// The page is XML, has the numbers of `info`, and nothing in it comes from elsewhere.
+#[test]
+fn a_report_holds_what_info_says() {
+    let folder = TempDir::new().unwrap();
+    let (map, page) = (map(&folder), folder.path().join("page.html"));
+    output(&["snapshot", text(&map), "before"]);
+    output(&["report", text(&map), "-o", text(&page)]);
+    let page = fs::read_to_string(&page).unwrap();
+    check_markup(&page);
+    let info = json(&["info", text(&map), "--json"]);
+    for (name, key) in [
+        ("voxels", "voxels"),
+        ("occupied", "occupied"),
+        ("tiles", "tiles"),
+        ("bytes of tables", "table_bytes"),
+        ("bytes of octrees", "octree_bytes"),
+        ("scans", "scan_number"),
+    ] {
+        let row = format!("<tr><th>{name}</th><td>");
+        let value = page.split_once(&row).unwrap().1.split_once('<').unwrap().0.replace(',', "");
+        assert_eq!(value, info[key].to_string(), "{name}");
+    }
+    assert!(page.contains(info["map_id"].as_str().unwrap()));
+    assert!(page.contains("Whole: every checksum matches") && page.contains("<td>before</td>"));
+    assert_eq!(page.matches("data:image/png;base64,").count(), 2);
+    for outside in ["http://", "https://", "<script", "<link", "@import", "url("] {
+        let page = page.replace("http://www.w3.org/1999/xhtml", "");
+        assert!(!page.contains(outside), "{outside}");
+    }
+    let snapshot = format!("{}@before", text(&map));
+    let other = folder.path().join("snapshot.html");
+    output(&["report", &snapshot, "-o", text(&other), "--no-verify"]);
+    check_markup(&fs::read_to_string(other).unwrap());
+}
+
+#[test]
+fn hostile_names_are_text_in_a_report() {
+    let folder = TempDir::new().unwrap();
+    let scans = scans(&folder);
+    let input = folder.path().join("<img src=x onerror=alert(1)>&");
+    fs::rename(&scans, &input).unwrap();
+    let map = folder.path().join("a<script>alert('1')<&\"b");
+    output(&["build", text(&input), "-o", text(&map)]);
+    let page = folder.path().join("page.html");
+    output(&["report", text(&map), "-o", text(&page)]);
+    let page = fs::read_to_string(&page).unwrap();
+    check_markup(&page);
+    assert!(page.contains("a&lt;script&gt;alert(&#39;1&#39;)&lt;&amp;&quot;b"), "the name as text");
+    assert!(!page.contains("<script") && !page.contains("<img src=x"));
+}
+
+#[test]
+fn maps_without_voxels_and_with_one_have_pictures_and_reports() {
+    let folder = TempDir::new().unwrap();
+    let (png, page) = (folder.path().join("a.png"), folder.path().join("a.html"));
+    let empty = folder.path().join("empty");
+    let config = voxtile::MapConfig::new(0.1, 10.0).unwrap();
+    drop(voxtile::OutOfCoreTileMapper::create(&empty, config).unwrap());
+    let cloud = folder.path().join("one.pcd");
+    let header = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 1\nHEIGHT 1\nDATA ascii\n";
+    fs::write(&cloud, format!("{header}0.04 0.04 0.04\n")).unwrap();
+    let one = folder.path().join("one");
+    output(&["build", text(&cloud), "-o", text(&one), "--no-rays"]);
+    for (map, cells) in [(&empty, 0), (&one, 1)] {
+        let said = json(&["picture", text(map), "-o", text(&png), "--json"]);
+        assert_eq!(said["known_cells"], cells, "{said}");
+        assert!(pixels_of(&png).0 > 100);
+        output(&["report", text(map), "-o", text(&page)]);
+        check_markup(&fs::read_to_string(&page).unwrap());
+        output(&["picture", text(map), "--blocks"]);
+    }
+}
+
+#[test]
+fn a_map_that_does_not_open_has_a_report_of_its_damage() {
+    let folder = TempDir::new().unwrap();
+    let (map, page) = (map(&folder), folder.path().join("page.html"));
+    let log = map.join("commits.log");
+    let mut bytes = fs::read(&log).unwrap();
+    bytes.iter_mut().for_each(|byte| *byte = !*byte);
+    fs::write(&log, bytes).unwrap();
+    let said = json(&["report", text(&map), "-o", text(&page), "--json"]);
+    assert!(said["damage"].as_u64() > Some(0), "{said}");
+    let page = fs::read_to_string(&page).unwrap();
+    check_markup(&page);
+    assert!(page.contains("commits.log"), "{page}");
+    let (code, error) =
+        failure(&["report", text(&folder.path().join("none")), "-o", text(&folder.path().join("x"))]);
+    assert!(code != 0 && error.contains("no map here"), "{error}");
+}
+
+#[test]
+fn info_draws_for_people_alone() {
+    let folder = TempDir::new().unwrap();
+    let map = map(&folder);
+    // Not a terminal.
+    assert!(!output(&["info", text(&map)]).contains('▀'));
+}
+
+/// Every element ends where it should, and every letter that could be markup is.
+fn check_markup(page: &str) {
+    let mut open: Vec<&str> = Vec::new();
+    let body = page.strip_prefix("<!DOCTYPE html>").unwrap();
+    for piece in body.split('<').skip(1) {
+        let (tag, content) = piece.split_once('>').unwrap();
+        // No attribute holds an angle bracket, or the tag would end within a quote.
+        assert_eq!(tag.matches('"').count() % 2, 0, "<{tag}>");
+        if let Some(name) = tag.strip_prefix('/') {
+            assert_eq!(open.pop(), Some(name));
+        } else if !tag.ends_with('/') {
+            open.push(tag.split_whitespace().next().unwrap());
+        }
+        assert!(!content.contains('>') || open.last() == Some(&"style"), "{content}");
+        for entity in content.split('&').skip(1) {
+            assert!(
+                ["amp;", "lt;", "gt;", "quot;", "#39;"].iter().any(|known| entity.starts_with(known)),
+                "{entity}"
+            );
+        }
+        assert!(content.chars().all(|letter| !letter.is_control() || letter == '\n'));
+    }
+    assert!(open.is_empty(), "{open:?}");
+}

@@ -1,0 +1,43 @@
+//! The command, as a person or a program runs it.
+
+/// The command as a person types it.
+mod cli;
+/// The commands that merge, crop, clear and fade.
+mod cli_edit;
+/// Files that are exported: whole or not there, where they say, and no stranger's.
+mod cli_export;
+/// Files of other programs, in and out.
+mod cli_formats;
+/// Help, man pages and completion scripts.
+mod cli_help;
+/// What `--json` prints: the version, shapes of places and boxes, failures.
+mod cli_json;
+/// The local map, by the command.
+mod cli_local;
+/// What `-q`, `-v` and `RUST_LOG` say beside the answer.
+mod cli_log;
+/// Pictures, in files and for terminals, and reports.
+mod cli_pictures;
+/// Poses that come with files, beside them or by options.
+mod cli_poses;
+/// Maps of a region from the command line.
+mod cli_region;
+/// Maps that follow new poses, by the command.
+mod cli_remap;
+/// The stream of scans, from standard input.
+mod cli_scan_stream;
+/// Snapshots from the command line.
+mod cli_snapshots;
+/// Recordings with damaged chunks.
+#[cfg(feature = "ros")]
+mod damaged_recordings;
+/// Builds that are resumed, maps that are verified and repaired, from the command line.
+mod interrupted;
+/// Messages of ROS that tests make.
+#[cfg(feature = "ros")]
+#[allow(dead_code)]
+#[path = "../../../formats/tests/made/message.rs"]
+mod message;
+/// Maps in a browser, by what the server sends.
+#[cfg(all(feature = "view", target_os = "linux"))]
+mod view;

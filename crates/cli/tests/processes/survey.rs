@@ -1,0 +1,211 @@
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+use tempfile::TempDir;
+use voxtile::{InMemoryMapper, MapConfig, MapQueries, Mapper, Scan};
+use voxtile_formats::{ScanStreamWriter, open_scans};
+use voxtile_simulation::{City, Drive, Lidar, Survey};
+
+/// A folder of scans, and the digest of their map after each number of them.
+pub struct Scans {
+    pub folder: TempDir,
+    pub digests: Vec<String>,
+}
+
+pub const RESOLUTION_M: f64 = 0.5;
+const MAX_RANGE_M: f64 = 20.0;
+
+impl Scans {
+    /// So many scans of a drive through a made-up city, mapped `rounds` times one after the other.
+    pub fn new(count: usize, rounds: usize) -> Self {
+        let folder = TempDir::new().unwrap();
+        let survey = Survey::new(City::new(3), Drive::new(3, 2.0), Lidar::demo(), 3);
+        for (number, scan) in survey.take(count).enumerate() {
+            let points: Vec<_> = scan.points.iter().step_by(9).collect();
+            fs::write(folder.path().join(format!("{number:04}.pcd")), pcd(scan.origin, &points)).unwrap();
+        }
+        let config = MapConfig::new(RESOLUTION_M, 10.0).unwrap().with_range(0.0, MAX_RANGE_M);
+        let mut mapper = InMemoryMapper::new(config).unwrap();
+        let mut digests = vec![mapper.digest().unwrap().to_string()];
+        for _ in 0..rounds {
+            let mut source = open_scans(folder.path(), None).unwrap();
+            while let Some(scan) = source.next_scan().unwrap() {
+                mapper.insert_scan(&scan.into_scan()).unwrap();
+                digests.push(mapper.digest().unwrap().to_string());
+            }
+        }
+        Self { folder, digests }
+    }
+
+    /// The command that builds the map with little memory, so that it evicts all the while.
+    pub fn build(&self, map: &Path, how: &[&str]) -> Command {
+        let mut command = voxtile();
+        let resolution = RESOLUTION_M.to_string();
+        let range = MAX_RANGE_M.to_string();
+        command.arg("build").arg(self.folder.path()).arg("-o").arg(map);
+        command.args(["--resolution", &resolution, "--max-range", &range, "--cache-tiles", "4"]);
+        command.args(how).stdout(Stdio::null()).stderr(Stdio::piped());
+        command
+    }
+}
+
+/// The command under test.
+pub fn voxtile() -> Command {
+    Command::new(env!("CARGO_BIN_EXE_voxtile"))
+}
+
+/// The same command, with a limit of the shell's (`ulimit`): files (`n`), KiB of addresses (`v`). What it aborts with
+/// stays short.
+pub fn limited(command: &Command, of: char, limit: u64) -> Command {
+    let mut limited = Command::new("sh");
+    limited.args(["-c", &format!("ulimit -c 0; ulimit -{of} $0 && exec \"$@\"")]).arg(limit.to_string());
+    limited.arg(command.get_program()).args(command.get_args());
+    limited.env("RUST_BACKTRACE", "0");
+    limited
+}
+
+/// Scan number and digest of a map, from a process of its own.
+pub fn digest(map: &Path) -> Result<(usize, String), String> {
+    let output = voxtile().arg("digest").arg(map).arg("--json").output().unwrap();
+    if !output.status.success() {
+        return Err(String::from_utf8_lossy(&output.stderr).into_owned());
+    }
+    let answer: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let scan_number = answer["scan_number"].as_u64().unwrap() as usize;
+    Ok((scan_number, answer["digest"].as_str().unwrap().to_owned()))
+}
+
+/// Whether `voxtile verify` finds the map whole.
+pub fn is_whole(map: &Path) -> bool {
+    voxtile().arg("verify").arg(map).stdout(Stdio::null()).status().unwrap().success()
+}
+
+/// A number from the environment, or the short form's.
+pub fn setting(name: &str, short: u64) -> u64 {
+    std::env::var(name).map_or(short, |value| value.parse().expect("a number"))
+}
+
+/// A place for maps on the disk that is built on, which syncs are real on.
+pub fn folder_for_maps() -> (TempDir, PathBuf) {
+    let folder = TempDir::new_in(env!("CARGO_TARGET_TMPDIR")).unwrap();
+    let map = folder.path().join("map");
+    (folder, map)
+}
+
+fn pcd(origin: [f64; 3], points_in_world: &[&[f64; 3]]) -> Vec<u8> {
+    let [x, y, z] = origin;
+    let count = points_in_world.len();
+    let header = format!(
+        "VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH {count}\nHEIGHT 1\n\
+         VIEWPOINT {x} {y} {z} 1 0 0 0\nPOINTS {count}\nDATA binary\n"
+    );
+    let mut bytes = header.into_bytes();
+    for point in points_in_world {
+        for axis in 0..3 {
+            bytes.extend_from_slice(&((point[axis] - origin[axis]) as f32).to_le_bytes());
+        }
+    }
+    bytes
+}
+
+/// A build of scans that this process writes into it, one by one.
+pub struct StreamedBuild {
+    pub child: Child,
+    writer: ScanStreamWriter<ChildStdin>,
+}
+
+impl StreamedBuild {
+    /// So many scans of a drive, as their stream keeps them: to a few digits.
+    pub fn scans(seed: u64, count: usize) -> Vec<Scan> {
+        Survey::tour(seed, 300).take(count).collect()
+    }
+
+    /// A build that keeps few tiles in memory.
+    pub fn spawn(map: &Path, how: &[&str]) -> Self {
+        let resolution = RESOLUTION_M.to_string();
+        let few = ["--resolution", &resolution, "--cache-tiles", "4"];
+        Self::spawn_with(map, &[&few[..], how].concat())
+    }
+
+    pub fn spawn_with(map: &Path, how: &[&str]) -> Self {
+        let mut command = voxtile();
+        command.args(["build", "-", "-o"]).arg(map).args(how);
+        command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped());
+        let mut child = command.spawn().unwrap();
+        let writer = ScanStreamWriter::new(child.stdin.take().unwrap(), "drive", false).unwrap();
+        Self { child, writer }
+    }
+
+    pub fn write(&mut self, scans: &[Scan]) {
+        scans.iter().for_each(|scan| self.writer.write_world(scan).unwrap());
+        self.writer.flush().unwrap();
+    }
+
+    /// Ends the input and waits for the build.
+    pub fn end(self) -> ExitStatus {
+        let Self { mut child, writer } = self;
+        drop(writer);
+        child.wait().unwrap()
+    }
+
+    pub fn kill(mut self) {
+        self.child.kill().unwrap();
+        self.child.wait().unwrap();
+    }
+
+    /// The digest of the map of these scans, from a build that nothing disturbs.
+    pub fn digest_of(scans: &[Scan]) -> String {
+        let (_folder, map) = folder_for_maps();
+        let mut build = Self::spawn(&map, &[]);
+        build.write(scans);
+        assert!(build.end().success());
+        digest(&map).unwrap().1
+    }
+}
+
+/// Waits for something that comes sooner or later, on a busy machine much later.
+pub fn wait_until(what: &str, mut is_so: impl FnMut() -> bool) {
+    const PATIENCE: Duration = Duration::from_secs(300);
+    let begun = Instant::now();
+    while !is_so() {
+        assert!(begun.elapsed() < PATIENCE, "waited in vain: {what}");
+        sleep(Duration::from_millis(2));
+    }
+}
+
+/// What a map's metadata says, if there is a map: it is replaced whole.
+fn metadata(map: &Path) -> Option<serde_json::Value> {
+    let text = fs::read_to_string(map.join("metadata.json")).ok()?;
+    Some(serde_json::from_str(&text).expect("metadata are JSON at all times"))
+}
+
+/// Number of the last scan in a map's last flush; `None` while there is no map.
+pub fn flushed_scans(map: &Path) -> Option<u64> {
+    metadata(map)?.pointer("/ext/scan_number")?.as_u64()
+}
+
+/// How many inputs a map knows.
+pub fn inputs(map: &Path) -> usize {
+    let inputs = metadata(map).and_then(|metadata| Some(metadata.pointer("/ext/inputs")?.as_array()?.len()));
+    inputs.unwrap_or(0)
+}
+
+/// Whether a process has said that it wants to hear of SIGINT and SIGTERM; where the system does not tell, it is waited
+/// for a while.
+pub fn signals_are_caught(process: u32) -> bool {
+    let Ok(status) = fs::read_to_string(format!("/proc/{process}/status")) else {
+        sleep(Duration::from_millis(500));
+        return true;
+    };
+    let caught = status.lines().find_map(|line| line.strip_prefix("SigCgt:"));
+    let caught = caught.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0);
+    [2, 15].iter().all(|signal| caught & (1 << (signal - 1)) != 0)
+}
+
+/// Sends a signal to a process of ours.
+pub fn signal(child: &Child, name: &str) {
+    let status = Command::new("kill").args([&format!("-{name}"), &child.id().to_string()]).status();
+    assert!(status.is_ok());
+}

@@ -1,0 +1,21 @@
+use super::matrix::matrix_of;
+use crate::clouds::error::{Error, Place, Result};
+use crate::clouds::lines::Lines;
+use crate::clouds::pose::RigidPose;
+use std::path::Path;
+
+/// The pose of the lidar in the camera of a KITTI sequence: the line `Tr:` of its `calib.txt`.
+pub(super) fn read(path: &Path) -> Result<RigidPose> {
+    let mut lines = Lines::open(path)?;
+    while let Some((_, line)) = lines.next()? {
+        let Some((name, numbers)) = line.split_once(':') else { continue };
+        if !matches!(name.trim(), "Tr" | "Tr_velo_to_cam" | "Tr_velo_cam") {
+            continue;
+        }
+        let words = numbers.split_ascii_whitespace();
+        let numbers: std::result::Result<Vec<f64>, _> = words.map(str::parse).collect();
+        let numbers = numbers.map_err(|_| lines.error("what follows `Tr:` are not 12 numbers"))?;
+        return matrix_of(&numbers).map_err(|reason| lines.error(reason));
+    }
+    Err(Error::format(path, Place::Line(1), "no line starts with `Tr:`, the pose of the lidar in the camera"))
+}

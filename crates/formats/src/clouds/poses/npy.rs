@@ -1,0 +1,114 @@
+use super::matrix::matrix_of;
+use super::pose_input::PoseInput;
+use super::pose_rows::{PoseRows, Row};
+use super::text::pose;
+use super::time_unit::{digits_of_value, stamp_of_value};
+use crate::clouds::error::{Error, Place, Result};
+use std::io::Read;
+use std::path::Path;
+
+const MAGIC: &[u8] = b"\x93NUMPY";
+const NO_ARRAY: &str = "is no array of NumPy, which its name says: save it with numpy.save, or give a text of poses a \
+                        name that ends with .txt or .csv";
+const CUT_HEADER: &str = "the file ends within its header; copy or save it again";
+/// A longer header is an error.
+const MOST_HEADER_BYTES: usize = 1 << 16;
+
+/// Whether a file that starts like this is an array of NumPy, or is named as one.
+pub(super) fn is_npy(path: &Path, head: &[u8]) -> bool {
+    head.starts_with(MAGIC) || path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("npy"))
+}
+
+/// Takes the poses of an array: N x 8 of TUM, N x 12, N x 16, N x 3 x 4 or N x 4 x 4.
+pub(super) fn read(path: &Path, mut input: PoseInput, poses: &mut PoseRows) -> Result<()> {
+    let fail = |error| Error::io(path, "read", error);
+    let wrong = |at: u64, reason: String| Error::format(path, Place::Byte(at), reason);
+    let mut start = Vec::new();
+    (&mut input).take(8).read_to_end(&mut start).map_err(fail)?;
+    let version = match *start.as_slice() {
+        [.., version, _] if start.len() == 8 && start.starts_with(MAGIC) => version,
+        _ => return Err(wrong(0, NO_ARRAY.into())),
+    };
+    if !(1..=3).contains(&version) {
+        let reason = "its version is none of 1, 2 and 3; save it again with numpy.save";
+        return Err(wrong(6, reason.into()));
+    }
+    let is_long = version >= 2;
+    let mut length = [0; 4];
+    let length_bytes = if is_long { &mut length[..] } else { &mut length[..2] };
+    input.read_exact(length_bytes).map_err(|_| wrong(8, CUT_HEADER.into()))?;
+    let header_bytes = u32::from_le_bytes(length) as usize;
+    if header_bytes > MOST_HEADER_BYTES {
+        return Err(wrong(8, format!("a header of {header_bytes} bytes is no header")));
+    }
+    let mut header = vec![0; header_bytes];
+    input.read_exact(&mut header).map_err(|_| wrong(8, CUT_HEADER.into()))?;
+    let header = String::from_utf8_lossy(&header).into_owned();
+    let (width, rows, columns) = layout(&header).map_err(|reason| wrong(10, reason))?;
+    let data_at = 8 + if is_long { 4 } else { 2 } + header_bytes as u64;
+    let (mut record, mut numbers, mut digits) = (vec![0; columns * width], Vec::new(), None);
+    for row in 0..rows {
+        let at = data_at.saturating_add(row.saturating_mul((columns * width) as u64));
+        input
+            .read_exact(&mut record)
+            .map_err(|_| wrong(at, format!("the file ends after {row} of {rows} poses")))?;
+        numbers.clear();
+        numbers.extend(record.chunks_exact(width).map(|bytes| match *bytes {
+            [a, b, c, d] => f64::from(f32::from_le_bytes([a, b, c, d])),
+            [a, b, c, d, e, f, g, h] => f64::from_le_bytes([a, b, c, d, e, f, g, h]),
+            _ => f64::NAN,
+        }));
+        let bad = |reason: String| Error::format(path, Place::Record(row), reason);
+        if !numbers.iter().all(|number| number.is_finite()) {
+            return Err(bad("a number is not finite".into()));
+        }
+        let row = match *numbers.as_slice() {
+            [stamp, x, y, z, qx, qy, qz, qw] => {
+                let digits = *digits.get_or_insert_with(|| digits_of_value(stamp));
+                let stamp_ns =
+                    stamp_of_value(stamp, digits).ok_or_else(|| bad(format!("{stamp} is no time stamp")))?;
+                Row { stamp_ns: Some(stamp_ns), pose: pose([x, y, z, qx, qy, qz, qw]).map_err(bad)? }
+            }
+            _ => Row { stamp_ns: None, pose: matrix_of(&numbers).map_err(bad)? },
+        };
+        poses.push(row)?;
+    }
+    Ok(())
+}
+
+/// Bytes of a number, rows, numbers in a row.
+fn layout(header: &str) -> std::result::Result<(usize, u64, usize), String> {
+    let value = |key: &str| header.split_once(key).map(|(_, rest)| rest.trim_start_matches([':', ' ']));
+    let Some(descr) = value("'descr'") else {
+        return Err("its header names no type ('descr'); save it again with numpy.save".into());
+    };
+    if descr.starts_with('[') {
+        let reason = "is a structured array; save a plain one: \
+                      numpy.lib.recfunctions.structured_to_unstructured(poses)";
+        return Err(reason.into());
+    }
+    let kind = descr.split('\'').nth(1).unwrap_or_default();
+    let width = match kind {
+        "<f8" => 8,
+        "<f4" => 4,
+        other => {
+            return Err(format!(
+                "numbers of type `{other}`; poses are little-endian floats: save it with astype('<f8')"
+            ));
+        }
+    };
+    if value("'fortran_order'").is_some_and(|rest| rest.starts_with("True")) {
+        return Err("is in Fortran order; save numpy.ascontiguousarray(poses)".into());
+    }
+    let shape =
+        value("'shape'").and_then(|rest| rest.strip_prefix('(')?.split(')').next()).unwrap_or_default();
+    let sides: Vec<u64> = shape.split(',').filter_map(|side| side.trim().parse().ok()).collect();
+    match *sides.as_slice() {
+        [rows, 8] => Ok((width, rows, 8)),
+        [rows, 12] | [rows, 3, 4] => Ok((width, rows, 12)),
+        [rows, 16] | [rows, 4, 4] => Ok((width, rows, 16)),
+        _ => Err(format!(
+            "has the shape ({shape}); poses are N x 8 (t x y z qx qy qz qw), N x 3 x 4 or N x 4 x 4"
+        )),
+    }
+}

@@ -1,0 +1,250 @@
+use super::gap::most_gap_ns;
+use super::pose_input::PoseInput;
+use super::pose_rows::{PoseRows, Stamps};
+use super::{npy, text};
+use crate::clouds::cloud::CloudSource;
+use crate::clouds::error::{Error, Result};
+use crate::clouds::pose::RigidPose;
+use crate::clouds::spill::{Budget, PoseList};
+use std::path::{Path, PathBuf};
+
+/// Poses of a sensor, sensor to world, in the order of their file and by time. Many are in a temporary file.
+#[derive(Clone, Debug, Default)]
+pub struct Trajectory {
+    path: PathBuf,
+    /// In the order of the file.
+    poses: PoseList,
+    /// In strict order of time, where that is another order.
+    by_time: Option<PoseList>,
+    has_stamps: bool,
+    /// Number of the first pose whose stamp is earlier than the one before, from 1.
+    goes_back: Option<u64>,
+    /// Poses are of a camera; those of the lidar are `[0] * pose * [1]`.
+    lidar: Option<[RigidPose; 2]>,
+    /// How far a stamp may be from the time that it was rounded from.
+    rounding_ns: u64,
+    remarks: Vec<String>,
+}
+
+/// What a trajectory knows of a time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Found {
+    /// A pose with this very stamp, as it was written.
+    Exact(RigidPose),
+    /// Between two poses: positions along a line, rotations at constant speed.
+    Between(RigidPose),
+    /// The poses before and after are too far apart for the tolerance.
+    Gap {
+        /// Nanoseconds from one to the other.
+        gap_ns: u64,
+    },
+    /// Before the first pose.
+    Before {
+        /// Its stamp.
+        first_ns: i64,
+    },
+    /// After the last pose.
+    After {
+        /// Its stamp.
+        last_ns: i64,
+    },
+    /// The file has no stamps: its poses are known by number only.
+    WithoutStamps,
+}
+
+impl Trajectory {
+    /// Reads a file of poses: TUM (`t x y z qx qy qz qw`), KITTI (12 numbers of a 3x4 matrix), matrices of 4x4, tables
+    /// with names of columns (EuRoC, exports of ROS), arrays of NumPy (`.npy`) of N x 8, N x 3 x 4 or N x 4 x 4.
+    ///
+    /// Stamps are seconds; of nanoseconds, if their column says so or they would lie thousands of years ahead.
+    /// `calib` is the `calib.txt` of a KITTI sequence, whose poses are of the camera: they become those of the lidar.
+    ///
+    /// # Errors
+    ///
+    /// It cannot be read; a line that is no pose, with its number; no pose at all.
+    pub fn read(path: &Path, calib: Option<&Path>) -> Result<Self> {
+        Self::read_within(path, calib, &Budget::default())
+    }
+
+    /// As [`Trajectory::read`], in so much memory. Each pose takes 64 bytes, of memory or of a temporary file.
+    ///
+    /// # Errors
+    ///
+    /// As for [`Trajectory::read`]; a temporary file that cannot be written.
+    pub fn read_within(path: &Path, calib: Option<&Path>, budget: &Budget) -> Result<Self> {
+        let mut rows = PoseRows::new(budget);
+        let input = PoseInput::open(path)?;
+        if npy::is_npy(path, input.head()) {
+            npy::read(path, input, &mut rows)?
+        } else {
+            text::read(path, input, &mut rows)?
+        }
+        let Some(mut trajectory) = rows.finish(path)? else {
+            return Err(Error::argument(path.display().to_string(), "holds no pose"));
+        };
+        if let Some(calib) = calib {
+            let camera_from_lidar = super::calib::read(calib)?;
+            trajectory.lidar = Some([camera_from_lidar.inverse(), camera_from_lidar]);
+        }
+        Ok(trajectory)
+    }
+
+    pub(super) fn new(path: &Path, poses: PoseList, by_time: Option<PoseList>, stamps: Stamps) -> Self {
+        let Stamps { has_stamps, goes_back, rounding_ns, remarks } = stamps;
+        Self {
+            path: path.to_owned(),
+            poses,
+            by_time,
+            has_stamps,
+            goes_back,
+            lidar: None,
+            rounding_ns,
+            remarks,
+        }
+    }
+
+    /// The pose at a time. Between two poses there is one if they are at most twice the tolerance apart, see
+    /// [`most_gap_ns`]; none is ever extrapolated.
+    /// A time that is before the first stamp or after the last one only because that was rounded has the pose there.
+    ///
+    /// # Errors
+    ///
+    /// A temporary file that cannot be read.
+    pub fn at(&self, stamp_ns: i64, tolerance_ns: i64) -> Result<Found> {
+        let Some(poses) = self.stamped() else { return Ok(Found::WithoutStamps) };
+        let after = poses.before(stamp_ns)?;
+        let later = poses.get(after)?;
+        let earlier = after.checked_sub(1).map(|before| poses.get(before)).transpose()?.flatten();
+        Ok(match (earlier, later) {
+            (_, Some(same)) if same.stamp_ns == stamp_ns => Found::Exact(self.of_lidar(same.pose)),
+            (Some(before), Some(after)) => {
+                let gap_ns = before.stamp_ns.abs_diff(after.stamp_ns);
+                if gap_ns > most_gap_ns(tolerance_ns).unsigned_abs() {
+                    return Ok(Found::Gap { gap_ns });
+                }
+                let share = before.stamp_ns.abs_diff(stamp_ns) as f64 / gap_ns as f64;
+                let [before, after] = [before, after].map(|timed| self.of_lidar(timed.pose));
+                Found::Between(before.towards(&after, share))
+            }
+            (None, Some(end)) | (Some(end), None) if end.stamp_ns.abs_diff(stamp_ns) <= self.rounding_ns => {
+                Found::Exact(self.of_lidar(end.pose))
+            }
+            (None, Some(first)) => Found::Before { first_ns: first.stamp_ns },
+            (Some(last), None) => Found::After { last_ns: last.stamp_ns },
+            (None, None) => Found::WithoutStamps,
+        })
+    }
+
+    /// The poses in strict order of time, if they have stamps.
+    fn stamped(&self) -> Option<&PoseList> {
+        self.has_stamps.then(|| self.by_time.as_ref().unwrap_or(&self.poses))
+    }
+
+    fn of_lidar(&self, pose: RigidPose) -> RigidPose {
+        self.lidar.map_or(pose, |[before, after]| before.then(&pose).then(&after))
+    }
+
+    /// The pose of a number, from 0, in the order of the file.
+    ///
+    /// # Errors
+    ///
+    /// A temporary file that cannot be read.
+    pub fn by_number(&self, number: usize) -> Result<Option<RigidPose>> {
+        Ok(self.poses.get(number)?.map(|timed| self.of_lidar(timed.pose)))
+    }
+
+    /// The pose of a cloud by its number, from 0, where stamps do not tell it.
+    ///
+    /// # Errors
+    ///
+    /// Not as many poses as clouds: which belong together is not known then; a temporary file that cannot be read.
+    pub fn of_cloud(&self, number: u64, source: &dyn CloudSource) -> Result<RigidPose> {
+        self.check_clouds(source)?;
+        self.check_order()?;
+        let pose = usize::try_from(number).ok().map(|number| self.by_number(number)).transpose()?.flatten();
+        pose.ok_or_else(|| self.other_number(&format!("at least {} clouds", number.saturating_add(1))))
+    }
+
+    /// Checks that there are as many poses as clouds, if that number is known before they are read.
+    ///
+    /// # Errors
+    ///
+    /// There are not.
+    pub fn check_clouds(&self, source: &dyn CloudSource) -> Result<()> {
+        let Some(clouds) = source.len_hint().filter(|clouds| *clouds != self.len() as u64) else {
+            return Ok(());
+        };
+        // A file that is no cloud is often at an end of the list.
+        let named = source.ends().map(|[first, last]| format!(" ({first} to {last})")).unwrap_or_default();
+        Err(self.other_number(&format!("{clouds} clouds{named}")))
+    }
+
+    /// Checks that the poses may be taken line by line, for clouds that have no time stamps: stamps that go back tell
+    /// that the lines are in another order than the clouds.
+    ///
+    /// # Errors
+    ///
+    /// A time stamp is earlier than the one before.
+    pub fn check_order(&self) -> Result<()> {
+        let Some(number) = self.goes_back else { return Ok(()) };
+        let reason = format!(
+            "its time stamps go back (pose {number} is earlier than the one before), but there are no time stamps of \
+             clouds to compare with, and line by line these are the poses of the clouds in their order: put the lines \
+             in that order (stamps that mean nothing may all be 0)"
+        );
+        Err(Error::argument(self.path.display().to_string(), reason))
+    }
+
+    /// Whether a time stamp is earlier than the one before.
+    pub fn goes_back(&self) -> bool {
+        self.goes_back.is_some()
+    }
+
+    fn other_number(&self, clouds: &str) -> Error {
+        let reason = format!(
+            "{} poses for {clouds}, which have no time stamps in common: there must be one pose a cloud, in \
+             their order (files in the natural order of their names, scan2 before scan10)",
+            self.len()
+        );
+        Error::argument(self.path.display().to_string(), reason)
+    }
+
+    /// Number of poses in the file.
+    pub fn len(&self) -> usize {
+        self.poses.len()
+    }
+
+    /// Whether there is no pose.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// First and last time stamp, if poses have stamps.
+    ///
+    /// # Errors
+    ///
+    /// A temporary file that cannot be read.
+    pub fn span_ns(&self) -> Result<Option<[i64; 2]>> {
+        let Some(poses) = self.stamped() else { return Ok(None) };
+        let (first, last) = (poses.get(0)?, poses.get(poses.len().saturating_sub(1))?);
+        Ok(first.zip(last).map(|(first, last)| [first.stamp_ns, last.stamp_ns]))
+    }
+
+    /// Whether poses have stamps; they are known by number only otherwise.
+    pub fn has_stamps(&self) -> bool {
+        self.has_stamps
+    }
+
+    /// The different stamps, in order.
+    pub fn stamps_ns(&self) -> impl Iterator<Item = Result<i64>> + '_ {
+        let poses = self.stamped();
+        let count = poses.map_or(0, PoseList::len);
+        let stamps = poses.map(move |poses| (0..count).map(|number| poses.get(number)));
+        stamps.into_iter().flatten().filter_map(|timed| timed.map(|timed| Some(timed?.stamp_ns)).transpose())
+    }
+
+    /// What a person should know of the file.
+    pub fn remarks(&self) -> &[String] {
+        &self.remarks
+    }
+}

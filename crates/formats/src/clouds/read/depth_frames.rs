@@ -1,0 +1,144 @@
+use super::intrinsics::Intrinsics;
+use super::one::Visit;
+use super::regular::check_regular;
+use crate::clouds::cloud::{CloudHead, CloudPoint, CloudSource};
+use crate::clouds::error::{Error, Place, Result};
+use std::fs::File;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+
+/// A depth image before it is read.
+pub(super) struct Frame {
+    pub(super) path: PathBuf,
+    pub(super) head: CloudHead,
+}
+
+/// Tells the frames one after the other, with their poses and what there is to say of them.
+pub(super) trait Frames: Send {
+    fn next(&mut self) -> Result<Option<Frame>>;
+
+    fn len_hint(&self) -> Option<u64> {
+        None
+    }
+
+    fn remarks(&self) -> Vec<String> {
+        Vec::new()
+    }
+}
+
+/// How depths are written.
+#[derive(Clone, Copy)]
+pub(super) struct DepthCode {
+    pub(super) camera: Intrinsics,
+    /// Units in a metre.
+    pub(super) scale: f64,
+    /// Whether the largest value, beside 0, means that nothing came back.
+    pub(super) is_largest_invalid: bool,
+}
+
+/// Clouds of depth images.
+pub(super) struct DepthFrames {
+    format: String,
+    frames: Box<dyn Frames>,
+    code: DepthCode,
+    current: Option<PathBuf>,
+}
+
+impl DepthFrames {
+    pub(super) fn new(format: String, frames: Box<dyn Frames>, code: DepthCode) -> Self {
+        Self { format, frames, code, current: None }
+    }
+}
+
+impl CloudSource for DepthFrames {
+    fn format(&self) -> &str {
+        &self.format
+    }
+
+    fn len_hint(&self) -> Option<u64> {
+        self.frames.len_hint()
+    }
+
+    fn next_cloud(&mut self) -> Result<Option<CloudHead>> {
+        self.current = None;
+        let Some(frame) = self.frames.next()? else { return Ok(None) };
+        let mut head = frame.head;
+        let (width, height) = size(&open(&frame.path)?);
+        head.points = Some(u64::from(width) * u64::from(height));
+        head.fields = vec!["depth".into()];
+        self.current = Some(frame.path);
+        Ok(Some(head))
+    }
+
+    fn read_points(&mut self, visit: Visit<'_>) -> Result<()> {
+        match self.current.take() {
+            Some(path) => read(&path, &self.code, visit),
+            None => Ok(()),
+        }
+    }
+
+    fn remarks(&self) -> Vec<String> {
+        self.frames.remarks()
+    }
+}
+
+/// Memory of the decoder, which holds a few rows: images may be a million pixels wide.
+const MAX_DECODER_BYTES: usize = 8 << 20;
+
+type Reader = png::Reader<BufReader<File>>;
+
+fn size(reader: &Reader) -> (u32, u32) {
+    (reader.info().width, reader.info().height)
+}
+
+fn open(path: &Path) -> Result<Reader> {
+    check_regular(path)?;
+    let file = File::open(path).map_err(|error| Error::io(path, "read", error))?;
+    let limits = png::Limits { bytes: MAX_DECODER_BYTES };
+    let mut decoder = png::Decoder::new_with_limits(BufReader::with_capacity(1 << 16, file), limits);
+    decoder.set_ignore_text_chunk(true);
+    decoder.set_ignore_iccp_chunk(true);
+    decoder.set_transformations(png::Transformations::IDENTITY);
+    let reader = decoder.read_info().map_err(|error| wrong(path, &error))?;
+    let info = reader.info();
+    let refuse = |reason: String| Err(Error::format(path, Place::Byte(16), reason));
+    if (info.bit_depth, info.color_type) != (png::BitDepth::Sixteen, png::ColorType::Grayscale) {
+        return refuse(format!(
+            "is no depth image: those are grey with 16 bits, this one is {:?} with {:?}",
+            info.color_type, info.bit_depth
+        ));
+    }
+    if info.interlaced {
+        return refuse("is interlaced; save it without".into());
+    }
+    Ok(reader)
+}
+
+fn wrong(path: &Path, error: &png::DecodingError) -> Error {
+    Error::format(path, Place::Byte(0), error.to_string())
+}
+
+/// Reads an image row by row: each pixel is a point, or the direction in which nothing came back.
+fn read(path: &Path, code: &DepthCode, visit: Visit<'_>) -> Result<()> {
+    let mut reader = open(path)?;
+    let (_, height) = size(&reader);
+    for row in 0..height {
+        let damaged = |reason: String| {
+            Error::format(path, Place::Record(u64::from(row)), format!("row {row} of {height}: {reason}"))
+        };
+        let pixels = match reader.next_row() {
+            Ok(Some(pixels)) => pixels,
+            Ok(None) => return Err(damaged("it is missing".into())),
+            Err(error) => return Err(damaged(error.to_string())),
+        };
+        for (column, pixel) in pixels.data().as_chunks::<2>().0.iter().enumerate() {
+            let raw = u16::from_be_bytes(*pixel);
+            let direction = code.camera.direction(column as f64, f64::from(row));
+            let is_return = raw != 0 && !(code.is_largest_invalid && raw == u16::MAX);
+            let depth_m = if is_return { f64::from(raw) / code.scale } else { 1.0 };
+            let position_m = direction.map(|axis| axis * depth_m);
+            visit(CloudPoint { is_return, ..CloudPoint::hit(position_m) })?;
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,89 @@
+use super::depth_frames::{DepthCode, DepthFrames, Frame, Frames};
+use super::format::Format;
+use super::intrinsics::Intrinsics;
+use super::one::head_of;
+use super::options::OpenOptions;
+use super::regular::check_regular;
+use crate::clouds::cloud::CloudSource;
+use crate::clouds::error::{Error, Place, Result};
+use crate::clouds::pose::RigidPose;
+use crate::clouds::poses::matrix_of;
+use std::path::{Path, PathBuf};
+
+/// Depth images in the order of their names, each perhaps with a pose beside it: `frame-000000.pose.txt`.
+struct ImageFrames {
+    files: u64,
+    paths: std::vec::IntoIter<PathBuf>,
+    lost: u64,
+}
+
+/// Units of a depth image in a metre: millimetres.
+const SCALE: f64 = 1000.0;
+/// A file of a pose is small.
+const MOST_POSE_BYTES: u64 = 1 << 14;
+
+/// Opens a folder of depth images.
+pub(super) fn open(
+    folder: &Path,
+    paths: Vec<PathBuf>,
+    options: &OpenOptions,
+) -> Result<Box<dyn CloudSource>> {
+    if paths.is_empty() {
+        return Err(Error::argument(folder.display().to_string(), "no file in it ends with .png"));
+    }
+    let camera = match options.intrinsics {
+        Some(camera) => camera,
+        None => Intrinsics::find(folder, options.intrinsics_path.as_deref())?,
+    };
+    let code = DepthCode { camera, scale: options.depth_scale.unwrap_or(SCALE), is_largest_invalid: true };
+    let frames = ImageFrames { files: paths.len() as u64, paths: paths.into_iter(), lost: 0 };
+    Ok(Box::new(DepthFrames::new(Format::DepthImages.to_string(), Box::new(frames), code)))
+}
+
+impl Frames for ImageFrames {
+    fn next(&mut self) -> Result<Option<Frame>> {
+        let Some(path) = self.paths.next() else { return Ok(None) };
+        let mut head = head_of(&path);
+        let stem = head.name.trim_end_matches(".png").trim_end_matches(".depth").to_owned();
+        let beside = path.with_file_name(format!("{stem}.pose.txt"));
+        check_regular(&beside)?;
+        if beside.is_file() {
+            head.world_from_sensor = pose(&beside)?;
+            self.lost += u64::from(head.world_from_sensor.is_none());
+        }
+        Ok(Some(Frame { path, head }))
+    }
+
+    fn len_hint(&self) -> Option<u64> {
+        Some(self.files)
+    }
+
+    fn remarks(&self) -> Vec<String> {
+        let lost = self.lost;
+        let remark = format!("{lost} images have a pose that is not a number: tracking was lost there");
+        if lost == 0 { Vec::new() } else { vec![remark] }
+    }
+}
+
+/// The pose of the camera in the world: a matrix of 4x4. `None` where tracking was lost.
+fn pose(path: &Path) -> Result<Option<RigidPose>> {
+    use std::io::Read;
+    let mut text = String::new();
+    std::fs::File::open(path)
+        .and_then(|file| file.take(MOST_POSE_BYTES).read_to_string(&mut text))
+        .map_err(|error| Error::io(path, "read", error))?;
+    let wrong = |reason: String| Error::format(path, Place::Line(1), reason);
+    let mut numbers = Vec::new();
+    for word in text.split_ascii_whitespace() {
+        // Windows writes `-1.#IND` for what is not a number.
+        let number = if word.contains('#') { Ok(f64::NAN) } else { word.parse::<f64>() };
+        numbers.push(number.map_err(|_| wrong(format!("`{word:.40}` is not a number")))?);
+    }
+    if numbers.len() != 16 {
+        return Err(wrong(format!("{} numbers; a pose is a matrix of 4x4", numbers.len())));
+    }
+    if !numbers.iter().all(|number| number.is_finite()) {
+        return Ok(None);
+    }
+    matrix_of(&numbers).map(Some).map_err(wrong)
+}

@@ -1,0 +1,232 @@
+use super::e57_packets::check_packets;
+use super::e57_pages::{PAGE_BYTES, Pages};
+use super::one::{Visit, head_of};
+use super::wkt::WktUnits;
+use super::xml_check::XmlCheck;
+use crate::clouds::cloud::{CloudHead, CloudPoint, CloudSource};
+use crate::clouds::error::{Error, Place, Result};
+use crate::clouds::guard::guarded;
+use crate::clouds::pose::RigidPose;
+use crate::clouds::spill::Budget;
+use e57::{CartesianCoordinate, E57Reader, PointCloud, RecordDataType, RecordName, SphericalCoordinate};
+use std::fs::File;
+use std::io::{BufReader, Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+
+/// The scans of an E57 file.
+struct E57 {
+    path: PathBuf,
+    reader: E57Reader<BufReader<File>>,
+    scans: Vec<PointCloud>,
+    next: usize,
+    is_read: bool,
+    /// Whether the caller knows where the sensor of scans without a pose was.
+    has_origin: bool,
+    crs: Option<String>,
+    remarks: Vec<String>,
+    budget: Budget,
+}
+
+/// Opens an E57 file: each scan is a cloud in the frame of its scanner, with its pose. A scan without a pose is in the
+/// frame of the file, and its sensor at the origin of that, if `has_origin` does not say that another one is known.
+pub(super) fn open(path: &Path, has_origin: bool, budget: &Budget) -> Result<Box<dyn CloudSource>> {
+    let mut file = File::open(path).map_err(|error| Error::io(path, "read", error))?;
+    check_xml(path, &mut file, budget)?;
+    let reader = guarded(|| E57Reader::new(BufReader::new(file)))
+        .map_err(|reason| Error::format(path, Place::Byte(0), reason))?;
+    let scans = reader.pointclouds();
+    let mut remarks = Vec::new();
+    let mut crs = reader.coordinate_metadata().map(str::to_owned).filter(|crs| !crs.trim().is_empty());
+    // Coordinates of E57 are metres, whatever is said of them.
+    let units = crs.as_deref().map(WktUnits::of);
+    if units.is_some_and(|units| [units.flat_m, units.high_m].iter().flatten().any(|metres| *metres != 1.0)) {
+        crs = None;
+        remarks.push(
+            "the coordinate system is not in metres as the points are, and the output does not name it"
+                .into(),
+        );
+    }
+    let bare = scans.iter().filter(|scan| scan.transform.is_none()).count();
+    if bare > 0 && !has_origin {
+        remarks.push(format!(
+            "{bare} of {} scans have no pose: their points are in the frame of the file, and without --poses or \
+             --sensor-origin the sensor is taken to be at its origin",
+            scans.len()
+        ));
+    }
+    let (next, is_read) = (0, true);
+    let (path, budget) = (path.to_owned(), budget.clone());
+    Ok(Box::new(E57 { path, reader, scans, next, is_read, has_origin, crs, remarks, budget }))
+}
+
+/// Checks that the description of the scans fits in memory, and takes no long time. The library holds all of it, as text
+/// and as a tree.
+fn check_xml(path: &Path, file: &mut File, budget: &Budget) -> Result<()> {
+    let fail = |error| Error::io(path, "read", error);
+    let mut header = Vec::new();
+    file.take(HEADER_BYTES as u64).read_to_end(&mut header).map_err(fail)?;
+    let number = |at: usize| {
+        let bytes = header.get(at..).and_then(|bytes| bytes.first_chunk()).copied();
+        bytes.map_or(0, u64::from_le_bytes)
+    };
+    let [start, bytes, page_bytes] = [24, 32, 40].map(number);
+    let wrong = |at: u64, reason: String| Err(Error::format(path, Place::Byte(at), reason));
+    if header.len() < HEADER_BYTES || !header.starts_with(SIGNATURE) {
+        return wrong(0, "it is no E57 file, or is cut off; copy it again".to_owned());
+    }
+    if page_bytes != PAGE_BYTES {
+        return wrong(40, format!("pages of {page_bytes} bytes; those of E57 have {PAGE_BYTES}"));
+    }
+    let mut text = Pages::new(&mut *file, start).map_err(fail)?.take(bytes);
+    let (mut check, mut buffer) = (XmlCheck::default(), vec![0; PAGE_BYTES as usize]);
+    loop {
+        let count = text.read(&mut buffer).map_err(fail)?;
+        let read = buffer.get(..count).unwrap_or_default();
+        if let Err(reason) = check.take(read) {
+            return wrong(start, format!("{reason}; write the file again with another program"));
+        }
+        let needed = check.nodes.saturating_mul(NODE_BYTES).saturating_add(bytes.saturating_mul(3));
+        if needed > budget.whole_bytes() {
+            let reason = format!(
+                "its description of {bytes} bytes would take more than {} bytes of memory: raise --memory, or split \
+                 the file",
+                budget.whole_bytes()
+            );
+            return wrong(start, reason);
+        }
+        if count == 0 {
+            break;
+        }
+    }
+    file.seek(SeekFrom::Start(0)).map(drop).map_err(fail)
+}
+
+/// The first bytes of a file, and how many its header has.
+const SIGNATURE: &[u8] = b"ASTM-E57";
+const HEADER_BYTES: usize = 48;
+/// Each point takes the time of its fields, also of those that take no bytes of the file.
+const MAX_FIELDS: usize = 256;
+/// What a tag or an attribute takes in the library's tree.
+const NODE_BYTES: u64 = 100;
+
+/// The name of a field, as the library spells it.
+fn name_of(name: &RecordName) -> String {
+    match name {
+        RecordName::Unknown { name, .. } => name.clone(),
+        known => format!("{known:?}"),
+    }
+}
+
+/// Whether any field of a point takes bits of the file. The library counts points by those bits: where there are none,
+/// a single packet would fill all memory with points.
+fn has_bits(scan: &PointCloud) -> bool {
+    scan.prototype.iter().any(|record| match record.data_type {
+        RecordDataType::ScaledInteger { min, max, .. } | RecordDataType::Integer { min, max } => min < max,
+        RecordDataType::Single { .. } | RecordDataType::Double { .. } => true,
+    })
+}
+
+fn pose(scan: &PointCloud) -> Option<RigidPose> {
+    let transform = scan.transform.as_ref()?;
+    let (at, turn) = (&transform.translation, &transform.rotation);
+    Some(RigidPose { position_m: [at.x, at.y, at.z], quaternion: [turn.x, turn.y, turn.z, turn.w] })
+}
+
+impl CloudSource for E57 {
+    fn format(&self) -> &str {
+        "E57"
+    }
+
+    fn len_hint(&self) -> Option<u64> {
+        Some(self.scans.len() as u64)
+    }
+
+    fn next_cloud(&mut self) -> Result<Option<CloudHead>> {
+        let Some(scan) = self.scans.get(self.next) else {
+            self.is_read = true;
+            return Ok(None);
+        };
+        let number = self.next;
+        self.next += 1;
+        self.is_read = false;
+        let pose = pose(scan).or_else(|| (!self.has_origin).then_some(RigidPose::IDENTITY));
+        if pose.is_some_and(|pose| !pose.is_valid()) {
+            self.is_read = true;
+            let reason = "the pose of the scan is not a rotation and a translation";
+            return Err(Error::format(&self.path, Place::Record(number as u64), reason));
+        }
+        let one = if self.scans.len() == 1 { head_of(&self.path) } else { CloudHead::default() };
+        let name = scan.name.clone().filter(|name| !name.is_empty()).unwrap_or_else(|| number.to_string());
+        Ok(Some(CloudHead {
+            name,
+            world_from_sensor: pose,
+            points: Some(scan.records),
+            fields: scan.prototype.iter().map(|record| name_of(&record.name)).collect(),
+            has_intensities: scan.prototype.iter().any(|record| record.name == RecordName::Intensity),
+            ..one
+        }))
+    }
+
+    fn read_points(&mut self, visit: Visit<'_>) -> Result<()> {
+        let Some(scan) = self.next.checked_sub(1).and_then(|number| self.scans.get(number)) else {
+            return Ok(());
+        };
+        if std::mem::replace(&mut self.is_read, true) {
+            return Ok(());
+        }
+        if scan.prototype.len() > MAX_FIELDS {
+            let reason = format!(
+                "a point has {} fields, at most {MAX_FIELDS} are read: export the scan with fewer fields",
+                scan.prototype.len()
+            );
+            return Err(Error::format(&self.path, Place::Record(0), reason));
+        }
+        let (path, mut done) = (&self.path, 0);
+        let wrong = |done: u64, reason: String| {
+            let reason = format!("{reason} (after {done} of {} points)", scan.records);
+            Error::format(path, Place::Record(done), reason)
+        };
+        if scan.records > 0 && !has_bits(scan) {
+            let reason = "every field of its points has a minimum that is its maximum, so that points take no bytes \
+                          and cannot be counted; write the scan again with a wider range of x, y or z";
+            return Err(wrong(0, reason.into()));
+        }
+        check_packets(path, scan, &self.budget)?;
+        let mut points =
+            guarded(|| self.reader.pointcloud_simple(scan)).map_err(|reason| wrong(0, reason))?;
+        points.apply_pose(false);
+        points.normalize_intensity(false);
+        points.normalize_color(false);
+        while let Some(point) = guarded(|| points.next().transpose()).map_err(|reason| wrong(done, reason))? {
+            done += 1;
+            let (position_m, is_return) = place(&point.cartesian, &point.spherical);
+            let intensity = point.intensity.unwrap_or(0.0);
+            visit(CloudPoint { intensity, is_return, ..CloudPoint::hit(position_m) })?;
+        }
+        Ok(())
+    }
+
+    fn remarks(&self) -> Vec<String> {
+        self.remarks.clone()
+    }
+
+    fn crs(&self) -> Option<&str> {
+        self.crs.as_deref()
+    }
+}
+
+/// Where a point is, or where nothing came back.
+fn place(cartesian: &CartesianCoordinate, spherical: &SphericalCoordinate) -> ([f64; 3], bool) {
+    match (cartesian, spherical) {
+        (CartesianCoordinate::Valid { x, y, z }, _) => {
+            let position_m = [*x, *y, *z];
+            (position_m, position_m.iter().all(|axis| axis.is_finite()))
+        }
+        (CartesianCoordinate::Direction { x, y, z }, _) => ([*x, *y, *z], false),
+        (CartesianCoordinate::Invalid, SphericalCoordinate::Direction { azimuth, elevation }) => {
+            let flat = elevation.cos();
+            ([flat * azimuth.cos(), flat * azimuth.sin(), elevation.sin()], false)
+        }
+        _ => ([f64::NAN; 3], false),
+    }
+}

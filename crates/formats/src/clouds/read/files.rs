@@ -1,0 +1,140 @@
+use super::one::Visit;
+use crate::clouds::cloud::{CloudHead, CloudSource};
+use crate::clouds::error::{Error, Result};
+use std::path::{Path, PathBuf};
+
+/// Opens a file of a folder.
+pub(super) type OpenFile = Box<dyn Fn(&PathBuf) -> Result<Box<dyn CloudSource>> + Send>;
+
+/// Remarks that are kept; a folder may have a million files.
+const MOST_REMARKS: usize = 20;
+
+/// The clouds of all files of a folder, one file open at a time.
+pub(super) struct Files {
+    format: String,
+    paths: std::vec::IntoIter<PathBuf>,
+    files: u64,
+    is_one_each: bool,
+    ends: Option<[String; 2]>,
+    open: OpenFile,
+    current: Option<(PathBuf, Box<dyn CloudSource>)>,
+    crs: Option<String>,
+    /// Whether a file was opened, so that the coordinate system is known or known to be missing.
+    is_begun: bool,
+    remarks: Vec<String>,
+}
+
+impl Files {
+    /// The clouds of files in this order. `is_one_each`: every file is one cloud.
+    pub(super) fn new(format: String, paths: Vec<PathBuf>, is_one_each: bool, open: OpenFile) -> Self {
+        let ends =
+            paths.first().zip(paths.last()).map(|(first, last)| [first, last].map(|path| name_of(path)));
+        Self {
+            format,
+            files: paths.len() as u64,
+            ends: ends.filter(|_| is_one_each),
+            paths: paths.into_iter(),
+            is_one_each,
+            open,
+            current: None,
+            crs: None,
+            is_begun: false,
+            remarks: Vec::new(),
+        }
+    }
+
+    fn remark(&mut self, remark: String) {
+        if self.remarks.len() < MOST_REMARKS {
+            self.remarks.push(remark);
+        } else if self.remarks.len() == MOST_REMARKS {
+            self.remarks.push("there is more to say of other files".into());
+        }
+    }
+
+    /// Keeps what is to be said of the file that ends.
+    fn close(&mut self) {
+        let Some((path, source)) = self.current.take() else { return };
+        let name = name_of(&path);
+        for remark in source.remarks() {
+            self.remark(format!("{name}: {remark}"));
+        }
+    }
+
+    /// Takes a file only if its points are in the coordinate system of those before: no point of another is mapped.
+    fn check_crs(&mut self, path: &Path, crs: Option<&str>) -> Result<()> {
+        let is_first = !std::mem::replace(&mut self.is_begun, true);
+        let Some(crs) = crs else { return Ok(()) };
+        match &self.crs {
+            Some(first) if first != crs => {
+                let reason = format!(
+                    "its coordinates are in {crs:.80}, those of the files before it in {first:.80}; convert it \
+                     first, for instance with pdal, or map it on its own"
+                );
+                return Err(Error::argument(path.display().to_string(), reason));
+            }
+            Some(_) => return Ok(()),
+            None => self.crs = Some(crs.to_owned()),
+        }
+        if !is_first {
+            let name = name_of(path);
+            self.remark(format!(
+                "{name}: names the coordinate system {crs:.80}, the files before it name none; are their points in \
+                 it, and does the map name it (`voxtile info`)? Read this file first otherwise"
+            ));
+        }
+        Ok(())
+    }
+}
+
+fn name_of(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+impl CloudSource for Files {
+    fn format(&self) -> &str {
+        &self.format
+    }
+
+    fn len_hint(&self) -> Option<u64> {
+        self.is_one_each.then_some(self.files)
+    }
+
+    fn ends(&self) -> Option<[String; 2]> {
+        self.ends.clone()
+    }
+
+    fn next_cloud(&mut self) -> Result<Option<CloudHead>> {
+        loop {
+            if let Some((path, source)) = &mut self.current {
+                match source.next_cloud() {
+                    Ok(Some(mut head)) => {
+                        let file = name_of(path);
+                        if head.name != file {
+                            head.name = format!("{file}/{}", head.name);
+                        }
+                        return Ok(Some(head));
+                    }
+                    Ok(None) => self.close(),
+                    Err(error) => return Err(error),
+                }
+            }
+            let Some(path) = self.paths.next() else { return Ok(None) };
+            let source = (self.open)(&path)?;
+            self.check_crs(&path, source.crs())?;
+            self.current = Some((path, source));
+        }
+    }
+
+    fn read_points(&mut self, visit: Visit<'_>) -> Result<()> {
+        self.current.as_mut().map_or(Ok(()), |(_, source)| source.read_points(visit))
+    }
+
+    fn remarks(&self) -> Vec<String> {
+        let now = self.current.iter().flat_map(|(_, source)| source.remarks());
+        self.remarks.iter().cloned().chain(now).collect()
+    }
+
+    fn crs(&self) -> Option<&str> {
+        self.crs.as_deref()
+    }
+}

@@ -1,0 +1,141 @@
+use crate::clouds::error::Error;
+use std::path::Path;
+
+/// A format that is known, but not read.
+pub(super) struct Foreign {
+    name: &'static str,
+    /// Starts of its files; empty if the name alone tells.
+    magic: &'static [&'static [u8]],
+    extensions: &'static [&'static str],
+    /// What a person can do.
+    way: &'static str,
+}
+
+impl Foreign {
+    /// Says what a file is, and the way to one that can be read.
+    pub(super) fn error(&self, path: &Path) -> Error {
+        Error::argument(
+            path.display().to_string(),
+            format!("is {}, which is not read: {}", self.name, self.way),
+        )
+    }
+}
+
+const TO_CLOUD: &str =
+    "sample points of its surface (CloudCompare, MeshLab) and save them as PLY, LAS or PCD";
+const UNPACK: &str = "unpack it and give the files inside";
+const PACKETS: &str =
+    "let the sensor's own tool (or its ROS driver) make clouds of it: PCD, PLY, .bag or .mcap";
+
+const FOREIGN: [Foreign; 19] = [
+    Foreign {
+        name: "a network capture",
+        magic: &[
+            b"\xd4\xc3\xb2\xa1",
+            b"\xa1\xb2\xc3\xd4",
+            b"\x4d\x3c\xb2\xa1",
+            b"\xa1\xb2\x3c\x4d",
+            b"\x0a\x0d\x0d\x0a",
+        ],
+        extensions: &["pcap", "pcapng"],
+        way: PACKETS,
+    },
+    Foreign {
+        name: "HDF5",
+        magic: &[b"\x89HDF\r\n\x1a\n"],
+        extensions: &["h5", "hdf5"],
+        way: "write its clouds as PLY, .bin or CSV (Python: h5py)",
+    },
+    Foreign {
+        name: "a NumPy array",
+        magic: &[b"\x93NUMPY"],
+        extensions: &["npy"],
+        way: "write it as .bin, `array.astype('<f4').tofile(...)`, and name its columns as fields; poses are read from \
+              .npy",
+    },
+    Foreign {
+        name: "one image",
+        magic: &[b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff", b"II*\0", b"MM\0*"],
+        extensions: &["png", "jpg", "jpeg", "tif", "tiff", "pgm"],
+        way: "give the folder of 16-bit depth PNGs that it is in",
+    },
+    Foreign {
+        name: "an archive or a packed file",
+        magic: &[
+            b"PK\x03\x04",
+            b"\x1f\x8b",
+            b"\x28\xb5\x2f\xfd",
+            b"BZh",
+            b"7z\xbc\xaf",
+            b"\xfd7zXZ\0",
+            b"Rar!",
+        ],
+        extensions: &["zip", "gz", "zst", "bz2", "7z", "xz", "tar", "npz"],
+        way: UNPACK,
+    },
+    Foreign { name: "a mesh (OBJ)", magic: &[], extensions: &["obj"], way: TO_CLOUD },
+    Foreign { name: "a mesh (STL)", magic: &[b"solid "], extensions: &["stl"], way: TO_CLOUD },
+    Foreign { name: "a mesh (OFF)", magic: &[b"OFF\n", b"COFF"], extensions: &["off"], way: TO_CLOUD },
+    Foreign { name: "a scene (glTF)", magic: &[b"glTF"], extensions: &["glb", "gltf"], way: TO_CLOUD },
+    Foreign { name: "a mesh (FBX)", magic: &[b"Kaydara FBX"], extensions: &["fbx"], way: TO_CLOUD },
+    Foreign {
+        name: "Parquet",
+        magic: &[b"PAR1"],
+        extensions: &["parquet"],
+        way: "write x, y, z and intensity as CSV (Python: pandas)",
+    },
+    Foreign {
+        name: "a map (OctoMap)",
+        magic: &[b"# Octomap OcTree"],
+        extensions: &["bt", "ot"],
+        way: "it holds no clouds; `voxtile import FILE -o MAP` makes a map of it, and info, query, raycast and export take \
+              the file itself",
+    },
+    Foreign {
+        name: "OpenVDB",
+        magic: &[b" BDV"],
+        extensions: &["vdb"],
+        way: "it holds volumes, no clouds; write its points as PLY",
+    },
+    Foreign {
+        name: "a project of a scanner's maker",
+        magic: &[],
+        extensions: &["rcp", "rcs", "fls", "zfs", "rdbx", "rxp", "lgs", "ptg", "ptx", "3dd"],
+        way: "export it there as E57 or LAS",
+    },
+    Foreign {
+        name: "a recording of Livox",
+        magic: &[b"livox_tech"],
+        extensions: &["lvx", "lvx2"],
+        way: "Livox Viewer exports LAS and CSV; its driver records .bag",
+    },
+    Foreign { name: "packets of Ouster", magic: &[], extensions: &["osf"], way: PACKETS },
+    Foreign {
+        name: "CloudCompare's own format",
+        magic: &[b"CCB"],
+        extensions: &["sbf", "bin2"],
+        way: "CloudCompare saves it as PLY, LAS or E57",
+    },
+    Foreign {
+        name: "a point cloud for the web",
+        magic: &[],
+        extensions: &["pnts", "ept", "slpk"],
+        way: "give the LAZ or COPC that it was made of",
+    },
+    Foreign {
+        name: "a table of Excel or MATLAB",
+        magic: &[b"MATLAB 5.0"],
+        extensions: &["mat", "xlsx", "xls"],
+        way: "save x, y, z and intensity as CSV",
+    },
+];
+
+/// The foreign format that starts with these bytes.
+pub(super) fn of_bytes(start: &[u8]) -> Option<&'static Foreign> {
+    FOREIGN.iter().find(|foreign| foreign.magic.iter().any(|magic| start.starts_with(magic)))
+}
+
+/// The foreign format with this ending, in lower case.
+pub(super) fn of_extension(extension: &str) -> Option<&'static Foreign> {
+    FOREIGN.iter().find(|foreign| foreign.extensions.contains(&extension))
+}

@@ -1,0 +1,71 @@
+use super::one::Visit;
+use crate::clouds::cloud::{CloudHead, CloudSource};
+use crate::clouds::error::{Error, Result};
+use crate::clouds::pose::RigidPose;
+
+/// Clouds that are registered already, seen from where the sensor was.
+pub struct FromOrigin {
+    source: Box<dyn CloudSource>,
+    origin_m: [f64; 3],
+    /// A cloud that knows its own pose keeps it.
+    is_posed: bool,
+}
+
+impl FromOrigin {
+    /// Points in the frame of the file, in metres, and where the sensor stood in it.
+    ///
+    /// # Errors
+    ///
+    /// An origin that is not finite.
+    pub fn new(source: Box<dyn CloudSource>, origin_m: [f64; 3]) -> Result<Self> {
+        if !origin_m.iter().all(|axis| axis.is_finite()) {
+            return Err(Error::argument("sensor origin", "must be three finite numbers in metres"));
+        }
+        Ok(Self { source, origin_m, is_posed: false })
+    }
+}
+
+impl CloudSource for FromOrigin {
+    fn format(&self) -> &str {
+        self.source.format()
+    }
+
+    fn len_hint(&self) -> Option<u64> {
+        self.source.len_hint()
+    }
+
+    fn ends(&self) -> Option<[String; 2]> {
+        self.source.ends()
+    }
+
+    fn next_cloud(&mut self) -> Result<Option<CloudHead>> {
+        let mut head = self.source.next_cloud()?;
+        if let Some(head) = &mut head {
+            self.is_posed = head.world_from_sensor.is_some();
+            if !self.is_posed {
+                head.world_from_sensor = Some(RigidPose { position_m: self.origin_m, ..RigidPose::IDENTITY });
+            }
+        }
+        Ok(head)
+    }
+
+    fn read_points(&mut self, visit: Visit<'_>) -> Result<()> {
+        if self.is_posed {
+            return self.source.read_points(visit);
+        }
+        let [x, y, z] = self.origin_m;
+        self.source.read_points(&mut |mut point| {
+            let [px, py, pz] = point.position_m;
+            point.position_m = [px - x, py - y, pz - z];
+            visit(point)
+        })
+    }
+
+    fn remarks(&self) -> Vec<String> {
+        self.source.remarks()
+    }
+
+    fn crs(&self) -> Option<&str> {
+        self.source.crs()
+    }
+}

@@ -1,0 +1,106 @@
+use super::regular::check_regular;
+use crate::clouds::error::{Error, Place, Result};
+use crate::clouds::lines::Lines;
+use std::path::{Path, PathBuf};
+
+/// A camera without distortion: where a pixel looks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Intrinsics {
+    /// Focal lengths along columns and rows, in pixels.
+    pub focal_px: [f64; 2],
+    /// The pixel on the axis: column and row.
+    pub center_px: [f64; 2],
+}
+
+/// Where a data set keeps its camera.
+const NAMES: [&str; 3] = ["camera-intrinsics.txt", "intrinsics.txt", "camera.txt"];
+/// More numbers than any form has.
+const MOST_NUMBERS: usize = 64;
+
+impl Intrinsics {
+    /// A camera of `fx fy cx cy`.
+    ///
+    /// # Errors
+    ///
+    /// A focal length that is not above 0; what is not finite.
+    pub fn new(numbers: [f64; 4]) -> Result<Self> {
+        let [fx, fy, cx, cy] = numbers;
+        if !numbers.iter().all(|number| number.is_finite()) || fx <= 0.0 || fy <= 0.0 {
+            let reason =
+                format!("fx {fx}, fy {fy}, cx {cx}, cy {cy}: focal lengths must be above 0, in pixels");
+            return Err(Error::argument("intrinsics", reason));
+        }
+        Ok(Self { focal_px: [fx, fy], center_px: [cx, cy] })
+    }
+
+    /// Reads a file with a 3x3 matrix, or with `fx fy cx cy`; `#` starts a comment.
+    ///
+    /// # Errors
+    ///
+    /// Other numbers; a camera with distortion, whose images must be rectified first.
+    pub fn read(path: &Path) -> Result<Self> {
+        let mut lines = Lines::open(path)?;
+        let mut numbers: Vec<f64> = Vec::new();
+        while let Some((_, line)) = lines.next()? {
+            let line = line.split('#').next().unwrap_or_default();
+            for word in line.split([' ', '\t', ',', ';']).filter(|word| !word.is_empty()) {
+                numbers.push(word.parse().map_err(|_| lines.error(format!("`{word:.40}` is not a number")))?);
+            }
+            if numbers.len() > MOST_NUMBERS {
+                break;
+            }
+        }
+        let wrong = |reason: &str| Err(Error::format(path, Place::Line(1), reason));
+        match numbers.as_slice() {
+            &[fx, skew, cx, zero, fy, cy, a, b, one] => {
+                if (skew, zero, a, b, one) != (0.0, 0.0, 0.0, 0.0, 1.0) {
+                    return wrong("the matrix is not fx 0 cx, 0 fy cy, 0 0 1: skewed cameras are not known");
+                }
+                Self::new([fx, fy, cx, cy])
+            }
+            &[fx, fy, cx, cy] => Self::new([fx, fy, cx, cy]),
+            &[fx, fy, cx, cy, ref distortion @ ..] if distortion.len() <= 5 => {
+                if distortion.iter().any(|number| *number != 0.0) {
+                    return wrong("the camera has a distortion: rectify the images first");
+                }
+                Self::new([fx, fy, cx, cy])
+            }
+            other => wrong(&format!(
+                "{} numbers; a camera is a matrix of 3x3, or fx fy cx cy, in pixels",
+                other.len()
+            )),
+        }
+    }
+
+    /// The camera of a folder: of its file, if it has one, or of one beside it.
+    pub(super) fn find(folder: &Path, asked: Option<&Path>) -> Result<Self> {
+        if let Some(path) = asked {
+            return Self::read(path);
+        }
+        let folders: Vec<PathBuf> =
+            std::iter::once(folder.to_owned()).chain(folder.parent().map(Path::to_owned)).collect();
+        let mut paths = folders.iter().flat_map(|folder| NAMES.map(|name| folder.join(name)));
+        let found = paths.find(|path| path.exists() && !path.is_dir());
+        let Some(path) = found else {
+            let reason = format!(
+                "depth images need the camera: name a file with fx fy cx cy in pixels, or with a matrix of 3x3, by \
+                 --intrinsics FILE, or put it in the folder or beside it as {}",
+                NAMES.join(" or ")
+            );
+            return Err(Error::argument(folder.display().to_string(), reason));
+        };
+        check_regular(&path)?;
+        Self::read(&path)
+    }
+
+    /// Whether one of these files is a camera by its name.
+    pub(super) fn is_in(files: &[PathBuf]) -> bool {
+        files.iter().any(|path| path.file_name().is_some_and(|name| NAMES.iter().any(|known| name == *known)))
+    }
+
+    /// Where a pixel looks, of depth 1.
+    pub(super) fn direction(&self, column: f64, row: f64) -> [f64; 3] {
+        let ([fx, fy], [cx, cy]) = (self.focal_px, self.center_px);
+        [(column - cx) / fx, (row - cy) / fy, 1.0]
+    }
+}

@@ -1,0 +1,92 @@
+use super::las_layout::Layout;
+use super::las_points::LasPoints;
+use super::las_scans::{LasScans, withheld};
+use super::las_units::Units;
+use super::one::{Visit, head_of};
+use super::options::OpenOptions;
+use crate::clouds::cloud::{CloudHead, CloudPoint, CloudSource};
+use crate::clouds::error::{Error, Result};
+use std::fs::File;
+use std::path::Path;
+
+/// Opens a LAS, LAZ or COPC file. Coordinates become metres. With GPS times it is cut into scans of
+/// [`OpenOptions::scan_period_s`], numbered from 0, each with the middle of its window as stamp; without them, or where
+/// the origin of the rays is given, it is one cloud in the order of the file.
+///
+/// Stamps are GPS time in nanoseconds, without leap seconds taken off: since 6 January 1980 where the header says that
+/// times are "adjusted standard GPS time" (the 10^9 seconds that such files leave out are added), since the begin of
+/// the week otherwise.
+pub(super) fn open(path: &Path, options: &OpenOptions) -> Result<Box<dyn CloudSource>> {
+    let mut file = File::open(path).map_err(|error| Error::io(path, "read", error))?;
+    let layout = Layout::read(path, &mut file)?;
+    let table_at = match layout.is_compressed {
+        true => super::laz_chunks::check(path, &file, &layout, &options.budget())?,
+        false => None,
+    };
+    let mut units = Units::of(&layout);
+    units.remarks.extend(layout.remark.clone());
+    let points = LasPoints::open(path, &layout, table_at, &units)?;
+    let format = if layout.is_compressed { "LAZ" } else { "LAS" }.to_owned();
+    let is_cut = points.has_times && options.scan_period_s > 0.0 && options.sensor_origin_m.is_none();
+    if is_cut {
+        return Ok(Box::new(LasScans::new(format, path, &layout, units, points, options)));
+    }
+    let head = CloudHead {
+        points: Some(layout.points),
+        fields: fields(points.has_times),
+        has_intensities: true,
+        ..head_of(path)
+    };
+    Ok(Box::new(WholeLas { format, units, head: Some(head), points, is_read: false }))
+}
+
+/// Names of the fields that are read.
+pub(super) fn fields(has_times: bool) -> Vec<String> {
+    let names = ["X", "Y", "Z", "Intensity"].into_iter().chain(has_times.then_some("GPS Time"));
+    names.map(str::to_owned).collect()
+}
+
+/// A LAS file as one cloud.
+struct WholeLas {
+    format: String,
+    units: Units,
+    head: Option<CloudHead>,
+    points: LasPoints,
+    is_read: bool,
+}
+
+impl CloudSource for WholeLas {
+    fn format(&self) -> &str {
+        &self.format
+    }
+
+    fn len_hint(&self) -> Option<u64> {
+        Some(1)
+    }
+
+    fn next_cloud(&mut self) -> Result<Option<CloudHead>> {
+        let head = self.head.take();
+        self.is_read |= head.is_none();
+        Ok(head)
+    }
+
+    fn read_points(&mut self, visit: Visit<'_>) -> Result<()> {
+        if self.head.is_some() || self.is_read {
+            return Ok(());
+        }
+        self.is_read = true;
+        self.points.visit(&mut |point| {
+            let intensity = f32::from(point.intensity);
+            visit(CloudPoint { intensity, ..CloudPoint::hit(point.position_m) })
+        })
+    }
+
+    fn remarks(&self) -> Vec<String> {
+        let withheld = Some(self.points.withheld).filter(|points| *points > 0).map(withheld);
+        self.units.remarks.iter().cloned().chain(withheld).collect()
+    }
+
+    fn crs(&self) -> Option<&str> {
+        self.units.crs.as_deref()
+    }
+}

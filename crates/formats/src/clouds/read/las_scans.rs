@@ -1,0 +1,204 @@
+use super::las_layout::Layout;
+use super::las_points::{LasPoint, LasPoints};
+use super::las_units::Units;
+use super::one::Visit;
+use super::options::OpenOptions;
+use crate::clouds::cloud::{CloudHead, CloudPoint, CloudSource};
+use crate::clouds::error::{Error, Place, Result};
+use crate::clouds::spill::{Sorted, Sorter};
+use std::path::{Path, PathBuf};
+
+/// The zero of adjusted standard GPS time, in nanoseconds of GPS time.
+const STANDARD_ZERO_NS: i64 = 1_000_000_000_000_000_000;
+
+/// A LAS file cut into scans of equal length by GPS time.
+pub(super) struct LasScans {
+    format: String,
+    path: PathBuf,
+    units: Units,
+    /// Until the first scan is asked for.
+    unsorted: Option<(LasPoints, Sorter<LasPoint>)>,
+    sorted: Option<Sorted<LasPoint>>,
+    period_s: f64,
+    zero_ns: i64,
+    first_s: f64,
+    has_one_time: bool,
+    /// The window that is read, and the first point that was not given.
+    window: Option<u64>,
+    peeked: Option<LasPoint>,
+    scans: u64,
+    remarks: Vec<String>,
+    /// Why not all points could be read; told after those that could.
+    failure: Option<Error>,
+}
+
+impl LasScans {
+    pub(super) fn new(
+        format: String,
+        path: &Path,
+        layout: &Layout,
+        units: Units,
+        points: LasPoints,
+        options: &OpenOptions,
+    ) -> Self {
+        let sorter = Sorter::new(&options.budget(), options.memory_bytes);
+        Self {
+            format,
+            path: path.to_owned(),
+            units,
+            unsorted: Some((points, sorter)),
+            sorted: None,
+            period_s: options.scan_period_s,
+            zero_ns: if layout.has_standard_time { STANDARD_ZERO_NS } else { 0 },
+            first_s: 0.0,
+            has_one_time: false,
+            window: None,
+            peeked: None,
+            scans: 0,
+            remarks: Vec::new(),
+            failure: None,
+        }
+    }
+
+    fn sort(&mut self) -> Result<()> {
+        let Some((mut points, mut sorter)) = self.unsorted.take() else { return Ok(()) };
+        let (mut number, mut least, mut most) = (0, f64::INFINITY, f64::NEG_INFINITY);
+        let mut is_sorting = false;
+        let path = &self.path;
+        let read = points.visit(&mut |point| {
+            if !point.time_s.is_finite() {
+                return Err(Error::format(path, Place::Record(number), "the GPS time is not a number"));
+            }
+            number += 1;
+            (least, most) = (least.min(point.time_s), most.max(point.time_s));
+            let pushed = sorter.push(point);
+            is_sorting = pushed.is_err();
+            pushed
+        });
+        match read {
+            Err(error) if is_sorting => return Err(error),
+            other => self.failure = other.err(),
+        }
+        if points.withheld > 0 {
+            self.remarks.push(withheld(points.withheld));
+        }
+        (self.first_s, self.has_one_time) = (least, least >= most);
+        if self.has_one_time && number > 1 {
+            self.remarks
+                .push("all points have the same GPS time: the file is one cloud without a stamp".into());
+        }
+        let mut sorted = sorter.finish()?;
+        self.peeked = sorted.next()?;
+        self.sorted = Some(sorted);
+        Ok(())
+    }
+
+    /// The window of a time, from 0.
+    fn window_of(&self, time_s: f64) -> u64 {
+        if self.has_one_time { 0 } else { window_after(time_s - self.first_s, self.period_s) }
+    }
+
+    /// The middle of a window, in seconds of the file.
+    fn middle_s(&self, window: u64) -> f64 {
+        self.first_s + (window as f64 + 0.5) * self.period_s
+    }
+
+    /// Nanoseconds of GPS time: since 6 January 1980 or, of old files, since the begin of the week.
+    fn stamp_ns(&self, window: u64) -> Option<i64> {
+        let middle_ns = (self.middle_s(window) * 1e9).round();
+        let is_possible = middle_ns.abs() < 9e18 && !self.has_one_time;
+        is_possible.then(|| (middle_ns as i64).checked_add(self.zero_ns)).flatten()
+    }
+
+    fn next_of(&mut self, window: u64) -> Result<Option<LasPoint>> {
+        let Some(point) = self.peeked else { return Ok(None) };
+        if self.window_of(point.time_s) != window {
+            return Ok(None);
+        }
+        self.peeked = match &mut self.sorted {
+            Some(sorted) => sorted.next()?,
+            None => None,
+        };
+        Ok(Some(point))
+    }
+}
+
+/// The window of a time after the first, from 0. One that begins a window may be written a little earlier, as rounding
+/// has it: it is taken as its begin.
+fn window_after(since_s: f64, period_s: f64) -> u64 {
+    /// Of a window. Seconds of the GPS epoch have steps of 0.1 us.
+    const ROUNDING: f64 = 1e-5;
+    (since_s / period_s + ROUNDING) as u64
+}
+
+/// A remark on points that are left out.
+pub(super) fn withheld(points: u64) -> String {
+    format!("{points} points are marked as withheld, that is deleted, and are left out")
+}
+
+impl CloudSource for LasScans {
+    fn format(&self) -> &str {
+        &self.format
+    }
+
+    fn next_cloud(&mut self) -> Result<Option<CloudHead>> {
+        self.sort()?;
+        if let Some(window) = self.window.take() {
+            while self.next_of(window)?.is_some() {}
+        }
+        let Some(first) = self.peeked else {
+            // What was whole has been given.
+            return self.failure.take().map_or(Ok(None), Err);
+        };
+        let window = self.window_of(first.time_s);
+        self.window = Some(window);
+        let head = CloudHead {
+            name: self.scans.to_string(),
+            stamp_ns: self.stamp_ns(window),
+            fields: super::las::fields(true),
+            has_intensities: true,
+            has_times: !self.has_one_time,
+            ..CloudHead::default()
+        };
+        self.scans += 1;
+        Ok(Some(head))
+    }
+
+    fn read_points(&mut self, visit: Visit<'_>) -> Result<()> {
+        let Some(window) = self.window else { return Ok(()) };
+        let middle_s = if self.has_one_time { self.first_s } else { self.middle_s(window) };
+        while let Some(point) = self.next_of(window)? {
+            let intensity = f32::from(point.intensity);
+            visit(CloudPoint {
+                intensity,
+                time_s: point.time_s - middle_s,
+                ..CloudPoint::hit(point.position_m)
+            })?;
+        }
+        Ok(())
+    }
+
+    fn remarks(&self) -> Vec<String> {
+        self.units.remarks.iter().chain(&self.remarks).cloned().collect()
+    }
+
+    fn crs(&self) -> Option<&str> {
+        self.units.crs.as_deref()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_time_that_begins_a_window_is_in_it() {
+        // In the numbers of a file a window is not quite a tenth of a second.
+        for window in 0..10_000 {
+            let first_s = 1_000_000_000.05_f64;
+            let time_s = first_s + 0.1 * f64::from(window);
+            assert_eq!(window_after(time_s - first_s, 0.1), u64::from(window as u32));
+            assert_eq!(window_after(0.1 * (f64::from(window) + 0.999), 0.1), u64::from(window as u32));
+        }
+    }
+}

@@ -1,0 +1,61 @@
+use crate::clouds::cloud::{CloudHead, CloudPoint, CloudSource};
+use crate::clouds::error::Result;
+use crate::clouds::stamp;
+use std::path::Path;
+
+/// Takes points.
+pub(super) type Visit<'v> = &'v mut dyn FnMut(CloudPoint) -> Result<()>;
+
+/// The points of a cloud that was opened.
+pub(super) trait Points: Send {
+    /// Visits them once, in order.
+    fn read(&mut self, visit: Visit<'_>) -> Result<()>;
+}
+
+/// What a file's name tells of its cloud.
+pub(super) fn head_of(path: &Path) -> CloudHead {
+    let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    CloudHead { name, stamp_ns: stamp::in_name(path), ..CloudHead::default() }
+}
+
+/// A file with one cloud.
+pub(super) struct OneCloud {
+    format: String,
+    head: Option<CloudHead>,
+    points: Option<Box<dyn Points>>,
+}
+
+impl OneCloud {
+    pub(super) fn new(format: impl Into<String>, (head, points): (CloudHead, Box<dyn Points>)) -> Self {
+        Self { format: format.into(), head: Some(head), points: Some(points) }
+    }
+}
+
+impl CloudSource for OneCloud {
+    fn format(&self) -> &str {
+        &self.format
+    }
+
+    fn len_hint(&self) -> Option<u64> {
+        Some(1)
+    }
+
+    fn next_cloud(&mut self) -> Result<Option<CloudHead>> {
+        let head = self.head.take();
+        if head.is_none() {
+            self.points = None;
+        }
+        Ok(head)
+    }
+
+    fn read_points(&mut self, visit: Visit<'_>) -> Result<()> {
+        // Before the first cloud there is nothing to read.
+        match (&self.head, self.points.take()) {
+            (None, Some(mut points)) => points.read(visit),
+            (_, points) => {
+                self.points = points;
+                Ok(())
+            }
+        }
+    }
+}

@@ -1,0 +1,185 @@
+use super::columns::{Clock, Meaning};
+use super::one::{Points, Visit};
+use super::ply_header::{Element, Encoding, Header};
+use super::scalar::Scalar;
+use crate::clouds::cloud::CloudHead;
+use crate::clouds::error::{Error, Place, Result};
+use crate::clouds::lines::Lines;
+use std::fs::File;
+use std::io::{self, BufReader, Read};
+use std::path::{Path, PathBuf};
+
+/// The points of a PLY file.
+struct PlyPoints {
+    path: PathBuf,
+    header: Header,
+    input: Option<BufReader<File>>,
+    vertices: usize,
+    meaning: Meaning,
+    clock: Clock,
+}
+
+/// Opens a PLY file and reads its header.
+pub(super) fn open(path: &Path, mut head: CloudHead) -> Result<(CloudHead, Box<dyn Points>)> {
+    let file = File::open(path).map_err(|error| Error::io(path, "read", error))?;
+    let mut input = BufReader::with_capacity(1 << 16, file);
+    let header = Header::read(path, &mut input)?;
+    let wrong = |reason: &str| Error::format(path, Place::Line(header.lines), reason);
+    let vertices = header.elements.iter().position(|element| element.name == "vertex");
+    let vertices = vertices.ok_or_else(|| wrong("the file has no element `vertex`"))?;
+    let element = header.elements.get(vertices).ok_or_else(|| wrong("the file has no element `vertex`"))?;
+    let names: Vec<String> = element.properties.iter().map(|property| property.name.clone()).collect();
+    let meaning =
+        Meaning::of(&names, |at| element.properties.get(at).is_some_and(|found| found.kind.is_integer()))
+            .ok_or_else(|| wrong("vertices have no x, y and z"))?;
+    head.points = Some(element.count);
+    head.fields = names;
+    head.has_intensities = meaning.intensity.is_some();
+    head.has_times = meaning.time.is_some();
+    let clock = Clock::new(head.stamp_ns);
+    let points = PlyPoints { path: path.to_owned(), header, input: Some(input), vertices, meaning, clock };
+    Ok((head, Box::new(points)))
+}
+
+impl Points for PlyPoints {
+    fn read(&mut self, visit: Visit<'_>) -> Result<()> {
+        let Some(input) = self.input.take() else { return Ok(()) };
+        match self.header.encoding {
+            Encoding::Ascii => self.read_ascii(Lines::new(&self.path, input, self.header.lines), visit),
+            encoding => self.read_binary(input, encoding == Encoding::BigEndian, visit),
+        }
+    }
+}
+
+impl PlyPoints {
+    fn read_ascii(&mut self, mut lines: Lines, visit: Visit<'_>) -> Result<()> {
+        let mut values = Vec::new();
+        for (number, element) in self.header.elements.iter().enumerate().take(self.vertices + 1) {
+            if element.properties.is_empty() {
+                continue;
+            }
+            for done in 0..element.count {
+                let (name, count) = (&element.name, element.count);
+                let cut =
+                    |lines: &Lines| lines.error(format!("the file ends after {done} of {count} {name}"));
+                if number != self.vertices {
+                    if !lines.pass()? {
+                        return Err(cut(&lines));
+                    }
+                    continue;
+                }
+                let line = loop {
+                    match lines.next()? {
+                        Some((_, line)) if line.trim().is_empty() => {}
+                        Some((_, line)) => break line,
+                        None => return Err(cut(&lines)),
+                    }
+                };
+                values_of(element, &line, &mut values).map_err(|reason| lines.error(reason))?;
+                visit(self.clock.point(&self.meaning, |at| values.get(at).copied().unwrap_or(f64::NAN)))?;
+            }
+        }
+        Ok(())
+    }
+
+    fn read_binary(&mut self, input: BufReader<File>, is_big: bool, visit: Visit<'_>) -> Result<()> {
+        let mut records = Records { input, at: self.header.bytes, is_big, bytes: Vec::new() };
+        let mut values = Vec::new();
+        for (number, element) in self.header.elements.iter().enumerate().take(self.vertices + 1) {
+            let cut = |done: u64, records: &Records| {
+                let reason = format!("the file ends after {done} of {} {}", element.count, element.name);
+                Error::format(&self.path, Place::Byte(records.at), reason)
+            };
+            let is_wanted = number == self.vertices;
+            if let (false, Some(bytes)) = (is_wanted, element.bytes()) {
+                // All are alike: skipped at once. What is beyond the end shows at the next element.
+                let skipped = element.count.checked_mul(bytes).map(|bytes| records.skip(bytes));
+                match skipped {
+                    Some(Ok(())) => continue,
+                    Some(Err(error)) if error.kind() != io::ErrorKind::UnexpectedEof => {
+                        return Err(Error::io(&self.path, "read", error));
+                    }
+                    _ => return Err(cut(0, &records)),
+                }
+            }
+            for done in 0..element.count {
+                match records.next(element, &mut values) {
+                    Ok(()) => {}
+                    Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => {
+                        return Err(cut(done, &records));
+                    }
+                    Err(error) => return Err(Error::io(&self.path, "read", error)),
+                }
+                if is_wanted {
+                    visit(self.clock.point(&self.meaning, |at| values.get(at).copied().unwrap_or(f64::NAN)))?;
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Elements of a binary file.
+struct Records {
+    input: BufReader<File>,
+    at: u64,
+    is_big: bool,
+    bytes: Vec<u8>,
+}
+
+impl Records {
+    /// Reads an element: a value a property, NaN for a list.
+    fn next(&mut self, element: &Element, values: &mut Vec<f64>) -> io::Result<()> {
+        values.clear();
+        for property in &element.properties {
+            match property.list {
+                None => {
+                    let value = self.value(property.kind)?;
+                    values.push(value);
+                }
+                Some(count) => {
+                    // A negative length, which is damage, is none.
+                    let count = self.value(count)? as u64;
+                    self.skip(count.saturating_mul(property.kind.bytes() as u64))?;
+                    values.push(f64::NAN);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn value(&mut self, kind: Scalar) -> io::Result<f64> {
+        self.bytes.resize(kind.bytes(), 0);
+        self.input.read_exact(&mut self.bytes)?;
+        self.at += self.bytes.len() as u64;
+        Ok(kind.value(&self.bytes, self.is_big))
+    }
+
+    fn skip(&mut self, bytes: u64) -> io::Result<()> {
+        let skipped = io::copy(&mut (&mut self.input).take(bytes), &mut io::sink())?;
+        self.at = self.at.saturating_add(skipped);
+        if skipped == bytes { Ok(()) } else { Err(io::ErrorKind::UnexpectedEof.into()) }
+    }
+}
+
+/// The values of a line: one a property, NaN for a list.
+fn values_of(element: &Element, line: &str, values: &mut Vec<f64>) -> std::result::Result<(), String> {
+    values.clear();
+    let mut words = line.split_ascii_whitespace();
+    for property in &element.properties {
+        let missing = || format!("the value of `{}` is missing", property.name);
+        let word = words.next().ok_or_else(missing)?;
+        let value: f64 = word.parse().map_err(|_| format!("`{word:.40}` is not a number"))?;
+        if property.list.is_none() {
+            // More digits than a float holds say nothing: the binary forms have none of them.
+            values.push(if property.kind == Scalar::F32 { f64::from(value as f32) } else { value });
+            continue;
+        }
+        let count: u64 = word.parse().map_err(|_| format!("`{word:.40}` is no length of a list"))?;
+        for _ in 0..count {
+            words.next().ok_or_else(missing)?;
+        }
+        values.push(f64::NAN);
+    }
+    Ok(())
+}

@@ -1,0 +1,22 @@
+use super::format::{Format, extension_of};
+use crate::clouds::error::{Error, Result};
+use std::path::Path;
+
+/// Checks that a path is no FIFO, socket or device: opening one waits for a program that writes, perhaps for ever, and
+/// gives its bytes once. What is not there is reported when it is opened.
+pub(crate) fn check_regular(path: &Path) -> Result<()> {
+    let is_special = std::fs::metadata(path).is_ok_and(|meta| !meta.is_file() && !meta.is_dir());
+    if !is_special {
+        return Ok(());
+    }
+    // Of these, a single cloud is read in one pass.
+    let extension = extension_of(path);
+    let mut extensions = [Format::Ply, Format::Text].into_iter().flat_map(Format::extensions);
+    let is_streamed = extension.is_empty() || extensions.any(|known| *known == extension);
+    let hint = "; or name it alone, with --format ply or --format xyz, which are read in one pass";
+    let reason = format!(
+        "is a FIFO, a socket or a device, not a file: save its contents to a file{}",
+        if is_streamed { hint } else { "" }
+    );
+    Err(Error::argument(path.display().to_string(), reason))
+}

@@ -1,0 +1,254 @@
+use super::bag2_metadata::Bag2Metadata;
+use super::chunk::{MOST_CHUNK_BYTES, decompress, unpacker};
+use super::message_data::MessageData;
+use super::open::open_file;
+use super::recording::{Message, Recording, Topic};
+use super::sequence::Sequence;
+use crate::clouds::error::{Error, Place, Result};
+use crate::clouds::inside::is_inside;
+use crate::clouds::spill::{Budget, Bytes, SpillFile, StreamSize};
+use std::collections::HashSet;
+use std::fs::File;
+use std::io::{BufReader, Read, Write};
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+/// A folder of `ros2 bag`: `metadata.yaml` and the files that it names, in order. Without one, all recordings in the
+/// folder in the natural order of their names: the parts of a bag that `rosbag record --split` wrote.
+///
+/// Files that are compressed as a whole are unpacked into a temporary folder, which goes with this.
+pub struct Bag2Folder {
+    path: PathBuf,
+    files: Sequence,
+    has_compressed_messages: bool,
+    spill: SpillFile,
+    remarks: Vec<String>,
+    _unpacked: Option<TempDir>,
+}
+
+/// A longer `metadata.yaml` is an error.
+const MOST_METADATA_BYTES: u64 = 8 << 20;
+
+impl Bag2Folder {
+    /// Opens a folder.
+    ///
+    /// # Errors
+    ///
+    /// A folder without files of a recording; a file that cannot be read or is invalid.
+    pub fn open(path: &Path) -> Result<Self> {
+        Self::open_within(path, &Budget::default())
+    }
+
+    /// As [`Bag2Folder::open`], in so much memory. Compressed files are unpacked into its folder for temporary files.
+    ///
+    /// # Errors
+    ///
+    /// As for [`Bag2Folder::open`].
+    pub fn open_within(path: &Path, budget: &Budget) -> Result<Self> {
+        let scratch = budget.scratch.as_deref();
+        let mut remarks = Vec::new();
+        let metadata_path = path.join("metadata.yaml");
+        let (metadata, files) = if metadata_path.is_file() {
+            let file =
+                File::open(&metadata_path).map_err(|error| Error::io(&metadata_path, "read", error))?;
+            let mut text = Vec::new();
+            let read = file.take(MOST_METADATA_BYTES + 1).read_to_end(&mut text);
+            read.map_err(|error| Error::io(&metadata_path, "read", error))?;
+            if text.len() as u64 > MOST_METADATA_BYTES {
+                let reason = format!("it is longer than {MOST_METADATA_BYTES} bytes; name the files instead");
+                return Err(Error::format(&metadata_path, Place::Byte(MOST_METADATA_BYTES), reason));
+            }
+            let metadata = Bag2Metadata::of(&String::from_utf8_lossy(&text));
+            let files = metadata.files.iter().map(|name| find(path, name)).collect::<Result<Vec<_>>>()?;
+            (metadata, files)
+        } else {
+            (Bag2Metadata::default(), Vec::new())
+        };
+        let mut files = if files.is_empty() { files_of(path)? } else { files };
+        // Each of a million names of one file would be a file of its own.
+        let (named, mut seen) = (files.len(), HashSet::new());
+        files.retain(|file| seen.insert(file.clone()));
+        if files.len() < named {
+            let again = named - files.len();
+            remarks.push(format!(
+                "{}: names of files occur again ({again}); each file is read once",
+                metadata_path.display()
+            ));
+        }
+        // Bags of ROS 1 have none.
+        if !metadata_path.is_file() && !files.iter().all(|file| is_bag1(file)) {
+            let path = path.display();
+            remarks
+                .push(format!("{path} has no metadata.yaml: its files are read in the order of their names"));
+        }
+        if files.is_empty() {
+            let reason = "the folder holds no .mcap, .db3 or .bag file, and no metadata.yaml names one";
+            return Err(Error::argument(path.display().to_string(), reason));
+        }
+        let format = metadata.compression_format.as_str();
+        if !matches!(format, "" | "zstd") {
+            let reason = format!("compression_format `{format}` is not read; known: zstd");
+            return Err(Error::format(&metadata_path, Place::Byte(0), reason));
+        }
+        let (mut unpacked, spill) = (None, SpillFile::new(budget));
+        let mut recordings = Sequence::default();
+        for (number, file) in files.iter().enumerate() {
+            if is_packed(file) {
+                let folder = match &mut unpacked {
+                    Some(folder) => folder,
+                    none => none.insert(temporary_folder(scratch)?),
+                };
+                let (plain, damage) = unpack(file, folder.path(), number, &spill)?;
+                // The name of the temporary file would tell nobody anything.
+                let damaged = damage.map(|damage| format!("it is cut off or damaged ({damage})"));
+                let opened = open_file(&plain, budget).map_err(|error| {
+                    let damaged = damaged.as_deref().unwrap_or("it was unpacked");
+                    Error::format(
+                        file,
+                        Place::Byte(0),
+                        format!("{damaged}, and what is in it cannot be read: {error}"),
+                    )
+                })?;
+                let remark =
+                    damaged.map(|damaged| format!("{}: {damaged}; read as far as it goes", file.display()));
+                remarks.extend(remark);
+                recordings.push(opened);
+            } else {
+                recordings.push(open_file(file, budget)?);
+            }
+        }
+        Ok(Self {
+            path: path.to_owned(),
+            files: recordings,
+            has_compressed_messages: metadata.compression_mode.eq_ignore_ascii_case("message"),
+            spill,
+            remarks,
+            _unpacked: unpacked,
+        })
+    }
+}
+
+fn temporary_folder(scratch: Option<&Path>) -> Result<TempDir> {
+    let scratch = scratch.map_or_else(std::env::temp_dir, Path::to_owned);
+    tempfile::tempdir_in(&scratch).map_err(|error| Error::io(&scratch, "unpack a recording into", error))
+}
+
+/// By its name; one that the recorder did not close ends with `.bag.active`.
+fn is_bag1(file: &Path) -> bool {
+    let name = file.to_string_lossy().to_lowercase();
+    name.ends_with(".bag") || name.ends_with(".bag.active")
+}
+
+fn is_packed(file: &Path) -> bool {
+    file.extension().is_some_and(|extension| extension == "zstd" || extension == "zst")
+}
+
+/// A file that the metadata name: beside them, perhaps behind the name of the folder, perhaps compressed since. Of one
+/// that leads out of the folder only the last part counts.
+fn find(folder: &Path, name: &str) -> Result<PathBuf> {
+    let is_inside = is_inside(Path::new(name));
+    let whole = is_inside.then(|| folder.join(name));
+    let last = Path::new(name).file_name().map(|name| folder.join(name));
+    let candidates = [whole, last];
+    let candidates = candidates.into_iter().flatten().flat_map(|path| {
+        let packed = PathBuf::from(format!("{}.zstd", path.display()));
+        [path, packed]
+    });
+    candidates.into_iter().find(|path| path.is_file()).ok_or_else(|| {
+        let reason = match is_inside {
+            true => format!(
+                "metadata.yaml names {name}, which is not there; give the files that are there instead"
+            ),
+            false => format!(
+                "metadata.yaml names {name}, which leads out of the folder and is not read; move the file into it"
+            ),
+        };
+        Error::argument(folder.display().to_string(), reason)
+    })
+}
+
+/// The files of recordings in a folder, in the natural order of their names.
+fn files_of(folder: &Path) -> Result<Vec<PathBuf>> {
+    let wrong = |error| Error::io(folder, "read", error);
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(wrong)? {
+        let path = entry.map_err(wrong)?.path();
+        let name = path.to_string_lossy().to_lowercase();
+        let name = name.trim_end_matches(".zstd");
+        if path.is_file() && (is_bag1(&path) || [".mcap", ".db3"].iter().any(|known| name.ends_with(known))) {
+            files.push(path);
+        }
+    }
+    alphanumeric_sort::sort_path_slice(&mut files);
+    Ok(files)
+}
+
+/// Unpacks a compressed file; as much of it as is whole, and why not more, if it is cut off. Files of other folders, or
+/// `a.mcap.zst` beside `a.mcap.zstd`, may have the same name without its end: the number of the file tells them apart.
+fn unpack(file: &Path, folder: &Path, number: usize, spill: &SpillFile) -> Result<(PathBuf, Option<String>)> {
+    let stem = file.file_stem().unwrap_or_default().to_string_lossy();
+    let target = folder.join(format!("{number}_{stem}"));
+    let input = File::open(file).map_err(|error| Error::io(file, "read", error))?;
+    let mut output = File::create(&target).map_err(|error| Error::io(&target, "write", error))?;
+    let mut decoder =
+        unpacker(BufReader::new(input), spill).map_err(|error| Error::io(file, "unpack", error))?;
+    let mut bytes = vec![0; 1 << 16];
+    loop {
+        match decoder.read(&mut bytes) {
+            Ok(0) => return Ok((target, None)),
+            Ok(count) => {
+                let taken = bytes.get(..count).unwrap_or_default();
+                output.write_all(taken).map_err(|error| Error::io(&target, "write", error))?;
+            }
+            Err(error) => return Ok((target, Some(error.to_string()))),
+        }
+    }
+}
+
+impl Recording for Bag2Folder {
+    fn format(&self) -> &str {
+        self.files.format()
+    }
+
+    fn topics(&self) -> &[Topic] {
+        self.files.topics()
+    }
+
+    fn begin(&mut self, topics: &[usize]) -> Result<()> {
+        self.files.begin(topics)
+    }
+
+    fn next_message(&mut self) -> Result<Option<Message>> {
+        let Some(mut message) = self.files.next_message()? else { return Ok(None) };
+        if self.has_compressed_messages {
+            let input = match &message.data.0 {
+                Bytes::Memory(bytes) => Ok(bytes.as_slice()),
+                Bytes::File(part) => Err(part.reader()),
+            };
+            let memory_bytes = self.spill.budget().bytes / 2;
+            let size = StreamSize::AtMost(MOST_CHUNK_BYTES);
+            let mut unpacked = |input: &mut dyn Read| {
+                decompress("zstd", input, size, &mut self.spill, memory_bytes, &mut |_| {})
+            };
+            let (data, complaint) = match input {
+                Ok(mut bytes) => unpacked(&mut bytes)?,
+                Err(mut reader) => unpacked(&mut reader)?,
+            };
+            if let Some(complaint) = complaint {
+                let (log_ns, why) = (message.log_ns, complaint.reason);
+                let reason = format!("a message recorded at {log_ns} ns cannot be unpacked: {why}");
+                return Err(Error::argument(self.path.display().to_string(), reason));
+            }
+            message.data = MessageData(data);
+        }
+        Ok(Some(message))
+    }
+
+    fn close_files(&mut self) {
+        self.files.close_files();
+    }
+
+    fn remarks(&self) -> Vec<String> {
+        self.remarks.iter().cloned().chain(self.files.remarks()).collect()
+    }
+}

@@ -1,0 +1,230 @@
+use super::bag_options::BagOptions;
+use super::bag_poses::BagPoses;
+use super::bag_topic::{Chosen, choose_clouds};
+use super::cloud_message::CloudMessage;
+use super::message_data::{MessageData, read};
+use super::messages::{CameraInfo, Header, MAX_HEAD_BYTES, MessageKind};
+use super::open::open_recording_within;
+use super::recording::{Message, Recording, Topic};
+use super::wire::Wire;
+use crate::clouds::cloud::{CloudHead, CloudPoint, CloudSource, PoseAt};
+use crate::clouds::error::{Error, Place, Result};
+use crate::clouds::spill::{Bytes, FilePart};
+use std::path::PathBuf;
+
+/// The clouds of one topic of a recording, with the poses that the recording knows.
+pub struct BagClouds {
+    path: PathBuf,
+    recording: Box<dyn Recording>,
+    topic: Topic,
+    wire: Wire,
+    chosen: Chosen,
+    camera: Option<CameraInfo>,
+    poses: BagPoses,
+    /// Number of the next cloud.
+    next: u64,
+    current: Option<Current>,
+    /// The largest message that is held in memory.
+    whole_bytes: u64,
+    /// The frame of the cloud at hand.
+    frame: Option<String>,
+    /// Number of clouds whose stamp is 0.
+    without_stamp: u64,
+}
+
+/// The message of the cloud at hand.
+struct Current {
+    log_ns: i64,
+    /// The message or, of a large one, its first bytes.
+    bytes: Vec<u8>,
+    /// All of a large message.
+    part: Option<FilePart>,
+}
+
+/// Opens the clouds of a recording: a file, the folder of a bag of ROS 2, or several that follow one another in time.
+///
+/// The recording is read once for its poses here, and once more for its clouds.
+///
+/// # Errors
+///
+/// A file that cannot be read or is no recording; no topic with clouds, or several and none is chosen.
+pub fn open_bag(paths: &[PathBuf], options: &BagOptions) -> Result<BagClouds> {
+    let path = paths.first().cloned().unwrap_or_default();
+    let name_it = |error| match error {
+        Error::Argument { what, reason } if what == "recording" => {
+            Error::argument(path.display().to_string(), reason)
+        }
+        error => error,
+    };
+    let mut recording = open_recording_within(paths, &options.budget()).map_err(name_it)?;
+    let whole_bytes = options.budget().whole_bytes();
+    let chosen = choose_clouds(recording.as_mut(), options.topic.as_deref(), whole_bytes).map_err(name_it)?;
+    let poses = BagPoses::read(recording.as_mut(), options).map_err(name_it)?;
+    let topic = recording.topics().get(chosen.index).cloned();
+    let gone = || Error::argument(path.display().to_string(), "the topic of the clouds is gone");
+    let topic = topic.ok_or_else(gone)?;
+    let wire = topic.wire.ok_or_else(gone)?;
+    let camera = match chosen.camera {
+        Some(index) => Some(read_camera(recording.as_mut(), index, whole_bytes).map_err(name_it)?),
+        None => None,
+    };
+    recording.begin(&[chosen.index])?;
+    Ok(BagClouds {
+        path,
+        recording,
+        topic,
+        wire,
+        chosen,
+        camera,
+        poses,
+        next: 0,
+        current: None,
+        whole_bytes,
+        frame: None,
+        without_stamp: 0,
+    })
+}
+
+/// The first camera of a topic that is whole: cameras do not change while they record.
+fn read_camera(recording: &mut dyn Recording, index: usize, whole_bytes: u64) -> Result<CameraInfo> {
+    let topic = recording.topics().get(index).cloned();
+    let (name, wire) = topic.map_or_else(Default::default, |topic| (topic.name, topic.wire));
+    recording.begin(&[index])?;
+    let mut last = format!("depth images need their camera, but {name} holds no message");
+    loop {
+        match recording.next_message() {
+            Ok(Some(mut message)) => {
+                let data = message.data.load(whole_bytes);
+                let data = data.map_err(|error| error.to_string());
+                let decode = |data: &[u8]| CameraInfo::decode(wire.unwrap_or(Wire::Cdr), data);
+                match data.and_then(|data| decode(data).map_err(|error| error.to_string())) {
+                    Ok(camera) => return Ok(camera),
+                    Err(error) => last = format!("no message of {name} can be used; the last: {error}"),
+                }
+            }
+            Ok(None) => return Err(Error::argument("recording", last)),
+            Err(error @ Error::Io { .. }) => return Err(error),
+            // Bad parts are told of when clouds are read.
+            Err(_) => {}
+        }
+    }
+}
+
+impl BagClouds {
+    /// The topic that is read.
+    pub fn topic(&self) -> &Topic {
+        &self.topic
+    }
+
+    /// All topics of the recording.
+    pub fn topics(&self) -> &[Topic] {
+        self.recording.topics()
+    }
+
+    /// The bytes of a message that are needed at a time.
+    fn current(&self, message: Message, number: u64) -> Result<Current> {
+        let Message { log_ns, mut data, .. } = message;
+        if self.chosen.kind != MessageKind::PointCloud2 {
+            // Points of other kinds cannot be read piece by piece.
+            data.load(self.whole_bytes).map_err(|error| match error {
+                Error::Argument { reason, .. } => self.wrong(number, &reason),
+                error => error,
+            })?;
+        }
+        Ok(match data {
+            MessageData(Bytes::Memory(bytes)) => Current { log_ns, bytes, part: None },
+            MessageData(Bytes::File(part)) => {
+                Current { log_ns, bytes: read(&part, MAX_HEAD_BYTES)?, part: Some(part) }
+            }
+        })
+    }
+
+    fn decode<'a>(&'a self, message: &'a Current, number: u64) -> Result<CloudMessage<'a>> {
+        let (kind, wire, bytes) = (self.chosen.kind, self.wire, message.bytes.as_slice());
+        let cloud = match &message.part {
+            Some(part) => CloudMessage::decode_start(wire, bytes, part.len()),
+            None => CloudMessage::decode(kind, wire, bytes, self.camera.as_ref()),
+        };
+        cloud.map_err(|error| self.wrong(number, &error))
+    }
+
+    fn wrong(&self, number: u64, error: &dyn std::fmt::Display) -> Error {
+        Error::format(&self.path, Place::Record(number), format!("topic {}: {error}", self.topic.name))
+    }
+}
+
+/// When a cloud was taken: drivers without a clock leave its stamp at 0.
+fn stamp_of(header: &Header, message: &Current) -> i64 {
+    if header.stamp_ns == 0 { message.log_ns } else { header.stamp_ns }
+}
+
+impl CloudSource for BagClouds {
+    fn format(&self) -> &str {
+        self.recording.format()
+    }
+
+    fn len_hint(&self) -> Option<u64> {
+        Some(self.topic.messages)
+    }
+
+    fn next_cloud(&mut self) -> Result<Option<CloudHead>> {
+        self.current = None;
+        let message = match self.recording.next_message() {
+            Ok(Some(message)) => message,
+            Ok(None) => return Ok(None),
+            Err(error) => {
+                // One that is damaged has a number, too.
+                self.next += u64::from(!matches!(error, Error::Io { .. }));
+                return Err(error);
+            }
+        };
+        let number = self.next;
+        self.next += 1;
+        let message = self.current(message, number)?;
+        let cloud = self.decode(&message, number)?;
+        let header = cloud.header().clone();
+        let stamp_ns = stamp_of(&header, &message);
+        let (points, fields) = (cloud.points_claimed(), cloud.fields());
+        let (has_intensities, has_times) = (cloud.has_intensities(), cloud.has_times());
+        self.without_stamp += u64::from(header.stamp_ns == 0);
+        let head = CloudHead {
+            name: number.to_string(),
+            stamp_ns: Some(stamp_ns),
+            world_from_sensor: self.poses.world_from_sensor(&header.frame_id, stamp_ns)?,
+            frame: Some(header.frame_id),
+            points: Some(points),
+            fields,
+            has_intensities,
+            has_times,
+        };
+        self.current = Some(message);
+        self.frame.clone_from(&head.frame);
+        Ok(Some(head))
+    }
+
+    fn read_points(&mut self, visit: &mut dyn FnMut(CloudPoint) -> Result<()>) -> Result<()> {
+        let Some(message) = self.current.take() else { return Ok(()) };
+        let number = self.next.saturating_sub(1);
+        let mut cloud = self.decode(&message, number)?;
+        let stamp_ns = stamp_of(cloud.header(), &message);
+        cloud.count_times_from(stamp_ns);
+        let shortage = cloud.visit(message.part.as_ref(), visit)?;
+        shortage.map_or(Ok(()), |error| Err(self.wrong(number, &error)))
+    }
+
+    fn poses(&self) -> Option<PoseAt> {
+        let lookup = self.poses.lookup(self.frame.as_deref()?).ok()?;
+        Some(Box::new(move |stamp_ns| lookup.pose(stamp_ns)))
+    }
+
+    fn remarks(&self) -> Vec<String> {
+        let mut remarks = self.recording.remarks();
+        remarks.extend(self.poses.remarks());
+        if self.without_stamp > 0 {
+            let count = self.without_stamp;
+            remarks
+                .push(format!("{count} clouds have no stamp; they are taken as of when they were recorded"));
+        }
+        remarks
+    }
+}

@@ -1,0 +1,149 @@
+use crate::clouds::error::{Error, Result};
+use crate::clouds::spill::{Bytes, Complaint, FilePart, Record, SpillFile, StreamSize};
+use std::cmp::Ordering;
+use std::io::Read;
+use std::sync::Arc;
+
+/// A part of a file whose messages are read together.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct ChunkPlace {
+    /// Bytes of the file before it.
+    pub(super) offset: u64,
+    /// Its bytes in the file; fewer are there if it is cut off.
+    pub(super) bytes: u64,
+    /// No message of it is earlier.
+    pub(super) start_ns: i64,
+    /// The topics that it has messages of; `None` if that is not known. Chunks share their lists.
+    pub(super) topics: Option<Arc<[usize]>>,
+    /// Its bytes are records of the file itself, not compressed and without a frame.
+    pub(super) is_bare: bool,
+}
+
+/// A chunk of which messages are found.
+#[derive(Debug, Default)]
+pub(super) struct OpenChunk {
+    pub(super) bytes: Bytes,
+    /// What is wrong with it: its messages are those before the bad place. Where it is broken, no message is taken.
+    pub(super) complaint: Option<Complaint>,
+}
+
+impl OpenChunk {
+    /// Whether any byte of it may be wrong.
+    pub(super) fn is_broken(&self) -> bool {
+        self.complaint.as_ref().is_some_and(|complaint| complaint.is_broken)
+    }
+
+    /// Notes that no record starts where one should, unless something else is wrong already.
+    pub(super) fn note(complaint: &mut Option<Complaint>, reason: String) {
+        complaint.get_or_insert(Complaint { reason, is_broken: false });
+    }
+}
+
+/// A message in a chunk.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct MessagePlace {
+    pub(super) log_ns: i64,
+    pub(super) start: u64,
+    pub(super) len: u64,
+    pub(super) topic: usize,
+}
+
+impl Record for MessagePlace {
+    const BYTES: usize = 32;
+
+    fn encode(&self, bytes: &mut [u8]) {
+        let numbers = [self.log_ns.cast_unsigned(), self.start, self.len, self.topic as u64];
+        for (to, from) in bytes.iter_mut().zip(numbers.into_iter().flat_map(u64::to_le_bytes)) {
+            *to = from;
+        }
+    }
+
+    fn decode(bytes: &[u8]) -> Self {
+        let (numbers, _) = bytes.as_chunks::<8>();
+        let number = |k: usize| numbers.get(k).copied().map_or(0, u64::from_le_bytes);
+        let topic = usize::try_from(number(3)).unwrap_or(usize::MAX);
+        Self { log_ns: number(0).cast_signed(), start: number(1), len: number(2), topic }
+    }
+
+    fn order(&self, other: &Self) -> Ordering {
+        (self.log_ns, self.start).cmp(&(other.log_ns, other.start))
+    }
+}
+
+/// A chunk that takes more bytes is not read, not even into a temporary file.
+pub(super) const MOST_CHUNK_BYTES: u64 = 1 << 30;
+
+/// What to do about a window of zstd that is too large.
+const WINDOW_HINT: &str =
+    "raise --memory, or compress it with a smaller window (zstd without --long and --ultra)";
+
+/// Unpacks a compressed stream, as far as it goes, and says why not all of it. `see` gets the bytes in order.
+pub(super) fn decompress(
+    compression: &str,
+    input: impl Read,
+    size: StreamSize,
+    spill: &mut SpillFile,
+    memory_bytes: usize,
+    see: &mut dyn FnMut(&[u8]),
+) -> Result<(Bytes, Option<Complaint>)> {
+    let bare = |reason: String| Complaint { reason, is_broken: false };
+    let (plain, complaint) = match compression {
+        "bz2" => spill.take(bzip2::read::BzDecoder::new(input), size, memory_bytes, see)?,
+        "lz4" => spill.take(lz4_flex::frame::FrameDecoder::new(input), size, memory_bytes, see)?,
+        "zstd" => match unpacker(input, spill) {
+            Ok(decoder) => {
+                let (plain, complaint) = spill.take(decoder, size, memory_bytes, see)?;
+                // The library says so of a window.
+                let hinted = complaint.map(|complaint| match complaint.reason.contains("too much memory") {
+                    true => Complaint { reason: format!("{}: {WINDOW_HINT}", complaint.reason), ..complaint },
+                    false => complaint,
+                });
+                (plain, hinted)
+            }
+            Err(error) => (Bytes::default(), Some(bare(error.to_string()))),
+        },
+        other => {
+            let reason = format!("compression `{other}` is not known; known: none, bz2, lz4, zstd");
+            (Bytes::default(), Some(bare(reason)))
+        }
+    };
+    let complaint = complaint.or_else(|| match size {
+        StreamSize::Claimed(claimed) => {
+            let missing = claimed.saturating_sub(plain.len());
+            (missing > 0).then(|| bare(format!("{missing} of {claimed} bytes are missing")))
+        }
+        StreamSize::AtMost(_) => None,
+    });
+    Ok((plain, complaint))
+}
+
+/// The bytes of a chunk that is not compressed: in memory or, of a large one, where they are.
+pub(super) fn plain(
+    part: FilePart,
+    memory_bytes: usize,
+    input: &mut dyn Read,
+    see: &mut dyn FnMut(&[u8]),
+) -> Result<(Bytes, Option<Complaint>)> {
+    let fail = |error| Error::io(part.path(), "read", error);
+    if part.len() <= memory_bytes as u64 {
+        let mut taken = Vec::with_capacity(usize::try_from(part.len()).unwrap_or(0));
+        input.read_to_end(&mut taken).map_err(fail)?;
+        see(&taken);
+        return Ok((Bytes::Memory(taken), None));
+    }
+    let mut buffer = vec![0; 1 << 16];
+    loop {
+        let count = input.read(&mut buffer).map_err(fail)?;
+        if count == 0 {
+            return Ok((Bytes::File(part), None));
+        }
+        see(buffer.get(..count).unwrap_or_default());
+    }
+}
+
+/// Unpacks zstd. A frame says how much memory it needs, which is believed up to a bound.
+pub(super) fn unpacker<'i, R: Read + 'i>(input: R, spill: &SpillFile) -> std::io::Result<Box<dyn Read + 'i>> {
+    let mut decoder = zstd::stream::read::Decoder::new(input)?;
+    decoder.window_log_max(spill.budget().window_log())?;
+    Ok(Box::new(decoder))
+}

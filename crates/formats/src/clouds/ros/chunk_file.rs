@@ -1,0 +1,131 @@
+use super::chunk::{ChunkPlace, MessagePlace, OpenChunk};
+use super::chunk_order::{BrokenChunk, ChunkOrder, Step};
+use super::recording::{Message, TopicList};
+use crate::clouds::error::{Error, Place, Result};
+use crate::clouds::spill::{Budget, Complaint};
+use std::collections::HashMap;
+use std::path::Path;
+
+/// A recording whose messages lie in chunks.
+pub(super) trait ChunkFile {
+    fn path(&self) -> &Path;
+
+    fn order(&mut self) -> &mut ChunkOrder;
+
+    /// The next step of the order.
+    fn step(&mut self) -> Result<Step>;
+
+    /// Reads a chunk, and finds its messages.
+    fn load(&mut self, place: &ChunkPlace, take: &mut TakeMessage<'_>) -> Result<OpenChunk>;
+
+    /// The topics and the places of chunks.
+    fn found(&mut self) -> (&mut TopicList, &mut Vec<ChunkPlace>);
+
+    /// Looks into the next chunk of a file without an index: takes its place, and counts its messages.
+    fn look_into(&mut self, offset: u64, bytes: u64, walk: &mut Walk) -> Result<()> {
+        let start_ns = walk.start_ns.unwrap_or(i64::MIN);
+        let place = ChunkPlace { offset, bytes, start_ns, topics: None, is_bare: false };
+        let (mut earliest, mut counts) = (None, HashMap::<usize, u64>::new());
+        let loaded = self.load(&place, &mut |MessagePlace { log_ns, topic, .. }| {
+            *counts.entry(topic).or_default() += 1;
+            earliest = Some(earliest.map_or(log_ns, |earliest: i64| earliest.min(log_ns)));
+            Ok(())
+        });
+        match loaded {
+            Err(error @ Error::Io { .. }) => return Err(error),
+            Ok(chunk) if !chunk.is_broken() => walk.messages += counts.values().sum::<u64>(),
+            // Each of its messages is an error when it is its turn.
+            Ok(_) => earliest = None,
+            Err(_) => (earliest, counts) = Default::default(),
+        }
+        walk.start_ns = earliest.or(walk.start_ns);
+        check_chunks(self.found().1.len(), self.order().shares(), self.path())?;
+        let (topics, places) = self.found();
+        counts.into_iter().for_each(|(topic, messages)| topics.count(topic, messages));
+        places.push(ChunkPlace { start_ns: walk.start_ns.unwrap_or(i64::MIN), ..place });
+        Ok(())
+    }
+
+    /// The next message of all chunks, in order of time. A damaged chunk is reported once, and what is whole of it
+    /// follows. Of a broken one, each message is an error.
+    fn next_in_order(&mut self) -> Result<Option<Message>> {
+        loop {
+            let place = match self.step()? {
+                Step::Load(place) => place,
+                Step::Message(message) => return Ok(Some(message)),
+                Step::End => return Ok(None),
+            };
+            let wanted = std::mem::take(&mut self.order().topics);
+            let (mut sorter, mut whole) = (self.order().sorter(), 0_u64);
+            let loaded = self.load(&place, &mut |message| {
+                if wanted.contains(message.topic) {
+                    whole += 1;
+                    return sorter.push(message);
+                }
+                Ok(())
+            });
+            self.order().topics = wanted;
+            let mut chunk = loaded?;
+            let sorted = sorter.finish()?;
+            let Some(Complaint { reason, is_broken }) = chunk.complaint.take() else {
+                self.order().open(Ok(chunk.bytes), sorted, whole)?;
+                continue;
+            };
+            if is_broken && whole > 0 {
+                let (path, offset) = (self.path().to_owned(), place.offset);
+                self.order().open(Err(BrokenChunk { path, offset, reason }), sorted, whole)?;
+                continue;
+            }
+            self.order().open(Ok(chunk.bytes), sorted, whole)?;
+            let reason = format!("a chunk is damaged: {reason}; {whole} messages of it can be read");
+            return Err(Error::format(self.path(), Place::Byte(place.offset), reason));
+        }
+    }
+}
+
+/// Takes the messages of a chunk.
+pub(super) type TakeMessage<'t> = dyn FnMut(MessagePlace) -> Result<()> + 't;
+
+/// How the memory of a recording is divided.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Shares {
+    /// For the bytes of chunks that are played together.
+    pub(super) chunks: usize,
+    /// For the places of their messages.
+    pub(super) messages: usize,
+    /// For the places of all chunks.
+    pub(super) places: usize,
+}
+
+impl Shares {
+    pub(super) fn of(budget: &Budget) -> Self {
+        Self {
+            chunks: budget.bytes / 2,
+            messages: budget.bytes / 4,
+            // In the first bytes of memory are those of a few hundred gigabytes.
+            places: usize::try_from(budget.whole_bytes()).unwrap_or(usize::MAX),
+        }
+    }
+}
+
+/// What a walk over the chunks of a file without an index has found.
+#[derive(Debug, Default)]
+pub(super) struct Walk {
+    pub(super) messages: u64,
+    /// The earliest message of the last chunk that had one.
+    start_ns: Option<i64>,
+}
+
+/// Checks that the place of one more chunk fits in memory.
+pub(super) fn check_chunks(chunks: usize, shares: Shares, path: &Path) -> Result<()> {
+    // The order in which they are played takes a number for each.
+    if chunks < shares.places / (size_of::<ChunkPlace>() + size_of::<u32>()) {
+        return Ok(());
+    }
+    let reason = format!(
+        "has more than {} chunks, whose places would exceed {} bytes of memory: raise --memory, or record with larger \
+         chunks",
+        chunks, shares.places
+    );
+    Err(Error::argument(path.display().to_string(), reason))
+}

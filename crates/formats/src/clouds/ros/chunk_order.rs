@@ -1,0 +1,201 @@
+use super::chunk::{ChunkPlace, MOST_CHUNK_BYTES, MessagePlace};
+use super::chunk_file::Shares;
+use super::message_data::{MessageData, read};
+use super::recording::{Message, TopicSet};
+use crate::clouds::error::{Error, Place, Result};
+use crate::clouds::spill::{Budget, Bytes, Record, Sorted, Sorter};
+use std::path::{Path, PathBuf};
+
+/// Puts the messages of chunks in order of time. Chunks overlap a little; those that do are played together.
+#[derive(Debug)]
+pub(super) struct ChunkOrder {
+    /// What messages are wanted of.
+    pub(super) topics: TopicSet,
+    budget: Budget,
+    /// Numbers of chunks in order of their starts.
+    order: Vec<u32>,
+    next: usize,
+    open: Vec<Playing>,
+    /// Messages may be out of order, because too many chunks overlap.
+    has_given_up: bool,
+}
+
+#[derive(Debug)]
+struct Playing {
+    bytes: std::result::Result<Bytes, BrokenChunk>,
+    /// The next message.
+    head: MessagePlace,
+    /// The messages after it, in order of time, and how many all are.
+    rest: Sorted<MessagePlace>,
+    messages: u64,
+    /// Number of the chunk in its file.
+    number: usize,
+}
+
+/// A chunk of which any byte may be wrong. Each of its messages is an error, so that those behind keep their numbers.
+#[derive(Debug)]
+pub(super) struct BrokenChunk {
+    pub(super) path: PathBuf,
+    pub(super) offset: u64,
+    pub(super) reason: String,
+}
+
+impl BrokenChunk {
+    fn error(&self, log_ns: i64) -> Error {
+        let reason =
+            format!("a chunk is damaged: {}; its message recorded at {log_ns} ns is left out", self.reason);
+        Error::format(&self.path, Place::Byte(self.offset), reason)
+    }
+}
+
+impl Playing {
+    fn bytes(&self) -> Option<&Bytes> {
+        self.bytes.as_ref().ok()
+    }
+}
+
+/// What to do next.
+#[derive(Debug)]
+pub(super) enum Step {
+    /// Read this chunk and give it to [`ChunkOrder::open`].
+    Load(ChunkPlace),
+    /// The next message.
+    Message(Message),
+    /// There is nothing left.
+    End,
+}
+
+/// Most chunks that are played together.
+const MAX_OPEN: usize = 1024;
+/// A message of so many bytes is taken into memory, from wherever it is.
+const SMALL_BYTES: u64 = 1 << 16;
+
+impl ChunkOrder {
+    pub(super) fn new(budget: &Budget) -> Self {
+        let (topics, order, open) = Default::default();
+        Self { topics, budget: budget.clone(), order, next: 0, open, has_given_up: false }
+    }
+
+    /// Begins with these chunks.
+    pub(super) fn begin(&mut self, places: &[ChunkPlace], topics: &[usize]) {
+        let topics = TopicSet::of(topics);
+        let is_wanted = |place: &ChunkPlace| {
+            place.topics.as_ref().is_none_or(|there| there.iter().any(|topic| topics.contains(*topic)))
+        };
+        let mut order: Vec<u32> =
+            (0..).zip(places).filter(|(_, place)| is_wanted(place)).map(|(number, _)| number).collect();
+        order.sort_by_key(|number| places.get(*number as usize).map(|place| (place.start_ns, place.offset)));
+        *self = Self { topics, order, ..Self::new(&self.budget) };
+    }
+
+    /// How the memory of the recording is divided.
+    pub(super) fn shares(&self) -> Shares {
+        Shares::of(&self.budget)
+    }
+
+    /// Sorts the messages of a chunk that is to be loaded.
+    pub(super) fn sorter(&self) -> Sorter<MessagePlace> {
+        let share = Shares::of(&self.budget).messages as u64;
+        let held: u64 = self.open.iter().map(|playing| playing.messages * MessagePlace::BYTES as u64).sum();
+        Sorter::new(&self.budget, usize::try_from(share.saturating_sub(held)).unwrap_or(0))
+    }
+
+    /// Bytes of memory for a chunk that is to be loaded.
+    pub(super) fn chunk_bytes(&self) -> usize {
+        let held: usize = self.open.iter().filter_map(Playing::bytes).map(Bytes::in_memory).sum();
+        Shares::of(&self.budget).chunks.saturating_sub(held)
+    }
+
+    /// The next step.
+    pub(super) fn step(&mut self, places: &[ChunkPlace]) -> Result<Step> {
+        let earliest = self.earliest();
+        let next = self.order.get(self.next).and_then(|number| places.get(*number as usize));
+        if let Some(place) = next {
+            let is_due = earliest.is_none_or(|(_, log_ns)| place.start_ns <= log_ns);
+            let held: u64 = self.open.iter().filter_map(Playing::bytes).map(Bytes::len).sum();
+            // A file whose chunks all overlap would be open as a whole.
+            let is_room = earliest.is_none() || (held < MOST_CHUNK_BYTES && self.open.len() < MAX_OPEN);
+            self.has_given_up |= is_due && !is_room;
+            if is_due && is_room {
+                self.next += 1;
+                return Ok(Step::Load(place.clone()));
+            }
+        }
+        match earliest {
+            Some((index, _)) => Ok(self.take(index)?.map_or(Step::End, Step::Message)),
+            None => Ok(Step::End),
+        }
+    }
+
+    /// What a person should know of the order of a file's messages.
+    pub(super) fn remark(&self, path: &Path) -> Option<String> {
+        let text =
+            || format!("{}: its chunks overlap so much that messages come out of order", path.display());
+        self.has_given_up.then(text)
+    }
+
+    /// Takes a chunk that was asked for, and its messages.
+    pub(super) fn open(
+        &mut self,
+        bytes: std::result::Result<Bytes, BrokenChunk>,
+        mut rest: Sorted<MessagePlace>,
+        messages: u64,
+    ) -> Result<()> {
+        if let Some(head) = rest.next()? {
+            self.open.push(Playing { bytes, head, rest, messages, number: self.next });
+        }
+        Ok(())
+    }
+
+    /// The open chunk with the earliest message, and its time.
+    fn earliest(&self) -> Option<(usize, i64)> {
+        let heads = self.open.iter().enumerate();
+        let heads = heads.map(|(index, playing)| (playing.head.log_ns, playing.number, index));
+        heads.min().map(|(log_ns, _, index)| (index, log_ns))
+    }
+
+    fn take(&mut self, index: usize) -> Result<Option<Message>> {
+        let Some(playing) = self.open.get_mut(index) else { return Ok(None) };
+        let MessagePlace { log_ns, topic, start, len } = playing.head;
+        let data = match &playing.bytes {
+            Err(broken) => Err(broken.error(log_ns)),
+            Ok(Bytes::Memory(bytes)) => {
+                let range = usize::try_from(start).ok().zip(usize::try_from(len).ok());
+                let data = range.and_then(|(start, len)| bytes.get(start..start.checked_add(len)?));
+                Ok(Bytes::Memory(data.unwrap_or_default().to_vec()))
+            }
+            Ok(Bytes::File(part)) if len <= SMALL_BYTES => {
+                read(&part.part(start, len), len).map(Bytes::Memory)
+            }
+            Ok(Bytes::File(part)) => Ok(Bytes::File(part.part(start, len))),
+        };
+        // A message that cannot be read is passed over, or it would come again for ever.
+        match playing.rest.next()? {
+            Some(next) => playing.head = next,
+            None => drop(self.open.swap_remove(index)),
+        }
+        Ok(Some(Message { topic, log_ns, data: MessageData(data?) }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::clouds::spill::FilePart;
+
+    #[test]
+    fn messages_that_cannot_be_read_are_told_of_once() {
+        let cut = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(cut.path(), [7; 10]).unwrap();
+        let mut order = ChunkOrder::new(&Budget::default());
+        let mut sorter = order.sorter();
+        for start in [0, 8, 16] {
+            sorter.push(MessagePlace { log_ns: 5, start, len: 8, topic: 0 }).unwrap();
+        }
+        let bytes = Bytes::File(FilePart::open(cut.path(), 0, 24).unwrap());
+        order.open(Ok(bytes), sorter.finish().unwrap(), 3).unwrap();
+        assert!(matches!(order.step(&[]), Ok(Step::Message(message)) if message.data.len() == 8));
+        assert!(order.step(&[]).is_err() && order.step(&[]).is_err());
+        assert!(matches!(order.step(&[]), Ok(Step::End)));
+    }
+}

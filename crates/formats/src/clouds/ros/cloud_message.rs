@@ -1,0 +1,129 @@
+use super::messages::{CameraInfo, Header, Image, LaserScan, LivoxCustom, MessageKind, PointCloud2};
+use super::wire::{Wire, WireError};
+use crate::clouds::cloud::CloudPoint;
+use crate::clouds::error::Result;
+use crate::clouds::spill::FilePart;
+
+/// A message that is a cloud.
+pub(super) enum CloudMessage<'a> {
+    PointCloud2(PointCloud2<'a>),
+    Livox(LivoxCustom<'a>),
+    LaserScan(LaserScan),
+    Depth(Image<'a>, &'a CameraInfo),
+}
+
+impl<'a> CloudMessage<'a> {
+    pub(super) fn decode(
+        kind: MessageKind,
+        wire: Wire,
+        data: &'a [u8],
+        camera: Option<&'a CameraInfo>,
+    ) -> std::result::Result<Self, WireError> {
+        Ok(match (kind, camera) {
+            (MessageKind::PointCloud2, _) => Self::PointCloud2(PointCloud2::decode(wire, data)?),
+            (MessageKind::LivoxCustom, _) => Self::Livox(LivoxCustom::decode(wire, data)?),
+            (MessageKind::LaserScan, _) => Self::LaserScan(LaserScan::decode(wire, data)?),
+            (MessageKind::Image, Some(camera)) => Self::Depth(Image::decode(wire, data)?, camera),
+            _ => return Err(WireError { byte: 0, reason: "it is no cloud".to_owned() }),
+        })
+    }
+
+    /// Decodes a `PointCloud2` of `len` bytes of which only the first are at hand.
+    pub(super) fn decode_start(
+        wire: Wire,
+        start: &'a [u8],
+        len: u64,
+    ) -> std::result::Result<Self, WireError> {
+        PointCloud2::decode_start(wire, start, len).map(Self::PointCloud2)
+    }
+
+    pub(super) fn header(&self) -> &Header {
+        match self {
+            Self::PointCloud2(cloud) => &cloud.header,
+            Self::Livox(cloud) => &cloud.header,
+            Self::LaserScan(scan) => &scan.header,
+            Self::Depth(image, _) => &image.header,
+        }
+    }
+
+    /// Takes this as the stamp of the message: times of points are told from there on.
+    pub(super) fn count_times_from(&mut self, stamp_ns: i64) {
+        match self {
+            Self::PointCloud2(cloud) => cloud.header.stamp_ns = stamp_ns,
+            Self::Livox(cloud) => cloud.header.stamp_ns = stamp_ns,
+            // Their times are after the stamp, whichever it is.
+            Self::LaserScan(_) | Self::Depth(..) => {}
+        }
+    }
+
+    pub(super) fn points_claimed(&self) -> u64 {
+        match self {
+            Self::PointCloud2(cloud) => cloud.points_claimed(),
+            Self::Livox(cloud) => cloud.count as u64,
+            // Beams that mean nothing are left out.
+            Self::LaserScan(scan) => scan.points().count() as u64,
+            Self::Depth(image, _) => image.pixels_claimed(),
+        }
+    }
+
+    pub(super) fn fields(&self) -> Vec<String> {
+        let names: &[&str] = match self {
+            Self::PointCloud2(cloud) => return cloud.fields.iter().map(|field| field.name.clone()).collect(),
+            Self::Livox(_) => &["offset_time", "x", "y", "z", "reflectivity", "tag", "line"],
+            Self::LaserScan(scan) if scan.intensities.is_empty() => &["ranges"],
+            Self::LaserScan(_) => &["ranges", "intensities"],
+            Self::Depth(..) => &["depth"],
+        };
+        names.iter().map(|name| (*name).to_owned()).collect()
+    }
+
+    pub(super) fn has_intensities(&self) -> bool {
+        match self {
+            Self::PointCloud2(cloud) => cloud.has_intensities(),
+            Self::Livox(_) => true,
+            Self::LaserScan(scan) => !scan.intensities.is_empty(),
+            Self::Depth(..) => false,
+        }
+    }
+
+    pub(super) fn has_times(&self) -> bool {
+        match self {
+            Self::PointCloud2(cloud) => cloud.has_times(),
+            Self::Livox(_) => true,
+            Self::LaserScan(scan) => scan.time_increment_s != 0.0,
+            Self::Depth(..) => false,
+        }
+    }
+
+    /// Visits all points that are there; returns why there are not more. `part` is a message of which the first bytes
+    /// were decoded.
+    pub(super) fn visit(
+        &self,
+        part: Option<&FilePart>,
+        visit: &mut dyn FnMut(CloudPoint) -> Result<()>,
+    ) -> Result<Option<WireError>> {
+        match self {
+            Self::PointCloud2(cloud) => {
+                if let Some(part) = part {
+                    return cloud.visit_part(part, visit);
+                }
+                cloud.points().try_for_each(visit)?;
+                Ok(cloud.shortage())
+            }
+            Self::Livox(cloud) => {
+                for point in cloud.points() {
+                    match point {
+                        Ok(point) => visit(point)?,
+                        Err(error) => return Ok(Some(error)),
+                    }
+                }
+                Ok(None)
+            }
+            Self::LaserScan(scan) => scan.points().try_for_each(visit).map(|()| None),
+            Self::Depth(image, camera) => {
+                image.points(camera).try_for_each(visit)?;
+                Ok(image.shortage())
+            }
+        }
+    }
+}

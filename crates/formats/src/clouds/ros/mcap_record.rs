@@ -1,0 +1,192 @@
+use super::file_bytes::{Pieces, signed_ns};
+use super::recording::TopicList;
+use super::wire::Wire;
+use crate::clouds::spill::Complaint;
+use std::collections::{HashMap, HashSet};
+use std::ops::Range;
+use std::sync::Arc;
+
+/// The first and the last bytes of an MCAP file.
+pub(super) const MAGIC: &[u8] = b"\x89MCAP0\r\n";
+/// Bytes of a record before its contents: its kind and its length.
+pub(super) const RECORD_HEAD_BYTES: u64 = 9;
+/// Bytes of a message before its data: channel, sequence, two times.
+pub(super) const MESSAGE_HEAD_BYTES: u64 = 2 + 4 + 8 + 8;
+
+/// Kinds of records.
+pub(super) mod op {
+    pub(in crate::clouds::ros) const FOOTER: u8 = 2;
+    pub(in crate::clouds::ros) const SCHEMA: u8 = 3;
+    pub(in crate::clouds::ros) const CHANNEL: u8 = 4;
+    pub(in crate::clouds::ros) const MESSAGE: u8 = 5;
+    pub(in crate::clouds::ros) const CHUNK: u8 = 6;
+    pub(in crate::clouds::ros) const CHUNK_INDEX: u8 = 8;
+    pub(in crate::clouds::ros) const STATISTICS: u8 = 11;
+    pub(in crate::clouds::ros) const DATA_END: u8 = 15;
+}
+
+/// The channels of a file: what its messages are.
+#[derive(Debug, Default)]
+pub(super) struct Channels {
+    types: HashMap<u16, String>,
+    /// `None` for a topic that is left out, because there are too many.
+    topics: HashMap<u16, Option<usize>>,
+}
+
+/// The bytes of a schema or a channel that are read: its names come first.
+pub(super) const MAX_NAMES_BYTES: u64 = 1 << 14;
+
+/// The record at a place of some bytes: its kind, its contents and the place behind it.
+pub(super) fn record_at(bytes: &[u8], at: usize) -> Option<(u8, Range<usize>, usize)> {
+    let mut pieces = Pieces { bytes, at };
+    let (kind, count) = (pieces.u8()?, usize::try_from(pieces.u64()?).ok()?);
+    let start = pieces.at;
+    pieces.take(count)?;
+    Some((kind, start..pieces.at, pieces.at))
+}
+
+impl Channels {
+    pub(super) fn is_empty(&self) -> bool {
+        self.topics.is_empty()
+    }
+
+    /// The topic of a channel, or that it is left out; `None` if the channel is not known.
+    pub(super) fn topic(&self, channel: u16) -> Option<Option<usize>> {
+        self.topics.get(&channel).copied()
+    }
+
+    /// Whether the contents of a schema or channel record have a number that is known already.
+    pub(super) fn knows(&self, kind: u8, contents: &[u8]) -> bool {
+        let id = Pieces::new(contents).u16();
+        id.is_some_and(|id| match kind {
+            op::SCHEMA => self.types.contains_key(&id),
+            _ => self.topics.contains_key(&id),
+        })
+    }
+
+    /// Takes the contents of a schema record.
+    pub(super) fn add_schema(&mut self, contents: &[u8]) -> Option<()> {
+        let mut pieces = Pieces::new(contents);
+        let id = pieces.u16()?;
+        self.types.insert(id, pieces.name()?);
+        Some(())
+    }
+
+    /// Takes the contents of a channel record.
+    pub(super) fn add_channel(&mut self, contents: &[u8], topics: &mut TopicList) -> Option<()> {
+        let mut pieces = Pieces::new(contents);
+        let (id, schema) = (pieces.u16()?, pieces.u16()?);
+        let (name, encoding) = (pieces.name()?, pieces.name()?);
+        let wire = match encoding.as_str() {
+            "ros1" => Some(Wire::Ros1),
+            "cdr" => Some(Wire::Cdr),
+            _ => None,
+        };
+        let type_name = self.types.get(&schema).map_or("", String::as_str);
+        self.topics.insert(id, topics.index(&name, type_name, wire));
+        Some(())
+    }
+}
+
+/// The start of a message: its channel, and when it was recorded.
+pub(super) fn message_head(contents: &[u8]) -> Option<(u16, i64)> {
+    let mut pieces = Pieces::new(contents);
+    let channel = pieces.u16()?;
+    pieces.u32()?;
+    let log_ns = signed_ns(pieces.u64()?);
+    pieces.u64()?;
+    Some((channel, log_ns))
+}
+
+/// The start of a chunk.
+pub(super) struct ChunkHead {
+    pub(super) plain_bytes: u64,
+    /// Of its records once they are unpacked; 0 if the recorder made none.
+    pub(super) crc: u32,
+    pub(super) compression: String,
+    /// Bytes of the chunk before its compressed records, and how many these are.
+    pub(super) records_at: u64,
+    pub(super) records_bytes: u64,
+}
+
+impl ChunkHead {
+    /// The most bytes that it takes.
+    pub(super) const MAX_BYTES: u64 = 1 << 13;
+
+    pub(super) fn of(contents: &[u8]) -> Option<Self> {
+        let mut pieces = Pieces::new(contents);
+        pieces.take(16)?;
+        let plain_bytes = pieces.u64()?;
+        let crc = pieces.u32()?;
+        let compression = pieces.name()?;
+        let records_bytes = pieces.u64()?;
+        Some(Self { plain_bytes, crc, compression, records_at: pieces.at as u64, records_bytes })
+    }
+
+    /// What is wrong with its unpacked records by their checksum.
+    pub(super) fn complaint(&self, plain: crc32fast::Hasher) -> Option<Complaint> {
+        let (found, wanted) = (plain.finalize(), self.crc);
+        let reason = || {
+            format!(
+                "its contents are damaged: their checksum is {found:08x}, that in its header {wanted:08x}"
+            )
+        };
+        (wanted != 0 && found != wanted).then(|| Complaint { reason: reason(), is_broken: true })
+    }
+}
+
+/// Where a chunk is.
+pub(super) struct ChunkIndex {
+    pub(super) start_ns: i64,
+    pub(super) offset: u64,
+    pub(super) bytes: u64,
+    /// Empty if the file does not say.
+    pub(super) channels: Arc<[u16]>,
+}
+
+impl ChunkIndex {
+    /// The same, with the list that an equal one has already.
+    pub(super) fn shared(self, lists: &mut HashSet<Arc<[u16]>>) -> Self {
+        match lists.get(&self.channels) {
+            Some(list) => Self { channels: Arc::clone(list), ..self },
+            None => {
+                lists.insert(Arc::clone(&self.channels));
+                self
+            }
+        }
+    }
+
+    pub(super) fn of(contents: &[u8]) -> Option<Self> {
+        let mut pieces = Pieces::new(contents);
+        let start_ns = signed_ns(pieces.u64()?);
+        pieces.u64()?;
+        let (offset, bytes) = (pieces.u64()?, pieces.u64()?);
+        let map = pieces.sized()?;
+        let channels = map.chunks_exact(10).filter_map(|entry| Pieces::new(entry).u16()).collect();
+        Some(Self { start_ns, offset, bytes, channels })
+    }
+}
+
+/// How many messages each channel has.
+pub(super) struct Statistics {
+    pub(super) messages: u64,
+    pub(super) chunks: u32,
+    pub(super) channels: Vec<(u16, u64)>,
+}
+
+impl Statistics {
+    pub(super) fn of(contents: &[u8]) -> Option<Self> {
+        let mut pieces = Pieces::new(contents);
+        let messages = pieces.u64()?;
+        // Numbers of schemas, channels, attachments and metadata.
+        pieces.take(2 + 4 + 4 + 4)?;
+        let chunks = pieces.u32()?;
+        pieces.take(16)?;
+        let map = pieces.sized()?;
+        let channels = map.chunks_exact(10).filter_map(|entry| {
+            let mut pieces = Pieces::new(entry);
+            Some((pieces.u16()?, pieces.u64()?))
+        });
+        Some(Self { messages, chunks, channels: channels.collect() })
+    }
+}

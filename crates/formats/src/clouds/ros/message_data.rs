@@ -1,0 +1,60 @@
+use crate::clouds::error::{Error, Result};
+use crate::clouds::spill::{Bytes, FilePart};
+
+/// The bytes of a message: in memory or, of a large one, in a file.
+#[derive(Clone, Debug, Default)]
+pub struct MessageData(pub(super) Bytes);
+
+impl MessageData {
+    /// Number of bytes.
+    pub fn len(&self) -> u64 {
+        self.0.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The bytes, if they are in memory.
+    pub fn in_memory(&self) -> Option<&[u8]> {
+        match &self.0 {
+            Bytes::Memory(bytes) => Some(bytes),
+            Bytes::File(_) => None,
+        }
+    }
+
+    /// Reads the bytes into memory, if they are not there.
+    ///
+    /// # Errors
+    ///
+    /// More than `most_bytes`; a file that cannot be read.
+    pub fn load(&mut self, most_bytes: u64) -> Result<&[u8]> {
+        if let Bytes::File(part) = &self.0 {
+            if part.len() > most_bytes {
+                let reason = format!(
+                    "{} bytes; at most {most_bytes} bytes of a message of its kind are held in memory: raise --memory, \
+                     or leave the topic out",
+                    part.len()
+                );
+                return Err(Error::argument("message", reason));
+            }
+            self.0 = Bytes::Memory(read(part, part.len())?);
+        }
+        Ok(self.in_memory().unwrap_or_default())
+    }
+}
+
+/// The first bytes of a part.
+pub(super) fn read(part: &FilePart, bytes: u64) -> Result<Vec<u8>> {
+    // The file has so many bytes, and the caller room for them.
+    let mut taken = vec![0; usize::try_from(bytes.min(part.len())).unwrap_or(0)];
+    part.read_at(0, &mut taken)?;
+    Ok(taken)
+}
+
+impl From<Vec<u8>> for MessageData {
+    fn from(bytes: Vec<u8>) -> Self {
+        Self(Bytes::Memory(bytes))
+    }
+}

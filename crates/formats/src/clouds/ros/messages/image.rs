@@ -1,0 +1,142 @@
+use super::header::Header;
+use super::point_field::FieldType;
+use crate::clouds::cloud::CloudPoint;
+use crate::clouds::ros::wire::{Decoded, Wire, WireError, WireReader};
+
+/// `sensor_msgs/Image`, with its pixels as the bytes that they are.
+#[derive(Clone, Debug)]
+pub struct Image<'a> {
+    /// Stamp and frame; the frame is the camera's optical one: z ahead, x to the right, y down.
+    pub header: Header,
+    /// Rows.
+    pub height: u32,
+    /// Columns.
+    pub width: u32,
+    /// What a pixel is: `16UC1`.
+    pub encoding: String,
+    is_big_endian: bool,
+    row_bytes: usize,
+    data: &'a [u8],
+}
+
+/// `sensor_msgs/CameraInfo`: as much of it as places pixels in space.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CameraInfo {
+    /// Stamp and frame.
+    pub header: Header,
+    /// Focal lengths, in pixels.
+    pub focal_px: [f64; 2],
+    /// The principal point, in pixels.
+    pub center_px: [f64; 2],
+}
+
+/// Whether pixels of an encoding are depths.
+pub fn is_depth_encoding(encoding: &str) -> bool {
+    matches!(encoding, "16UC1" | "mono16" | "32FC1")
+}
+
+impl CameraInfo {
+    /// Decodes a message.
+    ///
+    /// # Errors
+    ///
+    /// The message is cut off; a camera that is not calibrated.
+    pub fn decode(wire: Wire, bytes: &[u8]) -> Decoded<Self> {
+        let mut reader = WireReader::new(wire, bytes)?;
+        let header = Header::read(&mut reader)?;
+        reader.u32()?;
+        reader.u32()?;
+        // The distortion: depth images are rectified before they are depths, but for a few sensors with little of it.
+        reader.string()?;
+        for _ in 0..reader.sequence(8)? {
+            reader.f64()?;
+        }
+        let mut k = [0.0; 9];
+        for value in &mut k {
+            *value = reader.f64()?;
+        }
+        let [fx, _, cx, _, fy, cy, ..] = k;
+        if ![fx, fy, cx, cy].iter().all(|value| value.is_finite()) || fx == 0.0 || fy == 0.0 {
+            return Err(reader.error("the camera is not calibrated: K has no focal lengths"));
+        }
+        Ok(Self { header, focal_px: [fx, fy], center_px: [cx, cy] })
+    }
+}
+
+impl<'a> Image<'a> {
+    /// Decodes a message.
+    ///
+    /// # Errors
+    ///
+    /// The message is cut off.
+    pub fn decode(wire: Wire, bytes: &'a [u8]) -> Decoded<Self> {
+        let mut reader = WireReader::new(wire, bytes)?;
+        Ok(Self {
+            header: Header::read(&mut reader)?,
+            height: reader.u32()?,
+            width: reader.u32()?,
+            encoding: reader.string()?,
+            is_big_endian: reader.u8()? != 0,
+            row_bytes: reader.u32()? as usize,
+            data: reader.byte_sequence()?,
+        })
+    }
+
+    /// Number of pixels that it claims.
+    pub fn pixels_claimed(&self) -> u64 {
+        u64::from(self.height) * u64::from(self.width)
+    }
+
+    /// A point a pixel, row by row; nothing if its pixels are not depths.
+    pub fn points<'s>(&'s self, camera: &'s CameraInfo) -> impl Iterator<Item = CloudPoint> + 's {
+        let depth = self.depth();
+        let rows = if self.width == 0 || depth.is_none() { 0 } else { self.height };
+        let pixel_bytes = depth.map_or(1, |(kind, _)| kind.bytes());
+        let width = self.width as usize;
+        let row_bytes = self.row_bytes.max(width.saturating_mul(pixel_bytes));
+        let rows = (0..rows as usize)
+            .map_while(move |row| Some((row, self.data.get(row.checked_mul(row_bytes)?..)?)));
+        rows.flat_map(move |(v, row)| {
+            row.chunks_exact(pixel_bytes).take(width).enumerate().map(move |(u, pixel)| (u, v, pixel))
+        })
+        .map(move |(u, v, pixel)| {
+            let value =
+                depth.and_then(|(kind, unit_m)| Some(kind.value(pixel, self.is_big_endian)? * unit_m));
+            let depth_m = value.unwrap_or(f64::NAN);
+            let is_return = depth_m.is_finite() && depth_m > 0.0;
+            // Nothing came back: the ray through the pixel.
+            let z = if is_return { depth_m } else { 1.0 };
+            let x = (u as f64 - camera.center_px[0]) / camera.focal_px[0] * z;
+            let y = (v as f64 - camera.center_px[1]) / camera.focal_px[1] * z;
+            CloudPoint { is_return, ..CloudPoint::hit([x, y, z]) }
+        })
+    }
+
+    /// Why there are fewer points than pixels, if there are.
+    pub fn shortage(&self) -> Option<WireError> {
+        let Some((kind, _)) = self.depth() else {
+            let reason = format!("pixels are `{}`; depths are 16UC1 (mm) or 32FC1 (m)", self.encoding);
+            return Some(WireError { byte: 0, reason });
+        };
+        let row = (self.width as usize).checked_mul(kind.bytes())?;
+        let rows = (self.height as usize).checked_sub(1)?.checked_mul(self.row_bytes.max(row));
+        let needed = rows.and_then(|rows| rows.checked_add(row));
+        if self.width == 0 || needed.is_some_and(|needed| needed <= self.data.len()) {
+            return None;
+        }
+        let (claimed, bytes) = (self.pixels_claimed(), self.data.len());
+        Some(WireError {
+            byte: 0,
+            reason: format!("{claimed} pixels are announced; {bytes} bytes are there"),
+        })
+    }
+
+    /// The type of a pixel, and how many metres its unit has.
+    fn depth(&self) -> Option<(FieldType, f64)> {
+        match self.encoding.as_str() {
+            "16UC1" | "mono16" => Some((FieldType::U16, 1e-3)),
+            "32FC1" => Some((FieldType::F32, 1.0)),
+            _ => None,
+        }
+    }
+}

@@ -1,0 +1,273 @@
+use super::header::Header;
+use super::point_field::{FieldType, PointField};
+use crate::clouds::cloud::CloudPoint;
+use crate::clouds::error::Result;
+use crate::clouds::ros::wire::{Decoded, Wire, WireError, WireReader};
+use crate::clouds::spill::FilePart;
+
+/// `sensor_msgs/PointCloud2`, with its points as the bytes that they are.
+#[derive(Clone, Debug)]
+pub struct PointCloud2<'a> {
+    /// Stamp and frame.
+    pub header: Header,
+    /// Rows; 1 if the cloud is not organised.
+    pub height: u32,
+    /// Points of a row.
+    pub width: u32,
+    /// All fields, in the order of the message.
+    pub fields: Vec<PointField>,
+    is_big_endian: bool,
+    point_bytes: usize,
+    row_bytes: usize,
+    /// The points, or as many of them as are at hand.
+    data: &'a [u8],
+    /// Where they begin in the message, and how many bytes they take.
+    data_at: u64,
+    data_bytes: usize,
+    xyz: [Column; 3],
+    intensity: Option<Column>,
+    time: Option<TimeColumn>,
+}
+
+/// Where a value is in a point.
+#[derive(Clone, Copy, Debug)]
+struct Column {
+    offset: usize,
+    kind: FieldType,
+}
+
+/// Where the time of a point is, and what it means.
+#[derive(Clone, Copy, Debug)]
+enum TimeColumn {
+    /// Nanoseconds (integers) or seconds (`f32`) after the stamp.
+    AfterStamp(Column),
+    /// `f64`, mostly since the epoch.
+    Double(usize),
+    /// 64 bits as two values of 32: nanoseconds since the epoch.
+    Wide(usize),
+}
+
+const INTENSITY_NAMES: [&str; 5] = ["intensity", "Intensity", "i", "reflectivity", "reflectance"];
+const TIME_NAMES: [&str; 8] =
+    ["t", "time", "time_stamp", "timestamp", "offset_time", "timeOffset", "time_offset", "stamps"];
+/// More fields of a point are damage.
+const MAX_FIELDS: usize = 1024;
+/// The bytes of a large message that must have all that is before its points.
+pub(crate) const MAX_HEAD_BYTES: u64 = 1 << 20;
+/// Bytes of a large message that are read at a time.
+const PIECE_BYTES: usize = 1 << 16;
+/// Points of a large message may have at most so many bytes.
+const MAX_POINT_BYTES: usize = 1 << 20;
+/// Times of type `f64` above this are nanoseconds: in seconds this is three million years.
+const LEAST_NANOSECONDS: f64 = 1e14;
+
+impl<'a> PointCloud2<'a> {
+    /// Decodes a message.
+    ///
+    /// # Errors
+    ///
+    /// A message that is cut off; fields without x, y or z, or outside of a point.
+    pub fn decode(wire: Wire, bytes: &'a [u8]) -> Decoded<Self> {
+        Self::decode_start(wire, bytes, bytes.len() as u64)
+    }
+
+    /// Decodes a message of `len` bytes of which only the first are at hand; [`PointCloud2::visit_part`] visits its
+    /// points.
+    pub(crate) fn decode_start(wire: Wire, bytes: &'a [u8], len: u64) -> Decoded<Self> {
+        let mut reader = WireReader::of_start(wire, bytes, len)?;
+        let header = Header::read(&mut reader)?;
+        let (height, width) = (reader.u32()?, reader.u32()?);
+        let count = reader.sequence(PointField::LEAST_BYTES)?;
+        if count > MAX_FIELDS {
+            return Err(reader.error(format!("points of {count} fields; at most {MAX_FIELDS} are possible")));
+        }
+        let fields = (0..count).map(|_| PointField::read(&mut reader)).collect::<Decoded<Vec<_>>>()?;
+        let is_big_endian = reader.u8()? != 0;
+        let (point_bytes, row_bytes) = (reader.u32()? as usize, reader.u32()? as usize);
+        let (data, data_at, data_bytes) = reader.start_of_bytes()?;
+        if point_bytes == 0 && width != 0 && height != 0 {
+            return Err(reader.error("point_step is 0"));
+        }
+        let column = |name: &str| find(&fields, name, point_bytes);
+        let need = |name: &str| {
+            column(name).ok_or_else(|| {
+                let names: Vec<&str> = fields.iter().map(|field| field.name.as_str()).collect();
+                let names = names.join(", ");
+                reader.error(format!("points of {point_bytes} bytes have no field {name}; fields: {names}"))
+            })
+        };
+        let xyz = [need("x")?, need("y")?, need("z")?];
+        let intensity = INTENSITY_NAMES.iter().find_map(|name| column(name));
+        let time = TIME_NAMES.iter().find_map(|name| time_column(&fields, name, point_bytes));
+        // Some drivers leave row_step at 0 or at the size of the cloud; rows never overlap.
+        let row_bytes = match point_bytes.checked_mul(width as usize) {
+            Some(least) if height > 1 => row_bytes.max(least),
+            Some(least) => least,
+            None => return Err(reader.error("width * point_step is too large")),
+        };
+        Ok(Self {
+            header,
+            height,
+            width,
+            fields,
+            is_big_endian,
+            point_bytes,
+            row_bytes,
+            data,
+            data_at,
+            data_bytes,
+            xyz,
+            intensity,
+            time,
+        })
+    }
+
+    /// Whether points have intensities.
+    pub fn has_intensities(&self) -> bool {
+        self.intensity.is_some()
+    }
+
+    /// Whether points have times.
+    pub fn has_times(&self) -> bool {
+        self.time.is_some()
+    }
+
+    /// Number of points that it claims.
+    pub fn points_claimed(&self) -> u64 {
+        u64::from(self.height) * u64::from(self.width)
+    }
+
+    /// The points whose bytes are there, in order.
+    pub fn points(&self) -> impl Iterator<Item = CloudPoint> + '_ {
+        let rows =
+            (0..self.height as usize).map_while(|row| self.data.get(row.checked_mul(self.row_bytes)?..));
+        // An empty row has no points, and however many of them there are, nothing follows.
+        let rows = rows.take(if self.width == 0 { 0 } else { usize::MAX });
+        rows.flat_map(|row| row.chunks_exact(self.point_bytes.max(1)).take(self.width as usize))
+            .map(|point| self.point(point))
+    }
+
+    /// Visits the points of a large message, of which [`PointCloud2::decode_start`] got the first bytes.
+    pub(crate) fn visit_part(
+        &self,
+        message: &FilePart,
+        visit: &mut dyn FnMut(CloudPoint) -> Result<()>,
+    ) -> Result<Option<WireError>> {
+        let point_bytes = self.point_bytes.max(1);
+        if point_bytes > MAX_POINT_BYTES {
+            let reason = format!("points of {point_bytes} bytes; at most {MAX_POINT_BYTES} are possible");
+            return Ok(Some(WireError { byte: 0, reason }));
+        }
+        let (mut height, mut width) = (self.height as usize, self.width as usize);
+        // Rows without anything between them are one.
+        if point_bytes.checked_mul(width) == Some(self.row_bytes)
+            && let Some(points) = height.checked_mul(width)
+        {
+            (height, width) = (1, points);
+        }
+        let at_a_time = (PIECE_BYTES / point_bytes).max(1);
+        let (mut bytes, mut there) = (Vec::new(), 0_u64);
+        for row in 0..if width == 0 { 0 } else { height } {
+            let start = row.checked_mul(self.row_bytes).filter(|start| *start <= self.data_bytes);
+            let Some(start) = start else { break };
+            let points = ((self.data_bytes - start) / point_bytes).min(width);
+            for first in (0..points).step_by(at_a_time) {
+                let count = at_a_time.min(points - first);
+                bytes.resize(count * point_bytes, 0);
+                message.read_at(self.data_at + (start + first * point_bytes) as u64, &mut bytes)?;
+                bytes.chunks_exact(point_bytes).try_for_each(|point| visit(self.point(point)))?;
+                there += count as u64;
+            }
+        }
+        Ok(self.is_short().then(|| self.shortage_of(there)))
+    }
+
+    /// Why there are fewer points than the message claims, if there are.
+    pub fn shortage(&self) -> Option<WireError> {
+        self.is_short().then(|| self.shortage_of(self.points().count() as u64))
+    }
+
+    fn is_short(&self) -> bool {
+        let rows_before = (self.height as usize).checked_sub(1);
+        let last_row = rows_before.and_then(|rows| rows.checked_mul(self.row_bytes));
+        let last_row_bytes = self.point_bytes.checked_mul(self.width as usize);
+        let needed = last_row.zip(last_row_bytes).and_then(|(rows, row)| rows.checked_add(row));
+        self.points_claimed() > 0 && needed.is_none_or(|needed| needed > self.data_bytes)
+    }
+
+    fn shortage_of(&self, there: u64) -> WireError {
+        let (claimed, bytes) = (self.points_claimed(), self.data_bytes);
+        let reason = format!("{claimed} points are announced; {bytes} bytes of data hold {there}");
+        WireError { byte: 0, reason }
+    }
+
+    fn point(&self, point: &[u8]) -> CloudPoint {
+        let position_m = self.xyz.map(|column| self.value(point, column));
+        // Sensors write NaN, or all zeros, where nothing came back.
+        let is_return = position_m.iter().all(|m| m.is_finite()) && position_m != [0.0; 3];
+        CloudPoint {
+            position_m: if is_return { position_m } else { [f64::NAN; 3] },
+            intensity: self.intensity.map_or(0.0, |column| self.value(point, column) as f32),
+            time_s: self.time.map_or(0.0, |time| self.time_s(point, time)),
+            is_return,
+        }
+    }
+
+    /// Columns lie within a point, so that there always is a value.
+    fn value(&self, point: &[u8], column: Column) -> f64 {
+        let bytes = point.get(column.offset..).unwrap_or_default();
+        column.kind.value(bytes, self.is_big_endian).unwrap_or(f64::NAN)
+    }
+
+    fn time_s(&self, point: &[u8], time: TimeColumn) -> f64 {
+        let seconds = match time {
+            TimeColumn::AfterStamp(column) if column.kind == FieldType::F32 => self.value(point, column),
+            TimeColumn::AfterStamp(column) => self.value(point, column) * 1e-9,
+            TimeColumn::Double(offset) => {
+                let value = self.value(point, Column { offset, kind: FieldType::F64 });
+                let seconds = if value.abs() > LEAST_NANOSECONDS { value * 1e-9 } else { value };
+                self.after_stamp_s(seconds)
+            }
+            TimeColumn::Wide(offset) => {
+                let bytes = point.get(offset..).and_then(|bytes| bytes.first_chunk()).copied();
+                let bytes = bytes.unwrap_or_default();
+                let stamp_ns =
+                    if self.is_big_endian { u64::from_be_bytes(bytes) } else { u64::from_le_bytes(bytes) };
+                let after_ns = i128::from(stamp_ns) - i128::from(self.header.stamp_ns);
+                if after_ns.unsigned_abs() < u128::from(stamp_ns) {
+                    after_ns as f64 * 1e-9
+                } else {
+                    stamp_ns as f64 * 1e-9
+                }
+            }
+        };
+        if seconds.is_finite() { seconds } else { 0.0 }
+    }
+
+    /// A time that is since the epoch or since the stamp, whichever makes it the shorter one.
+    fn after_stamp_s(&self, seconds: f64) -> f64 {
+        let (whole_s, rest_ns) =
+            (self.header.stamp_ns.div_euclid(1_000_000_000), self.header.stamp_ns.rem_euclid(1_000_000_000));
+        let after = (seconds - whole_s as f64) - rest_ns as f64 * 1e-9;
+        if after.abs() < seconds.abs() { after } else { seconds }
+    }
+}
+
+/// A field of this name that lies within a point.
+fn find(fields: &[PointField], name: &str, point_bytes: usize) -> Option<Column> {
+    let field = fields.iter().find(|field| field.name == name)?;
+    let kind = field.kind?;
+    let end = field.offset.checked_add(kind.bytes())?;
+    (end <= point_bytes).then_some(Column { offset: field.offset, kind })
+}
+
+fn time_column(fields: &[PointField], name: &str, point_bytes: usize) -> Option<TimeColumn> {
+    let column = find(fields, name, point_bytes)?;
+    let is_pair = fields.iter().any(|field| field.name == name && field.count == 2);
+    let is_whole = column.offset.checked_add(8).is_some_and(|end| end <= point_bytes);
+    Some(match column.kind {
+        FieldType::F64 => TimeColumn::Double(column.offset),
+        FieldType::U32 if is_pair && is_whole => TimeColumn::Wide(column.offset),
+        _ => TimeColumn::AfterStamp(column),
+    })
+}

@@ -1,0 +1,84 @@
+use super::messages::StampedPose;
+use super::samples::Samples;
+use super::transforms::is_pose;
+
+/// The poses of a topic, all of one frame in another. Every message of a path tells all the way so far: a pose is kept
+/// once for each stamp, whatever the number of messages that tell it.
+#[derive(Debug, Default)]
+pub(super) struct PoseTrack {
+    /// As the first pose that can be used names it.
+    pub(super) parent: String,
+    /// Empty if the poses do not say.
+    pub(super) child: String,
+    /// By stamp; of two poses of the same stamp the later one counts.
+    pub(super) poses: Samples,
+    /// Number of poses that are not valid or of other frames.
+    pub(super) odd: u64,
+}
+
+impl PoseTrack {
+    /// Takes a pose, if it can be used.
+    pub(super) fn insert(&mut self, pose: StampedPose) {
+        let StampedPose { header, child_frame, parent_from_child } = pose;
+        let parent = header.frame_id;
+        if parent.is_empty() || parent == child_frame || !is_pose(&parent_from_child) {
+            self.odd += 1;
+            return;
+        }
+        if self.poses.is_empty() {
+            (self.parent, self.child) = (parent, child_frame);
+        } else if parent != self.parent || !(child_frame.is_empty() || child_frame == self.child) {
+            self.odd += 1;
+            return;
+        }
+        self.poses.insert(header.stamp_ns, parent_from_child);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::clouds::pose::RigidPose;
+    use crate::clouds::ros::messages::Header;
+
+    fn pose(stamp_ns: i64, parent: &str, x_m: f64) -> StampedPose {
+        let header = Header { stamp_ns, frame_id: parent.to_owned() };
+        let parent_from_child = RigidPose { position_m: [x_m, 0.0, 0.0], ..RigidPose::IDENTITY };
+        StampedPose { header, child_frame: String::new(), parent_from_child }
+    }
+
+    #[test]
+    fn a_path_that_is_told_again_and_again_is_kept_once() {
+        let mut track = PoseTrack::default();
+        for message in 1..=100 {
+            (0..message).for_each(|stamp_ns| track.insert(pose(stamp_ns, "odom", f64::from(message as i32))));
+        }
+        assert_eq!((track.poses.len(), track.odd), (100, 0));
+        let (_, first) = track.poses.around(0).unwrap();
+        assert_eq!(first.map(|first| first.pose.position_m[0]), Some(100.0), "what is told last counts");
+    }
+
+    #[test]
+    fn the_first_pose_that_can_be_used_names_the_frames() {
+        let mut track = PoseTrack::default();
+        for (parent, x_m) in [("", 1.0), ("map", f64::NAN), ("odom", 2.0), ("map", 3.0), ("odom", 4.0)] {
+            track.insert(pose(track.odd as i64, parent, x_m));
+        }
+        assert_eq!((track.parent.as_str(), track.poses.len(), track.odd), ("odom", 2, 3));
+        // As if memory were full.
+        assert_eq!(track.poses.drain().len(), 2);
+        track.insert(pose(9, "map", 5.0));
+        assert_eq!((track.parent.as_str(), track.odd), ("odom", 4));
+    }
+
+    #[test]
+    fn a_pose_is_one_as_those_of_transforms_are() {
+        let mut track = PoseTrack::default();
+        for length in [1.0, 0.95, 0.5, 0.0, f64::INFINITY] {
+            let mut pose = pose(0, "odom", 1.0);
+            pose.parent_from_child.quaternion = [0.0, 0.0, 0.0, length];
+            track.insert(pose);
+        }
+        assert_eq!((track.poses.len(), track.odd), (1, 3));
+    }
+}

@@ -1,0 +1,505 @@
+use super::frame_links::{FrameLinks, Step};
+use super::frame_search::Search;
+use super::samples::Samples;
+use super::second_parent::SecondParent;
+use crate::clouds::pose::RigidPose;
+use std::collections::{HashMap, HashSet};
+use std::convert::Infallible;
+
+/// The tree of frames of a recording or a robot: where each frame was in its parents, over time.
+///
+/// At a time a frame has one parent: the first of these that leads to the frame that is asked for, and to no frame
+/// twice.
+///
+/// 1. One with transforms before and after the stamp, or at it: of several the one with the latest before.
+/// 2. One with transforms up to 10 s before the stamp, which give no pose, or not yet.
+/// 3. A static one: of several the newest.
+/// 4. One with a single transform, or with transforms at other times: of several the newest.
+///
+/// So a transform that makes a loop, or that names another parent once, changes no pose.
+#[derive(Clone, Debug, Default)]
+pub struct Transforms {
+    frames: HashMap<String, FrameLinks>,
+    /// Number of transforms taken.
+    taken: u64,
+    /// Two samples further apart have nothing between them.
+    most_gap_ns: Option<i64>,
+}
+
+/// The frames among which poses of a frame in another are searched, so that others cost nothing.
+#[derive(Debug)]
+pub(super) struct SearchFrames {
+    /// See [`Transforms::frames_between`].
+    between: HashSet<String>,
+    /// All frames above the source, where the target is one of them at some time: at other times, both may be connected
+    /// by a common ancestor. `None` if there are too many.
+    above: Option<HashSet<String>>,
+}
+
+/// Why the pose of a frame in another is not known at a time.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, thiserror::Error)]
+#[non_exhaustive]
+pub enum WhyNot {
+    /// No transform names it.
+    #[error("no transform names the frame {0}")]
+    UnknownFrame(String),
+    /// Both frames are known, but nothing connects them.
+    #[error("nothing connects the frames {0} and {1}")]
+    NotConnected(String, String),
+    /// A frame is its own ancestor.
+    #[error("the frame {0} is its own ancestor")]
+    Loop(String),
+    /// More frames are above it than a robot has.
+    #[error(
+        "too many frames are above the frame {0}: name a nearer frame with --fixed-frame (ROS 2 node: --frame-id)"
+    )]
+    TooManyFrames(String),
+    /// The stamp is before the first transform of a frame.
+    #[error("the stamp is before the first transform of {0}")]
+    Before(String),
+    /// The stamp is behind the last transform of a frame.
+    #[error("the stamp is after the last transform of {0}")]
+    After(String),
+    /// The transforms before and after the stamp are too far apart.
+    #[error(
+        "the transforms of {0} before and after the stamp are too far apart; --pose-tolerance allows for more"
+    )]
+    Gap(String),
+    /// The frame moves in no other, so that nothing says where it was.
+    #[error("no transform says how {0} moves")]
+    NothingMoves(String),
+    /// The points are in the fixed frame already, and where the sensor was is not known.
+    #[error("the points are in the frame {0} already; nothing says where the sensor was")]
+    AlreadyFixed(String),
+    /// A temporary file cannot be read.
+    #[error("{0}")]
+    Unreadable(String),
+}
+
+/// Why a transform is not taken.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum BadTransform {
+    /// The parent or the child has no name.
+    #[error("a frame has no name")]
+    NoName,
+    /// The parent is the child.
+    #[error("the frame {0} is in itself")]
+    InItself(String),
+    /// Numbers that are not finite, or a quaternion whose length is off by more than a tenth.
+    #[error("the pose of {0} has numbers that are not finite, or a quaternion whose length is not 1")]
+    Pose(String),
+}
+
+/// How far the length of a quaternion may be from 1, as in files of poses.
+const MOST_LENGTH_ERROR: f64 = 0.1;
+/// Most frames among which ways are searched for each cloud of a recording.
+const MAX_FRAMES_BETWEEN: usize = 1000;
+
+impl Transforms {
+    /// Sets how far apart in time two samples may be that a pose is found between; see
+    /// [`most_gap_ns`](crate::clouds::poses::most_gap_ns).
+    pub fn set_most_gap_ns(&mut self, most_gap_ns: Option<i64>) {
+        self.most_gap_ns = most_gap_ns;
+    }
+
+    /// Adds where a child was in a parent, and returns whether the child gets a parent that it did not have. Of two
+    /// samples of the same stamp the later one counts. Of more than 16 parents of a frame the first ones and the last
+    /// are kept.
+    ///
+    /// # Errors
+    ///
+    /// The transform is not taken: a frame without a name or in itself, a pose that is not valid.
+    pub fn insert(
+        &mut self,
+        parent: &str,
+        child: &str,
+        stamp_ns: i64,
+        parent_from_child: RigidPose,
+        is_static: bool,
+    ) -> Result<bool, BadTransform> {
+        let (parent, child) = names(parent, child)?;
+        if !is_pose(&parent_from_child) {
+            return Err(BadTransform::Pose(child.to_owned()));
+        }
+        let (links, number) = self.links_of(child);
+        Ok(links.is_some_and(|links| links.insert(parent, stamp_ns, parent_from_child, is_static, number)))
+    }
+
+    /// Puts samples, all of them [poses](is_pose), in the place of those of a child in a parent, and returns whether
+    /// the child gets a parent that it did not have.
+    ///
+    /// # Errors
+    ///
+    /// The samples are not taken: a frame without a name or in itself.
+    pub(super) fn attach(
+        &mut self,
+        parent: &str,
+        child: &str,
+        samples: Samples,
+    ) -> Result<bool, BadTransform> {
+        let (parent, child) = names(parent, child)?;
+        if samples.is_empty() {
+            return Ok(false);
+        }
+        let (links, number) = self.links_of(child);
+        Ok(links.is_some_and(|links| links.attach(parent, samples, number)))
+    }
+
+    /// The links of a child, and the number of its next transform.
+    fn links_of(&mut self, child: &str) -> (Option<&mut FrameLinks>, u64) {
+        if !self.frames.contains_key(child) {
+            self.frames.insert(child.to_owned(), FrameLinks::default());
+        }
+        self.taken += 1;
+        (self.frames.get_mut(child), self.taken)
+    }
+
+    /// Whether a transform names this parent of a child.
+    pub(super) fn has_link(&self, parent: &str, child: &str) -> bool {
+        self.frames.get(bare(child)).is_some_and(|links| links.has_parent(bare(parent)))
+    }
+
+    /// Number of parents of a child.
+    pub(super) fn parents_of(&self, child: &str) -> usize {
+        self.frames.get(bare(child)).map_or(0, FrameLinks::parents)
+    }
+
+    /// All samples.
+    pub(super) fn samples_mut(&mut self) -> impl Iterator<Item = &mut Samples> {
+        self.frames.values_mut().flat_map(FrameLinks::samples_mut)
+    }
+
+    /// What is wrong with a parent of a child, if the child has another one, or if they are in a loop.
+    pub fn second_parent(&self, parent: &str, child: &str) -> Option<SecondParent> {
+        let (parent, child) = (bare(parent), bare(child));
+        let others = self.steps(child);
+        let before = others.iter().find(|step| step.parent != parent).map(|step| step.parent.to_owned());
+        let found = self.search(parent, |_| true, |frame| frame == child);
+        let above = found.route.into_iter().flatten().map(|step| step.parent.to_owned());
+        let mut loop_frames: Vec<String> = above.collect();
+        if !loop_frames.is_empty() {
+            loop_frames.insert(0, parent.to_owned());
+        }
+        if before.is_none() && loop_frames.is_empty() {
+            return None;
+        }
+        Some(SecondParent { child: child.to_owned(), parent: parent.to_owned(), before, loop_frames })
+    }
+
+    /// Forgets where a frame was in its parents.
+    pub fn detach(&mut self, child: &str) {
+        self.frames.remove(bare(child));
+    }
+
+    /// Forgets how a frame moved in its parents; static transforms stay.
+    pub fn forget_samples(&mut self, child: &str) {
+        if let Some(links) = self.frames.get_mut(bare(child)) {
+            links.forget_samples();
+            if links.is_empty() {
+                self.detach(child);
+            }
+        }
+    }
+
+    /// Forgets samples that are older than this before the last one of the same frames, and returns how many samples
+    /// are left, with one for what is static: a buffer of tf keeps its last seconds.
+    pub fn forget_older_than(&mut self, span_ns: i64) -> usize {
+        self.frames.values_mut().for_each(|links| links.forget_older_than(span_ns));
+        self.frames.values().map(FrameLinks::len).sum()
+    }
+
+    /// Forgets older samples of the frame that has most, and returns how many those were: who sends too many takes no
+    /// room of others. Static transforms stay.
+    pub fn shrink_largest(&mut self) -> usize {
+        let largest = self.frames.iter_mut().max_by_key(|(_, links)| links.samples());
+        let Some((child, links)) = largest else { return 0 };
+        let before = links.samples();
+        links.shrink();
+        let lost = before - links.samples();
+        if links.is_empty() {
+            let child = child.clone();
+            self.frames.remove(&child);
+        }
+        lost
+    }
+
+    /// Number of frames that have a parent.
+    pub fn frames(&self) -> usize {
+        self.frames.len()
+    }
+
+    /// Whether a transform names a frame.
+    pub fn knows(&self, frame: &str) -> bool {
+        let frame = bare(frame);
+        self.frames.contains_key(frame) || self.frames.values().any(|links| links.has_parent(frame))
+    }
+
+    /// Whether there are no transforms.
+    pub fn is_empty(&self) -> bool {
+        self.frames.is_empty()
+    }
+
+    /// The frame and what is above it, at whatever time. Parents that a single transform names are left out if
+    /// something moves without them.
+    pub fn ancestors(&self, frame: &str) -> Vec<String> {
+        self.above(bare(frame)).frames.into_iter().map(str::to_owned).collect()
+    }
+
+    /// The last of the parents above a frame, of the same ones.
+    pub fn root_of(&self, frame: &str) -> String {
+        let frame = bare(frame);
+        self.above(frame).end.unwrap_or(frame).to_owned()
+    }
+
+    fn above<'a>(&'a self, frame: &'a str) -> Search<'a> {
+        let trusted = self.search(frame, Step::is_trusted, |_| false);
+        // A single transform that is left out must not count as what moves.
+        let moves = |frame: &&str| self.frames.get(*frame).is_some_and(FrameLinks::moves);
+        if trusted.frames.iter().any(moves) {
+            return trusted;
+        }
+        self.search(frame, |_| true, |_| false)
+    }
+
+    /// A search at whatever time.
+    fn search<'a>(
+        &'a self,
+        frame: &'a str,
+        is_taken: impl Fn(&Step<'a>) -> bool,
+        is_wanted: impl Fn(&str) -> bool,
+    ) -> Search<'a> {
+        let steps = |at: &'a str| Ok(kept(self.steps(at), &is_taken));
+        let Ok(search) = Search::run::<Infallible>(frame, &steps, is_wanted);
+        search
+    }
+
+    /// Whether a link of a frame to a parent has transforms of `/tf`, be it a single one.
+    pub fn is_moving(&self, child: &str) -> bool {
+        self.frames.get(bare(child)).is_some_and(FrameLinks::is_moving)
+    }
+
+    /// The pose of the source frame in the target frame at a time: along the whole chain, each link between the samples
+    /// around the stamp. Nothing is extrapolated.
+    ///
+    /// # Errors
+    ///
+    /// Why it is not known.
+    pub fn lookup(&self, target_frame: &str, source_frame: &str, stamp_ns: i64) -> Result<RigidPose, WhyNot> {
+        self.lookup_among(target_frame, source_frame, stamp_ns, None)
+    }
+
+    /// As [`Transforms::lookup`], with no other frames than these.
+    pub(super) fn lookup_among(
+        &self,
+        target_frame: &str,
+        source_frame: &str,
+        stamp_ns: i64,
+        among: Option<&SearchFrames>,
+    ) -> Result<RigidPose, WhyNot> {
+        let (target, source) = (bare(target_frame), bare(source_frame));
+        if target == source {
+            return Ok(RigidPose::IDENTITY);
+        }
+        let [from_target, from_source] = self.route(target, source, stamp_ns, among)?;
+        let common_from_source = self.along(&from_source, stamp_ns)?;
+        let common_from_target = self.along(&from_target, stamp_ns)?;
+        Ok(common_from_target.inverse().then(&common_from_source))
+    }
+
+    /// The frames among which poses of a source in a target are searched.
+    ///
+    /// # Errors
+    ///
+    /// There are too many.
+    pub(super) fn search_frames(&self, target: &str, source: &str) -> Result<SearchFrames, WhyNot> {
+        let between = self.frames_between(target, source)?;
+        let above = self.children_above(bare(source), None);
+        let is_small = above.contains_key(bare(target)) && above.len() <= MAX_FRAMES_BETWEEN;
+        let above = is_small.then(|| above.into_keys().map(str::to_owned).collect());
+        Ok(SearchFrames { between, above })
+    }
+
+    /// The frames on all upward paths from a source to a target, at whatever time; where there is no such path, the
+    /// frames above both.
+    ///
+    /// # Errors
+    ///
+    /// There are too many.
+    pub fn frames_between(&self, target: &str, source: &str) -> Result<HashSet<String>, WhyNot> {
+        let (target, source) = (bare(target), bare(source));
+        let up = self.children_above(source, Some(target));
+        let mut between: HashSet<String> = HashSet::new();
+        if up.contains_key(target) {
+            let mut open = vec![target];
+            while let Some(frame) = open.pop() {
+                if between.insert(frame.to_owned()) {
+                    open.extend(up.get(frame).into_iter().flatten());
+                }
+            }
+        } else {
+            let down = self.children_above(target, Some(source));
+            between.extend(up.into_keys().chain(down.into_keys()).map(str::to_owned));
+        }
+        match between.len() > MAX_FRAMES_BETWEEN {
+            true => Err(WhyNot::TooManyFrames(source.to_owned())),
+            false => Ok(between),
+        }
+    }
+
+    /// The children of each frame above a frame, up to an end: what is above that does not matter.
+    fn children_above<'a>(&'a self, from: &'a str, end: Option<&str>) -> HashMap<&'a str, Vec<&'a str>> {
+        let mut children: HashMap<&str, Vec<&str>> = HashMap::from([(from, Vec::new())]);
+        let mut open = vec![from];
+        while let Some(child) = open.pop() {
+            for step in self.steps(child) {
+                let is_new = !children.contains_key(step.parent);
+                children.entry(step.parent).or_default().push(child);
+                if is_new && Some(step.parent) != end {
+                    open.push(step.parent);
+                }
+            }
+        }
+        children
+    }
+
+    /// The frames whose place in their parents leads from one frame to another at a time: up to what is above both,
+    /// from each.
+    ///
+    /// # Errors
+    ///
+    /// Why there is no such way.
+    pub fn links_between(
+        &self,
+        target_frame: &str,
+        source_frame: &str,
+        stamp_ns: i64,
+    ) -> Result<[Vec<String>; 2], WhyNot> {
+        let route = self.route(bare(target_frame), bare(source_frame), stamp_ns, None)?;
+        Ok(route.map(|steps| steps.iter().map(|step| step.child.to_owned()).collect()))
+    }
+
+    /// The steps up to what is above both, from each. Doubtful ones are taken only where no others lead there: they do
+    /// not say where a frame was, but why that is not known.
+    fn route<'a>(
+        &'a self,
+        target: &'a str,
+        source: &'a str,
+        stamp_ns: i64,
+        among: Option<&SearchFrames>,
+    ) -> Result<[Vec<Step<'a>>; 2], WhyNot> {
+        let Some(SearchFrames { between, above }) = among else {
+            return self.route_among(target, source, stamp_ns, None);
+        };
+        let Some(above) = above else {
+            return self.route_among(target, source, stamp_ns, Some(between));
+        };
+        // A trusted upward path is the result of the full search, too.
+        let trusted = |at: &'a str| {
+            let steps = self.steps_at(at, stamp_ns)?;
+            Ok(kept(steps, |step| step.is_trusted() && between.contains(step.parent)))
+        };
+        match Search::run(source, &trusted, |frame| frame == target)?.route {
+            Some(route) => Ok([Vec::new(), route]),
+            None => self.route_among(target, source, stamp_ns, Some(above)),
+        }
+    }
+
+    fn route_among<'a>(
+        &'a self,
+        target: &'a str,
+        source: &'a str,
+        stamp_ns: i64,
+        among: Option<&HashSet<String>>,
+    ) -> Result<[Vec<Step<'a>>; 2], WhyNot> {
+        let is_among = |step: &Step<'a>| among.is_none_or(|among| among.contains(step.parent));
+        let all = |at: &'a str| self.steps_at(at, stamp_ns).map(|steps| kept(steps, is_among));
+        let trusted = |at: &'a str| all(at).map(|steps| kept(steps, Step::is_trusted));
+        let found = match route_by(target, source, &trusted) {
+            found @ (Ok(_) | Err(WhyNot::Unreadable(_))) => return found,
+            Err(_) => route_by(target, source, &all),
+        };
+        found.map_err(|why| match [target, source].into_iter().find(|frame| !self.knows(frame)) {
+            Some(frame) if !matches!(why, WhyNot::Unreadable(_)) => WhyNot::UnknownFrame(frame.to_owned()),
+            _ => why,
+        })
+    }
+
+    fn steps_at<'a>(&'a self, child: &'a str, stamp_ns: i64) -> Result<Vec<Step<'a>>, WhyNot> {
+        let links = self.frames.get(child);
+        links.map_or(Ok(Vec::new()), |links| links.steps_at(child, stamp_ns, self.most_gap_ns))
+    }
+
+    fn steps<'a>(&'a self, child: &'a str) -> Vec<Step<'a>> {
+        self.frames.get(child).map_or(Vec::new(), |links| links.steps(child))
+    }
+
+    /// The pose of the first frame in the parent of the last.
+    fn along(&self, steps: &[Step<'_>], stamp_ns: i64) -> Result<RigidPose, WhyNot> {
+        let mut pose = RigidPose::IDENTITY;
+        for step in steps {
+            pose = step.pose(stamp_ns, self.most_gap_ns)?.then(&pose);
+        }
+        Ok(pose)
+    }
+}
+
+/// A target above the source is found first, then a source above the target, then what is above both. In a tree there
+/// is one way; in a loop the first one is that of the robot: what is above the frame of the map does not matter.
+fn route_by<'a>(
+    target: &'a str,
+    source: &'a str,
+    steps: &dyn Fn(&'a str) -> Result<Vec<Step<'a>>, WhyNot>,
+) -> Result<[Vec<Step<'a>>; 2], WhyNot> {
+    let up = Search::run(source, steps, |frame| frame == target)?;
+    if let Some(route) = up.route {
+        return Ok([Vec::new(), route]);
+    }
+    let down = Search::run(target, steps, |frame| frame == source)?;
+    if let Some(route) = down.route {
+        return Ok([route, Vec::new()]);
+    }
+    let above_target: HashSet<&str> = down.frames.into_iter().collect();
+    let to_common = Search::run(source, steps, |frame| above_target.contains(frame))?;
+    if let Some(from_source) = to_common.route {
+        let common = from_source.last().map_or(source, |step| step.parent);
+        let from_target = Search::run(target, steps, |frame| frame == common)?.route;
+        return Ok([from_target.unwrap_or_default(), from_source]);
+    }
+    Err(match up.looped.or(down.looped) {
+        _ if up.is_cut || down.is_cut => WhyNot::TooManyFrames(source.to_owned()),
+        Some(frame) => WhyNot::Loop(frame.to_owned()),
+        None => WhyNot::NotConnected(target.to_owned(), source.to_owned()),
+    })
+}
+
+fn kept<'a>(mut steps: Vec<Step<'a>>, is_kept: impl Fn(&Step<'a>) -> bool) -> Vec<Step<'a>> {
+    steps.retain(is_kept);
+    steps
+}
+
+/// The names of a parent and a child.
+fn names<'a>(parent: &'a str, child: &'a str) -> Result<(&'a str, &'a str), BadTransform> {
+    let (parent, child) = (bare(parent), bare(child));
+    if parent.is_empty() || child.is_empty() {
+        return Err(BadTransform::NoName);
+    }
+    if parent == child {
+        return Err(BadTransform::InItself(child.to_owned()));
+    }
+    Ok((parent, child))
+}
+
+/// Whether a pose may be one: finite numbers, and a quaternion whose length is about 1.
+pub(super) fn is_pose(pose: &RigidPose) -> bool {
+    let length = pose.quaternion.iter().map(|q| q * q).sum::<f64>().sqrt();
+    pose.is_valid() && (length - 1.0).abs() <= MOST_LENGTH_ERROR
+}
+
+/// tf 1 wrote slashes before names, tf 2 does not know them.
+fn bare(frame: &str) -> &str {
+    frame.trim_start_matches('/')
+}
+
+#[cfg(test)]
+mod tests;

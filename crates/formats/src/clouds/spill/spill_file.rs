@@ -1,0 +1,166 @@
+use super::budget::Budget;
+use super::bytes::Bytes;
+use super::file_part::FilePart;
+use crate::clouds::error::Result;
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom, Write};
+use std::path::Path;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// A temporary file for what exceeds the memory of a reader. Its space is used again once no part of it is; where parts
+/// overlap in time for long, another file takes its place, and each is freed with its last part.
+#[derive(Debug)]
+pub(crate) struct SpillFile {
+    budget: Budget,
+    file: Option<Arc<Mutex<File>>>,
+    end: u64,
+    /// A file of so many bytes takes no more.
+    most_bytes: u64,
+}
+
+/// How many bytes a stream has.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum StreamSize {
+    /// As many as the file says; more are an error.
+    Claimed(u64),
+    /// Unknown; more than these are an error.
+    AtMost(u64),
+}
+
+impl StreamSize {
+    fn most(self) -> u64 {
+        match self {
+            Self::Claimed(bytes) | Self::AtMost(bytes) => bytes,
+        }
+    }
+
+    fn word(self) -> &'static str {
+        match self {
+            Self::Claimed(_) => "claims",
+            Self::AtMost(_) => "may have",
+        }
+    }
+}
+
+/// Why a stream is not whole.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Complaint {
+    pub(crate) reason: String,
+    /// The decoder failed: the bytes before that may be wrong, too, since many checksums come behind their data.
+    pub(crate) is_broken: bool,
+}
+
+const MOST_FILE_BYTES: u64 = 256 << 20;
+/// Bytes that are copied at a time.
+const COPY_BYTES: usize = 1 << 16;
+
+impl SpillFile {
+    pub(crate) fn new(budget: &Budget) -> Self {
+        Self { budget: budget.clone(), file: None, end: 0, most_bytes: MOST_FILE_BYTES }
+    }
+
+    pub(crate) fn budget(&self) -> &Budget {
+        &self.budget
+    }
+
+    /// Reads a stream to its end, or up to `most_bytes`: into memory as long as `memory_bytes` suffice, else into the
+    /// file. `see` gets the bytes in order. Returns also why the stream is not whole.
+    pub(crate) fn take(
+        &mut self,
+        mut input: impl Read,
+        size: StreamSize,
+        memory_bytes: usize,
+        see: &mut dyn FnMut(&[u8]),
+    ) -> Result<(Bytes, Option<Complaint>)> {
+        let (mut start, mut complaint) = (Vec::new(), None);
+        let broken = |error: std::io::Error| Complaint { reason: error.to_string(), is_broken: true };
+        let (most_bytes, limit) = (size.most(), size.most().saturating_add(1));
+        let reason = format!("it holds more than the {most_bytes} bytes that it {}", size.word());
+        let too_many = Complaint { reason, is_broken: false };
+        // What is announced to be larger does not pass through memory.
+        let first_bytes = match size {
+            StreamSize::Claimed(claimed) if claimed >= memory_bytes as u64 => 0,
+            _ => limit.min(memory_bytes as u64),
+        };
+        if first_bytes > 0 {
+            if let StreamSize::Claimed(_) = size {
+                // At most `memory_bytes`.
+                start.reserve_exact(usize::try_from(first_bytes).unwrap_or(0));
+            }
+            let read = (&mut input).take(first_bytes).read_to_end(&mut start);
+            complaint = read.err().map(broken);
+            let is_too_long = start.len() as u64 == limit;
+            start.truncate(usize::try_from(most_bytes).unwrap_or(usize::MAX));
+            see(&start);
+            if complaint.is_some() || is_too_long || (start.len() as u64) < first_bytes {
+                return Ok((Bytes::Memory(start), complaint.or(is_too_long.then_some(too_many))));
+            }
+        }
+        let cannot = |error| self.budget.cannot("write", error);
+        let file = match self.file.take() {
+            Some(file) if self.end < self.most_bytes || Arc::strong_count(&file) == 1 => file,
+            _ => Arc::new(Mutex::new(self.budget.file()?)),
+        };
+        if Arc::strong_count(&file) == 1 {
+            self.end = 0;
+        }
+        let begin = self.end;
+        {
+            let mut out = file.lock().unwrap_or_else(PoisonError::into_inner);
+            if begin == 0 {
+                out.set_len(0).map_err(cannot)?;
+            }
+            out.seek(SeekFrom::Start(begin)).map_err(cannot)?;
+            out.write_all(&start).map_err(cannot)?;
+            let mut written = start.len() as u64;
+            drop(std::mem::take(&mut start));
+            let mut buffer = vec![0; COPY_BYTES];
+            while complaint.is_none() {
+                match input.read(&mut buffer) {
+                    Ok(0) => break,
+                    Ok(count) => {
+                        let left = usize::try_from(most_bytes - written).unwrap_or(usize::MAX);
+                        if count > left {
+                            complaint = Some(too_many.clone());
+                        }
+                        let bytes = buffer.get(..count.min(left)).unwrap_or_default();
+                        see(bytes);
+                        out.write_all(bytes).map_err(cannot)?;
+                        written += bytes.len() as u64;
+                    }
+                    Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
+                    Err(error) => complaint = Some(broken(error)),
+                }
+            }
+            self.end = begin + written;
+        }
+        let folder = self.budget.scratch.clone().unwrap_or_else(std::env::temp_dir);
+        let part = FilePart::new(Arc::clone(&file), Arc::<Path>::from(folder), begin, self.end - begin);
+        self.file = Some(file);
+        Ok((Bytes::File(part), complaint))
+    }
+}
+
+#[cfg(all(test, feature = "ros"))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_that_always_overlap_take_several_files() {
+        let mut spill = SpillFile { most_bytes: 1000, ..SpillFile::new(&Budget::default()) };
+        let mut held = Vec::new();
+        for k in 0..100_u8 {
+            let size = StreamSize::Claimed(100);
+            let (bytes, complaint) = spill.take(&[k; 100][..], size, 0, &mut |_| {}).unwrap();
+            assert_eq!(complaint, None);
+            held.push((k, bytes));
+            if held.len() > 3 {
+                held.remove(0);
+            }
+            assert!(spill.end <= 1000, "{}", spill.end);
+            for (k, bytes) in &held {
+                assert_eq!(bytes.piece(0, 100, &mut Default::default()).unwrap(), Some(&[*k; 100][..]));
+            }
+        }
+    }
+}

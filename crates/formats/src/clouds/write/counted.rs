@@ -1,0 +1,45 @@
+use super::row::{VoxelRow, VoxelSink};
+use crate::clouds::error::{Error, Result};
+use std::path::PathBuf;
+
+/// Lets through as many voxels as were announced, all of them finite: formats name their number up front.
+pub(super) struct Counted {
+    inner: Box<dyn VoxelSink>,
+    final_path: PathBuf,
+    announced: u64,
+    seen: u64,
+}
+
+impl Counted {
+    pub(super) fn new(inner: Box<dyn VoxelSink>, final_path: PathBuf, announced: u64) -> Self {
+        Self { inner, final_path, announced, seen: 0 }
+    }
+
+    fn wrong(&self, reason: String) -> Error {
+        Error::argument(self.final_path.display().to_string(), reason)
+    }
+}
+
+impl VoxelSink for Counted {
+    fn put(&mut self, voxel: &VoxelRow) -> Result<()> {
+        if self.seen == self.announced {
+            let reason = format!("more than the {} voxels that were announced", self.announced);
+            return Err(self.wrong(reason));
+        }
+        let numbers = voxel.center_m.iter().chain([&voxel.probability, &voxel.log_odds]);
+        if let Some(number) = numbers.copied().find(|number| !number.is_finite()) {
+            return Err(self.wrong(format!("voxel {:?} has the number {number}", voxel.index)));
+        }
+        self.inner.put(voxel)?;
+        self.seen += 1;
+        Ok(())
+    }
+
+    fn finish(self: Box<Self>) -> Result<()> {
+        if self.seen < self.announced {
+            let reason = format!("{} voxels of the {} that were announced", self.seen, self.announced);
+            return Err(self.wrong(reason));
+        }
+        self.inner.finish()
+    }
+}

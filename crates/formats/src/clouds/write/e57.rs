@@ -1,0 +1,134 @@
+use super::options::WriteOptions;
+use super::out_file::OutFile;
+use super::row::{VoxelRow, VoxelSink};
+use super::sort::part;
+use super::spool::Spool;
+use crate::clouds::error::{Error, Result};
+use ::e57::{E57Writer, Record, RecordValue};
+use std::path::{Path, PathBuf};
+
+/// Three coordinates of 64 bit and a probability of 32.
+const RECORD_BYTES: u64 = 28;
+/// Points that are read back at once.
+const BATCH: u64 = 4096;
+
+/// A cloud of E57: coordinates in double precision, probabilities as intensities.
+///
+/// The library's writer of a cloud borrows its file for as long as it lives, so points wait in a file of their own.
+pub(super) struct E57Sink {
+    out: OutFile,
+    points: Spool,
+    crs: Option<String>,
+}
+
+impl E57Sink {
+    pub(super) fn create(path: &Path, options: &WriteOptions) -> Result<Self> {
+        let points = Spool::new(&options.scratch_folder)?;
+        let crs = options.crs.as_deref().map(as_cdata).transpose()?;
+        Ok(Self { out: OutFile::create(path)?, points, crs })
+    }
+}
+
+impl VoxelSink for E57Sink {
+    fn put(&mut self, voxel: &VoxelRow) -> Result<()> {
+        self.points.write(voxel.center_m.map(f64::to_le_bytes).as_flattened())?;
+        self.points.write(&(voxel.probability.clamp(0.0, 1.0) as f32).to_le_bytes())
+    }
+
+    fn finish(self: Box<Self>) -> Result<()> {
+        let Self { mut out, points, crs } = *self;
+        let path: PathBuf = out.path().to_owned();
+        let refused = |error: ::e57::Error| Error::io(&path, "write", std::io::Error::other(error));
+        let bytes = points.len();
+        let mut reader = points.into_reader()?;
+        let mut file = E57Writer::new(&mut out, &guid(bytes, 1)).map_err(refused)?;
+        file.set_coordinate_metadata(crs);
+        let fields = vec![
+            Record::CARTESIAN_X_F64,
+            Record::CARTESIAN_Y_F64,
+            Record::CARTESIAN_Z_F64,
+            Record::INTENSITY_UNIT_F32,
+        ];
+        let mut cloud = file.add_pointcloud(&guid(bytes, 2), fields).map_err(refused)?;
+        cloud.set_name(Some("voxels".to_owned()));
+        let mut batch = Vec::new();
+        let mut at = 0;
+        while at < bytes {
+            reader.read_at(at, &mut batch, BATCH * RECORD_BYTES)?;
+            at += BATCH * RECORD_BYTES;
+            for record in batch.chunks(RECORD_BYTES as usize) {
+                let [x, y, z] = [0, 8, 16].map(|k| RecordValue::Double(f64::from_le_bytes(part(record, k))));
+                let probability = RecordValue::Single(f32::from_le_bytes(part(record, 24)));
+                cloud.add_point(vec![x, y, z, probability]).map_err(refused)?;
+            }
+        }
+        cloud.finalize().map_err(refused)?;
+        file.finalize().map_err(refused)?;
+        drop(file);
+        out.finish()
+    }
+}
+
+/// A coordinate system as the library may put it between `<![CDATA[` and `]]>`: an end within the text is divided among
+/// two such sections, which readers join.
+fn as_cdata(crs: &str) -> Result<String> {
+    let is_xml = |c: char| matches!(c, '\t' | '\n' | '\r' | ' '..='\u{fffd}' | '\u{10000}'..);
+    if let Some(c) = crs.chars().find(|c| !is_xml(*c)) {
+        let reason =
+            format!("has the character {c:?}, which no E57 file can hold; export .las, .laz or .ply");
+        return Err(Error::argument("coordinate reference system", reason));
+    }
+    Ok(crs.replace("]]>", "]]]]><![CDATA[>"))
+}
+
+/// A name for a file or a cloud, as the format wants one: unlike in one file, and the same for the same voxels.
+fn guid(bytes: u64, number: u16) -> String {
+    format!("{{766f7874-696c-{number:04x}-8000-{:012x}}}", bytes & 0xffff_ffff_ffff)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::row;
+    use super::*;
+    use ::e57::{CartesianCoordinate, E57Reader};
+
+    fn crs_read_back(crs: &str) -> Result<Option<String>> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.e57");
+        let options = WriteOptions { crs: Some(crs.to_owned()), ..WriteOptions::beside(&path) };
+        let mut sink = Box::new(E57Sink::create(&path, &options)?);
+        sink.put(&row([1, 2, 3], 0.75)).unwrap();
+        sink.finish().unwrap();
+        Ok(E57Reader::from_file(&path).unwrap().coordinate_metadata().map(str::to_owned))
+    }
+
+    #[test]
+    fn every_coordinate_system_is_readable_or_refused() {
+        for crs in ["EPSG:25832", "PROJCS[\"a & b <c>\",\n\tUNIT[\"metre\",1]]", "a]]>b]]]>c]]", "]]>"] {
+            assert_eq!(crs_read_back(crs).unwrap().as_deref(), Some(crs));
+        }
+        for crs in ["EPSG:25832\0", "a\u{1b}[2J", "\u{ffff}"] {
+            let error = crs_read_back(crs).unwrap_err().to_string();
+            assert!(error.contains("E57") && error.contains(".laz"), "{error}");
+        }
+    }
+
+    #[test]
+    fn points_come_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.e57");
+        let rows: Vec<_> = (0..5000).map(|k| row([k, -k, 3], 0.75)).collect();
+        let mut sink = Box::new(E57Sink::create(&path, &WriteOptions::beside(&path)).unwrap());
+        rows.iter().for_each(|row| sink.put(row).unwrap());
+        sink.finish().unwrap();
+        let mut reader = E57Reader::from_file(&path).unwrap();
+        let cloud = reader.pointclouds().remove(0);
+        let points: Vec<_> = reader.pointcloud_simple(&cloud).unwrap().collect::<::e57::Result<_>>().unwrap();
+        assert_eq!(points.len(), rows.len());
+        for (point, row) in points.iter().zip(&rows) {
+            let [x, y, z] = row.center_m;
+            assert_eq!(point.cartesian, CartesianCoordinate::Valid { x, y, z });
+            assert_eq!(point.intensity, Some(0.75));
+        }
+    }
+}

@@ -1,0 +1,378 @@
+use super::glb_json;
+use super::greedy::{BRICK, Brick, Quad};
+use super::lattice::Lattice;
+use super::options::WriteOptions;
+use super::out_file::OutFile;
+use super::row::{VoxelRow, VoxelSink, VoxelsHead};
+use super::sort::{ExternalSort, key, of_key, part};
+use super::spool::Spool;
+use crate::clouds::error::{Error, Result};
+use std::path::PathBuf;
+
+/// A brick and a place in it.
+const RECORD_BYTES: usize = 15;
+
+/// The six indices of a face.
+const INDEX_BYTES: u64 = 24;
+
+/// Heights from low to high: red, green, blue.
+const COLOURS: [[f64; 3]; 5] =
+    [[68.0, 1.0, 84.0], [59.0, 82.0, 139.0], [33.0, 145.0, 140.0], [94.0, 201.0, 98.0], [253.0, 231.0, 37.0]];
+
+/// The surface of occupied voxels as binary glTF. Voxels are sorted into bricks, with those around each brick, so that
+/// faces at its border are seen exactly.
+pub(super) struct GlbSink {
+    out: OutFile,
+    head: VoxelsHead,
+    crs: Option<String>,
+    scratch_folder: PathBuf,
+    colour_heights_m: Option<[f64; 2]>,
+    places: ExternalSort<RECORD_BYTES>,
+    lattice: Option<Lattice>,
+    least: [i32; 3],
+    most: [i32; 3],
+}
+
+/// How a vertex is written.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum VertexKind {
+    /// Numbers of 16 bit, as far as they reach.
+    Short,
+    Single,
+}
+
+/// What a file says of its mesh.
+pub(super) struct Surface {
+    pub(super) quads: u64,
+    pub(super) kind: VertexKind,
+    pub(super) resolution_m: f64,
+    /// The lower corner of all occupied voxels, as the map has it: z up.
+    pub(super) corner_m: [f64; 3],
+    /// Voxels along x, y and z.
+    pub(super) size: [i64; 3],
+    /// Bounds of the vertices, as glTF has it: y up.
+    pub(super) least: [i64; 3],
+    pub(super) most: [i64; 3],
+    pub(super) crs: Option<String>,
+}
+
+impl GlbSink {
+    pub(super) fn create(head: &VoxelsHead, path: &std::path::Path, options: &WriteOptions) -> Result<Self> {
+        Ok(Self {
+            out: OutFile::create(path)?,
+            head: head.clone(),
+            crs: options.crs.clone(),
+            scratch_folder: options.scratch_folder.clone(),
+            colour_heights_m: options.colour_heights_m,
+            places: ExternalSort::new(&options.scratch_folder),
+            lattice: None,
+            least: [i32::MAX; 3],
+            most: [i32::MIN; 3],
+        })
+    }
+}
+
+impl VertexKind {
+    pub(super) fn bytes(self) -> usize {
+        match self {
+            Self::Short => 12,
+            Self::Single => 16,
+        }
+    }
+
+    fn push(self, bytes: &mut Vec<u8>, place: [i64; 3], colour: [u8; 4]) {
+        match self {
+            Self::Short => {
+                bytes.extend(place.map(|k| (k as u16).to_le_bytes()).as_flattened());
+                bytes.extend([0; 2]);
+            }
+            Self::Single => bytes.extend(place.map(|k| (k as f32).to_le_bytes()).as_flattened()),
+        }
+        bytes.extend(colour);
+    }
+}
+
+impl VoxelSink for GlbSink {
+    fn put(&mut self, voxel: &VoxelRow) -> Result<()> {
+        if voxel.log_odds < self.head.occupied_log_odds {
+            return Ok(());
+        }
+        self.lattice.get_or_insert_with(|| Lattice::of(voxel, self.head.resolution_m));
+        let edge = BRICK as i32;
+        let (brick, place) =
+            (voxel.index.map(|k| k.div_euclid(edge)), voxel.index.map(|k| k.rem_euclid(edge)));
+        self.places.push(record(brick, place))?;
+        for k in 0..3 {
+            self.least[k] = self.least[k].min(voxel.index[k]);
+            self.most[k] = self.most[k].max(voxel.index[k]);
+            let (mut beside, mut around) = (brick, place);
+            if place[k] == 0 {
+                (beside[k], around[k]) = (brick[k] - 1, edge);
+            } else if place[k] == edge - 1 {
+                (beside[k], around[k]) = (brick[k] + 1, -1);
+            } else {
+                continue;
+            }
+            self.places.push(record(beside, around))?;
+        }
+        Ok(())
+    }
+
+    fn finish(self: Box<Self>) -> Result<()> {
+        let Self { mut out, head, crs, scratch_folder, colour_heights_m, places, lattice, least, most } =
+            *self;
+        let size: [i64; 3] = std::array::from_fn(|k| (i64::from(most[k]) - i64::from(least[k]) + 1).max(0));
+        let longest = size.iter().copied().max().unwrap_or(0);
+        if longest > 1 << 24 {
+            let reason = format!("{longest} voxels along a side are more than single precision tells apart");
+            return Err(Error::argument("GLB", format!("{reason}; choose a region")));
+        }
+        let kind = if longest <= i64::from(u16::MAX) { VertexKind::Short } else { VertexKind::Single };
+        let corner_m = lattice.map_or([0.0; 3], |lattice| lattice.corner_m(least.map(i64::from)));
+        let mut mesh = Mesh {
+            vertices: Spool::new(&scratch_folder)?,
+            indices: Spool::new(&scratch_folder)?,
+            bytes: Vec::new(),
+            colour_heights_m,
+            surface: Surface {
+                quads: 0,
+                kind,
+                resolution_m: head.resolution_m,
+                corner_m,
+                size,
+                least: [i64::MAX; 3],
+                most: [i64::MIN; 3],
+                crs,
+            },
+        };
+        let (mut sorted, mut brick, mut last) = (places.into_sorted()?, Brick::new(), None);
+        while let Some(record) = sorted.next()? {
+            let index = [0, 4, 8].map(|at| i64::from(of_key(part(&record, at))));
+            if let Some(done) = last.replace(index).filter(|&done| done != index) {
+                mesh.add(&brick, done, least)?;
+                brick.clear();
+            }
+            brick.insert(part(&record, 12));
+        }
+        if let Some(done) = last {
+            mesh.add(&brick, done, least)?;
+        }
+        mesh.write(&mut out)?;
+        out.finish()
+    }
+}
+
+fn record(brick: [i32; 3], place: [i32; 3]) -> [u8; RECORD_BYTES] {
+    let mut record = [0; RECORD_BYTES];
+    record[..12].copy_from_slice(brick.map(key).as_flattened());
+    record[12..].copy_from_slice(&place.map(|k| (k + 1) as u8));
+    record
+}
+
+struct Mesh {
+    vertices: Spool,
+    indices: Spool,
+    bytes: Vec<u8>,
+    colour_heights_m: Option<[f64; 2]>,
+    surface: Surface,
+}
+
+impl Mesh {
+    fn add(&mut self, brick: &Brick, index: [i64; 3], least: [i32; 3]) -> Result<()> {
+        let mut quads: Vec<Quad> = Vec::new();
+        brick.quads(&mut |quad| quads.push(quad));
+        for quad in quads {
+            self.check_room()?;
+            self.bytes.clear();
+            for corner in quad.corners {
+                let place: [i64; 3] = std::array::from_fn(|k| {
+                    index[k] * BRICK as i64 + i64::from(corner[k]) - i64::from(least[k])
+                });
+                let colour = colour(self.share_of_height(place[2]));
+                let turned = [place[0], place[2], self.surface.size[1] - place[1]];
+                for (k, &at) in turned.iter().enumerate() {
+                    self.surface.least[k] = self.surface.least[k].min(at);
+                    self.surface.most[k] = self.surface.most[k].max(at);
+                }
+                self.surface.kind.push(&mut self.bytes, turned, colour);
+            }
+            self.vertices.write(&self.bytes)?;
+            let first =
+                u32::try_from(4 * self.surface.quads).ok().filter(|first| first.checked_add(4).is_some());
+            let first = first.ok_or_else(too_large)?;
+            let indices = [0, 1, 2, 0, 2, 3].map(|k| (first + k).to_le_bytes());
+            self.indices.write(indices.as_flattened())?;
+            self.surface.quads += 1;
+        }
+        Ok(())
+    }
+
+    /// Whether one more face fits: said before the scratch files hold more than any file can.
+    fn check_room(&self) -> Result<()> {
+        let bytes = 4 * self.surface.kind.bytes() as u64 + INDEX_BYTES;
+        if (self.surface.quads + 1) * bytes > u64::from(u32::MAX) { Err(too_large()) } else { Ok(()) }
+    }
+
+    /// Where a height is among those that are coloured: 0 is the first colour, 1 the last.
+    fn share_of_height(&self, place: i64) -> f64 {
+        match self.colour_heights_m {
+            Some([low, high]) if high > low => {
+                (self.surface.corner_m[2] + place as f64 * self.surface.resolution_m - low) / (high - low)
+            }
+            _ => place as f64 / self.surface.size[2].max(1) as f64,
+        }
+    }
+
+    fn write(self, out: &mut OutFile) -> Result<()> {
+        let mut json = glb_json::of(&self.surface).to_string().into_bytes();
+        json.resize(json.len().next_multiple_of(4), b' ');
+        let binary = self.vertices.len() + self.indices.len();
+        let chunk = if binary == 0 { 0 } else { 8 + binary };
+        let short = |number: u64| u32::try_from(number).map(u32::to_le_bytes).map_err(|_| too_large());
+        let mut head = b"glTF\x02\x00\x00\x00".to_vec();
+        head.extend(short(12 + 8 + json.len() as u64 + chunk)?);
+        head.extend(short(json.len() as u64)?);
+        head.extend(b"JSON");
+        head.extend(json);
+        if binary > 0 {
+            head.extend(short(binary)?);
+            head.extend(b"BIN\x00");
+        }
+        out.write(&head)?;
+        out.append(self.vertices.into_reader()?.file())?;
+        out.append(self.indices.into_reader()?.file())?;
+        Ok(())
+    }
+}
+
+fn too_large() -> Error {
+    Error::argument("GLB", "the mesh has more than the 4 GiB of a file of this format; choose a region")
+}
+
+/// The colour of a height from 0 to 1, without transparency.
+fn colour(share: f64) -> [u8; 4] {
+    let along = share.clamp(0.0, 1.0) * (COLOURS.len() - 1) as f64;
+    let below = (along as usize).min(COLOURS.len() - 2);
+    let part = along - below as f64;
+    let mixed = |k: usize| COLOURS[below][k] + part * (COLOURS[below + 1][k] - COLOURS[below][k]);
+    [mixed(0).round() as u8, mixed(1).round() as u8, mixed(2).round() as u8, 255]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{head_of, row};
+    use super::*;
+    use std::collections::HashSet;
+
+    /// Unit faces of a file: the middle of each, doubled, with its direction.
+    fn faces(rows: &[VoxelRow]) -> Vec<([i64; 3], [i64; 3])> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.glb");
+        let options = WriteOptions::beside(&path);
+        let mut sink = Box::new(GlbSink::create(&head_of(rows), &path, &options).unwrap());
+        rows.iter().for_each(|row| sink.put(row).unwrap());
+        sink.finish().unwrap();
+        let bytes = std::fs::read(path).unwrap();
+        let u32_at = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
+        assert_eq!(u32_at(8), bytes.len());
+        let json: serde_json::Value = serde_json::from_slice(&bytes[20..20 + u32_at(12)]).unwrap();
+        let origin = json["nodes"][0]["extras"]["origin_m"].as_array().unwrap();
+        let origin: Vec<i64> = origin.iter().map(|m| (m.as_f64().unwrap() / 0.5).round() as i64).collect();
+        let top = origin[1] as f64 * 0.5
+            - json["nodes"][0]["translation"][2].as_f64().unwrap()
+            - origin[1] as f64 * 0.5;
+        let top = (top / 0.5).round() as i64;
+        let count = json["accessors"][0]["count"].as_u64().unwrap() as usize;
+        let start = 20 + u32_at(12) + 8;
+        let vertex = |k: usize| {
+            let at = |n: usize| {
+                i64::from(bytes[start + 12 * k + 2 * n]) + 256 * i64::from(bytes[start + 12 * k + 2 * n + 1])
+            };
+            [origin[0] + at(0), top - at(2), origin[2] + at(1)]
+        };
+        let mut faces = Vec::new();
+        for quad in 0..count / 4 {
+            let [a, b, c] = [0, 1, 2].map(|k| vertex(4 * quad + k));
+            let (u, v): ([i64; 3], [i64; 3]) =
+                (std::array::from_fn(|k| b[k] - a[k]), std::array::from_fn(|k| c[k] - b[k]));
+            let normal = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
+                .map(i64::signum);
+            let (low, high): ([i64; 3], [i64; 3]) = (
+                std::array::from_fn(|k| a[k].min(c[k])),
+                std::array::from_fn(|k| a[k].max(c[k]).max(a[k].min(c[k]) + 1)),
+            );
+            for x in low[0]..high[0] {
+                for y in low[1]..high[1] {
+                    for z in low[2]..high[2] {
+                        let place = [x, y, z];
+                        let middle = std::array::from_fn(|k| 2 * place[k] + i64::from(normal[k] == 0));
+                        faces.push((middle, normal));
+                    }
+                }
+            }
+        }
+        faces
+    }
+
+    #[test]
+    fn a_mesh_that_no_file_can_hold_is_refused_while_it_grows() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut brick = Brick::new();
+        brick.insert([5, 6, 7]);
+        for (kind, most) in [(VertexKind::Short, 0xffff_ffff / 72), (VertexKind::Single, 0xffff_ffff / 88)] {
+            let surface = Surface {
+                quads: most - 6,
+                kind,
+                resolution_m: 0.5,
+                corner_m: [0.0; 3],
+                size: [1; 3],
+                least: [0; 3],
+                most: [1; 3],
+                crs: None,
+            };
+            let spool = || Spool::new(folder.path()).unwrap();
+            let (vertices, indices, bytes) = (spool(), spool(), Vec::new());
+            let mut mesh = Mesh { vertices, indices, bytes, colour_heights_m: None, surface };
+            mesh.add(&brick, [0; 3], [0; 3]).unwrap();
+            assert_eq!(mesh.surface.quads, most);
+            let error = mesh.add(&brick, [0; 3], [0; 3]).unwrap_err().to_string();
+            assert!(error.contains("4 GiB") && error.contains("choose a region"), "{error}");
+            assert_eq!(mesh.surface.quads, most);
+        }
+    }
+
+    #[test]
+    fn faces_are_those_between_occupied_and_not() {
+        // Clumps around the borders of bricks, below zero as well, with a free voxel among them.
+        let mut rows = Vec::new();
+        for x in -35..35 {
+            for y in [-33, -32, -1, 0, 1, 31, 32] {
+                for z in -2..34 {
+                    let [a, b, c] = [x, y, z].map(i64::from);
+                    let mixed = (a * 73_856_093) ^ (b * 19_349_663) ^ (c * 83_492_791);
+                    if mixed & 3 != 0 || y == 0 {
+                        rows.push(row([x, y, z], if mixed & 31 == 5 { 0.3 } else { 0.9 }));
+                    }
+                }
+            }
+        }
+        let occupied: HashSet<[i64; 3]> =
+            rows.iter().filter(|row| row.probability > 0.5).map(|row| row.index.map(i64::from)).collect();
+        let mut expected = HashSet::new();
+        for voxel in &occupied {
+            for axis in 0..3 {
+                for side in [-1, 1] {
+                    let (mut beside, mut normal) = (*voxel, [0; 3]);
+                    beside[axis] += side;
+                    normal[axis] = side;
+                    if !occupied.contains(&beside) {
+                        expected.insert((std::array::from_fn(|k| 2 * voxel[k] + 1 + normal[k]), normal));
+                    }
+                }
+            }
+        }
+        let found = faces(&rows);
+        assert_eq!(found.len(), expected.len());
+        assert_eq!(found.into_iter().collect::<HashSet<_>>(), expected);
+    }
+}

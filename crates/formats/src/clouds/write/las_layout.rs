@@ -1,0 +1,229 @@
+use super::options::WriteOptions;
+use super::out_file::OutFile;
+use super::row::{VoxelRow, VoxelsHead};
+use crate::clouds::error::{Error, Result};
+use ::las::raw::header::{Evlr, LargeFile};
+use ::las::raw::vlr::RecordLength;
+use ::las::raw::{Header, Vlr};
+use std::io::{Seek, SeekFrom};
+
+/// Bytes of a point: point format 6, log-odds as f64, the number of updates as i32.
+pub(super) const POINT_BYTES: usize = 30 + EXTRA_BYTES as usize;
+pub(super) const EXTRA_BYTES: u16 = 12;
+pub(super) const POINT_FORMAT: u8 = 6;
+/// Set in the format of a point that is compressed.
+pub(super) const COMPRESSED: u8 = 0x80;
+/// Bytes of the head of a file of LAS 1.4.
+const HEADER_BYTES: u16 = 375;
+
+/// How voxels become points of LAS 1.4: whole numbers of a scale, from an offset near them.
+#[derive(Clone, Debug)]
+pub(super) struct LasLayout {
+    /// A power of two, as all offsets are whole: coordinates come back without a rounding of their own.
+    scale_m: f64,
+    offset_m: [f64; 3],
+    /// What points were made so far.
+    points: u64,
+    least: [i32; 3],
+    most: [i32; 3],
+}
+
+impl LasLayout {
+    /// Fine enough that a center is a thousandth of a voxel off at most, as far as whole numbers of 32 bit allow it.
+    ///
+    /// # Errors
+    ///
+    /// Voxels too far apart.
+    pub(super) fn of(head: &VoxelsHead) -> Result<Self> {
+        let [low, high] = head.bounds_m;
+        let offset_m: [f64; 3] = std::array::from_fn(|k| (0.5 * (low[k] + high[k])).round());
+        let reach = (0..3).map(|k| (high[k] - offset_m[k]).max(offset_m[k] - low[k])).fold(0.0, f64::max);
+        let mut scale_m = (head.resolution_m / 1000.0).log2().floor().exp2();
+        while reach / scale_m > f64::from(i32::MAX - 1) && scale_m < head.resolution_m {
+            scale_m *= 2.0;
+        }
+        if scale_m > head.resolution_m / 8.0 || scale_m <= 0.0 {
+            let reason = format!(
+                "voxels of {} m over {reach} m do not fit into the whole numbers of the format; choose a region",
+                head.resolution_m
+            );
+            return Err(Error::argument("LAS", reason));
+        }
+        Ok(Self { scale_m, offset_m, points: 0, least: [i32::MAX; 3], most: [i32::MIN; 3] })
+    }
+
+    /// A point.
+    ///
+    /// # Errors
+    ///
+    /// A voxel far outside the box that was announced.
+    pub(super) fn point(&mut self, voxel: &VoxelRow) -> Result<[u8; POINT_BYTES]> {
+        let mut position = [0; 3];
+        for (k, whole) in position.iter_mut().enumerate() {
+            let scaled = ((voxel.center_m[k] - self.offset_m[k]) / self.scale_m).round();
+            if scaled.abs() > f64::from(i32::MAX) {
+                let reason = format!("voxel {:?} lies outside the box that was announced", voxel.index);
+                return Err(Error::argument("LAS", reason));
+            }
+            *whole = scaled as i32;
+            self.least[k] = self.least[k].min(*whole);
+            self.most[k] = self.most[k].max(*whole);
+        }
+        self.points += 1;
+        let mut point = [0; POINT_BYTES];
+        let [x, y, z] = position.map(i32::to_le_bytes);
+        point[..12].copy_from_slice([x, y, z].as_flattened());
+        let intensity = (voxel.probability.clamp(0.0, 1.0) * 65535.0).round() as u16;
+        point[12..14].copy_from_slice(&intensity.to_le_bytes());
+        // The first of one return; created, not classified.
+        point[14] = 0x11;
+        point[16] = 1;
+        point[30..38].copy_from_slice(&voxel.log_odds.to_le_bytes());
+        point[38..42].copy_from_slice(&voxel.observation_count.to_le_bytes());
+        Ok(point)
+    }
+
+    /// Writes the head of the file: over what stood there, if points were written already.
+    pub(super) fn write_head(
+        &self,
+        out: &mut OutFile,
+        point_format: u8,
+        vlrs: &[Vlr],
+        evlr_start: Option<u64>,
+    ) -> Result<()> {
+        let vlr_bytes: usize = vlrs.iter().map(|vlr| 54 + vlr.data.len()).sum();
+        let bound = |of: [i32; 3], k: usize| match self.points {
+            0 => self.offset_m[k],
+            _ => f64::from(of[k]) * self.scale_m + self.offset_m[k],
+        };
+        let mut by_return = [0; 15];
+        by_return[0] = self.points;
+        let header = Header {
+            // Well-known text is the only way to name a coordinate system with this point format.
+            global_encoding: 1 << 4,
+            version: ::las::Version::new(1, 4),
+            system_identifier: padded("voxtile"),
+            generating_software: padded(concat!("voxtile-clouds ", env!("CARGO_PKG_VERSION"))),
+            header_size: HEADER_BYTES,
+            offset_to_point_data: u32::from(HEADER_BYTES) + vlr_bytes as u32,
+            number_of_variable_length_records: vlrs.len() as u32,
+            point_data_record_format: point_format,
+            point_data_record_length: POINT_BYTES as u16,
+            x_scale_factor: self.scale_m,
+            y_scale_factor: self.scale_m,
+            z_scale_factor: self.scale_m,
+            x_offset: self.offset_m[0],
+            y_offset: self.offset_m[1],
+            z_offset: self.offset_m[2],
+            max_x: bound(self.most, 0),
+            min_x: bound(self.least, 0),
+            max_y: bound(self.most, 1),
+            min_y: bound(self.least, 1),
+            max_z: bound(self.most, 2),
+            min_z: bound(self.least, 2),
+            start_of_waveform_data_packet_record: None,
+            evlr: evlr_start.map(|start| Evlr { start_of_first_evlr: start, number_of_evlrs: 1 }),
+            large_file: Some(LargeFile {
+                number_of_point_records: self.points,
+                number_of_points_by_return: by_return,
+            }),
+            ..Header::default()
+        };
+        let path = out.path().to_owned();
+        out.seek(SeekFrom::Start(0)).map_err(|error| Error::io(&path, "write", error))?;
+        header.write_to(&mut *out).map_err(|error| refused(&path, error))?;
+        for vlr in vlrs {
+            vlr.write_to(&mut *out).map_err(|error| refused(&path, error))?;
+        }
+        Ok(())
+    }
+}
+
+/// What every file says of its points beside its head: the fields behind format 6, and where the world is.
+pub(super) fn common_vlrs(options: &WriteOptions) -> Result<Vec<Vlr>> {
+    let mut fields = extra_field("log_odds", 10, "log-odds of being occupied");
+    fields.extend(extra_field("count", 6, "number of updates"));
+    let mut vlrs = vec![vlr("LASF_Spec", 4, "fields of voxels", fields)?];
+    if let Some(crs) = &options.crs {
+        vlrs.push(crs_vlr(crs)?);
+    }
+    Ok(vlrs)
+}
+
+/// The coordinate system. LAS 1.4 wants well-known text with this point format; a number of the EPSG register alone
+/// cannot become one here and goes where older versions keep it, among the keys of GeoTIFF.
+fn crs_vlr(crs: &str) -> Result<Vlr> {
+    let Some(number) = crs.strip_prefix("EPSG:") else {
+        let text = [crs.as_bytes(), &[0]].concat();
+        return vlr("LASF_Projection", 2112, "coordinate system", text);
+    };
+    let number: u16 = number.parse().map_err(|_| {
+        Error::argument("crs", format!("`{crs}` is no number of a projected system; give well-known text"))
+    })?;
+    // Version 1.1.0 and three keys: projected, by this number, in metres.
+    let keys = [[1, 1, 0, 3], [1024, 0, 1, 1], [3072, 0, 1, number], [3076, 0, 1, 9001]];
+    let data = keys.as_flattened().iter().flat_map(|value| value.to_le_bytes()).collect();
+    vlr("LASF_Projection", 34735, "coordinate system", data)
+}
+
+/// A record of variable length.
+pub(super) fn vlr(user: &str, record_id: u16, description: &str, data: Vec<u8>) -> Result<Vlr> {
+    let too_long = |_| Error::argument("LAS", format!("{} bytes of {description} are too many", data.len()));
+    let length = u16::try_from(data.len()).map_err(too_long)?;
+    Ok(Vlr {
+        reserved: 0,
+        user_id: padded(user),
+        record_id,
+        record_length_after_header: RecordLength::Vlr(length),
+        description: padded(description),
+        data,
+    })
+}
+
+/// A text, cut or filled up with zeros.
+pub(super) fn padded<const N: usize>(text: &str) -> [u8; N] {
+    let mut bytes = [0; N];
+    bytes.iter_mut().zip(text.bytes()).for_each(|(to, from)| *to = from);
+    bytes
+}
+
+/// The description of an extra field of points.
+fn extra_field(name: &str, data_type: u8, description: &str) -> Vec<u8> {
+    let mut field = vec![0, 0, data_type, 0];
+    field.extend(padded::<32>(name));
+    // Neither a value for nothing, nor bounds, nor a scale.
+    field.extend([0; 4 + 5 * 24]);
+    field.extend(padded::<32>(description));
+    field
+}
+
+pub(super) fn refused(path: &std::path::Path, error: ::las::Error) -> Error {
+    match error {
+        ::las::Error::Io(error) => Error::io(path, "write", error),
+        other => Error::argument(path.display().to_string(), other.to_string()),
+    }
+}
+
+pub(super) fn not_compressed(path: &std::path::Path, error: laz::LasZipError) -> Error {
+    match error {
+        laz::LasZipError::IoError(error) => Error::io(path, "write", error),
+        other => Error::argument(path.display().to_string(), other.to_string()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{head_of, row};
+    use super::*;
+
+    #[test]
+    fn far_voxels_take_a_coarser_scale_or_none() {
+        let mut head = head_of(&[row([0; 3], 0.5)]);
+        let near = LasLayout::of(&head).unwrap();
+        assert_eq!(near.scale_m, 1.0 / 2048.0);
+        head.bounds_m = [[-1e8; 3], [1e8; 3]];
+        assert_eq!(LasLayout::of(&head).unwrap().scale_m, 1.0 / 16.0);
+        head.bounds_m = [[-1e9; 3], [1e9; 3]];
+        assert!(LasLayout::of(&head).unwrap_err().to_string().contains("choose a region"));
+    }
+}

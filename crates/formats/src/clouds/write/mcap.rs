@@ -1,0 +1,151 @@
+use super::mcap_file::{McapFile, Topic};
+use super::options::WriteOptions;
+use super::point_cloud2::{FieldType, SCHEMA, encode};
+use super::row::{VoxelRow, VoxelSink, VoxelsHead};
+use crate::clouds::error::Result;
+use std::path::Path;
+
+/// Most points of a cloud.
+const MOST_POINTS: usize = 1 << 20;
+const TOPIC: &str = "/voxels";
+
+/// A recording of ROS 2 (MCAP) with clouds of whole tiles, as far as they fit.
+///
+/// Coordinates are in single precision, which all viewers know, unless that is too coarse where the map is.
+pub(super) struct McapSink {
+    file: McapFile,
+    frame: String,
+    stamp_ns: u64,
+    fields: Vec<(&'static str, FieldType)>,
+    /// Points of the cloud that is next, and where its last tile begins.
+    points: Vec<u8>,
+    most_points: usize,
+    tile: Option<[i32; 3]>,
+    tile_start: usize,
+    clouds: u32,
+}
+
+impl McapSink {
+    pub(super) fn create(head: &VoxelsHead, path: &Path, options: &WriteOptions) -> Result<Self> {
+        let topic = Topic { name: TOPIC, type_name: "sensor_msgs/msg/PointCloud2", definition: SCHEMA };
+        let file = McapFile::create(path, &topic)?;
+        let fits = head.bounds_m.as_flattened().iter().all(|bound| {
+            // Half the distance of neighbouring numbers of single precision at that place.
+            bound.abs() * f64::from(f32::EPSILON) <= head.resolution_m / 16.0
+        });
+        let of = if fits { FieldType::Float32 } else { FieldType::Float64 };
+        let fields = vec![
+            ("x", of),
+            ("y", of),
+            ("z", of),
+            ("intensity", FieldType::Float32),
+            ("log_odds", FieldType::Float64),
+            ("count", FieldType::Int32),
+        ];
+        Ok(Self {
+            file,
+            frame: options.frame.clone(),
+            stamp_ns: options.stamp_ns,
+            fields,
+            points: Vec::new(),
+            most_points: MOST_POINTS,
+            tile: None,
+            tile_start: 0,
+            clouds: 0,
+        })
+    }
+
+    fn step(&self) -> usize {
+        self.fields.iter().map(|(_, of)| of.bytes() as usize).sum()
+    }
+
+    /// Writes the points up to a place as a cloud.
+    fn write_cloud(&mut self, end: usize) -> Result<()> {
+        let end = end.min(self.points.len());
+        if end == 0 {
+            return Ok(());
+        }
+        let rest = self.points.split_off(end);
+        let data = encode(self.stamp_ns, &self.frame, &self.fields, &self.points);
+        // A nanosecond apart, so that players keep their order.
+        let log_ns = self.stamp_ns.saturating_add(u64::from(self.clouds));
+        self.file.write(log_ns, self.stamp_ns, &data)?;
+        self.clouds = self.clouds.saturating_add(1);
+        self.points = rest;
+        self.tile_start = self.tile_start.saturating_sub(end);
+        Ok(())
+    }
+}
+
+impl VoxelSink for McapSink {
+    fn put(&mut self, voxel: &VoxelRow) -> Result<()> {
+        if self.tile.replace(voxel.tile) != Some(voxel.tile) {
+            self.tile_start = self.points.len();
+        }
+        if self.points.len() >= self.most_points.saturating_mul(self.step()) {
+            // Before the last tile, unless it fills the cloud alone.
+            let end = if self.tile_start == 0 { self.points.len() } else { self.tile_start };
+            self.write_cloud(end)?;
+        }
+        let is_short = self.fields.first().is_some_and(|(_, of)| *of == FieldType::Float32);
+        for place in voxel.center_m {
+            match is_short {
+                true => self.points.extend((place as f32).to_le_bytes()),
+                false => self.points.extend(place.to_le_bytes()),
+            }
+        }
+        self.points.extend((voxel.probability as f32).to_le_bytes());
+        self.points.extend(voxel.log_odds.to_le_bytes());
+        self.points.extend(voxel.observation_count.to_le_bytes());
+        Ok(())
+    }
+
+    fn finish(mut self: Box<Self>) -> Result<()> {
+        self.write_cloud(self.points.len())?;
+        self.file.finish()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{head_of, row};
+    use super::*;
+
+    #[test]
+    fn clouds_hold_whole_tiles_as_far_as_they_fit() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.mcap");
+        // Tiles of 16 voxels along x: 16 points each, and one of 64 that is cut.
+        let mut rows: Vec<_> = (0..48).map(|x| row([x, 0, 0], 0.9)).collect();
+        rows.extend((0..4).flat_map(|y| (48..64).map(move |x| row([x, y, 0], 0.9))));
+        let mut sink = McapSink::create(&head_of(&rows), &path, &WriteOptions::beside(&path)).unwrap();
+        sink.most_points = 40;
+        rows.iter().for_each(|row| sink.put(row).unwrap());
+        Box::new(sink).finish().unwrap();
+        let bytes = std::fs::read(&path).unwrap();
+        let messages: Vec<_> =
+            ::mcap::MessageStream::new(&bytes).unwrap().map(|message| message.unwrap()).collect();
+        // Behind the head of the CDR, stamp, frame and height stands the number of points.
+        let width = |data: &[u8]| u32::from_le_bytes(data[24..28].try_into().unwrap());
+        let widths: Vec<u32> = messages.iter().map(|message| width(&message.data)).collect();
+        assert_eq!(widths, [32, 16, 40, 24]);
+        assert!(messages.is_sorted_by_key(|message| message.log_time));
+
+        // By the index alone, each chunk is found and its sum is right.
+        let summary = ::mcap::Summary::read(&bytes).unwrap().unwrap();
+        let stats = summary.stats.as_ref().unwrap();
+        assert_eq!((stats.message_count, stats.chunk_count, stats.channel_count), (4, 4, 1));
+        let channel = summary.channels.values().next().unwrap();
+        assert_eq!((channel.topic.as_str(), channel.message_encoding.as_str()), ("/voxels", "cdr"));
+        assert_eq!(channel.schema.as_ref().unwrap().name, "sensor_msgs/msg/PointCloud2");
+        for (chunk, message) in summary.chunk_indexes.iter().zip(&messages) {
+            let found: Vec<_> =
+                summary.stream_chunk(&bytes, chunk).unwrap().map(|found| found.unwrap()).collect();
+            assert_eq!(found.len(), 1);
+            assert_eq!(found[0].data, message.data);
+            let index = summary.read_message_indexes(&bytes, chunk).unwrap();
+            let entry = index.values().next().unwrap()[0];
+            assert_eq!(summary.seek_message(&bytes, chunk, &entry).unwrap().data, message.data);
+        }
+    }
+}

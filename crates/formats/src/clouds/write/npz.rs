@@ -1,0 +1,156 @@
+use super::options::WriteOptions;
+use super::row::{VoxelRow, VoxelSink, VoxelsHead};
+use super::spool::Spool;
+use super::zip_store::ZipStore;
+use crate::clouds::error::Result;
+use std::io::Read;
+use std::path::Path;
+
+/// Columns as arrays of NumPy in an archive. Each waits in a file of its own until the next can follow it.
+pub(super) struct NpzSink {
+    zip: ZipStore,
+    columns: Vec<Column>,
+}
+
+struct Column {
+    name: &'static str,
+    /// The head of a `.npy` file: type and shape.
+    head: Vec<u8>,
+    crc: crc32fast::Hasher,
+    spool: Spool,
+}
+
+impl NpzSink {
+    pub(super) fn create(head: &VoxelsHead, path: &Path, options: &WriteOptions) -> Result<Self> {
+        Self::in_zip(ZipStore::create(path)?, head, options)
+    }
+
+    fn in_zip(zip: ZipStore, head: &VoxelsHead, options: &WriteOptions) -> Result<Self> {
+        let rows = head.voxels;
+        let columns = [
+            ("xyz.npy", "<f8", format!("({rows}, 3)")),
+            ("log_odds.npy", "<f8", format!("({rows},)")),
+            ("probability.npy", "<f4", format!("({rows},)")),
+            ("count.npy", "<i4", format!("({rows},)")),
+        ];
+        let columns = columns.map(|(name, of, shape)| Column::new(name, of, &shape, &options.scratch_folder));
+        Ok(Self { zip, columns: columns.into_iter().collect::<Result<_>>()? })
+    }
+}
+
+impl VoxelSink for NpzSink {
+    fn put(&mut self, voxel: &VoxelRow) -> Result<()> {
+        let [x, y, z] = voxel.center_m.map(f64::to_le_bytes);
+        if let [xyz, log_odds, probability, count] = self.columns.as_mut_slice() {
+            xyz.write([x, y, z].as_flattened())?;
+            log_odds.write(&voxel.log_odds.to_le_bytes())?;
+            probability.write(&(voxel.probability as f32).to_le_bytes())?;
+            count.write(&voxel.observation_count.to_le_bytes())?;
+        }
+        Ok(())
+    }
+
+    fn finish(mut self: Box<Self>) -> Result<()> {
+        for column in self.columns {
+            let bytes = column.head.len() as u64 + column.spool.len();
+            let mut data = column.spool.into_reader()?;
+            let parts: &mut [&mut dyn Read] = &mut [&mut column.head.as_slice(), data.file()];
+            self.zip.entry(column.name, column.crc.finalize(), bytes, parts)?;
+        }
+        self.zip.finish()
+    }
+}
+
+impl Column {
+    fn new(name: &'static str, of: &str, shape: &str, scratch_folder: &Path) -> Result<Self> {
+        let head = npy_head(of, shape);
+        let mut crc = crc32fast::Hasher::new();
+        crc.update(&head);
+        Ok(Self { name, head, crc, spool: Spool::new(scratch_folder)? })
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> Result<()> {
+        self.crc.update(bytes);
+        self.spool.write(bytes)
+    }
+}
+
+/// The head of a `.npy` file, version 1.0: a dictionary in the words of Python, filled up to a multiple of 64 bytes.
+fn npy_head(of: &str, shape: &str) -> Vec<u8> {
+    let mut words = format!("{{'descr': '{of}', 'fortran_order': False, 'shape': {shape}, }}");
+    while (10 + words.len() + 1) % 64 != 0 {
+        words.push(' ');
+    }
+    words.push('\n');
+    let mut head = b"\x93NUMPY\x01\x00".to_vec();
+    head.extend((words.len() as u16).to_le_bytes());
+    head.extend(words.as_bytes());
+    head
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn archive(zip64_from: u64) -> Vec<u8> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.npz");
+        let head = VoxelsHead {
+            voxels: 2,
+            resolution_m: 0.5,
+            bounds_m: [[0.0; 3], [1.0; 3]],
+            occupied_log_odds: 0.0,
+        };
+        let zip = ZipStore::create(&path).unwrap().with_zip64_from(zip64_from);
+        let mut sink = Box::new(NpzSink::in_zip(zip, &head, &WriteOptions::beside(&path)).unwrap());
+        for x in [0.25, 0.75] {
+            let voxel = VoxelRow {
+                index: [(2.0 * x) as i32, 0, 0],
+                center_m: [x, 0.25, 0.25],
+                probability: 0.7,
+                log_odds: 0.85,
+                observation_count: 3,
+                tile: [0; 3],
+            };
+            sink.put(&voxel).unwrap();
+        }
+        sink.finish().unwrap();
+        std::fs::read(path).unwrap()
+    }
+
+    #[test]
+    fn heads_fill_lines_of_64_bytes() {
+        for rows in [0_u64, 7, 1 << 40] {
+            let head = npy_head("<f8", &format!("({rows}, 3)"));
+            assert_eq!(head.len() % 64, 0);
+            assert_eq!(usize::from(head[8]) + 256 * usize::from(head[9]) + 10, head.len());
+            assert!(head[10..].starts_with(b"{'descr': '<f8', 'fortran_order': False, 'shape': ("));
+            assert!(head.starts_with(b"\x93NUMPY\x01\x00") && head.ends_with(b"\n"));
+        }
+    }
+
+    #[test]
+    fn the_checksum_is_that_of_the_entry() {
+        let bytes = archive(u64::from(u32::MAX));
+        let at = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
+        assert_eq!(at(0), 0x0403_4b50);
+        let (crc, size, name) = (at(14), at(22) as usize, at(26) as usize);
+        let data = &bytes[30 + name..30 + name + size];
+        assert_eq!(&bytes[30..30 + name], b"xyz.npy");
+        assert_eq!(crc32fast::hash(data), crc);
+        assert_eq!(size, 128 + 48);
+        assert_eq!(data[128..136], 0.25_f64.to_le_bytes());
+    }
+
+    #[test]
+    fn large_archives_say_64_bit() {
+        let bytes = archive(100);
+        // The record of 64 bit and its locator stand before the old end.
+        let end = bytes.len() - 22;
+        assert_eq!(bytes[end..end + 4], 0x0605_4b50_u32.to_le_bytes());
+        assert_eq!(bytes[end - 20..end - 16], 0x0706_4b50_u32.to_le_bytes());
+        let record = u64::from_le_bytes(bytes[end - 12..end - 4].try_into().unwrap()) as usize;
+        assert_eq!(bytes[record..record + 4], 0x0606_4b50_u32.to_le_bytes());
+        assert_eq!(bytes[18..26], [255; 8]);
+    }
+}

@@ -1,0 +1,113 @@
+use crate::clouds::error::{Error, Result};
+use std::path::{Path, PathBuf};
+
+/// How voxels are written.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WriteOptions {
+    /// The name that the output has in the end: files beside it, and names within it, follow this one.
+    pub final_path: PathBuf,
+    /// Where files beside the output are written, under names that follow the final one: `map.yaml`, `map.pgw`.
+    pub companion_folder: PathBuf,
+    /// Where files without a name are kept until the output is whole. They need about as much room as the output.
+    pub scratch_folder: PathBuf,
+    /// The coordinate reference system that the coordinates are in, in metres: well-known text or, where only its
+    /// number is known, `EPSG:25832`. Formats that name none leave it out.
+    pub crs: Option<String>,
+    /// Flat maps: the lowest height that counts, in metres.
+    pub z_min_m: Option<f64>,
+    /// Flat maps: the greatest height that counts, in metres.
+    pub z_max_m: Option<f64>,
+    /// Autoware: edge of the square of a file, in whole metres.
+    pub cell_m: f64,
+    /// Subtracted from coordinates where a format holds them in single precision (Autoware).
+    pub origin_m: [f64; 3],
+    /// Meshes: the heights of the first and the last colour, in metres; of the lowest and highest voxel if not given.
+    pub colour_heights_m: Option<[f64; 2]>,
+    /// Recordings: the frame of the clouds.
+    pub frame: String,
+    /// Recordings: the time of the clouds, in nanoseconds since 1970.
+    pub stamp_ns: u64,
+}
+
+impl WriteOptions {
+    /// All that follows from where the output ends up: files beside it and scratch files lie in its folder.
+    pub fn beside(final_path: &Path) -> Self {
+        let folder = match final_path.parent() {
+            Some(folder) if !folder.as_os_str().is_empty() => folder.to_owned(),
+            _ => PathBuf::from("."),
+        };
+        Self {
+            final_path: final_path.to_owned(),
+            companion_folder: folder.clone(),
+            scratch_folder: folder,
+            crs: None,
+            z_min_m: None,
+            z_max_m: None,
+            cell_m: 20.0,
+            origin_m: [0.0; 3],
+            colour_heights_m: None,
+            frame: "map".to_owned(),
+            stamp_ns: 0,
+        }
+    }
+
+    /// The final name without its folder.
+    pub(super) fn final_name(&self) -> Result<&str> {
+        let name = self.final_path.file_name().and_then(|name| name.to_str());
+        name.ok_or_else(|| {
+            let reason = "the output needs a name in Unicode, for files beside it name it";
+            Error::argument(self.final_path.display().to_string(), reason)
+        })
+    }
+
+    /// Where a file beside the output is written: its name is the final one with another end. `own` is the end that the
+    /// output itself should have.
+    pub(super) fn companion(&self, extension: &str, own: &str) -> Result<PathBuf> {
+        let name = self.final_name()?;
+        let beside = Path::new(name).with_extension(extension);
+        // Some disks take names that differ in case for one.
+        if beside.to_str().is_some_and(|beside| beside.eq_ignore_ascii_case(name)) {
+            let hint = self.final_path.with_extension(own);
+            let reason =
+                format!("a file beside the output has this name; name the output {}", hint.display());
+            return Err(Error::argument(self.final_path.display().to_string(), reason));
+        }
+        Ok(self.companion_folder.join(beside))
+    }
+
+    /// Heights that count, checked.
+    pub(super) fn heights_m(&self) -> Result<[f64; 2]> {
+        let least = self.z_min_m.unwrap_or(f64::NEG_INFINITY);
+        let most = self.z_max_m.unwrap_or(f64::INFINITY);
+        if least < most {
+            return Ok([least, most]);
+        }
+        let reason = format!("heights from {least} to {most} m hold nothing; z_min must be below z_max");
+        Err(Error::argument("z_min, z_max", reason))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{head_of, row};
+    use super::super::{VoxelFileFormat, open_sink};
+    use super::*;
+
+    #[test]
+    fn no_output_takes_the_name_of_what_belongs_beside_it() {
+        let rows = [row([0, 0, 0], 0.9)];
+        for (format, name, hint) in [
+            (VoxelFileFormat::Nav2Map, "map.yaml", "map.pgm"),
+            (VoxelFileFormat::Nav2Map, "map.YAML", "map.pgm"),
+            (VoxelFileFormat::Heightmap, "h.json", "h.png"),
+            (VoxelFileFormat::Heightmap, "h.Pgw", "h.png"),
+        ] {
+            let folder = tempfile::tempdir().unwrap();
+            let path = folder.path().join(name);
+            let opened = open_sink(format, &head_of(&rows), &path, &WriteOptions::beside(&path));
+            let error = opened.err().map(|error| error.to_string()).unwrap_or_default();
+            assert!(error.contains(name) && error.contains(hint), "{name}: {error:?}");
+            assert!(!path.exists());
+        }
+    }
+}

@@ -1,0 +1,48 @@
+use crate::clouds::error::Result;
+
+/// A voxel that is written.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VoxelRow {
+    /// Its index along x, y and z: its lower corner is the index times the edge of a voxel, before the origin is added.
+    pub index: [i32; 3],
+    /// Its center in true coordinates, in metres.
+    pub center_m: [f64; 3],
+    /// Probability of being occupied.
+    pub probability: f64,
+    /// Exact log-odds.
+    pub log_odds: f64,
+    /// Number of updates.
+    pub observation_count: i32,
+    /// The tile that it belongs to.
+    pub tile: [i32; 3],
+}
+
+/// What is known of a file before its first voxel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct VoxelsHead {
+    /// Number of voxels, exactly.
+    pub voxels: u64,
+    /// Edge of a voxel in metres.
+    pub resolution_m: f64,
+    /// A box around the centers of all voxels, in true coordinates in metres.
+    pub bounds_m: [[f64; 3]; 2],
+    /// Log-odds from which on a voxel is occupied. The probability does not tell: faded log-odds have exactly 0.5.
+    pub occupied_log_odds: f64,
+}
+
+/// Takes voxels one after the other: tile by tile, in Morton order within each.
+pub trait VoxelSink {
+    /// Appends a voxel.
+    ///
+    /// # Errors
+    ///
+    /// The system refuses; what the format cannot hold.
+    fn put(&mut self, voxel: &VoxelRow) -> Result<()>;
+
+    /// Ends the file.
+    ///
+    /// # Errors
+    ///
+    /// The system refuses; another number of voxels than was announced.
+    fn finish(self: Box<Self>) -> Result<()>;
+}

@@ -1,0 +1,70 @@
+use crate::clouds::error::{Error, Result};
+use std::fs::File;
+use std::io::{BufWriter, Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+/// Bytes that wait in a file without a name until it is known where they belong.
+pub(super) struct Spool {
+    folder: PathBuf,
+    out: BufWriter<File>,
+    len: u64,
+}
+
+impl Spool {
+    pub(super) fn new(folder: &Path) -> Result<Self> {
+        let file = tempfile::tempfile_in(folder)
+            .map_err(|error| Error::io(folder, "make a temporary file in", error))?;
+        Ok(Self { folder: folder.to_owned(), out: BufWriter::with_capacity(1 << 16, file), len: 0 })
+    }
+
+    /// Bytes that were written.
+    pub(super) fn len(&self) -> u64 {
+        self.len
+    }
+
+    pub(super) fn write(&mut self, bytes: &[u8]) -> Result<()> {
+        self.out.write_all(bytes).map_err(|error| refused(&self.folder, error))?;
+        self.len += bytes.len() as u64;
+        Ok(())
+    }
+
+    /// What was written, from the start.
+    pub(super) fn into_reader(mut self) -> Result<SpoolReader> {
+        let folder = self.folder.clone();
+        self.out.flush().map_err(|error| refused(&folder, error))?;
+        let mut file = self.out.into_inner().map_err(|error| refused(&folder, error.into_error()))?;
+        file.seek(SeekFrom::Start(0)).map_err(|error| refused(&folder, error))?;
+        Ok(SpoolReader { folder, file, len: self.len })
+    }
+}
+
+/// A spool that is read.
+pub(super) struct SpoolReader {
+    folder: PathBuf,
+    file: File,
+    len: u64,
+}
+
+impl SpoolReader {
+    /// Its file, at its start.
+    pub(super) fn file(&mut self) -> &mut File {
+        &mut self.file
+    }
+
+    /// Reads bytes at an offset: as many as there are, and at most as many as the buffer holds.
+    pub(super) fn read_at(&mut self, offset: u64, buffer: &mut Vec<u8>, most: u64) -> Result<()> {
+        buffer.clear();
+        let failed = |error| Error::io(&self.folder, "read a temporary file in", error);
+        self.file.seek(SeekFrom::Start(offset)).map_err(failed)?;
+        let most = most.min(self.len.saturating_sub(offset));
+        let read = (&mut self.file).take(most).read_to_end(buffer).map_err(failed)?;
+        if read as u64 != most {
+            return Err(failed(std::io::ErrorKind::UnexpectedEof.into()));
+        }
+        Ok(())
+    }
+}
+
+fn refused(folder: &Path, error: std::io::Error) -> Error {
+    Error::io(folder, "write a temporary file in", error)
+}

@@ -1,0 +1,26 @@
+use super::out_file::OutFile;
+use super::row::{VoxelRow, VoxelSink};
+use crate::clouds::error::Result;
+use std::path::Path;
+
+/// Text, a line a voxel: `x y z probability`, in as few digits as give back the same numbers.
+pub(super) struct XyzSink {
+    out: OutFile,
+}
+
+impl XyzSink {
+    pub(super) fn create(path: &Path) -> Result<Self> {
+        Ok(Self { out: OutFile::create(path)? })
+    }
+}
+
+impl VoxelSink for XyzSink {
+    fn put(&mut self, voxel: &VoxelRow) -> Result<()> {
+        let [x, y, z] = voxel.center_m;
+        self.out.write(format!("{x} {y} {z} {}\n", voxel.probability).as_bytes())
+    }
+
+    fn finish(self: Box<Self>) -> Result<()> {
+        self.out.finish()
+    }
+}

@@ -1,0 +1,57 @@
+//! Files of other programs, one format per file, and voxtile's scan stream. Knows no mapper.
+//!
+//! ```text
+//! folder of PCD + poses ┐                                  ┌ .ply .pcd .csv
+//! OctoMap scan graph    ├ ScanSource -> SensorScan   Voxel ┤
+//! OctoMap scan log      │                                  └ VoxelWriter
+//! voxtile's scan stream ┘
+//! ```
+
+mod any_scans;
+pub mod clouds;
+mod file_order;
+mod fingerprint;
+mod lzf;
+mod pcd;
+mod pcd_clouds;
+mod pcd_folder;
+mod pcd_header;
+mod pcd_viewpoint;
+mod point_store;
+mod points;
+mod pose_source;
+mod posed_clouds;
+mod poses;
+mod read_options;
+mod scan_chain;
+mod scan_graph;
+mod scan_log;
+mod scan_reach;
+mod scan_stream;
+mod scan_stream_writer;
+mod selected_scans;
+mod sensor_scan;
+mod source;
+mod stored_scan;
+mod stream_input;
+mod voxel_writer;
+
+pub use any_scans::open_any_scans;
+pub use pcd::{PcdCloud, read_pcd};
+pub use point_store::{PointRoom, PointStore};
+pub use points::read_points;
+pub use pose_source::PoseSource;
+pub use posed_clouds::CloudOptions;
+pub use poses::{parse_poses, read_poses};
+pub use read_options::{ReadOptions, RecordingOptions};
+pub use scan_chain::{ScanChain, ScanMark};
+pub use scan_graph::read_scan_graph;
+pub use scan_log::read_scan_log;
+pub use scan_reach::ScanReach;
+pub use scan_stream::read_scan_stream;
+pub use scan_stream_writer::ScanStreamWriter;
+pub use selected_scans::Selection;
+pub use sensor_scan::SensorScan;
+pub use source::{ScanHead, ScanSource, open_scans};
+pub use stored_scan::StoredScan;
+pub use voxel_writer::{VoxelFile, VoxelFormat, VoxelRecord, VoxelWriter};

@@ -1,0 +1,270 @@
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom, Write};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+use voxtile::scan::TakePoints;
+use voxtile::space::Point;
+use voxtile::{Error, Result};
+
+/// The points of one scan in the sensor's frame, in metres: in memory up to a limit, the rest in a temporary file.
+///
+/// The file is unnamed and is freed when the store is dropped.
+#[derive(Debug, Default)]
+pub struct PointStore {
+    /// The last points; all of them if there is no file.
+    points: Vec<Point>,
+    intensities: Option<Vec<f32>>,
+    /// Number of points before these, in the file.
+    filed: usize,
+    file: Option<Mutex<File>>,
+    room: PointRoom,
+}
+
+/// How many points of a scan may be in memory, and where the rest goes.
+#[derive(Clone, Debug)]
+pub struct PointRoom {
+    most_points: usize,
+    folder: PathBuf,
+}
+
+/// Bytes of a point in the file: the point, and the intensity, 0 if there is none. The bytes are native, as no other
+/// process reads them.
+const RECORD_BYTES: usize = size_of::<Point>() + size_of::<f32>();
+/// Points that are read at a time.
+const POINTS_AT_A_TIME: usize = 1 << 14;
+/// Points in memory that are passed at a time. The receiver copies them into the world frame, 6 MiB; and beam coherence
+/// works within one chunk, which should be a whole scan of most sensors.
+const POINTS_HANDED_OVER: usize = 1 << 18;
+
+impl Default for PointRoom {
+    fn default() -> Self {
+        Self { most_points: usize::MAX, folder: PathBuf::new() }
+    }
+}
+
+impl PointRoom {
+    /// Room for the points of so many bytes; more go to a file in a folder.
+    pub fn new(most_bytes: usize, folder: &Path) -> Self {
+        Self { most_points: (most_bytes / RECORD_BYTES).max(POINTS_AT_A_TIME), folder: folder.to_owned() }
+    }
+
+    /// Whether so many bytes exceed the limit.
+    pub(super) fn is_too_much(&self, bytes: usize) -> bool {
+        bytes / RECORD_BYTES > self.most_points
+    }
+
+    /// An unnamed file in this folder.
+    pub(super) fn file(&self) -> Result<File> {
+        tempfile::tempfile_in(&self.folder).map_err(|error| {
+            Error::io(&self.folder, "keep the points of a scan in a temporary file in", error)
+        })
+    }
+
+    pub(super) fn folder(&self) -> &Path {
+        &self.folder
+    }
+}
+
+impl PointStore {
+    /// A store without points.
+    pub fn new(room: PointRoom) -> Self {
+        Self { room, ..Self::default() }
+    }
+
+    /// Removes all points; the next ones come with intensities or without.
+    pub fn begin(&mut self, has_intensities: bool) {
+        self.points.clear();
+        self.intensities = has_intensities.then(Vec::new);
+        (self.filed, self.file) = (0, None);
+    }
+
+    pub(super) fn room(&self) -> &PointRoom {
+        &self.room
+    }
+
+    /// Reserves memory for so many points.
+    pub(crate) fn reserve(&mut self, points: usize) {
+        let points = points.min(self.room.most_points);
+        self.points.reserve_exact(points);
+        if let Some(intensities) = &mut self.intensities {
+            intensities.reserve_exact(points);
+        }
+    }
+
+    /// Adds a point; the intensity is ignored if the scan has none.
+    ///
+    /// # Errors
+    ///
+    /// A file that cannot be written.
+    #[inline]
+    pub fn push(&mut self, point: Point, intensity: f32) -> Result<()> {
+        if self.points.len() == self.room.most_points {
+            self.put_in_file()?;
+        }
+        self.points.push(point);
+        if let Some(intensities) = &mut self.intensities {
+            intensities.push(intensity);
+        }
+        Ok(())
+    }
+
+    /// Adds points with their intensities, which are ignored if the scan has none.
+    ///
+    /// # Errors
+    ///
+    /// A file that cannot be written.
+    pub(crate) fn extend(
+        &mut self,
+        mut points: impl ExactSizeIterator<Item = (Point, f32)> + Clone,
+    ) -> Result<()> {
+        if points.len() > self.room.most_points.saturating_sub(self.points.len()) {
+            return points.try_for_each(|(point, intensity)| self.push(point, intensity));
+        }
+        self.points.extend(points.clone().map(|(point, _)| point));
+        if let Some(intensities) = &mut self.intensities {
+            intensities.extend(points.map(|(_, intensity)| intensity));
+        }
+        Ok(())
+    }
+
+    #[cold]
+    fn put_in_file(&mut self) -> Result<()> {
+        let mut file = match self.file.take() {
+            Some(file) => file.into_inner().unwrap_or_else(PoisonError::into_inner),
+            None => self.room.file()?,
+        };
+        let cannot =
+            |error| Error::io(self.room.folder(), "keep the points of a scan in a temporary file in", error);
+        let mut bytes = Vec::with_capacity(POINTS_AT_A_TIME * RECORD_BYTES);
+        for (chunk, points) in self.points.chunks(POINTS_AT_A_TIME).enumerate() {
+            bytes.clear();
+            for (number, point) in (chunk * POINTS_AT_A_TIME..).zip(points) {
+                let intensity = self.intensities.as_ref().map_or(0.0, |intensities| intensities[number]);
+                bytes.extend_from_slice(bytemuck::bytes_of(point));
+                bytes.extend_from_slice(bytemuck::bytes_of(&intensity));
+            }
+            file.write_all(&bytes).map_err(cannot)?;
+        }
+        self.filed += self.points.len();
+        self.points.clear();
+        if let Some(intensities) = &mut self.intensities {
+            intensities.clear();
+        }
+        self.file = Some(Mutex::new(file));
+        Ok(())
+    }
+
+    /// Number of points.
+    pub fn len(&self) -> usize {
+        self.filed + self.points.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Whether each point has an intensity.
+    pub fn has_intensities(&self) -> bool {
+        self.intensities.is_some()
+    }
+
+    /// Passes the points of a range to `take` in order, chunk by chunk, with their intensities if they have any. `take`
+    /// returns whether to continue.
+    ///
+    /// # Errors
+    ///
+    /// A file that cannot be read.
+    pub fn for_each_chunk(&self, range: Range<usize>, take: &mut TakePoints<'_>) -> Result<()> {
+        let in_file = range.start.min(self.filed)..range.end.min(self.filed);
+        let in_memory = range.start.max(self.filed) - self.filed..range.end.max(self.filed) - self.filed;
+        let mut next = in_file.start;
+        let (mut bytes, mut points, mut intensities) = (Vec::new(), Vec::new(), Vec::new());
+        while next < in_file.end {
+            let count = (in_file.end - next).min(POINTS_AT_A_TIME);
+            self.read(next, count, &mut bytes)?;
+            points.clear();
+            intensities.clear();
+            for record in bytes.chunks_exact(RECORD_BYTES) {
+                let (point, intensity) = record.split_at(size_of::<Point>());
+                points.push(bytemuck::pod_read_unaligned::<Point>(point));
+                intensities.push(bytemuck::pod_read_unaligned::<f32>(intensity));
+            }
+            if !take(&points, self.has_intensities().then_some(&*intensities)) {
+                return Ok(());
+            }
+            next += count;
+        }
+        for first in in_memory.clone().step_by(POINTS_HANDED_OVER) {
+            let some = first..in_memory.end.min(first + POINTS_HANDED_OVER);
+            let intensities = self.intensities.as_ref().map(|intensities| &intensities[some.clone()]);
+            if !take(&self.points[some], intensities) {
+                return Ok(());
+            }
+        }
+        Ok(())
+    }
+
+    fn read(&self, first: usize, count: usize, bytes: &mut Vec<u8>) -> Result<()> {
+        let Some(file) = &self.file else { return Ok(()) };
+        let mut file = file.lock().unwrap_or_else(PoisonError::into_inner);
+        bytes.resize(count * RECORD_BYTES, 0);
+        let at = SeekFrom::Start((first * RECORD_BYTES) as u64);
+        file.seek(at).and_then(|_| file.read_exact(bytes)).map_err(|error| {
+            Error::io(self.room.folder(), "read the points of a scan back from a temporary file in", error)
+        })
+    }
+
+    /// Points and intensities, if all are in memory.
+    pub(super) fn into_parts(self) -> (Vec<Point>, Option<Vec<f32>>) {
+        (self.points, self.intensities)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_come_back_from_file_and_memory_in_order() {
+        let folder = tempfile::TempDir::new().unwrap();
+        // More than is handed over at a time, from memory and from the file.
+        let count = POINTS_HANDED_OVER + 3 * POINTS_AT_A_TIME + 77;
+        for (most_bytes, has_intensities) in [(0, true), (1 << 20, false), (usize::MAX, true)] {
+            let mut store = PointStore::new(PointRoom::new(most_bytes, folder.path()));
+            store.begin(has_intensities);
+            let point = |k: usize| ([k as f64, -0.5 * k as f64, f64::NAN], k as f32);
+            for first in (0..count).step_by(1000) {
+                match first % 3000 {
+                    0 => store.extend((first..count.min(first + 1000)).map(point)).unwrap(),
+                    _ => (first..count.min(first + 1000))
+                        .map(point)
+                        .for_each(|(point, intensity)| store.push(point, intensity).unwrap()),
+                }
+                assert!(store.points.len() <= store.room.most_points);
+            }
+            assert_eq!((store.len(), store.file.is_some()), (count, most_bytes < usize::MAX));
+            for range in
+                [0..count, 5..6, 100..count - 3, POINTS_AT_A_TIME - 1..2 * POINTS_AT_A_TIME + 1, 7..7]
+            {
+                let mut next = range.start;
+                let mut take = |points: &[Point], intensities: Option<&[f32]>| {
+                    assert!(points.len() <= POINTS_HANDED_OVER);
+                    assert_eq!(intensities.is_some(), has_intensities);
+                    for (at, point) in points.iter().enumerate() {
+                        assert!(
+                            point[0] == next as f64 && point[1] == -0.5 * next as f64 && point[2].is_nan()
+                        );
+                        assert!(intensities.is_none_or(|intensities| intensities[at] == next as f32));
+                        next += 1;
+                    }
+                    true
+                };
+                store.for_each_chunk(range.clone(), &mut take).unwrap();
+                assert_eq!(next, range.end);
+            }
+        }
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+}

@@ -1,0 +1,430 @@
+use super::point_store::PointStore;
+use super::pose_source::PoseSource;
+use super::source::{ScanHead, ScanSource};
+use crate::clouds::poses::{Found, Trajectory};
+use crate::clouds::{CloudHead, CloudPoint, CloudSource, Deskew, Place, PoseAt, RigidPose};
+use std::cell::RefCell;
+use std::path::{Path, PathBuf};
+use voxtile::scan::{Pose, no_return};
+use voxtile::space::Point;
+use voxtile::{Error, FormatError, Result};
+
+/// How clouds get their poses, and what becomes of their points.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct CloudOptions {
+    /// Most nanoseconds from a cloud to the nearer of the poses around it, which may be twice as much apart; a cloud
+    /// in a longer gap has no pose.
+    pub pose_tolerance_ns: i64,
+    /// Where the sensor is in the body that the poses are of.
+    pub body_from_sensor: RigidPose,
+    /// Points are in the world frame already; poses say from where they were seen.
+    pub is_world_frame: bool,
+    /// Takes each point to where it was at the time of its cloud, by its own time and the poses between.
+    pub is_deskewed: bool,
+    /// A cloud without a pose is in the world frame: for points without rays.
+    pub may_lack_poses: bool,
+    /// Whether a cloud without a pose is worth a remark: not where points count alone.
+    pub are_poses_needed: bool,
+    /// Points without a return are kept as rays: [`RayConfig::no_return_range_m`](voxtile::RayConfig).
+    pub has_no_returns: bool,
+}
+
+impl CloudOptions {
+    /// Whether nothing but the poses' own places is asked for.
+    pub(super) fn is_plain(&self) -> bool {
+        self.body_from_sensor == RigidPose::IDENTITY && !self.is_world_frame && !self.is_deskewed
+    }
+}
+
+impl Default for CloudOptions {
+    fn default() -> Self {
+        Self {
+            pose_tolerance_ns: 500_000_000,
+            body_from_sensor: RigidPose::IDENTITY,
+            is_world_frame: false,
+            is_deskewed: false,
+            may_lack_poses: false,
+            are_poses_needed: true,
+            has_no_returns: false,
+        }
+    }
+}
+
+/// From where poses come.
+pub(super) enum CloudPoses {
+    /// A file, by time stamp or else by number.
+    File(PathBuf, Box<Trajectory>),
+    /// The source has them.
+    Source,
+    /// Every cloud is in the world frame.
+    Identity,
+    /// There are none.
+    Missing,
+}
+
+/// Clouds of other programs as scans. Clouds without a pose are passed over and counted.
+pub(super) struct PosedClouds {
+    source: Box<dyn CloudSource>,
+    path: PathBuf,
+    poses: CloudPoses,
+    options: CloudOptions,
+    /// Clouds so far.
+    number: u64,
+    without_pose: u64,
+    is_at_end: bool,
+    /// Whether the poses cannot be used: no other cloud would have one.
+    has_bad_poses: bool,
+    /// Whether any had one.
+    has_pose: bool,
+    /// Why they have none, and the names of the first of each reason.
+    reasons: Vec<(String, Vec<String>)>,
+    fields: Vec<String>,
+    /// Points that `is_deskewed` left where they were, as there is no pose at their time.
+    stayed: u64,
+    /// Clouds without times of points, of which it moved none.
+    without_times: u64,
+}
+
+/// Most reasons that are told, and most clouds that are named for each.
+const MOST_NAMED: usize = 3;
+
+impl PosedClouds {
+    pub(super) fn new(
+        source: Box<dyn CloudSource>,
+        path: &Path,
+        poses: CloudPoses,
+        options: CloudOptions,
+    ) -> Result<Self> {
+        if options.is_deskewed && options.is_world_frame {
+            let reason = "points that are in the world frame already have no motion left in them; leave one of the two out";
+            return Err(Error::argument("--deskew, --world-frame", reason));
+        }
+        if let CloudPoses::File(_, trajectory) = &poses
+            && !trajectory.has_stamps()
+        {
+            trajectory.check_clouds(&*source)?;
+        }
+        let (number, without_pose, is_at_end, has_pose, reasons, fields) = Default::default();
+        let (has_bad_poses, stayed, without_times) = Default::default();
+        Ok(Self {
+            source,
+            path: path.to_owned(),
+            poses,
+            options,
+            number,
+            without_pose,
+            is_at_end,
+            has_bad_poses,
+            has_pose,
+            reasons,
+            fields,
+            stayed,
+            without_times,
+        })
+    }
+
+    /// The pose of the body at a time, or of a cloud; or why there is none.
+    fn pose_of(&self, head: &CloudHead, number: u64) -> Result<std::result::Result<RigidPose, String>> {
+        let tolerance_ns = self.options.pose_tolerance_ns;
+        Ok(match (&self.poses, head.stamp_ns) {
+            (CloudPoses::Identity, _) => Ok(RigidPose::IDENTITY),
+            (CloudPoses::Missing, _) => {
+                Err("neither the input has poses nor a file of them was named".to_owned())
+            }
+            (CloudPoses::Source, _) => {
+                head.world_from_sensor.ok_or_else(|| "the input has none for it".to_owned())
+            }
+            (CloudPoses::File(_, trajectory), Some(stamp_ns)) if trajectory.has_stamps() => {
+                match trajectory.at(stamp_ns, tolerance_ns)? {
+                    Found::Exact(pose) | Found::Between(pose) => Ok(pose),
+                    Found::Gap { gap_ns } => {
+                        let gap_s = gap_ns as f64 * 1e-9;
+                        Err(format!(
+                            "the poses around it are {gap_s:.3} s apart; --pose-tolerance allows for more"
+                        ))
+                    }
+                    Found::Before { first_ns } => Err(outside(first_ns, stamp_ns, "before the first pose")),
+                    Found::After { last_ns } => Err(outside(stamp_ns, last_ns, "after the last pose")),
+                    Found::WithoutStamps => Err("the poses have no time stamps".to_owned()),
+                }
+            }
+            (CloudPoses::File(_, trajectory), _) => Ok(trajectory.of_cloud(number, &*self.source)?),
+        })
+    }
+
+    /// The next cloud and its number. One that cannot be read has a number too: those behind it keep theirs.
+    fn next_cloud(&mut self) -> Result<Option<(u64, CloudHead)>> {
+        let found = self.source.next_cloud();
+        let number = self.number;
+        self.number += u64::from(!matches!(found, Ok(None)));
+        Ok(found?.map(|head| (number, head)))
+    }
+
+    /// How many poses are by number, and left where the clouds end.
+    fn poses_left(&self) -> Option<u64> {
+        let CloudPoses::File(_, trajectory) = &self.poses else { return None };
+        let left = (trajectory.len() as u64).saturating_sub(self.number);
+        (self.is_at_end && !trajectory.has_stamps() && left > 0).then_some(left)
+    }
+
+    fn note_without_pose(&mut self, head: &CloudHead, why: &str) {
+        self.without_pose += 1;
+        log::debug!("{}: cloud {} has no pose: {why}", self.path.display(), head.name);
+        if let Some((_, names)) = self.reasons.iter_mut().find(|(known, _)| known == why) {
+            if names.len() <= MOST_NAMED {
+                names.push(head.name.clone());
+            }
+        } else if self.reasons.len() <= MOST_NAMED {
+            self.reasons.push((why.to_owned(), vec![head.name.clone()]));
+        }
+    }
+
+    /// Why clouds have no pose: each reason once.
+    fn why_without_pose(&self) -> String {
+        let list = |names: &[String]| {
+            let more = if names.len() > MOST_NAMED { ", ..." } else { "" };
+            names.iter().take(MOST_NAMED).map(String::as_str).collect::<Vec<_>>().join(", ") + more
+        };
+        let told = self.reasons.iter().take(MOST_NAMED);
+        let told: Vec<String> = told.map(|(why, names)| format!("{}: {why}", list(names))).collect();
+        let more = if self.reasons.len() > MOST_NAMED { "; ..." } else { "" };
+        told.join("; ") + more
+    }
+
+    /// Reads the points of the cloud at hand.
+    fn read_points(&mut self, head: &CloudHead, body: &RigidPose, points: &mut PointStore) -> Result<Pose> {
+        let sensor = body.then(&self.options.body_from_sensor);
+        let mut world_from_sensor = Pose::from_quaternion(sensor.position_m, sensor.quaternion)?;
+        if self.options.is_world_frame {
+            // The points stay where they are to the last bits; a rotation and its inverse would move them.
+            world_from_sensor = Pose::from_quaternion(sensor.position_m, RigidPose::IDENTITY.quaternion)?;
+        }
+        let Self { source, options, poses, .. } = self;
+        let stamp_ns = head.stamp_ns.filter(|_| options.is_deskewed && head.has_times);
+        let own = stamp_ns.and_then(|_| source.poses());
+        self.without_times += u64::from(options.is_deskewed && stamp_ns.is_none());
+        let unreadable = RefCell::new(None);
+        let mut deskew = stamp_ns.map(|stamp_ns| {
+            let pose_at = |at_ns| match body_at(poses, own.as_ref(), options, at_ns) {
+                Ok(body) => Some(body?.then(&options.body_from_sensor)),
+                Err(error) => {
+                    unreadable.borrow_mut().get_or_insert(error);
+                    None
+                }
+            };
+            Deskew::new(stamp_ns, &sensor, pose_at)
+        });
+        points.begin(head.has_intensities);
+        let origin = if options.is_world_frame { sensor.position_m } else { [0.0; 3] };
+        let read = source.read_points(&mut |point| {
+            let CloudPoint { position_m, intensity, is_return, .. } = point;
+            let place = match is_return {
+                true => deskew.as_mut().map_or(position_m, |deskew| deskew.apply(&point)),
+                false if options.has_no_returns => {
+                    // As long as a direction is known.
+                    let direction = std::array::from_fn(|k| position_m[k] - origin[k]);
+                    let far = position_m
+                        .iter()
+                        .all(|c| c.is_finite())
+                        .then(|| no_return([0.0; 3], direction))
+                        .flatten();
+                    return points.push(far.unwrap_or([f64::NAN; 3]), intensity).map_err(keep);
+                }
+                // Counted as a point without a return.
+                false => origin,
+            };
+            let in_sensor: Point = std::array::from_fn(|k| place[k] - origin[k]);
+            let in_sensor = if options.is_world_frame { in_sensor } else { place };
+            points.push(in_sensor, intensity).map_err(keep)
+        });
+        self.stayed += deskew.map_or(0, |deskew| deskew.stayed());
+        read?;
+        if let Some(error) = unreadable.into_inner() {
+            return Err(error.into());
+        }
+        Ok(world_from_sensor)
+    }
+}
+
+/// Where the body was at another time than that of the cloud at hand.
+fn body_at(
+    poses: &CloudPoses,
+    own: Option<&PoseAt>,
+    options: &CloudOptions,
+    at_ns: i64,
+) -> crate::clouds::Result<Option<RigidPose>> {
+    match poses {
+        CloudPoses::File(_, trajectory) => match trajectory.at(at_ns, options.pose_tolerance_ns)? {
+            Found::Exact(body) | Found::Between(body) => Ok(Some(body)),
+            _ => Ok(None),
+        },
+        CloudPoses::Source => own.map_or(Ok(None), |own| own(at_ns)),
+        CloudPoses::Identity | CloudPoses::Missing => Ok(None),
+    }
+}
+
+/// An error of this crate on its way through the reader.
+fn keep(error: Error) -> crate::clouds::Error {
+    match error {
+        Error::Io { path, cause, .. } => crate::clouds::Error::io(&path, "write", cause),
+        other => crate::clouds::Error::argument("points", other.to_string()),
+    }
+}
+
+impl From<crate::clouds::Error> for Error {
+    fn from(error: crate::clouds::Error) -> Self {
+        match error {
+            crate::clouds::Error::Io { path, action, source } => Self::io(&path, action, source),
+            crate::clouds::Error::Format { path, place, reason } => {
+                let error = match place {
+                    Place::Byte(offset) => FormatError::at_offset(offset, reason),
+                    Place::Line(line) => FormatError::at_line(line, reason),
+                    Place::Record(record) => FormatError::at_record(record, reason),
+                };
+                error.in_input(&path)
+            }
+            crate::clouds::Error::Argument { what, reason } => Self::argument(what, reason),
+        }
+    }
+}
+
+/// Why a stamp has no pose, from the later and the earlier of two times.
+fn outside(later_ns: i64, earlier_ns: i64, place: &str) -> String {
+    /// Seconds that clocks are apart: GPS and Unix time, adjusted standard GPS time of LAS.
+    const CLOCKS_S: [f64; 3] = [315_964_800.0, 1e9, 1e9 + 315_964_800.0];
+    let apart_s = (i128::from(later_ns) - i128::from(earlier_ns)) as f64 * 1e-9;
+    // Leap seconds, and a drive of a day.
+    let is_clock = |clock_s: &f64| (apart_s - clock_s).abs() < 100_000.0;
+    let hint =
+        if CLOCKS_S.iter().any(is_clock) { "; do their clocks differ, as GPS and Unix time do?" } else { "" };
+    format!("it is {apart_s:.3} s {place}{hint}")
+}
+
+impl ScanSource for PosedClouds {
+    fn len_hint(&self) -> Option<usize> {
+        self.source.len_hint().and_then(|clouds| usize::try_from(clouds).ok())
+    }
+
+    fn read_scan(&mut self, points: &mut PointStore) -> Result<Option<ScanHead>> {
+        while let Some((number, head)) = self.next_cloud()? {
+            let found = self.pose_of(&head, number);
+            self.has_bad_poses |= found.is_err();
+            let body = match found? {
+                Ok(body) => body,
+                Err(why) => {
+                    if self.options.are_poses_needed {
+                        self.note_without_pose(&head, &why);
+                    }
+                    if !self.options.may_lack_poses {
+                        continue;
+                    }
+                    RigidPose::IDENTITY
+                }
+            };
+            let world_from_sensor = self.read_points(&head, &body, points)?;
+            self.has_pose = true;
+            let CloudHead { name, stamp_ns, fields, .. } = head;
+            self.fields = fields;
+            return Ok(Some(ScanHead { name, stamp_ns, world_from_sensor }));
+        }
+        self.is_at_end = true;
+        if self.without_pose > 0 && !self.has_pose && !self.options.may_lack_poses {
+            // A map of nothing would be no answer.
+            let mut why = self.why_without_pose();
+            if matches!(self.poses, CloudPoses::Source) {
+                // The source knows what its own poses lack.
+                why = self.source.remarks().into_iter().fold(why, |why, remark| why + "; " + &remark);
+            }
+            let reason = format!(
+                "none of its {} clouds has a pose ({why}); name a file of poses with --poses FILE, or map points alone \
+                     with --no-rays",
+                self.without_pose
+            );
+            return Err(Error::argument(self.path.display().to_string(), reason));
+        }
+        Ok(None)
+    }
+
+    fn skip(&mut self, scans: usize) -> Result<usize> {
+        let mut skipped = 0;
+        while skipped < scans
+            && let Some((number, head)) = self.next_cloud()?
+        {
+            let found = self.pose_of(&head, number);
+            self.has_bad_poses |= found.is_err();
+            match found? {
+                Err(why) if !self.options.may_lack_poses => self.note_without_pose(&head, &why),
+                _ => {
+                    self.has_pose = true;
+                    skipped += 1;
+                }
+            }
+        }
+        Ok(skipped)
+    }
+
+    fn pass_unread(&mut self) -> bool {
+        // After the end there is no scan that could be passed.
+        !self.is_at_end && !self.has_bad_poses
+    }
+
+    fn pose_source(&self) -> PoseSource {
+        match &self.poses {
+            CloudPoses::File(path, _) => PoseSource::File(path.clone()),
+            CloudPoses::Source => PoseSource::Scans,
+            CloudPoses::Identity => PoseSource::Identity,
+            CloudPoses::Missing => PoseSource::Missing,
+        }
+    }
+
+    fn format(&self) -> String {
+        self.source.format().to_owned()
+    }
+
+    fn fields(&self) -> Vec<String> {
+        self.fields.clone()
+    }
+
+    fn crs(&self) -> Option<String> {
+        self.source.crs().map(str::to_owned)
+    }
+
+    fn remarks(&self) -> Vec<String> {
+        let mut remarks = self.source.remarks();
+        if let CloudPoses::File(_, trajectory) = &self.poses {
+            remarks.extend(trajectory.remarks().iter().cloned());
+        }
+        if let Some(left) = self.poses_left() {
+            let clouds = self.number;
+            remarks.push(format!(
+                "{left} more poses than clouds ({clouds}): do the poses, which have no time stamps, begin with the first cloud?"
+            ));
+        }
+        if self.without_pose > 0 {
+            let clouds = if self.without_pose == 1 { "cloud has" } else { "clouds have" };
+            let why = self.why_without_pose();
+            remarks.push(format!("{} {clouds} no pose, left out ({why})", self.without_pose));
+        }
+        if self.without_times > 0 {
+            let clouds = if self.without_times == 1 { "cloud has" } else { "clouds have" };
+            remarks.push(format!(
+                "{} {clouds} no times of points, or no stamp: --deskew moved nothing there",
+                self.without_times
+            ));
+        }
+        if self.stayed > 0 {
+            let points = if self.stayed == 1 { "point" } else { "points" };
+            remarks.push(format!(
+                "{} {points} stayed: no pose is known at their own times (--deskew)",
+                self.stayed
+            ));
+        }
+        remarks
+    }
+
+    fn fingerprint(&self) -> Result<String> {
+        let reason = "maps of earlier versions have no inputs of this kind";
+        Err(Error::argument(self.path.display().to_string(), reason))
+    }
+}

@@ -1,0 +1,221 @@
+use super::stored_scan::StoredScan;
+use voxtile::Result;
+use voxtile::scan::Pose;
+
+/// Identifies a scan: a hash of its points and intensities, and another of its pose. Storage format and name do not
+/// matter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ScanMark {
+    scan: [u8; MARK_BYTES],
+    pose: [u8; MARK_BYTES],
+    has_points: bool,
+}
+
+/// Identifies the start of an input: hash chains over its scans and over their poses.
+///
+/// Its size does not grow with the scans, and it can be continued.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ScanChain {
+    scans: u64,
+    scan_chain: [u8; MARK_BYTES],
+    pose_chain: [u8; MARK_BYTES],
+}
+
+const MARK_BYTES: usize = 16;
+/// Points that are hashed at a time.
+const POINTS_AT_A_TIME: usize = 1024;
+
+impl ScanMark {
+    /// The mark of a scan.
+    ///
+    /// # Errors
+    ///
+    /// Points that cannot be read.
+    pub fn of(scan: &StoredScan) -> Result<Self> {
+        let StoredScan { points_in_sensor: store, world_from_sensor, .. } = scan;
+        let mut hasher = hasher("voxtile 1 scan");
+        hasher.update(&(store.len() as u64).to_le_bytes());
+        let mut bytes = Vec::new();
+        store.for_each_chunk(0..store.len(), &mut |points, _| {
+            for points in points.chunks(POINTS_AT_A_TIME) {
+                bytes.clear();
+                points.iter().flatten().for_each(|&number| bytes.extend(bits(number).to_le_bytes()));
+                hasher.update(&bytes);
+            }
+            true
+        })?;
+        if store.has_intensities() {
+            store.for_each_chunk(0..store.len(), &mut |_, intensities| {
+                for intensities in intensities.unwrap_or_default().chunks(POINTS_AT_A_TIME) {
+                    bytes.clear();
+                    intensities
+                        .iter()
+                        .for_each(|&number| bytes.extend(bits(f64::from(number)).to_le_bytes()));
+                    hasher.update(&bytes);
+                }
+                true
+            })?;
+        }
+        Ok(Self { scan: mark(&hasher), pose: pose_mark(world_from_sensor), has_points: !store.is_empty() })
+    }
+
+    /// A mark that tells nothing but whether the scan has points, for who asks nothing else: marking takes a tenth of
+    /// the time of reading.
+    pub fn without_content(scan: &StoredScan) -> Self {
+        Self { scan: [0; MARK_BYTES], pose: [0; MARK_BYTES], has_points: !scan.points_in_sensor.is_empty() }
+    }
+
+    /// Whether the scan has points: one without is like many others.
+    pub fn has_points(&self) -> bool {
+        self.has_points
+    }
+
+    /// The hash of the scan without its pose, as 32 hexadecimal digits.
+    pub fn scan_text(&self) -> String {
+        to_text(&self.scan)
+    }
+}
+
+impl ScanChain {
+    /// Parses a chain; `None` if the texts are not 32 hexadecimal digits each.
+    pub fn from_texts(scans: u64, scan_chain: &str, pose_chain: &str) -> Option<Self> {
+        Some(Self { scans, scan_chain: from_text(scan_chain)?, pose_chain: from_text(pose_chain)? })
+    }
+
+    /// Number of scans so far.
+    pub fn scans(&self) -> u64 {
+        self.scans
+    }
+
+    /// The chain of the scans, as 32 hexadecimal digits.
+    pub fn scan_text(&self) -> String {
+        to_text(&self.scan_chain)
+    }
+
+    /// The chain of their poses, likewise.
+    pub fn pose_text(&self) -> String {
+        to_text(&self.pose_chain)
+    }
+
+    /// Adds a scan.
+    pub fn add(&mut self, mark: &ScanMark) {
+        self.chain(&mark.scan, &mark.pose);
+    }
+
+    /// Adds a scan that could not be read.
+    pub fn add_unread(&mut self) {
+        self.chain(b"could not be read", b"could not be read");
+    }
+
+    fn chain(&mut self, scan: &[u8], pose: &[u8]) {
+        self.scans += 1;
+        for (chain, new) in [(&mut self.scan_chain, scan), (&mut self.pose_chain, pose)] {
+            let mut hasher = hasher("voxtile 1 chain");
+            hasher.update(chain);
+            hasher.update(new);
+            *chain = mark(&hasher);
+        }
+    }
+}
+
+fn hasher(context: &str) -> blake3::Hasher {
+    blake3::Hasher::new_derive_key(context)
+}
+
+fn mark(hasher: &blake3::Hasher) -> [u8; MARK_BYTES] {
+    let mut mark = [0; MARK_BYTES];
+    hasher.finalize_xof().fill(&mut mark);
+    mark
+}
+
+fn pose_mark(pose: &Pose) -> [u8; MARK_BYTES] {
+    let mut hasher = hasher("voxtile 1 pose");
+    for number in pose.position_m().into_iter().chain(pose.quaternion()) {
+        hasher.update(&bits(number).to_le_bytes());
+    }
+    mark(&hasher)
+}
+
+/// The bits of a number; all NaN are equal.
+fn bits(number: f64) -> u64 {
+    if number.is_nan() { f64::NAN.to_bits() } else { number.to_bits() }
+}
+
+fn to_text(mark: &[u8; MARK_BYTES]) -> String {
+    mark.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+fn from_text(text: &str) -> Option<[u8; MARK_BYTES]> {
+    if text.len() != 2 * MARK_BYTES || !text.is_ascii() {
+        return None;
+    }
+    let mut mark = [0; MARK_BYTES];
+    for (k, byte) in mark.iter_mut().enumerate() {
+        *byte = u8::from_str_radix(&text[2 * k..2 * k + 2], 16).ok()?;
+    }
+    Some(mark)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::PointStore;
+    use nalgebra::Isometry3;
+
+    fn scan(points: &[[f64; 3]], intensity: Option<f32>, x_m: f64) -> StoredScan {
+        let mut points_in_sensor = PointStore::default();
+        points_in_sensor.begin(intensity.is_some());
+        points.iter().for_each(|point| points_in_sensor.push(*point, intensity.unwrap_or_default()).unwrap());
+        StoredScan {
+            name: "any".into(),
+            stamp_ns: None,
+            points_in_sensor,
+            world_from_sensor: Isometry3::translation(x_m, 0.0, 0.0).into(),
+        }
+    }
+
+    fn mark_of(scan: &StoredScan) -> ScanMark {
+        ScanMark::of(scan).unwrap()
+    }
+
+    #[test]
+    fn a_chain_tells_scans_and_poses_apart_and_goes_on_from_its_texts() {
+        let first_points = [[1.0, 2.0, 3.0]];
+        let scans = || {
+            [scan(&first_points, None, 0.0), scan(&[], None, 1.0), scan(&[[f64::NAN; 3]; 3000], None, 2.0)]
+        };
+        let chain_of = |scans: &[StoredScan]| {
+            let mut chain = ScanChain::default();
+            scans.iter().for_each(|scan| chain.add(&mark_of(scan)));
+            chain
+        };
+        let whole = chain_of(&scans());
+        let first = chain_of(&scans()[..2]);
+        let mut on = ScanChain::from_texts(2, &first.scan_text(), &first.pose_text()).unwrap();
+        on.add(&mark_of(&scans()[2]));
+        assert_eq!(on, whole);
+
+        let mut moved = scans();
+        moved[1].world_from_sensor = Isometry3::translation(1.5, 0.0, 0.0).into();
+        let moved = chain_of(&moved);
+        assert_eq!(moved.scan_text(), whole.scan_text());
+        assert_ne!(moved.pose_text(), whole.pose_text());
+
+        let mut changed = scans();
+        let mut points = vec![[f64::NAN; 3]; 3000];
+        points[2999] = [0.0; 3];
+        changed[2] = scan(&points, None, 2.0);
+        let changed = chain_of(&changed);
+        assert_ne!(changed.scan_text(), whole.scan_text());
+        assert_eq!(changed.pose_text(), whole.pose_text());
+
+        let of = |intensity| mark_of(&scan(&first_points, intensity, 0.0)).scan_text();
+        let marks = [None, Some(1.0), Some(2.0)].map(of);
+        assert!(marks[0] != marks[1] && marks[1] != marks[2], "{marks:?}");
+
+        let mut unread = chain_of(&scans()[..1]);
+        unread.add_unread();
+        assert_ne!(unread, first);
+        assert_eq!(ScanChain::from_texts(0, "0g", ""), None);
+    }
+}

@@ -1,0 +1,268 @@
+use super::fingerprint::Fingerprint;
+use super::point_store::PointStore;
+use super::scan_stream_writer::{FLAG_INTENSITIES, MAGIC, MAX_LABEL_BYTES, VERSION};
+use super::source::{ScanHead, ScanSource};
+use super::stream_input::{AnyInput, FileInput, StreamInput};
+use std::io::{ErrorKind, Read};
+use std::path::{Path, PathBuf};
+use voxtile::scan::Pose;
+use voxtile::{Error, FormatError, Result};
+
+/// Reads voxtile's scan stream, as written by a [`ScanStreamWriter`](super::ScanStreamWriter), scan by scan, from a
+/// file or a pipe.
+///
+/// `path` is for errors. With `is_file` the file is opened for the fingerprint; otherwise the fingerprint is the
+/// stream's label, and an error if it has none. Reads are small: `input` should be buffered.
+///
+/// # Errors
+///
+/// A stream that fails or has another header; errors in a scan are returned with that scan.
+pub fn read_scan_stream<R: Read>(input: R, path: &Path, is_file: bool) -> Result<impl ScanSource + use<R>> {
+    begin(AnyInput(input), path, is_file)
+}
+
+/// The same of a file: scans that are skipped are not read.
+///
+/// # Errors
+///
+/// As for [`read_scan_stream`].
+pub(super) fn open_scan_stream(path: &Path) -> Result<impl ScanSource + use<>> {
+    begin(FileInput::open(path)?, path, true)
+}
+
+fn begin<R: StreamInput>(input: R, path: &Path, is_file: bool) -> Result<ScanStream<R>> {
+    let mut stream = ScanStream {
+        path: path.to_owned(),
+        is_file,
+        input,
+        offset: 0,
+        label: String::new(),
+        has_intensities: false,
+        done: 0,
+        is_past_error: false,
+        chunk: Vec::new(),
+    };
+    stream.read_header()?;
+    Ok(stream)
+}
+
+struct ScanStream<R> {
+    path: PathBuf,
+    is_file: bool,
+    input: R,
+    offset: u64,
+    label: String,
+    has_intensities: bool,
+    done: u64,
+    /// Whether the input is behind the scan that caused an error.
+    is_past_error: bool,
+    /// Points as they are in the stream.
+    chunk: Vec<u8>,
+}
+
+/// What stands before the points of a scan.
+struct Head {
+    count: u32,
+    pose_at: u64,
+    pose: [f64; 7],
+}
+
+const COUNT_BYTES: usize = 4;
+const POSE_BYTES: usize = 56;
+
+/// Points that are read at a time.
+const CHUNK_POINTS: usize = 4096;
+
+/// Most points reserved at once: the count in a damaged stream may be any number.
+const MOST_RESERVED: usize = 1 << 16;
+
+impl<R: StreamInput> ScanStream<R> {
+    fn read_header(&mut self) -> Result<()> {
+        if self.bytes("the magic number")? != *MAGIC {
+            return Err(self.wrong(0, "this is no scan stream of voxtile's"));
+        }
+        let version = u32::from_le_bytes(self.bytes("the version")?);
+        if version != VERSION {
+            return Err(self.wrong(8, format!("version {version} is not known, only version {VERSION}")));
+        }
+        let flags = u32::from_le_bytes(self.bytes("the flags")?);
+        if flags & !FLAG_INTENSITIES != 0 {
+            return Err(self.wrong(12, format!("flags {flags:#x} are not known")));
+        }
+        self.has_intensities = flags & FLAG_INTENSITIES != 0;
+        let length = u32::from_le_bytes(self.bytes("the length of the label")?);
+        if length > MAX_LABEL_BYTES {
+            return Err(
+                self.wrong(16, format!("a label of {length} bytes; it has {MAX_LABEL_BYTES} at most"))
+            );
+        }
+        let mut label = vec![0; length as usize];
+        self.fill(&mut label, "the label")?;
+        self.label = String::from_utf8(label).map_err(|_| self.wrong(20, "the label is no UTF-8"))?;
+        Ok(())
+    }
+
+    fn bytes<const N: usize>(&mut self, what: &str) -> Result<[u8; N]> {
+        let mut bytes = [0; N];
+        self.fill(&mut bytes, what)?;
+        Ok(bytes)
+    }
+
+    fn fill(&mut self, bytes: &mut [u8], what: &str) -> Result<()> {
+        self.input.read_exact(bytes).map_err(|error| match error.kind() {
+            ErrorKind::UnexpectedEof => self.wrong(self.offset, format!("the stream ends in {what}")),
+            _ => Error::io(&self.path, "read", error),
+        })?;
+        self.offset += bytes.len() as u64;
+        Ok(())
+    }
+
+    /// What stands before the points of a scan; `None` at the end of the stream. It is read at once: passing over a
+    /// scan takes as long as its reads.
+    fn next_head(&mut self) -> Result<Option<Head>> {
+        let mut bytes = [0; COUNT_BYTES + POSE_BYTES];
+        let mut filled = 0;
+        while filled < bytes.len() {
+            match self.input.read(&mut bytes[filled..]) {
+                Ok(0) => break,
+                Ok(read) => filled += read,
+                Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                Err(error) => return Err(Error::io(&self.path, "read", error)),
+            }
+        }
+        let ends_in = |at: u64, what| Err(self.wrong(self.offset + at, format!("the stream ends in {what}")));
+        match filled {
+            0 => return Ok(None),
+            1..COUNT_BYTES => return ends_in(1, "the count of points"),
+            _ if filled < bytes.len() => return ends_in(COUNT_BYTES as u64, "a pose"),
+            _ => {}
+        }
+        let pose_at = self.offset + COUNT_BYTES as u64;
+        self.offset += bytes.len() as u64;
+        let (count, pose) = bytes.split_at(COUNT_BYTES);
+        let number = |k: usize| f64::from_le_bytes(std::array::from_fn(|byte| pose[8 * k + byte]));
+        let count = u32::from_le_bytes(std::array::from_fn(|byte| count[byte]));
+        Ok(Some(Head { count, pose_at, pose: std::array::from_fn(number) }))
+    }
+
+    fn point_bytes(&self) -> usize {
+        if self.has_intensities { 16 } else { 12 }
+    }
+
+    /// Reads so many points as they are in the stream.
+    fn read_chunk(&mut self, points: usize) -> Result<()> {
+        let mut chunk = std::mem::take(&mut self.chunk);
+        chunk.resize(points * self.point_bytes(), 0);
+        let mut filled = 0;
+        while filled < chunk.len() {
+            match self.input.read(&mut chunk[filled..]) {
+                Ok(0) => return Err(self.ends_in_points(filled as u64)),
+                Ok(read) => filled += read,
+                Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                Err(error) => return Err(Error::io(&self.path, "read", error)),
+            }
+        }
+        self.offset += filled as u64;
+        self.chunk = chunk;
+        Ok(())
+    }
+
+    /// The stream ends so many bytes into points that begin here.
+    fn ends_in_points(&self, bytes: u64) -> Error {
+        let number = bytes - bytes % 4;
+        let what = if number % self.point_bytes() as u64 == 12 { "an intensity" } else { "a point" };
+        self.wrong(self.offset + number, format!("the stream ends in {what}"))
+    }
+
+    /// Passes over a scan; `false` at the end of the stream.
+    fn pass_scan(&mut self) -> Result<bool> {
+        let Some(Head { count, pose_at, pose }) = self.next_head()? else { return Ok(false) };
+        let bytes = u64::from(count) * self.point_bytes() as u64;
+        let passed = self.input.pass(bytes).map_err(|error| Error::io(&self.path, "read", error))?;
+        if passed < bytes {
+            return Err(self.ends_in_points(passed));
+        }
+        self.offset += bytes;
+        self.done += 1;
+        let pose = self.pose(pose, pose_at);
+        self.is_past_error = pose.is_err();
+        pose.map(|_| true)
+    }
+
+    /// The pose from the numbers that start at an offset.
+    fn pose(&self, numbers: [f64; 7], at: u64) -> Result<Pose> {
+        if !numbers.iter().all(|number| number.is_finite()) {
+            return Err(self.wrong(at, "a pose that is not finite"));
+        }
+        let [x, y, z, qx, qy, qz, qw] = numbers;
+        Pose::of_quaternion([x, y, z], [qx, qy, qz, qw]).map_err(|reason| self.wrong(at + 24, reason))
+    }
+
+    fn wrong(&self, offset: u64, reason: impl Into<String>) -> Error {
+        FormatError::at_offset(offset, reason).in_input(&self.path)
+    }
+}
+
+impl<R: StreamInput> ScanSource for ScanStream<R> {
+    fn len_hint(&self) -> Option<usize> {
+        None
+    }
+
+    fn format(&self) -> String {
+        "voxtile's scan stream".to_owned()
+    }
+
+    fn read_scan(&mut self, points: &mut PointStore) -> Result<Option<ScanHead>> {
+        let Some(Head { count, pose_at, pose }) = self.next_head()? else { return Ok(None) };
+        self.is_past_error = false;
+        let count = count as usize;
+        points.begin(self.has_intensities);
+        points.reserve(count.min(MOST_RESERVED));
+        let mut left = count;
+        while left > 0 {
+            let here = left.min(CHUNK_POINTS);
+            self.read_chunk(here)?;
+            let (numbers, _) = self.chunk.as_chunks::<4>();
+            let number = |bytes: [u8; 4]| f32::from_le_bytes(bytes);
+            let point = |[x, y, z]: [[u8; 4]; 3]| [x, y, z].map(|bytes| f64::from(number(bytes)));
+            match self.has_intensities {
+                true => points.extend(
+                    numbers.as_chunks::<4>().0.iter().map(|&[x, y, z, i]| (point([x, y, z]), number(i))),
+                )?,
+                false => points.extend(numbers.as_chunks::<3>().0.iter().map(|&xyz| (point(xyz), 0.0)))?,
+            }
+            left -= here;
+        }
+        let name = self.done.to_string();
+        self.done += 1;
+        let pose = self.pose(pose, pose_at);
+        self.is_past_error = pose.is_err();
+        let world_from_sensor = pose?;
+        Ok(Some(ScanHead { name, stamp_ns: None, world_from_sensor }))
+    }
+
+    fn skip(&mut self, scans: usize) -> Result<usize> {
+        for skipped in 0..scans {
+            if !self.pass_scan()? {
+                return Ok(skipped);
+            }
+        }
+        Ok(scans)
+    }
+
+    fn pass_unread(&mut self) -> bool {
+        std::mem::take(&mut self.is_past_error)
+    }
+
+    fn fingerprint(&self) -> Result<String> {
+        if self.is_file {
+            return Fingerprint::of_file(&self.path);
+        }
+        if self.label.is_empty() {
+            let reason = "a stream without a label cannot be told from others, so that a build of it cannot be \
+                          resumed; store it in a file, or give it a label where it is made";
+            return Err(Error::argument(self.path.display().to_string(), reason));
+        }
+        Ok(format!("stream {:?}", self.label))
+    }
+}

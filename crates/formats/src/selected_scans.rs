@@ -1,0 +1,186 @@
+use super::point_store::{PointRoom, PointStore};
+use super::pose_source::PoseSource;
+use super::source::{ScanHead, ScanSource};
+use voxtile::Result;
+use voxtile::scan::Pose;
+use voxtile::space::Aabb;
+
+/// Which scans of an input are taken, and which of their points are left out.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct Selection {
+    /// Scans that are passed over at the beginning.
+    pub first: u64,
+    /// Most scans that are taken; `None` for all.
+    pub count: Option<u64>,
+    /// Of the others, one of so many is taken; 1 takes each.
+    pub every: u64,
+    /// Points in this box are left out: the car sees itself. Both corners are inside.
+    pub ignored: Option<Aabb>,
+    /// The frame of that box: the sensor's, or the body's if this says where the sensor is in it.
+    pub body_from_sensor: Option<Pose>,
+}
+
+impl Default for Selection {
+    fn default() -> Self {
+        Self { first: 0, count: None, every: 1, ignored: None, body_from_sensor: None }
+    }
+}
+
+impl Selection {
+    /// Whether everything is taken.
+    pub fn is_everything(&self) -> bool {
+        self.first == 0 && self.count.is_none() && self.every <= 1 && self.ignored.is_none()
+    }
+
+    /// These scans and points of a source.
+    pub fn of(self, source: Box<dyn ScanSource + Send>) -> Box<dyn ScanSource + Send> {
+        if self.is_everything() {
+            return source;
+        }
+        Box::new(SelectedScans {
+            source,
+            selection: self,
+            passed: 0,
+            taken: 0,
+            bad: 0,
+            unfiltered: PointStore::default(),
+        })
+    }
+}
+
+/// Some scans of a source, without some of their points.
+struct SelectedScans {
+    source: Box<dyn ScanSource + Send>,
+    selection: Selection,
+    /// Scans of the source that were passed over or taken.
+    passed: u64,
+    taken: u64,
+    /// Scans that were passed over and cannot be read.
+    bad: u64,
+    unfiltered: PointStore,
+}
+
+impl SelectedScans {
+    fn is_at_end(&self) -> bool {
+        self.selection.count.is_some_and(|count| self.taken >= count)
+    }
+
+    /// Moves to the next scan that is wanted; `false` if there is none.
+    fn seek(&mut self) -> Result<bool> {
+        if self.is_at_end() {
+            return Ok(false);
+        }
+        let wanted = self.selection.first + self.taken * self.selection.every.max(1);
+        while self.passed < wanted {
+            // One at a time: a scan that cannot be read has a number as the others do, and was not wanted.
+            match self.source.skip(1) {
+                Ok(0) => return Ok(false),
+                Ok(_) => {}
+                Err(error) if !self.source.pass_unread() => return Err(error),
+                Err(error) => {
+                    log::debug!("scan {} is passed over and cannot be read: {error}", self.passed);
+                    self.bad += 1;
+                }
+            }
+            self.passed += 1;
+        }
+        Ok(true)
+    }
+
+    fn read_without_ignored(&mut self, points: &mut PointStore, ignored: &Aabb) -> Result<Option<ScanHead>> {
+        let room: PointRoom = points.room().clone();
+        self.unfiltered = PointStore::new(room);
+        let head = self.source.read_scan(&mut self.unfiltered)?;
+        points.begin(self.unfiltered.has_intensities());
+        let to_body = self.selection.body_from_sensor.as_ref().map(Pose::to_world);
+        let is_ignored = |point: [f64; 3]| {
+            let point = to_body.as_ref().map_or(point, |to_body| to_body(point));
+            (0..3).all(|k| ignored.min[k] <= point[k] && point[k] <= ignored.max[k])
+        };
+        let mut outcome = Ok(());
+        self.unfiltered.for_each_chunk(0..self.unfiltered.len(), &mut |chunk, intensities| {
+            for (number, &point) in chunk.iter().enumerate() {
+                if !is_ignored(point) {
+                    let intensity = intensities.map_or(0.0, |intensities| intensities[number]);
+                    outcome = points.push(point, intensity);
+                    if outcome.is_err() {
+                        return false;
+                    }
+                }
+            }
+            true
+        })?;
+        self.unfiltered = PointStore::default();
+        outcome?;
+        Ok(head)
+    }
+}
+
+impl ScanSource for SelectedScans {
+    fn len_hint(&self) -> Option<usize> {
+        let left = (self.source.len_hint()? as u64).saturating_sub(self.selection.first);
+        let all = left.div_ceil(self.selection.every.max(1));
+        Some(self.selection.count.map_or(all, |count| all.min(count)) as usize)
+    }
+
+    fn read_scan(&mut self, points: &mut PointStore) -> Result<Option<ScanHead>> {
+        if !self.seek()? {
+            return Ok(None);
+        }
+        let head = match self.selection.ignored {
+            None => self.source.read_scan(points)?,
+            Some(ignored) => self.read_without_ignored(points, &ignored)?,
+        };
+        if head.is_some() {
+            (self.passed, self.taken) = (self.passed + 1, self.taken + 1);
+        }
+        Ok(head)
+    }
+
+    fn skip(&mut self, scans: usize) -> Result<usize> {
+        for skipped in 0..scans {
+            if !self.seek()? || self.source.skip(1)? == 0 {
+                return Ok(skipped);
+            }
+            (self.passed, self.taken) = (self.passed + 1, self.taken + 1);
+        }
+        Ok(scans)
+    }
+
+    fn pass_unread(&mut self) -> bool {
+        let is_passed = self.source.pass_unread();
+        if is_passed {
+            (self.passed, self.taken) = (self.passed + 1, self.taken + 1);
+        }
+        is_passed
+    }
+
+    fn pose_source(&self) -> PoseSource {
+        self.source.pose_source()
+    }
+
+    fn format(&self) -> String {
+        self.source.format()
+    }
+
+    fn fields(&self) -> Vec<String> {
+        self.source.fields()
+    }
+
+    fn remarks(&self) -> Vec<String> {
+        let mut remarks = self.source.remarks();
+        if self.bad > 0 {
+            remarks.push(format!("{} of the scans that were passed over cannot be read", self.bad));
+        }
+        remarks
+    }
+
+    fn crs(&self) -> Option<String> {
+        self.source.crs()
+    }
+
+    fn fingerprint(&self) -> Result<String> {
+        self.source.fingerprint()
+    }
+}

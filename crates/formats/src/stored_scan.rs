@@ -1,0 +1,55 @@
+use super::point_store::PointStore;
+use std::ops::Range;
+use voxtile::Result;
+use voxtile::scan::{Pose, ScanPoints, TakePoints};
+use voxtile::space::Point;
+
+/// A scan of any size in the sensor's frame, and the sensor's pose.
+///
+/// As [`ScanPoints`] its points are in the world frame.
+#[derive(Debug)]
+pub struct StoredScan {
+    /// Name of the scan in its source: a file name or a number.
+    pub name: String,
+    /// When it was taken, in nanoseconds since the epoch of its source, if that is known.
+    pub stamp_ns: Option<i64>,
+    /// End points in metres, sensor frame.
+    pub points_in_sensor: PointStore,
+    /// Pose of the sensor: `world = R * p + t`.
+    pub world_from_sensor: Pose,
+}
+
+impl ScanPoints for StoredScan {
+    fn origin(&self) -> Point {
+        self.world_from_sensor.position_m()
+    }
+
+    fn stamp_ns(&self) -> Option<i64> {
+        self.stamp_ns
+    }
+
+    fn len(&self) -> usize {
+        self.points_in_sensor.len()
+    }
+
+    fn has_intensities(&self) -> bool {
+        self.points_in_sensor.has_intensities()
+    }
+
+    fn for_each_chunk(&self, range: Range<usize>, take: &mut TakePoints<'_>) -> Result<()> {
+        let (to_world, mut in_world) = (self.world_from_sensor.to_world(), Vec::new());
+        self.points_in_sensor.for_each_chunk(range, &mut |points, intensities| {
+            in_world.clear();
+            in_world.extend(points.iter().copied().map(to_world));
+            take(&in_world, intensities)
+        })
+    }
+
+    fn world_from_sensor(&self) -> Option<Pose> {
+        Some(self.world_from_sensor)
+    }
+
+    fn for_each_own_chunk(&self, range: Range<usize>, take: &mut TakePoints<'_>) -> Result<()> {
+        self.points_in_sensor.for_each_chunk(range, take)
+    }
+}

@@ -1,0 +1,75 @@
+use std::fs::File;
+use std::io::{self, Read, Seek, SeekFrom};
+use std::path::Path;
+use voxtile::{Error, Result};
+
+/// Where a scan stream comes from.
+pub(super) trait StreamInput: Read {
+    /// Passes over so many bytes; returns how many of them there were.
+    fn pass(&mut self, bytes: u64) -> io::Result<u64>;
+}
+
+/// Anything that can be read. To pass over bytes is to read them.
+pub(super) struct AnyInput<R>(pub(super) R);
+
+impl<R: Read> Read for AnyInput<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        self.0.read(buffer)
+    }
+}
+
+impl<R: Read> StreamInput for AnyInput<R> {
+    fn pass(&mut self, bytes: u64) -> io::Result<u64> {
+        io::copy(&mut (&mut self.0).take(bytes), &mut io::sink())
+    }
+}
+
+/// A file, without a buffer: points are read in large pieces, and what is passed over is not to be read.
+pub(super) struct FileInput {
+    file: File,
+    at: u64,
+    /// How long it was when that was last asked: a file may grow. 0 for a pipe by a name.
+    known_bytes: u64,
+    /// Whether the file has not been told yet where to read on.
+    has_passed: bool,
+}
+
+impl FileInput {
+    pub(super) fn open(path: &Path) -> Result<Self> {
+        match File::open(path) {
+            Ok(file) => Ok(Self { file, at: 0, known_bytes: 0, has_passed: false }),
+            Err(error) => Err(Error::io(path, "open", error)),
+        }
+    }
+}
+
+impl Read for FileInput {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        if self.has_passed {
+            self.file.seek(SeekFrom::Start(self.at))?;
+            self.has_passed = false;
+        }
+        let read = self.file.read(buffer)?;
+        self.at += read as u64;
+        Ok(read)
+    }
+}
+
+impl StreamInput for FileInput {
+    fn pass(&mut self, bytes: u64) -> io::Result<u64> {
+        if bytes > self.known_bytes.saturating_sub(self.at) {
+            let metadata = self.file.metadata()?;
+            if !metadata.is_file() {
+                // A pipe by a name.
+                let passed = io::copy(&mut (&mut self.file).take(bytes), &mut io::sink())?;
+                self.at += passed;
+                return Ok(passed);
+            }
+            self.known_bytes = metadata.len();
+        }
+        let passed = bytes.min(self.known_bytes.saturating_sub(self.at));
+        self.at += passed;
+        self.has_passed |= passed > 0;
+        Ok(passed)
+    }
+}

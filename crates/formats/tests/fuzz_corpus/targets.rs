@@ -1,0 +1,259 @@
+//! Bytes of any kind into every reader of other programs' files: none may panic, hang or take much memory, and what is
+//! read must hold together. The result says whether the bytes were read as a whole.
+//!
+//! The crates `las` and `e57` panic on damage, and their readers here make errors of it. libFuzzer ends the program at
+//! a panic before anything can catch it: the programs of those two targets replace its hook, see `fuzz/src/lib.rs`.
+
+use std::fs;
+use std::path::Path;
+use tempfile::TempDir;
+use voxtile_formats::clouds::poses::{Found, Trajectory};
+use voxtile_formats::clouds::read::{Format, OpenOptions, open};
+use voxtile_formats::clouds::ros::messages::{
+    CameraInfo, Image, LaserScan, LivoxCustom, MessageKind, PointCloud2, decode_poses,
+};
+use voxtile_formats::clouds::ros::{
+    BagOptions, Decoded, PoseSource, Recording, Wire, open_bag, open_recording,
+};
+use voxtile_formats::clouds::{CloudSource, Error};
+
+pub type Target = fn(&[u8]) -> bool;
+
+/// Every target by the name of its corpus.
+pub const TARGETS: [(&str, Target); 10] = [
+    ("cloud_ply", ply),
+    ("cloud_text", text),
+    ("cloud_bin", bin),
+    ("cloud_las", las),
+    ("cloud_e57", e57),
+    ("trajectory", trajectory),
+    ("ros_bag1", bag1),
+    ("ros_mcap", mcap),
+    ("ros_metadata", bag2_metadata),
+    ("ros_messages", messages),
+];
+
+/// LAZ says a lot in few bytes: so many points of a cloud are enough.
+const MOST_POINTS: u64 = 2_000;
+
+/// PLY in any of its encodings.
+pub fn ply(data: &[u8]) -> bool {
+    clouds(data, "a.ply", Format::Ply, 0.0)
+}
+
+/// Points as text.
+pub fn text(data: &[u8]) -> bool {
+    clouds(data, "a.xyz", Format::Text, 0.0)
+}
+
+/// Floats without a header, as KITTI and nuScenes write them.
+pub fn bin(data: &[u8]) -> bool {
+    let is_kitti = clouds(data, "a.bin", Format::Bin, 0.0);
+    is_kitti || clouds(data, "a.pcd.bin", Format::Bin, 0.0)
+}
+
+/// LAS and LAZ: as one cloud and, if it has few points, cut into scans by time.
+pub fn las(data: &[u8]) -> bool {
+    let is_read = clouds(data, "a.laz", Format::Las, 0.0);
+    if is_read {
+        clouds(data, "a.laz", Format::Las, 0.1);
+    }
+    is_read
+}
+
+/// E57. Where the lowest bit of the first byte is set, the checksums of its pages are made right before the rest is
+/// read, so that what lies behind them is reached.
+pub fn e57(data: &[u8]) -> bool {
+    let Some((&choice, file)) = data.split_first() else { return false };
+    let mut file = file.to_vec();
+    if choice & 1 == 1 {
+        file.as_chunks_mut::<1024>().0.iter_mut().for_each(seal_page);
+    }
+    clouds(&file, "a.e57", Format::E57, 0.0)
+}
+
+/// Makes the last four bytes the CRC-32C of those before, the most significant first.
+fn seal_page(page: &mut [u8; 1024]) {
+    let Some((content, crc)) = page.split_last_chunk_mut::<4>() else { return };
+    let shifted = |sum: u32, _| if sum & 1 == 1 { sum >> 1 ^ 0x82f6_3b78 } else { sum >> 1 };
+    let sum = content.iter().fold(!0, |sum, &byte| (0..8).fold(sum ^ u32::from(byte), shifted));
+    *crc = (!sum).to_be_bytes();
+}
+
+fn clouds(data: &[u8], name: &str, format: Format, scan_period_s: f64) -> bool {
+    let options =
+        OpenOptions { format: Some(format), scan_period_s, memory_bytes: 1 << 16, ..OpenOptions::default() };
+    with_file(name, data, |path| {
+        open(path, &options).is_ok_and(|mut source| drain(source.as_mut(), data.len()))
+    })
+}
+
+/// Reads all clouds of a source; whether nothing was wrong.
+fn drain(source: &mut dyn CloudSource, bytes: usize) -> bool {
+    let (mut is_whole, mut steps) = (true, 0);
+    loop {
+        // An error that comes again and again would be a hang.
+        steps += 1;
+        assert!(steps <= 2 * bytes + 16, "{} steps", steps);
+        match source.next_cloud() {
+            Ok(None) => break,
+            Err(_) => is_whole = false,
+            Ok(Some(head)) => {
+                assert!(head.world_from_sensor.is_none_or(|pose| pose.is_valid()), "{head:?}");
+                let mut points = 0;
+                let read = source.read_points(&mut |point| {
+                    assert!(
+                        !point.is_return || point.position_m.iter().all(|axis| axis.is_finite()),
+                        "{point:?}"
+                    );
+                    points += 1;
+                    if points < MOST_POINTS { Ok(()) } else { Err(Error::argument("points", "enough")) }
+                });
+                is_whole &= read.is_ok();
+            }
+        }
+    }
+    source.remarks();
+    is_whole
+}
+
+/// Poses of any layout, text or array of NumPy.
+pub fn trajectory(data: &[u8]) -> bool {
+    let read = with_file("poses", data, |path| Trajectory::read(path, None));
+    let Ok(poses) = read else { return false };
+    assert!(!poses.is_empty() && poses.len() <= data.len());
+    assert!(
+        (0..poses.len()).all(|number| poses.by_number(number).unwrap().is_some_and(|pose| pose.is_valid()))
+    );
+    let stamps: Vec<i64> = poses.stamps_ns().map(|stamp| stamp.unwrap()).collect();
+    assert!(stamps.is_sorted());
+    for pair in stamps.windows(2) {
+        assert!(matches!(poses.at(pair[0], 0).unwrap(), Found::Exact(_)));
+        let middle = pair[0].midpoint(pair[1]);
+        if let Found::Between(pose) = poses.at(middle, i64::MAX).unwrap() {
+            assert!(pose.quaternion.iter().all(|number| number.is_finite()), "{pose:?}");
+        }
+    }
+    true
+}
+
+/// A recording of ROS 1.
+pub fn bag1(data: &[u8]) -> bool {
+    recording(data, "a.bag")
+}
+
+/// A recording of MCAP.
+pub fn mcap(data: &[u8]) -> bool {
+    recording(data, "a.mcap")
+}
+
+fn recording(data: &[u8], name: &str) -> bool {
+    with_file(name, data, |path| {
+        let paths = [path.to_owned()];
+        let Ok(mut recording) = open_recording(&paths) else { return false };
+        let topics: Vec<usize> = (0..recording.topics().len()).collect();
+        let is_whole = recording.begin(&topics).is_ok() && play(recording.as_mut(), data.len());
+        for poses in [PoseSource::Tf, PoseSource::Odometry] {
+            let options = BagOptions { poses, ..BagOptions::default() };
+            if let Ok(mut clouds) = open_bag(&paths, &options) {
+                let stamp_ns = clouds.next_cloud().ok().flatten().and_then(|head| head.stamp_ns);
+                if let Some(pose_at) = clouds.poses() {
+                    pose_at(stamp_ns.unwrap_or(0).saturating_add(1)).unwrap();
+                }
+                while let Ok(Some(_)) = clouds.next_cloud() {
+                    let _ = clouds.read_points(&mut |_| Ok(()));
+                }
+                clouds.remarks();
+            }
+        }
+        is_whole && !topics.is_empty()
+    })
+}
+
+/// Plays all messages; whether nothing was wrong.
+fn play(recording: &mut dyn Recording, bytes: usize) -> bool {
+    let (mut is_whole, mut errors) = (true, 0);
+    loop {
+        match recording.next_message() {
+            Ok(None) => break,
+            Ok(Some(message)) => assert!(message.topic < recording.topics().len()),
+            Err(_) => {
+                (is_whole, errors) = (false, errors + 1);
+                assert!(errors <= bytes, "{errors} errors");
+            }
+        }
+    }
+    recording.remarks();
+    is_whole
+}
+
+/// The `metadata.yaml` of a bag of ROS 2, beside a file without messages.
+pub fn bag2_metadata(data: &[u8]) -> bool {
+    let folder = TempDir::new().expect("a temporary folder");
+    fs::write(folder.path().join("metadata.yaml"), data).expect("a temporary file");
+    fs::write(folder.path().join("x_0.mcap"), b"\x89MCAP0\r\n").expect("a temporary file");
+    let recording = open_recording(&[folder.path().to_owned()]);
+    recording.is_ok_and(|mut recording| play(recording.as_mut(), data.len()))
+}
+
+const KINDS: [MessageKind; 11] = [
+    MessageKind::PointCloud2,
+    MessageKind::LivoxCustom,
+    MessageKind::LaserScan,
+    MessageKind::Image,
+    MessageKind::CameraInfo,
+    MessageKind::Tf,
+    MessageKind::TransformStamped,
+    MessageKind::Odometry,
+    MessageKind::PoseStamped,
+    MessageKind::PoseWithCovarianceStamped,
+    MessageKind::Path,
+];
+
+/// A message: the first byte chooses its kind, and ROS 1 or CDR.
+pub fn messages(data: &[u8]) -> bool {
+    let Some((&choice, data)) = data.split_first() else { return false };
+    let wire = if choice & 1 == 1 { Wire::Cdr } else { Wire::Ros1 };
+    let kind = KINDS[usize::from(choice >> 1) % KINDS.len()];
+    decode(kind, wire, data).is_ok_and(|points| {
+        assert!(points <= data.len(), "{points} points of {} bytes", data.len());
+        true
+    })
+}
+
+/// The byte before a message of a kind in [`messages`].
+pub fn choice(kind: MessageKind, wire: Wire) -> u8 {
+    let number = KINDS.iter().position(|known| *known == kind).expect("all kinds are listed");
+    (number as u8) << 1 | u8::from(wire == Wire::Cdr)
+}
+
+/// Number of points, or of poses.
+fn decode(kind: MessageKind, wire: Wire, data: &[u8]) -> Decoded<usize> {
+    Ok(match kind {
+        MessageKind::PointCloud2 => {
+            let cloud = PointCloud2::decode(wire, data)?;
+            cloud.shortage();
+            cloud.points().count()
+        }
+        MessageKind::LivoxCustom => LivoxCustom::decode(wire, data)?.points().map_while(Decoded::ok).count(),
+        MessageKind::LaserScan => LaserScan::decode(wire, data)?.points().count(),
+        MessageKind::Image => {
+            let image = Image::decode(wire, data)?;
+            image.shortage();
+            let (focal_px, center_px) = ([500.0; 2], [320.0, 240.0]);
+            image.points(&CameraInfo { header: image.header.clone(), focal_px, center_px }).count()
+        }
+        MessageKind::CameraInfo => CameraInfo::decode(wire, data).map(|_| 0)?,
+        _ => decode_poses(kind, wire, data)?.len(),
+    })
+}
+
+/// Readers take paths: each thread has a folder, whose file is written anew.
+fn with_file<T>(name: &str, data: &[u8], read: impl FnOnce(&Path) -> T) -> T {
+    thread_local!(static FOLDER: TempDir = TempDir::new().expect("a temporary folder"));
+    FOLDER.with(|folder| {
+        let path = folder.path().join(name);
+        fs::write(&path, data).expect("a temporary file");
+        read(&path)
+    })
+}

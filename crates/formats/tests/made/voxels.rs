@@ -1,0 +1,43 @@
+use std::fs;
+use std::path::Path;
+use voxtile_formats::clouds::write::{VoxelFileFormat, VoxelRow, VoxelsHead, WriteOptions, open_sink};
+
+/// Number of voxels in a file of [`write_voxels`].
+pub const VOXELS: i32 = 30;
+
+/// A voxel of half a metre.
+pub fn voxel(k: i32) -> VoxelRow {
+    let index = [k, 7 * k, -k];
+    VoxelRow {
+        index,
+        center_m: index.map(|k| f64::from(k) * 0.5 + 0.25),
+        probability: 0.9,
+        log_odds: 2.0,
+        observation_count: k,
+        tile: [0; 3],
+    }
+}
+
+/// Writes the voxels of 0 to [`VOXELS`].
+pub fn write_voxels(format: VoxelFileFormat, path: &Path, crs: Option<&str>) {
+    let [first, last] = [voxel(0), voxel(VOXELS - 1)].map(|row| row.center_m);
+    let bound = |pick: fn(f64, f64) -> f64| std::array::from_fn(|k| pick(first[k], last[k]));
+    let head = VoxelsHead {
+        voxels: VOXELS as u64,
+        resolution_m: 0.5,
+        bounds_m: [bound(f64::min), bound(f64::max)],
+        occupied_log_odds: 0.0,
+    };
+    let options = WriteOptions { crs: crs.map(str::to_owned), ..WriteOptions::beside(path) };
+    let mut sink = open_sink(format, &head, path, &options).unwrap();
+    (0..VOXELS).for_each(|k| sink.put(&voxel(k)).unwrap());
+    sink.finish().unwrap();
+}
+
+/// The bytes of such a file.
+pub fn voxel_file(format: VoxelFileFormat) -> Vec<u8> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(format!("a.{}", format.extension().unwrap()));
+    write_voxels(format, &path, Some("LOCAL_CS[\"hall\",UNIT[\"metre\",1]]"));
+    fs::read(path).unwrap()
+}

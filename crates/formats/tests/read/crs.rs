@@ -1,0 +1,116 @@
+use crate::made::voxels::write_voxels;
+use std::fs;
+use std::path::Path;
+use voxtile_formats::clouds::CloudSource;
+use voxtile_formats::clouds::read::{OpenOptions, open};
+use voxtile_formats::clouds::write::{VoxelFileFormat, WriteOptions};
+
+const FORMATS: [VoxelFileFormat; 4] =
+    [VoxelFileFormat::Las, VoxelFileFormat::Laz, VoxelFileFormat::Copc, VoxelFileFormat::E57];
+const UTM: &str = "PROJCS[\"WGS 84 / UTM zone 32N\",GEOGCS[\"WGS 84\",DATUM[\"WGS_1984\",SPHEROID[\"WGS 84\",6378137,\
+                   298.257223563]],PRIMEM[\"Greenwich\",0],UNIT[\"degree\",0.0174532925199433]],\
+                   PROJECTION[\"Transverse_Mercator\"],UNIT[\"metre\",1],AUTHORITY[\"EPSG\",\"32632\"]]";
+
+/// The coordinate system that comes back of a file, and what is remarked.
+fn round_trip(format: VoxelFileFormat, crs: Option<&str>) -> (Option<String>, Vec<String>) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(format!("a.{}", format.extension().unwrap()));
+    write_voxels(format, &path, crs);
+    if format != VoxelFileFormat::E57 {
+        let bytes = fs::read(&path).unwrap();
+        // Point format 6 wants the bit, whether or not a system is known.
+        assert_eq!(bytes[6] & 1 << 4, 1 << 4, "{format:?}");
+    }
+    // A scan of E57 without a pose is remarked otherwise.
+    let options = OpenOptions { sensor_origin_m: Some([0.0; 3]), ..OpenOptions::default() };
+    let source = open(&path, &options).unwrap();
+    (source.crs().map(str::to_owned), source.remarks())
+}
+
+#[test]
+fn text_and_numbers_come_back() {
+    for format in FORMATS {
+        for crs in [None, Some(UTM), Some("EPSG:25832")] {
+            assert_eq!(round_trip(format, crs), (crs.map(str::to_owned), vec![]), "{format:?}");
+        }
+    }
+}
+
+#[test]
+fn a_system_in_feet_is_not_that_of_metres() {
+    let feet = UTM.replace("UNIT[\"metre\",1]", "UNIT[\"US survey foot\",0.304800609601219]");
+    for format in FORMATS {
+        let (crs, remarks) = round_trip(format, Some(&feet));
+        let said = "the coordinate system is not in metres";
+        assert!(
+            crs.is_none() && remarks.iter().any(|remark| remark.starts_with(said)),
+            "{format:?}: {remarks:?}"
+        );
+    }
+}
+
+#[test]
+fn what_is_no_number_of_a_system_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.las");
+    let head = voxtile_formats::clouds::write::VoxelsHead {
+        voxels: 0,
+        resolution_m: 0.5,
+        bounds_m: [[0.0; 3]; 2],
+        occupied_log_odds: 0.0,
+    };
+    for crs in ["EPSG:", "EPSG:100000", "EPSG:4326+5773"] {
+        let options = WriteOptions { crs: Some(crs.to_owned()), ..WriteOptions::beside(&path) };
+        let error = voxtile_formats::clouds::write::open_sink(VoxelFileFormat::Las, &head, &path, &options)
+            .err()
+            .unwrap();
+        assert!(error.to_string().contains(crs), "{error}");
+    }
+}
+
+/// A folder of files, each with its coordinate system.
+fn folder_of(folder: &Path, format: VoxelFileFormat, systems: &[Option<&str>]) -> Box<dyn CloudSource> {
+    for (number, crs) in systems.iter().enumerate() {
+        let path = folder.join(format!("{number}.{}", format.extension().unwrap()));
+        write_voxels(format, &path, *crs);
+    }
+    open(folder, &OpenOptions::default()).unwrap()
+}
+
+fn of_systems(source: &dyn CloudSource) -> Vec<String> {
+    source.remarks().into_iter().filter(|remark| remark.contains("coordinate system")).collect()
+}
+
+#[test]
+fn files_of_another_system_are_refused_before_their_points() {
+    for format in [VoxelFileFormat::Las, VoxelFileFormat::E57] {
+        let folder = tempfile::tempdir().unwrap();
+        let systems = [Some("EPSG:25832"), Some("EPSG:25833"), None, Some("EPSG:25832")];
+        let mut source = folder_of(folder.path(), format, &systems);
+        let (mut clouds, mut errors) = (0, Vec::new());
+        loop {
+            match source.next_cloud() {
+                Ok(Some(_)) => clouds += 1,
+                Ok(None) => break,
+                Err(error) => errors.push(error.to_string()),
+            }
+        }
+        assert_eq!((clouds, errors.len()), (3, 1), "{format:?}: {errors:?}");
+        let parts = ["/1.", "in EPSG:25833, those of the files before it in EPSG:25832"];
+        assert!(parts.iter().all(|part| errors[0].contains(part)), "{errors:?}");
+        assert_eq!((source.crs(), of_systems(&*source)), (Some("EPSG:25832"), vec![]));
+    }
+}
+
+#[test]
+fn a_system_that_later_files_name_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut source = folder_of(folder.path(), VoxelFileFormat::Las, &[None, Some("EPSG:25832")]);
+    assert!(source.next_cloud().unwrap().is_some());
+    assert_eq!((source.crs(), of_systems(&*source)), (None, vec![]));
+    assert!(source.next_cloud().unwrap().is_some());
+    assert_eq!(source.crs(), Some("EPSG:25832"));
+    let remarks = of_systems(&*source);
+    let told = "1.las: names the coordinate system EPSG:25832, the files before it name none";
+    assert!(remarks.len() == 1 && remarks[0].starts_with(told), "{remarks:?}");
+}

@@ -1,0 +1,141 @@
+use crate::support::{clouds, clouds_with, failure, shared_data};
+use std::fs::{self, File};
+use std::path::Path;
+use voxtile_formats::clouds::read::{Intrinsics, OpenOptions};
+
+fn image(path: &Path, width: u32, depths: &[u16]) {
+    let mut encoder = png::Encoder::new(File::create(path).unwrap(), width, depths.len() as u32 / width);
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder.set_depth(png::BitDepth::Sixteen);
+    let bytes: Vec<u8> = depths.iter().flat_map(|depth| depth.to_be_bytes()).collect();
+    encoder.write_header().unwrap().write_image_data(&bytes).unwrap();
+}
+
+#[test]
+fn seven_scenes_have_millimetres_invalid_pixels_and_poses() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    image(&at("frame-000000.depth.png"), 2, &[2000, 0, 65535, 500]);
+    image(&at("frame-000001.depth.png"), 2, &[0; 4]);
+    fs::write(at("frame-000000.color.png"), "not looked at").unwrap();
+    fs::write(at("camera-intrinsics.txt"), "100 0 1\n0 200 0.5\n0 0 1\n").unwrap();
+    fs::write(at("frame-000000.pose.txt"), "0 -1 0 7\n1 0 0 8\n0 0 1 9\n0 0 0 1\n").unwrap();
+    fs::write(at("frame-000001.pose.txt"), "-1.#IND ".repeat(16)).unwrap();
+    let clouds = clouds(folder.path());
+    assert_eq!(clouds.len(), 2);
+    let (head, points) = &clouds[0];
+    let pose = head.world_from_sensor.unwrap();
+    assert_eq!(pose.position_m, [7.0, 8.0, 9.0]);
+    // A quarter turn about z: the camera's x is the world's y.
+    let turned = pose.apply([1.0, 0.0, 0.0]);
+    assert!((turned[0] - 7.0).abs() < 1e-12 && (turned[1] - 9.0).abs() < 1e-12, "{turned:?}");
+    let found: Vec<_> = points.iter().map(|point| (point.position_m, point.is_return)).collect();
+    let wanted = [
+        ([-0.02, -0.005, 2.0], true),
+        ([0.0, -0.0025, 1.0], false),
+        ([-0.01, 0.0025, 1.0], false),
+        ([0.0, 0.00125, 0.5], true),
+    ];
+    for ((found, is_return), (wanted, is_hit)) in found.iter().zip(wanted) {
+        assert!(found.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-12), "{found:?} {wanted:?}");
+        assert_eq!(*is_return, is_hit);
+    }
+    assert_eq!(clouds[1].0.world_from_sensor, None);
+}
+
+#[test]
+fn tum_has_a_list_with_stamps_and_a_scale_of_5000() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::create_dir(folder.path().join("depth")).unwrap();
+    image(&folder.path().join("depth/b.png"), 1, &[5000, 65535]);
+    fs::write(folder.path().join("depth.txt"), "# depth maps\n1305031453.374112 depth/b.png\n").unwrap();
+    let (error, _) = failure(folder.path(), &OpenOptions::default());
+    assert!(error.contains("fx fy cx cy"), "{error}");
+    let intrinsics = Some(Intrinsics::new([525.0, 525.0, 319.5, 239.5]).unwrap());
+    let clouds = clouds_with(folder.path(), &OpenOptions { intrinsics, ..Default::default() });
+    assert_eq!(clouds[0].0.stamp_ns, Some(1_305_031_453_374_112_000));
+    let depths: Vec<_> = clouds[0].1.iter().map(|point| (point.position_m[2], point.is_return)).collect();
+    assert_eq!(depths, [(1.0, true), (13.107, true)]);
+}
+
+/// A list from elsewhere is not to open any file of the machine.
+#[test]
+fn images_out_of_the_folder_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let inner = folder.path().join("set");
+    fs::create_dir(&inner).unwrap();
+    image(&folder.path().join("1.png"), 1, &[5000]);
+    let options = OpenOptions {
+        intrinsics: Some(Intrinsics::new([525.0, 525.0, 319.5, 239.5]).unwrap()),
+        format: Some(voxtile_formats::clouds::read::Format::DepthTum),
+        ..Default::default()
+    };
+    for name in ["../1.png".to_owned(), folder.path().join("1.png").display().to_string()] {
+        fs::write(inner.join("depth.txt"), format!("# depth maps\n1305031453.374112 {name}\n")).unwrap();
+        let (error, points) = failure(&inner, &options);
+        assert!(error.contains("depth.txt, line 2") && error.contains("leads out of the folder"), "{error}");
+        assert_eq!(points, 0);
+    }
+}
+
+#[test]
+fn images_that_are_no_depths_are_errors() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("1.png");
+    let intrinsics = Some(Intrinsics::new([1.0, 1.0, 0.0, 0.0]).unwrap());
+    let options = OpenOptions { intrinsics, ..Default::default() };
+    let encoder = png::Encoder::new(File::create(&path).unwrap(), 1, 1);
+    encoder.write_header().unwrap().write_image_data(&[9]).unwrap();
+    let (error, _) = failure(folder.path(), &options);
+    assert!(error.contains("is no depth image"), "{error}");
+    let depths: Vec<u16> = (0..40_000_u32).map(|k| (k.wrapping_mul(2_654_435_761) >> 16) as u16).collect();
+    image(&path, 100, &depths);
+    let whole = fs::read(&path).unwrap();
+    fs::write(&path, &whole[..whole.len() / 2]).unwrap();
+    let (error, points) = failure(folder.path(), &options);
+    assert!(error.contains("of 400") && points > 0 && points < 40_000, "{error} after {points}");
+}
+
+#[test]
+fn real_depth_images() {
+    let Some(folder) = shared_data("sevenscenes_kinect") else { return };
+    let mut source =
+        voxtile_formats::clouds::read::open(&folder.join("scans"), &OpenOptions::default()).unwrap();
+    assert_eq!(source.len_hint(), Some(100));
+    let head = source.next_cloud().unwrap().unwrap();
+    assert_eq!((head.name.as_str(), head.points), ("000000.depth.png", Some(640 * 480)));
+    let (mut hits, mut far) = (0, 0.0_f64);
+    source
+        .read_points(&mut |point| {
+            hits += u32::from(point.is_return);
+            far = far.max(if point.is_return { point.position_m[2] } else { 0.0 });
+            Ok(())
+        })
+        .unwrap();
+    assert!(hits > 200_000 && far > 1.0 && far < 10.0, "{hits} {far}");
+}
+
+#[cfg(unix)]
+#[test]
+fn fifos_among_depth_images_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let fifo = |name: &str| {
+        assert!(std::process::Command::new("mkfifo").arg(at(name)).status().unwrap().success());
+    };
+    image(&at("frame-000000.depth.png"), 1, &[2000]);
+    fifo("camera-intrinsics.txt");
+    let (error, _) = failure(folder.path(), &OpenOptions::default());
+    assert!(error.contains("camera-intrinsics.txt: is a FIFO"), "{error}");
+    fs::remove_file(at("camera-intrinsics.txt")).unwrap();
+    fs::write(at("camera-intrinsics.txt"), "100 0 1\n0 200 0.5\n0 0 1\n").unwrap();
+    fifo("frame-000000.pose.txt");
+    let (error, _) = failure(folder.path(), &OpenOptions::default());
+    assert!(error.contains("frame-000000.pose.txt: is a FIFO"), "{error}");
+    // Only what is read in one pass may be named alone.
+    for (name, is_hinted) in [("a.ply", true), ("b.e57", false)] {
+        fifo(name);
+        let (error, _) = failure(&at(name), &OpenOptions::default());
+        assert!(error.contains("is a FIFO") && error.contains("--format") == is_hinted, "{error}");
+    }
+}

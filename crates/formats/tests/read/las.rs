@@ -1,0 +1,279 @@
+use crate::support::{all, clouds, clouds_with, failure, fixture, shared_data, wanted};
+use std::fs;
+use voxtile_formats::clouds::CloudPoint;
+use voxtile_formats::clouds::read::{OpenOptions, open};
+use voxtile_formats::clouds::write::{VoxelFileFormat, VoxelsHead, WriteOptions, open_sink};
+
+fn one_cloud() -> OpenOptions {
+    OpenOptions { scan_period_s: 0.0, ..OpenOptions::default() }
+}
+
+fn assert_near(found: &[CloudPoint], wanted: &[CloudPoint], what: &str) {
+    assert_eq!(found.len(), wanted.len(), "{what}");
+    for (found, wanted) in found.iter().zip(wanted) {
+        let is_near = |k: usize| (found.position_m[k] - wanted.position_m[k]).abs() < 1e-6;
+        assert!((0..3).all(is_near) && found.intensity == wanted.intensity, "{what}: {found:?} {wanted:?}");
+    }
+}
+
+/// By hand: points k and k + 1 of even k were measured at 3e8 + k / 32 s, in any order in the file. Windows of 0.1 s
+/// hold the pairs 0 1, 2 3, 4, 5 6, 7, 8 9.
+#[test]
+fn a_file_is_cut_into_scans_by_its_times() {
+    for name in ["timed.las", "timed.laz"] {
+        for memory_bytes in [0, 1 << 20] {
+            let clouds = clouds_with(&fixture(name), &OpenOptions { memory_bytes, ..Default::default() });
+            let names: Vec<&str> = clouds.iter().map(|(head, _)| head.name.as_str()).collect();
+            assert_eq!(names, ["0", "1", "2", "3", "4", "5"], "{name}");
+            // The first window ends at 0.1 s: times 0 and 0.0625. The whole number of the GPS time of today is 1.3e9.
+            assert_eq!(clouds[0].0.stamp_ns, Some(1_300_000_000_050_000_000));
+            let counts: Vec<usize> = clouds.iter().map(|(_, points)| points.len()).collect();
+            assert_eq!(counts, [4, 4, 2, 4, 2, 4], "{name}");
+            let times: Vec<f64> = clouds[0].1.iter().map(|point| point.time_s).collect();
+            for (found, wanted) in times.iter().zip([-0.05, -0.05, 0.0125, 0.0125]) {
+                assert!((found - wanted).abs() < 1e-6, "{times:?}");
+            }
+            let mut points: Vec<CloudPoint> = clouds.into_iter().flat_map(|(_, points)| points).collect();
+            // Two points of a time keep the order of the file, which is any.
+            for pair in points.chunks_mut(2) {
+                pair.sort_by(|a, b| a.intensity.total_cmp(&b.intensity));
+            }
+            assert_near(&points, &wanted([600_000.0, 5_000_000.0, 100.0]), name);
+        }
+    }
+}
+
+#[test]
+fn scans_that_are_not_read_are_passed_by() {
+    let mut source = open(&fixture("timed.laz"), &OpenOptions::default()).unwrap();
+    let mut heads = 0;
+    while source.next_cloud().unwrap().is_some() {
+        heads += 1;
+    }
+    assert_eq!(heads, 6);
+}
+
+#[test]
+fn feet_become_metres_on_each_axis() {
+    let us_foot = 1200.0 / 3937.0;
+    for (name, flat) in [("feet.las", 0.3048), ("survey_feet.las", us_foot)] {
+        let mut source = open(&fixture(name), &OpenOptions::default()).unwrap();
+        let clouds = all(source.as_mut()).unwrap();
+        let mut points = wanted([600_000.0, 5_000_000.0, 100.0]);
+        for point in &mut points {
+            let [x, y, z] = point.position_m;
+            point.position_m = [x * flat, y * flat, z];
+        }
+        assert_near(&clouds[0].1, &points, name);
+        let remarks = source.remarks();
+        assert!(remarks[0].contains("coordinates become metres"), "{remarks:?}");
+        // What is read is not in the system of the file any more.
+        assert_eq!(source.crs(), None, "{name}");
+        assert!(remarks[1].starts_with("the coordinate system is not in metres"), "{remarks:?}");
+    }
+}
+
+#[test]
+fn withheld_points_are_left_out() {
+    let mut source = open(&fixture("withheld.laz"), &one_cloud()).unwrap();
+    let clouds = all(source.as_mut()).unwrap();
+    let mut points = wanted([600_000.0, 5_000_000.0, 100.0]);
+    points.drain(3..5);
+    assert_near(&clouds[0].1, &points, "withheld");
+    assert!(source.remarks()[0].starts_with("2 points are marked as withheld"), "{:?}", source.remarks());
+}
+
+#[test]
+fn the_origin_of_the_rays_makes_one_cloud() {
+    let options =
+        OpenOptions { sensor_origin_m: Some([600_000.0, 5_000_000.0, 100.0]), ..Default::default() };
+    let clouds = clouds_with(&fixture("feet.las"), &options);
+    assert_eq!(clouds.len(), 1);
+    let clouds = clouds_with(&fixture("timed.laz"), &options);
+    assert_eq!((clouds.len(), clouds[0].1.len()), (1, 20));
+    assert!(clouds[0].1.iter().all(|point| point.position_m[0].abs() < 10.0));
+}
+
+#[test]
+fn a_file_that_is_cut_off_gives_what_is_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("cut.las");
+    let bytes = fs::read(fixture("timed.las")).unwrap();
+    fs::write(&path, &bytes[..bytes.len() - 29]).unwrap();
+    for options in [one_cloud(), OpenOptions::default()] {
+        let (error, points) = failure(&path, &options);
+        assert!(error.contains("record 18: the file ends after 18 of 20 points"), "{error}");
+        assert_eq!(points, 18);
+    }
+}
+
+/// Writes a number of points into a header, which LAS 1.4 has twice.
+fn announce(bytes: &mut [u8], points: u64) {
+    bytes[107..111].copy_from_slice(&(points as u32).to_le_bytes());
+    if bytes[25] >= 4 {
+        bytes[247..255].copy_from_slice(&points.to_le_bytes());
+    }
+}
+
+/// A recorder writes the number of points last.
+#[test]
+fn a_file_whose_writer_was_killed_is_read_as_far_as_it_goes() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("killed.las");
+    let whole = fs::read(fixture("timed.las")).unwrap();
+    for (announced, cut, points, remark) in [
+        (0, 5, 19, "announces no points, as a writer leaves it that was stopped: the 19 "),
+        (0, 20 * 28, 0, ""),
+        (15, 0, 15, "announces 15 points, which are read; the file has room for 5 more"),
+        (20, 0, 20, ""),
+    ] {
+        let mut bytes = whole[..whole.len() - cut].to_vec();
+        announce(&mut bytes, announced);
+        fs::write(&path, &bytes).unwrap();
+        for options in [one_cloud(), OpenOptions::default()] {
+            let mut source = open(&path, &options).unwrap();
+            let clouds = all(source.as_mut()).unwrap();
+            let found: usize = clouds.iter().map(|(_, points)| points.len()).sum();
+            let remarks = source.remarks().join("\n");
+            assert!(found == points && remarks.contains(remark), "{announced}: {found} {remarks}");
+            assert_eq!(remarks.is_empty(), remark.is_empty(), "{remarks}");
+        }
+    }
+    // Of compressed points the file does not tell how many there are.
+    let mut bytes = fs::read(fixture("timed.laz")).unwrap();
+    announce(&mut bytes, 0);
+    let path = folder.path().join("killed.laz");
+    fs::write(&path, &bytes).unwrap();
+    let (error, _) = failure(&path, &OpenOptions::default());
+    assert!(error.contains("the header announces no points, but "), "{error}");
+}
+
+/// What stands behind the points is none: wave packets of LAS 1.3, long records of LAS 1.4.
+#[test]
+fn records_behind_points_are_not_taken_for_points() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("records.las");
+    for place in [227, 235] {
+        let mut bytes = fs::read(fixture("feet.las")).unwrap();
+        let points_at = u64::from(u32::from_le_bytes(bytes[96..100].try_into().unwrap()));
+        announce(&mut bytes, 0);
+        bytes[place..place + 8].copy_from_slice(&(points_at + 12 * 30).to_le_bytes());
+        fs::write(&path, &bytes).unwrap();
+        assert_eq!(clouds(&path)[0].1.len(), 12, "{place}");
+    }
+}
+
+/// A LAZ file of no points, as writers close one, has no cloud with points and is none that was killed.
+#[test]
+fn compressed_files_may_be_empty() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("empty.laz");
+    let head = VoxelsHead { voxels: 0, resolution_m: 0.5, bounds_m: [[0.0; 3]; 2], occupied_log_odds: 0.0 };
+    let sink = open_sink(VoxelFileFormat::Laz, &head, &path, &WriteOptions::beside(&path)).unwrap();
+    sink.finish().unwrap();
+    assert_eq!(clouds(&path).iter().map(|(_, points)| points.len()).sum::<usize>(), 0);
+}
+
+/// Found by fuzzing: coordinates that were no numbers, and hits all the same.
+#[test]
+fn scales_and_offsets_must_give_coordinates() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("damaged.las");
+    let bytes = fs::read(fixture("timed.las")).unwrap();
+    for (at, value, what) in [
+        (131, f64::NAN, "byte 131: the scale of x is NaN"),
+        (147, 0.0, "byte 147: the scale of z is 0"),
+        (163, f64::INFINITY, "byte 163: the offset of y is inf"),
+    ] {
+        let mut damaged = bytes.clone();
+        damaged[at..at + 8].copy_from_slice(&value.to_le_bytes());
+        fs::write(&path, &damaged).unwrap();
+        let (error, points) = failure(&path, &OpenOptions::default());
+        assert!(points == 0 && error.contains(what), "{error}");
+    }
+}
+
+#[test]
+fn no_damage_makes_a_panic() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["timed.las", "timed.laz", "feet.las", "survey_feet.las"] {
+        let bytes = fs::read(fixture(name)).unwrap();
+        for at in (0..bytes.len()).step_by(23) {
+            for flip in [0xff_u8] {
+                let mut damaged = bytes.clone();
+                damaged[at] ^= flip;
+                let path = folder.path().join(name);
+                fs::write(&path, &damaged).unwrap();
+                if let Ok(mut source) = open(&path, &OpenOptions::default()) {
+                    // Hours of empty windows are one step each.
+                    for _ in 0..50 {
+                        match source.next_cloud() {
+                            Ok(Some(_)) => drop(source.read_points(&mut |_| Ok(()))),
+                            Ok(None) => break,
+                            Err(_) => {}
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+type Sums = (&'static str, usize, [f64; 3], f64, [f64; 2]);
+const FT: f64 = 1200.0 / 3937.0;
+const LASPY: [Sums; 8] = [
+    (
+        "autzen_trim.las",
+        110000,
+        [70020104544.61, 93406036431.28, 47337127.730000004],
+        11220547.0,
+        [0.3048; 2],
+    ),
+    (
+        "autzen_trim.laz",
+        110000,
+        [70020104544.61, 93406036431.28, 47337127.730000004],
+        11220547.0,
+        [0.3048; 2],
+    ),
+    (
+        "certainty3d-color-utm-feet-navd88.las",
+        10126,
+        [64083393715.56996, 20954059642.2831, 28897394.740343627],
+        8902430.0,
+        [FT; 2],
+    ),
+    ("lidR_Megaplot.laz", 81590, [55879288878.380005, 409410433749.01, 1082864.1], 1878418.0, [1.0; 2]),
+    (
+        "lidR_Topography.laz",
+        73403,
+        [20076894310.32075, 387163805581.34076, 59389154.98625],
+        63213441.0,
+        [1.0; 2],
+    ),
+    ("loadersgl_indoor.laz", 808042, [-5781227.5, 2379069.97, 3102581.71], 0.0, [1.0; 2]),
+    ("lone-star.laz", 518862, [267417386868.5165, 2551953195888.609, 1208260675.9405], 562919835.0, [1.0; 2]),
+    ("pdal_4_6_crop.las", 23875, [39147701499.18, 34728463766.2, 169401233.96], 439166.0, [FT; 2]),
+];
+
+/// Number of points, sums of x, y and z in the unit of the file and of the intensity, by laspy 2.7 with lazrs.
+#[test]
+fn real_files_are_what_laspy_reads() {
+    let Some(folder) = shared_data("las_large_coords") else { return };
+    for (name, count, sums, intensities, metres) in LASPY {
+        let mut source = open(&folder.join(name), &one_cloud()).unwrap();
+        let clouds = all(source.as_mut()).unwrap();
+        let points = &clouds[0].1;
+        assert_eq!(points.len(), count, "{name}");
+        for (axis, sum) in sums.into_iter().enumerate() {
+            let unit = metres[usize::from(axis == 2)];
+            let found: f64 = points.iter().map(|point| point.position_m[axis]).sum();
+            assert!((found / unit / sum - 1.0).abs() < 1e-11, "{name}: axis {axis}: {found} {sum}");
+        }
+        assert_eq!(points.iter().map(|point| f64::from(point.intensity)).sum::<f64>(), intensities, "{name}");
+        let scans =
+            clouds_with(&folder.join(name), &OpenOptions { memory_bytes: 1 << 20, ..Default::default() });
+        assert_eq!(scans.iter().map(|(_, points)| points.len()).sum::<usize>(), count, "{name}");
+    }
+    assert_eq!(clouds(&folder.join("loadersgl_indoor.laz")).len(), 1);
+}

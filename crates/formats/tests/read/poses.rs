@@ -1,0 +1,273 @@
+use crate::support::shared_data;
+use std::fs;
+use std::path::PathBuf;
+use voxtile_formats::clouds::poses::{Found, Trajectory, most_gap_ns};
+use voxtile_formats::clouds::{CloudHead, CloudPoint, CloudSource, RigidPose};
+
+fn read(text: &str) -> voxtile_formats::clouds::Result<Trajectory> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("poses.txt");
+    fs::write(&path, text).unwrap();
+    Trajectory::read(&path, None)
+}
+
+const TUM: &str = "# timestamp tx ty tz qx qy qz qw\n\
+                   1403636579.763555584 1 2 3 0 0 0 1\n\
+                   1403636580.763555584 3 2 3 0 0 0.7071067811865476 0.7071067811865476\n\
+                   1403636590.763555584 3 2 3 0 0 0.707 0.7072\n";
+const FIRST_NS: i64 = 1_403_636_579_763_555_584;
+
+#[test]
+fn stamps_are_exact_and_poses_lie_between() {
+    let trajectory = read(TUM).unwrap();
+    let first = RigidPose { position_m: [1.0, 2.0, 3.0], ..RigidPose::IDENTITY };
+    assert_eq!(trajectory.at(FIRST_NS, 0).unwrap(), Found::Exact(first));
+    assert_eq!(trajectory.at(FIRST_NS - 1, i64::MAX).unwrap(), Found::Before { first_ns: FIRST_NS });
+    let last_ns = FIRST_NS + 11_000_000_000;
+    assert_eq!(trajectory.at(last_ns + 1, i64::MAX).unwrap(), Found::After { last_ns });
+    // Written numbers stay, though their length is not 1 to the last bit.
+    let Found::Exact(last) = trajectory.at(last_ns, 0).unwrap() else { panic!() };
+    assert_eq!(last.quaternion, [0.0, 0.0, 0.707, 0.7072]);
+    let Found::Between(half) = trajectory.at(FIRST_NS + 500_000_000, 500_000_000).unwrap() else { panic!() };
+    assert_eq!(half.position_m, [2.0, 2.0, 3.0]);
+    let (sin, cos) = (std::f64::consts::PI / 8.0).sin_cos();
+    assert!((half.quaternion[2] - sin).abs() < 1e-12 && (half.quaternion[3] - cos).abs() < 1e-12, "{half:?}");
+    // A hole of ten seconds, near to its begin as in its middle.
+    for into_ns in [400_000_000, 5_000_000_000] {
+        let at_ns = FIRST_NS + 1_000_000_000 + into_ns;
+        assert_eq!(trajectory.at(at_ns, 4_999_999_999).unwrap(), Found::Gap { gap_ns: 10_000_000_000 });
+        assert!(matches!(trajectory.at(at_ns, 5_000_000_000).unwrap(), Found::Between(_)));
+    }
+    // Once a second, every moment is within half a second of a pose.
+    assert_eq!(trajectory.at(FIRST_NS + 1, 499_999_999).unwrap(), Found::Gap { gap_ns: 1_000_000_000 });
+    assert_eq!(most_gap_ns(i64::MAX), i64::MAX);
+    assert_eq!(most_gap_ns(-1), 0);
+    assert_eq!(trajectory.by_number(0).unwrap(), Some(first));
+    assert_eq!(trajectory.by_number(3).unwrap(), None);
+}
+
+#[test]
+fn a_time_beyond_an_end_by_rounding_alone_has_the_pose_there() {
+    let trajectory = read("10.0000 1 0 0 0 0 0 1\n10.1001 2 0 0 0 0 0 1\n10.2003 3 0 0 0 0 0 1\n").unwrap();
+    let last_ns = 10_200_300_000;
+    let Found::Exact(last) = trajectory.at(last_ns + 50_000, 0).unwrap() else { panic!() };
+    assert_eq!(last.position_m[0], 3.0);
+    assert_eq!(trajectory.at(last_ns + 50_001, i64::MAX).unwrap(), Found::After { last_ns });
+    assert!(matches!(trajectory.at(9_999_950_000, 0).unwrap(), Found::Exact(_)));
+    assert!(matches!(trajectory.at(9_999_949_999, 0).unwrap(), Found::Before { .. }));
+    // Whole seconds need not be rounded.
+    let trajectory = read("10 1 0 0 0 0 0 1\n11 2 0 0 0 0 0 1\n").unwrap();
+    assert!(matches!(trajectory.at(11_000_500_000, 0).unwrap(), Found::Exact(_)));
+    assert!(matches!(trajectory.at(11_000_500_001, 0).unwrap(), Found::After { .. }));
+}
+
+#[test]
+fn stamps_out_of_order_and_twice_are_remarked() {
+    let trajectory = read("2 1 0 0 0 0 0 1\n1 2 0 0 0 0 0 1\n2 3 0 0 0 0 0 1\n").unwrap();
+    assert_eq!(
+        trajectory.stamps_ns().map(|stamp| stamp.unwrap()).collect::<Vec<_>>(),
+        [1_000_000_000, 2_000_000_000]
+    );
+    let Found::Exact(pose) = trajectory.at(2_000_000_000, 0).unwrap() else { panic!() };
+    assert_eq!(pose.position_m[0], 3.0);
+    assert_eq!(trajectory.remarks().len(), 2, "{:?}", trajectory.remarks());
+    assert_eq!(trajectory.by_number(0).unwrap().map(|pose| pose.position_m[0]), Some(1.0));
+}
+
+#[test]
+fn what_is_no_pose_is_an_error_with_its_line() {
+    for (text, reason) in [
+        ("0 0 0 0 0 0 0 1\n1 nan 0 0 0 0 0 1\n", "line 2: `nan` is not finite"),
+        ("0 0 0 0 0 0 0 0\n", "line 1: the quaternion 0 0 0 0 has length 0"),
+        ("0 0 0 0 0 0 0 1\n\n# x\n1 2 3\n", "line 4: 3 numbers; the lines before have 8"),
+        ("1 0 0 0 0 2 0 0 0 0 1 0\n", "line 1: the matrix is no rotation"),
+        ("one two\n", "line 1: `one two` is neither"),
+        ("1 2 3\n", "line 1: 3 numbers"),
+        ("# nothing\n", "holds no pose"),
+        ("x 0 0 0 0 0 0 1\n", "is neither a pose"),
+    ] {
+        let error = read(text).unwrap_err().to_string();
+        assert!(error.contains(reason), "{error}");
+    }
+}
+
+/// So many clouds, if that is known, which are never read.
+struct Clouds(Option<u64>);
+
+impl CloudSource for Clouds {
+    fn format(&self) -> &str {
+        "nothing"
+    }
+
+    fn len_hint(&self) -> Option<u64> {
+        self.0
+    }
+
+    fn ends(&self) -> Option<[String; 2]> {
+        Some(["1.txt", "trajectory.txt"].map(str::to_owned))
+    }
+
+    fn next_cloud(&mut self) -> voxtile_formats::clouds::Result<Option<CloudHead>> {
+        Ok(None)
+    }
+
+    fn read_points(
+        &mut self,
+        _: &mut dyn FnMut(CloudPoint) -> voxtile_formats::clouds::Result<()>,
+    ) -> voxtile_formats::clouds::Result<()> {
+        Ok(())
+    }
+}
+
+#[test]
+fn poses_by_number_are_as_many_as_clouds() {
+    let trajectory = read(TUM).unwrap();
+    assert_eq!(trajectory.of_cloud(2, &Clouds(Some(3))).unwrap(), trajectory.by_number(2).unwrap().unwrap());
+    assert_eq!(trajectory.of_cloud(2, &Clouds(None)).unwrap(), trajectory.by_number(2).unwrap().unwrap());
+    for (number, clouds, counts) in [
+        (0, Some(4), "3 poses for 4 clouds (1.txt to trajectory.txt), which have no time stamps in common"),
+        (0, Some(2), "3 poses for 2 clouds (1.txt to trajectory.txt), "),
+        (3, None, "3 poses for at least 4 clouds, "),
+    ] {
+        let error = trajectory.of_cloud(number, &Clouds(clouds)).unwrap_err().to_string();
+        assert!(error.contains("poses.txt: ") && error.contains(counts), "{error}");
+    }
+}
+
+#[test]
+fn tables_name_their_columns() {
+    let euroc = "#timestamp [ns], p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], q_RS_z []\n\
+                 1403636579763555584,1,2,3,0,1,0,0\n";
+    let csv = "qw,qz,qy,qx,z,y,x,timestamp,note\n0,0,0,1,3,2,1,1403636579.763555584,9\n";
+    for text in [euroc, csv] {
+        let trajectory = read(text).unwrap();
+        let wanted = RigidPose { position_m: [1.0, 2.0, 3.0], quaternion: [1.0, 0.0, 0.0, 0.0] };
+        assert_eq!(trajectory.at(FIRST_NS, 0).unwrap(), Found::Exact(wanted), "{text}");
+    }
+}
+
+#[test]
+fn kitti_poses_of_the_camera_become_those_of_the_lidar() {
+    let folder = tempfile::tempdir().unwrap();
+    let (poses, calib) = (folder.path().join("00.txt"), folder.path().join("calib.txt"));
+    // The camera looks along the lidar's x and went 5 m forward.
+    fs::write(&poses, "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0 0 1 0 0 0 0 1 5\n").unwrap();
+    fs::write(&calib, "P0: 1 0 0 0 0 1 0 0 0 0 1 0\nTr: 0 -1 0 0 0 0 -1 -0.08 1 0 0 -0.27\n").unwrap();
+    let trajectory = Trajectory::read(&poses, Some(&calib)).unwrap();
+    let moved = trajectory.by_number(1).unwrap().unwrap();
+    for (found, wanted) in moved.position_m.iter().zip([5.0, 0.0, 0.0]) {
+        assert!((found - wanted).abs() < 1e-12, "{moved:?}");
+    }
+    assert_eq!(trajectory.at(0, 0).unwrap(), Found::WithoutStamps);
+    let plain = Trajectory::read(&poses, None).unwrap();
+    assert_eq!(plain.by_number(1).unwrap().unwrap().position_m, [0.0, 0.0, 5.0]);
+}
+
+#[test]
+fn arrays_of_numpy() {
+    let at = |name: &str| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name);
+    let tum = Trajectory::read(&at("poses_tum.npy"), None).unwrap();
+    assert_eq!(tum.span_ns().unwrap(), Some([1_700_000_000_250_000_000, 1_700_000_001_250_000_000]));
+    for name in ["poses_4x4.npy", "poses_3x4_f4.npy"] {
+        let matrices = Trajectory::read(&at(name), None).unwrap();
+        assert_eq!(matrices.len(), 2);
+        for number in 0..2 {
+            let (a, b) =
+                (tum.by_number(number).unwrap().unwrap(), matrices.by_number(number).unwrap().unwrap());
+            assert_eq!(a.position_m, b.position_m, "{name}");
+            let cosine: f64 = a.quaternion.iter().zip(b.quaternion).map(|(a, b)| a * b).sum();
+            assert!((cosine.abs() - 1.0).abs() < 1e-7, "{name}: {a:?} {b:?}");
+        }
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let cut = folder.path().join("cut.npy");
+    let bytes = fs::read(at("poses_tum.npy")).unwrap();
+    fs::write(&cut, &bytes[..bytes.len() - 1]).unwrap();
+    let error = Trajectory::read(&cut, None).unwrap_err().to_string();
+    assert!(error.contains("the file ends after 1 of 2 poses"), "{error}");
+}
+
+#[test]
+fn real_poses_of_two_forms_agree() {
+    let Some(folder) = shared_data("balm_os0_hall") else { return };
+    let tum = Trajectory::read(&folder.join("poses_tum.txt"), None).unwrap();
+    let kitti = Trajectory::read(&folder.join("poses_kitti.txt"), None).unwrap();
+    let stacked = Trajectory::read(&folder.join("alidarPose_all177.csv"), None).unwrap();
+    assert_eq!((tum.len(), kitti.len(), stacked.len()), (36, 36, 177));
+    assert_eq!(stacked.span_ns().unwrap().map(|[first, _]| first), Some(1_630_577_758_569_490_000));
+    for number in 0..36 {
+        let (a, b) = (tum.by_number(number).unwrap().unwrap(), kitti.by_number(number).unwrap().unwrap());
+        let point = [10.0, -20.0, 5.0];
+        let (a, b) = (a.apply(point), b.apply(point));
+        assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-3), "{number}: {a:?} {b:?}");
+    }
+}
+
+/// A file of NumPy with this header, of a version, and so many bytes.
+fn npy(version: u8, header: &str, bytes: usize) -> Vec<u8> {
+    let length = header.len() as u32;
+    let length =
+        if version == 1 { length.to_le_bytes()[..2].to_vec() } else { length.to_le_bytes().to_vec() };
+    [b"\x93NUMPY".to_vec(), vec![version, 0], length, header.as_bytes().to_vec(), vec![0; bytes]].concat()
+}
+
+#[test]
+fn an_array_that_holds_no_poses_says_what_is_expected() {
+    let folder = tempfile::tempdir().unwrap();
+    let fail = |name: &str, bytes: &[u8]| {
+        let path = folder.path().join(name);
+        fs::write(&path, bytes).unwrap();
+        Trajectory::read(&path, None).unwrap_err().to_string()
+    };
+    let header = |kind: &str, order: &str, shape: &str| {
+        format!("{{'descr': {kind}, 'fortran_order': {order}, 'shape': ({shape}), }}\n")
+    };
+    let plain = header("'<f8'", "False", "2, 8");
+    for (bytes, wanted) in [
+        (
+            npy(1, &header("'<i8'", "False", "2, 8"), 128),
+            "numbers of type `<i8`; poses are little-endian floats",
+        ),
+        (npy(2, &header("'>f8'", "False", "2, 8"), 128), "numbers of type `>f8`"),
+        (npy(1, &header("'|O'", "False", "2, 8"), 128), "numbers of type `|O`"),
+        (npy(3, &header("[('t', '<f8'), ('x', '<f8')]", "False", "2,"), 32), "is a structured array"),
+        (npy(1, &header("'<f8'", "True", "2, 8"), 128), "is in Fortran order"),
+        (npy(1, &header("'<f8'", "False", "2, 9"), 144), "has the shape (2, 9); poses are N x 8"),
+        (npy(1, &header("'<f8'", "False", ""), 8), "has the shape ()"),
+        (npy(1, &header("'<f8'", "False", "18446744073709551615, 8"), 0), "the file ends after 0 of"),
+        (npy(1, &plain, 40), "the file ends after 0 of 2 poses"),
+        (npy(1, &plain, 128), "record 0: the quaternion 0 0 0 0 has length 0.000, not 1"),
+        (npy(4, &plain, 128), "its version is none of 1, 2 and 3"),
+        (npy(1, "{}", 0), "its header names no type"),
+        (npy(1, &plain, 0)[..40].to_vec(), "the file ends within its header"),
+        (npy(2, &plain, 0)[..9].to_vec(), "the file ends within its header"),
+        (npy(1, &plain, 0)[..7].to_vec(), "is no array of NumPy, which its name says"),
+        (Vec::new(), "is no array of NumPy"),
+        (TUM.as_bytes().to_vec(), "is no array of NumPy"),
+        (b"\x80\x04\x95numpy".to_vec(), "is no array of NumPy"),
+    ] {
+        let error = fail("poses.NPY", &bytes);
+        assert!(error.contains("poses.NPY") && error.contains(wanted), "{error}\n{wanted}");
+    }
+    for (name, bytes, wanted) in [
+        (
+            "poses.npz",
+            &b"PK\x03\x04rest"[..],
+            "is an archive (.zip, .npz), not a text of poses: save one array",
+        ),
+        ("poses.csv.gz", b"\x1f\x8b\x08\x00", "is packed (gzip), not a text of poses: unpack it first"),
+        (
+            "drive.bag",
+            b"#ROSBAG V2.0\n",
+            "is a recording (.bag), not a text of poses: give the recording itself",
+        ),
+        ("drive.mcap", b"\x89MCAP0\r\n", "is a recording (.mcap)"),
+        ("drive.db3", b"SQLite format 3\0", "is a database"),
+        ("poses.csv", b"\xff\xfe1\0 \0", "is text in UTF-16"),
+        ("poses.bin", &1.5_f64.to_le_bytes(), "is binary, not a text of poses: save the poses as text"),
+    ] {
+        let error = fail(name, bytes);
+        assert!(error.contains(wanted), "{error}");
+    }
+    assert_eq!(read(&format!("\u{feff}{TUM}")).unwrap().len(), 3, "a mark of UTF-8 is none of UTF-16");
+}

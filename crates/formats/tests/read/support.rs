@@ -1,0 +1,76 @@
+use std::path::{Path, PathBuf};
+use voxtile_formats::clouds::read::{OpenOptions, open};
+use voxtile_formats::clouds::{CloudHead, CloudPoint, CloudSource, Result};
+
+/// A file that somebody else's writer made, see `tests/fixtures/clouds.py`.
+pub fn fixture(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name)
+}
+
+/// A folder of real data: under `$VOXTILE_DATA`, by default beside the repository. `None`, after saying so, where it is
+/// absent.
+pub fn shared_data(folder: &str) -> Option<PathBuf> {
+    let root = std::env::var_os("VOXTILE_DATA")
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data"), PathBuf::from);
+    let path = root.join(folder);
+    if path.is_dir() {
+        return Some(path);
+    }
+    println!("skipped: there is no {} (VOXTILE_DATA may name another folder)", path.display());
+    None
+}
+
+/// A cloud with its points.
+pub type Cloud = (CloudHead, Vec<CloudPoint>);
+
+/// All clouds of a source, or the first error.
+pub fn all(source: &mut dyn CloudSource) -> Result<Vec<Cloud>> {
+    let mut clouds = Vec::new();
+    while let Some(head) = source.next_cloud()? {
+        let mut points = Vec::new();
+        source.read_points(&mut |point| {
+            points.push(point);
+            Ok(())
+        })?;
+        clouds.push((head, points));
+    }
+    Ok(clouds)
+}
+
+pub fn clouds_with(path: &Path, options: &OpenOptions) -> Vec<Cloud> {
+    let mut source = open(path, options).unwrap_or_else(|error| panic!("{error}"));
+    all(source.as_mut()).unwrap_or_else(|error| panic!("{error}"))
+}
+
+pub fn clouds(path: &Path) -> Vec<Cloud> {
+    clouds_with(path, &OpenOptions::default())
+}
+
+/// What goes wrong, and how many points came before.
+pub fn failure(path: &Path, options: &OpenOptions) -> (String, usize) {
+    let mut points = 0;
+    let mut read = || -> Result<()> {
+        let mut source = open(path, options)?;
+        while source.next_cloud()?.is_some() {
+            source.read_points(&mut |_| {
+                points += 1;
+                Ok(())
+            })?;
+        }
+        Ok(())
+    };
+    let error = read().expect_err("it must fail");
+    (error.to_string(), points)
+}
+
+/// The points of the fixtures, shifted.
+pub fn wanted(shift: [f64; 3]) -> Vec<CloudPoint> {
+    (0..20)
+        .map(f64::from)
+        .map(|k| {
+            let position_m =
+                [0.5 * k - 3.0 + shift[0], 0.25 * k * k - 7.0 + shift[1], 10.0 - 0.125 * k + shift[2]];
+            CloudPoint { intensity: 3.0 * k as f32, ..CloudPoint::hit(position_m) }
+        })
+        .collect()
+}

@@ -1,0 +1,270 @@
+use super::page_table::PageTable;
+use super::place::{cell_at, in_box, mirrored, place_of};
+use super::sparse::Sparse64;
+use super::tree::{Node, Page, Tree};
+use voxtile::scan::RayWalk;
+use voxtile::space::{Point, VoxelIndex};
+
+/// Finds the voxels with occupancy on a ray: exactly those that [`RayWalk`] visits before its last voxel.
+///
+/// A ray crosses borders in the order of their times, at equal times the lowest axis first. So it visits a voxel if and
+/// only if it crosses all borders into it before any border out of it. The same holds for larger cells, whose borders
+/// are voxel borders with bit-identical times. So no walk is needed: each non-empty cell near the ray is tested by
+/// itself.
+#[derive(Clone, Debug)]
+pub(super) struct RaySearch {
+    origin: Point,
+    direction: Point,
+    inv_direction: Point,
+    step: [i32; 3],
+    start: VoxelIndex,
+    last: VoxelIndex,
+    /// A box that contains the ray: the voxels of its two ends, less a quarter of a voxel at their outer borders.
+    low: Point,
+    high: Point,
+    /// The highest place along the axes on which the ray descends, else 0: places XORed with it are in the order of the
+    /// ray.
+    flip: usize,
+}
+
+/// The times at which a ray enters and leaves a cell.
+#[derive(Clone, Copy, Debug)]
+struct Stay {
+    enter: f64,
+    leave: f64,
+}
+
+/// The position of the walk from page to page.
+struct Cursor {
+    page: VoxelIndex,
+    next: Point,
+    enter: f64,
+}
+
+impl RaySearch {
+    /// The ray from `origin` to `end`, both in units of voxels and inside `start` and `last`, their voxels.
+    pub(super) fn new(origin: Point, start: VoxelIndex, end: Point, last: VoxelIndex) -> Self {
+        let direction: Point = std::array::from_fn(|k| end[k] - origin[k]);
+        Self {
+            origin,
+            direction,
+            inv_direction: direction.map(|d| 1.0 / d),
+            step: std::array::from_fn(|k| (last[k] - start[k]).signum()),
+            start,
+            last,
+            low: std::array::from_fn(|k| f64::from(start[k].min(last[k])) + 0.25),
+            high: std::array::from_fn(|k| f64::from(start[k].max(last[k])) + 0.75),
+            flip: (0..3).map(|k| if last[k] < start[k] { 3 << (2 * k) } else { 0 }).sum(),
+        }
+    }
+
+    /// Visits the number of each voxel with occupancy on the ray, from the first up to, not including, the last.
+    #[inline]
+    pub(super) fn for_each_stored(
+        &self,
+        tree: &Tree,
+        pages: &PageTable,
+        end: Point,
+        mut visit: impl FnMut(u32),
+    ) {
+        // Times are undefined along an axis on which the ray hardly moves.
+        let is_sound = |k: usize| self.step[k] == 0 || self.inv_direction[k].abs() < 1e30;
+        if !(is_sound(0) && is_sound(1) && is_sound(2)) {
+            return self.for_each_stored_by_steps(tree, end, visit);
+        }
+        let page = self.start.map(|k| k >> 6);
+        let mut at =
+            Cursor { page, next: std::array::from_fn(|k| self.leave_time::<6>(k, page[k])), enter: 0.0 };
+        loop {
+            let (axis, leave) = earliest(at.next);
+            if let Some(page) = pages.get(tree, at.page) {
+                self.search_page(tree, tree.pages.get(page), Stay { enter: at.enter, leave }, &mut visit);
+            }
+            if leave == f64::INFINITY {
+                return;
+            }
+            at.page[axis] += self.step[axis];
+            at.next[axis] = self.leave_time::<6>(axis, at.page[axis]);
+            at.enter = leave;
+        }
+    }
+
+    #[cold]
+    fn for_each_stored_by_steps(&self, tree: &Tree, end: Point, mut visit: impl FnMut(u32)) {
+        RayWalk::between(self.origin, self.start, end, self.last).for_each_before_end(|voxel| {
+            let block = tree.block_at(voxel.map(|k| k >> 2)).map(|block| tree.blocks.get(block));
+            if let Some(voxel) = block.and_then(|block| block.voxels.get(&tree.lists, place_of(voxel))) {
+                visit(voxel);
+            }
+        });
+    }
+
+    fn search_page(&self, tree: &Tree, page: &Page, stay: Stay, visit: &mut impl FnMut(u32)) {
+        self.search::<4>(page.index, page.stored, stay, |cell, place, stay| {
+            if let Some(node) = page.nodes.get(&tree.lists, place) {
+                self.search_node(tree, tree.nodes.get(node), cell, stay, visit);
+            }
+        });
+    }
+
+    #[inline]
+    fn search_node(&self, tree: &Tree, node: &Node, at: VoxelIndex, stay: Stay, visit: &mut impl FnMut(u32)) {
+        let end = if at == self.last.map(|k| k >> 4) { self.block_of_end_alone(tree, node) } else { 0 };
+        self.search::<2>(at, node.stored & !end, stay, |cell, place, stay| {
+            if let Some(block) = node.blocks.get(&tree.lists, place) {
+                self.search_block(tree, &tree.blocks.get(block).voxels, cell, stay, visit);
+            }
+        });
+    }
+
+    /// The block of the ray's end, if it is in the node and holds only the end: this saves most rays the descent to it.
+    #[inline]
+    fn block_of_end_alone(&self, tree: &Tree, node: &Node) -> u64 {
+        let place = place_of(self.last.map(|k| k >> 2));
+        let block = node.blocks.get(&tree.lists, place).map(|block| tree.blocks.get(block));
+        let is_alone = block.is_some_and(|block| block.voxels.mask == 1 << place_of(self.last));
+        u64::from(is_alone) << place
+    }
+
+    #[inline]
+    fn search_block(
+        &self,
+        tree: &Tree,
+        stored: &Sparse64,
+        at: VoxelIndex,
+        stay: Stay,
+        visit: &mut impl FnMut(u32),
+    ) {
+        let is_end = at == self.last.map(|k| k >> 2);
+        let before_end = stored.mask & !(u64::from(is_end) << place_of(self.last));
+        self.search::<0>(at, before_end, stay, |_, place, _| {
+            if let Some(voxel) = stored.get(&tree.lists, place) {
+                visit(voxel);
+            }
+        });
+    }
+
+    /// Visits the cells of `2^SHIFT` voxels that are in the mask and on the ray, in the ray's order. `stay` is the
+    /// ray's stay in their parent.
+    #[inline]
+    fn search<const SHIFT: u32>(
+        &self,
+        parent: VoxelIndex,
+        mask: u64,
+        stay: Stay,
+        mut visit: impl FnMut(VoxelIndex, usize, Stay),
+    ) {
+        if mask == 0 {
+            return;
+        }
+        // Without a branch per cell: it would be unpredictable.
+        let (mut near, mut visited) = (mask & self.near::<SHIFT>(parent, stay), 0_u64);
+        while near != 0 {
+            let place = near.trailing_zeros() as usize;
+            near &= near - 1;
+            visited |= u64::from(self.visits::<SHIFT>(cell_at(parent, place))) << place;
+        }
+        if visited == 0 {
+            return;
+        }
+        let mut in_order = mirrored(visited, self.flip);
+        while in_order != 0 {
+            let place = in_order.trailing_zeros() as usize ^ self.flip;
+            in_order &= in_order - 1;
+            let cell = cell_at(parent, place);
+            visit(cell, place, self.stay_in::<SHIFT>(cell));
+        }
+    }
+
+    /// The cells of `2^SHIFT` voxels of a parent that lie in a box around the ray's part in it, and in the box of the
+    /// ray's ends.
+    #[inline]
+    fn near<const SHIFT: u32>(&self, parent: VoxelIndex, stay: Stay) -> u64 {
+        // In voxels; the rounding error of times and positions is at most a thousandth of this.
+        const MARGIN: f64 = 1e-3;
+        let cells_per_voxel = 1.0 / f64::from(1 << SHIFT);
+        let leave = if stay.leave < 1.0 { stay.leave } else { 1.0 };
+        let range = |k: usize| {
+            let (a, b) =
+                (self.origin[k] + self.direction[k] * stay.enter, self.origin[k] + self.direction[k] * leave);
+            let (low, high) = (smaller(a, b) - MARGIN, larger(a, b) + MARGIN);
+            let corner = f64::from(parent[k] << (SHIFT + 2));
+            let (low, high) = (larger(low, self.low[k]) - corner, smaller(high, self.high[k]) - corner);
+            (cell_of(low * cells_per_voxel), cell_of(high * cells_per_voxel))
+        };
+        in_box(range(0), range(1), range(2))
+    }
+
+    /// Whether the ray visits a cell of `2^SHIFT` voxels that is in the box of the ray's ends.
+    #[inline]
+    fn visits<const SHIFT: u32>(&self, cell: VoxelIndex) -> bool {
+        let [ex, ey, ez]: Point = std::array::from_fn(|k| self.enter_time::<SHIFT>(k, cell[k]));
+        let [lx, ly, lz]: Point = std::array::from_fn(|k| self.leave_time::<SHIFT>(k, cell[k]));
+        // At equal times the lowest axis goes first.
+        (ex <= ly) & (ex <= lz) & (ey < lx) & (ey <= lz) & (ez < lx) & (ez < ly)
+    }
+
+    /// The times at which the ray enters and leaves a cell of `2^SHIFT` voxels that it visits.
+    #[inline]
+    fn stay_in<const SHIFT: u32>(&self, cell: VoxelIndex) -> Stay {
+        let [ex, ey, ez]: Point = std::array::from_fn(|k| self.enter_time::<SHIFT>(k, cell[k]));
+        let [lx, ly, lz]: Point = std::array::from_fn(|k| self.leave_time::<SHIFT>(k, cell[k]));
+        Stay { enter: larger(larger(ex, ey), larger(ez, 0.0)), leave: smaller(smaller(lx, ly), lz) }
+    }
+
+    /// Time at which the ray enters a cell of `2^SHIFT` voxels along `axis`; minus infinity for the first.
+    #[inline]
+    fn enter_time<const SHIFT: u32>(&self, axis: usize, cell: i32) -> f64 {
+        match cell == self.start[axis] >> SHIFT {
+            true => f64::NEG_INFINITY,
+            false => self.time(axis, (cell + i32::from(self.step[axis] < 0)) << SHIFT),
+        }
+    }
+
+    /// Time at which the ray leaves a cell of `2^SHIFT` voxels along `axis`; infinite for the last.
+    #[inline]
+    fn leave_time<const SHIFT: u32>(&self, axis: usize, cell: i32) -> f64 {
+        match cell == self.last[axis] >> SHIFT {
+            true => f64::INFINITY,
+            false => self.time(axis, (cell + i32::from(self.step[axis] > 0)) << SHIFT),
+        }
+    }
+
+    /// Time at which the ray crosses a voxel border, as in [`RayWalk`].
+    #[inline]
+    fn time(&self, axis: usize, border: i32) -> f64 {
+        (f64::from(border) - self.origin[axis]) * self.inv_direction[axis]
+    }
+}
+
+/// The axis with the least time, the lowest at equal times, and that time.
+#[inline]
+fn earliest([x, y, z]: Point) -> (usize, f64) {
+    if x <= y && x <= z {
+        (0, x)
+    } else if y <= z {
+        (1, y)
+    } else {
+        (2, z)
+    }
+}
+
+// One instruction each; the library's versions handle NaN.
+#[inline]
+fn smaller(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+#[inline]
+fn larger(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}
+
+/// Which of the cells 0 to 3 holds a coordinate, or is nearest to it; on a border either of the two.
+#[inline]
+fn cell_of(x: f64) -> usize {
+    // Added to a number, this leaves the nearest integer in the lowest bits.
+    const INTEGERS: f64 = 6_755_399_441_055_744.0;
+    let x = smaller(larger(x, 0.25), 3.75);
+    (x - 0.5 + INTEGERS).to_bits() as usize & 3
+}

@@ -1,0 +1,77 @@
+//! OctoMap's files in place of a map: what they hold, and their voxels.
+
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
+use voxtile::octree::{self, Leaf, OctreeFile};
+use voxtile::space::{Grid, MortonCode, VoxelIndex};
+use voxtile::{Error, Result};
+use voxtile_formats::VoxelRecord;
+
+/// Most voxels that the pruned leaves of a file may stand for when they are written out one by one: a file of twenty
+/// bytes can stand for 2^48.
+pub const MAX_VOXELS: u64 = 1 << 28;
+
+/// Reads an octree file.
+///
+/// # Errors
+///
+/// A file that cannot be read or is none of OctoMap.
+pub fn read(path: &Path) -> Result<OctreeFile> {
+    let file = File::open(path).map_err(|error| Error::io(path, "open", error))?;
+    octree::read(BufReader::with_capacity(1 << 16, file)).map_err(|error| error.in_input(path))
+}
+
+/// Number of finest voxels with at least `min_log_odds`, which a file's leaves may stand for.
+///
+/// # Errors
+///
+/// More than [`MAX_VOXELS`].
+pub fn count_voxels(
+    file: &OctreeFile,
+    min_log_odds: f32,
+    keep: impl Fn(&VoxelRecord) -> bool,
+) -> Result<u64> {
+    let size = file.tree.count_voxels(min_log_odds).occupied;
+    if size > MAX_VOXELS {
+        let hint = "such a file is made by pruning large cubes; export it as .ot or .bt, which stays pruned";
+        return Err(Error::TooLarge { what: "number of voxels in the file", size, limit: MAX_VOXELS, hint });
+    }
+    let mut count = 0;
+    for_each_voxel(file, min_log_odds, |_, voxel| {
+        count += u64::from(keep(voxel));
+        Ok::<_, Error>(())
+    })?;
+    Ok(count)
+}
+
+/// Visits the finest voxels with at least `min_log_odds`, in Morton order. OctoMap's files keep no counts: 0.
+///
+/// # Errors
+///
+/// Those of `visit`; a resolution that is none.
+pub fn for_each_voxel<E: From<Error>>(
+    file: &OctreeFile,
+    min_log_odds: f32,
+    mut visit: impl FnMut(VoxelIndex, &VoxelRecord) -> std::result::Result<(), E>,
+) -> std::result::Result<(), E> {
+    // The tile size has no meaning here; two voxels always make a grid.
+    let grid = Grid::new(file.resolution_m, 2.0 * file.resolution_m).map_err(Error::from)?;
+    for Leaf { code, depth, value } in file.tree.leaves() {
+        if value < min_log_odds {
+            continue;
+        }
+        for offset in 0..MortonCode::span(depth) {
+            let voxel = MortonCode(code.0 + offset).to_key().to_index_from([-32768; 3]);
+            let log_odds = f64::from(value);
+            let record = VoxelRecord {
+                center_m: grid.center_m(voxel),
+                probability: voxtile::maths::sigmoid(log_odds),
+                log_odds,
+                observation_count: 0,
+            };
+            visit(voxel, &record)?;
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,215 @@
+use super::node_key::NodeKey;
+use super::scheme::Scheme;
+use rustc_hash::FxHashSet;
+use std::collections::BTreeMap;
+use voxtile::MapConfig;
+use voxtile::sensor::Evidence;
+use voxtile::tile::Tile;
+
+/// What the voxels of a node are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Kind {
+    /// Occupied, by the map's threshold.
+    Occupied,
+    /// Observed, and below the threshold.
+    Free,
+    /// Never observed, with a free voxel of the same tile beside it: where knowledge ends.
+    Unknown,
+}
+
+/// A voxel of a node.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Cell {
+    /// Place in the node: z in bits 16 to 23, y in 8 to 15, x in 0 to 7. Cells are in this order.
+    pub(super) place: u32,
+    /// Log-odds, from 0 to 255 on a [`Scale`].
+    pub(super) value: u8,
+    /// `round(16 log2(1 + n))` of the number of observations.
+    pub(super) count: u8,
+}
+
+/// The voxels of a node, in order.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(super) struct Cells {
+    pub(super) cells: Vec<Cell>,
+    /// The last scan that may have changed them; 0 where nobody knows.
+    pub(super) last_scan: u64,
+}
+
+/// What values stand for: log-odds along a line.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Scale {
+    pub(super) least: f64,
+    pub(super) most: f64,
+}
+
+impl Scale {
+    /// The scale of a kind of voxels: from the threshold to the clamp on its side.
+    pub(super) fn of(config: &MapConfig, kind: Kind) -> Self {
+        let [min, max] = config.sensor_model.limits();
+        let threshold = config.occupied_log_odds();
+        let (least, most) = match kind {
+            Kind::Occupied => (threshold, max),
+            Kind::Free | Kind::Unknown => (min, threshold),
+        };
+        Self { least, most: if most > least { most } else { least + 1.0 } }
+    }
+
+    fn value(self, log_odds: f64) -> u8 {
+        (255.0 * (log_odds - self.least) / (self.most - self.least)).round() as u8
+    }
+}
+
+fn count_of(observations: i32) -> u8 {
+    (16.0 * (1.0 + f64::from(observations.max(0))).log2()).round() as u8
+}
+
+pub(super) fn place(cell: [i64; 3]) -> u32 {
+    cell.iter().rev().fold(0, |place, &k| place << 8 | (k as u32 & 0xff))
+}
+
+/// The place along x, y and z.
+pub(super) fn axes(place: u32) -> [i64; 3] {
+    [0, 8, 16].map(|shift| i64::from(place >> shift & 0xff))
+}
+
+impl Cells {
+    /// The voxels of a kind in a node that is a tile or a part of one.
+    pub(super) fn of_tile(
+        scheme: Scheme,
+        key: NodeKey,
+        tile: &Tile,
+        config: &MapConfig,
+        kind: Kind,
+        last_scan: u64,
+    ) -> Self {
+        let (first, edges) = (scheme.first_voxel(key), scheme.edges(key));
+        let own = |voxel: [i32; 3]| {
+            let cell = [0, 1, 2].map(|k| (i64::from(voxel[k]) - first[k]) >> key.level);
+            (0..3).all(|k| cell[k] >= 0 && cell[k] < edges[k]).then_some(cell)
+        };
+        let (threshold, scale) = (config.occupied_log_odds(), Scale::of(config, kind));
+        let mut cells = Vec::new();
+        match kind {
+            Kind::Unknown => {
+                let unknown = unknown_beside_free(tile, threshold);
+                cells.extend(unknown.into_iter().filter_map(own).map(|cell| Cell {
+                    place: place(cell),
+                    value: 0,
+                    count: 0,
+                }));
+            }
+            _ => {
+                let is_wanted =
+                    |evidence: &Evidence| (evidence.log_odds >= threshold) == (kind == Kind::Occupied);
+                for voxel in tile.voxels().filter(|voxel| is_wanted(&voxel.evidence)) {
+                    if let Some(cell) = own(voxel.index) {
+                        let value = scale.value(voxel.evidence.log_odds);
+                        let count = count_of(voxel.evidence.observation_count);
+                        cells.push(Cell { place: place(cell), value, count });
+                    }
+                }
+            }
+        }
+        Self { cells: merged(cells), last_scan }
+    }
+
+    /// The occupied voxels of all nodes of a tile: of itself, and of each block of it.
+    pub(super) fn of_nodes_of_tile(
+        scheme: Scheme,
+        tile: &Tile,
+        config: &MapConfig,
+        last_scan: u64,
+    ) -> BTreeMap<NodeKey, Self> {
+        let index = tile.index();
+        let keys = scheme.nodes_of_tile(index).into_iter();
+        let mut nodes: BTreeMap<_, _> =
+            keys.map(|key| (key, Self { cells: Vec::new(), last_scan })).collect();
+        let (threshold, scale) = (config.occupied_log_odds(), Scale::of(config, Kind::Occupied));
+        for voxel in tile.voxels_from(threshold) {
+            let value = scale.value(voxel.evidence.log_odds);
+            let count = count_of(voxel.evidence.observation_count);
+            for level in 0..=scheme.tile_level() {
+                let (key, at) = scheme.node_of_voxel(index, voxel.index, level);
+                if let Some(node) = nodes.get_mut(&key) {
+                    node.cells.push(Cell { place: place(at), value, count });
+                }
+            }
+        }
+        for node in nodes.values_mut() {
+            node.cells = merged(std::mem::take(&mut node.cells));
+        }
+        nodes
+    }
+
+    /// Takes in the voxels of a node within this one's: each becomes a part of a coarser one, which has the largest of
+    /// its values. Call [`Cells::sort`] after the last.
+    pub(super) fn add_child(&mut self, scheme: Scheme, own: NodeKey, child: NodeKey, cells: &Self) {
+        let (from, first, edges) = (scheme.first_voxel(child), scheme.first_voxel(own), scheme.edges(own));
+        let width = 1 << child.level;
+        for cell in &cells.cells {
+            let at = axes(cell.place);
+            let low = [0, 1, 2].map(|k| from[k] - first[k] + (at[k] << child.level));
+            // One coarser voxel; two where the edge of a tile is not a multiple of them.
+            let [xs, ys, zs] = [0, 1, 2].map(|k| {
+                let last = ((low[k] + width - 1) >> own.level).min(edges[k] - 1);
+                (low[k] >> own.level)..=last
+            });
+            for z in zs {
+                for y in ys.clone() {
+                    for x in xs.clone() {
+                        self.cells.push(Cell { place: place([x, y, z]), ..*cell });
+                    }
+                }
+            }
+        }
+        self.cells = merged(std::mem::take(&mut self.cells));
+        self.last_scan = self.last_scan.max(cells.last_scan);
+    }
+
+    /// The lowest and the highest place along each axis that has a voxel; `None` if there are no voxels.
+    pub(super) fn bounds(&self) -> Option<[[u8; 3]; 2]> {
+        let mut bounds = None;
+        for cell in &self.cells {
+            let at = axes(cell.place).map(|k| k as u8);
+            let [low, high] = bounds.get_or_insert([at; 2]);
+            for k in 0..3 {
+                low[k] = low[k].min(at[k]);
+                high[k] = high[k].max(at[k]);
+            }
+        }
+        bounds
+    }
+}
+
+/// Sorted, one of each place, with the largest of their values.
+fn merged(mut cells: Vec<Cell>) -> Vec<Cell> {
+    cells.sort_unstable_by_key(|cell| cell.place);
+    cells.dedup_by(|later, kept| {
+        let is_same = later.place == kept.place;
+        if is_same {
+            kept.value = kept.value.max(later.value);
+            kept.count = kept.count.max(later.count);
+        }
+        is_same
+    });
+    cells
+}
+
+/// The voxels of a tile that were never observed and have a free voxel of the tile beside them.
+fn unknown_beside_free(tile: &Tile, threshold: f64) -> FxHashSet<[i32; 3]> {
+    let bounds = tile.voxel_box();
+    let mut unknown = FxHashSet::default();
+    for voxel in tile.voxels().filter(|voxel| voxel.evidence.log_odds < threshold) {
+        for k in 0..3 {
+            for step in [-1, 1] {
+                let mut beside = voxel.index;
+                beside[k] = beside[k].saturating_add(step);
+                if bounds.contains(beside) && tile.evidence(beside).is_none() {
+                    unknown.insert(beside);
+                }
+            }
+        }
+    }
+    unknown
+}

@@ -1,0 +1,509 @@
+use super::cells::{Cells, Kind, Scale, axes};
+use super::node_bytes::{self, Head};
+use super::node_key::{MAX_LEVEL, NodeKey};
+use super::node_store::{NodeStore, Stored};
+use super::scheme::Scheme;
+use parking_lot::Mutex;
+use rayon::prelude::*;
+use rustc_hash::FxHashMap;
+use std::collections::{BTreeMap, BTreeSet};
+use voxtile::MapConfig;
+use voxtile::mapper::MapView;
+use voxtile::space::{Aabb, Point, TileBox, TileIndex};
+use voxtile::{Error, Result};
+
+/// The levels of detail of one state of a map, or of some of its tiles.
+///
+/// ```
+/// use voxtile::render::levels::{Kind, Levels, NodeStore};
+/// use voxtile::{InMemoryMapper, MapConfig, MapView, Mapper, Scan};
+///
+/// # fn main() -> voxtile::Result<()> {
+/// let mut map = InMemoryMapper::new(MapConfig::new(0.1, 10.0)?)?;
+/// map.insert_scan(&Scan { points: vec![[5.0, 0.0, 0.0]], ..Scan::default() })?;
+/// let store = NodeStore::open(std::io::Cursor::new(Vec::new()), "nodes")?;
+/// let levels = Levels::build(&map, &map.tile_indices(), 0, &store, &|_| true)?.expect("not stopped");
+/// let top = levels.tops()[0];
+/// assert!(levels.node(&map, &store, top, Kind::Occupied)?.is_some());
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Debug)]
+pub struct Levels {
+    config: MapConfig,
+    pub(super) scheme: Scheme,
+    /// From the level of tiles on, those without occupied voxels only where one beside them has some.
+    nodes: FxHashMap<NodeKey, Node>,
+    tops: Vec<NodeKey>,
+    /// Around all tiles.
+    tile_box: Option<TileBox>,
+    unreadable: Vec<String>,
+}
+
+/// What is known of a node without its bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Node {
+    /// A hash of the tiles below it, of the threshold, and of how nodes are made.
+    pub(super) version: u64,
+    /// Whether it has occupied voxels.
+    pub(super) is_occupied: bool,
+    /// The last scan that may have changed it; 0 where nobody knows.
+    last_scan: u64,
+}
+
+/// Another number whenever nodes are made in another way.
+const HOW_NODES_ARE_MADE: u64 = 1;
+/// The coarsest level has no more voxels than this, so that it is there at once.
+const MOST_TOP_VOXELS: u64 = 4096;
+
+impl Levels {
+    /// Makes the coarse nodes of these tiles of a map, those that the store does not have yet, on all cores. `progress`
+    /// is told how many tiles were read since the last call; if it returns `false` the work stops, and the result is
+    /// `None`. What was made until then stays in the store.
+    ///
+    /// Tiles that are damaged are left out; [`Levels::unreadable`] says which.
+    ///
+    /// Nodes are known by the versions of their tiles. Tiles of OctoMap's files and of maps without a log have none:
+    /// `origin` stands for what is in them, another number for every map, and for the same map at another time.
+    ///
+    /// Memory: some sixty bytes a tile, and a few tiles for each thread.
+    ///
+    /// # Errors
+    ///
+    /// A tile that cannot be read for other reasons than damage, a store that cannot be read or written.
+    pub fn build<V: MapView>(
+        map: &V,
+        tiles: &[TileIndex],
+        origin: u64,
+        store: &NodeStore,
+        progress: &(dyn Fn(u64) -> bool + Sync),
+    ) -> Result<Option<Self>> {
+        let mut left_out = BTreeSet::new();
+        let mut unreadable = Vec::new();
+        loop {
+            let damaged = Mutex::new(Vec::new());
+            let levels = Self::build_without(map, tiles, origin, &left_out, store, progress, &damaged)?;
+            let damaged = damaged.into_inner();
+            if damaged.is_empty() {
+                return Ok(levels.map(|levels| Self { unreadable, ..levels }));
+            }
+            for (tile, reason) in damaged {
+                if left_out.insert(tile) {
+                    unreadable.push(reason);
+                }
+            }
+        }
+    }
+
+    fn build_without<V: MapView>(
+        map: &V,
+        tiles: &[TileIndex],
+        origin: u64,
+        left_out: &BTreeSet<TileIndex>,
+        store: &NodeStore,
+        progress: &(dyn Fn(u64) -> bool + Sync),
+        damaged: &Mutex<Vec<(TileIndex, String)>>,
+    ) -> Result<Option<Self>> {
+        let config = map.config().clone();
+        let scheme = Scheme::of(&config.grid);
+        let mut levels = Self {
+            config,
+            scheme,
+            nodes: FxHashMap::default(),
+            tops: Vec::new(),
+            tile_box: TileBox::of(tiles.iter().copied()),
+            unreadable: Vec::new(),
+        };
+        let mut level: Vec<(NodeKey, Node)> = tiles
+            .iter()
+            .filter(|tile| !left_out.contains(tile))
+            .map(|&tile| (scheme.key_of_tile(tile), levels.node_of_tile(map, tile, origin)))
+            .collect();
+        level.sort_unstable_by_key(|(key, _)| *key);
+        levels.nodes.extend(level.iter().copied());
+        loop {
+            level.retain(|(_, node)| node.is_occupied);
+            let parents = parents_of(&level);
+            let made = parents.par_iter().map(|&(key, node)| {
+                let stored = match store.find(key, node.version) {
+                    Some(stored) => stored,
+                    None => match levels.make(map, store, key, node, damaged)? {
+                        Some(stored) => stored,
+                        None => return Ok(None),
+                    },
+                };
+                let tiles = if key.level == scheme.tile_level() + 1 { 8 } else { 0 };
+                if !progress(tiles) {
+                    return Err(Stop::Asked);
+                }
+                Ok(Some((key, Node { is_occupied: stored.voxels > 0, ..node }, stored.voxels)))
+            });
+            let made: Vec<_> = match made.collect::<std::result::Result<_, Stop>>() {
+                Ok(made) => made,
+                Err(Stop::Asked) => return Ok(None),
+                Err(Stop::Failed(error)) => return Err(error),
+            };
+            if !damaged.lock().is_empty() || parents.is_empty() {
+                return Ok(Some(levels));
+            }
+            let voxels: u64 = made.iter().flatten().map(|(_, _, voxels)| u64::from(*voxels)).sum();
+            level = made.into_iter().flatten().map(|(key, node, _)| (key, node)).collect();
+            levels.nodes.extend(level.iter().copied());
+            let is_coarsest = level.first().is_none_or(|(key, _)| key.level == MAX_LEVEL);
+            if is_coarsest || (voxels <= MOST_TOP_VOXELS && is_small(&level)) {
+                levels.tops =
+                    level.iter().filter(|(_, node)| node.is_occupied).map(|(key, _)| *key).collect();
+                levels.leave_out_empty_regions();
+                return Ok(Some(levels));
+            }
+        }
+    }
+
+    /// What the index of the map tells of a tile.
+    fn node_of_tile<V: MapView>(&self, map: &V, tile: TileIndex, origin: u64) -> Node {
+        let version = map.version_of_tile(tile);
+        let mut hasher = blake3::Hasher::new();
+        hasher.update(&HOW_NODES_ARE_MADE.to_le_bytes());
+        hasher.update(&self.config.occupied_log_odds().to_le_bytes());
+        hasher.update(tile.to_array().map(i32::to_le_bytes).as_flattened());
+        match version {
+            Some(version) => {
+                hasher.update(&version.table.bytes.to_le_bytes());
+                hasher.update(&version.table.crc.to_le_bytes());
+            }
+            None => {
+                hasher.update(&origin.to_le_bytes());
+            }
+        }
+        Node {
+            version: first_eight(&hasher),
+            is_occupied: version.is_none_or(|version| version.occupied > 0),
+            last_scan: version.map_or(0, |version| version.scan_number),
+        }
+    }
+
+    /// Tiles where everything is free are of no use by themselves.
+    fn leave_out_empty_regions(&mut self) {
+        let parents: FxHashMap<NodeKey, bool> =
+            self.nodes.iter().map(|(&key, node)| (key, node.is_occupied)).collect();
+        self.nodes.retain(|key, node| {
+            node.is_occupied || parents.get(&key.parent()).is_some_and(|&is_occupied| is_occupied)
+        });
+    }
+
+    /// Makes a node of several tiles and stores it; `None` if a tile below it is damaged.
+    fn make<V: MapView>(
+        &self,
+        map: &V,
+        store: &NodeStore,
+        key: NodeKey,
+        node: Node,
+        damaged: &Mutex<Vec<(TileIndex, String)>>,
+    ) -> std::result::Result<Option<Stored>, Stop> {
+        let cells = match self.pooled(map, store, key) {
+            Ok(cells) => Cells { last_scan: node.last_scan, ..cells },
+            Err(error @ Error::Damaged { tile: Some(tile), .. }) => {
+                damaged.lock().push((tile, format!("{error:#}")));
+                return Ok(None);
+            }
+            Err(error) => return Err(Stop::Failed(error)),
+        };
+        let bytes = node_bytes::encode(&self.head(key, Kind::Occupied), &cells);
+        let bounds = cells.bounds().unwrap_or_default();
+        let stored = store.put(key, node.version, &bytes, bounds, cells.cells.len() as u32);
+        stored.map(Some).map_err(Stop::Failed)
+    }
+
+    /// The occupied voxels of a node, from those of its children.
+    fn pooled<V: MapView>(&self, map: &V, store: &NodeStore, key: NodeKey) -> Result<Cells> {
+        let mut cells = Cells::default();
+        for child in key.children() {
+            if self.get(child).is_some_and(|node| node.is_occupied) {
+                cells.add_child(self.scheme, key, child, &self.cells(map, store, child)?);
+            }
+        }
+        Ok(cells)
+    }
+
+    /// The occupied voxels of a node.
+    pub(super) fn cells<V: MapView>(&self, map: &V, store: &NodeStore, key: NodeKey) -> Result<Cells> {
+        let tile = self.scheme.tile_of(key);
+        let Some(node) = self.get(tile.map_or(key, |tile| self.scheme.key_of_tile(tile))) else {
+            return Ok(Cells::default());
+        };
+        let store_of_key = tile.map_or(Some(store), |tile| Self::store_of_tile(map, store, tile));
+        let kept = store_of_key.map(|store| store.get(key, node.version)).transpose()?.flatten();
+        match (kept.map(|bytes| node_bytes::decode(&bytes)), tile) {
+            (Some(Ok(cells)), _) => Ok(cells),
+            (_, Some(tile)) => self.cells_of_tile(map, key, tile, Kind::Occupied),
+            // What is kept for later may have been damaged: it is made again.
+            _ => {
+                let cells = self.pooled(map, store, key)?;
+                Ok(Cells { last_scan: node.last_scan, ..cells })
+            }
+        }
+    }
+
+    fn cells_of_tile<V: MapView>(&self, map: &V, key: NodeKey, tile: TileIndex, kind: Kind) -> Result<Cells> {
+        let last_scan = self.nodes.get(&self.scheme.key_of_tile(tile)).map_or(0, |node| node.last_scan);
+        let Some(tile) = map.tile_uncached(tile)? else { return Ok(Cells::default()) };
+        Ok(Cells::of_tile(self.scheme, key, &tile, &self.config, kind, last_scan))
+    }
+
+    /// The store for nodes of a tile, if its version tells what is in them: those of OctoMap's files have none.
+    fn store_of_tile<'s, V: MapView>(
+        map: &V,
+        store: &'s NodeStore,
+        tile: TileIndex,
+    ) -> Option<&'s NodeStore> {
+        map.version_of_tile(tile).map(|_| store)
+    }
+
+    /// Makes and stores all nodes of a tile; whoever asks for one of them will ask for the others. The bytes of each,
+    /// and how many voxels it has.
+    fn make_nodes_of_tile<V: MapView>(
+        &self,
+        map: &V,
+        store: &NodeStore,
+        tile: TileIndex,
+    ) -> Result<BTreeMap<NodeKey, (Vec<u8>, usize)>> {
+        let Some(node) = self.nodes.get(&self.scheme.key_of_tile(tile)) else { return Ok(BTreeMap::new()) };
+        let Some(read) = map.tile_uncached(tile)? else { return Ok(BTreeMap::new()) };
+        let made = Cells::of_nodes_of_tile(self.scheme, &read, &self.config, node.last_scan).into_iter();
+        let store = Self::store_of_tile(map, store, tile);
+        let made = made.map(|(key, cells)| {
+            let bytes = node_bytes::encode(&self.head(key, Kind::Occupied), &cells);
+            let (bounds, voxels) = (cells.bounds().unwrap_or_default(), cells.cells.len());
+            // They can be made again: a full disk is no reason to show nothing.
+            let put = store.map(|store| store.put(key, node.version, &bytes, bounds, voxels as u32));
+            if let Some(Err(error)) = put {
+                log::debug!("{error:#}");
+            }
+            (key, (bytes, voxels))
+        });
+        Ok(made.collect())
+    }
+
+    /// The bytes of a node (`docs/view.md`), compressed as gzip; `None` if there is no such node. Only nodes that are
+    /// tiles, or parts of them, know free and unknown voxels.
+    ///
+    /// # Errors
+    ///
+    /// A tile that cannot be read, a store that cannot be read.
+    pub fn node<V: MapView>(
+        &self,
+        map: &V,
+        store: &NodeStore,
+        key: NodeKey,
+        kind: Kind,
+    ) -> Result<Option<Vec<u8>>> {
+        let head = self.head(key, kind);
+        let Some(tile) = self.scheme.tile_of(key) else {
+            let Some(node) = self.nodes.get(&key).filter(|_| kind == Kind::Occupied) else { return Ok(None) };
+            return match store.get(key, node.version)? {
+                Some(bytes) => Ok(Some(bytes)),
+                None => Ok(Some(node_bytes::encode(&head, &self.cells(map, store, key)?))),
+            };
+        };
+        let is_there = self.scheme.edges(key).iter().all(|&edge| edge > 0);
+        let Some(node) = self.nodes.get(&self.scheme.key_of_tile(tile)).filter(|_| is_there) else {
+            return Ok(None);
+        };
+        let cells = match kind {
+            Kind::Occupied if !node.is_occupied => Cells { last_scan: node.last_scan, ..Cells::default() },
+            Kind::Occupied => {
+                let kept = Self::store_of_tile(map, store, tile).map(|store| store.get(key, node.version));
+                if let Some(bytes) = kept.transpose()?.flatten() {
+                    return Ok(Some(bytes));
+                }
+                return Ok(self.make_nodes_of_tile(map, store, tile)?.remove(&key).map(|(bytes, _)| bytes));
+            }
+            _ => self.cells_of_tile(map, key, tile, kind)?,
+        };
+        Ok(Some(node_bytes::encode(&head, &cells)))
+    }
+
+    /// The occupied voxels of a node: the places of each along the axes, counted from the node's lower corner in voxels
+    /// of
+    /// [`Levels::voxel_edge_m`].
+    ///
+    /// # Errors
+    ///
+    /// A tile that cannot be read, a store that cannot be read.
+    pub fn voxels<V: MapView>(&self, map: &V, store: &NodeStore, key: NodeKey) -> Result<Vec<[u8; 3]>> {
+        let cells = self.cells(map, store, key)?.cells;
+        Ok(cells.iter().map(|cell| axes(cell.place).map(|at| at as u8)).collect())
+    }
+
+    /// Whether a node is a tile.
+    pub fn is_tile(&self, key: NodeKey) -> bool {
+        key.level == self.scheme.tile_level()
+    }
+
+    /// The lower corner of a node, in metres.
+    pub fn corner_m(&self, key: NodeKey) -> Point {
+        self.head(key, Kind::Occupied).corner_m
+    }
+
+    /// The nodes that have occupied voxels, in order, but for those within tiles.
+    pub fn keys(&self) -> Vec<NodeKey> {
+        let occupied = self.nodes.iter().filter(|(_, node)| node.is_occupied);
+        let mut keys: Vec<_> = occupied.map(|(key, _)| *key).collect();
+        keys.sort_unstable();
+        keys
+    }
+
+    /// The nodes within a tile that is divided, which is one itself; none of a tile that is not.
+    ///
+    /// # Errors
+    ///
+    /// A tile that cannot be read.
+    pub fn keys_within<V: MapView>(&self, map: &V, store: &NodeStore, tile: NodeKey) -> Result<Vec<NodeKey>> {
+        match self.scheme.tile_of(tile).filter(|_| tile.level == self.scheme.tile_level() && tile.level > 0) {
+            Some(index) => Ok(self.blocks_of_tile(map, store, index)?.into_iter().collect()),
+            None => Ok(Vec::new()),
+        }
+    }
+
+    /// The blocks of a tile that have occupied voxels, at every level.
+    pub(super) fn blocks_of_tile<V: MapView>(
+        &self,
+        map: &V,
+        store: &NodeStore,
+        tile: TileIndex,
+    ) -> Result<BTreeSet<NodeKey>> {
+        let own = self.scheme.key_of_tile(tile);
+        let Some(node) = self.nodes.get(&own) else { return Ok(BTreeSet::new()) };
+        let keys = self.scheme.nodes_of_tile(tile).into_iter();
+        let kept = Self::store_of_tile(map, store, tile);
+        let known: Option<Vec<_>> =
+            keys.map(|key| Some((key, kept?.find(key, node.version)?.voxels as usize))).collect();
+        let voxels = match known {
+            Some(known) => known,
+            None => {
+                let made = self.make_nodes_of_tile(map, store, tile)?.into_iter();
+                made.map(|(key, (_, voxels))| (key, voxels)).collect()
+            }
+        };
+        let blocks = voxels.into_iter().filter(|&(key, voxels)| key != own && voxels > 0);
+        Ok(blocks.map(|(key, _)| key).collect())
+    }
+
+    pub(super) fn head(&self, key: NodeKey, kind: Kind) -> Head {
+        let resolution_m = self.config.grid.resolution_m();
+        let edges = self.scheme.edges(key);
+        Head {
+            corner_m: self.scheme.first_voxel(key).map(|voxel| voxel as f64 * resolution_m),
+            voxel_edge_m: self.voxel_edge_m(key.level),
+            edge: edges.into_iter().max().unwrap_or(0).max(0),
+            kind: match kind {
+                Kind::Occupied => 0,
+                Kind::Free => 1,
+                Kind::Unknown => 2,
+            },
+            scale: Scale::of(&self.config, kind),
+            threshold: self.config.occupied_log_odds(),
+        }
+    }
+
+    /// Edge of the voxels of a level, in metres.
+    pub fn voxel_edge_m(&self, level: u8) -> f64 {
+        self.config.grid.resolution_m() * (1_u64 << level) as f64
+    }
+
+    /// The coarsest nodes, at most eight: all of the map in few voxels. None for a map without occupied voxels.
+    pub fn tops(&self) -> &[NodeKey] {
+        &self.tops
+    }
+
+    /// Tiles that are damaged and were left out: an error each.
+    pub fn unreadable(&self) -> &[String] {
+        &self.unreadable
+    }
+
+    /// Number of nodes that are tiles.
+    pub fn tiles(&self) -> usize {
+        self.nodes.keys().filter(|key| key.level == self.scheme.tile_level()).count()
+    }
+
+    /// What is known of a node, also of one above the coarsest, which stands for those below it.
+    pub(super) fn get(&self, key: NodeKey) -> Option<Node> {
+        let top_level = self.tops.first().map_or(MAX_LEVEL, |top| top.level);
+        if key.level <= top_level {
+            return self.nodes.get(&key).copied();
+        }
+        let up = |top: &NodeKey| NodeKey {
+            level: key.level,
+            index: top.index.map(|k| k >> (key.level - top.level).min(31)),
+        };
+        let below = self.tops.iter().filter(|top| up(top) == key).filter_map(|top| self.nodes.get(top));
+        below.copied().reduce(|a, b| Node {
+            version: a.version.rotate_left(1) ^ b.version,
+            last_scan: a.last_scan.max(b.last_scan),
+            is_occupied: true,
+        })
+    }
+
+    /// A box around the occupied voxels of a node, in metres: as tight as is known without reading a tile.
+    pub fn bounds_m(&self, store: &NodeStore, key: NodeKey) -> Aabb {
+        let head = self.head(key, Kind::Occupied);
+        let stored = self.nodes.get(&key).and_then(|node| store.find(key, node.version));
+        let bounds = match stored.filter(|stored| stored.voxels > 0) {
+            Some(stored) => stored.bounds,
+            None => [[0; 3], self.scheme.edges(key).map(|edge| (edge - 1).clamp(0, 255) as u8)],
+        };
+        let [min, max] = node_bytes::bounds_m(&head, bounds);
+        // Coarse voxels reach beyond the tiles.
+        let Some(tiles) = self.tile_box else { return Aabb { min, max } };
+        let edge_m = self.config.grid.tile_size_m();
+        let (low, high) = (tiles.min().to_array(), tiles.max().to_array());
+        Aabb {
+            min: std::array::from_fn(|k| min[k].max(f64::from(low[k]) * edge_m)),
+            max: std::array::from_fn(|k| max[k].min((f64::from(high[k]) + 1.0) * edge_m)),
+        }
+    }
+}
+
+enum Stop {
+    Asked,
+    Failed(Error),
+}
+
+impl From<Error> for Stop {
+    fn from(error: Error) -> Self {
+        Self::Failed(error)
+    }
+}
+
+/// The nodes above those of a level, which are in order, with their versions.
+fn parents_of(level: &[(NodeKey, Node)]) -> Vec<(NodeKey, Node)> {
+    let mut children: Vec<_> = level.iter().map(|&(key, node)| (key.parent(), key, node)).collect();
+    children.sort_unstable_by_key(|&(parent, key, _)| (parent, key));
+    let families = children.chunk_by(|(first, ..), (second, ..)| first == second);
+    families
+        .map(|family| {
+            let mut hasher = blake3::Hasher::new();
+            for (_, key, node) in family {
+                hasher.update(key.index.map(i32::to_le_bytes).as_flattened());
+                hasher.update(&node.version.to_le_bytes());
+            }
+            let last_scan = family.iter().map(|(_, _, node)| node.last_scan).max().unwrap_or(0);
+            (family[0].0, Node { version: first_eight(&hasher), is_occupied: true, last_scan })
+        })
+        .collect()
+}
+
+fn first_eight(hasher: &blake3::Hasher) -> u64 {
+    let hash = hasher.finalize();
+    hash.as_bytes().iter().take(8).fold(0, |number, &byte| number << 8 | u64::from(byte))
+}
+
+/// Whether the nodes of a level are at most two along each axis.
+fn is_small(level: &[(NodeKey, Node)]) -> bool {
+    (0..3).all(|k| {
+        let places = level.iter().map(|(key, _)| i64::from(key.index[k]));
+        let (least, most) =
+            places.fold((i64::MAX, i64::MIN), |(least, most), at| (least.min(at), most.max(at)));
+        most - least <= 1
+    })
+}

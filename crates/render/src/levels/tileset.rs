@@ -1,0 +1,264 @@
+//! Nodes as [3D Tiles 1.1](https://docs.ogc.org/cs/22-025r4/22-025r4.html): trees of boxes, cut into files of three
+//! levels.
+
+use super::levels_of_map::Levels;
+use super::node_key::NodeKey;
+use super::node_store::NodeStore;
+use serde_json::{Value, json};
+use std::collections::BTreeSet;
+use voxtile::Result;
+use voxtile::mapper::MapView;
+use voxtile::space::{Aabb, Point};
+
+/// In what form a tileset's nodes are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TilesetContent {
+    /// [`Levels::node`]'s bytes, `.vox`.
+    Voxels,
+    /// Meshes, `.glb`, whose coordinates begin at the node's corner: `f32` is fine enough anywhere.
+    Meshes,
+}
+
+/// Nodes that a tileset can be made of.
+pub trait TilesetNodes {
+    /// The coarsest nodes.
+    fn tops(&self) -> Vec<NodeKey>;
+
+    /// Whether there is such a node, and a number that changes with its content.
+    fn version(&self, key: NodeKey) -> Option<u64>;
+
+    /// Whether a node has occupied voxels. Some tiles have only free ones, which a viewer may ask for.
+    fn is_occupied(&self, key: NodeKey) -> bool;
+
+    /// The version of a node, or of the tile that it is a part of.
+    fn version_of(&self, key: NodeKey) -> Option<u64> {
+        let level = key.level.max(self.tile_level());
+        self.version(NodeKey { level, index: key.index.map(|k| k >> (level - key.level)) })
+    }
+
+    /// A box around the node, in metres.
+    fn bounds_m(&self, store: &NodeStore, key: NodeKey) -> Aabb;
+
+    /// The lower corner of a node, in metres.
+    fn corner_m(&self, key: NodeKey) -> Point;
+
+    /// Edge of the voxels of a level, in metres.
+    fn voxel_edge_m(&self, level: u8) -> f64;
+
+    /// The level of nodes that are tiles.
+    fn tile_level(&self) -> u8;
+
+    /// The nodes within a tile that is itself a node, if it is divided.
+    ///
+    /// # Errors
+    ///
+    /// A tile that cannot be read.
+    fn within_tile(&self, store: &NodeStore, key: NodeKey) -> Result<BTreeSet<NodeKey>>;
+}
+
+/// Levels of a file.
+const FILE_LEVELS: u8 = 3;
+
+/// The tileset of all nodes, to be served or written as `tileset.json`; files of further levels are at
+/// `subtree/L/X/Y/Z.json`, nodes at `node/L/X/Y/Z.vox` or `.glb` beside it.
+///
+/// # Errors
+///
+/// A tile that cannot be read.
+pub fn tileset(
+    nodes: &dyn TilesetNodes,
+    store: &NodeStore,
+    content: TilesetContent,
+    extras: Value,
+) -> Result<Value> {
+    let tops = nodes.tops();
+    let boxes: Vec<Aabb> = tops.iter().map(|&key| nodes.bounds_m(store, key)).collect();
+    let around =
+        boxes.into_iter().reduce(|a, b| union(&a, &b)).unwrap_or(Aabb { min: [0.0; 3], max: [0.0; 3] });
+    let writer = Writer { nodes, store, content, to_root: "" };
+    let top_level = tops.first().map_or(0, |key| key.level);
+    let children =
+        tops.iter().map(|&key| writer.node(key, [0.0; 3], FILE_LEVELS, None)).collect::<Result<Vec<_>>>()?;
+    // Larger than that of any child, so that the empty root is always refined.
+    let error_m = 4.0 * nodes.voxel_edge_m(top_level) + length(&around);
+    let mut root = json!({
+        "boundingVolume": { "box": box_of(&around) },
+        "geometricError": error_m,
+        "refine": "REPLACE",
+    });
+    if !children.is_empty() {
+        root["children"] = children.into();
+    }
+    Ok(json!({
+        "asset": { "version": "1.1", "generator": concat!("voxtile ", env!("CARGO_PKG_VERSION")), "extras": extras },
+        "geometricError": error_m,
+        "root": root,
+    }))
+}
+
+/// The file of a node at which one begins, `subtree/L/X/Y/Z.json`; `None` if there is no such node.
+///
+/// # Errors
+///
+/// A tile that cannot be read.
+pub fn subtree(
+    nodes: &dyn TilesetNodes,
+    store: &NodeStore,
+    content: TilesetContent,
+    key: NodeKey,
+) -> Result<Option<Value>> {
+    let level = key.level.max(nodes.tile_level());
+    if nodes.version(NodeKey { level, ..key }).is_none() || key.level != level {
+        return Ok(None);
+    }
+    let within = if key.level == nodes.tile_level() { Some(nodes.within_tile(store, key)?) } else { None };
+    let writer = Writer { nodes, store, content, to_root: "../../../../" };
+    Ok(Some(json!({
+        "asset": { "version": "1.1" },
+        "geometricError": nodes.voxel_edge_m(key.level),
+        "root": writer.node(key, nodes.corner_m(key), FILE_LEVELS, within.as_ref())?,
+    })))
+}
+
+struct Writer<'a> {
+    nodes: &'a dyn TilesetNodes,
+    store: &'a NodeStore,
+    content: TilesetContent,
+    /// From the file to the folder of `tileset.json`.
+    to_root: &'static str,
+}
+
+impl Writer<'_> {
+    /// Whether a node is there; a mesh of no voxels is not.
+    fn is_written(&self, key: NodeKey) -> bool {
+        match self.content {
+            TilesetContent::Voxels => self.nodes.version(key).is_some(),
+            TilesetContent::Meshes => self.nodes.is_occupied(key),
+        }
+    }
+
+    /// A node and those below it that belong into the same file. `within` has the nodes below a tile.
+    /// `corner_m` is that of the node above it, which coordinates of meshes are relative to.
+    fn node(
+        &self,
+        key: NodeKey,
+        corner_m: Point,
+        levels: u8,
+        within: Option<&BTreeSet<NodeKey>>,
+    ) -> Result<Value> {
+        let version = match within {
+            // Parts of a tile change with it.
+            Some(_) => self.nodes.version_of(key),
+            None => self.nodes.version(key),
+        }
+        .unwrap_or_default();
+        // Files have no question marks.
+        let version = match self.content {
+            TilesetContent::Voxels => format!("?v={version:016x}"),
+            TilesetContent::Meshes => String::new(),
+        };
+        let bounds = self.nodes.bounds_m(self.store, key);
+        let children: Vec<NodeKey> = match within {
+            Some(within) => key.children().filter(|child| within.contains(child)).collect(),
+            None if key.level == self.nodes.tile_level() => Vec::new(),
+            None => key.children().filter(|&child| self.is_written(child)).collect(),
+        };
+        let is_divided_tile = within.is_none() && key.level == self.nodes.tile_level() && key.level > 0;
+        let error_m =
+            if children.is_empty() && !is_divided_tile { 0.0 } else { self.nodes.voxel_edge_m(key.level) };
+        let own_m = self.nodes.corner_m(key);
+        let mut node = match self.content {
+            TilesetContent::Voxels => json!({ "boundingVolume": { "box": box_of(&bounds) } }),
+            TilesetContent::Meshes => {
+                let mut node = json!({ "boundingVolume": { "box": box_of(&relative(&bounds, own_m)) } });
+                let [x, y, z] = [0, 1, 2].map(|k| own_m[k] - corner_m[k]);
+                if [x, y, z] != [0.0; 3] {
+                    node["transform"] = json!([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, x, y, z, 1]);
+                }
+                node
+            }
+        };
+        node["geometricError"] = error_m.into();
+        if is_divided_tile || (levels == 0 && within.is_none() && !children.is_empty()) {
+            node["content"] = json!({ "uri": format!("{}subtree/{key}.json{version}", self.to_root) });
+            return Ok(node);
+        }
+        let extension = match self.content {
+            TilesetContent::Voxels => "vox",
+            TilesetContent::Meshes => "glb",
+        };
+        node["content"] = json!({ "uri": format!("{}node/{key}.{extension}{version}", self.to_root) });
+        if !children.is_empty() {
+            let children =
+                children.into_iter().map(|child| self.node(child, own_m, levels.saturating_sub(1), within));
+            node["children"] = children.collect::<Result<Vec<_>>>()?.into();
+        }
+        Ok(node)
+    }
+}
+
+/// A map's levels, with the map to read tiles from.
+#[derive(Debug)]
+pub struct LevelsOf<'a, V> {
+    /// The levels.
+    pub levels: &'a Levels,
+    /// The map that they are of.
+    pub map: &'a V,
+}
+
+impl<V: MapView> TilesetNodes for LevelsOf<'_, V> {
+    fn tops(&self) -> Vec<NodeKey> {
+        self.levels.tops().to_vec()
+    }
+
+    fn version(&self, key: NodeKey) -> Option<u64> {
+        self.levels.get(key).map(|node| node.version)
+    }
+
+    fn is_occupied(&self, key: NodeKey) -> bool {
+        self.levels.get(key).is_some_and(|node| node.is_occupied)
+    }
+
+    fn bounds_m(&self, store: &NodeStore, key: NodeKey) -> Aabb {
+        self.levels.bounds_m(store, key)
+    }
+
+    fn corner_m(&self, key: NodeKey) -> Point {
+        self.levels.corner_m(key)
+    }
+
+    fn voxel_edge_m(&self, level: u8) -> f64 {
+        self.levels.voxel_edge_m(level)
+    }
+
+    fn tile_level(&self) -> u8 {
+        self.levels.scheme.tile_level()
+    }
+
+    fn within_tile(&self, store: &NodeStore, key: NodeKey) -> Result<BTreeSet<NodeKey>> {
+        self.levels.blocks_of_tile(self.map, store, key.index.into())
+    }
+}
+
+fn union(a: &Aabb, b: &Aabb) -> Aabb {
+    Aabb {
+        min: std::array::from_fn(|k| a.min[k].min(b.min[k])),
+        max: std::array::from_fn(|k| a.max[k].max(b.max[k])),
+    }
+}
+
+fn relative(around: &Aabb, origin: Point) -> Aabb {
+    let less = |corner: Point| [0, 1, 2].map(|k| corner[k] - origin[k]);
+    Aabb { min: less(around.min), max: less(around.max) }
+}
+
+fn length(around: &Aabb) -> f64 {
+    (0..3).map(|k| (around.max[k] - around.min[k]).powi(2)).sum::<f64>().sqrt()
+}
+
+/// Center, and half of the three edges as vectors.
+fn box_of(around: &Aabb) -> [f64; 12] {
+    let center = |k: usize| 0.5 * (around.min[k] + around.max[k]);
+    let half = |k: usize| 0.5 * (around.max[k] - around.min[k]);
+    [center(0), center(1), center(2), half(0), 0.0, 0.0, 0.0, half(1), 0.0, 0.0, 0.0, half(2)]
+}

@@ -1,0 +1,242 @@
+use super::cells::{Cell, Cells, Rank};
+use super::frame::Frame;
+use super::options::Picture;
+use super::view::{Change, ColorBy, View};
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, PoisonError};
+use voxtile::mapper::MapView;
+use voxtile::space::{Grid, TileIndex, VoxelBox, VoxelIndex};
+use voxtile::{Error, Result};
+
+/// What is drawn.
+#[derive(Clone, Copy)]
+pub(super) enum Source<'a> {
+    /// A map.
+    One(&'a dyn MapView),
+    /// What became of one on the way to another.
+    Two { before: &'a dyn MapView, after: &'a dyn MapView },
+}
+
+/// The cells of a picture, and which of them are known.
+pub(super) struct Collected {
+    /// `None` if nothing was observed.
+    pub known: Option<Known>,
+    pub is_difference: bool,
+    pub tiles: u64,
+    /// Tiles that could not be read, in order.
+    pub unread: Vec<TileIndex>,
+}
+
+/// Cells, and the box around those in which something is known.
+pub(super) struct Known {
+    pub frame: Frame,
+    pub cells: Cells,
+    pub first: [usize; 2],
+    pub count: [usize; 2],
+}
+
+/// Tiles beyond which the cells are not made finer by a second look.
+const MOST_TILES_READ_TWICE: usize = 4096;
+
+impl Collected {
+    /// Reads all tiles. If the box around what is known turns out to be so much smaller than its tiles that cells can
+    /// be finer, reads them once more.
+    pub fn of(picture: &Picture, source: Source, progress: &(dyn Fn(u64, u64) + Sync)) -> Result<Self> {
+        let mut collector = Collector { picture, source, grid: source.grid(), unread: Mutex::default() };
+        let tiles = collector.tiles();
+        let done =
+            Progress { done: AtomicU64::new(0), all: AtomicU64::new(tiles.len() as u64), tell: progress };
+        let mut known = None;
+        if let Some(voxels) = collector.bounds(&tiles) {
+            known = collector.collect(&tiles, voxels, &done)?;
+        }
+        if let Some(found) = &known {
+            let seen = found.frame.voxels_of(found.first, found.count);
+            let finer = Frame::new(picture.view, seen, picture.most_px);
+            if finer.voxels_a_cell < found.frame.voxels_a_cell && tiles.len() <= MOST_TILES_READ_TWICE {
+                drop(known.take());
+                done.all.fetch_add(tiles.len() as u64, Ordering::Relaxed);
+                known = collector.collect(&tiles, seen, &done)?;
+            }
+        }
+        let unread = collector.unread.get_mut().unwrap_or_else(PoisonError::into_inner);
+        unread.sort_unstable();
+        unread.dedup();
+        Ok(Self {
+            known,
+            is_difference: matches!(source, Source::Two { .. }),
+            tiles: tiles.len() as u64,
+            unread: std::mem::take(unread),
+        })
+    }
+}
+
+struct Progress<'a> {
+    done: AtomicU64,
+    all: AtomicU64,
+    tell: &'a (dyn Fn(u64, u64) + Sync),
+}
+
+impl Progress<'_> {
+    fn step(&self) {
+        let done = 1 + self.done.fetch_add(1, Ordering::Relaxed);
+        (self.tell)(done, self.all.load(Ordering::Relaxed));
+    }
+}
+
+impl Source<'_> {
+    fn grid(self) -> Grid {
+        match self {
+            Self::One(map) => map.config().grid,
+            Self::Two { after, .. } => after.config().grid,
+        }
+    }
+}
+
+struct Collector<'a> {
+    picture: &'a Picture,
+    source: Source<'a>,
+    grid: Grid,
+    unread: Mutex<Vec<TileIndex>>,
+}
+
+impl Collector<'_> {
+    /// The voxels that are asked for.
+    fn wanted(&self) -> VoxelBox {
+        let all = VoxelBox { min: [i32::MIN; 3], end: [i32::MAX; 3] };
+        let mut wanted = self.picture.region.as_ref().map_or(all, |region| self.grid.voxels_in(region));
+        if let View::Slice { z_m, thickness_m } = self.picture.view {
+            let half_m = 0.5 * thickness_m;
+            let [x, y] = [0.0; 2];
+            let layer = voxtile::space::Aabb { min: [x, y, z_m - half_m], max: [x, y, z_m + half_m] };
+            let mut layer = self.grid.voxels_in(&layer);
+            if layer.min[2] >= layer.end[2]
+                && let Some([_, _, z]) = self.grid.voxel_of([x, y, z_m])
+            {
+                (layer.min[2], layer.end[2]) = (z, z.saturating_add(1));
+            }
+            wanted.min[2] = wanted.min[2].max(layer.min[2]);
+            wanted.end[2] = wanted.end[2].min(layer.end[2]);
+        }
+        wanted
+    }
+
+    /// The tiles that have some of these voxels, in order.
+    fn tiles(&self) -> Vec<TileIndex> {
+        let mut tiles = match self.source {
+            Source::One(map) => map.tile_indices(),
+            Source::Two { before, after } => [before.tile_indices(), after.tile_indices()].concat(),
+        };
+        let wanted = self.wanted();
+        tiles.retain(|&tile| !self.grid.voxels_of_tile(tile).intersection(&wanted).is_empty());
+        tiles.sort_unstable();
+        tiles.dedup();
+        tiles
+    }
+
+    fn bounds(&self, tiles: &[TileIndex]) -> Option<VoxelBox> {
+        let wanted = self.wanted();
+        let boxes = tiles.iter().map(|&tile| self.grid.voxels_of_tile(tile).intersection(&wanted));
+        boxes.reduce(|a, b| VoxelBox {
+            min: std::array::from_fn(|k| a.min[k].min(b.min[k])),
+            end: std::array::from_fn(|k| a.end[k].max(b.end[k])),
+        })
+    }
+
+    fn collect(&self, tiles: &[TileIndex], voxels: VoxelBox, progress: &Progress) -> Result<Option<Known>> {
+        let frame = Frame::new(self.picture.view, voxels, self.picture.most_px);
+        let cells = Cells::new(frame.cells[0] * frame.cells[1]);
+        let outcomes = tiles.par_iter().map(|&tile| {
+            let added = match self.source {
+                Source::One(map) => self.add(map, tile, &frame, &cells),
+                Source::Two { before, after } => self.add_difference(before, after, tile, &frame, &cells),
+            };
+            progress.step();
+            added.or_else(|error| self.skip(tile, error))
+        });
+        // The first in order, so that the error is the same for any number of threads.
+        if let Some(failed) = outcomes.find_first(Result::is_err) {
+            failed?;
+        }
+        let seen = seen(&frame, &cells);
+        Ok(seen.map(|(first, count)| Known { frame, cells, first, count }))
+    }
+
+    fn skip(&self, tile: TileIndex, error: Error) -> Result<()> {
+        if !self.picture.skips_unreadable || !matches!(error, Error::Damaged { .. } | Error::Io { .. }) {
+            return Err(error);
+        }
+        self.unread.lock().unwrap_or_else(PoisonError::into_inner).push(tile);
+        Ok(())
+    }
+
+    fn add(&self, map: &dyn MapView, index: TileIndex, frame: &Frame, cells: &Cells) -> Result<()> {
+        let Some(tile) = map.tile_uncached(index)? else { return Ok(()) };
+        let (view, resolution_m) = (self.picture.view, self.grid.resolution_m());
+        let occupied_from = map.config().occupied_log_odds();
+        let last_scan = map.last_scan_of_tile_hint(index).unwrap_or_default() as f32;
+        for voxel in tile.voxels().filter(|voxel| frame.voxels.contains(voxel.index)) {
+            let evidence = voxel.evidence;
+            let is_occupied = evidence.log_odds >= occupied_from;
+            let value = match self.picture.color_by {
+                ColorBy::Count => evidence.observation_count as f32,
+                ColorBy::LastScan => last_scan,
+                _ if !is_occupied => 0.0,
+                ColorBy::Height => ((f64::from(voxel.index[2]) + 0.5) * resolution_m) as f32,
+                ColorBy::Probability => evidence.probability() as f32,
+            };
+            let rank = if is_occupied { Rank::Occupied } else { Rank::Free };
+            cells.add(frame.place_of(voxel.index), Cell { rank, value, near: view.nearness(voxel.index) });
+        }
+        Ok(())
+    }
+
+    fn add_difference(
+        &self,
+        before: &dyn MapView,
+        after: &dyn MapView,
+        index: TileIndex,
+        frame: &Frame,
+        cells: &Cells,
+    ) -> Result<()> {
+        let maps = [before, after];
+        let tiles = [before.tile_uncached(index)?, after.tile_uncached(index)?];
+        let occupied_from = maps.map(|map| map.config().occupied_log_odds());
+        let is_occupied = |side: usize, voxel: VoxelIndex| {
+            let evidence = tiles[side].as_ref().and_then(|tile| tile.evidence(voxel));
+            evidence.is_some_and(|evidence| evidence.log_odds >= occupied_from[side])
+        };
+        for (side, tile) in tiles.iter().enumerate() {
+            for voxel in tile.iter().flat_map(|tile| tile.voxels()) {
+                if !frame.voxels.contains(voxel.index) {
+                    continue;
+                }
+                let here = voxel.evidence.log_odds >= occupied_from[side];
+                // What is free here is on the other side's list if it is occupied there.
+                let rank = match (here, here && is_occupied(1 - side, voxel.index)) {
+                    (false, _) => Rank::Free,
+                    (true, true) => Rank::Changed(Change::Same),
+                    (true, false) if side == 0 => Rank::Changed(Change::Vanished),
+                    (true, false) => Rank::Changed(Change::Appeared),
+                };
+                let near = self.picture.view.nearness(voxel.index);
+                cells.add(frame.place_of(voxel.index), Cell { rank, value: 0.0, near });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// First cell and number of cells of the box around all that is known; `None` if nothing is.
+fn seen(frame: &Frame, cells: &Cells) -> Option<([usize; 2], [usize; 2])> {
+    let (mut low, mut high) = (frame.cells, [0; 2]);
+    for (place, cell) in cells.iter().enumerate() {
+        if cell.rank > Rank::Unknown {
+            let at = [place % frame.cells[0], place / frame.cells[0]];
+            low = std::array::from_fn(|k| low[k].min(at[k]));
+            high = std::array::from_fn(|k| high[k].max(at[k]));
+        }
+    }
+    (low[0] <= high[0]).then(|| (low, std::array::from_fn(|k| high[k] + 1 - low[k])))
+}

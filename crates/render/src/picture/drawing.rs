@@ -1,0 +1,352 @@
+use super::canvas::Canvas;
+use super::cells::{Cell, Rank};
+use super::collect::{Collected, Known};
+use super::font;
+use super::image::Image;
+use super::legend::{Legend, Scale};
+use super::options::Picture;
+use super::palette::{self, Rgb, color_of, lit, mixed};
+use super::view::{Change, ColorBy};
+use voxtile::space::{Aabb, Grid, TileIndex};
+
+/// A picture, and what it shows.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct Drawn {
+    /// The pixels.
+    pub image: Image,
+    /// Upper left pixel of the map, and its width and height: margins are left out.
+    pub map_px: [usize; 4],
+    /// What the map's part of the image covers in metres; along the line of sight, what was looked at. `None` if there
+    /// was nothing to draw.
+    pub region_m: Option<Aabb>,
+    /// Edge of a cell in metres: one voxel or several.
+    pub cell_m: f64,
+    /// Edge of a cell in pixels.
+    pub cell_px: usize,
+    /// What the first and the last color stand for; `None` for a difference, and where nothing is occupied.
+    pub range: Option<[f64; 2]>,
+    /// Cells in which something is occupied, in either state for a difference.
+    pub solid_cells: u64,
+    /// Cells in which something was observed.
+    pub known_cells: u64,
+    /// Tiles that were looked at.
+    pub tiles: u64,
+    /// Tiles that could not be read and are missing.
+    pub unread: Vec<TileIndex>,
+}
+
+/// The part of the picture that shows the map: which cells, and where.
+struct Pane {
+    first: [usize; 2],
+    cells: [usize; 2],
+    /// Pixels along a cell's edge.
+    zoom: usize,
+    left: usize,
+    top: usize,
+}
+
+/// Cells turned into pixels.
+pub(super) struct Drawing<'a> {
+    picture: &'a Picture,
+    grid: Grid,
+    collected: Collected,
+    range: Option<[f64; 2]>,
+}
+
+/// The legend needs this width.
+const LEAST_WIDTH: usize = 760;
+/// Pixels of a voxel in a picture of few.
+const LARGEST_ZOOM: usize = 48;
+/// Where there is nothing to draw.
+const EMPTY_SIZE: [usize; 2] = [LEAST_WIDTH, 240];
+
+impl Pane {
+    fn size(&self) -> [usize; 2] {
+        self.cells.map(|n| n * self.zoom)
+    }
+
+    /// Upper left pixel of a cell: rows count down.
+    fn pixel(&self, [across, up]: [usize; 2]) -> [usize; 2] {
+        let row = self.cells[1] - 1 - (up - self.first[1]);
+        [self.left + (across - self.first[0]) * self.zoom, self.top + row * self.zoom]
+    }
+
+    /// The pixel of a position in cells, if it is inside.
+    fn pixel_of(&self, position: [f64; 2]) -> Option<[usize; 2]> {
+        let at: [f64; 2] = std::array::from_fn(|k| (position[k] - self.first[k] as f64) * self.zoom as f64);
+        let size = self.size();
+        let is_inside = (0..2).all(|k| at[k] >= 0.0 && at[k] < size[k] as f64);
+        is_inside.then(|| [self.left + at[0] as usize, self.top + size[1] - 1 - at[1] as usize])
+    }
+}
+
+impl<'a> Drawing<'a> {
+    pub fn new(picture: &'a Picture, grid: Grid, collected: Collected) -> Self {
+        let mut drawing = Self { picture, grid, collected, range: None };
+        drawing.range = drawing.range();
+        drawing
+    }
+
+    pub fn draw(mut self) -> Drawn {
+        let Some(known) = self.collected.known.take() else { return self.draw_nothing() };
+        let (first, cells) = with_air(&known);
+        let most_px = self.picture.most_px;
+        let zoom = (0..2).map(|k| most_px[k] / cells[k]).min().unwrap_or(1).clamp(1, LARGEST_ZOOM);
+        let size = cells.map(|n| n * zoom);
+        let layout = Layout::of(self.picture, size);
+        let pane = Pane { first, cells, zoom, left: layout.left, top: layout.top };
+        let mut canvas = Canvas::new(layout.width, layout.height, palette::UNKNOWN);
+        self.draw_cells(&mut canvas, &known, &pane);
+        let cell_m = known.frame.voxels_a_cell as f64 * self.grid.resolution_m();
+        let pixels_a_metre = zoom as f64 / cell_m;
+        let lines_m = self.picture.has_grid.then(|| self.line_spacing_m(pixels_a_metre));
+        if let Some(every_m) = lines_m {
+            self.draw_tile_lines(&mut canvas, &known, &pane, every_m);
+        }
+        self.draw_path(&mut canvas, &known, &pane, layout.dot);
+        if self.picture.has_legend {
+            canvas.text(layout.margin, layout.margin, layout.dot, palette::INK, &self.title(&layout));
+            let legend = Legend {
+                metres_a_pixel: 1.0 / pixels_a_metre,
+                lines_m,
+                axes: self.picture.view.axes(),
+                has_path: !self.picture.path.is_empty(),
+                scale: self.scale(),
+            };
+            legend.draw(&mut canvas, layout.foot, layout.dot);
+        }
+        let voxels = known.frame.voxels_of(first, cells);
+        let corner_m = |voxel: [i32; 3]| voxel.map(|index| self.grid.corner_m(index));
+        let count = |from: Rank| known.cells.iter().filter(|cell| cell.rank >= from).count() as u64;
+        Drawn {
+            image: canvas.into_image(),
+            map_px: [pane.left, pane.top, size[0], size[1]],
+            region_m: Some(Aabb { min: corner_m(voxels.min), max: corner_m(voxels.end) }),
+            cell_m,
+            cell_px: zoom,
+            range: self.range.filter(|_| !self.collected.is_difference),
+            solid_cells: count(Rank::Occupied),
+            known_cells: count(Rank::Free),
+            tiles: self.collected.tiles,
+            unread: self.collected.unread,
+        }
+    }
+
+    /// A map without a voxel, or a region of it.
+    fn draw_nothing(self) -> Drawn {
+        let size = if self.picture.has_legend { EMPTY_SIZE } else { [1; 2] };
+        let mut canvas = Canvas::new(size[0], size[1], palette::UNKNOWN);
+        if self.picture.has_legend {
+            canvas.text(20, 20, 2, palette::INK, &self.picture.title);
+            let text = "nothing was observed here";
+            let left = (size[0] - 2 * font::width_of(text)) / 2;
+            canvas.text(left, size[1] / 2, 2, palette::FAINT_INK, text);
+        }
+        Drawn {
+            image: canvas.into_image(),
+            map_px: [0; 4],
+            region_m: None,
+            cell_m: self.grid.resolution_m(),
+            cell_px: 1,
+            range: None,
+            solid_cells: 0,
+            known_cells: 0,
+            tiles: self.collected.tiles,
+            unread: self.collected.unread,
+        }
+    }
+
+    fn title(&self, layout: &Layout) -> String {
+        let letters = (layout.width - 2 * layout.margin) / (font::ADVANCE * layout.dot);
+        self.picture.title.chars().take(letters).collect()
+    }
+
+    fn scale(&self) -> Scale {
+        match self.range {
+            _ if self.collected.is_difference => Scale::Change,
+            range => Scale::Values { color_by: self.picture.color_by, range },
+        }
+    }
+
+    /// What the first and the last color stand for: one cell in a hundred may lie outside either.
+    ///
+    /// Probabilities always span the same range, so that two pictures can be compared.
+    fn range(&self) -> Option<[f64; 2]> {
+        let known = self.collected.known.as_ref()?;
+        let least = match self.picture.color_by {
+            ColorBy::Probability => return Some([0.5, 1.0]),
+            ColorBy::Height => Rank::Occupied,
+            ColorBy::Count | ColorBy::LastScan => Rank::Free,
+        };
+        let cells = known.cells.iter().filter(|cell| cell.rank >= least);
+        let mut values: Vec<f32> = cells.map(|cell| cell.value).collect();
+        values.sort_unstable_by(f32::total_cmp);
+        let (least, most) = (values.get(values.len() / 100)?, values.get(values.len() * 99 / 100)?);
+        let apart = if self.picture.color_by == ColorBy::Height { 0.01 } else { 1.0 };
+        Some([f64::from(*least), f64::from(*most).max(f64::from(*least) + apart)])
+    }
+
+    fn draw_cells(&self, canvas: &mut Canvas, known: &Known, pane: &Pane) {
+        for up in pane.first[1]..pane.first[1] + pane.cells[1] {
+            for across in pane.first[0]..pane.first[0] + pane.cells[0] {
+                let cell = known.cell([across, up]);
+                let Some(color) = self.color(cell) else { continue };
+                let light =
+                    if cell.rank.is_solid() { self.light(known, [across, up], cell.near) } else { 1.0 };
+                let [left, top] = pane.pixel([across, up]);
+                canvas.fill(left, top, [pane.zoom; 2], lit(color, light), 1.0);
+            }
+        }
+    }
+
+    /// The color of a cell before light falls on it; `None` if nothing is known of it.
+    fn color(&self, cell: Cell) -> Option<Rgb> {
+        let value_color = || {
+            let [least, most] = self.range.unwrap_or([0.0, 1.0]);
+            let value = f64::from(cell.value);
+            color_of(match self.picture.color_by {
+                // Most voxels are seen a few times, and some very often.
+                ColorBy::Count => ((value + 1.0) / (least + 1.0)).ln() / ((most + 1.0) / (least + 1.0)).ln(),
+                _ => (value - least) / (most - least),
+            })
+        };
+        match cell.rank {
+            Rank::Unknown => None,
+            Rank::Changed(Change::Same) => Some(palette::SAME),
+            Rank::Changed(Change::Vanished) => Some(palette::VANISHED),
+            Rank::Changed(Change::Appeared) => Some(palette::APPEARED),
+            Rank::Occupied => Some(value_color()),
+            Rank::Free => match self.picture.color_by {
+                _ if self.collected.is_difference => Some(palette::FREE),
+                ColorBy::Height | ColorBy::Probability => Some(palette::FREE),
+                ColorBy::Count | ColorBy::LastScan => Some(mixed(palette::UNKNOWN, value_color(), 0.4)),
+            },
+        }
+    }
+
+    /// Light from the upper left: an edge that faces it is brighter, one that looks away is darker.
+    fn light(&self, known: &Known, [across, up]: [usize; 2], near: i32) -> f64 {
+        let rise_m = |at: [usize; 2]| {
+            let other = known.cell(at);
+            let rise = f64::from(near) - f64::from(other.near);
+            if other.rank.is_solid() { (rise * self.grid.resolution_m()).clamp(-2.0, 2.0) } else { 0.0 }
+        };
+        let left_m = if across > 0 { rise_m([across - 1, up]) } else { 0.0 };
+        let above_m = if up + 1 < known.frame.cells[1] { rise_m([across, up + 1]) } else { 0.0 };
+        (1.0 + 0.1 * (left_m + above_m)).clamp(0.72, 1.22)
+    }
+
+    fn draw_tile_lines(&self, canvas: &mut Canvas, known: &Known, pane: &Pane, every_m: f64) {
+        let (size, frame) = (pane.size(), &known.frame);
+        let every = ((every_m / self.grid.resolution_m()).round() as i64).max(1);
+        for (k, axis) in frame.view.axes().into_iter().enumerate() {
+            let low = i64::from(frame.voxels.min[axis]) + pane.first[k] as i64 * frame.voxels_a_cell;
+            let end = low + pane.cells[k] as i64 * frame.voxels_a_cell;
+            let first = low.div_euclid(every) * every;
+            let lines = std::iter::successors(Some(first), |line| Some(line + every));
+            for line in lines.skip_while(|&line| line < low).take_while(|&line| line <= end) {
+                let at =
+                    ((line - low) as f64 / frame.voxels_a_cell as f64 * pane.zoom as f64).round() as usize;
+                if k == 0 {
+                    let left = pane.left + at.min(size[0] - 1);
+                    canvas.fill(left, pane.top, [1, size[1]], palette::TILE_LINE, 0.2);
+                } else {
+                    let row = size[1].saturating_sub(at.max(1));
+                    canvas.fill(pane.left, pane.top + row, [size[0], 1], palette::TILE_LINE, 0.2);
+                }
+            }
+        }
+    }
+
+    /// Metres from one line to the next: a tile, or ten, a hundred of them where lines would be a haze over the map.
+    fn line_spacing_m(&self, pixels_a_metre: f64) -> f64 {
+        let mut every_m = self.grid.tile_size_m();
+        while every_m * pixels_a_metre < 16.0 {
+            every_m *= 10.0;
+        }
+        every_m
+    }
+
+    /// The sensor's way as a line. Where it jumps, as from one recording to the next, there is a gap.
+    fn draw_path(&self, canvas: &mut Canvas, known: &Known, pane: &Pane, dot: usize) {
+        let resolution_m = self.grid.resolution_m();
+        let positions: Vec<[f64; 2]> =
+            self.picture.path.iter().map(|&place| known.frame.position_of(place, resolution_m)).collect();
+        let length = |pair: &[[f64; 2]]| (pair[1][0] - pair[0][0]).hypot(pair[1][1] - pair[0][1]);
+        let mut steps: Vec<f64> = positions.windows(2).map(length).collect();
+        steps.sort_unstable_by(f64::total_cmp);
+        let usual = steps.get(steps.len() / 2).copied().unwrap_or_default();
+        let longest = 8.0 * usual.max(2.0 / pane.zoom as f64);
+        let mut middles: Vec<[usize; 2]> =
+            positions.first().and_then(|&at| pane.pixel_of(at)).into_iter().collect();
+        for pair in positions.windows(2) {
+            let length = length(pair);
+            // A pixel a step, and no more than the longest line inside of the picture has.
+            let parts =
+                (length * pane.zoom as f64).ceil().clamp(1.0, 4.0 * super::options::MOST_PX as f64) as usize;
+            let parts = if length <= longest { parts } else { 1 };
+            for part in 1..=parts {
+                let share = part as f64 / parts as f64;
+                let at = std::array::from_fn(|k| pair[0][k] * (1.0 - share) + pair[1][k] * share);
+                if let Some(pixel) = pane.pixel_of(at)
+                    && middles.last() != Some(&pixel)
+                {
+                    middles.push(pixel);
+                }
+            }
+        }
+        // A pixel that is passed often is drawn once: a day of standing still costs nothing.
+        middles.sort_unstable();
+        middles.dedup();
+        let pixels_a_metre = pane.zoom as f64 / (known.frame.voxels_a_cell as f64 * resolution_m);
+        // As wide as a street lane needs, and no wider: on a large map it would hide the streets.
+        let most = if self.picture.has_legend { dot + 1 } else { 1 };
+        let radius = ((0.2 * pixels_a_metre) as usize).clamp(usize::from(self.picture.has_legend), most);
+        let color = if self.collected.is_difference { palette::INK } else { palette::PATH };
+        canvas.path(middles.into_iter(), radius, color);
+    }
+}
+
+impl Known {
+    fn cell(&self, [across, up]: [usize; 2]) -> Cell {
+        self.cells.at(across + up * self.frame.cells[0])
+    }
+}
+
+/// The cells to show: all that are known, with a little air.
+fn with_air(known: &Known) -> ([usize; 2], [usize; 2]) {
+    let air = known.count[0].max(known.count[1]) / 60;
+    let first: [usize; 2] = std::array::from_fn(|k| known.first[k].saturating_sub(air));
+    let end = |k: usize| (known.first[k] + known.count[k] + air).min(known.frame.cells[k]);
+    (first, std::array::from_fn(|k| end(k) - first[k]))
+}
+
+/// Where everything is, in pixels.
+struct Layout {
+    width: usize,
+    height: usize,
+    margin: usize,
+    left: usize,
+    top: usize,
+    /// Where the legend begins.
+    foot: usize,
+    /// Pixels of a letter's dot.
+    dot: usize,
+}
+
+impl Layout {
+    fn of(picture: &Picture, size: [usize; 2]) -> Self {
+        if !picture.has_legend {
+            let [width, height] = size;
+            return Self { width, height, margin: 0, left: 0, top: 0, foot: height, dot: 1 };
+        }
+        let inner = size[0].max(LEAST_WIDTH);
+        let dot = (inner / 480).clamp(2, 5);
+        let margin = 10 * dot;
+        let width = inner + 2 * margin;
+        let top = 2 * margin + font::HEIGHT * dot;
+        let foot = top + size[1] + margin;
+        Self { width, height: foot + 24 * dot + margin, margin, left: (width - size[0]) / 2, top, foot, dot }
+    }
+}

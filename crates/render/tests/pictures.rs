@@ -1,0 +1,291 @@
+use std::sync::Mutex;
+use voxtile::mapper::{MapStatistics, MapView, TileRef};
+use voxtile::scan::PointBatch;
+use voxtile::space::{Aabb, Point, TileBox};
+use voxtile::{InMemoryMapper, MapConfig, Mapper, Result, Scan, TileIndex};
+use voxtile_render::{ColorBy, Drawn, Image, Picture, SideAxis, Survey, View, colors};
+
+const RESOLUTION_M: f64 = 0.5;
+
+/// A map of single observations: the voxels of these centers, occupied or free.
+fn map_of(occupied: &[Point], free: &[Point]) -> InMemoryMapper {
+    let mut map = InMemoryMapper::new(MapConfig::new(RESOLUTION_M, 4.0).unwrap()).unwrap();
+    for (points, is_occupied) in [(occupied, true), (free, false)] {
+        let is_occupied = vec![is_occupied; points.len()];
+        map.batch_update(&PointBatch { points, intensities: None, is_occupied: &is_occupied }).unwrap();
+    }
+    map
+}
+
+/// A wall of 12 voxels along x and 4 along z, with a free voxel in front of each end.
+fn wall() -> InMemoryMapper {
+    let mut wall = Vec::new();
+    for x in 0..12 {
+        for z in 0..4 {
+            wall.push(center([x, 3, z]));
+        }
+    }
+    map_of(&wall, &[center([0, 0, 0]), center([11, 0, 0])])
+}
+
+fn center(voxel: [i32; 3]) -> Point {
+    voxel.map(|index| (f64::from(index) + 0.5) * RESOLUTION_M)
+}
+
+/// Cells as pixels: no margin, no grid.
+fn plain() -> Picture {
+    Picture::new().with_legend(false).with_grid(false).with_size_px([240; 2])
+}
+
+fn draw(picture: &Picture, map: &impl MapView) -> Drawn {
+    picture.draw(map, |_, _| {}).unwrap()
+}
+
+/// The color in the middle of a cell, counted from the lower left.
+fn cell(drawn: &Drawn, [across, up]: [usize; 2]) -> [u8; 3] {
+    let [left, top, _, height] = drawn.map_px;
+    let half = drawn.cell_px / 2;
+    drawn
+        .image
+        .pixel(left + across * drawn.cell_px + half, top + height - 1 - up * drawn.cell_px - half)
+        .unwrap()
+}
+
+#[test]
+fn a_wall_from_above_is_where_it_is() {
+    let drawn = draw(&plain(), &wall());
+    assert_eq!((drawn.cell_px, drawn.cell_m), (20, RESOLUTION_M));
+    assert_eq!(drawn.region_m.unwrap().max[..2], [6.0, 2.0]);
+    assert_eq!((drawn.image.width_px(), drawn.image.height_px()), (240, 80));
+    assert_eq!((drawn.solid_cells, drawn.known_cells), (12, 14));
+    for x in 0..12 {
+        // One height has one color: that of the lowest.
+        assert_eq!(cell(&drawn, [x, 3]), colors::color_of(0.0), "{x}");
+        let below = if x == 0 || x == 11 { colors::FREE } else { colors::UNKNOWN };
+        assert_eq!(cell(&drawn, [x, 0]), below, "{x}");
+        assert_eq!(cell(&drawn, [x, 1]), colors::UNKNOWN);
+    }
+}
+
+#[test]
+fn a_wall_from_the_side_rises_in_color() {
+    let drawn = draw(&plain().with_view(View::Side(SideAxis::X)), &wall());
+    assert_eq!((drawn.image.width_px(), drawn.image.height_px()), (240, 80));
+    assert_eq!(drawn.range.unwrap(), [0.25, 1.75]);
+    for z in 0..4 {
+        assert_eq!(cell(&drawn, [5, z]), colors::color_of(z as f64 / 3.0), "{z}");
+    }
+    // From the other side the wall is a line, and what is free lies beside it.
+    let drawn = draw(&plain().with_view(View::Side(SideAxis::Y)), &wall());
+    assert_eq!(cell(&drawn, [3, 3]), colors::color_of(1.0));
+    assert_eq!(cell(&drawn, [0, 0]), colors::FREE);
+    assert_eq!(cell(&drawn, [0, 1]), colors::UNKNOWN);
+}
+
+#[test]
+fn a_slice_cuts_what_is_above_and_below() {
+    let map = map_of(&[center([0, 0, 0]), center([1, 0, 1]), center([2, 0, 2]), center([3, 0, 3])], &[]);
+    let known = |z_m, thickness_m| {
+        let drawn = draw(&plain().with_view(View::Slice { z_m, thickness_m }), &map);
+        let region = drawn.region_m.unwrap();
+        (region.min[0], region.max[0])
+    };
+    assert_eq!(known(0.6, 0.0), (0.5, 1.0));
+    assert_eq!(known(0.5, 0.0), (0.5, 1.0));
+    assert_eq!(known(1.0, 1.0), (0.5, 1.5));
+    let none = draw(&plain().with_view(View::Slice { z_m: 9.0, thickness_m: 0.0 }), &map);
+    assert!(none.region_m.is_none() && none.solid_cells == 0);
+    for view in [View::Slice { z_m: f64::NAN, thickness_m: 0.0 }, View::Slice { z_m: 0.0, thickness_m: -1.0 }]
+    {
+        let error = plain().with_view(view).draw(&map, |_, _| {}).unwrap_err();
+        assert_eq!(error.kind(), "invalid_argument");
+    }
+}
+
+#[test]
+fn a_region_is_all_that_is_drawn() {
+    let region = Aabb { min: [1.0, 1.5, 0.0], max: [2.5, 2.0, 0.5] };
+    let drawn = draw(&plain().with_region(region), &wall());
+    let drawn_region = drawn.region_m.unwrap();
+    assert_eq!(
+        (drawn_region.min[..2].to_vec(), drawn_region.max[..2].to_vec()),
+        (vec![1.0, 1.5], vec![2.5, 2.0])
+    );
+    assert_eq!(drawn.solid_cells, 3);
+    assert_eq!(drawn.range.unwrap()[0], 0.25);
+}
+
+#[test]
+fn what_changed_has_a_color_of_its_own() {
+    let places: Vec<Point> = (0..3).map(|x| center([2 * x, 0, 0])).collect();
+    let before = map_of(&places[..2], &[]);
+    let after = map_of(&places[1..], &places[..1]);
+    let drawn = plain().draw_difference(&before, &after, |_, _| {}).unwrap();
+    let found = [0, 2, 4].map(|x| cell(&drawn, [x, 0]));
+    assert_eq!(found, [colors::VANISHED, colors::SAME, colors::APPEARED]);
+    let back = plain().draw_difference(&after, &before, |_, _| {}).unwrap();
+    assert_eq!(cell(&back, [0, 0]), colors::APPEARED);
+    let other = InMemoryMapper::new(MapConfig::new(0.25, 4.0).unwrap()).unwrap();
+    let error = plain().draw_difference(&before, &other, |_, _| {}).unwrap_err().to_string();
+    assert!(error.contains("0.25") && error.contains("0.5"), "{error}");
+}
+
+#[test]
+fn the_way_of_the_sensor_is_a_line() {
+    let path = vec![center([1, 1, 0]), center([3, 1, 0]), center([5, 1, 0])];
+    let drawn = draw(&plain().with_path(path), &wall());
+    for x in 1..=5 {
+        assert_eq!(cell(&drawn, [x, 1]), colors::PATH, "{x}");
+    }
+    assert_eq!(cell(&drawn, [6, 1]), colors::UNKNOWN);
+    // What lies outside is left out, also what is no number.
+    let stray = vec![[f64::NAN; 3], [1e300; 3], [-1e9, 0.0, 0.0], [f64::INFINITY, 1.0, 1.0]];
+    let stray = draw(&plain().with_path(stray), &wall());
+    assert_eq!(stray.image, draw(&plain(), &wall()).image);
+}
+
+#[test]
+fn probability_and_count_have_scales_of_their_own() {
+    let twice = [center([0, 0, 0]), center([0, 0, 0]), center([1, 0, 0])];
+    let map = map_of(&twice, &[]);
+    let drawn = draw(&plain().with_color(ColorBy::Probability), &map);
+    assert_eq!(drawn.range.unwrap(), [0.5, 1.0]);
+    let [often, once] = [0, 1].map(|x| cell(&drawn, [x, 0]));
+    assert_ne!(often, once);
+    let drawn = draw(&plain().with_color(ColorBy::Count), &map);
+    assert_eq!(drawn.range.unwrap(), [1.0, 2.0]);
+    assert_eq!([0, 1].map(|x| cell(&drawn, [x, 0])), [colors::color_of(1.0), colors::color_of(0.0)]);
+}
+
+#[test]
+fn any_map_has_a_picture() {
+    let nothing = InMemoryMapper::new(MapConfig::new(0.1, 10.0).unwrap()).unwrap();
+    let one = map_of(&[center([-70_000, 9, 4])], &[]);
+    let far = map_of(&[center([0; 3]), center([2_000_000_000, 0, 7])], &[]);
+    for picture in [Picture::new(), plain(), Picture::new().with_size_px([0; 2])] {
+        for map in [&nothing, &one, &far] {
+            let Drawn { image, .. } = draw(&picture.clone().with_title("é <& 漢"), map);
+            assert!(image.width_px() > 0 && image.width_px() < 3000 && image.height_px() < 3000);
+            assert_eq!(image.rgba().len(), 4 * image.width_px() * image.height_px());
+        }
+    }
+    assert_eq!(draw(&plain(), &one).solid_cells, 1);
+    assert_eq!(draw(&plain(), &far).solid_cells, 2);
+}
+
+/// Scattered scans over many tiles.
+fn survey_map() -> InMemoryMapper {
+    let mut map = InMemoryMapper::new(MapConfig::new(0.2, 2.0).unwrap().with_range(0.0, 30.0)).unwrap();
+    for scan in 0..6 {
+        let angle = |k: i32| f64::from(k) * 0.7 + f64::from(scan);
+        let points = (0..400).map(|k| {
+            let far = 4.0 + f64::from(k % 37) * 0.5;
+            [far * angle(k).cos(), far * angle(k).sin(), f64::from(k % 11) * 0.3]
+        });
+        let origin = [f64::from(scan), 0.0, 1.0];
+        map.insert_scan(&Scan { origin, points: points.collect(), intensities: None }).unwrap();
+    }
+    map
+}
+
+#[test]
+fn the_picture_does_not_depend_on_threads() {
+    let map = survey_map();
+    let with_threads = |threads: usize| -> Vec<Image> {
+        let pool = rayon_pool(threads);
+        pool.install(|| {
+            let views = [View::Above, View::Side(SideAxis::X), View::Slice { z_m: 1.0, thickness_m: 0.5 }];
+            let colors = [ColorBy::Height, ColorBy::Probability, ColorBy::Count];
+            let pictures = views.into_iter().zip(colors).map(|(view, color)| {
+                draw(&Picture::new().with_view(view).with_color(color).with_size_px([90; 2]), &map).image
+            });
+            pictures.collect()
+        })
+    };
+    let one = with_threads(1);
+    for threads in [2, 5, 16] {
+        assert!(with_threads(threads) == one, "{threads} threads");
+    }
+}
+
+fn rayon_pool(threads: usize) -> rayon::ThreadPool {
+    rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap()
+}
+
+/// A map that knows how many of its tiles were out at once.
+struct Counting<'a> {
+    map: &'a InMemoryMapper,
+    asked: Mutex<u64>,
+}
+
+impl MapView for Counting<'_> {
+    fn config(&self) -> &MapConfig {
+        self.map.config()
+    }
+    fn scan_number(&self) -> u64 {
+        self.map.scan_number()
+    }
+    fn tile_indices(&self) -> Vec<TileIndex> {
+        self.map.tile_indices()
+    }
+    fn tile_bounds(&self) -> Option<TileBox> {
+        self.map.tile_bounds()
+    }
+    fn has_tile(&self, index: TileIndex) -> bool {
+        self.map.has_tile(index)
+    }
+    fn cached_tile_indices(&self) -> Vec<TileIndex> {
+        Vec::new()
+    }
+    fn tile(&self, _: TileIndex) -> Result<Option<TileRef<'_>>> {
+        panic!("a picture pushes no tile out of a cache")
+    }
+    fn tile_uncached(&self, index: TileIndex) -> Result<Option<TileRef<'_>>> {
+        *self.asked.lock().unwrap() += 1;
+        self.map.tile_uncached(index)
+    }
+    fn voxels_of_tile_hint(&self, index: TileIndex) -> Option<u64> {
+        self.map.voxels_of_tile_hint(index)
+    }
+    fn last_scan_of_tile_hint(&self, index: TileIndex) -> Option<u64> {
+        Some(index.to_array()[0].unsigned_abs().into())
+    }
+    fn statistics(&self) -> MapStatistics {
+        MapStatistics::default()
+    }
+}
+
+#[test]
+fn tiles_outside_of_what_is_drawn_are_not_read() {
+    let map = survey_map();
+    let counting = Counting { map: &map, asked: Mutex::new(0) };
+    let region = Aabb { min: [0.1, 0.1, 0.1], max: [1.9, 1.9, 1.9] };
+    let drawn = draw(&plain().with_region(region), &counting);
+    assert_eq!((drawn.tiles, *counting.asked.lock().unwrap()), (1, 1));
+    let by_scan = draw(&plain().with_color(ColorBy::LastScan), &counting);
+    assert!(by_scan.range.unwrap()[1] > 1.0);
+    let error = plain().with_color(ColorBy::LastScan).draw(&map, |_, _| {}).unwrap_err();
+    assert!(error.to_string().contains("scan"), "{error}");
+}
+
+#[test]
+fn a_survey_counts_what_the_map_holds() {
+    let map = survey_map();
+    let survey = Survey::of(&map, |_, _| {}).unwrap();
+    let (mut voxels, mut occupied, mut columns) = (0, 0, std::collections::BTreeSet::new());
+    let threshold = map.config().occupied_log_odds();
+    for tile in map.tiles() {
+        for voxel in tile.unwrap().voxels() {
+            voxels += 1;
+            occupied += u64::from(voxel.evidence.log_odds >= threshold);
+            columns.insert([voxel.index[0], voxel.index[1]]);
+        }
+    }
+    assert_eq!((survey.voxels, survey.occupied, survey.columns), (voxels, occupied, columns.len() as u64));
+    assert_eq!(survey.probabilities.iter().sum::<u64>(), voxels);
+    assert_eq!(survey.heights.iter().map(|bin| bin.occupied).sum::<u64>(), occupied);
+    assert!(survey.heights.windows(2).all(|pair| (pair[0].to_m - pair[1].from_m).abs() < 1e-9));
+    assert!((survey.area_m2 - 0.04 * columns.len() as f64).abs() < 1e-6);
+    let nothing = InMemoryMapper::new(MapConfig::new(0.1, 10.0).unwrap()).unwrap();
+    assert_eq!(Survey::of(&nothing, |_, _| {}).unwrap(), Survey::default());
+}

@@ -1,0 +1,230 @@
+use crate::cloud::Cloud;
+use crate::counters::Counters;
+use crate::when_behind::WhenBehind;
+use std::collections::VecDeque;
+use voxtile_formats::clouds::RigidPose;
+
+/// Clouds that wait, oldest first, in a bounded number of bytes. Decoded points count from the beginning, and those of
+/// the cloud that was taken until the next one is: so all of them have room, whenever they are mapped.
+#[derive(Debug)]
+pub struct CloudQueue {
+    clouds: VecDeque<Cloud>,
+    bytes: usize,
+    /// How many of them are of the cloud that was taken.
+    taken_bytes: usize,
+    most_bytes: usize,
+    when_behind: WhenBehind,
+    /// By topic: whether the last one was left out.
+    was_thinned: Vec<bool>,
+}
+
+/// What is said of a cloud that waits.
+#[derive(Debug, PartialEq)]
+pub enum Verdict<P> {
+    /// It can be mapped, with this pose.
+    Ready(P),
+    /// Not yet; nor may later ones of its topic pass it.
+    Waits,
+    /// It never will.
+    Hopeless,
+}
+
+/// What a cloud takes beside its bytes: no flood of empty ones is free.
+const CLOUD_BYTES: usize = 256;
+/// Of a flood of clouds only the first ones get poses before they are mapped.
+const MOST_SETTLED: usize = 1000;
+
+impl CloudQueue {
+    pub fn new(most_bytes: usize, topics: usize, when_behind: WhenBehind) -> Self {
+        let (clouds, was_thinned) = (VecDeque::new(), vec![false; topics]);
+        Self { clouds, bytes: 0, taken_bytes: 0, most_bytes, when_behind, was_thinned }
+    }
+
+    pub fn len(&self) -> usize {
+        self.clouds.len()
+    }
+
+    /// Whether a cloud has to wait for room outside of the queue.
+    pub fn must_wait(&self, cloud: &Cloud) -> bool {
+        let needed = self.bytes.saturating_add(bytes_of(cloud));
+        self.when_behind == WhenBehind::Wait && self.bytes > 0 && needed > self.most_bytes
+    }
+
+    pub fn push(&mut self, cloud: Cloud, counters: &mut Counters) {
+        let bytes = bytes_of(&cloud);
+        if bytes > self.most_bytes {
+            counters.too_large += 1;
+            return;
+        }
+        if self.when_behind == WhenBehind::Thin
+            && let Some(was_thinned) = self.was_thinned.get_mut(cloud.topic)
+        {
+            *was_thinned = !*was_thinned && self.bytes > self.most_bytes / 2;
+            if *was_thinned {
+                counters.thinned += 1;
+                return;
+            }
+        }
+        while self.bytes + bytes > self.most_bytes {
+            counters.dropped_behind += 1;
+            // What is left is of the cloud that is being mapped.
+            let Some(oldest) = self.clouds.pop_front() else { return };
+            self.bytes -= bytes_of(&oldest);
+        }
+        self.bytes += bytes;
+        self.clouds.push_back(cloud);
+    }
+
+    /// Gives clouds the poses that are known now, before what they come from is forgotten.
+    pub fn settle(&mut self, pose_of: impl Fn(&Cloud) -> Option<RigidPose>) {
+        for cloud in self.clouds.iter_mut().filter(|cloud| cloud.pose.is_none()).take(MOST_SETTLED) {
+            cloud.pose = pose_of(cloud);
+        }
+    }
+
+    /// Gives back the room of the cloud that was taken.
+    pub fn let_go(&mut self) {
+        self.bytes -= std::mem::take(&mut self.taken_bytes);
+    }
+
+    /// Takes the first cloud that is ready, and lets go of the one before. Those of one topic keep their order; topics
+    /// do not wait for one another.
+    pub fn take_ready<P>(
+        &mut self,
+        counters: &mut Counters,
+        mut verdict: impl FnMut(&Cloud) -> Verdict<P>,
+    ) -> Option<(Cloud, P)> {
+        self.let_go();
+        let mut waiting: Vec<usize> = Vec::new();
+        let mut at = 0;
+        while let Some(cloud) = self.clouds.get(at) {
+            if waiting.contains(&cloud.topic) {
+                at += 1;
+                continue;
+            }
+            match verdict(cloud) {
+                Verdict::Waits => {
+                    waiting.push(cloud.topic);
+                    at += 1;
+                }
+                Verdict::Hopeless => {
+                    counters.dropped_without_pose += 1;
+                    let cloud = self.clouds.remove(at)?;
+                    self.bytes -= bytes_of(&cloud);
+                }
+                Verdict::Ready(pose) => {
+                    let cloud = self.clouds.remove(at)?;
+                    self.taken_bytes = bytes_of(&cloud);
+                    return Some((cloud, pose));
+                }
+            }
+        }
+        None
+    }
+}
+
+fn bytes_of(cloud: &Cloud) -> usize {
+    let own_bytes = cloud.cdr.capacity() + cloud.frame.capacity() + CLOUD_BYTES;
+    own_bytes.saturating_add(cloud.points_bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::time::Instant;
+
+    fn cloud(topic: usize, stamp_ns: i64) -> Cloud {
+        let (frame, cdr) = (String::new(), vec![0; 744]);
+        Cloud { topic, stamp_ns, frame, cdr, points_bytes: 0, arrived: Instant::now(), pose: None }
+    }
+
+    fn stamps(queue: &mut CloudQueue) -> Vec<i64> {
+        let mut counters = Counters::default();
+        std::iter::from_fn(|| queue.take_ready(&mut counters, |_| Verdict::Ready(())))
+            .map(|(cloud, ())| cloud.stamp_ns)
+            .collect()
+    }
+
+    #[test]
+    fn the_oldest_makes_room_and_is_counted() {
+        let (mut queue, mut counters) =
+            (CloudQueue::new(3000, 1, WhenBehind::DropOldest), Counters::default());
+        (0..5).for_each(|stamp| queue.push(cloud(0, stamp), &mut counters));
+        assert_eq!((queue.len(), counters.dropped_behind), (3, 2));
+        assert_eq!(stamps(&mut queue), [2, 3, 4]);
+        assert_eq!(queue.bytes, 0);
+    }
+
+    #[test]
+    fn a_cloud_larger_than_the_queue_pushes_nothing_out() {
+        let (mut queue, mut counters) =
+            (CloudQueue::new(1500, 1, WhenBehind::DropOldest), Counters::default());
+        queue.push(cloud(0, 1), &mut counters);
+        queue.push(Cloud { cdr: vec![0; 2000], ..cloud(0, 2) }, &mut counters);
+        assert_eq!((queue.len(), counters.too_large, counters.dropped_behind), (1, 1, 0));
+    }
+
+    #[test]
+    fn thin_leaves_out_every_second_one_of_a_topic_while_over_half_full() {
+        let (mut queue, mut counters) = (CloudQueue::new(8000, 2, WhenBehind::Thin), Counters::default());
+        (0..9).for_each(|stamp| queue.push(cloud(0, stamp), &mut counters));
+        assert_eq!((counters.thinned, counters.dropped_behind), (2, 0));
+        assert_eq!(stamps(&mut queue), [0, 1, 2, 3, 4, 6, 8]);
+    }
+
+    #[test]
+    fn wait_asks_for_room_but_takes_one_cloud_always() {
+        let (mut queue, mut counters) = (CloudQueue::new(1500, 1, WhenBehind::Wait), Counters::default());
+        assert!(!queue.must_wait(&Cloud { points_bytes: usize::MAX, ..cloud(0, 1) }));
+        queue.push(cloud(0, 1), &mut counters);
+        assert!(queue.must_wait(&cloud(0, 2)));
+        assert!(!CloudQueue::new(1500, 1, WhenBehind::DropOldest).must_wait(&cloud(0, 2)));
+        // It is being mapped, and then it is not.
+        assert_eq!(queue.take_ready(&mut counters, |_| Verdict::Ready(())).unwrap().0.stamp_ns, 1);
+        assert!(queue.must_wait(&cloud(0, 2)));
+        queue.let_go();
+        assert!(!queue.must_wait(&cloud(0, 2)));
+    }
+
+    #[test]
+    fn points_have_room_before_they_are_decoded_and_while_they_are_mapped() {
+        let (mut queue, mut counters) =
+            (CloudQueue::new(3000, 1, WhenBehind::DropOldest), Counters::default());
+        let with_points = |stamp_ns| Cloud { points_bytes: 1000, ..cloud(0, stamp_ns) };
+        queue.push(Cloud { points_bytes: 2001, ..cloud(0, 1) }, &mut counters);
+        queue.push(Cloud { points_bytes: usize::MAX, ..cloud(0, 2) }, &mut counters);
+        assert_eq!((queue.len(), counters.too_large), (0, 2));
+        queue.push(with_points(3), &mut counters);
+        queue.push(with_points(4), &mut counters);
+        assert_eq!((queue.len(), counters.dropped_behind), (1, 1));
+        let taken = queue.take_ready(&mut counters, |_| Verdict::Ready(()));
+        assert_eq!((taken.unwrap().0.stamp_ns, queue.len()), (4, 0));
+        // The second one has no room beside the one that is being mapped and the first one, and then none beside that.
+        queue.push(cloud(0, 5), &mut counters);
+        queue.push(with_points(6), &mut counters);
+        assert_eq!((queue.len(), queue.bytes, counters.dropped_behind), (0, 2000, 3));
+        assert_eq!(stamps(&mut queue), [0; 0]);
+        queue.push(with_points(7), &mut counters);
+        assert_eq!(stamps(&mut queue), [7]);
+        assert_eq!(queue.bytes, 0);
+    }
+
+    #[test]
+    fn a_sensor_that_waits_holds_up_its_own_clouds_alone() {
+        let (mut queue, mut counters) =
+            (CloudQueue::new(1 << 20, 2, WhenBehind::DropOldest), Counters::default());
+        for (topic, stamp) in [(0, 1), (0, 2), (1, 3), (1, 4)] {
+            queue.push(cloud(topic, stamp), &mut counters);
+        }
+        let mut take = |queue: &mut CloudQueue| {
+            let taken = queue.take_ready(&mut counters, |cloud| match cloud.stamp_ns {
+                1 => Verdict::Waits,
+                3 => Verdict::Hopeless,
+                stamp => Verdict::Ready(stamp),
+            });
+            taken.map(|(_, stamp)| stamp)
+        };
+        assert_eq!((take(&mut queue), take(&mut queue)), (Some(4), None));
+        assert_eq!((queue.len(), counters.dropped_without_pose), (2, 1));
+    }
+}

@@ -1,0 +1,194 @@
+use voxtile::Pose;
+use voxtile::mapper::pose_of_numbers;
+use voxtile::store::{KeptFrame, KeptRecord};
+use voxtile_formats::clouds::RigidPose;
+use voxtile_formats::clouds::ros::messages::StampedPose;
+
+/// What a corrected path means for the scans of a map: new poses of those that it names, by their stamps, and of those
+/// between them.
+#[derive(Clone, Debug, Default)]
+pub struct Corrections {
+    /// New poses, by the numbers of the scans.
+    pub poses: Vec<(u64, Pose)>,
+    /// Scans that the path names.
+    pub named: usize,
+    /// The longest way of a scan, in metres.
+    pub most_moved_m: f64,
+    /// The largest angle by which a scan turns, in radians.
+    pub most_turned: f64,
+}
+
+/// A scan and a pose belong together whose stamps differ by no more; paths are often kept in seconds.
+const SAME_STAMP_NS: u64 = 1_000_000;
+/// Where stamps go back by more, another run begins.
+const ANOTHER_RUN_NS: i64 = 2_000_000_000;
+
+/// A scan that can be moved.
+struct Scan {
+    number: u64,
+    stamp_ns: i64,
+    world_from_sensor: Pose,
+}
+
+impl Corrections {
+    /// A scan that the path does not name keeps its place relative to the nearest one, in time, that it names. Scans
+    /// without a stamp or a pose stay, and so do those of earlier runs, which may have the same stamps.
+    ///
+    /// # Errors
+    ///
+    /// Poses that are none.
+    pub fn of<'a>(
+        records: impl IntoIterator<Item = &'a KeptRecord>,
+        path: &[StampedPose],
+    ) -> voxtile::Result<Self> {
+        let mut path: Vec<(i64, RigidPose)> =
+            path.iter().map(|pose| (pose.header.stamp_ns, pose.parent_from_child)).collect();
+        path.sort_by_key(|(stamp_ns, _)| *stamp_ns);
+        let (mut scans, mut newest_ns) = (Vec::new(), i64::MIN);
+        for record in records {
+            if let (Some(stamp_ns), KeptFrame::Sensor(pose)) = (record.stamp_ns, &record.frame) {
+                if stamp_ns < newest_ns.saturating_sub(ANOTHER_RUN_NS) {
+                    scans.clear();
+                    newest_ns = i64::MIN;
+                }
+                newest_ns = newest_ns.max(stamp_ns);
+                let world_from_sensor = pose_of_numbers(pose);
+                scans.push(Scan { number: record.number, stamp_ns, world_from_sensor });
+            }
+        }
+        // Stamp, pose until now and new pose of those that the path names, by stamp.
+        let mut named = Vec::new();
+        for scan in &scans {
+            let pose = nearest(&path, scan.stamp_ns, |(stamp_ns, _)| *stamp_ns);
+            if let Some((stamp_ns, pose)) = pose
+                && stamp_ns.abs_diff(scan.stamp_ns) <= SAME_STAMP_NS
+            {
+                let new = Pose::from_quaternion(pose.position_m, pose.quaternion)?;
+                named.push((scan.stamp_ns, scan.world_from_sensor, new));
+            }
+        }
+        named.sort_by_key(|(stamp_ns, ..)| *stamp_ns);
+        let mut found = Self { named: named.len(), ..Self::default() };
+        for scan in &scans {
+            let Some(&(stamp_ns, old, new)) = nearest(&named, scan.stamp_ns, |(stamp_ns, ..)| *stamp_ns)
+            else {
+                break;
+            };
+            let own = scan.world_from_sensor;
+            let corrected = if stamp_ns == scan.stamp_ns {
+                new
+            } else if old == new {
+                own
+            } else {
+                let own = old.isometry().inv_mul(own.isometry());
+                Pose::from(new.isometry() * own)
+            };
+            let between = own.isometry().inv_mul(corrected.isometry());
+            found.most_moved_m = found.most_moved_m.max(between.translation.vector.norm());
+            found.most_turned = found.most_turned.max(between.rotation.angle());
+            found.poses.push((scan.number, corrected));
+        }
+        Ok(found)
+    }
+}
+
+/// The one nearest in time, of some that are sorted by it.
+fn nearest<T>(sorted: &[T], stamp_ns: i64, stamp_of: impl Fn(&T) -> i64) -> Option<&T> {
+    let after = sorted.partition_point(|one| stamp_of(one) < stamp_ns);
+    let around = sorted.get(after.saturating_sub(1)..sorted.len().min(after + 1))?;
+    around.iter().min_by_key(|one| stamp_of(one).abs_diff(stamp_ns))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use voxtile::RayConfig;
+    use voxtile_formats::clouds::ros::messages::Header;
+
+    fn record(number: u64, stamp_ns: Option<i64>, x: f64) -> KeptRecord {
+        KeptRecord {
+            number,
+            stamp_ns,
+            frame: KeptFrame::Sensor([x, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]),
+            rays: RayConfig::default(),
+            points: 1,
+            has_intensities: false,
+            updates: 1,
+            place: Default::default(),
+            tiles: Vec::new(),
+        }
+    }
+
+    fn pose(stamp_ns: i64, position_m: [f64; 3], quaternion: [f64; 4]) -> StampedPose {
+        let header = Header { stamp_ns, frame_id: "map".to_owned() };
+        StampedPose {
+            header,
+            child_frame: String::new(),
+            parent_from_child: RigidPose { position_m, quaternion },
+        }
+    }
+
+    const STRAIGHT: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
+    /// By a quarter to the left, and not normalized.
+    const LEFT: [f64; 4] = [0.0, 0.0, 2.0, 2.0];
+
+    #[test]
+    fn scans_between_keep_the_correction_of_the_nearest_that_is_named() {
+        let s = 1_000_000_000;
+        let records = [
+            record(1, Some(0), 0.0),
+            record(2, Some(s), 1.0),
+            record(3, Some(4 * s), 4.0),
+            record(4, Some(10 * s), 10.0),
+            record(5, None, 11.0),
+        ];
+        let path = [
+            pose(10 * s + 900_000, [10.0, 5.0, 0.0], LEFT),
+            pose(7, [0.0; 3], STRAIGHT),
+            pose(50 * s, [9.0; 3], LEFT),
+        ];
+        let found = Corrections::of(&records, &path).unwrap();
+        assert_eq!(found.named, 2);
+        let numbers: Vec<u64> = found.poses.iter().map(|(number, _)| *number).collect();
+        assert_eq!(numbers, [1, 2, 3, 4]);
+        let places = found.poses.iter().map(|(_, pose)| pose.position_m());
+        assert_eq!(
+            places.collect::<Vec<_>>(),
+            [[0.0; 3], [1.0, 0.0, 0.0], [4.0, 0.0, 0.0], [10.0, 5.0, 0.0]]
+        );
+        assert!(
+            (found.most_moved_m - 5.0).abs() < 1e-12 && (found.most_turned.to_degrees() - 90.0).abs() < 1e-9
+        );
+
+        // The third is nearer to the fourth now: it is six metres behind it, along its way.
+        let found = Corrections::of(&records[2..4], &path).unwrap();
+        let place = found.poses[0].1.position_m();
+        assert!((0..3).all(|k| (place[k] - [10.0, -1.0, 0.0][k]).abs() < 1e-12), "{place:?}");
+    }
+
+    #[test]
+    fn scans_of_another_run_stay_though_they_have_the_same_stamps() {
+        let s = 1_000_000_000;
+        let stamps_s = [0, 1, 2, 3, 0, 2, 1, 4];
+        let records: Vec<_> = stamps_s
+            .iter()
+            .zip(1..)
+            .map(|(stamp_s, number)| record(number, Some(stamp_s * s), 0.0))
+            .collect();
+        let path = [pose(s, [0.0, 7.0, 0.0], STRAIGHT)];
+        let found = Corrections::of(&records, &path).unwrap();
+        let numbers: Vec<u64> = found.poses.iter().map(|(number, _)| *number).collect();
+        assert_eq!((found.named, numbers), (1, vec![5, 6, 7, 8]));
+        // Of one run all are moved, whichever node has mapped them.
+        assert_eq!(Corrections::of(&records[..4], &path).unwrap().poses.len(), 4);
+    }
+
+    #[test]
+    fn a_path_that_names_no_scan_changes_nothing_and_a_wrong_one_is_refused() {
+        let records = [record(1, Some(0), 0.0)];
+        let found = Corrections::of(&records, &[pose(2_000_000, [1.0; 3], STRAIGHT)]).unwrap();
+        assert_eq!((found.named, found.poses.len()), (0, 0));
+        assert!(Corrections::of(&records, &[pose(0, [1.0; 3], [0.0; 4])]).is_err());
+        assert!(Corrections::of(&records, &[pose(0, [f64::NAN; 3], STRAIGHT)]).is_err());
+    }
+}

@@ -1,0 +1,82 @@
+use crate::args::Args;
+use crate::inbox::Inbox;
+use crate::live_map::LiveMap;
+use crate::publishers::Publishing;
+use crate::services::{self, Orders};
+use crate::transport::{Message, Qos, Transport, TypeName};
+use anyhow::Context as _;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use voxtile_formats::clouds::ros::messages::MessageKind;
+
+/// What keeps the node in the graph.
+pub struct RunningNode {
+    publishing: JoinHandle<()>,
+    stop: Arc<AtomicBool>,
+    transport: Transport,
+}
+
+impl RunningNode {
+    /// Leaves the graph.
+    pub fn end(self) {
+        self.stop.store(true, Ordering::Relaxed);
+        if self.publishing.join().is_err() {
+            log::error!("the thread that publishes has died");
+        }
+        self.transport.leave();
+    }
+}
+
+/// Joins the others and reads each topic in a thread of its own.
+///
+/// # Errors
+///
+/// No sockets; names of topics that ROS 2 does not know.
+pub fn start(
+    args: &Args,
+    inbox: &Arc<Inbox>,
+    map: Arc<LiveMap>,
+    orders: &Orders,
+) -> anyhow::Result<RunningNode> {
+    let mut transport = Transport::join(args, inbox)?;
+    let volatile = Qos::best_effort(5);
+    for (number, topic) in args.cloud.iter().enumerate() {
+        let to = inbox.clone();
+        let put = Box::new(move |message: Message| to.put_cloud(number, message.cdr));
+        transport.subscribe(topic, TypeName::new("sensor_msgs", "PointCloud2"), volatile, put)?;
+    }
+    let poses = |kind, is_static| {
+        let to = inbox.clone();
+        Box::new(move |message: Message| to.put_poses(kind, &message, is_static))
+    };
+    let tf = TypeName::new("tf2_msgs", "TFMessage");
+    transport.subscribe("/tf_static", tf, Qos::latched(100), poses(MessageKind::Tf, true))?;
+    match &args.odometry {
+        Some(topic) => {
+            let odometry = TypeName::new("nav_msgs", "Odometry");
+            transport.subscribe(topic, odometry, volatile, poses(MessageKind::Odometry, false))?;
+        }
+        None => transport.subscribe("/tf", tf, Qos::reliable(100), poses(MessageKind::Tf, false))?,
+    }
+    if let Some(topic) = &args.path {
+        let to = inbox.clone();
+        let path = TypeName::new("nav_msgs", "Path");
+        transport.subscribe(
+            topic,
+            path,
+            Qos::reliable(1),
+            Box::new(move |message: Message| to.put_path(&message.cdr)),
+        )?;
+    }
+    let names = args.names()?;
+    let clouds: Vec<String> = args.cloud.iter().map(|topic| names.full(topic)).collect();
+    log::info!("listening to {} in domain {}", clouds.join(", "), args.domain_id);
+    services::start(args, &mut transport, &map, orders)?;
+    let mut publishing = Publishing::new(args, &mut transport, inbox.clone(), map)?;
+    let stop = Arc::new(AtomicBool::new(false));
+    let its_stop = stop.clone();
+    let thread = std::thread::Builder::new().name("publisher".to_owned());
+    let publishing = thread.spawn(move || publishing.run(&its_stop)).context("a thread cannot be started")?;
+    Ok(RunningNode { publishing, stop, transport })
+}

@@ -1,0 +1,25 @@
+use super::occupied_voxels::MOST_VOXELS;
+use crate::messages::{Header, PointCloud2};
+use anyhow::ensure;
+use voxtile::Aabb;
+use voxtile_local::{LocalView, Obstacle};
+
+/// The centers of the obstacles of a local map in a box.
+///
+/// # Errors
+///
+/// More of them than a message may have.
+pub fn local_obstacles(
+    view: &LocalView,
+    region: &Aabb,
+    obstacle: Obstacle,
+    header: Header,
+) -> anyhow::Result<PointCloud2> {
+    let centers_m = view.points_in(region, obstacle);
+    let count = centers_m.len();
+    ensure!(
+        count <= MOST_VOXELS,
+        "{count} voxels, and a message has at most {MOST_VOXELS}: take a smaller --publish-radius"
+    );
+    Ok(PointCloud2::of_points(header, centers_m))
+}

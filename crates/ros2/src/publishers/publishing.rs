@@ -1,0 +1,116 @@
+use super::Extent;
+use super::changing::Changing;
+use super::diagnosing::Diagnosing;
+use super::local_obstacles::local_obstacles;
+use super::occupied_voxels::{cloud, markers, occupied_voxels};
+use super::octomap::octomap;
+use super::outlet::Outlet;
+use super::projected_map::projected_map;
+use crate::args::Args;
+use crate::inbox::Inbox;
+use crate::live_map::LiveMap;
+use crate::messages::{MarkerArray, OccupancyGrid, Octomap, PointCloud2};
+use crate::transport::{Transport, TypeName};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+use voxtile::octree::OctreeFormat;
+use voxtile_local::Obstacle;
+
+/// The thread that publishes the map, beside the mapper: it reads views, for which no mapper waits.
+pub struct Publishing {
+    inbox: Arc<Inbox>,
+    map: Arc<LiveMap>,
+    every: Duration,
+    extent: Extent,
+    projected: Extent,
+    octomap_binary: Outlet<Octomap>,
+    octomap_full: Outlet<Octomap>,
+    centers: Outlet<PointCloud2>,
+    markers: Outlet<MarkerArray>,
+    projected_map: Outlet<OccupancyGrid>,
+    local_occupied: Outlet<PointCloud2>,
+    local_inflated: Outlet<PointCloud2>,
+    changing: Changing,
+    diagnosing: Diagnosing,
+}
+
+/// How long it sleeps before it looks whether it is to end.
+const NAP: Duration = Duration::from_millis(20);
+
+impl Publishing {
+    /// # Errors
+    ///
+    /// Rates and lengths that are none; the transport refuses.
+    pub fn new(
+        args: &Args,
+        transport: &mut Transport,
+        inbox: Arc<Inbox>,
+        map: Arc<LiveMap>,
+    ) -> anyhow::Result<Self> {
+        let octomap = TypeName::new("octomap_msgs", "Octomap");
+        let cloud = TypeName::new("sensor_msgs", "PointCloud2");
+        Ok(Self {
+            every: args.publish_every()?,
+            extent: args.extent()?,
+            projected: args.projected_extent()?,
+            octomap_binary: Outlet::new(transport, "octomap_binary", octomap)?,
+            octomap_full: Outlet::new(transport, "octomap_full", octomap)?,
+            centers: Outlet::new(transport, "octomap_point_cloud_centers", cloud)?,
+            markers: Outlet::new(
+                transport,
+                "occupied_cells_vis_array",
+                TypeName::new("visualization_msgs", "MarkerArray"),
+            )?,
+            projected_map: Outlet::new(
+                transport,
+                "projected_map",
+                TypeName::new("nav_msgs", "OccupancyGrid"),
+            )?,
+            local_occupied: Outlet::new(transport, "local_occupied", cloud)?,
+            local_inflated: Outlet::new(transport, "local_inflated", cloud)?,
+            changing: Changing::new(transport, "octomap_point_cloud_changes")?,
+            diagnosing: Diagnosing::new(transport, &args.node_name)?,
+            inbox,
+            map,
+        })
+    }
+
+    /// Publishes until it is told to stop.
+    pub fn run(&mut self, stop: &AtomicBool) {
+        let mut begun = Instant::now();
+        while !stop.load(Ordering::Relaxed) {
+            if begun.elapsed() >= self.every {
+                begun = Instant::now();
+                self.refresh();
+            }
+            self.diagnosing.refresh(&self.inbox, &self.map);
+            std::thread::sleep(NAP);
+        }
+    }
+
+    /// Each message has a view of its own, which is held no longer than it takes.
+    fn refresh(&mut self) {
+        let (map, extent) = (&self.map, &self.extent);
+        let moment = map.moment();
+        let version = moment.version;
+        let around = extent.around(moment.sensor_m);
+        let header = || map.header(&moment);
+        self.octomap_binary.refresh(version, || octomap(&map.view(), &around, OctreeFormat::Bt, header()));
+        self.octomap_full.refresh(version, || octomap(&map.view(), &around, OctreeFormat::Ot, header()));
+        self.centers.refresh(version, || cloud(&map.view(), &around, extent, header()));
+        self.markers.refresh(version, || markers(&map.view(), &around, extent, header()));
+        let occupied = || occupied_voxels(&map.view(), &around, extent);
+        self.changing.refresh(version, map.grid(), &around, header(), occupied);
+        let is_wanted = self.local_occupied.is_wanted() || self.local_inflated.is_wanted();
+        map.local().want(is_wanted);
+        if let Some(view) = map.local().view() {
+            let cloud = |obstacle| local_obstacles(&view, &around, obstacle, header());
+            self.local_occupied.refresh(version, || cloud(Obstacle::Occupied));
+            self.local_inflated.refresh(version, || cloud(Obstacle::Inflated));
+        }
+        let around = self.projected.around(moment.sensor_m);
+        self.projected_map
+            .refresh(version, || projected_map(&map.view(), &around, &self.projected, header()));
+    }
+}

@@ -1,0 +1,603 @@
+use crate::args::Args;
+use crate::cloud::Cloud;
+use crate::cloud_queue::{CloudQueue, Verdict};
+use crate::counters::Counters;
+use crate::frame_owners::FrameOwners;
+use crate::parent_warnings::ParentWarnings;
+use crate::pose_watch::PoseWatch;
+use crate::stamp_check::{StampCheck, StampVerdict};
+use crate::transport::Gid;
+use std::collections::{HashMap, HashSet};
+use std::time::{Duration, Instant};
+use voxtile_formats::clouds::RigidPose;
+use voxtile_formats::clouds::poses::most_gap_ns;
+use voxtile_formats::clouds::ros::messages::StampedPose;
+use voxtile_formats::clouds::ros::{BadTransform, Transforms, WhyNot};
+
+/// The last seconds of tf, and how long clouds wait for more of it.
+#[derive(Debug)]
+pub struct TransformBuffer {
+    transforms: Transforms,
+    stamps: StampCheck,
+    fixed_frame: String,
+    most_wait: Duration,
+    /// Samples since the last time that old ones were forgotten, and those left then.
+    samples: (usize, usize),
+    owners: FrameOwners,
+    /// Frames of clouds so far, each with the stamp of the last cloud that had a pose.
+    sensors: HashMap<String, Option<i64>>,
+    parents: ParentWarnings,
+    watch: PoseWatch,
+    refused_at: Option<Instant>,
+}
+
+/// As long as the buffers of tf2 are.
+const SPAN_NS: i64 = 10_000_000_000;
+/// Old samples are forgotten after so many new ones.
+const FORGET_EVERY: usize = 1000;
+/// Bounds of what a flood can fill.
+const MOST_SAMPLES: usize = 200_000;
+const MOST_FRAMES: usize = 2000;
+const MAX_SENSORS: usize = 100;
+const MOST_NAME_BYTES: usize = 256;
+/// How often transforms that are none are reported.
+const REFUSED_AGAIN: Duration = Duration::from_secs(30);
+
+impl TransformBuffer {
+    pub fn new(args: &Args) -> Self {
+        let mut transforms = Transforms::default();
+        let tolerance_ns = i64::try_from(args.pose_tolerance.as_nanos()).unwrap_or(i64::MAX);
+        transforms.set_most_gap_ns(Some(most_gap_ns(tolerance_ns)));
+        Self {
+            transforms,
+            stamps: StampCheck::default(),
+            fixed_frame: bare(&args.frame_id).to_owned(),
+            most_wait: args.transform_wait,
+            samples: (0, 0),
+            owners: FrameOwners::default(),
+            sensors: HashMap::new(),
+            parents: ParentWarnings::default(),
+            watch: PoseWatch::default(),
+            refused_at: None,
+        }
+    }
+
+    /// Takes a transform. Clouds that wait get their poses before it replaces what they need.
+    pub fn insert(
+        &mut self,
+        pose: &StampedPose,
+        is_static: bool,
+        publisher: Option<Gid>,
+        now: Instant,
+        queue: &mut CloudQueue,
+        counters: &mut Counters,
+    ) {
+        if self.samples.0 >= FORGET_EVERY {
+            self.make_room(queue, counters);
+        }
+        let (new, kept) = self.samples;
+        let (parent, child) = (&pose.header.frame_id, &pose.child_frame);
+        let is_long = parent.len().max(child.len()) > MOST_NAME_BYTES;
+        if !is_long && !self.owners.knows(bare(child)) && self.owners.len() >= MOST_FRAMES {
+            self.forget_frames(counters);
+        }
+        let is_new = !self.owners.knows(bare(child));
+        let is_full = new + kept >= MOST_SAMPLES || (is_new && self.owners.len() >= MOST_FRAMES);
+        if is_long || is_full || !(is_static || self.is_of_now(child, pose.header.stamp_ns, now, queue)) {
+            counters.transforms_refused += 1;
+        } else {
+            let stamp_ns = pose.header.stamp_ns;
+            match self.transforms.insert(parent, child, stamp_ns, pose.parent_from_child, is_static) {
+                Ok(false) => self.owners.note(bare(parent), bare(child), publisher, is_static),
+                Ok(true) => {
+                    self.owners.note(bare(parent), bare(child), publisher, is_static);
+                    self.parents.check(&self.transforms, [parent, child].map(|of| bare(of)), publisher)
+                }
+                Err(why) => {
+                    counters.transforms_refused += 1;
+                    self.warn_of_refused(&why, publisher, now);
+                }
+            }
+        }
+        self.samples.0 += 1;
+    }
+
+    /// Forgets what is old, and of who floods the buffer so much that there is room for others.
+    fn make_room(&mut self, queue: &mut CloudQueue, counters: &mut Counters) {
+        queue.settle(|cloud| self.find(cloud).ok());
+        let mut left = self.transforms.forget_older_than(SPAN_NS);
+        while left > MOST_SAMPLES - FORGET_EVERY {
+            let lost = self.transforms.shrink_largest();
+            if lost == 0 {
+                break;
+            }
+            left -= lost;
+            counters.transforms_refused += lost as u64;
+        }
+        self.samples = (0, left);
+    }
+
+    /// Forgets frames of who names most, so that there is room for others: those that lead from a sensor to the map stay.
+    fn forget_frames(&mut self, counters: &mut Counters) {
+        let fixed = self.fixed_frame.as_str();
+        let mut needed = HashSet::new();
+        for (sensor, stamp_ns) in &self.sensors {
+            needed.extend(self.transforms.frames_between(fixed, sensor).unwrap_or_default());
+            // These may be others, and a flood may lead to too many of those.
+            let last = stamp_ns.map(|stamp_ns| self.transforms.links_between(fixed, sensor, stamp_ns));
+            needed.extend(last.and_then(Result::ok).into_iter().flatten().flatten());
+        }
+        for child in self.owners.forget_some(&needed, fixed) {
+            self.transforms.detach(&child);
+            self.stamps.forget(&child);
+            counters.transforms_refused += 1;
+        }
+    }
+
+    /// Whether a stamp is one of the robot's clock. If that of a frame has jumped, what was before it is forgotten.
+    fn is_of_now(&mut self, child: &str, stamp_ns: i64, now: Instant, queue: &mut CloudQueue) -> bool {
+        match self.stamps.verdict(child, stamp_ns, now) {
+            StampVerdict::Take => true,
+            StampVerdict::Refuse => false,
+            StampVerdict::Jump { children, since } => {
+                let (count, of) = (children.len(), if children.len() > 1 { " and others" } else { "" });
+                log::warn!(
+                    "the clock of {child}{of} has jumped: the transforms of {count} frames before are forgotten"
+                );
+                queue.settle(|cloud| if cloud.arrived < since { self.look_up(cloud).ok() } else { None });
+                for child in children {
+                    self.transforms.forget_samples(&child);
+                }
+                true
+            }
+        }
+    }
+
+    /// Whether a cloud has its pose, may still get it, or never will.
+    pub fn verdict(&mut self, cloud: &Cloud, now: Instant) -> Verdict<RigidPose> {
+        if !self.sensors.contains_key(bare(&cloud.frame)) && self.sensors.len() < MAX_SENSORS {
+            self.sensors.insert(bare(&cloud.frame).to_owned(), None);
+        }
+        let why = match cloud.pose.map_or_else(|| self.find(cloud), Ok) {
+            Ok(pose) => {
+                if let Some(stamp_ns) = self.sensors.get_mut(bare(&cloud.frame)) {
+                    *stamp_ns = Some(cloud.stamp_ns);
+                }
+                self.watch.found(cloud.topic);
+                return Verdict::Ready(pose);
+            }
+            Err(why) => why,
+        };
+        let may_pass = !matches!(why, WhyNot::AlreadyFixed(_));
+        let missed = || {
+            format!("{} (a cloud of {} in {})", printable(&why), cloud.frame.escape_debug(), self.fixed_frame)
+        };
+        if let Some(warning) = self.watch.missed(cloud.topic, now, may_pass, missed) {
+            log::warn!("{warning}{}", remedy(&why));
+        }
+        // Transforms may come late and out of order.
+        if may_pass && now.saturating_duration_since(cloud.arrived) < self.most_wait {
+            log::trace!("a cloud of {} waits: {why}", cloud.frame);
+            return Verdict::Waits;
+        }
+        log::debug!("a cloud is dropped, it has no pose in {}: {why}", self.fixed_frame);
+        Verdict::Hopeless
+    }
+
+    /// Why no cloud gets a pose, if that lasts.
+    pub fn trouble(&self) -> Option<String> {
+        self.watch.trouble()
+    }
+
+    fn warn_of_refused(&mut self, why: &BadTransform, publisher: Option<Gid>, now: Instant) {
+        if self.refused_at.is_some_and(|at| now.saturating_duration_since(at) < REFUSED_AGAIN) {
+            return;
+        }
+        self.refused_at = Some(now);
+        let publisher = publisher.map(|gid| format!(" (publisher {gid})")).unwrap_or_default();
+        log::warn!("a transform is refused{publisher}: {}", printable(why));
+    }
+
+    /// The pose of a cloud, if its clock is known now.
+    fn find(&self, cloud: &Cloud) -> Result<RigidPose, WhyNot> {
+        let pose = self.look_up(cloud)?;
+        // What came since then may be of another clock, which passes the same stamps again.
+        let mut off = self.stamps.off().filter(|(_, since)| *since <= cloud.arrived).peekable();
+        if off.peek().is_some() {
+            let links = self.transforms.links_between(&self.fixed_frame, &cloud.frame, cloud.stamp_ns)?;
+            let is_between = |child: &str| links.iter().flatten().any(|link| link == bare(child));
+            if let Some((child, _)) = off.find(|(child, _)| is_between(child)) {
+                return Err(WhyNot::After(bare(child).to_owned()));
+            }
+        }
+        Ok(pose)
+    }
+
+    fn look_up(&self, cloud: &Cloud) -> Result<RigidPose, WhyNot> {
+        // A frame is at the origin of itself, and rays would begin there.
+        if bare(&cloud.frame) == self.fixed_frame {
+            return Err(WhyNot::AlreadyFixed(self.fixed_frame.clone()));
+        }
+        self.transforms.lookup(&self.fixed_frame, &cloud.frame, cloud.stamp_ns)
+    }
+}
+
+/// What others sent is printed without what a terminal obeys.
+fn printable(why: &dyn std::fmt::Display) -> String {
+    why.to_string().escape_debug().to_string()
+}
+
+/// What to do about clouds that get no pose, where that is not obvious.
+fn remedy(why: &WhyNot) -> &'static str {
+    match why {
+        WhyNot::AlreadyFixed(_) => {
+            ". Publish them in the frame of the sensor, with its transforms, or give with --frame-id a frame in which \
+             the sensor moves"
+        }
+        _ => "",
+    }
+}
+
+/// tf 1 wrote slashes before names, tf 2 does not know them.
+fn bare(frame: &str) -> &str {
+    frame.trim_start_matches('/')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::when_behind::WhenBehind;
+    use clap::Parser;
+    use voxtile_formats::clouds::ros::messages::Header;
+
+    fn buffer() -> TransformBuffer {
+        TransformBuffer::new(&Args::parse_from(["voxtile-ros2", "-o", "map"]))
+    }
+
+    fn queue() -> CloudQueue {
+        CloudQueue::new(1 << 20, 1, WhenBehind::DropOldest)
+    }
+
+    fn pose(parent: &str, child: &str, stamp_ns: i64, x: f64) -> StampedPose {
+        StampedPose {
+            header: Header { stamp_ns, frame_id: parent.to_owned() },
+            child_frame: child.to_owned(),
+            parent_from_child: RigidPose { position_m: [x, 0.0, 0.0], ..RigidPose::IDENTITY },
+        }
+    }
+
+    fn cloud(stamp_ns: i64) -> Cloud {
+        let (frame, cdr) = ("lidar".to_owned(), Vec::new());
+        Cloud { topic: 0, stamp_ns, frame, cdr, points_bytes: 0, arrived: Instant::now(), pose: None }
+    }
+
+    #[test]
+    fn a_cloud_waits_for_the_transform_behind_its_stamp_and_then_is_dropped() {
+        let (mut buffer, mut counters) = (buffer(), Counters::default());
+        let cloud = cloud(150_000_000);
+        buffer.insert(
+            &pose("base", "lidar", 0, 1.0),
+            true,
+            None,
+            Instant::now(),
+            &mut queue(),
+            &mut counters,
+        );
+        buffer.insert(
+            &pose("map", "base", 100_000_000, 0.0),
+            false,
+            None,
+            Instant::now(),
+            &mut queue(),
+            &mut counters,
+        );
+        assert_eq!(buffer.verdict(&cloud, cloud.arrived), Verdict::Waits);
+        assert_eq!(buffer.verdict(&cloud, cloud.arrived + Duration::from_secs(2)), Verdict::Hopeless);
+        buffer.insert(
+            &pose("map", "base", 200_000_000, 2.0),
+            false,
+            None,
+            Instant::now(),
+            &mut queue(),
+            &mut counters,
+        );
+        let Verdict::Ready(found) = buffer.verdict(&cloud, cloud.arrived) else { panic!("no pose") };
+        assert_eq!(found.position_m, [2.0, 0.0, 0.0]);
+        assert_eq!(counters, Counters::default());
+    }
+
+    #[test]
+    fn a_stamp_in_the_future_costs_no_history_and_a_restart_forgets_it() {
+        const S: i64 = 1_000_000_000;
+        let (mut buffer, mut counters, start) = (buffer(), Counters::default(), Instant::now());
+        buffer.insert(&pose("base", "lidar", 0, 1.0), true, None, start, &mut queue(), &mut counters);
+        let mut tick = |buffer: &mut TransformBuffer, number: i64, stamp_ns: i64, x: f64| {
+            let now = start + Duration::from_millis(20) * number as u32;
+            buffer.insert(&pose("map", "base", stamp_ns, x), false, None, now, &mut queue(), &mut counters);
+        };
+        for number in 0..3000 {
+            tick(&mut buffer, number, 5 * S + number * S / 50, 3.0);
+            if number % 10 == 0 {
+                tick(&mut buffer, number, 900_000 * S, 9.0);
+            }
+        }
+        let found =
+            |buffer: &mut TransformBuffer, stamp_ns: i64| match buffer.verdict(&cloud(stamp_ns), start) {
+                Verdict::Ready(pose) => Some(pose.position_m[0]),
+                _ => None,
+            };
+        assert_eq!(found(&mut buffer, 60 * S), Some(4.0));
+        // The simulation begins anew, and passes the same stamps.
+        for number in 3000..6000 {
+            tick(&mut buffer, number, 5 * S + (number - 3000) * S / 50 + 7, 5.0);
+        }
+        assert_eq!(found(&mut buffer, 60 * S), Some(6.0));
+        assert_eq!(found(&mut buffer, 5 * S + S / 10), None);
+        assert!((300..330).contains(&counters.transforms_refused), "{counters}");
+    }
+
+    #[test]
+    fn a_frame_whose_clock_falls_back_costs_the_others_no_history() {
+        const S: i64 = 1_000_000_000;
+        let (mut buffer, mut counters, start) = (buffer(), Counters::default(), Instant::now());
+        buffer.insert(&pose("base", "lidar", 0, 1.0), true, None, start, &mut queue(), &mut counters);
+        for number in 0..500 {
+            let now = start + Duration::from_millis(20) * number as u32;
+            let stamp_ns = 1000 * S + number * S / 50;
+            let of_arm = if number < 250 { stamp_ns } else { number * S / 50 };
+            buffer.insert(&pose("base", "arm", of_arm, 0.0), false, None, now, &mut queue(), &mut counters);
+            buffer.insert(&pose("map", "base", stamp_ns, 3.0), false, None, now, &mut queue(), &mut counters);
+            let found = buffer.verdict(&cloud(stamp_ns), now);
+            assert!(
+                matches!(found, Verdict::Ready(pose) if pose.position_m[0] == 4.0),
+                "{number}: {found:?}"
+            );
+        }
+        assert_eq!(counters.transforms_refused, 25);
+    }
+
+    #[test]
+    fn a_flood_of_frames_fills_the_buffer_and_no_more() {
+        let (mut buffer, mut counters) = (buffer(), Counters::default());
+        for frame in 0..MOST_FRAMES + 7 {
+            buffer.insert(
+                &pose("map", &format!("f{frame}"), 0, 0.0),
+                false,
+                None,
+                Instant::now(),
+                &mut queue(),
+                &mut counters,
+            );
+        }
+        assert_eq!((buffer.transforms.frames(), counters.transforms_refused), (1507, 500));
+        // What was named last is still known.
+        let last = format!("f{}", MOST_FRAMES + 6);
+        buffer.insert(&pose("map", &last, 1, 0.0), false, None, Instant::now(), &mut queue(), &mut counters);
+        assert_eq!((buffer.transforms.frames(), counters.transforms_refused), (1507, 500));
+    }
+
+    #[test]
+    fn unknown_frames_do_not_crowd_out_the_robots_own() {
+        const S: i64 = 1_000_000_000;
+        let [flood, robot, state] = [1, 2, 3].map(|k| Some(Gid([k; 16])));
+        // Before the robot's own, and after them, by publishers that are known and not.
+        for publishers in [[flood, robot, state], [None; 3]] {
+            let [flood, robot, state] = publishers;
+            let (mut buffer, mut counters, start) = (buffer(), Counters::default(), Instant::now());
+            let mut number = 0;
+            let mut put = |buffer: &mut TransformBuffer, pose: &StampedPose, is_static, publisher| {
+                number += 1;
+                let now = start + Duration::from_micros(number);
+                buffer.insert(pose, is_static, publisher, now, &mut queue(), &mut counters);
+            };
+            for k in 0..MOST_FRAMES + 500 {
+                put(&mut buffer, &pose("x", &format!("f{k}"), 0, 0.0), k % 2 == 0, flood);
+            }
+            put(&mut buffer, &pose("base", "lidar", 0, 1.0), true, state);
+            // A loop above the frame of the map, and a cloud that waits.
+            put(&mut buffer, &pose("world", "map", 0, 9.0), true, flood);
+            put(&mut buffer, &pose("map", "world", 0, 9.0), true, flood);
+            assert_eq!(buffer.verdict(&cloud(S / 2), start), Verdict::Waits);
+            put(&mut buffer, &pose("map", "base", 0, 2.0), false, robot);
+            for k in 0..3 * MOST_FRAMES {
+                put(&mut buffer, &pose("x", &format!("g{k}"), 0, 0.0), k % 2 == 0, flood);
+            }
+            put(&mut buffer, &pose("map", "base", S, 2.0), false, robot);
+            let found = buffer.verdict(&cloud(S / 2), start);
+            assert!(matches!(found, Verdict::Ready(pose) if pose.position_m[0] == 3.0), "{found:?}");
+            assert!(buffer.transforms.frames() <= MOST_FRAMES);
+        }
+    }
+
+    /// The frames of the last pose are kept, however many others lead from the sensor to the map.
+    #[test]
+    fn a_flood_above_the_sensor_costs_no_pose() {
+        const S: i64 = 1_000_000_000;
+        let [flood, robot] = [1, 2].map(|k| Some(Gid([k; 16])));
+        let (mut buffer, mut counters, start) = (buffer(), Counters::default(), Instant::now());
+        let mut put = |buffer: &mut TransformBuffer, pose: &StampedPose, is_static, publisher| {
+            buffer.insert(pose, is_static, publisher, start, &mut queue(), &mut counters);
+        };
+        put(&mut buffer, &pose("base", "lidar", 0, 1.0), true, robot);
+        put(&mut buffer, &pose("odom", "base", 0, 1.0), true, robot);
+        for stamp_ns in [0, S] {
+            put(&mut buffer, &pose("map", "odom", stamp_ns, 1.0), false, robot);
+        }
+        assert!(matches!(buffer.verdict(&cloud(S / 2), start), Verdict::Ready(_)));
+        put(&mut buffer, &pose("g0", "lidar", 0, 0.0), false, flood);
+        for k in 0..3 * MOST_FRAMES {
+            put(&mut buffer, &pose("map", &format!("g{k}"), 0, 0.0), false, flood);
+            put(&mut buffer, &pose(&format!("g{}", k + 1), &format!("g{k}"), 0, 0.0), false, flood);
+        }
+        let found = buffer.verdict(&cloud(S / 2), start);
+        assert!(matches!(found, Verdict::Ready(pose) if pose.position_m[0] == 3.0), "{found:?}");
+    }
+
+    #[test]
+    fn who_floods_the_buffer_loses_its_own_past_alone() {
+        const S: i64 = 1_000_000_000;
+        let (mut buffer, mut counters, now) = (buffer(), Counters::default(), Instant::now());
+        buffer.insert(&pose("base", "lidar", 0, 1.0), true, None, now, &mut queue(), &mut counters);
+        for tick in 0..100 {
+            buffer.insert(
+                &pose("map", "base", tick * S / 50, 2.0),
+                false,
+                None,
+                now,
+                &mut queue(),
+                &mut counters,
+            );
+        }
+        for stamp_ns in 0..2 * MOST_SAMPLES as i64 {
+            buffer.insert(
+                &pose("map", "flood", stamp_ns, 0.0),
+                false,
+                None,
+                now,
+                &mut queue(),
+                &mut counters,
+            );
+        }
+        for tick in 100..200 {
+            buffer.insert(
+                &pose("map", "base", tick * S / 50, 2.0),
+                false,
+                None,
+                now,
+                &mut queue(),
+                &mut counters,
+            );
+        }
+        for stamp_ns in [S / 100, 2 * S - S / 100, 3 * S + S / 100] {
+            let found = buffer.verdict(&cloud(stamp_ns), now);
+            assert!(
+                matches!(found, Verdict::Ready(pose) if pose.position_m[0] == 3.0),
+                "{stamp_ns}: {found:?}"
+            );
+        }
+        assert!(counters.transforms_refused >= MOST_SAMPLES as u64, "{counters}");
+        assert!(buffer.transforms.forget_older_than(SPAN_NS) <= MOST_SAMPLES);
+        // Parents are samples, too.
+        for parent in 0..MOST_SAMPLES + 2 * FORGET_EVERY {
+            let pose = pose(&format!("p{parent}"), "flood", 0, 0.0);
+            buffer.insert(&pose, true, None, now, &mut queue(), &mut counters);
+        }
+        assert!(buffer.transforms.forget_older_than(SPAN_NS) <= MOST_SAMPLES);
+        assert!(matches!(buffer.verdict(&cloud(S / 100), now), Verdict::Ready(_)));
+    }
+
+    #[test]
+    fn transforms_that_make_loops_cost_no_cloud_and_few_warnings() {
+        const S: i64 = 1_000_000_000;
+        let (mut buffer, mut counters, mut queue, start) =
+            (buffer(), Counters::default(), queue(), Instant::now());
+        // Before all others, between them, and a thousand times a second.
+        let wrong = [("lidar", "map"), ("base", "map"), ("lidar", "base"), ("lidar", "odom"), ("x", "lidar")];
+        let mut put = |buffer: &mut TransformBuffer, parent: &str, child: &str, stamp_ns: i64, is_static| {
+            let now = start + Duration::from_nanos(stamp_ns as u64);
+            let pose = pose(parent, child, stamp_ns, 1.0);
+            buffer.insert(&pose, is_static, None, now, &mut queue, &mut counters);
+        };
+        for (parent, child) in wrong {
+            put(&mut buffer, parent, child, 0, false);
+        }
+        put(&mut buffer, "base", "lidar", 0, true);
+        for tick in 0..150 {
+            put(&mut buffer, "map", "odom", tick * S / 50, false);
+            put(&mut buffer, "odom", "base", tick * S / 50, false);
+            for k in 0..20 {
+                let (parent, child) = wrong[k as usize % wrong.len()];
+                put(&mut buffer, parent, child, tick * S / 50 + k * S / 1000, false);
+            }
+            let stamp_ns = tick * S / 50 - S / 100;
+            if tick > 0 {
+                let now = start + Duration::from_nanos(stamp_ns as u64);
+                let found = buffer.verdict(&Cloud { arrived: now, ..cloud(stamp_ns) }, now);
+                assert!(
+                    matches!(found, Verdict::Ready(pose) if pose.position_m[0] == 3.0),
+                    "{tick}: {found:?}"
+                );
+            }
+        }
+        assert!((3..=6).contains(&buffer.parents.len()), "{}", buffer.parents.len());
+        assert_eq!(counters, Counters::default());
+    }
+
+    #[test]
+    fn what_keeps_all_clouds_from_their_poses_is_reported() {
+        let (mut buffer, mut counters) = (buffer(), Counters::default());
+        let now = Instant::now();
+        buffer.insert(&pose("base", "lidar", 0, 1.0), true, None, now, &mut queue(), &mut counters);
+        let mut lost = |seconds| {
+            let now = now + Duration::from_secs(seconds);
+            buffer.verdict(&Cloud { arrived: now, ..cloud(0) }, now);
+            buffer.trouble()
+        };
+        assert_eq!((lost(0), lost(2)), (None, None));
+        let why = "no cloud gets a pose: no transform names the frame map (a cloud of lidar in map)";
+        assert_eq!(lost(4).as_deref(), Some(why));
+    }
+
+    #[test]
+    fn a_long_name_is_no_frame() {
+        let (mut buffer, mut counters) = (buffer(), Counters::default());
+        buffer.insert(
+            &pose("map", &"x".repeat(1 << 20), 0, 0.0),
+            true,
+            None,
+            Instant::now(),
+            &mut queue(),
+            &mut counters,
+        );
+        assert_eq!((buffer.transforms.frames(), counters.transforms_refused), (0, 1));
+    }
+
+    #[test]
+    fn clouds_that_wait_for_long_keep_the_poses_that_they_had() {
+        const S: i64 = 1_000_000_000;
+        let (mut buffer, mut counters, mut queue, start) =
+            (buffer(), Counters::default(), queue(), Instant::now());
+        let mut tick = |buffer: &mut TransformBuffer, queue: &mut CloudQueue, number: i64| {
+            let now = start + Duration::from_millis(20) * number as u32;
+            let pose = pose("map", "lidar", number * S / 50, number as f64 / 50.0);
+            buffer.insert(&pose, false, None, now, queue, &mut counters);
+        };
+        queue.push(cloud(2 * S), &mut Counters::default());
+        queue.push(cloud(70 * S + S / 100), &mut Counters::default());
+        // The mapper comes to them after two minutes.
+        (0..6000).for_each(|number| tick(&mut buffer, &mut queue, number));
+        let now = start + Duration::from_secs(120);
+        let mut take = || queue.take_ready(&mut Counters::default(), |cloud| buffer.verdict(cloud, now));
+        let mut places_m = Vec::new();
+        while let Some((_, pose)) = take() {
+            places_m.push(pose.position_m[0]);
+        }
+        assert_eq!(places_m.len(), 2);
+        assert!((places_m[0] - 2.0).abs() + (places_m[1] - 70.01).abs() < 1e-9, "{places_m:?}");
+    }
+
+    #[test]
+    fn a_cloud_of_a_clock_that_has_gone_back_gets_no_pose_of_before() {
+        const S: i64 = 1_000_000_000;
+        let (mut buffer, mut counters, mut queue, start) =
+            (buffer(), Counters::default(), queue(), Instant::now());
+        let at = |number: i64| start + Duration::from_millis(20) * number as u32;
+        let mut tick = |buffer: &mut TransformBuffer, queue: &mut CloudQueue, number: i64, stamp_ns, x| {
+            buffer.insert(&pose("map", "lidar", stamp_ns, x), false, None, at(number), queue, &mut counters);
+        };
+        (0..300).for_each(|number| tick(&mut buffer, &mut queue, number, number * S / 50, 1.0));
+        let before = Cloud { arrived: at(299), ..cloud(5 * S + S / 100) };
+        queue.push(before.clone(), &mut Counters::default());
+        assert!(matches!(buffer.verdict(&before, at(299)), Verdict::Ready(_)));
+        // A bag is played again, from its second on.
+        tick(&mut buffer, &mut queue, 300, S, 9.0);
+        let again = Cloud { arrived: at(301), ..cloud(2 * S + S / 100) };
+        assert_eq!(buffer.verdict(&again, at(301)), Verdict::Waits);
+        assert!(matches!(buffer.verdict(&before, at(301)), Verdict::Ready(_)));
+        (301..400).for_each(|number| tick(&mut buffer, &mut queue, number, (number - 250) * S / 50, 9.0));
+        let found = buffer.verdict(&again, at(301));
+        assert!(matches!(found, Verdict::Ready(pose) if pose.position_m[0] == 9.0), "{found:?}");
+        let taken = queue.take_ready(&mut Counters::default(), |cloud| buffer.verdict(cloud, at(400)));
+        assert_eq!(taken.map(|(_, pose)| pose.position_m[0]), Some(1.0));
+    }
+}

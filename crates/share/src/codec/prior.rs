@@ -1,0 +1,33 @@
+use super::bit_coder::Bits;
+use super::context::CONTEXTS;
+use super::voxel_tree::{Cube, Update};
+use voxtile::{FormatError, Result};
+
+/// Probability of a 1 in each context before a packet's own bits are known, in 1/256; 0 if the context never occurred.
+///
+/// Counted in packets of lidar scans of a hall, of a street and by hand; `docs/sharing.md` says how, and what it gains
+/// for scans that were not counted. Part of the format: another table needs another version.
+pub(super) static PRIOR: &[u8; CONTEXTS] = include_bytes!("prior.bin");
+
+/// Counts zeros and ones in each context of a packet of these updates: the source of the prior.
+///
+/// # Errors
+///
+/// As for [`encode_updates`](super::encode_updates).
+pub fn count_contexts(updates: &[Update], counts: &mut [[u64; 2]]) -> Result<()> {
+    let cube = Cube::of(updates)?;
+    // A counter cannot fail.
+    let _ = cube.walk(&mut Counter(counts));
+    Ok(())
+}
+
+struct Counter<'a>(&'a mut [[u64; 2]]);
+
+impl Bits for Counter<'_> {
+    fn bit(&mut self, context: usize, bit: bool) -> std::result::Result<bool, FormatError> {
+        if let Some(counts) = self.0.get_mut(context) {
+            counts[usize::from(bit)] += 1;
+        }
+        Ok(bit)
+    }
+}

@@ -1,0 +1,334 @@
+use super::anti_entropy::AntiEntropy;
+use super::codec::{DigestEntry, Header, MAX_LISTED, Packet, Request, Status, Update};
+use super::differences::Content;
+use super::layer_limits::LayerLimits;
+use super::nonce::Nonce;
+use super::receiver_config::{ReceiverConfig, ReceiverCounts};
+use super::replace::Work;
+use super::set::VoxelSet;
+use super::set_range::SetRange;
+use super::stream::Stream;
+use std::time::Duration;
+use voxtile::FormatError;
+use voxtile::space::{Grid, TileIndex};
+
+/// Receives the packets of one robot and keeps a layer: its set of voxels. The owner calls [`Receiver::poll`] a few
+/// times a second.
+#[derive(Clone, Debug)]
+pub struct Receiver {
+    config: ReceiverConfig,
+    pub(super) limits: LayerLimits,
+    pub(super) layer: Option<VoxelSet>,
+    pub(super) stream: Option<Stream>,
+    /// Bytes of memory for the versions of voxels.
+    pub(super) version_bytes: usize,
+    anti_entropy: AntiEntropy,
+    pub(super) counts: ReceiverCounts,
+    nonce: Nonce,
+    /// Since when packets have come that need a status to explain them.
+    unexplained_since: Option<Duration>,
+    request_missing_at: Duration,
+    /// The layer was equal to the sender's set as of this packet.
+    pub(super) equal_as_of: Option<u64>,
+    pub(super) is_over_limit: bool,
+    /// A status to be compared with the layer, and the earliest time for that.
+    to_compare: Option<Status>,
+    compare_at: Duration,
+    /// The last refused grid.
+    refused_grid: Option<Grid>,
+}
+
+/// After so long without an answer a sender is believed: there may be no way back to it.
+const ONE_WAY: Duration = Duration::from_secs(5);
+/// Time before the first repeated request for a packet: its voxels come with a frame.
+const RETRY: Duration = Duration::from_millis(1500);
+/// Time between two comparisons, per voxel and per tile of the layer: some twenty times the cost of a comparison.
+const COMPARE_NS_PER_VOXEL: u64 = 100;
+const COMPARE_NS_A_TILE: u64 = 2000;
+
+impl Receiver {
+    /// A receiver without a layer.
+    pub fn new(config: ReceiverConfig) -> Self {
+        Self::started(config, None)
+    }
+
+    /// A receiver that continues with the layer of an earlier one.
+    pub fn with_layer(config: ReceiverConfig, layer: VoxelSet) -> Self {
+        Self::started(config, Some(layer))
+    }
+
+    pub(super) fn started(config: ReceiverConfig, layer: Option<VoxelSet>) -> Self {
+        let nonce = Nonce::new(config.nonce_seed);
+        let mut receiver = Self {
+            limits: LayerLimits::new(&config, 0),
+            config,
+            layer,
+            stream: None,
+            version_bytes: 0,
+            anti_entropy: AntiEntropy::default(),
+            counts: ReceiverCounts::default(),
+            nonce,
+            unexplained_since: None,
+            request_missing_at: Duration::ZERO,
+            equal_as_of: None,
+            is_over_limit: false,
+            to_compare: None,
+            compare_at: Duration::ZERO,
+            refused_grid: None,
+        };
+        receiver.set_part_bytes(receiver.config.memory_bytes);
+        receiver.set_memory_bytes(receiver.config.memory_bytes);
+        receiver.cut_to_bytes(receiver.config.memory_bytes);
+        receiver
+    }
+
+    /// The robot's voxels so far; `None` before any packet was accepted.
+    pub fn layer(&self) -> Option<&VoxelSet> {
+        self.layer.as_ref()
+    }
+
+    /// The layer, for its digests.
+    pub fn layer_mut(&mut self) -> Option<&mut VoxelSet> {
+        self.layer.as_mut()
+    }
+
+    /// Ends the receiver and returns its layer.
+    pub fn into_layer(self) -> Option<VoxelSet> {
+        self.layer
+    }
+
+    /// Counts so far.
+    pub fn counts(&self) -> ReceiverCounts {
+        self.counts
+    }
+
+    /// Number of lost packets.
+    pub fn missing_packets(&self) -> usize {
+        self.stream.as_ref().map_or(0, Stream::missing)
+    }
+
+    /// Whether the layer was found equal to the sender's set, and nothing came since.
+    pub fn is_converged(&self) -> bool {
+        let Some(stream) = &self.stream else { return false };
+        stream.is_complete() && self.equal_as_of == Some(stream.highest) && self.unexplained_since.is_none()
+    }
+
+    /// Epoch and number of the packet as of which the layer was last found equal to the sender's set.
+    pub fn equal_as_of(&self) -> Option<(u32, u64)> {
+        Some((self.stream.as_ref()?.epoch, self.equal_as_of?))
+    }
+
+    /// Whether voxels were refused: then the layer cannot become equal and is not compared any more.
+    pub fn is_over_limit(&self) -> bool {
+        self.is_over_limit
+    }
+
+    /// The grid of the robot's voxels, if it was refused.
+    pub fn refused_grid(&self) -> Option<&Grid> {
+        self.refused_grid.as_ref()
+    }
+
+    /// Takes the bytes of a packet.
+    ///
+    /// # Errors
+    ///
+    /// Bytes that are not a packet; the layer is unchanged.
+    pub fn take(&mut self, bytes: &[u8], now: Duration) -> Result<(), FormatError> {
+        self.counts.bytes += bytes.len() as u64;
+        let taken = Packet::decode(bytes).and_then(|packet| self.take_packet(packet, now));
+        match &taken {
+            Ok(()) => self.counts.packets += 1,
+            Err(_) => self.counts.malformed += 1,
+        }
+        taken
+    }
+
+    fn take_packet(&mut self, packet: Packet, now: Duration) -> Result<(), FormatError> {
+        let Header { epoch, sequence } = packet.header();
+        if let Packet::Status(status) = packet {
+            self.take_status(&status, now);
+            return Ok(());
+        }
+        if !self.stream.as_ref().is_some_and(|stream| stream.can_be(epoch, sequence)) {
+            self.counts.unconfirmed += 1;
+            self.unexplained_since.get_or_insert(now);
+            return Ok(());
+        }
+        match packet {
+            Packet::Changes { repaired, updates, .. } => {
+                self.take_changes(sequence, &repaired, &updates, now)
+            }
+            Packet::Content { range, voxels, .. } => {
+                let Some(layer) = &self.layer else { return Ok(()) };
+                let content = Content::new(layer.grid(), range, &voxels)
+                    .ok_or_else(|| FormatError::at_offset(0, "content with voxels outside of its range"))?;
+                self.take_content(sequence, range, &content, &mut Work::of_a_packet(), now);
+            }
+            Packet::Digests { first, entries, .. } => self.take_digests(sequence, first, &entries, now),
+            Packet::Status(_) => {}
+        }
+        Ok(())
+    }
+
+    fn take_changes(&mut self, sequence: u64, repaired: &[u64], updates: &[Update], now: Duration) {
+        let (Some(stream), Some(layer)) = (&mut self.stream, &mut self.layer) else { return };
+        for &repaired in repaired {
+            stream.is_repaired(repaired);
+        }
+        if !stream.arrive(sequence, now, self.config.patience) {
+            self.counts.repeated += 1;
+            return;
+        }
+        let grid = *layer.grid();
+        for update in updates {
+            if !stream.versions.is_later(&grid, update.voxel, sequence)
+                && !self.limits.put(layer, update.voxel, update.is_in)
+            {
+                self.counts.refused_voxels += 1;
+                self.is_over_limit = true;
+            }
+        }
+        stream.versions.note(sequence, updates.iter().map(|update| update.voxel));
+    }
+
+    /// Replaces a range of the layer by a packet's content, except for voxels changed after that packet's version.
+    fn take_content(
+        &mut self,
+        as_of: u64,
+        range: SetRange,
+        content: &Content,
+        work: &mut Work,
+        now: Duration,
+    ) {
+        let Some(stream) = &mut self.stream else { return };
+        if as_of < stream.versions.forgotten() {
+            return;
+        }
+        stream.reach(as_of, now, self.config.patience);
+        let Some(done) = self.replace(as_of, range, content, work) else { return };
+        if let Some(stream) = &mut self.stream {
+            stream.versions.note_part(done, as_of);
+        }
+        self.anti_entropy.take_content(done, now);
+    }
+
+    fn take_digests(&mut self, as_of: u64, first: TileIndex, entries: &[DigestEntry], now: Duration) {
+        let Some(layer) = &mut self.layer else { return };
+        let mut work = Work::of_a_packet();
+        for range in self.anti_entropy.take_digests(first, entries, layer, now) {
+            // Requested until it is done: the packet may exceed the work limit.
+            self.anti_entropy.request_content(range);
+            self.take_content(as_of, range, &Content::default(), &mut work, now);
+        }
+    }
+
+    fn take_status(&mut self, status: &Status, now: Duration) {
+        let Header { epoch, sequence } = status.header;
+        let asked_at = self.nonce.take(status.nonce);
+        let Some(stream) = self.stream.as_mut().filter(|stream| stream.can_be(epoch, sequence)) else {
+            let is_one_way = self.unexplained_since.is_some_and(|since| now >= since + ONE_WAY);
+            self.counts.unconfirmed += 1;
+            self.unexplained_since.get_or_insert(now);
+            if asked_at.is_some() || (is_one_way && status.nonce == 0) {
+                self.adopt(status, now);
+            }
+            return;
+        };
+        // If the sender's status does not reach these numbers, someone forged them.
+        if sequence < stream.highest && asked_at.is_some_and(|asked_at| stream.highest_at < asked_at) {
+            self.adopt(status, now);
+            return;
+        }
+        if asked_at.is_some() {
+            self.unexplained_since = None;
+        }
+        stream.reach(sequence, now, self.config.patience);
+        let is_lost = stream.give_up_before(status.oldest);
+        self.compare(status, is_lost, now);
+    }
+
+    /// Starts anew with a sender's status.
+    fn adopt(&mut self, status: &Status, now: Duration) {
+        // The farthest voxels must have coordinates, too.
+        let has_places = |grid: &Grid| grid.center_m([i32::MIN; 3]).iter().all(|k| k.is_finite());
+        let grid = Grid::new(status.resolution_m, status.tile_size_m).ok().filter(has_places);
+        let Some(grid) = grid.filter(|grid| self.config.grid.is_none_or(|accepted| accepted == *grid)) else {
+            self.refused_grid = grid.or(self.refused_grid);
+            self.counts.refused_grids += 1;
+            return;
+        };
+        if self.layer.as_ref().is_none_or(|layer| *layer.grid() != grid) {
+            self.layer = Some(VoxelSet::new(grid));
+        }
+        self.equal_as_of = None;
+        self.stream = Some(Stream::new(status.header.epoch, status.header.sequence, now, self.version_bytes));
+        self.anti_entropy = AntiEntropy::default();
+        self.unexplained_since = None;
+        self.to_compare = None;
+        self.compare(status, false, now);
+    }
+
+    /// Compares the layer with a status once all packets before it are here; starts anti-entropy if they differ. The
+    /// cost grows with voxels and tiles, so the comparison may be delayed.
+    fn compare(&mut self, status: &Status, is_lost: bool, now: Duration) {
+        let (Some(stream), Some(layer)) = (&self.stream, &mut self.layer) else { return };
+        let can_compare = stream.is_complete() && stream.highest == status.header.sequence;
+        let mut differs = is_lost;
+        if can_compare && now < self.compare_at {
+            self.to_compare = Some(*status);
+        } else if can_compare {
+            let wait_ns = COMPARE_NS_PER_VOXEL.saturating_mul(layer.len())
+                + COMPARE_NS_A_TILE.saturating_mul(layer.tile_count() as u64);
+            self.compare_at = now + Duration::from_nanos(wait_ns);
+            let is_equal = layer.len() == status.voxels && *layer.digest().as_bytes() == status.digest;
+            self.equal_as_of = is_equal.then_some(stream.highest);
+            differs |= !is_equal;
+            if is_equal {
+                self.anti_entropy = AntiEntropy::default();
+                return;
+            }
+        }
+        if differs && self.anti_entropy.is_done() && !self.is_over_limit {
+            self.anti_entropy.begin(layer);
+            self.counts.catch_ups += 1;
+        }
+    }
+
+    /// Requests to send to the robot now.
+    pub fn poll(&mut self, now: Duration) -> Vec<Vec<u8>> {
+        if now >= self.compare_at
+            && let Some(status) = self.to_compare.take()
+        {
+            self.compare(&status, false, now);
+        }
+        if !self.config.sends_requests {
+            return Vec::new();
+        }
+        let mut requests = Vec::new();
+        let mut wants_status = self.unexplained_since.is_some() || self.stream.is_none();
+        if let Some(stream) = &mut self.stream {
+            if now >= self.request_missing_at {
+                let (sequences, is_hopeless) = stream.due(now, MAX_LISTED, RETRY);
+                wants_status |= is_hopeless;
+                if !sequences.is_empty() {
+                    self.request_missing_at = now + self.config.request_interval;
+                    requests.push(Request::Missing { epoch: stream.epoch, sequences });
+                }
+            }
+            let patience = self.config.patience + self.config.request_interval;
+            requests.extend(self.anti_entropy.poll(
+                stream.epoch,
+                now,
+                self.config.request_interval,
+                patience,
+            ));
+        }
+        if wants_status {
+            requests.extend(self.nonce.request(now));
+        }
+        let requests: Vec<Vec<u8>> = requests.iter().map(Request::encode).collect();
+        self.counts.asks += requests.len() as u64;
+        self.counts.ask_bytes += requests.iter().map(|request| request.len() as u64).sum::<u64>();
+        requests
+    }
+}

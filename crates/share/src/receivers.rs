@@ -1,0 +1,167 @@
+use super::receiver::Receiver;
+use super::receiver_config::ReceiverConfig;
+use super::set::VoxelSet;
+use std::collections::BTreeMap;
+use std::time::Duration;
+use voxtile::{Error, FormatError, Result};
+
+/// Receivers of several robots under one memory limit.
+///
+/// While memory is free, any receiver may take it. Once none is free, every robot is entitled to an equal share of the
+/// limit: a robot below its share may grow up to it, and the robot that exceeds its share most loses as many voxels,
+/// from the end of its layer. So nobody loses memory below the share.
+#[derive(Clone, Debug)]
+pub struct Receivers<K> {
+    memory_bytes: usize,
+    robots: BTreeMap<K, Receiver>,
+}
+
+impl<K> IntoIterator for Receivers<K> {
+    type Item = (K, Receiver);
+    type IntoIter = std::collections::btree_map::IntoIter<K, Receiver>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.robots.into_iter()
+    }
+}
+
+/// What one packet can add before voxels are removed: voxels each alone in its tile.
+const PACKET_BYTES: usize = super::codec::MAX_VOXELS_PER_PACKET * VoxelSet::MAX_BYTES_PER_VOXEL;
+
+impl<K: Ord + Clone> Receivers<K> {
+    /// Least memory limit, in bytes.
+    pub const LEAST_BYTES: usize = 64 << 20;
+
+    /// No receivers yet, and a limit on their total memory.
+    ///
+    /// # Errors
+    ///
+    /// Less than [`Receivers::LEAST_BYTES`].
+    pub fn new(memory_bytes: usize) -> Result<Self> {
+        if memory_bytes < Self::LEAST_BYTES {
+            let reason = format!("{memory_bytes} bytes; at least {} are needed", Self::LEAST_BYTES);
+            return Err(Error::argument("memory", reason));
+        }
+        Ok(Self { memory_bytes, robots: BTreeMap::new() })
+    }
+
+    /// Adds a receiver for a robot, with the layer of an earlier one if there is one. Its limit is what the others
+    /// leave; if that is too little, the largest layers shrink. A robot has no share before its first status.
+    pub fn insert(&mut self, robot: K, config: ReceiverConfig, layer: Option<VoxelSet>) {
+        self.robots.insert(robot, Receiver::started(config, layer));
+        self.share_out();
+    }
+
+    /// Gives every robot the same share.
+    fn share_out(&mut self) {
+        let part = self.part_bytes();
+        self.robots.values_mut().for_each(|receiver| receiver.set_part_bytes(part));
+        self.make_room();
+    }
+
+    /// Robots that have sent a status or have a layer.
+    pub fn known(&self) -> usize {
+        self.robots.values().filter(|receiver| receiver.layer().is_some()).count()
+    }
+
+    /// Whether there is a share for one more robot.
+    pub fn has_room(&self) -> bool {
+        self.for_all() / (self.known() + 1) >= Receiver::LEAST_BYTES
+    }
+
+    /// Removes a robot, and returns its receiver.
+    pub fn remove(&mut self, robot: &K) -> Option<Receiver> {
+        self.robots.remove(robot)
+    }
+
+    /// Takes the bytes of a robot's packet. Packets of robots that were not added, or that have no share, are ignored.
+    ///
+    /// # Errors
+    ///
+    /// Bytes that are not a packet; the layer is unchanged.
+    pub fn take(&mut self, robot: &K, bytes: &[u8], now: Duration) -> std::result::Result<(), FormatError> {
+        let (all, part) = (self.memory_bytes(), self.part_bytes());
+        let for_all = self.for_all();
+        let has_room = self.has_room();
+        let Some(receiver) = self.robots.get_mut(robot) else { return Ok(()) };
+        let was_known = receiver.layer().is_some();
+        if !was_known && !has_room {
+            return Ok(());
+        }
+        let free = for_all.saturating_sub(all - receiver.memory_bytes());
+        receiver.set_memory_bytes(free.max(part));
+        let taken = receiver.take(bytes, now);
+        if receiver.layer().is_some() != was_known {
+            self.share_out();
+        } else {
+            self.make_room();
+        }
+        taken
+    }
+
+    /// Shrinks the layers that exceed their share most, until the limit is kept.
+    fn make_room(&mut self) {
+        let part = self.part_bytes();
+        loop {
+            let excess = self.memory_bytes().saturating_sub(self.for_all());
+            let most = self.robots.values_mut().max_by_key(|receiver| receiver.memory_bytes());
+            let Some(receiver) = most.filter(|receiver| excess > 0 && receiver.memory_bytes() > part) else {
+                return;
+            };
+            let before = receiver.memory_bytes();
+            receiver.cut_to_bytes(part.max(before - excess));
+            if receiver.memory_bytes() >= before {
+                return;
+            }
+        }
+    }
+
+    /// Upper bound of the bytes of memory of all receivers.
+    pub fn memory_bytes(&self) -> usize {
+        self.robots.values().map(Receiver::memory_bytes).sum()
+    }
+
+    /// The share of each robot, whatever the others do.
+    pub fn part_bytes(&self) -> usize {
+        self.for_all() / self.known().max(1)
+    }
+
+    /// Free bytes, beyond what a packet may need.
+    pub fn free_bytes(&self) -> usize {
+        self.for_all().saturating_sub(self.memory_bytes())
+    }
+
+    fn for_all(&self) -> usize {
+        self.memory_bytes - PACKET_BYTES
+    }
+
+    /// Number of robots.
+    pub fn len(&self) -> usize {
+        self.robots.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.robots.is_empty()
+    }
+
+    /// A robot's receiver.
+    pub fn get(&self, robot: &K) -> Option<&Receiver> {
+        self.robots.get(robot)
+    }
+
+    /// The same, mutably, for its requests and for digests of its layer.
+    pub fn get_mut(&mut self, robot: &K) -> Option<&mut Receiver> {
+        self.robots.get_mut(robot)
+    }
+
+    /// All receivers, by robot.
+    pub fn iter(&self) -> impl Iterator<Item = (&K, &Receiver)> {
+        self.robots.iter()
+    }
+
+    /// The same, mutably, for their requests and for digests of their layers.
+    pub fn iter_mut(&mut self) -> impl Iterator<Item = (&K, &mut Receiver)> {
+        self.robots.iter_mut()
+    }
+}

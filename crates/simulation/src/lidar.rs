@@ -1,0 +1,200 @@
+use super::{Hit, Random, World};
+use std::f64::consts::PI;
+use voxtile::maths;
+use voxtile::scan::{Pose, Scan};
+use voxtile::space::Point;
+
+/// A spinning lidar: beams at fixed elevations, each fired at even steps around the full circle.
+///
+/// Its frame has x ahead, y to the left, z up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Lidar {
+    /// Beams above each other.
+    pub beams: u32,
+    /// Rays of each beam in a turn.
+    pub rays_per_beam: u32,
+    /// Elevation of the lowest and the highest beam in degrees, up is positive; the others lie evenly between.
+    pub elevation_deg: [f64; 2],
+    /// Farther surfaces are not seen, in metres; at most [`Scene::MAX_RADIUS_M`](super::Scene::MAX_RADIUS_M).
+    pub max_range_m: f64,
+    /// Standard deviation of a measured distance in metres; 0 measures exactly.
+    pub range_noise_m: f64,
+    /// Whether a ray that meets nothing still gives a point: the sensor's own position, which maps skip and count.
+    pub reports_misses: bool,
+}
+
+impl Lidar {
+    /// The lidar of the *street* workload: 64 beams of 1024 rays. In a [`City`](super::City) its mean range is
+    /// about 12 m.
+    pub fn street() -> Self {
+        Self {
+            beams: 64,
+            rays_per_beam: 1024,
+            elevation_deg: [-28.0, 8.0],
+            max_range_m: 60.0,
+            range_noise_m: 0.02,
+            reports_misses: false,
+        }
+    }
+
+    /// The lidar of the *indoor* workload: 90 000 rays. In a [`Building`](super::Building) its mean range is
+    /// about 2.3 m.
+    pub fn indoor() -> Self {
+        Self {
+            beams: 100,
+            rays_per_beam: 900,
+            elevation_deg: [-70.0, 70.0],
+            max_range_m: 20.0,
+            range_noise_m: 0.01,
+            reports_misses: false,
+        }
+    }
+
+    /// A small lidar for a quick look: 16 beams of 360 rays.
+    pub fn demo() -> Self {
+        Self { beams: 16, rays_per_beam: 360, max_range_m: 40.0, ..Self::street() }
+    }
+
+    /// The street lidar with about so many rays a turn (at least 1): 64 beams from 32 768 rays on, else 32 from 4096
+    /// on, else 16.
+    pub fn of_rays(rays: u32) -> Self {
+        let beams = match rays {
+            32_768.. => 64,
+            4_096.. => 32,
+            _ => 16,
+        };
+        Self { beams, rays_per_beam: (rays.saturating_add(beams / 2) / beams).max(1), ..Self::street() }
+    }
+
+    /// A lidar on a mast of [`Lidar::MAST_M`], with about so many rays a turn: it looks down on the city around, as far
+    /// as [`Scene::MAX_RADIUS_M`](super::Scene::MAX_RADIUS_M).
+    pub fn mast(rays: u32) -> Self {
+        Self { elevation_deg: [-40.0, -4.0], max_range_m: super::Scene::MAX_RADIUS_M, ..Self::of_rays(rays) }
+    }
+
+    /// Height of the mast of [`Lidar::mast`] above the ground, in metres: above all roofs.
+    pub const MAST_M: f64 = 50.0;
+
+    /// What the lidar sees from a pose: points in the world frame, intensities from 0 to 255.
+    ///
+    /// The points come in the order of a turn, all beams of one direction together. The noise is that of
+    /// `seed` and `scan_number`, so it is another one at the next visit.
+    pub fn scan(&self, world: &impl World, world_from_sensor: &Pose, seed: u64, scan_number: u64) -> Scan {
+        let origin = world_from_sensor.position_m();
+        let rotation = world_from_sensor.isometry().rotation.to_rotation_matrix();
+        let r = rotation.matrix();
+        let scene = world.scene(origin, self.max_range_m);
+        let mut noise = Random::of(seed, &[scan_number as i64]);
+        let elevations: Vec<(f64, f64)> = (0..self.beams).map(|beam| self.elevation(beam)).collect();
+        let mut points: Vec<Point> = Vec::new();
+        let mut intensities = Vec::new();
+        for column in 0..self.rays_per_beam {
+            let azimuth_rad = 2.0 * PI * f64::from(column) / f64::from(self.rays_per_beam);
+            let (sin_azimuth, cos_azimuth) = maths::sin_cos(azimuth_rad);
+            for &(up, flat) in &elevations {
+                let d = [flat * cos_azimuth, flat * sin_azimuth, up];
+                let direction =
+                    std::array::from_fn(|i| r[(i, 0)] * d[0] + r[(i, 1)] * d[1] + r[(i, 2)] * d[2]);
+                // Drawn for every ray, so that a ray's noise does not depend on what others met.
+                let error_m = self.range_noise_m * noise.bell();
+                match scene.cast(origin, direction, self.max_range_m) {
+                    Some(hit) => {
+                        let measured_m = (hit.distance_m + error_m).max(0.0);
+                        points.push(std::array::from_fn(|k| origin[k] + direction[k] * measured_m));
+                        intensities.push(intensity(&hit));
+                    }
+                    None if self.reports_misses => {
+                        points.push(origin);
+                        intensities.push(0.0);
+                    }
+                    None => {}
+                }
+            }
+        }
+        Scan { origin, points, intensities: Some(intensities) }
+    }
+
+    /// Sine and cosine of a beam's elevation.
+    fn elevation(&self, beam: u32) -> (f64, f64) {
+        let [low, high] = self.elevation_deg;
+        let share = if self.beams > 1 { f64::from(beam) / f64::from(self.beams - 1) } else { 0.5 };
+        maths::sin_cos((low + (high - low) * share) * (PI / 180.0))
+    }
+}
+
+/// The echo as a lidar reports it, a whole number from 0 to 255: dimmer from afar and at a grazing angle.
+fn intensity(hit: &Hit) -> f32 {
+    let distance = hit.distance_m / 40.0;
+    let echo = hit.reflectivity * (0.5 + 0.5 * hit.cos_incidence) / (1.0 + distance * distance);
+    // Near and bright surfaces saturate, as they do in a real one.
+    (400.0 * echo + 0.5).floor().clamp(0.0, 255.0) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::route::level_pose;
+    use super::super::{Building, City};
+    use super::*;
+
+    #[test]
+    fn without_noise_every_point_lies_on_a_surface() {
+        let lidar = Lidar { range_noise_m: 0.0, beams: 8, ..Lidar::street() };
+        let pose = level_pose([2.0, 30.0, 1.8], 1.2);
+        let scan = lidar.scan(&City::new(3), &pose, 1, 0);
+        let scene = super::super::World::scene(&City::new(3), scan.origin, 90.0);
+        assert!(scan.points.len() > 3_000);
+        for point in &scan.points {
+            let box_m = scene.solids().iter().map(|solid| solid.bounds.distance_squared(*point).sqrt());
+            let nearest_m = box_m.fold(point[2].abs(), f64::min);
+            assert!(nearest_m < 1e-9, "{point:?} hangs {nearest_m} m from everything");
+        }
+    }
+
+    #[test]
+    fn rays_that_meet_nothing_give_a_point_only_if_asked() {
+        let lidar = Lidar { elevation_deg: [80.0, 90.0], beams: 4, ..Lidar::street() };
+        let pose = level_pose([0.0, 0.0, 1.8], 0.0);
+        let city = City::new(3);
+        assert_eq!(lidar.scan(&city, &pose, 1, 0).points, Vec::<Point>::new());
+        let scan = Lidar { reports_misses: true, ..lidar }.scan(&city, &pose, 1, 0);
+        assert_eq!(scan.points, vec![scan.origin; 4 * 1024]);
+    }
+
+    #[test]
+    fn intensities_are_whole_numbers_of_a_byte_and_spread() {
+        let scan = Lidar::indoor().scan(&Building::new(3), &level_pose([2.0, 10.0, 1.4], 0.0), 1, 0);
+        let intensities = scan.intensities.expect("a lidar has intensities");
+        assert_eq!(intensities.len(), scan.points.len());
+        assert!(intensities.iter().all(|i| (0.0..=255.0).contains(i) && i.fract() == 0.0));
+        let bright = intensities.iter().filter(|&&i| i > 100.0).count();
+        assert!(bright > intensities.len() / 10 && bright < intensities.len());
+    }
+
+    #[test]
+    fn a_lidar_has_about_as_many_rays_as_asked_for() {
+        for rays in [0, 1, 100, 4_000, 8_000, 65_536, 1_000_000] {
+            let lidar = Lidar::of_rays(rays);
+            let has = lidar.beams * lidar.rays_per_beam;
+            assert!(has.abs_diff(rays) <= lidar.beams, "{has} for {rays}");
+        }
+        assert_eq!(Lidar::of_rays(u32::MAX).beams, 64);
+    }
+
+    #[test]
+    fn a_lidar_of_odd_numbers_scans_without_a_panic() {
+        for odd in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e300] {
+            let lidar = Lidar {
+                beams: 1,
+                rays_per_beam: 3,
+                elevation_deg: [odd; 2],
+                max_range_m: odd,
+                range_noise_m: odd,
+                ..Lidar::demo()
+            };
+            lidar.scan(&City::new(1), &level_pose([odd, 0.0, 1.0], 0.0), 1, 0);
+        }
+        let nothing = Lidar { beams: 0, ..Lidar::demo() };
+        assert!(nothing.scan(&City::new(1), &level_pose([0.0, 0.0, 1.0], 0.0), 1, 0).points.is_empty());
+    }
+}

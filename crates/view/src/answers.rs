@@ -1,0 +1,168 @@
+//! What is computed for a request: it may read tiles, so a thread that may wait does it.
+
+use super::map_state::Shown;
+use super::response::{Answer, Keep};
+use super::route::{MapId, Thing};
+use super::served_map::{Found, Makes, ServedMap};
+use hyper::StatusCode;
+use serde_json::{Value, json};
+use std::sync::Arc;
+use voxtile::mapper::MapView;
+use voxtile::query::UnknownAs;
+use voxtile::space::{Aabb, VoxelIndex};
+use voxtile::{Error, Point, Queries, Result};
+use voxtile_pipeline::AnyMap;
+use voxtile_pipeline::answer_at;
+
+/// Most places of a trajectory.
+const TRAJECTORY: usize = 20_000;
+
+/// `maps.json`: which maps there are.
+pub fn maps(maps: &[Arc<ServedMap>]) -> Answer {
+    let maps: Vec<Value> = maps.iter().enumerate().map(|(number, map)| describe(number, map)).collect();
+    Answer::json(json!({ "maps": maps }))
+}
+
+fn describe(number: usize, map: &ServedMap) -> Value {
+    let state = map.now();
+    let grid = state.map.config().grid;
+    let edge_m = grid.tile_size_m();
+    let bounds = state.map.tile_bounds().map(|tiles| {
+        let corner = |tile: [i32; 3], more: i64| tile.map(|k| (i64::from(k) + more) as f64 * edge_m);
+        json!({ "min": corner(tiles.min().to_array(), 0), "max": corner(tiles.max().to_array(), 1) })
+    });
+    let listed = map.snapshots();
+    let snapshots = listed.iter().map(|listed| json!({ "name": listed.name, "tiles": listed.tiles }));
+    json!({
+        "id": number.to_string(),
+        "name": map.name(),
+        "resolution_m": grid.resolution_m(),
+        "tile_size_m": edge_m,
+        "tiles": state.map.tile_indices().len(),
+        "generation": state.generation,
+        "bounds": bounds,
+        "scans": state.map.scan_number(),
+        "snapshots": snapshots.collect::<Vec<_>>(),
+        "pending_tiles": state.pending_tiles,
+        "unreadable": state.levels.unreadable(),
+    })
+}
+
+/// What is asked of a map; `None` if that takes levels which are to be made first, and this may not.
+pub fn of_map(
+    maps: &[Arc<ServedMap>],
+    id: &MapId,
+    thing: &Thing,
+    version: Option<u64>,
+    makes: Makes,
+) -> Option<Answer> {
+    let nothing = || Answer::error(StatusCode::NOT_FOUND, "there is no such map, snapshot or node");
+    let Some(map) = maps.get(id.number) else { return Some(nothing()) };
+    let answer = if thing.takes_levels() {
+        match map.shown(id, makes) {
+            Ok(Found::Here(shown)) => of_levels(&shown, thing, version),
+            Ok(Found::NotMade) => return None,
+            Ok(Found::Nothing) => Ok(None),
+            Err(error) => Err(error),
+        }
+    } else {
+        map.asked(id).and_then(|asked| match asked {
+            Some(asked) => question(asked.map(), thing),
+            None => Ok(None),
+        })
+    };
+    Some(match answer {
+        Ok(answer) => answer.unwrap_or_else(nothing),
+        Err(error) => {
+            let status = status_of(&error);
+            if status.is_server_error() {
+                log::warn!("{error:#}");
+            }
+            Answer::error(status, &format!("{error:#}"))
+        }
+    })
+}
+
+/// Whose error it is: of the request, of the moment, of a bucket, or of the map.
+fn status_of(error: &Error) -> StatusCode {
+    match error {
+        Error::InvalidArgument { .. } | Error::TooLarge { .. } => StatusCode::BAD_REQUEST,
+        Error::Changed { .. } | Error::Expired | Error::Stopped => StatusCode::SERVICE_UNAVAILABLE,
+        Error::NoAnswer { .. } => StatusCode::GATEWAY_TIMEOUT,
+        _ => StatusCode::INTERNAL_SERVER_ERROR,
+    }
+}
+
+/// `version` is that which the request asks for: an answer of another one, of a newer state, is not kept as if it were.
+fn of_levels(shown: &Shown, thing: &Thing, version: Option<u64>) -> Result<Option<Answer>> {
+    let keep = match thing {
+        Thing::Node(key, _) | Thing::Subtree(key) if version.is_some() && shown.version(*key)? == version => {
+            Keep::ForEver
+        }
+        _ => Keep::No,
+    };
+    let kept = |answer: Answer| Answer { keep, ..answer };
+    Ok(match thing {
+        Thing::Tileset => Some(Answer::json(shown.tileset()?)),
+        Thing::Subtree(key) => shown.subtree(*key)?.map(Answer::json).map(kept),
+        Thing::Node(key, kind) => shown.node(*key, *kind)?.map(|bytes| Answer::node(bytes, keep)),
+        Thing::Query(_) | Thing::Raycast(..) | Thing::Trajectory => None,
+    })
+}
+
+/// What a map says without its levels.
+fn question(map: &AnyMap, thing: &Thing) -> Result<Option<Answer>> {
+    let answer = match thing {
+        Thing::Query(point) => query(map, *point)?,
+        Thing::Raycast(from, to) => raycast(map, *from, *to)?,
+        Thing::Trajectory => {
+            let (scans, points) = trajectory(map, TRAJECTORY)?;
+            json!({ "scans": scans, "points": points })
+        }
+        Thing::Tileset | Thing::Subtree(_) | Thing::Node(..) => return Ok(None),
+    };
+    Ok(Some(Answer::json(answer)))
+}
+
+/// Where the sensor was, scan by scan, at most so many places; and how many scans there are.
+fn trajectory(map: &AnyMap, most: usize) -> Result<(u64, Vec<Point>)> {
+    let AnyMap::Map(map) = map else { return Ok((0, Vec::new())) };
+    let scans = map.scans()?;
+    let step = scans.len().div_ceil(most).max(1);
+    let last = scans.last().filter(|_| scans.len() % step != 1 && step > 1);
+    let points = scans.iter().step_by(step).chain(last).map(|scan| scan.origin_m).collect();
+    Ok((scans.len() as u64, points))
+}
+
+/// As `voxtile query --json`, and which voxel and tile it is.
+fn query(map: &AnyMap, point: Point) -> Result<Value> {
+    let grid = map.config().grid;
+    let mut answer = json!(answer_at(map, point)?);
+    if let (Some(voxel), Some(object)) = (grid.voxel_of(point), answer.as_object_mut()) {
+        object.insert("voxel_m".into(), json!(extent(&grid, voxel)));
+        object.insert("tile".into(), json!(grid.tile_of_voxel(voxel).to_array()));
+    }
+    Ok(answer)
+}
+
+fn extent(grid: &voxtile::Grid, voxel: VoxelIndex) -> Aabb {
+    Aabb { min: voxel.map(|k| grid.corner_m(k)), max: voxel.map(|k| grid.corner_m(k.saturating_add(1))) }
+}
+
+/// Whether one point is seen from another: the voxel of the second may be occupied itself.
+fn raycast(map: &AnyMap, from: Point, to: Point) -> Result<Value> {
+    let grid = map.config().grid;
+    let is_end = |center: Point| grid.voxel_of(center) == grid.voxel_of(to);
+    let hit = map.cast_segment(from, to, UnknownAs::Free)?;
+    let first = map.cast_segment(from, to, UnknownAs::Obstacle)?;
+    let blocked = hit.filter(|hit| !is_end(hit.center_m));
+    let unknown = first.filter(|hit| hit.probability.is_none() && !is_end(hit.center_m));
+    Ok(json!({
+        "from_m": from,
+        "to_m": to,
+        "visible": blocked.is_none(),
+        "hit": blocked,
+        // How far the way is known; null if all of it is.
+        "unknown_from_m": unknown.map(|hit| hit.distance_m),
+    }))
+}

@@ -1,0 +1,218 @@
+use super::token::Token;
+use std::str::FromStr;
+use voxtile::Point;
+use voxtile::store::SnapshotName;
+use voxtile_render::levels::{Kind, NodeKey};
+
+/// What a request asks for.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Route {
+    /// A file of the page.
+    Page(&'static str),
+    /// The page without the slash that makes its links work.
+    Slash,
+    Maps,
+    Events,
+    Of(MapId, Thing),
+}
+
+/// Which map, and which state of it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct MapId {
+    /// Number of the map.
+    pub number: usize,
+    pub at: At,
+    /// The state to compare with.
+    pub since: Option<At>,
+}
+
+/// A state of a map.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum At {
+    Now,
+    Snapshot(SnapshotName),
+}
+
+/// What of a map.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Thing {
+    Tileset,
+    Subtree(NodeKey),
+    Node(NodeKey, Kind),
+    Query(Point),
+    Raycast(Point, Point),
+    Trajectory,
+}
+
+impl Route {
+    /// The route of a path and what follows its question mark; `None` if there is nothing for it, which a wrong token
+    /// has as well.
+    pub fn of(path: &str, question: Option<&str>, token: &Token) -> Option<Self> {
+        let (given, rest) = match path.strip_prefix('/')?.split_once('/') {
+            Some((given, rest)) => (given, Some(rest)),
+            None => (path.strip_prefix('/')?, None),
+        };
+        if !token.is(given) {
+            return None;
+        }
+        let Some(rest) = rest else { return Some(Self::Slash) };
+        match rest {
+            "" | "index.html" => return Some(Self::Page("index.html")),
+            "page.js" => return Some(Self::Page("page.js")),
+            "page.css" => return Some(Self::Page("page.css")),
+            "licences.txt" => return Some(Self::Page("licences.txt")),
+            "maps.json" => return Some(Self::Maps),
+            "events" => return Some(Self::Events),
+            _ => {}
+        }
+        let (id, thing) = rest.strip_prefix("maps/")?.split_once('/')?;
+        Some(Self::Of(id.parse().ok()?, Thing::of(thing, question.unwrap_or_default())?))
+    }
+}
+
+impl Thing {
+    /// Whether it is of the levels of a state; everything else is asked of the map itself.
+    pub fn takes_levels(&self) -> bool {
+        matches!(self, Self::Tileset | Self::Subtree(_) | Self::Node(..))
+    }
+
+    fn of(path: &str, question: &str) -> Option<Self> {
+        let key = |text: &str, extension| text.strip_suffix(extension)?.parse().ok();
+        match path {
+            "tileset.json" => Some(Self::Tileset),
+            "trajectory.json" => Some(Self::Trajectory),
+            "query" => {
+                let number = |name| field(question, name)?.parse().ok();
+                Some(Self::Query(finite([number("x")?, number("y")?, number("z")?])?))
+            }
+            "raycast" => {
+                Some(Self::Raycast(point(field(question, "from")?)?, point(field(question, "to")?)?))
+            }
+            _ => match path.split_once('/')? {
+                ("subtree", rest) => Some(Self::Subtree(key(rest, ".json")?)),
+                ("node", rest) => {
+                    let kind = match field(question, "what") {
+                        None | Some("occupied") => Kind::Occupied,
+                        Some("free") => Kind::Free,
+                        Some("unknown") => Kind::Unknown,
+                        Some(_) => return None,
+                    };
+                    Some(Self::Node(key(rest, ".vox")?, kind))
+                }
+                _ => None,
+            },
+        }
+    }
+}
+
+/// The version that a URL names, `v=0123456789abcdef`.
+pub fn version_in(question: &str) -> Option<u64> {
+    u64::from_str_radix(field(question, "v")?, 16).ok()
+}
+
+/// The value of a name in `a=1&b=2`.
+fn field<'a>(question: &'a str, name: &str) -> Option<&'a str> {
+    question.split('&').find_map(|part| part.strip_prefix(name)?.strip_prefix('='))
+}
+
+/// `X,Y,Z`; the comma may be written as `%2C`.
+fn point(text: &str) -> Option<Point> {
+    let text = text.replace("%2C", ",").replace("%2c", ",");
+    let mut numbers = text.split(',').map(|number| number.parse().ok());
+    let point = [numbers.next()??, numbers.next()??, numbers.next()??];
+    if numbers.next().is_some() { None } else { finite(point) }
+}
+
+fn finite(point: Point) -> Option<Point> {
+    point.iter().all(|coordinate| coordinate.is_finite()).then_some(point)
+}
+
+/// `0`, `0@monday`, and both with `~monday` for what changed since.
+impl FromStr for MapId {
+    type Err = ();
+
+    fn from_str(text: &str) -> Result<Self, ()> {
+        let (state, since) = match text.split_once('~') {
+            Some((state, since)) => (state, Some(At::Snapshot(SnapshotName::new(since).map_err(|_| ())?))),
+            None => (text, None),
+        };
+        let (number, at) = match state.split_once('@') {
+            Some((number, name)) => (number, At::Snapshot(SnapshotName::new(name).map_err(|_| ())?)),
+            None => (state, At::Now),
+        };
+        Ok(Self { number: number.parse().map_err(|_| ())?, at, since })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn route(path: &str, question: Option<&str>) -> Option<Route> {
+        Route::of(path, question, &Token::new("sesame_42").unwrap())
+    }
+
+    #[test]
+    fn paths_ask_for_what_is_there_and_nothing_else() {
+        assert_eq!(route("/sesame_42/", None), Some(Route::Page("index.html")));
+        assert_eq!(route("/sesame_42", None), Some(Route::Slash));
+        assert_eq!(route("/sesame_42/maps.json", None), Some(Route::Maps));
+        let now = MapId { number: 1, at: At::Now, since: None };
+        assert_eq!(
+            route("/sesame_42/maps/1/tileset.json", None),
+            Some(Route::Of(now.clone(), Thing::Tileset))
+        );
+        let key = NodeKey { level: 2, index: [0, -1, 3] };
+        let node = route("/sesame_42/maps/1/node/2/0/-1/3.vox", Some("v=00ff&what=free"));
+        assert_eq!(node, Some(Route::Of(now.clone(), Thing::Node(key, Kind::Free))));
+        let query = route("/sesame_42/maps/1/query", Some("x=1&y=-2.5&z=3e1"));
+        assert_eq!(query, Some(Route::Of(now.clone(), Thing::Query([1.0, -2.5, 30.0]))));
+        let ray = route("/sesame_42/maps/1/raycast", Some("from=0,0,0&to=1%2C2,3"));
+        assert_eq!(ray, Some(Route::Of(now, Thing::Raycast([0.0; 3], [1.0, 2.0, 3.0]))));
+        let name = |name| At::Snapshot(SnapshotName::new(name).unwrap());
+        let since = MapId { number: 0, at: name("b"), since: Some(name("a")) };
+        assert_eq!(route("/sesame_42/maps/0@b~a/tileset.json", None), Some(Route::Of(since, Thing::Tileset)));
+    }
+
+    #[test]
+    fn nothing_else_is_served() {
+        for path in [
+            "",
+            "/",
+            "//",
+            "/sesame_42x/",
+            "/sesame_4/maps.json",
+            "/maps.json",
+            "/sesame_42//etc/passwd",
+            "/sesame_42/../../etc/passwd",
+            "/sesame_42/maps/0/../../../etc/passwd",
+            "/sesame_42/maps/0/node/..%2f..%2fetc/passwd",
+            "/sesame_42/maps/0@../tileset.json",
+            "/sesame_42/maps/0@.hidden/tileset.json",
+            "/sesame_42/maps//tileset.json",
+            "/sesame_42/maps/-1/tileset.json",
+            "/sesame_42/maps/0/metadata.json",
+            "/sesame_42/maps/0/node/0/0/0/0",
+            "/sesame_42/maps/0/node/0/0/0/0.vox/",
+            "/sesame_42/maps/0/node/99/0/0/0.vox",
+            "/sesame_42/page.js/",
+        ] {
+            assert_eq!(route(path, None), None, "{path}");
+        }
+        for question in [
+            None,
+            Some(""),
+            Some("x=1&y=2"),
+            Some("x=nan&y=0&z=0"),
+            Some("x=1e999&y=0&z=0"),
+            Some("x=&y=&z="),
+        ] {
+            assert_eq!(route("/sesame_42/maps/0/query", question), None, "{question:?}");
+        }
+        for question in ["from=1,2,3", "from=1,2,3&to=1,2", "from=1,2,3&to=1,2,3,4", "from=inf,0,0&to=0,0,0"]
+        {
+            assert_eq!(route("/sesame_42/maps/0/raycast", Some(question)), None, "{question}");
+        }
+        assert_eq!(route("/sesame_42/maps/0/node/0/0/0/0.vox", Some("what=everything")), None);
+    }
+}

@@ -1,0 +1,300 @@
+use super::map_state::{Asked, MapState, Shown};
+use super::node_cache;
+use super::route::{At, MapId};
+use voxtile_pipeline::{AnyMap, MapAt, open_any_map};
+
+use crate::view::Progress;
+use anyhow::Context;
+use parking_lot::{Mutex, RwLock};
+use std::hash::{BuildHasher, Hasher, RandomState};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::thread;
+use std::time::{Duration, Instant, SystemTime};
+use tokio::sync::watch;
+use voxtile::mapper::MapView;
+use voxtile::operations::snapshots;
+use voxtile::store::SnapshotName;
+use voxtile_pipeline::place::place_of;
+use voxtile_render::levels::{Levels, NodeStore};
+
+/// A map that is shown, followed while somebody writes it.
+pub struct ServedMap {
+    path: PathBuf,
+    at: MapAt,
+    name: String,
+    store: Arc<NodeStore>,
+    now: RwLock<Arc<MapState>>,
+    /// Which snapshots there are, and when that was so.
+    listed: Mutex<Option<(Stamp, Arc<Vec<Listed>>)>>,
+    /// Snapshots that were looked at, those used last at the end.
+    snapshots: Mutex<Vec<(Listed, Arc<MapState>)>>,
+    /// Hears how far the first look at all tiles is.
+    progress: Progress,
+}
+
+/// A snapshot of the map. One that was deleted and made again is another: its flush tells.
+#[derive(Clone, PartialEq)]
+pub struct Listed {
+    pub name: String,
+    pub flush_number: u64,
+    pub tiles: u64,
+}
+
+/// What a request may have made on its way.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Makes {
+    Nothing,
+    /// The levels of snapshots: one request at a time does, so that memory stays bounded and none are made twice.
+    Levels,
+}
+
+/// What there is of a state that a path names.
+pub enum Found<T> {
+    Here(T),
+    /// Its levels are to be made first.
+    NotMade,
+    Nothing,
+}
+
+/// How often a map is looked at for a new flush.
+const LOOK_EVERY: Duration = Duration::from_millis(500);
+/// Tiles of the first coarse levels of a large map, which are shown while the others are read.
+const FIRST_TILES: usize = 512;
+/// Each time so many times as many.
+const GROWTH: usize = 4;
+/// What is not complete is shown this often at most.
+const SHOW_EVERY: Duration = Duration::from_secs(1);
+/// Tiles whose coarse nodes are made together, along each axis, as a power of two.
+const GROUP: u32 = 3;
+/// Snapshots whose levels stay in memory.
+const SNAPSHOTS_KEPT: usize = 4;
+
+/// What tells whether a map was flushed, or a snapshot of it made or deleted: length and time of its log, its metadata,
+/// and the folder of its snapshots.
+#[derive(PartialEq)]
+struct Stamp([Option<(u64, SystemTime)>; 3]);
+
+impl Stamp {
+    fn of(map: &Path) -> Self {
+        Self(["commits.log", "metadata.json", "snapshots"].map(|name| {
+            let metadata = std::fs::metadata(map.join(name)).ok()?;
+            Some((metadata.len(), metadata.modified().ok()?))
+        }))
+    }
+}
+
+impl ServedMap {
+    /// Opens a map; its levels come with [`ServedMap::follow`].
+    pub fn open(path: &Path, is_kept: bool, progress: Progress) -> anyhow::Result<Self> {
+        let map = open_any_map(path).with_context(|| format!("cannot show {}", path.display()))?;
+        let id = match &map {
+            AnyMap::Map(map) => map.metadata().ext.as_ref().map(|ext| ext.map_id.clone()),
+            AnyMap::Octree(_) => None,
+        };
+        let store = Arc::new(node_cache::open(id.as_deref().filter(|_| is_kept))?);
+        let levels = Levels::build(&map, &[], 0, &store, &|_| true)?;
+        let levels = levels.context("the levels of a map without tiles")?;
+        let pending_tiles = map.tile_indices().len() as u64;
+        let now = MapState { map, levels, store: store.clone(), generation: 0, pending_tiles };
+        let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
+        Ok(Self {
+            path: path.to_owned(),
+            at: MapAt::of(path)?,
+            name,
+            store,
+            now: RwLock::new(Arc::new(now)),
+            listed: Mutex::default(),
+            snapshots: Mutex::default(),
+            progress,
+        })
+    }
+
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The map as it is known now.
+    pub fn now(&self) -> Arc<MapState> {
+        self.now.read().clone()
+    }
+
+    /// The snapshots that can be shown; none of a map that is shown as one.
+    pub fn snapshots(&self) -> Arc<Vec<Listed>> {
+        let is_map = self.at.snapshot.is_none() && matches!(self.now().map, AnyMap::Map(_));
+        if !is_map {
+            return Arc::default();
+        }
+        // From before they are read: one that is made in between is seen the next time.
+        let stamp = Stamp::of(&self.at.map);
+        if let Some((at, listed)) = &*self.listed.lock()
+            && *at == stamp
+        {
+            return listed.clone();
+        }
+        // What cannot be read now may be the next time.
+        let Ok(found) = place_of(&self.at.map).and_then(snapshots) else { return Arc::default() };
+        let whole = found.into_iter().filter(|info| info.damage.is_none());
+        let listed =
+            whole.map(|info| Listed { name: info.name, flush_number: info.flush_number, tiles: info.tiles });
+        let listed = Arc::new(listed.collect::<Vec<_>>());
+        *self.listed.lock() = Some((stamp, listed.clone()));
+        listed
+    }
+
+    /// The state that a path names.
+    pub fn shown(&self, id: &MapId, makes: Makes) -> voxtile::Result<Found<Shown>> {
+        let after = match self.state(&id.at, makes)? {
+            Found::Here(state) => state,
+            Found::NotMade => return Ok(Found::NotMade),
+            Found::Nothing => return Ok(Found::Nothing),
+        };
+        let Some(since) = &id.since else { return Ok(Found::Here(Shown::State(after))) };
+        Ok(match self.state(since, makes)? {
+            Found::Here(before) => Found::Here(Shown::Change { before, after }),
+            Found::NotMade => Found::NotMade,
+            Found::Nothing => Found::Nothing,
+        })
+    }
+
+    /// The map that a path names, for questions: nobody waits for the levels of a snapshot. `None` if there is no such
+    /// snapshot.
+    pub fn asked(&self, id: &MapId) -> voxtile::Result<Option<Asked>> {
+        if let Some(At::Snapshot(since)) = &id.since
+            && self.listed(since).is_none()
+        {
+            return Ok(None);
+        }
+        let At::Snapshot(name) = &id.at else { return Ok(Some(Asked::State(self.now()))) };
+        let Some(listed) = self.listed(name) else { return Ok(None) };
+        Ok(Some(match self.kept(&listed) {
+            Some(state) => Asked::State(state),
+            None => Asked::Opened(self.opened(name)?),
+        }))
+    }
+
+    fn listed(&self, name: &SnapshotName) -> Option<Listed> {
+        self.snapshots().iter().find(|listed| listed.name == name.as_str()).cloned()
+    }
+
+    fn state(&self, at: &At, makes: Makes) -> voxtile::Result<Found<Arc<MapState>>> {
+        let At::Snapshot(name) = at else { return Ok(Found::Here(self.now())) };
+        let Some(listed) = self.listed(name) else { return Ok(Found::Nothing) };
+        if let Some(state) = self.kept(&listed) {
+            return Ok(Found::Here(state));
+        }
+        if makes == Makes::Nothing {
+            return Ok(Found::NotMade);
+        }
+        let Some(state) = self.made(name)? else { return Ok(Found::Nothing) };
+        let mut kept = self.snapshots.lock();
+        // One of this name that was deleted is of no use any more.
+        kept.retain(|(known, _)| known.name != listed.name);
+        if kept.len() == SNAPSHOTS_KEPT {
+            kept.remove(0);
+        }
+        kept.push((listed, state.clone()));
+        Ok(Found::Here(state))
+    }
+
+    /// A snapshot that was looked at, which becomes the one used last.
+    fn kept(&self, listed: &Listed) -> Option<Arc<MapState>> {
+        let mut kept = self.snapshots.lock();
+        let at = kept.iter().position(|(known, _)| known == listed)?;
+        let found = kept.remove(at);
+        kept.push(found.clone());
+        Some(found.1)
+    }
+
+    fn opened(&self, name: &SnapshotName) -> voxtile::Result<AnyMap> {
+        let at = MapAt { map: self.at.map.clone(), snapshot: Some(name.clone()) };
+        Ok(AnyMap::Map(Box::new(at.open()?)))
+    }
+
+    /// A snapshot with its levels.
+    fn made(&self, name: &SnapshotName) -> voxtile::Result<Option<Arc<MapState>>> {
+        let map = self.opened(name)?;
+        let tiles = map.tile_indices();
+        let Some(levels) = Levels::build(&map, &tiles, new_origin(), &self.store, &|_| true)? else {
+            return Ok(None);
+        };
+        let state = MapState { map, levels, store: self.store.clone(), generation: 0, pending_tiles: 0 };
+        Ok(Some(Arc::new(state)))
+    }
+
+    /// Makes the levels, and makes them anew whenever the map was flushed, in a thread of its own that ends with the
+    /// process.
+    pub fn follow(self: Arc<Self>, changes: watch::Sender<u64>) -> anyhow::Result<()> {
+        let work = move || {
+            // From before it is read: a flush in between is seen the next time.
+            let mut seen = None;
+            let mut told = String::new();
+            loop {
+                let stamp = Stamp::of(&self.at.map);
+                if seen.as_ref() != Some(&stamp) {
+                    match self.show_newest(&changes) {
+                        Ok(()) => seen = Some(stamp),
+                        // Flushed again meanwhile, or gone: what is shown stays, and the next look may find more.
+                        Err(error) => {
+                            let error = format!("{error:#}");
+                            if told != error {
+                                log::warn!("{}: {error}", self.path.display());
+                                told = error;
+                            }
+                        }
+                    }
+                }
+                thread::sleep(LOOK_EVERY);
+            }
+        };
+        thread::Builder::new()
+            .name("voxtile-follow".into())
+            .spawn(work)
+            .context("no thread to read the map")?;
+        Ok(())
+    }
+
+    fn show_newest(&self, changes: &watch::Sender<u64>) -> anyhow::Result<()> {
+        let open = || open_any_map(&self.path);
+        let origin = new_origin();
+        let mut tiles = open()?.tile_indices();
+        tiles.sort_by_key(|tile| (tile.to_array().map(|k| k >> GROUP), *tile));
+        let is_first = self.now().generation == 0;
+        let mut shown = Instant::now();
+        let mut end = if is_first { FIRST_TILES.min(tiles.len()) } else { tiles.len() };
+        loop {
+            let map = open()?;
+            let step = |_| true;
+            let levels =
+                Levels::build(&map, &tiles[..end], origin, &self.store, &step)?.context("stopped")?;
+            if is_first {
+                (self.progress)(end as u64, tiles.len() as u64);
+            }
+            let is_complete = end == tiles.len();
+            if is_complete || shown.elapsed() > SHOW_EVERY {
+                self.show(map, levels, (tiles.len() - end) as u64, changes);
+                shown = Instant::now();
+            }
+            if is_complete {
+                return Ok(());
+            }
+            end = end.saturating_mul(GROWTH).min(tiles.len());
+        }
+    }
+
+    fn show(&self, map: AnyMap, levels: Levels, pending_tiles: u64, changes: &watch::Sender<u64>) {
+        for reason in levels.unreadable() {
+            log::warn!("not shown: {reason}");
+        }
+        let generation = self.now().generation + 1;
+        let state = MapState { map, levels, store: self.store.clone(), generation, pending_tiles };
+        *self.now.write() = Arc::new(state);
+        changes.send_modify(|count| *count += 1);
+    }
+}
+
+/// Tiles without versions, as those of OctoMap's files: a browser keeps their nodes for ever, and this server may have
+/// shown another file before, or the next one may.
+fn new_origin() -> u64 {
+    RandomState::new().build_hasher().finish()
+}

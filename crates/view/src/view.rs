@@ -1,0 +1,109 @@
+use crate::served_map::ServedMap;
+use crate::server::Server;
+use crate::token::Token;
+use anyhow::Context;
+use std::fmt;
+use std::net::{IpAddr, SocketAddr, TcpListener};
+use std::path::PathBuf;
+use std::sync::Arc;
+use tokio::sync::watch;
+
+/// Hears how many tiles of a map have been read, and of how many; from any thread.
+pub type Progress = Arc<dyn Fn(u64, u64) + Send + Sync>;
+
+/// What is shown, to whom.
+pub struct ViewOptions {
+    /// Folders of maps, `FOLDER@SNAPSHOT`, OctoMap files, or URLs of maps; several are shown as layers.
+    pub maps: Vec<PathBuf>,
+    /// Address and port to listen on; port 0 takes a free one.
+    pub listen: SocketAddr,
+    /// Secret part of the URL, 8 to 128 of `A-Z a-z 0-9 _ -`; `None` for a random one.
+    pub token: Option<String>,
+    /// Whether coarse levels are kept in the user's cache folder for the next time.
+    pub keeps_levels: bool,
+    /// Hears how far the first look at a map is.
+    pub progress: Progress,
+}
+
+impl fmt::Debug for ViewOptions {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        // Nothing of the secret.
+        let Self { maps, listen, keeps_levels, .. } = self;
+        let mut out = formatter.debug_struct("ViewOptions");
+        out.field("maps", maps).field("listen", listen).field("keeps_levels", keeps_levels);
+        out.finish_non_exhaustive()
+    }
+}
+
+/// Maps that are opened and an address that is listened on: nobody is answered yet.
+pub struct View {
+    server: Server,
+    listener: TcpListener,
+    address: SocketAddr,
+    url: String,
+}
+
+impl fmt::Debug for View {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.debug_struct("View").field("address", &self.address).finish_non_exhaustive()
+    }
+}
+
+impl View {
+    /// Opens the maps and begins to listen. Threads read the maps from here on, and follow what others write.
+    ///
+    /// # Errors
+    ///
+    /// A map that cannot be opened, a token that is none, an address that cannot be listened on.
+    pub fn open(options: &ViewOptions) -> anyhow::Result<Self> {
+        let token = match &options.token {
+            Some(token) => Token::new(token)?,
+            None => Token::random()?,
+        };
+        // Counts whatever becomes visible, in any map.
+        let (changes, changed) = watch::channel(0_u64);
+        let maps = options
+            .maps
+            .iter()
+            .map(|path| ServedMap::open(path, options.keeps_levels, options.progress.clone()))
+            .collect::<anyhow::Result<Vec<_>>>()?;
+        let maps: Vec<Arc<ServedMap>> = maps.into_iter().map(Arc::new).collect();
+        let listener = TcpListener::bind(options.listen)
+            .with_context(|| format!("--listen: cannot use {}", options.listen))?;
+        let address = listener.local_addr()?;
+        let url = url_of(address, &token);
+        for map in &maps {
+            map.clone().follow(changes.clone())?;
+        }
+        Ok(Self { server: Server::new(maps, token, address, changed), listener, address, url })
+    }
+
+    /// The URL of the page, with its secret part.
+    pub fn url(&self) -> &str {
+        &self.url
+    }
+
+    /// Address and port that are listened on.
+    pub fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// Answers until a signal.
+    ///
+    /// # Errors
+    ///
+    /// An operating system that gives no threads or no connections.
+    pub fn serve(self) -> anyhow::Result<()> {
+        self.server.run(self.listener)
+    }
+}
+
+fn url_of(address: SocketAddr, token: &Token) -> String {
+    let host = match address.ip() {
+        IpAddr::V4(ip) if ip.is_unspecified() => "127.0.0.1".to_owned(),
+        IpAddr::V6(ip) if ip.is_unspecified() => "[::1]".to_owned(),
+        IpAddr::V4(ip) => ip.to_string(),
+        IpAddr::V6(ip) => format!("[{ip}]"),
+    };
+    format!("http://{host}:{}/{}/", address.port(), token.as_str())
+}

@@ -1,5 +1,0 @@
-//! The command `voxtile`.
-
-fn main() -> std::process::ExitCode {
-    voxtile::command::main()
-}
