@@ -27,7 +27,7 @@ run() { # package, arguments
 }
 
 endurance() {
-    cargo build --release --quiet --locked --package voxtile --package endurance
+    cargo build --release --quiet --locked --package voxtile-cli --package endurance
     run endurance "$@"
 }
 
@@ -54,7 +54,7 @@ versions() {
         esac
     done
     [[ -n $commit ]] || { echo "versions: say --before COMMIT" >&2 && exit 2; }
-    cargo build --release --quiet --locked --package voxtile --package peers --package versions
+    cargo build --release --quiet --locked --package voxtile-cli --package peers --package versions
     git worktree remove --force "$source" 2>/dev/null || rm -rf "$source"
     git worktree prune
     git worktree add --quiet --detach "$source" "$commit"
@@ -62,7 +62,7 @@ versions() {
     cp tools/peers/src/bin/questions.rs "$source/tools/peers/src/bin/"
     local before
     before=$(realpath "$target")/versions/before
-    (cd "$source" && CARGO_TARGET_DIR=$before cargo build --release --quiet --locked --package voxtile --package peers)
+    (cd "$source" && CARGO_TARGET_DIR=$before cargo build --release --quiet --locked --package voxtile-cli --package peers)
     git worktree remove --force "$source"
     run versions --before "$before/release" --now "$target/release" "${options[@]}"
 }

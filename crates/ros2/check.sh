@@ -66,7 +66,7 @@ end() {
 
 # Writes down for so many seconds what the node publishes under these names.
 listen() {
-    "$python" programs/ros2/tests/outputs.py listen $domain "$work/$kind.outputs" "$@" &
+    "$python" crates/ros2/tests/outputs.py listen $domain "$work/$kind.outputs" "$@" &
     listener=$!
 }
 
@@ -91,7 +91,7 @@ play() {
     else
         listen $seconds
     fi
-    "$python" programs/ros2/tests/peer.py $domain "$work/$kind.bag" $count $kind "$street"
+    "$python" crates/ros2/tests/peer.py $domain "$work/$kind.bag" $count $kind "$street"
     wait "$listener"
     listener=
     end INT
@@ -107,7 +107,7 @@ built_of() {
 flood() {
     local clouds=1500 grown received dropped waiting mapped_before mapped without
     start --memory 128MiB --transform-wait 100 --resolution 0.1
-    "$python" programs/ros2/tests/flood.py $domain $clouds $node >"$work/flood.counts" || fail "the peer has failed"
+    "$python" crates/ros2/tests/flood.py $domain $clouds $node >"$work/flood.counts" || fail "the peer has failed"
     end INT
     read -r grown received dropped waiting mapped_before mapped without <"$work/flood.counts"
     echo "flood: $received received, $dropped dropped, $waiting waited, $mapped mapped; $((grown >> 20)) MiB more"
@@ -137,7 +137,7 @@ rclpy() {
         domain=$((RANDOM % 100 + 100))
         rm -rf "$map" "$map.saved" "$work/rclpy.bag"
         start --resolution $resolution $outputs --odometry /odom --frame-id odom
-        "$python" programs/ros2/tests/rclpy_peer.py $domain "$work/rclpy.bag" $count "$voxtile" "$map" $radius $max_z ||
+        "$python" crates/ros2/tests/rclpy_peer.py $domain "$work/rclpy.bag" $count "$voxtile" "$map" $radius $max_z ||
             fail "the peer has failed"
         end INT
         if grep -q " $count mapped" "$work/rclpy.log"; then break; fi
@@ -166,7 +166,7 @@ zenoh() {
     fi
     program=$(realpath "$program")
     export python voxtile program outputs radius max_z inflation_range
-    programs/ros2/tests/zenoh.sh "$work"
+    crates/ros2/tests/zenoh.sh "$work"
 }
 
 # A street of real clouds where they are at hand.
@@ -241,7 +241,7 @@ for kind in ${*:-friendly hostile types variants odometry launch path real senso
         # What moved was published, and no scan was mapped twice.
         grep -q 'remapped: 30 of' "$work/$kind.log" || fail "nothing was remapped"
         "$voxtile" export "$map" -o "$map.csv" --what all >/dev/null
-        "$python" programs/ros2/tests/outputs.py whole "$work/$kind.outputs" "$map.csv"
+        "$python" crates/ros2/tests/outputs.py whole "$work/$kind.outputs" "$map.csv"
         echo "$kind: $of_node"
         continue
     fi
@@ -260,7 +260,7 @@ for kind in ${*:-friendly hostile types variants odometry launch path real senso
     "$voxtile" export "$map" -o "$map.csv" --what all >/dev/null
     "$voxtile" export "$map" -o "$map.pgm" --z-max $max_z >/dev/null
     compare() {
-        [ $kind = real ] || "$python" programs/ros2/tests/outputs.py compare \
+        [ $kind = real ] || "$python" crates/ros2/tests/outputs.py compare \
             "$work/$kind.outputs" "$map.csv" "$map.pgm" $count $radius $max_z $1 $inflation_range
     }
     compare live
@@ -274,7 +274,7 @@ for kind in ${*:-friendly hostile types variants odometry launch path real senso
         echo "$kind: what did not change was published again"
         exit 1
     fi
-    [ $kind = real ] || "$python" programs/ros2/tests/services.py $domain || fail "services"
+    [ $kind = real ] || "$python" crates/ros2/tests/services.py $domain || fail "services"
     end TERM
     grep -q "the map is at scan $count" "$work/$kind.log" || fail "scans are missing"
     [ "$("$voxtile" digest "$map")" = "$of_node" ] || fail "starting again changes the map"

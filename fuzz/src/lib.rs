@@ -8,7 +8,7 @@ use std::alloc::System;
 pub mod targets;
 
 /// The same of the crate of other programs' files.
-#[path = "../../clouds/tests/fuzz_corpus/targets.rs"]
+#[path = "../../crates/formats/tests/fuzz_corpus/targets.rs"]
 pub mod clouds;
 
 /// No input of 64 KiB may need more memory: beyond it an allocation fails, which is a finding.

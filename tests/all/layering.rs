@@ -27,8 +27,8 @@ fn uses(folder: &str) -> Vec<(PathBuf, String)> {
     edges
 }
 
-/// Every folder and file of the library, and what of ours it may name. Above them is `command/`, which may name all.
-const LAYERS: [(&str, &[&str]); 26] = [
+/// Every folder and file of the engine, and what of ours it may name. What other crates may use, their manifests say.
+const LAYERS: [(&str, &[&str]); 19] = [
     ("maths.rs", &[]),
     ("one_heap.rs", &[]),
     ("path_text.rs", &[]),
@@ -47,27 +47,12 @@ const LAYERS: [(&str, &[&str]); 26] = [
     ("persistence", &["config", "error", "sensor", "space", "store", "tile"]),
     ("mapper", &["config", "error", "octree", "persistence", "scan", "sensor", "space", "store", "tile"]),
     ("query", &["config", "error", "mapper", "maths", "octree", "scan", "sensor", "space", "store", "tile"]),
-    ("io", &["error", "maths", "scan", "space"]),
-    // Voxels of an archive by the interface of mappers and queries alone.
-    ("local", &["error", "mapper", "maths", "query", "scan", "sensor", "space"]),
-    // No transport, file or clock; of the configuration which rays a map takes.
-    ("share", &["config", "error", "local", "mapper", "maths", "query", "scan", "space"]),
     // Whole maps on disk, tile by tile.
     (
         "operations",
         &["config", "error", "mapper", "maths", "persistence", "scan", "sensor", "space", "store", "tile"],
     ),
-    // Maps in a bucket: their files, and no tile's content.
-    ("bucket", &["error", "scratch", "space", "store"]),
     ("integrity", &["config", "error", "path_text", "persistence", "space", "store", "tile"]),
-    // Maps to look at, by the interface of mappers: no web, no screen, no file.
-    (
-        "render",
-        &["config", "error", "local", "mapper", "query", "scan", "scratch", "sensor", "space", "tile"],
-    ),
-    ("simulation", &["maths", "scan", "space"]),
-    // It explains, and names what callers use.
-    ("lib.rs", &["config", "error", "mapper", "query", "scan", "sensor", "space", "store", "tile"]),
 ];
 
 #[test]
@@ -78,10 +63,6 @@ fn every_folder_knows_only_what_lies_before_it_in_the_flow() {
             assert!(name == own || allowed.contains(&name.as_str()), "{} uses {name}", path.display());
         }
     }
-    // A codec knows no state.
-    for (path, name) in uses("share/codec") {
-        assert!(["error", "share", "space"].contains(&name.as_str()), "{} uses {name}", path.display());
-    }
 }
 
 #[test]
@@ -90,22 +71,21 @@ fn every_folder_has_its_place_in_the_flow() {
     for entry in fs::read_dir(src).unwrap() {
         let name = entry.unwrap().file_name().into_string().unwrap();
         assert!(
-            ["bin", "command"].contains(&&*name) || LAYERS.iter().any(|(layer, _)| *layer == name),
+            name == "lib.rs" || LAYERS.iter().any(|(layer, _)| *layer == name),
             "src/{name} has no layer"
         );
     }
 }
 
 #[test]
-fn only_the_disk_touches_a_maps_files_and_nothing_below_the_command_prints_or_exits() {
+fn only_the_disk_touches_a_maps_files_and_the_engine_neither_prints_nor_exits() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    for path in sources(&root).into_iter().filter(|path| !path.starts_with(root.join("command"))) {
+    for path in sources(&root) {
         let text = fs::read_to_string(&path).unwrap();
         let code = text.split("#[cfg(test)]\nmod tests {").next().unwrap();
-        let reads_inputs = path.starts_with(root.join("io"));
         let is_disk = path.ends_with("store/fs_disk.rs");
         for word in ["std::fs", "File::open", "File::create"] {
-            assert!(reads_inputs || is_disk || !code.contains(word), "{} has {word}", path.display());
+            assert!(is_disk || !code.contains(word), "{} has {word}", path.display());
         }
         for word in ["println!", "eprintln!", "process::exit"] {
             assert!(!code.contains(word), "{} has {word}", path.display());

@@ -48,9 +48,10 @@ trap 'rm -rf "$work"' EXIT
 
 # Leaves the machine's paths out of the binaries.
 export RUSTFLAGS="--remap-path-prefix=$PWD=voxtile --remap-path-prefix=${CARGO_HOME:-$HOME/.cargo}=cargo"
-cargo build --profile dist --locked --target "$target" --package voxtile --package voxtile-share --bins
+cargo build --profile dist --locked --target "$target" --package voxtile-cli --package voxtile-share-node --bins
 unset RUSTFLAGS
-cargo package --locked --package voxtile-clouds --package voxtile "${dirty[@]}"
+# shellcheck disable=SC2046
+cargo package --locked $(tools/release/published.sh) "${dirty[@]}"
 
 # What is installed, as below /usr.
 tree=$work/voxtile-$version-$target
@@ -66,7 +67,7 @@ complete bash bash-completion/completions/voxtile
 complete zsh zsh/vendor-completions/_voxtile
 complete fish fish/vendor_completions.d/voxtile.fish
 install -D -m 644 -t "$tree/share/doc/voxtile" README.md CHANGELOG.md LICENSE-MIT LICENSE-APACHE docs/*.md
-python3 tools/release/licenses.py "$target" voxtile voxtile-share >"$tree/share/doc/voxtile/THIRD-PARTY-LICENSES"
+python3 tools/release/licenses.py "$target" voxtile-cli voxtile-share-node >"$tree/share/doc/voxtile/THIRD-PARTY-LICENSES"
 
 . tools/release/deb.sh
 mkdir "$work/out"

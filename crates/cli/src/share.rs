@@ -16,7 +16,7 @@ pub fn run(args: &ShareArgs) -> anyhow::Result<ExitCode> {
         }
         ran => ran.with_context(|| {
             let hint =
-                "put it beside voxtile or on the PATH (cargo install --path programs/share installs it)";
+                "put it beside voxtile or on the PATH (cargo install --path crates/share-node installs it)";
             format!("cannot run {}: {hint}", name())
         }),
     }
@@ -48,7 +48,7 @@ Usage: voxtile share --publish <MAP_OR_SCANS> --robot <NAME> [OPTIONS]
 The work is done by the program voxtile-share, which is not here: neither beside voxtile nor on the PATH. It comes
 separately, since its network library is six times as large as voxtile. To install it, in the sources of voxtile:
 
-    cargo install --locked --path programs/share
+    cargo install --locked --path crates/share-node
 
 Then this help lists all options. docs/sharing.md says what is shared, and how.";
 

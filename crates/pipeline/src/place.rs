@@ -109,6 +109,6 @@ fn in_bucket(url: &str) -> Result<MapPath> {
 /// Why a URL cannot be used, where there are no buckets.
 #[cfg(not(feature = "bucket"))]
 pub fn without_buckets(url: &str) -> Error {
-    let reason = "this voxtile was built without buckets; `cargo install --locked --path . --features bucket` makes one with them";
+    let reason = "this voxtile was built without buckets; `cargo install --locked --path crates/cli --features bucket` makes one with them";
     Error::argument(url, reason)
 }

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# Makes view/dist, which goes into the command: the page, with all that it needs, in four files.
+# Makes crates/view/page/dist, which goes into the command: the page, with all that it needs, in four files.
 #
-#   view/bundle.sh            with the packages of package-lock.json
-#   view/bundle.sh --check    says whether view/dist is what it would make, and small enough
+#   crates/view/page/bundle.sh            with the packages of package-lock.json
+#   crates/view/page/bundle.sh --check    says whether crates/view/page/dist is what it would make, and small enough
 set -euo pipefail
 cd "$(dirname "$0")"
 most_gzip=260000
@@ -30,7 +30,7 @@ gzip=$(gzip -9 -c "$out/page.js" | wc -c)
 printf 'page.js: %d bytes, %d as gzip (at most %d)\n' "$bytes" "$gzip" "$most_gzip"
 if ((gzip > most_gzip)); then exit 1; fi
 if [[ ${1:-} == --check ]]; then
-    diff -r "$out" dist && echo 'view/dist is up to date'
+    diff -r "$out" dist && echo 'crates/view/page/dist is up to date'
 else
     rm -rf dist
     cp -r "$out" dist

@@ -517,7 +517,9 @@ fn share_runs_the_program_beside_this_one_or_says_where_to_put_it() {
         let helped = share(help);
         let said = String::from_utf8_lossy(&helped.stdout).into_owned();
         assert!(helped.status.success() && helped.stderr.is_empty(), "{help:?}");
-        for word in ["--publish", "--subscribe", "cargo install --locked --path programs/share", "not here"] {
+        for word in
+            ["--publish", "--subscribe", "cargo install --locked --path crates/share-node", "not here"]
+        {
             assert!(said.contains(word), "{help:?}: {said}");
         }
     }

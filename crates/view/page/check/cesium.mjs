@@ -1,6 +1,6 @@
 // Opens a folder of `voxtile export --format 3dtiles` in CesiumJS, in a real browser:
 //
-//   npm install --prefix FOLDER cesium; node view/check/cesium.mjs TILES FOLDER/node_modules/cesium [PICTURE.png]
+//   npm install --prefix FOLDER cesium; node crates/view/page/check/cesium.mjs TILES FOLDER/node_modules/cesium [PICTURE.png]
 //
 // It fails where a tile cannot be read and where nothing is drawn.
 

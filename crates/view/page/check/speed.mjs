@@ -1,4 +1,4 @@
-// How fast the server makes and sends nodes: VOXTILE=PROGRAM node view/check/speed.mjs MAP [MOST_NODES]
+// How fast the server makes and sends nodes: VOXTILE=PROGRAM node crates/view/page/check/speed.mjs MAP [MOST_NODES]
 //
 // It begins with an empty cache: the coarse levels are made, then every node is asked for, eight at a time, twice.
 // The second time only what the first has left in the cache is sent.
