@@ -2,18 +2,28 @@
 # Builds the Python package, installs it into an empty environment, and tests it there: behaviour, guide, notebooks,
 # types, stubs.
 #
-#   python/check.sh [PYTEST ARGUMENTS]
+#   python/check.sh [--short] [PYTEST ARGUMENTS]
+#
+# --short leaves out clusters of Dask, the notebooks and pyright, whose three minutes guard what seldom changes.
 #
 # Needs python3 with venv, and the network for maturin, pytest, mypy and the like. The build is that of the tests, which
 # is made in a few minutes; `maturin build --release` makes the wheel to hand out.
 set -euo pipefail
 cd "$(dirname "$0")"
+short=
+if [[ ${1:-} == --short ]]; then short=1 && shift; fi
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 python3 -m venv "$work/venv"
 python=$work/venv/bin/python
 install() { "$python" -m pip install --quiet --disable-pip-version-check "$@"; }
-install dask distributed ipykernel matplotlib mypy nbclient pyright pytest
+install dask distributed matplotlib mypy pytest
+left_out=()
+if [[ $short ]]; then
+    for file in dask dask_jobs dask_pieces notebooks; do left_out+=("--ignore=tests/test_$file.py"); done
+else
+    install ipykernel nbclient pyright
+fi
 install --only-binary :all: pyoctomap || echo "skipped: pyoctomap, which has no wheel for this Python"
 MATURIN_PEP517_ARGS="--profile dev --locked" install .
 # Beside the sources, Python would find the package without its module.
@@ -27,11 +37,13 @@ export VOXTILE_DATA
 mkdir "$work/python"
 mv "$work/tests" "$work/examples" "$work/python"
 cd "$work/python"
-"$python" -m pytest --quiet tests "$@"
+"$python" -m pytest --quiet tests "${left_out[@]}" "$@"
 "$python" -m mypy --strict --package voxtile
 "$python" -m mypy.stubtest voxtile
 # It gets its program from npm.
-if "$python" -m pyright --version >/dev/null 2>&1; then
+if [[ $short ]]; then
+    echo "left out: pyright"
+elif "$python" -m pyright --version >/dev/null 2>&1; then
     "$python" -m pyright --pythonpath "$python" "$("$python" -c 'import os, voxtile; print(os.path.dirname(voxtile.__file__))')"
 else
     echo "skipped: pyright, whose program is not to be had"
