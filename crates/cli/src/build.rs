@@ -1,277 +1,25 @@
-use crate::args::BuildArgs;
-use crate::build_config::{config_to_create, config_to_go_on};
+use crate::args::{BuildArgs, InsertName, ModelName};
 use crate::failure::JsonTo;
-use crate::flush_schedule::FlushSchedule;
-use crate::intake::{Intake, Next, RayNeeds, Taken};
-use crate::progress::Progress;
+use crate::octree_choice::octree_config;
+use crate::part::region_of;
+use crate::progress::at_terminal;
 use crate::read_options::read_options;
 use crate::run::{INTERRUPTED, say};
-use crate::scan_input::is_standard_input;
-use crate::scan_queue::{ScanQueue, WhenBehind};
-use crate::scan_reader::{Marking, ScanReader};
-use crate::stop_signal;
-use crate::summary::Summary;
-use crate::watch::Watch;
-use std::path::Path;
+use crate::{stop_signal, summary};
 use std::process::ExitCode;
-use std::sync::Arc;
-use std::time::Instant;
-use voxtile::beginning_or_difference;
-use voxtile::mapper::{MapReader, MapView, Mapper, OutOfCoreTileMapper};
-use voxtile::scan::{ScanPoints, ScanReport};
-use voxtile::store::{FsDisk, InputContent, InputRecord, UnsyncedDisk};
-use voxtile::{Error, MapConfig, MapPath, MemoryLimit};
-use voxtile_formats::{PointRoom, ReadOptions, ScanMark};
-use voxtile_pipeline::whole_map;
-
-/// The share of the limit of memory that reading may take, beside the points of scans: chunks and messages of
-/// recordings, poses, the sorting of LAS.
-const PARTS_FOR_READING: usize = 32;
-/// Reading has so much at least. What it has beyond that is taken from the map.
-const LEAST_FOR_READING: usize = 4 << 20;
-
-/// The share of the limit of memory that the points of scans may take, as they are read and as they are mapped.
-const PARTS_OF_MEMORY: usize = 32;
-
-/// Scans are taken together where there is so much room for the points of each, a lidar's of 128 beams.
-const ROOM_TO_GO_TOGETHER: usize = 3 << 20;
+use voxtile::{InsertMode, MemoryLimit, Storage};
+use voxtile_pipeline::{BuildOptions, SensorModelKind, build};
 
 pub fn run(args: &BuildArgs) -> anyhow::Result<ExitCode> {
-    let watch = Watch::at_terminal(stop_signal::catch()?);
-    let Some(summary) = build(args, &watch)? else { return Ok(stopped_early(args)) };
-    summary.print(args.json)?;
-    if summary.interrupted {
-        let all = summary.resumed_after + summary.scans;
+    let watch = at_terminal(stop_signal::catch()?);
+    let Some(built) = build(&options_of(args)?, &watch)? else { return Ok(stopped_early(args)) };
+    summary::print(&built, args.json)?;
+    if built.interrupted {
+        let all = built.resumed_after + built.scans;
         say(format_args!("stopped after {all} scans; all of them are in the map; --resume goes on"));
         return Ok(ExitCode::from(INTERRUPTED));
     }
     Ok(ExitCode::SUCCESS)
-}
-
-/// Makes the map, or goes on with it; `None` if it was asked to stop before the first scan. What was accepted is in the
-/// map then, whatever ended the build.
-pub fn build(args: &BuildArgs, watch: &Watch) -> anyhow::Result<Option<Summary>> {
-    let started = Instant::now();
-    let stop = watch.stop();
-    let exists = exists(args)?;
-    let config = if exists { config_to_go_on(args)? } else { config_to_create(args)? };
-    check_no_rays(args, &config)?;
-    check_when_behind(args)?;
-    // Nobody goes on with a piece, or asks whether it has a scan.
-    let mark: Marking =
-        if args.piece_of.is_none() { ScanMark::of } else { |scan| Ok(ScanMark::without_content(scan)) };
-    let room = room(args, &config);
-    let most_together = most_together(args, &config);
-    let opened = ScanReader::open(args.scans.clone(), options_of(args, &config)?, room, mark, stop.clone())?;
-    let Some((reader, input)) = opened else { return Ok(None) };
-    let config = config_of_map(args, &config);
-    let needs = RayNeeds { grid: config.grid, sensor_model: config.sensor_model };
-    let mut intake = Intake::new(reader, args.scans.clone(), args.skip_bad, (!args.no_rays).then_some(needs));
-    let mut mapper = match exists {
-        true => Some(OutOfCoreTileMapper::open(place_of_map(args), config.clone())?),
-        false => None,
-    };
-    if !intake.read_lead()? {
-        return Ok(None);
-    }
-    let crs = intake.crs();
-    let mapper = match &mut mapper {
-        Some(mapper) => {
-            check_crs(args, crs.as_ref(), config.crs.as_ref())?;
-            mapper
-        }
-        none => {
-            // A first scan that cannot be mapped should not leave an empty map behind.
-            intake.check_first()?;
-            let mut config = config;
-            config.crs = crs;
-            whole_map(&args.output)?;
-            none.insert(match args.piece_of {
-                None => OutOfCoreTileMapper::create(&args.output, config)?,
-                Some(map_id) => OutOfCoreTileMapper::create_as(place_of_map(args), config, map_id)?,
-            })
-        }
-    };
-    mapper.stop_with(stop.clone());
-    let Some(resumed_after) = begin(args, mapper, &mut intake, &input.name)? else {
-        return Ok(None);
-    };
-
-    if args.when_behind != WhenBehind::Wait {
-        intake.read_ahead(ScanQueue::new(args.when_behind, ScanQueue::MOST_SCANS));
-    } else if most_together > 1 {
-        intake.read_ahead(ScanQueue::new(args.when_behind, most_together));
-    }
-    let progress = watch.over_scans(input.scans);
-    progress.pass(intake.content().scans);
-    let mut build = Build {
-        mapper,
-        intake,
-        schedule: FlushSchedule::new(args.flush_every),
-        progress,
-        report: ScanReport::default(),
-        scans: 0,
-        has_rays: !args.no_rays,
-        most_together,
-        notes_content: args.piece_of.is_none(),
-    };
-    let outcome = build.insert_all();
-    build.progress.say("flushing");
-    // What was accepted is kept, whatever ended the build.
-    let flushed = build.mapper.flush().map_err(|error| say_what_is_safe(error, build.mapper));
-    let Build { report, scans, mut intake, progress, .. } = build;
-    drop(progress);
-    let mut remarks = intake.remarks();
-    remarks.iter_mut().for_each(|remark| *remark = format!("{}: {remark}", args.scans.display()));
-    remarks.extend(all_is_cut(&report, mapper.config()));
-    remarks.iter().for_each(|remark| log::warn!("{remark}"));
-    match (outcome, flushed) {
-        (Err(error), Ok(())) => {
-            let all = resumed_after + scans;
-            return Err(error.context(format!("after {all} scans, which are in the map")));
-        }
-        (Err(error), Err(flush_error)) => return Err(error.context(format!("{flush_error:#}; before that"))),
-        (Ok(()), flushed) => flushed?,
-    }
-    let interrupted = stop.is_set();
-    let summary = Summary::of(&args.output, scans, report, mapper, started.elapsed())?;
-    let (poses, unread, left_out) = (Some(input.poses.to_string()), intake.unread, intake.left_out);
-    Ok(Some(Summary { interrupted, resumed_after, poses, unread, left_out, remarks, ..summary }))
-}
-
-struct Build<'a> {
-    mapper: &'a mut OutOfCoreTileMapper,
-    intake: Intake,
-    schedule: FlushSchedule,
-    progress: Progress,
-    report: ScanReport,
-    scans: u64,
-    has_rays: bool,
-    /// Most scans that are mapped together.
-    most_together: usize,
-    notes_content: bool,
-}
-
-impl Build<'_> {
-    fn insert_all(&mut self) -> anyhow::Result<()> {
-        loop {
-            let (mapper, schedule) = (&mut *self.mapper, &mut self.schedule);
-            let most = self.most_together.min(schedule.scans_until_due());
-            // An input that is quiet does not keep what came from being made durable.
-            let next =
-                self.intake.next(most, &mut || flush_if(schedule.is_due_waiting(), mapper, schedule))?;
-            let taken = match next {
-                Next::Scans(taken) => taken,
-                Next::Stopped => return Ok(()),
-                Next::End => {
-                    // The last scans may have been skipped.
-                    self.note_content(self.intake.content());
-                    return Ok(());
-                }
-            };
-            let mut reports = Vec::with_capacity(taken.len());
-            let inserted = self.insert(&taken, &mut reports);
-            for report in &reports {
-                self.report += *report;
-                self.scans += 1;
-                self.progress.step();
-                self.progress.show(self.mapper);
-            }
-            if let Some(last) = reports.len().checked_sub(1) {
-                self.note_content(taken[last].content.clone());
-            }
-            match inserted {
-                Ok(()) => {}
-                Err(Error::Stopped) => return Ok(()),
-                Err(error) => return Err(error.into()),
-            }
-            flush_if(self.schedule.is_due(reports.len()), self.mapper, &mut self.schedule)?;
-        }
-    }
-
-    fn insert(&mut self, taken: &[Taken], reports: &mut Vec<ScanReport>) -> voxtile::Result<()> {
-        if self.has_rays {
-            let scans: Vec<&dyn ScanPoints> = taken.iter().map(|taken| &taken.scan as _).collect();
-            return self.mapper.insert_all(&scans, reports);
-        }
-        for Taken { scan, .. } in taken {
-            reports.push(self.mapper.insert_hits(scan)?);
-        }
-        Ok(())
-    }
-
-    fn note_content(&mut self, content: InputContent) {
-        if self.notes_content {
-            self.mapper.note_input_content(content);
-        }
-    }
-}
-
-/// How the input is read; without rays no poses are needed.
-fn options_of(args: &BuildArgs, config: &MapConfig) -> voxtile::Result<ReadOptions> {
-    let mut options = read_options(&args.read)?;
-    options.open.scratch = Some(folder_beside(args).to_owned());
-    if let MemoryLimit::Bytes(bytes) = config.memory {
-        options.open.memory_bytes = for_reading(bytes);
-    }
-    options.clouds.has_no_returns = config.rays.no_return_range_m.is_some();
-    if args.no_rays && options.poses.is_none() {
-        options.clouds.may_lack_poses = true;
-        options.clouds.are_poses_needed = false;
-    }
-    Ok(options)
-}
-
-/// Batches have no rays to map again.
-fn check_no_rays(args: &BuildArgs, config: &MapConfig) -> voxtile::Result<()> {
-    if !(args.no_rays && config.keeps_scans) {
-        return Ok(());
-    }
-    let reason = "points without rays are no scans, which a map could keep; leave one of the two out, or build \
-                  another map";
-    Err(Error::argument("--no-rays, --keep-scans", reason))
-}
-
-/// Only scans that come by themselves can come too fast.
-fn check_when_behind(args: &BuildArgs) -> voxtile::Result<()> {
-    let is_file = args.scans.is_file() || args.scans.is_dir();
-    if args.when_behind == WhenBehind::Wait || !is_file {
-        return Ok(());
-    }
-    let reason =
-        "files wait until they are read: leave it out, or give the scans as they come, as - or a pipe";
-    Err(Error::argument("--when-behind", reason))
-}
-
-fn flush_if(
-    is_due: bool,
-    mapper: &mut OutOfCoreTileMapper,
-    schedule: &mut FlushSchedule,
-) -> voxtile::Result<()> {
-    if !is_due {
-        return Ok(());
-    }
-    if !schedule.is_by_time() {
-        mapper.flush()?;
-    } else if mapper.is_flushing() {
-        // The disk is slower than the clock: the next flush begins once this one has ended.
-        return Ok(());
-    } else {
-        // Scans go on meanwhile.
-        mapper.begin_flush()?;
-    }
-    schedule.flushed();
-    Ok(())
-}
-
-/// After a flush that failed: what a user can rely on.
-fn say_what_is_safe(error: Error, mapper: &OutOfCoreTileMapper) -> anyhow::Error {
-    let (folder, scan_number) = (mapper.folder(), mapper.flushed_scan_number());
-    anyhow::Error::new(error).context(format!(
-        "{}: the map is as of scan {scan_number}; once the cause is gone, the same command with --resume \
-         goes on from there",
-        folder.display()
-    ))
 }
 
 /// It was asked to stop while nothing had been mapped.
@@ -281,226 +29,39 @@ fn stopped_early(args: &BuildArgs) -> ExitCode {
     ExitCode::from(INTERRUPTED)
 }
 
-/// Where the map is made. A piece of a map is made again after a crash, and made durable when it is handed over.
-fn place_of_map(args: &BuildArgs) -> MapPath {
-    match args.piece_of {
-        None => MapPath::from(&args.output),
-        Some(_) => MapPath::on(Arc::new(UnsyncedDisk::of(Arc::new(FsDisk))), &args.output),
-    }
-}
-
-/// Whether there is a map to go on with.
-fn exists(args: &BuildArgs) -> anyhow::Result<bool> {
-    if args.output.is_file() {
-        let reason = "is a file; a map is a folder, name another -o";
-        return Err(Error::argument(args.output.display().to_string(), reason).into());
-    }
-    let exists = match MapReader::open(&args.output, 1) {
-        Err(Error::NoMap { .. }) => false,
-        // Damage is told by the mapper, which opens the map next.
-        _ => true,
-    };
-    if exists && !args.append && !args.resume {
-        let hint = "use --resume to go on with these scans, --append to add them to it, or another -o";
-        return Err(Error::AlreadyExists { path: args.output.clone(), hint }.into());
-    }
-    if !exists && args.append && !args.resume {
-        return Err(Error::NoMap { path: args.output.clone() }.into());
-    }
-    Ok(exists)
-}
-
-/// Goes on with an input of which the map has scans, or begins with one that it does not know; returns how many of its
-/// scans the map has, `None` if it was asked to stop.
-fn begin(
-    args: &BuildArgs,
-    mapper: &mut OutOfCoreTileMapper,
-    intake: &mut Intake,
-    name: &str,
-) -> anyhow::Result<Option<u64>> {
-    let inputs = mapper.inputs();
-    // Of inputs that begin with many scans without points nothing tells one from another but what comes later, and their
-    // names, where the map has nothing else.
-    let is_this = |input: &InputRecord| {
-        let is_known = |content: &InputContent| content.begins_with.is_some() || input.is_named(name);
-        let is_same = |content: &InputContent| {
-            content.begins_with.as_deref() == intake.begins_with()
-                || (is_known(content) && intake.begins_as(content))
-        };
-        input.content.as_ref().is_some_and(is_same)
-    };
-    if let Some(at) = inputs.iter().rposition(is_this).filter(|_| !args.again) {
-        let content = inputs[at].content.clone().unwrap_or_default();
-        if args.resume {
-            if !intake.pass_over(&content)? {
-                return Ok(None);
-            }
-            check_begun(args, &inputs[at], mapper)?;
-            if at + 1 < inputs.len() {
-                // Other inputs came between.
-                mapper.begin_input(inputs[at].clone())?;
-            }
-            return Ok(Some(content.scans - content.skipped.len() as u64));
-        }
-        if content.scans > 0 {
-            return Err(taken_before(args, &inputs[at].name, content.scans));
-        }
-    }
-    if let Some(last) = inputs.last().filter(|last| last.content.is_none() && !args.again) {
-        // Of an earlier version: one name for all of it.
-        let Some(fingerprint) = intake.fingerprint()? else { return Ok(None) };
-        if fingerprint.is_ok_and(|fingerprint| fingerprint == last.name) {
-            let done = mapper.scan_number().saturating_sub(last.first_scan);
-            if !args.resume {
-                return Err(taken_before(args, name, done));
-            }
-            check_begun(args, last, mapper)?;
-            return Ok(intake.pass(done)?.then_some(done));
-        }
-    }
-    // A map that was merged of others has tiles, and knows of no scans.
-    let is_empty = mapper.scan_number() == 0 && mapper.tile_bounds().is_none();
-    if args.resume && !args.append && !is_empty {
-        let same = inputs.iter().rfind(|input| input.is_named(name) && input.content.is_some());
-        let (found, wanted) = match same.or(inputs.last()) {
-            None => ("that it does not know".to_owned(), name.to_owned()),
-            Some(known) => match known.content {
-                // Its name is a fingerprint.
-                None => {
-                    let Some(fingerprint) = intake.fingerprint()? else { return Ok(None) };
-                    (known.name.clone(), fingerprint.map_or(name.to_owned(), |of| format!("{of} ({name})")))
-                }
-                Some(_) if known.is_named(name) => (
-                    beginning(&known.name, known.begins_with()),
-                    format!(
-                        "{}: the input was replaced or its beginning has changed",
-                        beginning(name, intake.begins_with())
-                    ),
-                ),
-                Some(_) => (known.name.clone(), name.to_owned()),
-            },
-        };
-        let (path, what) = (args.output.clone(), "been built from input");
-        let error = anyhow::Error::from(Error::Mismatch { path, what, found, wanted });
-        return Err(error.context(
-            "--resume takes what came since of an input that the map has; --append adds another one",
-        ));
-    }
-    let content = args.piece_of.is_none().then(|| intake.content());
-    let (rays, is_hits_alone) = (Some(mapper.config().rays), Some(args.no_rays));
-    mapper.begin_input(InputRecord { content, rays, is_hits_alone, ..InputRecord::from(name) })?;
-    Ok(Some(0))
-}
-
-/// An input by what tells it from others of its name.
-fn beginning(name: &str, begins_with: Option<&str>) -> String {
-    match begins_with {
-        Some(fingerprint) => {
-            format!("{name} whose first scan with points has the fingerprint {fingerprint:.12}")
-        }
-        None => format!("{name} without points in its first scans"),
-    }
-}
-
-/// An input goes on as it was begun.
-fn check_begun(args: &BuildArgs, input: &InputRecord, mapper: &OutOfCoreTileMapper) -> voxtile::Result<()> {
-    match input.is_hits_alone {
-        Some(begun) if begun != args.no_rays => {
-            let how = |is_hits_alone| if is_hits_alone { "points alone (--no-rays)" } else { "rays" };
-            let (found, wanted) = (how(begun).to_owned(), how(args.no_rays).to_owned());
-            let what = "been built of this input with";
-            Err(Error::Mismatch { path: args.output.clone(), what, found, wanted })
-        }
-        _ => mapper.check_rays(input),
-    }
-}
-
-/// Points of another coordinate reference system are elsewhere.
-fn check_crs(args: &BuildArgs, found: Option<&String>, own: Option<&String>) -> voxtile::Result<()> {
-    match (found, own) {
-        (Some(found), Some(own)) if found != own => {
-            let reason = format!(
-                "its coordinates are in {}, those of the map in {}; convert them first, for instance with pdal",
-                beginning_or_difference(found, own),
-                beginning_or_difference(own, found)
-            );
-            Err(Error::argument(args.scans.display().to_string(), reason))
-        }
-        _ => Ok(()),
-    }
-}
-
-fn taken_before(args: &BuildArgs, name: &str, scans: u64) -> anyhow::Error {
-    let reason = format!(
-        "the map has {scans} scans of an input that begins as this one does ({name}); --resume takes what came since, \
-         and --append --again adds all of them once more"
-    );
-    Error::argument(args.scans.display().to_string(), reason).into()
-}
-
-/// For temporary files: the map's folder or, where that is still to be made, the nearest folder around it. The system
-/// may keep its own in memory.
-fn folder_beside(args: &BuildArgs) -> &Path {
-    args.output.ancestors().find(|folder| folder.is_dir()).unwrap_or(Path::new("."))
-}
-
-/// The memory for reading, of a limit of so many bytes.
-fn for_reading(bytes: usize) -> usize {
-    (bytes / PARTS_FOR_READING).max(LEAST_FOR_READING)
-}
-
-/// The configuration of the map, which leaves the memory for reading alone.
-fn config_of_map(args: &BuildArgs, config: &MapConfig) -> MapConfig {
-    let mut config = config.clone();
-    if let MemoryLimit::Bytes(bytes) = config.memory
-        && !is_standard_input(&args.scans)
-    {
-        let least = MemoryLimit::least_bytes(&config.grid).min(bytes);
-        config.memory = MemoryLimit::Bytes((bytes - (for_reading(bytes) - LEAST_FOR_READING)).max(least));
-    }
-    config
-}
-
-/// Points of a scan that the limit of memory has no room for go to a file.
-fn room(args: &BuildArgs, config: &MapConfig) -> PointRoom {
-    let folder = folder_beside(args);
-    match config.memory {
-        MemoryLimit::Bytes(bytes) => {
-            PointRoom::new(bytes / PARTS_OF_MEMORY / scans_in_memory(args, config), folder)
-        }
-        _ => PointRoom::default(),
-    }
-}
-
-/// How many scans there may be at a time: those that are mapped, those that wait, and the one that is read.
-fn scans_in_memory(args: &BuildArgs, config: &MapConfig) -> usize {
-    let together = most_together(args, config);
-    match args.when_behind {
-        WhenBehind::Wait if together == 1 => 1,
-        WhenBehind::Wait => 2 * together + 1,
-        _ => together + ScanQueue::MOST_SCANS + 1,
-    }
-}
-
-/// How many scans are taken together if they are at hand: one for each core, as far as there is room for their points.
-fn most_together(args: &BuildArgs, config: &MapConfig) -> usize {
-    let room = match config.memory {
-        MemoryLimit::Bytes(bytes) => bytes / PARTS_OF_MEMORY / ROOM_TO_GO_TOGETHER,
-        _ => usize::MAX,
-    };
-    if args.no_rays { 1 } else { rayon::current_num_threads().min(room.saturating_sub(1) / 2).max(1) }
-}
-
-/// Free space alone is rarely what was wanted.
-fn all_is_cut(report: &ScanReport, config: &MapConfig) -> Option<String> {
-    let ScanReport { points, skipped, cut_at_max_range, .. } = *report;
-    let skipped: u64 = skipped.by_cause().into_iter().map(|(_, count)| count).sum();
-    let range_m = config.rays.max_range_m?;
-    (cut_at_max_range > 0 && cut_at_max_range + skipped == points).then(|| {
-        format!(
-            "all {cut_at_max_range} rays were cut at {range_m} m, so that nothing is occupied: raise --max-range; are \
-             the points in metres? Points that are in the world frame already, far from 0 0 0, need --world-frame \
-             with poses, --sensor-origin or --no-rays"
-        )
-    })
+/// What the command line asks for.
+pub fn options_of(args: &BuildArgs) -> voxtile::Result<BuildOptions> {
+    let mut options = BuildOptions::new(&args.scans, &args.output);
+    options.read = read_options(&args.read)?;
+    options.resolution_m = args.resolution;
+    options.tile_size_m = args.tile_size;
+    options.storage = args.storage.map(Storage::from);
+    let bytes = |memory: bytesize::ByteSize| MemoryLimit::Bytes(memory.as_u64() as usize);
+    options.memory = args.cache_tiles.map(MemoryLimit::tiles).or(args.memory.map(bytes));
+    options.min_range_m = args.min_range;
+    options.max_range_m = args.max_range;
+    options.sensor_model = args.sensor_model.map(|name| match name {
+        ModelName::LogOdds => SensorModelKind::LogOdds,
+        ModelName::Iwlo => SensorModelKind::Iwlo,
+    });
+    options.probabilities = args.probabilities.as_deref().and_then(|four| four.try_into().ok());
+    options.occupancy_threshold = args.occupancy_threshold;
+    options.intensity_threshold = args.intensity_threshold;
+    options.intensity_max = args.intensity_max;
+    options.insert_mode = args.insert.map(|name| match name {
+        InsertName::PerScan => InsertMode::PerScan,
+        InsertName::PerRay => InsertMode::PerRay,
+    });
+    options.keep_scans = args.keep_scans;
+    options.region = args.region.as_deref().map(region_of).transpose()?;
+    options.clear_no_return_m = args.clear_no_return;
+    options.no_rays = args.no_rays;
+    options.append = args.append;
+    options.resume = args.resume;
+    options.again = args.again;
+    options.skip_bad = args.skip_bad;
+    options.flush_every = args.flush_every;
+    options.when_behind = args.when_behind.into();
+    options.octree = octree_config(&args.octree)?;
+    Ok(options)
 }

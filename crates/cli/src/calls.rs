@@ -4,16 +4,15 @@
 use super::args::{BuildArgs, ExportArgs, ReadArgs};
 use super::call_error::CallError;
 use super::read_options::read_options;
-use super::summary::Summary;
-use super::watch::Watch;
-use super::{build as scans_to_map, export as map_to_file, scan_input};
+use super::build::options_of;
+use super::export as map_to_file;
 use clap::error::{ContextKind, ContextValue};
 use clap::{Args, Parser};
 use serde_json::Value;
 use std::ffi::OsString;
 use std::path::Path;
+use voxtile_pipeline::{Summary, Watch};
 use voxtile::Error;
-use voxtile::scan::Stop;
 use voxtile_formats::ScanSource;
 
 /// The arguments of one command, without its name.
@@ -32,7 +31,7 @@ struct Arguments<A: Args> {
 ///
 /// What the command fails for; [`Error::Stopped`] before the first scan.
 pub fn build(arguments: Vec<OsString>, watch: &Watch) -> Result<Value, CallError> {
-    told(scans_to_map::build(&parse::<BuildArgs>(arguments)?, watch)?)
+    told(voxtile_pipeline::build(&options_of(&parse::<BuildArgs>(arguments)?)?, watch)?)
 }
 
 /// The same for a map that is to become a piece of another one, whose id it gets. It is not durable: whoever crashes
@@ -42,8 +41,9 @@ pub fn build(arguments: Vec<OsString>, watch: &Watch) -> Result<Value, CallError
 ///
 /// As for [`build`].
 pub fn build_piece(arguments: Vec<OsString>, piece_of: [u8; 16], watch: &Watch) -> Result<Value, CallError> {
-    let args = BuildArgs { piece_of: Some(piece_of), ..parse(arguments)? };
-    told(scans_to_map::build(&args, watch)?)
+    let mut options = options_of(&parse::<BuildArgs>(arguments)?)?;
+    options.piece_of = Some(piece_of);
+    told(voxtile_pipeline::build(&options, watch)?)
 }
 
 /// `voxtile export` with these arguments; returns what it prints with `--json`. Where it is stopped, nothing is
@@ -63,7 +63,7 @@ pub fn export(arguments: Vec<OsString>, watch: &Watch) -> Result<Value, CallErro
 /// Arguments that make no sense, and an input that cannot be read.
 pub fn open_scans(scans: &Path, arguments: Vec<OsString>) -> Result<Box<dyn ScanSource + Send>, CallError> {
     let options = read_options(&parse::<ReadArgs>(arguments)?)?;
-    Ok(scan_input::open(scans, &options, &Stop::default())?)
+    Ok(voxtile_pipeline::open_scans(scans, &options, &Watch::nobody())?)
 }
 
 fn told(summary: Option<Summary>) -> Result<Value, CallError> {

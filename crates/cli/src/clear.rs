@@ -1,6 +1,6 @@
 use crate::args::ClearArgs;
 use crate::json;
-use crate::memory;
+use voxtile_pipeline::memory;
 use crate::part::part_of;
 use crate::progress::Progress;
 use indicatif::HumanCount;

@@ -2,7 +2,7 @@ use crate::args::ConvertArgs;
 use crate::json;
 use voxtile_pipeline::{read_map, whole_map};
 
-use crate::memory;
+use voxtile_pipeline::memory;
 use crate::progress::Progress;
 use crate::written::warn_of_scans_left;
 use indicatif::{HumanBytes, HumanCount};

@@ -2,7 +2,7 @@ use crate::args::CropArgs;
 use crate::json;
 use voxtile_pipeline::{read_map, whole_map};
 
-use crate::memory;
+use voxtile_pipeline::memory;
 use crate::part::part_of;
 use crate::progress::Progress;
 use crate::written::{print_written, warn_of_scans_left};

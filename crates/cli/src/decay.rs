@@ -1,6 +1,6 @@
 use crate::args::DecayArgs;
 use crate::json;
-use crate::memory;
+use voxtile_pipeline::memory;
 use crate::progress::Progress;
 use indicatif::HumanCount;
 use serde::Serialize;

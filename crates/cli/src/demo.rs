@@ -5,7 +5,8 @@ use crate::picture::write_png;
 use crate::progress::Progress;
 use crate::run::INTERRUPTED;
 use crate::stop_signal;
-use crate::summary::Summary;
+use crate::summary;
+use voxtile_pipeline::Summary;
 use std::io::Write;
 use std::path::Path;
 use std::process::ExitCode;
@@ -53,7 +54,7 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<ExitCode> {
             Err(error) => return Err(error.into()),
         }
         inserted += 1;
-        progress.show(&mapper);
+        progress.show(&|| mapper.statistics());
     }
     progress.say("flushing");
     mapper.flush()?;
@@ -65,8 +66,9 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<ExitCode> {
         JsonTo::output_if(args.json).tell_stopped(&message);
         return Ok(ExitCode::from(INTERRUPTED));
     }
-    let summary = Summary::of(&map, inserted, report, &mapper, started.elapsed())?;
-    Summary { resumed_after: done, ..summary }.print(args.json)?;
+    let mut built = Summary::of(&map, inserted, report, &mapper, started.elapsed())?;
+    built.resumed_after = done;
+    summary::print(&built, args.json)?;
     drop(mapper);
 
     let picture = args.out.join("map.png");

@@ -2,7 +2,7 @@ use crate::args::DiffArgs;
 use crate::json;
 use voxtile_pipeline::{MapAt, read_maps};
 
-use crate::memory;
+use voxtile_pipeline::memory;
 use crate::progress::Progress;
 use indicatif::HumanCount;
 use serde::Serialize;

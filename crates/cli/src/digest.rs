@@ -1,6 +1,6 @@
 use crate::args::DigestArgs;
 use crate::json;
-use crate::memory;
+use voxtile_pipeline::memory;
 use std::io::Write;
 use std::process::ExitCode;
 use voxtile::MapQueries;

@@ -4,12 +4,13 @@ use crate::export_origin::{ExportOrigin, OriginFile};
 use crate::export_scans;
 use crate::export_voxels::{self, log_odds_of};
 use crate::exported::Exported;
-use crate::memory;
+use voxtile_pipeline::memory;
 use crate::output_file::{OutputFile, is_standard_output, scratch_for};
 use crate::part::point_of;
 use crate::part::region_of;
 use crate::stop_signal;
-use crate::watch::Watch;
+use crate::progress::at_terminal;
+use voxtile_pipeline::Watch;
 use indicatif::HumanCount;
 use std::io::{self, IsTerminal, Write};
 use std::path::Path;
@@ -51,7 +52,7 @@ struct Written {
 
 /// Writes the file and says what it is; on standard error, unless `is_quiet`, where standard output is the file.
 pub fn run(args: &ExportArgs, is_quiet: bool) -> anyhow::Result<ExitCode> {
-    let exported = export(args, &Watch::at_terminal(stop_signal::catch_unfinished()?))?;
+    let exported = export(args, &at_terminal(stop_signal::catch_unfinished()?))?;
     if args.scans.is_some() || !is_standard_output(&args.output) {
         exported.print(args.json, &mut io::stdout().lock())?;
     } else if args.json || !is_quiet {

@@ -4,9 +4,9 @@ use crate::args::ExportArgs;
 use crate::exported::Exported;
 use voxtile_pipeline::{AnyMap, read_any_map};
 
-use crate::memory;
+use voxtile_pipeline::memory;
 use crate::output_file::{StagedOutput, is_standard_output, scratch_for};
-use crate::watch::Watch;
+use voxtile_pipeline::Watch;
 use indicatif::HumanCount;
 use rayon::prelude::*;
 use std::fs;

@@ -3,7 +3,7 @@
 use crate::args::ExportArgs;
 use crate::exported::Exported;
 use crate::output_file::StagedOutput;
-use crate::watch::Watch;
+use voxtile_pipeline::Watch;
 use indicatif::HumanCount;
 use serde::Serialize;
 use std::fs::{self, File};

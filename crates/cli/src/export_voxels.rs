@@ -2,10 +2,10 @@
 
 use crate::args::{ExportArgs, WhatName};
 use crate::exported::Exported;
-use crate::memory;
+use voxtile_pipeline::memory;
 use crate::output_file::{StagedOutput, is_standard_output};
 use crate::part::point_of;
-use crate::watch::Watch;
+use voxtile_pipeline::Watch;
 use indicatif::HumanCount;
 use voxtile::mapper::{MapView, Stoppable};
 use voxtile::maths::least_logit;

@@ -6,7 +6,6 @@
 
 mod args;
 mod build;
-mod build_config;
 mod call_error;
 pub mod calls;
 mod clear;
@@ -24,20 +23,13 @@ mod export_scans;
 mod export_voxels;
 mod exported;
 mod failure;
-#[cfg(feature = "bucket")]
-mod fetched_source;
-mod flush_schedule;
 mod import;
 mod info;
-mod intake;
 mod json;
-mod kept_source;
 mod local;
 mod local_table;
 mod man;
-mod memory;
 mod merge;
-mod new_poses;
 mod octree_choice;
 mod octree_info;
 mod output_file;
@@ -60,10 +52,6 @@ mod report;
 mod revert;
 mod rework;
 mod run;
-mod scan_input;
-mod scan_place;
-mod scan_queue;
-mod scan_reader;
 mod scans;
 mod share;
 mod snapshot;
@@ -75,9 +63,8 @@ mod threads;
 mod verify;
 #[cfg(feature = "view")]
 mod view;
-mod watch;
 mod written;
 
 pub use call_error::CallError;
 pub use run::{main, run};
-pub use watch::{Listener, Watch};
+pub use voxtile_pipeline::{Listener, Watch};

@@ -2,14 +2,13 @@ use crate::args::{LocalArgs, PresetName};
 use crate::json;
 use crate::local_table::{Row, print_table};
 use crate::output_file::{OutputFile, check_picture};
-use crate::progress::Progress;
+use crate::progress::{Progress, at_terminal};
 use crate::read_options::read_options;
-use crate::scan_input::{self, is_standard_input};
-use crate::scan_place::LocalScans;
+use voxtile_pipeline::{is_standard_input, open_scans};
+use voxtile_pipeline::{LocalScans, Watch};
 use crate::stop_signal;
 use std::io::Write;
 use std::process::ExitCode;
-use voxtile::scan::Stop;
 use voxtile::space::{Grid, Point};
 use voxtile::{Error, Scan};
 use voxtile_formats::ScanSource;
@@ -105,13 +104,13 @@ fn setups(args: &LocalArgs) -> Vec<Setup> {
 /// The scans, which all runs read.
 struct Input {
     scans: LocalScans,
-    stop: Stop,
+    watch: Watch,
 }
 
 impl Input {
     fn of(args: &LocalArgs) -> anyhow::Result<Self> {
-        let stop = stop_signal::catch_if_fetched(&args.scans)?;
-        Ok(Self { scans: LocalScans::of(&args.scans, &stop)?, stop })
+        let watch = at_terminal(stop_signal::catch_if_fetched(&args.scans)?);
+        Ok(Self { scans: LocalScans::of(&args.scans, &watch)?, watch })
     }
 }
 
@@ -121,7 +120,7 @@ fn run_setup(
     setup: &Setup,
     mut panels: Option<&mut Vec<Panel>>,
 ) -> anyhow::Result<Row> {
-    let mut source = scan_input::open(input.scans.path(), &read_options(&args.read)?, &input.stop)?;
+    let mut source = open_scans(input.scans.path(), &read_options(&args.read)?, &input.watch)?;
     let scans = source.len_hint();
     let progress = Progress::over_scans(scans);
     let mut map = LocalMap::new(args.resolution, setup.parameters)?;
@@ -133,7 +132,7 @@ fn run_setup(
     let mut path = Vec::new();
     let mut number = 0;
     while let Some(scan) = next_scan(&mut *source, args.points)? {
-        input.stop.check()?;
+        input.watch.stop().check()?;
         let relayed = relay.as_mut().map(|relay| relay.points(&scan)).transpose()?;
         let begin = cpu_seconds();
         let report = match relayed {

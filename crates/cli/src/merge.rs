@@ -2,7 +2,7 @@ use crate::args::MergeArgs;
 use crate::json;
 use voxtile_pipeline::{read_all_maps, whole_map};
 
-use crate::memory;
+use voxtile_pipeline::memory;
 use crate::progress::Progress;
 use crate::written::{print_written, warn_of_scans_left};
 use indicatif::HumanCount;

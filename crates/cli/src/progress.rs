@@ -1,15 +1,29 @@
-use crate::memory::resident_bytes;
-use crate::watch::Listener;
+use voxtile_pipeline::memory::resident_bytes;
+use voxtile::scan::Stop;
+use voxtile_pipeline::{Gauge, Unit, Watch};
 use indicatif::{HumanBytes, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use parking_lot::Mutex;
 use std::io::{self, Write};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use voxtile::mapper::{MapStatistics, MapView};
+use voxtile::mapper::MapStatistics;
 
-/// A bar on standard error for long work; nothing where that is no terminal. Or another program hears of each step.
+/// A bar on standard error for long work; nothing where that is no terminal.
 pub struct Progress {
     bar: ProgressBar,
-    listener: Option<Listener>,
+}
+
+/// A person who sees bars.
+pub fn at_terminal(stop: Stop) -> Watch {
+    let bar = |unit, all: Option<u64>| -> Box<dyn Gauge> {
+        let all = all.map(|all| usize::try_from(all).unwrap_or(usize::MAX));
+        Box::new(match unit {
+            Unit::Scans => Progress::over_scans(all),
+            Unit::Tiles => Progress::over_tiles(all.unwrap_or(0)),
+            Unit::Bytes => Progress::over_bytes(),
+        })
+    };
+    Watch::new(stop, Arc::new(bar))
 }
 
 static ARE_HIDDEN: AtomicBool = AtomicBool::new(false);
@@ -56,7 +70,6 @@ impl Progress {
     }
 
     /// A bar over bytes.
-    #[cfg(feature = "bucket")]
     pub fn over_bytes() -> Self {
         Self::styled(ProgressBar::new(0), "{bar:30} {bytes}/{total_bytes}  {bytes_per_sec}  {eta} left")
     }
@@ -67,14 +80,7 @@ impl Progress {
         }
         bar.set_style(style(template));
         *SHOWN.lock() = Some(bar.clone());
-        Self { bar, listener: None }
-    }
-
-    /// Tells a program, if there is one, in place of a person.
-    pub fn told_to(mut self, listener: Option<Listener>) -> Self {
-        self.bar.set_draw_target(ProgressDrawTarget::hidden());
-        self.listener = listener;
-        self
+        Self { bar }
     }
 
     /// So many were done before.
@@ -86,9 +92,6 @@ impl Progress {
     /// One more is done.
     pub fn step(&self) {
         self.bar.inc(1);
-        if let Some(listener) = &self.listener {
-            listener(self.bar.position(), self.bar.length().unwrap_or(0));
-        }
     }
 
     /// So many of all are done.
@@ -104,11 +107,11 @@ impl Progress {
     }
 
     /// Shows what a mapper holds. Asked for a few times a second at most.
-    pub fn show(&self, mapper: &impl MapView) {
+    pub fn show(&self, statistics: &dyn Fn() -> MapStatistics) {
         if self.bar.is_hidden() || !self.bar.position().is_multiple_of(8) {
             return;
         }
-        let MapStatistics { tiles, cached_tiles, buffered_tiles, stalls, .. } = mapper.statistics();
+        let MapStatistics { tiles, cached_tiles, buffered_tiles, stalls, .. } = statistics();
         let memory = resident_bytes().map_or(String::new(), |bytes| format!(", {}", HumanBytes(bytes)));
         let waiting = match buffered_tiles {
             0 => String::new(),
@@ -124,6 +127,28 @@ impl Progress {
     /// Says what is going on when it is no step.
     pub fn say(&self, message: &'static str) {
         self.bar.set_message(message);
+    }
+}
+
+impl Gauge for Progress {
+    fn pass(&self, done: u64) {
+        self.pass(done);
+    }
+
+    fn step(&self) {
+        self.step();
+    }
+
+    fn set(&self, done: u64, all: u64) {
+        self.set(done, all);
+    }
+
+    fn say(&self, message: &'static str) {
+        self.say(message);
+    }
+
+    fn show(&self, statistics: &dyn Fn() -> MapStatistics) {
+        self.show(statistics);
     }
 }
 

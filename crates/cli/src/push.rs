@@ -1,6 +1,6 @@
 use crate::args::PushArgs;
 use crate::json;
-use crate::memory;
+use voxtile_pipeline::memory;
 use crate::progress::Progress;
 use indicatif::{HumanBytes, HumanCount};
 use serde::Serialize;

@@ -1,20 +1,6 @@
-//! The tiles of a region that a map is built of.
+//! The tiles of a region that a map is built of, for people.
 
-use crate::part::region_of;
 use voxtile::space::{Grid, TileBox};
-use voxtile::{Error, Result};
-
-/// The tiles of a `--region`.
-pub fn tiles_of(corners: &[f64], grid: &Grid) -> Result<TileBox> {
-    let region = region_of(corners)?;
-    TileBox::with_centers_in(&region, grid).ok_or_else(|| {
-        let reason = format!(
-            "no tile has its center in {region}; tiles are {} m long, and a region is made of whole ones",
-            grid.tile_size_m()
-        );
-        Error::argument("--region", reason)
-    })
-}
 
 /// The tiles in metres; what reaches beyond all voxels is infinite.
 pub fn text(tiles: TileBox, grid: &Grid) -> String {

@@ -2,8 +2,10 @@ use crate::args::{InsertName, ModelName, RemapArgs};
 use crate::json;
 use voxtile_pipeline::{MapAt, whole_map};
 
-use crate::memory;
-use crate::new_poses::{PoseFile, poses_for, records_of};
+use voxtile_pipeline::memory;
+use crate::read_options::{pose_of, tolerance_ns};
+use voxtile_formats::clouds::Budget;
+use voxtile_pipeline::{PoseFile, poses_for, records_of};
 use crate::rework::{self, Job};
 use indicatif::HumanCount;
 use serde::Serialize;
@@ -37,7 +39,7 @@ pub fn run(args: &RemapArgs) -> anyhow::Result<ExitCode> {
     let job = Job::of(&args.rework, map)?;
     let poses = {
         let scans = records_of(&MapReader::open(map, 1)?)?;
-        poses_for(&PoseFile::of_remap(args, file)?, &scans)?
+        poses_for(&pose_file(args, file)?, &scans)?
     };
     let how = Remap::new(job.rework.clone()).with_tolerance(tolerance);
     let outcome = remap(map, &poses, &how, |done, all| job.progress.set(done, all));
@@ -164,4 +166,14 @@ fn rays_of(args: &RemapArgs, own: &RayConfig) -> RayConfig {
         None => rays.insert_mode,
     };
     rays
+}
+
+/// How the new poses are read.
+fn pose_file<'a>(args: &'a RemapArgs, path: &'a Path) -> voxtile::Result<PoseFile<'a>> {
+    let body_from_sensor = args.extrinsic.as_deref().map(pose_of).transpose()?.map(|(rigid, _)| rigid);
+    let tolerance_ns = tolerance_ns(args.pose_tolerance)?;
+    // Where builds put what they cannot hold: the system's folder may be in memory.
+    let scratch = args.map.ancestors().skip(1).find(|folder| folder.is_dir()).unwrap_or(Path::new("."));
+    let budget = Budget { scratch: Some(scratch.to_owned()), ..Budget::default() };
+    Ok(PoseFile { path, calib: args.calib.as_deref(), body_from_sensor, tolerance_ns, budget })
 }

@@ -1,6 +1,6 @@
 use crate::args::RemovePointsArgs;
 use crate::json;
-use crate::memory;
+use voxtile_pipeline::memory;
 use crate::part::region_of;
 use crate::rework::{self, Job};
 use indicatif::HumanCount;

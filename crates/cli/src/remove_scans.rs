@@ -1,6 +1,6 @@
 use crate::args::RemoveScansArgs;
 use crate::json;
-use crate::memory;
+use voxtile_pipeline::memory;
 use crate::rework::{self, Job};
 use crate::run::say;
 use indicatif::HumanCount;

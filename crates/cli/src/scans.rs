@@ -1,10 +1,8 @@
 use crate::args::ScansArgs;
 use crate::json;
-use crate::kept_source;
-use crate::progress::Progress;
+use crate::progress::{Progress, at_terminal};
 use crate::read_options::read_options;
-use crate::scan_input;
-use crate::scan_place::LocalScans;
+use voxtile_pipeline::{LocalScans, open_scans};
 use crate::stop_signal;
 use anyhow::Context;
 use indicatif::{HumanBytes, HumanCount};
@@ -75,7 +73,7 @@ fn is_map(path: &Path) -> voxtile::Result<bool> {
     let text = path.to_str().and_then(|text| text.rsplit_once('@'));
     match url_of(path) {
         // Nothing is to be removed yet: signals do what they always do.
-        Some(_) => kept_source::is_map(path, &Stop::default()),
+        Some(_) => voxtile_pipeline::is_map(path, &Stop::default()),
         None => Ok(has_metadata(path) || text.is_some_and(|(map, _)| has_metadata(Path::new(map)))),
     }
 }
@@ -120,9 +118,9 @@ fn of_input(args: &ScansArgs, out: &mut impl Write) -> anyhow::Result<Overview> 
     let mut options = read_options(&args.read)?;
     // What a build would leave out is listed all the same, and said.
     options.clouds.may_lack_poses = true;
-    let stop = stop_signal::catch_if_fetched(&args.data)?;
-    let local = LocalScans::of(&args.data, &stop)?;
-    let mut source: Box<dyn ScanSource + Send> = scan_input::open(local.path(), &options, &stop)?;
+    let watch = at_terminal(stop_signal::catch_if_fetched(&args.data)?);
+    let local = LocalScans::of(&args.data, &watch)?;
+    let mut source: Box<dyn ScanSource + Send> = open_scans(local.path(), &options, &watch)?;
     let progress = Progress::over_scans(source.len_hint());
     let room = PointRoom::new(ROOM_BYTES, &std::env::temp_dir());
     let mut overview = Overview { format: source.format(), points: Some(0), ..Overview::default() };
@@ -141,7 +139,7 @@ fn of_input(args: &ScansArgs, out: &mut impl Write) -> anyhow::Result<Overview> 
         };
         overview.add(&row, args, out)?;
         progress.step();
-        stop.check()?;
+        watch.stop().check()?;
     }
     overview.fields = source.fields();
     overview.remarks = source.remarks();

@@ -1,10 +1,45 @@
 //! How scans become a map, and how maps are found: what the command, the page, the Python package and the ROS 2 node
 //! share. Nothing here prints, parses a command line or knows a screen.
+//!
+//! ```text
+//! BuildOptions -> build                                             build, build_config, flush_schedule
+//!   scans of a file, folder, map, bucket or pipe                    scan_input, kept_source, fetched_source
+//!   -> ScanReader, in a thread of its own -> ScanQueue -> Intake    scan_reader, scan_queue, intake
+//!   -> a mapper -> Summary                                          summary
+//! Watch: ends work, and hears how far it is                         watch
+//! ```
 
 mod answer;
+mod build;
+mod build_config;
+mod build_options;
+#[cfg(feature = "bucket")]
+mod fetched_source;
+mod flush_schedule;
+mod intake;
+mod kept_source;
 mod map_at;
+pub mod memory;
+mod new_poses;
 pub mod octree_file;
 pub mod place;
+mod region_tiles;
+mod scan_input;
+mod scan_place;
+mod scan_queue;
+mod scan_reader;
+mod summary;
+mod watch;
 
 pub use answer::{Answer, answer_at};
+pub use build::build;
+pub use build_options::{BuildOptions, SensorModelKind};
+pub use flush_schedule::FlushEvery;
+pub use kept_source::is_map;
 pub use map_at::{AnyMap, MapAt, open_any_map, read_all_maps, read_any_map, read_map, read_maps, whole_map};
+pub use new_poses::{PoseFile, poses_for, records_of};
+pub use scan_input::{is_standard_input, open as open_scans};
+pub use scan_place::LocalScans;
+pub use scan_queue::WhenBehind;
+pub use summary::{OctreeWork, Summary};
+pub use watch::{Gauge, Listener, MakeGauge, Unit, Watch};

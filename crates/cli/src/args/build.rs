@@ -1,6 +1,5 @@
 use super::ReadArgs;
-use crate::flush_schedule::FlushEvery;
-use crate::scan_queue::WhenBehind;
+use voxtile_pipeline::{FlushEvery, WhenBehind};
 use bytesize::ByteSize;
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
@@ -80,9 +79,6 @@ pub struct BuildArgs {
     /// with --append: every scan counts exactly once, however often the command is repeated
     #[arg(long)]
     pub resume: bool,
-    /// The map is made as a piece with this id, and not durably: for callers of `calls::build_piece`
-    #[arg(skip)]
-    pub piece_of: Option<[u8; 16]>,
     /// Add the scans even if the map has scans of this input: they count once more
     #[arg(long, requires = "append", conflicts_with = "resume")]
     pub again: bool,
@@ -96,7 +92,7 @@ pub struct BuildArgs {
     /// What becomes of scans from standard input or a pipe that come faster than they can be mapped; those left out are
     /// counted
     #[arg(long, value_name = "HOW", default_value = "wait")]
-    pub when_behind: WhenBehind,
+    pub when_behind: WhenBehindName,
     /// Print the summary as JSON
     #[arg(long)]
     pub json: bool,
@@ -157,6 +153,27 @@ impl From<StorageName> for Storage {
         match name {
             StorageName::OctoMap => Self::OctoMap,
             StorageName::Compact => Self::Compact,
+        }
+    }
+}
+
+/// What becomes of scans that come faster than they can be mapped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum WhenBehindName {
+    /// The input waits
+    Wait,
+    /// The oldest scan that waits makes room
+    DropOldest,
+    /// While more than half of the room is taken, every second scan is left out; then as drop-oldest
+    Thin,
+}
+
+impl From<WhenBehindName> for WhenBehind {
+    fn from(name: WhenBehindName) -> Self {
+        match name {
+            WhenBehindName::Wait => Self::Wait,
+            WhenBehindName::DropOldest => Self::DropOldest,
+            WhenBehindName::Thin => Self::Thin,
         }
     }
 }

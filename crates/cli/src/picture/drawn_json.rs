@@ -1,5 +1,5 @@
 use crate::args::{ColorName, PictureArgs, ViewName};
-use crate::memory;
+use voxtile_pipeline::memory;
 use clap::ValueEnum;
 use serde::Serialize;
 use std::path::Path;

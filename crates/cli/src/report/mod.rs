@@ -9,7 +9,7 @@ use crate::info::Info;
 use crate::json;
 use voxtile_pipeline::{AnyMap, MapAt, read_any_map};
 
-use crate::memory;
+use voxtile_pipeline::memory;
 use crate::output_file::{OutputFile, is_standard_output};
 use crate::picture::{name_of, path_of};
 use crate::progress::Progress;

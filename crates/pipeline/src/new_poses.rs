@@ -1,5 +1,3 @@
-use crate::args::RemapArgs;
-use crate::read_options::{pose_of, tolerance_ns};
 use std::path::Path;
 use voxtile::mapper::MapReader;
 use voxtile::operations::NewPoses;
@@ -14,26 +12,21 @@ use voxtile_formats::{ReadOptions, read_poses};
 const MOST_NAMED: usize = 5;
 
 /// How a file of poses is read.
+#[derive(Debug)]
 pub struct PoseFile<'a> {
+    /// The file.
     pub path: &'a Path,
     /// The `calib.txt` of KITTI.
     pub calib: Option<&'a Path>,
     /// Where the sensor is in the body that the poses are of.
     pub body_from_sensor: Option<RigidPose>,
+    /// Most nanoseconds from a scan to the nearer of the poses around it.
     pub tolerance_ns: i64,
+    /// What reading may take of memory.
     pub budget: Budget,
 }
 
 impl<'a> PoseFile<'a> {
-    pub fn of_remap(args: &'a RemapArgs, path: &'a Path) -> Result<Self> {
-        let body_from_sensor = args.extrinsic.as_deref().map(pose_of).transpose()?.map(|(rigid, _)| rigid);
-        let tolerance_ns = tolerance_ns(args.pose_tolerance)?;
-        // Where builds put what they cannot hold: the system's folder may be in memory.
-        let scratch = args.map.ancestors().skip(1).find(|folder| folder.is_dir()).unwrap_or(Path::new("."));
-        let budget = Budget { scratch: Some(scratch.to_owned()), ..Budget::default() };
-        Ok(Self { path, calib: args.calib.as_deref(), body_from_sensor, tolerance_ns, budget })
-    }
-
     /// `None` if scans are to keep their own poses.
     pub fn of_reading(options: &'a ReadOptions) -> Option<Self> {
         let body = options.clouds.body_from_sensor;
@@ -48,6 +41,10 @@ impl<'a> PoseFile<'a> {
 }
 
 /// The scans that a map keeps, without their tiles, of which a long drive has many.
+///
+/// # Errors
+///
+/// A map that does not keep all its scans; damage.
 pub fn records_of(reader: &MapReader) -> Result<Vec<KeptRecord>> {
     reader.check_keeps_all()?;
     let (mut records, mut scans) = (reader.kept_scans()?, Vec::new());
@@ -59,6 +56,10 @@ pub fn records_of(reader: &MapReader) -> Result<Vec<KeptRecord>> {
 }
 
 /// The poses of a file for the scans that a map keeps, as a build with that file would give them.
+///
+/// # Errors
+///
+/// A file that cannot be read, and poses that do not fit the scans.
 pub fn poses_for(from: &PoseFile<'_>, scans: &[KeptRecord]) -> Result<NewPoses> {
     let &PoseFile { path: file, calib, body_from_sensor, tolerance_ns, ref budget } = from;
     if std::fs::metadata(file).is_ok_and(|meta| !meta.is_file() && !meta.is_dir()) {

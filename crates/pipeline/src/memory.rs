@@ -1,3 +1,5 @@
+//! What this process takes of memory.
+
 use std::fs;
 
 /// Largest resident memory of this process so far, in bytes; `None` where the system does not tell.

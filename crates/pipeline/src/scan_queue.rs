@@ -1,19 +1,18 @@
 use crate::scan_reader::{Read, ReadScan};
-use clap::ValueEnum;
 use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use voxtile::Error;
 
 /// What becomes of scans that come faster than they can be mapped.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum WhenBehind {
-    /// The input waits
+    /// The input waits.
     #[default]
     Wait,
-    /// The oldest scan that waits makes room
+    /// The oldest scan that waits makes room.
     DropOldest,
-    /// While more than half of the room is taken, every second scan is left out; then as drop-oldest
+    /// While more than half of the room is taken, every second scan is left out; then as [`DropOldest`](Self::DropOldest).
     Thin,
 }
 

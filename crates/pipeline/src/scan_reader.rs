@@ -1,6 +1,7 @@
 use crate::scan_input;
 use crate::scan_place::LocalScans;
 use crate::scan_queue::{ScanQueue, is_last};
+use crate::watch::Watch;
 use anyhow::bail;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -82,18 +83,18 @@ impl ScanReader {
         options: ReadOptions,
         room: PointRoom,
         mark: Marking,
-        stop: Stop,
+        watch: Watch,
     ) -> anyhow::Result<Option<(Self, Opened)>> {
         let (requests, requests_in) = channel();
         let (answers_out, answers) = channel();
-        let local = match LocalScans::of(&scans, &stop) {
+        let local = match LocalScans::of(&scans, &watch) {
             Err(Error::Stopped) => return Ok(None),
             local => local?,
         };
         let (path, own_options, here) = (local.path().to_owned(), options.clone(), room.clone());
-        let (named, own_stop) = (scans.clone(), stop.clone());
+        let (named, own_watch, stop) = (scans.clone(), watch.clone(), watch.stop().clone());
         let read = move || {
-            let mut source = match scan_input::open(&path, &own_options, &own_stop) {
+            let mut source = match scan_input::open(&path, &own_options, &own_watch) {
                 Ok(source) => source,
                 Err(error) => return drop(answers_out.send(Answer::Opened(Err(error)))),
             };
@@ -120,7 +121,7 @@ impl ScanReader {
             }
             Err(error) => {
                 log::warn!("no thread for reading, so that requests to stop wait for the input: {error}");
-                let source = scan_input::open(local.path(), &options, &stop)?;
+                let source = scan_input::open(local.path(), &options, &watch)?;
                 let opened = Opened::of(&scans, &*source);
                 Ok(Some((
                     Self { place: Place::Here(source, here, mark), stop, ahead: None, _scans: local },

@@ -1,10 +1,10 @@
+use crate::watch::Watch;
 use std::path::{Path, PathBuf};
 use voxtile::Result;
-use voxtile::scan::Stop;
 use voxtile_formats::{ReadOptions, ScanSource};
-use voxtile_pipeline::place::url_of;
+use crate::place::url_of;
 #[cfg(not(feature = "bucket"))]
-use voxtile_pipeline::place::without_buckets;
+use crate::place::without_buckets;
 
 /// Opens the scans at a URL that is none of a map.
 ///
@@ -13,12 +13,12 @@ use voxtile_pipeline::place::without_buckets;
 /// As for [`Bucket::open`](voxtile_bucket::Bucket::open) and
 /// [`FetchedFiles::fetch`](voxtile_bucket::FetchedFiles::fetch); a URL, where the command was built without buckets.
 #[cfg(feature = "bucket")]
-pub fn scans_at(url: &str, options: &ReadOptions, stop: &Stop) -> Result<Box<dyn ScanSource + Send>> {
-    Ok(Box::new(crate::fetched_source::FetchedSource::open(url, options, stop)?))
+pub fn scans_at(url: &str, options: &ReadOptions, watch: &Watch) -> Result<Box<dyn ScanSource + Send>> {
+    Ok(Box::new(crate::fetched_source::FetchedSource::open(url, options, watch)?))
 }
 
 #[cfg(not(feature = "bucket"))]
-pub fn scans_at(url: &str, _: &ReadOptions, _: &Stop) -> Result<Box<dyn ScanSource + Send>> {
+pub fn scans_at(url: &str, _: &ReadOptions, _: &Watch) -> Result<Box<dyn ScanSource + Send>> {
     Err(without_buckets(url))
 }
 
@@ -36,18 +36,18 @@ impl LocalScans {
     ///
     /// As for [`scans_at`]; [`Error::Stopped`].
     #[cfg(feature = "bucket")]
-    pub fn of(scans: &Path, stop: &Stop) -> Result<Self> {
+    pub fn of(scans: &Path, watch: &Watch) -> Result<Self> {
         let url = match url_of(scans) {
-            Some(url) if !crate::kept_source::is_map(scans, stop)? => Some(url),
+            Some(url) if !crate::kept_source::is_map(scans, watch.stop())? => Some(url),
             _ => None,
         };
-        let fetched = url.map(|url| crate::fetched_source::fetch(url, stop)).transpose()?;
+        let fetched = url.map(|url| crate::fetched_source::fetch(url, watch)).transpose()?;
         let path = fetched.as_ref().map_or(scans, |files| files.path()).to_owned();
         Ok(Self { path, _fetched: fetched })
     }
 
     #[cfg(not(feature = "bucket"))]
-    pub fn of(scans: &Path, _: &Stop) -> Result<Self> {
+    pub fn of(scans: &Path, _: &Watch) -> Result<Self> {
         url_of(scans).map_or(Ok(Self { path: scans.to_owned() }), |url| Err(without_buckets(url)))
     }
 

@@ -1,9 +1,8 @@
-use crate::progress::Progress;
+use crate::watch::Watch;
 use voxtile::Result;
-use voxtile::scan::Stop;
 use voxtile_bucket::FetchedFiles;
 use voxtile_formats::{PointStore, PoseSource, ReadOptions, ScanHead, ScanSource, open_any_scans};
-use voxtile_pipeline::place::bucket_at;
+use crate::place::bucket_at;
 
 /// Scans of a bucket, from files that were fetched.
 pub struct FetchedSource {
@@ -14,20 +13,20 @@ pub struct FetchedSource {
 
 impl FetchedSource {
     /// Fetches all files at a URL, then reads them as those of a folder.
-    pub fn open(url: &str, options: &ReadOptions, stop: &Stop) -> Result<Self> {
-        let files = fetch(url, stop)?;
+    pub fn open(url: &str, options: &ReadOptions, watch: &Watch) -> Result<Self> {
+        let files = fetch(url, watch)?;
         Ok(Self { source: open_any_scans(files.path(), options)?, _files: files })
     }
 }
 
 /// Fetches all files at a URL, until it is asked to stop.
-pub fn fetch(url: &str, stop: &Stop) -> Result<FetchedFiles> {
+pub fn fetch(url: &str, watch: &Watch) -> Result<FetchedFiles> {
     let bucket = bucket_at(url)?;
-    let progress = Progress::over_bytes();
-    let is_stopped = || stop.is_set();
-    let report = |done, all| progress.set(done, all);
+    let gauge = watch.over_bytes();
+    let is_stopped = || watch.stop().is_set();
+    let report = |done, all| gauge.set(done, all);
     let files = FetchedFiles::fetch(&bucket, &std::env::temp_dir(), &is_stopped, report)?;
-    drop(progress);
+    drop(gauge);
     log::info!("{url}: fetched {} files, {} bytes", files.files(), files.bytes());
     Ok(files)
 }

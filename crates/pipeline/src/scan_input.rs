@@ -1,12 +1,12 @@
 use crate::kept_source::{KeptSource, is_map};
 use crate::new_poses::PoseFile;
 use crate::scan_place::scans_at;
+use crate::watch::Watch;
 use std::io::{BufReader, stdin};
 use std::path::Path;
-use voxtile::scan::Stop;
 use voxtile::{Error, Result};
 use voxtile_formats::{ReadOptions, ScanSource, open_any_scans, read_scan_stream};
-use voxtile_pipeline::place::url_of;
+use crate::place::url_of;
 
 /// Most letters of an input's name that a map keeps.
 const MOST_LETTERS: usize = 200;
@@ -18,13 +18,17 @@ pub fn is_standard_input(scans: &Path) -> bool {
 
 /// Opens scans, which are a scan stream if they come from standard input. Once it is to stop, nothing waits for a
 /// bucket.
-pub fn open(scans: &Path, options: &ReadOptions, stop: &Stop) -> Result<Box<dyn ScanSource + Send>> {
-    if options.open.format.is_none() && is_map(scans, stop)? {
+///
+/// # Errors
+///
+/// An input that cannot be read, options that do not fit it; [`Error::Stopped`].
+pub fn open(scans: &Path, options: &ReadOptions, watch: &Watch) -> Result<Box<dyn ScanSource + Send>> {
+    if options.open.format.is_none() && is_map(scans, watch.stop())? {
         let source = KeptSource::open(scans, PoseFile::of_reading(options).as_ref())?;
         return Ok(options.selection.clone().of(Box::new(source)));
     }
     if let Some(url) = url_of(scans) {
-        return scans_at(url, options, stop);
+        return scans_at(url, options, watch);
     }
     if !is_standard_input(scans) {
         return open_any_scans(scans, options);

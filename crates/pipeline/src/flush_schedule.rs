@@ -4,8 +4,11 @@ use std::time::{Duration, Instant};
 /// How often a build makes durable what it mapped.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FlushEvery {
+    /// After so many scans.
     Scans(u64),
+    /// After so long, beside scans.
     Time(Duration),
+    /// At the end alone.
     End,
 }
 

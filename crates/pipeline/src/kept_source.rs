@@ -5,8 +5,8 @@ use voxtile::mapper::KeptScans;
 use voxtile::scan::{Pose, ScanPoints, Stop};
 use voxtile::{Error, Result};
 use voxtile_formats::{PointStore, ScanHead, ScanSource};
-use voxtile_pipeline::MapAt;
-use voxtile_pipeline::place::{is_map_at, url_of};
+use crate::MapAt;
+use crate::place::{is_map_at, url_of};
 
 /// The scans that a map or a snapshot of one keeps, as an input like any other.
 pub struct KeptSource {

@@ -1,0 +1,130 @@
+use crate::build_options::{BuildOptions, SensorModelKind};
+use crate::region_tiles::tiles_of;
+use crate::scan_input::name_of_path;
+use voxtile::mapper::{MapReader, MapView};
+use voxtile::sensor::{Iwlo, LogOdds, SensorModel};
+use voxtile::space::{Grid, GridError};
+use voxtile::{Error, InsertMode, MapConfig, MemoryLimit, RayConfig, Storage};
+
+/// Where rays are cut unless something else is asked for.
+const MAX_RANGE_M: f64 = 100.0;
+
+/// What a build may use of memory unless something else is asked for.
+const DEFAULT_MEMORY_BYTES: usize = 512 << 20;
+
+/// The parameters of a new map.
+pub fn config_to_create(options: &BuildOptions) -> anyhow::Result<MapConfig> {
+    let (resolution_m, tile_size_m) = (options.resolution_m.unwrap_or(0.1), options.tile_size_m.unwrap_or(10.0));
+    let mut config = MapConfig::new(resolution_m, tile_size_m)
+        .map_err(name_the_option)?
+        .with_storage(options.storage.unwrap_or_default());
+    config.occupancy_threshold = options.occupancy_threshold.unwrap_or(config.occupancy_threshold);
+    Ok(for_this_run(options, config, None)?.validated()?)
+}
+
+/// The map's own parameters, and those that were typed, which must be the same.
+pub fn config_to_go_on(options: &BuildOptions) -> anyhow::Result<MapConfig> {
+    let map = MapReader::open(&options.output, 1)?;
+    let mut config = map.config().clone();
+    if options.resolution_m.is_some() || options.tile_size_m.is_some() {
+        let resolution_m = options.resolution_m.unwrap_or(config.grid.resolution_m());
+        let tile_size_m = options.tile_size_m.unwrap_or(config.grid.tile_size_m());
+        config.grid = Grid::new(resolution_m, tile_size_m).map_err(|error| name_the_option(error.into()))?;
+    }
+    check_storage(options, config.storage)?;
+    check_threshold(options, config.occupancy_threshold)?;
+    let begun = options.resume.then(|| rays_begun(options, &map));
+    Ok(for_this_run(options, config, begun)?.validated()?)
+}
+
+/// What counts of the rays of the input that is to go on: another one may have come behind it. Which input it is shows
+/// when it is read; by then this is compared with what it was begun with.
+fn rays_begun(options: &BuildOptions, map: &MapReader) -> RayConfig {
+    let name = name_of_path(&options.scans);
+    let inputs = map.metadata().ext.as_ref().map_or(&[][..], |ext| &ext.inputs);
+    let input = inputs.iter().rfind(|input| input.is_named(&name)).or(inputs.last());
+    input.and_then(|input| input.rays).unwrap_or(map.config().rays)
+}
+
+/// Names the option that makes a tile fit its voxels.
+fn name_the_option(error: Error) -> anyhow::Error {
+    match error {
+        Error::Grid(GridError::NotWhole { smaller_m, larger_m, .. }) => {
+            let fitting = match smaller_m == larger_m {
+                true => format!("--tile-size {smaller_m}"),
+                false => format!("--tile-size {smaller_m} or --tile-size {larger_m}"),
+            };
+            anyhow::Error::new(error).context(format!("add {fitting}, or choose another --resolution"))
+        }
+        error => error.into(),
+    }
+}
+
+fn check_storage(options: &BuildOptions, own: Storage) -> voxtile::Result<()> {
+    match options.storage {
+        Some(wanted) if wanted != own => {
+            let reason = format!("the map's tiles are stored as {own}; leave it out, or convert the map");
+            Err(Error::argument("--storage", reason))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn check_threshold(options: &BuildOptions, own: f64) -> voxtile::Result<()> {
+    match options.occupancy_threshold {
+        Some(wanted) if wanted != own => {
+            Err(Error::argument("--occupancy-threshold", format!("the map's is {own}; leave it out")))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// What was begun goes on as it was, unless something else is asked for, which is then refused.
+fn for_this_run(options: &BuildOptions, config: MapConfig, begun: Option<RayConfig>) -> anyhow::Result<MapConfig> {
+    let begun_mode = begun.map_or(InsertMode::PerScan, |rays| rays.insert_mode);
+    let insert_mode = options.insert_mode.unwrap_or(begun_mode);
+    let min_range_m = options.min_range_m.unwrap_or(begun.map_or(0.0, |rays| rays.min_range_m));
+    let begun_max_m = begun.map_or(Some(MAX_RANGE_M), |rays| rays.max_range_m);
+    let sensor_model = sensor_model(options, config.sensor_model)?;
+    let mut config = config
+        .with_sensor_model(sensor_model)
+        .with_insert_mode(insert_mode)
+        .with_octree(options.octree);
+    let least = MemoryLimit::least_bytes(&config.grid);
+    config.memory = options.memory.unwrap_or(MemoryLimit::Bytes(least.max(DEFAULT_MEMORY_BYTES)));
+    config.keeps_scans |= options.keep_scans;
+    config.rays.no_return_range_m = options.clear_no_return_m.or(begun.and_then(|rays| rays.no_return_range_m));
+    config.rays.region = match &options.region {
+        Some(region) => Some(tiles_of(region, &config.grid)?),
+        None => begun.and_then(|rays| rays.region),
+    };
+    config.rays.min_range_m = min_range_m;
+    config.rays.max_range_m = options.max_range_m.or(begun_max_m);
+    Ok(config)
+}
+
+fn sensor_model(options: &BuildOptions, own: SensorModel) -> anyhow::Result<SensorModel> {
+    let model = match (options.sensor_model, own) {
+        (None, own) => own,
+        (Some(SensorModelKind::LogOdds), SensorModel::LogOdds(own)) => SensorModel::LogOdds(own),
+        (Some(SensorModelKind::LogOdds), _) => SensorModel::default(),
+        (Some(SensorModelKind::Iwlo), SensorModel::Iwlo(own)) => SensorModel::Iwlo(own),
+        (Some(SensorModelKind::Iwlo), _) => SensorModel::Iwlo(Iwlo::default()),
+    };
+    if options.probabilities.is_some() && !matches!(model, SensorModel::LogOdds(_)) {
+        return Err(Error::argument("--probabilities", "only the sensor model log-odds has these").into());
+    }
+    if let Some([hit, miss, least, most]) = options.probabilities {
+        return Ok(SensorModel::LogOdds(LogOdds::from_probabilities(hit, miss, least, most)?));
+    }
+    let SensorModel::Iwlo(mut iwlo) = model else {
+        if options.intensity_threshold.is_some() || options.intensity_max.is_some() {
+            let reason = "only the sensor model iwlo has these; add --sensor-model iwlo";
+            return Err(Error::argument("--intensity-threshold, --intensity-max", reason).into());
+        }
+        return Ok(model);
+    };
+    iwlo.intensity_threshold = options.intensity_threshold.unwrap_or(iwlo.intensity_threshold);
+    iwlo.intensity_max = options.intensity_max.unwrap_or(iwlo.intensity_max);
+    Ok(SensorModel::Iwlo(iwlo.validated()?))
+}

@@ -1,0 +1,17 @@
+use voxtile::space::{Aabb, Grid, TileBox};
+use voxtile::{Error, Result};
+
+/// The tiles whose centers are in a region.
+///
+/// # Errors
+///
+/// [`Error::InvalidArgument`] if there are none.
+pub fn tiles_of(region: &Aabb, grid: &Grid) -> Result<TileBox> {
+    TileBox::with_centers_in(region, grid).ok_or_else(|| {
+        let reason = format!(
+            "no tile has its center in {region}; tiles are {} m long, and a region is made of whole ones",
+            grid.tile_size_m()
+        );
+        Error::argument("--region", reason)
+    })
+}
