@@ -9,7 +9,7 @@ use std::fmt;
 pub use storage::Storage;
 
 /// Texts of coordinate reference systems are far shorter.
-const MOST_CRS_BYTES: usize = 1 << 16;
+const MAX_CRS_BYTES: usize = 1 << 16;
 
 /// How a map is made and how much memory it may use.
 ///
@@ -308,8 +308,8 @@ impl MapConfig {
             let max = max_range_m.unwrap_or_default();
             return Err(wrong("max range", max, "a length above the min range, in metres"));
         }
-        if self.crs.as_ref().is_some_and(|crs| crs.len() > MOST_CRS_BYTES) {
-            let reason = format!("a coordinate reference system of more than {MOST_CRS_BYTES} bytes");
+        if self.crs.as_ref().is_some_and(|crs| crs.len() > MAX_CRS_BYTES) {
+            let reason = format!("a coordinate reference system of more than {MAX_CRS_BYTES} bytes");
             return Err(Error::argument("crs", reason));
         }
         self.memory.check(&self.grid)?;

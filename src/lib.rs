@@ -93,7 +93,9 @@ pub use mapper::{
 /// The crate of [`Pose::isometry`], in the version that voxtile uses.
 pub use nalgebra;
 pub use one_heap::begin_with_one_heap;
-pub use query::{Hit, MapQueries, Occupancy, Queries, RayQuery, Shape, United, UnknownAs, VoxelOccupancy};
+pub use query::{
+    Digest, Hit, MapQueries, Occupancy, Queries, RayQuery, Shape, United, UnknownAs, VoxelOccupancy,
+};
 pub use scan::{Pose, Scan, ScanPoints, ScanRef, ScanReport, Stop};
 pub use sensor::{Evidence, SensorModel};
 pub use space::{Aabb, Grid, Point, TileBox, TileIndex, TileSelection, VoxelIndex};

@@ -20,7 +20,7 @@ const DENSITY: f64 = 0.07;
 /// Share of these that are thickets.
 const THICKETS: f64 = 0.15;
 /// Between the middles of two trees.
-const LEAST_DISTANCE_M: f64 = 2.4;
+const MIN_DISTANCE_M: f64 = 2.4;
 /// The paper's sensor.
 const RANGE_M: f64 = 40.0;
 const VIEW_DEG: [f64; 2] = [60.0, 45.0];
@@ -32,7 +32,7 @@ impl Forest {
         let mut middles: Vec<[f64; 2]> = Vec::new();
         for _ in 0..(LENGTH_M * WIDTH_M * DENSITY) as usize {
             let at = [random.between(0.0, LENGTH_M), random.between(-0.5, 0.5) * WIDTH_M];
-            let is_apart = |other: &[f64; 2]| (at[0] - other[0]).hypot(at[1] - other[1]) >= LEAST_DISTANCE_M;
+            let is_apart = |other: &[f64; 2]| (at[0] - other[0]).hypot(at[1] - other[1]) >= MIN_DISTANCE_M;
             if middles.iter().all(is_apart) {
                 middles.push(at);
             }

@@ -13,7 +13,7 @@ pub struct Forest {
 pub const LENGTH_M: f64 = 120.0;
 pub const WIDTH_M: f64 = 30.0;
 const TREES: u32 = 220;
-const LEAST_DISTANCE_M: f64 = 2.6;
+const MIN_DISTANCE_M: f64 = 2.6;
 
 impl Forest {
     pub fn new(seed: u64) -> Self {
@@ -21,7 +21,7 @@ impl Forest {
         let mut middles: Vec<[f64; 2]> = Vec::new();
         for _ in 0..TREES {
             let at = [random.between(4.0, LENGTH_M - 4.0), random.between(-0.5, 0.5) * WIDTH_M];
-            if middles.iter().all(|other| (at[0] - other[0]).hypot(at[1] - other[1]) >= LEAST_DISTANCE_M) {
+            if middles.iter().all(|other| (at[0] - other[0]).hypot(at[1] - other[1]) >= MIN_DISTANCE_M) {
                 middles.push(at);
             }
         }

@@ -25,7 +25,7 @@ const RESOLUTION_M: f64 = 0.1;
 /// Between two looks of the planner, and two scans of a spotter (5 Hz).
 const STEP: Duration = Duration::from_millis(200);
 /// A flight that is not over by then does not arrive.
-const MOST_STEPS: u32 = 600;
+const MAX_STEPS: u32 = 600;
 /// How long spotters look before travellers begin.
 const HEAD_START_STEPS: u32 = 25;
 
@@ -65,7 +65,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 /// Travellers that know what two spotters share.
 fn by_shared_map(forest: &Forest, sharing: &mut Sharing) -> voxtile::Result<Outcome> {
     let mut travellers = Traveller::four()?;
-    for step in 0..MOST_STEPS {
+    for step in 0..MAX_STEPS {
         let middle =
             travellers.iter().map(|traveller| traveller.at[0]).sum::<f64>() / travellers.len() as f64;
         sharing.step(forest, middle, step)?;
@@ -87,7 +87,7 @@ fn by_shared_map(forest: &Forest, sharing: &mut Sharing) -> voxtile::Result<Outc
 fn by_own_sensor(forest: &Forest) -> voxtile::Result<Outcome> {
     let mut travellers = Traveller::four()?;
     let (mut points, mut steps) = (0, 0);
-    for step in 0..MOST_STEPS {
+    for step in 0..MAX_STEPS {
         for (number, traveller) in
             travellers.iter_mut().enumerate().filter(|(_, traveller)| !traveller.is_over())
         {

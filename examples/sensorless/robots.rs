@@ -153,7 +153,7 @@ const RADIUS_M: f64 = 0.2;
 const INFLATION_M: f64 = 0.4;
 const HEIGHT_M: f64 = 2.0;
 /// The paper's local maps have 50 000; these see the ground, too.
-const MOST_VOXELS: usize = 150_000;
+const MAX_VOXELS: usize = 150_000;
 
 impl Traveller {
     /// Side by side.
@@ -165,7 +165,7 @@ impl Traveller {
         let parameters = LocalParameters::passive_perception().with_inflation_radius(INFLATION_M);
         let at = [0.0, y, HEIGHT_M];
         Ok(Self {
-            map: LocalMap::new(RESOLUTION_M, parameters.with_max_voxels(Some(MOST_VOXELS)))?,
+            map: LocalMap::new(RESOLUTION_M, parameters.with_max_voxels(Some(MAX_VOXELS)))?,
             at,
             goal: [LENGTH_M, y, HEIGHT_M],
             path: vec![at],

@@ -607,7 +607,7 @@ impl Map {
     /// The digest of the map's content, equal for equal maps, as the command prints it.
     fn digest(&self, py: Python<'_>) -> PyResult<String> {
         let digest = self.ask(py, usize::MAX, |source, stop| source.ask(stop, |map| map.digest()))?;
-        Ok(digest.to_hex().to_string())
+        Ok(digest.to_string())
     }
 
     /// A matplotlib figure of the map from above; see `voxtile.pictures.plot`.

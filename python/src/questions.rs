@@ -15,7 +15,7 @@ const POINTS_AT_A_TIME: usize = 1 << 20;
 /// Rays likewise: each may cross a million voxels.
 const RAYS_AT_A_TIME: usize = 1 << 14;
 /// Most bytes of a dense array.
-const MOST_DENSE_BYTES: u64 = 1 << 32;
+const MAX_DENSE_BYTES: u64 = 1 << 32;
 
 /// Boxes of an array of N x 6 or N x 2 x 3: lower and upper corner, in metres.
 pub fn bodies_of(boxes: &Bound<'_, PyAny>) -> PyResult<Vec<Shape>> {
@@ -124,11 +124,8 @@ fn array_of<T: Clone>(edges: [u64; 3], value: T) -> Result<Vec<T>> {
     let bytes = count.saturating_mul(size_of::<T>() as u64);
     let too_large =
         |limit, hint| Error::TooLarge { what: "number of bytes of the array", size: bytes, limit, hint };
-    if bytes > MOST_DENSE_BYTES {
-        return Err(too_large(
-            MOST_DENSE_BYTES,
-            "ask for a smaller region, or for the occupied voxels alone",
-        ));
+    if bytes > MAX_DENSE_BYTES {
+        return Err(too_large(MAX_DENSE_BYTES, "ask for a smaller region, or for the occupied voxels alone"));
     }
     let mut values = Vec::new();
     // How much memory there is, nobody knows: less than this.

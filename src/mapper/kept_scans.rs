@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 /// Most points of a kept scan that are read into memory: 7 MiB. Those of a larger one are read again when needed.
-const MOST_POINTS_IN_MEMORY: u64 = 1 << 18;
+const MAX_POINTS_IN_MEMORY: u64 = 1 << 18;
 
 /// The scans that a map keeps, one at a time, in order. Reading one does not read others.
 #[derive(Debug)]
@@ -42,7 +42,7 @@ impl KeptScans {
     ///
     /// Damage, or a disk that refuses.
     pub fn open(&self, record: KeptRecord) -> Result<KeptScan> {
-        KeptScan::open(&self.disk, &self.layout, record, MOST_POINTS_IN_MEMORY)
+        KeptScan::open(&self.disk, &self.layout, record, MAX_POINTS_IN_MEMORY)
             .map_err(|error| self.explain(error))
     }
 

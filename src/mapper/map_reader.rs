@@ -48,14 +48,14 @@ struct ReaderCache {
 }
 
 /// Most tiles that are remembered for having been asked once.
-const MOST_ASKED_ONCE: NonZeroUsize = NonZeroUsize::new(1024).unwrap();
+const MAX_ASKED_ONCE: NonZeroUsize = NonZeroUsize::new(1024).unwrap();
 
 impl Default for ReaderCache {
     fn default() -> Self {
         Self {
             tiles: LruCache::unbounded(),
             bytes: 0,
-            asked_once: LruCache::new(MOST_ASKED_ONCE),
+            asked_once: LruCache::new(MAX_ASKED_ONCE),
             io: IoCounts::default(),
         }
     }

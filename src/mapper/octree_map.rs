@@ -48,13 +48,13 @@ pub struct OctreeMap {
 /// Edge of the tiles that a file is cut into, about.
 const TILE_SIZE_M: f64 = 10.0;
 /// Most voxels along an edge of these: all of a tile take 150 MB.
-const MOST_TILE_EDGE: f64 = 400.0;
+const MAX_TILE_EDGE: f64 = 400.0;
 /// Tiles in memory.
 const CACHE_TILES: NonZeroUsize = NonZeroUsize::new(32).expect("more than none");
 /// Bytes of these, but for the last one.
 const CACHE_BYTES: usize = 128 << 20;
 /// Most tiles that the leaves of a file may stand for: one of twenty bytes can stand for 2^48 voxels.
-const MOST_TILES: u64 = 1 << 23;
+const MAX_TILES: u64 = 1 << 23;
 /// Depth of bricks in OctoMap's tree.
 const BRICK_DEPTH: u8 = 13;
 /// The first voxel of OctoMap's space.
@@ -75,7 +75,7 @@ impl OctreeMap {
     /// Leaves that stand for more tiles than can be listed, a resolution that no map can have.
     pub fn of(file: OctreeFile) -> Result<Self> {
         let OctreeFile { tree, resolution_m, id, format, .. } = file;
-        let edge = (TILE_SIZE_M / resolution_m).round().clamp(2.0, MOST_TILE_EDGE);
+        let edge = (TILE_SIZE_M / resolution_m).round().clamp(2.0, MAX_TILE_EDGE);
         let config = MapConfig::new(resolution_m, edge * resolution_m)?;
         let tiles = tiles_of(&config, &tree)?;
         let space = tiles.iter().copied().collect();
@@ -194,10 +194,10 @@ fn tiles_of(config: &MapConfig, tree: &Octree) -> Result<Vec<TileIndex>> {
         let last = first.map(|k| k + ((1 << (16 - i32::from(depth))) - 1));
         let covered = TileBox::new(grid.tile_of_voxel(first), grid.tile_of_voxel(last));
         let count = covered.count();
-        if tiles.len() as u64 + count > MOST_TILES {
+        if tiles.len() as u64 + count > MAX_TILES {
             let hint = "such a file is made by pruning large cubes; cut it with OctoMap's tools first";
             let what = "number of tiles that the file stands for";
-            return Err(Error::TooLarge { what, size: count, limit: MOST_TILES, hint });
+            return Err(Error::TooLarge { what, size: count, limit: MAX_TILES, hint });
         }
         if count == 1 && tiles.last() == Some(&covered.min()) {
             continue;

@@ -43,7 +43,7 @@ pub struct Decayed {
 
 /// Log-odds do not fade below this: as `f32`, which octrees have, they would become 0, and what is free would count as
 /// occupied.
-const LEAST_LOG_ODDS: f64 = f32::MIN_POSITIVE as f64;
+const MIN_LOG_ODDS: f64 = f32::MIN_POSITIVE as f64;
 
 impl Decay {
     /// The rule with a half-life in scans.
@@ -69,7 +69,7 @@ impl Decay {
 
     /// A voxel's evidence after it has faded by a factor; `None` if it is forgotten.
     pub fn faded(&self, evidence: Evidence, factor: f64) -> Option<Evidence> {
-        let least = evidence.log_odds.abs().min(LEAST_LOG_ODDS);
+        let least = evidence.log_odds.abs().min(MIN_LOG_ODDS);
         let faded = (evidence.log_odds * factor).abs().max(least);
         (faded >= self.forget_below)
             .then_some(Evidence { log_odds: faded.copysign(evidence.log_odds), ..evidence })

@@ -23,7 +23,7 @@ pub(crate) struct IoThreads {
 }
 
 /// Most tiles in flight in each direction. More would only take memory: a disk does one after the other.
-const MOST_IN_FLIGHT: usize = 4;
+const MAX_IN_FLIGHT: usize = 4;
 
 struct Save {
     writer: TileWriter,
@@ -69,7 +69,7 @@ impl IoThreads {
 
     /// Whether another tile may be saved.
     pub(crate) fn can_save(&self) -> bool {
-        self.saver.in_flight() < MOST_IN_FLIGHT
+        self.saver.in_flight() < MAX_IN_FLIGHT
     }
 
     /// Begins to save a tile.
@@ -113,7 +113,7 @@ impl IoThreads {
 
     /// Whether another tile may be loaded.
     pub(crate) fn can_load(&self) -> bool {
-        self.loader.in_flight() < MOST_IN_FLIGHT
+        self.loader.in_flight() < MAX_IN_FLIGHT
     }
 
     /// Whether a tile is being loaded.

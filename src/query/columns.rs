@@ -25,7 +25,7 @@ pub struct Columns {
 }
 
 /// Most columns of an answer.
-const MOST_COLUMNS: i64 = 1 << 31;
+const MAX_COLUMNS: i64 = 1 << 31;
 
 /// The columns of a brick, one bit each, in Morton order: the bits of x and y alternate.
 #[derive(Clone, Copy, Debug, Default)]
@@ -145,12 +145,12 @@ fn spread(bricks: &FxHashMap<[i32; 2], BrickColumns>, resolution_m: f64) -> Resu
     let [width, height] = [0, 1].map(|k| last[k] - first[k] + 1);
     let too_many = || {
         let reason = format!(
-            "{width} x {height} columns of {resolution_m} m; an answer has at most {MOST_COLUMNS}: ask for a smaller \
+            "{width} x {height} columns of {resolution_m} m; an answer has at most {MAX_COLUMNS}: ask for a smaller \
              region"
         );
         Error::argument("region", reason)
     };
-    let count = width.checked_mul(height).filter(|&count| count <= MOST_COLUMNS);
+    let count = width.checked_mul(height).filter(|&count| count <= MAX_COLUMNS);
     let count = count.and_then(|count| usize::try_from(count).ok()).ok_or_else(too_many)?;
     let mut states = Vec::new();
     states.try_reserve_exact(count).map_err(|_| too_many())?;

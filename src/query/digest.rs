@@ -3,10 +3,40 @@ use crate::mapper::MapView;
 use crate::tile::Tile;
 use crate::tile::format::encode_entries;
 use std::convert::Infallible;
+use std::fmt;
+
+/// The digest of the content of a map or a set: equal for equal ones, however they were built. 32 bytes of BLAKE3 over
+/// what `docs/format.md` says; printed as 64 hexadecimal digits.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Digest([u8; 32]);
+
+impl Digest {
+    /// The digest of these bytes, as [`Digest::to_bytes`] gave them.
+    pub const fn from_bytes(bytes: [u8; 32]) -> Self {
+        Self(bytes)
+    }
+
+    /// Its bytes.
+    pub const fn to_bytes(self) -> [u8; 32] {
+        self.0
+    }
+}
+
+impl fmt::Display for Digest {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.iter().try_for_each(|byte| write!(formatter, "{byte:02x}"))
+    }
+}
+
+impl fmt::Debug for Digest {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(formatter, "Digest({self})")
+    }
+}
 
 const LABEL: &[u8] = b"voxtile-digest-1";
 
-pub(super) fn digest(view: &impl MapView) -> Result<blake3::Hash> {
+pub(super) fn digest(view: &impl MapView) -> Result<Digest> {
     let grid = &view.config().grid;
     let mut hasher = blake3::Hasher::new();
     hasher.update(LABEL);
@@ -22,7 +52,7 @@ pub(super) fn digest(view: &impl MapView) -> Result<blake3::Hash> {
         }
         hasher.update(digest_of_tile(&tile).as_bytes());
     }
-    Ok(hasher.finalize())
+    Ok(Digest(*hasher.finalize().as_bytes()))
 }
 
 /// Over key, log-odds and count of every entry, as in `iwlo_meta.bin`.

@@ -1,5 +1,5 @@
 use super::{
-    Columns, Occupancy, OctreeExport, coarse, columns, digest, merged, octree_blocks, point, region,
+    Columns, Digest, Occupancy, OctreeExport, coarse, columns, digest, merged, octree_blocks, point, region,
 };
 use crate::error::{Error, Result};
 use crate::mapper::MapView;
@@ -108,7 +108,7 @@ pub trait MapQueries: MapView + Sized {
     /// # Errors
     ///
     /// A tile that cannot be read.
-    fn digest(&self) -> Result<blake3::Hash> {
+    fn digest(&self) -> Result<Digest> {
         digest::digest(self)
     }
 

@@ -47,6 +47,7 @@ mod tile_cursor;
 mod united;
 
 pub use columns::{Column, Columns};
+pub use digest::Digest;
 pub use hit::Hit;
 pub use map_queries::MapQueries;
 pub use occupancy::{Occupancy, UnknownAs};

@@ -49,6 +49,18 @@ impl Occupancy {
         }
     }
 
+    /// Whether the place was observed and is free.
+    #[inline]
+    pub const fn is_free(&self) -> bool {
+        matches!(self, Self::Free(_))
+    }
+
+    /// Whether the place was never observed.
+    #[inline]
+    pub const fn is_unknown(&self) -> bool {
+        matches!(self, Self::Unknown)
+    }
+
     /// Whether the place is known to be occupied.
     pub const fn is_occupied(&self) -> bool {
         matches!(self, Self::Occupied(_))

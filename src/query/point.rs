@@ -19,7 +19,7 @@ pub(super) fn voxel_at<V: MapView + ?Sized>(view: &V, point: Point) -> Result<Op
 const POINTS_AT_A_TIME: usize = 4096;
 
 /// Points that are grouped by tile before each tile is loaded for its own.
-const MOST_GROUPED: usize = 1 << 22;
+const MAX_GROUPED: usize = 1 << 22;
 
 /// What each of many points is answered, from the evidence of its voxel; each core makes an `answer` for some of them.
 fn at_points<V: MapView, A: Copy + Send + Sync, F: FnMut(Evidence) -> A>(
@@ -34,7 +34,7 @@ fn at_points<V: MapView, A: Copy + Send + Sync, F: FnMut(Evidence) -> A>(
         chunks.for_each(|(points, answers)| at_hand(view, points, answers, answer()));
         return Ok(answers);
     }
-    for (points, answers) in points.chunks(MOST_GROUPED).zip(answers.chunks_mut(MOST_GROUPED)) {
+    for (points, answers) in points.chunks(MAX_GROUPED).zip(answers.chunks_mut(MAX_GROUPED)) {
         by_tile(view, points, answers, &answer)?;
     }
     Ok(answers)
@@ -91,7 +91,7 @@ fn by_tile<V: MapView, A: Copy + Send + Sync, F: FnMut(Evidence) -> A>(
 ) -> Result<()> {
     /// Parts of a tile that are answered by one core at a time.
     const PARTS_AT_A_TIME: usize = 8;
-    const OF_GROUP: usize = PointsByTile::MOST_POINTS;
+    const OF_GROUP: usize = PointsByTile::MAX_POINTS;
     let grid = view.config().grid;
     let groups: Vec<PointsByTile> =
         points.par_chunks(OF_GROUP).map(|points| PointsByTile::of(&grid, points)).collect();

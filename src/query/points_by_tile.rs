@@ -1,7 +1,7 @@
 use crate::space::{Grid, Point, TileIndex};
 use rustc_hash::FxHashMap;
 
-/// At most [`PointsByTile::MOST_POINTS`] points in the order of the tiles that hold them; those that no tile holds come
+/// At most [`PointsByTile::MAX_POINTS`] points in the order of the tiles that hold them; those that no tile holds come
 /// last.
 pub(super) struct PointsByTile {
     /// Tiles in the order of their first points, and how many points each has.
@@ -12,11 +12,11 @@ pub(super) struct PointsByTile {
 
 impl PointsByTile {
     /// Most points that can be grouped: their answers stay in the CPU's cache until they are in the points' order.
-    pub(super) const MOST_POINTS: usize = 1 << 15;
+    pub(super) const MAX_POINTS: usize = 1 << 15;
 
     /// Groups points by counting: comparing tiles of points with each other takes longer than to look at all of them.
     pub(super) fn of(grid: &Grid, points: &[Point]) -> Self {
-        debug_assert!(points.len() <= Self::MOST_POINTS);
+        debug_assert!(points.len() <= Self::MAX_POINTS);
         /// What points get that no tile holds.
         const NOWHERE: u16 = u16::MAX;
         let mut places: FxHashMap<TileIndex, u16> = FxHashMap::default();

@@ -104,9 +104,9 @@ pub(super) fn tiles_of_list_in<V: MapView + ?Sized>(
     all: &mut Option<Vec<TileIndex>>,
 ) -> Vec<TileIndex> {
     /// Looking up so many is cheaper than listing all tiles of a large map.
-    const MOST_LOOKED_UP: u64 = 4096;
+    const MAX_LOOKED_UP: u64 = 4096;
     let Some(tiles) = tile_box_around(view, voxels) else { return Vec::new() };
-    if tiles.count() <= MOST_LOOKED_UP {
+    if tiles.count() <= MAX_LOOKED_UP {
         return tiles.tiles().filter(|&tile| view.has_tile(tile)).collect();
     }
     let all = all.get_or_insert_with(|| view.tile_indices());

@@ -5,9 +5,9 @@ use crate::tile::Voxel;
 use rayon::prelude::*;
 
 /// Most voxels of tiles that are read together, unless one tile has more: 8 MB.
-const MOST_VOXELS: u64 = 1 << 18;
+const MAX_VOXELS: u64 = 1 << 18;
 /// Most tiles that are read together.
-const MOST_TILES: usize = 64;
+const MAX_TILES: usize = 64;
 
 /// At most how many voxels of a tile have log-odds of `from` or more, where that is known without reading it.
 fn most_from(view: &impl MapView, tile: TileIndex, from: f64) -> Option<u64> {
@@ -17,13 +17,13 @@ fn most_from(view: &impl MapView, tile: TileIndex, from: f64) -> Option<u64> {
 
 /// The first of `tiles` that are read together: none if the first one has too many voxels, or nobody knows how many.
 fn first_together<'a>(view: &impl MapView, tiles: &'a [TileIndex], from: f64) -> &'a [TileIndex] {
-    let mut room = MOST_VOXELS;
+    let mut room = MAX_VOXELS;
     let fits = |&&tile: &&TileIndex| {
         let left = most_from(view, tile, from).and_then(|most| room.checked_sub(most));
         room = left.unwrap_or(0);
         left.is_some()
     };
-    &tiles[..tiles.iter().take(MOST_TILES).take_while(fits).count()]
+    &tiles[..tiles.iter().take(MAX_TILES).take_while(fits).count()]
 }
 
 /// Visits the observed voxels of tiles whose log-odds are at least `from`: tile by tile in their order, in Morton order

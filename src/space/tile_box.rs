@@ -29,7 +29,7 @@ impl TryFrom<Corners> for TileBox {
 }
 
 /// Most tiles that lie ahead of a box; a scan that spans more is no vehicle's.
-const MOST_AHEAD: usize = 4096;
+const MAX_AHEAD: usize = 4096;
 
 impl TileBox {
     /// The box from one corner to another, both included; `min` is not above `max` along any axis.
@@ -111,7 +111,7 @@ impl TileBox {
             let Some(gained) = gained else { continue };
             let mut slab = self;
             (slab.min[axis], slab.max[axis]) = (gained, gained);
-            ahead.extend(slab.tiles().take(MOST_AHEAD - ahead.len()));
+            ahead.extend(slab.tiles().take(MAX_AHEAD - ahead.len()));
         }
         ahead
     }
@@ -159,7 +159,7 @@ mod tests {
         let near = TileBox { min: [0; 3], max: [1; 3] };
         assert_eq!(far.ahead(&near), []);
         let wide = TileBox { min: [-500; 3], max: [500; 3] };
-        assert_eq!(wide.ahead(&near).len(), MOST_AHEAD);
+        assert_eq!(wide.ahead(&near).len(), MAX_AHEAD);
     }
 
     #[test]

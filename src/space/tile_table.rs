@@ -39,7 +39,7 @@ struct Block {
 /// Most tiles of a block.
 const BLOCK_TILES: usize = 64;
 /// So many recent tiles are always allowed.
-const LEAST_RECENT: usize = 1024;
+const MIN_RECENT: usize = 1024;
 /// Most recent tiles, as a part of all.
 const RECENT_PART: usize = 16;
 /// What the allocator adds to each block.
@@ -127,7 +127,7 @@ impl<V: TileValue> TileTable<V> {
     }
 
     fn pack_if_due(&mut self) {
-        if self.recent.len() > LEAST_RECENT.max(self.tiles / RECENT_PART) {
+        if self.recent.len() > MIN_RECENT.max(self.tiles / RECENT_PART) {
             self.pack();
         }
     }

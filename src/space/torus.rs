@@ -32,8 +32,8 @@ impl Torus {
     pub const NONE: u32 = 0;
 
     /// Slots that a torus may have for any number of cells, and per cell.
-    const LEAST_SLOTS: usize = 64;
-    const MOST_SLOTS_A_CELL: usize = 16;
+    const MIN_SLOTS: usize = 64;
+    const MAX_SLOTS_A_CELL: usize = 16;
 
     /// Number of cells.
     pub fn len(&self) -> usize {
@@ -103,7 +103,7 @@ impl Torus {
             (differ != 0).then_some((axis, bits))
         };
         let (axis, bits) = (0..3).filter_map(bits_along).min_by_key(|&(_, bits)| bits)?;
-        let most = (Self::MOST_SLOTS_A_CELL * self.len).max(Self::LEAST_SLOTS);
+        let most = (Self::MAX_SLOTS_A_CELL * self.len).max(Self::MIN_SLOTS);
         // In 128 bits nothing is lost: at most 32 bits are added.
         ((self.slots.len() as u128) << bits <= most as u128).then_some((axis, bits))
     }

@@ -37,7 +37,7 @@ pub use commit::commit_log::CommitLog;
 pub use commit::commit_record::Flush;
 pub use commit::commits::Commits;
 pub use commit::flush::{BegunCommit, Step, Synced, Unsynced};
-pub(crate) use commit::input_record::MOST_INPUTS;
+pub(crate) use commit::input_record::MAX_INPUTS;
 pub use commit::input_record::{InputContent, InputRecord};
 pub use commit::linked_tiles::LinkedTiles;
 pub use commit::metadata::{Bounds, Extension, MapParameters, Metadata};

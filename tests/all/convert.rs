@@ -26,7 +26,7 @@ fn scan(number: u64) -> Scan {
 }
 
 /// A map of two scans, flushed after each, so that tiles are of different scans.
-fn map(disk: &FaultyDisk, config: MapConfig) -> blake3::Hash {
+fn map(disk: &FaultyDisk, config: MapConfig) -> voxtile::Digest {
     let mut mapper = OutOfCoreTileMapper::create(MapPath::on(disk.shared(), place("map")), config).unwrap();
     mapper.begin_input(INPUT).unwrap();
     for number in 0..2 {

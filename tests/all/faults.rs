@@ -43,7 +43,7 @@ fn scans() -> Vec<Scan> {
 struct Oracle {
     config: MapConfig,
     scans: Vec<Scan>,
-    digests: Vec<blake3::Hash>,
+    digests: Vec<voxtile::Digest>,
     answers: Vec<Occupancy>,
     /// Whether flushes go on beside the scans that come next.
     is_beside: bool,

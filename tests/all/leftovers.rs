@@ -504,7 +504,7 @@ fn a_removal_removes_the_second_map_of_a_remapping_that_was_killed() {
     assert!(!findings(&disk).1.contains(second));
 }
 
-fn digest(disk: &FaultyDisk) -> blake3::Hash {
+fn digest(disk: &FaultyDisk) -> voxtile::Digest {
     MapReader::open(at(disk), 1).unwrap().digest().unwrap()
 }
 

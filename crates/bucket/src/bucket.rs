@@ -71,7 +71,7 @@ const UNCOUNTED_BYTES: u64 = 1 << 20;
 pub(super) const SEND_AGAIN: &str = "send all of the map again with `voxtile push --resend`";
 
 /// The longest manifest or page that is read.
-const MOST_LIST_BYTES: u64 = 1 << 28;
+const MAX_LIST_BYTES: u64 = 1 << 28;
 
 impl Bucket {
     /// How long a request may remain without progress, unless something else is asked for.
@@ -221,7 +221,7 @@ impl Bucket {
                     Err(failure) => failure,
                 };
                 // The state there decides: an attempt whose answer was lost finds what it has put itself.
-                let now = request.ask(get_once(&request, &store, &key, MOST_LIST_BYTES)).await;
+                let now = request.ask(get_once(&request, &store, &key, MAX_LIST_BYTES)).await;
                 let is_unchanged = match now {
                     Ok((now, _)) if now == content => return Ok(true),
                     Ok((_, version)) => Some(found.as_ref() == Some(&version)),
@@ -274,7 +274,7 @@ impl Bucket {
 
     /// Reads a list of files.
     pub(super) fn fetch_list(&self, name: ObjectName) -> io::Result<Bytes> {
-        self.fetch(name, MOST_LIST_BYTES).wait()
+        self.fetch(name, MAX_LIST_BYTES).wait()
     }
 
     /// Begins to put an object; `false` if that is there already, of which the store is asked before where `asks`.
@@ -407,7 +407,7 @@ impl Bucket {
     fn get_manifest(&self) -> Pending<(Bytes, UpdateVersion)> {
         let (store, key) = (self.store.clone(), self.key(MANIFEST));
         self.pending("GET", MANIFEST, move |request| async move {
-            retried(&request, || get_once(&request, &store, &key, MOST_LIST_BYTES)).await
+            retried(&request, || get_once(&request, &store, &key, MAX_LIST_BYTES)).await
         })
     }
 

@@ -17,7 +17,7 @@ pub struct FetchedFiles {
 }
 
 /// Objects that are fetched at a time.
-const MOST_IN_FLIGHT: usize = 8;
+const MAX_IN_FLIGHT: usize = 8;
 
 impl FetchedFiles {
     /// Fetches them into a new folder in `parent`. An object that changes meanwhile is an error. `is_stopped` is asked
@@ -87,7 +87,7 @@ struct Fetching<'a, P> {
 impl<P: FnMut(u64, u64)> Fetching<'_, P> {
     fn all(&mut self, objects: Vec<StoredObject>, folder: &Path) -> Result<()> {
         for object in objects {
-            if self.on_their_way.len() == MOST_IN_FLIGHT {
+            if self.on_their_way.len() == MAX_IN_FLIGHT {
                 self.end_first()?;
             }
             let to = folder.join(checked_name(self.bucket, &object.name)?);

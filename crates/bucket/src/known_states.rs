@@ -24,10 +24,10 @@ pub(super) const BUCKET_STATES: &str = "bucket_states";
 pub(super) const BUCKET_STATES_NEXT: &str = "bucket_states.next";
 
 /// The oldest go.
-const MOST_STATES: usize = 256;
+const MAX_STATES: usize = 256;
 
 /// More than so many states have.
-const MOST_BYTES: u64 = 1 << 16;
+const MAX_BYTES: u64 = 1 << 16;
 
 impl KnownStates {
     /// The states that a folder knows; `None` if no voxtile that notes them has pushed or pulled it. A line that is
@@ -39,7 +39,7 @@ impl KnownStates {
             return Ok(None);
         }
         let mut bytes = Vec::new();
-        disk.open(&path).and_then(|input| input.take(MOST_BYTES).read_to_end(&mut bytes)).map_err(failed)?;
+        disk.open(&path).and_then(|input| input.take(MAX_BYTES).read_to_end(&mut bytes)).map_err(failed)?;
         let text = String::from_utf8_lossy(&bytes);
         Ok(Some(Self(text.lines().filter_map(KnownState::of_line).collect())))
     }
@@ -58,7 +58,7 @@ impl KnownStates {
     pub(super) fn note(&mut self, manifest: &Manifest, name: ObjectName, was_there: bool) {
         self.0.retain(|known| known.name != name);
         self.0.push(KnownState { flush_number: manifest.flush_number, name, was_there });
-        self.0.drain(..self.0.len().saturating_sub(MOST_STATES));
+        self.0.drain(..self.0.len().saturating_sub(MAX_STATES));
     }
 
     /// Writes them, durably, as a whole.

@@ -8,7 +8,7 @@ use std::io;
 use voxtile::{Error, Result};
 
 /// Objects that are removed at a time.
-const MOST_IN_FLIGHT: usize = 16;
+const MAX_IN_FLIGHT: usize = 16;
 
 /// Removes the objects that a manifest does not name, which the caller has put; returns how many.
 ///
@@ -27,7 +27,7 @@ pub(super) fn prune(bucket: &Bucket, manifest: Manifest) -> Result<u64> {
     for name in found.into_iter().filter(|name| !named.contains(name)) {
         in_flight.push_back(bucket.remove(name));
         removed += 1;
-        if in_flight.len() >= MOST_IN_FLIGHT
+        if in_flight.len() >= MAX_IN_FLIGHT
             && let Some(pending) = in_flight.pop_front()
         {
             pending.wait().map_err(failed)?;

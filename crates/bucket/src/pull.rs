@@ -34,7 +34,7 @@ pub struct Pulled {
 }
 
 /// Files of which the first part is on its way, beside the one that is written.
-const MOST_IN_FLIGHT: usize = 8;
+const MAX_IN_FLIGHT: usize = 8;
 
 /// Makes a map in a folder of the one in a bucket. It grows in `MAP.unfinished` and gets its name at the end; what an
 /// interrupted pull has fetched is not fetched again. `progress` hears of bytes done and of all bytes.
@@ -233,7 +233,7 @@ impl<P: FnMut(u64, u64)> Pull<'_, P> {
             let place = self.folder.join(path);
             self.begin_file(path, &place, file)?;
             paths.insert(place);
-            while self.in_flight.len() > MOST_IN_FLIGHT {
+            while self.in_flight.len() > MAX_IN_FLIGHT {
                 self.end_file()?;
             }
         }

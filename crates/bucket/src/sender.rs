@@ -42,11 +42,11 @@ struct OnItsWay {
 }
 
 /// Parts on their way at a time: with 16 MiB a part at most, 128 MiB of memory.
-const MOST_IN_FLIGHT: usize = 8;
+const MAX_IN_FLIGHT: usize = 8;
 
 /// A push that was interrupted has left objects behind, in the order in which they are sent again. After so many that
 /// are not there, small ones are sent without a question: it takes as long as they do.
-const MOST_MISSING: usize = 32;
+const MAX_MISSING: usize = 32;
 
 /// Objects from here on are always asked for.
 const LARGE_BYTES: usize = 1 << 20;
@@ -94,8 +94,8 @@ impl<'a> Sender<'a> {
     pub(super) fn send(&mut self, content: Bytes) -> Result<ObjectName> {
         let name = ObjectName::of(&content);
         if self.known.insert(name) {
-            self.wait_until(MOST_IN_FLIGHT - 1)?;
-            let was_asked_for = self.asks && (content.len() >= LARGE_BYTES || self.missing < MOST_MISSING);
+            self.wait_until(MAX_IN_FLIGHT - 1)?;
+            let was_asked_for = self.asks && (content.len() >= LARGE_BYTES || self.missing < MAX_MISSING);
             let bytes = content.len() as u64;
             let pending = self.bucket.put(name, content, was_asked_for);
             self.in_flight.push_back(OnItsWay { pending, bytes, tile: self.tile, was_asked_for });

@@ -2,18 +2,18 @@
 //! caller. Nothing is printed; standard input and output are used only where an argument is `-`.
 
 use super::args::{BuildArgs, ExportArgs, ReadArgs};
-use super::call_error::CallError;
-use super::read_options::read_options;
 use super::build::options_of;
+use super::call_error::CallError;
 use super::export as map_to_file;
+use super::read_options::read_options;
 use clap::error::{ContextKind, ContextValue};
 use clap::{Args, Parser};
 use serde_json::Value;
 use std::ffi::OsString;
 use std::path::Path;
-use voxtile_pipeline::{Summary, Watch};
 use voxtile::Error;
 use voxtile_formats::ScanSource;
+use voxtile_pipeline::{Summary, Watch};
 
 /// The arguments of one command, without its name.
 #[derive(Debug, Parser)]

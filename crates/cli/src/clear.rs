@@ -1,6 +1,5 @@
 use crate::args::ClearArgs;
 use crate::json;
-use voxtile_pipeline::memory;
 use crate::part::part_of;
 use crate::progress::Progress;
 use indicatif::HumanCount;
@@ -9,6 +8,7 @@ use std::io::Write;
 use std::path::Path;
 use std::process::ExitCode;
 use voxtile::operations::{Cleared, clear};
+use voxtile_pipeline::memory;
 use voxtile_pipeline::whole_map;
 
 #[derive(Serialize)]

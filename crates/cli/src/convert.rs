@@ -2,7 +2,6 @@ use crate::args::ConvertArgs;
 use crate::json;
 use voxtile_pipeline::{read_map, whole_map};
 
-use voxtile_pipeline::memory;
 use crate::progress::Progress;
 use crate::written::warn_of_scans_left;
 use indicatif::{HumanBytes, HumanCount};
@@ -14,6 +13,7 @@ use std::time::Instant;
 use voxtile::mapper::{MapReader, MapView};
 use voxtile::operations::{WrittenMap, convert};
 use voxtile::{Result, Storage};
+use voxtile_pipeline::memory;
 
 /// What became of what.
 #[derive(Serialize)]

@@ -2,7 +2,6 @@ use crate::args::CropArgs;
 use crate::json;
 use voxtile_pipeline::{read_map, whole_map};
 
-use voxtile_pipeline::memory;
 use crate::part::part_of;
 use crate::progress::Progress;
 use crate::written::{print_written, warn_of_scans_left};
@@ -10,6 +9,7 @@ use serde::Serialize;
 use std::path::Path;
 use std::process::ExitCode;
 use voxtile::operations::{WrittenMap, crop};
+use voxtile_pipeline::memory;
 
 #[derive(Serialize)]
 struct Summary<'a> {

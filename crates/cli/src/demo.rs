@@ -6,7 +6,6 @@ use crate::progress::Progress;
 use crate::run::INTERRUPTED;
 use crate::stop_signal;
 use crate::summary;
-use voxtile_pipeline::Summary;
 use std::io::Write;
 use std::path::Path;
 use std::process::ExitCode;
@@ -15,6 +14,7 @@ use voxtile::mapper::{MapReader, MapView, Mapper, OutOfCoreTileMapper};
 use voxtile::scan::ScanReport;
 use voxtile::space::Point;
 use voxtile::{Error, MapConfig};
+use voxtile_pipeline::Summary;
 use voxtile_render::Picture;
 use voxtile_simulation::{City, Drive, Lidar, Survey};
 

@@ -2,7 +2,6 @@ use crate::args::DiffArgs;
 use crate::json;
 use voxtile_pipeline::{MapAt, read_maps};
 
-use voxtile_pipeline::memory;
 use crate::progress::Progress;
 use indicatif::HumanCount;
 use serde::Serialize;
@@ -12,6 +11,7 @@ use std::process::ExitCode;
 use voxtile::mapper::{MapReader, MapView};
 use voxtile::operations::{Diff, TileDiff, VoxelDiff, diff};
 use voxtile::store::SnapshotName;
+use voxtile_pipeline::memory;
 
 #[derive(Serialize)]
 struct Report {

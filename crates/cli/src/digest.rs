@@ -1,10 +1,10 @@
 use crate::args::DigestArgs;
 use crate::json;
-use voxtile_pipeline::memory;
 use std::io::Write;
 use std::process::ExitCode;
 use voxtile::MapQueries;
 use voxtile::mapper::MapView;
+use voxtile_pipeline::memory;
 use voxtile_pipeline::read_any_map;
 
 pub fn run(args: &DigestArgs) -> anyhow::Result<ExitCode> {

@@ -4,9 +4,7 @@ use crate::args::ExportArgs;
 use crate::exported::Exported;
 use voxtile_pipeline::{AnyMap, read_any_map};
 
-use voxtile_pipeline::memory;
 use crate::output_file::{StagedOutput, is_standard_output, scratch_for};
-use voxtile_pipeline::Watch;
 use indicatif::HumanCount;
 use rayon::prelude::*;
 use std::fs;
@@ -15,6 +13,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use voxtile::mapper::MapView;
 use voxtile::{Error, Result};
 use voxtile_formats::clouds::write::{VoxelFileFormat, VoxelRow, VoxelsHead, WriteOptions, open_sink};
+use voxtile_pipeline::Watch;
+use voxtile_pipeline::memory;
 use voxtile_render::levels::{Levels, LevelsOf, NodeKey, NodeStore, TilesetContent, subtree, tileset};
 
 /// What was written.

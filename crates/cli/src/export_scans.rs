@@ -3,7 +3,6 @@
 use crate::args::ExportArgs;
 use crate::exported::Exported;
 use crate::output_file::StagedOutput;
-use voxtile_pipeline::Watch;
 use indicatif::HumanCount;
 use serde::Serialize;
 use std::fs::{self, File};
@@ -13,6 +12,7 @@ use voxtile::mapper::KeptScan;
 use voxtile::scan::ScanPoints;
 use voxtile::{Error, Result};
 use voxtile_pipeline::MapAt;
+use voxtile_pipeline::Watch;
 
 /// What was written.
 #[derive(Debug, Default, Serialize)]

@@ -2,10 +2,8 @@
 
 use crate::args::{ExportArgs, WhatName};
 use crate::exported::Exported;
-use voxtile_pipeline::memory;
 use crate::output_file::{StagedOutput, is_standard_output};
 use crate::part::point_of;
-use voxtile_pipeline::Watch;
 use indicatif::HumanCount;
 use voxtile::mapper::{MapView, Stoppable};
 use voxtile::maths::least_logit;
@@ -13,6 +11,8 @@ use voxtile::space::Aabb;
 use voxtile::tile::Voxel;
 use voxtile::{Error, Result};
 use voxtile_formats::clouds::write::{VoxelFileFormat, VoxelRow, VoxelsHead, WriteOptions, open_sink};
+use voxtile_pipeline::Watch;
+use voxtile_pipeline::memory;
 use voxtile_pipeline::{AnyMap, read_any_map};
 
 /// Which voxels are written.

@@ -1,6 +1,5 @@
 use crate::args::ImportArgs;
 use crate::json;
-use voxtile_pipeline::memory;
 use crate::progress::Progress;
 use indicatif::{HumanBytes, HumanCount};
 use serde::Serialize;
@@ -10,6 +9,7 @@ use std::process::ExitCode;
 use voxtile::Error;
 use voxtile::mapper::{MapView, OctreeMap};
 use voxtile::operations::{WrittenMap, import};
+use voxtile_pipeline::memory;
 use voxtile_pipeline::octree_file;
 use voxtile_pipeline::whole_map;
 

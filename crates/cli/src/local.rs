@@ -4,8 +4,6 @@ use crate::local_table::{Row, print_table};
 use crate::output_file::{OutputFile, check_picture};
 use crate::progress::{Progress, at_terminal};
 use crate::read_options::read_options;
-use voxtile_pipeline::{is_standard_input, open_scans};
-use voxtile_pipeline::{LocalScans, Watch};
 use crate::stop_signal;
 use std::io::Write;
 use std::process::ExitCode;
@@ -13,6 +11,8 @@ use voxtile::space::{Grid, Point};
 use voxtile::{Error, Scan};
 use voxtile_formats::ScanSource;
 use voxtile_local::{LocalMap, LocalParameters, LocalReader, LocalState};
+use voxtile_pipeline::{LocalScans, Watch};
+use voxtile_pipeline::{is_standard_input, open_scans};
 use voxtile_render::{OverTime, Panel};
 
 /// Times at which the picture shows the map.

@@ -2,7 +2,6 @@ use crate::args::MergeArgs;
 use crate::json;
 use voxtile_pipeline::{read_all_maps, whole_map};
 
-use voxtile_pipeline::memory;
 use crate::progress::Progress;
 use crate::written::{print_written, warn_of_scans_left};
 use indicatif::HumanCount;
@@ -11,6 +10,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use voxtile::operations::{Merged, merge};
+use voxtile_pipeline::memory;
 
 #[derive(Serialize)]
 struct Summary<'a> {

@@ -1,12 +1,12 @@
-use voxtile_pipeline::memory::resident_bytes;
-use voxtile::scan::Stop;
-use voxtile_pipeline::{Gauge, Unit, Watch};
 use indicatif::{HumanBytes, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use parking_lot::Mutex;
 use std::io::{self, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use voxtile::mapper::MapStatistics;
+use voxtile::scan::Stop;
+use voxtile_pipeline::memory::resident_bytes;
+use voxtile_pipeline::{Gauge, Unit, Watch};
 
 /// A bar on standard error for long work; nothing where that is no terminal.
 pub struct Progress {

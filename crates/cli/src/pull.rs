@@ -1,6 +1,5 @@
 use crate::args::PullArgs;
 use crate::json;
-use voxtile_pipeline::memory;
 use crate::progress::Progress;
 use indicatif::{HumanBytes, HumanCount};
 use serde::Serialize;
@@ -8,6 +7,7 @@ use std::io::Write;
 use std::path::Path;
 use std::process::ExitCode;
 use voxtile_bucket::{Pulled, pull};
+use voxtile_pipeline::memory;
 use voxtile_pipeline::place::{bucket_at, check_is_folder};
 
 #[derive(Serialize)]

@@ -1,6 +1,5 @@
 use crate::args::PushArgs;
 use crate::json;
-use voxtile_pipeline::memory;
 use crate::progress::Progress;
 use indicatif::{HumanBytes, HumanCount};
 use serde::Serialize;
@@ -8,6 +7,7 @@ use std::io::Write;
 use std::path::Path;
 use std::process::ExitCode;
 use voxtile_bucket::{PushOptions, Pushed, push};
+use voxtile_pipeline::memory;
 use voxtile_pipeline::place::bucket_at;
 use voxtile_pipeline::whole_map;
 

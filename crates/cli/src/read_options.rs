@@ -6,14 +6,14 @@ use voxtile_formats::ReadOptions;
 use voxtile_formats::clouds::RigidPose;
 
 /// Most seconds that a tolerance or a period may have.
-const MOST_S: f64 = 1e9;
+const MAX_S: f64 = 1e9;
 
 /// The nanoseconds of `--pose-tolerance`.
 pub fn tolerance_ns(seconds: f64) -> Result<i64> {
-    match (0.0..=MOST_S).contains(&seconds) {
+    match (0.0..=MAX_S).contains(&seconds) {
         true => Ok((seconds * 1e9).round() as i64),
         false => {
-            let reason = format!("{seconds} is no time in seconds, from 0 to {MOST_S}");
+            let reason = format!("{seconds} is no time in seconds, from 0 to {MAX_S}");
             Err(Error::argument("--pose-tolerance", reason))
         }
     }

@@ -2,10 +2,7 @@ use crate::args::{InsertName, ModelName, RemapArgs};
 use crate::json;
 use voxtile_pipeline::{MapAt, whole_map};
 
-use voxtile_pipeline::memory;
 use crate::read_options::{pose_of, tolerance_ns};
-use voxtile_formats::clouds::Budget;
-use voxtile_pipeline::{PoseFile, poses_for, records_of};
 use crate::rework::{self, Job};
 use indicatif::HumanCount;
 use serde::Serialize;
@@ -18,6 +15,9 @@ use voxtile::operations::{Remap, Remapped, map_anew, remap};
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::space::Grid;
 use voxtile::{Error, InsertMode, MapConfig, MemoryLimit, RayConfig};
+use voxtile_formats::clouds::Budget;
+use voxtile_pipeline::memory;
+use voxtile_pipeline::{PoseFile, poses_for, records_of};
 
 #[derive(Serialize)]
 struct Summary<'a> {

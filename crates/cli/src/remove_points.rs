@@ -1,6 +1,5 @@
 use crate::args::RemovePointsArgs;
 use crate::json;
-use voxtile_pipeline::memory;
 use crate::part::region_of;
 use crate::rework::{self, Job};
 use indicatif::HumanCount;
@@ -10,6 +9,7 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 use voxtile::operations::{PointsRemoved, remove_points};
+use voxtile_pipeline::memory;
 use voxtile_pipeline::whole_map;
 
 #[derive(Serialize)]

@@ -1,6 +1,5 @@
 use crate::args::RemoveScansArgs;
 use crate::json;
-use voxtile_pipeline::memory;
 use crate::rework::{self, Job};
 use crate::run::say;
 use indicatif::HumanCount;
@@ -11,6 +10,7 @@ use std::process::ExitCode;
 use std::time::Instant;
 use voxtile::Error;
 use voxtile::operations::{ScanSelection, ScansRemoved, remove_scans};
+use voxtile_pipeline::memory;
 use voxtile_pipeline::whole_map;
 
 #[derive(Serialize)]

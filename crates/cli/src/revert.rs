@@ -1,6 +1,5 @@
 use crate::args::RevertArgs;
 use crate::json;
-use voxtile_pipeline::memory;
 use crate::progress::Progress;
 use indicatif::HumanCount;
 use serde::Serialize;
@@ -8,6 +7,7 @@ use std::io::Write;
 use std::path::Path;
 use std::process::ExitCode;
 use voxtile::operations::{Reverted, revert};
+use voxtile_pipeline::memory;
 use voxtile_pipeline::whole_map;
 
 #[derive(Serialize)]

@@ -2,7 +2,6 @@ use crate::args::ScansArgs;
 use crate::json;
 use crate::progress::{Progress, at_terminal};
 use crate::read_options::read_options;
-use voxtile_pipeline::{LocalScans, open_scans};
 use crate::stop_signal;
 use anyhow::Context;
 use indicatif::{HumanBytes, HumanCount};
@@ -18,6 +17,7 @@ use voxtile::store::ScanRecord;
 use voxtile_formats::{PointRoom, ScanSource};
 use voxtile_pipeline::place::url_of;
 use voxtile_pipeline::read_map;
+use voxtile_pipeline::{LocalScans, open_scans};
 
 /// Bytes of memory for the points of one scan; more go to a temporary file.
 const ROOM_BYTES: usize = 64 << 20;

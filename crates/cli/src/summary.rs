@@ -16,7 +16,12 @@ pub fn print(summary: &Summary, json: bool) -> anyhow::Result<()> {
     let ScanReport { points, skipped, cut_at_max_range, .. } = summary.report;
     let rate = summary.scans as f64 / summary.seconds.max(1e-9);
     writeln!(out, "map       {}", summary.map.display())?;
-    writeln!(out, "scans     {} in {:.1} s ({rate:.1} a second)", HumanCount(summary.scans), summary.seconds)?;
+    writeln!(
+        out,
+        "scans     {} in {:.1} s ({rate:.1} a second)",
+        HumanCount(summary.scans),
+        summary.seconds
+    )?;
     if summary.resumed_after > 0 {
         writeln!(out, "resumed   after {} scans", HumanCount(summary.resumed_after))?;
     }
@@ -34,12 +39,7 @@ pub fn print(summary: &Summary, json: bool) -> anyhow::Result<()> {
         let left_out = HumanCount(summary.left_out);
         writeln!(out, "left out  {left_out} scans, which came faster than they could be mapped")?;
     }
-    writeln!(
-        out,
-        "points    {}, {} cut at the max range",
-        HumanCount(points),
-        HumanCount(cut_at_max_range)
-    )?;
+    writeln!(out, "points    {}, {} cut at the max range", HumanCount(points), HumanCount(cut_at_max_range))?;
     for (cause, count) in skipped.by_cause().into_iter().filter(|&(_, count)| count > 0) {
         writeln!(out, "skipped   {} {cause}", HumanCount(count))?;
     }
@@ -75,12 +75,7 @@ fn print_io(summary: &Summary, out: &mut impl Write) -> std::io::Result<()> {
         HumanBytes(bytes_written)
     )?;
     if encoded > 0 {
-        writeln!(
-            out,
-            "compact   {} tiles encoded, {} decoded",
-            HumanCount(encoded),
-            HumanCount(decoded)
-        )?;
+        writeln!(out, "compact   {} tiles encoded, {} decoded", HumanCount(encoded), HumanCount(decoded))?;
     }
     let StallCounts { count, p50_us, p99_us, worst_us, .. } = summary.stalls;
     if count > 0 {

@@ -1,12 +1,12 @@
 use crate::args::VerifyArgs;
 use crate::json;
-use voxtile_pipeline::memory;
 use crate::progress::Progress;
 use indicatif::{HumanBytes, HumanCount};
 use serde::Serialize;
 use std::io::Write;
 use std::process::ExitCode;
 use voxtile::integrity::{Finding, Verification, verify};
+use voxtile_pipeline::memory;
 use voxtile_pipeline::place::{place_of, url_of};
 use voxtile_pipeline::whole_map;
 

@@ -1,5 +1,5 @@
 use super::lzf;
-use super::pcd_header::{Encoding, Header, MOST_HEADER_BYTES};
+use super::pcd_header::{Encoding, Header, MAX_HEADER_BYTES};
 use super::point_store::{PointRoom, PointStore};
 use std::fs::{self, File};
 use std::io::{self, BufRead, BufReader, Cursor, Read, Seek, SeekFrom};
@@ -92,7 +92,7 @@ type Result<T, E = PcdError> = std::result::Result<T, E>;
 
 fn read(mut input: impl BufRead + Seek, file_bytes: u64, points: &mut PointStore) -> Result<Pose> {
     let mut start = Vec::new();
-    (&mut input).take(MOST_HEADER_BYTES as u64).read_to_end(&mut start)?;
+    (&mut input).take(MAX_HEADER_BYTES as u64).read_to_end(&mut start)?;
     let header = Header::parse(&start)?;
     drop(start);
     input.seek(SeekFrom::Start(header.data_at as u64))?;
@@ -128,7 +128,7 @@ impl Columns {
 }
 
 /// A longer line is an error.
-const MOST_LINE_BYTES: u64 = 1 << 20;
+const MAX_LINE_BYTES: u64 = 1 << 20;
 
 fn read_ascii(
     header: &Header,
@@ -142,12 +142,12 @@ fn read_ascii(
         loop {
             line.clear();
             number += 1;
-            let read = (&mut input).take(MOST_LINE_BYTES).read_until(b'\n', &mut line)?;
+            let read = (&mut input).take(MAX_LINE_BYTES).read_until(b'\n', &mut line)?;
             if read == 0 {
                 let reason = format!("the file ends after {done} of {} points", header.points);
                 return Err(FormatError::at_line(header.data_line + done as u64, reason).into());
             }
-            if read as u64 == MOST_LINE_BYTES {
+            if read as u64 == MAX_LINE_BYTES {
                 return Err(FormatError::at_line(number, "the line is too long for a PCD file").into());
             }
             if !line.trim_ascii().is_empty() {

@@ -36,7 +36,7 @@ pub(super) struct Header {
 }
 
 /// A longer header is an error.
-pub(super) const MOST_HEADER_BYTES: usize = 1 << 16;
+pub(super) const MAX_HEADER_BYTES: usize = 1 << 16;
 
 /// A larger point is an error: as many bytes are read at a time.
 const MAX_POINT_BYTES: usize = 1 << 20;

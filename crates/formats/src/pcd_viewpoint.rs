@@ -4,7 +4,7 @@ use std::io::Read;
 use std::path::Path;
 
 /// A longer header is an error.
-const MOST_BYTES: u64 = 1 << 16;
+const MAX_BYTES: u64 = 1 << 16;
 
 /// The `VIEWPOINT` of a PCD file: x y z, and a quaternion w x y z.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,7 +24,7 @@ pub(super) fn viewpoint_of_file(path: &Path) -> Option<Viewpoint> {
         return None;
     }
     let mut header = Vec::new();
-    File::open(path).ok()?.take(MOST_BYTES).read_to_end(&mut header).ok()?;
+    File::open(path).ok()?.take(MAX_BYTES).read_to_end(&mut header).ok()?;
     viewpoint_of(&header)
 }
 

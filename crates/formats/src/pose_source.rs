@@ -26,7 +26,7 @@ const POSE_FILES: [&str; 2] = ["poses_tum.txt", "poses_kitti.txt"];
 /// Given instead of a pose file: every scan is in the world frame.
 pub(super) const IDENTITY: &str = "identity";
 /// Most files that an error names.
-const MOST_NAMED: usize = 4;
+const MAX_NAMED: usize = 4;
 
 impl fmt::Display for PoseSource {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -131,6 +131,6 @@ fn files_like_poses(folder: &Path) -> Vec<String> {
             paths.iter().filter(|path| looks_like_poses(path)).map(|path| path.display().to_string()),
         );
     }
-    found.truncate(MOST_NAMED);
+    found.truncate(MAX_NAMED);
     found
 }

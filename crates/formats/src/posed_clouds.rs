@@ -87,7 +87,7 @@ pub(super) struct PosedClouds {
 }
 
 /// Most reasons that are told, and most clouds that are named for each.
-const MOST_NAMED: usize = 3;
+const MAX_NAMED: usize = 3;
 
 impl PosedClouds {
     pub(super) fn new(
@@ -172,10 +172,10 @@ impl PosedClouds {
         self.without_pose += 1;
         log::debug!("{}: cloud {} has no pose: {why}", self.path.display(), head.name);
         if let Some((_, names)) = self.reasons.iter_mut().find(|(known, _)| known == why) {
-            if names.len() <= MOST_NAMED {
+            if names.len() <= MAX_NAMED {
                 names.push(head.name.clone());
             }
-        } else if self.reasons.len() <= MOST_NAMED {
+        } else if self.reasons.len() <= MAX_NAMED {
             self.reasons.push((why.to_owned(), vec![head.name.clone()]));
         }
     }
@@ -183,12 +183,12 @@ impl PosedClouds {
     /// Why clouds have no pose: each reason once.
     fn why_without_pose(&self) -> String {
         let list = |names: &[String]| {
-            let more = if names.len() > MOST_NAMED { ", ..." } else { "" };
-            names.iter().take(MOST_NAMED).map(String::as_str).collect::<Vec<_>>().join(", ") + more
+            let more = if names.len() > MAX_NAMED { ", ..." } else { "" };
+            names.iter().take(MAX_NAMED).map(String::as_str).collect::<Vec<_>>().join(", ") + more
         };
-        let told = self.reasons.iter().take(MOST_NAMED);
+        let told = self.reasons.iter().take(MAX_NAMED);
         let told: Vec<String> = told.map(|(why, names)| format!("{}: {why}", list(names))).collect();
-        let more = if self.reasons.len() > MOST_NAMED { "; ..." } else { "" };
+        let more = if self.reasons.len() > MAX_NAMED { "; ..." } else { "" };
         told.join("; ") + more
     }
 

@@ -19,7 +19,7 @@ const GLANCE_BYTES: u64 = 1 << 14;
 /// A longer line is an error.
 const MAX_LINE_BYTES: u64 = 1 << 16;
 /// Numbers in file names are compared with time stamps if both exceed this many seconds: counters do not.
-const LEAST_STAMP_S: f64 = 1e6;
+const MIN_STAMP_S: f64 = 1e6;
 
 impl Poses {
     /// Reads a file and keeps its first `wanted` poses.
@@ -76,7 +76,7 @@ impl Poses {
         let stamps: Vec<f64> = self.stamps.iter().map(|&(_, stamp)| stamp).collect();
         let (first, last) = (*stamps.first()?, *stamps.last()?);
         let names: Vec<f64> = files.iter().map(|path| number_in(path)).collect::<Option<_>>()?;
-        if stamps.len() != names.len() || first < LEAST_STAMP_S || last <= first {
+        if stamps.len() != names.len() || first < MIN_STAMP_S || last <= first {
             return None;
         }
         let spacing = (last - first) / (stamps.len() - 1) as f64;

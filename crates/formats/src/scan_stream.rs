@@ -74,7 +74,7 @@ const POSE_BYTES: usize = 56;
 const CHUNK_POINTS: usize = 4096;
 
 /// Most points reserved at once: the count in a damaged stream may be any number.
-const MOST_RESERVED: usize = 1 << 16;
+const MAX_RESERVED: usize = 1 << 16;
 
 impl<R: StreamInput> ScanStream<R> {
     fn read_header(&mut self) -> Result<()> {
@@ -217,7 +217,7 @@ impl<R: StreamInput> ScanSource for ScanStream<R> {
         self.is_past_error = false;
         let count = count as usize;
         points.begin(self.has_intensities);
-        points.reserve(count.min(MOST_RESERVED));
+        points.reserve(count.min(MAX_RESERVED));
         let mut left = count;
         while left > 0 {
             let here = left.min(CHUNK_POINTS);

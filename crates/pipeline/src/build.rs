@@ -1,5 +1,5 @@
-use crate::build_options::BuildOptions;
 use crate::build_config::{config_to_create, config_to_go_on};
+use crate::build_options::BuildOptions;
 use crate::flush_schedule::FlushSchedule;
 use crate::intake::{Intake, Next, RayNeeds, Taken};
 use crate::scan_input::is_standard_input;
@@ -7,6 +7,7 @@ use crate::scan_queue::{ScanQueue, WhenBehind};
 use crate::scan_reader::{Marking, ScanReader};
 use crate::summary::Summary;
 use crate::watch::{Gauge, Watch};
+use crate::whole_map;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
@@ -16,13 +17,12 @@ use voxtile::scan::{ScanPoints, ScanReport};
 use voxtile::store::{FsDisk, InputContent, InputRecord, UnsyncedDisk};
 use voxtile::{Error, MapConfig, MapPath, MemoryLimit};
 use voxtile_formats::{PointRoom, ReadOptions, ScanMark};
-use crate::whole_map;
 
 /// The share of the limit of memory that reading may take, beside the points of scans: chunks and messages of
 /// recordings, poses, the sorting of LAS.
 const PARTS_FOR_READING: usize = 32;
 /// Reading has so much at least. What it has beyond that is taken from the map.
-const LEAST_FOR_READING: usize = 4 << 20;
+const MIN_FOR_READING: usize = 4 << 20;
 
 /// The share of the limit of memory that the points of scans may take, as they are read and as they are mapped.
 const PARTS_OF_MEMORY: usize = 32;
@@ -48,11 +48,13 @@ pub fn build(options: &BuildOptions, watch: &Watch) -> anyhow::Result<Option<Sum
         if options.piece_of.is_none() { ScanMark::of } else { |scan| Ok(ScanMark::without_content(scan)) };
     let room = room(options, &config);
     let most_together = most_together(options, &config);
-    let opened = ScanReader::open(options.scans.clone(), read_options(options, &config), room, mark, watch.clone())?;
+    let opened =
+        ScanReader::open(options.scans.clone(), read_options(options, &config), room, mark, watch.clone())?;
     let Some((reader, input)) = opened else { return Ok(None) };
     let config = config_of_map(options, &config);
     let needs = RayNeeds { grid: config.grid, sensor_model: config.sensor_model };
-    let mut intake = Intake::new(reader, options.scans.clone(), options.skip_bad, (!options.no_rays).then_some(needs));
+    let mut intake =
+        Intake::new(reader, options.scans.clone(), options.skip_bad, (!options.no_rays).then_some(needs));
     let mut mapper = match exists {
         true => Some(OutOfCoreTileMapper::open(place_of_map(options), config.clone())?),
         false => None,
@@ -84,7 +86,7 @@ pub fn build(options: &BuildOptions, watch: &Watch) -> anyhow::Result<Option<Sum
     };
 
     if options.when_behind != WhenBehind::Wait {
-        intake.read_ahead(ScanQueue::new(options.when_behind, ScanQueue::MOST_SCANS));
+        intake.read_ahead(ScanQueue::new(options.when_behind, ScanQueue::MAX_SCANS));
     } else if most_together > 1 {
         intake.read_ahead(ScanQueue::new(options.when_behind, most_together));
     }
@@ -382,7 +384,11 @@ fn beginning(name: &str, begins_with: Option<&str>) -> String {
 }
 
 /// An input goes on as it was begun.
-fn check_begun(options: &BuildOptions, input: &InputRecord, mapper: &OutOfCoreTileMapper) -> voxtile::Result<()> {
+fn check_begun(
+    options: &BuildOptions,
+    input: &InputRecord,
+    mapper: &OutOfCoreTileMapper,
+) -> voxtile::Result<()> {
     match input.is_hits_alone {
         Some(begun) if begun != options.no_rays => {
             let how = |is_hits_alone| if is_hits_alone { "points alone (--no-rays)" } else { "rays" };
@@ -425,7 +431,7 @@ fn folder_beside(options: &BuildOptions) -> &Path {
 
 /// The memory for reading, of a limit of so many bytes.
 fn for_reading(bytes: usize) -> usize {
-    (bytes / PARTS_FOR_READING).max(LEAST_FOR_READING)
+    (bytes / PARTS_FOR_READING).max(MIN_FOR_READING)
 }
 
 /// The configuration of the map, which leaves the memory for reading alone.
@@ -435,7 +441,7 @@ fn config_of_map(options: &BuildOptions, config: &MapConfig) -> MapConfig {
         && !is_standard_input(&options.scans)
     {
         let least = MemoryLimit::least_bytes(&config.grid).min(bytes);
-        config.memory = MemoryLimit::Bytes((bytes - (for_reading(bytes) - LEAST_FOR_READING)).max(least));
+        config.memory = MemoryLimit::Bytes((bytes - (for_reading(bytes) - MIN_FOR_READING)).max(least));
     }
     config
 }
@@ -457,7 +463,7 @@ fn scans_in_memory(options: &BuildOptions, config: &MapConfig) -> usize {
     match options.when_behind {
         WhenBehind::Wait if together == 1 => 1,
         WhenBehind::Wait => 2 * together + 1,
-        _ => together + ScanQueue::MOST_SCANS + 1,
+        _ => together + ScanQueue::MAX_SCANS + 1,
     }
 }
 

@@ -14,7 +14,8 @@ const DEFAULT_MEMORY_BYTES: usize = 512 << 20;
 
 /// The parameters of a new map.
 pub fn config_to_create(options: &BuildOptions) -> anyhow::Result<MapConfig> {
-    let (resolution_m, tile_size_m) = (options.resolution_m.unwrap_or(0.1), options.tile_size_m.unwrap_or(10.0));
+    let (resolution_m, tile_size_m) =
+        (options.resolution_m.unwrap_or(0.1), options.tile_size_m.unwrap_or(10.0));
     let mut config = MapConfig::new(resolution_m, tile_size_m)
         .map_err(name_the_option)?
         .with_storage(options.storage.unwrap_or_default());
@@ -80,20 +81,23 @@ fn check_threshold(options: &BuildOptions, own: f64) -> voxtile::Result<()> {
 }
 
 /// What was begun goes on as it was, unless something else is asked for, which is then refused.
-fn for_this_run(options: &BuildOptions, config: MapConfig, begun: Option<RayConfig>) -> anyhow::Result<MapConfig> {
+fn for_this_run(
+    options: &BuildOptions,
+    config: MapConfig,
+    begun: Option<RayConfig>,
+) -> anyhow::Result<MapConfig> {
     let begun_mode = begun.map_or(InsertMode::PerScan, |rays| rays.insert_mode);
     let insert_mode = options.insert_mode.unwrap_or(begun_mode);
     let min_range_m = options.min_range_m.unwrap_or(begun.map_or(0.0, |rays| rays.min_range_m));
     let begun_max_m = begun.map_or(Some(MAX_RANGE_M), |rays| rays.max_range_m);
     let sensor_model = sensor_model(options, config.sensor_model)?;
-    let mut config = config
-        .with_sensor_model(sensor_model)
-        .with_insert_mode(insert_mode)
-        .with_octree(options.octree);
+    let mut config =
+        config.with_sensor_model(sensor_model).with_insert_mode(insert_mode).with_octree(options.octree);
     let least = MemoryLimit::least_bytes(&config.grid);
     config.memory = options.memory.unwrap_or(MemoryLimit::Bytes(least.max(DEFAULT_MEMORY_BYTES)));
     config.keeps_scans |= options.keep_scans;
-    config.rays.no_return_range_m = options.clear_no_return_m.or(begun.and_then(|rays| rays.no_return_range_m));
+    config.rays.no_return_range_m =
+        options.clear_no_return_m.or(begun.and_then(|rays| rays.no_return_range_m));
     config.rays.region = match &options.region {
         Some(region) => Some(tiles_of(region, &config.grid)?),
         None => begun.and_then(|rays| rays.region),

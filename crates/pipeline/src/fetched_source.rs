@@ -1,8 +1,8 @@
+use crate::place::bucket_at;
 use crate::watch::Watch;
 use voxtile::Result;
 use voxtile_bucket::FetchedFiles;
 use voxtile_formats::{PointStore, PoseSource, ReadOptions, ScanHead, ScanSource, open_any_scans};
-use crate::place::bucket_at;
 
 /// Scans of a bucket, from files that were fetched.
 pub struct FetchedSource {

@@ -1,12 +1,12 @@
+use crate::MapAt;
 use crate::new_poses::{PoseFile, poses_for, records_of};
+use crate::place::{is_map_at, url_of};
 use rustc_hash::FxHashMap;
 use std::path::{Path, PathBuf};
 use voxtile::mapper::KeptScans;
 use voxtile::scan::{Pose, ScanPoints, Stop};
 use voxtile::{Error, Result};
 use voxtile_formats::{PointStore, ScanHead, ScanSource};
-use crate::MapAt;
-use crate::place::{is_map_at, url_of};
 
 /// The scans that a map or a snapshot of one keeps, as an input like any other.
 pub struct KeptSource {

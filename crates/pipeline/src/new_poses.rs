@@ -9,7 +9,7 @@ use voxtile_formats::clouds::{Budget, RigidPose};
 use voxtile_formats::{ReadOptions, read_poses};
 
 /// Most scans that an error names.
-const MOST_NAMED: usize = 5;
+const MAX_NAMED: usize = 5;
 
 /// How a file of poses is read.
 #[derive(Debug)]
@@ -148,8 +148,8 @@ fn by_time(
     if missing.is_empty() {
         return Ok(NewPoses::Numbered(poses));
     }
-    let named = missing[..missing.len().min(MOST_NAMED)].join(", ");
-    let more = match missing.len().saturating_sub(MOST_NAMED) {
+    let named = missing[..missing.len().min(MAX_NAMED)].join(", ");
+    let more = match missing.len().saturating_sub(MAX_NAMED) {
         0 => String::new(),
         more => format!(" and {more} more"),
     };

@@ -1,15 +1,15 @@
 use crate::kept_source::{KeptSource, is_map};
 use crate::new_poses::PoseFile;
+use crate::place::url_of;
 use crate::scan_place::scans_at;
 use crate::watch::Watch;
 use std::io::{BufReader, stdin};
 use std::path::Path;
 use voxtile::{Error, Result};
 use voxtile_formats::{ReadOptions, ScanSource, open_any_scans, read_scan_stream};
-use crate::place::url_of;
 
 /// Most letters of an input's name that a map keeps.
-const MOST_LETTERS: usize = 200;
+const MAX_LETTERS: usize = 200;
 
 /// Whether scans are to come from standard input.
 pub fn is_standard_input(scans: &Path) -> bool {
@@ -59,5 +59,5 @@ pub fn name_of_path(scans: &Path) -> String {
         Some(parent) if last == "scans" => format!("{parent}/{last}"),
         _ => last,
     };
-    name.chars().take(MOST_LETTERS).collect()
+    name.chars().take(MAX_LETTERS).collect()
 }

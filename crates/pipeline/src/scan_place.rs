@@ -1,10 +1,10 @@
+use crate::place::url_of;
+#[cfg(not(feature = "bucket"))]
+use crate::place::without_buckets;
 use crate::watch::Watch;
 use std::path::{Path, PathBuf};
 use voxtile::Result;
 use voxtile_formats::{ReadOptions, ScanSource};
-use crate::place::url_of;
-#[cfg(not(feature = "bucket"))]
-use crate::place::without_buckets;
 
 /// Opens the scans at a URL that is none of a map.
 ///

@@ -39,7 +39,7 @@ struct Waiting {
 
 impl ScanQueue {
     /// Most scans that wait where the input does not.
-    pub const MOST_SCANS: usize = 8;
+    pub const MAX_SCANS: usize = 8;
 
     /// A queue in which at most so many scans wait.
     pub fn new(when_behind: WhenBehind, most_scans: usize) -> Self {
@@ -131,7 +131,7 @@ mod tests {
 
     /// What comes out after so many scans: the numbers of those that are to be mapped, and how many were left out.
     fn after(scans: usize, when_behind: WhenBehind) -> (Vec<usize>, usize) {
-        let queue = ScanQueue::new(when_behind, ScanQueue::MOST_SCANS);
+        let queue = ScanQueue::new(when_behind, ScanQueue::MAX_SCANS);
         let marks: Vec<String> = (0..scans).map(|number| scan(number).mark.scan_text()).collect();
         assert!((0..scans).all(|number| queue.push(Ok(Read::Scan(scan(number))))));
         assert!(queue.push(Ok(Read::End)));

@@ -42,7 +42,7 @@ pub struct HeightBin {
 }
 
 /// Most bins of heights.
-const MOST_BINS: u64 = 40;
+const MAX_BINS: u64 = 40;
 
 impl Survey {
     /// Counts a map, tile by tile, on the threads of the caller's rayon pool; damaged tiles are left out. `progress`
@@ -91,7 +91,7 @@ impl<'a> Counter<'a> {
         let grid = map.config().grid;
         let [low, high] = [bounds.min(), bounds.max()].map(|tile| grid.voxels_of_tile(tile));
         let (bottom, end) = (i64::from(low.min[2]), i64::from(high.end[2]));
-        let bin = (end - bottom).max(1).unsigned_abs().div_ceil(MOST_BINS) as i64;
+        let bin = (end - bottom).max(1).unsigned_abs().div_ceil(MAX_BINS) as i64;
         Self { map, bottom, bin }
     }
 
@@ -130,7 +130,7 @@ impl<'a> Counter<'a> {
     }
 
     fn bin_of(&self, z: i32) -> usize {
-        ((i64::from(z) - self.bottom) / self.bin).clamp(0, MOST_BINS as i64 - 1) as usize
+        ((i64::from(z) - self.bottom) / self.bin).clamp(0, MAX_BINS as i64 - 1) as usize
     }
 
     fn survey(&self, counts: Counts) -> Survey {

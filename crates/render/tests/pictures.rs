@@ -1,3 +1,5 @@
+//! Pictures of known maps, pixel by pixel, and counts of what a map holds.
+
 use std::sync::Mutex;
 use voxtile::mapper::{MapStatistics, MapView, TileRef};
 use voxtile::scan::PointBatch;

@@ -145,16 +145,16 @@ pub struct Args {
 }
 
 /// What stamps can be apart: some hundred years.
-const MOST_S: f64 = 9e9;
+const MAX_S: f64 = 9e9;
 /// Farther than a map reaches.
-const MOST_M: f64 = 1e9;
+const MAX_M: f64 = 1e9;
 
 fn seconds(text: &str) -> Result<Duration, String> {
-    within(text, MOST_S, "seconds").map(Duration::from_secs_f64)
+    within(text, MAX_S, "seconds").map(Duration::from_secs_f64)
 }
 
 fn metres(text: &str) -> Result<f64, String> {
-    within(text, MOST_M, "metres")
+    within(text, MAX_M, "metres")
 }
 
 /// A number that is not below zero, and no more than this.

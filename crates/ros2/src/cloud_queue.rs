@@ -32,7 +32,7 @@ pub enum Verdict<P> {
 /// What a cloud takes beside its bytes: no flood of empty ones is free.
 const CLOUD_BYTES: usize = 256;
 /// Of a flood of clouds only the first ones get poses before they are mapped.
-const MOST_SETTLED: usize = 1000;
+const MAX_SETTLED: usize = 1000;
 
 impl CloudQueue {
     pub fn new(most_bytes: usize, topics: usize, when_behind: WhenBehind) -> Self {
@@ -77,7 +77,7 @@ impl CloudQueue {
 
     /// Gives clouds the poses that are known now, before what they come from is forgotten.
     pub fn settle(&mut self, pose_of: impl Fn(&Cloud) -> Option<RigidPose>) {
-        for cloud in self.clouds.iter_mut().filter(|cloud| cloud.pose.is_none()).take(MOST_SETTLED) {
+        for cloud in self.clouds.iter_mut().filter(|cloud| cloud.pose.is_none()).take(MAX_SETTLED) {
             cloud.pose = pose_of(cloud);
         }
     }

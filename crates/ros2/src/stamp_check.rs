@@ -33,19 +33,19 @@ pub enum StampVerdict {
 }
 
 /// So far ahead of all others a stamp is none, unless all of its frame are.
-const MOST_AHEAD_NS: i64 = 10_000_000_000;
+const MAX_AHEAD_NS: i64 = 10_000_000_000;
 /// So far behind the last one of its frame it is none, unless all of its frame are.
-const MOST_BEHIND_NS: i64 = 2_000_000_000;
+const MAX_BEHIND_NS: i64 = 2_000_000_000;
 /// Bound of what a flood can fill.
-const MOST_CHILDREN: usize = 4000;
+const MAX_CHILDREN: usize = 4000;
 /// For so long all have to be.
 const PROOF: Duration = Duration::from_millis(500);
 
 impl StampCheck {
     pub fn verdict(&mut self, child: &str, stamp_ns: i64, now: Instant) -> StampVerdict {
         let known = self.children.get(child).copied().unwrap_or_default();
-        let is_early = self.newest_ns.is_some_and(|newest| stamp_ns > newest.saturating_add(MOST_AHEAD_NS));
-        let is_late = known.newest_ns.is_some_and(|newest| stamp_ns < newest.saturating_sub(MOST_BEHIND_NS));
+        let is_early = self.newest_ns.is_some_and(|newest| stamp_ns > newest.saturating_add(MAX_AHEAD_NS));
+        let is_late = known.newest_ns.is_some_and(|newest| stamp_ns < newest.saturating_sub(MAX_BEHIND_NS));
         if !is_early && !is_late {
             self.newest_ns = self.newest_ns.max(Some(stamp_ns));
             let newest_ns = known.newest_ns.max(Some(stamp_ns));
@@ -94,7 +94,7 @@ impl StampCheck {
     fn note(&mut self, name: &str, child: Child) {
         if let Some(known) = self.children.get_mut(name) {
             *known = child;
-        } else if self.children.len() < MOST_CHILDREN {
+        } else if self.children.len() < MAX_CHILDREN {
             self.children.insert(name.to_owned(), child);
         }
     }

@@ -36,10 +36,10 @@ const SPAN_NS: i64 = 10_000_000_000;
 /// Old samples are forgotten after so many new ones.
 const FORGET_EVERY: usize = 1000;
 /// Bounds of what a flood can fill.
-const MOST_SAMPLES: usize = 200_000;
-const MOST_FRAMES: usize = 2000;
+const MAX_SAMPLES: usize = 200_000;
+const MAX_FRAMES: usize = 2000;
 const MAX_SENSORS: usize = 100;
-const MOST_NAME_BYTES: usize = 256;
+const MAX_NAME_BYTES: usize = 256;
 /// How often transforms that are none are reported.
 const REFUSED_AGAIN: Duration = Duration::from_secs(30);
 
@@ -77,12 +77,12 @@ impl TransformBuffer {
         }
         let (new, kept) = self.samples;
         let (parent, child) = (&pose.header.frame_id, &pose.child_frame);
-        let is_long = parent.len().max(child.len()) > MOST_NAME_BYTES;
-        if !is_long && !self.owners.knows(bare(child)) && self.owners.len() >= MOST_FRAMES {
+        let is_long = parent.len().max(child.len()) > MAX_NAME_BYTES;
+        if !is_long && !self.owners.knows(bare(child)) && self.owners.len() >= MAX_FRAMES {
             self.forget_frames(counters);
         }
         let is_new = !self.owners.knows(bare(child));
-        let is_full = new + kept >= MOST_SAMPLES || (is_new && self.owners.len() >= MOST_FRAMES);
+        let is_full = new + kept >= MAX_SAMPLES || (is_new && self.owners.len() >= MAX_FRAMES);
         if is_long || is_full || !(is_static || self.is_of_now(child, pose.header.stamp_ns, now, queue)) {
             counters.transforms_refused += 1;
         } else {
@@ -106,7 +106,7 @@ impl TransformBuffer {
     fn make_room(&mut self, queue: &mut CloudQueue, counters: &mut Counters) {
         queue.settle(|cloud| self.find(cloud).ok());
         let mut left = self.transforms.forget_older_than(SPAN_NS);
-        while left > MOST_SAMPLES - FORGET_EVERY {
+        while left > MAX_SAMPLES - FORGET_EVERY {
             let lost = self.transforms.shrink_largest();
             if lost == 0 {
                 break;
@@ -359,7 +359,7 @@ mod tests {
     #[test]
     fn a_flood_of_frames_fills_the_buffer_and_no_more() {
         let (mut buffer, mut counters) = (buffer(), Counters::default());
-        for frame in 0..MOST_FRAMES + 7 {
+        for frame in 0..MAX_FRAMES + 7 {
             buffer.insert(
                 &pose("map", &format!("f{frame}"), 0, 0.0),
                 false,
@@ -371,7 +371,7 @@ mod tests {
         }
         assert_eq!((buffer.transforms.frames(), counters.transforms_refused), (1507, 500));
         // What was named last is still known.
-        let last = format!("f{}", MOST_FRAMES + 6);
+        let last = format!("f{}", MAX_FRAMES + 6);
         buffer.insert(&pose("map", &last, 1, 0.0), false, None, Instant::now(), &mut queue(), &mut counters);
         assert_eq!((buffer.transforms.frames(), counters.transforms_refused), (1507, 500));
     }
@@ -390,7 +390,7 @@ mod tests {
                 let now = start + Duration::from_micros(number);
                 buffer.insert(pose, is_static, publisher, now, &mut queue(), &mut counters);
             };
-            for k in 0..MOST_FRAMES + 500 {
+            for k in 0..MAX_FRAMES + 500 {
                 put(&mut buffer, &pose("x", &format!("f{k}"), 0, 0.0), k % 2 == 0, flood);
             }
             put(&mut buffer, &pose("base", "lidar", 0, 1.0), true, state);
@@ -399,13 +399,13 @@ mod tests {
             put(&mut buffer, &pose("map", "world", 0, 9.0), true, flood);
             assert_eq!(buffer.verdict(&cloud(S / 2), start), Verdict::Waits);
             put(&mut buffer, &pose("map", "base", 0, 2.0), false, robot);
-            for k in 0..3 * MOST_FRAMES {
+            for k in 0..3 * MAX_FRAMES {
                 put(&mut buffer, &pose("x", &format!("g{k}"), 0, 0.0), k % 2 == 0, flood);
             }
             put(&mut buffer, &pose("map", "base", S, 2.0), false, robot);
             let found = buffer.verdict(&cloud(S / 2), start);
             assert!(matches!(found, Verdict::Ready(pose) if pose.position_m[0] == 3.0), "{found:?}");
-            assert!(buffer.transforms.frames() <= MOST_FRAMES);
+            assert!(buffer.transforms.frames() <= MAX_FRAMES);
         }
     }
 
@@ -425,7 +425,7 @@ mod tests {
         }
         assert!(matches!(buffer.verdict(&cloud(S / 2), start), Verdict::Ready(_)));
         put(&mut buffer, &pose("g0", "lidar", 0, 0.0), false, flood);
-        for k in 0..3 * MOST_FRAMES {
+        for k in 0..3 * MAX_FRAMES {
             put(&mut buffer, &pose("map", &format!("g{k}"), 0, 0.0), false, flood);
             put(&mut buffer, &pose(&format!("g{}", k + 1), &format!("g{k}"), 0, 0.0), false, flood);
         }
@@ -448,7 +448,7 @@ mod tests {
                 &mut counters,
             );
         }
-        for stamp_ns in 0..2 * MOST_SAMPLES as i64 {
+        for stamp_ns in 0..2 * MAX_SAMPLES as i64 {
             buffer.insert(
                 &pose("map", "flood", stamp_ns, 0.0),
                 false,
@@ -475,14 +475,14 @@ mod tests {
                 "{stamp_ns}: {found:?}"
             );
         }
-        assert!(counters.transforms_refused >= MOST_SAMPLES as u64, "{counters}");
-        assert!(buffer.transforms.forget_older_than(SPAN_NS) <= MOST_SAMPLES);
+        assert!(counters.transforms_refused >= MAX_SAMPLES as u64, "{counters}");
+        assert!(buffer.transforms.forget_older_than(SPAN_NS) <= MAX_SAMPLES);
         // Parents are samples, too.
-        for parent in 0..MOST_SAMPLES + 2 * FORGET_EVERY {
+        for parent in 0..MAX_SAMPLES + 2 * FORGET_EVERY {
             let pose = pose(&format!("p{parent}"), "flood", 0, 0.0);
             buffer.insert(&pose, true, None, now, &mut queue(), &mut counters);
         }
-        assert!(buffer.transforms.forget_older_than(SPAN_NS) <= MOST_SAMPLES);
+        assert!(buffer.transforms.forget_older_than(SPAN_NS) <= MAX_SAMPLES);
         assert!(matches!(buffer.verdict(&cloud(S / 100), now), Verdict::Ready(_)));
     }
 

@@ -33,7 +33,7 @@ pub fn write_layer(layer: &mut VoxelSet, out: &mut impl Write) -> io::Result<()>
         }
     }
     drop(voxels);
-    out.write_all(layer.digest().as_bytes())
+    out.write_all(&layer.digest().to_bytes())
 }
 
 /// Writes voxels in one packet, or in as many as they need.
@@ -109,7 +109,7 @@ pub fn read_layer_within(
     }
     let mut digest = [0; 32];
     input.read_exact(&mut digest)?;
-    if *layer.digest().as_bytes() != digest {
+    if layer.digest().to_bytes() != digest {
         return Err(FormatError::at_offset(offset, "the digest is not that of the voxels").into());
     }
     Ok(layer)

@@ -280,7 +280,7 @@ impl Receiver {
             let wait_ns = COMPARE_NS_PER_VOXEL.saturating_mul(layer.len())
                 + COMPARE_NS_A_TILE.saturating_mul(layer.tile_count() as u64);
             self.compare_at = now + Duration::from_nanos(wait_ns);
-            let is_equal = layer.len() == status.voxels && *layer.digest().as_bytes() == status.digest;
+            let is_equal = layer.len() == status.voxels && layer.digest().to_bytes() == status.digest;
             self.equal_as_of = is_equal.then_some(stream.highest);
             differs |= !is_equal;
             if is_equal {

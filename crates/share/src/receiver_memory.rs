@@ -8,7 +8,7 @@ const VERSIONS_PART: usize = 8;
 
 impl Receiver {
     /// With less memory, not even small layers have room.
-    pub(super) const LEAST_BYTES: usize = 4 << 20;
+    pub(super) const MIN_BYTES: usize = 4 << 20;
 
     /// Upper bound of the bytes of memory: the layer, and the full size of versions and outstanding requests.
     pub fn memory_bytes(&self) -> usize {

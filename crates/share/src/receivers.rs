@@ -30,16 +30,16 @@ const PACKET_BYTES: usize = super::codec::MAX_VOXELS_PER_PACKET * VoxelSet::MAX_
 
 impl<K: Ord + Clone> Receivers<K> {
     /// Least memory limit, in bytes.
-    pub const LEAST_BYTES: usize = 64 << 20;
+    pub const MIN_BYTES: usize = 64 << 20;
 
     /// No receivers yet, and a limit on their total memory.
     ///
     /// # Errors
     ///
-    /// Less than [`Receivers::LEAST_BYTES`].
+    /// Less than [`Receivers::MIN_BYTES`].
     pub fn new(memory_bytes: usize) -> Result<Self> {
-        if memory_bytes < Self::LEAST_BYTES {
-            let reason = format!("{memory_bytes} bytes; at least {} are needed", Self::LEAST_BYTES);
+        if memory_bytes < Self::MIN_BYTES {
+            let reason = format!("{memory_bytes} bytes; at least {} are needed", Self::MIN_BYTES);
             return Err(Error::argument("memory", reason));
         }
         Ok(Self { memory_bytes, robots: BTreeMap::new() })
@@ -66,7 +66,7 @@ impl<K: Ord + Clone> Receivers<K> {
 
     /// Whether there is a share for one more robot.
     pub fn has_room(&self) -> bool {
-        self.for_all() / (self.known() + 1) >= Receiver::LEAST_BYTES
+        self.for_all() / (self.known() + 1) >= Receiver::MIN_BYTES
     }
 
     /// Removes a robot, and returns its receiver.

@@ -182,7 +182,7 @@ impl Sender {
             resolution_m: grid.resolution_m(),
             tile_size_m: grid.tile_size_m(),
             voxels: self.sent.len(),
-            digest: *self.sent.digest().as_bytes(),
+            digest: self.sent.digest().to_bytes(),
         };
         // Cannot fail: a status has no voxels.
         Packet::Status(status).encode().unwrap_or_default()

@@ -1,5 +1,6 @@
 use super::set_range::{LAST_CODE, SetPosition, SetRange};
 use std::collections::BTreeMap;
+use voxtile::Digest;
 use voxtile::space::{
     BRICK_VOXELS, BrickCode, BrickMask, Grid, LAST_VOXEL_INDEX, MortonCode, TileIndex, VoxelBox, VoxelIndex,
     VoxelKey, is_in_mask, places,
@@ -14,7 +15,7 @@ pub struct VoxelSet {
     pub(super) bricks: usize,
     len: u64,
     /// `None` after a change.
-    digest: Option<blake3::Hash>,
+    digest: Option<Digest>,
 }
 
 /// The voxels of a tile, by brick. Never empty.
@@ -184,7 +185,7 @@ impl VoxelSet {
 
     /// BLAKE3 over "voxtile-set-1", the bits of resolution and tile size, and each tile's index and digest, in order:
     /// equal for equal sets. It is kept until the set changes: a sender tells it to anyone who asks.
-    pub fn digest(&mut self) -> blake3::Hash {
+    pub fn digest(&mut self) -> Digest {
         if let Some(digest) = self.digest {
             return digest;
         }
@@ -193,7 +194,7 @@ impl VoxelSet {
         hasher.update(&self.grid.resolution_m().to_bits().to_le_bytes());
         hasher.update(&self.grid.tile_size_m().to_bits().to_le_bytes());
         self.add_tiles(&mut hasher, SetRange::ALL.first.tile, SetRange::ALL.last.tile);
-        *self.digest.insert(hasher.finalize())
+        *self.digest.insert(Digest::from_bytes(*hasher.finalize().as_bytes()))
     }
 
     /// The number of voxels of some tiles, and the first eight bytes of BLAKE3 over these tiles' indices and digests.
@@ -293,7 +294,7 @@ mod tests {
             let digest = set.digest();
             assert_ne!(digest, empty);
             // Whatever is kept is told, and nothing is added up anew.
-            let kept = blake3::hash(b"kept");
+            let kept = Digest::from_bytes([7; 32]);
             set.digest = Some(kept);
             assert_eq!(set.digest(), kept);
             assert!(!set.put([100 * k, 0, 0], true), "no change");

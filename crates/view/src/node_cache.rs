@@ -4,7 +4,7 @@ use voxtile::{Error, Result};
 use voxtile_render::levels::NodeStore;
 
 /// A file that would get larger than this is begun anew: most of it is of states that nobody looks at any more.
-const MOST_BYTES: u64 = 4 << 30;
+const MAX_BYTES: u64 = 4 << 30;
 
 /// Where the coarse nodes of a map are kept: in the user's cache folder, under the map's id, or in a file that goes
 /// with the program where there is no such folder, another program has it, or nothing is to be kept.
@@ -28,7 +28,7 @@ pub fn open(map_id: Option<&str>) -> Result<NodeStore> {
 /// A store that begins its file anew before it gets too large.
 fn open_limited(file: File, path: &Path) -> Result<NodeStore> {
     let same = file.try_clone().map_err(|error| Error::io(path, "open", error))?;
-    Ok(NodeStore::open(file, path)?.with_limit(MOST_BYTES, move || same.set_len(0)))
+    Ok(NodeStore::open(file, path)?.with_limit(MAX_BYTES, move || same.set_len(0)))
 }
 
 /// `None` if another program has it.
@@ -42,7 +42,7 @@ fn open_kept(path: &Path) -> std::io::Result<Option<File>> {
         Err(std::fs::TryLockError::WouldBlock) => return Ok(None),
         Err(std::fs::TryLockError::Error(error)) => return Err(error),
     }
-    if file.metadata()?.len() > MOST_BYTES {
+    if file.metadata()?.len() > MAX_BYTES {
         file.set_len(0)?;
     }
     Ok(Some(file))

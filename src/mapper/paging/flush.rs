@@ -14,7 +14,7 @@ use super::unapplied_tile::UnappliedTile;
 use crate::error::{Error, Result};
 use crate::persistence::CompactTile;
 use crate::space::TileIndex;
-use crate::store::{InputRecord, MOST_INPUTS};
+use crate::store::{InputRecord, MAX_INPUTS};
 use crate::tile::Tile;
 use std::sync::Arc;
 use std::time::Instant;
@@ -28,7 +28,7 @@ impl TilePager<'_> {
             self.contents.inputs.pop();
         }
         self.contents.inputs.push(input);
-        let excess = self.contents.inputs.len().saturating_sub(MOST_INPUTS);
+        let excess = self.contents.inputs.len().saturating_sub(MAX_INPUTS);
         self.contents.inputs.drain(..excess);
         let flushed = self.flush();
         if flushed.is_err() {

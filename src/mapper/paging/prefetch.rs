@@ -10,7 +10,7 @@ use crate::tile::Table;
 use std::sync::Arc;
 
 /// So many tiles in the compact form are brought in with one scan: unpacking takes milliseconds.
-const MOST_PACKED_AT_ONCE: usize = 2;
+const MAX_PACKED_AT_ONCE: usize = 2;
 
 impl TilePager<'_> {
     /// Prefetches tiles that will be needed, as far as there is room for them. `updates` are those of the scan that is
@@ -52,7 +52,7 @@ impl TilePager<'_> {
             let is_wanted = self.is_often_changed(tile)
                 && matches!(self.contents.cache.find(tile), Some(Cached::Compact(_)))
                 && !self.contents.buffer.is_staged(tile);
-            if is_wanted && brought_in < MOST_PACKED_AT_ONCE && self.may_replace_oldest() {
+            if is_wanted && brought_in < MAX_PACKED_AT_ONCE && self.may_replace_oldest() {
                 self.load(tile)?;
                 brought_in += 1;
             }

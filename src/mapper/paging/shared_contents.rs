@@ -14,7 +14,7 @@ pub(in crate::mapper) struct SharedContents {
 
 /// How long a scan waits for a view to close. Most last for a few milliseconds, and copying the tiles that a scan of a
 /// lidar changes takes longer than this.
-const MOST_WAIT: Duration = Duration::from_millis(20);
+const MAX_WAIT: Duration = Duration::from_millis(20);
 
 /// The contents while they are locked.
 pub(in crate::mapper) type ContentsGuard<'a> = MutexGuard<'a, TileContents>;
@@ -32,7 +32,7 @@ impl SharedContents {
 
     /// Waits a moment for those who look at the map as it is, before it changes.
     pub(super) fn wait_for_views(&self, contents: &mut ContentsGuard<'_>) {
-        let until = Instant::now() + MOST_WAIT;
+        let until = Instant::now() + MAX_WAIT;
         while contents.views.may_close_soon() {
             if self.closed.wait_until(contents, until).timed_out() {
                 contents.views.expect_no_close();

@@ -37,10 +37,10 @@ pub(in crate::mapper) struct TilePager<'a> {
 const BYTES_OF_UPDATE: usize = 4;
 
 /// A tile whose spill file is longer than this is brought in: applying so much is cheaper than keeping it.
-const MOST_SPILLED_BYTES: u64 = 1 << 20;
+const MAX_SPILLED_BYTES: u64 = 1 << 20;
 
 /// Below so many bytes of updates a tile is never read only to apply them.
-const LEAST_BYTES_TO_LOAD_FOR: u64 = 1 << 14;
+const MIN_BYTES_TO_LOAD_FOR: u64 = 1 << 14;
 
 /// New tiles are made so many bytes at a time, about: then what they really take is known.
 const BYTES_OF_NEW_TILES: usize = 4 << 20;
@@ -248,7 +248,7 @@ impl TilePager<'_> {
         // Even a short spill file has an entry in memory, so their number is limited.
         let most_files = most_bytes / 2 / WriteBuffer::BYTES_OF_FILE;
         let too_many = self.contents.buffer.spill_files().saturating_sub(most_files);
-        for tile in self.contents.buffer.longest_files(MOST_SPILLED_BYTES, too_many) {
+        for tile in self.contents.buffer.longest_files(MAX_SPILLED_BYTES, too_many) {
             self.load_buffered(tile)?;
         }
         Ok(())
@@ -288,7 +288,7 @@ impl TilePager<'_> {
             return false;
         }
         let tile_bytes = self.store().version(tile).map_or(0, |version| version.table.bytes);
-        self.contents.buffer.bytes_of(tile) < tile_bytes.max(LEAST_BYTES_TO_LOAD_FOR)
+        self.contents.buffer.bytes_of(tile) < tile_bytes.max(MIN_BYTES_TO_LOAD_FOR)
     }
 
     // Tiles.

@@ -22,7 +22,7 @@ pub enum NewPoses {
 }
 
 /// Most scans that an error names.
-const MOST_NAMED: usize = 5;
+const MAX_NAMED: usize = 5;
 
 impl NewPoses {
     /// The pose of every scan, by its number.
@@ -100,7 +100,7 @@ fn stamped(
 
 /// An error that names what there is; none if there is nothing.
 fn refuse(reason: &str, mut named: impl Iterator<Item = String>) -> Result<()> {
-    let first: Vec<_> = named.by_ref().take(MOST_NAMED).collect();
+    let first: Vec<_> = named.by_ref().take(MAX_NAMED).collect();
     if first.is_empty() {
         return Ok(());
     }

@@ -43,7 +43,7 @@ pub struct RemapBeside {
 type Fates = Box<dyn Fn(&KeptRecord) -> Fate + Send + Sync>;
 
 /// Entries of scans that wait in memory to be written.
-const MOST_ENTRIES: u64 = 256;
+const MAX_ENTRIES: u64 = 256;
 
 impl RemapBeside {
     /// Finds out what the new poses of the scans of the last flush touch. Scans after that flush keep their poses.
@@ -184,7 +184,7 @@ fn follow_scans(
         *entries += 1;
         uncommitted += 1;
         if let Some(last) = last
-            && uncommitted == MOST_ENTRIES
+            && uncommitted == MAX_ENTRIES
         {
             side.commit(last)?;
             uncommitted = 0;

@@ -95,7 +95,7 @@ pub(super) enum Fate {
 /// would cost more than it spares.
 const PART_FOR_ALL: u64 = 3;
 /// Points of a kept scan that are read into memory; those of a larger one are read again when needed.
-const MOST_POINTS_IN_MEMORY: u64 = 1 << 18;
+const MAX_POINTS_IN_MEMORY: u64 = 1 << 18;
 
 /// Maps again what scans touch whose fate is not to stay. The fates were decided by what flush `seen` has; nothing may
 /// have come since, whose fate nobody has looked at. `progress` is told the scans done and all.
@@ -368,7 +368,7 @@ impl<F: Fn(&KeptRecord) -> Fate> Revision<F> {
     }
 
     fn open(&self, store: &TileStore, record: KeptRecord) -> Result<KeptScan> {
-        KeptScan::open(&self.disk, store.layout(), record, MOST_POINTS_IN_MEMORY)
+        KeptScan::open(&self.disk, store.layout(), record, MAX_POINTS_IN_MEMORY)
     }
 
     /// # Errors
@@ -394,7 +394,7 @@ impl<F: Fn(&KeptRecord) -> Fate> Revision<F> {
         if pose.is_none() && !touched.has_any_of(&record) {
             return Ok(record);
         }
-        let scan = KeptScan::open(&self.disk, layout, record, MOST_POINTS_IN_MEMORY)?;
+        let scan = KeptScan::open(&self.disk, layout, record, MAX_POINTS_IN_MEMORY)?;
         let scan = pose.map_or(scan.clone(), |pose| scan.with_pose(pose));
         self.map_points(scan.record().clone(), touched, pose.is_some(), |selection| map(&scan, selection))
     }
@@ -430,7 +430,7 @@ impl<F: Fn(&KeptRecord) -> Fate> Revision<F> {
             let is_touched = is_changed || touched.has_any_of(&record);
             let mut record = *record;
             if is_touched {
-                let scan = KeptScan::open(&self.disk, &layout, record, MOST_POINTS_IN_MEMORY)?;
+                let scan = KeptScan::open(&self.disk, &layout, record, MAX_POINTS_IN_MEMORY)?;
                 record = self.map_scan(&mut remapper, scan, fate, &touched)?;
             } else if touched.segments.contains(&record.place.segment) {
                 record.place = remapper.copy_points(record.place)?;

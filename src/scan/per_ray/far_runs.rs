@@ -19,7 +19,7 @@ pub(crate) struct FarRuns {
 }
 
 /// Most updates that are not packed yet: half a megabyte at most.
-const MOST_PENDING: usize = 4096;
+const MAX_PENDING: usize = 4096;
 
 #[derive(Clone, Debug)]
 struct BrickOfRay {
@@ -54,7 +54,7 @@ impl FarRuns {
     fn push(&mut self, voxel: VoxelIndex, run: Run) {
         let tile = self.grid.tile_of_voxel(voxel);
         // Rays that are cut may be in one tile for as long as there are any.
-        if self.tile != Some(tile) || self.pending == MOST_PENDING {
+        if self.tile != Some(tile) || self.pending == MAX_PENDING {
             self.end_tile();
             self.tile = Some(tile);
         }
@@ -104,10 +104,10 @@ mod tests {
     #[test]
     fn rays_that_are_cut_in_one_tile_are_packed_on_the_way() {
         let mut far = FarRuns::new(Grid::new(0.1, 10.0).unwrap());
-        let rays = 40 * MOST_PENDING / 100;
+        let rays = 40 * MAX_PENDING / 100;
         for _ in 0..rays {
             (0..100).for_each(|x| far.pass([x, 7, 7]));
-            assert!(far.pending <= MOST_PENDING);
+            assert!(far.pending <= MAX_PENDING);
         }
         assert!(far.bytes() > 0);
         let parts: Vec<_> = far.take().collect();

@@ -4,14 +4,14 @@ use crate::store::tiles::tile_version::MAX_NUMBER;
 use serde::{Deserialize, Serialize};
 
 /// Most inputs that a map remembers; of more it forgets the earliest.
-pub(crate) const MOST_INPUTS: usize = 1000;
+pub(crate) const MAX_INPUTS: usize = 1000;
 
 /// Most bytes of the name of an input; of a longer one the beginning is kept.
-const MOST_NAME_BYTES: usize = 255;
+const MAX_NAME_BYTES: usize = 255;
 
 /// Most bytes of `metadata.json` for all inputs; of more the earliest are forgotten. With the longest list of snapshots
 /// beside them the file stays below a mebibyte, which is as much as earlier versions read.
-const MOST_TEXT_BYTES: usize = 600 << 10;
+const MAX_TEXT_BYTES: usize = 600 << 10;
 
 /// Columns by which `metadata.json` indents an input.
 const INDENT: usize = 6;
@@ -92,18 +92,18 @@ impl InputRecord {
 /// Forgets the earliest inputs that a map has no room for. Without that its metadata would grow with every input until
 /// nobody reads it any more.
 pub(in crate::store) fn forget_earliest(inputs: &mut Vec<InputRecord>) {
-    let mut left_bytes = Some(MOST_TEXT_BYTES);
+    let mut left_bytes = Some(MAX_TEXT_BYTES);
     let fits = |input: &&InputRecord| {
         left_bytes = left_bytes.and_then(|left| left.checked_sub(input.text_bytes()));
         left_bytes.is_some()
     };
-    let kept = inputs.iter().rev().take(MOST_INPUTS).take_while(fits).count();
+    let kept = inputs.iter().rev().take(MAX_INPUTS).take_while(fits).count();
     inputs.drain(..inputs.len() - kept);
 }
 
 /// As much of a name as a map keeps.
 fn beginning_of(name: &str) -> &str {
-    let mut ends = (0..=name.len().min(MOST_NAME_BYTES)).rev();
+    let mut ends = (0..=name.len().min(MAX_NAME_BYTES)).rev();
     ends.find_map(|end| name.get(..end)).unwrap_or_default()
 }
 

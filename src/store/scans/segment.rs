@@ -1,5 +1,5 @@
 use super::catalog_entry::{KeptRecord, SegmentPlace};
-use super::codec::{MOST_POINTS, PointDecoder, PointEncoder};
+use super::codec::{MAX_POINTS, PointDecoder, PointEncoder};
 use crate::error::{DecodeError, Error, FormatError, Result};
 use crate::space::Point;
 use crate::store::disk::{Disk, DiskRead, DiskWrite};
@@ -9,11 +9,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 /// A segment that is longer is followed by another.
-const MOST_BYTES: u64 = 256 << 20;
+const MAX_BYTES: u64 = 256 << 20;
 /// Length and checksum of a block.
 const BLOCK_FRAME_BYTES: u64 = 8;
 /// No block is longer: the points as they are in memory, and some.
-const MOST_BLOCK_BYTES: usize = 2 * MOST_POINTS * (size_of::<Point>() + size_of::<f32>());
+const MAX_BLOCK_BYTES: usize = 2 * MAX_POINTS * (size_of::<Point>() + size_of::<f32>());
 
 /// Appends scans to a segment, block by block. What no catalog names is nothing.
 pub(super) struct SegmentWriter {
@@ -45,22 +45,22 @@ impl SegmentWriter {
 
     /// Whether the next scan goes to another segment.
     pub(super) fn is_full(&self) -> bool {
-        self.bytes >= MOST_BYTES
+        self.bytes >= MAX_BYTES
     }
 
     /// Adds points to the scan.
     pub(super) fn push(&mut self, points: &[Point], intensities: Option<&[f32]>) -> Result<()> {
         let mut at = 0;
         while at < points.len() {
-            let count = (points.len() - at).min(MOST_POINTS - self.points.len());
-            if count == MOST_POINTS {
+            let count = (points.len() - at).min(MAX_POINTS - self.points.len());
+            if count == MAX_POINTS {
                 // A whole block need not be copied.
                 let some = at..at + count;
                 self.put(&points[some.clone()], intensities.map(|all| &all[some]))?;
             } else {
                 self.points.extend_from_slice(&points[at..at + count]);
                 self.intensities.extend_from_slice(intensities.map_or(&[], |all| &all[at..at + count]));
-                if self.points.len() == MOST_POINTS {
+                if self.points.len() == MAX_POINTS {
                     self.put_rest(intensities.is_some())?;
                 }
             }
@@ -218,7 +218,7 @@ impl SegmentScan {
         let [length, checksum] =
             [0, 4].map(|at| u32::from_le_bytes([frame[at], frame[at + 1], frame[at + 2], frame[at + 3]]));
         let length = length as usize;
-        if length == 0 || length > MOST_BLOCK_BYTES || length as u64 > self.input.limit() {
+        if length == 0 || length > MAX_BLOCK_BYTES || length as u64 > self.input.limit() {
             return Err(wrong("a block of no possible length"));
         }
         self.block.resize(length, 0);

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 pub struct SnapshotList(BTreeMap<SnapshotName, Option<u64>>);
 
 /// Most snapshots of a map: the list is part of `metadata.json`, which is read whole.
-pub(in crate::store) const MOST_SNAPSHOTS: usize = 4096;
+pub(in crate::store) const MAX_SNAPSHOTS: usize = 4096;
 
 impl SnapshotList {
     /// A list of one.

@@ -19,10 +19,10 @@ impl SnapshotName {
     ///
     /// A name that no snapshot may have.
     pub fn new(name: impl Into<String>) -> Result<Self> {
-        const MOST_LETTERS: usize = 64;
+        const MAX_LETTERS: usize = 64;
         let name = name.into();
         let is_letter = |letter: u8| letter.is_ascii_alphanumeric() || b"._-".contains(&letter);
-        let is_good = (1..=MOST_LETTERS).contains(&name.len())
+        let is_good = (1..=MAX_LETTERS).contains(&name.len())
             && name.bytes().all(is_letter)
             && !name.starts_with('.')
             && name != NOW;
@@ -30,7 +30,7 @@ impl SnapshotName {
             return Ok(Self(name));
         }
         let reason = format!(
-            "{name:?} cannot be a snapshot's name; 1 to {MOST_LETTERS} of A-Z a-z 0-9 . _ - can, beginning with no dot, \
+            "{name:?} cannot be a snapshot's name; 1 to {MAX_LETTERS} of A-Z a-z 0-9 . _ - can, beginning with no dot, \
              but for {NOW:?}, which is the map as it is"
         );
         Err(Error::argument("snapshot", reason))

@@ -2,7 +2,7 @@
 
 use super::seen_tables::SeenTables;
 use super::snapshot_file::Snapshot;
-use super::snapshot_list::{MOST_SNAPSHOTS, SnapshotList};
+use super::snapshot_list::{MAX_SNAPSHOTS, SnapshotList};
 use super::snapshot_name::SnapshotName;
 use crate::error::{Error, FormatError, Result};
 use crate::space::TileIndex;
@@ -110,8 +110,8 @@ impl TileStore {
             let hint = "choose another name, or delete that snapshot first";
             return Err(Error::AlreadyExists { path, hint });
         }
-        if listed.len() >= MOST_SNAPSHOTS {
-            let (size, limit) = (listed.len() as u64 + 1, MOST_SNAPSHOTS as u64);
+        if listed.len() >= MAX_SNAPSHOTS {
+            let (size, limit) = (listed.len() as u64 + 1, MAX_SNAPSHOTS as u64);
             let hint = "delete some first";
             return Err(Error::TooLarge { what: "the number of snapshots", size, limit, hint });
         }

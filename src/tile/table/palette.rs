@@ -46,7 +46,7 @@ struct Next {
 pub(crate) struct Full;
 
 const FIRST_LIMIT: usize = 1 << 10;
-const MOST_STATES: usize = 1 << 16;
+const MAX_STATES: usize = 1 << 16;
 
 fn most_after_miss(model: &SensorModel) -> f32 {
     (model.most_after_miss() as f32).next_up()
@@ -54,7 +54,7 @@ fn most_after_miss(model: &SensorModel) -> f32 {
 
 impl Default for Palette {
     fn default() -> Self {
-        Self::limited(FIRST_LIMIT, MOST_STATES)
+        Self::limited(FIRST_LIMIT, MAX_STATES)
     }
 }
 
@@ -77,7 +77,7 @@ impl Palette {
 
     /// A palette with the largest limit, until [`limit_by_use`](Self::limit_by_use).
     pub(crate) fn with_all_room() -> Self {
-        Self::limited(MOST_STATES, MOST_STATES)
+        Self::limited(MAX_STATES, MAX_STATES)
     }
 
     /// Sets the limit that would result if the states had come one by one.

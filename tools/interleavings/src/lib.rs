@@ -49,7 +49,7 @@ mod space {
 mod store {
     pub(crate) use voxtile::store::*;
 
-    pub(crate) const MOST_INPUTS: usize = 1000;
+    pub(crate) const MAX_INPUTS: usize = 1000;
 
     pub(crate) fn hex(bytes: &[u8]) -> String {
         bytes.iter().map(|byte| format!("{byte:02x}")).collect()

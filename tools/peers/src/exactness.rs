@@ -13,9 +13,9 @@ use workload::ScanReader;
 /// By how much OctoMap's log-odds, sums of `f32`, may differ.
 const TOLERANCE: f64 = 1e-3;
 /// Share of the voxels that must agree with OctoMap.
-const LEAST_AGREEMENT: f64 = 0.999;
+const MIN_AGREEMENT: f64 = 0.999;
 /// The same where every ray counts: a voxel differs if any of the many rays through it grazes it on one side only.
-const LEAST_AGREEMENT_PER_RAY: f64 = 0.99;
+const MIN_AGREEMENT_PER_RAY: f64 = 0.99;
 const TILE_SIZE_M: f64 = 10.0;
 
 /// Where a map differs from the naive one.
@@ -46,7 +46,7 @@ pub fn rows(
             continue;
         }
         eprintln!("{}: the naive map{what}", workload.name);
-        let least = if counting == Counting::PerRay { LEAST_AGREEMENT_PER_RAY } else { LEAST_AGREEMENT };
+        let least = if counting == Counting::PerRay { MIN_AGREEMENT_PER_RAY } else { MIN_AGREEMENT };
         let scans = if counting == Counting::PerScan { workload.exact_scans } else { 1 };
         let job = Job { workload, files, scans, counting };
         let naive = naive_map(&job)?;

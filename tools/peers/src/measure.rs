@@ -4,7 +4,7 @@ use crate::workloads::{Files, Workload};
 use anyhow::{Context, Result};
 
 /// Of all voxels and of all answers, so many may differ between the contenders (rays that graze a voxel's edge).
-const MOST_DIFFERENT: f64 = 1e-3;
+const MAX_DIFFERENT: f64 = 1e-3;
 
 /// The samples of a workload.
 #[derive(Default)]
@@ -44,7 +44,7 @@ pub fn rows(
     }
     for (what, pairs) in [("voxels", &samples.voxels), ("answers \"known\"", &samples.known_answers)] {
         let (octomap, voxtile) = (pairs.octomap(), pairs.voxtile());
-        if (octomap - voxtile).abs() > MOST_DIFFERENT * octomap.max(voxtile) {
+        if (octomap - voxtile).abs() > MAX_DIFFERENT * octomap.max(voxtile) {
             faults.push(format!("{}: {octomap} {what} of OctoMap, {voxtile} of voxtile", workload.name));
         }
     }

@@ -2,7 +2,7 @@ use tempfile::TempDir;
 
 /// What tests may need at once; containers often have 64 MiB.
 #[cfg(target_os = "linux")]
-const LEAST_FREE_BYTES: u64 = 1 << 30;
+const MIN_FREE_BYTES: u64 = 1 << 30;
 
 /// A temporary folder in memory where the system has room for it, else where temporary files are.
 ///
@@ -15,7 +15,7 @@ pub fn memory_folder() -> TempDir {
 #[cfg(target_os = "linux")]
 fn in_memory() -> Option<TempDir> {
     let room = rustix::fs::statvfs("/dev/shm").ok()?;
-    let is_roomy = room.f_bavail.saturating_mul(room.f_frsize) >= LEAST_FREE_BYTES;
+    let is_roomy = room.f_bavail.saturating_mul(room.f_frsize) >= MIN_FREE_BYTES;
     is_roomy.then(|| TempDir::new_in("/dev/shm").ok())?
 }
 

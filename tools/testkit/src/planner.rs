@@ -7,7 +7,7 @@ use voxtile_local::{LocalState, LocalView, Obstacle};
 /// Between the nodes of the search.
 const STEP_M: f64 = 0.4;
 /// Nodes that a search looks at before it gives up.
-const MOST_NODES: usize = 60_000;
+const MAX_NODES: usize = 60_000;
 /// Heights between which is flown.
 const HEIGHTS_M: [f64; 2] = [1.0, 4.0];
 
@@ -30,7 +30,7 @@ pub fn plan(view: &LocalView, from: Point, to: Point) -> Option<Vec<Point>> {
         if !closed.insert(node) {
             continue;
         }
-        if closed.len() > MOST_NODES {
+        if closed.len() > MAX_NODES {
             return None;
         }
         let cost = best[&node].0;

@@ -17,7 +17,7 @@ pub struct ScanReader<R> {
 }
 
 /// Room made at once for the points of a scan: the count in a damaged stream may be any.
-const MOST_RESERVED: usize = 1 << 20;
+const MAX_RESERVED: usize = 1 << 20;
 
 impl<W: Write> ScanWriter<W> {
     /// A writer to the stream of scans and, if wanted, that of intensities.
@@ -72,7 +72,7 @@ impl<R: BufRead> ScanReader<R> {
         self.scans.read_exact(&mut count).map_err(ends)?;
         let count = u32::from_le_bytes(count) as usize;
         let origin = read_point(&mut self.scans).map_err(ends)?;
-        let mut points = Vec::with_capacity(count.min(MOST_RESERVED));
+        let mut points = Vec::with_capacity(count.min(MAX_RESERVED));
         for _ in 0..count {
             points.push(read_point(&mut self.scans).map_err(ends)?);
         }

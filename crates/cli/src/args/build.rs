@@ -1,9 +1,9 @@
 use super::ReadArgs;
-use voxtile_pipeline::{FlushEvery, WhenBehind};
 use bytesize::ByteSize;
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 use voxtile::Storage;
+use voxtile_pipeline::{FlushEvery, WhenBehind};
 
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]

@@ -1,9 +1,9 @@
 use crate::args::{ColorName, PictureArgs, ViewName};
-use voxtile_pipeline::memory;
 use clap::ValueEnum;
 use serde::Serialize;
 use std::path::Path;
 use voxtile::space::Aabb;
+use voxtile_pipeline::memory;
 use voxtile_render::Drawn;
 
 /// What was drawn, for a program.

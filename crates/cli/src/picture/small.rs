@@ -8,14 +8,14 @@ use voxtile_render::Picture;
 /// Characters of a small picture, in columns and rows.
 const SIZE: [usize; 2] = [60, 20];
 /// Maps of more tiles or voxels take longer to read than somebody waits for a few lines.
-const MOST_TILES: usize = 2000;
-const MOST_VOXELS: u64 = 40_000_000;
+const MAX_TILES: usize = 2000;
+const MAX_VOXELS: u64 = 40_000_000;
 
 /// Whether a map is drawn in about a second.
 pub fn is_quick(map: &AnyMap) -> bool {
     let tiles = map.tile_indices();
     let voxels: u64 = tiles.iter().filter_map(|&tile| map.voxels_of_tile_hint(tile)).sum();
-    (1..=MOST_TILES).contains(&tiles.len()) && voxels <= MOST_VOXELS
+    (1..=MAX_TILES).contains(&tiles.len()) && voxels <= MAX_VOXELS
 }
 
 /// Draws a map from above, in a few lines of half blocks.

@@ -9,7 +9,6 @@ use crate::info::Info;
 use crate::json;
 use voxtile_pipeline::{AnyMap, MapAt, read_any_map};
 
-use voxtile_pipeline::memory;
 use crate::output_file::{OutputFile, is_standard_output};
 use crate::picture::{name_of, path_of};
 use crate::progress::Progress;
@@ -21,6 +20,7 @@ use voxtile::mapper::{MapReader, MapView};
 use voxtile::operations::{SnapshotInfo, snapshots};
 use voxtile::store::ScanRecord;
 use voxtile::{Error, TileIndex};
+use voxtile_pipeline::memory;
 use voxtile_pipeline::place::place_of;
 use voxtile_render::{Drawn, Picture, SideAxis, Survey, View};
 
@@ -67,9 +67,9 @@ enum Damage {
 const ABOVE_PX: [usize; 2] = [1400, 1400];
 const SIDE_PX: [usize; 2] = [1400, 500];
 /// Findings on the page; the others are counted.
-const MOST_FINDINGS: usize = 200;
+const MAX_FINDINGS: usize = 200;
 /// Tiles on the page.
-const MOST_TILES: usize = 10;
+const MAX_TILES: usize = 10;
 
 /// Writes the page; says where it is, on standard error unless `is_quiet` where standard output is the page.
 pub fn run(args: &ReportArgs, is_quiet: bool) -> anyhow::Result<ExitCode> {
@@ -167,7 +167,7 @@ impl Sizes {
             .collect();
         sizes.sort_by_key(|&(tile, bytes, _)| (std::cmp::Reverse(bytes), tile));
         let bytes = sizes.iter().rev().map(|&(_, bytes, _)| bytes).collect();
-        sizes.truncate(MOST_TILES);
+        sizes.truncate(MAX_TILES);
         Self { largest: sizes, bytes }
     }
 }
@@ -177,7 +177,7 @@ impl Damage {
         let progress = Progress::over_tiles(0);
         let mut findings = Vec::new();
         let found = |finding: &Finding| {
-            if findings.len() < MOST_FINDINGS {
+            if findings.len() < MAX_FINDINGS {
                 findings.push(finding.clone());
             }
         };

@@ -1,6 +1,6 @@
 use super::html::Text;
 use super::svg::{Bar, histogram};
-use super::{Content, Damage, MOST_FINDINGS, Report, Sizes};
+use super::{Content, Damage, MAX_FINDINGS, Report, Sizes};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use indicatif::{HumanBytes, HumanCount};
@@ -99,7 +99,7 @@ impl Report {
             writeln!(out, "<td>{}</td></tr>", Text(&finding.reason))?;
         }
         end_table(out)?;
-        let more = (verification.damage + verification.notes).saturating_sub(MOST_FINDINGS as u64);
+        let more = (verification.damage + verification.notes).saturating_sub(MAX_FINDINGS as u64);
         if more > 0 {
             let more = HumanCount(more);
             writeln!(out, "<p class=\"faint\">{more} more; <code>voxtile verify</code> lists all.</p>")?;

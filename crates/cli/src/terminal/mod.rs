@@ -30,7 +30,7 @@ const USUAL_CHARACTERS: [usize; 2] = [80, 24];
 /// Pixels of a character where the terminal does not tell.
 const CHARACTER_PX: [usize; 2] = [9, 18];
 /// A map narrower than this is drawn without a legend.
-const LEAST_LEGEND_PX: usize = 700;
+const MIN_LEGEND_PX: usize = 700;
 
 impl Protocol {
     /// What the command line forces.
@@ -87,7 +87,7 @@ impl Protocol {
             .filter(|pixels| pixels.iter().all(|&count| count > 0))
             .unwrap_or([columns * CHARACTER_PX[0], rows * CHARACTER_PX[1]]);
         let high = pixels[1] * lines / rows.max(1);
-        let has_legend = pixels[0] >= LEAST_LEGEND_PX + 100 && high >= 400;
+        let has_legend = pixels[0] >= MIN_LEGEND_PX + 100 && high >= 400;
         // Title, legend and margins take so much.
         let [across, up] = if has_legend { [40, 120] } else { [0; 2] };
         Room { map_px: [pixels[0] - across, high - up], has_legend }

@@ -4,7 +4,7 @@ use std::io::{self, Write};
 use voxtile_render::Image;
 
 /// Colors of a picture in sixels.
-const MOST_COLORS: usize = 256;
+const MAX_COLORS: usize = 256;
 
 /// Sixels: bands of six rows, each color of a band by itself. A hundred lines; the crates for it bring quantizers of
 /// photographs, which these few flat colors do not need.
@@ -73,7 +73,7 @@ impl Palette {
         let (bits, groups) = (2..=8)
             .rev()
             .map(|bits| (bits, groups(bits)))
-            .find(|(_, groups)| groups.len() <= MOST_COLORS)
+            .find(|(_, groups)| groups.len() <= MAX_COLORS)
             .unwrap_or_default();
         let numbers = groups.keys().copied().zip(0..).collect();
         let mean = |(sums, members): ([u64; 3], u64)| sums.map(|sum| (sum / members.max(1)) as u8);

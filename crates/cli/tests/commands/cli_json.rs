@@ -1,7 +1,6 @@
 use crate::cli::{output, scans, text, voxtile};
 use serde_json::Value;
 use std::fs;
-use std::path::Path;
 use tempfile::TempDir;
 
 /// The objects that a run prints on standard output, which must succeed.

@@ -16,7 +16,7 @@ pub struct Deskew<F> {
 /// Between two poses so far apart the sensor moves along a line.
 const POSE_PERIOD_NS: i64 = 1_000_000;
 /// Poses that are kept: those of a minute. Points with times at random would fill the memory otherwise.
-const MOST_POSES: usize = 1 << 16;
+const MAX_POSES: usize = 1 << 16;
 
 impl<F: FnMut(i64) -> Option<RigidPose>> Deskew<F> {
     /// For a cloud with its stamp, and where the sensor was then. `pose_at` says where the sensor was at another time,
@@ -64,7 +64,7 @@ impl<F: FnMut(i64) -> Option<RigidPose>> Deskew<F> {
 
     /// Where the sensor was at the start of a period.
     fn pose_of(&mut self, period: i64) -> Option<RigidPose> {
-        if self.poses.len() >= MOST_POSES {
+        if self.poses.len() >= MAX_POSES {
             self.poses.clear();
         }
         let Self { stamp_ns, pose_at, poses, .. } = self;

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 /// Digits that a number may have; more are an error, so that nothing overflows.
-const MOST_DIGITS: usize = 36;
+const MAX_DIGITS: usize = 36;
 
 /// The nanoseconds of a decimal text of units of `10^digits_per_unit` nanoseconds: 9 for seconds, 0 for nanoseconds.
 /// Digits beyond a nanosecond are rounded. `None` if it is not a number or beyond 292 years.
@@ -22,7 +22,7 @@ pub(crate) fn nanoseconds(text: &str, digits_per_unit: i32) -> Option<i64> {
     if (whole.is_empty() && fraction.is_empty()) || !is_number(whole) || !is_number(fraction) {
         return None;
     }
-    if whole.len() + fraction.len() > MOST_DIGITS {
+    if whole.len() + fraction.len() > MAX_DIGITS {
         return None;
     }
     let value: i128 = format!("{whole}{fraction}").parse().ok()?;

@@ -34,7 +34,7 @@ pub const TARGETS: [(&str, Target); 10] = [
 ];
 
 /// LAZ says a lot in few bytes: so many points of a cloud are enough.
-const MOST_POINTS: u64 = 2_000;
+const MAX_POINTS: u64 = 2_000;
 
 /// PLY in any of its encodings.
 pub fn ply(data: &[u8]) -> bool {
@@ -107,7 +107,7 @@ fn drain(source: &mut dyn CloudSource, bytes: usize) -> bool {
                         "{point:?}"
                     );
                     points += 1;
-                    if points < MOST_POINTS { Ok(()) } else { Err(Error::argument("points", "enough")) }
+                    if points < MAX_POINTS { Ok(()) } else { Err(Error::argument("points", "enough")) }
                 });
                 is_whole &= read.is_ok();
             }

@@ -54,7 +54,7 @@ pub(super) struct Node {
 /// Another number whenever nodes are made in another way.
 const HOW_NODES_ARE_MADE: u64 = 1;
 /// The coarsest level has no more voxels than this, so that it is there at once.
-const MOST_TOP_VOXELS: u64 = 4096;
+const MAX_TOP_VOXELS: u64 = 4096;
 
 impl Levels {
     /// Makes the coarse nodes of these tiles of a map, those that the store does not have yet, on all cores. `progress`
@@ -150,7 +150,7 @@ impl Levels {
             level = made.into_iter().flatten().map(|(key, node, _)| (key, node)).collect();
             levels.nodes.extend(level.iter().copied());
             let is_coarsest = level.first().is_none_or(|(key, _)| key.level == MAX_LEVEL);
-            if is_coarsest || (voxels <= MOST_TOP_VOXELS && is_small(&level)) {
+            if is_coarsest || (voxels <= MAX_TOP_VOXELS && is_small(&level)) {
                 levels.tops =
                     level.iter().filter(|(_, node)| node.is_occupied).map(|(key, _)| *key).collect();
                 levels.leave_out_empty_regions();

@@ -22,7 +22,7 @@ const HEADER_BYTES: usize = 64;
 /// Bytes of a voxel before they are compressed.
 const VOXEL_BYTES: usize = 5;
 /// More voxels than a node can have.
-const MOST_VOXELS: usize = 1 << 24;
+const MAX_VOXELS: usize = 1 << 24;
 /// The number of a scan that nobody knows.
 const NO_SCAN: u32 = u32::MAX;
 
@@ -70,7 +70,7 @@ pub(super) fn encode(head: &Head, cells: &Cells) -> Vec<u8> {
 pub(super) fn decode(compressed: &[u8]) -> io::Result<Cells> {
     let wrong = |reason| io::Error::new(io::ErrorKind::InvalidData, reason);
     let mut bytes = Vec::new();
-    let most = HEADER_BYTES + VOXEL_BYTES * MOST_VOXELS;
+    let most = HEADER_BYTES + VOXEL_BYTES * MAX_VOXELS;
     GzDecoder::new(compressed).take(most as u64).read_to_end(&mut bytes)?;
     let (head, voxels) =
         bytes.split_at_checked(HEADER_BYTES).ok_or_else(|| wrong("a node without a head"))?;

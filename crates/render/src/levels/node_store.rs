@@ -19,7 +19,7 @@ use voxtile::{Error, Result};
 const HEADER: [u8; 16] = *b"VXLEVELS\x01\0\0\0\0\0\0\0";
 const RECORD_BYTES: usize = 48;
 /// More bytes than a node can have.
-const MOST_BYTES: u32 = 1 << 27;
+const MAX_BYTES: u32 = 1 << 27;
 
 /// Nodes of any state of a map, in a file that may be kept for later or go with the program.
 pub struct NodeStore {
@@ -204,7 +204,7 @@ fn parse(record: &[u8]) -> Option<((NodeKey, u64), Stored)> {
     let version = u64::from(word(16)?) | u64::from(word(20)?) << 32;
     let bounds = [record.get(24..27)?.try_into().ok()?, record.get(27..30)?.try_into().ok()?];
     let (voxels, bytes) = (word(32)?, word(36)?);
-    (bytes <= MOST_BYTES).then_some(((key, version), Stored { offset: 0, bytes, bounds, voxels }))
+    (bytes <= MAX_BYTES).then_some(((key, version), Stored { offset: 0, bytes, bounds, voxels }))
 }
 
 impl std::fmt::Debug for NodeStore {

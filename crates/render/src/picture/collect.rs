@@ -37,7 +37,7 @@ pub(super) struct Known {
 }
 
 /// Tiles beyond which the cells are not made finer by a second look.
-const MOST_TILES_READ_TWICE: usize = 4096;
+const MAX_TILES_READ_TWICE: usize = 4096;
 
 impl Collected {
     /// Reads all tiles. If the box around what is known turns out to be so much smaller than its tiles that cells can
@@ -54,7 +54,7 @@ impl Collected {
         if let Some(found) = &known {
             let seen = found.frame.voxels_of(found.first, found.count);
             let finer = Frame::new(picture.view, seen, picture.most_px);
-            if finer.voxels_a_cell < found.frame.voxels_a_cell && tiles.len() <= MOST_TILES_READ_TWICE {
+            if finer.voxels_a_cell < found.frame.voxels_a_cell && tiles.len() <= MAX_TILES_READ_TWICE {
                 drop(known.take());
                 done.all.fetch_add(tiles.len() as u64, Ordering::Relaxed);
                 known = collector.collect(&tiles, seen, &done)?;

@@ -55,11 +55,11 @@ pub(super) struct Drawing<'a> {
 }
 
 /// The legend needs this width.
-const LEAST_WIDTH: usize = 760;
+const MIN_WIDTH: usize = 760;
 /// Pixels of a voxel in a picture of few.
 const LARGEST_ZOOM: usize = 48;
 /// Where there is nothing to draw.
-const EMPTY_SIZE: [usize; 2] = [LEAST_WIDTH, 240];
+const EMPTY_SIZE: [usize; 2] = [MIN_WIDTH, 240];
 
 impl Pane {
     fn size(&self) -> [usize; 2] {
@@ -284,7 +284,7 @@ impl<'a> Drawing<'a> {
             let length = length(pair);
             // A pixel a step, and no more than the longest line inside of the picture has.
             let parts =
-                (length * pane.zoom as f64).ceil().clamp(1.0, 4.0 * super::options::MOST_PX as f64) as usize;
+                (length * pane.zoom as f64).ceil().clamp(1.0, 4.0 * super::options::MAX_PX as f64) as usize;
             let parts = if length <= longest { parts } else { 1 };
             for part in 1..=parts {
                 let share = part as f64 / parts as f64;
@@ -341,7 +341,7 @@ impl Layout {
             let [width, height] = size;
             return Self { width, height, margin: 0, left: 0, top: 0, foot: height, dot: 1 };
         }
-        let inner = size[0].max(LEAST_WIDTH);
+        let inner = size[0].max(MIN_WIDTH);
         let dot = (inner / 480).clamp(2, 5);
         let margin = 10 * dot;
         let width = inner + 2 * margin;

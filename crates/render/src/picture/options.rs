@@ -22,7 +22,7 @@ pub struct Picture {
 }
 
 /// Most pixels along an edge of a map, which need 1.2 GB; more are cut to it.
-pub(super) const MOST_PX: usize = 8192;
+pub(super) const MAX_PX: usize = 8192;
 
 impl Default for Picture {
     fn default() -> Self {
@@ -64,7 +64,7 @@ impl Picture {
     /// Most pixels of the map to the right and up, 8192 at most; title and legend come on top. A small map is enlarged
     /// as far as whole pixels a voxel allow, of a large one a pixel covers many voxels.
     pub fn with_size_px(self, most_px: [usize; 2]) -> Self {
-        Self { most_px: most_px.map(|px| px.clamp(1, MOST_PX)), ..self }
+        Self { most_px: most_px.map(|px| px.clamp(1, MAX_PX)), ..self }
     }
 
     /// Whether the borders of tiles are drawn: of ten, a hundred where they would lie too close.

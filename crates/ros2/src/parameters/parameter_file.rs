@@ -7,7 +7,7 @@ use std::path::Path;
 
 /// The name under which ROS 2 keeps the parameters of a node.
 const PARAMETERS: &str = "ros__parameters";
-const MOST_BYTES: u64 = 1 << 20;
+const MAX_BYTES: u64 = 1 << 20;
 
 /// The parameters that a file has for a node, by their full names. Of two for one name the section counts that says
 /// more precisely which node it means: `/**`, then `/*`, then its name.
@@ -18,9 +18,9 @@ const MOST_BYTES: u64 = 1 << 20;
 pub fn read(path: &Path, node: &str) -> anyhow::Result<BTreeMap<String, Value>> {
     let mut text = String::new();
     let file = File::open(path).with_context(|| format!("cannot open {}", path.display()))?;
-    let bytes = file.take(MOST_BYTES + 1).read_to_string(&mut text);
+    let bytes = file.take(MAX_BYTES + 1).read_to_string(&mut text);
     let bytes = bytes.with_context(|| format!("cannot read {}", path.display()))?;
-    ensure!(bytes as u64 <= MOST_BYTES, "{}: more than {MOST_BYTES} bytes are no parameters", path.display());
+    ensure!(bytes as u64 <= MAX_BYTES, "{}: more than {MAX_BYTES} bytes are no parameters", path.display());
     of_text(&text, node).with_context(|| path.display().to_string())
 }
 

@@ -5,7 +5,7 @@ use std::io::{self, Cursor, Error, ErrorKind, Read, Seek, SeekFrom, Write};
 pub struct BoundedFile(Cursor<Vec<u8>>);
 
 /// Nobody gets a larger one over DDS.
-const MOST_BYTES: usize = 64 << 20;
+const MAX_BYTES: usize = 64 << 20;
 
 impl BoundedFile {
     pub fn into_bytes(self) -> Vec<u8> {
@@ -16,8 +16,8 @@ impl BoundedFile {
 impl Write for BoundedFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let end = self.0.position().saturating_add(bytes.len() as u64);
-        if end > MOST_BYTES as u64 {
-            let reason = format!("the octree has more than {MOST_BYTES} bytes: ask for a smaller box");
+        if end > MAX_BYTES as u64 {
+            let reason = format!("the octree has more than {MAX_BYTES} bytes: ask for a smaller box");
             return Err(Error::new(ErrorKind::FileTooLarge, reason));
         }
         self.0.write(bytes)
@@ -48,7 +48,7 @@ mod tests {
     fn it_refuses_what_is_too_much_and_keeps_what_it_has() {
         let mut file = BoundedFile::default();
         file.write_all(&[7; 3]).unwrap();
-        file.seek(SeekFrom::Start(MOST_BYTES as u64 - 1)).unwrap();
+        file.seek(SeekFrom::Start(MAX_BYTES as u64 - 1)).unwrap();
         assert_eq!(file.write(&[1; 2]).unwrap_err().kind(), ErrorKind::FileTooLarge);
         assert_eq!(file.into_bytes(), [7; 3]);
     }

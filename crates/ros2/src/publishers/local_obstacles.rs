@@ -1,4 +1,4 @@
-use super::occupied_voxels::MOST_VOXELS;
+use super::occupied_voxels::MAX_VOXELS;
 use crate::messages::{Header, PointCloud2};
 use anyhow::ensure;
 use voxtile::Aabb;
@@ -18,8 +18,8 @@ pub fn local_obstacles(
     let centers_m = view.points_in(region, obstacle);
     let count = centers_m.len();
     ensure!(
-        count <= MOST_VOXELS,
-        "{count} voxels, and a message has at most {MOST_VOXELS}: take a smaller --publish-radius"
+        count <= MAX_VOXELS,
+        "{count} voxels, and a message has at most {MAX_VOXELS}: take a smaller --publish-radius"
     );
     Ok(PointCloud2::of_points(header, centers_m))
 }

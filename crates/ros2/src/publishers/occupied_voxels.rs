@@ -4,7 +4,7 @@ use anyhow::bail;
 use voxtile::{Aabb, MapQueries, MapView, VoxelIndex};
 
 /// Most voxels of a message: nobody gets a larger one over DDS.
-pub(super) const MOST_VOXELS: usize = 4 << 20;
+pub(super) const MAX_VOXELS: usize = 4 << 20;
 const COLOR: Color = Color { r: 0.0, g: 0.0, b: 1.0, a: 1.0 };
 
 /// The occupied voxels of a region that reach between the heights.
@@ -22,14 +22,14 @@ pub fn occupied_voxels(
     map.for_each_occupied(None, Some(region), |voxel| {
         if extent.reaches(grid.center_m(voxel.index)[2], grid.resolution_m()) {
             count += 1;
-            if count <= MOST_VOXELS {
+            if count <= MAX_VOXELS {
                 voxels.push(voxel.index);
             }
         }
     })?;
-    if count > MOST_VOXELS {
+    if count > MAX_VOXELS {
         bail!(
-            "{count} occupied voxels, and a message has at most {MOST_VOXELS}: take a smaller --publish-radius"
+            "{count} occupied voxels, and a message has at most {MAX_VOXELS}: take a smaller --publish-radius"
         );
     }
     Ok(voxels)

@@ -4,7 +4,7 @@ use voxtile::query::Column;
 use voxtile::{Aabb, Grid, MapQueries, MapView};
 
 /// Most cells along an edge of a map without voxels, around the middle of its region: such a message comes through.
-const MOST_EMPTY_CELLS: f64 = 1000.0;
+const MAX_EMPTY_CELLS: f64 = 1000.0;
 
 /// The voxels of a region from above, cell by cell what `voxtile export` writes for nav2. Without voxels all of the
 /// region is unknown: nav2 takes no map without cells, and would keep the one before.
@@ -49,7 +49,7 @@ fn empty_cells(grid: &Grid, region: &Aabb, axis: usize) -> (f64, u32) {
     let middle_m = 0.5 * (least_m + most_m);
     // Of a region without an end there is none.
     let middle_m = if middle_m.is_finite() { middle_m } else { 0.0 };
-    let reach_m = (0.5 * (most_m - least_m)).min(0.5 * MOST_EMPTY_CELLS * edge_m);
+    let reach_m = (0.5 * (most_m - least_m)).min(0.5 * MAX_EMPTY_CELLS * edge_m);
     let first = ((middle_m - reach_m) / edge_m).floor();
     let end = ((middle_m + reach_m) / edge_m).ceil();
     (first * edge_m, (end - first).max(1.0) as u32)

@@ -13,11 +13,11 @@ pub struct PlacedOrder {
 pub struct Orders(SyncSender<PlacedOrder>);
 
 /// Orders that may wait; one more waits with its sender.
-const MOST_WAITING: usize = 16;
+const MAX_WAITING: usize = 16;
 
 /// Both ends of the way that orders take.
 pub fn orders() -> (Orders, Receiver<PlacedOrder>) {
-    let (sender, receiver) = sync_channel(MOST_WAITING);
+    let (sender, receiver) = sync_channel(MAX_WAITING);
     (Orders(sender), receiver)
 }
 

@@ -92,7 +92,7 @@ impl Hostile {
 /// layer.
 #[test]
 fn hostile_robots_take_no_more_than_the_limit_and_nothing_from_others() {
-    const MEMORY: usize = Receivers::<u8>::LEAST_BYTES;
+    const MEMORY: usize = Receivers::<u8>::MIN_BYTES;
     for seed in 0..2 {
         let mut receivers = Receivers::new(MEMORY).unwrap();
         // But for what a packet may take.
@@ -143,7 +143,7 @@ fn hostile_robots_take_no_more_than_the_limit_and_nothing_from_others() {
 /// Who came first and took all gives up what is beyond its part once somebody else needs it.
 #[test]
 fn who_has_most_makes_room_for_who_comes_later() {
-    let mut receivers = Receivers::new(Receivers::<u8>::LEAST_BYTES).unwrap();
+    let mut receivers = Receivers::new(Receivers::<u8>::MIN_BYTES).unwrap();
     let mut senders =
         [0_u8, 1].map(|robot| (robot, Sender::new(grid(), 1, SenderConfig::default()).unwrap()));
     for (robot, sender) in &mut senders {

@@ -40,7 +40,7 @@ const LOOKED_AT: usize = 48;
 /// Larger multiples have no exact products any more.
 const MOST: f64 = 2_251_799_813_685_248.0;
 /// How far a value may be from the product, in units of its last place: readers add offsets.
-const MOST_ULPS: u64 = 100;
+const MAX_ULPS: u64 = 100;
 
 /// A grid: multiples of a step, or parts of a unit. Readers multiply or divide, which differs in the last place.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -86,7 +86,7 @@ impl Grid {
         let steps = steps as i64;
         let of_steps = width.ordered(width.bits(self.value(steps)));
         let apart = width.ordered(width.bits(value)).wrapping_sub(of_steps) as i64;
-        let most = if width == Width::Narrow { 1 } else { MOST_ULPS };
+        let most = if width == Width::Narrow { 1 } else { MAX_ULPS };
         (apart.unsigned_abs() <= most).then_some((steps, apart as i8))
     }
 

@@ -22,7 +22,7 @@ pub(in crate::store) use point_decoder::PointDecoder;
 pub(in crate::store) use point_encoder::PointEncoder;
 
 /// Most points of a block.
-pub(in crate::store) const MOST_POINTS: usize = 1 << 16;
+pub(in crate::store) const MAX_POINTS: usize = 1 << 16;
 
 /// The first byte of a block.
 const VERSION: u8 = 1;

@@ -8,7 +8,7 @@ const LOOKED_AT: usize = 4096;
 /// Points that it must give to the bit before all are tried.
 const TRIED: usize = 24;
 /// Images have fewer pixels along an edge.
-const MOST_PIXELS: usize = 4096;
+const MAX_PIXELS: usize = 4096;
 /// How many decimals the numbers of a camera may have.
 const DECIMALS: [i32; 3] = [4, 6, 8];
 /// Two ratios nearer to each other than this are one.
@@ -26,7 +26,7 @@ pub(super) struct Pinhole {
 
 impl Pinhole {
     pub(super) fn new(focal: f64, center: f64) -> Self {
-        let directions = (0..MOST_PIXELS).map(|pixel| (pixel as f64 - center) / focal).collect();
+        let directions = (0..MAX_PIXELS).map(|pixel| (pixel as f64 - center) / focal).collect();
         Self { focal, center, directions }
     }
 
@@ -69,7 +69,7 @@ impl Pinhole {
             // Rounding tells by how many whole pixels the center is further on.
             // Pixels count from 0: what they are if the center were this part.
             let least = (-(first * focal + part)).ceil().max(0.0);
-            let mut centers = (0..MOST_PIXELS).map(|pixels| least + pixels as f64 + part);
+            let mut centers = (0..MAX_PIXELS).map(|pixels| least + pixels as f64 + part);
             let center = centers.find(|center| makes(focal, *center));
             if let Some(center) = center {
                 return Some(Self::new(focal, center));

@@ -14,7 +14,7 @@ const GROUPED: u8 = 3;
 /// Fast, and as small as the higher ones on what is left here.
 const LEVEL: i32 = 1;
 /// Groups of fewer bytes go together: each has a table of its own.
-const LEAST_GROUP: usize = 1024;
+const MIN_GROUP: usize = 1024;
 /// What such a table takes, about, in bytes.
 const TABLE_BYTES: f64 = 80.0;
 /// Bytes that vary more than this, in bits a byte, are stored.
@@ -168,7 +168,7 @@ struct Groups {
 impl Groups {
     fn of(above: &[u8]) -> Self {
         let counts = histogram(above);
-        let is_own = |byte: usize| counts[byte] as usize >= LEAST_GROUP;
+        let is_own = |byte: usize| counts[byte] as usize >= MIN_GROUP;
         let groups = (0..256).filter(|&byte| is_own(byte)).count() + 1;
         let (mut of_byte, mut starts, mut next, mut start) = ([groups as u16 - 1; 256], [0; 257], 0, 0);
         for byte in (0..256).filter(|&byte| is_own(byte)) {

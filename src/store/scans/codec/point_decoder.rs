@@ -1,7 +1,7 @@
 use super::column::ColumnReader;
 use super::planes::BlockInput;
 use super::words::Width;
-use super::{MOST_POINTS, VERSION};
+use super::{MAX_POINTS, VERSION};
 use crate::error::FormatError;
 use crate::space::Point;
 use std::fmt;
@@ -36,7 +36,7 @@ impl PointDecoder {
             _ => return Err(input.wrong("a block of points with unknown columns")),
         };
         let count = input.number()?;
-        if count > MOST_POINTS {
+        if count > MAX_POINTS {
             return Err(input.wrong("a block of too many points"));
         }
         let Self { columns, values: [z, x, y] } = self;

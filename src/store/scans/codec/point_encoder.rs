@@ -14,7 +14,7 @@ pub(in crate::store) struct PointEncoder {
 }
 
 impl PointEncoder {
-    /// Appends a block of at most [`MOST_POINTS`](super::MOST_POINTS) points, with their intensities if they have any.
+    /// Appends a block of at most [`MAX_POINTS`](super::MAX_POINTS) points, with their intensities if they have any.
     ///
     /// # Errors
     ///

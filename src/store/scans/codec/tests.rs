@@ -46,7 +46,7 @@ fn turn(points: usize, state: &mut u64) -> Vec<Point> {
 #[test]
 fn blocks_of_every_kind_come_back_to_the_bit() {
     let state = &mut 1;
-    for points in [0, 1, 2, 5, 255, 4096, MOST_POINTS] {
+    for points in [0, 1, 2, 5, 255, 4096, MAX_POINTS] {
         let turn = turn(points, state);
         let narrow: Vec<Point> = turn.iter().map(|point| point.map(|x| f64::from(x as f32))).collect();
         let millimetres: Vec<Point> =
@@ -93,7 +93,7 @@ fn depth_images_are_stored_as_pixels() {
                 points.push([direction[0] * z, direction[1] * z, z]);
             }
         }
-        points.truncate(MOST_POINTS);
+        points.truncate(MAX_POINTS);
         let a_point = round_trip(&points, None) as f64 / points.len() as f64;
         assert!(a_point < 2.5, "{a_point} bytes a point");
     }
@@ -152,7 +152,7 @@ proptest! {
         block.extend(&bytes);
         let (mut points, mut intensities) = (Vec::new(), Vec::new());
         let _ = PointDecoder::default().decode(&block, &mut points, &mut intensities);
-        prop_assert!(points.len() <= MOST_POINTS);
+        prop_assert!(points.len() <= MAX_POINTS);
     }
 }
 
@@ -180,8 +180,8 @@ fn a_table_of_real_sets() {
         let (mut encoder, mut decoder) = (PointEncoder::default(), PointDecoder::default());
         let (mut count, mut bytes, mut encoding_s, mut decoding_s) = (0, 0, 0.0, 0.0);
         while let Some(scan) = source.next_scan().unwrap() {
-            for (number, points) in scan.points_in_sensor.chunks(MOST_POINTS).enumerate() {
-                let first = number * MOST_POINTS;
+            for (number, points) in scan.points_in_sensor.chunks(MAX_POINTS).enumerate() {
+                let first = number * MAX_POINTS;
                 let of_points = scan.intensities.as_ref().map(|all| &all[first..first + points.len()]);
                 let (mut block, began) = (Vec::new(), Instant::now());
                 encoder.encode(points, of_points, &mut block).unwrap();

@@ -13,7 +13,7 @@ use std::io;
 const GROUP_VOXELS: usize = 1 << 15;
 
 /// What a reader takes; version 1 was written so.
-pub(super) const MOST_GROUP_VOXELS: usize = (1 << 16) + BRICK_VOXELS - 1;
+pub(super) const MAX_GROUP_VOXELS: usize = (1 << 16) + BRICK_VOXELS - 1;
 
 /// Most bricks of a group.
 pub(super) const GROUP_BRICKS: usize = 1 << 10;

@@ -1,6 +1,6 @@
 use super::column_reader::{Column, ColumnReader};
 use super::columns::{STATE_BYTES, state_at};
-use super::group::{GROUP_BRICKS, MOST_GROUP_VOXELS};
+use super::group::{GROUP_BRICKS, MAX_GROUP_VOXELS};
 use super::input::Input;
 use super::numbers::take_number;
 use super::symbol::{RARE, Symbols};
@@ -42,7 +42,7 @@ impl Columns {
         const STEP_BYTES: usize = 6;
         self.offset = input.offset;
         let bricks = input.number("bricks of a group", GROUP_BRICKS.min(room.bricks))?;
-        let voxels = room.voxels.min(MOST_GROUP_VOXELS).min(bricks * BRICK_VOXELS);
+        let voxels = room.voxels.min(MAX_GROUP_VOXELS).min(bricks * BRICK_VOXELS);
         self.bricks = bricks;
         let column = |name, most, bytes| Column { name, most, bytes };
         column_reader.take_columns(

@@ -25,14 +25,14 @@ const FLUSH_EVERY_SCANS_SHORT: usize = 100;
 /// Scans of a round, a metre a second.
 const SCANS_PER_ROUND: usize = 24_000;
 /// The last part by the middle one, in which everything has been seen often.
-const MOST_GROWTH: f64 = 1.05;
+const MAX_GROWTH: f64 = 1.05;
 /// The same of bytes on disk: counts of observations go on to grow, and with them the number of different states in a
 /// tile, ever more slowly.
-const MOST_DISK_GROWTH: f64 = 1.25;
+const MAX_DISK_GROWTH: f64 = 1.25;
 /// The same of a short day, whose voxels have not been seen often enough to stay as they are.
-const MOST_GROWTH_SHORT: f64 = 1.5;
+const MAX_GROWTH_SHORT: f64 = 1.5;
 /// The same of times.
-const MOST_SLOWER: f64 = 1.15;
+const MAX_SLOWER: f64 = 1.15;
 
 pub fn answer(setting: &Setting) -> Result<Findings> {
     // The short day has as many rounds as fit: its robot is 96 times as fast.
@@ -58,7 +58,7 @@ pub fn answer(setting: &Setting) -> Result<Findings> {
     let found = day.clone().apart()?;
     let mut findings = Findings::default();
     findings.keep(&day, &found)?;
-    let most_growth = setting.size([MOST_GROWTH, MOST_DISK_GROWTH], [MOST_GROWTH_SHORT; 2]);
+    let most_growth = setting.size([MAX_GROWTH, MAX_DISK_GROWTH], [MAX_GROWTH_SHORT; 2]);
     findings.promises.extend(promises(&found, scans, most_growth)?);
     findings.answer.tables = vec![table(&day, &found)];
     findings.answer.plots = vec![plot(&found)];
@@ -84,7 +84,7 @@ fn promises(
         growth("bytes on disk", most_disk_growth, |part| part.map_bytes as f64),
         growth("bytes of the log of commits", most_growth, |part| part.log_bytes as f64),
         Promise::new("scans that are not in the map", missing, Wanted::AtMost(0.0), ""),
-        Promise::about_time(slower, last.cpu_ms / middle.cpu_ms, Wanted::AtMost(MOST_SLOWER), ""),
+        Promise::about_time(slower, last.cpu_ms / middle.cpu_ms, Wanted::AtMost(MAX_SLOWER), ""),
     ])
 }
 
@@ -170,7 +170,7 @@ mod tests {
         };
         let parts = vec![part(0.1), part(1.0), part(1.2)];
         let found = DayFound { parts, peak_resident_bytes: 0, scan_number: 30 };
-        let most = [MOST_GROWTH, MOST_DISK_GROWTH];
+        let most = [MAX_GROWTH, MAX_DISK_GROWTH];
         let kept: Vec<bool> = promises(&found, 30, most).unwrap().iter().map(Promise::is_kept).collect();
         assert_eq!(kept, [false, true, true, false, true, false]);
         assert!(promises(&DayFound { parts: vec![], ..found }, 30, most).is_err());

@@ -14,9 +14,9 @@ use workload::SurveyName;
 /// Scans that are made before they are inserted one after another.
 const SCANS_AT_A_TIME: usize = 50;
 /// Cost of the last stretch by that of the second.
-const MOST_GROWTH: f64 = 1.15;
+const MAX_GROWTH: f64 = 1.15;
 /// Slow scans by the median.
-const MOST_SLOW: f64 = 3.0;
+const MAX_SLOW: f64 = 3.0;
 /// Windows of a plot.
 const WINDOWS: usize = 40;
 
@@ -70,12 +70,12 @@ fn promises(case: &str, built: &Built, stretch_m: f64) -> Vec<Promise> {
         let [second, last] = [stretch(built, stretch_m, 1), last_stretch(built, stretch_m)];
         let growth = mean(last, time_of) / mean(second, time_of);
         let what = format!("{case}: {clock} of a scan, last stretch by second");
-        Promise::about_time(what, growth, Wanted::AtMost(MOST_GROWTH), "")
+        Promise::about_time(what, growth, Wanted::AtMost(MAX_GROWTH), "")
     });
     let wall_ms = samples(evicting(built), |scan| scan.wall_ms);
     let slow = wall_ms.quantile(0.99) / wall_ms.median();
     let what = format!("{case}: wall of the 99th percentile by the median, while tiles are pushed out");
-    growth.into_iter().chain([Promise::about_time(what, slow, Wanted::AtMost(MOST_SLOW), "")]).collect()
+    growth.into_iter().chain([Promise::about_time(what, slow, Wanted::AtMost(MAX_SLOW), "")]).collect()
 }
 
 /// The scans of a stretch of the way, the first being 0.

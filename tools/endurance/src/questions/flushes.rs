@@ -13,11 +13,11 @@ use voxtile::Storage;
 use workload::SurveyName;
 
 /// Worst of a thousand calls by their median.
-const MOST_BY_MEDIAN: f64 = 4.0;
+const MAX_BY_MEDIAN: f64 = 4.0;
 /// Worst of all calls, those that flush among them, in milliseconds.
-const MOST_MS: f64 = 100.0;
+const MAX_MS: f64 = 100.0;
 /// CPU time by that of flushes that stop the mapper.
-const MOST_CPU: f64 = 1.1;
+const MAX_CPU: f64 = 1.1;
 /// What the slow disk moves in a second, reads and writes together.
 const SLOW: DiskSpeed = DiskSpeed::BytesPerSecond(40e6);
 /// As the command has it.
@@ -62,9 +62,9 @@ pub fn answer(setting: &Setting) -> Result<Findings> {
             Promise::about_time(format!("{disk}: {what}"), found, Wanted::AtMost(wanted), unit)
         };
         findings.promises.extend([
-            promise("p99.9 of a scan by the median", by_median, MOST_BY_MEDIAN, ""),
-            promise("longest call", beside.insert_ms(1.0).max(beside.flush_ms()), MOST_MS, "ms"),
-            promise("CPU time by that of flushes that stop", cpu, MOST_CPU, ""),
+            promise("p99.9 of a scan by the median", by_median, MAX_BY_MEDIAN, ""),
+            promise("longest call", beside.insert_ms(1.0).max(beside.flush_ms()), MAX_MS, "ms"),
+            promise("CPU time by that of flushes that stop", cpu, MAX_CPU, ""),
         ]);
         let differ = f64::from(u8::from(stopped.built.digest != beside.built.digest));
         let what = format!("{disk}: digests that differ from that of flushes that stop");

@@ -11,7 +11,7 @@ use std::fs;
 use workload::SurveyName;
 
 /// How many times the CPU time without a limit a map may take within one.
-const MOST_TIMES_CPU: f64 = 4.0;
+const MAX_TIMES_CPU: f64 = 4.0;
 
 pub fn answer(setting: &Setting) -> Result<Findings> {
     let mut findings = Findings::default();
@@ -49,7 +49,7 @@ pub fn answer(setting: &Setting) -> Result<Findings> {
             Promise::about_time(
                 format!("{}: CPU time by that without a limit", hard.name),
                 times,
-                Wanted::AtMost(MOST_TIMES_CPU),
+                Wanted::AtMost(MAX_TIMES_CPU),
                 "x",
             ),
         ]);

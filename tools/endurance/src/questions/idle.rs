@@ -10,7 +10,7 @@ use report::{Cell, Table};
 use workload::SurveyName;
 
 /// Share of a core, in percent: what the clock itself cannot tell from nothing.
-const MOST_PERCENT: f64 = 0.1;
+const MAX_PERCENT: f64 = 0.1;
 
 pub fn answer(setting: &Setting) -> Result<Findings> {
     let case = made_up("drive", (SurveyName::Drive, RAYS, 60), [0.1, 5.0, 60.0]);
@@ -25,7 +25,7 @@ pub fn answer(setting: &Setting) -> Result<Findings> {
     findings.keep(&idle, &idled)?;
     let percent = 100.0 * idled.cpu_s / idled.wall_s;
     let what = "share of a core that a mapper with nothing to do takes";
-    findings.promises = vec![Promise::new(what, percent, Wanted::AtMost(MOST_PERCENT), "%")];
+    findings.promises = vec![Promise::new(what, percent, Wanted::AtMost(MAX_PERCENT), "%")];
     let caption = format!(
         "CPU time of all threads of a mapper that has taken scans, is not flushed, and then waits; {}, limit {} MiB.",
         case.description(),

@@ -15,12 +15,12 @@ use workload::SurveyName;
 /// What the slow disk moves in a second, reads and writes together.
 const SLOW_BYTES_PER_S: f64 = 40e6;
 /// Bytes of a map's files with the original storage by those with compact storage.
-const LEAST_SMALLER: f64 = 8.0;
+const MIN_SMALLER: f64 = 8.0;
 /// The limit beside none, in MiB: a fraction of each map.
 const LIMIT_MIB: usize = 64;
 const SHORT_LIMIT_MIB: usize = 24;
 /// Wall time with compact storage by that with the original: what repeated runs differ by is no loss.
-const MOST_TIME: f64 = 1.05;
+const MAX_TIME: f64 = 1.05;
 
 /// Builds of one map that differ in storage alone, the original first.
 struct Measured {
@@ -113,14 +113,14 @@ impl Measured {
             Promise::new(
                 format!("{what}: the map's files, octomap by compact"),
                 smaller,
-                Wanted::AtLeast(LEAST_SMALLER),
+                Wanted::AtLeast(MIN_SMALLER),
                 "",
             ),
             Promise::new(format!("{what}: digests that differ"), differ, Wanted::AtMost(0.0), ""),
             Promise::about_time(
                 format!("{what}: wall time, compact by octomap"),
                 time,
-                Wanted::AtMost(MOST_TIME),
+                Wanted::AtMost(MAX_TIME),
                 "",
             ),
         ]

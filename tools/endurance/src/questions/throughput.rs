@@ -16,7 +16,7 @@ use workload::SurveyName;
 /// Parts of the working set that are given, and the share of the speed without a limit that is wanted then.
 const PARTS: [(f64, f64); 2] = [(4.0, 0.60), (10.0, 0.35)];
 /// Bytes written by bytes of the map's files.
-const MOST_WRITTEN: f64 = 4.0;
+const MAX_WRITTEN: f64 = 4.0;
 /// What the slow disk moves in a second, reads and writes together.
 const SLOW_BYTES_PER_S: f64 = 40e6;
 
@@ -134,7 +134,7 @@ impl Measured {
                 Promise::new(
                     format!("{what}: bytes written by bytes of the map"),
                     written,
-                    Wanted::AtMost(MOST_WRITTEN),
+                    Wanted::AtMost(MAX_WRITTEN),
                     "",
                 ),
             ]

@@ -21,7 +21,7 @@ type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<Axis, Axis>>;
 
 const PANEL_PIXELS: (u32, u32) = (380, 290);
 const LEGEND_PIXELS: u32 = 30;
-const MOST_PANELS_A_ROW: usize = 3;
+const MAX_PANELS_A_ROW: usize = 3;
 /// Colors that those who do not tell red from green tell apart (Okabe and Ito).
 const COLORS: [RGBColor; 8] = [
     RGBColor(213, 94, 0),
@@ -45,7 +45,7 @@ impl Plot {
     fn svg(&self) -> Result<String> {
         let columns = match self.panels.len() {
             4 => 2,
-            count => count.clamp(1, MOST_PANELS_A_ROW),
+            count => count.clamp(1, MAX_PANELS_A_ROW),
         };
         let rows = self.panels.len().div_ceil(columns).max(1);
         let width = (PANEL_PIXELS.0 * columns as u32).max(self.legend_pixels());

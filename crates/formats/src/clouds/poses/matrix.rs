@@ -2,7 +2,7 @@ use crate::clouds::pose::RigidPose;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 
 /// How far a matrix may be from a rotation: files round to a few digits.
-const MOST_ERROR: f64 = 1e-2;
+const MAX_ERROR: f64 = 1e-2;
 
 /// The pose of a row-major matrix of 3x4 or 4x4.
 pub(crate) fn matrix_of(numbers: &[f64]) -> Result<RigidPose, String> {
@@ -21,7 +21,7 @@ pub(crate) fn matrix_of(numbers: &[f64]) -> Result<RigidPose, String> {
     let &[a, b, c, x, d, e, f, y, g, h, i, z] = rows else { return Err("the matrix is not 3x4".into()) };
     let matrix = Matrix3::new(a, b, c, d, e, f, g, h, i);
     let error = (matrix * matrix.transpose() - Matrix3::identity()).abs().max();
-    if !(error < MOST_ERROR && matrix.determinant() > 0.0) {
+    if !(error < MAX_ERROR && matrix.determinant() > 0.0) {
         return Err(format!(
             "the matrix is no rotation (it is {error:.3} off, determinant {:.3})",
             matrix.determinant()

@@ -12,7 +12,7 @@ const NO_ARRAY: &str = "is no array of NumPy, which its name says: save it with 
                         name that ends with .txt or .csv";
 const CUT_HEADER: &str = "the file ends within its header; copy or save it again";
 /// A longer header is an error.
-const MOST_HEADER_BYTES: usize = 1 << 16;
+const MAX_HEADER_BYTES: usize = 1 << 16;
 
 /// Whether a file that starts like this is an array of NumPy, or is named as one.
 pub(super) fn is_npy(path: &Path, head: &[u8]) -> bool {
@@ -38,7 +38,7 @@ pub(super) fn read(path: &Path, mut input: PoseInput, poses: &mut PoseRows) -> R
     let length_bytes = if is_long { &mut length[..] } else { &mut length[..2] };
     input.read_exact(length_bytes).map_err(|_| wrong(8, CUT_HEADER.into()))?;
     let header_bytes = u32::from_le_bytes(length) as usize;
-    if header_bytes > MOST_HEADER_BYTES {
+    if header_bytes > MAX_HEADER_BYTES {
         return Err(wrong(8, format!("a header of {header_bytes} bytes is no header")));
     }
     let mut header = vec![0; header_bytes];

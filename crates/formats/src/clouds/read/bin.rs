@@ -15,7 +15,7 @@ const GLANCE_BYTES: usize = 1000 * 4 * NUSCENES.len();
 /// Points that say nothing of their columns are no more than this.
 const FEW_POINTS: usize = 16;
 /// More columns than any sensor has.
-const MOST_FIELDS: usize = 256;
+const MAX_FIELDS: usize = 256;
 
 /// The points of a file of floats without a header.
 struct BinPoints {
@@ -39,10 +39,10 @@ pub(super) fn open(
         None => KITTI.map(str::to_owned).into(),
     };
     let list = fields.join(", ");
-    if fields.len() > MOST_FIELDS {
+    if fields.len() > MAX_FIELDS {
         return Err(Error::argument(
             "fields",
-            format!("{} names; at most {MOST_FIELDS} are possible", fields.len()),
+            format!("{} names; at most {MAX_FIELDS} are possible", fields.len()),
         ));
     }
     let meaning = Meaning::of(&fields, |_| false)

@@ -20,7 +20,7 @@ struct ImageFrames {
 /// Units of a depth image in a metre: millimetres.
 const SCALE: f64 = 1000.0;
 /// A file of a pose is small.
-const MOST_POSE_BYTES: u64 = 1 << 14;
+const MAX_POSE_BYTES: u64 = 1 << 14;
 
 /// Opens a folder of depth images.
 pub(super) fn open(
@@ -70,7 +70,7 @@ fn pose(path: &Path) -> Result<Option<RigidPose>> {
     use std::io::Read;
     let mut text = String::new();
     std::fs::File::open(path)
-        .and_then(|file| file.take(MOST_POSE_BYTES).read_to_string(&mut text))
+        .and_then(|file| file.take(MAX_POSE_BYTES).read_to_string(&mut text))
         .map_err(|error| Error::io(path, "read", error))?;
     let wrong = |reason: String| Error::format(path, Place::Line(1), reason);
     let mut numbers = Vec::new();

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 pub(super) type OpenFile = Box<dyn Fn(&PathBuf) -> Result<Box<dyn CloudSource>> + Send>;
 
 /// Remarks that are kept; a folder may have a million files.
-const MOST_REMARKS: usize = 20;
+const MAX_REMARKS: usize = 20;
 
 /// The clouds of all files of a folder, one file open at a time.
 pub(super) struct Files {
@@ -44,9 +44,9 @@ impl Files {
     }
 
     fn remark(&mut self, remark: String) {
-        if self.remarks.len() < MOST_REMARKS {
+        if self.remarks.len() < MAX_REMARKS {
             self.remarks.push(remark);
-        } else if self.remarks.len() == MOST_REMARKS {
+        } else if self.remarks.len() == MAX_REMARKS {
             self.remarks.push("there is more to say of other files".into());
         }
     }

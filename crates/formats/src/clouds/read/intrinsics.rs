@@ -15,7 +15,7 @@ pub struct Intrinsics {
 /// Where a data set keeps its camera.
 const NAMES: [&str; 3] = ["camera-intrinsics.txt", "intrinsics.txt", "camera.txt"];
 /// More numbers than any form has.
-const MOST_NUMBERS: usize = 64;
+const MAX_NUMBERS: usize = 64;
 
 impl Intrinsics {
     /// A camera of `fx fy cx cy`.
@@ -46,7 +46,7 @@ impl Intrinsics {
             for word in line.split([' ', '\t', ',', ';']).filter(|word| !word.is_empty()) {
                 numbers.push(word.parse().map_err(|_| lines.error(format!("`{word:.40}` is not a number")))?);
             }
-            if numbers.len() > MOST_NUMBERS {
+            if numbers.len() > MAX_NUMBERS {
                 break;
             }
         }

@@ -42,10 +42,10 @@ const HEADER_BYTES: usize = 375;
 /// Three scales and three offsets.
 const SCALES_AT: usize = 131;
 /// Neither scales nor offsets are as large: a hundred times the way to the sun.
-const MOST_COORDINATE: f64 = 1e13;
+const MAX_COORDINATE: f64 = 1e13;
 /// Records of more bytes, and more of them, have nothing to do with coordinates.
-const MOST_RECORD_BYTES: u64 = 1 << 20;
-const MOST_RECORDS: u32 = 10_000;
+const MAX_RECORD_BYTES: u64 = 1 << 20;
+const MAX_RECORDS: u32 = 10_000;
 
 impl Layout {
     pub(super) fn read(path: &Path, file: &mut File) -> Result<Self> {
@@ -113,7 +113,7 @@ impl Layout {
     ) -> io::Result<()> {
         let head_bytes = 52 + wide as u64;
         let mut at = start;
-        for _ in 0..count.min(u64::from(MOST_RECORDS)) {
+        for _ in 0..count.min(u64::from(MAX_RECORDS)) {
             if at.checked_add(head_bytes).is_none_or(|behind| behind > end) {
                 break;
             }
@@ -133,7 +133,7 @@ impl Layout {
                 _ => false,
             };
             // Of equal records the first counts.
-            if is_wanted && bytes <= MOST_RECORD_BYTES && self.record_of(&user, id).is_none() {
+            if is_wanted && bytes <= MAX_RECORD_BYTES && self.record_of(&user, id).is_none() {
                 let mut data = Vec::new();
                 (&mut *file).take(bytes).read_to_end(&mut data)?;
                 self.records.push(Record { user, id, data });
@@ -214,7 +214,7 @@ fn check_scales(header: &[u8]) -> std::result::Result<(), (u64, String)> {
     for (k, axis) in ["x", "y", "z", "x", "y", "z"].into_iter().enumerate() {
         let (at, what) = (SCALES_AT + 8 * k, if k < 3 { "scale" } else { "offset" });
         let value = f64::from_bits(number(header, at, 8));
-        if !(value.abs() < MOST_COORDINATE && (value != 0.0 || what == "offset")) {
+        if !(value.abs() < MAX_COORDINATE && (value != 0.0 || what == "offset")) {
             return Err((at as u64, format!("the {what} of {axis} is {value}: no coordinates come of it")));
         }
     }

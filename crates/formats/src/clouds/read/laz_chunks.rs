@@ -13,9 +13,9 @@ use std::path::Path;
 
 /// Most bytes of a point before it is compressed: formats need 67, the rest are extra bytes, each with models of its
 /// own in memory.
-const MOST_POINT_BYTES: u64 = 1024;
+const MAX_POINT_BYTES: u64 = 1024;
 /// Most parts of a point: position, time, colour, wave packet, extra bytes.
-const MOST_ITEMS: usize = 5;
+const MAX_ITEMS: usize = 5;
 /// Points in one stream, without chunks.
 const POINT_WISE: u64 = 1;
 /// Points in chunks, whose fields are apart: each chunk says how many bytes every field takes.
@@ -40,11 +40,10 @@ pub(super) fn check(path: &Path, file: &File, layout: &Layout, budget: &Budget) 
         guarded(|| LazVlr::from_buffer(description).map(|laz| (number(description, 0, 2), laz)));
     let (compressor, laz) = description.map_err(|reason| wrong(100, reason))?;
     let point_bytes: u64 = laz.items().iter().map(|item| u64::from(item.size())).sum();
-    if laz.items().len() > MOST_ITEMS || point_bytes != layout.record_bytes || point_bytes > MOST_POINT_BYTES
-    {
+    if laz.items().len() > MAX_ITEMS || point_bytes != layout.record_bytes || point_bytes > MAX_POINT_BYTES {
         let reason = format!(
             "points of {} bytes are compressed as {} parts of {point_bytes} bytes: these must be as many, and at most \
-             {MOST_POINT_BYTES}",
+             {MAX_POINT_BYTES}",
             layout.record_bytes,
             laz.items().len()
         );

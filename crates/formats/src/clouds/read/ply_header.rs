@@ -46,7 +46,7 @@ pub(super) struct Header {
 }
 
 /// A longer header is an error.
-const MOST_HEADER_BYTES: u64 = 1 << 20;
+const MAX_HEADER_BYTES: u64 = 1 << 20;
 
 impl Header {
     pub(super) fn read(path: &Path, input: &mut impl BufRead) -> Result<Self> {
@@ -55,7 +55,7 @@ impl Header {
         let mut line = Vec::new();
         loop {
             line.clear();
-            let left = MOST_HEADER_BYTES - header.bytes;
+            let left = MAX_HEADER_BYTES - header.bytes;
             let read = (&mut *input).take(left).read_until(b'\n', &mut line);
             header.bytes += read.map_err(|error| Error::io(path, "read", error))? as u64;
             header.lines += 1;

@@ -1,5 +1,5 @@
 use super::bag1_record::{Record, RecordKind};
-use super::chunk::{ChunkPlace, MOST_CHUNK_BYTES, MessagePlace, OpenChunk, decompress, plain};
+use super::chunk::{ChunkPlace, MAX_CHUNK_BYTES, MessagePlace, OpenChunk, decompress, plain};
 use super::chunk_file::{ChunkFile, Shares, TakeMessage, Walk, check_chunks};
 use super::chunk_order::{ChunkOrder, Step};
 use super::file_bytes::FileBytes;
@@ -28,7 +28,7 @@ const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
 /// A longer header of a record is damage.
 const MAX_HEADER_BYTES: u64 = 1 << 16;
 /// A longer connection, which has the definition of a message, or place of a chunk is damage.
-const MOST_RECORD_BYTES: u64 = 4 << 20;
+const MAX_RECORD_BYTES: u64 = 4 << 20;
 /// Most connections of a recording: publishers of topics. Others are left out.
 const MAX_CONNECTIONS: usize = 1 << 16;
 
@@ -94,7 +94,7 @@ impl Bag1 {
         let data_at = offset + 8 + header_bytes;
         let Some(mut record) = Record::of(fields) else { return Ok(None) };
         if matches!(record.op, Some(RecordKind::Connection | RecordKind::ChunkInfo)) {
-            if data_bytes > MOST_RECORD_BYTES {
+            if data_bytes > MAX_RECORD_BYTES {
                 return Ok(None);
             }
             record.data = self.file.read_at(data_at, data_bytes)?;
@@ -225,7 +225,7 @@ impl Bag1 {
             };
             let len = end - data_at;
             if record.op == Some(RecordKind::Connection) {
-                let data_bytes = if len > MOST_RECORD_BYTES { 0 } else { len as usize };
+                let data_bytes = if len > MAX_RECORD_BYTES { 0 } else { len as usize };
                 let data = bytes.piece(data_at, data_bytes, &mut window)?.unwrap_or_default();
                 // What a broken chunk says of a connection may be wrong.
                 let is_known = record.u32("conn").is_some_and(|id| self.connections.contains_key(&id));
@@ -283,7 +283,7 @@ impl ChunkFile for Bag1 {
         let compression = record.text("compression").unwrap_or_default();
         let data_at = place.offset + 8 + record.header_bytes;
         let data_bytes = end.saturating_sub(data_at);
-        if claimed.max(data_bytes) > MOST_CHUNK_BYTES {
+        if claimed.max(data_bytes) > MAX_CHUNK_BYTES {
             let reason =
                 "a chunk of more than 1 GiB is not read; record smaller ones (rosbag record --chunksize)";
             return Err(wrong(reason.into()));

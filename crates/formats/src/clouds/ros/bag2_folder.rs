@@ -1,5 +1,5 @@
 use super::bag2_metadata::Bag2Metadata;
-use super::chunk::{MOST_CHUNK_BYTES, decompress, unpacker};
+use super::chunk::{MAX_CHUNK_BYTES, decompress, unpacker};
 use super::message_data::MessageData;
 use super::open::open_file;
 use super::recording::{Message, Recording, Topic};
@@ -27,7 +27,7 @@ pub struct Bag2Folder {
 }
 
 /// A longer `metadata.yaml` is an error.
-const MOST_METADATA_BYTES: u64 = 8 << 20;
+const MAX_METADATA_BYTES: u64 = 8 << 20;
 
 impl Bag2Folder {
     /// Opens a folder.
@@ -52,11 +52,11 @@ impl Bag2Folder {
             let file =
                 File::open(&metadata_path).map_err(|error| Error::io(&metadata_path, "read", error))?;
             let mut text = Vec::new();
-            let read = file.take(MOST_METADATA_BYTES + 1).read_to_end(&mut text);
+            let read = file.take(MAX_METADATA_BYTES + 1).read_to_end(&mut text);
             read.map_err(|error| Error::io(&metadata_path, "read", error))?;
-            if text.len() as u64 > MOST_METADATA_BYTES {
-                let reason = format!("it is longer than {MOST_METADATA_BYTES} bytes; name the files instead");
-                return Err(Error::format(&metadata_path, Place::Byte(MOST_METADATA_BYTES), reason));
+            if text.len() as u64 > MAX_METADATA_BYTES {
+                let reason = format!("it is longer than {MAX_METADATA_BYTES} bytes; name the files instead");
+                return Err(Error::format(&metadata_path, Place::Byte(MAX_METADATA_BYTES), reason));
             }
             let metadata = Bag2Metadata::of(&String::from_utf8_lossy(&text));
             let files = metadata.files.iter().map(|name| find(path, name)).collect::<Result<Vec<_>>>()?;
@@ -226,7 +226,7 @@ impl Recording for Bag2Folder {
                 Bytes::File(part) => Err(part.reader()),
             };
             let memory_bytes = self.spill.budget().bytes / 2;
-            let size = StreamSize::AtMost(MOST_CHUNK_BYTES);
+            let size = StreamSize::AtMost(MAX_CHUNK_BYTES);
             let mut unpacked = |input: &mut dyn Read| {
                 decompress("zstd", input, size, &mut self.spill, memory_bytes, &mut |_| {})
             };

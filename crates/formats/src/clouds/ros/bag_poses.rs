@@ -42,8 +42,8 @@ const MAX_REASONS: usize = 100;
 /// The frames that a robot moves by, if a pose does not name its own.
 const BASE_FRAMES: [&str; 2] = ["base_link", "base_footprint"];
 /// Second parents of frames that are reported, and links among which they are looked for.
-const MOST_SECONDS: usize = 8;
-const MOST_CHECKED: usize = 2000;
+const MAX_SECONDS: usize = 8;
+const MAX_CHECKED: usize = 2000;
 
 impl BagPoses {
     /// Reads all transforms, and the poses of a topic if these are asked for.
@@ -161,7 +161,7 @@ impl BagPoses {
                     Ok(true) => {
                         links += transforms.parents_of(&child_frame).saturating_sub(parents);
                         checked += 1;
-                        if checked <= MOST_CHECKED && seconds.len() < MOST_SECONDS {
+                        if checked <= MAX_CHECKED && seconds.len() < MAX_SECONDS {
                             seconds.extend(transforms.second_parent(parent, &child_frame));
                         }
                     }

@@ -71,7 +71,7 @@ impl Record for MessagePlace {
 }
 
 /// A chunk that takes more bytes is not read, not even into a temporary file.
-pub(super) const MOST_CHUNK_BYTES: u64 = 1 << 30;
+pub(super) const MAX_CHUNK_BYTES: u64 = 1 << 30;
 
 /// What to do about a window of zstd that is too large.
 const WINDOW_HINT: &str =

@@ -1,4 +1,4 @@
-use super::chunk::{ChunkPlace, MOST_CHUNK_BYTES, MessagePlace};
+use super::chunk::{ChunkPlace, MAX_CHUNK_BYTES, MessagePlace};
 use super::chunk_file::Shares;
 use super::message_data::{MessageData, read};
 use super::recording::{Message, TopicSet};
@@ -114,7 +114,7 @@ impl ChunkOrder {
             let is_due = earliest.is_none_or(|(_, log_ns)| place.start_ns <= log_ns);
             let held: u64 = self.open.iter().filter_map(Playing::bytes).map(Bytes::len).sum();
             // A file whose chunks all overlap would be open as a whole.
-            let is_room = earliest.is_none() || (held < MOST_CHUNK_BYTES && self.open.len() < MAX_OPEN);
+            let is_room = earliest.is_none() || (held < MAX_CHUNK_BYTES && self.open.len() < MAX_OPEN);
             self.has_given_up |= is_due && !is_room;
             if is_due && is_room {
                 self.next += 1;

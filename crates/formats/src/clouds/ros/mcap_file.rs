@@ -1,4 +1,4 @@
-use super::chunk::{ChunkPlace, MOST_CHUNK_BYTES, MessagePlace, OpenChunk, decompress, plain};
+use super::chunk::{ChunkPlace, MAX_CHUNK_BYTES, MessagePlace, OpenChunk, decompress, plain};
 use super::chunk_file::{ChunkFile, Shares, TakeMessage, Walk, check_chunks};
 use super::chunk_order::{ChunkOrder, Step};
 use super::file_bytes::{FileBytes, Pieces};
@@ -33,7 +33,7 @@ const END_BYTES: u64 = RECORD_HEAD_BYTES + 20 + 8;
 /// The magic at the end.
 const END_MAGIC_BYTES: u64 = 8;
 /// A longer record of the summary is damage.
-const MOST_RECORD_BYTES: u64 = 1 << 20;
+const MAX_RECORD_BYTES: u64 = 1 << 20;
 /// Messages outside of chunks are read together up to this size.
 const BARE_CHUNK_BYTES: u64 = 4 << 20;
 /// Such a part that has messages of more topics is read whatever topics are wanted.
@@ -107,7 +107,7 @@ impl McapFile {
             if matches!(kind, op::SCHEMA | op::CHANNEL | op::CHUNK_INDEX | op::STATISTICS) {
                 let most_bytes = match kind {
                     op::SCHEMA | op::CHANNEL => bytes.min(MAX_NAMES_BYTES),
-                    _ if bytes > MOST_RECORD_BYTES => return Ok(false),
+                    _ if bytes > MAX_RECORD_BYTES => return Ok(false),
                     _ => bytes,
                 };
                 let contents = self.file.read_at(at + RECORD_HEAD_BYTES, most_bytes)?;
@@ -289,14 +289,14 @@ impl McapFile {
         let Some((_, bytes)) = head.filter(|(kind, _)| *kind == op::CHUNK) else {
             return Err(wrong("there is no chunk where the index says so; `mcap recover` makes a new index"));
         };
-        if bytes > MOST_CHUNK_BYTES {
+        if bytes > MAX_CHUNK_BYTES {
             return Err(too_large());
         }
         let contents_at = place.offset.saturating_add(RECORD_HEAD_BYTES);
         let there = bytes.min(self.file.len.saturating_sub(contents_at));
         let start = self.file.read_at(contents_at, there.min(ChunkHead::MAX_BYTES))?;
         let head = ChunkHead::of(&start).ok_or_else(|| wrong("a chunk is cut off in its header"))?;
-        if head.plain_bytes > MOST_CHUNK_BYTES {
+        if head.plain_bytes > MAX_CHUNK_BYTES {
             return Err(too_large());
         }
         let (records_at, room) = (contents_at + head.records_at, there.saturating_sub(head.records_at));

@@ -14,8 +14,8 @@ pub struct SecondParent {
 }
 
 /// Longer names are cut, and longer loops.
-const MOST_CHARS: usize = 60;
-const MOST_FRAMES: usize = 8;
+const MAX_CHARS: usize = 60;
+const MAX_FRAMES: usize = 8;
 
 impl fmt::Display for SecondParent {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -25,9 +25,9 @@ impl fmt::Display for SecondParent {
             None => write!(f, "frame {child} has the parent {parent}")?,
         }
         if !self.loop_frames.is_empty() {
-            let cut = if self.loop_frames.len() > MOST_FRAMES { " .." } else { "" };
+            let cut = if self.loop_frames.len() > MAX_FRAMES { " .." } else { "" };
             let frames: Vec<String> =
-                self.loop_frames.iter().take(MOST_FRAMES).map(|frame| name(frame)).collect();
+                self.loop_frames.iter().take(MAX_FRAMES).map(|frame| name(frame)).collect();
             write!(f, ", which makes a loop ({child} in {}{cut})", frames.join(" in "))?;
         }
         Ok(())
@@ -36,6 +36,6 @@ impl fmt::Display for SecondParent {
 
 /// What others sent is printed without what a terminal obeys.
 fn name(frame: &str) -> String {
-    let cut: String = frame.chars().take(MOST_CHARS).collect();
+    let cut: String = frame.chars().take(MAX_CHARS).collect();
     cut.escape_debug().to_string()
 }

@@ -92,7 +92,7 @@ pub enum BadTransform {
 }
 
 /// How far the length of a quaternion may be from 1, as in files of poses.
-const MOST_LENGTH_ERROR: f64 = 0.1;
+const MAX_LENGTH_ERROR: f64 = 0.1;
 /// Most frames among which ways are searched for each cloud of a recording.
 const MAX_FRAMES_BETWEEN: usize = 1000;
 
@@ -493,7 +493,7 @@ fn names<'a>(parent: &'a str, child: &'a str) -> Result<(&'a str, &'a str), BadT
 /// Whether a pose may be one: finite numbers, and a quaternion whose length is about 1.
 pub(super) fn is_pose(pose: &RigidPose) -> bool {
     let length = pose.quaternion.iter().map(|q| q * q).sum::<f64>().sqrt();
-    pose.is_valid() && (length - 1.0).abs() <= MOST_LENGTH_ERROR
+    pose.is_valid() && (length - 1.0).abs() <= MAX_LENGTH_ERROR
 }
 
 /// tf 1 wrote slashes before names, tf 2 does not know them.

@@ -50,13 +50,13 @@ pub(crate) struct Complaint {
     pub(crate) is_broken: bool,
 }
 
-const MOST_FILE_BYTES: u64 = 256 << 20;
+const MAX_FILE_BYTES: u64 = 256 << 20;
 /// Bytes that are copied at a time.
 const COPY_BYTES: usize = 1 << 16;
 
 impl SpillFile {
     pub(crate) fn new(budget: &Budget) -> Self {
-        Self { budget: budget.clone(), file: None, end: 0, most_bytes: MOST_FILE_BYTES }
+        Self { budget: budget.clone(), file: None, end: 0, most_bytes: MAX_FILE_BYTES }
     }
 
     pub(crate) fn budget(&self) -> &Budget {

@@ -3,7 +3,7 @@ use super::row::{VoxelRow, VoxelsHead};
 use crate::clouds::error::{Error, Result};
 
 /// Most cells of a flat map.
-const MOST_CELLS: u64 = 1 << 31;
+const MAX_CELLS: u64 = 1 << 31;
 
 /// Columns of voxels, seen from above as a picture: its first row has the largest y.
 #[derive(Clone, Debug)]
@@ -29,10 +29,10 @@ impl<T: Copy> ColumnGrid<T> {
         let size: [u64; 3] =
             std::array::from_fn(|k| highest[k].saturating_sub(lowest[k]).saturating_add(1).max(0) as u64);
         let [width, height, layers] = size;
-        let count = width.checked_mul(height).filter(|&count| count <= MOST_CELLS);
+        let count = width.checked_mul(height).filter(|&count| count <= MAX_CELLS);
         let too_large = || {
             let reason = format!(
-                "{width} x {height} cells of {} m; at most {MOST_CELLS} can be written: choose a region, or write coarser \
+                "{width} x {height} cells of {} m; at most {MAX_CELLS} can be written: choose a region, or write coarser \
                  voxels",
                 head.resolution_m
             );

@@ -6,7 +6,7 @@ use crate::clouds::error::Result;
 use std::path::Path;
 
 /// Most points of a cloud.
-const MOST_POINTS: usize = 1 << 20;
+const MAX_POINTS: usize = 1 << 20;
 const TOPIC: &str = "/voxels";
 
 /// A recording of ROS 2 (MCAP) with clouds of whole tiles, as far as they fit.
@@ -48,7 +48,7 @@ impl McapSink {
             stamp_ns: options.stamp_ns,
             fields,
             points: Vec::new(),
-            most_points: MOST_POINTS,
+            most_points: MAX_POINTS,
             tile: None,
             tile_start: 0,
             clouds: 0,

@@ -34,7 +34,7 @@ pub struct DdsNode {
 
 const RECEIVE_BUFFER_BYTES: usize = 8 << 20;
 /// Below this most fragments of a large cloud are lost.
-const LEAST_RECEIVE_BUFFER_BYTES: usize = 2 << 20;
+const MIN_RECEIVE_BUFFER_BYTES: usize = 2 << 20;
 
 impl DdsNode {
     /// Joins the domain.
@@ -140,7 +140,7 @@ impl DdsNode {
 fn check_receive_buffer() {
     let most = std::fs::read_to_string("/proc/sys/net/core/rmem_max");
     let Some(most) = most.ok().and_then(|text| text.trim().parse::<usize>().ok()) else { return };
-    if most < LEAST_RECEIVE_BUFFER_BYTES {
+    if most < MIN_RECEIVE_BUFFER_BYTES {
         log::warn!(
             "the system gives sockets {most} bytes, too few for large clouds, most of which will be lost: \
              sysctl net.core.rmem_max={RECEIVE_BUFFER_BYTES}"

@@ -40,7 +40,7 @@ pub struct ZenohNode {
 /// As services are in ROS 2.
 const SERVICE_QOS: Qos = Qos::reliable(10);
 /// With its attachment and its parameters.
-const MOST_REQUEST_BYTES: usize = 1 << 20;
+const MAX_REQUEST_BYTES: usize = 1 << 20;
 /// How often a publisher tells what it has sent last, while something new was sent.
 const HEARTBEAT: Duration = Duration::from_millis(500);
 
@@ -144,7 +144,7 @@ impl ZenohNode {
     {
         let channel = Channel::service(&self.names, service, kind)?;
         let key = key(&channel.key(self.name.domain_id))?;
-        let mailbox = Mailbox::new(SERVICE_QOS.depth, SERVICE_QOS.depth * MOST_REQUEST_BYTES);
+        let mailbox = Mailbox::new(SERVICE_QOS.depth, SERVICE_QOS.depth * MAX_REQUEST_BYTES);
         let (to, label, inbox) = (mailbox.clone(), channel.name.clone(), self.inbox.clone());
         self.session
             .declare_queryable(key.clone())
@@ -152,7 +152,7 @@ impl ZenohNode {
             .callback(move |query| {
                 // Who gets no answer is told so: Zenoh does it where a query is dropped.
                 let lost = match waiting_bytes(&query) {
-                    Some(bytes) if bytes <= MOST_REQUEST_BYTES => to.put(query, bytes),
+                    Some(bytes) if bytes <= MAX_REQUEST_BYTES => to.put(query, bytes),
                     _ => 1,
                 };
                 if lost > 0 {

@@ -15,7 +15,7 @@ pub struct LivoxCustom<'a> {
 }
 
 /// A time base further from the stamp is that of another clock.
-const MOST_BASE_NS: u128 = 1_000_000_000;
+const MAX_BASE_NS: u128 = 1_000_000_000;
 
 /// `offset_time`, x, y, z, `reflectivity`, `tag`, `line`.
 const POINT_BYTES: usize = 4 + 3 * 4 + 3;
@@ -41,7 +41,7 @@ impl<'a> LivoxCustom<'a> {
     /// From the stamp to the time base. Mostly it repeats the stamp; some drivers stamp a cloud when they send it.
     fn base_after_stamp_s(&self) -> f64 {
         let base_ns = i128::from(self.timebase_ns) - i128::from(self.header.stamp_ns);
-        if base_ns.unsigned_abs() <= MOST_BASE_NS { base_ns as f64 * 1e-9 } else { 0.0 }
+        if base_ns.unsigned_abs() <= MAX_BASE_NS { base_ns as f64 * 1e-9 } else { 0.0 }
     }
 
     /// Its points, in order. A message that is cut off ends with an error.

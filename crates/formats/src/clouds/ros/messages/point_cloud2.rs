@@ -59,7 +59,7 @@ const PIECE_BYTES: usize = 1 << 16;
 /// Points of a large message may have at most so many bytes.
 const MAX_POINT_BYTES: usize = 1 << 20;
 /// Times of type `f64` above this are nanoseconds: in seconds this is three million years.
-const LEAST_NANOSECONDS: f64 = 1e14;
+const MIN_NANOSECONDS: f64 = 1e14;
 
 impl<'a> PointCloud2<'a> {
     /// Decodes a message.
@@ -77,7 +77,7 @@ impl<'a> PointCloud2<'a> {
         let mut reader = WireReader::of_start(wire, bytes, len)?;
         let header = Header::read(&mut reader)?;
         let (height, width) = (reader.u32()?, reader.u32()?);
-        let count = reader.sequence(PointField::LEAST_BYTES)?;
+        let count = reader.sequence(PointField::MIN_BYTES)?;
         if count > MAX_FIELDS {
             return Err(reader.error(format!("points of {count} fields; at most {MAX_FIELDS} are possible")));
         }
@@ -225,7 +225,7 @@ impl<'a> PointCloud2<'a> {
             TimeColumn::AfterStamp(column) => self.value(point, column) * 1e-9,
             TimeColumn::Double(offset) => {
                 let value = self.value(point, Column { offset, kind: FieldType::F64 });
-                let seconds = if value.abs() > LEAST_NANOSECONDS { value * 1e-9 } else { value };
+                let seconds = if value.abs() > MIN_NANOSECONDS { value * 1e-9 } else { value };
                 self.after_stamp_s(seconds)
             }
             TimeColumn::Wide(offset) => {

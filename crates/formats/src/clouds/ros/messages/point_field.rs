@@ -36,7 +36,7 @@ pub struct PointField {
 
 impl PointField {
     /// The fewest bytes that one takes in a message.
-    pub const LEAST_BYTES: usize = 13;
+    pub const MIN_BYTES: usize = 13;
 
     /// Reads it.
     ///

@@ -17,7 +17,7 @@ pub struct StampedPose {
 /// The poses of a message of so many bytes are decoded together.
 const SMALL_BYTES: usize = 1 << 16;
 /// The fewest bytes of a transform, and of a pose, in a message.
-const LEAST_BYTES: usize = 7 * 8;
+const MIN_BYTES: usize = 7 * 8;
 
 /// Decodes the poses of a message: tf, odometry, poses and paths. Messages of other kinds have none.
 ///
@@ -54,7 +54,7 @@ fn visit(kind: MessageKind, wire: Wire, bytes: &[u8], take: &mut dyn FnMut(Stamp
     let reader = &mut WireReader::new(wire, bytes)?;
     match kind {
         MessageKind::Tf => {
-            for _ in 0..reader.sequence(LEAST_BYTES)? {
+            for _ in 0..reader.sequence(MIN_BYTES)? {
                 take(transform(reader)?);
             }
         }
@@ -66,7 +66,7 @@ fn visit(kind: MessageKind, wire: Wire, bytes: &[u8], take: &mut dyn FnMut(Stamp
         MessageKind::PoseStamped | MessageKind::PoseWithCovarianceStamped => take(stamped(reader)?),
         MessageKind::Path => {
             let whole = Header::read(reader)?;
-            for _ in 0..reader.sequence(LEAST_BYTES)? {
+            for _ in 0..reader.sequence(MIN_BYTES)? {
                 let mut pose = stamped(reader)?;
                 if pose.header.frame_id.is_empty() {
                     pose.header.frame_id.clone_from(&whole.frame_id);
