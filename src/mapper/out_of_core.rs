@@ -95,7 +95,7 @@ impl OutOfCoreTileMapper {
             store.keep_scans();
         }
         config.keeps_scans = store.keeps_scans();
-        let scan_bytes = MemoryPlan::new(config.memory).scan_bytes;
+        let scan_bytes = MemoryPlan::of(&config).scan_bytes;
         let tiles = PagedTiles::new(config.clone(), store);
         let tracer = ScanTracer::with_memory_bytes(scan_bytes);
         Self { tiles, live: OnceLock::new(), config, tracer, fewest_points_alone: usize::MAX }
@@ -225,7 +225,7 @@ impl OutOfCoreTileMapper {
         if let Some(reader) = self.live.get() {
             return Ok(reader.clone());
         }
-        let bytes = MemoryPlan::new(self.config.memory).reader_bytes;
+        let bytes = MemoryPlan::of(&self.config).reader_bytes;
         let files = self.pager().open_to_readers(bytes)?;
         let new = || LiveReader::new(self.config.clone(), self.tiles.contents().clone(), files, bytes);
         Ok(self.live.get_or_init(new).clone())
@@ -363,7 +363,7 @@ impl OutOfCoreTileMapper {
         &mut self,
         make: impl FnOnce(&MapConfig, &mut ScanTracer, Option<Overflow<'_>>) -> Result<ScanUpdates>,
     ) -> Result<(ScanReport, Vec<TileIndex>)> {
-        let plan = MemoryPlan::new(self.config.memory);
+        let plan = MemoryPlan::of(&self.config);
         let tiles = &self.tiles;
         let (disk, folder, max_tiles) = {
             let pager = tiles.pager();

@@ -18,7 +18,7 @@ pub(crate) struct TileFinder {
 impl TileFinder {
     /// Finds tiles of maps with this configuration, in as much memory as it allows for a scan.
     pub(crate) fn new(config: &MapConfig, disk: Arc<dyn Disk>, stop: Stop) -> Self {
-        let bytes = MemoryPlan::new(config.memory).scan_bytes;
+        let bytes = MemoryPlan::of(config).scan_bytes;
         let mut tracer = ScanTracer::with_memory_bytes(bytes);
         tracer.stop_with(stop);
         Self { config: config.clone(), tracer, disk }
@@ -32,7 +32,7 @@ impl TileFinder {
         folder: &Path,
     ) -> Result<Vec<TileIndex>> {
         self.config.rays = *rays;
-        let max_bytes = MemoryPlan::new(self.config.memory).updates_bytes;
+        let max_bytes = MemoryPlan::of(&self.config).updates_bytes;
         let mut tiles = Vec::new();
         let make_scratch = &|| self.disk.scratch(folder);
         let spill = &mut |part: Vec<(TileIndex, PackedUpdates)>| {

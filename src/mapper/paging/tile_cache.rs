@@ -48,7 +48,7 @@ pub(super) enum Cached<'a> {
 
 impl TileCache {
     pub(super) fn new(config: &MapConfig) -> Self {
-        let plan = MemoryPlan::new(config.memory);
+        let plan = MemoryPlan::of(config);
         let is_compact = config.storage == Storage::Compact;
         Self {
             plan,

@@ -128,7 +128,8 @@ fn a_map_is_built_asked_exported_and_added_to() {
 
 #[test]
 fn the_example_answers_as_the_readme_says() {
-    let example = concat!(env!("CARGO_MANIFEST_DIR"), "/map_tiles_example");
+    let example = testkit::support::repository("map_tiles_example");
+    let example = example.to_str().unwrap();
     let answer = output(&["raycast", example, "--origin", "8", "-2", "1.8", "--direction", "1", "1", "0"]);
     let readme = include_str!("../../../../README.md");
     assert!(readme.contains(answer.trim()), "{answer}");
