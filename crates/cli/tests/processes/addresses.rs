@@ -103,20 +103,38 @@ fn a_build_whose_allocations_fail_leaves_what_it_flushed_and_goes_on_from_there(
     let drive = Drive::new();
     for (seed, storage) in (0..).zip(["octomap", "compact"]) {
         let (mut whole, mut cut, mut in_vain) = (0, 0, 0);
-        for limit_kib in falling_limits(seed) {
+        // The least limit with which all was mapped, and the largest with which nothing was.
+        let (mut enough_kib, mut too_few_kib) = (u64::MAX, 0);
+        let mut try_with = |limit_kib: u64| {
             let (_folder, map) = folder_for_maps();
             // The second goes on with what the first left.
             match [(); 2].map(|()| scans_of_build(&drive, &map, storage, limit_kib)) {
-                [None, None] => in_vain += 1,
+                [None, None] => {
+                    in_vain += 1;
+                    too_few_kib = too_few_kib.max(limit_kib);
+                }
                 [first, second] => {
                     assert!(first <= second, "{storage}, {limit_kib} KiB: {first:?}, then {second:?}");
                     if second == Some(SCANS) {
-                        whole += 1
+                        whole += 1;
+                        enough_kib = enough_kib.min(limit_kib);
                     } else {
-                        cut += 1
+                        cut += 1;
                     }
                     drive.build_whole(&map, storage);
                 }
+            }
+            (cut, (enough_kib / 2).saturating_add(too_few_kib / 2))
+        };
+        let mut between_kib = 0;
+        for limit_kib in falling_limits(seed) {
+            (_, between_kib) = try_with(limit_kib);
+        }
+        // What is cut short lies between, in a range that may be small.
+        for _ in 0..8 {
+            match try_with(between_kib) {
+                (0, next_kib) => between_kib = next_kib,
+                _ => break,
             }
         }
         assert!(

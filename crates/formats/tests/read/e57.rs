@@ -72,7 +72,7 @@ fn no_damage_makes_a_panic() {
 fn points_that_take_no_bits_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("constant.e57");
-    let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("../fuzz/corpus/cloud_e57/without-bits");
+    let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/corpus/cloud_e57/without-bits");
     // The first byte is for the target of the fuzzer.
     fs::write(&path, &fs::read(corpus).unwrap()[1..]).unwrap();
     let (error, points) = failure(&path, &OpenOptions::default());

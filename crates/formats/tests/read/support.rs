@@ -11,7 +11,7 @@ pub fn fixture(name: &str) -> PathBuf {
 /// absent.
 pub fn shared_data(folder: &str) -> Option<PathBuf> {
     let root = std::env::var_os("VOXTILE_DATA")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data"), PathBuf::from);
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"), PathBuf::from);
     let path = root.join(folder);
     if path.is_dir() {
         return Some(path);
