@@ -91,8 +91,8 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
     ) -> Result<()> {
         let mut reasons = Reasons::default();
         let mut replaced = Vec::new();
-        for at in 0..snapshots.len() {
-            let Some(as_of) = kept_as_of(&snapshots[at]) else { continue };
+        for (at, snapshot) in snapshots.iter_mut().enumerate() {
+            let Some(as_of) = kept_as_of(snapshot) else { continue };
             let found = whole_entries(self.disk, &self.layout, as_of, &mut self.points, |_| Ok(()))?;
             if found.damage.is_empty() {
                 continue;
@@ -100,7 +100,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
             reasons.add(&found);
             let old = store.catalog_path(as_of)?;
             let is_old_kept = self.keep_catalog(old.as_deref(), &reasons)?;
-            let scans_lost = self.write_other_catalog(store, &mut snapshots[at], as_of)?;
+            let scans_lost = self.write_other_catalog(store, snapshot, as_of)?;
             replaced.push(Replaced { at, old, is_old_kept, scans_lost });
         }
         if replaced.is_empty() {

@@ -24,7 +24,6 @@
 //!
 //! `docs/format.md` describes the objects.
 
-#[expect(clippy::module_inception, reason = "the noun that the rest is about")]
 mod bucket;
 mod bucket_disk;
 mod content;

@@ -44,7 +44,6 @@ impl PcdFolder {
     }
 
     /// The files of a folder with poses that were read.
-
     pub(super) fn with_lines(files: Vec<PathBuf>, path: PathBuf, lines: Poses) -> Result<Self> {
         let (pose_source, poses) = of_lines(&files, path, lines)?;
         Ok(Self { files, poses: Some(poses), pose_source, next: 0 })

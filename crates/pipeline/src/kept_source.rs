@@ -21,6 +21,10 @@ pub struct KeptSource {
 
 /// Whether a path names a map that may keep scans, or a snapshot of one. Of a URL nobody knows before the store
 /// answers.
+///
+/// # Errors
+///
+/// A bucket that cannot be asked.
 pub fn is_map(path: &Path, stop: &Stop) -> Result<bool> {
     let has_files =
         |path: &Path| ["metadata.json", "commits.log"].iter().all(|name| path.join(name).is_file());

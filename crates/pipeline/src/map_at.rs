@@ -23,6 +23,10 @@ pub struct MapAt {
 
 impl MapAt {
     /// `MAP`, or `MAP@SNAPSHOT` where nothing has that as its own name.
+    ///
+    /// # Errors
+    ///
+    /// A name that no snapshot can have.
     pub fn of(path: &Path) -> Result<Self> {
         match named_snapshot(path) {
             Some((map, name)) => Ok(Self { map: map.to_owned(), snapshot: Some(SnapshotName::new(name)?) }),
@@ -153,12 +157,20 @@ pub fn whole_map(path: &Path) -> Result<&Path> {
 
 /// Answers from one state of a map, or from a snapshot of it (`MAP@SNAPSHOT`); if a writer flushes the map meanwhile,
 /// begins again with the new state.
+///
+/// # Errors
+///
+/// As for [`MapAt::open`]; those of `read`.
 pub fn read_map<T>(map: &Path, mut read: impl FnMut(&MapReader) -> anyhow::Result<T>) -> anyhow::Result<T> {
     let map = MapAt::of(map)?;
     again_if_changed(|| read(&map.open()?))
 }
 
 /// Opens a map, a snapshot, or a file of OctoMap.
+///
+/// # Errors
+///
+/// As for [`MapAt::open`]; a file that is none of OctoMap.
 pub fn open_any_map(map: &Path) -> anyhow::Result<AnyMap> {
     if OctreeMap::is_named_by(map) {
         return Ok(AnyMap::Octree(Box::new(OctreeMap::of(octree_file::read(map)?)?)));
@@ -167,11 +179,19 @@ pub fn open_any_map(map: &Path) -> anyhow::Result<AnyMap> {
 }
 
 /// Answers from one state of a map, a snapshot, or a file of OctoMap.
+///
+/// # Errors
+///
+/// As for [`open_any_map`]; those of `read`.
 pub fn read_any_map<T>(map: &Path, mut read: impl FnMut(&AnyMap) -> anyhow::Result<T>) -> anyhow::Result<T> {
     again_if_changed(|| read(&open_any_map(map)?))
 }
 
 /// The same from two maps.
+///
+/// # Errors
+///
+/// As for [`MapAt::open`]; those of `read`.
 pub fn read_maps<T>(
     first: &MapAt,
     second: &MapAt,
@@ -181,6 +201,10 @@ pub fn read_maps<T>(
 }
 
 /// The same from any number of maps.
+///
+/// # Errors
+///
+/// As for [`MapAt::open`]; those of `read`.
 pub fn read_all_maps<T>(
     maps: &[PathBuf],
     mut read: impl FnMut(&[MapReader]) -> anyhow::Result<T>,

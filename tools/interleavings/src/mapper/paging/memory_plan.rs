@@ -1,4 +1,4 @@
-use crate::config::MemoryLimit;
+use crate::config::MapConfig;
 
 /// How much memory lives have: room for two or three tiles in use and for as many that are packed, so that tiles are on
 /// their way all the time.
@@ -17,7 +17,7 @@ pub(in crate::mapper) struct MemoryPlan {
 }
 
 impl MemoryPlan {
-    pub(super) fn new(_: MemoryLimit) -> Self {
+    pub(super) fn of(_: &MapConfig) -> Self {
         Self {
             tiles: 3,
             bytes: 20 << 10,
