@@ -121,7 +121,7 @@ pub trait MapView: Sync {
 /// is not used.
 pub trait Mapper: MapView + Send {
     /// Adds a scan: rays from its origin to its points, wherever these lie: borrowed
-    /// ([`ScanRef`](crate::scan::ScanRef)), in a file ([`StoredScan`](crate::io::StoredScan)), or in a [`Scan`].
+    /// ([`ScanRef`](crate::scan::ScanRef)), in a file (`StoredScan` of `voxtile-formats`), or in a [`Scan`].
     ///
     /// # Errors
     ///

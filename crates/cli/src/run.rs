@@ -16,6 +16,7 @@ use std::ffi::OsString;
 use std::io::Write;
 use std::process::ExitCode;
 use voxtile::begin_with_one_heap;
+#[cfg(feature = "bucket")]
 use voxtile_pipeline::place;
 
 /// The command with the arguments of this process.

@@ -12,7 +12,7 @@ const SCHEMES: [&str; 7] = ["s3", "gs", "az", "abfs", "abfss", "http", "https"];
 ///
 /// # Errors
 ///
-/// As for [`Bucket::open`](voxtile_bucket::Bucket::open); a URL, where the command was built without buckets.
+/// As for `Bucket::open`; a URL, where the command was built without buckets.
 pub fn place_of(map: &Path) -> Result<MapPath> {
     match url_of(map) {
         Some(url) => in_bucket(url),
@@ -65,7 +65,7 @@ pub fn set_bucket_timeout(timeout: std::time::Duration) {
 ///
 /// # Errors
 ///
-/// As for [`Bucket::open`](voxtile_bucket::Bucket::open).
+/// As for `Bucket::open`.
 #[cfg(feature = "bucket")]
 pub fn bucket_at(url: &str) -> Result<voxtile_bucket::Bucket> {
     let bucket =
@@ -80,7 +80,7 @@ pub fn bucket_at(url: &str) -> Result<voxtile_bucket::Bucket> {
 ///
 /// # Errors
 ///
-/// As for [`Bucket::open`](voxtile_bucket::Bucket::open) and [`Bucket::has_map`](voxtile_bucket::Bucket::has_map).
+/// As for `Bucket::open` and `Bucket::has_map`.
 #[cfg(feature = "bucket")]
 pub fn is_map_at(url: &str, stop: &Stop) -> Result<bool> {
     bucket_at(url)?.has_map(&|| stop.is_set())

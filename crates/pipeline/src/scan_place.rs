@@ -10,8 +10,8 @@ use voxtile_formats::{ReadOptions, ScanSource};
 ///
 /// # Errors
 ///
-/// As for [`Bucket::open`](voxtile_bucket::Bucket::open) and
-/// [`FetchedFiles::fetch`](voxtile_bucket::FetchedFiles::fetch); a URL, where the command was built without buckets.
+/// As for `Bucket::open` and
+/// `FetchedFiles::fetch`; a URL, where the command was built without buckets.
 #[cfg(feature = "bucket")]
 pub fn scans_at(url: &str, options: &ReadOptions, watch: &Watch) -> Result<Box<dyn ScanSource + Send>> {
     Ok(Box::new(crate::fetched_source::FetchedSource::open(url, options, watch)?))
@@ -46,6 +46,11 @@ impl LocalScans {
         Ok(Self { path, _fetched: fetched })
     }
 
+    /// Takes what is no URL as it is.
+    ///
+    /// # Errors
+    ///
+    /// A URL: there are no buckets.
     #[cfg(not(feature = "bucket"))]
     pub fn of(scans: &Path, _: &Watch) -> Result<Self> {
         url_of(scans).map_or(Ok(Self { path: scans.to_owned() }), |url| Err(without_buckets(url)))
