@@ -62,7 +62,9 @@ versions() {
     cp tools/peers/src/bin/questions.rs "$source/tools/peers/src/bin/"
     local before
     before=$(realpath "$target")/versions/before
-    (cd "$source" && CARGO_TARGET_DIR=$before cargo build --release --quiet --locked --package voxtile-cli --package peers)
+    # Whatever package the command is in there.
+    (cd "$source" && export CARGO_TARGET_DIR=$before && cargo build --release --quiet --locked --workspace --bin voxtile &&
+        cargo build --release --quiet --locked --package peers)
     git worktree remove --force "$source"
     run versions --before "$before/release" --now "$target/release" "${options[@]}"
 }

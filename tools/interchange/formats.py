@@ -1,4 +1,4 @@
-"""Reads voxels back from every format that voxtile-clouds writes, with the libraries of others; see formats.sh."""
+"""Reads voxels back from every format that voxtile-formats writes, with the libraries of others; see formats.sh."""
 
 import json
 import math

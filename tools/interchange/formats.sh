@@ -1,5 +1,5 @@
 #!/bin/sh
-# Other programs read what voxtile-clouds writes: every format is read back with somebody else's library, and every voxel
+# Other programs read what voxtile-formats writes: every format is read back with somebody else's library, and every voxel
 # must come back to its index exactly; near the origin, around UTM coordinates, and with indices that reach that far.
 #
 #   tools/interchange/formats.sh
