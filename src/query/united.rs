@@ -11,7 +11,7 @@ use crate::space::{Aabb, Grid, Point, VoxelIndex};
 /// voxel the first is believed.
 ///
 /// ```
-/// use voxtile::local::{LocalMap, LocalParameters, Obstacle};
+/// use voxtile_local::{LocalMap, LocalParameters, Obstacle};
 /// use voxtile::query::{Queries, United, UnknownAs};
 /// use voxtile::{InMemoryMapper, MapConfig, Mapper, Scan};
 ///

@@ -11,7 +11,7 @@
 //! ```
 //!
 //! ```
-//! use voxtile::local::{LocalMap, LocalParameters, LocalState, Obstacle};
+//! use voxtile_local::{LocalMap, LocalParameters, LocalState, Obstacle};
 //! use voxtile::{Queries, UnknownAs};
 //!
 //! # fn main() -> voxtile::Result<()> {

@@ -7,7 +7,7 @@
 //! number of threads. Nothing here knows a terminal, a page or a file.
 //!
 //! ```
-//! use voxtile::render::{ColorBy, Picture, View};
+//! use voxtile_render::{ColorBy, Picture, View};
 //! use voxtile::{InMemoryMapper, MapConfig, Mapper, Scan};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {

@@ -1,6 +1,6 @@
 //! The command `voxtile-share`, which `voxtile share` runs: sets of occupied voxels over Zenoh.
 //!
-//! All that is clever is in [`voxtile::share`]; here are the transport, the clock and the files.
+//! All that is clever is in [`voxtile_share`]; here are the transport, the clock and the files.
 
 mod args;
 mod files;

@@ -15,7 +15,7 @@
 //!
 //! ```
 //! use std::time::Duration;
-//! use voxtile::share::{Receiver, ReceiverConfig, Sender, SenderConfig};
+//! use voxtile_share::{Receiver, ReceiverConfig, Sender, SenderConfig};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let grid = voxtile::space::Grid::new(0.1, 10.0)?;

@@ -11,7 +11,7 @@
 //! scan k comes out the same whether or not the scans before it were made.
 //!
 //! ```
-//! use voxtile::simulation::Survey;
+//! use voxtile_simulation::Survey;
 //!
 //! let mut survey = Survey::demo(7);
 //! let first = survey.next().expect("the demo drive has no end");

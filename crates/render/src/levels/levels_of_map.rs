@@ -15,7 +15,7 @@ use voxtile::{Error, Result};
 /// The levels of detail of one state of a map, or of some of its tiles.
 ///
 /// ```
-/// use voxtile::render::levels::{Kind, Levels, NodeStore};
+/// use voxtile_render::levels::{Kind, Levels, NodeStore};
 /// use voxtile::{InMemoryMapper, MapConfig, MapView, Mapper, Scan};
 ///
 /// # fn main() -> voxtile::Result<()> {
