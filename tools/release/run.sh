@@ -4,8 +4,7 @@
 #   voxtile-VERSION-TARGET.tar.gz     static binaries of voxtile and voxtile-share, man pages, completions, licenses
 #   voxtile_VERSION-1_ARCH.deb        the same as Debian packages
 #   voxtile-share_VERSION-1_ARCH.deb
-#   voxtile-VERSION.crate             the sources of the library and of voxtile, built once more from this package
-#   voxtile-clouds-VERSION.crate      the sources of what reads and writes files of other programs
+#   voxtile*-VERSION.crate            the sources of the engine, the command and the crates between, built once more
 #   SHA256SUMS
 #
 #   tools/release/run.sh [--out FOLDER] [--dirty]
@@ -81,7 +80,9 @@ deb voxtile-share "occupancy map sharing between robots over Zenoh" \
 
 tar --create --gzip --directory "$work" --sort=name --owner=0 --group=0 --numeric-owner --mtime="@$SOURCE_DATE_EPOCH" \
     --file "$work/out/voxtile-$version-$target.tar.gz" "$(basename "$tree")"
-cp "$built/package/voxtile-$version.crate" "$built/package/voxtile-clouds-$version.crate" "$work/out/"
+for package in $(tools/release/published.sh); do
+    if [[ $package != --package ]]; then cp "$built/package/$package-$version.crate" "$work/out/"; fi
+done
 (cd "$work/out" && sha256sum ./* | sed 's| \./| |' >SHA256SUMS)
 
 tools/release/try.sh "$work/out/voxtile-$version-$target.tar.gz"
