@@ -63,12 +63,7 @@ impl CatalogReader {
 
     fn begin(disk: &dyn Disk, layout: &Layout, generation: u64, as_of: KeptAsOf) -> Result<Self> {
         let path = layout.catalog(generation);
-        let input = disk.open(&path).map_err(|error| match error.kind() {
-            io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => {
-                FormatError::at_offset(0, IS_MISSING).in_map(&path, None)
-            }
-            _ => Error::io(&path, "open", error),
-        })?;
+        let input = disk.open(&path).map_err(|error| refusal(&path, error))?;
         let file_bytes = input.file_bytes();
         let file = std::sync::Mutex::new(BufReader::with_capacity(1 << 16, input));
         let (input, payload, crc) = (Input { file, file_bytes }, Vec::new(), crc32fast::Hasher::new());
@@ -242,13 +237,23 @@ impl CatalogWriter {
     }
 }
 
+/// Why a catalog cannot be opened.
+fn refusal(path: &Path, error: io::Error) -> Error {
+    match error.kind() {
+        io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => {
+            FormatError::at_offset(0, IS_MISSING).in_map(path, None)
+        }
+        _ => Error::io(path, "open", error),
+    }
+}
+
 /// Length, at most `bytes`, and checksum of the beginning of a file.
 ///
 /// # Errors
 ///
-/// A disk that refuses.
+/// None there, as damage: a writer may have removed it since it was opened. A disk that refuses.
 pub(super) fn checksum_of_front(disk: &dyn Disk, path: &Path, bytes: u64) -> Result<FileChecksum> {
-    let input = disk.open(path).map_err(|error| Error::io(path, "open", error))?;
+    let input = disk.open(path).map_err(|error| refusal(path, error))?;
     let mut input = Checksumming::new(input.take(bytes));
     io::copy(&mut input, &mut io::sink()).map_err(|error| Error::io(path, "read", error))?;
     Ok(input.finish().0)
