@@ -4,11 +4,11 @@ use std::time::{Duration, Instant};
 /// How often a build makes durable what it mapped.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FlushEvery {
-    /// After so many scans.
+    /// After this number of scans.
     Scans(u64),
-    /// After so long, beside scans.
+    /// After this time, while scans are still inserted.
     Time(Duration),
-    /// At the end alone.
+    /// Only at the end.
     End,
 }
 

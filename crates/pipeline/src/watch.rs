@@ -15,9 +15,9 @@ pub enum Unit {
     Bytes,
 }
 
-/// Hears how far some work is, from its beginning until it is dropped.
+/// Receives the progress of one piece of work. Dropped when the work ends.
 pub trait Gauge: Send + Sync {
-    /// So many were done before.
+    /// Sets how many were done by an earlier run.
     fn pass(&self, done: u64);
 
     /// One more is done.
@@ -26,10 +26,10 @@ pub trait Gauge: Send + Sync {
     /// So many of all are done.
     fn set(&self, done: u64, all: u64);
 
-    /// What goes on when it is no step.
+    /// Shows a message between steps, such as "flushing".
     fn say(&self, message: &'static str);
 
-    /// What a mapper holds; asks only if somebody wants to know.
+    /// Shows what a mapper holds. Calls `statistics` only if it is displayed.
     fn show(&self, statistics: &dyn Fn() -> MapStatistics);
 }
 
@@ -39,7 +39,7 @@ pub type MakeGauge = Arc<dyn Fn(Unit, Option<u64>) -> Box<dyn Gauge> + Send + Sy
 /// Hears how many scans or tiles are done, and of how many; 0 where that is not known.
 pub type Listener = Arc<dyn Fn(u64, u64) + Send + Sync>;
 
-/// Who asked for long work: can end it, and hears how far it is.
+/// The caller's side of long work: stops it and receives its progress.
 #[derive(Clone)]
 pub struct Watch {
     stop: Stop,
@@ -47,17 +47,17 @@ pub struct Watch {
 }
 
 impl Watch {
-    /// Nobody: the work goes on to its end.
+    /// Runs to the end and reports no progress.
     pub fn nobody() -> Self {
         Self::of_program(Stop::default(), None)
     }
 
-    /// Somebody who sees gauges.
+    /// Reports progress to gauges that `make_gauge` makes.
     pub fn new(stop: Stop, make_gauge: MakeGauge) -> Self {
         Self { stop, make_gauge }
     }
 
-    /// A program, which hears of each step.
+    /// Calls a listener after each step.
     pub fn of_program(stop: Stop, listener: Option<Listener>) -> Self {
         let make_gauge = move |_, all: Option<u64>| -> Box<dyn Gauge> {
             let (listener, done) = (listener.clone(), AtomicU64::new(0));

@@ -27,7 +27,7 @@ pub struct ViewOptions {
 
 impl fmt::Debug for ViewOptions {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        // Nothing of the secret.
+        // The token is a secret.
         let Self { maps, listen, keeps_levels, .. } = self;
         let mut out = formatter.debug_struct("ViewOptions");
         out.field("maps", maps).field("listen", listen).field("keeps_levels", keeps_levels);
@@ -35,7 +35,7 @@ impl fmt::Debug for ViewOptions {
     }
 }
 
-/// Maps that are opened and an address that is listened on: nobody is answered yet.
+/// Opened maps and a listening socket. Requests are answered by [`View::serve`].
 pub struct View {
     server: Server,
     listener: TcpListener,

@@ -4,7 +4,7 @@
 mod cli;
 /// The commands that merge, crop, clear and fade.
 mod cli_edit;
-/// Files that are exported: whole or not there, where they say, and no stranger's.
+/// Exported files: written as a whole or not at all, and never over other files.
 mod cli_export;
 /// Files of other programs, in and out.
 mod cli_formats;
