@@ -4,7 +4,9 @@
 #
 #   python/check.sh [--short] [PYTEST ARGUMENTS]
 #
-# --short leaves out clusters of Dask, the notebooks and pyright, whose three minutes guard what seldom changes.
+# --short leaves out clusters of Dask, the notebooks and pyright, whose three minutes guard what seldom changes, and takes
+# the module that `cargo build --workspace --features voxtile-python/extension-module` has made, from VOXTILE_BIN: a
+# wheel has other features, with which half of the dependencies would compile once more.
 #
 # Needs python3 with venv, and the network for maturin, pytest, mypy and the like. The build is that of the tests, which
 # is made in a few minutes; `maturin build --release` makes the wheel to hand out.
@@ -25,7 +27,17 @@ else
     install ipykernel nbclient pyright
 fi
 install --only-binary :all: pyoctomap || echo "skipped: pyoctomap, which has no wheel for this Python"
-MATURIN_PEP517_ARGS="--profile dev --locked" install .
+if [[ $short ]]; then
+    module=$(realpath "${VOXTILE_BIN:-../target/debug}")/lib_voxtile.so
+    package=$("$python" -c 'import sysconfig; print(sysconfig.get_path("platlib"))')/voxtile
+    install 'numpy>=1.24'
+    cp -r python/voxtile "$package"
+    cp "$module" "$package/_voxtile.abi3.so"
+    printf '#!%s\nfrom voxtile.__main__ import main\nmain()\n' "$python" >"$work/venv/bin/voxtile"
+    chmod +x "$work/venv/bin/voxtile"
+else
+    MATURIN_PEP517_ARGS="--profile dev --locked" install .
+fi
 # Beside the sources, Python would find the package without its module.
 cp -r tests "$work/tests"
 cp -r examples "$work/examples"

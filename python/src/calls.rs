@@ -1,30 +1,38 @@
-//! What the command does with files, in this process: the same options, checks and answers.
+//! What the commands `build` and `export` do, in this process: the same options, checks and answers.
 
 use crate::arrays::object;
-use crate::errors::{exception_of_call, with_keywords};
+use crate::errors::exception_of_any;
+use crate::keywords::Keywords;
 use crate::operations::map_id_of;
+use crate::options::build_options;
 use crate::watched::{Teller, left_to_itself};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use serde_json::Value;
 use std::ffi::OsString;
+use std::path::PathBuf;
 use std::sync::Arc;
-use voxtile::Stop;
-use voxtile_cli::{CallError, Listener, Watch, calls};
+use voxtile::{Error, Stop};
+use voxtile_cli::calls;
+use voxtile_pipeline::{Listener, Watch, build};
 
-/// `voxtile build` with these arguments: a dict, what it prints with `--json`. With `piece_of`, 32 hexadecimal digits,
-/// it makes a piece of the map with this id, which is not durable until `move_piece` has moved it.
+/// Builds a map: a dict, what `voxtile build` prints with `--json`. With `piece_of`, 32 hexadecimal digits, it makes a
+/// piece of the map with this id, which is not durable until `move_piece` has moved it.
 #[pyfunction]
-#[pyo3(signature = (arguments, progress=None, *, piece_of=None))]
+#[pyo3(signature = (scans, output, options, progress=None, *, piece_of=None))]
 pub fn call_build<'py>(
     py: Python<'py>,
-    arguments: Vec<OsString>,
+    scans: PathBuf,
+    output: PathBuf,
+    options: &Bound<'py, PyDict>,
     progress: Option<Py<PyAny>>,
     piece_of: Option<&str>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let piece_of = piece_of.map(|digits| map_id_of(py, "piece_of", digits)).transpose()?;
-    called(py, progress, move |watch| match piece_of {
-        None => calls::build(arguments, watch),
-        Some(map_id) => calls::build_piece(arguments, map_id, watch),
+    let mut options = build_options(py, &scans, output, Keywords::of(options)?)?;
+    options.piece_of = piece_of.map(|digits| map_id_of(py, "piece_of", digits)).transpose()?;
+    called(py, progress, move |watch| {
+        let summary = build(&options, watch)?.ok_or(Error::Stopped)?;
+        Ok(serde_json::to_value(summary)?)
     })
 }
 
@@ -43,7 +51,7 @@ pub fn call_export<'py>(
 fn called<'py>(
     py: Python<'py>,
     callback: Option<Py<PyAny>>,
-    call: impl FnOnce(&Watch) -> Result<Value, CallError> + Send + 'static,
+    call: impl FnOnce(&Watch) -> anyhow::Result<Value> + Send + 'static,
 ) -> PyResult<Bound<'py, PyAny>> {
     let stop = Stop::default();
     let teller = callback.map(|callback| Arc::new(Teller::new(stop.clone(), callback)));
@@ -54,9 +62,6 @@ fn called<'py>(
     if let Some(raised) = teller.and_then(|teller| teller.raised()) {
         return Err(raised);
     }
-    let mut answer = outcome.map_err(|error| exception_of_call(py, &error))?;
-    for remark in answer["remarks"].as_array_mut().into_iter().flatten() {
-        *remark = with_keywords(remark.as_str().unwrap_or_default()).into();
-    }
+    let answer = outcome.map_err(|error| exception_of_any(py, &error))?;
     object(py, &answer)
 }

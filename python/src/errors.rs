@@ -4,38 +4,15 @@ use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::PyDict;
 use voxtile::Error;
-use voxtile_cli::CallError;
 
 /// The exception of an error, with path, tile and offset as attributes.
 pub fn exception(py: Python<'_>, error: &Error) -> PyErr {
     with_details(py, Some(error), format!("{error:#}"))
 }
 
-/// The exception of a command that failed: it names keywords in place of options.
-pub fn exception_of_call(py: Python<'_>, error: &CallError) -> PyErr {
-    with_details(py, error.library_error(), with_keywords(&error.to_string()))
-}
-
-/// A text about options of the command as one about keywords: `max_range` for `--max-range`.
-pub fn with_keywords(text: &str) -> String {
-    let mut named = String::with_capacity(text.len());
-    let mut rest = text;
-    while let Some(at) = rest.find('-') {
-        let (before, option) = rest.split_at(at);
-        named += before;
-        let begins_word = named.chars().next_back().is_none_or(|last| " (`'".contains(last));
-        let end = option.find(|letter: char| !letter.is_ascii_lowercase() && letter != '-');
-        let (option, after) = option.split_at(end.unwrap_or(option.len()));
-        match option.strip_prefix("--") {
-            _ if !begins_word => named += option,
-            Some("insert") => named += "insert_mode",
-            Some(option) if !option.is_empty() => named += &option.replace('-', "_"),
-            None if option == "-o" => named += "output",
-            _ => named += option,
-        }
-        rest = after;
-    }
-    named + rest
+/// The exception of a build or an export that failed, with what it was about.
+pub fn exception_of_any(py: Python<'_>, error: &anyhow::Error) -> PyErr {
+    with_details(py, error.downcast_ref(), format!("{error:#}"))
 }
 
 fn with_details(py: Python<'_>, error: Option<&Error>, message: String) -> PyErr {

@@ -7,7 +7,9 @@
 //! operations     whole maps on disk
 //! remapping      maps that follow the scans that they keep
 //! scan_iterator  files of scans
-//! calls          what the command does with files, in this process
+//! calls          builds and exports, in this process
+//! options        keywords as options
+//! keywords       keyword arguments, taken one by one
 //! command        the command `voxtile`
 //! watched        work beside the interpreter, which Ctrl-C ends
 //! ```
@@ -19,9 +21,11 @@ mod calls;
 mod command;
 mod config;
 mod errors;
+mod keywords;
 mod local_map;
 mod map;
 mod operations;
+mod options;
 mod pose;
 mod questions;
 mod remapping;

@@ -1,21 +1,23 @@
 //! `voxtile.ScanIterator`: the scans of a file or folder, by the command's own readers, and those that a map keeps.
 
 use crate::arrays::{column, rows};
-use crate::errors::{exception, exception_of_call};
+use crate::errors::{exception, exception_of_any};
+use crate::keywords::Keywords;
+use crate::options::{no_stream, read_options};
 use crate::pose::matrix_of;
 use crate::watched::left_to_itself;
 use numpy::{PyArray1, PyArray2};
 use parking_lot::Mutex;
 use pyo3::prelude::*;
-use std::ffi::OsString;
+use pyo3::types::PyDict;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use voxtile::mapper::{KeptScan, KeptScans, MapReader};
 use voxtile::scan::ScanPoints;
 use voxtile::{Pose, Result as Fallible, Stop};
-use voxtile_cli::{CallError, calls};
-use voxtile_formats::{ScanReach, ScanSource, SensorScan};
+use voxtile_formats::{ReadOptions, ScanReach, ScanSource, SensorScan};
+use voxtile_pipeline::Watch;
 
 /// A scan that was read: points in the sensor's frame, and its pose.
 type ReadScan<'py> =
@@ -113,11 +115,45 @@ impl ScanIterator {
     }
 }
 
-/// The scans of a path, read with these arguments of `voxtile build`.
+/// A path, and how it is read.
+struct Input {
+    path: PathBuf,
+    options: ReadOptions,
+    /// Whether something was asked for.
+    has_options: bool,
+}
+
+impl Input {
+    fn of(py: Python<'_>, path: &Path, options: &Bound<'_, PyDict>) -> PyResult<Self> {
+        let mut keywords = Keywords::of(options)?;
+        let read = read_options(py, &mut keywords)?;
+        keywords.end()?;
+        Ok(Self { path: no_stream(path), options: read, has_options: !options.is_empty() })
+    }
+
+    fn open(&self) -> anyhow::Result<Scans> {
+        if self.has_options || !is_map(&self.path) {
+            return Ok(Scans::Input(self.source()?));
+        }
+        let reader = MapReader::open(&self.path, 1)?;
+        let (mut records, mut count) = (reader.kept_scans()?, 0);
+        while records.next_record()?.is_some() {
+            count += 1;
+        }
+        Ok(Scans::Kept(Box::new(reader.kept_scans()?), count))
+    }
+
+    fn source(&self) -> anyhow::Result<Box<dyn ScanSource + Send>> {
+        Ok(voxtile_pipeline::open_scans(&self.path, &self.options, &Watch::nobody())?)
+    }
+}
+
+/// The scans of a path.
 #[pyfunction]
-pub fn open_scans(py: Python<'_>, path: PathBuf, arguments: Vec<OsString>) -> PyResult<ScanIterator> {
-    let opened = left_to_itself(py, &Stop::default(), move || open(&path, arguments))?;
-    let scans = opened.map_err(|error| exception_of_call(py, &error))?;
+pub fn open_scans(py: Python<'_>, path: PathBuf, options: &Bound<'_, PyDict>) -> PyResult<ScanIterator> {
+    let input = Input::of(py, &path, options)?;
+    let opened = left_to_itself(py, &Stop::default(), move || input.open())?;
+    let scans = opened.map_err(|error| exception_of_any(py, &error))?;
     let count = match &scans {
         Scans::Input(scans) => scans.len_hint(),
         Scans::Kept(_, count) => Some(*count),
@@ -128,36 +164,25 @@ pub fn open_scans(py: Python<'_>, path: PathBuf, arguments: Vec<OsString>) -> Py
     })
 }
 
-fn open(path: &Path, arguments: Vec<OsString>) -> Result<Scans, CallError> {
-    if !(arguments.is_empty() && is_map(path)) {
-        return Ok(Scans::Input(calls::open_scans(path, arguments)?));
-    }
-    let reader = MapReader::open(path, 1)?;
-    let (mut records, mut count) = (reader.kept_scans()?, 0);
-    while records.next_record()?.is_some() {
-        count += 1;
-    }
-    Ok(Scans::Kept(Box::new(reader.kept_scans()?), count))
-}
-
 /// Content and bounds of a scan: west, south, east, north.
 type Reach = (String, Option<(f64, f64, f64, f64)>);
 
 /// Reads the scans of a path, and tells of each what tells it from others, 32 hexadecimal digits, and a box around it
 /// and its rays along x and y in metres, `None` if it leaves nothing.
 #[pyfunction]
-#[pyo3(signature = (path, arguments, *, max_range=None, no_return_range=None))]
+#[pyo3(signature = (path, options, *, max_range=None, no_return_range=None))]
 pub fn scan_reaches(
     py: Python<'_>,
     path: PathBuf,
-    arguments: Vec<OsString>,
+    options: &Bound<'_, PyDict>,
     max_range: Option<f64>,
     no_return_range: Option<f64>,
 ) -> PyResult<Vec<Reach>> {
+    let input = Input::of(py, &path, options)?;
     let stop = Stop::default();
     let asked = stop.clone();
-    let reaches = left_to_itself(py, &stop, move || -> Result<Vec<Reach>, CallError> {
-        let (mut scans, mut reaches) = (open(&path, arguments)?, Vec::new());
+    let reaches = left_to_itself(py, &stop, move || -> anyhow::Result<Vec<Reach>> {
+        let (mut scans, mut reaches) = (input.open()?, Vec::new());
         while let Some(scan) = scans.next()? {
             asked.check()?;
             let ScanReach { content, bounds } = ScanReach::of(&scan, max_range, no_return_range);
@@ -166,20 +191,21 @@ pub fn scan_reaches(
         }
         Ok(reaches)
     })?;
-    reaches.map_err(|error| exception_of_call(py, &error))
+    reaches.map_err(|error| exception_of_any(py, &error))
 }
 
 /// The number of scans of a path; where only reading tells it, they are read.
 #[pyfunction]
-pub fn count_scans(py: Python<'_>, path: PathBuf, arguments: Vec<OsString>) -> PyResult<usize> {
-    let counted = left_to_itself(py, &Stop::default(), move || -> Result<usize, CallError> {
-        let mut scans = calls::open_scans(&path, arguments)?;
+pub fn count_scans(py: Python<'_>, path: PathBuf, options: &Bound<'_, PyDict>) -> PyResult<usize> {
+    let input = Input::of(py, &path, options)?;
+    let counted = left_to_itself(py, &Stop::default(), move || -> anyhow::Result<usize> {
+        let mut scans = input.source()?;
         match scans.len_hint() {
             Some(count) => Ok(count),
             None => Ok(scans.skip(usize::MAX)?),
         }
     })?;
-    counted.map_err(|error| exception_of_call(py, &error))
+    counted.map_err(|error| exception_of_any(py, &error))
 }
 
 fn is_map(path: &Path) -> bool {

@@ -70,7 +70,7 @@ impl Iterator for KeptScans {
 
 /// What to do about a map without kept scans.
 const NOT_KEPT: &str =
-    "keeps no scans, so that it cannot be mapped again; build it with --keep-scans to have them";
+    "keeps no scans, so that it cannot be mapped again; build it with `keep_scans` to have them";
 
 /// The error of a map that keeps none.
 pub(super) fn keeps_none(folder: &Path) -> Error {

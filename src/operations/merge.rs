@@ -95,7 +95,7 @@ fn rule_for(maps: &[MapReader], first: &MapReader, prefer: Option<Prefer>) -> Re
         MergeRule::of(first.config(), prefer).ok_or_else(|| {
             let reason = format!(
                 "the maps' sensor model is {}, whose evidence does not add up: say which map's voxels to take with \
-                 --prefer first, last or more-observed",
+                 `prefer` first, last or more-observed",
                 model.name()
             );
             Error::argument("maps", reason)
@@ -212,7 +212,7 @@ pub(super) fn check_model(map: &MapReader, first: &MapReader) -> Result<()> {
     } else {
         return Ok(());
     };
-    let hint = "so that evidence does not add up: say which map's voxels to take with --prefer first, last or more-observed";
+    let hint = "so that evidence does not add up: say which map's voxels to take with `prefer` first, last or more-observed";
     Err(Error::argument(map.folder().display().to_string(), format!("{what}, {hint}")))
 }
 

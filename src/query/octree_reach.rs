@@ -11,13 +11,13 @@ pub(super) fn out_of_reach(grid: &Grid, voxel: VoxelIndex, tiles: Option<&[TileI
     let half_m = f64::from(REACH.end[0]) * grid.resolution_m();
     let (center, width_m) = (grid.center_m(voxel), 2.0 * half_m);
     let hint = match tiles.map(|tiles| origin_for(grid, tiles)) {
-        None => "name a region (--region) inside".to_owned(),
+        None => "name a region (`region`) inside".to_owned(),
         Some(Some([x, y, z])) => {
-            format!("--origin {x} {y} {z} brings all of it into reach, a region (--region) a part")
+            format!("`origin` {x} {y} {z} brings all of it into reach, a region (`region`) a part")
         }
         Some(None) => format!(
-            "no --origin helps, for the map is wider than the {width_m} m that they reach in all: export it region by region \
-             (--region), each with an --origin inside"
+            "no `origin` helps, for the map is wider than the {width_m} m that they reach in all: export it region by region \
+             (`region`), each with an `origin` inside"
         ),
     };
     let reason = format!(

@@ -144,7 +144,6 @@ mod tests {
     use crate::scratch::Scratch;
     use crate::space::TileIndex;
     use std::collections::BTreeMap;
-    use std::io::Cursor;
     use std::path::Path;
 
     /// The updates of each tile, packed, in order.
@@ -192,7 +191,7 @@ mod tests {
             add(part, &mut found);
             Ok(())
         };
-        let make_scratch = || Ok(Box::new(Cursor::new(Vec::new())) as Box<dyn Scratch>);
+        let make_scratch = || Ok(Box::new(Vec::new()) as Box<dyn Scratch>);
         let overflow = Overflow {
             max_bytes: MAX_BYTES,
             max_tiles: usize::MAX,

@@ -14,7 +14,7 @@ use crate::space::{
 };
 use proptest::prelude::*;
 use std::collections::BTreeMap;
-use std::io::{self, Cursor};
+use std::io;
 use std::path::Path;
 
 /// The updates of each voxel, in order: `None` for a miss, the bits of the intensity for a hit. By tile, code of the
@@ -101,7 +101,7 @@ impl Setting {
             }
             Ok(())
         };
-        let make_scratch = &|| Ok(Box::new(Cursor::new(Vec::new())) as Box<dyn Scratch>);
+        let make_scratch = &|| Ok(Box::new(Vec::new()) as Box<dyn Scratch>);
         let folder = Path::new("map");
         let overflow = Overflow { max_bytes, max_tiles: usize::MAX, folder, make_scratch, spill: &mut spill };
         let ScanUpdates { tiles, report } =

@@ -7,6 +7,7 @@ use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 use std::time::Duration;
+use voxtile_scratch::ScratchFile;
 
 /// The real file system.
 #[derive(Clone, Copy, Debug, Default)]
@@ -121,7 +122,7 @@ impl Disk for FsDisk {
     }
 
     fn scratch(&self, folder: &Path) -> io::Result<Box<dyn Scratch>> {
-        Ok(Box::new(tempfile::tempfile_in(folder)?))
+        Ok(Box::new(ScratchFile::in_folder(folder)?))
     }
 
     fn kind(&self, path: &Path) -> io::Result<Option<EntryKind>> {

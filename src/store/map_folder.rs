@@ -18,7 +18,7 @@ pub(super) fn check_is_free(disk: &dyn Disk, folder: &Path) -> Result<()> {
     if names.iter().all(|name| leftovers.contains(&name.as_str())) {
         return Ok(());
     }
-    let hint = "open it, name --append to add scans to it, or choose an empty folder";
+    let hint = "open it, name `append` to add scans to it, or choose an empty folder";
     Err(Error::AlreadyExists { path: folder.to_owned(), hint })
 }
 

@@ -109,7 +109,7 @@ impl Earlier {
         }
         let path = folder.to_owned();
         if !replaces {
-            let hint = "choose a folder that does not exist yet; or replace an earlier state of the map with --replace";
+            let hint = "choose a folder that does not exist yet; or replace an earlier state of the map with `replace`";
             return Err(Error::AlreadyExists { path, hint });
         }
         let lock = WriterLock::take(disk, &Layout::new(folder))?;

@@ -13,9 +13,9 @@ use voxtile_pipeline::{BuildOptions, SensorModelKind, build};
 pub fn run(args: &BuildArgs) -> anyhow::Result<ExitCode> {
     let watch = at_terminal(stop_signal::catch()?);
     let Some(built) = build(&options_of(args)?, &watch)? else { return Ok(stopped_early(args)) };
-    summary::print(&built, args.json)?;
-    if built.interrupted {
-        let all = built.resumed_after + built.scans;
+    let (interrupted, all) = (built.interrupted, built.resumed_after + built.scans);
+    summary::print(built, args.json)?;
+    if interrupted {
         say(format_args!("stopped after {all} scans; all of them are in the map; --resume goes on"));
         return Ok(ExitCode::from(INTERRUPTED));
     }

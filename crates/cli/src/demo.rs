@@ -68,7 +68,7 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<ExitCode> {
     }
     let mut built = Summary::of(&map, inserted, report, &mapper, started.elapsed())?;
     built.resumed_after = done;
-    summary::print(&built, args.json)?;
+    summary::print(built, args.json)?;
     drop(mapper);
 
     let picture = args.out.join("map.png");

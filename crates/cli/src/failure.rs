@@ -1,5 +1,6 @@
 use crate::args::Command;
 use crate::json;
+use crate::option_names::{option_of, with_options};
 use crate::output_file::is_standard_output;
 use crate::run::{INTERRUPTED, say};
 use serde::Serialize;
@@ -24,7 +25,7 @@ struct Failure<'a> {
     kind: &'a str,
     message: &'a str,
     #[serde(skip_serializing_if = "Option::is_none")]
-    argument: Option<&'a str>,
+    argument: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     path: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -96,7 +97,7 @@ impl<'a> Failure<'a> {
             kind: error.map_or("other", Error::kind),
             message,
             argument: match error {
-                Some(Error::InvalidArgument { argument, .. }) => Some(argument),
+                Some(Error::InvalidArgument { argument, .. }) => Some(option_of(argument)),
                 _ => None,
             },
             path: error.and_then(Error::path).map(|path| path.display().to_string()),
@@ -108,12 +109,18 @@ impl<'a> Failure<'a> {
     }
 }
 
-/// The error with its causes. Of files and programs, errors tell the name.
+/// The error with its causes, and fields as options. Of files and programs, errors tell the name.
 pub fn message_of(error: &anyhow::Error) -> String {
-    match error.chain().next().and_then(|first| first.downcast_ref::<io::Error>()) {
-        Some(error) => format!("standard output: cannot write: {error}"),
-        None => format!("{error:#}"),
+    if let Some(error) = error.chain().next().and_then(|first| first.downcast_ref::<io::Error>()) {
+        return format!("standard output: cannot write: {error}");
     }
+    let causes = error.chain().map(|cause| match cause.downcast_ref::<Error>() {
+        Some(Error::InvalidArgument { argument, reason }) => {
+            format!("{}: {}", option_of(argument), with_options(reason))
+        }
+        _ => with_options(&cause.to_string()).into_owned(),
+    });
+    causes.collect::<Vec<_>>().join(": ")
 }
 
 /// 2 for what the user can put right on the command line, 1 for everything else.

@@ -6,7 +6,6 @@
 
 mod args;
 mod build;
-mod call_error;
 pub mod calls;
 mod clear;
 mod completions;
@@ -32,6 +31,7 @@ mod man;
 mod merge;
 mod octree_choice;
 mod octree_info;
+mod option_names;
 mod output_file;
 mod part;
 mod picture;
@@ -65,6 +65,4 @@ mod verify;
 mod view;
 mod written;
 
-pub use call_error::CallError;
 pub use run::{main, run};
-pub use voxtile_pipeline::{Listener, Watch};

@@ -1,16 +1,12 @@
 use crate::args::PartArgs;
+use voxtile::Result;
 use voxtile::operations::Part;
 use voxtile::space::{Aabb, Point};
-use voxtile::{Error, Result};
+use voxtile_pipeline::numbers;
 
-/// The box of a `--region`: six numbers that the argument parser has counted.
+/// The box of a `--region`.
 pub fn region_of(corners: &[f64]) -> Result<Aabb> {
-    let (lower, upper) = corners.split_at(corners.len().min(3));
-    let region = Aabb { min: point_of(lower), max: point_of(upper) };
-    if (0..3).all(|k| region.min[k] < region.max[k]) {
-        return Ok(region);
-    }
-    Err(Error::argument("--region", "needs X0 < X1, Y0 < Y1 and Z0 < Z1"))
+    numbers::region_of("region", corners)
 }
 
 /// The part of space that a command is about.

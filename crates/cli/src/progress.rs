@@ -1,3 +1,4 @@
+use crate::option_names::with_options;
 use indicatif::{HumanBytes, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use parking_lot::Mutex;
 use std::io::{self, Write};
@@ -31,12 +32,13 @@ static ARE_HIDDEN: AtomicBool = AtomicBool::new(false);
 /// The bar that was made last, if it is still there.
 static SHOWN: Mutex<Option<ProgressBar>> = Mutex::new(None);
 
-/// Standard error for the log, whose lines go above the bar.
+/// Standard error for the log, whose lines go above the bar and name options.
 pub struct AboveBar;
 
 impl Write for AboveBar {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        let write = || io::stderr().write_all(bytes).map(|()| bytes.len());
+        let line = String::from_utf8_lossy(bytes);
+        let write = || io::stderr().write_all(with_options(&line).as_bytes()).map(|()| bytes.len());
         let shown = SHOWN.lock().clone();
         shown.map_or_else(write, |bar| bar.suspend(write))
     }

@@ -2,7 +2,6 @@ use crate::args::{InsertName, ModelName, RemapArgs};
 use crate::json;
 use voxtile_pipeline::{MapAt, whole_map};
 
-use crate::read_options::{pose_of, tolerance_ns};
 use crate::rework::{self, Job};
 use indicatif::HumanCount;
 use serde::Serialize;
@@ -17,6 +16,7 @@ use voxtile::space::Grid;
 use voxtile::{Error, InsertMode, MapConfig, MemoryLimit, RayConfig};
 use voxtile_formats::clouds::Budget;
 use voxtile_pipeline::memory;
+use voxtile_pipeline::numbers::{Mount, tolerance_ns};
 use voxtile_pipeline::{PoseFile, poses_for, records_of};
 
 #[derive(Serialize)]
@@ -170,7 +170,7 @@ fn rays_of(args: &RemapArgs, own: &RayConfig) -> RayConfig {
 
 /// How the new poses are read.
 fn pose_file<'a>(args: &'a RemapArgs, path: &'a Path) -> voxtile::Result<PoseFile<'a>> {
-    let body_from_sensor = args.extrinsic.as_deref().map(pose_of).transpose()?.map(|(rigid, _)| rigid);
+    let body_from_sensor = args.extrinsic.as_deref().map(Mount::of).transpose()?.map(|mount| mount.rigid);
     let tolerance_ns = tolerance_ns(args.pose_tolerance)?;
     // Where builds put what they cannot hold: the system's folder may be in memory.
     let scratch = args.map.ancestors().skip(1).find(|folder| folder.is_dir()).unwrap_or(Path::new("."));

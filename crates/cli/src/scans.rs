@@ -1,5 +1,6 @@
 use crate::args::ScansArgs;
 use crate::json;
+use crate::option_names::with_options;
 use crate::progress::{Progress, at_terminal};
 use crate::read_options::read_options;
 use crate::stop_signal;
@@ -142,7 +143,7 @@ fn of_input(args: &ScansArgs, out: &mut impl Write) -> anyhow::Result<Overview> 
         watch.stop().check()?;
     }
     overview.fields = source.fields();
-    overview.remarks = source.remarks();
+    overview.remarks = source.remarks().iter().map(|remark| with_options(remark).into_owned()).collect();
     Ok(overview)
 }
 

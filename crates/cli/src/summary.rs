@@ -1,4 +1,5 @@
 use crate::json;
+use crate::option_names::with_options;
 use crate::region_tiles;
 use indicatif::{HumanBytes, HumanCount};
 use std::io::Write;
@@ -8,10 +9,13 @@ use voxtile::tile::{OctreeStatistics, TileCounts};
 use voxtile_pipeline::{OctreeWork, Summary};
 
 /// Prints what a build did, for a person or as JSON.
-pub fn print(summary: &Summary, json: bool) -> anyhow::Result<()> {
+pub fn print(mut summary: Summary, json: bool) -> anyhow::Result<()> {
+    for text in summary.remarks.iter_mut().chain(&mut summary.unread) {
+        *text = with_options(text).into_owned();
+    }
     let mut out = std::io::stdout().lock();
     if json {
-        return json::print(summary, &mut out);
+        return json::print(&summary, &mut out);
     }
     let ScanReport { points, skipped, cut_at_max_range, .. } = summary.report;
     let rate = summary.scans as f64 / summary.seconds.max(1e-9);
@@ -57,7 +61,7 @@ pub fn print(summary: &Summary, json: bool) -> anyhow::Result<()> {
     if let Some(octrees) = &summary.octrees {
         print_octrees(octrees, &mut out)?;
     }
-    print_io(summary, &mut out)?;
+    print_io(&summary, &mut out)?;
     if let Some(bytes) = summary.peak_rss_bytes {
         writeln!(out, "memory    {} at most", HumanBytes(bytes))?;
     }

@@ -180,8 +180,8 @@ fn poses_for(path: &Path, options: &ReadOptions, has_own: bool, clouds: Option<u
         None if options.clouds.may_lack_poses => Ok(CloudPoses::Missing),
         None => {
             let reason = "has no poses, and there is no poses_tum.txt or poses_kitti.txt in or beside it: name a file with \
-                          --poses FILE, or say --poses identity if all scans are in the world frame; --sensor-origin X Y Z is \
-                          for one station, --no-rays for points alone";
+                          `poses` FILE, or say `poses` identity if all scans are in the world frame; `sensor_origin` X Y Z is \
+                          for one station, `no_rays` for points alone";
             Err(Error::argument(path.display().to_string(), reason))
         }
     }

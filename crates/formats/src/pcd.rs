@@ -7,6 +7,7 @@ use std::path::Path;
 use voxtile::scan::Pose;
 use voxtile::space::Point;
 use voxtile::{Error, FormatError};
+use voxtile_scratch::ScratchFile;
 
 /// The points of a PCD file.
 #[derive(Clone, Debug)]
@@ -281,7 +282,7 @@ fn read_compressed(
 /// The decompressed values, field after field.
 enum Fields {
     InMemory(Vec<u8>),
-    InFile(File),
+    InFile(ScratchFile),
 }
 
 impl Fields {
@@ -306,15 +307,9 @@ impl Fields {
         let stride = field.size * field.count;
         let at = field.offset * header.points + first * stride;
         let bytes = count * stride;
-        let mut read = Vec::new();
         let bytes = match self {
             Self::InMemory(all) => all.get(at..at + bytes).ok_or(io::ErrorKind::UnexpectedEof)?,
-            Self::InFile(file) => {
-                read.resize(bytes, 0);
-                file.seek(SeekFrom::Start(at as u64))?;
-                file.read_exact(&mut read)?;
-                &*read
-            }
+            Self::InFile(file) => file.bytes(at as u64, bytes)?,
         };
         values.clear();
         values.extend(bytes.chunks_exact(stride).map(|point| number(field.kind, &point[..field.size])));

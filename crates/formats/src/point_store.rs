@@ -1,11 +1,10 @@
-use std::fs::File;
-use std::io::{Read, Seek, SeekFrom, Write};
+use std::io;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
 use voxtile::scan::TakePoints;
 use voxtile::space::Point;
 use voxtile::{Error, Result};
+use voxtile_scratch::{ScratchFile, Window};
 
 /// The points of one scan in the sensor's frame, in metres: in memory up to a limit, the rest in a temporary file.
 ///
@@ -17,7 +16,7 @@ pub struct PointStore {
     intensities: Option<Vec<f32>>,
     /// Number of points before these, in the file.
     filed: usize,
-    file: Option<Mutex<File>>,
+    file: Option<ScratchFile>,
     room: PointRoom,
 }
 
@@ -55,8 +54,8 @@ impl PointRoom {
     }
 
     /// An unnamed file in this folder.
-    pub(super) fn file(&self) -> Result<File> {
-        tempfile::tempfile_in(&self.folder).map_err(|error| {
+    pub(super) fn file(&self) -> Result<ScratchFile> {
+        ScratchFile::in_folder(&self.folder).map_err(|error| {
             Error::io(&self.folder, "keep the points of a scan in a temporary file in", error)
         })
     }
@@ -131,7 +130,7 @@ impl PointStore {
     #[cold]
     fn put_in_file(&mut self) -> Result<()> {
         let mut file = match self.file.take() {
-            Some(file) => file.into_inner().unwrap_or_else(PoisonError::into_inner),
+            Some(file) => file,
             None => self.room.file()?,
         };
         let cannot =
@@ -144,14 +143,14 @@ impl PointStore {
                 bytes.extend_from_slice(bytemuck::bytes_of(point));
                 bytes.extend_from_slice(bytemuck::bytes_of(&intensity));
             }
-            file.write_all(&bytes).map_err(cannot)?;
+            file.append(&bytes).map_err(cannot)?;
         }
         self.filed += self.points.len();
         self.points.clear();
         if let Some(intensities) = &mut self.intensities {
             intensities.clear();
         }
-        self.file = Some(Mutex::new(file));
+        self.file = Some(file);
         Ok(())
     }
 
@@ -180,10 +179,10 @@ impl PointStore {
         let in_file = range.start.min(self.filed)..range.end.min(self.filed);
         let in_memory = range.start.max(self.filed) - self.filed..range.end.max(self.filed) - self.filed;
         let mut next = in_file.start;
-        let (mut bytes, mut points, mut intensities) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut points, mut intensities) = (Vec::new(), Vec::new());
         while next < in_file.end {
             let count = (in_file.end - next).min(POINTS_AT_A_TIME);
-            self.read(next, count, &mut bytes)?;
+            let bytes = self.window(next, count)?;
             points.clear();
             intensities.clear();
             for record in bytes.chunks_exact(RECORD_BYTES) {
@@ -206,12 +205,13 @@ impl PointStore {
         Ok(())
     }
 
-    fn read(&self, first: usize, count: usize, bytes: &mut Vec<u8>) -> Result<()> {
-        let Some(file) = &self.file else { return Ok(()) };
-        let mut file = file.lock().unwrap_or_else(PoisonError::into_inner);
-        bytes.resize(count * RECORD_BYTES, 0);
-        let at = SeekFrom::Start((first * RECORD_BYTES) as u64);
-        file.seek(at).and_then(|_| file.read_exact(bytes)).map_err(|error| {
+    /// The records of points in the file.
+    fn window(&self, first: usize, count: usize) -> Result<Window> {
+        let window = match &self.file {
+            Some(file) => file.window((first * RECORD_BYTES) as u64, count * RECORD_BYTES),
+            None => Err(io::ErrorKind::UnexpectedEof.into()),
+        };
+        window.map_err(|error| {
             Error::io(self.room.folder(), "read the points of a scan back from a temporary file in", error)
         })
     }

@@ -98,7 +98,7 @@ impl PosedClouds {
     ) -> Result<Self> {
         if options.is_deskewed && options.is_world_frame {
             let reason = "points that are in the world frame already have no motion left in them; leave one of the two out";
-            return Err(Error::argument("--deskew, --world-frame", reason));
+            return Err(Error::argument("deskew, world_frame", reason));
         }
         if let CloudPoses::File(_, trajectory) = &poses
             && !trajectory.has_stamps()
@@ -141,7 +141,7 @@ impl PosedClouds {
                     Found::Gap { gap_ns } => {
                         let gap_s = gap_ns as f64 * 1e-9;
                         Err(format!(
-                            "the poses around it are {gap_s:.3} s apart; --pose-tolerance allows for more"
+                            "the poses around it are {gap_s:.3} s apart; `pose_tolerance` allows for more"
                         ))
                     }
                     Found::Before { first_ns } => Err(outside(first_ns, stamp_ns, "before the first pose")),
@@ -337,8 +337,8 @@ impl ScanSource for PosedClouds {
                 why = self.source.remarks().into_iter().fold(why, |why, remark| why + "; " + &remark);
             }
             let reason = format!(
-                "none of its {} clouds has a pose ({why}); name a file of poses with --poses FILE, or map points alone \
-                     with --no-rays",
+                "none of its {} clouds has a pose ({why}); name a file of poses with `poses` FILE, or map points alone \
+                     with `no_rays`",
                 self.without_pose
             );
             return Err(Error::argument(self.path.display().to_string(), reason));
@@ -409,14 +409,14 @@ impl ScanSource for PosedClouds {
         if self.without_times > 0 {
             let clouds = if self.without_times == 1 { "cloud has" } else { "clouds have" };
             remarks.push(format!(
-                "{} {clouds} no times of points, or no stamp: --deskew moved nothing there",
+                "{} {clouds} no times of points, or no stamp: `deskew` moved nothing there",
                 self.without_times
             ));
         }
         if self.stayed > 0 {
             let points = if self.stayed == 1 { "point" } else { "points" };
             remarks.push(format!(
-                "{} {points} stayed: no pose is known at their own times (--deskew)",
+                "{} {points} stayed: no pose is known at their own times (`deskew`)",
                 self.stayed
             ));
         }

@@ -38,11 +38,11 @@ impl ReadOptions {
         if self.open.depth_scale.is_some() {
             let reason = "depth images of a recording say themselves what they are in, 16UC1 millimetres and 32FC1 metres: \
                           leave it out";
-            return Err(Error::argument("--depth-scale", reason));
+            return Err(Error::argument("depth_scale", reason));
         }
         if self.open.intrinsics_path.is_some() || self.open.intrinsics.is_some() {
             let reason = "the camera of a recording is in the topic `camera_info` beside its depth images: leave it out";
-            return Err(Error::argument("--intrinsics", reason));
+            return Err(Error::argument("intrinsics", reason));
         }
         Ok(())
     }

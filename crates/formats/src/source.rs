@@ -144,9 +144,7 @@ pub fn open_scans(path: &Path, poses: Option<&Path>) -> Result<Box<dyn ScanSourc
     };
     let needs_no_poses = |kind: &str| match poses {
         None => Ok(()),
-        Some(_) => {
-            Err(Error::argument("--poses", format!("a {kind} has its own poses; leave the option out")))
-        }
+        Some(_) => Err(Error::argument("poses", format!("a {kind} has its own poses; leave the option out"))),
     };
     match extension.to_ascii_lowercase().as_str() {
         _ if metadata.is_dir() => Ok(Box::new(PcdFolder::open(path, poses)?)),

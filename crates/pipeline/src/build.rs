@@ -39,6 +39,7 @@ const ROOM_TO_GO_TOGETHER: usize = 3 << 20;
 pub fn build(options: &BuildOptions, watch: &Watch) -> anyhow::Result<Option<Summary>> {
     let started = Instant::now();
     let stop = watch.stop();
+    check_combinations(options)?;
     let exists = exists(options)?;
     let config = if exists { config_to_go_on(options)? } else { config_to_create(options)? };
     check_no_rays(options, &config)?;
@@ -217,7 +218,18 @@ fn check_no_rays(options: &BuildOptions, config: &MapConfig) -> voxtile::Result<
     }
     let reason = "points without rays are no scans, which a map could keep; leave one of the two out, or build \
                   another map";
-    Err(Error::argument("--no-rays, --keep-scans", reason))
+    Err(Error::argument("no_rays, keep_scans", reason))
+}
+
+/// What makes sense only beside something else.
+fn check_combinations(options: &BuildOptions) -> voxtile::Result<()> {
+    if options.again && (options.resume || !options.append) {
+        return Err(Error::argument("again", "goes with `append`, and without `resume`"));
+    }
+    if options.read.calib.is_some() && options.read.poses.is_none() {
+        return Err(Error::argument("calib", "belongs to a file of poses; name it with `poses`"));
+    }
+    Ok(())
 }
 
 /// Only scans that come by themselves can come too fast.
@@ -228,7 +240,7 @@ fn check_when_behind(options: &BuildOptions) -> voxtile::Result<()> {
     }
     let reason =
         "files wait until they are read: leave it out, or give the scans as they come, as - or a pipe";
-    Err(Error::argument("--when-behind", reason))
+    Err(Error::argument("when_behind", reason))
 }
 
 fn flush_if(
@@ -256,7 +268,7 @@ fn flush_if(
 fn say_what_is_safe(error: Error, mapper: &OutOfCoreTileMapper) -> anyhow::Error {
     let (folder, scan_number) = (mapper.folder(), mapper.flushed_scan_number());
     anyhow::Error::new(error).context(format!(
-        "{}: the map is as of scan {scan_number}; once the cause is gone, the same command with --resume \
+        "{}: the map is as of scan {scan_number}; once the cause is gone, the same command with `resume` \
          goes on from there",
         folder.display()
     ))
@@ -273,7 +285,7 @@ fn place_of_map(options: &BuildOptions) -> MapPath {
 /// Whether there is a map to go on with.
 fn exists(options: &BuildOptions) -> anyhow::Result<bool> {
     if options.output.is_file() {
-        let reason = "is a file; a map is a folder, name another -o";
+        let reason = "is a file; a map is a folder, name another `output`";
         return Err(Error::argument(options.output.display().to_string(), reason).into());
     }
     let exists = match MapReader::open(&options.output, 1) {
@@ -282,7 +294,7 @@ fn exists(options: &BuildOptions) -> anyhow::Result<bool> {
         _ => true,
     };
     if exists && !options.append && !options.resume {
-        let hint = "use --resume to go on with these scans, --append to add them to it, or another -o";
+        let hint = "use `resume` to go on with these scans, `append` to add them to it, or another `output`";
         return Err(Error::AlreadyExists { path: options.output.clone(), hint }.into());
     }
     if !exists && options.append && !options.resume {
@@ -364,7 +376,7 @@ fn begin(
         let (path, what) = (options.output.clone(), "been built from input");
         let error = anyhow::Error::from(Error::Mismatch { path, what, found, wanted });
         return Err(error.context(
-            "--resume takes what came since of an input that the map has; --append adds another one",
+            "`resume` takes what came since of an input that the map has; `append` adds another one",
         ));
     }
     let content = options.piece_of.is_none().then(|| intake.content());
@@ -391,7 +403,7 @@ fn check_begun(
 ) -> voxtile::Result<()> {
     match input.is_hits_alone {
         Some(begun) if begun != options.no_rays => {
-            let how = |is_hits_alone| if is_hits_alone { "points alone (--no-rays)" } else { "rays" };
+            let how = |is_hits_alone| if is_hits_alone { "points alone (`no_rays`)" } else { "rays" };
             let (found, wanted) = (how(begun).to_owned(), how(options.no_rays).to_owned());
             let what = "been built of this input with";
             Err(Error::Mismatch { path: options.output.clone(), what, found, wanted })
@@ -417,8 +429,8 @@ fn check_crs(options: &BuildOptions, found: Option<&String>, own: Option<&String
 
 fn taken_before(options: &BuildOptions, name: &str, scans: u64) -> anyhow::Error {
     let reason = format!(
-        "the map has {scans} scans of an input that begins as this one does ({name}); --resume takes what came since, \
-         and --append --again adds all of them once more"
+        "the map has {scans} scans of an input that begins as this one does ({name}); `resume` takes what came since, \
+         and `append` `again` adds all of them once more"
     );
     Error::argument(options.scans.display().to_string(), reason).into()
 }
@@ -483,9 +495,9 @@ fn all_is_cut(report: &ScanReport, config: &MapConfig) -> Option<String> {
     let range_m = config.rays.max_range_m?;
     (cut_at_max_range > 0 && cut_at_max_range + skipped == points).then(|| {
         format!(
-            "all {cut_at_max_range} rays were cut at {range_m} m, so that nothing is occupied: raise --max-range; are \
-             the points in metres? Points that are in the world frame already, far from 0 0 0, need --world-frame \
-             with poses, --sensor-origin or --no-rays"
+            "all {cut_at_max_range} rays were cut at {range_m} m, so that nothing is occupied: raise `max_range`; are \
+             the points in metres? Points that are in the world frame already, far from 0 0 0, need `world_frame` \
+             with poses, `sensor_origin` or `no_rays`"
         )
     })
 }

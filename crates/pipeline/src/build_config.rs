@@ -52,10 +52,10 @@ fn name_the_option(error: Error) -> anyhow::Error {
     match error {
         Error::Grid(GridError::NotWhole { smaller_m, larger_m, .. }) => {
             let fitting = match smaller_m == larger_m {
-                true => format!("--tile-size {smaller_m}"),
-                false => format!("--tile-size {smaller_m} or --tile-size {larger_m}"),
+                true => format!("`tile_size` {smaller_m}"),
+                false => format!("`tile_size` {smaller_m} or `tile_size` {larger_m}"),
             };
-            anyhow::Error::new(error).context(format!("add {fitting}, or choose another --resolution"))
+            anyhow::Error::new(error).context(format!("add {fitting}, or choose another `resolution`"))
         }
         error => error.into(),
     }
@@ -65,7 +65,7 @@ fn check_storage(options: &BuildOptions, own: Storage) -> voxtile::Result<()> {
     match options.storage {
         Some(wanted) if wanted != own => {
             let reason = format!("the map's tiles are stored as {own}; leave it out, or convert the map");
-            Err(Error::argument("--storage", reason))
+            Err(Error::argument("storage", reason))
         }
         _ => Ok(()),
     }
@@ -74,7 +74,7 @@ fn check_storage(options: &BuildOptions, own: Storage) -> voxtile::Result<()> {
 fn check_threshold(options: &BuildOptions, own: f64) -> voxtile::Result<()> {
     match options.occupancy_threshold {
         Some(wanted) if wanted != own => {
-            Err(Error::argument("--occupancy-threshold", format!("the map's is {own}; leave it out")))
+            Err(Error::argument("occupancy_threshold", format!("the map's is {own}; leave it out")))
         }
         _ => Ok(()),
     }
@@ -116,15 +116,15 @@ fn sensor_model(options: &BuildOptions, own: SensorModel) -> anyhow::Result<Sens
         (Some(SensorModelKind::Iwlo), _) => SensorModel::Iwlo(Iwlo::default()),
     };
     if options.probabilities.is_some() && !matches!(model, SensorModel::LogOdds(_)) {
-        return Err(Error::argument("--probabilities", "only the sensor model log-odds has these").into());
+        return Err(Error::argument("probabilities", "only the sensor model log-odds has these").into());
     }
     if let Some([hit, miss, least, most]) = options.probabilities {
         return Ok(SensorModel::LogOdds(LogOdds::from_probabilities(hit, miss, least, most)?));
     }
     let SensorModel::Iwlo(mut iwlo) = model else {
         if options.intensity_threshold.is_some() || options.intensity_max.is_some() {
-            let reason = "only the sensor model iwlo has these; add --sensor-model iwlo";
-            return Err(Error::argument("--intensity-threshold, --intensity-max", reason).into());
+            let reason = "only the sensor model iwlo has these; add `sensor_model` iwlo";
+            return Err(Error::argument("intensity_threshold, intensity_max", reason).into());
         }
         return Ok(model);
     };

@@ -218,7 +218,7 @@ impl Intake {
         };
         Err(self.wrong(format!(
             "of its first {} scans, the map has taken all, but {differs} those that it took: what changed cannot be taken \
-             back; build another map, or add all of them once more with --append --again",
+             back; build another map, or add all of them once more with `append` `again`",
             content.scans
         )))
     }
@@ -309,8 +309,8 @@ impl Intake {
         };
         if let Some(excess) = excess {
             let context = format!(
-                "more than {excess} of one input cannot be read: copy or repair the input and go on with --resume, or \
-                 build from later scans with --first"
+                "more than {excess} of one input cannot be read: copy or repair the input and go on with `resume`, or \
+                 build from later scans with `first`"
             );
             return Err(anyhow::Error::new(error).context(context));
         }
@@ -363,7 +363,7 @@ impl RayNeeds {
             let StoredScan { name, .. } = scan;
             let reason = format!(
                 "the sensor of scan {name} is at {origin:?} m, which is not finite or too far away for a voxel index: \
-                 mend its pose, or leave the scan out with --skip-bad"
+                 mend its pose, or leave the scan out with `skip_bad`"
             );
             return Err(FormatError::at_record(number, reason).in_input(input));
         }

@@ -6,6 +6,7 @@
 //!   scans of a file, folder, map, bucket or pipe                    scan_input, kept_source, fetched_source
 //!   -> ScanReader, in a thread of its own -> ScanQueue -> Intake    scan_reader, scan_queue, intake
 //!   -> a mapper -> Summary                                          summary
+//! numbers: lists of numbers that all front ends have                numbers
 //! Watch: ends work, and hears how far it is                         watch
 //! ```
 
@@ -21,6 +22,7 @@ mod kept_source;
 mod map_at;
 pub mod memory;
 mod new_poses;
+pub mod numbers;
 pub mod octree_file;
 pub mod place;
 mod region_tiles;

@@ -153,7 +153,7 @@ fn by_time(
         0 => String::new(),
         more => format!(" and {more} more"),
     };
-    let reason = format!("has no pose near in time for scan {named}{more}; --pose-tolerance allows for more");
+    let reason = format!("has no pose near in time for scan {named}{more}; `pose_tolerance` allows for more");
     Err(Error::argument(file.display().to_string(), reason))
 }
 

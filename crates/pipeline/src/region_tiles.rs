@@ -12,6 +12,6 @@ pub fn tiles_of(region: &Aabb, grid: &Grid) -> Result<TileBox> {
             "no tile has its center in {region}; tiles are {} m long, and a region is made of whole ones",
             grid.tile_size_m()
         );
-        Error::argument("--region", reason)
+        Error::argument("region", reason)
     })
 }

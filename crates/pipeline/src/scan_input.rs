@@ -34,7 +34,7 @@ pub fn open(scans: &Path, options: &ReadOptions, watch: &Watch) -> Result<Box<dy
         return open_any_scans(scans, options);
     }
     if options.poses.is_some() {
-        return Err(Error::argument("--poses", "a scan stream has its own poses; leave the option out"));
+        return Err(Error::argument("poses", "a scan stream has its own poses; leave the option out"));
     }
     let input = BufReader::with_capacity(1 << 18, stdin());
     let stream = read_scan_stream(input, Path::new("standard input"), false)?;

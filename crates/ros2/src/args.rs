@@ -6,6 +6,7 @@ use crate::when_behind::WhenBehind;
 use anyhow::ensure;
 use bytesize::ByteSize;
 use clap::Parser;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::path::PathBuf;
 use std::time::Duration;
 use voxtile::sensor::LogOdds;
@@ -15,7 +16,8 @@ use voxtile_local::LocalParameters;
 const DEFAULT_INFLATION_M: f64 = 0.2;
 
 /// Map what the sensors of a robot see, from ROS 2, into a map of voxtile. Lengths are metres, times seconds.
-#[derive(Clone, Debug, Parser)]
+// Options of a command line for clap, parameters of ROS for serde: the same names, types and limits.
+#[derive(Clone, Debug, Parser, Serialize, Deserialize)]
 #[command(name = "voxtile-ros2", version, max_term_width = 80, args_override_self = true)]
 pub struct Args {
     /// Folder of the map; made if it is not there, gone on with if it is
@@ -26,6 +28,7 @@ pub struct Args {
     pub params_file: Vec<PathBuf>,
     /// Topic of clouds (sensor_msgs/PointCloud2); give it again for each sensor
     #[arg(long, value_name = "TOPIC", default_value = "cloud_in")]
+    #[serde(deserialize_with = "one_or_more")]
     pub cloud: Vec<String>,
     /// Frame of the map
     #[arg(long, value_name = "FRAME", default_value = "map")]
@@ -39,13 +42,16 @@ pub struct Args {
     pub path: Option<String>,
     /// A path by which no scan moves farther than this, or turns by half a degree, changes nothing
     #[arg(long, value_name = "M", default_value_t = 0.05, value_parser = metres, allow_negative_numbers = true)]
+    #[serde(deserialize_with = "metres_of")]
     pub path_tolerance: f64,
     /// How long a cloud waits for the transforms around its stamp before it is dropped
     #[arg(long, value_name = "S", default_value = "1", value_parser = seconds, allow_negative_numbers = true)]
+    #[serde(serialize_with = "as_seconds", deserialize_with = "seconds_of")]
     pub transform_wait: Duration,
     /// Most seconds from a cloud to the nearer of the transforms of a frame around it; gaps of up to twice as long
     /// are filled
     #[arg(long, value_name = "S", default_value = "0.5", value_parser = seconds, allow_negative_numbers = true)]
+    #[serde(serialize_with = "as_seconds", deserialize_with = "seconds_of")]
     pub pose_tolerance: Duration,
 
     /// Edge of a voxel of a new map
@@ -77,6 +83,7 @@ pub struct Args {
     pub keep_scans: bool,
     /// Memory for the map and for clouds until they are mapped; the clouds get an eighth, and remapping for --path a quarter
     #[arg(long, value_name = "SIZE", default_value = "1GiB")]
+    #[serde(serialize_with = "as_bytes")]
     pub memory: ByteSize,
     /// Flush so often
     #[arg(long, value_name = "S", default_value_t = 10.0)]
@@ -128,6 +135,7 @@ pub struct Args {
     pub transport: TransportName,
     /// Router of Zenoh; give it again for each
     #[arg(long, value_name = "ENDPOINT", default_value = "tcp/localhost:7447")]
+    #[serde(deserialize_with = "one_or_more")]
     pub zenoh_router: Vec<String>,
     /// Configuration of Zenoh (JSON5), instead of --zenoh-router and --network
     #[arg(long, value_name = "FILE", conflicts_with_all = ["zenoh_router", "network"])]
@@ -137,7 +145,8 @@ pub struct Args {
     pub rmw: Rmw,
     /// Domain of ROS
     #[arg(long, value_name = "ID", env = "ROS_DOMAIN_ID", default_value_t = 0)]
-    #[arg(value_parser = clap::value_parser!(u16).range(0..=232))]
+    #[arg(value_parser = clap::value_parser!(u16).range(0..=i64::from(MAX_DOMAIN_ID)))]
+    #[serde(deserialize_with = "domain_id_of")]
     pub domain_id: u16,
     /// Talk to other machines too; without it, the loopback interface alone is used
     #[arg(long)]
@@ -148,19 +157,60 @@ pub struct Args {
 const MAX_S: f64 = 9e9;
 /// Farther than a map reaches.
 const MAX_M: f64 = 1e9;
+/// Of DDS, whose ports follow from it.
+const MAX_DOMAIN_ID: u16 = 232;
 
 fn seconds(text: &str) -> Result<Duration, String> {
-    within(text, MAX_S, "seconds").map(Duration::from_secs_f64)
+    within(text.parse().ok(), MAX_S, "seconds").map(Duration::from_secs_f64)
 }
 
 fn metres(text: &str) -> Result<f64, String> {
-    within(text, MAX_M, "metres")
+    within(text.parse().ok(), MAX_M, "metres")
 }
 
 /// A number that is not below zero, and no more than this.
-fn within(text: &str, most: f64, unit: &str) -> Result<f64, String> {
-    let number = text.parse().ok().filter(|number| (0.0..=most).contains(number));
+fn within(number: Option<f64>, most: f64, unit: &str) -> Result<f64, String> {
+    let number = number.filter(|number| (0.0..=most).contains(number));
     number.ok_or_else(|| format!("give {unit}, from 0 to {most}"))
+}
+
+fn seconds_of<'de, D: Deserializer<'de>>(parameter: D) -> Result<Duration, D::Error> {
+    let number = within(Some(f64::deserialize(parameter)?), MAX_S, "seconds");
+    number.map(Duration::from_secs_f64).map_err(serde::de::Error::custom)
+}
+
+fn as_seconds<S: Serializer>(time: &Duration, serializer: S) -> Result<S::Ok, S::Error> {
+    time.as_secs_f64().serialize(serializer)
+}
+
+/// In full: by itself it would be rounded to a text.
+fn as_bytes<S: Serializer>(size: &ByteSize, serializer: S) -> Result<S::Ok, S::Error> {
+    size.as_u64().serialize(serializer)
+}
+
+fn metres_of<'de, D: Deserializer<'de>>(parameter: D) -> Result<f64, D::Error> {
+    within(Some(f64::deserialize(parameter)?), MAX_M, "metres").map_err(serde::de::Error::custom)
+}
+
+fn domain_id_of<'de, D: Deserializer<'de>>(parameter: D) -> Result<u16, D::Error> {
+    let id = u16::deserialize(parameter)?;
+    let too_large = || serde::de::Error::custom(format!("give a domain from 0 to {MAX_DOMAIN_ID}"));
+    (id <= MAX_DOMAIN_ID).then_some(id).ok_or_else(too_large)
+}
+
+/// A text, or a list of them.
+fn one_or_more<'de, D: Deserializer<'de>>(parameter: D) -> Result<Vec<String>, D::Error> {
+    #[derive(Deserialize)]
+    #[serde(untagged, expecting = "expected a text or a list of texts")]
+    enum Texts {
+        One(String),
+        More(Vec<String>),
+    }
+    match Texts::deserialize(parameter)? {
+        Texts::One(text) => Ok(vec![text]),
+        Texts::More(texts) if texts.is_empty() => Err(serde::de::Error::custom("give at least one")),
+        Texts::More(texts) => Ok(texts),
+    }
 }
 
 impl Args {

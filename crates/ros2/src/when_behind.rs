@@ -1,5 +1,6 @@
 /// What becomes of clouds that come faster than they can be mapped.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, serde::Deserialize, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum WhenBehind {
     /// Readers wait for room; what DDS cannot keep meanwhile is lost unseen.
     Wait,

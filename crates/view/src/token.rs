@@ -9,14 +9,14 @@ impl Token {
         if (8..=128).contains(&token.len()) && token.bytes().all(is_letter) {
             return Ok(Self(token.to_owned()));
         }
-        Err(Error::argument("--token", "8 to 128 of A-Z a-z 0-9 _ - can be one"))
+        Err(Error::argument("token", "8 to 128 of A-Z a-z 0-9 _ - can be one"))
     }
 
     /// 128 random bits.
     pub fn random() -> Result<Self> {
         let mut bytes = [0; 16];
         getrandom::fill(&mut bytes).map_err(|error| {
-            Error::argument("--token", format!("no random one can be made ({error}); pass one"))
+            Error::argument("token", format!("no random one can be made ({error}); pass one"))
         })?;
         Ok(Self(bytes.iter().map(|byte| format!("{byte:02x}")).collect()))
     }

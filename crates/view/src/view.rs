@@ -69,7 +69,7 @@ impl View {
             .collect::<anyhow::Result<Vec<_>>>()?;
         let maps: Vec<Arc<ServedMap>> = maps.into_iter().map(Arc::new).collect();
         let listener = TcpListener::bind(options.listen)
-            .with_context(|| format!("--listen: cannot use {}", options.listen))?;
+            .with_context(|| format!("`listen`: cannot use {}", options.listen))?;
         let address = listener.local_addr()?;
         let url = url_of(address, &token);
         for map in &maps {

@@ -98,12 +98,12 @@ def scans(path: _Path, **options: Unpack[ReadOptions]) -> ScanIterator:
     A scan is a tuple of points in the sensor's frame (``float64``, N x 3), the pose (4 x 4) and intensities
     (``float32``, or ``None``). ``ReadOptions`` lists the keywords.
     """
-    return open_scans(_path(path), _arguments(options))
+    return open_scans(path, options)
 
 
 def count_scans(path: _Path, **options: Unpack[ReadOptions]) -> int:
     """The number of scans of a file or folder. Where the format does not tell it, they are read, but in ``.scans``."""
-    return _count_scans(_path(path), _arguments(options))
+    return _count_scans(path, options)
 
 
 def reaches(
@@ -117,13 +117,12 @@ def reaches(
 
     The box is ``None`` where a scan leaves nothing in a map.
     """
-    return scan_reaches(_path(path), _arguments(options), max_range=max_range, no_return_range=clear_no_return)
+    return scan_reaches(path, options, max_range=max_range, no_return_range=clear_no_return)
 
 
 def build_piece(path: _Path, output: _Path, map_id: str, **options: Unpack[BuildOptions]) -> dict[str, Any]:
     """Makes a map as ``build`` does, but as a piece of the map with this id: ``move_piece`` makes it durable."""
-    arguments = [_path(path), f"--output={_path(output)}", *_arguments(options)]
-    return call_build(arguments, piece_of=map_id)
+    return call_build(path, output, options, piece_of=map_id)
 
 
 def build(
@@ -139,7 +138,7 @@ def build(
     known. Returns what the command prints with ``--json``; its remarks are warnings, too. If it is interrupted, the map
     has what was accepted until then, and ``resume=True`` goes on.
     """
-    answer = call_build([_path(path), f"--output={_path(output)}", *_arguments(options)], progress)
+    answer = call_build(path, output, options, progress)
     for remark in answer["remarks"]:
         warnings.warn(remark, stacklevel=2)
     return answer

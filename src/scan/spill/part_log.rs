@@ -1,5 +1,5 @@
 use crate::scratch::Scratch;
-use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::io;
 
 /// Makes the file to which a [`PartLog`] spills.
 pub(crate) type MakeScratch<'a> = dyn Fn() -> io::Result<Box<dyn Scratch>> + Sync + 'a;
@@ -48,8 +48,7 @@ impl<'a> PartLog<'a> {
             Some(file) => file,
             none => none.insert((self.make_file)()?),
         };
-        file.seek(SeekFrom::Start(self.tail_at))?;
-        file.write_all(&self.tail)?;
+        file.append(&self.tail)?;
         self.tail_at += self.tail.len() as u64;
         self.tail.clear();
         Ok(())
@@ -64,39 +63,26 @@ impl<'a> PartLog<'a> {
         Ok(self.header(at)?.0)
     }
 
-    /// Reads the record at a position into `record`.
+    /// The record at a position.
     ///
     /// # Errors
     ///
     /// A file that cannot be read.
-    pub(crate) fn read(&mut self, at: u64, record: &mut Vec<u8>) -> io::Result<()> {
+    pub(crate) fn record(&mut self, at: u64) -> io::Result<&[u8]> {
         let (_, length) = self.header(at)?;
-        record.clear();
-        match (&mut self.file, at.checked_sub(self.tail_at)) {
-            // After its header.
-            (Some(file), None) => file.take(length as u64).read_to_end(record).map(drop)?,
-            (_, at) => {
-                let first = at.unwrap_or_default() as usize + HEADER_BYTES;
-                record.extend(self.tail.iter().skip(first).take(length));
-            }
-        }
-        if record.len() < length { Err(io::ErrorKind::UnexpectedEof.into()) } else { Ok(()) }
+        self.bytes(at + HEADER_BYTES as u64, length)
     }
 
     fn header(&mut self, at: u64) -> io::Result<(u64, usize)> {
-        let mut header = [0; HEADER_BYTES];
+        let header = self.bytes(at, HEADER_BYTES)?.first_chunk().ok_or(io::ErrorKind::UnexpectedEof)?;
+        Ok(parsed(header))
+    }
+
+    fn bytes(&mut self, at: u64, count: usize) -> io::Result<&[u8]> {
         match (&mut self.file, at.checked_sub(self.tail_at)) {
-            (Some(file), None) => {
-                file.seek(SeekFrom::Start(at))?;
-                file.read_exact(&mut header)?;
-            }
-            (_, at) => self
-                .tail
-                .get(at.unwrap_or_default() as usize..)
-                .unwrap_or_default()
-                .read_exact(&mut header)?,
+            (Some(file), None) => file.bytes(at, count),
+            (_, at) => self.tail.bytes(at.unwrap_or_default(), count),
         }
-        Ok(parsed(&header))
     }
 }
 
@@ -109,7 +95,6 @@ fn parsed(header: &[u8; HEADER_BYTES]) -> (u64, usize) {
 mod tests {
     use super::*;
     use proptest::prelude::*;
-    use std::io::Cursor;
 
     proptest! {
         #[test]
@@ -117,7 +102,7 @@ mod tests {
             records in prop::collection::vec((0..4_usize, prop::collection::vec(any::<u8>(), 0..40)), 0..60),
             max_tail_bytes in 0..300_usize,
         ) {
-            let make = || Ok(Box::new(Cursor::new(Vec::new())) as Box<dyn Scratch>);
+            let make = || Ok(Box::new(Vec::new()) as Box<dyn Scratch>);
             let mut log = PartLog::new(max_tail_bytes, &make);
             let mut last = [NONE; 4];
             for (list, record) in &records {
@@ -126,9 +111,7 @@ mod tests {
             for (list, mut at) in last.into_iter().enumerate() {
                 let mut back = Vec::new();
                 while at != NONE {
-                    let mut record = Vec::new();
-                    log.read(at, &mut record).unwrap();
-                    back.push(record);
+                    back.push(log.record(at).unwrap().to_vec());
                     at = log.before(at).unwrap();
                 }
                 back.reverse();

@@ -225,8 +225,8 @@ impl Parts<'_> {
     }
 
     fn read(&mut self, at: u64) -> io::Result<PackedUpdates> {
-        self.log.read(at, &mut self.record)?;
-        let (updates, bytes) = self.record.split_first_chunk().ok_or(io::ErrorKind::UnexpectedEof)?;
+        let (updates, bytes) =
+            self.log.record(at)?.split_first_chunk().ok_or(io::ErrorKind::UnexpectedEof)?;
         Ok(PackedUpdates::from_parts(bytes.to_vec(), u64::from_le_bytes(*updates) as usize))
     }
 

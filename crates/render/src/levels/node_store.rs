@@ -11,9 +11,8 @@
 use super::node_key::{MAX_LEVEL, NodeKey};
 use parking_lot::Mutex;
 use rustc_hash::FxHashMap;
-use std::io::{self, Read, Seek, SeekFrom};
+use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::PathBuf;
-use voxtile::scratch::Scratch;
 use voxtile::{Error, Result};
 
 const HEADER: [u8; 16] = *b"VXLEVELS\x01\0\0\0\0\0\0\0";
@@ -33,10 +32,15 @@ pub struct NodeStore {
 type Nodes = FxHashMap<(NodeKey, u64), Stored>;
 
 struct Spool {
-    file: Box<dyn Scratch>,
+    file: Box<dyn Reopenable>,
     end: u64,
     limit: Option<Limit>,
 }
+
+/// A file that may be kept for the next time.
+trait Reopenable: Read + Write + Seek + Send {}
+
+impl<T: Read + Write + Seek + Send> Reopenable for T {}
 
 /// How long the file may be, and what empties it.
 struct Limit {
@@ -62,7 +66,7 @@ impl NodeStore {
     ///
     /// A file that cannot be read or written.
     pub fn open(
-        mut file: impl Read + io::Write + Seek + Send + 'static,
+        mut file: impl Read + Write + Seek + Send + 'static,
         path: impl Into<PathBuf>,
     ) -> Result<Self> {
         let path = path.into();

@@ -1,26 +1,24 @@
 use crate::args::Args;
-use clap::{ArgAction, CommandFactory as _};
+use clap::CommandFactory as _;
 
 /// What a parameter's name means here.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Known {
-    /// An option with a value, or with several.
-    Option(String),
-    /// An option without a value: true or false.
-    Switch(String),
+    /// A field of the node's options.
+    Field(String),
     /// One of octomap_server, or of ROS, that changes nothing here.
     WithoutEffect,
     Unknown,
 }
 
-/// Names of octomap_server for options that have others.
+/// Names of octomap_server for fields that have others.
 const ALIASES: [(&str, &str); 6] = [
-    ("sensor_model.max_range", "max-range"),
-    ("sensor_model.min_range", "min-range"),
+    ("sensor_model.max_range", "max_range"),
+    ("sensor_model.min_range", "min_range"),
     ("sensor_model.hit", "hit"),
     ("sensor_model.miss", "miss"),
-    ("sensor_model.min", "clamp-min"),
-    ("sensor_model.max", "clamp-max"),
+    ("sensor_model.min", "clamp_min"),
+    ("sensor_model.max", "clamp_max"),
 ];
 
 /// What is drawn, how topics are latched and compressed, and whose clock counts: the stamps of messages do here.
@@ -35,8 +33,8 @@ const WITHOUT_EFFECT: [&str; 8] = [
     "use_sim_time",
 ];
 
-/// Options that are for a command line alone.
-const NOT_IN_FILES: [&str; 6] = ["params-file", "node-name", "namespace", "remap", "help", "version"];
+/// Fields that are for a command line alone.
+const NOT_IN_FILES: [&str; 6] = ["params_file", "node_name", "namespace", "remap", "help", "version"];
 
 impl Known {
     pub fn of(name: &str) -> Self {
@@ -44,25 +42,23 @@ impl Known {
         if WITHOUT_EFFECT.contains(&group) || group == "qos_overrides" {
             return Self::WithoutEffect;
         }
-        let long = ALIASES.iter().find(|(alias, _)| *alias == name);
-        let long = long.map_or_else(|| name.replace('_', "-"), |(_, long)| (*long).to_owned());
-        let command = Args::command();
-        let found = command.get_arguments().find(|arg| arg.get_long() == Some(&long));
-        match found.map(|arg| arg.get_action()) {
-            Some(_) if NOT_IN_FILES.contains(&long.as_str()) => Self::Unknown,
-            Some(ArgAction::SetTrue) => Self::Switch(long),
-            Some(_) => Self::Option(long),
-            None => Self::Unknown,
-        }
+        let alias = ALIASES.iter().find(|(alias, _)| *alias == name);
+        let field = alias.map_or(name, |(_, field)| field);
+        let is_known = fields().iter().any(|known| known == field);
+        if is_known { Self::Field(field.to_owned()) } else { Self::Unknown }
     }
 
-    /// All names that mean an option.
+    /// All names that mean a field.
     pub fn names() -> Vec<String> {
-        let command = Args::command();
-        let longs = command.get_arguments().filter_map(|arg| arg.get_long());
-        let longs = longs.filter(|long| !NOT_IN_FILES.contains(long)).map(|long| long.replace('-', "_"));
-        longs.chain(ALIASES.map(|(alias, _)| alias.to_owned())).collect()
+        fields().into_iter().chain(ALIASES.map(|(alias, _)| alias.to_owned())).collect()
     }
+}
+
+/// The fields that files may give.
+fn fields() -> Vec<String> {
+    let command = Args::command();
+    let fields = command.get_arguments().map(|arg| arg.get_id().to_string());
+    fields.filter(|field| !NOT_IN_FILES.contains(&field.as_str())).collect()
 }
 
 #[cfg(test)]
@@ -70,12 +66,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_mean_options() {
-        let option = |long: &str| Known::Option(long.to_owned());
-        assert_eq!(Known::of("resolution"), option("resolution"));
-        assert_eq!(Known::of("occupancy_min_z"), option("occupancy-min-z"));
-        assert_eq!(Known::of("sensor_model.max"), option("clamp-max"));
-        assert_eq!(Known::of("network"), Known::Switch("network".to_owned()));
+    fn names_mean_fields() {
+        let field = |name: &str| Known::Field(name.to_owned());
+        assert_eq!(Known::of("resolution"), field("resolution"));
+        assert_eq!(Known::of("occupancy_min_z"), field("occupancy_min_z"));
+        assert_eq!(Known::of("sensor_model.max"), field("clamp_max"));
+        assert_eq!(Known::of("network"), field("network"));
         assert_eq!(Known::of("color.r"), Known::WithoutEffect);
         for unknown in ["", "help", "params_file", "filter_ground_plane", "sensor_model.hits"] {
             assert_eq!(Known::of(unknown), Known::Unknown, "{unknown}");

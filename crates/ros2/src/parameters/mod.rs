@@ -1,9 +1,8 @@
-//! Options from what launch files pass and from parameter files of ROS 2: they are as if they stood on the command
-//! line, before what stands there.
+//! Options from what launch files pass and from parameter files of ROS 2. What stands on the command line wins.
 //!
 //! ```text
 //! --ros-args -> options, parameters
-//! file -> parameters of this node -> Known: an option, one without effect, one that is not there -> Args
+//! file -> parameters of this node -> Known: a field, one without effect, one that is not there -> Args
 //! ```
 
 mod known;

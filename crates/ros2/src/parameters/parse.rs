@@ -5,9 +5,16 @@ use super::value::Value;
 use crate::args::Args;
 use clap::error::ErrorKind;
 use clap::parser::ValueSource;
-use clap::{ArgMatches, CommandFactory as _, Error, Parser as _};
+use clap::{ArgMatches, CommandFactory as _, Error, FromArgMatches as _};
+use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::path::PathBuf;
+
+/// A parameter, and where it stands.
+struct Given {
+    value: Value,
+    place: String,
+}
 
 /// The options of a command line, of the parameters on it, and of the files that it names; options win over parameters,
 /// and these over files.
@@ -17,96 +24,89 @@ use std::path::PathBuf;
 /// Wrong options; files that cannot be read; parameters that are not known, or have a wrong value.
 pub fn parse(arguments: &[OsString]) -> Result<Args, Error> {
     let RosArgs { arguments, parameters } = RosArgs::of(arguments).map_err(wrong)?;
-    let arguments = arguments.as_slice();
-    // Only what is there is looked at: what a file may give can still be missing.
-    let given = Args::command().ignore_errors(true).try_get_matches_from(arguments);
-    let Ok(given) = given else { return Args::try_parse_from(arguments) };
-    let files = given.try_get_many::<PathBuf>("params_file").ok().flatten();
-    let files: Vec<PathBuf> = files.into_iter().flatten().cloned().collect();
-    let text = |id| given.try_get_one::<String>(id).ok().flatten().cloned().unwrap_or_default();
-    let node = format!("{}/{}", text("namespace"), text("node_name"));
-    let mut from_files: Vec<(String, Vec<OsString>)> = Vec::new();
-    // A later one wins.
-    let mut put = |found: Vec<(String, Vec<OsString>)>| {
-        for (long, options) in found {
-            from_files.retain(|(earlier, _)| *earlier != long);
-            from_files.push((long, options));
+    let given = given_by(&arguments, parameters)?;
+    let has_output = given.contains_key("output");
+    // What a file gives may be missing here.
+    let command = Args::command().mut_arg("output", |output| match has_output {
+        true => output.required(false).default_value("map"),
+        false => output,
+    });
+    let matches = command.try_get_matches_from(&arguments)?;
+    let mut args = Args::from_arg_matches(&matches)?;
+    for (field, Given { value, place }) in &given {
+        if matches.value_source(field) != Some(ValueSource::CommandLine) {
+            args = with(&args, field, value).map_err(|why| wrong(format!("{place}: {why}")))?;
         }
+    }
+    if args.zenoh_config.is_some() && (args.network || given.contains_key("zenoh_router")) {
+        return Err(wrong("zenoh_config stands in place of zenoh_router and network".to_owned()));
+    }
+    Ok(args)
+}
+
+/// The fields that files and parameters give; of several for one the last.
+fn given_by(arguments: &[OsString], parameters: Vec<[String; 2]>) -> Result<BTreeMap<String, Given>, Error> {
+    let mut given = BTreeMap::new();
+    // Whatever else is wrong with the command line is told later.
+    let Ok(named) = Args::command().ignore_errors(true).try_get_matches_from(arguments) else {
+        return Ok(given);
     };
-    for file in &files {
-        let parameters = parameter_file::read(file, &node);
+    let files = named.try_get_many::<PathBuf>("params_file").ok().flatten();
+    for file in files.into_iter().flatten() {
+        let parameters = parameter_file::read(file, &node_of(&named));
         let parameters = parameters.map_err(|error| wrong(format!("--params-file: {error:#}")))?;
-        put(options_of(&file.display().to_string(), parameters, &given)?);
+        for (name, value) in parameters {
+            put(&mut given, &file.display().to_string(), &name, value)?;
+        }
     }
     for [name, text] in parameters {
         let value = serde_saphyr::from_str::<Value>(&text);
         let value = value.map_err(|error| wrong(format!("--param {name}: {text} is no YAML: {error}")))?;
-        put(options_of("--param", [(name, value)], &given)?);
+        put(&mut given, "--param", &name, value)?;
     }
-    let mut all: Vec<OsString> = arguments.iter().take(1).cloned().collect();
-    all.extend(from_files.into_iter().flat_map(|(_, options)| options));
-    all.extend(arguments.iter().skip(1).cloned());
-    Args::try_parse_from(all)
+    Ok(given)
+}
+
+/// The full name of the node.
+fn node_of(named: &ArgMatches) -> String {
+    let text = |id| named.try_get_one::<String>(id).ok().flatten().cloned().unwrap_or_default();
+    format!("{}/{}", text("namespace"), text("node_name"))
+}
+
+fn put(given: &mut BTreeMap<String, Given>, source: &str, name: &str, value: Value) -> Result<(), Error> {
+    let place = format!("{source}: parameter {name}");
+    match Known::of(name) {
+        Known::WithoutEffect => log::warn!("{place} has no effect here"),
+        Known::Unknown => {
+            let names = Known::names().join(", ");
+            return Err(wrong(format!("{place} is not known; known are {names}")));
+        }
+        // octomap_server's word for no limit.
+        Known::Field(field) if field == "max_range" && is_negative(&value) => {
+            given.insert(field, Given { value: Value::Nothing(()), place });
+        }
+        Known::Field(field) => {
+            given.insert(field, Given { value, place });
+        }
+    }
+    Ok(())
+}
+
+/// The options with another value of one field.
+fn with(args: &Args, field: &str, value: &Value) -> Result<Args, String> {
+    let changed = || -> serde_json::Result<Args> {
+        let mut fields = serde_json::to_value(args)?;
+        fields[field] = serde_json::to_value(value)?;
+        serde_json::from_value(fields)
+    };
+    match value {
+        Value::Number(number) if !number.is_finite() => Err(format!("{number} is no number")),
+        _ => changed().map_err(|error| error.to_string()),
+    }
 }
 
 fn wrong(what: String) -> Error {
     Args::command().error(ErrorKind::ValueValidation, what)
-}
-
-/// The options that parameters mean, but for those that are given anyhow.
-fn options_of(
-    source: &str,
-    parameters: impl IntoIterator<Item = (String, Value)>,
-    given: &ArgMatches,
-) -> Result<Vec<(String, Vec<OsString>)>, Error> {
-    let mut found = Vec::new();
-    for (name, value) in parameters {
-        let place = format!("{source}: parameter {name}");
-        let no_value = || wrong(format!("{place} has no value that it can have: {value:?}"));
-        let (long, options) = match Known::of(&name) {
-            Known::WithoutEffect => {
-                log::warn!("{place} has no effect here");
-                continue;
-            }
-            Known::Unknown => {
-                let names = Known::names().join(", ");
-                return Err(wrong(format!("{place} is not known; known are {names}")));
-            }
-            Known::Switch(long) => match value {
-                Value::Bool(true) => (long.clone(), vec![format!("--{long}").into()]),
-                // Nothing, in the place of what an earlier file says.
-                Value::Bool(false) => (long, Vec::new()),
-                _ => return Err(no_value()),
-            },
-            // octomap_server's word for no limit.
-            Known::Option(long) if long == "max-range" && is_negative(&value) => (long, Vec::new()),
-            Known::Option(long) => {
-                let values = match &value {
-                    Value::List(values) => values.iter().map(Value::text).collect(),
-                    value => value.text().map(|text| vec![text]),
-                };
-                let values = values.filter(|values| !values.is_empty()).ok_or_else(no_value)?;
-                let option = |text: &String| OsString::from(format!("--{long}={text}"));
-                (long.clone(), values.iter().map(option).collect())
-            }
-        };
-        // By itself, so that what is wrong is told with its file.
-        let mut alone: Vec<OsString> = vec!["voxtile-ros2".into()];
-        if long != "output" {
-            alone.push("--output=map".into());
-        }
-        alone.extend(options.iter().cloned());
-        if let Err(error) = Args::try_parse_from(alone) {
-            let error = error.to_string();
-            let why = error.lines().next().unwrap_or_default().trim_start_matches("error: ");
-            return Err(wrong(format!("{place}: {why}")));
-        }
-        let id = long.replace('-', "_");
-        if given.try_get_raw(&id).is_err() || given.value_source(&id) != Some(ValueSource::CommandLine) {
-            found.push((long, options));
-        }
-    }
-    Ok(found)
 }
 
 fn is_negative(value: &Value) -> bool {
@@ -185,18 +185,27 @@ mod tests {
         let with =
             |line: &str| parsed(&format!("/**: {{ros__parameters: {{{line}}}}}"), &["-o", "m"]).unwrap_err();
         assert!(with("resolutoin: 0.1").contains("p.yaml: parameter resolutoin is not known; known are"));
-        assert!(with("resolution: fine").contains("p.yaml: parameter resolution: invalid value 'fine'"));
-        assert!(with("network: 7").contains("parameter network has no value that it can have"));
-        assert!(with("resolution: []").contains("parameter resolution has no value"));
+        assert!(
+            with("resolution: fine").contains("p.yaml: parameter resolution: invalid type: string \"fine\"")
+        );
+        assert!(with("network: 7").contains("parameter network: invalid type: integer"));
+        assert!(with("resolution: []").contains("parameter resolution: invalid type: sequence"));
         for name in ["transform_wait", "pose_tolerance", "path_tolerance"] {
-            for value in ["-1", "-1e-9", "'nan'", "'inf'", "1e20"] {
+            for (value, why) in [
+                ("-1", "give "),
+                ("-1e-9", "give "),
+                ("1e20", "give "),
+                ("'nan'", "invalid"),
+                (".nan", "NaN is no"),
+            ] {
                 let told = with(&format!("{name}: {value}"));
-                let option = name.replace('_', "-");
-                let place = format!("p.yaml: parameter {name}: invalid value");
-                assert!(told.contains(&place) && told.contains(&option), "{told}");
-                assert!(told.contains("give ") && told.contains("from 0 to "), "{told}");
+                assert!(told.contains(&format!("p.yaml: parameter {name}: {why}")), "{told}");
+                assert!(why != "give " || told.contains("from 0 to "), "{told}");
             }
         }
+        assert!(with("domain_id: 233").contains("give a domain from 0 to 232"));
+        assert!(with("cloud: []").contains("give at least one"));
+        assert!(with("zenoh_config: a, network: true").contains("in place of zenoh_router"));
         assert!(parsed("/**: 7", &["-o", "m"]).unwrap_err().contains("p.yaml"));
         assert!(parsed("{}", &[]).unwrap_err().contains("--output"));
     }

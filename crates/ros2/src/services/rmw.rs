@@ -1,5 +1,6 @@
 /// The middleware of the clients: they mark requests in different ways.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, serde::Deserialize, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Rmw {
     /// Fast DDS (`rmw_fastrtps`), the default of ROS 2.
     Fastrtps,

@@ -2,9 +2,9 @@ use super::disk::FaultyDisk;
 use super::names::{Entry, Inode};
 use super::operation::{Kind, Verdict};
 use super::state::medium_error;
-use std::io::{self, Cursor, Read, Seek, SeekFrom, Write};
+use std::io::{self, Read, Write};
 use std::path::PathBuf;
-use voxtile::store::{DiskLock, DiskRead, DiskWrite, ReaderWatch};
+use voxtile::store::{DiskLock, DiskRead, DiskWrite, ReaderWatch, Scratch};
 
 /// A file that is read, as it was when it was opened.
 pub(super) struct Reader {
@@ -120,29 +120,17 @@ impl Drop for Locked {
 pub(super) struct ScratchFile {
     pub(super) disk: FaultyDisk,
     pub(super) folder: PathBuf,
-    pub(super) content: Cursor<Vec<u8>>,
+    pub(super) content: Vec<u8>,
 }
 
-impl Read for ScratchFile {
-    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        self.disk.state().attempt(Kind::Reads, &self.folder)?;
-        self.content.read(buffer)
-    }
-}
-
-impl Write for ScratchFile {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+impl Scratch for ScratchFile {
+    fn append(&mut self, bytes: &[u8]) -> io::Result<()> {
         self.disk.state().attempt(Kind::NeedsRoom, &self.folder)?;
-        self.content.write(bytes)
+        Scratch::append(&mut self.content, bytes)
     }
 
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
-    }
-}
-
-impl Seek for ScratchFile {
-    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
-        self.content.seek(to)
+    fn bytes(&mut self, at: u64, count: usize) -> io::Result<&[u8]> {
+        self.disk.state().attempt(Kind::Reads, &self.folder)?;
+        self.content.bytes(at, count)
     }
 }

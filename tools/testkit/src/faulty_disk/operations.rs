@@ -2,7 +2,7 @@ use super::disk::FaultyDisk;
 use super::handles::{Locked, Reader, ScratchFile, Watch, Writer};
 use super::names::{Entry, NameChange};
 use super::operation::Kind;
-use std::io::{self, Cursor, Read};
+use std::io::{self, Read};
 use std::path::Path;
 use voxtile::store::{Disk, DiskLock, DiskRead, DiskWrite, EntryKind, ReaderWatch, Scratch};
 
@@ -138,8 +138,7 @@ impl Disk for FaultyDisk {
 
     fn scratch(&self, folder: &Path) -> io::Result<Box<dyn Scratch>> {
         self.state().attempt(Kind::NeedsRoom, folder)?;
-        let content = Cursor::new(Vec::new());
-        Ok(Box::new(ScratchFile { disk: self.clone(), folder: folder.to_owned(), content }))
+        Ok(Box::new(ScratchFile { disk: self.clone(), folder: folder.to_owned(), content: Vec::new() }))
     }
 
     fn link(&self, from: &Path, to: &Path) -> io::Result<()> {

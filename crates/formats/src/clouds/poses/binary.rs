@@ -21,7 +21,7 @@ const KINDS: [(&[u8], &str, &str); 14] = [
 const UNPACK: &str = "unpack it first";
 const SAVE: &str = "save the poses as text (TUM, KITTI, CSV) or as .npy";
 const RECORDING: &str =
-    "give the recording itself as scans, with --odometry for a topic of poses, or save its poses as text";
+    "give the recording itself as scans, with `odometry` for a topic of poses, or save its poses as text";
 
 /// Checks that a file of poses that starts like this may be text, which has no zero bytes.
 ///

@@ -49,8 +49,8 @@ pub(super) fn open(path: &Path, has_origin: bool, budget: &Budget) -> Result<Box
     let bare = scans.iter().filter(|scan| scan.transform.is_none()).count();
     if bare > 0 && !has_origin {
         remarks.push(format!(
-            "{bare} of {} scans have no pose: their points are in the frame of the file, and without --poses or \
-             --sensor-origin the sensor is taken to be at its origin",
+            "{bare} of {} scans have no pose: their points are in the frame of the file, and without `poses` or \
+             `sensor_origin` the sensor is taken to be at its origin",
             scans.len()
         ));
     }
@@ -88,7 +88,7 @@ fn check_xml(path: &Path, file: &mut File, budget: &Budget) -> Result<()> {
         let needed = check.nodes.saturating_mul(NODE_BYTES).saturating_add(bytes.saturating_mul(3));
         if needed > budget.whole_bytes() {
             let reason = format!(
-                "its description of {bytes} bytes would take more than {} bytes of memory: raise --memory, or split \
+                "its description of {bytes} bytes would take more than {} bytes of memory: raise `memory`, or split \
                  the file",
                 budget.whole_bytes()
             );

@@ -80,7 +80,7 @@ pub(super) fn check(path: &Path, file: &File, layout: &Layout, budget: &Budget) 
     }
     if chunks.saturating_mul(size_of::<ChunkTableEntry>() as u64) > budget.whole_bytes() / TABLE_COPIES {
         let reason = format!(
-            "a table of {chunks} chunks exceeds its share of the memory for reading: raise --memory, or write the file \
+            "a table of {chunks} chunks exceeds its share of the memory for reading: raise `memory`, or write the file \
              with larger chunks"
         );
         return Err(wrong(table_at + 4, reason));
@@ -101,7 +101,7 @@ pub(super) fn check(path: &Path, file: &File, layout: &Layout, budget: &Budget) 
         // A chunk behind all points may be empty.
         if compressor == LAYERED && entry.byte_count > budget.whole_bytes() {
             let reason = format!(
-                "chunk {chunk} has {} bytes, and at most {} of a chunk are held in memory: raise --memory, or write the \
+                "chunk {chunk} has {} bytes, and at most {} of a chunk are held in memory: raise `memory`, or write the \
                  file with smaller chunks",
                 entry.byte_count,
                 budget.whole_bytes()

@@ -13,7 +13,7 @@ pub(crate) fn check_regular(path: &Path) -> Result<()> {
     let extension = extension_of(path);
     let mut extensions = [Format::Ply, Format::Text].into_iter().flat_map(Format::extensions);
     let is_streamed = extension.is_empty() || extensions.any(|known| *known == extension);
-    let hint = "; or name it alone, with --format ply or --format xyz, which are read in one pass";
+    let hint = "; or name it alone, with `format` ply or `format` xyz, which are read in one pass";
     let reason = format!(
         "is a FIFO, a socket or a device, not a file: save its contents to a file{}",
         if is_streamed { hint } else { "" }

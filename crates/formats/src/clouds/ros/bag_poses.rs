@@ -86,9 +86,9 @@ impl BagPoses {
         let bad = self.remarks.first().map(|bad| format!("; {bad}")).unwrap_or_default();
         let reason = format!(
             "none of its {messages} messages gives a pose that can be used{unusable}{bad}; choose another topic, \
-             leave the option out for /tf, or name a file with --poses"
+             leave the option out for /tf, or name a file with `poses`"
         );
-        Error::argument(format!("--odometry {}", topic.name), reason)
+        Error::argument(format!("odometry {}", topic.name), reason)
     }
 
     fn read_topics(

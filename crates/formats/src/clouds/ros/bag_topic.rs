@@ -30,12 +30,12 @@ pub(super) fn choose_clouds(
 ) -> Result<Chosen> {
     let topics = recording.topics().to_vec();
     if let Some(name) = name {
-        let index = named(&topics, name, "--topic")?;
+        let index = named(&topics, name, "topic")?;
         let topic = topics.get(index);
         let Some(kind) = topic.and_then(kind_of).filter(|kind| kind.is_cloud()) else {
             let type_name = topic.map_or("", |topic| topic.type_name.as_str());
             return Err(Error::argument(
-                format!("--topic {name}"),
+                format!("topic {name}"),
                 format!("messages of type {type_name} are no clouds; topics: {}", list(topics.iter())),
             ));
         };
@@ -74,7 +74,7 @@ pub(super) fn choose_clouds(
         several => {
             let several = several.iter().filter_map(|&(index, _)| topics.get(index));
             let reason =
-                format!("several topics hold clouds; choose one with --topic NAME: {}", list(several));
+                format!("several topics hold clouds; choose one with `topic` NAME: {}", list(several));
             Err(Error::argument("recording", reason))
         }
     }
@@ -83,11 +83,11 @@ pub(super) fn choose_clouds(
 /// Finds the topic of poses.
 pub(super) fn choose_poses(topics: &[Topic], name: Option<&str>) -> Result<usize> {
     if let Some(name) = name {
-        let index = named(topics, name, "--odometry")?;
+        let index = named(topics, name, "odometry")?;
         let topic = topics.get(index).filter(|topic| kind_of(topic).is_some_and(MessageKind::is_pose));
         return topic.map(|_| index).ok_or_else(|| {
             let reason = format!("its messages are no poses; topics: {}", list(topics.iter()));
-            Error::argument(format!("--odometry {name}"), reason)
+            Error::argument(format!("odometry {name}"), reason)
         });
     }
     let is_pose = |topic: &&Topic| topic.messages > 0 && kind_of(topic).is_some_and(MessageKind::is_pose);
@@ -107,7 +107,7 @@ pub(super) fn choose_poses(topics: &[Topic], name: Option<&str>) -> Result<usize
         }
         _ => {
             let found = list(found.into_iter());
-            let reason = format!("several topics hold poses; choose one with --odometry NAME: {found}");
+            let reason = format!("several topics hold poses; choose one with `odometry` NAME: {found}");
             Err(Error::argument("recording", reason))
         }
     }
@@ -140,7 +140,7 @@ fn chosen(topics: &[Topic], index: usize, kind: MessageKind) -> Result<Chosen> {
             let name = camera_name(&image.name);
             let reason =
                 format!("depth images need their camera, but there is no topic {name} of type CameraInfo");
-            Err(Error::argument(format!("--topic {}", image.name), reason))
+            Err(Error::argument(format!("topic {}", image.name), reason))
         }
     }
 }

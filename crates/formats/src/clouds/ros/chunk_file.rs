@@ -123,7 +123,7 @@ pub(super) fn check_chunks(chunks: usize, shares: Shares, path: &Path) -> Result
         return Ok(());
     }
     let reason = format!(
-        "has more than {} chunks, whose places would exceed {} bytes of memory: raise --memory, or record with larger \
+        "has more than {} chunks, whose places would exceed {} bytes of memory: raise `memory`, or record with larger \
          chunks",
         chunks, shares.places
     );

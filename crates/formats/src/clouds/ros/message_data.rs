@@ -33,7 +33,7 @@ impl MessageData {
         if let Bytes::File(part) = &self.0 {
             if part.len() > most_bytes {
                 let reason = format!(
-                    "{} bytes; at most {most_bytes} bytes of a message of its kind are held in memory: raise --memory, \
+                    "{} bytes; at most {most_bytes} bytes of a message of its kind are held in memory: raise `memory`, \
                      or leave the topic out",
                     part.len()
                 );

@@ -51,7 +51,7 @@ pub enum WhyNot {
     Loop(String),
     /// More frames are above it than a robot has.
     #[error(
-        "too many frames are above the frame {0}: name a nearer frame with --fixed-frame (ROS 2 node: --frame-id)"
+        "too many frames are above the frame {0}: name a nearer frame with `fixed_frame` (ROS 2 node: `frame_id`)"
     )]
     TooManyFrames(String),
     /// The stamp is before the first transform of a frame.
@@ -62,7 +62,7 @@ pub enum WhyNot {
     After(String),
     /// The transforms before and after the stamp are too far apart.
     #[error(
-        "the transforms of {0} before and after the stamp are too far apart; --pose-tolerance allows for more"
+        "the transforms of {0} before and after the stamp are too far apart; `pose_tolerance` allows for more"
     )]
     Gap(String),
     /// The frame moves in no other, so that nothing says where it was.

@@ -178,7 +178,7 @@ impl Disk for MemoryDisk {
     }
 
     fn scratch(&self, _: &Path) -> io::Result<Box<dyn Scratch>> {
-        Ok(Box::new(Cursor::new(Vec::new())))
+        Ok(Box::new(Vec::new()))
     }
 
     fn kind(&self, path: &Path) -> io::Result<Option<EntryKind>> {

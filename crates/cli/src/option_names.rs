@@ -1,0 +1,67 @@
+//! The library names fields; the command line has options. `` `max_range` `` is `--max-range` here.
+
+use super::args::Cli;
+use clap::CommandFactory as _;
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::sync::LazyLock;
+
+/// The option of each field.
+static OPTIONS: LazyLock<BTreeMap<String, String>> = LazyLock::new(|| {
+    let command = Cli::command();
+    let arguments = command.get_subcommands().flat_map(clap::Command::get_arguments);
+    let longs = arguments.filter_map(clap::Arg::get_long);
+    let mut options: BTreeMap<_, _> =
+        longs.map(|long| (long.replace('-', "_"), format!("--{long}"))).collect();
+    options.insert("insert_mode".to_owned(), "--insert".to_owned());
+    options
+});
+
+/// A text with fields between backticks as one with options.
+pub fn with_options(text: &str) -> Cow<'_, str> {
+    if !text.contains('`') {
+        return text.into();
+    }
+    let mut named = String::with_capacity(text.len());
+    let mut rest = text;
+    while let Some((before, quoted)) = rest.split_once('`') {
+        named += before;
+        match quoted.split_once('`').and_then(|(field, after)| Some((OPTIONS.get(field)?, after))) {
+            Some((option, after)) => {
+                named += option;
+                rest = after;
+            }
+            None => {
+                named.push('`');
+                rest = quoted;
+            }
+        }
+    }
+    (named + rest).into()
+}
+
+/// An argument by the name of its field, or several after commas, as options; a value may follow a name.
+pub fn option_of(argument: &str) -> String {
+    let named = |part: &str| {
+        let (name, value) = part.split_at(part.find(' ').unwrap_or(part.len()));
+        OPTIONS.get(name).map_or_else(|| part.to_owned(), |option| format!("{option}{value}"))
+    };
+    argument.split(", ").map(named).collect::<Vec<_>>().join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fields_become_options() {
+        let of = with_options;
+        assert_eq!(of("raise `max_range`, or `poses` FILE"), "raise --max-range, or --poses FILE");
+        assert_eq!(of("`insert_mode` per-ray"), "--insert per-ray");
+        assert_eq!(of("the topic `camera_info`; `voxtile repair`: `memory`"), {
+            "the topic `camera_info`; `voxtile repair`: --memory"
+        });
+        assert_eq!(of("a ` alone, and `memory"), "a ` alone, and `memory");
+        assert_eq!(option_of("topic /a, deskew, map.ot"), "--topic /a, --deskew, map.ot");
+    }
+}

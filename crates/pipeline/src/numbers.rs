@@ -1,0 +1,111 @@
+//! Lists of numbers as front ends have them, and what they mean.
+
+use voxtile::scan::Pose;
+use voxtile::space::{Aabb, Point};
+use voxtile::{Error, Result};
+use voxtile_formats::ReadOptions;
+use voxtile_formats::clouds::RigidPose;
+
+/// Most seconds that a tolerance or a period may have.
+const MAX_S: f64 = 1e9;
+
+/// A box of six numbers in metres: X0 Y0 Z0 X1 Y1 Z1.
+///
+/// # Errors
+///
+/// Another count; corners that are not in this order. It names the `argument`.
+pub fn region_of(argument: &str, corners: &[f64]) -> Result<Aabb> {
+    if let [x0, y0, z0, x1, y1, z1] = *corners
+        && x0 < x1
+        && y0 < y1
+        && z0 < z1
+    {
+        return Ok(Aabb { min: [x0, y0, z0], max: [x1, y1, z1] });
+    }
+    Err(Error::argument(argument, "needs X0 < X1, Y0 < Y1 and Z0 < Z1"))
+}
+
+/// A point of three numbers in metres.
+///
+/// # Errors
+///
+/// Another count. It names the `argument`.
+pub fn point_of(argument: &str, numbers: &[f64]) -> Result<Point> {
+    let count = numbers.len();
+    numbers.try_into().map_err(|_| Error::argument(argument, format!("{count} numbers; give 3 (x y z)")))
+}
+
+/// The nanoseconds of a `pose_tolerance`.
+///
+/// # Errors
+///
+/// What is no time.
+pub fn tolerance_ns(seconds: f64) -> Result<i64> {
+    match (0.0..=MAX_S).contains(&seconds) {
+        true => Ok((seconds * 1e9).round() as i64),
+        false => {
+            let reason = format!("{seconds} is no time in seconds, from 0 to {MAX_S}");
+            Err(Error::argument("pose_tolerance", reason))
+        }
+    }
+}
+
+/// Where the sensor is in a body.
+#[derive(Clone, Copy, Debug)]
+pub struct Mount {
+    /// As it is put behind poses of the body. A quaternion that was given is this one, to the bit.
+    pub rigid: RigidPose,
+    /// The same as a matrix.
+    pub body_from_sensor: Pose,
+}
+
+impl Mount {
+    /// A pose of 7 numbers (position in metres, quaternion x y z w) or of a 3x4 matrix, row by row; 9 numbers are a
+    /// rotation.
+    ///
+    /// # Errors
+    ///
+    /// Another count; what turns nothing.
+    pub fn of(numbers: &[f64]) -> Result<Self> {
+        let body_from_sensor = match *numbers {
+            [x, y, z, qx, qy, qz, qw] => {
+                let body_from_sensor = Pose::from_quaternion([x, y, z], [qx, qy, qz, qw])?;
+                let rigid = RigidPose { position_m: [x, y, z], quaternion: [qx, qy, qz, qw] };
+                return Ok(Self { rigid, body_from_sensor });
+            }
+            [a, b, c, d, e, f, g, h, i] => {
+                Pose::from_matrix(&[[a, b, c, 0.0], [d, e, f, 0.0], [g, h, i, 0.0]])?
+            }
+            _ if numbers.len() == 12 => Pose::from_matrix(numbers.as_chunks().0)?,
+            _ => {
+                let reason = format!(
+                    "{} numbers; give 7 (tx ty tz qx qy qz qw), 9 (a 3x3 matrix) or 12 (a 3x4 matrix, row by row)",
+                    numbers.len()
+                );
+                return Err(Error::argument("extrinsic", reason));
+            }
+        };
+        let rigid = RigidPose {
+            position_m: body_from_sensor.position_m(),
+            quaternion: body_from_sensor.quaternion(),
+        };
+        Ok(Self { rigid, body_from_sensor })
+    }
+}
+
+/// Says where the sensor is, and in whose frame the box of ignored points is: the body's or the sensor's own.
+///
+/// # Errors
+///
+/// A box in the frame of a body that is not known.
+pub fn set_mount(options: &mut ReadOptions, mount: Option<Mount>, is_box_of_body: bool) -> Result<()> {
+    options.clouds.body_from_sensor = mount.map_or(RigidPose::IDENTITY, |mount| mount.rigid);
+    if is_box_of_body {
+        let Some(mount) = mount else {
+            let reason = "the body's frame is known by `extrinsic` only; add it, or name the box in the sensor's frame";
+            return Err(Error::argument("ignore_frame", reason));
+        };
+        options.selection.body_from_sensor = Some(mount.body_from_sensor);
+    }
+    Ok(())
+}

@@ -1,0 +1,9 @@
+//! Temporary files without a name, for what has no room in memory for a while. What was appended is read back through
+//! mappings: without a copy, and without system calls for each record.
+
+mod mapping;
+mod scratch_file;
+mod window;
+
+pub use scratch_file::ScratchFile;
+pub use window::Window;

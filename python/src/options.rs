@@ -1,0 +1,115 @@
+//! Keywords as options: the one place that knows both. What is left out is the default of the options.
+
+use crate::errors::exception;
+use crate::keywords::Keywords;
+use pyo3::prelude::*;
+use std::path::{Path, PathBuf};
+use voxtile::space::Aabb;
+use voxtile::{InsertMode, MemoryLimit, Storage};
+use voxtile_formats::ReadOptions;
+use voxtile_pipeline::numbers::{Mount, point_of, region_of, set_mount, tolerance_ns};
+use voxtile_pipeline::{BuildOptions, SensorModelKind, WhenBehind};
+
+pub const STORAGES: [(&str, Storage); 2] = [("octomap", Storage::OctoMap), ("compact", Storage::Compact)];
+pub const INSERT_MODES: [(&str, InsertMode); 2] =
+    [("per-scan", InsertMode::PerScan), ("per-ray", InsertMode::PerRay)];
+const SENSOR_MODELS: [(&str, SensorModelKind); 2] =
+    [("log-odds", SensorModelKind::LogOdds), ("iwlo", SensorModelKind::Iwlo)];
+const WHEN_BEHIND: [(&str, WhenBehind); 3] =
+    [("wait", WhenBehind::Wait), ("drop-oldest", WhenBehind::DropOldest), ("thin", WhenBehind::Thin)];
+/// Whether the box of ignored points is in the body's frame.
+const FRAMES: [(&str, bool); 2] = [("sensor", false), ("body", true)];
+
+/// How scans are read: `voxtile.files.ReadOptions`.
+pub fn read_options(py: Python<'_>, keywords: &mut Keywords<'_>) -> PyResult<ReadOptions> {
+    let raised = |error: voxtile::Error| exception(py, &error);
+    let mut options = ReadOptions::default();
+    let open = &mut options.open;
+    open.format = keywords.parsed("format", str::parse)?;
+    open.fields = keywords.texts("fields")?;
+    open.scan_period_s = keywords.number("scan_period")?.unwrap_or(open.scan_period_s);
+    let origin = keywords.numbers("sensor_origin")?;
+    open.sensor_origin_m =
+        origin.map(|numbers| point_of("sensor_origin", &numbers)).transpose().map_err(raised)?;
+    open.depth_scale = keywords.number("depth_scale")?;
+    open.intrinsics_path = keywords.path("intrinsics")?;
+    let clouds = &mut options.clouds;
+    if let Some(seconds) = keywords.number("pose_tolerance")? {
+        clouds.pose_tolerance_ns = tolerance_ns(seconds).map_err(raised)?;
+    }
+    clouds.is_world_frame = keywords.flag("world_frame")?;
+    clouds.is_deskewed = keywords.flag("deskew")?;
+    let selection = &mut options.selection;
+    selection.first = keywords.count("first")?.unwrap_or(selection.first);
+    selection.count = keywords.count("count")?;
+    selection.every = keywords.count("every")?.unwrap_or(selection.every);
+    selection.ignored = region(py, keywords, "ignore_box")?;
+    let recording = &mut options.recording;
+    recording.topic = keywords.text("topic")?;
+    recording.odometry_topic = keywords.text("odometry")?;
+    recording.fixed_frame = keywords.text("fixed_frame")?;
+    options.poses = keywords.path("poses")?;
+    options.calib = keywords.path("calib")?;
+    let mount = keywords.numbers("extrinsic")?.map(|mut numbers| {
+        // Of a 4 x 4 matrix the last row says nothing.
+        if numbers.len() == 16 {
+            numbers.truncate(12);
+        }
+        Mount::of(&numbers)
+    });
+    let mount = mount.transpose().map_err(raised)?;
+    let is_box_of_body = keywords.one_of("ignore_frame", &FRAMES)?.unwrap_or(false);
+    set_mount(&mut options, mount, is_box_of_body).map_err(raised)?;
+    Ok(options)
+}
+
+/// How a map is built: `voxtile.files.BuildOptions`.
+pub fn build_options(
+    py: Python<'_>,
+    scans: &Path,
+    output: PathBuf,
+    mut keywords: Keywords<'_>,
+) -> PyResult<BuildOptions> {
+    let mut options = BuildOptions::new(no_stream(scans), output);
+    options.read = read_options(py, &mut keywords)?;
+    options.resolution_m = keywords.number("resolution")?;
+    options.tile_size_m = keywords.number("tile_size")?;
+    options.storage = keywords.one_of("storage", &STORAGES)?;
+    options.memory = keywords.bytes("memory")?.map(MemoryLimit::Bytes);
+    options.min_range_m = keywords.number("min_range")?;
+    options.max_range_m = keywords.number("max_range")?;
+    options.sensor_model = keywords.one_of("sensor_model", &SENSOR_MODELS)?;
+    options.probabilities = match keywords.numbers("probabilities")? {
+        Some(numbers) => Some(numbers.try_into().map_err(|_| {
+            let reason = "four numbers: of a hit, of a miss, least, most";
+            exception(py, &voxtile::Error::argument("probabilities", reason))
+        })?),
+        None => None,
+    };
+    options.occupancy_threshold = keywords.number("occupancy_threshold")?;
+    options.intensity_threshold = keywords.number("intensity_threshold")?;
+    options.intensity_max = keywords.number("intensity_max")?;
+    options.insert_mode = keywords.one_of("insert_mode", &INSERT_MODES)?;
+    options.keep_scans = keywords.flag("keep_scans")?;
+    options.region = region(py, &mut keywords, "region")?;
+    options.clear_no_return_m = keywords.number("clear_no_return")?;
+    options.no_rays = keywords.flag("no_rays")?;
+    options.append = keywords.flag("append")?;
+    options.resume = keywords.flag("resume")?;
+    options.again = keywords.flag("again")?;
+    options.skip_bad = keywords.flag("skip_bad")?;
+    options.flush_every = keywords.parsed("flush_every", str::parse)?.unwrap_or(options.flush_every);
+    options.when_behind = keywords.one_of("when_behind", &WHEN_BEHIND)?.unwrap_or(options.when_behind);
+    keywords.end()?;
+    Ok(options)
+}
+
+/// The file or folder, whatever its name: `-` is no standard input here.
+pub fn no_stream(path: &Path) -> PathBuf {
+    if path.as_os_str() == "-" { Path::new(".").join(path) } else { path.to_owned() }
+}
+
+fn region(py: Python<'_>, keywords: &mut Keywords<'_>, name: &'static str) -> PyResult<Option<Aabb>> {
+    let corners = keywords.numbers(name)?;
+    corners.map(|corners| region_of(name, &corners)).transpose().map_err(|error| exception(py, &error))
+}
