@@ -19,7 +19,7 @@ use voxtile::query::OctreeExport;
 use voxtile::sensor::Probabilities;
 use voxtile::space::{Aabb, Grid, TileIndex, VoxelBox};
 use voxtile::{Error, MapQueries};
-use voxtile_formats::clouds::write::VoxelFileFormat;
+use voxtile_formats::write::VoxelFileFormat;
 use voxtile_formats::{VoxelFile, VoxelFormat, VoxelRecord, VoxelWriter};
 use voxtile_pipeline::Watch;
 use voxtile_pipeline::memory;

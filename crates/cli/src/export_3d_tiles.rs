@@ -12,7 +12,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 use voxtile::mapper::MapView;
 use voxtile::{Error, Result};
-use voxtile_formats::clouds::write::{VoxelFileFormat, VoxelRow, VoxelsHead, WriteOptions, open_sink};
+use voxtile_formats::write::{VoxelFileFormat, VoxelRow, VoxelsHead, WriteOptions, open_sink};
 use voxtile_pipeline::Watch;
 use voxtile_pipeline::memory;
 use voxtile_render::levels::{Levels, LevelsOf, NodeKey, NodeStore, TilesetContent, subtree, tileset};

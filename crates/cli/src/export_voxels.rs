@@ -10,7 +10,7 @@ use voxtile::maths::least_logit;
 use voxtile::space::Aabb;
 use voxtile::tile::Voxel;
 use voxtile::{Error, Result};
-use voxtile_formats::clouds::write::{VoxelFileFormat, VoxelRow, VoxelsHead, WriteOptions, open_sink};
+use voxtile_formats::write::{VoxelFileFormat, VoxelRow, VoxelsHead, WriteOptions, open_sink};
 use voxtile_pipeline::Watch;
 use voxtile_pipeline::memory;
 use voxtile_pipeline::{AnyMap, read_any_map};

@@ -8,7 +8,7 @@
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use voxtile_formats::clouds::write::{VoxelFileFormat, VoxelRow, VoxelsHead, WriteOptions, open_sink};
+use voxtile_formats::write::{VoxelFileFormat, VoxelRow, VoxelsHead, WriteOptions, open_sink};
 
 const TILE_VOXELS: i32 = 32;
 

@@ -35,6 +35,7 @@ mod source;
 mod stored_scan;
 mod stream_input;
 mod voxel_writer;
+pub mod write;
 
 pub use any_scans::open_any_scans;
 pub use pcd::{PcdCloud, read_pcd};

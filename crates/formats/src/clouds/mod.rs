@@ -1,9 +1,8 @@
-//! What people record, as clouds of points with poses, and voxels as files that other programs open. Knows no map.
+//! What people record, as clouds of points with poses. Knows no map.
 //!
 //! ```text
 //! file or folder -> CloudSource -> CloudHead, then CloudPoint after CloudPoint
 //! file of poses  -> Trajectory  -> RigidPose at a time
-//! VoxelRow after VoxelRow -> VoxelSink -> file
 //! ```
 //!
 //! Formats that need many crates stand behind features: `las`, `e57`, `ros`, `sqlite`.
@@ -22,7 +21,6 @@ pub mod read;
 pub mod ros;
 mod spill;
 mod stamp;
-pub mod write;
 
 pub use cloud::{CloudHead, CloudPoint, CloudSource, PoseAt};
 pub use deskew::Deskew;

@@ -8,7 +8,7 @@ use std::fs;
 use std::path::Path;
 use voxtile_formats::clouds::ros::Wire;
 use voxtile_formats::clouds::ros::messages::MessageKind;
-use voxtile_formats::clouds::write::VoxelFileFormat;
+use voxtile_formats::write::VoxelFileFormat;
 
 /// Target, name and content of seeds.
 pub type Seeds = Vec<(&'static str, &'static str, Vec<u8>)>;

@@ -1,6 +1,6 @@
 use std::fs;
 use std::path::Path;
-use voxtile_formats::clouds::write::{VoxelFileFormat, VoxelRow, VoxelsHead, WriteOptions, open_sink};
+use voxtile_formats::write::{VoxelFileFormat, VoxelRow, VoxelsHead, WriteOptions, open_sink};
 
 /// Number of voxels in a file of [`write_voxels`].
 pub const VOXELS: i32 = 30;

@@ -3,7 +3,7 @@ use std::fs;
 use std::path::Path;
 use voxtile_formats::clouds::CloudSource;
 use voxtile_formats::clouds::read::{OpenOptions, open};
-use voxtile_formats::clouds::write::{VoxelFileFormat, WriteOptions};
+use voxtile_formats::write::{VoxelFileFormat, WriteOptions};
 
 const FORMATS: [VoxelFileFormat; 4] =
     [VoxelFileFormat::Las, VoxelFileFormat::Laz, VoxelFileFormat::Copc, VoxelFileFormat::E57];
@@ -53,7 +53,7 @@ fn a_system_in_feet_is_not_that_of_metres() {
 fn what_is_no_number_of_a_system_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.las");
-    let head = voxtile_formats::clouds::write::VoxelsHead {
+    let head = voxtile_formats::write::VoxelsHead {
         voxels: 0,
         resolution_m: 0.5,
         bounds_m: [[0.0; 3]; 2],
@@ -61,9 +61,8 @@ fn what_is_no_number_of_a_system_is_refused() {
     };
     for crs in ["EPSG:", "EPSG:100000", "EPSG:4326+5773"] {
         let options = WriteOptions { crs: Some(crs.to_owned()), ..WriteOptions::beside(&path) };
-        let error = voxtile_formats::clouds::write::open_sink(VoxelFileFormat::Las, &head, &path, &options)
-            .err()
-            .unwrap();
+        let error =
+            voxtile_formats::write::open_sink(VoxelFileFormat::Las, &head, &path, &options).err().unwrap();
         assert!(error.to_string().contains(crs), "{error}");
     }
 }

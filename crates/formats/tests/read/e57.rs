@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 use voxtile_formats::clouds::RigidPose;
 use voxtile_formats::clouds::read::{Format, OpenOptions, open};
-use voxtile_formats::clouds::write::VoxelFileFormat;
+use voxtile_formats::write::VoxelFileFormat;
 
 /// Written by pye57 (libE57Format).
 #[test]

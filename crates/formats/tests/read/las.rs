@@ -2,7 +2,7 @@ use crate::support::{all, clouds, clouds_with, failure, fixture, shared_data, wa
 use std::fs;
 use voxtile_formats::clouds::CloudPoint;
 use voxtile_formats::clouds::read::{OpenOptions, open};
-use voxtile_formats::clouds::write::{VoxelFileFormat, VoxelsHead, WriteOptions, open_sink};
+use voxtile_formats::write::{VoxelFileFormat, VoxelsHead, WriteOptions, open_sink};
 
 fn one_cloud() -> OpenOptions {
     OpenOptions { scan_period_s: 0.0, ..OpenOptions::default() }

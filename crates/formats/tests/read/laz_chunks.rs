@@ -3,7 +3,7 @@ use crate::support::{clouds, clouds_with, failure, fixture};
 use std::fs;
 use voxtile_formats::clouds::CloudPoint;
 use voxtile_formats::clouds::read::OpenOptions;
-use voxtile_formats::clouds::write::VoxelFileFormat;
+use voxtile_formats::write::VoxelFileFormat;
 
 /// Where the points begin, and where the chunk table is.
 fn places(file: &[u8]) -> (usize, usize) {

@@ -1,5 +1,5 @@
 use super::row::{VoxelRow, VoxelSink};
-use crate::clouds::error::{Error, Result};
+use super::{Error, Result};
 use std::path::PathBuf;
 
 /// Lets through as many voxels as were announced, all of them finite: formats name their number up front.

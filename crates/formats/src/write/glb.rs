@@ -6,7 +6,7 @@ use super::out_file::OutFile;
 use super::row::{VoxelRow, VoxelSink, VoxelsHead};
 use super::sort::{ExternalSort, key, of_key, part};
 use super::spool::Spool;
-use crate::clouds::error::{Error, Result};
+use super::{Error, Result};
 use std::path::PathBuf;
 
 /// A brick and a place in it.

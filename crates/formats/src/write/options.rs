@@ -1,4 +1,4 @@
-use crate::clouds::error::{Error, Result};
+use super::{Error, Result};
 use std::path::{Path, PathBuf};
 
 /// How voxels are written.

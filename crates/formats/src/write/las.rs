@@ -2,7 +2,7 @@ use super::las_layout::{COMPRESSED, EXTRA_BYTES, LasLayout, POINT_FORMAT, common
 use super::options::WriteOptions;
 use super::out_file::OutFile;
 use super::row::{VoxelRow, VoxelSink, VoxelsHead};
-use crate::clouds::error::{Error, Result};
+use super::{Error, Result};
 use laz::{LasZipCompressor, LazItemRecordBuilder, LazVlr, LazVlrBuilder};
 use std::path::{Path, PathBuf};
 

@@ -8,7 +8,7 @@ use super::options::WriteOptions;
 use super::out_file::OutFile;
 use super::row::{VoxelRow, VoxelSink, VoxelsHead};
 use super::sort::{ExternalSort, part};
-use crate::clouds::error::{Error, Result};
+use super::{Error, Result};
 use ::las::raw::Vlr;
 use laz::LasZipCompressor;
 use std::collections::BTreeMap;

@@ -1,5 +1,5 @@
+use super::Result;
 use super::out_file::OutFile;
-use crate::clouds::error::Result;
 use std::path::Path;
 
 /// The first and the last bytes of a file.

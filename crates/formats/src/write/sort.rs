@@ -1,5 +1,5 @@
+use super::Result;
 use super::spool::{Spool, SpoolReader};
-use crate::clouds::error::Result;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::path::{Path, PathBuf};

@@ -2,7 +2,7 @@ use super::column_grid::{ColumnGrid, nothing_to_draw};
 use super::options::WriteOptions;
 use super::out_file::OutFile;
 use super::row::{VoxelRow, VoxelSink, VoxelsHead};
-use crate::clouds::error::{Error, Result};
+use super::{Error, Result};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 

@@ -1,8 +1,8 @@
+use super::Result;
 use super::flat_map::{Column, FlatMap};
 use super::options::WriteOptions;
 use super::out_file::OutFile;
 use super::row::{VoxelRow, VoxelSink, VoxelsHead};
-use crate::clouds::error::Result;
 use std::path::{Path, PathBuf};
 
 /// A flat map as nav2's map server loads it: a picture, and a `.yaml` beside it that names it.

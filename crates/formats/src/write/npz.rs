@@ -1,8 +1,8 @@
+use super::Result;
 use super::options::WriteOptions;
 use super::row::{VoxelRow, VoxelSink, VoxelsHead};
 use super::spool::Spool;
 use super::zip_store::ZipStore;
-use crate::clouds::error::Result;
 use std::io::Read;
 use std::path::Path;
 

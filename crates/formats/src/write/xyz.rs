@@ -1,6 +1,6 @@
+use super::Result;
 use super::out_file::OutFile;
 use super::row::{VoxelRow, VoxelSink};
-use crate::clouds::error::Result;
 use std::path::Path;
 
 /// Text, a line a voxel: `x y z probability`, in as few digits as give back the same numbers.

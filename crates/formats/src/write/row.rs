@@ -1,4 +1,4 @@
-use crate::clouds::error::Result;
+use super::Result;
 
 /// A voxel that is written.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,8 +1,8 @@
+use super::Result;
 use super::mcap_file::{McapFile, Topic};
 use super::options::WriteOptions;
 use super::point_cloud2::{FieldType, SCHEMA, encode};
 use super::row::{VoxelRow, VoxelSink, VoxelsHead};
-use crate::clouds::error::Result;
 use std::path::Path;
 
 /// Most points of a cloud.

@@ -1,5 +1,5 @@
 use super::out_file::OutFile;
-use crate::clouds::error::{Error, Result};
+use super::{Error, Result};
 use std::io::Read;
 use std::path::Path;
 

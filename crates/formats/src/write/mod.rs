@@ -49,6 +49,7 @@ mod testing;
 mod xyz;
 mod zip_store;
 
+use crate::clouds::{Error, Result};
 pub use format::VoxelFileFormat;
 pub use open::open_sink;
 pub use options::WriteOptions;

@@ -1,6 +1,6 @@
+use super::Result;
 use super::column_grid::{ColumnGrid, nothing_to_draw};
 use super::row::{VoxelRow, VoxelsHead};
-use crate::clouds::error::Result;
 
 /// What is known of a column of voxels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -3,7 +3,7 @@ use super::options::WriteOptions;
 use super::out_file::OutFile;
 use super::row::{VoxelRow, VoxelSink, VoxelsHead};
 use super::sort::{ExternalSort, key, of_key, part};
-use crate::clouds::error::{Error, Result};
+use super::{Error, Result};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};

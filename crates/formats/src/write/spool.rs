@@ -1,4 +1,4 @@
-use crate::clouds::error::{Error, Result};
+use super::{Error, Result};
 use std::fs::File;
 use std::io::{BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};

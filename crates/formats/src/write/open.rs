@@ -8,10 +8,10 @@ use super::options::WriteOptions;
 #[cfg(feature = "parquet")]
 use super::parquet;
 use super::row::{VoxelSink, VoxelsHead};
+use super::{Error, Result};
 use super::{autoware, glb, heightmap, nav2, npz, xyz};
 #[cfg(feature = "las")]
 use super::{copc, las};
-use crate::clouds::error::{Error, Result};
 use std::path::Path;
 
 /// Starts a file, or a folder where the format is one, at a path of its own. It is whole when the sink is finished.

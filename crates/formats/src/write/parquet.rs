@@ -1,7 +1,7 @@
 use super::options::WriteOptions;
 use super::out_file::OutFile;
 use super::row::{VoxelRow, VoxelSink, VoxelsHead};
-use crate::clouds::error::{Error, Result};
+use super::{Error, Result};
 use ::parquet::basic::{Compression, ZstdLevel};
 use ::parquet::data_type::{DataType, DoubleType, FloatType, Int32Type};
 use ::parquet::errors::{ParquetError, Result as ParquetResult};

@@ -1,6 +1,6 @@
 use super::lattice::Lattice;
 use super::row::{VoxelRow, VoxelsHead};
-use crate::clouds::error::{Error, Result};
+use super::{Error, Result};
 
 /// Most cells of a flat map.
 const MAX_CELLS: u64 = 1 << 31;

@@ -1,7 +1,7 @@
 use super::options::WriteOptions;
 use super::out_file::OutFile;
 use super::row::{VoxelRow, VoxelsHead};
-use crate::clouds::error::{Error, Result};
+use super::{Error, Result};
 use ::las::raw::header::{Evlr, LargeFile};
 use ::las::raw::vlr::RecordLength;
 use ::las::raw::{Header, Vlr};

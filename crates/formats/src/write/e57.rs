@@ -3,7 +3,7 @@ use super::out_file::OutFile;
 use super::row::{VoxelRow, VoxelSink};
 use super::sort::part;
 use super::spool::Spool;
-use crate::clouds::error::{Error, Result};
+use super::{Error, Result};
 use ::e57::{E57Writer, Record, RecordValue};
 use std::path::{Path, PathBuf};
 
