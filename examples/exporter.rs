@@ -2,13 +2,12 @@
 //! `cargo run --release --example exporter -- map_tiles_example occupied.ply`.
 
 use std::error::Error;
-use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use voxtile::{MapOptions, MapView, Occupancy};
-use voxtile_formats::{VoxelFile, VoxelFormat, VoxelRecord, VoxelWriter};
+use voxtile_formats::write::{OutputFormats, VoxelRow, VoxelsHead, WriteOptions};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -26,10 +25,11 @@ fn main() -> Result<(), Box<dyn Error>> {
         asked.store(is_line, Ordering::Relaxed);
     });
 
-    let (grid, origin_m) = (map.config().grid, [0.0; 3]);
-    let header =
-        VoxelFile { format: VoxelFormat::Ply, voxels: occupied, resolution_m: grid.resolution_m(), origin_m };
-    let mut out = VoxelWriter::new(header, BufWriter::new(File::create(file)?))?;
+    let (grid, path) = (map.config().grid, Path::new(file));
+    let formats = OutputFormats::default();
+    let format = formats.of_name("ply").ok_or("without PLY")?;
+    let head = VoxelsHead::of_stream(occupied, grid.resolution_m());
+    let mut out = format.open(&head, path, &WriteOptions::beside(path))?;
     let all = map.tile_indices().len();
     for (done, tile) in map.tiles().enumerate() {
         if stop.load(Ordering::Relaxed) {
@@ -40,17 +40,19 @@ fn main() -> Result<(), Box<dyn Error>> {
         for voxel in tile?.voxels() {
             let found = Occupancy::of(map.config(), Some(voxel.evidence));
             if let Occupancy::Occupied(probability) = found {
-                out.write(&VoxelRecord {
+                out.put(&VoxelRow {
+                    index: voxel.index,
                     center_m: grid.center_m(voxel.index),
                     probability,
                     log_odds: voxel.evidence.log_odds,
                     observation_count: voxel.evidence.observation_count,
+                    tile: grid.tile_of_voxel(voxel.index).to_array(),
                 })?;
             }
         }
         eprint!("\r{} of {all} tiles", done + 1);
     }
-    out.finish()?.flush()?;
+    out.finish()?;
     eprintln!("; {occupied} voxels");
     Ok(())
 }

@@ -17,7 +17,7 @@ pub use build::{BuildArgs, InsertName, ModelName, OctreeArgs, OctreeName, Storag
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 pub use edit::{ClearArgs, CropArgs, DecayArgs, MergeArgs, PartArgs};
-pub use export::{ExportArgs, ExportFormatName, WhatName};
+pub use export::{ExportArgs, WhatName};
 pub use local::{LocalArgs, PresetName};
 use log::LevelFilter;
 pub use picture::{PictureArgs, ReportArgs, TerminalArgs, ViewName};

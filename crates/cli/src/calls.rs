@@ -2,7 +2,7 @@
 //! caller. Nothing is printed; standard input and output are used only where an argument is `-`.
 
 use super::args::ExportArgs;
-use super::export as map_to_file;
+use super::export;
 use clap::error::{ContextKind, ContextValue};
 use clap::{Args, Parser};
 use serde_json::Value;
@@ -25,7 +25,11 @@ struct Arguments<A: Args> {
 ///
 /// What the command fails for; [`Error::Stopped`].
 pub fn export(arguments: Vec<OsString>, watch: &Watch) -> anyhow::Result<Value> {
-    Ok(map_to_file::export(&parse::<ExportArgs>(arguments)?, watch)?.json)
+    let args = parse::<ExportArgs>(arguments)?;
+    Ok(match &args.scans {
+        Some(folder) => serde_json::to_value(voxtile_pipeline::export_scans(&args.map, folder, watch)?),
+        None => serde_json::to_value(voxtile_pipeline::export(&export::options_of(&args)?, watch)?),
+    }?)
 }
 
 fn parse<A: Args>(arguments: Vec<OsString>) -> voxtile::Result<A> {

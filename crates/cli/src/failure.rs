@@ -1,12 +1,12 @@
 use crate::args::Command;
 use crate::json;
 use crate::option_names::{option_of, with_options};
-use crate::output_file::is_standard_output;
 use crate::run::{INTERRUPTED, say};
 use serde::Serialize;
 use std::io;
 use std::process::ExitCode;
 use voxtile::{Error, Place};
+use voxtile_pipeline::output::is_standard_output;
 
 /// Where a command that fails says so for a program, beside the line for a person.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,7 +1,6 @@
 use crate::args::{LocalArgs, PresetName};
 use crate::json;
 use crate::local_table::{Row, print_table};
-use crate::output_file::{OutputFile, check_picture};
 use crate::progress::{Progress, at_terminal};
 use crate::read_options::read_options;
 use crate::stop_signal;
@@ -11,6 +10,7 @@ use voxtile::space::{Grid, Point};
 use voxtile::{Error, Scan};
 use voxtile_formats::ScanSource;
 use voxtile_local::{LocalMap, LocalParameters, LocalReader, LocalState};
+use voxtile_pipeline::output::OutputFile;
 use voxtile_pipeline::{LocalScans, Watch};
 use voxtile_pipeline::{is_standard_input, open_scans};
 use voxtile_render::{OverTime, Panel};
@@ -33,7 +33,7 @@ pub fn run(args: &LocalArgs) -> anyhow::Result<ExitCode> {
         return Err(Error::argument("SCANS", reason).into());
     }
     // All arguments before the first scan.
-    check_picture(&args.output)?;
+    OutputFile::check_picture(&args.output)?;
     for setup in &setups {
         LocalMap::new(args.resolution, setup.parameters)?;
     }

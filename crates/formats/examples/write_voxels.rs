@@ -8,12 +8,12 @@
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use voxtile_formats::write::{VoxelFileFormat, VoxelRow, VoxelsHead, WriteOptions, open_sink};
+use voxtile_formats::write::{Origin, OutputFormat, OutputFormats, VoxelRow, VoxelsHead, WriteOptions};
 
 const TILE_VOXELS: i32 = 32;
 
 struct Arguments {
-    format: VoxelFileFormat,
+    format: OutputFormat,
     table: PathBuf,
     output: PathBuf,
     resolution_m: f64,
@@ -57,7 +57,7 @@ fn run() -> Result<(), Box<dyn std::error::Error>> {
     options.crs = Some("LOCAL_CS[\"voxels\",UNIT[\"metre\",1]]".to_owned());
     options.origin_m = arguments.subtract_m;
     options.stamp_ns = 1_700_000_000_123_456_789;
-    let mut sink = open_sink(arguments.format, &head, &arguments.output, &options)?;
+    let mut sink = arguments.format.open(&head, &arguments.output, &options)?;
     for row in &rows {
         sink.put(row)?;
     }
@@ -69,7 +69,7 @@ fn arguments() -> Result<Arguments, String> {
     let mut words = std::env::args().skip(1);
     let mut word = |what: &str| words.next().ok_or_else(|| format!("{what} is missing"));
     let name = word("FORMAT")?;
-    let format = VoxelFileFormat::of_name(&name).ok_or_else(|| format!("{name} is no format"))?;
+    let format = *OutputFormats::default().of_name(&name).ok_or_else(|| format!("{name} is no format"))?;
     let (table, output) = (word("VOXELS.csv")?.into(), Path::new(&word("OUTPUT")?).to_owned());
     let mut arguments =
         Arguments { format, table, output, resolution_m: 0.1, origin_m: [0.0; 3], subtract_m: [0.0; 3] };
@@ -87,6 +87,9 @@ fn arguments() -> Result<Arguments, String> {
             _ => return Err(format!("{option} is no option")),
         }
     }
+    if format.origin == Origin::Map {
+        arguments.subtract_m = [0.0; 3];
+    }
     Ok(arguments)
 }
 
@@ -97,7 +100,10 @@ fn row(line: &str, arguments: &Arguments) -> Option<VoxelRow> {
     };
     let index: [i32; 3] = [x.parse().ok()?, y.parse().ok()?, z.parse().ok()?];
     let log_odds: f64 = log_odds.parse().ok()?;
-    let center = |k: usize| arguments.origin_m[k] + (f64::from(index[k]) + 0.5) * arguments.resolution_m;
+    let center = |k: usize| {
+        let center = arguments.origin_m[k] + (f64::from(index[k]) + 0.5) * arguments.resolution_m;
+        center - arguments.subtract_m[k]
+    };
     Some(VoxelRow {
         index,
         center_m: std::array::from_fn(center),

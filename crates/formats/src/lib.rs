@@ -1,9 +1,9 @@
 //! Files of other programs, one format per file, and voxtile's scan stream. Knows no mapper.
 //!
 //! ```text
-//! folder of PCD + poses ┐                                  ┌ .ply .pcd .csv
-//! OctoMap scan graph    ├ ScanSource -> SensorScan   Voxel ┤
-//! OctoMap scan log      │                                  └ VoxelWriter
+//! folder of PCD + poses ┐
+//! OctoMap scan graph    ├ ScanSource -> SensorScan      VoxelRow -> VoxelSink -> .ply .las .npz ..
+//! OctoMap scan log      │
 //! voxtile's scan stream ┘
 //! ```
 
@@ -34,7 +34,6 @@ mod sensor_scan;
 mod source;
 mod stored_scan;
 mod stream_input;
-mod voxel_writer;
 pub mod write;
 
 pub use any_scans::open_any_scans;
@@ -55,4 +54,3 @@ pub use selected_scans::Selection;
 pub use sensor_scan::SensorScan;
 pub use source::{ScanHead, ScanSource, open_scans};
 pub use stored_scan::StoredScan;
-pub use voxel_writer::{VoxelFile, VoxelFormat, VoxelRecord, VoxelWriter};

@@ -1,11 +1,12 @@
-//! How scans become a map, and how maps are found: what the command, the page, the Python package and the ROS 2 node
-//! share. Nothing here prints, parses a command line or knows a screen.
+//! How scans become a map, how maps are found, and how they become files: what the command, the page, the Python
+//! package and the ROS 2 node share. Nothing here prints, parses a command line or knows a screen.
 //!
 //! ```text
 //! BuildOptions -> build                                             build, build_config, flush_schedule
 //!   scans of a file, folder, map, bucket or pipe                    scan_input, kept_source, fetched_source
 //!   -> ScanReader, in a thread of its own -> ScanQueue -> Intake    scan_reader, scan_queue, intake
 //!   -> a mapper -> Summary                                          summary
+//! ExportOptions -> export -> ExportSummary                          export/, output/
 //! numbers: lists of numbers that all front ends have                numbers
 //! Watch: ends work, and hears how far it is                         watch
 //! ```
@@ -14,6 +15,7 @@ mod answer;
 mod build;
 mod build_config;
 mod build_options;
+mod export;
 #[cfg(feature = "bucket")]
 mod fetched_source;
 mod flush_schedule;
@@ -24,6 +26,7 @@ pub mod memory;
 mod new_poses;
 pub mod numbers;
 pub mod octree_file;
+pub mod output;
 pub mod place;
 mod region_tiles;
 mod scan_input;
@@ -36,6 +39,9 @@ mod watch;
 pub use answer::{Answer, answer_at};
 pub use build::build;
 pub use build_options::{BuildOptions, SensorModelKind};
+pub use export::{
+    ExportOptions, ExportSummary, ExportedScans, POSES_NAME, WhichVoxels, Written, export, export_scans,
+};
 pub use flush_schedule::FlushEvery;
 pub use kept_source::is_map;
 pub use map_at::{AnyMap, MapAt, open_any_map, read_all_maps, read_any_map, read_map, read_maps, whole_map};

@@ -4,9 +4,9 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 use voxtile::octree::{self, Leaf, OctreeFile};
-use voxtile::space::{Grid, MortonCode, VoxelIndex};
+use voxtile::space::{Grid, MortonCode};
 use voxtile::{Error, Result};
-use voxtile_formats::VoxelRecord;
+use voxtile_formats::write::VoxelRow;
 
 /// Most voxels that the pruned leaves of a file may stand for when they are written out one by one: a file of twenty
 /// bytes can stand for 2^48.
@@ -22,25 +22,30 @@ pub fn read(path: &Path) -> Result<OctreeFile> {
     octree::read(BufReader::with_capacity(1 << 16, file)).map_err(|error| error.in_input(path))
 }
 
+/// The voxels of a file. The size of tiles has no meaning; two voxels always make a grid.
+///
+/// # Errors
+///
+/// A resolution that is none.
+pub fn grid_of(file: &OctreeFile) -> Result<Grid> {
+    Ok(Grid::new(file.resolution_m, 2.0 * file.resolution_m)?)
+}
+
 /// Number of finest voxels with at least `min_log_odds`, which a file's leaves may stand for.
 ///
 /// # Errors
 ///
 /// More than [`MAX_VOXELS`].
-pub fn count_voxels(
-    file: &OctreeFile,
-    min_log_odds: f32,
-    keep: impl Fn(&VoxelRecord) -> bool,
-) -> Result<u64> {
+pub fn count_voxels(file: &OctreeFile, min_log_odds: f32, keep: impl Fn(&VoxelRow) -> bool) -> Result<u64> {
     let size = file.tree.count_voxels(min_log_odds).occupied;
     if size > MAX_VOXELS {
         let hint = "such a file is made by pruning large cubes; export it as .ot or .bt, which stays pruned";
         return Err(Error::TooLarge { what: "number of voxels in the file", size, limit: MAX_VOXELS, hint });
     }
     let mut count = 0;
-    for_each_voxel(file, min_log_odds, |_, voxel| {
+    for_each_voxel(file, min_log_odds, |voxel| {
         count += u64::from(keep(voxel));
-        Ok::<_, Error>(())
+        Ok(())
     })?;
     Ok(count)
 }
@@ -50,13 +55,12 @@ pub fn count_voxels(
 /// # Errors
 ///
 /// Those of `visit`; a resolution that is none.
-pub fn for_each_voxel<E: From<Error>>(
+pub fn for_each_voxel(
     file: &OctreeFile,
     min_log_odds: f32,
-    mut visit: impl FnMut(VoxelIndex, &VoxelRecord) -> std::result::Result<(), E>,
-) -> std::result::Result<(), E> {
-    // The tile size has no meaning here; two voxels always make a grid.
-    let grid = Grid::new(file.resolution_m, 2.0 * file.resolution_m).map_err(Error::from)?;
+    mut visit: impl FnMut(&VoxelRow) -> Result<()>,
+) -> Result<()> {
+    let grid = grid_of(file)?;
     for Leaf { code, depth, value } in file.tree.leaves() {
         if value < min_log_odds {
             continue;
@@ -64,13 +68,14 @@ pub fn for_each_voxel<E: From<Error>>(
         for offset in 0..MortonCode::span(depth) {
             let voxel = MortonCode(code.0 + offset).to_key().to_index_from([-32768; 3]);
             let log_odds = f64::from(value);
-            let record = VoxelRecord {
+            visit(&VoxelRow {
+                index: voxel,
                 center_m: grid.center_m(voxel),
                 probability: voxtile::maths::sigmoid(log_odds),
                 log_odds,
                 observation_count: 0,
-            };
-            visit(voxel, &record)?;
+                tile: [0; 3],
+            })?;
         }
     }
     Ok(())

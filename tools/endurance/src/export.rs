@@ -9,7 +9,7 @@ use std::time::Instant;
 use voxtile::octree::OctreeFormat;
 use voxtile::query::OctreeExport;
 use voxtile::{MapQueries, MapReader, MapView};
-use voxtile_formats::{VoxelFile, VoxelFormat, VoxelRecord, VoxelWriter};
+use voxtile_formats::write::{OutputFormats, VoxelRow, VoxelsHead, WriteOptions};
 
 /// A map to export in little memory.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -86,46 +86,45 @@ impl Export {
 
     fn write(&self, path: &Path) -> Result<u64> {
         let map = MapReader::open(&self.map, 1)?;
-        let mut out = BufWriter::with_capacity(1 << 18, File::create(path)?);
-        let voxels = match self.format {
-            ExportFormat::Ply => write_occupied(&map, &mut out)?,
-            ExportFormat::Bt => self.write_octree(&map, OctreeFormat::Bt, &mut out)?,
-            ExportFormat::Ot => self.write_octree(&map, OctreeFormat::Ot, &mut out)?,
-        };
-        out.flush()?;
-        Ok(voxels)
+        match self.format {
+            ExportFormat::Ply => write_occupied(&map, path),
+            ExportFormat::Bt => self.write_octree(&map, OctreeFormat::Bt, path),
+            ExportFormat::Ot => self.write_octree(&map, OctreeFormat::Ot, path),
+        }
     }
 
-    fn write_octree(&self, map: &MapReader, format: OctreeFormat, out: &mut impl Write) -> Result<u64> {
+    fn write_octree(&self, map: &MapReader, format: OctreeFormat, path: &Path) -> Result<u64> {
+        let mut out = BufWriter::with_capacity(1 << 18, File::create(path)?);
         let spool = self.folder.join("spool");
         let mut spool = File::options().read(true).write(true).create_new(true).open(spool)?;
         let export = OctreeExport { format, region: None, origin: [0; 3], memory_bytes: self.memory_bytes };
-        map.write_octree::<anyhow::Error>(&export, &mut spool, out)
+        let voxels = map.write_octree::<anyhow::Error>(&export, &mut spool, &mut out)?;
+        out.flush()?;
+        Ok(voxels)
     }
 }
 
-fn write_occupied(map: &MapReader, out: &mut impl Write) -> Result<u64> {
+fn write_occupied(map: &MapReader, path: &Path) -> Result<u64> {
     let grid = map.config().grid;
     let (_, count) = map.voxel_counts().context("the map does not know how many voxels it has")?;
-    let file = VoxelFile {
-        format: VoxelFormat::Ply,
-        voxels: count,
-        resolution_m: grid.resolution_m(),
-        origin_m: [0.0; 3],
-    };
-    let mut writer = VoxelWriter::new(file, out)?;
+    let formats = OutputFormats::default();
+    let format = formats.of_name("ply").context("without PLY")?;
+    let head = VoxelsHead::of_stream(count, grid.resolution_m());
+    let mut sink = format.open(&head, path, &WriteOptions::beside(path))?;
     let mut written = Ok(());
     map.for_each_occupied(None, None, |voxel| {
         if written.is_ok() {
-            written = writer.write(&VoxelRecord {
+            written = sink.put(&VoxelRow {
+                index: voxel.index,
                 center_m: grid.center_m(voxel.index),
                 probability: voxel.evidence.probability(),
                 log_odds: voxel.evidence.log_odds,
                 observation_count: voxel.evidence.observation_count,
+                tile: grid.tile_of_voxel(voxel.index).to_array(),
             });
         }
     })?;
     written?;
-    writer.finish()?;
+    sink.finish()?;
     Ok(count)
 }

@@ -1,7 +1,8 @@
 use bytesize::ByteSize;
-use clap::builder::ArgPredicate;
+use clap::builder::{ArgPredicate, PossibleValue, PossibleValuesParser};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
+use voxtile_formats::write::OutputFormats;
 
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
@@ -24,8 +25,8 @@ pub struct ExportArgs {
     #[arg(long, value_name = "DIR", conflicts_with_all = ["output", "format", "what", "region", "origin"])]
     pub scans: Option<PathBuf>,
     /// What to write, whatever the extension
-    #[arg(long, value_name = "FORMAT")]
-    pub format: Option<ExportFormatName>,
+    #[arg(long, value_name = "FORMAT", value_parser = format_names())]
+    pub format: Option<String>,
     /// Voxels of at least this probability; 0 takes all observed ones [default: the map's occupancy threshold]
     #[arg(long, value_name = "P")]
     pub min_probability: Option<f64>,
@@ -50,59 +51,18 @@ pub struct ExportArgs {
     #[arg(long, value_names = ["X", "Y", "Z"], num_args = 3)]
     pub origin: Option<Vec<f64>>,
     /// Memory for putting a .bt or .ot file together, beside that of one tile (64MiB, 1GiB)
-    #[arg(long, value_name = "SIZE", default_value = "64MiB")]
-    pub memory: ByteSize,
+    /// [default: 64MiB]
+    #[arg(long, value_name = "SIZE")]
+    pub memory: Option<ByteSize>,
     /// Print the summary as JSON
     #[arg(long)]
     pub json: bool,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum ExportFormatName {
-    /// Points with doubles, probability, log-odds and count
-    Ply,
-    /// Points with float32, as PCL reads them
-    Pcd,
-    /// Text
-    Csv,
-    /// OctoMap's free and occupied voxels
-    Bt,
-    /// OctoMap's log-odds
-    Ot,
-    /// Text: x y z probability
-    Xyz,
-    /// NumPy arrays: xyz, log_odds, probability, count
-    Npz,
-    /// LAS 1.4 with log-odds and count as extra bytes
-    Las,
-    /// The same, compressed
-    Laz,
-    /// The same with levels of detail
-    Copc,
-    /// ASTM E57
-    E57,
-    /// Apache Parquet, where it was built in
-    Parquet,
-    /// A recording with PointCloud2, as Foxglove opens it
-    Mcap,
-    /// The surface of occupied voxels as binary glTF, Y-up
-    Glb,
-    /// A flat map of nav2: .pgm and .yaml
-    Nav2,
-    /// Heights as a 16-bit PNG with a world file
-    Heightmap,
-    /// A folder of PCD squares with the metadata of Autoware
-    Autoware,
-    /// A folder of 3D Tiles: the surface at every level of detail, as Cesium and others open it
-    #[value(name = "3dtiles")]
-    ThreeDTiles,
-}
-
-impl ExportFormatName {
-    /// The name of the format.
-    pub fn name(self) -> String {
-        self.to_possible_value().map_or(String::new(), |value| value.get_name().to_owned())
-    }
+/// The names of all formats, with what they are.
+fn format_names() -> PossibleValuesParser {
+    let formats = OutputFormats::default();
+    formats.all().iter().map(|format| PossibleValue::new(format.name).help(format.help)).into()
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

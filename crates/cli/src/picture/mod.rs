@@ -5,9 +5,6 @@ mod small;
 
 use crate::args::{ColorName, PictureArgs, ViewName};
 use crate::json;
-use voxtile_pipeline::{AnyMap, read_any_map};
-
-use crate::output_file::{OutputFile, is_standard_output};
 use crate::part::region_of;
 use crate::progress::Progress;
 use crate::terminal::{self, Protocol};
@@ -20,6 +17,8 @@ use std::process::ExitCode;
 use voxtile::mapper::MapView;
 use voxtile::space::Point;
 use voxtile::{Error, Result};
+use voxtile_pipeline::output::{OutputFile, is_standard_output};
+use voxtile_pipeline::{AnyMap, read_any_map};
 use voxtile_render::{ColorBy, Drawn, Picture, SideAxis, View};
 
 /// Where the picture goes.

@@ -7,9 +7,6 @@ mod svg;
 use crate::args::ReportArgs;
 use crate::info::Info;
 use crate::json;
-use voxtile_pipeline::{AnyMap, MapAt, read_any_map};
-
-use crate::output_file::{OutputFile, is_standard_output};
 use crate::picture::{name_of, path_of};
 use crate::progress::Progress;
 use std::io::{self, Write};
@@ -21,7 +18,9 @@ use voxtile::operations::{SnapshotInfo, snapshots};
 use voxtile::store::ScanRecord;
 use voxtile::{Error, TileIndex};
 use voxtile_pipeline::memory;
+use voxtile_pipeline::output::{OutputFile, is_standard_output};
 use voxtile_pipeline::place::place_of;
+use voxtile_pipeline::{AnyMap, MapAt, read_any_map};
 use voxtile_render::{Drawn, Picture, SideAxis, Survey, View};
 
 /// All that the page tells.

@@ -74,15 +74,14 @@ impl AutowareSink {
 
 impl VoxelSink for AutowareSink {
     fn put(&mut self, voxel: &VoxelRow) -> Result<()> {
-        let place: [f32; 3] = std::array::from_fn(|k| (voxel.center_m[k] - self.origin_m[k]) as f32);
+        let place = voxel.center_m.map(|coordinate| coordinate as f32);
         let is_far = |k: usize| {
-            let exact = voxel.center_m[k] - self.origin_m[k];
-            let error_m = (f64::from(place[k]) - exact).abs();
+            let error_m = (f64::from(place[k]) - voxel.center_m[k]).abs();
             error_m.is_nan() || error_m > self.resolution_m / 8.0
         };
         if (0..3).any(is_far) {
             let reason = format!(
-                "single precision cannot hold voxels of {} m at {:?} m; give an origin near the map that is subtracted",
+                "single precision cannot hold voxels of {} m at {:?} m; give an origin near the map, which is subtracted",
                 self.resolution_m, voxel.center_m
             );
             return Err(Error::argument("origin", reason));
@@ -170,6 +169,7 @@ mod tests {
         assert!(sink.put(&voxel).unwrap_err().to_string().contains("origin"));
         options.origin_m = [500_000.0, 40_182_000.0, 0.0];
         let mut sink = AutowareSink::create(&head_of(&[]), &folder.path().join("b"), &options).unwrap();
+        voxel.center_m = std::array::from_fn(|k| voxel.center_m[k] - options.origin_m[k]);
         sink.put(&voxel).unwrap();
     }
 }

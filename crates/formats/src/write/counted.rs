@@ -3,15 +3,15 @@ use super::{Error, Result};
 use std::path::PathBuf;
 
 /// Lets through as many voxels as were announced, all of them finite: formats name their number up front.
-pub(super) struct Counted {
-    inner: Box<dyn VoxelSink>,
+pub(super) struct Counted<'a> {
+    inner: Box<dyn VoxelSink + 'a>,
     final_path: PathBuf,
     announced: u64,
     seen: u64,
 }
 
-impl Counted {
-    pub(super) fn new(inner: Box<dyn VoxelSink>, final_path: PathBuf, announced: u64) -> Self {
+impl<'a> Counted<'a> {
+    pub(super) fn new(inner: Box<dyn VoxelSink + 'a>, final_path: PathBuf, announced: u64) -> Self {
         Self { inner, final_path, announced, seen: 0 }
     }
 
@@ -20,7 +20,7 @@ impl Counted {
     }
 }
 
-impl VoxelSink for Counted {
+impl VoxelSink for Counted<'_> {
     fn put(&mut self, voxel: &VoxelRow) -> Result<()> {
         if self.seen == self.announced {
             let reason = format!("more than the {} voxels that were announced", self.announced);

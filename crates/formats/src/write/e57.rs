@@ -1,6 +1,6 @@
 use super::options::WriteOptions;
 use super::out_file::OutFile;
-use super::row::{VoxelRow, VoxelSink};
+use super::row::{VoxelRow, VoxelSink, VoxelsHead};
 use super::sort::part;
 use super::spool::Spool;
 use super::{Error, Result};
@@ -22,7 +22,7 @@ pub(super) struct E57Sink {
 }
 
 impl E57Sink {
-    pub(super) fn create(path: &Path, options: &WriteOptions) -> Result<Self> {
+    pub(super) fn create(_: &VoxelsHead, path: &Path, options: &WriteOptions) -> Result<Self> {
         let points = Spool::new(&options.scratch_folder)?;
         let crs = options.crs.as_deref().map(as_cdata).transpose()?;
         Ok(Self { out: OutFile::create(path)?, points, crs })
@@ -88,7 +88,7 @@ fn guid(bytes: u64, number: u16) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::testing::row;
+    use super::super::testing::{head_of, row};
     use super::*;
     use ::e57::{CartesianCoordinate, E57Reader};
 
@@ -96,8 +96,9 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.e57");
         let options = WriteOptions { crs: Some(crs.to_owned()), ..WriteOptions::beside(&path) };
-        let mut sink = Box::new(E57Sink::create(&path, &options)?);
-        sink.put(&row([1, 2, 3], 0.75)).unwrap();
+        let voxel = row([1, 2, 3], 0.75);
+        let mut sink = Box::new(E57Sink::create(&head_of(&[voxel]), &path, &options)?);
+        sink.put(&voxel).unwrap();
         sink.finish().unwrap();
         Ok(E57Reader::from_file(&path).unwrap().coordinate_metadata().map(str::to_owned))
     }
@@ -118,7 +119,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.e57");
         let rows: Vec<_> = (0..5000).map(|k| row([k, -k, 3], 0.75)).collect();
-        let mut sink = Box::new(E57Sink::create(&path, &WriteOptions::beside(&path)).unwrap());
+        let options = WriteOptions::beside(&path);
+        let mut sink = Box::new(E57Sink::create(&head_of(&rows), &path, &options).unwrap());
         rows.iter().for_each(|row| sink.put(row).unwrap());
         sink.finish().unwrap();
         let mut reader = E57Reader::from_file(&path).unwrap();

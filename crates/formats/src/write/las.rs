@@ -20,12 +20,15 @@ enum Points {
 }
 
 impl LasSink {
-    pub(super) fn create(
-        head: &VoxelsHead,
-        path: &Path,
-        options: &WriteOptions,
-        is_compressed: bool,
-    ) -> Result<Self> {
+    pub(super) fn plain(head: &VoxelsHead, path: &Path, options: &WriteOptions) -> Result<Self> {
+        Self::create(head, path, options, false)
+    }
+
+    pub(super) fn compressed(head: &VoxelsHead, path: &Path, options: &WriteOptions) -> Result<Self> {
+        Self::create(head, path, options, true)
+    }
+
+    fn create(head: &VoxelsHead, path: &Path, options: &WriteOptions, is_compressed: bool) -> Result<Self> {
         let (layout, mut vlrs) = (LasLayout::of(head)?, common_vlrs(options)?);
         let mut out = OutFile::create(path)?;
         let points = if is_compressed {

@@ -1,12 +1,12 @@
-//! Voxels as files of other programs, one format a file.
+//! Voxels as files for other programs: one format a file, and a row in the table of `registry.rs`.
 //!
 //! ```text
-//! VoxelsHead, WriteOptions -> open_sink -> VoxelSink <- VoxelRow after VoxelRow, then finish
+//! OutputFormats -> OutputFormat::open(VoxelsHead, WriteOptions) -> VoxelSink <- VoxelRow after VoxelRow, then finish
 //! ```
 //!
 //! A sink writes to the path that it is given; who calls renames it when it is whole. What cannot be written in the
 //! order of the voxels is sorted in files without names beside the output: memory does not grow with the voxels, but
-//! for the flat grids of [`VoxelFileFormat::Nav2Map`] and [`VoxelFileFormat::Heightmap`].
+//! for the flat grids of `nav2` and `heightmap`.
 
 mod autoware;
 mod column_grid;
@@ -15,10 +15,10 @@ mod copc;
 #[cfg(feature = "las")]
 mod copc_levels;
 mod counted;
+mod csv;
 #[cfg(feature = "e57")]
 mod e57;
 mod flat_map;
-mod format;
 mod glb;
 mod glb_json;
 mod greedy;
@@ -34,23 +34,28 @@ mod mcap;
 mod mcap_file;
 mod nav2;
 mod npz;
-mod open;
 mod options;
 mod out_file;
+mod output_format;
 #[cfg(feature = "parquet")]
 mod parquet;
+mod pcd;
+mod ply;
 #[cfg(feature = "ros")]
 mod point_cloud2;
+mod registry;
 mod row;
 mod sort;
 mod spool;
+mod stream_out;
 #[cfg(test)]
 mod testing;
 mod xyz;
 mod zip_store;
 
 use crate::clouds::{Error, Result};
-pub use format::VoxelFileFormat;
-pub use open::open_sink;
 pub use options::WriteOptions;
+pub use output_format::{OpenFiles, OpenStream, Origin, OutputFormat, OutputOption, Writer};
+pub use pcd::PCD_REACH_VOXELS;
+pub use registry::OutputFormats;
 pub use row::{VoxelRow, VoxelSink, VoxelsHead};

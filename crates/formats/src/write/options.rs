@@ -19,7 +19,8 @@ pub struct WriteOptions {
     pub z_max_m: Option<f64>,
     /// Autoware: edge of the square of a file, in whole metres.
     pub cell_m: f64,
-    /// Subtracted from coordinates where a format holds them in single precision (Autoware).
+    /// Where in the map the file's coordinates begin, in metres: what is to be added to the centers of voxels. Formats
+    /// without room for it leave it out.
     pub origin_m: [f64; 3],
     /// Meshes: the heights of the first and the last colour, in metres; of the lowest and highest voxel if not given.
     pub colour_heights_m: Option<[f64; 2]>,
@@ -89,22 +90,23 @@ impl WriteOptions {
 
 #[cfg(test)]
 mod tests {
+    use super::super::OutputFormats;
     use super::super::testing::{head_of, row};
-    use super::super::{VoxelFileFormat, open_sink};
     use super::*;
 
     #[test]
     fn no_output_takes_the_name_of_what_belongs_beside_it() {
         let rows = [row([0, 0, 0], 0.9)];
         for (format, name, hint) in [
-            (VoxelFileFormat::Nav2Map, "map.yaml", "map.pgm"),
-            (VoxelFileFormat::Nav2Map, "map.YAML", "map.pgm"),
-            (VoxelFileFormat::Heightmap, "h.json", "h.png"),
-            (VoxelFileFormat::Heightmap, "h.Pgw", "h.png"),
+            ("nav2", "map.yaml", "map.pgm"),
+            ("nav2", "map.YAML", "map.pgm"),
+            ("heightmap", "h.json", "h.png"),
+            ("heightmap", "h.Pgw", "h.png"),
         ] {
             let folder = tempfile::tempdir().unwrap();
             let path = folder.path().join(name);
-            let opened = open_sink(format, &head_of(&rows), &path, &WriteOptions::beside(&path));
+            let format = *OutputFormats::default().of_name(format).unwrap();
+            let opened = format.open(&head_of(&rows), &path, &WriteOptions::beside(&path));
             let error = opened.err().map(|error| error.to_string()).unwrap_or_default();
             assert!(error.contains(name) && error.contains(hint), "{name}: {error:?}");
             assert!(!path.exists());

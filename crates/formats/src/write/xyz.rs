@@ -1,6 +1,7 @@
 use super::Result;
+use super::options::WriteOptions;
 use super::out_file::OutFile;
-use super::row::{VoxelRow, VoxelSink};
+use super::row::{VoxelRow, VoxelSink, VoxelsHead};
 use std::path::Path;
 
 /// Text, a line a voxel: `x y z probability`, in as few digits as give back the same numbers.
@@ -9,7 +10,7 @@ pub(super) struct XyzSink {
 }
 
 impl XyzSink {
-    pub(super) fn create(path: &Path) -> Result<Self> {
+    pub(super) fn create(_: &VoxelsHead, path: &Path, _: &WriteOptions) -> Result<Self> {
         Ok(Self { out: OutFile::create(path)? })
     }
 }

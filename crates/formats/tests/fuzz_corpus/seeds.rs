@@ -8,7 +8,6 @@ use std::fs;
 use std::path::Path;
 use voxtile_formats::clouds::ros::Wire;
 use voxtile_formats::clouds::ros::messages::MessageKind;
-use voxtile_formats::write::VoxelFileFormat;
 
 /// Target, name and content of seeds.
 pub type Seeds = Vec<(&'static str, &'static str, Vec<u8>)>;
@@ -46,11 +45,11 @@ fn surveys() -> Seeds {
         ("cloud_las", "timed-laz", fixture("timed.laz")),
         ("cloud_las", "feet", fixture("feet.las")),
         ("cloud_las", "keys", fixture("survey_feet.las")),
-        ("cloud_las", "layers", voxel_file(VoxelFileFormat::Laz)),
-        ("cloud_las", "copc", voxel_file(VoxelFileFormat::Copc)),
+        ("cloud_las", "layers", voxel_file("laz")),
+        ("cloud_las", "copc", voxel_file("copc")),
         ("cloud_e57", "scans", [&[1], &fixture("scans.e57")[..]].concat()),
-        ("cloud_e57", "plain", [&[0], &voxel_file(VoxelFileFormat::E57)[..]].concat()),
-        ("cloud_e57", "sealed", [&[1], &unsealed(voxel_file(VoxelFileFormat::E57))[..]].concat()),
+        ("cloud_e57", "plain", [&[0], &voxel_file("e57")[..]].concat()),
+        ("cloud_e57", "sealed", [&[1], &unsealed(voxel_file("e57"))[..]].concat()),
     ]
 }
 
@@ -110,7 +109,7 @@ fn recordings() -> Seeds {
         ("ros_bag1", "whole", bag),
         ("ros_bag1", "small", bag1(&topics[..1], &messages[..1])),
         ("ros_mcap", "points", fixture("ros/only_points.mcap")),
-        ("ros_mcap", "voxels", voxel_file(VoxelFileFormat::Mcap)),
+        ("ros_mcap", "voxels", voxel_file("mcap")),
         ("ros_metadata", "list", metadata.into()),
         ("ros_metadata", "behind", behind.into()),
     ]

@@ -1,6 +1,6 @@
 use std::fs;
 use std::path::Path;
-use voxtile_formats::write::{VoxelFileFormat, VoxelRow, VoxelsHead, WriteOptions, open_sink};
+use voxtile_formats::write::{OutputFormat, OutputFormats, VoxelRow, VoxelsHead, WriteOptions};
 
 /// Number of voxels in a file of [`write_voxels`].
 pub const VOXELS: i32 = 30;
@@ -18,8 +18,13 @@ pub fn voxel(k: i32) -> VoxelRow {
     }
 }
 
+/// The format of a name.
+pub fn format_of(name: &str) -> OutputFormat {
+    *OutputFormats::default().of_name(name).unwrap()
+}
+
 /// Writes the voxels of 0 to [`VOXELS`].
-pub fn write_voxels(format: VoxelFileFormat, path: &Path, crs: Option<&str>) {
+pub fn write_voxels(format: &str, path: &Path, crs: Option<&str>) {
     let [first, last] = [voxel(0), voxel(VOXELS - 1)].map(|row| row.center_m);
     let bound = |pick: fn(f64, f64) -> f64| std::array::from_fn(|k| pick(first[k], last[k]));
     let head = VoxelsHead {
@@ -29,15 +34,15 @@ pub fn write_voxels(format: VoxelFileFormat, path: &Path, crs: Option<&str>) {
         occupied_log_odds: 0.0,
     };
     let options = WriteOptions { crs: crs.map(str::to_owned), ..WriteOptions::beside(path) };
-    let mut sink = open_sink(format, &head, path, &options).unwrap();
+    let mut sink = format_of(format).open(&head, path, &options).unwrap();
     (0..VOXELS).for_each(|k| sink.put(&voxel(k)).unwrap());
     sink.finish().unwrap();
 }
 
 /// The bytes of such a file.
-pub fn voxel_file(format: VoxelFileFormat) -> Vec<u8> {
+pub fn voxel_file(format: &str) -> Vec<u8> {
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join(format!("a.{}", format.extension().unwrap()));
+    let path = folder.path().join("a").with_extension(format_of(format).extension.unwrap());
     write_voxels(format, &path, Some("LOCAL_CS[\"hall\",UNIT[\"metre\",1]]"));
     fs::read(path).unwrap()
 }

@@ -1,25 +1,24 @@
-use crate::made::voxels::write_voxels;
+use crate::made::voxels::{format_of, write_voxels};
 use std::fs;
 use std::path::Path;
 use voxtile_formats::clouds::CloudSource;
 use voxtile_formats::clouds::read::{OpenOptions, open};
-use voxtile_formats::write::{VoxelFileFormat, WriteOptions};
+use voxtile_formats::write::{VoxelsHead, WriteOptions};
 
-const FORMATS: [VoxelFileFormat; 4] =
-    [VoxelFileFormat::Las, VoxelFileFormat::Laz, VoxelFileFormat::Copc, VoxelFileFormat::E57];
+const FORMATS: [&str; 4] = ["las", "laz", "copc", "e57"];
 const UTM: &str = "PROJCS[\"WGS 84 / UTM zone 32N\",GEOGCS[\"WGS 84\",DATUM[\"WGS_1984\",SPHEROID[\"WGS 84\",6378137,\
                    298.257223563]],PRIMEM[\"Greenwich\",0],UNIT[\"degree\",0.0174532925199433]],\
                    PROJECTION[\"Transverse_Mercator\"],UNIT[\"metre\",1],AUTHORITY[\"EPSG\",\"32632\"]]";
 
 /// The coordinate system that comes back of a file, and what is remarked.
-fn round_trip(format: VoxelFileFormat, crs: Option<&str>) -> (Option<String>, Vec<String>) {
+fn round_trip(format: &str, crs: Option<&str>) -> (Option<String>, Vec<String>) {
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join(format!("a.{}", format.extension().unwrap()));
+    let path = folder.path().join(format!("a.{}", format_of(format).extension.unwrap()));
     write_voxels(format, &path, crs);
-    if format != VoxelFileFormat::E57 {
+    if format != "e57" {
         let bytes = fs::read(&path).unwrap();
         // Point format 6 wants the bit, whether or not a system is known.
-        assert_eq!(bytes[6] & 1 << 4, 1 << 4, "{format:?}");
+        assert_eq!(bytes[6] & 1 << 4, 1 << 4, "{format}");
     }
     // A scan of E57 without a pose is remarked otherwise.
     let options = OpenOptions { sensor_origin_m: Some([0.0; 3]), ..OpenOptions::default() };
@@ -31,7 +30,7 @@ fn round_trip(format: VoxelFileFormat, crs: Option<&str>) -> (Option<String>, Ve
 fn text_and_numbers_come_back() {
     for format in FORMATS {
         for crs in [None, Some(UTM), Some("EPSG:25832")] {
-            assert_eq!(round_trip(format, crs), (crs.map(str::to_owned), vec![]), "{format:?}");
+            assert_eq!(round_trip(format, crs), (crs.map(str::to_owned), vec![]), "{format}");
         }
     }
 }
@@ -44,7 +43,7 @@ fn a_system_in_feet_is_not_that_of_metres() {
         let said = "the coordinate system is not in metres";
         assert!(
             crs.is_none() && remarks.iter().any(|remark| remark.starts_with(said)),
-            "{format:?}: {remarks:?}"
+            "{format}: {remarks:?}"
         );
     }
 }
@@ -53,24 +52,18 @@ fn a_system_in_feet_is_not_that_of_metres() {
 fn what_is_no_number_of_a_system_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.las");
-    let head = voxtile_formats::write::VoxelsHead {
-        voxels: 0,
-        resolution_m: 0.5,
-        bounds_m: [[0.0; 3]; 2],
-        occupied_log_odds: 0.0,
-    };
+    let head = VoxelsHead::of_stream(0, 0.5);
     for crs in ["EPSG:", "EPSG:100000", "EPSG:4326+5773"] {
         let options = WriteOptions { crs: Some(crs.to_owned()), ..WriteOptions::beside(&path) };
-        let error =
-            voxtile_formats::write::open_sink(VoxelFileFormat::Las, &head, &path, &options).err().unwrap();
+        let error = format_of("las").open(&head, &path, &options).err().unwrap();
         assert!(error.to_string().contains(crs), "{error}");
     }
 }
 
 /// A folder of files, each with its coordinate system.
-fn folder_of(folder: &Path, format: VoxelFileFormat, systems: &[Option<&str>]) -> Box<dyn CloudSource> {
+fn folder_of(folder: &Path, format: &str, systems: &[Option<&str>]) -> Box<dyn CloudSource> {
     for (number, crs) in systems.iter().enumerate() {
-        let path = folder.join(format!("{number}.{}", format.extension().unwrap()));
+        let path = folder.join(format!("{number}.{}", format_of(format).extension.unwrap()));
         write_voxels(format, &path, *crs);
     }
     open(folder, &OpenOptions::default()).unwrap()
@@ -82,7 +75,7 @@ fn of_systems(source: &dyn CloudSource) -> Vec<String> {
 
 #[test]
 fn files_of_another_system_are_refused_before_their_points() {
-    for format in [VoxelFileFormat::Las, VoxelFileFormat::E57] {
+    for format in ["las", "e57"] {
         let folder = tempfile::tempdir().unwrap();
         let systems = [Some("EPSG:25832"), Some("EPSG:25833"), None, Some("EPSG:25832")];
         let mut source = folder_of(folder.path(), format, &systems);
@@ -94,7 +87,7 @@ fn files_of_another_system_are_refused_before_their_points() {
                 Err(error) => errors.push(error.to_string()),
             }
         }
-        assert_eq!((clouds, errors.len()), (3, 1), "{format:?}: {errors:?}");
+        assert_eq!((clouds, errors.len()), (3, 1), "{format}: {errors:?}");
         let parts = ["/1.", "in EPSG:25833, those of the files before it in EPSG:25832"];
         assert!(parts.iter().all(|part| errors[0].contains(part)), "{errors:?}");
         assert_eq!((source.crs(), of_systems(&*source)), (Some("EPSG:25832"), vec![]));
@@ -104,7 +97,7 @@ fn files_of_another_system_are_refused_before_their_points() {
 #[test]
 fn a_system_that_later_files_name_is_told() {
     let folder = tempfile::tempdir().unwrap();
-    let mut source = folder_of(folder.path(), VoxelFileFormat::Las, &[None, Some("EPSG:25832")]);
+    let mut source = folder_of(folder.path(), "las", &[None, Some("EPSG:25832")]);
     assert!(source.next_cloud().unwrap().is_some());
     assert_eq!((source.crs(), of_systems(&*source)), (None, vec![]));
     assert!(source.next_cloud().unwrap().is_some());

@@ -4,7 +4,6 @@ use std::fs;
 use std::path::Path;
 use voxtile_formats::clouds::RigidPose;
 use voxtile_formats::clouds::read::{Format, OpenOptions, open};
-use voxtile_formats::write::VoxelFileFormat;
 
 /// Written by pye57 (libE57Format).
 #[test]
@@ -37,7 +36,7 @@ fn scans_have_poses_and_invalid_points_are_no_returns() {
 fn a_scan_without_a_pose_is_in_the_frame_of_the_file() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("bare.e57");
-    write_voxels(VoxelFileFormat::E57, &path, None);
+    write_voxels("e57", &path, None);
     let read = |options: &OpenOptions| {
         let mut source = open(&path, options).unwrap();
         let (head, points) = crate::support::all(source.as_mut()).unwrap().remove(0);

@@ -1,8 +1,9 @@
+use crate::made::voxels::format_of;
 use crate::support::{all, clouds, clouds_with, failure, fixture, shared_data, wanted};
 use std::fs;
 use voxtile_formats::clouds::CloudPoint;
 use voxtile_formats::clouds::read::{OpenOptions, open};
-use voxtile_formats::write::{VoxelFileFormat, VoxelsHead, WriteOptions, open_sink};
+use voxtile_formats::write::{VoxelsHead, WriteOptions};
 
 fn one_cloud() -> OpenOptions {
     OpenOptions { scan_period_s: 0.0, ..OpenOptions::default() }
@@ -168,8 +169,8 @@ fn records_behind_points_are_not_taken_for_points() {
 fn compressed_files_may_be_empty() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("empty.laz");
-    let head = VoxelsHead { voxels: 0, resolution_m: 0.5, bounds_m: [[0.0; 3]; 2], occupied_log_odds: 0.0 };
-    let sink = open_sink(VoxelFileFormat::Laz, &head, &path, &WriteOptions::beside(&path)).unwrap();
+    let head = VoxelsHead::of_stream(0, 0.5);
+    let sink = format_of("laz").open(&head, &path, &WriteOptions::beside(&path)).unwrap();
     sink.finish().unwrap();
     assert_eq!(clouds(&path).iter().map(|(_, points)| points.len()).sum::<usize>(), 0);
 }

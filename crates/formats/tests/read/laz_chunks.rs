@@ -1,9 +1,8 @@
-use crate::made::voxels::{VOXELS, voxel, voxel_file};
+use crate::made::voxels::{VOXELS, format_of, voxel, voxel_file};
 use crate::support::{clouds, clouds_with, failure, fixture};
 use std::fs;
 use voxtile_formats::clouds::CloudPoint;
 use voxtile_formats::clouds::read::OpenOptions;
-use voxtile_formats::write::VoxelFileFormat;
 
 /// Where the points begin, and where the chunk table is.
 fn places(file: &[u8]) -> (usize, usize) {
@@ -31,8 +30,8 @@ fn assert_says(error: &str, at: usize, what: &str) {
 /// Each claim would have the library reserve gigabytes, or read for years.
 #[test]
 fn a_chunk_table_that_lies_is_refused() {
-    let (by_point, by_layer) = (fs::read(fixture("timed.laz")).unwrap(), voxel_file(VoxelFileFormat::Laz));
-    for file in [&by_point, &by_layer, &voxel_file(VoxelFileFormat::Copc)] {
+    let (by_point, by_layer) = (fs::read(fixture("timed.laz")).unwrap(), voxel_file("laz"));
+    for file in [&by_point, &by_layer, &voxel_file("copc")] {
         let (points_at, table_at) = places(file);
         let error = of_damaged(file, table_at + 4, &[0xff; 4]);
         assert_says(&error, table_at + 4, "the chunk table promises 4294967295 chunks");
@@ -57,11 +56,9 @@ fn a_chunk_table_that_lies_is_refused() {
 /// Found by fuzzing: layers that are said to be none are not checked as such.
 #[test]
 fn a_compressor_must_fit_the_versions_of_its_parts() {
-    for (file, compressor) in [
-        (fs::read(fixture("timed.laz")).unwrap(), 2_u16),
-        (voxel_file(VoxelFileFormat::Laz), 2),
-        (voxel_file(VoxelFileFormat::Laz), 1),
-    ] {
+    for (file, compressor) in
+        [(fs::read(fixture("timed.laz")).unwrap(), 2_u16), (voxel_file("laz"), 2), (voxel_file("laz"), 1)]
+    {
         // The description follows the head of its record, which begins with two bytes and the name.
         let name_at = file.windows(14).position(|bytes| bytes == b"laszip encoded").unwrap();
         let error = of_damaged(&file, name_at - 2 + 54, &compressor.to_le_bytes());
@@ -71,7 +68,7 @@ fn a_compressor_must_fit_the_versions_of_its_parts() {
 
 #[test]
 fn more_points_than_the_chunks_have_room_for_are_refused() {
-    let by_layer = voxel_file(VoxelFileFormat::Laz);
+    let by_layer = voxel_file("laz");
     let error = of_damaged(&by_layer, 247, &u64::to_le_bytes(1 << 50));
     assert_says(&error, 247, "1125899906842624 points are announced; the chunk table has room for 50000");
     let by_point = fs::read(fixture("timed.laz")).unwrap();
@@ -86,8 +83,8 @@ fn more_points_than_the_chunks_have_room_for_are_refused() {
 #[test]
 fn copc_is_read_as_laz_is() {
     let folder = tempfile::tempdir().unwrap();
-    let centers = |format: VoxelFileFormat| {
-        let path = folder.path().join(format!("a.{}", format.extension().unwrap()));
+    let centers = |format: &str| {
+        let path = folder.path().join(format!("a.{}", format_of(format).extension.unwrap()));
         fs::write(&path, voxel_file(format)).unwrap();
         let clouds = clouds_with(&path, &OpenOptions { scan_period_s: 0.0, ..OpenOptions::default() });
         let [(head, points)] = clouds.as_slice() else { panic!("{} clouds", clouds.len()) };
@@ -96,12 +93,12 @@ fn copc_is_read_as_laz_is() {
         points.sort_by(|a, b| a.position_m[0].total_cmp(&b.position_m[0]));
         points
     };
-    let copc = centers(VoxelFileFormat::Copc);
+    let copc = centers("copc");
     assert_eq!(
         copc.iter().map(|point| point.position_m).collect::<Vec<_>>(),
         (0..VOXELS).map(|k| voxel(k).center_m).collect::<Vec<_>>()
     );
-    assert_eq!(copc, centers(VoxelFileFormat::Laz));
-    assert_eq!(copc, centers(VoxelFileFormat::Las));
+    assert_eq!(copc, centers("laz"));
+    assert_eq!(copc, centers("las"));
     assert_eq!(clouds(&folder.path().join("a.copc.laz")).len(), 1);
 }

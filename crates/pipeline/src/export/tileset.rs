@@ -1,94 +1,69 @@
 //! A folder of 3D Tiles: `tileset.json`, and the surface of every node as binary glTF.
 
-use crate::args::ExportArgs;
-use crate::exported::Exported;
-use voxtile_pipeline::{AnyMap, read_any_map};
-
-use crate::output_file::{StagedOutput, is_standard_output, scratch_for};
-use indicatif::HumanCount;
+use super::run::Export;
+use super::summary::{ExportSummary, Written};
+use crate::output::{StagedOutput, scratch_for};
+use crate::watch::Watch;
+use crate::{AnyMap, read_any_map};
 use rayon::prelude::*;
 use std::fs;
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 use voxtile::mapper::MapView;
 use voxtile::{Error, Result};
-use voxtile_formats::write::{VoxelFileFormat, VoxelRow, VoxelsHead, WriteOptions, open_sink};
-use voxtile_pipeline::Watch;
-use voxtile_pipeline::memory;
+use voxtile_formats::write::{OutputFormat, VoxelRow, VoxelsHead, WriteOptions};
 use voxtile_render::levels::{Levels, LevelsOf, NodeKey, NodeStore, TilesetContent, subtree, tileset};
 
-/// What was written.
+/// How much was written.
 #[derive(Default)]
-struct Written {
+struct Counts {
     nodes: AtomicU64,
     /// Of the finest nodes.
     voxels: AtomicU64,
 }
 
-pub fn export(args: &ExportArgs, watch: &Watch) -> anyhow::Result<Exported> {
-    check(args)?;
-    let written = read_any_map(&args.map, |map| {
-        let staged = StagedOutput::beside(&args.output)?;
+/// Writes the folder: all of it or nothing.
+pub(super) fn export(export: &Export<'_>) -> anyhow::Result<ExportSummary> {
+    let (output, watch) = (&export.options.output, export.watch);
+    let counts = read_any_map(&export.options.map, |map| {
+        let staged = StagedOutput::beside(output)?;
         let folder = staged.path()?;
         let tiles = map.tile_indices();
         let progress = watch.over_tiles(tiles.len());
-        let store = NodeStore::open(scratch_for(&args.output)?, &args.output)?;
+        let store = NodeStore::open(scratch_for(output)?, output)?;
         let levels =
             Levels::build(map, &tiles, 0, &store, &|_| !watch.stop().is_set())?.ok_or(Error::Stopped)?;
         if let Some(reason) = levels.unreadable().first() {
             // Whoever opens the folder would not know what is missing.
             return Err(anyhow::anyhow!("{reason}"));
         }
-        let export = Export {
+        let tileset = Tileset {
             map,
             levels: &levels,
             store: &store,
             folder: &folder,
             watch,
-            written: Written::default(),
+            counts: Counts::default(),
         };
-        export.write(&|| progress.step())?;
-        let written = export.written;
+        tileset.write(&|| progress.step())?;
+        let counts = tileset.counts;
         staged.finish()?;
-        Ok(written)
+        Ok(counts)
     })?;
-    let folder = args.output.display().to_string();
-    let (nodes, voxels) = (written.nodes.into_inner(), written.voxels.into_inner());
-    let json = serde_json::json!({
-        "file": folder,
-        "format": "3dtiles",
-        "nodes": nodes,
-        "voxels": voxels,
-        "peak_rss_bytes": memory::peak_bytes(),
-    });
-    let [voxels, nodes] = [voxels, nodes].map(HumanCount);
-    Ok(Exported { json, text: format!("{voxels} voxels in {nodes} nodes in {folder}/tileset.json\n") })
+    let (nodes, voxels) = (counts.nodes.into_inner(), counts.voxels.into_inner());
+    Ok(export.summary(voxels, Written::Tileset { format: export.format.name, nodes }))
 }
 
-/// A tileset is of the whole map.
-fn check(args: &ExportArgs) -> Result<()> {
-    if is_standard_output(&args.output) {
-        return Err(Error::argument("--output", "3dtiles is a folder; name one"));
-    }
-    let is_part = args.region.is_some() || args.what.is_some() || args.min_probability.is_some();
-    if is_part || args.origin.is_some() {
-        let reason = "3dtiles holds what is occupied of the whole map, in true coordinates; make a map of a part with \
-                      `voxtile crop`";
-        return Err(Error::argument("--region, --what, --min-probability, --origin", reason));
-    }
-    Ok(())
-}
-
-struct Export<'a> {
+struct Tileset<'a> {
     map: &'a AnyMap,
     levels: &'a Levels,
     store: &'a NodeStore,
     folder: &'a Path,
     watch: &'a Watch,
-    written: Written,
+    counts: Counts,
 }
 
-impl Export<'_> {
+impl Tileset<'_> {
     fn write(&self, next_tile: &(dyn Fn() + Sync)) -> Result<()> {
         self.make_folder(self.folder)?;
         let nodes = LevelsOf { levels: self.levels, map: self.map };
@@ -144,7 +119,7 @@ impl Export<'_> {
         let mut options = WriteOptions::beside(&path);
         // Coordinates begin at the node's corner.
         options.colour_heights_m = Some(heights_m.map(|height| height - corner_m[2]));
-        let mut sink = open_sink(VoxelFileFormat::Glb, &head, &path, &options).map_err(Error::from)?;
+        let mut sink = OutputFormat::GLB.open(&head, &path, &options).map_err(Error::from)?;
         for voxel in &voxels {
             sink.put(&VoxelRow {
                 index: voxel.map(i32::from),
@@ -157,9 +132,9 @@ impl Export<'_> {
             .map_err(Error::from)?;
         }
         sink.finish().map_err(Error::from)?;
-        self.written.nodes.fetch_add(1, Ordering::Relaxed);
+        self.counts.nodes.fetch_add(1, Ordering::Relaxed);
         if key.level == 0 {
-            self.written.voxels.fetch_add(voxels.len() as u64, Ordering::Relaxed);
+            self.counts.voxels.fetch_add(voxels.len() as u64, Ordering::Relaxed);
         }
         Ok(())
     }

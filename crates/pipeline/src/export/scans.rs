@@ -1,9 +1,8 @@
 //! The scans that a map keeps, as a folder that `build` and others read: a PCD file each, and their poses.
 
-use crate::args::ExportArgs;
-use crate::exported::Exported;
-use crate::output_file::StagedOutput;
-use indicatif::HumanCount;
+use crate::map_at::MapAt;
+use crate::output::StagedOutput;
+use crate::watch::Watch;
 use serde::Serialize;
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
@@ -11,24 +10,28 @@ use std::path::Path;
 use voxtile::mapper::KeptScan;
 use voxtile::scan::ScanPoints;
 use voxtile::{Error, Result};
-use voxtile_pipeline::MapAt;
-use voxtile_pipeline::Watch;
 
 /// What was written.
 #[derive(Debug, Default, Serialize)]
-struct ExportedScans {
-    scans: u64,
-    points: u64,
-    /// Whether the points are in the world frame, so that reading them takes `--world-frame`.
-    world_frame: bool,
+pub struct ExportedScans {
+    /// Scans.
+    pub scans: u64,
+    /// Points of all of them.
+    pub points: u64,
+    /// Whether the points are in the world frame, which whoever reads them must say.
+    pub world_frame: bool,
 }
 
-/// The poses, in the format of TUM: seconds, position, quaternion.
-const POSES: &str = "poses_tum.txt";
+/// Name of the file of poses, in the format of TUM: seconds, position, quaternion.
+pub const POSES_NAME: &str = "poses_tum.txt";
 
-/// Writes the folder; it is there whole or not at all.
-pub fn export(args: &ExportArgs, folder: &Path, watch: &Watch) -> anyhow::Result<Exported> {
-    let reader = MapAt::of(&args.map)?.open()?;
+/// Writes the scans that a map keeps into a new folder; it is there whole or not at all.
+///
+/// # Errors
+///
+/// A map that cannot be read; scans in the world frame beside others; a folder that is not empty or cannot be written.
+pub fn export_scans(map: &Path, folder: &Path, watch: &Watch) -> anyhow::Result<ExportedScans> {
+    let reader = MapAt::of(map)?.open()?;
     let (mut records, mut all, mut are_stamped) = (reader.kept_scans()?, 0, true);
     while let Some(record) = records.next_record()? {
         all += 1;
@@ -38,7 +41,7 @@ pub fn export(args: &ExportArgs, folder: &Path, watch: &Watch) -> anyhow::Result
     let unfinished = staged.path()?;
     fs::create_dir(&unfinished).map_err(|error| Error::io(&unfinished, "create", error))?;
     let progress = watch.over_scans(Some(all));
-    let poses = unfinished.join(POSES);
+    let poses = unfinished.join(POSES_NAME);
     let open = File::create_new(&poses).map_err(|error| Error::io(&poses, "create", error))?;
     let mut lines = BufWriter::new(open);
     let mut exported = ExportedScans::default();
@@ -50,7 +53,7 @@ pub fn export(args: &ExportArgs, folder: &Path, watch: &Watch) -> anyhow::Result
         let is_in_world = scan.world_from_sensor().is_none();
         if exported.scans > 0 && is_in_world != exported.world_frame {
             let reason = "has scans in the world frame and others in the frame of their sensor; one folder cannot hold both";
-            return Err(Error::argument(args.map.display().to_string(), reason).into());
+            return Err(Error::argument(map.display().to_string(), reason).into());
         }
         let path = unfinished.join(format!("{:0digits$}.pcd", scan.number()));
         write_pcd(&scan, &path)?;
@@ -64,13 +67,7 @@ pub fn export(args: &ExportArgs, folder: &Path, watch: &Watch) -> anyhow::Result
     progress.say("making it durable");
     staged.finish()?;
     drop(progress);
-    let (scans, points) = (HumanCount(exported.scans), HumanCount(exported.points));
-    let mut text =
-        format!("exported  {scans} scans, {points} points, and {POSES}, to {}\n", folder.display());
-    if exported.world_frame {
-        text += "note      the points are in the world frame: build them with --world-frame\n";
-    }
-    Ok(Exported { json: serde_json::to_value(&exported)?, text })
+    Ok(exported)
 }
 
 fn write_pose(scan: &KeptScan, is_stamped: bool, out: &mut impl Write) -> io::Result<()> {

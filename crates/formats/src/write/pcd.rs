@@ -1,0 +1,57 @@
+use super::options::WriteOptions;
+use super::row::{VoxelRow, VoxelSink, VoxelsHead};
+use super::stream_out::StreamOut;
+use super::{Error, Result};
+use std::io::Write;
+
+/// Up to so many voxels from a PCD file's origin along an axis, `f32` resolves centers to an eighth of a voxel; more
+/// distant ones are refused.
+pub const PCD_REACH_VOXELS: i32 = 1 << 21;
+
+/// PCD 0.7, binary, as PCL reads it: x y z as F4, intensity F4 holds the probability, observation_count I4. A file's
+/// origin is its `VIEWPOINT`.
+pub(super) struct PcdSink<'a> {
+    out: StreamOut<'a>,
+    resolution_m: f64,
+}
+
+impl<'a> PcdSink<'a> {
+    pub(super) fn new(head: &VoxelsHead, out: Box<dyn Write + 'a>, options: &WriteOptions) -> Result<Self> {
+        let (&VoxelsHead { voxels, resolution_m, .. }, [x, y, z]) = (head, options.origin_m);
+        let origin = match options.origin_m {
+            [0.0, 0.0, 0.0] => String::new(),
+            _ => format!("# origin {x} {y} {z} m: to be added to x y z, as VIEWPOINT says, too\n"),
+        };
+        let text = format!(
+            "# .PCD v0.7 - occupied voxels, edge {resolution_m} m\n{origin}VERSION 0.7\nFIELDS x y z intensity \
+             observation_count\nSIZE 4 4 4 4 4\nTYPE F F F F I\nCOUNT 1 1 1 1 1\nWIDTH {voxels}\nHEIGHT 1\n\
+             VIEWPOINT {x} {y} {z} 1 0 0 0\nPOINTS {voxels}\nDATA binary\n"
+        );
+        let mut out = StreamOut::new(&options.final_path, out);
+        out.write(text.as_bytes())?;
+        Ok(Self { out, resolution_m })
+    }
+}
+
+impl VoxelSink for PcdSink<'_> {
+    fn put(&mut self, voxel: &VoxelRow) -> Result<()> {
+        let [x, y, z] = voxel.center_m;
+        let reach_m = f64::from(PCD_REACH_VOXELS) * self.resolution_m;
+        if let Some(far) = voxel.center_m.iter().find(|coordinate| coordinate.abs() > reach_m) {
+            let reason = format!(
+                "{far} m from the file's origin a float32 of PCD does not tell voxels of {} m apart",
+                self.resolution_m
+            );
+            return Err(Error::argument("origin", reason));
+        }
+        let mut record = [0; 20];
+        let numbers = [x, y, z, voxel.probability].map(|number| (number as f32).to_le_bytes());
+        record[..16].copy_from_slice(numbers.as_flattened());
+        record[16..].copy_from_slice(&voxel.observation_count.to_le_bytes());
+        self.out.write(&record)
+    }
+
+    fn finish(self: Box<Self>) -> Result<()> {
+        self.out.finish()
+    }
+}

@@ -1,0 +1,173 @@
+use super::output_format::OutputOption::{Cell, Heights, Region, Which};
+use super::*;
+use std::path::Path;
+use voxtile::octree::OctreeFormat;
+
+/// Calls what makes a sink of one stream.
+macro_rules! stream {
+    ($new:expr) => {
+        Writer::Stream(|head, out, options| Ok(Box::new($new(head, out, options)?)))
+    };
+}
+
+/// Calls what makes a sink of files.
+macro_rules! files {
+    ($create:expr) => {
+        Writer::Files(|head, path, options| Ok(Box::new($create(head, path, options)?)))
+    };
+}
+
+/// A row that needs a feature.
+macro_rules! behind {
+    ($feature:literal, $name:literal, $extension:literal, $help:literal, $writer:expr) => {
+        OutputFormat {
+            feature: Some($feature),
+            ..row($name, Some($extension), $help, {
+                #[cfg(feature = $feature)]
+                {
+                    $writer
+                }
+                #[cfg(not(feature = $feature))]
+                {
+                    Writer::NotBuilt
+                }
+            })
+        }
+    };
+}
+
+/// A row with what most formats have in common.
+const fn row(
+    name: &'static str,
+    extension: Option<&'static str>,
+    help: &'static str,
+    writer: Writer,
+) -> OutputFormat {
+    OutputFormat {
+        name,
+        extension,
+        help,
+        feature: None,
+        takes: &[Region, Which],
+        origin: Origin::Map,
+        refusal: "leave the option out",
+        is_text: false,
+        needs_free_voxels: false,
+        writer,
+    }
+}
+
+const TREE_REFUSAL: &str = "an octree file holds free and occupied voxels alike; leave the option out";
+
+/// The table: help texts, hints and checks of options are made from it, pages are checked against it.
+#[rustfmt::skip]
+const TABLE: [OutputFormat; 18] = [
+    OutputFormat { origin: Origin::Corner,
+        ..row("ply", Some("ply"), "Points with doubles, probability, log-odds and count",
+              stream!(ply::PlySink::new)) },
+    OutputFormat { origin: Origin::CornerNearby,
+        ..row("pcd", Some("pcd"), "Points with float32, as PCL reads them", stream!(pcd::PcdSink::new)) },
+    OutputFormat { origin: Origin::Corner, is_text: true,
+        ..row("csv", Some("csv"), "Text", stream!(csv::CsvSink::new)) },
+    OutputFormat { origin: Origin::Corner, takes: &[Region], refusal: TREE_REFUSAL,
+        ..row("bt", Some("bt"), "OctoMap's free and occupied voxels", Writer::Octree(OctreeFormat::Bt)) },
+    OutputFormat { origin: Origin::Corner, takes: &[Region], refusal: TREE_REFUSAL,
+        ..row("ot", Some("ot"), "OctoMap's log-odds", Writer::Octree(OctreeFormat::Ot)) },
+    OutputFormat { is_text: true,
+        ..row("xyz", Some("xyz"), "Text: x y z probability", files!(xyz::XyzSink::create)) },
+    row("npz", Some("npz"), "NumPy arrays: xyz, log_odds, probability, count", files!(npz::NpzSink::create)),
+    behind!("las", "las", "las", "LAS 1.4 with log-odds and count as extra bytes", files!(las::LasSink::plain)),
+    behind!("las", "laz", "laz", "The same, compressed", files!(las::LasSink::compressed)),
+    behind!("las", "copc", "copc.laz", "The same with levels of detail", files!(copc::CopcSink::create)),
+    behind!("e57", "e57", "e57", "ASTM E57", files!(e57::E57Sink::create)),
+    behind!("parquet", "parquet", "parquet", "Apache Parquet, where it was built in",
+            files!(parquet::ParquetSink::create)),
+    behind!("ros", "mcap", "mcap", "A recording with PointCloud2, as Foxglove opens it",
+            files!(mcap::McapSink::create)),
+    OutputFormat::GLB,
+    OutputFormat { takes: &[Region, Which, Heights], needs_free_voxels: true,
+        ..row("nav2", Some("pgm"), "A flat map of nav2: .pgm and .yaml", files!(nav2::Nav2Sink::create)) },
+    OutputFormat { takes: &[Region, Which, Heights],
+        ..row("heightmap", Some("png"), "Heights as a 16-bit PNG with a world file",
+              files!(heightmap::HeightmapSink::create)) },
+    OutputFormat { takes: &[Region, Which, Cell], origin: Origin::Point,
+        ..row("autoware", None, "A folder of PCD squares with the metadata of Autoware",
+              files!(autoware::AutowareSink::create)) },
+    OutputFormat { takes: &[],
+        refusal: "it holds what is occupied of the whole map, in true coordinates; make a map of a part with \
+                  `voxtile crop`",
+        ..row("3dtiles", None,
+              "A folder of 3D Tiles: the surface at every level of detail, as Cesium and others open it",
+              Writer::Tileset) },
+];
+
+impl OutputFormat {
+    /// The surface of occupied voxels as binary glTF, which 3D Tiles are made of, too.
+    pub const GLB: Self = row(
+        "glb",
+        Some("glb"),
+        "The surface of occupied voxels as binary glTF, Y-up",
+        files!(glb::GlbSink::create),
+    );
+}
+
+/// The formats that maps are written in.
+#[derive(Clone, Debug)]
+pub struct OutputFormats {
+    rows: Vec<OutputFormat>,
+}
+
+impl Default for OutputFormats {
+    /// Those of this crate, whether or not it was built to write them.
+    fn default() -> Self {
+        Self { rows: TABLE.to_vec() }
+    }
+}
+
+impl OutputFormats {
+    /// Adds a format.
+    pub fn with(mut self, format: OutputFormat) -> Self {
+        self.rows.push(format);
+        self
+    }
+
+    /// All of them, in the order of help texts.
+    pub fn all(&self) -> &[OutputFormat] {
+        &self.rows
+    }
+
+    /// The format of a name, as a person types it: `nav2`, `copc`.
+    pub fn of_name(&self, name: &str) -> Option<&OutputFormat> {
+        self.rows.iter().find(|format| format.name.eq_ignore_ascii_case(name))
+    }
+
+    /// The format that the end of a file's name asks for. Folders say nothing.
+    pub fn of_path(&self, path: &Path) -> Option<&OutputFormat> {
+        let name = path.file_name()?.to_string_lossy().to_ascii_lowercase();
+        let is_end = |end: &str| name.strip_suffix(end).is_some_and(|before| before.ends_with('.'));
+        let found = self.rows.iter().filter(|format| format.extension.is_some_and(is_end));
+        // `.copc.laz` ends with `.laz`, too.
+        found.max_by_key(|format| format.extension.map_or(0, str::len))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_files_ask_for_formats() {
+        let formats = OutputFormats::default();
+        let of_path = |name: &str| formats.of_path(Path::new(name)).map(|format| format.name);
+        for format in formats.all() {
+            assert_eq!(formats.of_name(format.name).map(|found| found.name), Some(format.name));
+            if let Some(extension) = format.extension {
+                let name = format!("a.b/hall.2.{}", extension.to_ascii_uppercase());
+                assert_eq!(of_path(&name), Some(format.name));
+            }
+        }
+        assert_eq!(of_path("hall.copc"), None);
+        assert_eq!(of_path("laz"), None);
+        assert_eq!(of_path("copc.laz"), Some("laz"));
+    }
+}

@@ -1,0 +1,71 @@
+use super::chosen::Chosen;
+use super::run::Export;
+use super::summary::{ExportSummary, Written};
+use crate::output::StagedOutput;
+use crate::read_any_map;
+use crate::watch::Watch;
+use voxtile::mapper::{MapView, Stoppable};
+use voxtile::space::Aabb;
+use voxtile::{Error, Result};
+use voxtile_formats::write::{VoxelsHead, WriteOptions};
+
+/// Writes the file, or the folder, and what belongs beside it: all of it or nothing.
+pub(super) fn export(export: &Export<'_>) -> anyhow::Result<ExportSummary> {
+    let (options, watch) = (export.options, export.watch);
+    let (head, files_beside) = read_any_map(&options.map, |map| {
+        let map = &Stoppable::new(map, watch.stop());
+        let chosen = Chosen::of(export, map.config().occupied_log_odds());
+        let head = head_of(&chosen, map)?;
+        let staged = StagedOutput::beside(&options.output)?;
+        let mut how = WriteOptions::beside(&options.output);
+        how.crs.clone_from(&map.config().crs);
+        how.companion_folder = staged.folder().to_owned();
+        (how.z_min_m, how.z_max_m) = (options.z_min_m, options.z_max_m);
+        how.cell_m = options.cell_m.unwrap_or(how.cell_m);
+        how.origin_m = options.origin_m.unwrap_or_default();
+        let mut sink = export.format.open(&head, &staged.path()?, &how).map_err(Error::from)?;
+        let (grid, origin_m) = (map.config().grid, how.origin_m);
+        let center_m = |voxel| {
+            let center_m = grid.center_m(voxel);
+            std::array::from_fn(|k| center_m[k] - origin_m[k])
+        };
+        let gauge = watch.over_tiles(map.tile_indices().len());
+        chosen.for_each(map, &*gauge, center_m, |row| Ok(sink.put(row)?))?;
+        sink.finish().map_err(Error::from)?;
+        drop(gauge);
+        watch.stop().check()?;
+        Ok((head, staged.finish()?))
+    })?;
+    let [min, max] = head.bounds_m;
+    let bounds_m = (head.voxels > 0).then_some(Aabb { min, max });
+    Ok(export.summary(head.voxels, Written::Files { format: export.format.name, bounds_m, files_beside }))
+}
+
+/// Counts the voxels, and finds a box around their centers.
+fn head_of(chosen: &Chosen, map: &impl MapView) -> Result<VoxelsHead> {
+    let grid = map.config().grid;
+    let mut head = VoxelsHead {
+        voxels: 0,
+        resolution_m: grid.resolution_m(),
+        bounds_m: [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]],
+        occupied_log_odds: map.config().occupied_log_odds(),
+    };
+    let gauge = Watch::nobody().over_tiles(0);
+    chosen.for_each(
+        map,
+        &*gauge,
+        |voxel| grid.center_m(voxel),
+        |row| {
+            head.voxels += 1;
+            for k in 0..3 {
+                head.bounds_m[0][k] = head.bounds_m[0][k].min(row.center_m[k]);
+                head.bounds_m[1][k] = head.bounds_m[1][k].max(row.center_m[k]);
+            }
+            Ok(())
+        },
+    )?;
+    if head.voxels == 0 {
+        head.bounds_m = [[0.0; 3]; 2];
+    }
+    Ok(head)
+}

@@ -1,0 +1,101 @@
+use super::origin::ExportOrigin;
+use crate::output::{OutputFile, is_standard_output};
+use serde::{Deserialize, Serialize};
+use std::fs;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use voxtile::space::{Grid, Point, VoxelIndex};
+use voxtile::{Error, Result};
+
+/// The file beside an exported one that says where in the map it is: `FILE.origin.json`.
+#[derive(Debug)]
+pub struct OriginFile {
+    path: PathBuf,
+    /// Whether one is there, from an earlier export.
+    is_there: bool,
+}
+
+#[derive(Debug, Deserialize, Serialize)]
+struct OriginRecord {
+    format: String,
+    /// Of the exported file: which one this is about.
+    file: String,
+    blake3: String,
+    /// To be added to its coordinates.
+    origin_m: Point,
+    origin_voxel: VoxelIndex,
+    resolution_m: f64,
+}
+
+const FORMAT: &str = "voxtile-origin-1";
+/// Ours are a few hundred bytes.
+const MAX_BYTES: u64 = 1 << 16;
+
+impl OriginFile {
+    /// The one of an exported file, which need not be there; `None` for a stream, which has nothing beside it.
+    ///
+    /// # Errors
+    ///
+    /// Something else that has the name.
+    pub fn of(output: &Path) -> Result<Option<Self>> {
+        if is_standard_output(output) || output.file_name().is_none() {
+            return Ok(None);
+        }
+        let path = output.with_added_extension("origin.json");
+        let is_there = match fs::symlink_metadata(&path) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => false,
+            Err(error) => return Err(Error::io(&path, "look at", error)),
+            Ok(metadata) if metadata.is_file() && metadata.len() <= MAX_BYTES => {
+                let text = fs::read(&path).map_err(|error| Error::io(&path, "read", error))?;
+                if !serde_json::from_slice(&text).is_ok_and(|record: OriginRecord| record.format == FORMAT) {
+                    return Err(in_the_way(path));
+                }
+                true
+            }
+            Ok(_) => return Err(in_the_way(path)),
+        };
+        Ok(Some(Self { path, is_there }))
+    }
+
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Says where a file is that is about to get its name. Who reads the two in between is told by the file's hash.
+    pub fn write(
+        &self,
+        output: &Path,
+        hash: blake3::Hash,
+        origin: &ExportOrigin,
+        grid: &Grid,
+    ) -> anyhow::Result<()> {
+        let record = OriginRecord {
+            format: FORMAT.to_owned(),
+            file: output.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+            blake3: hash.to_hex().to_string(),
+            origin_m: origin.corner_m,
+            origin_voxel: origin.voxel,
+            resolution_m: grid.resolution_m(),
+        };
+        let mut file = OutputFile::create(&self.path)?;
+        let text = serde_json::to_string_pretty(&record)?;
+        let written = writeln!(file.out(), "{text}");
+        file.written(written)?;
+        file.finish()
+    }
+
+    /// Removes what an earlier export said, for a file that is where the map is.
+    pub fn remove(&self) -> Result<()> {
+        match self.is_there.then(|| fs::remove_file(&self.path)) {
+            Some(Err(error)) if error.kind() != io::ErrorKind::NotFound => {
+                Err(Error::io(&self.path, "remove", error))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+fn in_the_way(path: PathBuf) -> Error {
+    let hint = "it is in the way of what says where the exported file is; move or remove it";
+    Error::AlreadyExists { path, hint }
+}

@@ -1,0 +1,9 @@
+//! Files and folders that are made whole or not at all.
+
+mod output_file;
+mod staged_output;
+mod target;
+
+pub use output_file::{OutputFile, scratch_for};
+pub use staged_output::StagedOutput;
+pub use target::is_standard_output;

@@ -1,0 +1,144 @@
+use super::target::{Place, check_target, folder_of, sync_folder};
+use std::fs::{self, File};
+use std::io;
+use std::path::{Path, PathBuf};
+use voxtile::{Error, Result};
+
+/// A file or a folder that another library writes under its own name, and files beside it: in a folder of its own until
+/// all of it is whole.
+pub struct StagedOutput {
+    target: PathBuf,
+    staging: tempfile::TempDir,
+}
+
+impl StagedOutput {
+    /// Begins an output.
+    ///
+    /// # Errors
+    ///
+    /// A link, a place inside of a map; a folder that is not empty; a folder that refuses.
+    pub fn beside(target: &Path) -> Result<Self> {
+        check_staged_target(target)?;
+        let staging = tempfile::Builder::new().prefix(".voxtile-").tempdir_in(folder_of(target));
+        let staging = staging.map_err(|error| Error::io(target, "create", error))?;
+        Ok(Self { target: target.to_owned(), staging })
+    }
+
+    /// Where all of it is written.
+    pub fn folder(&self) -> &Path {
+        self.staging.path()
+    }
+
+    /// Where the output itself is written.
+    ///
+    /// # Errors
+    ///
+    /// A path without a name.
+    pub fn path(&self) -> Result<PathBuf> {
+        let name = self.target.file_name().ok_or_else(|| Error::argument("output", "has no name"))?;
+        Ok(self.folder().join(name))
+    }
+
+    /// Gives everything its name, durably, the output itself last. Returns the files beside it.
+    ///
+    /// # Errors
+    ///
+    /// A name that something else has: then all of it is as it was. A disk that refuses.
+    pub fn finish(self) -> Result<Vec<PathBuf>> {
+        let own = self.path()?;
+        let folder = folder_of(&self.target);
+        let beside = self.beside_output(&own)?;
+        let name_of = |from: &Path| from.file_name().map_or(self.target.clone(), |name| folder.join(name));
+        let mut names: Vec<PathBuf> = beside.iter().map(|from| name_of(from)).collect();
+        // All before the first gets its name.
+        for (from, to) in beside.iter().zip(&names) {
+            check_staged(from, to)?;
+            self.check_beside(from, to)?;
+        }
+        names.push(name_of(&own));
+        check_staged(&own, &self.target)?;
+        for (from, to) in beside.iter().chain([&own]).zip(&names) {
+            take_name(from, to).map_err(|error| Error::io(to, "replace", error))?;
+        }
+        names.pop();
+        sync_folder(folder).map_err(|error| Error::io(&self.target, "make durable", error))?;
+        Ok(names)
+    }
+
+    /// What was written beside the output itself, in order.
+    fn beside_output(&self, own: &Path) -> Result<Vec<PathBuf>> {
+        let list = fs::read_dir(self.folder()).and_then(Iterator::collect::<io::Result<Vec<_>>>);
+        let list = list.map_err(|error| Error::io(self.folder(), "list", error))?;
+        let mut beside: Vec<PathBuf> =
+            list.iter().map(fs::DirEntry::path).filter(|path| path != own).collect();
+        beside.sort_unstable();
+        Ok(beside)
+    }
+
+    /// Nobody has named the files beside an output. One that is there belongs to an earlier output of this name, or
+    /// is what an export left that was killed, or is of somebody else.
+    fn check_beside(&self, from: &Path, to: &Path) -> Result<()> {
+        if self.target.exists() || !to.exists() || is_same(from, to)? {
+            return Ok(());
+        }
+        let hint =
+            "a file beside the output needs this name; move or remove what has it, or name another output";
+        Err(Error::AlreadyExists { path: to.to_owned(), hint })
+    }
+}
+
+/// Whether two files have the same content.
+fn is_same(a: &Path, b: &Path) -> Result<bool> {
+    let len = |path: &Path| {
+        fs::metadata(path).map(|metadata| metadata.len()).map_err(|error| Error::io(path, "look at", error))
+    };
+    let content = |path: &Path| fs::read(path).map_err(|error| Error::io(path, "read", error));
+    Ok(len(a)? == len(b)? && content(a)? == content(b)?)
+}
+
+/// Makes a file or folder durable that is about to get a name.
+fn check_staged(from: &Path, to: &Path) -> Result<()> {
+    sync_all(from).map_err(|error| Error::io(from, "make durable", error))?;
+    if to.is_dir() && !from.is_dir() {
+        let reason = "is a folder, and a file needs its name; name another output, or remove it first";
+        return Err(Error::argument(to.display().to_string(), reason));
+    }
+    check_staged_target(to)
+}
+
+fn take_name(from: &Path, to: &Path) -> io::Result<()> {
+    if from.is_dir() && to.is_dir() {
+        fs::remove_dir(to)?;
+    }
+    fs::rename(from, to)
+}
+
+/// A new file, a file that is replaced, or an empty folder.
+fn check_staged_target(target: &Path) -> Result<()> {
+    if !target.is_dir() {
+        return match check_target(target)? {
+            Place::File => Ok(()),
+            Place::Stream => {
+                let reason = format!("{} is no regular file", target.display());
+                Err(Error::argument("output", reason))
+            }
+        };
+    }
+    let is_empty = std::fs::read_dir(target).is_ok_and(|mut entries| entries.next().is_none());
+    if is_empty {
+        return Ok(());
+    }
+    let reason = "is a folder with content; name another, or remove it first";
+    Err(Error::argument(target.display().to_string(), reason))
+}
+
+/// Makes a file durable, or a folder with its files.
+fn sync_all(path: &Path) -> io::Result<()> {
+    if path.is_dir() {
+        for entry in std::fs::read_dir(path)? {
+            sync_all(&entry?.path())?;
+        }
+        return sync_folder(path);
+    }
+    File::open(path)?.sync_all()
+}

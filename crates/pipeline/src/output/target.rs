@@ -1,0 +1,56 @@
+use std::fs::{self, File};
+use std::io;
+use std::path::Path;
+use voxtile::store::check_outside_of_maps;
+use voxtile::{Error, Result};
+
+/// Whether a path stands for standard output.
+pub fn is_standard_output(path: &Path) -> bool {
+    path == Path::new("-")
+}
+
+/// What a path names that is to be written to.
+pub(super) enum Place {
+    File,
+    Stream,
+}
+
+pub(super) fn place_of(target: &Path) -> Result<Place> {
+    if is_standard_output(target) {
+        return Ok(Place::Stream);
+    }
+    check_target(target)
+}
+
+pub(super) fn check_target(target: &Path) -> Result<Place> {
+    let reason = match fs::symlink_metadata(target) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => None,
+        Err(error) => return Err(Error::io(target, "look at", error)),
+        Ok(metadata) if metadata.is_file() => None,
+        Ok(metadata) if metadata.is_dir() => Some("is a folder; name a file in it"),
+        Ok(metadata) if metadata.is_symlink() => Some(
+            "is a symbolic link, and links are not followed; name the file itself, or - for standard output",
+        ),
+        // A pipe or a device.
+        Ok(_) => return Ok(Place::Stream),
+    };
+    if target.file_name().is_none() {
+        return Err(Error::argument("output", format!("{} is no name of a file", target.display())));
+    }
+    match reason {
+        Some(reason) => Err(Error::argument("output", format!("{} {reason}", target.display()))),
+        None => check_outside_of_maps(target).map(|()| Place::File),
+    }
+}
+
+pub(super) fn folder_of(target: &Path) -> &Path {
+    target.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+pub(super) fn sync_folder(folder: &Path) -> io::Result<()> {
+    // Only Unix lets a folder be opened and synced, and who may write to it need not be allowed to read it.
+    match File::open(folder) {
+        Ok(folder) if cfg!(unix) => folder.sync_all(),
+        _ => Ok(()),
+    }
+}
