@@ -26,7 +26,7 @@ pub fn run(args: &ExportArgs, is_quiet: bool) -> anyhow::Result<ExitCode> {
     let is_stream = is_standard_output(&options.output);
     if is_stream && !options.checked_format()?.is_text && io::stdout().is_terminal() {
         let reason = "standard output is a terminal; send it to a file or a pipe";
-        return Err(Error::argument("--output", reason).into());
+        return Err(Error::argument("output", reason).into());
     }
     let summary = export(&options, &watch)?;
     let text = text_of(&summary);

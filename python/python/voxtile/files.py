@@ -79,7 +79,11 @@ class BuildOptions(ReadOptions, total=False):
 
 
 class ExportOptions(TypedDict, total=False):
-    """What is written, and how: the options of ``voxtile export``. Lengths are in metres."""
+    """What is written, and how: the options of ``voxtile export``. Lengths are in metres.
+
+    ``format`` names what the ending of the output does not: ply pcd csv bt ot xyz npz las laz copc e57 parquet mcap
+    glb nav2 heightmap autoware 3dtiles.
+    """
 
     format: str | None
     min_probability: float | None

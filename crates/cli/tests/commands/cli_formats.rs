@@ -4,6 +4,7 @@ use assert_cmd::Command;
 use std::fs;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
+use voxtile_formats::write::{Origin, OutputFormat, OutputFormats, OutputOption};
 
 fn voxtile(arguments: &[&str]) -> Command {
     let mut command = Command::cargo_bin("voxtile").unwrap();
@@ -671,4 +672,64 @@ fn a_resumed_build_takes_rays_without_a_return_as_it_did_before() {
     let digest = |name: &str| output(&["digest", text(&path(name))]);
     assert_eq!(digest("map"), digest("whole"));
     assert_ne!(digest("whole"), digest("without"));
+}
+
+/// What the table of formats says, the help, the page and the Python package say too.
+#[test]
+fn output_formats_are_the_same_in_help_pages_and_python() {
+    let formats = OutputFormats::default();
+    let names = |wanted: &dyn Fn(&OutputFormat) -> bool, name: &dyn Fn(&OutputFormat) -> String| {
+        formats.all().iter().filter(|format| wanted(format)).map(name).collect::<Vec<_>>()
+    };
+    // Folders have no extension.
+    let end = |format: &OutputFormat| match format.extension {
+        Some(extension) => format!(".{extension}"),
+        None => format.name.to_owned(),
+    };
+    let words = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
+
+    let help = words(&output(&["export", "--help"]));
+    let about = |option: &str| help.split_once(option).unwrap().1.split(" --").next().unwrap();
+    let outputs = about("--output <FILE>");
+    for extension in names(&|format| format.extension.is_some(), &end) {
+        assert!(outputs.split([' ', ',']).any(|word| word == extension), "{extension}: {outputs}");
+    }
+    let streams = names(&OutputFormat::is_stream, &end);
+    assert!(outputs.contains(&format!("standard output ({})", streams.join(" "))), "{outputs}");
+    let takers = |option| names(&|format| format.takes.contains(&option), &end);
+    let heights = takers(OutputOption::Heights).join(", ");
+    assert!(about("--z-min <M>").trim_start().starts_with(&heights), "{heights}");
+    assert!(about("--z-max <M>").trim_start().starts_with(&heights), "{heights}");
+    assert!(about("--cell <M>").trim_start().starts_with(&takers(OutputOption::Cell).join(", ")));
+
+    let page = fs::read_to_string(repository("docs/formats.md")).unwrap();
+    let (_, page) = page.split_once("\n## Out\n").unwrap();
+    let rows: Vec<&str> = page.lines().filter(|line| line.starts_with('|')).collect();
+    let firsts = rows.iter().map(|row| row.split('|').nth(1).unwrap());
+    for format in formats.all() {
+        let word = format!("`{}`", end(format));
+        assert!(firsts.clone().any(|first| first.contains(&word)), "docs/formats.md says nothing of {word}");
+    }
+    let quoted =
+        |names: Vec<String>| names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
+    let takes = |format: &OutputFormat, option| format.takes.contains(&option);
+    let but = |option| format!("all but {}", quoted(names(&|format| !takes(format, option), &end)));
+    for (option, wanted) in [
+        ("--what occupied\\|free\\|all`, `--min-probability", but(OutputOption::Which)),
+        ("--region", but(OutputOption::Region)),
+        ("--z-min`, `--z-max", quoted(takers(OutputOption::Heights))),
+        ("--cell", quoted(takers(OutputOption::Cell))),
+        ("--origin", quoted(names(&|format| format.origin != Origin::Map, &end))),
+        ("-o -` (standard output)", quoted(streams)),
+    ] {
+        let row = match option.ends_with(')') {
+            true => format!("| `{option} | {wanted} |"),
+            false => format!("| `{option}` | {wanted} |"),
+        };
+        assert!(rows.contains(&row.as_str()), "docs/formats.md lacks the row {row}");
+    }
+
+    let python = words(&fs::read_to_string(repository("python/python/voxtile/files.py")).unwrap());
+    let all = names(&|_| true, &|format| format.name.to_owned()).join(" ");
+    assert!(python.contains(&all), "python/python/voxtile/files.py lacks: {all}");
 }
