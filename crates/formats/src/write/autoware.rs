@@ -81,7 +81,7 @@ impl VoxelSink for AutowareSink {
         };
         if (0..3).any(is_far) {
             let reason = format!(
-                "single precision cannot hold voxels of {} m at {:?} m; give an origin near the map, which is subtracted",
+                "single precision cannot hold voxels of {} m at {:?} m; give an origin near the map that is subtracted",
                 self.resolution_m, voxel.center_m
             );
             return Err(Error::argument("origin", reason));
