@@ -4,17 +4,15 @@ use crate::arrays::object;
 use crate::errors::exception_of_any;
 use crate::keywords::Keywords;
 use crate::operations::map_id_of;
-use crate::options::build_options;
+use crate::options::{build_options, export_options};
 use crate::watched::{Teller, left_to_itself};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use serde_json::Value;
-use std::ffi::OsString;
 use std::path::PathBuf;
 use std::sync::Arc;
 use voxtile::{Error, Stop};
-use voxtile_cli::calls;
-use voxtile_pipeline::{Listener, Watch, build};
+use voxtile_pipeline::{Listener, Watch, build, export, export_scans};
 
 /// Builds a map: a dict, what `voxtile build` prints with `--json`. With `piece_of`, 32 hexadecimal digits, it makes a
 /// piece of the map with this id, which is not durable until `move_piece` has moved it.
@@ -36,18 +34,33 @@ pub fn call_build<'py>(
     })
 }
 
-/// `voxtile export` with these arguments: a dict, what it prints with `--json`.
+/// Writes a map for other programs: a dict, what `voxtile export` prints with `--json`.
 #[pyfunction]
-#[pyo3(signature = (arguments, progress=None))]
+#[pyo3(signature = (map, output, options, progress=None))]
 pub fn call_export<'py>(
     py: Python<'py>,
-    arguments: Vec<OsString>,
+    map: PathBuf,
+    output: PathBuf,
+    options: &Bound<'py, PyDict>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    called(py, progress, move |watch| calls::export(arguments, watch))
+    let options = export_options(py, map, &output, Keywords::of(options)?)?;
+    called(py, progress, move |watch| Ok(serde_json::to_value(export(&options, watch)?)?))
 }
 
-/// Calls a command, which ends as after Ctrl-C where the callback raises.
+/// Writes the scans that a map keeps into a new folder: a dict, what `voxtile export --scans` prints with `--json`.
+#[pyfunction]
+#[pyo3(signature = (map, folder, progress=None))]
+pub fn call_export_scans<'py>(
+    py: Python<'py>,
+    map: PathBuf,
+    folder: PathBuf,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Bound<'py, PyAny>> {
+    called(py, progress, move |watch| Ok(serde_json::to_value(export_scans(&map, &folder, watch)?)?))
+}
+
+/// Does something that ends as after Ctrl-C where the callback raises.
 fn called<'py>(
     py: Python<'py>,
     callback: Option<Py<PyAny>>,

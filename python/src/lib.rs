@@ -40,7 +40,7 @@ mod watched;
 #[pyo3::pymodule]
 mod _voxtile {
     #[pymodule_export]
-    use super::calls::{call_build, call_export};
+    use super::calls::{call_build, call_export, call_export_scans};
     #[pymodule_export]
     use super::command::run_command;
     #[pymodule_export]

@@ -1,6 +1,6 @@
 //! Keywords as options: the one place that knows both. What is left out is the default of the options.
 
-use crate::errors::exception;
+use crate::errors::{exception, wrong};
 use crate::keywords::Keywords;
 use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
@@ -8,7 +8,7 @@ use voxtile::space::Aabb;
 use voxtile::{InsertMode, MemoryLimit, Storage};
 use voxtile_formats::ReadOptions;
 use voxtile_pipeline::numbers::{Mount, point_of, region_of, set_mount, tolerance_ns};
-use voxtile_pipeline::{BuildOptions, SensorModelKind, WhenBehind};
+use voxtile_pipeline::{BuildOptions, ExportOptions, SensorModelKind, WhenBehind, WhichVoxels};
 
 pub const STORAGES: [(&str, Storage); 2] = [("octomap", Storage::OctoMap), ("compact", Storage::Compact)];
 pub const INSERT_MODES: [(&str, InsertMode); 2] =
@@ -17,6 +17,8 @@ const SENSOR_MODELS: [(&str, SensorModelKind); 2] =
     [("log-odds", SensorModelKind::LogOdds), ("iwlo", SensorModelKind::Iwlo)];
 const WHEN_BEHIND: [(&str, WhenBehind); 3] =
     [("wait", WhenBehind::Wait), ("drop-oldest", WhenBehind::DropOldest), ("thin", WhenBehind::Thin)];
+const WHICH_VOXELS: [(&str, WhichVoxels); 3] =
+    [("occupied", WhichVoxels::Occupied), ("free", WhichVoxels::Free), ("all", WhichVoxels::All)];
 /// Whether the box of ignored points is in the body's frame.
 const FRAMES: [(&str, bool); 2] = [("sensor", false), ("body", true)];
 
@@ -81,8 +83,7 @@ pub fn build_options(
     options.sensor_model = keywords.one_of("sensor_model", &SENSOR_MODELS)?;
     options.probabilities = match keywords.numbers("probabilities")? {
         Some(numbers) => Some(numbers.try_into().map_err(|_| {
-            let reason = "four numbers: of a hit, of a miss, least, most";
-            exception(py, &voxtile::Error::argument("probabilities", reason))
+            wrong(py, "probabilities", "must be four numbers: of a hit, of a miss, least, most")
         })?),
         None => None,
     };
@@ -100,6 +101,33 @@ pub fn build_options(
     options.skip_bad = keywords.flag("skip_bad")?;
     options.flush_every = keywords.parsed("flush_every", str::parse)?.unwrap_or(options.flush_every);
     options.when_behind = keywords.one_of("when_behind", &WHEN_BEHIND)?.unwrap_or(options.when_behind);
+    keywords.end()?;
+    Ok(options)
+}
+
+/// What is written: `voxtile.files.ExportOptions`.
+pub fn export_options(
+    py: Python<'_>,
+    map: PathBuf,
+    output: &Path,
+    mut keywords: Keywords<'_>,
+) -> PyResult<ExportOptions> {
+    let raised = |error: voxtile::Error| exception(py, &error);
+    let mut options = ExportOptions::new(map, no_stream(output));
+    options.format = keywords.text("format")?;
+    let what = keywords.one_of("what", &WHICH_VOXELS)?;
+    let min_probability = keywords.number("min_probability")?.map(WhichVoxels::AtLeast);
+    if what.is_some() && min_probability.is_some() {
+        return Err(wrong(py, "min_probability", "says itself which voxels; leave `what` out"));
+    }
+    options.which = min_probability.or(what);
+    options.z_min_m = keywords.number("z_min")?;
+    options.z_max_m = keywords.number("z_max")?;
+    options.cell_m = keywords.number("cell")?;
+    options.region = region(py, &mut keywords, "region")?;
+    let origin = keywords.numbers("origin")?;
+    options.origin_m = origin.map(|numbers| point_of("origin", &numbers)).transpose().map_err(raised)?;
+    options.memory_bytes = keywords.bytes("memory")?.unwrap_or(options.memory_bytes);
     keywords.end()?;
     Ok(options)
 }

@@ -30,7 +30,7 @@ fn stopped_early(args: &BuildArgs) -> ExitCode {
 }
 
 /// What the command line asks for.
-pub fn options_of(args: &BuildArgs) -> voxtile::Result<BuildOptions> {
+fn options_of(args: &BuildArgs) -> voxtile::Result<BuildOptions> {
     let mut options = BuildOptions::new(&args.scans, &args.output);
     options.read = read_options(&args.read)?;
     options.resolution_m = args.resolution;

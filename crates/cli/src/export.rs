@@ -39,7 +39,7 @@ pub fn run(args: &ExportArgs, is_quiet: bool) -> anyhow::Result<ExitCode> {
 }
 
 /// What the command line asks for.
-pub fn options_of(args: &ExportArgs) -> voxtile::Result<ExportOptions> {
+fn options_of(args: &ExportArgs) -> voxtile::Result<ExportOptions> {
     let mut options = ExportOptions::new(&args.map, &args.output);
     options.format.clone_from(&args.format);
     options.which = args.min_probability.map(WhichVoxels::AtLeast).or(args.what.map(|what| match what {

@@ -1,12 +1,10 @@
 //! The command `voxtile`: parse, run one command, exit code.
 //!
-//! One file a subcommand. It is part of the library so that other programs can carry the command (the Python package
-//! does), or call what is more than a line of it, in `calls`; it uses the library as anybody else would, by its public
-//! items.
+//! One file a subcommand: it maps options to typed fields, calls what does the work, and prints. It is a library so that
+//! other programs can carry the command; the Python package does.
 
 mod args;
 mod build;
-pub mod calls;
 mod clear;
 mod completions;
 mod convert;

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, Literal, TypedDict
 
-from ._voxtile import ScanIterator, call_build, call_export, open_scans, scan_reaches
+from ._voxtile import ScanIterator, call_build, call_export, call_export_scans, open_scans, scan_reaches
 from ._voxtile import count_scans as _count_scans
 
 if TYPE_CHECKING:
@@ -160,52 +160,11 @@ def export(
     ``path`` is a map, a file of OctoMap, or ``"map@snapshot"``; what is not flushed is not exported. ``ExportOptions``
     lists the keywords. Returns what the command prints with ``--json``. If it is interrupted, nothing is written.
     """
-    return call_export([_path(path), f"--output={_path(output)}", *_arguments(options)], progress)
+    return call_export(path, output, options, progress)
 
 
 def export_scans(
     path: _Path, output: _Path, *, progress: Callable[[int, int], object] | None = None
 ) -> dict[str, Any]:
     """Writes the scans that a map keeps into a new folder: a ``.pcd`` each, and ``poses_tum.txt``."""
-    return call_export([_path(path), f"--scans={_path(output)}"], progress)
-
-
-def _path(path: _Path) -> str:
-    """A path that is no option and no standard input, whatever its name."""
-    text = os.fspath(path)
-    return os.path.join(".", text) if text.startswith("-") else text
-
-
-def _arguments(options: Mapping[str, Any]) -> list[str]:
-    """Keywords as arguments of the command. Lists of numbers stand last: they end where no number follows."""
-    single: list[str] = []
-    lists: list[str] = []
-    for keyword, value in options.items():
-        name = "--" + {"insert_mode": "insert"}.get(keyword, keyword).replace("_", "-")
-        # One number or truth value of NumPy: Python's own, which `is True` knows.
-        if hasattr(value, "dtype") and value.ndim == 0:
-            value = value.item()
-        if value is None or value is False:
-            continue
-        if value is True:
-            single.append(name)
-        elif keyword == "fields":
-            single.append(f"{name}={value if isinstance(value, str) else ','.join(value)}")
-        elif isinstance(value, str | bytes | os.PathLike):
-            single.append(f"{name}={os.fsdecode(value)}")
-        elif isinstance(value, int | float) or not hasattr(value, "__iter__"):
-            single.append(f"{name}={value}")
-        else:
-            numbers = [_number(number) for number in _flat(value)]
-            # Of a 4 x 4 matrix the last row says nothing.
-            lists += [name, *(numbers[:12] if keyword == "extrinsic" and len(numbers) == 16 else numbers)]
-    return single + lists
-
-
-def _flat(value: Any) -> list[Any]:
-    return [number for part in value for number in _flat(part)] if hasattr(value, "__iter__") else [value]
-
-
-def _number(value: Any) -> str:
-    # The shortest text that reads back to the same bits; NumPy's own numbers print their type.
-    return repr(float(value))
+    return call_export_scans(path, output, progress)
