@@ -127,7 +127,11 @@ impl ExportOptions {
             if !format.takes.contains(&option) {
                 let takers = self.formats.all().iter().filter(|other| other.takes.contains(&option));
                 let takers: Vec<&str> = takers.map(|other| other.name).collect();
-                let reason = format!("{name} does not take it, but {} do: {refusal}", takers.join(" "));
+                let which = match takers.len() {
+                    1..=4 => format!("formats that do: {}; ", takers.join(" ")),
+                    _ => String::new(),
+                };
+                let reason = format!("{name} does not take it; {which}{refusal}");
                 return Err(Error::argument(argument, reason));
             }
         }

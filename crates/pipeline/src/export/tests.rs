@@ -92,7 +92,10 @@ fn what_a_row_does_not_take_is_refused_with_those_that_do() {
         export(&options, &Watch::nobody()).unwrap_err().to_string()
     };
     let heights = refusal("a.index", |options| options.z_min_m = Some(1.0));
-    assert!(heights.contains("index does not take it, but nav2 heightmap do: it has no room"), "{heights}");
+    assert!(
+        heights.contains("index does not take it; formats that do: nav2 heightmap; it has no room"),
+        "{heights}"
+    );
     let origin = refusal("a.index", |options| options.origin_m = Some([1.0; 3]));
     assert!(origin.contains("index keeps true coordinates"), "{origin}");
     let stream = refusal("-", |options| options.format = Some("index".to_owned()));
