@@ -20,7 +20,7 @@ fn open(criterion: &mut Criterion) {
     eprintln!("{TILES} tiles made in {:.1} s", start.elapsed().as_secs_f64());
     print_memory(&path);
 
-    let open_reader = || MapReader::open(&path, 1).expect("a map");
+    let open_reader = || MapReader::open(&path, 0).expect("a map");
     let open_mapper = || OutOfCoreTileMapper::open(&path, config.clone()).expect("a map");
     let mut group = criterion.benchmark_group("open 100 000 tiles");
     group.sample_size(10).sampling_mode(SamplingMode::Flat);
@@ -57,13 +57,13 @@ fn make_map(path: &Path) -> MapConfig {
 
 fn print_memory(path: &Path) {
     const READERS: usize = 10;
-    let mut readers = vec![MapReader::open(path, 1).expect("a map")];
+    let mut readers = vec![MapReader::open(path, 0).expect("a map")];
     // The first reader took what the allocator had left of making the map; the others show what one takes.
     let Some(before) = resident_bytes() else {
         eprintln!("memory of an open map: skipped, there is no /proc/self/status here");
         return;
     };
-    readers.extend((0..READERS).map(|_| MapReader::open(path, 1).expect("a map")));
+    readers.extend((0..READERS).map(|_| MapReader::open(path, 0).expect("a map")));
     let bytes = resident_bytes().unwrap_or_default().saturating_sub(before);
     eprintln!("memory of an open map: {} bytes a tile", bytes / (READERS * TILES as usize));
 }

@@ -62,7 +62,7 @@ fn row(map: &Path, repeats: usize) -> Result<String, Box<dyn Error>> {
 
 /// What it takes to make tiles of tables, with octrees that are up to date.
 fn octree_seconds(map: &Path, tables: &[(Table, VoxelBox)], repeats: usize) -> Result<f64, Box<dyn Error>> {
-    let (reader, octrees) = (MapReader::open(map, 1)?, OctreeFactory::default());
+    let (reader, octrees) = (MapReader::open(map, 0)?, OctreeFactory::default());
     let grid = reader.config().grid;
     let mut least = f64::INFINITY;
     for _ in 0..repeats {
@@ -80,7 +80,7 @@ fn octree_seconds(map: &Path, tables: &[(Table, VoxelBox)], repeats: usize) -> R
 /// The tables of a map's tiles, and the voxels that belong to each.
 fn tables(map: &Path) -> Result<Vec<(Table, VoxelBox)>, Box<dyn Error>> {
     let mut tables = Vec::new();
-    for tile in MapReader::open(map, 1)?.tiles() {
+    for tile in MapReader::open(map, 0)?.tiles() {
         let tile = tile?;
         tables.push((tile.table().clone(), tile.voxel_box()));
     }

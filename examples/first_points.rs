@@ -29,7 +29,7 @@ fn row(map: &Path, passes: usize) -> Result<String, Box<dyn Error>> {
     let (mut bytes, mut cpu, mut wall) = (Vec::new(), Vec::new(), Vec::new());
     // The first pass brings the files into the page cache.
     for pass in 0..=passes {
-        let reader = MapReader::open(map, 1)?;
+        let reader = MapReader::open(map, 0)?;
         for &point in &points {
             let read_before = reader.statistics().io.bytes_read;
             let (began, cpu_before) = (Instant::now(), cpu_seconds());
@@ -56,7 +56,7 @@ fn row(map: &Path, passes: usize) -> Result<String, Box<dyn Error>> {
 /// The voxel in the middle of each tile's observed ones.
 fn points(map: &Path) -> Result<Vec<VoxelIndex>, Box<dyn Error>> {
     let mut points = Vec::new();
-    for tile in MapReader::open(map, 1)?.tiles() {
+    for tile in MapReader::open(map, 0)?.tiles() {
         let tile = tile?;
         points.extend(tile.voxels().nth(tile.table().len() / 2).map(|voxel| voxel.index));
     }

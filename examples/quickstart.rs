@@ -6,7 +6,7 @@ use voxtile_simulation::Survey;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let folder = std::env::temp_dir().join(format!("voxtile_quickstart_{}", std::process::id()));
-    let config = MapConfig::new(0.25, 10.0)?.with_range(0.0, 40.0).with_cache_tiles(16);
+    let config = MapConfig::new(0.25, 10.0)?.with_range(0.0, 40.0);
 
     let mut mapper = OutOfCoreTileMapper::create(&folder, config)?;
     let mut survey = Survey::demo(1);
@@ -25,7 +25,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     mapper.flush()?;
     drop(mapper);
 
-    let map = MapReader::open(&folder, 8)?;
+    let map = MapReader::open(&folder, 64 << 20)?;
     println!("{} tiles, digest {}", map.tile_indices().len(), map.digest()?);
     std::fs::remove_dir_all(&folder)?;
     Ok(())

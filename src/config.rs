@@ -42,7 +42,7 @@ pub struct MapConfig {
     pub rays: RayConfig,
     /// What each tile keeps for coarse queries. Default: a view of the table's bricks.
     pub octree: OctreeConfig,
-    /// How much an out-of-core mapper keeps in memory. Default: 16 tiles, and 32 MiB of updates for others.
+    /// How much an out-of-core mapper keeps in memory. Default: 512 MiB, or what tiles of this size need at least.
     pub memory: MemoryLimit,
     /// How the tiles of a new map are stored. Default: the original files.
     pub storage: Storage,
@@ -55,9 +55,12 @@ pub struct MapConfig {
 }
 
 /// How much an out-of-core mapper keeps in memory. The map does not depend on it, only the work to make it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum MemoryLimit {
+    /// [`MemoryLimit::DEFAULT_BYTES`], or [`MemoryLimit::least_bytes`] if that is more.
+    #[default]
+    Default,
     /// Tiles are counted, however large they are.
     #[non_exhaustive]
     Tiles {
@@ -165,12 +168,6 @@ impl Default for MapConfig {
     }
 }
 
-impl Default for MemoryLimit {
-    fn default() -> Self {
-        Self::tiles(16)
-    }
-}
-
 impl Default for RayConfig {
     fn default() -> Self {
         Self {
@@ -243,9 +240,14 @@ impl MapConfig {
     pub fn with_write_buffer_bytes(self, write_buffer_bytes: usize) -> Self {
         let tiles = match self.memory {
             MemoryLimit::Tiles { tiles, .. } => tiles,
-            MemoryLimit::Bytes(_) | MemoryLimit::Tight(_) => usize::MAX,
+            _ => usize::MAX,
         };
         Self { memory: MemoryLimit::Tiles { tiles, write_buffer_bytes }, ..self }
+    }
+
+    /// Most bytes of all that grows; `None` where tiles are counted.
+    pub fn memory_bytes(&self) -> Option<usize> {
+        self.memory.bytes(&self.grid)
     }
 
     /// The same with at most so many bytes for all that grows.
@@ -268,7 +270,7 @@ impl MapConfig {
     fn write_buffer_bytes(&self) -> usize {
         match self.memory {
             MemoryLimit::Tiles { write_buffer_bytes, .. } => write_buffer_bytes,
-            MemoryLimit::Bytes(_) | MemoryLimit::Tight(_) => DEFAULT_WRITE_BUFFER_BYTES,
+            _ => DEFAULT_WRITE_BUFFER_BYTES,
         }
     }
 
@@ -375,6 +377,9 @@ impl VoxelCacheConfig {
 const DEFAULT_WRITE_BUFFER_BYTES: usize = 32 << 20;
 
 impl MemoryLimit {
+    /// What library, command and Python use unless something else is asked for.
+    pub const DEFAULT_BYTES: usize = 512 << 20;
+
     /// So many tiles, however large they are.
     pub fn tiles(tiles: usize) -> Self {
         Self::Tiles { tiles, write_buffer_bytes: DEFAULT_WRITE_BUFFER_BYTES }
@@ -385,6 +390,15 @@ impl MemoryLimit {
     /// no two alike, one at work and one on its way in or out, and what a scan takes.
     pub fn least_bytes(grid: &Grid) -> usize {
         least_bytes(grid.voxels_per_tile_edge() as usize)
+    }
+
+    /// Most bytes of all that grows in a map with this grid; `None` where tiles are counted.
+    pub fn bytes(self, grid: &Grid) -> Option<usize> {
+        match self {
+            Self::Default => Some(Self::DEFAULT_BYTES.max(Self::least_bytes(grid))),
+            Self::Bytes(bytes) | Self::Tight(bytes) => Some(bytes),
+            Self::Tiles { .. } => None,
+        }
     }
 
     fn check(self, grid: &Grid) -> Result<()> {

@@ -17,7 +17,7 @@
 //! mapper.insert_points(&ScanRef::in_sensor(pose, &points))?;
 //! mapper.flush()?; // From here on it survives a crash.
 //!
-//! let map = MapReader::open(&folder, 16)?;
+//! let map = MapReader::open(&folder, 64 << 20)?;
 //! assert!(map.occupancy_at([4.25, 1.05, 0.35])?.is_occupied());
 //! # Ok(())
 //! # }

@@ -6,9 +6,6 @@ use pyo3::prelude::*;
 use voxtile::sensor::{Iwlo, LogOdds};
 use voxtile::{InsertMode, MapConfig, MemoryLimit, SensorModel, Storage};
 
-/// What a map may use of memory unless something else is asked for.
-const DEFAULT_MEMORY_BYTES: usize = 512 << 20;
-
 /// What [`config_of`] makes a configuration of.
 pub struct ConfigArguments<'a, 'py> {
     pub resolution: f64,
@@ -55,11 +52,13 @@ pub fn config_of(py: Python<'_>, arguments: &ConfigArguments<'_, '_>) -> PyResul
         .with_storage(storage_of(py, arguments.storage)?)
         .with_kept_scans(arguments.keep_scans);
     config.occupancy_threshold = arguments.occupancy_threshold;
-    let bytes = match &arguments.memory {
-        Some(memory) => bytes_of(memory)?,
-        None => MemoryLimit::least_bytes(&config.grid).max(DEFAULT_MEMORY_BYTES),
-    };
-    config.with_memory_bytes(bytes).validated().map_err(raised)
+    config.memory = memory_of(arguments.memory.as_ref())?;
+    config.validated().map_err(raised)
+}
+
+/// A limit of memory, or the default.
+pub fn memory_of(memory: Option<&Bound<'_, PyAny>>) -> PyResult<MemoryLimit> {
+    Ok(memory.map(bytes_of).transpose()?.map_or(MemoryLimit::Default, MemoryLimit::Bytes))
 }
 
 /// The storage of a new map, by its name.

@@ -225,7 +225,7 @@ impl Map {
         memory: Option<Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let memory = memory.as_ref().map(bytes_of).transpose()?;
-        let options = MapOptions::new().memory_bytes(memory.unwrap_or(512 << 20));
+        let options = memory.map_or(MapOptions::new(), |bytes| MapOptions::new().memory_bytes(bytes));
         let name = snapshot.map(SnapshotName::new).transpose().map_err(|error| exception(py, &error))?;
         let is_octree = OctreeMap::is_named_by(&path);
         let reader = |reader: MapReader| Source::Reader(Box::new(RwLock::new(reader)));

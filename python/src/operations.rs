@@ -13,10 +13,7 @@ use std::path::PathBuf;
 use voxtile::integrity::VerifyScope;
 use voxtile::mapper::{MapReader, MapView, OctreeMap};
 use voxtile::operations::{self, Decay, Part, Prefer};
-use voxtile::{Error, MapPath, Result, SnapshotName, Stop, TileIndex, integrity, octree};
-
-/// Tiles of each map that is read.
-const CACHE_TILES: usize = 32;
+use voxtile::{Error, MapPath, MemoryLimit, Result, SnapshotName, Stop, TileIndex, integrity, octree};
 
 /// A map, or a snapshot of it as a tuple with its name.
 #[derive(FromPyObject)]
@@ -30,9 +27,9 @@ pub enum MapOrSnapshot {
 impl MapOrSnapshot {
     pub fn open(&self) -> Result<MapReader> {
         match self {
-            Self::Map(path) => MapReader::open(path, CACHE_TILES),
+            Self::Map(path) => MapReader::open(path, MemoryLimit::DEFAULT_BYTES),
             Self::Snapshot(path, name) => {
-                MapReader::open_snapshot(path, &SnapshotName::new(name)?, CACHE_TILES)
+                MapReader::open_snapshot(path, &SnapshotName::new(name)?, MemoryLimit::DEFAULT_BYTES)
             }
         }
     }
@@ -190,8 +187,10 @@ pub fn adopt<'py>(
     progress: Callback,
 ) -> PyResult<Bound<'py, PyAny>> {
     told(py, progress, |_, progress| {
-        let parts =
-            parts.iter().map(|part| MapReader::open(part, CACHE_TILES)).collect::<Result<Vec<_>>>()?;
+        let parts = parts
+            .iter()
+            .map(|part| MapReader::open(part, MemoryLimit::DEFAULT_BYTES))
+            .collect::<Result<Vec<_>>>()?;
         operations::adopt(&map, &parts, of_flush, scans, |done, all| progress.tell(done, all))
     })
 }

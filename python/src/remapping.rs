@@ -1,38 +1,27 @@
 //! Maps that follow the scans that they keep: new poses, other parameters, removals.
 
-use crate::config::{bytes_of, storage_of};
-use crate::errors::{exception, exception_of_kind, wrong};
+use crate::config::{memory_of, storage_of};
+use crate::errors::{exception_of_kind, wrong};
 use crate::map::region_of;
 use crate::operations::{Callback, MapOrSnapshot, name_of, told};
 use crate::pose::pose_of;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use std::path::{Path, PathBuf};
-use voxtile::mapper::MapReader;
+use std::path::PathBuf;
+use voxtile::mapper::KeptSummary;
 use voxtile::operations::{self, NewPoses, Remap, Rework, ScanSelection};
 use voxtile::space::Grid;
-use voxtile::{InsertMode, MapView, MemoryLimit};
-
-/// What a change may use of memory unless something else is asked for.
-const DEFAULT_MEMORY_BYTES: usize = 512 << 20;
+use voxtile::{InsertMode, MapView};
 
 /// What every change of the scans can do.
 fn rework_of(
     py: Python<'_>,
-    map: &Path,
     keep_as: Option<&str>,
     dry_run: bool,
     memory: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Rework> {
     let keep_as = keep_as.map(|name| name_of(py, name)).transpose()?;
-    let bytes = match memory {
-        Some(memory) => bytes_of(memory)?,
-        None => {
-            let config = MapReader::config_of(map).map_err(|error| exception(py, &error))?;
-            MemoryLimit::least_bytes(&config.grid).max(DEFAULT_MEMORY_BYTES)
-        }
-    };
-    Ok(Rework::default().with_memory_bytes(bytes).with_keep_as(keep_as).with_dry_run(dry_run))
+    Ok(Rework::default().with_memory(memory_of(memory)?).with_keep_as(keep_as).with_dry_run(dry_run))
 }
 
 /// Gives the scans that a map keeps new poses, and maps again what they touch: one commit, after which the map is as if
@@ -60,11 +49,11 @@ pub fn remap<'py>(
         }
         Err(_) => NewPoses::InOrder(poses.try_iter()?.map(|pose| pose_of(&pose?)).collect::<PyResult<_>>()?),
     };
-    let how = rework_of(py, &map, keep_as, dry_run, memory.as_ref())?;
+    let how = rework_of(py, keep_as, dry_run, memory.as_ref())?;
     let tolerance = tolerance.map(|(moved_m, turned_deg)| (moved_m, turned_deg.to_radians()));
     told(py, progress, |stop, progress| {
         let how = Remap::new(how.with_stop(stop.clone())).with_tolerance(tolerance);
-        operations::remap(&map, &poses, &how, |done, all| progress.tell(done, all))
+        operations::remap(&KeptSummary::read(&map)?, &poses, &how, |done, all| progress.tell(done, all))
     })
 }
 
@@ -96,7 +85,7 @@ pub fn remap_as<'py>(
         }
     };
     let storage = storage.map(|storage| storage_of(py, storage)).transpose()?;
-    let bytes = memory.as_ref().map(bytes_of).transpose()?;
+    let memory = memory_of(memory.as_ref())?;
     told(py, progress, |stop, progress| {
         let reader = map.open()?;
         let own = reader.config().clone();
@@ -105,7 +94,7 @@ pub fn remap_as<'py>(
         let mut config = own.with_kept_scans(keep_scans);
         config.grid = Grid::new(edges.0, edges.1)?;
         config.storage = storage.unwrap_or(config.storage);
-        let bytes = bytes.unwrap_or(MemoryLimit::least_bytes(&config.grid).max(DEFAULT_MEMORY_BYTES));
+        config.memory = memory;
         let rays = |rays: &voxtile::RayConfig| {
             let mut rays = *rays;
             rays.min_range_m = min_range.unwrap_or(rays.min_range_m);
@@ -113,7 +102,6 @@ pub fn remap_as<'py>(
             rays.insert_mode = insert_mode.unwrap_or(rays.insert_mode);
             rays
         };
-        let config = config.with_memory_bytes(bytes);
         operations::map_anew(&reader, &output, config, rays, stop, |done, all| progress.tell(done, all))
     })
 }
@@ -146,7 +134,7 @@ pub fn remove_scans<'py>(
         (None, None, Some(name)) => ScanSelection::Input(name),
         _ => return Err(wrong(py, "scans", "name one of scans, time and input")),
     };
-    let how = rework_of(py, &map, keep_as, dry_run, memory.as_ref())?;
+    let how = rework_of(py, keep_as, dry_run, memory.as_ref())?;
     let report = told(py, progress, |stop, progress| {
         let how = how.with_stop(stop.clone());
         operations::remove_scans(&map, &selection, from_snapshots, &how, |done, all| progress.tell(done, all))
@@ -176,7 +164,7 @@ pub fn remove_points<'py>(
     progress: Callback,
 ) -> PyResult<Bound<'py, PyAny>> {
     let region = region_of(region)?;
-    let how = rework_of(py, &map, keep_as, dry_run, memory.as_ref())?;
+    let how = rework_of(py, keep_as, dry_run, memory.as_ref())?;
     told(py, progress, |stop, progress| {
         let how = how.with_stop(stop.clone());
         operations::remove_points(&map, &region, &how, |done, all| progress.tell(done, all))

@@ -151,7 +151,7 @@ pub(crate) fn pose_numbers(pose: &Pose) -> [f64; 7] {
 }
 
 /// The pose of the numbers of a [`KeptFrame::Sensor`], to the bit.
-pub fn pose_of_numbers(&[x, y, z, qx, qy, qz, qw]: &[f64; 7]) -> Pose {
+pub(super) fn pose_of_numbers(&[x, y, z, qx, qy, qz, qw]: &[f64; 7]) -> Pose {
     let rotation = UnitQuaternion::new_unchecked(Quaternion::new(qw, qx, qy, qz));
     Pose::from(Isometry3::from_parts(Translation3::new(x, y, z), rotation))
 }

@@ -1,7 +1,6 @@
 use super::kept_scan::KeptScan;
 use crate::error::{Error, Result};
-use crate::store::{CatalogEntry, Disk, KeptRecord, KeptRecords, Layout, TileStore};
-use std::path::Path;
+use crate::store::{Disk, KeptRecord, KeptRecords, Layout, TileStore};
 use std::sync::Arc;
 
 /// Most points of a kept scan that are read into memory: 7 MiB. Those of a larger one are read again when needed.
@@ -66,33 +65,4 @@ impl Iterator for KeptScans {
         let record = self.next_record().transpose()?;
         Some(record.and_then(|record| self.open(record)))
     }
-}
-
-/// What to do about a map without kept scans.
-const NOT_KEPT: &str =
-    "keeps no scans, so that it cannot be mapped again; build it with `keep_scans` to have them";
-
-/// The error of a map that keeps none.
-pub(super) fn keeps_none(folder: &Path) -> Error {
-    Error::argument(folder.display().to_string(), NOT_KEPT)
-}
-
-/// A map that consists of more than the scans that it keeps cannot be mapped again from these. `records` is `None` for
-/// one that keeps none.
-pub(crate) fn check_keeps_all(records: Option<KeptRecords>, folder: &Path) -> Result<()> {
-    let mut records = records.ok_or_else(|| keeps_none(folder))?;
-    while let Some(entry) = records.next_entry()? {
-        let what = match entry {
-            CatalogEntry::Kept(_) | CatalogEntry::Removed(..) => continue,
-            CatalogEntry::Listed(scan) => format!("scan {}, whose points are not kept", scan.number),
-            CatalogEntry::Unlisted(first, last) if first == last => {
-                format!("number {first}, which is no scan")
-            }
-            CatalogEntry::Unlisted(first, last) => format!("numbers {first} to {last}, which are no scans"),
-            CatalogEntry::Operation(what) => format!("a change that is no scan: {what}"),
-        };
-        let reason = format!("cannot be mapped again from its scans, for it also consists of {what}");
-        return Err(Error::argument(folder.display().to_string(), reason));
-    }
-    Ok(())
 }

@@ -1,4 +1,5 @@
-use super::kept_scans::{KeptScans, check_keeps_all, keeps_none};
+use super::kept_scans::KeptScans;
+use super::kept_summary::{KeptSummary, keeps_none};
 use super::statistics::IoCounts;
 use super::{MapStatistics, MapView, TileRef};
 use crate::config::{MapConfig, MemoryLimit};
@@ -9,8 +10,8 @@ use crate::persistence::one_voxel::read_voxel;
 use crate::sensor::Evidence;
 use crate::space::{TileBox, TileIndex, TileSpace, VoxelIndex};
 use crate::store::{
-    CatalogEntry, Disk, KeptRecords, MapPath, Metadata, ScanRecord, SnapshotName, TileFile, TileStore,
-    TileVersion, read_scans,
+    CatalogEntry, Disk, KeptRecord, KeptRecords, MapPath, Metadata, ScanRecord, SnapshotName, TileFile,
+    TileStore, TileVersion, read_scans,
 };
 use crate::tile::{OctreeFactory, Tile, Voxel};
 use lru::LruCache;
@@ -73,11 +74,12 @@ impl ReaderCache {
     }
 
     /// Puts a tile in and drops others, those used longest ago first, until all fit. One always does.
-    fn put(&mut self, tile: Arc<Tile>, memory: MemoryLimit) {
+    fn put(&mut self, tile: Arc<Tile>, config: &MapConfig) {
         let (index, bytes) = (tile.index(), tile.bytes());
-        let (most_tiles, most_bytes) = match memory {
-            MemoryLimit::Tiles { tiles, .. } => (tiles, usize::MAX),
-            MemoryLimit::Bytes(bytes) | MemoryLimit::Tight(bytes) => (usize::MAX, bytes),
+        let most_bytes = config.memory_bytes().unwrap_or(usize::MAX);
+        let most_tiles = match config.memory {
+            MemoryLimit::Tiles { tiles, .. } => tiles,
+            _ => usize::MAX,
         };
         self.remove(index);
         self.asked_once.pop(&index);
@@ -101,14 +103,13 @@ fn config_of_store(store: &TileStore, memory: MemoryLimit) -> Result<MapConfig> 
 }
 
 impl MapReader {
-    /// Opens the map in a folder, keeping up to `cache_tiles` tiles in memory. [`MapOptions`](super::MapOptions) take a
-    /// number of bytes instead.
+    /// Opens the map in a folder, keeping up to so many bytes of tiles in memory, and one tile in any case.
     ///
     /// # Errors
     ///
     /// No map there, or damage to what tells which tiles there are.
-    pub fn open(folder: impl Into<MapPath>, cache_tiles: usize) -> Result<Self> {
-        Self::open_within(folder.into(), MemoryLimit::tiles(cache_tiles))
+    pub fn open(folder: impl Into<MapPath>, memory_bytes: usize) -> Result<Self> {
+        Self::open_within(folder.into(), MemoryLimit::Bytes(memory_bytes))
     }
 
     pub(super) fn open_within(map: MapPath, memory: MemoryLimit) -> Result<Self> {
@@ -116,7 +117,7 @@ impl MapReader {
         Self::of_store(TileStore::open_read_only(disk.clone(), &folder)?, disk, memory)
     }
 
-    /// Opens a snapshot of the map in a folder: it is read like the map, as of then.
+    /// Opens a snapshot of the map in a folder: it is read like the map, as of then, and in as much memory.
     ///
     /// # Errors
     ///
@@ -124,9 +125,9 @@ impl MapReader {
     pub fn open_snapshot(
         folder: impl Into<MapPath>,
         name: &SnapshotName,
-        cache_tiles: usize,
+        memory_bytes: usize,
     ) -> Result<Self> {
-        Self::open_snapshot_within(folder.into(), name, MemoryLimit::tiles(cache_tiles))
+        Self::open_snapshot_within(folder.into(), name, MemoryLimit::Bytes(memory_bytes))
     }
 
     pub(super) fn open_snapshot_within(
@@ -190,8 +191,7 @@ impl MapReader {
     /// No map there, or metadata that cannot be read.
     pub fn config_of(folder: impl Into<MapPath>) -> Result<MapConfig> {
         let (disk, folder) = folder.into().into_parts();
-        let folder = &*folder;
-        Ok(Self::open(MapPath::on(disk, folder), 1)?.config)
+        config_of_store(&TileStore::open_read_only(disk, &folder)?, MemoryLimit::default())
     }
 
     /// What `metadata.json` says.
@@ -253,7 +253,7 @@ impl MapReader {
     pub fn scans(&self) -> Result<Vec<ScanRecord>> {
         if self.keeps_scans() {
             let (mut records, mut scans) = (self.kept_records()?, Vec::new());
-            while let Some(entry) = records.next_entry().map_err(|error| self.explain(error))? {
+            while let Some(entry) = self.explained(records.next_entry())? {
                 match entry {
                     CatalogEntry::Kept(scan) => {
                         scans.push(ScanRecord::new(scan.number, scan.stamp_ns, scan.origin_m()));
@@ -286,18 +286,25 @@ impl MapReader {
         Ok(KeptScans::new(self.disk.clone(), self.store.layout().clone(), self.kept_records()?, flush_number))
     }
 
-    /// Checks that the map consists of scans that it keeps and of nothing else: only then it can be mapped again.
+    /// What is known of these scans without their points, by one pass over their list.
     ///
     /// # Errors
     ///
-    /// What else there is, named; a list that cannot be read or is damaged.
-    pub fn check_keeps_all(&self) -> Result<()> {
-        let records = self.keeps_scans().then(|| self.kept_records()).transpose()?;
-        check_keeps_all(records, self.folder())
+    /// A list that cannot be read or is damaged. A map that keeps no scans is none.
+    pub fn kept_summary(&self) -> Result<KeptSummary> {
+        self.kept_summary_with(|_| Ok(()))
     }
 
-    pub(crate) fn kept_records(&self) -> Result<KeptRecords> {
-        self.store.kept_records().map_err(|error| self.explain(error))
+    /// The same; `each` sees the records in passing.
+    pub(crate) fn kept_summary_with(
+        &self,
+        each: impl FnMut(&KeptRecord) -> Result<()>,
+    ) -> Result<KeptSummary> {
+        KeptSummary::of(self, each)
+    }
+
+    pub(super) fn kept_records(&self) -> Result<KeptRecords> {
+        self.explained(self.store.kept_records())
     }
 
     /// Bytes on disk in tables and in octrees, of which a snapshot has none; `None` for a map of the original format.
@@ -328,7 +335,7 @@ impl MapReader {
     /// The table of a tile as it stands in its file, which is not kept in memory; `None` if the map has no such tile.
     pub(crate) fn read_table(&self, index: TileIndex) -> Result<Option<ReadTable>> {
         self.read_ahead(index);
-        load::load_table(&self.store, &self.config.grid, index).map_err(|error| self.explain(error))
+        self.explained(load::load_table(&self.store, &self.config.grid, index))
     }
 
     /// Names the tiles behind this one to a disk that wants to know them: who looks at a tile once walks over all.
@@ -346,7 +353,7 @@ impl MapReader {
     }
 
     fn load(&self, index: TileIndex) -> Result<Option<(Tile, u64)>> {
-        load::load(&self.store, &self.config.grid, &self.octrees, index).map_err(|error| self.explain(error))
+        self.explained(load::load(&self.store, &self.config.grid, &self.octrees, index))
     }
 
     /// Looks into the cache.
@@ -355,6 +362,10 @@ impl MapReader {
     }
 
     /// A tile that does not match the log is damage, unless a writer has flushed since and did not see this reader.
+    pub(super) fn explained<T>(&self, result: Result<T>) -> Result<T> {
+        result.map_err(|error| self.explain(error))
+    }
+
     fn explain(&self, error: Error) -> Error {
         if !matches!(error, Error::Damaged { .. }) {
             return error;
@@ -417,7 +428,7 @@ impl MapView for MapReader {
         self.found(|cache| {
             cache.io.loads += 1;
             cache.io.bytes_read += bytes;
-            cache.put(tile.clone(), self.config.memory);
+            cache.put(tile.clone(), &self.config);
         });
         Ok(Some(TileRef::shared(tile)))
     }
@@ -446,8 +457,7 @@ impl MapView for MapReader {
             return Ok(Some(TileRef::shared(tile)));
         }
         self.read_ahead(index);
-        let loaded = load::load_uncached(&self.store, &self.config.grid, index);
-        let loaded = loaded.map_err(|error| self.explain(error))?;
+        let loaded = self.explained(load::load_uncached(&self.store, &self.config.grid, index))?;
         Ok(loaded.map(|(tile, _)| TileRef::shared(Arc::new(tile))))
     }
 
@@ -458,7 +468,7 @@ impl MapView for MapReader {
         self.read_ahead(index);
         let loaded = load::load_voxels_from(&self.store, &self.config.grid, index, from);
         let min = self.config.grid.voxels_of_tile(index).min;
-        let voxels = loaded.map_err(|error| self.explain(error))?.unwrap_or_default().into_iter();
+        let voxels = self.explained(loaded)?.unwrap_or_default().into_iter();
         Ok(voxels
             .map(|(code, evidence)| Voxel { index: code.to_key().to_index_from(min), evidence })
             .collect())

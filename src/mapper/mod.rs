@@ -17,6 +17,7 @@
 mod in_memory;
 mod kept_scan;
 mod kept_scans;
+mod kept_summary;
 mod live;
 mod map_reader;
 mod octree_map;
@@ -34,9 +35,10 @@ mod trace_rules;
 mod traits;
 
 pub use in_memory::InMemoryMapper;
-pub use kept_scan::{KeptScan, pose_of_numbers};
+pub use kept_scan::KeptScan;
 pub use kept_scans::KeptScans;
-pub(crate) use kept_scans::check_keeps_all;
+pub(crate) use kept_summary::no_kept_scan;
+pub use kept_summary::{KeptScanHead, KeptSummary};
 pub use live::{LiveReader, LiveView};
 pub use map_reader::MapReader;
 pub use octree_map::OctreeMap;

@@ -686,7 +686,7 @@ mod tests {
             assert_eq!(found.digest().unwrap(), expected.digest().unwrap());
             assert_eq!((found.scan_number(), expected.scan_number()), (3, 3));
             drop((found, expected));
-            let scans = |folder: &Path| MapReader::open(folder, 4).unwrap().scans().unwrap();
+            let scans = |folder: &Path| MapReader::open(folder, 1 << 20).unwrap().scans().unwrap();
             assert_eq!(scans(&parts), scans(&whole));
             assert_eq!(scans(&parts).iter().map(|scan| scan.number).collect::<Vec<_>>(), [1, 3]);
             [whole, parts].iter().for_each(|folder| std::fs::remove_dir_all(folder).unwrap());

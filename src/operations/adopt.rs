@@ -43,7 +43,7 @@ pub fn adopt(
 ) -> Result<Adopted> {
     let (disk, map) = map.into().into_parts();
     let map = &*map;
-    let before = MapReader::open(MapPath::on(disk.clone(), map), 1)?;
+    let before = MapReader::open(MapPath::on(disk.clone(), map), 0)?;
     for part in parts {
         check_grid(part, &before)?;
         check_model(part, &before)?;

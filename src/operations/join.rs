@@ -24,7 +24,7 @@ pub fn join(
     output: impl AsRef<Path>,
     mut progress: impl FnMut(u64, u64),
 ) -> Result<WrittenMap> {
-    let open = |piece: &MapPath| MapReader::open(piece.clone(), 1);
+    let open = |piece: &MapPath| MapReader::open(piece.clone(), 0);
     let [first, ..] = pieces else {
         return Err(Error::argument("pieces", "name one or more"));
     };

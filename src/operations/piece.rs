@@ -57,7 +57,7 @@ pub fn move_piece(
     progress: impl FnMut(u64, u64),
 ) -> Result<WrittenMap> {
     let (disk, folder) = map.into().into_parts();
-    let map = MapReader::open(MapPath::on(disk.clone(), &folder), 1)?;
+    let map = MapReader::open(MapPath::on(disk.clone(), &folder), 0)?;
     if map.map_id() != Some(map_id) || map.keeps_scans() {
         return make_piece(&map, output, map_id, progress);
     }
@@ -68,5 +68,5 @@ pub fn move_piece(
     if move_map(&disk, &folder, output.as_ref())? {
         return Ok(written);
     }
-    make_piece(&MapReader::open(MapPath::on(disk, &folder), 1)?, output, map_id, progress)
+    make_piece(&MapReader::open(MapPath::on(disk, &folder), 0)?, output, map_id, progress)
 }

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
 use testkit::random_scans::{Random, random_scan};
 use voxtile::integrity::{Finding, Repair, Severity, repair, verify};
+use voxtile::mapper::KeptSummary;
 use voxtile::operations::{
     NewPoses, Remap, Rework, ScanSelection, delete_snapshot, remap, remove_scans, revert, snapshot,
 };
@@ -27,13 +28,17 @@ fn name(name: &str) -> SnapshotName {
     SnapshotName::new(name).unwrap()
 }
 
+fn scans(disk: &FaultyDisk) -> Result<KeptSummary> {
+    KeptSummary::read(at(disk))
+}
+
 fn config() -> MapConfig {
     let config = MapConfig::new(0.4, 3.2).unwrap().with_range(0.3, 3.0).with_kept_scans(true);
     config.with_cache_tiles(2).with_write_buffer_bytes(600)
 }
 
 fn rework() -> Rework {
-    Rework::default().with_memory_bytes(MemoryLimit::least_bytes(&config().grid))
+    Rework::default().with_memory(MemoryLimit::Bytes(MemoryLimit::least_bytes(&config().grid)))
 }
 
 fn pose(number: u64, by_m: f64) -> Pose {
@@ -72,7 +77,7 @@ fn remove(disk: &FaultyDisk, number: u64) -> Result<()> {
 
 fn moved(disk: &FaultyDisk) -> Result<()> {
     let poses = NewPoses::Numbered(vec![(1, pose(1, 0.7)), (4, pose(4, 0.7))]);
-    remap(at(disk), &poses, &Remap::new(rework()), |_, _| ()).map(drop)
+    remap(&scans(disk)?, &poses, &Remap::new(rework()), |_, _| ()).map(drop)
 }
 
 fn reverted(disk: &FaultyDisk, to: &str) -> Result<()> {

@@ -7,6 +7,7 @@ use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
 use testkit::random_scans::{Random, random_scan};
 use testkit::support::{message_of, some_of};
 use voxtile::integrity::{Verification, repair, verify};
+use voxtile::mapper::KeptSummary;
 use voxtile::operations::{
     Decay, NewPoses, Part, Remap, RemapBeside, Rework, ScanSelection, clear, decay, delete_snapshot,
     kept_bytes, remap, remove_points, remove_scans, revert, snapshot,
@@ -29,13 +30,18 @@ fn name(name: &str) -> SnapshotName {
     SnapshotName::new(name).unwrap()
 }
 
+fn scans(disk: &FaultyDisk) -> Result<KeptSummary> {
+    KeptSummary::read(at(disk))
+}
+
 fn config(storage: Storage, keeps_scans: bool) -> MapConfig {
     let config = MapConfig::new(0.4, 3.2).unwrap().with_range(0.3, 3.0).with_storage(storage);
     config.with_kept_scans(keeps_scans).with_cache_tiles(2).with_write_buffer_bytes(600)
 }
 
 fn rework() -> Rework {
-    Rework::default().with_memory_bytes(MemoryLimit::least_bytes(&config(Storage::OctoMap, true).grid))
+    Rework::default()
+        .with_memory(MemoryLimit::Bytes(MemoryLimit::least_bytes(&config(Storage::OctoMap, true).grid)))
 }
 
 fn pose(number: u64, by_m: f64) -> Pose {
@@ -122,12 +128,13 @@ fn new_poses() -> NewPoses {
 }
 
 fn moved(disk: &FaultyDisk) -> Result<()> {
-    remap(at(disk), &new_poses(), &Remap::new(rework().with_keep_as(name("before"))), |_, _| ()).map(drop)
+    remap(&scans(disk)?, &new_poses(), &Remap::new(rework().with_keep_as(name("before"))), |_, _| ())
+        .map(drop)
 }
 
 fn moved_beside(disk: &FaultyDisk) -> Result<()> {
     let how = Remap::new(rework().with_keep_as(name("before")));
-    let mut beside = RemapBeside::begin(at(disk), &new_poses(), &how)?;
+    let mut beside = RemapBeside::begin(&scans(disk)?, &new_poses(), &how)?;
     beside.follow(|_| ())?;
     beside.finish().map(drop)
 }
@@ -474,7 +481,7 @@ fn a_revert_leaves_no_kept_scans_that_nothing_needs() {
 #[test]
 fn a_removal_completes_the_removal_of_a_second_map() {
     let start = four_scans(Storage::Compact, true);
-    let beside = RemapBeside::begin(at(&start), &new_poses(), &Remap::new(rework())).unwrap();
+    let beside = RemapBeside::begin(&scans(&start).unwrap(), &new_poses(), &Remap::new(rework())).unwrap();
     let start = start.after_kill();
     drop(beside);
     let second = Path::new("/city/map.remapping");
@@ -494,7 +501,7 @@ fn a_removal_completes_the_removal_of_a_second_map() {
 fn a_removal_removes_the_second_map_of_a_remapping_that_was_killed() {
     let start = four_scans(Storage::Compact, true);
     delete_snapshot(at(&start), &name("third")).unwrap();
-    let beside = RemapBeside::begin(at(&start), &new_poses(), &Remap::new(rework())).unwrap();
+    let beside = RemapBeside::begin(&scans(&start).unwrap(), &new_poses(), &Remap::new(rework())).unwrap();
     let disk = start.after_kill();
     drop(beside);
     let second = Path::new("/city/map.remapping");
@@ -558,7 +565,9 @@ fn a_snapshot_of_another_state_is_not_taken_for_that_of_an_earlier_attempt() {
     let how = rework().with_keep_as(third.clone());
     let refusals = [
         message_of(snapshot(at(&disk), &name("third"))),
-        message_of(remap(at(&disk), &new_poses(), &Remap::new(how.clone()), |_, _| ())),
+        message_of(
+            scans(&disk).and_then(|scans| remap(&scans, &new_poses(), &Remap::new(how.clone()), |_, _| ())),
+        ),
         message_of(remove_scans(at(&disk), &ScanSelection::Numbers(2, 2), false, &how, |_, _| ())),
         message_of(remove_points(at(&disk), &region(), &how, |_, _| ())),
         message_of(revert(at(&disk), &name("third"), third.as_ref(), |_, _| ())),
@@ -578,7 +587,7 @@ fn a_snapshot_of_another_state_is_not_taken_for_that_of_an_earlier_attempt() {
     // Nothing but the pose of that scan, which is in no tile.
     snapshot(at(&disk), &name("fifth")).unwrap();
     let poses = NewPoses::Numbered(vec![(5, pose(0, 9.0))]);
-    remap(at(&disk), &poses, &Remap::new(rework()), |_, _| ()).unwrap();
+    remap(&scans(&disk).unwrap(), &poses, &Remap::new(rework()), |_, _| ()).unwrap();
     assert!(message_of(snapshot(at(&disk), &name("fifth"))).contains("snapshots/fifth"));
 }
 

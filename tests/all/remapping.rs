@@ -8,6 +8,7 @@ use testkit::random_scans::{Random, random_scan};
 use testkit::reference_map::{ReferenceMap, Voxels, voxels_of};
 use testkit::support::{message_of, some_of};
 use voxtile::integrity::{Finding, Severity, repair, verify};
+use voxtile::mapper::KeptSummary;
 use voxtile::operations::{
     NewPoses, Part, Remap, RemapBeside, Rework, ScanSelection, clear, delete_snapshot, remap, remove_points,
     remove_scans, revert, snapshot,
@@ -28,13 +29,17 @@ fn at(disk: &FaultyDisk) -> MapPath {
     MapPath::on(disk.shared(), map())
 }
 
+fn scans(disk: &FaultyDisk) -> Result<KeptSummary> {
+    KeptSummary::read(at(disk))
+}
+
 fn config() -> MapConfig {
     let config = MapConfig::new(0.4, 3.2).unwrap().with_range(0.3, 3.0).with_kept_scans(true);
     config.with_cache_tiles(2).with_write_buffer_bytes(600)
 }
 
 fn rework() -> Rework {
-    Rework::default().with_memory_bytes(MemoryLimit::least_bytes(&config().grid))
+    Rework::default().with_memory(MemoryLimit::Bytes(MemoryLimit::least_bytes(&config().grid)))
 }
 
 /// A scan as it was measured, and where from.
@@ -186,12 +191,12 @@ fn act(disk: &FaultyDisk, config: &MapConfig, before: &State, act: &Act) -> Resu
         }
         Act::Move { seed, rest } => {
             let poses = NewPoses::Numbered(new_poses(&before.scans.0, *seed, *rest));
-            remap(at(disk), &poses, &Remap::new(rework()), |_, _| ()).map(drop)
+            remap(&scans(disk)?, &poses, &Remap::new(rework()), |_, _| ()).map(drop)
         }
         Act::MoveBeside { seed, rest, meanwhile } => {
             let poses = NewPoses::Numbered(new_poses(&before.scans.0, *seed, *rest));
             let mut mapper = open_or_create(disk, config)?;
-            let mut beside = RemapBeside::begin(at(disk), &poses, &Remap::new(rework()))?;
+            let mut beside = RemapBeside::begin(&scans(disk)?, &poses, &Remap::new(rework()))?;
             for number in meanwhile.clone() {
                 if number % 3 > 0 {
                     beside.follow(|_| ())?;
@@ -311,8 +316,12 @@ impl Life {
                 check_whole(disk, what);
                 let poses = new_poses(&before.scans.0, *seed, *rest);
                 let mut mapper = open_or_create(disk, &self.config).unwrap();
-                let mut beside =
-                    RemapBeside::begin(at(disk), &NewPoses::Numbered(poses), &Remap::new(rework())).unwrap();
+                let mut beside = RemapBeside::begin(
+                    &scans(disk).unwrap(),
+                    &NewPoses::Numbered(poses),
+                    &Remap::new(rework()),
+                )
+                .unwrap();
                 (next..meanwhile.end).for_each(|seed| insert(&mut mapper, &Taken::new(seed, 5)).unwrap());
                 mapper.flush().unwrap();
                 drop(mapper);
@@ -465,7 +474,8 @@ fn damage_among_kept_scans_is_named_and_nothing_is_changed() {
             verify(at(&disk), |finding| findings.push(finding.to_string()), |_, _| ()).unwrap();
             let poses = NewPoses::Numbered(new_poses(&state.scans.0, 3, None));
             let before = disk.files();
-            let remapped = remap(at(&disk), &poses, &Remap::new(rework()), |_, _| ());
+            let remapped =
+                scans(&disk).and_then(|scans| remap(&scans, &poses, &Remap::new(rework()), |_, _| ()));
             match remapped {
                 Ok(_) => {
                     let moved = naive(state.clone(), &Act::Move { seed: 3, rest: None });
@@ -501,7 +511,9 @@ fn segments_and_catalogs_that_are_missing_are_damage() {
         let disk = whole.copy();
         disk.take(path);
         let poses = NewPoses::Numbered(new_poses(&state.scans.0, 3, None));
-        let message = message_of(remap(at(&disk), &poses, &Remap::new(rework()), |_, _| ()));
+        let message = message_of(
+            scans(&disk).and_then(|scans| remap(&scans, &poses, &Remap::new(rework()), |_, _| ())),
+        );
         assert!(message.contains("missing"), "{message}");
         let mut damage = 0;
         verify(at(&disk), |_| damage += 1, |_, _| ()).unwrap();
@@ -517,7 +529,7 @@ fn segments_and_catalogs_that_are_missing_are_damage() {
 fn what_is_no_scan_is_named_and_refused() {
     let refused = |disk: &FaultyDisk| {
         let poses = NewPoses::Numbered(vec![(1, Pose::identity())]);
-        message_of(remap(at(disk), &poses, &Remap::new(rework()), |_, _| ()))
+        message_of(scans(disk).and_then(|scans| remap(&scans, &poses, &Remap::new(rework()), |_, _| ())))
     };
     let (disk, _) = a_map_with_kept_scans();
     clear(at(&disk), &Part::Inside(region(0.0, 1.0)), |_, _| ()).unwrap();
@@ -558,7 +570,9 @@ fn what_is_no_scan_is_named_and_refused() {
 #[test]
 fn new_poses_that_do_not_fit_are_named() {
     let (disk, _) = a_map_with_kept_scans();
-    let wrong = |poses: NewPoses| message_of(remap(at(&disk), &poses, &Remap::new(rework()), |_, _| ()));
+    let wrong = |poses: NewPoses| {
+        message_of(scans(&disk).and_then(|scans| remap(&scans, &poses, &Remap::new(rework()), |_, _| ())))
+    };
     let identity = Pose::identity();
     let message = wrong(NewPoses::InOrder(vec![identity; 3]));
     assert!(message.contains("3 poses for 5 scans: none from scan 4 of the map on"), "{message}");
@@ -568,8 +582,6 @@ fn new_poses_that_do_not_fit_are_named() {
     assert!(message.contains("no scan with the number 9"), "{message}");
     let message = wrong(NewPoses::Numbered(vec![(2, identity), (2, identity)]));
     assert!(message.contains("two poses for scan 2"), "{message}");
-    let message = wrong(NewPoses::Stamped { poses: vec![(0, identity)], tolerance_ns: 5 });
-    assert!(message.contains("no time stamp in the map"), "{message}");
     let mut isometry = *identity.isometry();
     isometry.translation.vector.y = f64::NAN;
     let message = wrong(NewPoses::Numbered(vec![(4, isometry.into())]));
@@ -589,13 +601,16 @@ fn scans_that_hardly_move_are_left_alone_and_told() {
         NewPoses::Numbered(poses.collect())
     };
     let how = Remap::new(rework()).with_tolerance((0.045, 0.01));
-    let remapped = remap(at(&disk), &moved(0.01), &how, |_, _| ()).unwrap();
+    let remapped = remap(&scans(&disk).unwrap(), &moved(0.01), &how, |_, _| ()).unwrap();
     assert_eq!((remapped.scans_within_tolerance, remapped.mapped.scans_changed), (4, 1), "{remapped:?}");
     let left_m = remapped.largest_move_left_m;
     assert!((left_m - 0.04).abs() < 1e-9 && (remapped.largest_move_m - 0.05).abs() < 1e-9);
     assert!(MapReader::open(at(&disk), 1).unwrap().digest().unwrap() != digest);
     let wide = Remap::new(rework().with_dry_run(true)).with_tolerance((9.0, 9.0));
-    assert_eq!(remap(at(&disk), &moved(0.02), &wide, |_, _| ()).unwrap().mapped.scans_changed, 0);
+    assert_eq!(
+        remap(&scans(&disk).unwrap(), &moved(0.02), &wide, |_, _| ()).unwrap().mapped.scans_changed,
+        0
+    );
 }
 
 /// The same scans in little memory, and a request to stop in the middle.
@@ -605,7 +620,7 @@ fn a_dry_run_and_a_stop_change_nothing() {
     let poses = NewPoses::Numbered(new_poses(&state.scans.0, 5, Some(1)));
     let before = disk.files();
     let dry = Remap::new(rework().with_dry_run(true));
-    let told = remap(at(&disk), &poses, &dry, |_, _| ()).unwrap().mapped;
+    let told = remap(&scans(&disk).unwrap(), &poses, &dry, |_, _| ()).unwrap().mapped;
     assert!(told.estimated_s.is_some() && told.scans_changed == 2 && told.tiles_mapped > 0, "{told:?}");
     let is_lock = |path: &std::path::PathBuf| path.ends_with("writer.lock");
     let without_lock = |files: BTreeMap<std::path::PathBuf, Vec<u8>>| {
@@ -614,7 +629,7 @@ fn a_dry_run_and_a_stop_change_nothing() {
     assert!(without_lock(before) == without_lock(disk.files()));
     let stop = Stop::default();
     let how = Remap::new(rework().with_stop(stop.clone()));
-    let stopped = remap(at(&disk), &poses, &how, |done, _| {
+    let stopped = remap(&scans(&disk).unwrap(), &poses, &how, |done, _| {
         if done == 1 {
             stop.set()
         }
@@ -622,7 +637,7 @@ fn a_dry_run_and_a_stop_change_nothing() {
     assert!(matches!(stopped, Err(Error::Stopped)));
     assert!(is_in_state(&disk, &config(), &state));
     check_whole(&disk, "stopped");
-    let done = remap(at(&disk), &poses, &Remap::new(rework()), |_, _| ()).unwrap().mapped;
+    let done = remap(&scans(&disk).unwrap(), &poses, &Remap::new(rework()), |_, _| ()).unwrap().mapped;
     assert_eq!((done.tiles_mapped > 0, done.scans_changed), (true, 2));
 }
 

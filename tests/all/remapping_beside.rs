@@ -5,13 +5,15 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use testkit::random_scans::{Random, random_scan};
 use testkit::support::message_of;
 use voxtile::integrity::{Finding, Severity, verify};
+use voxtile::mapper::KeptSummary;
 use voxtile::operations::{
     NewPoses, Part, Remap, RemapBeside, Rework, ScanSelection, clear, remap, remove_scans,
 };
 use voxtile::scan::Stop;
 use voxtile::store::SnapshotName;
 use voxtile::{
-    Error, MapConfig, MapQueries, MapReader, MapView, Mapper, OutOfCoreTileMapper, Pose, ScanRef, Storage,
+    Error, MapConfig, MapQueries, MapReader, MapView, Mapper, MemoryLimit, OutOfCoreTileMapper, Pose, Result,
+    ScanRef, Storage,
 };
 
 fn config() -> MapConfig {
@@ -19,8 +21,12 @@ fn config() -> MapConfig {
     config.with_memory_bytes(20 << 20)
 }
 
+fn scans(folder: impl AsRef<Path>) -> Result<KeptSummary> {
+    KeptSummary::read(folder)
+}
+
 fn how() -> Remap {
-    Remap::new(Rework::default().with_memory_bytes(20 << 20))
+    Remap::new(Rework::default().with_memory(MemoryLimit::Bytes(20 << 20)))
 }
 
 fn insert(mapper: &mut OutOfCoreTileMapper, number: u64) {
@@ -64,7 +70,7 @@ fn scans_go_on_while_the_map_is_mapped_again() {
         let place = tempfile::tempdir().unwrap();
         let folder = place.path().join("map");
         let mut mapper = with_scans(&folder, config().with_storage(storage), 40);
-        let beside = RemapBeside::begin(&folder, &moved(moving), &how()).unwrap();
+        let beside = RemapBeside::begin(&scans(&folder).unwrap(), &moved(moving), &how()).unwrap();
         assert!(beside.moves_scans());
         let (is_over, mut followed) = (AtomicBool::new(false), 0);
         let beside = std::thread::scope(|scope| {
@@ -97,7 +103,7 @@ fn scans_go_on_while_the_map_is_mapped_again() {
         // What the command makes of the same scans and poses.
         let other = place.path().join("other");
         drop(with_scans(&other, config().with_storage(storage), 91));
-        remap(&*other, &moved(moving), &how(), |_, _| ()).unwrap();
+        remap(&scans(&other).unwrap(), &moved(moving), &how(), |_, _| ()).unwrap();
         assert_eq!(digest_of(&folder), digest_of(&other), "{storage:?}");
         nothing_is_left_beside(&folder);
 
@@ -121,7 +127,7 @@ fn poses_that_move_nothing_leave_the_map_alone() {
     drop(with_scans(&folder, config(), 5));
     let commits = std::fs::read(folder.join("commits.log")).unwrap();
     let same = NewPoses::Numbered((1..=5).map(|number| (number, pose(number, 0.0))).collect());
-    let mut beside = RemapBeside::begin(&folder, &same, &how()).unwrap();
+    let mut beside = RemapBeside::begin(&scans(&folder).unwrap(), &same, &how()).unwrap();
     assert!(!beside.moves_scans());
     assert_eq!(beside.follow(|_| ()).unwrap(), 0);
     assert_eq!(beside.finish().unwrap().mapped.scans_changed, 0);
@@ -135,7 +141,7 @@ fn scans_that_were_changed_meanwhile_are_not_overwritten() {
     let folder = place.path().join("map");
     drop(with_scans(&folder, config(), 6));
     let begun = || {
-        let mut beside = RemapBeside::begin(&folder, &moved(6), &how()).unwrap();
+        let mut beside = RemapBeside::begin(&scans(&folder).unwrap(), &moved(6), &how()).unwrap();
         beside.follow(|_| ()).unwrap();
         beside
     };
@@ -147,7 +153,7 @@ fn scans_that_were_changed_meanwhile_are_not_overwritten() {
     nothing_is_left_beside(&folder);
 
     let moved = moved(1);
-    let beside = RemapBeside::begin(&folder, &moved, &how()).unwrap();
+    let beside = RemapBeside::begin(&scans(&folder).unwrap(), &moved, &how()).unwrap();
     let region = voxtile::Aabb { min: [0.0; 3], max: [1.0; 3] };
     clear(&*folder, &Part::Inside(region), |_, _| ()).unwrap();
     let digest = digest_of(&folder);
@@ -165,8 +171,8 @@ fn one_at_a_time_and_a_stop_or_a_drop_leaves_nothing() {
     let stop = Stop::default();
     let mut stoppable = how();
     stoppable.rework = stoppable.rework.with_stop(stop.clone());
-    let mut beside = RemapBeside::begin(&folder, &moved(6), &stoppable).unwrap();
-    let second = RemapBeside::begin(&folder, &moved(6), &how());
+    let mut beside = RemapBeside::begin(&scans(&folder).unwrap(), &moved(6), &stoppable).unwrap();
+    let second = RemapBeside::begin(&scans(&folder).unwrap(), &moved(6), &how());
     assert!(matches!(second, Err(Error::Locked { .. })), "{second:?}");
     assert!(place.path().join("map.remapping").exists());
     assert!(matches!(
@@ -180,21 +186,24 @@ fn one_at_a_time_and_a_stop_or_a_drop_leaves_nothing() {
     insert(&mut mapper, 7);
     mapper.flush().unwrap();
     // Not while the mapper has the map.
-    let beside = RemapBeside::begin(&folder, &moved(6), &how()).unwrap();
+    let beside = RemapBeside::begin(&scans(&folder).unwrap(), &moved(6), &how()).unwrap();
     assert!(matches!(beside.finish(), Err(Error::Locked { .. })));
     nothing_is_left_beside(&folder);
     drop(mapper);
     assert_ne!(digest_of(&folder), digest);
 
-    let message = message_of(RemapBeside::begin(&folder, &moved(8), &how()));
+    let message = message_of(scans(&folder).and_then(|scans| RemapBeside::begin(&scans, &moved(8), &how())));
     assert!(message.contains("no scan with the number 8"), "{message}");
     let mut dry = how();
     dry.rework = dry.rework.with_dry_run(true);
-    assert!(message_of(RemapBeside::begin(&folder, &moved(6), &dry)).contains("dry_run"));
+    assert!(
+        message_of(scans(&folder).and_then(|scans| RemapBeside::begin(&scans, &moved(6), &dry)))
+            .contains("dry_run")
+    );
     // What is not of a map stays, and is in the way.
     std::fs::create_dir_all(place.path().join("map.remapping/kept_scans")).unwrap();
     std::fs::write(place.path().join("map.remapping/kept_scans/letter.txt"), "dear").unwrap();
-    let message = message_of(RemapBeside::begin(&folder, &moved(6), &how()));
+    let message = message_of(scans(&folder).and_then(|scans| RemapBeside::begin(&scans, &moved(6), &how())));
     assert!(message.contains("letter.txt"), "{message}");
     assert!(place.path().join("map.remapping/kept_scans/letter.txt").exists());
 }
@@ -207,7 +216,7 @@ fn a_snapshot_keeps_the_map_as_it_was_before_the_end() {
     let name = SnapshotName::new("before").unwrap();
     let mut keeping = how();
     keeping.rework = keeping.rework.with_keep_as(name.clone());
-    let beside = RemapBeside::begin(&folder, &moved(6), &keeping).unwrap();
+    let beside = RemapBeside::begin(&scans(&folder).unwrap(), &moved(6), &keeping).unwrap();
     insert(&mut mapper, 7);
     mapper.flush().unwrap();
     drop(mapper);

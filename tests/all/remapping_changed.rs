@@ -6,6 +6,7 @@ use std::path::Path;
 use std::sync::{Arc, Mutex};
 use testkit::faulty_disk::{Fault, FaultyDisk};
 use testkit::support::message_of;
+use voxtile::mapper::KeptSummary;
 use voxtile::operations::{NewPoses, Remap, Rework, ScanSelection, remap, remove_points, remove_scans};
 use voxtile::store::{Disk, DiskLock, DiskRead, DiskWrite, EntryKind, ReaderWatch, Scratch};
 use voxtile::{
@@ -139,5 +140,5 @@ fn scans_that_came_meanwhile_are_not_removed_uncounted() {
 fn scans_that_came_meanwhile_do_not_keep_poses_unasked() {
     let pose = Pose::from_quaternion([1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]).unwrap();
     let poses = NewPoses::InOrder(vec![pose]);
-    is_refused(|map| remap(map, &poses, &Remap::new(Rework::default()), |_, _| ()));
+    is_refused(|map| remap(&KeptSummary::read(map)?, &poses, &Remap::new(Rework::default()), |_, _| ()));
 }

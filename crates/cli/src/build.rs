@@ -6,6 +6,7 @@ use crate::progress::at_terminal;
 use crate::read_options::read_options;
 use crate::run::{INTERRUPTED, say};
 use crate::{stop_signal, summary};
+use bytesize::ByteSize;
 use std::process::ExitCode;
 use voxtile::{InsertMode, MemoryLimit, Storage};
 use voxtile_pipeline::{BuildOptions, SensorModelKind, build};
@@ -29,6 +30,13 @@ fn stopped_early(args: &BuildArgs) -> ExitCode {
     ExitCode::from(INTERRUPTED)
 }
 
+/// The limit of `--memory`, or the default.
+pub fn memory_of(memory: Option<ByteSize>) -> MemoryLimit {
+    memory.map_or(MemoryLimit::Default, |memory| {
+        MemoryLimit::Bytes(usize::try_from(memory.as_u64()).unwrap_or(usize::MAX))
+    })
+}
+
 /// What the command line asks for.
 fn options_of(args: &BuildArgs) -> voxtile::Result<BuildOptions> {
     let mut options = BuildOptions::new(&args.scans, &args.output);
@@ -36,8 +44,7 @@ fn options_of(args: &BuildArgs) -> voxtile::Result<BuildOptions> {
     options.resolution_m = args.resolution;
     options.tile_size_m = args.tile_size;
     options.storage = args.storage.map(Storage::from);
-    let bytes = |memory: bytesize::ByteSize| MemoryLimit::Bytes(memory.as_u64() as usize);
-    options.memory = args.cache_tiles.map(MemoryLimit::tiles).or(args.memory.map(bytes));
+    options.memory = args.cache_tiles.map_or(memory_of(args.memory), MemoryLimit::tiles);
     options.min_range_m = args.min_range;
     options.max_range_m = args.max_range;
     options.sensor_model = args.sensor_model.map(|name| match name {

@@ -82,7 +82,7 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<ExitCode> {
 /// Begins the demo's map, or goes on with one that was interrupted; returns how many of its scans are there.
 fn begin(args: &DemoArgs, map: &Path, config: MapConfig) -> anyhow::Result<(OutOfCoreTileMapper, u64)> {
     let name = format!("demo city {} over {} m", args.seed, args.length);
-    let mut mapper = match MapReader::open(map, 1) {
+    let mut mapper = match MapReader::open(map, 0) {
         Err(Error::NoMap { .. }) => OutOfCoreTileMapper::create(map, config)?,
         _ => OutOfCoreTileMapper::open(map, config).map_err(|error| match error {
             Error::Mismatch { .. } => another_demo(map),
@@ -104,7 +104,7 @@ fn another_demo(map: &Path) -> Error {
 
 /// Draws a map on disk from above, tile by tile, and the way of the sensor.
 fn draw(args: &DemoArgs, map: &Path, path: &[Point], file: &Path) -> anyhow::Result<()> {
-    let reader = MapReader::open(map, 1)?;
+    let reader = MapReader::open(map, 0)?;
     let grid = reader.config().grid;
     let (scans, resolution_m, tile_size_m) = (path.len(), grid.resolution_m(), grid.tile_size_m());
     let title = format!("voxtile demo: {scans} scans, {resolution_m} m voxels, {tile_size_m} m tiles");

@@ -9,7 +9,7 @@ use std::io::Write;
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
-use voxtile::mapper::{MapReader, MapView};
+use voxtile::mapper::{KeptSummary, MapReader, MapView};
 use voxtile::operations::{Remap, Remapped, map_anew, remap};
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::space::Grid;
@@ -17,7 +17,7 @@ use voxtile::{Error, InsertMode, MapConfig, MemoryLimit, RayConfig};
 use voxtile_formats::clouds::Budget;
 use voxtile_pipeline::memory;
 use voxtile_pipeline::numbers::{Mount, tolerance_ns};
-use voxtile_pipeline::{PoseFile, poses_for, records_of};
+use voxtile_pipeline::{PoseFile, poses_for};
 
 #[derive(Serialize)]
 struct Summary<'a> {
@@ -36,13 +36,11 @@ pub fn run(args: &RemapArgs) -> anyhow::Result<ExitCode> {
     let map = whole_map(&args.map)?;
     let started = Instant::now();
     let tolerance = args.tolerance.as_deref().map(tolerance_of).transpose()?;
-    let job = Job::of(&args.rework, map)?;
-    let poses = {
-        let scans = records_of(&MapReader::open(map, 1)?)?;
-        poses_for(&pose_file(args, file)?, &scans)?
-    };
+    let job = Job::of(&args.rework)?;
+    let scans = KeptSummary::read(map)?;
+    let poses = poses_for(&pose_file(args, file)?, &scans)?;
     let how = Remap::new(job.rework.clone()).with_tolerance(tolerance);
-    let outcome = remap(map, &poses, &how, |done, all| job.progress.set(done, all));
+    let outcome = remap(&scans, &poses, &how, |done, all| job.progress.set(done, all));
     let remapped = match job.ended(outcome)? {
         Ok(remapped) => remapped,
         Err(code) => return Ok(code),
@@ -108,9 +106,9 @@ fn run_anew(args: &RemapArgs) -> anyhow::Result<ExitCode> {
         let reason = "go with --poses; with -o the map stays as it is";
         return Err(Error::argument("--keep-as, --dry-run", reason).into());
     }
-    let job = Job::of(&args.rework, &MapAt::of(&args.map)?.map)?;
+    let job = Job::of(&args.rework)?;
     let reader = MapAt::of(&args.map)?.open()?;
-    let config = config_of(args, reader.config(), job.rework.memory_bytes)?;
+    let config = config_of(args, reader.config(), job.rework.memory)?;
     let rays = |rays: &RayConfig| rays_of(args, rays);
     let outcome = map_anew(&reader, whole_map(output)?, config, rays, &job.rework.stop, |done, all| {
         job.progress.set(done, all)
@@ -127,22 +125,19 @@ fn run_anew(args: &RemapArgs) -> anyhow::Result<ExitCode> {
     }
     let (scans, points) = (HumanCount(mapped.scans), HumanCount(mapped.report.points));
     writeln!(out, "mapped    {scans} scans, {points} points, into {}", output.display())?;
-    let (voxels, occupied) = MapReader::open(output, 1)?.voxel_counts().unwrap_or_default();
+    let (voxels, occupied) = MapReader::open(output, 0)?.voxel_counts().unwrap_or_default();
     writeln!(out, "map       {} voxels, {} occupied", HumanCount(voxels), HumanCount(occupied))?;
     Ok(ExitCode::SUCCESS)
 }
 
-fn config_of(args: &RemapArgs, own: &MapConfig, memory_bytes: usize) -> anyhow::Result<MapConfig> {
+fn config_of(args: &RemapArgs, own: &MapConfig, memory: MemoryLimit) -> anyhow::Result<MapConfig> {
     let (resolution_m, tile_size_m) = (
         args.resolution.unwrap_or(own.grid.resolution_m()),
         args.tile_size.unwrap_or(own.grid.tile_size_m()),
     );
     let grid = Grid::new(resolution_m, tile_size_m).map_err(Error::from)?;
     let mut config = own.clone().with_kept_scans(args.keep_scans);
-    config.grid = grid;
-    // What was asked for is kept to, or refused.
-    let least = if args.rework.memory.is_some() { 0 } else { MemoryLimit::least_bytes(&grid) };
-    config.memory = MemoryLimit::Bytes(memory_bytes.max(least));
+    (config.grid, config.memory) = (grid, memory);
     if let Some(storage) = args.storage {
         config.storage = storage.into();
     }

@@ -27,7 +27,7 @@ struct Summary<'a> {
 pub fn run(args: &RemovePointsArgs) -> anyhow::Result<ExitCode> {
     let map = whole_map(&args.map)?;
     let started = Instant::now();
-    let (job, region) = (Job::of(&args.rework, map)?, region_of(&args.region)?);
+    let (job, region) = (Job::of(&args.rework)?, region_of(&args.region)?);
     let outcome = remove_points(map, &region, &job.rework, |done, all| job.progress.set(done, all));
     let removed = match job.ended(outcome)? {
         Ok(removed) => removed,

@@ -28,7 +28,7 @@ struct Summary<'a> {
 pub fn run(args: &RemoveScansArgs) -> anyhow::Result<ExitCode> {
     let map = whole_map(&args.map)?;
     let started = Instant::now();
-    let (job, scans) = (Job::of(&args.rework, map)?, selection_of(args)?);
+    let (job, scans) = (Job::of(&args.rework)?, selection_of(args)?);
     let progress = |done, all| job.progress.set(done, all);
     let outcome = remove_scans(map, &scans, args.from_snapshots, &job.rework, progress);
     let removed = match job.ended(outcome)? {

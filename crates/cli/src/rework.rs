@@ -1,20 +1,15 @@
 //! What the commands share that map a part of a map again.
 
 use crate::args::ReworkArgs;
+use crate::build::memory_of;
 use crate::progress::Progress;
 use crate::run::{INTERRUPTED, say};
 use crate::stop_signal;
 use indicatif::HumanCount;
 use std::io::Write;
-use std::path::Path;
 use std::process::ExitCode;
-use voxtile::MemoryLimit;
-use voxtile::mapper::MapReader;
 use voxtile::operations::{MappedAgain, Rework};
 use voxtile::scan::Stop;
-
-/// What a rework may use of memory unless something else is asked for.
-const DEFAULT_MEMORY_BYTES: usize = 512 << 20;
 
 /// How a map is mapped again, and its progress.
 pub struct Job {
@@ -24,15 +19,10 @@ pub struct Job {
 }
 
 impl Job {
-    pub fn of(args: &ReworkArgs, map: &Path) -> anyhow::Result<Self> {
+    pub fn of(args: &ReworkArgs) -> anyhow::Result<Self> {
         let stop = stop_signal::catch_undone()?;
-        let config = MapReader::config_of(map)?;
-        let memory =
-            args.memory.map_or(DEFAULT_MEMORY_BYTES.max(MemoryLimit::least_bytes(&config.grid)), |memory| {
-                usize::try_from(memory.as_u64()).unwrap_or(usize::MAX)
-            });
         let rework = Rework::default()
-            .with_memory_bytes(memory)
+            .with_memory(memory_of(args.memory))
             .with_keep_as(args.keep_as.clone())
             .with_dry_run(args.dry_run)
             .with_stop(stop.clone());

@@ -200,7 +200,7 @@ impl Build<'_> {
 fn read_options(options: &BuildOptions, config: &MapConfig) -> ReadOptions {
     let mut read = options.read.clone();
     read.open.scratch = Some(folder_beside(options).to_owned());
-    if let MemoryLimit::Bytes(bytes) = config.memory {
+    if let Some(bytes) = config.memory_bytes() {
         read.open.memory_bytes = for_reading(bytes);
     }
     read.clouds.has_no_returns = config.rays.no_return_range_m.is_some();
@@ -288,7 +288,7 @@ fn exists(options: &BuildOptions) -> anyhow::Result<bool> {
         let reason = "is a file; a map is a folder, name another `output`";
         return Err(Error::argument(options.output.display().to_string(), reason).into());
     }
-    let exists = match MapReader::open(&options.output, 1) {
+    let exists = match MapReader::open(&options.output, 0) {
         Err(Error::NoMap { .. }) => false,
         // Damage is told by the mapper, which opens the map next.
         _ => true,
@@ -449,7 +449,7 @@ fn for_reading(bytes: usize) -> usize {
 /// The configuration of the map, which leaves the memory for reading alone.
 fn config_of_map(options: &BuildOptions, config: &MapConfig) -> MapConfig {
     let mut config = config.clone();
-    if let MemoryLimit::Bytes(bytes) = config.memory
+    if let Some(bytes) = config.memory_bytes()
         && !is_standard_input(&options.scans)
     {
         let least = MemoryLimit::least_bytes(&config.grid).min(bytes);
@@ -461,11 +461,9 @@ fn config_of_map(options: &BuildOptions, config: &MapConfig) -> MapConfig {
 /// Points of a scan that the limit of memory has no room for go to a file.
 fn room(options: &BuildOptions, config: &MapConfig) -> PointRoom {
     let folder = folder_beside(options);
-    match config.memory {
-        MemoryLimit::Bytes(bytes) => {
-            PointRoom::new(bytes / PARTS_OF_MEMORY / scans_in_memory(options, config), folder)
-        }
-        _ => PointRoom::default(),
+    match config.memory_bytes() {
+        Some(bytes) => PointRoom::new(bytes / PARTS_OF_MEMORY / scans_in_memory(options, config), folder),
+        None => PointRoom::default(),
     }
 }
 
@@ -481,10 +479,8 @@ fn scans_in_memory(options: &BuildOptions, config: &MapConfig) -> usize {
 
 /// How many scans are taken together if they are at hand: one for each core, as far as there is room for their points.
 fn most_together(options: &BuildOptions, config: &MapConfig) -> usize {
-    let room = match config.memory {
-        MemoryLimit::Bytes(bytes) => bytes / PARTS_OF_MEMORY / ROOM_TO_GO_TOGETHER,
-        _ => usize::MAX,
-    };
+    let room =
+        config.memory_bytes().map_or(usize::MAX, |bytes| bytes / PARTS_OF_MEMORY / ROOM_TO_GO_TOGETHER);
     if options.no_rays { 1 } else { rayon::current_num_threads().min(room.saturating_sub(1) / 2).max(1) }
 }
 

@@ -4,13 +4,10 @@ use crate::scan_input::name_of_path;
 use voxtile::mapper::{MapReader, MapView};
 use voxtile::sensor::{Iwlo, LogOdds, SensorModel};
 use voxtile::space::{Grid, GridError};
-use voxtile::{Error, InsertMode, MapConfig, MemoryLimit, RayConfig, Storage};
+use voxtile::{Error, InsertMode, MapConfig, RayConfig, Storage};
 
 /// Where rays are cut unless something else is asked for.
 const MAX_RANGE_M: f64 = 100.0;
-
-/// What a build may use of memory unless something else is asked for.
-const DEFAULT_MEMORY_BYTES: usize = 512 << 20;
 
 /// The parameters of a new map.
 pub fn config_to_create(options: &BuildOptions) -> anyhow::Result<MapConfig> {
@@ -25,7 +22,7 @@ pub fn config_to_create(options: &BuildOptions) -> anyhow::Result<MapConfig> {
 
 /// The map's own parameters, and those that were typed, which must be the same.
 pub fn config_to_go_on(options: &BuildOptions) -> anyhow::Result<MapConfig> {
-    let map = MapReader::open(&options.output, 1)?;
+    let map = MapReader::open(&options.output, 0)?;
     let mut config = map.config().clone();
     if options.resolution_m.is_some() || options.tile_size_m.is_some() {
         let resolution_m = options.resolution_m.unwrap_or(config.grid.resolution_m());
@@ -93,8 +90,7 @@ fn for_this_run(
     let sensor_model = sensor_model(options, config.sensor_model)?;
     let mut config =
         config.with_sensor_model(sensor_model).with_insert_mode(insert_mode).with_octree(options.octree);
-    let least = MemoryLimit::least_bytes(&config.grid);
-    config.memory = options.memory.unwrap_or(MemoryLimit::Bytes(least.max(DEFAULT_MEMORY_BYTES)));
+    config.memory = options.memory;
     config.keeps_scans |= options.keep_scans;
     config.rays.no_return_range_m =
         options.clear_no_return_m.or(begun.and_then(|rays| rays.no_return_range_m));

@@ -31,8 +31,8 @@ pub struct BuildOptions {
     pub tile_size_m: Option<f64>,
     /// How tiles are stored: as OctoMap's files.
     pub storage: Option<Storage>,
-    /// Limit of memory: 512 MiB, or what tiles of this size need at least.
-    pub memory: Option<MemoryLimit>,
+    /// Limit of memory.
+    pub memory: MemoryLimit,
     /// Points nearer to the sensor than this are skipped, in metres: 0.
     pub min_range_m: Option<f64>,
     /// Rays are cut at this range in metres: 100.
@@ -86,7 +86,7 @@ impl BuildOptions {
             resolution_m: None,
             tile_size_m: None,
             storage: None,
-            memory: None,
+            memory: MemoryLimit::default(),
             min_range_m: None,
             max_range_m: None,
             sensor_model: None,

@@ -1,5 +1,5 @@
 use crate::MapAt;
-use crate::new_poses::{PoseFile, poses_for, records_of};
+use crate::new_poses::{PoseFile, poses_for};
 use crate::place::{is_map_at, url_of};
 use rustc_hash::FxHashMap;
 use std::path::{Path, PathBuf};
@@ -46,19 +46,16 @@ impl KeptSource {
     /// Opens them with their own poses, or with those of a file.
     pub fn open(path: &Path, poses: Option<&PoseFile<'_>>) -> Result<Self> {
         let reader = MapAt::of(path)?.open()?;
+        let (scans, summary) = (reader.kept_scans()?, reader.kept_summary()?);
         let new_poses = match poses {
-            Some(poses) => poses_for(poses, &records_of(&reader)?)?.of_scans(&reader)?,
+            Some(poses) => poses_for(poses, &summary)?.by_number(&summary)?,
             None => FxHashMap::default(),
         };
-        let (mut records, mut count) = (reader.kept_scans()?, 0);
-        while records.next_record()?.is_some() {
-            count += 1;
-        }
+        let count = summary.scans().len();
         let ext = reader.metadata().ext.as_ref();
         let id = ext.map_or("", |ext| &ext.map_id);
         let fingerprint = format!("kept scans of map {id} as of flush {}", reader.flush_number());
         let crs = ext.and_then(|ext| ext.crs.clone());
-        let scans = reader.kept_scans()?;
         Ok(Self { path: path.to_owned(), scans, new_poses, count, crs, fingerprint })
     }
 }

@@ -45,7 +45,7 @@ pub use export::{
 pub use flush_schedule::FlushEvery;
 pub use kept_source::is_map;
 pub use map_at::{AnyMap, MapAt, open_any_map, read_all_maps, read_any_map, read_map, read_maps, whole_map};
-pub use new_poses::{PoseFile, poses_for, records_of};
+pub use new_poses::{PoseFile, poses_for};
 pub use scan_input::{is_standard_input, open as open_scans};
 pub use scan_place::LocalScans;
 pub use scan_queue::WhenBehind;

@@ -1,8 +1,7 @@
 use std::path::Path;
-use voxtile::mapper::MapReader;
+use voxtile::mapper::{KeptScanHead, KeptSummary};
 use voxtile::operations::NewPoses;
 use voxtile::scan::Pose;
-use voxtile::store::KeptRecord;
 use voxtile::{Error, Result};
 use voxtile_formats::clouds::poses::{Found, Trajectory};
 use voxtile_formats::clouds::{Budget, RigidPose};
@@ -40,27 +39,14 @@ impl<'a> PoseFile<'a> {
     }
 }
 
-/// The scans that a map keeps, without their tiles, of which a long drive has many.
-///
-/// # Errors
-///
-/// A map that does not keep all its scans; damage.
-pub fn records_of(reader: &MapReader) -> Result<Vec<KeptRecord>> {
-    reader.check_keeps_all()?;
-    let (mut records, mut scans) = (reader.kept_scans()?, Vec::new());
-    while let Some(mut record) = records.next_record()? {
-        record.tiles = Vec::new();
-        scans.push(record);
-    }
-    Ok(scans)
-}
-
 /// The poses of a file for the scans that a map keeps, as a build with that file would give them.
 ///
 /// # Errors
 ///
-/// A file that cannot be read, and poses that do not fit the scans.
-pub fn poses_for(from: &PoseFile<'_>, scans: &[KeptRecord]) -> Result<NewPoses> {
+/// A map that does not keep all its scans; a file that cannot be read, and poses that do not fit the scans.
+pub fn poses_for(from: &PoseFile<'_>, scans: &KeptSummary) -> Result<NewPoses> {
+    scans.check_keeps_all()?;
+    let scans = scans.scans();
     let &PoseFile { path: file, calib, body_from_sensor, tolerance_ns, ref budget } = from;
     if std::fs::metadata(file).is_ok_and(|meta| !meta.is_file() && !meta.is_dir()) {
         let reason =
@@ -101,7 +87,7 @@ pub fn poses_for(from: &PoseFile<'_>, scans: &[KeptRecord]) -> Result<NewPoses> 
 }
 
 /// Whether the poses are those of the scans in order, as far as time stamps tell.
-fn is_in_step(trajectory: &Trajectory, scans: &[KeptRecord], tolerance_ns: i64) -> Result<bool> {
+fn is_in_step(trajectory: &Trajectory, scans: &[KeptScanHead], tolerance_ns: i64) -> Result<bool> {
     let most = u64::try_from(tolerance_ns).unwrap_or(0);
     for (of_pose, scan) in trajectory.stamps_ns().zip(scans) {
         let of_pose = of_pose?;
@@ -112,7 +98,7 @@ fn is_in_step(trajectory: &Trajectory, scans: &[KeptRecord], tolerance_ns: i64) 
     Ok(true)
 }
 
-fn other_number(poses: usize, scans: &[KeptRecord]) -> String {
+fn other_number(poses: usize, scans: &[KeptScanHead]) -> String {
     let all = scans.len();
     match scans.get(poses) {
         Some(scan) => format!(
@@ -131,7 +117,7 @@ fn other_number(poses: usize, scans: &[KeptRecord]) -> String {
 fn by_time(
     trajectory: &Trajectory,
     file: &Path,
-    scans: &[KeptRecord],
+    scans: &[KeptScanHead],
     tolerance_ns: i64,
     body_from_sensor: Option<&RigidPose>,
 ) -> Result<NewPoses> {

@@ -97,7 +97,7 @@ impl Summary {
         mapper: &impl MapView,
         elapsed: Duration,
     ) -> voxtile::Result<Self> {
-        let reader = MapReader::open(map, 1)?;
+        let reader = MapReader::open(map, 0)?;
         let (voxels, occupied) = reader.voxel_counts().unwrap_or_default();
         let statistics = mapper.statistics();
         Ok(Self {

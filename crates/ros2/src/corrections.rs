@@ -1,6 +1,5 @@
 use voxtile::Pose;
-use voxtile::mapper::pose_of_numbers;
-use voxtile::store::{KeptFrame, KeptRecord};
+use voxtile::mapper::KeptScanHead;
 use voxtile_formats::clouds::RigidPose;
 use voxtile_formats::clouds::ros::messages::StampedPose;
 
@@ -38,7 +37,7 @@ impl Corrections {
     ///
     /// Poses that are none.
     pub fn of<'a>(
-        records: impl IntoIterator<Item = &'a KeptRecord>,
+        records: impl IntoIterator<Item = &'a KeptScanHead>,
         path: &[StampedPose],
     ) -> voxtile::Result<Self> {
         let mut path: Vec<(i64, RigidPose)> =
@@ -46,13 +45,12 @@ impl Corrections {
         path.sort_by_key(|(stamp_ns, _)| *stamp_ns);
         let (mut scans, mut newest_ns) = (Vec::new(), i64::MIN);
         for record in records {
-            if let (Some(stamp_ns), KeptFrame::Sensor(pose)) = (record.stamp_ns, &record.frame) {
+            if let (Some(stamp_ns), Some(world_from_sensor)) = (record.stamp_ns, record.world_from_sensor) {
                 if stamp_ns < newest_ns.saturating_sub(ANOTHER_RUN_NS) {
                     scans.clear();
                     newest_ns = i64::MIN;
                 }
                 newest_ns = newest_ns.max(stamp_ns);
-                let world_from_sensor = pose_of_numbers(pose);
                 scans.push(Scan { number: record.number, stamp_ns, world_from_sensor });
             }
         }
@@ -102,21 +100,11 @@ fn nearest<T>(sorted: &[T], stamp_ns: i64, stamp_of: impl Fn(&T) -> i64) -> Opti
 #[cfg(test)]
 mod tests {
     use super::*;
-    use voxtile::RayConfig;
     use voxtile_formats::clouds::ros::messages::Header;
 
-    fn record(number: u64, stamp_ns: Option<i64>, x: f64) -> KeptRecord {
-        KeptRecord {
-            number,
-            stamp_ns,
-            frame: KeptFrame::Sensor([x, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]),
-            rays: RayConfig::default(),
-            points: 1,
-            has_intensities: false,
-            updates: 1,
-            place: Default::default(),
-            tiles: Vec::new(),
-        }
+    fn record(number: u64, stamp_ns: Option<i64>, x: f64) -> KeptScanHead {
+        let pose = Pose::from_quaternion([x, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]).unwrap();
+        KeptScanHead::new(number, stamp_ns, Some(pose))
     }
 
     fn pose(stamp_ns: i64, position_m: [f64; 3], quaternion: [f64; 4]) -> StampedPose {

@@ -470,7 +470,7 @@ fn cleared(folder: &Path, region: Aabb) -> voxtile::Result<String> {
 
 /// Where the sensor of a map was last, and when; the origin where the map does not tell.
 fn last_place(folder: &Path) -> (Point, i64) {
-    let scans = MapReader::open(folder, 1).and_then(|reader| reader.scans());
+    let scans = MapReader::open(folder, 0).and_then(|reader| reader.scans());
     let last = scans.ok().and_then(|scans| scans.last().copied());
     last.map_or(([0.0; 3], 0), |scan| (scan.origin_m, scan.stamp_ns.unwrap_or(0)))
 }

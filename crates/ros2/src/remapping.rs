@@ -5,8 +5,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
+use voxtile::mapper::KeptSummary;
 use voxtile::operations::{NewPoses, Remap, RemapBeside, Rework};
-use voxtile::{MapReader, Point, Stop};
+use voxtile::{MemoryLimit, Point, Stop};
 use voxtile_formats::clouds::ros::messages::StampedPose;
 
 /// A map that is mapped again beside its mapper, by a corrected path, in a thread of its own.
@@ -105,35 +106,20 @@ fn follow(
     has_caught_up: &AtomicBool,
     flushed: &Receiver<()>,
 ) -> voxtile::Result<Option<Remapped>> {
-    let found = corrections(&folder, path, order.last_scan)?;
+    let scans = KeptSummary::read(&folder)?;
+    let found = Corrections::of(scans.scans().iter().filter(|scan| scan.number <= order.last_scan), path)?;
     if found.most_moved_m <= order.tolerance_m && found.most_turned <= TOLERANCE {
         log::debug!("a path of {} poses changes nothing: it names {} scans", path.len(), found.named);
         return Ok(None);
     }
     log::info!("remapping beside the mapper: a path moves scans, by {:.2} m at most", found.most_moved_m);
     let sensor_m = found.poses.last().map(|(_, pose)| pose.position_m());
-    let rework = Rework::default().with_memory_bytes(order.memory_bytes).with_stop(stop);
-    let mut beside = RemapBeside::begin(&folder, &NewPoses::Numbered(found.poses), &Remap::new(rework))?;
+    let rework = Rework::default().with_memory(MemoryLimit::Bytes(order.memory_bytes)).with_stop(stop);
+    let mut beside = RemapBeside::begin(&scans, &NewPoses::Numbered(found.poses), &Remap::new(rework))?;
     while beside.follow(|_| ())? > 0 {}
     has_caught_up.store(true, Ordering::Relaxed);
     // An error means that nobody waits for the map any more.
     let _ = flushed.recv();
     beside.follow(|_| ())?;
     Ok(Some(Remapped { beside, last: (order.last_scan, sensor_m) }))
-}
-
-/// What a path means for the scans up to this one that the map on disk has.
-fn corrections(
-    folder: &std::path::Path,
-    path: &[StampedPose],
-    last_scan: u64,
-) -> voxtile::Result<Corrections> {
-    let mut scans = MapReader::open(folder, 1)?.kept_scans()?;
-    let mut records = Vec::new();
-    while let Some(mut record) = scans.next_record()?.filter(|record| record.number <= last_scan) {
-        // Of many scans they would take much memory.
-        record.tiles = Vec::new();
-        records.push(record);
-    }
-    Corrections::of(&records, path)
 }

@@ -90,7 +90,7 @@ enum Feed {
 
 impl Feed {
     fn open(args: &Args, source: &Path) -> anyhow::Result<Self> {
-        match MapReader::open(source, 64) {
+        match MapReader::open(source, 64 << 20) {
             Ok(map) => return Ok(Self::Map(Box::new(map))),
             // Then these are scans.
             Err(voxtile::Error::NoMap { .. } | voxtile::Error::Io { .. }) => {}

@@ -49,7 +49,7 @@ struct Subscriber<'a> {
 
 pub fn run(args: &Args, map: &Path, stop: &AtomicBool) -> anyhow::Result<()> {
     let end = args.seconds.map(|end| seconds("--for", end)).transpose()?;
-    let grid = match MapReader::open(map, 1) {
+    let grid = match MapReader::open(map, 0) {
         Ok(reader) => Some(reader.config().grid),
         Err(Error::NoMap { .. } | Error::Io { .. }) => None,
         Err(error) => return Err(error.into()),

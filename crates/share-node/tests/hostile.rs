@@ -215,7 +215,7 @@ fn one_robots_fault_stays_its_own() {
         assert!(layers.join(format!("{robot}.layer")).is_file(), "{robot}");
     }
     // All but that of another size are in the map.
-    let map_voxels = voxtile::MapReader::open(&map, 16).unwrap();
+    let map_voxels = voxtile::MapReader::open(&map, 16 << 20).unwrap();
     let folded = voxtile::MapQueries::all_occupied_voxels(&map_voxels, None).unwrap();
     assert!(folded.len() as u64 > voxels);
     assert!(folded.iter().any(|voxel| voxel.index == [i32::MAX - 1, i32::MIN, 0]));

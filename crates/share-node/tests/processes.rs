@@ -20,7 +20,7 @@ fn two_processes_have_equal_sets_and_the_layer_is_folded_into_a_map() {
     drop(subscriber);
     let again = self::subscriber(&map, &[&endpoint], &["--until-equal", "--for", "120"]);
     assert_eq!(layers_of(&mut { again }), [("spotter".to_string(), voxels, digest, true)]);
-    let map = voxtile::MapReader::open(&map, 16).unwrap();
+    let map = voxtile::MapReader::open(&map, 16 << 20).unwrap();
     assert_eq!(voxtile::MapQueries::all_occupied_voxels(&map, None).unwrap().len() as u64, voxels);
 }
 

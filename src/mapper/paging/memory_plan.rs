@@ -44,39 +44,36 @@ const LOST_BETWEEN_BLOCKS: usize = 12;
 impl MemoryPlan {
     pub(in crate::mapper) fn of(config: &MapConfig) -> Self {
         let has_tiny_tiles = config.grid.voxels_per_tile_edge() < BRICK_EDGE;
-        match config.memory {
-            MemoryLimit::Bytes(bytes) if has_tiny_tiles => {
-                Self::new(MemoryLimit::Bytes(bytes - bytes / LOST_BETWEEN_BLOCKS))
+        match (config.memory, config.memory_bytes()) {
+            // For tests: the limit is below the least that works, so it is not enforced.
+            (MemoryLimit::Tight(bytes), _) => {
+                let (is_enforced, least_scan_bytes, flight_bytes) = (false, 0, usize::MAX);
+                Self { least_scan_bytes, is_enforced, flight_bytes, ..Self::of_bytes(bytes) }
             }
-            limit => Self::new(limit),
+            (MemoryLimit::Tiles { tiles, write_buffer_bytes }, _) => {
+                Self::of_tiles(tiles, write_buffer_bytes)
+            }
+            (_, Some(bytes)) if has_tiny_tiles => Self::of_bytes(bytes - bytes / LOST_BETWEEN_BLOCKS),
+            (_, bytes) => Self::of_bytes(bytes.unwrap_or(usize::MAX)),
         }
     }
 
-    fn new(limit: MemoryLimit) -> Self {
-        match limit {
-            MemoryLimit::Tiles { tiles, write_buffer_bytes } => Self {
-                tiles,
-                bytes: usize::MAX,
-                buffer_bytes: write_buffer_bytes,
-                scan_bytes: usize::MAX,
-                updates_bytes: usize::MAX,
-                least_scan_bytes: 0,
-                is_enforced: true,
-                spare_bytes: 0,
-                often_scans: OFTEN_SCANS,
-                compact_bytes: 0,
-                index_bytes: 0,
-                reader_bytes: 64 << 20,
-                view_bytes: usize::MAX,
-                flight_bytes: usize::MAX,
-            },
-            // Buffered updates are small beside their tiles; a larger buffer saves reads and writes.
-            MemoryLimit::Bytes(bytes) => Self::shares_of(bytes),
-            // For tests: the limit is below the least that works, so it is not enforced.
-            MemoryLimit::Tight(bytes) => {
-                let (is_enforced, least_scan_bytes, flight_bytes) = (false, 0, usize::MAX);
-                Self { least_scan_bytes, is_enforced, flight_bytes, ..Self::shares_of(bytes) }
-            }
+    fn of_tiles(tiles: usize, write_buffer_bytes: usize) -> Self {
+        Self {
+            tiles,
+            bytes: usize::MAX,
+            buffer_bytes: write_buffer_bytes,
+            scan_bytes: usize::MAX,
+            updates_bytes: usize::MAX,
+            least_scan_bytes: 0,
+            is_enforced: true,
+            spare_bytes: 0,
+            often_scans: OFTEN_SCANS,
+            compact_bytes: 0,
+            index_bytes: 0,
+            reader_bytes: 64 << 20,
+            view_bytes: usize::MAX,
+            flight_bytes: usize::MAX,
         }
     }
 
@@ -107,7 +104,8 @@ impl MemoryPlan {
         share - (share as u128 * taken as u128 / self.bytes.max(1) as u128) as usize
     }
 
-    fn shares_of(bytes: usize) -> Self {
+    /// Buffered updates are small beside their tiles; a larger buffer saves reads and writes.
+    fn of_bytes(bytes: usize) -> Self {
         Self {
             tiles: usize::MAX,
             bytes,
@@ -133,13 +131,13 @@ mod tests {
 
     #[test]
     fn the_index_takes_from_every_share_alike() {
-        let mut plan = MemoryPlan::new(MemoryLimit::Bytes(64 << 20));
+        let mut plan = MemoryPlan::of_bytes(64 << 20);
         assert_eq!((plan.buffer_bytes(), plan.compact_bytes()), (16 << 20, 24 << 20));
         plan.note_index(8 << 20);
         assert_eq!((plan.buffer_bytes(), plan.compact_bytes()), (14 << 20, 21 << 20));
         plan.note_index(usize::MAX);
         assert_eq!((plan.buffer_bytes(), plan.compact_bytes()), (0, 0));
-        let mut plan = MemoryPlan::new(MemoryLimit::Tiles { tiles: 3, write_buffer_bytes: 1000 });
+        let mut plan = MemoryPlan::of_tiles(3, 1000);
         plan.note_index(1 << 30);
         assert_eq!((plan.buffer_bytes(), plan.compact_bytes()), (1000, 0));
     }

@@ -39,12 +39,15 @@ pub fn map_anew(
     stop: &Stop,
     progress: impl FnMut(u64, u64),
 ) -> Result<MappedAnew> {
-    map.check_keeps_all()?;
     let retiling = Retiling::between(&map.config().grid, &config.grid);
     let rays = |own: &RayConfig| retiling.rays(own).map(|own| rays(&own));
     let of_map = RayConfig { region: map.config().rays.region, ..config.rays };
     let config = MapConfig { rays: rays(&of_map)?, ..config };
-    let count = count_scans(map, rays)?;
+    // What their rays cannot become is refused before anything is made.
+    let scans = map.kept_summary_with(|record| rays(&record.rays).map(drop))?;
+    scans.check_keeps_all()?;
+    let count = scans.scans().len() as u64;
+    drop(scans);
     let (disk, folder) = output.into().into_parts();
     let create =
         |unfinished: &Path| OutOfCoreTileMapper::create(MapPath::on(disk.clone(), unfinished), config);
@@ -52,16 +55,6 @@ pub fn map_anew(
     let mapped = map_scans(map, made.writer(), rays, stop, count, progress)?;
     made.finish()?;
     Ok(mapped)
-}
-
-/// Counts the scans. What their rays cannot become is refused here, before anything is made.
-fn count_scans(map: &MapReader, rays: impl Fn(&RayConfig) -> Result<RayConfig>) -> Result<u64> {
-    let (mut scans, mut count) = (map.kept_scans()?, 0);
-    while let Some(record) = scans.next_record()? {
-        rays(&record.rays)?;
-        count += 1;
-    }
-    Ok(count)
 }
 
 /// Maps all scans, and flushes.

@@ -7,6 +7,7 @@
 //! The map is afterwards as if it had been built from the scans as they are now, to the bit: a tile depends on the
 //! scans that touch it, and on nothing else.
 
+mod completion;
 mod filtered_scan;
 mod map_anew;
 mod new_poses;
@@ -16,6 +17,7 @@ mod remove_points;
 mod remove_scans;
 mod retiling;
 mod revision;
+mod rework;
 
 pub use map_anew::{MappedAnew, map_anew};
 pub use new_poses::NewPoses;
@@ -23,4 +25,4 @@ pub use remap::{Remap, Remapped, remap};
 pub use remap_beside::RemapBeside;
 pub use remove_points::{PointsRemoved, remove_points};
 pub use remove_scans::{ScanSelection, ScansRemoved, SnapshotFailure, remove_scans};
-pub use revision::{MappedAgain, Rework};
+pub use rework::{MappedAgain, Rework};

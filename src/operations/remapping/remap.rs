@@ -1,10 +1,9 @@
 use super::new_poses::NewPoses;
-use super::revision::{Fate, MappedAgain, Rework, has_pose, rework};
+use super::revision::{Change, Changes};
+use super::rework::{MappedAgain, Rework, rework};
 use crate::error::{Error, Result};
-use crate::mapper::{MapReader, pose_of_numbers};
+use crate::mapper::{KeptScanHead, KeptSummary};
 use crate::scan::Pose;
-use crate::store::{KeptFrame, KeptRecord, MapPath};
-use rustc_hash::FxHashMap;
 use serde::Serialize;
 
 /// How a map follows new poses.
@@ -53,6 +52,18 @@ pub struct Remapped {
 /// Gives the scans of a map new poses: what they touch under the old or the new ones is mapped again, from all scans
 /// that touch it. One commit; the map is then as if it had been built with these poses, to the bit.
 ///
+/// ```no_run
+/// use voxtile::mapper::KeptSummary;
+/// use voxtile::operations::{NewPoses, Remap, remap};
+///
+/// # fn main() -> voxtile::Result<()> {
+/// # let poses = Vec::new();
+/// let scans = KeptSummary::read("maps/city")?;
+/// remap(&scans, &NewPoses::InOrder(poses), &Remap::default(), |_, _| ())?;
+/// # Ok(())
+/// # }
+/// ```
+///
 /// Work: the tiles touched, in the memory that `how` allows. `progress` is told the scans done and all.
 ///
 /// # Errors
@@ -62,35 +73,19 @@ pub struct Remapped {
 /// [`Error::Changed`] if one has flushed before the map was locked; a disk that refuses; a request to stop. The map is
 /// as it was then; the snapshot that keeps it may have been made.
 pub fn remap(
-    map: impl Into<MapPath>,
+    scans: &KeptSummary,
     poses: &NewPoses,
     how: &Remap,
     progress: impl FnMut(u64, u64),
 ) -> Result<Remapped> {
-    let (disk, folder) = map.into().into_parts();
-    let path = || MapPath::on(disk.clone(), &folder);
-    let reader = MapReader::open(path(), 1)?;
-    let (mut remapped, moves) = Remapped::by_poses(&reader, poses, how)?;
-    let seen = reader.flush_number();
-    drop(reader);
-    let fate = |record: &KeptRecord| fate_by(&moves, record);
-    remapped.mapped = rework(path(), seen, &how.rework, fate, progress)?;
+    let (mut remapped, changes) = Remapped::by_poses(scans, poses, how)?;
+    remapped.mapped = rework(scans, changes, &how.rework, progress)?;
     Ok(remapped)
-}
-
-/// New poses of scans that move, by their numbers.
-pub(super) type Moves = FxHashMap<u64, Pose>;
-
-pub(super) fn fate_by(moves: &Moves, record: &KeptRecord) -> Fate {
-    match moves.get(&record.number) {
-        Some(pose) => Fate::Moves(Box::new(*pose)),
-        None => Fate::Stays,
-    }
 }
 
 impl Remapped {
     /// Which scans of the map get a new pose, and how far they move.
-    pub(super) fn by_poses(reader: &MapReader, poses: &NewPoses, how: &Remap) -> Result<(Self, Moves)> {
+    pub(super) fn by_poses(scans: &KeptSummary, poses: &NewPoses, how: &Remap) -> Result<(Self, Changes)> {
         if let Some((moved_m, turned)) = how.tolerance
             && !(moved_m >= 0.0 && turned >= 0.0)
         {
@@ -99,32 +94,29 @@ impl Remapped {
                 "two lengths that are not negative: metres and an angle",
             ));
         }
-        let (mut remapped, mut moves) = (Self::default(), Moves::default());
-        reader.check_keeps_all()?;
-        let poses = poses.by_number(reader.kept_records()?)?;
-        let mut records = reader.kept_records()?;
-        while let Some(record) = records.next_kept()? {
-            if let Some(pose) = poses.get(&record.number)
-                && remapped.moves(&record, pose, how.tolerance)?
+        let (mut remapped, mut changes) = (Self::default(), Changes::default());
+        scans.check_keeps_all()?;
+        let poses = poses.by_number(scans)?;
+        for scan in scans.scans() {
+            if let Some(pose) = poses.get(&scan.number)
+                && remapped.moves(scan, pose, how.tolerance)?
             {
-                moves.insert(record.number, *pose);
+                changes.insert(scan.number, Change::Move(*pose));
             }
         }
-        Ok((remapped, moves))
+        Ok((remapped, changes))
     }
 
     /// Whether a scan gets a new pose.
-    fn moves(&mut self, record: &KeptRecord, new: &Pose, tolerance: Option<(f64, f64)>) -> Result<bool> {
-        let KeptFrame::Sensor(numbers) = &record.frame else {
-            debug_assert!(!has_pose(record));
+    fn moves(&mut self, scan: &KeptScanHead, new: &Pose, tolerance: Option<(f64, f64)>) -> Result<bool> {
+        let Some(old) = scan.world_from_sensor else {
             let reason = format!(
                 "scan {} has its points in the world frame, so that no pose moves it; insert scans in the frame of \
                  their sensor",
-                record.number
+                scan.number
             );
             return Err(Error::argument("poses", reason));
         };
-        let old = pose_of_numbers(numbers);
         if old == *new {
             return Ok(false);
         }

@@ -1,11 +1,12 @@
 use super::new_poses::NewPoses;
-use super::remap::{Remap, Remapped, fate_by};
-use super::revision::{Fate, Revision, Touched, keep_as_it_is, tidied};
+use super::remap::{Remap, Remapped};
+use super::revision::{Revision, Touched};
+use super::rework::{keep_as_it_is, tidied};
 use crate::error::{Error, Result};
-use crate::mapper::{KeptScan, MapReader, Remapper, SideMapper, check_keeps_all};
+use crate::mapper::{KeptScan, KeptSummary, Remapper, SideMapper, no_kept_scan};
 use crate::persistence::give_way;
 use crate::space::TileSelection;
-use crate::store::{CatalogEntry, Disk, KeptRecord, MapPath, SideFolder, TileStore};
+use crate::store::{CatalogEntry, Disk, MapPath, SideFolder, TileStore};
 use rayon::ThreadPool;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -22,7 +23,7 @@ use std::sync::Arc;
 /// that there are, then from those that were flushed meanwhile, which keep their poses. In the end the map takes these
 /// tiles over. It is then, to the bit, what `remap` would have made of it with the same poses for the same scans.
 ///
-/// Memory: [`Rework::memory_bytes`](super::Rework::memory_bytes), beside what the mapper takes. Disk: the touched tiles
+/// Memory: [`Rework::memory`](super::Rework::memory), beside what the mapper takes. Disk: the touched tiles
 /// once more. Dropping it gives both back; the map is as it was.
 pub struct RemapBeside {
     disk: Arc<dyn Disk>,
@@ -30,7 +31,7 @@ pub struct RemapBeside {
     how: Remap,
     /// Where scans come from is mapped again in these, so that the mapper's threads go first.
     threads: ThreadPool,
-    revision: Revision<Fates>,
+    revision: Revision,
     touched: Touched,
     remapped: Remapped,
     /// `None` if no scan moves.
@@ -40,19 +41,18 @@ pub struct RemapBeside {
     entries: u64,
 }
 
-type Fates = Box<dyn Fn(&KeptRecord) -> Fate + Send + Sync>;
-
 /// Entries of scans that wait in memory to be written.
 const MAX_ENTRIES: u64 = 256;
 
 impl RemapBeside {
-    /// Finds out what the new poses of the scans of the last flush touch. Scans after that flush keep their poses.
+    /// Finds out what the new poses of some scans touch. Scans that were flushed since `scans` was read keep their
+    /// poses.
     ///
     /// # Errors
     ///
     /// As for [`remap`](super::remap()); a dry run, which is that function's; another remapping of the same map.
-    pub fn begin(map: impl Into<MapPath>, poses: &NewPoses, how: &Remap) -> Result<Self> {
-        let (disk, folder) = map.into().into_parts();
+    pub fn begin(scans: &KeptSummary, poses: &NewPoses, how: &Remap) -> Result<Self> {
+        let (disk, folder) = scans.place();
         if how.rework.is_dry_run {
             return Err(Error::argument(
                 "is_dry_run",
@@ -61,22 +61,19 @@ impl RemapBeside {
         }
         let threads = rayon::ThreadPoolBuilder::new().start_handler(|_| give_way()).build();
         let threads =
-            threads.map_err(|error| Error::io(&folder, "start threads for", std::io::Error::other(error)))?;
-        let reader = MapReader::open(MapPath::on(disk.clone(), &folder), 1)?;
-        let (remapped, moves) = Remapped::by_poses(&reader, poses, how)?;
-        drop(reader);
-        let fates: Fates = Box::new(move |record| fate_by(&moves, record));
-        let mut revision = Revision::new(disk.clone(), &how.rework, fates);
-        let store = TileStore::open_read_only(disk.clone(), &folder)?;
+            threads.map_err(|error| Error::io(folder, "start threads for", std::io::Error::other(error)))?;
+        let (remapped, changes) = Remapped::by_poses(scans, poses, how)?;
+        let mut revision = Revision::new(scans, &how.rework, changes);
+        let store = TileStore::open_read_only(disk.clone(), folder)?;
+        check_catalog(&store, scans.catalog())?;
         let touched = threads.install(|| revision.look(&store))?;
         let is_needed = revision.counts.scans_changed > 0;
         let begin = || SideMapper::begin(&store, touched.config.clone(), how.rework.stop.clone());
         let side = is_needed.then(begin).transpose()?;
-        let catalog = store.catalog_generation()?;
         // Counted again as they are gone over.
         (revision.counts.scans, revision.counts.updates) = (0, 0);
         drop(store);
-        let how = how.clone();
+        let (folder, how, catalog) = (folder.to_owned(), how.clone(), scans.catalog());
         Ok(Self { disk, folder, how, threads, revision, touched, remapped, side, catalog, entries: 0 })
     }
 
@@ -151,15 +148,12 @@ fn follow_scans(
     store: &TileStore,
     catalog: Option<u64>,
     entries: &mut u64,
-    revision: &mut Revision<Fates>,
+    revision: &mut Revision,
     touched: &Touched,
     side: &mut SideMapper,
     progress: &mut (dyn FnMut(u64) + Send),
 ) -> Result<u64> {
-    if store.catalog_generation()? != catalog {
-        return Err(Error::Changed { path: store.folder().to_owned() });
-    }
-    check_keeps_all(Some(store.kept_records()?), store.folder())?;
+    check_catalog(store, catalog)?;
     let mut records = store.kept_records()?;
     for _ in 0..*entries {
         records.next_entry()?;
@@ -178,7 +172,10 @@ fn follow_scans(
                 let record = revision.map_beside(store.layout(), *record, touched, map)?;
                 CatalogEntry::Kept(Box::new(record))
             }
-            other => other,
+            other => match no_kept_scan(&other) {
+                None => other,
+                Some(reason) => return Err(Error::argument(store.folder().display().to_string(), reason)),
+            },
         };
         side.note(entry);
         *entries += 1;
@@ -194,6 +191,14 @@ fn follow_scans(
         side.commit(last)?;
     }
     Ok(scans)
+}
+
+/// Scans add to the catalog that was read; what changes earlier entries makes another one.
+fn check_catalog(store: &TileStore, catalog: Option<u64>) -> Result<()> {
+    match store.catalog_generation()? == catalog {
+        true => Ok(()),
+        false => Err(Error::Changed { path: store.folder().to_owned() }),
+    }
 }
 
 impl std::fmt::Debug for RemapBeside {

@@ -1,12 +1,14 @@
+use super::completion::complete_earlier;
 use super::filtered_scan::FilteredScan;
-use super::revision::{Fate, MappedAgain, Rework, check_region, complete_earlier, rework};
-use crate::error::Result;
+use super::revision::{Change, Changes};
+use super::rework::{MappedAgain, Rework, rework};
+use crate::error::{Error, Result};
 use crate::mapper::MapReader;
 use crate::scan::ScanPoints;
 use crate::space::Aabb;
-use crate::store::{KeptRecord, MapPath};
-use rustc_hash::FxHashSet;
+use crate::store::MapPath;
 use serde::Serialize;
+use std::path::Path;
 
 /// What was removed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -35,29 +37,36 @@ pub fn remove_points(
 ) -> Result<PointsRemoved> {
     let (disk, folder) = map.into().into_parts();
     check_region(region, &folder)?;
-    let (mut changed, mut points_removed) = (FxHashSet::default(), 0);
-    let seen = {
-        let reader = MapReader::open(MapPath::on(disk.clone(), &folder), 1)?;
-        reader.check_keeps_all()?;
+    let (mut changes, mut points_removed) = (Changes::default(), 0);
+    let summary = {
+        let reader = MapReader::open(MapPath::on(disk.clone(), &folder), 0)?;
+        let summary = reader.kept_summary()?;
+        summary.check_keeps_all()?;
         for scan in reader.kept_scans()? {
             how.stop.check()?;
             let scan = scan?;
             let points = FilteredScan::new(&scan, *region, true)?.len() as u64;
             if points > 0 {
                 points_removed += points;
-                changed.insert(scan.number());
+                changes.insert(scan.number(), Change::Filter(*region));
             }
         }
-        reader.flush_number()
+        summary
     };
-    let fate = |record: &KeptRecord| match changed.contains(&record.number) {
-        true => Fate::Loses(*region),
-        false => Fate::Stays,
-    };
-    let mapped = rework(MapPath::on(disk.clone(), &folder), seen, how, fate, progress)?;
+    let mapped = rework(&summary, changes, how, progress)?;
     if mapped.scans_changed == 0 && !how.is_dry_run {
         // An earlier call may have been killed after its commit.
         complete_earlier(disk, &folder)?;
     }
     Ok(PointsRemoved { mapped, points_removed })
+}
+
+/// A box as an argument.
+fn check_region(region: &Aabb, map: &Path) -> Result<()> {
+    let is_box = (0..3).all(|axis| region.min[axis] < region.max[axis]);
+    if is_box {
+        return Ok(());
+    }
+    let reason = format!("of {}: not a box; the lower corner comes first", map.display());
+    Err(Error::argument("region", reason))
 }

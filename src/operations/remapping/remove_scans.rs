@@ -1,8 +1,10 @@
-use super::revision::{Fate, MappedAgain, Rework, complete_earlier, rework};
+use super::completion::complete_earlier;
+use super::revision::{Change, Changes};
+use super::rework::{MappedAgain, Rework, rework};
 use crate::error::{Error, Result};
-use crate::mapper::{MapReader, MapView};
+use crate::mapper::{KeptScanHead, KeptSummary, MapReader, MapView};
 use crate::operations::snapshot::delete_snapshot;
-use crate::store::{CatalogEntry, InputRecord, KeptRecord, MapPath, SnapshotName, TileStore};
+use crate::store::{InputRecord, MapPath, SnapshotName, TileStore};
 use serde::Serialize;
 
 /// Scans of a map.
@@ -90,7 +92,7 @@ pub fn remove_scans(
         None => {}
     }
     if removed.scans_removed == 0 && !is_repeated && !removed.has_found_snapshots() {
-        return Err(none_selected(scans, &MapReader::open(path(), 1)?));
+        return Err(none_selected(scans, &MapReader::open(path(), 0)?));
     }
     Ok(removed)
 }
@@ -104,35 +106,32 @@ fn remove_from_map(
     how: &Rework,
     progress: impl FnMut(u64, u64),
 ) -> Result<(ScansRemoved, bool)> {
-    let (selection, scans_removed, seen) = {
-        let reader = MapReader::open(path(), 1)?;
-        let selection = Selection::of(scans, &reader);
-        let (scans_removed, were_removed) = selection.count(&reader)?;
-        if scans_removed == 0 {
-            if !from_snapshots && !were_removed {
-                reader.check_keeps_all()?;
-            }
-            let refusal = none_selected(scans, &reader);
-            // A reader would have the tables kept that the removal replaced.
-            drop(reader);
-            let (disk, folder) = path().into_parts();
-            let files_removed = if how.is_dry_run { 0 } else { complete_earlier(disk, &folder)? };
-            let is_repeated = match &selection {
-                Selection::Numbers(_) => were_removed,
-                // The catalog has no times of removed scans.
-                Selection::Time(..) => files_removed > 0,
-            };
-            return match from_snapshots || is_repeated {
-                true => Ok((ScansRemoved { files_removed, ..ScansRemoved::default() }, is_repeated)),
-                false => Err(refusal),
-            };
-        }
-        reader.check_keeps_all()?;
-        (selection, scans_removed, reader.flush_number())
+    let reader = MapReader::open(path(), 0)?;
+    let (summary, selection) = (reader.kept_summary()?, Selection::of(scans, &reader));
+    let changes = selection.removals(&summary);
+    let refusal = none_selected(scans, &reader);
+    // A reader would have the tables kept that the removal replaces.
+    drop(reader);
+    let was_removed = selection.has_removed(&summary);
+    if !changes.is_empty() || !from_snapshots && !was_removed {
+        summary.check_keeps_all()?;
+    }
+    if !changes.is_empty() {
+        let scans_removed = changes.len() as u64;
+        let mapped = rework(&summary, changes, how, progress)?;
+        return Ok((ScansRemoved { mapped, scans_removed, ..ScansRemoved::default() }, false));
+    }
+    let (disk, folder) = path().into_parts();
+    let files_removed = if how.is_dry_run { 0 } else { complete_earlier(disk, &folder)? };
+    let is_repeated = match &selection {
+        Selection::Numbers(_) => was_removed,
+        // The catalog has no times of removed scans.
+        Selection::Time(..) => files_removed > 0,
     };
-    let fate = |record: &KeptRecord| if selection.has(record) { Fate::Goes } else { Fate::Stays };
-    let mapped = rework(path(), seen, how, fate, progress)?;
-    Ok((ScansRemoved { mapped, scans_removed, ..ScansRemoved::default() }, false))
+    match from_snapshots || is_repeated {
+        true => Ok((ScansRemoved { files_removed, ..ScansRemoved::default() }, is_repeated)),
+        false => Err(refusal),
+    }
 }
 
 impl ScansRemoved {
@@ -178,37 +177,28 @@ impl Selection {
         }
     }
 
-    fn has(&self, record: &KeptRecord) -> bool {
+    fn has(&self, scan: &KeptScanHead) -> bool {
         match self {
             Self::Numbers(ranges) => {
-                ranges.iter().any(|&(first, last)| (first..=last).contains(&record.number))
+                ranges.iter().any(|&(first, last)| (first..=last).contains(&scan.number))
             }
-            Self::Time(first, last) => record.stamp_ns.is_some_and(|stamp| (*first..=*last).contains(&stamp)),
+            Self::Time(first, last) => scan.stamp_ns.is_some_and(|stamp| (*first..=*last).contains(&stamp)),
         }
     }
 
-    /// How many of the scans that are kept it has, and whether it has numbers of scans that were removed.
-    fn count(&self, reader: &MapReader) -> Result<(u64, bool)> {
-        if !reader.keeps_scans() {
-            return Ok((0, false));
-        }
-        let (mut records, mut count, mut were_removed) = (reader.kept_records()?, 0, false);
-        while let Some(entry) = records.next_entry()? {
-            match entry {
-                CatalogEntry::Kept(record) => count += u64::from(self.has(&record)),
-                CatalogEntry::Removed(first, last) => were_removed |= self.has_any_number(first, last),
-                _ => {}
-            }
-        }
-        Ok((count, were_removed))
+    /// The removal of each scan that is kept and selected.
+    fn removals(&self, scans: &KeptSummary) -> Changes {
+        let selected = scans.scans().iter().filter(|scan| self.has(scan));
+        selected.map(|scan| (scan.number, Change::Remove)).collect()
     }
 
-    /// Whether it has one of these numbers; of times nothing tells.
-    fn has_any_number(&self, first: u64, last: u64) -> bool {
-        match self {
-            Self::Numbers(ranges) => ranges.iter().any(|&(from, to)| from <= last && first <= to),
-            Self::Time(..) => false,
-        }
+    /// Whether it has numbers of scans that were removed before; of times nothing tells.
+    fn has_removed(&self, scans: &KeptSummary) -> bool {
+        let Self::Numbers(ranges) = self else { return false };
+        scans
+            .removed()
+            .iter()
+            .any(|&(first, last)| ranges.iter().any(|&(from, to)| from <= last && first <= to))
     }
 }
 
@@ -242,8 +232,9 @@ fn none_selected(scans: &ScanSelection, reader: &MapReader) -> Error {
 
 /// Whether a snapshot keeps any of these scans.
 fn holds_any(map: MapPath, name: &SnapshotName, scans: &ScanSelection) -> Result<bool> {
-    let past = MapReader::open_snapshot(map, name, 1)?;
-    Ok(Selection::of(scans, &past).count(&past)?.0 > 0)
+    let past = MapReader::open_snapshot(map, name, 0)?;
+    let selection = Selection::of(scans, &past);
+    Ok(past.kept_summary()?.scans().iter().any(|scan| selection.has(scan)))
 }
 
 /// The error of a snapshot that cannot be read, with what to do about it.

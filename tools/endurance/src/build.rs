@@ -120,7 +120,7 @@ impl Build {
         drop(mapper);
         if self.has_digest {
             // Not by way of the slow disk: this is no part of what is measured.
-            built.digest = MapReader::open(&self.folder, 1)?.digest()?.to_string();
+            built.digest = MapReader::open(&self.folder, 0)?.digest()?.to_string();
         }
         if !self.is_kept {
             remove_folder(&self.folder)?;

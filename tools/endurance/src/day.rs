@@ -112,7 +112,7 @@ impl Day {
         }
         mapper.flush()?;
         drop(mapper);
-        let scan_number = MapReader::open(&self.folder, 1)?.scan_number();
+        let scan_number = MapReader::open(&self.folder, 0)?.scan_number();
         remove_folder(&self.folder)?;
         Ok(DayFound { parts, peak_resident_bytes: process_memory::peak_bytes()?, scan_number })
     }

@@ -85,7 +85,7 @@ impl Export {
     }
 
     fn write(&self, path: &Path) -> Result<u64> {
-        let map = MapReader::open(&self.map, 1)?;
+        let map = MapReader::open(&self.map, 0)?;
         match self.format {
             ExportFormat::Ply => write_occupied(&map, path),
             ExportFormat::Bt => self.write_octree(&map, OctreeFormat::Bt, path),

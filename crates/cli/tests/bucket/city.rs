@@ -32,11 +32,11 @@ pub fn city(map: &Path, storage: Storage, keeps_scans: bool) -> OutOfCoreTileMap
 }
 
 pub fn digest(map: &Path) -> String {
-    MapReader::open(map, 4).unwrap().digest().unwrap().to_string()
+    MapReader::open(map, 1 << 20).unwrap().digest().unwrap().to_string()
 }
 
 pub fn open(bucket: &Bucket) -> voxtile::Result<MapReader> {
-    MapReader::open(BucketDisk::open(bucket.clone())?.into_map_path(), 4)
+    MapReader::open(BucketDisk::open(bucket.clone())?.into_map_path(), 1 << 20)
 }
 
 pub fn digest_there(bucket: &Bucket) -> voxtile::Result<String> {

@@ -28,7 +28,7 @@ fn what_is_pushed_is_read_there_and_pulled() {
         let pushed = push_now(&map, &bucket);
         assert_eq!((pushed.tiles, pushed.tiles_sent), (mapper.statistics().tiles, pushed.tiles));
         assert_eq!(digest_there(&bucket).unwrap(), digest(&map));
-        let (here, there) = (MapReader::open(&map, 4).unwrap(), open(&bucket).unwrap());
+        let (here, there) = (MapReader::open(&map, 1 << 20).unwrap(), open(&bucket).unwrap());
         assert_eq!(there.scans().unwrap().len(), here.scans().unwrap().len());
         for number in 0..12 {
             let point = [5.0 * f64::from(number) + 1.0, 0.1, 0.1];
@@ -316,7 +316,7 @@ fn snapshots_are_taken_along() {
     let there = BucketDisk::open(bucket.clone()).unwrap().into_map_path();
     assert_eq!(snapshots(there.clone()).unwrap().len(), 1);
     for place in [there, pulled.as_path().into()] {
-        let reader = MapReader::open_snapshot(place, &name, 4).unwrap();
+        let reader = MapReader::open_snapshot(place, &name, 1 << 20).unwrap();
         assert_eq!(reader.digest().unwrap().to_string(), before);
     }
     assert_eq!(digest_there(&bucket).unwrap(), digest(&map));
@@ -461,7 +461,7 @@ fn scans_that_only_a_snapshot_keeps_are_pushed() {
     pull(&bucket, &pulled, false, |_, _| {}).unwrap();
     assert_whole(&pulled);
     revert(&pulled, &keeping, None, |_, _| ()).unwrap();
-    let reader = MapReader::open(&pulled, 1).unwrap();
+    let reader = MapReader::open(&pulled, 0).unwrap();
     assert_eq!(reader.kept_scans().unwrap().filter(Result::is_ok).count(), 1);
 }
 

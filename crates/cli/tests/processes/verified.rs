@@ -11,7 +11,7 @@ use voxtile::integrity::{Finding, Severity, verify};
 
 /// The poses of a map's scans, moved, as lines of a file.
 fn poses(map: &Path, by_m: f64) -> String {
-    let scans = MapReader::open(map, 1).unwrap().scans().unwrap();
+    let scans = MapReader::open(map, 0).unwrap().scans().unwrap();
     let line = |[x, y, z]: [f64; 3]| format!("1 0 0 {} 0 1 0 {y} 0 0 1 {z}\n", x + by_m);
     scans.iter().map(|scan| line(scan.origin_m)).collect()
 }
