@@ -1,5 +1,6 @@
 use crate::error::Result;
-use crate::store::{Disk, KeptRecord, Layout, SegmentPlace, check_points};
+use crate::persistence::check_points;
+use crate::store::{Disk, KeptRecord, Layout, SegmentPlace};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Segment, offset and bytes of points.

@@ -44,12 +44,12 @@ fn needed_catalogs(store: &TileStore) -> Result<Vec<Vec<Needed>>> {
         Some(catalog) => named.entry(catalog.generation).or_default().push(Needed { as_of, by }),
         None => unnamed.push(vec![Needed { as_of, by }]),
     };
-    if store.keeps_scans() {
-        add(store.last_commit(), None);
+    if store.archive().is_on() {
+        add(store.archive().last_commit(), None);
     }
-    for name in store.snapshot_names().unwrap_or_default() {
+    for name in store.snapshots().names().unwrap_or_default() {
         // One that cannot be read is told by the look at the snapshots.
-        if let Ok(snapshot) = store.snapshot(&name)
+        if let Ok(snapshot) = store.snapshots().read(&name)
             && let Some(as_of) = kept_as_of(&snapshot)
         {
             add(as_of, Some(name));
@@ -127,7 +127,7 @@ impl Check<'_> {
 /// A disk that refuses more than single files.
 pub(super) fn find_idle(disk: &Arc<dyn Disk>, store: &TileStore) -> Result<Vec<PathBuf>> {
     let idle_in = |store: &TileStore| -> Result<Vec<PathBuf>> {
-        match store.idle_scan_files() {
+        match store.snapshots().idle_scan_files() {
             Err(Error::Damaged { .. }) => Ok(Vec::new()),
             Err(error) if Finding::is_of_file(&error) => Ok(Vec::new()),
             idle => Ok(idle?.unwrap_or_default()),

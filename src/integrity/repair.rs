@@ -327,10 +327,10 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
             let folder = self.layout.folder().to_owned();
             self.note(ActionKind::Removed, &folder, reason);
         }
-        for tile in store.orphans() {
+        for tile in store.tiles().orphans() {
             self.quarantine_tile(tile, "commits.log does not name this tile")?;
         }
-        let mut tiles: Vec<_> = store.tiles().collect();
+        let mut tiles: Vec<_> = store.tiles().iter().collect();
         tiles.sort_unstable();
         let mut lost = Vec::new();
         for (done, &tile) in (1..).zip(&tiles) {
@@ -403,7 +403,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         if !matches!(self.kind(&path)?, None | Some(EntryKind::File(_))) {
             self.quarantine(&path, "no file")?;
         }
-        let expected = store.version(tile).map(|version| version.octree);
+        let expected = store.tiles().version(tile).map(|version| version.octree);
         let written = store.write_next(tile, TileFile::Octree, |out| write_octree(config, &table, out))?;
         if Some(written) == expected {
             store.place_octree(tile)?;
@@ -422,7 +422,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
     /// Puts a kept table in place of a damaged one, where it is the very version that the log names: a revert leaves a
     /// tile with both. False if there is none.
     fn restore_table(&mut self, store: &mut TileStore, tile: TileIndex, why: &str) -> Result<bool> {
-        let Some(version) = store.version(tile) else { return Ok(false) };
+        let Some(version) = store.tiles().version(tile) else { return Ok(false) };
         // What cannot be listed or read is not there.
         for flush_number in store.kept_tables(tile).unwrap_or_default() {
             let (kept, current) =

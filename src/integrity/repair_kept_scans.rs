@@ -12,9 +12,9 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
     /// that the map can be mapped on. What neither the map nor a snapshot needs then goes to quarantine: the next
     /// writer would remove it.
     pub(super) fn repair_kept_scans(&mut self, store: &mut TileStore) -> Result<()> {
-        let (folder, as_of) = (self.layout.kept_scans(), store.last_commit());
+        let (folder, as_of) = (self.layout.kept_scans(), store.archive().last_commit());
         self.repair_folder_of_scans(&folder)?;
-        if !store.keeps_scans() {
+        if !store.archive().is_on() {
             return Ok(());
         }
         let found = whole_entries(self.disk, &self.layout, as_of, &mut self.points, |_| Ok(()))?;
@@ -22,11 +22,11 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
             return Ok(());
         }
         let reasons = Reasons::of(&found);
-        let replaced = store.catalog_path(as_of)?;
+        let replaced = store.archive().catalog_path(as_of)?;
         let is_kept = self.keep_catalog(replaced.as_deref(), &reasons)?;
-        store.begin_catalog()?;
+        store.archive_mut().begin_catalog()?;
         let (disk, layout, points) = (self.disk, &self.layout, &mut self.points);
-        let left = whole_entries(disk, layout, as_of, points, |entry| store.put_entry(entry))?;
+        let left = whole_entries(disk, layout, as_of, points, |entry| store.archive_mut().put(entry))?;
         // Where a snapshot cannot be read it may need any, and no writer removes any: they go with the snapshot.
         let snapshots = known_snapshots(store);
         if let Some(snapshots) = &snapshots {
@@ -98,7 +98,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
                 continue;
             }
             reasons.add(&found);
-            let old = store.catalog_path(as_of)?;
+            let old = store.archive().catalog_path(as_of)?;
             let is_old_kept = self.keep_catalog(old.as_deref(), &reasons)?;
             let scans_lost = self.write_other_catalog(store, snapshot, as_of)?;
             replaced.push(Replaced { at, old, is_old_kept, scans_lost });
@@ -116,7 +116,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         self.quarantine_unneeded(store, snapshots, &reasons, |path| {
             replaced.iter().any(|replaced| replaced.is_old_kept && replaced.old.as_deref() == Some(path))
         })?;
-        store.release_unseen()
+        store.snapshot_writer().release_unseen()
     }
 
     /// Moves files of kept scans that neither the map nor these snapshots need to quarantine, except some.
@@ -145,7 +145,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
     ) -> Result<u64> {
         let mut scans_lost = 0;
         let (disk, layout, points) = (self.disk, &self.layout, &mut self.points);
-        let catalog = store.write_other_catalog(|put| {
+        let catalog = store.snapshot_writer().write_catalog(|put| {
             scans_lost = whole_entries(disk, layout, as_of, points, put)?.scans_lost;
             Ok(())
         })?;
@@ -153,8 +153,13 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         Ok(scans_lost)
     }
 
-    fn name_other_catalog(&mut self, store: &TileStore, snapshot: &Snapshot, scans_lost: u64) -> Result<()> {
-        store.replace_snapshot(snapshot)?;
+    fn name_other_catalog(
+        &mut self,
+        store: &mut TileStore,
+        snapshot: &Snapshot,
+        scans_lost: u64,
+    ) -> Result<()> {
+        store.snapshot_writer().replace(snapshot)?;
         self.counts.snapshot_scans_lost += scans_lost;
         let reason = match scans_lost {
             0 => "a record that is damaged is no longer in the catalog of its kept scans".to_owned(),
@@ -238,5 +243,5 @@ impl Reasons {
 
 /// The snapshots of a map; `None` if one cannot be read.
 fn known_snapshots(store: &TileStore) -> Option<Vec<Snapshot>> {
-    store.snapshot_names().ok()?.iter().map(|name| store.snapshot(name).ok()).collect()
+    store.snapshots().names().ok()?.iter().map(|name| store.snapshots().read(name).ok()).collect()
 }

@@ -22,8 +22,8 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         }
         self.put_names_right(store)?;
         let (mut snapshots, mut gone) = (Vec::new(), Vec::new());
-        for name in store.snapshot_names()? {
-            match store.snapshot(&name) {
+        for name in store.snapshots().names()? {
+            match store.snapshots().read(&name) {
                 Ok(snapshot) => snapshots.push(snapshot),
                 Err(error) => {
                     let (finding, path) = (Finding::of(error)?, self.layout.snapshot(&name));
@@ -44,20 +44,20 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         if !gone.is_empty() {
             self.counts.snapshots_lost += gone.len() as u64;
             self.quarantine_unseen(store, &snapshots)?;
-            store.give_up_snapshots(&gone)?;
+            store.snapshot_writer().give_up(&gone)?;
         }
         self.repair_scans_of_snapshots(store, &mut snapshots)
     }
 
     /// Puts snapshots that the log names and that lie under other names back under their own.
-    fn put_names_right(&mut self, store: &TileStore) -> Result<()> {
-        let (Some(map_id), Some(listed)) = (store.map_id(), store.snapshot_list().cloned()) else {
+    fn put_names_right(&mut self, store: &mut TileStore) -> Result<()> {
+        let (Some(map_id), Some(listed)) = (store.map_id(), store.snapshots().list().cloned()) else {
             return Ok(());
         };
         let mut found = BTreeMap::new();
         let mut misnamed = Vec::new();
         let is_wanted = |snapshot: &Snapshot| {
-            let own = snapshot.name_inside().filter(|own| store.snapshot(own).is_err())?;
+            let own = snapshot.name_inside().filter(|own| store.snapshots().read(own).is_err())?;
             (listed.flush_of(own) == Some(snapshot.commits.flush_number)).then(|| own.clone())
         };
         for name in Snapshot::list(self.disk, &self.layout)? {
@@ -88,7 +88,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
                 self.quarantine(&path, "it cannot be read; the snapshot is whole under another name")?;
             }
             misnamed.retain(|name| *name != own);
-            store.replace_snapshot(&Snapshot { name: own, ..snapshot })?;
+            store.snapshot_writer().replace(&Snapshot { name: own, ..snapshot })?;
             self.note(ActionKind::Renamed, &path, "the snapshot had another name");
         }
         // Copied already, and no snapshot.
@@ -100,7 +100,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
 
     fn repair_snapshot(
         &mut self,
-        store: &TileStore,
+        store: &mut TileStore,
         config: &MapConfig,
         snapshot: &mut Snapshot,
         whole: &mut WholeTables,
@@ -115,7 +115,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
             let Some(&flush_number) = kept.range(snapshot.commits.flush_number..).next() else { continue };
             self.quarantine_if_damaged(store, config, *tile, flush_number)?;
         }
-        store.replace_snapshot(snapshot)?;
+        store.snapshot_writer().replace(snapshot)?;
         let reason = format!("{} tiles whose tables are missing or damaged", lost.len());
         self.note(ActionKind::Forgotten, &self.layout.snapshot(&snapshot.name), reason);
         self.counts.snapshot_tiles_lost += lost.len() as u64;
@@ -143,7 +143,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
 
     /// Kept tables that none of the snapshots sees: one that cannot be read may have.
     fn quarantine_unseen(&mut self, store: &TileStore, snapshots: &[Snapshot]) -> Result<()> {
-        let mut kept: Vec<_> = store.seen_by_snapshots().collect();
+        let mut kept: Vec<_> = store.snapshots().kept_tables().collect();
         kept.sort_unstable();
         for (tile, flush_number) in kept {
             let flushes = store.kept_tables(tile)?;

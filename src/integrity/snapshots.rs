@@ -29,7 +29,7 @@ pub(super) fn lost_tiles(
         let kept = past.kept_tables(tile)?.range(snapshot.commits.flush_number..).next().copied();
         let is_known = match kept {
             Some(flush_number) => whole.get(&(tile, flush_number)) == Some(&version),
-            None => store.version(tile) == Some(version),
+            None => store.tiles().version(tile) == Some(version),
         };
         if is_known {
             continue;

@@ -34,7 +34,7 @@ pub(super) fn check_tile(
         Err(error) => return Err(error),
     };
     let has_octree = store.layout().files().contains(&TileFile::Octree);
-    let octree = match store.version(tile).filter(|_| has_octree) {
+    let octree = match store.tiles().version(tile).filter(|_| has_octree) {
         Some(version) => Some(check_octree(disk, store, tile, version)?),
         None => None,
     };

@@ -192,7 +192,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
             }
         };
         self.layout = store.layout().clone();
-        self.listed = store.snapshot_list().cloned();
+        self.listed = store.snapshots().list().cloned();
         Ok(Some(store))
     }
 
@@ -272,7 +272,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         if self.scope.has_rest() {
             self.verify_list(store)?;
         }
-        let mut tiles: Vec<_> = store.tiles().collect();
+        let mut tiles: Vec<_> = store.tiles().iter().collect();
         tiles.sort_unstable();
         let chosen: Vec<_> = tiles.iter().copied().filter(|&tile| self.scope.has_tile(tile)).collect();
         self.counts.tiles = chosen.len() as u64;
@@ -292,11 +292,11 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         if !self.scope.has_rest() {
             return Ok(());
         }
-        self.listed = store.snapshot_list().cloned();
+        self.listed = store.snapshots().list().cloned();
         for path in find_idle(&self.disk, store)? {
             self.leftover(&path, None, IDLE_SCANS);
         }
-        self.look_around(store, |tile| store.contains(tile))
+        self.look_around(store, |tile| store.tiles().contains(tile))
     }
 
     /// Looks again at what seemed damaged, until each is damaged or whole as of one flush.
@@ -328,7 +328,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
                 // Segments that were removed since may have others with their numbers.
                 self.points = WholePoints::default();
             }
-            self.listed = store.snapshot_list().cloned();
+            self.listed = store.snapshots().list().cloned();
             let Some(config) = self.config_of(&store)? else { return Ok(()) };
             self.verify_suspects(&store, &config, suspects)?;
         }
@@ -351,7 +351,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
             self.verify_list(store)?;
         }
         for (tile, is_counted) in tiles {
-            if store.version(tile).is_some() {
+            if store.tiles().version(tile).is_some() {
                 self.verify_tile(store, config, tile, is_counted)?;
             }
         }
@@ -363,7 +363,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         }
         for tile in folders {
             let folder = self.layout.tile_folder(tile);
-            self.look_into(store, &folder, tile, store.version(tile).is_some())?;
+            self.look_into(store, &folder, tile, store.tiles().version(tile).is_some())?;
         }
         Ok(())
     }
@@ -447,7 +447,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
     /// Looks at the snapshots, and at the tables that only they see.
     fn verify_snapshots(&mut self, store: &TileStore, config: &MapConfig) -> Result<()> {
         self.counts.snapshots = 0;
-        let names = match store.snapshot_names() {
+        let names = match store.snapshots().names() {
             Err(error) => {
                 let finding = Finding::of(error)?;
                 self.report_if_seen_twice(finding, Suspect::Snapshots);
@@ -457,7 +457,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         };
         for name in names {
             self.counts.snapshots += 1;
-            let snapshot = store.snapshot(&name);
+            let snapshot = store.snapshots().read(&name);
             let lost = snapshot.and_then(|snapshot| lost_tiles(store, config, &snapshot, &mut self.whole));
             let errors = match lost {
                 // Deleted meanwhile.

@@ -1,8 +1,9 @@
 use crate::config::RayConfig;
 use crate::error::Result;
+use crate::persistence::PointReader;
 use crate::scan::{Pose, ScanPoints, TakePoints};
 use crate::space::Point;
-use crate::store::{Disk, KeptFrame, KeptRecord, Layout, SegmentScan};
+use crate::store::{Disk, KeptFrame, KeptRecord, Layout};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use std::ops::Range;
 use std::sync::Arc;
@@ -125,7 +126,7 @@ impl ScanPoints for KeptScan {
                 return Ok(());
             }
         };
-        let mut input = SegmentScan::open(&**disk, layout, self.record.place)?;
+        let mut input = PointReader::open(&**disk, layout, self.record.place)?;
         let (mut points, mut intensities, mut first) = (Vec::new(), Vec::new(), 0);
         while first < range.end && input.next(&mut points, &mut intensities)? {
             input.check_intensities(points.len(), intensities.len(), has_intensities)?;

@@ -69,7 +69,7 @@ impl KeptSummary {
             summary.refusal = Some(NOT_KEPT.to_owned());
             return Ok(summary);
         }
-        summary.catalog = map.store().catalog_generation()?;
+        summary.catalog = map.store().archive().generation()?;
         let mut records = map.kept_records()?;
         while let Some(entry) = map.explained(records.next_entry())? {
             match &entry {

@@ -142,7 +142,7 @@ impl MapReader {
     fn of_store(store: TileStore, disk: Arc<dyn Disk>, memory: MemoryLimit) -> Result<Self> {
         let config = config_of_store(&store, memory)?;
         let octrees = OctreeFactory::default();
-        let space = store.tiles().collect();
+        let space = store.tiles().iter().collect();
         Ok(Self { config, octrees, store, space, disk, order: OnceLock::new(), cache: Mutex::default() })
     }
 
@@ -175,11 +175,13 @@ impl MapReader {
         let cache = self.cache.get_mut().unwrap_or_else(PoisonError::into_inner);
         let tiles: Vec<_> = cache.tiles.iter().map(|(index, _)| *index).collect();
         for index in tiles {
-            if store.version(index).is_none() || store.version(index) != self.store.version(index) {
+            if store.tiles().version(index).is_none()
+                || store.tiles().version(index) != self.store.tiles().version(index)
+            {
                 cache.remove(index);
             }
         }
-        self.space = store.tiles().collect();
+        self.space = store.tiles().iter().collect();
         (self.store, self.config, self.disk, self.order) = (store, config, disk, OnceLock::new());
         Ok(is_newer)
     }
@@ -226,7 +228,7 @@ impl MapReader {
 
     /// What is known of a tile without reading it.
     pub(crate) fn version(&self, index: TileIndex) -> Option<TileVersion> {
-        self.store.version(index)
+        self.store.tiles().version(index)
     }
 
     /// Number of the flush that this reader sees.
@@ -270,7 +272,7 @@ impl MapReader {
 
     /// Whether the map keeps its scans.
     pub fn keeps_scans(&self) -> bool {
-        self.store.keeps_scans()
+        self.store.archive().is_on()
     }
 
     /// The scans that the map keeps, in order.
@@ -304,7 +306,7 @@ impl MapReader {
     }
 
     pub(super) fn kept_records(&self) -> Result<KeptRecords> {
-        self.explained(self.store.kept_records())
+        self.explained(self.store.archive().records())
     }
 
     /// Bytes on disk in tables and in octrees, of which a snapshot has none; `None` for a map of the original format.
@@ -394,7 +396,7 @@ impl MapView for MapReader {
     }
 
     fn tile_indices(&self) -> Vec<TileIndex> {
-        let mut indices: Vec<_> = self.store.tiles().collect();
+        let mut indices: Vec<_> = self.store.tiles().iter().collect();
         indices.sort_unstable();
         indices
     }
@@ -408,7 +410,7 @@ impl MapView for MapReader {
     }
 
     fn has_tile(&self, index: TileIndex) -> bool {
-        self.store.contains(index)
+        self.store.tiles().contains(index)
     }
 
     fn cached_tile_indices(&self) -> Vec<TileIndex> {
@@ -475,11 +477,11 @@ impl MapView for MapReader {
     }
 
     fn voxels_of_tile_hint(&self, index: TileIndex) -> Option<u64> {
-        self.store.version(index).map(|version| version.voxels)
+        self.store.tiles().version(index).map(|version| version.voxels)
     }
 
     fn version_of_tile(&self, index: TileIndex) -> Option<TileVersion> {
-        self.store.version(index)
+        self.store.tiles().version(index)
     }
 
     fn statistics(&self) -> MapStatistics {
@@ -487,7 +489,7 @@ impl MapView for MapReader {
         let disk_bytes = self.disk_bytes().map_or(0, |(table, octree)| table + octree);
         let mut statistics = MapStatistics {
             scan_number: self.scan_number(),
-            tiles: self.store.tiles().count() as u64,
+            tiles: self.store.tiles().iter().count() as u64,
             cached_tiles: cache.tiles.len() as u64,
             disk_bytes,
             io: cache.io,

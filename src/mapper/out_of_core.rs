@@ -92,9 +92,9 @@ impl OutOfCoreTileMapper {
     fn new(mut config: MapConfig, mut store: TileStore) -> Self {
         // A map of the original format gets what this needs with its first change.
         if config.keeps_scans {
-            store.keep_scans();
+            store.archive_mut().begin();
         }
-        config.keeps_scans = store.keeps_scans();
+        config.keeps_scans = store.archive().is_on();
         let scan_bytes = MemoryPlan::of(&config).scan_bytes;
         let tiles = PagedTiles::new(config.clone(), store);
         let tracer = ScanTracer::with_memory_bytes(scan_bytes);

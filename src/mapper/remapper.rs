@@ -23,7 +23,7 @@ impl Remapper {
         stop: Stop,
     ) -> Result<Self> {
         let scan_number = store.commits().scan_number;
-        store.begin_catalog()?;
+        store.archive_mut().begin_catalog()?;
         let mut mapper = OutOfCoreTileMapper::without_tiles(store, config, tiles)?;
         mapper.stop_with(stop);
         Ok(Self { mapper, scan_number })
@@ -42,12 +42,12 @@ impl Remapper {
 
     /// Adds an entry to the new catalog; every scan of the map has its own.
     pub(crate) fn put(&mut self, entry: &CatalogEntry) -> Result<()> {
-        self.mapper.with_store(|store| store.put_entry(entry))
+        self.mapper.with_store(|store| store.archive_mut().put(entry))
     }
 
     /// Copies the points of a scan to where nothing lies that is to go.
     pub(crate) fn copy_points(&mut self, place: SegmentPlace) -> Result<SegmentPlace> {
-        self.mapper.with_store(|store| store.copy_kept_points(place))
+        self.mapper.with_store(|store| store.archive_mut().copy(place))
     }
 
     /// Writes points in place of those that a scan has.
@@ -59,9 +59,9 @@ impl Remapper {
     pub(crate) fn take_over(&mut self, side: &mut SideMapper) -> Result<()> {
         self.mapper.with_store(|store| {
             side.with_store(|side| {
-                let mut records = side.kept_records()?;
+                let mut records = side.archive().records()?;
                 while let Some(entry) = records.next_entry()? {
-                    store.put_entry(&entry)?;
+                    store.archive_mut().put(&entry)?;
                 }
                 // What a commit may leave to the next opening is not left here: the files need their names.
                 side.checkpoint()?;

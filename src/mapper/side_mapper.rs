@@ -42,7 +42,7 @@ impl SideMapper {
 
     /// Notes the entry that a scan is to have; the number of each follows that of the one before.
     pub(crate) fn note(&mut self, entry: CatalogEntry) {
-        self.mapper.with_store(|store| store.note_entry(entry));
+        self.mapper.with_store(|store| store.archive_mut().note(entry));
     }
 
     /// Writes what was mapped and noted, up to the scan of this number.

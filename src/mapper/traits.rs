@@ -11,6 +11,10 @@ use crate::tile::{Tile, Voxel};
 /// few.
 ///
 /// Queries see whole scans, unsaved ones too.
+///
+/// Other crates may implement it, for maps that wrap another one: to stop it, to count what is asked, to choose between
+/// two. Tiles come from the map inside. A method with a default is answered by the others; pass it on where the map
+/// inside knows a faster answer.
 pub trait MapView: Sync {
     /// How the map is made.
     fn config(&self) -> &MapConfig;
@@ -30,7 +34,6 @@ pub trait MapView: Sync {
 
     /// A box of tiles around this one in which nothing was observed, where the map knows one. Its cost does not depend
     /// on the number of tiles.
-    #[doc(hidden)]
     fn empty_around(&self, index: TileIndex) -> Option<TileBox> {
         let _ = index;
         None
@@ -61,7 +64,6 @@ pub trait MapView: Sync {
     /// # Errors
     ///
     /// A tile that cannot be read.
-    #[doc(hidden)]
     fn voxels_from(&self, index: TileIndex, from: f64) -> Result<Vec<Voxel>> {
         let tile = self.tile_uncached(index)?;
         Ok(tile.map_or(Vec::new(), |tile| tile.voxels_from(from).collect()))
@@ -79,7 +81,6 @@ pub trait MapView: Sync {
 
     /// A tile, or an empty one if nothing was observed in it, where all tiles stay in memory: then looking one up is
     /// cheaper than grouping what is asked. `None` where tiles come and go.
-    #[doc(hidden)]
     #[inline]
     fn tile_at_hand(&self, index: TileIndex) -> Option<&Tile> {
         let _ = index;
@@ -91,7 +92,6 @@ pub trait MapView: Sync {
 
     /// The committed version of a tile, where the map knows it without reading the tile: maps on disk that are open to
     /// be read.
-    #[doc(hidden)]
     fn version_of_tile(&self, index: TileIndex) -> Option<TileVersion> {
         let _ = index;
         None

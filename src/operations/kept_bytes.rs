@@ -59,9 +59,9 @@ fn seen_by_snapshots(
     kept: &BTreeMap<TileIndex, BTreeSet<u64>>,
 ) -> Result<BTreeSet<(TileIndex, u64)>> {
     let mut seen = BTreeSet::new();
-    for name in store.snapshot_names()? {
-        let snapshot = store.snapshot(&name).ok();
-        let listed = store.snapshot_list().and_then(|listed| listed.flush_of(&name));
+    for name in store.snapshots().names()? {
+        let snapshot = store.snapshots().read(&name).ok();
+        let listed = store.snapshots().list().and_then(|listed| listed.flush_of(&name));
         let as_of_flush = snapshot.as_ref().map(|snapshot| snapshot.commits.flush_number).or(listed);
         for (&tile, flushes) in kept {
             match as_of_flush {

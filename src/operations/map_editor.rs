@@ -74,14 +74,14 @@ impl MapEditor {
 
     /// The map's tiles, in order.
     pub(super) fn tiles(&self) -> Vec<TileIndex> {
-        let mut tiles: Vec<_> = self.store.tiles().collect();
+        let mut tiles: Vec<_> = self.store.tiles().iter().collect();
         tiles.sort_unstable();
         tiles
     }
 
     /// What is known of a tile without reading it.
     pub(super) fn version(&self, tile: TileIndex) -> Option<TileVersion> {
-        self.store.version(tile)
+        self.store.tiles().version(tile)
     }
 
     /// The table of a tile; an empty one where there is none.
@@ -97,7 +97,7 @@ impl MapEditor {
         }
         self.begin_writing()?;
         let version = self.saver.write(&self.store.writer()?, tile, table, self.scan_number())?;
-        self.store.note_next(tile, version);
+        self.store.tiles_mut().note_next(tile, version);
         Ok(())
     }
 
@@ -110,7 +110,7 @@ impl MapEditor {
     /// Commits every change, and what `note` changes in the map's metadata. `what` names the change.
     pub(super) fn commit(&mut self, what: &str, note: impl FnOnce(&mut Extension)) -> Result<()> {
         self.begin_writing()?;
-        self.store.note_entry(CatalogEntry::Operation(what.to_owned()));
+        self.store.archive_mut().note(CatalogEntry::Operation(what.to_owned()));
         let mut metadata = self.store.metadata().clone();
         if let Some(ext) = &mut metadata.ext {
             note(ext);

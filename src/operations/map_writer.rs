@@ -136,7 +136,7 @@ impl MapWriter {
         }
         let store = self.map.store();
         let version = self.saver.write(&store.writer()?, tile, table, scan_number)?;
-        store.note_next(tile, version);
+        store.tiles_mut().note_next(tile, version);
         self.added(tile, version)
     }
 
@@ -146,7 +146,7 @@ impl MapWriter {
         self.check_order(tile)?;
         let store = self.map.store();
         let version = copy_tile(map.store(), &store.writer()?, tile, scan_number)?;
-        store.note_next(tile, version);
+        store.tiles_mut().note_next(tile, version);
         self.added(tile, version)
     }
 

@@ -1,12 +1,10 @@
 use crate::config::MapConfig;
 use crate::error::{Error, FormatError, Result};
-use crate::persistence::TileSaver;
-use crate::persistence::config_from;
 use crate::persistence::load::read_stored_table;
+use crate::persistence::{TileSaver, check_points, config_from};
 use crate::space::TileIndex;
 use crate::store::{
-    KeptRecord, MapPath, Metadata, SnapshotName, TileFile, TileStore, TileVersion, check_points,
-    check_segment,
+    KeptRecord, MapPath, Metadata, SnapshotName, TileFile, TileStore, TileVersion, check_segment,
 };
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -59,12 +57,12 @@ pub fn revert(
     let mut store = TileStore::open(disk.clone(), folder)?;
     let past = TileStore::open_snapshot(disk.clone(), folder, name)?;
     check_is_of_map(&store, &past)?;
-    if past.keeps_scans() {
+    if past.archive().is_on() {
         check_kept_scans(&store, &past)?;
     }
     if let Some(keep_as) = keep_as {
-        if store.snapshot_names()?.contains(keep_as) && store.is_as(&past)? {
-            let (scan_number, tiles) = (store.commits().scan_number, store.count_tiles() as u64);
+        if store.snapshots().names()?.contains(keep_as) && store.is_as(&past)? {
+            let (scan_number, tiles) = (store.commits().scan_number, store.tiles().count() as u64);
             let flush_number = store.commits().flush_number;
             let (scan_number_before, was_done) = (scan_number, true);
             let reverted = Reverted {
@@ -77,7 +75,7 @@ pub fn revert(
             };
             return Ok(reverted);
         }
-        store.create_snapshot(keep_as)?;
+        store.snapshot_writer().create(keep_as)?;
     }
     let outcome = revert_to(&mut store, &past, progress);
     if outcome.is_ok()
@@ -102,14 +100,14 @@ fn revert_to(
 ) -> Result<Reverted> {
     let mut reverted = Reverted { scan_number_before: store.commits().scan_number, ..Reverted::default() };
     let mut reverter = Reverter::new(store, past)?;
-    let mut tiles: Vec<_> = past.tiles().collect();
+    let mut tiles: Vec<_> = past.tiles().iter().collect();
     tiles.sort_unstable();
     for (done, &tile) in (1..).zip(&tiles) {
         reverted.tiles_restored += u64::from(reverter.restore(tile)?);
         progress(done, tiles.len() as u64);
     }
-    for tile in store.tiles().collect::<Vec<_>>() {
-        if past.version(tile).is_none() {
+    for tile in store.tiles().iter().collect::<Vec<_>>() {
+        if past.tiles().version(tile).is_none() {
             store.remove(tile)?;
             reverted.tiles_removed += 1;
         }
@@ -132,8 +130,8 @@ fn check_is_of_map(store: &TileStore, past: &TileStore) -> Result<()> {
         let path = past.opened_snapshot().map(|name| past.layout().snapshot(name)).unwrap_or_default();
         return Err(FormatError::at_offset(0, reason).in_map(&path, None));
     }
-    for tile in store.orphans() {
-        if past.version(tile).is_some() {
+    for tile in store.tiles().orphans() {
+        if past.tiles().version(tile).is_some() {
             let hint = "it is no part of the map as it is; `voxtile repair` moves it out of the way";
             return Err(Error::AlreadyExists { path: store.layout().tile_folder(tile), hint });
         }
@@ -145,10 +143,10 @@ fn check_is_of_map(store: &TileStore, past: &TileStore) -> Result<()> {
 /// whole after a revert as before it.
 fn check_kept_scans(store: &TileStore, past: &TileStore) -> Result<()> {
     let (disk, layout) = (&**past.disk(), past.layout());
-    let mut own = store.keeps_scans().then(|| store.kept_records().ok()).flatten();
+    let mut own = store.archive().is_on().then(|| store.archive().records().ok()).flatten();
     let mut next_own: Option<KeptRecord> = None;
     let mut ends = BTreeMap::new();
-    let mut records = past.kept_records()?;
+    let mut records = past.archive().records()?;
     while let Some(scan) = records.next_kept()? {
         while let Some(some) = &mut own
             && next_own.as_ref().is_none_or(|known| known.number < scan.number)
@@ -185,8 +183,11 @@ impl<'a> Reverter<'a> {
 
     /// Makes the snapshot's version of a tile the next one; false if it is the present one.
     fn restore(&mut self, tile: TileIndex) -> Result<bool> {
-        let Some(version) =
-            self.past.version(tile).filter(|_| self.past.version(tile) != self.store.version(tile))
+        let Some(version) = self
+            .past
+            .tiles()
+            .version(tile)
+            .filter(|_| self.past.tiles().version(tile) != self.store.tiles().version(tile))
         else {
             return Ok(false);
         };
@@ -196,12 +197,12 @@ impl<'a> Reverter<'a> {
         let read = read_stored_table(&self.config.grid, tile, stored)?;
         if self.has_octree_of(tile, &read.table, version)? {
             self.store.link_next(tile, &path)?;
-            self.store.note_next(tile, version);
+            self.store.tiles_mut().note_next(tile, version);
         } else {
             // The table names an octree that another version of the program derived: both are written anew.
             let scan_number = read.trailer.map_or(version.scan_number, |trailer| trailer.scan_number);
             let version = self.saver.write(&self.store.writer()?, tile, &read.table, scan_number)?;
-            self.store.note_next(tile, version);
+            self.store.tiles_mut().note_next(tile, version);
         }
         Ok(true)
     }

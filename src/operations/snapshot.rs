@@ -47,7 +47,7 @@ pub fn snapshot(folder: impl Into<MapPath>, name: &SnapshotName) -> Result<()> {
     let folder = &*folder;
     let mut store = TileStore::open(disk.clone(), folder)?;
     if store.metadata().ext.is_some() {
-        return store.create_snapshot(name);
+        return store.snapshot_writer().create(name);
     }
     drop(store);
     let config = MapReader::config_of(MapPath::on(disk.clone(), folder))?;
@@ -63,7 +63,7 @@ pub fn snapshot(folder: impl Into<MapPath>, name: &SnapshotName) -> Result<()> {
 pub fn delete_snapshot(folder: impl Into<MapPath>, name: &SnapshotName) -> Result<()> {
     let (disk, folder) = folder.into().into_parts();
     let folder = &*folder;
-    TileStore::open(disk, folder)?.delete_snapshot(name)
+    TileStore::open(disk, folder)?.snapshot_writer().delete(name)
 }
 
 /// The snapshots of a map, by flush and then by name, those that cannot be read first. Takes no lock; beside a writer
@@ -77,8 +77,8 @@ pub fn snapshots(folder: impl Into<MapPath>) -> Result<Vec<SnapshotInfo>> {
     let folder = &*folder;
     let store = TileStore::open_read_only(disk, folder)?;
     let (mut infos, mut owners) = (Vec::new(), Owners::default());
-    for name in store.snapshot_names()? {
-        match store.snapshot(&name) {
+    for name in store.snapshots().names()? {
+        match store.snapshots().read(&name) {
             Ok(snapshot) => {
                 owners.count(&store, infos.len(), &snapshot)?;
                 infos.push(SnapshotInfo::of(&snapshot));
@@ -108,7 +108,7 @@ pub fn snapshots(folder: impl Into<MapPath>) -> Result<Vec<SnapshotInfo>> {
 pub fn new_snapshot(folder: impl Into<MapPath>, name: &SnapshotName) -> Result<SnapshotInfo> {
     let (disk, folder) = folder.into().into_parts();
     let store = TileStore::open_read_only(disk, &folder)?;
-    Ok(SnapshotInfo::of(&store.snapshot(name)?))
+    Ok(SnapshotInfo::of(&store.snapshots().read(name)?))
 }
 
 /// Who sees each of the kept tables.
@@ -127,7 +127,7 @@ enum Owner {
 impl Owners {
     fn count(&mut self, store: &TileStore, number: usize, snapshot: &Snapshot) -> Result<()> {
         for (tile, version) in snapshot.commits.tiles.iter() {
-            if store.version(tile) == Some(version) {
+            if store.tiles().version(tile) == Some(version) {
                 continue; // It is the present one, under whatever names.
             }
             let kept = match self.kept.entry(tile) {

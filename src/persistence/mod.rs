@@ -7,6 +7,7 @@
 //! copy_tile     a tile of one map -> another map's store, its bytes but for the map's id
 //! compact_tile  a tile in the compact form, in memory; packer makes it
 //! io_threads    one saving and one loading thread, each a `Worker`
+//! point_reader  store -> the points of a kept scan
 //! priority      threads that give way to the mapper's
 //! upgrade       a map of the original format -> the same map with id, log and checksums
 //! parameters    MapConfig <-> metadata.json; map_id makes ids
@@ -20,6 +21,7 @@ mod map_id;
 pub(crate) mod one_voxel;
 mod packer;
 mod parameters;
+mod point_reader;
 mod priority;
 mod tile_saver;
 mod upgrade;
@@ -31,6 +33,7 @@ pub(crate) use io_threads::{IoThreads, Loaded, Saved};
 pub(crate) use map_id::new_map_id;
 pub(crate) use packer::Packer;
 pub(crate) use parameters::{config_from, new_metadata};
+pub(crate) use point_reader::{PointReader, check_points};
 pub(crate) use priority::give_way;
 pub(crate) use tile_saver::TileSaver;
 pub(crate) use upgrade::upgrade;

@@ -38,7 +38,7 @@ impl TileSaver {
         scan_number: u64,
     ) -> Result<TileVersion> {
         let version = self.write(&store.writer()?, tile.index(), tile.table(), scan_number)?;
-        store.note_next(tile.index(), version);
+        store.tiles_mut().note_next(tile.index(), version);
         Ok(version)
     }
 

@@ -19,17 +19,17 @@ pub(crate) fn upgrade(
     }
     log::info!("{}: a map of the original format; its tiles get checksums", store.folder().display());
     let map_id = store.upgrade(new_map_id())?;
-    for index in store.suspects() {
+    for index in store.tiles().suspects() {
         // What an earlier attempt wrote of it cannot be trusted: it is written again from the tile's own file.
-        store.drop_next(index);
+        store.tiles_mut().drop_next(index);
     }
-    for index in store.tiles().collect::<BTreeSet<_>>() {
-        if store.version(index).is_some() {
+    for index in store.tiles().iter().collect::<BTreeSet<_>>() {
+        if store.tiles().version(index).is_some() {
             continue; // Written by an earlier attempt.
         }
         if let Some(read) = load::load_table(store, &config.grid, index)? {
             let version = saver.write(&store.writer()?, index, &read.table, 0)?;
-            store.note_next(index, version);
+            store.tiles_mut().note_next(index, version);
         }
     }
     store.commit(metadata(map_id), 0)

@@ -6,7 +6,9 @@
 //! ```
 //!
 //! `trace` drives all of it. The updates do not depend on what a tile holds: they can be stored and applied later.
+//! `codec` has the points of a kept scan in few bytes.
 
+mod codec;
 mod coherence;
 mod coordinate;
 mod pages;
@@ -26,6 +28,9 @@ mod trace;
 mod updates;
 mod world_scan;
 
+#[doc(hidden)]
+pub use codec::PointBlocks;
+pub(crate) use codec::{MAX_BLOCK_BYTES, PointDecoder};
 pub use coordinate::Coordinate;
 pub use point_batch::PointBatch;
 pub(crate) use point_batch::updates_of_hits;

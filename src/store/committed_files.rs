@@ -45,18 +45,6 @@ pub struct FileVersion {
 }
 
 impl TileStore {
-    /// All snapshots of the map.
-    ///
-    /// # Errors
-    ///
-    /// As for [`Snapshot::read`].
-    pub fn read_snapshots(&self) -> Result<Vec<Snapshot>> {
-        if self.map_id().is_none() {
-            return Ok(Vec::new());
-        }
-        self.snapshot_names()?.iter().map(|name| self.snapshot(name)).collect()
-    }
-
     /// The files of the map that belong to no tile, `metadata.json` last: whoever finds it finds the others.
     ///
     /// # Errors
@@ -91,7 +79,7 @@ impl TileStore {
     /// [`Error::Changed`] if a writer was faster; a folder that cannot be listed.
     pub fn committed_files_of(&self, tile: TileIndex, snapshots: &[Snapshot]) -> Result<Vec<CommittedFile>> {
         let mut files = Vec::new();
-        let version = self.version(tile);
+        let version = self.tiles().version(tile);
         match version {
             Some(version) => {
                 let table = self.layout().current(tile, TileFile::Table);
@@ -104,7 +92,7 @@ impl TileStore {
                 }
             }
             // Of a map without a log.
-            None if self.contains(tile) => {
+            None if self.tiles().contains(tile) => {
                 for file in self.layout().files() {
                     let path = self.layout().current(tile, *file);
                     if let Some(EntryKind::File(_)) = self.disk().kind_at(&path)? {

@@ -2,10 +2,10 @@
 //!
 //! | module | content |
 //! |---|---|
-//! | `tile_store` | [`TileStore`]: opens maps and reads tiles; `commit/flush` and `snapshots/snapshot_store` extend it |
+//! | `tile_store` | [`TileStore`]: opens maps and reads tiles; `commit/flush` commits |
 //! | `tiles` | versions of tiles, locations, writers, spill files |
 //! | `commit` | the commit log, `metadata.json`, the steps after a commit |
-//! | `scans` | number, time and origin of each scan |
+//! | `scans` | number, time and origin of each scan; [`ScanArchive`]: the scans that a map keeps |
 //! | `snapshots` | snapshots, and replaced tables kept for them and for readers |
 //! | `recovery` | crash recovery, damaged logs, quarantine, unfinished maps |
 //! | `committed_files` | which files a copy of the map consists of |
@@ -55,23 +55,26 @@ pub use recovery::quarantine::Quarantine;
 pub use recovery::salvage::Salvage;
 pub use recovery::side_folder::SideFolder;
 pub use recovery::staged_map::{StagedMap, staging_folder};
-pub use scans::{CatalogEntry, CatalogVersion, KeptFrame, KeptRecord, ScanRecord, SegmentPlace};
+pub use scans::{CatalogEntry, CatalogVersion, KeptFrame, KeptRecord, ScanArchive, ScanRecord, SegmentPlace};
 pub(crate) use scans::{
-    KeptAsOf, KeptRecords, Salvaged, SegmentScan, catalog_generations, check_points, check_scans,
+    KeptAsOf, KeptRecords, MAX_BLOCK_BYTES, Salvaged, SegmentReader, catalog_generations, check_scans,
     check_segment, kept_as_of, read_scans, salvage_entries, whole_fronts,
 };
 pub use snapshots::snapshot_file::Snapshot;
 pub use snapshots::snapshot_list::SnapshotList;
 pub use snapshots::snapshot_name::SnapshotName;
+pub use snapshots::snapshot_writer::SnapshotWriter;
+pub use snapshots::snapshots_of_map::Snapshots;
 pub use tile_store::TileStore;
 pub use tile_store::hex;
 pub(crate) use tile_store::id_from_hex;
 pub use tiles::file_checksum::{Checksumming, FileChecksum};
-pub use tiles::spill_file::SpillFile;
+pub use tiles::spill_file::{SpillFile, SpillFiles};
 pub use tiles::tile_location::{StoredTile, TileLocation};
 pub use tiles::tile_reader::TileReader;
 pub(crate) use tiles::tile_version::MAX_NUMBER;
 pub use tiles::tile_version::TileVersion;
+pub use tiles::tile_versions::TileVersions;
 pub use tiles::tile_writer::TileWriter;
 pub use unsynced_disk::UnsyncedDisk;
 pub use writer_lock::WriterLock;

@@ -9,7 +9,7 @@ use super::map_files::MapFiles;
 use super::map_folder;
 use super::place;
 use super::recovery::recover::{recover, remove_deleted_snapshots, remove_uncommitted, settle_own_files};
-use super::scans::{ScanKeeper, ScanList};
+use super::scans::{KeptAsOf, ScanArchive, ScanList};
 use super::snapshots::kept_tables::KeptTables;
 use super::snapshots::seen_tables::seen_by;
 use super::snapshots::snapshot_name::SnapshotName;
@@ -30,7 +30,8 @@ use std::sync::{Arc, Mutex};
 /// A tile is written beside its committed version, as `*.next`. [`TileStore::commit`] makes all of them durable,
 /// appends one synced record to the log (that is the commit), and renames them over the committed versions.
 ///
-/// This file opens maps and reads tiles; `flush` writes and commits; `snapshot_store` keeps snapshots.
+/// This file opens maps and reads tiles; `flush` writes and commits. The kept scans are those of [`ScanArchive`], the
+/// snapshots those of [`Snapshots`](super::Snapshots).
 #[derive(Debug)]
 pub struct TileStore {
     pub(super) files: MapFiles,
@@ -43,7 +44,7 @@ pub struct TileStore {
     /// Which scans are in the map.
     pub(super) scans: ScanList,
     /// The scans that the map keeps.
-    pub(super) keeper: ScanKeeper,
+    pub(super) archive: ScanArchive,
     /// Replaced tables that readers and snapshots see; a writer's.
     pub(super) kept: KeptTables,
     /// How many files of an earlier writer opening has removed.
@@ -235,15 +236,15 @@ impl TileStore {
         commits: Commits,
     ) -> Self {
         let layout = layout.with_storage(metadata.storage());
-        let mut keeper = ScanKeeper::default();
-        keeper.set_on(metadata.ext.as_ref().is_some_and(|ext| ext.keeps_scans));
+        let files = MapFiles::new(disk, layout);
+        let keeps_scans = metadata.ext.as_ref().is_some_and(|ext| ext.keeps_scans);
         Self {
-            files: MapFiles::new(disk, layout),
+            archive: ScanArchive::new(files.clone(), keeps_scans, KeptAsOf::last_of(&commits)),
+            files,
             versions: TileVersions::new(commits),
             committer: Committer::new(log, metadata, None),
             checkpoint: Checkpoint::default(),
             scans: ScanList::default(),
-            keeper,
             kept: KeptTables::default(),
             leftovers_removed: 0,
             snapshots_removed: Vec::new(),
@@ -283,6 +284,26 @@ impl TileStore {
         self.versions.commits()
     }
 
+    /// Which tiles there are on disk.
+    pub fn tiles(&self) -> &TileVersions {
+        &self.versions
+    }
+
+    /// The same, to note what is written.
+    pub fn tiles_mut(&mut self) -> &mut TileVersions {
+        &mut self.versions
+    }
+
+    /// The scans that the map keeps.
+    pub fn archive(&self) -> &ScanArchive {
+        &self.archive
+    }
+
+    /// The same, to keep more.
+    pub fn archive_mut(&mut self) -> &mut ScanArchive {
+        &mut self.archive
+    }
+
     /// Whether `metadata.json` is older than the log: a crash came between the two.
     pub fn is_metadata_behind(&self) -> bool {
         self.committer.is_metadata_behind(self.commits().flush_number)
@@ -296,11 +317,6 @@ impl TileStore {
         Ok(self.files.kind(&self.layout().commit_log())?.is_some())
     }
 
-    /// The tile folders that the log does not name, in order.
-    pub fn orphans(&self) -> Vec<TileIndex> {
-        self.versions.orphans()
-    }
-
     /// How many files that an earlier writer left behind were removed when the store was opened.
     pub fn leftovers_removed(&self) -> u64 {
         self.leftovers_removed
@@ -311,26 +327,6 @@ impl TileStore {
         self.has_replaced_metadata
     }
 
-    /// Whether the tile has a version on disk, committed or not.
-    pub fn contains(&self, tile: TileIndex) -> bool {
-        self.versions.contains(tile)
-    }
-
-    /// The tiles that have a version on disk, in no particular order.
-    pub fn tiles(&self) -> impl Iterator<Item = TileIndex> {
-        self.versions.tiles()
-    }
-
-    /// How many tiles have a version on disk.
-    pub fn count_tiles(&self) -> usize {
-        self.versions.count()
-    }
-
-    /// What is known of the latest version of each tile, in no particular order.
-    pub fn versions(&self) -> impl Iterator<Item = TileVersion> {
-        self.versions.versions()
-    }
-
     /// Bytes of memory of what is known of the tiles without reading them: some thirty a tile, and as many more for one
     /// with a version that is not committed.
     pub fn index_bytes(&self) -> usize {
@@ -339,12 +335,7 @@ impl TileStore {
 
     /// Bytes of memory that the next commit takes beside the index.
     pub fn commit_bytes(&self) -> usize {
-        self.versions.commit_bytes() + self.scans.bytes() + self.keeper.bytes()
-    }
-
-    /// What is known of the latest version of a tile on disk without reading it.
-    pub fn version(&self, tile: TileIndex) -> Option<TileVersion> {
-        self.versions.version(tile)
+        self.versions.commit_bytes() + self.scans.bytes() + self.archive.bytes()
     }
 
     /// Opens the latest version of a tile's table; `None` if the tile has none.
@@ -362,7 +353,7 @@ impl TileStore {
     ///
     /// A folder that cannot be listed.
     pub fn table_location(&self, tile: TileIndex) -> Result<Option<TileLocation>> {
-        let Some(version) = self.version(tile) else { return Ok(None) };
+        let Some(version) = self.versions.version(tile) else { return Ok(None) };
         Ok(Some(self.location_at(tile, self.table_path(tile)?, Some(version))))
     }
 
@@ -426,7 +417,7 @@ impl TileStore {
             let reason = "commits.log does not name this tile";
             return Err(FormatError::at_offset(0, reason).in_map(&path, Some(tile)));
         }
-        let version = self.version(tile);
+        let version = self.versions.version(tile);
         if version.is_none() && !self.versions.is_foreign(tile) {
             return Ok(None);
         }
@@ -436,7 +427,7 @@ impl TileStore {
     /// Where the latest version of a tile's table is that is known to be there, for another thread to open it before
     /// the next commit.
     pub fn location(&self, tile: TileIndex) -> Option<TileLocation> {
-        let version = self.version(tile)?;
+        let version = self.versions.version(tile)?;
         Some(self.location_at(tile, self.latest_path(tile), Some(version)))
     }
 

@@ -50,7 +50,7 @@ fn a_deletion_that_is_killed_is_completed_by_the_same_call_which_succeeds() {
         for disk in [disk.after_kill(), disk.after_crash(Unsynced::Dropped), disk.after_crash(Unsynced::Kept)]
         {
             let store = TileStore::open_read_only(disk.shared(), map()).unwrap();
-            let is_listed = store.snapshot_names().unwrap().contains(&name);
+            let is_listed = store.snapshots().names().unwrap().contains(&name);
             drop(store);
             let before = looked_at(&disk);
             match delete_snapshot(at(&disk), &name) {

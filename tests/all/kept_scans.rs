@@ -7,6 +7,7 @@ use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
 use voxtile::integrity::{Repair, repair, verify};
 use voxtile::mapper::KeptScan;
 use voxtile::operations::{delete_snapshot, snapshot};
+use voxtile::scan::PointBlocks;
 use voxtile::scan::ScanPoints;
 use voxtile::store::{CatalogEntry, KeptFrame, KeptRecord, SegmentPlace, SnapshotName, TileStore};
 use voxtile::{
@@ -127,14 +128,17 @@ impl Writer {
     }
 
     fn write(&mut self, name: u64) -> Result<SegmentPlace> {
-        self.store.begin_kept_scan()?;
-        self.store.push_kept_points(&points(name), None)?;
-        self.store.end_kept_scan(false)
+        let archive = self.store.archive_mut();
+        archive.begin_scan()?;
+        let (mut blocks, put) = (PointBlocks::default(), &mut |block: &[u8]| archive.push_block(block));
+        blocks.push(&points(name), None, put)?;
+        blocks.end(false, put)?;
+        Ok(archive.end_scan())
     }
 
     fn note(&mut self, place: SegmentPlace) {
         self.scan_number += 1;
-        self.store.note_entry(CatalogEntry::Kept(Box::new(KeptRecord {
+        self.store.archive_mut().note(CatalogEntry::Kept(Box::new(KeptRecord {
             number: self.scan_number,
             stamp_ns: None,
             frame: KeptFrame::World([0.0; 3]),
@@ -179,7 +183,7 @@ fn a_scan_that_is_given_up_after_a_failed_sync_takes_no_other_along() {
         writer.note(first);
         writer.write(2).unwrap();
         failed += writer.commit_after(Fault::LosesSync(change));
-        writer.store.give_up_kept_scan();
+        writer.store.archive_mut().give_up_scan();
         let third = writer.write(3).unwrap();
         writer.note(third);
         writer.check(&[1, 3], &format!("change {change} fails"));

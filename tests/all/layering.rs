@@ -45,7 +45,7 @@ const LAYERS: [(&str, &[&str]); 19] = [
     ("tile", &["config", "error", "octree", "scan", "sensor", "space"]),
     ("store", &["config", "error", "scratch", "sensor", "space"]),
     // The one layer that knows both tiles and files.
-    ("persistence", &["config", "error", "sensor", "space", "store", "tile"]),
+    ("persistence", &["config", "error", "scan", "sensor", "space", "store", "tile"]),
     ("mapper", &["config", "error", "octree", "persistence", "scan", "sensor", "space", "store", "tile"]),
     ("query", &["config", "error", "mapper", "maths", "octree", "scan", "sensor", "space", "store", "tile"]),
     // Whole maps on disk, tile by tile.

@@ -376,7 +376,7 @@ fn a_copy_of_a_map_leaves_out_what_a_killed_removal_left() {
         let disk = disk.after_kill();
         if segments(&disk).1 == 2 {
             let store = TileStore::open_read_only(disk.shared(), map()).unwrap();
-            let files = store.committed_files(&store.read_snapshots().unwrap()).unwrap();
+            let files = store.committed_files(&store.snapshots().read_all().unwrap()).unwrap();
             let kept: Vec<_> =
                 files.iter().map(|file| &*file.path).filter(|path| path.starts_with("kept_scans/")).collect();
             left += u64::from(segments(&disk).0.contains("segment.1"));

@@ -202,7 +202,7 @@ fn act(disk: &FaultyDisk, act: &Act) -> Result<()> {
         }
         Act::Remove(every) => {
             let mut store = TileStore::open(disk.shared(), map())?;
-            for tile in store.tiles().filter(|tile| is_removed(*every, *tile)).collect::<Vec<_>>() {
+            for tile in store.tiles().iter().filter(|tile| is_removed(*every, *tile)).collect::<Vec<_>>() {
                 store.remove(tile)?;
             }
             store.commit(store.metadata().clone(), store.commits().scan_number)
@@ -361,12 +361,12 @@ fn a_removal_counts_from_the_commit_on() {
     let disk = FaultyDisk::new(Fault::None);
     act(&disk, &life.acts[0]).unwrap();
     let mut store = TileStore::open(disk.shared(), map()).unwrap();
-    let tiles: Vec<_> = store.tiles().collect();
+    let tiles: Vec<_> = store.tiles().iter().collect();
     for &tile in &tiles {
         store.remove(tile).unwrap();
-        assert!(!store.contains(tile) && store.open_table(tile).unwrap().is_none());
+        assert!(!store.tiles().contains(tile) && store.open_table(tile).unwrap().is_none());
     }
-    assert_eq!(store.tiles().count(), 0);
+    assert_eq!(store.tiles().iter().count(), 0);
     drop(store);
     assert_eq!(life.state_of(&disk, &[1], "not committed"), 1);
 }

@@ -92,7 +92,7 @@ fn live(seed: u64, storage: Storage) {
                     }
                     11 => {
                         let mut store = TileStore::open(disk.clone(), &map).unwrap();
-                        let gone = store.tiles().filter(|tile| tile.x % 2 == 0).collect::<Vec<_>>();
+                        let gone = store.tiles().iter().filter(|tile| tile.x % 2 == 0).collect::<Vec<_>>();
                         gone.iter().for_each(|tile| store.remove(*tile).unwrap());
                         store.commit(store.metadata().clone(), store.commits().scan_number).unwrap();
                         let tile_of = |voxel| config.grid.tile_of_voxel(voxel);

@@ -137,7 +137,7 @@ impl Earlier {
     fn place_of(&self, path: &str, file: &StoredFile) -> Option<PathBuf> {
         let place = self.store.folder().join(path);
         let (folder, name) = path.split_once('/')?;
-        let version = self.store.version(tile_of_folder(folder)?)?;
+        let version = self.store.tiles().version(tile_of_folder(folder)?)?;
         let of_tile = self
             .store
             .layout()

@@ -143,9 +143,9 @@ impl<'a> Push<'a> {
         let commits = store.commits();
         let map_id = store.map_id().map(|id| hex(&id));
         let mut manifest = Manifest::new(map_id, commits.flush_number, commits.scan_number);
-        manifest.tiles = store.count_tiles() as u64;
+        manifest.tiles = store.tiles().count() as u64;
         self.check_is_later(&manifest, &folder)?;
-        let snapshots = store.read_snapshots()?;
+        let snapshots = store.snapshots().read_all()?;
         let pages = pages_of(&store, &snapshots);
         let all = pages.values().map(|tiles| tiles.len() as u64).sum();
         let mut done = 0;
@@ -372,7 +372,7 @@ fn unless_changed(store: &TileStore, error: Error) -> Error {
 fn pages_of(store: &TileStore, snapshots: &[Snapshot]) -> BTreeMap<String, BTreeSet<TileIndex>> {
     let mut pages: BTreeMap<String, BTreeSet<TileIndex>> = BTreeMap::new();
     let of_snapshots = snapshots.iter().flat_map(|snapshot| snapshot.commits.tiles.tiles());
-    for tile in store.tiles().chain(of_snapshots) {
+    for tile in store.tiles().iter().chain(of_snapshots) {
         pages.entry(Manifest::page_of(tile)).or_default().insert(tile);
     }
     pages

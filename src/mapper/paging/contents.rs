@@ -1,15 +1,18 @@
-use super::flight::Flight;
+use super::flight::{Flight, FlightSize};
 use super::flusher::FlushedTile;
 use super::memory_plan::MemoryPlan;
-use super::tile_cache::{Cached, TileCache};
+use super::tile_cache::{Cached, Eviction, TileCache};
 use super::tile_disk::TileDisk;
 use super::tile_state::{Base, StoredTileState, TileState};
 use super::views::{ViewId, Views};
 use super::write_buffer::WriteBuffer;
 use crate::error::{Error, Result};
-use crate::persistence::Saved;
+use crate::mapper::statistics::{MapStatistics, MemoryCounts};
+use crate::persistence::{CompactTile, Saved};
 use crate::space::{TileBox, TileIndex, TileSpace};
-use crate::store::{InputRecord, TileVersion};
+use crate::store::{InputRecord, MAX_INPUTS, TileVersion};
+use crate::tile::Tile;
+use std::sync::Arc;
 
 /// What a map holds after some scan: its tiles in memory and what is buffered for the others.
 #[derive(Debug)]
@@ -40,6 +43,169 @@ pub(in crate::mapper) struct TileContents {
 impl TileContents {
     pub(super) fn plan(&self) -> &MemoryPlan {
         self.cache.plan()
+    }
+
+    // Tiles in memory, and updates that are buffered for others.
+
+    /// Whether something of a tile is in memory: the tile, or updates of it.
+    pub(super) fn holds(&self, index: TileIndex) -> bool {
+        self.cache.contains(index) || self.buffer.contains(index)
+    }
+
+    /// The tiles of which something is in memory, in no particular order, some of them twice.
+    pub(super) fn held_tiles(&self) -> impl Iterator<Item = TileIndex> {
+        self.cache.indices().chain(self.buffer.tiles())
+    }
+
+    /// Whether a tile has updates that are not on disk.
+    pub(super) fn is_dirty(&self, index: TileIndex) -> bool {
+        self.buffer.contains(index) || self.cache.is_dirty(index)
+    }
+
+    /// Whether a tile can be made resident: its spill file must not hold updates of a scan that is not accepted, which
+    /// come after those that are buffered.
+    pub(super) fn can_come_in(&self, index: TileIndex) -> bool {
+        !self.cache.is_resident(index) && !self.buffer.is_staged(index)
+    }
+
+    /// Whether updates are buffered for a tile that can be applied now.
+    pub(super) fn has_applicable(&self, index: TileIndex) -> bool {
+        self.buffer.contains(index) && !self.buffer.is_staged(index)
+    }
+
+    /// The tiles with most buffered updates, without which these take so many bytes.
+    pub(super) fn heaviest_beyond(&self, bytes: usize) -> Vec<TileIndex> {
+        match self.buffer.bytes().saturating_sub(bytes) {
+            0 => Vec::new(),
+            excess => self.buffer.heaviest(excess),
+        }
+    }
+
+    /// Puts in a tile with all its updates.
+    pub(super) fn put(&mut self, tile: Arc<Tile>, disk: &TileDisk) {
+        self.buffer.forget(tile.index(), disk);
+        self.leave_to_flush(std::iter::once(tile.index()));
+        self.cache.put(tile);
+    }
+
+    /// Drops a tile and its updates, whatever they are.
+    pub(super) fn discard(&mut self, index: TileIndex, disk: &TileDisk) {
+        self.keep_for_views(std::iter::once(index));
+        self.cache.discard(index);
+        self.buffer.forget(index, disk);
+    }
+
+    /// Comes before an accepted scan changes these tiles.
+    pub(super) fn begin_change(&mut self, tiles: &[TileIndex]) {
+        self.keep_for_views(tiles.iter().copied());
+        self.leave_to_flush(tiles.iter().copied());
+        self.space.extend(tiles.iter().copied());
+        self.buffer.accept_staged();
+    }
+
+    /// Ends an accepted scan, which has changed these tiles.
+    pub(super) fn end_change(&mut self, tiles: &[TileIndex]) {
+        self.scan_number += 1;
+        self.cache.note_scan();
+        self.note_touched(tiles);
+    }
+
+    /// Moves a resident tile into the compact form.
+    ///
+    /// # Errors
+    ///
+    /// A lack of memory; the tile stays where it was.
+    pub(super) fn pack(&mut self, index: TileIndex) -> Result<()> {
+        self.cache.make_compact(index)?;
+        self.leave_packed_to_flush(index);
+        Ok(())
+    }
+
+    /// Drops a tile in the compact form that is on disk.
+    pub(super) fn drop_packed(&mut self, index: TileIndex) {
+        self.leave_to_flush(std::iter::once(index));
+        self.cache.drop_compact(index);
+    }
+
+    /// Puts a tile with all its updates in the place of its compact form.
+    ///
+    /// # Errors
+    ///
+    /// A lack of memory; the updates stay buffered.
+    pub(super) fn renew_packed(&mut self, tile: &Tile, disk: &TileDisk) -> Result<()> {
+        if self.cache.renew_compact(tile)? {
+            self.buffer.forget(tile.index(), disk);
+        }
+        Ok(())
+    }
+
+    /// A resident tile that is about to be written; it is dirty until that is done: a failed attempt may cut short what
+    /// is on disk of it.
+    pub(super) fn begin_write(&mut self, index: TileIndex) -> Option<Arc<Tile>> {
+        self.cache.change(index, Tile::mark_dirty);
+        self.cache.peek(index).cloned()
+    }
+
+    /// Notes that it is on disk.
+    pub(super) fn end_write(&mut self, index: TileIndex, version: TileVersion) {
+        self.views.note_on_disk(index, version);
+        self.cache.change(index, Tile::mark_clean);
+    }
+
+    /// Adds an input. It replaces one without scans; the earliest of too many is dropped. Returns those before.
+    pub(super) fn add_input(&mut self, input: InputRecord) -> Vec<InputRecord> {
+        let before = self.inputs.clone();
+        if self.inputs.last().is_some_and(|last| last.first_scan == self.scan_number) {
+            self.inputs.pop();
+        }
+        self.inputs.push(input);
+        let excess = self.inputs.len().saturating_sub(MAX_INPUTS);
+        self.inputs.drain(..excess);
+        before
+    }
+
+    // Memory. `of_disk` are the bytes that the disk takes.
+
+    /// Bytes that count towards the limit and are not the cache's.
+    fn outside_bytes(&self, of_disk: usize) -> usize {
+        of_disk + self.buffer.bytes() + self.views.bytes() + self.flush_bytes()
+    }
+
+    /// Whether so many more tiles fit, and so many bytes with them.
+    pub(super) fn has_room_for(&self, tiles: usize, bytes: usize, of_disk: usize) -> bool {
+        self.cache.has_room_for(tiles, bytes, self.outside_bytes(of_disk))
+    }
+
+    /// What has to go next for at most `tiles` resident tiles and `bytes` free bytes; see
+    /// [`TileCache::next_eviction`].
+    pub(super) fn next_eviction(&self, bytes: usize, tiles: usize, of_disk: usize) -> Option<Eviction> {
+        self.cache.next_eviction(bytes, tiles, self.outside_bytes(of_disk), self.flight.as_ref())
+    }
+
+    /// Whether there are more than `tiles` resident tiles, or fewer than `bytes` free bytes.
+    pub(super) fn is_over(&self, bytes: usize, tiles: usize, of_disk: usize) -> bool {
+        self.cache.is_over(bytes, tiles, self.outside_bytes(of_disk))
+    }
+
+    /// For how many scans the resident tile that has to go next has not been used; `None` if none can go.
+    pub(super) fn scans_since_oldest(&self) -> Option<u64> {
+        self.cache.scans_since_oldest(self.flight.as_ref())
+    }
+
+    /// Bytes by what they hold, without those of the disk.
+    pub(super) fn memory(&self) -> MemoryCounts {
+        MemoryCounts {
+            write_buffer: self.buffer.bytes() as u64,
+            readers: self.views.bytes() as u64,
+            ..self.cache.memory()
+        }
+    }
+
+    /// Adds the contents' part of the statistics.
+    pub(super) fn count_into(&self, statistics: &mut MapStatistics) {
+        statistics.scan_number = self.scan_number;
+        self.buffer.count_into(statistics);
+        self.cache.count_into(statistics);
     }
 
     /// Number of scans in the map.
@@ -85,6 +251,49 @@ impl TileContents {
     }
 
     // A flush beside the mapper.
+
+    /// Whether there is one.
+    pub(super) fn is_flushing(&self) -> bool {
+        self.flight.is_some()
+    }
+
+    /// How many tiles it would have to write.
+    pub(super) fn flight_size(&self) -> FlightSize {
+        FlightSize {
+            resident: self.cache.used_last_first().filter(|tile| tile.is_dirty()).count(),
+            compact: self.cache.dirty_compact(),
+            unapplied: self.buffer.tiles().count(),
+        }
+    }
+
+    /// Notes that one has begun.
+    pub(super) fn begin_flight(&mut self, flight: Flight) {
+        self.flight = Some(flight);
+        self.flush_reserve = self.flush_reserve.max(1);
+    }
+
+    /// Tiles in the compact form that are being saved as they are, and for which no updates are buffered.
+    pub(super) fn saving_as_they_are(&self) -> Vec<(TileIndex, CompactTile)> {
+        self.cache.saving_compact().filter(|(index, _)| !self.buffer.is_frozen(*index)).collect()
+    }
+
+    /// The tiles for which updates are buffered, in order.
+    pub(super) fn buffered_tiles(&self) -> Vec<TileIndex> {
+        let mut buffered: Vec<_> = self.buffer.tiles().collect();
+        buffered.sort_unstable();
+        buffered
+    }
+
+    /// Leaves the buffered updates of a tile to the flush: they are applied to the compact form of the tile, or to what
+    /// is on disk of it.
+    pub(super) fn freeze(&mut self, index: TileIndex, on_disk: Base) -> StoredTileState {
+        let (spilled, updates) = self.buffer.freeze(index);
+        let base = match self.cache.find(index) {
+            Some(Cached::Compact(tile)) => Base::Compact(tile.clone()),
+            _ => on_disk,
+        };
+        StoredTileState { base, spilled, updates }
+    }
 
     /// Bytes of memory that a flush holds alone.
     pub(super) fn flight_bytes(&self) -> usize {
@@ -231,13 +440,12 @@ impl TileContents {
     /// Whether there may be something in a tile.
     pub(in crate::mapper) fn may_hold(&self, index: TileIndex) -> bool {
         let is_on_disk = || !matches!(self.views.on_disk(index), Base::Nothing);
-        self.cache.contains(index) || self.buffer.contains(index) || is_on_disk()
+        self.holds(index) || is_on_disk()
     }
 
     /// The tiles in which there may be something, in order.
     pub(in crate::mapper) fn tiles(&self) -> Vec<TileIndex> {
-        let in_memory = self.cache.indices().chain(self.buffer.tiles());
-        let mut tiles: Vec<_> = in_memory.chain(self.views.tiles_on_disk()).collect();
+        let mut tiles: Vec<_> = self.held_tiles().chain(self.views.tiles_on_disk()).collect();
         tiles.sort_unstable();
         tiles.dedup();
         tiles

@@ -1,6 +1,6 @@
 //! How room is made: resident tiles go into the compact form, and these to disk, beside the mapper.
 
-use super::contents::TileContents;
+use super::memory_plan::MemoryPlan;
 use super::tile_cache::Eviction;
 use super::tile_pager::TilePager;
 use crate::error::{Error, Result};
@@ -22,7 +22,7 @@ impl TilePager<'_> {
         let is_new = |tile: &&TileIndex| !self.exists(**tile) && !self.contents.buffer.is_staged(**tile);
         let tiles = updates.tiles.iter().map(|(tile, _)| tile).filter(is_new).count();
         let tiles = tiles + self.contents.buffer.staged_tiles().filter(|tile| !self.exists(*tile)).count();
-        let plan = self.contents.cache.plan();
+        let plan = self.plan();
         let index = self.disk.index_bytes() + BYTES_OF_NEW_TILE * tiles;
         if !plan.is_enforced || index <= plan.bytes / 2 {
             return Ok(());
@@ -40,18 +40,21 @@ impl TilePager<'_> {
 
     /// How many tiles one scan may touch.
     pub(in crate::mapper) fn most_tiles_of_scan(&self) -> usize {
-        let plan = self.contents.cache.plan();
+        let plan = self.plan();
         match plan.is_enforced {
             true => (plan.bytes / 2).saturating_sub(self.memory().index as usize) / BYTES_OF_NEW_TILE,
             false => usize::MAX,
         }
     }
 
-    /// Bytes of memory that grow outside of the cache.
-    fn outside_bytes(&self) -> usize {
-        let disk = self.disk.in_flight_bytes() + self.disk.index_bytes() + self.disk.commit_bytes();
-        let contents = self.contents.buffer.bytes() + self.contents.views.bytes();
-        disk + contents + self.contents.flush_bytes()
+    /// How the memory is shared out.
+    pub(super) fn plan(&self) -> &MemoryPlan {
+        self.contents.plan()
+    }
+
+    /// Bytes of memory that the disk takes.
+    fn bytes_of_disk(&self) -> usize {
+        self.disk.in_flight_bytes() + self.disk.index_bytes() + self.disk.commit_bytes()
     }
 
     /// Bytes of memory of what is on its way to disk or from there.
@@ -61,30 +64,31 @@ impl TilePager<'_> {
 
     /// Whether so many more tiles fit, and so many bytes with them.
     pub(super) fn has_room_for(&self, tiles: usize, bytes: usize) -> bool {
-        self.contents.cache.has_room_for(tiles, bytes, self.outside_bytes())
+        self.contents.has_room_for(tiles, bytes, self.bytes_of_disk())
     }
 
     /// Whether there is room to load a tile ahead of use without evicting others soon.
     pub(super) fn has_room_to_spare(&self) -> bool {
-        self.has_room_for(1, self.contents.cache.plan().spare_bytes)
+        self.has_room_for(1, self.plan().spare_bytes)
     }
 
     /// Evicts tiles until this one fits.
     pub(super) fn make_room(&mut self, tile: &Tile) -> Result<()> {
-        self.make_room_for(tile.bytes(), self.contents.cache.plan().tiles - 1)
+        self.evict_until(tile.bytes(), self.plan().tiles - 1)?;
+        self.save_ahead()
     }
 
-    /// Evicts tiles until at most `tiles` are resident and `bytes` are free. Tiles in use are not evicted; if all are
-    /// in use, the limit is exceeded.
-    pub(super) fn make_room_for(&mut self, bytes: usize, tiles: usize) -> Result<()> {
-        self.evict_until(bytes, tiles)?;
+    /// Evicts tiles until so many bytes are free. Tiles in use are not evicted; if all are in use, the limit is
+    /// exceeded.
+    pub(super) fn make_room_for(&mut self, bytes: usize) -> Result<()> {
+        self.evict_until(bytes, self.plan().tiles)?;
         self.save_ahead()
     }
 
     /// Where the disk does not keep up, waits for one save with each scan: otherwise one of them would have to wait for
     /// many. While a flush goes on nothing is saved, and it is waited for only where it has to be.
     pub(super) fn keep_pace(&mut self) {
-        let is_saving = self.contents.flight.is_none() && !self.disk.can_save();
+        let is_saving = !self.contents.is_flushing() && !self.disk.can_save();
         if is_saving
             && self.contents.cache.has_compact_tier()
             && self.contents.cache.is_behind()
@@ -94,19 +98,18 @@ impl TilePager<'_> {
         }
     }
 
-    /// [`TilePager::make_room_for`], which saves no tile that need not go.
+    /// Evicts tiles until at most `tiles` are resident and `bytes` are free; saves no tile that need not go.
     pub(super) fn evict_until(&mut self, bytes: usize, tiles: usize) -> Result<()> {
         loop {
-            let (outside, is_flushing) = (self.outside_bytes(), self.contents.flight.is_some());
-            let TileContents { cache, flight, .. } = &*self.contents;
-            match cache.next_eviction(bytes, tiles, outside, flight.as_ref()) {
+            let (of_disk, is_flushing) = (self.bytes_of_disk(), self.contents.is_flushing());
+            match self.contents.next_eviction(bytes, tiles, of_disk) {
                 Some(Eviction::Resident(index)) => self.evict(index)?,
                 // It is being written, or cannot be before the flush has ended.
                 Some(Eviction::Compact(index)) if is_flushing && self.contents.cache.is_dirty(index) => {
                     self.wait_for_flight();
                 }
                 Some(Eviction::Compact(index)) => self.evict_compact(index)?,
-                None if self.contents.cache.is_over(bytes, tiles, self.outside_bytes()) => {
+                None if self.contents.is_over(bytes, tiles, of_disk) => {
                     // All that is left is held, and where a flush beside the mapper holds it, it lets go.
                     if !is_flushing {
                         return Ok(());
@@ -122,9 +125,7 @@ impl TilePager<'_> {
     pub(super) fn evict(&mut self, index: TileIndex) -> Result<()> {
         log::debug!("tile {index}: evicted");
         if self.contents.cache.has_compact_tier() {
-            self.contents.cache.make_compact(index)?;
-            self.contents.leave_packed_to_flush(index);
-            return Ok(());
+            return self.contents.pack(index);
         }
         if self.contents.cache.is_dirty(index) {
             self.write(index)?;
@@ -142,16 +143,17 @@ impl TilePager<'_> {
                 self.wait_for_save()?;
             }
         }
-        self.contents.leave_to_flush(std::iter::once(index));
-        self.contents.cache.drop_compact(index);
+        self.contents.drop_packed(index);
         Ok(())
     }
 
     /// Saves tiles before they have to go, as many as may be in flight.
     fn save_ahead(&mut self) -> Result<()> {
         // While a flush goes on beside the mapper, nothing is saved that need not be.
-        let is_flushing = self.contents.flight.is_some();
-        if is_flushing || !self.contents.cache.has_compact_tier() || self.disk.has_save_error() {
+        if self.contents.is_flushing()
+            || !self.contents.cache.has_compact_tier()
+            || self.disk.has_save_error()
+        {
             return Ok(());
         }
         while self.disk.can_save()
@@ -186,15 +188,11 @@ impl TilePager<'_> {
     /// Applies what is buffered for a tile in the compact form that is about to be saved. It was not used for long, so
     /// nothing else would bring it in: the buffer would fill with a few updates of every tile that a way has passed.
     fn apply_before_save(&mut self, index: TileIndex) -> Result<()> {
-        let buffer = &self.contents.buffer;
-        if !buffer.contains(index) || buffer.is_staged(index) || buffer.is_frozen(index) {
+        if !self.contents.has_applicable(index) || self.contents.buffer.is_frozen(index) {
             return Ok(());
         }
         let tile = self.read(index)?;
-        if self.contents.cache.renew_compact(&tile)? {
-            self.contents.buffer.forget(index, &self.disk);
-        }
-        Ok(())
+        self.contents.renew_packed(&tile, &self.disk)
     }
 
     /// Waits for a save to end.

@@ -1,21 +1,17 @@
 //! How a map becomes durable: buffered updates are applied, dirty tiles written, and all of it committed at once.
 
-use super::contents::TileContents;
-use super::flight::{Flight, FlightSize};
+use super::flight::Flight;
 use super::flusher::{BegunFlush, FlushedTile};
 use super::held_tile::HeldTile;
 use super::shared_contents::unlocked;
 use super::shared_disk;
-use super::tile_cache::Cached;
 use super::tile_disk::BYTES_OF_VOXEL;
 use super::tile_pager::TilePager;
-use super::tile_state::{Base, StoredTileState};
+use super::tile_state::Base;
 use super::unapplied_tile::UnappliedTile;
 use crate::error::{Error, Result};
-use crate::persistence::CompactTile;
 use crate::space::TileIndex;
-use crate::store::{InputRecord, MAX_INPUTS};
-use crate::tile::Tile;
+use crate::store::InputRecord;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -23,13 +19,7 @@ impl TilePager<'_> {
     /// Records a new input and flushes, so that the record is durable. It replaces an input without scans; the earliest
     /// of too many is dropped.
     pub(in crate::mapper) fn begin_input(&mut self, input: InputRecord) -> Result<()> {
-        let before = self.contents.inputs.clone();
-        if self.contents.inputs.last().is_some_and(|last| last.first_scan == self.contents.scan_number) {
-            self.contents.inputs.pop();
-        }
-        self.contents.inputs.push(input);
-        let excess = self.contents.inputs.len().saturating_sub(MAX_INPUTS);
-        self.contents.inputs.drain(..excess);
+        let before = self.contents.add_input(input);
         let flushed = self.flush();
         if flushed.is_err() {
             self.contents.inputs = before;
@@ -65,7 +55,7 @@ impl TilePager<'_> {
         }
         self.end_saves()?;
         // A commit of many tiles takes memory, too.
-        self.make_room_for(0, self.contents.cache.plan().tiles)?;
+        self.make_room_for(0)?;
         self.upgrade()?;
         let (inputs, scan_number) = (self.contents.inputs.clone(), self.contents.scan_number);
         self.wait(|disk| disk.commit(&inputs, scan_number))
@@ -77,8 +67,8 @@ impl TilePager<'_> {
     pub(super) fn begin_flush(&mut self) -> Result<Option<BegunFlush>> {
         self.end_flight();
         self.contents.take_flush_error().map_or(Ok(()), Err)?;
-        let list_bytes = self.flight_size().bytes();
-        if list_bytes > self.contents.cache.plan().flight_bytes {
+        let list_bytes = self.contents.flight_size().bytes();
+        if list_bytes > self.plan().flight_bytes {
             self.flush()?;
             return Ok(None);
         }
@@ -89,13 +79,13 @@ impl TilePager<'_> {
         let _ = self.disk.take_save_error();
         let flight_bytes = list_bytes + self.bytes_to_make();
         let bytes_beyond = flight_bytes.saturating_sub(self.contents.flush_reserve);
-        self.evict_until(bytes_beyond, self.contents.cache.plan().tiles)?;
+        self.evict_until(bytes_beyond, self.plan().tiles)?;
         let (inputs, scan_number) = (self.contents.inputs.clone(), self.contents.scan_number);
         let files = self.store().reader()?;
         let (commit, writer) = self.wait(|disk| disk.begin_commit(&inputs, scan_number))?;
         let mut tiles = self.freeze_buffer();
         // What is being saved is not waited for here.
-        let saving = self.saving_as_they_are();
+        let saving = self.contents.saving_as_they_are();
         let dirty = self.contents.cache.used_last_first().filter(|tile| tile.is_dirty());
         tiles.extend(dirty.cloned().map(|tile| FlushedTile::Resident(Arc::new(HeldTile::new(tile)))));
         let mut compact = Vec::new();
@@ -114,41 +104,21 @@ impl TilePager<'_> {
         let residents = tiles.iter().skip(after_saves).position(is_resident);
         let first = residents.map_or(tiles.len(), |first| after_saves + first);
         let soon_changed = first..tiles.len().min(first + self.contents.last_touched);
-        self.contents.flight = Some(Flight::of(tiles.iter().chain(&compact), flight_bytes, saving));
-        self.contents.flush_reserve = self.contents.flush_reserve.max(1);
+        self.contents.begin_flight(Flight::of(tiles.iter().chain(&compact), flight_bytes, saving));
         Ok(Some(BegunFlush { scan_number, tiles, compact, after_saves, soon_changed, writer, files, commit }))
-    }
-
-    /// How many tiles a flush beside the mapper would have to write.
-    fn flight_size(&self) -> FlightSize {
-        let TileContents { cache, buffer, .. } = &*self.contents;
-        FlightSize {
-            resident: cache.used_last_first().filter(|tile| tile.is_dirty()).count(),
-            compact: cache.dirty_compact(),
-            unapplied: buffer.tiles().count(),
-        }
-    }
-
-    /// Tiles in the compact form that are being saved as they are, and for which no updates are buffered.
-    fn saving_as_they_are(&self) -> Vec<(TileIndex, CompactTile)> {
-        let saving = self.contents.cache.saving_compact();
-        saving.filter(|(index, _)| !self.contents.buffer.is_frozen(*index)).collect()
     }
 
     /// What is buffered, left to a flush beside the mapper.
     fn freeze_buffer(&mut self) -> Vec<FlushedTile> {
-        let mut buffered: Vec<_> = self.contents.buffer.tiles().collect();
-        buffered.sort_unstable();
-        let unapplied = buffered.into_iter().map(|index| {
-            let (spilled, updates) = self.contents.buffer.freeze(index);
-            let version = self.disk.store().version(index);
-            let (base, location) = match (self.contents.cache.find(index), version) {
-                (Some(Cached::Compact(tile)), _) => (Base::Compact(tile.clone()), None),
-                (_, Some(version)) => (Base::OnDisk(version), self.disk.store().location(index)),
-                _ if self.disk.store().contains(index) => (Base::Orphan, None),
-                _ => (Base::Nothing, None),
+        let unapplied = self.contents.buffered_tiles().into_iter().map(|index| {
+            let store = self.disk.store();
+            let on_disk = match store.tiles().version(index) {
+                Some(version) => Base::OnDisk(version),
+                None if store.tiles().contains(index) => Base::Orphan,
+                None => Base::Nothing,
             };
-            let state = StoredTileState { base, spilled, updates };
+            let state = self.contents.freeze(index, on_disk);
+            let location = matches!(state.base, Base::OnDisk(_)).then(|| store.location(index)).flatten();
             FlushedTile::Unapplied(Box::new(UnappliedTile { index, state, location }))
         });
         unapplied.collect()
@@ -167,14 +137,14 @@ impl TilePager<'_> {
 
     /// Waits for a flush beside the mapper. If it failed, the next one says why, or makes up for it.
     pub(super) fn end_flight(&mut self) {
-        if self.contents.flight.is_none() {
+        if !self.contents.is_flushing() {
             return;
         }
         let since = Instant::now();
         let Self { contents, disk, flusher, .. } = self;
         unlocked(contents, || shared_disk::unlocked(disk, || while flusher.wait() {}));
         self.disk.note_stall(since.elapsed());
-        if self.contents.flight.is_some() {
+        if self.contents.is_flushing() {
             let lost = std::io::Error::other("the thread that flushed has ended early");
             let error = Error::io(self.store().folder(), "flush", lost);
             self.contents.end_flight(Err(error));
@@ -201,14 +171,12 @@ impl TilePager<'_> {
     fn settle(&mut self) -> Result<()> {
         self.end_io()?;
         self.write_suspects()?;
-        let mut buffered: Vec<_> = self.contents.buffer.tiles().collect();
-        buffered.sort_unstable();
-        buffered.into_iter().try_for_each(|index| self.flush_buffered(index))
+        self.contents.buffered_tiles().into_iter().try_for_each(|index| self.flush_buffered(index))
     }
 
     /// Writes tiles anew that the disk has failed to sync.
     fn write_suspects(&mut self) -> Result<()> {
-        for index in self.store().suspects() {
+        for index in self.store().tiles().suspects() {
             // Its file may not be on the medium; what can be read of it is checked as always.
             if !self.contents.cache.is_resident(index) {
                 self.load(index)?;
@@ -245,14 +213,11 @@ impl TilePager<'_> {
         self.end_flight();
         self.upgrade()?;
         self.end_saves_of(index);
-        // Dirty until it is written: a failed attempt may cut short what is on disk of it.
-        self.contents.cache.change(index, Tile::mark_dirty);
-        let Some(tile) = self.contents.cache.peek(index).cloned() else { return Ok(()) };
+        let Some(tile) = self.contents.begin_write(index) else { return Ok(()) };
         let scan_number = self.contents.scan_number;
         // The tile is dropped with what writes it: changing a tile that somebody else holds would copy it.
         let version = self.wait(move |disk| disk.write(&tile, scan_number))?;
-        self.contents.views.note_on_disk(index, version);
-        self.contents.cache.change(index, Tile::mark_clean);
+        self.contents.end_write(index, version);
         Ok(())
     }
 

@@ -31,7 +31,7 @@ impl PagedTiles {
             scan_number: store.commits().scan_number,
             last_scan: None,
             last_touched: 0,
-            space: store.tiles().chain(store.orphans()).collect(),
+            space: store.tiles().iter().chain(store.tiles().orphans()).collect(),
             inputs: store.metadata().ext.as_ref().map_or(Vec::new(), |ext| ext.inputs.clone()),
             views: Views::default(),
             flight: None,

@@ -20,13 +20,9 @@ impl TilePager<'_> {
             return;
         }
         // Soon these will have to come in.
-        let excess =
-            self.contents.buffer.bytes().saturating_sub(self.contents.cache.plan().buffer_bytes() / 4 * 3);
-        if excess > 0 {
-            for tile in self.contents.buffer.heaviest(excess) {
-                if !self.is_spilling_cheaper(tile) {
-                    self.begin_prefetch(tile);
-                }
+        for tile in self.contents.heaviest_beyond(self.plan().buffer_bytes() / 4 * 3) {
+            if !self.is_spilling_cheaper(tile) {
+                self.begin_prefetch(tile);
             }
         }
         for (tile, _) in updates {
@@ -62,15 +58,14 @@ impl TilePager<'_> {
 
     /// Whether updates of many scans wait for a tile.
     fn is_often_changed(&self, tile: TileIndex) -> bool {
-        self.contents.buffer.scans_of(tile) >= self.contents.plan().often_scans
+        self.contents.buffer.scans_of(tile) >= self.plan().often_scans
     }
 
     /// Whether a tile that scan after scan changes may take the place of the one that was not used for longest. Where
     /// all are used about as often, it would have to go again at once, and its updates had better wait.
     fn may_replace_oldest(&self) -> bool {
-        let often_scans = u64::from(self.contents.plan().often_scans);
-        let since = self.contents.cache.scans_since_oldest(self.contents.flight.as_ref());
-        since.is_some_and(|scans| scans > 2 * often_scans)
+        let often_scans = u64::from(self.plan().often_scans);
+        self.contents.scans_since_oldest().is_some_and(|scans| scans > 2 * often_scans)
     }
 
     fn begin_prefetch(&mut self, index: TileIndex) {

@@ -3,11 +3,11 @@ use crate::config::MapConfig;
 use crate::error::{Error, Result};
 use crate::mapper::statistics::{IoCounts, MapStatistics};
 use crate::persistence::{CompactTile, IoThreads, Loaded, Saved, TileSaver, load, new_metadata, upgrade};
-use crate::scan::{PackedUpdates, ScanPoints, TileUpdates};
+use crate::scan::{PackedUpdates, PointBlocks, ScanPoints, TileUpdates};
 use crate::space::{TileIndex, TileTable};
 use crate::store::{
-    BegunCommit, CatalogEntry, InputRecord, Metadata, SegmentPlace, SnapshotName, SpillFile, TileStore,
-    TileVersion, TileWriter,
+    BegunCommit, CatalogEntry, InputRecord, Metadata, SegmentPlace, SnapshotName, SpillFile, SpillFiles,
+    TileStore, TileVersion, TileWriter,
 };
 use crate::tile::{Table, Tile};
 use std::time::{Duration, Instant};
@@ -18,6 +18,7 @@ use std::time::{Duration, Instant};
 pub(super) struct TileDisk {
     config: MapConfig,
     store: TileStore,
+    spills: SpillFiles,
     /// Saves on the mapper's own thread.
     saver: TileSaver,
     threads: IoThreads,
@@ -30,6 +31,8 @@ pub(super) struct TileDisk {
     written: TileTable<()>,
     /// Why a save beside the mapper failed; its tile is still dirty.
     save_error: Option<Error>,
+    /// What makes blocks of the points of scans that are kept.
+    blocks: PointBlocks,
 }
 
 /// Bytes of memory that a voxel of a tile on disk takes, about.
@@ -37,9 +40,10 @@ pub(super) const BYTES_OF_VOXEL: usize = 6;
 
 impl TileDisk {
     pub(super) fn new(config: &MapConfig, store: TileStore) -> Self {
-        let unread = store.tiles().chain(store.orphans()).map(|tile| (tile, ())).collect();
+        let unread = store.tiles().iter().chain(store.tiles().orphans()).map(|tile| (tile, ())).collect();
         Self {
             config: config.clone(),
+            spills: store.spill_files(),
             store,
             saver: TileSaver::new(config),
             threads: IoThreads::new(config),
@@ -48,6 +52,7 @@ impl TileDisk {
             unread,
             written: TileTable::default(),
             save_error: None,
+            blocks: PointBlocks::default(),
         }
     }
 
@@ -82,7 +87,7 @@ impl TileDisk {
     ///
     /// Damage, and a disk that refuses.
     pub(super) fn read(&mut self, index: TileIndex) -> Result<Option<Table>> {
-        if !self.store.contains(index) {
+        if !self.store.tiles().contains(index) {
             return Ok(None);
         }
         let read = self.stall(|disk| load::load_table(&disk.store, &disk.config.grid, index))?;
@@ -111,7 +116,7 @@ impl TileDisk {
     /// Begins to read a tile beside the mapper, if it is on disk.
     pub(super) fn prefetch(&mut self, index: TileIndex) {
         if let Some(location) = self.store.location(index) {
-            let voxels = self.store.version(index).map_or(0, |version| version.voxels) as usize;
+            let voxels = self.store.tiles().version(index).map_or(0, |version| version.voxels) as usize;
             self.threads.load(location, BYTES_OF_VOXEL.saturating_mul(voxels));
         }
     }
@@ -132,7 +137,7 @@ impl TileDisk {
     fn note_prefetched(&mut self, loaded: Loaded) -> (TileIndex, Option<Table>) {
         let Loaded { index, result } = loaded;
         let Ok(read) = result else { return (index, None) };
-        if self.store.version(index).is_some_and(|version| version.table != read.file) {
+        if self.store.tiles().version(index).is_some_and(|version| version.table != read.file) {
             return (index, None); // A flush beside the mapper has written a newer one meanwhile.
         }
         self.note_read(index, read.file.bytes);
@@ -156,7 +161,7 @@ impl TileDisk {
 
     /// Notes that a flush beside the mapper has written a tile.
     pub(super) fn note_flushed(&mut self, index: TileIndex, version: TileVersion) {
-        self.store.note_next(index, version);
+        self.store.tiles_mut().note_next(index, version);
         self.note_written(index, version);
     }
 
@@ -218,7 +223,7 @@ impl TileDisk {
         let Saved { index, result, .. } = saved;
         match result {
             Ok(version) => {
-                self.store.note_next(index, version);
+                self.store.tiles_mut().note_next(index, version);
                 self.note_written(index, version);
                 return Some(version);
             }
@@ -251,8 +256,8 @@ impl TileDisk {
         before: SpillFile,
         updates: &PackedUpdates,
     ) -> Result<SpillFile> {
-        let appended = self.store.append_spill(index, before, updates.as_bytes());
-        let file = appended.inspect_err(|_| self.store.cut_spill(index, before))?;
+        let appended = self.spills.append(index, before, updates.as_bytes());
+        let file = appended.inspect_err(|_| self.spills.cut(index, before))?;
         self.counts.bytes_written += updates.as_bytes().len() as u64;
         Ok(file)
     }
@@ -268,7 +273,7 @@ impl TileDisk {
         file: SpillFile,
         take: impl FnMut(TileUpdates),
     ) -> Result<()> {
-        let input = self.stall(|disk| disk.store.open_spill(index, file))?;
+        let input = self.stall(|disk| disk.spills.open(index, file))?;
         self.counts.bytes_read += file.bytes;
         PackedUpdates::unpack(input, take)
             .map_err(|error| Error::io(&self.store.layout().spill(index), "read", error))
@@ -276,12 +281,12 @@ impl TileDisk {
 
     /// Removes a tile's spill file.
     pub(super) fn remove_spill(&self, index: TileIndex) {
-        self.store.remove_spill(index);
+        self.spills.remove(index);
     }
 
     /// Cuts a tile's spill file to the bytes that count.
     pub(super) fn cut_spill(&self, index: TileIndex, file: SpillFile) {
-        self.store.cut_spill(index, file);
+        self.spills.cut(index, file);
     }
 
     // Commits.
@@ -302,29 +307,33 @@ impl TileDisk {
     ///
     /// Points that cannot be read, a disk that refuses; nothing is kept then.
     pub(super) fn keep(&mut self, scan: &dyn ScanPoints) -> Result<SegmentPlace> {
-        self.store.begin_kept_scan()?;
-        let mut written = Ok(());
+        let (archive, blocks) = (self.store.archive_mut(), &mut self.blocks);
+        archive.begin_scan()?;
+        blocks.begin();
+        let (mut written, put) = (Ok(()), &mut |block: &[u8]| archive.push_block(block));
         let read = scan.for_each_own_chunk(0..scan.len(), &mut |points, intensities| {
-            written = self.store.push_kept_points(points, intensities);
+            written = blocks.push(points, intensities, put);
             written.is_ok()
         });
-        let kept = read.and(written).and_then(|()| self.store.end_kept_scan(scan.has_intensities()));
-        if kept.is_err() {
-            self.store.give_up_kept_scan();
+        match read.and(written).and_then(|()| blocks.end(scan.has_intensities(), put)) {
+            Ok(()) => Ok(archive.end_scan()),
+            Err(error) => {
+                archive.give_up_scan();
+                Err(error)
+            }
         }
-        kept
     }
 
     /// Takes back a scan that was written and not noted.
     pub(super) fn give_up_kept(&mut self) {
-        self.store.give_up_kept_scan();
+        self.store.archive_mut().give_up_scan();
     }
 
     /// Records a scan or a batch of the next commit.
     pub(super) fn note(&mut self, entry: CatalogEntry) {
         match entry {
             CatalogEntry::Listed(scan) => self.store.note_scan(scan),
-            entry => self.store.note_entry(entry),
+            entry => self.store.archive_mut().note(entry),
         }
     }
 
@@ -373,7 +382,7 @@ impl TileDisk {
     ///
     /// A name that is taken, and a disk that refuses.
     pub(super) fn create_snapshot(&mut self, name: &SnapshotName) -> Result<()> {
-        self.store.create_snapshot(name)
+        self.store.snapshot_writer().create(name)
     }
 
     // Counts.
@@ -395,7 +404,7 @@ impl TileDisk {
 
     /// Adds the disk's part of the statistics.
     pub(super) fn count_into(&self, statistics: &mut MapStatistics) {
-        let versions = self.store.versions();
+        let versions = self.store.tiles().versions();
         statistics.disk_bytes = versions.map(|version| version.table.bytes + version.octree.bytes).sum();
         statistics.stalls = self.stalls.counts();
         statistics.io = self.counts;

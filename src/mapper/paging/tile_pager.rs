@@ -89,10 +89,7 @@ impl TilePager<'_> {
         self.drain_buffer()?;
         for (tile, _) in &updates.tiles {
             let is_wanted = self.disk.is_unread(*tile) || (self.exists(*tile) && self.has_room_to_spare());
-            // The spill file of a staged tile holds buffered updates, then those of this scan. Applying only the former
-            // would reorder them.
-            if is_wanted && !self.contents.cache.is_resident(*tile) && !self.contents.buffer.is_staged(*tile)
-            {
+            if is_wanted && self.contents.can_come_in(*tile) {
                 self.load(*tile)?;
             }
         }
@@ -100,7 +97,7 @@ impl TilePager<'_> {
         let all: usize = updates.tiles.iter().map(|(_, updates)| updates.len()).sum();
         let copied = self.contents.bytes_to_copy(updates.tiles.iter().map(|(tile, _)| *tile));
         // A tile that is made new by the updates is one tile more than there are.
-        self.make_room_for(BYTES_OF_UPDATE * all + copied, self.contents.cache.plan().tiles)?;
+        self.make_room_for(BYTES_OF_UPDATE * all + copied)?;
         self.keep_pace();
         Ok(())
     }
@@ -114,10 +111,7 @@ impl TilePager<'_> {
         touched.sort_unstable();
         touched.dedup();
         self.shared.wait_for_views(&mut self.contents);
-        self.contents.keep_for_views(touched.iter().copied());
-        self.contents.leave_to_flush(touched.iter().copied());
-        self.contents.space.extend(touched.iter().copied());
-        self.contents.buffer.accept_staged();
+        self.contents.begin_change(&touched);
         let mut resident = FxHashMap::default();
         let mut others = Vec::new();
         for (index, tile_updates) in updates.tiles {
@@ -144,15 +138,13 @@ impl TilePager<'_> {
             }
         }
         self.make_tiles(new);
-        self.contents.scan_number += 1;
-        self.contents.cache.note_scan();
-        self.contents.note_touched(&touched);
+        self.contents.end_change(&touched);
         touched
     }
 
     /// Whether the map keeps its scans.
     pub(in crate::mapper) fn keeps_scans(&self) -> bool {
-        self.store().keeps_scans()
+        self.store().archive().is_on()
     }
 
     /// Writes the points of a scan that is to be kept. That it is kept is to be noted, or it is given up.
@@ -219,7 +211,7 @@ impl TilePager<'_> {
             let spilled = self.wait(|disk| disk.spill(index, before, &updates))?;
             self.contents.buffer.stage(index, spilled, updates.len());
         }
-        self.make_room_for(0, self.contents.cache.plan().tiles)
+        self.make_room_for(0)
     }
 
     /// Takes back what a scan that was not accepted has staged.
@@ -229,10 +221,8 @@ impl TilePager<'_> {
 
     /// Shrinks the write buffer to its share of memory: updates are applied, or spilled where that is cheaper.
     fn drain_buffer(&mut self) -> Result<()> {
-        let most_bytes = self.contents.cache.plan().buffer_bytes();
-        let excess = self.contents.buffer.bytes().saturating_sub(most_bytes);
-        let heaviest = if excess > 0 { self.contents.buffer.heaviest(excess) } else { Vec::new() };
-        for tile in heaviest {
+        let most_bytes = self.plan().buffer_bytes();
+        for tile in self.contents.heaviest_beyond(most_bytes) {
             // A flush beside the mapper is about to apply what is frozen.
             if self.contents.buffer.is_staged(tile) || self.contents.buffer.is_frozen(tile) {
                 continue;
@@ -273,7 +263,7 @@ impl TilePager<'_> {
 
     fn load_buffered(&mut self, tile: TileIndex) -> Result<()> {
         // It may have come in with another.
-        if self.contents.buffer.contains(tile) && !self.contents.buffer.is_staged(tile) {
+        if self.contents.has_applicable(tile) {
             self.load(tile)?;
         }
         Ok(())
@@ -287,7 +277,7 @@ impl TilePager<'_> {
         if !self.contents.cache.has_compact_tier() || is_near {
             return false;
         }
-        let tile_bytes = self.store().version(tile).map_or(0, |version| version.table.bytes);
+        let tile_bytes = self.store().tiles().version(tile).map_or(0, |version| version.table.bytes);
         self.contents.buffer.bytes_of(tile) < tile_bytes.max(MIN_BYTES_TO_LOAD_FOR)
     }
 
@@ -295,9 +285,7 @@ impl TilePager<'_> {
 
     /// Whether anything was observed in a tile.
     pub(in crate::mapper) fn exists(&self, index: TileIndex) -> bool {
-        self.store().contains(index)
-            || self.contents.buffer.contains(index)
-            || self.contents.cache.contains(index)
+        self.store().tiles().contains(index) || self.contents.holds(index)
     }
 
     /// Where something was observed.
@@ -359,9 +347,7 @@ impl TilePager<'_> {
     /// Puts a tile into memory. Its buffered updates are applied already, so they are dropped. The caller has made
     /// room.
     pub(super) fn put(&mut self, tile: Arc<Tile>) {
-        self.contents.buffer.forget(tile.index(), &self.disk);
-        self.contents.leave_to_flush(std::iter::once(tile.index()));
-        self.contents.cache.put(tile);
+        self.contents.put(tile, &self.disk);
     }
 
     /// A tile that is not resident, with its buffered updates applied.
@@ -416,14 +402,13 @@ impl TilePager<'_> {
         match self.contents.cache.find(index) {
             Some(Cached::Resident(tile)) => Some(tile.table().len() as u64),
             Some(Cached::Compact(tile)) => Some(tile.voxels()),
-            None => self.store().version(index).map(|version| version.voxels),
+            None => self.store().tiles().version(index).map(|version| version.voxels),
         }
     }
 
     /// Every tile in which something was observed, in order.
     pub(in crate::mapper) fn tile_indices(&self) -> Vec<TileIndex> {
-        let in_memory = self.contents.cache.indices().chain(self.contents.buffer.tiles());
-        let mut indices: Vec<_> = self.store().tiles().chain(in_memory).collect();
+        let mut indices: Vec<_> = self.store().tiles().iter().chain(self.contents.held_tiles()).collect();
         indices.sort_unstable();
         indices.dedup();
         indices
@@ -431,7 +416,7 @@ impl TilePager<'_> {
 
     /// Number of tiles in which something was observed.
     pub(super) fn count_tiles(&self) -> usize {
-        let is_new = |index: &TileIndex| !self.store().contains(*index);
+        let is_new = |index: &TileIndex| !self.store().tiles().contains(*index);
         let cached = self.contents.cache.indices().filter(is_new).count();
         let buffered = self
             .contents
@@ -439,7 +424,7 @@ impl TilePager<'_> {
             .tiles()
             .filter(|index| is_new(index) && !self.contents.cache.contains(*index))
             .count();
-        self.store().count_tiles() + cached + buffered
+        self.store().tiles().count() + cached + buffered
     }
 
     /// The resident tiles, in order.
@@ -449,12 +434,12 @@ impl TilePager<'_> {
 
     /// Whether a flush goes on beside the mapper.
     pub(in crate::mapper) fn is_flushing(&self) -> bool {
-        self.contents.flight.is_some()
+        self.contents.is_flushing()
     }
 
     /// Whether a tile has updates that are not on disk.
     pub(in crate::mapper) fn is_dirty(&self, index: TileIndex) -> bool {
-        self.contents.buffer.contains(index) || self.contents.cache.is_dirty(index)
+        self.contents.is_dirty(index)
     }
 
     /// Drops a tile from memory and reads it from disk again; tells whether it is there.
@@ -476,9 +461,7 @@ impl TilePager<'_> {
         {
             self.make_room(tile)?;
         }
-        self.contents.keep_for_views(std::iter::once(index));
-        self.contents.cache.discard(index);
-        self.contents.buffer.forget(index, &self.disk);
+        self.contents.discard(index, &self.disk);
         let is_there = tile.is_some();
         if let Some(tile) = tile {
             self.contents.cache.put(Arc::new(tile));
@@ -502,8 +485,8 @@ impl TilePager<'_> {
         let threads = TileThreads::own(self.store().folder())?;
         self.contents.cache.use_threads(threads);
         let store = self.disk.store();
-        let versions = store.tiles().filter_map(|tile| Some((tile, store.version(tile)?)));
-        self.contents.views.watch_disk(bytes, versions, store.orphans().into_iter());
+        let versions = store.tiles().iter().filter_map(|tile| Some((tile, store.tiles().version(tile)?)));
+        self.contents.views.watch_disk(bytes, versions, store.tiles().orphans().into_iter());
         store.reader()
     }
 
@@ -534,24 +517,20 @@ impl TilePager<'_> {
     /// Bytes of memory of all that grows, by what they hold.
     pub(super) fn memory(&self) -> MemoryCounts {
         MemoryCounts {
-            write_buffer: self.contents.buffer.bytes() as u64,
             in_flight: self.in_flight_bytes() as u64,
             index: (self.disk.index_bytes() + self.disk.commit_bytes()) as u64,
-            readers: self.contents.views.bytes() as u64,
-            ..self.contents.cache.memory()
+            ..self.contents.memory()
         }
     }
 
     pub(in crate::mapper) fn statistics(&self) -> MapStatistics {
         let mut statistics = MapStatistics {
-            scan_number: self.contents.scan_number,
             tiles: self.count_tiles() as u64,
             memory: self.memory(),
             ..MapStatistics::default()
         };
         self.disk.count_into(&mut statistics);
-        self.contents.buffer.count_into(&mut statistics);
-        self.contents.cache.count_into(&mut statistics);
+        self.contents.count_into(&mut statistics);
         statistics
     }
 }

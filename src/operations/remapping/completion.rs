@@ -53,7 +53,8 @@ pub(super) fn remove_second_map(disk: Arc<dyn Disk>, folder: &Path) -> Result<()
 /// Damage, a disk that refuses; with files that are to be gone, another writer.
 pub(super) fn complete_earlier(disk: Arc<dyn Disk>, folder: &Path) -> Result<u64> {
     let second = remove_second_map(disk.clone(), folder);
-    let idle = TileStore::open_read_only(disk.clone(), folder)?.idle_scan_files()?.unwrap_or_default();
+    let idle =
+        TileStore::open_read_only(disk.clone(), folder)?.snapshots().idle_scan_files()?.unwrap_or_default();
     match TileStore::open(disk.clone(), folder) {
         // The other writer has done it when it opened the map.
         Err(_) if idle.is_empty() => {}

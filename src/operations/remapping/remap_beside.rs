@@ -129,8 +129,8 @@ impl RemapBeside {
     fn take_over(mut self, store: TileStore, mut side: SideMapper) -> Result<Remapped> {
         let (revision, touched) = (&mut self.revision, &self.touched);
         follow_scans(&store, self.catalog, &mut self.entries, revision, touched, &mut side, &mut |_| ())?;
-        let tiles: Vec<_> = store.tiles().filter(|&tile| touched.has(tile)).collect();
-        revision.counts.tiles = store.count_tiles() as u64;
+        let tiles: Vec<_> = store.tiles().iter().filter(|&tile| touched.has(tile)).collect();
+        revision.counts.tiles = store.tiles().count() as u64;
         revision.counts.tiles_mapped = tiles.len() as u64;
         self.remapped.mapped = revision.counts;
         let stop = self.how.rework.stop.clone();
@@ -154,7 +154,7 @@ fn follow_scans(
     progress: &mut (dyn FnMut(u64) + Send),
 ) -> Result<u64> {
     check_catalog(store, catalog)?;
-    let mut records = store.kept_records()?;
+    let mut records = store.archive().records()?;
     for _ in 0..*entries {
         records.next_entry()?;
     }
@@ -195,7 +195,7 @@ fn follow_scans(
 
 /// Scans add to the catalog that was read; what changes earlier entries makes another one.
 fn check_catalog(store: &TileStore, catalog: Option<u64>) -> Result<()> {
-    match store.catalog_generation()? == catalog {
+    match store.archive().generation()? == catalog {
         true => Ok(()),
         false => Err(Error::Changed { path: store.folder().to_owned() }),
     }

@@ -76,7 +76,7 @@ pub fn remove_scans(
     let path = || MapPath::on(disk.clone(), &folder);
     let (mut removed, is_repeated) = remove_from_map(path, scans, from_snapshots, how, progress)?;
     let (mut first_error, is_to_go) = (None, from_snapshots && !how.is_dry_run);
-    for name in TileStore::open_read_only(disk.clone(), &folder)?.snapshot_names()? {
+    for name in TileStore::open_read_only(disk.clone(), &folder)?.snapshots().names()? {
         // The one that was asked for keeps them.
         let is_to_go = is_to_go && how.keep_as.as_ref() != Some(&name);
         if let Err(error) = removed.look_at_snapshot(path, name.clone(), scans, is_to_go) {

@@ -86,7 +86,7 @@ impl Revision {
     /// Finds out what the change touches.
     pub(super) fn look(&mut self, store: &TileStore) -> Result<Touched> {
         let config = self.config_of(store)?;
-        self.counts.tiles = store.count_tiles() as u64;
+        self.counts.tiles = store.tiles().count() as u64;
         let (began, mut looked_at) = (Instant::now(), 0);
         let are_all = self.changed_updates > self.counts.updates / PART_FOR_ALL;
         let tiles = match are_all {
@@ -111,7 +111,7 @@ impl Revision {
     ) -> Result<FxHashSet<TileIndex>> {
         let mut tiles = FxHashSet::default();
         let mut finder = TileFinder::new(config, self.disk.clone(), self.how.stop.clone());
-        let mut records = store.kept_records()?;
+        let mut records = store.archive().records()?;
         while let Some(record) = records.next_kept()? {
             self.how.stop.check()?;
             let Some(&change) = self.changes.get(&record.number) else { continue };
@@ -138,7 +138,7 @@ impl Revision {
 
     /// What is to be done, by what is known without doing it.
     fn estimate(&mut self, store: &TileStore, touched: &Touched, took_s: f64, looked_at: u64) -> Result<()> {
-        let mut records = store.kept_records()?;
+        let mut records = store.archive().records()?;
         let (mut updates, mut scans) = (0.0, 0);
         while let Some(record) = records.next_kept()? {
             let change = self.changes.get(&record.number);
@@ -202,8 +202,8 @@ impl Revision {
         progress: &mut impl FnMut(u64, u64),
     ) -> Result<(MappedAgain, Result<()>)> {
         let layout = store.layout().clone();
-        let mut records = store.kept_records()?;
-        let tiles: Vec<_> = store.tiles().filter(|&tile| touched.has(tile)).collect();
+        let mut records = store.archive().records()?;
+        let tiles: Vec<_> = store.tiles().iter().filter(|&tile| touched.has(tile)).collect();
         self.counts.tiles_mapped = tiles.len() as u64;
         let mut remapper = Remapper::begin(store, touched.config.clone(), tiles, self.how.stop.clone())?;
         let (mut done, mut have_poses_changed) = (0, false);

@@ -85,7 +85,7 @@ pub(super) fn rework(
     let takes_points = revision.takes_points();
     if takes_points {
         // Before the look, which may take long.
-        store.check_catalogs_of_snapshots()?;
+        store.snapshots().check_catalogs()?;
     }
     let touched = revision.look(&store)?;
     if how.is_dry_run || revision.counts.scans_changed == 0 {
@@ -107,7 +107,7 @@ pub(super) fn rework(
 /// Makes the snapshot of the map as it is, if there is to be one. One of this state that is there already counts.
 pub(super) fn keep_as_it_is(store: &mut TileStore, how: &Rework) -> Result<()> {
     let Some(name) = &how.keep_as else { return Ok(()) };
-    store.create_snapshot(name)
+    store.snapshot_writer().create(name)
 }
 
 /// Gives room back that was written to in vain.

@@ -119,7 +119,7 @@ impl Committer {
         versions: &TileVersions,
         [flush_number, scan_number]: [u64; 2],
     ) -> Metadata {
-        metadata.bounds = Bounds::of(versions.tiles());
+        metadata.bounds = Bounds::of(versions.iter());
         if let Some(ext) = &mut metadata.ext {
             ext.storage = files.layout().storage();
             ext.snapshots = self.listed.clone();

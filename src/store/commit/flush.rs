@@ -10,7 +10,6 @@ use crate::store::map_files::MapFiles;
 use crate::store::scans::{Catalog, CatalogEntry, CatalogVersion, ScanRecord};
 use crate::store::tile_store::TileStore;
 use crate::store::tiles::file_checksum::FileChecksum;
-use crate::store::tiles::tile_version::TileVersion;
 use crate::store::tiles::tile_writer::TileWriter;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -42,11 +41,6 @@ impl TileStore {
         Ok(TileWriter::new(self.files.clone(), map_id))
     }
 
-    /// Records that the next version of a tile is written, with all its files.
-    pub fn note_next(&mut self, tile: TileIndex, version: TileVersion) {
-        self.versions.note_next(tile, version);
-    }
-
     /// Takes a tile out of the map, at the next commit: its space is unknown again. From here on the store does not
     /// hold the tile, unless a next version of it is written later. What is not committed leaves the tile where it was.
     ///
@@ -63,8 +57,8 @@ impl TileStore {
 
     /// Records a scan of the next commit whose points are not kept.
     pub fn note_scan(&mut self, scan: ScanRecord) {
-        match self.keeper.is_on() {
-            true => self.keeper.note(CatalogEntry::Listed(scan)),
+        match self.archive.is_on() {
+            true => self.archive.note(CatalogEntry::Listed(scan)),
             false => self.scans.note_scan(scan),
         }
     }
@@ -96,22 +90,11 @@ impl TileStore {
     ///
     /// A list of kept scans that is damaged, a disk that refuses.
     pub fn note_rewind(&mut self, past: &Self) -> Result<()> {
-        self.rewind_kept(past)?;
-        if !past.keeps_scans() {
+        self.archive.rewind(&past.archive)?;
+        if !past.archive.is_on() {
             self.scans.note_rewind(past.commits().flush_number);
         }
         Ok(())
-    }
-
-    /// Forgets the next version of a tile, as if it had not been written.
-    pub fn drop_next(&mut self, tile: TileIndex) {
-        self.versions.drop_next(tile);
-    }
-
-    /// The tiles whose next version must be written again before the next commit: the disk failed to sync it, and what
-    /// it says of these files from then on proves nothing.
-    pub fn suspects(&self) -> Vec<TileIndex> {
-        self.versions.suspects()
     }
 
     /// Commits every version written and every tile removed since the last commit. When this returns they are durable,
@@ -151,7 +134,7 @@ impl TileStore {
             let folder = self.layout().tile_folder(tile);
             return Err(Error::io(&folder, "trust", io::Error::other("an earlier sync failed")));
         }
-        self.keeper.begin_commit();
+        self.archive.begin_commit();
         Ok(BegunCommit { metadata, scan_number, listed_scans: self.scans.pending() })
     }
 
@@ -160,14 +143,14 @@ impl TileStore {
         let has_changed = !self.versions.next().is_empty() || !self.versions.removed().is_empty();
         has_changed
             || self.committer.is_new(&self.metadata_of(begun))
-            || self.keeper.has_news()
+            || self.archive.has_news()
             || begun.scan_number != self.commits().scan_number
     }
 
     /// What a commit is to make durable before it can name it.
     pub fn unsynced(&self) -> Unsynced {
         let tiles = self.versions.next().tiles().collect();
-        Unsynced { files: self.files.clone(), tiles, segments: self.keeper.unsynced() }
+        Unsynced { files: self.files.clone(), tiles, segments: self.archive.unsynced() }
     }
 
     fn metadata_of(&self, begun: &BegunCommit) -> Metadata {
@@ -175,7 +158,7 @@ impl TileStore {
         let mut metadata =
             self.committer.fill_in(begun.metadata.clone(), &self.files, &self.versions, numbers);
         if let Some(ext) = &mut metadata.ext {
-            ext.keeps_scans = self.keeper.is_on();
+            ext.keeps_scans = self.archive.is_on();
         }
         metadata
     }
@@ -188,7 +171,7 @@ impl TileStore {
     pub fn commit_synced(&mut self, begun: &BegunCommit, synced: Synced) -> Result<()> {
         synced.suspects.into_iter().for_each(|tile| self.versions.suspect(tile));
         if synced.has_lost_scans {
-            self.keeper.suspect_unsynced();
+            self.archive.suspect_unsynced();
         }
         synced.result?;
         let number = self.commits().flush_number + 1;
@@ -196,9 +179,9 @@ impl TileStore {
         let is_new = self.committer.is_new(&metadata);
         let removed = self.versions.removed();
         let scans = self.scans.write(&self.files, number - 1, self.listed_records(), begun.listed_scans)?;
-        let kept = self.write_kept()?;
+        let kept = self.archive.write(!self.versions.commits().tiles.is_empty())?;
         let named = || kept.map_or(CatalogVersion::NONE, Catalog::version);
-        let catalog = self.keeper.is_on().then(named);
+        let catalog = self.archive.is_on().then(named);
         if let Some(ext) = &mut metadata.ext {
             (ext.scan_records, ext.catalog) = (Some(scans.records), catalog);
         }
@@ -211,14 +194,15 @@ impl TileStore {
         if let Err(error) = self.committer.append(&self.files, &flush, &metadata) {
             // At once if it goes: another process may come next, and would see a record that is not on the medium.
             let _ = self.finish_earlier_work();
-            self.keeper.not_committed();
+            self.archive.not_committed();
             return Err(error);
         }
         // Committed.
         self.note_added(number);
         self.scans.commit(scans, begun.listed_scans);
-        self.keeper.commit(kept);
+        self.archive.commit(kept);
         let changed = self.versions.committed(number, scan_number, catalog);
+        self.archive.set_last_commit(self.versions.commits());
         log::info!(
             "{}: flush {number}, as of scan {scan_number}: {} tiles written, {} removed",
             self.files.folder().display(),
@@ -340,10 +324,16 @@ impl TileStore {
         self.finish_earlier_work()?;
         self.versions.forget(tiles);
         if self.map_id().is_some() {
-            self.versions.committed_nothing(self.commits().flush_number + 1);
+            self.committed_nothing(self.commits().flush_number + 1);
             self.committer.replace_log(&self.files, self.versions.commits())?;
         }
         self.write_metadata()
+    }
+
+    /// Notes a commit in which no tile and no scan changed.
+    pub(in crate::store) fn committed_nothing(&mut self, number: u64) {
+        self.versions.committed_nothing(number);
+        self.archive.set_last_commit(self.versions.commits());
     }
 
     /// Gives a map of the original format an id and a log, so that it can be written to, and returns the id. Its tiles

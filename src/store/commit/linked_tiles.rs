@@ -30,7 +30,7 @@ impl TileStore {
 impl LinkedTiles<'_> {
     /// Whether the tile is here.
     pub fn contains(&self, tile: TileIndex) -> bool {
-        self.store.contains(tile)
+        self.store.tiles().contains(tile)
     }
 
     /// Links a tile of another map.
@@ -75,12 +75,12 @@ impl LinkedTiles<'_> {
     pub fn commit(mut self, metadata: Metadata) -> Result<()> {
         self.sync_copies()?;
         let store = self.store;
-        let tiles: Vec<_> = store.tiles().collect();
+        let tiles: Vec<_> = store.tiles().iter().collect();
         for tiles in tiles.chunks(TILES_SYNCED_AT_ONCE) {
             sync_folders(&store.files, tiles, |_| {})?;
         }
         store.files.sync_map_folder()?;
-        store.versions.committed_nothing(store.commits().flush_number + 1);
+        store.committed_nothing(store.commits().flush_number + 1);
         let numbers = [store.commits().flush_number, store.commits().scan_number];
         store.committer.set_metadata(store.committer.fill_in(
             metadata,

@@ -9,6 +9,7 @@ use crate::store::tiles::file_checksum::{Checksumming, FileChecksum};
 use crate::store::tiles::tile_version::TileVersion;
 use crate::store::tiles::tile_writer::{TileWriter, make_folder};
 use std::io;
+use std::path::Path;
 
 impl TileStore {
     /// Moves all tiles of `other`, a map of the same id, storage and file system that has committed them and loses them
@@ -19,13 +20,13 @@ impl TileStore {
     /// A folder in the way that the log does not name, a disk that refuses; `other` has lost some of its tiles then.
     pub fn take_over(&mut self, other: &Self) -> Result<()> {
         self.finish_earlier_work()?;
-        let mut tiles: Vec<_> = other.tiles().collect();
+        let mut tiles: Vec<_> = other.tiles().iter().collect();
         tiles.sort_unstable();
         tiles.into_iter().try_for_each(|tile| self.take_tile(other, tile))
     }
 
     fn take_tile(&mut self, other: &Self, tile: TileIndex) -> Result<()> {
-        let Some(version) = other.version(tile) else { return Ok(()) };
+        let Some(version) = other.tiles().version(tile) else { return Ok(()) };
         let folder = self.layout().tile_folder(tile);
         if self.versions.is_orphan(tile) {
             let hint = "it is no part of the map as it is; `voxtile repair` moves it out of the way";
@@ -36,7 +37,7 @@ impl TileStore {
             let (from, to) = (other.layout().current(tile, file), self.layout().next(tile, file));
             self.disk().rename(&from, &to).map_err(|error| Error::io(&from, "rename", error))?;
         }
-        self.note_next(tile, version);
+        self.versions.note_next(tile, version);
         Ok(())
     }
 
@@ -86,8 +87,37 @@ impl TileStore {
         }
     }
 
+    /// Puts a table that is kept under another name, and is the one that the log names, in place.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses.
+    pub fn put_kept_in_place(&mut self, tile: TileIndex, table: &Path) -> Result<()> {
+        self.link_next(tile, table)?;
+        let layout = self.layout();
+        let (next, current) = (layout.next(tile, TileFile::Table), layout.current(tile, TileFile::Table));
+        self.disk().sync_file(&next).map_err(|error| Error::io(&next, "sync", error))?;
+        self.files.rename(&next, &current)?;
+        self.files.sync_folder(&layout.tile_folder(tile))
+    }
+
+    /// Makes a table of the tile that is whole under another name its next version: the same file where the file system
+    /// has hard links, else a copy.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses.
+    pub fn link_next(&mut self, tile: TileIndex, table: &Path) -> Result<()> {
+        self.finish_earlier_work()?;
+        if self.disk().link(table, &self.layout().next(tile, TileFile::Table)).is_ok() {
+            return Ok(());
+        }
+        let mut input = self.disk().open(table).map_err(|error| Error::io(table, "open", error))?;
+        self.write_next(tile, TileFile::Table, |out| io::copy(&mut input, out).map(drop)).map(drop)
+    }
+
     pub(in crate::store) fn version_to_copy(&self, tile: TileIndex) -> Result<TileVersion> {
-        self.version(tile).ok_or_else(|| {
+        self.tiles().version(tile).ok_or_else(|| {
             let reason = format!("{} has no checksums of {tile}", self.folder().display());
             Error::argument("tile", reason)
         })

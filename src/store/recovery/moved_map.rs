@@ -32,7 +32,7 @@ pub fn move_map(disk: &Arc<dyn Disk>, map: &Path, folder: &Path) -> Result<bool>
     // It goes along with the folder, and keeps others from taking that for something left behind.
     let lock = WriterLock::take(&**disk, &Layout::new(map))?;
     let store = TileStore::open_read_only(disk.clone(), map)?;
-    let mut tiles: Vec<_> = store.tiles().collect();
+    let mut tiles: Vec<_> = store.tiles().iter().collect();
     tiles.sort_unstable();
     for &tile in &tiles {
         store.layout().files().iter().try_for_each(|&file| store.check_length(tile, file))?;

@@ -1,19 +1,17 @@
-use super::catalog_entry::{KeptRecord, SegmentPlace};
-use super::codec::{MAX_POINTS, PointDecoder, PointEncoder};
+use super::catalog_entry::SegmentPlace;
 use crate::error::{DecodeError, Error, FormatError, Result};
-use crate::space::Point;
 use crate::store::disk::{Disk, DiskRead, DiskWrite};
 use crate::store::layout::Layout;
 use std::io::{self, Read, Write};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Mutex;
 
 /// A segment that is longer is followed by another.
 const MAX_BYTES: u64 = 256 << 20;
 /// Length and checksum of a block.
 const BLOCK_FRAME_BYTES: u64 = 8;
-/// No block is longer: the points as they are in memory, and some.
-const MAX_BLOCK_BYTES: usize = 2 * MAX_POINTS * (size_of::<Point>() + size_of::<f32>());
+/// Most bytes of a block.
+pub(crate) const MAX_BLOCK_BYTES: usize = 7 << 19;
 
 /// Appends scans to a segment, block by block. What no catalog names is nothing.
 pub(super) struct SegmentWriter {
@@ -22,11 +20,6 @@ pub(super) struct SegmentWriter {
     /// A store that is read by several threads is `Sync`.
     out: Mutex<Box<dyn DiskWrite>>,
     bytes: u64,
-    encoder: PointEncoder,
-    /// Points of the block that is being filled.
-    points: Vec<Point>,
-    intensities: Vec<f32>,
-    block: Vec<u8>,
 }
 
 impl SegmentWriter {
@@ -34,8 +27,7 @@ impl SegmentWriter {
     pub(super) fn create(disk: &dyn Disk, layout: &Layout, segment: u64) -> Result<Self> {
         let path = layout.segment(segment);
         let out = disk.create(&path).map_err(|error| Error::io(&path, "create", error))?;
-        let (encoder, points, intensities, block) = Default::default();
-        Ok(Self { segment, path, out: Mutex::new(out), bytes: 0, encoder, points, intensities, block })
+        Ok(Self { segment, path, out: Mutex::new(out), bytes: 0 })
     }
 
     /// Where the next scan begins.
@@ -48,62 +40,23 @@ impl SegmentWriter {
         self.bytes >= MAX_BYTES
     }
 
-    /// Adds points to the scan.
-    pub(super) fn push(&mut self, points: &[Point], intensities: Option<&[f32]>) -> Result<()> {
-        let mut at = 0;
-        while at < points.len() {
-            let count = (points.len() - at).min(MAX_POINTS - self.points.len());
-            if count == MAX_POINTS {
-                // A whole block need not be copied.
-                let some = at..at + count;
-                self.put(&points[some.clone()], intensities.map(|all| &all[some]))?;
-            } else {
-                self.points.extend_from_slice(&points[at..at + count]);
-                self.intensities.extend_from_slice(intensities.map_or(&[], |all| &all[at..at + count]));
-                if self.points.len() == MAX_POINTS {
-                    self.put_rest(intensities.is_some())?;
-                }
-            }
-            at += count;
-        }
-        Ok(())
+    /// Adds a block to the scan.
+    pub(super) fn push(&mut self, block: &[u8]) -> Result<()> {
+        self.write(block).map_err(|error| Error::io(&self.path, "write", error))
     }
 
-    /// Ends the scan that began at `offset`.
-    pub(super) fn end(&mut self, offset: u64, has_intensities: bool) -> Result<SegmentPlace> {
-        self.put_rest(has_intensities)?;
-        Ok(SegmentPlace { segment: self.segment, offset, bytes: self.bytes - offset })
+    /// The scan that began at `offset`, as far as it is written.
+    pub(super) fn place_from(&self, offset: u64) -> SegmentPlace {
+        SegmentPlace { segment: self.segment, offset, bytes: self.bytes - offset }
     }
 
     /// Copies a scan that lies elsewhere, block by block, checked.
-    pub(super) fn copy(&mut self, scan: &mut SegmentScan) -> Result<SegmentPlace> {
+    pub(super) fn copy(&mut self, scan: &mut SegmentReader) -> Result<SegmentPlace> {
         let offset = self.bytes;
         while let Some(block) = scan.next_block()? {
-            self.write(block).map_err(|error| Error::io(&self.path, "write", error))?;
+            self.push(block)?;
         }
-        self.end(offset, false)
-    }
-
-    fn put_rest(&mut self, has_intensities: bool) -> Result<()> {
-        if self.points.is_empty() {
-            return Ok(());
-        }
-        let (points, intensities) = (std::mem::take(&mut self.points), std::mem::take(&mut self.intensities));
-        let put = self.put(&points, has_intensities.then_some(&*intensities));
-        // Their memory serves again.
-        (self.points, self.intensities) = (points, intensities);
-        self.points.clear();
-        self.intensities.clear();
-        put
-    }
-
-    fn put(&mut self, points: &[Point], intensities: Option<&[f32]>) -> Result<()> {
-        let mut block = std::mem::take(&mut self.block);
-        block.clear();
-        let encoded = self.encoder.encode(points, intensities, &mut block);
-        let written = encoded.and_then(|()| self.write(&block));
-        self.block = block;
-        written.map_err(|error| Error::io(&self.path, "write", error))
+        Ok(self.place_from(offset))
     }
 
     fn write(&mut self, block: &[u8]) -> io::Result<()> {
@@ -120,8 +73,6 @@ impl SegmentWriter {
 
     /// Takes back a scan that is given up: what comes next begins where it began.
     pub(super) fn cut(&mut self, disk: &dyn Disk, offset: u64) -> io::Result<()> {
-        self.points.clear();
-        self.intensities.clear();
         *self.out.get_mut().unwrap_or_else(std::sync::PoisonError::into_inner) =
             disk.append(&self.path, offset)?;
         self.bytes = offset;
@@ -129,17 +80,16 @@ impl SegmentWriter {
     }
 }
 
-/// Reads the points of one scan from its segment, block by block, and nothing else of it.
-pub(crate) struct SegmentScan {
+/// Reads one scan from its segment, block by block, and nothing else of it.
+pub(crate) struct SegmentReader {
     input: io::Take<Box<dyn DiskRead>>,
     path: PathBuf,
     /// Where the next block begins in the segment.
     at: u64,
     block: Vec<u8>,
-    decoder: PointDecoder,
 }
 
-impl SegmentScan {
+impl SegmentReader {
     /// Goes to where a scan begins.
     ///
     /// # Errors
@@ -153,51 +103,25 @@ impl SegmentScan {
             }
             _ => Error::io(&path, "open", error),
         })?;
-        let (block, decoder) = Default::default();
-        Ok(Self { input: input.take(place.bytes), path, at: place.offset, block, decoder })
+        Ok(Self { input: input.take(place.bytes), path, at: place.offset, block: Vec::new() })
     }
 
-    /// Reads the next block's points in place of those in the lists; false after the last block.
+    /// Where the next block begins in the segment.
+    pub(crate) fn at(&self) -> u64 {
+        self.at
+    }
+
+    /// The error of what is found at an offset of the segment.
+    pub(crate) fn damaged(&self, at: u64, reason: &str) -> Error {
+        FormatError::at_offset(at, reason).in_map(&self.path, None)
+    }
+
+    /// The next block as it is encoded; `None` after the last.
     ///
     /// # Errors
     ///
     /// Damage, or a disk that refuses.
-    pub(crate) fn next(&mut self, points: &mut Vec<Point>, intensities: &mut Vec<f32>) -> Result<bool> {
-        points.clear();
-        intensities.clear();
-        let at = self.at;
-        if self.next_block()?.is_none() {
-            return Ok(false);
-        }
-        let decoded = self.decoder.decode(&self.block, points, intensities);
-        decoded.map_err(|error| damaged(&self.path, at, &error.to_string()))?;
-        Ok(true)
-    }
-
-    /// After a block: whether it has as many intensities as it should.
-    pub(crate) fn check_intensities(&self, points: usize, intensities: usize, has_any: bool) -> Result<()> {
-        match intensities == if has_any { points } else { 0 } {
-            true => Ok(()),
-            false => {
-                Err(damaged(&self.path, self.at, "a block with intensities that do not match its points"))
-            }
-        }
-    }
-
-    /// After the last block: whether as many points were there as the catalog says.
-    pub(crate) fn check_count(&self, points: u64, scan: &KeptRecord) -> Result<()> {
-        match points == scan.points {
-            true => Ok(()),
-            false => {
-                let reason =
-                    format!("scan {} has {points} points, its record says {}", scan.number, scan.points);
-                Err(damaged(&self.path, self.at, &reason))
-            }
-        }
-    }
-
-    /// The next block as it is encoded; `None` after the last.
-    fn next_block(&mut self) -> Result<Option<&[u8]>> {
+    pub(crate) fn next_block(&mut self) -> Result<Option<&[u8]>> {
         self.read_block().map_err(|error| error.in_map(&self.path, None))?;
         Ok((!self.block.is_empty()).then_some(&*self.block))
     }
@@ -234,8 +158,4 @@ impl SegmentScan {
         self.at += BLOCK_FRAME_BYTES + length as u64;
         Ok(())
     }
-}
-
-fn damaged(path: &Path, at: u64, reason: &str) -> Error {
-    FormatError::at_offset(at, reason).in_map(path, None)
 }

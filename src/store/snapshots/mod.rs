@@ -6,4 +6,5 @@ pub(super) mod seen_tables;
 pub(super) mod snapshot_file;
 pub(super) mod snapshot_list;
 pub(super) mod snapshot_name;
-mod snapshot_store;
+pub(super) mod snapshot_writer;
+pub(super) mod snapshots_of_map;

@@ -28,21 +28,33 @@ impl TileValue for SpillFile {
     }
 }
 
-/// Updates of a tile in a file of its folder, because memory is short. They are no part of the map on disk: a commit
-/// does not know the file, and opening the map removes it.
+/// Updates of tiles in files of their folders, because memory is short. They are no part of the map on disk: a commit
+/// does not know these files, and opening the map removes them.
+#[derive(Clone, Debug)]
+pub struct SpillFiles {
+    files: MapFiles,
+}
+
 impl TileStore {
+    /// Where updates of tiles go that memory has no room for.
+    pub fn spill_files(&self) -> SpillFiles {
+        SpillFiles { files: self.files.clone() }
+    }
+}
+
+impl SpillFiles {
     /// Appends updates to those of `file`, and returns what is there then. After an error `file` still counts.
     ///
     /// # Errors
     ///
     /// A disk that refuses.
-    pub fn append_spill(&self, tile: TileIndex, file: SpillFile, updates: &[u8]) -> Result<SpillFile> {
-        let path = self.layout().spill(tile);
-        make_folder(&**self.disk(), &self.layout().tile_folder(tile))?;
+    pub fn append(&self, tile: TileIndex, file: SpillFile, updates: &[u8]) -> Result<SpillFile> {
+        let path = self.files.layout().spill(tile);
+        make_folder(&**self.files.disk(), &self.files.layout().tile_folder(tile))?;
         let append = || {
             let mut out = match file.bytes {
-                0 => self.disk().create(&path)?,
-                bytes => self.disk().append(&path, bytes)?,
+                0 => self.files.disk().create(&path)?,
+                bytes => self.files.disk().append(&path, bytes)?,
             };
             out.write_all(updates)?;
             out.flush()
@@ -58,26 +70,26 @@ impl TileStore {
     /// # Errors
     ///
     /// A disk that refuses, and a file that is not what was written.
-    pub fn open_spill(&self, tile: TileIndex, file: SpillFile) -> Result<impl BufRead + use<>> {
+    pub fn open(&self, tile: TileIndex, file: SpillFile) -> Result<impl BufRead + use<>> {
         self.files.open_spill(tile, file)
     }
 
     /// Cuts off what stands behind the updates that count. A failure costs disk space and does no other harm.
-    pub fn cut_spill(&self, tile: TileIndex, file: SpillFile) {
+    pub fn cut(&self, tile: TileIndex, file: SpillFile) {
         if file.bytes == 0 {
-            return self.remove_spill(tile);
+            return self.remove(tile);
         }
-        let path = self.layout().spill(tile);
-        if let Err(error) = self.disk().append(&path, file.bytes) {
+        let path = self.files.layout().spill(tile);
+        if let Err(error) = self.files.disk().append(&path, file.bytes) {
             log::debug!("{}: not cut: {error}", path.display());
         }
     }
 
     /// Removes a tile's spill file: its updates were applied, or nobody wants them any more. A file that stays does no
     /// harm.
-    pub fn remove_spill(&self, tile: TileIndex) {
-        let path = self.layout().spill(tile);
-        if let Err(error) = self.disk().remove_file(&path) {
+    pub fn remove(&self, tile: TileIndex) {
+        let path = self.files.layout().spill(tile);
+        if let Err(error) = self.files.disk().remove_file(&path) {
             log::debug!("{}: not removed: {error}", path.display());
         }
     }

@@ -7,7 +7,7 @@ use rustc_hash::FxHashSet;
 /// Which tiles a map has on disk and which version of each is the latest: the last commit, and what was written or
 /// removed since.
 #[derive(Debug, Default)]
-pub(in crate::store) struct TileVersions {
+pub struct TileVersions {
     commits: Commits,
     /// Versions written since the last commit.
     next: TileTable<TileVersion>,
@@ -45,32 +45,32 @@ impl TileVersions {
     }
 
     /// What is known of the latest version of a tile.
-    pub(in crate::store) fn version(&self, tile: TileIndex) -> Option<TileVersion> {
+    pub fn version(&self, tile: TileIndex) -> Option<TileVersion> {
         let committed = || self.commits.tiles.get(tile).filter(|_| !self.removed.contains(&tile));
         self.next.get(tile).or_else(committed)
     }
 
     /// What is known of the latest version of each tile, in no particular order.
-    pub(in crate::store) fn versions(&self) -> impl Iterator<Item = TileVersion> {
+    pub fn versions(&self) -> impl Iterator<Item = TileVersion> {
         let is_latest = |tile: TileIndex| !self.removed.contains(&tile) && !self.next.contains(tile);
         let committed = self.commits.tiles.iter().filter(move |(tile, _)| is_latest(*tile));
         self.next.values().chain(committed.map(|(_, version)| version))
     }
 
     /// Whether the tile has a version on disk, committed or not.
-    pub(in crate::store) fn contains(&self, tile: TileIndex) -> bool {
+    pub fn contains(&self, tile: TileIndex) -> bool {
         self.version(tile).is_some() || self.foreign.contains(&tile) || self.orphans.contains(&tile)
     }
 
     /// The tiles that have a version on disk, in no particular order.
-    pub(in crate::store) fn tiles(&self) -> impl Iterator<Item = TileIndex> {
+    pub fn iter(&self) -> impl Iterator<Item = TileIndex> {
         let uncommitted = self.next.tiles().filter(|tile| !self.commits.tiles.contains(*tile));
         let committed = self.commits.tiles.tiles().filter(|tile| !self.removed.contains(tile));
         committed.chain(self.foreign.iter().copied()).chain(uncommitted)
     }
 
     /// Number of tiles that have a version on disk.
-    pub(in crate::store) fn count(&self) -> usize {
+    pub fn count(&self) -> usize {
         let uncommitted = self.next.tiles().filter(|tile| !self.commits.tiles.contains(*tile)).count();
         self.commits.tiles.len() - self.removed.len() + self.foreign.len() + uncommitted
     }
@@ -93,7 +93,7 @@ impl TileVersions {
     }
 
     /// The tile folders that the log does not name, in order.
-    pub(in crate::store) fn orphans(&self) -> Vec<TileIndex> {
+    pub fn orphans(&self) -> Vec<TileIndex> {
         sorted(&self.orphans)
     }
 
@@ -113,14 +113,14 @@ impl TileVersions {
     // What was written since the last commit.
 
     /// Notes that the next version of a tile is written.
-    pub(in crate::store) fn note_next(&mut self, tile: TileIndex, version: TileVersion) {
+    pub fn note_next(&mut self, tile: TileIndex, version: TileVersion) {
         self.suspect.remove(&tile);
         self.removed.remove(&tile);
         self.next.insert(tile, version);
     }
 
     /// Forgets the next version of a tile, as if it had not been written.
-    pub(in crate::store) fn drop_next(&mut self, tile: TileIndex) {
+    pub fn drop_next(&mut self, tile: TileIndex) {
         self.suspect.remove(&tile);
         self.next.remove(tile);
     }
@@ -148,8 +148,9 @@ impl TileVersions {
         self.suspect.insert(tile);
     }
 
-    /// The tiles whose next version could not be synced, in order.
-    pub(in crate::store) fn suspects(&self) -> Vec<TileIndex> {
+    /// The tiles whose next version must be written again before the next commit, in order: the disk failed to sync it,
+    /// and what it says of these files from then on proves nothing.
+    pub fn suspects(&self) -> Vec<TileIndex> {
         sorted(&self.suspect)
     }
 

@@ -32,7 +32,7 @@ mod octree {
 }
 
 mod scan {
-    pub(crate) use voxtile::scan::{PackedUpdates, ScanPoints, ScanUpdates, TileUpdates};
+    pub(crate) use voxtile::scan::{PackedUpdates, PointBlocks, ScanPoints, ScanUpdates, TileUpdates};
 }
 
 mod sensor {

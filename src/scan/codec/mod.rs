@@ -12,17 +12,23 @@ mod column;
 mod grid;
 mod pinhole;
 mod planes;
+mod point_blocks;
 mod point_decoder;
 mod point_encoder;
 #[cfg(test)]
 mod tests;
 mod words;
 
-pub(in crate::store) use point_decoder::PointDecoder;
-pub(in crate::store) use point_encoder::PointEncoder;
+pub use point_blocks::PointBlocks;
+pub(crate) use point_decoder::PointDecoder;
+use point_encoder::PointEncoder;
+
+use crate::space::Point;
 
 /// Most points of a block.
-pub(in crate::store) const MAX_POINTS: usize = 1 << 16;
+const MAX_POINTS: usize = 1 << 16;
+/// No block is longer: the points as they are in memory, and some.
+pub(crate) const MAX_BLOCK_BYTES: usize = 2 * MAX_POINTS * (size_of::<Point>() + size_of::<f32>());
 
 /// The first byte of a block.
 const VERSION: u8 = 1;

@@ -7,7 +7,7 @@ use std::io;
 
 /// Encodes blocks of points. It keeps its memory from block to block.
 #[derive(Default)]
-pub(in crate::store) struct PointEncoder {
+pub(crate) struct PointEncoder {
     columns: ColumnWriter,
     depths: Vec<f64>,
     values: Vec<f64>,
@@ -19,7 +19,7 @@ impl PointEncoder {
     /// # Errors
     ///
     /// No memory to compress it.
-    pub(in crate::store) fn encode(
+    pub(crate) fn encode(
         &mut self,
         points: &[Point],
         intensities: Option<&[f32]>,

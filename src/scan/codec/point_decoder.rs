@@ -8,7 +8,7 @@ use std::fmt;
 
 /// Decodes blocks of points. It keeps its memory from block to block.
 #[derive(Default)]
-pub(in crate::store) struct PointDecoder {
+pub(crate) struct PointDecoder {
     columns: ColumnReader,
     values: [Vec<f64>; 3],
 }
@@ -20,7 +20,7 @@ impl PointDecoder {
     /// # Errors
     ///
     /// Damage, with its offset in the block.
-    pub(in crate::store) fn decode(
+    pub(crate) fn decode(
         &mut self,
         block: &[u8],
         points: &mut Vec<Point>,

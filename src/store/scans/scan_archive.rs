@@ -1,23 +1,30 @@
-use super::catalog::{CatalogWriter, KeptAsOf, KeptRecords, whole_fronts};
-use super::catalog_entry::{CatalogEntry, KeptRecord, SegmentPlace};
+use super::catalog::{CatalogWriter, KeptAsOf, KeptRecords};
+use super::catalog_entry::{CatalogEntry, SegmentPlace};
 use super::catalog_version::CatalogVersion;
-use super::segment::{SegmentScan, SegmentWriter};
-use crate::error::{Error, FormatError, Result};
-use crate::space::Point;
-use crate::store::disk::{Disk, EntryKind};
+use super::scan_list::read_scans;
+use super::segment::{SegmentReader, SegmentWriter};
+use crate::error::{Error, Result};
+use crate::store::commit::commits::Commits;
+use crate::store::disk::Disk;
 use crate::store::layout::Layout;
 use crate::store::map_files::MapFiles;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::fmt;
 use std::io;
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 
-/// What a writer knows of the scans that its map keeps.
-#[derive(Debug, Default)]
-pub(in crate::store) struct ScanKeeper {
+/// The scans that a map keeps: a catalog of them, and segments with their points.
+///
+/// A scan is written block by block, what is in a block is its writer's to know; it is kept once its entry is noted and
+/// committed. [`TileStore::commit`](crate::store::TileStore::commit) commits what was noted.
+#[derive(Debug)]
+pub struct ScanArchive {
+    files: MapFiles,
     /// Whether the map keeps its scans.
     is_on: bool,
+    /// The last commit, as far as kept scans go.
+    last_commit: KeptAsOf,
     /// The catalog as of the last commit, nothing before the first; `None` before it was looked for.
     committed: Option<Option<Catalog>>,
     /// Entries of the next commit, behind the committed ones or, if there is one, the replacement.
@@ -88,19 +95,73 @@ impl fmt::Debug for SegmentWriter {
     }
 }
 
-impl ScanKeeper {
+impl ScanArchive {
+    /// The archive of a map that was opened.
+    pub(in crate::store) fn new(files: MapFiles, is_on: bool, last_commit: KeptAsOf) -> Self {
+        Self {
+            files,
+            is_on,
+            last_commit,
+            committed: None,
+            pending: Vec::new(),
+            begun_entries: 0,
+            replacement: None,
+            segment: None,
+            scan_start: None,
+            unsynced: BTreeSet::new(),
+            suspects: BTreeSet::new(),
+            is_replacement_suspect: false,
+            has_new_names: false,
+            highest_segment: 0,
+            begun: None,
+        }
+    }
+
     /// Whether the map keeps its scans.
-    pub(in crate::store) fn is_on(&self) -> bool {
+    pub fn is_on(&self) -> bool {
         self.is_on
     }
 
-    /// Of a map that is opened, or is another state's again.
-    pub(in crate::store) fn set_on(&mut self, is_on: bool) {
-        self.is_on = is_on;
+    /// The last commit, as far as kept scans go.
+    pub(crate) fn last_commit(&self) -> KeptAsOf {
+        self.last_commit
     }
 
-    /// Begins to keep scans.
-    pub(in crate::store) fn begin(&mut self) {
+    /// Notes that there is another last commit.
+    pub(in crate::store) fn set_last_commit(&mut self, commits: &Commits) {
+        self.last_commit = KeptAsOf::last_of(commits);
+    }
+
+    /// The scans as of the last commit, in order.
+    ///
+    /// # Errors
+    ///
+    /// Damage, a disk that refuses.
+    pub(crate) fn records(&self) -> Result<KeptRecords> {
+        KeptRecords::open(&**self.files.disk(), self.files.layout(), self.last_commit)
+    }
+
+    /// The catalog that they are in. Scans add to it; what changes earlier entries makes another one.
+    ///
+    /// # Errors
+    ///
+    /// A folder that cannot be listed.
+    pub(crate) fn generation(&self) -> Result<Option<u64>> {
+        self.last_commit.generation(&**self.files.disk(), self.files.layout())
+    }
+
+    /// The file of the catalog of a flush, if it has one.
+    ///
+    /// # Errors
+    ///
+    /// A folder that cannot be listed.
+    pub(crate) fn catalog_path(&self, as_of: KeptAsOf) -> Result<Option<PathBuf>> {
+        let generation = as_of.generation(&**self.files.disk(), self.files.layout())?;
+        Ok(generation.map(|generation| self.files.layout().catalog(generation)))
+    }
+
+    /// From the next commit on the map keeps the scans that it takes.
+    pub fn begin(&mut self) {
         if !self.is_on {
             self.is_on = true;
             // Catalogs that are there belong to snapshots.
@@ -134,65 +195,67 @@ impl ScanKeeper {
 
     // Points.
 
-    /// Begins a scan.
-    pub(in crate::store) fn begin_scan(&mut self, files: &MapFiles, last_commit: KeptAsOf) -> Result<()> {
-        let (_, start) = self.open_segment(files, last_commit)?;
+    /// Begins to write the points of a scan, in place of one that was begun before and not noted.
+    ///
+    /// # Errors
+    ///
+    /// A catalog that is damaged, a disk that refuses.
+    pub fn begin_scan(&mut self) -> Result<()> {
+        let (_, start) = self.open_segment()?;
         self.scan_start = Some(start);
         Ok(())
     }
 
     /// The segment that scans are written to, and where the next one begins.
-    fn open_segment(
-        &mut self,
-        files: &MapFiles,
-        last_commit: KeptAsOf,
-    ) -> Result<(&mut SegmentWriter, ScanStart)> {
+    fn open_segment(&mut self) -> Result<(&mut SegmentWriter, ScanStart)> {
         // A catalog that is damaged is told before anything is written.
         if self.replacement.is_none() {
-            self.find_committed(files, last_commit)?;
+            self.find_committed()?;
         }
-        let (disk, layout) = (&**files.disk(), files.layout());
         if self.segment.as_ref().is_none_or(SegmentWriter::is_full) {
-            self.make_folder(files)?;
+            self.make_folder()?;
+            let (disk, layout) = (&**self.files.disk(), self.files.layout());
             let last = segments_in(disk, layout)?.last().copied().unwrap_or_default();
             let segment = last.max(self.highest_segment) + 1;
             self.highest_segment = segment;
             self.segment = Some(SegmentWriter::create(disk, layout, segment)?);
             self.has_new_names = true;
         }
+        let layout = self.files.layout();
         let missing = || Error::io(&layout.kept_scans(), "write", io::Error::other("no segment is open"));
         let segment = self.segment.as_mut().ok_or_else(missing)?;
         let start = ScanStart { segment: segment.segment, offset: segment.bytes() };
         Ok((segment, start))
     }
 
-    /// Adds points to the scan.
-    pub(in crate::store) fn push_points(
-        &mut self,
-        points: &[Point],
-        intensities: Option<&[f32]>,
-    ) -> Result<()> {
-        self.segment.as_mut().map_or(Ok(()), |segment| segment.push(points, intensities))
+    /// Adds a block of points to the scan.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses.
+    pub fn push_block(&mut self, block: &[u8]) -> Result<()> {
+        self.segment.as_mut().map_or(Ok(()), |segment| segment.push(block))
     }
 
     /// Ends the scan. It is nothing until it is noted.
-    pub(in crate::store) fn end_scan(&mut self, has_intensities: bool) -> Result<SegmentPlace> {
+    pub fn end_scan(&mut self) -> SegmentPlace {
         let (Some(segment), Some(start)) = (&mut self.segment, self.scan_start) else {
-            return Ok(SegmentPlace::default());
+            return SegmentPlace::default();
         };
         self.unsynced.insert(segment.segment);
-        segment.end(start.offset, has_intensities)
+        segment.place_from(start.offset)
     }
 
     /// Takes back the scan that was begun last and is not noted.
-    pub(in crate::store) fn give_up_scan(&mut self, disk: &dyn Disk) {
+    pub fn give_up_scan(&mut self) {
         if let Some(start) = self.scan_start.take() {
-            self.cut(disk, start);
+            self.cut(start);
         }
     }
 
     /// Cuts the open segment, if it is this one.
-    fn cut(&mut self, disk: &dyn Disk, start: ScanStart) {
+    fn cut(&mut self, start: ScanStart) {
+        let disk = &**self.files.disk();
         if let Some(segment) = self.segment.as_mut().filter(|segment| segment.segment == start.segment)
             && segment.cut(disk, start.offset).is_err()
         {
@@ -201,31 +264,32 @@ impl ScanKeeper {
         }
     }
 
-    /// Copies the points of a scan to the segment that is being written.
-    pub(in crate::store) fn copy(
-        &mut self,
-        files: &MapFiles,
-        last_commit: KeptAsOf,
-        place: SegmentPlace,
-    ) -> Result<SegmentPlace> {
-        let disk = &**files.disk();
-        let mut scan = SegmentScan::open(disk, files.layout(), place)?;
-        let (segment, start) = self.open_segment(files, last_commit)?;
+    /// Copies the points of a scan to the segment that is being written, which no catalog names yet.
+    ///
+    /// # Errors
+    ///
+    /// Damage, a disk that refuses.
+    pub fn copy(&mut self, place: SegmentPlace) -> Result<SegmentPlace> {
+        let mut scan = SegmentReader::open(&**self.files.disk(), self.files.layout(), place)?;
+        let (segment, start) = self.open_segment()?;
         let copied = segment.copy(&mut scan);
         self.unsynced.insert(start.segment);
         match copied {
             // What a scan's owner may still give up lies before it now, and stays.
             Ok(_) => self.scan_start = self.scan_start.filter(|begun| begun.segment != start.segment),
             // Half a scan must not move those that follow.
-            Err(_) => self.cut(disk, start),
+            Err(_) => self.cut(start),
         }
         copied
     }
 
     // Entries.
 
-    /// Records an entry of the next commit.
-    pub(in crate::store) fn note(&mut self, entry: CatalogEntry) {
+    /// Records an entry of the next commit, if the map keeps its scans.
+    pub fn note(&mut self, entry: CatalogEntry) {
+        if !self.is_on {
+            return;
+        }
         if matches!(entry, CatalogEntry::Kept(_)) {
             self.scan_start = None;
         }
@@ -242,14 +306,15 @@ impl ScanKeeper {
     }
 
     /// Begins a catalog that takes the place of the committed one with the next commit.
-    pub(in crate::store) fn begin_replacement(
-        &mut self,
-        files: &MapFiles,
-        committed_flush: u64,
-    ) -> Result<()> {
-        self.make_folder(files)?;
-        remove_catalogs_after(files, committed_flush)?;
-        let generation = committed_flush + 1;
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses.
+    pub fn begin_catalog(&mut self) -> Result<()> {
+        self.make_folder()?;
+        let files = &self.files;
+        remove_catalogs_after(files, self.last_commit.flush_number)?;
+        let generation = self.last_commit.flush_number + 1;
         let out = CatalogWriter::create(&**files.disk(), files.layout(), generation)
             .map_err(|error| Error::io(&files.layout().catalog(generation), "create", error))?;
         self.has_new_names = true;
@@ -258,12 +323,58 @@ impl ScanKeeper {
         Ok(())
     }
 
-    /// Adds an entry to the catalog that takes the place of the committed one.
-    pub(in crate::store) fn put(&mut self, files: &MapFiles, entry: &CatalogEntry) -> Result<()> {
+    /// Adds an entry to that catalog; the number of each scan follows that of the one before.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses.
+    pub fn put(&mut self, entry: &CatalogEntry) -> Result<()> {
         let Some(Replacement::Open { generation, out }) = &mut self.replacement else { return Ok(()) };
         let out = out.get_mut().unwrap_or_else(PoisonError::into_inner);
         out.put(entry, *generation)
-            .map_err(|error| Error::io(&files.layout().catalog(*generation), "write", error))
+            .map_err(|error| Error::io(&self.files.layout().catalog(*generation), "write", error))
+    }
+
+    /// Writes a catalog that neither the map nor a snapshot names yet, synced: of the generation of the next commit.
+    pub(in crate::store) fn write_other(
+        &self,
+        write: impl FnOnce(&mut dyn FnMut(&CatalogEntry) -> Result<()>) -> Result<()>,
+    ) -> Result<CatalogVersion> {
+        let generation = self.last_commit.flush_number + 1;
+        let (disk, layout) = (&**self.files.disk(), self.files.layout());
+        let refused = |error| Error::io(&layout.catalog(generation), "write", error);
+        self.make_folder()?;
+        let mut out = CatalogWriter::create(disk, layout, generation).map_err(refused)?;
+        write(&mut |entry| out.put(entry, generation).map_err(refused))?;
+        let catalog = out.finish().map_err(refused)?;
+        self.files.sync_folder(&layout.kept_scans())?;
+        Ok(catalog)
+    }
+
+    /// Makes the kept scans those of an earlier commit again.
+    pub(in crate::store) fn rewind(&mut self, past: &Self) -> Result<()> {
+        self.is_on = past.is_on;
+        if !past.is_on {
+            return Ok(());
+        }
+        self.begin_catalog()?;
+        let mut records = past.records()?;
+        while let Some(entry) = records.next_entry()? {
+            self.put(&entry)?;
+        }
+        Ok(())
+    }
+
+    /// Whether the scans of the last commit are those of another state.
+    pub(in crate::store) fn has_scans_of(&self, past: &Self) -> Result<bool> {
+        let (mut now, mut then) = (self.records()?, past.records()?);
+        loop {
+            match (now.next_entry()?, then.next_entry()?) {
+                (None, None) => return Ok(true),
+                (now, then) if now == then => {}
+                _ => return Ok(false),
+            }
+        }
     }
 
     // Commits.
@@ -278,49 +389,37 @@ impl ScanKeeper {
         self.unsynced.iter().copied().collect()
     }
 
-    /// Writes what belongs to the commit after `last_commit`, synced. `before` are the entries of
-    /// what the map had before its scans were kept, for the first catalog. Returns what [`ScanKeeper::commit`] is to be
+    /// Writes what belongs to the next commit, synced. `has_tiles` tells whether the map has any as of the last one.
+    /// Returns what [`ScanArchive::commit`] is to be
     /// told.
     ///
     /// # Errors
     ///
     /// A disk that refuses: the next call writes it again.
-    pub(in crate::store) fn write(
-        &mut self,
-        files: &MapFiles,
-        last_commit: KeptAsOf,
-        before: impl FnOnce() -> Result<Vec<CatalogEntry>>,
-    ) -> Result<Option<Catalog>> {
+    pub(in crate::store) fn write(&mut self, has_tiles: bool) -> Result<Option<Catalog>> {
         if !self.is_on {
             return Ok(None);
         }
         // Where another takes its place, the committed one may be damaged.
-        let committed =
-            if self.replacement.is_some() { None } else { self.find_committed(files, last_commit)? };
-        self.move_suspects(files, last_commit)?;
-        self.sync_segments(files)?;
-        let written = self.write_catalog(files, last_commit.flush_number, committed, before)?;
+        let committed = if self.replacement.is_some() { None } else { self.find_committed()? };
+        self.move_suspects()?;
+        self.sync_segments()?;
+        let written = self.write_catalog(committed, has_tiles)?;
         if self.has_new_names {
-            files.sync_folder(&files.layout().kept_scans())?;
+            self.files.sync_folder(&self.files.layout().kept_scans())?;
             self.has_new_names = false;
         }
         Ok(written)
     }
 
-    fn write_catalog(
-        &mut self,
-        files: &MapFiles,
-        committed_flush: u64,
-        committed: Option<Catalog>,
-        before: impl FnOnce() -> Result<Vec<CatalogEntry>>,
-    ) -> Result<Option<Catalog>> {
-        let (disk, layout, flush_number) = (&**files.disk(), files.layout(), committed_flush + 1);
+    fn write_catalog(&mut self, committed: Option<Catalog>, has_tiles: bool) -> Result<Option<Catalog>> {
+        let flush_number = self.last_commit.flush_number + 1;
         let in_place = match self.replacement.take() {
             Some(Replacement::Open { generation, out }) => {
                 let out = out.into_inner().unwrap_or_else(PoisonError::into_inner);
                 let version = out.finish();
-                let version =
-                    version.map_err(|error| Error::io(&layout.catalog(generation), "write", error))?;
+                let version = version
+                    .map_err(|error| Error::io(&self.files.layout().catalog(generation), "write", error))?;
                 let whole = Catalog { version, has_excess: false };
                 self.replacement = Some(Replacement::Whole(whole));
                 Some(whole)
@@ -335,14 +434,15 @@ impl ScanKeeper {
         if in_place.is_some_and(|catalog| !catalog.has_excess) && self.begun_entries == 0 {
             return Ok(in_place);
         }
-        let earlier = if in_place.is_none() { before()? } else { Vec::new() };
+        let earlier = if in_place.is_none() { self.entries_before(has_tiles)? } else { Vec::new() };
         if in_place.is_none() && earlier.is_empty() && self.begun_entries == 0 {
             return Ok(None);
         }
-        self.make_folder(files)?;
+        self.make_folder()?;
+        let (disk, layout) = (&**self.files.disk(), self.files.layout());
         if let Some(begun) = self.begun.take().filter(|&begun| begun != flush_number) {
             // Another commit came in between.
-            files.remove_file(&layout.catalog(begun))?;
+            self.files.remove_file(&layout.catalog(begun))?;
         }
         self.begun = in_place.is_none().then_some(flush_number);
         let generation = in_place.map_or(flush_number, |catalog| catalog.version.generation);
@@ -379,19 +479,37 @@ impl ScanKeeper {
         }
     }
 
+    /// What a map had before its scans were kept: its list of scans, and what is not in it.
+    fn entries_before(&self, has_tiles: bool) -> Result<Vec<CatalogEntry>> {
+        let KeptAsOf { flush_number, scan_number, .. } = self.last_commit;
+        let mut entries = Vec::new();
+        let mut last = 0;
+        for scan in read_scans(&**self.files.disk(), self.files.layout(), flush_number, None)? {
+            if scan.number <= last || scan.number > scan_number {
+                continue;
+            }
+            if scan.number > last + 1 {
+                entries.push(CatalogEntry::Unlisted(last + 1, scan.number - 1));
+            }
+            last = scan.number;
+            entries.push(CatalogEntry::Listed(scan));
+        }
+        if last < scan_number {
+            entries.push(CatalogEntry::Unlisted(last + 1, scan_number));
+        }
+        if scan_number == 0 && has_tiles {
+            entries.push(CatalogEntry::Operation("what it had before its scans were kept".to_owned()));
+        }
+        Ok(entries)
+    }
+
     /// The catalog as of the last commit. What is behind it in the file may be cut off; what is damaged may not.
-    pub(super) fn find_committed(
-        &mut self,
-        files: &MapFiles,
-        last_commit: KeptAsOf,
-    ) -> Result<Option<Catalog>> {
+    pub(in crate::store) fn find_committed(&mut self) -> Result<Option<Catalog>> {
         if let Some(committed) = self.committed {
             return Ok(committed);
         }
-        let (disk, layout) = (&**files.disk(), files.layout());
-        remove_catalogs_after(files, last_commit.flush_number)?;
-        let generation = last_commit.generation(disk, layout)?;
-        let mut records = KeptRecords::open(disk, layout, last_commit)?;
+        remove_catalogs_after(&self.files, self.last_commit.flush_number)?;
+        let (generation, mut records) = (self.generation()?, self.records()?);
         while let Some(scan) = records.next_kept()? {
             self.highest_segment = self.highest_segment.max(scan.place.segment);
         }
@@ -408,10 +526,10 @@ impl ScanKeeper {
         self.segment = None;
     }
 
-    fn sync_segments(&mut self, files: &MapFiles) -> Result<()> {
+    fn sync_segments(&mut self) -> Result<()> {
         for &segment in &self.unsynced {
-            let path = files.layout().segment(segment);
-            if let Err(error) = files.disk().sync_file(&path) {
+            let path = self.files.layout().segment(segment);
+            if let Err(error) = self.files.disk().sync_file(&path) {
                 self.suspect_unsynced();
                 return Err(Error::io(&path, "sync", error));
             }
@@ -421,10 +539,10 @@ impl ScanKeeper {
     }
 
     /// Copies scans of segments that could not be synced to another: what can still be read of them is checked.
-    fn move_suspects(&mut self, files: &MapFiles, last_commit: KeptAsOf) -> Result<()> {
+    fn move_suspects(&mut self) -> Result<()> {
         if self.replacement.is_some() && self.is_replacement_suspect {
             let error = io::Error::other("an earlier sync failed; begin again");
-            return Err(Error::io(&files.layout().kept_scans(), "trust", error));
+            return Err(Error::io(&self.files.layout().kept_scans(), "trust", error));
         }
         let mut pending = std::mem::take(&mut self.pending);
         let mut moved = Ok(());
@@ -432,7 +550,7 @@ impl ScanKeeper {
             if let CatalogEntry::Kept(scan) = entry
                 && self.suspects.contains(&scan.place.segment)
             {
-                moved = self.copy(files, last_commit, scan.place).map(|place| scan.place = place);
+                moved = self.copy(scan.place).map(|place| scan.place = place);
                 if moved.is_err() {
                     break;
                 }
@@ -443,7 +561,8 @@ impl ScanKeeper {
         moved
     }
 
-    pub(super) fn make_folder(&mut self, files: &MapFiles) -> Result<()> {
+    pub(in crate::store) fn make_folder(&self) -> Result<()> {
+        let files = &self.files;
         let folder = files.layout().kept_scans();
         if files.kind(&folder)?.is_none() {
             files.disk().create_folder(&folder).map_err(|error| Error::io(&folder, "create", error))?;
@@ -451,75 +570,6 @@ impl ScanKeeper {
         }
         Ok(())
     }
-}
-
-/// The catalogs and segments that no flush in `flushes` needs, in order; new segments are left out. Also returns the
-/// highest segment that one needs.
-///
-/// # Errors
-///
-/// A catalog that cannot be read to its end: it may need any segment. A disk that refuses.
-pub(in crate::store) fn unneeded(
-    disk: &dyn Disk,
-    layout: &Layout,
-    flushes: &[KeptAsOf],
-    is_new: impl Fn(u64) -> bool,
-) -> Result<(Vec<PathBuf>, u64)> {
-    let folder = layout.kept_scans();
-    let mut names = match disk.list(&folder) {
-        // A map that keeps scans and lacks the folder is damaged.
-        Err(error) if error.kind() == io::ErrorKind::NotFound && flushes.is_empty() => {
-            return Ok((Vec::new(), 0));
-        }
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Vec::new(),
-        names => names.map_err(|error| Error::io(&folder, "list", error))?,
-    };
-    let (mut generations, mut segments) = (BTreeSet::new(), BTreeSet::new());
-    for as_of in with_all_records(disk, layout, flushes)? {
-        generations.extend(as_of.generation(disk, layout)?);
-        let mut records = KeptRecords::open(disk, layout, as_of)?;
-        while let Some(scan) = records.next_kept()? {
-            segments.insert(scan.place.segment);
-        }
-    }
-    names.retain(|name| match (Layout::generation_of(name), Layout::segment_of(name)) {
-        (Some(generation), _) => !generations.contains(&generation),
-        (_, Some(segment)) => !segments.contains(&segment) && !is_new(segment),
-        // Not voxtile's.
-        _ => false,
-    });
-    names.sort_unstable();
-    let highest = segments.last().copied().unwrap_or_default();
-    Ok((names.iter().map(|name| folder.join(name)).collect(), highest))
-}
-
-/// Those of some flushes whose catalogs have the records of all: where several see the beginning of one, the last.
-///
-/// # Errors
-///
-/// A catalog that is not whole as of one of the others.
-pub(super) fn with_all_records(
-    disk: &dyn Disk,
-    layout: &Layout,
-    flushes: &[KeptAsOf],
-) -> Result<Vec<KeptAsOf>> {
-    let (mut left, mut named) = (Vec::new(), BTreeMap::<u64, Vec<(CatalogVersion, KeptAsOf)>>::new());
-    for &as_of in flushes {
-        match as_of.catalog {
-            Some(catalog) => named.entry(catalog.generation).or_default().push((catalog, as_of)),
-            None => left.push(as_of),
-        }
-    }
-    for mut of_one in named.into_values() {
-        of_one.sort_by_key(|(catalog, _)| catalog.bytes);
-        left.extend(of_one.pop().map(|(_, longest)| longest));
-        let fronts: Vec<_> = of_one.iter().map(|(catalog, _)| *catalog).collect();
-        let are_whole = whole_fronts(disk, layout, &fronts);
-        for ((_, as_of), _) in of_one.iter().zip(are_whole).filter(|(_, is_whole)| !is_whole) {
-            KeptRecords::open(disk, layout, *as_of)?;
-        }
-    }
-    Ok(left)
 }
 
 /// Removes catalogs of commits that never happened.
@@ -544,30 +594,4 @@ fn segments_in(disk: &dyn Disk, layout: &Layout) -> Result<Vec<u64>> {
     let mut segments: Vec<u64> = names.iter().filter_map(|name| Layout::segment_of(name)).collect();
     segments.sort_unstable();
     Ok(segments)
-}
-
-/// Checks that a segment is there and as long as the scans in it need.
-///
-/// # Errors
-///
-/// If it is not; a disk that refuses.
-pub(crate) fn check_segment(disk: &dyn Disk, layout: &Layout, segment: u64, end: u64) -> Result<()> {
-    let path = layout.segment(segment);
-    let error = match disk.kind_at(&path)? {
-        Some(EntryKind::File(bytes)) if bytes >= end => return Ok(()),
-        Some(EntryKind::File(bytes)) => FormatError::at_offset(bytes, "the segment ends early"),
-        Some(_) => FormatError::at_offset(0, "not a regular file"),
-        None => FormatError::at_offset(0, "the segment is missing"),
-    };
-    Err(error.in_map(&path, None))
-}
-
-/// Checks that the points of a kept scan are whole.
-pub(crate) fn check_points(disk: &dyn Disk, layout: &Layout, scan: &KeptRecord) -> Result<()> {
-    let mut input = SegmentScan::open(disk, layout, scan.place)?;
-    let (mut points, mut intensities, mut count) = (Vec::new(), Vec::new(), 0);
-    while input.next(&mut points, &mut intensities)? {
-        count += points.len() as u64;
-    }
-    input.check_count(count, scan)
 }

@@ -1,0 +1,249 @@
+use super::seen_tables::SeenTables;
+use super::snapshot_file::Snapshot;
+use super::snapshot_list::{MAX_SNAPSHOTS, SnapshotList};
+use super::snapshot_name::SnapshotName;
+use crate::error::{Error, FormatError, Result};
+use crate::store::commit::commit_log::CommitLog;
+use crate::store::commit::commits::Commits;
+use crate::store::commit::metadata::Metadata;
+use crate::store::disk::EntryKind;
+use crate::store::scans::{CatalogEntry, CatalogVersion};
+use crate::store::tile_store::TileStore;
+use std::io;
+
+/// Makes and deletes the snapshots of a map: each a commit of its own, in which nothing else changes.
+#[derive(Debug)]
+pub struct SnapshotWriter<'a> {
+    pub(super) store: &'a mut TileStore,
+}
+
+impl SnapshotWriter<'_> {
+    /// Keeps the last commit under a name, until the snapshot is deleted: from here on its tables stay when they are
+    /// replaced. What is written and not committed is no part of it. When this returns it is durable; after an error
+    /// there is none.
+    ///
+    /// Where there is one of this name and of this very state, an earlier attempt made it: nothing is done.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::AlreadyExists`] if there is one of this name and of another state; a map of the original format, which
+    /// must be upgraded first; a disk that refuses.
+    pub fn create(&mut self, name: &SnapshotName) -> Result<()> {
+        self.store.finish_earlier_work()?;
+        let map_id = self.store.committer.logged_map_id()?;
+        let (folder, path) = (self.store.layout().snapshots(), self.store.layout().snapshot(name));
+        let has_folder = Snapshot::has_folder(&**self.store.disk(), self.store.layout())?;
+        let mut listed = self.store.committer.snapshots().cloned().unwrap_or_default();
+        if listed.contains(name) && self.is_kept_as(name) {
+            log::info!("{}: the snapshot {name} is of this state already", self.store.folder().display());
+            return Ok(());
+        }
+        if listed.contains(name) || has_folder && self.store.files.kind(&path)?.is_some() {
+            let hint = "choose another name, or delete that snapshot first";
+            return Err(Error::AlreadyExists { path, hint });
+        }
+        if listed.len() >= MAX_SNAPSHOTS {
+            let (size, limit) = (listed.len() as u64 + 1, MAX_SNAPSHOTS as u64);
+            let hint = "delete some first";
+            return Err(Error::TooLarge { what: "the number of snapshots", size, limit, hint });
+        }
+        if !has_folder {
+            self.store.disk().create_folder(&folder).map_err(|error| Error::io(&folder, "create", error))?;
+        }
+        // Perhaps made by an attempt that could not.
+        self.store.files.sync_map_folder()?;
+        let next = self.store.layout().snapshot_next();
+        let flush_number = self.store.commits().flush_number;
+        self.store.name_own_catalog();
+        self.write_next(name, map_id, self.store.metadata(), self.store.commits())?;
+        self.store.files.sync_folder(&folder)?;
+        listed.insert(name.clone(), Some(flush_number));
+        if let Err(error) = self.store.commit_snapshots(listed) {
+            // Also if it stays, nothing names it.
+            let _ = self.store.disk().remove_file(&next);
+            return Err(error);
+        }
+        // Committed.
+        self.store.kept.share(self.store.versions.commits().tiles.tiles());
+        self.store.checkpoint.name_snapshot(name);
+        self.finish_commit();
+        Ok(())
+    }
+
+    /// Whether a snapshot of this name can be read and keeps the state of the last commit.
+    fn is_kept_as(&self, name: &SnapshotName) -> bool {
+        self.store
+            .snapshots()
+            .read(name)
+            .and_then(|snapshot| self.store.is_as(&self.store.at(&snapshot)))
+            .unwrap_or(false)
+    }
+
+    /// Writes what a snapshot says in place of what it said before.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses.
+    pub fn replace(&mut self, snapshot: &Snapshot) -> Result<()> {
+        let Snapshot { name, map_id, metadata, commits, .. } = snapshot;
+        let (next, path) = (self.store.layout().snapshot_next(), self.store.layout().snapshot(name));
+        self.write_next(name, *map_id, metadata, commits)?;
+        self.store.disk().rename(&next, &path).map_err(|error| Error::io(&path, "replace", error))?;
+        self.store.files.sync_folder(&self.store.layout().snapshots())
+    }
+
+    /// Puts the files of snapshots in order after a commit; what the disk refuses is made good by the next call.
+    fn finish_commit(&mut self) {
+        if let Err(error) = self.store.finish_commit() {
+            log::warn!("{}: committed, but not tidied up: {error:#}", self.store.folder().display());
+        }
+    }
+
+    fn write_next(
+        &self,
+        name: &SnapshotName,
+        map_id: [u8; 16],
+        metadata: &Metadata,
+        commits: &Commits,
+    ) -> Result<()> {
+        let mut metadata = metadata.as_of(commits);
+        if let Some(ext) = &mut metadata.ext {
+            ext.snapshots = Some(SnapshotList::of(name.clone(), commits.flush_number));
+        }
+        let next = self.store.layout().snapshot_next();
+        CommitLog::write_whole(&**self.store.disk(), &next, map_id, commits, &metadata.to_text())
+            .map_err(|error| Error::io(&next, "write", error))?;
+        Ok(())
+    }
+
+    /// Deletes a snapshot, and the tables that no other one sees. One that is damaged, cannot be read or is missing can
+    /// be deleted too: from then on nothing is kept for it. One whose deletion was interrupted after its commit is gone
+    /// since the map was opened: that is no error.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::InvalidArgument`] if there is none of this name; a disk that refuses. Where kept scans that nothing
+    /// needs could not be removed, as the disk refused or a catalog is damaged, the snapshot is deleted all the same, and
+    /// another call tries again to remove them.
+    pub fn delete(&mut self, name: &SnapshotName) -> Result<()> {
+        self.store.finish_earlier_work()?;
+        let path = self.store.layout().snapshot(name);
+        let is_listed = self.store.committer.snapshots().is_some_and(|listed| listed.contains(name));
+        match self.store.disk().kind(&path) {
+            Ok(Some(EntryKind::File(_))) => {}
+            Ok(Some(_)) if Snapshot::has_folder(&**self.store.disk(), self.store.layout()).is_ok() => {
+                let reason = "no regular file; `voxtile repair` moves it out of the map";
+                return Err(FormatError::at_offset(0, reason).in_map(&path, None));
+            }
+            _ if is_listed => {}
+            // By an attempt that was killed after its commit.
+            Ok(_) if self.store.snapshots_removed.contains(name) => return Ok(()),
+            // Says which ones there are.
+            Ok(_) => return self.store.snapshots().read(name).map(drop),
+            Err(error) => return Err(Error::io(&path, "look at", error)),
+        }
+        let mut listed = self.store.committer.snapshots().cloned().unwrap_or_default();
+        listed.remove(name);
+        if self.store.map_id().is_some() {
+            self.store.commit_snapshots(listed)?;
+        }
+        self.finish_commit();
+        // As long as the file is there, the same command completes a deletion that was killed or refused.
+        if let Err(error) = self.release_unseen_tables() {
+            log::warn!("deleted, but its tables stay until the map is opened again: {error:#}");
+        }
+        self.store.release_scans().map_err(|error| scans_remain(error, name))?;
+        self.store.checkpoint.remove_snapshot(name);
+        self.finish_commit();
+        Ok(())
+    }
+
+    /// Takes snapshots off the list whose files are not there any more, and what was kept for them.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses.
+    pub fn give_up(&mut self, names: &[SnapshotName]) -> Result<()> {
+        self.store.finish_earlier_work()?;
+        let mut listed = self.store.committer.snapshots().cloned().unwrap_or_default();
+        let mut is_changed = false;
+        for name in names {
+            is_changed |= listed.remove(name);
+        }
+        if is_changed {
+            self.store.commit_snapshots(listed)?;
+            self.finish_commit();
+            self.release_unseen()?;
+        }
+        Ok(())
+    }
+
+    /// Looks at the snapshots anew, and removes the kept tables and kept scans that none of them and no reader needs
+    /// any more.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses.
+    pub fn release_unseen(&mut self) -> Result<()> {
+        self.release_unseen_tables()?;
+        self.store.remove_unneeded_scans();
+        Ok(())
+    }
+
+    fn release_unseen_tables(&mut self) -> Result<()> {
+        let Some(map_id) = self.store.map_id() else { return Ok(()) };
+        let (listed, pinned) = (self.store.committer.snapshots(), self.store.kept.snapshots().pinned());
+        let tiles: Vec<_> = pinned.keys().copied().collect();
+        let snapshots = SeenTables::read_all(
+            &**self.store.disk(),
+            self.store.layout(),
+            map_id,
+            self.store.commits(),
+            listed,
+            pinned,
+        )?;
+        self.store.kept.set_snapshots(snapshots);
+        self.store.kept.release(&self.store.files);
+        for tile in tiles.into_iter().filter(|tile| !self.store.commits().tiles.contains(*tile)) {
+            // Of a removed tile: it goes if that was all that was in it.
+            let _ = self.store.disk().remove_folder(&self.store.layout().tile_folder(tile));
+        }
+        Ok(())
+    }
+
+    /// Writes a catalog that a snapshot is to name in place of its own, in a commit of its own; as long as it is not
+    /// named, it is a leftover.
+    ///
+    /// # Errors
+    ///
+    /// A disk that refuses; a damaged catalog of the map itself, in a map of a version that did not name it.
+    pub(crate) fn write_catalog(
+        &mut self,
+        write: impl FnOnce(&mut dyn FnMut(&CatalogEntry) -> Result<()>) -> Result<()>,
+    ) -> Result<CatalogVersion> {
+        self.store.finish_earlier_work()?;
+        // From here on the newest is no longer the map's own.
+        self.store.try_to_name_own_catalog()?;
+        let catalog = self.store.archive.write_other(write)?;
+        let listed = self.store.snapshots().list().cloned().unwrap_or_default();
+        self.store.commit_snapshots(listed)?;
+        self.store.tidy_up();
+        Ok(catalog)
+    }
+}
+
+/// The error of a deletion after which kept scans remain that nothing needs, with what to do.
+fn scans_remain(error: Error, name: &SnapshotName) -> Error {
+    let hint = format!("the snapshot {name} is deleted, but points of scans that only it kept may remain");
+    match error {
+        Error::Io { path, action, cause } => {
+            let cause = io::Error::new(cause.kind(), format!("{cause}; {hint}: delete it again"));
+            Error::Io { path, action, cause }
+        }
+        Error::Damaged { path, tile, mut cause } => {
+            cause.reason.push_str(&format!("; {hint}: repair the map"));
+            Error::Damaged { path, tile, cause }
+        }
+        other => other,
+    }
+}
