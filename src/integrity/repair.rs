@@ -424,7 +424,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
     fn restore_table(&mut self, store: &mut TileStore, tile: TileIndex, why: &str) -> Result<bool> {
         let Some(version) = store.tiles().version(tile) else { return Ok(false) };
         // What cannot be listed or read is not there.
-        for flush_number in store.kept_tables(tile).unwrap_or_default() {
+        for flush_number in store.tables().kept(tile).unwrap_or_default() {
             let (kept, current) =
                 (self.layout.kept(tile, flush_number), self.layout.current(tile, TileFile::Table));
             if !matches!(checksum_of(self.disk, &kept), Ok(Some(found)) if found == version.table) {

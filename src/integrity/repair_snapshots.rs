@@ -111,7 +111,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         }
         for (tile, _) in &lost {
             snapshot.commits.tiles.remove(*tile);
-            let kept = store.kept_tables(*tile)?;
+            let kept = store.tables().kept(*tile)?;
             let Some(&flush_number) = kept.range(snapshot.commits.flush_number..).next() else { continue };
             self.quarantine_if_damaged(store, config, *tile, flush_number)?;
         }
@@ -146,7 +146,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         let mut kept: Vec<_> = store.snapshots().kept_tables().collect();
         kept.sort_unstable();
         for (tile, flush_number) in kept {
-            let flushes = store.kept_tables(tile)?;
+            let flushes = store.tables().kept(tile)?;
             let is_seen = |snapshot: &Snapshot| {
                 let first = flushes.range(snapshot.commits.flush_number..).next();
                 snapshot.commits.tiles.contains(tile) && first == Some(&flush_number)

@@ -26,7 +26,7 @@ pub(super) fn lost_tiles(
     let past = store.at(snapshot);
     let mut lost = Vec::new();
     for (tile, version) in snapshot.commits.tiles.iter() {
-        let kept = past.kept_tables(tile)?.range(snapshot.commits.flush_number..).next().copied();
+        let kept = past.tables().kept(tile)?.range(snapshot.commits.flush_number..).next().copied();
         let is_known = match kept {
             Some(flush_number) => whole.get(&(tile, flush_number)) == Some(&version),
             None => store.tiles().version(tile) == Some(version),

@@ -32,7 +32,7 @@ pub fn kept_bytes(folder: impl Into<MapPath>) -> Result<KeptBytes> {
     let mut kept: BTreeMap<TileIndex, BTreeSet<u64>> = BTreeMap::new();
     for name in disk.list(folder).map_err(|error| Error::io(folder, "list", error))? {
         let Some(tile) = tile_of_folder(&name) else { continue };
-        let flushes = store.kept_tables(tile)?;
+        let flushes = store.tables().kept(tile)?;
         if !flushes.is_empty() {
             kept.insert(tile, flushes);
         }

@@ -191,7 +191,7 @@ impl<'a> Reverter<'a> {
         else {
             return Ok(false);
         };
-        let stored = self.past.open_table(tile)?.ok_or_else(|| self.missing(tile))?;
+        let stored = self.past.tables().open(tile)?.ok_or_else(|| self.missing(tile))?;
         let path = stored.path.clone();
         // Whole and the one that the snapshot names, or an error before anything has changed.
         let read = read_stored_table(&self.config.grid, tile, stored)?;

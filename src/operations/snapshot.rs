@@ -132,7 +132,7 @@ impl Owners {
             }
             let kept = match self.kept.entry(tile) {
                 Entry::Occupied(kept) => kept.into_mut(),
-                Entry::Vacant(none) => none.insert(store.kept_tables(tile)?),
+                Entry::Vacant(none) => none.insert(store.tables().kept(tile)?),
             };
             let Some(&flush_number) = kept.range(snapshot.commits.flush_number..).next() else { continue };
             let one = Owner::One { snapshot: number, bytes: version.table.bytes };

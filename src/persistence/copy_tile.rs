@@ -17,7 +17,7 @@ pub(crate) fn copy_tile(
     scan_number: u64,
 ) -> Result<TileVersion> {
     let Some((StoredTile { path, mut input, bytes, .. }, version)) =
-        from.open_table(tile)?.and_then(|stored| stored.version.map(|version| (stored, version)))
+        from.tables().open(tile)?.and_then(|stored| stored.version.map(|version| (stored, version)))
     else {
         let reason = format!("{} has no checksums of {tile}", from.folder().display());
         return Err(Error::argument("tile", reason));

@@ -58,10 +58,10 @@ fn load_made<T>(
         }
         Ok(Some(table))
     };
-    let loaded = read(store.open_table(index));
+    let loaded = read(store.tables().open(index));
     if matches!(loaded, Err(Error::Damaged { .. })) {
-        for path in store.other_places(index)? {
-            match read(store.open_version(index, path)) {
+        for path in store.tables().other_places(index)? {
+            match read(store.tables().open_at(index, path)) {
                 Err(Error::Damaged { .. }) => {}
                 elsewhere => return elsewhere,
             }

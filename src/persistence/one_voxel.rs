@@ -24,7 +24,7 @@ const FIRST_BYTES: usize = 8 << 10;
 /// is wrong with it: whoever loads the tile hears what.
 pub(crate) fn read_voxel(store: &TileStore, grid: &Grid, voxel: VoxelIndex) -> Option<FoundVoxel> {
     let tile = grid.tile_of_voxel(voxel);
-    let location = store.table_location(tile).ok()??;
+    let location = store.tables().location_to_read(tile).ok()??;
     let (version, map_id) = (location.version()?, location.map_id()?);
     if location.storage() != Storage::Compact || !location.is_in_folder().ok()? {
         return None;

@@ -84,7 +84,7 @@ impl TileStore {
             Some(version) => {
                 let table = self.layout().current(tile, TileFile::Table);
                 let table = self.stored(table, Some((version.table, version.scan_number)));
-                files.push(self.at_places(table, self.other_places(tile)?));
+                files.push(self.at_places(table, self.tables().other_places(tile)?));
                 if self.layout().files().contains(&TileFile::Octree) {
                     let octree = self.layout().current(tile, TileFile::Octree);
                     let octree = self.stored(octree, Some((version.octree, version.scan_number)));
@@ -108,7 +108,7 @@ impl TileStore {
             if Some(seen) == version {
                 continue;
             }
-            let kept = self.kept_tables(tile)?;
+            let kept = self.tables().kept(tile)?;
             let Some(flush_number) = seen_by(Some(&kept), snapshot.commits.flush_number) else {
                 // It was in place a moment ago.
                 return Err(Error::Changed { path: self.folder().to_owned() });

@@ -2,8 +2,8 @@
 //!
 //! | module | content |
 //! |---|---|
-//! | `tile_store` | [`TileStore`]: opens maps and reads tiles; `commit/flush` commits |
-//! | `tiles` | versions of tiles, locations, writers, spill files |
+//! | `tile_store` | [`TileStore`]: opens maps; `commit/flush` commits |
+//! | `tiles` | [`TileVersions`]: which tiles there are; [`Tables`], to read them; writers, spill files |
 //! | `commit` | the commit log, `metadata.json`, the steps after a commit |
 //! | `scans` | number, time and origin of each scan; [`ScanArchive`]: the scans that a map keeps |
 //! | `snapshots` | snapshots, and replaced tables kept for them and for readers |
@@ -70,6 +70,7 @@ pub use tile_store::hex;
 pub(crate) use tile_store::id_from_hex;
 pub use tiles::file_checksum::{Checksumming, FileChecksum};
 pub use tiles::spill_file::{SpillFile, SpillFiles};
+pub use tiles::tables::Tables;
 pub use tiles::tile_location::{StoredTile, TileLocation};
 pub use tiles::tile_reader::TileReader;
 pub(crate) use tiles::tile_version::MAX_NUMBER;

@@ -4,25 +4,19 @@ use super::commit::commits::Commits;
 use super::commit::committer::Committer;
 use super::commit::metadata::Metadata;
 use super::disk::{Disk, DiskRead};
-use super::layout::{Layout, TileFile};
+use super::layout::Layout;
 use super::map_files::MapFiles;
 use super::map_folder;
 use super::place;
 use super::recovery::recover::{recover, remove_deleted_snapshots, remove_uncommitted, settle_own_files};
 use super::scans::{KeptAsOf, ScanArchive, ScanList};
 use super::snapshots::kept_tables::KeptTables;
-use super::snapshots::seen_tables::seen_by;
 use super::snapshots::snapshot_name::SnapshotName;
-use super::tiles::tile_location::{StoredTile, TileLocation};
-use super::tiles::tile_reader::TileReader;
-use super::tiles::tile_version::TileVersion;
+use super::tiles::tables::Tables;
 use super::tiles::tile_versions::TileVersions;
 use crate::error::{Error, FormatError, Result};
-use crate::space::TileIndex;
 use crate::store::WriterLock;
-use std::collections::BTreeSet;
-use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::{Arc, Mutex};
 
 /// The tiles of a map on disk, and the one commit point that makes a flush whole.
@@ -30,8 +24,8 @@ use std::sync::{Arc, Mutex};
 /// A tile is written beside its committed version, as `*.next`. [`TileStore::commit`] makes all of them durable,
 /// appends one synced record to the log (that is the commit), and renames them over the committed versions.
 ///
-/// This file opens maps and reads tiles; `flush` writes and commits. The kept scans are those of [`ScanArchive`], the
-/// snapshots those of [`Snapshots`](super::Snapshots).
+/// This file opens maps; `flush` writes and commits. Tables are read through [`Tables`], kept scans through
+/// [`ScanArchive`], snapshots through [`Snapshots`](super::Snapshots).
 #[derive(Debug)]
 pub struct TileStore {
     pub(super) files: MapFiles,
@@ -294,6 +288,11 @@ impl TileStore {
         &mut self.versions
     }
 
+    /// Their tables, to be read.
+    pub fn tables(&self) -> Tables<'_> {
+        Tables::of(self)
+    }
+
     /// The scans that the map keeps.
     pub fn archive(&self) -> &ScanArchive {
         &self.archive
@@ -336,132 +335,6 @@ impl TileStore {
     /// Bytes of memory that the next commit takes beside the index.
     pub fn commit_bytes(&self) -> usize {
         self.versions.commit_bytes() + self.scans.bytes() + self.archive.bytes()
-    }
-
-    /// Opens the latest version of a tile's table; `None` if the tile has none.
-    ///
-    /// # Errors
-    ///
-    /// A file that the log names and that is missing, and a tile folder that the log does not name.
-    pub fn open_table(&self, tile: TileIndex) -> Result<Option<StoredTile>> {
-        self.open_version(tile, self.table_path(tile)?)
-    }
-
-    /// Where a reader finds the table of a tile, to read a part of it; `None` if no log names it.
-    ///
-    /// # Errors
-    ///
-    /// A folder that cannot be listed.
-    pub fn table_location(&self, tile: TileIndex) -> Result<Option<TileLocation>> {
-        let Some(version) = self.versions.version(tile) else { return Ok(None) };
-        Ok(Some(self.location_at(tile, self.table_path(tile)?, Some(version))))
-    }
-
-    fn table_path(&self, tile: TileIndex) -> Result<PathBuf> {
-        match &self.opened_snapshot {
-            Some(_) => self.path_in_snapshot(tile),
-            None => Ok(self.latest_path(tile)),
-        }
-    }
-
-    /// Where a snapshot's version of a table is while no writer is at work.
-    fn path_in_snapshot(&self, tile: TileIndex) -> Result<PathBuf> {
-        let kept = self.kept_tables(tile)?;
-        Ok(match seen_by(Some(&kept), self.commits().flush_number) {
-            Some(flush_number) => self.layout().kept(tile, flush_number),
-            None => self.layout().current(tile, TileFile::Table),
-        })
-    }
-
-    /// The flushes as of which tables of a tile are kept beside the one in place.
-    ///
-    /// # Errors
-    ///
-    /// A folder that cannot be listed.
-    pub fn kept_tables(&self, tile: TileIndex) -> Result<BTreeSet<u64>> {
-        let folder = self.layout().tile_folder(tile);
-        match self.disk().list(&folder) {
-            // It tells when the table is opened.
-            Err(error) if matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => {
-                Ok(BTreeSet::new())
-            }
-            Err(error) => Err(Error::io(&folder, "list", error)),
-            Ok(names) => Ok(names.iter().filter_map(|name| self.layout().flush_of_kept(name)).collect()),
-        }
-    }
-
-    /// Other places where a reader beside a writer may find the version of a tile's table that it sees: committed and
-    /// waiting for its name, or already replaced and kept for readers. Empty for a writer.
-    ///
-    /// # Errors
-    ///
-    /// A folder that cannot be listed.
-    pub fn other_places(&self, tile: TileIndex) -> Result<Vec<PathBuf>> {
-        if self.committer.is_writer() {
-            return Ok(Vec::new());
-        }
-        let kept = self.kept_tables(tile)?.split_off(&self.commits().flush_number);
-        let kept = kept.into_iter().map(|flush_number| self.layout().kept(tile, flush_number));
-        let places = kept
-            .chain([self.layout().next(tile, TileFile::Table), self.layout().current(tile, TileFile::Table)]);
-        Ok(places.collect())
-    }
-
-    /// Opens one of [`TileStore::other_places`].
-    ///
-    /// # Errors
-    ///
-    /// As for [`TileStore::open_table`].
-    pub fn open_version(&self, tile: TileIndex, path: PathBuf) -> Result<Option<StoredTile>> {
-        if self.versions.is_orphan(tile) {
-            let reason = "commits.log does not name this tile";
-            return Err(FormatError::at_offset(0, reason).in_map(&path, Some(tile)));
-        }
-        let version = self.versions.version(tile);
-        if version.is_none() && !self.versions.is_foreign(tile) {
-            return Ok(None);
-        }
-        self.location_at(tile, path, version).open().map(Some)
-    }
-
-    /// Where the latest version of a tile's table is that is known to be there, for another thread to open it before
-    /// the next commit.
-    pub fn location(&self, tile: TileIndex) -> Option<TileLocation> {
-        let version = self.versions.version(tile)?;
-        Some(self.location_at(tile, self.latest_path(tile), Some(version)))
-    }
-
-    /// What finds tables beside this store; for a map with an id.
-    ///
-    /// # Errors
-    ///
-    /// [`Error::InvalidArgument`] for a map of the original format.
-    pub fn reader(&self) -> Result<TileReader> {
-        match self.map_id() {
-            Some(map_id) => Ok(TileReader::new(self.files.clone(), map_id)),
-            None => Err(Error::argument("map", "of the original format; its versions have no checksums")),
-        }
-    }
-
-    fn location_at(&self, tile: TileIndex, path: PathBuf, version: Option<TileVersion>) -> TileLocation {
-        let map_id = version.and_then(|_| self.map_id());
-        let folder = self.layout().tile_folder(tile);
-        TileLocation {
-            disk: self.disk().clone(),
-            tile,
-            folder,
-            path,
-            map_id,
-            version,
-            storage: self.layout().storage(),
-        }
-    }
-
-    fn latest_path(&self, tile: TileIndex) -> PathBuf {
-        match self.versions.is_uncommitted(tile) || self.checkpoint.is_unrenamed(tile) {
-            true => self.layout().next(tile, TileFile::Table),
-            false => self.layout().current(tile, TileFile::Table),
-        }
     }
 }
 

@@ -56,6 +56,7 @@ mod queries;
 /// Scans from files, good and bad.
 mod readers;
 /// Maps that follow their scans: poses move, scans and points go.
+mod remap_reads;
 mod remapping;
 mod remapping_beside;
 mod remapping_changed;

@@ -364,7 +364,7 @@ fn a_removal_counts_from_the_commit_on() {
     let tiles: Vec<_> = store.tiles().iter().collect();
     for &tile in &tiles {
         store.remove(tile).unwrap();
-        assert!(!store.tiles().contains(tile) && store.open_table(tile).unwrap().is_none());
+        assert!(!store.tiles().contains(tile) && store.tables().open(tile).unwrap().is_none());
     }
     assert_eq!(store.tiles().iter().count(), 0);
     drop(store);

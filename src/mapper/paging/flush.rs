@@ -81,7 +81,7 @@ impl TilePager<'_> {
         let bytes_beyond = flight_bytes.saturating_sub(self.contents.flush_reserve);
         self.evict_until(bytes_beyond, self.plan().tiles)?;
         let (inputs, scan_number) = (self.contents.inputs.clone(), self.contents.scan_number);
-        let files = self.store().reader()?;
+        let files = self.store().tables().reader()?;
         let (commit, writer) = self.wait(|disk| disk.begin_commit(&inputs, scan_number))?;
         let mut tiles = self.freeze_buffer();
         // What is being saved is not waited for here.
@@ -118,7 +118,8 @@ impl TilePager<'_> {
                 None => Base::Nothing,
             };
             let state = self.contents.freeze(index, on_disk);
-            let location = matches!(state.base, Base::OnDisk(_)).then(|| store.location(index)).flatten();
+            let location =
+                matches!(state.base, Base::OnDisk(_)).then(|| store.tables().location(index)).flatten();
             FlushedTile::Unapplied(Box::new(UnappliedTile { index, state, location }))
         });
         unapplied.collect()

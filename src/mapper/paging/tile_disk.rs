@@ -115,7 +115,7 @@ impl TileDisk {
 
     /// Begins to read a tile beside the mapper, if it is on disk.
     pub(super) fn prefetch(&mut self, index: TileIndex) {
-        if let Some(location) = self.store.location(index) {
+        if let Some(location) = self.store.tables().location(index) {
             let voxels = self.store.tiles().version(index).map_or(0, |version| version.voxels) as usize;
             self.threads.load(location, BYTES_OF_VOXEL.saturating_mul(voxels));
         }

@@ -487,7 +487,7 @@ impl TilePager<'_> {
         let store = self.disk.store();
         let versions = store.tiles().iter().filter_map(|tile| Some((tile, store.tiles().version(tile)?)));
         self.contents.views.watch_disk(bytes, versions, store.tiles().orphans().into_iter());
-        store.reader()
+        store.tables().reader()
     }
 
     pub(in crate::mapper) fn sync_octrees(&mut self) {

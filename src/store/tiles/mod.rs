@@ -2,6 +2,7 @@
 
 pub(super) mod file_checksum;
 pub(super) mod spill_file;
+pub(super) mod tables;
 pub(super) mod tile_location;
 pub(super) mod tile_reader;
 pub(super) mod tile_version;
