@@ -77,7 +77,7 @@ pub fn build_options(
     options.resolution_m = keywords.number("resolution")?;
     options.tile_size_m = keywords.number("tile_size")?;
     options.storage = keywords.one_of("storage", &STORAGES)?;
-    options.memory = keywords.bytes("memory")?.map(MemoryLimit::Bytes);
+    options.memory = keywords.bytes("memory")?.map_or(MemoryLimit::Default, MemoryLimit::Bytes);
     options.min_range_m = keywords.number("min_range")?;
     options.max_range_m = keywords.number("max_range")?;
     options.sensor_model = keywords.one_of("sensor_model", &SENSOR_MODELS)?;

@@ -37,7 +37,7 @@ fn map(disk: &FaultyDisk, config: MapConfig) -> voxtile::Digest {
 }
 
 fn reader(disk: &FaultyDisk, name: &str) -> Result<MapReader> {
-    MapReader::open(MapPath::on(disk.shared(), place(name)), 1)
+    MapReader::open(MapPath::on(disk.shared(), place(name)), 0)
 }
 
 fn converted(disk: &FaultyDisk, from: &str, to: &str, storage: Storage) -> Result<()> {

@@ -44,7 +44,7 @@ fn small_map(storage: Storage) -> FaultyDisk {
 
 /// What can be read of each tile.
 fn contents(disk: &FaultyDisk) -> voxtile::Result<Digests> {
-    let reader = MapReader::open(MapPath::on(disk.shared(), map()), 4)?;
+    let reader = MapReader::open(MapPath::on(disk.shared(), map()), 1 << 20)?;
     let mut contents = Digests::new();
     for index in reader.tile_indices() {
         if let Some(tile) = reader.tile(index)? {
@@ -148,7 +148,7 @@ fn check_every_damage(storage: Storage) {
 
 /// Reading says what is damaged, and the rest goes on.
 fn check_reading(disk: &FaultyDisk, before: &Digests, tile: Option<TileIndex>, is_derived: bool, what: &str) {
-    let reader = MapReader::open(MapPath::on(disk.shared(), map()), 4);
+    let reader = MapReader::open(MapPath::on(disk.shared(), map()), 1 << 20);
     let Ok(reader) = reader else {
         assert!(tile.is_none() && !is_derived, "{what}");
         assert!(matches!(reader, Err(Error::Damaged { .. })), "{what}: {reader:?}");
@@ -383,7 +383,7 @@ fn numbers_that_cannot_be_true_are_damage_and_not_counted_on() {
         hostile[payload.end..payload.end + 4].copy_from_slice(&crc.to_le_bytes());
         let disk = whole.copy();
         disk.put(log, &hostile);
-        let error = message_of(MapReader::open(MapPath::on(disk.shared(), map()), 1));
+        let error = message_of(MapReader::open(MapPath::on(disk.shared(), map()), 0));
         assert!(
             error.contains("exceeds 2^62") || error.contains("tile sizes or counts out of range"),
             "{error:#}"

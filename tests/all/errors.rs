@@ -30,7 +30,7 @@ fn a_cause_is_told_once_by_whoever_prints() {
         assert_eq!(format!("{error:#}"), whole);
         assert_eq!(format!("{:#}", error.context("after 3 scans")), format!("after 3 scans: {whole}"));
     }
-    let error = MapReader::open("/no/map/here", 1).err().unwrap();
+    let error = MapReader::open("/no/map/here", 0).err().unwrap();
     assert!(error.source().is_none(), "nothing is behind it");
     assert_eq!(format!("{error}"), format!("{error:#}"));
 }

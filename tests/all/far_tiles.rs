@@ -143,7 +143,7 @@ fn a_tile_at_the_end_of_the_world_costs_rays_little() {
         occupy(&mut out_of_core, points);
     }
     out_of_core.flush().unwrap();
-    let on_disk = MapReader::open(path, 16).unwrap();
+    let on_disk = MapReader::open(path, 1 << 20).unwrap();
     let maps: [&dyn Queries; 4] = [&in_memory, &out_of_core, &reader, &on_disk];
     for map in maps {
         check_far(map, &wall);

@@ -199,7 +199,7 @@ fn live_until_crash(disk: &FaultyDisk, oracle: &Oracle, reached: &mut Reached) -
             // writer a tenth of a second, and this disk has no clock.
             end_flush(disk, &mut mapper, look, reached, number)?;
         }
-        let reader = || MapReader::open(MapPath::on(disk.shared(), map()), 1);
+        let reader = || MapReader::open(MapPath::on(disk.shared(), map()), 0);
         readers.push(insist(disk, &mut (), nothing, |_| reader())?);
         if oracle.is_beside {
             reached.tried = number;
@@ -248,7 +248,7 @@ fn undisturbed(oracle: &Oracle) -> FaultyDisk {
 /// on from there to the same end.
 fn check_after_crash(disk: &FaultyDisk, oracle: &Oracle, reached: Reached, what: &str) {
     let allowed = [reached.safe, reached.tried, reached.failed];
-    match MapReader::open(MapPath::on(disk.shared(), map()), 1) {
+    match MapReader::open(MapPath::on(disk.shared(), map()), 0) {
         Ok(reader) => {
             assert!(allowed.contains(&(reader.scan_number() as usize)), "{what}: {reached:?}");
             oracle.check(&reader, what);
@@ -284,7 +284,7 @@ fn fail_once_at_every_operation(oracle: &Oracle) {
         assert!(reached.finished, "{fault:?}");
         // What was said to be safe is on the medium.
         let left = disk.after_crash(Unsynced::Dropped);
-        let reader = MapReader::open(MapPath::on(left.shared(), map()), 1)
+        let reader = MapReader::open(MapPath::on(left.shared(), map()), 0)
             .unwrap_or_else(|error| panic!("{fault:?}: {error:#}"));
         assert_eq!(reader.scan_number() as usize, oracle.scans.len(), "{fault:?}");
         oracle.check(&reader, &format!("{fault:?}"));
@@ -304,7 +304,7 @@ fn a_fault_that_stays_gives_no_wrong_answer_and_once_it_is_mended_the_map_goes_o
                 reached = live(&disk, &oracle);
             }
             assert!(reached.finished, "{operation}");
-            let reader = MapReader::open(MapPath::on(disk.shared(), map()), 1).unwrap();
+            let reader = MapReader::open(MapPath::on(disk.shared(), map()), 0).unwrap();
             oracle.check(&reader, &format!("operation {operation}"));
         }
     }
@@ -351,7 +351,7 @@ fn fail_and_crash_short_of_memory(oracle: &Oracle) {
             let reached = live(&disk, oracle);
             let left = disk.after_crash(Unsynced::Shuffled(at));
             if reached.finished {
-                let reader = MapReader::open(MapPath::on(left.shared(), map()), 1);
+                let reader = MapReader::open(MapPath::on(left.shared(), map()), 0);
                 oracle.check(&reader.unwrap_or_else(|error| panic!("{fault:?}: {error:#}")), "at the end");
             } else {
                 assert!(disk.has_crashed(), "{fault:?}");
@@ -408,7 +408,7 @@ fn crash_again_while_opening(oracle: &Oracle) {
                 drop(opened);
                 let what = format!("crash at {at}, {unsynced:?}, again at {again} of opening");
                 let left = recovering.after_crash(Unsynced::Shuffled(again));
-                match MapReader::open(MapPath::on(left.shared(), map()), 1) {
+                match MapReader::open(MapPath::on(left.shared(), map()), 0) {
                     Ok(reader) => {
                         let found = reader.scan_number() as usize;
                         assert!([reached.safe, reached.tried].contains(&found), "{what}");
@@ -556,7 +556,7 @@ fn a_failed_sync_and_then_a_full_disk_lose_nothing() {
             mapper.flush().unwrap_or_else(|error| panic!("at {at}, full {full}: {error:#}"));
             oracle.check(&mapper, "with room");
             let left = disk.after_crash(Unsynced::Dropped);
-            oracle.check(&MapReader::open(MapPath::on(left.shared(), map()), 1).unwrap(), "after a crash");
+            oracle.check(&MapReader::open(MapPath::on(left.shared(), map()), 0).unwrap(), "after a crash");
         }
     }
 }
@@ -632,7 +632,7 @@ fn a_map_of_the_seeds_format_is_adopted_whole_or_not_at_all() {
         {
             let left = disk.after_crash(unsynced);
             let what = format!("crash at {at}, {unsynced:?}");
-            let reader = MapReader::open(MapPath::on(left.shared(), map()), 1)
+            let reader = MapReader::open(MapPath::on(left.shared(), map()), 0)
                 .unwrap_or_else(|error| panic!("{what}: {error:#}"));
             let digest = reader.digest().unwrap_or_else(|error| panic!("{what}: {error:#}"));
             assert!(digest == after || (!done && digest == before), "{what}");
@@ -660,7 +660,7 @@ fn a_map_of_the_seeds_format_is_adopted_whole_or_not_at_all() {
     }
     // A reader that opened it before sees what it was.
     let disk = foreign.copy();
-    let reader = MapReader::open(MapPath::on(disk.shared(), map()), 1).unwrap();
+    let reader = MapReader::open(MapPath::on(disk.shared(), map()), 0).unwrap();
     adopt(&disk).unwrap();
     assert_eq!(reader.digest().unwrap(), before);
 }

@@ -51,7 +51,7 @@ fn long() -> FaultyDisk {
 }
 
 fn open(disk: &FaultyDisk) -> MapReader {
-    MapReader::open(MapPath::on(disk.shared(), map()), 1).unwrap()
+    MapReader::open(MapPath::on(disk.shared(), map()), 0).unwrap()
 }
 
 fn bits(evidence: Option<Evidence>) -> Option<(u64, i32)> {
@@ -69,7 +69,7 @@ fn the_first_voxel_is_the_one_of_the_whole_tile_in_both_storages() {
         let disk = small(storage, seed);
         let snapshot = || {
             let (map, name) = (MapPath::on(disk.shared(), map()), SnapshotName::new("first").unwrap());
-            MapReader::open_snapshot(map, &name, 1).unwrap()
+            MapReader::open_snapshot(map, &name, 0).unwrap()
         };
         let mut observed = 0;
         for (whole, first) in

@@ -61,10 +61,10 @@ fn name(name: &str) -> SnapshotName {
 
 /// What is known of a map without changing it.
 fn described(map: &Path) -> Value {
-    let reader = MapReader::open(map, 4).unwrap();
+    let reader = MapReader::open(map, 1 << 20).unwrap();
     let mut described = json!({ "digest": digest(&reader), "scans": reader.scan_number() });
     if map.join("snapshots/first").is_file() {
-        described["first"] = digest(&MapReader::open_snapshot(map, &name("first"), 4).unwrap());
+        described["first"] = digest(&MapReader::open_snapshot(map, &name("first"), 1 << 20).unwrap());
     }
     described
 }

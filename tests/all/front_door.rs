@@ -224,7 +224,7 @@ fn whatever_holds_a_map_gives_its_answers() {
     let live = out_of_core.reader().unwrap();
     let view = live.view();
     let (reader, snapshot) =
-        (MapReader::open(&path, 3).unwrap(), MapReader::open_snapshot(&path, &name, 2).unwrap());
+        (MapReader::open(&path, 0).unwrap(), MapReader::open_snapshot(&path, &name, 0).unwrap());
     let united = United::new(&[&in_memory, &live]).unwrap();
     let maps: [(&str, &dyn Queries); 7] = [
         ("in memory", &in_memory),

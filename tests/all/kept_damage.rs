@@ -101,16 +101,16 @@ fn files_of_scans(disk: &FaultyDisk) -> BTreeMap<PathBuf, Vec<u8>> {
 }
 
 fn digest(disk: &FaultyDisk) -> String {
-    MapReader::open(at(disk), 1).unwrap().digest().unwrap().to_string()
+    MapReader::open(at(disk), 0).unwrap().digest().unwrap().to_string()
 }
 
 fn flush_number(disk: &FaultyDisk) -> u64 {
-    MapReader::open(at(disk), 1).unwrap().flush_number()
+    MapReader::open(at(disk), 0).unwrap().flush_number()
 }
 
 /// The numbers of the scans that can be read with their points.
 fn kept(disk: &FaultyDisk) -> Result<Vec<u64>> {
-    MapReader::open(at(disk), 1)?.kept_scans()?.map(|scan| scan.map(|scan| scan.number())).collect()
+    MapReader::open(at(disk), 0)?.kept_scans()?.map(|scan| scan.map(|scan| scan.number())).collect()
 }
 
 fn damage_in(disk: &FaultyDisk) -> BTreeSet<PathBuf> {
@@ -273,7 +273,7 @@ fn a_repair_of_a_snapshots_scans_that_the_power_ends_is_completed_by_another() {
             drop(TileStore::open(disk.shared(), map()).unwrap());
             repaired(&disk, &what);
             assert_eq!(kept(&disk).unwrap(), [1, 4, 5], "{what}");
-            let past = MapReader::open_snapshot(at(&disk), &name("s"), 1).unwrap();
+            let past = MapReader::open_snapshot(at(&disk), &name("s"), 0).unwrap();
             assert_eq!(past.kept_scans().unwrap().count(), 2, "{what}");
             insert(&disk, 6).unwrap();
             let left = disk.files();
@@ -331,7 +331,7 @@ fn a_map_whose_log_names_no_catalog_opens_and_names_it_from_the_next_flush_on() 
     ["commits.log", "snapshots/s", "snapshots/t"]
         .iter()
         .for_each(|path| forget_catalog(&disk, &map().join(path)));
-    let mut metadata = MapReader::open(at(&disk), 1).unwrap().metadata().clone();
+    let mut metadata = MapReader::open(at(&disk), 0).unwrap().metadata().clone();
     metadata.ext.as_mut().unwrap().catalog = None;
     disk.put(&map().join("metadata.json"), metadata.to_text().as_bytes());
     let disk = disk.copy();
@@ -458,7 +458,7 @@ fn no_removed_scan_returns_where_log_and_metadata_are_damaged() {
                 kept_scans.iter().filter(|(_, bytes)| is_gone(bytes)).map(|(path, _)| path).collect();
             // What a flush wrote that the log does not tell of any more is cut off, as after a crash.
             assert!(is_earlier || gone.is_empty(), "{what}: {gone:?} are gone: {repair:?}");
-            let past = MapReader::open_snapshot(at(&damaged), &name("s"), 1).unwrap();
+            let past = MapReader::open_snapshot(at(&damaged), &name("s"), 0).unwrap();
             assert_eq!(past.kept_scans().unwrap().count(), 4, "{what}");
             insert(&damaged, 6).unwrap();
             assert_eq!(damage_in(&damaged), BTreeSet::new(), "{what}");

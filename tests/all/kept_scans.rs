@@ -67,7 +67,7 @@ fn kept_points(disk: &FaultyDisk) -> Result<Vec<Vec<[f64; 3]>>> {
         })?;
         Ok(points)
     };
-    MapReader::open(at(disk), 1)?.kept_scans()?.map(of_scan).collect()
+    MapReader::open(at(disk), 0)?.kept_scans()?.map(of_scan).collect()
 }
 
 /// Segments that could not be synced may be left behind.
@@ -446,7 +446,7 @@ fn a_repair_without_metadata_and_log_keeps_the_kept_scans_of_snapshots() {
         go_on(&disk);
         assert!(has_all(&disk, &files));
         if is_whole {
-            let past = MapReader::open_snapshot(at(&disk), &name, 1).unwrap();
+            let past = MapReader::open_snapshot(at(&disk), &name, 0).unwrap();
             assert_eq!(past.kept_scans().unwrap().count(), 3);
         }
     }

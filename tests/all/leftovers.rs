@@ -214,7 +214,7 @@ fn all_works() -> Vec<(&'static str, FaultyDisk, Work)> {
 
 /// What `info` says of the bytes on disk: of the map, and of readers.
 fn bytes_of(disk: &FaultyDisk) -> (Option<(u64, u64)>, u64) {
-    let reader = MapReader::open(at(disk), 1).unwrap();
+    let reader = MapReader::open(at(disk), 0).unwrap();
     (reader.disk_bytes(), kept_bytes(at(disk)).unwrap().reader_bytes)
 }
 
@@ -294,7 +294,7 @@ fn segments(disk: &FaultyDisk) -> (BTreeSet<String>, u64) {
         name.starts_with("segment.").then_some(name)
     };
     let found = disk.files().keys().filter_map(is_segment).collect();
-    (found, MapReader::open(at(disk), 1).unwrap().kept_scans().unwrap().count() as u64)
+    (found, MapReader::open(at(disk), 0).unwrap().kept_scans().unwrap().count() as u64)
 }
 
 /// A map of three scans in one segment.
@@ -512,7 +512,7 @@ fn a_removal_removes_the_second_map_of_a_remapping_that_was_killed() {
 }
 
 fn digest(disk: &FaultyDisk) -> voxtile::Digest {
-    MapReader::open(at(disk), 1).unwrap().digest().unwrap()
+    MapReader::open(at(disk), 0).unwrap().digest().unwrap()
 }
 
 fn names(disk: &FaultyDisk) -> Vec<String> {

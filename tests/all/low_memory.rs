@@ -127,7 +127,7 @@ fn a_tile_that_is_flushed_overtakes_no_older_version_of_itself() {
             expected.insert_scan(scan).unwrap();
             if number % 6 == 5 {
                 mapper.flush().unwrap();
-                let reader = MapReader::open(MapPath::on(disk.clone(), &path), 2).unwrap();
+                let reader = MapReader::open(MapPath::on(disk.clone(), &path), 0).unwrap();
                 assert_eq!(reader.digest().unwrap(), expected.digest().unwrap(), "after scan {number}");
             }
         }
@@ -163,7 +163,7 @@ fn updates_of_tiles_on_disk_wait_in_files_until_they_are_worth_reading_them() {
         assert!(loads < most_loads_of_tile, "{loads} reads a tile in {bytes} bytes");
         assert_eq!(mapper.digest().unwrap(), digest);
         mapper.flush().unwrap();
-        assert_eq!(MapReader::open(&path, 2).unwrap().digest().unwrap(), digest);
+        assert_eq!(MapReader::open(&path, 0).unwrap().digest().unwrap(), digest);
         let statistics = mapper.statistics();
         assert_eq!(statistics.spilled_bytes, 0);
         let written = statistics.io.bytes_written as f64 / statistics.disk_bytes as f64;
@@ -211,10 +211,10 @@ fn a_flush_that_stands_still_stops_no_scan() {
     let _ = end.send(());
     assert!(holder.join().unwrap(), "a scan waited");
     mapper.end_flush().unwrap();
-    assert_eq!(MapReader::open(&path, 1).unwrap().digest().unwrap(), as_of_flush);
+    assert_eq!(MapReader::open(&path, 0).unwrap().digest().unwrap(), as_of_flush);
     assert_eq!(mapper.digest().unwrap(), expected.digest().unwrap());
     mapper.flush().unwrap();
-    assert_eq!(MapReader::open(&path, 1).unwrap().digest().unwrap(), expected.digest().unwrap());
+    assert_eq!(MapReader::open(&path, 0).unwrap().digest().unwrap(), expected.digest().unwrap());
 }
 
 /// A flush beside the mapper has lists of its tiles, which nothing could make room for if these are small and many.
@@ -238,7 +238,7 @@ fn a_flush_of_very_many_small_tiles_is_done_at_once() {
     mapper.begin_flush().unwrap();
     assert!(!mapper.is_flushing());
     assert_eq!(mapper.flushed_scan_number(), 1);
-    assert_eq!(MapReader::open(&path, 1).unwrap().digest().unwrap(), expected.digest().unwrap());
+    assert_eq!(MapReader::open(&path, 0).unwrap().digest().unwrap(), expected.digest().unwrap());
     // A few tiles go beside the mapper, however many there are.
     mapper.insert_points(&ScanRef::in_world([0.0; 3], &[[3.0, 0.0, 0.0]])).unwrap();
     mapper.begin_flush().unwrap();
@@ -261,7 +261,7 @@ fn tables_that_are_kept_for_a_reader_count_as_memory() {
             mapper.statistics().memory.index
         };
         insert(0.2);
-        let reader = is_read.then(|| MapReader::open(&*map, 1).unwrap());
+        let reader = is_read.then(|| MapReader::open(&*map, 0).unwrap());
         let bytes = insert(0.7);
         drop(reader);
         bytes

@@ -63,7 +63,7 @@ impl Life {
 
     /// The number of the state that a map is in, among these.
     fn state_of(&self, disk: &FaultyDisk, among: &[usize], what: &str) -> usize {
-        let reader = match MapReader::open(MapPath::on(disk.shared(), map()), 1) {
+        let reader = match MapReader::open(MapPath::on(disk.shared(), map()), 0) {
             Err(Error::NoMap { .. }) if among.contains(&0) => return 0,
             opened => opened.unwrap_or_else(|error| panic!("{what}: {error:#}")),
         };
@@ -122,7 +122,7 @@ fn name(name: &str) -> SnapshotName {
 
 fn state_seen(disk: &FaultyDisk, reader: &MapReader) -> State {
     let (voxels, scan_number) = (voxels_of(reader), reader.scan_number());
-    let open = |name| MapReader::open_snapshot(MapPath::on(disk.shared(), map()), &name, 1).unwrap();
+    let open = |name| MapReader::open_snapshot(MapPath::on(disk.shared(), map()), &name, 0).unwrap();
     let infos = voxtile::operations::snapshots(MapPath::on(disk.shared(), map())).unwrap().into_iter();
     let readers = infos.map(|info| open(name(&info.name)));
     let snapshots = readers.map(|reader| {
@@ -141,7 +141,7 @@ fn check_whole(disk: &FaultyDisk, what: &str) -> Verification {
 /// Nothing is damaged, and nothing lies around.
 fn check_files(disk: &FaultyDisk, what: &str) {
     assert_eq!(check_whole(disk, what).notes, 0, "{what}");
-    let reader = MapReader::open(MapPath::on(disk.shared(), map()), 1).unwrap();
+    let reader = MapReader::open(MapPath::on(disk.shared(), map()), 0).unwrap();
     let tiles = reader.tile_indices();
     for path in disk.files().into_keys() {
         let folder = path.parent().and_then(|folder| folder.file_name()?.to_str()).unwrap();
@@ -344,7 +344,7 @@ fn a_reader_goes_on_seeing_removed_tiles() {
     let life = removals();
     let disk = FaultyDisk::new(Fault::None);
     for (number, action) in life.acts.iter().enumerate() {
-        let reader = MapReader::open(MapPath::on(disk.shared(), map()), 1);
+        let reader = MapReader::open(MapPath::on(disk.shared(), map()), 0);
         let digest = reader.as_ref().ok().map(|reader| reader.digest().unwrap());
         act(&disk, action).unwrap();
         if let Ok(reader) = reader {

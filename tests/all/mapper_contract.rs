@@ -111,7 +111,7 @@ fn out_of_core_equals_the_naive_map_for_any_cache_and_after_flush_and_reopen() {
             }
             assert_eq!(voxels_of(&mapper), reference.voxels, "after reopening");
             mapper.flush().unwrap();
-            let reader = MapReader::open(folder.path().join("map"), 2).unwrap();
+            let reader = MapReader::open(folder.path().join("map"), 20_000).unwrap();
             assert_eq!(voxels_of(&reader), reference.voxels, "by a reader");
             assert_eq!(reader.voxel_counts().unwrap().0, reference.voxels.len() as u64);
             digests.push(reader.digest().unwrap());

@@ -103,7 +103,7 @@ fn dirty_tiles_and_waiting_updates_are_in_the_file_and_the_tiles_in_memory_stay(
     assert_eq!((after.buffered_updates, map.cached_tile_indices()), (before.0.buffered_updates, before.1));
     assert_eq!((after.dirty_tiles, after.io.saves), (before.0.dirty_tiles, before.0.io.saves));
     map.flush().unwrap();
-    check(&MapReader::open(folder.path().join("map"), 1).unwrap(), None);
+    check(&MapReader::open(folder.path().join("map"), 0).unwrap(), None);
 }
 
 fn update(map: &mut impl Mapper, voxels: impl IntoIterator<Item = ([i32; 3], u32)>) {
@@ -293,7 +293,7 @@ fn a_damaged_tile_ends_the_export() -> Result<()> {
     let mut bytes = std::fs::read(&table).unwrap();
     bytes[20] ^= 1;
     std::fs::write(&table, bytes).unwrap();
-    let error = streamed(&MapReader::open(&path, 1)?, OctreeFormat::Ot, None, 1000).unwrap_err();
+    let error = streamed(&MapReader::open(&path, 0)?, OctreeFormat::Ot, None, 1000).unwrap_err();
     assert!(matches!(error.downcast_ref(), Some(Error::Damaged { .. })), "{error}");
     Ok(())
 }

@@ -65,7 +65,7 @@ fn a_reader_keeps_to_its_bytes_and_gives_the_same_answers() {
     }
     mapper.flush().unwrap();
     let small = MapOptions::new().memory_bytes(BYTES).open_read_only(&place).unwrap();
-    let all = MapReader::open(&place, 100_000).unwrap();
+    let all = MapReader::open(&place, 1 << 30).unwrap();
     let mut most = 0;
     for _ in 0..2000 {
         let point = random.point([0.0; 3], 9.0);

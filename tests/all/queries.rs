@@ -169,7 +169,7 @@ fn at_the_finest_depth_an_octree_answers_as_the_table_does() {
     let folder = TempDir::new().unwrap();
     let (in_memory, mut out_of_core) = maps(&folder);
     out_of_core.flush().unwrap();
-    let reader = MapReader::open(folder.path().join("map"), 4).unwrap();
+    let reader = MapReader::open(folder.path().join("map"), 100_000).unwrap();
     let voxels = {
         let mut voxels = Vec::new();
         in_memory.for_each_occupied(Some(0.0), None, |voxel| voxels.push(voxel)).unwrap();
@@ -274,7 +274,7 @@ fn occupied_voxels_of_a_map_on_disk_are_those_of_its_tables_in_their_order() {
         let mut count = 0;
         for threads in [1, 5] {
             // Some of the tiles in memory, others not.
-            let reader = MapReader::open(&path, 3).unwrap();
+            let reader = MapReader::open(&path, 100_000).unwrap();
             reader.occupancy_at([0.0; 3]).unwrap();
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             for least in [None, Some(0.0), Some(0.3), Some(0.999), Some(1.0)] {
@@ -388,7 +388,7 @@ fn free_space_is_passed_over_only_where_it_is_free() {
             mapper.flush().unwrap();
             check_by_every_voxel(&mapper, &mut random);
             drop(mapper);
-            check_by_every_voxel(&MapReader::open(&path, 64).unwrap(), &mut random);
+            check_by_every_voxel(&MapReader::open(&path, 1 << 30).unwrap(), &mut random);
         }
     }
 }
@@ -405,7 +405,7 @@ fn many_points_are_answered_in_their_order() {
     points[8] = [1e300, 0.0, 0.0];
     let occupied = map.all_occupied_voxels(None).unwrap();
     points.extend(occupied.iter().map(|voxel| map.config().grid.center_m(voxel.index)));
-    let reader = MapReader::open(folder.path().join("map"), 2).unwrap();
+    let reader = MapReader::open(folder.path().join("map"), 100_000).unwrap();
     let live = out_of_core.reader().unwrap();
     let one_by_one: Vec<_> = points.iter().map(|&point| map.occupancy_at(point).unwrap()).collect();
     assert!(one_by_one.iter().any(Occupancy::is_occupied) && one_by_one.contains(&Occupancy::Unknown));

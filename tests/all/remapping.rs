@@ -239,7 +239,7 @@ fn is_as(reader: &MapReader, config: &MapConfig, scans: &Scans) -> bool {
 }
 
 fn is_in_state(disk: &FaultyDisk, config: &MapConfig, state: &State) -> bool {
-    let reader = match MapReader::open(at(disk), 1) {
+    let reader = match MapReader::open(at(disk), 0) {
         Err(Error::NoMap { .. }) => return state.scans.1 == 0,
         opened => opened.unwrap(),
     };
@@ -248,7 +248,7 @@ fn is_in_state(disk: &FaultyDisk, config: &MapConfig, state: &State) -> bool {
     names.iter().eq(state.snapshots.keys())
         && is_as(&reader, config, &state.scans)
         && state.snapshots.iter().all(|(of, scans)| {
-            is_as(&MapReader::open_snapshot(at(disk), &name(of), 1).unwrap(), config, scans)
+            is_as(&MapReader::open_snapshot(at(disk), &name(of), 0).unwrap(), config, scans)
         })
 }
 
@@ -520,7 +520,7 @@ fn segments_and_catalogs_that_are_missing_are_damage() {
         assert!(damage > 0);
         repair(at(&disk), |_| (), |_, _| ()).unwrap();
         check_whole(&disk, "repaired");
-        let reader = MapReader::open(at(&disk), 1).unwrap();
+        let reader = MapReader::open(at(&disk), 0).unwrap();
         assert_eq!(voxels_of(&reader), naive_map(&config(), &state.scans.0));
     }
 }
@@ -553,7 +553,7 @@ fn what_is_no_scan_is_named_and_refused() {
     mapper.flush().unwrap();
     drop(mapper);
     assert!(refused(&disk).contains("scan 1, whose points are not kept"), "{}", refused(&disk));
-    assert_eq!(MapReader::open(at(&disk), 1).unwrap().scans().unwrap().len(), 3);
+    assert_eq!(MapReader::open(at(&disk), 0).unwrap().scans().unwrap().len(), 3);
 
     // In the world frame there is no pose that could change.
     let disk = FaultyDisk::new(Fault::None);
@@ -591,7 +591,7 @@ fn new_poses_that_do_not_fit_are_named() {
 #[test]
 fn scans_that_hardly_move_are_left_alone_and_told() {
     let (disk, state) = a_map_with_kept_scans();
-    let digest = MapReader::open(at(&disk), 1).unwrap().digest().unwrap();
+    let digest = MapReader::open(at(&disk), 0).unwrap().digest().unwrap();
     let moved = |by_m: f64| {
         let poses = state.scans.0.iter().map(|(&number, scan)| {
             let mut isometry = *scan.pose.isometry();
@@ -605,7 +605,7 @@ fn scans_that_hardly_move_are_left_alone_and_told() {
     assert_eq!((remapped.scans_within_tolerance, remapped.mapped.scans_changed), (4, 1), "{remapped:?}");
     let left_m = remapped.largest_move_left_m;
     assert!((left_m - 0.04).abs() < 1e-9 && (remapped.largest_move_m - 0.05).abs() < 1e-9);
-    assert!(MapReader::open(at(&disk), 1).unwrap().digest().unwrap() != digest);
+    assert!(MapReader::open(at(&disk), 0).unwrap().digest().unwrap() != digest);
     let wide = Remap::new(rework().with_dry_run(true)).with_tolerance((9.0, 9.0));
     assert_eq!(
         remap(&scans(&disk).unwrap(), &moved(0.02), &wide, |_, _| ()).unwrap().mapped.scans_changed,
@@ -659,7 +659,7 @@ fn scans_are_removed_by_time_and_by_input_and_snapshots_are_told() {
     assert!(message.contains("it has first, second"), "{message}");
     let removed = remove(ScanSelection::Input("second".to_owned()), false).unwrap();
     assert_eq!((removed.scans_removed, removed.snapshots_with_them.len()), (2, 1));
-    let reader = MapReader::open(at(&disk), 1).unwrap();
+    let reader = MapReader::open(at(&disk), 0).unwrap();
     let left: BTreeMap<_, _> = (0..3).map(|seed| (seed + 1, Taken::new(seed, 5))).collect();
     assert!(is_as(&reader, &config(), &(left, 5)));
     // Their numbers stay theirs: the next scan is the sixth.
@@ -758,7 +758,7 @@ fn a_snapshot_that_cannot_be_read_is_told_after_the_others_are_gone() {
     let message = message_of(remove());
     assert!(is_told(&message), "{message}");
     assert_eq!(snapshot_names(&disk), ["first", "second"]);
-    assert_eq!(MapReader::open(at(&disk), 1).unwrap().scans().unwrap().len(), 3);
+    assert_eq!(MapReader::open(at(&disk), 0).unwrap().scans().unwrap().len(), 3);
     delete_snapshot(at(&disk), &name("second")).unwrap();
     let removed = remove().unwrap();
     assert_eq!((removed.scans_removed, removed.snapshots_deleted.len()), (0, 0));
@@ -783,7 +783,7 @@ fn a_removal_that_ended_between_map_and_snapshots_is_completed() {
         let disk = disk.after_kill();
         remove(&disk).unwrap_or_else(|error| panic!("{fault:?}: {error:#}"));
         assert_eq!(snapshot_names(&disk), left, "{fault:?}");
-        assert_eq!(MapReader::open(at(&disk), 1).unwrap().scans().unwrap().len(), 3, "{fault:?}");
+        assert_eq!(MapReader::open(at(&disk), 0).unwrap().scans().unwrap().len(), 3, "{fault:?}");
         check_files(&disk, &format!("{fault:?}"));
     }
 }

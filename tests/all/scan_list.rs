@@ -39,7 +39,7 @@ fn expected(scans: u64) -> Vec<ScanRecord> {
 }
 
 fn scans_of(folder: &Path) -> Vec<ScanRecord> {
-    MapReader::open(folder, 4).unwrap().scans().unwrap()
+    MapReader::open(folder, 1 << 20).unwrap().scans().unwrap()
 }
 
 #[test]
@@ -60,7 +60,7 @@ fn a_map_lists_the_scans_of_its_last_flush() {
     mapper.flush().unwrap();
     assert_eq!(scans_of(&map), expected(7));
     let other = folder.path().join("other");
-    convert(&MapReader::open(&map, 4).unwrap(), &other, Storage::Compact, |_, _| ()).unwrap();
+    convert(&MapReader::open(&map, 1 << 20).unwrap(), &other, Storage::Compact, |_, _| ()).unwrap();
     assert_eq!(scans_of(&other), expected(7));
 }
 
@@ -129,7 +129,7 @@ fn a_list_that_was_cut_or_removed_is_found() {
 /// Damage in the list at a byte is found, and repaired up to it.
 fn check_damage(map: &Path, at: usize, what: &str) {
     assert!(!verify(map, |_| (), |_, _| ()).unwrap().is_whole(), "{what}");
-    assert!(MapReader::open(map, 4).unwrap().scans().is_err(), "{what}");
+    assert!(MapReader::open(map, 1 << 20).unwrap().scans().is_err(), "{what}");
     repair(map, |_| (), |_, _| ()).unwrap();
     let kept = at.saturating_sub(16) as u64 / 64;
     assert_eq!(scans_of(map), expected(kept), "{what}");

@@ -85,7 +85,7 @@ fn the_map_and_the_reports_are_those_of_one_scan_after_the_other_for_any_threads
             assert_eq!(digest, wanted.1, "{threads} threads, {bytes:?} bytes");
             mapper.flush().unwrap();
             drop(mapper);
-            let reader = MapReader::open(folder.path().join("map"), 4).unwrap();
+            let reader = MapReader::open(folder.path().join("map"), 1 << 20).unwrap();
             assert_eq!(reader.digest().unwrap().to_string(), wanted.1);
             let listed: Vec<u64> = reader.scans().unwrap().iter().map(|scan| scan.number).collect();
             assert_eq!(listed, (1..=scans.len() as u64).collect::<Vec<_>>());

@@ -47,8 +47,8 @@ fn with_two() -> (FaultyDisk, [String; 2]) {
 
 fn digest_of(disk: &FaultyDisk, snapshot: Option<&str>) -> Result<String> {
     let reader = match snapshot {
-        Some(of) => MapReader::open_snapshot(MapPath::on(disk.shared(), map()), &name(of), 2)?,
-        None => MapReader::open(MapPath::on(disk.shared(), map()), 2)?,
+        Some(of) => MapReader::open_snapshot(MapPath::on(disk.shared(), map()), &name(of), 1 << 20)?,
+        None => MapReader::open(MapPath::on(disk.shared(), map()), 1 << 20)?,
     };
     Ok(reader.digest()?.to_string())
 }

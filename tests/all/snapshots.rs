@@ -39,7 +39,7 @@ fn check_snapshots(disk: &Arc<dyn Disk>, map: &Path, naive: &Naive, what: &str) 
     let infos = snapshots(MapPath::on(disk.clone(), map)).unwrap();
     assert_eq!(infos.len(), naive.snapshots.len(), "{what}");
     for (of, (voxels, scans)) in &naive.snapshots {
-        let reader = MapReader::open_snapshot(MapPath::on(disk.clone(), map), &name(of), 2).unwrap();
+        let reader = MapReader::open_snapshot(MapPath::on(disk.clone(), map), &name(of), 1 << 20).unwrap();
         assert_eq!((voxels_of(&reader), reader.scan_number()), (voxels.clone(), *scans), "{what}: {of}");
         let numbers: Vec<u64> = reader.scans().unwrap().iter().map(|scan| scan.number).collect();
         assert_eq!(numbers, (1..=*scans).collect::<Vec<_>>(), "{what}: {of}");
@@ -147,8 +147,8 @@ fn small(storage: Storage) -> (FaultyDisk, PathBuf, Vec<String>) {
 
 fn digest_of(disk: &FaultyDisk, map: &Path, snapshot: Option<&str>) -> voxtile::Result<String> {
     let reader = match snapshot {
-        Some(of) => MapReader::open_snapshot(MapPath::on(disk.shared(), map), &name(of), 2)?,
-        None => MapReader::open(MapPath::on(disk.shared(), map), 2)?,
+        Some(of) => MapReader::open_snapshot(MapPath::on(disk.shared(), map), &name(of), 1 << 20)?,
+        None => MapReader::open(MapPath::on(disk.shared(), map), 1 << 20)?,
     };
     Ok(reader.digest()?.to_string())
 }
@@ -158,7 +158,7 @@ fn a_revert_brings_back_all_of_it_and_readers_go_on_seeing_what_they_saw() {
     for storage in [Storage::OctoMap, Storage::Compact] {
         for disk in [small(storage).0, small(storage).0.without_links()] {
             let (_, map, digests) = small(storage);
-            let reader = MapReader::open(MapPath::on(disk.shared(), &map), 1).unwrap();
+            let reader = MapReader::open(MapPath::on(disk.shared(), &map), 0).unwrap();
             let reverted =
                 revert(MapPath::on(disk.shared(), &map), &name("first"), Some(&name("third")), |_, _| ())
                     .unwrap();
@@ -286,7 +286,7 @@ fn wrong_names_and_other_refusals_say_what_to_do() {
     for error in [
         revert("none", Some("kept")),
         delete_snapshot(MapPath::on(disk.shared(), &map), &name("none")).unwrap_err(),
-        MapReader::open_snapshot(MapPath::on(disk.shared(), &map), &name("none"), 1).unwrap_err(),
+        MapReader::open_snapshot(MapPath::on(disk.shared(), &map), &name("none"), 0).unwrap_err(),
     ] {
         assert!(error.to_string().contains("`voxtile snapshots /map` lists them"), "{error:#}");
     }
@@ -313,7 +313,7 @@ fn a_map_of_the_seeds_format_is_adopted_by_its_first_snapshot() {
         }
     }
     snapshot(MapPath::on(disk.shared(), &map), &name("adopted")).unwrap();
-    assert!(MapReader::open(MapPath::on(disk.shared(), &map), 1).unwrap().is_verified());
+    assert!(MapReader::open(MapPath::on(disk.shared(), &map), 0).unwrap().is_verified());
     assert_eq!(digest_of(&disk, &map, Some("adopted")).unwrap(), digests[2]);
 }
 
@@ -568,8 +568,8 @@ fn a_diff_counts_what_a_naive_one_counts() {
     };
     let (a, b) = (build("a", Storage::OctoMap, 0..6), build("b", Storage::Compact, 3..8));
     let empty = build("empty", Storage::OctoMap, 0..0);
-    let open = |map: &Path| MapReader::open(map, 2).unwrap();
-    let at = |seed: u64| MapReader::open_snapshot(&a, &name(&format!("s{seed}")), 2).unwrap();
+    let open = |map: &Path| MapReader::open(map, 1 << 20).unwrap();
+    let at = |seed: u64| MapReader::open_snapshot(&a, &name(&format!("s{seed}")), 1 << 20).unwrap();
     let pairs = [
         (at(0), at(5)),
         (at(4), at(2)),

@@ -30,7 +30,7 @@ fn far_negative_and_border_tiles_come_back_to_the_bit() {
         reference.insert_scan(&scan);
     }
     mapper.flush().unwrap();
-    let reader = MapReader::open(&path, 4).unwrap();
+    let reader = MapReader::open(&path, 1 << 20).unwrap();
     assert_eq!(voxels_of(&reader), reference.voxels);
     for (voxel, (bits, count)) in reference.voxels.iter().step_by(97) {
         let found = reader.voxel_at(config.grid.center_m(*voxel)).unwrap().unwrap();

@@ -48,14 +48,14 @@ fn copy(from: &Path, to: &Path) {
 fn what_came_after_the_last_flush_is_lost_whole_and_nothing_else() {
     let folder = TempDir::new().unwrap();
     let path = map(&folder);
-    let flushed = voxels_of(&MapReader::open(&path, 4).unwrap());
+    let flushed = voxels_of(&MapReader::open(&path, 1 << 20).unwrap());
     let mut mapper = open(&path).unwrap();
     for seed in 10..14 {
         // Evictions write tiles all the while.
         mapper.insert_scan(&random_scan(&mut Random(seed), [0.5; 3], 30)).unwrap();
     }
     assert!(!mapper.take_saved_tiles().is_empty());
-    assert_eq!(voxels_of(&MapReader::open(&path, 4).unwrap()), flushed, "a reader beside the writer");
+    assert_eq!(voxels_of(&MapReader::open(&path, 1 << 20).unwrap()), flushed, "a reader beside the writer");
     let crashed = folder.path().join("crashed");
     copy(&path, &crashed);
     let reopened = open(&crashed).unwrap();
@@ -101,7 +101,7 @@ fn a_commit_whose_renames_were_cut_short_is_finished_on_opening() {
             }
         }
     }
-    assert_eq!(voxels_of(&MapReader::open(&cut, 4).unwrap()), committed, "read beside nobody");
+    assert_eq!(voxels_of(&MapReader::open(&cut, 1 << 20).unwrap()), committed, "read beside nobody");
     let mapper = open(&cut).unwrap();
     assert_eq!((voxels_of(&mapper), mapper.scan_number()), (committed, 4));
 }
@@ -112,7 +112,7 @@ fn one_writer_at_a_time_and_readers_beside_it() {
     let path = map(&folder);
     let writer = open(&path).unwrap();
     assert!(matches!(open(&path), Err(Error::Locked { .. })));
-    assert!(MapReader::open(&path, 1).unwrap().digest().is_ok());
+    assert!(MapReader::open(&path, 0).unwrap().digest().is_ok());
     drop(writer);
     assert!(open(&path).is_ok());
 }
@@ -125,7 +125,7 @@ fn a_reader_sees_one_flush_whole_however_often_the_map_is_flushed_meanwhile() {
     let mut readers = Vec::new();
     for seed in 40..46 {
         // Opened for reading while versions wait for the commit.
-        readers.push((MapReader::open(&path, 1).unwrap(), voxels_of(&MapReader::open(&path, 1).unwrap())));
+        readers.push((MapReader::open(&path, 0).unwrap(), voxels_of(&MapReader::open(&path, 0).unwrap())));
         writer.insert_scan(&random_scan(&mut Random(seed), [0.0; 3], 30)).unwrap();
         writer.flush().unwrap();
         for (reader, voxels) in &readers {
@@ -141,7 +141,7 @@ fn a_reader_sees_one_flush_whole_however_often_the_map_is_flushed_meanwhile() {
     writer.flush().unwrap();
     let kept = walk(&path).into_iter().filter(|path| path.to_string_lossy().contains(".bin.flush"));
     assert_eq!(kept.count(), 0, "nobody reads any more");
-    assert_eq!(MapReader::open(&path, 1).unwrap().digest().unwrap(), writer.digest().unwrap());
+    assert_eq!(MapReader::open(&path, 0).unwrap().digest().unwrap(), writer.digest().unwrap());
 }
 
 /// Bytes of the tables that are kept for readers.
@@ -162,13 +162,13 @@ fn a_reader_that_stays_keeps_one_version_of_the_tables_that_it_sees() {
         writer.flush().unwrap();
     };
     insert(0);
-    let mut reader = MapReader::open(&path, 1).unwrap();
+    let mut reader = MapReader::open(&path, 0).unwrap();
     let (digest, seen_bytes) = (reader.digest().unwrap(), reader.disk_bytes().unwrap().0);
     let mut later = None;
     for seed in 1..31 {
         insert(seed);
         if seed == 20 {
-            later = Some(MapReader::open(&path, 1).unwrap());
+            later = Some(MapReader::open(&path, 0).unwrap());
         }
         let readers_bytes = seen_bytes + later.as_ref().map_or(0, |later| later.disk_bytes().unwrap().0);
         let kept = kept_bytes(&path);
@@ -179,7 +179,7 @@ fn a_reader_that_stays_keeps_one_version_of_the_tables_that_it_sees() {
     assert_eq!(reader.digest().unwrap(), digest);
     assert!(kept_bytes(&path) > 0);
     assert!(reader.refresh().unwrap() && !reader.refresh().unwrap());
-    assert_eq!(reader.digest().unwrap(), MapReader::open(&path, 1).unwrap().digest().unwrap());
+    assert_eq!(reader.digest().unwrap(), MapReader::open(&path, 0).unwrap().digest().unwrap());
     drop(later);
     let now = reader.digest().unwrap();
     insert(31);
@@ -294,7 +294,7 @@ fn damage_is_named_when_read_and_a_damaged_tile_is_never_overwritten() {
     }
     for damaged in cases {
         fs::write(&file, &damaged).unwrap();
-        let reader = MapReader::open(&path, 4).unwrap();
+        let reader = MapReader::open(&path, 1 << 20).unwrap();
         let error = reader.tile(tile).unwrap_err();
         assert!(matches!(&error, Error::Damaged { tile: Some(named), .. } if *named == tile), "{error:#}");
         assert!(error.to_string().contains("tile_0_0_0"), "{error:#}");
@@ -308,7 +308,7 @@ fn damage_is_named_when_read_and_a_damaged_tile_is_never_overwritten() {
         assert_eq!(fs::read(&file).unwrap(), damaged);
     }
     fs::remove_file(&file).unwrap();
-    let error = message_of(MapReader::open(&path, 4).unwrap().tile(tile));
+    let error = message_of(MapReader::open(&path, 1 << 20).unwrap().tile(tile));
     assert!(error.contains("the file is missing"), "{error}");
 }
 
@@ -323,7 +323,7 @@ fn an_older_version_of_a_tile_is_damage() {
     mapper.flush().unwrap();
     drop(mapper);
     fs::write(&file, old).unwrap();
-    let error = message_of(MapReader::open(&path, 4).unwrap().digest());
+    let error = message_of(MapReader::open(&path, 1 << 20).unwrap().digest());
     assert!(error.contains("the file is of scan 3, commits.log names the version of scan 4"), "{error}");
 }
 
@@ -341,7 +341,7 @@ fn a_stray_tile_folder_is_neither_read_nor_overwritten() {
 fn a_map_of_the_seeds_own_format_opens_and_is_adopted_on_the_first_write() {
     let folder = TempDir::new().unwrap();
     let path = map(&folder);
-    let voxels = voxels_of(&MapReader::open(&path, 4).unwrap());
+    let voxels = voxels_of(&MapReader::open(&path, 1 << 20).unwrap());
     // Take from it all that is ours, and the order of the entries.
     fs::remove_file(path.join("commits.log")).unwrap();
     let metadata = r#"{"version": "1.0", "resolution": 0.1, "tile_size": 3.2, "bounds": {"min": [0,0,0], "max": [0,0,0]}}"#;
@@ -352,7 +352,7 @@ fn a_map_of_the_seeds_own_format_opens_and_is_adopted_on_the_first_write() {
         entries.reverse();
         fs::write(&file, [&bytes[..16], &entries.concat()].concat()).unwrap();
     }
-    let reader = MapReader::open(&path, 4).unwrap();
+    let reader = MapReader::open(&path, 1 << 20).unwrap();
     assert!(!reader.is_verified());
     assert_eq!(voxels_of(&reader), voxels);
 
@@ -360,7 +360,7 @@ fn a_map_of_the_seeds_own_format_opens_and_is_adopted_on_the_first_write() {
     assert_eq!(voxels_of(&mapper), voxels);
     mapper.insert_scan(&random_scan(&mut Random(5), [0.0; 3], 30)).unwrap();
     mapper.flush().unwrap();
-    let reader = MapReader::open(&path, 4).unwrap();
+    let reader = MapReader::open(&path, 1 << 20).unwrap();
     assert!(reader.is_verified());
     assert_eq!(voxels_of(&reader), voxels_of(&mapper));
 }
@@ -454,7 +454,7 @@ fn somebody_elses_file_in_the_folder_of_a_removed_tile_stops_nobody() {
 fn octree_files_are_what_the_octree_of_the_table_gives() {
     let folder = TempDir::new().unwrap();
     let path = map(&folder);
-    let reader = MapReader::open(&path, 4).unwrap();
+    let reader = MapReader::open(&path, 1 << 20).unwrap();
     for tile in reader.tiles() {
         let tile = tile.unwrap();
         let mut expected = Vec::new();
@@ -470,7 +470,7 @@ fn octree_files_are_what_the_octree_of_the_table_gives() {
 fn the_example_in_the_repository_has_the_digest_that_its_city_gives() {
     let golden = "a6c7d4295b7b4c7095b24eac4ea6227dfb799ad759fa1b4428543507e5ac7b7b";
     let example_folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("map_tiles_example");
-    let example = MapReader::open(&example_folder, 4).unwrap();
+    let example = MapReader::open(&example_folder, 1 << 20).unwrap();
     assert_eq!(example.digest().unwrap().to_string(), golden);
     for tile in example.tiles() {
         let tile = tile.unwrap();

@@ -125,12 +125,12 @@ fn maps_of_regions_that_partition_space_merge_to_the_map_of_the_whole() {
                     mapper.insert_scan(scan).unwrap();
                 }
                 mapper.flush().unwrap();
-                maps.push(MapReader::open(MapPath::on(disk.shared(), &path), 4).unwrap());
+                maps.push(MapReader::open(MapPath::on(disk.shared(), &path), 1 << 20).unwrap());
             }
             assert!(maps.iter().all(|map| map.voxel_counts().unwrap().0 > 1000));
             let merged = voxtile::operations::merge(&maps, "merged", None, |_, _| {}).unwrap();
             assert_eq!(merged.common_voxels, 0);
-            let merged = MapReader::open(MapPath::on(disk.shared(), "merged"), 4).unwrap();
+            let merged = MapReader::open(MapPath::on(disk.shared(), "merged"), 1 << 20).unwrap();
             assert_eq!(merged.digest().unwrap(), whole.digest().unwrap());
             assert_eq!(merged.config().rays.region, None);
         }
@@ -150,7 +150,7 @@ fn a_map_of_a_region_knows_it_and_goes_on_with_no_other() {
     mapper.flush().unwrap();
     drop(mapper);
 
-    let found = MapReader::open(path(), 1).unwrap();
+    let found = MapReader::open(path(), 0).unwrap();
     assert_eq!(found.config().rays.region, Some(region));
     let mut reference = ReferenceMap::new(&config);
     reference.insert_scan(&scan);

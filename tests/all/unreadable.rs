@@ -36,8 +36,8 @@ fn small(storage: Storage) -> FaultyDisk {
 }
 
 fn digests(disk: &FaultyDisk) -> Result<[String; 2]> {
-    let now = MapReader::open(MapPath::on(disk.shared(), map()), 2)?.digest()?;
-    let then = MapReader::open_snapshot(MapPath::on(disk.shared(), map()), &snapshot(), 2)?.digest()?;
+    let now = MapReader::open(MapPath::on(disk.shared(), map()), 1 << 20)?.digest()?;
+    let then = MapReader::open_snapshot(MapPath::on(disk.shared(), map()), &snapshot(), 1 << 20)?.digest()?;
     Ok([now, then].map(|digest| digest.to_string()))
 }
 
@@ -162,7 +162,7 @@ fn a_bad_sector_of_the_list_of_scans_leaves_those_before_it() {
             repair(MapPath::on(disk.shared(), map()), |_| (), |_, _| ()).unwrap();
             assert_eq!(damaged(&disk, "after"), BTreeSet::new());
             let numbers = || {
-                let reader = MapReader::open(MapPath::on(disk.shared(), map()), 2).unwrap();
+                let reader = MapReader::open(MapPath::on(disk.shared(), map()), 1 << 20).unwrap();
                 reader.scans().unwrap().iter().map(|scan| scan.number).collect::<Vec<_>>()
             };
             assert_eq!(numbers(), [1, 2]);

@@ -61,7 +61,7 @@ fn a_scan_of_more_updates_than_memory_is_taken_whole() {
             }
             mapper.flush().unwrap();
             drop(mapper);
-            let reader = MapReader::open(MapPath::on(disk.shared(), Path::new("/map")), 4).unwrap();
+            let reader = MapReader::open(MapPath::on(disk.shared(), Path::new("/map")), 1 << 20).unwrap();
             assert_eq!(reader.digest().unwrap(), digest);
             assert!(disk.files().keys().all(|path| path.extension().is_none_or(|last| last != "next")));
         }

@@ -41,7 +41,7 @@ fn crop_and_clear_are_filters_and_what_is_cut_apart_is_the_whole_again() {
         let (disk, config) = (disk(), config(&mut random));
         let voxels = random_voxels(&mut random, 400);
         write_map(&disk, &path("whole"), &config, &voxels);
-        let whole = MapReader::open(MapPath::on(disk.shared(), path("whole")), 1).unwrap().digest().unwrap();
+        let whole = MapReader::open(MapPath::on(disk.shared(), path("whole")), 0).unwrap().digest().unwrap();
         let region = random_box(&mut random);
         if config.grid.voxels_in(&region).is_empty() {
             let refused =
@@ -59,7 +59,7 @@ fn crop_and_clear_are_filters_and_what_is_cut_apart_is_the_whole_again() {
         }
         let halves = ["inside", "outside"].map(|half| open(&disk, &path(half)).unwrap());
         merge(&halves, path("again"), Some(Prefer::First), |_, _| {}).unwrap();
-        let again = MapReader::open(MapPath::on(disk.shared(), path("again")), 1).unwrap();
+        let again = MapReader::open(MapPath::on(disk.shared(), path("again")), 0).unwrap();
         assert_eq!(again.digest().unwrap(), whole, "seed {seed}");
         for (part, name) in parts {
             let copy = disk.copy();
@@ -67,7 +67,7 @@ fn crop_and_clear_are_filters_and_what_is_cut_apart_is_the_whole_again() {
             let other = read_map(&disk, &path(if name == "inside" { "outside" } else { "inside" }));
             assert_eq!(read_map(&copy, &path("whole")), other, "seed {seed}, cleared {name}");
             assert_eq!(cleared.voxels_cleared, (voxels.len() - other.len()) as u64);
-            let reader = MapReader::open(MapPath::on(copy.shared(), path("whole")), 1).unwrap();
+            let reader = MapReader::open(MapPath::on(copy.shared(), path("whole")), 0).unwrap();
             assert_eq!(cleared.tiles, reader.tile_indices().len() as u64);
             assert_eq!(reader.voxel_counts().unwrap().0, other.len() as u64);
             removed += cleared.tiles_removed;

@@ -48,7 +48,7 @@ fn log_odds_fade_by_the_rule_and_counts_stay() {
         let decayed = decay(&disk, &rule).unwrap();
         let expected = naive(&voxels, halflife, scans, forget_below);
         assert_eq!(read_map(&disk, &path("map")), expected, "seed {seed}: {rule:?}");
-        let reader = MapReader::open(MapPath::on(disk.shared(), path("map")), 1).unwrap();
+        let reader = MapReader::open(MapPath::on(disk.shared(), path("map")), 0).unwrap();
         assert_eq!((decayed.scans, decayed.voxels), (scans, expected.len() as u64));
         assert_eq!(decayed.voxels_forgotten, (voxels.len() - expected.len()) as u64);
         assert_eq!(decayed.tiles, reader.tile_indices().len() as u64);
@@ -64,7 +64,7 @@ fn what_is_free_stays_free_however_much_has_faded() {
     let voxels = Voxels::from([([0, 0, 0], ((-2.0_f64).to_bits(), 5)), ([9, 0, 0], (3.0_f64.to_bits(), 5))]);
     write_map(&disk, &path("map"), &MapConfig::new(0.5, 2.5).unwrap(), &voxels);
     decay(&disk, &Decay::new(1.0).with_scans(1_000_000)).unwrap();
-    let reader = MapReader::open(MapPath::on(disk.shared(), path("map")), 1).unwrap();
+    let reader = MapReader::open(MapPath::on(disk.shared(), path("map")), 0).unwrap();
     assert!(matches!(reader.occupancy_at([0.25; 3]).unwrap(), Occupancy::Free(_)));
     assert!(matches!(reader.occupancy_at([4.75, 0.25, 0.25]).unwrap(), Occupancy::Occupied(_)));
     let tree = reader.merged_octree(None, 1 << 20).unwrap();
@@ -124,7 +124,7 @@ fn a_snapshot_does_not_fade_and_a_revert_brings_back_what_has() {
     decay(&disk, &Decay::new(4.0).with_forget_below(0.3)).unwrap();
     let once = read_map(&disk, &path("map"));
     assert!(once.len() < before.len());
-    let kept = MapReader::open_snapshot(MapPath::on(disk.shared(), path("map")), &name, 1).unwrap();
+    let kept = MapReader::open_snapshot(MapPath::on(disk.shared(), path("map")), &name, 0).unwrap();
     assert_eq!(voxels_of(&kept), before);
     revert(MapPath::on(disk.shared(), path("map")), &name, None, |_, _| {}).unwrap();
     assert_eq!(read_map(&disk, &path("map")), before);

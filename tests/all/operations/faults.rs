@@ -152,7 +152,7 @@ fn decay(disk: &FaultyDisk) -> Result<()> {
 
 /// The digest of a map, `None` if there is none; of a damaged one there is none either, and that is a failure.
 fn digest(disk: &FaultyDisk, name: &str, what: &str) -> Option<voxtile::Digest> {
-    match MapReader::open(MapPath::on(disk.shared(), path(name)), 1) {
+    match MapReader::open(MapPath::on(disk.shared(), path(name)), 0) {
         Ok(reader) => Some(reader.digest().unwrap_or_else(|error| panic!("{what}: {error:#}"))),
         Err(Error::NoMap { .. }) => None,
         Err(error) => panic!("{what}: {error:#}"),

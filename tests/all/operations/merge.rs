@@ -96,7 +96,7 @@ fn a_merge_is_the_naive_one_for_two_to_five_maps_and_every_preference() {
                 .filter(|voxel| maps.iter().filter(|map| map.contains_key(*voxel)).count() > 1);
             assert_eq!(merged.common_voxels, in_several.count() as u64);
             assert!(merged.related.is_empty());
-            let reader = MapReader::open(MapPath::on(disk.shared(), path("merged")), 1).unwrap();
+            let reader = MapReader::open(MapPath::on(disk.shared(), path("merged")), 0).unwrap();
             assert_eq!(reader.scan_number(), 0);
             assert_eq!(reader.config().storage, config.storage);
             let after = disk.files();
@@ -151,7 +151,7 @@ fn maps_that_do_not_go_together_are_refused_with_what_differs() {
         );
         let (disk, maps) = two(&usual, other);
         merge(&disk, &maps, Some(Prefer::Last)).unwrap();
-        let reader = MapReader::open(MapPath::on(disk.shared(), path("merged")), 1).unwrap();
+        let reader = MapReader::open(MapPath::on(disk.shared(), path("merged")), 0).unwrap();
         assert_eq!(reader.config().sensor_model, usual.sensor_model);
     }
     let (disk, maps) = two(&usual, &usual);

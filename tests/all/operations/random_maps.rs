@@ -68,7 +68,7 @@ fn table_of(voxels: &Voxels) -> Table {
 }
 
 pub fn open(disk: &FaultyDisk, folder: &Path) -> Result<MapReader> {
-    MapReader::open(MapPath::on(disk.shared(), folder), 2)
+    MapReader::open(MapPath::on(disk.shared(), folder), 0)
 }
 
 /// The voxels of a map on disk.
