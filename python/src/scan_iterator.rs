@@ -135,11 +135,8 @@ impl Input {
         if self.has_options || !is_map(&self.path) {
             return Ok(Scans::Input(self.source()?));
         }
-        let reader = MapReader::open(&self.path, 1)?;
-        let (mut records, mut count) = (reader.kept_scans()?, 0);
-        while records.next_record()?.is_some() {
-            count += 1;
-        }
+        let reader = MapReader::open(&self.path, 0)?;
+        let count = reader.kept_summary()?.scans().len();
         Ok(Scans::Kept(Box::new(reader.kept_scans()?), count))
     }
 

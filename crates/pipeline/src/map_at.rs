@@ -5,8 +5,10 @@ use voxtile::mapper::{MapReader, MapStatistics, MapView, OctreeMap, TileRef};
 use voxtile::space::{TileBox, TileIndex};
 use voxtile::store::{SnapshotName, TileVersion};
 use voxtile::tile::Voxel;
-use voxtile::{Error, MapConfig, MemoryLimit, Result};
+use voxtile::{Error, MapConfig, Result};
 
+/// Bytes of the tiles that a reading command keeps in memory.
+const TILES_BYTES: usize = 64 << 20;
 /// How often a map is opened again because a writer flushed it.
 const ATTEMPTS: usize = 8;
 
@@ -48,8 +50,8 @@ impl MapAt {
             return Err(Error::argument(self.map.display().to_string(), reason));
         }
         match &self.snapshot {
-            Some(name) => MapReader::open_snapshot(place_of(&self.map)?, name, MemoryLimit::DEFAULT_BYTES),
-            None => MapReader::open(place_of(&self.map)?, MemoryLimit::DEFAULT_BYTES),
+            Some(name) => MapReader::open_snapshot(place_of(&self.map)?, name, TILES_BYTES),
+            None => MapReader::open(place_of(&self.map)?, TILES_BYTES),
         }
     }
 }
