@@ -2,30 +2,25 @@ use super::Result;
 use super::options::WriteOptions;
 use super::row::{VoxelRow, VoxelSink, VoxelsHead};
 use super::stream_out::StreamOut;
-use std::fmt::Write as _;
 use std::io::Write;
 
 /// Text with a header line; every number reads back to the same bits.
 pub(super) struct CsvSink<'a> {
     out: StreamOut<'a>,
-    line: String,
 }
 
 impl<'a> CsvSink<'a> {
     pub(super) fn new(_: &VoxelsHead, out: Box<dyn Write + 'a>, options: &WriteOptions) -> Result<Self> {
         let mut out = StreamOut::new(&options.final_path, out);
         out.write(b"x,y,z,probability,log_odds,observation_count\n")?;
-        Ok(Self { out, line: String::new() })
+        Ok(Self { out })
     }
 }
 
 impl VoxelSink for CsvSink<'_> {
     fn put(&mut self, voxel: &VoxelRow) -> Result<()> {
         let VoxelRow { center_m: [x, y, z], probability, log_odds, observation_count, .. } = voxel;
-        self.line.clear();
-        // Into memory, which refuses nothing.
-        let _ = writeln!(self.line, "{x},{y},{z},{probability},{log_odds},{observation_count}");
-        self.out.write(self.line.as_bytes())
+        writeln!(self.out, "{x},{y},{z},{probability},{log_odds},{observation_count}")
     }
 
     fn finish(self: Box<Self>) -> Result<()> {

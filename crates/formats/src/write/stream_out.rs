@@ -1,4 +1,5 @@
 use super::{Error, Result};
+use std::fmt;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -15,6 +16,11 @@ impl<'a> StreamOut<'a> {
 
     pub(super) fn write(&mut self, bytes: &[u8]) -> Result<()> {
         self.out.write_all(bytes).map_err(|error| Error::io(&self.name, "write", error))
+    }
+
+    /// What `write!` calls.
+    pub(super) fn write_fmt(&mut self, text: fmt::Arguments<'_>) -> Result<()> {
+        self.out.write_fmt(text).map_err(|error| Error::io(&self.name, "write", error))
     }
 
     pub(super) fn finish(mut self) -> Result<()> {
