@@ -26,15 +26,14 @@ const FRAMES: [(&str, bool); 2] = [("sensor", false), ("body", true)];
 pub fn read_options(py: Python<'_>, keywords: &mut Keywords<'_>) -> PyResult<ReadOptions> {
     let raised = |error: voxtile::Error| exception(py, &error);
     let mut options = ReadOptions::default();
-    let open = &mut options.open;
-    open.format = keywords.parsed("format", str::parse)?;
-    open.fields = keywords.texts("fields")?;
-    open.scan_period_s = keywords.number("scan_period")?.unwrap_or(open.scan_period_s);
+    options.format = keywords.text("format")?;
+    options.fields = keywords.texts("fields")?;
+    options.scan_period_s = keywords.number("scan_period")?.unwrap_or(options.scan_period_s);
     let origin = keywords.numbers("sensor_origin")?;
-    open.sensor_origin_m =
+    options.sensor_origin_m =
         origin.map(|numbers| point_of("sensor_origin", &numbers)).transpose().map_err(raised)?;
-    open.depth_scale = keywords.number("depth_scale")?;
-    open.intrinsics_path = keywords.path("intrinsics")?;
+    options.depth_scale = keywords.number("depth_scale")?;
+    options.intrinsics_path = keywords.path("intrinsics")?;
     let clouds = &mut options.clouds;
     if let Some(seconds) = keywords.number("pose_tolerance")? {
         clouds.pose_tolerance_ns = tolerance_ns(seconds).map_err(raised)?;

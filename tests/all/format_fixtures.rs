@@ -18,7 +18,7 @@ use voxtile::space::{Aabb, VoxelBox, VoxelKey};
 use voxtile::store::SnapshotName;
 use voxtile::tile::format::{CompactFileIndex, read_compact_file, read_compact_voxels_from};
 use voxtile::{MapConfig, MapQueries, MapReader, MapView, Mapper, OutOfCoreTileMapper, Scan, Storage};
-use voxtile_formats::{ScanStreamWriter, open_scans};
+use voxtile_formats::{ReadOptions, ScanStreamWriter, open_scans};
 use voxtile_share::codec::Packet;
 use voxtile_share::{Sender, SenderConfig, VoxelSet, read_layer, write_layer};
 
@@ -108,7 +108,7 @@ fn streams_packets_and_layers_of_all_versions_are_read() {
     for folder in fixtures() {
         let expected: Value =
             serde_json::from_slice(&fs::read(folder.join("expected.json")).unwrap()).unwrap();
-        let mut source = open_scans(&folder.join("six.scans"), None).unwrap();
+        let mut source = open_scans(&folder.join("six.scans"), &ReadOptions::default()).unwrap();
         let mut points = Vec::new();
         while let Some(scan) = source.next_scan().unwrap() {
             points.push(scan.points_in_sensor.len());

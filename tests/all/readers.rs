@@ -3,7 +3,7 @@ use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 use testkit::random_scans::Random;
 use testkit::support::{fixtures, message_of, shared_data};
-use voxtile_formats::{SensorScan, open_scans, parse_poses, read_pcd, read_poses};
+use voxtile_formats::{PointRoom, ReadOptions, SensorScan, open_scans, read_pcd};
 
 const HEADER: &str =
     "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z intensity\nSIZE 4 4 4 4\nTYPE F F F F\nCOUNT 1 1 1 1\n";
@@ -48,8 +48,12 @@ pub fn pcd(encoding: &str, points: &[[f32; 4]]) -> Vec<u8> {
     }
 }
 
+fn with_poses(path: &Path) -> ReadOptions {
+    ReadOptions { poses: Some(path.to_owned()), ..ReadOptions::default() }
+}
+
 fn all_scans(path: &Path) -> Vec<SensorScan> {
-    let mut source = open_scans(path, None).unwrap();
+    let mut source = open_scans(path, &ReadOptions::default()).unwrap();
     std::iter::from_fn(|| source.next_scan().unwrap()).collect()
 }
 
@@ -59,8 +63,8 @@ fn the_three_encodings_of_a_cloud_are_one_cloud() {
     let clouds =
         ["ascii", "binary", "binary_compressed"].map(|encoding| read_pcd(&pcd(encoding, &points)).unwrap());
     for cloud in &clouds {
-        assert_eq!(cloud.points[7], [0, 1, 2].map(|k| f64::from(points[7][k])));
-        assert_eq!(cloud.points, clouds[0].points);
+        assert_eq!(cloud.points_in_sensor[7], [0, 1, 2].map(|k| f64::from(points[7][k])));
+        assert_eq!(cloud.points_in_sensor, clouds[0].points_in_sensor);
         assert_eq!(cloud.intensities, clouds[0].intensities);
         assert_eq!(cloud.world_from_sensor.position_m(), [1.0, 2.0, 3.0]);
     }
@@ -77,15 +81,15 @@ fn fields_of_any_type_order_and_padding_are_read() {
     file.extend((-3_i32).to_le_bytes());
     file.extend(f32::NAN.to_le_bytes());
     let cloud = read_pcd(&file).unwrap();
-    assert!(cloud.points[0][0].is_nan());
-    assert_eq!((cloud.points[0][1], cloud.points[0][2]), (-3.0, -2.5));
+    assert!(cloud.points_in_sensor[0][0].is_nan());
+    assert_eq!((cloud.points_in_sensor[0][1], cloud.points_in_sensor[0][2]), (-3.0, -2.5));
     assert_eq!(cloud.intensities, Some(vec![700.0]));
 }
 
 #[test]
 fn wrong_pcd_files_are_told_what_is_wrong() {
     let good = String::from_utf8(pcd("ascii", &points(3))).unwrap();
-    let changed = |from: &str, to: &str| read_pcd(good.replace(from, to).as_bytes()).unwrap_err().to_string();
+    let changed = |from: &str, to: &str| message_of(read_pcd(good.replace(from, to).as_bytes()));
     for (from, to, message) in [
         ("FIELDS x y z", "FIELDS x y w", "the points have no field z"),
         ("SIZE 4 4 4 4", "SIZE 4 4 4", "SIZE has 3 entries for 4 fields"),
@@ -100,7 +104,7 @@ fn wrong_pcd_files_are_told_what_is_wrong() {
         let error = changed(from, to);
         assert!(error.contains(message), "{error}");
     }
-    assert!(read_pcd(b"ply\nformat").unwrap_err().to_string().contains("line 1"));
+    assert!(message_of(read_pcd(b"ply\nformat")).contains("line 1"));
     assert!(
         changed("WIDTH 3\nHEIGHT 1", "WIDTH 99999999999999999999\nHEIGHT 1")
             .contains("not a number that fits")
@@ -145,21 +149,21 @@ fn poses_match_the_files_or_both_counts_are_told() {
         read.iter().map(|scan| scan.world_from_sensor.position_m()[0]).collect::<Vec<_>>(),
         [1.0, 2.0, 3.0]
     );
-    let fingerprint = open_scans(&scans, None).unwrap().fingerprint().unwrap();
+    let fingerprint = open_scans(&scans, &ReadOptions::default()).unwrap().fingerprint().unwrap();
     write("0 1 0 0 0 0 0 1\n1 2 0 0 0 0 0 1\n2 3.5 0 0 0 0 0 1\n");
-    assert_ne!(open_scans(&scans, None).unwrap().fingerprint().unwrap(), fingerprint);
+    assert_ne!(open_scans(&scans, &ReadOptions::default()).unwrap().fingerprint().unwrap(), fingerprint);
     for (text, message) in [
-        ("0 1 0 0 0 0 0 1\n", "1 poses for 3 scan files"),
-        ("0 1 0 0 0 0 0 1\n1 2 0 0 0 0 0 1\n2 3 0 0 0 0 0 1\n3 3 0 0 0 0 0 1\n", "4 poses for 3 scan files"),
-        ("0 1 0 0 0 0 0 0\n", "line 1: a quaternion of no length"),
-        ("0 1 0 0 0 0 1e300 0\n", "line 1: a quaternion too long to be a rotation"),
-        ("0 1 0 NaN 0 0 0 1\n", "line 1: NaN in a pose"),
-        ("0 1 0\n", "line 1: 3 numbers; a pose has 8 (TUM) or 12 (KITTI)"),
-        ("1 0 0 0 0 2 0 0 0 0 1 0\n", "line 1: the 3x3 part of the matrix is not a rotation"),
+        ("0 1 0 0 0 0 0 1\n", "1 poses for 3 clouds"),
+        ("0 1 0 0 0 0 0 1\n1 2 0 0 0 0 0 1\n2 3 0 0 0 0 0 1\n3 3 0 0 0 0 0 1\n", "4 poses for 3 clouds"),
+        ("0 1 0 0 0 0 0 0\n", "line 1: the quaternion 0 0 0 0 has length 0.000, not 1"),
+        ("0 1 0 0 0 0 1e300 0\n", "has length inf, not 1"),
+        ("0 1 0 NaN 0 0 0 1\n", "line 1: `NaN` is not finite"),
+        ("0 1 0\n", "line 1: 3 numbers; a pose has 8 (TUM"),
+        ("1 0 0 0 0 2 0 0 0 0 1 0\n", "line 1: the matrix is no rotation"),
         ("0 1 0 zero 0 0 0 1\n", "`zero` is not a number"),
     ] {
         write(text);
-        let error = message_of(open_scans(folder.path(), None));
+        let error = message_of(open_scans(folder.path(), &ReadOptions::default()));
         assert!(error.contains(message), "{error}");
     }
 }
@@ -176,13 +180,12 @@ fn unplaced(folder: &Path, names: &[&str]) {
 /// A caller of the library says what the command's arguments cannot.
 #[test]
 fn points_in_the_world_frame_are_not_deskewed() {
-    use voxtile_formats::{ReadOptions, open_any_scans};
     let folder = TempDir::new().unwrap();
     unplaced(folder.path(), &["0.pcd"]);
     let mut options = ReadOptions::default();
     options.poses = Some("identity".into());
     (options.clouds.is_deskewed, options.clouds.is_world_frame) = (true, true);
-    let error = message_of(open_any_scans(folder.path(), &options).map(drop));
+    let error = message_of(open_scans(folder.path(), &options).map(drop));
     assert!(error.contains("--deskew, --world-frame: points that are in the world frame already"), "{error}");
 }
 
@@ -193,27 +196,27 @@ fn files_come_in_natural_order_and_scans_without_poses_are_refused() {
     let names: Vec<String> = (0..12).map(|number| format!("full{number}.pcd")).collect();
     unplaced(folder.path(), &names.iter().map(String::as_str).collect::<Vec<_>>());
     fs::write(folder.path().join("trajectory.txt"), "0 0 0 0 0 0 0 1\n".repeat(12)).unwrap();
-    let error = message_of(open_scans(folder.path(), None));
-    assert!(error.contains("12 scans and no poses"), "{error}");
+    let error = message_of(open_scans(folder.path(), &ReadOptions::default()));
+    assert!(error.contains("has no poses"), "{error}");
     assert!(error.contains("trajectory.txt looks like one") && error.contains("--poses identity"), "{error}");
 
-    let mut meant = open_scans(folder.path(), Some(Path::new("identity"))).unwrap();
+    let mut meant = open_scans(folder.path(), &with_poses(Path::new("identity"))).unwrap();
     assert_eq!(meant.pose_source(), PoseSource::Identity);
     for number in 0..12 {
         assert_eq!(meant.next_scan().unwrap().unwrap().points_in_sensor[0][0], f64::from(number));
     }
-    let single = open_scans(&folder.path().join("full3.pcd"), None).unwrap();
+    let single = open_scans(&folder.path().join("full3.pcd"), &ReadOptions::default()).unwrap();
     assert_eq!(single.pose_source(), PoseSource::Identity);
 
     let poses = folder.path().join("trajectory.txt");
     assert_eq!(
-        open_scans(folder.path(), Some(&poses)).unwrap().pose_source(),
+        open_scans(folder.path(), &with_poses(&poses)).unwrap().pose_source(),
         PoseSource::File(poses.clone())
     );
     let lines = (0..12).map(|number| format!("{} 0 0 0 0 0 0 1\n", if number == 7 { 3 } else { number }));
     fs::write(&poses, lines.collect::<String>()).unwrap();
-    let error = message_of(open_scans(folder.path(), Some(&poses)));
-    assert!(error.contains("line 8: time stamp 3 comes after 6"), "{error}");
+    let error = message_of(open_scans(folder.path(), &with_poses(&poses)));
+    assert!(error.contains("pose 8 is earlier than the one before"), "{error}");
 }
 
 #[test]
@@ -223,7 +226,7 @@ fn a_file_without_the_viewpoint_that_others_have_is_an_error_of_its_own() {
         fs::write(folder.path().join(format!("{number}.pcd")), pcd("binary", &points(5))).unwrap();
     }
     unplaced(folder.path(), &["2.pcd"]);
-    let mut source = open_scans(folder.path(), None).unwrap();
+    let mut source = open_scans(folder.path(), &ReadOptions::default()).unwrap();
     assert_eq!(source.pose_source(), voxtile_formats::PoseSource::Viewpoint);
     assert!(source.next_scan().unwrap().is_some() && source.next_scan().unwrap().is_some());
     assert!(message_of(source.next_scan()).contains("no VIEWPOINT in this file"));
@@ -232,9 +235,59 @@ fn a_file_without_the_viewpoint_that_others_have_is_an_error_of_its_own() {
 
 #[test]
 fn a_matrix_that_is_a_rotation_to_a_few_digits_gives_a_pose_that_does_not_scale() {
-    let poses = parse_poses("0.6004 -0.8 0 1 0.8 0.6004 0 2 0 0 1.0004 3\n").unwrap();
-    assert!((poses[0].isometry().rotation.norm() - 1.0).abs() < 1e-15);
-    assert!((poses[0].to_world()([1.0, 0.0, 0.0])[0] - 1.6).abs() < 1e-3);
+    let folder = TempDir::new().unwrap();
+    fs::write(folder.path().join("0.pcd"), pcd("binary", &points(5))).unwrap();
+    let poses = folder.path().join("kitti.txt");
+    fs::write(&poses, "0.6004 -0.8 0 1 0.8 0.6004 0 2 0 0 1.0004 3\n").unwrap();
+    let mut source = open_scans(folder.path(), &with_poses(&poses)).unwrap();
+    let pose = source.next_scan().unwrap().unwrap().world_from_sensor;
+    assert!((pose.isometry().rotation.norm() - 1.0).abs() < 1e-15);
+    assert!((pose.to_world()([1.0, 0.0, 0.0])[0] - 1.6).abs() < 1e-3);
+}
+
+/// Stamps and lengths decide nothing where poses go line by line.
+#[test]
+fn plain_poses_of_pcd_files_have_any_stamps_and_lengths() {
+    let folder = TempDir::new().unwrap();
+    for number in 0..2 {
+        fs::write(folder.path().join(format!("{number}.pcd")), pcd("binary", &points(5))).unwrap();
+    }
+    let poses = folder.path().join("poses.txt");
+    for text in [
+        "20180810150607.5 1 0 0 0 0 0 1\n20180810150608.5 2 0 0 0 0 0 1\n",
+        "nan 1 0 0 0 0 0 1\ninf 2 0 0 0 0 0 1\n",
+        "0, 1 0 0, 0 0 0 2\n0, 2 0 0, 0 0 0 0.5\n",
+    ] {
+        fs::write(&poses, text).unwrap();
+        let mut source = open_scans(folder.path(), &with_poses(&poses)).unwrap();
+        for x in [1.0, 2.0] {
+            let scan = source.next_stored(&PointRoom::default()).unwrap().unwrap();
+            let pose = scan.world_from_sensor;
+            assert_eq!((pose.position_m()[0], pose.quaternion()), (x, [0.0, 0.0, 0.0, 1.0]), "{text}");
+            assert_eq!(scan.stamp_ns, None);
+        }
+        assert!(source.remarks().is_empty(), "{:?}", source.remarks());
+    }
+}
+
+/// By which maps of earlier versions know their inputs: files, and poses where they are not in these.
+#[test]
+fn fingerprints_of_pcd_files_are_those_of_earlier_versions() {
+    let folder = TempDir::new().unwrap();
+    let scans = folder.path().join("scans");
+    fs::create_dir(&scans).unwrap();
+    for number in 0..2 {
+        fs::write(scans.join(format!("{number}.pcd")), pcd("ascii", &points(2))).unwrap();
+    }
+    let poses = folder.path().join("poses.txt");
+    let fingerprint = |options: &ReadOptions| open_scans(&scans, options).unwrap().fingerprint().unwrap();
+    let viewpoint = fingerprint(&ReadOptions::default());
+    let identity = fingerprint(&with_poses(Path::new("identity")));
+    fs::write(&poses, "0 1 2 3 0 0 0.6 0.8\n1 4 5 6 0 0 -0.6 0.8\n").unwrap();
+    let tum = fingerprint(&with_poses(&poses));
+    fs::write(&poses, "0.28 -0.96 0 1 0.96 0.28 0 2 0 0 1 3\n1 0 0 4 0 1 0 5 0 0 1 6\n").unwrap();
+    let kitti = fingerprint(&with_poses(&poses));
+    assert_eq!([viewpoint, identity, tum, kitti], FINGERPRINTS);
 }
 
 #[test]
@@ -250,9 +303,11 @@ fn folders_of_other_programs_have_the_scans_and_points_that_their_notes_say() {
         assert_eq!(read.len(), scans, "{name}");
         assert_eq!(read.iter().map(|scan| scan.points_in_sensor.len()).sum::<usize>(), points, "{name}");
         assert!(read.iter().all(|scan| scan.intensities.is_some()));
-        let tum = read_poses(&folder.join("poses_tum.txt")).unwrap();
-        let kitti = read_poses(&folder.join("poses_kitti.txt")).unwrap();
-        for (a, b) in tum.iter().zip(&kitti) {
+        let poses_of = |name: &str| -> Vec<_> {
+            let mut source = open_scans(&folder, &with_poses(&folder.join(name))).unwrap();
+            std::iter::from_fn(|| source.next_scan().unwrap()).map(|scan| scan.world_from_sensor).collect()
+        };
+        for (a, b) in poses_of("poses_tum.txt").iter().zip(poses_of("poses_kitti.txt")) {
             assert!(
                 (a.isometry().to_homogeneous() - b.isometry().to_homogeneous()).abs().max() < 1e-5,
                 "{name}"
@@ -312,7 +367,7 @@ fn graphs_and_logs_are_read_and_hostile_ones_are_errors() {
     assert!((a - b).abs().max() < 1e-6);
 
     let read = |path: &Path| {
-        let mut source = open_scans(path, None)?;
+        let mut source = open_scans(path, &ReadOptions::default())?;
         while source.next_scan()?.is_some() {}
         Ok::<(), voxtile::Error>(())
     };

@@ -1,7 +1,7 @@
 use std::path::Path;
 use tempfile::TempDir;
 use voxtile::{Error, Pose, Scan};
-use voxtile_formats::{ScanSource, ScanStreamWriter, SensorScan, open_scans, read_scan_stream};
+use voxtile_formats::{ReadOptions, ScanSource, ScanStreamWriter, SensorScan, open_scans, read_scan_stream};
 use voxtile_simulation::Survey;
 
 fn sensor_scan(number: u32) -> SensorScan {
@@ -111,7 +111,7 @@ fn skipped_scans_are_looked_at_as_if_they_were_read() {
                     Ok(usize::from(source.next_scan()?.is_some()))
                 });
                 let piped = skip_and_read(&mut stream(), skipped, |source| source.skip(1));
-                let mut of_file = open_scans(&path, None).unwrap();
+                let mut of_file = open_scans(&path, &ReadOptions::default()).unwrap();
                 let of_file = skip_and_read(&mut *of_file, skipped, |source| source.skip(1));
                 assert_eq!(naive, piped, "{} bytes, {skipped} skipped", bytes.len());
                 assert_eq!(naive, of_file, "{} bytes, {skipped} skipped", bytes.len());
@@ -165,8 +165,11 @@ fn a_stream_is_known_by_its_label_and_a_file_by_its_bytes() {
     let folder = TempDir::new().unwrap();
     let path = folder.path().join("drive.scans");
     std::fs::write(&path, written("", true, &[sensor_scan(2)])).unwrap();
-    let mut file = open_scans(&path, None).unwrap();
+    let mut file = open_scans(&path, &ReadOptions::default()).unwrap();
     assert!(file.fingerprint().unwrap().starts_with("1 file, "));
     assert_same(&file.next_scan().unwrap().unwrap(), &sensor_scan(2));
-    assert!(open_scans(&path, Some(Path::new("poses.txt"))).is_err());
+    assert!(
+        open_scans(&path, &ReadOptions { poses: Some("poses.txt".into()), ..ReadOptions::default() })
+            .is_err()
+    );
 }

@@ -6,14 +6,13 @@ use voxtile_pipeline::numbers::{Mount, point_of, region_of, set_mount, tolerance
 /// What the command line says of the input.
 pub fn read_options(args: &ReadArgs) -> Result<ReadOptions> {
     let mut options = ReadOptions::default();
-    let open = &mut options.open;
-    open.format = args.format.as_deref().map(str::parse).transpose()?;
-    open.fields.clone_from(&args.fields);
-    open.scan_period_s = args.scan_period;
-    open.sensor_origin_m =
+    options.format.clone_from(&args.format);
+    options.fields.clone_from(&args.fields);
+    options.scan_period_s = args.scan_period;
+    options.sensor_origin_m =
         args.sensor_origin.as_deref().map(|numbers| point_of("sensor_origin", numbers)).transpose()?;
-    open.depth_scale = args.depth_scale;
-    open.intrinsics_path.clone_from(&args.intrinsics);
+    options.depth_scale = args.depth_scale;
+    options.intrinsics_path.clone_from(&args.intrinsics);
     let clouds = &mut options.clouds;
     clouds.pose_tolerance_ns = tolerance_ns(args.pose_tolerance)?;
     clouds.is_world_frame = args.world_frame;

@@ -7,22 +7,21 @@
 //! voxtile's scan stream ┘
 //! ```
 
-mod any_scans;
 pub mod clouds;
 mod file_order;
+mod find_poses;
 mod fingerprint;
-mod lzf;
-mod pcd;
-mod pcd_clouds;
-mod pcd_folder;
-mod pcd_header;
-mod pcd_viewpoint;
+mod guess;
+mod input_format;
+mod open;
 mod point_store;
 mod points;
 mod pose_source;
 mod posed_clouds;
-mod poses;
 mod read_options;
+#[cfg(feature = "ros")]
+mod recording_clouds;
+mod registry;
 mod scan_chain;
 mod scan_graph;
 mod scan_log;
@@ -36,14 +35,15 @@ mod stored_scan;
 mod stream_input;
 pub mod write;
 
-pub use any_scans::open_any_scans;
-pub use pcd::{PcdCloud, read_pcd};
+pub use clouds::read::read_pcd;
+pub use input_format::{InputFormat, Mark, Open, OpenCloud, OpenClouds, OpenScans};
+pub use open::{open_clouds, open_scans};
 pub use point_store::{PointRoom, PointStore};
 pub use points::read_points;
 pub use pose_source::PoseSource;
 pub use posed_clouds::CloudOptions;
-pub use poses::{parse_poses, read_poses};
 pub use read_options::{ReadOptions, RecordingOptions};
+pub use registry::Registry;
 pub use scan_chain::{ScanChain, ScanMark};
 pub use scan_graph::read_scan_graph;
 pub use scan_log::read_scan_log;
@@ -52,5 +52,5 @@ pub use scan_stream::read_scan_stream;
 pub use scan_stream_writer::ScanStreamWriter;
 pub use selected_scans::Selection;
 pub use sensor_scan::SensorScan;
-pub use source::{ScanHead, ScanSource, open_scans};
+pub use source::{ScanHead, ScanSource};
 pub use stored_scan::StoredScan;

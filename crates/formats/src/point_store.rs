@@ -48,13 +48,8 @@ impl PointRoom {
         Self { most_points: (most_bytes / RECORD_BYTES).max(POINTS_AT_A_TIME), folder: folder.to_owned() }
     }
 
-    /// Whether so many bytes exceed the limit.
-    pub(super) fn is_too_much(&self, bytes: usize) -> bool {
-        bytes / RECORD_BYTES > self.most_points
-    }
-
     /// An unnamed file in this folder.
-    pub(super) fn file(&self) -> Result<ScratchFile> {
+    fn file(&self) -> Result<ScratchFile> {
         ScratchFile::in_folder(&self.folder).map_err(|error| {
             Error::io(&self.folder, "keep the points of a scan in a temporary file in", error)
         })

@@ -1,13 +1,14 @@
+use super::fingerprint::Fingerprint;
 use super::point_store::PointStore;
 use super::pose_source::PoseSource;
 use super::source::{ScanHead, ScanSource};
 use crate::clouds::poses::{Found, Trajectory};
-use crate::clouds::{CloudHead, CloudPoint, CloudSource, Deskew, Place, PoseAt, RigidPose};
+use crate::clouds::{CloudHead, CloudPoint, CloudSource, Deskew, PoseAt, RigidPose};
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 use voxtile::scan::{Pose, no_return};
 use voxtile::space::Point;
-use voxtile::{Error, FormatError, Result};
+use voxtile::{Error, Result};
 
 /// How clouds get their poses, and what becomes of their points.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,7 +33,7 @@ pub struct CloudOptions {
 
 impl CloudOptions {
     /// Whether nothing but the poses' own places is asked for.
-    pub(super) fn is_plain(&self) -> bool {
+    pub(crate) fn is_plain(&self) -> bool {
         self.body_from_sensor == RigidPose::IDENTITY && !self.is_world_frame && !self.is_deskewed
     }
 }
@@ -54,9 +55,9 @@ impl Default for CloudOptions {
 /// From where poses come.
 pub(super) enum CloudPoses {
     /// A file, by time stamp or else by number.
-    File(PathBuf, Box<Trajectory>),
-    /// The source has them.
-    Source,
+    File(Box<Trajectory>),
+    /// The source has them; what people call them.
+    Source(PoseSource),
     /// Every cloud is in the world frame.
     Identity,
     /// There are none.
@@ -67,6 +68,8 @@ pub(super) enum CloudPoses {
 pub(super) struct PosedClouds {
     source: Box<dyn CloudSource>,
     path: PathBuf,
+    /// By which maps of earlier versions know the input.
+    files: Vec<PathBuf>,
     poses: CloudPoses,
     options: CloudOptions,
     /// Clouds so far.
@@ -100,7 +103,7 @@ impl PosedClouds {
             let reason = "points that are in the world frame already have no motion left in them; leave one of the two out";
             return Err(Error::argument("deskew, world_frame", reason));
         }
-        if let CloudPoses::File(_, trajectory) = &poses
+        if let CloudPoses::File(trajectory) = &poses
             && !trajectory.has_stamps()
         {
             trajectory.check_clouds(&*source)?;
@@ -110,6 +113,7 @@ impl PosedClouds {
         Ok(Self {
             source,
             path: path.to_owned(),
+            files: Vec::new(),
             poses,
             options,
             number,
@@ -124,6 +128,11 @@ impl PosedClouds {
         })
     }
 
+    /// Sets the files by which maps of earlier versions know the input.
+    pub(super) fn set_files(&mut self, files: Vec<PathBuf>) {
+        self.files = files;
+    }
+
     /// The pose of the body at a time, or of a cloud; or why there is none.
     fn pose_of(&self, head: &CloudHead, number: u64) -> Result<std::result::Result<RigidPose, String>> {
         let tolerance_ns = self.options.pose_tolerance_ns;
@@ -132,10 +141,10 @@ impl PosedClouds {
             (CloudPoses::Missing, _) => {
                 Err("neither the input has poses nor a file of them was named".to_owned())
             }
-            (CloudPoses::Source, _) => {
+            (CloudPoses::Source(_), _) => {
                 head.world_from_sensor.ok_or_else(|| "the input has none for it".to_owned())
             }
-            (CloudPoses::File(_, trajectory), Some(stamp_ns)) if trajectory.has_stamps() => {
+            (CloudPoses::File(trajectory), Some(stamp_ns)) if trajectory.has_stamps() => {
                 match trajectory.at(stamp_ns, tolerance_ns)? {
                     Found::Exact(pose) | Found::Between(pose) => Ok(pose),
                     Found::Gap { gap_ns } => {
@@ -149,7 +158,7 @@ impl PosedClouds {
                     Found::WithoutStamps => Err("the poses have no time stamps".to_owned()),
                 }
             }
-            (CloudPoses::File(_, trajectory), _) => Ok(trajectory.of_cloud(number, &*self.source)?),
+            (CloudPoses::File(trajectory), _) => Ok(trajectory.of_cloud(number, &*self.source)?),
         })
     }
 
@@ -163,7 +172,7 @@ impl PosedClouds {
 
     /// How many poses are by number, and left where the clouds end.
     fn poses_left(&self) -> Option<u64> {
-        let CloudPoses::File(_, trajectory) = &self.poses else { return None };
+        let CloudPoses::File(trajectory) = &self.poses else { return None };
         let left = (trajectory.len() as u64).saturating_sub(self.number);
         (self.is_at_end && !trajectory.has_stamps() && left > 0).then_some(left)
     }
@@ -229,19 +238,19 @@ impl PosedClouds {
                         .all(|c| c.is_finite())
                         .then(|| no_return([0.0; 3], direction))
                         .flatten();
-                    return points.push(far.unwrap_or([f64::NAN; 3]), intensity).map_err(keep);
+                    return points.push(far.unwrap_or([f64::NAN; 3]), intensity);
                 }
                 // Counted as a point without a return.
                 false => origin,
             };
             let in_sensor: Point = std::array::from_fn(|k| place[k] - origin[k]);
             let in_sensor = if options.is_world_frame { in_sensor } else { place };
-            points.push(in_sensor, intensity).map_err(keep)
+            points.push(in_sensor, intensity)
         });
         self.stayed += deskew.map_or(0, |deskew| deskew.stayed());
         read?;
         if let Some(error) = unreadable.into_inner() {
-            return Err(error.into());
+            return Err(error);
         }
         Ok(world_from_sensor)
     }
@@ -253,39 +262,14 @@ fn body_at(
     own: Option<&PoseAt>,
     options: &CloudOptions,
     at_ns: i64,
-) -> crate::clouds::Result<Option<RigidPose>> {
+) -> Result<Option<RigidPose>> {
     match poses {
-        CloudPoses::File(_, trajectory) => match trajectory.at(at_ns, options.pose_tolerance_ns)? {
+        CloudPoses::File(trajectory) => match trajectory.at(at_ns, options.pose_tolerance_ns)? {
             Found::Exact(body) | Found::Between(body) => Ok(Some(body)),
             _ => Ok(None),
         },
-        CloudPoses::Source => own.map_or(Ok(None), |own| own(at_ns)),
+        CloudPoses::Source(_) => own.map_or(Ok(None), |own| own(at_ns)),
         CloudPoses::Identity | CloudPoses::Missing => Ok(None),
-    }
-}
-
-/// An error of this crate on its way through the reader.
-fn keep(error: Error) -> crate::clouds::Error {
-    match error {
-        Error::Io { path, cause, .. } => crate::clouds::Error::io(&path, "write", cause),
-        other => crate::clouds::Error::argument("points", other.to_string()),
-    }
-}
-
-impl From<crate::clouds::Error> for Error {
-    fn from(error: crate::clouds::Error) -> Self {
-        match error {
-            crate::clouds::Error::Io { path, action, source } => Self::io(&path, action, source),
-            crate::clouds::Error::Format { path, place, reason } => {
-                let error = match place {
-                    Place::Byte(offset) => FormatError::at_offset(offset, reason),
-                    Place::Line(line) => FormatError::at_line(line, reason),
-                    Place::Record(record) => FormatError::at_record(record, reason),
-                };
-                error.in_input(&path)
-            }
-            crate::clouds::Error::Argument { what, reason } => Self::argument(what, reason),
-        }
     }
 }
 
@@ -332,7 +316,7 @@ impl ScanSource for PosedClouds {
         if self.without_pose > 0 && !self.has_pose && !self.options.may_lack_poses {
             // A map of nothing would be no answer.
             let mut why = self.why_without_pose();
-            if matches!(self.poses, CloudPoses::Source) {
+            if matches!(self.poses, CloudPoses::Source(_)) {
                 // The source knows what its own poses lack.
                 why = self.source.remarks().into_iter().fold(why, |why, remark| why + "; " + &remark);
             }
@@ -371,8 +355,8 @@ impl ScanSource for PosedClouds {
 
     fn pose_source(&self) -> PoseSource {
         match &self.poses {
-            CloudPoses::File(path, _) => PoseSource::File(path.clone()),
-            CloudPoses::Source => PoseSource::Scans,
+            CloudPoses::File(trajectory) => PoseSource::File(trajectory.path().to_owned()),
+            CloudPoses::Source(source) => source.clone(),
             CloudPoses::Identity => PoseSource::Identity,
             CloudPoses::Missing => PoseSource::Missing,
         }
@@ -392,7 +376,7 @@ impl ScanSource for PosedClouds {
 
     fn remarks(&self) -> Vec<String> {
         let mut remarks = self.source.remarks();
-        if let CloudPoses::File(_, trajectory) = &self.poses {
+        if let CloudPoses::File(trajectory) = &self.poses {
             remarks.extend(trajectory.remarks().iter().cloned());
         }
         if let Some(left) = self.poses_left() {
@@ -424,7 +408,24 @@ impl ScanSource for PosedClouds {
     }
 
     fn fingerprint(&self) -> Result<String> {
-        let reason = "maps of earlier versions have no inputs of this kind";
-        Err(Error::argument(self.path.display().to_string(), reason))
+        if self.files.is_empty() {
+            let reason = "maps of earlier versions have no inputs of this kind";
+            return Err(Error::argument(self.path.display().to_string(), reason));
+        }
+        let mut fingerprint = Fingerprint::default();
+        self.files.iter().try_for_each(|path| fingerprint.add_file(path))?;
+        match &self.poses {
+            CloudPoses::File(trajectory) => {
+                for number in 0..trajectory.len() {
+                    let pose = trajectory.by_number(number)?.unwrap_or(RigidPose::IDENTITY);
+                    fingerprint.add_pose(&Pose::from_quaternion(pose.position_m, pose.quaternion)?);
+                }
+            }
+            CloudPoses::Identity => {
+                self.files.iter().for_each(|_| fingerprint.add_pose(&Pose::identity()));
+            }
+            CloudPoses::Source(_) | CloudPoses::Missing => {}
+        }
+        Ok(fingerprint.finish())
     }
 }

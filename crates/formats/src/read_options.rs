@@ -1,16 +1,30 @@
 use super::posed_clouds::CloudOptions;
 use super::selected_scans::Selection;
-use crate::clouds::read::OpenOptions;
+use crate::clouds::Budget;
+use crate::clouds::read::Intrinsics;
 use std::path::PathBuf;
-#[cfg(feature = "ros")]
-use voxtile::{Error, Result};
 
-/// How an input of any known format is read; see [`open_any_scans`](super::open_any_scans).
-#[derive(Clone, Debug, Default)]
-#[non_exhaustive]
+/// How an input is read where its files do not say it; see [`open_scans`](super::open_scans).
+#[derive(Clone, Debug)]
 pub struct ReadOptions {
-    /// What the files do not say themselves.
-    pub open: OpenOptions,
+    /// The name of the format; guessed if `None`.
+    pub format: Option<String>,
+    /// Columns of a `.bin` file, each a float of four bytes: `x`, `y`, `z`, `intensity`, and any others. `None`:
+    /// KITTI's four, or nuScenes' five for a `.pcd.bin`.
+    pub fields: Option<Vec<String>>,
+    /// A LAS file with GPS times is cut into scans of this many seconds. 0: the file is one cloud.
+    pub scan_period_s: f64,
+    /// Where the sensor was, in metres in the frame of the points: for clouds that are registered already and come
+    /// without poses. Their points are then given relative to it, and the cloud says where it was.
+    pub sensor_origin_m: Option<[f64; 3]>,
+    /// Units of a depth image in a metre. `None`: 5000 for TUM RGB-D, 1000 (millimetres) otherwise.
+    pub depth_scale: Option<f64>,
+    /// The camera of depth images.
+    pub intrinsics: Option<Intrinsics>,
+    /// A file with the camera of depth images. `None`: `camera-intrinsics.txt` in the folder or beside it.
+    pub intrinsics_path: Option<PathBuf>,
+    /// Files that are no clouds, though they may lie among them. Those that are named above and below are none anyway.
+    pub not_clouds: Vec<PathBuf>,
     /// What to take of a recording.
     pub recording: RecordingOptions,
     /// A file of poses, or `identity`: all scans are in the world frame.
@@ -21,30 +35,44 @@ pub struct ReadOptions {
     pub clouds: CloudOptions,
     /// Which scans and points are taken.
     pub selection: Selection,
+    /// Bytes of memory for what grows with the input; beyond them it goes to temporary files.
+    pub memory_bytes: usize,
+    /// Folder of temporary files; the system's own if `None`.
+    pub scratch: Option<PathBuf>,
 }
 
 impl ReadOptions {
-    /// The same, with the files that are named for something else known to be no clouds.
-    pub(super) fn with_not_clouds(&self) -> Self {
-        let mut options = self.clone();
-        let named = [&self.poses, &self.calib, &self.open.intrinsics_path];
-        options.open.not_clouds.extend(named.into_iter().flatten().cloned());
-        options
+    /// How much memory reading may take, and where the rest goes.
+    pub fn budget(&self) -> Budget {
+        Budget { bytes: self.memory_bytes, scratch: self.scratch.clone() }
     }
 
-    /// Refuses what a recording says itself, and what would be passed over.
-    #[cfg(feature = "ros")]
-    pub(super) fn check_for_recording(&self) -> Result<()> {
-        if self.open.depth_scale.is_some() {
-            let reason = "depth images of a recording say themselves what they are in, 16UC1 millimetres and 32FC1 metres: \
-                          leave it out";
-            return Err(Error::argument("depth_scale", reason));
+    /// The files that are no clouds.
+    pub(crate) fn not_clouds(&self) -> Vec<PathBuf> {
+        let named = [&self.poses, &self.calib, &self.intrinsics_path].into_iter().flatten();
+        self.not_clouds.iter().chain(named).cloned().collect()
+    }
+}
+
+impl Default for ReadOptions {
+    fn default() -> Self {
+        Self {
+            format: None,
+            fields: None,
+            scan_period_s: 0.1,
+            sensor_origin_m: None,
+            depth_scale: None,
+            intrinsics: None,
+            intrinsics_path: None,
+            not_clouds: Vec::new(),
+            recording: RecordingOptions::default(),
+            poses: None,
+            calib: None,
+            clouds: CloudOptions::default(),
+            selection: Selection::default(),
+            memory_bytes: Budget::DEFAULT_BYTES,
+            scratch: None,
         }
-        if self.open.intrinsics_path.is_some() || self.open.intrinsics.is_some() {
-            let reason = "the camera of a recording is in the topic `camera_info` beside its depth images: leave it out";
-            return Err(Error::argument("intrinsics", reason));
-        }
-        Ok(())
     }
 }
 

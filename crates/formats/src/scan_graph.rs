@@ -1,10 +1,25 @@
 use super::fingerprint::Fingerprint;
 use super::point_store::PointStore;
+use super::read_options::ReadOptions;
 use super::source::{ScanHead, ScanSource};
-use std::io::Read;
+use crate::clouds::read::regular::check_regular;
+use std::fs::File;
+use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
 use voxtile::scan::Pose;
 use voxtile::{Error, FormatError, Result};
+
+/// Opens a scan graph.
+pub(crate) fn open(path: &Path, _: &ReadOptions) -> Result<Box<dyn ScanSource + Send>> {
+    check_regular(path)?;
+    let open = || {
+        let file = File::open(path)?;
+        let bytes = file.metadata()?.len();
+        Ok((BufReader::with_capacity(1 << 16, file), bytes))
+    };
+    let (input, bytes) = open().map_err(|error| Error::io(path, "open", error))?;
+    Ok(Box::new(read_scan_graph(input, bytes, path)?))
+}
 
 /// Reads OctoMap's binary scan graph of `file_bytes` bytes, as written by `ScanGraph::writeBinary`, scan by scan. Its
 /// edges are not read.

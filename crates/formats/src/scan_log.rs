@@ -1,12 +1,20 @@
 use super::fingerprint::Fingerprint;
 use super::point_store::PointStore;
+use super::read_options::ReadOptions;
 use super::source::{ScanHead, ScanSource};
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion};
-use std::io::BufRead;
+use std::fs::File;
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use voxtile::maths::sin_cos;
 use voxtile::scan::Pose;
 use voxtile::{Error, FormatError, Result};
+
+/// Opens a scan log.
+pub(crate) fn open(path: &Path, _: &ReadOptions) -> Result<Box<dyn ScanSource + Send>> {
+    let file = File::open(path).map_err(|error| Error::io(path, "open", error))?;
+    Ok(Box::new(read_scan_log(BufReader::with_capacity(1 << 16, file), path)))
+}
 
 /// Reads OctoMap's scan log, a text: `NODE x y z roll pitch yaw` starts a scan, its points follow as `x y z`, in the
 /// frame of the node. Empty lines and those that start with `#` or a blank are skipped, as in OctoMap.

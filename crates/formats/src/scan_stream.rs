@@ -1,5 +1,6 @@
 use super::fingerprint::Fingerprint;
 use super::point_store::PointStore;
+use super::read_options::ReadOptions;
 use super::scan_stream_writer::{FLAG_INTENSITIES, MAGIC, MAX_LABEL_BYTES, VERSION};
 use super::source::{ScanHead, ScanSource};
 use super::stream_input::{AnyInput, FileInput, StreamInput};
@@ -26,8 +27,8 @@ pub fn read_scan_stream<R: Read>(input: R, path: &Path, is_file: bool) -> Result
 /// # Errors
 ///
 /// As for [`read_scan_stream`].
-pub(super) fn open_scan_stream(path: &Path) -> Result<impl ScanSource + use<>> {
-    begin(FileInput::open(path)?, path, true)
+pub(crate) fn open(path: &Path, _: &ReadOptions) -> Result<Box<dyn ScanSource + Send>> {
+    Ok(Box::new(begin(FileInput::open(path)?, path, true)?))
 }
 
 fn begin<R: StreamInput>(input: R, path: &Path, is_file: bool) -> Result<ScanStream<R>> {

@@ -1,16 +1,9 @@
-use super::pcd_folder::PcdFolder;
 use super::point_store::{PointRoom, PointStore};
 use super::pose_source::PoseSource;
-use super::scan_graph::read_scan_graph;
-use super::scan_log::read_scan_log;
-use super::scan_stream::open_scan_stream;
 use super::sensor_scan::SensorScan;
 use super::stored_scan::StoredScan;
-use std::fs::File;
-use std::io::{BufReader, ErrorKind};
-use std::path::Path;
+use voxtile::Result;
 use voxtile::scan::Pose;
-use voxtile::{Error, Result};
 
 /// Name and pose of a scan.
 #[derive(Clone, Debug)]
@@ -119,51 +112,4 @@ pub trait ScanSource {
     ///
     /// A file that cannot be read, a stream without a label.
     fn fingerprint(&self) -> Result<String>;
-}
-
-/// Opens scans by the kind of path: a folder of PCD files (or its parent, if it is named `scans/`), one PCD file, an
-/// OctoMap scan graph (`.graph`) or scan log (`.log`), a scan stream of voxtile (`.scans`).
-///
-/// PCD files are in natural order of their names (`scan2` before `scan10`). Their poses come from `poses`, or from
-/// `poses_tum.txt` or `poses_kitti.txt` in or beside the folder, or from the `VIEWPOINT` of each file; see
-/// [`ScanSource::pose_source`]. `poses` may be `identity`: all scans are in the world frame.
-///
-/// # Errors
-///
-/// Any other path, poses that do not match the files in number or order of time, more than one scan without any pose, a
-/// file that cannot be read.
-pub fn open_scans(path: &Path, poses: Option<&Path>) -> Result<Box<dyn ScanSource + Send>> {
-    let metadata = std::fs::metadata(path).map_err(|error| match error.kind() {
-        ErrorKind::NotFound => Error::argument(path.display().to_string(), "there is no such file or folder"),
-        _ => Error::io(path, "open", error),
-    })?;
-    let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
-    let open = || match File::open(path) {
-        Ok(file) => Ok(BufReader::with_capacity(1 << 16, file)),
-        Err(error) => Err(Error::io(path, "open", error)),
-    };
-    let needs_no_poses = |kind: &str| match poses {
-        None => Ok(()),
-        Some(_) => Err(Error::argument("poses", format!("a {kind} has its own poses; leave the option out"))),
-    };
-    match extension.to_ascii_lowercase().as_str() {
-        _ if metadata.is_dir() => Ok(Box::new(PcdFolder::open(path, poses)?)),
-        "pcd" => Ok(Box::new(PcdFolder::open_file(path, poses)?)),
-        "graph" => {
-            needs_no_poses("scan graph")?;
-            Ok(Box::new(read_scan_graph(open()?, metadata.len(), path)?))
-        }
-        "log" => {
-            needs_no_poses("scan log")?;
-            Ok(Box::new(read_scan_log(open()?, path)))
-        }
-        "scans" => {
-            needs_no_poses("scan stream")?;
-            Ok(Box::new(open_scan_stream(path)?))
-        }
-        _ => {
-            let reason = "not a folder of .pcd files, nor a .pcd, .graph, .log or .scans file";
-            Err(Error::argument(path.display().to_string(), reason))
-        }
-    }
 }

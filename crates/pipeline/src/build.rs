@@ -199,9 +199,9 @@ impl Build<'_> {
 /// How the input is read; without rays no poses are needed.
 fn read_options(options: &BuildOptions, config: &MapConfig) -> ReadOptions {
     let mut read = options.read.clone();
-    read.open.scratch = Some(folder_beside(options).to_owned());
+    read.scratch = Some(folder_beside(options).to_owned());
     if let Some(bytes) = config.memory_bytes() {
-        read.open.memory_bytes = for_reading(bytes);
+        read.memory_bytes = for_reading(bytes);
     }
     read.clouds.has_no_returns = config.rays.no_return_range_m.is_some();
     if options.no_rays && read.poses.is_none() {

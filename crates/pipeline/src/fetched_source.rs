@@ -2,7 +2,7 @@ use crate::place::bucket_at;
 use crate::watch::Watch;
 use voxtile::Result;
 use voxtile_bucket::FetchedFiles;
-use voxtile_formats::{PointStore, PoseSource, ReadOptions, ScanHead, ScanSource, open_any_scans};
+use voxtile_formats::{PointStore, PoseSource, ReadOptions, ScanHead, ScanSource, open_scans};
 
 /// Scans of a bucket, from files that were fetched.
 pub struct FetchedSource {
@@ -15,7 +15,7 @@ impl FetchedSource {
     /// Fetches all files at a URL, then reads them as those of a folder.
     pub fn open(url: &str, options: &ReadOptions, watch: &Watch) -> Result<Self> {
         let files = fetch(url, watch)?;
-        Ok(Self { source: open_any_scans(files.path(), options)?, _files: files })
+        Ok(Self { source: open_scans(files.path(), options)?, _files: files })
     }
 }
 

@@ -3,9 +3,9 @@ use voxtile::mapper::{KeptScanHead, KeptSummary};
 use voxtile::operations::NewPoses;
 use voxtile::scan::Pose;
 use voxtile::{Error, Result};
+use voxtile_formats::ReadOptions;
 use voxtile_formats::clouds::poses::{Found, Trajectory};
 use voxtile_formats::clouds::{Budget, RigidPose};
-use voxtile_formats::{ReadOptions, read_poses};
 
 /// Most scans that an error names.
 const MAX_NAMED: usize = 5;
@@ -34,7 +34,7 @@ impl<'a> PoseFile<'a> {
             calib: options.calib.as_deref(),
             body_from_sensor: (body != RigidPose::IDENTITY).then_some(body),
             tolerance_ns: options.clouds.pose_tolerance_ns,
-            budget: options.open.budget(),
+            budget: options.budget(),
         })
     }
 }
@@ -53,7 +53,6 @@ pub fn poses_for(from: &PoseFile<'_>, scans: &KeptSummary) -> Result<NewPoses> {
             "is a FIFO, a socket or a device, and new poses may be read twice: save what it gives to a file";
         return Err(Error::argument(file.display().to_string(), reason));
     }
-    let is_plain = calib.is_none() && body_from_sensor.is_none();
     let trajectory = Trajectory::read_within(file, calib, budget)?;
     // Stamps that mean nothing are all the same.
     if trajectory.span_ns()?.is_none_or(|[first, last]| first < last) {
@@ -64,13 +63,6 @@ pub fn poses_for(from: &PoseFile<'_>, scans: &KeptSummary) -> Result<NewPoses> {
     let is_by_line = !(have_stamps && trajectory.goes_back());
     if is_by_line && trajectory.len() == scans.len() && is_in_step(&trajectory, scans, tolerance_ns)? {
         trajectory.check_order()?;
-        // As a folder of PCD takes them, to the bit.
-        if is_plain
-            && let Ok(poses) = read_poses(file)
-            && poses.len() == scans.len()
-        {
-            return Ok(NewPoses::InOrder(poses));
-        }
         let mut poses = Vec::with_capacity(scans.len());
         for number in 0..scans.len() {
             if let Some(pose) = trajectory.by_number(number)? {

@@ -6,7 +6,7 @@ use crate::watch::Watch;
 use std::io::{BufReader, stdin};
 use std::path::Path;
 use voxtile::{Error, Result};
-use voxtile_formats::{ReadOptions, ScanSource, open_any_scans, read_scan_stream};
+use voxtile_formats::{ReadOptions, ScanSource, open_scans, read_scan_stream};
 
 /// Most letters of an input's name that a map keeps.
 const MAX_LETTERS: usize = 200;
@@ -23,7 +23,7 @@ pub fn is_standard_input(scans: &Path) -> bool {
 ///
 /// An input that cannot be read, options that do not fit it; [`Error::Stopped`].
 pub fn open(scans: &Path, options: &ReadOptions, watch: &Watch) -> Result<Box<dyn ScanSource + Send>> {
-    if options.open.format.is_none() && is_map(scans, watch.stop())? {
+    if options.format.is_none() && is_map(scans, watch.stop())? {
         let source = KeptSource::open(scans, PoseFile::of_reading(options).as_ref())?;
         return Ok(options.selection.clone().of(Box::new(source)));
     }
@@ -31,7 +31,7 @@ pub fn open(scans: &Path, options: &ReadOptions, watch: &Watch) -> Result<Box<dy
         return scans_at(url, options, watch);
     }
     if !is_standard_input(scans) {
-        return open_any_scans(scans, options);
+        return open_scans(scans, options);
     }
     if options.poses.is_some() {
         return Err(Error::argument("poses", "a scan stream has its own poses; leave the option out"));

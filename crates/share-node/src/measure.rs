@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 use testkit::lossy_link::LossyLink;
 use voxtile::{InMemoryMapper, MapConfig, MapView, Mapper};
-use voxtile_formats::open_scans;
+use voxtile_formats::{ReadOptions, open_scans};
 use voxtile_share::codec::{CONTEXTS, Packet, count_contexts};
 use voxtile_share::{MapWatch, Receiver, ReceiverConfig, Sender};
 
@@ -95,7 +95,7 @@ struct World {
 }
 
 fn measure(args: &Args, path: &Path, counts: &mut [[u64; 2]]) -> anyhow::Result<Row> {
-    let mut source = open_scans(path, args.poses.as_deref())?;
+    let mut source = open_scans(path, &ReadOptions { poses: args.poses.clone(), ..ReadOptions::default() })?;
     let scans = source.len_hint().unwrap_or(0) as u32;
     let period = seconds("--period", args.period)?;
     let cut = seconds("--cut", args.cut)?;

@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 use voxtile::space::Grid;
 use voxtile::{InMemoryMapper, MapConfig, MapReader, Mapper, Scan};
-use voxtile_formats::{ScanSource, open_scans};
+use voxtile_formats::{ReadOptions, ScanSource, open_scans};
 use voxtile_share::{MapWatch, Outgoing, Sender};
 
 /// How often there may be something to send.
@@ -99,7 +99,11 @@ impl Feed {
         let config =
             MapConfig::new(args.resolution, 100.0 * args.resolution)?.with_range(0.0, args.max_range);
         let mapper = Box::new(InMemoryMapper::new(config)?);
-        Ok(Self::Scans { source: open_scans(source, args.poses.as_deref())?, mapper, is_over: false })
+        Ok(Self::Scans {
+            source: open_scans(source, &ReadOptions { poses: args.poses.clone(), ..ReadOptions::default() })?,
+            mapper,
+            is_over: false,
+        })
     }
 
     fn grid(&self) -> Grid {

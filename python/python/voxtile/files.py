@@ -21,8 +21,8 @@ class ReadOptions(TypedDict, total=False):
     """How scans are read. Lengths are in metres, times in seconds; what is left out is as for ``voxtile build``.
 
     ``format`` names what the content does not tell: pcd ply xyz bin las laz copc e57 tum-rgbd depth bag mcap db3
-    rosbag2. ``topic``, ``odometry`` and ``fixed_frame`` choose from a recording, ``first``, ``count`` and ``every``
-    choose scans. ``poses`` is a file of poses (TUM, KITTI, CSV, .npy), sensor to world, or "identity";
+    rosbag2 graph log scans. ``topic``, ``odometry`` and ``fixed_frame`` choose from a recording, ``first``, ``count``
+    and ``every`` choose scans. ``poses`` is a file of poses (TUM, KITTI, CSV, .npy), sensor to world, or "identity";
     ``extrinsic`` says where the sensor is in the body that poses are of: seven numbers, or twelve of a 3 x 4 matrix.
     """
 

@@ -161,7 +161,7 @@ proptest! {
 #[ignore = "a table, by hand"]
 fn a_table_of_real_sets() {
     use std::time::Instant;
-    use voxtile_formats::{ReadOptions, open_any_scans};
+    use voxtile_formats::{ReadOptions, open_scans};
     let root = std::env::var_os("VOXTILE_DATA").unwrap_or_else(|| "../shared/data".into());
     for set in [
         "balm_os0_hall",
@@ -174,7 +174,7 @@ fn a_table_of_real_sets() {
     ] {
         let mut options = ReadOptions::default();
         options.poses = set.ends_with("laz").then(|| "identity".into());
-        let Ok(mut source) = open_any_scans(&std::path::Path::new(&root).join(set), &options) else {
+        let Ok(mut source) = open_scans(&std::path::Path::new(&root).join(set), &options) else {
             continue;
         };
         let (mut encoder, mut decoder) = (PointEncoder::default(), PointDecoder::default());

@@ -219,8 +219,6 @@ fn shared() -> Seeds {
 
 fn texts() -> Seeds {
     vec![
-        ("poses", "tum", "# t x y z qx qy qz qw\n0 1 0 0 0 0 0 1\n\n2 3 0 0 0 0 0.6 0.8\n".into()),
-        ("poses", "kitti", "1 0 0 0.5 0 1 0 -2 0 0 1 0\n0 -1 0 1 1 0 0 2 0 0 1 3\n".into()),
         ("points", "columns", "1 2 3\n-0.5\t1e3 nan 4\n\n# more\n0 0 0\n".into()),
         ("points", "csv", "x,y,z\n1,2,3\r\n4;5;6\n".into()),
     ]

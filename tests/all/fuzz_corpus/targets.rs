@@ -18,8 +18,7 @@ use voxtile::tile::format::{
     read_compact_front, read_table, write_compact, write_compact_file, write_table,
 };
 use voxtile_formats::{
-    PcdCloud, ScanSource, parse_poses, read_pcd, read_points, read_scan_graph, read_scan_log,
-    read_scan_stream,
+    ScanSource, SensorScan, read_pcd, read_points, read_scan_graph, read_scan_log, read_scan_stream,
 };
 use voxtile_share::codec::{Packet, Request};
 use voxtile_share::{Receiver, ReceiverConfig, Sender, SenderConfig, read_layer};
@@ -27,7 +26,7 @@ use voxtile_share::{Receiver, ReceiverConfig, Sender, SenderConfig, read_layer};
 pub type Target = fn(&[u8]) -> bool;
 
 /// Every target by the name of its corpus.
-pub const TARGETS: [(&str, Target); 15] = [
+pub const TARGETS: [(&str, Target); 14] = [
     ("bt", octree),
     ("ot", octree),
     ("table", table),
@@ -39,7 +38,6 @@ pub const TARGETS: [(&str, Target); 15] = [
     ("graph", graph),
     ("log", log),
     ("scan_stream", scan_stream),
-    ("poses", poses),
     ("points", points),
     ("share_packet", share_packet),
     ("share_life", share_life),
@@ -308,8 +306,10 @@ fn seal_commit_log(file: &mut [u8]) {
 
 /// A PCD file in any of its encodings.
 pub fn pcd(data: &[u8]) -> bool {
-    let Ok(PcdCloud { points, intensities, world_from_sensor }) = read_pcd(data) else { return false };
-    assert!(intensities.is_none_or(|intensities| intensities.len() == points.len()));
+    let Ok(SensorScan { points_in_sensor, intensities, world_from_sensor, .. }) = read_pcd(data) else {
+        return false;
+    };
+    assert!(intensities.is_none_or(|intensities| intensities.len() == points_in_sensor.len()));
     assert_is_pose(&world_from_sensor);
     true
 }
@@ -355,15 +355,6 @@ fn all_points(mut source: impl ScanSource) -> Option<usize> {
     }
     assert!(len_hint.is_none_or(|hint| hint == scans));
     Some(points)
-}
-
-/// Poses of TUM or KITTI, a text.
-pub fn poses(data: &[u8]) -> bool {
-    let text = String::from_utf8_lossy(data);
-    let Ok(poses) = parse_poses(&text) else { return false };
-    assert!(poses.len() <= text.lines().count());
-    poses.iter().for_each(assert_is_pose);
-    true
 }
 
 /// Points, a text.

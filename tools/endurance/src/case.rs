@@ -2,7 +2,7 @@ use anyhow::{Context, Result};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use voxtile::{MapConfig, MemoryLimit, Scan};
-use voxtile_formats::open_scans;
+use voxtile_formats::{ReadOptions, open_scans};
 use workload::SurveyName;
 
 /// Scans, and the map that is made of them.
@@ -116,7 +116,8 @@ impl Case {
             }
             Input::Recorded { folder } => {
                 let cannot = format!("{}: cannot read the scans", folder.display());
-                let mut source = open_scans(folder, None).with_context(|| cannot.clone())?;
+                let mut source =
+                    open_scans(folder, &ReadOptions::default()).with_context(|| cannot.clone())?;
                 let scans = std::iter::from_fn(move || source.next_scan().transpose());
                 Ok(Box::new(scans.map(move |scan| {
                     Ok(without_intensities(scan.with_context(|| cannot.clone())?.into_scan()))

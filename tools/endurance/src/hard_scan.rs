@@ -251,7 +251,7 @@ mod tests {
             let mut file = Vec::new();
             write_packed(points, &mut file).unwrap();
             let cloud = voxtile_formats::read_pcd(&file).unwrap();
-            assert_eq!(cloud.points, vec![[3.0, 4.0, 5.0]; points as usize]);
+            assert_eq!(cloud.points_in_sensor, vec![[3.0, 4.0, 5.0]; points as usize]);
         }
     }
 }

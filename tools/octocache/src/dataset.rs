@@ -2,7 +2,7 @@ use anyhow::{Context, Result};
 use std::path::{Path, PathBuf};
 use voxtile::space::MAX_VOXELS_PER_TILE_EDGE;
 use voxtile::{MapConfig, Scan};
-use voxtile_formats::open_scans;
+use voxtile_formats::{ReadOptions, open_scans};
 use workload::SurveyName;
 
 /// Scans that the questions are put to.
@@ -62,7 +62,7 @@ impl Dataset {
 }
 
 fn recorded(folder: &Path, count: usize) -> Result<Vec<Scan>> {
-    let mut source = open_scans(folder, None)?;
+    let mut source = open_scans(folder, &ReadOptions::default())?;
     let mut scans = Vec::new();
     while scans.len() < count {
         let Some(scan) = source.next_scan()? else { break };

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 use voxtile::Scan;
-use voxtile_formats::open_scans;
+use voxtile_formats::{ReadOptions, open_scans};
 use workload::{ScanWriter, SurveyName};
 
 /// Scans that are mapped, and how finely.
@@ -70,7 +70,7 @@ impl ScanSet {
         }
         let Some(folder) = recorded_set(data, self.name) else { return Ok(None) };
         let cannot_read = || format!("{}: cannot read the scans", folder.display());
-        let mut source = open_scans(&folder, None).with_context(cannot_read)?;
+        let mut source = open_scans(&folder, &ReadOptions::default()).with_context(cannot_read)?;
         let mut scans = Vec::new();
         while scans.len() < self.scans
             && let Some(scan) = source.next_scan().with_context(cannot_read)?

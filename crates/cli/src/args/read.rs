@@ -1,13 +1,12 @@
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
+use voxtile_formats::Registry;
 
 /// What is read, and how it becomes scans.
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Input")]
 pub struct ReadArgs {
-    /// Format of the input, where its content does not tell: pcd ply xyz bin las laz copc e57 tum-rgbd depth bag mcap
-    /// db3 rosbag2
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help = format_help())]
     pub format: Option<String>,
     /// Topic with the clouds of a recording, where there are several
     #[arg(long, value_name = "TOPIC")]
@@ -70,6 +69,11 @@ pub struct ReadArgs {
     /// Camera of depth images: a file with fx fy cx cy or a 3x3 matrix [default: camera-intrinsics.txt in or beside it]
     #[arg(long, value_name = "FILE")]
     pub intrinsics: Option<PathBuf>,
+}
+
+fn format_help() -> String {
+    let known = Registry::default().names(" ");
+    format!("Format of the input, where its content does not tell: {known}")
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

@@ -113,7 +113,7 @@ fn a_map_is_built_asked_exported_and_added_to() {
     let lines = fs::read_to_string(folder.path().join("a.csv")).unwrap().lines().count() as u64;
     assert_eq!(lines, 1 + info["occupied"].as_u64().unwrap());
     let exported = voxtile_formats::read_pcd(&fs::read(folder.path().join("a.pcd")).unwrap()).unwrap();
-    assert_eq!(exported.points.len() as u64 + 1, lines);
+    assert_eq!(exported.points_in_sensor.len() as u64 + 1, lines);
     let all = folder.path().join("all.csv");
     let count = json(&["export", map, "-o", text(&all), "--min-probability", "0", "--json"]);
     assert_eq!(count["voxels"], info["voxels"]);
@@ -234,8 +234,8 @@ fn bad_inputs_get_one_line_that_says_what_to_do() {
         (vec!["build", "nowhere", "-o", new], 2, "nowhere: there is no such file or folder"),
         (vec!["build", text(&empty_folder), "-o", new], 2, "no file of a known format"),
         (vec!["build", &other, "-o", new], 2, "pcap"),
-        (vec!["build", scans, "-o", new, "--poses", &few], 2, "1 poses for 3 scan files"),
-        (vec!["build", scans, "-o", new, "--poses", &many], 2, "4 poses for 3 scan files"),
+        (vec!["build", scans, "-o", new, "--poses", &few], 2, "1 poses for 3 clouds"),
+        (vec!["build", scans, "-o", new, "--poses", &many], 2, "4 poses for 3 clouds"),
         (vec!["build", &wrong_header, "-o", new], 1, "line 7: the points have no field z"),
         (vec!["build", &truncated, "-o", new], 1, "the file ends after 0 of 9 points"),
         (vec!["build", &plain, "-o", new, "--sensor-model", "iwlo"], 2, "needs an intensity a point"),

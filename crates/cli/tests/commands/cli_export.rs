@@ -342,7 +342,7 @@ fn points_of_a_pcd_are_float32_and_come_back_to_their_voxels_wherever_the_map_is
         assert_eq!(origin.map(|x| f64::from(x as f32)), origin);
         let expected: Vec<_> = centers(&table).into_iter().map(|center| grid.voxel_of(center)).collect();
         let found: Vec<_> = read
-            .points
+            .points_in_sensor
             .iter()
             .map(|point| grid.voxel_of(std::array::from_fn(|k| point[k] + origin[k])))
             .collect();

@@ -164,7 +164,7 @@ fn an_input_of_an_earlier_version_is_gone_on_with() {
     numbered(&a, 1, 0..6);
     let config = voxtile::MapConfig::new(0.1, 10.0).unwrap().with_range(0.0, 100.0);
     let mut mapper = voxtile::OutOfCoreTileMapper::create(&map, config).unwrap();
-    let mut source = voxtile_formats::open_scans(&a, None).unwrap();
+    let mut source = voxtile_formats::open_scans(&a, &Default::default()).unwrap();
     mapper.begin_input(source.fingerprint().unwrap()).unwrap();
     for _ in 0..4 {
         let scan = source.next_scan().unwrap().unwrap().into_scan();

@@ -8,7 +8,7 @@ use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use tempfile::NamedTempFile;
 use voxtile::{InMemoryMapper, MapConfig, MapQueries, Mapper};
-use voxtile_formats::{ScanStreamWriter, open_scans};
+use voxtile_formats::{ReadOptions, ScanStreamWriter, open_scans};
 use voxtile_simulation::Survey;
 
 const SCANS: usize = 16;
@@ -35,7 +35,7 @@ impl Drive {
         let config = MapConfig::new(RESOLUTION_M, 10.0).unwrap().with_range(0.0, MAX_RANGE_M);
         let mut mapper = InMemoryMapper::new(config).unwrap();
         let mut digests = vec![mapper.digest().unwrap().to_string()];
-        let mut source = open_scans(stream.path(), None).unwrap();
+        let mut source = open_scans(stream.path(), &ReadOptions::default()).unwrap();
         while let Some(scan) = source.next_scan().unwrap() {
             mapper.insert_scan(&scan.into_scan()).unwrap();
             digests.push(mapper.digest().unwrap().to_string());

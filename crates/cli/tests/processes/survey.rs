@@ -5,7 +5,7 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 use voxtile::{InMemoryMapper, MapConfig, MapQueries, Mapper, Scan};
-use voxtile_formats::{ScanStreamWriter, open_scans};
+use voxtile_formats::{ReadOptions, ScanStreamWriter, open_scans};
 use voxtile_simulation::{City, Drive, Lidar, Survey};
 
 /// A folder of scans, and the digest of their map after each number of them.
@@ -30,7 +30,7 @@ impl Scans {
         let mut mapper = InMemoryMapper::new(config).unwrap();
         let mut digests = vec![mapper.digest().unwrap().to_string()];
         for _ in 0..rounds {
-            let mut source = open_scans(folder.path(), None).unwrap();
+            let mut source = open_scans(folder.path(), &ReadOptions::default()).unwrap();
             while let Some(scan) = source.next_scan().unwrap() {
                 mapper.insert_scan(&scan.into_scan()).unwrap();
                 digests.push(mapper.digest().unwrap().to_string());

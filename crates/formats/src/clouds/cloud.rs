@@ -1,5 +1,5 @@
-use crate::clouds::error::Result;
 use crate::clouds::pose::RigidPose;
+use voxtile::Result;
 
 /// What is known of a cloud before its points are read.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -1,9 +1,9 @@
 //! Lines of a text of any size, each of bounded length.
 
-use crate::clouds::error::{Error, Place, Result};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
+use voxtile::{Error, FormatError, Result};
 
 /// A longer line is an error: its words would take many times its bytes.
 pub(crate) const MAX_LINE_BYTES: u64 = 1 << 16;
@@ -77,7 +77,7 @@ impl Lines {
 
     /// An error of the line that was read last.
     pub(crate) fn error(&self, reason: impl Into<String>) -> Error {
-        Error::format(&self.path, Place::Line(self.number), reason)
+        FormatError::at_line(self.number, reason).in_input(&self.path)
     }
 }
 
@@ -103,7 +103,7 @@ mod tests {
         assert_eq!(next().unwrap(), Some((1, long)));
         assert_eq!(next().unwrap(), Some((2, 3)));
         assert_eq!(next().unwrap(), Some((3, long - 1)), "its end is in the last byte");
-        let error = next().unwrap_err().to_string();
+        let error = format!("{:#}", next().unwrap_err());
         assert!(error.contains("line 4: the line is longer than 64 KiB"), "{error}");
     }
 }

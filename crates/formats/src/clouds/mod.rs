@@ -24,7 +24,6 @@ mod stamp;
 
 pub use cloud::{CloudHead, CloudPoint, CloudSource, PoseAt};
 pub use deskew::Deskew;
-pub use error::{Error, Place, Result};
 pub use pose::RigidPose;
 pub use spill::Budget;
 pub use stamp::in_name as stamp_of_name;

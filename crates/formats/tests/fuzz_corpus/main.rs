@@ -9,6 +9,7 @@ mod targets;
 use std::fs;
 use std::path::{Path, PathBuf};
 use targets::TARGETS;
+use voxtile_formats::Registry;
 
 fn corpus(target: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/corpus").join(target)
@@ -25,6 +26,38 @@ fn no_file_of_the_corpus_breaks_a_reader() {
             // Says which file it was, should the next line panic.
             println!("{}", path.display());
             target(&fs::read(&path).unwrap());
+        }
+    }
+}
+
+/// Formats and the corpus of each. The crate png reads depth images, and what is around them is a list of stamps.
+const CORPORA: [(&str, &str); 15] = [
+    ("pcd", "pcd"),
+    ("ply", "cloud_ply"),
+    ("xyz", "cloud_text"),
+    ("bin", "cloud_bin"),
+    ("las", "cloud_las"),
+    ("laz", "cloud_las"),
+    ("copc", "cloud_las"),
+    ("e57", "cloud_e57"),
+    ("bag", "ros_bag1"),
+    ("mcap", "ros_mcap"),
+    ("db3", "ros_messages"),
+    ("rosbag2", "ros_metadata"),
+    ("graph", "graph"),
+    ("log", "log"),
+    ("scans", "scan_stream"),
+];
+
+#[test]
+fn every_format_is_fuzzed() {
+    for format in Registry::default().formats() {
+        let found = CORPORA.iter().find(|(name, _)| *name == format.name);
+        match found {
+            Some((_, target)) => assert!(corpus(target).is_dir(), "{target}"),
+            None => {
+                assert!(["tum-rgbd", "depth"].contains(&format.name), "{} has no fuzz target", format.name)
+            }
         }
     }
 }

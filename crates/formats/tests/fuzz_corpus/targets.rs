@@ -7,15 +7,16 @@
 use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
+use voxtile::Error;
+use voxtile_formats::clouds::CloudSource;
 use voxtile_formats::clouds::poses::{Found, Trajectory};
-use voxtile_formats::clouds::read::{Format, OpenOptions, open};
 use voxtile_formats::clouds::ros::messages::{
     CameraInfo, Image, LaserScan, LivoxCustom, MessageKind, PointCloud2, decode_poses,
 };
 use voxtile_formats::clouds::ros::{
     BagOptions, Decoded, PoseSource, Recording, Wire, open_bag, open_recording,
 };
-use voxtile_formats::clouds::{CloudSource, Error};
+use voxtile_formats::{ReadOptions, Registry, open_clouds};
 
 pub type Target = fn(&[u8]) -> bool;
 
@@ -38,25 +39,25 @@ const MAX_POINTS: u64 = 2_000;
 
 /// PLY in any of its encodings.
 pub fn ply(data: &[u8]) -> bool {
-    clouds(data, "a.ply", Format::Ply, 0.0)
+    clouds(data, "a.ply", "ply", 0.0)
 }
 
 /// Points as text.
 pub fn text(data: &[u8]) -> bool {
-    clouds(data, "a.xyz", Format::Text, 0.0)
+    clouds(data, "a.xyz", "xyz", 0.0)
 }
 
 /// Floats without a header, as KITTI and nuScenes write them.
 pub fn bin(data: &[u8]) -> bool {
-    let is_kitti = clouds(data, "a.bin", Format::Bin, 0.0);
-    is_kitti || clouds(data, "a.pcd.bin", Format::Bin, 0.0)
+    let is_kitti = clouds(data, "a.bin", "bin", 0.0);
+    is_kitti || clouds(data, "a.pcd.bin", "bin", 0.0)
 }
 
 /// LAS and LAZ: as one cloud and, if it has few points, cut into scans by time.
 pub fn las(data: &[u8]) -> bool {
-    let is_read = clouds(data, "a.laz", Format::Las, 0.0);
+    let is_read = clouds(data, "a.laz", "las", 0.0);
     if is_read {
-        clouds(data, "a.laz", Format::Las, 0.1);
+        clouds(data, "a.laz", "las", 0.1);
     }
     is_read
 }
@@ -69,7 +70,7 @@ pub fn e57(data: &[u8]) -> bool {
     if choice & 1 == 1 {
         file.as_chunks_mut::<1024>().0.iter_mut().for_each(seal_page);
     }
-    clouds(&file, "a.e57", Format::E57, 0.0)
+    clouds(&file, "a.e57", "e57", 0.0)
 }
 
 /// Makes the last four bytes the CRC-32C of those before, the most significant first.
@@ -80,11 +81,15 @@ fn seal_page(page: &mut [u8; 1024]) {
     *crc = (!sum).to_be_bytes();
 }
 
-fn clouds(data: &[u8], name: &str, format: Format, scan_period_s: f64) -> bool {
-    let options =
-        OpenOptions { format: Some(format), scan_period_s, memory_bytes: 1 << 16, ..OpenOptions::default() };
+fn clouds(data: &[u8], name: &str, format: &str, scan_period_s: f64) -> bool {
+    let options = ReadOptions {
+        format: Some(format.to_owned()),
+        scan_period_s,
+        memory_bytes: 1 << 16,
+        ..ReadOptions::default()
+    };
     with_file(name, data, |path| {
-        open(path, &options).is_ok_and(|mut source| drain(source.as_mut(), data.len()))
+        open_clouds(path, &options).is_ok_and(|mut source| drain(source.as_mut(), data.len()))
     })
 }
 

@@ -2,7 +2,7 @@ use crate::made::voxels::{format_of, write_voxels};
 use std::fs;
 use std::path::Path;
 use voxtile_formats::clouds::CloudSource;
-use voxtile_formats::clouds::read::{OpenOptions, open};
+use voxtile_formats::{ReadOptions, open_clouds};
 use voxtile_formats::write::{VoxelsHead, WriteOptions};
 
 const FORMATS: [&str; 4] = ["las", "laz", "copc", "e57"];
@@ -21,8 +21,8 @@ fn round_trip(format: &str, crs: Option<&str>) -> (Option<String>, Vec<String>) 
         assert_eq!(bytes[6] & 1 << 4, 1 << 4, "{format}");
     }
     // A scan of E57 without a pose is remarked otherwise.
-    let options = OpenOptions { sensor_origin_m: Some([0.0; 3]), ..OpenOptions::default() };
-    let source = open(&path, &options).unwrap();
+    let options = ReadOptions { sensor_origin_m: Some([0.0; 3]), ..ReadOptions::default() };
+    let source = open_clouds(&path, &options).unwrap();
     (source.crs().map(str::to_owned), source.remarks())
 }
 
@@ -56,7 +56,7 @@ fn what_is_no_number_of_a_system_is_refused() {
     for crs in ["EPSG:", "EPSG:100000", "EPSG:4326+5773"] {
         let options = WriteOptions { crs: Some(crs.to_owned()), ..WriteOptions::beside(&path) };
         let error = format_of("las").open(&head, &path, &options).err().unwrap();
-        assert!(error.to_string().contains(crs), "{error}");
+        assert!(format!("{error:#}").contains(crs), "{error}");
     }
 }
 
@@ -66,7 +66,7 @@ fn folder_of(folder: &Path, format: &str, systems: &[Option<&str>]) -> Box<dyn C
         let path = folder.join(format!("{number}.{}", format_of(format).extension.unwrap()));
         write_voxels(format, &path, *crs);
     }
-    open(folder, &OpenOptions::default()).unwrap()
+    open_clouds(folder, &ReadOptions::default()).unwrap()
 }
 
 fn of_systems(source: &dyn CloudSource) -> Vec<String> {
@@ -84,7 +84,7 @@ fn files_of_another_system_are_refused_before_their_points() {
             match source.next_cloud() {
                 Ok(Some(_)) => clouds += 1,
                 Ok(None) => break,
-                Err(error) => errors.push(error.to_string()),
+                Err(error) => errors.push(format!("{error:#}")),
             }
         }
         assert_eq!((clouds, errors.len()), (3, 1), "{format}: {errors:?}");

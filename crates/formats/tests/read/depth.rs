@@ -1,7 +1,8 @@
 use crate::support::{clouds, clouds_with, failure, shared_data};
 use std::fs::{self, File};
 use std::path::Path;
-use voxtile_formats::clouds::read::{Intrinsics, OpenOptions};
+use voxtile_formats::ReadOptions;
+use voxtile_formats::clouds::read::Intrinsics;
 
 fn image(path: &Path, width: u32, depths: &[u16]) {
     let mut encoder = png::Encoder::new(File::create(path).unwrap(), width, depths.len() as u32 / width);
@@ -49,10 +50,10 @@ fn tum_has_a_list_with_stamps_and_a_scale_of_5000() {
     fs::create_dir(folder.path().join("depth")).unwrap();
     image(&folder.path().join("depth/b.png"), 1, &[5000, 65535]);
     fs::write(folder.path().join("depth.txt"), "# depth maps\n1305031453.374112 depth/b.png\n").unwrap();
-    let (error, _) = failure(folder.path(), &OpenOptions::default());
+    let (error, _) = failure(folder.path(), &ReadOptions::default());
     assert!(error.contains("fx fy cx cy"), "{error}");
     let intrinsics = Some(Intrinsics::new([525.0, 525.0, 319.5, 239.5]).unwrap());
-    let clouds = clouds_with(folder.path(), &OpenOptions { intrinsics, ..Default::default() });
+    let clouds = clouds_with(folder.path(), &ReadOptions { intrinsics, ..Default::default() });
     assert_eq!(clouds[0].0.stamp_ns, Some(1_305_031_453_374_112_000));
     let depths: Vec<_> = clouds[0].1.iter().map(|point| (point.position_m[2], point.is_return)).collect();
     assert_eq!(depths, [(1.0, true), (13.107, true)]);
@@ -65,9 +66,9 @@ fn images_out_of_the_folder_are_refused() {
     let inner = folder.path().join("set");
     fs::create_dir(&inner).unwrap();
     image(&folder.path().join("1.png"), 1, &[5000]);
-    let options = OpenOptions {
+    let options = ReadOptions {
         intrinsics: Some(Intrinsics::new([525.0, 525.0, 319.5, 239.5]).unwrap()),
-        format: Some(voxtile_formats::clouds::read::Format::DepthTum),
+        format: Some("tum-rgbd".into()),
         ..Default::default()
     };
     for name in ["../1.png".to_owned(), folder.path().join("1.png").display().to_string()] {
@@ -83,7 +84,7 @@ fn images_that_are_no_depths_are_errors() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("1.png");
     let intrinsics = Some(Intrinsics::new([1.0, 1.0, 0.0, 0.0]).unwrap());
-    let options = OpenOptions { intrinsics, ..Default::default() };
+    let options = ReadOptions { intrinsics, ..Default::default() };
     let encoder = png::Encoder::new(File::create(&path).unwrap(), 1, 1);
     encoder.write_header().unwrap().write_image_data(&[9]).unwrap();
     let (error, _) = failure(folder.path(), &options);
@@ -99,8 +100,7 @@ fn images_that_are_no_depths_are_errors() {
 #[test]
 fn real_depth_images() {
     let Some(folder) = shared_data("sevenscenes_kinect") else { return };
-    let mut source =
-        voxtile_formats::clouds::read::open(&folder.join("scans"), &OpenOptions::default()).unwrap();
+    let mut source = voxtile_formats::open_clouds(&folder.join("scans"), &ReadOptions::default()).unwrap();
     assert_eq!(source.len_hint(), Some(100));
     let head = source.next_cloud().unwrap().unwrap();
     assert_eq!((head.name.as_str(), head.points), ("000000.depth.png", Some(640 * 480)));
@@ -125,17 +125,17 @@ fn fifos_among_depth_images_are_refused() {
     };
     image(&at("frame-000000.depth.png"), 1, &[2000]);
     fifo("camera-intrinsics.txt");
-    let (error, _) = failure(folder.path(), &OpenOptions::default());
+    let (error, _) = failure(folder.path(), &ReadOptions::default());
     assert!(error.contains("camera-intrinsics.txt: is a FIFO"), "{error}");
     fs::remove_file(at("camera-intrinsics.txt")).unwrap();
     fs::write(at("camera-intrinsics.txt"), "100 0 1\n0 200 0.5\n0 0 1\n").unwrap();
     fifo("frame-000000.pose.txt");
-    let (error, _) = failure(folder.path(), &OpenOptions::default());
+    let (error, _) = failure(folder.path(), &ReadOptions::default());
     assert!(error.contains("frame-000000.pose.txt: is a FIFO"), "{error}");
     // Only what is read in one pass may be named alone.
     for (name, is_hinted) in [("a.ply", true), ("b.e57", false)] {
         fifo(name);
-        let (error, _) = failure(&at(name), &OpenOptions::default());
+        let (error, _) = failure(&at(name), &ReadOptions::default());
         assert!(error.contains("is a FIFO") && error.contains("--format") == is_hinted, "{error}");
     }
 }

@@ -3,7 +3,7 @@ use crate::support::{clouds, failure, fixture, wanted};
 use std::fs;
 use std::path::Path;
 use voxtile_formats::clouds::RigidPose;
-use voxtile_formats::clouds::read::{Format, OpenOptions, open};
+use voxtile_formats::{ReadOptions, open_clouds};
 
 /// Written by pye57 (libE57Format).
 #[test]
@@ -37,15 +37,15 @@ fn a_scan_without_a_pose_is_in_the_frame_of_the_file() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("bare.e57");
     write_voxels("e57", &path, None);
-    let read = |options: &OpenOptions| {
-        let mut source = open(&path, options).unwrap();
+    let read = |options: &ReadOptions| {
+        let mut source = open_clouds(&path, options).unwrap();
         let (head, points) = crate::support::all(source.as_mut()).unwrap().remove(0);
         (head.world_from_sensor.unwrap(), points[0].position_m, source.remarks())
     };
-    let (pose, first, remarks) = read(&OpenOptions::default());
+    let (pose, first, remarks) = read(&ReadOptions::default());
     assert_eq!((pose, first), (RigidPose::IDENTITY, [0.25; 3]));
     assert!(remarks[0].starts_with("1 of 1 scans have no pose: ") && remarks[0].contains("--sensor-origin"));
-    let origin = OpenOptions { sensor_origin_m: Some([1.0, 2.0, 3.0]), ..OpenOptions::default() };
+    let origin = ReadOptions { sensor_origin_m: Some([1.0, 2.0, 3.0]), ..ReadOptions::default() };
     let (pose, first, remarks) = read(&origin);
     assert_eq!((pose.position_m, first), ([1.0, 2.0, 3.0], [-0.75, -1.75, -2.75]));
     assert!(remarks.is_empty(), "{remarks:?}");
@@ -60,7 +60,7 @@ fn no_damage_makes_a_panic() {
         let mut damaged = bytes.clone();
         damaged[at] ^= 0x55;
         fs::write(&path, &damaged).unwrap();
-        if let Ok(mut source) = open(&path, &OpenOptions::default()) {
+        if let Ok(mut source) = open_clouds(&path, &ReadOptions::default()) {
             drop(crate::support::all(source.as_mut()));
         }
     }
@@ -74,7 +74,7 @@ fn points_that_take_no_bits_are_refused() {
     let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/corpus/cloud_e57/without-bits");
     // The first byte is for the target of the fuzzer.
     fs::write(&path, &fs::read(corpus).unwrap()[1..]).unwrap();
-    let (error, points) = failure(&path, &OpenOptions::default());
+    let (error, points) = failure(&path, &ReadOptions::default());
     assert!(error.contains("constant.e57, record 0: every field of its points has"), "{error}");
     assert_eq!(points, 0);
 }
@@ -102,7 +102,8 @@ fn a_file_that_is_no_e57_or_is_cut_off_says_so() {
     let page = b"<!DOCTYPE html><html><body>The file has moved to another server.</body></html>";
     for bytes in [&b""[..], &whole[..8], &whole[..47], page] {
         fs::write(&path, bytes).unwrap();
-        let (error, _) = failure(&path, &OpenOptions { format: Some(Format::E57), ..OpenOptions::default() });
+        let (error, _) =
+            failure(&path, &ReadOptions { format: Some("e57".into()), ..ReadOptions::default() });
         assert!(error.contains("byte 0: it is no E57 file, or is cut off; copy it again"), "{error}");
     }
 }
@@ -114,7 +115,7 @@ fn a_tag_with_many_attributes_is_refused() {
     let path = folder.path().join("many.e57");
     let attributes: String = (0..200_000).map(|k| format!(" a{k}=''")).collect();
     described(&path, format!("<e57Root{attributes}/>").as_bytes());
-    let (error, _) = failure(&path, &OpenOptions::default());
+    let (error, _) = failure(&path, &ReadOptions::default());
     assert!(error.contains("more than 256 attributes of one tag"), "{error}");
 }
 
@@ -138,7 +139,7 @@ fn packets_that_exceed_the_memory_are_refused() {
     }
     cloud.finalize().unwrap();
     writer.finalize().unwrap();
-    let with = |memory_bytes| OpenOptions { memory_bytes, ..OpenOptions::default() };
+    let with = |memory_bytes| ReadOptions { memory_bytes, ..ReadOptions::default() };
     let (error, points) = failure(&path, &with(0));
     assert!(
         error.contains("record 0: a packet of points would take") && error.contains("--memory"),

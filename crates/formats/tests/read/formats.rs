@@ -1,34 +1,40 @@
 use crate::support::fixture;
 use std::fs;
-use voxtile_formats::clouds::read::{Format, OpenOptions, open};
+use std::path::Path;
+use voxtile_formats::{ReadOptions, Registry, open_clouds};
+
+/// The name of a file's or a folder's format.
+fn guess(path: &Path) -> voxtile::Result<&'static str> {
+    Registry::default().guess(path, &[]).map(|format| format.name)
+}
 
 #[test]
 fn content_tells_the_format_whatever_the_name() {
     let folder = tempfile::tempdir().unwrap();
     for (name, format) in [
-        ("ascii.ply", Format::Ply),
-        ("points.csv", Format::Text),
-        ("points.xyz", Format::Text),
-        ("timed.las", Format::Las),
-        ("timed.laz", Format::Laz),
-        ("scans.e57", Format::E57),
+        ("ascii.ply", "ply"),
+        ("points.csv", "xyz"),
+        ("points.xyz", "xyz"),
+        ("timed.las", "las"),
+        ("timed.laz", "laz"),
+        ("scans.e57", "e57"),
     ] {
-        assert_eq!(Format::guess(&fixture(name)).unwrap(), format, "{name}");
+        assert_eq!(guess(&fixture(name)).unwrap(), format, "{name}");
         let renamed = folder.path().join("cloud.dat");
         fs::copy(fixture(name), &renamed).unwrap();
-        assert_eq!(Format::guess(&renamed).unwrap(), format, "{name} renamed");
+        assert_eq!(guess(&renamed).unwrap(), format, "{name} renamed");
     }
     for (bytes, format) in [
-        (&b"#ROSBAG V2.0\n"[..], Format::Bag1),
-        (b"\x89MCAP0\r\n", Format::Mcap),
-        (b"SQLite format 3\0", Format::Db3),
-        (b"# .PCD v0.7\n", Format::Pcd),
+        (&b"#ROSBAG V2.0\n"[..], "bag"),
+        (b"\x89MCAP0\r\n", "mcap"),
+        (b"SQLite format 3\0", "db3"),
+        (b"# .PCD v0.7\n", "pcd"),
     ] {
         let path = folder.path().join("other.dat");
         fs::write(&path, bytes).unwrap();
-        assert_eq!(Format::guess(&path).unwrap(), format);
+        assert_eq!(guess(&path).unwrap(), format);
     }
-    assert_eq!(Format::guess(&fixture("kitti.bin")).unwrap(), Format::Bin);
+    assert_eq!(guess(&fixture("kitti.bin")).unwrap(), "bin");
 }
 
 #[test]
@@ -36,17 +42,17 @@ fn folders_tell_what_they_hold() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     fs::create_dir(at("data")).unwrap();
-    let error = Format::guess(folder.path()).unwrap_err().to_string();
+    let error = format!("{:#}", guess(folder.path()).unwrap_err());
     assert!(error.contains("is one of its folders meant (data)"), "{error}");
     fs::copy(fixture("kitti.bin"), at("1.bin")).unwrap();
-    assert_eq!(Format::guess(folder.path()).unwrap(), Format::Bin);
+    assert_eq!(guess(folder.path()).unwrap(), "bin");
     fs::copy(fixture("ascii.ply"), at("1.ply")).unwrap();
-    let error = Format::guess(folder.path()).unwrap_err().to_string();
+    let error = format!("{:#}", guess(folder.path()).unwrap_err());
     assert!(error.contains("holds 1 files of bin and 1 of ply"), "{error}");
     fs::write(at("depth.txt"), "").unwrap();
-    assert_eq!(Format::guess(folder.path()).unwrap(), Format::DepthTum);
+    assert_eq!(guess(folder.path()).unwrap(), "tum-rgbd");
     fs::write(at("metadata.yaml"), "rosbag2_bagfile_information:\n").unwrap();
-    assert_eq!(Format::guess(folder.path()).unwrap(), Format::Bag2Folder);
+    assert_eq!(guess(folder.path()).unwrap(), "rosbag2");
 }
 
 #[test]
@@ -65,16 +71,20 @@ fn what_is_not_read_is_named_with_the_way() {
     ] {
         let path = folder.path().join(name);
         fs::write(&path, bytes).unwrap();
-        let error = Format::guess(&path).unwrap_err().to_string();
+        let error = format!("{:#}", guess(&path).unwrap_err());
         assert!(error.contains(reason) && error.contains(name), "{error}");
     }
     let path = folder.path().join("a.pcd");
     fs::write(&path, "# .PCD v0.7\n").unwrap();
-    let error = open(&path, &OpenOptions::default()).err().map(|error| error.to_string()).unwrap_or_default();
-    assert!(error.contains("voxtile itself reads"), "{error}");
-    assert!(
-        Format::guess(&folder.path().join("nothing")).unwrap_err().to_string().starts_with("cannot read")
-    );
-    assert_eq!("LAZ".parse::<Format>().unwrap(), Format::Laz);
-    assert!("foo".parse::<Format>().is_err());
+    let error = open_clouds(&path, &ReadOptions::default())
+        .err()
+        .map(|error| format!("{error:#}"))
+        .unwrap_or_default();
+    assert!(error.contains("is PCD: it has scans, not clouds alone"), "{error}");
+    let error = guess(&folder.path().join("nothing")).unwrap_err().to_string();
+    assert!(error.ends_with("nothing: there is no such file or folder"), "{error}");
+    let formats = Registry::default();
+    assert_eq!(formats.named("LAZ").unwrap().name, "laz");
+    assert_eq!(formats.named("kitti").unwrap().name, "bin");
+    assert!(formats.named("foo").unwrap_err().to_string().contains("known are pcd, ply, xyz"));
 }

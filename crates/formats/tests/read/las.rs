@@ -2,11 +2,11 @@ use crate::made::voxels::format_of;
 use crate::support::{all, clouds, clouds_with, failure, fixture, shared_data, wanted};
 use std::fs;
 use voxtile_formats::clouds::CloudPoint;
-use voxtile_formats::clouds::read::{OpenOptions, open};
+use voxtile_formats::{ReadOptions, open_clouds};
 use voxtile_formats::write::{VoxelsHead, WriteOptions};
 
-fn one_cloud() -> OpenOptions {
-    OpenOptions { scan_period_s: 0.0, ..OpenOptions::default() }
+fn one_cloud() -> ReadOptions {
+    ReadOptions { scan_period_s: 0.0, ..ReadOptions::default() }
 }
 
 fn assert_near(found: &[CloudPoint], wanted: &[CloudPoint], what: &str) {
@@ -23,7 +23,7 @@ fn assert_near(found: &[CloudPoint], wanted: &[CloudPoint], what: &str) {
 fn a_file_is_cut_into_scans_by_its_times() {
     for name in ["timed.las", "timed.laz"] {
         for memory_bytes in [0, 1 << 20] {
-            let clouds = clouds_with(&fixture(name), &OpenOptions { memory_bytes, ..Default::default() });
+            let clouds = clouds_with(&fixture(name), &ReadOptions { memory_bytes, ..Default::default() });
             let names: Vec<&str> = clouds.iter().map(|(head, _)| head.name.as_str()).collect();
             assert_eq!(names, ["0", "1", "2", "3", "4", "5"], "{name}");
             // The first window ends at 0.1 s: times 0 and 0.0625. The whole number of the GPS time of today is 1.3e9.
@@ -46,7 +46,7 @@ fn a_file_is_cut_into_scans_by_its_times() {
 
 #[test]
 fn scans_that_are_not_read_are_passed_by() {
-    let mut source = open(&fixture("timed.laz"), &OpenOptions::default()).unwrap();
+    let mut source = open_clouds(&fixture("timed.laz"), &ReadOptions::default()).unwrap();
     let mut heads = 0;
     while source.next_cloud().unwrap().is_some() {
         heads += 1;
@@ -58,7 +58,7 @@ fn scans_that_are_not_read_are_passed_by() {
 fn feet_become_metres_on_each_axis() {
     let us_foot = 1200.0 / 3937.0;
     for (name, flat) in [("feet.las", 0.3048), ("survey_feet.las", us_foot)] {
-        let mut source = open(&fixture(name), &OpenOptions::default()).unwrap();
+        let mut source = open_clouds(&fixture(name), &ReadOptions::default()).unwrap();
         let clouds = all(source.as_mut()).unwrap();
         let mut points = wanted([600_000.0, 5_000_000.0, 100.0]);
         for point in &mut points {
@@ -76,7 +76,7 @@ fn feet_become_metres_on_each_axis() {
 
 #[test]
 fn withheld_points_are_left_out() {
-    let mut source = open(&fixture("withheld.laz"), &one_cloud()).unwrap();
+    let mut source = open_clouds(&fixture("withheld.laz"), &one_cloud()).unwrap();
     let clouds = all(source.as_mut()).unwrap();
     let mut points = wanted([600_000.0, 5_000_000.0, 100.0]);
     points.drain(3..5);
@@ -87,7 +87,7 @@ fn withheld_points_are_left_out() {
 #[test]
 fn the_origin_of_the_rays_makes_one_cloud() {
     let options =
-        OpenOptions { sensor_origin_m: Some([600_000.0, 5_000_000.0, 100.0]), ..Default::default() };
+        ReadOptions { sensor_origin_m: Some([600_000.0, 5_000_000.0, 100.0]), ..Default::default() };
     let clouds = clouds_with(&fixture("feet.las"), &options);
     assert_eq!(clouds.len(), 1);
     let clouds = clouds_with(&fixture("timed.laz"), &options);
@@ -101,7 +101,7 @@ fn a_file_that_is_cut_off_gives_what_is_whole() {
     let path = folder.path().join("cut.las");
     let bytes = fs::read(fixture("timed.las")).unwrap();
     fs::write(&path, &bytes[..bytes.len() - 29]).unwrap();
-    for options in [one_cloud(), OpenOptions::default()] {
+    for options in [one_cloud(), ReadOptions::default()] {
         let (error, points) = failure(&path, &options);
         assert!(error.contains("record 18: the file ends after 18 of 20 points"), "{error}");
         assert_eq!(points, 18);
@@ -131,8 +131,8 @@ fn a_file_whose_writer_was_killed_is_read_as_far_as_it_goes() {
         let mut bytes = whole[..whole.len() - cut].to_vec();
         announce(&mut bytes, announced);
         fs::write(&path, &bytes).unwrap();
-        for options in [one_cloud(), OpenOptions::default()] {
-            let mut source = open(&path, &options).unwrap();
+        for options in [one_cloud(), ReadOptions::default()] {
+            let mut source = open_clouds(&path, &options).unwrap();
             let clouds = all(source.as_mut()).unwrap();
             let found: usize = clouds.iter().map(|(_, points)| points.len()).sum();
             let remarks = source.remarks().join("\n");
@@ -145,7 +145,7 @@ fn a_file_whose_writer_was_killed_is_read_as_far_as_it_goes() {
     announce(&mut bytes, 0);
     let path = folder.path().join("killed.laz");
     fs::write(&path, &bytes).unwrap();
-    let (error, _) = failure(&path, &OpenOptions::default());
+    let (error, _) = failure(&path, &ReadOptions::default());
     assert!(error.contains("the header announces no points, but "), "{error}");
 }
 
@@ -189,7 +189,7 @@ fn scales_and_offsets_must_give_coordinates() {
         let mut damaged = bytes.clone();
         damaged[at..at + 8].copy_from_slice(&value.to_le_bytes());
         fs::write(&path, &damaged).unwrap();
-        let (error, points) = failure(&path, &OpenOptions::default());
+        let (error, points) = failure(&path, &ReadOptions::default());
         assert!(points == 0 && error.contains(what), "{error}");
     }
 }
@@ -205,7 +205,7 @@ fn no_damage_makes_a_panic() {
                 damaged[at] ^= flip;
                 let path = folder.path().join(name);
                 fs::write(&path, &damaged).unwrap();
-                if let Ok(mut source) = open(&path, &OpenOptions::default()) {
+                if let Ok(mut source) = open_clouds(&path, &ReadOptions::default()) {
                     // Hours of empty windows are one step each.
                     for _ in 0..50 {
                         match source.next_cloud() {
@@ -262,7 +262,7 @@ const LASPY: [Sums; 8] = [
 fn real_files_are_what_laspy_reads() {
     let Some(folder) = shared_data("las_large_coords") else { return };
     for (name, count, sums, intensities, metres) in LASPY {
-        let mut source = open(&folder.join(name), &one_cloud()).unwrap();
+        let mut source = open_clouds(&folder.join(name), &one_cloud()).unwrap();
         let clouds = all(source.as_mut()).unwrap();
         let points = &clouds[0].1;
         assert_eq!(points.len(), count, "{name}");
@@ -273,7 +273,7 @@ fn real_files_are_what_laspy_reads() {
         }
         assert_eq!(points.iter().map(|point| f64::from(point.intensity)).sum::<f64>(), intensities, "{name}");
         let scans =
-            clouds_with(&folder.join(name), &OpenOptions { memory_bytes: 1 << 20, ..Default::default() });
+            clouds_with(&folder.join(name), &ReadOptions { memory_bytes: 1 << 20, ..Default::default() });
         assert_eq!(scans.iter().map(|(_, points)| points.len()).sum::<usize>(), count, "{name}");
     }
     assert_eq!(clouds(&folder.join("loadersgl_indoor.laz")).len(), 1);

@@ -1,8 +1,9 @@
 use crate::made::voxels::{VOXELS, format_of, voxel, voxel_file};
 use crate::support::{clouds, clouds_with, failure, fixture};
 use std::fs;
+use voxtile_formats::ReadOptions;
 use voxtile_formats::clouds::CloudPoint;
-use voxtile_formats::clouds::read::OpenOptions;
+use voxtile_formats::ReadOptions;
 
 /// Where the points begin, and where the chunk table is.
 fn places(file: &[u8]) -> (usize, usize) {
@@ -18,7 +19,7 @@ fn of_damaged(file: &[u8], at: usize, bytes: &[u8]) -> String {
     let mut damaged = file.to_vec();
     damaged[at..at + bytes.len()].copy_from_slice(bytes);
     fs::write(&path, damaged).unwrap();
-    let (error, points) = failure(&path, &OpenOptions::default());
+    let (error, points) = failure(&path, &ReadOptions::default());
     assert_eq!(points, 0, "{error}");
     error
 }
@@ -86,7 +87,7 @@ fn copc_is_read_as_laz_is() {
     let centers = |format: &str| {
         let path = folder.path().join(format!("a.{}", format_of(format).extension.unwrap()));
         fs::write(&path, voxel_file(format)).unwrap();
-        let clouds = clouds_with(&path, &OpenOptions { scan_period_s: 0.0, ..OpenOptions::default() });
+        let clouds = clouds_with(&path, &ReadOptions { scan_period_s: 0.0, ..ReadOptions::default() });
         let [(head, points)] = clouds.as_slice() else { panic!("{} clouds", clouds.len()) };
         assert_eq!(head.points, Some(VOXELS as u64));
         let mut points: Vec<CloudPoint> = points.clone();

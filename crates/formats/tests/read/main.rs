@@ -22,4 +22,6 @@ mod made;
 mod plain;
 /// Files of poses.
 mod poses;
+/// The formats that there are.
+mod registry;
 mod support;

@@ -1,7 +1,7 @@
 use crate::support::{clouds, clouds_with, failure, fixture, wanted};
 use std::fs;
-use voxtile_formats::clouds::read::{Format, OpenOptions};
 use voxtile_formats::clouds::{CloudPoint, RigidPose};
+use voxtile_formats::{ReadOptions, Registry};
 
 #[test]
 fn ply_of_every_encoding() {
@@ -50,7 +50,7 @@ fn ply_that_is_cut_off_gives_what_is_whole() {
         let bytes = fs::read(fixture(name)).unwrap();
         let path = folder.path().join(name);
         fs::write(&path, &bytes[..bytes.len() - cut]).unwrap();
-        let (error, points) = failure(&path, &OpenOptions::default());
+        let (error, points) = failure(&path, &ReadOptions::default());
         assert!(error.contains("of 20 vertex") || error.contains("is missing"), "{error}");
         assert_eq!(points, 19, "{name}: {error}");
     }
@@ -66,7 +66,7 @@ fn text_and_raw_floats_are_the_same_points() {
     }
     let fields = ["z", "y", "x", "intensity"].map(str::to_owned).to_vec();
     let turned =
-        clouds_with(&fixture("kitti.bin"), &OpenOptions { fields: Some(fields), ..Default::default() });
+        clouds_with(&fixture("kitti.bin"), &ReadOptions { fields: Some(fields), ..Default::default() });
     assert_eq!(turned[0].1[0].position_m, [10.0, -7.0, -3.0]);
 }
 
@@ -74,7 +74,7 @@ fn text_and_raw_floats_are_the_same_points() {
 fn raw_floats_that_do_not_fit_their_columns_are_an_error() {
     let fields = ["x", "y", "z"].map(str::to_owned).to_vec();
     let (error, points) =
-        failure(&fixture("kitti.bin"), &OpenOptions { fields: Some(fields), ..Default::default() });
+        failure(&fixture("kitti.bin"), &ReadOptions { fields: Some(fields), ..Default::default() });
     assert!(error.contains("320 bytes are no whole number of points of 3 floats"), "{error}");
     assert_eq!(points, 0);
 }
@@ -90,14 +90,14 @@ fn five_columns_are_not_read_as_four() {
     let path = folder.path().join("0.bin");
     let wall = |k: f32| [8.25, 0.1 * k - 3.0, 0.03 * k];
     fs::write(&path, raw_floats(400, |k| [&wall(k)[..], &[k % 97.0, k % 32.0]].concat())).unwrap();
-    let (error, points) = failure(&path, &OpenOptions::default());
+    let (error, points) = failure(&path, &ReadOptions::default());
     assert!(error.contains("`--fields x,y,z,intensity,ring` or") && error.contains("0.bin"), "{error}");
     assert_eq!(points, 0);
     let five = ["x", "y", "z", "intensity", "ring"].map(str::to_owned).to_vec();
-    let (_, points) = clouds_with(&path, &OpenOptions { fields: Some(five), ..Default::default() }).remove(0);
+    let (_, points) = clouds_with(&path, &ReadOptions { fields: Some(five), ..Default::default() }).remove(0);
     assert_eq!((points.len(), points[1].position_m[0], points[33].intensity), (400, 8.25, 33.0));
     let four = ["x", "y", "z", "intensity"].map(str::to_owned).to_vec();
-    let asked = OpenOptions { fields: Some(four), ..Default::default() };
+    let asked = ReadOptions { fields: Some(four), ..Default::default() };
     assert_eq!(clouds_with(&path, &asked)[0].1.len(), 500);
 }
 
@@ -120,7 +120,7 @@ fn no_file_of_four_columns_is_refused() {
     ] {
         fs::write(&path, &bytes).unwrap();
         // What is empty has no format of its own.
-        let options = OpenOptions { format: Some(Format::Bin), ..OpenOptions::default() };
+        let options = ReadOptions { format: Some("bin".into()), ..ReadOptions::default() };
         assert_eq!(clouds_with(&path, &options)[0].1.len(), bytes.len() / 16, "{what}");
     }
 }
@@ -149,20 +149,20 @@ fn files_that_are_named_for_something_else_are_no_clouds() {
     }
     fs::write(scans.join("0_gps.csv"), "timestamp,tx,ty,tz\n0,1,2,3\n").unwrap();
     fs::write(scans.join("lens.txt"), "500 500 320 240\n").unwrap();
-    assert!(Format::guess(&scans).is_err());
+    assert!(Registry::default().guess(&scans, &[]).is_err());
     let other_path = scans.join("../scans/0_gps.csv");
-    assert_eq!(Format::guess_without(&scans, std::slice::from_ref(&other_path)).unwrap(), Format::Text);
-    let options = OpenOptions {
+    assert_eq!(Registry::default().guess(&scans, std::slice::from_ref(&other_path)).unwrap().name, "xyz");
+    let options = ReadOptions {
         not_clouds: vec![other_path, folder.path().join("nothing")],
         intrinsics_path: Some(scans.join("lens.txt")),
-        ..OpenOptions::default()
+        ..ReadOptions::default()
     };
-    let source = voxtile_formats::clouds::read::open(&scans, &options).unwrap();
+    let source = voxtile_formats::open_clouds(&scans, &options).unwrap();
     assert_eq!((source.len_hint(), source.ends()), (Some(2), Some(["1.csv", "2.csv"].map(str::to_owned))));
     #[cfg(unix)]
     {
         std::os::unix::fs::symlink(scans.join("0_gps.csv"), scans.join("3.csv")).unwrap();
-        assert_eq!(voxtile_formats::clouds::read::open(&scans, &options).unwrap().len_hint(), Some(2));
+        assert_eq!(voxtile_formats::open_clouds(&scans, &options).unwrap().len_hint(), Some(2));
     }
 }
 
@@ -173,10 +173,10 @@ fn a_bad_file_of_a_folder_is_passed_by() {
         fs::copy(fixture("little.ply"), folder.path().join(name)).unwrap();
     }
     fs::write(folder.path().join("2.ply"), "ply\nformat ascii 1.0\nelement point 5\nend_header\n").unwrap();
-    let mut source = voxtile_formats::clouds::read::open(folder.path(), &OpenOptions::default()).unwrap();
+    let mut source = voxtile_formats::open_clouds(folder.path(), &ReadOptions::default()).unwrap();
     assert_eq!(source.len_hint(), Some(3));
     assert_eq!(source.next_cloud().unwrap().map(|head| head.name), Some("1.ply".into()));
-    let error = source.next_cloud().unwrap_err().to_string();
+    let error = format!("{:#}", source.next_cloud().unwrap_err());
     assert!(error.contains("2.ply, line 4: the file has no element `vertex`"), "{error}");
     assert_eq!(source.next_cloud().unwrap().map(|head| head.name), Some("3.ply".into()));
     assert_eq!(source.next_cloud().unwrap(), None);
@@ -184,7 +184,7 @@ fn a_bad_file_of_a_folder_is_passed_by() {
 
 #[test]
 fn registered_points_are_seen_from_the_sensor_origin() {
-    let options = OpenOptions { sensor_origin_m: Some([1.0, 2.0, 4.0]), ..Default::default() };
+    let options = ReadOptions { sensor_origin_m: Some([1.0, 2.0, 4.0]), ..Default::default() };
     let clouds = clouds_with(&fixture("points.csv"), &options);
     let (head, points) = &clouds[0];
     assert_eq!(
@@ -205,7 +205,7 @@ fn no_damage_of_a_small_file_makes_a_panic() {
             damaged.truncate(bytes.len() - at % 13);
             let path = folder.path().join(name);
             fs::write(&path, &damaged).unwrap();
-            if let Ok(mut source) = voxtile_formats::clouds::read::open(&path, &OpenOptions::default()) {
+            if let Ok(mut source) = voxtile_formats::open_clouds(&path, &ReadOptions::default()) {
                 let _ = crate::support::all(source.as_mut());
             }
         }

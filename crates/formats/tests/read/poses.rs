@@ -1,10 +1,12 @@
 use crate::support::shared_data;
+use nalgebra::Rotation3;
 use std::fs;
 use std::path::PathBuf;
+use voxtile::scan::Pose;
 use voxtile_formats::clouds::poses::{Found, Trajectory, most_gap_ns};
 use voxtile_formats::clouds::{CloudHead, CloudPoint, CloudSource, RigidPose};
 
-fn read(text: &str) -> voxtile_formats::clouds::Result<Trajectory> {
+fn read(text: &str) -> voxtile::Result<Trajectory> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("poses.txt");
     fs::write(&path, text).unwrap();
@@ -86,7 +88,7 @@ fn what_is_no_pose_is_an_error_with_its_line() {
         ("# nothing\n", "holds no pose"),
         ("x 0 0 0 0 0 0 1\n", "is neither a pose"),
     ] {
-        let error = read(text).unwrap_err().to_string();
+        let error = format!("{:#}", read(text).unwrap_err());
         assert!(error.contains(reason), "{error}");
     }
 }
@@ -107,14 +109,11 @@ impl CloudSource for Clouds {
         Some(["1.txt", "trajectory.txt"].map(str::to_owned))
     }
 
-    fn next_cloud(&mut self) -> voxtile_formats::clouds::Result<Option<CloudHead>> {
+    fn next_cloud(&mut self) -> voxtile::Result<Option<CloudHead>> {
         Ok(None)
     }
 
-    fn read_points(
-        &mut self,
-        _: &mut dyn FnMut(CloudPoint) -> voxtile_formats::clouds::Result<()>,
-    ) -> voxtile_formats::clouds::Result<()> {
+    fn read_points(&mut self, _: &mut dyn FnMut(CloudPoint) -> voxtile::Result<()>) -> voxtile::Result<()> {
         Ok(())
     }
 }
@@ -129,7 +128,7 @@ fn poses_by_number_are_as_many_as_clouds() {
         (0, Some(2), "3 poses for 2 clouds (1.txt to trajectory.txt), "),
         (3, None, "3 poses for at least 4 clouds, "),
     ] {
-        let error = trajectory.of_cloud(number, &Clouds(clouds)).unwrap_err().to_string();
+        let error = format!("{:#}", trajectory.of_cloud(number, &Clouds(clouds)).unwrap_err());
         assert!(error.contains("poses.txt: ") && error.contains(counts), "{error}");
     }
 }
@@ -163,6 +162,39 @@ fn kitti_poses_of_the_camera_become_those_of_the_lidar() {
     assert_eq!(plain.by_number(1).unwrap().unwrap().position_m, [0.0, 0.0, 5.0]);
 }
 
+/// Maps that were built of the one are resumed with the other.
+#[test]
+fn a_matrix_in_a_file_is_the_pose_that_the_engine_makes_of_it_to_the_bit() {
+    let (mut text, mut wanted) = (String::new(), Vec::new());
+    let mut next = 1_u64;
+    let mut random = || {
+        next = next.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (next >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    for k in 0..3000 {
+        let [roll, pitch, yaw] = [0; 3].map(|_| 6.4 * random() - 3.2);
+        let rotation = Rotation3::from_euler_angles(roll, pitch, yaw);
+        // As few digits as make a rotation, and as many as a double has.
+        let digits = 4 + k % 14;
+        let rows: [[f64; 4]; 3] = std::array::from_fn(|row| {
+            std::array::from_fn(|column| {
+                let number = if column < 3 { rotation[(row, column)] } else { 1e3 * random() };
+                format!("{number:.digits$}").parse().unwrap()
+            })
+        });
+        let words: Vec<String> = rows.iter().flatten().map(f64::to_string).collect();
+        text += &(words.join(" ") + "\n");
+        wanted.push(Pose::from_matrix(&rows).unwrap());
+    }
+    let bits = |pose: &Pose| (pose.position_m().map(f64::to_bits), pose.quaternion().map(f64::to_bits));
+    let trajectory = read(&text).unwrap();
+    for (number, wanted) in wanted.iter().enumerate() {
+        let found = trajectory.by_number(number).unwrap().unwrap();
+        let found = Pose::from_quaternion(found.position_m, found.quaternion).unwrap();
+        assert_eq!(bits(&found), bits(wanted), "{number}");
+    }
+}
+
 #[test]
 fn arrays_of_numpy() {
     let at = |name: &str| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name);
@@ -183,7 +215,7 @@ fn arrays_of_numpy() {
     let cut = folder.path().join("cut.npy");
     let bytes = fs::read(at("poses_tum.npy")).unwrap();
     fs::write(&cut, &bytes[..bytes.len() - 1]).unwrap();
-    let error = Trajectory::read(&cut, None).unwrap_err().to_string();
+    let error = format!("{:#}", Trajectory::read(&cut, None).unwrap_err());
     assert!(error.contains("the file ends after 1 of 2 poses"), "{error}");
 }
 
@@ -217,7 +249,7 @@ fn an_array_that_holds_no_poses_says_what_is_expected() {
     let fail = |name: &str, bytes: &[u8]| {
         let path = folder.path().join(name);
         fs::write(&path, bytes).unwrap();
-        Trajectory::read(&path, None).unwrap_err().to_string()
+        format!("{:#}", Trajectory::read(&path, None).unwrap_err())
     };
     let header = |kind: &str, order: &str, shape: &str| {
         format!("{{'descr': {kind}, 'fortran_order': {order}, 'shape': ({shape}), }}\n")

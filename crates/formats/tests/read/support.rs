@@ -1,6 +1,7 @@
 use std::path::{Path, PathBuf};
-use voxtile_formats::clouds::read::{OpenOptions, open};
-use voxtile_formats::clouds::{CloudHead, CloudPoint, CloudSource, Result};
+use voxtile::Result;
+use voxtile_formats::clouds::{CloudHead, CloudPoint, CloudSource};
+use voxtile_formats::{ReadOptions, open_clouds};
 
 /// A file that somebody else's writer made, see `tests/fixtures/clouds.py`.
 pub fn fixture(name: &str) -> PathBuf {
@@ -37,20 +38,20 @@ pub fn all(source: &mut dyn CloudSource) -> Result<Vec<Cloud>> {
     Ok(clouds)
 }
 
-pub fn clouds_with(path: &Path, options: &OpenOptions) -> Vec<Cloud> {
-    let mut source = open(path, options).unwrap_or_else(|error| panic!("{error}"));
+pub fn clouds_with(path: &Path, options: &ReadOptions) -> Vec<Cloud> {
+    let mut source = open_clouds(path, options).unwrap_or_else(|error| panic!("{error}"));
     all(source.as_mut()).unwrap_or_else(|error| panic!("{error}"))
 }
 
 pub fn clouds(path: &Path) -> Vec<Cloud> {
-    clouds_with(path, &OpenOptions::default())
+    clouds_with(path, &ReadOptions::default())
 }
 
 /// What goes wrong, and how many points came before.
-pub fn failure(path: &Path, options: &OpenOptions) -> (String, usize) {
+pub fn failure(path: &Path, options: &ReadOptions) -> (String, usize) {
     let mut points = 0;
     let mut read = || -> Result<()> {
-        let mut source = open(path, options)?;
+        let mut source = open_clouds(path, options)?;
         while source.next_cloud()?.is_some() {
             source.read_points(&mut |_| {
                 points += 1;
@@ -60,7 +61,7 @@ pub fn failure(path: &Path, options: &OpenOptions) -> (String, usize) {
         Ok(())
     };
     let error = read().expect_err("it must fail");
-    (error.to_string(), points)
+    (format!("{error:#}"), points)
 }
 
 /// The points of the fixtures, shifted.

@@ -65,7 +65,7 @@ fn scans_depth_images_and_livox_are_clouds() {
 fn several_topics_are_listed_and_none_too() {
     let error = |name: &str, options: &BagOptions| match open_bag(&[data(name)], options) {
         Ok(_) => panic!("{name} opens"),
-        Err(error) => error.to_string(),
+        Err(error) => format!("{error:#}"),
     };
     for name in recordings() {
         let text = error(name, &BagOptions::default());
@@ -112,7 +112,7 @@ fn content_tells_a_recording_whatever_its_name() {
     let path = folder.path().join("points.xyz");
     std::fs::write(&path, "1 2 3\n").unwrap();
     let Err(error) = open_recording(&[path]) else { panic!("points are no recording") };
-    assert!(error.to_string().contains("no recording by its content or its name"), "{error}");
+    assert!(format!("{error:#}").contains("no recording by its content or its name"), "{error}");
 }
 
 #[test]

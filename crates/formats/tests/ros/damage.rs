@@ -30,12 +30,12 @@ fn folders_whose_file_is_cut_off_or_gone_say_so() {
     let folder = tempfile::tempdir().unwrap();
     let copy = |name: &str, bytes: &[u8]| std::fs::write(folder.path().join(name), bytes).unwrap();
     copy("metadata.yaml", &std::fs::read(data("by_file/metadata.yaml")).unwrap());
-    let error = open_recording(&[folder.path().to_owned()]).err().unwrap().to_string();
+    let error = format!("{:#}", open_recording(&[folder.path().to_owned()]).err().unwrap());
     assert!(error.contains("names by_file.db3.zstd, which is not there"), "{error}");
     let bytes = std::fs::read(data("by_file/by_file.db3.zstd")).unwrap();
     copy("by_file.db3.zstd", &bytes[..bytes.len() - 1]);
     // The archive is one block: without its end there is nothing.
-    let error = open_recording(&[folder.path().to_owned()]).err().unwrap().to_string();
+    let error = format!("{:#}", open_recording(&[folder.path().to_owned()]).err().unwrap());
     assert!(error.contains("by_file.db3.zstd, byte 0: it is cut off or damaged"), "{error}");
     // Without metadata, files are found by their names.
     std::fs::remove_file(folder.path().join("metadata.yaml")).unwrap();
@@ -52,7 +52,7 @@ fn files_that_are_no_recordings_say_so() {
         let path = folder.path().join(name);
         for bytes in [&b""[..], b"#ROSBAG V1.2\n", b"hello"] {
             std::fs::write(&path, bytes).unwrap();
-            let error = open_recording(from_ref(&path)).err().map(|error| error.to_string());
+            let error = open_recording(from_ref(&path)).err().map(|error| format!("{error:#}"));
             assert!(error.is_some_and(|error| error.contains(name)), "{name}");
         }
     }

@@ -32,7 +32,7 @@ fn temporary_files_that_cannot_be_made_are_an_error() {
     // Without the end of its index.
     std::fs::write(active.path(), &whole[..whole.len() - 10]).unwrap();
     for path in [data("bz2.bag"), data("zstd.mcap"), active.path().to_owned()] {
-        let error = open_bag(from_ref(&path), &options).err().map(|error| error.to_string());
+        let error = open_bag(from_ref(&path), &options).err().map(|error| format!("{error:#}"));
         let wanted = format!("cannot make a temporary file in {}", data("gone").display());
         assert_eq!(error, Some(wanted), "{}", path.display());
     }

@@ -40,7 +40,7 @@ fn a_topic_of_poses_without_any_that_can_be_used_is_an_error() {
         (vec![cut], "; 1 messages or chunks with poses cannot be read; the first: /odom: "),
     ] {
         let path = with_odometry(folder.path(), &poses, "geometry_msgs/PoseStamped");
-        let error = open_bag(&[path], &options).err().map(|error| error.to_string()).unwrap_or_default();
+        let error = open_bag(&[path], &options).err().map(|error| format!("{error:#}")).unwrap_or_default();
         assert!(error.contains(told), "{error}");
     }
     // One is enough.

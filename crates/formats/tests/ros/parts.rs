@@ -3,7 +3,7 @@ use crate::made::message::{F32, MessageWriter};
 use crate::support::{assert_clouds, data, read, topic};
 use std::path::{Path, PathBuf};
 use std::slice::from_ref;
-use voxtile_formats::clouds::read::Format;
+use voxtile_formats::Registry;
 use voxtile_formats::clouds::ros::{BagOptions, open_bag, open_recording};
 
 #[test]
@@ -46,7 +46,7 @@ fn a_split_bag_is_one_recording() {
         std::fs::write(folder.path().join(name), part(number as i64, number == 0)).unwrap();
     }
     let files: Vec<PathBuf> = names.iter().map(|name| folder.path().join(name)).collect();
-    assert_eq!(Format::guess(folder.path()).unwrap(), Format::Bag1);
+    assert_eq!(Registry::default().guess(folder.path(), &[]).unwrap().name, "bag");
     for paths in [vec![folder.path().to_owned()], files] {
         let (clouds, errors, remarks) = read(&paths, &BagOptions::default());
         assert_eq!((clouds.len(), errors), (11, vec![]), "{paths:?}");
@@ -89,7 +89,8 @@ fn files_out_of_the_folder_of_a_bag_are_not_read() {
     for name in ["../a.mcap".to_owned(), "x/../../a.mcap".to_owned(), outside.display().to_string()] {
         std::fs::create_dir_all(bag.join("x")).unwrap();
         std::fs::write(bag.join("metadata.yaml"), format!("relative_file_paths:\n- {name}\n")).unwrap();
-        let error = open_recording(from_ref(&bag)).err().map(|error| error.to_string()).unwrap_or_default();
+        let error =
+            open_recording(from_ref(&bag)).err().map(|error| format!("{error:#}")).unwrap_or_default();
         assert!(error.contains(&format!("names {name}, which leads out of the folder")), "{error}");
     }
     // The name of a recorder's own folder, and the file moved since.
@@ -128,7 +129,7 @@ fn packed_files_are_unpacked_where_it_is_said() {
     let paths = [folder.path().to_owned()];
     let gone = folder.path().join("gone");
     let scratch = |scratch: &Path| BagOptions { scratch: Some(scratch.to_owned()), ..BagOptions::default() };
-    let error = open_bag(&paths, &scratch(&gone)).err().map(|error| error.to_string()).unwrap_or_default();
+    let error = open_bag(&paths, &scratch(&gone)).err().map(|error| format!("{error:#}")).unwrap_or_default();
     assert!(error.contains("cannot unpack a recording into") && error.contains("gone"), "{error}");
     assert_eq!(read(&paths, &scratch(folder.path())).0.len(), 4);
 }

@@ -40,11 +40,11 @@ pub fn read(paths: &[PathBuf], options: &BagOptions) -> (Vec<Cloud>, Vec<String>
                     points.push(point);
                     Ok(())
                 });
-                errors.extend(result.err().map(|error| error.to_string()));
+                errors.extend(result.err().map(|error| format!("{error:#}")));
                 clouds.push((head, points));
             }
             Ok(None) => break,
-            Err(error) => errors.push(error.to_string()),
+            Err(error) => errors.push(format!("{error:#}")),
         }
     }
     let remarks = source.remarks();

@@ -6,7 +6,7 @@ use testkit::support::{fixtures, shared_data};
 use voxtile::Scan;
 use voxtile::maths::logit;
 use voxtile::space::{Point, VoxelIndex};
-use voxtile_formats::open_scans;
+use voxtile_formats::{ReadOptions, open_scans};
 use voxtile_local::{LocalMap, LocalParameters};
 
 fn pick<T: Copy>(random: &mut Random, choices: &[T]) -> T {
@@ -172,7 +172,7 @@ fn real_scans_give_the_naive_map() {
         let parameters = at_once(LocalParameters::local_mapping().with_max_voxels(4000));
         let mut map = LocalMap::new(0.1, parameters).unwrap();
         let mut naive = ReferenceLocal::new(0.1, parameters);
-        let mut source = open_scans(&folder, None).unwrap();
+        let mut source = open_scans(&folder, &ReadOptions::default()).unwrap();
         for number in 0..6 {
             let mut scan = source.next_scan().unwrap().unwrap().into_scan();
             let every = scan.points.len() / 1500;

@@ -17,7 +17,7 @@ use voxtile::{
     Aabb, InMemoryMapper, MapConfig, MapQueries, Mapper, Occupancy, Point, Queries, RayQuery, Scan, Shape,
     UnknownAs,
 };
-use voxtile_formats::open_scans;
+use voxtile_formats::{ReadOptions, open_scans};
 use voxtile_simulation::Random;
 use workload::SurveyName;
 
@@ -115,8 +115,8 @@ fn scans_of(name: &str, count: usize) -> Result<Vec<Scan>> {
     if let Ok(survey) = SurveyName::from_str(name, true) {
         return Ok(survey.scans(SEED, 0, SurveyName::RAYS).take(count).collect());
     }
-    let mut source =
-        open_scans(Path::new(name), None).with_context(|| format!("{name}: cannot read the scans"))?;
+    let mut source = open_scans(Path::new(name), &ReadOptions::default())
+        .with_context(|| format!("{name}: cannot read the scans"))?;
     let mut scans = Vec::new();
     while scans.len() < count
         && let Some(scan) = source.next_scan()?

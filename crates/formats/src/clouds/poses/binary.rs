@@ -1,5 +1,5 @@
-use crate::clouds::error::{Error, Result};
 use std::path::Path;
+use voxtile::{Error, Result};
 
 /// Starts of files that are no text, what they are, and the way to poses that are read.
 const KINDS: [(&[u8], &str, &str); 14] = [

@@ -1,8 +1,8 @@
 use super::matrix::matrix_of;
-use crate::clouds::error::{Error, Place, Result};
 use crate::clouds::lines::Lines;
 use crate::clouds::pose::RigidPose;
 use std::path::Path;
+use voxtile::{FormatError, Result};
 
 /// The pose of the lidar in the camera of a KITTI sequence: the line `Tr:` of its `calib.txt`.
 pub(super) fn read(path: &Path) -> Result<RigidPose> {
@@ -17,5 +17,6 @@ pub(super) fn read(path: &Path) -> Result<RigidPose> {
         let numbers = numbers.map_err(|_| lines.error("what follows `Tr:` are not 12 numbers"))?;
         return matrix_of(&numbers).map_err(|reason| lines.error(reason));
     }
-    Err(Error::format(path, Place::Line(1), "no line starts with `Tr:`, the pose of the lidar in the camera"))
+    Err(FormatError::at_line(1, "no line starts with `Tr:`, the pose of the lidar in the camera")
+        .in_input(path))
 }

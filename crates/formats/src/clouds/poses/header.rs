@@ -1,3 +1,5 @@
+use super::time_unit::SECONDS;
+
 /// Which columns of a table are a pose.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Roles {
@@ -13,10 +15,10 @@ const UNITS: [(&str, i32); 9] = [
     ("nsecs", 0),
     ("us", 3),
     ("ms", 6),
-    ("s", 9),
-    ("sec", 9),
-    ("secs", 9),
-    ("seconds", 9),
+    ("s", SECONDS),
+    ("sec", SECONDS),
+    ("secs", SECONDS),
+    ("seconds", SECONDS),
 ];
 /// Names of times, the best first.
 const TIMES: [&str; 6] = ["timestamp", "stamp", "header.stamp", "field.header.stamp", "time", "t"];
@@ -39,6 +41,12 @@ impl Roles {
             position: [position('x')?, position('y')?, position('z')?],
             quaternion: [quaternion('x')?, quaternion('y')?, quaternion('z')?, quaternion('w')?],
         })
+    }
+
+    /// Whether these are `t x y z qx qy qz qw`, in seconds as far as the names tell.
+    pub(super) fn are_those_of_tum(&self) -> bool {
+        matches!(self.time, Some((0, None | Some(SECONDS))))
+            && (self.position, self.quaternion) == ([1, 2, 3], [4, 5, 6, 7])
     }
 
     /// The last column that is needed.

@@ -14,4 +14,5 @@ mod trajectory;
 
 pub use gap::most_gap_ns;
 pub(crate) use matrix::matrix_of;
+pub(crate) use text::{Rules, looks_like_poses};
 pub use trajectory::{Found, Trajectory};

@@ -1,11 +1,11 @@
 use super::matrix::matrix_of;
 use super::pose_input::PoseInput;
 use super::pose_rows::{PoseRows, Row};
-use super::text::pose;
+use super::text::{Rules, pose};
 use super::time_unit::{digits_of_value, stamp_of_value};
-use crate::clouds::error::{Error, Place, Result};
 use std::io::Read;
 use std::path::Path;
+use voxtile::{Error, FormatError, Result};
 
 const MAGIC: &[u8] = b"\x93NUMPY";
 const NO_ARRAY: &str = "is no array of NumPy, which its name says: save it with numpy.save, or give a text of poses a \
@@ -22,7 +22,7 @@ pub(super) fn is_npy(path: &Path, head: &[u8]) -> bool {
 /// Takes the poses of an array: N x 8 of TUM, N x 12, N x 16, N x 3 x 4 or N x 4 x 4.
 pub(super) fn read(path: &Path, mut input: PoseInput, poses: &mut PoseRows) -> Result<()> {
     let fail = |error| Error::io(path, "read", error);
-    let wrong = |at: u64, reason: String| Error::format(path, Place::Byte(at), reason);
+    let wrong = |at: u64, reason: String| FormatError::at_offset(at, reason).in_input(path);
     let mut start = Vec::new();
     (&mut input).take(8).read_to_end(&mut start).map_err(fail)?;
     let version = match *start.as_slice() {
@@ -58,7 +58,7 @@ pub(super) fn read(path: &Path, mut input: PoseInput, poses: &mut PoseRows) -> R
             [a, b, c, d, e, f, g, h] => f64::from_le_bytes([a, b, c, d, e, f, g, h]),
             _ => f64::NAN,
         }));
-        let bad = |reason: String| Error::format(path, Place::Record(row), reason);
+        let bad = |reason: String| FormatError::at_record(row, reason).in_input(path);
         if !numbers.iter().all(|number| number.is_finite()) {
             return Err(bad("a number is not finite".into()));
         }
@@ -67,7 +67,10 @@ pub(super) fn read(path: &Path, mut input: PoseInput, poses: &mut PoseRows) -> R
                 let digits = *digits.get_or_insert_with(|| digits_of_value(stamp));
                 let stamp_ns =
                     stamp_of_value(stamp, digits).ok_or_else(|| bad(format!("{stamp} is no time stamp")))?;
-                Row { stamp_ns: Some(stamp_ns), pose: pose([x, y, z, qx, qy, qz, qw]).map_err(bad)? }
+                Row {
+                    stamp_ns: Some(stamp_ns),
+                    pose: pose([x, y, z, qx, qy, qz, qw], Rules::Strict).map_err(bad)?,
+                }
             }
             _ => Row { stamp_ns: None, pose: matrix_of(&numbers).map_err(bad)? },
         };

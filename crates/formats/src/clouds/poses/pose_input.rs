@@ -1,7 +1,7 @@
-use crate::clouds::error::{Error, Result};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
+use voxtile::{Error, Result};
 
 /// A file of poses, opened once: a pipe gives its bytes only once.
 pub(super) struct PoseInput {

@@ -1,9 +1,9 @@
 use super::trajectory::Trajectory;
-use crate::clouds::error::Result;
 use crate::clouds::pose::RigidPose;
 use crate::clouds::spill::{Budget, PoseList, PoseWriter, Record, Sorter, TimedPose};
 use std::cmp::Ordering;
 use std::path::Path;
+use voxtile::Result;
 
 /// A line or a row of a file of poses.
 pub(super) struct Row {

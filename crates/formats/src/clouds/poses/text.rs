@@ -3,8 +3,7 @@ use super::header::Roles;
 use super::matrix::matrix_of;
 use super::pose_input::PoseInput;
 use super::pose_rows::{PoseRows, Row};
-use super::time_unit::{digits_of, stamp_of};
-use crate::clouds::error;
+use super::time_unit::{SECONDS, digits_of, stamp_of};
 use crate::clouds::lines::Lines;
 use crate::clouds::pose::RigidPose;
 use std::path::Path;
@@ -24,12 +23,29 @@ enum Layout {
     Rows,
 }
 
-/// Reads the poses of a text.
-pub(super) fn read(path: &Path, input: PoseInput, poses: &mut PoseRows) -> error::Result<()> {
+/// What is taken for a pose in lines of numbers alone.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Rules {
+    /// Stamps are times, quaternions have a length near 1.
+    #[default]
+    Strict,
+    /// As earlier versions took the poses of PCD files: any number is a stamp, one that is no time is none, and
+    /// quaternions have any length but 0.
+    Lenient,
+}
+
+/// Reads the poses of a text. Returns whether it is plain: lines of 8 numbers in the order of TUM, with seconds, or of
+/// KITTI's 12.
+pub(super) fn read(
+    path: &Path,
+    input: PoseInput,
+    rules: Rules,
+    poses: &mut PoseRows,
+) -> voxtile::Result<bool> {
     check_text(path, input.head())?;
+    let mut text = TextPoses::new(rules, input.head().starts_with(BYTE_ORDER_MARK));
     let mut lines = Lines::new(path, input, 0);
     let mut names: Option<Roles> = None;
-    let mut text = TextPoses::default();
     while let Some((_, line)) = lines.next()? {
         let line = line.trim();
         if line.is_empty() {
@@ -43,7 +59,7 @@ pub(super) fn read(path: &Path, input: PoseInput, poses: &mut PoseRows) -> error
         }
         if text.layout.is_none() && !starts_with_number(line) {
             match Roles::of(line) {
-                Some(found) => names = Some(found),
+                Some(found) => (names, text.has_header) = (Some(found), true),
                 None => {
                     let reason = format!(
                         "`{line:.60}` is neither a pose (8 numbers of TUM, 12 of KITTI) nor names of columns (t, x, y, z, \
@@ -62,24 +78,50 @@ pub(super) fn read(path: &Path, input: PoseInput, poses: &mut PoseRows) -> error
             lines.error(format!("the file ends within a matrix of 4x4, after {} numbers", text.rows.len()))
         );
     }
-    Ok(())
+    Ok(text.is_plain())
 }
+
+/// Whether a text that starts like this starts with poses.
+pub(crate) fn looks_like_poses(start: &[u8]) -> bool {
+    let start = String::from_utf8_lossy(start);
+    let mut text = TextPoses::new(Rules::Strict, false);
+    let mut lines = start.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with('#'));
+    lines.next().is_some_and(|line| matches!(text.take(line, &mut None), Ok(Some(_))))
+}
+
+/// What editors on Windows put before a text.
+const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
 /// Whether the first word is a number; `nan` is none, which is told later.
 fn starts_with_number(line: &str) -> bool {
-    words(line).first().is_some_and(|word| word.parse::<f64>().is_ok())
+    numbers(line).first().is_some_and(|word| word.parse::<f64>().is_ok())
 }
 
-fn words(line: &str) -> Vec<&str> {
+/// The cells of a table.
+fn cells(line: &str) -> Vec<&str> {
     match [';', ','].into_iter().find(|mark| line.contains(*mark)) {
         Some(mark) => line.strip_suffix(mark).unwrap_or(line).split(mark).map(str::trim).collect(),
         None => line.split_ascii_whitespace().collect(),
     }
 }
 
-#[derive(Default)]
+/// The words of a line of numbers alone: commas or blanks part them, or both.
+fn numbers(line: &str) -> Vec<&str> {
+    let cells = cells(line);
+    if !cells.iter().any(|cell| cell.contains(char::is_whitespace)) {
+        return cells;
+    }
+    let parts = cells.into_iter().map(|cell| (cell, cell.split(char::is_whitespace)));
+    parts.flat_map(|(cell, words)| words.filter(move |word| cell.is_empty() || !word.is_empty())).collect()
+}
+
 struct TextPoses {
+    rules: Rules,
     layout: Option<Layout>,
+    /// Whether a line without numbers names the columns, not a comment.
+    has_header: bool,
+    /// Whether each line so far is plain.
+    are_plain: bool,
     /// Decimal digits of a unit of time below which there are nanoseconds.
     digits: Option<i32>,
     /// Lines of a matrix that is not whole yet.
@@ -87,19 +129,34 @@ struct TextPoses {
 }
 
 impl TextPoses {
+    fn new(rules: Rules, has_mark: bool) -> Self {
+        let (layout, has_header, are_plain, digits, rows) = (None, false, !has_mark, None, Vec::new());
+        Self { rules, layout, has_header, are_plain, digits, rows }
+    }
+
+    fn is_plain(&self) -> bool {
+        self.are_plain && self.digits.is_none_or(|digits| digits == SECONDS)
+    }
+
     fn take(&mut self, line: &str, names: &mut Option<Roles>) -> Result<Option<Row>, String> {
-        let words = words(line);
-        if self.layout.is_none() {
+        let mut words = cells(line);
+        if self.layout.is_none()
             // Names that need more columns than there are belong to prose.
-            let named = names.take().filter(|roles| roles.last() < words.len());
-            self.layout = Some(match (named, words.len()) {
-                (Some(roles), _) => Layout::Named(roles),
-                (None, 8) => Layout::Tum,
-                (None, 7) => Layout::Bare,
-                (None, 12 | 16) => Layout::Matrix { has_time: false },
-                (None, 13 | 17) => Layout::Matrix { has_time: true },
-                (None, 4) => Layout::Rows,
-                (None, other) => {
+            && let Some(roles) = names.take().filter(|roles| roles.last() < words.len())
+        {
+            self.layout = Some(Layout::Named(roles));
+        }
+        if !matches!(self.layout, Some(Layout::Named(_))) {
+            words = numbers(line);
+        }
+        if self.layout.is_none() {
+            self.layout = Some(match words.len() {
+                8 => Layout::Tum,
+                7 => Layout::Bare,
+                12 | 16 => Layout::Matrix { has_time: false },
+                13 | 17 => Layout::Matrix { has_time: true },
+                4 => Layout::Rows,
+                other => {
                     return Err(format!(
                         "{other} numbers; a pose has 8 (TUM: t x y z qx qy qz qw) or 12 (KITTI: a matrix of 3x4), or a line \
                          of names before it"
@@ -108,6 +165,13 @@ impl TextPoses {
             });
         }
         let Some(layout) = self.layout.clone() else { return Ok(None) };
+        self.are_plain &= match &layout {
+            Layout::Tum => true,
+            Layout::Matrix { has_time } => !has_time && words.len() == 12,
+            Layout::Named(roles) => roles.are_those_of_tum() && words.len() == 8 && !self.has_header,
+            Layout::Bare | Layout::Rows => false,
+        };
+        let rules = if self.are_plain { self.rules } else { Rules::Strict };
         let number = |at: usize| -> Result<f64, String> {
             let word = words
                 .get(at)
@@ -127,18 +191,13 @@ impl TextPoses {
             Layout::Named(roles) => {
                 let [x, y, z] = roles.position;
                 let [qx, qy, qz, qw] = roles.quaternion;
-                let pose = pose([
-                    number(x)?,
-                    number(y)?,
-                    number(z)?,
-                    number(qx)?,
-                    number(qy)?,
-                    number(qz)?,
-                    number(qw)?,
-                ])?;
+                let pose = pose(
+                    [number(x)?, number(y)?, number(z)?, number(qx)?, number(qy)?, number(qz)?, number(qw)?],
+                    rules,
+                )?;
                 let stamp_ns = match roles.time {
                     Some((at, digits)) => {
-                        Some(self.stamp(words.get(at).copied().unwrap_or_default(), digits)?)
+                        self.stamp(words.get(at).copied().unwrap_or_default(), digits, rules)?
                     }
                     None => None,
                 };
@@ -152,16 +211,16 @@ impl TextPoses {
                     *place = number(first + k)?;
                 }
                 let stamp_ns = match (first, words.first()) {
-                    (1, Some(stamp)) => Some(self.stamp(stamp, None)?),
+                    (1, Some(stamp)) => self.stamp(stamp, None, rules)?,
                     _ => None,
                 };
-                Ok(Some(Row { stamp_ns, pose: pose(numbers)? }))
+                Ok(Some(Row { stamp_ns, pose: pose(numbers, rules)? }))
             }
             Layout::Matrix { has_time } => {
                 let first = usize::from(has_time);
                 let numbers: Vec<f64> = (first..words.len()).map(number).collect::<Result<_, _>>()?;
                 let stamp_ns = match (has_time, words.first()) {
-                    (true, Some(stamp)) => Some(self.stamp(stamp, None)?),
+                    (true, Some(stamp)) => self.stamp(stamp, None, rules)?,
                     _ => None,
                 };
                 Ok(Some(Row { stamp_ns, pose: matrix_of(&numbers)? }))
@@ -177,7 +236,7 @@ impl TextPoses {
                 let stamp_ns = match (self.rows.last_mut(), words.last()) {
                     (Some(corner), Some(stamp)) if *corner != 1.0 => {
                         *corner = 1.0;
-                        Some(self.stamp(stamp, None)?)
+                        self.stamp(stamp, None, rules)?
                     }
                     _ => None,
                 };
@@ -188,21 +247,24 @@ impl TextPoses {
         }
     }
 
-    fn stamp(&mut self, word: &str, named: Option<i32>) -> Result<i64, String> {
-        let guessed = named.or(self.digits).or_else(|| digits_of(word));
-        let wrong = || format!("`{word:.40}` is no time stamp");
-        let digits = guessed.ok_or_else(wrong)?;
-        self.digits = Some(digits);
-        stamp_of(word, digits).ok_or_else(wrong)
+    fn stamp(&mut self, word: &str, named: Option<i32>, rules: Rules) -> Result<Option<i64>, String> {
+        let digits = named.or(self.digits).or_else(|| digits_of(word));
+        let stamp_ns = digits.and_then(|digits| stamp_of(word, digits));
+        if stamp_ns.is_some() {
+            self.digits = digits;
+        } else if rules == Rules::Strict || word.parse::<f64>().is_err() {
+            return Err(format!("`{word:.40}` is no time stamp"));
+        }
+        Ok(stamp_ns)
     }
 }
 
 /// The pose of x y z and a quaternion.
-pub(super) fn pose(numbers: [f64; 7]) -> Result<RigidPose, String> {
+pub(super) fn pose(numbers: [f64; 7], rules: Rules) -> Result<RigidPose, String> {
     let [x, y, z, qx, qy, qz, qw] = numbers;
     let pose = RigidPose { position_m: [x, y, z], quaternion: [qx, qy, qz, qw] };
     let length = (qx * qx + qy * qy + qz * qz + qw * qw).sqrt();
-    if !pose.is_valid() || (length - 1.0).abs() > 0.1 {
+    if !pose.is_valid() || (rules == Rules::Strict && (length - 1.0).abs() > 0.1) {
         return Err(format!("the quaternion {qx} {qy} {qz} {qw} has length {length:.3}, not 1"));
     }
     Ok(pose)

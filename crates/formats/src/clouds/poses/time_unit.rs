@@ -1,5 +1,8 @@
 use crate::clouds::stamp;
 
+/// Digits between a second and a nanosecond.
+pub(super) const SECONDS: i32 = 9;
+
 /// Units of time by how large a number of them is today: decimal digits between the unit and a nanosecond.
 pub(super) fn digits_of(word: &str) -> Option<i32> {
     let value: f64 = word.parse().ok()?;
@@ -13,7 +16,7 @@ pub(super) fn digits_of_value(value: f64) -> i32 {
         large if large >= 1e17 => 0,
         large if large >= 1e14 => 3,
         large if large >= 1e11 => 6,
-        _ => 9,
+        _ => SECONDS,
     }
 }
 

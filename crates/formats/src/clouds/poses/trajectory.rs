@@ -1,12 +1,13 @@
 use super::gap::most_gap_ns;
 use super::pose_input::PoseInput;
 use super::pose_rows::{PoseRows, Stamps};
+use super::text::Rules;
 use super::{npy, text};
 use crate::clouds::cloud::CloudSource;
-use crate::clouds::error::{Error, Result};
 use crate::clouds::pose::RigidPose;
 use crate::clouds::spill::{Budget, PoseList};
 use std::path::{Path, PathBuf};
+use voxtile::{Error, Result};
 
 /// Poses of a sensor, sensor to world, in the order of their file and by time. Many are in a temporary file.
 #[derive(Clone, Debug, Default)]
@@ -21,6 +22,8 @@ pub struct Trajectory {
     goes_back: Option<u64>,
     /// Poses are of a camera; those of the lidar are `[0] * pose * [1]`.
     lidar: Option<[RigidPose; 2]>,
+    /// Whether it is a plain text of TUM or KITTI.
+    is_plain: bool,
     /// How far a stamp may be from the time that it was rounded from.
     rounding_ns: u64,
     remarks: Vec<String>,
@@ -72,16 +75,23 @@ impl Trajectory {
     ///
     /// As for [`Trajectory::read`]; a temporary file that cannot be written.
     pub fn read_within(path: &Path, calib: Option<&Path>, budget: &Budget) -> Result<Self> {
+        Self::read_by(Rules::Strict, path, calib, budget)
+    }
+
+    /// As [`Trajectory::read_within`], by these rules.
+    pub(crate) fn read_by(rules: Rules, path: &Path, calib: Option<&Path>, budget: &Budget) -> Result<Self> {
         let mut rows = PoseRows::new(budget);
         let input = PoseInput::open(path)?;
+        let mut is_plain = false;
         if npy::is_npy(path, input.head()) {
             npy::read(path, input, &mut rows)?
         } else {
-            text::read(path, input, &mut rows)?
+            is_plain = text::read(path, input, rules, &mut rows)?;
         }
         let Some(mut trajectory) = rows.finish(path)? else {
             return Err(Error::argument(path.display().to_string(), "holds no pose"));
         };
+        trajectory.is_plain = is_plain;
         if let Some(calib) = calib {
             let camera_from_lidar = super::calib::read(calib)?;
             trajectory.lidar = Some([camera_from_lidar.inverse(), camera_from_lidar]);
@@ -98,6 +108,7 @@ impl Trajectory {
             has_stamps,
             goes_back,
             lidar: None,
+            is_plain: false,
             rounding_ns,
             remarks,
         }
@@ -151,6 +162,27 @@ impl Trajectory {
     /// A temporary file that cannot be read.
     pub fn by_number(&self, number: usize) -> Result<Option<RigidPose>> {
         Ok(self.poses.get(number)?.map(|timed| self.of_lidar(timed.pose)))
+    }
+
+    /// The time stamp of a pose by its number, from 0, in the order of the file.
+    pub(crate) fn stamp_of(&self, number: usize) -> Result<Option<i64>> {
+        let timed = if self.has_stamps { self.poses.get(number)? } else { None };
+        Ok(timed.map(|timed| timed.stamp_ns))
+    }
+
+    /// Leaves the poses their numbers alone.
+    pub(crate) fn forget_stamps(&mut self) {
+        (self.has_stamps, self.by_time, self.goes_back, self.remarks) = Default::default();
+    }
+
+    /// The file.
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Whether the file is a plain text: lines of 8 numbers in the order of TUM, with seconds, or of KITTI's 12.
+    pub(crate) fn is_plain(&self) -> bool {
+        self.is_plain
     }
 
     /// The pose of a cloud by its number, from 0, where stamps do not tell it.

@@ -1,12 +1,12 @@
 use super::columns::{Clock, Meaning};
 use super::one::{Points, Visit};
-use super::options::OpenOptions;
 use super::scalar::Scalar;
 use crate::clouds::cloud::CloudHead;
-use crate::clouds::error::{Error, Place, Result};
+use crate::read_options::ReadOptions;
 use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
+use voxtile::{Error, FormatError, Result};
 
 const KITTI: [&str; 4] = ["x", "y", "z", "intensity"];
 const NUSCENES: [&str; 5] = ["x", "y", "z", "intensity", "ring"];
@@ -28,10 +28,10 @@ struct BinPoints {
 }
 
 /// Opens a file of floats without a header. Nothing in it tells its columns: its size must fit them.
-pub(super) fn open(
+pub(crate) fn open(
     path: &Path,
     mut head: CloudHead,
-    options: &OpenOptions,
+    options: &ReadOptions,
 ) -> Result<(CloudHead, Box<dyn Points>)> {
     let fields: Vec<String> = match &options.fields {
         Some(fields) => fields.clone(),
@@ -56,7 +56,7 @@ pub(super) fn open(
              it is cut off",
             fields.len()
         );
-        return Err(Error::format(path, Place::Byte(bytes - bytes % record_bytes as u64), reason));
+        return Err(FormatError::at_offset(bytes - bytes % record_bytes as u64, reason).in_input(path));
     }
     let may_be_wider =
         fields == KITTI && options.fields.is_none() && bytes % (4 * NUSCENES.len() as u64) == 0;
@@ -70,7 +70,7 @@ pub(super) fn open(
             NUSCENES.join(","),
             KITTI.join(",")
         );
-        return Err(Error::format(path, Place::Byte(0), reason));
+        return Err(FormatError::at_offset(0, reason).in_input(path));
     }
     head.points = Some(bytes / record_bytes as u64);
     head.fields = fields;

@@ -2,10 +2,10 @@ use super::intrinsics::Intrinsics;
 use super::one::Visit;
 use super::regular::check_regular;
 use crate::clouds::cloud::{CloudHead, CloudPoint, CloudSource};
-use crate::clouds::error::{Error, Place, Result};
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
+use voxtile::{Error, FormatError, Result};
 
 /// A depth image before it is read.
 pub(super) struct Frame {
@@ -101,7 +101,7 @@ fn open(path: &Path) -> Result<Reader> {
     decoder.set_transformations(png::Transformations::IDENTITY);
     let reader = decoder.read_info().map_err(|error| wrong(path, &error))?;
     let info = reader.info();
-    let refuse = |reason: String| Err(Error::format(path, Place::Byte(16), reason));
+    let refuse = |reason: String| Err(FormatError::at_offset(16, reason).in_input(path));
     if (info.bit_depth, info.color_type) != (png::BitDepth::Sixteen, png::ColorType::Grayscale) {
         return refuse(format!(
             "is no depth image: those are grey with 16 bits, this one is {:?} with {:?}",
@@ -115,7 +115,7 @@ fn open(path: &Path) -> Result<Reader> {
 }
 
 fn wrong(path: &Path, error: &png::DecodingError) -> Error {
-    Error::format(path, Place::Byte(0), error.to_string())
+    FormatError::at_offset(0, error.to_string()).in_input(path)
 }
 
 /// Reads an image row by row: each pixel is a point, or the direction in which nothing came back.
@@ -124,7 +124,7 @@ fn read(path: &Path, code: &DepthCode, visit: Visit<'_>) -> Result<()> {
     let (_, height) = size(&reader);
     for row in 0..height {
         let damaged = |reason: String| {
-            Error::format(path, Place::Record(u64::from(row)), format!("row {row} of {height}: {reason}"))
+            FormatError::at_record(u64::from(row), format!("row {row} of {height}: {reason}")).in_input(path)
         };
         let pixels = match reader.next_row() {
             Ok(Some(pixels)) => pixels,

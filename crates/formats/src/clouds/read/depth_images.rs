@@ -1,14 +1,15 @@
 use super::depth_frames::{DepthCode, DepthFrames, Frame, Frames};
-use super::format::Format;
 use super::intrinsics::Intrinsics;
+use super::listing::{Listing, extension_of, is_named_depth};
 use super::one::head_of;
-use super::options::OpenOptions;
 use super::regular::check_regular;
 use crate::clouds::cloud::CloudSource;
-use crate::clouds::error::{Error, Place, Result};
 use crate::clouds::pose::RigidPose;
 use crate::clouds::poses::matrix_of;
+use crate::read_options::ReadOptions;
+use std::fs::{self, DirEntry};
 use std::path::{Path, PathBuf};
+use voxtile::{Error, FormatError, Result};
 
 /// Depth images in the order of their names, each perhaps with a pose beside it: `frame-000000.pose.txt`.
 struct ImageFrames {
@@ -22,12 +23,21 @@ const SCALE: f64 = 1000.0;
 /// A file of a pose is small.
 const MAX_POSE_BYTES: u64 = 1 << 14;
 
+/// Whether depth images have files with their poses, as those of 7-Scenes have.
+pub(crate) fn has_poses(folder: &Path) -> bool {
+    let is_pose = |entry: DirEntry| entry.file_name().to_string_lossy().ends_with(".pose.txt");
+    fs::read_dir(folder).is_ok_and(|entries| entries.flatten().any(is_pose))
+}
+
 /// Opens a folder of depth images.
-pub(super) fn open(
-    folder: &Path,
-    paths: Vec<PathBuf>,
-    options: &OpenOptions,
-) -> Result<Box<dyn CloudSource>> {
+pub(crate) fn open(folder: &Path, options: &ReadOptions) -> Result<Box<dyn CloudSource>> {
+    let listing = Listing::read(folder, &options.not_clouds())?;
+    let mut paths: Vec<PathBuf> =
+        listing.clouds().filter(|path| extension_of(path) == "png").cloned().collect();
+    // Beside colours, depths say that they are depths.
+    if paths.iter().any(|path| is_named_depth(path)) {
+        paths.retain(|path| is_named_depth(path));
+    }
     if paths.is_empty() {
         return Err(Error::argument(folder.display().to_string(), "no file in it ends with .png"));
     }
@@ -37,7 +47,7 @@ pub(super) fn open(
     };
     let code = DepthCode { camera, scale: options.depth_scale.unwrap_or(SCALE), is_largest_invalid: true };
     let frames = ImageFrames { files: paths.len() as u64, paths: paths.into_iter(), lost: 0 };
-    Ok(Box::new(DepthFrames::new(Format::DepthImages.to_string(), Box::new(frames), code)))
+    Ok(Box::new(DepthFrames::new("depth images".to_owned(), Box::new(frames), code)))
 }
 
 impl Frames for ImageFrames {
@@ -72,7 +82,7 @@ fn pose(path: &Path) -> Result<Option<RigidPose>> {
     std::fs::File::open(path)
         .and_then(|file| file.take(MAX_POSE_BYTES).read_to_string(&mut text))
         .map_err(|error| Error::io(path, "read", error))?;
-    let wrong = |reason: String| Error::format(path, Place::Line(1), reason);
+    let wrong = |reason: String| FormatError::at_line(1, reason).in_input(path);
     let mut numbers = Vec::new();
     for word in text.split_ascii_whitespace() {
         // Windows writes `-1.#IND` for what is not a number.

@@ -1,15 +1,15 @@
 use super::depth_frames::{DepthCode, DepthFrames, Frame, Frames};
-use super::format::Format;
 use super::intrinsics::Intrinsics;
+use super::listing::is_rosbag2;
 use super::one::head_of;
-use super::options::OpenOptions;
 use super::regular::check_regular;
 use crate::clouds::cloud::CloudSource;
-use crate::clouds::error::Result;
 use crate::clouds::inside::is_inside;
 use crate::clouds::lines::Lines;
 use crate::clouds::stamp;
+use crate::read_options::ReadOptions;
 use std::path::{Path, PathBuf};
+use voxtile::Result;
 
 /// The lines of `depth.txt`: a stamp in seconds and a file.
 struct TumFrames {
@@ -20,8 +20,14 @@ struct TumFrames {
 /// Units of a depth image in a metre.
 const SCALE: f64 = 5000.0;
 
+/// Whether a folder has the list of TUM RGB-D. A recording may have one beside it.
+pub(crate) fn is_folder(folder: &Path) -> bool {
+    let list = folder.join("depth.txt");
+    list.exists() && !list.is_dir() && !is_rosbag2(folder)
+}
+
 /// Opens a folder of TUM RGB-D. Its poses, `groundtruth.txt`, are a file of poses.
-pub(super) fn open(folder: &Path, options: &OpenOptions) -> Result<Box<dyn CloudSource>> {
+pub(crate) fn open(folder: &Path, options: &ReadOptions) -> Result<Box<dyn CloudSource>> {
     let camera = match options.intrinsics {
         Some(camera) => camera,
         None => Intrinsics::find(folder, options.intrinsics_path.as_deref())?,
@@ -30,7 +36,7 @@ pub(super) fn open(folder: &Path, options: &OpenOptions) -> Result<Box<dyn Cloud
     let list = folder.join("depth.txt");
     check_regular(&list)?;
     let frames = TumFrames { folder: folder.to_owned(), lines: Lines::open(&list)? };
-    Ok(Box::new(DepthFrames::new(Format::DepthTum.to_string(), Box::new(frames), code)))
+    Ok(Box::new(DepthFrames::new("depth images (TUM RGB-D)".to_owned(), Box::new(frames), code)))
 }
 
 impl Frames for TumFrames {

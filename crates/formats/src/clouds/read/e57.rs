@@ -4,14 +4,15 @@ use super::one::{Visit, head_of};
 use super::wkt::WktUnits;
 use super::xml_check::XmlCheck;
 use crate::clouds::cloud::{CloudHead, CloudPoint, CloudSource};
-use crate::clouds::error::{Error, Place, Result};
 use crate::clouds::guard::guarded;
 use crate::clouds::pose::RigidPose;
 use crate::clouds::spill::Budget;
+use crate::read_options::ReadOptions;
 use e57::{CartesianCoordinate, E57Reader, PointCloud, RecordDataType, RecordName, SphericalCoordinate};
 use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
+use voxtile::{Error, FormatError, Result};
 
 /// The scans of an E57 file.
 struct E57 {
@@ -28,12 +29,13 @@ struct E57 {
 }
 
 /// Opens an E57 file: each scan is a cloud in the frame of its scanner, with its pose. A scan without a pose is in the
-/// frame of the file, and its sensor at the origin of that, if `has_origin` does not say that another one is known.
-pub(super) fn open(path: &Path, has_origin: bool, budget: &Budget) -> Result<Box<dyn CloudSource>> {
+/// frame of the file, and its sensor at the origin of that, if no other one is given.
+pub(crate) fn open(path: &Path, options: &ReadOptions) -> Result<Box<dyn CloudSource>> {
+    let (has_origin, budget) = (options.sensor_origin_m.is_some(), &options.budget());
     let mut file = File::open(path).map_err(|error| Error::io(path, "read", error))?;
     check_xml(path, &mut file, budget)?;
     let reader = guarded(|| E57Reader::new(BufReader::new(file)))
-        .map_err(|reason| Error::format(path, Place::Byte(0), reason))?;
+        .map_err(|reason| FormatError::at_offset(0, reason).in_input(path))?;
     let scans = reader.pointclouds();
     let mut remarks = Vec::new();
     let mut crs = reader.coordinate_metadata().map(str::to_owned).filter(|crs| !crs.trim().is_empty());
@@ -70,7 +72,7 @@ fn check_xml(path: &Path, file: &mut File, budget: &Budget) -> Result<()> {
         bytes.map_or(0, u64::from_le_bytes)
     };
     let [start, bytes, page_bytes] = [24, 32, 40].map(number);
-    let wrong = |at: u64, reason: String| Err(Error::format(path, Place::Byte(at), reason));
+    let wrong = |at: u64, reason: String| Err(FormatError::at_offset(at, reason).in_input(path));
     if header.len() < HEADER_BYTES || !header.starts_with(SIGNATURE) {
         return wrong(0, "it is no E57 file, or is cut off; copy it again".to_owned());
     }
@@ -153,7 +155,7 @@ impl CloudSource for E57 {
         if pose.is_some_and(|pose| !pose.is_valid()) {
             self.is_read = true;
             let reason = "the pose of the scan is not a rotation and a translation";
-            return Err(Error::format(&self.path, Place::Record(number as u64), reason));
+            return Err(FormatError::at_record(number as u64, reason).in_input(&self.path));
         }
         let one = if self.scans.len() == 1 { head_of(&self.path) } else { CloudHead::default() };
         let name = scan.name.clone().filter(|name| !name.is_empty()).unwrap_or_else(|| number.to_string());
@@ -179,12 +181,12 @@ impl CloudSource for E57 {
                 "a point has {} fields, at most {MAX_FIELDS} are read: export the scan with fewer fields",
                 scan.prototype.len()
             );
-            return Err(Error::format(&self.path, Place::Record(0), reason));
+            return Err(FormatError::at_record(0, reason).in_input(&self.path));
         }
         let (path, mut done) = (&self.path, 0);
         let wrong = |done: u64, reason: String| {
             let reason = format!("{reason} (after {done} of {} points)", scan.records);
-            Error::format(path, Place::Record(done), reason)
+            FormatError::at_record(done, reason).in_input(path)
         };
         if scan.records > 0 && !has_bits(scan) {
             let reason = "every field of its points has a minimum that is its maximum, so that points take no bytes \

@@ -1,10 +1,10 @@
 use super::e57_pages::Pages;
-use crate::clouds::error::{Error, Place, Result};
 use crate::clouds::spill::Budget;
 use e57::{PointCloud, RecordDataType};
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
+use voxtile::{Error, FormatError, Result};
 
 /// Bytes of memory for a value that waits for the others of its point, and for a point that waits to be taken.
 const VALUE_BYTES: u64 = 32;
@@ -35,7 +35,7 @@ pub(super) fn check_packets(path: &Path, scan: &PointCloud, budget: &Budget) -> 
                 "a packet of points would take {needed} bytes of memory: raise `memory`, or write the file again with \
                  smaller packets"
             );
-            Err(Error::format(path, Place::Record(packets.points), reason))
+            Err(FormatError::at_record(packets.points, reason).in_input(path))
         }
         Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => Ok(()),
         Err(error) => Err(fail(error)),

@@ -1,16 +1,16 @@
 use super::one::Visit;
 use crate::clouds::cloud::{CloudHead, CloudSource};
-use crate::clouds::error::{Error, Result};
 use std::path::{Path, PathBuf};
+use voxtile::{Error, Result};
 
 /// Opens a file of a folder.
-pub(super) type OpenFile = Box<dyn Fn(&PathBuf) -> Result<Box<dyn CloudSource>> + Send>;
+pub(crate) type OpenFile = Box<dyn Fn(&Path) -> Result<Box<dyn CloudSource>> + Send>;
 
 /// Remarks that are kept; a folder may have a million files.
 const MAX_REMARKS: usize = 20;
 
 /// The clouds of all files of a folder, one file open at a time.
-pub(super) struct Files {
+pub(crate) struct Files {
     format: String,
     paths: std::vec::IntoIter<PathBuf>,
     files: u64,
@@ -26,7 +26,7 @@ pub(super) struct Files {
 
 impl Files {
     /// The clouds of files in this order. `is_one_each`: every file is one cloud.
-    pub(super) fn new(format: String, paths: Vec<PathBuf>, is_one_each: bool, open: OpenFile) -> Self {
+    pub(crate) fn new(format: String, paths: Vec<PathBuf>, is_one_each: bool, open: OpenFile) -> Self {
         let ends =
             paths.first().zip(paths.last()).map(|(first, last)| [first, last].map(|path| name_of(path)));
         Self {

@@ -1,8 +1,8 @@
-use crate::clouds::error::Error;
 use std::path::Path;
+use voxtile::Error;
 
 /// A format that is known, but not read.
-pub(super) struct Foreign {
+pub(crate) struct Foreign {
     name: &'static str,
     /// Starts of its files; empty if the name alone tells.
     magic: &'static [&'static [u8]],
@@ -13,7 +13,7 @@ pub(super) struct Foreign {
 
 impl Foreign {
     /// Says what a file is, and the way to one that can be read.
-    pub(super) fn error(&self, path: &Path) -> Error {
+    pub(crate) fn error(&self, path: &Path) -> Error {
         Error::argument(
             path.display().to_string(),
             format!("is {}, which is not read: {}", self.name, self.way),
@@ -131,11 +131,11 @@ const FOREIGN: [Foreign; 19] = [
 ];
 
 /// The foreign format that starts with these bytes.
-pub(super) fn of_bytes(start: &[u8]) -> Option<&'static Foreign> {
+pub(crate) fn of_bytes(start: &[u8]) -> Option<&'static Foreign> {
     FOREIGN.iter().find(|foreign| foreign.magic.iter().any(|magic| start.starts_with(magic)))
 }
 
 /// The foreign format with this ending, in lower case.
-pub(super) fn of_extension(extension: &str) -> Option<&'static Foreign> {
+pub(crate) fn of_extension(extension: &str) -> Option<&'static Foreign> {
     FOREIGN.iter().find(|foreign| foreign.extensions.contains(&extension))
 }

@@ -1,7 +1,7 @@
 use super::one::Visit;
 use crate::clouds::cloud::{CloudHead, CloudSource};
-use crate::clouds::error::{Error, Result};
 use crate::clouds::pose::RigidPose;
+use voxtile::{Error, Result};
 
 /// Clouds that are registered already, seen from where the sensor was.
 pub struct FromOrigin {

@@ -1,7 +1,7 @@
 use super::regular::check_regular;
-use crate::clouds::error::{Error, Place, Result};
 use crate::clouds::lines::Lines;
 use std::path::{Path, PathBuf};
+use voxtile::{Error, FormatError, Result};
 
 /// A camera without distortion: where a pixel looks.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,7 +50,7 @@ impl Intrinsics {
                 break;
             }
         }
-        let wrong = |reason: &str| Err(Error::format(path, Place::Line(1), reason));
+        let wrong = |reason: &str| Err(FormatError::at_line(1, reason).in_input(path));
         match numbers.as_slice() {
             &[fx, skew, cx, zero, fy, cy, a, b, one] => {
                 if (skew, zero, a, b, one) != (0.0, 0.0, 0.0, 0.0, 1.0) {

@@ -3,20 +3,20 @@ use super::las_points::LasPoints;
 use super::las_scans::{LasScans, withheld};
 use super::las_units::Units;
 use super::one::{Visit, head_of};
-use super::options::OpenOptions;
 use crate::clouds::cloud::{CloudHead, CloudPoint, CloudSource};
-use crate::clouds::error::{Error, Result};
+use crate::read_options::ReadOptions;
 use std::fs::File;
 use std::path::Path;
+use voxtile::{Error, Result};
 
 /// Opens a LAS, LAZ or COPC file. Coordinates become metres. With GPS times it is cut into scans of
-/// [`OpenOptions::scan_period_s`], numbered from 0, each with the middle of its window as stamp; without them, or where
+/// [`ReadOptions::scan_period_s`], numbered from 0, each with the middle of its window as stamp; without them, or where
 /// the origin of the rays is given, it is one cloud in the order of the file.
 ///
 /// Stamps are GPS time in nanoseconds, without leap seconds taken off: since 6 January 1980 where the header says that
 /// times are "adjusted standard GPS time" (the 10^9 seconds that such files leave out are added), since the begin of
 /// the week otherwise.
-pub(super) fn open(path: &Path, options: &OpenOptions) -> Result<Box<dyn CloudSource>> {
+pub(crate) fn open(path: &Path, options: &ReadOptions) -> Result<Box<dyn CloudSource>> {
     let mut file = File::open(path).map_err(|error| Error::io(path, "read", error))?;
     let layout = Layout::read(path, &mut file)?;
     let table_at = match layout.is_compressed {

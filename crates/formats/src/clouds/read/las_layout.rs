@@ -1,7 +1,7 @@
-use crate::clouds::error::{Error, Place, Result};
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::Path;
+use voxtile::{Error, FormatError, Result};
 
 /// What the header of a LAS file says, checked against the size of the file.
 pub(super) struct Layout {
@@ -54,7 +54,7 @@ impl Layout {
         let mut header = Vec::new();
         file.seek(SeekFrom::Start(0)).map_err(fail)?;
         file.take(HEADER_BYTES as u64).read_to_end(&mut header).map_err(fail)?;
-        let wrong = |at: u64, reason: String| Error::format(path, Place::Byte(at), reason);
+        let wrong = |at: u64, reason: String| FormatError::at_offset(at, reason).in_input(path);
         if !header.starts_with(b"LASF") || header.len() < 227 {
             return Err(wrong(0, "the file ends within its header, or is no LAS".into()));
         }

@@ -1,12 +1,12 @@
 use super::las_layout::Layout;
 use super::las_trimmed::{Start, Trimmed};
 use super::las_units::Units;
-use crate::clouds::error::{Error, Place, Result};
 use crate::clouds::guard::guarded;
 use las::{PointData, PointDataBuilder, Reader};
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
+use voxtile::{Error, FormatError, Result};
 
 /// Points that are decoded at a time, and most bytes of them.
 const AT_A_TIME: u64 = 4096;
@@ -70,7 +70,7 @@ impl LasPoints {
         }
         if self.done < self.announced {
             let reason = format!("the file ends after {} of {} points", self.done, self.announced);
-            return Err(Error::format(&self.path, Place::Record(self.done), reason));
+            return Err(FormatError::at_record(self.done, reason).in_input(&self.path));
         }
         Ok(())
     }
@@ -94,7 +94,7 @@ impl LasPoints {
         }
         let reason =
             format!("the file is damaged or ends after {} of {} points: {reason}", self.done, self.announced);
-        Err(Error::format(&self.path, Place::Record(self.done), reason))
+        Err(FormatError::at_record(self.done, reason).in_input(&self.path))
     }
 }
 
@@ -110,7 +110,7 @@ impl Decoder {
         let file = File::open(path).map_err(fail)?;
         let input = BufReader::with_capacity(1 << 16, Trimmed::new(start, file));
         let reader = guarded(|| Reader::new(input)).map_err(|reason| {
-            Error::format(path, Place::Byte(0), format!("the header is invalid: {reason}"))
+            FormatError::at_offset(0, format!("the header is invalid: {reason}")).in_input(path)
         })?;
         let batch = PointDataBuilder::new().for_header(reader.header()).build();
         Ok(Self { reader, batch })

@@ -2,11 +2,11 @@ use super::las_layout::Layout;
 use super::las_points::{LasPoint, LasPoints};
 use super::las_units::Units;
 use super::one::Visit;
-use super::options::OpenOptions;
 use crate::clouds::cloud::{CloudHead, CloudPoint, CloudSource};
-use crate::clouds::error::{Error, Place, Result};
 use crate::clouds::spill::{Sorted, Sorter};
+use crate::read_options::ReadOptions;
 use std::path::{Path, PathBuf};
+use voxtile::{Error, FormatError, Result};
 
 /// The zero of adjusted standard GPS time, in nanoseconds of GPS time.
 const STANDARD_ZERO_NS: i64 = 1_000_000_000_000_000_000;
@@ -39,7 +39,7 @@ impl LasScans {
         layout: &Layout,
         units: Units,
         points: LasPoints,
-        options: &OpenOptions,
+        options: &ReadOptions,
     ) -> Self {
         let sorter = Sorter::new(&options.budget(), options.memory_bytes);
         Self {
@@ -67,7 +67,7 @@ impl LasScans {
         let path = &self.path;
         let read = points.visit(&mut |point| {
             if !point.time_s.is_finite() {
-                return Err(Error::format(path, Place::Record(number), "the GPS time is not a number"));
+                return Err(FormatError::at_record(number, "the GPS time is not a number").in_input(path));
             }
             number += 1;
             (least, most) = (least.min(point.time_s), most.max(point.time_s));

@@ -2,7 +2,6 @@
 //! claims, and a claim of gigabytes ends the program.
 
 use super::las_layout::{Layout, number};
-use crate::clouds::error::{Error, Place, Result};
 use crate::clouds::guard::guarded;
 use crate::clouds::spill::Budget;
 use laz::LazVlr;
@@ -10,6 +9,7 @@ use laz::laszip::{ChunkTable, ChunkTableEntry};
 use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
+use voxtile::{Error, FormatError, Result};
 
 /// Most bytes of a point before it is compressed: formats need 67, the rest are extra bytes, each with models of its
 /// own in memory.
@@ -28,7 +28,7 @@ const TABLE_PLACE_BYTES: u64 = 8;
 /// Refuses a file whose chunks cannot be where it says, or do not fit in memory. Returns where the chunk table is, if
 /// there is one.
 pub(super) fn check(path: &Path, file: &File, layout: &Layout, budget: &Budget) -> Result<Option<u64>> {
-    let wrong = |at: u64, reason: String| Error::format(path, Place::Byte(at), reason);
+    let wrong = |at: u64, reason: String| FormatError::at_offset(at, reason).in_input(path);
     let points_at = layout.points_at;
     let Some(description) = layout.laszip() else {
         return Err(wrong(
@@ -136,7 +136,7 @@ fn table_place(path: &Path, input: &mut BufReader<&File>, layout: &Layout) -> Re
             "the chunk table is said to be at byte {table_at} of a file of {} bytes: it is cut off or damaged",
             layout.file_bytes
         );
-        return Err(Error::format(path, Place::Byte(said_at), reason));
+        return Err(FormatError::at_offset(said_at, reason).in_input(path));
     }
     Ok(table_at)
 }
@@ -158,7 +158,7 @@ fn check_layers(path: &Path, input: &mut BufReader<&File>, laz: &LazVlr, at: u64
     // The library takes what stands behind the fields as the next chunk.
     if claimed != there {
         let reason = format!("the fields of a chunk claim {claimed} bytes; it has {there}");
-        return Err(Error::format(path, Place::Byte(lengths_at), reason));
+        return Err(FormatError::at_offset(lengths_at, reason).in_input(path));
     }
     Ok(())
 }
@@ -169,7 +169,7 @@ fn bytes_at(path: &Path, input: &mut BufReader<&File>, at: u64, count: u64) -> R
     let read = input.seek(SeekFrom::Start(at)).and_then(|_| input.take(count).read_to_end(&mut bytes));
     read.map_err(|error| Error::io(path, "read", error))?;
     if (bytes.len() as u64) < count {
-        return Err(Error::format(path, Place::Byte(at), "the file ends within its compressed points"));
+        return Err(FormatError::at_offset(at, "the file ends within its compressed points").in_input(path));
     }
     Ok(bytes)
 }

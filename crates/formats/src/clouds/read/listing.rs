@@ -1,15 +1,14 @@
 use super::foreign;
-use super::format::{Format, extension_of};
 use super::intrinsics::Intrinsics;
-use crate::clouds::error::{Error, Result};
-use std::collections::BTreeMap;
+use crate::input_format::InputFormat;
 use std::fs::{DirEntry, File};
 use std::io::Read;
 use std::path::{Path, PathBuf};
+use voxtile::{Error, Result};
 
 /// What a folder holds, in the natural order of names: `scan2` before `scan10`.
-pub(super) struct Listing {
-    pub(super) files: Vec<PathBuf>,
+pub(crate) struct Listing {
+    files: Vec<PathBuf>,
     folders: Vec<PathBuf>,
 }
 
@@ -36,7 +35,7 @@ const BAG2_MARK: &[u8] = b"rosbag2_bagfile_information";
 
 impl Listing {
     /// Lists a folder, without files that are known to be no clouds, by whatever path they were named.
-    pub(super) fn read(folder: &Path, not_clouds: &[PathBuf]) -> Result<Self> {
+    pub(crate) fn read(folder: &Path, not_clouds: &[PathBuf]) -> Result<Self> {
         let fail = |error| Error::io(folder, "read", error);
         let (mut files, mut folders) = (Vec::new(), Vec::new());
         let not_clouds: Vec<PathBuf> = not_clouds.iter().flat_map(|path| path.canonicalize().ok()).collect();
@@ -59,79 +58,29 @@ impl Listing {
         Ok(Self { files, folders })
     }
 
-    fn has(&self, name: &str) -> Option<&PathBuf> {
-        self.files.iter().find(|path| path.file_name().is_some_and(|found| found == name))
+    /// The files that may be clouds by their names.
+    pub(crate) fn clouds(&self) -> impl Iterator<Item = &PathBuf> {
+        self.files.iter().filter(|path| !is_beside_clouds(path))
     }
 
     /// The files of a format.
-    pub(super) fn of(&self, format: Format) -> Vec<PathBuf> {
-        let is_of = |path: &&PathBuf| {
-            format.extensions().contains(&extension_of(path).as_str()) && !is_beside_clouds(path)
-        };
-        let files: Vec<PathBuf> = self.files.iter().filter(is_of).cloned().collect();
-        // Beside colours, depths say that they are depths.
-        if format == Format::DepthImages && files.iter().any(|path| is_named_depth(path)) {
-            return files.into_iter().filter(|path| is_named_depth(path)).collect();
-        }
-        files
+    pub(crate) fn with_extension(&self, format: &InputFormat) -> Vec<PathBuf> {
+        self.clouds().filter(|path| format.has_extension(&extension_of(path))).cloned().collect()
     }
 
-    /// The format of a folder.
-    pub(super) fn format(&self, folder: &Path) -> Result<Format> {
-        let what = || folder.display().to_string();
-        if let Some(metadata) = self.has("metadata.yaml")
-            && metadata.is_file()
-            && start_of(metadata)
-                .is_ok_and(|text| text.windows(BAG2_MARK.len()).any(|window| window == BAG2_MARK))
-        {
-            return Ok(Format::Bag2Folder);
-        }
-        if self.has("depth.txt").is_some() {
-            return Ok(Format::DepthTum);
-        }
-        let mut counts = BTreeMap::new();
-        for path in self.files.iter().filter(|path| !is_beside_clouds(path)) {
-            let extension = extension_of(path);
-            if let Some(format) = of_extension(&extension) {
-                counts.entry(format.name()).or_insert((format, path, 0_u64)).2 += 1;
-            }
-        }
-        // Lists, times and poses lie beside clouds, and so do pictures. Between the two, a camera decides.
-        let are_depths = self.files.iter().any(|path| is_named_depth(path)) || Intrinsics::is_in(&self.files);
-        let sides = if are_depths {
-            [Format::Text, Format::DepthImages]
-        } else {
-            [Format::DepthImages, Format::Text]
-        };
-        for side in sides {
-            if counts.len() > 1 {
-                counts.remove(side.name());
-            }
-        }
-        let mut found = counts.values();
-        match (found.next(), found.next()) {
-            (Some((Format::DepthImages, ..)), None) => Ok(Format::DepthImages),
-            // The first file tells LAS from LAZ, and is checked early.
-            (Some((_, path, _)), None) => Format::guess(path),
-            (Some((one, _, count)), Some((other, _, others))) => {
-                let (one, other) = (one.name(), other.name());
-                let reason = format!(
-                    "holds {count} files of {one} and {others} of {other}; name the format that is meant"
-                );
-                Err(Error::argument(what(), reason))
-            }
-            (None, _) => Err(Error::argument(what(), self.why_nothing())),
-        }
+    /// Whether there are pictures that say that they are depths, or a camera.
+    pub(crate) fn has_depths(&self) -> bool {
+        self.files.iter().any(|path| is_named_depth(path)) || Intrinsics::is_in(&self.files)
     }
 
     /// Why a folder has no clouds, and where they may be.
-    fn why_nothing(&self) -> String {
+    pub(crate) fn why_nothing(&self, known: &str) -> String {
         let foreign = self.files.iter().find_map(|path| {
             let known = foreign::of_extension(&extension_of(path))?;
             Some(known.error(path))
         });
         if let Some(foreign) = foreign {
-            return format!("no file that is read: {foreign}");
+            return format!("no file that is read: {foreign:#}");
         }
         let names: Vec<String> = (self.folders.iter().take(5))
             .filter_map(|path| Some(path.file_name()?.to_string_lossy().into_owned()))
@@ -141,15 +90,21 @@ impl Listing {
         } else {
             format!("; is one of its folders meant ({})?", names.join(", "))
         };
-        format!("no file of a known format ({}){hint}", Format::names())
+        format!("no file of a known format ({}){hint}", known)
     }
 }
 
-/// The first bytes of a file, among which the mark of rosbag2 is.
-fn start_of(path: &Path) -> std::io::Result<Vec<u8>> {
+/// Whether a folder has the description of a bag of ROS 2.
+pub(crate) fn is_rosbag2(folder: &Path) -> bool {
+    let path = folder.join("metadata.yaml");
     let mut start = Vec::new();
-    File::open(path)?.take(MARK_WITHIN_BYTES).read_to_end(&mut start)?;
-    Ok(start)
+    let mut read = || File::open(&path)?.take(MARK_WITHIN_BYTES).read_to_end(&mut start);
+    path.is_file() && read().is_ok() && start.windows(BAG2_MARK.len()).any(|window| window == BAG2_MARK)
+}
+
+/// The ending of a file's name, in lower case.
+pub(crate) fn extension_of(path: &Path) -> String {
+    path.extension().map(|extension| extension.to_string_lossy().to_lowercase()).unwrap_or_default()
 }
 
 /// What an entry of a folder is called elsewhere, too. Only links are looked up: a folder may have a million files.
@@ -159,17 +114,8 @@ fn place_of(entry: &DirEntry, folder: &Path) -> PathBuf {
     target.unwrap_or_else(|| folder.join(entry.file_name()))
 }
 
-fn is_named_depth(path: &Path) -> bool {
+pub(super) fn is_named_depth(path: &Path) -> bool {
     path.to_string_lossy().to_lowercase().ends_with(".depth.png")
-}
-
-fn of_extension(extension: &str) -> Option<Format> {
-    Some(match extension {
-        "las" | "laz" => Format::Las,
-        "png" => Format::DepthImages,
-        "db3" => Format::Db3,
-        _ => Format::ALL.into_iter().find(|format| format.extensions().contains(&extension))?,
-    })
 }
 
 /// Whether a file is a text beside clouds, by its name.

@@ -1,27 +1,26 @@
 //! Point clouds in files, one format a file.
 //!
-//! [`open`] takes a file or a folder; [`Format::guess`] looks at what is in it. Each format is a [`crate::clouds::CloudSource`]:
-//! files with one cloud (PLY, text, `.bin`), with several (LAS cut by GPS time, E57), and folders of either.
+//! Each format is a [`crate::clouds::CloudSource`]: files with one cloud (PLY, text, `.bin`), with several (LAS cut by
+//! GPS time, E57), and folders of either.
 
-mod bin;
+pub(crate) mod bin;
 mod columns;
 mod depth_frames;
-mod depth_images;
-mod depth_tum;
+pub(crate) mod depth_images;
+pub(crate) mod depth_tum;
 #[cfg(feature = "e57")]
-mod e57;
+pub(crate) mod e57;
 #[cfg(feature = "e57")]
 mod e57_packets;
 #[cfg(feature = "e57")]
 mod e57_pages;
-mod files;
-mod foreign;
-mod format;
-mod from_origin;
-mod glance;
+pub(crate) mod files;
+pub(crate) mod foreign;
+pub(crate) mod from_origin;
+pub(crate) mod glance;
 mod intrinsics;
 #[cfg(feature = "las")]
-mod las;
+pub(crate) mod las;
 #[cfg(feature = "las")]
 mod las_layout;
 #[cfg(feature = "las")]
@@ -36,23 +35,23 @@ mod las_trimmed;
 mod las_units;
 #[cfg(feature = "las")]
 mod laz_chunks;
-mod listing;
-mod one;
-mod open;
-mod options;
-mod ply;
+pub(crate) mod listing;
+mod lzf;
+pub(crate) mod one;
+mod pcd;
+mod pcd_header;
+pub(crate) mod pcd_scans;
+pub(crate) mod ply;
 mod ply_header;
-mod regular;
+pub(crate) mod regular;
 mod scalar;
-mod text;
+pub(crate) mod text;
 mod text_line;
 #[cfg(any(feature = "las", feature = "e57"))]
 mod wkt;
 #[cfg(feature = "e57")]
 mod xml_check;
 
-pub use format::Format;
-pub use from_origin::FromOrigin;
 pub use intrinsics::Intrinsics;
-pub use open::open;
-pub use options::OpenOptions;
+pub use one::{Points, Visit};
+pub use pcd::read_pcd;

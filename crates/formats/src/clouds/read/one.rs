@@ -1,32 +1,36 @@
 use crate::clouds::cloud::{CloudHead, CloudPoint, CloudSource};
-use crate::clouds::error::Result;
 use crate::clouds::stamp;
 use std::path::Path;
+use voxtile::Result;
 
-/// Takes points.
-pub(super) type Visit<'v> = &'v mut dyn FnMut(CloudPoint) -> Result<()>;
+/// Takes the points of a cloud.
+pub type Visit<'v> = &'v mut dyn FnMut(CloudPoint) -> Result<()>;
 
 /// The points of a cloud that was opened.
-pub(super) trait Points: Send {
+pub trait Points: Send {
     /// Visits them once, in order.
+    ///
+    /// # Errors
+    ///
+    /// A file that cannot be read or is invalid; the first error of `visit`.
     fn read(&mut self, visit: Visit<'_>) -> Result<()>;
 }
 
 /// What a file's name tells of its cloud.
-pub(super) fn head_of(path: &Path) -> CloudHead {
+pub(crate) fn head_of(path: &Path) -> CloudHead {
     let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     CloudHead { name, stamp_ns: stamp::in_name(path), ..CloudHead::default() }
 }
 
 /// A file with one cloud.
-pub(super) struct OneCloud {
+pub(crate) struct OneCloud {
     format: String,
     head: Option<CloudHead>,
     points: Option<Box<dyn Points>>,
 }
 
 impl OneCloud {
-    pub(super) fn new(format: impl Into<String>, (head, points): (CloudHead, Box<dyn Points>)) -> Self {
+    pub(crate) fn new(format: impl Into<String>, (head, points): (CloudHead, Box<dyn Points>)) -> Self {
         Self { format: format.into(), head: Some(head), points: Some(points) }
     }
 }

@@ -3,11 +3,12 @@ use super::one::{Points, Visit};
 use super::ply_header::{Element, Encoding, Header};
 use super::scalar::Scalar;
 use crate::clouds::cloud::CloudHead;
-use crate::clouds::error::{Error, Place, Result};
 use crate::clouds::lines::Lines;
+use crate::read_options::ReadOptions;
 use std::fs::File;
 use std::io::{self, BufReader, Read};
 use std::path::{Path, PathBuf};
+use voxtile::{Error, FormatError, Result};
 
 /// The points of a PLY file.
 struct PlyPoints {
@@ -20,11 +21,15 @@ struct PlyPoints {
 }
 
 /// Opens a PLY file and reads its header.
-pub(super) fn open(path: &Path, mut head: CloudHead) -> Result<(CloudHead, Box<dyn Points>)> {
+pub(crate) fn open(
+    path: &Path,
+    mut head: CloudHead,
+    _: &ReadOptions,
+) -> Result<(CloudHead, Box<dyn Points>)> {
     let file = File::open(path).map_err(|error| Error::io(path, "read", error))?;
     let mut input = BufReader::with_capacity(1 << 16, file);
     let header = Header::read(path, &mut input)?;
-    let wrong = |reason: &str| Error::format(path, Place::Line(header.lines), reason);
+    let wrong = |reason: &str| FormatError::at_line(header.lines, reason).in_input(path);
     let vertices = header.elements.iter().position(|element| element.name == "vertex");
     let vertices = vertices.ok_or_else(|| wrong("the file has no element `vertex`"))?;
     let element = header.elements.get(vertices).ok_or_else(|| wrong("the file has no element `vertex`"))?;
@@ -88,7 +93,7 @@ impl PlyPoints {
         for (number, element) in self.header.elements.iter().enumerate().take(self.vertices + 1) {
             let cut = |done: u64, records: &Records| {
                 let reason = format!("the file ends after {done} of {} {}", element.count, element.name);
-                Error::format(&self.path, Place::Byte(records.at), reason)
+                FormatError::at_offset(records.at, reason).in_input(&self.path)
             };
             let is_wanted = number == self.vertices;
             if let (false, Some(bytes)) = (is_wanted, element.bytes()) {

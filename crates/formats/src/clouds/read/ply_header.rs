@@ -1,7 +1,7 @@
 use super::scalar::Scalar;
-use crate::clouds::error::{Error, Place, Result};
 use std::io::{BufRead, Read};
 use std::path::Path;
+use voxtile::{Error, FormatError, Result};
 
 /// How the numbers of a PLY file are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,7 +59,7 @@ impl Header {
             let read = (&mut *input).take(left).read_until(b'\n', &mut line);
             header.bytes += read.map_err(|error| Error::io(path, "read", error))? as u64;
             header.lines += 1;
-            let wrong = |reason: String| Error::format(path, Place::Line(header.lines), reason);
+            let wrong = |reason: String| FormatError::at_line(header.lines, reason).in_input(path);
             if line.last() != Some(&b'\n') {
                 return Err(wrong("the header has no end_header".into()));
             }
@@ -93,7 +93,7 @@ impl Header {
             }
         }
         header.encoding = encoding
-            .ok_or_else(|| Error::format(path, Place::Line(header.lines), "the header has no format"))?;
+            .ok_or_else(|| FormatError::at_line(header.lines, "the header has no format").in_input(path))?;
         Ok(header)
     }
 }

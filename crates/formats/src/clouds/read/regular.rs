@@ -1,6 +1,8 @@
-use super::format::{Format, extension_of};
-use crate::clouds::error::{Error, Result};
+use super::listing::extension_of;
+use crate::input_format::Open;
+use crate::registry::Registry;
 use std::path::Path;
+use voxtile::{Error, Result};
 
 /// Checks that a path is no FIFO, socket or device: opening one waits for a program that writes, perhaps for ever, and
 /// gives its bytes once. What is not there is reported when it is opened.
@@ -11,8 +13,9 @@ pub(crate) fn check_regular(path: &Path) -> Result<()> {
     }
     // Of these, a single cloud is read in one pass.
     let extension = extension_of(path);
-    let mut extensions = [Format::Ply, Format::Text].into_iter().flat_map(Format::extensions);
-    let is_streamed = extension.is_empty() || extensions.any(|known| *known == extension);
+    let is_streamed = extension.is_empty()
+        || (Registry::default().formats().iter())
+            .any(|format| matches!(format.open, Open::Stream(_)) && format.has_extension(&extension));
     let hint = "; or name it alone, with `format` ply or `format` xyz, which are read in one pass";
     let reason = format!(
         "is a FIFO, a socket or a device, not a file: save its contents to a file{}",

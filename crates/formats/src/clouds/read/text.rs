@@ -1,9 +1,11 @@
+use super::glance::GLANCE_BYTES;
 use super::one::{Points, Visit};
 use super::text_line::{Columns, Line};
 use crate::clouds::cloud::{CloudHead, CloudPoint};
-use crate::clouds::error::{Error, Place, Result};
 use crate::clouds::lines::Lines;
+use crate::read_options::ReadOptions;
 use std::path::Path;
+use voxtile::{FormatError, Result};
 
 /// The points of a text.
 struct TextPoints {
@@ -13,13 +15,42 @@ struct TextPoints {
     first: Option<CloudPoint>,
 }
 
+/// Whether a file that starts like this is a text of points.
+pub(crate) fn looks_like_points(start: &[u8]) -> bool {
+    if start.contains(&0) {
+        return false;
+    }
+    let text = String::from_utf8_lossy(start);
+    let is_cut = start.len() as u64 == GLANCE_BYTES;
+    let mut lines: Vec<&str> = text.lines().collect();
+    if is_cut && lines.len() > 1 {
+        lines.pop();
+    }
+    let mut columns = Columns::default();
+    for line in lines {
+        match columns.take(line) {
+            Ok(Line::Point(_)) => return true,
+            Ok(Line::Nothing) => {}
+            Err(_) => return false,
+        }
+    }
+    // Names alone: a text without points yet.
+    columns.are_named()
+}
+
 /// Opens a text of points and reads up to its first point.
-pub(super) fn open(path: &Path, mut head: CloudHead) -> Result<(CloudHead, Box<dyn Points>)> {
+pub(crate) fn open(
+    path: &Path,
+    mut head: CloudHead,
+    _: &ReadOptions,
+) -> Result<(CloudHead, Box<dyn Points>)> {
     let mut points = TextPoints { lines: Lines::open(path)?, columns: Columns::default(), first: None };
     points.columns.clock = super::columns::Clock::new(head.stamp_ns);
     points.first = points.next()?;
     if points.first.is_none() && !points.columns.are_named() {
-        return Err(Error::format(path, Place::Byte(0), "no point, and no names of columns with x, y and z"));
+        return Err(
+            FormatError::at_offset(0, "no point, and no names of columns with x, y and z").in_input(path)
+        );
     }
     head.fields = points.columns.names.clone();
     if let Some(meaning) = points.columns.meaning() {

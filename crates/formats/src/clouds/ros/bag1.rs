@@ -5,11 +5,11 @@ use super::chunk_order::{ChunkOrder, Step};
 use super::file_bytes::FileBytes;
 use super::recording::{Message, Recording, Topic, TopicList};
 use super::wire::Wire;
-use crate::clouds::error::{Error, Place, Result};
 use crate::clouds::spill::{Budget, Complaint, SpillFile, StreamSize, Window};
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 use std::sync::Arc;
+use voxtile::{FormatError, Result};
 
 /// A `.bag` of ROS 1, version 2.0. Its index is read if there is one; otherwise the file is read once before.
 #[derive(Debug)]
@@ -56,7 +56,7 @@ impl Bag1 {
             } else {
                 "it does not start with `#ROSBAG V2.0`: it is no bag of ROS 1"
             };
-            return Err(Error::format(path, Place::Byte(0), reason));
+            return Err(FormatError::at_offset(0, reason).in_input(path));
         }
         let mut bag = Self {
             file,
@@ -272,7 +272,7 @@ impl ChunkFile for Bag1 {
 
     fn load(&mut self, place: &ChunkPlace, take: &mut TakeMessage<'_>) -> Result<OpenChunk> {
         let path = self.file.path().to_owned();
-        let wrong = |reason: String| Error::format(&path, Place::Byte(place.offset), reason);
+        let wrong = |reason: String| FormatError::at_offset(place.offset, reason).in_input(&path);
         let head = self.record(place.offset)?;
         let Some((record, end)) = head.filter(|(record, _)| record.op == Some(RecordKind::Chunk)) else {
             return Err(wrong(

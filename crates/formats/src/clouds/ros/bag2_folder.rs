@@ -4,7 +4,6 @@ use super::message_data::MessageData;
 use super::open::open_file;
 use super::recording::{Message, Recording, Topic};
 use super::sequence::Sequence;
-use crate::clouds::error::{Error, Place, Result};
 use crate::clouds::inside::is_inside;
 use crate::clouds::spill::{Budget, Bytes, SpillFile, StreamSize};
 use std::collections::HashSet;
@@ -12,6 +11,7 @@ use std::fs::File;
 use std::io::{BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
+use voxtile::{Error, FormatError, Result};
 
 /// A folder of `ros2 bag`: `metadata.yaml` and the files that it names, in order. Without one, all recordings in the
 /// folder in the natural order of their names: the parts of a bag that `rosbag record --split` wrote.
@@ -56,7 +56,7 @@ impl Bag2Folder {
             read.map_err(|error| Error::io(&metadata_path, "read", error))?;
             if text.len() as u64 > MAX_METADATA_BYTES {
                 let reason = format!("it is longer than {MAX_METADATA_BYTES} bytes; name the files instead");
-                return Err(Error::format(&metadata_path, Place::Byte(MAX_METADATA_BYTES), reason));
+                return Err(FormatError::at_offset(MAX_METADATA_BYTES, reason).in_input(&metadata_path));
             }
             let metadata = Bag2Metadata::of(&String::from_utf8_lossy(&text));
             let files = metadata.files.iter().map(|name| find(path, name)).collect::<Result<Vec<_>>>()?;
@@ -88,7 +88,7 @@ impl Bag2Folder {
         let format = metadata.compression_format.as_str();
         if !matches!(format, "" | "zstd") {
             let reason = format!("compression_format `{format}` is not read; known: zstd");
-            return Err(Error::format(&metadata_path, Place::Byte(0), reason));
+            return Err(FormatError::at_offset(0, reason).in_input(&metadata_path));
         }
         let (mut unpacked, spill) = (None, SpillFile::new(budget));
         let mut recordings = Sequence::default();
@@ -103,11 +103,11 @@ impl Bag2Folder {
                 let damaged = damage.map(|damage| format!("it is cut off or damaged ({damage})"));
                 let opened = open_file(&plain, budget).map_err(|error| {
                     let damaged = damaged.as_deref().unwrap_or("it was unpacked");
-                    Error::format(
-                        file,
-                        Place::Byte(0),
-                        format!("{damaged}, and what is in it cannot be read: {error}"),
+                    FormatError::at_offset(
+                        0,
+                        format!("{damaged}, and what is in it cannot be read: {error:#}"),
                     )
+                    .in_input(file)
                 })?;
                 let remark =
                     damaged.map(|damaged| format!("{}: {damaged}; read as far as it goes", file.display()));

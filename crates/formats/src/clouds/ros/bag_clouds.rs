@@ -8,9 +8,9 @@ use super::open::open_recording_within;
 use super::recording::{Message, Recording, Topic};
 use super::wire::Wire;
 use crate::clouds::cloud::{CloudHead, CloudPoint, CloudSource, PoseAt};
-use crate::clouds::error::{Error, Place, Result};
 use crate::clouds::spill::{Bytes, FilePart};
 use std::path::PathBuf;
+use voxtile::{Error, FormatError, Result};
 
 /// The clouds of one topic of a recording, with the poses that the recording knows.
 pub struct BagClouds {
@@ -51,7 +51,7 @@ struct Current {
 pub fn open_bag(paths: &[PathBuf], options: &BagOptions) -> Result<BagClouds> {
     let path = paths.first().cloned().unwrap_or_default();
     let name_it = |error| match error {
-        Error::Argument { what, reason } if what == "recording" => {
+        Error::InvalidArgument { argument, reason } if argument == "recording" => {
             Error::argument(path.display().to_string(), reason)
         }
         error => error,
@@ -95,7 +95,7 @@ fn read_camera(recording: &mut dyn Recording, index: usize, whole_bytes: u64) ->
         match recording.next_message() {
             Ok(Some(mut message)) => {
                 let data = message.data.load(whole_bytes);
-                let data = data.map_err(|error| error.to_string());
+                let data = data.map_err(|error| format!("{error:#}"));
                 let decode = |data: &[u8]| CameraInfo::decode(wire.unwrap_or(Wire::Cdr), data);
                 match data.and_then(|data| decode(data).map_err(|error| error.to_string())) {
                     Ok(camera) => return Ok(camera),
@@ -127,7 +127,7 @@ impl BagClouds {
         if self.chosen.kind != MessageKind::PointCloud2 {
             // Points of other kinds cannot be read piece by piece.
             data.load(self.whole_bytes).map_err(|error| match error {
-                Error::Argument { reason, .. } => self.wrong(number, &reason),
+                Error::InvalidArgument { reason, .. } => self.wrong(number, &reason),
                 error => error,
             })?;
         }
@@ -149,7 +149,7 @@ impl BagClouds {
     }
 
     fn wrong(&self, number: u64, error: &dyn std::fmt::Display) -> Error {
-        Error::format(&self.path, Place::Record(number), format!("topic {}: {error}", self.topic.name))
+        FormatError::at_record(number, format!("topic {}: {error}", self.topic.name)).in_input(&self.path)
     }
 }
 

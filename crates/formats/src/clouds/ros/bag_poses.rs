@@ -7,11 +7,11 @@ use super::recording::{Recording, Topic};
 use super::sample_spool::SampleSpool;
 use super::second_parent::SecondParent;
 use super::transforms::{Transforms, WhyNot};
-use crate::clouds::error::{Error, Result};
 use crate::clouds::pose::RigidPose;
 use crate::clouds::spill::Budget;
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
+use voxtile::{Error, Result};
 
 /// Where the sensor was at the stamp of each cloud.
 #[derive(Debug)]
@@ -122,7 +122,7 @@ impl BagPoses {
                 // Damage costs a few poses; a disk that is full, or fails, might cost all.
                 Err(error @ Error::Io { .. }) => return Err(error),
                 Err(error) => {
-                    note(error.to_string());
+                    note(format!("{error:#}"));
                     continue;
                 }
             };
@@ -136,7 +136,7 @@ impl BagPoses {
                 Ok(data) => data,
                 Err(error @ Error::Io { .. }) => return Err(error),
                 Err(error) => {
-                    note(format!("{}: {error}", topic.name));
+                    note(format!("{}: {error:#}", topic.name));
                     continue;
                 }
             };

@@ -1,7 +1,7 @@
 use super::messages::{Image, MessageKind, is_depth_encoding};
 use super::recording::{Recording, Topic};
-use crate::clouds::error::{Error, Result};
 use std::collections::HashSet;
+use voxtile::{Error, Result};
 
 /// Most topics of images that are looked into. Of more, the user chooses.
 const MAX_LOOKED_INTO: usize = 100;

@@ -1,8 +1,8 @@
-use crate::clouds::error::{Error, Result};
 use crate::clouds::spill::{Bytes, Complaint, FilePart, Record, SpillFile, StreamSize};
 use std::cmp::Ordering;
 use std::io::Read;
 use std::sync::Arc;
+use voxtile::{Error, Result};
 
 /// A part of a file whose messages are read together.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -1,10 +1,10 @@
 use super::chunk::{ChunkPlace, MessagePlace, OpenChunk};
 use super::chunk_order::{BrokenChunk, ChunkOrder, Step};
 use super::recording::{Message, TopicList};
-use crate::clouds::error::{Error, Place, Result};
 use crate::clouds::spill::{Budget, Complaint};
 use std::collections::HashMap;
 use std::path::Path;
+use voxtile::{Error, FormatError, Result};
 
 /// A recording whose messages lie in chunks.
 pub(super) trait ChunkFile {
@@ -78,7 +78,7 @@ pub(super) trait ChunkFile {
             }
             self.order().open(Ok(chunk.bytes), sorted, whole)?;
             let reason = format!("a chunk is damaged: {reason}; {whole} messages of it can be read");
-            return Err(Error::format(self.path(), Place::Byte(place.offset), reason));
+            return Err(FormatError::at_offset(place.offset, reason).in_input(self.path()));
         }
     }
 }

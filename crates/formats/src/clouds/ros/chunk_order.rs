@@ -2,9 +2,9 @@ use super::chunk::{ChunkPlace, MAX_CHUNK_BYTES, MessagePlace};
 use super::chunk_file::Shares;
 use super::message_data::{MessageData, read};
 use super::recording::{Message, TopicSet};
-use crate::clouds::error::{Error, Place, Result};
 use crate::clouds::spill::{Budget, Bytes, Record, Sorted, Sorter};
 use std::path::{Path, PathBuf};
+use voxtile::{Error, FormatError, Result};
 
 /// Puts the messages of chunks in order of time. Chunks overlap a little; those that do are played together.
 #[derive(Debug)]
@@ -44,7 +44,7 @@ impl BrokenChunk {
     fn error(&self, log_ns: i64) -> Error {
         let reason =
             format!("a chunk is damaged: {}; its message recorded at {log_ns} ns is left out", self.reason);
-        Error::format(&self.path, Place::Byte(self.offset), reason)
+        FormatError::at_offset(self.offset, reason).in_input(&self.path)
     }
 }
 

@@ -1,8 +1,8 @@
 use super::messages::{CameraInfo, Header, Image, LaserScan, LivoxCustom, MessageKind, PointCloud2};
 use super::wire::{Wire, WireError};
 use crate::clouds::cloud::CloudPoint;
-use crate::clouds::error::Result;
 use crate::clouds::spill::FilePart;
+use voxtile::Result;
 
 /// A message that is a cloud.
 pub(super) enum CloudMessage<'a> {

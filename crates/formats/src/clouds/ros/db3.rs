@@ -1,13 +1,13 @@
 use super::message_data::MessageData;
 use super::recording::{Message, Recording, Topic, TopicList, TopicSet};
 use super::wire::Wire;
-use crate::clouds::error::{Error, Place, Result};
 use crate::clouds::spill::{Budget, Record, Sorted, Sorter, SpillFile, StreamSize};
 use rusqlite::limits::Limit;
 use rusqlite::{Connection, MAIN_DB, OpenFlags};
 use std::cmp::Ordering;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
+use voxtile::{Error, FormatError, Result};
 
 /// A `.db3` of ROS 2: a database of SQLite, which is opened for reading only.
 ///
@@ -178,7 +178,7 @@ impl Db3 {
             self.spill.take(input, StreamSize::Claimed(bytes), memory_bytes, &mut |_| {})?;
         match complaint {
             Some(complaint) => {
-                Err(Error::format(&path, Place::Record(u64::try_from(id).unwrap_or(0)), complaint.reason))
+                Err(FormatError::at_record(u64::try_from(id).unwrap_or(0), complaint.reason).in_input(&path))
             }
             None => Ok(MessageData(data)),
         }
@@ -246,5 +246,5 @@ impl Recording for Db3 {
 }
 
 fn wrong(path: &Path, row: u64, error: &rusqlite::Error) -> Error {
-    Error::format(path, Place::Record(row), format!("it cannot be read as a bag of ROS 2: {error}"))
+    FormatError::at_record(row, format!("it cannot be read as a bag of ROS 2: {error}")).in_input(path)
 }

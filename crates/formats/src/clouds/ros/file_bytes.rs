@@ -1,8 +1,8 @@
-use crate::clouds::error::{Error, Result};
 use crate::clouds::spill::FilePart;
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
+use voxtile::{Error, Result};
 
 /// A file that is read here and there.
 #[derive(Debug)]

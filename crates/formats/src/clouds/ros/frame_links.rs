@@ -175,7 +175,7 @@ impl FrameLinks {
     ) -> Result<Vec<Step<'a>>, WhyNot> {
         self.steps_by(child, |link| {
             let around = link.samples.around(stamp_ns);
-            let around = around.map_err(|error| WhyNot::Unreadable(error.to_string()))?;
+            let around = around.map_err(|error| WhyNot::Unreadable(format!("{error:#}")))?;
             Ok((around, trust_at(link, &around, stamp_ns, most_gap_ns)))
         })
     }

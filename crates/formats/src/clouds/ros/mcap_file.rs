@@ -7,11 +7,11 @@ use super::mcap_record::{
     Statistics, message_head, op, record_at,
 };
 use super::recording::{Message, Recording, Topic, TopicList};
-use crate::clouds::error::{Error, Place, Result};
 use crate::clouds::spill::{Budget, Complaint, SpillFile, StreamSize, Window};
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 use std::sync::Arc;
+use voxtile::{FormatError, Result};
 
 /// An MCAP file, of ROS 1 or ROS 2. Its summary is read if there is one; otherwise the file is read once before.
 ///
@@ -57,11 +57,8 @@ impl McapFile {
     pub fn open_within(path: &Path, budget: &Budget) -> Result<Self> {
         let mut file = FileBytes::open(path)?;
         if file.read_at(0, MAGIC.len() as u64)? != MAGIC {
-            return Err(Error::format(
-                path,
-                Place::Byte(0),
-                "it does not start as an MCAP file (version 0) does",
-            ));
+            return Err(FormatError::at_offset(0, "it does not start as an MCAP file (version 0) does")
+                .in_input(path));
         }
         let mut mcap = Self {
             file,
@@ -282,7 +279,7 @@ impl McapFile {
     /// The bytes of a chunk that is not bare, unpacked.
     fn unpacked(&mut self, place: &ChunkPlace) -> Result<OpenChunk> {
         let path = self.file.path().to_owned();
-        let wrong = |reason: &str| Error::format(&path, Place::Byte(place.offset), reason);
+        let wrong = |reason: &str| FormatError::at_offset(place.offset, reason).in_input(&path);
         let too_large =
             || wrong("a chunk of more than 1 GiB is not read; record with smaller chunks (`mcap recover`)");
         let head = self.head(place.offset)?;

@@ -1,5 +1,5 @@
-use crate::clouds::error::{Error, Result};
 use crate::clouds::spill::{Bytes, FilePart};
+use voxtile::{Error, Result};
 
 /// The bytes of a message: in memory or, of a large one, in a file.
 #[derive(Clone, Debug, Default)]

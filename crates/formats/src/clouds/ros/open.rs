@@ -3,10 +3,12 @@ use super::bag2_folder::Bag2Folder;
 use super::mcap_file::McapFile;
 use super::recording::Recording;
 use super::sequence::Sequence;
-use crate::clouds::error::{Error, Result};
-use crate::clouds::read::Format;
+use crate::clouds::read::glance::first_bytes;
+use crate::clouds::read::listing::extension_of;
 use crate::clouds::spill::Budget;
+use crate::registry::Registry;
 use std::path::{Path, PathBuf};
+use voxtile::{Error, Result};
 
 /// Opens a recording: a file, the folder of a bag of ROS 2, or several that follow one another in time.
 ///
@@ -42,26 +44,22 @@ pub fn open_recording_within(paths: &[PathBuf], budget: &Budget) -> Result<Box<d
 
 /// Opens a file by how it starts; where that is damaged, by the end of its name.
 pub(super) fn open_file(path: &Path, budget: &Budget) -> Result<Box<dyn Recording>> {
-    let format = match Format::of_content(path)? {
-        Some(format @ (Format::Bag1 | Format::Mcap | Format::Db3)) => Some(format),
-        _ => of_name(path),
-    };
-    match format {
-        Some(Format::Bag1) => Ok(Box::new(Bag1::open_within(path, budget)?)),
-        Some(Format::Mcap) => Ok(Box::new(McapFile::open_within(path, budget)?)),
-        Some(Format::Db3) => open_db3(path, budget),
+    let formats = Registry::default();
+    let (start, extension) = (first_bytes(path)?, extension_of(path));
+    let recordings = ["bag", "mcap", "db3"];
+    let by_start =
+        formats.of_start(&start).map(|format| format.name).filter(|name| recordings.contains(name));
+    let mut named = formats.formats().iter().filter(|format| format.has_extension(&extension));
+    match by_start.or_else(|| named.next().map(|format| format.name)) {
+        Some("bag") => Ok(Box::new(Bag1::open_within(path, budget)?)),
+        Some("mcap") => Ok(Box::new(McapFile::open_within(path, budget)?)),
+        Some("db3") => open_db3(path, budget),
         _ => {
             let reason = "it is no recording by its content or its name; known: .bag, .mcap, .db3, a folder with \
                           metadata.yaml";
             Err(Error::argument(path.display().to_string(), reason))
         }
     }
-}
-
-fn of_name(path: &Path) -> Option<Format> {
-    let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase())?;
-    let formats = [Format::Bag1, Format::Mcap, Format::Db3];
-    formats.into_iter().find(|format| format.extensions().contains(&extension.as_str()))
 }
 
 #[cfg(feature = "sqlite")]

@@ -1,7 +1,7 @@
 use super::transforms::{SearchFrames, Transforms, WhyNot};
-use crate::clouds::error::{Error, Result};
 use crate::clouds::pose::RigidPose;
 use std::sync::Arc;
+use voxtile::{Error, Result};
 
 /// Looks up where a sensor was in the world, for as long as anybody asks.
 #[derive(Clone, Debug)]

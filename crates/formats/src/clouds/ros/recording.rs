@@ -1,9 +1,9 @@
 use super::message_data::MessageData;
 use super::wire::Wire;
-use crate::clouds::error::Result;
 use std::collections::HashMap;
 use std::collections::hash_map::DefaultHasher;
 use std::hash::{Hash, Hasher};
+use voxtile::Result;
 
 /// A topic of a recording.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -1,7 +1,7 @@
 use super::samples::Samples;
-use crate::clouds::error::Result;
 use crate::clouds::spill::{Budget, PoseList, PoseWriter, Record, Sorter, TimedPose};
 use std::cmp::Ordering;
+use voxtile::Result;
 
 /// Sorts the samples of a recording whose transforms do not fit in memory.
 #[derive(Debug)]

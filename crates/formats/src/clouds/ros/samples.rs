@@ -1,7 +1,7 @@
-use crate::clouds::error::Result;
 use crate::clouds::pose::RigidPose;
 use crate::clouds::spill::{PoseList, TimedPose};
 use std::collections::BTreeMap;
+use voxtile::Result;
 
 /// Where a frame was in its parent, by stamp: in memory or, of a long recording, in a temporary file.
 #[derive(Clone, Debug, Default)]

@@ -1,5 +1,5 @@
 use super::recording::{Message, Recording, Topic, TopicList, TopicSet};
-use crate::clouds::error::Result;
+use voxtile::Result;
 
 /// Recordings one after the other, as one: the parts of a split bag.
 ///

@@ -1,6 +1,7 @@
-use crate::clouds::error::{Error, Result};
 use std::fs::File;
 use std::path::{Path, PathBuf};
+use voxtile::{Error, Result};
+use voxtile_scratch::ScratchFile;
 
 /// How much memory a reader may take. What exceeds it goes to temporary files.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -41,6 +42,12 @@ impl Budget {
     pub(crate) fn file(&self) -> Result<File> {
         let folder = self.scratch.clone().unwrap_or_else(std::env::temp_dir);
         tempfile::tempfile_in(&folder).map_err(|error| self.cannot("make", error))
+    }
+
+    /// A file that is read as memory.
+    pub(crate) fn scratch_file(&self) -> Result<ScratchFile> {
+        let folder = self.scratch.clone().unwrap_or_else(std::env::temp_dir);
+        ScratchFile::in_folder(&folder).map_err(|error| self.cannot("make", error))
     }
 
     /// An error of a temporary file.

@@ -1,5 +1,5 @@
 use super::file_part::FilePart;
-use crate::clouds::error::Result;
+use voxtile::Result;
 
 /// Bytes in memory, or in a file.
 #[derive(Clone, Debug)]

@@ -1,8 +1,8 @@
-use crate::clouds::error::{Error, Result};
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
+use voxtile::{Error, Result};
 
 /// A part of a file that several readers share.
 #[derive(Clone, Debug)]

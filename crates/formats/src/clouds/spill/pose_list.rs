@@ -1,11 +1,11 @@
 use super::budget::Budget;
 use super::file_part::FilePart;
-use crate::clouds::error::Result;
 use crate::clouds::pose::RigidPose;
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
 use std::sync::{Arc, Mutex};
+use voxtile::Result;
 
 /// A pose and its time; 0 where it has none.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,9 +1,9 @@
 use super::budget::Budget;
-use crate::clouds::error::Result;
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 use std::fs::File;
 use std::io::{BufWriter, Read, Seek, SeekFrom, Write};
+use voxtile::Result;
 
 /// What is sorted in bounded memory.
 pub(crate) trait Record: Copy {

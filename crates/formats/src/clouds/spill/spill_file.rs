@@ -1,11 +1,11 @@
 use super::budget::Budget;
 use super::bytes::Bytes;
 use super::file_part::FilePart;
-use crate::clouds::error::Result;
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
+use voxtile::Result;
 
 /// A temporary file for what exceeds the memory of a reader. Its space is used again once no part of it is; where parts
 /// overlap in time for long, another file takes its place, and each is freed with its last part.

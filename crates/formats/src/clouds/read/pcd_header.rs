@@ -1,3 +1,4 @@
+use crate::clouds::RigidPose;
 use voxtile::FormatError;
 use voxtile::scan::Pose;
 
@@ -30,7 +31,8 @@ pub(super) struct Header {
     pub(super) points: usize,
     pub(super) point_bytes: usize,
     pub(super) encoding: Encoding,
-    pub(super) world_from_sensor: Pose,
+    /// The `VIEWPOINT`, as it is written.
+    pub(super) world_from_sensor: Option<RigidPose>,
     pub(super) data_at: usize,
     pub(super) data_line: u64,
 }
@@ -127,10 +129,7 @@ impl Header {
             }
         }
         let points = number_of_points(&find, data_line)?;
-        let world_from_sensor = match find("VIEWPOINT") {
-            None => Pose::identity(),
-            Some((words, line)) => viewpoint(words, line)?,
-        };
+        let world_from_sensor = find("VIEWPOINT").map(|(words, line)| viewpoint(words, line)).transpose()?;
         let (encoding, line) = need("DATA")?;
         let encoding = match encoding.first().map(String::as_str) {
             Some("ascii") => Encoding::Ascii,
@@ -171,12 +170,15 @@ fn number_of_points<'a>(
     }
 }
 
-fn viewpoint(words: &[String], line: u64) -> Result<Pose> {
+fn viewpoint(words: &[String], line: u64) -> Result<RigidPose> {
     let numbers = words.iter().map(|word| parse(word, line)).collect::<Result<Vec<f64>>>()?;
     match numbers[..] {
         [x, y, z, qw, qx, qy, qz] if numbers.iter().all(|number| number.is_finite()) => {
-            Pose::of_quaternion([x, y, z], [qx, qy, qz, qw])
-                .map_err(|reason| FormatError::at_line(line, format!("VIEWPOINT has {reason}")))
+            let pose = RigidPose { position_m: [x, y, z], quaternion: [qx, qy, qz, qw] };
+            match Pose::of_quaternion(pose.position_m, pose.quaternion) {
+                Ok(_) => Ok(pose),
+                Err(reason) => Err(FormatError::at_line(line, format!("VIEWPOINT has {reason}"))),
+            }
         }
         _ => Err(FormatError::at_line(line, "VIEWPOINT needs seven finite numbers: tx ty tz qw qx qy qz")),
     }

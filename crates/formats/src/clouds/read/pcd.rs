@@ -1,0 +1,301 @@
+use super::lzf;
+use super::one::{Points, Visit};
+use super::pcd_header::{Encoding, Header, MAX_HEADER_BYTES};
+use super::regular::check_regular;
+use crate::clouds::{Budget, CloudHead, CloudPoint, RigidPose};
+use crate::sensor_scan::SensorScan;
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, Cursor, Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+use voxtile::scan::Pose;
+use voxtile::{Error, FormatError, Result};
+use voxtile_scratch::ScratchFile;
+
+/// A longer line is an error.
+const MAX_LINE_BYTES: u64 = 1 << 20;
+/// Bytes that are read at a time.
+const BYTES_AT_A_TIME: usize = 1 << 16;
+/// Bytes of one field that are read at a time.
+const MAX_FIELD_BYTES: usize = 1 << 20;
+
+/// Reads a PCD file (versions 0.5 to 0.7; `ascii`, `binary` or `binary_compressed`) from memory. Bytes after the last
+/// point are ignored: PCL pads its files. The pose is the `VIEWPOINT`; points are NaN where the sensor saw nothing.
+///
+/// # Errors
+///
+/// An invalid header (with the line), points that are missing or not numbers.
+pub fn read_pcd(file: &[u8]) -> Result<SensorScan> {
+    let (path, head) = (Path::new("PCD"), CloudHead::default());
+    let (head, mut pcd) = begin(path, head, Cursor::new(file), file.len() as u64, &Budget::default())?;
+    let (mut points_in_sensor, mut intensities) = (Vec::new(), head.has_intensities.then(Vec::new));
+    pcd.visit(&mut |point| {
+        points_in_sensor.push(point.position_m);
+        intensities.iter_mut().for_each(|intensities| intensities.push(point.intensity));
+        Ok(())
+    })?;
+    let RigidPose { position_m, quaternion } = head.world_from_sensor.unwrap_or(RigidPose::IDENTITY);
+    let world_from_sensor = Pose::from_quaternion(position_m, quaternion)?;
+    Ok(SensorScan { name: head.name, points_in_sensor, intensities, world_from_sensor })
+}
+
+/// Opens a PCD file and reads its header, which may have a `VIEWPOINT`.
+pub(super) fn open(path: &Path, head: CloudHead, budget: &Budget) -> Result<(CloudHead, Box<dyn Points>)> {
+    check_regular(path)?;
+    let open = || {
+        let file = File::open(path)?;
+        let bytes = file.metadata()?.len();
+        Ok((BufReader::with_capacity(1 << 16, file), bytes))
+    };
+    let (input, bytes) = open().map_err(|error| Error::io(path, "read", error))?;
+    let (head, points) = begin(path, head, input, bytes, budget)?;
+    Ok((head, Box::new(points)))
+}
+
+/// The points of a PCD file.
+struct PcdPoints<R> {
+    path: PathBuf,
+    header: Header,
+    columns: Columns,
+    input: R,
+    file_bytes: u64,
+    /// For what is unpacked.
+    budget: Budget,
+}
+
+/// Reads the header, and moves to the points.
+fn begin<R: BufRead + Seek>(
+    path: &Path,
+    mut head: CloudHead,
+    mut input: R,
+    file_bytes: u64,
+    budget: &Budget,
+) -> Result<(CloudHead, PcdPoints<R>)> {
+    let cannot = |error| Error::io(path, "read", error);
+    let mut start = Vec::new();
+    (&mut input).take(MAX_HEADER_BYTES as u64).read_to_end(&mut start).map_err(cannot)?;
+    let parsed = Header::parse(&start).and_then(|header| Ok((Columns::of(&header)?, header)));
+    let (columns, header) = parsed.map_err(|error| error.in_input(path))?;
+    input.seek(SeekFrom::Start(header.data_at as u64)).map_err(cannot)?;
+    head.points = Some(header.points as u64);
+    head.has_intensities = columns.intensity.is_some();
+    head.world_from_sensor = header.world_from_sensor;
+    let (path, budget) = (path.to_owned(), budget.clone());
+    Ok((head, PcdPoints { path, header, columns, input, file_bytes, budget }))
+}
+
+impl<R: BufRead + Seek + Send> Points for PcdPoints<R> {
+    fn read(&mut self, visit: Visit<'_>) -> Result<()> {
+        self.visit(visit)
+    }
+}
+
+impl<R: BufRead> PcdPoints<R> {
+    fn visit(&mut self, visit: Visit<'_>) -> Result<()> {
+        match self.header.encoding {
+            Encoding::Ascii => self.visit_ascii(visit),
+            Encoding::Binary => self.visit_binary(visit),
+            Encoding::Compressed => self.visit_compressed(visit),
+        }
+    }
+
+    fn visit_ascii(&mut self, visit: Visit<'_>) -> Result<()> {
+        let Self { path, header, columns, input, .. } = self;
+        let wrong = |line: u64, reason: String| FormatError::at_line(line, reason).in_input(path);
+        let mut number = header.data_line;
+        let mut line = Vec::new();
+        for done in 0..header.points {
+            loop {
+                line.clear();
+                number += 1;
+                let read = (&mut *input).take(MAX_LINE_BYTES).read_until(b'\n', &mut line);
+                let read = read.map_err(|error| Error::io(path, "read", error))?;
+                if read == 0 {
+                    let reason = format!("the file ends after {done} of {} points", header.points);
+                    return Err(wrong(header.data_line + done as u64, reason));
+                }
+                if read as u64 == MAX_LINE_BYTES {
+                    return Err(wrong(number, "the line is too long for a PCD file".into()));
+                }
+                if !line.trim_ascii().is_empty() {
+                    break;
+                }
+            }
+            let text = String::from_utf8_lossy(&line);
+            let words: Vec<&str> = text.split_ascii_whitespace().collect();
+            let value = |column: usize| -> Result<f64> {
+                let field = &header.fields[column];
+                let word = words.get(field.first_value).ok_or_else(|| {
+                    wrong(number, format!("{} values; field {} is missing", words.len(), field.name))
+                })?;
+                // A number of a four-byte field is rounded to it, as in the binary encodings.
+                let parsed = match (field.kind, field.size) {
+                    (b'F', 4) => word.parse::<f32>().map(f64::from),
+                    _ => word.parse(),
+                };
+                parsed.map_err(|_| wrong(number, format!("`{word}` is not a number")))
+            };
+            let [x, y, z] = columns.xyz;
+            let position_m = [value(x)?, value(y)?, value(z)?];
+            let intensity = columns.intensity.map(value).transpose()?.unwrap_or_default() as f32;
+            visit(CloudPoint { intensity, ..CloudPoint::hit(position_m) })?;
+        }
+        Ok(())
+    }
+
+    /// Points one after the other.
+    fn visit_binary(&mut self, visit: Visit<'_>) -> Result<()> {
+        let Self { path, header, columns, input, file_bytes, .. } = self;
+        let there = file_bytes.saturating_sub(header.data_at as u64);
+        let wanted = (header.point_bytes as u64).checked_mul(header.points as u64);
+        if wanted.is_none_or(|wanted| wanted > there) {
+            let points = there / (header.point_bytes as u64).max(1);
+            let reason = format!("the file ends after {points} of {} points", header.points);
+            return Err(FormatError::at_offset(*file_bytes, reason).in_input(path));
+        }
+        let at_a_time = (BYTES_AT_A_TIME / header.point_bytes.max(1)).max(1);
+        let mut bytes = Vec::new();
+        for first in (0..header.points).step_by(at_a_time) {
+            bytes.resize(at_a_time.min(header.points - first) * header.point_bytes, 0);
+            input.read_exact(&mut bytes).map_err(|error| Error::io(path, "read", error))?;
+            for record in bytes.chunks_exact(header.point_bytes) {
+                let value = |column: usize| {
+                    let field = &header.fields[column];
+                    number(field.kind, &record[field.offset..field.offset + field.size])
+                };
+                let intensity = columns.intensity.map_or(0.0, value) as f32;
+                visit(CloudPoint { intensity, ..CloudPoint::hit(columns.xyz.map(value)) })?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Compressed size, uncompressed size, then the compressed fields one after the other.
+    fn visit_compressed(&mut self, visit: Visit<'_>) -> Result<()> {
+        let Self { path, header, columns, input, file_bytes, budget } = self;
+        let cannot = |error| Error::io(path, "read", error);
+        let wrong = |reason: String| FormatError::at_offset(header.data_at as u64, reason).in_input(path);
+        let there = file_bytes.saturating_sub(header.data_at as u64);
+        let mut sizes = [0; 8];
+        if there < sizes.len() as u64 {
+            return Err(wrong("the file ends before the sizes of the packed data".into()));
+        }
+        input.read_exact(&mut sizes).map_err(cannot)?;
+        let there = there - sizes.len() as u64;
+        let size = |at: usize| u64::from(u32::from_le_bytes(std::array::from_fn(|k| sizes[at + k])));
+        let wanted = (header.point_bytes as u64).saturating_mul(header.points as u64);
+        let (packed, unpacked) = (size(0), size(4));
+        if unpacked != wanted {
+            return Err(wrong(format!(
+                "{unpacked} bytes unpacked for {} points of {}",
+                header.points, header.point_bytes
+            )));
+        }
+        if packed > there {
+            return Err(wrong(format!("{packed} bytes of packed data announced, {there} there")));
+        }
+        if wanted == 0 {
+            return Ok(());
+        }
+        if !lzf::is_possible(packed, wanted) {
+            return Err(wrong("the packed data is damaged".into()));
+        }
+        let mut fields = Fields::new(budget, wanted)?;
+        let is_whole = match &mut fields {
+            Fields::InMemory(bytes) => lzf::decompress(&mut (&mut *input).take(packed), wanted, bytes),
+            Fields::InFile(file) => lzf::decompress(&mut (&mut *input).take(packed), wanted, file),
+        };
+        if !is_whole.map_err(cannot)? {
+            return Err(wrong("the packed data is damaged".into()));
+        }
+        let wanted: Vec<usize> = columns.xyz.into_iter().chain(columns.intensity).collect();
+        let strides = wanted.iter().map(|&column| header.fields[column].size * header.fields[column].count);
+        let at_a_time = (MAX_FIELD_BYTES / strides.max().unwrap_or(1)).clamp(1, BYTES_AT_A_TIME / 8);
+        let mut values = vec![Vec::new(); wanted.len()];
+        for first in (0..header.points).step_by(at_a_time) {
+            let count = at_a_time.min(header.points - first);
+            for (values, &column) in values.iter_mut().zip(&wanted) {
+                fields.read(header, column, first, count, values).map_err(cannot)?;
+            }
+            for k in 0..count {
+                let intensity = values.get(3).map_or(0.0, |values| values[k]) as f32;
+                let position_m = std::array::from_fn(|axis| values[axis][k]);
+                visit(CloudPoint { intensity, ..CloudPoint::hit(position_m) })?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Which fields are read.
+struct Columns {
+    xyz: [usize; 3],
+    intensity: Option<usize>,
+}
+
+const INTENSITY_NAMES: [&str; 4] = ["intensity", "Intensity", "i", "reflectivity"];
+
+impl Columns {
+    fn of(header: &Header) -> std::result::Result<Self, FormatError> {
+        let find = |name: &str| header.fields.iter().position(|field| field.name == name && field.count > 0);
+        let need = |name: &str| {
+            find(name).ok_or_else(|| {
+                FormatError::at_line(header.data_line, format!("the points have no field {name}"))
+            })
+        };
+        let intensity = INTENSITY_NAMES.iter().find_map(|name| find(name));
+        Ok(Self { xyz: [need("x")?, need("y")?, need("z")?], intensity })
+    }
+}
+
+/// The decompressed values, field after field.
+enum Fields {
+    InMemory(Vec<u8>),
+    InFile(ScratchFile),
+}
+
+impl Fields {
+    fn new(budget: &Budget, bytes: u64) -> Result<Self> {
+        match bytes > budget.bytes as u64 {
+            true => budget.scratch_file().map(Self::InFile),
+            // It grows as data arrives.
+            false => Ok(Self::InMemory(Vec::new())),
+        }
+    }
+
+    /// The values of a field of some points.
+    fn read(
+        &mut self,
+        header: &Header,
+        column: usize,
+        first: usize,
+        count: usize,
+        values: &mut Vec<f64>,
+    ) -> io::Result<()> {
+        let field = &header.fields[column];
+        let stride = field.size * field.count;
+        let at = field.offset * header.points + first * stride;
+        let bytes = count * stride;
+        let bytes = match self {
+            Self::InMemory(all) => all.get(at..at + bytes).ok_or(io::ErrorKind::UnexpectedEof)?,
+            Self::InFile(file) => file.bytes(at as u64, bytes)?,
+        };
+        values.clear();
+        values.extend(bytes.chunks_exact(stride).map(|point| number(field.kind, &point[..field.size])));
+        Ok(())
+    }
+}
+
+/// A little-endian number.
+fn number(kind: u8, bytes: &[u8]) -> f64 {
+    // Zero-extended to eight bytes.
+    let mut wide = [0; 8];
+    wide[..bytes.len()].copy_from_slice(bytes);
+    let unsigned = u64::from_le_bytes(wide);
+    let unused_bits = 64 - 8 * bytes.len();
+    match (kind, bytes.len()) {
+        (b'F', 4) => f64::from(f32::from_bits(unsigned as u32)),
+        (b'F', _) => f64::from_bits(unsigned),
+        (b'U', _) => unsigned as f64,
+        _ => ((unsigned << unused_bits) as i64 >> unused_bits) as f64,
+    }
+}

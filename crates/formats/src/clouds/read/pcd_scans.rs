@@ -1,0 +1,188 @@
+//! Scans of PCD files. They were the first that were read: what maps of earlier versions rely on is here.
+
+use super::files::Files;
+use super::from_origin::FromOrigin;
+use super::one::{OneCloud, head_of};
+use super::pcd;
+use crate::clouds::poses::{Rules, Trajectory};
+use crate::clouds::{CloudHead, CloudSource, RigidPose, stamp_of_name};
+use crate::file_order::sort_naturally;
+use crate::find_poses::{find_poses, pose_file_for};
+use crate::pose_source::PoseSource;
+use crate::posed_clouds::{CloudPoses, PosedClouds};
+use crate::read_options::ReadOptions;
+use crate::source::ScanSource;
+use std::fs;
+use std::path::{Path, PathBuf};
+use voxtile::scan::Pose;
+use voxtile::{Error, FormatError, Result};
+
+/// Numbers in file names are compared with time stamps if both exceed this many seconds: counters do not.
+const MIN_STAMP_S: f64 = 1e6;
+
+/// Whether there are PCD files in a folder.
+pub(crate) fn is_folder(folder: &Path) -> bool {
+    files_of(folder).is_ok_and(|files| !files.is_empty())
+}
+
+/// Opens a PCD file, or those of a folder. A pose file goes before the `VIEWPOINT` of the files.
+///
+/// Where nothing more is asked for than scans with their poses, scans have no time stamps, and plain poses are taken
+/// line by line, unless the stamps of the files are those of other poses.
+pub(crate) fn open(path: &Path, options: &ReadOptions) -> Result<Box<dyn ScanSource + Send>> {
+    let files = if path.is_dir() { files_of(path)? } else { vec![path.to_owned()] };
+    if files.is_empty() {
+        return Err(Error::argument(path.display().to_string(), "no file in it ends with .pcd"));
+    }
+    let is_plain = options.calib.is_none() && options.clouds.is_plain() && options.sensor_origin_m.is_none();
+    let mut poses = poses_of(path, &files, is_plain, options)?;
+    let has_stamps = match &poses {
+        CloudPoses::File(trajectory) => !is_plain || !is_by_line(trajectory, &files)?,
+        CloudPoses::Missing => true,
+        CloudPoses::Source(_) | CloudPoses::Identity => !is_plain,
+    };
+    let must_have_viewpoint = is_plain && matches!(poses, CloudPoses::Source(PoseSource::Viewpoint));
+    let (is_alone, budget) = (files.len() == 1, options.budget());
+    let has_origin = options.sensor_origin_m.is_some();
+    let open = move |path: &Path| -> Result<Box<dyn CloudSource>> {
+        let (mut head, points) = pcd::open(path, head_of(path), &budget)?;
+        if head.world_from_sensor.is_none() && must_have_viewpoint {
+            let reason = "no VIEWPOINT in this file, which other files of the folder have: where it was taken is not known";
+            return Err(FormatError::at_line(1, reason).in_input(path));
+        }
+        head.stamp_ns = head.stamp_ns.filter(|_| has_stamps);
+        head.world_from_sensor = match head.world_from_sensor {
+            None if is_alone && !has_origin => Some(RigidPose::IDENTITY),
+            // Writers without a pose write the identity.
+            Some(pose) if has_origin && is_identity(&pose) => None,
+            // What is calculated with begins with a quaternion of length 1, what is taken as it is becomes one later.
+            Some(pose) if !is_plain => Some(normalized(&pose)?),
+            pose => pose,
+        };
+        Ok(Box::new(OneCloud::new("PCD", (head, points))))
+    };
+    let clouds = Box::new(Files::new("PCD".into(), files.clone(), true, Box::new(open)));
+    let clouds: Box<dyn CloudSource> = match options.sensor_origin_m {
+        Some(origin_m) => Box::new(FromOrigin::new(clouds, origin_m)?),
+        None => clouds,
+    };
+    if let (CloudPoses::File(trajectory), false) = (&mut poses, has_stamps) {
+        trajectory.check_order()?;
+        warn_of_shift(trajectory, &files)?;
+        trajectory.forget_stamps();
+    }
+    let mut scans = PosedClouds::new(clouds, path, poses, options.clouds.clone())?;
+    if !has_stamps {
+        scans.set_files(files);
+    }
+    Ok(Box::new(scans))
+}
+
+fn poses_of(path: &Path, files: &[PathBuf], is_plain: bool, options: &ReadOptions) -> Result<CloudPoses> {
+    // A pose file beside a single PCD file belongs to its whole folder.
+    let has_file = options.poses.is_some() || (path.is_dir() && pose_file_for(path).is_some());
+    let own = match options.sensor_origin_m {
+        Some(_) => Some(PoseSource::Scans),
+        None if has_file => None,
+        None if files.iter().any(|file| is_placed(file)) => Some(PoseSource::Viewpoint),
+        None => (files.len() == 1).then_some(PoseSource::Identity),
+    };
+    let rules = if is_plain { Rules::Lenient } else { Rules::Strict };
+    find_poses(path, own, None, rules, options)
+}
+
+/// Whether files take these poses line by line: a plain text, unless the names of the files are time stamps that its
+/// stamps contradict.
+fn is_by_line(trajectory: &Trajectory, files: &[PathBuf]) -> Result<bool> {
+    /// Up to the milliseconds that some programs write.
+    const SAME_NS: u64 = 1_000_000;
+    if !trajectory.is_plain() {
+        return Ok(false);
+    }
+    let stamps: Option<Vec<i64>> = files.iter().map(|file| stamp_of_name(file)).collect();
+    let Some((stamps, [first_ns, last_ns])) = stamps.zip(trajectory.span_ns()?) else { return Ok(true) };
+    if trajectory.len() != files.len() {
+        return Ok(false);
+    }
+    // Clocks of which neither knows the other tell nothing.
+    if !stamps.iter().any(|stamp| (first_ns..=last_ns).contains(stamp)) {
+        return Ok(true);
+    }
+    for (number, of_file) in stamps.into_iter().enumerate() {
+        if trajectory.stamp_of(number)?.is_none_or(|of_pose| of_pose.abs_diff(of_file) > SAME_NS) {
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
+
+/// Warns where the numbers in the names of files are time stamps, and one does not match its pose as the others do.
+fn warn_of_shift(trajectory: &Trajectory, files: &[PathBuf]) -> Result<()> {
+    let mut stamps = Vec::with_capacity(files.len());
+    for number in 0..files.len() {
+        stamps.extend(trajectory.stamp_of(number)?.map(|stamp_ns| stamp_ns as f64 * 1e-9));
+    }
+    if let Some((file, seconds)) = first_shifted(&stamps, files) {
+        log::warn!(
+            "{}: the number in {} is {seconds:.3} s further from its pose's time stamp than those of most files: is a \
+             line or a file missing?",
+            trajectory.path().display(),
+            file.display()
+        );
+    }
+    Ok(())
+}
+
+/// The first file whose name does not match its pose, and by how many seconds.
+fn first_shifted<'f>(stamps_s: &[f64], files: &'f [PathBuf]) -> Option<(&'f PathBuf, f64)> {
+    let (first, last) = (*stamps_s.first()?, *stamps_s.last()?);
+    let names: Vec<f64> = files.iter().map(|path| number_in(path)).collect::<Option<_>>()?;
+    if stamps_s.len() != names.len() || first < MIN_STAMP_S || last <= first {
+        return None;
+    }
+    let spacing = (last - first) / (stamps_s.len() - 1) as f64;
+    let near = first - (last - first) - 1.0..=last + (last - first) + 1.0;
+    let unit = [1.0, 1e-3, 1e-6, 1e-9].into_iter().find(|unit| near.contains(&(names[0] * unit)))?;
+    let apart: Vec<f64> = names.iter().zip(stamps_s).map(|(name, stamp)| name * unit - stamp).collect();
+    let mut sorted = apart.clone();
+    sorted.sort_by(f64::total_cmp);
+    let most = sorted[sorted.len() / 2];
+    let is_shifted = |&k: &usize| (apart[k] - most).abs() > 0.5 * spacing;
+    (0..apart.len()).find(is_shifted).map(|k| (&files[k], (apart[k] - most).abs()))
+}
+
+/// The number at the end of a file's name.
+fn number_in(path: &Path) -> Option<f64> {
+    let stem = path.file_stem()?.to_str()?;
+    let digits = stem.trim_end_matches(|letter: char| letter.is_ascii_digit() || letter == '.').len();
+    stem[digits..].trim_start_matches('.').parse().ok()
+}
+
+/// Whether the `VIEWPOINT` of a PCD file tells where it was taken.
+fn is_placed(path: &Path) -> bool {
+    let head = pcd::open(path, CloudHead::default(), &Default::default()).ok();
+    head.and_then(|(head, _)| head.world_from_sensor).is_some_and(|pose| !is_identity(&pose))
+}
+
+fn is_identity(pose: &RigidPose) -> bool {
+    let [x, y, z, w] = pose.quaternion;
+    pose.position_m == [0.0; 3] && [x, y, z] == [0.0; 3] && w != 0.0
+}
+
+fn normalized(pose: &RigidPose) -> Result<RigidPose> {
+    let pose = Pose::from_quaternion(pose.position_m, pose.quaternion)?;
+    Ok(RigidPose { position_m: pose.position_m(), quaternion: pose.quaternion() })
+}
+
+fn files_of(folder: &Path) -> Result<Vec<PathBuf>> {
+    let cannot = |error| Error::io(folder, "list", error);
+    let mut files = Vec::new();
+    for entry in fs::read_dir(folder).map_err(cannot)? {
+        let path = entry.map_err(cannot)?.path();
+        if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("pcd")) {
+            files.push(path);
+        }
+    }
+    sort_naturally(&mut files);
+    Ok(files)
+}

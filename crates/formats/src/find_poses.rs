@@ -1,0 +1,106 @@
+use crate::clouds::poses::{Rules, Trajectory, looks_like_poses};
+use crate::pose_source::PoseSource;
+use crate::posed_clouds::CloudPoses;
+use crate::read_options::ReadOptions;
+use std::fs::{self, File};
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use voxtile::{Error, Result};
+
+/// Names of pose files that are searched for.
+const POSE_FILES: [&str; 2] = ["poses_tum.txt", "poses_kitti.txt"];
+/// Given instead of a pose file: every scan is in the world frame.
+const IDENTITY: &str = "identity";
+/// Most files that an error names.
+const MAX_NAMED: usize = 4;
+/// Files that may be poses, by their extensions.
+const POSE_EXTENSIONS: [&str; 4] = ["txt", "tum", "kitti", "csv"];
+/// How much of a file is read to see whether it may be poses.
+const GLANCE_BYTES: u64 = 1 << 14;
+
+/// Where the poses of an input come from: the file that is named, the input's own, a file in it or beside it. One cloud
+/// alone needs none.
+///
+/// # Errors
+///
+/// A file that cannot be read; no poses, where they are needed.
+pub(crate) fn find_poses(
+    path: &Path,
+    own: Option<PoseSource>,
+    clouds: Option<u64>,
+    rules: Rules,
+    options: &ReadOptions,
+) -> Result<CloudPoses> {
+    let folder = if path.is_dir() { path } else { path.parent().unwrap_or(Path::new(".")) };
+    let file = match &options.poses {
+        Some(file) if file == Path::new(IDENTITY) => return Ok(CloudPoses::Identity),
+        Some(file) => Some(file.clone()),
+        None => match own {
+            Some(own) => return Ok(CloudPoses::Source(own)),
+            None => pose_file_for(folder),
+        },
+    };
+    match file {
+        Some(file) => {
+            let budget = options.budget();
+            let trajectory = Trajectory::read_by(rules, &file, options.calib.as_deref(), &budget)?;
+            Ok(CloudPoses::File(Box::new(trajectory)))
+        }
+        None if clouds == Some(1) => Ok(CloudPoses::Identity),
+        None if options.clouds.may_lack_poses => Ok(CloudPoses::Missing),
+        None => Err(no_poses(path, folder)),
+    }
+}
+
+/// The pose file in a folder, or beside it.
+pub(crate) fn pose_file_for(folder: &Path) -> Option<PathBuf> {
+    let beside = above(folder);
+    let places = [folder, &*beside];
+    places.iter().flat_map(|place| POSE_FILES.map(|name| place.join(name))).find(|path| path.is_file())
+}
+
+fn no_poses(path: &Path, folder: &Path) -> Error {
+    let found = match &files_like_poses(folder)[..] {
+        [] => String::new(),
+        [one] => format!(" ({one} looks like one)"),
+        more => format!(" ({} look like some)", more.join(", ")),
+    };
+    let reason = format!(
+        "has no poses: there is no poses_tum.txt or poses_kitti.txt in or beside it (nor a VIEWPOINT but the identity, if \
+         these are PCD files); name a file with `poses` FILE{found}, or say `poses` identity if all scans are in the \
+         world frame; `sensor_origin` X Y Z is for one station, `no_rays` for points alone"
+    );
+    Error::argument(path.display().to_string(), reason)
+}
+
+/// The folder that a folder is in, by the name that a person would use for it.
+fn above(folder: &Path) -> PathBuf {
+    let is_named = folder.file_name().is_some();
+    let parent = folder.parent().filter(|parent| is_named && !parent.as_os_str().is_empty());
+    // What a link leads to is somewhere else than its name.
+    let is_link = fs::symlink_metadata(folder).is_ok_and(|metadata| metadata.is_symlink());
+    parent.filter(|_| !is_link).map_or_else(|| folder.join(".."), Path::to_owned)
+}
+
+/// A few files in a folder or beside it that look like pose files.
+fn files_like_poses(folder: &Path) -> Vec<String> {
+    let mut found = Vec::new();
+    for place in [folder.to_owned(), above(folder)] {
+        let mut paths: Vec<PathBuf> =
+            fs::read_dir(place).into_iter().flatten().flatten().map(|entry| entry.path()).collect();
+        paths.sort_unstable();
+        found.extend(paths.iter().filter(|path| may_be_poses(path)).map(|path| path.display().to_string()));
+    }
+    found.truncate(MAX_NAMED);
+    found
+}
+
+/// Whether a file is a text that starts like a pose file.
+fn may_be_poses(path: &Path) -> bool {
+    let is_text = path
+        .extension()
+        .is_some_and(|extension| POSE_EXTENSIONS.iter().any(|known| extension.eq_ignore_ascii_case(known)));
+    let mut start = Vec::new();
+    let mut glance = || File::open(path)?.take(GLANCE_BYTES).read_to_end(&mut start);
+    is_text && path.is_file() && glance().is_ok() && looks_like_poses(&start)
+}

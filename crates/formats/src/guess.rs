@@ -1,0 +1,147 @@
+use crate::clouds::read::foreign;
+use crate::clouds::read::glance::first_bytes;
+use crate::clouds::read::listing::{Listing, extension_of};
+use crate::clouds::read::pcd_scans;
+use crate::input_format::{InputFormat, Mark, Open};
+use crate::read_options::ReadOptions;
+use crate::registry::Registry;
+use std::collections::BTreeMap;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+use voxtile::{Error, Result};
+
+impl Registry {
+    /// What a file or a folder is: by its content first, by its name second. Of a folder, `not_clouds` are left out.
+    ///
+    /// # Errors
+    ///
+    /// It cannot be read; it is of no known format, or of one that must be converted first.
+    pub fn guess(&self, path: &Path, not_clouds: &[PathBuf]) -> Result<&InputFormat> {
+        let meta = std::fs::metadata(path).map_err(|error| match error.kind() {
+            ErrorKind::NotFound => argument(path, "there is no such file or folder"),
+            _ => Error::io(path, "open", error),
+        })?;
+        if meta.is_dir() { self.guess_folder(path, not_clouds) } else { self.guess_file(path) }
+    }
+
+    /// The input itself, which may be a folder `scans` in the one that was named, and its format.
+    pub(crate) fn find(&self, path: &Path, options: &ReadOptions) -> Result<(PathBuf, &InputFormat)> {
+        let named = options.format.as_deref().map(|name| self.named(name)).transpose()?;
+        let not_clouds = options.not_clouds();
+        let inner = path.join("scans");
+        if !inner.is_dir() {
+            return Ok((path.to_owned(), named.map_or_else(|| self.guess(path, &not_clouds), Ok)?));
+        }
+        let pcd = self.named("pcd")?;
+        let is_pcd =
+            |folder| named.is_none_or(|named| named.name == pcd.name) && pcd_scans::is_folder(folder);
+        // Texts of any kind lie beside a folder of PCD.
+        if !is_pcd(path) && is_pcd(&inner) {
+            return Ok((inner, pcd));
+        }
+        match (self.guess(path, &not_clouds), named) {
+            (Ok(guessed), named) => Ok((path.to_owned(), named.unwrap_or(guessed))),
+            (Err(_), Some(named)) => Ok((inner, named)),
+            (Err(_), None) => self.guess(&inner, &not_clouds).map(|format| (inner.clone(), format)),
+        }
+    }
+
+    /// What starts with these bytes, if that tells it.
+    pub(crate) fn of_start(&self, start: &[u8]) -> Option<&InputFormat> {
+        self.formats().iter().find(|format| match format.mark {
+            Mark::Start(is_it) | Mark::StartOrName(is_it) => is_it(start),
+            _ => false,
+        })
+    }
+
+    fn guess_file(&self, path: &Path) -> Result<&InputFormat> {
+        let extension = extension_of(path);
+        let of = |is_it: fn(&Mark) -> bool| {
+            let mut formats = self.formats().iter();
+            formats.find(|format| is_it(&format.mark) && format.has_extension(&extension))
+        };
+        if let Some(named) = of(|mark| matches!(mark, Mark::Name)) {
+            return Ok(named);
+        }
+        let start = first_bytes(path)?;
+        if start.is_empty() {
+            return Err(argument(path, "the file is empty"));
+        }
+        if let Some(known) = self.of_start(&start) {
+            return Ok(known);
+        }
+        if let Some(foreign) = foreign::of_bytes(&start) {
+            return Err(foreign.error(path));
+        }
+        if let Some(named) = of(|mark| matches!(mark, Mark::StartOrName(_))) {
+            return Ok(named);
+        }
+        if let Some(foreign) = foreign::of_extension(&extension) {
+            return Err(foreign.error(path));
+        }
+        let looks = |format: &&InputFormat| matches!(format.mark, Mark::Look(is_it) if is_it(&start));
+        if let Some(alike) = self.formats().iter().find(looks) {
+            return Ok(alike);
+        }
+        Err(match (of(|mark| matches!(mark, Mark::Look(_))), of(|_| true)) {
+            (Some(_), _) => argument(
+                path,
+                "is no text of points: the first lines are neither three numbers and more, nor names with x, y and z",
+            ),
+            (None, Some(_)) => argument(
+                path,
+                format!("is called .{extension}, but does not start like such a file: is it damaged?"),
+            ),
+            _ => argument(path, format!("is of no known format; known are {}", self.names(", "))),
+        })
+    }
+
+    fn guess_folder(&self, path: &Path, not_clouds: &[PathBuf]) -> Result<&InputFormat> {
+        if let Some(format) = self.formats().iter().find(|format| (format.is_folder)(path)) {
+            return Ok(format);
+        }
+        let listing = Listing::read(path, not_clouds)?;
+        let mut counts = BTreeMap::new();
+        for file in listing.clouds() {
+            if let Some(format) = self.in_folder(&extension_of(file)) {
+                counts.entry(format.name).or_insert((format, file, 0_u64)).2 += 1;
+            }
+        }
+        // Lists, times and poses lie beside clouds, and so do pictures. Between the two, a camera decides.
+        let mut aside: Vec<&str> =
+            self.formats().iter().filter(|format| format.is_aside).map(|format| format.name).collect();
+        if !listing.has_depths() {
+            aside.reverse();
+        }
+        for name in aside {
+            if counts.len() > 1 {
+                counts.remove(name);
+            }
+        }
+        let mut found = counts.values();
+        match (found.next(), found.next()) {
+            (Some((format, ..)), None) if matches!(format.open, Open::Folder(_)) => Ok(format),
+            // The first file tells LAS from LAZ, and is checked early.
+            (Some((_, file, _)), None) => self.guess_file(file),
+            (Some((one, _, count)), Some((other, _, others))) => {
+                let (one, other) = (one.name, other.name);
+                let reason = format!(
+                    "holds {count} files of {one} and {others} of {other}; name the format that is meant"
+                );
+                Err(argument(path, reason))
+            }
+            (None, _) => Err(argument(path, listing.why_nothing(&self.names(", ")))),
+        }
+    }
+
+    /// The format of files with an extension, in lower case, in a folder of clouds.
+    fn in_folder(&self, extension: &str) -> Option<&InputFormat> {
+        let may_be =
+            |format: &&InputFormat| !matches!(format.mark, Mark::Name) && format.has_extension(extension);
+        self.formats().iter().find(may_be)
+    }
+}
+
+fn argument(path: &Path, reason: impl Into<String>) -> Error {
+    Error::argument(path.display().to_string(), reason)
+}

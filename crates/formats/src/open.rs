@@ -1,0 +1,142 @@
+use crate::clouds::CloudSource;
+use crate::clouds::poses::Rules;
+use crate::clouds::read::files::Files;
+use crate::clouds::read::from_origin::FromOrigin;
+use crate::clouds::read::listing::Listing;
+use crate::clouds::read::one::{OneCloud, head_of};
+use crate::clouds::read::regular::check_regular;
+use crate::find_poses::find_poses;
+use crate::input_format::{InputFormat, Open};
+use crate::pose_source::PoseSource;
+use crate::posed_clouds::PosedClouds;
+use crate::read_options::ReadOptions;
+use crate::registry::Registry;
+use crate::source::ScanSource;
+use std::path::Path;
+use voxtile::{Error, Result};
+
+/// Opens scans of any known format: a file, a folder of files, or the folder that holds such a folder as `scans`. Its
+/// content tells the format first, its name second.
+///
+/// Files of a folder are in natural order of their names (`scan2` before `scan10`). Scans without poses of their own
+/// take them from [`ReadOptions::poses`], or from `poses_tum.txt` or `poses_kitti.txt` in or beside the folder; see
+/// [`ScanSource::pose_source`].
+///
+/// # Errors
+///
+/// Nothing that is known, options that do not fit, a file that cannot be read; scans without any poses, poses that do
+/// not match the scans.
+pub fn open_scans(path: &Path, options: &ReadOptions) -> Result<Box<dyn ScanSource + Send>> {
+    Registry::default().open_scans(path, options)
+}
+
+/// Opens clouds of any known format, without the poses that are beside them.
+///
+/// # Errors
+///
+/// As for [`open_scans`]; a format that has no clouds without poses.
+pub fn open_clouds(path: &Path, options: &ReadOptions) -> Result<Box<dyn CloudSource>> {
+    Registry::default().open_clouds(path, options)
+}
+
+impl Registry {
+    /// [`open_scans`] of these formats.
+    ///
+    /// # Errors
+    ///
+    /// As for [`open_scans`].
+    pub fn open_scans(&self, path: &Path, options: &ReadOptions) -> Result<Box<dyn ScanSource + Send>> {
+        let (path, format) = self.find(path, options)?;
+        let has_poses = (format.has_poses)(&path);
+        let scans = match format.open {
+            Open::Scans(_) if has_poses && options.poses.is_some() => {
+                let reason = format!("a {} has its own poses; leave the option out", format.title);
+                return Err(Error::argument("poses", reason));
+            }
+            Open::Scans(open) => open(&path, options)?,
+            _ => {
+                let clouds = open_as(&path, format, options)?;
+                let own = (has_poses || options.sensor_origin_m.is_some()).then_some(PoseSource::Scans);
+                let poses = find_poses(&path, own, clouds.len_hint(), Rules::Strict, options)?;
+                Box::new(PosedClouds::new(clouds, &path, poses, options.clouds.clone())?)
+            }
+        };
+        Ok(options.selection.clone().of(scans))
+    }
+
+    /// [`open_clouds`] of these formats.
+    ///
+    /// # Errors
+    ///
+    /// As for [`open_clouds`].
+    pub fn open_clouds(&self, path: &Path, options: &ReadOptions) -> Result<Box<dyn CloudSource>> {
+        let (path, format) = self.find(path, options)?;
+        open_as(&path, format, options)
+    }
+}
+
+fn open_as(path: &Path, format: &InputFormat, options: &ReadOptions) -> Result<Box<dyn CloudSource>> {
+    check(options)?;
+    let wrong = |reason: String| Err(Error::argument(path.display().to_string(), reason));
+    let is_folder = path.is_dir();
+    let source = match format.open {
+        Open::Recording(open) => return open(path, options),
+        Open::Scans(_) => return wrong(format!("is {}: it has scans, not clouds alone", format.title)),
+        Open::LeftOut(feature) => {
+            let title = format.title;
+            return wrong(format!(
+                "is {title}, which this build leaves out: build with the feature `{feature}`"
+            ));
+        }
+        Open::Folder(open) if is_folder => open(path, options)?,
+        Open::Folder(_) => return wrong(format!("is a file; {} needs a folder", format.title)),
+        _ if is_folder => open_folder(path, *format, options)?,
+        _ => open_file(path, format, options)?,
+    };
+    Ok(match options.sensor_origin_m {
+        Some(origin_m) => Box::new(FromOrigin::new(source, origin_m)?),
+        None => source,
+    })
+}
+
+fn check(options: &ReadOptions) -> Result<()> {
+    if !(options.scan_period_s >= 0.0 && options.scan_period_s.is_finite()) {
+        return Err(Error::argument(
+            "scan period",
+            "must be seconds from 0 on; 0 leaves a file in one cloud",
+        ));
+    }
+    if options.depth_scale.is_some_and(|scale| !(scale > 0.0 && scale.is_finite())) {
+        return Err(Error::argument("depth scale", "must be above 0: the units of a depth image in a metre"));
+    }
+    Ok(())
+}
+
+fn open_folder(path: &Path, format: InputFormat, options: &ReadOptions) -> Result<Box<dyn CloudSource>> {
+    let paths = Listing::read(path, &options.not_clouds())?.with_extension(&format);
+    if paths.is_empty() {
+        let reason = format!("no file in it ends with .{}", format.extensions.join(", ."));
+        return Err(Error::argument(path.display().to_string(), reason));
+    }
+    let is_one_each = !matches!(format.open, Open::Clouds(_));
+    let name = format!("{}, a folder", format.title);
+    let options = options.clone();
+    let open = Box::new(move |path: &Path| {
+        check_regular(path)?;
+        open_file(path, &format, &options)
+    });
+    Ok(Box::new(Files::new(name, paths, is_one_each, open)))
+}
+
+fn open_file(path: &Path, format: &InputFormat, options: &ReadOptions) -> Result<Box<dyn CloudSource>> {
+    if !matches!(format.open, Open::Stream(_)) {
+        check_regular(path)?;
+    }
+    match format.open {
+        Open::Cloud(open) | Open::Stream(open) => {
+            Ok(Box::new(OneCloud::new(format.title, open(path, head_of(path), options)?)))
+        }
+        Open::Clouds(open) => open(path, options),
+        _ => Err(Error::argument(path.display().to_string(), format!("{} has no such files", format.title))),
+    }
+}

@@ -1,0 +1,42 @@
+use crate::clouds::CloudSource;
+use crate::clouds::poses::most_gap_ns;
+use crate::clouds::ros::{BagOptions, PoseSource, open_bag};
+use crate::read_options::ReadOptions;
+use std::path::Path;
+use voxtile::{Error, Result};
+
+/// Opens the clouds of a recording. A file of poses goes before its own.
+pub(crate) fn open(path: &Path, options: &ReadOptions) -> Result<Box<dyn CloudSource>> {
+    check(options)?;
+    let recording = &options.recording;
+    let poses = match (&options.poses, &recording.odometry_topic) {
+        (Some(_), _) => PoseSource::None,
+        (None, Some(_)) => PoseSource::Odometry,
+        (None, None) => PoseSource::Tf,
+    };
+    let bag = BagOptions {
+        topic: recording.topic.clone(),
+        odometry_topic: recording.odometry_topic.clone(),
+        fixed_frame: recording.fixed_frame.clone(),
+        poses,
+        most_gap_ns: Some(most_gap_ns(options.clouds.pose_tolerance_ns)),
+        memory_bytes: options.memory_bytes,
+        scratch: options.scratch.clone(),
+    };
+    Ok(Box::new(open_bag(&[path.to_owned()], &bag)?))
+}
+
+/// Refuses what a recording says itself, and what would be passed over.
+fn check(options: &ReadOptions) -> Result<()> {
+    if options.depth_scale.is_some() {
+        let reason = "depth images of a recording say themselves what they are in, 16UC1 millimetres and 32FC1 metres: \
+                      leave it out";
+        return Err(Error::argument("depth_scale", reason));
+    }
+    if options.intrinsics_path.is_some() || options.intrinsics.is_some() {
+        let reason =
+            "the camera of a recording is in the topic `camera_info` beside its depth images: leave it out";
+        return Err(Error::argument("intrinsics", reason));
+    }
+    Ok(())
+}

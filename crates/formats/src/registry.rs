@@ -1,0 +1,233 @@
+use crate::clouds::read::{self, pcd_scans};
+use crate::input_format::{InputFormat, Mark, Open};
+use crate::{scan_graph, scan_log, scan_stream};
+use voxtile::{Error, Result};
+
+#[cfg(feature = "las")]
+const LAS: Open = Open::Clouds(read::las::open);
+#[cfg(not(feature = "las"))]
+const LAS: Open = Open::LeftOut("las");
+#[cfg(feature = "e57")]
+const E57: Open = Open::Clouds(read::e57::open);
+#[cfg(not(feature = "e57"))]
+const E57: Open = Open::LeftOut("e57");
+#[cfg(feature = "ros")]
+const ROS: Open = Open::Recording(crate::recording_clouds::open);
+#[cfg(not(feature = "ros"))]
+const ROS: Open = Open::LeftOut("ros");
+
+/// Every format that is read: a row here and the file that opens it are all that a format needs.
+const FORMATS: [InputFormat; 17] = [
+    InputFormat {
+        name: "pcd",
+        title: "PCD",
+        extensions: &["pcd"],
+        mark: Mark::StartOrName(|start| {
+            [&b"# .PCD"[..], b"VERSION ", b"# .pcd"].iter().any(|magic| start.starts_with(magic))
+        }),
+        is_folder: pcd_scans::is_folder,
+        open: Open::Scans(pcd_scans::open),
+        ..InputFormat::UNNAMED
+    },
+    InputFormat {
+        name: "ply",
+        title: "PLY",
+        extensions: &["ply"],
+        mark: Mark::Start(|start| start.starts_with(b"ply\n") || start.starts_with(b"ply\r")),
+        open: Open::Stream(read::ply::open),
+        ..InputFormat::UNNAMED
+    },
+    InputFormat {
+        name: "xyz",
+        aliases: &["txt", "csv", "pts", "asc"],
+        title: "text of points",
+        extensions: &["xyz", "txt", "csv", "pts", "asc", "xyzi", "tsv"],
+        mark: Mark::Look(read::text::looks_like_points),
+        is_aside: true,
+        open: Open::Stream(read::text::open),
+        ..InputFormat::UNNAMED
+    },
+    InputFormat {
+        name: "bin",
+        aliases: &["kitti", "nuscenes"],
+        title: "raw floats (KITTI .bin)",
+        extensions: &["bin", "velodyne"],
+        mark: Mark::StartOrName(|_| false),
+        open: Open::Cloud(read::bin::open),
+        ..InputFormat::UNNAMED
+    },
+    // One may be called the other; the header says which it is.
+    InputFormat {
+        name: "las",
+        title: "LAS",
+        extensions: &["las", "laz"],
+        mark: Mark::Start(|start| is_las(start) && !is_laz(start)),
+        open: LAS,
+        ..InputFormat::UNNAMED
+    },
+    InputFormat {
+        name: "laz",
+        title: "LAZ",
+        extensions: &["las", "laz"],
+        mark: Mark::Start(|start| is_las(start) && is_laz(start) && !is_copc(start)),
+        open: LAS,
+        ..InputFormat::UNNAMED
+    },
+    InputFormat {
+        name: "copc",
+        title: "COPC",
+        extensions: &["las", "laz"],
+        mark: Mark::Start(|start| is_las(start) && is_copc(start)),
+        open: LAS,
+        ..InputFormat::UNNAMED
+    },
+    InputFormat {
+        name: "e57",
+        title: "E57",
+        extensions: &["e57"],
+        mark: Mark::Start(|start| start.starts_with(b"ASTM-E57")),
+        has_poses: |_| true,
+        open: E57,
+        ..InputFormat::UNNAMED
+    },
+    InputFormat {
+        name: "tum-rgbd",
+        title: "depth images (TUM RGB-D)",
+        is_folder: read::depth_tum::is_folder,
+        open: Open::Folder(read::depth_tum::open),
+        ..InputFormat::UNNAMED
+    },
+    InputFormat {
+        name: "depth",
+        aliases: &["7scenes", "png"],
+        title: "depth images",
+        extensions: &["png"],
+        is_aside: true,
+        has_poses: read::depth_images::has_poses,
+        open: Open::Folder(read::depth_images::open),
+        ..InputFormat::UNNAMED
+    },
+    InputFormat {
+        name: "bag",
+        title: "ROS 1 bag",
+        // A recorder that is killed leaves `.bag.active`.
+        extensions: &["bag", "active"],
+        mark: Mark::Start(|start| start.starts_with(b"#ROSBAG V2.0")),
+        has_poses: |_| true,
+        open: ROS,
+        ..InputFormat::UNNAMED
+    },
+    InputFormat {
+        name: "mcap",
+        title: "MCAP",
+        extensions: &["mcap"],
+        mark: Mark::Start(|start| start.starts_with(b"\x89MCAP0\r\n")),
+        has_poses: |_| true,
+        open: ROS,
+        ..InputFormat::UNNAMED
+    },
+    InputFormat {
+        name: "db3",
+        title: "ROS 2 bag (SQLite)",
+        extensions: &["db3"],
+        mark: Mark::Start(|start| start.starts_with(b"SQLite format 3\0")),
+        has_poses: |_| true,
+        open: ROS,
+        ..InputFormat::UNNAMED
+    },
+    InputFormat {
+        name: "rosbag2",
+        title: "ROS 2 bag",
+        is_folder: read::listing::is_rosbag2,
+        has_poses: |_| true,
+        open: ROS,
+        ..InputFormat::UNNAMED
+    },
+    InputFormat {
+        name: "graph",
+        title: "OctoMap scan graph",
+        extensions: &["graph"],
+        mark: Mark::Name,
+        has_poses: |_| true,
+        open: Open::Scans(scan_graph::open),
+        ..InputFormat::UNNAMED
+    },
+    InputFormat {
+        name: "log",
+        title: "OctoMap scan log",
+        extensions: &["log"],
+        mark: Mark::Name,
+        has_poses: |_| true,
+        open: Open::Scans(scan_log::open),
+        ..InputFormat::UNNAMED
+    },
+    InputFormat {
+        name: "scans",
+        title: "scan stream",
+        extensions: &["scans"],
+        mark: Mark::Name,
+        has_poses: |_| true,
+        open: Open::Scans(scan_stream::open),
+        ..InputFormat::UNNAMED
+    },
+];
+
+fn is_las(start: &[u8]) -> bool {
+    start.starts_with(b"LASF")
+}
+
+/// Whether the points of a LAS file are compressed: a format number above 127.
+fn is_laz(start: &[u8]) -> bool {
+    is_copc(start) || start.get(104).is_some_and(|format| format & 0x80 != 0)
+}
+
+/// Whether the first record of a LAS file is COPC's own.
+fn is_copc(start: &[u8]) -> bool {
+    start.get(377..382) == Some(b"copc\0")
+}
+
+/// The formats that are read.
+#[derive(Clone, Debug)]
+pub struct Registry {
+    formats: Vec<InputFormat>,
+}
+
+impl Default for Registry {
+    /// Every format of this crate.
+    fn default() -> Self {
+        Self { formats: FORMATS.to_vec() }
+    }
+}
+
+impl Registry {
+    /// These formats and one more, which others of the same name hide.
+    pub fn with(mut self, format: InputFormat) -> Self {
+        self.formats.push(format);
+        self
+    }
+
+    /// The formats, also those that this build leaves out.
+    pub fn formats(&self) -> &[InputFormat] {
+        &self.formats
+    }
+
+    /// The format of a name or another name of it, in letters of either case.
+    ///
+    /// # Errors
+    ///
+    /// There is none.
+    pub fn named(&self, name: &str) -> Result<&InputFormat> {
+        let lower = name.to_lowercase();
+        let is_it = |format: &&InputFormat| format.name == lower || format.aliases.contains(&&*lower);
+        let unknown = || {
+            let reason = format!("is not known; known are {}", self.names(", "));
+            Error::argument(format!("format `{name}`"), reason)
+        };
+        self.formats.iter().find(is_it).ok_or_else(unknown)
+    }
+
+    /// The names of all formats.
+    pub fn names(&self, separator: &str) -> String {
+        self.formats.iter().map(|format| format.name).collect::<Vec<_>>().join(separator)
+    }
+}
