@@ -3,6 +3,7 @@ use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 use testkit::random_scans::Random;
 use testkit::support::{fixtures, message_of, shared_data};
+use voxtile::scan::Pose;
 use voxtile_formats::{PointRoom, ReadOptions, SensorScan, open_scans, read_pcd};
 
 const HEADER: &str =
@@ -270,24 +271,50 @@ fn plain_poses_of_pcd_files_have_any_stamps_and_lengths() {
     }
 }
 
-/// By which maps of earlier versions know their inputs: files, and poses where they are not in these.
+/// How maps of earlier versions know an input: by its files, and by the poses that are not in them.
+fn fingerprint_of(files: &[PathBuf], poses: &[Pose]) -> String {
+    let (mut hasher, mut bytes) = (blake3::Hasher::new(), 0);
+    for path in files {
+        let content = fs::read(path).unwrap();
+        hasher.update(&content);
+        hasher.update(path.file_name().unwrap().as_encoded_bytes());
+        hasher.update(&[0]);
+        hasher.update(&(content.len() as u64).to_le_bytes());
+        bytes += content.len();
+    }
+    for number in poses.iter().flat_map(|pose| pose.isometry().to_homogeneous().as_slice().to_vec()) {
+        hasher.update(&number.to_bits().to_le_bytes());
+    }
+    format!("{} files, {bytes} bytes, blake3 {}", files.len(), &hasher.finalize().to_hex()[..32])
+}
+
 #[test]
 fn fingerprints_of_pcd_files_are_those_of_earlier_versions() {
     let folder = TempDir::new().unwrap();
     let scans = folder.path().join("scans");
     fs::create_dir(&scans).unwrap();
-    for number in 0..2 {
-        fs::write(scans.join(format!("{number}.pcd")), pcd("ascii", &points(2))).unwrap();
-    }
+    let files = ["2", "10"].map(|number| scans.join(format!("{number}.pcd")));
+    files.iter().for_each(|path| fs::write(path, pcd("ascii", &points(2))).unwrap());
     let poses = folder.path().join("poses.txt");
     let fingerprint = |options: &ReadOptions| open_scans(&scans, options).unwrap().fingerprint().unwrap();
-    let viewpoint = fingerprint(&ReadOptions::default());
-    let identity = fingerprint(&with_poses(Path::new("identity")));
-    fs::write(&poses, "0 1 2 3 0 0 0.6 0.8\n1 4 5 6 0 0 -0.6 0.8\n").unwrap();
-    let tum = fingerprint(&with_poses(&poses));
-    fs::write(&poses, "0.28 -0.96 0 1 0.96 0.28 0 2 0 0 1 3\n1 0 0 4 0 1 0 5 0 0 1 6\n").unwrap();
-    let kitti = fingerprint(&with_poses(&poses));
-    assert_eq!([viewpoint, identity, tum, kitti], FINGERPRINTS);
+    assert_eq!(
+        fingerprint(&ReadOptions::default()),
+        fingerprint_of(&files, &[]),
+        "the VIEWPOINT is in the files"
+    );
+    let identity = fingerprint_of(&files, &[Pose::identity(); 2]);
+    assert_eq!(fingerprint(&with_poses(Path::new("identity"))), identity);
+    fs::write(&poses, "0 1 2 3 0 0 0.3 0.4\n1 4 5 6 0.1 0 -0.6 0.8\n").unwrap();
+    let tum = [([1.0, 2.0, 3.0], [0.0, 0.0, 0.3, 0.4]), ([4.0, 5.0, 6.0], [0.1, 0.0, -0.6, 0.8])]
+        .map(|(position_m, xyzw)| Pose::from_quaternion(position_m, xyzw).unwrap());
+    assert_eq!(fingerprint(&with_poses(&poses)), fingerprint_of(&files, &tum));
+    fs::write(&poses, "0.28 -0.96 0 1 0.96 0.28 0 2 0 0 1.0003 3\n1 0 0 4 0 1 0 5 0 0 1 6\n").unwrap();
+    let kitti = [
+        [[0.28, -0.96, 0.0, 1.0], [0.96, 0.28, 0.0, 2.0], [0.0, 0.0, 1.0003, 3.0]],
+        [[1.0, 0.0, 0.0, 4.0], [0.0, 1.0, 0.0, 5.0], [0.0, 0.0, 1.0, 6.0]],
+    ]
+    .map(|rows| Pose::from_matrix(&rows).unwrap());
+    assert_eq!(fingerprint(&with_poses(&poses)), fingerprint_of(&files, &kitti));
 }
 
 #[test]

@@ -14,7 +14,7 @@ use voxtile::operations::{Remap, Remapped, map_anew, remap};
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::space::Grid;
 use voxtile::{Error, InsertMode, MapConfig, MemoryLimit, RayConfig};
-use voxtile_formats::clouds::Budget;
+use voxtile_formats::Budget;
 use voxtile_pipeline::memory;
 use voxtile_pipeline::numbers::{Mount, tolerance_ns};
 use voxtile_pipeline::{PoseFile, poses_for};

@@ -1,8 +1,8 @@
-use crate::clouds::read::foreign;
-use crate::clouds::read::glance::first_bytes;
-use crate::clouds::read::listing::{Listing, extension_of};
-use crate::clouds::read::pcd_scans;
 use crate::input_format::{InputFormat, Mark, Open};
+use crate::read::foreign;
+use crate::read::glance::first_bytes;
+use crate::read::listing::{Listing, extension_of};
+use crate::read::pcd_scans;
 use crate::read_options::ReadOptions;
 use crate::registry::Registry;
 use std::collections::BTreeMap;

@@ -1,7 +1,7 @@
-use crate::clouds::read::Points;
-use crate::clouds::{CloudHead, CloudSource};
+use crate::read::Points;
 use crate::read_options::ReadOptions;
-use crate::source::ScanSource;
+use crate::scans::ScanSource;
+use crate::{CloudHead, CloudSource};
 use std::path::Path;
 use voxtile::Result;
 

@@ -1,17 +1,17 @@
-use crate::clouds::CloudSource;
-use crate::clouds::poses::Rules;
-use crate::clouds::read::files::Files;
-use crate::clouds::read::from_origin::FromOrigin;
-use crate::clouds::read::listing::Listing;
-use crate::clouds::read::one::{OneCloud, head_of};
-use crate::clouds::read::regular::check_regular;
-use crate::find_poses::find_poses;
+use crate::CloudSource;
 use crate::input_format::{InputFormat, Open};
-use crate::pose_source::PoseSource;
-use crate::posed_clouds::PosedClouds;
+use crate::poses::PoseSource;
+use crate::poses::PosedClouds;
+use crate::poses::Rules;
+use crate::poses::find_poses;
+use crate::read::files::Files;
+use crate::read::from_origin::FromOrigin;
+use crate::read::listing::Listing;
+use crate::read::one::{OneCloud, head_of};
+use crate::read::regular::check_regular;
 use crate::read_options::ReadOptions;
 use crate::registry::Registry;
-use crate::source::ScanSource;
+use crate::scans::ScanSource;
 use std::path::Path;
 use voxtile::{Error, Result};
 

@@ -1,7 +1,7 @@
-use super::posed_clouds::CloudOptions;
-use super::selected_scans::Selection;
-use crate::clouds::Budget;
-use crate::clouds::read::Intrinsics;
+use crate::Budget;
+use crate::poses::CloudOptions;
+use crate::read::Intrinsics;
+use crate::scans::Selection;
 use std::path::PathBuf;
 
 /// How an input is read where its files do not say it; see [`open_scans`](super::open_scans).

@@ -1,6 +1,5 @@
-use crate::clouds::read::{self, pcd_scans};
 use crate::input_format::{InputFormat, Mark, Open};
-use crate::{scan_graph, scan_log, scan_stream};
+use crate::read::{self, pcd_scans};
 use voxtile::{Error, Result};
 
 #[cfg(feature = "las")]
@@ -12,7 +11,7 @@ const E57: Open = Open::Clouds(read::e57::open);
 #[cfg(not(feature = "e57"))]
 const E57: Open = Open::LeftOut("e57");
 #[cfg(feature = "ros")]
-const ROS: Open = Open::Recording(crate::recording_clouds::open);
+const ROS: Open = Open::Recording(crate::ros::recording_clouds::open);
 #[cfg(not(feature = "ros"))]
 const ROS: Open = Open::LeftOut("ros");
 
@@ -149,7 +148,7 @@ const FORMATS: [InputFormat; 17] = [
         extensions: &["graph"],
         mark: Mark::Name,
         has_poses: |_| true,
-        open: Open::Scans(scan_graph::open),
+        open: Open::Scans(read::scan_graph::open),
         ..InputFormat::UNNAMED
     },
     InputFormat {
@@ -158,7 +157,7 @@ const FORMATS: [InputFormat; 17] = [
         extensions: &["log"],
         mark: Mark::Name,
         has_poses: |_| true,
-        open: Open::Scans(scan_log::open),
+        open: Open::Scans(read::scan_log::open),
         ..InputFormat::UNNAMED
     },
     InputFormat {
@@ -167,7 +166,7 @@ const FORMATS: [InputFormat; 17] = [
         extensions: &["scans"],
         mark: Mark::Name,
         has_poses: |_| true,
-        open: Open::Scans(scan_stream::open),
+        open: Open::Scans(read::scan_stream::open),
         ..InputFormat::UNNAMED
     },
 ];

@@ -4,8 +4,8 @@ use voxtile::operations::NewPoses;
 use voxtile::scan::Pose;
 use voxtile::{Error, Result};
 use voxtile_formats::ReadOptions;
-use voxtile_formats::clouds::poses::{Found, Trajectory};
-use voxtile_formats::clouds::{Budget, RigidPose};
+use voxtile_formats::poses::{Found, Trajectory};
+use voxtile_formats::{Budget, RigidPose};
 
 /// Most scans that an error names.
 const MAX_NAMED: usize = 5;

@@ -4,7 +4,7 @@ use voxtile::scan::Pose;
 use voxtile::space::{Aabb, Point};
 use voxtile::{Error, Result};
 use voxtile_formats::ReadOptions;
-use voxtile_formats::clouds::RigidPose;
+use voxtile_formats::RigidPose;
 
 /// Most seconds that a tolerance or a period may have.
 const MAX_S: f64 = 1e9;

@@ -1,5 +1,5 @@
 use std::time::Instant;
-use voxtile_formats::clouds::RigidPose;
+use voxtile_formats::RigidPose;
 
 /// A `sensor_msgs/PointCloud2` that waits for its pose, its points still in CDR.
 #[derive(Clone, Debug)]

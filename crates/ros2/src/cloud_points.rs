@@ -1,6 +1,6 @@
 use voxtile::{Pose, ScanRef};
-use voxtile_formats::clouds::RigidPose;
-use voxtile_formats::clouds::ros::messages::PointCloud2;
+use voxtile_formats::RigidPose;
+use voxtile_formats::ros::messages::PointCloud2;
 
 /// The points of a cloud, as they are mapped.
 #[derive(Debug)]
@@ -52,7 +52,7 @@ impl CloudPoints {
 mod tests {
     use super::*;
     use crate::messages::{self, Header};
-    use voxtile_formats::clouds::ros::Wire;
+    use voxtile_formats::ros::Wire;
 
     #[test]
     fn points_take_no_more_than_was_said() {

@@ -2,7 +2,7 @@ use crate::cloud::Cloud;
 use crate::counters::Counters;
 use crate::when_behind::WhenBehind;
 use std::collections::VecDeque;
-use voxtile_formats::clouds::RigidPose;
+use voxtile_formats::RigidPose;
 
 /// Clouds that wait, oldest first, in a bounded number of bytes. Decoded points count from the beginning, and those of
 /// the cloud that was taken until the next one is: so all of them have room, whenever they are mapped.

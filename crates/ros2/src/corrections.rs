@@ -1,7 +1,7 @@
 use voxtile::Pose;
 use voxtile::mapper::KeptScanHead;
-use voxtile_formats::clouds::RigidPose;
-use voxtile_formats::clouds::ros::messages::StampedPose;
+use voxtile_formats::RigidPose;
+use voxtile_formats::ros::messages::StampedPose;
 
 /// What a corrected path means for the scans of a map: new poses of those that it names, by their stamps, and of those
 /// between them.
@@ -100,7 +100,7 @@ fn nearest<T>(sorted: &[T], stamp_ns: i64, stamp_of: impl Fn(&T) -> i64) -> Opti
 #[cfg(test)]
 mod tests {
     use super::*;
-    use voxtile_formats::clouds::ros::messages::Header;
+    use voxtile_formats::ros::messages::Header;
 
     fn record(number: u64, stamp_ns: Option<i64>, x: f64) -> KeptScanHead {
         let pose = Pose::from_quaternion([x, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]).unwrap();

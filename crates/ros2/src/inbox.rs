@@ -7,9 +7,9 @@ use crate::transform_buffer::TransformBuffer;
 use crate::transport::Message;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
-use voxtile_formats::clouds::RigidPose;
-use voxtile_formats::clouds::ros::messages::{Header, MessageKind, PointCloud2, StampedPose, decode_poses};
-use voxtile_formats::clouds::ros::{Wire, WireError};
+use voxtile_formats::RigidPose;
+use voxtile_formats::ros::messages::{Header, MessageKind, PointCloud2, StampedPose, decode_poses};
+use voxtile_formats::ros::{Wire, WireError};
 
 /// What readers have for the mapping thread.
 #[derive(Debug)]

@@ -19,9 +19,9 @@ use voxtile::operations::{self, Part, RemapBeside};
 use voxtile::{
     Aabb, Error, MapConfig, MapReader, MapView, Mapper, MemoryLimit, OutOfCoreTileMapper, Point, Stop,
 };
-use voxtile_formats::clouds::RigidPose;
-use voxtile_formats::clouds::ros::Wire;
-use voxtile_formats::clouds::ros::messages::{PointCloud2, StampedPose};
+use voxtile_formats::RigidPose;
+use voxtile_formats::ros::Wire;
+use voxtile_formats::ros::messages::{PointCloud2, StampedPose};
 
 /// The thread that maps: clouds from the inbox into the map, flushed by a timer.
 pub struct Mapping {

@@ -8,7 +8,7 @@ use anyhow::Context as _;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
-use voxtile_formats::clouds::ros::messages::MessageKind;
+use voxtile_formats::ros::messages::MessageKind;
 
 /// What keeps the node in the graph.
 pub struct RunningNode {

@@ -1,6 +1,6 @@
 use crate::transport::Gid;
 use std::collections::{HashMap, HashSet};
-use voxtile_formats::clouds::ros::{SecondParent, Transforms};
+use voxtile_formats::ros::{SecondParent, Transforms};
 
 /// Warns of frames that get a second parent, or a parent that makes a loop: once for each pair of frames.
 #[derive(Debug, Default)]
@@ -59,7 +59,7 @@ impl ParentWarnings {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use voxtile_formats::clouds::RigidPose;
+    use voxtile_formats::RigidPose;
 
     #[test]
     fn both_publishers_are_named() {

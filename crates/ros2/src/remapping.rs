@@ -8,7 +8,7 @@ use std::thread::JoinHandle;
 use voxtile::mapper::KeptSummary;
 use voxtile::operations::{NewPoses, Remap, RemapBeside, Rework};
 use voxtile::{MemoryLimit, Point, Stop};
-use voxtile_formats::clouds::ros::messages::StampedPose;
+use voxtile_formats::ros::messages::StampedPose;
 
 /// A map that is mapped again beside its mapper, by a corrected path, in a thread of its own.
 ///

@@ -9,10 +9,10 @@ use crate::stamp_check::{StampCheck, StampVerdict};
 use crate::transport::Gid;
 use std::collections::{HashMap, HashSet};
 use std::time::{Duration, Instant};
-use voxtile_formats::clouds::RigidPose;
-use voxtile_formats::clouds::poses::most_gap_ns;
-use voxtile_formats::clouds::ros::messages::StampedPose;
-use voxtile_formats::clouds::ros::{BadTransform, Transforms, WhyNot};
+use voxtile_formats::RigidPose;
+use voxtile_formats::poses::most_gap_ns;
+use voxtile_formats::ros::messages::StampedPose;
+use voxtile_formats::ros::{BadTransform, Transforms, WhyNot};
 
 /// The last seconds of tf, and how long clouds wait for more of it.
 #[derive(Debug)]
@@ -248,7 +248,7 @@ mod tests {
     use super::*;
     use crate::when_behind::WhenBehind;
     use clap::Parser;
-    use voxtile_formats::clouds::ros::messages::Header;
+    use voxtile_formats::ros::messages::Header;
 
     fn buffer() -> TransformBuffer {
         TransformBuffer::new(&Args::parse_from(["voxtile-ros2", "-o", "map"]))

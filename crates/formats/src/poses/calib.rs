@@ -1,6 +1,6 @@
+use super::RigidPose;
 use super::matrix::matrix_of;
-use crate::clouds::lines::Lines;
-use crate::clouds::pose::RigidPose;
+use crate::read::lines::Lines;
 use std::path::Path;
 use voxtile::{FormatError, Result};
 

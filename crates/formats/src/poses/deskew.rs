@@ -1,5 +1,5 @@
-use crate::clouds::cloud::CloudPoint;
-use crate::clouds::pose::RigidPose;
+use super::RigidPose;
+use crate::read::cloud::CloudPoint;
 use std::collections::HashMap;
 
 /// Takes points to where they were in the sensor's frame at the time of their cloud. Poses are looked up as points need

@@ -1,6 +1,6 @@
-use crate::clouds::poses::{Rules, Trajectory, looks_like_poses};
-use crate::pose_source::PoseSource;
-use crate::posed_clouds::CloudPoses;
+use super::pose_source::PoseSource;
+use super::posed_clouds::CloudPoses;
+use super::{Rules, Trajectory, looks_like_poses};
 use crate::read_options::ReadOptions;
 use std::fs::{self, File};
 use std::io::Read;

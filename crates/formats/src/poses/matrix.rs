@@ -1,4 +1,4 @@
-use crate::clouds::pose::RigidPose;
+use super::RigidPose;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 
 /// How far a matrix may be from a rotation: files round to a few digits.

@@ -1,18 +1,30 @@
-//! Files of poses: [`Trajectory`] reads them and tells the pose at a time.
+//! Poses of clouds, which make scans of them. [`Trajectory`] reads files of poses and tells the pose at a time,
+//! `find_poses.rs` finds the poses of an input, `posed_clouds.rs` gives them to its clouds.
 
 mod binary;
 mod calib;
+mod deskew;
+mod find_poses;
 mod gap;
 mod header;
 mod matrix;
 mod npy;
 mod pose_input;
 mod pose_rows;
+mod pose_source;
+mod posed_clouds;
+mod rigid_pose;
 mod text;
 mod time_unit;
 mod trajectory;
 
+pub use deskew::Deskew;
+pub(crate) use find_poses::{find_poses, pose_file_for};
 pub use gap::most_gap_ns;
 pub(crate) use matrix::matrix_of;
+pub use pose_source::PoseSource;
+pub use posed_clouds::CloudOptions;
+pub(crate) use posed_clouds::{CloudPoses, PosedClouds};
+pub use rigid_pose::RigidPose;
 pub(crate) use text::{Rules, looks_like_poses};
 pub use trajectory::{Found, Trajectory};

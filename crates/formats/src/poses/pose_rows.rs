@@ -1,6 +1,6 @@
+use super::RigidPose;
 use super::trajectory::Trajectory;
-use crate::clouds::pose::RigidPose;
-use crate::clouds::spill::{Budget, PoseList, PoseWriter, Record, Sorter, TimedPose};
+use crate::spill::{Budget, PoseList, PoseWriter, Record, Sorter, TimedPose};
 use std::cmp::Ordering;
 use std::path::Path;
 use voxtile::Result;

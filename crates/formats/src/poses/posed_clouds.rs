@@ -1,9 +1,9 @@
-use super::fingerprint::Fingerprint;
-use super::point_store::PointStore;
 use super::pose_source::PoseSource;
-use super::source::{ScanHead, ScanSource};
-use crate::clouds::poses::{Found, Trajectory};
-use crate::clouds::{CloudHead, CloudPoint, CloudSource, Deskew, PoseAt, RigidPose};
+use super::{Found, Trajectory};
+use crate::scans::Fingerprint;
+use crate::scans::PointStore;
+use crate::scans::{ScanHead, ScanSource};
+use crate::{CloudHead, CloudPoint, CloudSource, Deskew, PoseAt, RigidPose};
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 use voxtile::scan::{Pose, no_return};
@@ -53,7 +53,7 @@ impl Default for CloudOptions {
 }
 
 /// From where poses come.
-pub(super) enum CloudPoses {
+pub(crate) enum CloudPoses {
     /// A file, by time stamp or else by number.
     File(Box<Trajectory>),
     /// The source has them; what people call them.
@@ -65,7 +65,7 @@ pub(super) enum CloudPoses {
 }
 
 /// Clouds of other programs as scans. Clouds without a pose are passed over and counted.
-pub(super) struct PosedClouds {
+pub(crate) struct PosedClouds {
     source: Box<dyn CloudSource>,
     path: PathBuf,
     /// By which maps of earlier versions know the input.
@@ -93,7 +93,7 @@ pub(super) struct PosedClouds {
 const MAX_NAMED: usize = 3;
 
 impl PosedClouds {
-    pub(super) fn new(
+    pub(crate) fn new(
         source: Box<dyn CloudSource>,
         path: &Path,
         poses: CloudPoses,
@@ -129,7 +129,7 @@ impl PosedClouds {
     }
 
     /// Sets the files by which maps of earlier versions know the input.
-    pub(super) fn set_files(&mut self, files: Vec<PathBuf>) {
+    pub(crate) fn set_files(&mut self, files: Vec<PathBuf>) {
         self.files = files;
     }
 

@@ -1,11 +1,11 @@
+use super::RigidPose;
 use super::binary::check_text;
 use super::header::Roles;
 use super::matrix::matrix_of;
 use super::pose_input::PoseInput;
 use super::pose_rows::{PoseRows, Row};
 use super::time_unit::{SECONDS, digits_of, stamp_of};
-use crate::clouds::lines::Lines;
-use crate::clouds::pose::RigidPose;
+use crate::read::lines::Lines;
 use std::path::Path;
 
 /// What the numbers of a line are, decided by the first line of numbers.

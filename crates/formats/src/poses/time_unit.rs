@@ -1,4 +1,4 @@
-use crate::clouds::stamp;
+use crate::read::stamp;
 
 /// Digits between a second and a nanosecond.
 pub(super) const SECONDS: i32 = 9;

@@ -1,11 +1,11 @@
+use super::RigidPose;
 use super::gap::most_gap_ns;
 use super::pose_input::PoseInput;
 use super::pose_rows::{PoseRows, Stamps};
 use super::text::Rules;
 use super::{npy, text};
-use crate::clouds::cloud::CloudSource;
-use crate::clouds::pose::RigidPose;
-use crate::clouds::spill::{Budget, PoseList};
+use crate::read::cloud::CloudSource;
+use crate::spill::{Budget, PoseList};
 use std::path::{Path, PathBuf};
 use voxtile::{Error, Result};
 

@@ -1,7 +1,7 @@
+use super::cloud::CloudHead;
 use super::columns::{Clock, Meaning};
 use super::one::{Points, Visit};
 use super::scalar::Scalar;
-use crate::clouds::cloud::CloudHead;
 use crate::read_options::ReadOptions;
 use std::fs::File;
 use std::io::{BufReader, Read};

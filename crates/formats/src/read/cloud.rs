@@ -1,4 +1,4 @@
-use crate::clouds::pose::RigidPose;
+use crate::poses::RigidPose;
 use voxtile::Result;
 
 /// What is known of a cloud before its points are read.

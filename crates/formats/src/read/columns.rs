@@ -1,6 +1,6 @@
 //! What the columns of a table of points mean, by their names.
 
-use crate::clouds::cloud::CloudPoint;
+use super::cloud::CloudPoint;
 
 /// A column with times.
 #[derive(Clone, Copy, Debug, PartialEq)]

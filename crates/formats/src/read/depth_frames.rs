@@ -1,7 +1,7 @@
+use super::cloud::{CloudHead, CloudPoint, CloudSource};
 use super::intrinsics::Intrinsics;
 use super::one::Visit;
 use super::regular::check_regular;
-use crate::clouds::cloud::{CloudHead, CloudPoint, CloudSource};
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};

@@ -1,11 +1,11 @@
+use super::cloud::CloudSource;
 use super::depth_frames::{DepthCode, DepthFrames, Frame, Frames};
 use super::intrinsics::Intrinsics;
 use super::listing::{Listing, extension_of, is_named_depth};
 use super::one::head_of;
 use super::regular::check_regular;
-use crate::clouds::cloud::CloudSource;
-use crate::clouds::pose::RigidPose;
-use crate::clouds::poses::matrix_of;
+use crate::poses::RigidPose;
+use crate::poses::matrix_of;
 use crate::read_options::ReadOptions;
 use std::fs::{self, DirEntry};
 use std::path::{Path, PathBuf};

@@ -1,12 +1,12 @@
+use super::cloud::CloudSource;
 use super::depth_frames::{DepthCode, DepthFrames, Frame, Frames};
+use super::inside::is_inside;
 use super::intrinsics::Intrinsics;
+use super::lines::Lines;
 use super::listing::is_rosbag2;
 use super::one::head_of;
 use super::regular::check_regular;
-use crate::clouds::cloud::CloudSource;
-use crate::clouds::inside::is_inside;
-use crate::clouds::lines::Lines;
-use crate::clouds::stamp;
+use super::stamp;
 use crate::read_options::ReadOptions;
 use std::path::{Path, PathBuf};
 use voxtile::Result;

@@ -1,13 +1,13 @@
+use super::cloud::{CloudHead, CloudPoint, CloudSource};
 use super::e57_packets::check_packets;
 use super::e57_pages::{PAGE_BYTES, Pages};
+use super::guard::guarded;
 use super::one::{Visit, head_of};
 use super::wkt::WktUnits;
 use super::xml_check::XmlCheck;
-use crate::clouds::cloud::{CloudHead, CloudPoint, CloudSource};
-use crate::clouds::guard::guarded;
-use crate::clouds::pose::RigidPose;
-use crate::clouds::spill::Budget;
+use crate::poses::RigidPose;
 use crate::read_options::ReadOptions;
+use crate::spill::Budget;
 use e57::{CartesianCoordinate, E57Reader, PointCloud, RecordDataType, RecordName, SphericalCoordinate};
 use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};

@@ -1,5 +1,5 @@
 use super::e57_pages::Pages;
-use crate::clouds::spill::Budget;
+use crate::spill::Budget;
 use e57::{PointCloud, RecordDataType};
 use std::fs::File;
 use std::io::{self, Read};

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 /// Sorts files in natural order: `full2` before `full10`, and `9.5` before `10.25`.
 ///
 /// Names of equal length are compared letter by letter: their numbers are padded, perhaps hexadecimal.
-pub(super) fn sort_naturally(files: &mut [PathBuf]) {
+pub(crate) fn sort_naturally(files: &mut [PathBuf]) {
     let length = |path: &PathBuf| path.file_name().unwrap_or_default().len();
     let is_padded = files.windows(2).all(|pair| length(&pair[0]) == length(&pair[1]));
     let are_decimals = !is_padded && files.iter().all(|path| decimal(path).is_some());
@@ -21,7 +21,7 @@ pub(super) fn sort_naturally(files: &mut [PathBuf]) {
 }
 
 /// The last part of a path, for messages.
-pub(super) fn name_of(path: &Path) -> String {
+pub(crate) fn name_of(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 

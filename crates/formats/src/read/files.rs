@@ -1,5 +1,5 @@
+use super::cloud::{CloudHead, CloudSource};
 use super::one::Visit;
-use crate::clouds::cloud::{CloudHead, CloudSource};
 use std::path::{Path, PathBuf};
 use voxtile::{Error, Result};
 

@@ -1,6 +1,6 @@
+use super::cloud::{CloudHead, CloudSource};
 use super::one::Visit;
-use crate::clouds::cloud::{CloudHead, CloudSource};
-use crate::clouds::pose::RigidPose;
+use crate::poses::RigidPose;
 use voxtile::{Error, Result};
 
 /// Clouds that are registered already, seen from where the sensor was.

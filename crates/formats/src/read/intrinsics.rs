@@ -1,5 +1,5 @@
+use super::lines::Lines;
 use super::regular::check_regular;
-use crate::clouds::lines::Lines;
 use std::path::{Path, PathBuf};
 use voxtile::{Error, FormatError, Result};
 

@@ -1,9 +1,9 @@
+use super::cloud::{CloudHead, CloudPoint, CloudSource};
 use super::las_layout::Layout;
 use super::las_points::LasPoints;
 use super::las_scans::{LasScans, withheld};
 use super::las_units::Units;
 use super::one::{Visit, head_of};
-use crate::clouds::cloud::{CloudHead, CloudPoint, CloudSource};
 use crate::read_options::ReadOptions;
 use std::fs::File;
 use std::path::Path;

@@ -1,7 +1,7 @@
+use super::guard::guarded;
 use super::las_layout::Layout;
 use super::las_trimmed::{Start, Trimmed};
 use super::las_units::Units;
-use crate::clouds::guard::guarded;
 use las::{PointData, PointDataBuilder, Reader};
 use std::fs::File;
 use std::io::BufReader;

@@ -1,5 +1,5 @@
 use super::las_points::LasPoint;
-use crate::clouds::spill::Record;
+use crate::spill::Record;
 use std::cmp::Ordering;
 
 impl Record for LasPoint {
@@ -31,7 +31,7 @@ impl Record for LasPoint {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::clouds::spill::{Budget, Sorter};
+    use crate::spill::{Budget, Sorter};
 
     #[test]
     fn many_runs_and_one_give_the_same_stable_order() {

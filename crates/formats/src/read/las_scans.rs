@@ -1,10 +1,10 @@
+use super::cloud::{CloudHead, CloudPoint, CloudSource};
 use super::las_layout::Layout;
 use super::las_points::{LasPoint, LasPoints};
 use super::las_units::Units;
 use super::one::Visit;
-use crate::clouds::cloud::{CloudHead, CloudPoint, CloudSource};
-use crate::clouds::spill::{Sorted, Sorter};
 use crate::read_options::ReadOptions;
+use crate::spill::{Sorted, Sorter};
 use std::path::{Path, PathBuf};
 use voxtile::{Error, FormatError, Result};
 

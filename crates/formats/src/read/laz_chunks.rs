@@ -1,9 +1,9 @@
 //! What a LAZ file says of its chunks, checked before the crate `laz` decodes it: that reserves memory by what the file
 //! claims, and a claim of gigabytes ends the program.
 
+use super::guard::guarded;
 use super::las_layout::{Layout, number};
-use crate::clouds::guard::guarded;
-use crate::clouds::spill::Budget;
+use crate::spill::Budget;
 use laz::LazVlr;
 use laz::laszip::{ChunkTable, ChunkTableEntry};
 use std::fs::File;

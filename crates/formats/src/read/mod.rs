@@ -1,9 +1,10 @@
 //! Point clouds in files, one format a file.
 //!
-//! Each format is a [`crate::clouds::CloudSource`]: files with one cloud (PLY, text, `.bin`), with several (LAS cut by
+//! Each format is a [`CloudSource`]: files with one cloud (PLY, text, `.bin`), with several (LAS cut by
 //! GPS time, E57), and folders of either.
 
 pub(crate) mod bin;
+pub(crate) mod cloud;
 mod columns;
 mod depth_frames;
 pub(crate) mod depth_images;
@@ -14,10 +15,14 @@ pub(crate) mod e57;
 mod e57_packets;
 #[cfg(feature = "e57")]
 mod e57_pages;
+mod file_order;
 pub(crate) mod files;
 pub(crate) mod foreign;
 pub(crate) mod from_origin;
 pub(crate) mod glance;
+#[cfg(any(feature = "las", feature = "e57"))]
+mod guard;
+pub(crate) mod inside;
 mod intrinsics;
 #[cfg(feature = "las")]
 pub(crate) mod las;
@@ -35,6 +40,7 @@ mod las_trimmed;
 mod las_units;
 #[cfg(feature = "las")]
 mod laz_chunks;
+pub(crate) mod lines;
 pub(crate) mod listing;
 mod lzf;
 pub(crate) mod one;
@@ -43,8 +49,14 @@ mod pcd_header;
 pub(crate) mod pcd_scans;
 pub(crate) mod ply;
 mod ply_header;
+mod points;
 pub(crate) mod regular;
 mod scalar;
+pub(crate) mod scan_graph;
+pub(crate) mod scan_log;
+pub(crate) mod scan_stream;
+pub(crate) mod stamp;
+mod stream_input;
 pub(crate) mod text;
 mod text_line;
 #[cfg(any(feature = "las", feature = "e57"))]
@@ -52,6 +64,12 @@ mod wkt;
 #[cfg(feature = "e57")]
 mod xml_check;
 
+pub use cloud::{CloudHead, CloudPoint, CloudSource, PoseAt};
 pub use intrinsics::Intrinsics;
 pub use one::{Points, Visit};
 pub use pcd::read_pcd;
+pub use points::read_points;
+pub use scan_graph::read_scan_graph;
+pub use scan_log::read_scan_log;
+pub use scan_stream::read_scan_stream;
+pub use stamp::in_name as stamp_of_name;

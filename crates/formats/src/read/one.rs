@@ -1,5 +1,5 @@
-use crate::clouds::cloud::{CloudHead, CloudPoint, CloudSource};
-use crate::clouds::stamp;
+use super::cloud::{CloudHead, CloudPoint, CloudSource};
+use super::stamp;
 use std::path::Path;
 use voxtile::Result;
 

@@ -1,4 +1,4 @@
-use crate::clouds::RigidPose;
+use crate::RigidPose;
 use voxtile::FormatError;
 use voxtile::scan::Pose;
 

@@ -1,17 +1,17 @@
 //! Scans of PCD files. They were the first that were read: what maps of earlier versions rely on is here.
 
+use super::file_order::sort_naturally;
 use super::files::Files;
 use super::from_origin::FromOrigin;
 use super::one::{OneCloud, head_of};
 use super::pcd;
-use crate::clouds::poses::{Rules, Trajectory};
-use crate::clouds::{CloudHead, CloudSource, RigidPose, stamp_of_name};
-use crate::file_order::sort_naturally;
-use crate::find_poses::{find_poses, pose_file_for};
-use crate::pose_source::PoseSource;
-use crate::posed_clouds::{CloudPoses, PosedClouds};
+use crate::poses::PoseSource;
+use crate::poses::{CloudPoses, PosedClouds};
+use crate::poses::{Rules, Trajectory};
+use crate::poses::{find_poses, pose_file_for};
 use crate::read_options::ReadOptions;
-use crate::source::ScanSource;
+use crate::scans::ScanSource;
+use crate::{CloudHead, CloudSource, RigidPose, stamp_of_name};
 use std::fs;
 use std::path::{Path, PathBuf};
 use voxtile::scan::Pose;

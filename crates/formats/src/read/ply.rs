@@ -1,9 +1,9 @@
+use super::cloud::CloudHead;
 use super::columns::{Clock, Meaning};
+use super::lines::Lines;
 use super::one::{Points, Visit};
 use super::ply_header::{Element, Encoding, Header};
 use super::scalar::Scalar;
-use crate::clouds::cloud::CloudHead;
-use crate::clouds::lines::Lines;
 use crate::read_options::ReadOptions;
 use std::fs::File;
 use std::io::{self, BufReader, Read};

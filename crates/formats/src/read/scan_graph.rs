@@ -1,8 +1,8 @@
-use super::fingerprint::Fingerprint;
-use super::point_store::PointStore;
-use super::read_options::ReadOptions;
-use super::source::{ScanHead, ScanSource};
-use crate::clouds::read::regular::check_regular;
+use super::regular::check_regular;
+use crate::read_options::ReadOptions;
+use crate::scans::Fingerprint;
+use crate::scans::PointStore;
+use crate::scans::{ScanHead, ScanSource};
 use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};

@@ -1,7 +1,7 @@
-use super::fingerprint::Fingerprint;
-use super::point_store::PointStore;
-use super::read_options::ReadOptions;
-use super::source::{ScanHead, ScanSource};
+use crate::read_options::ReadOptions;
+use crate::scans::Fingerprint;
+use crate::scans::PointStore;
+use crate::scans::{ScanHead, ScanSource};
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion};
 use std::fs::File;
 use std::io::{BufRead, BufReader};

@@ -1,9 +1,9 @@
-use super::fingerprint::Fingerprint;
-use super::point_store::PointStore;
-use super::read_options::ReadOptions;
-use super::scan_stream_writer::{FLAG_INTENSITIES, MAGIC, MAX_LABEL_BYTES, VERSION};
-use super::source::{ScanHead, ScanSource};
 use super::stream_input::{AnyInput, FileInput, StreamInput};
+use crate::read_options::ReadOptions;
+use crate::scans::Fingerprint;
+use crate::scans::PointStore;
+use crate::scans::{FLAG_INTENSITIES, MAGIC, MAX_LABEL_BYTES, VERSION};
+use crate::scans::{ScanHead, ScanSource};
 use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 use voxtile::scan::Pose;

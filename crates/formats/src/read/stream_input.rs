@@ -4,13 +4,13 @@ use std::path::Path;
 use voxtile::{Error, Result};
 
 /// Where a scan stream comes from.
-pub(super) trait StreamInput: Read {
+pub(crate) trait StreamInput: Read {
     /// Passes over so many bytes; returns how many of them there were.
     fn pass(&mut self, bytes: u64) -> io::Result<u64>;
 }
 
 /// Anything that can be read. To pass over bytes is to read them.
-pub(super) struct AnyInput<R>(pub(super) R);
+pub(crate) struct AnyInput<R>(pub(crate) R);
 
 impl<R: Read> Read for AnyInput<R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
@@ -25,7 +25,7 @@ impl<R: Read> StreamInput for AnyInput<R> {
 }
 
 /// A file, without a buffer: points are read in large pieces, and what is passed over is not to be read.
-pub(super) struct FileInput {
+pub(crate) struct FileInput {
     file: File,
     at: u64,
     /// How long it was when that was last asked: a file may grow. 0 for a pipe by a name.
@@ -35,7 +35,7 @@ pub(super) struct FileInput {
 }
 
 impl FileInput {
-    pub(super) fn open(path: &Path) -> Result<Self> {
+    pub(crate) fn open(path: &Path) -> Result<Self> {
         match File::open(path) {
             Ok(file) => Ok(Self { file, at: 0, known_bytes: 0, has_passed: false }),
             Err(error) => Err(Error::io(path, "open", error)),

@@ -1,8 +1,8 @@
+use super::cloud::{CloudHead, CloudPoint};
 use super::glance::GLANCE_BYTES;
+use super::lines::Lines;
 use super::one::{Points, Visit};
 use super::text_line::{Columns, Line};
-use crate::clouds::cloud::{CloudHead, CloudPoint};
-use crate::clouds::lines::Lines;
 use crate::read_options::ReadOptions;
 use std::path::Path;
 use voxtile::{FormatError, Result};

@@ -1,5 +1,5 @@
+use super::cloud::CloudPoint;
 use super::columns::{Clock, Meaning};
-use crate::clouds::cloud::CloudPoint;
 
 /// What a line of a text of points is.
 #[derive(Debug, PartialEq)]

@@ -5,7 +5,7 @@ use super::chunk_order::{ChunkOrder, Step};
 use super::file_bytes::FileBytes;
 use super::recording::{Message, Recording, Topic, TopicList};
 use super::wire::Wire;
-use crate::clouds::spill::{Budget, Complaint, SpillFile, StreamSize, Window};
+use crate::spill::{Budget, Complaint, SpillFile, StreamSize, Window};
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 use std::sync::Arc;

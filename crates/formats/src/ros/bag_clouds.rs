@@ -7,8 +7,8 @@ use super::messages::{CameraInfo, Header, MAX_HEAD_BYTES, MessageKind};
 use super::open::open_recording_within;
 use super::recording::{Message, Recording, Topic};
 use super::wire::Wire;
-use crate::clouds::cloud::{CloudHead, CloudPoint, CloudSource, PoseAt};
-use crate::clouds::spill::{Bytes, FilePart};
+use crate::read::cloud::{CloudHead, CloudPoint, CloudSource, PoseAt};
+use crate::spill::{Bytes, FilePart};
 use std::path::PathBuf;
 use voxtile::{Error, FormatError, Result};
 

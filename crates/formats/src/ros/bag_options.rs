@@ -1,4 +1,4 @@
-use crate::clouds::spill::Budget;
+use crate::spill::Budget;
 use std::path::PathBuf;
 
 /// Which clouds of a recording are read, and where their poses come from.
@@ -13,7 +13,7 @@ pub struct BagOptions {
     pub fixed_frame: Option<String>,
     /// Where poses come from.
     pub poses: PoseSource,
-    /// Between two poses further apart in time there is none; see [`most_gap_ns`](crate::clouds::poses::most_gap_ns).
+    /// Between two poses further apart in time there is none; see [`most_gap_ns`](crate::poses::most_gap_ns).
     pub most_gap_ns: Option<i64>,
     /// Bytes of memory for chunks, messages and poses; beyond them they go to temporary files.
     pub memory_bytes: usize,

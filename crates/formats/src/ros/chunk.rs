@@ -1,4 +1,4 @@
-use crate::clouds::spill::{Bytes, Complaint, FilePart, Record, SpillFile, StreamSize};
+use crate::spill::{Bytes, Complaint, FilePart, Record, SpillFile, StreamSize};
 use std::cmp::Ordering;
 use std::io::Read;
 use std::sync::Arc;

@@ -1,7 +1,7 @@
 use super::chunk::{ChunkPlace, MessagePlace, OpenChunk};
 use super::chunk_order::{BrokenChunk, ChunkOrder, Step};
 use super::recording::{Message, TopicList};
-use crate::clouds::spill::{Budget, Complaint};
+use crate::spill::{Budget, Complaint};
 use std::collections::HashMap;
 use std::path::Path;
 use voxtile::{Error, FormatError, Result};

@@ -2,7 +2,7 @@ use super::chunk::{ChunkPlace, MAX_CHUNK_BYTES, MessagePlace};
 use super::chunk_file::Shares;
 use super::message_data::{MessageData, read};
 use super::recording::{Message, TopicSet};
-use crate::clouds::spill::{Budget, Bytes, Record, Sorted, Sorter};
+use crate::spill::{Budget, Bytes, Record, Sorted, Sorter};
 use std::path::{Path, PathBuf};
 use voxtile::{Error, FormatError, Result};
 
@@ -181,7 +181,7 @@ impl ChunkOrder {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::clouds::spill::FilePart;
+    use crate::spill::FilePart;
 
     #[test]
     fn messages_that_cannot_be_read_are_told_of_once() {

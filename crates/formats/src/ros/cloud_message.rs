@@ -1,7 +1,7 @@
 use super::messages::{CameraInfo, Header, Image, LaserScan, LivoxCustom, MessageKind, PointCloud2};
 use super::wire::{Wire, WireError};
-use crate::clouds::cloud::CloudPoint;
-use crate::clouds::spill::FilePart;
+use crate::read::cloud::CloudPoint;
+use crate::spill::FilePart;
 use voxtile::Result;
 
 /// A message that is a cloud.

@@ -1,7 +1,7 @@
 use super::message_data::MessageData;
 use super::recording::{Message, Recording, Topic, TopicList, TopicSet};
 use super::wire::Wire;
-use crate::clouds::spill::{Budget, Record, Sorted, Sorter, SpillFile, StreamSize};
+use crate::spill::{Budget, Record, Sorted, Sorter, SpillFile, StreamSize};
 use rusqlite::limits::Limit;
 use rusqlite::{Connection, MAIN_DB, OpenFlags};
 use std::cmp::Ordering;

@@ -1,4 +1,4 @@
-use crate::clouds::spill::FilePart;
+use crate::spill::FilePart;
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};

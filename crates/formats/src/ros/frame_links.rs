@@ -1,7 +1,7 @@
 use super::samples::{Around, Samples};
 use super::transforms::WhyNot;
-use crate::clouds::pose::RigidPose;
-use crate::clouds::spill::TimedPose;
+use crate::poses::RigidPose;
+use crate::spill::TimedPose;
 use std::cmp::Reverse;
 use std::convert::Infallible;
 

@@ -7,7 +7,7 @@ use super::mcap_record::{
     Statistics, message_head, op, record_at,
 };
 use super::recording::{Message, Recording, Topic, TopicList};
-use crate::clouds::spill::{Budget, Complaint, SpillFile, StreamSize, Window};
+use crate::spill::{Budget, Complaint, SpillFile, StreamSize, Window};
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 use std::sync::Arc;

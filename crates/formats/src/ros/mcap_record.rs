@@ -1,7 +1,7 @@
 use super::file_bytes::{Pieces, signed_ns};
 use super::recording::TopicList;
 use super::wire::Wire;
-use crate::clouds::spill::Complaint;
+use crate::spill::Complaint;
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 use std::sync::Arc;
@@ -15,14 +15,14 @@ pub(super) const MESSAGE_HEAD_BYTES: u64 = 2 + 4 + 8 + 8;
 
 /// Kinds of records.
 pub(super) mod op {
-    pub(in crate::clouds::ros) const FOOTER: u8 = 2;
-    pub(in crate::clouds::ros) const SCHEMA: u8 = 3;
-    pub(in crate::clouds::ros) const CHANNEL: u8 = 4;
-    pub(in crate::clouds::ros) const MESSAGE: u8 = 5;
-    pub(in crate::clouds::ros) const CHUNK: u8 = 6;
-    pub(in crate::clouds::ros) const CHUNK_INDEX: u8 = 8;
-    pub(in crate::clouds::ros) const STATISTICS: u8 = 11;
-    pub(in crate::clouds::ros) const DATA_END: u8 = 15;
+    pub(in crate::ros) const FOOTER: u8 = 2;
+    pub(in crate::ros) const SCHEMA: u8 = 3;
+    pub(in crate::ros) const CHANNEL: u8 = 4;
+    pub(in crate::ros) const MESSAGE: u8 = 5;
+    pub(in crate::ros) const CHUNK: u8 = 6;
+    pub(in crate::ros) const CHUNK_INDEX: u8 = 8;
+    pub(in crate::ros) const STATISTICS: u8 = 11;
+    pub(in crate::ros) const DATA_END: u8 = 15;
 }
 
 /// The channels of a file: what its messages are.

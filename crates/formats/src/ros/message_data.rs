@@ -1,4 +1,4 @@
-use crate::clouds::spill::{Bytes, FilePart};
+use crate::spill::{Bytes, FilePart};
 use voxtile::{Error, Result};
 
 /// The bytes of a message: in memory or, of a large one, in a file.

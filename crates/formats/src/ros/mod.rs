@@ -32,6 +32,7 @@ mod open;
 mod pose_lookup;
 mod pose_track;
 mod recording;
+pub(crate) mod recording_clouds;
 mod sample_spool;
 mod samples;
 mod second_parent;

@@ -3,10 +3,10 @@ use super::bag2_folder::Bag2Folder;
 use super::mcap_file::McapFile;
 use super::recording::Recording;
 use super::sequence::Sequence;
-use crate::clouds::read::glance::first_bytes;
-use crate::clouds::read::listing::extension_of;
-use crate::clouds::spill::Budget;
+use crate::read::glance::first_bytes;
+use crate::read::listing::extension_of;
 use crate::registry::Registry;
+use crate::spill::Budget;
 use std::path::{Path, PathBuf};
 use voxtile::{Error, Result};
 

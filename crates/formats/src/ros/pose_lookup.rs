@@ -1,5 +1,5 @@
 use super::transforms::{SearchFrames, Transforms, WhyNot};
-use crate::clouds::pose::RigidPose;
+use crate::poses::RigidPose;
 use std::sync::Arc;
 use voxtile::{Error, Result};
 

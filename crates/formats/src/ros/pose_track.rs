@@ -38,8 +38,8 @@ impl PoseTrack {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::clouds::pose::RigidPose;
-    use crate::clouds::ros::messages::Header;
+    use crate::poses::RigidPose;
+    use crate::ros::messages::Header;
 
     fn pose(stamp_ns: i64, parent: &str, x_m: f64) -> StampedPose {
         let header = Header { stamp_ns, frame_id: parent.to_owned() };

@@ -1,7 +1,7 @@
-use crate::clouds::CloudSource;
-use crate::clouds::poses::most_gap_ns;
-use crate::clouds::ros::{BagOptions, PoseSource, open_bag};
+use crate::CloudSource;
+use crate::poses::most_gap_ns;
 use crate::read_options::ReadOptions;
+use crate::ros::{BagOptions, PoseSource, open_bag};
 use std::path::Path;
 use voxtile::{Error, Result};
 

@@ -1,5 +1,5 @@
 use super::samples::Samples;
-use crate::clouds::spill::{Budget, PoseList, PoseWriter, Record, Sorter, TimedPose};
+use crate::spill::{Budget, PoseList, PoseWriter, Record, Sorter, TimedPose};
 use std::cmp::Ordering;
 use voxtile::Result;
 
@@ -105,7 +105,7 @@ impl SampleSpool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::clouds::pose::RigidPose;
+    use crate::poses::RigidPose;
 
     #[test]
     fn samples_in_a_file_are_found_as_those_in_memory() {

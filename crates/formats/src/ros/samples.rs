@@ -1,5 +1,5 @@
-use crate::clouds::pose::RigidPose;
-use crate::clouds::spill::{PoseList, TimedPose};
+use crate::poses::RigidPose;
+use crate::spill::{PoseList, TimedPose};
 use std::collections::BTreeMap;
 use voxtile::Result;
 

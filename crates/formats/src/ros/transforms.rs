@@ -2,7 +2,7 @@ use super::frame_links::{FrameLinks, Step};
 use super::frame_search::Search;
 use super::samples::Samples;
 use super::second_parent::SecondParent;
-use crate::clouds::pose::RigidPose;
+use crate::poses::RigidPose;
 use std::collections::{HashMap, HashSet};
 use std::convert::Infallible;
 
@@ -98,7 +98,7 @@ const MAX_FRAMES_BETWEEN: usize = 1000;
 
 impl Transforms {
     /// Sets how far apart in time two samples may be that a pose is found between; see
-    /// [`most_gap_ns`](crate::clouds::poses::most_gap_ns).
+    /// [`most_gap_ns`](crate::poses::most_gap_ns).
     pub fn set_most_gap_ns(&mut self, most_gap_ns: Option<i64>) {
         self.most_gap_ns = most_gap_ns;
     }

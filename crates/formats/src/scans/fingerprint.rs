@@ -5,20 +5,20 @@ use voxtile::{Error, Result};
 
 /// Identifies an input: see [`ScanSource::fingerprint`](super::ScanSource::fingerprint).
 #[derive(Default)]
-pub(super) struct Fingerprint {
+pub(crate) struct Fingerprint {
     hasher: blake3::Hasher,
     files: u64,
     bytes: u64,
 }
 
 impl Fingerprint {
-    pub(super) fn of_file(path: &Path) -> Result<String> {
+    pub(crate) fn of_file(path: &Path) -> Result<String> {
         let mut fingerprint = Self::default();
         fingerprint.add_file(path)?;
         Ok(fingerprint.finish())
     }
 
-    pub(super) fn add_file(&mut self, path: &Path) -> Result<()> {
+    pub(crate) fn add_file(&mut self, path: &Path) -> Result<()> {
         let bytes = self.add_content(path).map_err(|error| Error::io(path, "read", error))?;
         self.hasher.update(path.file_name().unwrap_or_default().as_encoded_bytes());
         self.hasher.update(&[0]);
@@ -28,13 +28,13 @@ impl Fingerprint {
         Ok(())
     }
 
-    pub(super) fn add_pose(&mut self, world_from_sensor: &Pose) {
+    pub(crate) fn add_pose(&mut self, world_from_sensor: &Pose) {
         for value in world_from_sensor.isometry().to_homogeneous().iter() {
             self.hasher.update(&value.to_bits().to_le_bytes());
         }
     }
 
-    pub(super) fn finish(self) -> String {
+    pub(crate) fn finish(self) -> String {
         let hash = &self.hasher.finalize().to_hex()[..32];
         let files = if self.files == 1 { "file" } else { "files" };
         format!("{} {files}, {} bytes, blake3 {hash}", self.files, self.bytes)

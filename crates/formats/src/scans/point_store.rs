@@ -55,7 +55,7 @@ impl PointRoom {
         })
     }
 
-    pub(super) fn folder(&self) -> &Path {
+    pub(crate) fn folder(&self) -> &Path {
         &self.folder
     }
 }
@@ -73,7 +73,7 @@ impl PointStore {
         (self.filed, self.file) = (0, None);
     }
 
-    pub(super) fn room(&self) -> &PointRoom {
+    pub(crate) fn room(&self) -> &PointRoom {
         &self.room
     }
 
@@ -212,7 +212,7 @@ impl PointStore {
     }
 
     /// Points and intensities, if all are in memory.
-    pub(super) fn into_parts(self) -> (Vec<Point>, Option<Vec<f32>>) {
+    pub(crate) fn into_parts(self) -> (Vec<Point>, Option<Vec<f32>>) {
         (self.points, self.intensities)
     }
 }

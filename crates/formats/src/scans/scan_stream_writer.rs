@@ -4,11 +4,11 @@ use std::io::{self, ErrorKind, Write};
 use voxtile::scan::{Pose, Scan};
 use voxtile::space::Point;
 
-pub(super) const MAGIC: &[u8; 8] = b"VXSCANS\n";
-pub(super) const VERSION: u32 = 1;
-pub(super) const FLAG_INTENSITIES: u32 = 1;
+pub(crate) const MAGIC: &[u8; 8] = b"VXSCANS\n";
+pub(crate) const VERSION: u32 = 1;
+pub(crate) const FLAG_INTENSITIES: u32 = 1;
 /// The longest label, in bytes.
-pub(super) const MAX_LABEL_BYTES: u32 = 4096;
+pub(crate) const MAX_LABEL_BYTES: u32 = 4096;
 
 /// Writes scans as voxtile's scan stream, to a file (`.scans`) or to `voxtile build -`. `docs/format.md` has the bytes.
 ///

@@ -1,6 +1,6 @@
 use super::point_store::{PointRoom, PointStore};
-use super::pose_source::PoseSource;
 use super::source::{ScanHead, ScanSource};
+use crate::poses::PoseSource;
 use voxtile::Result;
 use voxtile::scan::Pose;
 use voxtile::space::Aabb;

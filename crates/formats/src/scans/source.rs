@@ -1,7 +1,7 @@
 use super::point_store::{PointRoom, PointStore};
-use super::pose_source::PoseSource;
 use super::sensor_scan::SensorScan;
 use super::stored_scan::StoredScan;
+use crate::poses::PoseSource;
 use voxtile::Result;
 use voxtile::scan::Pose;
 

@@ -1,6 +1,6 @@
 use super::budget::Budget;
 use super::file_part::FilePart;
-use crate::clouds::pose::RigidPose;
+use crate::poses::RigidPose;
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;

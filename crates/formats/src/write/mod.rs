@@ -53,7 +53,7 @@ mod testing;
 mod xyz;
 mod zip_store;
 
-use crate::clouds::{Error, Result};
+use voxtile::{Error, Result};
 pub use options::WriteOptions;
 pub use output_format::{OpenFiles, OpenStream, Origin, OutputFormat, OutputOption, Writer};
 pub use pcd::PCD_REACH_VOXELS;

@@ -6,8 +6,8 @@ use super::made::voxels::voxel_file;
 use super::targets::choice;
 use std::fs;
 use std::path::Path;
-use voxtile_formats::clouds::ros::Wire;
-use voxtile_formats::clouds::ros::messages::MessageKind;
+use voxtile_formats::ros::Wire;
+use voxtile_formats::ros::messages::MessageKind;
 
 /// Target, name and content of seeds.
 pub type Seeds = Vec<(&'static str, &'static str, Vec<u8>)>;

@@ -8,15 +8,13 @@ use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
 use voxtile::Error;
-use voxtile_formats::clouds::CloudSource;
-use voxtile_formats::clouds::poses::{Found, Trajectory};
-use voxtile_formats::clouds::ros::messages::{
+use voxtile_formats::CloudSource;
+use voxtile_formats::poses::{Found, Trajectory};
+use voxtile_formats::ros::messages::{
     CameraInfo, Image, LaserScan, LivoxCustom, MessageKind, PointCloud2, decode_poses,
 };
-use voxtile_formats::clouds::ros::{
-    BagOptions, Decoded, PoseSource, Recording, Wire, open_bag, open_recording,
-};
-use voxtile_formats::{ReadOptions, Registry, open_clouds};
+use voxtile_formats::ros::{BagOptions, Decoded, PoseSource, Recording, Wire, open_bag, open_recording};
+use voxtile_formats::{ReadOptions, open_clouds};
 
 pub type Target = fn(&[u8]) -> bool;
 

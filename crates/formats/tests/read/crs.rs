@@ -1,7 +1,7 @@
 use crate::made::voxels::{format_of, write_voxels};
 use std::fs;
 use std::path::Path;
-use voxtile_formats::clouds::CloudSource;
+use voxtile_formats::CloudSource;
 use voxtile_formats::{ReadOptions, open_clouds};
 use voxtile_formats::write::{VoxelsHead, WriteOptions};
 

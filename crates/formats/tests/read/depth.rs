@@ -2,7 +2,7 @@ use crate::support::{clouds, clouds_with, failure, shared_data};
 use std::fs::{self, File};
 use std::path::Path;
 use voxtile_formats::ReadOptions;
-use voxtile_formats::clouds::read::Intrinsics;
+use voxtile_formats::read::Intrinsics;
 
 fn image(path: &Path, width: u32, depths: &[u16]) {
     let mut encoder = png::Encoder::new(File::create(path).unwrap(), width, depths.len() as u32 / width);

@@ -2,8 +2,8 @@ use crate::support::clouds;
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
-use voxtile_formats::clouds::poses::{Found, Trajectory};
-use voxtile_formats::clouds::{CloudPoint, Deskew, RigidPose};
+use voxtile_formats::poses::{Found, Trajectory};
+use voxtile_formats::{CloudPoint, Deskew, RigidPose};
 
 /// When the sweep begins: the stamp of the cloud.
 const STAMP_NS: i64 = 1_700_000_000_250_000_000;
@@ -177,8 +177,8 @@ mod recordings {
     use super::*;
     use crate::made::bag1::{BagMessage, bag1};
     use crate::made::message::{F32, F64, Field, MessageWriter, U32};
-    use voxtile_formats::clouds::CloudSource;
-    use voxtile_formats::clouds::ros::{BagOptions, open_bag};
+    use voxtile_formats::CloudSource;
+    use voxtile_formats::ros::{BagOptions, open_bag};
 
     /// A sweep with the transforms around it, as a bag.
     fn assert_bag_deskews(type_name: &str, cloud: Vec<u8>, of: &str) {

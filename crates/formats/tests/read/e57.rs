@@ -2,7 +2,7 @@ use crate::made::voxels::write_voxels;
 use crate::support::{clouds, failure, fixture, wanted};
 use std::fs;
 use std::path::Path;
-use voxtile_formats::clouds::RigidPose;
+use voxtile_formats::RigidPose;
 use voxtile_formats::{ReadOptions, open_clouds};
 
 /// Written by pye57 (libE57Format).

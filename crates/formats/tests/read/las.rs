@@ -1,7 +1,7 @@
 use crate::made::voxels::format_of;
 use crate::support::{all, clouds, clouds_with, failure, fixture, shared_data, wanted};
 use std::fs;
-use voxtile_formats::clouds::CloudPoint;
+use voxtile_formats::CloudPoint;
 use voxtile_formats::{ReadOptions, open_clouds};
 use voxtile_formats::write::{VoxelsHead, WriteOptions};
 

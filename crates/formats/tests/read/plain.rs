@@ -1,6 +1,6 @@
 use crate::support::{clouds, clouds_with, failure, fixture, wanted};
 use std::fs;
-use voxtile_formats::clouds::{CloudPoint, RigidPose};
+use voxtile_formats::{CloudPoint, RigidPose};
 use voxtile_formats::{ReadOptions, Registry};
 
 #[test]

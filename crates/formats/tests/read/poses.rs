@@ -3,8 +3,8 @@ use nalgebra::Rotation3;
 use std::fs;
 use std::path::PathBuf;
 use voxtile::scan::Pose;
-use voxtile_formats::clouds::poses::{Found, Trajectory, most_gap_ns};
-use voxtile_formats::clouds::{CloudHead, CloudPoint, CloudSource, RigidPose};
+use voxtile_formats::poses::{Found, Trajectory, most_gap_ns};
+use voxtile_formats::{CloudHead, CloudPoint, CloudSource, RigidPose};
 
 fn read(text: &str) -> voxtile::Result<Trajectory> {
     let folder = tempfile::tempdir().unwrap();

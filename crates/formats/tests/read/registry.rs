@@ -5,8 +5,8 @@ use std::fs;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 use voxtile::{Error, FormatError, Result};
-use voxtile_formats::clouds::read::{Points, Visit};
-use voxtile_formats::clouds::{CloudHead, CloudPoint};
+use voxtile_formats::read::{Points, Visit};
+use voxtile_formats::{CloudHead, CloudPoint};
 use voxtile_formats::{InputFormat, Mark, Open, ReadOptions, Registry};
 
 /// Points on the x axis, one a line.

@@ -1,6 +1,6 @@
 use std::path::{Path, PathBuf};
 use voxtile::Result;
-use voxtile_formats::clouds::{CloudHead, CloudPoint, CloudSource};
+use voxtile_formats::{CloudHead, CloudPoint, CloudSource};
 use voxtile_formats::{ReadOptions, open_clouds};
 
 /// A file that somebody else's writer made, see `tests/fixtures/clouds.py`.

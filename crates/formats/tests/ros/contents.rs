@@ -1,6 +1,6 @@
 use crate::support::{assert_clouds, assert_points, assert_pose, data, expected, read, recordings, topic};
-use voxtile_formats::clouds::poses::most_gap_ns;
-use voxtile_formats::clouds::ros::{BagOptions, PoseSource, open_bag, open_recording};
+use voxtile_formats::poses::most_gap_ns;
+use voxtile_formats::ros::{BagOptions, PoseSource, open_bag, open_recording};
 
 #[test]
 fn the_same_clouds_and_poses_come_out_of_each() {

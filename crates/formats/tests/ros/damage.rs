@@ -1,7 +1,7 @@
 use crate::support::{Cloud, FILES, assert_clouds, data, read, topic};
 use std::slice::from_ref;
-use voxtile_formats::clouds::CloudSource;
-use voxtile_formats::clouds::ros::{BagOptions, PoseSource, open_bag, open_recording};
+use voxtile_formats::CloudSource;
+use voxtile_formats::ros::{BagOptions, PoseSource, open_bag, open_recording};
 
 #[test]
 fn files_that_are_cut_off_give_what_is_whole() {

@@ -3,7 +3,7 @@ use crate::made::message::{F32, MessageWriter};
 use crate::support::{Cloud, read};
 use std::slice::from_ref;
 use std::time::{Duration, Instant};
-use voxtile_formats::clouds::ros::BagOptions;
+use voxtile_formats::ros::BagOptions;
 
 #[test]
 fn a_transform_that_makes_a_loop_costs_a_recording_no_pose() {

@@ -2,7 +2,7 @@ use crate::made::bag1::bag1;
 use crate::made::message::{F32, MessageWriter};
 use crate::support::{data, read, recordings, topic};
 use std::slice::from_ref;
-use voxtile_formats::clouds::ros::{BagOptions, PoseSource, open_bag};
+use voxtile_formats::ros::{BagOptions, PoseSource, open_bag};
 
 /// What does not fit in memory is read from temporary files, and is the same.
 #[test]

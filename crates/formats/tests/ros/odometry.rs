@@ -2,7 +2,7 @@ use crate::made::bag1::bag1;
 use crate::made::message::{F32, MessageWriter};
 use crate::support::read;
 use std::path::{Path, PathBuf};
-use voxtile_formats::clouds::ros::{BagOptions, PoseSource, open_bag};
+use voxtile_formats::ros::{BagOptions, PoseSource, open_bag};
 
 /// A bag of one cloud, `/tf`, and a topic of poses.
 fn with_odometry(folder: &Path, poses: &[Vec<u8>], type_name: &str) -> PathBuf {

@@ -4,7 +4,7 @@ use crate::support::{assert_clouds, data, read, topic};
 use std::path::{Path, PathBuf};
 use std::slice::from_ref;
 use voxtile_formats::Registry;
-use voxtile_formats::clouds::ros::{BagOptions, open_bag, open_recording};
+use voxtile_formats::ros::{BagOptions, open_bag, open_recording};
 
 #[test]
 fn parts_of_a_split_recording_are_one() {

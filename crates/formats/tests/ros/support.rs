@@ -1,7 +1,7 @@
 use serde_json::Value;
 use std::path::{Path, PathBuf};
-use voxtile_formats::clouds::ros::{BagOptions, open_bag};
-use voxtile_formats::clouds::{CloudHead, CloudPoint, CloudSource, RigidPose};
+use voxtile_formats::ros::{BagOptions, open_bag};
+use voxtile_formats::{CloudHead, CloudPoint, CloudSource, RigidPose};
 
 pub const FILES: [&str; 8] =
     ["none.bag", "bz2.bag", "lz4.bag", "none.mcap", "lz4.mcap", "zstd.mcap", "ros1.mcap", "unchunked.mcap"];

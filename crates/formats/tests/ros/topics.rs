@@ -2,7 +2,7 @@ use crate::made::bag1::bag1;
 use crate::made::message::{F32, MessageWriter};
 use crate::support::read;
 use std::time::{Duration, Instant};
-use voxtile_formats::clouds::ros::{BagOptions, open_bag};
+use voxtile_formats::ros::{BagOptions, open_bag};
 
 /// Names of topics beyond the most that are kept, and messages of these topics before those that are wanted.
 #[test]

@@ -3,7 +3,7 @@ use crate::watch::Watch;
 use std::fs::{self, File};
 use std::io::{BufWriter, Write};
 use std::path::Path;
-use voxtile_formats::clouds::{Error, Result};
+use voxtile::{Error, Result};
 use voxtile_formats::write::{
     Origin, OutputFormat, OutputFormats, OutputOption, VoxelRow, VoxelSink, Writer,
 };

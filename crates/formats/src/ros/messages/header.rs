@@ -1,4 +1,4 @@
-use crate::clouds::ros::wire::{Decoded, Wire, WireReader};
+use crate::ros::wire::{Decoded, Wire, WireReader};
 
 /// `std_msgs/Header`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

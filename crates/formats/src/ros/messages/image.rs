@@ -1,7 +1,7 @@
 use super::header::Header;
 use super::point_field::FieldType;
-use crate::clouds::cloud::CloudPoint;
-use crate::clouds::ros::wire::{Decoded, Wire, WireError, WireReader};
+use crate::read::cloud::CloudPoint;
+use crate::ros::wire::{Decoded, Wire, WireError, WireReader};
 
 /// `sensor_msgs/Image`, with its pixels as the bytes that they are.
 #[derive(Clone, Debug)]

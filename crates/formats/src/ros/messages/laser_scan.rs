@@ -1,6 +1,6 @@
 use super::header::Header;
-use crate::clouds::cloud::CloudPoint;
-use crate::clouds::ros::wire::{Decoded, Wire, WireReader};
+use crate::read::cloud::CloudPoint;
+use crate::ros::wire::{Decoded, Wire, WireReader};
 
 /// `sensor_msgs/LaserScan`.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,8 +1,8 @@
 use super::header::Header;
 use super::point_field::{FieldType, PointField};
-use crate::clouds::cloud::CloudPoint;
-use crate::clouds::ros::wire::{Decoded, Wire, WireError, WireReader};
-use crate::clouds::spill::FilePart;
+use crate::read::cloud::CloudPoint;
+use crate::ros::wire::{Decoded, Wire, WireError, WireReader};
+use crate::spill::FilePart;
 use voxtile::Result;
 
 /// `sensor_msgs/PointCloud2`, with its points as the bytes that they are.

@@ -1,4 +1,4 @@
-use crate::clouds::ros::wire::{Decoded, WireReader};
+use crate::ros::wire::{Decoded, WireReader};
 
 /// The type of a field of `sensor_msgs/PointCloud2`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

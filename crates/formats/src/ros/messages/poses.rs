@@ -1,7 +1,7 @@
 use super::header::{Header, read_frame};
 use super::kind::MessageKind;
-use crate::clouds::pose::RigidPose;
-use crate::clouds::ros::wire::{Decoded, Wire, WireReader};
+use crate::poses::RigidPose;
+use crate::ros::wire::{Decoded, Wire, WireReader};
 
 /// Where a frame was in another, and when.
 #[derive(Clone, Debug, PartialEq)]

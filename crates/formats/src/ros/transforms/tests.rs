@@ -1,5 +1,5 @@
 use super::*;
-use crate::clouds::spill::{FilePart, PoseList};
+use crate::spill::{FilePart, PoseList};
 
 const S: i64 = 1_000_000_000;
 

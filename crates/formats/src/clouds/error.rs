@@ -1,1 +1,0 @@
-pub use voxtile::{Error, Result};
