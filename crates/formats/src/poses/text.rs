@@ -7,6 +7,7 @@ use super::pose_rows::{PoseRows, Row};
 use super::time_unit::{SECONDS, digits_of, stamp_of};
 use crate::read::lines::Lines;
 use std::path::Path;
+use voxtile::scan::Pose;
 
 /// What the numbers of a line are, decided by the first line of numbers.
 #[derive(Clone, Debug)]
@@ -34,14 +35,23 @@ pub(crate) enum Rules {
     Lenient,
 }
 
-/// Reads the poses of a text. Returns whether it is plain: lines of 8 numbers in the order of TUM, with seconds, or of
-/// KITTI's 12.
+/// How a text of poses is written.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Form {
+    /// Whether earlier versions took it for the poses of PCD files: lines of 7 or 8 numbers in the order of TUM or of
+    /// KITTI's 12, with blanks and commas between them, and comments after `#`.
+    pub(crate) is_plain: bool,
+    /// Whether its stamps, if it has any, are seconds.
+    pub(crate) is_in_seconds: bool,
+}
+
+/// Reads the poses of a text.
 pub(super) fn read(
     path: &Path,
     input: PoseInput,
     rules: Rules,
     poses: &mut PoseRows,
-) -> voxtile::Result<bool> {
+) -> voxtile::Result<Form> {
     check_text(path, input.head())?;
     let mut text = TextPoses::new(rules, input.head().starts_with(BYTE_ORDER_MARK));
     let mut lines = Lines::new(path, input, 0);
@@ -51,6 +61,7 @@ pub(super) fn read(
         if line.is_empty() {
             continue;
         }
+        text.are_plain &= !line.starts_with('%');
         if let Some(comment) = line.strip_prefix(['#', '%']) {
             if text.layout.is_none() {
                 names = Roles::of(comment).or(names);
@@ -78,7 +89,8 @@ pub(super) fn read(
             lines.error(format!("the file ends within a matrix of 4x4, after {} numbers", text.rows.len()))
         );
     }
-    Ok(text.is_plain())
+    let is_in_seconds = text.digits.is_none_or(|digits| digits == SECONDS);
+    Ok(Form { is_plain: text.are_plain, is_in_seconds })
 }
 
 /// Whether a text that starts like this starts with poses.
@@ -134,10 +146,6 @@ impl TextPoses {
         Self { rules, layout, has_header, are_plain, digits, rows }
     }
 
-    fn is_plain(&self) -> bool {
-        self.are_plain && self.digits.is_none_or(|digits| digits == SECONDS)
-    }
-
     fn take(&mut self, line: &str, names: &mut Option<Roles>) -> Result<Option<Row>, String> {
         let mut words = cells(line);
         if self.layout.is_none()
@@ -166,10 +174,10 @@ impl TextPoses {
         }
         let Some(layout) = self.layout.clone() else { return Ok(None) };
         self.are_plain &= match &layout {
-            Layout::Tum => true,
-            Layout::Matrix { has_time } => !has_time && words.len() == 12,
+            Layout::Tum | Layout::Bare => !line.contains(';'),
+            Layout::Matrix { has_time } => !has_time && words.len() == 12 && !line.contains(';'),
             Layout::Named(roles) => roles.are_those_of_tum() && words.len() == 8 && !self.has_header,
-            Layout::Bare | Layout::Rows => false,
+            Layout::Rows => false,
         };
         let rules = if self.are_plain { self.rules } else { Rules::Strict };
         let number = |at: usize| -> Result<f64, String> {
@@ -219,6 +227,7 @@ impl TextPoses {
             Layout::Matrix { has_time } => {
                 let first = usize::from(has_time);
                 let numbers: Vec<f64> = (first..words.len()).map(number).collect::<Result<_, _>>()?;
+                self.are_plain = self.are_plain && Pose::of_matrix(numbers.as_chunks().0).is_ok();
                 let stamp_ns = match (has_time, words.first()) {
                     (true, Some(stamp)) => self.stamp(stamp, None, rules)?,
                     _ => None,

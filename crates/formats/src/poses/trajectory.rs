@@ -2,7 +2,7 @@ use super::RigidPose;
 use super::gap::most_gap_ns;
 use super::pose_input::PoseInput;
 use super::pose_rows::{PoseRows, Stamps};
-use super::text::Rules;
+use super::text::{Form, Rules};
 use super::{npy, text};
 use crate::read::cloud::CloudSource;
 use crate::spill::{Budget, PoseList};
@@ -22,8 +22,8 @@ pub struct Trajectory {
     goes_back: Option<u64>,
     /// Poses are of a camera; those of the lidar are `[0] * pose * [1]`.
     lidar: Option<[RigidPose; 2]>,
-    /// Whether it is a plain text of TUM or KITTI.
-    is_plain: bool,
+    /// How the text is written, if it is one.
+    form: Form,
     /// How far a stamp may be from the time that it was rounded from.
     rounding_ns: u64,
     remarks: Vec<String>,
@@ -82,16 +82,16 @@ impl Trajectory {
     pub(crate) fn read_by(rules: Rules, path: &Path, calib: Option<&Path>, budget: &Budget) -> Result<Self> {
         let mut rows = PoseRows::new(budget);
         let input = PoseInput::open(path)?;
-        let mut is_plain = false;
+        let mut form = Form::default();
         if npy::is_npy(path, input.head()) {
             npy::read(path, input, &mut rows)?
         } else {
-            is_plain = text::read(path, input, rules, &mut rows)?;
+            form = text::read(path, input, rules, &mut rows)?;
         }
         let Some(mut trajectory) = rows.finish(path)? else {
             return Err(Error::argument(path.display().to_string(), "holds no pose"));
         };
-        trajectory.is_plain = is_plain;
+        trajectory.form = form;
         if let Some(calib) = calib {
             let camera_from_lidar = super::calib::read(calib)?;
             trajectory.lidar = Some([camera_from_lidar.inverse(), camera_from_lidar]);
@@ -108,7 +108,7 @@ impl Trajectory {
             has_stamps,
             goes_back,
             lidar: None,
-            is_plain: false,
+            form: Form::default(),
             rounding_ns,
             remarks,
         }
@@ -180,9 +180,9 @@ impl Trajectory {
         &self.path
     }
 
-    /// Whether the file is a plain text: lines of 8 numbers in the order of TUM, with seconds, or of KITTI's 12.
-    pub(crate) fn is_plain(&self) -> bool {
-        self.is_plain
+    /// How the file is written, if it is a text.
+    pub(crate) fn form(&self) -> Form {
+        self.form
     }
 
     /// The pose of a cloud by its number, from 0, where stamps do not tell it.

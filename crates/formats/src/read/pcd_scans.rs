@@ -41,7 +41,7 @@ pub(crate) fn open(path: &Path, options: &ReadOptions) -> Result<Box<dyn ScanSou
         CloudPoses::Missing => true,
         CloudPoses::Source(_) | CloudPoses::Identity => !is_plain,
     };
-    let must_have_viewpoint = is_plain && matches!(poses, CloudPoses::Source(PoseSource::Viewpoint));
+    let must_have_viewpoint = matches!(poses, CloudPoses::Source(PoseSource::Viewpoint));
     let (is_alone, budget) = (files.len() == 1, options.budget());
     let has_origin = options.sensor_origin_m.is_some();
     let open = move |path: &Path| -> Result<Box<dyn CloudSource>> {
@@ -87,6 +87,7 @@ fn poses_of(path: &Path, files: &[PathBuf], is_plain: bool, options: &ReadOption
         None if files.iter().any(|file| is_placed(file)) => Some(PoseSource::Viewpoint),
         None => (files.len() == 1).then_some(PoseSource::Identity),
     };
+    let own = own.map(|own| if is_plain { own } else { PoseSource::Scans });
     let rules = if is_plain { Rules::Lenient } else { Rules::Strict };
     find_poses(path, own, None, rules, options)
 }
@@ -96,7 +97,7 @@ fn poses_of(path: &Path, files: &[PathBuf], is_plain: bool, options: &ReadOption
 fn is_by_line(trajectory: &Trajectory, files: &[PathBuf]) -> Result<bool> {
     /// Up to the milliseconds that some programs write.
     const SAME_NS: u64 = 1_000_000;
-    if !trajectory.is_plain() {
+    if !trajectory.form().is_plain {
         return Ok(false);
     }
     let stamps: Option<Vec<i64>> = files.iter().map(|file| stamp_of_name(file)).collect();
@@ -107,6 +108,9 @@ fn is_by_line(trajectory: &Trajectory, files: &[PathBuf]) -> Result<bool> {
     // Clocks of which neither knows the other tell nothing.
     if !stamps.iter().any(|stamp| (first_ns..=last_ns).contains(stamp)) {
         return Ok(true);
+    }
+    if !trajectory.form().is_in_seconds {
+        return Ok(false);
     }
     for (number, of_file) in stamps.into_iter().enumerate() {
         if trajectory.stamp_of(number)?.is_none_or(|of_pose| of_pose.abs_diff(of_file) > SAME_NS) {
