@@ -53,9 +53,9 @@ mod testing;
 mod xyz;
 mod zip_store;
 
-use voxtile::{Error, Result};
 pub use options::WriteOptions;
 pub use output_format::{OpenFiles, OpenStream, Origin, OutputFormat, OutputOption, Writer};
 pub use pcd::PCD_REACH_VOXELS;
 pub use registry::OutputFormats;
 pub use row::{VoxelRow, VoxelSink, VoxelsHead};
+use voxtile::{Error, Result};

@@ -2,8 +2,8 @@ use crate::made::voxels::{format_of, write_voxels};
 use std::fs;
 use std::path::Path;
 use voxtile_formats::CloudSource;
-use voxtile_formats::{ReadOptions, open_clouds};
 use voxtile_formats::write::{VoxelsHead, WriteOptions};
+use voxtile_formats::{ReadOptions, open_clouds};
 
 const FORMATS: [&str; 4] = ["las", "laz", "copc", "e57"];
 const UTM: &str = "PROJCS[\"WGS 84 / UTM zone 32N\",GEOGCS[\"WGS 84\",DATUM[\"WGS_1984\",SPHEROID[\"WGS 84\",6378137,\

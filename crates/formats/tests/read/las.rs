@@ -2,8 +2,8 @@ use crate::made::voxels::format_of;
 use crate::support::{all, clouds, clouds_with, failure, fixture, shared_data, wanted};
 use std::fs;
 use voxtile_formats::CloudPoint;
-use voxtile_formats::{ReadOptions, open_clouds};
 use voxtile_formats::write::{VoxelsHead, WriteOptions};
+use voxtile_formats::{ReadOptions, open_clouds};
 
 fn one_cloud() -> ReadOptions {
     ReadOptions { scan_period_s: 0.0, ..ReadOptions::default() }
