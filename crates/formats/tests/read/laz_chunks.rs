@@ -2,8 +2,6 @@ use crate::made::voxels::{VOXELS, format_of, voxel, voxel_file};
 use crate::support::{clouds, clouds_with, failure, fixture};
 use std::fs;
 use voxtile_formats::CloudPoint;
-use voxtile_formats::CloudPoint;
-use voxtile_formats::ReadOptions;
 use voxtile_formats::ReadOptions;
 
 /// Where the points begin, and where the chunk table is.
