@@ -87,7 +87,8 @@ fn a_row_more_is_a_format_more() {
 fn what_a_row_does_not_take_is_refused_with_those_that_do() {
     let folder = tempfile::tempdir().unwrap();
     let refusal = |name: &str, change: fn(&mut ExportOptions)| {
-        let mut options = options(&folder.path().join(name));
+        let output = if name == "-" { name.into() } else { folder.path().join(name) };
+        let mut options = options(&output);
         change(&mut options);
         export(&options, &Watch::nobody()).unwrap_err().to_string()
     };
