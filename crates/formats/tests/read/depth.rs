@@ -136,6 +136,6 @@ fn fifos_among_depth_images_are_refused() {
     for (name, is_hinted) in [("a.ply", true), ("b.e57", false)] {
         fifo(name);
         let (error, _) = failure(&at(name), &ReadOptions::default());
-        assert!(error.contains("is a FIFO") && error.contains("--format") == is_hinted, "{error}");
+        assert!(error.contains("is a FIFO") && error.contains("`format`") == is_hinted, "{error}");
     }
 }

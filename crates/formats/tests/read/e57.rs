@@ -44,7 +44,7 @@ fn a_scan_without_a_pose_is_in_the_frame_of_the_file() {
     };
     let (pose, first, remarks) = read(&ReadOptions::default());
     assert_eq!((pose, first), (RigidPose::IDENTITY, [0.25; 3]));
-    assert!(remarks[0].starts_with("1 of 1 scans have no pose: ") && remarks[0].contains("--sensor-origin"));
+    assert!(remarks[0].starts_with("1 of 1 scans have no pose: ") && remarks[0].contains("`sensor_origin`"));
     let origin = ReadOptions { sensor_origin_m: Some([1.0, 2.0, 3.0]), ..ReadOptions::default() };
     let (pose, first, remarks) = read(&origin);
     assert_eq!((pose.position_m, first), ([1.0, 2.0, 3.0], [-0.75, -1.75, -2.75]));
@@ -142,7 +142,7 @@ fn packets_that_exceed_the_memory_are_refused() {
     let with = |memory_bytes| ReadOptions { memory_bytes, ..ReadOptions::default() };
     let (error, points) = failure(&path, &with(0));
     assert!(
-        error.contains("record 0: a packet of points would take") && error.contains("--memory"),
+        error.contains("record 0: a packet of points would take") && error.contains("`memory`"),
         "{error}"
     );
     assert_eq!(points, 0);

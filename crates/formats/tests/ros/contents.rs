@@ -75,7 +75,7 @@ fn several_topics_are_listed_and_none_too() {
             "/depth/image_raw (sensor_msgs/msg/Image, 1 messages)"
         };
         for part in
-            ["--topic NAME", "/points (sensor_msgs/", "PointCloud2, 4 messages)", "/livox", "/scan", image]
+            ["`topic` NAME", "/points (sensor_msgs/", "PointCloud2, 4 messages)", "/livox", "/scan", image]
         {
             assert!(text.contains(part), "{name}: {text}");
         }

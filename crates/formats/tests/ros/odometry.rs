@@ -35,7 +35,7 @@ fn a_topic_of_poses_without_any_that_can_be_used_is_an_error() {
     };
     let cut = pose("odom", 1.0)[..20].to_vec();
     for (poses, told) in [
-        (vec![], "--odometry /odom: none of its 0 messages gives a pose"),
+        (vec![], "odometry /odom: none of its 0 messages gives a pose"),
         (vec![pose("odom", f64::NAN), pose("", 1.0)], "; 2 are not valid, or their frames have no name"),
         (vec![cut], "; 1 messages or chunks with poses cannot be read; the first: /odom: "),
     ] {
