@@ -4,9 +4,9 @@ use super::summary::{ExportSummary, Written};
 use crate::output::StagedOutput;
 use crate::read_any_map;
 use crate::watch::Watch;
+use voxtile::Result;
 use voxtile::mapper::{MapView, Stoppable};
 use voxtile::space::Aabb;
-use voxtile::{Error, Result};
 use voxtile_formats::write::{VoxelsHead, WriteOptions};
 
 /// Writes the file, or the folder, and what belongs beside it: all of it or nothing.
@@ -23,15 +23,15 @@ pub(super) fn export(export: &Export<'_>) -> anyhow::Result<ExportSummary> {
         (how.z_min_m, how.z_max_m) = (options.z_min_m, options.z_max_m);
         how.cell_m = options.cell_m.unwrap_or(how.cell_m);
         how.origin_m = options.origin_m.unwrap_or_default();
-        let mut sink = export.format.open(&head, &staged.path()?, &how).map_err(Error::from)?;
+        let mut sink = export.format.open(&head, &staged.path()?, &how)?;
         let (grid, origin_m) = (map.config().grid, how.origin_m);
         let center_m = |voxel| {
             let center_m = grid.center_m(voxel);
             std::array::from_fn(|k| center_m[k] - origin_m[k])
         };
         let gauge = watch.over_tiles(map.tile_indices().len());
-        chosen.for_each(map, &*gauge, center_m, |row| Ok(sink.put(row)?))?;
-        sink.finish().map_err(Error::from)?;
+        chosen.for_each(map, &*gauge, center_m, |row| sink.put(row))?;
+        sink.finish()?;
         drop(gauge);
         watch.stop().check()?;
         Ok((head, staged.finish()?))

@@ -5,10 +5,10 @@ use super::run::Export;
 use super::summary::ExportSummary;
 use crate::{octree_file, read_map};
 use std::io::Write;
+use voxtile::Result;
 use voxtile::mapper::{MapReader, MapView, OctreeMap, Stoppable};
 use voxtile::octree::OctreeFile;
 use voxtile::space::{Aabb, Grid, TileIndex, VoxelBox};
-use voxtile::{Error, Result};
 use voxtile_formats::write::{Origin, VoxelRow, VoxelSink, VoxelsHead, WriteOptions};
 
 /// Writes voxels as one stream of bytes.
@@ -33,9 +33,9 @@ fn of_map(export: &Export<'_>, file: &MovedFile<'_>, reader: &MapReader) -> anyh
             &Stoppable::new(reader, stop),
             &*gauge,
             |voxel| origin.center_m(voxel, &grid),
-            |row| Ok(sink.put(row)?),
+            |row| sink.put(row),
         )?;
-        Ok(sink.finish().map_err(Error::from)?)
+        Ok(sink.finish()?)
     })?;
     Ok(file.summary(voxels, &origin))
 }
@@ -64,7 +64,7 @@ fn of_octree(
             }
             Ok(())
         })?;
-        Ok(sink.finish().map_err(Error::from)?)
+        Ok(sink.finish()?)
     })?;
     Ok(file.summary(voxels, &origin))
 }
@@ -79,7 +79,7 @@ fn open<'a>(
     let head = VoxelsHead::of_stream(voxels, grid.resolution_m());
     let mut options = WriteOptions::beside(&export.options.output);
     options.origin_m = origin.corner_m;
-    Ok(export.format.open_stream(&head, out, &options)?)
+    export.format.open_stream(&head, out, &options)
 }
 
 /// Where the file's coordinates begin: where they are asked to, or, in a file in single precision of a far map, where

@@ -119,7 +119,7 @@ impl Tileset<'_> {
         let mut options = WriteOptions::beside(&path);
         // Coordinates begin at the node's corner.
         options.colour_heights_m = Some(heights_m.map(|height| height - corner_m[2]));
-        let mut sink = OutputFormat::GLB.open(&head, &path, &options).map_err(Error::from)?;
+        let mut sink = OutputFormat::GLB.open(&head, &path, &options)?;
         for voxel in &voxels {
             sink.put(&VoxelRow {
                 index: voxel.map(i32::from),
@@ -128,10 +128,9 @@ impl Tileset<'_> {
                 log_odds: 0.0,
                 observation_count: 0,
                 tile: [0; 3],
-            })
-            .map_err(Error::from)?;
+            })?;
         }
-        sink.finish().map_err(Error::from)?;
+        sink.finish()?;
         self.counts.nodes.fetch_add(1, Ordering::Relaxed);
         if key.level == 0 {
             self.counts.voxels.fetch_add(voxels.len() as u64, Ordering::Relaxed);
