@@ -1,15 +1,14 @@
 use crate::args::{LocalArgs, PresetName};
 use crate::json;
-use crate::local_table::{Row, print_table};
+use crate::local_table::Row;
 use crate::progress::{Progress, at_terminal};
 use crate::read_options::read_options;
 use crate::stop_signal;
 use std::io::Write;
 use std::process::ExitCode;
-use voxtile::space::{Grid, Point};
 use voxtile::{Error, Scan};
 use voxtile_formats::ScanSource;
-use voxtile_local::{LocalMap, LocalParameters, LocalReader, LocalState};
+use voxtile_local::{LocalMap, LocalParameters};
 use voxtile_pipeline::output::OutputFile;
 use voxtile_pipeline::{LocalScans, Watch};
 use voxtile_pipeline::{is_standard_input, open_scans};
@@ -18,87 +17,54 @@ use voxtile_render::{OverTime, Panel};
 /// Times at which the picture shows the map.
 const PANELS: usize = 6;
 
-/// One run of the scans through a map.
-struct Setup {
-    name: &'static str,
-    parameters: LocalParameters,
-    /// Whether the map hears what another map, which takes the scans, newly finds occupied.
-    is_relayed: bool,
-}
-
 pub fn run(args: &LocalArgs) -> anyhow::Result<ExitCode> {
-    let setups = setups(args);
-    if is_standard_input(&args.scans) && (setups.len() > 1 || args.repeat > 1) {
-        let reason = "scans from standard input come once: choose one preset and no --repeat, or give a file";
+    if is_standard_input(&args.scans) && args.repeat > 1 {
+        let reason = "scans from standard input come once: leave out --repeat, or give a file";
         return Err(Error::argument("SCANS", reason).into());
     }
     // All arguments before the first scan.
     OutputFile::check_picture(&args.output)?;
-    for setup in &setups {
-        LocalMap::new(args.resolution, setup.parameters)?;
-    }
+    let (preset, parameters) = parameters(args);
+    LocalMap::new(args.resolution, parameters)?;
     let input = Input::of(args)?;
-    let mut rows = Vec::new();
-    for (number, setup) in setups.iter().enumerate() {
-        let mut panels = (number == 0).then(Vec::new);
-        let mut row = run_setup(args, &input, setup, panels.as_mut())?;
-        for _ in 1..args.repeat {
-            row.take_least(&run_setup(args, &input, setup, None)?);
-        }
-        row.finish();
-        rows.push(row);
-        if let Some(panels) = panels {
-            let title = format!("voxtile local: {} m voxels, setup {}", args.resolution, setup.name);
-            let image = OverTime { resolution_m: args.resolution, title, panels }.draw();
-            let mut file = OutputFile::create(&args.output)?;
-            let written = image.write_png(file.out());
-            file.written(written)?;
-            file.finish()?;
-        }
+    let mut panels = Vec::new();
+    let mut row = run_scans(args, &input, Row::new(preset, &parameters), Some(&mut panels))?;
+    for _ in 1..args.repeat {
+        row.take_least(&run_scans(args, &input, Row::new(preset, &parameters), None)?);
     }
+    row.finish();
+    let title = format!("voxtile local: {} m voxels, setup {preset}", args.resolution);
+    let image = OverTime { resolution_m: args.resolution, title, panels }.draw();
+    let mut file = OutputFile::create(&args.output)?;
+    let written = image.write_png(file.out());
+    file.written(written)?;
+    file.finish()?;
     let mut out = std::io::stdout().lock();
     if args.json {
-        for row in &rows {
-            json::print(row, &mut out)?;
-        }
+        json::print(&row, &mut out)?;
     } else {
-        print_table(&mut out, &rows)?;
+        row.print(&mut out)?;
         writeln!(out, "picture   {}", args.output.display())?;
     }
     Ok(ExitCode::SUCCESS)
 }
 
-fn setups(args: &LocalArgs) -> Vec<Setup> {
-    let far = f64::INFINITY;
-    let paper = |name, d_in, d_inf, n_lim: Option<usize>| Setup {
-        name,
-        parameters: LocalParameters::local_mapping().with_ranges(d_in, d_inf).with_max_voxels(n_lim),
-        is_relayed: name == "d",
+/// The preset's name, and its parameters with what the arguments change.
+fn parameters(args: &LocalArgs) -> (&'static str, LocalParameters) {
+    let (name, mut parameters) = match args.preset {
+        PresetName::Local => ("local", LocalParameters::local_mapping()),
+        PresetName::Autonomous => ("autonomous", LocalParameters::autonomous_mapping()),
+        PresetName::Passive => ("passive", LocalParameters::passive_perception()),
     };
-    let preset = |name, parameters| vec![Setup { name, parameters, is_relayed: false }];
-    let mut setups = match args.preset {
-        PresetName::Local => preset("local", LocalParameters::local_mapping()),
-        PresetName::Autonomous => preset("autonomous", LocalParameters::autonomous_mapping()),
-        PresetName::Passive => preset("passive", LocalParameters::passive_perception()),
-        PresetName::Table => vec![
-            paper("a", far, 8.0, Some(50_000)),
-            paper("b", far, 8.0, Some(250_000)),
-            paper("c", far, 8.0, None),
-            paper("d", far, far, Some(50_000)),
-            paper("e", 10.0, 8.0, Some(50_000)),
-        ],
-    };
-    for Setup { parameters, .. } in &mut setups {
-        if let Some(n_lim) = args.n_lim {
-            parameters.max_voxels = (n_lim > 0).then_some(n_lim);
-        }
-        parameters.input_range_m = args.d_in.unwrap_or(parameters.input_range_m);
-        parameters.inflation_range_m = args.d_inf.unwrap_or(parameters.inflation_range_m);
-        parameters.inflation_radius_m = args.radius;
-        parameters.initial_probability = args.p_init;
-        parameters.min_input_range_m = args.min_range;
+    if let Some(n_lim) = args.n_lim {
+        parameters.max_voxels = (n_lim > 0).then_some(n_lim);
     }
-    setups
+    parameters.input_range_m = args.d_in.unwrap_or(parameters.input_range_m);
+    parameters.inflation_range_m = args.d_inf.unwrap_or(parameters.inflation_range_m);
+    parameters.inflation_radius_m = args.radius;
+    parameters.initial_probability = args.p_init;
+    parameters.min_input_range_m = args.min_range;
+    (name, parameters)
 }
 
 /// The scans, which all runs read.
@@ -114,31 +80,22 @@ impl Input {
     }
 }
 
-fn run_setup(
+fn run_scans(
     args: &LocalArgs,
     input: &Input,
-    setup: &Setup,
+    mut row: Row,
     mut panels: Option<&mut Vec<Panel>>,
 ) -> anyhow::Result<Row> {
     let mut source = open_scans(input.scans.path(), &read_options(&args.read)?, &input.watch)?;
     let scans = source.len_hint();
     let progress = Progress::over_scans(scans);
-    let mut map = LocalMap::new(args.resolution, setup.parameters)?;
-    let mut relay = match setup.is_relayed {
-        true => Some(Relay::new(args, setup)?),
-        false => None,
-    };
-    let mut row = Row::new(setup.name, &setup.parameters);
+    let mut map = LocalMap::new(args.resolution, row.parameters)?;
     let mut path = Vec::new();
     let mut number = 0;
     while let Some(scan) = next_scan(&mut *source, args.points)? {
         input.watch.stop().check()?;
-        let relayed = relay.as_mut().map(|relay| relay.points(&scan)).transpose()?;
         let begin = cpu_seconds();
-        let report = match relayed {
-            Some(points) => map.insert_relayed(scan.origin, &points)?,
-            None => map.insert_scan(&scan)?,
-        };
+        let report = map.insert_scan(&scan)?;
         row.add(&report, cpu_seconds() - begin, &map);
         path.push(scan.origin);
         number += 1;
@@ -172,30 +129,6 @@ fn next_scan(source: &mut dyn ScanSource, points: Option<u32>) -> voxtile::Resul
         scan.intensities = None;
     }
     Ok(Some(scan))
-}
-
-/// Another robot's map, which sends what it newly finds occupied.
-struct Relay {
-    map: LocalMap,
-    reader: LocalReader,
-    grid: Grid,
-}
-
-impl Relay {
-    fn new(args: &LocalArgs, setup: &Setup) -> voxtile::Result<Self> {
-        let parameters = setup.parameters.with_ranges(f64::INFINITY, 0.0);
-        let map = LocalMap::new(args.resolution, parameters)?;
-        let reader = map.reader();
-        Ok(Self { reader, grid: Grid::new(args.resolution, 64.0 * args.resolution)?, map })
-    }
-
-    /// The centers of the voxels that a scan newly made occupied, in metres.
-    fn points(&mut self, scan: &Scan) -> voxtile::Result<Vec<Point>> {
-        self.map.insert_scan(scan)?;
-        let (_, changes) = self.reader.changes();
-        let new = changes.into_iter().filter(|change| change.after == LocalState::Occupied);
-        Ok(new.map(|change| self.grid.center_m(change.voxel)).collect())
-    }
 }
 
 /// Seconds that this thread has worked: on a busy machine the time on the wall says little.

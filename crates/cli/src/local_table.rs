@@ -3,7 +3,7 @@ use std::io::{self, Write};
 use std::time::Duration;
 use voxtile_local::{LocalMap, LocalParameters, LocalReport, StageTimes};
 
-/// What one setup came to: a row of the voxel mapping paper's table I.
+/// What a run of scans through a map came to, in the terms of the voxel mapping paper.
 #[derive(Debug, Serialize)]
 pub struct Row {
     pub setup: &'static str,
@@ -122,6 +122,59 @@ impl Row {
         self.stages_ms =
             self.updates.iter().fold(Stages::default(), |sum, times| sum.with(&times.stages, share));
     }
+
+    /// Prints the row for a person; times in milliseconds an update.
+    pub fn print(&self, out: &mut impl Write) -> io::Result<()> {
+        writeln!(
+            out,
+            "{:<10} {:>6} {:>6} {:>8} {:>8} {:>10}  {:>6} {:>6} {:>6}  {:>5} {:>5} {:>5} {:>5} {:>5} {:>5}  {:>6} {:>7}",
+            "setup",
+            "d_in",
+            "d_inf",
+            "n_lim",
+            "n_occ",
+            "n_inf",
+            "t_cpu",
+            "p99",
+            "t_tot",
+            "t_in",
+            "t_ray",
+            "t_occ",
+            "t_inf",
+            "t_m",
+            "t_pub",
+            "MB",
+            "B/voxel"
+        )?;
+        let LocalParameters { input_range_m, inflation_range_m, max_voxels, .. } = self.parameters;
+        let limit = max_voxels.map_or("none".to_owned(), |limit| limit.to_string());
+        let Stages { input, rays, occupancy, removal, inflation, publishing } = self.stages_ms;
+        writeln!(
+            out,
+            "{:<10} {:>6} {:>6} {:>8} {:>8} {:>10.0}  {:>6.2} {:>6.2} {:>6.2}  {:>5.2} {:>5.2} {:>5.2} {:>5.2} {:>5.2} \
+             {:>5.2}  {:>6.1} {:>7.1}",
+            self.setup,
+            input_range_m,
+            inflation_range_m,
+            limit,
+            self.n_occ,
+            self.n_inf,
+            self.cpu_ms.mean,
+            self.cpu_ms.p99,
+            self.t_tot_ms.mean,
+            input,
+            rays,
+            occupancy,
+            inflation,
+            removal,
+            publishing,
+            self.bytes as f64 / 1e6,
+            self.bytes_per_voxel,
+        )?;
+        let points = self.points as f64 / self.scans.max(1) as f64;
+        let scans = self.scans;
+        writeln!(out, "{scans} scans, {points:.0} points each; m, ms an update (t_cpu, p99: processor time)")
+    }
 }
 
 impl Stages {
@@ -160,65 +213,6 @@ impl Distribution {
 
 fn ms(time: Duration) -> f64 {
     time.as_secs_f64() * 1e3
-}
-
-/// Prints rows for a person; times in milliseconds an update.
-pub fn print_table(out: &mut impl Write, rows: &[Row]) -> io::Result<()> {
-    writeln!(
-        out,
-        "{:<10} {:>6} {:>6} {:>8} {:>8} {:>10}  {:>6} {:>6} {:>6}  {:>5} {:>5} {:>5} {:>5} {:>5} {:>5}  {:>6} {:>7}",
-        "setup",
-        "d_in",
-        "d_inf",
-        "n_lim",
-        "n_occ",
-        "n_inf",
-        "t_cpu",
-        "p99",
-        "t_tot",
-        "t_in",
-        "t_ray",
-        "t_occ",
-        "t_inf",
-        "t_m",
-        "t_pub",
-        "MB",
-        "B/voxel"
-    )?;
-    for row in rows {
-        let LocalParameters { input_range_m, inflation_range_m, max_voxels, .. } = row.parameters;
-        let limit = max_voxels.map_or("none".to_owned(), |limit| limit.to_string());
-        let Stages { input, rays, occupancy, removal, inflation, publishing } = row.stages_ms;
-        writeln!(
-            out,
-            "{:<10} {:>6} {:>6} {:>8} {:>8} {:>10.0}  {:>6.2} {:>6.2} {:>6.2}  {:>5.2} {:>5.2} {:>5.2} {:>5.2} {:>5.2} \
-             {:>5.2}  {:>6.1} {:>7.1}",
-            row.setup,
-            input_range_m,
-            inflation_range_m,
-            limit,
-            row.n_occ,
-            row.n_inf,
-            row.cpu_ms.mean,
-            row.cpu_ms.p99,
-            row.t_tot_ms.mean,
-            input,
-            rays,
-            occupancy,
-            inflation,
-            removal,
-            publishing,
-            row.bytes as f64 / 1e6,
-            row.bytes_per_voxel,
-        )?;
-    }
-    let Some(first) = rows.first() else { return Ok(()) };
-    let points = first.points as f64 / first.scans.max(1) as f64;
-    writeln!(
-        out,
-        "{} scans, {points:.0} points each; m, ms an update (t_cpu, p99: processor time)",
-        first.scans
-    )
 }
 
 #[cfg(test)]

@@ -2,8 +2,7 @@
 //!
 //! - what a clever part must equal: [`reference_map`], [`reference_local`];
 //! - what goes wrong: [`faulty_disk`], [`lossy_link`];
-//! - what they work on: [`random_scans`], [`unsynced_disk`], [`memory_folder`],
-//!   [`planner`];
+//! - what they work on: [`random_scans`], [`unsynced_disk`], [`memory_folder`];
 //! - where files are, and what errors say: [`support`].
 
 #[allow(missing_docs)]
@@ -12,8 +11,6 @@ pub mod faulty_disk;
 pub mod lossy_link;
 #[allow(missing_docs)]
 pub mod memory_folder;
-#[allow(missing_docs)]
-pub mod planner;
 #[allow(missing_docs)]
 pub mod random_scans;
 #[allow(missing_docs)]

@@ -10,7 +10,7 @@ pub struct LocalArgs {
     /// .graph and .log, a scan stream (.scans), or - for a scan stream from standard input
     #[arg(value_name = "SCANS")]
     pub scans: PathBuf,
-    /// What the map is for; table runs the setups a to e of the voxel mapping paper one after the other
+    /// What the map is for
     #[arg(long, value_name = "NAME", default_value = "local")]
     pub preset: PresetName,
     /// Most voxels with occupancy; 0 for no limit [default: the preset's]
@@ -44,7 +44,7 @@ pub struct LocalArgs {
     /// Picture of the map at several times
     #[arg(short = 'o', long = "output", value_name = "FILE", default_value = "local_map.png")]
     pub output: PathBuf,
-    /// Print JSON, one object a setup
+    /// Print JSON
     #[arg(long)]
     pub json: bool,
     #[command(flatten)]
@@ -59,6 +59,4 @@ pub enum PresetName {
     Autonomous,
     /// For a robot that listens to others: far input, all of it inflated
     Passive,
-    /// The setups a to e of the paper
-    Table,
 }

@@ -1,11 +1,11 @@
-use crate::outcome::{json_lines_of, number};
+use crate::outcome::{json_of, number};
 use crate::scans::RECORDED;
 use crate::setting::Setting;
 use anyhow::Result;
 use report::{Answer, Cell, Table};
 
-/// The setups of the paper's table I.
-const SETUPS: [&str; 5] = ["a", "b", "c", "d", "e"];
+/// The presets of `voxtile local`.
+const PRESETS: [&str; 3] = ["local", "autonomous", "passive"];
 
 /// What an update of the local map takes.
 pub fn answer(setting: &Setting) -> Result<Answer> {
@@ -13,18 +13,18 @@ pub fn answer(setting: &Setting) -> Result<Answer> {
         "local_map",
         "Mean CPU milliseconds of an update of the local map, 4000 points a scan at 0.1 m, each update the least of 4: \
          before, now, and how many times as fast.",
-        ["scans"].into_iter().chain(SETUPS),
+        ["scans"].into_iter().chain(PRESETS),
     );
     for set in RECORDED {
         let Some(folder) = report::recorded_set(&setting.data, set) else { continue };
         let picture = setting.work.join("local.png");
         let pairs = setting.versions.measure(|programs| {
-            let mut command = programs.command("voxtile", 1);
-            command.arg("local").arg(&folder).args(["--preset", "table", "--points", "4000", "--json"]);
-            command.args(["--repeat", if setting.is_short { "1" } else { "4" }]).arg("-o").arg(&picture);
-            let mut means = [f64::NAN; SETUPS.len()];
-            for (mean, row) in means.iter_mut().zip(json_lines_of(&mut command)?) {
-                *mean = number(&row, "/cpu_ms/mean")?;
+            let mut means = [f64::NAN; PRESETS.len()];
+            for (mean, preset) in means.iter_mut().zip(PRESETS) {
+                let mut command = programs.command("voxtile", 1);
+                command.arg("local").arg(&folder).args(["--preset", preset, "--points", "4000", "--json"]);
+                command.args(["--repeat", if setting.is_short { "1" } else { "4" }]).arg("-o").arg(&picture);
+                *mean = number(&json_of(&mut command)?, "/cpu_ms/mean")?;
             }
             Ok(means)
         })?;

@@ -1,12 +1,7 @@
-//! The high-speed scenario of the voxel mapping paper (its table III): the same plain A* planner flies through made-up
-//! forests with a local map, and with a fixed window of 16 m around the robot.
+//! The paper's table III: the same plain A* planner flies through synthetic forests with a local map, and with a fixed
+//! window of 16 m around the robot. The picture shows every forest from above with both flights.
 //!
-//! ```text
-//! high_speed [FORESTS] [PICTURE.svg]
-//! ```
-//!
-//! Prints the paper's table, and draws every forest from above with both flights. It is a simulation of a point with
-//! limited acceleration, not of a drone: what it compares is how far the planner sees.
+//! It simulates a point with limited acceleration, not a drone: it compares how far the planner sees.
 
 mod flight;
 mod forest;
@@ -15,8 +10,8 @@ mod window;
 
 use flight::{Flight, fly};
 use forest::Forest;
-use std::error::Error;
 use std::fs;
+use std::path::Path;
 use voxtile::{Result, Scan};
 use voxtile_local::{LocalMap, LocalParameters, LocalView};
 use window::Window;
@@ -50,10 +45,8 @@ impl PlannersMap for LocalMap {
     }
 }
 
-fn main() -> std::result::Result<(), Box<dyn Error>> {
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let forests: u64 = arguments.first().map_or(Ok(10), |forests| forests.parse())?;
-    let picture = arguments.get(1).map_or("high_speed.svg", String::as_str);
+/// Flies through so many forests, prints the table and writes the picture.
+pub fn run(forests: u64, picture: &Path) -> anyhow::Result<()> {
     let mut flights: [Vec<Flight>; 2] = Default::default();
     let mut drawn = Vec::new();
     for seed in 0..forests {
@@ -72,7 +65,7 @@ fn main() -> std::result::Result<(), Box<dyn Error>> {
         println!("| {name} | {} |", summary(flights));
     }
     fs::write(picture, picture::page(&drawn))?;
-    println!("picture: {picture}");
+    println!("picture: {}", picture.display());
     Ok(())
 }
 

@@ -2,7 +2,7 @@ use super::PlannersMap;
 use super::forest::{Forest, GOAL, START};
 use std::fmt;
 use std::time::Instant;
-use testkit::planner::{distance_m, plan};
+use crate::planner::{distance_m, plan};
 use voxtile::space::Point;
 use voxtile::{Queries, Result, UnknownAs};
 use voxtile_local::{LocalView, Obstacle};

@@ -1,5 +1,5 @@
-use crate::forest::{Forest, LENGTH_M, WIDTH_M};
-use crate::robots::{Sharing, Traveller};
+use super::forest::{Forest, LENGTH_M, WIDTH_M};
+use super::robots::{Sharing, Traveller};
 use std::collections::BTreeSet;
 use std::fmt::Write;
 

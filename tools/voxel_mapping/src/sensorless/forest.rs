@@ -1,4 +1,4 @@
-use crate::robots::Sensing;
+use super::robots::Sensing;
 use voxtile::Scan;
 use voxtile::space::Point;
 use voxtile_simulation::{Random, Scene, Solid};

@@ -1,14 +1,9 @@
-//! The sensorless scenario of the voxel mapping paper (its section VII-B and table II): travellers without sensors
-//! follow the maps that two spotters share, around the trees of made-up forests; and, to compare, travellers with their
-//! own sensor and no sharing.
+//! The paper's table II: travellers without sensors follow the maps that two spotters share, around the trees of
+//! synthetic forests; and, to compare, travellers with their own sensor and no sharing. The picture shows the first
+//! forest from above.
 //!
-//! ```text
-//! sensorless [FORESTS] [PICTURE.svg]
-//! ```
-//!
-//! Prints the paper's table, and draws the first forest from above. It is a simulation of points that fly at the
-//! paper's 3 m/s, not of drones, and they do not avoid each other: what it shows is that a shared map is enough to plan
-//! by.
+//! It simulates points that fly at the paper's 3 m/s and do not avoid each other: it shows that a shared map is enough
+//! to plan by.
 
 mod forest;
 mod picture;
@@ -16,8 +11,8 @@ mod robots;
 
 use forest::Forest;
 use robots::{Sensing, Sharing, Traveller};
-use std::error::Error;
 use std::fs;
+use std::path::Path;
 use std::time::Duration;
 
 /// Edge of a voxel.
@@ -36,10 +31,8 @@ struct Outcome {
     bytes_per_s: f64,
 }
 
-fn main() -> Result<(), Box<dyn Error>> {
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let forests: u64 = arguments.first().map_or(Ok(10), |forests| forests.parse())?;
-    let picture = arguments.get(1).map_or("sensorless.svg", String::as_str);
+/// Flies through so many forests, prints the table and writes the picture.
+pub fn run(forests: u64, picture: &Path) -> anyhow::Result<()> {
     let mut outcomes: [Vec<Outcome>; 2] = Default::default();
     for seed in 0..forests {
         let forest = Forest::new(seed);
@@ -58,7 +51,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     for (name, outcomes) in ["sensorless, two spotters", "own sensor"].into_iter().zip(&outcomes) {
         println!("| {name} | {} |", summary(outcomes));
     }
-    println!("picture: {picture}");
+    println!("picture: {}", picture.display());
     Ok(())
 }
 
