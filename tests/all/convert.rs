@@ -1,3 +1,4 @@
+use crate::harness::config;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
@@ -15,10 +16,6 @@ const INPUT: &str = "random scans";
 
 fn place(name: &str) -> PathBuf {
     Path::new("/city").join(name)
-}
-
-fn config() -> MapConfig {
-    MapConfig::new(0.4, 3.2).unwrap().with_range(0.0, 3.0)
 }
 
 fn scan(number: u64) -> Scan {

@@ -102,7 +102,7 @@ fn check_every_damage(storage: Storage) {
     assert!(verification.is_whole() && found.is_empty(), "{found:?}");
     let damages = damages(&whole);
     println!("{} damages, {storage}", damages.len());
-    for (path, bytes) in some_of(damages, 3) {
+    for (path, bytes) in some_of(damages, 8) {
         let what = format!("{} of {} bytes", path.display(), bytes.len());
         let disk = whole.copy();
         disk.put(&path, &bytes);

@@ -1,24 +1,13 @@
 //! Deletions of snapshots that are killed: the same command completes them, and its exit code says so.
 
+use crate::harness::{at, keeping_scans as config, map, name};
 use std::path::Path;
 use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
 use testkit::random_scans::{Random, random_scan};
 use voxtile::integrity::{Verification, verify};
 use voxtile::operations::{delete_snapshot, snapshot};
-use voxtile::store::{SnapshotName, TileStore};
-use voxtile::{Error, MapConfig, MapPath, Mapper, OutOfCoreTileMapper, Pose, ScanRef};
-
-fn map() -> &'static Path {
-    Path::new("/city/map")
-}
-
-fn at(disk: &FaultyDisk) -> MapPath {
-    MapPath::on(disk.shared(), map())
-}
-
-fn config() -> MapConfig {
-    MapConfig::new(0.4, 3.2).unwrap().with_range(0.3, 3.0).with_kept_scans(true)
-}
+use voxtile::store::TileStore;
+use voxtile::{Error, Mapper, OutOfCoreTileMapper, Pose, ScanRef};
 
 fn insert(mapper: &mut OutOfCoreTileMapper, number: u64) {
     let pose = Pose::from_quaternion([3.0, 0.0, 0.5], [0.0, 0.0, 0.0, 1.0]).unwrap();
@@ -33,27 +22,27 @@ fn looked_at(disk: &FaultyDisk) -> Verification {
 
 #[test]
 fn a_deletion_that_is_killed_is_completed_by_the_same_call_which_succeeds() {
-    let name = SnapshotName::new("s").unwrap();
+    let of = name("s");
     let start = FaultyDisk::new(Fault::None);
     insert(&mut OutOfCoreTileMapper::create(at(&start), config()).unwrap(), 1);
-    snapshot(at(&start), &name).unwrap();
+    snapshot(at(&start), &of).unwrap();
     insert(&mut OutOfCoreTileMapper::open(at(&start), config()).unwrap(), 2);
     let start = start.copy();
     let (mut completed, mut gone) = (0, 0);
     for change in 0.. {
         let disk = start.copy();
         disk.set_fault(Fault::Crashes(change));
-        let _ = delete_snapshot(at(&disk), &name);
+        let _ = delete_snapshot(at(&disk), &of);
         if !disk.has_crashed() {
             break;
         }
         for disk in [disk.after_kill(), disk.after_crash(Unsynced::Dropped), disk.after_crash(Unsynced::Kept)]
         {
             let store = TileStore::open_read_only(disk.shared(), map()).unwrap();
-            let is_listed = store.snapshots().names().unwrap().contains(&name);
+            let is_listed = store.snapshots().names().unwrap().contains(&of);
             drop(store);
             let before = looked_at(&disk);
-            match delete_snapshot(at(&disk), &name) {
+            match delete_snapshot(at(&disk), &of) {
                 Ok(()) => completed += usize::from(!is_listed),
                 // Nothing was left to do.
                 Err(Error::InvalidArgument { .. }) => {
@@ -75,6 +64,6 @@ fn a_deletion_that_is_killed_is_completed_by_the_same_call_which_succeeds() {
 fn a_name_that_no_snapshot_had_is_refused() {
     let disk = FaultyDisk::new(Fault::None);
     insert(&mut OutOfCoreTileMapper::create(at(&disk), config()).unwrap(), 1);
-    let refused = delete_snapshot(at(&disk), &SnapshotName::new("s").unwrap());
+    let refused = delete_snapshot(at(&disk), &name("s"));
     assert!(matches!(refused, Err(Error::InvalidArgument { .. })), "{refused:?}");
 }

@@ -1,9 +1,12 @@
-use std::path::PathBuf;
+use crate::harness::{
+    EVERY_CRASH, Job, Left, Reached, Subject, at, config, digest_of, faults, make_foreign, map,
+    open_or_create, sweep, sweep_after_kills,
+};
 use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
 use testkit::random_scans::{Random, random_scan};
 use testkit::support::some_of;
 use voxtile::{
-    Error, InMemoryMapper, MapConfig, MapPath, MapQueries, MapReader, MapView, Mapper, Occupancy,
+    Digest, Error, InMemoryMapper, MapConfig, MapQueries, MapReader, MapView, Mapper, Occupancy,
     OutOfCoreTileMapper, Queries, Result, Scan, Storage,
 };
 
@@ -12,24 +15,9 @@ const INPUT: &str = "random scans";
 const FLUSHED: [usize; 4] = [3, 5, 8, 11];
 const REOPENED: usize = 8;
 
-fn map() -> PathBuf {
-    PathBuf::from("/city/map")
-}
-
-/// Room for two tiles and next to nothing that waits: every scan evicts.
-fn config() -> MapConfig {
-    MapConfig::new(0.4, 3.2).unwrap().with_range(0.0, 3.0).with_cache_tiles(2).with_write_buffer_bytes(600)
-}
-
-/// The same map with compact storage.
+/// The configuration with compact storage.
 fn compact() -> MapConfig {
     config().with_storage(Storage::Compact)
-}
-
-/// Next to no memory: resident tiles become compact, those are saved by a thread of their own, and updates wait in
-/// files. Which operation comes as the n-th is left to chance then.
-fn short_of_memory() -> MapConfig {
-    config().with_tight_memory_bytes(6_000)
 }
 
 /// Scans on a way there and back again, so that tiles come again that were pushed out.
@@ -39,21 +27,19 @@ fn scans() -> Vec<Scan> {
     ways.iter().map(|&x| random_scan(&mut random, [x, 0.0, 0.0], 4)).collect()
 }
 
-/// What must come out: the digests after each number of scans.
-struct Oracle {
+/// A build of the map to the end, from wherever it is, with readers beside it. Its state `n` is the map of `n` scans.
+/// What the disk refuses is tried again by the same process.
+struct Build {
     config: MapConfig,
     scans: Vec<Scan>,
-    digests: Vec<voxtile::Digest>,
+    /// After each number of scans: the digest, and the answer to a query.
+    digests: Vec<Digest>,
     answers: Vec<Occupancy>,
-    /// Whether flushes go on beside the scans that come next.
+    /// Whether flushes go on beside the next scans. Which operation comes as the n-th is left to chance then.
     is_beside: bool,
 }
 
-impl Oracle {
-    fn new() -> Self {
-        Self::of(config())
-    }
-
+impl Build {
     fn of(config: MapConfig) -> Self {
         let scans = scans();
         let mut mapper = InMemoryMapper::new(config.clone()).unwrap();
@@ -68,52 +54,136 @@ impl Oracle {
         Self { config, scans, digests, answers, is_beside: false }
     }
 
-    /// The same life with flushes beside scans. Which operation comes as the n-th is left to chance then.
     fn beside(self) -> Self {
         Self { is_beside: true, ..self }
     }
 
-    fn check(&self, map: &impl MapView, what: &str) {
+    /// Both ways to flush, with both storages.
+    fn all(config: &MapConfig) -> impl Iterator<Item = Self> {
+        [Storage::OctoMap, Storage::Compact].into_iter().flat_map(move |storage| {
+            let config = config.clone().with_storage(storage);
+            [Self::of(config.clone()), Self::of(config).beside()]
+        })
+    }
+
+    fn open(&self, disk: &FaultyDisk) -> Result<OutOfCoreTileMapper> {
+        OutOfCoreTileMapper::open(at(disk), self.config.clone())
+    }
+
+    fn create(&self, disk: &FaultyDisk) -> Result<OutOfCoreTileMapper> {
+        OutOfCoreTileMapper::create(at(disk), self.config.clone())
+    }
+
+    fn check_digest(&self, map: &impl MapView, what: &str) {
         let number = map.scan_number() as usize;
         let digest = map.digest().unwrap_or_else(|error| panic!("{what}: after {number} scans: {error:#}"));
         assert_eq!(digest, self.digests[number], "{what}: after {number} scans");
     }
-}
 
-fn create(disk: &FaultyDisk, oracle: &Oracle) -> Result<OutOfCoreTileMapper> {
-    match OutOfCoreTileMapper::create(MapPath::on(disk.shared(), map()), oracle.config.clone()) {
-        // An attempt that failed at its very end has made the map.
-        Err(Error::AlreadyExists { .. }) => open(disk, oracle),
-        created => created,
+    /// Looks at a mapper after an error: nothing has changed.
+    fn look(&self, disk: &FaultyDisk, mapper: &OutOfCoreTileMapper) {
+        if disk.broken().is_some() {
+            // What is not to be had is an error; what is had is right.
+            match mapper.digest() {
+                Ok(digest) => assert_eq!(digest, self.digests[mapper.scan_number() as usize]),
+                Err(error) => assert!(error.is_of_medium(), "{error:#}"),
+            }
+            return;
+        }
+        self.check_digest(mapper, "after an error");
+        // A query that wants a tile in memory.
+        let answer = mapper.occupancy_at([3.0, 0.1, 0.1]).expect("queries go on");
+        assert_eq!(answer, self.answers[mapper.scan_number() as usize]);
     }
-}
 
-fn open(disk: &FaultyDisk, oracle: &Oracle) -> Result<OutOfCoreTileMapper> {
-    OutOfCoreTileMapper::open(MapPath::on(disk.shared(), map()), oracle.config.clone())
-}
+    fn run_on(&self, disk: &FaultyDisk, from: usize, progress: &mut Progress) -> Result<()> {
+        let nothing = |_: &()| ();
+        let look = |mapper: &OutOfCoreTileMapper| self.look(disk, mapper);
+        let mut mapper = insist(disk, &mut (), nothing, |_| match open_or_create(disk, &self.config) {
+            // An attempt that failed at its very end has made the map.
+            Err(Error::AlreadyExists { .. }) => self.open(disk),
+            opened => opened,
+        })?;
+        let done = insist(disk, &mut mapper, look, |mapper| mapper.resume_input(INPUT))? as usize;
+        assert_eq!(done, from, "a reader sees what a mapper goes on from");
+        *progress = Progress { is_early: false, safe: done, tried: done, failed: None };
+        assert_eq!(mapper.scan_number(), done as u64);
+        let digest = insist(disk, &mut mapper, look, |mapper| mapper.digest())?;
+        assert_eq!(digest, self.digests[done], "as opened");
+        let mut readers: Vec<MapReader> = Vec::new();
+        for (scan, number) in self.scans.iter().zip(1..).skip(done) {
+            insist(disk, &mut mapper, look, |mapper| mapper.insert_scan(scan))?;
+            if !FLUSHED.contains(&number) {
+                continue;
+            }
+            if self.is_beside {
+                // Before a reader opens the map: one that comes between a commit and its `metadata.json` waits for the
+                // writer a tenth of a second, and this disk has no clock.
+                self.end_flush(disk, &mut mapper, progress, number)?;
+            }
+            readers.push(insist(disk, &mut (), nothing, |_| MapReader::open(at(disk), 0))?);
+            progress.tried = number;
+            if self.is_beside {
+                insist(disk, &mut mapper, look, |mapper| mapper.begin_flush())?;
+            } else {
+                insist(disk, &mut mapper, look, |mapper| mapper.flush())?;
+                progress.safe = number;
+            }
+            for reader in &mut readers {
+                let digest = insist(disk, reader, |_| (), |reader| reader.digest())?;
+                assert_eq!(digest, self.digests[reader.scan_number() as usize], "a reader beside the writer");
+            }
+            if number == REOPENED {
+                readers.clear();
+                self.end_flush(disk, &mut mapper, progress, number)?;
+                drop(mapper);
+                mapper = insist(disk, &mut (), nothing, |_| self.open(disk))?;
+            }
+        }
+        let digest = insist(disk, &mut mapper, look, |mapper| mapper.digest())?;
+        assert_eq!(digest, self.digests[self.scans.len()], "at the end");
+        self.end_flush(disk, &mut mapper, progress, self.scans.len())
+    }
 
-fn open_or_create(disk: &FaultyDisk, oracle: &Oracle) -> Result<OutOfCoreTileMapper> {
-    match open(disk, oracle) {
-        Err(Error::NoMap { .. }) => create(disk, oracle),
-        opened => opened,
+    /// Waits for a flush that went on beside scans; what it could not do is done now, after `number` scans.
+    fn end_flush(
+        &self,
+        disk: &FaultyDisk,
+        mapper: &mut OutOfCoreTileMapper,
+        progress: &mut Progress,
+        number: usize,
+    ) -> Result<()> {
+        match mapper.end_flush() {
+            Ok(()) => progress.safe = progress.tried,
+            Err(error) if disk.has_crashed() => return Err(error),
+            Err(error) => {
+                assert!(matches!(error, Error::Io { .. }), "{error:#}");
+                self.look(disk, mapper);
+                (progress.failed, progress.tried) = (Some(progress.tried), number);
+                insist(disk, mapper, |mapper| self.look(disk, mapper), |mapper| mapper.flush())?;
+                progress.safe = number;
+            }
+        }
+        assert!(mapper.flushed_scan_number() as usize == progress.safe && !mapper.is_flushing());
+        Ok(())
     }
 }
 
 /// Does one thing. If the disk refuses, the subject must be as before; again, in vain if there is no room; and with
-/// room it must go. `None` if the power went.
+/// room it must go. An error only if the power went, or of damage where a fault stays.
 fn insist<S, T>(
     disk: &FaultyDisk,
     subject: &mut S,
     look: impl Fn(&S),
     mut attempt: impl FnMut(&mut S) -> Result<T>,
-) -> Option<T> {
-    for number in 0.. {
+) -> Result<T> {
+    let mut number = 0;
+    loop {
         match attempt(subject) {
-            Ok(done) => return Some(done),
-            Err(_) if disk.has_crashed() => return None,
-            // Of what could not be read when the map was opened, nobody can tell what it was: not before it is opened
-            // again.
-            Err(Error::Damaged { .. }) if disk.had_a_fault_that_stays() => return None,
+            Ok(done) => return Ok(done),
+            Err(error) if disk.has_crashed() => return Err(error),
+            // What could not be read when the map was opened is unknown until it is opened again.
+            Err(error @ Error::Damaged { .. }) if disk.had_a_fault_that_stays() => return Err(error),
             Err(error) => {
                 assert!(number < 3 && matches!(error, Error::Io { .. }), "attempt {number}: {error:#}");
                 look(subject);
@@ -122,304 +192,140 @@ fn insist<S, T>(
         if number == 1 {
             disk.make_room();
         }
+        number += 1;
     }
-    None
 }
 
-/// How far a life came: the last flush that returned, and the one that was tried last.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-struct Reached {
+/// The last flush that returned, the one that was tried last, and one beside scans that failed before: a crash may
+/// bring back its record.
+struct Progress {
+    is_early: bool,
     safe: usize,
     tried: usize,
-    /// One beside scans that failed before: a crash may bring back its record.
-    failed: usize,
-    finished: bool,
+    failed: Option<usize>,
 }
 
-/// Waits for a flush that went on beside scans; what it could not do is done now, after `number` scans.
-fn end_flush(
-    disk: &FaultyDisk,
-    mapper: &mut OutOfCoreTileMapper,
-    look: impl Fn(&OutOfCoreTileMapper),
-    reached: &mut Reached,
-    number: usize,
-) -> Option<()> {
-    match mapper.end_flush() {
-        Ok(()) => reached.safe = reached.tried,
-        Err(_) if disk.has_crashed() => return None,
-        Err(error) => {
-            assert!(matches!(error, Error::Io { .. }), "{error:#}");
-            look(mapper);
-            (reached.failed, reached.tried) = (reached.tried, number);
-            insist(disk, mapper, look, |mapper| mapper.flush())?;
-            reached.safe = number;
-        }
-    }
-    assert!(mapper.flushed_scan_number() as usize == reached.safe && !mapper.is_flushing());
-    Some(())
-}
-
-/// Builds the map to the end, from wherever it is, with a reader beside it now and then.
-fn live(disk: &FaultyDisk, oracle: &Oracle) -> Reached {
-    let mut reached = Reached::default();
-    let finished = live_until_crash(disk, oracle, &mut reached).is_some();
-    Reached { finished, ..reached }
-}
-
-fn live_until_crash(disk: &FaultyDisk, oracle: &Oracle, reached: &mut Reached) -> Option<()> {
-    let nothing = |_: &()| ();
-    let look = |mapper: &OutOfCoreTileMapper| {
-        if disk.broken().is_some() {
-            // What is not to be had is an error; what is had is right.
-            match mapper.digest() {
-                Ok(digest) => assert_eq!(digest, oracle.digests[mapper.scan_number() as usize]),
-                Err(error) => assert!(error.is_of_medium(), "{error:#}"),
-            }
-            return;
-        }
-        oracle.check(mapper, "after an error");
-        // A query that wants a tile in memory.
-        let answer = mapper.occupancy_at([3.0, 0.1, 0.1]).expect("queries go on");
-        assert_eq!(answer, oracle.answers[mapper.scan_number() as usize]);
-    };
-    let mut mapper = insist(disk, &mut (), nothing, |_| open_or_create(disk, oracle))?;
-    let done = insist(disk, &mut mapper, look, |mapper| mapper.resume_input(INPUT))? as usize;
-    (reached.safe, reached.tried) = (done, done);
-    assert_eq!(mapper.scan_number(), done as u64);
-    let digest = insist(disk, &mut mapper, look, |mapper| mapper.digest())?;
-    assert_eq!(digest, oracle.digests[done], "as opened");
-    let mut readers: Vec<MapReader> = Vec::new();
-    for (scan, number) in oracle.scans.iter().zip(1..).skip(done) {
-        insist(disk, &mut mapper, look, |mapper| mapper.insert_scan(scan))?;
-        if !FLUSHED.contains(&number) {
-            continue;
-        }
-        if oracle.is_beside {
-            // Before a reader opens the map: one that comes between a commit and its `metadata.json` waits for the
-            // writer a tenth of a second, and this disk has no clock.
-            end_flush(disk, &mut mapper, look, reached, number)?;
-        }
-        let reader = || MapReader::open(MapPath::on(disk.shared(), map()), 0);
-        readers.push(insist(disk, &mut (), nothing, |_| reader())?);
-        if oracle.is_beside {
-            reached.tried = number;
-            insist(disk, &mut mapper, look, |mapper| mapper.begin_flush())?;
-        } else {
-            reached.tried = number;
-            insist(disk, &mut mapper, look, |mapper| mapper.flush())?;
-            reached.safe = number;
-        }
-        for reader in &mut readers {
-            let digest = insist(disk, reader, |_| (), |reader| reader.digest())?;
-            assert_eq!(digest, oracle.digests[reader.scan_number() as usize], "a reader beside the writer");
-        }
-        if number == REOPENED {
-            readers.clear();
-            end_flush(disk, &mut mapper, look, reached, number)?;
-            drop(mapper);
-            mapper = insist(disk, &mut (), nothing, |_| open(disk, oracle))?;
-        }
-    }
-    let digest = insist(disk, &mut mapper, look, |mapper| mapper.digest())?;
-    assert_eq!(digest, oracle.digests[oracle.scans.len()], "at the end");
-    end_flush(disk, &mut mapper, look, reached, oracle.scans.len())
-}
-
-/// The list of scans is that of the flush that the reader sees.
-fn check_scans(reader: &MapReader, what: &str) {
-    let scans = reader.scans().unwrap_or_else(|error| panic!("{what}: {error:#}"));
-    let numbers: Vec<u64> = scans.iter().map(|scan| scan.number).collect();
-    assert_eq!(numbers, (1..=reader.scan_number()).collect::<Vec<_>>(), "{what}");
-    if reader.keeps_scans() && reader.scan_number() > 0 {
-        let kept = reader.kept_scans().unwrap_or_else(|error| panic!("{what}: {error:#}"));
-        let kept = kept.map(|scan| scan.unwrap_or_else(|error| panic!("{what}: {error:#}")).number());
-        assert_eq!(kept.collect::<Vec<_>>(), numbers, "{what}");
+impl Progress {
+    fn reached(&self, end: Result<()>) -> Reached {
+        let states = [self.safe, self.tried].into_iter().chain(self.failed).collect();
+        Reached { states, is_early: self.is_early, end }
     }
 }
 
-/// The disk after an undisturbed life.
-fn undisturbed(oracle: &Oracle) -> FaultyDisk {
-    let disk = FaultyDisk::new(Fault::None);
-    assert!(live(&disk, oracle).finished);
-    disk
+impl Subject for Build {
+    fn disk(&self) -> FaultyDisk {
+        FaultyDisk::new(Fault::None)
+    }
+
+    fn run(&self, disk: &FaultyDisk, from: usize) -> Reached {
+        let mut progress = Progress { is_early: true, safe: from, tried: from, failed: None };
+        let end = self.run_on(disk, from, &mut progress);
+        if let Err(error) = &end {
+            assert!(disk.has_crashed() || disk.had_a_fault_that_stays(), "{error:#}");
+        }
+        progress.reached(end)
+    }
+
+    fn find(&self, disk: &FaultyDisk, among: &[usize], what: &str) -> usize {
+        let reader = match MapReader::open(at(disk), 0) {
+            Err(Error::NoMap { .. }) if among.contains(&0) => return 0,
+            opened => opened.unwrap_or_else(|error| panic!("{what}: {among:?}: {error:#}")),
+        };
+        let found = reader.scan_number() as usize;
+        assert!(among.contains(&found), "{what}: {found} is none of {among:?}");
+        self.check_digest(&reader, what);
+        // The list of scans, and the scans that are kept, are those of the flush that the reader sees.
+        let numbers: Vec<u64> = (1..=found as u64).collect();
+        let listed = reader.scans().unwrap_or_else(|error| panic!("{what}: {error:#}"));
+        assert!(listed.iter().map(|scan| scan.number).eq(numbers.iter().copied()), "{what}");
+        if reader.keeps_scans() && found > 0 {
+            let kept = reader.kept_scans().unwrap_or_else(|error| panic!("{what}: {error:#}"));
+            let kept = kept.map(|scan| scan.unwrap_or_else(|error| panic!("{what}: {error:#}")).number());
+            assert_eq!(kept.collect::<Vec<_>>(), numbers, "{what}");
+        }
+        found
+    }
+
+    fn check_end(&self, disk: &FaultyDisk, what: &str) {
+        self.find(disk, &[self.scans.len()], what);
+        let is_left = |path: &std::path::PathBuf| path.to_string_lossy().ends_with(".next");
+        assert!(!disk.files().keys().any(is_left), "{what}");
+    }
 }
 
-/// What a crash left opens as of the last flush that returned, or of the one that it hit, whole; and the build goes
-/// on from there to the same end.
-fn check_after_crash(disk: &FaultyDisk, oracle: &Oracle, reached: Reached, what: &str) {
-    let allowed = [reached.safe, reached.tried, reached.failed];
-    match MapReader::open(MapPath::on(disk.shared(), map()), 0) {
-        Ok(reader) => {
-            assert!(allowed.contains(&(reader.scan_number() as usize)), "{what}: {reached:?}");
-            oracle.check(&reader, what);
-            check_scans(&reader, what);
-        }
-        Err(Error::NoMap { .. }) if reached.safe == 0 => {}
-        Err(error) => panic!("{what}: {reached:?}: {error:#}"),
-    }
-    let end = live(disk, oracle);
-    assert!(end.finished, "{what}");
-    assert!(disk.files().keys().all(|path| !path.to_string_lossy().ends_with(".next")), "{what}");
-}
+/// Kinds of faults after which the same process succeeds in the end.
+const REFUSALS: [fn(u64) -> Fault; 4] = [Fault::Fails, Fault::LosesSync, Fault::IsFull, Fault::IsReadOnly];
 
 #[test]
 fn every_operation_fails_once_and_the_call_is_undone_and_goes_the_next_time() {
-    for config in [config(), compact()] {
-        fail_once_at_every_operation(&Oracle::of(config.clone()));
-        fail_once_at_every_operation(&Oracle::of(config).beside());
-    }
-    fail_once_at_every_operation(&Oracle::of(config().with_kept_scans(true)).beside());
-}
-
-fn fail_once_at_every_operation(oracle: &Oracle) {
-    let disk = undisturbed(oracle);
-    let (operations, changes) = (disk.operations(), disk.changes());
-    println!("{operations} operations, {changes} of them changes, {} storage", oracle.config.storage);
-    let faults = (0..operations).map(Fault::Fails);
-    let faults = faults.chain((0..changes).map(Fault::LosesSync));
-    let faults = faults.chain((0..changes).map(Fault::IsFull));
-    for fault in some_of(faults.chain((0..changes).map(Fault::IsReadOnly)), 5) {
-        let disk = FaultyDisk::new(fault);
-        let reached = live(&disk, oracle);
-        assert!(reached.finished, "{fault:?}");
-        // What was said to be safe is on the medium.
-        let left = disk.after_crash(Unsynced::Dropped);
-        let reader = MapReader::open(MapPath::on(left.shared(), map()), 0)
-            .unwrap_or_else(|error| panic!("{fault:?}: {error:#}"));
-        assert_eq!(reader.scan_number() as usize, oracle.scans.len(), "{fault:?}");
-        oracle.check(&reader, &format!("{fault:?}"));
-        check_scans(&reader, &format!("{fault:?}"));
+    let keeping = Build::of(config().with_kept_scans(true)).beside();
+    for build in Build::all(&config()).chain([keeping]) {
+        sweep(&build, faults(&build, &REFUSALS, 16), &[Left::Dropped]);
     }
 }
 
 #[test]
 fn a_fault_that_stays_gives_no_wrong_answer_and_once_it_is_mended_the_map_goes_on() {
     for config in [config(), compact()] {
-        let oracle = Oracle::of(config);
-        for operation in some_of(0..undisturbed(&oracle).operations(), 4) {
-            let disk = FaultyDisk::new(Fault::Breaks(operation));
-            let mut reached = live(&disk, &oracle);
-            disk.mend();
-            if !reached.finished {
-                reached = live(&disk, &oracle);
-            }
-            assert!(reached.finished, "{operation}");
-            let reader = MapReader::open(MapPath::on(disk.shared(), map()), 0).unwrap();
-            oracle.check(&reader, &format!("operation {operation}"));
-        }
+        let build = Build::of(config);
+        sweep(&build, faults(&build, &[Fault::Breaks], 8), &[Left::Mended]);
     }
 }
 
 #[test]
 fn the_power_goes_at_every_operation_and_the_last_flush_is_there() {
-    for config in [config(), compact()] {
-        crash_at_every_operation(&Oracle::of(config.clone()));
-        crash_at_every_operation(&Oracle::of(config).beside());
-    }
-    crash_at_every_operation(&Oracle::of(config().with_kept_scans(true)).beside());
-}
-
-fn crash_at_every_operation(oracle: &Oracle) {
-    for at in some_of(0..undisturbed(oracle).changes(), 5) {
-        let disk = FaultyDisk::new(Fault::Crashes(at));
-        let reached = live(&disk, oracle);
-        // The last operations may be more or fewer where threads do them side by side.
-        assert!(disk.has_crashed() || (oracle.is_beside && reached.finished));
-        let shuffled = (0..3).map(|seed| Unsynced::Shuffled(31 * at + seed));
-        for unsynced in shuffled.chain([Unsynced::Dropped, Unsynced::Kept]) {
-            let what = format!("crash at {at}, {unsynced:?}");
-            let left = disk.after_crash(unsynced);
-            check_after_crash(&left.copy(), oracle, reached, &what);
-        }
+    let keeping = Build::of(config().with_kept_scans(true)).beside();
+    for build in Build::all(&config()).chain([keeping]) {
+        sweep(&build, faults(&build, &[Fault::Crashes], 12), &EVERY_CRASH);
     }
 }
 
+/// Next to no memory: resident tiles become compact, those are saved by a thread of their own, and updates wait in
+/// files. Which operation comes as the n-th is left to chance then.
 #[test]
 fn short_of_memory_every_operation_fails_once_and_the_power_goes_at_every_operation() {
-    for storage in [Storage::OctoMap, Storage::Compact] {
-        let config = short_of_memory().with_storage(storage);
-        fail_and_crash_short_of_memory(&Oracle::of(config.clone()));
-        fail_and_crash_short_of_memory(&Oracle::of(config).beside());
-    }
-}
-
-fn fail_and_crash_short_of_memory(oracle: &Oracle) {
-    let changes = undisturbed(oracle).changes();
-    for at in some_of(0..changes, 5) {
-        for fault in [Fault::Fails(2 * at), Fault::IsFull(at), Fault::Crashes(at)] {
-            let disk = FaultyDisk::new(fault);
-            let reached = live(&disk, oracle);
-            let left = disk.after_crash(Unsynced::Shuffled(at));
-            if reached.finished {
-                let reader = MapReader::open(MapPath::on(left.shared(), map()), 0);
-                oracle.check(&reader.unwrap_or_else(|error| panic!("{fault:?}: {error:#}")), "at the end");
-            } else {
-                assert!(disk.has_crashed(), "{fault:?}");
-                check_after_crash(&left, oracle, reached, &format!("{fault:?}, short of memory"));
-            }
-        }
+    let kinds: [fn(u64) -> Fault; 3] = [Fault::Fails, Fault::IsFull, Fault::Crashes];
+    for build in Build::all(&config().with_tight_memory_bytes(6_000)) {
+        sweep(&build, faults(&build, &kinds, 20), &[Left::Shuffled(0)]);
     }
 }
 
 #[test]
 fn the_power_goes_some_time_after_the_process_was_killed_at_every_operation() {
-    let oracle = Oracle::new();
-    let changes = undisturbed(&oracle).changes();
-    for at in some_of(0..changes, 4) {
-        let disk = FaultyDisk::new(Fault::Crashes(at));
-        let before = live(&disk, &oracle);
-        for again in [at % 17, 7 + at % 89] {
-            let killed = disk.after_kill();
-            killed.set_fault(Fault::Crashes(again));
-            let mut reached = live(&killed, &oracle);
-            if reached == Reached::default() {
-                // It did not come to open the map.
-                reached = before;
-            }
-            let left = killed.after_crash(Unsynced::Shuffled(again));
-            check_after_crash(&left, &oracle, reached, &format!("killed at {at}, crash {again} later"));
-        }
-    }
+    sweep_after_kills(&Build::of(config()), 4, |at| vec![at % 17, 7 + at % 89]);
 }
 
 #[test]
 fn the_power_goes_again_at_every_operation_of_opening_after_a_crash() {
     for config in [config(), compact()] {
-        crash_again_while_opening(&Oracle::of(config));
+        crash_again_while_opening(&Build::of(config));
     }
 }
 
-fn crash_again_while_opening(oracle: &Oracle) {
+fn crash_again_while_opening(build: &Build) {
     let mut points = 0;
-    for at in some_of(0..undisturbed(oracle).changes(), 12) {
-        let disk = FaultyDisk::new(Fault::Crashes(at));
-        let reached = live(&disk, oracle);
+    for (at, fault) in (0..).zip(faults(build, &[Fault::Crashes], 24)) {
+        let disk = build.disk();
+        disk.set_fault(fault);
+        let reached = build.run(&disk, 0);
         for unsynced in [Unsynced::Dropped, Unsynced::Kept, Unsynced::Shuffled(at)] {
             let left = disk.after_crash(unsynced);
             for again in 0.. {
                 let recovering = left.copy();
                 recovering.set_fault(Fault::Crashes(again));
-                let opened = open(&recovering, oracle);
+                let opened = build.open(&recovering);
                 if !recovering.has_crashed() {
                     break;
                 }
                 points += 1;
                 // An error, except in the last steps: a later commit replaces `metadata.json` and the log as well.
                 drop(opened);
-                let what = format!("crash at {at}, {unsynced:?}, again at {again} of opening");
+                let what = format!("{fault:?}, {unsynced:?}, again at {again} of opening");
                 let left = recovering.after_crash(Unsynced::Shuffled(again));
-                match MapReader::open(MapPath::on(left.shared(), map()), 0) {
-                    Ok(reader) => {
-                        let found = reader.scan_number() as usize;
-                        assert!([reached.safe, reached.tried].contains(&found), "{what}");
-                        oracle.check(&reader, &what);
-                    }
-                    Err(Error::NoMap { .. }) if reached.safe == 0 => {}
-                    Err(error) => panic!("{what}: {error:#}"),
-                }
-                match open(&left, oracle) {
-                    Ok(mapper) => oracle.check(&mapper, &what),
-                    Err(Error::NoMap { .. }) if reached.safe == 0 => {}
+                build.find(&left, &reached.states, &what);
+                match build.open(&left) {
+                    Ok(mapper) => build.check_digest(&mapper, &what),
+                    Err(Error::NoMap { .. }) if reached.states.contains(&0) => {}
                     Err(error) => panic!("{what}: {error:#}"),
                 }
             }
@@ -431,18 +337,18 @@ fn crash_again_while_opening(oracle: &Oracle) {
 /// A flush that the disk refused is not tried again at once: the map goes on, and the power goes.
 #[test]
 fn a_flush_that_failed_leaves_nothing_behind_that_a_crash_could_bring_back() {
-    let oracle = Oracle::new();
+    let build = Build::of(config());
     let mut points = 0;
-    for at in some_of(0..undisturbed(&oracle).changes(), 8) {
+    for (at, fault) in (0..).zip(faults(&build, &[Fault::LosesSync], 16)) {
         for later in [0, 1, 2, 3, 5, 8, 13, 21, 34] {
-            let disk = FaultyDisk::new(Fault::LosesSync(at));
-            let Some(reached) = live_carelessly(&disk, &oracle, Fault::Crashes(later)) else { break };
+            let disk = FaultyDisk::new(fault);
+            let Some(reached) = live_carelessly(&disk, &build, Fault::Crashes(later)) else { break };
             points += 1;
             let unsynced =
                 [Unsynced::Dropped, Unsynced::Kept, Unsynced::Shuffled(at), Unsynced::Shuffled(later)];
             for unsynced in unsynced {
-                let what = format!("sync lost at {at}, crash {later} later, {unsynced:?}");
-                check_after_crash(&disk.after_crash(unsynced), &oracle, reached, &what);
+                let what = format!("{fault:?}, crash {later} later, {unsynced:?}");
+                build.check(&disk.after_crash(unsynced), &reached, &what);
             }
         }
     }
@@ -451,18 +357,19 @@ fn a_flush_that_failed_leaves_nothing_behind_that_a_crash_could_bring_back() {
 
 /// Inserts all scans and flushes as always, whatever a flush answers; after the first that fails comes another fault.
 /// `None` if none failed, or something else did.
-fn live_carelessly(disk: &FaultyDisk, oracle: &Oracle, then: Fault) -> Option<Reached> {
-    let mut mapper = create(disk, oracle).ok()?;
+fn live_carelessly(disk: &FaultyDisk, build: &Build, then: Fault) -> Option<Reached> {
+    let mut mapper = build.create(disk).ok()?;
     mapper.begin_input(INPUT).ok()?;
-    let (mut reached, mut has_failed) = (Reached::default(), false);
-    for (scan, number) in oracle.scans.iter().zip(1..) {
+    let mut progress = Progress { is_early: false, safe: 0, tried: 0, failed: None };
+    let mut has_failed = false;
+    for (scan, number) in build.scans.iter().zip(1..) {
         if mapper.insert_scan(scan).is_err() {
             break;
         }
         if FLUSHED.contains(&number) {
-            reached.tried = number;
+            progress.tried = number;
             match mapper.flush() {
-                Ok(()) => reached.safe = number,
+                Ok(()) => progress.safe = number,
                 Err(_) if has_failed => break,
                 Err(_) => {
                     has_failed = true;
@@ -474,24 +381,21 @@ fn live_carelessly(disk: &FaultyDisk, oracle: &Oracle, then: Fault) -> Option<Re
             }
         }
     }
-    has_failed.then_some(reached)
+    has_failed.then(|| progress.reached(Ok(())))
 }
 
 #[test]
 fn a_flush_that_failed_is_not_believed_by_the_next_process() {
-    let oracle = Oracle::new();
+    let build = Build::of(config());
     let mut points = 0;
-    for at in some_of(0..undisturbed(&oracle).changes(), 2) {
-        for fault in [Fault::LosesSync(at), Fault::LosesSyncAndDies(at)] {
-            let disk = FaultyDisk::new(fault);
-            // The process ends where the flush fails.
-            let Some(reached) = live_carelessly(&disk, &oracle, Fault::Crashes(0)) else { continue };
-            points += 1;
-            let next = disk.after_kill();
-            drop(open(&next, &oracle).unwrap());
-            let left = next.after_crash(Unsynced::Dropped);
-            check_after_crash(&left, &oracle, reached, &format!("{fault:?}"));
-        }
+    for fault in faults(&build, &[Fault::LosesSync, Fault::LosesSyncAndDies], 4) {
+        let disk = FaultyDisk::new(fault);
+        // The process ends where the flush fails.
+        let Some(reached) = live_carelessly(&disk, &build, Fault::Crashes(0)) else { continue };
+        points += 1;
+        let next = disk.after_kill();
+        drop(build.open(&next).unwrap());
+        build.check(&next.after_crash(Unsynced::Dropped), &reached, &format!("{fault:?}"));
     }
     println!("{points} failed flushes and new processes");
 }
@@ -499,11 +403,11 @@ fn a_flush_that_failed_is_not_believed_by_the_next_process() {
 /// What a map was built from is known from the commit on, not from when `metadata.json` says it too.
 #[test]
 fn the_input_is_that_of_the_last_commit() {
-    let oracle = Oracle::new();
+    let build = Build::of(config());
     let begin = |fault| {
         let disk = FaultyDisk::new(Fault::None);
-        let mut mapper = create(&disk, &oracle).unwrap();
-        mapper.insert_scan(&oracle.scans[0]).unwrap();
+        let mut mapper = build.create(&disk).unwrap();
+        mapper.insert_scan(&build.scans[0]).unwrap();
         mapper.begin_input("other scans").unwrap();
         disk.set_fault(fault);
         let begun = mapper.begin_input(INPUT).is_ok();
@@ -526,7 +430,7 @@ fn the_input_is_that_of_the_last_commit() {
         assert!(is_committed || !begun);
         *(if is_committed { &mut committed } else { &mut not_committed }) += 1;
         let resumed =
-            open(left, &oracle).unwrap().resume_input(if is_committed { INPUT } else { "other scans" });
+            build.open(left).unwrap().resume_input(if is_committed { INPUT } else { "other scans" });
         assert!(resumed.is_ok(), "crash at {at}: {resumed:?}");
     }
     assert!(committed > 1 && not_committed > 0);
@@ -534,40 +438,38 @@ fn the_input_is_that_of_the_last_commit() {
 
 #[test]
 fn a_failed_sync_and_then_a_full_disk_lose_nothing() {
-    let oracle = Oracle::new();
-    for at in 0..60 {
-        for full in 0..12 {
-            let disk = FaultyDisk::new(Fault::None);
-            let mut mapper = create(&disk, &oracle).unwrap();
-            for scan in &oracle.scans[..3] {
-                mapper.insert_scan(scan).unwrap();
-            }
-            disk.set_fault(Fault::LosesSync(at));
-            if mapper.flush().is_ok() {
-                continue;
-            }
-            disk.set_fault(Fault::IsFull(full));
-            let _ = mapper.flush();
-            disk.make_room();
-            // Queries push tiles out of memory.
-            for tile in mapper.tile_indices() {
-                mapper.tile(tile).unwrap();
-            }
-            mapper.flush().unwrap_or_else(|error| panic!("at {at}, full {full}: {error:#}"));
-            oracle.check(&mapper, "with room");
-            let left = disk.after_crash(Unsynced::Dropped);
-            oracle.check(&MapReader::open(MapPath::on(left.shared(), map()), 0).unwrap(), "after a crash");
+    let build = Build::of(config());
+    for (lost, full) in some_of((0..60).flat_map(|lost| (0..12).map(move |full| (lost, full))), 2) {
+        let disk = FaultyDisk::new(Fault::None);
+        let mut mapper = build.create(&disk).unwrap();
+        for scan in &build.scans[..3] {
+            mapper.insert_scan(scan).unwrap();
         }
+        disk.set_fault(Fault::LosesSync(lost));
+        if mapper.flush().is_ok() {
+            continue;
+        }
+        disk.set_fault(Fault::IsFull(full));
+        let _ = mapper.flush();
+        disk.make_room();
+        // Queries push tiles out of memory.
+        for tile in mapper.tile_indices() {
+            mapper.tile(tile).unwrap();
+        }
+        mapper.flush().unwrap_or_else(|error| panic!("at {lost}, full {full}: {error:#}"));
+        build.check_digest(&mapper, "with room");
+        let left = disk.after_crash(Unsynced::Dropped);
+        build.check_digest(&MapReader::open(at(&left), 0).unwrap(), "after a crash");
     }
 }
 
 #[test]
 fn a_reload_that_fails_changes_nothing() {
-    let oracle = Oracle::new();
+    let build = Build::of(config());
     let disk = FaultyDisk::new(Fault::None);
     let roomy = config().with_write_buffer_bytes(1 << 20);
-    let mut mapper = OutOfCoreTileMapper::create(MapPath::on(disk.shared(), map()), roomy).unwrap();
-    for (scan, number) in oracle.scans.iter().zip(1..) {
+    let mut mapper = OutOfCoreTileMapper::create(at(&disk), roomy).unwrap();
+    for (scan, number) in build.scans.iter().zip(1..) {
         mapper.insert_scan(scan).unwrap();
         if number == 3 {
             mapper.flush().unwrap();
@@ -581,86 +483,58 @@ fn a_reload_that_fails_changes_nothing() {
             if reloaded == Some(true) {
                 return;
             }
-            oracle.check(&mapper, "after a reload that failed");
+            build.check_digest(&mapper, "after a reload that failed");
         }
     }
 }
 
 /// A map of the original format, with the content of the first three scans.
-fn foreign(oracle: &Oracle) -> FaultyDisk {
+fn foreign(build: &Build) -> FaultyDisk {
     let disk = FaultyDisk::new(Fault::None);
-    let mut mapper = create(&disk, oracle).unwrap();
-    for scan in &oracle.scans[..3] {
+    let mut mapper = build.create(&disk).unwrap();
+    for scan in &build.scans[..3] {
         mapper.insert_scan(scan).unwrap();
     }
     mapper.flush().unwrap();
     drop(mapper);
     let disk = disk.copy();
-    disk.take(&map().join("commits.log"));
-    let metadata = br#"{"version": "1.0", "resolution": 0.4, "tile_size": 3.2, "bounds": {"min": [0,0,0], "max": [0,0,0]}}"#;
-    disk.put(&map().join("metadata.json"), metadata);
-    for (path, bytes) in disk.files() {
-        if path.ends_with("iwlo_meta.bin") {
-            let count = u64::from_le_bytes(bytes[8..16].try_into().unwrap()) as usize;
-            disk.put(&path, &bytes[..16 + 18 * count]);
-        }
-    }
+    make_foreign(&disk, map());
     disk
 }
 
 #[test]
 fn a_map_of_the_seeds_format_is_adopted_whole_or_not_at_all() {
-    let oracle = Oracle::new();
-    let foreign = foreign(&oracle);
-    let (before, after) = {
-        let mut mapper = open(&foreign.copy(), &oracle).unwrap();
-        let before = mapper.digest().unwrap();
-        mapper.insert_scan(&oracle.scans[3]).unwrap();
-        (before, mapper.digest().unwrap())
-    };
-    let adopt = |disk: &FaultyDisk| -> Result<()> {
-        let mut mapper = open(disk, &oracle)?;
-        mapper.insert_scan(&oracle.scans[3])?;
+    let build = Build::of(config());
+    let (foreign, fourth) = (foreign(&build), build.scans[3].clone());
+    let before = digest_of(&foreign, None).unwrap();
+    let adopt = move |disk: &FaultyDisk| -> Result<()> {
+        let mut mapper = OutOfCoreTileMapper::open(at(disk), config())?;
+        if mapper.digest()? == before {
+            mapper.insert_scan(&fourth)?;
+        }
         mapper.flush()
     };
-    for at in 0.. {
-        let disk = foreign.copy();
-        disk.set_fault(Fault::Crashes(at));
-        let done = adopt(&disk).is_ok();
-        for unsynced in
-            [Unsynced::Dropped, Unsynced::Kept, Unsynced::Shuffled(at), Unsynced::Shuffled(at + 7)]
-        {
-            let left = disk.after_crash(unsynced);
-            let what = format!("crash at {at}, {unsynced:?}");
-            let reader = MapReader::open(MapPath::on(left.shared(), map()), 0)
-                .unwrap_or_else(|error| panic!("{what}: {error:#}"));
-            let digest = reader.digest().unwrap_or_else(|error| panic!("{what}: {error:#}"));
-            assert!(digest == after || (!done && digest == before), "{what}");
-            let mapper = open(&left, &oracle).unwrap_or_else(|error| panic!("{what}: {error:#}"));
-            assert_eq!(mapper.digest().unwrap(), digest, "{what}");
-        }
-        if !disk.has_crashed() {
-            break;
-        }
-    }
+    let done = foreign.copy();
+    adopt(&done).unwrap();
+    let after = digest_of(&done, None).unwrap();
+    let job = Job::new(foreign.copy(), map(), adopt.clone(), |disk| digest_of(disk, None).unwrap());
+    sweep(&job, faults(&job, &[Fault::Crashes], 2), &EVERY_CRASH);
     // Twice no room, at any two changes.
-    for first in (0..90).step_by(3) {
-        for second in (0..90).step_by(2) {
-            let disk = foreign.copy();
-            let mut mapper = open(&disk, &oracle).unwrap();
-            mapper.insert_scan(&oracle.scans[3]).unwrap();
-            for full in [first, second] {
-                disk.set_fault(Fault::IsFull(full));
-                let _ = mapper.flush();
-            }
-            disk.make_room();
-            mapper.flush().unwrap_or_else(|error| panic!("full at {first}, at {second}: {error:#}"));
-            assert_eq!(mapper.digest().unwrap(), after);
+    for (first, second) in some_of((0..90).flat_map(|first| (0..90).map(move |second| (first, second))), 6) {
+        let disk = foreign.copy();
+        let mut mapper = build.open(&disk).unwrap();
+        mapper.insert_scan(&build.scans[3]).unwrap();
+        for full in [first, second] {
+            disk.set_fault(Fault::IsFull(full));
+            let _ = mapper.flush();
         }
+        disk.make_room();
+        mapper.flush().unwrap_or_else(|error| panic!("full at {first}, at {second}: {error:#}"));
+        assert_eq!(mapper.digest().unwrap(), after);
     }
     // A reader that opened it before sees what it was.
     let disk = foreign.copy();
-    let reader = MapReader::open(MapPath::on(disk.shared(), map()), 0).unwrap();
+    let reader = MapReader::open(at(&disk), 0).unwrap();
     adopt(&disk).unwrap();
     assert_eq!(reader.digest().unwrap(), before);
 }

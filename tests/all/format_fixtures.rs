@@ -43,7 +43,7 @@ fn copy(from: &Path, to: &Path) {
 }
 
 fn config() -> MapConfig {
-    MapConfig::new(0.4, 3.2).unwrap().with_range(0.0, 5.0).with_cache_tiles(2).with_write_buffer_bytes(600)
+    crate::harness::config().with_range(0.0, 5.0)
 }
 
 fn scans() -> Vec<Scan> {

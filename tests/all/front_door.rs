@@ -1,6 +1,7 @@
 //! One trait for everything that can be asked: the same answers from whatever holds the map, and those of a search of
 //! every voxel.
 
+use crate::queries::config;
 use std::collections::BTreeMap;
 use tempfile::TempDir;
 use testkit::random_scans::{Random, random_scan};
@@ -17,10 +18,6 @@ use voxtile_local::{LocalMap, LocalParameters, Obstacle};
 use voxtile_share::VoxelSet;
 
 type Voxels = BTreeMap<VoxelIndex, Occupancy>;
-
-fn config() -> MapConfig {
-    MapConfig::new(0.1, 1.0).unwrap().with_cache_tiles(4).with_write_buffer_bytes(5_000)
-}
 
 fn everything() -> Aabb {
     Aabb { min: [-100.0; 3], max: [100.0; 3] }

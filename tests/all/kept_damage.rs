@@ -1,45 +1,19 @@
 //! Damage to each kind of file of kept scans, whether the map or only a snapshot needs it: found, repaired, and never a
 //! way back for scans that were removed.
 
+use crate::harness::{
+    at, damage_in, digest_of, keeping_scans as config, map, name, open_or_create, rework, scans,
+};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
 use testkit::random_scans::{Random, random_scan};
-use voxtile::integrity::{Finding, Repair, Severity, repair, verify};
-use voxtile::mapper::KeptSummary;
+use voxtile::integrity::{Repair, repair};
 use voxtile::operations::{
-    NewPoses, Remap, Rework, ScanSelection, delete_snapshot, remap, remove_scans, revert, snapshot,
+    NewPoses, Remap, ScanSelection, delete_snapshot, remap, remove_scans, revert, snapshot,
 };
-use voxtile::store::{CommitLog, Layout, SnapshotName, TileStore, read_log};
-use voxtile::{
-    Error, MapConfig, MapPath, MapQueries, MapReader, Mapper, MemoryLimit, OutOfCoreTileMapper, Pose, Result,
-    ScanRef,
-};
-
-fn map() -> &'static Path {
-    Path::new("/city/map")
-}
-
-fn at(disk: &FaultyDisk) -> MapPath {
-    MapPath::on(disk.shared(), map())
-}
-
-fn name(name: &str) -> SnapshotName {
-    SnapshotName::new(name).unwrap()
-}
-
-fn scans(disk: &FaultyDisk) -> Result<KeptSummary> {
-    KeptSummary::read(at(disk))
-}
-
-fn config() -> MapConfig {
-    let config = MapConfig::new(0.4, 3.2).unwrap().with_range(0.3, 3.0).with_kept_scans(true);
-    config.with_cache_tiles(2).with_write_buffer_bytes(600)
-}
-
-fn rework() -> Rework {
-    Rework::default().with_memory(MemoryLimit::Bytes(MemoryLimit::least_bytes(&config().grid)))
-}
+use voxtile::store::{CommitLog, Layout, TileStore, read_log};
+use voxtile::{Digest, MapReader, Mapper, OutOfCoreTileMapper, Pose, Result, ScanRef};
 
 fn pose(number: u64, by_m: f64) -> Pose {
     Pose::from_quaternion([3.0 * (number % 4) as f64 + by_m, 0.0, 0.5], [0.0, 0.0, 0.0, 1.0]).unwrap()
@@ -47,10 +21,7 @@ fn pose(number: u64, by_m: f64) -> Pose {
 
 /// Maps a scan, by a process of its own: it gets a segment of its own.
 fn insert(disk: &FaultyDisk, number: u64) -> Result<()> {
-    let mut mapper = match OutOfCoreTileMapper::open(at(disk), config()) {
-        Err(Error::NoMap { .. }) => OutOfCoreTileMapper::create(at(disk), config())?,
-        opened => opened?,
-    };
+    let mut mapper = open_or_create(disk, &config())?;
     let scan = random_scan(&mut Random(number), [0.0; 3], 5);
     mapper.insert_points(&ScanRef::in_sensor(pose(number, 0.0), &scan.points))?;
     mapper.flush()
@@ -100,10 +71,6 @@ fn files_of_scans(disk: &FaultyDisk) -> BTreeMap<PathBuf, Vec<u8>> {
     disk.files().into_iter().filter(|(path, _)| path.starts_with(&folder)).collect()
 }
 
-fn digest(disk: &FaultyDisk) -> String {
-    MapReader::open(at(disk), 0).unwrap().digest().unwrap().to_string()
-}
-
 fn flush_number(disk: &FaultyDisk) -> u64 {
     MapReader::open(at(disk), 0).unwrap().flush_number()
 }
@@ -111,17 +78,6 @@ fn flush_number(disk: &FaultyDisk) -> u64 {
 /// The numbers of the scans that can be read with their points.
 fn kept(disk: &FaultyDisk) -> Result<Vec<u64>> {
     MapReader::open(at(disk), 0)?.kept_scans()?.map(|scan| scan.map(|scan| scan.number())).collect()
-}
-
-fn damage_in(disk: &FaultyDisk) -> BTreeSet<PathBuf> {
-    let mut found = BTreeSet::new();
-    let note = |finding: &Finding| {
-        if finding.severity == Severity::Damage {
-            found.insert(finding.path.clone());
-        }
-    };
-    verify(at(disk), note, |_, _| ()).unwrap();
-    found
 }
 
 fn repaired(disk: &FaultyDisk, what: &str) -> Repair {
@@ -153,14 +109,14 @@ fn damages(files: &BTreeMap<PathBuf, Vec<u8>>, path: &Path) -> Vec<(String, Opti
 }
 
 /// Does one thing with a map: it is what it would be without the damage, or an error and nothing was done.
-fn works(disk: &FaultyDisk, work: &Work, expected: &str, what: &str, is_repaired: bool) -> bool {
+fn works(disk: &FaultyDisk, work: &Work, expected: Digest, what: &str, is_repaired: bool) -> bool {
     let (name, work, may_bring_back) = work;
-    let (before, flush) = (digest(disk), flush_number(disk));
+    let (before, flush) = (digest_of(disk, None).unwrap(), flush_number(disk));
     let what = format!("{what}: {name}");
     match work(disk) {
-        Ok(()) => assert_eq!(digest(disk), expected, "{what}"),
+        Ok(()) => assert_eq!(digest_of(disk, None).unwrap(), expected, "{what}"),
         Err(error) => {
-            assert_eq!(digest(disk), before, "{what}: {error:#}");
+            assert_eq!(digest_of(disk, None).unwrap(), before, "{what}: {error:#}");
             assert_eq!(flush_number(disk), flush, "{what}: {error:#}");
             return false;
         }
@@ -183,7 +139,7 @@ fn damage_to_any_file_of_kept_scans_is_found_and_repaired_and_brings_no_removed_
     let digests = WORKS.map(|(name, work, _)| {
         let disk = whole.copy();
         work(&disk).unwrap_or_else(|error| panic!("{name}: {error:#}"));
-        digest(&disk)
+        digest_of(&disk, None).unwrap()
     });
     let (mut done, mut refused) = (0, 0);
     for path in files.keys() {
@@ -198,7 +154,7 @@ fn damage_to_any_file_of_kept_scans_is_found_and_repaired_and_brings_no_removed_
                 assert!(format!("{error:#}").contains(&path.display().to_string()), "{what}: {error:#}");
             }
             let mut done_before = 0;
-            for (work, expected) in WORKS.iter().zip(&digests) {
+            for (work, &expected) in WORKS.iter().zip(&digests) {
                 done_before += usize::from(works(&damaged.copy(), work, expected, &what, false));
             }
             let before = files_of_scans(&damaged);
@@ -209,13 +165,13 @@ fn damage_to_any_file_of_kept_scans_is_found_and_repaired_and_brings_no_removed_
             assert_eq!((repair.is_complete(), repair.tiles_lost), (is_complete, 0), "{what}: {repair:?}");
             let lost = repair.scans_lost + repair.snapshot_scans_lost;
             assert!(is_complete == (lost == 0) && repair.actions > 0, "{what}: {repair:?}");
-            assert_eq!(digest(&damaged), digest(&whole), "{what}");
+            assert_eq!(digest_of(&damaged, None).unwrap(), digest_of(&whole, None).unwrap(), "{what}");
             assert!(!kept(&damaged).unwrap().contains(&REMOVED), "{what}");
             let left = damaged.files();
             let is_left = |bytes: &Vec<u8>| left.values().any(|other| other == bytes);
             assert!(before.values().all(is_left), "{what}: a file is gone");
             let mut done_after = 0;
-            for (work, expected) in WORKS.iter().zip(&digests) {
+            for (work, &expected) in WORKS.iter().zip(&digests) {
                 let disk = damaged.copy();
                 done_after += usize::from(works(&disk, work, expected, &what, true));
                 assert_eq!(damage_in(&disk), BTreeSet::new(), "{what}");
@@ -296,7 +252,7 @@ fn a_file_in_place_of_the_scans_that_only_snapshots_keep_is_moved_away() {
     insert(&disk, 2).unwrap();
     snapshot(at(&disk), &name("kept")).unwrap();
     reverted(&disk, "plain").unwrap();
-    let digest_before = digest(&disk);
+    let digest_before = digest_of(&disk, None).unwrap();
     let scans = map().join("kept_scans");
     assert!(!files_of_scans(&disk).is_empty());
     disk.take(&scans);
@@ -305,7 +261,7 @@ fn a_file_in_place_of_the_scans_that_only_snapshots_keep_is_moved_away() {
     let report = repaired(&disk, "a file");
     assert!(report.snapshot_scans_lost > 0, "{report:?}");
     assert!(disk.files().iter().any(|(path, bytes)| path.starts_with(map()) && bytes == b"not a folder"));
-    assert_eq!(digest(&disk), digest_before);
+    assert_eq!(digest_of(&disk, None).unwrap(), digest_before);
     insert(&disk, 3).unwrap();
     revert(at(&disk), &name("kept"), None, |_, _| ()).unwrap();
 }
@@ -344,7 +300,7 @@ fn a_map_whose_log_names_no_catalog_opens_and_names_it_from_the_next_flush_on() 
         let (disk, undisturbed) = (disk.copy(), whole.copy());
         work(&disk).unwrap_or_else(|error| panic!("{name}: {error:#}"));
         work(&undisturbed).unwrap();
-        assert_eq!(digest(&disk), digest(&undisturbed), "{name}");
+        assert_eq!(digest_of(&disk, None).unwrap(), digest_of(&undisturbed, None).unwrap(), "{name}");
         assert!(named(&disk).is_some(), "{name}");
         assert_eq!(damage_in(&disk), BTreeSet::new(), "{name}");
     }
@@ -369,13 +325,13 @@ fn a_removal_is_refused_before_it_changes_anything_while_the_catalog_of_a_snapsh
     let disk = a_map();
     let catalog = files_of_scans(&disk).into_keys().find(|path| path.ends_with("catalog.1")).unwrap();
     disk.take(&catalog);
-    let (before, flush) = (digest(&disk), flush_number(&disk));
+    let (before, flush) = (digest_of(&disk, None).unwrap(), flush_number(&disk));
     let how = rework().with_keep_as(name("before"));
     let refused = remove_scans(at(&disk), &ScanSelection::Numbers(2, 2), true, &how, |_, _| ());
     let message = testkit::support::message_of(refused);
     let parts = ["catalog.1: ", "the snapshot s needs it", "nothing was changed"];
     assert!(parts.iter().all(|part| message.contains(part)), "{message}");
-    assert_eq!((digest(&disk), flush_number(&disk)), (before, flush));
+    assert_eq!((digest_of(&disk, None).unwrap(), flush_number(&disk)), (before, flush));
     delete_snapshot(at(&disk), &name("s")).unwrap();
     remove(&disk, 2).unwrap();
     assert_eq!(kept(&disk).unwrap(), [1, 4, 5]);

@@ -1,30 +1,17 @@
 //! The files of kept scans under the hands of a writer: what is damaged stays, and what could not be synced is no
 //! scan's undoing.
 
+use crate::harness::{at, is_whole, keeping_scans as config, map, name};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
-use voxtile::integrity::{Repair, repair, verify};
+use voxtile::integrity::{Repair, repair};
 use voxtile::mapper::KeptScan;
 use voxtile::operations::{delete_snapshot, snapshot};
 use voxtile::scan::PointBlocks;
 use voxtile::scan::ScanPoints;
-use voxtile::store::{CatalogEntry, KeptFrame, KeptRecord, SegmentPlace, SnapshotName, TileStore};
-use voxtile::{
-    Error, MapConfig, MapPath, MapReader, Mapper, OutOfCoreTileMapper, RayConfig, Result, ScanRef,
-};
-
-fn map() -> &'static Path {
-    Path::new("/city/map")
-}
-
-fn at(disk: &FaultyDisk) -> MapPath {
-    MapPath::on(disk.shared(), map())
-}
-
-fn config() -> MapConfig {
-    MapConfig::new(0.4, 3.2).unwrap().with_kept_scans(true)
-}
+use voxtile::store::{CatalogEntry, KeptFrame, KeptRecord, SegmentPlace, TileStore};
+use voxtile::{Error, MapReader, Mapper, OutOfCoreTileMapper, RayConfig, Result, ScanRef};
 
 /// The points of a scan, told by its name.
 fn points(name: u64) -> Vec<[f64; 3]> {
@@ -68,11 +55,6 @@ fn kept_points(disk: &FaultyDisk) -> Result<Vec<Vec<[f64; 3]>>> {
         Ok(points)
     };
     MapReader::open(at(disk), 0)?.kept_scans()?.map(of_scan).collect()
-}
-
-/// Segments that could not be synced may be left behind.
-fn is_whole(disk: &FaultyDisk) -> bool {
-    verify(at(disk), |_| (), |_, _| ()).unwrap().is_whole()
 }
 
 #[test]
@@ -251,7 +233,7 @@ fn flip(disk: &FaultyDisk, path: &Path, offset: usize) {
 
 fn repaired(disk: &FaultyDisk, what: &str) -> Repair {
     let repaired = repair(at(disk), |_| (), |_, _| ()).unwrap_or_else(|error| panic!("{what}: {error:#}"));
-    assert!(verify(at(disk), |_| (), |_, _| ()).unwrap().is_whole(), "{what}");
+    assert!(is_whole(disk), "{what}");
     repaired
 }
 
@@ -304,7 +286,7 @@ fn a_flipped_bit_in_a_catalog_costs_one_scan_at_most_and_no_file() {
 #[test]
 fn what_only_a_lost_record_named_stays_when_a_snapshot_of_it_goes() {
     let disk = a_map_of(3);
-    let name = SnapshotName::new("s").unwrap();
+    let name = name("s");
     snapshot(at(&disk), &name).unwrap();
     let mut mapper = OutOfCoreTileMapper::open(at(&disk), config()).unwrap();
     insert(&mut mapper, 4).and_then(|()| mapper.flush()).unwrap();
@@ -427,7 +409,7 @@ fn a_repair_without_metadata_and_log_keeps_all_kept_scans() {
 #[test]
 fn a_repair_without_metadata_and_log_keeps_the_kept_scans_of_snapshots() {
     let disk = a_map_of(3);
-    let name = SnapshotName::new("s").unwrap();
+    let name = name("s");
     snapshot(at(&disk), &name).unwrap();
     let mut mapper = OutOfCoreTileMapper::open(at(&disk), config()).unwrap();
     insert(&mut mapper, 4).and_then(|()| mapper.flush()).unwrap();

@@ -1,47 +1,24 @@
 //! What a command that is killed, or that the disk refuses a rename, leaves in a map: reported by `verify`, completed by
 //! the next writer and by the same command.
 
+use crate::harness::{at, digest_of, keeping_scans, make_foreign, map, name, open_or_create, rework, scans};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
 use testkit::random_scans::{Random, random_scan};
 use testkit::support::{message_of, some_of};
 use voxtile::integrity::{Verification, repair, verify};
-use voxtile::mapper::KeptSummary;
 use voxtile::operations::{
-    Decay, NewPoses, Part, Remap, RemapBeside, Rework, ScanSelection, clear, decay, delete_snapshot,
-    kept_bytes, remap, remove_points, remove_scans, revert, snapshot,
+    Decay, NewPoses, Part, Remap, RemapBeside, ScanSelection, clear, decay, delete_snapshot, kept_bytes,
+    remap, remove_points, remove_scans, revert, snapshot,
 };
-use voxtile::store::{SnapshotName, TileStore};
+use voxtile::store::TileStore;
 use voxtile::{
-    Aabb, Error, MapConfig, MapPath, MapQueries, MapReader, MapView, Mapper, MemoryLimit,
-    OutOfCoreTileMapper, Pose, Result, ScanRef, Storage,
+    Aabb, Error, MapConfig, MapReader, MapView, Mapper, OutOfCoreTileMapper, Pose, Result, ScanRef, Storage,
 };
-
-fn map() -> &'static Path {
-    Path::new("/city/map")
-}
-
-fn at(disk: &FaultyDisk) -> MapPath {
-    MapPath::on(disk.shared(), map())
-}
-
-fn name(name: &str) -> SnapshotName {
-    SnapshotName::new(name).unwrap()
-}
-
-fn scans(disk: &FaultyDisk) -> Result<KeptSummary> {
-    KeptSummary::read(at(disk))
-}
 
 fn config(storage: Storage, keeps_scans: bool) -> MapConfig {
-    let config = MapConfig::new(0.4, 3.2).unwrap().with_range(0.3, 3.0).with_storage(storage);
-    config.with_kept_scans(keeps_scans).with_cache_tiles(2).with_write_buffer_bytes(600)
-}
-
-fn rework() -> Rework {
-    Rework::default()
-        .with_memory(MemoryLimit::Bytes(MemoryLimit::least_bytes(&config(Storage::OctoMap, true).grid)))
+    keeping_scans().with_storage(storage).with_kept_scans(keeps_scans)
 }
 
 fn pose(number: u64, by_m: f64) -> Pose {
@@ -50,10 +27,7 @@ fn pose(number: u64, by_m: f64) -> Pose {
 
 /// Maps scans with these numbers, with a flush after each.
 fn build(disk: &FaultyDisk, config: MapConfig, numbers: std::ops::Range<u64>) -> Result<()> {
-    let mut mapper = match OutOfCoreTileMapper::open(at(disk), config.clone()) {
-        Err(Error::NoMap { .. }) => OutOfCoreTileMapper::create(at(disk), config)?,
-        opened => opened?,
-    };
+    let mut mapper = open_or_create(disk, &config)?;
     for number in numbers.filter(|&number| number >= mapper.scan_number()).collect::<Vec<_>>() {
         let scan = random_scan(&mut Random(number), [0.0; 3], 5);
         mapper.insert_points(&ScanRef::in_sensor(pose(number, 0.0), &scan.points))?;
@@ -176,17 +150,7 @@ fn damaged(storage: Storage) -> FaultyDisk {
 /// The same without the files that voxtile adds.
 fn foreign() -> FaultyDisk {
     let disk = four_scans(Storage::OctoMap, false);
-    ["commits.log", "snapshots", "scans.bin"].iter().for_each(|name| disk.take(&map().join(name)));
-    let metadata = br#"{"version": "1.0", "resolution": 0.4, "tile_size": 3.2, "bounds": {"min": [0,0,0], "max": [0,0,0]}}"#;
-    disk.put(&map().join("metadata.json"), metadata);
-    for (path, bytes) in disk.files() {
-        if path.ends_with("iwlo_meta.bin") {
-            let count = u64::from_le_bytes(bytes[8..16].try_into().unwrap()) as usize;
-            disk.put(&path, &bytes[..16 + 18 * count]);
-        } else if path.to_string_lossy().contains(".flush") {
-            disk.take(&path);
-        }
-    }
+    make_foreign(&disk, map());
     disk.copy()
 }
 
@@ -511,10 +475,6 @@ fn a_removal_removes_the_second_map_of_a_remapping_that_was_killed() {
     assert!(!findings(&disk).1.contains(second));
 }
 
-fn digest(disk: &FaultyDisk) -> voxtile::Digest {
-    MapReader::open(at(disk), 0).unwrap().digest().unwrap()
-}
-
 fn names(disk: &FaultyDisk) -> Vec<String> {
     let infos = voxtile::operations::snapshots(at(disk)).unwrap();
     let mut names: Vec<_> =
@@ -539,7 +499,7 @@ fn a_call_that_makes_a_snapshot_first_can_be_repeated_after_a_kill() {
             let start = four_scans(storage, true);
             let done = start.copy();
             work(&done).unwrap();
-            let (before, after) = (digest(&start), digest(&done));
+            let (before, after) = (digest_of(&start, None).unwrap(), digest_of(&done, None).unwrap());
             assert_eq!(before == after, what == "snapshot");
             for at in some_of(0..done.changes(), one_in) {
                 let disk = start.copy();
@@ -547,9 +507,9 @@ fn a_call_that_makes_a_snapshot_first_can_be_repeated_after_a_kill() {
                 let _ = work(&disk);
                 let disk = disk.after_kill();
                 let what = format!("{what}, change {at}");
-                assert!([before, after].contains(&digest(&disk)), "{what}");
+                assert!([before, after].contains(&digest_of(&disk, None).unwrap()), "{what}");
                 work(&disk).unwrap_or_else(|error| panic!("{what}: again: {error:#}"));
-                assert_eq!((digest(&disk), names(&disk)), (after, names(&done)), "{what}");
+                assert_eq!((digest_of(&disk, None).unwrap(), names(&disk)), (after, names(&done)), "{what}");
                 assert!(findings(&disk).0.is_whole(), "{what}");
             }
         }
@@ -561,7 +521,7 @@ fn a_call_that_makes_a_snapshot_first_can_be_repeated_after_a_kill() {
 fn a_snapshot_of_another_state_is_not_taken_for_that_of_an_earlier_attempt() {
     let disk = four_scans(Storage::Compact, true);
     let third = Some(name("third"));
-    let before = (digest(&disk), names(&disk));
+    let before = (digest_of(&disk, None).unwrap(), names(&disk));
     let how = rework().with_keep_as(third.clone());
     let refusals = [
         message_of(snapshot(at(&disk), &name("third"))),
@@ -575,7 +535,7 @@ fn a_snapshot_of_another_state_is_not_taken_for_that_of_an_earlier_attempt() {
     for message in refusals {
         assert!(message.contains("snapshots/third"), "{message}");
     }
-    assert_eq!((digest(&disk), names(&disk)), before);
+    assert_eq!((digest_of(&disk, None).unwrap(), names(&disk)), before);
     // The same tiles and another scan.
     snapshot(at(&disk), &name("fourth")).unwrap();
     snapshot(at(&disk), &name("fourth")).unwrap();

@@ -6,6 +6,7 @@ use std::time::Duration;
 use testkit::memory_folder::memory_folder;
 use testkit::random_scans::{Random, random_scan};
 use testkit::reference_map::{ReferenceMap, Voxels, voxels_of};
+use testkit::support::cases;
 use testkit::unsynced_disk::UnsyncedDisk;
 use voxtile::mapper::{LiveReader, LiveView};
 use voxtile::sensor::{Iwlo, SensorModel};
@@ -130,7 +131,7 @@ fn beside_each_other(seed: u64, config: &MapConfig) -> (u64, u64) {
 #[test]
 fn readers_beside_the_mapper_see_whole_scans() {
     let config = MapConfig::new(0.2, 1.6).unwrap();
-    for seed in 0..8 {
+    for seed in 0..cases(3, 8) {
         let mode = if seed % 3 == 0 { InsertMode::PerRay } else { InsertMode::PerScan };
         let mut config = config.clone().with_insert_mode(mode);
         if seed % 2 == 1 {

@@ -22,6 +22,8 @@ mod format_fixtures;
 mod front_door;
 /// Inputs that fuzzing found worth keeping, once more.
 mod fuzz_corpus;
+/// One map on a disk that fails: acts, faults, and the naive map to compare with.
+mod harness;
 /// Damage to the files of kept scans, of the map and of its snapshots.
 mod kept_damage;
 /// Files of kept scans under the hands of a writer.
@@ -35,11 +37,11 @@ mod live_arrays;
 /// Readers in other threads beside the mapper.
 mod live_readers;
 mod low_memory;
-/// Lives of maps in commands of their own, against a naive life: removed tiles, and every operation as a fault.
+/// Lives of maps in processes of their own, against the naive map: at random, and with every operation as a fault.
 mod map_life;
 /// The same sentences about every mapper: equal to the naive one, to the bit.
 mod mapper_contract;
-/// Random insert, query, eviction, flush, crash, reopen: always the naive map as of then.
+/// Random insert, query, eviction, flush, snapshot, revert, crash, reopen: always the naive map as of then.
 mod model;
 /// What the OctoCache paper says, where it can be tried.
 mod octocache;
@@ -55,8 +57,9 @@ mod options;
 mod queries;
 /// Scans from files, good and bad.
 mod readers;
-/// Maps that follow their scans: poses move, scans and points go.
+/// How often a remap reads the list of kept scans.
 mod remap_reads;
+/// Maps that follow their scans: what is refused, reported and left alone.
 mod remapping;
 mod remapping_beside;
 mod remapping_changed;

@@ -15,7 +15,8 @@ use voxtile::{
     OutOfCoreTileMapper, Queries, Scan, Storage,
 };
 
-fn config() -> MapConfig {
+/// A map of ten voxels a tile, four tiles in memory and updates that wait.
+pub fn config() -> MapConfig {
     MapConfig::new(0.1, 1.0).unwrap().with_cache_tiles(4).with_write_buffer_bytes(5_000)
 }
 

@@ -1,6 +1,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
+use testkit::memory_folder::lone_folder;
 use testkit::random_scans::Random;
 use testkit::support::{fixtures, message_of, shared_data};
 use voxtile::scan::Pose;
@@ -181,53 +182,53 @@ fn unplaced(folder: &Path, names: &[&str]) {
 /// A caller of the library says what the command's arguments cannot.
 #[test]
 fn points_in_the_world_frame_are_not_deskewed() {
-    let folder = TempDir::new().unwrap();
-    unplaced(folder.path(), &["0.pcd"]);
+    let (_outer, folder) = lone_folder();
+    unplaced(&folder, &["0.pcd"]);
     let mut options = ReadOptions::default();
     options.poses = Some("identity".into());
     (options.clouds.is_deskewed, options.clouds.is_world_frame) = (true, true);
-    let error = message_of(open_scans(folder.path(), &options).map(drop));
+    let error = message_of(open_scans(&folder, &options).map(drop));
     assert!(error.contains("--deskew, --world-frame: points that are in the world frame already"), "{error}");
 }
 
 #[test]
 fn files_come_in_natural_order_and_scans_without_poses_are_refused() {
     use voxtile_formats::PoseSource;
-    let folder = TempDir::new().unwrap();
+    let (_outer, folder) = lone_folder();
     let names: Vec<String> = (0..12).map(|number| format!("full{number}.pcd")).collect();
-    unplaced(folder.path(), &names.iter().map(String::as_str).collect::<Vec<_>>());
-    fs::write(folder.path().join("trajectory.txt"), "0 0 0 0 0 0 0 1\n".repeat(12)).unwrap();
-    let error = message_of(open_scans(folder.path(), &ReadOptions::default()));
+    unplaced(&folder, &names.iter().map(String::as_str).collect::<Vec<_>>());
+    fs::write(folder.join("trajectory.txt"), "0 0 0 0 0 0 0 1\n".repeat(12)).unwrap();
+    let error = message_of(open_scans(&folder, &ReadOptions::default()));
     assert!(error.contains("has no poses"), "{error}");
     assert!(error.contains("trajectory.txt looks like one") && error.contains("--poses identity"), "{error}");
 
-    let mut meant = open_scans(folder.path(), &with_poses(Path::new("identity"))).unwrap();
+    let mut meant = open_scans(&folder, &with_poses(Path::new("identity"))).unwrap();
     assert_eq!(meant.pose_source(), PoseSource::Identity);
     for number in 0..12 {
         assert_eq!(meant.next_scan().unwrap().unwrap().points_in_sensor[0][0], f64::from(number));
     }
-    let single = open_scans(&folder.path().join("full3.pcd"), &ReadOptions::default()).unwrap();
+    let single = open_scans(&folder.join("full3.pcd"), &ReadOptions::default()).unwrap();
     assert_eq!(single.pose_source(), PoseSource::Identity);
 
-    let poses = folder.path().join("trajectory.txt");
+    let poses = folder.join("trajectory.txt");
     assert_eq!(
-        open_scans(folder.path(), &with_poses(&poses)).unwrap().pose_source(),
+        open_scans(&folder, &with_poses(&poses)).unwrap().pose_source(),
         PoseSource::File(poses.clone())
     );
     let lines = (0..12).map(|number| format!("{} 0 0 0 0 0 0 1\n", if number == 7 { 3 } else { number }));
     fs::write(&poses, lines.collect::<String>()).unwrap();
-    let error = message_of(open_scans(folder.path(), &with_poses(&poses)));
+    let error = message_of(open_scans(&folder, &with_poses(&poses)));
     assert!(error.contains("pose 8 is earlier than the one before"), "{error}");
 }
 
 #[test]
 fn a_file_without_the_viewpoint_that_others_have_is_an_error_of_its_own() {
-    let folder = TempDir::new().unwrap();
+    let (_outer, folder) = lone_folder();
     for number in 0..2 {
-        fs::write(folder.path().join(format!("{number}.pcd")), pcd("binary", &points(5))).unwrap();
+        fs::write(folder.join(format!("{number}.pcd")), pcd("binary", &points(5))).unwrap();
     }
-    unplaced(folder.path(), &["2.pcd"]);
-    let mut source = open_scans(folder.path(), &ReadOptions::default()).unwrap();
+    unplaced(&folder, &["2.pcd"]);
+    let mut source = open_scans(&folder, &ReadOptions::default()).unwrap();
     assert_eq!(source.pose_source(), voxtile_formats::PoseSource::Viewpoint);
     assert!(source.next_scan().unwrap().is_some() && source.next_scan().unwrap().is_some());
     assert!(message_of(source.next_scan()).contains("no VIEWPOINT in this file"));

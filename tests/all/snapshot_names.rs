@@ -1,27 +1,17 @@
-use std::path::{Path, PathBuf};
+use crate::harness::{at, config, damage_in, digest_of, map, name};
+use std::collections::BTreeSet;
+use std::path::PathBuf;
 use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
 use testkit::random_scans::{Random, random_scan};
 use testkit::support::message_of;
-use voxtile::integrity::{Severity, repair, verify};
+use voxtile::integrity::repair;
 use voxtile::operations::{delete_snapshot, revert, snapshots};
-use voxtile::store::{CommitLog, Layout, SnapshotName, TileStore, read_log};
-use voxtile::{MapConfig, MapPath, MapQueries, MapReader, Mapper, OutOfCoreTileMapper, Result};
-
-fn map() -> &'static Path {
-    Path::new("/map")
-}
-
-fn name(name: &str) -> SnapshotName {
-    SnapshotName::new(name).unwrap()
-}
-
-fn config() -> MapConfig {
-    MapConfig::new(0.4, 3.2).unwrap().with_range(0.0, 3.0).with_cache_tiles(2)
-}
+use voxtile::store::{CommitLog, Layout, TileStore, read_log};
+use voxtile::{Digest, Mapper, OutOfCoreTileMapper, Result};
 
 /// Inserts scans into the same tiles each time, and flushes.
 fn go_on(disk: &FaultyDisk, seeds: std::ops::Range<u64>) -> Result<()> {
-    let mut mapper = OutOfCoreTileMapper::open(MapPath::on(disk.shared(), map()), config())?;
+    let mut mapper = OutOfCoreTileMapper::open(at(disk), config())?;
     for seed in seeds {
         mapper.insert_scan(&random_scan(&mut Random(seed), [0.0; 3], 5))?;
         mapper.flush()?;
@@ -30,38 +20,16 @@ fn go_on(disk: &FaultyDisk, seeds: std::ops::Range<u64>) -> Result<()> {
 }
 
 /// A map with two snapshots of different flushes, which has changed since; and their digests.
-fn with_two() -> (FaultyDisk, [String; 2]) {
+fn with_two() -> (FaultyDisk, [Digest; 2]) {
     let disk = FaultyDisk::new(Fault::None);
-    drop(OutOfCoreTileMapper::create(MapPath::on(disk.shared(), map()), config()).unwrap());
+    drop(OutOfCoreTileMapper::create(at(&disk), config()).unwrap());
     let digests = ["s1", "s2"].map(|of| {
         go_on(&disk, if of == "s1" { 0..2 } else { 2..4 }).unwrap();
-        OutOfCoreTileMapper::open(MapPath::on(disk.shared(), map()), config())
-            .unwrap()
-            .snapshot(&name(of))
-            .unwrap();
+        OutOfCoreTileMapper::open(at(&disk), config()).unwrap().snapshot(&name(of)).unwrap();
         digest_of(&disk, Some(of)).unwrap()
     });
     go_on(&disk, 4..6).unwrap();
     (disk, digests)
-}
-
-fn digest_of(disk: &FaultyDisk, snapshot: Option<&str>) -> Result<String> {
-    let reader = match snapshot {
-        Some(of) => MapReader::open_snapshot(MapPath::on(disk.shared(), map()), &name(of), 1 << 20)?,
-        None => MapReader::open(MapPath::on(disk.shared(), map()), 1 << 20)?,
-    };
-    Ok(reader.digest()?.to_string())
-}
-
-fn damaged(disk: &FaultyDisk) -> Vec<PathBuf> {
-    let mut damaged = Vec::new();
-    let found = |finding: &voxtile::integrity::Finding| {
-        if finding.severity == Severity::Damage {
-            damaged.push(finding.path.clone());
-        }
-    };
-    verify(MapPath::on(disk.shared(), map()), found, |_, _| ()).unwrap();
-    damaged
 }
 
 fn path(of: &str) -> PathBuf {
@@ -83,8 +51,8 @@ fn swapped_snapshots_are_found_refused_and_put_back() {
     let (disk, digests) = with_two();
     let now = digest_of(&disk, None).unwrap();
     swap(&disk);
-    assert_eq!(damaged(&disk), [path("s1"), path("s2")]);
-    let error = message_of(revert(MapPath::on(disk.shared(), map()), &name("s1"), None, |_, _| ()));
+    assert_eq!(damage_in(&disk), BTreeSet::from(["s1", "s2"].map(path)));
+    let error = message_of(revert(at(&disk), &name("s1"), None, |_, _| ()));
     assert!(error.contains("that of the snapshot s2"), "{error}");
     assert!(digest_of(&disk, Some("s2")).is_err());
     assert_eq!(digest_of(&disk, None).unwrap(), now);
@@ -93,9 +61,9 @@ fn swapped_snapshots_are_found_refused_and_put_back() {
     let repaired = disk.copy();
     swap(&disk);
     for disk in [&disk, &repaired] {
-        let repair = repair(MapPath::on(disk.shared(), map()), |_| (), |_, _| ()).unwrap();
+        let repair = repair(at(disk), |_| (), |_, _| ()).unwrap();
         assert!(repair.is_complete());
-        assert_eq!(damaged(disk), Vec::<PathBuf>::new());
+        assert_eq!(damage_in(disk), BTreeSet::new());
         for (of, digest) in ["s1", "s2"].iter().zip(&digests) {
             assert_eq!(digest_of(disk, Some(of)).unwrap(), *digest);
         }
@@ -106,19 +74,23 @@ fn swapped_snapshots_are_found_refused_and_put_back() {
 fn a_repair_of_swapped_snapshots_can_be_cut_short_anywhere() {
     let (disk, digests) = with_two();
     swap(&disk);
-    for at in 0.. {
+    for moment in 0.. {
         let cut = disk.copy();
-        cut.set_fault(Fault::Crashes(at));
-        let _ = repair(MapPath::on(cut.shared(), map()), |_| (), |_, _| ());
+        cut.set_fault(Fault::Crashes(moment));
+        let _ = repair(at(&cut), |_| (), |_, _| ());
         if !cut.has_crashed() {
-            assert!(at > 5);
+            assert!(moment > 5);
             break;
         }
-        for unsynced in [Unsynced::Dropped, Unsynced::Kept, Unsynced::Shuffled(at)] {
+        for unsynced in [Unsynced::Dropped, Unsynced::Kept, Unsynced::Shuffled(moment)] {
             let left = cut.after_crash(unsynced);
-            repair(MapPath::on(left.shared(), map()), |_| (), |_, _| ()).unwrap();
+            repair(at(&left), |_| (), |_, _| ()).unwrap();
             for (of, digest) in ["s1", "s2"].iter().zip(&digests) {
-                assert_eq!(digest_of(&left, Some(of)).unwrap(), *digest, "crash at {at}, {unsynced:?}: {of}");
+                assert_eq!(
+                    digest_of(&left, Some(of)).unwrap(),
+                    *digest,
+                    "crash at {moment}, {unsynced:?}: {of}"
+                );
             }
         }
     }
@@ -129,25 +101,25 @@ fn a_snapshot_that_is_missing_is_a_finding_and_its_tables_stay_until_a_person_de
     let (disk, digests) = with_two();
     let file = disk.files()[&path("s1")].clone();
     disk.take(&path("s1"));
-    assert_eq!(damaged(&disk), [path("s1")]);
-    assert!(snapshots(MapPath::on(disk.shared(), map())).unwrap().iter().any(|info| info.damage.is_some()));
+    assert_eq!(damage_in(&disk), BTreeSet::from([path("s1")]));
+    assert!(snapshots(at(&disk)).unwrap().iter().any(|info| info.damage.is_some()));
     go_on(&disk, 6..9).unwrap();
     assert_eq!(digest_of(&disk, Some("s2")).unwrap(), digests[1]);
     // Put back.
     let again = disk.copy();
     again.put(&path("s1"), &file);
-    assert_eq!(damaged(&again), Vec::<PathBuf>::new());
+    assert_eq!(damage_in(&again), BTreeSet::new());
     assert_eq!(digest_of(&again, Some("s1")).unwrap(), digests[0]);
     // Given up by name.
     let given_up = disk.copy();
-    delete_snapshot(MapPath::on(given_up.shared(), map()), &name("s1")).unwrap();
-    assert_eq!(damaged(&given_up), Vec::<PathBuf>::new());
+    delete_snapshot(at(&given_up), &name("s1")).unwrap();
+    assert_eq!(damage_in(&given_up), BTreeSet::new());
     assert!(kept(&given_up) < kept(&disk));
     assert_eq!(digest_of(&given_up, Some("s2")).unwrap(), digests[1]);
     // Or by a repair, which deletes nothing.
-    let repair = repair(MapPath::on(disk.shared(), map()), |_| (), |_, _| ()).unwrap();
+    let repair = repair(at(&disk), |_| (), |_, _| ()).unwrap();
     assert_eq!((repair.snapshots_lost, repair.tiles_lost, repair.is_complete()), (1, 0, false));
-    assert_eq!(damaged(&disk), Vec::<PathBuf>::new());
+    assert_eq!(damage_in(&disk), BTreeSet::new());
     assert_eq!(kept(&disk), kept(&again), "in quarantine");
     assert_eq!(digest_of(&disk, Some("s2")).unwrap(), digests[1]);
 }
@@ -177,7 +149,7 @@ fn without_list(disk: &FaultyDisk) {
 fn snapshots_of_maps_that_do_not_list_them_are_read_and_listed_at_the_next_commit() {
     let (disk, digests) = with_two();
     without_list(&disk);
-    assert_eq!(damaged(&disk), Vec::<PathBuf>::new());
+    assert_eq!(damage_in(&disk), BTreeSet::new());
     for (of, digest) in ["s1", "s2"].iter().zip(&digests) {
         assert_eq!(digest_of(&disk, Some(of)).unwrap(), *digest);
     }
@@ -186,12 +158,12 @@ fn snapshots_of_maps_that_do_not_list_them_are_read_and_listed_at_the_next_commi
         assert_eq!(digest_of(&disk, Some(of)).unwrap(), *digest);
     }
     swap(&disk);
-    assert_eq!(damaged(&disk), [path("s1"), path("s2")], "by the flushes that the log names");
+    assert_eq!(damage_in(&disk), BTreeSet::from(["s1", "s2"].map(path)), "by the flushes that the log names");
     swap(&disk);
-    delete_snapshot(MapPath::on(disk.shared(), map()), &name("s1")).unwrap();
+    delete_snapshot(at(&disk), &name("s1")).unwrap();
     assert_eq!(digest_of(&disk, Some("s2")).unwrap(), digests[1]);
-    delete_snapshot(MapPath::on(disk.shared(), map()), &name("s2")).unwrap();
-    assert_eq!((kept(&disk), damaged(&disk).len()), (0, 0));
+    delete_snapshot(at(&disk), &name("s2")).unwrap();
+    assert_eq!((kept(&disk), damage_in(&disk).len()), (0, 0));
 }
 
 /// Copies by hand, files of other maps, notes: the log names none of them, and a deleted snapshot is told from them.
@@ -207,7 +179,7 @@ fn what_somebody_else_put_beside_the_snapshots_stays() {
     ];
     put.iter().for_each(|(path, bytes)| disk.put(path, bytes));
     let deleted = files[&path("s2")].clone();
-    delete_snapshot(MapPath::on(disk.shared(), map()), &name("s2")).unwrap();
+    delete_snapshot(at(&disk), &name("s2")).unwrap();
     // As the disk has it if the power goes before the removal is durable.
     disk.put(&path("s2"), &deleted);
     go_on(&disk, 6..8).unwrap();
@@ -217,7 +189,7 @@ fn what_somebody_else_put_beside_the_snapshots_stays() {
         assert_eq!(left.get(path).map(Vec::as_slice), Some(*bytes), "{}", path.display());
     }
     assert_eq!(digest_of(&disk, Some("s1")).unwrap(), digests[0]);
-    repair(MapPath::on(disk.shared(), map()), |_| (), |_, _| ()).unwrap();
+    repair(at(&disk), |_| (), |_, _| ()).unwrap();
     let left = disk.files();
     for (path, bytes) in &put {
         assert!(left.values().any(|file| file == bytes), "{}", path.display());

@@ -1,187 +1,69 @@
+use crate::harness::{at, config, digest_of, is_whole, make_foreign, map, name};
 use std::collections::BTreeMap;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use tempfile::TempDir;
 use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
 use testkit::random_scans::{Random, random_scan};
-use testkit::reference_map::{ReferenceMap, Voxels, voxels_of};
+use testkit::reference_map::{Voxels, voxels_of};
 use testkit::unsynced_disk::UnsyncedDisk;
 use voxtile::integrity::{Severity, repair, verify};
 use voxtile::operations::{Diff, TileChange, TileDiff, delete_snapshot, diff, revert, snapshot, snapshots};
-use voxtile::store::{Disk, EntryKind, FsDisk, SnapshotName, TileFile, TileStore};
+use voxtile::store::{Disk, EntryKind, FsDisk, TileFile, TileStore};
 use voxtile::{
-    Error, MapConfig, MapPath, MapQueries, MapReader, MapView, Mapper, OutOfCoreTileMapper, Scan, Storage,
+    Digest, Error, MapConfig, MapPath, MapQueries, MapReader, MapView, Mapper, OutOfCoreTileMapper, Scan,
+    Storage,
 };
-
-fn name(name: &str) -> SnapshotName {
-    SnapshotName::new(name).unwrap()
-}
-
-fn config(storage: Storage) -> MapConfig {
-    let config = MapConfig::new(0.4, 3.2).unwrap().with_range(0.0, 3.0).with_storage(storage);
-    config.with_cache_tiles(2).with_write_buffer_bytes(600)
-}
 
 fn scan(seed: u64) -> Scan {
     random_scan(&mut Random(seed), [[0.0, 3.0, 6.0, 3.0][seed as usize % 4], 0.0, 0.0], 5)
 }
 
-/// A naive map with its snapshots: copies.
-struct Naive {
-    now: ReferenceMap,
-    scans: u64,
-    flushed: (Voxels, u64),
-    snapshots: BTreeMap<String, (Voxels, u64)>,
-}
-
-fn check_snapshots(disk: &Arc<dyn Disk>, map: &Path, naive: &Naive, what: &str) {
-    let infos = snapshots(MapPath::on(disk.clone(), map)).unwrap();
-    assert_eq!(infos.len(), naive.snapshots.len(), "{what}");
-    for (of, (voxels, scans)) in &naive.snapshots {
-        let reader = MapReader::open_snapshot(MapPath::on(disk.clone(), map), &name(of), 1 << 20).unwrap();
-        assert_eq!((voxels_of(&reader), reader.scan_number()), (voxels.clone(), *scans), "{what}: {of}");
-        let numbers: Vec<u64> = reader.scans().unwrap().iter().map(|scan| scan.number).collect();
-        assert_eq!(numbers, (1..=*scans).collect::<Vec<_>>(), "{what}: {of}");
-        let info = infos.iter().find(|info| info.name == *of).unwrap();
-        assert_eq!((info.voxels, info.scan_number), (voxels.len() as u64, *scans), "{what}: {of}");
-    }
-}
-
-fn live(seed: u64, storage: Storage) {
-    let (folder, disk) = (TempDir::new().unwrap(), UnsyncedDisk::shared());
-    let map = folder.path().join("map");
-    let config = config(storage);
-    let mut random = Random(seed);
-    let open =
-        || OutOfCoreTileMapper::open(MapPath::on(UnsyncedDisk::shared(), &map), config.clone()).unwrap();
-    let mut mapper = OutOfCoreTileMapper::create(MapPath::on(disk.clone(), &map), config.clone()).unwrap();
-    let now = ReferenceMap::new(&config);
-    let mut naive = Naive { now, scans: 0, flushed: Default::default(), snapshots: BTreeMap::new() };
-    for step in 0..80 {
-        let what = format!("seed {seed}, step {step}");
-        let snapshot = ["a", "b", "c"][random.below(3) as usize];
-        let exists = naive.snapshots.contains_key(snapshot);
-        match random.below(12) {
-            0..5 => {
-                let scan = scan(random.below(40));
-                mapper.insert_scan(&scan).unwrap();
-                naive.now.insert_scan(&scan);
-                naive.scans += 1;
-            }
-            5 => {
-                mapper.flush().unwrap();
-                naive.flushed = (naive.now.voxels.clone(), naive.scans);
-            }
-            6 | 7 if !exists => {
-                mapper.snapshot(&name(snapshot)).unwrap();
-                naive.flushed = (naive.now.voxels.clone(), naive.scans);
-                naive.snapshots.insert(snapshot.to_owned(), naive.flushed.clone());
-            }
-            // What is not flushed goes with the process.
-            choice => {
-                drop(mapper);
-                match choice {
-                    8 if exists => {
-                        delete_snapshot(MapPath::on(disk.clone(), &map), &name(snapshot)).unwrap();
-                        naive.snapshots.remove(snapshot);
-                    }
-                    9 | 10 if exists => {
-                        revert(MapPath::on(disk.clone(), &map), &name(snapshot), None, |_, _| ()).unwrap();
-                        naive.flushed = naive.snapshots[snapshot].clone();
-                    }
-                    11 => {
-                        let mut store = TileStore::open(disk.clone(), &map).unwrap();
-                        let gone = store.tiles().iter().filter(|tile| tile.x % 2 == 0).collect::<Vec<_>>();
-                        gone.iter().for_each(|tile| store.remove(*tile).unwrap());
-                        store.commit(store.metadata().clone(), store.commits().scan_number).unwrap();
-                        let tile_of = |voxel| config.grid.tile_of_voxel(voxel);
-                        naive.flushed.0.retain(|&voxel, _| tile_of(voxel).x % 2 != 0);
-                    }
-                    _ => {}
-                }
-                (naive.now.voxels, naive.scans) = naive.flushed.clone();
-                mapper = open();
-            }
-        }
-        assert_eq!(mapper.scan_number(), naive.scans, "{what}");
-        if step % 8 == 0 {
-            check_snapshots(&disk, &map, &naive, &what);
-            assert_eq!(voxels_of(&mapper), naive.now.voxels, "{what}");
-        }
-    }
-    mapper.flush().unwrap();
-    assert_eq!(voxels_of(&mapper), naive.now.voxels, "seed {seed}");
-    drop(mapper);
-    check_snapshots(&disk, &map, &naive, "at the end");
-    drop(open());
-    let verification = verify(MapPath::on(disk, &map), |finding| panic!("{finding}"), |_, _| ()).unwrap();
-    assert_eq!(verification.snapshots, naive.snapshots.len() as u64);
-}
-
-#[test]
-fn any_life_with_snapshots_equals_the_naive_one() {
-    for seed in 0..10 {
-        live(seed, if seed % 2 == 0 { Storage::OctoMap } else { Storage::Compact });
-    }
-}
-
 /// A map in memory with three scans flushed one by one, a snapshot after the first and the second, and the digests.
-fn small(storage: Storage) -> (FaultyDisk, PathBuf, Vec<String>) {
-    let (disk, map) = (FaultyDisk::new(Fault::None), PathBuf::from("/map"));
-    let mut mapper = OutOfCoreTileMapper::create(MapPath::on(disk.shared(), &map), config(storage)).unwrap();
+fn small(storage: Storage) -> (FaultyDisk, Vec<Digest>) {
+    let disk = FaultyDisk::new(Fault::None);
+    let mut mapper = OutOfCoreTileMapper::create(at(&disk), config().with_storage(storage)).unwrap();
     mapper.begin_input("scans").unwrap();
     let mut digests = Vec::new();
     for (seed, of) in (1..).zip([Some("first"), Some("second"), None]) {
         mapper.insert_scan(&scan(4 * seed)).unwrap();
         mapper.insert_scan(&scan(4 * seed + 1)).unwrap();
         mapper.flush().unwrap();
-        digests.push(mapper.digest().unwrap().to_string());
+        digests.push(mapper.digest().unwrap());
         if let Some(of) = of {
             mapper.snapshot(&name(of)).unwrap();
         }
     }
     drop(mapper);
-    (disk.copy(), map, digests)
-}
-
-fn digest_of(disk: &FaultyDisk, map: &Path, snapshot: Option<&str>) -> voxtile::Result<String> {
-    let reader = match snapshot {
-        Some(of) => MapReader::open_snapshot(MapPath::on(disk.shared(), map), &name(of), 1 << 20)?,
-        None => MapReader::open(MapPath::on(disk.shared(), map), 1 << 20)?,
-    };
-    Ok(reader.digest()?.to_string())
+    (disk.copy(), digests)
 }
 
 #[test]
 fn a_revert_brings_back_all_of_it_and_readers_go_on_seeing_what_they_saw() {
     for storage in [Storage::OctoMap, Storage::Compact] {
         for disk in [small(storage).0, small(storage).0.without_links()] {
-            let (_, map, digests) = small(storage);
-            let reader = MapReader::open(MapPath::on(disk.shared(), &map), 0).unwrap();
-            let reverted =
-                revert(MapPath::on(disk.shared(), &map), &name("first"), Some(&name("third")), |_, _| ())
-                    .unwrap();
+            let (_, digests) = small(storage);
+            let reader = MapReader::open(at(&disk), 0).unwrap();
+            let reverted = revert(at(&disk), &name("first"), Some(&name("third")), |_, _| ()).unwrap();
             assert_eq!((reverted.scan_number_before, reverted.scan_number), (6, 2));
             assert!(reverted.flush_number > reader.flush_number());
-            assert_eq!(reader.digest().unwrap().to_string(), digests[2], "a reader across the revert");
+            assert_eq!(reader.digest().unwrap(), digests[2], "a reader across the revert");
             for (of, digest) in [(None, 0), (Some("first"), 0), (Some("second"), 1), (Some("third"), 2)] {
-                assert_eq!(digest_of(&disk, &map, of).unwrap(), digests[digest], "{of:?}");
+                assert_eq!(digest_of(&disk, of).unwrap(), digests[digest], "{of:?}");
             }
             drop(reader);
             // The input is that of the snapshot, and the same scans lead to the same maps again.
-            let mut mapper =
-                OutOfCoreTileMapper::open(MapPath::on(disk.shared(), &map), config(storage)).unwrap();
+            let mut mapper = OutOfCoreTileMapper::open(at(&disk), config().with_storage(storage)).unwrap();
             assert_eq!(mapper.resume_input("scans").unwrap(), 2);
             for seed in 2..4 {
                 mapper.insert_scan(&scan(4 * seed)).unwrap();
                 mapper.insert_scan(&scan(4 * seed + 1)).unwrap();
             }
             mapper.flush().unwrap();
-            assert_eq!(mapper.digest().unwrap().to_string(), digests[2]);
+            assert_eq!(mapper.digest().unwrap(), digests[2]);
             drop(mapper);
             for of in ["first", "second", "third"] {
-                delete_snapshot(MapPath::on(disk.shared(), &map), &name(of)).unwrap();
+                delete_snapshot(at(&disk), &name(of)).unwrap();
             }
             let kept = disk.files().into_keys().filter(|path| path.to_string_lossy().contains(".flush"));
             assert_eq!(kept.count(), 0, "nobody sees any kept table");
@@ -194,8 +76,8 @@ fn a_revert_brings_back_all_of_it_and_readers_go_on_seeing_what_they_saw() {
 fn a_kept_table_takes_the_place_of_a_damaged_one_with_the_same_bytes() {
     for storage in [Storage::OctoMap, Storage::Compact] {
         for disk in [small(storage).0, small(storage).0.without_links()] {
-            let (_, map, digests) = small(storage);
-            revert(MapPath::on(disk.shared(), &map), &name("first"), None, |_, _| ()).unwrap();
+            let (_, digests) = small(storage);
+            revert(at(&disk), &name("first"), None, |_, _| ()).unwrap();
             let (whole, table) = (disk.copy(), TileFile::Table.name(storage));
             let files = whole.files();
             let is_twice = |path: &Path, bytes: &[u8]| {
@@ -207,7 +89,7 @@ fn a_kept_table_takes_the_place_of_a_damaged_one_with_the_same_bytes() {
             let tables: Vec<_> = files.iter().filter(|(path, bytes)| is_twice(path, bytes)).collect();
             assert!(!tables.is_empty());
             for (path, bytes) in tables {
-                check_restored(&whole, &map, (path, bytes), &digests, storage);
+                check_restored(&whole, (path, bytes), &digests, storage);
             }
         }
     }
@@ -215,9 +97,8 @@ fn a_kept_table_takes_the_place_of_a_damaged_one_with_the_same_bytes() {
 
 fn check_restored(
     whole: &FaultyDisk,
-    map: &Path,
     (path, bytes): (&PathBuf, &Vec<u8>),
-    digests: &[String],
+    digests: &[Digest],
     storage: Storage,
 ) {
     let mut bad = bytes.clone();
@@ -227,15 +108,16 @@ fn check_restored(
         disk.put(path, &bad);
         disk
     };
-    let repaired = |disk: &FaultyDisk| repair(MapPath::on(disk.shared(), map), |_| (), |_, _| ()).unwrap();
+    let repaired = |disk: &FaultyDisk| repair(at(disk), |_| (), |_, _| ()).unwrap();
     let check = |disk: &FaultyDisk, what: &str| {
         let what = format!("{}, {storage}, {what}", path.display());
-        let kept = |(place, kept): (PathBuf, Vec<u8>)| place.starts_with("/map/quarantine") && kept == bad;
+        let kept =
+            |(place, kept): (PathBuf, Vec<u8>)| place.starts_with(map().join("quarantine")) && kept == bad;
         assert_eq!(disk.files()[path], *bytes, "{what}");
         assert!(disk.files().into_iter().any(kept), "{what}");
-        assert!(verify(MapPath::on(disk.shared(), map), |_| (), |_, _| ()).unwrap().is_whole(), "{what}");
+        assert!(is_whole(disk), "{what}");
         for (of, digest) in [(None, 0), (Some("first"), 0), (Some("second"), 1)] {
-            assert_eq!(digest_of(disk, map, of).unwrap(), digests[digest], "{what}, {of:?}");
+            assert_eq!(digest_of(disk, of).unwrap(), digests[digest], "{what}, {of:?}");
         }
     };
     let disk = damaged();
@@ -245,7 +127,7 @@ fn check_restored(
     for change in 0.. {
         let disk = damaged();
         disk.set_fault(Fault::Crashes(change));
-        let _ = repair(MapPath::on(disk.shared(), map), |_| (), |_, _| ());
+        let _ = repair(at(&disk), |_| (), |_, _| ());
         if !disk.has_crashed() {
             break;
         }
@@ -259,16 +141,16 @@ fn check_restored(
 
 #[test]
 fn own_bytes_are_what_deleting_frees() {
-    let (disk, map, _) = small(Storage::OctoMap);
+    let (disk, _) = small(Storage::OctoMap);
     // The log and `metadata.json` say what happened.
-    let is_counted = |path: &Path| path.parent() != Some(&*map);
+    let is_counted = |path: &Path| path.parent() != Some(map());
     let files = || disk.files().into_iter().filter(|(path, _)| is_counted(path));
     let bytes = || files().map(|(_, bytes)| bytes.len() as u64).sum::<u64>();
     for of in ["second", "first"] {
-        let infos = snapshots(MapPath::on(disk.shared(), &map)).unwrap();
+        let infos = snapshots(at(&disk)).unwrap();
         let info = infos.iter().find(|info| info.name == of).unwrap();
         let before = bytes();
-        delete_snapshot(MapPath::on(disk.shared(), &map), &name(of)).unwrap();
+        delete_snapshot(at(&disk), &name(of)).unwrap();
         assert_eq!(before - bytes(), info.own_bytes, "{of}");
         assert!(info.own_bytes > 500, "{of}");
     }
@@ -276,45 +158,34 @@ fn own_bytes_are_what_deleting_frees() {
 
 #[test]
 fn wrong_names_and_other_refusals_say_what_to_do() {
-    let (disk, map, _) = small(Storage::OctoMap);
-    let error = snapshot(MapPath::on(disk.shared(), &map), &name("first")).unwrap_err();
+    let (disk, _) = small(Storage::OctoMap);
+    let error = snapshot(at(&disk), &name("first")).unwrap_err();
     assert!(matches!(error, Error::AlreadyExists { .. }), "{error:#}");
     let revert = |to, keep: Option<&str>| {
-        revert(MapPath::on(disk.shared(), &map), &name(to), keep.map(name).as_ref(), |_, _| ()).unwrap_err()
+        revert(at(&disk), &name(to), keep.map(name).as_ref(), |_, _| ()).unwrap_err()
     };
     assert!(matches!(revert("first", Some("second")), Error::AlreadyExists { .. }));
     for error in [
         revert("none", Some("kept")),
-        delete_snapshot(MapPath::on(disk.shared(), &map), &name("none")).unwrap_err(),
-        MapReader::open_snapshot(MapPath::on(disk.shared(), &map), &name("none"), 0).unwrap_err(),
+        delete_snapshot(at(&disk), &name("none")).unwrap_err(),
+        MapReader::open_snapshot(at(&disk), &name("none"), 0).unwrap_err(),
     ] {
-        assert!(error.to_string().contains("`voxtile snapshots /map` lists them"), "{error:#}");
+        assert!(error.to_string().contains("`voxtile snapshots /city/map` lists them"), "{error:#}");
     }
-    assert_eq!(snapshots(MapPath::on(disk.shared(), &map)).unwrap().len(), 2, "nothing was kept in vain");
-    let writer = TileStore::open(disk.shared(), &map).unwrap();
-    assert!(matches!(snapshot(MapPath::on(disk.shared(), &map), &name("x")), Err(Error::Locked { .. })));
+    assert_eq!(snapshots(at(&disk)).unwrap().len(), 2, "nothing was kept in vain");
+    let writer = TileStore::open(disk.shared(), map()).unwrap();
+    assert!(matches!(snapshot(at(&disk), &name("x")), Err(Error::Locked { .. })));
     drop(writer);
 }
 
 /// A map of the original format gets its checksums first.
 #[test]
 fn a_map_of_the_seeds_format_is_adopted_by_its_first_snapshot() {
-    let (disk, map, digests) = small(Storage::OctoMap);
-    disk.take(&map.join("commits.log"));
-    disk.take(&map.join("snapshots"));
-    let metadata = br#"{"version": "1.0", "resolution": 0.4, "tile_size": 3.2, "bounds": {"min": [0,0,0], "max": [0,0,0]}}"#;
-    disk.put(&map.join("metadata.json"), metadata);
-    for (path, bytes) in disk.files() {
-        if path.ends_with("iwlo_meta.bin") {
-            let count = u64::from_le_bytes(bytes[8..16].try_into().unwrap()) as usize;
-            disk.put(&path, &bytes[..16 + 18 * count]);
-        } else if path.to_string_lossy().contains(".flush") {
-            disk.take(&path);
-        }
-    }
-    snapshot(MapPath::on(disk.shared(), &map), &name("adopted")).unwrap();
-    assert!(MapReader::open(MapPath::on(disk.shared(), &map), 0).unwrap().is_verified());
-    assert_eq!(digest_of(&disk, &map, Some("adopted")).unwrap(), digests[2]);
+    let (disk, digests) = small(Storage::OctoMap);
+    make_foreign(&disk, map());
+    snapshot(at(&disk), &name("adopted")).unwrap();
+    assert!(MapReader::open(at(&disk), 0).unwrap().is_verified());
+    assert_eq!(digest_of(&disk, Some("adopted")).unwrap(), digests[2]);
 }
 
 /// Every few bytes of a snapshot and of a table that only snapshots see, and these files gone: found, named, repaired;
@@ -322,7 +193,7 @@ fn a_map_of_the_seeds_format_is_adopted_by_its_first_snapshot() {
 #[test]
 fn damage_to_what_only_snapshots_see_is_found_and_repaired() {
     for storage in [Storage::OctoMap, Storage::Compact] {
-        let (whole, map, digests) = small(storage);
+        let (whole, digests) = small(storage);
         let is_of_snapshots = |path: &Path| {
             path.parent().is_some_and(|folder| folder.ends_with("snapshots"))
                 || path.to_string_lossy().contains(".flush")
@@ -341,7 +212,7 @@ fn damage_to_what_only_snapshots_see_is_found_and_repaired() {
                     None => disk.take(&path),
                 }
                 damages += 1;
-                check_repair(&disk, &map, &digests, &path, &format!("{}, byte {at}", path.display()));
+                check_repair(&disk, &digests, &path, &format!("{}, byte {at}", path.display()));
             }
         }
         println!("{damages} damages");
@@ -349,29 +220,30 @@ fn damage_to_what_only_snapshots_see_is_found_and_repaired() {
     }
 }
 
-fn check_repair(disk: &FaultyDisk, map: &Path, digests: &[String], path: &Path, what: &str) {
+fn check_repair(disk: &FaultyDisk, digests: &[Digest], path: &Path, what: &str) {
     let mut named = false;
     let found = |finding: &voxtile::integrity::Finding| {
         named |= finding.severity == Severity::Damage && finding.path == path;
     };
-    assert!(!verify(MapPath::on(disk.shared(), map), found, |_, _| ()).unwrap().is_whole(), "{what}");
+    assert!(!verify(at(disk), found, |_, _| ()).unwrap().is_whole(), "{what}");
     let is_missing = !disk.files().contains_key(path);
     assert!(named || is_missing, "{what}: the file is not named");
-    assert_eq!(digest_of(disk, map, None).unwrap(), digests[2], "{what}");
+    assert_eq!(digest_of(disk, None).unwrap(), digests[2], "{what}");
     // Opening for writing removes nothing that a snapshot may see.
     let files = disk.files();
-    drop(TileStore::open(disk.shared(), map).unwrap());
+    drop(TileStore::open(disk.shared(), map()).unwrap());
     assert_eq!(disk.files(), files, "{what}");
-    let repair = repair(MapPath::on(disk.shared(), map), |_| (), |_, _| ()).unwrap();
+    let repair = repair(at(disk), |_| (), |_, _| ()).unwrap();
     assert!(repair.actions > 0 && repair.tiles_lost == 0, "{what}");
-    let lost: u64 = disk.files().keys().filter(|path| path.starts_with("/map/quarantine")).count() as u64;
+    let lost: u64 =
+        disk.files().keys().filter(|path| path.starts_with(map().join("quarantine"))).count() as u64;
     assert!(lost > 0 || is_missing, "{what}: nothing is deleted");
-    let verification = verify(MapPath::on(disk.shared(), map), |_| (), |_, _| ()).unwrap();
+    let verification = verify(at(disk), |_| (), |_, _| ()).unwrap();
     assert!(verification.is_whole(), "{what}");
-    assert_eq!(digest_of(disk, map, None).unwrap(), digests[2], "{what}");
-    for info in snapshots(MapPath::on(disk.shared(), map)).unwrap() {
+    assert_eq!(digest_of(disk, None).unwrap(), digests[2], "{what}");
+    for info in snapshots(at(disk)).unwrap() {
         assert!(info.damage.is_none(), "{what}");
-        let digest = digest_of(disk, map, Some(&info.name)).unwrap();
+        let digest = digest_of(disk, Some(&info.name)).unwrap();
         let was = &digests[usize::from(info.name == "second")];
         assert!(digest == *was || repair.snapshot_tiles_lost > 0, "{what}: {}", info.name);
     }
@@ -382,9 +254,8 @@ fn check_repair(disk: &FaultyDisk, map: &Path, digests: &[String], path: &Path, 
 #[test]
 fn a_snapshot_that_is_led_to_a_table_of_another_is_found() {
     for names in [["a", "b"], ["b", "a"]] {
-        let (disk, map) = (FaultyDisk::new(Fault::None), PathBuf::from("/map"));
-        let mut mapper =
-            OutOfCoreTileMapper::create(MapPath::on(disk.shared(), &map), config(Storage::OctoMap)).unwrap();
+        let disk = FaultyDisk::new(Fault::None);
+        let mut mapper = OutOfCoreTileMapper::create(at(&disk), config()).unwrap();
         for (seed, of) in (1..).zip([Some(names[0]), Some(names[1]), None]) {
             for number in 0..8 {
                 mapper.insert_scan(&scan(4 * (8 * seed + number))).unwrap();
@@ -398,17 +269,16 @@ fn a_snapshot_that_is_led_to_a_table_of_another_is_found() {
         let twice = tables.windows(2).find(|two| two[0].parent() == two[1].parent()).unwrap();
         disk.take(&twice[0]);
         let mut found = Vec::new();
-        verify(MapPath::on(disk.shared(), &map), |finding| found.push(finding.clone()), |_, _| ()).unwrap();
+        verify(at(&disk), |finding| found.push(finding.clone()), |_, _| ()).unwrap();
         assert!(found.iter().any(|finding| finding.severity == Severity::Damage), "{names:?}: {found:?}");
-        assert!(digest_of(&disk, &map, Some(names[0])).is_err());
+        assert!(digest_of(&disk, Some(names[0])).is_err());
     }
 }
 
 #[test]
 fn a_repair_takes_nothing_from_snapshots_that_are_whole() {
-    let (disk, map) = (FaultyDisk::new(Fault::None), Path::new("/map"));
-    let mut mapper =
-        OutOfCoreTileMapper::create(MapPath::on(disk.shared(), map), config(Storage::OctoMap)).unwrap();
+    let disk = FaultyDisk::new(Fault::None);
+    let mut mapper = OutOfCoreTileMapper::create(at(&disk), config()).unwrap();
     let mut digests = BTreeMap::new();
     for names in [&["a", "b", "c"][..], &["d", "e"], &["f"], &[]] {
         // The same tiles each time.
@@ -416,7 +286,7 @@ fn a_repair_takes_nothing_from_snapshots_that_are_whole() {
         mapper.flush().unwrap();
         for of in names {
             mapper.snapshot(&name(of)).unwrap();
-            digests.insert(*of, mapper.digest().unwrap().to_string());
+            digests.insert(*of, mapper.digest().unwrap());
         }
     }
     drop(mapper);
@@ -430,13 +300,13 @@ fn a_repair_takes_nothing_from_snapshots_that_are_whole() {
                 true => damaged.take(path),
                 false => damaged.put(path, b"damaged"),
             }
-            repair(MapPath::on(damaged.shared(), map), |_| (), |_, _| ()).unwrap();
-            assert!(verify(MapPath::on(damaged.shared(), map), |_| (), |_, _| ()).unwrap().is_whole());
+            repair(at(&damaged), |_| (), |_, _| ()).unwrap();
+            assert!(is_whole(&damaged));
             let flush = path.to_string_lossy().rsplit_once(".flush").unwrap().1.to_owned();
             let hit = [("4", &["a", "b", "c"][..]), ("7", &["d", "e"]), ("9", &["f"])];
             let (_, hit) = hit.iter().find(|(number, _)| *number == flush).unwrap();
             for (of, digest) in &digests {
-                let found = digest_of(&damaged, map, Some(of)).unwrap();
+                let found = digest_of(&damaged, Some(of)).unwrap();
                 assert_eq!(found == *digest, !hit.contains(of), "{}: {of}", path.display());
             }
         }
@@ -446,13 +316,12 @@ fn a_repair_takes_nothing_from_snapshots_that_are_whole() {
 /// Whatever is put together again from the tiles: snapshots see what they saw, also after what comes then.
 #[test]
 fn snapshots_outlive_the_loss_of_the_log_and_of_tables_in_place() {
-    let (whole, map, digests) = small(Storage::OctoMap);
+    let (whole, digests) = small(Storage::OctoMap);
     for lost in [&["commits.log"][..], &["commits.log", "metadata.json"]] {
         let disk = whole.copy();
-        lost.iter().for_each(|file| disk.take(&map.join(file)));
-        repair(MapPath::on(disk.shared(), &map), |_| (), |_, _| ()).unwrap();
-        let mut mapper =
-            OutOfCoreTileMapper::open(MapPath::on(disk.shared(), &map), config(Storage::OctoMap));
+        lost.iter().for_each(|file| disk.take(&map().join(file)));
+        repair(at(&disk), |_| (), |_, _| ()).unwrap();
+        let mut mapper = OutOfCoreTileMapper::open(at(&disk), config());
         for seed in 30..34 {
             // Without metadata.json the ranges of the rays are not known any more, which matters to no snapshot.
             let mapper = mapper.as_mut().unwrap();
@@ -460,55 +329,54 @@ fn snapshots_outlive_the_loss_of_the_log_and_of_tables_in_place() {
             mapper.flush().unwrap();
         }
         drop(mapper);
-        assert_eq!(digest_of(&disk, &map, Some("first")).unwrap(), digests[0], "{lost:?}");
-        assert_eq!(digest_of(&disk, &map, Some("second")).unwrap(), digests[1], "{lost:?}");
+        assert_eq!(digest_of(&disk, Some("first")).unwrap(), digests[0], "{lost:?}");
+        assert_eq!(digest_of(&disk, Some("second")).unwrap(), digests[1], "{lost:?}");
     }
     // A table in place is damaged: the tile goes, but not what snapshots see of it.
     let disk = whole.copy();
     let files = disk.files();
     let kept = files.keys().find(|path| path.to_string_lossy().contains(".flush")).unwrap();
     disk.put(&kept.with_file_name("iwlo_meta.bin"), b"damaged");
-    let repair = repair(MapPath::on(disk.shared(), &map), |_| (), |_, _| ()).unwrap();
+    let repair = repair(at(&disk), |_| (), |_, _| ()).unwrap();
     assert_eq!(repair.tiles_lost, 1);
-    assert!(verify(MapPath::on(disk.shared(), &map), |_| (), |_, _| ()).unwrap().is_whole());
-    assert_eq!(digest_of(&disk, &map, Some("first")).unwrap(), digests[0]);
-    revert(MapPath::on(disk.shared(), &map), &name("first"), None, |_, _| ()).unwrap();
-    assert_eq!(digest_of(&disk, &map, None).unwrap(), digests[0], "the tile is back");
+    assert!(is_whole(&disk));
+    assert_eq!(digest_of(&disk, Some("first")).unwrap(), digests[0]);
+    revert(at(&disk), &name("first"), None, |_, _| ()).unwrap();
+    assert_eq!(digest_of(&disk, None).unwrap(), digests[0], "the tile is back");
 }
 
 /// A flush is committed and named by `metadata.json`, its tables wait for their names, and the log is lost.
 #[test]
 fn a_repair_that_completes_a_commit_without_a_log_takes_nothing_from_snapshots() {
     for storage in [Storage::OctoMap, Storage::Compact] {
-        let (whole, map, digests) = small(storage);
-        snapshot(MapPath::on(whole.shared(), &map), &name("third")).unwrap();
+        let (whole, digests) = small(storage);
+        snapshot(at(&whole), &name("third")).unwrap();
         let mut crashes = 0;
-        for at in 0.. {
+        for moment in 0.. {
             let disk = whole.copy();
-            let mut mapper =
-                OutOfCoreTileMapper::open(MapPath::on(disk.shared(), &map), config(storage)).unwrap();
+            let mut mapper = OutOfCoreTileMapper::open(at(&disk), config().with_storage(storage)).unwrap();
             mapper.insert_scan(&scan(28)).unwrap();
             mapper.insert_scan(&scan(29)).unwrap();
-            disk.set_fault(Fault::Crashes(at));
+            disk.set_fault(Fault::Crashes(moment));
             let _ = mapper.flush();
             drop(mapper);
             if !disk.has_crashed() {
                 break;
             }
             let left = disk.after_crash(Unsynced::Kept);
-            let metadata = left.files()[&map.join("metadata.json")].clone();
+            let metadata = left.files()[&map().join("metadata.json")].clone();
             if !String::from_utf8_lossy(&metadata).contains("\"scan_number\": 8") {
                 continue;
             }
-            let what = format!("crash at {at}, {storage}");
-            let now = digest_of(&left, &map, None).unwrap();
-            left.take(&map.join("commits.log"));
-            repair(MapPath::on(left.shared(), &map), |_| (), |_, _| ()).unwrap();
-            assert_eq!(digest_of(&left, &map, None).unwrap(), now, "{what}");
+            let what = format!("crash at {moment}, {storage}");
+            let now = digest_of(&left, None).unwrap();
+            left.take(&map().join("commits.log"));
+            repair(at(&left), |_| (), |_, _| ()).unwrap();
+            assert_eq!(digest_of(&left, None).unwrap(), now, "{what}");
             for (of, digest) in ["first", "second", "third"].into_iter().zip(&digests) {
-                assert_eq!(digest_of(&left, &map, Some(of)).unwrap(), *digest, "{what}: {of}");
+                assert_eq!(digest_of(&left, Some(of)).unwrap(), *digest, "{what}: {of}");
             }
-            let verified = verify(MapPath::on(left.shared(), &map), |_| (), |_, _| ()).unwrap();
+            let verified = verify(at(&left), |_| (), |_, _| ()).unwrap();
             assert!(verified.is_whole(), "{what}");
             crashes += 1;
         }
@@ -518,21 +386,21 @@ fn a_repair_that_completes_a_commit_without_a_log_takes_nothing_from_snapshots()
 
 #[test]
 fn something_else_in_place_of_the_folder_of_snapshots_is_damage_also_where_the_map_has_none() {
-    let (disk, map, digests) = small(Storage::OctoMap);
+    let (disk, digests) = small(Storage::OctoMap);
     for of in ["first", "second"] {
-        delete_snapshot(MapPath::on(disk.shared(), &map), &name(of)).unwrap();
+        delete_snapshot(at(&disk), &name(of)).unwrap();
     }
-    let folder = map.join("snapshots");
+    let folder = map().join("snapshots");
     disk.take(&folder);
     disk.put(&folder, b"no folder");
     let mut found = Vec::new();
     let mut tell =
         |finding: &voxtile::integrity::Finding| found.push((finding.severity, finding.path.clone()));
-    verify(MapPath::on(disk.shared(), &map), &mut tell, |_, _| ()).unwrap();
+    verify(at(&disk), &mut tell, |_, _| ()).unwrap();
     assert_eq!(found, [(Severity::Damage, folder)]);
-    repair(MapPath::on(disk.shared(), &map), |_| (), |_, _| ()).unwrap();
-    assert!(verify(MapPath::on(disk.shared(), &map), |_| (), |_, _| ()).unwrap().is_whole());
-    assert_eq!(digest_of(&disk, &map, None).unwrap(), digests[2]);
+    repair(at(&disk), |_| (), |_, _| ()).unwrap();
+    assert!(is_whole(&disk));
+    assert_eq!(digest_of(&disk, None).unwrap(), digests[2]);
 }
 
 /// The naive difference of two maps, voxel by voxel.
@@ -558,8 +426,11 @@ fn a_diff_counts_what_a_naive_one_counts() {
     let folder = TempDir::new().unwrap();
     let build = |map: &str, storage, seeds: std::ops::Range<u64>| {
         let path = folder.path().join(map);
-        let mut mapper =
-            OutOfCoreTileMapper::create(MapPath::on(UnsyncedDisk::shared(), &path), config(storage)).unwrap();
+        let mut mapper = OutOfCoreTileMapper::create(
+            MapPath::on(UnsyncedDisk::shared(), &path),
+            config().with_storage(storage),
+        )
+        .unwrap();
         for seed in seeds {
             mapper.insert_scan(&scan(seed)).unwrap();
             mapper.snapshot(&name(&format!("s{seed}"))).unwrap();

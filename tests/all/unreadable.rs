@@ -1,61 +1,35 @@
+use crate::harness::{at, config, damage_in, digest_of, map, name};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use testkit::faulty_disk::{Fault, FaultyDisk};
 use testkit::random_scans::{Random, random_scan};
-use voxtile::integrity::{Severity, repair, verify};
+use voxtile::integrity::repair;
 use voxtile::operations::delete_snapshot;
-use voxtile::store::SnapshotName;
-use voxtile::{MapConfig, MapPath, MapQueries, MapReader, Mapper, OutOfCoreTileMapper, Result, Storage};
-
-fn map() -> &'static Path {
-    Path::new("/map")
-}
-
-fn config(storage: Storage) -> MapConfig {
-    MapConfig::new(0.4, 3.2).unwrap().with_range(0.0, 3.0).with_cache_tiles(2).with_storage(storage)
-}
-
-fn snapshot() -> SnapshotName {
-    SnapshotName::new("s").unwrap()
-}
+use voxtile::{Digest, MapReader, Mapper, OutOfCoreTileMapper, Result, Storage};
 
 /// A map of a few tiles with a snapshot that sees tables of its own.
 fn small(storage: Storage) -> FaultyDisk {
     let disk = FaultyDisk::new(Fault::None);
-    let mut mapper = OutOfCoreTileMapper::create(MapPath::on(disk.shared(), map()), config(storage)).unwrap();
+    let mut mapper = OutOfCoreTileMapper::create(at(&disk), config().with_storage(storage)).unwrap();
     for seed in 0..4 {
         let x = 3.0 * (seed % 2) as f64;
         mapper.insert_scan(&random_scan(&mut Random(seed), [x, 0.0, 0.0], 5)).unwrap();
         mapper.flush().unwrap();
         if seed == 1 {
-            mapper.snapshot(&snapshot()).unwrap();
+            mapper.snapshot(&name("s")).unwrap();
         }
     }
     drop(mapper);
     disk.copy()
 }
 
-fn digests(disk: &FaultyDisk) -> Result<[String; 2]> {
-    let now = MapReader::open(MapPath::on(disk.shared(), map()), 1 << 20)?.digest()?;
-    let then = MapReader::open_snapshot(MapPath::on(disk.shared(), map()), &snapshot(), 1 << 20)?.digest()?;
-    Ok([now, then].map(|digest| digest.to_string()))
-}
-
-fn damaged(disk: &FaultyDisk, what: &str) -> BTreeSet<PathBuf> {
-    let mut damaged = BTreeSet::new();
-    let found = |finding: &voxtile::integrity::Finding| {
-        if finding.severity == Severity::Damage {
-            damaged.insert(finding.path.clone());
-        }
-    };
-    verify(MapPath::on(disk.shared(), map()), found, |_, _| ())
-        .unwrap_or_else(|error| panic!("{what}: {error:#}"));
-    damaged
+fn digests(disk: &FaultyDisk) -> Result<[Digest; 2]> {
+    Ok([digest_of(disk, None)?, digest_of(disk, Some("s"))?])
 }
 
 /// A scan far from all tiles, flushed.
 fn go_on(disk: &FaultyDisk, storage: Storage) -> Result<()> {
-    let mut mapper = OutOfCoreTileMapper::open(MapPath::on(disk.shared(), map()), config(storage))?;
+    let mut mapper = OutOfCoreTileMapper::open(at(disk), config().with_storage(storage))?;
     mapper.insert_scan(&random_scan(&mut Random(9), [300.0, 0.0, 0.0], 5))?;
     mapper.flush()
 }
@@ -73,7 +47,7 @@ fn a_file_that_cannot_be_read_is_a_finding_and_mapping_goes_on_and_all_else_is_r
             let what = format!("{}, {storage}", path.display());
             let disk = whole.copy();
             disk.make_unreadable(path);
-            let found = damaged(&disk, &what);
+            let found = damage_in(&disk);
             assert!(found.contains(path) && found.len() == 1, "{what}: {found:?}");
             if !is_index(path) {
                 go_on(&disk, storage).unwrap_or_else(|error| panic!("{what}: {error:#}"));
@@ -84,17 +58,17 @@ fn a_file_that_cannot_be_read_is_a_finding_and_mapping_goes_on_and_all_else_is_r
                 deleted.mend();
                 assert_eq!(digests(&deleted).unwrap()[1], before[1], "{what}");
                 disk.make_unreadable(path);
-                delete_snapshot(MapPath::on(disk.shared(), map()), &snapshot()).unwrap();
-                assert_eq!(damaged(&disk, &what).len(), 0);
+                delete_snapshot(at(&disk), &name("s")).unwrap();
+                assert_eq!(damage_in(&disk).len(), 0);
                 continue;
             }
             let disk = whole.copy();
             disk.make_unreadable(path);
             let octree = whole.files()[path].clone();
-            let repair = repair(MapPath::on(disk.shared(), map()), |_| (), |_, _| ())
-                .unwrap_or_else(|error| panic!("{what}: {error:#}"));
+            let repair =
+                repair(at(&disk), |_| (), |_, _| ()).unwrap_or_else(|error| panic!("{what}: {error:#}"));
             assert!(repair.actions > 0, "{what}");
-            assert_eq!(damaged(&disk, &what), BTreeSet::new(), "{what}");
+            assert_eq!(damage_in(&disk), BTreeSet::new(), "{what}");
             if path.ends_with("octree.bt") {
                 assert!(repair.is_complete() && disk.files()[path] == octree, "{what}");
             }
@@ -105,7 +79,7 @@ fn a_file_that_cannot_be_read_is_a_finding_and_mapping_goes_on_and_all_else_is_r
             }
             // Nothing was deleted.
             disk.mend();
-            let is_in_quarantine = |path: &PathBuf| path.starts_with("/map/quarantine");
+            let is_in_quarantine = |path: &PathBuf| path.starts_with(map().join("quarantine"));
             assert!(disk.files().keys().any(is_in_quarantine), "{what}");
         }
     }
@@ -119,7 +93,7 @@ fn a_file_on_which_every_operation_fails_stops_nothing_but_itself() {
         let what = path.display().to_string();
         let disk = whole.copy();
         disk.break_path(path);
-        let found = damaged(&disk, &what);
+        let found = damage_in(&disk);
         assert!(found.contains(path), "{what}: {found:?}");
         match go_on(&disk, Storage::OctoMap) {
             Ok(()) => assert!(!is_index(path), "{what}"),
@@ -128,7 +102,7 @@ fn a_file_on_which_every_operation_fails_stops_nothing_but_itself() {
             }
         }
         // A repair does what it can, or says which file stops it; nothing is lost.
-        if let Err(error) = repair(MapPath::on(disk.shared(), map()), |_| (), |_, _| ()) {
+        if let Err(error) = repair(at(&disk), |_| (), |_, _| ()) {
             assert!(format!("{error:#}").contains(&what), "{what}: {error:#}");
         }
         disk.mend();
@@ -141,7 +115,7 @@ fn a_file_on_which_every_operation_fails_stops_nothing_but_itself() {
             let disk = whole.copy();
             disk.break_path(folder);
             let what = folder.display().to_string();
-            assert!(!damaged(&disk, &what).is_empty(), "{what}");
+            assert!(!damage_in(&disk).is_empty(), "{what}");
             go_on(&disk, Storage::OctoMap).unwrap_or_else(|error| panic!("{what}: {error:#}"));
             disk.mend();
             assert_eq!(digests(&disk).unwrap()[1], before[1], "{what}");
@@ -158,17 +132,18 @@ fn a_bad_sector_of_the_list_of_scans_leaves_those_before_it() {
             let (before, list) = (digests(&disk).unwrap(), disk.files()[&path].clone());
             // A header of 16 bytes, and records of 64.
             disk.make_bytes_unreadable(&path, 16 + 2 * 64 + 5..16 + 2 * 64 + 6);
-            assert!(damaged(&disk, "before").contains(&path));
-            repair(MapPath::on(disk.shared(), map()), |_| (), |_, _| ()).unwrap();
-            assert_eq!(damaged(&disk, "after"), BTreeSet::new());
+            assert!(damage_in(&disk).contains(&path));
+            repair(at(&disk), |_| (), |_, _| ()).unwrap();
+            assert_eq!(damage_in(&disk), BTreeSet::new());
             let numbers = || {
-                let reader = MapReader::open(MapPath::on(disk.shared(), map()), 1 << 20).unwrap();
+                let reader = MapReader::open(at(&disk), 1 << 20).unwrap();
                 reader.scans().unwrap().iter().map(|scan| scan.number).collect::<Vec<_>>()
             };
             assert_eq!(numbers(), [1, 2]);
             assert_eq!(digests(&disk).unwrap(), before);
-            let is_kept =
-                |(path, bytes): (PathBuf, Vec<u8>)| path.starts_with("/map/quarantine") && bytes == list;
+            let is_kept = |(path, bytes): (PathBuf, Vec<u8>)| {
+                path.starts_with(map().join("quarantine")) && bytes == list
+            };
             assert!(disk.files().into_iter().any(is_kept));
             go_on(&disk, storage).unwrap();
             assert_eq!(numbers(), [1, 2, 5]);

@@ -1,7 +1,7 @@
 use super::random_maps::{open, path};
-use std::path::PathBuf;
+use crate::harness::{EVERY_CRASH, Job, Left, faults, make_foreign, sweep};
 use std::sync::Arc;
-use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
+use testkit::faulty_disk::{Fault, FaultyDisk};
 use testkit::random_scans::{Random, random_scan};
 use voxtile::operations::{self, Decay, Part};
 use voxtile::scan::Stop;
@@ -151,79 +151,29 @@ fn decay(disk: &FaultyDisk) -> Result<()> {
 }
 
 /// The digest of a map, `None` if there is none; of a damaged one there is none either, and that is a failure.
-fn digest(disk: &FaultyDisk, name: &str, what: &str) -> Option<voxtile::Digest> {
+fn digest(disk: &FaultyDisk, name: &str) -> Option<voxtile::Digest> {
     match MapReader::open(MapPath::on(disk.shared(), path(name)), 0) {
-        Ok(reader) => Some(reader.digest().unwrap_or_else(|error| panic!("{what}: {error:#}"))),
+        Ok(reader) => Some(reader.digest().unwrap_or_else(|error| panic!("{name}: {error:#}"))),
         Err(Error::NoMap { .. }) => None,
-        Err(error) => panic!("{what}: {error:#}"),
+        Err(error) => panic!("{name}: {error:#}"),
     }
 }
 
 /// The map that `work` changes or makes is as before or as after, whatever fails and wherever the power goes; and the
 /// same work, done again, ends as if nothing had happened.
-fn check(storage: Storage, name: &str, work: Work) {
-    check_from(&two_maps(storage), name, work);
+fn check(storage: Storage, name: &'static str, work: Work) {
+    check_from(two_maps(storage), name, work);
 }
 
-fn check_from(start: &FaultyDisk, name: &str, work: Work) {
-    let done = start.copy();
-    work(&done).unwrap();
-    let (before, after) = (digest(start, name, "before"), digest(&done, name, "after").unwrap());
-    assert_ne!(before, Some(after));
-    let (operations, changes) = (done.operations(), done.changes());
+fn check_from(start: FaultyDisk, name: &'static str, work: Work) {
     // A map of the original format goes on being adopted the next time.
     let is_own = start.files().contains_key(&path("a").join("commits.log"));
-    println!("{name}: {operations} operations, {changes} of them changes");
-    let settle = |disk: &FaultyDisk, returned: bool, what: &str| {
-        let found = digest(disk, name, what);
-        assert!(found == Some(after) || (!returned && found == before), "{what}");
-        match work(disk) {
-            Ok(()) => {}
-            Err(Error::AlreadyExists { .. }) if found == Some(after) => {}
-            Err(error) => panic!("{what}: again: {error:#}"),
-        }
-        assert_eq!(digest(disk, name, what), Some(after), "{what}: again");
-        let left: Vec<_> = disk.files().into_keys().collect();
-        assert!(left.iter().all(|path| !path.to_string_lossy().ends_with(".next")), "{what}: {left:?}");
-        assert!(left.iter().all(|path| !path.to_string_lossy().contains("unfinished")), "{what}: {left:?}");
-    };
-    let faults = (0..operations).map(Fault::Fails);
-    let faults = faults.chain((0..changes).map(Fault::LosesSync));
-    for fault in faults.chain((0..changes).map(Fault::IsFull)).chain((0..changes).map(Fault::IsReadOnly)) {
-        let disk = start.copy();
-        disk.set_fault(fault);
-        let returned = work(&disk).is_ok();
-        let what = format!("{fault:?}");
-        if let (false, Fault::IsFull(_) | Fault::Fails(_)) = (returned, fault) {
-            let is_unfinished = |path: &PathBuf| path.to_string_lossy().contains("out.unfinished");
-            let left: Vec<_> = disk.files().into_keys().filter(is_unfinished).collect();
-            assert!(left.is_empty(), "{what}: {left:?}");
-        }
-        if let (false, Fault::IsFull(_), true) = (returned, fault, is_own) {
-            // What was written in vain gives its room back.
-            let is_tile = |path: &PathBuf| path.to_string_lossy().contains("tile_");
-            let left =
-                disk.files().into_keys().filter(is_tile).find(|path| !start.files().contains_key(path));
-            assert_eq!(left, None, "{what}");
-        }
-        disk.make_room();
-        if returned {
-            settle(&disk.after_crash(Unsynced::Dropped), true, &what);
-        }
-        settle(&disk.after_crash(Unsynced::Shuffled(7)), returned, &what);
-        settle(&disk, returned, &what);
-    }
-    for at in 0..changes {
-        let disk = start.copy();
-        disk.set_fault(Fault::Crashes(at));
-        let returned = work(&disk).is_ok();
-        for unsynced in
-            [Unsynced::Dropped, Unsynced::Kept, Unsynced::Shuffled(at), Unsynced::Shuffled(at + 99)]
-        {
-            settle(&disk.after_crash(unsynced), returned, &format!("crash at {at}, {unsynced:?}"));
-        }
-        settle(&disk.after_kill(), returned, &format!("killed at {at}"));
-    }
+    let job = Job::new(start, path(name), work, move |disk| digest(disk, name));
+    let job = if is_own { job.tidy() } else { job };
+    let kinds: [fn(u64) -> Fault; 4] = [Fault::Fails, Fault::LosesSync, Fault::IsFull, Fault::IsReadOnly];
+    sweep(&job, faults(&job, &kinds, 8), &[Left::Dropped, Left::Shuffled(7), Left::Mended]);
+    let crashes = faults(&job, &[Fault::Crashes], 6);
+    sweep(&job, crashes, &[&EVERY_CRASH[..], &[Left::Killed]].concat());
 }
 
 #[test]
@@ -248,15 +198,15 @@ fn a_piece_that_is_moved_is_there_whole_and_durable_or_not_at_all() {
 
 #[test]
 fn pieces_are_one_map_or_as_they_were() {
-    check_from(&two_pieces(Storage::OctoMap), "out", join);
-    check_from(&two_pieces(Storage::Compact), "out", join);
-    check_from(&two_pieces(Storage::Compact).without_links(), "out", join);
+    check_from(two_pieces(Storage::OctoMap), "out", join);
+    check_from(two_pieces(Storage::Compact), "out", join);
+    check_from(two_pieces(Storage::Compact).without_links(), "out", join);
 }
 
 #[test]
 fn a_map_of_kept_scans_is_there_whole_or_not_at_all() {
-    check_from(&a_map_with_kept_scans(Storage::OctoMap), "out", map_anew);
-    check_from(&a_map_with_kept_scans(Storage::Compact), "out", map_anew);
+    check_from(a_map_with_kept_scans(Storage::OctoMap), "out", map_anew);
+    check_from(a_map_with_kept_scans(Storage::Compact), "out", map_anew);
 }
 
 /// A request to stop leaves nothing behind, and no map that could be taken for the one that was asked for.
@@ -307,28 +257,18 @@ fn evidence_fades_whole_or_not_at_all_and_once() {
 /// The same maps in the original format.
 fn foreign() -> FaultyDisk {
     let disk = two_maps(Storage::OctoMap);
-    for name in ["a", "b"] {
-        disk.take(&path(name).join("commits.log"));
-        let metadata = br#"{"version": "1.0", "resolution": 0.4, "tile_size": 3.2, "bounds": {"min": [0,0,0], "max": [0,0,0]}}"#;
-        disk.put(&path(name).join("metadata.json"), metadata);
-    }
-    for (path, bytes) in disk.files() {
-        if path.ends_with("iwlo_meta.bin") {
-            let count = u64::from_le_bytes(bytes[8..16].try_into().unwrap()) as usize;
-            disk.put(&path, &bytes[..16 + 18 * count]);
-        }
-    }
+    ["a", "b"].iter().for_each(|name| make_foreign(&disk, &path(name)));
     disk
 }
 
 #[test]
 fn maps_of_the_seeds_own_format_are_cut_and_cleared_too() {
-    check_from(&foreign(), "a", clear);
+    check_from(foreign(), "a", clear);
     let disk = foreign();
     crop(&disk).unwrap();
     clear(&disk).unwrap();
     // Both have gone to the same voxels, and only one of them is a new map.
-    assert_eq!(digest(&disk, "out", "cropped"), digest(&disk, "a", "cleared outside"));
+    assert_eq!(digest(&disk, "out"), digest(&disk, "a"));
     disk.take(&path("out"));
     // `a` is voxtile's own by now, `b` is not.
     assert!(merge(&disk).unwrap_err().to_string().contains("original format"));

@@ -1,5 +1,6 @@
+use crate::harness::{EVERY_CRASH, Job, Left, faults, sweep};
 use std::path::{Path, PathBuf};
-use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
+use testkit::faulty_disk::{Fault, FaultyDisk};
 use testkit::random_scans::{Random, random_scan};
 use voxtile::operations::{MapWriter, WrittenMap};
 use voxtile::space::TileIndex;
@@ -28,70 +29,19 @@ fn write(disk: &FaultyDisk, source: &InMemoryMapper) -> Result<WrittenMap> {
     writer.finish()
 }
 
-/// Whether the map is there; if so it must be whole.
-fn is_there(disk: &FaultyDisk, source: &InMemoryMapper, what: &str) -> bool {
-    match MapReader::open(MapPath::on(disk.shared(), folder()), 0) {
-        Ok(reader) => {
-            assert_eq!(reader.digest().unwrap(), source.digest().unwrap(), "{what}");
-            true
-        }
-        Err(Error::NoMap { .. }) => false,
-        Err(error) => panic!("{what}: {error:#}"),
-    }
-}
-
-/// Makes the map where it is not there, whatever an attempt left.
-fn again(disk: &FaultyDisk, source: &InMemoryMapper, what: &str) {
-    let was_there = is_there(disk, source, what);
-    match write(disk, source) {
-        Ok(_) => assert!(!was_there, "{what}"),
-        Err(Error::AlreadyExists { .. }) => assert!(was_there, "{what}"),
-        Err(error) => panic!("{what}: {error:#}"),
-    }
-    assert!(is_there(disk, source, what), "{what}");
-    let left = disk.files();
-    assert!(left.keys().all(|path| path.starts_with(folder())), "{what}: {:?}", left.keys());
-    assert!(left.keys().all(|path| !path.to_string_lossy().ends_with(".next")), "{what}");
-}
-
 #[test]
 fn whatever_fails_and_wherever_the_power_goes_there_is_no_map_or_the_whole_one() {
-    let source = source();
-    let disk = FaultyDisk::new(Fault::None);
-    let written = write(&disk, &source).unwrap();
-    assert_eq!(written.tiles, source.tile_indices().len() as u64);
-    assert!(is_there(&disk, &source, "undisturbed"));
-    let (operations, changes) = (disk.operations(), disk.changes());
-    println!("{operations} operations, {changes} of them changes");
-    let faults = (0..operations).map(Fault::Fails);
-    let faults = faults.chain((0..changes).map(Fault::LosesSync));
-    let (mut none, mut whole) = (0, 0);
-    for fault in faults.chain((0..changes).map(Fault::IsFull)) {
-        let disk = FaultyDisk::new(fault);
-        let written = write(&disk, &source);
-        disk.make_room();
-        let what = format!("{fault:?}");
-        match is_there(&disk, &source, &what) {
-            true => whole += 1,
-            false => none += 1,
-        }
-        assert!(written.is_err() || is_there(&disk.after_crash(Unsynced::Dropped), &source, &what), "{what}");
-        again(&disk, &source, &what);
-    }
-    assert!(none > 100 && whole > 0, "{none} {whole}");
-    for at in 0..changes {
-        let disk = FaultyDisk::new(Fault::Crashes(at));
-        let written = write(&disk, &source);
-        for unsynced in
-            [Unsynced::Dropped, Unsynced::Kept, Unsynced::Shuffled(at), Unsynced::Shuffled(at + 99)]
-        {
-            let what = format!("crash at {at}, {unsynced:?}");
-            let left = disk.after_crash(unsynced);
-            assert!(written.is_err() || is_there(&left, &source, &what), "{what}");
-            again(&left, &source, &what);
-        }
-        again(&disk.after_kill(), &source, &format!("killed at {at}"));
-    }
+    let written = write(&FaultyDisk::new(Fault::None), &source()).unwrap();
+    assert_eq!(written.tiles, source().tile_indices().len() as u64);
+    let look = |disk: &FaultyDisk| match MapReader::open(MapPath::on(disk.shared(), folder()), 0) {
+        Err(Error::NoMap { .. }) => None,
+        opened => Some(opened.unwrap().digest().unwrap()),
+    };
+    let work = |disk: &FaultyDisk| write(disk, &source()).map(drop);
+    let job = Job::new(FaultyDisk::new(Fault::None), folder(), work, look).tidy();
+    let kinds: [fn(u64) -> Fault; 3] = [Fault::Fails, Fault::LosesSync, Fault::IsFull];
+    sweep(&job, faults(&job, &kinds, 2), &[Left::Dropped, Left::Mended]);
+    sweep(&job, faults(&job, &[Fault::Crashes], 2), &[&EVERY_CRASH[..], &[Left::Killed]].concat());
 }
 
 #[test]

@@ -1,3 +1,5 @@
+use std::fs;
+use std::path::PathBuf;
 use tempfile::TempDir;
 
 /// What tests may need at once; containers often have 64 MiB.
@@ -10,6 +12,15 @@ const MIN_FREE_BYTES: u64 = 1 << 30;
 /// removed in the last seconds. Tests of the file system itself take [`TempDir::new`].
 pub fn memory_folder() -> TempDir {
     in_memory().unwrap_or_else(|| TempDir::new().unwrap())
+}
+
+/// A temporary folder alone in another: poses and cameras are also searched for next to a folder of scans, where other
+/// programs may have theirs. The first is removed when it is dropped.
+pub fn lone_folder() -> (TempDir, PathBuf) {
+    let outer = TempDir::new().unwrap();
+    let folder = outer.path().join("folder");
+    fs::create_dir(&folder).unwrap();
+    (outer, folder)
 }
 
 #[cfg(target_os = "linux")]

@@ -10,11 +10,21 @@ pub fn message_of<T>(result: voxtile::Result<T>) -> String {
     }
 }
 
-/// One in so many of the moments at which something may go wrong, spread without a pattern; all of them where the
-/// environment says `VOXTILE_FAULTS=all`, which takes some ten minutes.
+/// Whether tests take every case, and not the sample that a run of all tests takes: the environment says
+/// `VOXTILE_TESTS=all`. Some ten minutes with optimised code.
+fn is_every_case() -> bool {
+    std::env::var_os("VOXTILE_TESTS").is_some_and(|wanted| wanted == "all")
+}
+
+/// The number of random cases: a few, or all where `VOXTILE_TESTS=all`.
+pub fn cases(few: u64, all: u64) -> u64 {
+    if is_every_case() { all } else { few }
+}
+
+/// One in so many of the moments at which something may go wrong, spread without a pattern; all of them where
+/// `VOXTILE_TESTS=all`.
 pub fn some_of<T>(moments: impl IntoIterator<Item = T>, one_in: u64) -> impl Iterator<Item = T> {
-    let is_every_one = std::env::var_os("VOXTILE_FAULTS").is_some_and(|wanted| wanted == "all");
-    let one_in = if is_every_one { 1 } else { one_in };
+    let one_in = cases(one_in, 1);
     // Fibonacci hashing (Knuth): neighbours land far from each other.
     let is_taken =
         move |number: u64| (number.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40).is_multiple_of(one_in);

@@ -5,7 +5,7 @@ use report::{Cell, Samples, Stopwatch, Table};
 use std::path::Path;
 use voxtile::Scan;
 use voxtile::space::{Grid, Point};
-use voxtile_formats::{ScanSource, open_scans};
+use voxtile_formats::{ReadOptions, ScanSource, open_scans};
 use voxtile_local::{LocalMap, LocalParameters, LocalReader, LocalState};
 
 /// Edge of a voxel.
@@ -74,7 +74,7 @@ impl Outcome {
 
 fn run_setup(scans: &Path, points: Option<u32>, (name, d_in, d_inf, n_lim): Setup) -> Result<Outcome> {
     let parameters = LocalParameters::local_mapping().with_ranges(d_in, d_inf).with_max_voxels(n_lim);
-    let mut source = open_scans(scans, None)?;
+    let mut source = open_scans(scans, &ReadOptions::default())?;
     let mut map = LocalMap::new(RESOLUTION_M, parameters)?;
     let mut relay = if name == RELAYED { Some(Relay::new(parameters)?) } else { None };
     let mut outcome = Outcome::default();

@@ -4,6 +4,7 @@ use assert_cmd::Command;
 use std::fs;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
+use testkit::memory_folder::lone_folder;
 use voxtile_formats::write::{Origin, OutputFormat, OutputFormats, OutputOption};
 
 fn voxtile(arguments: &[&str]) -> Command {
@@ -115,9 +116,9 @@ fn recordings_are_known_by_their_content() {
 /// Depth images without their camera.
 #[test]
 fn the_option_for_a_camera_is_named() {
-    let folder = TempDir::new().unwrap();
-    fs::write(folder.path().join("0.depth.png"), "").unwrap();
-    let refused = refusal(&["scans", text(folder.path())]);
+    let (_outer, folder) = lone_folder();
+    fs::write(folder.join("0.depth.png"), "").unwrap();
+    let refused = refusal(&["scans", text(&folder)]);
     assert!(refused.contains("--intrinsics FILE") && refused.contains("camera-intrinsics.txt"), "{refused}");
 }
 
@@ -429,8 +430,8 @@ fn a_recording_that_was_not_closed_is_found_in_its_folder() {
 /// Far clouds with a coordinate reference system: the map keeps it, and files that can say it do.
 #[test]
 fn coordinate_reference_systems_are_kept_and_written_back() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = |name: &str| folder.path().join(name);
+    let (_outer, folder) = lone_folder();
+    let path = |name: &str| folder.join(name);
     let points = path("points.xyz");
     fs::write(&points, "600000.25 5300000.25 400.5\n600001.25 5300000.75 401.5\n").unwrap();
     let (plain, other) = (path("plain"), path("other"));

@@ -15,7 +15,7 @@ fn a_build_that_is_killed_again_and_again_ends_as_if_it_had_not_been() {
         assert!(scans.build(&map, &hows[0]).status().unwrap().success());
         started.elapsed().as_micros() as u64
     };
-    let kills = setting("VOXTILE_KILLS", 50);
+    let kills = setting("VOXTILE_KILLS", 24);
     let mut random = Random(setting("VOXTILE_SEED", 1));
     let (mut killed, mut lives, mut in_vain) = (0, 0, 0);
     while killed < kills {
@@ -68,7 +68,7 @@ fn a_conversion_that_is_killed_leaves_no_new_map_or_the_whole_one() {
     fs::remove_dir_all(&new).unwrap();
     let mut random = Random(setting("VOXTILE_SEED", 1));
     let (mut in_vain, mut whole) = (0, 0);
-    for number in 0..setting("VOXTILE_KILLS", 50) {
+    for number in 0..setting("VOXTILE_KILLS", 24) {
         let storage = ["octomap", "compact"][number as usize % 2];
         let mut child = convert(storage).spawn().unwrap();
         sleep(Duration::from_micros(random.below(whole_us * 5 / 4)));

@@ -132,7 +132,7 @@ impl Life<'_> {
 /// Long random lives: `VOXTILE_LIVES_SECONDS=3600` for an hour of them.
 #[test]
 fn a_map_is_what_it_must_be_after_any_life_of_commands_kills_and_readers() {
-    let until = Instant::now() + Duration::from_secs(setting("VOXTILE_LIVES_SECONDS", 30));
+    let until = Instant::now() + Duration::from_secs(setting("VOXTILE_LIVES_SECONDS", 12));
     let scans = Scans::new(SCANS, ROUNDS);
     let seed = setting("VOXTILE_SEED", 1);
     let (mut lives, mut steps, mut kills) = (0, 0, 0);

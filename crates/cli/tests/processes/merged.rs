@@ -24,7 +24,7 @@ fn a_merge_that_is_killed_leaves_no_map_and_goes_the_next_time() {
     let whole_us = started.elapsed().as_micros() as u64;
     let expected = digest(&whole).unwrap();
     let output = folder.path().join("merged");
-    let kills = setting("VOXTILE_KILLS", 50) / 2;
+    let kills = setting("VOXTILE_KILLS", 24) / 2;
     let (mut killed, mut ended) = (0, 0);
     while killed < kills {
         let mut child = merge([&a, &b], &output).spawn().unwrap();

@@ -30,7 +30,7 @@ fn a_snapshot_a_revert_and_a_deletion_that_are_killed_have_happened_or_not() {
         started.elapsed().as_micros() as u64
     };
     let (mut state, mut seed, mut happened) = (0, setting("VOXTILE_SEED", 1), 0);
-    for number in 0..setting("VOXTILE_KILLS", 50) {
+    for number in 0..setting("VOXTILE_KILLS", 24) {
         let to = 1 - state;
         let name = ["base", "twice"][to];
         let arguments: &[&str] = match number % 4 {

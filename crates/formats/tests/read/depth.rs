@@ -46,14 +46,16 @@ fn seven_scenes_have_millimetres_invalid_pixels_and_poses() {
 
 #[test]
 fn tum_has_a_list_with_stamps_and_a_scale_of_5000() {
-    let folder = tempfile::tempdir().unwrap();
-    fs::create_dir(folder.path().join("depth")).unwrap();
-    image(&folder.path().join("depth/b.png"), 1, &[5000, 65535]);
-    fs::write(folder.path().join("depth.txt"), "# depth maps\n1305031453.374112 depth/b.png\n").unwrap();
-    let (error, _) = failure(folder.path(), &ReadOptions::default());
+    // A camera is also searched for next to the folder.
+    let outer = tempfile::tempdir().unwrap();
+    let folder = outer.path().join("folder");
+    fs::create_dir_all(folder.join("depth")).unwrap();
+    image(&folder.join("depth/b.png"), 1, &[5000, 65535]);
+    fs::write(folder.join("depth.txt"), "# depth maps\n1305031453.374112 depth/b.png\n").unwrap();
+    let (error, _) = failure(&folder, &ReadOptions::default());
     assert!(error.contains("fx fy cx cy"), "{error}");
     let intrinsics = Some(Intrinsics::new([525.0, 525.0, 319.5, 239.5]).unwrap());
-    let clouds = clouds_with(folder.path(), &ReadOptions { intrinsics, ..Default::default() });
+    let clouds = clouds_with(&folder, &ReadOptions { intrinsics, ..Default::default() });
     assert_eq!(clouds[0].0.stamp_ns, Some(1_305_031_453_374_112_000));
     let depths: Vec<_> = clouds[0].1.iter().map(|point| (point.position_m[2], point.is_return)).collect();
     assert_eq!(depths, [(1.0, true), (13.107, true)]);

@@ -1,7 +1,7 @@
 use super::content::Content;
 use super::fault::{Fault, Unsynced};
 use super::names::{Entry, Inode, Names};
-use super::state::State;
+use super::state::{BeforeLock, State};
 use crate::random_scans::Random;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::ops::Range;
@@ -45,6 +45,7 @@ impl FaultyDisk {
             broken: BTreeSet::new(),
             unreadable: BTreeMap::new(),
             opened: BTreeMap::new(),
+            before_lock: None,
         };
         Self { state: Arc::new(Mutex::new(state)) }
     }
@@ -72,6 +73,11 @@ impl FaultyDisk {
     /// How often a file was opened to be read from its beginning.
     pub fn times_opened(&self, path: &Path) -> u64 {
         self.state().opened.get(path).copied().unwrap_or_default()
+    }
+
+    /// Lets something happen once, before the next lock is taken: what another process does meanwhile.
+    pub fn before_lock(&self, happens: impl FnOnce() + Send + 'static) {
+        self.state().before_lock = Some(BeforeLock(Box::new(happens)));
     }
 
     /// Whether the power has gone.
@@ -122,7 +128,7 @@ impl FaultyDisk {
         state.fault = Fault::None;
     }
 
-    /// Whether the disk was made with a fault that stays.
+    /// Whether the disk has had a fault that stays.
     pub fn had_a_fault_that_stays(&self) -> bool {
         self.state().stays
     }
@@ -131,6 +137,7 @@ impl FaultyDisk {
     pub fn set_fault(&self, fault: Fault) {
         let mut state = self.state();
         (state.fault, state.operations, state.changes, state.renames) = (fault, 0, 0, 0);
+        state.stays |= matches!(fault, Fault::Breaks(_));
     }
 
     /// The disk as it is found when the power is back.

@@ -2,6 +2,7 @@ use super::disk::FaultyDisk;
 use super::handles::{Locked, Reader, ScratchFile, Watch, Writer};
 use super::names::{Entry, NameChange};
 use super::operation::Kind;
+use super::state::BeforeLock;
 use std::io::{self, Read};
 use std::path::Path;
 use voxtile::store::{Disk, DiskLock, DiskRead, DiskWrite, EntryKind, ReaderWatch, Scratch};
@@ -213,6 +214,10 @@ impl Disk for FaultyDisk {
     }
 
     fn lock(&self, path: &Path) -> io::Result<Option<Box<dyn DiskLock>>> {
+        let before_lock = self.state().before_lock.take();
+        if let Some(BeforeLock(happens)) = before_lock {
+            happens();
+        }
         let mut state = self.state();
         let is_there = state.names.contains_key(path);
         state.attempt(if is_there { Kind::Changes } else { Kind::NeedsRoom }, path)?;

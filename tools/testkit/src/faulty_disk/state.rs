@@ -3,6 +3,7 @@ use super::fault::Fault;
 use super::names::{Entry, Inode, NameChange, Names};
 use super::operation::{Kind, Verdict};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::fmt;
 use std::io;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -32,6 +33,16 @@ pub(super) struct State {
     pub(super) unreadable: BTreeMap<PathBuf, Range<usize>>,
     /// How often each file was opened to be read from its beginning.
     pub(super) opened: BTreeMap<PathBuf, u64>,
+    pub(super) before_lock: Option<BeforeLock>,
+}
+
+/// What happens before the next lock is taken.
+pub(super) struct BeforeLock(pub(super) Box<dyn FnOnce() + Send>);
+
+impl fmt::Debug for BeforeLock {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("BeforeLock")
+    }
 }
 
 impl State {

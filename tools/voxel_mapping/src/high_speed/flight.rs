@@ -1,8 +1,8 @@
 use super::PlannersMap;
 use super::forest::{Forest, GOAL, START};
+use crate::planner::{distance_m, plan};
 use std::fmt;
 use std::time::Instant;
-use crate::planner::{distance_m, plan};
 use voxtile::space::Point;
 use voxtile::{Queries, Result, UnknownAs};
 use voxtile_local::{LocalView, Obstacle};

@@ -1,8 +1,8 @@
 use super::forest::{Forest, LENGTH_M};
 use super::{RESOLUTION_M, STEP};
+use crate::planner::{distance_m, is_free, plan};
 use std::time::{Duration, Instant};
 use testkit::lossy_link::LossyLink;
-use crate::planner::{distance_m, is_free, plan};
 use voxtile::space::{Grid, Point};
 use voxtile::{InMemoryMapper, MapConfig, Mapper, Result};
 use voxtile_local::{LocalMap, LocalParameters};

@@ -1,0 +1,117 @@
+use super::acts::{Act, perform};
+use super::interruption::{Reached, Subject};
+use super::map::{at, damage_in, map, open_or_create, rework, scans, snapshot_names};
+use super::model::State;
+use super::scans::{Taken, new_poses};
+use std::collections::BTreeSet;
+use std::path::PathBuf;
+use testkit::faulty_disk::{Fault, FaultyDisk};
+use voxtile::integrity::verify;
+use voxtile::operations::{NewPoses, Remap, RemapBeside};
+use voxtile::store::{TileStore, tile_of_folder};
+use voxtile::{MapConfig, MapReader, MapView, Mapper};
+
+/// Acts with a map, each in a process of its own, and the naive map after each number of them.
+pub struct Life {
+    pub acts: Vec<Act>,
+    pub states: Vec<State>,
+    pub config: MapConfig,
+    has_links: bool,
+}
+
+impl Life {
+    pub fn new(config: MapConfig, acts: Vec<Act>) -> Self {
+        let mut states = vec![State::default()];
+        for act in &acts {
+            states.push(states.last().unwrap().after(act, &config));
+        }
+        Self { acts, states, config, has_links: true }
+    }
+
+    /// The same where a file has one name only.
+    pub fn without_links(self) -> Self {
+        Self { has_links: false, ..self }
+    }
+
+    /// Scans that were flushed before the commit of a remapping beside them are in the map; what is left of that act is
+    /// done.
+    fn complete_what_was_beside(&self, disk: &FaultyDisk, number: usize, what: &str) {
+        let (before, Some(Act::MoveBeside { seed, rest, meanwhile })) =
+            (&self.states[number], self.acts.get(number))
+        else {
+            return;
+        };
+        for next in meanwhile.start + 1..=meanwhile.end {
+            if before.after(&Act::Scans(meanwhile.start..next), &self.config).is_on(disk) {
+                assert_eq!(damage_in(disk), BTreeSet::new(), "{what}");
+                let poses = NewPoses::Numbered(new_poses(&before.now.scans, *seed, *rest));
+                let mut mapper = open_or_create(disk, &self.config).unwrap();
+                let mut beside =
+                    RemapBeside::begin(&scans(disk).unwrap(), &poses, &Remap::new(rework())).unwrap();
+                (next..meanwhile.end).for_each(|seed| Taken::new(seed).insert_into(&mut mapper).unwrap());
+                mapper.flush().unwrap();
+                drop(mapper);
+                beside.follow(|_| ()).unwrap();
+                beside.finish().unwrap();
+                return;
+            }
+        }
+    }
+}
+
+/// State `n` is that after `n` acts.
+impl Subject for Life {
+    fn disk(&self) -> FaultyDisk {
+        let disk = FaultyDisk::new(Fault::None);
+        if self.has_links { disk } else { disk.without_links() }
+    }
+
+    fn run(&self, disk: &FaultyDisk, from: usize) -> Reached {
+        for number in from..self.acts.len() {
+            let performed = perform(disk, &self.config, &self.states[number], &self.acts[number]);
+            if performed.is_err() {
+                let (states, is_early) = (vec![number, number + 1], number == from);
+                return Reached { states, is_early, end: performed };
+            }
+        }
+        Reached { states: vec![self.acts.len()], is_early: from == self.acts.len(), end: Ok(()) }
+    }
+
+    fn find(&self, disk: &FaultyDisk, among: &[usize], what: &str) -> usize {
+        among.iter().for_each(|&number| self.complete_what_was_beside(disk, number, what));
+        let found = among.iter().copied().find(|&number| self.states[number].is_on(disk));
+        let found =
+            found.unwrap_or_else(|| panic!("{what}: none of the states {among:?} of {:?}", self.acts));
+        if found > 0 {
+            assert_eq!(damage_in(disk), BTreeSet::new(), "{what}");
+        }
+        found
+    }
+
+    fn check_end(&self, disk: &FaultyDisk, what: &str) {
+        RemapBeside::remove_leftovers(at(disk)).unwrap();
+        // What a crash in the last act left goes when the map is opened.
+        drop(TileStore::open(disk.shared(), map()).unwrap());
+        assert!(self.states.last().unwrap().is_on(disk), "{what}: another end");
+        check_files(disk, what);
+    }
+}
+
+/// Nothing is damaged, and no file is there that the map does not need.
+pub fn check_files(disk: &FaultyDisk, what: &str) {
+    let mut found = Vec::new();
+    verify(at(disk), |finding| found.push(finding.clone()), |_, _| ()).unwrap();
+    assert!(found.is_empty(), "{what}: {found:?}");
+    let tiles = MapReader::open(at(disk), 0).unwrap().tile_indices();
+    let is_of_map = |path: &PathBuf| {
+        let folder = path.parent().and_then(|folder| folder.file_name()?.to_str()).unwrap();
+        let is_of_tile = tile_of_folder(folder).is_none_or(|tile| tiles.binary_search(&tile).is_ok());
+        path.starts_with(map()) && (is_of_tile || path.to_string_lossy().contains(".flush"))
+    };
+    let files = disk.files();
+    let strays: Vec<_> = files.keys().filter(|path| !is_of_map(path)).collect();
+    assert!(strays.is_empty(), "{what}: {strays:?}");
+    let is_catalog = |path: &&PathBuf| path.to_string_lossy().contains("kept_scans/catalog");
+    let catalogs = files.keys().filter(is_catalog).count();
+    assert!(catalogs <= 1 + snapshot_names(disk).len(), "{what}: {catalogs} catalogs");
+}

@@ -1,0 +1,60 @@
+use std::collections::BTreeMap;
+use testkit::random_scans::{Random, random_scan};
+use voxtile::{Mapper, OutOfCoreTileMapper, Pose, Result, Scan, ScanRef};
+
+/// A scan as it was measured, and where from.
+#[derive(Clone, Debug)]
+pub struct Taken {
+    pub points: Vec<[f64; 3]>,
+    pub intensities: Vec<f32>,
+    pub pose: Pose,
+}
+
+impl Taken {
+    /// A scan of five points, some of which are none, and a point at the sensor.
+    pub fn new(seed: u64) -> Self {
+        let mut random = Random(seed);
+        let scan = random_scan(&mut random, [0.0; 3], 5);
+        let mut points = scan.points;
+        points.push([0.0; 3]);
+        let mut intensities = scan.intensities.unwrap();
+        intensities.push(-0.0);
+        Self { points, intensities, pose: random_pose(&mut random, seed) }
+    }
+
+    pub fn in_world(&self) -> Scan {
+        Scan::from_sensor_frame(&self.points, Some(self.intensities.clone()), self.pose)
+    }
+
+    pub fn insert_into(&self, mapper: &mut OutOfCoreTileMapper) -> Result<()> {
+        let points = ScanRef::in_sensor(self.pose, &self.points).with_intensities(&self.intensities)?;
+        mapper.insert_points(&points).map(drop)
+    }
+}
+
+/// To the bit: some points are not numbers.
+impl PartialEq for Taken {
+    fn eq(&self, other: &Self) -> bool {
+        let bits = |scan: &Self| {
+            let points: Vec<_> = scan.points.iter().map(|point| point.map(f64::to_bits)).collect();
+            let intensities: Vec<_> = scan.intensities.iter().map(|value| value.to_bits()).collect();
+            let ([x, y, z], [a, b, c, d]) = (scan.pose.position_m(), scan.pose.quaternion());
+            (points, intensities, [x, y, z, a, b, c, d].map(f64::to_bits))
+        };
+        bits(self) == bits(other)
+    }
+}
+
+/// Somewhere on a short drive; neighbours see the same places.
+fn random_pose(random: &mut Random, number: u64) -> Pose {
+    let along = [0.0, 3.0, 6.0, 9.0, 6.0, 3.0][number as usize % 6];
+    let turn = random.between(-3.0, 3.0);
+    let position = random.point([along, 0.0, 0.5], 0.3);
+    Pose::from_quaternion(position, [0.1, 0.0, (turn / 2.0_f64).sin(), (turn / 2.0_f64).cos()]).unwrap()
+}
+
+/// Other poses for scans whose number leaves a rest when it is divided by four, or for all.
+pub fn new_poses(scans: &BTreeMap<u64, Taken>, seed: u64, rest: Option<u64>) -> Vec<(u64, Pose)> {
+    let numbers = scans.keys().copied().filter(|number| rest.is_none_or(|rest| number % 4 == rest));
+    numbers.map(|number| (number, random_pose(&mut Random(seed ^ number), number))).collect()
+}
