@@ -8,7 +8,7 @@ use crate::persistence::config_from;
 use crate::persistence::load::{self, ReadTable};
 use crate::persistence::one_voxel::read_voxel;
 use crate::sensor::Evidence;
-use crate::space::{TileBox, TileIndex, TileSpace, VoxelIndex};
+use crate::space::{Grid, TileBox, TileIndex, TileSpace, VoxelIndex};
 use crate::store::{
     CatalogEntry, Disk, KeptRecord, KeptRecords, MapPath, Metadata, ScanRecord, SnapshotName, TileFile,
     TileStore, TileVersion, read_scans,
@@ -43,6 +43,8 @@ struct ReaderCache {
     /// With their bytes.
     tiles: LruCache<TileIndex, (Arc<Tile>, usize)>,
     bytes: usize,
+    max_tiles: usize,
+    max_bytes: usize,
     /// Tiles not in memory of which one voxel was asked.
     asked_once: LruCache<TileIndex, ()>,
     io: IoCounts,
@@ -51,18 +53,22 @@ struct ReaderCache {
 /// Most tiles that are remembered for having been asked once.
 const MAX_ASKED_ONCE: NonZeroUsize = NonZeroUsize::new(1024).unwrap();
 
-impl Default for ReaderCache {
-    fn default() -> Self {
+impl ReaderCache {
+    fn new(memory: MemoryLimit, grid: &Grid) -> Self {
+        let max_tiles = match memory {
+            MemoryLimit::Tiles { tiles, .. } => tiles,
+            _ => usize::MAX,
+        };
         Self {
             tiles: LruCache::unbounded(),
             bytes: 0,
+            max_tiles,
+            max_bytes: memory.bytes(grid).unwrap_or(usize::MAX),
             asked_once: LruCache::new(MAX_ASKED_ONCE),
             io: IoCounts::default(),
         }
     }
-}
 
-impl ReaderCache {
     fn get(&mut self, index: TileIndex) -> Option<Arc<Tile>> {
         let (tile, _) = self.tiles.get(&index)?;
         self.io.hits += 1;
@@ -74,16 +80,11 @@ impl ReaderCache {
     }
 
     /// Puts a tile in and drops others, those used longest ago first, until all fit. One always does.
-    fn put(&mut self, tile: Arc<Tile>, config: &MapConfig) {
+    fn put(&mut self, tile: Arc<Tile>) {
         let (index, bytes) = (tile.index(), tile.bytes());
-        let most_bytes = config.memory_bytes().unwrap_or(usize::MAX);
-        let most_tiles = match config.memory {
-            MemoryLimit::Tiles { tiles, .. } => tiles,
-            _ => usize::MAX,
-        };
         self.remove(index);
         self.asked_once.pop(&index);
-        while (self.tiles.len() >= most_tiles || self.bytes.saturating_add(bytes) > most_bytes)
+        while (self.tiles.len() >= self.max_tiles || self.bytes.saturating_add(bytes) > self.max_bytes)
             && let Some((_, (_, dropped))) = self.tiles.pop_lru()
         {
             self.bytes -= dropped;
@@ -93,13 +94,9 @@ impl ReaderCache {
     }
 }
 
-fn config_of_store(store: &TileStore, memory: MemoryLimit) -> Result<MapConfig> {
-    let config = config_from(store.metadata(), &store.layout().metadata())?;
-    match memory {
-        // The least number of bytes is that of a mapper; a reader always has room for one tile.
-        MemoryLimit::Bytes(_) => Ok(MapConfig { memory, ..config.validated()? }),
-        _ => MapConfig { memory, ..config }.validated(),
-    }
+/// What only concerns a run has its defaults.
+fn config_of_store(store: &TileStore) -> Result<MapConfig> {
+    config_from(store.metadata(), &store.layout().metadata())?.validated()
 }
 
 impl MapReader {
@@ -140,10 +137,11 @@ impl MapReader {
     }
 
     fn of_store(store: TileStore, disk: Arc<dyn Disk>, memory: MemoryLimit) -> Result<Self> {
-        let config = config_of_store(&store, memory)?;
+        let config = config_of_store(&store)?;
         let octrees = OctreeFactory::default();
         let space = store.tiles().iter().collect();
-        Ok(Self { config, octrees, store, space, disk, order: OnceLock::new(), cache: Mutex::default() })
+        let cache = Mutex::new(ReaderCache::new(memory, &config.grid));
+        Ok(Self { config, octrees, store, space, disk, order: OnceLock::new(), cache })
     }
 
     /// Goes on to the last flush; whether there is a newer one than the one seen so far. Tiles in memory that have not
@@ -170,7 +168,7 @@ impl MapReader {
             let [wanted, found] = [seen, found].map(|id| id.unwrap_or_else(|| "none".into()));
             return Err(Error::Mismatch { path: folder, what: "the id", found, wanted });
         }
-        let config = config_of_store(&store, self.config.memory)?;
+        let config = config_of_store(&store)?;
         let is_newer = seen != found || store.commits().flush_number != self.flush_number();
         let cache = self.cache.get_mut().unwrap_or_else(PoisonError::into_inner);
         let tiles: Vec<_> = cache.tiles.iter().map(|(index, _)| *index).collect();
@@ -193,7 +191,7 @@ impl MapReader {
     /// No map there, or metadata that cannot be read.
     pub fn config_of(folder: impl Into<MapPath>) -> Result<MapConfig> {
         let (disk, folder) = folder.into().into_parts();
-        config_of_store(&TileStore::open_read_only(disk, &folder)?, MemoryLimit::default())
+        config_of_store(&TileStore::open_read_only(disk, &folder)?)
     }
 
     /// What `metadata.json` says.
@@ -430,7 +428,7 @@ impl MapView for MapReader {
         self.found(|cache| {
             cache.io.loads += 1;
             cache.io.bytes_read += bytes;
-            cache.put(tile.clone(), &self.config);
+            cache.put(tile.clone());
         });
         Ok(Some(TileRef::shared(tile)))
     }

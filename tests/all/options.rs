@@ -4,7 +4,8 @@ use tempfile::TempDir;
 use testkit::faulty_disk::{Fault, FaultyDisk};
 use testkit::random_scans::{Random, random_scan};
 use voxtile::{
-    Error, MapConfig, MapOptions, MapPath, MapQueries, MapReader, MapView, Mapper, Queries, SnapshotName,
+    Error, MapConfig, MapOptions, MapPath, MapQueries, MapReader, MapView, Mapper, MemoryLimit, Queries,
+    SnapshotName,
 };
 
 fn config() -> MapConfig {
@@ -74,6 +75,8 @@ fn a_reader_keeps_to_its_bytes_and_gives_the_same_answers() {
     }
     assert!(all.statistics().cached.bytes() > 2 * BYTES as u64, "the map is larger than the limit");
     assert!((BYTES as u64 / 2..=BYTES as u64).contains(&most), "{most} bytes");
+    // It is the reader's alone: a map that is made with this configuration has another.
+    assert_eq!(small.config().memory, MemoryLimit::Default);
     // One tile has room in any limit.
     let least = MapOptions::new().memory_bytes(1).open_read_only(&place).unwrap();
     assert_eq!(least.digest().unwrap(), all.digest().unwrap());
