@@ -4,18 +4,28 @@ use super::args::Cli;
 use clap::CommandFactory as _;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
-use std::sync::LazyLock;
+use std::sync::{LazyLock, OnceLock};
 
-/// The option of each field.
+/// The name of the subcommand that runs.
+static SUBCOMMAND: OnceLock<String> = OnceLock::new();
+
+/// The option of each field, of the subcommand that runs.
 static OPTIONS: LazyLock<BTreeMap<String, String>> = LazyLock::new(|| {
     let command = Cli::command();
-    let arguments = command.get_subcommands().flat_map(clap::Command::get_arguments);
+    let runs =
+        |subcommand: &&clap::Command| SUBCOMMAND.get().is_none_or(|name| name == subcommand.get_name());
+    let arguments = command.get_subcommands().filter(runs).flat_map(clap::Command::get_arguments);
     let longs = arguments.filter_map(clap::Arg::get_long);
     let mut options: BTreeMap<_, _> =
         longs.map(|long| (long.replace('-', "_"), format!("--{long}"))).collect();
     options.insert("insert_mode".to_owned(), "--insert".to_owned());
     options
 });
+
+/// Says which subcommand runs, before anything is named.
+pub fn name_options_of(subcommand: &str) {
+    SUBCOMMAND.get_or_init(|| subcommand.to_owned());
+}
 
 /// A text with fields between backticks as one with options.
 pub fn with_options(text: &str) -> Cow<'_, str> {

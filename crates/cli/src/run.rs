@@ -6,12 +6,12 @@ use super::failure::JsonTo;
 use super::view;
 use super::{
     build, clear, completions, convert, crop, decay, demo, diff, digest, export, import, info, local, man,
-    merge, picture, progress, query, raycast, remap, remove_points, remove_scans, repair, report, revert,
-    scans, share, snapshot, snapshots, threads, verify,
+    merge, option_names, picture, progress, query, raycast, remap, remove_points, remove_scans, repair,
+    report, revert, scans, share, snapshot, snapshots, threads, verify,
 };
 #[cfg(feature = "bucket")]
 use super::{pull, push};
-use clap::Parser;
+use clap::{CommandFactory as _, FromArgMatches as _};
 use std::ffi::OsString;
 use std::io::Write;
 use std::process::ExitCode;
@@ -27,7 +27,9 @@ pub fn main() -> ExitCode {
 /// The command with `arguments`, the program's name first. It ends the process where they make no sense or ask for
 /// help, and it expects a process of its own: it sets up logging, threads and signals.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
-    let cli = Cli::parse_from(with_plain_numbers(arguments));
+    let matches = Cli::command().get_matches_from(with_plain_numbers(arguments));
+    option_names::name_options_of(matches.subcommand_name().unwrap_or_default());
+    let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     // The command line before the environment, where it says something.
     let mut log = env_logger::Builder::new();
     log.filter_level(cli.log_level()).format_timestamp(None);
