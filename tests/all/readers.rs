@@ -188,7 +188,7 @@ fn points_in_the_world_frame_are_not_deskewed() {
     options.poses = Some("identity".into());
     (options.clouds.is_deskewed, options.clouds.is_world_frame) = (true, true);
     let error = message_of(open_scans(&folder, &options).map(drop));
-    assert!(error.contains("--deskew, --world-frame: points that are in the world frame already"), "{error}");
+    assert!(error.contains("deskew, world_frame: points that are in the world frame already"), "{error}");
 }
 
 #[test]
@@ -200,7 +200,7 @@ fn files_come_in_natural_order_and_scans_without_poses_are_refused() {
     fs::write(folder.join("trajectory.txt"), "0 0 0 0 0 0 0 1\n".repeat(12)).unwrap();
     let error = message_of(open_scans(&folder, &ReadOptions::default()));
     assert!(error.contains("has no poses"), "{error}");
-    assert!(error.contains("trajectory.txt looks like one") && error.contains("--poses identity"), "{error}");
+    assert!(error.contains("trajectory.txt looks like one") && error.contains("`poses` identity"), "{error}");
 
     let mut meant = open_scans(&folder, &with_poses(Path::new("identity"))).unwrap();
     assert_eq!(meant.pose_source(), PoseSource::Identity);

@@ -76,7 +76,10 @@ fn images_out_of_the_folder_are_refused() {
     for name in ["../1.png".to_owned(), folder.path().join("1.png").display().to_string()] {
         fs::write(inner.join("depth.txt"), format!("# depth maps\n1305031453.374112 {name}\n")).unwrap();
         let (error, points) = failure(&inner, &options);
-        assert!(error.contains("depth.txt, line 2") && error.contains("leads out of the folder"), "{error}");
+        assert!(
+            error.contains("depth.txt: malformed: line 2") && error.contains("leads out of the folder"),
+            "{error}"
+        );
         assert_eq!(points, 0);
     }
 }

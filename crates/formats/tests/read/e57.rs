@@ -75,7 +75,7 @@ fn points_that_take_no_bits_are_refused() {
     // The first byte is for the target of the fuzzer.
     fs::write(&path, &fs::read(corpus).unwrap()[1..]).unwrap();
     let (error, points) = failure(&path, &ReadOptions::default());
-    assert!(error.contains("constant.e57, record 0: every field of its points has"), "{error}");
+    assert!(error.contains("constant.e57: malformed: record 0: every field of its points has"), "{error}");
     assert_eq!(points, 0);
 }
 
@@ -104,7 +104,7 @@ fn a_file_that_is_no_e57_or_is_cut_off_says_so() {
         fs::write(&path, bytes).unwrap();
         let (error, _) =
             failure(&path, &ReadOptions { format: Some("e57".into()), ..ReadOptions::default() });
-        assert!(error.contains("byte 0: it is no E57 file, or is cut off; copy it again"), "{error}");
+        assert!(error.contains("offset 0: it is no E57 file, or is cut off; copy it again"), "{error}");
     }
 }
 

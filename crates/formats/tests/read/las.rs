@@ -182,9 +182,9 @@ fn scales_and_offsets_must_give_coordinates() {
     let path = folder.path().join("damaged.las");
     let bytes = fs::read(fixture("timed.las")).unwrap();
     for (at, value, what) in [
-        (131, f64::NAN, "byte 131: the scale of x is NaN"),
-        (147, 0.0, "byte 147: the scale of z is 0"),
-        (163, f64::INFINITY, "byte 163: the offset of y is inf"),
+        (131, f64::NAN, "offset 131: the scale of x is NaN"),
+        (147, 0.0, "offset 147: the scale of z is 0"),
+        (163, f64::INFINITY, "offset 163: the offset of y is inf"),
     ] {
         let mut damaged = bytes.clone();
         damaged[at..at + 8].copy_from_slice(&value.to_le_bytes());

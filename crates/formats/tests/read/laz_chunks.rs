@@ -24,7 +24,10 @@ fn of_damaged(file: &[u8], at: usize, bytes: &[u8]) -> String {
 }
 
 fn assert_says(error: &str, at: usize, what: &str) {
-    assert!(error.contains(&format!("damaged.laz, byte {at}: ")) && error.contains(what), "{error}");
+    assert!(
+        error.contains(&format!("damaged.laz: malformed: offset {at}: ")) && error.contains(what),
+        "{error}"
+    );
 }
 
 /// Each claim would have the library reserve gigabytes, or read for years.
@@ -39,7 +42,7 @@ fn a_chunk_table_that_lies_is_refused() {
         assert_says(&error, points_at, "the chunk table is said to be at byte 1099511627776");
         // The table itself is compressed: other bytes are other lengths of chunks.
         let error = of_damaged(file, table_at + 8, &[0xf3; 4]);
-        assert!(error.contains(&format!("damaged.laz, byte {table_at}: ")), "{error}");
+        assert!(error.contains(&format!("damaged.laz: malformed: offset {table_at}: ")), "{error}");
     }
     let (points_at, _) = places(&by_layer);
     // Behind the place of the table, the first point and the number of points.

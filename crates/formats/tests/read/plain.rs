@@ -177,7 +177,7 @@ fn a_bad_file_of_a_folder_is_passed_by() {
     assert_eq!(source.len_hint(), Some(3));
     assert_eq!(source.next_cloud().unwrap().map(|head| head.name), Some("1.ply".into()));
     let error = format!("{:#}", source.next_cloud().unwrap_err());
-    assert!(error.contains("2.ply, line 4: the file has no element `vertex`"), "{error}");
+    assert!(error.contains("2.ply: malformed: line 4: the file has no element `vertex`"), "{error}");
     assert_eq!(source.next_cloud().unwrap().map(|head| head.name), Some("3.ply".into()));
     assert_eq!(source.next_cloud().unwrap(), None);
 }

@@ -33,8 +33,12 @@ fn temporary_files_that_cannot_be_made_are_an_error() {
     std::fs::write(active.path(), &whole[..whole.len() - 10]).unwrap();
     for path in [data("bz2.bag"), data("zstd.mcap"), active.path().to_owned()] {
         let error = open_bag(from_ref(&path), &options).err().map(|error| format!("{error:#}"));
-        let wanted = format!("cannot make a temporary file in {}", data("gone").display());
-        assert_eq!(error, Some(wanted), "{}", path.display());
+        let wanted = format!("{}: cannot make a temporary file in: ", data("gone").display());
+        assert!(
+            error.as_ref().is_some_and(|error| error.starts_with(&wanted)),
+            "{}: {error:?}",
+            path.display()
+        );
     }
 }
 

@@ -65,6 +65,6 @@ fn of_many_topics_of_images_some_are_looked_into() {
     let start = Instant::now();
     let error =
         open_bag(&[path], &BagOptions::default()).err().map(|error| format!("{error:#}")).unwrap_or_default();
-    assert!(error.contains("choose one with --topic NAME: /c100/image") && error.contains("more"), "{error}");
+    assert!(error.contains("choose one with `topic` NAME: /c100/image") && error.contains("more"), "{error}");
     assert!(start.elapsed() < Duration::from_secs(30), "{:?}", start.elapsed());
 }
