@@ -445,7 +445,7 @@ fn the_merged_octree_holds_every_voxel_and_refuses_what_octomap_cannot_address()
     assert!(out_of_core.merged_octree(None, 10).unwrap_err().to_string().contains("limit of 10"));
     map.insert_scan(&random_scan(&mut Random(1), [4000.0, 0.0, 0.0], 5)).unwrap();
     let message = map.merged_octree(None, 1 << 20).unwrap_err().to_string();
-    assert!(message.contains("--region"), "{message}");
+    assert!(message.contains("`region`"), "{message}");
     let region = Aabb { min: [-9.0; 3], max: [9.0; 3] };
     assert_eq!(map.merged_octree(Some(&region), 1 << 20).unwrap().expanded_leaf_count(), voxels.len() as u64);
 }
