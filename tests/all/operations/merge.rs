@@ -82,7 +82,7 @@ fn a_merge_is_the_naive_one_for_two_to_five_maps_and_every_preference() {
                 Err(Error::InvalidArgument { reason, .. })
                     if needs_choice && have_common_tile(&config, &maps) =>
                 {
-                    assert!(reason.contains("iwlo") && reason.contains("--prefer"), "{reason}");
+                    assert!(reason.contains("iwlo") && reason.contains("`prefer`"), "{reason}");
                     continue;
                 }
                 merged => merged.unwrap_or_else(|error| panic!("seed {seed}: {error:#}")),
@@ -146,7 +146,7 @@ fn maps_that_do_not_go_together_are_refused_with_what_differs() {
     for (other, what) in [(&surer, "hit 2,"), (&iwlo, "iwlo"), (&stricter, "0.7")] {
         let message = refusal(&usual, other, None);
         assert!(
-            message.contains("/maps/b") && message.contains(what) && message.contains("--prefer"),
+            message.contains("/maps/b") && message.contains(what) && message.contains("`prefer`"),
             "{message}"
         );
         let (disk, maps) = two(&usual, other);
