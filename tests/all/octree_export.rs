@@ -160,7 +160,7 @@ fn voxels_that_octomap_has_no_key_for_are_an_error_before_anything_is_written() 
     for format in FORMATS {
         let error = streamed(&map, format, None, 1000).unwrap_err();
         assert!(matches!(error.downcast_ref(), Some(Error::InvalidArgument { .. })), "{error}");
-        assert!(error.to_string().contains("--origin 2000 0 0"), "{error}");
+        assert!(error.to_string().contains("`origin` 2000 0 0"), "{error}");
     }
     let inside = Aabb { min: [-1.0; 3], max: [3276.8, 1.0, 1.0] };
     check(&map, Some(&inside));
