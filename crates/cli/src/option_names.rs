@@ -9,25 +9,29 @@ use std::sync::{LazyLock, OnceLock};
 /// The name of the subcommand that runs.
 static SUBCOMMAND: OnceLock<String> = OnceLock::new();
 
-/// The option of each field, of the subcommand that runs.
-static OPTIONS: LazyLock<BTreeMap<String, String>> = LazyLock::new(|| {
+/// The option of each field.
+static OPTIONS: LazyLock<BTreeMap<String, String>> = LazyLock::new(|| options_of(|_| true));
+/// The same, of the subcommand that runs.
+static OWN_OPTIONS: LazyLock<BTreeMap<String, String>> =
+    LazyLock::new(|| options_of(|subcommand| SUBCOMMAND.get().is_none_or(|name| name == subcommand)));
+
+fn options_of(is_wanted: impl Fn(&str) -> bool) -> BTreeMap<String, String> {
     let command = Cli::command();
-    let runs =
-        |subcommand: &&clap::Command| SUBCOMMAND.get().is_none_or(|name| name == subcommand.get_name());
-    let arguments = command.get_subcommands().filter(runs).flat_map(clap::Command::get_arguments);
+    let subcommands = command.get_subcommands().filter(|subcommand| is_wanted(subcommand.get_name()));
+    let arguments = subcommands.flat_map(clap::Command::get_arguments);
     let longs = arguments.filter_map(clap::Arg::get_long);
     let mut options: BTreeMap<_, _> =
         longs.map(|long| (long.replace('-', "_"), format!("--{long}"))).collect();
     options.insert("insert_mode".to_owned(), "--insert".to_owned());
     options
-});
+}
 
 /// Says which subcommand runs, before anything is named.
 pub fn name_options_of(subcommand: &str) {
     SUBCOMMAND.get_or_init(|| subcommand.to_owned());
 }
 
-/// A text with fields between backticks as one with options.
+/// A text with fields between backticks as one with options, be they of another subcommand.
 pub fn with_options(text: &str) -> Cow<'_, str> {
     if !text.contains('`') {
         return text.into();
@@ -50,11 +54,12 @@ pub fn with_options(text: &str) -> Cow<'_, str> {
     (named + rest).into()
 }
 
-/// An argument by the name of its field, or several after commas, as options; a value may follow a name.
+/// An argument by the name of its field, or several after commas, as options; a value may follow a name. What is no option
+/// of the subcommand stays.
 pub fn option_of(argument: &str) -> String {
     let named = |part: &str| {
         let (name, value) = part.split_at(part.find(' ').unwrap_or(part.len()));
-        OPTIONS.get(name).map_or_else(|| part.to_owned(), |option| format!("{option}{value}"))
+        OWN_OPTIONS.get(name).map_or_else(|| part.to_owned(), |option| format!("{option}{value}"))
     };
     argument.split(", ").map(named).collect::<Vec<_>>().join(", ")
 }

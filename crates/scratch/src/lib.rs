@@ -1,5 +1,5 @@
-//! Temporary files without a name, for what has no room in memory for a while. What was appended is read back through
-//! mappings: without a copy, and without system calls for each record.
+//! Temporary files without a name, for what has no room in memory for a while. What was appended is read back in order as
+//! memory ([`Window`]), or at any place.
 
 mod mapping;
 mod scratch_file;
