@@ -184,8 +184,7 @@ fn unplaced(folder: &Path, names: &[&str]) {
 fn points_in_the_world_frame_are_not_deskewed() {
     let (_outer, folder) = lone_folder();
     unplaced(&folder, &["0.pcd"]);
-    let mut options = ReadOptions::default();
-    options.poses = Some("identity".into());
+    let mut options = ReadOptions { poses: Some("identity".into()), ..ReadOptions::default() };
     (options.clouds.is_deskewed, options.clouds.is_world_frame) = (true, true);
     let error = message_of(open_scans(&folder, &options).map(drop));
     assert!(error.contains("deskew, world_frame: points that are in the world frame already"), "{error}");
