@@ -34,7 +34,7 @@ impl LocalScans {
     ///
     /// # Errors
     ///
-    /// As for [`scans_at`]; [`Error::Stopped`].
+    /// A place that cannot be read; [`Error::Stopped`](voxtile::Error::Stopped).
     #[cfg(feature = "bucket")]
     pub fn of(scans: &Path, watch: &Watch) -> Result<Self> {
         let url = match url_of(scans) {

@@ -172,8 +172,8 @@ fn a_table_of_real_sets() {
         "las_large_coords/lidR_Megaplot.laz",
         "las_large_coords/autzen_trim.laz",
     ] {
-        let mut options = ReadOptions::default();
-        options.poses = set.ends_with("laz").then(|| "identity".into());
+        let poses = set.ends_with("laz").then(|| "identity".into());
+        let options = ReadOptions { poses, ..ReadOptions::default() };
         let Ok(mut source) = open_scans(&std::path::Path::new(&root).join(set), &options) else {
             continue;
         };

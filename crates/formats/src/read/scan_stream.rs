@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use voxtile::scan::Pose;
 use voxtile::{Error, FormatError, Result};
 
-/// Reads voxtile's scan stream, as written by a [`ScanStreamWriter`](super::ScanStreamWriter), scan by scan, from a
+/// Reads voxtile's scan stream, as written by a [`ScanStreamWriter`](crate::ScanStreamWriter), scan by scan, from a
 /// file or a pipe.
 ///
 /// `path` is for errors. With `is_file` the file is opened for the fingerprint; otherwise the fingerprint is the
