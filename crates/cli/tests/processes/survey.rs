@@ -12,6 +12,8 @@ use voxtile_simulation::{City, Drive, Lidar, Survey};
 pub struct Scans {
     pub folder: TempDir,
     pub digests: Vec<String>,
+    /// Around the folder: poses that somebody left among temporary files are not beside it.
+    _around: TempDir,
 }
 
 pub const RESOLUTION_M: f64 = 0.5;
@@ -20,7 +22,8 @@ const MAX_RANGE_M: f64 = 20.0;
 impl Scans {
     /// So many scans of a drive through a made-up city, mapped `rounds` times one after the other.
     pub fn new(count: usize, rounds: usize) -> Self {
-        let folder = TempDir::new().unwrap();
+        let around = TempDir::new().unwrap();
+        let folder = TempDir::new_in(around.path()).unwrap();
         let survey = Survey::new(City::new(3), Drive::new(3, 2.0), Lidar::demo(), 3);
         for (number, scan) in survey.take(count).enumerate() {
             let points: Vec<_> = scan.points.iter().step_by(9).collect();
@@ -36,7 +39,7 @@ impl Scans {
                 digests.push(mapper.digest().unwrap().to_string());
             }
         }
-        Self { folder, digests }
+        Self { folder, digests, _around: around }
     }
 
     /// The command that builds the map with little memory, so that it evicts all the while.
