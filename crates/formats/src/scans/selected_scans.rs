@@ -71,7 +71,9 @@ impl SelectedScans {
         if self.is_at_end() {
             return Ok(false);
         }
-        let wanted = self.selection.first + self.taken * self.selection.every.max(1);
+        // Behind the last number there is no scan.
+        let passed_between = self.taken.saturating_mul(self.selection.every.max(1));
+        let wanted = self.selection.first.saturating_add(passed_between);
         while self.passed < wanted {
             // One at a time: a scan that cannot be read has a number as the others do, and was not wanted.
             match self.source.skip(1) {
