@@ -20,7 +20,7 @@ pub use edit::{ClearArgs, CropArgs, DecayArgs, MergeArgs, PartArgs};
 pub use export::{ExportArgs, WhatName};
 pub use local::{LocalArgs, PresetName};
 use log::LevelFilter;
-pub use picture::{PictureArgs, ReportArgs, TerminalArgs, ViewName};
+pub use picture::{PictureArgs, ReportArgs, ViewName};
 pub use read::{FrameName, ReadArgs};
 pub use remap::{RemapArgs, RemovePointsArgs, RemoveScansArgs, ReworkArgs};
 pub use snapshot::{DiffArgs, RevertArgs, SnapshotArgs, SnapshotsArgs};
@@ -84,7 +84,7 @@ pub enum Command {
     Raycast(RaycastArgs),
     /// Write a map's voxels to a file for other programs, or its surface, or its octree
     Export(ExportArgs),
-    /// Draw a map: from above, cut at a height, from a side, or what has changed; as PNG or into the terminal
+    /// Draw a map: from above, cut at a height, from a side, or what has changed; as PNG
     Picture(PictureArgs),
     /// Write a page about a map: pictures, numbers, histograms, damage; one file that needs no network
     Report(ReportArgs),
@@ -243,9 +243,6 @@ pub struct ImportArgs {
 pub struct InfoArgs {
     /// Folder of the map, FOLDER@SNAPSHOT, or an OctoMap file (.bt .ot)
     pub map: PathBuf,
-    /// Draw nothing: a terminal gets a small picture of a map that is not large, unless NO_COLOR is set
-    #[arg(long)]
-    pub no_picture: bool,
     /// Print JSON
     #[arg(long)]
     pub json: bool,

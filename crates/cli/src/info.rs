@@ -1,13 +1,10 @@
 use crate::args::InfoArgs;
 use crate::json;
-use voxtile_pipeline::{read_any_map, read_map};
-
 use crate::octree_info;
-use crate::picture::{is_quick, print_small};
 use crate::region_tiles;
 use indicatif::{HumanBytes, HumanCount};
 use serde::Serialize;
-use std::io::{IsTerminal, Write};
+use std::io::Write;
 use std::process::ExitCode;
 use voxtile::mapper::{MapReader, MapView, OctreeMap};
 use voxtile::operations::{KeptBytes, kept_bytes};
@@ -15,6 +12,7 @@ use voxtile::sensor::SensorModel;
 use voxtile::space::{Aabb, Grid, TileBox};
 use voxtile::store::{Bounds, InputRecord, MapPath};
 use voxtile::{MapQueries, Result, Storage};
+use voxtile_pipeline::read_map;
 
 /// Inputs that are shown to people; JSON has them all.
 const INPUTS_SHOWN: usize = 5;
@@ -54,7 +52,6 @@ pub fn run(args: &InfoArgs) -> anyhow::Result<ExitCode> {
     let mut out = std::io::stdout().lock();
     if OctreeMap::is_named_by(&args.map) {
         octree_info::print_info(&args.map, args.json, &mut out)?;
-        draw(args, &mut out)?;
         return Ok(ExitCode::SUCCESS);
     }
     let info = read_map(&args.map, |reader| Ok(Info::of(reader)?))?;
@@ -62,29 +59,8 @@ pub fn run(args: &InfoArgs) -> anyhow::Result<ExitCode> {
         json::print(&info, &mut out)?;
     } else {
         info.print(&mut out)?;
-        draw(args, &mut out)?;
     }
     Ok(ExitCode::SUCCESS)
-}
-
-/// Whether a picture may follow the text: where a person looks at colors.
-pub fn may_draw(args: &InfoArgs) -> bool {
-    let set = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty());
-    !(args.json || args.no_picture || set("NO_COLOR").is_some())
-        && set("TERM").is_some_and(|term| term != "dumb")
-        && std::io::stdout().is_terminal()
-}
-
-fn draw(args: &InfoArgs, out: &mut impl Write) -> anyhow::Result<()> {
-    if !may_draw(args) {
-        return Ok(());
-    }
-    let drawn = read_any_map(&args.map, |map| if is_quick(map) { print_small(map, out) } else { Ok(()) });
-    // The text was the answer; what is wrong with a tile is for `verify` to say.
-    drawn.or_else(|error| {
-        log::warn!("no picture: {error:#}");
-        Ok(())
-    })
 }
 
 impl Info {

@@ -50,7 +50,6 @@ mod snapshot;
 mod snapshots;
 mod stop_signal;
 mod summary;
-mod terminal;
 mod threads;
 mod verify;
 #[cfg(feature = "view")]

@@ -15,6 +15,9 @@ use voxtile_formats::{PointRoom, PoseSource, ReadOptions, ScanMark, ScanSource, 
 /// How long an input may keep us waiting before we look up.
 const PATIENCE: Duration = Duration::from_millis(100);
 
+/// A panic in a reader of a format must end the build, not leave it waiting.
+const READER_IS_GONE: &str = "the thread that reads the scans ended before the input did";
+
 /// Reads an input on a thread of its own, scan by scan: whoever asks can stop waiting, whatever the input does. Scans are
 /// read when they are asked for, or a few of them ahead. Where the system gives no thread, it reads here.
 pub struct ScanReader {
@@ -214,7 +217,7 @@ impl ScanReader {
             match answers.recv_timeout(PATIENCE) {
                 Ok(answer) => return Ok(Some(answer)),
                 Err(RecvTimeoutError::Timeout) => idle()?,
-                Err(RecvTimeoutError::Disconnected) => bail!("the thread that reads the scans is gone"),
+                Err(RecvTimeoutError::Disconnected) => bail!(READER_IS_GONE),
             }
         }
     }
@@ -234,13 +237,16 @@ impl Opened {
 }
 
 fn take(
-    queue: &ScanQueue,
+    queue: &Arc<ScanQueue>,
     stop: &Stop,
     idle: &mut dyn FnMut() -> voxtile::Result<()>,
 ) -> anyhow::Result<Read> {
     while !stop.is_set() {
+        // The reading thread holds the queue until it has pushed the last scan, or has panicked.
+        let is_ours_alone = Arc::strong_count(queue) == 1;
         match queue.take(PATIENCE) {
             Some(read) => return Ok(read?),
+            None if is_ours_alone => bail!(READER_IS_GONE),
             None => idle()?,
         }
     }
@@ -277,5 +283,25 @@ fn read(source: &mut dyn ScanSource, room: &PointRoom, mark: Marking) -> voxtile
         Err(Error::Stopped) => Ok(Read::Stopped),
         Err(error) if source.pass_unread() => Ok(Read::Unread(error)),
         Err(error) => Err(error),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_thread_that_panicked_is_an_error_and_no_endless_wait() {
+        let queue = Arc::new(ScanQueue::new(crate::scan_queue::WhenBehind::Wait, 1));
+        let thread_queue = queue.clone();
+        let thread = thread::spawn(move || {
+            assert!(thread_queue.push(Ok(Read::End)));
+            panic!("as a reader of a format might");
+        });
+        assert!(thread.join().is_err());
+        let mut idle = || Ok(());
+        assert!(matches!(take(&queue, &Stop::default(), &mut idle), Ok(Read::End)));
+        let error = take(&queue, &Stop::default(), &mut idle).err().expect("nobody pushes any more");
+        assert_eq!(error.to_string(), READER_IS_GONE);
     }
 }

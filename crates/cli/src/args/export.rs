@@ -33,10 +33,10 @@ pub struct ExportArgs {
     /// Which voxels [default: occupied; all for .pgm]
     #[arg(long, value_name = "WHICH", conflicts_with = "min_probability")]
     pub what: Option<WhatName>,
-    /// .pgm, .png: only voxels whose center is at least this high, in metres
+    /// .pgm, .png: only voxels that reach above this height, in metres
     #[arg(long, value_name = "M")]
     pub z_min: Option<f64>,
-    /// .pgm, .png: only voxels whose center is at most this high, in metres
+    /// .pgm, .png: only voxels that reach below this height, in metres
     #[arg(long, value_name = "M")]
     pub z_max: Option<f64>,
     /// autoware: edge of the square of a file, in whole metres [default: 20]

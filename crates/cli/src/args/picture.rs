@@ -7,9 +7,9 @@ use std::path::PathBuf;
 pub struct PictureArgs {
     /// Folder of the map, FOLDER@SNAPSHOT, or an OctoMap file (.bt .ot)
     pub map: PathBuf,
-    /// PNG to write; - is standard output [default: straight into the terminal]
+    /// PNG to write; - is standard output
     #[arg(short = 'o', long = "output", value_name = "FILE")]
-    pub output: Option<PathBuf>,
+    pub output: PathBuf,
     /// From where to look
     #[arg(long, value_name = "VIEW", default_value = "above")]
     pub from: ViewName,
@@ -25,9 +25,9 @@ pub struct PictureArgs {
     /// Only voxels whose center is in this box: X0 <= x < X1 and so on, in metres
     #[arg(long, value_names = ["X0", "Y0", "Z0", "X1", "Y1", "Z1"], num_args = 6)]
     pub region: Option<Vec<f64>>,
-    /// Most pixels along an edge of the map, 16 to 8192 [default: 2048, or what the terminal has room for]
-    #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u16).range(16..=8192))]
-    pub size: Option<u16>,
+    /// Most pixels along an edge of the map, 16 to 8192
+    #[arg(long, value_name = "PIXELS", default_value = "2048", value_parser = clap::value_parser!(u16).range(16..=8192))]
+    pub size: u16,
     /// Leave out the borders of tiles
     #[arg(long)]
     pub no_grid: bool,
@@ -38,26 +38,8 @@ pub struct PictureArgs {
     #[arg(long, value_name = "SNAPSHOT|MAP", conflicts_with = "color")]
     pub since: Option<PathBuf>,
     /// Print what was drawn as JSON
-    #[arg(long, requires = "output")]
+    #[arg(long)]
     pub json: bool,
-    #[command(flatten)]
-    pub terminal: TerminalArgs,
-}
-
-/// How a picture gets into a terminal.
-#[derive(Debug, Args)]
-#[command(next_help_heading = "Terminal (without --output) [default: what its environment tells]")]
-#[group(multiple = false, conflicts_with = "output")]
-pub struct TerminalArgs {
-    /// As pixels, by kitty's protocol (kitty, Ghostty, Konsole)
-    #[arg(long)]
-    pub kitty: bool,
-    /// As pixels, by sixels (foot, WezTerm, mlterm, xterm -ti vt340)
-    #[arg(long)]
-    pub sixel: bool,
-    /// As half blocks, in any terminal
-    #[arg(long)]
-    pub blocks: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

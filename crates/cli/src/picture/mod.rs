@@ -1,15 +1,12 @@
-//! `voxtile picture`: a map as a PNG, or straight into the terminal.
+//! `voxtile picture`: a map as a PNG.
 
 mod drawn_json;
-mod small;
 
 use crate::args::{ColorName, PictureArgs, ViewName};
 use crate::json;
 use crate::part::region_of;
 use crate::progress::Progress;
-use crate::terminal::{self, Protocol};
 use drawn_json::DrawnJson;
-pub use small::{is_quick, print_small};
 use std::ffi::OsString;
 use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
@@ -21,16 +18,14 @@ use voxtile_pipeline::output::{OutputFile, is_standard_output};
 use voxtile_pipeline::{AnyMap, read_any_map};
 use voxtile_render::{ColorBy, Drawn, Picture, SideAxis, View};
 
-/// Where the picture goes.
-enum Target<'a> {
-    File(&'a Path),
-    Terminal(Protocol),
-}
-
 /// Draws a map; says what was drawn, on standard error unless `is_quiet` where standard output is the picture.
 pub fn run(args: &PictureArgs, is_quiet: bool) -> anyhow::Result<ExitCode> {
-    let target = Target::of(args)?;
-    let picture = picture_of(args, &target)?;
+    let is_stream = is_standard_output(&args.output);
+    if is_stream && io::stdout().is_terminal() {
+        let reason = "standard output is a terminal; send it to a file or a pipe";
+        return Err(Error::argument("output", reason).into());
+    }
+    let picture = picture_of(args)?;
     let drawn = match &args.since {
         None => read_any_map(&args.map, |map| {
             check_color(map, args.color)?;
@@ -51,25 +46,15 @@ pub fn run(args: &PictureArgs, is_quiet: bool) -> anyhow::Result<ExitCode> {
         }
     };
     let (drawn, _) = drawn?;
-    match target {
-        Target::Terminal(protocol) => {
-            let mut out = io::stdout().lock();
-            terminal::write(&drawn.image, protocol, &mut out)?;
-            writeln!(out, "{}", caption(args, &drawn))?;
-        }
-        Target::File(path) => {
-            write_png(&drawn, path)?;
-            let is_stream = is_standard_output(path);
-            if args.json {
-                let of = DrawnJson::of(args, path, &drawn);
-                let out: &mut dyn Write = if is_stream { &mut io::stderr() } else { &mut io::stdout() };
-                json::print(&of, &mut { out })?;
-            } else if !is_stream {
-                writeln!(io::stdout(), "{}: {}", path.display(), caption(args, &drawn))?;
-            } else if !is_quiet {
-                writeln!(io::stderr(), "{}", caption(args, &drawn))?;
-            }
-        }
+    write_png(&drawn, &args.output)?;
+    if args.json {
+        let of = DrawnJson::of(args, &args.output, &drawn);
+        let out: &mut dyn Write = if is_stream { &mut io::stderr() } else { &mut io::stdout() };
+        json::print(&of, &mut { out })?;
+    } else if !is_stream {
+        writeln!(io::stdout(), "{}: {}", args.output.display(), caption(args, &drawn))?;
+    } else if !is_quiet {
+        writeln!(io::stderr(), "{}", caption(args, &drawn))?;
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -111,29 +96,7 @@ impl From<ColorName> for ColorBy {
     }
 }
 
-impl<'a> Target<'a> {
-    fn of(args: &'a PictureArgs) -> Result<Self> {
-        let is_terminal = io::stdout().is_terminal();
-        match &args.output {
-            Some(path) if is_standard_output(path) && is_terminal => {
-                let reason = "standard output is a terminal; leave the option out to draw into it";
-                Err(Error::argument("--output", reason))
-            }
-            Some(path) => Ok(Self::File(path)),
-            None => match Protocol::asked_for(&args.terminal) {
-                Some(protocol) => Ok(Self::Terminal(protocol)),
-                None if is_terminal => Ok(Self::Terminal(Protocol::of_environment())),
-                None => {
-                    let reason = "standard output is no terminal; name a file with -o map.png, or force --kitty, --sixel \
-                                  or --blocks";
-                    Err(Error::argument("--output", reason))
-                }
-            },
-        }
-    }
-}
-
-fn picture_of(args: &PictureArgs, target: &Target) -> Result<Picture> {
+fn picture_of(args: &PictureArgs) -> Result<Picture> {
     let view = match (args.slice, args.from) {
         (Some(z_m), ViewName::Above) => View::Slice { z_m, thickness_m: args.thickness.unwrap_or(0.0) },
         (Some(_), _) => {
@@ -146,15 +109,9 @@ fn picture_of(args: &PictureArgs, target: &Target) -> Result<Picture> {
         (None, ViewName::SideX) => View::Side(SideAxis::X),
         (None, ViewName::SideY) => View::Side(SideAxis::Y),
     };
-    let mut picture = Picture::new().with_view(view).with_color(args.color.into()).with_grid(!args.no_grid);
-    if let Target::Terminal(protocol) = target {
-        let room = protocol.room();
-        picture = picture.with_size_px(room.map_px).with_legend(room.has_legend);
-        picture = picture.with_grid(!args.no_grid && room.has_legend);
-    }
-    if let Some(size) = args.size {
-        picture = picture.with_size_px([usize::from(size); 2]);
-    }
+    let size_px = [usize::from(args.size); 2];
+    let mut picture = Picture::new().with_view(view).with_color(args.color.into()).with_size_px(size_px);
+    picture = picture.with_grid(!args.no_grid);
     if let Some(region) = &args.region {
         picture = picture.with_region(region_of(region)?);
     }

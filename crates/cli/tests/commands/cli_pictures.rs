@@ -89,7 +89,7 @@ fn a_picture_that_cannot_be_drawn_says_what_to_do() {
     let folder = TempDir::new().unwrap();
     let (map, file) = (map(&folder), folder.path().join("map.png"));
     let (code, error) = failure(&["picture", text(&map)]);
-    assert!(code == 2 && error.contains("-o map.png") && error.contains("--blocks"), "{error}");
+    assert!(code == 2 && error.contains("--output <FILE>"), "{error}");
     let (code, error) =
         failure(&["picture", text(&map), "-o", text(&file), "--slice", "1", "--from", "side-x"]);
     assert!(code == 2 && error.contains("--slice"), "{error}");
@@ -124,119 +124,6 @@ fn a_file_of_octomap_has_a_picture_and_no_counts() {
     assert_eq!(said["solid_cells"], of_map["solid_cells"]);
     let (code, error) = failure(&["picture", text(&tree), "-o", text(&file), "--color", "count"]);
     assert!(code == 2 && error.contains("counts"), "{error}");
-}
-
-/// The picture of a map as a terminal gets it, without a terminal.
-fn drawn_by(protocol: &str, map: &Path, variables: &[(&str, &str)]) -> Vec<u8> {
-    let mut command = voxtile(&["picture", text(map), protocol, "--size", "120"]);
-    command.env_remove("COLORTERM").envs(variables.iter().copied());
-    command.assert().success().get_output().stdout.clone()
-}
-
-#[test]
-fn kitty_and_sixels_carry_the_same_pixels() {
-    let folder = TempDir::new().unwrap();
-    let map = map(&folder);
-    let (width, height, pixels) = decoded(&of_kitty(&drawn_by("--kitty", &map, &[])));
-    let (sixel_width, sixel_height, sixels) = of_sixel(&drawn_by("--sixel", &map, &[]));
-    assert_eq!((width, height), (sixel_width, sixel_height));
-    for (at, (pixel, sixel)) in pixels.iter().zip(&sixels).enumerate() {
-        // A channel has a hundred levels in sixels, and few colors stand for many.
-        assert!((0..3).all(|k| pixel[k].abs_diff(sixel[k]) < 18), "pixel {at}: {pixel:?} {sixel:?}");
-    }
-}
-
-#[test]
-fn blocks_carry_two_pixels_each() {
-    let folder = TempDir::new().unwrap();
-    let map = map(&folder);
-    let full = String::from_utf8(drawn_by("--blocks", &map, &[("COLORTERM", "truecolor")])).unwrap();
-    let indexed = String::from_utf8(drawn_by("--blocks", &map, &[])).unwrap();
-    let widths =
-        |text: &str| -> Vec<usize> { text.lines().map(|line| line.matches('▀').count()).collect() };
-    assert_eq!(widths(&full), widths(&indexed));
-    let blocks = widths(&full);
-    assert!(
-        blocks[0] > 20 && blocks[..blocks.len() - 1].iter().all(|&width| width == blocks[0]),
-        "{blocks:?}"
-    );
-    let free = voxtile_render::colors::FREE;
-    assert!(full.contains(&format!("2;{};{};{}", free[0], free[1], free[2])));
-    assert!(indexed.contains("38;5;") && !indexed.contains("38;2;"));
-}
-
-/// The PNG in kitty's sequences.
-fn of_kitty(bytes: &[u8]) -> Vec<u8> {
-    let text = String::from_utf8_lossy(bytes);
-    let pieces = text.split("\x1b_G").skip(1).map(|piece| piece.split("\x1b\\").next().unwrap());
-    let mut bits = (0_u32, 0);
-    let mut png = Vec::new();
-    let mut more = true;
-    for piece in pieces {
-        assert!(more, "a piece after the last");
-        let (keys, data) = piece.split_once(';').unwrap();
-        assert!(data.len() <= 4096);
-        more = keys.contains("m=1");
-        for letter in data.bytes().filter(|&letter| letter != b'=') {
-            let alphabet = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-            let value = alphabet.iter().position(|&known| known == letter).unwrap() as u32;
-            bits = (bits.0 << 6 | value, bits.1 + 6);
-            if bits.1 >= 8 {
-                bits.1 -= 8;
-                png.push((bits.0 >> bits.1) as u8);
-            }
-        }
-    }
-    assert!(!more, "no last piece");
-    png
-}
-
-/// Width, height and pixels of sixels.
-fn of_sixel(bytes: &[u8]) -> (usize, usize, Vec<[u8; 3]>) {
-    let text = String::from_utf8_lossy(bytes);
-    let (_, rest) = text.split_once("\x1bP0;1;0q\"1;1;").unwrap();
-    let (data, _) = rest.split_once("\x1b\\").unwrap();
-    let numbers = |text: &str| -> Vec<usize> { text.split(';').map(|word| word.parse().unwrap()).collect() };
-    let end = data.find('#').unwrap();
-    let size = numbers(&data[..end]);
-    let mut pixels = vec![[1, 2, 3]; size[0] * size[1]];
-    let mut colors: Vec<[u8; 3]> = Vec::new();
-    let (mut x, mut top, mut color, mut repeat) = (0, 0, 0, 1);
-    let mut letters = data[end..].chars().peekable();
-    while let Some(letter) = letters.next() {
-        let mut number = String::new();
-        if letter == '#' || letter == '!' {
-            while let Some(&next) = letters.peek().filter(|next| next.is_ascii_digit() || **next == ';') {
-                number.push(next);
-                letters.next();
-            }
-        }
-        match letter {
-            '#' => {
-                let numbers = numbers(&number);
-                color = numbers[0];
-                if let [_, 2, red, green, blue] = numbers[..] {
-                    assert_eq!(colors.len(), color);
-                    colors.push([red, green, blue].map(|percent| (percent * 255 / 100) as u8));
-                }
-            }
-            '!' => repeat = number.parse().unwrap(),
-            '$' => x = 0,
-            '-' => (x, top) = (0, top + 6),
-            '?'..='~' => {
-                let rows = letter as u8 - 63;
-                for _ in 0..repeat {
-                    for row in (0..6).filter(|row| rows >> row & 1 == 1) {
-                        pixels[x + (top + row) * size[0]] = colors[color];
-                    }
-                    x += 1;
-                }
-                repeat = 1;
-            }
-            other => panic!("{other:?}"),
-        }
-    }
-    (size[0], size[1], pixels)
 }
 
 /// The page is XML, has the numbers of `info`, and nothing in it comes from elsewhere.
@@ -308,7 +195,6 @@ fn maps_without_voxels_and_with_one_have_pictures_and_reports() {
         assert!(pixels_of(&png).0 > 100);
         output(&["report", text(map), "-o", text(&page)]);
         check_markup(&fs::read_to_string(&page).unwrap());
-        output(&["picture", text(map), "--blocks"]);
     }
 }
 
@@ -328,14 +214,6 @@ fn a_map_that_does_not_open_has_a_report_of_its_damage() {
     let (code, error) =
         failure(&["report", text(&folder.path().join("none")), "-o", text(&folder.path().join("x"))]);
     assert!(code != 0 && error.contains("no map here"), "{error}");
-}
-
-#[test]
-fn info_draws_for_people_alone() {
-    let folder = TempDir::new().unwrap();
-    let map = map(&folder);
-    // Not a terminal.
-    assert!(!output(&["info", text(&map)]).contains('▀'));
 }
 
 /// Every element ends where it should, and every letter that could be markup is.

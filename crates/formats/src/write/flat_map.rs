@@ -1,5 +1,6 @@
 use super::Result;
 use super::column_grid::{ColumnGrid, nothing_to_draw};
+use super::height_range::HeightRange;
 use super::row::{VoxelRow, VoxelsHead};
 
 /// What is known of a column of voxels.
@@ -17,14 +18,14 @@ pub(super) enum Column {
 #[derive(Clone, Debug)]
 pub(super) struct FlatMap {
     head: VoxelsHead,
-    heights_m: [f64; 2],
+    heights: HeightRange,
     grid: Option<ColumnGrid<Column>>,
 }
 
 impl FlatMap {
-    /// A map of what will be announced; voxels count that reach between the two heights.
-    pub(super) fn new(head: &VoxelsHead, heights_m: [f64; 2]) -> Self {
-        Self { head: head.clone(), heights_m, grid: None }
+    /// A map of what will be announced, of the voxels that have a part at these heights.
+    pub(super) fn new(head: &VoxelsHead, heights: HeightRange) -> Self {
+        Self { head: head.clone(), heights, grid: None }
     }
 
     /// Adds a voxel.
@@ -38,9 +39,7 @@ impl FlatMap {
             none => none.insert(ColumnGrid::new(&self.head, voxel, Column::Unknown)?),
         };
         let (column, _) = grid.column(voxel)?;
-        let [least, most] = self.heights_m;
-        let (z, half) = (voxel.center_m[2], 0.5 * self.head.resolution_m);
-        if z + half <= least || z - half >= most {
+        if !self.heights.meets(voxel, self.head.resolution_m) {
             return Ok(());
         }
         if voxel.log_odds >= self.head.occupied_log_odds {

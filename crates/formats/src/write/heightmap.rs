@@ -1,4 +1,5 @@
 use super::column_grid::{ColumnGrid, nothing_to_draw};
+use super::height_range::HeightRange;
 use super::options::WriteOptions;
 use super::out_file::OutFile;
 use super::row::{VoxelRow, VoxelSink, VoxelsHead};
@@ -14,6 +15,7 @@ pub(super) struct HeightmapSink {
     out: OutFile,
     head: VoxelsHead,
     crs: Option<String>,
+    heights: HeightRange,
     world_file: PathBuf,
     scale_file: PathBuf,
     grid: Option<ColumnGrid<u16>>,
@@ -22,10 +24,12 @@ pub(super) struct HeightmapSink {
 impl HeightmapSink {
     pub(super) fn create(head: &VoxelsHead, path: &Path, options: &WriteOptions) -> Result<Self> {
         let (world_file, scale_file) = (options.companion("pgw", "png")?, options.companion("json", "png")?);
+        let heights = HeightRange::of(options)?;
         Ok(Self {
             out: OutFile::create(path)?,
             head: head.clone(),
             crs: options.crs.clone(),
+            heights,
             world_file,
             scale_file,
             grid: None,
@@ -46,7 +50,8 @@ impl VoxelSink for HeightmapSink {
         };
         let share = layers_per_value(grid);
         let (column, layer) = grid.column(voxel)?;
-        if voxel.log_odds >= self.head.occupied_log_odds {
+        if voxel.log_odds >= self.head.occupied_log_odds && self.heights.meets(voxel, self.head.resolution_m)
+        {
             let value = u16::try_from(1 + layer / share).unwrap_or(u16::MAX);
             *column = value.max(*column);
         }
@@ -115,23 +120,36 @@ mod tests {
     use super::super::testing::{head_of, row};
     use super::*;
 
-    #[test]
-    fn the_topmost_occupied_voxel_counts() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("heights.png");
+    /// The values of a heightmap of five voxels, row by row.
+    fn values(options: &WriteOptions) -> Vec<u16> {
+        let path = &options.final_path;
         let rows = [row([0, 0, -3], 0.9), row([0, 0, 5], 0.9), row([0, 0, 6], 0.1), row([1, 2, 0], 0.8)];
-        let mut sink =
-            Box::new(HeightmapSink::create(&head_of(&rows), &path, &WriteOptions::beside(&path)).unwrap());
+        let mut sink = Box::new(HeightmapSink::create(&head_of(&rows), path, options).unwrap());
         for row in &rows {
             sink.put(row).unwrap();
         }
         sink.finish().unwrap();
-        let file = std::io::BufReader::new(std::fs::File::open(&path).unwrap());
+        let file = std::io::BufReader::new(std::fs::File::open(path).unwrap());
         let mut reader = png::Decoder::new(file).read_info().unwrap();
         let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
         reader.next_frame(&mut pixels).unwrap();
-        let values: Vec<u16> = pixels.chunks(2).map(|pair| u16::from_be_bytes([pair[0], pair[1]])).collect();
-        assert_eq!(values, [0, 4, 0, 0, 9, 0]);
+        pixels.chunks(2).map(|pair| u16::from_be_bytes([pair[0], pair[1]])).collect()
+    }
+
+    #[test]
+    fn only_heights_that_are_asked_for_count() {
+        let folder = tempfile::tempdir().unwrap();
+        let all = WriteOptions::beside(&folder.path().join("heights.png"));
+        // The voxel at 2.75 m is left out, and the one below it is the topmost.
+        assert_eq!(values(&WriteOptions { z_max_m: Some(2.5), ..all.clone() }), [0, 4, 0, 0, 1, 0]);
+        assert_eq!(values(&WriteOptions { z_min_m: Some(0.5), ..all }), [0, 0, 0, 0, 9, 0]);
+    }
+
+    #[test]
+    fn the_topmost_occupied_voxel_counts() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("heights.png");
+        assert_eq!(values(&WriteOptions::beside(&path)), [0, 4, 0, 0, 9, 0]);
         let text = std::fs::read_to_string(folder.path().join("heights.json")).unwrap();
         let scale: serde_json::Value = serde_json::from_str(&text).unwrap();
         let height =

@@ -22,6 +22,7 @@ mod flat_map;
 mod glb;
 mod glb_json;
 mod greedy;
+mod height_range;
 mod heightmap;
 #[cfg(feature = "las")]
 mod las;

@@ -1,5 +1,6 @@
 use super::Result;
 use super::flat_map::{Column, FlatMap};
+use super::height_range::HeightRange;
 use super::options::WriteOptions;
 use super::out_file::OutFile;
 use super::row::{VoxelRow, VoxelSink, VoxelsHead};
@@ -16,7 +17,7 @@ pub(super) struct Nav2Sink {
 
 impl Nav2Sink {
     pub(super) fn create(head: &VoxelsHead, path: &Path, options: &WriteOptions) -> Result<Self> {
-        let map = FlatMap::new(head, options.heights_m()?);
+        let map = FlatMap::new(head, HeightRange::of(options)?);
         let (yaml, image) = (options.companion("yaml", "pgm")?, options.final_name()?.to_owned());
         Ok(Self { out: OutFile::create(path)?, resolution_m: head.resolution_m, yaml, image, map })
     }

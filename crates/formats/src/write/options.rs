@@ -13,9 +13,9 @@ pub struct WriteOptions {
     /// The coordinate reference system that the coordinates are in, in metres: well-known text or, where only its
     /// number is known, `EPSG:25832`. Formats that name none leave it out.
     pub crs: Option<String>,
-    /// Flat maps: the lowest height that counts, in metres.
+    /// Flat maps and heightmaps: voxels that reach above this height alone, in metres.
     pub z_min_m: Option<f64>,
-    /// Flat maps: the greatest height that counts, in metres.
+    /// Flat maps and heightmaps: voxels that reach below this height alone, in metres.
     pub z_max_m: Option<f64>,
     /// Autoware: edge of the square of a file, in whole metres.
     pub cell_m: f64,
@@ -74,17 +74,6 @@ impl WriteOptions {
             return Err(Error::argument(self.final_path.display().to_string(), reason));
         }
         Ok(self.companion_folder.join(beside))
-    }
-
-    /// Heights that count, checked.
-    pub(super) fn heights_m(&self) -> Result<[f64; 2]> {
-        let least = self.z_min_m.unwrap_or(f64::NEG_INFINITY);
-        let most = self.z_max_m.unwrap_or(f64::INFINITY);
-        if least < most {
-            return Ok([least, most]);
-        }
-        let reason = format!("heights from {least} to {most} m hold nothing; z_min must be below z_max");
-        Err(Error::argument("z_min, z_max", reason))
     }
 }
 
