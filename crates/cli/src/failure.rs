@@ -47,9 +47,7 @@ impl JsonTo {
             {
                 Self::Error
             }
-            Command::Picture(args) if args.json && args.output.as_deref().is_some_and(is_standard_output) => {
-                Self::Error
-            }
+            Command::Picture(args) if args.json && is_standard_output(&args.output) => Self::Error,
             Command::Report(args) if args.json && is_standard_output(&args.output) => Self::Error,
             command => Self::output_if(command.is_json()),
         }

@@ -144,7 +144,6 @@ fn is_parallel(command: &Command) -> bool {
         | Command::Report(_) => true,
         #[cfg(feature = "view")]
         Command::View(_) => true,
-        Command::Info(args) => info::may_draw(args),
         _ => false,
     }
 }
