@@ -1,5 +1,5 @@
 //! How small is the compact form of a map's tiles, and how fast is it made and read? One row a map, for
-//! `docs/measurements.md`.
+//! `docs/measurements/sizes.md`.
 //!
 //! `compact_form [--repeat N] MAP...`
 

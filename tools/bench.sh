@@ -14,10 +14,10 @@ target=${CARGO_TARGET_DIR:-target}
 
 list() {
     echo "benchmarks, to run with tools/bench.sh NAME:"
-    echo "  endurance  memory, cost of a scan, speed in little memory, over distance: docs/endurance.md"
-    echo "  octocache  the questions of the OctoCache paper: docs/octocache.md"
+    echo "  endurance  memory, cost of a scan, speed in little memory, over distance: docs/measurements/endurance.md"
+    echo "  octocache  the questions of the OctoCache paper: docs/measurements/octocache.md"
     echo "  peers      speed, memory and exactness beside OctoMap: a table on standard output"
-    echo "  versions   speed beside an earlier version: docs/versions.md; --before COMMIT names it"
+    echo "  versions   speed beside an earlier version: docs/measurements/versions.md; --before COMMIT names it"
 }
 
 run() { # package, arguments

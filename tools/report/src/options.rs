@@ -41,7 +41,7 @@ impl Options {
         WorkFolder::create(self.target.join(benchmark).join("work"))
     }
 
-    /// The page `docs/BENCHMARK.md`, or its copy where the results are to go elsewhere.
+    /// The page `docs/measurements/BENCHMARK.md`, or its copy where the results are to go elsewhere.
     ///
     /// # Errors
     ///
@@ -50,7 +50,7 @@ impl Options {
         let name = format!("{benchmark}.md");
         let folder = self.out.clone().or_else(|| self.short.then(|| self.target.join(benchmark)));
         let copy = folder.map(|folder| folder.join(&name));
-        Page::open(&Path::new("docs").join(name), copy.as_deref())
+        Page::open(&Path::new("docs/measurements").join(name), copy.as_deref())
     }
 
     /// The parts that are wanted, in their order.
