@@ -260,7 +260,7 @@ const REFUSALS: [fn(u64) -> Fault; 4] = [Fault::Fails, Fault::LosesSync, Fault::
 fn every_operation_fails_once_and_the_call_is_undone_and_goes_the_next_time() {
     let keeping = Build::of(config().with_kept_scans(true)).beside();
     for build in Build::all(&config()).chain([keeping]) {
-        sweep(&build, faults(&build, &REFUSALS, 16), &[Left::Dropped]);
+        sweep(&build, faults(&build, &REFUSALS, 32), &[Left::Dropped]);
     }
 }
 
@@ -268,7 +268,7 @@ fn every_operation_fails_once_and_the_call_is_undone_and_goes_the_next_time() {
 fn a_fault_that_stays_gives_no_wrong_answer_and_once_it_is_mended_the_map_goes_on() {
     for config in [config(), compact()] {
         let build = Build::of(config);
-        sweep(&build, faults(&build, &[Fault::Breaks], 8), &[Left::Mended]);
+        sweep(&build, faults(&build, &[Fault::Breaks], 16), &[Left::Mended]);
     }
 }
 
@@ -276,7 +276,7 @@ fn a_fault_that_stays_gives_no_wrong_answer_and_once_it_is_mended_the_map_goes_o
 fn the_power_goes_at_every_operation_and_the_last_flush_is_there() {
     let keeping = Build::of(config().with_kept_scans(true)).beside();
     for build in Build::all(&config()).chain([keeping]) {
-        sweep(&build, faults(&build, &[Fault::Crashes], 12), &EVERY_CRASH);
+        sweep(&build, faults(&build, &[Fault::Crashes], 24), &EVERY_CRASH);
     }
 }
 
@@ -286,7 +286,7 @@ fn the_power_goes_at_every_operation_and_the_last_flush_is_there() {
 fn short_of_memory_every_operation_fails_once_and_the_power_goes_at_every_operation() {
     let kinds: [fn(u64) -> Fault; 3] = [Fault::Fails, Fault::IsFull, Fault::Crashes];
     for build in Build::all(&config().with_tight_memory_bytes(6_000)) {
-        sweep(&build, faults(&build, &kinds, 20), &[Left::Shuffled(0)]);
+        sweep(&build, faults(&build, &kinds, 40), &[Left::Shuffled(0)]);
     }
 }
 

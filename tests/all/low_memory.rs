@@ -4,6 +4,7 @@ use std::sync::{Arc, Mutex, mpsc};
 use std::thread;
 use std::time::Duration;
 use testkit::memory_folder::memory_folder;
+use testkit::support::cases;
 use testkit::unsynced_disk::UnsyncedDisk;
 use voxtile::{
     InMemoryMapper, MapConfig, MapPath, MapQueries, MapReader, MapView, Mapper, OutOfCoreTileMapper, Scan,
@@ -91,7 +92,7 @@ fn with_little_memory_tiles_wait_packed_and_everything_is_counted() {
 fn tiles_that_are_left_behind_take_their_updates_with_them() {
     let folder = memory_folder();
     let config = MapConfig::new(0.2, 1.6).unwrap().with_range(0.0, 20.0);
-    let scans: Vec<Scan> = Survey::tour(3, 1_000).take(240).collect();
+    let scans: Vec<Scan> = Survey::tour(3, 1_000).take(cases(120, 240) as usize).collect();
     let mut expected = InMemoryMapper::new(config.clone()).unwrap();
     let tight = config.with_tight_memory_bytes(2_000_000);
     let path = MapPath::on(UnsyncedDisk::shared(), folder.path().join("map"));
@@ -140,7 +141,7 @@ fn a_tile_that_is_flushed_overtakes_no_older_version_of_itself() {
 fn updates_of_tiles_on_disk_wait_in_files_until_they_are_worth_reading_them() {
     let folder = memory_folder();
     let config = MapConfig::new(0.1, 6.4).unwrap().with_range(0.0, 20.0);
-    let scans: Vec<Scan> = (0..3).flat_map(|_| scans(20)).collect();
+    let scans: Vec<Scan> = (0..3).flat_map(|_| scans(cases(12, 20) as usize)).collect();
     let mut expected = InMemoryMapper::new(config.clone()).unwrap();
     for scan in &scans {
         expected.insert_scan(scan).unwrap();

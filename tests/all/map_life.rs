@@ -88,10 +88,10 @@ fn the_power_goes_after_a_kill(life: &Life, one_in: u64) {
 
 #[test]
 fn an_operation_fails_and_the_next_process_goes_on() {
-    every_operation_fails(&removals(), 4);
-    every_operation_fails(&snapshots(), 16);
-    every_operation_fails(&snapshots().without_links(), 24);
-    every_operation_fails(&replays(), 24);
+    every_operation_fails(&removals(), 8);
+    every_operation_fails(&snapshots(), 32);
+    every_operation_fails(&snapshots().without_links(), 48);
+    every_operation_fails(&replays(), 48);
 }
 
 #[test]
