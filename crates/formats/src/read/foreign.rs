@@ -139,3 +139,47 @@ pub(crate) fn of_bytes(start: &[u8]) -> Option<&'static Foreign> {
 pub(crate) fn of_extension(extension: &str) -> Option<&'static Foreign> {
     FOREIGN.iter().find(|foreign| foreign.extensions.contains(&extension))
 }
+
+/// What lies in the place of a file that did not arrive, and what to do.
+pub(crate) fn stand_in(start: &[u8]) -> Option<&'static str> {
+    let text = without_mark(start).trim_ascii_start();
+    let starts =
+        |word: &str| text.get(..word.len()).is_some_and(|start| start.eq_ignore_ascii_case(word.as_bytes()));
+    if starts("version https://git-lfs.") || starts("version https://hawser.") {
+        return Some("is a Git LFS pointer, not the file itself: fetch it with `git lfs pull`");
+    }
+    if starts("/annex/objects/") {
+        return Some("is a pointer of git-annex, not the file itself: fetch it with `git annex get`");
+    }
+    if ["<!doctype html", "<html", "<head", "<body", "<!-- saved from url"].iter().any(|tag| starts(tag)) {
+        return Some(
+            "is a page of HTML, not data: the download gave a web page, perhaps a login or an error; open it in a \
+             browser and download the file itself",
+        );
+    }
+    if starts("<?xml") || starts("<Error>") {
+        return Some(
+            "is XML, not data: the download gave an error or a list; open it in an editor to see which",
+        );
+    }
+    None
+}
+
+/// The encoding of a text that is not UTF-8, and what to do.
+pub(crate) fn text_encoding(start: &[u8]) -> Option<&'static str> {
+    let is_utf16 = match *start {
+        [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => true,
+        // Digits and blanks with a zero byte each.
+        [0, low, 0, ..] | [low, 0, _, 0, ..] => low.is_ascii_graphic() || low == b' ',
+        _ => false,
+    };
+    is_utf16.then_some("is text in UTF-16: save it as UTF-8")
+}
+
+/// What editors on Windows put before a text.
+pub(crate) const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
+
+/// The bytes behind a byte order mark, if there is one.
+pub(crate) fn without_mark(start: &[u8]) -> &[u8] {
+    start.strip_prefix(BYTE_ORDER_MARK).unwrap_or(start)
+}

@@ -1,90 +1,126 @@
 //! Lines of a text of any size, each of bounded length.
 
-use std::fs::File;
-use std::io::{BufRead, BufReader, Read};
+use super::foreign::text_encoding;
+use super::input_file::open_input;
+use super::text_line::comment_of;
+use std::io::{BufRead, BufReader, ErrorKind};
 use std::path::{Path, PathBuf};
 use voxtile::{Error, FormatError, Result};
 
 /// A longer line is an error: its words would take many times its bytes.
-pub(crate) const MAX_LINE_BYTES: u64 = 1 << 16;
+pub(crate) const MAX_LINE_BYTES: usize = 1 << 16;
 
-/// Lines of a file, one at a time.
+/// Lines of a file, one at a time. They end with LF, CR LF or CR alone.
 pub(crate) struct Lines {
     path: PathBuf,
     input: Box<dyn BufRead + Send>,
     line: Vec<u8>,
     number: u64,
+    /// Whether the last line ended with CR: an LF after it belongs to it.
+    is_after_return: bool,
+}
+
+/// How much of a line was read.
+#[derive(Clone, Copy, PartialEq)]
+enum Extent {
+    Whole,
+    /// The line goes on.
+    Start,
 }
 
 impl Lines {
     pub(crate) fn open(path: &Path) -> Result<Self> {
-        let file = File::open(path).map_err(|error| Error::io(path, "read", error))?;
-        Ok(Self::new(path, BufReader::with_capacity(1 << 16, file), 0))
+        Ok(Self::new(path, BufReader::with_capacity(1 << 16, open_input(path)?), 0))
     }
 
     /// The lines of what is left of an input, after so many lines.
     pub(crate) fn new(path: &Path, input: impl BufRead + Send + 'static, lines_before: u64) -> Self {
-        Self { path: path.to_owned(), input: Box::new(input), line: Vec::new(), number: lines_before }
+        let (path, input) = (path.to_owned(), Box::new(input));
+        Self { path, input, line: Vec::new(), number: lines_before, is_after_return: false }
     }
 
     /// The next line without its end, and its number. Of a long comment only the start is read.
     pub(crate) fn next(&mut self) -> Result<Option<(u64, String)>> {
-        self.line.clear();
-        let read = (&mut self.input)
-            .take(MAX_LINE_BYTES)
-            .read_until(b'\n', &mut self.line)
-            .map_err(|error| Error::io(&self.path, "read", error))?;
-        if read == 0 {
-            return Ok(None);
-        }
-        self.number += 1;
-        if self.is_cut() {
-            if !is_comment(&self.line) {
-                return Err(self.error("the line is longer than 64 KiB: this is no text of numbers"));
-            }
-            self.input.skip_until(b'\n').map_err(|error| Error::io(&self.path, "read", error))?;
+        let Some(extent) = self.read()? else { return Ok(None) };
+        if self.number == 1
+            && let Some(encoding) = text_encoding(&self.line)
+        {
+            return Err(self.error(encoding));
         }
         let text = String::from_utf8_lossy(&self.line);
-        let text = if self.number == 1 { text.trim_start_matches('\u{feff}') } else { &text };
-        Ok(Some((self.number, text.trim_end_matches(['\r', '\n']).to_owned())))
+        let text = if self.number == 1 { text.trim_start_matches('\u{feff}') } else { &text }.to_owned();
+        if extent == Extent::Start {
+            if comment_of(&text).is_none() {
+                return Err(self.error("the line is longer than 64 KiB: this is no text of numbers"));
+            }
+            self.pass_rest()?;
+        }
+        Ok(Some((self.number, text)))
     }
 
     /// Passes over the next line that is not blank, of any length; `false` at the end.
     pub(crate) fn pass(&mut self) -> Result<bool> {
-        let fail = |error| Error::io(&self.path, "read", error);
-        loop {
-            self.line.clear();
-            let mut start = (&mut self.input).take(MAX_LINE_BYTES);
-            let read = start.read_until(b'\n', &mut self.line).map_err(fail)?;
-            if read == 0 {
-                return Ok(false);
+        while let Some(extent) = self.read()? {
+            if extent == Extent::Start {
+                self.pass_rest()?;
+                return Ok(true);
             }
-            self.number += 1;
-            let is_long = self.is_cut();
-            if is_long {
-                self.input.skip_until(b'\n').map_err(fail)?;
-            }
-            if is_long || !self.line.trim_ascii().is_empty() {
+            if !self.line.trim_ascii().is_empty() {
                 return Ok(true);
             }
         }
+        Ok(false)
     }
 
-    /// Whether the line goes on behind what was read of it.
-    fn is_cut(&self) -> bool {
-        self.line.len() as u64 == MAX_LINE_BYTES && self.line.last() != Some(&b'\n')
+    /// Reads a line, or its start.
+    fn read(&mut self) -> Result<Option<Extent>> {
+        let extent = self.read_some()?;
+        self.number += u64::from(extent.is_some());
+        Ok(extent)
+    }
+
+    fn pass_rest(&mut self) -> Result<()> {
+        while self.read_some()? == Some(Extent::Start) {}
+        Ok(())
+    }
+
+    /// Reads up to the end of the line, at most the bytes of the longest line. `None` at the end of the input.
+    fn read_some(&mut self) -> Result<Option<Extent>> {
+        let Self { path, input, line, is_after_return, .. } = self;
+        line.clear();
+        let mut has_read = false;
+        loop {
+            let chunk = match input.fill_buf() {
+                Ok([]) => return Ok(has_read.then_some(Extent::Whole)),
+                Ok(chunk) => chunk,
+                Err(error) if error.kind() == ErrorKind::Interrupted => continue,
+                Err(error) => return Err(Error::io(path, "read", error)),
+            };
+            if std::mem::take(is_after_return) && chunk.first() == Some(&b'\n') {
+                input.consume(1);
+                continue;
+            }
+            has_read = true;
+            let part = chunk.get(..MAX_LINE_BYTES - line.len()).unwrap_or(chunk);
+            let end = part.iter().position(|byte| matches!(byte, b'\n' | b'\r'));
+            let (text, after) = part.split_at(end.unwrap_or(part.len()));
+            line.extend_from_slice(text);
+            *is_after_return = after.first() == Some(&b'\r');
+            let taken = text.len() + usize::from(end.is_some());
+            input.consume(taken);
+            if end.is_some() {
+                return Ok(Some(Extent::Whole));
+            }
+            if line.len() == MAX_LINE_BYTES {
+                return Ok(Some(Extent::Start));
+            }
+        }
     }
 
     /// An error of the line that was read last.
     pub(crate) fn error(&self, reason: impl Into<String>) -> Error {
         FormatError::at_line(self.number, reason).in_input(&self.path)
     }
-}
-
-/// Whether a line starts as comments do in the texts that are read.
-fn is_comment(line: &[u8]) -> bool {
-    let start = line.strip_prefix(b"\xef\xbb\xbf").unwrap_or(line).trim_ascii_start();
-    [&b"#"[..], b"%", b"//"].iter().any(|mark| start.starts_with(mark))
 }
 
 #[cfg(test)]
@@ -94,7 +130,7 @@ mod tests {
     #[test]
     fn long_comments_are_skipped_and_long_lines_refused() {
         let file = tempfile::NamedTempFile::new().unwrap();
-        let long = MAX_LINE_BYTES as usize;
+        let long = MAX_LINE_BYTES;
         let text =
             format!("# {}\n1 2\n%{}\n{}\n", "x".repeat(5 * long), "y".repeat(long - 2), "3 ".repeat(long));
         std::fs::write(file.path(), text).unwrap();
@@ -105,5 +141,28 @@ mod tests {
         assert_eq!(next().unwrap(), Some((3, long - 1)), "its end is in the last byte");
         let error = format!("{:#}", next().unwrap_err());
         assert!(error.contains("line 4: the line is longer than 64 KiB"), "{error}");
+    }
+
+    #[test]
+    fn lines_end_as_on_any_system() {
+        let read = |text: &'static [u8]| {
+            // Two bytes at a time: an end may be cut in two.
+            let mut lines = Lines::new(Path::new("a"), BufReader::with_capacity(2, text), 0);
+            std::iter::from_fn(|| lines.next().unwrap()).collect::<Vec<_>>()
+        };
+        let wanted = [(1, "1 2".to_owned()), (2, String::new()), (3, "3".to_owned())];
+        for text in [&b"1 2\n\n3\n"[..], b"1 2\r\n\r\n3", b"1 2\r\r3\r", b"\xef\xbb\xbf1 2\r\n\r3\r\n"] {
+            assert_eq!(read(text), wanted, "{}", String::from_utf8_lossy(text));
+        }
+        assert_eq!(read(b""), []);
+    }
+
+    #[test]
+    fn text_in_another_encoding_is_named() {
+        for text in [&b"\xff\xfe1\0 \0"[..], b"\xfe\xff\x001", b"1\0 \x002\0\r\0\n\0"] {
+            let mut lines = Lines::new(Path::new("a"), text, 0);
+            let error = format!("{:#}", lines.next().unwrap_err());
+            assert!(error.contains("line 1: is text in UTF-16: save it as UTF-8"), "{error}");
+        }
     }
 }

@@ -22,6 +22,7 @@ pub(crate) mod from_origin;
 pub(crate) mod glance;
 #[cfg(any(feature = "las", feature = "e57"))]
 mod guard;
+pub(crate) mod input_file;
 pub(crate) mod inside;
 mod intrinsics;
 #[cfg(feature = "las")]
@@ -58,7 +59,9 @@ pub(crate) mod scan_stream;
 pub(crate) mod stamp;
 mod stream_input;
 pub(crate) mod text;
-mod text_line;
+mod text_columns;
+pub(crate) mod text_line;
+pub(crate) mod units;
 #[cfg(any(feature = "las", feature = "e57"))]
 mod wkt;
 #[cfg(feature = "e57")]

@@ -2,7 +2,7 @@ use super::cloud::{CloudHead, CloudPoint};
 use super::glance::GLANCE_BYTES;
 use super::lines::Lines;
 use super::one::{Points, Visit};
-use super::text_line::{Columns, Line};
+use super::text_columns::{Columns, Line};
 use crate::read_options::ReadOptions;
 use std::path::Path;
 use voxtile::{FormatError, Result};

@@ -1,208 +1,238 @@
-use super::cloud::CloudPoint;
-use super::columns::{Clock, Meaning};
+//! A line of a text of numbers: what parts its cells, and the numbers in them.
 
-/// What a line of a text of points is.
-#[derive(Debug, PartialEq)]
-pub(super) enum Line {
-    Point(CloudPoint),
-    /// A comment, names, an empty line, a number of points.
-    Nothing,
-}
-
-/// How the lines of a text are split, and what their columns mean. Both are known with the first point.
-#[derive(Debug, Default)]
-pub(super) struct Columns {
-    pub(super) clock: Clock,
-    separator: Option<Separator>,
-    pub(super) names: Vec<String>,
-    meaning: Option<Meaning>,
-    has_points: bool,
-    has_count: bool,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Separator {
+/// What parts the cells of a line.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Separator {
+    /// Blanks and tabs, one or more.
+    #[default]
     Blank,
+    /// A mark; there may be nothing between two of them.
     Mark(char),
 }
 
 impl Separator {
-    fn of(line: &str) -> Self {
-        [';', ','].into_iter().find(|mark| line.contains(*mark)).map_or(Self::Blank, Self::Mark)
+    /// What parts the cells of a line. A comma is a mark, unless the words between blanks are numbers with decimal
+    /// commas.
+    pub(crate) fn of(line: &str) -> Self {
+        let has = |mark: char| is_outside_quotes(line, mark);
+        if let Some(mark) = [';', '|'].into_iter().find(|mark| has(*mark)) {
+            return Self::Mark(mark);
+        }
+        let is_decimal = |word: &str| Self::Blank.number(word).is_some() && !word.starts_with(',');
+        let mut words = line.split_ascii_whitespace();
+        let are_decimals = words.clone().count() > 1 && words.all(is_decimal);
+        if has(',') && !are_decimals { Self::Mark(',') } else { Self::Blank }
     }
 
-    /// Empty cells count, but not the one behind a last mark.
-    fn split(self, line: &str) -> Vec<&str> {
+    /// What parts the cells of a line of a table with so many columns: a tab, if it gives as many cells.
+    pub(crate) fn of_row(line: &str, columns: usize) -> Self {
+        let tab = Self::Mark('\t');
+        if line.contains('\t') && tab.split(line).len() == columns { tab } else { Self::of(line) }
+    }
+
+    /// The cells of a line, without quotes around them. Empty ones between marks count, also behind the last mark.
+    pub(crate) fn split(self, line: &str) -> Vec<&str> {
+        let has_quotes = line.contains('"');
         match self {
-            Self::Blank => line.split_ascii_whitespace().collect(),
+            Self::Blank if !has_quotes => line.split_ascii_whitespace().collect(),
+            Self::Blank => split_unquoted(line, |letter| letter.is_ascii_whitespace())
+                .into_iter()
+                .filter(|cell| !cell.is_empty())
+                .map(cell_of)
+                .collect(),
             Self::Mark(mark) => {
-                let line = line.trim();
-                line.strip_suffix(mark).unwrap_or(line).split(mark).map(str::trim).collect()
-            }
-        }
-    }
-}
-
-impl Columns {
-    /// Whether names were found.
-    pub(super) fn are_named(&self) -> bool {
-        !self.names.is_empty()
-    }
-
-    pub(super) fn meaning(&self) -> Option<&Meaning> {
-        self.meaning.as_ref()
-    }
-
-    /// Reads the next line.
-    pub(super) fn take(&mut self, line: &str) -> Result<Line, String> {
-        let line = line.trim();
-        if line.is_empty() {
-            return Ok(Line::Nothing);
-        }
-        if let Some(comment) = line.strip_prefix("//").or_else(|| line.strip_prefix('#')) {
-            // Some programs write the names as a comment.
-            if !self.has_points && !self.are_named() {
-                self.take_names(comment);
-            }
-            return Ok(Line::Nothing);
-        }
-        let separator = *self.separator.get_or_insert(Separator::of(line));
-        let words = separator.split(line);
-        if !self.has_points {
-            let are_numbers = words.iter().all(|word| word.is_empty() || number(word).is_some());
-            if !are_numbers {
-                if self.take_names(line) {
-                    self.separator = Some(Separator::of(line));
-                    return Ok(Line::Nothing);
+                let mut line = line.trim_matches(|letter: char| letter.is_whitespace() && letter != mark);
+                // Rows of Markdown and of some databases begin and end with a bar.
+                if mark == '|' && line.starts_with(mark) {
+                    line = line.strip_prefix(mark).unwrap_or(line);
+                    line = line.strip_suffix(mark).unwrap_or(line);
                 }
-                return Err(format!("`{line:.60}` is neither numbers nor names of columns with x, y and z"));
-            }
-            // PTS starts with the number of its points.
-            if words.len() == 1 && !self.has_count && !self.are_named() {
-                self.has_count = true;
-                self.separator = None;
-                return Ok(Line::Nothing);
-            }
-            if words.len() < 3 {
-                return Err(format!("{} columns; a point has x, y and z", words.len()));
-            }
-            let meaning = *self.meaning.get_or_insert_with(|| by_count(words.len()));
-            if !self.are_named() {
-                self.names = default_names(words.len(), &meaning);
-            }
-            self.has_points = true;
-        }
-        self.point(&words).map(Line::Point)
-    }
-
-    /// Takes a line as names, if it has x, y and z.
-    fn take_names(&mut self, line: &str) -> bool {
-        let line = line.trim();
-        let words = Separator::of(line).split(line);
-        let names: Vec<String> = words.iter().map(|word| word.trim_matches('"').to_owned()).collect();
-        // Livox counts nanoseconds; that a column holds integers is not known before all of it is read.
-        let is_integer =
-            |at: usize| names.get(at).is_some_and(|name| name.eq_ignore_ascii_case("offset_time"));
-        let Some(meaning) = Meaning::of(&names, is_integer) else { return false };
-        self.names = names;
-        self.meaning = Some(meaning);
-        true
-    }
-
-    fn point(&mut self, words: &[&str]) -> Result<CloudPoint, String> {
-        let Some(meaning) = self.meaning else { return Err("x, y and z are not known".into()) };
-        let value = |at: usize| -> Result<f64, String> {
-            match words.get(at) {
-                None => Err(format!("{} columns, {} are needed", words.len(), meaning.last() + 1)),
-                Some(&"") => Ok(f64::NAN),
-                Some(word) => number(word).ok_or_else(|| format!("`{word:.40}` is not a number")),
-            }
-        };
-        let mut values = vec![0.0; meaning.last() + 1];
-        let extra = meaning.intensity.into_iter().chain(meaning.time.map(|time| time.at));
-        for at in meaning.xyz.into_iter().chain(extra) {
-            if let Some(place) = values.get_mut(at) {
-                *place = value(at)?;
+                if has_quotes {
+                    split_unquoted(line, |letter| letter == mark).into_iter().map(cell_of).collect()
+                } else {
+                    line.split(mark).map(cell_of).collect()
+                }
             }
         }
-        Ok(self.clock.point(&meaning, |at| values.get(at).copied().unwrap_or(f64::NAN)))
+    }
+
+    /// The number in a cell, which may have a decimal comma where no comma parts cells.
+    pub(crate) fn number(self, cell: &str) -> Option<f64> {
+        if let Some(number) = number(cell) {
+            return Some(number);
+        }
+        let (whole, fraction) = cell.split_once(',')?;
+        // Between commas, a cell with a comma was quoted; three digits behind it may be thousands.
+        let may_be_thousands = self == Self::Mark(',') && fraction.len() == 3;
+        let is_fraction = fraction.starts_with(|first: char| first.is_ascii_digit());
+        if may_be_thousands || !is_fraction || whole.contains('.') || fraction.contains([',', '.']) {
+            return None;
+        }
+        number(&format!("{whole}.{fraction}"))
     }
 }
 
-/// Columns without names: x y z, then the intensity, unless the three after them are a colour or a normal.
-fn by_count(columns: usize) -> Meaning {
-    Meaning { xyz: [0, 1, 2], intensity: (columns > 3 && columns != 6).then_some(3), time: None }
+/// Cells without empty ones at the end: a mark behind the last cell begins none.
+pub(crate) fn without_end<'c, 'l>(cells: &'c [&'l str]) -> &'c [&'l str] {
+    let end = cells.iter().rposition(|cell| !cell.is_empty()).map_or(0, |last| last + 1);
+    cells.get(..end).unwrap_or(cells)
 }
 
-fn default_names(columns: usize, meaning: &Meaning) -> Vec<String> {
-    let mut names: Vec<String> = ["x", "y", "z"].map(str::to_owned).into();
-    names.extend(meaning.intensity.map(|_| "intensity".to_owned()));
-    names.truncate(columns);
-    names
+/// What a comment says; `None` of a line that is none.
+pub(crate) fn comment_of(line: &str) -> Option<&str> {
+    let line = line.trim_start();
+    ["#", "%", "//"].iter().find_map(|mark| line.strip_prefix(mark))
 }
 
-fn number(word: &str) -> Option<f64> {
-    // `infinity` and the like are names as well as numbers to Rust; points know `nan` and `inf`.
-    word.parse().ok()
+/// The number that a word is. What programs write for no number is NaN.
+pub(crate) fn number(word: &str) -> Option<f64> {
+    word.parse().ok().or_else(|| unusual_number(word))
+}
+
+/// `-nan(ind)` and `1.#QNAN` of Windows, `1.#INF`, `NA` of tables, `1.5D+02` of Fortran.
+#[cold]
+fn unusual_number(word: &str) -> Option<f64> {
+    let lower = word.trim().trim_matches(['"', '\'']).to_ascii_lowercase();
+    if let Ok(number) = lower.parse() {
+        return Some(number);
+    }
+    let (sign, plain) = match lower.strip_prefix('-') {
+        Some(rest) => (-1.0, rest),
+        None => (1.0, lower.strip_prefix('+').unwrap_or(&lower)),
+    };
+    let is_nan = ["nan(", "1.#qnan", "1.#ind", "1.#snan", "1.#nan", "nanq", "nans", "qnan", "snan"]
+        .iter()
+        .any(|start| plain.starts_with(start));
+    if is_nan || matches!(plain, "na" | "n/a" | "#n/a" | "<na>" | "null" | "none" | "nil") {
+        return Some(f64::NAN);
+    }
+    if plain.starts_with("1.#inf") {
+        return Some(sign * f64::INFINITY);
+    }
+    let (mantissa, exponent) = plain.split_once('d')?;
+    let is_number = |text: &str| text.bytes().all(|byte| byte.is_ascii_digit() || byte == b'.');
+    let is_exponent = exponent.trim_start_matches(['+', '-']).bytes().all(|byte| byte.is_ascii_digit());
+    if !is_number(mantissa) || !is_exponent {
+        return None;
+    }
+    format!("{mantissa}e{exponent}").parse::<f64>().ok().map(|number| sign * number)
+}
+
+/// A cell without blanks and quotes around it.
+fn cell_of(cell: &str) -> &str {
+    let cell = cell.trim();
+    let quoted = ['"', '\''].into_iter().find_map(|quote| cell.strip_prefix(quote)?.strip_suffix(quote));
+    quoted.map_or(cell, str::trim)
+}
+
+fn is_outside_quotes(line: &str, mark: char) -> bool {
+    if !line.contains(mark) {
+        return false;
+    }
+    split_unquoted(line, |letter| letter == mark).len() > 1
+}
+
+/// Parts of a line between marks that are not within double quotes.
+fn split_unquoted(line: &str, is_mark: impl Fn(char) -> bool) -> Vec<&str> {
+    let mut is_quoted = false;
+    line.split(|letter: char| {
+        is_quoted ^= letter == '"';
+        !is_quoted && is_mark(letter)
+    })
+    .collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn read(text: &str) -> Result<Vec<CloudPoint>, String> {
-        let mut columns = Columns::default();
-        let mut points = Vec::new();
-        for line in text.lines() {
-            if let Line::Point(point) = columns.take(line)? {
-                points.push(point);
-            }
-        }
-        Ok(points)
-    }
-
     #[test]
-    fn names_and_marks_of_many_programs() {
-        let wanted = CloudPoint { intensity: 7.0, ..CloudPoint::hit([1.0, 2.0, 3.0]) };
-        for text in [
-            "1 2 3 7",
-            "1\t2\t3\t7\n",
-            "# made by hand\n1, 2, 3, 7,\n",
-            "//X Y Z Scalar_Intensity\n1 2 3 7\n",
-            "\"z\";\"intensity\";\"y\";\"x\"\n3;7;2;1\n",
-            "Points:0,Points:1,Points:2,Intensity\n1,2,3,7\n",
-            "1\n1 2 3 7 255 0 0\n",
+    fn lines_of_many_programs_are_parted() {
+        let mark = Separator::Mark;
+        for (line, separator, cells) in [
+            ("1 2\t 3", Separator::Blank, vec!["1", "2", "3"]),
+            ("1, 2 ,3,", mark(','), vec!["1", "2", "3", ""]),
+            (",,", mark(','), vec!["", "", ""]),
+            ("1,5;2,25;3", mark(';'), vec!["1,5", "2,25", "3"]),
+            ("1,5 2,25\t3", Separator::Blank, vec!["1,5", "2,25", "3"]),
+            ("\"1,5\",\"2;5\",3", mark(','), vec!["1,5", "2;5", "3"]),
+            ("| 1 | 2 | 3 |", mark('|'), vec!["1", "2", "3"]),
+            ("1|2|", mark('|'), vec!["1", "2", ""]),
+            ("'x','y'", mark(','), vec!["x", "y"]),
+            ("\"a b\" 1", Separator::Blank, vec!["a b", "1"]),
+            ("1,2 3,4,5", mark(','), vec!["1", "2 3", "4", "5"]),
         ] {
-            assert_eq!(read(text), Ok(vec![wanted]), "{text}");
+            assert_eq!(Separator::of(line), separator, "{line}");
+            assert_eq!(separator.split(line), cells, "{line}");
         }
+        assert_eq!(Separator::of_row("1\t\t3", 3).split("1\t\t3"), ["1", "", "3"]);
+        assert_eq!(Separator::of_row("\t\t", 3).split("\t\t"), ["", "", ""]);
+        assert_eq!(Separator::of_row("1\t\t3", 2), Separator::Blank);
+        assert_eq!(without_end(&["1", "", "2", "", ""]), ["1", "", "2"]);
+        assert!(without_end(&["", ""]).is_empty());
     }
 
     #[test]
-    fn a_colour_is_no_intensity_and_an_empty_cell_is_no_return() {
-        assert_eq!(read("1 2 3 255 0 0"), Ok(vec![CloudPoint::hit([1.0, 2.0, 3.0])]));
-        let points = read("x,y,z,time\n,,,5\nnan,nan,nan,5").unwrap_or_default();
-        assert_eq!(points.iter().map(|point| point.is_return).collect::<Vec<_>>(), [false, false]);
-        assert_eq!(points.first().map(|point| point.time_s), Some(5.0));
-    }
-
-    #[test]
-    fn absolute_times_count_from_the_first_point() {
-        let points = read("timestamp[ns] x y z\n1700000000000000000 1 2 3\n1700000000250000000 1 2 3")
-            .unwrap_or_default();
-        assert_eq!(points.iter().map(|point| point.time_s).collect::<Vec<_>>(), [0.0, 0.25]);
-    }
-
-    #[test]
-    fn what_is_no_point_is_an_error() {
-        for (text, reason) in [
-            ("hello world", "neither numbers nor names"),
-            ("1 2", "2 columns"),
-            ("x y z intensity\n1 2 3", "3 columns, 4 are needed"),
-            ("1 2 3\n1 2 c", "`c` is not a number"),
-            ("1\n2\n3", "1 columns"),
+    fn numbers_of_many_programs() {
+        for (word, wanted) in [
+            ("1.5", Some(1.5)),
+            ("-.5e1", Some(-5.0)),
+            ("+2", Some(2.0)),
+            ("\"3\"", Some(3.0)),
+            ("-1.5D+02", Some(-150.0)),
+            ("-inf", Some(f64::NEG_INFINITY)),
+            ("-1.#INF", Some(f64::NEG_INFINITY)),
+            ("1.#INF00", Some(f64::INFINITY)),
+            ("abc", None),
+            ("", None),
+            ("0x10", None),
+            ("1,5", None),
+            ("d", None),
+            ("id", None),
         ] {
-            let error = read(text).unwrap_err();
-            assert!(error.contains(reason), "{error}");
+            assert_eq!(number(word), wanted, "{word}");
         }
+        for word in [
+            "nan",
+            "-NaN",
+            "-nan(ind)",
+            "nan(snan)",
+            "1.#QNAN",
+            "-1.#IND",
+            "1.#IND00",
+            "NA",
+            "N/A",
+            "null",
+            "None",
+            "<NA>",
+        ] {
+            assert!(number(word).is_some_and(f64::is_nan), "{word}");
+        }
+    }
+
+    #[test]
+    fn decimal_commas_count_where_commas_part_no_cells() {
+        let semicolon = Separator::Mark(';');
+        for (separator, cell, wanted) in [
+            (semicolon, "1,5", Some(1.5)),
+            (semicolon, "-1,250", Some(-1.25)),
+            (semicolon, "1,5e-3", Some(1.5e-3)),
+            (Separator::Blank, "0,25", Some(0.25)),
+            (semicolon, "1.234,5", None),
+            (semicolon, "1,234,567", None),
+            (Separator::Mark(','), "1,25", Some(1.25)),
+            // Thousands, perhaps.
+            (Separator::Mark(','), "1,250", None),
+        ] {
+            assert_eq!(separator.number(cell), wanted, "{cell}");
+        }
+    }
+
+    #[test]
+    fn comments_have_three_marks() {
+        assert_eq!(comment_of("  # x y"), Some(" x y"));
+        assert_eq!(comment_of("//X Y"), Some("X Y"));
+        assert_eq!(comment_of("% t"), Some(" t"));
+        assert_eq!(comment_of("1 # 2"), None);
     }
 }
