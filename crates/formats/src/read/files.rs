@@ -21,7 +21,44 @@ pub(crate) struct Files {
     crs: Option<String>,
     /// Whether a file was opened, so that the coordinate system is known or known to be missing.
     is_begun: bool,
-    remarks: Vec<String>,
+    remarks: Remarks,
+}
+
+/// What is to be said of files. What is true of several is said once.
+#[derive(Clone, Default)]
+struct Remarks {
+    said: Vec<Said>,
+    are_more: bool,
+}
+
+/// A remark on a file, or on the folder if it has no name, and how many other files it is true of.
+#[derive(Clone)]
+struct Said {
+    file: String,
+    others: u64,
+    remark: String,
+}
+
+impl Remarks {
+    fn add(&mut self, file: String, remark: String) {
+        let same = self.said.iter_mut().find(|said| said.remark == remark && !said.file.is_empty());
+        match same {
+            Some(said) => said.others += 1,
+            None if self.said.len() < MAX_REMARKS => self.said.push(Said { file, others: 0, remark }),
+            None => self.are_more = true,
+        }
+    }
+
+    fn lines(&self) -> Vec<String> {
+        let line = |Said { file, others, remark }: &Said| match (file.as_str(), others) {
+            ("", _) => remark.clone(),
+            (_, 0) => format!("{file}: {remark}"),
+            (_, 1) => format!("{file} and another file: {remark}"),
+            _ => format!("{file} and {others} other files: {remark}"),
+        };
+        let more = self.are_more.then(|| "there is more to say of other files".to_owned());
+        self.said.iter().map(line).chain(more).collect()
+    }
 }
 
 impl Files {
@@ -39,16 +76,14 @@ impl Files {
             current: None,
             crs: None,
             is_begun: false,
-            remarks: Vec::new(),
+            remarks: Remarks::default(),
         }
     }
 
-    fn remark(&mut self, remark: String) {
-        if self.remarks.len() < MAX_REMARKS {
-            self.remarks.push(remark);
-        } else if self.remarks.len() == MAX_REMARKS {
-            self.remarks.push("there is more to say of other files".into());
-        }
+    /// With remarks on the folder itself.
+    pub(crate) fn with_remarks(mut self, remarks: Vec<String>) -> Self {
+        remarks.into_iter().for_each(|remark| self.remarks.add(String::new(), remark));
+        self
     }
 
     /// Keeps what is to be said of the file that ends.
@@ -56,7 +91,7 @@ impl Files {
         let Some((path, source)) = self.current.take() else { return };
         let name = name_of(&path);
         for remark in source.remarks() {
-            self.remark(format!("{name}: {remark}"));
+            self.remarks.add(name.clone(), remark);
         }
     }
 
@@ -76,11 +111,11 @@ impl Files {
             None => self.crs = Some(crs.to_owned()),
         }
         if !is_first {
-            let name = name_of(path);
-            self.remark(format!(
-                "{name}: names the coordinate system {crs:.80}, the files before it name none; are their points in \
-                 it, and does the map name it (`voxtile info`)? Read this file first otherwise"
-            ));
+            let remark = format!(
+                "names the coordinate system {crs:.80}, the files before it name none; are their points in it, and does \
+                 the map name it (`voxtile info`)? Read this file first otherwise"
+            );
+            self.remarks.add(name_of(path), remark);
         }
         Ok(())
     }
@@ -130,8 +165,11 @@ impl CloudSource for Files {
     }
 
     fn remarks(&self) -> Vec<String> {
-        let now = self.current.iter().flat_map(|(_, source)| source.remarks());
-        self.remarks.iter().cloned().chain(now).collect()
+        let mut remarks = self.remarks.clone();
+        for (path, source) in &self.current {
+            source.remarks().into_iter().for_each(|remark| remarks.add(name_of(path), remark));
+        }
+        remarks.lines()
     }
 
     fn crs(&self) -> Option<&str> {

@@ -3,29 +3,86 @@
 use super::foreign::text_encoding;
 use super::input_file::open_input;
 use super::text_line::comment_of;
-use std::io::{BufRead, BufReader, ErrorKind};
+use std::io::{self, BufRead, BufReader, ErrorKind};
 use std::path::{Path, PathBuf};
 use voxtile::{Error, FormatError, Result};
 
 /// A longer line is an error: its words would take many times its bytes.
 pub(crate) const MAX_LINE_BYTES: usize = 1 << 16;
 
-/// Lines of a file, one at a time. They end with LF, CR LF or CR alone.
-pub(crate) struct Lines {
-    path: PathBuf,
-    input: Box<dyn BufRead + Send>,
+/// How much of a line was read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Extent {
+    Whole,
+    /// The line goes on.
+    Start,
+}
+
+/// Lines of an input as bytes. They end with LF, CR LF or CR alone.
+pub(crate) struct RawLines<R> {
+    input: R,
     line: Vec<u8>,
-    number: u64,
+    /// At most so many bytes of a line are read.
+    max_bytes: usize,
     /// Whether the last line ended with CR: an LF after it belongs to it.
     is_after_return: bool,
 }
 
-/// How much of a line was read.
-#[derive(Clone, Copy, PartialEq)]
-enum Extent {
-    Whole,
-    /// The line goes on.
-    Start,
+impl<R: BufRead> RawLines<R> {
+    pub(crate) fn new(input: R, max_bytes: usize) -> Self {
+        Self { input, line: Vec::new(), max_bytes, is_after_return: false }
+    }
+
+    /// The line that was read last, without its end.
+    pub(crate) fn line(&self) -> &[u8] {
+        &self.line
+    }
+
+    /// Reads the next line, or its start. `None` at the end of the input.
+    pub(crate) fn next(&mut self) -> io::Result<Option<Extent>> {
+        let Self { input, line, max_bytes, is_after_return } = self;
+        line.clear();
+        let mut has_read = false;
+        loop {
+            let chunk = match input.fill_buf() {
+                Ok([]) => return Ok(has_read.then_some(Extent::Whole)),
+                Ok(chunk) => chunk,
+                Err(error) if error.kind() == ErrorKind::Interrupted => continue,
+                Err(error) => return Err(error),
+            };
+            if std::mem::take(is_after_return) && chunk.first() == Some(&b'\n') {
+                input.consume(1);
+                continue;
+            }
+            has_read = true;
+            let part = chunk.get(..*max_bytes - line.len()).unwrap_or(chunk);
+            let end = part.iter().position(|byte| matches!(byte, b'\n' | b'\r'));
+            let (text, after) = part.split_at(end.unwrap_or(part.len()));
+            line.extend_from_slice(text);
+            *is_after_return = after.first() == Some(&b'\r');
+            let taken = text.len() + usize::from(end.is_some());
+            input.consume(taken);
+            if end.is_some() {
+                return Ok(Some(Extent::Whole));
+            }
+            if line.len() == *max_bytes {
+                return Ok(Some(Extent::Start));
+            }
+        }
+    }
+
+    /// Passes over what is left of a line whose start was read.
+    pub(crate) fn pass_rest(&mut self) -> io::Result<()> {
+        while self.next()? == Some(Extent::Start) {}
+        Ok(())
+    }
+}
+
+/// Lines of a file, one at a time.
+pub(crate) struct Lines {
+    path: PathBuf,
+    lines: RawLines<Box<dyn BufRead + Send>>,
+    number: u64,
 }
 
 impl Lines {
@@ -35,19 +92,19 @@ impl Lines {
 
     /// The lines of what is left of an input, after so many lines.
     pub(crate) fn new(path: &Path, input: impl BufRead + Send + 'static, lines_before: u64) -> Self {
-        let (path, input) = (path.to_owned(), Box::new(input));
-        Self { path, input, line: Vec::new(), number: lines_before, is_after_return: false }
+        let lines = RawLines::new(Box::new(input) as Box<dyn BufRead + Send>, MAX_LINE_BYTES);
+        Self { path: path.to_owned(), lines, number: lines_before }
     }
 
     /// The next line without its end, and its number. Of a long comment only the start is read.
     pub(crate) fn next(&mut self) -> Result<Option<(u64, String)>> {
         let Some(extent) = self.read()? else { return Ok(None) };
         if self.number == 1
-            && let Some(encoding) = text_encoding(&self.line)
+            && let Some(encoding) = text_encoding(self.lines.line())
         {
             return Err(self.error(encoding));
         }
-        let text = String::from_utf8_lossy(&self.line);
+        let text = String::from_utf8_lossy(self.lines.line());
         let text = if self.number == 1 { text.trim_start_matches('\u{feff}') } else { &text }.to_owned();
         if extent == Extent::Start {
             if comment_of(&text).is_none() {
@@ -65,61 +122,31 @@ impl Lines {
                 self.pass_rest()?;
                 return Ok(true);
             }
-            if !self.line.trim_ascii().is_empty() {
+            if !self.lines.line().trim_ascii().is_empty() {
                 return Ok(true);
             }
         }
         Ok(false)
     }
 
-    /// Reads a line, or its start.
     fn read(&mut self) -> Result<Option<Extent>> {
-        let extent = self.read_some()?;
+        let extent = self.lines.next().map_err(|error| Error::io(&self.path, "read", error))?;
         self.number += u64::from(extent.is_some());
         Ok(extent)
     }
 
     fn pass_rest(&mut self) -> Result<()> {
-        while self.read_some()? == Some(Extent::Start) {}
-        Ok(())
-    }
-
-    /// Reads up to the end of the line, at most the bytes of the longest line. `None` at the end of the input.
-    fn read_some(&mut self) -> Result<Option<Extent>> {
-        let Self { path, input, line, is_after_return, .. } = self;
-        line.clear();
-        let mut has_read = false;
-        loop {
-            let chunk = match input.fill_buf() {
-                Ok([]) => return Ok(has_read.then_some(Extent::Whole)),
-                Ok(chunk) => chunk,
-                Err(error) if error.kind() == ErrorKind::Interrupted => continue,
-                Err(error) => return Err(Error::io(path, "read", error)),
-            };
-            if std::mem::take(is_after_return) && chunk.first() == Some(&b'\n') {
-                input.consume(1);
-                continue;
-            }
-            has_read = true;
-            let part = chunk.get(..MAX_LINE_BYTES - line.len()).unwrap_or(chunk);
-            let end = part.iter().position(|byte| matches!(byte, b'\n' | b'\r'));
-            let (text, after) = part.split_at(end.unwrap_or(part.len()));
-            line.extend_from_slice(text);
-            *is_after_return = after.first() == Some(&b'\r');
-            let taken = text.len() + usize::from(end.is_some());
-            input.consume(taken);
-            if end.is_some() {
-                return Ok(Some(Extent::Whole));
-            }
-            if line.len() == MAX_LINE_BYTES {
-                return Ok(Some(Extent::Start));
-            }
-        }
+        self.lines.pass_rest().map_err(|error| Error::io(&self.path, "read", error))
     }
 
     /// An error of the line that was read last.
     pub(crate) fn error(&self, reason: impl Into<String>) -> Error {
-        FormatError::at_line(self.number, reason).in_input(&self.path)
+        self.error_at(self.number, reason)
+    }
+
+    /// An error of a line by its number.
+    pub(crate) fn error_at(&self, line: u64, reason: impl Into<String>) -> Error {
+        FormatError::at_line(line, reason).in_input(&self.path)
     }
 }
 

@@ -43,6 +43,7 @@ mod las_units;
 mod laz_chunks;
 pub(crate) mod lines;
 pub(crate) mod listing;
+mod left_out;
 mod lzf;
 pub(crate) mod one;
 mod pcd;
@@ -60,6 +61,7 @@ pub(crate) mod stamp;
 mod stream_input;
 pub(crate) mod text;
 mod text_columns;
+mod text_header;
 pub(crate) mod text_line;
 pub(crate) mod units;
 #[cfg(any(feature = "las", feature = "e57"))]

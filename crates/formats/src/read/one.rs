@@ -14,6 +14,11 @@ pub trait Points: Send {
     ///
     /// A file that cannot be read or is invalid; the first error of `visit`.
     fn read(&mut self, visit: Visit<'_>) -> Result<()>;
+
+    /// What a person should know of them, so far: what was guessed, rows that were left out.
+    fn remarks(&self) -> Vec<String> {
+        Vec::new()
+    }
 }
 
 /// What a file's name tells of its cloud.
@@ -27,11 +32,20 @@ pub(crate) struct OneCloud {
     format: String,
     head: Option<CloudHead>,
     points: Option<Box<dyn Points>>,
+    /// Of points that were read.
+    remarks: Vec<String>,
 }
 
 impl OneCloud {
     pub(crate) fn new(format: impl Into<String>, (head, points): (CloudHead, Box<dyn Points>)) -> Self {
-        Self { format: format.into(), head: Some(head), points: Some(points) }
+        Self { format: format.into(), head: Some(head), points: Some(points), remarks: Vec::new() }
+    }
+
+    /// Lets go of the file.
+    fn close(&mut self) {
+        if let Some(points) = self.points.take() {
+            self.remarks = points.remarks();
+        }
     }
 }
 
@@ -47,7 +61,7 @@ impl CloudSource for OneCloud {
     fn next_cloud(&mut self) -> Result<Option<CloudHead>> {
         let head = self.head.take();
         if head.is_none() {
-            self.points = None;
+            self.close();
         }
         Ok(head)
     }
@@ -55,11 +69,23 @@ impl CloudSource for OneCloud {
     fn read_points(&mut self, visit: Visit<'_>) -> Result<()> {
         // Before the first cloud there is nothing to read.
         match (&self.head, self.points.take()) {
-            (None, Some(mut points)) => points.read(visit),
+            (None, Some(mut points)) => {
+                let read = points.read(visit);
+                self.points = Some(points);
+                self.close();
+                read
+            }
             (_, points) => {
                 self.points = points;
                 Ok(())
             }
+        }
+    }
+
+    fn remarks(&self) -> Vec<String> {
+        match &self.points {
+            Some(points) => points.remarks(),
+            None => self.remarks.clone(),
         }
     }
 }

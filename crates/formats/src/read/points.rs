@@ -1,44 +1,125 @@
-use std::io::{self, BufRead, Read};
+use super::columns::Meaning;
+use super::foreign::{text_encoding, without_mark};
+use super::lines::{Extent, MAX_LINE_BYTES, RawLines};
+use super::text_header::names_of;
+use super::text_line::{Separator, comment_of, digits_behind_comma};
+use std::io::{self, BufRead};
 use voxtile::FormatError;
 use voxtile::space::Point;
 
-/// A longer line is an error.
-const MAX_LINE_BYTES: u64 = 1 << 16;
-
-/// Reads points, one per line: x y z in metres, separated by blanks or commas; more columns are ignored. Empty lines,
-/// lines that start with `#` and a first line of words are skipped.
+/// Reads points, one per line: x y z in metres, separated by blanks, commas, semicolons or tabs, with decimal commas
+/// where commas separate nothing. More columns are ignored. Names of columns before the points say which are x, y and z,
+/// and their units. Empty lines, comments (`#`, `//`, `%`) and a first line of other words are skipped.
 ///
 /// # Errors
 ///
-/// A line without three numbers; the outer error is the stream's.
-pub fn read_points(mut input: impl BufRead) -> io::Result<Result<Vec<Point>, FormatError>> {
-    let (mut points, mut bytes) = (Vec::new(), Vec::new());
-    for number in 1.. {
-        bytes.clear();
-        let read = (&mut input).take(MAX_LINE_BYTES).read_until(b'\n', &mut bytes)?;
-        if read == 0 {
-            break;
+/// A line without three numbers; a unit that is not known; the outer error is the stream's.
+pub fn read_points(input: impl BufRead) -> io::Result<Result<Vec<Point>, FormatError>> {
+    let mut lines = RawLines::new(input, MAX_LINE_BYTES);
+    let (mut points, mut meaning, mut number) = (Vec::new(), Meaning::of_metres([0, 1, 2]), 0);
+    while let Some(extent) = lines.next()? {
+        number += 1;
+        let wrong = |reason: String| Ok(Err(FormatError::at_line(number, reason)));
+        if extent == Extent::Start {
+            return wrong(format!("the line is longer than {} KiB", MAX_LINE_BYTES >> 10));
         }
-        if read as u64 == MAX_LINE_BYTES {
-            let reason = format!("the line is longer than {} KiB", MAX_LINE_BYTES >> 10);
-            return Ok(Err(FormatError::at_line(number, reason)));
+        let mut bytes = lines.line();
+        if number == 1 {
+            if let Some(encoding) = text_encoding(bytes) {
+                return wrong(encoding.to_owned());
+            }
+            bytes = without_mark(bytes);
         }
         let text =
-            str::from_utf8(&bytes).map_err(|error| io::Error::new(io::ErrorKind::InvalidData, error))?;
+            str::from_utf8(bytes).map_err(|error| io::Error::new(io::ErrorKind::InvalidData, error))?;
         let line = text.trim();
-        if line.is_empty() || line.starts_with('#') {
+        let comment = comment_of(line);
+        if points.is_empty() {
+            match Meaning::of(&names_of(comment.unwrap_or(line)), |_| false) {
+                Ok(Some(named)) => {
+                    meaning = named;
+                    continue;
+                }
+                Ok(None) => {}
+                Err(reason) => return wrong(reason),
+            }
+        }
+        if line.is_empty() || comment.is_some() {
             continue;
         }
-        let words = line.split([' ', '\t', ',', ';']).filter(|word| !word.is_empty());
-        let numbers: Vec<Option<f64>> = words.take(3).map(|word| word.parse().ok()).collect();
-        match numbers[..] {
-            [Some(x), Some(y), Some(z)] => points.push([x, y, z]),
-            _ if points.is_empty() && number == 1 && numbers.iter().all(Option::is_none) => {}
-            _ => {
-                let reason = format!("`{line}` is not a point; three numbers x y z are needed");
-                return Ok(Err(FormatError::at_line(number, reason)));
-            }
+        match point_of(line, &meaning) {
+            Some(point) => points.push(point),
+            None if points.is_empty() && number == 1 && !has_numbers(line) => {}
+            None => return wrong(format!("`{line:.80}` is not a point; three numbers x y z are needed")),
         }
     }
     Ok(Ok(points))
+}
+
+/// The point of a line.
+fn point_of(line: &str, meaning: &Meaning) -> Option<Point> {
+    let separator = Separator::of(line);
+    let mut cells = separator.split(line);
+    if digits_behind_comma(separator, &cells).is_some() {
+        return None;
+    }
+    if separator == Separator::Mark(',') {
+        // Blanks part cells, too: `1, 2 3`.
+        cells = cells.into_iter().flat_map(str::split_ascii_whitespace).collect();
+    }
+    let [x, y, z] = meaning.xyz.map(|at| separator.number(cells.get(at)?));
+    let [in_x, in_y, in_z] = meaning.units;
+    Some([in_x.metres(x?), in_y.metres(y?), in_z.metres(z?)])
+}
+
+/// Whether a number is among the first three words.
+fn has_numbers(line: &str) -> bool {
+    let separator = Separator::of(line);
+    separator.split(line).iter().take(3).any(|cell| separator.number(cell).is_some())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<Vec<Point>, String> {
+        match read_points(text.as_bytes()) {
+            Ok(read) => read.map_err(|error| error.to_string()),
+            Err(error) => Err(error.to_string()),
+        }
+    }
+
+    #[test]
+    fn points_of_many_programs() {
+        let wanted = vec![[1.5, 2.25, -3.0], [4.0, 5.0, 6.0]];
+        for text in [
+            "1.5 2.25 -3\n4 5 6\n",
+            "\u{feff}x,y,z\r\n1.5,2.25,-3\r\n4,5,6\r\n",
+            "1.5 2.25 -3\r4 5 6\r",
+            "1,5;2,25;-3,0\n4;5;6\n",
+            "1,5\t2,25\t-3,0\n4\t5\t6\n",
+            "words of no names\n1.5 2.25 -3\n4 5 6",
+            "z;y;x\n-3;2.25;1.5\n6;5;4\n",
+            "x (cm),y (cm),z (cm)\n150,225,-300\n400,500,600\n",
+        ] {
+            assert_eq!(read(text), Ok(wanted.clone()), "{text}");
+        }
+        assert_eq!(read("1.5, 2.25 -3 7\n4;5;6;seven"), Ok(wanted));
+    }
+
+    #[test]
+    fn a_line_without_a_point_is_an_error() {
+        for (text, reason) in [
+            ("1 2 3\n4 five 6\n", "line 2: `4 five 6` is not a point"),
+            ("# by hand\nlon lat\n", "line 2: `lon lat` is not a point"),
+            ("1,2\n", "line 1: `1,2` is not a point"),
+            ("6,001,3,178,-1,000\n", "is not a point"),
+            ("1 2 3\nx y z\n", "line 2: `x y z` is not a point"),
+            ("x (px) y (px) z (px)\n1 2 3\n", "`px` is no known unit"),
+            ("\u{0}1\u{0} \u{0}2", "is text in UTF-16"),
+        ] {
+            let error = read(text).unwrap_err();
+            assert!(error.contains(reason), "{error}");
+        }
+    }
 }

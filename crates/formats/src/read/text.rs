@@ -1,6 +1,8 @@
 use super::cloud::{CloudHead, CloudPoint};
+use super::foreign::{text_encoding, without_mark};
 use super::glance::GLANCE_BYTES;
-use super::lines::Lines;
+use super::left_out::LeftOut;
+use super::lines::{Lines, MAX_LINE_BYTES, RawLines};
 use super::one::{Points, Visit};
 use super::text_columns::{Columns, Line};
 use crate::read_options::ReadOptions;
@@ -11,31 +13,53 @@ use voxtile::{FormatError, Result};
 struct TextPoints {
     lines: Lines,
     columns: Columns,
+    left_out: LeftOut,
     /// The point that told what the columns are.
     first: Option<CloudPoint>,
+    is_at_end: bool,
 }
 
-/// Whether a file that starts like this is a text of points.
-pub(crate) fn looks_like_points(start: &[u8]) -> bool {
+/// Checks that a file that starts like this is a text of points. One whose name does not say so has numbers alone.
+///
+/// # Errors
+///
+/// Why it is none, with the line.
+pub(crate) fn check_start(start: &[u8], is_named: bool) -> std::result::Result<(), String> {
+    if let Some(encoding) = text_encoding(start) {
+        return Err(encoding.to_owned());
+    }
     if start.contains(&0) {
-        return false;
+        return Err("it has bytes of zero, as no text has".to_owned());
     }
-    let text = String::from_utf8_lossy(start);
     let is_cut = start.len() as u64 == GLANCE_BYTES;
-    let mut lines: Vec<&str> = text.lines().collect();
-    if is_cut && lines.len() > 1 {
-        lines.pop();
+    let mut text = without_mark(start);
+    if is_cut && let Some(end) = text.iter().rposition(|byte| matches!(byte, b'\n' | b'\r')) {
+        text = text.get(..end).unwrap_or(text);
     }
-    let mut columns = Columns::default();
-    for line in lines {
-        match columns.take(line) {
-            Ok(Line::Point(_)) => return true,
-            Ok(Line::Nothing) => {}
-            Err(_) => return false,
+    let (mut lines, mut columns, mut left_out) =
+        (RawLines::new(text, MAX_LINE_BYTES), Columns::default(), LeftOut::default());
+    let at_line = |(line, reason): (u64, String)| format!("line {line}: {reason}");
+    for number in 1.. {
+        // What is in memory is read without errors.
+        if !matches!(lines.next(), Ok(Some(_))) {
+            break;
+        }
+        match columns.take(number, &String::from_utf8_lossy(lines.line())).map_err(at_line)? {
+            Line::Point(_) if is_named || columns.are_named() || columns.are_numbers() => return Ok(()),
+            Line::Point(_) => return Err(format!("line {number}: there are words among the numbers")),
+            Line::Nothing => {}
+            Line::Unread(reason) => left_out.add(number, reason),
         }
     }
-    // Names alone: a text without points yet.
-    columns.are_named()
+    if let Some(wrong) = columns.why_none() {
+        return Err(at_line(wrong));
+    }
+    // Names alone: a text without points yet. What follows long comments is not known.
+    match left_out.error() {
+        None if columns.are_named() || (is_named && is_cut) => Ok(()),
+        Some(error) => Err(error.to_string()),
+        None => Err("no line of it has three numbers or more, or names with x, y and z".to_owned()),
+    }
 }
 
 /// Opens a text of points and reads up to its first point.
@@ -44,13 +68,22 @@ pub(crate) fn open(
     mut head: CloudHead,
     _: &ReadOptions,
 ) -> Result<(CloudHead, Box<dyn Points>)> {
-    let mut points = TextPoints { lines: Lines::open(path)?, columns: Columns::default(), first: None };
+    let (columns, left_out) = (Columns::default(), LeftOut::default());
+    let mut points =
+        TextPoints { lines: Lines::open(path)?, columns, left_out, first: None, is_at_end: false };
     points.columns.clock = super::columns::Clock::new(head.stamp_ns);
     points.first = points.next()?;
-    if points.first.is_none() && !points.columns.are_named() {
-        return Err(
-            FormatError::at_offset(0, "no point, and no names of columns with x, y and z").in_input(path)
-        );
+    if points.first.is_none() {
+        if let Some((line, reason)) = points.columns.why_none() {
+            return Err(FormatError::at_line(line, reason).in_input(path));
+        }
+        if let Some(error) = points.left_out.error() {
+            return Err(error.in_input(path));
+        }
+        if !points.columns.are_named() {
+            let reason = "no point, and no names of columns with x, y and z";
+            return Err(FormatError::at_offset(0, reason).in_input(path));
+        }
     }
     head.fields = points.columns.names.clone();
     if let Some(meaning) = points.columns.meaning() {
@@ -62,13 +95,15 @@ pub(crate) fn open(
 
 impl TextPoints {
     fn next(&mut self) -> Result<Option<CloudPoint>> {
-        while let Some((_, line)) = self.lines.next()? {
-            match self.columns.take(&line) {
+        while let Some((number, line)) = self.lines.next()? {
+            match self.columns.take(number, &line) {
                 Ok(Line::Point(point)) => return Ok(Some(point)),
                 Ok(Line::Nothing) => {}
-                Err(reason) => return Err(self.lines.error(reason)),
+                Ok(Line::Unread(reason)) => self.left_out.add(number, reason),
+                Err((line, reason)) => return Err(self.lines.error_at(line, reason)),
             }
         }
+        self.is_at_end = true;
         Ok(None)
     }
 }
@@ -82,5 +117,10 @@ impl Points for TextPoints {
             visit(point)?;
         }
         Ok(())
+    }
+
+    fn remarks(&self) -> Vec<String> {
+        let last = self.columns.last_remark().filter(|_| self.is_at_end);
+        self.columns.remarks().into_iter().chain(self.left_out.remark()).chain(last).collect()
     }
 }

@@ -1,5 +1,9 @@
+//! A text of points, line by line.
+
 use super::cloud::CloudPoint;
 use super::columns::{Clock, Meaning};
+use super::text_header::{are_poses, asked_separator, names_of, unit_of_comment, units_row};
+use super::text_line::{Separator, comment_of, digits_behind_comma, without_end};
 
 /// What a line of a text of points is.
 #[derive(Debug, PartialEq)]
@@ -7,158 +11,337 @@ pub(super) enum Line {
     Point(CloudPoint),
     /// A comment, names, an empty line, a number of points.
     Nothing,
+    /// A row that is no point, and why.
+    Unread(String),
 }
+
+/// Why a text is none of points, and the number of the line that says so.
+pub(super) type Wrong = (u64, String);
 
 /// How the lines of a text are split, and what their columns mean. Both are known with the first point.
 #[derive(Debug, Default)]
 pub(super) struct Columns {
     pub(super) clock: Clock,
-    separator: Option<Separator>,
     pub(super) names: Vec<String>,
+    separator: Separator,
+    asked: Option<Separator>,
+    are_named: bool,
     meaning: Option<Meaning>,
     has_points: bool,
-    has_count: bool,
+    /// Whether each cell of the first point is a number.
+    are_numbers: bool,
+    /// Columns before those with names: R writes the names of rows there.
+    unnamed: usize,
+    counts: Counts,
+    /// The first line before the points that says nothing. Only names behind it make it harmless.
+    prose: Option<Wrong>,
+    /// Lines before the points.
+    lines_before: u32,
+    /// A comment that speaks of another unit than metres.
+    comment_unit: Option<Wrong>,
+    notes: Vec<String>,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Separator {
-    Blank,
-    Mark(char),
+/// Numbers of points that stand before them: PTS has one before each scan.
+#[derive(Debug, Default)]
+struct Counts {
+    scans: u64,
+    announced: u64,
+    rows: u64,
 }
 
-impl Separator {
-    fn of(line: &str) -> Self {
-        [';', ','].into_iter().find(|mark| line.contains(*mark)).map_or(Self::Blank, Self::Mark)
+/// More lines of prose before the names of columns are an error.
+const MAX_LINES_BEFORE: u32 = 100;
+
+impl Counts {
+    /// Takes a line of one number, if a scan may begin here.
+    fn begin(&mut self, count: f64) -> bool {
+        let may_begin = self.scans == 0 || self.rows >= self.announced;
+        if may_begin {
+            self.scans += 1;
+            // What is no number of points announces none.
+            self.announced =
+                self.announced.saturating_add(if count.fract() == 0.0 { count as u64 } else { 0 });
+        }
+        may_begin
     }
 
-    /// Empty cells count, but not the one behind a last mark.
-    fn split(self, line: &str) -> Vec<&str> {
-        match self {
-            Self::Blank => line.split_ascii_whitespace().collect(),
-            Self::Mark(mark) => {
-                let line = line.trim();
-                line.strip_suffix(mark).unwrap_or(line).split(mark).map(str::trim).collect()
-            }
+    fn remark(&self) -> Option<String> {
+        let Self { scans, announced, rows } = self;
+        if *scans > 0 && announced != rows {
+            return Some(format!("announces {announced} points and has {rows}: is it cut off?"));
         }
+        (*scans > 1).then(|| format!("{scans} scans with a number of points each, read as one cloud"))
     }
 }
 
 impl Columns {
     /// Whether names were found.
     pub(super) fn are_named(&self) -> bool {
-        !self.names.is_empty()
+        self.are_named
+    }
+
+    /// Whether each cell of the first point is a number.
+    pub(super) fn are_numbers(&self) -> bool {
+        self.are_numbers
     }
 
     pub(super) fn meaning(&self) -> Option<&Meaning> {
         self.meaning.as_ref()
     }
 
+    /// What a person should know of the columns.
+    pub(super) fn remarks(&self) -> Vec<String> {
+        let units = self.meaning.as_ref().and_then(Meaning::remark);
+        self.notes.iter().cloned().chain(units).collect()
+    }
+
+    /// What a person should know at the end of the text.
+    pub(super) fn last_remark(&self) -> Option<String> {
+        self.counts.remark()
+    }
+
+    /// Why a text that ended without a point is none of points.
+    pub(super) fn why_none(&self) -> Option<Wrong> {
+        self.prose.clone().filter(|_| !self.are_named)
+    }
+
     /// Reads the next line.
-    pub(super) fn take(&mut self, line: &str) -> Result<Line, String> {
-        let line = line.trim();
-        if line.is_empty() {
-            return Ok(Line::Nothing);
+    pub(super) fn take(&mut self, number: u64, line: &str) -> Result<Line, Wrong> {
+        let text = line.trim();
+        if text.is_empty() {
+            // A row of empty cells may be nothing but tabs.
+            let is_row = self.has_points && self.separator == Separator::Mark('\t') && line.contains('\t');
+            return Ok(if is_row { self.row(line) } else { Line::Nothing });
         }
-        if let Some(comment) = line.strip_prefix("//").or_else(|| line.strip_prefix('#')) {
-            // Some programs write the names as a comment.
-            if !self.has_points && !self.are_named() {
-                self.take_names(comment);
+        if let Some(comment) = comment_of(text) {
+            if !self.has_points {
+                self.take_comment(number, comment).map_err(|reason| (number, reason))?;
             }
             return Ok(Line::Nothing);
         }
-        let separator = *self.separator.get_or_insert(Separator::of(line));
-        let words = separator.split(line);
-        if !self.has_points {
-            let are_numbers = words.iter().all(|word| word.is_empty() || number(word).is_some());
-            if !are_numbers {
-                if self.take_names(line) {
-                    self.separator = Some(Separator::of(line));
-                    return Ok(Line::Nothing);
+        if self.has_points {
+            return Ok(self.row(line));
+        }
+        if let Some(separator) = asked_separator(text).filter(|_| self.lines_before == 0) {
+            self.asked = Some(separator);
+            return Ok(Line::Nothing);
+        }
+        let found = self.begin(number, line).map_err(|reason| (number, reason))?;
+        self.lines_before += 1;
+        if found == Line::Nothing || self.are_named {
+            return Ok(found);
+        }
+        match self.prose.take() {
+            Some(prose) => Err(prose),
+            None => Ok(found),
+        }
+    }
+
+    /// Takes names of columns, which some programs write as a comment, and the unit that it speaks of.
+    fn take_comment(&mut self, number: u64, comment: &str) -> Result<(), String> {
+        if !self.are_named {
+            self.take_names(comment)?;
+        }
+        if unit_of_comment(comment).is_some() {
+            self.comment_unit.get_or_insert_with(|| (number, comment.trim().to_owned()));
+        }
+        Ok(())
+    }
+
+    /// Takes a line before the first point.
+    fn begin(&mut self, number: u64, line: &str) -> Result<Line, String> {
+        let separator = self.asked.unwrap_or_else(|| Separator::of_row(line, self.names.len()));
+        let cells = separator.split(line);
+        // PTS starts with the number of its points.
+        if let [only] = without_end(&cells)
+            && let Some(count) = separator.number(only)
+        {
+            return if self.counts.begin(count) { Ok(Line::Nothing) } else { Err(too_few(1)) };
+        }
+        if self.are_named {
+            return self.begin_named(separator, &cells, line);
+        }
+        let is_number = |cell: &&str| cell.is_empty() || separator.number(cell).is_some();
+        match cells.get(..3) {
+            Some(first) if first.iter().all(is_number) => self.begin_unnamed(separator, &cells),
+            _ if self.take_names(line)? => Ok(Line::Nothing),
+            _ if cells.iter().all(is_number) => Err(too_few(without_end(&cells).len())),
+            _ => {
+                let text = line.trim();
+                let reason = if text.get(..5).is_some_and(|start| start.eq_ignore_ascii_case("ncols")) {
+                    "this is a grid of heights (ESRI ASCII), not points: gdal_translate -of XYZ makes points of it".into()
+                } else {
+                    format!("`{text:.60}` is neither numbers nor names of columns with x, y and z")
+                };
+                if self.lines_before >= MAX_LINES_BEFORE {
+                    return Err(reason);
                 }
-                return Err(format!("`{line:.60}` is neither numbers nor names of columns with x, y and z"));
+                self.prose.get_or_insert((number, reason));
+                Ok(Line::Nothing)
             }
-            // PTS starts with the number of its points.
-            if words.len() == 1 && !self.has_count && !self.are_named() {
-                self.has_count = true;
-                self.separator = None;
-                return Ok(Line::Nothing);
-            }
-            if words.len() < 3 {
-                return Err(format!("{} columns; a point has x, y and z", words.len()));
-            }
-            let meaning = *self.meaning.get_or_insert_with(|| by_count(words.len()));
-            if !self.are_named() {
-                self.names = default_names(words.len(), &meaning);
-            }
-            self.has_points = true;
         }
-        self.point(&words).map(Line::Point)
+    }
+
+    fn begin_unnamed(&mut self, separator: Separator, cells: &[&str]) -> Result<Line, String> {
+        let columns = without_end(cells).len();
+        if columns == 0 {
+            // A row of no return says nothing of the columns.
+            let position_m = [f64::NAN; 3];
+            return Ok(Line::Point(CloudPoint { is_return: false, ..CloudPoint::hit(position_m) }));
+        }
+        if let Some(cell) = digits_behind_comma(separator, cells) {
+            return Err(ambiguous_commas(columns, &format!("`{cell:.20}` is the end of a number")));
+        }
+        let is_number = |cell: Option<&&str>| cell.is_some_and(|cell| separator.number(cell).is_some());
+        let mut meaning = Meaning::of_metres([0, 1, 2]);
+        // x y z, then the intensity, unless the three after them are a colour or a normal.
+        meaning.intensity = (columns > 3 && columns != 6 && is_number(cells.get(3))).then_some(3);
+        self.names = ["x", "y", "z"].map(str::to_owned).into();
+        self.names.extend(meaning.intensity.map(|_| "intensity".to_owned()));
+        if columns > 3 {
+            let rest = if columns > self.names.len() { ", the rest is not read" } else { "" };
+            self.notes.push(format!("{columns} columns without names: {}{rest}", self.names.join(" ")));
+        }
+        (self.separator, self.meaning) = (separator, Some(meaning));
+        self.are_numbers = without_end(cells).iter().all(|cell| cell.is_empty() || is_number(Some(cell)));
+        self.first_point(cells)
+    }
+
+    fn begin_named(&mut self, separator: Separator, cells: &[&str], line: &str) -> Result<Line, String> {
+        let Some(mut meaning) = self.meaning else { return Err("x, y and z are not known".into()) };
+        if let Some(units) = units_row(cells, &meaning) {
+            meaning.units = units;
+            self.meaning = Some(meaning);
+            return Ok(Line::Nothing);
+        }
+        self.separator = separator;
+        let columns = without_end(cells).len();
+        if separator == Separator::Mark(',') && columns == 2 * self.names.len() {
+            return Err(ambiguous_commas(columns, &format!("{} names of columns", self.names.len())));
+        }
+        let is_one_more = columns == self.names.len() + 1 && line.trim_start().starts_with('"');
+        self.unnamed = usize::from(is_one_more);
+        // What a point can do without may be words.
+        for at in meaning.intensity.into_iter().chain(meaning.time.map(|time| time.at)) {
+            let cell = cells.get(at + self.unnamed).copied().unwrap_or_default();
+            if cell.is_empty() || separator.number(cell).is_some() {
+                continue;
+            }
+            meaning.intensity = meaning.intensity.filter(|intensity| *intensity != at);
+            meaning.time = meaning.time.filter(|time| time.at != at);
+            let name = self.names.get(at).map(String::as_str).unwrap_or_default();
+            self.notes.push(format!("column `{name:.40}` has no numbers (`{cell:.20}`): not read"));
+        }
+        let before = self.meaning.replace(meaning);
+        match self.first_point(cells) {
+            Ok(point) => Ok(point),
+            Err(reason) => {
+                self.meaning = before;
+                self.notes.clear();
+                Ok(if self.take_names(line)? { Line::Nothing } else { Line::Unread(reason) })
+            }
+        }
+    }
+
+    fn first_point(&mut self, cells: &[&str]) -> Result<Line, String> {
+        let point = self.point(cells)?;
+        self.has_points = true;
+        self.counts.rows += 1;
+        if let (Some((line, comment)), Some(None)) = (&self.comment_unit, self.meaning().map(Meaning::remark))
+        {
+            self.notes.push(format!("line {line} says `{comment:.60}`, but coordinates are read as metres"));
+        }
+        Ok(Line::Point(point))
+    }
+
+    fn row(&mut self, line: &str) -> Line {
+        let cells = self.separator.split(line);
+        let reason = match self.point(&cells) {
+            Ok(point) => {
+                self.counts.rows += 1;
+                return Line::Point(point);
+            }
+            Err(reason) => reason,
+        };
+        if let [only] = without_end(&cells)
+            && self.counts.scans > 0
+            && let Some(count) = self.separator.number(only)
+            && self.counts.begin(count)
+        {
+            return Line::Nothing;
+        }
+        self.counts.rows += 1;
+        Line::Unread(reason)
     }
 
     /// Takes a line as names, if it has x, y and z.
-    fn take_names(&mut self, line: &str) -> bool {
-        let line = line.trim();
-        let words = Separator::of(line).split(line);
-        let names: Vec<String> = words.iter().map(|word| word.trim_matches('"').to_owned()).collect();
+    fn take_names(&mut self, line: &str) -> Result<bool, String> {
+        let names = names_of(line.trim());
         // Livox counts nanoseconds; that a column holds integers is not known before all of it is read.
         let is_integer =
             |at: usize| names.get(at).is_some_and(|name| name.eq_ignore_ascii_case("offset_time"));
-        let Some(meaning) = Meaning::of(&names, is_integer) else { return false };
-        self.names = names;
-        self.meaning = Some(meaning);
-        true
+        let Some(meaning) = Meaning::of(&names, is_integer)? else { return Ok(false) };
+        if are_poses(&names) {
+            self.notes
+                .push("has columns qx qy qz qw: if these are poses, give them with `poses` FILE".into());
+        }
+        (self.names, self.meaning, self.are_named) = (names, Some(meaning), true);
+        Ok(true)
     }
 
-    fn point(&mut self, words: &[&str]) -> Result<CloudPoint, String> {
+    fn point(&mut self, cells: &[&str]) -> Result<CloudPoint, String> {
         let Some(meaning) = self.meaning else { return Err("x, y and z are not known".into()) };
+        let (separator, unnamed) = (self.separator, self.unnamed);
         let value = |at: usize| -> Result<f64, String> {
-            match words.get(at) {
-                None => Err(format!("{} columns, {} are needed", words.len(), meaning.last() + 1)),
+            match cells.get(at + unnamed) {
+                None => Err(format!("{} columns, {} are needed", cells.len(), meaning.last() + unnamed + 1)),
                 Some(&"") => Ok(f64::NAN),
-                Some(word) => number(word).ok_or_else(|| format!("`{word:.40}` is not a number")),
+                Some(cell) => separator.number(cell).ok_or_else(|| format!("`{cell:.40}` is not a number")),
             }
         };
-        let mut values = vec![0.0; meaning.last() + 1];
-        let extra = meaning.intensity.into_iter().chain(meaning.time.map(|time| time.at));
-        for at in meaning.xyz.into_iter().chain(extra) {
-            if let Some(place) = values.get_mut(at) {
-                *place = value(at)?;
-            }
-        }
-        Ok(self.clock.point(&meaning, |at| values.get(at).copied().unwrap_or(f64::NAN)))
+        let [x, y, z] = meaning.xyz;
+        let xyz = [value(x)?, value(y)?, value(z)?];
+        let intensity = meaning.intensity.map(value).transpose()?;
+        let time = meaning.time.map(|time| value(time.at)).transpose()?;
+        Ok(self.clock.point_of(&meaning, xyz, intensity, time))
     }
 }
 
-/// Columns without names: x y z, then the intensity, unless the three after them are a colour or a normal.
-fn by_count(columns: usize) -> Meaning {
-    Meaning { xyz: [0, 1, 2], intensity: (columns > 3 && columns != 6).then_some(3), time: None }
+fn too_few(columns: usize) -> String {
+    format!("{columns} columns; a point has x, y and z")
 }
 
-fn default_names(columns: usize, meaning: &Meaning) -> Vec<String> {
-    let mut names: Vec<String> = ["x", "y", "z"].map(str::to_owned).into();
-    names.extend(meaning.intensity.map(|_| "intensity".to_owned()));
-    names.truncate(columns);
-    names
-}
-
-fn number(word: &str) -> Option<f64> {
-    // `infinity` and the like are names as well as numbers to Rust; points know `nan` and `inf`.
-    word.parse().ok()
+fn ambiguous_commas(cells: usize, why: &str) -> String {
+    format!(
+        "{cells} cells between commas, but {why}: decimal commas cannot be told from commas between cells; save it with \
+         semicolons or tabs, or with decimal points"
+    )
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn read(text: &str) -> Result<Vec<CloudPoint>, String> {
+    fn read_all(text: &str) -> Result<(Vec<CloudPoint>, Columns, Vec<String>), String> {
         let mut columns = Columns::default();
-        let mut points = Vec::new();
-        for line in text.lines() {
-            if let Line::Point(point) = columns.take(line)? {
-                points.push(point);
+        let (mut points, mut unread) = (Vec::new(), Vec::new());
+        for (number, line) in (1..).zip(text.lines()) {
+            match columns.take(number, line).map_err(|(line, reason)| format!("line {line}: {reason}"))? {
+                Line::Point(point) => points.push(point),
+                Line::Nothing => {}
+                Line::Unread(reason) => unread.push(format!("line {number}: {reason}")),
             }
         }
-        Ok(points)
+        if let (true, Some((line, reason))) = (points.is_empty(), columns.why_none()) {
+            return Err(format!("line {line}: {reason}"));
+        }
+        Ok((points, columns, unread))
+    }
+
+    fn read(text: &str) -> Result<Vec<CloudPoint>, String> {
+        let (points, _, unread) = read_all(text)?;
+        unread.into_iter().next().map_or(Ok(points), Err)
     }
 
     #[test]
@@ -172,6 +355,24 @@ mod tests {
             "\"z\";\"intensity\";\"y\";\"x\"\n3;7;2;1\n",
             "Points:0,Points:1,Points:2,Intensity\n1,2,3,7\n",
             "1\n1 2 3 7 255 0 0\n",
+            "//X;Y;Z;R;Intensity\n1\n1;2;3;255;7\n",
+            "\"intensity\",\"Points_m_XYZ:0\",\"Points_m_XYZ:1\",\"Points_m_XYZ:2\"\n7,1,2,3\n",
+            "sep=;\nx;y;z;i\n1,0;2,0;3,0;7\n",
+            "1,0 2,0 3,0 7,0\n",
+            "1,0\t2,0\t3,0\t7,0\n",
+            "\"1,0\",\"2,0\",\"3,0\",7\n",
+            "x|y|z|i\n1|2|3|7\n",
+            "| x | y | z | i |\n| 1 | 2 | 3 | 7 |\n",
+            "error,x,y,z,i\n0x0000,1,2,3,7\n",
+            "class\tx\ty\tz\ti\n\t1\t2\t3\t7\n",
+            "x y z i label\n1 2 3 7 building\n",
+            "1 2 3 7 building\n",
+            "Exported by hand\nX Y Z Intensity\n1 2 3 7\n",
+            "x,y,z,i\nmm,mm,mm,-\n1000,2000,3000,7\n",
+            "x (cm) y (cm) z (cm) i\n100 200 300 7\n",
+            "\"x\" \"y\" \"z\" \"i\"\n\"1\" 1 2 3 7\n",
+            "% x y z i\n1D0 2.0D+00 3 7\n",
+            "x,y,z,i\n1,2,3,7,,\n",
         ] {
             assert_eq!(read(text), Ok(vec![wanted]), "{text}");
         }
@@ -180,9 +381,12 @@ mod tests {
     #[test]
     fn a_colour_is_no_intensity_and_an_empty_cell_is_no_return() {
         assert_eq!(read("1 2 3 255 0 0"), Ok(vec![CloudPoint::hit([1.0, 2.0, 3.0])]));
-        let points = read("x,y,z,time\n,,,5\nnan,nan,nan,5").unwrap_or_default();
-        assert_eq!(points.iter().map(|point| point.is_return).collect::<Vec<_>>(), [false, false]);
+        let points = read("x,y,z,time\n,,,5\nnan,nan,nan,5\n,,,").unwrap_or_default();
+        assert_eq!(points.iter().map(|point| point.is_return).collect::<Vec<_>>(), [false; 3]);
         assert_eq!(points.first().map(|point| point.time_s), Some(5.0));
+        for text in ["x,y,z\n,,\n1,2,3\n", ",,\n1,2,3\n", "1,2,3\n,,\n", "x\ty\tz\n1\t2\t3\n\t\t\n"] {
+            assert_eq!(read(text).map(|points| points.len()), Ok(2), "{text}");
+        }
     }
 
     #[test]
@@ -193,16 +397,70 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_point_is_an_error() {
+    fn rows_that_are_no_points_are_left_out() {
         for (text, reason) in [
-            ("hello world", "neither numbers nor names"),
-            ("1 2", "2 columns"),
-            ("x y z intensity\n1 2 3", "3 columns, 4 are needed"),
-            ("1 2 3\n1 2 c", "`c` is not a number"),
-            ("1\n2\n3", "1 columns"),
+            ("x y z intensity\n1 2 3\n1 2 3 4", "line 2: 3 columns, 4 are needed"),
+            ("1 2 3\n1 2 c\n4 5 6", "line 2: `c` is not a number"),
+            ("x,y,z\n1,2,3\nx,y,z\n4,5,6", "line 3: `x` is not a number"),
+            ("1 2 3\n7\n4 5 6", "line 2: 1 columns, 3 are needed"),
+        ] {
+            let (points, _, unread) = read_all(text).unwrap_or_else(|error| panic!("{error}"));
+            assert_eq!(unread, [reason], "{text}");
+            assert_eq!(points.len(), text.lines().count() - 1 - usize::from(text.starts_with('x')), "{text}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_text_of_points_is_an_error_with_line_and_word() {
+        for (text, reason) in [
+            ("# a\nhello world", "line 2: `hello world` is neither numbers nor names"),
+            ("Exported\n1 2 3", "line 1: `Exported` is neither"),
+            ("1 2", "line 1: 2 columns; a point has x, y and z"),
+            ("1\n2\n3", "line 2: 1 columns"),
+            ("x (px),y (px),z (px)\n1,2,3", "line 1: column `x (px)`: `px` is no known unit"),
+            ("6,001,3,178,-1,000", "line 1: 6 cells between commas, but `001` is the end of a number"),
+            ("x,y,z\n6,5,3,5,1,5", "line 2: 6 cells between commas, but 3 names of columns"),
+            ("ncols 3\nnrows 2\n1 2 3", "line 1: this is a grid of heights"),
         ] {
             let error = read(text).unwrap_err();
             assert!(error.contains(reason), "{error}");
+        }
+    }
+
+    #[test]
+    fn guesses_are_said() {
+        for (text, remark) in [
+            ("1 2 3 7", "4 columns without names: x y z intensity"),
+            ("1 2 3 7 255 0 0", "7 columns without names: x y z intensity, the rest is not read"),
+            ("1 2 3 255 0 0", "6 columns without names: x y z, the rest is not read"),
+            ("# units: mm\n1 2 3", "line 1 says `units: mm`, but coordinates are read as metres"),
+            ("x,y,z,time\n1,2,3,12:05", "column `time` has no numbers (`12:05`): not read"),
+            ("t,x,y,z,qx,qy,qz,qw\n0,1,2,3,0,0,0,1", "if these are poses"),
+            ("x[mm] y[mm] z[mm]\n1 2 3", "x, y and z are in mm"),
+        ] {
+            let (_, columns, _) = read_all(text).unwrap_or_else(|error| panic!("{error}"));
+            let remarks = columns.remarks();
+            assert!(remarks.len() == 1 && remarks[0].contains(remark), "{text}: {remarks:?}");
+        }
+        for text in ["1 2 3", "x y z i\n1 2 3 4", "# units: m\n1 2 3", "#units: mm\nx_mm,y_mm,z_mm\n1,2,3"] {
+            let (_, columns, _) = read_all(text).unwrap_or_else(|error| panic!("{error}"));
+            assert!(columns.remarks().iter().all(|remark| remark.contains("are in mm")), "{text}");
+        }
+    }
+
+    #[test]
+    fn numbers_of_points_stand_before_each_scan() {
+        for (text, points, remark) in [
+            ("2\n1 2 3\n4 5 6\n", 2, None),
+            ("2\n1 2 3\n4 5 6\n1\n7 8 9\n", 3, Some("2 scans with a number of points each")),
+            ("0\n1\n1 2 3\n", 1, Some("2 scans")),
+            ("3\n1 2 3\n4 5 6\n", 2, Some("announces 3 points and has 2")),
+        ] {
+            let (found, columns, unread) = read_all(text).unwrap_or_else(|error| panic!("{error}"));
+            assert_eq!((found.len(), unread.len()), (points, 0), "{text}");
+            let said = columns.last_remark();
+            assert_eq!(said.is_some(), remark.is_some(), "{text}: {said:?}");
+            assert!(said.is_none_or(|said| said.contains(remark.unwrap_or_default())), "{text}");
         }
     }
 }

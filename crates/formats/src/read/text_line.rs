@@ -78,6 +78,19 @@ pub(crate) fn without_end<'c, 'l>(cells: &'c [&'l str]) -> &'c [&'l str] {
     cells.get(..end).unwrap_or(cells)
 }
 
+/// A cell between commas that is the fraction of a number with a decimal comma: `001` of `6,001,3,178`.
+pub(super) fn digits_behind_comma<'c>(separator: Separator, cells: &[&'c str]) -> Option<&'c str> {
+    let is_integer =
+        |cell: &str| !cell.is_empty() && cell.trim_start_matches('-').bytes().all(|b| b.is_ascii_digit());
+    let cells = without_end(cells);
+    if separator != Separator::Mark(',') || cells.len() % 2 != 0 || !cells.iter().all(|cell| is_integer(cell))
+    {
+        return None;
+    }
+    let is_fraction = |cell: &&&str| cell.len() > 1 && cell.starts_with('0');
+    cells.iter().skip(1).step_by(2).find(is_fraction).copied()
+}
+
 /// What a comment says; `None` of a line that is none.
 pub(crate) fn comment_of(line: &str) -> Option<&str> {
     let line = line.trim_start();
