@@ -18,7 +18,7 @@ impl Registry {
     /// It cannot be read; it is of no known format, or of one that must be converted first.
     pub fn guess(&self, path: &Path, not_clouds: &[PathBuf]) -> Result<&InputFormat> {
         let meta = std::fs::metadata(path).map_err(|error| match error.kind() {
-            ErrorKind::NotFound => argument(path, "there is no such file or folder"),
+            ErrorKind::NotFound => argument(path, why_missing(path)),
             _ => Error::io(path, "open", error),
         })?;
         if meta.is_dir() { self.guess_folder(path, not_clouds) } else { self.guess_file(path) }
@@ -29,6 +29,12 @@ impl Registry {
         let named = options.format.as_deref().map(|name| self.named(name)).transpose()?;
         let not_clouds = options.not_clouds();
         let inner = path.join("scans");
+        if named.is_some() && path.is_file() {
+            // What is packed is named, whatever it was called.
+            if let Some(archive) = foreign::archive_of(&first_bytes(path)?) {
+                return Err(archive.error(path));
+            }
+        }
         if !inner.is_dir() {
             return Ok((path.to_owned(), named.map_or_else(|| self.guess(path, &not_clouds), Ok)?));
         }
@@ -48,6 +54,7 @@ impl Registry {
 
     /// What starts with these bytes, if that tells it.
     pub(crate) fn of_start(&self, start: &[u8]) -> Option<&InputFormat> {
+        let start = foreign::without_mark(start);
         self.formats().iter().find(|format| match format.mark {
             Mark::Start(is_it) | Mark::StartOrName(is_it) => is_it(start),
             _ => false,
@@ -79,20 +86,26 @@ impl Registry {
         if let Some(foreign) = foreign::of_extension(&extension) {
             return Err(foreign.error(path));
         }
-        let looks = |format: &&InputFormat| matches!(format.mark, Mark::Look(is_it) if is_it(&start));
-        if let Some(alike) = self.formats().iter().find(looks) {
-            return Ok(alike);
+        let mut why_not = None;
+        for format in self.formats() {
+            let Mark::Look(check) = format.mark else { continue };
+            let is_named = format.has_extension(&extension);
+            match check(&start, is_named) {
+                Ok(()) => return Ok(format),
+                Err(reason) if is_named => why_not = Some((format.title, reason)),
+                Err(_) => {}
+            }
         }
-        Err(match (of(|mark| matches!(mark, Mark::Look(_))), of(|_| true)) {
-            (Some(_), _) => argument(
-                path,
-                "is no text of points: the first lines are neither three numbers and more, nor names with x, y and z",
-            ),
+        let beginning = foreign::beginning_of(&start);
+        Err(match (why_not, of(|_| true)) {
+            (Some((title, reason)), _) => argument(path, format!("is no {title}: {reason}")),
             (None, Some(_)) => argument(
                 path,
-                format!("is called .{extension}, but does not start like such a file: is it damaged?"),
+                format!(
+                    "is called .{extension}, but does not start like such a file: is it damaged?{beginning}"
+                ),
             ),
-            _ => argument(path, format!("is of no known format; known are {}", self.names(", "))),
+            _ => argument(path, format!("is of no known format{beginning}; known are {}", self.names(", "))),
         })
     }
 
@@ -121,6 +134,13 @@ impl Registry {
         let mut found = counts.values();
         match (found.next(), found.next()) {
             (Some((format, ..)), None) if matches!(format.open, Open::Folder(_)) => Ok(format),
+            (Some((format, ..)), None) if matches!(format.mark, Mark::Look(_)) => {
+                let texts = listing.texts(format);
+                match texts.clouds.first() {
+                    Some(file) => self.guess_file(file),
+                    None => Err(argument(path, listing.why_nothing(&self.names(", "), &texts.others))),
+                }
+            }
             // The first file tells LAS from LAZ, and is checked early.
             (Some((_, file, _)), None) => self.guess_file(file),
             (Some((one, _, count)), Some((other, _, others))) => {
@@ -130,7 +150,7 @@ impl Registry {
                 );
                 Err(argument(path, reason))
             }
-            (None, _) => Err(argument(path, listing.why_nothing(&self.names(", ")))),
+            (None, _) => Err(argument(path, listing.why_nothing(&self.names(", "), &[]))),
         }
     }
 
@@ -144,4 +164,15 @@ impl Registry {
 
 fn argument(path: &Path, reason: impl Into<String>) -> Error {
     Error::argument(path.display().to_string(), reason)
+}
+
+/// Why there is no file.
+fn why_missing(path: &Path) -> String {
+    match std::fs::read_link(path) {
+        Err(_) => "there is no such file or folder".to_owned(),
+        Ok(target) if target.to_string_lossy().contains(".git/annex/") => {
+            "is a link of git-annex to a file that is not here: fetch it with `git annex get`".to_owned()
+        }
+        Ok(target) => format!("is a link to {}, and there is no such file or folder", target.display()),
+    }
 }

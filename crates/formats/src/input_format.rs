@@ -3,7 +3,6 @@ use crate::read_options::ReadOptions;
 use crate::scans::ScanSource;
 use crate::{CloudHead, CloudSource};
 use std::path::Path;
-use voxtile::Result;
 
 /// A format of input: a row of the [`Registry`](crate::Registry).
 #[derive(Clone, Copy, Debug)]
@@ -57,18 +56,19 @@ pub enum Mark {
     Start(fn(&[u8]) -> bool),
     /// By its first bytes or, where they tell nothing, by its extension.
     StartOrName(fn(&[u8]) -> bool),
-    /// By what its first bytes look like, where nothing else tells.
-    Look(fn(&[u8]) -> bool),
+    /// By what its first bytes look like, where nothing else tells; the flag is whether its extension is one of the
+    /// format's. An error is why it is none.
+    Look(fn(&[u8], bool) -> Result<(), String>),
     /// Not by the file: folders are recognised, or the format is named.
     None,
 }
 
 /// Opens one cloud: what is known of it, begun by its file's name, and its points.
-pub type OpenCloud = fn(&Path, CloudHead, &ReadOptions) -> Result<(CloudHead, Box<dyn Points>)>;
+pub type OpenCloud = fn(&Path, CloudHead, &ReadOptions) -> voxtile::Result<(CloudHead, Box<dyn Points>)>;
 /// Opens clouds.
-pub type OpenClouds = fn(&Path, &ReadOptions) -> Result<Box<dyn CloudSource>>;
+pub type OpenClouds = fn(&Path, &ReadOptions) -> voxtile::Result<Box<dyn CloudSource>>;
 /// Opens scans.
-pub type OpenScans = fn(&Path, &ReadOptions) -> Result<Box<dyn ScanSource + Send>>;
+pub type OpenScans = fn(&Path, &ReadOptions) -> voxtile::Result<Box<dyn ScanSource + Send>>;
 
 /// How an input is opened.
 #[derive(Clone, Copy, Debug)]

@@ -1,5 +1,5 @@
 use crate::CloudSource;
-use crate::input_format::{InputFormat, Open};
+use crate::input_format::{InputFormat, Mark, Open};
 use crate::poses::PoseSource;
 use crate::poses::PosedClouds;
 use crate::poses::Rules;
@@ -113,7 +113,18 @@ fn check(options: &ReadOptions) -> Result<()> {
 }
 
 fn open_folder(path: &Path, format: InputFormat, options: &ReadOptions) -> Result<Box<dyn CloudSource>> {
-    let paths = Listing::read(path, &options.not_clouds())?.with_extension(&format);
+    let listing = Listing::read(path, &options.not_clouds())?;
+    let (paths, others) = match format.mark {
+        Mark::Look(_) => {
+            let texts = listing.texts(&format);
+            (texts.clouds, texts.others)
+        }
+        _ => (listing.with_extension(&format), Vec::new()),
+    };
+    if paths.is_empty() && !others.is_empty() {
+        let reason = listing.why_nothing(&format.extensions.join(", "), &others);
+        return Err(Error::argument(path.display().to_string(), reason));
+    }
     if paths.is_empty() {
         let reason = format!("no file in it ends with .{}", format.extensions.join(", ."));
         return Err(Error::argument(path.display().to_string(), reason));
@@ -125,7 +136,8 @@ fn open_folder(path: &Path, format: InputFormat, options: &ReadOptions) -> Resul
         check_regular(path)?;
         open_file(path, &format, &options)
     });
-    Ok(Box::new(Files::new(name, paths, is_one_each, open)))
+    let others = others.into_iter().map(|other| format!("{other} is no cloud, left out"));
+    Ok(Box::new(Files::new(name, paths, is_one_each, open).with_remarks(others.collect())))
 }
 
 fn open_file(path: &Path, format: &InputFormat, options: &ReadOptions) -> Result<Box<dyn CloudSource>> {

@@ -21,9 +21,7 @@ const FORMATS: [InputFormat; 17] = [
         name: "pcd",
         title: "PCD",
         extensions: &["pcd"],
-        mark: Mark::StartOrName(|start| {
-            [&b"# .PCD"[..], b"VERSION ", b"# .pcd"].iter().any(|magic| start.starts_with(magic))
-        }),
+        mark: Mark::StartOrName(read::pcd_header::is_start),
         is_folder: pcd_scans::is_folder,
         open: Open::Scans(pcd_scans::open),
         ..InputFormat::UNNAMED
@@ -32,7 +30,7 @@ const FORMATS: [InputFormat; 17] = [
         name: "ply",
         title: "PLY",
         extensions: &["ply"],
-        mark: Mark::Start(|start| start.starts_with(b"ply\n") || start.starts_with(b"ply\r")),
+        mark: Mark::Start(read::ply_header::is_start),
         open: Open::Stream(read::ply::open),
         ..InputFormat::UNNAMED
     },
@@ -41,7 +39,7 @@ const FORMATS: [InputFormat; 17] = [
         aliases: &["txt", "csv", "pts", "asc"],
         title: "text of points",
         extensions: &["xyz", "txt", "csv", "pts", "asc", "xyzi", "tsv"],
-        mark: Mark::Look(read::text::looks_like_points),
+        mark: Mark::Look(read::text::check_start),
         is_aside: true,
         open: Open::Stream(read::text::open),
         ..InputFormat::UNNAMED

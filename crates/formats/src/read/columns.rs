@@ -145,10 +145,20 @@ impl Meaning {
         Some(format!("coordinates become metres: {units}, by the names of their columns"))
     }
 
+    /// The columns that are read.
+    fn all(&self) -> impl Iterator<Item = usize> {
+        let more = self.intensity.into_iter().chain(self.time.map(|time| time.at));
+        self.xyz.into_iter().chain(more)
+    }
+
+    /// Whether a column is read.
+    pub(super) fn reads(&self, at: usize) -> bool {
+        self.all().any(|column| column == at)
+    }
+
     /// The last column that is needed.
     pub(super) fn last(&self) -> usize {
-        let more = self.intensity.into_iter().chain(self.time.map(|time| time.at));
-        self.xyz.into_iter().chain(more).max().unwrap_or(0)
+        self.all().max().unwrap_or(0)
     }
 }
 

@@ -27,7 +27,7 @@ const UNPACK: &str = "unpack it and give the files inside";
 const PACKETS: &str =
     "let the sensor's own tool (or its ROS driver) make clouds of it: PCD, PLY, .bag or .mcap";
 
-const FOREIGN: [Foreign; 19] = [
+const FOREIGN: [Foreign; 27] = [
     Foreign {
         name: "a network capture",
         magic: &[
@@ -60,19 +60,24 @@ const FOREIGN: [Foreign; 19] = [
         way: "give the folder of 16-bit depth PNGs that it is in",
     },
     Foreign {
-        name: "an archive or a packed file",
-        magic: &[
-            b"PK\x03\x04",
-            b"\x1f\x8b",
-            b"\x28\xb5\x2f\xfd",
-            b"BZh",
-            b"7z\xbc\xaf",
-            b"\xfd7zXZ\0",
-            b"Rar!",
-        ],
-        extensions: &["zip", "gz", "zst", "bz2", "7z", "xz", "tar", "npz"],
+        name: "a ZIP archive",
+        magic: &[b"PK\x03\x04", b"PK\x05\x06"],
+        extensions: &["zip", "npz"],
         way: UNPACK,
     },
+    Foreign { name: "packed with gzip", magic: &[b"\x1f\x8b\x08"], extensions: &["gz", "tgz"], way: UNPACK },
+    Foreign {
+        name: "packed with Zstandard",
+        magic: &[b"\x28\xb5\x2f\xfd"],
+        extensions: &["zst"],
+        way: UNPACK,
+    },
+    Foreign { name: "packed with bzip2", magic: &[b"BZh"], extensions: &["bz2"], way: UNPACK },
+    Foreign { name: "packed with xz", magic: &[b"\xfd7zXZ\0"], extensions: &["xz"], way: UNPACK },
+    Foreign { name: "packed with LZ4", magic: &[b"\x04\x22\x4d\x18"], extensions: &["lz4"], way: UNPACK },
+    Foreign { name: "a 7z archive", magic: &[b"7z\xbc\xaf\x27\x1c"], extensions: &["7z"], way: UNPACK },
+    Foreign { name: "a RAR archive", magic: &[b"Rar!"], extensions: &["rar"], way: UNPACK },
+    Foreign { name: "a tar archive", magic: &[], extensions: &["tar"], way: UNPACK },
     Foreign { name: "a mesh (OBJ)", magic: &[], extensions: &["obj"], way: TO_CLOUD },
     Foreign { name: "a mesh (STL)", magic: &[b"solid "], extensions: &["stl"], way: TO_CLOUD },
     Foreign { name: "a mesh (OFF)", magic: &[b"OFF\n", b"COFF"], extensions: &["off"], way: TO_CLOUD },
@@ -132,7 +137,15 @@ const FOREIGN: [Foreign; 19] = [
 
 /// The foreign format that starts with these bytes.
 pub(crate) fn of_bytes(start: &[u8]) -> Option<&'static Foreign> {
+    if start.get(257..262) == Some(b"ustar") {
+        return of_extension("tar");
+    }
     FOREIGN.iter().find(|foreign| foreign.magic.iter().any(|magic| start.starts_with(magic)))
+}
+
+/// The archive that starts with these bytes, whatever its name.
+pub(crate) fn archive_of(start: &[u8]) -> Option<&'static Foreign> {
+    of_bytes(start).filter(|foreign| foreign.way == UNPACK)
 }
 
 /// The foreign format with this ending, in lower case.
@@ -182,4 +195,57 @@ pub(crate) const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 /// The bytes behind a byte order mark, if there is one.
 pub(crate) fn without_mark(start: &[u8]) -> &[u8] {
     start.strip_prefix(BYTE_ORDER_MARK).unwrap_or(start)
+}
+
+/// How a file starts that is not what its name says.
+pub(crate) fn beginning_of(start: &[u8]) -> String {
+    let line = start.split(|byte| matches!(byte, b'\n' | b'\r')).next().unwrap_or_default().trim_ascii();
+    let is_text = !line.is_empty() && line.iter().all(|byte| byte.is_ascii_graphic() || *byte == b' ');
+    if is_text {
+        return format!("; it starts with `{:.60}`", String::from_utf8_lossy(line));
+    }
+    let are_zeros = !start.is_empty() && start.iter().all(|byte| *byte == 0);
+    if are_zeros {
+        "; it starts with zeros: was a copy or a download cut off?".to_owned()
+    } else {
+        String::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_stands_for_a_file_is_named() {
+        for (start, what) in [
+            (&b"version https://git-lfs.github.com/spec/v1\noid sha256:0\n"[..], "git lfs pull"),
+            (b"version https://hawser.github.com/spec/v1\n", "git lfs pull"),
+            (b"/annex/objects/SHA256E-s1--0\n", "git annex get"),
+            (b"\xef\xbb\xbf\r\n<!DOCTYPE HTML><html>", "is a page of HTML"),
+            (b"<html lang=\"en\">", "is a page of HTML"),
+            (b"<?xml version=\"1.0\"?><Error>", "is XML"),
+        ] {
+            assert!(stand_in(start).is_some_and(|found| found.contains(what)), "{what}");
+        }
+        for start in [&b"version 0.7\n"[..], b"<", b"", b"1 2 3", b"VERSION .7\nFIELDS x y z\n"] {
+            assert_eq!(stand_in(start), None);
+        }
+    }
+
+    #[test]
+    fn archives_are_named_one_by_one() {
+        let tar = [&[b'a'; 257][..], b"ustar\x0000"].concat();
+        for (start, name) in [
+            (&b"PK\x03\x04"[..], "ZIP"),
+            (b"\x1f\x8b\x08\0", "gzip"),
+            (b"7z\xbc\xaf\x27\x1c", "7z"),
+            (b"BZh91AY", "bzip2"),
+            (&tar, "tar"),
+        ] {
+            assert!(archive_of(start).is_some_and(|found| found.name.contains(name)), "{name}");
+        }
+        assert!(archive_of(b"\x89HDF\r\n\x1a\n").is_none());
+        assert!(archive_of(b"\x1f\x8b\x23\x41").is_none(), "a float");
+    }
 }

@@ -1,5 +1,5 @@
+use super::input_file::open_input;
 use super::regular::check_regular;
-use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 use voxtile::{Error, Result};
@@ -11,8 +11,7 @@ pub(super) const GLANCE_BYTES: u64 = 1 << 13;
 pub(crate) fn first_bytes(path: &Path) -> Result<Vec<u8>> {
     check_regular(path)?;
     let mut start = Vec::new();
-    File::open(path)
-        .and_then(|file| file.take(GLANCE_BYTES).read_to_end(&mut start))
-        .map_err(|error| Error::io(path, "read", error))?;
+    let read = open_input(path)?.take(GLANCE_BYTES).read_to_end(&mut start);
+    read.map_err(|error| Error::io(path, "read", error))?;
     Ok(start)
 }

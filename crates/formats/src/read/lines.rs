@@ -139,6 +139,11 @@ impl Lines {
         self.lines.pass_rest().map_err(|error| Error::io(&self.path, "read", error))
     }
 
+    /// The number of the line that was read last.
+    pub(crate) fn number(&self) -> u64 {
+        self.number
+    }
+
     /// An error of the line that was read last.
     pub(crate) fn error(&self, reason: impl Into<String>) -> Error {
         self.error_at(self.number, reason)

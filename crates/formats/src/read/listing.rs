@@ -1,3 +1,4 @@
+use super::aside::{self, Texts};
 use super::foreign;
 use super::intrinsics::Intrinsics;
 use crate::input_format::InputFormat;
@@ -11,22 +12,6 @@ pub(crate) struct Listing {
     files: Vec<PathBuf>,
     folders: Vec<PathBuf>,
 }
-
-/// Names, without their ends, of texts that lie beside clouds and are none: poses, times, cameras.
-const BESIDE_CLOUDS: [&str; 12] = [
-    "calib",
-    "camera-intrinsics",
-    "depth",
-    "groundtruth",
-    "intrinsics",
-    "odometry",
-    "poses",
-    "poses_kitti",
-    "poses_tum",
-    "readme",
-    "rgb",
-    "times",
-];
 
 /// How much of a `metadata.yaml` is read to see whether it is rosbag2's.
 const MARK_WITHIN_BYTES: u64 = 1 << 20;
@@ -60,7 +45,7 @@ impl Listing {
 
     /// The files that may be clouds by their names.
     pub(crate) fn clouds(&self) -> impl Iterator<Item = &PathBuf> {
-        self.files.iter().filter(|path| !is_beside_clouds(path))
+        self.files.iter().filter(|path| !aside::is_surely_named(path))
     }
 
     /// The files of a format.
@@ -68,13 +53,21 @@ impl Listing {
         self.clouds().filter(|path| format.has_extension(&extension_of(path))).cloned().collect()
     }
 
+    /// The files of a format of text, without those that are no clouds: lists, logs and cameras lie among texts.
+    pub(crate) fn texts(&self, format: &InputFormat) -> Texts {
+        aside::sort_out(self.with_extension(format))
+    }
+
     /// Whether there are pictures that say that they are depths, or a camera.
     pub(crate) fn has_depths(&self) -> bool {
         self.files.iter().any(|path| is_named_depth(path)) || Intrinsics::is_in(&self.files)
     }
 
-    /// Why a folder has no clouds, and where they may be.
-    pub(crate) fn why_nothing(&self, known: &str) -> String {
+    /// Why a folder has no clouds, and where they may be; `others` says what its texts are.
+    pub(crate) fn why_nothing(&self, known: &str, others: &[String]) -> String {
+        if let Some(list) = self.files.iter().find_map(|path| aside::depth_list_of(path)) {
+            return list;
+        }
         let foreign = self.files.iter().find_map(|path| {
             let known = foreign::of_extension(&extension_of(path))?;
             Some(known.error(path))
@@ -90,7 +83,10 @@ impl Listing {
         } else {
             format!("; is one of its folders meant ({})?", names.join(", "))
         };
-        format!("no file of a known format ({}){hint}", known)
+        if others.is_empty() {
+            return format!("no file of a known format ({known}){hint}");
+        }
+        format!("no file in it is a cloud: {}{hint}", others.join(", "))
     }
 }
 
@@ -116,10 +112,4 @@ fn place_of(entry: &DirEntry, folder: &Path) -> PathBuf {
 
 pub(super) fn is_named_depth(path: &Path) -> bool {
     path.to_string_lossy().to_lowercase().ends_with(".depth.png")
-}
-
-/// Whether a file is a text beside clouds, by its name.
-fn is_beside_clouds(path: &Path) -> bool {
-    let stem = path.file_stem().map(|stem| stem.to_string_lossy().to_lowercase()).unwrap_or_default();
-    BESIDE_CLOUDS.contains(&stem.as_str())
 }

@@ -3,6 +3,7 @@
 //! Each format is a [`CloudSource`]: files with one cloud (PLY, text, `.bin`), with several (LAS cut by
 //! GPS time, E57), and folders of either.
 
+mod aside;
 pub(crate) mod bin;
 pub(crate) mod cloud;
 mod columns;
@@ -47,10 +48,11 @@ mod left_out;
 mod lzf;
 pub(crate) mod one;
 mod pcd;
-mod pcd_header;
+pub(crate) mod pcd_header;
 pub(crate) mod pcd_scans;
 pub(crate) mod ply;
-mod ply_header;
+pub(crate) mod ply_header;
+mod ply_rows;
 mod points;
 pub(crate) mod regular;
 mod scalar;

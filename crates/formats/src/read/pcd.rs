@@ -1,10 +1,14 @@
+use super::columns::Meaning;
+use super::input_file::open_input;
+use super::left_out::LeftOut;
+use super::lines::{Extent, RawLines};
 use super::lzf;
 use super::one::{Points, Visit};
 use super::pcd_header::{Encoding, Header, MAX_HEADER_BYTES};
 use super::regular::check_regular;
+use super::text_line;
 use crate::scans::SensorScan;
 use crate::{Budget, CloudHead, CloudPoint, RigidPose};
-use std::fs::File;
 use std::io::{self, BufRead, BufReader, Cursor, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use voxtile::scan::Pose;
@@ -12,7 +16,7 @@ use voxtile::{Error, FormatError, Result};
 use voxtile_scratch::ScratchFile;
 
 /// A longer line is an error.
-const MAX_LINE_BYTES: u64 = 1 << 20;
+const MAX_LINE_BYTES: usize = 1 << 20;
 /// Bytes that are read at a time.
 const BYTES_AT_A_TIME: usize = 1 << 16;
 /// Bytes of one field that are read at a time.
@@ -26,7 +30,7 @@ const MAX_FIELD_BYTES: usize = 1 << 20;
 /// An invalid header (with the line), points that are missing or not numbers.
 pub fn read_pcd(file: &[u8]) -> Result<SensorScan> {
     let (path, head) = (Path::new("PCD"), CloudHead::default());
-    let (head, mut pcd) = begin(path, head, Cursor::new(file), file.len() as u64, &Budget::default())?;
+    let (head, mut pcd) = begin(path, head, Cursor::new(file), file.len() as u64, &Budget::default(), true)?;
     let (mut points_in_sensor, mut intensities) = (Vec::new(), head.has_intensities.then(Vec::new));
     pcd.visit(&mut |point| {
         points_in_sensor.push(point.position_m);
@@ -38,16 +42,22 @@ pub fn read_pcd(file: &[u8]) -> Result<SensorScan> {
     Ok(SensorScan { name: head.name, points_in_sensor, intensities, world_from_sensor })
 }
 
-/// Opens a PCD file and reads its header, which may have a `VIEWPOINT`.
-pub(super) fn open(path: &Path, head: CloudHead, budget: &Budget) -> Result<(CloudHead, Box<dyn Points>)> {
+/// Opens a PCD file and reads its header, which may have a `VIEWPOINT`. One that is none is an error only if it is
+/// needed.
+pub(super) fn open(
+    path: &Path,
+    head: CloudHead,
+    budget: &Budget,
+    is_pose_needed: bool,
+) -> Result<(CloudHead, Box<dyn Points>)> {
     check_regular(path)?;
-    let open = || {
-        let file = File::open(path)?;
-        let bytes = file.metadata()?.len();
-        Ok((BufReader::with_capacity(1 << 16, file), bytes))
-    };
-    let (input, bytes) = open().map_err(|error| Error::io(path, "read", error))?;
-    let (head, points) = begin(path, head, input, bytes, budget)?;
+    let file = open_input(path)?;
+    let bytes = file.metadata().map_err(|error| Error::io(path, "read", error))?.len();
+    if bytes == 0 {
+        return Err(Error::argument(path.display().to_string(), "the file is empty"));
+    }
+    let input = BufReader::with_capacity(1 << 16, file);
+    let (head, points) = begin(path, head, input, bytes, budget, is_pose_needed)?;
     Ok((head, Box::new(points)))
 }
 
@@ -60,6 +70,7 @@ struct PcdPoints<R> {
     file_bytes: u64,
     /// For what is unpacked.
     budget: Budget,
+    left_out: LeftOut,
 }
 
 /// Reads the header, and moves to the points.
@@ -69,23 +80,31 @@ fn begin<R: BufRead + Seek>(
     mut input: R,
     file_bytes: u64,
     budget: &Budget,
+    is_pose_needed: bool,
 ) -> Result<(CloudHead, PcdPoints<R>)> {
     let cannot = |error| Error::io(path, "read", error);
     let mut start = Vec::new();
     (&mut input).take(MAX_HEADER_BYTES as u64).read_to_end(&mut start).map_err(cannot)?;
     let parsed = Header::parse(&start).and_then(|header| Ok((Columns::of(&header)?, header)));
-    let (columns, header) = parsed.map_err(|error| error.in_input(path))?;
+    let (columns, mut header) = parsed.map_err(|error| error.in_input(path))?;
     input.seek(SeekFrom::Start(header.data_at as u64)).map_err(cannot)?;
     head.points = Some(header.points as u64);
     head.has_intensities = columns.intensity.is_some();
-    head.world_from_sensor = header.world_from_sensor;
-    let (path, budget) = (path.to_owned(), budget.clone());
-    Ok((head, PcdPoints { path, header, columns, input, file_bytes, budget }))
+    head.world_from_sensor = match std::mem::replace(&mut header.world_from_sensor, Ok(None)) {
+        Err(error) if is_pose_needed => return Err(error.in_input(path)),
+        pose => pose.unwrap_or_default(),
+    };
+    let (path, budget, left_out) = (path.to_owned(), budget.clone(), LeftOut::default());
+    Ok((head, PcdPoints { path, header, columns, input, file_bytes, budget, left_out }))
 }
 
 impl<R: BufRead + Seek + Send> Points for PcdPoints<R> {
     fn read(&mut self, visit: Visit<'_>) -> Result<()> {
         self.visit(visit)
+    }
+
+    fn remarks(&self) -> Vec<String> {
+        self.columns.meaning.remark().into_iter().chain(self.left_out.remark()).collect()
     }
 }
 
@@ -99,47 +118,59 @@ impl<R: BufRead> PcdPoints<R> {
     }
 
     fn visit_ascii(&mut self, visit: Visit<'_>) -> Result<()> {
-        let Self { path, header, columns, input, .. } = self;
+        let Self { path, header, columns, input, left_out, .. } = self;
         let wrong = |line: u64, reason: String| FormatError::at_line(line, reason).in_input(path);
-        let mut number = header.data_line;
-        let mut line = Vec::new();
+        let mut lines = RawLines::new(input, MAX_LINE_BYTES);
+        let (mut number, mut visited) = (header.data_line, 0_u64);
+        let last = columns.all().map(|column| &header.fields[column]).max_by_key(|field| field.first_value);
         for done in 0..header.points {
             loop {
-                line.clear();
                 number += 1;
-                let read = (&mut *input).take(MAX_LINE_BYTES).read_until(b'\n', &mut line);
-                let read = read.map_err(|error| Error::io(path, "read", error))?;
-                if read == 0 {
-                    let reason = format!("the file ends after {done} of {} points", header.points);
-                    return Err(wrong(header.data_line + done as u64, reason));
-                }
-                if read as u64 == MAX_LINE_BYTES {
-                    return Err(wrong(number, "the line is too long for a PCD file".into()));
-                }
-                if !line.trim_ascii().is_empty() {
-                    break;
+                match lines.next().map_err(|error| Error::io(path, "read", error))? {
+                    None => {
+                        let reason = format!("the file ends after {done} of {} points", header.points);
+                        return Err(wrong(header.data_line + done as u64, reason));
+                    }
+                    Some(Extent::Start) => {
+                        return Err(wrong(number, "the line is too long for a PCD file".into()));
+                    }
+                    Some(Extent::Whole) if !lines.line().trim_ascii().is_empty() => break,
+                    Some(Extent::Whole) => {}
                 }
             }
-            let text = String::from_utf8_lossy(&line);
+            let text = String::from_utf8_lossy(lines.line());
             let words: Vec<&str> = text.split_ascii_whitespace().collect();
-            let value = |column: usize| -> Result<f64> {
+            // A row that is too short is damage; a word is a value that is not known.
+            if let Some(field) = last.filter(|field| words.len() <= field.first_value) {
+                return Err(wrong(
+                    number,
+                    format!("{} values; field {} is missing", words.len(), field.name),
+                ));
+            }
+            let value = |column: usize| {
                 let field = &header.fields[column];
-                let word = words.get(field.first_value).ok_or_else(|| {
-                    wrong(number, format!("{} values; field {} is missing", words.len(), field.name))
-                })?;
+                let word = words.get(field.first_value).copied().unwrap_or_default();
                 // A number of a four-byte field is rounded to it, as in the binary encodings.
                 let parsed = match (field.kind, field.size) {
                     (b'F', 4) => word.parse::<f32>().map(f64::from),
                     _ => word.parse(),
                 };
-                parsed.map_err(|_| wrong(number, format!("`{word}` is not a number")))
+                let other =
+                    |_| text_line::number(word).ok_or_else(|| format!("`{word:.40}` is not a number"));
+                parsed.or_else(other)
             };
-            let [x, y, z] = columns.xyz;
-            let position_m = [value(x)?, value(y)?, value(z)?];
-            let intensity = columns.intensity.map(value).transpose()?.unwrap_or_default() as f32;
-            visit(CloudPoint { intensity, ..CloudPoint::hit(position_m) })?;
+            match columns.point(value) {
+                Ok(point) => {
+                    visited += 1;
+                    visit(point)?;
+                }
+                Err(reason) => left_out.add(number, reason),
+            }
         }
-        Ok(())
+        match left_out.error() {
+            Some(error) if visited == 0 => Err(error.in_input(path)),
+            _ => Ok(()),
+        }
     }
 
     /// Points one after the other.
@@ -162,8 +193,9 @@ impl<R: BufRead> PcdPoints<R> {
                     let field = &header.fields[column];
                     number(field.kind, &record[field.offset..field.offset + field.size])
                 };
-                let intensity = columns.intensity.map_or(0.0, value) as f32;
-                visit(CloudPoint { intensity, ..CloudPoint::hit(columns.xyz.map(value)) })?;
+                visit(
+                    columns.point_of(columns.meaning.xyz.map(value), columns.meaning.intensity.map(value)),
+                )?;
             }
         }
         Ok(())
@@ -207,7 +239,7 @@ impl<R: BufRead> PcdPoints<R> {
         if !is_whole.map_err(cannot)? {
             return Err(wrong("the packed data is damaged".into()));
         }
-        let wanted: Vec<usize> = columns.xyz.into_iter().chain(columns.intensity).collect();
+        let wanted: Vec<usize> = columns.all().collect();
         let strides = wanted.iter().map(|&column| header.fields[column].size * header.fields[column].count);
         let at_a_time = (MAX_FIELD_BYTES / strides.max().unwrap_or(1)).clamp(1, BYTES_AT_A_TIME / 8);
         let mut values = vec![Vec::new(); wanted.len()];
@@ -217,9 +249,8 @@ impl<R: BufRead> PcdPoints<R> {
                 fields.read(header, column, first, count, values).map_err(cannot)?;
             }
             for k in 0..count {
-                let intensity = values.get(3).map_or(0.0, |values| values[k]) as f32;
-                let position_m = std::array::from_fn(|axis| values[axis][k]);
-                visit(CloudPoint { intensity, ..CloudPoint::hit(position_m) })?;
+                let intensity = values.get(3).map(|values| values[k]);
+                visit(columns.point_of(std::array::from_fn(|axis| values[axis][k]), intensity))?;
             }
         }
         Ok(())
@@ -228,8 +259,7 @@ impl<R: BufRead> PcdPoints<R> {
 
 /// Which fields are read.
 struct Columns {
-    xyz: [usize; 3],
-    intensity: Option<usize>,
+    meaning: Meaning,
 }
 
 const INTENSITY_NAMES: [&str; 4] = ["intensity", "Intensity", "i", "reflectivity"];
@@ -237,13 +267,46 @@ const INTENSITY_NAMES: [&str; 4] = ["intensity", "Intensity", "i", "reflectivity
 impl Columns {
     fn of(header: &Header) -> std::result::Result<Self, FormatError> {
         let find = |name: &str| header.fields.iter().position(|field| field.name == name && field.count > 0);
-        let need = |name: &str| {
-            find(name).ok_or_else(|| {
-                FormatError::at_line(header.data_line, format!("the points have no field {name}"))
-            })
+        if let (Some(x), Some(y), Some(z)) = (find("x"), find("y"), find("z")) {
+            let mut meaning = Meaning::of_metres([x, y, z]);
+            meaning.intensity = INTENSITY_NAMES.iter().find_map(|name| find(name));
+            return Ok(Self { meaning });
+        }
+        // As tables have them: in letters of either case, with units.
+        let names: Vec<String> = header.fields.iter().map(|field| field.name.clone()).collect();
+        let meaning = Meaning::of(&names, |_| false);
+        let meaning = meaning.map_err(|reason| FormatError::at_line(header.data_line, reason))?;
+        let is_there = |meaning: &Meaning| meaning.xyz.iter().all(|at| header.fields[*at].count > 0);
+        let Some(mut meaning) = meaning.filter(is_there) else {
+            let axes = ["x", "y", "z"].into_iter().filter(|axis| find(axis).is_none());
+            let missing = axes.collect::<Vec<_>>().join(", ");
+            let names = names.join(" ");
+            let reason = format!("the points have no field {missing}; their fields are `{names:.200}`");
+            return Err(FormatError::at_line(header.data_line, reason));
         };
-        let intensity = INTENSITY_NAMES.iter().find_map(|name| find(name));
-        Ok(Self { xyz: [need("x")?, need("y")?, need("z")?], intensity })
+        meaning.intensity = meaning.intensity.filter(|at| header.fields[*at].count > 0);
+        Ok(Self { meaning })
+    }
+
+    /// The fields that are read: x, y, z, and the intensity if there is one.
+    fn all(&self) -> impl Iterator<Item = usize> {
+        self.meaning.xyz.into_iter().chain(self.meaning.intensity)
+    }
+
+    fn point<E>(
+        &self,
+        value: impl Fn(usize) -> std::result::Result<f64, E>,
+    ) -> std::result::Result<CloudPoint, E> {
+        let [x, y, z] = self.meaning.xyz;
+        let intensity = self.meaning.intensity.map(&value).transpose()?;
+        Ok(self.point_of([value(x)?, value(y)?, value(z)?], intensity))
+    }
+
+    /// The point of these values. It counts as hit also where they are no numbers.
+    fn point_of(&self, [x, y, z]: [f64; 3], intensity: Option<f64>) -> CloudPoint {
+        let [in_x, in_y, in_z] = self.meaning.units;
+        let position_m = [in_x.metres(x), in_y.metres(y), in_z.metres(z)];
+        CloudPoint { intensity: intensity.unwrap_or_default() as f32, ..CloudPoint::hit(position_m) }
     }
 }
 

@@ -1,3 +1,4 @@
+use super::foreign::without_mark;
 use crate::RigidPose;
 use voxtile::FormatError;
 use voxtile::scan::Pose;
@@ -31,8 +32,8 @@ pub(super) struct Header {
     pub(super) points: usize,
     pub(super) point_bytes: usize,
     pub(super) encoding: Encoding,
-    /// The `VIEWPOINT`, as it is written.
-    pub(super) world_from_sensor: Option<RigidPose>,
+    /// The `VIEWPOINT`, as it is written; zeros alone are none.
+    pub(super) world_from_sensor: Result<Option<RigidPose>>,
     pub(super) data_at: usize,
     pub(super) data_line: u64,
 }
@@ -57,6 +58,22 @@ const KEYS: [&str; 11] = [
     "DATA",
 ];
 
+/// Whether a file starts as PCD does: with comments, then a first key, in letters of either case.
+pub(crate) fn is_start(start: &[u8]) -> bool {
+    let text = String::from_utf8_lossy(start);
+    let is_comment = |line: &&str| line.is_empty() || (line.starts_with('#') && !is_magic(line));
+    let first = text.split(['\n', '\r']).map(str::trim).find(|line| !is_comment(line)).unwrap_or_default();
+    let mut words = first.split_ascii_whitespace();
+    let key = words.next().unwrap_or_default().to_ascii_uppercase();
+    is_magic(first)
+        || matches!(key.as_str(), "FIELDS" | "COLUMNS") && words.clone().next().is_some()
+        || key == "VERSION" && words.next().is_some_and(|number| number.parse::<f32>().is_ok())
+}
+
+fn is_magic(line: &str) -> bool {
+    line.get(..6).is_some_and(|start| start.eq_ignore_ascii_case("# .PCD"))
+}
+
 impl Header {
     /// Parses the header at the start of a file.
     ///
@@ -65,19 +82,24 @@ impl Header {
     /// An invalid header, with the line.
     pub(super) fn parse(file: &[u8]) -> Result<Self> {
         let mut entries: Vec<(String, Vec<String>, u64)> = Vec::new();
-        let (mut at, mut line_number) = (0, 0);
+        let (mut at, mut line_number) = (file.len() - without_mark(file).len(), 0);
+        let end = line_end(file);
         loop {
             line_number += 1;
-            let Some(length) = file[at..].iter().position(|&byte| byte == b'\n') else {
+            let Some(length) = file[at..].iter().position(|&byte| byte == end) else {
                 let reason = "the header ends without a line DATA; this is no PCD file";
                 return Err(FormatError::at_line(line_number, reason));
             };
             let line = String::from_utf8_lossy(&file[at..at + length]).into_owned();
             at += length + 1;
             let mut words = line.split_ascii_whitespace().map(str::to_owned);
-            let Some(key) = words.next().filter(|key| !key.starts_with('#')) else { continue };
+            let Some(word) = words.next().filter(|key| !key.starts_with('#')) else { continue };
+            let key = word.to_ascii_uppercase();
             if !KEYS.contains(&key.as_str()) {
-                return Err(FormatError::at_line(line_number, format!("`{key}` is no key of a PCD header")));
+                return Err(FormatError::at_line(
+                    line_number,
+                    format!("`{word:.40}` is no key of a PCD header"),
+                ));
             }
             let is_data = key == "DATA";
             entries.push((key, words.collect(), line_number));
@@ -129,9 +151,10 @@ impl Header {
             }
         }
         let points = number_of_points(&find, data_line)?;
-        let world_from_sensor = find("VIEWPOINT").map(|(words, line)| viewpoint(words, line)).transpose()?;
+        let world_from_sensor = find("VIEWPOINT").map_or(Ok(None), |(words, line)| viewpoint(words, line));
         let (encoding, line) = need("DATA")?;
-        let encoding = match encoding.first().map(String::as_str) {
+        let encoding = encoding.first().map(|word| word.to_ascii_lowercase());
+        let encoding = match encoding.as_deref() {
             Some("ascii") => Encoding::Ascii,
             Some("binary") => Encoding::Binary,
             Some("binary_compressed") => Encoding::Compressed,
@@ -142,6 +165,15 @@ impl Header {
             }
         };
         Ok(Self { fields, points, point_bytes: offset, encoding, world_from_sensor, data_at, data_line })
+    }
+}
+
+/// The last byte of the lines of a header: CR, if the first of them ends with that alone.
+fn line_end(file: &[u8]) -> u8 {
+    let first = file.iter().position(|byte| matches!(byte, b'\n' | b'\r'));
+    match first.map(|at| (file[at], file.get(at + 1))) {
+        Some((b'\r', after)) if after != Some(&b'\n') => b'\r',
+        _ => b'\n',
     }
 }
 
@@ -170,13 +202,16 @@ fn number_of_points<'a>(
     }
 }
 
-fn viewpoint(words: &[String], line: u64) -> Result<RigidPose> {
+fn viewpoint(words: &[String], line: u64) -> Result<Option<RigidPose>> {
     let numbers = words.iter().map(|word| parse(word, line)).collect::<Result<Vec<f64>>>()?;
+    if numbers.len() == 7 && numbers.iter().all(|number| *number == 0.0) {
+        return Ok(None);
+    }
     match numbers[..] {
         [x, y, z, qw, qx, qy, qz] if numbers.iter().all(|number| number.is_finite()) => {
             let pose = RigidPose { position_m: [x, y, z], quaternion: [qx, qy, qz, qw] };
             match Pose::of_quaternion(pose.position_m, pose.quaternion) {
-                Ok(_) => Ok(pose),
+                Ok(_) => Ok(Some(pose)),
                 Err(reason) => Err(FormatError::at_line(line, format!("VIEWPOINT has {reason}"))),
             }
         }

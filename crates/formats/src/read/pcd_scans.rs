@@ -41,11 +41,12 @@ pub(crate) fn open(path: &Path, options: &ReadOptions) -> Result<Box<dyn ScanSou
         CloudPoses::Missing => true,
         CloudPoses::Source(_) | CloudPoses::Identity => !is_plain,
     };
+    let is_viewpoint_needed = matches!(poses, CloudPoses::Source(_));
     let must_have_viewpoint = matches!(poses, CloudPoses::Source(PoseSource::Viewpoint));
     let (is_alone, budget) = (files.len() == 1, options.budget());
     let has_origin = options.sensor_origin_m.is_some();
     let open = move |path: &Path| -> Result<Box<dyn CloudSource>> {
-        let (mut head, points) = pcd::open(path, head_of(path), &budget)?;
+        let (mut head, points) = pcd::open(path, head_of(path), &budget, is_viewpoint_needed)?;
         if head.world_from_sensor.is_none() && must_have_viewpoint {
             let reason = "no VIEWPOINT in this file, which other files of the folder have: where it was taken is not known";
             return Err(FormatError::at_line(1, reason).in_input(path));
@@ -164,7 +165,7 @@ fn number_in(path: &Path) -> Option<f64> {
 
 /// Whether the `VIEWPOINT` of a PCD file tells where it was taken.
 fn is_placed(path: &Path) -> bool {
-    let head = pcd::open(path, CloudHead::default(), &Default::default()).ok();
+    let head = pcd::open(path, CloudHead::default(), &Default::default(), true).ok();
     head.and_then(|(head, _)| head.world_from_sensor).is_some_and(|pose| !is_identity(&pose))
 }
 

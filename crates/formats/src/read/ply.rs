@@ -1,8 +1,11 @@
 use super::cloud::CloudHead;
 use super::columns::{Clock, Meaning};
+use super::input_file::open_input;
+use super::left_out::LeftOut;
 use super::lines::Lines;
 use super::one::{Points, Visit};
 use super::ply_header::{Element, Encoding, Header};
+use super::ply_rows::{PlyRows, Row};
 use super::scalar::Scalar;
 use crate::read_options::ReadOptions;
 use std::fs::File;
@@ -18,6 +21,7 @@ struct PlyPoints {
     vertices: usize,
     meaning: Meaning,
     clock: Clock,
+    left_out: LeftOut,
 }
 
 /// Opens a PLY file and reads its header.
@@ -26,24 +30,24 @@ pub(crate) fn open(
     mut head: CloudHead,
     _: &ReadOptions,
 ) -> Result<(CloudHead, Box<dyn Points>)> {
-    let file = File::open(path).map_err(|error| Error::io(path, "read", error))?;
-    let mut input = BufReader::with_capacity(1 << 16, file);
+    let mut input = BufReader::with_capacity(1 << 16, open_input(path)?);
     let header = Header::read(path, &mut input)?;
     let wrong = |reason: &str| FormatError::at_line(header.lines, reason).in_input(path);
-    let vertices = header.elements.iter().position(|element| element.name == "vertex");
+    let is_vertices = |element: &Element| element.name.eq_ignore_ascii_case("vertex");
+    let vertices = header.elements.iter().position(is_vertices);
     let vertices = vertices.ok_or_else(|| wrong("the file has no element `vertex`"))?;
     let element = header.elements.get(vertices).ok_or_else(|| wrong("the file has no element `vertex`"))?;
     let names: Vec<String> = element.properties.iter().map(|property| property.name.clone()).collect();
-    let meaning =
-        Meaning::of(&names, |at| element.properties.get(at).is_some_and(|found| found.kind.is_integer()))
-            .ok_or_else(|| wrong("vertices have no x, y and z"))?;
+    let is_integer = |at: usize| element.properties.get(at).is_some_and(|found| found.kind.is_integer());
+    let meaning = Meaning::of(&names, is_integer).map_err(|reason| wrong(&reason))?;
+    let meaning = meaning.ok_or_else(|| wrong("vertices have no x, y and z"))?;
     head.points = Some(element.count);
     head.fields = names;
     head.has_intensities = meaning.intensity.is_some();
     head.has_times = meaning.time.is_some();
-    let clock = Clock::new(head.stamp_ns);
-    let points = PlyPoints { path: path.to_owned(), header, input: Some(input), vertices, meaning, clock };
-    Ok((head, Box::new(points)))
+    let (clock, left_out) = (Clock::new(head.stamp_ns), LeftOut::default());
+    let (path, input) = (path.to_owned(), Some(input));
+    Ok((head, Box::new(PlyPoints { path, header, input, vertices, meaning, clock, left_out })))
 }
 
 impl Points for PlyPoints {
@@ -54,37 +58,49 @@ impl Points for PlyPoints {
             encoding => self.read_binary(input, encoding == Encoding::BigEndian, visit),
         }
     }
+
+    fn remarks(&self) -> Vec<String> {
+        let units = self.meaning.remark();
+        let comment = self.header.unit.as_ref().filter(|_| units.is_none()).map(|(line, comment)| {
+            format!("line {line} says `{comment:.60}`, but coordinates are read as metres")
+        });
+        units.into_iter().chain(comment).chain(self.left_out.remark()).collect()
+    }
 }
 
 impl PlyPoints {
-    fn read_ascii(&mut self, mut lines: Lines, visit: Visit<'_>) -> Result<()> {
-        let mut values = Vec::new();
-        for (number, element) in self.header.elements.iter().enumerate().take(self.vertices + 1) {
+    fn read_ascii(&mut self, lines: Lines, visit: Visit<'_>) -> Result<()> {
+        let (meaning, mut visited) = (self.meaning, 0_u64);
+        let mut rows = PlyRows::new(lines);
+        for (number, element) in self.header.elements.iter().enumerate() {
             if element.properties.is_empty() {
                 continue;
             }
-            for done in 0..element.count {
-                let (name, count) = (&element.name, element.count);
-                let cut =
-                    |lines: &Lines| lines.error(format!("the file ends after {done} of {count} {name}"));
-                if number != self.vertices {
-                    if !lines.pass()? {
-                        return Err(cut(&lines));
-                    }
-                    continue;
+            if number != self.vertices {
+                // What follows the vertices matters only where lines are wrapped: it tells whether numbers are missing.
+                if number < self.vertices || rows.are_wrapped() {
+                    rows.pass(element)?;
                 }
-                let line = loop {
-                    match lines.next()? {
-                        Some((_, line)) if line.trim().is_empty() => {}
-                        Some((_, line)) => break line,
-                        None => return Err(cut(&lines)),
+                continue;
+            }
+            for done in 0..element.count {
+                match rows.next(element, done, &|at| meaning.reads(at))? {
+                    Row::Values(values) => {
+                        visited += 1;
+                        let value = |at: usize| values.get(at).copied().unwrap_or(f64::NAN);
+                        visit(self.clock.point(&meaning, value))?;
                     }
-                };
-                values_of(element, &line, &mut values).map_err(|reason| lines.error(reason))?;
-                visit(self.clock.point(&self.meaning, |at| values.get(at).copied().unwrap_or(f64::NAN)))?;
+                    Row::Unread(line, reason) => self.left_out.add(line, reason),
+                }
             }
         }
-        Ok(())
+        if rows.are_wrapped() {
+            rows.check_end()?;
+        }
+        match self.left_out.error() {
+            Some(error) if visited == 0 => Err(error.in_input(&self.path)),
+            _ => Ok(()),
+        }
     }
 
     fn read_binary(&mut self, input: BufReader<File>, is_big: bool, visit: Visit<'_>) -> Result<()> {
@@ -165,26 +181,4 @@ impl Records {
         self.at = self.at.saturating_add(skipped);
         if skipped == bytes { Ok(()) } else { Err(io::ErrorKind::UnexpectedEof.into()) }
     }
-}
-
-/// The values of a line: one a property, NaN for a list.
-fn values_of(element: &Element, line: &str, values: &mut Vec<f64>) -> std::result::Result<(), String> {
-    values.clear();
-    let mut words = line.split_ascii_whitespace();
-    for property in &element.properties {
-        let missing = || format!("the value of `{}` is missing", property.name);
-        let word = words.next().ok_or_else(missing)?;
-        let value: f64 = word.parse().map_err(|_| format!("`{word:.40}` is not a number"))?;
-        if property.list.is_none() {
-            // More digits than a float holds say nothing: the binary forms have none of them.
-            values.push(if property.kind == Scalar::F32 { f64::from(value as f32) } else { value });
-            continue;
-        }
-        let count: u64 = word.parse().map_err(|_| format!("`{word:.40}` is no length of a list"))?;
-        for _ in 0..count {
-            words.next().ok_or_else(missing)?;
-        }
-        values.push(f64::NAN);
-    }
-    Ok(())
 }

@@ -1,4 +1,6 @@
+use super::foreign::BYTE_ORDER_MARK;
 use super::scalar::Scalar;
+use super::text_header::unit_of_comment;
 use std::io::{BufRead, Read};
 use std::path::Path;
 use voxtile::{Error, FormatError, Result};
@@ -43,44 +45,69 @@ pub(super) struct Header {
     pub(super) elements: Vec<Element>,
     pub(super) lines: u64,
     pub(super) bytes: u64,
+    /// A comment that speaks of another unit than metres, with its line.
+    pub(super) unit: Option<(u64, String)>,
 }
 
 /// A longer header is an error.
 const MAX_HEADER_BYTES: u64 = 1 << 20;
 
+/// Whether a file starts as PLY does: with a line `ply`, perhaps with blanks behind it.
+pub(crate) fn is_start(start: &[u8]) -> bool {
+    let end = start.iter().position(|byte| matches!(byte, b'\n' | b'\r'));
+    let line = end.and_then(|end| start.get(..end)).unwrap_or_default();
+    line.trim_ascii().eq_ignore_ascii_case(b"ply")
+}
+
 impl Header {
     pub(super) fn read(path: &Path, input: &mut impl BufRead) -> Result<Self> {
-        let mut header = Self { encoding: Encoding::Ascii, elements: Vec::new(), lines: 0, bytes: 0 };
-        let mut encoding = None;
-        let mut line = Vec::new();
+        let mut header =
+            Self { encoding: Encoding::Ascii, elements: Vec::new(), lines: 0, bytes: 0, unit: None };
+        let (mut encoding, mut line, mut end) = (None, Vec::new(), b'\n');
         loop {
             line.clear();
             let left = MAX_HEADER_BYTES - header.bytes;
-            let read = (&mut *input).take(left).read_until(b'\n', &mut line);
-            header.bytes += read.map_err(|error| Error::io(path, "read", error))? as u64;
+            let mut limited = (&mut *input).take(left);
+            let read = if header.lines == 0 {
+                end = first_line(&mut limited, &mut line).map_err(|error| Error::io(path, "read", error))?;
+                line.len()
+            } else {
+                limited.read_until(end, &mut line).map_err(|error| Error::io(path, "read", error))?
+            };
+            header.bytes += read as u64;
             header.lines += 1;
             let wrong = |reason: String| FormatError::at_line(header.lines, reason).in_input(path);
-            if line.last() != Some(&b'\n') {
-                return Err(wrong("the header has no end_header".into()));
+            if line.last() != Some(&end) {
+                let is_empty = header.bytes == 0;
+                let reason = if is_empty { "the file is empty" } else { "the header has no end_header" };
+                return Err(wrong(reason.into()));
             }
-            let text = String::from_utf8_lossy(&line).trim().to_owned();
+            let line = line.strip_prefix(BYTE_ORDER_MARK).unwrap_or(&line);
+            let text = String::from_utf8_lossy(line).trim().to_owned();
             let words: Vec<&str> = text.split_ascii_whitespace().collect();
-            match words.as_slice() {
-                ["ply"] | [] | ["comment" | "obj_info", ..] => {}
-                ["format", name, ..] => {
-                    encoding = Some(match *name {
+            let Some((key, rest)) = words.split_first() else { continue };
+            match (key.to_ascii_lowercase().as_str(), rest) {
+                ("ply", []) => {}
+                ("comment" | "obj_info", _) => {
+                    if unit_of_comment(&text).is_some() {
+                        header.unit.get_or_insert((header.lines, text));
+                    }
+                }
+                ("format", [name, ..]) => {
+                    encoding = Some(match name.to_ascii_lowercase().as_str() {
                         "ascii" => Encoding::Ascii,
                         "binary_little_endian" => Encoding::LittleEndian,
                         "binary_big_endian" => Encoding::BigEndian,
-                        other => return Err(wrong(format!("format `{other}` is not known"))),
+                        other => return Err(wrong(format!("format `{other:.40}` is not known"))),
                     });
                 }
-                ["element", name, count] => {
-                    let count =
-                        count.parse().map_err(|_| wrong(format!("`{count}` is no number of elements")))?;
+                ("element", [name, count]) => {
+                    let count = count
+                        .parse()
+                        .map_err(|_| wrong(format!("`{count:.40}` is no number of elements")))?;
                     header.elements.push(Element { name: (*name).to_owned(), count, properties: Vec::new() });
                 }
-                ["property", rest @ ..] => {
+                ("property", rest) => {
                     let property = property(rest).map_err(&wrong)?;
                     let element = header.elements.last_mut();
                     element
@@ -88,13 +115,33 @@ impl Header {
                         .properties
                         .push(property);
                 }
-                ["end_header"] => break,
+                ("end_header", []) => break,
                 _ => return Err(wrong(format!("`{text:.60}` is no line of a header of PLY"))),
             }
         }
         header.encoding = encoding
             .ok_or_else(|| FormatError::at_line(header.lines, "the header has no format").in_input(path))?;
         Ok(header)
+    }
+}
+
+/// Reads the first line with its end, and gives the last byte of an end: CR, if that is all of it.
+fn first_line(input: &mut impl BufRead, line: &mut Vec<u8>) -> std::io::Result<u8> {
+    loop {
+        let Some(&byte) = input.fill_buf()?.first() else { return Ok(b'\n') };
+        input.consume(1);
+        line.push(byte);
+        if byte == b'\n' {
+            return Ok(byte);
+        }
+        if byte == b'\r' {
+            let has_more = input.fill_buf()?.first() == Some(&b'\n');
+            if has_more {
+                input.consume(1);
+                line.push(b'\n');
+            }
+            return Ok(if has_more { b'\n' } else { byte });
+        }
     }
 }
 
@@ -113,7 +160,7 @@ fn property(words: &[&str]) -> std::result::Result<Property, String> {
 }
 
 fn scalar(name: &str) -> std::result::Result<Scalar, String> {
-    Ok(match name {
+    Ok(match name.to_ascii_lowercase().as_str() {
         "char" | "int8" => Scalar::I8,
         "uchar" | "uint8" => Scalar::U8,
         "short" | "int16" => Scalar::I16,
@@ -124,6 +171,6 @@ fn scalar(name: &str) -> std::result::Result<Scalar, String> {
         "uint64" | "ulong" => Scalar::U64,
         "float" | "float32" => Scalar::F32,
         "double" | "float64" => Scalar::F64,
-        other => return Err(format!("type `{other}` is not known")),
+        other => return Err(format!("type `{other:.40}` is not known")),
     })
 }

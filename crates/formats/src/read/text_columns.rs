@@ -56,12 +56,11 @@ const MAX_LINES_BEFORE: u32 = 100;
 impl Counts {
     /// Takes a line of one number, if a scan may begin here.
     fn begin(&mut self, count: f64) -> bool {
-        let may_begin = self.scans == 0 || self.rows >= self.announced;
+        let is_number = count.fract() == 0.0 && count >= 0.0;
+        let may_begin = is_number && (self.scans == 0 || self.rows >= self.announced);
         if may_begin {
             self.scans += 1;
-            // What is no number of points announces none.
-            self.announced =
-                self.announced.saturating_add(if count.fract() == 0.0 { count as u64 } else { 0 });
+            self.announced = self.announced.saturating_add(count as u64);
         }
         may_begin
     }
