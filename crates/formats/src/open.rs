@@ -6,6 +6,7 @@ use crate::poses::Rules;
 use crate::poses::find_poses;
 use crate::read::files::Files;
 use crate::read::from_origin::FromOrigin;
+use crate::read::input_file::open_input;
 use crate::read::listing::Listing;
 use crate::read::one::{OneCloud, head_of};
 use crate::read::regular::check_regular;
@@ -134,6 +135,10 @@ fn open_folder(path: &Path, format: InputFormat, options: &ReadOptions) -> Resul
     let options = options.clone();
     let open = Box::new(move |path: &Path| {
         check_regular(path)?;
+        if matches!(format.open, Open::Clouds(_)) {
+            // Readers of libraries open the file themselves.
+            open_input(path)?;
+        }
         open_file(path, &format, &options)
     });
     let others = others.into_iter().map(|other| format!("{other} is no cloud, left out"));

@@ -1,5 +1,7 @@
+use super::bin_columns::{BinStart, Reading, Verdict};
 use super::cloud::CloudHead;
 use super::columns::{Clock, Meaning};
+use super::input_file::open_input;
 use super::one::{Points, Visit};
 use super::scalar::Scalar;
 use crate::read_options::ReadOptions;
@@ -10,70 +12,106 @@ use voxtile::{Error, FormatError, Result};
 
 const KITTI: [&str; 4] = ["x", "y", "z", "intensity"];
 const NUSCENES: [&str; 5] = ["x", "y", "z", "intensity", "ring"];
-/// Bytes of the begin of a file that tell four columns from five: whole points of both.
-const GLANCE_BYTES: usize = 1000 * 4 * NUSCENES.len();
+/// Bytes of the start of a file that tell its columns: whole points of three to eight floats or doubles.
+const GLANCE_BYTES: u64 = 3 * 840 * 8;
 /// Points that say nothing of their columns are no more than this.
 const FEW_POINTS: usize = 16;
 /// More columns than any sensor has.
 const MAX_FIELDS: usize = 256;
 
-/// The points of a file of floats without a header.
+/// The points of a file of numbers without a header.
 struct BinPoints {
     path: PathBuf,
     input: BufReader<File>,
     meaning: Meaning,
     clock: Clock,
+    columns: Columns,
     record: Vec<u8>,
     points: u64,
+    remarks: Vec<String>,
 }
 
-/// Opens a file of floats without a header. Nothing in it tells its columns: its size must fit them.
+/// The columns of a file: names, types, and where they are in a point.
+struct Columns {
+    names: Vec<String>,
+    places: Vec<(usize, Scalar)>,
+    point_bytes: usize,
+}
+
+impl Columns {
+    /// Names, each perhaps with a type behind a colon: `x:f64`.
+    fn of(fields: &[String]) -> Self {
+        let mut columns = Self { names: Vec::new(), places: Vec::new(), point_bytes: 0 };
+        for field in fields {
+            let typed = field.rsplit_once(':').and_then(|(name, kind)| Some((name, Scalar::named(kind)?)));
+            let (name, kind) = typed.unwrap_or((field, Scalar::F32));
+            columns.names.push(name.to_owned());
+            columns.places.push((columns.point_bytes, kind));
+            columns.point_bytes += kind.bytes();
+        }
+        columns
+    }
+
+    /// The columns of a reading that are known: x y z, and in the fourth of four the intensity.
+    fn of_reading(reading: Reading) -> Self {
+        let mut names: Vec<String> =
+            KITTI.iter().take(reading.columns).map(|name| (*name).to_owned()).collect();
+        if reading.columns > KITTI.len() {
+            names.truncate(3);
+        }
+        let unknown = names.len()..reading.columns;
+        names.extend(unknown.map(|number| format!("column{}", number + 1)));
+        let bytes = reading.kind.bytes();
+        let places = (0..reading.columns).map(|number| (number * bytes, reading.kind)).collect();
+        Self { names, places, point_bytes: reading.columns * bytes }
+    }
+}
+
+/// Opens a file of numbers without a header. Nothing in it names its columns: its size must fit them, and what is not
+/// named is checked against the numbers.
 pub(crate) fn open(
     path: &Path,
     mut head: CloudHead,
     options: &ReadOptions,
 ) -> Result<(CloudHead, Box<dyn Points>)> {
-    let fields: Vec<String> = match &options.fields {
-        Some(fields) => fields.clone(),
-        None if head.name.ends_with(".pcd.bin") => NUSCENES.map(str::to_owned).into(),
-        None => KITTI.map(str::to_owned).into(),
+    let fail = |error| Error::io(path, "read", error);
+    let mut file = open_input(path)?;
+    let bytes = file.metadata().map_err(fail)?.len();
+    let (columns, guess) = match &options.fields {
+        Some(fields) => (Columns::of(fields), None),
+        None => {
+            let mut start = Vec::new();
+            (&mut file).take(GLANCE_BYTES).read_to_end(&mut start).map_err(fail)?;
+            std::io::Seek::rewind(&mut file).map_err(fail)?;
+            let columns = guess(path, head.name.ends_with(".pcd.bin"), &start, bytes)?;
+            let said = said_of(&columns);
+            (columns, Some(said))
+        }
     };
-    let list = fields.join(", ");
-    if fields.len() > MAX_FIELDS {
+    let list = columns.names.join(", ");
+    if columns.names.len() > MAX_FIELDS {
         return Err(Error::argument(
             "fields",
-            format!("{} names; at most {MAX_FIELDS} are possible", fields.len()),
+            format!("{} names; at most {MAX_FIELDS} are possible", columns.names.len()),
         ));
     }
-    let meaning = Meaning::of(&fields, |_| false)
-        .ok_or_else(|| Error::argument("fields", format!("`{list}` lacks x, y or z")))?;
-    let file = File::open(path).map_err(|error| Error::io(path, "read", error))?;
-    let bytes = file.metadata().map_err(|error| Error::io(path, "read", error))?.len();
-    let record_bytes = fields.len() * 4;
-    if bytes % record_bytes as u64 != 0 {
+    let meaning =
+        Meaning::of(&columns.names, |at| columns.places.get(at).is_some_and(|(_, kind)| kind.is_integer()))
+            .map_err(|reason| Error::argument("fields", reason))?
+            .ok_or_else(|| Error::argument("fields", format!("`{list}` lacks x, y or z")))?;
+    let point_bytes = columns.point_bytes as u64;
+    if bytes % point_bytes != 0 {
+        let kind =
+            if columns.places.iter().all(|(_, kind)| *kind == Scalar::F32) { "floats" } else { "numbers" };
         let reason = format!(
-            "{bytes} bytes are no whole number of points of {} floats ({list}): name the columns of the file as fields, or \
-             it is cut off",
-            fields.len()
+            "{bytes} bytes are no whole number of points of {} {kind} ({list}): name the columns of the file as fields, \
+             or it is cut off",
+            columns.names.len()
         );
-        return Err(FormatError::at_offset(bytes - bytes % record_bytes as u64, reason).in_input(path));
+        return Err(FormatError::at_offset(bytes - bytes % point_bytes, reason).in_input(path));
     }
-    let may_be_wider =
-        fields == KITTI && options.fields.is_none() && bytes % (4 * NUSCENES.len() as u64) == 0;
-    if may_be_wider && looks_like_nuscenes(path)? {
-        let reason = format!(
-            "its size fits {} floats a point ({list}) and {}, and the last of {} are whole numbers, as of the ring of \
-             a sensor: name the columns of the file as fields, `--fields {}` or `--fields {}`",
-            KITTI.len(),
-            NUSCENES.len(),
-            NUSCENES.len(),
-            NUSCENES.join(","),
-            KITTI.join(",")
-        );
-        return Err(FormatError::at_offset(0, reason).in_input(path));
-    }
-    head.points = Some(bytes / record_bytes as u64);
-    head.fields = fields;
+    head.points = Some(bytes / point_bytes);
+    head.fields = columns.names.clone();
     head.has_intensities = meaning.intensity.is_some();
     head.has_times = meaning.time.is_some();
     let points = BinPoints {
@@ -81,19 +119,80 @@ pub(crate) fn open(
         input: BufReader::with_capacity(1 << 16, file),
         meaning,
         clock: Clock::new(head.stamp_ns),
-        record: vec![0; record_bytes],
-        points: bytes / record_bytes as u64,
+        record: vec![0; columns.point_bytes],
+        columns,
+        points: bytes / point_bytes,
+        remarks: guess.into_iter().chain(meaning.remark()).collect(),
     };
     Ok((head, Box::new(points)))
 }
 
+/// The columns of a file whose columns were not named: those of KITTI or nuScenes, unless its numbers say otherwise.
+fn guess(path: &Path, is_nuscenes: bool, start: &[u8], bytes: u64) -> Result<Columns> {
+    let names = if is_nuscenes { &NUSCENES[..] } else { &KITTI[..] };
+    let usual = Reading { kind: Scalar::F32, columns: names.len() };
+    let wrong = |reason: String| FormatError::at_offset(0, reason).in_input(path);
+    let is_whole = bytes % usual.point_bytes() == 0;
+    if !is_nuscenes && is_whole && bytes % (4 * NUSCENES.len() as u64) == 0 && looks_like_nuscenes(start) {
+        let reason = format!(
+            "its size fits {} floats a point ({}) and {}, and the last of {} are whole numbers, as of the ring of \
+             a sensor: name the columns of the file as fields, `--fields {}` or `--fields {}`",
+            KITTI.len(),
+            KITTI.join(", "),
+            NUSCENES.len(),
+            NUSCENES.len(),
+            NUSCENES.join(","),
+            KITTI.join(",")
+        );
+        return Err(wrong(reason));
+    }
+    match BinStart::new(start, bytes).judge(usual) {
+        Verdict::Wrong(reason) => Err(wrong(reason.to_owned())),
+        // Where the colour or the time is in 6 columns does not matter for x, y and z.
+        Verdict::Other(other) if matches!(other.columns, 3 | 4 | 6) => Ok(Columns::of_reading(other)),
+        Verdict::Other(other) => Err(wrong(format!(
+            "its numbers repeat every {} of {}, not every {} of float32: name the columns of the file as fields, for \
+             instance `--fields {}`",
+            other.columns,
+            other.type_name(),
+            usual.columns,
+            example(other)
+        ))),
+        Verdict::Doubtful(other) if is_whole => Err(wrong(format!(
+            "read as {} columns of float32 ({}), its intensities are below 0, and {} columns fit as well: name the \
+             columns of the file as fields, `--fields {}` or `--fields {}`",
+            usual.columns,
+            names.join(", "),
+            other.columns,
+            names.join(","),
+            example(other)
+        ))),
+        Verdict::Doubtful(_) | Verdict::Right => {
+            Ok(Columns::of(&names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>()))
+        }
+    }
+}
+
+/// Names for the columns of a reading, to begin with.
+fn example(reading: Reading) -> String {
+    let kind = if reading.kind == Scalar::F64 { ":f64" } else { "" };
+    let names = NUSCENES.map(str::to_owned).into_iter().chain((6..).map(|number| format!("column{number}")));
+    names.take(reading.columns).map(|name| name + kind).collect::<Vec<_>>().join(",")
+}
+
+/// What a person should know of columns that were guessed.
+fn said_of(columns: &Columns) -> String {
+    let count = columns.names.len();
+    let is_wide = columns.places.iter().any(|(_, kind)| *kind == Scalar::F64);
+    let known: Vec<&str> =
+        columns.names.iter().map(String::as_str).filter(|name| NUSCENES.contains(name)).collect();
+    let rest = if known.len() < count { ", the rest is not read (`fields` names them)" } else { "" };
+    format!("{count} columns of {}: {}{rest}", if is_wide { "float64" } else { "float32" }, known.join(" "))
+}
+
 /// Whether a file, read as five columns, has a ring in the last one, and as four no intensity there. In the wrong five
 /// columns, the last holds coordinates by turns, which are not all whole numbers; in the wrong four likewise.
-fn looks_like_nuscenes(path: &Path) -> Result<bool> {
-    let mut start = Vec::new();
-    File::open(path)
-        .and_then(|file| file.take(GLANCE_BYTES as u64).read_to_end(&mut start))
-        .map_err(|error| Error::io(path, "read", error))?;
+fn looks_like_nuscenes(start: &[u8]) -> bool {
     let floats: Vec<f32> = start.as_chunks().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
     let last_of = |columns: usize| floats.iter().skip(columns - 1).step_by(columns).copied();
     let is_whole = |value: f32| (0.0..=255.0).contains(&value) && value.fract() == 0.0;
@@ -103,18 +202,24 @@ fn looks_like_nuscenes(path: &Path) -> Result<bool> {
         && rings.next().is_some_and(|first| rings.any(|ring| ring != first));
     let is_intensity = last_of(KITTI.len()).all(is_whole)
         || last_of(KITTI.len()).all(|intensity| (0.0..=1.0).contains(&intensity));
-    Ok(is_ring && !is_intensity)
+    is_ring && !is_intensity
 }
 
 impl Points for BinPoints {
     fn read(&mut self, visit: Visit<'_>) -> Result<()> {
         for _ in 0..self.points {
             self.input.read_exact(&mut self.record).map_err(|error| Error::io(&self.path, "read", error))?;
-            let record = &self.record;
-            let value =
-                |at: usize| record.get(at * 4..).map_or(f64::NAN, |bytes| Scalar::F32.value(bytes, false));
+            let (record, places) = (&self.record, &self.columns.places);
+            let value = |at: usize| {
+                let (place, kind) = places.get(at).copied().unwrap_or((usize::MAX, Scalar::F32));
+                record.get(place..).map_or(f64::NAN, |bytes| kind.value(bytes, false))
+            };
             visit(self.clock.point(&self.meaning, value))?;
         }
         Ok(())
+    }
+
+    fn remarks(&self) -> Vec<String> {
+        self.remarks.clone()
     }
 }

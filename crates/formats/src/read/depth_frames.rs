@@ -1,4 +1,5 @@
 use super::cloud::{CloudHead, CloudPoint, CloudSource};
+use super::input_file::open_input;
 use super::intrinsics::Intrinsics;
 use super::one::Visit;
 use super::regular::check_regular;
@@ -93,7 +94,7 @@ fn size(reader: &Reader) -> (u32, u32) {
 
 fn open(path: &Path) -> Result<Reader> {
     check_regular(path)?;
-    let file = File::open(path).map_err(|error| Error::io(path, "read", error))?;
+    let file = open_input(path)?;
     let limits = png::Limits { bytes: MAX_DECODER_BYTES };
     let mut decoder = png::Decoder::new_with_limits(BufReader::with_capacity(1 << 16, file), limits);
     decoder.set_ignore_text_chunk(true);

@@ -5,6 +5,7 @@
 
 mod aside;
 pub(crate) mod bin;
+mod bin_columns;
 pub(crate) mod cloud;
 mod columns;
 mod depth_frames;
@@ -42,9 +43,9 @@ mod las_trimmed;
 mod las_units;
 #[cfg(feature = "las")]
 mod laz_chunks;
+mod left_out;
 pub(crate) mod lines;
 pub(crate) mod listing;
-mod left_out;
 mod lzf;
 pub(crate) mod one;
 mod pcd;

@@ -160,17 +160,5 @@ fn property(words: &[&str]) -> std::result::Result<Property, String> {
 }
 
 fn scalar(name: &str) -> std::result::Result<Scalar, String> {
-    Ok(match name.to_ascii_lowercase().as_str() {
-        "char" | "int8" => Scalar::I8,
-        "uchar" | "uint8" => Scalar::U8,
-        "short" | "int16" => Scalar::I16,
-        "ushort" | "uint16" => Scalar::U16,
-        "int" | "int32" => Scalar::I32,
-        "uint" | "uint32" => Scalar::U32,
-        "int64" | "long" => Scalar::I64,
-        "uint64" | "ulong" => Scalar::U64,
-        "float" | "float32" => Scalar::F32,
-        "double" | "float64" => Scalar::F64,
-        other => return Err(format!("type `{other:.40}` is not known")),
-    })
+    Scalar::named(name).ok_or_else(|| format!("type `{name:.40}` is not known"))
 }

@@ -25,6 +25,23 @@ macro_rules! number {
 }
 
 impl Scalar {
+    /// The type of a name: of PLY (`uchar`, `float`), of NumPy (`uint8`, `float32`) or short (`u8`, `f32`).
+    pub(super) fn named(name: &str) -> Option<Self> {
+        Some(match name.to_ascii_lowercase().as_str() {
+            "char" | "int8" | "i8" => Self::I8,
+            "uchar" | "uint8" | "u8" => Self::U8,
+            "short" | "int16" | "i16" => Self::I16,
+            "ushort" | "uint16" | "u16" => Self::U16,
+            "int" | "int32" | "i32" => Self::I32,
+            "uint" | "uint32" | "u32" => Self::U32,
+            "int64" | "long" | "i64" => Self::I64,
+            "uint64" | "ulong" | "u64" => Self::U64,
+            "float" | "float32" | "f32" => Self::F32,
+            "double" | "float64" | "f64" => Self::F64,
+            _ => return None,
+        })
+    }
+
     pub(super) fn bytes(self) -> usize {
         match self {
             Self::I8 | Self::U8 => 1,

@@ -1,9 +1,9 @@
+use super::input_file::open_input;
 use super::regular::check_regular;
 use crate::read_options::ReadOptions;
 use crate::scans::Fingerprint;
 use crate::scans::PointStore;
 use crate::scans::{ScanHead, ScanSource};
-use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
 use voxtile::scan::Pose;
@@ -12,13 +12,9 @@ use voxtile::{Error, FormatError, Result};
 /// Opens a scan graph.
 pub(crate) fn open(path: &Path, _: &ReadOptions) -> Result<Box<dyn ScanSource + Send>> {
     check_regular(path)?;
-    let open = || {
-        let file = File::open(path)?;
-        let bytes = file.metadata()?.len();
-        Ok((BufReader::with_capacity(1 << 16, file), bytes))
-    };
-    let (input, bytes) = open().map_err(|error| Error::io(path, "open", error))?;
-    Ok(Box::new(read_scan_graph(input, bytes, path)?))
+    let file = open_input(path)?;
+    let bytes = file.metadata().map_err(|error| Error::io(path, "open", error))?.len();
+    Ok(Box::new(read_scan_graph(BufReader::with_capacity(1 << 16, file), bytes, path)?))
 }
 
 /// Reads OctoMap's binary scan graph of `file_bytes` bytes, as written by `ScanGraph::writeBinary`, scan by scan. Its

@@ -1,9 +1,9 @@
+use super::input_file::open_input;
 use crate::read_options::ReadOptions;
 use crate::scans::Fingerprint;
 use crate::scans::PointStore;
 use crate::scans::{ScanHead, ScanSource};
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion};
-use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use voxtile::maths::sin_cos;
@@ -12,8 +12,7 @@ use voxtile::{Error, FormatError, Result};
 
 /// Opens a scan log.
 pub(crate) fn open(path: &Path, _: &ReadOptions) -> Result<Box<dyn ScanSource + Send>> {
-    let file = File::open(path).map_err(|error| Error::io(path, "open", error))?;
-    Ok(Box::new(read_scan_log(BufReader::with_capacity(1 << 16, file), path)))
+    Ok(Box::new(read_scan_log(BufReader::with_capacity(1 << 16, open_input(path)?), path)))
 }
 
 /// Reads OctoMap's scan log, a text: `NODE x y z roll pitch yaw` starts a scan, its points follow as `x y z`, in the

@@ -1,7 +1,8 @@
+use super::input_file::open_input;
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::Path;
-use voxtile::{Error, Result};
+use voxtile::Result;
 
 /// Where a scan stream comes from.
 pub(crate) trait StreamInput: Read {
@@ -36,10 +37,7 @@ pub(crate) struct FileInput {
 
 impl FileInput {
     pub(crate) fn open(path: &Path) -> Result<Self> {
-        match File::open(path) {
-            Ok(file) => Ok(Self { file, at: 0, known_bytes: 0, has_passed: false }),
-            Err(error) => Err(Error::io(path, "open", error)),
-        }
+        Ok(Self { file: open_input(path)?, at: 0, known_bytes: 0, has_passed: false })
     }
 }
 

@@ -18,6 +18,8 @@ mod las;
 mod laz_chunks;
 #[path = "../made/mod.rs"]
 mod made;
+/// What people have that is not quite what its name says.
+mod mistakes;
 /// PLY, text and raw floats.
 mod plain;
 /// Files of poses.
