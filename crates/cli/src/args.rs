@@ -256,7 +256,8 @@ pub struct QueryArgs {
     /// A point: X Y Z in metres
     #[arg(value_names = ["X", "Y", "Z"], num_args = 3, required_unless_present = "points")]
     pub point: Vec<f64>,
-    /// A file of points, one a line: x y z in metres, separated by blanks or commas; - for standard input
+    /// A file of points, one a line: x y z in metres, separated by blanks, commas, semicolons or tabs; - for standard
+    /// input
     #[arg(long, value_name = "FILE", conflicts_with = "point")]
     pub points: Option<PathBuf>,
     /// Print JSON, one object a line

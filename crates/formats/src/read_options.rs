@@ -9,8 +9,9 @@ use std::path::PathBuf;
 pub struct ReadOptions {
     /// The name of the format; guessed if `None`.
     pub format: Option<String>,
-    /// Columns of a `.bin` file, each a float of four bytes: `x`, `y`, `z`, `intensity`, and any others. `None`:
-    /// KITTI's four, or nuScenes' five for a `.pcd.bin`.
+    /// Columns of a `.bin` file: `x`, `y`, `z`, `intensity`, and any others, with units if not in metres (`x_mm`); each a
+    /// float of four bytes, or of the type behind a colon (`x:f64`, `ring:u16`). `None`: KITTI's four, or nuScenes' five
+    /// for a `.pcd.bin`, unless the numbers of the file are clearly those of other columns.
     pub fields: Option<Vec<String>>,
     /// A LAS file with GPS times is cut into scans of this many seconds. 0: the file is one cloud.
     pub scan_period_s: f64,

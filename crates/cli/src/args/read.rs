@@ -17,8 +17,8 @@ pub struct ReadArgs {
     /// Frame of a recording that is the world [default: map, odom, or the root of its tree]
     #[arg(long, value_name = "FRAME")]
     pub fixed_frame: Option<String>,
-    /// Columns of a .bin file, each a float32: x,y,z,intensity,ring; needed where it looks like more than four columns
-    /// [default: x,y,z,intensity]
+    /// Columns of a .bin file, each a float32 if no type stands behind it: x,y,z,intensity,ring:u16,t:f64; needed where
+    /// its numbers look like other columns than the default [default: x,y,z,intensity]
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     pub fields: Option<Vec<String>>,
     /// Pass over the first N scans

@@ -31,6 +31,8 @@ mod cli_snapshots;
 /// Recordings with damaged chunks.
 #[cfg(feature = "ros")]
 mod damaged_recordings;
+/// Texts and raw numbers of other programs.
+mod foreign_texts;
 /// Builds that are resumed, maps that are verified and repaired, from the command line.
 mod interrupted;
 /// Messages of ROS that tests make.
