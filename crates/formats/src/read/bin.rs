@@ -158,6 +158,15 @@ fn guess(path: &Path, is_nuscenes: bool, start: &[u8], bytes: u64) -> Result<Col
             usual.columns,
             example(other)
         ))),
+        Verdict::Either(one, other) => Err(wrong(format!(
+            "its numbers repeat every {} and every {} of {}: name the columns of the file as fields, `--fields {}` or \
+             `--fields {}`",
+            one.columns,
+            other.columns,
+            one.type_name(),
+            example(one),
+            example(other)
+        ))),
         Verdict::Doubtful(other) if is_whole => Err(wrong(format!(
             "read as {} columns of float32 ({}), its intensities are below 0, and {} columns fit as well: name the \
              columns of the file as fields, `--fields {}` or `--fields {}`",

@@ -22,6 +22,8 @@ pub(super) enum Verdict {
     Right,
     /// Another one fits clearly better.
     Other(Reading),
+    /// Two others fit, of which one has a multiple of the columns of the other.
+    Either(Reading, Reading),
     /// Another one fits as well, and the fourth column is negative: no intensity is.
     Doubtful(Reading),
     /// The bytes are of another kind: text, big-endian.
@@ -69,6 +71,9 @@ impl<'b> BinStart<'b> {
             let spreads = Spreads::of(&doubles);
             let Some(best) = self.best(Scalar::F64, &spreads, wide) else { return Verdict::Right };
             let spread = spreads.at(best.columns).unwrap_or(f64::INFINITY);
+            if let Some(multiple) = self.multiple_of(best, &spreads) {
+                return Verdict::Either(best, multiple);
+            }
             return if spread < UNRELATED * spreads.least_of_others(best.columns) {
                 Verdict::Other(best)
             } else {
@@ -89,7 +94,10 @@ impl<'b> BinStart<'b> {
         let other = spreads.at(best.columns).unwrap_or(f64::INFINITY);
         let is_multiple = best.columns.is_multiple_of(reading.columns);
         if other < CLEARLY * own && !(is_multiple && own < UNRELATED) {
-            return Verdict::Other(best);
+            return match self.multiple_of(best, &spreads) {
+                Some(multiple) => Verdict::Either(best, multiple),
+                None => Verdict::Other(best),
+            };
         }
         let mut fourth = floats.iter().skip(3).step_by(reading.columns);
         let is_sure = own < UNRELATED * spreads.least_of_others(reading.columns);
@@ -99,8 +107,18 @@ impl<'b> BinStart<'b> {
         Verdict::Right
     }
 
+    /// A reading with a multiple of the columns that fits clearly better: perhaps that is right, perhaps points take
+    /// turns, as those of two lasers do.
+    fn multiple_of(&self, reading: Reading, spreads: &Spreads) -> Option<Reading> {
+        let spread = |columns: usize| spreads.at(columns).unwrap_or(f64::INFINITY);
+        let mut multiples = (2..=COLUMNS.end() / reading.columns).map(|times| times * reading.columns);
+        let columns = multiples.find(|columns| spread(*columns) < CLEARLY * spread(reading.columns))?;
+        let multiple = Reading { columns, ..reading };
+        self.file_bytes.is_multiple_of(multiple.point_bytes()).then_some(multiple)
+    }
+
     /// The reading, other than this one, that the file has whole points of and that has the least spread; of multiples
-    /// the first.
+    /// the first that has one.
     fn best(&self, kind: Scalar, spreads: &Spreads, than: Reading) -> Option<Reading> {
         let readings = COLUMNS.map(|columns| Reading { kind, columns });
         let fitting = readings.filter(|reading| self.file_bytes.is_multiple_of(reading.point_bytes()));
@@ -108,7 +126,11 @@ impl<'b> BinStart<'b> {
         let mut best: Option<(Reading, f64)> = None;
         for reading in fitting.filter(|reading| *reading != than || kind == Scalar::F64) {
             let Some(spread) = spread(&reading) else { continue };
-            if best.is_none_or(|(_, least)| spread < UNRELATED * least) {
+            let is_better = best.is_none_or(|(best, least)| {
+                let is_multiple = reading.columns.is_multiple_of(best.columns) && least < UNRELATED;
+                spread < UNRELATED * least && !is_multiple
+            });
+            if is_better {
                 best = Some((reading, spread));
             }
         }
@@ -246,6 +268,13 @@ mod tests {
         assert!(matches!(judge(&three, 4), Verdict::Doubtful(_)));
         let above = bytes(Scalar::F32, 840, &|k| cube(k).iter().map(|value| value + 0.5).collect());
         assert_eq!(judge(&above, 4), Verdict::Right);
+    }
+
+    #[test]
+    fn points_that_take_turns_are_not_halved() {
+        let turns = |k: usize| [circle(k)[0], circle(k)[1], if k % 2 == 0 { 9.0 } else { -9.0 }].to_vec();
+        let [three, six] = [3, 6].map(|columns| Reading { kind: Scalar::F32, columns });
+        assert_eq!(judge(&bytes(Scalar::F32, 840, &turns), 4), Verdict::Either(three, six));
     }
 
     #[test]

@@ -41,11 +41,12 @@ struct Said {
 
 impl Remarks {
     fn add(&mut self, file: String, remark: String) {
-        let same = self.said.iter_mut().find(|said| said.remark == remark && !said.file.is_empty());
-        match same {
-            Some(said) => said.others += 1,
-            None if self.said.len() < MAX_REMARKS => self.said.push(Said { file, others: 0, remark }),
-            None => self.are_more = true,
+        if let Some(said) = self.said.iter_mut().find(|said| said.remark == remark && !said.file.is_empty()) {
+            said.others += 1;
+        } else if self.said.len() < MAX_REMARKS {
+            self.said.push(Said { file, others: 0, remark });
+        } else {
+            self.are_more = true;
         }
     }
 
@@ -166,7 +167,7 @@ impl CloudSource for Files {
 
     fn remarks(&self) -> Vec<String> {
         let mut remarks = self.remarks.clone();
-        for (path, source) in &self.current {
+        if let Some((path, source)) = &self.current {
             source.remarks().into_iter().for_each(|remark| remarks.add(name_of(path), remark));
         }
         remarks.lines()

@@ -89,7 +89,7 @@ fn begin<R: BufRead + Seek>(
     let (columns, mut header) = parsed.map_err(|error| error.in_input(path))?;
     input.seek(SeekFrom::Start(header.data_at as u64)).map_err(cannot)?;
     head.points = Some(header.points as u64);
-    head.has_intensities = columns.intensity.is_some();
+    head.has_intensities = columns.meaning.intensity.is_some();
     head.world_from_sensor = match std::mem::replace(&mut header.world_from_sensor, Ok(None)) {
         Err(error) if is_pose_needed => return Err(error.in_input(path)),
         pose => pose.unwrap_or_default(),
@@ -203,7 +203,7 @@ impl<R: BufRead> PcdPoints<R> {
 
     /// Compressed size, uncompressed size, then the compressed fields one after the other.
     fn visit_compressed(&mut self, visit: Visit<'_>) -> Result<()> {
-        let Self { path, header, columns, input, file_bytes, budget } = self;
+        let Self { path, header, columns, input, file_bytes, budget, .. } = self;
         let cannot = |error| Error::io(path, "read", error);
         let wrong = |reason: String| FormatError::at_offset(header.data_at as u64, reason).in_input(path);
         let there = file_bytes.saturating_sub(header.data_at as u64);

@@ -126,7 +126,10 @@ impl Columns {
             self.asked = Some(separator);
             return Ok(Line::Nothing);
         }
-        let found = self.begin(number, line).map_err(|reason| (number, reason))?;
+        let found = self.begin(number, line).map_err(|reason| {
+            let first = self.prose.take().filter(|_| !self.are_named);
+            first.unwrap_or((number, reason))
+        })?;
         self.lines_before += 1;
         if found == Line::Nothing || self.are_named {
             return Ok(found);

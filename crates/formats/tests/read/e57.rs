@@ -100,11 +100,14 @@ fn a_file_that_is_no_e57_or_is_cut_off_says_so() {
     let path = folder.path().join("a.e57");
     let whole = fs::read(fixture("scans.e57")).unwrap();
     let page = b"<!DOCTYPE html><html><body>The file has moved to another server.</body></html>";
-    for bytes in [&b""[..], &whole[..8], &whole[..47], page] {
+    let cut = "offset 0: it is no E57 file, or is cut off; copy it again";
+    for (bytes, reason) in
+        [(&b""[..], cut), (&whole[..8], cut), (&whole[..47], cut), (page, "is a page of HTML, not data")]
+    {
         fs::write(&path, bytes).unwrap();
         let (error, _) =
             failure(&path, &ReadOptions { format: Some("e57".into()), ..ReadOptions::default() });
-        assert!(error.contains("offset 0: it is no E57 file, or is cut off; copy it again"), "{error}");
+        assert!(error.contains(reason), "{error}");
     }
 }
 

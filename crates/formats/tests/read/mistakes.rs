@@ -250,9 +250,13 @@ fn headers_of_pcd_in_any_letters_and_line_ends() {
 
 /// Numbers of a file without a header: a room whose points are in no order.
 fn raw(points: usize, row: impl Fn(usize, [f64; 3]) -> Vec<f64>) -> Vec<f64> {
-    let part = |k: usize, of: usize| (k * 7919 % of) as f64 / of as f64;
-    let place = |k: usize| [1.0 + 6.0 * part(k, 211), 8.0 * part(k, 223) - 4.0, part(k, 227) - 1.0];
-    (0..points).flat_map(|k| row(k, place(k))).collect()
+    let mut state = 1_u64;
+    let mut part = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 40) as f64 / (1 << 24) as f64
+    };
+    let mut place = || [1.0 + 6.0 * part(), 8.0 * part() - 4.0, part() - 1.0];
+    (0..points).flat_map(|k| row(k, place())).collect()
 }
 
 #[test]
