@@ -355,8 +355,14 @@ fn a_file_of_poses_is_no_cloud() {
     }
     let other = folder.path().join("other.txt");
     fs::copy(&poses, &other).unwrap();
+    let told = output(&["scans", text(&scans), "--poses", text(&other)]);
+    assert!(
+        told.contains("scans     2,") && told.contains("optimized.txt (poses: its rows are matrices)"),
+        "{told}"
+    );
+    fs::write(scans.join("2.txt"), "4 0 0\n").unwrap();
     let refused = refusal(&["scans", text(&scans), "--poses", text(&other)]);
-    assert!(refused.contains("2 poses for 3 clouds (0.txt to optimized.txt), "), "{refused}");
+    assert!(refused.contains("2 poses for 3 clouds (0.txt to 2.txt), "), "{refused}");
 }
 
 /// Clouds and poses by clocks that differ: a map of nothing would be no answer.

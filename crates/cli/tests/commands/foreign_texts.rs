@@ -35,7 +35,7 @@ fn points_of_a_query_may_have_decimal_commas_and_units() {
         assert!(is_read, "{errors}");
         assert!(answer.starts_with("2.75 -1.25 0.35  occupied"), "{points}: {answer}");
     }
-    fs::write(at("points.txt"), "2,750,-1,250,0,350\n").unwrap();
+    fs::write(at("points.txt"), "2,050,-1,250,0,350\n").unwrap();
     let (is_read, _, errors) = voxtile(&["query", text(&map), "--points", text(&at("points.txt"))]);
     assert!(!is_read && errors.contains("points.txt") && errors.contains("line 1"), "{errors}");
 }
