@@ -132,8 +132,12 @@ fn guess(path: &Path, is_nuscenes: bool, start: &[u8], bytes: u64) -> Result<Col
     let names = if is_nuscenes { &NUSCENES[..] } else { &KITTI[..] };
     let usual = Reading { kind: Scalar::F32, columns: names.len() };
     let wrong = |reason: String| FormatError::at_offset(0, reason).in_input(path);
-    let is_whole = bytes % usual.point_bytes() == 0;
-    if !is_nuscenes && is_whole && bytes % (4 * NUSCENES.len() as u64) == 0 && looks_like_nuscenes(start) {
+    let is_whole = bytes.is_multiple_of(usual.point_bytes());
+    if !is_nuscenes
+        && is_whole
+        && bytes.is_multiple_of(4 * NUSCENES.len() as u64)
+        && looks_like_nuscenes(start)
+    {
         let reason = format!(
             "its size fits {} floats a point ({}) and {}, and the last of {} are whole numbers, as of the ring of \
              a sensor: name the columns of the file as fields, `--fields {}` or `--fields {}`",

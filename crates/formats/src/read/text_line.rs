@@ -83,7 +83,9 @@ pub(super) fn digits_behind_comma<'c>(separator: Separator, cells: &[&'c str]) -
     let is_integer =
         |cell: &str| !cell.is_empty() && cell.trim_start_matches('-').bytes().all(|b| b.is_ascii_digit());
     let cells = without_end(cells);
-    if separator != Separator::Mark(',') || cells.len() % 2 != 0 || !cells.iter().all(|cell| is_integer(cell))
+    if separator != Separator::Mark(',')
+        || !cells.len().is_multiple_of(2)
+        || !cells.iter().all(|cell| is_integer(cell))
     {
         return None;
     }
