@@ -272,7 +272,7 @@ mod tests {
 
     #[test]
     fn points_that_take_turns_are_not_halved() {
-        let turns = |k: usize| [circle(k)[0], circle(k)[1], if k % 2 == 0 { 9.0 } else { -9.0 }].to_vec();
+        let turns = |k: usize| [circle(k)[0], circle(k)[1], if k % 2 == 0 { 2.0 } else { -2.0 }].to_vec();
         let [three, six] = [3, 6].map(|columns| Reading { kind: Scalar::F32, columns });
         assert_eq!(judge(&bytes(Scalar::F32, 840, &turns), 4), Verdict::Either(three, six));
     }
