@@ -191,6 +191,9 @@ fn scaled(value: f64) -> f64 {
 mod tests {
     use super::*;
 
+    /// The numbers of a point.
+    type Row<'r> = &'r dyn Fn(usize) -> Vec<f64>;
+
     /// Numbers in a fixed order that looks random.
     fn noise(seed: usize) -> f64 {
         let mixed = (seed as u64)
@@ -224,11 +227,13 @@ mod tests {
 
     #[test]
     fn four_columns_are_found_right() {
-        let rows: [(&str, &dyn Fn(usize) -> Vec<f64>); 4] = [
+        let rows: [(&str, Row); 4] = [
             ("a room", &|k| [&room(k)[..], &[noise(k + 7)]].concat()),
             ("a circle", &|k| [&circle(k)[..], &[noise(k)]].concat()),
             ("intensities below 0", &|k| [&circle(k)[..], &[noise(k) - 0.5]].concat()),
-            ("two returns by turns", &|k| [&circle(k)[..], &[if k % 2 == 0 { 5.0 } else { 90.0 }]].concat()),
+            ("two returns by turns", &|k| {
+                [&circle(k)[..], &[if k.is_multiple_of(2) { 5.0 } else { 90.0 }]].concat()
+            }),
         ];
         for (what, row) in rows {
             // Sizes that fit any number of columns.
@@ -240,7 +245,7 @@ mod tests {
     #[test]
     fn other_columns_are_found_right() {
         let (narrow, wide) = (Scalar::F32, Scalar::F64);
-        let rows: [(&str, Scalar, usize, &dyn Fn(usize) -> Vec<f64>); 8] = [
+        let rows: [(&str, Scalar, usize, Row); 8] = [
             ("x y z", narrow, 3, &|k| room(k).to_vec()),
             ("x y z on a circle", narrow, 3, &|k| circle(k).to_vec()),
             ("colours", narrow, 6, &|k| [&room(k)[..], &[0.5, 0.5, 0.5]].concat()),
@@ -272,7 +277,8 @@ mod tests {
 
     #[test]
     fn points_that_take_turns_are_not_halved() {
-        let turns = |k: usize| [circle(k)[0], circle(k)[1], if k % 2 == 0 { 2.0 } else { -2.0 }].to_vec();
+        let turns =
+            |k: usize| [circle(k)[0], circle(k)[1], if k.is_multiple_of(2) { 2.0 } else { -2.0 }].to_vec();
         let [three, six] = [3, 6].map(|columns| Reading { kind: Scalar::F32, columns });
         assert_eq!(judge(&bytes(Scalar::F32, 840, &turns), 4), Verdict::Either(three, six));
     }
