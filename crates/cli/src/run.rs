@@ -6,8 +6,8 @@ use super::failure::JsonTo;
 use super::view;
 use super::{
     build, clear, completions, convert, crop, decay, demo, diff, digest, export, import, info, local, man,
-    merge, option_names, picture, progress, query, raycast, remap, remove_points, remove_scans, repair,
-    report, revert, scans, share, snapshot, snapshots, threads, verify,
+    merge, one_input, option_names, picture, progress, query, raycast, remap, remove_points, remove_scans,
+    repair, report, revert, scans, share, snapshot, snapshots, threads, verify,
 };
 #[cfg(feature = "bucket")]
 use super::{pull, push};
@@ -27,7 +27,8 @@ pub fn main() -> ExitCode {
 /// The command with `arguments`, the program's name first. It ends the process where they make no sense or ask for
 /// help, and it expects a process of its own: it sets up logging, threads and signals.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
-    let matches = Cli::command().get_matches_from(with_plain_numbers(arguments));
+    let matches = Cli::command().try_get_matches_from(with_plain_numbers(arguments));
+    let matches = matches.unwrap_or_else(|error| one_input::explained(error).exit());
     option_names::name_options_of(matches.subcommand_name().unwrap_or_default());
     let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     // The command line before the environment, where it says something.

@@ -74,7 +74,7 @@ impl Registry {
         if start.is_empty() {
             return Err(argument(path, "the file is empty"));
         }
-        if let Some(known) = self.of_start(&start) {
+        if let Some(known) = self.of_start(&start).or_else(|| self.packed_recording(path)) {
             return Ok(known);
         }
         if let Some(foreign) = foreign::of_bytes(&start) {
@@ -116,7 +116,8 @@ impl Registry {
         let listing = Listing::read(path, not_clouds)?;
         let mut counts = BTreeMap::new();
         for file in listing.clouds() {
-            if let Some(format) = self.in_folder(&extension_of(file)) {
+            let format = self.in_folder(&extension_of(file)).or_else(|| self.packed_recording(file));
+            if let Some(format) = format {
                 counts.entry(format.name).or_insert((format, file, 0_u64)).2 += 1;
             }
         }
@@ -152,6 +153,16 @@ impl Registry {
             }
             (None, _) => Err(argument(path, listing.why_nothing(&self.names(", "), &[]))),
         }
+    }
+
+    /// The format of a recording whose file is compressed as a whole: `a.mcap.zstd`.
+    fn packed_recording(&self, path: &Path) -> Option<&InputFormat> {
+        let is_packed = matches!(extension_of(path).as_str(), "zst" | "zstd");
+        let inner = extension_of(Path::new(path.file_stem().filter(|_| is_packed)?));
+        let is_it = |format: &&InputFormat| {
+            ["bag", "mcap", "db3"].contains(&format.name) && format.has_extension(&inner)
+        };
+        self.formats().iter().find(is_it)
     }
 
     /// The format of files with an extension, in lower case, in a folder of clouds.

@@ -94,6 +94,19 @@ fn recordings_of_either_ros_make_the_same_map() {
     assert!(!map.exists());
 }
 
+/// The shell's `drive_*.bag`.
+#[test]
+fn several_files_for_one_input_name_the_way() {
+    let folder = TempDir::new().unwrap();
+    let parts = ["0.bag", "1.bag"].map(|name| folder.path().join(name));
+    parts.iter().for_each(|part| fs::write(part, "").unwrap());
+    let map = folder.path().join("map");
+    let refused = refusal(&["build", text(&parts[0]), text(&parts[1]), "-o", text(&map)]);
+    assert!(refused.contains("an input is one file or folder: give the folder"), "{refused}");
+    let refused = refusal(&["build", text(&parts[0]), "gone.bag", "-o", text(&map)]);
+    assert!(refused.contains("gone.bag") && !refused.contains("give the folder"), "{refused}");
+}
+
 /// A backup is still a recording; what it says itself is not asked of anybody.
 #[cfg(feature = "ros")]
 #[test]

@@ -1,5 +1,9 @@
 //! The command, as a person or a program runs it.
 
+/// Recordings of ROS 1 that tests make.
+#[cfg(feature = "ros")]
+#[path = "../../../formats/tests/made/bag1.rs"]
+mod bag1;
 /// The command as a person types it.
 mod cli;
 /// The commands that merge, crop, clear and fade.
@@ -40,6 +44,9 @@ mod interrupted;
 #[allow(dead_code)]
 #[path = "../../../formats/tests/made/message.rs"]
 mod message;
+/// Recordings of programs for odometry.
+#[cfg(feature = "ros")]
+mod registered_clouds;
 /// Maps in a browser, by what the server sends.
 #[cfg(all(feature = "view", target_os = "linux"))]
 mod view;

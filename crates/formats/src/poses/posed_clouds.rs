@@ -89,6 +89,8 @@ pub(crate) struct PosedClouds {
     without_times: u64,
 }
 
+/// Why points are not moved.
+const IN_WORLD: &str = "points that are in the world frame already have no motion left in them";
 /// Most reasons that are told, and most clouds that are named for each.
 const MAX_NAMED: usize = 3;
 
@@ -100,8 +102,10 @@ impl PosedClouds {
         options: CloudOptions,
     ) -> Result<Self> {
         if options.is_deskewed && options.is_world_frame {
-            let reason = "points that are in the world frame already have no motion left in them; leave one of the two out";
-            return Err(Error::argument("deskew, world_frame", reason));
+            return Err(Error::argument(
+                "deskew, world_frame",
+                format!("{IN_WORLD}; leave one of the two out"),
+            ));
         }
         if let CloudPoses::File(trajectory) = &poses
             && !trajectory.has_stamps()
@@ -205,7 +209,11 @@ impl PosedClouds {
     fn read_points(&mut self, head: &CloudHead, body: &RigidPose, points: &mut PointStore) -> Result<Pose> {
         let sensor = body.then(&self.options.body_from_sensor);
         let mut world_from_sensor = Pose::from_quaternion(sensor.position_m, sensor.quaternion)?;
-        if self.options.is_world_frame {
+        let is_in_world = self.options.is_world_frame || head.is_in_world;
+        if is_in_world && self.options.is_deskewed {
+            return Err(Error::argument("deskew", IN_WORLD));
+        }
+        if is_in_world {
             // The points stay where they are to the last bits; a rotation and its inverse would move them.
             world_from_sensor = Pose::from_quaternion(sensor.position_m, RigidPose::IDENTITY.quaternion)?;
         }
@@ -225,7 +233,7 @@ impl PosedClouds {
             Deskew::new(stamp_ns, &sensor, pose_at)
         });
         points.begin(head.has_intensities);
-        let origin = if options.is_world_frame { sensor.position_m } else { [0.0; 3] };
+        let origin = if is_in_world { sensor.position_m } else { [0.0; 3] };
         let read = source.read_points(&mut |point| {
             let CloudPoint { position_m, intensity, is_return, .. } = point;
             let place = match is_return {
@@ -244,7 +252,7 @@ impl PosedClouds {
                 false => origin,
             };
             let in_sensor: Point = std::array::from_fn(|k| place[k] - origin[k]);
-            let in_sensor = if options.is_world_frame { in_sensor } else { place };
+            let in_sensor = if is_in_world { in_sensor } else { place };
             points.push(in_sensor, intensity)
         });
         self.stayed += deskew.map_or(0, |deskew| deskew.stayed());

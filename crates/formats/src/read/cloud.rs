@@ -12,6 +12,8 @@ pub struct CloudHead {
     pub frame: Option<String>,
     /// Where the sensor was, if the source knows it.
     pub world_from_sensor: Option<RigidPose>,
+    /// Its points are in the world frame already; `world_from_sensor` says from where they were seen.
+    pub is_in_world: bool,
     /// Number of points, if it is known before they are read. It may lie: it never sizes an allocation unchecked.
     pub points: Option<u64>,
     /// Names of the fields, in the words of the source.

@@ -1,4 +1,5 @@
 use super::cloud::{CloudHead, CloudPoint, CloudSource};
+use super::gray16::{self, size};
 use super::input_file::open_input;
 use super::intrinsics::Intrinsics;
 use super::one::Visit;
@@ -83,40 +84,13 @@ impl CloudSource for DepthFrames {
     }
 }
 
-/// Memory of the decoder, which holds a few rows: images may be a million pixels wide.
-const MAX_DECODER_BYTES: usize = 8 << 20;
-
 type Reader = png::Reader<BufReader<File>>;
-
-fn size(reader: &Reader) -> (u32, u32) {
-    (reader.info().width, reader.info().height)
-}
 
 fn open(path: &Path) -> Result<Reader> {
     check_regular(path)?;
     let file = open_input(path)?;
-    let limits = png::Limits { bytes: MAX_DECODER_BYTES };
-    let mut decoder = png::Decoder::new_with_limits(BufReader::with_capacity(1 << 16, file), limits);
-    decoder.set_ignore_text_chunk(true);
-    decoder.set_ignore_iccp_chunk(true);
-    decoder.set_transformations(png::Transformations::IDENTITY);
-    let reader = decoder.read_info().map_err(|error| wrong(path, &error))?;
-    let info = reader.info();
-    let refuse = |reason: String| Err(FormatError::at_offset(16, reason).in_input(path));
-    if (info.bit_depth, info.color_type) != (png::BitDepth::Sixteen, png::ColorType::Grayscale) {
-        return refuse(format!(
-            "is no depth image: those are grey with 16 bits, this one is {:?} with {:?}",
-            info.color_type, info.bit_depth
-        ));
-    }
-    if info.interlaced {
-        return refuse("is interlaced; save it without".into());
-    }
-    Ok(reader)
-}
-
-fn wrong(path: &Path, error: &png::DecodingError) -> Error {
-    FormatError::at_offset(0, error.to_string()).in_input(path)
+    let reader = gray16::open(BufReader::with_capacity(1 << 16, file));
+    reader.map_err(|(at, reason)| FormatError::at_offset(at, reason).in_input(path))
 }
 
 /// Reads an image row by row: each pixel is a point, or the direction in which nothing came back.

@@ -22,6 +22,7 @@ pub(crate) mod files;
 pub(crate) mod foreign;
 pub(crate) mod from_origin;
 pub(crate) mod glance;
+pub(crate) mod gray16;
 #[cfg(any(feature = "las", feature = "e57"))]
 mod guard;
 pub(crate) mod input_file;

@@ -2,7 +2,7 @@ use super::bag1_record::{Record, RecordKind};
 use super::chunk::{ChunkPlace, MAX_CHUNK_BYTES, MessagePlace, OpenChunk, decompress, plain};
 use super::chunk_file::{ChunkFile, Shares, TakeMessage, Walk, check_chunks};
 use super::chunk_order::{ChunkOrder, Step};
-use super::file_bytes::FileBytes;
+use super::file_bytes::{FileBytes, cut_at};
 use super::recording::{Message, Recording, Topic, TopicList};
 use super::wire::Wire;
 use crate::spill::{Budget, Complaint, SpillFile, StreamSize, Window};
@@ -162,8 +162,11 @@ impl Bag1 {
     /// Finds chunks one after the other and looks into each, where there is no index.
     fn scan(&mut self) -> Result<()> {
         let mut at = MAGIC.len() as u64;
-        let mut walk = Walk::default();
+        let (mut walk, mut cut) = (Walk::default(), String::new());
         while let Some((record, next)) = self.record(at)? {
+            if next > self.file.len {
+                cut = cut_at(at, self.file.len, Some(next));
+            }
             if record.op == Some(RecordKind::Connection) {
                 self.connect(&record, &record.data);
             }
@@ -173,7 +176,13 @@ impl Bag1 {
             at = next;
         }
         let (path, len, messages) = (self.file.path().display(), self.file.len, walk.messages);
-        let cut = if at == len { "" } else { ", which ends in the midst of a record (it was cut off)" };
+        if at < len {
+            cut = cut_at(at, len, None);
+        }
+        let cut = match at == len {
+            true => String::new(),
+            false => format!(", which ends in the midst of a record (it was cut off{cut})"),
+        };
         self.remarks.push(format!(
             "{path} has no index (the recorder did not close it){cut}: {messages} messages were found by reading it \
              whole"

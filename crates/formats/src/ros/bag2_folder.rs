@@ -1,29 +1,20 @@
 use super::bag2_metadata::Bag2Metadata;
-use super::chunk::{MAX_CHUNK_BYTES, decompress, unpacker};
-use super::message_data::MessageData;
 use super::open::open_file;
 use super::recording::{Message, Recording, Topic};
 use super::sequence::Sequence;
 use crate::read::inside::is_inside;
-use crate::spill::{Budget, Bytes, SpillFile, StreamSize};
+use crate::spill::Budget;
 use std::collections::HashSet;
 use std::fs::File;
-use std::io::{BufReader, Read, Write};
+use std::io::Read;
 use std::path::{Path, PathBuf};
-use tempfile::TempDir;
 use voxtile::{Error, FormatError, Result};
 
 /// A folder of `ros2 bag`: `metadata.yaml` and the files that it names, in order. Without one, all recordings in the
 /// folder in the natural order of their names: the parts of a bag that `rosbag record --split` wrote.
-///
-/// Files that are compressed as a whole are unpacked into a temporary folder, which goes with this.
 pub struct Bag2Folder {
-    path: PathBuf,
     files: Sequence,
-    has_compressed_messages: bool,
-    spill: SpillFile,
     remarks: Vec<String>,
-    _unpacked: Option<TempDir>,
 }
 
 /// A longer `metadata.yaml` is an error.
@@ -45,7 +36,6 @@ impl Bag2Folder {
     ///
     /// As for [`Bag2Folder::open`].
     pub fn open_within(path: &Path, budget: &Budget) -> Result<Self> {
-        let scratch = budget.scratch.as_deref();
         let mut remarks = Vec::new();
         let metadata_path = path.join("metadata.yaml");
         let (metadata, files) = if metadata_path.is_file() {
@@ -90,57 +80,16 @@ impl Bag2Folder {
             let reason = format!("compression_format `{format}` is not read; known: zstd");
             return Err(FormatError::at_offset(0, reason).in_input(&metadata_path));
         }
-        let (mut unpacked, spill) = (None, SpillFile::new(budget));
         let mut recordings = Sequence::default();
-        for (number, file) in files.iter().enumerate() {
-            if is_packed(file) {
-                let folder = match &mut unpacked {
-                    Some(folder) => folder,
-                    none => none.insert(temporary_folder(scratch)?),
-                };
-                let (plain, damage) = unpack(file, folder.path(), number, &spill)?;
-                // The name of the temporary file would tell nobody anything.
-                let damaged = damage.map(|damage| format!("it is cut off or damaged ({damage})"));
-                let opened = open_file(&plain, budget).map_err(|error| {
-                    let damaged = damaged.as_deref().unwrap_or("it was unpacked");
-                    FormatError::at_offset(
-                        0,
-                        format!("{damaged}, and what is in it cannot be read: {error:#}"),
-                    )
-                    .in_input(file)
-                })?;
-                let remark =
-                    damaged.map(|damaged| format!("{}: {damaged}; read as far as it goes", file.display()));
-                remarks.extend(remark);
-                recordings.push(opened);
-            } else {
-                recordings.push(open_file(file, budget)?);
-            }
-        }
-        Ok(Self {
-            path: path.to_owned(),
-            files: recordings,
-            has_compressed_messages: metadata.compression_mode.eq_ignore_ascii_case("message"),
-            spill,
-            remarks,
-            _unpacked: unpacked,
-        })
+        files.iter().try_for_each(|file| open_file(file, budget).map(|file| recordings.push(file)))?;
+        Ok(Self { files: recordings, remarks })
     }
-}
-
-fn temporary_folder(scratch: Option<&Path>) -> Result<TempDir> {
-    let scratch = scratch.map_or_else(std::env::temp_dir, Path::to_owned);
-    tempfile::tempdir_in(&scratch).map_err(|error| Error::io(&scratch, "unpack a recording into", error))
 }
 
 /// By its name; one that the recorder did not close ends with `.bag.active`.
 fn is_bag1(file: &Path) -> bool {
     let name = file.to_string_lossy().to_lowercase();
     name.ends_with(".bag") || name.ends_with(".bag.active")
-}
-
-fn is_packed(file: &Path) -> bool {
-    file.extension().is_some_and(|extension| extension == "zstd" || extension == "zst")
 }
 
 /// A file that the metadata name: beside them, perhaps behind the name of the folder, perhaps compressed since. Of one
@@ -174,35 +123,15 @@ fn files_of(folder: &Path) -> Result<Vec<PathBuf>> {
     for entry in std::fs::read_dir(folder).map_err(wrong)? {
         let path = entry.map_err(wrong)?.path();
         let name = path.to_string_lossy().to_lowercase();
-        let name = name.trim_end_matches(".zstd");
-        if path.is_file() && (is_bag1(&path) || [".mcap", ".db3"].iter().any(|known| name.ends_with(known))) {
+        let name = [".zstd", ".zst"].iter().find_map(|end| name.strip_suffix(end)).unwrap_or(&name);
+        if path.is_file()
+            && (is_bag1(Path::new(name)) || [".mcap", ".db3"].iter().any(|known| name.ends_with(known)))
+        {
             files.push(path);
         }
     }
     alphanumeric_sort::sort_path_slice(&mut files);
     Ok(files)
-}
-
-/// Unpacks a compressed file; as much of it as is whole, and why not more, if it is cut off. Files of other folders, or
-/// `a.mcap.zst` beside `a.mcap.zstd`, may have the same name without its end: the number of the file tells them apart.
-fn unpack(file: &Path, folder: &Path, number: usize, spill: &SpillFile) -> Result<(PathBuf, Option<String>)> {
-    let stem = file.file_stem().unwrap_or_default().to_string_lossy();
-    let target = folder.join(format!("{number}_{stem}"));
-    let input = File::open(file).map_err(|error| Error::io(file, "read", error))?;
-    let mut output = File::create(&target).map_err(|error| Error::io(&target, "write", error))?;
-    let mut decoder =
-        unpacker(BufReader::new(input), spill).map_err(|error| Error::io(file, "unpack", error))?;
-    let mut bytes = vec![0; 1 << 16];
-    loop {
-        match decoder.read(&mut bytes) {
-            Ok(0) => return Ok((target, None)),
-            Ok(count) => {
-                let taken = bytes.get(..count).unwrap_or_default();
-                output.write_all(taken).map_err(|error| Error::io(&target, "write", error))?;
-            }
-            Err(error) => return Ok((target, Some(error.to_string()))),
-        }
-    }
 }
 
 impl Recording for Bag2Folder {
@@ -219,29 +148,7 @@ impl Recording for Bag2Folder {
     }
 
     fn next_message(&mut self) -> Result<Option<Message>> {
-        let Some(mut message) = self.files.next_message()? else { return Ok(None) };
-        if self.has_compressed_messages {
-            let input = match &message.data.0 {
-                Bytes::Memory(bytes) => Ok(bytes.as_slice()),
-                Bytes::File(part) => Err(part.reader()),
-            };
-            let memory_bytes = self.spill.budget().bytes / 2;
-            let size = StreamSize::AtMost(MAX_CHUNK_BYTES);
-            let mut unpacked = |input: &mut dyn Read| {
-                decompress("zstd", input, size, &mut self.spill, memory_bytes, &mut |_| {})
-            };
-            let (data, complaint) = match input {
-                Ok(mut bytes) => unpacked(&mut bytes)?,
-                Err(mut reader) => unpacked(&mut reader)?,
-            };
-            if let Some(complaint) = complaint {
-                let (log_ns, why) = (message.log_ns, complaint.reason);
-                let reason = format!("a message recorded at {log_ns} ns cannot be unpacked: {why}");
-                return Err(Error::argument(self.path.display().to_string(), reason));
-            }
-            message.data = MessageData(data);
-        }
-        Ok(Some(message))
+        self.files.next_message()
     }
 
     fn close_files(&mut self) {

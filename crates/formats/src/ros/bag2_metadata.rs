@@ -5,12 +5,10 @@ pub(super) struct Bag2Metadata {
     pub(super) files: Vec<String>,
     /// Empty if nothing is compressed.
     pub(super) compression_format: String,
-    /// `FILE`, `MESSAGE` or empty.
-    pub(super) compression_mode: String,
 }
 
 impl Bag2Metadata {
-    /// Reads the lines of the three keys. `ros2 bag` and rosbags write each of them once, outside of other lists.
+    /// Reads the lines of the two keys. `ros2 bag` and rosbags write each of them once, outside of other lists.
     pub(super) fn of(text: &str) -> Self {
         let mut metadata = Self::default();
         let mut is_in_files = false;
@@ -35,7 +33,6 @@ impl Bag2Metadata {
                     }
                 }
                 "compression_format" => metadata.compression_format = scalar(value),
-                "compression_mode" => metadata.compression_mode = scalar(value),
                 _ => {}
             }
         }
@@ -57,10 +54,10 @@ mod tests {
     #[test]
     fn lists_stand_below_their_key_or_behind_it() {
         let text = "a:\n  relative_file_paths:\n    - x_0.db3\n    - \"x_1.db3\"\n  \
-                    compression_mode: ''\n  files:\n  - path: y\n";
+                    compression_format: ''\n  files:\n  - path: y\n";
         let metadata = Bag2Metadata::of(text);
         assert_eq!(metadata.files, ["x_0.db3", "x_1.db3"]);
-        assert_eq!(metadata.compression_mode, "");
+        assert_eq!(metadata.compression_format, "");
         assert_eq!(Bag2Metadata::of("relative_file_paths: [a.mcap, 'b.mcap']").files, ["a.mcap", "b.mcap"]);
     }
 }

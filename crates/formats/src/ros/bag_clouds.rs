@@ -6,9 +6,11 @@ use super::message_data::{MessageData, read};
 use super::messages::{CameraInfo, Header, MAX_HEAD_BYTES, MessageKind};
 use super::open::open_recording_within;
 use super::recording::{Message, Recording, Topic};
+use super::registered::find_registered;
 use super::wire::Wire;
 use crate::read::cloud::{CloudHead, CloudPoint, CloudSource, PoseAt};
 use crate::spill::{Bytes, FilePart};
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use voxtile::{Error, FormatError, Result};
 
@@ -30,6 +32,8 @@ pub struct BagClouds {
     frame: Option<String>,
     /// Number of clouds whose stamp is 0.
     without_stamp: u64,
+    /// Number of clouds that are read otherwise than they say.
+    repaired: BTreeMap<&'static str, u64>,
 }
 
 /// The message of the cloud at hand.
@@ -59,7 +63,9 @@ pub fn open_bag(paths: &[PathBuf], options: &BagOptions) -> Result<BagClouds> {
     let mut recording = open_recording_within(paths, &options.budget()).map_err(name_it)?;
     let whole_bytes = options.budget().whole_bytes();
     let chosen = choose_clouds(recording.as_mut(), options.topic.as_deref(), whole_bytes).map_err(name_it)?;
-    let poses = BagPoses::read(recording.as_mut(), options).map_err(name_it)?;
+    let poses = BagPoses::read(recording.as_mut(), options)
+        .and_then(|poses| find_registered(recording.as_mut(), chosen.index, poses, options))
+        .map_err(name_it)?;
     let topic = recording.topics().get(chosen.index).cloned();
     let gone = || Error::argument(path.display().to_string(), "the topic of the clouds is gone");
     let topic = topic.ok_or_else(gone)?;
@@ -82,6 +88,7 @@ pub fn open_bag(paths: &[PathBuf], options: &BagOptions) -> Result<BagClouds> {
         whole_bytes,
         frame: None,
         without_stamp: 0,
+        repaired: BTreeMap::new(),
     })
 }
 
@@ -186,11 +193,16 @@ impl CloudSource for BagClouds {
         let stamp_ns = stamp_of(&header, &message);
         let (points, fields) = (cloud.points_claimed(), cloud.fields());
         let (has_intensities, has_times) = (cloud.has_intensities(), cloud.has_times());
+        for repair in cloud.repairs().to_vec() {
+            *self.repaired.entry(repair).or_default() += 1;
+        }
         self.without_stamp += u64::from(header.stamp_ns == 0);
+        let placed = self.poses.place(&header.frame_id, stamp_ns)?;
         let head = CloudHead {
             name: number.to_string(),
             stamp_ns: Some(stamp_ns),
-            world_from_sensor: self.poses.world_from_sensor(&header.frame_id, stamp_ns)?,
+            world_from_sensor: placed.map(|placed| placed.world_from_sensor),
+            is_in_world: placed.is_some_and(|placed| placed.is_in_world),
             frame: Some(header.frame_id),
             points: Some(points),
             fields,
@@ -219,7 +231,9 @@ impl CloudSource for BagClouds {
 
     fn remarks(&self) -> Vec<String> {
         let mut remarks = self.recording.remarks();
+        remarks.extend(self.chosen.remarks.iter().cloned());
         remarks.extend(self.poses.remarks());
+        remarks.extend(self.repaired.iter().map(|(repair, count)| format!("{count} clouds {repair}")));
         if self.without_stamp > 0 {
             let count = self.without_stamp;
             remarks

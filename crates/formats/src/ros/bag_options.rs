@@ -15,6 +15,11 @@ pub struct BagOptions {
     pub poses: PoseSource,
     /// Between two poses further apart in time there is none; see [`most_gap_ns`](crate::poses::most_gap_ns).
     pub most_gap_ns: Option<i64>,
+    /// Points are in the frame of the map already; poses only say from where they were seen.
+    pub is_world_frame: bool,
+    /// Whether poses are looked for in other topics than those that are named, for clouds that are in the frame of the
+    /// map already.
+    pub are_poses_needed: bool,
     /// Bytes of memory for chunks, messages and poses; beyond them they go to temporary files.
     pub memory_bytes: usize,
     /// Folder that compressed files are unpacked into, and of other temporary files; the system's own if `None`.
@@ -36,6 +41,8 @@ impl Default for BagOptions {
             fixed_frame: None,
             poses: PoseSource::default(),
             most_gap_ns: None,
+            is_world_frame: false,
+            are_poses_needed: true,
             memory_bytes: Budget::DEFAULT_BYTES,
             scratch: None,
         }

@@ -1,12 +1,13 @@
 use super::bag_options::{BagOptions, PoseSource};
 use super::bag_topic::{choose_poses, kind_of};
-use super::messages::{MessageKind, StampedPose, visit_poses};
+use super::messages::{MessageKind, visit_poses};
 use super::pose_lookup::PoseLookup;
 use super::pose_track::PoseTrack;
 use super::recording::{Recording, Topic};
 use super::sample_spool::SampleSpool;
-use super::second_parent::SecondParent;
+use super::transform_intake::{TransformIntake, remark_on};
 use super::transforms::{Transforms, WhyNot};
+use super::unstamped::Unstamped;
 use crate::poses::RigidPose;
 use crate::spill::Budget;
 use std::collections::{BTreeMap, HashMap};
@@ -22,6 +23,18 @@ pub(super) struct BagPoses {
     fixed_frame: Option<String>,
     /// Poses of a topic, until they are among the transforms.
     track: PoseTrack,
+    /// The frame that the poses of a topic are of, once they are among the transforms.
+    body: Option<String>,
+    /// The frame of clouds that are in that of the map already, and the frame from where they were seen.
+    registered: Option<(String, String)>,
+    is_world_frame: bool,
+    are_poses_needed: bool,
+    /// What is read, as options say it.
+    odometry_topic: Option<String>,
+    /// Whether any cloud had a pose.
+    has_placed: bool,
+    /// What to do if no cloud has a pose.
+    hints: Vec<String>,
     /// How the pose of a sensor is looked up, by its frame.
     lookups: HashMap<String, std::result::Result<PoseLookup, WhyNot>>,
     /// Number of clouds without a pose, by reason.
@@ -29,22 +42,33 @@ pub(super) struct BagPoses {
     remarks: Vec<String>,
 }
 
+/// Where a sensor was.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Placed {
+    pub(super) world_from_sensor: RigidPose,
+    /// The points are in the frame of the map already.
+    pub(super) is_in_world: bool,
+}
+
+/// What names of frames contain that do not move.
+const MAP_NAMES: [&str; 6] = ["map", "odom", "world", "camera_init", "global", "earth"];
+/// What names of sensors, and of what carries them, contain.
+const BODY_NAMES: [&str; 14] = [
+    "base", "body", "camera", "imu", "laser", "lidar", "livox", "mapped", "os_", "ouster", "robot", "sensor",
+    "vehicle", "velodyne",
+];
+/// The frame of poses that do not name theirs, where it is not that of the clouds.
+const UNNAMED_BODY: &str = "(unnamed)";
+/// Most topics that a hint names.
+const MAX_NAMED: usize = 10;
 /// Memory that a sample takes.
 const SAMPLE_BYTES: usize = 96;
-/// Most pairs of a frame and its parent; a robot has a hundred.
-const MAX_LINKS: usize = 10_000;
-/// A longer name of a frame is damage.
-const MAX_NAME_BYTES: usize = 256;
 /// Most frames of sensors whose lookups are kept. A topic has few; those of more are made again.
 const MAX_LOOKUPS: usize = 32;
 /// Most reasons that are counted for clouds without a pose.
 const MAX_REASONS: usize = 100;
 /// The frames that a robot moves by, if a pose does not name its own.
 const BASE_FRAMES: [&str; 2] = ["base_link", "base_footprint"];
-/// Second parents of frames that are reported, and links among which they are looked for.
-const MAX_SECONDS: usize = 8;
-const MAX_CHECKED: usize = 2000;
-
 impl BagPoses {
     /// Reads all transforms, and the poses of a topic if these are asked for.
     pub(super) fn read(recording: &mut dyn Recording, options: &BagOptions) -> Result<Self> {
@@ -53,6 +77,13 @@ impl BagPoses {
             transforms: Arc::default(),
             fixed_frame: options.fixed_frame.as_ref().map(|frame| frame.trim_start_matches('/').to_owned()),
             track: PoseTrack::default(),
+            body: None,
+            registered: None,
+            is_world_frame: options.is_world_frame,
+            are_poses_needed: options.are_poses_needed,
+            odometry_topic: None,
+            has_placed: false,
+            hints: Vec::new(),
             lookups: HashMap::new(),
             without: BTreeMap::new(),
             remarks: Vec::new(),
@@ -69,6 +100,10 @@ impl BagPoses {
             _ => None,
         };
         wanted.extend(odometry);
+        poses.odometry_topic = odometry.and_then(|index| topics.get(index)).map(|topic| topic.name.clone());
+        if odometry.is_none() {
+            poses.hints.extend(poses_of_topics(&topics));
+        }
         poses.read_topics(recording, &topics, &wanted, odometry, &options.budget())?;
         match odometry.and_then(|index| topics.get(index)) {
             Some(topic) if poses.track.poses.is_empty() => Err(poses.without_track(topic)),
@@ -99,21 +134,20 @@ impl BagPoses {
         odometry: Option<usize>,
         budget: &Budget,
     ) -> Result<()> {
-        let (mut bad, mut first_bad, mut beyond) = (0_u64, None, 0_u64);
+        let (mut bad, mut first_bad) = (0_u64, None);
         let mut note = |what: String| {
             bad += 1;
             first_bad.get_or_insert(what);
         };
-        let (mut invalid, mut first_invalid) = (0_u64, None);
-        let (mut checked, mut seconds): (usize, Vec<SecondParent>) = (0, Vec::new());
-        let share = budget.bytes / 2;
-        let (mut links, mut in_memory, mut spool) = (0_usize, 0, None);
-        let transforms = Arc::make_mut(&mut self.transforms);
+        let (mut intake, share) = (TransformIntake::default(), budget.bytes / 2);
+        let (mut unstamped, mut unstamped_track) = (Unstamped::default(), Unstamped::default());
+        let (mut in_memory, mut spool) = (0, None);
+        let (transforms, track) = (Arc::make_mut(&mut self.transforms), &mut self.track);
         recording.begin(wanted)?;
         loop {
             if in_memory > share / SAMPLE_BYTES {
                 let spool = spool.get_or_insert_with(|| SampleSpool::new(budget, share));
-                spool.take(transforms.samples_mut().chain([&mut self.track.poses]))?;
+                spool.take(transforms.samples_mut().chain([&mut track.poses]))?;
                 in_memory = 0;
             }
             let mut message = match recording.next_message() {
@@ -142,75 +176,98 @@ impl BagPoses {
             };
             let is_track = Some(message.topic) == odometry;
             let is_static = topic.name.ends_with("tf_static");
+            let log_ns = message.log_ns;
             let decoded = visit_poses(kind, wire, data, &mut |pose| {
                 in_memory += 1;
-                if is_track {
-                    return self.track.insert(pose);
-                }
-                let StampedPose { header, child_frame, parent_from_child } = pose;
-                let (parent, stamp_ns) = (header.frame_id.as_str(), header.stamp_ns);
-                // A frame that has many parents loses one for the next.
-                let parents = transforms.parents_of(&child_frame);
-                let is_new = !transforms.has_link(parent, &child_frame);
-                if is_new && (links >= MAX_LINKS || parent.len().max(child_frame.len()) > MAX_NAME_BYTES) {
-                    beyond += 1;
-                    return;
-                }
-                match transforms.insert(parent, &child_frame, stamp_ns, parent_from_child, is_static) {
-                    Ok(false) => {}
-                    Ok(true) => {
-                        links += transforms.parents_of(&child_frame).saturating_sub(parents);
-                        checked += 1;
-                        if checked <= MAX_CHECKED && seconds.len() < MAX_SECONDS {
-                            seconds.extend(transforms.second_parent(parent, &child_frame));
-                        }
-                    }
-                    Err(why) => {
-                        invalid += 1;
-                        first_invalid.get_or_insert(why);
-                    }
+                match (is_track, is_static) {
+                    (true, _) => unstamped_track.sort(pose, log_ns, &mut |pose| track.insert(pose)),
+                    (false, true) => intake.take(transforms, pose, true),
+                    _ => unstamped.sort(pose, log_ns, &mut |pose| intake.take(transforms, pose, false)),
                 }
             });
             if let Err(error) = decoded {
                 note(format!("{}: {error}", topic.name));
             }
         }
+        unstamped_track.finish(&mut |pose| track.insert(pose));
+        unstamped.finish(&mut |pose| intake.take(transforms, pose, false));
         if let Some(spool) = spool {
-            spool.finish(transforms.samples_mut().chain([&mut self.track.poses]))?;
+            spool.finish(transforms.samples_mut().chain([&mut track.poses]))?;
         }
         if let Some(first) = first_bad {
             self.remarks
                 .push(format!("{bad} messages or chunks with poses cannot be read; the first: {first}"));
         }
-        if beyond > 0 {
-            self.remarks.push(format!(
-                "{beyond} transforms are left out: their frames are more than {MAX_LINKS}, or have names of more than \
-                 {MAX_NAME_BYTES} bytes"
-            ));
+        self.remarks.extend(intake.remarks());
+        let count = unstamped.count + unstamped_track.count;
+        if count > 0 {
+            self.remarks
+                .push(format!("{count} poses have no stamp; they are taken as of when they were recorded"));
         }
-        if let Some(first) = first_invalid {
-            self.remarks.push(format!("{invalid} transforms are not valid and left out; the first: {first}"));
-        }
-        self.remarks.extend(seconds.into_iter().map(told));
         Ok(())
     }
 
+    /// Whether the place of a frame in the map is known by what moves it.
+    pub(super) fn places(&self, frame: &str) -> bool {
+        let fixed = self.fixed_frame.clone().map_or_else(|| self.fixed_frame_of(frame), Ok);
+        fixed.is_ok_and(|fixed| fixed != frame)
+    }
+
+    /// Whether a frame moves.
+    pub(super) fn moves(&self, frame: &str) -> bool {
+        self.transforms.ancestors(frame).iter().any(|frame| self.transforms.is_moving(frame))
+    }
+
+    /// Whether anything moves in a frame.
+    pub(super) fn moves_below(&self, frame: &str) -> bool {
+        !self.transforms.moving_below(frame).is_empty()
+    }
+
+    /// Takes clouds in this frame as those of the map, seen from what moves in it. `false` if it is not called as a map
+    /// is, if nothing moves in it, or several frames do, none of which is that of a robot.
+    pub(super) fn see_from_below(&mut self, frame: &str) -> bool {
+        let is_like =
+            |frame: &str, names: &[&str]| names.iter().any(|name| frame.to_lowercase().contains(name));
+        // Wheels and arms move in the frame of a robot.
+        if !is_like(frame, &MAP_NAMES) {
+            return false;
+        }
+        let moving = self.transforms.moving_below(frame);
+        let last: Vec<&String> =
+            moving.iter().filter(|(_, is_last)| *is_last).map(|(name, _)| name).collect();
+        let base =
+            BASE_FRAMES.iter().find_map(|base| moving.iter().map(|(name, _)| name).find(|name| name == base));
+        let body = if let [only] = last[..] { Some(only) } else { base };
+        // An arm may move before a camera that stands.
+        let Some(body) = body.filter(|body| is_like(body, &BODY_NAMES)) else { return false };
+        self.registered = Some((frame.to_owned(), body.clone()));
+        self.fixed_frame = Some(frame.to_owned());
+        true
+    }
+
+    /// Says what to do if no cloud has a pose.
+    pub(super) fn hint(&mut self, hint: String) {
+        self.hints = vec![hint];
+    }
+
     /// Where the sensor was; counts why not.
-    pub(super) fn world_from_sensor(
-        &mut self,
-        sensor_frame: &str,
-        stamp_ns: i64,
-    ) -> Result<Option<RigidPose>> {
-        let found = match self.source {
-            PoseSource::None => return Ok(None),
-            PoseSource::Odometry if !self.track.poses.is_empty() => {
-                self.settle_track(sensor_frame);
-                self.find(sensor_frame, stamp_ns)
+    pub(super) fn place(&mut self, cloud_frame: &str, stamp_ns: i64) -> Result<Option<Placed>> {
+        if self.source == PoseSource::None {
+            return Ok(None);
+        }
+        if self.source == PoseSource::Odometry && !self.track.poses.is_empty() {
+            self.settle_track(cloud_frame);
+        }
+        let seen_from = self.seen_from(cloud_frame);
+        let is_in_world = seen_from.is_some();
+        match self.find(seen_from.as_deref().unwrap_or(cloud_frame), stamp_ns) {
+            Ok(world_from_sensor) => {
+                if let Some(body) = seen_from.filter(|_| self.registered.is_none()) {
+                    self.registered = Some((cloud_frame.to_owned(), body));
+                }
+                self.has_placed = true;
+                Ok(Some(Placed { world_from_sensor, is_in_world }))
             }
-            _ => self.find(sensor_frame, stamp_ns),
-        };
-        match found {
-            Ok(pose) => Ok(Some(pose)),
             Err(WhyNot::Unreadable(why)) => Err(Error::argument("poses of the recording", why)),
             Err(why) => {
                 let mut why = why.to_string();
@@ -221,6 +278,21 @@ impl BagPoses {
                 Ok(None)
             }
         }
+    }
+
+    /// The frame from where clouds were seen that are in the frame of the map already.
+    fn seen_from(&self, cloud_frame: &str) -> Option<String> {
+        if !self.are_poses_needed {
+            return None;
+        }
+        if let Some((_, body)) = self.registered.as_ref().filter(|(frame, _)| frame == cloud_frame) {
+            return Some(body.clone());
+        }
+        let body = self.body.as_deref().filter(|body| *body != cloud_frame)?;
+        let is_fixed = self.fixed_frame.as_deref() == Some(cloud_frame);
+        // Of points in the world, only the place of the sensor is asked for.
+        let is_unknown = self.is_world_frame && !self.transforms.knows(cloud_frame);
+        (is_fixed || is_unknown).then(|| body.to_owned())
     }
 
     fn find(&mut self, sensor_frame: &str, stamp_ns: i64) -> std::result::Result<RigidPose, WhyNot> {
@@ -272,7 +344,11 @@ impl BagPoses {
     /// Puts the poses of a topic among the transforms, in the place of those of the same frame.
     fn settle_track(&mut self, sensor_frame: &str) {
         let PoseTrack { parent, child: named, poses, mut odd } = std::mem::take(&mut self.track);
-        let child = if named.is_empty() { self.base_of(sensor_frame) } else { named.clone() };
+        let mut child = if named.is_empty() { self.base_of(sensor_frame) } else { named.clone() };
+        if named.is_empty() && child == parent {
+            child = UNNAMED_BODY.to_owned();
+        }
+        self.body = Some(child.clone());
         let transforms = Arc::make_mut(&mut self.transforms);
         transforms.detach(&child);
         if self.fixed_frame.is_none() {
@@ -282,7 +358,7 @@ impl BagPoses {
         }
         let count = poses.len() as u64;
         match transforms.attach(&parent, &child, poses) {
-            Ok(_) => self.remarks.extend(transforms.second_parent(&parent, &child).map(told)),
+            Ok(_) => self.remarks.extend(transforms.second_parent(&parent, &child).map(remark_on)),
             Err(_) => odd += count,
         }
         if odd > 0 {
@@ -291,7 +367,7 @@ impl BagPoses {
             );
             self.remarks.push(remark);
         }
-        if named.is_empty() {
+        if named.is_empty() && child != UNNAMED_BODY {
             self.remarks.push(format!(
                 "the poses do not say of which frame they are; they are taken as those of {child}"
             ));
@@ -308,13 +384,30 @@ impl BagPoses {
     /// What a person should know.
     pub(super) fn remarks(&self) -> impl Iterator<Item = String> + '_ {
         let without = self.without.iter().map(|(why, count)| format!("{count} clouds have no pose: {why}"));
-        self.remarks.iter().cloned().chain(without)
+        let is_without = !self.has_placed && !self.without.is_empty();
+        let hints = self.hints.iter().filter(move |_| is_without).cloned();
+        let registered = self.registered.as_ref().filter(|_| self.has_placed && !self.is_world_frame);
+        let registered = registered.map(|(frame, body)| {
+            let option = self.odometry_topic.as_ref();
+            let option = option.map(|topic| format!(" (`odometry` {topic} `world_frame`)")).unwrap_or_default();
+            format!("the clouds are in the frame {frame} already: they are taken as they are, seen from {body}{option}")
+        });
+        self.remarks.iter().cloned().chain(registered).chain(without).chain(hints)
     }
 }
 
-fn told(second: SecondParent) -> String {
-    format!(
-        "{second}; a parent named by one transform, or one that closes a loop, is used only if no other leads to the map \
-         frame"
-    )
+/// The topics with poses, as what to do without `/tf`.
+fn poses_of_topics(topics: &[Topic]) -> Option<String> {
+    let is_pose = |topic: &&Topic| topic.messages > 0 && kind_of(topic).is_some_and(MessageKind::is_pose);
+    let mut found = topics.iter().filter(is_pose).peekable();
+    let first = found.peek()?.name.clone();
+    let all: Vec<String> = found
+        .take(MAX_NAMED)
+        .map(|topic| format!("{} ({}, {} messages)", topic.name, topic.type_name, topic.messages))
+        .collect();
+    Some(format!(
+        "poses are in {}: name their topic, as with `odometry` {first}, and `world_frame` if the points are in the frame \
+         of the map already",
+        all.join(", ")
+    ))
 }

@@ -1,10 +1,9 @@
-use super::messages::{Image, MessageKind, is_depth_encoding};
+use super::cloud_topics::{CloudTopics, packets_of};
+use super::depth_images::{DepthImages, camera_name};
+use super::messages::MessageKind;
 use super::recording::{Recording, Topic};
-use std::collections::HashSet;
 use voxtile::{Error, Result};
 
-/// Most topics of images that are looked into. Of more, the user chooses.
-const MAX_LOOKED_INTO: usize = 100;
 /// Most topics that an error lists.
 const MAX_LISTED: usize = 100;
 
@@ -15,6 +14,8 @@ pub(super) struct Chosen {
     pub(super) kind: MessageKind,
     /// The topic of the camera, for depth images.
     pub(super) camera: Option<usize>,
+    /// What a person should know of the choice.
+    pub(super) remarks: Vec<String>,
 }
 
 /// The kind of the messages of a topic that can be decoded.
@@ -32,52 +33,26 @@ pub(super) fn choose_clouds(
     if let Some(name) = name {
         let index = named(&topics, name, "topic")?;
         let topic = topics.get(index);
-        let Some(kind) = topic.and_then(kind_of).filter(|kind| kind.is_cloud()) else {
+        let Some((topic, kind)) =
+            topic.and_then(|topic| Some((topic, kind_of(topic).filter(|kind| kind.is_cloud())?)))
+        else {
             let type_name = topic.map_or("", |topic| topic.type_name.as_str());
-            return Err(Error::argument(
-                format!("topic {name}"),
-                format!("messages of type {type_name} are no clouds; topics: {}", list(topics.iter())),
-            ));
+            let packets = topic.and_then(packets_of).map(|packets| packets + "; ").unwrap_or_default();
+            let list = list(topics.iter());
+            let reason = format!("messages of type {type_name} are no clouds; {packets}topics: {list}");
+            return Err(Error::argument(format!("topic {name}"), reason));
         };
-        return chosen(&topics, index, kind);
-    }
-    let (mut found, mut looked_into) = (Vec::new(), 0);
-    let is_camera = |topic: &&Topic| kind_of(topic) == Some(MessageKind::CameraInfo);
-    let cameras: HashSet<&str> = topics.iter().filter(is_camera).map(|topic| topic.name.as_str()).collect();
-    for (index, topic) in topics.iter().enumerate().filter(|(_, topic)| topic.messages > 0) {
-        let Some(kind) = kind_of(topic).filter(|kind| kind.is_cloud()) else { continue };
-        let is_found = if kind != MessageKind::Image {
-            true
-        } else if !cameras.contains(camera_name(&topic.name).as_str()) {
-            false
-        } else {
-            // Each look may read the recording up to the first image.
-            looked_into += 1;
-            looked_into > MAX_LOOKED_INTO || holds_depths(recording, index, topic, whole_bytes)?
-        };
-        if is_found {
-            found.push((index, kind));
+        let mut chosen = chosen(&topics, index, kind)?;
+        if kind.is_image()
+            && let Some(images) = DepthImages::of_topic(recording, index, topic, kind, whole_bytes)?
+            && images.holds_depths() == Some(false)
+        {
+            let encoding = &images.encoding;
+            chosen.remarks.push(format!("{} ({encoding}) is read as depths, as it was named", topic.name));
         }
+        return Ok(chosen);
     }
-    match found.as_slice() {
-        &[(index, kind)] => chosen(&topics, index, kind),
-        [] => {
-            let reason = match topics.as_slice() {
-                [] => "it holds no topics".to_owned(),
-                topics => format!(
-                    "no topic holds clouds (PointCloud2, CustomMsg of Livox, LaserScan, depth images); topics: {}",
-                    list(topics.iter())
-                ),
-            };
-            Err(Error::argument("recording", reason))
-        }
-        several => {
-            let several = several.iter().filter_map(|&(index, _)| topics.get(index));
-            let reason =
-                format!("several topics hold clouds; choose one with `topic` NAME: {}", list(several));
-            Err(Error::argument("recording", reason))
-        }
-    }
+    CloudTopics::find(recording, &topics, whole_bytes)?.choose(recording, &topics)
 }
 
 /// Finds the topic of poses.
@@ -131,13 +106,17 @@ fn named(topics: &[Topic], name: &str, option: &str) -> Result<usize> {
     })
 }
 
-fn chosen(topics: &[Topic], index: usize, kind: MessageKind) -> Result<Chosen> {
-    let topic = topics.get(index).filter(|_| kind == MessageKind::Image);
-    let camera = topic.and_then(|topic| camera_of(topics, topic));
-    match topic.filter(|_| camera.is_none()) {
-        None => Ok(Chosen { index, kind, camera }),
-        Some(image) => {
-            let name = camera_name(&image.name);
+/// The choice of a topic, with its camera if it holds images.
+pub(super) fn chosen(topics: &[Topic], index: usize, kind: MessageKind) -> Result<Chosen> {
+    let (camera, remarks) = (None, Vec::new());
+    let Some(image) = topics.get(index).filter(|_| kind.is_image()) else {
+        return Ok(Chosen { index, kind, camera, remarks });
+    };
+    let name = camera_name(&image.name);
+    let is_camera = |topic: &Topic| topic.name == name && kind_of(topic) == Some(MessageKind::CameraInfo);
+    match topics.iter().position(is_camera) {
+        Some(camera) => Ok(Chosen { index, kind, camera: Some(camera), remarks }),
+        None => {
             let reason =
                 format!("depth images need their camera, but there is no topic {name} of type CameraInfo");
             Err(Error::argument(format!("topic {}", image.name), reason))
@@ -145,40 +124,8 @@ fn chosen(topics: &[Topic], index: usize, kind: MessageKind) -> Result<Chosen> {
     }
 }
 
-/// The camera of images is described beside them.
-fn camera_name(image: &str) -> String {
-    let (folder, _) = image.rsplit_once('/').unwrap_or_default();
-    format!("{folder}/camera_info")
-}
-
-fn camera_of(topics: &[Topic], image: &Topic) -> Option<usize> {
-    let name = camera_name(&image.name);
-    topics.iter().position(|topic| topic.name == name && kind_of(topic) == Some(MessageKind::CameraInfo))
-}
-
-/// Whether the first image of a topic holds depths.
-fn holds_depths(
-    recording: &mut dyn Recording,
-    index: usize,
-    topic: &Topic,
-    whole_bytes: u64,
-) -> Result<bool> {
-    recording.begin(&[index])?;
-    let first = match recording.next_message() {
-        Err(error @ Error::Io { .. }) => return Err(error),
-        // Bad chunks are told of when clouds are read.
-        first => first.unwrap_or_default(),
-    };
-    let Some((mut message, wire)) = first.zip(topic.wire) else { return Ok(false) };
-    if message.data.len() > whole_bytes {
-        return Ok(false);
-    }
-    let data = message.data.load(whole_bytes)?;
-    Ok(Image::decode(wire, data).is_ok_and(|image| is_depth_encoding(&image.encoding)))
-}
-
 /// `/points (sensor_msgs/msg/PointCloud2, 20 messages), ...`.
-fn list<'t>(topics: impl Iterator<Item = &'t Topic>) -> String {
+pub(super) fn list<'t>(topics: impl Iterator<Item = &'t Topic>) -> String {
     let mut topics = topics.fuse();
     let mut text: Vec<String> = topics
         .by_ref()

@@ -1,5 +1,7 @@
-use super::messages::{CameraInfo, Header, Image, LaserScan, LivoxCustom, MessageKind, PointCloud2};
-use super::wire::{Wire, WireError};
+use super::messages::{
+    CameraInfo, CompressedDepth, Header, Image, LaserScan, LivoxCustom, MessageKind, PointCloud, PointCloud2,
+};
+use super::wire::{Decoded, Wire, WireError};
 use crate::read::cloud::CloudPoint;
 use crate::spill::FilePart;
 use voxtile::Result;
@@ -7,9 +9,11 @@ use voxtile::Result;
 /// A message that is a cloud.
 pub(super) enum CloudMessage<'a> {
     PointCloud2(PointCloud2<'a>),
+    PointCloud(PointCloud<'a>),
     Livox(LivoxCustom<'a>),
     LaserScan(LaserScan),
     Depth(Image<'a>, &'a CameraInfo),
+    CompressedDepth(CompressedDepth<'a>, &'a CameraInfo),
 }
 
 impl<'a> CloudMessage<'a> {
@@ -21,9 +25,13 @@ impl<'a> CloudMessage<'a> {
     ) -> std::result::Result<Self, WireError> {
         Ok(match (kind, camera) {
             (MessageKind::PointCloud2, _) => Self::PointCloud2(PointCloud2::decode(wire, data)?),
+            (MessageKind::PointCloud, _) => Self::PointCloud(PointCloud::decode(wire, data)?),
             (MessageKind::LivoxCustom, _) => Self::Livox(LivoxCustom::decode(wire, data)?),
             (MessageKind::LaserScan, _) => Self::LaserScan(LaserScan::decode(wire, data)?),
             (MessageKind::Image, Some(camera)) => Self::Depth(Image::decode(wire, data)?, camera),
+            (MessageKind::CompressedImage, Some(camera)) => {
+                Self::CompressedDepth(CompressedDepth::decode(wire, data)?, camera)
+            }
             _ => return Err(WireError { byte: 0, reason: "it is no cloud".to_owned() }),
         })
     }
@@ -40,9 +48,11 @@ impl<'a> CloudMessage<'a> {
     pub(super) fn header(&self) -> &Header {
         match self {
             Self::PointCloud2(cloud) => &cloud.header,
+            Self::PointCloud(cloud) => &cloud.header,
             Self::Livox(cloud) => &cloud.header,
             Self::LaserScan(scan) => &scan.header,
             Self::Depth(image, _) => &image.header,
+            Self::CompressedDepth(image, _) => &image.header,
         }
     }
 
@@ -52,27 +62,33 @@ impl<'a> CloudMessage<'a> {
             Self::PointCloud2(cloud) => cloud.header.stamp_ns = stamp_ns,
             Self::Livox(cloud) => cloud.header.stamp_ns = stamp_ns,
             // Their times are after the stamp, whichever it is.
-            Self::LaserScan(_) | Self::Depth(..) => {}
+            Self::PointCloud(_) | Self::LaserScan(_) | Self::Depth(..) | Self::CompressedDepth(..) => {}
         }
     }
 
     pub(super) fn points_claimed(&self) -> u64 {
         match self {
             Self::PointCloud2(cloud) => cloud.points_claimed(),
+            Self::PointCloud(cloud) => cloud.count as u64,
             Self::Livox(cloud) => cloud.count as u64,
             // Beams that mean nothing are left out.
             Self::LaserScan(scan) => scan.points().count() as u64,
             Self::Depth(image, _) => image.pixels_claimed(),
+            Self::CompressedDepth(image, _) => image.pixels_claimed(),
         }
     }
 
     pub(super) fn fields(&self) -> Vec<String> {
         let names: &[&str] = match self {
             Self::PointCloud2(cloud) => return cloud.fields.iter().map(|field| field.name.clone()).collect(),
+            Self::PointCloud(cloud) => {
+                let axes = ["x", "y", "z"].map(str::to_owned);
+                return axes.into_iter().chain(cloud.channels.iter().cloned()).collect();
+            }
             Self::Livox(_) => &["offset_time", "x", "y", "z", "reflectivity", "tag", "line"],
             Self::LaserScan(scan) if scan.intensities.is_empty() => &["ranges"],
             Self::LaserScan(_) => &["ranges", "intensities"],
-            Self::Depth(..) => &["depth"],
+            Self::Depth(..) | Self::CompressedDepth(..) => &["depth"],
         };
         names.iter().map(|name| (*name).to_owned()).collect()
     }
@@ -80,18 +96,20 @@ impl<'a> CloudMessage<'a> {
     pub(super) fn has_intensities(&self) -> bool {
         match self {
             Self::PointCloud2(cloud) => cloud.has_intensities(),
+            Self::PointCloud(cloud) => cloud.has_intensities(),
             Self::Livox(_) => true,
             Self::LaserScan(scan) => !scan.intensities.is_empty(),
-            Self::Depth(..) => false,
+            Self::Depth(..) | Self::CompressedDepth(..) => false,
         }
     }
 
     pub(super) fn has_times(&self) -> bool {
         match self {
             Self::PointCloud2(cloud) => cloud.has_times(),
+            Self::PointCloud(cloud) => cloud.has_times(),
             Self::Livox(_) => true,
             Self::LaserScan(scan) => scan.time_increment_s != 0.0,
-            Self::Depth(..) => false,
+            Self::Depth(..) | Self::CompressedDepth(..) => false,
         }
     }
 
@@ -110,20 +128,36 @@ impl<'a> CloudMessage<'a> {
                 cloud.points().try_for_each(visit)?;
                 Ok(cloud.shortage())
             }
-            Self::Livox(cloud) => {
-                for point in cloud.points() {
-                    match point {
-                        Ok(point) => visit(point)?,
-                        Err(error) => return Ok(Some(error)),
-                    }
-                }
-                Ok(None)
-            }
+            Self::PointCloud(cloud) => visit_decoded(cloud.points(), visit),
+            Self::Livox(cloud) => visit_decoded(cloud.points(), visit),
             Self::LaserScan(scan) => scan.points().try_for_each(visit).map(|()| None),
             Self::Depth(image, camera) => {
                 image.points(camera).try_for_each(visit)?;
                 Ok(image.shortage())
             }
+            Self::CompressedDepth(image, camera) => image.visit(camera, visit),
         }
     }
+
+    /// What is read otherwise than the message says, as the end of a sentence on clouds.
+    pub(super) fn repairs(&self) -> &[&'static str] {
+        match self {
+            Self::PointCloud2(cloud) => cloud.repairs(),
+            _ => &[],
+        }
+    }
+}
+
+/// Visits points until one cannot be decoded.
+fn visit_decoded(
+    points: impl Iterator<Item = Decoded<CloudPoint>>,
+    visit: &mut dyn FnMut(CloudPoint) -> Result<()>,
+) -> Result<Option<WireError>> {
+    for point in points {
+        match point {
+            Ok(point) => visit(point)?,
+            Err(error) => return Ok(Some(error)),
+        }
+    }
+    Ok(None)
 }

@@ -110,6 +110,14 @@ impl Input {
     }
 }
 
+/// Where a record is cut off, as the end of a remark.
+pub(super) fn cut_at(at: u64, file_bytes: u64, end: Option<u64>) -> String {
+    match end {
+        Some(end) => format!(" at byte {file_bytes}: the record from byte {at} on should end at byte {end}"),
+        None => format!(" at byte {file_bytes}, in the record from byte {at} on"),
+    }
+}
+
 /// A longer name of a topic, a type or an encoding is damage.
 const MAX_NAME_BYTES: usize = 1 << 12;
 

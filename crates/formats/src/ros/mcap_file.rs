@@ -1,7 +1,7 @@
 use super::chunk::{ChunkPlace, MAX_CHUNK_BYTES, MessagePlace, OpenChunk, decompress, plain};
 use super::chunk_file::{ChunkFile, Shares, TakeMessage, Walk, check_chunks};
 use super::chunk_order::{ChunkOrder, Step};
-use super::file_bytes::{FileBytes, Pieces};
+use super::file_bytes::{FileBytes, Pieces, cut_at};
 use super::mcap_record::{
     Channels, ChunkHead, ChunkIndex, MAGIC, MAX_NAMES_BYTES, MESSAGE_HEAD_BYTES, RECORD_HEAD_BYTES,
     Statistics, message_head, op, record_at,
@@ -157,7 +157,7 @@ impl McapFile {
     fn scan(&mut self) -> Result<()> {
         let mut at = MAGIC.len() as u64;
         let shares = Shares::of(self.spill.budget());
-        let (mut walk, mut is_closed) = (Walk::default(), false);
+        let (mut walk, mut is_closed, mut cut) = (Walk::default(), false, String::new());
         while let Some((kind, bytes)) = self.head(at)? {
             if matches!(kind, op::DATA_END | op::FOOTER) {
                 is_closed =
@@ -168,6 +168,9 @@ impl McapFile {
             let Some(next) = at.checked_add(RECORD_HEAD_BYTES).and_then(|at| at.checked_add(bytes)) else {
                 break;
             };
+            if next > self.file.len {
+                cut = cut_at(at, self.file.len, Some(next));
+            }
             match kind {
                 op::SCHEMA | op::CHANNEL => {
                     let contents = self.file.read_at(at + RECORD_HEAD_BYTES, bytes.min(MAX_NAMES_BYTES))?;
@@ -196,8 +199,8 @@ impl McapFile {
         if !is_closed {
             let messages = walk.messages;
             self.remarks.push(format!(
-                "{} has no end (the recorder did not close it, or it was cut off): {messages} messages were found by \
-                 reading it whole",
+                "{} has no end (the recorder did not close it, or it was cut off{cut}): {messages} messages were found \
+                 by reading it whole",
                 self.file.path().display()
             ));
         }

@@ -1,6 +1,8 @@
 use super::bag1::Bag1;
 use super::bag2_folder::Bag2Folder;
 use super::mcap_file::McapFile;
+use super::packed_file::{MAGIC, PackedFile, is_packed};
+use super::packed_messages::PackedMessages;
 use super::recording::Recording;
 use super::sequence::Sequence;
 use crate::read::glance::first_bytes;
@@ -42,8 +44,16 @@ pub fn open_recording_within(paths: &[PathBuf], budget: &Budget) -> Result<Box<d
     }
 }
 
-/// Opens a file by how it starts; where that is damaged, by the end of its name.
+/// Opens a file, which may be compressed as a whole.
 pub(super) fn open_file(path: &Path, budget: &Budget) -> Result<Box<dyn Recording>> {
+    match is_packed(path) || first_bytes(path)?.starts_with(MAGIC) {
+        true => Ok(Box::new(PackedFile::open(path, budget)?)),
+        false => open_plain_file(path, budget),
+    }
+}
+
+/// Opens a file by how it starts; where that is damaged, by the end of its name.
+pub(super) fn open_plain_file(path: &Path, budget: &Budget) -> Result<Box<dyn Recording>> {
     let formats = Registry::default();
     let (start, extension) = (first_bytes(path)?, extension_of(path));
     let recordings = ["bag", "mcap", "db3"];
@@ -52,7 +62,7 @@ pub(super) fn open_file(path: &Path, budget: &Budget) -> Result<Box<dyn Recordin
     let mut named = formats.formats().iter().filter(|format| format.has_extension(&extension));
     match by_start.or_else(|| named.next().map(|format| format.name)) {
         Some("bag") => Ok(Box::new(Bag1::open_within(path, budget)?)),
-        Some("mcap") => Ok(Box::new(McapFile::open_within(path, budget)?)),
+        Some("mcap") => Ok(Box::new(PackedMessages::new(McapFile::open_within(path, budget)?, path, budget))),
         Some("db3") => open_db3(path, budget),
         _ => {
             let reason = "it is no recording by its content or its name; known: .bag, .mcap, .db3, a folder with \
@@ -64,7 +74,7 @@ pub(super) fn open_file(path: &Path, budget: &Budget) -> Result<Box<dyn Recordin
 
 #[cfg(feature = "sqlite")]
 fn open_db3(path: &Path, budget: &Budget) -> Result<Box<dyn Recording>> {
-    Ok(Box::new(super::db3::Db3::open_within(path, budget)?))
+    Ok(Box::new(PackedMessages::new(super::db3::Db3::open_within(path, budget)?, path, budget)))
 }
 
 #[cfg(not(feature = "sqlite"))]

@@ -20,6 +20,8 @@ pub(crate) fn open(path: &Path, options: &ReadOptions) -> Result<Box<dyn CloudSo
         fixed_frame: recording.fixed_frame.clone(),
         poses,
         most_gap_ns: Some(most_gap_ns(options.clouds.pose_tolerance_ns)),
+        is_world_frame: options.clouds.is_world_frame,
+        are_poses_needed: options.clouds.are_poses_needed,
         memory_bytes: options.memory_bytes,
         scratch: options.scratch.clone(),
     };

@@ -95,6 +95,8 @@ pub enum BadTransform {
 const MAX_LENGTH_ERROR: f64 = 0.1;
 /// Most frames among which ways are searched for each cloud of a recording.
 const MAX_FRAMES_BETWEEN: usize = 1000;
+/// Most moving frames among which that of the robot is looked for.
+const MAX_MOVING: usize = 100;
 
 impl Transforms {
     /// Sets how far apart in time two samples may be that a pose is found between; see
@@ -279,6 +281,31 @@ impl Transforms {
         self.frames.get(bare(child)).is_some_and(FrameLinks::is_moving)
     }
 
+    /// The frames below a frame that move in their parents, in the order of their names, and whether nothing moves below
+    /// each: a robot or a sensor in the frame of its map is such a frame.
+    pub(super) fn moving_below(&self, frame: &str) -> Vec<(String, bool)> {
+        let frame = bare(frame);
+        let mut children: HashMap<&str, Vec<&str>> = HashMap::new();
+        for child in self.frames.keys() {
+            for step in self.steps(child) {
+                children.entry(step.parent).or_default().push(child);
+            }
+        }
+        let moves = |child: &str| self.frames.get(child).is_some_and(FrameLinks::moves);
+        let moving: Vec<&str> =
+            below(&children, frame).into_iter().filter(|child| *child != frame && moves(child)).collect();
+        // More are no robot.
+        if moving.len() > MAX_MOVING {
+            return Vec::new();
+        }
+        let is_last =
+            |child: &str| !below(&children, child).into_iter().any(|lower| lower != child && moves(lower));
+        let mut all: Vec<(String, bool)> =
+            moving.into_iter().map(|child| (child.to_owned(), is_last(child))).collect();
+        all.sort_unstable();
+        all
+    }
+
     /// The pose of the source frame in the target frame at a time: along the whole chain, each link between the samples
     /// around the stamp. Nothing is extrapolated.
     ///
@@ -442,6 +469,20 @@ impl Transforms {
         }
         Ok(pose)
     }
+}
+
+/// All that is below a frame, by the children of each.
+fn below<'a>(children: &HashMap<&'a str, Vec<&'a str>>, from: &str) -> HashSet<&'a str> {
+    let mut found = HashSet::new();
+    let mut open: Vec<&str> = vec![from];
+    while let Some(at) = open.pop() {
+        for child in children.get(at).into_iter().flatten() {
+            if found.insert(*child) {
+                open.push(child);
+            }
+        }
+    }
+    found
 }
 
 /// A target above the source is found first, then a source above the target, then what is above both. In a tree there

@@ -11,7 +11,8 @@ use voxtile::Error;
 use voxtile_formats::CloudSource;
 use voxtile_formats::poses::{Found, Trajectory};
 use voxtile_formats::ros::messages::{
-    CameraInfo, Image, LaserScan, LivoxCustom, MessageKind, PointCloud2, decode_poses,
+    CameraInfo, CompressedDepth, Image, LaserScan, LivoxCustom, MessageKind, PointCloud, PointCloud2,
+    decode_poses,
 };
 use voxtile_formats::ros::{BagOptions, Decoded, PoseSource, Recording, Wire, open_bag, open_recording};
 use voxtile_formats::{ReadOptions, open_clouds};
@@ -199,7 +200,7 @@ pub fn bag2_metadata(data: &[u8]) -> bool {
     recording.is_ok_and(|mut recording| play(recording.as_mut(), data.len()))
 }
 
-const KINDS: [MessageKind; 11] = [
+const KINDS: [MessageKind; 13] = [
     MessageKind::PointCloud2,
     MessageKind::LivoxCustom,
     MessageKind::LaserScan,
@@ -211,6 +212,8 @@ const KINDS: [MessageKind; 11] = [
     MessageKind::PoseStamped,
     MessageKind::PoseWithCovarianceStamped,
     MessageKind::Path,
+    MessageKind::PointCloud,
+    MessageKind::CompressedImage,
 ];
 
 /// A message: the first byte chooses its kind, and ROS 1 or CDR.
@@ -238,6 +241,8 @@ fn decode(kind: MessageKind, wire: Wire, data: &[u8]) -> Decoded<usize> {
             cloud.shortage();
             cloud.points().count()
         }
+        MessageKind::PointCloud => PointCloud::decode(wire, data)?.points().map_while(Decoded::ok).count(),
+        MessageKind::CompressedImage => CompressedDepth::decode(wire, data).map(|_| 0)?,
         MessageKind::LivoxCustom => LivoxCustom::decode(wire, data)?.points().map_while(Decoded::ok).count(),
         MessageKind::LaserScan => LaserScan::decode(wire, data)?.points().count(),
         MessageKind::Image => {

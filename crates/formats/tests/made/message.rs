@@ -12,6 +12,16 @@ pub const F64: u8 = 8;
 /// A field of points: its name, the bytes before it, its type.
 pub type Field = (&'static str, u32, u8);
 
+/// How a cloud says that its points lie.
+#[derive(Clone, Copy)]
+pub struct CloudLayout {
+    /// Height and width.
+    pub size: [u32; 2],
+    pub is_big_endian: bool,
+    pub point_step: u32,
+    pub row_step: u32,
+}
+
 impl MessageWriter {
     /// A message of ROS 1: little-endian, without padding.
     pub fn ros1() -> Self {
@@ -67,12 +77,54 @@ impl MessageWriter {
 
     /// `sensor_msgs/PointCloud2` of one row.
     pub fn point_cloud2(self, stamp_ns: i64, frame: &str, fields: &[Field], points: &[Vec<u8>]) -> Vec<u8> {
-        let message = self.header(stamp_ns, frame).u32(1).u32(points.len() as u32).u32(fields.len() as u32);
-        let message = fields.iter().fold(message, |message, &(name, offset, kind)| {
-            message.text(name).u32(offset).number([kind]).u32(1)
-        });
         let (step, data) = (points.first().map_or(1, Vec::len), points.concat());
-        message.number([0]).u32(step as u32).u32(data.len() as u32).sized(&data).number([1]).done()
+        let layout = CloudLayout {
+            size: [1, points.len() as u32],
+            is_big_endian: false,
+            point_step: step as u32,
+            row_step: data.len() as u32,
+        };
+        self.header(stamp_ns, frame).cloud_data(&layout, fields, &data)
+    }
+
+    /// The rest of `sensor_msgs/PointCloud2` behind its header.
+    pub fn cloud_data(self, layout: &CloudLayout, fields: &[Field], data: &[u8]) -> Vec<u8> {
+        let [height, width] = layout.size;
+        let message = self.u32(height).u32(width).u32(fields.len() as u32);
+        let message = fields.iter().fold(message, |message, &(name, offset, kind)| {
+            // A field called so has all three.
+            let count = if name == "xyz" { 3 } else { 1 };
+            message.text(name).u32(offset).number([kind]).u32(count)
+        });
+        let message = message.number([u8::from(layout.is_big_endian)]).u32(layout.point_step);
+        message.u32(layout.row_step).sized(data).number([1]).done()
+    }
+
+    /// `sensor_msgs/CameraInfo` of a camera without distortion: fx, fy, cx, cy.
+    pub fn camera(self, stamp_ns: i64, frame: &str, [fx, fy, cx, cy]: [f64; 4]) -> Vec<u8> {
+        let message = self.header(stamp_ns, frame).u32(1).u32(1).text("plumb_bob").u32(0);
+        let message = message.f64s(&[fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0]);
+        // R, P, binning and the region of interest are not needed.
+        message.f64s(&[0.0; 9 + 12]).u32(0).u32(0).f64s(&[0.0; 3]).done()
+    }
+
+    /// `sensor_msgs/Image` of pixels as they are, row by row.
+    pub fn image(self, stamp_ns: i64, frame: &str, encoding: &str, width: u32, pixels: &[u8]) -> Vec<u8> {
+        let pixel_bytes = if encoding.starts_with("32") { 4 } else { 2 };
+        let (step, height) = (width * pixel_bytes, pixels.len() as u32 / (width * pixel_bytes));
+        let message = self.header(stamp_ns, frame).u32(height).u32(width).text(encoding).number([0]);
+        message.u32(step).sized(pixels).done()
+    }
+
+    /// `sensor_msgs/CompressedImage`.
+    pub fn compressed_image(self, stamp_ns: i64, frame: &str, format: &str, data: &[u8]) -> Vec<u8> {
+        self.header(stamp_ns, frame).text(format).sized(data).done()
+    }
+
+    /// `nav_msgs/Odometry` without motion.
+    pub fn odometry(self, stamp_ns: i64, parent: &str, child: &str, numbers: &[f64; 7]) -> Vec<u8> {
+        let message = self.header(stamp_ns, parent).text(child).f64s(numbers);
+        message.f64s(&[0.0; 36 + 6 + 36]).done()
     }
 
     /// `tf2_msgs/TFMessage` of one transform: a translation and a quaternion, x y z w.

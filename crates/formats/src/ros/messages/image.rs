@@ -30,7 +30,10 @@ pub struct CameraInfo {
     pub center_px: [f64; 2],
 }
 
-/// Whether pixels of an encoding are depths.
+/// A depth of 16 bits that is none: the largest number, as much as 0.
+pub(super) const NO_DEPTH: u16 = u16::MAX;
+
+/// Whether pixels of an encoding may be depths. `16UC1` and `mono16` may be anything else of 16 bits, too.
 pub fn is_depth_encoding(encoding: &str) -> bool {
     matches!(encoding, "16UC1" | "mono16" | "32FC1")
 }
@@ -60,6 +63,18 @@ impl CameraInfo {
             return Err(reader.error("the camera is not calibrated: K has no focal lengths"));
         }
         Ok(Self { header, focal_px: [fx, fy], center_px: [cx, cy] })
+    }
+}
+
+impl CameraInfo {
+    /// The point of a pixel (column and row). Where its depth is none, nothing came back along the ray through it.
+    pub(super) fn point(&self, pixel: [usize; 2], depth_m: f64) -> CloudPoint {
+        let is_return = depth_m.is_finite() && depth_m > 0.0;
+        let z = if is_return { depth_m } else { 1.0 };
+        let [u, v] = pixel.map(|number| number as f64);
+        let x = (u - self.center_px[0]) / self.focal_px[0] * z;
+        let y = (v - self.center_px[1]) / self.focal_px[1] * z;
+        CloudPoint { is_return, ..CloudPoint::hit([x, y, z]) }
     }
 }
 
@@ -100,15 +115,12 @@ impl<'a> Image<'a> {
             row.chunks_exact(pixel_bytes).take(width).enumerate().map(move |(u, pixel)| (u, v, pixel))
         })
         .map(move |(u, v, pixel)| {
-            let value =
-                depth.and_then(|(kind, unit_m)| Some(kind.value(pixel, self.is_big_endian)? * unit_m));
-            let depth_m = value.unwrap_or(f64::NAN);
-            let is_return = depth_m.is_finite() && depth_m > 0.0;
-            // Nothing came back: the ray through the pixel.
-            let z = if is_return { depth_m } else { 1.0 };
-            let x = (u as f64 - camera.center_px[0]) / camera.focal_px[0] * z;
-            let y = (v as f64 - camera.center_px[1]) / camera.focal_px[1] * z;
-            CloudPoint { is_return, ..CloudPoint::hit([x, y, z]) }
+            let value = depth.and_then(|(kind, unit_m)| {
+                let value = kind.value(pixel, self.is_big_endian)?;
+                let is_depth = kind != FieldType::U16 || value != f64::from(NO_DEPTH);
+                is_depth.then_some(value * unit_m)
+            });
+            camera.point([u, v], value.unwrap_or(f64::NAN))
         })
     }
 

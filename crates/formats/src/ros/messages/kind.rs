@@ -3,12 +3,16 @@
 pub enum MessageKind {
     /// `sensor_msgs/PointCloud2`.
     PointCloud2,
+    /// `sensor_msgs/PointCloud`.
+    PointCloud,
     /// `CustomMsg` of `livox_ros_driver` and `livox_ros_driver2`.
     LivoxCustom,
     /// `sensor_msgs/LaserScan`.
     LaserScan,
     /// `sensor_msgs/Image`; a cloud if it holds depths.
     Image,
+    /// `sensor_msgs/CompressedImage`; a cloud if it holds depths.
+    CompressedImage,
     /// `sensor_msgs/CameraInfo`.
     CameraInfo,
     /// `tf2_msgs/TFMessage`, `tf/tfMessage`.
@@ -33,9 +37,11 @@ impl MessageKind {
         let (package, name) = (*words.first()?, words.last()?.trim_end_matches('_'));
         Some(match (package, name) {
             ("sensor_msgs", "PointCloud2") => Self::PointCloud2,
-            ("livox_ros_driver" | "livox_ros_driver2" | "livox_interfaces", "CustomMsg") => Self::LivoxCustom,
+            ("sensor_msgs", "PointCloud") => Self::PointCloud,
+            (package, "CustomMsg") if package.starts_with("livox_") => Self::LivoxCustom,
             ("sensor_msgs", "LaserScan") => Self::LaserScan,
             ("sensor_msgs", "Image") => Self::Image,
+            ("sensor_msgs", "CompressedImage") => Self::CompressedImage,
             ("sensor_msgs", "CameraInfo") => Self::CameraInfo,
             ("tf2_msgs", "TFMessage") | ("tf", "tfMessage") => Self::Tf,
             ("geometry_msgs", "TransformStamped") => Self::TransformStamped,
@@ -49,7 +55,13 @@ impl MessageKind {
 
     /// Whether its messages are clouds, or may be.
     pub fn is_cloud(self) -> bool {
-        matches!(self, Self::PointCloud2 | Self::LivoxCustom | Self::LaserScan | Self::Image)
+        matches!(self, Self::PointCloud2 | Self::PointCloud | Self::LivoxCustom | Self::LaserScan)
+            || self.is_image()
+    }
+
+    /// Whether its messages are images, which may hold depths.
+    pub fn is_image(self) -> bool {
+        matches!(self, Self::Image | Self::CompressedImage)
     }
 
     /// Whether its messages say where something was, in time.

@@ -1,5 +1,9 @@
 use super::header::Header;
 use super::point_field::{FieldType, PointField};
+use super::point_layout::{
+    Column, TimeColumn, any_of, find, is_little_endian, points_unannounced, position_columns, row_bytes_of,
+    time_column,
+};
 use crate::read::cloud::CloudPoint;
 use crate::ros::wire::{Decoded, Wire, WireError, WireReader};
 use crate::spill::FilePart;
@@ -24,27 +28,12 @@ pub struct PointCloud2<'a> {
     /// Where they begin in the message, and how many bytes they take.
     data_at: u64,
     data_bytes: usize,
-    xyz: [Column; 3],
+    /// Where x, y and z are; a plane cloud has no z.
+    xyz: [Column; 2],
+    z: Option<Column>,
     intensity: Option<Column>,
     time: Option<TimeColumn>,
-}
-
-/// Where a value is in a point.
-#[derive(Clone, Copy, Debug)]
-struct Column {
-    offset: usize,
-    kind: FieldType,
-}
-
-/// Where the time of a point is, and what it means.
-#[derive(Clone, Copy, Debug)]
-enum TimeColumn {
-    /// Nanoseconds (integers) or seconds (`f32`) after the stamp.
-    AfterStamp(Column),
-    /// `f64`, mostly since the epoch.
-    Double(usize),
-    /// 64 bits as two values of 32: nanoseconds since the epoch.
-    Wide(usize),
+    repairs: Vec<&'static str>,
 }
 
 const INTENSITY_NAMES: [&str; 5] = ["intensity", "Intensity", "i", "reflectivity", "reflectance"];
@@ -76,7 +65,7 @@ impl<'a> PointCloud2<'a> {
     pub(crate) fn decode_start(wire: Wire, bytes: &'a [u8], len: u64) -> Decoded<Self> {
         let mut reader = WireReader::of_start(wire, bytes, len)?;
         let header = Header::read(&mut reader)?;
-        let (height, width) = (reader.u32()?, reader.u32()?);
+        let (mut height, mut width) = (reader.u32()?, reader.u32()?);
         let count = reader.sequence(PointField::MIN_BYTES)?;
         if count > MAX_FIELDS {
             return Err(reader.error(format!("points of {count} fields; at most {MAX_FIELDS} are possible")));
@@ -88,22 +77,33 @@ impl<'a> PointCloud2<'a> {
         if point_bytes == 0 && width != 0 && height != 0 {
             return Err(reader.error("point_step is 0"));
         }
-        let column = |name: &str| find(&fields, name, point_bytes);
-        let need = |name: &str| {
-            column(name).ok_or_else(|| {
-                let names: Vec<&str> = fields.iter().map(|field| field.name.as_str()).collect();
-                let names = names.join(", ");
-                reader.error(format!("points of {point_bytes} bytes have no field {name}; fields: {names}"))
-            })
+        let mut repairs = Vec::new();
+        let (xyz, z) = match position_columns(&fields, point_bytes) {
+            Ok(columns) => columns,
+            // Some drivers send clouds without points and without fields.
+            Err(_) if data_bytes == 0 && (width == 0 || height == 0) => {
+                let none = Column { offset: 0, kind: FieldType::U8 };
+                ([none; 2], Some(none))
+            }
+            Err(reason) => return Err(reader.error(reason)),
         };
-        let xyz = [need("x")?, need("y")?, need("z")?];
-        let intensity = INTENSITY_NAMES.iter().find_map(|name| column(name));
-        let time = TIME_NAMES.iter().find_map(|name| time_column(&fields, name, point_bytes));
-        // Some drivers leave row_step at 0 or at the size of the cloud; rows never overlap.
-        let row_bytes = match point_bytes.checked_mul(width as usize) {
-            Some(least) if height > 1 => row_bytes.max(least),
-            Some(least) => least,
-            None => return Err(reader.error("width * point_step is too large")),
+        if z.is_none() {
+            repairs.push("have no field z: it is taken as 0");
+        }
+        let intensity = any_of(&INTENSITY_NAMES, |is_exact, name| find(&fields, name, is_exact, point_bytes));
+        let time = any_of(&TIME_NAMES, |is_exact, name| time_column(&fields, name, is_exact, point_bytes));
+        if let Some(count) = points_unannounced(height, width, point_bytes, data_bytes) {
+            (height, width) = (1, count);
+            repairs.push("announce no points, but hold some, which are read");
+        }
+        let Some(row_bytes) = row_bytes_of(row_bytes, height, width, point_bytes, data_bytes) else {
+            return Err(reader.error("width * point_step is too large"));
+        };
+        let is_big_endian = is_big_endian && {
+            let columns: Vec<Column> = xyz.into_iter().chain(z).collect();
+            let is_wrong = is_little_endian(data, point_bytes, &columns);
+            repairs.extend(is_wrong.then_some("say that they are big-endian, but are little-endian"));
+            !is_wrong
         };
         Ok(Self {
             header,
@@ -117,8 +117,10 @@ impl<'a> PointCloud2<'a> {
             data_at,
             data_bytes,
             xyz,
+            z,
             intensity,
             time,
+            repairs,
         })
     }
 
@@ -130,6 +132,11 @@ impl<'a> PointCloud2<'a> {
     /// Whether points have times.
     pub fn has_times(&self) -> bool {
         self.time.is_some()
+    }
+
+    /// What is read otherwise than the message says, as the end of a sentence on clouds.
+    pub fn repairs(&self) -> &[&'static str] {
+        &self.repairs
     }
 
     /// Number of points that it claims.
@@ -202,7 +209,8 @@ impl<'a> PointCloud2<'a> {
     }
 
     fn point(&self, point: &[u8]) -> CloudPoint {
-        let position_m = self.xyz.map(|column| self.value(point, column));
+        let [x_m, y_m] = self.xyz.map(|column| self.value(point, column));
+        let position_m = [x_m, y_m, self.z.map_or(0.0, |column| self.value(point, column))];
         // Sensors write NaN, or all zeros, where nothing came back.
         let is_return = position_m.iter().all(|m| m.is_finite()) && position_m != [0.0; 3];
         CloudPoint {
@@ -251,23 +259,4 @@ impl<'a> PointCloud2<'a> {
         let after = (seconds - whole_s as f64) - rest_ns as f64 * 1e-9;
         if after.abs() < seconds.abs() { after } else { seconds }
     }
-}
-
-/// A field of this name that lies within a point.
-fn find(fields: &[PointField], name: &str, point_bytes: usize) -> Option<Column> {
-    let field = fields.iter().find(|field| field.name == name)?;
-    let kind = field.kind?;
-    let end = field.offset.checked_add(kind.bytes())?;
-    (end <= point_bytes).then_some(Column { offset: field.offset, kind })
-}
-
-fn time_column(fields: &[PointField], name: &str, point_bytes: usize) -> Option<TimeColumn> {
-    let column = find(fields, name, point_bytes)?;
-    let is_pair = fields.iter().any(|field| field.name == name && field.count == 2);
-    let is_whole = column.offset.checked_add(8).is_some_and(|end| end <= point_bytes);
-    Some(match column.kind {
-        FieldType::F64 => TimeColumn::Double(column.offset),
-        FieldType::U32 if is_pair && is_whole => TimeColumn::Wide(column.offset),
-        _ => TimeColumn::AfterStamp(column),
-    })
 }

@@ -1,0 +1,37 @@
+//! PNG of depths: grey with 16 bits.
+
+use std::io::{BufRead, Seek};
+
+/// Memory of the decoder, which holds a few rows: images may be a million pixels wide.
+const MAX_DECODER_BYTES: usize = 8 << 20;
+
+/// The byte of an image that is wrong, and why.
+type Wrong = (u64, String);
+/// Where a PNG says what its pixels are.
+const KIND_AT: u64 = 16;
+
+/// Begins to read an image.
+pub(crate) fn open<R: BufRead + Seek>(input: R) -> Result<png::Reader<R>, Wrong> {
+    let limits = png::Limits { bytes: MAX_DECODER_BYTES };
+    let mut decoder = png::Decoder::new_with_limits(input, limits);
+    decoder.set_ignore_text_chunk(true);
+    decoder.set_ignore_iccp_chunk(true);
+    decoder.set_transformations(png::Transformations::IDENTITY);
+    let reader = decoder.read_info().map_err(|error| (0, error.to_string()))?;
+    let info = reader.info();
+    if (info.bit_depth, info.color_type) != (png::BitDepth::Sixteen, png::ColorType::Grayscale) {
+        let (color, bits) = (info.color_type, info.bit_depth);
+        let reason =
+            format!("is no depth image: those are grey with 16 bits, this one is {color:?} with {bits:?}");
+        return Err((KIND_AT, reason));
+    }
+    if info.interlaced {
+        return Err((KIND_AT, "is interlaced; save it without".into()));
+    }
+    Ok(reader)
+}
+
+/// Columns and rows.
+pub(crate) fn size<R: BufRead + Seek>(reader: &png::Reader<R>) -> (u32, u32) {
+    (reader.info().width, reader.info().height)
+}

@@ -1,0 +1,177 @@
+use super::bag_topic::{Chosen, chosen, kind_of, list};
+use super::depth_images::{DepthImages, base_name, camera_name};
+use super::depth_name::DepthName;
+use super::messages::{MessageKind, driver_of};
+use super::recording::{Recording, Topic};
+use std::collections::HashSet;
+use voxtile::{Error, Result};
+
+/// The topics of a recording that may be read as clouds.
+#[derive(Debug, Default)]
+pub(super) struct CloudTopics {
+    found: Vec<Found>,
+    /// The same clouds in other forms, or forms that are rarely meant: they are taken if there is nothing else.
+    others: Vec<Found>,
+    /// Images that may be depths or not.
+    unsure: Vec<String>,
+    /// Images that are called depths and have no camera.
+    without_camera: Vec<String>,
+}
+
+#[derive(Debug)]
+struct Found {
+    index: usize,
+    kind: MessageKind,
+    /// Its encoding, if that alone says that images are depths.
+    guessed: Option<String>,
+}
+
+/// Most topics of images that are looked into. Of more, the user chooses.
+const MAX_LOOKED_INTO: usize = 100;
+/// Most topics that are named for a reason.
+const MAX_NAMED: usize = 10;
+
+impl CloudTopics {
+    pub(super) fn find(recording: &mut dyn Recording, topics: &[Topic], whole_bytes: u64) -> Result<Self> {
+        let (mut all, mut looked_into) = (Self::default(), 0);
+        let is_camera = |topic: &&Topic| kind_of(topic) == Some(MessageKind::CameraInfo);
+        let cameras: HashSet<&str> =
+            topics.iter().filter(is_camera).map(|topic| topic.name.as_str()).collect();
+        for (index, topic) in topics.iter().enumerate().filter(|(_, topic)| topic.messages > 0) {
+            let Some(kind) = kind_of(topic).filter(|kind| kind.is_cloud()) else { continue };
+            let mut found = Found { index, kind, guessed: None };
+            if !kind.is_image() {
+                all.push(found, kind == MessageKind::PointCloud);
+                continue;
+            }
+            if !cameras.contains(camera_name(&topic.name).as_str()) {
+                if DepthName::of(base_name(&topic.name)) == Some(DepthName::Depth) {
+                    all.without_camera.push(topic.name.clone());
+                }
+                continue;
+            }
+            let is_compressed = kind == MessageKind::CompressedImage;
+            // Each look may read the recording up to the first image.
+            looked_into += 1;
+            if looked_into <= MAX_LOOKED_INTO {
+                let images = DepthImages::of_topic(recording, index, topic, kind, whole_bytes)?;
+                let Some(images) = images else { continue };
+                match images.holds_depths() {
+                    Some(false) => {
+                        all.unsure.push(format!("{} ({})", topic.name, images.encoding));
+                        continue;
+                    }
+                    Some(true) => {}
+                    None => found.guessed = Some(images.encoding),
+                }
+            } else if is_compressed {
+                continue;
+            }
+            all.push(found, is_compressed);
+        }
+        all.drop_copies(topics);
+        Ok(all)
+    }
+
+    fn push(&mut self, found: Found, is_other: bool) {
+        match is_other {
+            true => self.others.push(found),
+            false => self.found.push(found),
+        }
+    }
+
+    /// Leaves out compressed images that another topic has, too.
+    fn drop_copies(&mut self, topics: &[Topic]) {
+        let name_of = |found: &Found| topics.get(found.index).map_or("", |topic| topic.name.as_str());
+        let plain: HashSet<&str> = self.found.iter().map(name_of).collect();
+        let depths: HashSet<&str> = self.others.iter().map(name_of).collect();
+        self.others.retain(|found| {
+            let (name, base) = (name_of(found), base_name(name_of(found)));
+            let other = format!("{base}/compressedDepth");
+            let is_copy =
+                base != name && (plain.contains(base) || (name != other && depths.contains(other.as_str())));
+            !is_copy
+        });
+    }
+
+    /// Chooses the only one.
+    pub(super) fn choose(self, recording: &dyn Recording, topics: &[Topic]) -> Result<Chosen> {
+        let (first, rest) = match self.found.is_empty() {
+            true => (&self.others, &[][..]),
+            false => (&self.found, self.others.as_slice()),
+        };
+        let of = |found: &Found| topics.get(found.index);
+        match first.as_slice() {
+            [] => Err(Error::argument("recording", self.why_none(recording, topics))),
+            [only] => {
+                let mut chosen = chosen(topics, only.index, only.kind)?;
+                let name = of(only).map_or("", |topic| topic.name.as_str());
+                if let Some(encoding) = &only.guessed {
+                    chosen.remarks.push(format!(
+                        "{name} is read as depths because of its encoding {encoding}: its name does not say so"
+                    ));
+                }
+                if !rest.is_empty() {
+                    let rest = list(rest.iter().filter_map(of));
+                    chosen.remarks.push(format!("{name} is read; `topic` NAME takes another one: {rest}"));
+                }
+                chosen.remarks.extend(self.why_unsure().map(|why| format!("left out: {why}")));
+                Ok(chosen)
+            }
+            several => {
+                let several = list(several.iter().filter_map(of));
+                let reason = format!("several topics hold clouds; choose one with `topic` NAME: {several}");
+                Err(Error::argument("recording", reason))
+            }
+        }
+    }
+
+    fn why_unsure(&self) -> Option<String> {
+        (!self.unsure.is_empty()).then(|| {
+            format!(
+                "images whose names do not say that they are depths: {}; if they are, name the topic with `topic`",
+                named(&self.unsure)
+            )
+        })
+    }
+
+    fn why_none(&self, recording: &dyn Recording, topics: &[Topic]) -> String {
+        // A file that was cut off may lack what was looked for.
+        let found_out =
+            recording.remarks().into_iter().fold(String::new(), |all, remark| all + "; " + &remark);
+        if topics.is_empty() {
+            return format!("it holds no topics{found_out}");
+        }
+        let list = list(topics.iter());
+        if topics.iter().all(|topic| topic.messages == 0) {
+            return format!("it holds no messages{found_out}; topics: {list}");
+        }
+        let camera = (!self.without_camera.is_empty()).then(|| {
+            let names: Vec<String> = self
+                .without_camera
+                .iter()
+                .map(|name| format!("{name} without {}", camera_name(name)))
+                .collect();
+            format!("depth images need their camera, a topic of type CameraInfo: {}", named(&names))
+        });
+        let packets: Vec<String> =
+            topics.iter().filter(|topic| topic.messages > 0).filter_map(packets_of).take(MAX_NAMED).collect();
+        let whys = self.why_unsure().into_iter().chain(camera).chain(packets);
+        let whys = whys.fold(String::new(), |all, why| all + "; " + &why);
+        format!(
+            "no topic holds clouds (PointCloud2, PointCloud, CustomMsg of Livox, LaserScan, depth images){whys}\
+             {found_out}; topics: {list}"
+        )
+    }
+}
+
+/// What to do with a topic of packets.
+pub(super) fn packets_of(topic: &Topic) -> Option<String> {
+    let driver = driver_of(&topic.type_name)?;
+    Some(format!("{} holds no points: {driver} makes clouds of it, whose topic can be read", topic.name))
+}
+
+fn named(names: &[String]) -> String {
+    let more = if names.len() > MAX_NAMED { ", .." } else { "" };
+    names.iter().take(MAX_NAMED).map(String::as_str).collect::<Vec<_>>().join(", ") + more
+}

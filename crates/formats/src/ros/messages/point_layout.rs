@@ -1,0 +1,161 @@
+//! Where the values of a point are in the bytes of `sensor_msgs/PointCloud2`.
+
+use super::point_field::{FieldType, PointField};
+
+/// Where a value is in a point.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Column {
+    pub(super) offset: usize,
+    pub(super) kind: FieldType,
+}
+
+/// Where the time of a point is, and what it means.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum TimeColumn {
+    /// Nanoseconds (integers) or seconds (`f32`) after the stamp.
+    AfterStamp(Column),
+    /// `f64`, mostly since the epoch.
+    Double(usize),
+    /// 64 bits as two values of 32: nanoseconds since the epoch.
+    Wide(usize),
+}
+
+/// Names of a field that holds x, y and z.
+const VECTOR_NAMES: [&str; 2] = ["xyz", "position"];
+/// Points that are looked at for the byte order.
+const LOOKED_AT: usize = 64;
+/// Coordinates of points, in metres, are between these, or 0.
+const SENSIBLE_M: std::ops::Range<f64> = 1e-6..1e7;
+
+/// The columns of x and y, and that of z if there is one; or why not.
+pub(super) fn position_columns(
+    fields: &[PointField],
+    point_bytes: usize,
+) -> std::result::Result<([Column; 2], Option<Column>), String> {
+    let axis = |name: &str| any_of(&[name], |is_exact, name| find(fields, name, is_exact, point_bytes));
+    let axes = [axis("x"), axis("y"), axis("z")];
+    if let [Some(x), Some(y), Some(z)] = axes {
+        return Ok(([x, y], Some(z)));
+    }
+    let vector = any_of(&VECTOR_NAMES, |is_exact, name| {
+        let field = named(fields, name, is_exact).filter(|field| field.count >= 3)?;
+        let first = find(fields, name, is_exact, point_bytes)?;
+        let at = |k: usize| {
+            let offset = field.offset.checked_add(k * first.kind.bytes())?;
+            let end = offset.checked_add(first.kind.bytes())?;
+            (end <= point_bytes).then_some(Column { offset, kind: first.kind })
+        };
+        Some(([at(0)?, at(1)?], Some(at(2)?)))
+    });
+    if let Some(vector) = vector {
+        return Ok(vector);
+    }
+    let unused = |name: &&str| axis(name).is_none();
+    let missing = ["x", "y", "z"].into_iter().find(unused).unwrap_or_default();
+    let there = any_of(&[missing], |is_exact, name| named(fields, name, is_exact));
+    match (axes, there) {
+        ([Some(x), Some(y), None], None) => Ok(([x, y], None)),
+        (_, Some(field)) if field.kind.is_some() => Err(format!(
+            "the field {} begins at byte {} of points of {point_bytes} bytes (point_step): it is not within them",
+            field.name, field.offset
+        )),
+        (_, Some(field)) => Err(format!("the field {} is of no known type", field.name)),
+        (_, None) => {
+            let names: Vec<&str> = fields.iter().map(|field| field.name.as_str()).collect();
+            let names = names.join(", ");
+            Err(format!("points of {point_bytes} bytes have no field {missing}; fields: {names}"))
+        }
+    }
+}
+
+/// The number of points of a message that has the bytes of some and says that there are none.
+pub(super) fn points_unannounced(
+    height: u32,
+    width: u32,
+    point_bytes: usize,
+    data_bytes: usize,
+) -> Option<u32> {
+    if (height != 0 && width != 0) || point_bytes == 0 || !data_bytes.is_multiple_of(point_bytes) {
+        return None;
+    }
+    let count = u32::try_from(data_bytes / point_bytes).ok().filter(|count| *count > 0)?;
+    let announced = height.max(width);
+    (announced == 0 || announced == count).then_some(count)
+}
+
+/// Bytes from a row to the next. Some drivers leave `row_step` at 0, or write the size of the whole cloud or a number of
+/// points there: then rows are without a gap, as they are to viewers that go by `point_step` alone.
+pub(super) fn row_bytes_of(
+    row_step: usize,
+    height: u32,
+    width: u32,
+    point_bytes: usize,
+    data_bytes: usize,
+) -> Option<usize> {
+    let row = point_bytes.checked_mul(width as usize)?;
+    if height <= 1 || row_step <= row {
+        return Some(row);
+    }
+    let whole = row.checked_mul(height as usize);
+    let needed = row_step.checked_mul(height as usize - 1).and_then(|rows| rows.checked_add(row));
+    let is_there = needed.is_some_and(|needed| needed <= data_bytes);
+    let is_without_gaps = whole.is_some_and(|whole| whole == data_bytes || row_step >= whole);
+    Some(if !is_there && is_without_gaps { row } else { row_step })
+}
+
+/// Whether the first points are sensible in little-endian, and in big-endian they are not.
+pub(super) fn is_little_endian(data: &[u8], point_bytes: usize, columns: &[Column]) -> bool {
+    let (mut little, mut big, mut all) = (0, 0, 0);
+    for point in data.chunks_exact(point_bytes.max(1)).take(LOOKED_AT) {
+        for column in columns.iter().filter(|column| matches!(column.kind, FieldType::F32 | FieldType::F64)) {
+            let bytes = point.get(column.offset..).unwrap_or_default();
+            let values = [false, true].map(|is_big| column.kind.value(bytes, is_big).unwrap_or(f64::NAN));
+            if values == [0.0; 2] || values.iter().any(|value| value.is_nan()) {
+                continue;
+            }
+            let [is_little, is_big] = values.map(|value| value == 0.0 || SENSIBLE_M.contains(&value.abs()));
+            all += 1;
+            little += usize::from(is_little);
+            big += usize::from(is_big);
+        }
+    }
+    all >= 6 && 10 * little >= 9 * all && 2 * big < all
+}
+
+/// What the first of these names finds, as it is written; if none does, in letters of either case.
+pub(super) fn any_of<T>(names: &[&str], find: impl Fn(bool, &str) -> Option<T>) -> Option<T> {
+    [true, false].into_iter().find_map(|is_exact| names.iter().find_map(|name| find(is_exact, name)))
+}
+
+/// A field of this name. `T` is a temperature, no time.
+fn named<'f>(fields: &'f [PointField], name: &str, is_exact: bool) -> Option<&'f PointField> {
+    let is_it = |field: &&PointField| match is_exact || name == "t" {
+        true => field.name == name,
+        false => field.name.eq_ignore_ascii_case(name),
+    };
+    fields.iter().find(is_it)
+}
+
+/// A field of this name that lies within a point.
+pub(super) fn find(fields: &[PointField], name: &str, is_exact: bool, point_bytes: usize) -> Option<Column> {
+    let field = named(fields, name, is_exact)?;
+    let kind = field.kind?;
+    let end = field.offset.checked_add(kind.bytes())?;
+    (end <= point_bytes).then_some(Column { offset: field.offset, kind })
+}
+
+pub(super) fn time_column(
+    fields: &[PointField],
+    name: &str,
+    is_exact: bool,
+    point_bytes: usize,
+) -> Option<TimeColumn> {
+    let column = find(fields, name, is_exact, point_bytes)?;
+    let is_pair = named(fields, name, is_exact).is_some_and(|field| field.count == 2);
+    let is_whole = column.offset.checked_add(8).is_some_and(|end| end <= point_bytes);
+    Some(match column.kind {
+        FieldType::F64 => TimeColumn::Double(column.offset),
+        FieldType::U32 if is_pair && is_whole => TimeColumn::Wide(column.offset),
+        _ => TimeColumn::AfterStamp(column),
+    })
+}

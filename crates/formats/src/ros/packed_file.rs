@@ -1,0 +1,93 @@
+use super::chunk::unpacker;
+use super::open::open_plain_file;
+use super::recording::{Message, Recording, Topic};
+use crate::read::listing::extension_of;
+use crate::spill::{Budget, SpillFile};
+use std::fs::File;
+use std::io::{BufReader, Read, Write};
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+use voxtile::{Error, FormatError, Result};
+
+/// A file of a recording that is compressed as a whole (`a.mcap.zstd`). It is unpacked into a temporary folder, which
+/// goes with this.
+pub(super) struct PackedFile {
+    recording: Box<dyn Recording>,
+    remark: Option<String>,
+    _unpacked: TempDir,
+}
+
+/// Endings of names of such files.
+const EXTENSIONS: [&str; 2] = ["zstd", "zst"];
+/// How they begin.
+pub(super) const MAGIC: &[u8] = b"\x28\xb5\x2f\xfd";
+
+/// Whether a file is compressed as a whole, by its name.
+pub(super) fn is_packed(path: &Path) -> bool {
+    EXTENSIONS.contains(&extension_of(path).as_str())
+}
+
+impl PackedFile {
+    pub(super) fn open(path: &Path, budget: &Budget) -> Result<Self> {
+        let scratch = budget.scratch.clone().unwrap_or_else(std::env::temp_dir);
+        let folder = tempfile::tempdir_in(&scratch)
+            .map_err(|error| Error::io(&scratch, "unpack a recording into", error))?;
+        let (plain, damage) = unpack(path, folder.path(), budget)?;
+        let damaged = damage.map(|damage| format!("it is cut off or damaged ({damage})"));
+        // The name of the temporary file would tell nobody anything.
+        let recording = open_plain_file(&plain, budget).map_err(|error| {
+            let damaged = damaged.as_deref().unwrap_or("it was unpacked");
+            let reason = format!("{damaged}, and what is in it cannot be read: {error:#}");
+            FormatError::at_offset(0, reason).in_input(path)
+        })?;
+        let remark = damaged.map(|damaged| format!("{}: {damaged}; read as far as it goes", path.display()));
+        Ok(Self { recording, remark, _unpacked: folder })
+    }
+}
+
+/// Unpacks a compressed file; as much of it as is whole, and why not more, if it is cut off.
+fn unpack(file: &Path, folder: &Path, budget: &Budget) -> Result<(PathBuf, Option<String>)> {
+    let target = folder.join(file.file_stem().unwrap_or_default());
+    let input = File::open(file).map_err(|error| Error::io(file, "read", error))?;
+    let mut output = File::create(&target).map_err(|error| Error::io(&target, "write", error))?;
+    let spill = SpillFile::new(budget);
+    let mut decoder =
+        unpacker(BufReader::new(input), &spill).map_err(|error| Error::io(file, "unpack", error))?;
+    let mut bytes = vec![0; 1 << 16];
+    loop {
+        match decoder.read(&mut bytes) {
+            Ok(0) => return Ok((target, None)),
+            Ok(count) => {
+                let taken = bytes.get(..count).unwrap_or_default();
+                output.write_all(taken).map_err(|error| Error::io(&target, "write", error))?;
+            }
+            Err(error) => return Ok((target, Some(error.to_string()))),
+        }
+    }
+}
+
+impl Recording for PackedFile {
+    fn format(&self) -> &str {
+        self.recording.format()
+    }
+
+    fn topics(&self) -> &[Topic] {
+        self.recording.topics()
+    }
+
+    fn begin(&mut self, topics: &[usize]) -> Result<()> {
+        self.recording.begin(topics)
+    }
+
+    fn next_message(&mut self) -> Result<Option<Message>> {
+        self.recording.next_message()
+    }
+
+    fn close_files(&mut self) {
+        self.recording.close_files();
+    }
+
+    fn remarks(&self) -> Vec<String> {
+        self.remark.iter().cloned().chain(self.recording.remarks()).collect()
+    }
+}

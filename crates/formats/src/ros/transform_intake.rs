@@ -1,0 +1,74 @@
+use super::messages::StampedPose;
+use super::second_parent::SecondParent;
+use super::transforms::{BadTransform, Transforms};
+
+/// Takes the transforms of a recording, and counts those that are left out.
+#[derive(Debug, Default)]
+pub(super) struct TransformIntake {
+    /// Pairs of a frame and its parent.
+    links: usize,
+    beyond: u64,
+    invalid: u64,
+    first_invalid: Option<BadTransform>,
+    /// Links among which second parents were looked for.
+    checked: usize,
+    seconds: Vec<SecondParent>,
+}
+
+/// Most pairs of a frame and its parent; a robot has a hundred.
+const MAX_LINKS: usize = 10_000;
+/// A longer name of a frame is damage.
+const MAX_NAME_BYTES: usize = 256;
+/// Second parents of frames that are reported, and links among which they are looked for.
+const MAX_SECONDS: usize = 8;
+const MAX_CHECKED: usize = 2000;
+
+impl TransformIntake {
+    pub(super) fn take(&mut self, transforms: &mut Transforms, pose: StampedPose, is_static: bool) {
+        let StampedPose { header, child_frame, parent_from_child } = pose;
+        let (parent, stamp_ns) = (header.frame_id.as_str(), header.stamp_ns);
+        // A frame that has many parents loses one for the next.
+        let parents = transforms.parents_of(&child_frame);
+        let is_new = !transforms.has_link(parent, &child_frame);
+        if is_new && (self.links >= MAX_LINKS || parent.len().max(child_frame.len()) > MAX_NAME_BYTES) {
+            self.beyond += 1;
+            return;
+        }
+        match transforms.insert(parent, &child_frame, stamp_ns, parent_from_child, is_static) {
+            Ok(false) => {}
+            Ok(true) => {
+                self.links += transforms.parents_of(&child_frame).saturating_sub(parents);
+                self.checked += 1;
+                if self.checked <= MAX_CHECKED && self.seconds.len() < MAX_SECONDS {
+                    self.seconds.extend(transforms.second_parent(parent, &child_frame));
+                }
+            }
+            Err(why) => {
+                self.invalid += 1;
+                self.first_invalid.get_or_insert(why);
+            }
+        }
+    }
+
+    /// What a person should know.
+    pub(super) fn remarks(self) -> Vec<String> {
+        let Self { beyond, invalid, first_invalid, seconds, .. } = self;
+        let beyond = (beyond > 0).then(|| {
+            format!(
+                "{beyond} transforms are left out: their frames are more than {MAX_LINKS}, or have names of more than \
+                 {MAX_NAME_BYTES} bytes"
+            )
+        });
+        let invalid = first_invalid
+            .map(|first| format!("{invalid} transforms are not valid and left out; the first: {first}"));
+        beyond.into_iter().chain(invalid).chain(seconds.into_iter().map(remark_on)).collect()
+    }
+}
+
+/// What a second parent means.
+pub(super) fn remark_on(second: SecondParent) -> String {
+    format!(
+        "{second}; a parent named by one transform, or one that closes a loop, is used only if no other leads to the map \
+         frame"
+    )
+}
