@@ -1,6 +1,7 @@
 use super::bag_options::{BagOptions, PoseSource};
 use super::bag_topic::{choose_poses, kind_of};
 use super::messages::{MessageKind, visit_poses};
+use super::pose_hint::topics_with_poses;
 use super::pose_lookup::PoseLookup;
 use super::pose_track::PoseTrack;
 use super::recording::{Recording, Topic};
@@ -59,8 +60,6 @@ const BODY_NAMES: [&str; 14] = [
 ];
 /// The frame of poses that do not name theirs, where it is not that of the clouds.
 const UNNAMED_BODY: &str = "(unnamed)";
-/// Most topics that a hint names.
-const MAX_NAMED: usize = 10;
 /// Memory that a sample takes.
 const SAMPLE_BYTES: usize = 96;
 /// Most frames of sensors whose lookups are kept. A topic has few; those of more are made again.
@@ -102,7 +101,7 @@ impl BagPoses {
         wanted.extend(odometry);
         poses.odometry_topic = odometry.and_then(|index| topics.get(index)).map(|topic| topic.name.clone());
         if odometry.is_none() {
-            poses.hints.extend(poses_of_topics(&topics));
+            poses.hints.extend(topics_with_poses(&topics));
         }
         poses.read_topics(recording, &topics, &wanted, odometry, &options.budget())?;
         match odometry.and_then(|index| topics.get(index)) {
@@ -394,20 +393,4 @@ impl BagPoses {
         });
         self.remarks.iter().cloned().chain(registered).chain(without).chain(hints)
     }
-}
-
-/// The topics with poses, as what to do without `/tf`.
-fn poses_of_topics(topics: &[Topic]) -> Option<String> {
-    let is_pose = |topic: &&Topic| topic.messages > 0 && kind_of(topic).is_some_and(MessageKind::is_pose);
-    let mut found = topics.iter().filter(is_pose).peekable();
-    let first = found.peek()?.name.clone();
-    let all: Vec<String> = found
-        .take(MAX_NAMED)
-        .map(|topic| format!("{} ({}, {} messages)", topic.name, topic.type_name, topic.messages))
-        .collect();
-    Some(format!(
-        "poses are in {}: name their topic, as with `odometry` {first}, and `world_frame` if the points are in the frame \
-         of the map already",
-        all.join(", ")
-    ))
 }

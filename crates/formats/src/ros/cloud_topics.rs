@@ -156,7 +156,12 @@ impl CloudTopics {
         });
         let packets: Vec<String> =
             topics.iter().filter(|topic| topic.messages > 0).filter_map(packets_of).take(MAX_NAMED).collect();
-        let whys = self.why_unsure().into_iter().chain(camera).chain(packets);
+        let is_unread = |topic: &&Topic| topic.messages > 0 && topic.wire.is_none();
+        let unread: Vec<String> = topics.iter().filter(is_unread).map(|topic| topic.name.clone()).collect();
+        let unread = (!unread.is_empty()).then(|| {
+            format!("messages that are serialised otherwise than by ROS are not read: {}", named(&unread))
+        });
+        let whys = self.why_unsure().into_iter().chain(camera).chain(packets).chain(unread);
         let whys = whys.fold(String::new(), |all, why| all + "; " + &why);
         format!(
             "no topic holds clouds (PointCloud2, PointCloud, CustomMsg of Livox, LaserScan, depth images){whys}\

@@ -157,9 +157,10 @@ impl McapFile {
     fn scan(&mut self) -> Result<()> {
         let mut at = MAGIC.len() as u64;
         let shares = Shares::of(self.spill.budget());
-        let (mut walk, mut is_closed, mut cut) = (Walk::default(), false, String::new());
+        let (mut walk, mut is_ended, mut is_closed, mut cut) = (Walk::default(), false, false, String::new());
         while let Some((kind, bytes)) = self.head(at)? {
             if matches!(kind, op::DATA_END | op::FOOTER) {
+                is_ended = true;
                 is_closed =
                     self.file.read_at(self.file.len.saturating_sub(END_MAGIC_BYTES), END_MAGIC_BYTES)?
                         == MAGIC;
@@ -195,6 +196,9 @@ impl McapFile {
                 _ => {}
             }
             at = next;
+        }
+        if !is_ended && at < self.file.len {
+            cut = cut_at(at, self.file.len, None);
         }
         if !is_closed {
             let messages = walk.messages;

@@ -34,6 +34,7 @@ pub mod messages;
 mod open;
 mod packed_file;
 mod packed_messages;
+mod pose_hint;
 mod pose_lookup;
 mod pose_track;
 mod recording;

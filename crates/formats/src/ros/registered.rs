@@ -22,7 +22,8 @@ const MAX_LOOKED_INTO: usize = 20;
 const MAX_MESSAGES: usize = 10_000;
 
 /// Finds the poses of clouds that are in the frame of the map already, as programs for odometry publish them: `/tf`
-/// does not say where the sensor was. One topic of odometry in the frame of the clouds does, or a frame that moves in it.
+/// does not say where the sensor was. One topic of odometry in the frame of the clouds does, or a frame that moves in
+/// it.
 pub(super) fn find_registered(
     recording: &mut dyn Recording,
     clouds: usize,

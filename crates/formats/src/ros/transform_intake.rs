@@ -68,7 +68,7 @@ impl TransformIntake {
 /// What a second parent means.
 pub(super) fn remark_on(second: SecondParent) -> String {
     format!(
-        "{second}; a parent named by one transform, or one that closes a loop, is used only if no other leads to the map \
-         frame"
+        "{second}; a parent named by one transform, or one that closes a loop, is used only if no other leads to the \
+         map frame"
     )
 }

@@ -281,8 +281,8 @@ impl Transforms {
         self.frames.get(bare(child)).is_some_and(FrameLinks::is_moving)
     }
 
-    /// The frames below a frame that move in their parents, in the order of their names, and whether nothing moves below
-    /// each: a robot or a sensor in the frame of its map is such a frame.
+    /// The frames below a frame that move in their parents, in the order of their names, and whether nothing moves
+    /// below each: a robot or a sensor in the frame of its map is such a frame.
     pub(super) fn moving_below(&self, frame: &str) -> Vec<(String, bool)> {
         let frame = bare(frame);
         let mut children: HashMap<&str, Vec<&str>> = HashMap::new();

@@ -1,7 +1,7 @@
 use super::messages::StampedPose;
 
-/// Poses whose stamp is 0, as drivers without a clock leave it. Where no pose of a kind has a stamp, each is taken as of
-/// when it was recorded; where one has, 0 is a time as any other.
+/// Poses whose stamp is 0, as drivers without a clock leave it. Where no pose of a kind has a stamp, each is taken as
+/// of when it was recorded; where one has, 0 is a time as any other.
 #[derive(Debug, Default)]
 pub(super) struct Unstamped {
     held: Vec<StampedPose>,

@@ -273,7 +273,9 @@ fn what_is_missing_to_make_clouds_is_said() {
     let no_message = "it holds no messages; topics: /points";
     for (topics, told) in [(vec![], "it holds no topics"), (vec![("/points", "x/Y")], no_message)] {
         std::fs::write(&path, bag1(&topics, &[])).unwrap();
-        let error = open_bag(&[path.clone()], &BagOptions::default()).err().map(|error| format!("{error:#}"));
+        let error = open_bag(std::slice::from_ref(&path), &BagOptions::default())
+            .err()
+            .map(|error| format!("{error:#}"));
         assert!(error.as_ref().is_some_and(|error| error.contains(told)), "{error:?}");
     }
 }

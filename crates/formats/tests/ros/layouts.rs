@@ -203,7 +203,7 @@ fn old_clouds_are_read_with_their_channels() {
     // A channel with fewer values than points is that of something else.
     let short = MessageWriter::ros1().header(7, "lidar").u32(1).f32s(&[1.0, 2.0, 3.0]).u32(1);
     let short = short.text("intensity").u32(0).done();
-    let (clouds, errors, _) = read_messages("sensor_msgs/PointCloud", &[short.clone()]);
+    let (clouds, errors, _) = read_messages("sensor_msgs/PointCloud", std::slice::from_ref(&short));
     assert_eq!((clouds[0].0.has_intensities, errors), (false, vec![]));
     let (_, errors, _) = read_messages("sensor_msgs/PointCloud", &[short[..40].to_vec()]);
     assert!(errors[0].contains("topic /points: byte"), "{errors:?}");

@@ -112,7 +112,7 @@ fn files_that_are_compressed_are_read_alone() {
 #[test]
 fn files_that_are_cut_off_before_anything_say_where() {
     let folder = tempfile::tempdir().unwrap();
-    for name in ["zstd.mcap", "lz4.mcap", "bz2.bag"] {
+    for (name, at) in [("zstd.mcap", 30), ("lz4.mcap", 30), ("bz2.bag", 30), ("zstd.mcap", 3)] {
         let whole = std::fs::read(data(name)).unwrap();
         let path = folder.path().join(name);
         // The header of the first chunk is whole, its contents are not.
@@ -120,11 +120,15 @@ fn files_that_are_cut_off_before_anything_say_where() {
             "bz2.bag" => whole.windows(3).position(|bytes| bytes == b"BZh").unwrap(),
             _ => 8 + 9 + u64::from_le_bytes(whole[9..17].try_into().unwrap()) as usize + 9 + 60,
         };
-        let len = start + 30;
+        // Also in the header of a record.
+        let len = if at == 3 { start - 60 - 9 + at } else { start + at };
         std::fs::write(&path, &whole[..len]).unwrap();
         let error =
             open_bag(&[path], &BagOptions::default()).err().map(|error| format!("{error:#}")).unwrap();
-        let told = format!("cut off at byte {len}: the record from byte ");
+        let told = match at {
+            3 => format!("cut off at byte {len}, in the record from byte {}", len - at),
+            _ => format!("cut off at byte {len}: the record from byte "),
+        };
         assert!(error.contains("it holds no topics; ") && error.contains(&told), "{error}");
         assert!(error.contains("0 messages were found"), "{error}");
     }

@@ -90,7 +90,7 @@ fn registered_clouds_are_seen_from_the_odometry() {
     let (_folder, path) = record(&plain);
     let explicit = BagOptions { is_world_frame: true, ..odometry_of(Some("/Odometry")) };
     for options in [BagOptions::default(), odometry_of(None), explicit.clone()] {
-        let (clouds, errors, remarks) = read(&[path.clone()], &options);
+        let (clouds, errors, remarks) = read(std::slice::from_ref(&path), &options);
         assert_eq!(errors, Vec::<String>::new());
         assert_registered(&clouds, &format!("{options:?}"));
         // Who says so is not told.
@@ -102,13 +102,13 @@ fn registered_clouds_are_seen_from_the_odometry() {
     // A cloud in another frame that nothing knows is in the world if that is said.
     let (_folder, path) =
         record(&[("/cloud_registered", Clouds("map")), ("/Odometry", Odometry("camera_init", "body"))]);
-    assert_registered(&read(&[path.clone()], &explicit).0, "in the world");
+    assert_registered(&read(std::slice::from_ref(&path), &explicit).0, "in the world");
     let (clouds, _, remarks) = read(&[path], &odometry_of(None));
     assert!(clouds.iter().all(|(head, _)| head.world_from_sensor.is_none()));
     assert!(remarks[0].contains("no transform names the frame map"), "{remarks:?}");
     // Poses do not name the frame that they are of.
     let (_folder, path) = record(&[("/cloud_registered", Clouds("map")), ("/pose", Pose("map"))]);
-    let (clouds, _, remarks) = read(&[path.clone()], &odometry_of(Some("/pose")));
+    let (clouds, _, remarks) = read(std::slice::from_ref(&path), &odometry_of(Some("/pose")));
     assert_registered(&clouds, "poses");
     assert_eq!(remarks.len(), 1, "{remarks:?}");
     // Without being asked for, they are no odometry.

@@ -68,3 +68,23 @@ fn of_many_topics_of_images_some_are_looked_into() {
     assert!(error.contains("choose one with `topic` NAME: /c100/image") && error.contains("more"), "{error}");
     assert!(start.elapsed() < Duration::from_secs(30), "{:?}", start.elapsed());
 }
+
+/// Recordings of other programs in the same container.
+#[test]
+fn messages_that_are_not_of_ros_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.mcap");
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    let mut writer = mcap::Writer::new(&mut bytes).unwrap();
+    let schema = writer.add_schema("foxglove.PointCloud", "protobuf", b"").unwrap();
+    let channel_id = writer.add_channel(schema, "/lidar", "protobuf", &Default::default()).unwrap();
+    let header = mcap::records::MessageHeader { channel_id, sequence: 0, log_time: 1, publish_time: 1 };
+    writer.write_to_known_channel(&header, &[1, 2, 3]).unwrap();
+    writer.finish().unwrap();
+    drop(writer);
+    std::fs::write(&path, bytes.into_inner()).unwrap();
+    let error = open_bag(&[path], &BagOptions::default()).err().map(|error| format!("{error:#}"));
+    let told =
+        "serialised otherwise than by ROS are not read: /lidar; topics: /lidar (foxglove.PointCloud, 1 ";
+    assert!(error.as_ref().is_some_and(|error| error.contains(told)), "{error:?}");
+}

@@ -83,8 +83,8 @@ pub(super) fn points_unannounced(
     (announced == 0 || announced == count).then_some(count)
 }
 
-/// Bytes from a row to the next. Some drivers leave `row_step` at 0, or write the size of the whole cloud or a number of
-/// points there: then rows are without a gap, as they are to viewers that go by `point_step` alone.
+/// Bytes from a row to the next. Some drivers leave `row_step` at 0, or write the size of the whole cloud or a number
+/// of points there: then rows are without a gap, as they are to viewers that go by `point_step` alone.
 pub(super) fn row_bytes_of(
     row_step: usize,
     height: u32,

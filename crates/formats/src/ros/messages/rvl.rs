@@ -1,5 +1,5 @@
-/// RVL of depth images (Wilson 2017): runs of zeros and of numbers, which are differences from the number before. Each is
-/// written in groups of four bits, one of which says whether another group follows, in words of 32 bits.
+/// RVL of depth images (Wilson 2017): runs of zeros and of numbers, which are differences from the number before. Each
+/// is written in groups of four bits, one of which says whether another group follows, in words of 32 bits.
 #[derive(Clone, Debug)]
 pub(super) struct Rvl<'a> {
     words: &'a [[u8; 4]],

@@ -1,0 +1,22 @@
+use super::bag_topic::kind_of;
+use super::messages::MessageKind;
+use super::recording::Topic;
+
+/// Most topics that a hint names.
+const MAX_NAMED: usize = 10;
+
+/// The topics with poses, as what to do without `/tf`.
+pub(super) fn topics_with_poses(topics: &[Topic]) -> Option<String> {
+    let is_pose = |topic: &&Topic| topic.messages > 0 && kind_of(topic).is_some_and(MessageKind::is_pose);
+    let mut found = topics.iter().filter(is_pose).peekable();
+    let first = found.peek()?.name.clone();
+    let all: Vec<String> = found
+        .take(MAX_NAMED)
+        .map(|topic| format!("{} ({}, {} messages)", topic.name, topic.type_name, topic.messages))
+        .collect();
+    Some(format!(
+        "poses are in {}: name their topic, as with `odometry` {first}, and `world_frame` if the points are in the \
+         frame of the map already",
+        all.join(", ")
+    ))
+}
