@@ -29,7 +29,8 @@ impl Registry {
         let named = options.format.as_deref().map(|name| self.named(name)).transpose()?;
         let not_clouds = options.not_clouds();
         let inner = path.join("scans");
-        if named.is_some() && path.is_file() {
+        let packed = self.packed_recording(path).map(|format| format.name);
+        if named.is_some_and(|named| packed != Some(named.name)) && path.is_file() {
             // What is packed is named, whatever it was called.
             if let Some(archive) = foreign::archive_of(&first_bytes(path)?) {
                 return Err(archive.error(path));

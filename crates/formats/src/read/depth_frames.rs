@@ -7,7 +7,7 @@ use super::regular::check_regular;
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
-use voxtile::{Error, FormatError, Result};
+use voxtile::{FormatError, Result};
 
 /// A depth image before it is read.
 pub(super) struct Frame {

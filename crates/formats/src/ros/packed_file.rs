@@ -1,6 +1,7 @@
 use super::chunk::unpacker;
 use super::open::open_plain_file;
 use super::recording::{Message, Recording, Topic};
+use crate::read::input_file::open_input;
 use crate::read::listing::extension_of;
 use crate::spill::{Budget, SpillFile};
 use std::fs::File;
@@ -48,7 +49,7 @@ impl PackedFile {
 /// Unpacks a compressed file; as much of it as is whole, and why not more, if it is cut off.
 fn unpack(file: &Path, folder: &Path, budget: &Budget) -> Result<(PathBuf, Option<String>)> {
     let target = folder.join(file.file_stem().unwrap_or_default());
-    let input = File::open(file).map_err(|error| Error::io(file, "read", error))?;
+    let input = open_input(file)?;
     let mut output = File::create(&target).map_err(|error| Error::io(&target, "write", error))?;
     let spill = SpillFile::new(budget);
     let mut decoder =

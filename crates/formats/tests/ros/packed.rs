@@ -5,8 +5,8 @@ use crate::support::assert_clouds;
 use crate::support::{data, read, topic};
 use std::path::Path;
 use std::slice::from_ref;
-use voxtile_formats::Registry;
 use voxtile_formats::ros::{BagOptions, PoseSource, open_bag};
+use voxtile_formats::{ReadOptions, RecordingOptions, Registry, open_clouds};
 
 fn cloud(writer: MessageWriter, x_m: f32) -> Vec<u8> {
     let fields = [("x", 0, F32), ("y", 4, F32), ("z", 8, F32)];
@@ -89,6 +89,13 @@ fn files_that_are_compressed_are_read_alone() {
             let (clouds, errors, remarks) =
                 read(from_ref(&path), &BagOptions { poses: PoseSource::None, ..topic("/points") });
             assert_eq!((clouds.len(), errors, remarks), (4, vec![], vec![]), "{name}");
+            // Also where its format is named.
+            let named = ReadOptions { format: Some(format.to_owned()), ..ReadOptions::default() };
+            let named = ReadOptions {
+                recording: RecordingOptions { topic: Some("/points".into()), ..Default::default() },
+                ..named
+            };
+            assert_eq!(open_clouds(&path, &named).unwrap().len_hint(), Some(4));
             // Alone in a folder.
             let inner = tempfile::tempdir().unwrap();
             std::fs::copy(&path, inner.path().join(format!("{name}.{end}"))).unwrap();
