@@ -8,7 +8,8 @@ use crate::read::files::Files;
 use crate::read::from_origin::FromOrigin;
 use crate::read::input_file::open_input;
 use crate::read::listing::Listing;
-use crate::read::one::{OneCloud, head_of};
+use crate::read::name_stamps::NameStamps;
+use crate::read::one::OneCloud;
 use crate::read::regular::check_regular;
 use crate::read_options::ReadOptions;
 use crate::registry::Registry;
@@ -58,7 +59,8 @@ impl Registry {
             _ => {
                 let clouds = open_as(&path, format, options)?;
                 let own = (has_poses || options.sensor_origin_m.is_some()).then_some(PoseSource::Scans);
-                let poses = find_poses(&path, own, clouds.len_hint(), Rules::Strict, options)?;
+                let are_images = matches!(format.name, "depth" | "tum-rgbd");
+                let poses = find_poses(&path, own, clouds.len_hint(), are_images, Rules::Strict, options)?;
                 Box::new(PosedClouds::new(clouds, &path, poses, options.clouds.clone())?)
             }
         };
@@ -92,7 +94,7 @@ fn open_as(path: &Path, format: &InputFormat, options: &ReadOptions) -> Result<B
         Open::Folder(open) if is_folder => open(path, options)?,
         Open::Folder(_) => return wrong(format!("is a file; {} needs a folder", format.title)),
         _ if is_folder => open_folder(path, *format, options)?,
-        _ => open_file(path, format, options)?,
+        _ => open_file(path, format, NameStamps::default(), options)?,
     };
     Ok(match options.sensor_origin_m {
         Some(origin_m) => Box::new(FromOrigin::new(source, origin_m)?),
@@ -132,26 +134,32 @@ fn open_folder(path: &Path, format: InputFormat, options: &ReadOptions) -> Resul
     }
     let is_one_each = !matches!(format.open, Open::Clouds(_));
     let name = format!("{}, a folder", format.title);
-    let options = options.clone();
+    let (options, stamps) = (options.clone(), NameStamps::of(&paths));
     let open = Box::new(move |path: &Path| {
         check_regular(path)?;
         if matches!(format.open, Open::Clouds(_)) {
             // Readers of libraries open the file themselves.
             open_input(path)?;
         }
-        open_file(path, &format, &options)
+        open_file(path, &format, stamps, &options)
     });
     let others = others.into_iter().map(|other| format!("{other} is no cloud, left out"));
-    Ok(Box::new(Files::new(name, paths, is_one_each, open).with_remarks(others.collect())))
+    let remarks = stamps.remark().into_iter().chain(others).collect();
+    Ok(Box::new(Files::new(name, paths, is_one_each, open).with_remarks(remarks)))
 }
 
-fn open_file(path: &Path, format: &InputFormat, options: &ReadOptions) -> Result<Box<dyn CloudSource>> {
+fn open_file(
+    path: &Path,
+    format: &InputFormat,
+    stamps: NameStamps,
+    options: &ReadOptions,
+) -> Result<Box<dyn CloudSource>> {
     if !matches!(format.open, Open::Stream(_)) {
         check_regular(path)?;
     }
     match format.open {
         Open::Cloud(open) | Open::Stream(open) => {
-            Ok(Box::new(OneCloud::new(format.title, open(path, head_of(path), options)?)))
+            Ok(Box::new(OneCloud::new(format.title, open(path, stamps.head_of(path), options)?)))
         }
         Open::Clouds(open) => open(path, options),
         _ => Err(Error::argument(path.display().to_string(), format!("{} has no such files", format.title))),

@@ -64,10 +64,16 @@ pub fn poses_for(from: &PoseFile<'_>, scans: &KeptSummary) -> Result<NewPoses> {
     if is_by_line && trajectory.len() == scans.len() && is_in_step(&trajectory, scans, tolerance_ns)? {
         trajectory.check_order()?;
         let mut poses = Vec::with_capacity(scans.len());
-        for number in 0..scans.len() {
-            if let Some(pose) = trajectory.by_number(number)? {
-                poses.push(sensor_pose(&pose, body_from_sensor.as_ref())?);
-            }
+        for (number, scan) in scans.iter().enumerate() {
+            let pose = trajectory.by_number(number)?.ok_or_else(|| {
+                let reason = format!(
+                    "the pose of scan {} was lost: its row is no pose, and a map needs one of each scan; \
+                     `remove-scans` removes the scan",
+                    scan.number
+                );
+                Error::argument(file.display().to_string(), reason)
+            })?;
+            poses.push(sensor_pose(&pose, body_from_sensor.as_ref())?);
         }
         return Ok(NewPoses::InOrder(poses));
     }

@@ -113,9 +113,11 @@ fn pcd_files_take_every_form_of_poses() {
         assert_eq!(origins_m(&folder, &scans, &option), [5.0, 6.0], "{text}");
     }
     fs::write(&file, "1 5 0 0 0 0 0 1\n2 six 0 0 0 0 0 1\n").unwrap();
+    assert_eq!(origins_m(&folder, &scans, &option), [5.0]);
     let map = folder.path().join("map");
+    fs::write(&file, "1 five 0 0 0 0 0 1\n2 six 0 0 0 0 0 1\n").unwrap();
     let told = refusal(&["build", text(&scans), "--poses", text(&file), "-o", text(&map)]);
-    assert!(told.contains("line 2") && told.contains("`six` is not a number"), "{told}");
+    assert!(told.contains("line 1") && told.contains("`five` is not a number"), "{told}");
     // A file that is no scan is often at an end of the list.
     let three = "1 0 0 5\n0 1 0 0\n0 0 1 0\n0 0 0 1\n".repeat(3);
     fs::write(&file, three).unwrap();

@@ -19,7 +19,7 @@ const POSE_EXTENSIONS: [&str; 4] = ["txt", "tum", "kitti", "csv"];
 const GLANCE_BYTES: u64 = 1 << 14;
 
 /// Where the poses of an input come from: the file that is named, the input's own, a file in it or beside it. One cloud
-/// alone needs none.
+/// alone needs none. `are_images`: the sensor is a camera, which looks along z.
 ///
 /// # Errors
 ///
@@ -28,6 +28,7 @@ pub(crate) fn find_poses(
     path: &Path,
     own: Option<PoseSource>,
     clouds: Option<u64>,
+    are_images: bool,
     rules: Rules,
     options: &ReadOptions,
 ) -> Result<CloudPoses> {
@@ -43,13 +44,52 @@ pub(crate) fn find_poses(
     match file {
         Some(file) => {
             let budget = options.budget();
-            let trajectory = Trajectory::read_by(rules, &file, options.calib.as_deref(), &budget)?;
+            let mut trajectory = Trajectory::read_by(rules, &file, options.calib.as_deref(), &budget)?;
+            if !are_images && !options.clouds.is_world_frame {
+                remark_frame(&mut trajectory, &file, folder, options)?;
+            }
             Ok(CloudPoses::File(Box::new(trajectory)))
         }
         None if clouds == Some(1) => Ok(CloudPoses::Identity),
         None if options.clouds.may_lack_poses => Ok(CloudPoses::Missing),
         None => Err(no_poses(path, folder)),
     }
+}
+
+/// Names of the file with the pose of a lidar in its camera.
+const CALIB_FILES: [&str; 2] = ["calib.txt", "calib_velo_to_cam.txt"];
+
+/// Remarks what tells that the poses are those of another frame than the sensor's.
+fn remark_frame(
+    trajectory: &mut Trajectory,
+    file: &Path,
+    folder: &Path,
+    options: &ReadOptions,
+) -> Result<()> {
+    let direction = trajectory.direction(&options.clouds.body_from_sensor)?;
+    let mut remarks = direction.remarks(options.calib.is_some());
+    if options.calib.is_none()
+        && trajectory.are_matrices()
+        && direction.may_be_of_camera()
+        && let Some(calib) = calib_for(file, folder)
+    {
+        let way = if direction.is_along_z() { ", and these go along z, as a camera does" } else { "" };
+        let calib = calib.display();
+        remarks = vec![format!(
+            "{calib} has Tr, where the lidar is in the camera: poses of the camera, as KITTI's own are{way}, need \
+             `calib` {calib}"
+        )];
+    }
+    remarks.into_iter().for_each(|remark| trajectory.remark(remark));
+    Ok(())
+}
+
+/// The `calib.txt` of KITTI beside poses or clouds.
+fn calib_for(file: &Path, folder: &Path) -> Option<PathBuf> {
+    let of_file = file.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let places = [of_file.to_owned(), folder.to_owned(), above(folder)];
+    let mut paths = places.iter().flat_map(|place| CALIB_FILES.map(|name| place.join(name)));
+    paths.find(|path| path.is_file() && super::calib::read(path).is_ok())
 }
 
 /// The pose file in a folder, or beside it.

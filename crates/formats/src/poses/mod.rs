@@ -3,7 +3,9 @@
 
 mod binary;
 mod calib;
+mod cells;
 mod deskew;
+mod direction;
 mod find_poses;
 mod gap;
 mod header;
@@ -13,6 +15,7 @@ mod pose_input;
 mod pose_rows;
 mod pose_source;
 mod posed_clouds;
+mod quaternion_order;
 mod rigid_pose;
 mod text;
 mod time_unit;
@@ -20,6 +23,7 @@ mod trajectory;
 
 pub use deskew::Deskew;
 pub(crate) use find_poses::{find_poses, pose_file_for};
+pub(crate) use gap::SAME_TIME_NS;
 pub use gap::most_gap_ns;
 pub(crate) use matrix::matrix_of;
 pub use pose_source::PoseSource;

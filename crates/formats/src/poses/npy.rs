@@ -1,6 +1,6 @@
 use super::matrix::matrix_of;
 use super::pose_input::PoseInput;
-use super::pose_rows::{PoseRows, Row};
+use super::pose_rows::{BadKind, BadRow, PoseRows, Row, Stamp};
 use super::text::{Rules, pose};
 use super::time_unit::{digits_of_value, stamp_of_value};
 use std::io::Read;
@@ -19,8 +19,9 @@ pub(super) fn is_npy(path: &Path, head: &[u8]) -> bool {
     head.starts_with(MAGIC) || path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("npy"))
 }
 
-/// Takes the poses of an array: N x 8 of TUM, N x 12, N x 16, N x 3 x 4 or N x 4 x 4.
-pub(super) fn read(path: &Path, mut input: PoseInput, poses: &mut PoseRows) -> Result<()> {
+/// Takes the poses of an array: N x 8 of TUM, N x 7 without times, N x 12, N x 16, N x 3 x 4 or N x 4 x 4. Returns
+/// whether they are matrices.
+pub(super) fn read(path: &Path, mut input: PoseInput, poses: &mut PoseRows) -> Result<bool> {
     let fail = |error| Error::io(path, "read", error);
     let wrong = |at: u64, reason: String| FormatError::at_offset(at, reason).in_input(path);
     let mut start = Vec::new();
@@ -58,25 +59,40 @@ pub(super) fn read(path: &Path, mut input: PoseInput, poses: &mut PoseRows) -> R
             [a, b, c, d, e, f, g, h] => f64::from_le_bytes([a, b, c, d, e, f, g, h]),
             _ => f64::NAN,
         }));
-        let bad = |reason: String| FormatError::at_record(row, reason).in_input(path);
-        if !numbers.iter().all(|number| number.is_finite()) {
-            return Err(bad("a number is not finite".into()));
-        }
-        let row = match *numbers.as_slice() {
-            [stamp, x, y, z, qx, qy, qz, qw] => {
-                let digits = *digits.get_or_insert_with(|| digits_of_value(stamp));
-                let stamp_ns =
-                    stamp_of_value(stamp, digits).ok_or_else(|| bad(format!("{stamp} is no time stamp")))?;
-                Row {
-                    stamp_ns: Some(stamp_ns),
-                    pose: pose([x, y, z, qx, qy, qz, qw], Rules::Strict).map_err(bad)?,
-                }
-            }
-            _ => Row { stamp_ns: None, pose: matrix_of(&numbers).map_err(bad)? },
-        };
-        poses.push(row)?;
+        let taken = row_of(&numbers, &mut digits);
+        poses.push(taken, |reason| FormatError::at_record(row, reason).in_input(path))?;
     }
-    Ok(())
+    Ok(columns >= 12)
+}
+
+/// The pose of a row. All stamps have the unit of the first.
+fn row_of(numbers: &[f64], digits: &mut Option<i32>) -> std::result::Result<Row, BadRow> {
+    let (stamp, values) = match numbers {
+        [time, values @ ..] if values.len() == 7 => (stamp_of(*time, digits), values),
+        values => (Stamp::None, values),
+    };
+    let bad = |kind: BadKind| move |reason: String| BadRow { reason, kind, stamp };
+    if !values.iter().all(|number| number.is_finite()) {
+        return Err(bad(BadKind::Lost)("a number is not finite".into()));
+    }
+    match *values {
+        [x, y, z, qx, qy, qz, qw] => {
+            let pose = pose([x, y, z, qx, qy, qz, qw], Rules::Strict).map_err(bad(BadKind::Odd))?;
+            Ok(Row { stamp, pose, has_unnamed_quaternion: true })
+        }
+        _ => {
+            let pose = matrix_of(values).map_err(bad(BadKind::Odd))?;
+            Ok(Row { stamp, pose, has_unnamed_quaternion: false })
+        }
+    }
+}
+
+fn stamp_of(time: f64, digits: &mut Option<i32>) -> Stamp {
+    if !time.is_finite() {
+        return Stamp::Unreadable;
+    }
+    let digits = *digits.get_or_insert_with(|| digits_of_value(time));
+    stamp_of_value(time, digits).map_or(Stamp::Unreadable, Stamp::At)
 }
 
 /// Bytes of a number, rows, numbers in a row.
@@ -107,11 +123,12 @@ fn layout(header: &str) -> std::result::Result<(usize, u64, usize), String> {
         value("'shape'").and_then(|rest| rest.strip_prefix('(')?.split(')').next()).unwrap_or_default();
     let sides: Vec<u64> = shape.split(',').filter_map(|side| side.trim().parse().ok()).collect();
     match *sides.as_slice() {
-        [rows, 8] => Ok((width, rows, 8)),
+        [rows, columns @ (7 | 8)] => Ok((width, rows, columns as usize)),
         [rows, 12] | [rows, 3, 4] => Ok((width, rows, 12)),
         [rows, 16] | [rows, 4, 4] => Ok((width, rows, 16)),
         _ => Err(format!(
-            "has the shape ({shape}); poses are N x 8 (t x y z qx qy qz qw), N x 3 x 4 or N x 4 x 4"
+            "has the shape ({shape}); poses are N x 8 (t x y z qx qy qz qw), N x 7 (without t), N x 3 x 4 or \
+             N x 4 x 4; roll, pitch and yaw are not read"
         )),
     }
 }

@@ -1,14 +1,46 @@
 use super::RigidPose;
+use super::quaternion_order::OrderEvidence;
 use super::trajectory::Trajectory;
 use crate::spill::{Budget, PoseList, PoseWriter, Record, Sorter, TimedPose};
 use std::cmp::Ordering;
 use std::path::Path;
-use voxtile::Result;
+use voxtile::{Error, Result};
 
 /// A line or a row of a file of poses.
 pub(super) struct Row {
-    pub(super) stamp_ns: Option<i64>,
+    pub(super) stamp: Stamp,
     pub(super) pose: RigidPose,
+    /// Whether no name says where the quaternion has its w.
+    pub(super) has_unnamed_quaternion: bool,
+}
+
+/// The time stamp of a row.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Stamp {
+    /// Rows have none.
+    None,
+    At(i64),
+    /// What stands there is no time.
+    Unreadable,
+}
+
+/// Why a row is no pose.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct BadRow {
+    pub(super) reason: String,
+    pub(super) kind: BadKind,
+    pub(super) stamp: Stamp,
+}
+
+/// What is in the place of a pose.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum BadKind {
+    /// Numbers that are no numbers, or missing: the program lost track.
+    Lost,
+    /// A row of another kind, or a pose of another kind. If most are, the file is something else.
+    Odd,
+    /// Words: no row at all, which takes no number.
+    Words,
 }
 
 /// Takes the poses of a file one after the other.
@@ -16,28 +48,51 @@ pub(super) struct PoseRows {
     budget: Budget,
     poses: PoseWriter,
     rows: usize,
-    are_stamped: bool,
+    stamped: usize,
+    /// Poses whose rows have no time stamp.
+    without_stamp: usize,
     last_ns: Option<i64>,
     /// How often the time goes back, and how often it stands still.
     back: u64,
     /// Number of the first pose that is earlier than the one before, from 1.
     first_back: Option<u64>,
     still: u64,
-    digit_ns: i64,
+    bad: BadRows,
+    order: OrderEvidence,
+}
+
+/// The rows that are left out.
+#[derive(Default)]
+struct BadRows {
+    lost: u64,
+    odd: u64,
+    words: u64,
+    unstamped: u64,
+    first: Option<Error>,
+    first_odd: Option<Error>,
+    first_unstamped: Option<Error>,
 }
 
 /// What the stamps of a file are like.
-#[derive(Default)]
 pub(super) struct Stamps {
     pub(super) has_stamps: bool,
     /// Number of the first pose whose stamp is earlier than the one before, from 1.
     pub(super) goes_back: Option<u64>,
-    pub(super) rounding_ns: u64,
     pub(super) remarks: Vec<String>,
 }
 
-/// Stamps of whole seconds need not be rounded: they are a millisecond's at most.
-const MAX_DIGIT_NS: i64 = 1_000_000;
+/// The poses of a file, in the orders in which they are looked for.
+pub(super) struct PoseLists {
+    /// In the order of the file; lost ones have their place.
+    pub(super) poses: PoseList,
+    /// In strict order of time, without lost ones, where that is another list.
+    pub(super) by_time: Option<PoseList>,
+    /// The stamps of lost poses, in order.
+    pub(super) lost: PoseList,
+}
+
+/// In the place of a stamp that cannot be read.
+const NO_STAMP: i64 = i64::MIN;
 
 /// A pose by its time and its number in the file.
 #[derive(Clone, Copy)]
@@ -76,71 +131,162 @@ impl PoseRows {
             poses: PoseWriter::new(budget, budget.bytes / 4),
             budget: budget.clone(),
             rows: 0,
-            are_stamped: true,
+            stamped: 0,
+            without_stamp: 0,
             last_ns: None,
             back: 0,
             first_back: None,
             still: 0,
-            digit_ns: MAX_DIGIT_NS,
+            bad: BadRows::default(),
+            order: OrderEvidence::default(),
         }
     }
 
-    pub(super) fn push(&mut self, row: Row) -> Result<()> {
-        let Row { stamp_ns, pose } = row;
+    /// Takes a row; `error` makes an error that names its place.
+    pub(super) fn push(
+        &mut self,
+        row: std::result::Result<Row, BadRow>,
+        error: impl Fn(String) -> Error,
+    ) -> Result<()> {
+        let (stamp, pose) = match row {
+            Ok(Row { stamp, pose, has_unnamed_quaternion }) => {
+                if has_unnamed_quaternion {
+                    self.order.insert(pose.quaternion);
+                }
+                (stamp, pose)
+            }
+            Err(BadRow { reason, kind, stamp }) => {
+                let BadRows { lost, odd, words, first, first_odd, .. } = &mut self.bad;
+                first.get_or_insert_with(|| error(reason.clone()));
+                if kind != BadKind::Lost {
+                    first_odd.get_or_insert_with(|| error(reason));
+                }
+                match kind {
+                    BadKind::Lost => *lost += 1,
+                    BadKind::Odd => *odd += 1,
+                    BadKind::Words => {
+                        *words += 1;
+                        return Ok(());
+                    }
+                }
+                (stamp, LOST)
+            }
+        };
         self.rows += 1;
-        self.are_stamped &= stamp_ns.is_some();
-        if let Some(stamp_ns) = stamp_ns {
-            if self.last_ns.is_some_and(|last| stamp_ns < last) {
-                self.back += 1;
-                self.first_back.get_or_insert(self.rows as u64);
-            }
-            self.still += u64::from(self.last_ns == Some(stamp_ns));
-            self.last_ns = Some(stamp_ns);
-            while stamp_ns % self.digit_ns != 0 {
-                self.digit_ns /= 10;
-            }
+        if stamp == Stamp::Unreadable && !is_lost(&pose) {
+            self.bad.unstamped += 1;
+            self.bad.first_unstamped.get_or_insert_with(|| error("no time stamp".into()));
         }
-        self.poses.push(TimedPose { stamp_ns: stamp_ns.unwrap_or_default(), pose })
+        self.without_stamp += usize::from(stamp == Stamp::None && !is_lost(&pose));
+        if let Stamp::At(stamp_ns) = stamp {
+            self.note_stamp(stamp_ns);
+        }
+        let stamp_ns = match stamp {
+            Stamp::At(stamp_ns) => stamp_ns,
+            Stamp::None | Stamp::Unreadable => NO_STAMP,
+        };
+        self.poses.push(TimedPose { stamp_ns, pose })
     }
 
-    /// The trajectory of these poses; `None` if there are none.
-    pub(super) fn finish(self, path: &Path) -> Result<Option<Trajectory>> {
-        let poses = self.poses.finish()?;
+    fn note_stamp(&mut self, stamp_ns: i64) {
+        self.stamped += 1;
+        if self.last_ns.is_some_and(|last| stamp_ns < last) {
+            self.back += 1;
+            self.first_back.get_or_insert(self.rows as u64);
+        }
+        self.still += u64::from(self.last_ns == Some(stamp_ns));
+        self.last_ns = Some(stamp_ns);
+    }
+
+    /// The trajectory of these poses; `None` if the file has no rows.
+    ///
+    /// # Errors
+    ///
+    /// No row is a pose, or most are something else: the first of them; no time stamp that can be read, where there
+    /// must be one.
+    pub(super) fn finish(mut self, path: &Path, must_have_stamps: bool) -> Result<Option<Trajectory>> {
+        let good = (self.rows as u64).saturating_sub(self.bad.lost + self.bad.odd);
+        let BadRows { odd, words, first, first_odd, first_unstamped, .. } = &mut self.bad;
+        let is_other = *odd + *words > good;
+        let wrong = first.take_if(|_| good == 0).or_else(|| first_odd.take_if(|_| is_other));
+        let has_no_stamp = must_have_stamps && self.stamped == 0;
+        if let Some(wrong) = wrong.or_else(|| first_unstamped.take_if(|_| has_no_stamp)) {
+            return Err(wrong);
+        }
         if self.rows == 0 {
             return Ok(None);
         }
-        let goes_back = self.first_back.filter(|_| self.are_stamped);
-        let mut stamps = Stamps { has_stamps: self.are_stamped, goes_back, ..Stamps::default() };
-        if self.back > 0 {
-            let back = self.back;
-            stamps
-                .remarks
-                .push(format!("{back} time stamps of poses go back; the poses were sorted by time"));
+        let has_stamps = self.stamped > 0 && self.without_stamp == 0;
+        let mut stamps =
+            Stamps { has_stamps, goes_back: self.first_back.filter(|_| has_stamps), remarks: self.remarks() };
+        let is_w_first = self.order.is_w_first();
+        if is_w_first {
+            stamps.remarks.push(
+                "no line names its columns, and its quaternions are read w first (qw qx qy qz), by which the sensor is \
+                 upright and turns about z; a first line `# t tx ty tz qx qy qz qw` has them read as TUM's"
+                    .to_owned(),
+            );
         }
-        let mut by_time = None;
-        if self.are_stamped {
-            // Half of the digit that all stamps end with: programs write them with a few decimals.
-            stamps.rounding_ns = self.digit_ns.unsigned_abs() / 2;
-            if self.back > 0 || self.still > 0 {
-                let sorted = sort(&poses, &self.budget)?;
-                let twice = self.rows.saturating_sub(sorted.len());
-                if twice > 0 {
+        let poses = self.poses.finish()?;
+        let mut lists = PoseLists { poses, by_time: None, lost: PoseList::default() };
+        if has_stamps {
+            let is_whole = self.stamped == self.rows && self.bad.lost + self.bad.odd == 0;
+            if self.back > 0 || self.still > 0 || !is_whole {
+                let sorted = sort(&lists.poses, &self.budget, |pose| !is_lost(pose))?;
+                lists.lost = sort(&lists.poses, &self.budget, is_lost)?;
+                let twice = self.stamped.saturating_sub(sorted.len()).saturating_sub(lists.lost.len());
+                if twice > 0 && (self.back > 0 || self.still > 0) {
                     stamps.remarks.push(format!(
                         "{twice} time stamps of poses occur again; the last pose of each is taken"
                     ));
                 }
-                by_time = Some(sorted);
+                lists.by_time = Some(sorted);
             }
         }
-        Ok(Some(Trajectory::new(path, poses, by_time, stamps)))
+        Ok(Some(Trajectory::new(path, lists, stamps, is_w_first)))
+    }
+
+    fn remarks(&self) -> Vec<String> {
+        let mut remarks = Vec::new();
+        let BadRows { lost, odd, words, unstamped, first, first_unstamped, .. } = &self.bad;
+        if let Some(first) = first {
+            let rows = lost + odd + words;
+            let rows =
+                if rows == 1 { "1 row of poses is".to_owned() } else { format!("{rows} rows of poses are") };
+            remarks.push(format!("{rows} left out, the first: {first:#}"));
+        }
+        if let Some(first) = first_unstamped.as_ref().filter(|_| self.stamped > 0) {
+            remarks.push(format!("{unstamped} time stamps of poses cannot be read, the first: {first:#}"));
+        }
+        if self.back > 0 {
+            let back = self.back;
+            remarks.push(format!("{back} time stamps of poses go back; the poses were sorted by time"));
+        }
+        remarks
     }
 }
 
-/// The poses in strict order of time: of equal stamps the last stays.
-fn sort(poses: &PoseList, budget: &Budget) -> Result<PoseList> {
+/// In the place of a pose that was lost.
+const LOST: RigidPose = RigidPose { position_m: [f64::NAN; 3], quaternion: [0.0, 0.0, 0.0, 1.0] };
+
+/// Whether a pose was lost.
+pub(super) fn is_lost(pose: &RigidPose) -> bool {
+    pose.position_m.iter().any(|number| number.is_nan())
+}
+
+/// The stamp of a pose, if it has one.
+pub(super) fn stamp_of(timed: &TimedPose) -> Option<i64> {
+    (timed.stamp_ns != NO_STAMP).then_some(timed.stamp_ns)
+}
+
+/// The poses that are wanted in strict order of time: of equal stamps the last stays.
+fn sort(poses: &PoseList, budget: &Budget, is_wanted: impl Fn(&RigidPose) -> bool) -> Result<PoseList> {
     let mut sorter = Sorter::new(budget, budget.bytes / 4);
     for number in 0..poses.len() {
-        if let Some(timed) = poses.get(number)? {
+        if let Some(timed) = poses.get(number)?
+            && stamp_of(&timed).is_some()
+            && is_wanted(&timed.pose)
+        {
             sorter.push(Numbered { timed, number: number as u64 })?;
         }
     }

@@ -157,12 +157,16 @@ impl PosedClouds {
                             "the poses around it are {gap_s:.3} s apart; `pose_tolerance` allows for more"
                         ))
                     }
+                    Found::Lost => Err("the pose at its time was lost".to_owned()),
                     Found::Before { first_ns } => Err(outside(first_ns, stamp_ns, "before the first pose")),
                     Found::After { last_ns } => Err(outside(stamp_ns, last_ns, "after the last pose")),
                     Found::WithoutStamps => Err("the poses have no time stamps".to_owned()),
                 }
             }
-            (CloudPoses::File(trajectory), _) => Ok(trajectory.of_cloud(number, &*self.source)?),
+            (CloudPoses::File(trajectory), _) => {
+                let pose = trajectory.of_cloud(number, &*self.source)?;
+                pose.ok_or_else(|| "its pose was lost".to_owned())
+            }
         })
     }
 

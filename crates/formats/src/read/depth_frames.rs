@@ -1,4 +1,5 @@
 use super::cloud::{CloudHead, CloudPoint, CloudSource};
+use super::depth::depth_of;
 use super::gray16::{self, size};
 use super::input_file::open_input;
 use super::intrinsics::Intrinsics;
@@ -34,8 +35,6 @@ pub(super) struct DepthCode {
     pub(super) camera: Intrinsics,
     /// Units in a metre.
     pub(super) scale: f64,
-    /// Whether the largest value, beside 0, means that nothing came back.
-    pub(super) is_largest_invalid: bool,
 }
 
 /// Clouds of depth images.
@@ -107,12 +106,11 @@ fn read(path: &Path, code: &DepthCode, visit: Visit<'_>) -> Result<()> {
             Err(error) => return Err(damaged(error.to_string())),
         };
         for (column, pixel) in pixels.data().as_chunks::<2>().0.iter().enumerate() {
-            let raw = u16::from_be_bytes(*pixel);
+            let depth = depth_of(u16::from_be_bytes(*pixel));
             let direction = code.camera.direction(column as f64, f64::from(row));
-            let is_return = raw != 0 && !(code.is_largest_invalid && raw == u16::MAX);
-            let depth_m = if is_return { f64::from(raw) / code.scale } else { 1.0 };
+            let depth_m = depth.map_or(1.0, |depth| depth / code.scale);
             let position_m = direction.map(|axis| axis * depth_m);
-            visit(CloudPoint { is_return, ..CloudPoint::hit(position_m) })?;
+            visit(CloudPoint { is_return: depth.is_some(), ..CloudPoint::hit(position_m) })?;
         }
     }
     Ok(())

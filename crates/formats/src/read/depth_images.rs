@@ -2,7 +2,7 @@ use super::cloud::CloudSource;
 use super::depth_frames::{DepthCode, DepthFrames, Frame, Frames};
 use super::intrinsics::Intrinsics;
 use super::listing::{Listing, extension_of, is_named_depth};
-use super::one::head_of;
+use super::name_stamps::NameStamps;
 use super::regular::check_regular;
 use crate::poses::RigidPose;
 use crate::poses::matrix_of;
@@ -15,7 +15,10 @@ use voxtile::{Error, FormatError, Result};
 struct ImageFrames {
     files: u64,
     paths: std::vec::IntoIter<PathBuf>,
+    stamps: NameStamps,
     lost: u64,
+    /// What is wrong with the first pose that cannot be read.
+    first_bad: Option<String>,
 }
 
 /// Units of a depth image in a metre: millimetres.
@@ -45,20 +48,27 @@ pub(crate) fn open(folder: &Path, options: &ReadOptions) -> Result<Box<dyn Cloud
         Some(camera) => camera,
         None => Intrinsics::find(folder, options.intrinsics_path.as_deref())?,
     };
-    let code = DepthCode { camera, scale: options.depth_scale.unwrap_or(SCALE), is_largest_invalid: true };
-    let frames = ImageFrames { files: paths.len() as u64, paths: paths.into_iter(), lost: 0 };
+    let code = DepthCode { camera, scale: options.depth_scale.unwrap_or(SCALE) };
+    let (files, stamps) = (paths.len() as u64, NameStamps::of(&paths));
+    let frames = ImageFrames { files, paths: paths.into_iter(), stamps, lost: 0, first_bad: None };
     Ok(Box::new(DepthFrames::new("depth images".to_owned(), Box::new(frames), code)))
 }
 
 impl Frames for ImageFrames {
     fn next(&mut self) -> Result<Option<Frame>> {
         let Some(path) = self.paths.next() else { return Ok(None) };
-        let mut head = head_of(&path);
+        let mut head = self.stamps.head_of(&path);
         let stem = head.name.trim_end_matches(".png").trim_end_matches(".depth").to_owned();
         let beside = path.with_file_name(format!("{stem}.pose.txt"));
         check_regular(&beside)?;
         if beside.is_file() {
-            head.world_from_sensor = pose(&beside)?;
+            match pose(&beside) {
+                Ok(pose) => head.world_from_sensor = pose,
+                Err(error @ Error::Malformed { .. }) => {
+                    self.first_bad.get_or_insert_with(|| format!("{error:#}"));
+                }
+                Err(error) => return Err(error),
+            }
             self.lost += u64::from(head.world_from_sensor.is_none());
         }
         Ok(Some(Frame { path, head }))
@@ -70,8 +80,14 @@ impl Frames for ImageFrames {
 
     fn remarks(&self) -> Vec<String> {
         let lost = self.lost;
-        let remark = format!("{lost} images have a pose that is not a number: tracking was lost there");
-        if lost == 0 { Vec::new() } else { vec![remark] }
+        if lost == 0 {
+            return self.stamps.remark().into_iter().collect();
+        }
+        let mut remark = format!("{lost} images have a pose that is not a number: tracking was lost there");
+        if let Some(first) = &self.first_bad {
+            remark = format!("{lost} images have a pose that is lost or cannot be read: {first}");
+        }
+        self.stamps.remark().into_iter().chain([remark]).collect()
     }
 }
 

@@ -1,4 +1,4 @@
-use super::cloud::CloudSource;
+use super::cloud::{CloudHead, CloudSource};
 use super::depth_frames::{DepthCode, DepthFrames, Frame, Frames};
 use super::inside::is_inside;
 use super::intrinsics::Intrinsics;
@@ -7,14 +7,19 @@ use super::listing::is_rosbag2;
 use super::one::head_of;
 use super::regular::check_regular;
 use super::stamp;
+use super::text_line::comment_of;
 use crate::read_options::ReadOptions;
 use std::path::{Path, PathBuf};
-use voxtile::Result;
+use voxtile::{Error, Result};
 
 /// The lines of `depth.txt`: a stamp in seconds and a file.
 struct TumFrames {
     folder: PathBuf,
     lines: Lines,
+    /// Lines that name no image, and what is wrong with the first.
+    bad: u64,
+    first_bad: Option<Error>,
+    has_frame: bool,
 }
 
 /// Units of a depth image in a metre.
@@ -32,10 +37,16 @@ pub(crate) fn open(folder: &Path, options: &ReadOptions) -> Result<Box<dyn Cloud
         Some(camera) => camera,
         None => Intrinsics::find(folder, options.intrinsics_path.as_deref())?,
     };
-    let code = DepthCode { camera, scale: options.depth_scale.unwrap_or(SCALE), is_largest_invalid: false };
+    let code = DepthCode { camera, scale: options.depth_scale.unwrap_or(SCALE) };
     let list = folder.join("depth.txt");
     check_regular(&list)?;
-    let frames = TumFrames { folder: folder.to_owned(), lines: Lines::open(&list)? };
+    let frames = TumFrames {
+        folder: folder.to_owned(),
+        lines: Lines::open(&list)?,
+        bad: 0,
+        first_bad: None,
+        has_frame: false,
+    };
     Ok(Box::new(DepthFrames::new("depth images (TUM RGB-D)".to_owned(), Box::new(frames), code)))
 }
 
@@ -43,27 +54,46 @@ impl Frames for TumFrames {
     fn next(&mut self) -> Result<Option<Frame>> {
         while let Some((_, line)) = self.lines.next()? {
             let line = line.trim();
-            if line.is_empty() || line.starts_with('#') {
+            if line.is_empty() || comment_of(line).is_some() {
                 continue;
             }
-            let Some((stamp, file)) = line.split_once([' ', '\t', ',']) else {
-                return Err(self
-                    .lines
-                    .error("a line has a time stamp in seconds and the file of a depth image"));
-            };
-            let stamp_ns = stamp::of_seconds(stamp)
-                .ok_or_else(|| self.lines.error(format!("`{stamp:.40}` is no time stamp in seconds")))?;
-            let file = file.trim();
-            if !is_inside(Path::new(file)) {
-                let reason =
-                    format!("`{file:.80}` leads out of the folder; name images in it, as depth/1.png");
-                return Err(self.lines.error(reason));
+            match frame(line) {
+                Ok((_, file)) if !is_inside(Path::new(file)) => {
+                    let reason =
+                        format!("`{file:.80}` leads out of the folder; name images in it, as depth/1.png");
+                    return Err(self.lines.error(reason));
+                }
+                Ok((stamp_ns, file)) => {
+                    let path = self.folder.join(file);
+                    let head = CloudHead { stamp_ns: Some(stamp_ns), ..head_of(&path) };
+                    self.has_frame = true;
+                    return Ok(Some(Frame { path, head }));
+                }
+                Err(reason) => {
+                    self.bad += 1;
+                    self.first_bad.get_or_insert_with(|| self.lines.error(reason));
+                }
             }
-            let path = self.folder.join(file);
-            let mut head = head_of(&path);
-            head.stamp_ns = Some(stamp_ns);
-            return Ok(Some(Frame { path, head }));
         }
-        Ok(None)
+        match self.first_bad.take_if(|_| !self.has_frame) {
+            Some(error) => Err(error),
+            None => Ok(None),
+        }
     }
+
+    fn remarks(&self) -> Vec<String> {
+        let Some(first) = &self.first_bad else { return Vec::new() };
+        let lines = if self.bad == 1 { "1 line is".to_owned() } else { format!("{} lines are", self.bad) };
+        vec![format!("{lines} left out, the first: {first:#}")]
+    }
+}
+
+/// The stamp and the file of a line.
+fn frame(line: &str) -> std::result::Result<(i64, &str), String> {
+    let Some((stamp, file)) = line.split_once([' ', '\t', ',']) else {
+        return Err("a line has a time stamp in seconds and the file of a depth image".into());
+    };
+    let stamp_ns =
+        stamp::of_seconds(stamp).ok_or_else(|| format!("`{stamp:.40}` is no time stamp in seconds"))?;
+    Ok((stamp_ns, file.trim()))
 }

@@ -1,3 +1,4 @@
+use super::name_stamps::NameStamps;
 use std::cmp::Ordering;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -8,7 +9,8 @@ use std::path::{Path, PathBuf};
 pub(crate) fn sort_naturally(files: &mut [PathBuf]) {
     let length = |path: &PathBuf| path.file_name().unwrap_or_default().len();
     let is_padded = files.windows(2).all(|pair| length(&pair[0]) == length(&pair[1]));
-    let are_decimals = !is_padded && files.iter().all(|path| decimal(path).is_some());
+    let are_decimals =
+        !is_padded && files.iter().all(|path| decimal(path).is_some()) && !NameStamps::of(files).are_whole();
     files.sort_by(|a, b| {
         let letters = || a.file_name().cmp(&b.file_name());
         let order = match (is_padded, are_decimals) {
@@ -61,6 +63,9 @@ mod tests {
             sorted(&["9.5.pcd", "10.25.pcd", "10.3.pcd", "10.1.pcd"])[1..],
             ["10.1.pcd", "10.25.pcd", "10.3.pcd"]
         );
+        // Nanoseconds without leading zeros.
+        let names = ["1500000000.5000000.pcd", "1500000000.70000000.pcd", "1500000000.120000000.pcd"];
+        assert_eq!(sorted(&[names[2], names[0], names[1]]), names);
         // Hexadecimal numbers of one length.
         assert_eq!(sorted(&["0a1f.pcd", "0a10.pcd"]), ["0a10.pcd", "0a1f.pcd"]);
         assert_eq!(sorted(&["1.pcd", "01.pcd"]).len(), 2);

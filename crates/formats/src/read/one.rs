@@ -1,5 +1,5 @@
 use super::cloud::{CloudHead, CloudPoint, CloudSource};
-use super::stamp;
+use super::name_stamps;
 use std::path::Path;
 use voxtile::Result;
 
@@ -24,7 +24,7 @@ pub trait Points: Send {
 /// What a file's name tells of its cloud.
 pub(crate) fn head_of(path: &Path) -> CloudHead {
     let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    CloudHead { name, stamp_ns: stamp::in_name(path), ..CloudHead::default() }
+    CloudHead { name, stamp_ns: name_stamps::in_name(path), ..CloudHead::default() }
 }
 
 /// A file with one cloud.

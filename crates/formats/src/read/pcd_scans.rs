@@ -3,15 +3,16 @@
 use super::file_order::sort_naturally;
 use super::files::Files;
 use super::from_origin::FromOrigin;
-use super::one::{OneCloud, head_of};
+use super::name_stamps::NameStamps;
+use super::one::OneCloud;
 use super::pcd;
-use crate::poses::PoseSource;
 use crate::poses::{CloudPoses, PosedClouds};
+use crate::poses::{PoseSource, SAME_TIME_NS};
 use crate::poses::{Rules, Trajectory};
 use crate::poses::{find_poses, pose_file_for};
 use crate::read_options::ReadOptions;
 use crate::scans::ScanSource;
-use crate::{CloudHead, CloudSource, RigidPose, stamp_of_name};
+use crate::{CloudHead, CloudSource, RigidPose};
 use std::fs;
 use std::path::{Path, PathBuf};
 use voxtile::scan::Pose;
@@ -35,9 +36,10 @@ pub(crate) fn open(path: &Path, options: &ReadOptions) -> Result<Box<dyn ScanSou
         return Err(Error::argument(path.display().to_string(), "no file in it ends with .pcd"));
     }
     let is_plain = options.calib.is_none() && options.clouds.is_plain() && options.sensor_origin_m.is_none();
+    let stamps = NameStamps::of(&files);
     let mut poses = poses_of(path, &files, is_plain, options)?;
     let has_stamps = match &poses {
-        CloudPoses::File(trajectory) => !is_plain || !is_by_line(trajectory, &files)?,
+        CloudPoses::File(trajectory) => !is_plain || !is_by_line(trajectory, &files, stamps)?,
         CloudPoses::Missing => true,
         CloudPoses::Source(_) | CloudPoses::Identity => !is_plain,
     };
@@ -46,7 +48,7 @@ pub(crate) fn open(path: &Path, options: &ReadOptions) -> Result<Box<dyn ScanSou
     let (is_alone, budget) = (files.len() == 1, options.budget());
     let has_origin = options.sensor_origin_m.is_some();
     let open = move |path: &Path| -> Result<Box<dyn CloudSource>> {
-        let (mut head, points) = pcd::open(path, head_of(path), &budget, is_viewpoint_needed)?;
+        let (mut head, points) = pcd::open(path, stamps.head_of(path), &budget, is_viewpoint_needed)?;
         if head.world_from_sensor.is_none() && must_have_viewpoint {
             let reason = "no VIEWPOINT in this file, which other files of the folder have: where it was taken is not known";
             return Err(FormatError::at_line(1, reason).in_input(path));
@@ -62,14 +64,16 @@ pub(crate) fn open(path: &Path, options: &ReadOptions) -> Result<Box<dyn ScanSou
         };
         Ok(Box::new(OneCloud::new("PCD", (head, points))))
     };
-    let clouds = Box::new(Files::new("PCD".into(), files.clone(), true, Box::new(open)));
+    let remarks = stamps.remark().into_iter().filter(|_| has_stamps).collect();
+    let clouds =
+        Box::new(Files::new("PCD".into(), files.clone(), true, Box::new(open)).with_remarks(remarks));
     let clouds: Box<dyn CloudSource> = match options.sensor_origin_m {
         Some(origin_m) => Box::new(FromOrigin::new(clouds, origin_m)?),
         None => clouds,
     };
     if let (CloudPoses::File(trajectory), false) = (&mut poses, has_stamps) {
         trajectory.check_order()?;
-        warn_of_shift(trajectory, &files)?;
+        warn_of_shift(trajectory, &files, stamps)?;
         trajectory.forget_stamps();
     }
     let mut scans = PosedClouds::new(clouds, path, poses, options.clouds.clone())?;
@@ -90,18 +94,16 @@ fn poses_of(path: &Path, files: &[PathBuf], is_plain: bool, options: &ReadOption
     };
     let own = own.map(|own| if is_plain { own } else { PoseSource::Scans });
     let rules = if is_plain { Rules::Lenient } else { Rules::Strict };
-    find_poses(path, own, None, rules, options)
+    find_poses(path, own, None, false, rules, options)
 }
 
 /// Whether files take these poses line by line: a plain text, unless the names of the files are time stamps that its
 /// stamps contradict.
-fn is_by_line(trajectory: &Trajectory, files: &[PathBuf]) -> Result<bool> {
-    /// Up to the milliseconds that some programs write.
-    const SAME_NS: u64 = 1_000_000;
+fn is_by_line(trajectory: &Trajectory, files: &[PathBuf], stamps: NameStamps) -> Result<bool> {
     if !trajectory.form().is_plain {
         return Ok(false);
     }
-    let stamps: Option<Vec<i64>> = files.iter().map(|file| stamp_of_name(file)).collect();
+    let stamps: Option<Vec<i64>> = files.iter().map(|file| stamps.stamp(file)).collect();
     let Some((stamps, [first_ns, last_ns])) = stamps.zip(trajectory.span_ns()?) else { return Ok(true) };
     if trajectory.len() != files.len() {
         return Ok(false);
@@ -114,7 +116,8 @@ fn is_by_line(trajectory: &Trajectory, files: &[PathBuf]) -> Result<bool> {
         return Ok(false);
     }
     for (number, of_file) in stamps.into_iter().enumerate() {
-        if trajectory.stamp_of(number)?.is_none_or(|of_pose| of_pose.abs_diff(of_file) > SAME_NS) {
+        // A row that was lost may have lost its time, too.
+        if trajectory.stamp_of(number)?.is_some_and(|of_pose| of_pose.abs_diff(of_file) > SAME_TIME_NS) {
             return Ok(false);
         }
     }
@@ -122,12 +125,12 @@ fn is_by_line(trajectory: &Trajectory, files: &[PathBuf]) -> Result<bool> {
 }
 
 /// Warns where the numbers in the names of files are time stamps, and one does not match its pose as the others do.
-fn warn_of_shift(trajectory: &Trajectory, files: &[PathBuf]) -> Result<()> {
+fn warn_of_shift(trajectory: &Trajectory, files: &[PathBuf], names: NameStamps) -> Result<()> {
     let mut stamps = Vec::with_capacity(files.len());
     for number in 0..files.len() {
         stamps.extend(trajectory.stamp_of(number)?.map(|stamp_ns| stamp_ns as f64 * 1e-9));
     }
-    if let Some((file, seconds)) = first_shifted(&stamps, files) {
+    if let Some((file, seconds)) = first_shifted(&stamps, files, names) {
         log::warn!(
             "{}: the number in {} is {seconds:.3} s further from its pose's time stamp than those of most files: is a \
              line or a file missing?",
@@ -139,9 +142,18 @@ fn warn_of_shift(trajectory: &Trajectory, files: &[PathBuf]) -> Result<()> {
 }
 
 /// The first file whose name does not match its pose, and by how many seconds.
-fn first_shifted<'f>(stamps_s: &[f64], files: &'f [PathBuf]) -> Option<(&'f PathBuf, f64)> {
+fn first_shifted<'f>(
+    stamps_s: &[f64],
+    files: &'f [PathBuf],
+    of_names: NameStamps,
+) -> Option<(&'f PathBuf, f64)> {
     let (first, last) = (*stamps_s.first()?, *stamps_s.last()?);
-    let names: Vec<f64> = files.iter().map(|path| number_in(path)).collect::<Option<_>>()?;
+    let time_in = |path: &PathBuf| Some(of_names.stamp(path)? as f64 * 1e-9);
+    let times: Option<Vec<f64>> = files.iter().map(time_in).collect();
+    let names = match times {
+        Some(times) => times,
+        None => files.iter().map(|path| number_in(path)).collect::<Option<_>>()?,
+    };
     if stamps_s.len() != names.len() || first < MIN_STAMP_S || last <= first {
         return None;
     }

@@ -58,7 +58,30 @@ fn tum_has_a_list_with_stamps_and_a_scale_of_5000() {
     let clouds = clouds_with(&folder, &ReadOptions { intrinsics, ..Default::default() });
     assert_eq!(clouds[0].0.stamp_ns, Some(1_305_031_453_374_112_000));
     let depths: Vec<_> = clouds[0].1.iter().map(|point| (point.position_m[2], point.is_return)).collect();
-    assert_eq!(depths, [(1.0, true), (13.107, true)]);
+    // The largest value is no distance.
+    assert_eq!(depths, [(1.0, true), (1.0, false)]);
+}
+
+#[test]
+fn lines_of_the_list_that_cannot_be_read_are_left_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let options = ReadOptions {
+        intrinsics: Some(Intrinsics::new([525.0, 525.0, 319.5, 239.5]).unwrap()),
+        format: Some("tum-rgbd".into()),
+        ..Default::default()
+    };
+    image(&folder.path().join("1.png"), 1, &[5000]);
+    let list = folder.path().join("depth.txt");
+    fs::write(&list, "# depth maps\nnan 1.png\n// a comment\n1.png\n12.5 1.png\n").unwrap();
+    let mut source = voxtile_formats::open_clouds(folder.path(), &options).unwrap();
+    let clouds = crate::support::all(&mut *source).unwrap();
+    assert_eq!(clouds.iter().map(|(head, _)| head.stamp_ns).collect::<Vec<_>>(), [Some(12_500_000_000)]);
+    let remarks = source.remarks();
+    assert!(remarks.len() == 1 && remarks[0].starts_with("2 lines are left out, the first: "), "{remarks:?}");
+    assert!(remarks[0].contains("line 2: `nan` is no time stamp"), "{remarks:?}");
+    fs::write(&list, "nan 1.png\n").unwrap();
+    let (error, points) = failure(folder.path(), &options);
+    assert!(error.contains("line 1: `nan` is no time stamp") && points == 0, "{error}");
 }
 
 /// A list from elsewhere is not to open any file of the machine.

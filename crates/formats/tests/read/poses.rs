@@ -24,9 +24,10 @@ fn stamps_are_exact_and_poses_lie_between() {
     let trajectory = read(TUM).unwrap();
     let first = RigidPose { position_m: [1.0, 2.0, 3.0], ..RigidPose::IDENTITY };
     assert_eq!(trajectory.at(FIRST_NS, 0).unwrap(), Found::Exact(first));
-    assert_eq!(trajectory.at(FIRST_NS - 1, i64::MAX).unwrap(), Found::Before { first_ns: FIRST_NS });
+    let before_ns = FIRST_NS - 1_000_001;
+    assert_eq!(trajectory.at(before_ns, i64::MAX).unwrap(), Found::Before { first_ns: FIRST_NS });
     let last_ns = FIRST_NS + 11_000_000_000;
-    assert_eq!(trajectory.at(last_ns + 1, i64::MAX).unwrap(), Found::After { last_ns });
+    assert_eq!(trajectory.at(last_ns + 1_000_001, i64::MAX).unwrap(), Found::After { last_ns });
     // Written numbers stay, though their length is not 1 to the last bit.
     let Found::Exact(last) = trajectory.at(last_ns, 0).unwrap() else { panic!() };
     assert_eq!(last.quaternion, [0.0, 0.0, 0.707, 0.7072]);
@@ -49,18 +50,27 @@ fn stamps_are_exact_and_poses_lie_between() {
 }
 
 #[test]
-fn a_time_beyond_an_end_by_rounding_alone_has_the_pose_there() {
-    let trajectory = read("10.0000 1 0 0 0 0 0 1\n10.1001 2 0 0 0 0 0 1\n10.2003 3 0 0 0 0 0 1\n").unwrap();
-    let last_ns = 10_200_300_000;
-    let Found::Exact(last) = trajectory.at(last_ns + 50_000, 0).unwrap() else { panic!() };
-    assert_eq!(last.position_m[0], 3.0);
-    assert_eq!(trajectory.at(last_ns + 50_001, i64::MAX).unwrap(), Found::After { last_ns });
-    assert!(matches!(trajectory.at(9_999_950_000, 0).unwrap(), Found::Exact(_)));
-    assert!(matches!(trajectory.at(9_999_949_999, 0).unwrap(), Found::Before { .. }));
-    // Whole seconds need not be rounded.
-    let trajectory = read("10 1 0 0 0 0 0 1\n11 2 0 0 0 0 0 1\n").unwrap();
-    assert!(matches!(trajectory.at(11_000_500_000, 0).unwrap(), Found::Exact(_)));
-    assert!(matches!(trajectory.at(11_000_500_001, 0).unwrap(), Found::After { .. }));
+fn a_pose_within_a_millisecond_is_taken_whatever_the_gap() {
+    let key_frames =
+        "1700000010.000000000 1 0 0 0 0 0 1\n1700000025.5 2 0 0 0 0 0 1\n1700000040.25 3 0 0 0 0 0 1\n";
+    let trajectory = read(key_frames).unwrap();
+    let [first_ns, second_ns, last_ns] =
+        [10.0, 25.5, 40.25].map(|s| 1_700_000_000_000_000_000 + (s * 1e9) as i64);
+    let x_m = |stamp_ns: i64| match trajectory.at(stamp_ns, 500_000_000).unwrap() {
+        Found::Exact(pose) => Some(pose.position_m[0]),
+        _ => None,
+    };
+    for (stamp_ns, wanted) in [(first_ns, 1.0), (second_ns, 2.0), (last_ns, 3.0)] {
+        for apart_ns in [-1_000_000, -74, 0, 74, 1_000_000] {
+            assert_eq!(x_m(stamp_ns + apart_ns), Some(wanted), "{apart_ns}");
+        }
+        for apart_ns in [-1_000_001, 1_000_001] {
+            assert_eq!(x_m(stamp_ns + apart_ns), None, "{apart_ns}");
+        }
+    }
+    // Where the gap may be filled, the pose is between two, however near to one.
+    let Found::Between(pose) = trajectory.at(first_ns + 74, i64::MAX).unwrap() else { panic!() };
+    assert!(pose.position_m[0] > 1.0);
 }
 
 #[test]
@@ -79,9 +89,28 @@ fn stamps_out_of_order_and_twice_are_remarked() {
 #[test]
 fn what_is_no_pose_is_an_error_with_its_line() {
     for (text, reason) in [
-        ("0 0 0 0 0 0 0 1\n1 nan 0 0 0 0 0 1\n", "line 2: `nan` is not finite"),
+        ("1 nan 0 0 0 0 0 1\n", "line 1: `nan` is not finite"),
         ("0 0 0 0 0 0 0 0\n", "line 1: the quaternion 0 0 0 0 has length 0"),
-        ("0 0 0 0 0 0 0 1\n\n# x\n1 2 3\n", "line 4: 3 numbers; the lines before have 8"),
+        // Most lines are something else.
+        (
+            "0 0 0 0 0 0 0 1\n\n1 2 3 4 5 6 7 8 9\n1 2 3 4 5 6 7 8 9\n",
+            "line 3: 9 numbers; the lines before have 8",
+        ),
+        (
+            "1 2 3 0.1 0.2 0.3 0.4\n1 2 3 0 0 0 1\n2 2 3 0.1 0.2 0.3 0.4\n",
+            "are these angles, roll, pitch and yaw?",
+        ),
+        ("1 2 3 4 5 6\n", "line 1: 6 numbers; a pose is 8 numbers (TUM: t x y z qx qy qz qw), 7 without t"),
+        ("1 2 3 4 5 6\n", "roll, pitch and yaw are not read"),
+        ("t x y z roll pitch yaw\n1 2 3 4 0 0 1\n", "line 1: the column `roll` is an angle"),
+        ("# t x y z roll pitch yaw\n1 2 3 4 0 0 1\n", "line 2: the column `roll` is an angle"),
+        ("# t x[px] y[px] z[px] qx qy qz qw\n1 2 3 4 0 0 0 1\n", "line 2: `px` is no unit of length"),
+        (
+            "# id t x y z qw qx qy qz\n1 2 3 4 1 0 0 0\n",
+            "line 2: 8 columns; the names before it are of 9 or more",
+        ),
+        ("t[min] x y z qx qy qz qw\n1 2 3 4 0 0 0 1\n", "line 1: `min` is no unit of time"),
+        ("nan 2 3 4 0 0 0 1\nNA 2 3 4 0 0 0 1\n", "line 1: no time stamp"),
         ("1 0 0 0 0 2 0 0 0 0 1 0\n", "line 1: the matrix is no rotation"),
         ("one two\n", "line 1: `one two` is neither"),
         ("1 2 3\n", "line 1: 3 numbers"),
@@ -121,8 +150,8 @@ impl CloudSource for Clouds {
 #[test]
 fn poses_by_number_are_as_many_as_clouds() {
     let trajectory = read(TUM).unwrap();
-    assert_eq!(trajectory.of_cloud(2, &Clouds(Some(3))).unwrap(), trajectory.by_number(2).unwrap().unwrap());
-    assert_eq!(trajectory.of_cloud(2, &Clouds(None)).unwrap(), trajectory.by_number(2).unwrap().unwrap());
+    assert_eq!(trajectory.of_cloud(2, &Clouds(Some(3))).unwrap(), trajectory.by_number(2).unwrap());
+    assert_eq!(trajectory.of_cloud(2, &Clouds(None)).unwrap(), trajectory.by_number(2).unwrap());
     for (number, clouds, counts) in [
         (0, Some(4), "3 poses for 4 clouds (1.txt to trajectory.txt), which have no time stamps in common"),
         (0, Some(2), "3 poses for 2 clouds (1.txt to trajectory.txt), "),
@@ -142,6 +171,119 @@ fn tables_name_their_columns() {
         let trajectory = read(text).unwrap();
         let wanted = RigidPose { position_m: [1.0, 2.0, 3.0], quaternion: [1.0, 0.0, 0.0, 0.0] };
         assert_eq!(trajectory.at(FIRST_NS, 0).unwrap(), Found::Exact(wanted), "{text}");
+    }
+}
+
+#[test]
+fn units_of_columns_are_used() {
+    let wanted = RigidPose { position_m: [1.5, -0.25, 3.0], quaternion: [0.0, 0.0, 1.0, 0.0] };
+    for (text, unit) in [
+        (
+            "timestamp [ns],x [mm],y [mm],z [mm],qx,qy,qz,qw\n1700000000000000000,1500,-250,3000,0,0,1,0\n",
+            "mm",
+        ),
+        (
+            "# t[s] tx(cm) ty(cm) tz(cm) qw qx qy qz\n# of the left sensor\n1700000000 150 -25 300 0 0 0 1\n",
+            "cm",
+        ),
+        ("time_ms;x_mm;y_cm;z_m;q_x;q_y;q_z;q_w\n1700000000000;1500,0;-25,0;3;0;0;1;0\n", "mm, cm and m"),
+        ("sec,nsec,x,y,z,qx,qy,qz,qw\n1700000000,0,1.5,-0.25,3,0,0,1,0\n", ""),
+        ("#sec,nsec,x/mm,y/mm,z/mm,qx,qy,qz,qw\n1700000000,000000000,1500,-250,3000,0,0,1,0\n", "mm"),
+    ] {
+        let trajectory = read(text).unwrap();
+        assert_eq!(trajectory.at(1_700_000_000_000_000_000, 0).unwrap(), Found::Exact(wanted), "{text}");
+        let remarks = trajectory.remarks().join("\n");
+        let said = format!("positions are in {unit} by the names of their columns");
+        assert!(if unit.is_empty() { remarks.is_empty() } else { remarks.contains(&said) }, "{remarks}");
+    }
+}
+
+#[test]
+fn rows_that_are_no_poses_keep_their_numbers_and_are_remarked() {
+    for (row, reason) in [
+        ("2 nan nan nan nan nan nan nan", "line 3: `nan` is not finite"),
+        ("2 -nan(ind) 0 0 0 0 0 1", "line 3: `-nan(ind)` is not finite"),
+        ("2 20 0 0 0 0 0 0", "line 3: the quaternion 0 0 0 0 has length 0"),
+        ("2 lost", "line 3: 2 numbers; the lines before have 8"),
+        ("2 20 x 0 0 0 0 1", "line 3: `x` is not a number"),
+        ("2", "line 3: 1 numbers"),
+        ("2,,,,,,,", "line 3: 1 numbers"),
+    ] {
+        let text =
+            format!("# t x y z qx qy qz qw\n1 10 0 0 0 0 0 1\n{row}\n3 30 0 0 0 0 0 1\n4 40 0 0 0 0 0 1\n");
+        let trajectory = read(&text.replace("# t x y z qx qy qz qw", "# by hand")).unwrap();
+        assert_eq!(trajectory.len(), 4, "{row}");
+        let x_m = |number: usize| trajectory.by_number(number).unwrap().map(|pose| pose.position_m[0]);
+        assert_eq!([0, 1, 2, 3].map(x_m), [Some(10.0), None, Some(30.0), Some(40.0)], "{row}");
+        assert_eq!(trajectory.of_cloud(1, &Clouds(Some(4))).unwrap(), None);
+        assert_eq!(trajectory.at(2_000_000_000, i64::MAX).unwrap(), Found::Lost, "{row}");
+        assert_eq!(trajectory.at(2_000_900_000, i64::MAX).unwrap(), Found::Lost, "{row}");
+        assert!(matches!(trajectory.at(2_100_000_000, i64::MAX).unwrap(), Found::Between(_)), "{row}");
+        assert!(matches!(trajectory.at(3_000_000_000, 0).unwrap(), Found::Exact(_)));
+        let remarks = trajectory.remarks();
+        assert!(
+            remarks.len() == 1 && remarks[0].starts_with("1 row of poses is left out, the first: "),
+            "{remarks:?}"
+        );
+        assert!(remarks[0].contains(reason), "{remarks:?}");
+    }
+    // Words between poses are no pose of a scan, and a stamp that cannot be read leaves the pose its number.
+    let text =
+        "t x y z qx qy qz qw\n1 10 0 0 0 0 0 1\nt x y z qx qy qz qw\nnan 20 0 0 0 0 0 1\n3 30 0 0 0 0 0 1\n";
+    let trajectory = read(text).unwrap();
+    assert_eq!(trajectory.len(), 3);
+    assert_eq!(trajectory.by_number(1).unwrap().map(|pose| pose.position_m[0]), Some(20.0));
+    assert_eq!(
+        trajectory.stamps_ns().map(|stamp| stamp.unwrap() / 1_000_000_000).collect::<Vec<_>>(),
+        [1, 3]
+    );
+    let remarks = trajectory.remarks().join("\n");
+    assert!(remarks.contains("line 3: `t x y z") && remarks.contains("line 4: no time stamp"), "{remarks}");
+    // A matrix over four lines is lost as a whole.
+    let matrix = |x: &str| format!("1 0 0 {x}\n0 1 0 0\n0 0 1 0\n0 0 0 1\n");
+    let trajectory = read(&["1", "nan", "3"].map(matrix).concat()).unwrap();
+    let x_m = |number: usize| trajectory.by_number(number).unwrap().map(|pose| pose.position_m[0]);
+    assert_eq!((trajectory.len(), [0, 1, 2].map(x_m)), (3, [Some(1.0), None, Some(3.0)]));
+}
+
+/// The poses of a cart that turns to the left, each `x y z` and the quaternion as `w x y z`.
+fn turning_cart() -> Vec<([f64; 3], [f64; 4])> {
+    let at = |k: i32| (f64::from(k), 0.04 * f64::from(k));
+    (0..12)
+        .map(at)
+        .map(|(x, yaw)| ([x, 0.1 * x, 0.0], [(yaw / 2.0).cos(), 0.0, 0.0, (yaw / 2.0).sin()]))
+        .collect()
+}
+
+#[test]
+fn quaternions_with_w_first_are_told_by_the_way_the_sensor_stands() {
+    let text = |is_first: bool, head: &str| {
+        let line = |(k, (p, [w, x, y, z])): (usize, ([f64; 3], [f64; 4]))| {
+            let q = if is_first { [w, x, y, z] } else { [x, y, z, w] };
+            let words: Vec<String> = p.iter().chain(&q).map(f64::to_string).collect();
+            format!("{k} {}\n", words.join(" "))
+        };
+        head.to_owned() + &turning_cart().into_iter().enumerate().map(line).collect::<String>()
+    };
+    for (is_first, head, is_guess) in [
+        (false, "", false),
+        (true, "", true),
+        (true, "# k x y z\n", true),
+        (true, "# t x y z qw qx qy qz\n", false),
+        (true, "t x y z qw qx qy qz\n", false),
+        (false, "# t x y z qx qy qz qw\n", false),
+    ] {
+        let trajectory = read(&text(is_first, head)).unwrap();
+        for (number, (position_m, [w, x, y, z])) in turning_cart().into_iter().enumerate() {
+            let wanted = RigidPose { position_m, quaternion: [x, y, z, w] };
+            assert_eq!(trajectory.by_number(number).unwrap(), Some(wanted), "{is_first} {head}");
+            let Found::Exact(found) = trajectory.at(number as i64 * 1_000_000_000, 0).unwrap() else {
+                panic!()
+            };
+            assert_eq!(found, wanted);
+        }
+        let remarks = trajectory.remarks().join("\n");
+        assert_eq!(remarks.contains("are read w first (qw qx qy qz)"), is_guess, "{remarks}");
     }
 }
 
@@ -211,7 +353,18 @@ fn arrays_of_numpy() {
             assert!((cosine.abs() - 1.0).abs() < 1e-7, "{name}: {a:?} {b:?}");
         }
     }
+    // Without times, and with a lost pose.
     let folder = tempfile::tempdir().unwrap();
+    let rows = [[1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0], [f64::NAN; 7], [4.0, 5.0, 6.0, 0.0, 0.0, 1.0, 0.0]];
+    let numbers = rows.as_flattened().iter().flat_map(|number| number.to_le_bytes());
+    let mut bytes = npy(1, "{'descr': '<f8', 'fortran_order': False, 'shape': (3, 7), }\n", 0);
+    bytes.extend(numbers);
+    let path = folder.path().join("seven.npy");
+    fs::write(&path, bytes).unwrap();
+    let seven = Trajectory::read(&path, None).unwrap();
+    let x_m = |number: usize| seven.by_number(number).unwrap().map(|pose| pose.position_m[0]);
+    assert_eq!((seven.len(), [0, 1, 2].map(x_m)), (3, [Some(1.0), None, Some(4.0)]));
+    assert!(seven.remarks()[0].contains("record 1: a number is not finite"), "{:?}", seven.remarks());
     let cut = folder.path().join("cut.npy");
     let bytes = fs::read(at("poses_tum.npy")).unwrap();
     fs::write(&cut, &bytes[..bytes.len() - 1]).unwrap();
@@ -265,6 +418,7 @@ fn an_array_that_holds_no_poses_says_what_is_expected() {
         (npy(3, &header("[('t', '<f8'), ('x', '<f8')]", "False", "2,"), 32), "is a structured array"),
         (npy(1, &header("'<f8'", "True", "2, 8"), 128), "is in Fortran order"),
         (npy(1, &header("'<f8'", "False", "2, 9"), 144), "has the shape (2, 9); poses are N x 8"),
+        (npy(1, &header("'<f8'", "False", "2, 6"), 96), "roll, pitch and yaw are not read"),
         (npy(1, &header("'<f8'", "False", ""), 8), "has the shape ()"),
         (npy(1, &header("'<f8'", "False", "18446744073709551615, 8"), 0), "the file ends after 0 of"),
         (npy(1, &plain, 40), "the file ends after 0 of 2 poses"),

@@ -1,7 +1,8 @@
 use super::header::Header;
-use super::image::{CameraInfo, NO_DEPTH};
+use super::image::CameraInfo;
 use super::rvl::Rvl;
 use crate::read::cloud::CloudPoint;
+use crate::read::depth::depth_of;
 use crate::read::gray16;
 use crate::ros::wire::{Decoded, Wire, WireError, WireReader};
 use std::io::Cursor;
@@ -155,8 +156,7 @@ impl Code {
     /// The depth of a number; NaN if it means that nothing came back.
     fn depth_m(self, number: u16) -> f64 {
         match self {
-            Self::Millimetres if number == NO_DEPTH => f64::NAN,
-            Self::Millimetres => f64::from(number) * 1e-3,
+            Self::Millimetres => depth_of(number).map_or(f64::NAN, |depth| depth * 1e-3),
             Self::Inverse { .. } if number == 0 => f64::NAN,
             // The encoder worked in single precision, which decides nothing here.
             Self::Inverse { a, b } => a / (f64::from(number) - b),

@@ -1,6 +1,7 @@
 use super::header::Header;
 use super::point_field::FieldType;
 use crate::read::cloud::CloudPoint;
+use crate::read::depth::depth_of;
 use crate::ros::wire::{Decoded, Wire, WireError, WireReader};
 
 /// `sensor_msgs/Image`, with its pixels as the bytes that they are.
@@ -29,9 +30,6 @@ pub struct CameraInfo {
     /// The principal point, in pixels.
     pub center_px: [f64; 2],
 }
-
-/// A depth of 16 bits that is none: the largest number, as much as 0.
-pub(super) const NO_DEPTH: u16 = u16::MAX;
 
 /// Whether pixels of an encoding may be depths. `16UC1` and `mono16` may be anything else of 16 bits, too.
 pub fn is_depth_encoding(encoding: &str) -> bool {
@@ -117,8 +115,10 @@ impl<'a> Image<'a> {
         .map(move |(u, v, pixel)| {
             let value = depth.and_then(|(kind, unit_m)| {
                 let value = kind.value(pixel, self.is_big_endian)?;
-                let is_depth = kind != FieldType::U16 || value != f64::from(NO_DEPTH);
-                is_depth.then_some(value * unit_m)
+                match kind {
+                    FieldType::U16 => depth_of(value as u16).map(|depth| depth * unit_m),
+                    _ => Some(value * unit_m),
+                }
             });
             camera.point([u, v], value.unwrap_or(f64::NAN))
         })

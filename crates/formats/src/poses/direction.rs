@@ -1,0 +1,128 @@
+use super::RigidPose;
+use super::quaternion_order::up;
+
+/// Which way a sensor goes, seen from itself: what its poses look like where they are those of another frame.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Direction {
+    first: Option<RigidPose>,
+    last: Option<RigidPose>,
+    /// Squares of the steps along x, y and z of the sensor.
+    squares: [f64; 3],
+    /// The steps along them.
+    steps_m: [f64; 3],
+    path_m: f64,
+}
+
+/// Shorter steps are as much noise as motion.
+const MIN_STEP_M: f64 = 0.2;
+/// A path that tells a direction.
+const MIN_PATH_M: f64 = 1.5;
+const Y: usize = 1;
+const Z: usize = 2;
+
+impl Direction {
+    /// Poses that are looked at.
+    pub(super) const MAX_POSES: usize = 10_000;
+
+    pub(super) fn insert(&mut self, pose: &RigidPose) {
+        self.first.get_or_insert(*pose);
+        let Some(last) = &self.last else {
+            self.last = Some(*pose);
+            return;
+        };
+        let step = last.inverse().apply(pose.position_m);
+        let square: f64 = step.iter().map(|part| part * part).sum();
+        if square < MIN_STEP_M * MIN_STEP_M || !square.is_finite() {
+            return;
+        }
+        for ((sum, steps), part) in self.squares.iter_mut().zip(&mut self.steps_m).zip(step) {
+            *sum += part * part;
+            *steps += part;
+        }
+        self.path_m += square.sqrt();
+        self.last = Some(*pose);
+    }
+
+    /// The share of the way that goes along an axis, where the way is long enough.
+    fn share(&self, axis: usize) -> Option<f64> {
+        let all: f64 = self.squares.iter().sum();
+        (self.path_m >= MIN_PATH_M).then(|| self.squares.get(axis).map_or(0.0, |square| square / all))
+    }
+
+    /// Whether this may be the way of a camera, which looks along its z: not one that goes along x or y.
+    pub(super) fn may_be_of_camera(&self) -> bool {
+        self.share(Z).is_none_or(|share| share > 0.5)
+    }
+
+    /// Whether it goes along z.
+    pub(super) fn is_along_z(&self) -> bool {
+        self.share(Z).is_some_and(|share| share > 0.9)
+    }
+
+    /// What a person should know of the way of a lidar.
+    pub(super) fn remarks(&self, has_calib: bool) -> Vec<String> {
+        let mut remarks = Vec::new();
+        let Some(first) = &self.first else { return remarks };
+        let starts_level = up(first.quaternion) > 0.94;
+        if up(first.quaternion) < -0.7 {
+            remarks.push(
+                "the first pose is upside down: does the sensor hang so? If w comes first in the quaternions, a first \
+                 line of names says so (# t tx ty tz qw qx qy qz)"
+                    .to_owned(),
+            );
+        } else if !has_calib && starts_level && self.is_along_z() {
+            remarks.push(
+                "the poses go along their own z, as those of a camera do, not of a lidar on the ground: `calib` FILE \
+                 or `extrinsic` turns them into those of the sensor"
+                    .to_owned(),
+            );
+        } else if has_calib && self.share(Y).is_some_and(|share| share > 0.9) && self.steps_m[Y] < 0.0 {
+            remarks.push(
+                "with `calib` the poses go along their own -y: are they those of the lidar already? Leave `calib` out \
+                 then"
+                    .to_owned(),
+            );
+        }
+        remarks
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{UnitQuaternion, Vector3};
+
+    fn way(step_m: [f64; 3], roll: f64) -> Direction {
+        let mut direction = Direction::default();
+        for k in 0..30 {
+            let rotation = UnitQuaternion::from_euler_angles(roll, 0.0, 0.0);
+            let position_m: [f64; 3] = (rotation * (Vector3::from(step_m) * f64::from(k))).into();
+            let quaternion: [f64; 4] = rotation.coords.into();
+            direction.insert(&RigidPose { position_m, quaternion });
+        }
+        direction
+    }
+
+    #[test]
+    fn a_camera_goes_along_z() {
+        let camera = way([0.01, 0.0, 0.9], 0.0);
+        assert!(camera.is_along_z() && camera.may_be_of_camera());
+        assert!(camera.remarks(false).iter().any(|remark| remark.contains("along their own z")));
+        assert_eq!(camera.remarks(true), Vec::<String>::new());
+        let lidar = way([0.9, 0.1, 0.05], 0.0);
+        assert!(!lidar.is_along_z() && !lidar.may_be_of_camera());
+        assert!(lidar.remarks(false).is_empty() && lidar.remarks(true).is_empty());
+        let twice = way([0.0, -0.9, 0.0], 0.0);
+        assert!(twice.remarks(false).is_empty() && twice.remarks(true).len() == 1);
+        assert!(way([0.0, 0.9, 0.0], 0.0).remarks(true).is_empty());
+        let still = way([0.0, 0.0, 0.001], 0.0);
+        assert!(!still.is_along_z() && still.may_be_of_camera() && still.remarks(false).is_empty());
+    }
+
+    #[test]
+    fn a_first_pose_upside_down_is_worth_a_remark() {
+        let remarks = way([0.9, 0.0, 0.0], std::f64::consts::PI).remarks(false);
+        assert!(remarks.len() == 1 && remarks[0].contains("upside down"), "{remarks:?}");
+        assert!(way([0.9, 0.0, 0.0], 1.0).remarks(false).is_empty());
+    }
+}

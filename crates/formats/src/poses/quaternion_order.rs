@@ -1,0 +1,144 @@
+//! Whether quaternions that no name tells of have their w first or last.
+
+/// What tells the one from the other. Each quaternion is of length 1 either way, and turns from pose to pose are as
+/// large; but the sensor starts upright and turns about the vertical in one of the two readings only.
+#[derive(Clone, Debug, Default)]
+pub(super) struct OrderEvidence {
+    /// The first quaternion, as it is written.
+    first: Option<[f64; 4]>,
+    count: u64,
+    /// Of the turns since the first pose, the squares of their axes' parts; with w last, and with w first.
+    turns: [[f64; 3]; 2],
+    /// The largest turn, as the sine of half of it.
+    most_turned: f64,
+    /// How often z points up.
+    upright: [u64; 2],
+}
+
+/// A tenth of a degree of turn tells nothing, nor a first pose that is not exactly one that programs begin with.
+const EXACT: f64 = 1e-6;
+/// Sines of half of 1 and of 15 degrees.
+const SOME_TURN: f64 = 0.0087;
+const MUCH_TURN: f64 = 0.13;
+
+impl OrderEvidence {
+    /// Takes a quaternion, as it is written.
+    pub(super) fn insert(&mut self, written: [f64; 4]) {
+        let length = written.iter().map(|q| q * q).sum::<f64>().sqrt();
+        let written = written.map(|q| q / length);
+        if !written.iter().all(|q| q.is_finite()) {
+            return;
+        }
+        let first = *self.first.get_or_insert(written);
+        self.count += 1;
+        let readings = [w_last as fn([f64; 4]) -> [f64; 4], w_first];
+        for ((read, turns), upright) in readings.iter().zip(&mut self.turns).zip(&mut self.upright) {
+            let axis = turn(read(first), read(written));
+            turns.iter_mut().zip(axis).for_each(|(sum, part)| *sum += part * part);
+            self.most_turned = self.most_turned.max(axis.iter().map(|part| part * part).sum::<f64>().sqrt());
+            *upright += u64::from(up(read(written)) > 0.5);
+        }
+    }
+
+    /// Whether w is first, by all that is known. In doubt it is last, as in TUM's files.
+    pub(super) fn is_w_first(&self) -> bool {
+        let Some(first) = self.first else { return false };
+        let (up_if_last, up_if_first) = (up(w_last(first)), up(w_first(first)));
+        if up_if_last > 0.5 || up_if_first < 0.866 {
+            return false;
+        }
+        let [last, first_w] = self.turns.map(|[x, y, z]| z / (x + y + z));
+        let [upright_if_last, upright_if_first] = self.upright.map(|count| count as f64 / self.count as f64);
+        let is_identity = first[0].abs() > 1.0 - EXACT;
+        let turns_about_z = |least: f64| first_w > least && last < 0.4;
+        (is_identity && self.most_turned > SOME_TURN && turns_about_z(0.6))
+            || (self.most_turned > MUCH_TURN
+                && turns_about_z(0.8)
+                && upright_if_first > 0.95
+                && upright_if_last < 0.5)
+    }
+}
+
+fn w_last(written: [f64; 4]) -> [f64; 4] {
+    written
+}
+
+/// `w x y z` as `x y z w`.
+pub(super) fn w_first([w, x, y, z]: [f64; 4]) -> [f64; 4] {
+    [x, y, z, w]
+}
+
+/// How far the z axis of a rotation points up: 1 for all the way, -1 for down.
+pub(super) fn up([x, y, z, w]: [f64; 4]) -> f64 {
+    (w * w + z * z - x * x - y * y) / (w * w + z * z + x * x + y * y)
+}
+
+/// The axis of the turn from one rotation to another in the world, as long as the sine of half of the turn.
+fn turn([ax, ay, az, aw]: [f64; 4], [bx, by, bz, bw]: [f64; 4]) -> [f64; 3] {
+    [
+        bx * aw - bw * ax - by * az + bz * ay,
+        by * aw - bw * ay - bz * ax + bx * az,
+        bz * aw - bw * az - bx * ay + by * ax,
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::UnitQuaternion;
+
+    type Rotation = UnitQuaternion<f64>;
+
+    /// Whether w is taken to be first where it is, and where it is last.
+    fn found(rotations: &[Rotation]) -> [bool; 2] {
+        [true, false].map(|is_first| {
+            let mut evidence = OrderEvidence::default();
+            for rotation in rotations {
+                let [x, y, z, w]: [f64; 4] = rotation.coords.into();
+                evidence.insert(if is_first { [w, x, y, z] } else { [x, y, z, w] });
+            }
+            evidence.is_w_first()
+        })
+    }
+
+    fn of(angles: impl Iterator<Item = [f64; 3]>) -> Vec<Rotation> {
+        angles.map(|[roll, pitch, yaw]| Rotation::from_euler_angles(roll, pitch, yaw)).collect()
+    }
+
+    #[test]
+    fn turns_of_an_upright_sensor_tell() {
+        let car = of((0..50).map(|k| [0.01, 0.02, 0.02 * f64::from(k)]));
+        assert_eq!(found(&car), [true, false]);
+        let from_rest = of((0..50).map(|k| [0.0, 0.0, 0.001 * f64::from(k)]));
+        assert_eq!(found(&from_rest), [true, false]);
+        let hand = of((0..200)
+            .map(|k| f64::from(k) * 0.05)
+            .map(|t| [0.1 * (3.0 * t).sin(), 0.15 * (2.0 * t).sin(), 0.6 * t.sin() + 0.1 * t]));
+        assert_eq!(found(&hand), [true, false]);
+        let other_way = of((0..30).map(|k| [0.0, 0.0, 1.0 + 0.03 * f64::from(k)]));
+        assert_eq!(found(&other_way), [true, false]);
+    }
+
+    #[test]
+    fn in_doubt_w_is_last() {
+        let still = of((0..9).map(|_| [0.0; 3]));
+        assert_eq!(found(&still), [false, false]);
+        // Upside down, as a lidar below a drone is.
+        let below = of((0..50).map(|k| [std::f64::consts::PI, 0.0, 0.02 * f64::from(k)]));
+        assert_eq!(found(&below)[1], false);
+        let below = of((0..50).map(|_| [std::f64::consts::PI, 0.0, 0.0]));
+        assert_eq!(found(&below)[1], false);
+        // A camera, whose z looks ahead, faces any way.
+        for start in 0..24 {
+            let optical = Rotation::from_euler_angles(-std::f64::consts::FRAC_PI_2, 0.0, 0.0);
+            for swing in [0.0, 0.02, 0.3, 1.5, 6.0] {
+                let yaw = |k: u8| f64::from(start) * 0.2618 + swing * f64::from(k) / 60.0;
+                let turns = (0..60).map(|k| Rotation::from_euler_angles(0.0, 0.03, yaw(k)) * optical);
+                assert_eq!(found(&turns.collect::<Vec<_>>())[1], false, "{start} {swing}");
+            }
+        }
+        // The world is the first camera: y is down.
+        let nodding = of((0..60).map(|k| [0.02 * f64::from(k), 0.0, 0.0]));
+        assert_eq!(found(&nodding)[1], false);
+    }
+}
