@@ -98,6 +98,7 @@ pub fn build_options(
     options.resume = keywords.flag("resume")?;
     options.again = keywords.flag("again")?;
     options.skip_bad = keywords.flag("skip_bad")?;
+    options.strict = keywords.flag("strict")?;
     options.flush_every = keywords.parsed("flush_every", str::parse)?.unwrap_or(options.flush_every);
     options.when_behind = keywords.one_of("when_behind", &WHEN_BEHIND)?.unwrap_or(options.when_behind);
     keywords.end()?;

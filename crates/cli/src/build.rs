@@ -67,6 +67,7 @@ fn options_of(args: &BuildArgs) -> voxtile::Result<BuildOptions> {
     options.resume = args.resume;
     options.again = args.again;
     options.skip_bad = args.skip_bad;
+    options.strict = args.strict;
     options.flush_every = args.flush_every;
     options.when_behind = args.when_behind.into();
     options.octree = octree_config(&args.octree)?;

@@ -2,6 +2,7 @@ use crate::build_config::{config_to_create, config_to_go_on};
 use crate::build_options::BuildOptions;
 use crate::flush_schedule::FlushSchedule;
 use crate::intake::{Intake, Next, RayNeeds, Taken};
+use crate::pose_check::{Doubt, PoseCheck, check_ahead};
 use crate::scan_input::is_standard_input;
 use crate::scan_queue::{ScanQueue, WhenBehind};
 use crate::scan_reader::{Marking, ScanReader};
@@ -49,9 +50,11 @@ pub fn build(options: &BuildOptions, watch: &Watch) -> anyhow::Result<Option<Sum
         if options.piece_of.is_none() { ScanMark::of } else { |scan| Ok(ScanMark::without_content(scan)) };
     let room = room(options, &config);
     let most_together = most_together(options, &config);
-    let opened =
-        ScanReader::open(options.scans.clone(), read_options(options, &config), room, mark, watch.clone())?;
+    let read = read_options(options, &config);
+    let is_checked = options.strict && check_ahead(&options.scans, &read, &room, watch)?;
+    let opened = ScanReader::open(options.scans.clone(), read.clone(), room, mark, watch.clone())?;
     let Some((reader, input)) = opened else { return Ok(None) };
+    let pose_check = if is_checked { None } else { PoseCheck::of(&read, &input.poses, &options.scans) };
     let config = config_of_map(options, &config);
     let needs = RayNeeds { grid: config.grid, sensor_model: config.sensor_model };
     let mut intake =
@@ -103,15 +106,19 @@ pub fn build(options: &BuildOptions, watch: &Watch) -> anyhow::Result<Option<Sum
         has_rays: !options.no_rays,
         most_together,
         notes_content: options.piece_of.is_none(),
+        pose_check,
+        doubt: None,
+        is_strict: options.strict,
     };
     let outcome = build.insert_all();
     build.gauge.say("flushing");
     // What was accepted is kept, whatever ended the build.
     let flushed = build.mapper.flush().map_err(|error| say_what_is_safe(error, build.mapper));
-    let Build { report, scans, mut intake, gauge, .. } = build;
+    let Build { report, scans, mut intake, gauge, doubt, .. } = build;
     drop(gauge);
     let mut remarks = intake.remarks();
     remarks.iter_mut().for_each(|remark| *remark = format!("{}: {remark}", options.scans.display()));
+    remarks.extend(doubt.map(|doubt| doubt.remark()));
     remarks.extend(all_is_cut(&report, mapper.config()));
     remarks.iter().for_each(|remark| log::warn!("{remark}"));
     match (outcome, flushed) {
@@ -139,6 +146,10 @@ struct Build<'a> {
     /// Most scans that are mapped together.
     most_together: usize,
     notes_content: bool,
+    /// Whether the poses fit, while that is not known.
+    pose_check: Option<PoseCheck>,
+    doubt: Option<Doubt>,
+    is_strict: bool,
 }
 
 impl Build<'_> {
@@ -155,9 +166,13 @@ impl Build<'_> {
                 Next::End => {
                     // The last scans may have been skipped.
                     self.note_content(self.intake.content());
+                    self.check_poses(PoseCheck::finish)?;
                     return Ok(());
                 }
             };
+            for Taken { scan, .. } in &taken {
+                self.check_poses(|check| check.take(scan))?;
+            }
             let mut reports = Vec::with_capacity(taken.len());
             let inserted = self.insert(&taken, &mut reports);
             for report in &reports {
@@ -186,6 +201,23 @@ impl Build<'_> {
         for Taken { scan, .. } in taken {
             reports.push(self.mapper.insert_hits(scan)?);
         }
+        Ok(())
+    }
+
+    /// Compares a scan with those before. What cannot be compared is no reason to end.
+    fn check_poses(
+        &mut self,
+        look: impl FnOnce(&mut PoseCheck) -> voxtile::Result<Option<Doubt>>,
+    ) -> voxtile::Result<()> {
+        let Some(check) = &mut self.pose_check else { return Ok(()) };
+        match look(check) {
+            Ok(Some(doubt)) if self.is_strict => return Err(doubt.refusal()),
+            Ok(Some(doubt)) => self.doubt = Some(doubt),
+            Ok(None) if !check.is_done() => return Ok(()),
+            Ok(None) => {}
+            Err(error) => log::debug!("poses are not compared: {error}"),
+        }
+        self.pose_check = None;
         Ok(())
     }
 

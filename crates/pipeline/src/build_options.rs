@@ -65,6 +65,8 @@ pub struct BuildOptions {
     pub again: bool,
     /// Whether scans that cannot be read are skipped.
     pub skip_bad: bool,
+    /// Whether poses that do not fit the scans are refused, before anything is mapped, in place of a remark.
+    pub strict: bool,
     /// When the map is flushed: every 60 s, beside scans.
     pub flush_every: FlushEvery,
     /// What becomes of scans that come faster than they can be mapped.
@@ -103,6 +105,7 @@ impl BuildOptions {
             resume: false,
             again: false,
             skip_bad: false,
+            strict: false,
             flush_every: FlushEvery::Time(Duration::from_secs(60)),
             when_behind: WhenBehind::Wait,
             octree: OctreeConfig::default(),

@@ -28,6 +28,7 @@ pub mod numbers;
 pub mod octree_file;
 pub mod output;
 pub mod place;
+mod pose_check;
 mod region_tiles;
 mod scan_input;
 mod scan_place;

@@ -74,6 +74,7 @@ class BuildOptions(ReadOptions, total=False):
     resume: bool
     again: bool
     skip_bad: bool
+    strict: bool
     flush_every: int | str
     when_behind: Literal["wait", "drop-oldest", "thin"]
 

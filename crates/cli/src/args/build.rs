@@ -85,6 +85,10 @@ pub struct BuildArgs {
     /// Go past scans that cannot be read, and say which, in place of ending with an error
     #[arg(long)]
     pub skip_bad: bool,
+    /// Refuse poses that do not fit the scans, in place of a remark: some of the first scans are compared with those
+    /// before
+    #[arg(long)]
+    pub strict: bool,
     /// Make durable what was mapped every so many seconds while mapping goes on (60s), or stop every N scans for it
     /// (25), or only at the end (end): what a crash can lose
     #[arg(long, value_name = "N", default_value = "60s")]

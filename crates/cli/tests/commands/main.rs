@@ -22,6 +22,8 @@ mod cli_local;
 mod cli_log;
 /// Pictures, in files and for terminals, and reports.
 mod cli_pictures;
+/// Poses that may mean something else.
+mod cli_pose_guess;
 /// Poses that come with files, beside them or by options.
 mod cli_poses;
 /// Maps of a region from the command line.

@@ -1,0 +1,35 @@
+use super::check::PoseCheck;
+use crate::scan_input;
+use crate::watch::Watch;
+use std::path::Path;
+use voxtile::Result;
+use voxtile_formats::{PointRoom, ReadOptions};
+
+/// Checks the poses of an input before anything is mapped; `false` if it or its poses can be read only once.
+///
+/// # Errors
+///
+/// Poses that do not fit the scans; an input that cannot be opened.
+pub fn check_ahead(scans: &Path, options: &ReadOptions, room: &PointRoom, watch: &Watch) -> Result<bool> {
+    let may_be_read_twice = |path: &Path| path.is_file() || path.is_dir();
+    // `identity` is no file.
+    let poses = options.poses.as_deref().filter(|path| path.exists());
+    if !may_be_read_twice(scans) || !poses.is_none_or(may_be_read_twice) {
+        return Ok(false);
+    }
+    let mut source = scan_input::open(scans, options, watch)?;
+    let Some(mut check) = PoseCheck::of(options, &source.pose_source(), scans) else { return Ok(true) };
+    while !check.is_done() && !watch.stop().is_set() {
+        let doubt = match source.next_stored(room) {
+            Ok(Some(scan)) => check.take(&scan)?,
+            Ok(None) => check.finish()?,
+            Err(_) if source.pass_unread() => None,
+            // The build meets it, too.
+            Err(_) => check.finish()?,
+        };
+        if let Some(doubt) = doubt {
+            return Err(doubt.refusal());
+        }
+    }
+    Ok(true)
+}

@@ -1,0 +1,88 @@
+use rustc_hash::FxHashMap;
+use std::collections::hash_map::Entry;
+use std::ops::RangeInclusive;
+use voxtile::scan::Pose;
+use voxtile::space::Point;
+
+/// How far from the sensor points are looked at, in metres: nearer is what carries it, farther they are sparse.
+pub(super) const RANGE_M: RangeInclusive<f64> = 1.0..=25.0;
+/// A scan of fewer voxels tells nothing.
+const MIN_VOXELS: u32 = 50;
+/// Shares of which there is a median.
+const MIN_SHARES: usize = 2;
+
+/// The points of a scan, where they are in the world.
+pub(super) struct Placed<'p> {
+    pub(super) points: &'p [[f32; 3]],
+    pub(super) world_from_points: Pose,
+    /// Where the sensor is in the frame of the points.
+    pub(super) sensor: Point,
+}
+
+/// The median of what scans see again: the share of a scan's voxels that scans before it have. `None` where the scans
+/// are too few or too small.
+pub(super) fn overlap<'p>(scans: impl Iterator<Item = Placed<'p>>, voxel_m: f64) -> Option<f64> {
+    let mut last_seen: FxHashMap<u64, u32> = FxHashMap::default();
+    let (mut shares, mut anchor) = (Vec::new(), None);
+    for (number, scan) in (1..).zip(scans) {
+        let to_world = scan.world_from_points.to_world();
+        let anchor = *anchor.get_or_insert_with(|| to_world(scan.sensor));
+        let (mut voxels, mut again) = (0_u32, 0_u32);
+        for point in scan.points {
+            let point = point.map(f64::from);
+            let square: f64 = point.iter().zip(scan.sensor).map(|(a, b)| (a - b) * (a - b)).sum();
+            if !RANGE_M.contains(&square.sqrt()) {
+                continue;
+            }
+            match last_seen.entry(key(to_world(point), anchor, voxel_m)) {
+                Entry::Vacant(vacant) => {
+                    vacant.insert(number);
+                    voxels += 1;
+                }
+                Entry::Occupied(mut seen) if *seen.get() != number => {
+                    seen.insert(number);
+                    voxels += 1;
+                    again += 1;
+                }
+                Entry::Occupied(_) => {}
+            }
+        }
+        if number > 1 && voxels >= MIN_VOXELS {
+            shares.push(f64::from(again) / f64::from(voxels));
+        }
+    }
+    shares.sort_unstable_by(f64::total_cmp);
+    (shares.len() >= MIN_SHARES).then(|| shares[shares.len() / 2])
+}
+
+/// A voxel near the anchor; far from it voxels share keys.
+fn key(point: Point, anchor: Point, voxel_m: f64) -> u64 {
+    let mut key = 0;
+    for (coordinate, origin) in point.into_iter().zip(anchor) {
+        let index = ((coordinate - origin) / voxel_m).floor() as i64;
+        key = (key << 21) | (index & 0x1f_ffff).unsigned_abs();
+    }
+    key
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_seen_before_is_counted_once_for_each_scan() {
+        // A wall of 200 voxels, each hit twice; the second scan has moved by half of the wall.
+        let wall: Vec<[f32; 3]> =
+            (0..400).map(|k| [5.0, 0.4 * (k / 2 % 20) as f32 - 3.9, 0.4 * (k / 40) as f32 - 1.9]).collect();
+        let at = |y_m: f64| Placed {
+            points: &wall,
+            world_from_points: Pose::from_quaternion([0.0, y_m, 0.0], [0.0, 0.0, 0.0, 1.0]).unwrap(),
+            sensor: [0.0; 3],
+        };
+        assert_eq!(overlap([at(0.0), at(4.0), at(8.0)].into_iter(), 0.4), Some(0.5));
+        assert_eq!(overlap([at(0.0), at(4.0), at(0.0)].into_iter(), 0.4), Some(1.0));
+        assert_eq!(overlap([at(0.0), at(4.0)].into_iter(), 0.4), None);
+        let far = Placed { sensor: [100.0, 0.0, 0.0], ..at(0.0) };
+        assert_eq!(overlap([far, at(0.0), at(0.0)].into_iter(), 0.4), Some(1.0));
+    }
+}

@@ -1,0 +1,125 @@
+use super::overlap::Placed;
+use voxtile::Result;
+use voxtile::scan::Pose;
+use voxtile_formats::{PoseSource, RigidPose};
+
+/// A scan of the check: points of it, and the poses of the body when it and its neighbours were taken.
+pub(super) struct Pick {
+    pub(super) points: Vec<[f32; 3]>,
+    pub(super) stamp_ns: Option<i64>,
+    pub(super) before: RigidPose,
+    pub(super) own: RigidPose,
+    /// `None` where no scan came after it.
+    pub(super) after: Option<RigidPose>,
+}
+
+/// What poses may mean.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Reading {
+    /// What was read.
+    Given,
+    WFirst,
+    WLast,
+    /// World to sensor.
+    Inverse,
+    /// Of a camera, whose world is that of its first image.
+    Camera,
+    /// Of the lidar, which were taken for those of a camera.
+    NotCamera,
+    Millimetres,
+    Centimetres,
+    /// All at one place: to compare with, as flat ground looks alike from everywhere.
+    Still,
+    /// The points are in the world frame.
+    WorldFrame,
+    /// Each scan has the pose of the one after it.
+    Next,
+    Previous,
+}
+
+/// A camera's axes in those of a lidar: x to the right, y down, z ahead.
+const CAMERA_FROM_LIDAR: RigidPose = RigidPose { position_m: [0.0; 3], quaternion: [0.5, -0.5, 0.5, 0.5] };
+
+impl Reading {
+    /// The other readings that poses from there may have.
+    pub(super) fn others(source: &PoseSource, has_calib: bool) -> Vec<Self> {
+        let any = [Self::Inverse, Self::Next, Self::Previous];
+        let own: &[Self] = match source {
+            PoseSource::File(_) if has_calib => {
+                &[Self::NotCamera, Self::WorldFrame, Self::Millimetres, Self::Centimetres]
+            }
+            PoseSource::File(_) => &[
+                Self::WFirst,
+                Self::WLast,
+                Self::Camera,
+                Self::WorldFrame,
+                Self::Millimetres,
+                Self::Centimetres,
+            ],
+            PoseSource::Viewpoint => &[Self::WLast],
+            _ => &[],
+        };
+        any.into_iter().chain(own.iter().copied()).collect()
+    }
+
+    /// The points of a scan by this reading.
+    pub(super) fn place<'p>(self, pick: &'p Pick, mount: &RigidPose) -> Result<Placed<'p>> {
+        let body = self.body(pick);
+        let (frame, sensor) = match self {
+            Self::WorldFrame => (RigidPose::IDENTITY, body.then(mount).position_m),
+            _ => (body.then(mount), [0.0; 3]),
+        };
+        let world_from_points = Pose::from_quaternion(frame.position_m, frame.quaternion)?;
+        Ok(Placed { points: &pick.points, world_from_points, sensor })
+    }
+
+    fn body(self, pick: &Pick) -> RigidPose {
+        let RigidPose { position_m, quaternion } = pick.own;
+        let [x, y, z, w] = quaternion;
+        let scaled = |factor: f64| RigidPose { position_m: position_m.map(|c| c * factor), quaternion };
+        match self {
+            Self::Given | Self::WorldFrame => pick.own,
+            Self::WFirst => RigidPose { position_m, quaternion: [y, z, w, x] },
+            Self::WLast => RigidPose { position_m, quaternion: [w, x, y, z] },
+            Self::Inverse => pick.own.inverse(),
+            Self::Camera => CAMERA_FROM_LIDAR.inverse().then(&pick.own).then(&CAMERA_FROM_LIDAR),
+            Self::NotCamera => CAMERA_FROM_LIDAR.then(&pick.own).then(&CAMERA_FROM_LIDAR.inverse()),
+            Self::Millimetres => scaled(1e-3),
+            Self::Centimetres => scaled(1e-2),
+            Self::Still => scaled(0.0),
+            Self::Next => pick.after.unwrap_or(pick.own),
+            Self::Previous => pick.before,
+        }
+    }
+
+    /// If what they would fit, and what to do.
+    pub(super) fn advice(self) -> &'static str {
+        match self {
+            Self::Given | Self::Still => "they are right",
+            Self::WFirst => {
+                "w comes first in the quaternions: say so in a first line of names, # t tx ty tz qw qx qy qz"
+            }
+            Self::WLast => "w comes last in the quaternions, as in x y z w",
+            Self::Inverse => {
+                "they are the inverse, world to sensor: save the inverse of each, sensor to world"
+            }
+            Self::Camera => {
+                "they are poses of a camera (z ahead): `calib` FILE or `extrinsic` makes those of the sensor of them"
+            }
+            Self::NotCamera => "they are poses of the lidar already: leave `calib` out",
+            Self::Millimetres => {
+                "their positions are millimetres: say so in a first line of names, # t tx[mm] ty[mm] tz[mm] qx qy qz qw"
+            }
+            Self::Centimetres => {
+                "their positions are centimetres: say so in a first line of names, # t tx[cm] ty[cm] tz[cm] qx qy qz qw"
+            }
+            Self::WorldFrame => "the points are in the world frame already: `world_frame`",
+            Self::Next => {
+                "each scan has the pose of the next one: is a scan or a pose too much at the beginning?"
+            }
+            Self::Previous => {
+                "each scan has the pose of the one before it: does a scan or a pose lack at the beginning?"
+            }
+        }
+    }
+}
