@@ -59,8 +59,8 @@ impl Direction {
         self.share(Z).is_some_and(|share| share > 0.9)
     }
 
-    /// What a person should know of the way of a lidar.
-    pub(super) fn remarks(&self, has_calib: bool) -> Vec<String> {
+    /// What a person should know of the way of a lidar. `names_calib`: another remark names the `calib.txt` of a camera.
+    pub(super) fn remarks(&self, has_calib: bool, names_calib: bool) -> Vec<String> {
         let mut remarks = Vec::new();
         let Some(first) = &self.first else { return remarks };
         let starts_level = up(first.quaternion) > 0.94;
@@ -70,7 +70,7 @@ impl Direction {
                  line of names says so (# t tx ty tz qw qx qy qz)"
                     .to_owned(),
             );
-        } else if !has_calib && starts_level && self.is_along_z() {
+        } else if !has_calib && !names_calib && starts_level && self.is_along_z() {
             remarks.push(
                 "the poses go along their own z, as those of a camera do, not of a lidar on the ground: `calib` FILE \
                  or `extrinsic` turns them into those of the sensor"
@@ -107,22 +107,22 @@ mod tests {
     fn a_camera_goes_along_z() {
         let camera = way([0.01, 0.0, 0.9], 0.0);
         assert!(camera.is_along_z() && camera.may_be_of_camera());
-        assert!(camera.remarks(false).iter().any(|remark| remark.contains("along their own z")));
-        assert_eq!(camera.remarks(true), Vec::<String>::new());
+        assert!(camera.remarks(false, false).iter().any(|remark| remark.contains("along their own z")));
+        assert!(camera.remarks(true, false).is_empty() && camera.remarks(false, true).is_empty());
         let lidar = way([0.9, 0.1, 0.05], 0.0);
         assert!(!lidar.is_along_z() && !lidar.may_be_of_camera());
-        assert!(lidar.remarks(false).is_empty() && lidar.remarks(true).is_empty());
+        assert!(lidar.remarks(false, false).is_empty() && lidar.remarks(true, false).is_empty());
         let twice = way([0.0, -0.9, 0.0], 0.0);
-        assert!(twice.remarks(false).is_empty() && twice.remarks(true).len() == 1);
-        assert!(way([0.0, 0.9, 0.0], 0.0).remarks(true).is_empty());
+        assert!(twice.remarks(false, false).is_empty() && twice.remarks(true, false).len() == 1);
+        assert!(way([0.0, 0.9, 0.0], 0.0).remarks(true, false).is_empty());
         let still = way([0.0, 0.0, 0.001], 0.0);
-        assert!(!still.is_along_z() && still.may_be_of_camera() && still.remarks(false).is_empty());
+        assert!(!still.is_along_z() && still.may_be_of_camera() && still.remarks(false, false).is_empty());
     }
 
     #[test]
     fn a_first_pose_upside_down_is_worth_a_remark() {
-        let remarks = way([0.9, 0.0, 0.0], std::f64::consts::PI).remarks(false);
+        let remarks = way([0.9, 0.0, 0.0], std::f64::consts::PI).remarks(false, true);
         assert!(remarks.len() == 1 && remarks[0].contains("upside down"), "{remarks:?}");
-        assert!(way([0.9, 0.0, 0.0], 1.0).remarks(false).is_empty());
+        assert!(way([0.9, 0.0, 0.0], 1.0).remarks(false, false).is_empty());
     }
 }

@@ -67,18 +67,16 @@ fn remark_frame(
     options: &ReadOptions,
 ) -> Result<()> {
     let direction = trajectory.direction(&options.clouds.body_from_sensor)?;
-    let mut remarks = direction.remarks(options.calib.is_some());
-    if options.calib.is_none()
-        && trajectory.are_matrices()
-        && direction.may_be_of_camera()
-        && let Some(calib) = calib_for(file, folder)
-    {
+    let may_need_calib = options.calib.is_none() && trajectory.are_matrices() && direction.may_be_of_camera();
+    let calib = may_need_calib.then(|| calib_for(file, folder)).flatten();
+    let mut remarks = direction.remarks(options.calib.is_some(), calib.is_some());
+    if let Some(calib) = calib {
         let way = if direction.is_along_z() { ", and these go along z, as a camera does" } else { "" };
         let calib = calib.display();
-        remarks = vec![format!(
+        remarks.push(format!(
             "{calib} has Tr, where the lidar is in the camera: poses of the camera, as KITTI's own are{way}, need \
              `calib` {calib}"
-        )];
+        ));
     }
     remarks.into_iter().for_each(|remark| trajectory.remark(remark));
     Ok(())

@@ -22,6 +22,8 @@ pub struct Trajectory {
     /// Time stamps of lost poses.
     lost: PoseList,
     has_stamps: bool,
+    /// Whether the file has them, taken or not.
+    is_stamped: bool,
     /// Number of the first pose whose stamp is earlier than the one before, from 1.
     goes_back: Option<u64>,
     /// Poses are of a camera; those of the lidar are `[0] * pose * [1]`.
@@ -133,6 +135,7 @@ impl Trajectory {
             by_time,
             lost,
             has_stamps,
+            is_stamped: has_stamps,
             goes_back,
             lidar: None,
             is_w_first,
@@ -310,7 +313,7 @@ impl Trajectory {
 
     fn other_number(&self, clouds: &str) -> Error {
         // The poses have times, and what the clouds are called tells none.
-        let names = if self.has_stamps {
+        let names = if self.is_stamped {
             "; the names of the clouds tell no times (1700000000.123456789, 1700000000_123456789 and \
              1700000000123456789 would)"
         } else {

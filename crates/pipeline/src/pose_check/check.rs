@@ -1,4 +1,4 @@
-use super::overlap::{RANGE_M, overlap};
+use super::overlap::{Counted, RANGE_M, overlap};
 use super::reading::{Pick, Reading};
 use std::path::{Path, PathBuf};
 use voxtile::scan::ScanPoints as _;
@@ -15,6 +15,8 @@ const VOXEL_SHARE: f64 = 0.05;
 const VOXEL_M: [f64; 2] = [0.1, 0.4];
 /// Points of a scan that are looked at.
 const MAX_POINTS: usize = 1 << 14;
+/// Of more in all scans together, a quarter of the voxels is counted.
+const MANY_POINTS: usize = 50_000;
 /// Larger scans are those of stations, and to read them twice would take long.
 const MAX_SCAN_POINTS: usize = 1 << 21;
 
@@ -143,7 +145,9 @@ impl PoseCheck {
 
     fn overlap(&self, reading: Reading) -> Result<Option<f64>> {
         let placed: Result<Vec<_>> = self.picks.iter().map(|pick| reading.place(pick, &self.mount)).collect();
-        Ok(overlap(placed?.into_iter(), self.voxel_m))
+        let points: usize = self.picks.iter().map(|pick| pick.points.len()).sum();
+        let counted = if points > MANY_POINTS { Counted::Quarter } else { Counted::All };
+        Ok(overlap(placed?.into_iter(), self.voxel_m, counted))
     }
 
     fn doubt(&self) -> Result<Option<Doubt>> {

@@ -11,6 +11,13 @@ const MIN_VOXELS: u32 = 50;
 /// Shares of which there is a median.
 const MIN_SHARES: usize = 2;
 
+/// Which voxels are counted. A quarter of very many tells as much.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Counted {
+    All,
+    Quarter,
+}
+
 /// The points of a scan, where they are in the world.
 pub(super) struct Placed<'p> {
     pub(super) points: &'p [[f32; 3]],
@@ -21,7 +28,11 @@ pub(super) struct Placed<'p> {
 
 /// The median of what scans see again: the share of a scan's voxels that scans before it have. `None` where the scans
 /// are too few or too small.
-pub(super) fn overlap<'p>(scans: impl Iterator<Item = Placed<'p>>, voxel_m: f64) -> Option<f64> {
+pub(super) fn overlap<'p>(
+    scans: impl Iterator<Item = Placed<'p>>,
+    voxel_m: f64,
+    counted: Counted,
+) -> Option<f64> {
     let mut last_seen: FxHashMap<u64, u32> = FxHashMap::default();
     let (mut shares, mut anchor) = (Vec::new(), None);
     for (number, scan) in (1..).zip(scans) {
@@ -34,7 +45,11 @@ pub(super) fn overlap<'p>(scans: impl Iterator<Item = Placed<'p>>, voxel_m: f64)
             if !RANGE_M.contains(&square.sqrt()) {
                 continue;
             }
-            match last_seen.entry(key(to_world(point), anchor, voxel_m)) {
+            let key = key(to_world(point), anchor, voxel_m);
+            if counted == Counted::Quarter && !is_of_quarter(key) {
+                continue;
+            }
+            match last_seen.entry(key) {
                 Entry::Vacant(vacant) => {
                     vacant.insert(number);
                     voxels += 1;
@@ -65,6 +80,11 @@ fn key(point: Point, anchor: Point, voxel_m: f64) -> u64 {
     key
 }
 
+/// Whether a voxel is one of a quarter of all, spread evenly.
+fn is_of_quarter(key: u64) -> bool {
+    key.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 62 == 0
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -79,10 +99,15 @@ mod tests {
             world_from_points: Pose::from_quaternion([0.0, y_m, 0.0], [0.0, 0.0, 0.0, 1.0]).unwrap(),
             sensor: [0.0; 3],
         };
-        assert_eq!(overlap([at(0.0), at(4.0), at(8.0)].into_iter(), 0.4), Some(0.5));
-        assert_eq!(overlap([at(0.0), at(4.0), at(0.0)].into_iter(), 0.4), Some(1.0));
-        assert_eq!(overlap([at(0.0), at(4.0)].into_iter(), 0.4), None);
+        assert_eq!(overlap([at(0.0), at(4.0), at(8.0)].into_iter(), 0.4, Counted::All), Some(0.5));
+        assert_eq!(overlap([at(0.0), at(4.0), at(0.0)].into_iter(), 0.4, Counted::All), Some(1.0));
+        assert_eq!(overlap([at(0.0), at(4.0)].into_iter(), 0.4, Counted::All), None);
+        let quarter = overlap([at(0.0), at(4.0), at(8.0)].into_iter(), 0.4, Counted::Quarter);
+        assert!(quarter.is_none_or(|share| (0.35..0.65).contains(&share)), "{quarter:?}");
+        let keys = (0..90_000_u64).map(|k| ((k / 300) << 42) | ((k % 300) << 21) | (k % 7));
+        let counted = keys.filter(|key| is_of_quarter(*key)).count();
+        assert!((21_000..24_000).contains(&counted), "{counted}");
         let far = Placed { sensor: [100.0, 0.0, 0.0], ..at(0.0) };
-        assert_eq!(overlap([far, at(0.0), at(0.0)].into_iter(), 0.4), Some(1.0));
+        assert_eq!(overlap([far, at(0.0), at(0.0)].into_iter(), 0.4, Counted::All), Some(1.0));
     }
 }
