@@ -125,20 +125,20 @@ mod tests {
         assert_eq!(found(&still), [false, false]);
         // Upside down, as a lidar below a drone is.
         let below = of((0..50).map(|k| [std::f64::consts::PI, 0.0, 0.02 * f64::from(k)]));
-        assert_eq!(found(&below)[1], false);
+        assert!(!found(&below)[1]);
         let below = of((0..50).map(|_| [std::f64::consts::PI, 0.0, 0.0]));
-        assert_eq!(found(&below)[1], false);
+        assert!(!found(&below)[1]);
         // A camera, whose z looks ahead, faces any way.
         for start in 0..24 {
             let optical = Rotation::from_euler_angles(-std::f64::consts::FRAC_PI_2, 0.0, 0.0);
             for swing in [0.0, 0.02, 0.3, 1.5, 6.0] {
                 let yaw = |k: u8| f64::from(start) * 0.2618 + swing * f64::from(k) / 60.0;
                 let turns = (0..60).map(|k| Rotation::from_euler_angles(0.0, 0.03, yaw(k)) * optical);
-                assert_eq!(found(&turns.collect::<Vec<_>>())[1], false, "{start} {swing}");
+                assert!(!found(&turns.collect::<Vec<_>>())[1], "{start} {swing}");
             }
         }
         // The world is the first camera: y is down.
         let nodding = of((0..60).map(|k| [0.02 * f64::from(k), 0.0, 0.0]));
-        assert_eq!(found(&nodding)[1], false);
+        assert!(!found(&nodding)[1]);
     }
 }
