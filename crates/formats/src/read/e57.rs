@@ -41,7 +41,7 @@ pub(crate) fn open(path: &Path, options: &ReadOptions) -> Result<Box<dyn CloudSo
     let mut crs = reader.coordinate_metadata().map(str::to_owned).filter(|crs| !crs.trim().is_empty());
     // Coordinates of E57 are metres, whatever is said of them.
     let units = crs.as_deref().map(WktUnits::of);
-    if units.is_some_and(|units| [units.flat_m, units.high_m].iter().flatten().any(|metres| *metres != 1.0)) {
+    if units.is_some_and(|units| [units.flat, units.high].iter().flatten().any(|unit| unit.metres != 1.0)) {
         crs = None;
         remarks.push(
             "the coordinate system is not in metres as the points are, and the output does not name it"

@@ -1,10 +1,75 @@
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::cell::RefCell;
+use std::panic::{self, AssertUnwindSafe, PanicHookInfo, catch_unwind};
+use std::sync::Once;
 
-/// Calls into a library that may panic on a damaged file, and makes an error of it. What the call was using may hold
-/// nonsense after that: it is at most asked once more, guarded again.
+thread_local! {
+    /// The first panic of each call that is guarded in this thread, from the outer to the inner ones.
+    static PANICS: RefCell<Vec<Option<String>>> = const { RefCell::new(Vec::new()) };
+}
+
+/// Calls into a library that may panic on a damaged file, and makes an error of it; nothing is printed. What the call
+/// was using may hold nonsense after that: it is at most asked once more, guarded again.
+#[cfg(any(feature = "las", feature = "e57"))]
 pub(crate) fn guarded<T, E: std::fmt::Display>(call: impl FnOnce() -> Result<T, E>) -> Result<T, String> {
-    match catch_unwind(AssertUnwindSafe(call)) {
-        Ok(result) => result.map_err(|error| error.to_string()),
-        Err(_) => Err("the file is damaged: its library gave up".into()),
+    catch(call).map_or_else(
+        |place| {
+            Err(format!("its decoder gave up ({place}): the file is damaged, or of a kind it does not know"))
+        },
+        |result| result.map_err(|error| error.to_string()),
+    )
+}
+
+/// Returns what a call returns, or where it panicked.
+pub(crate) fn catch<T>(call: impl FnOnce() -> T) -> Result<T, String> {
+    static HOOK: Once = Once::new();
+    HOOK.call_once(|| {
+        let print = panic::take_hook();
+        panic::set_hook(Box::new(move |info| {
+            if !note(info) {
+                print(info);
+            }
+        }));
+    });
+    PANICS.with_borrow_mut(|panics| panics.push(None));
+    let result = catch_unwind(AssertUnwindSafe(call));
+    let place = PANICS.with_borrow_mut(Vec::pop).flatten();
+    result.map_err(|_| place.unwrap_or_default())
+}
+
+/// Notes a panic of this thread; `false` if no call of it is guarded.
+fn note(info: &PanicHookInfo<'_>) -> bool {
+    PANICS
+        .try_with(|panics| {
+            let Ok(mut panics) = panics.try_borrow_mut() else { return false };
+            let Some(panic) = panics.last_mut() else { return false };
+            let place = info.location().map(|place| {
+                // The name of the file is enough: the folder is that of a build.
+                let file = place.file().rsplit(['/', '\\']).next().unwrap_or_default();
+                format!("{file}:{}", place.line())
+            });
+            *panic = panic.take().or(place);
+            true
+        })
+        .unwrap_or(false)
+}
+
+#[cfg(test)]
+mod tests {
+    #[cfg(any(feature = "las", feature = "e57"))]
+    use super::*;
+
+    #[cfg(any(feature = "las", feature = "e57"))]
+    #[test]
+    fn a_panic_is_an_error_with_its_place() {
+        let inner = guarded(|| -> Result<(), String> {
+            assert!(
+                guarded(|| -> Result<(), String> { panic!("inner") }).unwrap_err().contains("(guard.rs:")
+            );
+            panic!("outer")
+        });
+        assert!(inner.unwrap_err().contains("its decoder gave up (guard.rs:"));
+        assert_eq!(guarded(|| Ok::<_, String>(5)), Ok(5));
+        assert_eq!(guarded(|| Err::<(), _>("no")), Err("no".to_owned()));
+        PANICS.with_borrow(|panics| assert!(panics.is_empty()));
     }
 }

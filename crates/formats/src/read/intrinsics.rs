@@ -84,7 +84,7 @@ impl Intrinsics {
         let Some(path) = found else {
             let reason = format!(
                 "depth images need the camera: name a file with fx fy cx cy in pixels, or with a matrix of 3x3, by \
-                 --intrinsics FILE, or put it in the folder or beside it as {}",
+                 `intrinsics` FILE, or put it in the folder or beside it as {}",
                 NAMES.join(" or ")
             );
             return Err(Error::argument(folder.display().to_string(), reason));

@@ -1,8 +1,11 @@
 use super::cloud::{CloudHead, CloudPoint, CloudSource};
+use super::las_count::settle;
+use super::las_hints::hints;
 use super::las_layout::Layout;
 use super::las_points::LasPoints;
-use super::las_scans::{LasScans, withheld};
+use super::las_scans::LasScans;
 use super::las_units::Units;
+use super::laz_chunks::Chunks;
 use super::one::{Visit, head_of};
 use crate::read_options::ReadOptions;
 use std::fs::File;
@@ -14,26 +17,27 @@ use voxtile::{Error, Result};
 /// the origin of the rays is given, it is one cloud in the order of the file.
 ///
 /// Stamps are GPS time in nanoseconds, without leap seconds taken off: since 6 January 1980 where the header says that
-/// times are "adjusted standard GPS time" (the 10^9 seconds that such files leave out are added), since the begin of
-/// the week otherwise.
+/// times are "adjusted standard GPS time" (the 10^9 seconds that such files leave out, or the offset of LAS 1.5, are
+/// added), since the begin of the week otherwise.
 pub(crate) fn open(path: &Path, options: &ReadOptions) -> Result<Box<dyn CloudSource>> {
     let mut file = File::open(path).map_err(|error| Error::io(path, "read", error))?;
-    let layout = Layout::read(path, &mut file)?;
-    let table_at = match layout.is_compressed {
-        true => super::laz_chunks::check(path, &file, &layout, &options.budget())?,
-        false => None,
+    let mut layout = Layout::read(path, &mut file)?;
+    let chunks = match layout.is_compressed {
+        true => Some(Chunks::read(path, &file, &mut layout, &options.budget())?),
+        false => settle(path, &mut file, &mut layout).map(|()| None)?,
     };
     let mut units = Units::of(&layout);
-    units.remarks.extend(layout.remark.clone());
-    let points = LasPoints::open(path, &layout, table_at, &units)?;
+    units.remarks.extend(hints(&layout, &units));
+    units.remarks.append(&mut layout.remarks);
+    let points = LasPoints::open(path, &layout, chunks, &units)?;
     let format = if layout.is_compressed { "LAZ" } else { "LAS" }.to_owned();
-    let is_cut = points.has_times && options.scan_period_s > 0.0 && options.sensor_origin_m.is_none();
+    let is_cut = points.has_times() && options.scan_period_s > 0.0 && options.sensor_origin_m.is_none();
     if is_cut {
         return Ok(Box::new(LasScans::new(format, path, &layout, units, points, options)));
     }
     let head = CloudHead {
         points: Some(layout.points),
-        fields: fields(points.has_times),
+        fields: fields(points.has_times()),
         has_intensities: true,
         ..head_of(path)
     };
@@ -82,8 +86,7 @@ impl CloudSource for WholeLas {
     }
 
     fn remarks(&self) -> Vec<String> {
-        let withheld = Some(self.points.withheld).filter(|points| *points > 0).map(withheld);
-        self.units.remarks.iter().cloned().chain(withheld).collect()
+        self.units.remarks.iter().cloned().chain(self.points.remarks()).collect()
     }
 
     fn crs(&self) -> Option<&str> {

@@ -1,51 +1,58 @@
+use super::las_count::Counts;
+use super::las_records::{self, Record};
 use std::fs::File;
-use std::io::{self, Read, Seek, SeekFrom};
+use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 use voxtile::{Error, FormatError, Result};
 
-/// What the header of a LAS file says, checked against the size of the file.
+/// The header of a LAS file, checked against the size of the file.
 pub(super) struct Layout {
     /// The header, and what follows a short one.
-    pub(super) header: Vec<u8>,
+    header: Vec<u8>,
     pub(super) file_bytes: u64,
     pub(super) points_at: u64,
+    /// The numbers of points in the header.
+    pub(super) counts: Counts,
+    /// Points to read.
     pub(super) points: u64,
-    /// Their number stands in the field of LAS 1.4.
-    pub(super) has_large_count: bool,
+    pub(super) format: PointFormat,
     /// Bytes of a point that is not compressed.
     pub(super) record_bytes: u64,
     pub(super) is_compressed: bool,
-    /// Times count from GPS time + 1e9 s, not from the begin of a week.
-    pub(super) has_standard_time: bool,
     pub(super) has_wkt: bool,
-    pub(super) records: Vec<Record>,
-    /// What a person should know of the number of points.
-    pub(super) remark: Option<String>,
+    records: Vec<Record>,
+    /// What a person should know of the header.
+    pub(super) remarks: Vec<String>,
 }
 
-/// A variable length record.
-pub(super) struct Record {
-    pub(super) user: String,
-    pub(super) id: u16,
-    pub(super) data: Vec<u8>,
+/// Where a point has the fields that are read.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct PointFormat {
+    /// Formats from 6 on have wider flags.
+    pub(super) is_extended: bool,
+    pub(super) time_at: Option<usize>,
 }
 
-/// Who records of coordinates are of, and the one of the compression.
-const PROJECTION: &str = "LASF_Projection";
-pub(super) const LASZIP: &str = "laszip encoded";
-pub(super) const LASZIP_ID: u16 = 22204;
-/// The coordinate system, as text and as keys of GeoTIFF.
-pub(super) const WKT_ID: u16 = 2112;
-pub(super) const KEYS_ID: u16 = 34735;
-/// A header is at most so long in LAS 1.4.
-const HEADER_BYTES: usize = 375;
-/// Three scales and three offsets.
+/// Bytes of the header of LAS 1.4 and LAS 1.5.
+const LONG_HEADER_BYTES: usize = 375;
+const HEADER_BYTES: usize = 393;
+/// Bytes of the header before LAS 1.3.
+const SHORT_HEADER_BYTES: u64 = 227;
+/// Three scales and three offsets; the largest and the least coordinate of each axis.
 const SCALES_AT: usize = 131;
-/// Neither scales nor offsets are as large: a hundred times the way to the sun.
+const BOUNDS_AT: usize = 179;
+/// Scales and offsets are smaller: a hundred times the distance to the sun.
 const MAX_COORDINATE: f64 = 1e13;
-/// Records of more bytes, and more of them, have nothing to do with coordinates.
-const MAX_RECORD_BYTES: u64 = 1 << 20;
-const MAX_RECORDS: u32 = 10_000;
+/// Bytes of a point by its format.
+const POINT_BYTES: [u64; 11] = [20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67];
+const COMPRESSED: u64 = 0x80;
+/// Bits of the global encoding.
+const IS_STANDARD_TIME: u64 = 1;
+const HAS_WKT: u64 = 1 << 4;
+const HAS_TIME_OFFSET: u64 = 1 << 6;
+/// Standard GPS time leaves out so many seconds; LAS 1.5 names them in millions.
+const STANDARD_OFFSET_S: i64 = 1_000_000_000;
+const TIME_OFFSET_AT: usize = 391;
 
 impl Layout {
     pub(super) fn read(path: &Path, file: &mut File) -> Result<Self> {
@@ -55,7 +62,7 @@ impl Layout {
         file.seek(SeekFrom::Start(0)).map_err(fail)?;
         file.take(HEADER_BYTES as u64).read_to_end(&mut header).map_err(fail)?;
         let wrong = |at: u64, reason: String| FormatError::at_offset(at, reason).in_input(path);
-        if !header.starts_with(b"LASF") || header.len() < 227 {
+        if !header.starts_with(b"LASF") || (header.len() as u64) < SHORT_HEADER_BYTES {
             return Err(wrong(0, "the file ends within its header, or is no LAS".into()));
         }
         let (minor, header_bytes) = (number(&header, 25, 1), number(&header, 94, 2));
@@ -63,149 +70,119 @@ impl Layout {
         let format = number(&header, 104, 1);
         let record_bytes = number(&header, 105, 2);
         let encoding = number(&header, 6, 2);
-        let is_large = minor >= 4 && header.len() == HEADER_BYTES && header_bytes >= HEADER_BYTES as u64;
-        let large_points = if is_large { number(&header, 247, 8) } else { 0 };
-        let has_large_count = number(&header, 107, 4) == 0;
-        let points = if has_large_count { large_points } else { number(&header, 107, 4) };
+        let is_long =
+            minor >= 4 && header.len() >= LONG_HEADER_BYTES && header_bytes >= LONG_HEADER_BYTES as u64;
+        let counts =
+            Counts { legacy: number(&header, 107, 4), large: is_long.then(|| number(&header, 247, 8)) };
         if points_at < header_bytes || points_at > file_bytes {
             let reason = format!("points begin at byte {points_at} of a file of {file_bytes} bytes");
             return Err(wrong(96, reason));
         }
-        if record_bytes == 0
-            || points.checked_mul(record_bytes).and_then(|all| all.checked_add(points_at)).is_none()
-        {
-            return Err(wrong(105, format!("{points} points of {record_bytes} bytes are impossible")));
+        let is_compressed = format & COMPRESSED != 0;
+        let id = format & !COMPRESSED;
+        let Some(least_bytes) = POINT_BYTES.get(id as usize) else {
+            return Err(wrong(104, format!("points have format {id}; formats 0 to 10 are known")));
+        };
+        if record_bytes < *least_bytes {
+            let reason = format!("points of format {id} take {least_bytes} bytes, not {record_bytes}");
+            return Err(wrong(105, reason));
         }
         check_scales(&header).map_err(|(at, reason)| wrong(at, reason))?;
         let mut layout = Self {
             header,
             file_bytes,
             points_at,
-            points,
-            has_large_count,
+            points: counts.choose(0, u64::MAX),
+            counts,
+            format: PointFormat::of(id),
             record_bytes,
-            is_compressed: format & 0x80 != 0,
-            has_standard_time: encoding & 1 != 0,
-            has_wkt: encoding & 16 != 0,
+            is_compressed,
+            has_wkt: encoding & HAS_WKT != 0,
             records: Vec::new(),
-            remark: None,
+            remarks: Vec::new(),
         };
-        layout.count_what_is_there(is_large);
-        let count = number(&layout.header, 100, 4);
-        layout.read_records(file, header_bytes, count, points_at, 2).map_err(fail)?;
-        if is_large {
-            let (start, count) = (number(&layout.header, 235, 8), number(&layout.header, 243, 4));
-            if start >= points_at {
-                layout.read_records(file, start, count, file_bytes, 8).map_err(fail)?;
-            }
-        }
+        layout.read_records(file, header_bytes, is_long).map_err(fail)?;
         Ok(layout)
     }
 
-    /// Reads the records of coordinates and of the compression between two places. What is cut off is left out.
-    fn read_records(
-        &mut self,
-        file: &mut File,
-        start: u64,
-        count: u64,
-        end: u64,
-        wide: usize,
-    ) -> io::Result<()> {
-        let head_bytes = 52 + wide as u64;
-        let mut at = start;
-        for _ in 0..count.min(u64::from(MAX_RECORDS)) {
-            if at.checked_add(head_bytes).is_none_or(|behind| behind > end) {
-                break;
+    /// Reads the records of coordinates and of the compression, before the points and, since LAS 1.4, behind them.
+    fn read_records(&mut self, file: &mut File, header_bytes: u64, is_long: bool) -> std::io::Result<()> {
+        let count = number(&self.header, 100, 4);
+        let before = las_records::Span { start: header_bytes, end: self.points_at, count, wide: 2 };
+        let found = before.read(file, &mut self.records)?;
+        if found != count {
+            self.remarks.push(format!(
+                "the header announces {count} records before the points; {found} are there and are used"
+            ));
+        }
+        let (start, count) = (number(&self.header, 235, 8), number(&self.header, 243, 4));
+        if is_long && count > 0 {
+            let behind = las_records::Span { start, end: self.file_bytes, count, wide: 8 };
+            let found = if start >= self.points_at { behind.read(file, &mut self.records)? } else { 0 };
+            if found != count {
+                self.remarks.push(format!(
+                    "the header announces {count} records behind the points; {found} are there and are used"
+                ));
             }
-            let mut head = vec![0; 52 + wide];
-            file.seek(SeekFrom::Start(at))?;
-            if file.read_exact(&mut head).is_err() {
-                break;
-            }
-            let user: Vec<u8> = head.iter().skip(2).take(16).copied().take_while(|byte| *byte != 0).collect();
-            let (id, bytes) = (number(&head, 18, 2) as u16, number(&head, 20, wide));
-            let data_at = at + head_bytes;
-            let Some(next) = data_at.checked_add(bytes).filter(|next| *next <= end) else { break };
-            let user = String::from_utf8_lossy(&user).into_owned();
-            let is_wanted = match user.as_str() {
-                PROJECTION => matches!(id, WKT_ID | KEYS_ID),
-                LASZIP => id == LASZIP_ID,
-                _ => false,
-            };
-            // Of equal records the first counts.
-            if is_wanted && bytes <= MAX_RECORD_BYTES && self.record_of(&user, id).is_none() {
-                let mut data = Vec::new();
-                (&mut *file).take(bytes).read_to_end(&mut data)?;
-                self.records.push(Record { user, id, data });
-            }
-            at = next;
         }
         Ok(())
     }
 
-    /// Compares the number of points with the room for them. A writer that was killed leaves 0 in the header, for the
-    /// number goes there last; then the file itself tells it. Any other number is what other programs go by, too.
-    fn count_what_is_there(&mut self, is_large: bool) {
-        if self.is_compressed {
-            return;
-        }
-        let room = (self.points_end(is_large) - self.points_at) / self.record_bytes;
-        if self.points == 0 && room > 0 {
-            self.announce(room, is_large);
-            let taken = self.points;
-            self.remark = Some(format!(
-                "the header announces no points, as a writer leaves it that was stopped: the {taken} that the file has \
-                 room for are read"
-            ));
-        } else if self.points < room {
-            let (points, behind) = (self.points, room - self.points);
-            self.remark = Some(format!(
-                "the header announces {points} points, which are read; the file has room for {behind} more behind them"
-            ));
-        }
-    }
-
-    /// Where points end at the latest: at what the header says to stand behind them, or with the file.
-    fn points_end(&self, is_large: bool) -> u64 {
+    /// Where points that are not compressed end at the latest: at what the header says to be behind them, or with the
+    /// file.
+    pub(super) fn points_end(&self) -> u64 {
         let minor = number(&self.header, 25, 1);
         // Wave packets since LAS 1.3, long records since LAS 1.4.
         let waves_at = if minor >= 3 { number(&self.header, 227, 8) } else { 0 };
-        let records_at = if is_large { number(&self.header, 235, 8) } else { 0 };
+        let records_at = if self.counts.large.is_some() { number(&self.header, 235, 8) } else { 0 };
         let ends = [waves_at, records_at].into_iter().filter(|end| *end >= self.points_at);
         ends.fold(self.file_bytes, u64::min)
     }
 
-    /// Writes a number of points into the header, which the library goes by.
-    fn announce(&mut self, points: u64, is_large: bool) {
-        let short = u32::try_from(points).unwrap_or(u32::MAX);
-        self.has_large_count = is_large && u64::from(short) < points;
-        self.points = if self.has_large_count { points } else { u64::from(short) };
-        let (at, width) = if self.has_large_count { (247, 8) } else { (107, 4) };
-        let bytes = self.points.to_le_bytes();
-        self.header.iter_mut().skip(at).take(width).zip(bytes).for_each(|(byte, new)| *byte = new);
+    /// Factor and offset that make a coordinate of a whole number.
+    pub(super) fn transform(&self, axis: usize) -> (f64, f64) {
+        (double(&self.header, SCALES_AT + 8 * axis), double(&self.header, SCALES_AT + 24 + 8 * axis))
     }
 
-    /// Points that are whole in a file that is not compressed.
-    pub(super) fn whole_points(&self) -> u64 {
-        if self.is_compressed {
-            return self.points;
-        }
-        self.points.min((self.file_bytes - self.points_at.min(self.file_bytes)) / self.record_bytes.max(1))
+    /// The least and the largest coordinate of an axis, if the header has finite ones.
+    pub(super) fn bounds(&self, axis: usize) -> Option<(f64, f64)> {
+        let (most, least) =
+            (double(&self.header, BOUNDS_AT + 16 * axis), double(&self.header, BOUNDS_AT + 8 + 16 * axis));
+        (least.is_finite() && most.is_finite() && least <= most).then_some((least, most))
+    }
+
+    /// The zero of GPS times, in nanoseconds of GPS time: 0 where they count from the begin of a week.
+    pub(super) fn zero_ns(&self) -> i64 {
+        let (minor, encoding) = (number(&self.header, 25, 1), number(&self.header, 6, 2));
+        let offset_s = match (encoding & IS_STANDARD_TIME != 0, minor >= 5 && encoding & HAS_TIME_OFFSET != 0)
+        {
+            (_, true) => number(&self.header, TIME_OFFSET_AT, 2) as i64 * 1_000_000,
+            (true, false) => STANDARD_OFFSET_S,
+            (false, false) => 0,
+        };
+        // At most 6.6e10 s.
+        offset_s.saturating_mul(1_000_000_000)
     }
 
     /// The record of coordinates with this number.
     pub(super) fn record(&self, id: u16) -> Option<&[u8]> {
-        self.record_of(PROJECTION, id)
+        las_records::find(&self.records, las_records::PROJECTION, id)
     }
 
     /// The record that says how points are compressed.
     pub(super) fn laszip(&self) -> Option<&[u8]> {
-        self.record_of(LASZIP, LASZIP_ID)
+        las_records::find(&self.records, las_records::LASZIP, las_records::LASZIP_ID)
     }
+}
 
-    fn record_of(&self, user: &str, id: u16) -> Option<&[u8]> {
-        let record = self.records.iter().find(|record| record.user == user && record.id == id);
-        record.map(|record| record.data.as_slice())
+impl PointFormat {
+    fn of(id: u64) -> Self {
+        let time_at = match id {
+            0 | 2 => None,
+            1 | 3..=5 => Some(20),
+            _ => Some(22),
+        };
+        Self { is_extended: id >= 6, time_at }
     }
 }
 
@@ -213,7 +190,7 @@ impl Layout {
 fn check_scales(header: &[u8]) -> std::result::Result<(), (u64, String)> {
     for (k, axis) in ["x", "y", "z", "x", "y", "z"].into_iter().enumerate() {
         let (at, what) = (SCALES_AT + 8 * k, if k < 3 { "scale" } else { "offset" });
-        let value = f64::from_bits(number(header, at, 8));
+        let value = double(header, at);
         if !(value.abs() < MAX_COORDINATE && (value != 0.0 || what == "offset")) {
             return Err((at as u64, format!("the {what} of {axis} is {value}: no coordinates come of it")));
         }
@@ -225,4 +202,9 @@ fn check_scales(header: &[u8]) -> std::result::Result<(), (u64, String)> {
 pub(super) fn number(bytes: &[u8], at: usize, width: usize) -> u64 {
     let bytes = bytes.iter().skip(at).take(width);
     bytes.enumerate().fold(0, |sum, (k, byte)| sum | u64::from(*byte) << (8 * k.min(7)))
+}
+
+/// A little-endian double.
+pub(super) fn double(bytes: &[u8], at: usize) -> f64 {
+    f64::from_bits(number(bytes, at, 8))
 }

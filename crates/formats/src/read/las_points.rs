@@ -1,10 +1,10 @@
-use super::guard::guarded;
-use super::las_layout::Layout;
-use super::las_trimmed::{Start, Trimmed};
+use super::las_count::cut_off;
+use super::las_layout::{Layout, PointFormat};
 use super::las_units::Units;
-use las::{PointData, PointDataBuilder, Reader};
+use super::laz_chunks::Chunks;
+use super::laz_points::{End, LazPoints};
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use voxtile::{Error, FormatError, Result};
 
@@ -24,127 +24,137 @@ pub(super) struct LasPoint {
 /// The points of a LAS or LAZ file, in order.
 pub(super) struct LasPoints {
     path: PathBuf,
-    start: Start,
+    records: Records,
+    fields: Fields,
+    record_bytes: usize,
     at_a_time: u64,
-    metres: [f64; 2],
-    /// Points that are announced, that are there, and that were read.
-    announced: u64,
-    whole: u64,
+    /// Points to read, and those that were read.
+    points: u64,
     done: u64,
-    pub(super) has_times: bool,
-    pub(super) withheld: u64,
+    withheld: u64,
+    is_cut: bool,
+}
+
+/// Where the bytes of points come from.
+enum Records {
+    Plain(BufReader<File>),
+    Compressed(Box<LazPoints>),
+}
+
+/// The fields of a point that are read.
+struct Fields {
+    format: PointFormat,
+    /// Factor and offset of each axis.
+    transforms: [(f64, f64); 3],
+    metres: [f64; 2],
 }
 
 impl LasPoints {
-    pub(super) fn open(path: &Path, layout: &Layout, table_at: Option<u64>, units: &Units) -> Result<Self> {
-        let start = Start::of(layout, table_at);
-        // The library's reader must stay in its thread: this one is only asked whether it takes the file.
-        let has_times = Decoder::open(path, &start)?.reader.header().point_format().has_gps_time;
+    /// `chunks` are those of a file that is compressed.
+    pub(super) fn open(path: &Path, layout: &Layout, chunks: Option<Chunks>, units: &Units) -> Result<Self> {
+        let fail = |error| Error::io(path, "read", error);
+        let file = File::open(path).map_err(fail)?;
+        let records = match chunks {
+            Some(chunks) => Records::Compressed(Box::new(LazPoints::new(path, file, chunks)?)),
+            None => {
+                let mut input = BufReader::with_capacity(1 << 16, file);
+                input.seek(SeekFrom::Start(layout.points_at)).map_err(fail)?;
+                Records::Plain(input)
+            }
+        };
+        let transforms = [0, 1, 2].map(|axis| layout.transform(axis));
         Ok(Self {
             path: path.to_owned(),
-            start,
+            records,
+            fields: Fields { format: layout.format, transforms, metres: units.metres },
+            record_bytes: layout.record_bytes.max(1) as usize,
             at_a_time: (MAX_BATCH_BYTES / layout.record_bytes.max(1)).clamp(1, AT_A_TIME),
-            metres: units.metres,
-            announced: layout.points,
-            whole: layout.whole_points(),
+            points: layout.points,
             done: 0,
-            has_times,
             withheld: 0,
+            is_cut: false,
         })
+    }
+
+    pub(super) fn has_times(&self) -> bool {
+        self.fields.format.time_at.is_some()
     }
 
     /// Visits the points, without those that are marked as deleted ("withheld").
     pub(super) fn visit(&mut self, visit: &mut dyn FnMut(LasPoint) -> Result<()>) -> Result<()> {
-        let mut decoder = Decoder::open(&self.path, &self.start)?;
-        while self.done < self.whole {
-            let wanted = self.at_a_time.min(self.whole - self.done);
-            if let Err(reason) = decoder.fill(wanted) {
-                return self.one_by_one(decoder, &reason, visit);
+        let mut batch = Vec::new();
+        while self.done < self.points {
+            let wanted = self.at_a_time.min(self.points - self.done) as usize;
+            batch.resize(wanted * self.record_bytes, 0);
+            let (read, end) = match &mut self.records {
+                Records::Plain(input) => match input.read_exact(&mut batch) {
+                    Ok(()) => (wanted, None),
+                    Err(error) => return Err(Error::io(&self.path, "read", error)),
+                },
+                Records::Compressed(points) => points.fill(&mut batch, self.record_bytes),
+            };
+            for point in batch.chunks_exact(self.record_bytes).take(read) {
+                match self.fields.of(point) {
+                    Some(point) => visit(point)?,
+                    None => self.withheld += 1,
+                }
             }
-            let read = decoder.batch.len() as u64;
-            if read == 0 {
-                break;
+            self.done += read as u64;
+            if let Some(end) = end {
+                return self.ended(end);
             }
-            self.withheld += decoder.hand_out(self.metres, visit)?;
-            self.done += read;
-        }
-        if self.done < self.announced {
-            let reason = format!("the file ends after {} of {} points", self.done, self.announced);
-            return Err(FormatError::at_record(self.done, reason).in_input(&self.path));
         }
         Ok(())
     }
 
-    /// What is whole before damage: the points of a batch, each for itself.
-    fn one_by_one(
-        &mut self,
-        mut decoder: Decoder,
-        reason: &str,
-        visit: &mut dyn FnMut(LasPoint) -> Result<()>,
-    ) -> Result<()> {
-        let done = self.done;
-        if guarded(|| decoder.reader.seek(done)).is_ok() {
-            for _ in 0..self.at_a_time {
-                if decoder.fill(1).is_err() || decoder.batch.is_empty() {
-                    break;
-                }
-                self.withheld += decoder.hand_out(self.metres, visit)?;
-                self.done += 1;
+    /// A file without a chunk table that ends early was cut off: its points are good as far as they go.
+    fn ended(&mut self, end: End) -> Result<()> {
+        let has_table = matches!(&self.records, Records::Compressed(points) if points.has_table);
+        let reason = match end {
+            End::File if !has_table && self.done > 0 => {
+                self.is_cut = true;
+                return Ok(());
             }
-        }
-        let reason =
-            format!("the file is damaged or ends after {} of {} points: {reason}", self.done, self.announced);
+            End::File => format!("the file ends after {} of {} points", self.done, self.points),
+            End::Damage(reason) => {
+                format!("the file is damaged after {} of {} points: {reason}", self.done, self.points)
+            }
+        };
         Err(FormatError::at_record(self.done, reason).in_input(&self.path))
     }
+
+    /// What a person should know of the points that were read.
+    pub(super) fn remarks(&self) -> Vec<String> {
+        let withheld = (self.withheld > 0).then(|| {
+            format!("{} points are marked as withheld, that is deleted, and are left out", self.withheld)
+        });
+        let cut = self.is_cut.then(|| cut_off(self.done, self.points));
+        withheld.into_iter().chain(cut).collect()
+    }
 }
 
-/// The library's reader.
-struct Decoder {
-    reader: Reader,
-    batch: PointData,
-}
-
-impl Decoder {
-    fn open(path: &Path, start: &Start) -> Result<Self> {
-        let fail = |error| Error::io(path, "read", error);
-        let file = File::open(path).map_err(fail)?;
-        let input = BufReader::with_capacity(1 << 16, Trimmed::new(start, file));
-        let reader = guarded(|| Reader::new(input)).map_err(|reason| {
-            FormatError::at_offset(0, format!("the header is invalid: {reason}")).in_input(path)
-        })?;
-        let batch = PointDataBuilder::new().for_header(reader.header()).build();
-        Ok(Self { reader, batch })
-    }
-
-    fn fill(&mut self, points: u64) -> std::result::Result<u64, String> {
-        let (reader, batch) = (&mut self.reader, &mut self.batch);
-        guarded(|| reader.fill_points(points, batch))
-    }
-
-    /// Visits the points of the batch; returns how many are withheld.
-    fn hand_out(&self, metres: [f64; 2], visit: &mut dyn FnMut(LasPoint) -> Result<()>) -> Result<u64> {
-        let batch = &self.batch;
-        let transforms = batch.transforms();
-        let format = batch.format();
-        let record = batch.record_len().max(1);
+impl Fields {
+    /// A point, if it is not withheld.
+    fn of(&self, bytes: &[u8]) -> Option<LasPoint> {
         // The flag is bit 7 of the classification in old formats, and bit 2 of the flags in new ones.
-        let (flag_at, flag) = if format.is_extended { (15, 0b100) } else { (15, 0b1000_0000) };
-        let mut times = batch.gps_time();
-        let axes = batch.x_raw().zip(batch.y_raw()).zip(batch.z_raw());
-        let flags =
-            batch.raw_bytes().chunks_exact(record).map(|bytes| bytes.get(flag_at).copied().unwrap_or(0));
-        let [flat, high] = metres;
-        let mut withheld = 0;
-        for ((((x, y), z), intensity), flags) in axes.zip(batch.intensity()).zip(flags) {
-            let time_s = times.as_mut().and_then(Iterator::next).unwrap_or(0.0);
-            if flags & flag != 0 {
-                withheld += 1;
-                continue;
-            }
-            let position_m =
-                [transforms.x.direct(x) * flat, transforms.y.direct(y) * flat, transforms.z.direct(z) * high];
-            visit(LasPoint { position_m, intensity, time_s })?;
+        let withheld = if self.format.is_extended { 0b100 } else { 0b1000_0000 };
+        if bytes.get(15).copied().unwrap_or(0) & withheld != 0 {
+            return None;
         }
-        Ok(withheld)
+        let [flat, high] = self.metres;
+        let coordinate = |axis: usize, (scale, offset): (f64, f64)| {
+            let whole = chunk::<4>(bytes, 4 * axis).map_or(0, i32::from_le_bytes);
+            scale * f64::from(whole) + offset
+        };
+        let [x, y, z] = self.transforms;
+        Some(LasPoint {
+            position_m: [coordinate(0, x) * flat, coordinate(1, y) * flat, coordinate(2, z) * high],
+            intensity: chunk::<2>(bytes, 12).map_or(0, u16::from_le_bytes),
+            time_s: self.format.time_at.and_then(|at| chunk::<8>(bytes, at)).map_or(0.0, f64::from_le_bytes),
+        })
     }
+}
+
+fn chunk<const N: usize>(bytes: &[u8], at: usize) -> Option<[u8; N]> {
+    bytes.get(at..).and_then(|bytes| bytes.first_chunk()).copied()
 }

@@ -8,9 +8,6 @@ use crate::spill::{Sorted, Sorter};
 use std::path::{Path, PathBuf};
 use voxtile::{Error, FormatError, Result};
 
-/// The zero of adjusted standard GPS time, in nanoseconds of GPS time.
-const STANDARD_ZERO_NS: i64 = 1_000_000_000_000_000_000;
-
 /// A LAS file cut into scans of equal length by GPS time.
 pub(super) struct LasScans {
     format: String,
@@ -49,7 +46,7 @@ impl LasScans {
             unsorted: Some((points, sorter)),
             sorted: None,
             period_s: options.scan_period_s,
-            zero_ns: if layout.has_standard_time { STANDARD_ZERO_NS } else { 0 },
+            zero_ns: layout.zero_ns(),
             first_s: 0.0,
             has_one_time: false,
             window: None,
@@ -62,14 +59,18 @@ impl LasScans {
 
     fn sort(&mut self) -> Result<()> {
         let Some((mut points, mut sorter)) = self.unsorted.take() else { return Ok(()) };
-        let (mut number, mut least, mut most) = (0, f64::INFINITY, f64::NEG_INFINITY);
+        let (mut number, mut least, mut most) = (0_u64, f64::INFINITY, f64::NEG_INFINITY);
+        let (mut timeless, mut first_timeless) = (0_u64, 0);
         let mut is_sorting = false;
-        let path = &self.path;
         let read = points.visit(&mut |point| {
-            if !point.time_s.is_finite() {
-                return Err(FormatError::at_record(number, "the GPS time is not a number").in_input(path));
-            }
             number += 1;
+            if !point.time_s.is_finite() {
+                if timeless == 0 {
+                    first_timeless = number - 1;
+                }
+                timeless += 1;
+                return Ok(());
+            }
             (least, most) = (least.min(point.time_s), most.max(point.time_s));
             let pushed = sorter.push(point);
             is_sorting = pushed.is_err();
@@ -79,11 +80,19 @@ impl LasScans {
             Err(error) if is_sorting => return Err(error),
             other => self.failure = other.err(),
         }
-        if points.withheld > 0 {
-            self.remarks.push(withheld(points.withheld));
+        self.remarks.extend(points.remarks());
+        if timeless > 0 && timeless == number {
+            let reason = "no GPS time of its points is a number: read it as one cloud with `scan_period` 0";
+            return Err(FormatError::at_record(first_timeless, reason).in_input(&self.path));
+        }
+        if timeless > 0 {
+            self.remarks.push(format!(
+                "{timeless} of {number} points have a GPS time that is not a number and are left out, first record \
+                 {first_timeless}; `scan_period` 0 reads the file as one cloud with them"
+            ));
         }
         (self.first_s, self.has_one_time) = (least, least >= most);
-        if self.has_one_time && number > 1 {
+        if self.has_one_time && number - timeless > 1 {
             self.remarks
                 .push("all points have the same GPS time: the file is one cloud without a stamp".into());
         }
@@ -129,11 +138,6 @@ fn window_after(since_s: f64, period_s: f64) -> u64 {
     /// Of a window. Seconds of the GPS epoch have steps of 0.1 us.
     const ROUNDING: f64 = 1e-5;
     (since_s / period_s + ROUNDING) as u64
-}
-
-/// A remark on points that are left out.
-pub(super) fn withheld(points: u64) -> String {
-    format!("{points} points are marked as withheld, that is deleted, and are left out")
 }
 
 impl CloudSource for LasScans {

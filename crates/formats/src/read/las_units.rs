@@ -1,4 +1,6 @@
-use super::las_layout::{KEYS_ID, Layout, WKT_ID, number};
+use super::las_layout::{Layout, double, number};
+use super::las_records::{DOUBLES_ID, KEYS_ID, WKT_ID};
+use super::length_unit::{FOOT_M, LengthUnit, US_FOOT_M};
 use super::wkt::WktUnits;
 
 /// What a LAS file says of its coordinates.
@@ -8,28 +10,65 @@ pub(super) struct Units {
     pub(super) metres: [f64; 2],
     /// The coordinate system, if the coordinates stay as they are in it.
     pub(super) crs: Option<String>,
+    /// Whether the file names a coordinate system or a unit.
+    pub(super) is_known: bool,
     pub(super) remarks: Vec<String>,
 }
 
 /// The system is that of the file, not of the metres that are read of it.
 const NOT_PASSED_ON: &str = "the coordinate system is not in metres, and the output does not name it";
-const US_FOOT_M: f64 = 1200.0 / 3937.0;
 
 /// Metres in a unit of length by its number in the EPSG register.
 fn of_epsg(code: u64) -> Option<f64> {
+    Some(match code {
+        9001 => 1.0,
+        9002 => FOOT_M,
+        9003 => US_FOOT_M,
+        9005 => 0.304_797_265_4,
+        9014 => 1.8288,
+        9030 => 1852.0,
+        9036 => 1000.0,
+        9037 => 0.914_391_796_2,
+        9040 => 0.914_398_414_616_028_7,
+        9041 => 0.304_799_471_538_676_2,
+        9093 => 1609.344,
+        9094 => 0.304_799_710_181_508_8,
+        9095 => 0.304_800_749_1,
+        9096 => 0.9144,
+        9097 => 20.1168,
+        9098 => 0.201_168,
+        1025 => 0.001,
+        1033 => 0.01,
+        _ => return None,
+    })
+}
+
+/// Metres in the unit of a vertical system of the EPSG register: NAVD88 and NGVD29 in feet, and common ones in metres.
+fn of_vertical(code: u64) -> Option<f64> {
     match code {
-        9001 => Some(1.0),
-        9002 => Some(0.3048),
-        9003 => Some(US_FOOT_M),
-        9005 => Some(0.304_797_265_4),
-        9036 => Some(1000.0),
+        5702 | 6360 => Some(US_FOOT_M),
+        8228 => Some(FOOT_M),
+        3855 | 5621 | 5701 | 5703 | 5709 | 5713 | 5714 | 5728 | 5729 | 5730 | 5773 | 5783 | 6647 | 7837 => {
+            Some(1.0)
+        }
         _ => None,
     }
 }
 
+/// Keys of GeoTIFF.
+const MODEL_TYPE: u64 = 1024;
+const GEOGRAPHIC: u64 = 2;
+const PROJECTED_SYSTEM: u64 = 3072;
+const LINEAR_UNITS: u64 = 3076;
+const LINEAR_UNIT_SIZE: u64 = 3077;
+const VERTICAL_SYSTEM: u64 = 4096;
+const VERTICAL_UNITS: u64 = 4099;
+/// A system or a unit of the file's own.
+const USER_DEFINED: u64 = 32767;
+
 impl Units {
     pub(super) fn of(layout: &Layout) -> Self {
-        let mut units = Self { metres: [1.0; 2], crs: None, remarks: Vec::new() };
+        let mut units = Self { metres: [1.0; 2], crs: None, is_known: false, remarks: Vec::new() };
         let text = layout
             .record(WKT_ID)
             .map(|data| String::from_utf8_lossy(data).trim_end_matches('\0').trim().to_owned());
@@ -37,10 +76,11 @@ impl Units {
         // Both may be there: the header says which one counts.
         let keys = layout.record(KEYS_ID).filter(|_| text.is_none() || !layout.has_wkt);
         if let Some(keys) = keys {
-            units.take_keys(keys);
+            units.take_keys(keys, layout.record(DOUBLES_ID).unwrap_or_default());
         } else if let Some(wkt) = &text {
             units.take_wkt(wkt);
         }
+        units.is_known |= text.is_some();
         units.crs = text.or(units.crs);
         if units.metres != [1.0; 2] {
             let [flat, high] = units.metres;
@@ -53,30 +93,50 @@ impl Units {
     }
 
     /// GeoTIFF: unit of the projection, unit of heights, and known systems in feet.
-    fn take_keys(&mut self, keys: &[u8]) {
+    fn take_keys(&mut self, keys: &[u8], doubles: &[u8]) {
         let entries = keys.as_chunks::<8>().0.iter().skip(1);
-        let value = |wanted: u64| {
-            let mut found =
-                entries.clone().filter(|entry| number(*entry, 0, 2) == wanted && number(*entry, 2, 2) == 0);
+        let found = |wanted: u64, place: u64| {
+            let mut found = entries
+                .clone()
+                .filter(|entry| number(*entry, 0, 2) == wanted && number(*entry, 2, 2) == place);
             found.next().map(|entry| number(entry, 6, 2))
         };
-        if value(1024) == Some(2) {
+        // 0 is a value that is not known.
+        let value = |wanted| found(wanted, 0).filter(|value| *value > 0);
+        self.is_known |= [MODEL_TYPE, PROJECTED_SYSTEM, LINEAR_UNITS, VERTICAL_SYSTEM, VERTICAL_UNITS]
+            .into_iter()
+            .any(|key| value(key).is_some());
+        if value(MODEL_TYPE) == Some(GEOGRAPHIC) {
             self.degrees();
             return;
         }
-        // 32767 is a system of the file's own.
-        self.crs = value(3072).filter(|code| (1024..32767).contains(code)).map(|code| format!("EPSG:{code}"));
-        let flat = value(3076).and_then(of_epsg);
-        match (flat.or(value(3072).and_then(of_state_plane)), value(3072)) {
+        let system = value(PROJECTED_SYSTEM);
+        self.crs =
+            system.filter(|code| (1024..USER_DEFINED).contains(code)).map(|code| format!("EPSG:{code}"));
+        let own_m = found(LINEAR_UNIT_SIZE, u64::from(DOUBLES_ID)).map(|at| double(doubles, 8 * at as usize));
+        let own_m = own_m.filter(|metres| *metres > 1e-6 && *metres < 1e6);
+        let unit = |code: u64| if code == USER_DEFINED { own_m } else { of_epsg(code) };
+        let flat = value(LINEAR_UNITS).and_then(unit);
+        match (flat.or(system.and_then(of_state_plane)), system) {
             (Some(metres), _) => self.metres = [metres; 2],
-            (None, Some(code)) if code != 32767 && !is_metric(code) => self.remarks.push(format!(
+            (None, Some(code)) if code != USER_DEFINED && !is_metric(code) => self.remarks.push(format!(
                 "the unit of coordinate system EPSG:{code} is not in the file; metres are assumed"
             )),
             _ => {}
         }
-        // Heights without a unit of their own are in that of the projection.
-        if let Some(metres) = value(4099).and_then(of_epsg) {
+        if let Some(code) = value(LINEAR_UNITS).filter(|code| unit(*code).is_none()) {
+            self.remarks.push(format!("the unit of x and y, EPSG:{code}, is not known; metres are assumed"));
+        }
+        // Heights without a unit of their own are in that of their system, else of the projection.
+        let high = value(VERTICAL_UNITS).and_then(unit).or(value(VERTICAL_SYSTEM).and_then(of_vertical));
+        if let Some(metres) = high {
             self.metres[1] = metres;
+        }
+        if let Some(code) = value(VERTICAL_UNITS).filter(|code| unit(*code).is_none()) {
+            self.remarks.push(format!(
+                "the unit of z, EPSG:{code}, is not known; one of {} m is assumed",
+                self.metres[1]
+            ));
         }
     }
 
@@ -86,10 +146,19 @@ impl Units {
         if found.is_degrees {
             self.degrees();
         }
-        if let Some(metres) = found.flat_m {
+        let mut take = |unit: Option<LengthUnit>, axes: &str| {
+            if let Some(LengthUnit { metres, conflict: Some((name, factor)) }) = &unit {
+                self.remarks.push(format!(
+                    "the unit of {axes} is named {name}, with the factor {factor}: the name counts, {metres} m"
+                ));
+            }
+            unit.map(|unit| unit.metres)
+        };
+        let (flat, high) = (take(found.flat, "x and y"), take(found.high, "z"));
+        if let Some(metres) = flat {
             self.metres = [metres; 2];
         }
-        if let Some(metres) = found.high_m {
+        if let Some(metres) = high {
             self.metres[1] = metres;
         }
     }
@@ -104,7 +173,7 @@ impl Units {
 /// Metres in a unit of the state planes of NAD83 in feet, which files often name without their unit.
 fn of_state_plane(code: u64) -> Option<f64> {
     match code {
-        2222..=2224 | 2251..=2253 | 2256 | 2265 | 2266 | 2269 | 2270 | 2273 | 2280..=2282 => Some(0.3048),
+        2222..=2224 | 2251..=2253 | 2256 | 2265 | 2266 | 2269 | 2270 | 2273 | 2280..=2282 => Some(FOOT_M),
         2225..=2289 => Some(US_FOOT_M),
         _ => None,
     }

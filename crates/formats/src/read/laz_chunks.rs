@@ -2,12 +2,14 @@
 //! claims, and a claim of gigabytes ends the program.
 
 use super::guard::guarded;
+use super::las_count::{cut_off, stopped};
 use super::las_layout::{Layout, number};
+use super::laz_head::{LayeredHead, bytes_at};
 use crate::spill::Budget;
-use laz::LazVlr;
 use laz::laszip::{ChunkTable, ChunkTableEntry};
+use laz::{LazItem, LazVlr};
 use std::fs::File;
-use std::io::{BufReader, Read, Seek, SeekFrom};
+use std::io::{BufReader, Seek, SeekFrom};
 use std::path::Path;
 use voxtile::{Error, FormatError, Result};
 
@@ -16,160 +18,324 @@ use voxtile::{Error, FormatError, Result};
 const MAX_POINT_BYTES: u64 = 1024;
 /// Most parts of a point: position, time, colour, wave packet, extra bytes.
 const MAX_ITEMS: usize = 5;
-/// Points in one stream, without chunks.
+/// Points in one stream, without chunks and without a table of them. LASzip wrote these until version 1.2.
 const POINT_WISE: u64 = 1;
 /// Points in chunks, whose fields are apart: each chunk says how many bytes every field takes.
 const LAYERED: u64 = 3;
-/// The library has the table twice, and so has this check.
-const TABLE_COPIES: u64 = 4;
+/// The table while it is read, and the numbers of points that are kept of it.
+const TABLE_COPIES: u64 = 2;
 /// Bytes of the place of the chunk table, in front of the points.
 const TABLE_PLACE_BYTES: u64 = 8;
 
-/// Refuses a file whose chunks cannot be where it says, or do not fit in memory. Returns where the chunk table is, if
-/// there is one.
-pub(super) fn check(path: &Path, file: &File, layout: &Layout, budget: &Budget) -> Result<Option<u64>> {
-    let wrong = |at: u64, reason: String| FormatError::at_offset(at, reason).in_input(path);
-    let points_at = layout.points_at;
-    let Some(description) = layout.laszip() else {
-        return Err(wrong(
-            100,
-            "the points are compressed, but no record says how (`laszip encoded`)".into(),
-        ));
-    };
-    let description =
-        guarded(|| LazVlr::from_buffer(description).map(|laz| (number(description, 0, 2), laz)));
-    let (compressor, laz) = description.map_err(|reason| wrong(100, reason))?;
-    let point_bytes: u64 = laz.items().iter().map(|item| u64::from(item.size())).sum();
-    if laz.items().len() > MAX_ITEMS || point_bytes != layout.record_bytes || point_bytes > MAX_POINT_BYTES {
-        let reason = format!(
-            "points of {} bytes are compressed as {} parts of {point_bytes} bytes: these must be as many, and at most \
-             {MAX_POINT_BYTES}",
-            layout.record_bytes,
-            laz.items().len()
-        );
-        return Err(wrong(105, reason));
+/// The compressed points of a file.
+pub(super) struct Chunks {
+    pub(super) items: Vec<LazItem>,
+    /// Layers of fields in place of points one after the other.
+    pub(super) is_layered: bool,
+    pub(super) data_at: u64,
+    pub(super) points: ChunkPoints,
+    /// Without a table of chunks nothing says where the points end but their number.
+    pub(super) has_table: bool,
+}
+
+/// How many points chunks have.
+pub(super) enum ChunkPoints {
+    /// One chunk has all.
+    All,
+    /// Each chunk but the last has as many.
+    Each(u64),
+    /// Numbers of their own.
+    Own(Vec<u64>),
+}
+
+impl Chunks {
+    /// Refuses a file whose chunks cannot be where it says, or do not fit in memory, and sets how many points are read.
+    pub(super) fn read(path: &Path, file: &File, layout: &mut Layout, budget: &Budget) -> Result<Self> {
+        let wrong = |at: u64, reason: String| FormatError::at_offset(at, reason).in_input(path);
+        let Some(description) = layout.laszip() else {
+            return Err(wrong(
+                100,
+                "the points are compressed, but no record says how (`laszip encoded`)".into(),
+            ));
+        };
+        let compressor = number(description, 0, 2);
+        let laz = guarded(|| LazVlr::from_buffer(description)).map_err(|reason| wrong(100, reason))?;
+        let point_bytes: u64 = laz.items().iter().map(|item| u64::from(item.size())).sum();
+        if laz.items().len() > MAX_ITEMS
+            || point_bytes != layout.record_bytes
+            || point_bytes > MAX_POINT_BYTES
+        {
+            let reason = format!(
+                "points of {} bytes are compressed as {} parts of {point_bytes} bytes: these must be as many, and at \
+                 most {MAX_POINT_BYTES}",
+                layout.record_bytes,
+                laz.items().len()
+            );
+            return Err(wrong(105, reason));
+        }
+        // The decoder goes by the version of the parts: those from 3 on are layers, whatever the compressor is called.
+        if !(POINT_WISE..=LAYERED).contains(&compressor)
+            || laz.items().iter().any(|item| (item.version() >= 3) != (compressor == LAYERED))
+        {
+            return Err(wrong(100, format!("compressor {compressor} does not fit the parts of its points")));
+        }
+        let mut reader = ChunkReader { path, input: BufReader::new(file), laz, compressor, budget };
+        if compressor == POINT_WISE {
+            let there = layout.file_bytes - layout.points_at;
+            layout.points = layout.counts.choose(0, u64::MAX);
+            reader.check_number(layout, there)?;
+            layout.remarks.extend(layout.counts.remark(layout.points));
+            return Ok(reader.chunks(layout.points_at, ChunkPoints::All, false));
+        }
+        match reader.table(layout)? {
+            Some((table_at, table)) => reader.with_table(layout, table_at, &table),
+            None => reader.without_table(layout),
+        }
     }
-    // The library goes by the version of the parts: those from 3 on are layers, whatever the compressor is said to be.
-    if laz.items().iter().any(|item| (item.version() >= 3) != (compressor == LAYERED)) {
-        return Err(wrong(100, format!("compressor {compressor} does not fit the parts of its points")));
+}
+
+/// What is known of the chunks of a file while they are looked at.
+struct ChunkReader<'f> {
+    path: &'f Path,
+    input: BufReader<&'f File>,
+    laz: LazVlr,
+    compressor: u64,
+    budget: &'f Budget,
+}
+
+impl ChunkReader<'_> {
+    fn wrong(&self, at: u64, reason: String) -> Error {
+        FormatError::at_offset(at, reason).in_input(self.path)
     }
-    // A writer that was killed leaves 0 in the header. How many points there are does not follow from their bytes.
-    let check_count = |bytes: u64| {
-        if layout.points > 0 || bytes < point_bytes {
+
+    fn point_bytes(&self) -> u64 {
+        self.laz.items().iter().map(|item| u64::from(item.size())).sum()
+    }
+
+    fn is_layered(&self) -> bool {
+        self.compressor == LAYERED
+    }
+
+    fn chunks(&self, data_at: u64, points: ChunkPoints, has_table: bool) -> Chunks {
+        let (items, is_layered) = (self.laz.items().clone(), self.is_layered());
+        Chunks { items, is_layered, data_at, points, has_table }
+    }
+
+    /// A writer that was killed leaves 0 in the header. How many points there are does not follow from their bytes.
+    fn check_number(&self, layout: &Layout, bytes: u64) -> Result<()> {
+        if layout.points > 0 || bytes < self.point_bytes() {
             return Ok(());
         }
         let reason = format!(
             "the header announces no points, but {bytes} bytes of compressed ones follow: the file was not finished; \
              repair its header with the program that wrote it, or write the points again"
         );
-        Err(wrong(if layout.has_large_count { 247 } else { 107 }, reason))
-    };
-    if compressor == POINT_WISE {
-        return check_count(layout.file_bytes - points_at).map(|()| None);
+        Err(self.wrong(layout.counts.place(), reason))
     }
-    let mut input = BufReader::new(file);
-    let table_at = table_place(path, &mut input, layout)?;
-    let (data_at, chunks) =
-        (points_at + TABLE_PLACE_BYTES, number(&bytes_at(path, &mut input, table_at, 8)?, 4, 4));
-    check_count(table_at.saturating_sub(data_at))?;
-    // Each chunk begins with a point that is not compressed.
-    let most_chunks = (table_at - data_at.min(table_at)) / point_bytes.max(1) + 1;
-    if chunks > most_chunks {
-        let reason = format!("the chunk table promises {chunks} chunks; before it is room for {most_chunks}");
-        return Err(wrong(table_at + 4, reason));
-    }
-    if chunks.saturating_mul(size_of::<ChunkTableEntry>() as u64) > budget.whole_bytes() / TABLE_COPIES {
-        let reason = format!(
-            "a table of {chunks} chunks exceeds its share of the memory for reading: raise `memory`, or write the file \
-             with larger chunks"
-        );
-        return Err(wrong(table_at + 4, reason));
-    }
-    input.seek(SeekFrom::Start(points_at)).map_err(|error| Error::io(path, "read", error))?;
-    let table =
-        guarded(|| ChunkTable::read_from(&mut input, &laz)).map_err(|reason| wrong(table_at, reason))?;
-    let (mut at, mut room) = (data_at, 0_u64);
-    for (chunk, entry) in table.as_ref().iter().enumerate() {
-        let end = at.checked_add(entry.byte_count).filter(|end| *end <= table_at);
-        let Some(end) = end else {
+
+    /// The chunk table and its place; `None` if the file ends before it or in it.
+    fn table(&mut self, layout: &Layout) -> Result<Option<(u64, ChunkTable)>> {
+        let Some(table_at) = self.table_place(layout)? else { return Ok(None) };
+        let data_at = layout.points_at + TABLE_PLACE_BYTES;
+        let chunks = number(&bytes_at(self.path, &mut self.input, table_at, 8)?, 4, 4);
+        // Each chunk begins with a point that is not compressed.
+        let most_chunks = (table_at - data_at.min(table_at)) / self.point_bytes().max(1) + 1;
+        if chunks > most_chunks {
+            let reason =
+                format!("the chunk table promises {chunks} chunks; before it is room for {most_chunks}");
+            return Err(self.wrong(table_at + 4, reason));
+        }
+        if chunks.saturating_mul(size_of::<ChunkTableEntry>() as u64)
+            > self.budget.whole_bytes() / TABLE_COPIES
+        {
             let reason = format!(
-                "the chunk table promises {} bytes for chunk {chunk} at byte {at}; the chunks end at byte {table_at}",
-                entry.byte_count
+                "a table of {chunks} chunks exceeds its share of the memory for reading: raise `memory`, or write the \
+                 file with larger chunks"
             );
-            return Err(wrong(table_at, reason));
+            return Err(self.wrong(table_at + 4, reason));
+        }
+        // The library reads the place again, and the table there.
+        self.input
+            .seek(SeekFrom::Start(layout.points_at))
+            .map_err(|error| Error::io(self.path, "read", error))?;
+        let (input, laz) = (&mut self.input, &self.laz);
+        Ok(guarded(|| ChunkTable::read_from(input, laz)).ok().map(|table| (table_at, table)))
+    }
+
+    /// Where the chunk table is: said in front of the points, or in the last bytes of the file if the writer could not
+    /// go back.
+    fn table_place(&mut self, layout: &Layout) -> Result<Option<u64>> {
+        let last_at = layout.file_bytes.saturating_sub(TABLE_PLACE_BYTES);
+        let is_place = |place: u64| place as i64 > layout.points_at as i64 && place <= last_at;
+        for said_at in [layout.points_at, last_at] {
+            if said_at > last_at {
+                continue;
+            }
+            let place = number(&bytes_at(self.path, &mut self.input, said_at, TABLE_PLACE_BYTES)?, 0, 8);
+            if is_place(place) {
+                return Ok(Some(place));
+            }
+            // The library looks at the end only where the writer left the place open.
+            if place as i64 > layout.points_at as i64 {
+                break;
+            }
+        }
+        Ok(None)
+    }
+
+    /// Checks each chunk against the table, and the number of points against both.
+    fn with_table(&mut self, layout: &mut Layout, table_at: u64, table: &ChunkTable) -> Result<Chunks> {
+        let data_at = layout.points_at + TABLE_PLACE_BYTES;
+        let most = layout.counts.legacy.max(layout.counts.large.unwrap_or(0));
+        let is_variable = self.laz.uses_variable_size_chunks();
+        let (mut at, mut room) = (data_at, 0_u64);
+        // Points as the chunks themselves count them.
+        let mut own = self.is_layered().then_some(0_u64);
+        for (chunk, entry) in table.as_ref().iter().enumerate() {
+            let end = at.checked_add(entry.byte_count).filter(|end| *end <= table_at);
+            let Some(end) = end else {
+                let reason = format!(
+                    "the chunk table promises {} bytes for chunk {chunk} at byte {at}; the chunks end at byte \
+                     {table_at}",
+                    entry.byte_count
+                );
+                return Err(self.wrong(table_at, reason));
+            };
+            self.check_chunk_bytes(chunk, at, entry.byte_count)?;
+            // A chunk behind all points may be empty.
+            if entry.point_count == 0 && entry.byte_count > 0 && (room < most || most == 0) {
+                let reason = format!("chunk {chunk} has {} bytes and no points", entry.byte_count);
+                return Err(self.wrong(at, reason));
+            }
+            if self.is_layered() && entry.point_count > 0 && (room < most || most == 0) {
+                let head = LayeredHead::read(self.path, &mut self.input, &self.laz, at);
+                match head.and_then(|head| head.check(self.path, end).map(|()| head.points)) {
+                    Ok(points) => {
+                        own =
+                            own.filter(|_| points <= entry.point_count).map(|own| own.saturating_add(points));
+                    }
+                    Err(error) if room < most => return Err(error),
+                    // Writers close a file without points with a chunk of none.
+                    Err(_) => own = None,
+                }
+            } else {
+                own = own.filter(|_| entry.point_count == 0);
+            }
+            room = room.saturating_add(entry.point_count);
+            at = end;
+        }
+        let there = if is_variable { Some(room) } else { own };
+        match there {
+            Some(there) => take_all(layout, there),
+            None => {
+                let chunk_size = u64::from(self.laz.chunk_size());
+                let least = (room + 1).saturating_sub(chunk_size).min(room);
+                let announced = layout.counts.choose(least, room);
+                layout.points = announced;
+                self.check_number(layout, table_at.saturating_sub(data_at))?;
+                if room < announced {
+                    let reason =
+                        format!("{announced} points are announced; the chunk table has room for {room}");
+                    return Err(self.wrong(layout.counts.place(), reason));
+                }
+                layout.remarks.extend(layout.counts.remark(announced));
+                if announced < least {
+                    layout.remarks.push(format!(
+                        "the header announces {announced} points, which are read; the chunks hold {least} or more"
+                    ));
+                }
+            }
+        }
+        let points = if is_variable {
+            ChunkPoints::Own(
+                table.as_ref().iter().map(|entry| entry.point_count).filter(|n| *n > 0).collect(),
+            )
+        } else {
+            ChunkPoints::Each(u64::from(self.laz.chunk_size()))
         };
-        // A chunk behind all points may be empty.
-        if compressor == LAYERED && entry.byte_count > budget.whole_bytes() {
-            let reason = format!(
-                "chunk {chunk} has {} bytes, and at most {} of a chunk are held in memory: raise `memory`, or write the \
-                 file with smaller chunks",
-                entry.byte_count,
-                budget.whole_bytes()
-            );
-            return Err(wrong(at, reason));
-        }
-        if compressor == LAYERED && room < layout.points && entry.point_count > 0 {
-            check_layers(path, &mut input, &laz, at, end)?;
-        }
-        room = room.saturating_add(entry.point_count);
-        at = end;
+        Ok(self.chunks(data_at, points, true))
     }
-    if room < layout.points {
-        let reason = format!("{} points are announced; the chunk table has room for {room}", layout.points);
-        return Err(wrong(if layout.has_large_count { 247 } else { 107 }, reason));
-    }
-    Ok(Some(table_at))
-}
 
-/// Where the chunk table is: said in front of the points, or in the last bytes of the file if the writer could not go
-/// back.
-fn table_place(path: &Path, input: &mut BufReader<&File>, layout: &Layout) -> Result<u64> {
-    let mut said_at = layout.points_at;
-    let mut table_at = number(&bytes_at(path, input, said_at, TABLE_PLACE_BYTES)?, 0, 8);
-    let is_before = |place: u64| place as i64 <= layout.points_at as i64;
-    if is_before(table_at) {
-        said_at = layout.file_bytes.saturating_sub(TABLE_PLACE_BYTES);
-        table_at = number(&bytes_at(path, input, said_at, TABLE_PLACE_BYTES)?, 0, 8);
+    /// Follows the chunks from one to the next, as far as they go.
+    fn without_table(&mut self, layout: &mut Layout) -> Result<Chunks> {
+        let data_at = layout.points_at + TABLE_PLACE_BYTES;
+        let is_variable = self.laz.uses_variable_size_chunks();
+        let announced = layout.counts.choose(0, u64::MAX);
+        let there = layout.file_bytes.saturating_sub(data_at);
+        if !self.is_layered() {
+            if is_variable {
+                let reason =
+                    "the chunk table, which says how many points each chunk has, is cut off or damaged";
+                return Err(self.wrong(layout.points_at, reason.into()));
+            }
+            layout.points = announced;
+            self.check_number(layout, there)?;
+            layout.remarks.extend(layout.counts.remark(announced));
+            let points = ChunkPoints::Each(u64::from(self.laz.chunk_size()));
+            return Ok(self.chunks(data_at, points, false));
+        }
+        let (mut at, mut whole, mut own) = (data_at, 0_u64, Vec::new());
+        let most_own = self.budget.whole_bytes() / TABLE_COPIES / 8;
+        while announced == 0 || whole < announced {
+            let Ok(head) = LayeredHead::read(self.path, &mut self.input, &self.laz, at) else { break };
+            let most = if is_variable { u64::MAX } else { u64::from(self.laz.chunk_size()) };
+            let Some(end) = head.end().filter(|end| *end <= layout.file_bytes) else { break };
+            if head.points == 0 || head.points > most {
+                break;
+            }
+            self.check_chunk_bytes(own.len(), at, end - at)?;
+            whole = whole.saturating_add(head.points);
+            if is_variable && own.len() as u64 >= most_own {
+                let reason = "its chunks exceed their share of the memory for reading: raise `memory`";
+                return Err(self.wrong(at, reason.into()));
+            }
+            if is_variable {
+                own.push(head.points);
+            }
+            at = end;
+        }
+        if whole == 0 && announced > 0 {
+            let reason = format!("the file ends within the first chunk of its {announced} points");
+            return Err(self.wrong(data_at, reason));
+        }
+        layout.points = if announced == 0 { whole } else { announced.min(whole) };
+        self.check_number(layout, there)?;
+        layout.remarks.extend(match announced {
+            0 if whole == 0 => None,
+            0 => Some(stopped(whole)),
+            _ if whole < announced => Some(cut_off(whole, announced)),
+            _ => {
+                Some(format!("the chunk table is cut off or damaged: {announced} points are read without it"))
+            }
+        });
+        let points = match is_variable {
+            true => ChunkPoints::Own(own),
+            false => ChunkPoints::Each(u64::from(self.laz.chunk_size())),
+        };
+        Ok(self.chunks(data_at, points, false))
     }
-    if is_before(table_at) || table_at > layout.file_bytes.saturating_sub(8) {
+
+    /// Chunks of layers are held in memory.
+    fn check_chunk_bytes(&self, chunk: usize, at: u64, bytes: u64) -> Result<()> {
+        let most = self.budget.whole_bytes();
+        if !self.is_layered() || bytes <= most {
+            return Ok(());
+        }
         let reason = format!(
-            "the chunk table is said to be at byte {table_at} of a file of {} bytes: it is cut off or damaged",
-            layout.file_bytes
+            "chunk {chunk} has {bytes} bytes, and at most {most} of a chunk are held in memory: raise `memory`, or \
+             write the file with smaller chunks"
         );
-        return Err(FormatError::at_offset(said_at, reason).in_input(path));
+        Err(self.wrong(at, reason))
     }
-    Ok(table_at)
 }
 
-/// Checks the lengths of the fields of a chunk: they stand behind its first point and its number of points.
-fn check_layers(path: &Path, input: &mut BufReader<&File>, laz: &LazVlr, at: u64, end: u64) -> Result<()> {
-    let layers = laz.items().iter().map(|item| match u16::from(item.item_type()) {
-        // Point, colour, colour with near infrared, wave packet, extra bytes.
-        10 => 9,
-        12 => 2,
-        14 => u64::from(item.size()),
-        _ => 1,
+/// Takes all points of a file whose chunks count them.
+fn take_all(layout: &mut Layout, there: u64) {
+    let announced = layout.counts.choose(there, there);
+    layout.points = there;
+    layout.remarks.extend(match announced {
+        _ if announced == there => layout.counts.remark(there),
+        0 => Some(stopped(there)),
+        _ => Some(format!("the header announces {announced} points; {there} are there and are read")),
     });
-    let lengths_bytes = 4 * layers.sum::<u64>();
-    let lengths_at = at + laz.items_size() + 4;
-    let lengths = bytes_at(path, input, lengths_at, lengths_bytes)?;
-    let claimed: u64 = lengths.chunks_exact(4).map(|length| number(length, 0, 4)).sum();
-    let there = end.saturating_sub(lengths_at + lengths_bytes);
-    // The library takes what stands behind the fields as the next chunk.
-    if claimed != there {
-        let reason = format!("the fields of a chunk claim {claimed} bytes; it has {there}");
-        return Err(FormatError::at_offset(lengths_at, reason).in_input(path));
-    }
-    Ok(())
-}
-
-/// A few bytes of a file; they are missing if it was cut off.
-fn bytes_at(path: &Path, input: &mut BufReader<&File>, at: u64, count: u64) -> Result<Vec<u8>> {
-    let mut bytes = Vec::new();
-    let read = input.seek(SeekFrom::Start(at)).and_then(|_| input.take(count).read_to_end(&mut bytes));
-    read.map_err(|error| Error::io(path, "read", error))?;
-    if (bytes.len() as u64) < count {
-        return Err(FormatError::at_offset(at, "the file ends within its compressed points").in_input(path));
-    }
-    Ok(bytes)
 }

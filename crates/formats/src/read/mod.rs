@@ -24,13 +24,16 @@ pub(crate) mod foreign;
 pub(crate) mod from_origin;
 pub(crate) mod glance;
 pub(crate) mod gray16;
-#[cfg(any(feature = "las", feature = "e57"))]
-mod guard;
+pub(crate) mod guard;
 pub(crate) mod input_file;
 pub(crate) mod inside;
 mod intrinsics;
 #[cfg(feature = "las")]
 pub(crate) mod las;
+#[cfg(feature = "las")]
+mod las_count;
+#[cfg(feature = "las")]
+mod las_hints;
 #[cfg(feature = "las")]
 mod las_layout;
 #[cfg(feature = "las")]
@@ -38,13 +41,19 @@ mod las_points;
 #[cfg(feature = "las")]
 mod las_record;
 #[cfg(feature = "las")]
-mod las_scans;
+mod las_records;
 #[cfg(feature = "las")]
-mod las_trimmed;
+mod las_scans;
 #[cfg(feature = "las")]
 mod las_units;
 #[cfg(feature = "las")]
 mod laz_chunks;
+#[cfg(feature = "las")]
+mod laz_head;
+#[cfg(feature = "las")]
+mod laz_points;
+#[cfg(any(feature = "las", feature = "e57"))]
+mod length_unit;
 mod left_out;
 pub(crate) mod lines;
 pub(crate) mod listing;

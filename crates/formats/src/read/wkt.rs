@@ -1,35 +1,51 @@
 //! Units of coordinate systems as well-known text.
 
+use super::length_unit::LengthUnit;
+
 /// What well-known text says of its coordinates.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct WktUnits {
-    /// Metres in a unit of x and y: the unit that closes PROJCS (PROJCRS).
-    pub(super) flat_m: Option<f64>,
-    /// Metres in a unit of z: the one of VERT_CS (VERTCRS).
-    pub(super) high_m: Option<f64>,
+    /// The unit of x and y: the one that closes PROJCS (PROJCRS).
+    pub(super) flat: Option<LengthUnit>,
+    /// The unit of z: the one of VERT_CS (VERTCRS).
+    pub(super) high: Option<LengthUnit>,
     /// Coordinates are angles.
     pub(super) is_degrees: bool,
 }
+
+/// Systems whose coordinates are lengths, systems of heights, and those whose coordinates are angles.
+const FLAT: [&str; 7] =
+    ["PROJCS", "PROJCRS", "PROJECTEDCRS", "LOCAL_CS", "ENGCRS", "ENGINEERINGCRS", "GEOCCS"];
+const HIGH: [&str; 4] = ["VERT_CS", "VERTCRS", "VERTCS", "VERTICALCRS"];
+const ANGLES: [&str; 4] = ["GEOGCS", "GEOGCRS", "GEOGRAPHICCRS", "GEODCRS"];
 
 impl WktUnits {
     pub(super) fn of(wkt: &str) -> Self {
         // Of the same length, unlike Unicode's.
         let upper = wkt.to_ascii_uppercase();
-        let at = |names: &[&str]| names.iter().find_map(|name| upper.find(name));
-        let flat = at(&["PROJCS[", "PROJCRS["]).and_then(|at| wkt.get(at..));
-        let vertical = at(&["VERT_CS[", "VERTCRS[", "VERTCS["]).and_then(|at| wkt.get(at..));
+        let at = |names: &[&str]| names.iter().find_map(|name| node(&upper, name));
+        let unit = |names: &[&str]| at(names).and_then(|at| wkt.get(at..)).and_then(last_unit);
         Self {
-            flat_m: flat.and_then(last_unit),
-            high_m: vertical.and_then(last_unit),
-            is_degrees: flat.is_none() && at(&["GEOGCS[", "GEOGCRS[", "GEODCRS["]).is_some(),
+            flat: unit(&FLAT),
+            high: unit(&HIGH),
+            is_degrees: at(&FLAT).is_none() && at(&ANGLES).is_some(),
         }
     }
+}
+
+/// Where a node of this name begins.
+fn node(upper: &str, name: &str) -> Option<usize> {
+    upper.match_indices(name).map(|(at, _)| at).find(|at| {
+        let (before, behind) = upper.split_at(*at);
+        let is_whole = !before.ends_with(|letter: char| letter.is_alphanumeric() || letter == '_');
+        is_whole && behind.get(name.len()..).is_some_and(|rest| rest.trim_start().starts_with(['[', '(']))
+    })
 }
 
 /// The last unit of length directly within the node that a text starts with: `UNIT["foot",0.3048]`,
 /// `LENGTHUNIT["metre",1]`. Units of what is nested deeper (degrees, parameters) are passed by; axes of newer texts
 /// hold the unit themselves and count if there is none beside them.
-fn last_unit(text: &str) -> Option<f64> {
+fn last_unit(text: &str) -> Option<LengthUnit> {
     let (mut depth, mut is_quoted) = (0_u32, false);
     let (mut own, mut of_axis) = (None, None);
     let mut axis_depth = None;
@@ -49,12 +65,11 @@ fn last_unit(text: &str) -> Option<f64> {
                     axis_depth = Some(depth);
                 }
                 if name == "UNIT" || name == "LENGTHUNIT" {
-                    let factor = || text.get(at..)?.split([',', ']', ')']).nth(1)?.trim().parse::<f64>().ok();
-                    let metres = factor().filter(|metres| *metres > 1e-6 && *metres < 1e6);
+                    let unit = text.get(at + 1..).and_then(unit);
                     if depth == 2 {
-                        own = metres.or(own);
+                        own = unit.or(own);
                     } else if depth == 3 && axis_depth.is_some() {
-                        of_axis = metres.or(of_axis);
+                        of_axis = unit.or(of_axis);
                     }
                 }
                 word.clear();
@@ -70,26 +85,58 @@ fn last_unit(text: &str) -> Option<f64> {
                 }
             }
             letter if letter.is_alphanumeric() || letter == '_' => word.push(letter),
+            letter if letter.is_whitespace() => {}
             _ => word.clear(),
         }
     }
     own.or(of_axis)
 }
 
+/// A unit: its name between quotes, and its factor.
+fn unit(inside: &str) -> Option<LengthUnit> {
+    let (name, rest) = inside.trim_start().strip_prefix('"')?.split_once('"')?;
+    let rest = rest.split([']', ')']).next().unwrap_or_default();
+    let factor = rest.split(',').nth(1).and_then(|factor| factor.trim().parse::<f64>().ok());
+    LengthUnit::of(name, factor.filter(|metres| *metres > 1e-6 && *metres < 1e6))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn metres(text: &str) -> Option<f64> {
+        last_unit(text).map(|unit| unit.metres)
+    }
 
     #[test]
     fn the_unit_of_the_projection_is_not_that_of_its_ellipsoid() {
         let projection = "PROJCS[\"a, [b]\",GEOGCS[\"c\",DATUM[\"d\",SPHEROID[\"e\",6378137,298.25]],\
                           UNIT[\"degree\",0.0174]],PARAMETER[\"f\",9],UNIT[\"US survey foot\",0.3048006096]],VERT_CS[\"g\",\
                           UNIT[\"metre\",1]]";
-        assert_eq!(last_unit(projection), Some(0.304_800_609_6));
+        assert_eq!(metres(projection), Some(0.304_800_609_6));
         let axes = "PROJCRS[\"a\",BASEGEOGCRS[\"b\",ANGLEUNIT[\"degree\",0.0174]],CS[Cartesian,2],\
                     AXIS[\"x\",east,ORDER[1],LENGTHUNIT[\"foot\",0.3048]],AXIS[\"y\",north,LENGTHUNIT[\"foot\",0.3048]]]";
-        assert_eq!(last_unit(axes), Some(0.3048));
-        assert_eq!(last_unit("PROJCS[\"a\"]"), None);
-        assert_eq!(last_unit("PROJCS[\"a\",UNIT[\"feet\",abc]]"), None);
+        assert_eq!(metres(axes), Some(0.3048));
+        assert_eq!(metres("PROJCS[\"a\"]"), None);
+        // A unit that is known needs no factor; another one does.
+        assert_eq!(metres("PROJCS[\"a\",UNIT[\"feet\",abc]]"), Some(0.3048));
+        assert_eq!(metres("PROJCS[\"a\",UNIT[\"ell\",abc]]"), None);
+    }
+
+    #[test]
+    fn nodes_are_whole_words() {
+        let of = |text: &str| {
+            let found = WktUnits::of(text);
+            (found.flat.map(|unit| unit.metres), found.high.map(|unit| unit.metres), found.is_degrees)
+        };
+        assert_eq!(of("PROJCS [\"a\",\n  UNIT [\"foot\", 0.3048]]"), (Some(0.3048), None, false));
+        assert_eq!(of("LOCAL_CS[\"hall\",UNIT[\"millimetre\",0.001]]"), (Some(0.001), None, false));
+        assert_eq!(
+            of("ENGCRS[\"a\",CS[Cartesian,3],LENGTHUNIT[\"foot\",0.3048]]"),
+            (Some(0.3048), None, false)
+        );
+        assert_eq!(of("VERTCRS[\"h\",LENGTHUNIT[\"foot\",0.3048]]"), (None, Some(0.3048), false));
+        assert_eq!(of("GEOGCS[\"WGS 84\",UNIT[\"degree\",0.0174]]"), (None, None, true));
+        assert_eq!(of("PROJCRS[\"a\",BASEGEOGCRS[\"b\"]]"), (None, None, false));
     }
 }

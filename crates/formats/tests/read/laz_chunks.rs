@@ -1,8 +1,8 @@
+use crate::made::las::{Las, Packing};
 use crate::made::voxels::{VOXELS, format_of, voxel, voxel_file};
-use crate::support::{clouds, clouds_with, failure, fixture};
+use crate::support::{Cloud, all, clouds, clouds_with, failure, fixture};
 use std::fs;
-use voxtile_formats::CloudPoint;
-use voxtile_formats::ReadOptions;
+use voxtile_formats::{CloudPoint, ReadOptions, open_clouds};
 
 /// Where the points begin, and where the chunk table is.
 fn places(file: &[u8]) -> (usize, usize) {
@@ -23,6 +23,24 @@ fn of_damaged(file: &[u8], at: usize, bytes: &[u8]) -> String {
     error
 }
 
+/// The number of points of a file with some bytes of it overwritten, and the remarks.
+fn of_changed(file: &[u8], at: usize, bytes: &[u8]) -> (usize, String) {
+    let folder = tempfile::tempdir().unwrap();
+    let [whole, changed] = ["whole.laz", "changed.laz"].map(|name| folder.path().join(name));
+    let mut other = file.to_vec();
+    other[at..at + bytes.len()].copy_from_slice(bytes);
+    fs::write(&whole, file).unwrap();
+    fs::write(&changed, other).unwrap();
+    let mut source = open_clouds(&changed, &ReadOptions::default()).unwrap();
+    let found = all(source.as_mut()).unwrap();
+    assert_eq!(points_of(found.clone()), points_of(clouds(&whole)));
+    (points_of(found).len(), source.remarks().join("\n"))
+}
+
+fn points_of(clouds: Vec<Cloud>) -> Vec<CloudPoint> {
+    clouds.into_iter().flat_map(|(_, points)| points).collect()
+}
+
 fn assert_says(error: &str, at: usize, what: &str) {
     assert!(
         error.contains(&format!("damaged.laz: malformed: offset {at}: ")) && error.contains(what),
@@ -38,11 +56,30 @@ fn a_chunk_table_that_lies_is_refused() {
         let (points_at, table_at) = places(file);
         let error = of_damaged(file, table_at + 4, &[0xff; 4]);
         assert_says(&error, table_at + 4, "the chunk table promises 4294967295 chunks");
-        let error = of_damaged(file, points_at, &u64::to_le_bytes(1 << 40));
-        assert_says(&error, points_at, "the chunk table is said to be at byte 1099511627776");
-        // The table itself is compressed: other bytes are other lengths of chunks.
-        let error = of_damaged(file, table_at + 8, &[0xf3; 4]);
-        assert!(error.contains(&format!("damaged.laz: malformed: offset {table_at}: ")), "{error}");
+        // Without its table, each chunk says how many points it has.
+        let (points, remarks) = of_changed(file, points_at, &u64::to_le_bytes(1 << 40));
+        assert!(
+            remarks.contains(&format!("cut off or damaged: {points} points are read without it")),
+            "{remarks}"
+        );
+        // The table itself is compressed: other bytes are other lengths of chunks, or none at all.
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("damaged.laz");
+        let mut refused = 0;
+        for byte in 0..=u8::MAX {
+            let mut damaged = file.clone();
+            damaged[table_at + 8..table_at + 12].fill(byte);
+            fs::write(&path, damaged).unwrap();
+            match open_clouds(&path, &ReadOptions::default()) {
+                Ok(mut source) => assert_eq!(points_of(all(source.as_mut()).unwrap()).len(), points),
+                Err(error) => {
+                    let said = format!("{error:#}");
+                    assert!(said.contains(&format!("damaged.laz: malformed: offset {table_at}: ")), "{said}");
+                    refused += 1;
+                }
+            }
+        }
+        assert!(refused > 50, "{refused}");
     }
     let (points_at, _) = places(&by_layer);
     // Behind the place of the table, the first point and the number of points.
@@ -71,13 +108,14 @@ fn a_compressor_must_fit_the_versions_of_its_parts() {
 
 #[test]
 fn more_points_than_the_chunks_have_room_for_are_refused() {
+    // Of layers, the chunks know better.
     let by_layer = voxel_file("laz");
-    let error = of_damaged(&by_layer, 247, &u64::to_le_bytes(1 << 50));
-    assert_says(&error, 247, "1125899906842624 points are announced; the chunk table has room for 50000");
-    let by_point = fs::read(fixture("timed.laz")).unwrap();
-    let at = if by_point[107..111] == [0; 4] { 247 } else { 107 };
-    let error = of_damaged(&by_point, at, &u32::to_le_bytes(1 << 30));
-    assert_says(&error, at, "1073741824 points are announced");
+    let (points, remarks) = of_changed(&by_layer, 247, &u64::to_le_bytes(1 << 50));
+    assert_eq!(points, VOXELS as usize);
+    assert!(remarks.contains("announces 1125899906842624 points; 30 are there"), "{remarks}");
+    let by_point = Las { legacy: 1 << 30, ..Las::new(2, 1, 400) }.packed(Packing::Chunked(100));
+    let error = of_damaged(&by_point, 107, &u32::to_le_bytes(1 << 30));
+    assert_says(&error, 107, "1073741824 points are announced; the chunk table has room for 400");
     let error = of_damaged(&by_layer, 105, &60_000_u16.to_le_bytes());
     assert_says(&error, 105, "points of 60000 bytes are compressed as 2 parts of 42 bytes");
 }

@@ -13,6 +13,12 @@ mod e57;
 mod formats;
 #[cfg(feature = "las")]
 mod las;
+/// How many points a LAS file has.
+#[cfg(feature = "las")]
+mod las_counts;
+/// In what a LAS file measures.
+#[cfg(feature = "las")]
+mod las_units;
 /// What is promised of compressed points.
 #[cfg(feature = "las")]
 mod laz_chunks;

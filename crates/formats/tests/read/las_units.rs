@@ -1,0 +1,121 @@
+use crate::made::las::Las;
+use crate::support::all;
+use std::fs;
+use voxtile_formats::{ReadOptions, open_clouds};
+
+const US_FOOT_M: f64 = 1200.0 / 3937.0;
+
+/// Metres in a unit of x, y and of z, as a file is read, and the remarks.
+fn units(las: &Las) -> ([f64; 2], String) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.las");
+    fs::write(&path, las.bytes()).unwrap();
+    let options = ReadOptions { scan_period_s: 0.0, ..ReadOptions::default() };
+    let mut source = open_clouds(&path, &options).unwrap();
+    let (_, points) = all(source.as_mut()).unwrap().remove(0);
+    let (read, place) = (points[3].position_m, las.place(3));
+    let [x, y, z] = std::array::from_fn(|axis| read[axis] / place[axis]);
+    assert!((x / y - 1.0).abs() < 1e-12);
+    ([x, z], source.remarks().join("\n"))
+}
+
+fn assert_units(las: &Las, wanted: [f64; 2], remark: &str) {
+    let (found, remarks) = units(las);
+    let is_near = (0..2).all(|k| (found[k] / wanted[k] - 1.0).abs() < 1e-12);
+    assert!(is_near && remarks.contains(remark), "{found:?}, not {wanted:?}: {remarks}");
+    assert_eq!(remarks.is_empty(), remark.is_empty(), "{remarks}");
+}
+
+fn with_wkt(text: &str) -> Las {
+    let records = vec![("LASF_Projection", 2112, text.as_bytes().to_vec())];
+    Las { encoding: 1 << 4 | 1, records, ..Las::new(4, 6, 10) }
+}
+
+fn projected(unit: &str, vertical: &str) -> String {
+    format!(
+        "COMPD_CS[\"c\",PROJCS[\"a\",GEOGCS[\"b\",UNIT[\"degree\",0.0174532925199433]],UNIT[{unit}]],\
+         VERT_CS[\"h\",VERT_DATUM[\"d\",2005],UNIT[{vertical}]]]"
+    )
+}
+
+/// Files of New Mexico name the survey foot of heights with the factor of a metre.
+#[test]
+fn the_name_of_a_unit_counts_where_its_factor_is_of_another() {
+    let survey = "\"US survey foot\",0.304800609601219";
+    let las = with_wkt(&projected(survey, "\"US survey foot\",1.0"));
+    assert_units(
+        &las,
+        [0.304_800_609_601_219, US_FOOT_M],
+        "the unit of z is named US survey foot, with the factor 1:",
+    );
+    let las = with_wkt(&projected("\"foot\",1", "\"metre\",1"));
+    assert_units(
+        &las,
+        [0.3048, 1.0],
+        "the unit of x and y is named foot, with the factor 1: the name counts, 0.3048 m",
+    );
+    // Digits of a factor count where it is the unit's own, and a name that is not known has no more than its factor.
+    let las = with_wkt(&projected("\"Foot_US\",0.3048006", "\"rod\",5.0292"));
+    assert_units(&las, [0.304_800_6, 5.0292], "coordinates become metres");
+    let las = with_wkt("LOCAL_CS[\"hall\",UNIT[\"millimetre\",0.001]]");
+    assert_units(&las, [0.001; 2], "coordinates become metres: x and y times 0.001, z times 0.001");
+    assert_units(&with_wkt(&projected("\"metre\",1", "\"Meter\",1")), [1.0; 2], "");
+}
+
+/// A file with GeoTIFF keys: key, place of the value, value.
+fn with_keys(keys: &[[u16; 3]], doubles: &[f64]) -> Las {
+    let mut values = vec![[1, 1, 0, keys.len() as u16]];
+    values.extend(keys.iter().map(|[key, place, value]| [*key, *place, 1, *value]));
+    let data = values.as_flattened().iter().flat_map(|value| value.to_le_bytes()).collect();
+    let doubles = doubles.iter().flat_map(|value| value.to_le_bytes()).collect();
+    let records = vec![("LASF_Projection", 34735, data), ("LASF_Projection", 34736, doubles)];
+    Las { records, ..Las::new(2, 1, 10) }
+}
+
+#[test]
+fn keys_name_units_by_number_by_size_and_by_the_vertical_system() {
+    let metres = "coordinates become metres";
+    assert_units(&with_keys(&[[3076, 0, 9003]], &[]), [US_FOOT_M; 2], metres);
+    // A size of the file's own, the second of its doubles.
+    let own = [[3076, 0, 32767], [3077, 34736, 1]];
+    assert_units(&with_keys(&own, &[7.0, 0.01]), [0.01; 2], metres);
+    // Heights of NAVD88 in metres, and in feet, over a projection in the other.
+    assert_units(&with_keys(&[[3076, 0, 9002], [4096, 0, 5703]], &[]), [0.3048, 1.0], metres);
+    assert_units(&with_keys(&[[3076, 0, 9001], [4096, 0, 6360]], &[]), [1.0, US_FOOT_M], metres);
+    assert_units(&with_keys(&[[3076, 0, 9001], [4096, 0, 6360], [4099, 0, 9001]], &[]), [1.0; 2], "");
+    assert_units(
+        &with_keys(&[[3076, 0, 9999]], &[]),
+        [1.0; 2],
+        "the unit of x and y, EPSG:9999, is not known",
+    );
+    assert_units(
+        &with_keys(&[[3076, 0, 9001], [4099, 0, 9999]], &[]),
+        [1.0; 2],
+        "the unit of z, EPSG:9999, is not known; one of 1 m is assumed",
+    );
+}
+
+#[test]
+fn coordinates_that_look_like_degrees_or_millimetres_are_remarked() {
+    let hint = |las: &Las| units(las).1;
+    let degrees = Las { scales: [1e-7, 1e-7, 0.01], offsets: [7.1, 50.7, 60.0], ..Las::new(2, 1, 400) };
+    let remark = hint(&degrees);
+    assert!(
+        remark.starts_with("x and y look like degrees (7.1") && remark.contains("in steps of 0.0000001"),
+        "{remark}"
+    );
+    // All axes in the same steps: heights are metres all the same.
+    let narrow = Las { scales: [1e-7, 1e-7, 1e-7], offsets: [-77.03, 38.9, 12.0], ..Las::new(2, 1, 400) };
+    assert_eq!(hint(&narrow), "", "a cloud of a millimetre in fine steps");
+    let millimetres = Las { scales: [1.0; 3], offsets: [0.0; 3], points: 40_000, ..Las::new(2, 0, 40_000) };
+    let remark = hint(&millimetres);
+    assert!(remark.contains("if they are millimetres or feet"), "{remark}");
+    // A named system says what the numbers are, and metres near zero are metres.
+    let named = Las {
+        scales: degrees.scales,
+        offsets: degrees.offsets,
+        ..with_wkt("PROJCS[\"a\",UNIT[\"metre\",1]]")
+    };
+    assert_eq!(hint(&named), "");
+    assert_eq!(hint(&Las { offsets: [7.1, 50.7, 60.0], ..Las::new(2, 1, 400) }), "");
+}
