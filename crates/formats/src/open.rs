@@ -13,7 +13,7 @@ use crate::read::one::OneCloud;
 use crate::read::regular::check_regular;
 use crate::read_options::ReadOptions;
 use crate::registry::Registry;
-use crate::scans::ScanSource;
+use crate::scans::{GuardedScans, ScanSource};
 use std::path::Path;
 use voxtile::{Error, Result};
 
@@ -48,6 +48,10 @@ impl Registry {
     ///
     /// As for [`open_scans`].
     pub fn open_scans(&self, path: &Path, options: &ReadOptions) -> Result<Box<dyn ScanSource + Send>> {
+        GuardedScans::open(path, || self.open_unguarded(path, options))
+    }
+
+    fn open_unguarded(&self, path: &Path, options: &ReadOptions) -> Result<Box<dyn ScanSource + Send>> {
         let (path, format) = self.find(path, options)?;
         let has_poses = (format.has_poses)(&path);
         let scans = match format.open {

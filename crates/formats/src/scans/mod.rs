@@ -1,6 +1,7 @@
 //! Scans as a build takes them: points in memory or in a file, a pose, and what identifies them.
 
 mod fingerprint;
+mod guarded_scans;
 mod point_store;
 mod scan_chain;
 mod scan_reach;
@@ -11,6 +12,7 @@ mod source;
 mod stored_scan;
 
 pub(crate) use fingerprint::Fingerprint;
+pub(crate) use guarded_scans::GuardedScans;
 pub use point_store::{PointRoom, PointStore};
 pub use scan_chain::{ScanChain, ScanMark};
 pub use scan_reach::ScanReach;
