@@ -124,6 +124,7 @@ pub fn export_options(
     options.z_min_m = keywords.number("z_min")?;
     options.z_max_m = keywords.number("z_max")?;
     options.cell_m = keywords.number("cell")?;
+    options.is_quantized = keywords.flag("quantize")?;
     options.region = region(py, &mut keywords, "region")?;
     let origin = keywords.numbers("origin")?;
     options.origin_m = origin.map(|numbers| point_of("origin", &numbers)).transpose().map_err(raised)?;

@@ -2,6 +2,7 @@ use crate::args::{ExportArgs, WhatName};
 use crate::json;
 use crate::part::{point_of, region_of};
 use crate::progress::at_terminal;
+use crate::quiet::summary_out;
 use crate::stop_signal;
 use indicatif::HumanCount;
 use serde::Serialize;
@@ -14,12 +15,12 @@ use voxtile_pipeline::{
     ExportOptions, ExportSummary, ExportedScans, POSES_NAME, WhichVoxels, Written, export, export_scans,
 };
 
-/// Writes the file and says what it is; on standard error, unless `is_quiet`, where standard output is the file.
+/// Writes the file and says what it is unless `is_quiet`; on standard error where standard output is the file.
 pub fn run(args: &ExportArgs, is_quiet: bool) -> anyhow::Result<ExitCode> {
     let watch = at_terminal(stop_signal::catch_unfinished()?);
     if let Some(folder) = &args.scans {
         let exported = export_scans(&args.map, folder, &watch)?;
-        print(args, &exported, &text_of_scans(&exported, folder), &mut io::stdout().lock())?;
+        print(args, &exported, &text_of_scans(&exported, folder), &mut summary_out(args.json))?;
         return Ok(ExitCode::SUCCESS);
     }
     let options = options_of(args)?;
@@ -31,7 +32,7 @@ pub fn run(args: &ExportArgs, is_quiet: bool) -> anyhow::Result<ExitCode> {
     let summary = export(&options, &watch)?;
     let text = text_of(&summary);
     if !is_stream {
-        print(args, &summary, &text, &mut io::stdout().lock())?;
+        print(args, &summary, &text, &mut summary_out(args.json))?;
     } else if args.json || !is_quiet {
         print(args, &summary, &text, &mut io::stderr().lock())?;
     }
@@ -50,6 +51,7 @@ fn options_of(args: &ExportArgs) -> voxtile::Result<ExportOptions> {
     options.z_min_m = args.z_min;
     options.z_max_m = args.z_max;
     options.cell_m = args.cell;
+    options.is_quantized = args.quantize;
     options.region = args.region.as_deref().map(region_of).transpose()?;
     options.origin_m = args.origin.as_deref().map(point_of);
     options.memory_bytes = args.memory.map_or(options.memory_bytes, |bytes| bytes.as_u64() as usize);

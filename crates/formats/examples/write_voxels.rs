@@ -1,7 +1,7 @@
 //! Writes voxels of a table in a format of another program.
 //!
 //! ```text
-//! write_voxels FORMAT VOXELS.csv OUTPUT [--resolution M] [--origin X Y Z] [--subtract X Y Z]
+//! write_voxels FORMAT VOXELS.csv OUTPUT [--resolution M] [--origin X Y Z] [--subtract X Y Z] [--quantize]
 //! ```
 //!
 //! A line of the table is `ix,iy,iz,log_odds,count`; tiles have 32 voxels along an edge.
@@ -19,6 +19,7 @@ struct Arguments {
     resolution_m: f64,
     origin_m: [f64; 3],
     subtract_m: [f64; 3],
+    is_quantized: bool,
 }
 
 fn main() -> ExitCode {
@@ -56,6 +57,7 @@ fn run() -> Result<(), Box<dyn std::error::Error>> {
     let mut options = WriteOptions::beside(&arguments.output);
     options.crs = Some("LOCAL_CS[\"voxels\",UNIT[\"metre\",1]]".to_owned());
     options.origin_m = arguments.subtract_m;
+    options.is_quantized = arguments.is_quantized;
     options.stamp_ns = 1_700_000_000_123_456_789;
     let mut sink = arguments.format.open(&head, &arguments.output, &options)?;
     for row in &rows {
@@ -71,8 +73,9 @@ fn arguments() -> Result<Arguments, String> {
     let name = word("FORMAT")?;
     let format = *OutputFormats::default().of_name(&name).ok_or_else(|| format!("{name} is no format"))?;
     let (table, output) = (word("VOXELS.csv")?.into(), Path::new(&word("OUTPUT")?).to_owned());
+    let (origin_m, subtract_m) = ([0.0; 3], [0.0; 3]);
     let mut arguments =
-        Arguments { format, table, output, resolution_m: 0.1, origin_m: [0.0; 3], subtract_m: [0.0; 3] };
+        Arguments { format, table, output, resolution_m: 0.1, origin_m, subtract_m, is_quantized: false };
     let mut rest: Vec<String> = words.collect();
     rest.reverse();
     while let Some(option) = rest.pop() {
@@ -83,6 +86,7 @@ fn arguments() -> Result<Arguments, String> {
         match option.as_str() {
             "--resolution" => arguments.resolution_m = number()?,
             "--origin" => arguments.origin_m = [number()?, number()?, number()?],
+            "--quantize" => arguments.is_quantized = true,
             "--subtract" => arguments.subtract_m = [number()?, number()?, number()?],
             _ => return Err(format!("{option} is no option")),
         }

@@ -92,6 +92,7 @@ class ExportOptions(TypedDict, total=False):
     z_min: float | None
     z_max: float | None
     cell: float | None
+    quantize: bool
     region: _Corners | None
     origin: Sequence[float] | None
     memory: int | str

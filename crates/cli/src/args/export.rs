@@ -42,6 +42,10 @@ pub struct ExportArgs {
     /// autoware: edge of the square of a file, in whole metres [default: 20]
     #[arg(long, value_name = "M")]
     pub cell: Option<f64>,
+    /// .glb: positions as 16-bit numbers (KHR_mesh_quantization) where these suffice, for a fifth less of a file;
+    /// Open3D and other programs misread them
+    #[arg(long)]
+    pub quantize: bool,
     /// Only voxels whose center is in this box: X0 <= x < X1 and so on, in metres
     #[arg(long, value_names = ["X0", "Y0", "Z0", "X1", "Y1", "Z1"], num_args = 6)]
     pub region: Option<Vec<f64>>,

@@ -721,6 +721,7 @@ fn output_formats_are_the_same_in_help_pages_and_python() {
     assert!(about("--z-min <M>").trim_start().starts_with(&heights), "{heights}");
     assert!(about("--z-max <M>").trim_start().starts_with(&heights), "{heights}");
     assert!(about("--cell <M>").trim_start().starts_with(&takers(OutputOption::Cell).join(", ")));
+    assert!(about("--quantize").trim_start().starts_with(&takers(OutputOption::Quantized).join(", ")));
 
     let page = fs::read_to_string(repository("docs/formats.md")).unwrap();
     let (_, page) = page.split_once("\n## Out\n").unwrap();
@@ -739,6 +740,7 @@ fn output_formats_are_the_same_in_help_pages_and_python() {
         ("--region", but(OutputOption::Region)),
         ("--z-min`, `--z-max", quoted(takers(OutputOption::Heights))),
         ("--cell", quoted(takers(OutputOption::Cell))),
+        ("--quantize", quoted(takers(OutputOption::Quantized))),
         ("--origin", quoted(names(&|format| format.origin != Origin::Map, &end))),
         ("-o -` (standard output)", quoted(streams)),
     ] {

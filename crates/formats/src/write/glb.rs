@@ -27,6 +27,7 @@ pub(super) struct GlbSink {
     crs: Option<String>,
     scratch_folder: PathBuf,
     colour_heights_m: Option<[f64; 2]>,
+    is_quantized: bool,
     places: ExternalSort<RECORD_BYTES>,
     lattice: Option<Lattice>,
     least: [i32; 3],
@@ -36,8 +37,9 @@ pub(super) struct GlbSink {
 /// How a vertex is written.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum VertexKind {
-    /// Numbers of 16 bit, as far as they reach.
+    /// Whole numbers of 16 bits, which need the extension `KHR_mesh_quantization`.
     Short,
+    /// Whole numbers in single precision: exact up to 2^24.
     Single,
 }
 
@@ -64,6 +66,7 @@ impl GlbSink {
             crs: options.crs.clone(),
             scratch_folder: options.scratch_folder.clone(),
             colour_heights_m: options.colour_heights_m,
+            is_quantized: options.is_quantized,
             places: ExternalSort::new(&options.scratch_folder),
             lattice: None,
             least: [i32::MAX; 3],
@@ -119,15 +122,26 @@ impl VoxelSink for GlbSink {
     }
 
     fn finish(self: Box<Self>) -> Result<()> {
-        let Self { mut out, head, crs, scratch_folder, colour_heights_m, places, lattice, least, most } =
-            *self;
+        let Self {
+            mut out,
+            head,
+            crs,
+            scratch_folder,
+            colour_heights_m,
+            is_quantized,
+            places,
+            lattice,
+            least,
+            most,
+        } = *self;
         let size: [i64; 3] = std::array::from_fn(|k| (i64::from(most[k]) - i64::from(least[k]) + 1).max(0));
         let longest = size.iter().copied().max().unwrap_or(0);
         if longest > 1 << 24 {
             let reason = format!("{longest} voxels along a side are more than single precision tells apart");
             return Err(Error::argument("GLB", format!("{reason}; choose a region")));
         }
-        let kind = if longest <= i64::from(u16::MAX) { VertexKind::Short } else { VertexKind::Single };
+        let is_short = is_quantized && longest <= i64::from(u16::MAX);
+        let kind = if is_short { VertexKind::Short } else { VertexKind::Single };
         let corner_m = lattice.map_or([0.0; 3], |lattice| lattice.corner_m(least.map(i64::from)));
         let mut mesh = Mesh {
             vertices: Spool::new(&scratch_folder)?,
@@ -265,10 +279,10 @@ mod tests {
     use std::collections::HashSet;
 
     /// Unit faces of a file: the middle of each, doubled, with its direction.
-    fn faces(rows: &[VoxelRow]) -> Vec<([i64; 3], [i64; 3])> {
+    fn faces(rows: &[VoxelRow], is_quantized: bool) -> Vec<([i64; 3], [i64; 3])> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.glb");
-        let options = WriteOptions::beside(&path);
+        let options = WriteOptions { is_quantized, ..WriteOptions::beside(&path) };
         let mut sink = Box::new(GlbSink::create(&head_of(rows), &path, &options).unwrap());
         rows.iter().for_each(|row| sink.put(row).unwrap());
         sink.finish().unwrap();
@@ -284,9 +298,14 @@ mod tests {
         let top = (top / 0.5).round() as i64;
         let count = json["accessors"][0]["count"].as_u64().unwrap() as usize;
         let start = 20 + u32_at(12) + 8;
+        assert_eq!(json["extensionsRequired"].is_array(), is_quantized);
+        assert_eq!(json["accessors"][0]["componentType"], if is_quantized { 5123 } else { 5126 });
         let vertex = |k: usize| {
-            let at = |n: usize| {
-                i64::from(bytes[start + 12 * k + 2 * n]) + 256 * i64::from(bytes[start + 12 * k + 2 * n + 1])
+            let at = |n: usize| match is_quantized {
+                true => {
+                    i64::from(u16::from_le_bytes(*bytes[start + 12 * k + 2 * n..].first_chunk().unwrap()))
+                }
+                false => f32::from_le_bytes(*bytes[start + 16 * k + 4 * n..].first_chunk().unwrap()) as i64,
             };
             [origin[0] + at(0), top - at(2), origin[2] + at(1)]
         };
@@ -371,8 +390,10 @@ mod tests {
                 }
             }
         }
-        let found = faces(&rows);
-        assert_eq!(found.len(), expected.len());
-        assert_eq!(found.into_iter().collect::<HashSet<_>>(), expected);
+        for is_quantized in [false, true] {
+            let found = faces(&rows, is_quantized);
+            assert_eq!(found.len(), expected.len());
+            assert_eq!(found.into_iter().collect::<HashSet<_>>(), expected);
+        }
     }
 }

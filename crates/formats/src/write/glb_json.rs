@@ -3,7 +3,8 @@ use serde_json::{Value, json};
 
 /// The head of a glTF file: one mesh, its buffer, and where it is in the world.
 ///
-/// Vertices are whole numbers of voxels; the node's scale and translation, in double precision, make them metres.
+/// Vertices are whole numbers of voxels, exact in single precision too; the node's scale and translation, in double
+/// precision, make them metres.
 pub(super) fn of(surface: &Surface) -> Value {
     let asset =
         json!({ "version": "2.0", "generator": concat!("voxtile-clouds ", env!("CARGO_PKG_VERSION")) });

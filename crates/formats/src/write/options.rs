@@ -24,6 +24,9 @@ pub struct WriteOptions {
     pub origin_m: [f64; 3],
     /// Meshes: the heights of the first and the last colour, in metres; of the lowest and highest voxel if not given.
     pub colour_heights_m: Option<[f64; 2]>,
+    /// Meshes: positions are numbers of 16 bits where these suffice (`KHR_mesh_quantization`), which not every program
+    /// reads.
+    pub is_quantized: bool,
     /// Recordings: the frame of the clouds.
     pub frame: String,
     /// Recordings: the time of the clouds, in nanoseconds since 1970.
@@ -47,6 +50,7 @@ impl WriteOptions {
             cell_m: 20.0,
             origin_m: [0.0; 3],
             colour_heights_m: None,
+            is_quantized: false,
             frame: "map".to_owned(),
             stamp_ns: 0,
         }

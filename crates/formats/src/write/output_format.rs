@@ -43,6 +43,8 @@ pub enum OutputOption {
     Heights,
     /// The edge of the square of a file.
     Cell,
+    /// Positions as numbers of 16 bits.
+    Quantized,
 }
 
 /// Where the coordinates of a file may begin.

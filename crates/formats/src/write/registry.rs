@@ -1,4 +1,4 @@
-use super::output_format::OutputOption::{Cell, Heights, Region, Which};
+use super::output_format::OutputOption::{Cell, Heights, Quantized, Region, Which};
 use super::*;
 use std::path::Path;
 use voxtile::octree::OctreeFormat;
@@ -103,12 +103,15 @@ const TABLE: [OutputFormat; 18] = [
 
 impl OutputFormat {
     /// The surface of occupied voxels as binary glTF, which 3D Tiles are made of, too.
-    pub const GLB: Self = row(
-        "glb",
-        Some("glb"),
-        "The surface of occupied voxels as binary glTF, Y-up",
-        files!(glb::GlbSink::create),
-    );
+    pub const GLB: Self = Self {
+        takes: &[Region, Which, Quantized],
+        ..row(
+            "glb",
+            Some("glb"),
+            "The surface of occupied voxels as binary glTF, Y-up",
+            files!(glb::GlbSink::create),
+        )
+    };
 }
 
 /// The formats that maps are written in.

@@ -21,6 +21,7 @@ pub(super) fn export(export: &Export<'_>) -> anyhow::Result<ExportSummary> {
         how.crs.clone_from(&map.config().crs);
         how.companion_folder = staged.folder().to_owned();
         (how.z_min_m, how.z_max_m) = (options.z_min_m, options.z_max_m);
+        how.is_quantized = options.is_quantized;
         how.cell_m = options.cell_m.unwrap_or(how.cell_m);
         how.origin_m = options.origin_m.unwrap_or_default();
         let mut sink = export.format.open(&head, &staged.path()?, &how)?;

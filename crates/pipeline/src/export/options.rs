@@ -23,6 +23,8 @@ pub struct ExportOptions {
     pub z_max_m: Option<f64>,
     /// Autoware: edge of the square of a file, in whole metres: 20.
     pub cell_m: Option<f64>,
+    /// Meshes: positions as numbers of 16 bits (`KHR_mesh_quantization`) in place of 32. Not every program reads them.
+    pub is_quantized: bool,
     /// Only voxels whose center is in this box are written.
     pub region: Option<Aabb>,
     /// The file's coordinates are those of the map less this, in metres: 0 0 0. The nearest corner of a voxel counts,
@@ -57,6 +59,7 @@ impl ExportOptions {
             z_min_m: None,
             z_max_m: None,
             cell_m: None,
+            is_quantized: false,
             region: None,
             origin_m: None,
             memory_bytes: 64 << 20,
@@ -121,6 +124,7 @@ impl ExportOptions {
             (OutputOption::Which, self.which.is_some(), which),
             (OutputOption::Heights, has_heights, "z_min, z_max"),
             (OutputOption::Cell, self.cell_m.is_some(), "cell"),
+            (OutputOption::Quantized, self.is_quantized, "quantize"),
         ];
         let (name, refusal) = (format.name, format.refusal);
         for (option, _, argument) in given.into_iter().filter(|&(_, is_given, _)| is_given) {
