@@ -1,5 +1,6 @@
 use crate::build_config::{config_to_create, config_to_go_on};
 use crate::build_options::BuildOptions;
+use crate::failed_flush::FailedFlush;
 use crate::flush_schedule::FlushSchedule;
 use crate::intake::{Intake, Next, RayNeeds, Taken};
 use crate::pose_check::{Doubt, PoseCheck, check_ahead};
@@ -59,7 +60,7 @@ pub fn build(options: &BuildOptions, watch: &Watch) -> anyhow::Result<Option<Sum
     let needs = RayNeeds { grid: config.grid, sensor_model: config.sensor_model };
     let mut intake =
         Intake::new(reader, options.scans.clone(), options.skip_bad, (!options.no_rays).then_some(needs));
-    let mut mapper = match exists {
+    let mut opened_map = match exists {
         true => Some(OutOfCoreTileMapper::open(place_of_map(options), config.clone())?),
         false => None,
     };
@@ -67,7 +68,7 @@ pub fn build(options: &BuildOptions, watch: &Watch) -> anyhow::Result<Option<Sum
         return Ok(None);
     }
     let crs = intake.crs();
-    let mapper = match &mut mapper {
+    let mapper = match &mut opened_map {
         Some(mapper) => {
             check_crs(options, crs.as_ref(), config.crs.as_ref())?;
             mapper
@@ -113,7 +114,7 @@ pub fn build(options: &BuildOptions, watch: &Watch) -> anyhow::Result<Option<Sum
     let outcome = build.insert_all();
     build.gauge.say("flushing");
     // What was accepted is kept, whatever ended the build.
-    let flushed = build.mapper.flush().map_err(|error| say_what_is_safe(error, build.mapper));
+    let flushed = build.mapper.flush();
     let Build { report, scans, mut intake, gauge, doubt, .. } = build;
     drop(gauge);
     let mut remarks = intake.remarks();
@@ -121,13 +122,20 @@ pub fn build(options: &BuildOptions, watch: &Watch) -> anyhow::Result<Option<Sum
     remarks.extend(doubt.map(|doubt| doubt.remark()));
     remarks.extend(all_is_cut(&report, mapper.config()));
     remarks.iter().for_each(|remark| log::warn!("{remark}"));
-    match (outcome, flushed) {
-        (Err(error), Ok(())) => {
-            let all = resumed_after + scans;
-            return Err(error.context(format!("after {all} scans, which are in the map")));
-        }
-        (Err(error), Err(flush_error)) => return Err(error.context(format!("{flush_error:#}; before that"))),
-        (Ok(()), flushed) => flushed?,
+    if let Err(flush_error) = flushed {
+        let (config, scan_number) = (mapper.config().clone(), mapper.flushed_scan_number());
+        let (is_new, is_piece) = (!exists, options.piece_of.is_some());
+        let failed = FailedFlush { folder: &options.output, config, scan_number, is_new, is_piece };
+        drop(opened_map);
+        let flush_error = failed.clean(flush_error);
+        return Err(match outcome {
+            Ok(()) => flush_error,
+            Err(error) => error.context(format!("{flush_error:#}; before that")),
+        });
+    }
+    if let Err(error) = outcome {
+        let all = resumed_after + scans;
+        return Err(error.context(format!("after {all} scans, which are in the map")));
     }
     let interrupted = stop.is_set();
     let summary = Summary::of(&options.output, scans, report, mapper, started.elapsed())?;
@@ -294,16 +302,6 @@ fn flush_if(
     }
     schedule.flushed();
     Ok(())
-}
-
-/// After a flush that failed: what a user can rely on.
-fn say_what_is_safe(error: Error, mapper: &OutOfCoreTileMapper) -> anyhow::Error {
-    let (folder, scan_number) = (mapper.folder(), mapper.flushed_scan_number());
-    anyhow::Error::new(error).context(format!(
-        "{}: the map is as of scan {scan_number}; once the cause is gone, the same command with `resume` \
-         goes on from there",
-        folder.display()
-    ))
 }
 
 /// Where the map is made. A piece of a map is made again after a crash, and made durable when it is handed over.

@@ -16,6 +16,7 @@ mod build;
 mod build_config;
 mod build_options;
 mod export;
+mod failed_flush;
 #[cfg(feature = "bucket")]
 mod fetched_source;
 mod flush_schedule;
@@ -45,7 +46,10 @@ pub use export::{
 };
 pub use flush_schedule::FlushEvery;
 pub use kept_source::is_map;
-pub use map_at::{AnyMap, MapAt, open_any_map, read_all_maps, read_any_map, read_map, read_maps, whole_map};
+pub use map_at::{
+    AnyMap, MapAt, check_is_no_file, open_any_map, read_all_maps, read_any_map, read_map, read_maps,
+    whole_map,
+};
 pub use new_poses::{PoseFile, poses_for};
 pub use scan_input::{is_standard_input, open as open_scans};
 pub use scan_place::LocalScans;

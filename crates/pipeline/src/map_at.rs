@@ -40,20 +40,29 @@ impl MapAt {
     ///
     /// As for [`MapReader::open`]; a file.
     pub fn open(&self) -> Result<MapReader> {
-        if OctreeMap::is_named_by(&self.map) {
-            let reason = "is a file of OctoMap, which this command does not take; make a map of it with `voxtile import`";
-            return Err(Error::argument(self.map.display().to_string(), reason));
-        }
-        if self.map.is_file() {
-            let reason =
-                "is a file, and none of OctoMap; a map is a folder, which `voxtile build` or `import` makes";
-            return Err(Error::argument(self.map.display().to_string(), reason));
-        }
+        check_is_no_file(&self.map)?;
         match &self.snapshot {
             Some(name) => MapReader::open_snapshot(place_of(&self.map)?, name, TILES_BYTES),
             None => MapReader::open(place_of(&self.map)?, TILES_BYTES),
         }
     }
+}
+
+/// A map is a folder; a file of OctoMap is another form of one.
+///
+/// # Errors
+///
+/// [`Error::InvalidArgument`] for a file.
+pub fn check_is_no_file(map: &Path) -> Result<()> {
+    let reason = if OctreeMap::is_named_by(map) {
+        "is a file of OctoMap, which this command does not take: `voxtile import` makes a map of it; info, query, raycast, \
+         digest, export, picture and view take the file itself"
+    } else if map.is_file() {
+        "is a file, and none of OctoMap; a map is a folder, which `voxtile build` or `import` makes"
+    } else {
+        return Ok(());
+    };
+    Err(Error::argument(map.display().to_string(), reason))
 }
 
 /// The two parts of `MAP@SNAPSHOT`, where nothing has that as its own name.
@@ -139,9 +148,10 @@ impl MapView for AnyMap {
 ///
 /// # Errors
 ///
-/// [`Error::InvalidArgument`] for `MAP@SNAPSHOT` where there is a map at `MAP`, and for a URL.
+/// [`Error::InvalidArgument`] for `MAP@SNAPSHOT` where there is a map at `MAP`, for a URL, and for a file.
 pub fn whole_map(path: &Path) -> Result<&Path> {
     check_is_folder(path)?;
+    check_is_no_file(path)?;
     if let Some((map, _)) = named_snapshot(path)
         && map.join("metadata.json").exists()
     {

@@ -1,0 +1,86 @@
+use std::fs;
+use std::io::ErrorKind;
+use std::path::Path;
+use voxtile::mapper::OutOfCoreTileMapper;
+use voxtile::{Error, MapConfig, Storage};
+
+/// The map of a flush that failed.
+pub(crate) struct FailedFlush<'a> {
+    pub folder: &'a Path,
+    pub config: MapConfig,
+    /// The scans of its last flush that did not fail.
+    pub scan_number: u64,
+    /// Whether this build made the map.
+    pub is_new: bool,
+    /// A piece of a map is made again as a whole.
+    pub is_piece: bool,
+}
+
+const GONE: &str = "no scan was flushed, and the new map was removed";
+/// The files of a map without scans.
+const EMPTY_MAP: [&str; 3] = ["metadata.json", "commits.log", "writer.lock"];
+
+impl FailedFlush<'_> {
+    /// Removes what the flush left, of a new map all, once the map is closed. Returns the error with what a user can
+    /// rely on.
+    pub fn clean(self, error: Error) -> anyhow::Error {
+        let hint = match self.config.storage {
+            Storage::OctoMap if is_full(&error) => {
+                "a map with `storage` compact takes about a thirtieth of the room"
+            }
+            _ => "",
+        };
+        let is_gone = self.remove_leftovers();
+        let Self { folder, scan_number, .. } = self;
+        let folder = folder.display();
+        let context = match (is_gone, hint) {
+            (true, "") => format!("{folder}: {GONE}; repeat the command once the cause is gone"),
+            (true, hint) => format!("{folder}: {GONE}; free disk space, or: {hint}"),
+            (false, _) => {
+                let hint = if hint.is_empty() { String::new() } else { format!("; {hint}") };
+                format!(
+                    "{folder}: the map is as of scan {scan_number}; once the cause is gone, the same command with \
+                     `resume` goes on from there{hint}"
+                )
+            }
+        };
+        anyhow::Error::new(error).context(context)
+    }
+
+    /// Returns whether the map is gone.
+    fn remove_leftovers(&self) -> bool {
+        if self.is_piece {
+            return false;
+        }
+        // Opening the map removes what was not committed.
+        let reopened = OutOfCoreTileMapper::open(self.folder, self.config.clone());
+        let is_open = reopened.inspect_err(|error| log::debug!("{error:#}")).is_ok();
+        is_open && self.is_new && self.scan_number == 0 && remove_empty_map(self.folder)
+    }
+}
+
+/// Removes a map that has no more than its own files. Returns whether it is gone.
+fn remove_empty_map(folder: &Path) -> bool {
+    let is_own = |name: &std::ffi::OsStr| EMPTY_MAP.iter().any(|own| name == *own);
+    let Ok(entries) = fs::read_dir(folder) else { return false };
+    let are_own = entries.into_iter().all(|entry| entry.is_ok_and(|entry| is_own(&entry.file_name())));
+    if !are_own {
+        return false;
+    }
+    let is_removed = EMPTY_MAP.iter().all(|name| match fs::remove_file(folder.join(name)) {
+        Err(error) => error.kind() == ErrorKind::NotFound,
+        Ok(()) => true,
+    });
+    // A folder that is a mount point stays.
+    let _ = fs::remove_dir(folder);
+    is_removed
+}
+
+/// Whether a disk, or what a user may take of it, is full.
+fn is_full(error: &Error) -> bool {
+    let kind = match error {
+        Error::Io { cause, .. } => cause.kind(),
+        _ => return false,
+    };
+    matches!(kind, ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge)
+}
