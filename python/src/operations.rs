@@ -9,11 +9,12 @@ use pyo3::prelude::*;
 use serde::Serialize;
 use std::fs::File;
 use std::io::BufReader;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use voxtile::integrity::VerifyScope;
 use voxtile::mapper::{MapReader, MapView, OctreeMap};
 use voxtile::operations::{self, Decay, Part, Prefer};
 use voxtile::{Error, MapPath, MemoryLimit, Result, SnapshotName, Stop, TileIndex, integrity, octree};
+use voxtile_pipeline::check_is_no_file;
 
 /// A map, or a snapshot of it as a tuple with its name.
 #[derive(FromPyObject)]
@@ -27,12 +28,19 @@ pub enum MapOrSnapshot {
 impl MapOrSnapshot {
     pub fn open(&self) -> Result<MapReader> {
         match self {
-            Self::Map(path) => MapReader::open(path, MemoryLimit::DEFAULT_BYTES),
-            Self::Snapshot(path, name) => {
-                MapReader::open_snapshot(path, &SnapshotName::new(name)?, MemoryLimit::DEFAULT_BYTES)
-            }
+            Self::Map(path) => MapReader::open(folder_of(path)?, MemoryLimit::DEFAULT_BYTES),
+            Self::Snapshot(path, name) => MapReader::open_snapshot(
+                folder_of(path)?,
+                &SnapshotName::new(name)?,
+                MemoryLimit::DEFAULT_BYTES,
+            ),
         }
     }
+}
+
+/// The folder of a map, and no file.
+pub fn folder_of(map: &Path) -> Result<&Path> {
+    check_is_no_file(map).map(|()| map)
 }
 
 pub type Callback = Option<Py<PyAny>>;
@@ -58,14 +66,14 @@ fn part_of(region: &Bound<'_, PyAny>, outside: bool) -> PyResult<Part> {
 /// The snapshots of a map, by flush and then by name: a list of dicts.
 #[pyfunction]
 pub fn snapshots<'py>(py: Python<'py>, map: PathBuf) -> PyResult<Bound<'py, PyAny>> {
-    told(py, None, |_, _| operations::snapshots(&map))
+    told(py, None, |_, _| operations::snapshots(folder_of(&map)?))
 }
 
 /// Deletes a snapshot; what it alone kept is freed.
 #[pyfunction]
 pub fn delete_snapshot(py: Python<'_>, map: PathBuf, name: &str) -> PyResult<()> {
     let name = name_of(py, name)?;
-    watched_with_progress(py, None, |_, _| operations::delete_snapshot(&map, &name))
+    watched_with_progress(py, None, |_, _| operations::delete_snapshot(folder_of(&map)?, &name))
 }
 
 /// Compares two maps, or snapshots `(map, name)`: a dict of sums, with a list of the tiles that differ in
@@ -103,7 +111,7 @@ pub fn revert<'py>(
 ) -> PyResult<Bound<'py, PyAny>> {
     let (name, keep_as) = (name_of(py, name)?, keep_as.map(|name| name_of(py, name)).transpose()?);
     told(py, progress, |_, progress| {
-        operations::revert(&map, &name, keep_as.as_ref(), |done, all| progress.tell(done, all))
+        operations::revert(folder_of(&map)?, &name, keep_as.as_ref(), |done, all| progress.tell(done, all))
     })
 }
 
@@ -298,7 +306,9 @@ pub fn clear<'py>(
     progress: Callback,
 ) -> PyResult<Bound<'py, PyAny>> {
     let part = part_of(region, outside)?;
-    told(py, progress, |_, progress| operations::clear(&map, &part, |done, all| progress.tell(done, all)))
+    told(py, progress, |_, progress| {
+        operations::clear(folder_of(&map)?, &part, |done, all| progress.tell(done, all))
+    })
 }
 
 /// Lets evidence fade: log-odds halve in so many scans. `scans` is how many have passed, those since the last decay
@@ -315,7 +325,9 @@ pub fn decay<'py>(
 ) -> PyResult<Bound<'py, PyAny>> {
     let mut how = Decay::new(halflife_scans).with_forget_below(forget_below);
     how.scans = scans;
-    told(py, progress, |_, progress| operations::decay(&map, &how, |done, all| progress.tell(done, all)))
+    told(py, progress, |_, progress| {
+        operations::decay(folder_of(&map)?, &how, |done, all| progress.tell(done, all))
+    })
 }
 
 /// Checks every file of a map: a dict of sums, with a list of what was found in `"findings"`. The map is whole if
@@ -342,7 +354,7 @@ pub fn verify<'py>(
     let mut findings = Vec::new();
     let sums = told(py, progress, |_, progress| {
         integrity::verify_scope(
-            &map,
+            folder_of(&map)?,
             &scope,
             |finding| findings.push(finding.clone()),
             |done, all| progress.tell(done, all),
@@ -358,7 +370,11 @@ pub fn verify<'py>(
 pub fn repair<'py>(py: Python<'py>, map: PathBuf, progress: Callback) -> PyResult<Bound<'py, PyAny>> {
     let mut done = Vec::new();
     let sums = told(py, progress, |_, progress| {
-        integrity::repair(&map, |action| done.push(action.clone()), |done, all| progress.tell(done, all))
+        integrity::repair(
+            folder_of(&map)?,
+            |action| done.push(action.clone()),
+            |done, all| progress.tell(done, all),
+        )
     })?;
     sums.set_item("done", object(py, &done)?)?;
     Ok(sums)

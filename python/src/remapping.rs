@@ -3,7 +3,7 @@
 use crate::config::{memory_of, storage_of};
 use crate::errors::{exception_of_kind, wrong};
 use crate::map::region_of;
-use crate::operations::{Callback, MapOrSnapshot, name_of, told};
+use crate::operations::{Callback, MapOrSnapshot, folder_of, name_of, told};
 use crate::pose::pose_of;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -53,7 +53,9 @@ pub fn remap<'py>(
     let tolerance = tolerance.map(|(moved_m, turned_deg)| (moved_m, turned_deg.to_radians()));
     told(py, progress, |stop, progress| {
         let how = Remap::new(how.with_stop(stop.clone())).with_tolerance(tolerance);
-        operations::remap(&KeptSummary::read(&map)?, &poses, &how, |done, all| progress.tell(done, all))
+        operations::remap(&KeptSummary::read(folder_of(&map)?)?, &poses, &how, |done, all| {
+            progress.tell(done, all)
+        })
     })
 }
 
@@ -137,7 +139,9 @@ pub fn remove_scans<'py>(
     let how = rework_of(py, keep_as, dry_run, memory.as_ref())?;
     let report = told(py, progress, |stop, progress| {
         let how = how.with_stop(stop.clone());
-        operations::remove_scans(&map, &selection, from_snapshots, &how, |done, all| progress.tell(done, all))
+        operations::remove_scans(folder_of(&map)?, &selection, from_snapshots, &how, |done, all| {
+            progress.tell(done, all)
+        })
     })?;
     let failed: Vec<Bound<'py, PyAny>> = report.get_item("snapshots_failed")?.extract()?;
     if failed.is_empty() {
@@ -167,6 +171,6 @@ pub fn remove_points<'py>(
     let how = rework_of(py, keep_as, dry_run, memory.as_ref())?;
     told(py, progress, |stop, progress| {
         let how = how.with_stop(stop.clone());
-        operations::remove_points(&map, &region, &how, |done, all| progress.tell(done, all))
+        operations::remove_points(folder_of(&map)?, &region, &how, |done, all| progress.tell(done, all))
     })
 }

@@ -199,6 +199,14 @@ def test_export_and_files_of_octomap(city: Path, tmp_path: Path) -> None:
         at = np.random.default_rng(5).uniform(-6, 6, (4000, 3))
         assert np.array_equal(ours.occupancy(at), theirs.occupancy(at))
         assert not theirs.writable
+    for needs_a_folder in (voxtile.verify, voxtile.repair, voxtile.snapshots):
+        with pytest.raises(errors.ArgumentError, match="city.ot: is a file of OctoMap"):
+            needs_a_folder(tmp_path / "city.ot")
+    meshes = [tmp_path / "plain.glb", tmp_path / "quantized.glb"]
+    for mesh, quantize in zip(meshes, [False, True], strict=True):
+        voxtile.export(city, mesh, quantize=quantize)
+        assert (b"KHR_mesh_quantization" in mesh.read_bytes()) is quantize
+    assert meshes[0].stat().st_size > meshes[1].stat().st_size
     voxtile.import_octree(tmp_path / "city.ot", tmp_path / "imported", storage="compact")
     with voxtile.open(tmp_path / "imported") as imported, voxtile.open(city) as ours:
         assert len(imported.occupied()[0]) == len(ours.occupied()[0])

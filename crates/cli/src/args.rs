@@ -45,7 +45,7 @@ pub struct Cli {
     /// Say what is done: -v flushes and the like, -vv each tile that comes and goes. RUST_LOG chooses by module
     #[arg(short, long, global = true, action = clap::ArgAction::Count)]
     pub verbose: u8,
-    /// Say nothing but errors: no warnings, no progress bars
+    /// Print nothing but errors, answers and JSON: no warnings, summaries or progress bars
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     pub quiet: bool,
     /// Fail a bucket request after this many seconds without progress (16 KiB transferred, or an answer); an upload
@@ -119,9 +119,17 @@ pub enum Command {
     /// Copy a map into a bucket of an object store; only what has changed since the last push is sent
     #[cfg(feature = "bucket")]
     Push(PushArgs),
+    /// Not in this build
+    #[cfg(not(feature = "bucket"))]
+    #[command(hide = true, disable_help_flag = true)]
+    Push(LeftOutArgs),
     /// Make a map in a folder of one in a bucket
     #[cfg(feature = "bucket")]
     Pull(PullArgs),
+    /// Not in this build
+    #[cfg(not(feature = "bucket"))]
+    #[command(hide = true, disable_help_flag = true)]
+    Pull(LeftOutArgs),
     /// Check every file of a map for damage; exit code 1 if there is any
     Verify(VerifyArgs),
     /// Do what is possible for a damaged map; what cannot stay goes to quarantine/, nothing is deleted; exit code 1 if
@@ -130,6 +138,10 @@ pub enum Command {
     /// Look at maps in a browser: a server on this machine, and a page that needs no network
     #[cfg(feature = "view")]
     View(ViewArgs),
+    /// Not in this build
+    #[cfg(not(feature = "view"))]
+    #[command(hide = true, disable_help_flag = true)]
+    View(LeftOutArgs),
     /// Run scans through a local map, as a planner needs it: sizes and times in a table, and a picture
     Local(LocalArgs),
     /// Share what is occupied with other robots over a network; runs voxtile-share, which comes separately
@@ -173,15 +185,34 @@ impl Command {
             Self::Push(args) => args.json,
             #[cfg(feature = "bucket")]
             Self::Pull(args) => args.json,
+            #[cfg(not(feature = "bucket"))]
+            Self::Push(args) | Self::Pull(args) => args.is_json(),
             Self::Verify(args) => args.json,
             Self::Repair(args) => args.json,
             #[cfg(feature = "view")]
             Self::View(args) => args.json,
+            #[cfg(not(feature = "view"))]
+            Self::View(args) => args.is_json(),
             Self::Local(args) => args.json,
             Self::Demo(args) => args.json,
             // What voxtile-share is asked for is its own to say.
             Self::Share(_) | Self::Completions(_) | Self::Man(_) => false,
         }
+    }
+}
+
+/// Arguments of a subcommand that this build leaves out.
+#[cfg(not(all(feature = "bucket", feature = "view")))]
+#[derive(Debug, Args)]
+pub struct LeftOutArgs {
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+    arguments: Vec<OsString>,
+}
+
+#[cfg(not(all(feature = "bucket", feature = "view")))]
+impl LeftOutArgs {
+    fn is_json(&self) -> bool {
+        self.arguments.iter().any(|argument| argument == "--json")
     }
 }
 

@@ -2,6 +2,7 @@ use crate::args::ClearArgs;
 use crate::json;
 use crate::part::part_of;
 use crate::progress::Progress;
+use crate::quiet::summary_out;
 use indicatif::HumanCount;
 use serde::Serialize;
 use std::io::Write;
@@ -24,7 +25,7 @@ pub fn run(args: &ClearArgs) -> anyhow::Result<ExitCode> {
     let progress = Progress::over_tiles(0);
     let cleared = clear(whole_map(&args.map)?, &part_of(&args.part)?, |done, all| progress.set(done, all))?;
     drop(progress);
-    let mut out = std::io::stdout().lock();
+    let mut out = summary_out(args.json);
     if args.json {
         let summary = Summary { map: &args.map, cleared, peak_rss_bytes: memory::peak_bytes() };
         json::print(&summary, &mut out)?;

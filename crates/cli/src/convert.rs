@@ -3,6 +3,7 @@ use crate::json;
 use voxtile_pipeline::{read_map, whole_map};
 
 use crate::progress::Progress;
+use crate::quiet::summary_out;
 use crate::written::warn_of_scans_left;
 use indicatif::{HumanBytes, HumanCount};
 use serde::Serialize;
@@ -52,7 +53,7 @@ pub fn run(args: &ConvertArgs) -> anyhow::Result<ExitCode> {
     drop(progress);
     conversion.seconds = started.elapsed().as_secs_f64();
     conversion.peak_rss_bytes = memory::peak_bytes();
-    let mut out = std::io::stdout().lock();
+    let mut out = summary_out(args.json);
     if args.json {
         json::print(&conversion, &mut out)?;
     } else {

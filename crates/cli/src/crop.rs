@@ -4,6 +4,7 @@ use voxtile_pipeline::{read_map, whole_map};
 
 use crate::part::part_of;
 use crate::progress::Progress;
+use crate::quiet::summary_out;
 use crate::written::{print_written, warn_of_scans_left};
 use serde::Serialize;
 use std::path::Path;
@@ -29,7 +30,7 @@ pub fn run(args: &CropArgs) -> anyhow::Result<ExitCode> {
         Ok((written, warn_of_scans_left([map])))
     })?;
     drop(progress);
-    let mut out = std::io::stdout().lock();
+    let mut out = summary_out(args.json);
     if args.json {
         let peak_rss_bytes = memory::peak_bytes();
         let summary = Summary { map: &args.output, written, warnings, peak_rss_bytes };

@@ -1,6 +1,7 @@
 use crate::args::DecayArgs;
 use crate::json;
 use crate::progress::Progress;
+use crate::quiet::summary_out;
 use indicatif::HumanCount;
 use serde::Serialize;
 use std::io::Write;
@@ -25,7 +26,7 @@ pub fn run(args: &DecayArgs) -> anyhow::Result<ExitCode> {
     let progress = Progress::over_tiles(0);
     let decayed = decay(whole_map(&args.map)?, &rule, |done, all| progress.set(done, all))?;
     drop(progress);
-    let mut out = std::io::stdout().lock();
+    let mut out = summary_out(args.json);
     if args.json {
         let summary = Summary { map: &args.map, decayed, peak_rss_bytes: memory::peak_bytes() };
         json::print(&summary, &mut out)?;

@@ -3,6 +3,7 @@ use crate::failure::JsonTo;
 use crate::octree_choice::octree_config;
 use crate::picture::write_png;
 use crate::progress::Progress;
+use crate::quiet::summary_out;
 use crate::run::INTERRUPTED;
 use crate::stop_signal;
 use crate::summary;
@@ -113,7 +114,7 @@ fn draw(args: &DemoArgs, map: &Path, path: &[Point], file: &Path) -> anyhow::Res
 }
 
 fn say_what_next(folder: &Path, map: &Path, picture: &Path, [x, y, z]: Point) -> std::io::Result<()> {
-    let mut out = std::io::stdout().lock();
+    let mut out = summary_out(false);
     let (folder, map) = (folder.display(), map.display());
     writeln!(out, "picture   {}", picture.display())?;
     writeln!(out, "\nWhat to try next:")?;

@@ -1,6 +1,7 @@
 use crate::args::ImportArgs;
 use crate::json;
 use crate::progress::Progress;
+use crate::quiet::summary_out;
 use indicatif::{HumanBytes, HumanCount};
 use serde::Serialize;
 use std::io::Write;
@@ -54,7 +55,7 @@ pub fn run(args: &ImportArgs) -> anyhow::Result<ExitCode> {
         written,
         peak_rss_bytes: memory::peak_bytes(),
     };
-    let mut out = std::io::stdout().lock();
+    let mut out = summary_out(args.json);
     if args.json {
         json::print(&imported, &mut out)?;
     } else {

@@ -34,6 +34,7 @@ mod pull;
 #[cfg(feature = "bucket")]
 mod push;
 mod query;
+mod quiet;
 mod raycast;
 mod read_options;
 mod region_tiles;

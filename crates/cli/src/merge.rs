@@ -3,6 +3,7 @@ use crate::json;
 use voxtile_pipeline::{read_all_maps, whole_map};
 
 use crate::progress::Progress;
+use crate::quiet::summary_out;
 use crate::written::{print_written, warn_of_scans_left};
 use indicatif::HumanCount;
 use serde::Serialize;
@@ -34,7 +35,7 @@ pub fn run(args: &MergeArgs) -> anyhow::Result<ExitCode> {
         log::warn!("{warning}");
         warnings.push(warning);
     }
-    let mut out = std::io::stdout().lock();
+    let mut out = summary_out(args.json);
     if args.json {
         let peak_rss_bytes = memory::peak_bytes();
         let summary = Summary { map: &args.output, merged, warnings, peak_rss_bytes };

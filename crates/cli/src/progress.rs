@@ -1,9 +1,9 @@
 use crate::option_names::with_options;
+use crate::quiet::is_quiet;
 use indicatif::{HumanBytes, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use parking_lot::Mutex;
 use std::io::{self, Write};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use voxtile::mapper::MapStatistics;
 use voxtile::scan::Stop;
 use voxtile_pipeline::memory::resident_bytes;
@@ -27,8 +27,6 @@ pub fn at_terminal(stop: Stop) -> Watch {
     Watch::new(stop, Arc::new(bar))
 }
 
-static ARE_HIDDEN: AtomicBool = AtomicBool::new(false);
-
 /// The bar that was made last, if it is still there.
 static SHOWN: Mutex<Option<ProgressBar>> = Mutex::new(None);
 
@@ -46,11 +44,6 @@ impl Write for AboveBar {
     fn flush(&mut self) -> io::Result<()> {
         io::stderr().flush()
     }
-}
-
-/// Shows no bar from here on.
-pub fn hide_all() {
-    ARE_HIDDEN.store(true, Ordering::Relaxed);
 }
 
 impl Progress {
@@ -77,7 +70,7 @@ impl Progress {
     }
 
     fn styled(bar: ProgressBar, template: &str) -> Self {
-        if ARE_HIDDEN.load(Ordering::Relaxed) {
+        if is_quiet() {
             bar.set_draw_target(ProgressDrawTarget::hidden());
         }
         bar.set_style(style(template));

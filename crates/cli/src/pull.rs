@@ -1,6 +1,7 @@
 use crate::args::PullArgs;
 use crate::json;
 use crate::progress::Progress;
+use crate::quiet::summary_out;
 use indicatif::{HumanBytes, HumanCount};
 use serde::Serialize;
 use std::io::Write;
@@ -26,7 +27,7 @@ pub fn run(args: &PullArgs) -> anyhow::Result<ExitCode> {
     let progress = Progress::over_bytes();
     let pulled = pull(&bucket, &args.map, args.replace, |done, all| progress.set(done, all))?;
     drop(progress);
-    let mut out = std::io::stdout().lock();
+    let mut out = summary_out(args.json);
     if args.json {
         let peak_rss_bytes = memory::peak_bytes();
         let summary = Summary { url: bucket.url(), map: &args.map, pulled, peak_rss_bytes };

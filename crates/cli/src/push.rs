@@ -1,6 +1,7 @@
 use crate::args::PushArgs;
 use crate::json;
 use crate::progress::Progress;
+use crate::quiet::summary_out;
 use indicatif::{HumanBytes, HumanCount};
 use serde::Serialize;
 use std::io::Write;
@@ -27,7 +28,7 @@ pub fn run(args: &PushArgs) -> anyhow::Result<ExitCode> {
     let options = PushOptions { prunes: args.prune, replaces: args.replace, resends: args.resend };
     let pushed = push(whole_map(&args.map)?, &bucket, options, |done, all| progress.set(done, all))?;
     drop(progress);
-    let mut out = std::io::stdout().lock();
+    let mut out = summary_out(args.json);
     if args.json {
         let peak_rss_bytes = memory::peak_bytes();
         let summary = Summary { map: &args.map, url: bucket.url(), pushed, peak_rss_bytes };

@@ -2,6 +2,7 @@ use crate::args::{InsertName, ModelName, RemapArgs};
 use crate::json;
 use voxtile_pipeline::{MapAt, whole_map};
 
+use crate::quiet::summary_out;
 use crate::rework::{self, Job};
 use indicatif::HumanCount;
 use serde::Serialize;
@@ -46,7 +47,7 @@ pub fn run(args: &RemapArgs) -> anyhow::Result<ExitCode> {
         Err(code) => return Ok(code),
     };
     drop(job);
-    let mut out = std::io::stdout().lock();
+    let mut out = summary_out(args.rework.json || args.rework.dry_run);
     if args.rework.json {
         let summary = Summary {
             map,
@@ -118,7 +119,7 @@ fn run_anew(args: &RemapArgs) -> anyhow::Result<ExitCode> {
         Err(code) => return Ok(code),
     };
     drop(job);
-    let mut out = std::io::stdout().lock();
+    let mut out = summary_out(args.rework.json);
     if args.rework.json {
         json::print(&mapped, &mut out)?;
         return Ok(ExitCode::SUCCESS);

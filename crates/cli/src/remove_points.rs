@@ -1,6 +1,7 @@
 use crate::args::RemovePointsArgs;
 use crate::json;
 use crate::part::region_of;
+use crate::quiet::summary_out;
 use crate::rework::{self, Job};
 use indicatif::HumanCount;
 use serde::Serialize;
@@ -34,7 +35,7 @@ pub fn run(args: &RemovePointsArgs) -> anyhow::Result<ExitCode> {
         Err(code) => return Ok(code),
     };
     drop(job);
-    let mut out = std::io::stdout().lock();
+    let mut out = summary_out(args.rework.json || args.rework.dry_run);
     if args.rework.json {
         let summary = Summary {
             map,

@@ -1,5 +1,6 @@
 use crate::args::RemoveScansArgs;
 use crate::json;
+use crate::quiet::summary_out;
 use crate::rework::{self, Job};
 use crate::run::say;
 use indicatif::HumanCount;
@@ -48,7 +49,7 @@ pub fn run(args: &RemoveScansArgs) -> anyhow::Result<ExitCode> {
             ExitCode::FAILURE
         }
     };
-    let mut out = std::io::stdout().lock();
+    let mut out = summary_out(args.rework.json || args.rework.dry_run);
     if args.rework.json {
         let summary = Summary {
             map,

@@ -1,6 +1,7 @@
 use crate::args::RevertArgs;
 use crate::json;
 use crate::progress::Progress;
+use crate::quiet::summary_out;
 use indicatif::HumanCount;
 use serde::Serialize;
 use std::io::Write;
@@ -26,7 +27,7 @@ pub fn run(args: &RevertArgs) -> anyhow::Result<ExitCode> {
     let keep_as = args.keep_as.as_ref();
     let reverted = revert(whole_map(&args.map)?, &args.name, keep_as, |done, all| progress.set(done, all))?;
     drop(progress);
-    let mut out = std::io::stdout().lock();
+    let mut out = summary_out(args.json);
     if args.json {
         let (snapshot, kept_as) = (args.name.as_str(), keep_as.map(|name| name.as_str()));
         let summary =

@@ -6,7 +6,7 @@ use super::failure::JsonTo;
 use super::view;
 use super::{
     build, clear, completions, convert, crop, decay, demo, diff, digest, export, import, info, local, man,
-    merge, one_input, option_names, picture, progress, query, raycast, remap, remove_points, remove_scans,
+    merge, one_input, option_names, picture, progress, query, quiet, raycast, remap, remove_points, remove_scans,
     repair, report, revert, scans, share, snapshot, snapshots, threads, verify,
 };
 #[cfg(feature = "bucket")]
@@ -46,7 +46,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     let Cli { command, threads, quiet, .. } = cli;
     let json_to = JsonTo::of(&command);
     if quiet {
-        progress::hide_all();
+        quiet::be_quiet();
     }
     if keeps_to_bytes(&command) {
         // Before there is a second thread, and before anything is read from standard input.
@@ -84,10 +84,16 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Command::Push(args) => push::run(&args),
         #[cfg(feature = "bucket")]
         Command::Pull(args) => pull::run(&args),
+        #[cfg(not(feature = "bucket"))]
+        Command::Push(_) => Err(left_out("push", "bucket")),
+        #[cfg(not(feature = "bucket"))]
+        Command::Pull(_) => Err(left_out("pull", "bucket")),
         Command::Verify(args) => verify::run(&args),
         Command::Repair(args) => repair::run(&args),
         #[cfg(feature = "view")]
         Command::View(args) => view::run(&args),
+        #[cfg(not(feature = "view"))]
+        Command::View(_) => Err(left_out("view", "view")),
         Command::Local(args) => local::run(&args),
         Command::Share(args) => share::run(&args),
         Command::Demo(args) => demo::run(&args),
@@ -95,6 +101,16 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Command::Man(args) => man::run(&args),
     };
     outcome.unwrap_or_else(|error| json_to.tell(&error))
+}
+
+/// The error of a subcommand that this build leaves out.
+#[cfg(not(all(feature = "bucket", feature = "view")))]
+fn left_out(subcommand: &str, feature: &str) -> anyhow::Error {
+    let reason = format!(
+        "this voxtile was built without the feature `{feature}`; `cargo install --locked --path crates/cli --features \
+         {feature}` makes one with it"
+    );
+    voxtile::Error::argument(subcommand, reason).into()
 }
 
 /// Negative numbers as programs print them (`-1e-05`, `-.5`, `-inf`), which would be taken for options.

@@ -1,23 +1,25 @@
 use crate::args::SnapshotArgs;
 use crate::json;
+use crate::quiet::summary_out;
 use std::io::Write;
 use std::process::ExitCode;
 use voxtile::operations::{SnapshotInfo, delete_snapshot, new_snapshot, snapshot, snapshots};
 use voxtile_pipeline::whole_map;
 
 pub fn run(args: &SnapshotArgs) -> anyhow::Result<ExitCode> {
-    let was_there = !args.delete && new_snapshot(&args.map, &args.name).is_ok();
+    let map = whole_map(&args.map)?;
+    let was_there = !args.delete && new_snapshot(map, &args.name).is_ok();
     let info = if args.delete {
         // What it was, before it is gone.
-        let info = snapshots(&args.map)?.into_iter().find(|info| info.name == args.name.as_str());
-        delete_snapshot(whole_map(&args.map)?, &args.name)?;
+        let info = snapshots(map)?.into_iter().find(|info| info.name == args.name.as_str());
+        delete_snapshot(map, &args.name)?;
         info
     } else {
-        snapshot(whole_map(&args.map)?, &args.name)?;
+        snapshot(map, &args.name)?;
         // It is there, whatever becomes of this.
-        new_snapshot(&args.map, &args.name).inspect_err(|error| log::warn!("{error:#}")).ok()
+        new_snapshot(map, &args.name).inspect_err(|error| log::warn!("{error:#}")).ok()
     };
-    let mut out = std::io::stdout().lock();
+    let mut out = summary_out(args.json);
     if args.json {
         let answer = serde_json::json!({ "map": args.map.display().to_string(), "deleted": args.delete, "snapshot": info });
         json::print(&answer, &mut out)?;

@@ -4,9 +4,11 @@ use indicatif::{HumanBytes, HumanCount};
 use std::io::Write;
 use std::process::ExitCode;
 use voxtile::operations::{SnapshotInfo, snapshots};
+use voxtile_pipeline::check_is_no_file;
 use voxtile_pipeline::place::place_of;
 
 pub fn run(args: &SnapshotsArgs) -> anyhow::Result<ExitCode> {
+    check_is_no_file(&args.map)?;
     let infos = snapshots(place_of(&args.map)?)?;
     let mut out = std::io::stdout().lock();
     if args.json {

@@ -1,5 +1,6 @@
 use crate::json;
 use crate::option_names::with_options;
+use crate::quiet::summary_out;
 use crate::region_tiles;
 use indicatif::{HumanBytes, HumanCount};
 use std::io::Write;
@@ -13,7 +14,7 @@ pub fn print(mut summary: Summary, json: bool) -> anyhow::Result<()> {
     for text in summary.remarks.iter_mut().chain(&mut summary.unread) {
         *text = with_options(text).into_owned();
     }
-    let mut out = std::io::stdout().lock();
+    let mut out = summary_out(json);
     if json {
         return json::print(&summary, &mut out);
     }

@@ -6,6 +6,7 @@ use crate::args::{ColorName, PictureArgs, ViewName};
 use crate::json;
 use crate::part::region_of;
 use crate::progress::Progress;
+use crate::quiet::summary_out;
 use drawn_json::DrawnJson;
 use std::ffi::OsString;
 use std::io::{self, IsTerminal, Write};
@@ -18,7 +19,7 @@ use voxtile_pipeline::output::{OutputFile, is_standard_output};
 use voxtile_pipeline::{AnyMap, read_any_map};
 use voxtile_render::{ColorBy, Drawn, Picture, SideAxis, View};
 
-/// Draws a map; says what was drawn, on standard error unless `is_quiet` where standard output is the picture.
+/// Draws a map; says what was drawn unless `is_quiet`, on standard error where standard output is the picture.
 pub fn run(args: &PictureArgs, is_quiet: bool) -> anyhow::Result<ExitCode> {
     let is_stream = is_standard_output(&args.output);
     if is_stream && io::stdout().is_terminal() {
@@ -52,7 +53,7 @@ pub fn run(args: &PictureArgs, is_quiet: bool) -> anyhow::Result<ExitCode> {
         let out: &mut dyn Write = if is_stream { &mut io::stderr() } else { &mut io::stdout() };
         json::print(&of, &mut { out })?;
     } else if !is_stream {
-        writeln!(io::stdout(), "{}: {}", args.output.display(), caption(args, &drawn))?;
+        writeln!(summary_out(false), "{}: {}", args.output.display(), caption(args, &drawn))?;
     } else if !is_quiet {
         writeln!(io::stderr(), "{}", caption(args, &drawn))?;
     }

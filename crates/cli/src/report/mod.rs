@@ -70,7 +70,7 @@ const MAX_FINDINGS: usize = 200;
 /// Tiles on the page.
 const MAX_TILES: usize = 10;
 
-/// Writes the page; says where it is, on standard error unless `is_quiet` where standard output is the page.
+/// Writes the page; says where it is unless `is_quiet`, on standard error where standard output is the page.
 pub fn run(args: &ReportArgs, is_quiet: bool) -> anyhow::Result<ExitCode> {
     let report = Report::of(args)?;
     let mut file = OutputFile::create(&args.output)?;
@@ -81,7 +81,7 @@ pub fn run(args: &ReportArgs, is_quiet: bool) -> anyhow::Result<ExitCode> {
     let out: &mut dyn Write = if is_stream { &mut io::stderr() } else { &mut io::stdout() };
     if args.json {
         json::print(&report.to_json(args), &mut { out })?;
-    } else if !(is_stream && is_quiet) {
+    } else if !is_quiet {
         let damage = report.damage_count().filter(|&count| count > 0);
         let damage = damage.map_or(String::new(), |count| format!("; the map is damaged: {count} findings"));
         writeln!(out, "{}: a report of {}{damage}", args.output.display(), args.map.display())?;

@@ -17,6 +17,37 @@ fn digest(map: &str) -> String {
     output(&["digest", map])
 }
 
+/// Commands that need the files of a folder name what a file of OctoMap is, and the way to a map.
+#[test]
+fn files_of_octomap_are_named_where_a_folder_is_needed() {
+    let folder = TempDir::new().unwrap();
+    let [tree, other] = ["a.bt", "a.txt"].map(|name| folder.path().join(name));
+    output(&["export", text(&built(&folder, &[]).0), "-o", text(&tree)]);
+    std::fs::write(&other, "no map").unwrap();
+    for arguments in [
+        &["verify"][..],
+        &["repair"],
+        &["snapshot", "before"],
+        &["snapshot", "before", "--delete"],
+        &["snapshots"],
+        &["revert", "before"],
+        &["clear", "--region", "0", "0", "0", "1", "1", "1"],
+        &["decay", "--halflife", "5"],
+        &["remap", "--poses", "poses.txt"],
+        &["remove-scans", "--scans", "1"],
+        &["remove-points", "--region", "0", "0", "0", "1", "1", "1"],
+        &["convert", "--storage", "compact", "-o", text(&folder.path().join("new"))],
+    ] {
+        for (file, named) in
+            [(&tree, "`voxtile import` makes a map of it"), (&other, "is a file, and none of OctoMap")]
+        {
+            let [command, rest @ ..] = arguments else { unreachable!() };
+            let (code, stderr) = failure(&[&[*command, text(file)], rest].concat());
+            assert!(code == 2 && stderr.contains(named), "{arguments:?}: {stderr}");
+        }
+    }
+}
+
 #[test]
 fn what_is_cropped_apart_is_merged_to_the_whole() {
     for storage in ["octomap", "compact"] {

@@ -55,3 +55,15 @@ fn help_fits_in_a_hundred_columns() {
         }
     }
 }
+
+#[cfg(not(feature = "bucket"))]
+#[test]
+fn a_command_that_was_left_out_names_its_feature() {
+    for command in [&["push", "map", "s3://a/b", "--prune"][..], &["pull", "--help"], &["push"]] {
+        let (code, said) = failure(command);
+        let named =
+            said.starts_with(&format!("voxtile: {}: ", command[0])) && said.contains("--features bucket");
+        assert!(code == 2 && named, "{said}");
+    }
+    assert!(!commands().contains(&"push".to_owned()));
+}

@@ -49,6 +49,11 @@ fn build(scans: &Path, map: &Path, case: &Case) -> (String, String) {
     (out, said)
 }
 
+/// Whether a run prints errors and answers alone.
+fn is_quiet(case: &Case) -> bool {
+    matches!(case.options, ["-q" | "--quiet"])
+}
+
 /// What a build prints, less times and the name of the map.
 fn lasting(out: &str) -> Vec<&str> {
     let is_lasting =
@@ -74,7 +79,10 @@ fn options_and_environment_choose_what_is_said_and_nothing_else() {
         }
         assert!(case.flushes || case.tiles || said.is_empty(), "{what}: {said}");
         let (earlier, earlier_map) = before.get_or_insert_with(|| (out.clone(), map.clone()));
-        assert_eq!(lasting(&out), lasting(earlier), "{what}");
+        match is_quiet(case) {
+            true => assert_eq!(out, "", "{what}"),
+            false => assert_eq!(lasting(&out), lasting(earlier), "{what}"),
+        }
         // A command whose answer has no times says the same to the byte.
         let ask = |map: &Path, case| {
             let (code, out, said) = run(&["query", text(map), "4.1", "-0.5", "0.6", "--json"], case);
@@ -100,6 +108,21 @@ fn quiet_leaves_out_warnings_and_summaries_beside_a_file_and_no_error() {
     assert!(said.contains("counts twice") && out.contains("counts twice"), "{said}");
     let (_, out, said) = merge(&merged("quiet"), quiet);
     assert!(said.is_empty() && out.contains("counts twice"), "{said}");
+    // Without JSON nothing is printed of work, and answers are.
+    let plain = |arguments: &[&str]| run(arguments, quiet);
+    for work in [
+        &["crop", text(&map), "-o", text(&merged("crop")), "--region", "0", "0", "0", "5", "5", "5"][..],
+        &["export", text(&map), "-o", text(&merged("a.ply"))],
+        &["picture", text(&map), "-o", text(&merged("a.png"))],
+        &["snapshot", text(&map), "before"],
+        &["report", text(&map), "-o", text(&merged("a.html"))],
+    ] {
+        assert_eq!(plain(work), (0, String::new(), String::new()), "{work:?}");
+    }
+    for answer in [&["info", text(&map)][..], &["snapshots", text(&map)], &["verify", text(&map)]] {
+        let (code, out, said) = plain(answer);
+        assert!(code == 0 && !out.is_empty() && said.is_empty(), "{answer:?}: {out}{said}");
+    }
 
     let export = ["export", text(&map), "-o", "-", "--format", "csv"];
     let [(_, file, said), (_, same, nothing)] = [loud, quiet].map(|case| run(&export, case));

@@ -56,6 +56,31 @@ fn a_full_disk_keeps_the_last_flush_and_the_build_goes_on_when_there_is_room() {
     assert!(is_whole(&map));
 }
 
+/// The first flush is the only one: nothing is in the map.
+#[test]
+fn a_disk_that_is_full_at_the_first_flush_is_as_empty_as_before() {
+    let scans = Scans::new(30, 1);
+    let Some(disk) = SmallDisk::new(300 << 10) else {
+        println!("skipped: this process may not mount a small disk");
+        return;
+    };
+    let map = disk.path().join("map");
+    for _ in 0..2 {
+        let output = scans.build(&map, &[]).output().unwrap();
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{message}");
+        for part in ["No space left", "no scan was flushed, and the new map was removed", "--storage compact"]
+        {
+            assert!(message.contains(part), "{part}: {message}");
+        }
+        assert_eq!(message.lines().count(), 1, "{message}");
+        assert_eq!(std::fs::read_dir(disk.path()).unwrap().count(), 0);
+    }
+    assert!(disk.mount("remount,size=64m"));
+    assert!(scans.build(&map, &[]).status().unwrap().success());
+    assert_eq!(digest(&map), Ok((30, scans.digests[30].clone())));
+}
+
 #[test]
 fn a_disk_that_is_only_for_reading_answers_and_is_not_written_to() {
     let scans = Scans::new(6, 1);

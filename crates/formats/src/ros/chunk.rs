@@ -75,7 +75,7 @@ pub(super) const MAX_CHUNK_BYTES: u64 = 1 << 30;
 
 /// What to do about a window of zstd that is too large.
 const WINDOW_HINT: &str =
-    "raise --memory, or compress it with a smaller window (zstd without --long and --ultra)";
+    "raise `memory`, or compress it with a smaller window (zstd without --long and --ultra)";
 
 /// Unpacks a compressed stream, as far as it goes, and says why not all of it. `see` gets the bytes in order.
 pub(super) fn decompress(
