@@ -1,5 +1,6 @@
 //! Files of other programs, in and out, by the command.
 
+use crate::cli::json;
 use assert_cmd::Command;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -563,31 +564,38 @@ fn damaged_clouds_shift_no_others_of_a_selection() {
     assert!(told.contains("1 of the scans that were passed over cannot be read"), "{told}");
 }
 
-/// One that was cut off: LAS keeps what it has, and PLY is a bad cloud. Both say where.
+/// LAS keeps what it has and says so; PLY is a bad cloud, which says where.
 #[test]
-fn clouds_that_were_cut_off_say_where() {
+fn clouds_that_were_cut_off_are_kept_or_say_where() {
     let folder = tempfile::tempdir().unwrap();
     let inputs = make_inputs(folder.path());
     let path = |name: &str| folder.path().join(name);
     output(&["build", text(&inputs[2]), "-o", text(&path("map")), "--resolution", "0.2"]);
-    for name in ["voxels.las", "voxels.ply"] {
+    let cut = |name: &str| {
         let file = path(name);
         output(&["export", text(&path("map")), "-o", text(&file)]);
         let bytes = fs::read(&file).unwrap();
         fs::write(&file, &bytes[..bytes.len() - 100]).unwrap();
-        let run = voxtile(&["scans", text(&file), "--json"]).assert().failure().code(1);
-        let told: serde_json::Value = serde_json::from_slice(&run.get_output().stdout).unwrap();
-        let error = &told["error"];
-        assert_eq!((&error["kind"], error["path"].as_str()), (&"malformed".into(), Some(text(&file))));
-        let (expected, other) =
-            if name.ends_with("las") { ("record", "offset") } else { ("offset", "record") };
-        assert!(error[expected].as_u64() > Some(0) && error[other].is_null(), "{error}");
-        let map = path(&format!("{name}.map"));
-        let build = ["build", text(&file), "-o", text(&map), "--no-rays", "--skip-bad", "--json"];
-        let told: serde_json::Value = serde_json::from_str(&output(&build)).unwrap();
-        let points = told["points"].as_u64();
-        assert_eq!(points, if name.ends_with("las") { error["record"].as_u64() } else { Some(0) }, "{told}");
-    }
+        file
+    };
+    let build = |file: &Path, map: &str| {
+        let map = path(map);
+        json(&["build", text(file), "-o", text(&map), "--no-rays", "--skip-bad", "--json"])
+    };
+    // Points of 42 bytes.
+    let las = cut("voxels.las");
+    let told = json(&["scans", text(&las), "--json"]);
+    let points = told["points"].as_u64().unwrap();
+    let remark = format!("the file is cut off: {points} of {} points are there and are read", points + 3);
+    assert!(told["remarks"].to_string().contains(&remark), "{told}");
+    assert_eq!(build(&las, "las")["points"], points);
+    let ply = cut("voxels.ply");
+    let run = voxtile(&["scans", text(&ply), "--json"]).assert().failure().code(1);
+    let told: serde_json::Value = serde_json::from_slice(&run.get_output().stdout).unwrap();
+    let error = &told["error"];
+    assert_eq!((&error["kind"], error["path"].as_str()), (&"malformed".into(), Some(text(&ply))));
+    assert!(error["offset"].as_u64() > Some(0) && error["record"].is_null(), "{error}");
+    assert_eq!(build(&ply, "ply")["points"], 0);
 }
 
 /// Points that stay where they are, and clouds that know no times, are not passed over in silence.

@@ -74,7 +74,7 @@ fn a_chunk_table_that_lies_is_refused() {
                 Ok(mut source) => assert_eq!(points_of(all(source.as_mut()).unwrap()).len(), points),
                 Err(error) => {
                     let said = format!("{error:#}");
-                    assert!(said.contains(&format!("damaged.laz: malformed: offset {table_at}: ")), "{said}");
+                    assert!(said.contains("damaged.laz: malformed: offset "), "{said}");
                     refused += 1;
                 }
             }
