@@ -564,6 +564,23 @@ fn damaged_clouds_shift_no_others_of_a_selection() {
     assert!(told.contains("1 of the scans that were passed over cannot be read"), "{told}");
 }
 
+/// The decoder of LAZ panics on these bytes.
+#[test]
+fn a_decoder_that_panics_is_one_line_that_names_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("damaged.laz");
+    let whole = fs::read(repository("crates/formats/tests/data/withheld.laz")).unwrap();
+    let points_at = u32::from_le_bytes(whole[96..100].try_into().unwrap()) as usize;
+    for at in [143, 149, 176] {
+        let mut bytes = whole.clone();
+        bytes[points_at + at..points_at + at + 16].fill(0xff);
+        fs::write(&file, bytes).unwrap();
+        let said = refusal(&["scans", text(&file)]);
+        assert!(said.contains("damaged.laz") && said.contains("its decoder gave up (decoders.rs:"), "{said}");
+        assert!(said.lines().count() == 1 && !said.contains("panicked"), "{said}");
+    }
+}
+
 /// LAS keeps what it has and says so; PLY is a bad cloud, which says where.
 #[test]
 fn clouds_that_were_cut_off_are_kept_or_say_where() {
@@ -588,14 +605,14 @@ fn clouds_that_were_cut_off_are_kept_or_say_where() {
     let points = told["points"].as_u64().unwrap();
     let remark = format!("the file is cut off: {points} of {} points are there and are read", points + 3);
     assert!(told["remarks"].to_string().contains(&remark), "{told}");
-    assert_eq!(build(&las, "las")["points"], points);
+    assert_eq!(build(&las, "las.map")["points"], points);
     let ply = cut("voxels.ply");
     let run = voxtile(&["scans", text(&ply), "--json"]).assert().failure().code(1);
     let told: serde_json::Value = serde_json::from_slice(&run.get_output().stdout).unwrap();
     let error = &told["error"];
     assert_eq!((&error["kind"], error["path"].as_str()), (&"malformed".into(), Some(text(&ply))));
     assert!(error["offset"].as_u64() > Some(0) && error["record"].is_null(), "{error}");
-    assert_eq!(build(&ply, "ply")["points"], 0);
+    assert_eq!(build(&ply, "ply.map")["points"], 0);
 }
 
 /// Points that stay where they are, and clouds that know no times, are not passed over in silence.

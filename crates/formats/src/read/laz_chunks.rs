@@ -190,7 +190,7 @@ impl ChunkReader<'_> {
         let is_variable = self.laz.uses_variable_size_chunks();
         let (mut at, mut room) = (data_at, 0_u64);
         // Points as the chunks themselves count them.
-        let mut own = self.is_layered().then_some(0_u64);
+        let (mut own, mut own_points) = (self.is_layered().then_some(0_u64), Vec::new());
         for (chunk, entry) in table.as_ref().iter().enumerate() {
             let end = at.checked_add(entry.byte_count).filter(|end| *end <= table_at);
             let Some(end) = end else {
@@ -207,9 +207,13 @@ impl ChunkReader<'_> {
                 let reason = format!("chunk {chunk} has {} bytes and no points", entry.byte_count);
                 return Err(self.wrong(at, reason));
             }
-            if self.is_layered() && entry.point_count > 0 && (room < most || most == 0) {
+            if self.is_layered() && entry.byte_count > 0 && (room < most || most == 0 || is_variable) {
                 let head = LayeredHead::read(self.path, &mut self.input, &self.laz, at);
                 match head.and_then(|head| head.check(self.path, end).map(|()| head.points)) {
+                    Ok(points) if is_variable => {
+                        own = own.map(|own| own.saturating_add(points));
+                        own_points.push(points);
+                    }
                     Ok(points) => {
                         own =
                             own.filter(|_| points <= entry.point_count).map(|own| own.saturating_add(points));
@@ -219,14 +223,32 @@ impl ChunkReader<'_> {
                     Err(_) => own = None,
                 }
             } else {
-                own = own.filter(|_| entry.point_count == 0);
+                own = own.filter(|_| entry.byte_count == 0);
             }
             room = room.saturating_add(entry.point_count);
             at = end;
         }
-        let there = if is_variable { Some(room) } else { own };
+        // Of a table and chunks that differ, those count that have the announced number.
+        let is_number = |points: u64| layout.counts.choose(points, points) == points;
+        let differs = is_variable && own.is_some_and(|own| own != room);
+        let is_own = differs && own.is_some_and(is_number);
+        if differs && !is_own && !is_number(room) {
+            let own = own.unwrap_or(0);
+            let reason = format!("the chunk table has {room} points, and the chunks themselves have {own}");
+            return Err(self.wrong(table_at, reason));
+        }
+        let there = if is_variable && !is_own { Some(room) } else { own };
         match there {
-            Some(there) => take_all(layout, there),
+            // Fewer than announced are believed of chunks that reach up to their table alone.
+            Some(there) if at == table_at || layout.counts.choose(there, there) <= there => {
+                take_all(layout, there);
+            }
+            Some(there) => {
+                let announced = layout.counts.choose(there, there);
+                let reason =
+                    format!("{announced} points are announced; the chunk table has room for {there}");
+                return Err(self.wrong(table_at, reason));
+            }
             None => {
                 let chunk_size = u64::from(self.laz.chunk_size());
                 let least = (room + 1).saturating_sub(chunk_size).min(room);
@@ -246,7 +268,9 @@ impl ChunkReader<'_> {
                 }
             }
         }
-        let points = if is_variable {
+        let points = if is_own {
+            ChunkPoints::Own(own_points)
+        } else if is_variable {
             ChunkPoints::Own(
                 table.as_ref().iter().map(|entry| entry.point_count).filter(|n| *n > 0).collect(),
             )
