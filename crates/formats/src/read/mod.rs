@@ -52,9 +52,9 @@ mod laz_chunks;
 mod laz_head;
 #[cfg(feature = "las")]
 mod laz_points;
+mod left_out;
 #[cfg(any(feature = "las", feature = "e57"))]
 mod length_unit;
-mod left_out;
 pub(crate) mod lines;
 pub(crate) mod listing;
 mod lzf;
