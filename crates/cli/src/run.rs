@@ -6,8 +6,8 @@ use super::failure::JsonTo;
 use super::view;
 use super::{
     build, clear, completions, convert, crop, decay, demo, diff, digest, export, import, info, local, man,
-    merge, one_input, option_names, picture, progress, query, quiet, raycast, remap, remove_points, remove_scans,
-    repair, report, revert, scans, share, snapshot, snapshots, threads, verify,
+    merge, one_input, option_names, picture, progress, query, quiet, raycast, remap, remove_points,
+    remove_scans, repair, report, revert, scans, share, snapshot, snapshots, threads, verify,
 };
 #[cfg(feature = "bucket")]
 use super::{pull, push};

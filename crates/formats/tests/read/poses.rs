@@ -42,7 +42,10 @@ fn stamps_are_exact_and_poses_lie_between() {
         assert!(matches!(trajectory.at(at_ns, 5_000_000_000).unwrap(), Found::Between(_)));
     }
     // Once a second, every moment is within half a second of a pose.
-    assert_eq!(trajectory.at(FIRST_NS + 1_000_001, 499_999_999).unwrap(), Found::Gap { gap_ns: 1_000_000_000 });
+    assert_eq!(
+        trajectory.at(FIRST_NS + 1_000_001, 499_999_999).unwrap(),
+        Found::Gap { gap_ns: 1_000_000_000 }
+    );
     assert_eq!(most_gap_ns(i64::MAX), i64::MAX);
     assert_eq!(most_gap_ns(-1), 0);
     assert_eq!(trajectory.by_number(0).unwrap(), Some(first));
