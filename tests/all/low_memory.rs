@@ -141,7 +141,7 @@ fn a_tile_that_is_flushed_overtakes_no_older_version_of_itself() {
 fn updates_of_tiles_on_disk_wait_in_files_until_they_are_worth_reading_them() {
     let folder = memory_folder();
     let config = MapConfig::new(0.1, 6.4).unwrap().with_range(0.0, 20.0);
-    let scans: Vec<Scan> = (0..3).flat_map(|_| scans(cases(12, 20) as usize)).collect();
+    let scans: Vec<Scan> = (0..3).flat_map(|_| scans(20)).collect();
     let mut expected = InMemoryMapper::new(config.clone()).unwrap();
     for scan in &scans {
         expected.insert_scan(scan).unwrap();
