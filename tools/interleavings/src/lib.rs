@@ -3,7 +3,7 @@
 //! carried for: the tiles of a map in little memory, on a disk in memory.
 //!
 //! ```text
-//! cargo test -p interleavings                            2,000 orders of each test
+//! cargo test -p interleavings                            800 orders of each test
 //! INTERLEAVINGS=1000000 cargo test --release -p interleavings
 //! ```
 //!
@@ -202,7 +202,7 @@ use shuttle::scheduler::{PctScheduler, RandomScheduler};
 /// Runs a life of threads in many orders.
 #[cfg(test)]
 fn in_many_orders(life: impl Fn() + Send + Sync + Copy + 'static) {
-    let orders = std::env::var("INTERLEAVINGS").ok().and_then(|text| text.parse().ok()).unwrap_or(2000);
+    let orders = std::env::var("INTERLEAVINGS").ok().and_then(|text| text.parse().ok()).unwrap_or(800);
     let mut config = shuttle::Config::new();
     // A file is written by deeper calls than a lock is taken.
     config.stack_size = 1 << 20;
