@@ -167,6 +167,10 @@ impl Inbox {
 /// The header of a cloud that has all points that it claims, and the bytes of memory that they will take.
 fn head(cdr: &[u8]) -> Result<(Header, usize), WireError> {
     let cloud = PointCloud2::decode(Wire::Cdr, cdr)?;
+    // No transform will ever name it, and later clouds of its topic would wait behind it.
+    if cloud.header.frame_id.is_empty() {
+        return Err(WireError { byte: 0, reason: "the cloud names no frame".to_owned() });
+    }
     match cloud.shortage() {
         Some(shortage) => Err(shortage),
         None => Ok((cloud.header.clone(), CloudPoints::bytes_of(&cloud))),
@@ -195,6 +199,17 @@ mod tests {
         inbox.put_cloud(0, lies.cdr());
         let (counters, waiting) = inbox.counters();
         assert_eq!((counters.received, counters.too_large, counters.malformed, waiting), (4, 2, 1, 1));
+    }
+
+    #[test]
+    fn a_cloud_without_a_frame_is_malformed_and_does_not_wait() {
+        let inbox = Inbox::new(&Args::parse_from(["voxtile-ros2", "-o", "map"]));
+        let header = messages::Header { frame_id: String::new(), ..header() };
+        inbox.put_cloud(0, messages::PointCloud2::of_points(header, vec![[1.0; 3]]).cdr());
+        // All zeros are an empty cloud without fields.
+        inbox.put_cloud(0, [&[0, 1, 0, 0][..], &[0; 60]].concat());
+        let (counters, waiting) = inbox.counters();
+        assert_eq!((counters.received, counters.malformed, waiting), (2, 2, 0));
     }
 
     #[test]
