@@ -141,7 +141,7 @@ def check(port):
     for name, map in (("here.ply", MAP), ("there.ply", url)):
         voxtile("export", map, "-o", WORK / name, port=port)
     assert (WORK / "here.ply").read_bytes() == (WORK / "there.ply").read_bytes()
-    assert json.loads(voxtile("info", url, "--json", "--no-picture", port=port))["tiles"] == first["tiles"]
+    assert json.loads(voxtile("info", url, "--json", port=port))["tiles"] == first["tiles"]
     print("read there: digest, query, raycast, verify, export, info")
 
     # What is not there, and what would write.
