@@ -158,7 +158,7 @@ fn poses_match_the_files_or_both_counts_are_told() {
         ("0 1 0 0 0 0 0 1\n", "1 poses for 3 clouds"),
         ("0 1 0 0 0 0 0 1\n1 2 0 0 0 0 0 1\n2 3 0 0 0 0 0 1\n3 3 0 0 0 0 0 1\n", "4 poses for 3 clouds"),
         ("0 1 0 0 0 0 0 0\n", "line 1: the quaternion 0 0 0 0 has length 0.000, not 1"),
-        ("0 1 0 0 0 0 1e300 0\n", "has length inf, not 1"),
+        ("0 1 0 0 0 0 1e300 0\n", "the quaternion 0 0 1e300 0 has length inf, not 1"),
         ("0 1 0 NaN 0 0 0 1\n", "line 1: `NaN` is not finite"),
         ("0 1 0\n", "line 1: 3 numbers; a pose is 8 numbers (TUM"),
         ("1 0 0 0 0 2 0 0 0 0 1 0\n", "line 1: the matrix is no rotation"),

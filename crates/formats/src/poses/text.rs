@@ -389,6 +389,12 @@ fn pose_of(numbers: &[f64], rules: Rules) -> Result<RigidPose, (BadKind, String)
     })
 }
 
+/// A number with an exponent if it would have many digits without.
+fn short(number: f64) -> String {
+    let is_short = number == 0.0 || !number.is_finite() || (1e-4..1e9).contains(&number.abs());
+    if is_short { number.to_string() } else { format!("{number:e}") }
+}
+
 /// The pose of x y z and a quaternion.
 pub(super) fn pose(numbers: [f64; 7], rules: Rules) -> Result<RigidPose, String> {
     let [x, y, z, qx, qy, qz, qw] = numbers;
@@ -397,7 +403,9 @@ pub(super) fn pose(numbers: [f64; 7], rules: Rules) -> Result<RigidPose, String>
     if !pose.is_valid() || (rules == Rules::Strict && (length - 1.0).abs() > 0.1) {
         let hint =
             if length.is_finite() && length > 1e-6 { "; are these angles, roll, pitch and yaw?" } else { "" };
-        return Err(format!("the quaternion {qx} {qy} {qz} {qw} has length {length:.3}, not 1{hint}"));
+        let [qx, qy, qz, qw] = pose.quaternion.map(short);
+        let length = if length < 1e6 { format!("{length:.3}") } else { short(length) };
+        return Err(format!("the quaternion {qx} {qy} {qz} {qw} has length {length}, not 1{hint}"));
     }
     Ok(pose)
 }

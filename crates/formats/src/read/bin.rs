@@ -140,7 +140,7 @@ fn guess(path: &Path, is_nuscenes: bool, start: &[u8], bytes: u64) -> Result<Col
     {
         let reason = format!(
             "its size fits {} floats a point ({}) and {}, and the last of {} are whole numbers, as of the ring of \
-             a sensor: name the columns of the file as fields, `--fields {}` or `--fields {}`",
+             a sensor: name the columns of the file as fields, `fields` {} or {}",
             KITTI.len(),
             KITTI.join(", "),
             NUSCENES.len(),
@@ -156,15 +156,15 @@ fn guess(path: &Path, is_nuscenes: bool, start: &[u8], bytes: u64) -> Result<Col
         Verdict::Other(other) if matches!(other.columns, 3 | 4 | 6) => Ok(Columns::of_reading(other)),
         Verdict::Other(other) => Err(wrong(format!(
             "its numbers repeat every {} of {}, not every {} of float32: name the columns of the file as fields, for \
-             instance `--fields {}`",
+             instance `fields` {}",
             other.columns,
             other.type_name(),
             usual.columns,
             example(other)
         ))),
         Verdict::Either(one, other) => Err(wrong(format!(
-            "its numbers repeat every {} and every {} of {}: name the columns of the file as fields, `--fields {}` or \
-             `--fields {}`",
+            "its numbers repeat every {} and every {} of {}: name the columns of the file as fields, `fields` {} or \
+             {}",
             one.columns,
             other.columns,
             one.type_name(),
@@ -173,7 +173,7 @@ fn guess(path: &Path, is_nuscenes: bool, start: &[u8], bytes: u64) -> Result<Col
         ))),
         Verdict::Doubtful(other) if is_whole => Err(wrong(format!(
             "read as {} columns of float32 ({}), its intensities are below 0, and {} columns fit as well: name the \
-             columns of the file as fields, `--fields {}` or `--fields {}`",
+             columns of the file as fields, `fields` {} or {}",
             usual.columns,
             names.join(", "),
             other.columns,

@@ -78,7 +78,7 @@ impl<'b> BinStart<'b> {
                 Verdict::Other(best)
             } else {
                 Verdict::Wrong(
-                    "its numbers are float64: name its columns as fields, for instance `--fields x:f64,y:f64,z:f64`",
+                    "its numbers are float64: name its columns as fields, for instance `fields` x:f64,y:f64,z:f64",
                 )
             };
         }

@@ -1,6 +1,6 @@
+use super::crs_unit::{CrsUnit, FOOT_M, US_FOOT_M};
 use super::las_layout::{Layout, double, number};
 use super::las_records::{DOUBLES_ID, KEYS_ID, WKT_ID};
-use super::length_unit::{FOOT_M, LengthUnit, US_FOOT_M};
 use super::wkt::WktUnits;
 
 /// What a LAS file says of its coordinates.
@@ -146,8 +146,8 @@ impl Units {
         if found.is_degrees {
             self.degrees();
         }
-        let mut take = |unit: Option<LengthUnit>, axes: &str| {
-            if let Some(LengthUnit { metres, conflict: Some((name, factor)) }) = &unit {
+        let mut take = |unit: Option<CrsUnit>, axes: &str| {
+            if let Some(CrsUnit { metres, conflict: Some((name, factor)) }) = &unit {
                 self.remarks.push(format!(
                     "the unit of {axes} is named {name}, with the factor {factor}: the name counts, {metres} m"
                 ));

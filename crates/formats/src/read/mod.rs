@@ -8,6 +8,7 @@ pub(crate) mod bin;
 mod bin_columns;
 pub(crate) mod cloud;
 mod columns;
+mod crs_unit;
 pub(crate) mod depth;
 mod depth_frames;
 pub(crate) mod depth_images;
@@ -54,7 +55,6 @@ mod laz_head;
 mod laz_points;
 mod left_out;
 #[cfg(any(feature = "las", feature = "e57"))]
-mod length_unit;
 pub(crate) mod lines;
 pub(crate) mod listing;
 mod lzf;

@@ -21,8 +21,8 @@ const fn length(name: &'static str, times: f64, per: f64) -> LengthUnit {
     LengthUnit { name, times, per }
 }
 
-/// Units with their names, in lower case. Division keeps decimals: 7 / 100 is 0.07, 7 * 0.01 is not.
-const LENGTHS: [(LengthUnit, &[&str]); 9] = [
+/// Units with their names in lower case. Division keeps decimals: 7 / 100 is 0.07, 7 * 0.01 is not.
+const LENGTHS: [(LengthUnit, &[&str]); 10] = [
     (LengthUnit::METRE, &["m", "meter", "meters", "metre", "metres", "mtr", "mtrs"]),
     (length("cm", 1.0, 100.0), &["cm", "centimeter", "centimeters", "centimetre", "centimetres"]),
     (length("mm", 1.0, 1000.0), &["mm", "millimeter", "millimeters", "millimetre", "millimetres"]),
@@ -32,11 +32,44 @@ const LENGTHS: [(LengthUnit, &[&str]); 9] = [
         &["um", "\u{b5}m", "\u{3bc}m", "micron", "microns", "micrometer", "micrometers"],
     ),
     (length("km", 1000.0, 1.0), &["km", "kilometer", "kilometers", "kilometre", "kilometres"]),
-    (length("ft", 0.3048, 1.0), &["ft", "foot", "feet", "ift", "'"]),
     (
-        length("US survey foot", 1200.0, 3937.0),
-        &["us-ft", "us_ft", "usft", "ftus", "sft", "us survey foot", "us survey feet"],
+        LengthUnit::FOOT,
+        &[
+            "ft",
+            "foot",
+            "feet",
+            "'",
+            "ift",
+            "ifoot",
+            "internationalfoot",
+            "internationalfeet",
+            "footinternational",
+            "footintl",
+            "intlfoot",
+        ],
     ),
+    (
+        LengthUnit::US_SURVEY_FOOT,
+        &[
+            "us-ft",
+            "us_ft",
+            "usft",
+            "ftus",
+            "sft",
+            "us survey foot",
+            "us survey feet",
+            "ussurveyfoot",
+            "ussurveyfeet",
+            "surveyfoot",
+            "footus",
+            "usfoot",
+            "usfeet",
+            "footussurvey",
+            "footuss",
+            "ussft",
+        ],
+    ),
+    (length("yd", 0.9144, 1.0), &["yd", "yard", "yards"]),
     (length("in", 0.0254, 1.0), &["in", "inch", "inches", "\""]),
 ];
 
@@ -55,8 +88,10 @@ const TIMES: [(TimeUnit, &[&str]); 4] = [
 
 impl LengthUnit {
     pub(crate) const METRE: Self = length("m", 1.0, 1.0);
+    pub(crate) const FOOT: Self = length("ft", 0.3048, 1.0);
+    pub(crate) const US_SURVEY_FOOT: Self = length("US survey foot", 1200.0, 3937.0);
     /// For messages.
-    pub(crate) const KNOWN: &str = "m, dm, cm, mm, um, km, ft, us-ft, in";
+    pub(crate) const KNOWN: &str = "m, dm, cm, mm, um, km, ft, us-ft, yd, in";
 
     /// The unit of a name in lower case.
     pub(crate) fn named(name: &str) -> Option<Self> {
@@ -65,7 +100,7 @@ impl LengthUnit {
 
     /// Metres of a number of these. Those of a metre stay as they are, to the bit.
     #[inline]
-    pub(crate) fn metres(self, number: f64) -> f64 {
+    pub(crate) const fn metres(self, number: f64) -> f64 {
         number * self.times / self.per
     }
 }

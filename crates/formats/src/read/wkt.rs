@@ -1,14 +1,14 @@
 //! Units of coordinate systems as well-known text.
 
-use super::length_unit::LengthUnit;
+use super::crs_unit::CrsUnit;
 
 /// What well-known text says of its coordinates.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct WktUnits {
     /// The unit of x and y: the one that closes PROJCS (PROJCRS).
-    pub(super) flat: Option<LengthUnit>,
+    pub(super) flat: Option<CrsUnit>,
     /// The unit of z: the one of VERT_CS (VERTCRS).
-    pub(super) high: Option<LengthUnit>,
+    pub(super) high: Option<CrsUnit>,
     /// Coordinates are angles.
     pub(super) is_degrees: bool,
 }
@@ -45,7 +45,7 @@ fn node(upper: &str, name: &str) -> Option<usize> {
 /// The last unit of length directly within the node that a text starts with: `UNIT["foot",0.3048]`,
 /// `LENGTHUNIT["metre",1]`. Units of what is nested deeper (degrees, parameters) are passed by; axes of newer texts
 /// hold the unit themselves and count if there is none beside them.
-fn last_unit(text: &str) -> Option<LengthUnit> {
+fn last_unit(text: &str) -> Option<CrsUnit> {
     let (mut depth, mut is_quoted) = (0_u32, false);
     let (mut own, mut of_axis) = (None, None);
     let mut axis_depth = None;
@@ -93,11 +93,11 @@ fn last_unit(text: &str) -> Option<LengthUnit> {
 }
 
 /// A unit: its name between quotes, and its factor.
-fn unit(inside: &str) -> Option<LengthUnit> {
+fn unit(inside: &str) -> Option<CrsUnit> {
     let (name, rest) = inside.trim_start().strip_prefix('"')?.split_once('"')?;
     let rest = rest.split([']', ')']).next().unwrap_or_default();
     let factor = rest.split(',').nth(1).and_then(|factor| factor.trim().parse::<f64>().ok());
-    LengthUnit::of(name, factor.filter(|metres| *metres > 1e-6 && *metres < 1e6))
+    CrsUnit::of(name, factor.filter(|metres| *metres > 1e-6 && *metres < 1e6))
 }
 
 #[cfg(test)]
