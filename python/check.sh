@@ -36,7 +36,7 @@ if [[ $short ]]; then
     printf '#!%s\nfrom voxtile.__main__ import main\nmain()\n' "$python" >"$work/venv/bin/voxtile"
     chmod +x "$work/venv/bin/voxtile"
 else
-    MATURIN_PEP517_ARGS="--profile dev --locked" install .
+    CARGO_PROFILE_DEV_OPT_LEVEL=1 MATURIN_PEP517_ARGS="--profile dev --locked" install .
 fi
 # Beside the sources, Python would find the package without its module.
 cp -r tests "$work/tests"

@@ -31,12 +31,12 @@ fi
 
 voxtile=${VOXTILE:-}
 if [ -z "$voxtile" ]; then
-    cargo build -q --locked
+    cargo build -q --profile test --locked
     voxtile=$built/voxtile
 fi
 program=${VOXTILE_ROS2:-}
 if [ -z "$program" ] && [ "$*" != zenoh ]; then
-    cargo build -q --locked -p voxtile-ros2
+    cargo build -q --profile test --locked -p voxtile-ros2
     program=$built/voxtile-ros2
 fi
 voxtile=$(realpath "$voxtile") program=${program:+$(realpath "$program")}
@@ -161,7 +161,7 @@ zenoh() {
         return
     fi
     if [ -z "$program" ]; then
-        cargo build -q --locked -p voxtile-ros2 --features zenoh
+        cargo build -q --profile test --locked -p voxtile-ros2 --features zenoh
         program=$built/voxtile-ros2
     fi
     program=$(realpath "$program")

@@ -14,7 +14,7 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
 if [ -z "${VOXTILE_BIN-}" ]; then
-    cargo build --quiet --package voxtile-formats --all-features --example write_voxels
+    cargo build --quiet --profile test --package voxtile-formats --all-features --example write_voxels
     VOXTILE_BIN=$target/debug/examples
 fi
 

@@ -77,7 +77,8 @@ pub struct Args {
     /// End after so many seconds [default: with Ctrl-C or SIGTERM]
     #[arg(long = "for", value_name = "S")]
     pub seconds: Option<f64>,
-    /// Subscribing: end once every robot's layer is equal to its set, and was for three seconds
+    /// Subscribing: end once the layer of every robot, and of each robot that --robot names, has equalled its set for
+    /// three seconds
     #[arg(long)]
     pub until_equal: bool,
     /// Subscribing: leave MAP as it is; only keep the layers

@@ -221,12 +221,13 @@ impl Subscriber<'_> {
         }
     }
 
+    /// Returns whether there is a layer, one of each robot that `--robot` names, and all layers equal their sets.
     fn is_equal(&self) -> bool {
-        {
-            let mut known =
-                self.receivers.iter().filter(|(_, receiver)| receiver.layer().is_some()).peekable();
-            known.peek().is_some() && known.all(|(_, receiver)| receiver.is_converged())
-        }
+        let mut layers = self.receivers.iter().filter(|(_, receiver)| receiver.layer().is_some()).peekable();
+        let has_layer = |name| self.receivers.get(name).is_some_and(|receiver| receiver.layer().is_some());
+        layers.peek().is_some()
+            && self.args.robot.iter().all(has_layer)
+            && layers.all(|(_, receiver)| receiver.is_converged())
     }
 
     fn save(&mut self) {

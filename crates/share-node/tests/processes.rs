@@ -42,8 +42,9 @@ fn four_processes_and_a_bad_link_that_is_cut() {
     bad.start(&link, &[&robots[0], &robots[1]]);
     let sets = publishers.each_mut().map(set_of);
     let maps = ["x", "y"].map(|name| folder.path().join(name));
-    let subscribers =
-        maps.each_ref().map(|map| subscriber(map, &[&link], &["--until-equal", "--for", "150"]));
+    let subscribers = maps.each_ref().map(|map| {
+        subscriber(map, &[&link], &["--robot", "a", "--robot", "b", "--until-equal", "--for", "150"])
+    });
     for subscriber in subscribers {
         let layers = layers_of(&mut { subscriber });
         assert_eq!(layers.len(), 2, "{layers:?}");
