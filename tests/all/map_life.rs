@@ -111,14 +111,14 @@ fn the_power_goes_at_every_change_of_snapshots_where_files_have_one_name() {
 
 #[test]
 fn the_power_goes_at_every_change_of_replays() {
-    the_power_goes(&replays(), 24);
+    the_power_goes(&replays(), 48);
 }
 
 #[test]
 fn the_power_goes_some_time_after_a_kill() {
-    the_power_goes_after_a_kill(&removals(), 8);
-    the_power_goes_after_a_kill(&snapshots(), 32);
-    the_power_goes_after_a_kill(&replays(), 96);
+    the_power_goes_after_a_kill(&removals(), 16);
+    the_power_goes_after_a_kill(&snapshots(), 64);
+    the_power_goes_after_a_kill(&replays(), 192);
 }
 
 fn random_acts(random: &mut Random) -> Vec<Act> {

@@ -133,7 +133,7 @@ fn check_snapshots(path: &Path, kept: &BTreeMap<&str, Content>, what: &str) {
 #[test]
 fn any_life_of_a_map_equals_the_naive_map_as_of_then() {
     let config = MapConfig::new(0.2, 1.6).unwrap();
-    for seed in 0..cases(12, 60) {
+    for seed in 0..cases(8, 60) {
         let mode = if seed % 3 == 0 { InsertMode::PerRay } else { InsertMode::PerScan };
         let mut config = config
             .clone()
