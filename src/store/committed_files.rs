@@ -1,4 +1,4 @@
-//! The files of a map as of a flush, to be copied to another place: a folder of these and no others is the map.
+//! Lists the files that make up a map as of a flush, so that they can be copied elsewhere.
 
 use super::commit::commit_log::CommitLog;
 use super::disk::EntryKind;
@@ -15,42 +15,43 @@ use std::path::{Path, PathBuf};
 /// A file of a map as of a flush.
 #[derive(Clone, Debug)]
 pub struct CommittedFile {
-    /// Its path in the folder of the map, with `/` between names.
+    /// Path in the map's folder, with `/` between names.
     pub path: String,
-    /// What is in it.
+    /// Content, or where to read it.
     pub content: CommittedContent,
 }
 
-/// Where the content of a [`CommittedFile`] is.
+/// Source of the content of a [`CommittedFile`].
 #[derive(Clone, Debug)]
 pub enum CommittedContent {
-    /// Here: the file says what the map's own file says as of the flush.
+    /// The content itself, for files that are generated as of the flush.
     Bytes(Vec<u8>),
-    /// In the first of these files that has this checksum. Beside a writer it may be none of them any more.
+    /// The first of these files that has this checksum. A concurrent writer may have replaced or removed all of them.
     Stored {
-        /// Where to look.
+        /// Candidate paths, in the order to try.
         places: Vec<PathBuf>,
-        /// Tells whether it is the one; `None` where no log says it.
+        /// Identifies the right file; `None` if no log records its checksum.
         version: Option<FileVersion>,
     },
 }
 
-/// What tells the versions of a tile's file apart.
+/// Identity of a version of a tile's file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FileVersion {
     /// Length and checksum.
     pub checksum: FileChecksum,
-    /// Number of the last scan that the map had taken when it was written.
+    /// Number of the last scan in the map when the file was written.
     pub scan_number: u64,
 }
 
 impl TileStore {
-    /// The files of the map that belong to no tile, `metadata.json` last: whoever finds it finds the others.
+    /// Returns the files of the map that belong to no tile. `metadata.json` is last, so that a reader that finds it in
+    /// a copy finds all other files too.
     ///
     /// # Errors
     ///
-    /// A catalog of kept scans that is damaged or missing, a segment that is missing or too short; next to a writer also
-    /// because it removed them since the map was opened. A disk that refuses.
+    /// A damaged or missing catalog of kept scans, a missing or truncated segment (also if a writer removed it after
+    /// the map was opened), or an I/O error.
     pub fn committed_files(&self, snapshots: &[Snapshot]) -> Result<Vec<CommittedFile>> {
         let mut files = Vec::new();
         for snapshot in snapshots {
@@ -72,11 +73,11 @@ impl TileStore {
         Ok(files)
     }
 
-    /// The files of a tile that the map or one of its snapshots sees.
+    /// Returns the files of a tile that the map or one of its snapshots uses.
     ///
     /// # Errors
     ///
-    /// [`Error::Changed`] if a writer was faster; a folder that cannot be listed.
+    /// [`Error::Changed`] if a writer has replaced the files meanwhile, or a folder that cannot be listed.
     pub fn committed_files_of(&self, tile: TileIndex, snapshots: &[Snapshot]) -> Result<Vec<CommittedFile>> {
         let mut files = Vec::new();
         let version = self.tiles().version(tile);
@@ -91,7 +92,7 @@ impl TileStore {
                     files.push(self.at_places(octree, vec![self.layout().next(tile, TileFile::Octree)]));
                 }
             }
-            // Of a map without a log.
+            // A map of the original format has no log, hence no versions.
             None if self.tiles().contains(tile) => {
                 for file in self.layout().files() {
                     let path = self.layout().current(tile, *file);
@@ -110,7 +111,7 @@ impl TileStore {
             }
             let kept = self.tables().kept(tile)?;
             let Some(flush_number) = seen_by(Some(&kept), snapshot.commits.flush_number) else {
-                // It was in place a moment ago.
+                // The kept table existed when the tile was read: a writer removed it.
                 return Err(Error::Changed { path: self.folder().to_owned() });
             };
             if seen_kept.insert(flush_number) {

@@ -7,107 +7,108 @@ use std::sync::Arc;
 use std::thread;
 use std::time::Duration;
 
-/// The interface to the file system: every operation on a map's files, one method each.
+/// Interface to the file system, with one method for each operation on a map's files.
 ///
-/// [`FsDisk`](super::FsDisk) is the real one; tests put in disks that fail, fill up or crash.
+/// [`FsDisk`](super::FsDisk) is the file system. Tests use disks that fail, fill up or crash.
 pub trait Disk: Debug + Send + Sync {
-    /// Opens a file for reading. Anything else, a symbolic link too, is an error of the kind `InvalidInput`.
+    /// Opens a regular file for reading. Other kinds of files, including symbolic links, are an error of kind
+    /// `InvalidInput`.
     fn open(&self, path: &Path) -> io::Result<Box<dyn DiskRead>>;
-    /// Opens a file for reading from `offset` on.
+    /// Opens a file for reading, starting at `offset`.
     fn open_at(&self, path: &Path, offset: u64) -> io::Result<Box<dyn DiskRead>> {
         let mut input = self.open(path)?;
         io::copy(&mut input.by_ref().take(offset), &mut io::sink())?;
         Ok(input)
     }
-    /// Reads some bytes of a file, fewer if it ends before.
+    /// Reads up to `bytes` bytes at `offset`, fewer at the end of the file.
     fn read_at(&self, path: &Path, offset: u64, bytes: usize) -> io::Result<Vec<u8>> {
         let mut read = Vec::new();
         self.open_at(path, offset)?.take(bytes as u64).read_to_end(&mut read)?;
         Ok(read)
     }
-    /// Opens a file for reading and counts as its reader until the result is dropped: [`Disk::watch`] tells. Where
-    /// the file system has no locks, the file is opened and nobody can tell.
+    /// Opens a file for reading and registers as its reader until the result is dropped, see [`Disk::watch`]. On a file
+    /// system without locks the file is opened, but its reader cannot be detected.
     fn open_shared(&self, path: &Path) -> io::Result<Box<dyn DiskRead>>;
-    /// Watches for readers of the file that has the name now, even after another file took its name.
+    /// Watches for readers of the file that has this name now, even after another file replaces it.
     fn watch(&self, path: &Path) -> io::Result<Box<dyn ReaderWatch>>;
-    /// Creates a file, or empties it, for writing from the beginning. A file with other names too ([`Disk::link`])
-    /// keeps its content under those.
+    /// Creates or truncates a file for writing. If the file has other hard links ([`Disk::link`]), their content is
+    /// unchanged.
     fn create(&self, path: &Path) -> io::Result<Box<dyn DiskWrite>>;
-    /// Opens a file, which must be there and be that long, for writing from `offset` on; what stood there is cut off.
+    /// Opens an existing file of at least `offset` bytes, truncates it to `offset`, and appends from there.
     fn append(&self, path: &Path, offset: u64) -> io::Result<Box<dyn DiskWrite>>;
     /// Makes a file's content durable.
     fn sync_file(&self, path: &Path) -> io::Result<()>;
-    /// Makes the names in a folder durable.
+    /// Makes the entries of a folder durable.
     fn sync_folder(&self, path: &Path) -> io::Result<()>;
-    /// Makes the content of many files and then the names in many folders durable, in any order among the files and
-    /// among the folders. Answers with the results for the files and for the folders.
+    /// Makes the content of files and then the entries of folders durable, each in any order. Returns the results of
+    /// the files and of the folders.
     fn sync_all(&self, files: &[PathBuf], folders: &[PathBuf]) -> [Vec<io::Result<()>>; 2] {
         [
             files.iter().map(|path| self.sync_file(path)).collect(),
             folders.iter().map(|path| self.sync_folder(path)).collect(),
         ]
     }
-    /// Renames a file, replacing what had the new name, or a folder to a name that nothing has.
+    /// Renames a file, replacing an existing file, or renames a folder to an unused name.
     fn rename(&self, from: &Path, to: &Path) -> io::Result<()>;
-    /// Gives each of two folders the name of the other, at once. An error where that cannot be done at once.
+    /// Swaps the names of two folders atomically. Fails where the file system does not support that.
     fn exchange(&self, _: &Path, _: &Path) -> io::Result<()> {
         Err(io::ErrorKind::Unsupported.into())
     }
-    /// Gives a file another name, which nothing has; the two are one file. An error where files have one name only.
+    /// Creates a hard link with an unused name. Fails where the file system has no hard links.
     fn link(&self, _: &Path, _: &Path) -> io::Result<()> {
         Err(io::ErrorKind::Unsupported.into())
     }
     /// Removes a file.
     fn remove_file(&self, path: &Path) -> io::Result<()>;
-    /// Makes a folder; its parents must exist.
+    /// Creates a folder. Its parent must exist.
     fn create_folder(&self, path: &Path) -> io::Result<()>;
     /// Removes an empty folder.
     fn remove_folder(&self, path: &Path) -> io::Result<()>;
-    /// The names in a folder, in no particular order; names that are not UTF-8 are left out.
+    /// Lists the names in a folder, in no particular order. Names that are not UTF-8 are omitted.
     fn list(&self, path: &Path) -> io::Result<Vec<String>>;
-    /// A file without a name on the same file system as a folder, which goes when it is dropped.
+    /// Creates an unnamed file on the file system of `folder`. It is deleted when it is dropped.
     fn scratch(&self, folder: &Path) -> io::Result<Box<dyn Scratch>>;
-    /// What has a name, links not followed; `None` if nothing has.
+    /// Returns the kind of a directory entry without following links; `None` if the name does not exist.
     fn kind(&self, path: &Path) -> io::Result<Option<EntryKind>>;
-    /// The same place as an absolute path without links, as far as it is there.
+    /// Returns `path` as an absolute path, with links resolved in the part that exists.
     fn resolve(&self, path: &Path) -> io::Result<PathBuf> {
         Ok(path.to_owned())
     }
-    /// Locks a file, made if missing, until the returned value is dropped; `None` if another holds it. Only who may
-    /// write the file can lock it.
+    /// Locks a file, which is created if missing, until the returned value is dropped. Returns `None` if the lock is
+    /// held elsewhere. Requires write permission for the file.
     fn lock(&self, path: &Path) -> io::Result<Option<Box<dyn DiskLock>>>;
-    /// The present state of what this disk shows as of a moment; `None` if it has not changed, or if this disk shows
-    /// what is there at any moment, as most do.
+    /// Returns the current state if this disk is a view of a past state and the content has changed since; otherwise
+    /// `None`. Most disks always show the current state.
     fn newer(&self) -> io::Result<Option<Arc<dyn Disk>>> {
         Ok(None)
     }
-    /// How many files are worth naming by [`Disk::read_ahead`]: none where reading takes no longer than asking.
+    /// Number of files worth announcing by [`Disk::read_ahead`] at a time; 0 if read-ahead does not help.
     fn files_ahead(&self) -> usize {
         0
     }
-    /// Says that a file will be opened soon. What goes wrong is told when it is.
+    /// Announces that a file will be opened soon. Errors are reported when the file is opened.
     fn read_ahead(&self, _: &Path) {}
-    /// Waits a moment for another process.
+    /// Waits briefly for another process.
     fn pause(&self) {
         thread::sleep(Duration::from_millis(2));
     }
 }
 
 impl dyn Disk + '_ {
-    /// [`Disk::kind`], whose error names the path.
+    /// Like [`Disk::kind`], with an error that names the path.
     pub fn kind_at(&self, path: &Path) -> Result<Option<EntryKind>> {
         self.kind(path).map_err(|error| Error::io(path, "look at", error))
     }
 }
 
-/// What a name in a folder stands for.
+/// Kind of a directory entry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EntryKind {
-    /// A file of so many bytes.
+    /// A regular file with its length in bytes.
     File(u64),
     /// A folder.
     Folder,
-    /// A symbolic link or something else that a map does not contain.
+    /// A symbolic link or another kind of entry that a map does not contain.
     Other,
 }
 
@@ -117,20 +118,21 @@ pub trait DiskRead: Read + Send {
     fn file_bytes(&self) -> u64;
 }
 
-/// Tells whether a file has readers.
+/// Detects readers of a file.
 pub trait ReaderWatch: Send + Sync {
-    /// Whether some process holds the file open by [`Disk::open_shared`].
+    /// Returns whether a process holds the file open by [`Disk::open_shared`].
     fn has_readers(&self) -> bool;
 }
 
 /// A lock that is held until it is dropped.
 pub trait DiskLock: Send + Sync {
-    /// Whether the locked file still has its name. If it has not, another process can lock the one that has.
+    /// Returns whether the locked file still has its name. If not, another process can lock the file that has the name
+    /// now.
     fn is_in_place(&self) -> io::Result<bool>;
 }
 
 /// A file open for writing.
 pub trait DiskWrite: Write + Send {
-    /// Makes what was written durable.
+    /// Makes the written bytes durable.
     fn sync(&mut self) -> io::Result<()>;
 }

@@ -9,11 +9,11 @@ use std::thread;
 use std::time::Duration;
 use voxtile_scratch::ScratchFile;
 
-/// The real file system.
+/// The file system of the operating system.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FsDisk;
 
-/// How often a lock is tried, one millisecond apart, before it counts as held.
+/// Number of attempts to take a lock, one millisecond apart.
 const LOCK_ATTEMPTS: usize = 100;
 
 struct FsRead {
@@ -37,7 +37,7 @@ impl Disk for FsDisk {
 
     fn open_shared(&self, path: &Path) -> io::Result<Box<dyn DiskRead>> {
         let file = File::open(only_a_file(path)?)?;
-        // A writer that looks for readers holds the lock for an instant.
+        // A writer that checks for readers holds the lock for an instant.
         for _ in 0..LOCK_ATTEMPTS {
             match file.try_lock_shared() {
                 Err(TryLockError::WouldBlock) => thread::sleep(Duration::from_millis(1)),
@@ -77,7 +77,7 @@ impl Disk for FsDisk {
     }
 
     fn sync_folder(&self, path: &Path) -> io::Result<()> {
-        // Only Unix lets a folder be opened and synced; elsewhere renames are durable by themselves.
+        // Only Unix can open and sync a folder. On other systems renames are durable by themselves.
         if cfg!(unix) { File::open(path)?.sync_all() } else { Ok(()) }
     }
 
@@ -96,7 +96,7 @@ impl Disk for FsDisk {
     }
 
     fn link(&self, from: &Path, to: &Path) -> io::Result<()> {
-        // Elsewhere it cannot be told that a file has other names.
+        // Other systems do not report the number of hard links, see `has_other_names`.
         if cfg!(unix) {
             fs::hard_link(only_a_file(from)?, to)
         } else {
@@ -152,11 +152,11 @@ impl Disk for FsDisk {
     }
 
     fn lock(&self, path: &Path) -> io::Result<Option<Box<dyn DiskLock>>> {
-        // A process that this one is just starting holds all its files for an instant, let go or not.
+        // A child process being started holds copies of all our file handles for an instant, including released locks.
         for _ in 0..LOCK_ATTEMPTS {
             let lock = FsLock { file: open_for_writers(only_a_file(path)?)?, path: path.to_owned() };
             match lock.file.try_lock() {
-                // Between the two steps the file may have been removed, and another process have made the next.
+                // Between open and lock another process may have removed the file and created a new one.
                 Ok(()) if lock.is_in_place()? => return Ok(Some(Box::new(lock))),
                 Ok(()) => {}
                 Err(TryLockError::WouldBlock) => thread::sleep(Duration::from_millis(1)),
@@ -184,14 +184,15 @@ impl DiskLock for FsLock {
         }
     }
 
-    /// A file that is open keeps its name there.
+    /// An open file keeps its name on these systems.
     #[cfg(not(unix))]
     fn is_in_place(&self) -> io::Result<bool> {
         self.path.try_exists()
     }
 }
 
-/// Opens a file, made if missing, that only who may write it can open: everybody who can open a file can lock it.
+/// Opens or creates the lock file such that only processes with write permission can open it. Read permission would
+/// suffice to take the lock.
 fn open_for_writers(path: &Path) -> io::Result<File> {
     let mut options = OpenOptions::new();
     options.write(true).create(true).truncate(false);
@@ -200,10 +201,10 @@ fn open_for_writers(path: &Path) -> io::Result<File> {
         use std::os::unix::fs::{OpenOptionsExt, PermissionsExt};
         let file = options.mode(0o622).open(path)?;
         let mode = file.metadata()?.permissions().mode();
-        // Group and others: who may not write may not read.
+        // Group and others without write permission lose read permission.
         let unwritten = !(mode << 1) & 0o044;
         if mode & unwritten != 0 {
-            // Only its owner can; to others it is as before.
+            // Only the owner can change the mode. For other users the file remains as it is.
             let _ = file.set_permissions(fs::Permissions::from_mode(mode & !unwritten));
         }
         Ok(file)
@@ -228,10 +229,10 @@ impl ReaderWatch for File {
     fn has_readers(&self) -> bool {
         match self.try_lock() {
             Err(TryLockError::WouldBlock) => true,
-            // Without locks no reader can hold one.
+            // Without locks, readers cannot be detected.
             Err(TryLockError::Error(_)) => false,
             Ok(()) => {
-                // Closing the file would release it too.
+                // Dropping the file would release the lock too, but only later.
                 let _ = self.unlock();
                 false
             }
@@ -245,10 +246,10 @@ impl DiskWrite for File {
     }
 }
 
-/// Syncs many paths. A sync is waiting, not work: a file system that is asked for several at once writes them together.
+/// Syncs many paths concurrently: a file system combines concurrent syncs.
 fn at_once(paths: &[PathBuf], sync: impl Fn(&Path) -> io::Result<()> + Sync) -> Vec<io::Result<()>> {
     const AT_ONCE: usize = 16;
-    /// Enough for a call of the system: sixteen of the usual stacks would be 32 MiB of addresses at each flush.
+    /// Enough for a system call. Sixteen default stacks would reserve 32 MiB of addresses at each flush.
     const STACK_BYTES: usize = 128 << 10;
     if paths.len() < 2 {
         return paths.iter().map(|path| sync(path)).collect();
@@ -264,7 +265,7 @@ fn at_once(paths: &[PathBuf], sync: impl Fn(&Path) -> io::Result<()> + Sync) -> 
     };
     thread::scope(|scope| {
         for _ in 1..AT_ONCE.min(paths.len()) {
-            // Where no thread is to be had, this one does it all.
+            // If no thread can be started, this thread syncs all paths.
             let _ = thread::Builder::new().stack_size(STACK_BYTES).spawn_scoped(scope, sync_next);
         }
         sync_next();
@@ -273,7 +274,7 @@ fn at_once(paths: &[PathBuf], sync: impl Fn(&Path) -> io::Result<()> + Sync) -> 
     results.into_iter().map(|result| result.into_inner().unwrap_or_else(never_tried)).collect()
 }
 
-/// Whether a file has names beside this one.
+/// Returns whether a file has more than one hard link.
 fn has_other_names(path: &Path) -> bool {
     #[cfg(unix)]
     let names = |metadata: fs::Metadata| std::os::unix::fs::MetadataExt::nlink(&metadata);
@@ -282,8 +283,8 @@ fn has_other_names(path: &Path) -> bool {
     fs::symlink_metadata(path).is_ok_and(|metadata| metadata.is_file() && names(metadata) > 1)
 }
 
-/// A link inside a map could lead anywhere, and a pipe would be waited for: only files are opened, and names that
-/// nothing has.
+/// Rejects names of anything but regular files: a symbolic link could lead out of the map, and opening a FIFO blocks.
+/// Names that do not exist are accepted.
 fn only_a_file(path: &Path) -> io::Result<&Path> {
     match fs::symlink_metadata(path) {
         Ok(metadata) if !metadata.is_file() => {

@@ -3,25 +3,25 @@ use crate::config::Storage;
 use crate::space::TileIndex;
 use std::path::{Path, PathBuf};
 
-/// Where the files of a map are.
+/// Paths of the files of a map.
 #[derive(Clone, Debug)]
 pub struct Layout {
     folder: PathBuf,
     storage: Storage,
 }
 
-/// One of the files of a tile.
+/// File of a tile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TileFile {
-    /// `iwlo_meta.bin`, or with compact storage `tile.vxt`: the exact table.
+    /// Table of exact evidence: `iwlo_meta.bin`, or `tile.vxt` with compact storage.
     Table,
-    /// `octree.bt`: the octree as OctoMap writes it; not with compact storage.
+    /// Octree in OctoMap's format: `octree.bt`. Absent with compact storage.
     Octree,
 }
 
 impl TileFile {
-    /// The files that a tile has, in the order in which they are written and renamed: the table, which names the
-    /// octree's checksum, comes last.
+    /// Returns the files of a tile in the order in which they are written and renamed. The table is last because it
+    /// contains the checksum of the octree.
     pub const fn all(storage: Storage) -> &'static [Self] {
         match storage {
             Storage::OctoMap => &[Self::Octree, Self::Table],
@@ -29,7 +29,7 @@ impl TileFile {
         }
     }
 
-    /// The file's name.
+    /// Returns the name of the file.
     pub const fn name(self, storage: Storage) -> &'static str {
         match (self, storage) {
             (Self::Table, Storage::OctoMap) => "iwlo_meta.bin",
@@ -38,7 +38,7 @@ impl TileFile {
         }
     }
 
-    /// The name of the version that waits for the next commit.
+    /// Returns the name of the version to be committed next.
     pub const fn next_name(self, storage: Storage) -> &'static str {
         match (self, storage) {
             (Self::Table, Storage::OctoMap) => "iwlo_meta.bin.next",
@@ -49,12 +49,12 @@ impl TileFile {
 }
 
 impl Layout {
-    /// The layout of the map in `folder`, if its tiles are the original files.
+    /// Returns the layout of the map in `folder` with [`Storage::OctoMap`].
     pub fn new(folder: impl Into<PathBuf>) -> Self {
         Self { folder: folder.into(), storage: Storage::OctoMap }
     }
 
-    /// The same with tiles stored in this way.
+    /// Returns the layout with this storage of tiles.
     pub fn with_storage(self, storage: Storage) -> Self {
         Self { storage, ..self }
     }
@@ -64,12 +64,12 @@ impl Layout {
         self.storage
     }
 
-    /// The files that each tile has, in the order in which they are written and renamed.
+    /// Files of each tile, in the order in which they are written and renamed.
     pub fn files(&self) -> &'static [TileFile] {
         TileFile::all(self.storage)
     }
 
-    /// The map's own folder.
+    /// The map's folder.
     pub fn folder(&self) -> &Path {
         &self.folder
     }
@@ -89,42 +89,42 @@ impl Layout {
         self.folder.join("scans.bin")
     }
 
-    /// What is to take the place of a damaged `scans.bin`.
+    /// Replacement of a damaged `scans.bin`, before it is renamed.
     pub(super) fn scans_next(&self) -> PathBuf {
         self.folder.join(SCANS_NEXT)
     }
 
-    /// The folder of the scans that the map keeps.
+    /// The folder of kept scans.
     pub fn kept_scans(&self) -> PathBuf {
         self.folder.join(KEPT_SCANS)
     }
 
-    /// A catalog of these scans: which there are from a flush on.
+    /// A catalog of kept scans. Each flush that changes the kept scans names one.
     pub(super) fn catalog(&self, generation: u64) -> PathBuf {
         self.kept_scans().join(format!("{CATALOG_PREFIX}{generation}"))
     }
 
-    /// The generation of a catalog's name; `None` for another name.
+    /// Parses the generation in a catalog's name; `None` for another name.
     pub(super) fn generation_of(name: &str) -> Option<u64> {
         number_behind(CATALOG_PREFIX, name)
     }
 
-    /// A file with the points of some of them.
+    /// A file with the points of some kept scans.
     pub(super) fn segment(&self, segment: u64) -> PathBuf {
         self.kept_scans().join(format!("{SEGMENT_PREFIX}{segment}"))
     }
 
-    /// The number of a segment's name; `None` for another name.
+    /// Parses the number in a segment's name; `None` for another name.
     pub(super) fn segment_of(name: &str) -> Option<u64> {
         number_behind(SEGMENT_PREFIX, name)
     }
 
-    /// Whether a file of the folder of kept scans has this name.
+    /// Returns whether the name is that of a catalog or a segment.
     pub fn is_of_kept_scans(name: &str) -> bool {
         Self::generation_of(name).is_some() || Self::segment_of(name).is_some()
     }
 
-    /// The file that a writer holds locked.
+    /// The lock file of the writer.
     pub fn lock(&self) -> PathBuf {
         self.folder.join("writer.lock")
     }
@@ -139,24 +139,23 @@ impl Layout {
         self.tile_folder(tile).join(file.name(self.storage))
     }
 
-    /// The table of a tile as of a flush, kept beside newer ones for readers that opened the map then and for
-    /// snapshots.
+    /// The table of a tile as of a flush. It is kept for readers that opened the map then and for snapshots.
     pub fn kept(&self, tile: TileIndex, flush_number: u64) -> PathBuf {
         let table = TileFile::Table.name(self.storage);
         self.tile_folder(tile).join(format!("{table}{KEPT_SUFFIX}{flush_number}"))
     }
 
-    /// The flush number of a kept table's name; `None` for another name.
+    /// Parses the flush number in a kept table's name; `None` for another name.
     pub fn flush_of_kept(&self, name: &str) -> Option<u64> {
         number_behind(KEPT_SUFFIX, name.strip_prefix(TileFile::Table.name(self.storage))?)
     }
 
-    /// Spilled updates of a tile, while the map is written to.
+    /// Spilled updates of a tile, which exist only while the map is written.
     pub fn spill(&self, tile: TileIndex) -> PathBuf {
         self.tile_folder(tile).join(SPILL)
     }
 
-    /// A file that is to take the place of a tile's next version, until it is whole.
+    /// A replacement of a tile's next version, while it is incomplete.
     pub(super) fn replacement(&self, tile: TileIndex) -> PathBuf {
         self.tile_folder(tile).join(REPLACEMENT)
     }
@@ -166,79 +165,76 @@ impl Layout {
         self.folder.join(SNAPSHOTS)
     }
 
-    /// A snapshot.
+    /// The file of a snapshot.
     pub fn snapshot(&self, name: &SnapshotName) -> PathBuf {
         self.snapshots().join(name.as_str())
     }
 
-    /// A snapshot that is being written; no snapshot has such a name.
+    /// A snapshot that is being written. No snapshot has this name.
     pub(super) fn snapshot_next(&self) -> PathBuf {
         self.snapshots().join(SNAPSHOT_NEXT)
     }
 
-    /// Where repair puts what it takes out of the map.
+    /// The folder for files that repair removes from the map.
     pub fn quarantine(&self) -> PathBuf {
         self.folder.join(QUARANTINE)
     }
 
-    /// Whether a file of the map's own folder has this name until it takes the place of another, or is given up.
+    /// Returns whether the name is that of a temporary file in the map's folder, which is renamed or discarded.
     pub fn is_next_of_map(name: &str) -> bool {
         OWN_NEXT.contains(&name) || name == SCANS_NEXT
     }
 
-    /// The same of a file in the folder of a tile.
+    /// Returns whether the name is that of a temporary file in a tile's folder, which is renamed or discarded.
     pub fn is_next_of_tile(&self, name: &str) -> bool {
         let is_version = self.files().iter().any(|file| file.next_name(self.storage) == name);
         is_version || name == SPILL || name == REPLACEMENT
     }
 
-    /// The version of a tile's file that waits for the next commit.
+    /// The version of a tile's file to be committed next.
     pub fn next(&self, tile: TileIndex, file: TileFile) -> PathBuf {
         self.tile_folder(tile).join(file.next_name(self.storage))
     }
 }
 
-/// What takes the place of `metadata.json` and of `commits.log`, until it is whole.
+/// Replacements of `metadata.json` and `commits.log`, before they are renamed.
 pub(super) const OWN_NEXT: [&str; 2] = ["metadata.json.next", "commits.log.next"];
 
-/// What takes the place of a damaged `scans.bin`.
 const SCANS_NEXT: &str = "scans.bin.next";
 
-/// The name of the file of updates that wait for a tile. Like all that no commit names, it ends with `.next`.
+/// File of spilled updates of a tile. The name ends with `.next` like those of all uncommitted files.
 pub(super) const SPILL: &str = "updates.next";
 
-/// The name of a file that is to take the place of a next version, until it is whole.
 pub(super) const REPLACEMENT: &str = "replacement.next";
 
-/// The name of the folder for what repair takes out of the map.
+/// Name of the folder for files that repair removes from the map.
 pub const QUARANTINE: &str = "quarantine";
 
-/// The name of the folder of snapshots.
+/// Name of the folder of snapshots.
 pub const SNAPSHOTS: &str = "snapshots";
 
-/// The name of the file in it that is being written.
+/// Name of a snapshot that is being written.
 pub const SNAPSHOT_NEXT: &str = ".next";
 
-/// The name of the folder of the scans that a map keeps.
+/// Name of the folder of kept scans.
 pub const KEPT_SCANS: &str = "kept_scans";
 
 const CATALOG_PREFIX: &str = "catalog.";
 const SEGMENT_PREFIX: &str = "segment.";
 const KEPT_SUFFIX: &str = ".flush";
 
-/// The number behind a prefix; `None` for another name.
 fn number_behind(prefix: &str, name: &str) -> Option<u64> {
     let number = name.strip_prefix(prefix)?;
-    // Only the canonical spelling: the store would look for 7, not for 007.
+    // Reject other spellings such as `007`: the store would look for `7`.
     number.parse().ok().filter(|parsed: &u64| parsed.to_string() == number)
 }
 
-/// The name of a tile's folder, such as `tile_0_1_-1`.
+/// Returns the name of a tile's folder, such as `tile_0_1_-1`.
 pub fn folder_name(tile: TileIndex) -> String {
     format!("tile_{}_{}_{}", tile.x, tile.y, tile.z)
 }
 
-/// The tile of a folder's name; `None` for any other spelling than [`folder_name`]'s.
+/// Parses the name of a tile's folder; `None` for any spelling other than [`folder_name`]'s.
 pub fn tile_of_folder(name: &str) -> Option<TileIndex> {
     let mut numbers = name.strip_prefix("tile_")?.split('_').map(str::parse);
     let tile = TileIndex::new(numbers.next()?.ok()?, numbers.next()?.ok()?, numbers.next()?.ok()?);

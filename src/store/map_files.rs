@@ -5,7 +5,7 @@ use std::io;
 use std::path::Path;
 use std::sync::Arc;
 
-/// A map's files: where they are, and the operations on them. Every error names its path.
+/// Layout of a map and operations on its files. Errors name the path.
 #[derive(Clone, Debug)]
 pub(super) struct MapFiles {
     disk: Arc<dyn Disk>,
@@ -25,12 +25,11 @@ impl MapFiles {
         &self.layout
     }
 
-    /// The map's folder.
     pub(super) fn folder(&self) -> &Path {
         self.layout.folder()
     }
 
-    /// Renames a file. One that is not there was renamed by an earlier attempt, or never was.
+    /// Renames a file. A missing file is ignored: an earlier attempt may have renamed it.
     pub(super) fn rename(&self, from: &Path, to: &Path) -> Result<()> {
         match self.disk.rename(from, to) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
@@ -38,7 +37,7 @@ impl MapFiles {
         }
     }
 
-    /// Removes a file, if it is there.
+    /// Removes a file if it exists.
     pub(super) fn remove_file(&self, path: &Path) -> Result<()> {
         match self.disk.remove_file(path) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
@@ -46,7 +45,6 @@ impl MapFiles {
         }
     }
 
-    /// What has this name, if anything does.
     pub(super) fn kind(&self, path: &Path) -> Result<Option<EntryKind>> {
         self.disk.kind_at(path)
     }
@@ -55,7 +53,7 @@ impl MapFiles {
         self.disk.sync_folder(folder).map_err(|error| Error::io(folder, "sync", error))
     }
 
-    /// Syncs the map's own folder: the names in it are durable then.
+    /// Makes the names in the map's folder durable.
     pub(super) fn sync_map_folder(&self) -> Result<()> {
         self.sync_folder(self.folder())
     }

@@ -1,4 +1,4 @@
-//! The folder of a map as a whole: its two own files, its tile folders.
+//! Operations on the folder of a map: `metadata.json`, `commits.log` and the list of tile folders.
 
 use super::commit::commit_log::CommitLog;
 use super::commit::commits::Commits;
@@ -11,7 +11,7 @@ use rustc_hash::FxHashSet;
 use std::io::{self, Write};
 use std::path::Path;
 
-/// A folder for a new map holds nothing but what an interrupted creation may have left.
+/// Checks that a folder for a new map is empty except for the remains of an interrupted creation.
 pub(super) fn check_is_free(disk: &dyn Disk, folder: &Path) -> Result<()> {
     let names = disk.list(folder).map_err(|error| Error::io(folder, "list", error))?;
     let leftovers = ["writer.lock", "commits.log", "metadata.json.next"];
@@ -22,7 +22,7 @@ pub(super) fn check_is_free(disk: &dyn Disk, folder: &Path) -> Result<()> {
     Err(Error::AlreadyExists { path: folder.to_owned(), hint })
 }
 
-/// Makes a folder and those above it, durably: a map must not vanish with the name of its folder.
+/// Creates a folder and its missing parents durably, so that a map cannot disappear with the name of its folder.
 pub(super) fn create_folders(disk: &dyn Disk, folder: &Path) -> Result<()> {
     let Some(parent) = folder.parent() else { return Ok(()) };
     let is_relative_end = parent.as_os_str().is_empty();
@@ -32,13 +32,14 @@ pub(super) fn create_folders(disk: &dyn Disk, folder: &Path) -> Result<()> {
         create_folders(disk, parent)?;
     }
     if is_there {
-        // Perhaps made by an attempt that failed to sync. Where others made it, their folders may refuse.
+        // An earlier attempt may have failed to sync. Folders of other users may refuse the sync, so errors are
+        // ignored.
         let _ = disk.sync_folder(parent);
         return Ok(());
     }
     disk.create_folder(folder).map_err(|error| Error::io(folder, "create", error))?;
     disk.sync_folder(parent).map_err(|error| {
-        // Left behind, it would count as durable the next time.
+        // If the folder remained, the next attempt would assume that its name is durable.
         let _ = disk.remove_folder(folder);
         Error::io(parent, "sync", error)
     })
@@ -52,8 +53,8 @@ pub(super) fn parent_of(folder: &Path) -> &Path {
     }
 }
 
-/// Replaces a file as a whole: `write` makes its successor beside it, synced, and that takes its name. The name is
-/// durable once the folder has been synced.
+/// Replaces a file atomically: `write` creates and syncs `*.next`, which is then renamed. The name is durable after the
+/// next sync of the folder.
 pub(super) fn replace<T>(
     disk: &dyn Disk,
     path: &Path,
@@ -66,14 +67,14 @@ pub(super) fn replace<T>(
         Ok(written)
     };
     replaced().map_err(|error| {
-        // Written anew by the next attempt, which may never come.
+        // The next attempt writes it again, but there may be none.
         let _ = disk.remove_file(&next);
         Error::io(path, "replace", error)
     })
 }
 
-/// Removes the folder of a tile that is no part of the map. It stays if somebody else's files are in it, perhaps under
-/// names that no list shows; what was taken out of it is durable then.
+/// Removes the folder of a tile that is not part of the map. A folder that contains other files, perhaps with names
+/// that are not UTF-8, is kept, and the removals in it are made durable.
 pub(super) fn remove_unless_used(disk: &dyn Disk, folder: &Path) -> io::Result<()> {
     match disk.remove_folder(folder) {
         Err(error) if error.kind() == io::ErrorKind::DirectoryNotEmpty => disk.sync_folder(folder),
@@ -81,7 +82,7 @@ pub(super) fn remove_unless_used(disk: &dyn Disk, folder: &Path) -> io::Result<(
     }
 }
 
-/// Writes a text to a file, synced.
+/// Writes and syncs a text file.
 pub(super) fn write_text(disk: &dyn Disk, path: &Path, text: &str) -> io::Result<()> {
     let mut out = disk.create(path)?;
     out.write_all(text.as_bytes())?;
@@ -97,7 +98,7 @@ pub(super) fn read_metadata(disk: &dyn Disk, layout: &Layout) -> Result<Metadata
     }
 }
 
-/// Reads `metadata.json` and counts as its reader as long as the returned file is held.
+/// Reads `metadata.json` and registers as its reader until the returned file is dropped.
 pub(super) fn read_metadata_shared(
     disk: &dyn Disk,
     layout: &Layout,
@@ -110,7 +111,7 @@ pub(super) fn read_metadata_shared(
 }
 
 fn metadata_from(input: &mut dyn DiskRead, path: &Path) -> Result<Metadata> {
-    // Ours has less than a mebibyte. Earlier versions wrote more for many inputs with long names.
+    // Files of this version are below 1 MiB. Earlier versions wrote larger ones for many inputs with long names.
     const LIMIT: u64 = 64 << 20;
     if input.file_bytes() > LIMIT {
         return Err(FormatError::at_offset(LIMIT, "too long for a map's metadata").in_map(path, None));
@@ -123,7 +124,7 @@ fn metadata_from(input: &mut dyn DiskRead, path: &Path) -> Result<Metadata> {
     Metadata::from_text(&text).map_err(|error| DecodeError::from(error).in_map(path, None))
 }
 
-/// A folder without `metadata.json` is no map, unless there are tiles in it.
+/// Returns the error for a missing `metadata.json`: damage if the folder contains tiles, otherwise no map.
 fn without_metadata(disk: &dyn Disk, layout: &Layout, error: io::Error) -> Error {
     let path = layout.metadata();
     if error.kind() != io::ErrorKind::NotFound {
@@ -137,11 +138,11 @@ fn without_metadata(disk: &dyn Disk, layout: &Layout, error: io::Error) -> Error
     Error::NoMap { path: layout.folder().to_owned() }
 }
 
-/// Reads `commits.log`; `None` if there is none.
+/// Reads `commits.log`; `None` if it does not exist.
 ///
 /// # Errors
 ///
-/// Damage, or a disk that refuses.
+/// Damage or an I/O error.
 pub fn read_log(disk: &dyn Disk, layout: &Layout) -> Result<Option<(CommitLog, Commits)>> {
     let path = layout.commit_log();
     match disk.open(&path) {
@@ -155,12 +156,12 @@ pub fn read_log(disk: &dyn Disk, layout: &Layout) -> Result<Option<(CommitLog, C
     }
 }
 
-/// The tiles of a map of the original format, which has no log.
+/// Lists the tiles of a map of the original format, which has no log.
 pub(super) fn list_foreign_tiles(disk: &dyn Disk, layout: &Layout) -> Result<FxHashSet<TileIndex>> {
     let names = disk.list(layout.folder()).map_err(|error| Error::io(layout.folder(), "list", error))?;
     let mut tiles = FxHashSet::default();
     for tile in names.iter().filter_map(|name| tile_of_folder(name)) {
-        // A folder with any content is a tile, even without a table. An empty one belongs to a tile that was never
+        // Any content makes a folder a tile, even without a table. An empty folder belongs to a tile that was never
         // flushed.
         let folder = layout.tile_folder(tile);
         match disk.list(&folder) {

@@ -3,7 +3,7 @@ use super::fs_disk::FsDisk;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Where a map is: a folder of the file system, which is made of any path, or of another [`Disk`].
+/// Location of a map: a folder of the file system or of another [`Disk`]. Any path converts into one.
 ///
 /// ```
 /// use voxtile::MapPath;
@@ -24,17 +24,17 @@ impl<P: AsRef<Path>> From<P> for MapPath {
 }
 
 impl MapPath {
-    /// A folder of another disk than the file system.
+    /// Returns the location of a folder on `disk`.
     pub fn on(disk: Arc<dyn Disk>, folder: impl AsRef<Path>) -> Self {
         Self { disk, folder: folder.as_ref().to_owned() }
     }
 
-    /// The folder.
+    /// The map's folder.
     pub fn folder(&self) -> &Path {
         &self.folder
     }
 
-    /// The disk and the folder.
+    /// Returns the disk and the folder.
     pub fn into_parts(self) -> (Arc<dyn Disk>, PathBuf) {
         (self.disk, self.folder)
     }

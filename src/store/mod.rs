@@ -1,17 +1,17 @@
-//! The files of a map: tiles, commit log, metadata, snapshots. Knows no voxel.
+//! Files of a map: tiles, commit log, metadata, snapshots. This module does not know about voxels.
 //!
 //! | module | content |
 //! |---|---|
 //! | `tile_store` | [`TileStore`]: opens maps; `commit/flush` commits |
-//! | `tiles` | [`TileVersions`]: which tiles there are; [`Tables`], to read them; writers, spill files |
+//! | `tiles` | [`TileVersions`]: list of tiles; [`Tables`]: reads tables; writers and spill files |
 //! | `commit` | the commit log, `metadata.json`, the steps after a commit |
-//! | `scans` | number, time and origin of each scan; [`ScanArchive`]: the scans that a map keeps |
-//! | `snapshots` | snapshots, and replaced tables kept for them and for readers |
+//! | `scans` | number, time and origin of each scan; [`ScanArchive`]: kept scans |
+//! | `snapshots` | snapshots; replaced tables that snapshots and readers still use |
 //! | `recovery` | crash recovery, damaged logs, quarantine, unfinished maps |
-//! | `committed_files` | which files a copy of the map consists of |
+//! | `committed_files` | files to copy for a copy of the map |
 //! | `layout`, `map_files` | file names; operations on them |
-//! | `disk`, `fs_disk` | [`Disk`], through which every file operation goes, and the file system |
-//! | `unsynced_disk` | a disk without its syncs, for maps that are made again after a crash |
+//! | `disk`, `fs_disk` | [`Disk`]: interface to the file system, and its implementation |
+//! | `unsynced_disk` | a disk without syncs, for temporary maps |
 //!
 //! Tests replace [`Disk`] to simulate failures and power cuts. `docs/durability.md` describes the protocol.
 

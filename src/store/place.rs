@@ -5,12 +5,12 @@ use super::map_folder::read_metadata;
 use crate::error::{Error, Result};
 use std::path::Path;
 
-/// Whether a file or folder may be made at a path: not inside of a map, where it would be taken for a part of it, or
-/// where the map's next change could remove it. Links on the way there are followed.
+/// Checks that a path is outside of any map, following symbolic links. A file or folder in a map would be taken for a
+/// part of it, or removed by its next change.
 ///
 /// # Errors
 ///
-/// [`Error::InvalidArgument`] if the path lies in a map, at whatever depth; a disk that refuses.
+/// [`Error::InvalidArgument`] if the path is in a map at any depth, or an I/O error.
 pub fn check_outside_of_maps(path: &Path) -> Result<()> {
     check_place(&FsDisk, path)
 }
@@ -32,7 +32,8 @@ pub(super) fn check_place(disk: &dyn Disk, path: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Other programs have files of the name `metadata.json`, too.
+/// Other programs also write files named `metadata.json`, so the content or the neighbouring files must be those of a
+/// map.
 fn is_map(disk: &dyn Disk, folder: &Path) -> Result<bool> {
     let layout = Layout::new(folder);
     let metadata = layout.metadata();

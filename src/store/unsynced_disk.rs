@@ -4,18 +4,18 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Another disk without its syncs: nothing that is written by it is durable, and no flush waits.
+/// Wraps a disk and ignores all syncs: writes are not durable, and no flush waits.
 ///
-/// It is for what is made again after a crash, such as a map that a task makes to hand it over
-/// ([`operations::move_piece`](crate::operations::move_piece()) syncs each file once, then). A map that is to stay is
-/// not to be written by it: the order in which its changes reach the medium is anybody's guess.
+/// For maps that are built again after a crash, such as the shards of a cluster build
+/// ([`operations::move_piece`](crate::operations::move_piece()) later syncs each file once). Do not use it for a
+/// permanent map: after a power failure its files may have any mixture of states.
 #[derive(Clone, Debug)]
 pub struct UnsyncedDisk {
     disk: Arc<dyn Disk>,
 }
 
 impl UnsyncedDisk {
-    /// The same disk without its syncs.
+    /// Wraps `disk`.
     pub fn of(disk: Arc<dyn Disk>) -> Self {
         Self { disk }
     }

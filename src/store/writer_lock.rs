@@ -3,18 +3,18 @@ use super::layout::Layout;
 use crate::error::{Error, Result};
 use std::path::PathBuf;
 
-/// Held while a store may write; a process that ends, however it ends, lets go of it.
+/// Lock on a map for writing, held until it is dropped. The operating system releases it when the process ends.
 pub struct WriterLock {
     lock: Box<dyn DiskLock>,
     path: PathBuf,
 }
 
 impl WriterLock {
-    /// Takes the lock of a map.
+    /// Takes the writer lock of a map.
     ///
     /// # Errors
     ///
-    /// [`Error::Locked`] if another process has it.
+    /// [`Error::Locked`] if another process holds the lock.
     pub fn take(disk: &dyn Disk, layout: &Layout) -> Result<Self> {
         let path = layout.lock();
         match disk.lock(&path).map_err(|error| Error::io(&path, "lock", error))? {
@@ -23,11 +23,11 @@ impl WriterLock {
         }
     }
 
-    /// Looks whether the lock still keeps others out. It does not once somebody has removed its file.
+    /// Checks that the lock is still effective. It is not if another program has removed its file.
     ///
     /// # Errors
     ///
-    /// [`Error::LockLost`] if it does not; a disk that refuses.
+    /// [`Error::LockLost`] if the lock file was removed, or an I/O error.
     pub fn check(&self) -> Result<()> {
         match self.lock.is_in_place().map_err(|error| Error::io(&self.path, "look at", error))? {
             true => Ok(()),
