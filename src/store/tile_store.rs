@@ -19,59 +19,58 @@ use crate::store::WriterLock;
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 
-/// The tiles of a map on disk, and the one commit point that makes a flush whole.
+/// Tiles of a map on disk, with one commit point for each flush.
 ///
-/// A tile is written beside its committed version, as `*.next`. [`TileStore::commit`] makes all of them durable,
-/// appends one synced record to the log (that is the commit), and renames them over the committed versions.
+/// A new version of a tile is written as `*.next`, next to the committed one. [`TileStore::commit`] makes all new
+/// versions durable, appends one synced record to the log (the commit), and renames them over the committed versions.
 ///
-/// This file opens maps; `flush` writes and commits. Tables are read through [`Tables`], kept scans through
-/// [`ScanArchive`], snapshots through [`Snapshots`](super::Snapshots).
+/// This file opens maps; `flush` writes and commits. [`Tables`] reads tables, [`ScanArchive`] kept scans, and
+/// [`Snapshots`](super::Snapshots) snapshots.
 #[derive(Debug)]
 pub struct TileStore {
     pub(super) files: MapFiles,
-    /// Which tiles there are, committed or written since.
+    /// Committed versions of tiles, and those written since.
     pub(super) versions: TileVersions,
-    /// The log, the metadata and the lock.
     pub(super) committer: Committer,
-    /// What the last commit left to do.
+    /// Work that the last commit left.
     pub(super) checkpoint: Checkpoint,
-    /// Which scans are in the map.
+    /// Scans in the map.
     pub(super) scans: ScanList,
-    /// The scans that the map keeps.
+    /// Kept scans.
     pub(super) archive: ScanArchive,
-    /// Replaced tables that readers and snapshots see; a writer's.
+    /// Replaced tables that readers and snapshots use. Only a writer fills it.
     pub(super) kept: KeptTables,
-    /// How many files of an earlier writer opening has removed.
+    /// Number of files of an earlier writer that were removed on opening.
     pub(super) leftovers_removed: u64,
-    /// The snapshots whose deletion by an earlier writer opening has completed.
+    /// Snapshots whose interrupted deletion was finished on opening.
     pub(super) snapshots_removed: Vec<SnapshotName>,
-    /// Whether opening has brought `metadata.json` up to the log.
+    /// Whether `metadata.json` was updated from the log on opening.
     has_replaced_metadata: bool,
-    /// The snapshot that was opened in place of the map as it is.
+    /// Opened snapshot; `None` for the current map.
     pub(super) opened_snapshot: Option<SnapshotName>,
-    /// Held by a reader, so that a writer keeps what it sees.
+    /// Marks the reader, so that a writer keeps the tables that it uses.
     #[expect(dead_code, reason = "held for its drop")]
     shared_metadata: Option<SharedMetadata>,
 }
 
 struct SharedMetadata(#[expect(dead_code, reason = "held for its drop")] Mutex<Box<dyn DiskRead>>);
 
-/// How often a reader begins to open a map again because a flush came in between.
+/// Number of times that a reader reopens a map because a writer flushed meanwhile.
 const OPEN_ATTEMPTS: usize = 100;
 
 impl TileStore {
-    /// Makes an empty map in a folder that is missing, empty, or holds what an interrupted creation left.
+    /// Creates an empty map in a folder that is missing, empty, or has only the remains of an interrupted creation.
     pub fn create(disk: Arc<dyn Disk>, folder: &Path, metadata: Metadata, map_id: [u8; 16]) -> Result<Self> {
         let layout = Layout::new(folder);
         place::check_place(&*disk, folder)?;
         map_folder::create_folders(&*disk, folder)?;
-        // Before the lock, which leaves a file behind, and after it, when nobody else can begin a map here.
+        // Before the lock, which creates a file, and again after it, when no other process can create a map here.
         map_folder::check_is_free(&*disk, folder)?;
         let lock = WriterLock::take(&*disk, &layout)?;
         map_folder::check_is_free(&*disk, folder)?;
         let mut metadata = metadata;
         if let Some(ext) = &mut metadata.ext {
-            // Of another map, perhaps.
+            // Fields that belong to another map, if `metadata` was copied from one.
             (ext.snapshots, ext.scan_records, ext.catalog) = (None, None, None);
         }
         let commits = Commits::default();
@@ -84,10 +83,10 @@ impl TileStore {
         Ok(store)
     }
 
-    /// Opens a map for writing: takes the lock, then brings the files to the state of the last commit.
+    /// Opens a map for writing: takes the lock, then restores the state of the last commit.
     pub fn open(disk: Arc<dyn Disk>, folder: &Path) -> Result<Self> {
         let layout = Layout::new(folder);
-        // Before the lock, so that a folder without a map is left as it is.
+        // Before the lock, so that a folder without a map is unchanged.
         map_folder::read_metadata(&*disk, &layout)?;
         let lock = WriterLock::take(&*disk, &layout)?;
         let metadata = map_folder::read_metadata(&*disk, &layout)?;
@@ -98,18 +97,18 @@ impl TileStore {
         let watch = store.disk().watch(&path).map_err(|error| Error::io(&path, "open", error))?;
         store.kept.watch(store.committer.written_flush().unwrap_or_default(), watch);
         if store.commits().flush_number == 0 {
-            // Of a creation that was killed no name may be durable yet.
+            // After an interrupted creation the names may not be durable.
             store.files.sync_map_folder()?;
         }
         if store.map_id().is_some() {
             if store.is_metadata_behind() {
-                // The last record may be one that a killed writer wrote and could not sync, and syncing the same bytes
-                // again proves nothing: written anew, it is durable before it is acted upon.
+                // A killed writer may have written the last record without a sync, and another sync of the same bytes
+                // proves nothing. So the log is written again before its last record is used.
                 store.committer.replace_log(&store.files, store.versions.commits())?;
             }
             store.recover()?;
             if store.is_metadata_behind() {
-                // Readers would wait for it. Those that the map has may see the last commit.
+                // New readers wait for this. Existing readers may use the last commit.
                 store.keep_for_late_readers();
                 store.tidy_up();
                 store.has_replaced_metadata = !store.is_metadata_behind();
@@ -122,13 +121,13 @@ impl TileStore {
         Ok(store)
     }
 
-    /// Brings the files to the state of the last commit.
+    /// Restores the state of the last commit.
     fn recover(&mut self) -> Result<()> {
         let map_id = self.map_id().unwrap_or_default();
         let listed = self.committer.snapshots();
         let found = recover(&**self.disk(), self.layout(), self.commits(), map_id, listed)?;
         if listed.is_none() && !found.snapshots.found().is_empty() {
-            // Of a version that did not list them: the next commit does.
+            // A version without a list of snapshots wrote the map. The next commit adds it.
             self.committer.adopt_snapshots(found.snapshots.found().clone());
         }
         self.kept.set_snapshots(found.snapshots);
@@ -138,7 +137,7 @@ impl TileStore {
         self.checkpoint = Checkpoint::of_leftovers(found.unrenamed, found.renamed, removed);
         self.run_checkpoint()?;
         if let Err(error) = self.release_scans() {
-            // The files of deleted snapshots remain: as long as one does, deleting it again completes its deletion.
+            // Files of deleted snapshots remain until this succeeds, so the deletion is resumed at the next opening.
             log::warn!("kept scans that nothing needs remain: {error:#}");
             return Ok(());
         }
@@ -148,17 +147,17 @@ impl TileStore {
         Ok(())
     }
 
-    /// Opens a map for reading beside a writer: takes no lock and writes nothing. The store sees the last flush, and
-    /// goes on seeing it while the writer flushes again.
+    /// Opens a map for reading, without a lock and without writing. The store shows the last flush, also after a writer
+    /// flushes again.
     pub fn open_read_only(disk: Arc<dyn Disk>, folder: &Path) -> Result<Self> {
         let layout = Layout::new(folder);
         for attempt in 0..OPEN_ATTEMPTS {
             let (metadata, shared) = map_folder::read_metadata_shared(&*disk, &layout)?;
             let store = Self::read(disk.clone(), layout.clone(), metadata)?;
-            // Only if it still is the present one has the writer seen, at its next flush, that it is read.
+            // If the file changed, the writer may have missed our lock: retry.
             let now = map_folder::read_metadata(&*disk, &layout)?;
-            // If the log is newer, the writer cannot tell which flush is read. Wait until it replaces metadata.json,
-            // unless it was killed.
+            // If the log is newer, the writer does not know which flush is read. Wait until it replaces
+            // `metadata.json`; after half of the attempts, assume that it was killed.
             let is_known = !store.is_metadata_behind() || attempt + 1 >= OPEN_ATTEMPTS / 2;
             if now.ext.map(|ext| ext.flush_number) == store.committer.written_flush() && is_known {
                 return Ok(Self { shared_metadata: Some(SharedMetadata(Mutex::new(shared))), ..store });
@@ -170,7 +169,8 @@ impl TileStore {
         Err(Error::Changed { path: folder.to_owned() })
     }
 
-    /// The tiles of a map whose own two files cannot be read, by what else is known of it; for reading only.
+    /// Returns the tiles of a map whose `metadata.json` or `commits.log` cannot be read, from other sources; for
+    /// reading only.
     pub fn of_commits(
         disk: Arc<dyn Disk>,
         folder: &Path,
@@ -190,7 +190,7 @@ impl TileStore {
             (Some(_), None) => {
                 return damaged(0, "the file is missing".into());
             }
-            // The upgrade was committed, but metadata.json was not replaced.
+            // The upgrade was committed, but `metadata.json` was not replaced.
             (None, Some((log, commits))) if commits.flush_number > 0 => (log, commits),
             (None, _) => {
                 let foreign = map_folder::list_foreign_tiles(&*disk, &layout)?;
@@ -212,9 +212,9 @@ impl TileStore {
             }
         }
         let written_flush = written.map(|ext| ext.flush_number);
-        // The log is the truth; the file may be older, if a crash came between the two.
+        // The log is authoritative. After a crash `metadata.json` may be older.
         let metadata = match &commits.metadata {
-            // What it says of tiles and numbers is as of the record that has it, which may be older than the last.
+            // Bounds and numbers are those of the record with the metadata, which may not be the last one.
             Some(committed) if written_flush != Some(commits.flush_number) => committed.as_of(&commits),
             _ => metadata,
         };
@@ -248,7 +248,7 @@ impl TileStore {
         }
     }
 
-    /// Where the map's files are kept.
+    /// Disk with the map's files.
     pub fn disk(&self) -> &Arc<dyn Disk> {
         self.files.disk()
     }
@@ -258,12 +258,12 @@ impl TileStore {
         self.files.folder()
     }
 
-    /// Where the map's files are.
+    /// Paths of the map's files.
     pub fn layout(&self) -> &Layout {
         self.files.layout()
     }
 
-    /// The metadata as last read or written.
+    /// Metadata as last read or written.
     pub fn metadata(&self) -> &Metadata {
         self.committer.metadata()
     }
@@ -278,37 +278,37 @@ impl TileStore {
         self.versions.commits()
     }
 
-    /// Which tiles there are on disk.
+    /// Tiles on disk.
     pub fn tiles(&self) -> &TileVersions {
         &self.versions
     }
 
-    /// The same, to note what is written.
+    /// Tiles on disk, to record written versions.
     pub fn tiles_mut(&mut self) -> &mut TileVersions {
         &mut self.versions
     }
 
-    /// Their tables, to be read.
+    /// Reader of tables.
     pub fn tables(&self) -> Tables<'_> {
         Tables::of(self)
     }
 
-    /// The scans that the map keeps.
+    /// Kept scans.
     pub fn archive(&self) -> &ScanArchive {
         &self.archive
     }
 
-    /// The same, to keep more.
+    /// Kept scans, to add scans.
     pub fn archive_mut(&mut self) -> &mut ScanArchive {
         &mut self.archive
     }
 
-    /// Whether `metadata.json` is older than the log: a crash came between the two.
+    /// Returns whether `metadata.json` is older than the log, as after a crash.
     pub fn is_metadata_behind(&self) -> bool {
         self.committer.is_metadata_behind(self.commits().flush_number)
     }
 
-    /// Whether a map that was of the original format when it was opened has a log now: a writer has begun to change it.
+    /// Returns whether a map of the original format has got a log since it was opened: a writer has upgraded it.
     pub fn is_upgraded_meanwhile(&self) -> Result<bool> {
         if self.map_id().is_some() {
             return Ok(false);
@@ -316,23 +316,23 @@ impl TileStore {
         Ok(self.files.kind(&self.layout().commit_log())?.is_some())
     }
 
-    /// How many files that an earlier writer left behind were removed when the store was opened.
+    /// Number of files of an earlier writer that were removed on opening.
     pub fn leftovers_removed(&self) -> u64 {
         self.leftovers_removed
     }
 
-    /// Whether `metadata.json` was older than the log and was replaced when the store was opened.
+    /// Returns whether `metadata.json` was older than the log and was replaced on opening.
     pub fn has_replaced_metadata(&self) -> bool {
         self.has_replaced_metadata
     }
 
-    /// Bytes of memory of what is known of the tiles without reading them: some thirty a tile, and as many more for one
-    /// with a version that is not committed.
+    /// Memory of the index of tiles in bytes: about 30 bytes per tile, and as much again for a tile with an uncommitted
+    /// version.
     pub fn index_bytes(&self) -> usize {
         self.versions.bytes() + self.kept.bytes()
     }
 
-    /// Bytes of memory that the next commit takes beside the index.
+    /// Additional memory of the next commit in bytes.
     pub fn commit_bytes(&self) -> usize {
         self.versions.commit_bytes() + self.scans.bytes() + self.archive.bytes()
     }
@@ -344,12 +344,12 @@ impl std::fmt::Debug for SharedMetadata {
     }
 }
 
-/// An id's bytes as hexadecimal digits.
+/// Formats an id as hexadecimal digits.
 pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// An id from its hexadecimal digits.
+/// Parses an id from its hexadecimal digits.
 pub(crate) fn id_from_hex(digits: &str) -> Option<[u8; 16]> {
     let byte = |at: usize| u8::from_str_radix(digits.get(2 * at..2 * at + 2)?, 16).ok();
     let bytes: Option<Vec<u8>> = (0..16).map(byte).collect();

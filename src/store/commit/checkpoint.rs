@@ -11,29 +11,30 @@ use crate::store::tiles::tile_versions::TileVersions;
 use std::collections::BTreeSet;
 use std::path::Path;
 
-/// What the last commit left to do on disk: its tables get their names, removed tiles and deleted snapshots lose their
-/// files.
+/// Work that a commit leaves: renames tables to their final names and removes the files of removed tiles and deleted
+/// snapshots.
 ///
-/// Until that is done and durable, nothing may be written under the names in question, which a crash could bring back.
+/// Until this is done durably, these names must not be reused: after a crash the pending renames and removals are
+/// repeated.
 #[derive(Debug, Default)]
 pub(in crate::store) struct Checkpoint {
     /// Committed versions that still have their `*.next` names.
     unrenamed: TileTable<()>,
-    /// Tiles whose versions have their names, but perhaps not on the medium.
+    /// Tiles whose versions are renamed, but perhaps not durably.
     renamed: TileTable<()>,
-    /// Tiles that a commit took out of the map, with files that are still there or whose absence may not be durable.
+    /// Removed tiles whose files may exist, or whose removal may not be durable.
     unremoved: BTreeSet<TileIndex>,
-    /// A snapshot that is committed and may not have its name yet.
+    /// Committed snapshot whose file may not be renamed yet.
     unnamed_snapshot: Option<SnapshotName>,
-    /// A snapshot whose deletion is committed and whose file may be there still.
+    /// Deleted snapshot whose file may still exist.
     deleted_snapshot: Option<SnapshotName>,
 }
 
-/// Tiles whose files are synced at once: their paths take several times the memory of what else is known of them.
+/// Number of tiles synced at a time. Their paths take several times the memory of the index.
 pub(in crate::store) const TILES_SYNCED_AT_ONCE: usize = 4096;
 
 impl Checkpoint {
-    /// What a writer that was killed left to do.
+    /// Returns the work that a killed writer left.
     pub(in crate::store) fn of_leftovers(
         unrenamed: TileTable<()>,
         renamed: TileTable<()>,
@@ -43,28 +44,28 @@ impl Checkpoint {
         Self { unrenamed, renamed, unremoved, ..Self::default() }
     }
 
-    /// Adds what a commit leaves to do.
+    /// Adds the work of a commit.
     pub(in crate::store) fn add(&mut self, changed: impl Iterator<Item = TileIndex>, removed: &[TileIndex]) {
         self.unrenamed.extend(changed.map(|tile| (tile, ())));
         self.unremoved.extend(removed);
     }
 
-    /// Adds that a committed snapshot gets its name.
+    /// Schedules the rename of a committed snapshot's file.
     pub(in crate::store) fn name_snapshot(&mut self, name: &SnapshotName) {
         self.unnamed_snapshot = Some(name.clone());
     }
 
-    /// Adds that a deleted snapshot loses its file.
+    /// Schedules the removal of a deleted snapshot's file.
     pub(in crate::store) fn remove_snapshot(&mut self, name: &SnapshotName) {
         self.deleted_snapshot = Some(name.clone());
     }
 
-    /// Whether the committed version of a tile still has its `*.next` name.
+    /// Returns whether the committed version of a tile still has its `*.next` name.
     pub(in crate::store) fn is_unrenamed(&self, tile: TileIndex) -> bool {
         self.unrenamed.contains(tile)
     }
 
-    /// Does what is left to do, durably. After an error calling again goes on.
+    /// Does the pending work durably. After an error, the next call resumes.
     pub(in crate::store) fn run(
         &mut self,
         files: &MapFiles,
@@ -79,14 +80,14 @@ impl Checkpoint {
         self.finish_snapshots(files)
     }
 
-    /// Some tiles whose committed versions still have their `*.next` names.
+    /// Returns up to `most` tiles whose committed versions still have their `*.next` names.
     pub(in crate::store) fn some_unrenamed(&self, most: usize) -> Vec<TileIndex> {
         self.unrenamed.tiles().take(most).collect()
     }
 
-    /// Keeps the tables in place of some tiles that the last commit replaces or removes, where a reader or a snapshot
-    /// sees them. Returns the tiles of which those of snapshots must have their new names durably before other tables
-    /// take the old ones.
+    /// Keeps the current tables of those tiles that the last commit replaces or removes, if a reader or a snapshot uses
+    /// them. Returns the tiles whose kept tables belong to snapshots: their new names must be durable before new tables
+    /// take the old names.
     pub(in crate::store) fn keep_replaced(
         &self,
         files: &MapFiles,
@@ -95,7 +96,7 @@ impl Checkpoint {
         kept: &mut KeptTables,
     ) -> Result<Vec<TileIndex>> {
         let (layout, flush_number) = (files.layout(), flush_number.saturating_sub(1));
-        // Asked after the commit: who begins to read later sees it.
+        // After the commit: readers that open the map later see the new tables.
         if !tiles.is_empty() {
             kept.refresh_readers();
         }
@@ -105,7 +106,7 @@ impl Checkpoint {
                 files.rename(&layout.current(tile, TileFile::Table), &layout.kept(tile, flush_number))?;
                 kept.keep(tile, flush_number);
             }
-            // Also what an earlier attempt, or a writer that was killed, renamed and could not sync.
+            // Includes names that an earlier attempt, or a killed writer, renamed but could not sync.
             if kept.is_pinned(tile, flush_number) {
                 pinned.push(tile);
             }
@@ -113,12 +114,12 @@ impl Checkpoint {
         Ok(pinned)
     }
 
-    /// Whether the table in place is the version before the last commit. An earlier attempt may have kept it already;
-    /// what is renamed then is not there, and nothing happens.
+    /// Returns whether the current table is the version before the last commit. If an earlier attempt has kept it
+    /// already, the table is missing and the rename has no effect.
     fn is_replaced_in_place(&self, files: &MapFiles, tile: TileIndex) -> Result<bool> {
         let is_there = |path: &Path| Ok(files.kind(path)?.is_some());
         match self.unrenamed.contains(tile) {
-            // Otherwise it has been put in place.
+            // If there is no next table, it has been renamed already.
             true => is_there(&files.layout().next(tile, TileFile::Table)),
             false => is_there(&files.layout().tile_folder(tile)),
         }
@@ -135,11 +136,11 @@ impl Checkpoint {
         Ok(())
     }
 
-    /// Gives the versions of some tiles their names, which are not durable yet.
+    /// Renames the versions of some tiles to their final names, not durably.
     pub(in crate::store) fn rename(&mut self, files: &MapFiles, tiles: &[TileIndex]) -> Result<()> {
         let layout = files.layout();
         for &tile in tiles {
-            // Another may have done it meanwhile.
+            // Another thread may have renamed it meanwhile.
             if !self.unrenamed.contains(tile) {
                 continue;
             }
@@ -152,15 +153,15 @@ impl Checkpoint {
         Ok(())
     }
 
-    /// Notes that the names of some tiles' versions are durable.
+    /// Records that the names of some tiles' versions are durable.
     pub(in crate::store) fn renames_are_durable(&mut self, tiles: &[TileIndex]) {
         for &tile in tiles {
             self.renamed.remove(tile);
         }
     }
 
-    /// Removes the files of removed tiles, and their folders where nothing else is in them. The log names these tiles
-    /// until that is durable.
+    /// Removes the files of removed tiles, and their folders if these are empty. The log names the tiles until the
+    /// removal is durable.
     fn finish_removals(&mut self, files: &MapFiles, versions: &mut TileVersions) -> Result<()> {
         if self.unremoved.is_empty() {
             return Ok(());
@@ -174,7 +175,7 @@ impl Checkpoint {
         Ok(())
     }
 
-    /// Gives a committed snapshot its name, and removes the file of a deleted one.
+    /// Renames the file of a committed snapshot, and removes the file of a deleted one.
     fn finish_snapshots(&mut self, files: &MapFiles) -> Result<()> {
         if self.unnamed_snapshot.is_none() && self.deleted_snapshot.is_none() {
             return Ok(());
@@ -192,7 +193,7 @@ impl Checkpoint {
     }
 }
 
-/// Makes the names in the folders of some tiles durable, and tells of each that is.
+/// Syncs the folders of some tiles, and calls `is_durable` for each.
 pub(in crate::store) fn sync_folders(
     files: &MapFiles,
     tiles: &[TileIndex],
@@ -207,7 +208,7 @@ pub(in crate::store) fn sync_folders(
     Ok(())
 }
 
-/// Gives a committed file its name. A folder or link that has it, which no map contains, is moved to quarantine.
+/// Renames a committed file to its final name. A folder or link with that name is foreign and moved to quarantine.
 fn put_in_place(files: &MapFiles, next: &Path, current: &Path) -> Result<()> {
     let disk = &**files.disk();
     let renamed = files.rename(next, current);
@@ -227,7 +228,7 @@ fn remove_tile_files(files: &MapFiles, tile: TileIndex) -> Result<()> {
     }
     for &file in layout.files() {
         for path in [layout.current(tile, file), layout.next(tile, file)] {
-            // What is no file is not voxtile's, and stays.
+            // Anything but a regular file is foreign and is kept.
             if matches!(files.kind(&path)?, Some(EntryKind::File(_))) {
                 files.remove_file(&path)?;
             }

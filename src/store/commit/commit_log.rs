@@ -5,7 +5,7 @@ use crate::store::disk::Disk;
 use std::io::{self, Read};
 use std::path::Path;
 
-/// The append-only record of flushes, `commits.log`. A record that is whole is a commit.
+/// Append-only log of flushes, `commits.log`. Each complete record is a commit.
 ///
 /// ```text
 /// header  32 bytes  magic "VXTCOMIT", version u32 1, map id 16 bytes, CRC-32 of these
@@ -20,7 +20,7 @@ use std::path::Path;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CommitLog {
     map_id: [u8; 16],
-    /// Length of the valid part in bytes: the next record goes here.
+    /// Length of the valid part in bytes. The next record is written here.
     bytes: u64,
 }
 
@@ -29,7 +29,7 @@ const VERSION: u32 = 1;
 const HEADER_BYTES: usize = 32;
 
 impl CommitLog {
-    /// The log of a map of which nothing is written yet.
+    /// Returns the log of a map that has no file yet.
     pub(in crate::store) fn of_map(map_id: [u8; 16]) -> Self {
         Self { map_id, bytes: 0 }
     }
@@ -44,7 +44,7 @@ impl CommitLog {
         self.map_id
     }
 
-    /// Writes a log with one record of the whole map, synced, in place of nothing or of a temporary name.
+    /// Writes and syncs a log with one record of the whole map. `path` is new or a temporary name.
     pub fn write_whole(
         disk: &dyn Disk,
         path: &Path,
@@ -58,7 +58,7 @@ impl CommitLog {
         Ok(Self { map_id, bytes: HEADER_BYTES as u64 + record_bytes })
     }
 
-    /// The same log in memory.
+    /// Returns the bytes that [`CommitLog::write_whole`] writes.
     pub(in crate::store) fn to_bytes(
         map_id: [u8; 16],
         commits: &Commits,
@@ -69,8 +69,8 @@ impl CommitLog {
         Ok(bytes)
     }
 
-    /// Appends a record of changed and removed tiles and syncs it: when this returns, the flush is committed. After an
-    /// error the record may be in the file or not, until [`CommitLog::cut`] has taken it out.
+    /// Appends and syncs a record of changed and removed tiles: when this returns, the flush is committed. After an
+    /// error the file may contain the record until [`CommitLog::cut`] removes it.
     pub fn append(&mut self, disk: &dyn Disk, path: &Path, flush: &Flush<'_>) -> io::Result<()> {
         let mut out = disk.append(path, self.bytes)?;
         let record_bytes = flush.write(false, &[], &mut out)?;
@@ -79,13 +79,12 @@ impl CommitLog {
         Ok(())
     }
 
-    /// Cuts off what a failed attempt may have left behind the valid part, durably.
+    /// Truncates the file durably to the valid part.
     pub fn cut(&self, disk: &dyn Disk, path: &Path) -> io::Result<()> {
         disk.append(path, self.bytes)?.sync()
     }
 
-    /// Reads a log of `file_bytes` bytes. An incomplete record at the end is a flush that never happened and is left
-    /// out.
+    /// Reads a log of `file_bytes` bytes. An incomplete record at the end is ignored: its flush was not committed.
     ///
     /// # Errors
     ///
@@ -98,7 +97,7 @@ impl CommitLog {
 }
 
 impl Commits {
-    /// Takes in the records of a log. After an error, those before the damage have been taken in.
+    /// Adds the records of a log. After an error, the records before the damage are included.
     ///
     /// # Errors
     ///
@@ -179,7 +178,7 @@ mod tests {
         TileVersion { scan_number: number, table: file, octree: file, voxels: number, occupied: number / 2 }
     }
 
-    /// Records that are longer than what is read and written at a time.
+    /// The records exceed the sizes of read and write buffers.
     #[test]
     fn a_log_cut_anywhere_ends_with_its_last_whole_record_and_a_wrong_byte_is_found() {
         let folder = tempfile::tempdir().unwrap();

@@ -7,27 +7,27 @@ use crate::store::tiles::file_checksum::Checksumming;
 use crate::store::tiles::tile_version::{MAX_NUMBER, TileVersion};
 use std::io::{self, Read, Write};
 
-/// A flush to be appended to a log.
+/// Flush to be appended to a log.
 #[derive(Clone, Copy, Debug)]
 pub struct Flush<'a> {
-    /// Its number.
+    /// Number of the flush.
     pub number: u64,
-    /// Number of the last scan in it.
+    /// Number of the last scan in the flush.
     pub scan_number: u64,
-    /// The tiles that changed.
+    /// Changed tiles.
     pub changed: &'a TileTable<TileVersion>,
-    /// The tiles that are no part of the map any more.
+    /// Tiles that the flush removes from the map.
     pub removed: &'a [TileIndex],
-    /// The catalog of the scans that the map keeps; `None` if it keeps none.
+    /// Catalog of kept scans; `None` if the map keeps none.
     pub catalog: Option<CatalogVersion>,
-    /// The text of `metadata.json`, if more of it changed than every flush changes.
+    /// Text of `metadata.json`, if more changed than the fields that every flush changes.
     pub metadata_text: Option<&'a str>,
 }
 
-/// A flush as a log has it.
+/// Flush as read from a log.
 #[derive(Debug)]
 pub(in crate::store) struct Record {
-    /// Whether there is nothing else in the map.
+    /// Whether the record lists all tiles of the map.
     pub(in crate::store) is_whole_map: bool,
     pub(in crate::store) flush_number: u64,
     pub(in crate::store) scan_number: u64,
@@ -37,16 +37,16 @@ pub(in crate::store) struct Record {
     pub(in crate::store) metadata: Option<Metadata>,
 }
 
-/// What stands where a record may begin.
+/// Content of a log at an offset.
 pub(in crate::store) enum Next {
-    /// A record and its length in bytes.
+    /// A record with its length in bytes.
     Record(Box<Record>, u64),
     End,
-    /// Something that is no whole record, with nothing behind it.
+    /// An incomplete record, with nothing after it.
     Torn(FormatError),
 }
 
-/// Bytes before and behind the payload.
+/// Bytes before and after the payload.
 pub(in crate::store) const LENGTHS_BYTES: u64 = 8;
 const CRC_BYTES: u64 = 4;
 const PAYLOAD_HEADER_BYTES: usize = 24;
@@ -56,16 +56,16 @@ const TILE_BYTES: usize = INDEX_BYTES + TileVersion::BYTES;
 const WHOLE_MAP: u32 = 1;
 const NAMES_REMOVED: u32 = 2;
 const NAMES_CATALOG: u32 = 4;
-/// So many bytes go to the file at once: a record of a large map is longer than anybody wants in memory.
+/// Bytes written to the file at a time. Records of large maps exceed what should be buffered.
 const CHUNK_BYTES: usize = 1 << 16;
 
-/// About the length of one record of a whole map of so many tiles.
+/// Approximate length of a record of a whole map of `tiles` tiles.
 pub(in crate::store) fn whole_map_bytes(tiles: usize) -> u64 {
     (tiles * TILE_BYTES) as u64
 }
 
 impl<'a> Flush<'a> {
-    /// The whole map as of its last flush.
+    /// Returns the whole map as of its last flush.
     pub(in crate::store) fn of_all(commits: &'a Commits, metadata_text: &'a str) -> Self {
         Self {
             number: commits.flush_number,
@@ -77,7 +77,7 @@ impl<'a> Flush<'a> {
         }
     }
 
-    /// Writes `front`, then the record. Returns the length of the record in bytes.
+    /// Writes `front` and then the record. Returns the length of the record in bytes.
     pub(in crate::store) fn write(
         &self,
         is_whole_map: bool,
@@ -124,7 +124,7 @@ impl<'a> Flush<'a> {
     }
 }
 
-/// Bytes on their way to a file, with the checksum of those that count.
+/// Buffered writer with a checksum.
 struct Chunks<'a> {
     out: &'a mut dyn Write,
     waiting: Vec<u8>,
@@ -151,7 +151,7 @@ impl Chunks<'_> {
 }
 
 impl Next {
-    /// Reads what stands at `offset` of a log of `file_bytes` bytes.
+    /// Reads the content at `offset` of a log of `file_bytes` bytes.
     pub(in crate::store) fn read(
         input: &mut impl Read,
         offset: u64,
@@ -182,7 +182,7 @@ impl Next {
             return Ok(Self::Record(Box::new(record?), record_bytes));
         }
         let error = wrong("the record does not match its checksum");
-        // A crash tears only the last record: its length can come to disk before its content.
+        // A crash damages only the last record. Its length can be on the disk without its content.
         if remaining == record_bytes { Ok(Self::Torn(error)) } else { Err(error.into()) }
     }
 }
@@ -245,7 +245,7 @@ impl Record {
     }
 }
 
-/// The payload of a record, piece by piece.
+/// Payload of a record, read incrementally.
 struct Payload<R> {
     input: Checksumming<R>,
     left: u64,
@@ -254,7 +254,7 @@ struct Payload<R> {
 }
 
 impl<R: Read> Payload<R> {
-    /// The next bytes, of which the caller knows that they are there.
+    /// Returns the next `N` bytes. The caller has checked that they exist.
     fn take<const N: usize>(&mut self) -> io::Result<[u8; N]> {
         let mut bytes = [0; N];
         self.input.read_exact(&mut bytes)?;
@@ -263,7 +263,7 @@ impl<R: Read> Payload<R> {
         Ok(bytes)
     }
 
-    /// All that is left, as metadata.
+    /// Reads the rest as metadata.
     fn metadata(&mut self) -> Result<Option<Metadata>, DecodeError> {
         let mut text = String::new();
         let at = self.at;
@@ -291,7 +291,7 @@ impl<R: Read> Payload<R> {
         Ok(self.input.finish())
     }
 
-    /// An error about what begins so many bytes before this place.
+    /// Returns an error with the offset of the data that begins `bytes_before` bytes earlier.
     fn wrong(&self, bytes_before: u64, reason: &str) -> DecodeError {
         FormatError::at_offset(self.at - bytes_before, reason).into()
     }

@@ -11,25 +11,26 @@ use crate::store::map_folder;
 use crate::store::snapshots::snapshot_list::SnapshotList;
 use crate::store::tiles::tile_versions::TileVersions;
 
-/// The map's own two files, `commits.log` and `metadata.json`, and the lock that lets only one process write them.
+/// Owner of `commits.log`, `metadata.json` and the writer lock.
 #[derive(Debug)]
 pub(in crate::store) struct Committer {
-    /// `None` for a map of the original format, and for nothing else.
+    /// `None` only for a map of the original format.
     log: Option<CommitLog>,
-    /// Whether the log ends with its last commit. After a failed append its end is unknown.
+    /// Whether the log ends with its last commit. It may not after a failed append.
     is_log_settled: bool,
     metadata: Metadata,
-    /// Flush number in the `metadata.json` on disk; `None` in the original format. A crash can leave it behind the log.
+    /// Flush number in the `metadata.json` on disk; `None` in the original format. After a crash it may be older than
+    /// the log.
     written_flush: Option<u64>,
-    /// The map's snapshots; `None` where nothing says which there are.
+    /// Snapshots of the map; `None` if neither log nor metadata lists them.
     listed: Option<SnapshotList>,
-    /// Whether the log has the list of snapshots.
+    /// Whether the log contains the list of snapshots.
     is_list_logged: bool,
     /// Held while the store may write.
     lock: Option<WriterLock>,
 }
 
-/// A log longer than this many bytes, and than twice what one record of the whole map takes, is compacted.
+/// A log is compacted when it exceeds this many bytes and twice the length of one record of the whole map.
 const COMPACT_LOG_BYTES: u64 = 2048;
 
 impl Committer {
@@ -43,19 +44,18 @@ impl Committer {
         Self { log, is_log_settled, metadata, written_flush, listed, is_list_logged, lock }
     }
 
-    /// Holds the lock from here on, so that the map may be written. `is_torn` tells whether the log ends with a record
-    /// that is not whole.
+    /// Starts holding the lock, which allows writes. `is_torn` states that the log ends with an incomplete record.
     pub(in crate::store) fn begin_writing(&mut self, lock: WriterLock, is_torn: bool) {
         self.lock = Some(lock);
         self.is_log_settled = !is_torn;
     }
 
-    /// Whether the map may be written.
+    /// Returns whether the map may be written.
     pub(in crate::store) fn is_writer(&self) -> bool {
         self.lock.is_some()
     }
 
-    /// Checks that the lock still keeps others from writing.
+    /// Checks that the lock is still effective.
     pub(in crate::store) fn check_lock(&self) -> Result<()> {
         self.lock.as_ref().map_or(Ok(()), WriterLock::check)
     }
@@ -79,12 +79,12 @@ impl Committer {
         self.log.ok_or_else(|| Error::argument("map", reason))
     }
 
-    /// The metadata as last read or written.
+    /// Metadata as last read or written.
     pub(in crate::store) fn metadata(&self) -> &Metadata {
         &self.metadata
     }
 
-    /// Takes what the next log and `metadata.json` say.
+    /// Sets the metadata for the next log and `metadata.json`.
     pub(in crate::store) fn set_metadata(&mut self, metadata: Metadata) {
         self.metadata = metadata;
     }
@@ -94,24 +94,24 @@ impl Committer {
         self.written_flush
     }
 
-    /// Whether `metadata.json` is older than the log, which ends with this flush.
+    /// Returns whether `metadata.json` is older than `flush_number`, the last flush in the log.
     pub(in crate::store) fn is_metadata_behind(&self, flush_number: u64) -> bool {
         self.log.is_some() && self.written_flush != Some(flush_number)
     }
 
-    /// Which snapshots the map has, if anything says so.
+    /// List of snapshots, if log or metadata contains one.
     pub(in crate::store) fn snapshots(&self) -> Option<&SnapshotList> {
         self.listed.as_ref()
     }
 
-    /// Takes over which snapshots were found: the next commit lists them.
+    /// Sets the list of snapshots to those found. The next commit records it.
     pub(in crate::store) fn adopt_snapshots(&mut self, found: SnapshotList) {
         self.listed = Some(found);
         self.is_list_logged = false;
     }
 
-    /// Metadata with what the store knows better than its callers: bounds, numbers, storage and snapshots; and with no
-    /// more inputs than there is room for.
+    /// Fills in the fields that the store manages (bounds, numbers, storage, snapshots), and drops the earliest inputs
+    /// beyond the limit.
     pub(in crate::store) fn fill_in(
         &self,
         mut metadata: Metadata,
@@ -131,21 +131,22 @@ impl Committer {
         metadata
     }
 
-    /// Corrects the number of records in the list of scans; the next `metadata.json` has it.
+    /// Corrects the number of records in the list of scans, for the next `metadata.json`.
     pub(in crate::store) fn set_scan_records(&mut self, records: u64) {
         if let Some(ext) = &mut self.metadata.ext {
             ext.scan_records = Some(records);
         }
     }
 
-    /// Whether a commit has to say what the metadata is.
+    /// Returns whether the next commit must contain the metadata.
     pub(in crate::store) fn is_new(&self, metadata: &Metadata) -> bool {
         !self.is_list_logged
             || self.metadata.ext.is_none()
             || !self.metadata.is_same_but_for_progress(metadata)
     }
 
-    /// Appends a record and syncs it: the commit. After an error the end of the log is unknown, until it is settled.
+    /// Appends and syncs a record: the commit. After an error the end of the log is unknown until [`Self::settle_log`]
+    /// succeeds.
     pub(in crate::store) fn append(
         &mut self,
         files: &MapFiles,
@@ -163,8 +164,8 @@ impl Committer {
         Ok(())
     }
 
-    /// Truncates the log after a failed append. The failed record may still reach the disk, and it names `*.next` files
-    /// that must not change until it is gone.
+    /// Truncates the log after a failed append. Until then the failed record may reach the disk, so the `*.next` files
+    /// that it names must not change.
     pub(in crate::store) fn settle_log(&mut self, files: &MapFiles) -> Result<()> {
         if let (false, Some(log)) = (self.is_log_settled, self.log) {
             let path = files.layout().commit_log();
@@ -205,7 +206,7 @@ impl Committer {
         })?;
         self.log = Some(compacted);
         self.is_list_logged = true;
-        // What is appended from now on is in this file only; every commit syncs the folder first.
+        // Later records are only in this file. Every commit syncs the folder first.
         files.sync_map_folder()
     }
 
@@ -219,8 +220,8 @@ impl Committer {
         }
     }
 
-    /// Replaces `metadata.json`: written beside, synced, renamed. The caller syncs the folder, once it watches for
-    /// readers of the new file by what is returned.
+    /// Replaces `metadata.json` atomically. The caller must sync the folder, and use the returned watch to find readers
+    /// of the new file.
     pub(in crate::store) fn write_metadata(
         &mut self,
         files: &MapFiles,
@@ -231,15 +232,15 @@ impl Committer {
         let (disk, text) = (&**files.disk(), self.metadata.to_text());
         let watch = map_folder::replace(disk, &files.layout().metadata(), |next| {
             map_folder::write_text(disk, next, &text)?;
-            // Before anybody can read it: no reader goes unseen.
+            // Before the file is visible, so that no reader is missed.
             disk.watch(next)
         })?;
         self.written_flush = Some(flush_number);
         Ok(watch)
     }
 
-    /// Commits which snapshots the map has, and nothing else. It is a flush of its own in the log, so that whatever
-    /// ends the process is found like any other.
+    /// Commits a new list of snapshots and nothing else. This is a flush of its own in the log, so that recovery
+    /// handles a crash like at any other flush.
     pub(in crate::store) fn append_snapshots(
         &mut self,
         files: &MapFiles,

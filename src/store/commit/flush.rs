@@ -1,4 +1,4 @@
-//! The writing half of [`TileStore`]: versions beside the committed ones, and the commit that puts them in place.
+//! Write operations of [`TileStore`]: next versions of tiles and the commit.
 
 use super::checkpoint::{TILES_SYNCED_AT_ONCE, sync_folders};
 use super::commit_record::Flush;
@@ -15,11 +15,11 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 impl TileStore {
-    /// Writes the next version of one of a tile's files; the committed version stays as it is.
+    /// Writes the next version of a tile's file. The committed version is unchanged.
     ///
     /// # Errors
     ///
-    /// An I/O error; the earlier next version is lost then.
+    /// An I/O error. The earlier next version is lost then.
     pub fn write_next(
         &mut self,
         tile: TileIndex,
@@ -29,33 +29,33 @@ impl TileStore {
         self.writer()?.write_next(tile, file, write)
     }
 
-    /// What writes next versions, for another thread too, until the next commit.
+    /// Returns a writer of next versions, valid until the next commit. It can be used on another thread.
     ///
     /// # Errors
     ///
-    /// A disk that refuses to finish what the last commit left to do.
+    /// An I/O error while finishing the last commit.
     pub fn writer(&mut self) -> Result<TileWriter> {
-        // A committed version may still be there under the name that is written to now.
+        // A committed version may still have the name that will be written.
         self.finish_earlier_work()?;
         let map_id = self.committer.logged_map_id()?;
         Ok(TileWriter::new(self.files.clone(), map_id))
     }
 
-    /// Takes a tile out of the map, at the next commit: its space is unknown again. From here on the store does not
-    /// hold the tile, unless a next version of it is written later. What is not committed leaves the tile where it was.
+    /// Removes a tile from the map at the next commit: its space becomes unknown. The store does not contain the tile
+    /// from now on, unless its next version is written later. Without a commit the tile remains in the map.
     ///
-    /// Memory that holds the tile is the caller's to clear.
+    /// The caller must remove the tile from memory.
     ///
     /// # Errors
     ///
-    /// A map of the original format, which has no log that could name removed tiles.
+    /// A map of the original format, whose removed tiles cannot be logged.
     pub fn remove(&mut self, tile: TileIndex) -> Result<()> {
         self.committer.logged_map_id()?;
         self.versions.remove(tile);
         Ok(())
     }
 
-    /// Records a scan of the next commit whose points are not kept.
+    /// Adds a scan whose points are not kept to the next commit.
     pub fn note_scan(&mut self, scan: ScanRecord) {
         match self.archive.is_on() {
             true => self.archive.note(CatalogEntry::Listed(scan)),
@@ -63,7 +63,8 @@ impl TileStore {
         }
     }
 
-    /// Cuts the list of scans to what is whole and committed; returns where it is as it was, if it was damaged.
+    /// Truncates the list of scans to its valid, committed part. Returns the path of the original file if it was
+    /// damaged.
     ///
     /// # Errors
     ///
@@ -78,17 +79,16 @@ impl TileStore {
         Ok(self.scans.quarantined().map(Path::to_owned))
     }
 
-    /// Records of the list of scans as of the last commit, if that is known.
+    /// Number of records in the list of scans as of the last commit, if known.
     pub(crate) fn listed_records(&self) -> Option<u64> {
         self.metadata().ext.as_ref().and_then(|ext| ext.scan_records)
     }
 
-    /// Records that from the next commit on the map consists of the scans of an earlier one again, which is open as
-    /// `past`.
+    /// Resets the scans of the map, at the next commit, to those of its earlier state `past`.
     ///
     /// # Errors
     ///
-    /// A list of kept scans that is damaged, a disk that refuses.
+    /// A damaged list of kept scans or an I/O error.
     pub fn note_rewind(&mut self, past: &Self) -> Result<()> {
         self.archive.rewind(&past.archive)?;
         if !past.archive.is_on() {
@@ -97,12 +97,12 @@ impl TileStore {
         Ok(())
     }
 
-    /// Commits every version written and every tile removed since the last commit. When this returns they are durable,
-    /// and only they.
+    /// Commits all versions written and all tiles removed since the last commit. When this returns, exactly these
+    /// changes are durable.
     ///
-    /// `metadata` gives the map's parameters; bounds and numbers are filled in here. After an error nothing is
-    /// committed, and calling again tries again. What comes after the commit only tidies up: if the disk refuses that,
-    /// it is logged as a warning and made good later.
+    /// `metadata` contains the map's parameters. Bounds and numbers are filled in here. After an error nothing is
+    /// committed, and the next call retries. An I/O error after the commit itself is logged as a warning, and its work
+    /// is done later.
     ///
     /// # Errors
     ///
@@ -117,10 +117,10 @@ impl TileStore {
         Ok(())
     }
 
-    /// Begins a commit that others complete while the map goes on: it takes along the scans that were noted until now.
+    /// Begins a commit in steps, so that the map can be used meanwhile. The commit contains the scans noted so far.
     ///
-    /// Then the versions are written that the commit is to name, and no others; [`TileStore::unsynced`] makes them
-    /// durable, beside the map; [`TileStore::commit_synced`] commits; and what is left to do is done in steps
+    /// The caller then writes the versions of this commit and no others, syncs them concurrently
+    /// ([`TileStore::unsynced`]), commits ([`TileStore::commit_synced`]), and finishes in steps
     /// ([`TileStore::begin_step`]).
     ///
     /// # Errors
@@ -138,7 +138,7 @@ impl TileStore {
         Ok(BegunCommit { metadata, scan_number, listed_scans: self.scans.pending() })
     }
 
-    /// Whether there is something to commit.
+    /// Returns whether there is something to commit.
     pub fn has_news(&self, begun: &BegunCommit) -> bool {
         let has_changed = !self.versions.next().is_empty() || !self.versions.removed().is_empty();
         has_changed
@@ -147,7 +147,7 @@ impl TileStore {
             || begun.scan_number != self.commits().scan_number
     }
 
-    /// What a commit is to make durable before it can name it.
+    /// Returns the files to sync before the commit.
     pub fn unsynced(&self) -> Unsynced {
         let tiles = self.versions.next().tiles().collect();
         Unsynced { files: self.files.clone(), tiles, segments: self.archive.unsynced() }
@@ -163,13 +163,13 @@ impl TileStore {
         metadata
     }
 
-    /// Commits what [`Unsynced::sync`] has made durable.
+    /// Commits the files that [`Unsynced::sync`] has made durable.
     ///
     /// # Errors
     ///
-    /// Why that failed; as for [`TileStore::commit`].
+    /// The error of the sync, and those of [`TileStore::commit`].
     pub fn commit_synced(&mut self, begun: &BegunCommit, synced: Synced) -> Result<()> {
-        synced.suspects.into_iter().for_each(|tile| self.versions.suspect(tile));
+        synced.failed.into_iter().for_each(|tile| self.versions.suspect(tile));
         if synced.has_lost_scans {
             self.archive.suspect_unsynced();
         }
@@ -185,14 +185,14 @@ impl TileStore {
         if let Some(ext) = &mut metadata.ext {
             (ext.scan_records, ext.catalog) = (Some(scans.records), catalog);
         }
-        // As late as can be: what another writer commits must not be cut off.
+        // As late as possible, so that the commit of another writer is not truncated.
         self.committer.check_lock()?;
         let text = metadata.to_text();
         let metadata_text = is_new.then_some(&*text);
         let (changed, scan_number) = (self.versions.next(), begun.scan_number);
         let flush = Flush { number, scan_number, changed, removed: &removed, catalog, metadata_text };
         if let Err(error) = self.committer.append(&self.files, &flush, &metadata) {
-            // At once if it goes: another process may come next, and would see a record that is not on the medium.
+            // Immediately, if possible: another process would see a record that is not durable.
             let _ = self.finish_earlier_work();
             self.archive.not_committed();
             return Err(error);
@@ -213,15 +213,15 @@ impl TileStore {
         Ok(())
     }
 
-    /// Does what a commit leaves to do. What the disk refuses is done later.
+    /// Finishes the last commit. After an I/O error the rest is done later.
     pub fn tidy_up(&mut self) {
         if let Err(error) = self.finish_commit() {
             log::warn!("flushed, but not tidied up: {error:#}");
         }
     }
 
-    /// Begins to put some of the committed versions in place; `None` if all are, or as far as they could be.
-    /// [`TileStore::put_in_place`] comes next.
+    /// Begins to rename some of the committed versions; `None` if there are none left. [`TileStore::put_in_place`]
+    /// follows.
     ///
     /// # Errors
     ///
@@ -239,8 +239,8 @@ impl TileStore {
         Ok(Some(Step { files: self.files.clone(), tiles, pinned }))
     }
 
-    /// Puts the version of a tile of a step in place, once [`Step::sync_kept`] has succeeded. On a busy disk a rename
-    /// takes milliseconds, so whoever shares the store lets others have it between two tiles.
+    /// Renames the version of one tile of a step, once [`Step::sync_kept`] has succeeded. A rename can take
+    /// milliseconds on a busy disk, so a shared store should be released between tiles.
     ///
     /// # Errors
     ///
@@ -257,8 +257,8 @@ impl TileStore {
         self.checkpoint.renames_are_durable(&step.tiles);
     }
 
-    /// Records the tiles that a commit adds. A reader of an earlier flush does not see them, so their tables need not
-    /// be kept for it. A reader that opens the map meanwhile may cause a table to be kept in vain.
+    /// Records the tiles that a commit adds. Readers of an earlier flush do not use them, so their tables need not be
+    /// kept. A reader that opens the map at the same time may cause a table to be kept needlessly.
     fn note_added(&mut self, number: u64) {
         if !self.kept.has_readers() {
             return;
@@ -269,7 +269,7 @@ impl TileStore {
         }
     }
 
-    /// Brings the files to what the last commit says, without another one.
+    /// Finishes the last commit without a new one.
     ///
     /// # Errors
     ///
@@ -279,7 +279,7 @@ impl TileStore {
         self.finish_commit()
     }
 
-    /// Completes the steps that an earlier call could not. Must come before any write.
+    /// Finishes the work that an earlier call left. Required before any write.
     pub(in crate::store) fn finish_earlier_work(&mut self) -> Result<()> {
         self.committer.check_lock()?;
         self.committer.settle_log(&self.files)?;
@@ -290,10 +290,10 @@ impl TileStore {
         self.checkpoint.run(&self.files, &mut self.versions, &mut self.kept)
     }
 
-    /// Does the steps after the commit record: `metadata.json`, renames, removals, log compaction. The next call
-    /// completes what the disk refuses.
+    /// Does the steps after the commit record: `metadata.json`, renames, removals, log compaction. After an I/O error
+    /// the next call resumes.
     pub(in crate::store) fn finish_commit(&mut self) -> Result<()> {
-        // At once: who opens the map in between cannot tell the writer which flush it reads.
+        // First: a reader that opens the map before this cannot report which flush it reads.
         if self.committer.written_flush() != Some(self.commits().flush_number) {
             self.write_metadata()?;
         }
@@ -302,7 +302,7 @@ impl TileStore {
         self.committer.compact_log(&self.files, self.versions.commits())
     }
 
-    /// Puts the next version of a tile's octree in place by itself: it must be the one that the log names.
+    /// Renames the next version of a tile's octree alone. It must be the octree that the log names.
     ///
     /// # Errors
     ///
@@ -315,7 +315,7 @@ impl TileStore {
         self.files.sync_folder(&layout.tile_folder(tile))
     }
 
-    /// Takes tiles out of the map: one commit, after which the log does not name them. Their folders stay.
+    /// Removes tiles from the log in one commit. Their folders remain.
     ///
     /// # Errors
     ///
@@ -330,14 +330,14 @@ impl TileStore {
         self.write_metadata()
     }
 
-    /// Notes a commit in which no tile and no scan changed.
+    /// Records a commit without changes of tiles or scans.
     pub(in crate::store) fn committed_nothing(&mut self, number: u64) {
         self.versions.committed_nothing(number);
         self.archive.set_last_commit(self.versions.commits());
     }
 
-    /// Gives a map of the original format an id and a log, so that it can be written to, and returns the id. Its tiles
-    /// count as unread until they have been written again. A map that has an id keeps it.
+    /// Gives a map of the original format an id and a log, so that it can be written, and returns the id. Its tiles
+    /// have no versions until they are written again. A map with an id keeps it.
     ///
     /// # Errors
     ///
@@ -347,7 +347,8 @@ impl TileStore {
         self.committer.logged_map_id()
     }
 
-    /// Where `metadata.json` could not be replaced after the last commit, readers of it may have opened that commit.
+    /// Keeps tables for readers that may have opened the last commit although `metadata.json` could not be replaced
+    /// after it.
     pub(in crate::store) fn keep_for_late_readers(&mut self) {
         if self.is_metadata_behind() {
             let flush_number = self.commits().flush_number;
@@ -355,7 +356,6 @@ impl TileStore {
         }
     }
 
-    /// Replaces `metadata.json`, durably.
     pub(in crate::store) fn write_metadata(&mut self) -> Result<()> {
         let watch = self.committer.write_metadata(&self.files, &self.versions)?;
         self.kept.watch(self.commits().flush_number, watch);
@@ -363,7 +363,7 @@ impl TileStore {
     }
 }
 
-/// Tiles whose new names are made durable at once beside the map.
+/// Number of tiles renamed in one step of a concurrent flush.
 const TILES_OF_STEP: usize = 64;
 
 /// A commit that has begun.
@@ -371,11 +371,11 @@ const TILES_OF_STEP: usize = 64;
 pub struct BegunCommit {
     metadata: Metadata,
     scan_number: u64,
-    /// How many of the scans that were noted belong to it.
+    /// Number of noted scans that belong to the commit.
     listed_scans: usize,
 }
 
-/// What a commit is to make durable.
+/// Files to sync before a commit.
 #[derive(Debug)]
 pub struct Unsynced {
     files: MapFiles,
@@ -383,48 +383,48 @@ pub struct Unsynced {
     segments: Vec<u64>,
 }
 
-/// What came of that.
+/// Result of [`Unsynced::sync`].
 #[derive(Debug)]
 pub struct Synced {
-    suspects: Vec<TileIndex>,
+    failed: Vec<TileIndex>,
     /// Whether kept scans could not be synced.
     has_lost_scans: bool,
     result: Result<()>,
 }
 
-/// Some committed versions that are put in place.
+/// Committed versions to rename in one step.
 #[derive(Debug)]
 pub struct Step {
     files: MapFiles,
     tiles: Vec<TileIndex>,
-    /// Those of which a snapshot sees what was in place before.
+    /// Tiles whose replaced tables a snapshot uses.
     pinned: Vec<TileIndex>,
 }
 
 impl Unsynced {
-    /// Syncs all versions that the commit names. The store needs not wait for it.
+    /// Syncs all versions of the commit. Does not need the store.
     pub fn sync(&self) -> Synced {
-        let mut suspects = Vec::new();
+        let mut failed = Vec::new();
         let mut changed = self.tiles.chunks(TILES_SYNCED_AT_ONCE).peekable();
         let result = loop {
             let group = changed.next().unwrap_or_default();
             let is_last = changed.peek().is_none();
-            let synced = sync_group(&self.files, group, is_last, &mut suspects);
+            let synced = sync_group(&self.files, group, is_last, &mut failed);
             if is_last || synced.is_err() {
                 break synced;
             }
         };
-        Synced { suspects, has_lost_scans: false, result }
+        Synced { failed, has_lost_scans: false, result }
     }
 
-    /// The same, and brings kept scans to the medium ahead of the commit, which then has little of them left to sync.
+    /// Like [`Unsynced::sync`], but first syncs kept scans, of which the commit then has little left to sync.
     pub fn sync_with_scans(&self) -> Synced {
         for &segment in &self.segments {
             let path = self.files.layout().segment(segment);
             if let Err(error) = self.files.disk().sync_file(&path) {
-                // A disk tells this once: what it says of the file from now on proves nothing.
+                // A failed sync is reported only once: later successful syncs of this file prove nothing.
                 let result = Err(Error::io(&path, "sync", error));
-                return Synced { suspects: Vec::new(), has_lost_scans: true, result };
+                return Synced { failed: Vec::new(), has_lost_scans: true, result };
             }
         }
         self.sync()
@@ -432,7 +432,7 @@ impl Unsynced {
 }
 
 impl Step {
-    /// Makes durable what snapshots see from now on.
+    /// Makes the tables kept for snapshots durable.
     ///
     /// # Errors
     ///
@@ -441,12 +441,12 @@ impl Step {
         sync_folders(&self.files, &self.pinned, |_| {})
     }
 
-    /// The tiles for [`TileStore::put_in_place`].
+    /// Tiles for [`TileStore::put_in_place`].
     pub fn tiles(&self) -> &[TileIndex] {
         &self.tiles
     }
 
-    /// Makes durable that the versions have their names.
+    /// Makes the new names of the versions durable.
     ///
     /// # Errors
     ///
@@ -456,13 +456,13 @@ impl Step {
     }
 }
 
-/// Syncs the versions of some tiles, and adds the tiles of which that failed to `suspects`. With the last of them goes
-/// the map's own folder, which names the new tile folders.
+/// Syncs the versions of some tiles, and adds those whose sync failed to `failed`. The last group includes the map's
+/// folder, which contains the names of new tile folders.
 fn sync_group(
     files: &MapFiles,
     changed: &[TileIndex],
     is_last: bool,
-    suspects: &mut Vec<TileIndex>,
+    failed: &mut Vec<TileIndex>,
 ) -> Result<()> {
     let layout = files.layout();
     let paths: Vec<_> = changed
@@ -475,7 +475,7 @@ fn sync_group(
     let per_tile = layout.files().len();
     for (number, result) in synced_files.iter().enumerate() {
         if result.is_err() {
-            suspects.push(changed[number / per_tile]);
+            failed.push(changed[number / per_tile]);
         }
     }
     let synced_files = paths.iter().zip(synced_files);

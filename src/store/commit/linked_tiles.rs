@@ -7,28 +7,28 @@ use crate::store::tiles::tile_version::TileVersion;
 use crate::store::tiles::tile_writer::make_folder;
 use std::path::PathBuf;
 
-/// Puts tiles of other maps of the same id and storage into a new one by second names for their files, in one commit.
+/// Adds tiles of other maps of the same id and storage to a new map by hard links, in one commit.
 ///
-/// The files get the names of committed versions at once, so that no file is renamed and each folder is synced once:
-/// it is for a map that nobody sees yet ([`StagedMap`](crate::store::StagedMap)). The other maps are durable and nobody
-/// writes to them; they stay whole. Where the file system gives a file one name only, the files are copied, and every
-/// byte is compared with the log; of others the length alone is.
+/// The files get the names of committed versions at once, so no file is renamed and each folder is synced once. This
+/// requires a map that no other process sees yet ([`StagedMap`](crate::store::StagedMap)). The other maps must be
+/// durable and have no writer; they are unchanged. Without hard links the files are copied, and their checksums are
+/// compared with the log. For links only the lengths are compared.
 #[derive(Debug)]
 pub struct LinkedTiles<'a> {
     store: &'a mut TileStore,
-    /// Copies, of which the content is not durable yet.
+    /// Copied files that are not durable yet.
     copies: Vec<PathBuf>,
 }
 
 impl TileStore {
-    /// Begins to link tiles of other maps into this one, which has no tile of its own.
+    /// Begins to link tiles of other maps into this map, which has no tiles.
     pub fn link_tiles(&mut self) -> LinkedTiles<'_> {
         LinkedTiles { store: self, copies: Vec::new() }
     }
 }
 
 impl LinkedTiles<'_> {
-    /// Whether the tile is here.
+    /// Returns whether the map contains the tile.
     pub fn contains(&self, tile: TileIndex) -> bool {
         self.store.tiles().contains(tile)
     }
@@ -37,7 +37,7 @@ impl LinkedTiles<'_> {
     ///
     /// # Errors
     ///
-    /// A file that is missing or of another length, a disk that refuses.
+    /// A file that is missing or of another length, or an I/O error.
     pub fn link(&mut self, other: &TileStore, tile: TileIndex) -> Result<TileVersion> {
         let version = other.version_to_copy(tile)?;
         make_folder(&**self.store.disk(), &self.store.layout().tile_folder(tile))?;
@@ -67,11 +67,11 @@ impl LinkedTiles<'_> {
             .try_for_each(|(path, synced)| synced.map_err(|error| Error::io(path, "sync", error)))
     }
 
-    /// Makes all of them durable, and then the log and the metadata that name them.
+    /// Makes all tiles durable, then the log and the metadata.
     ///
     /// # Errors
     ///
-    /// A disk that refuses.
+    /// An I/O error.
     pub fn commit(mut self, metadata: Metadata) -> Result<()> {
         self.sync_copies()?;
         let store = self.store;

@@ -9,16 +9,16 @@ use crate::store::snapshots::snapshot_list::SnapshotList;
 use crate::store::tiles::tile_version::MAX_NUMBER;
 use serde::{Deserialize, Serialize};
 
-/// What `metadata.json` says: the original keys, and voxtile's own in a last object `ext`.
+/// Content of `metadata.json`: the keys of the original format, and voxtile's own in the last object `ext`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Metadata {
     /// Edge of a voxel in metres.
     pub resolution_m: f64,
     /// Edge of a tile in metres.
     pub tile_size_m: f64,
-    /// The exact hull of the tiles; `None` for an empty map.
+    /// Bounding box of the tiles; `None` for an empty map.
     pub bounds: Option<Bounds>,
-    /// voxtile's own; `None` for a map of the original format, which cannot be verified.
+    /// voxtile's own keys; `None` for a map of the original format, which cannot be verified.
     pub ext: Option<Extension>,
 }
 
@@ -31,10 +31,10 @@ pub struct Bounds {
     pub max: [i32; 3],
 }
 
-/// What voxtile adds to the original metadata.
+/// Metadata that voxtile adds to the original format.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Extension {
-    /// Whether the map has no tile, which zeros as bounds cannot say.
+    /// Whether the map has no tiles. Its bounds are zeros then.
     pub empty: bool,
     /// Id of the map, 32 hexadecimal digits.
     pub map_id: String,
@@ -42,64 +42,63 @@ pub struct Extension {
     pub flush_number: u64,
     /// Number of the last scan in the map.
     pub scan_number: u64,
-    /// How observations become evidence.
+    /// Sensor model.
     pub sensor_model: SensorModel,
     /// Probability from which a voxel counts as occupied.
     pub occupancy_threshold: f64,
-    /// Which part of a ray counted when the map was last written to.
+    /// Ray settings when the map was last written.
     pub rays: RayConfig,
-    /// What the map was built from, the latest last: of more than a thousand inputs the earliest are forgotten.
+    /// Inputs of the map, the latest last. Beyond 1000 the earliest are dropped.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub inputs: Vec<InputRecord>,
-    /// Number of the last scan in the map when its evidence last faded; 0 if it never has.
+    /// Number of the last scan in the map at the last decay; 0 without any.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub decayed_scan: u64,
-    /// How the tiles are stored; maps of the original files do not say.
+    /// Storage of the tiles; missing in maps of the original format.
     #[serde(default, skip_serializing_if = "Storage::is_octomap")]
     pub storage: Storage,
-    /// The coordinate reference system of the map's frame, if one was named.
+    /// Coordinate reference system of the map's frame, if known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub crs: Option<String>,
     /// Whether the map keeps its scans.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub keeps_scans: bool,
-    /// The catalog of these scans as of the last flush; `None` in maps of versions that did not name it.
+    /// Catalog of kept scans as of the last flush; `None` in maps of versions that did not record it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub catalog: Option<CatalogVersion>,
-    /// Number of records in `scans.bin` as of the last flush; `None` if that is not known.
+    /// Number of records in `scans.bin` as of the last flush; `None` if unknown.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scan_records: Option<u64>,
-    /// The map's snapshots; in a snapshot's own file that one alone. `None` before the first, and in maps of versions
-    /// that did not list them: every file of the folder of snapshots is one then.
+    /// Snapshots of the map; in the file of a snapshot, only itself. `None` before the first snapshot, and in maps of
+    /// versions that had no list: every file in the folder of snapshots is one then.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub snapshots: Option<SnapshotList>,
 }
 
-/// The parameters of a map that never change. Every tile repeats them, so that repair can rebuild the metadata. It
-/// stands in every tile, so that a map can be put together again from its tiles.
+/// Parameters of a map that never change. Every tile contains a copy, so that the metadata can be rebuilt from tiles.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MapParameters {
     /// Edge of a voxel in metres.
     pub resolution: f64,
     /// Edge of a tile in metres.
     pub tile_size: f64,
-    /// How observations become evidence.
+    /// Sensor model.
     pub sensor_model: SensorModel,
     /// Probability from which a voxel counts as occupied.
     pub occupancy_threshold: f64,
 }
 
 impl MapParameters {
-    /// The parameters as one line of JSON.
+    /// Returns the parameters as one line of JSON.
     pub fn to_text(&self) -> String {
         serde_json::to_string(self).expect("plain data of strings and numbers")
     }
 
-    /// Reads the line.
+    /// Parses the line of JSON.
     ///
     /// # Errors
     ///
-    /// Text that is no such JSON.
+    /// Text that is not JSON of the parameters.
     pub fn from_text(text: &str) -> Result<Self, FormatError> {
         serde_json::from_str(text)
             .map_err(|error| FormatError::at_offset(0, format!("not the parameters of a map: {error}")))
@@ -115,7 +114,7 @@ struct Document {
     ext: Option<ReadExtension>,
 }
 
-/// An extension as earlier versions wrote it, too: with the name of the last input alone.
+/// Extension with the fields of earlier versions, which recorded only the name of the last input.
 #[derive(Deserialize)]
 struct ReadExtension {
     #[serde(flatten)]
@@ -136,12 +135,12 @@ impl ReadExtension {
 }
 
 const VERSION: &str = "1.0";
-/// The file ends with the checksum of all bytes before it, so that no byte is without guard.
+/// The file ends with a checksum of all bytes before it.
 const CHECKSUM_KEY: &str = "    \"crc32\": \"";
 const END: &str = "\"\n  }\n}\n";
 
 impl Bounds {
-    /// The hull of tiles; `None` of none.
+    /// Returns the bounding box of the tiles; `None` without tiles.
     pub fn of(tiles: impl Iterator<Item = TileIndex>) -> Option<Self> {
         tiles.map(TileIndex::to_array).fold(None, |bounds: Option<Self>, tile| {
             let Self { min, max } = bounds.unwrap_or(Self { min: tile, max: tile });
@@ -154,7 +153,7 @@ impl Bounds {
 }
 
 impl Metadata {
-    /// What makes the map the map it is; `None` for a map of the original format, which does not say it all.
+    /// Fixed parameters of the map; `None` for a map of the original format, which lacks some of them.
     pub fn parameters(&self) -> Option<MapParameters> {
         self.ext.as_ref().map(|ext| MapParameters {
             resolution: self.resolution_m,
@@ -169,7 +168,7 @@ impl Metadata {
         self.ext.as_ref().map_or(Storage::OctoMap, |ext| ext.storage)
     }
 
-    /// The same as of a commit: its tiles' hull and its numbers.
+    /// Returns the metadata with bounds and numbers as of a commit.
     pub(in crate::store) fn as_of(&self, commits: &Commits) -> Self {
         let mut metadata = Self { bounds: Bounds::of(commits.tiles.tiles()), ..self.clone() };
         if let Some(ext) = &mut metadata.ext {
@@ -180,7 +179,7 @@ impl Metadata {
         metadata
     }
 
-    /// Whether the two say the same but for what every flush brings: bounds and numbers.
+    /// Returns whether the two are equal apart from bounds and numbers, which every flush changes.
     pub(in crate::store) fn is_same_but_for_progress(&self, other: &Self) -> bool {
         let without_progress = |metadata: &Self| {
             let mut metadata = Self { bounds: None, ..metadata.clone() };
@@ -193,11 +192,11 @@ impl Metadata {
         without_progress(self) == without_progress(other)
     }
 
-    /// The file's text. The original keys come first and in its order; lengths are plain decimals.
+    /// Returns the text of the file. The original keys come first, in the original order. Lengths are plain decimals.
     pub fn to_text(&self) -> String {
         let Bounds { min, max } = self.bounds.unwrap_or(Bounds { min: [0; 3], max: [0; 3] });
         let bounds = format!("\"bounds\": {{\n    \"min\": {min:?},\n    \"max\": {max:?}\n  }}");
-        // Rust prints the shortest decimal that reads back to the same bits, never with an exponent.
+        // Rust prints the shortest decimal that reads back to the same bits, without an exponent.
         let (resolution, tile_size) = (decimal(self.resolution_m), decimal(self.tile_size_m));
         let head = format!(
             "{{\n  \"version\": \"{VERSION}\",\n  \"resolution\": {resolution},\n  \"tile_size\": {tile_size},\n  {bounds}"
@@ -211,11 +210,11 @@ impl Metadata {
         format!("{text}{crc:08x}{END}")
     }
 
-    /// Reads the file's text.
+    /// Parses the text of the file.
     ///
     /// # Errors
     ///
-    /// Text that is no such JSON, a version other than 1.0, or a checksum that does not match.
+    /// Text that is not JSON of a map's metadata, a version other than 1.0, or a wrong checksum.
     pub fn from_text(text: &str) -> Result<Self, FormatError> {
         let document: Document = serde_json::from_str(text).map_err(|error| {
             FormatError::at_line(error.line() as u64, format!("not a map's metadata: {error}"))
@@ -225,7 +224,7 @@ impl Metadata {
                 format!("version {:?} is not known; this program reads {VERSION:?}", document.version);
             return Err(FormatError::at_offset(0, reason));
         }
-        // A checksum without `ext` is a damaged name of that key, not a file of the original.
+        // A checksum without `ext` indicates a damaged key, not a file of the original format.
         if document.ext.is_some() || text.contains("\"crc32\"") {
             check_crc(text)?;
         }
@@ -262,7 +261,7 @@ fn is_zero(number: &u64) -> bool {
     *number == 0
 }
 
-/// A length as a plain decimal that is a JSON float.
+/// Formats a length as a plain decimal that JSON reads as a float.
 fn decimal(length_m: f64) -> String {
     let text = length_m.to_string();
     if text.contains('.') { text } else { text + ".0" }

@@ -1,4 +1,4 @@
-//! The commit: next versions of tiles, one synced record in `commits.log`, and the steps after it.
+//! Commits: next versions of tiles, one synced record in `commits.log`, and the steps after it.
 
 pub(super) mod checkpoint;
 pub(super) mod commit_log;

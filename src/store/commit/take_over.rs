@@ -1,4 +1,4 @@
-//! Tiles of another map as next versions of those here, without a look at what is in them.
+//! Moves, copies or links files of tiles as next versions, without decoding them.
 
 use crate::error::{Error, FormatError, Result};
 use crate::space::TileIndex;
@@ -12,12 +12,12 @@ use std::io;
 use std::path::Path;
 
 impl TileStore {
-    /// Moves all tiles of `other`, a map of the same id, storage and file system that has committed them and loses them
-    /// by this, to where the next commit finds them.
+    /// Moves all tiles of `other` to the next versions of this map. `other` must have the same id, storage and file
+    /// system, and its tiles must be committed. It loses them.
     ///
     /// # Errors
     ///
-    /// A folder in the way that the log does not name, a disk that refuses; `other` has lost some of its tiles then.
+    /// An existing folder that the log does not name, or an I/O error. `other` may have lost some of its tiles then.
     pub fn take_over(&mut self, other: &Self) -> Result<()> {
         self.finish_earlier_work()?;
         let mut tiles: Vec<_> = other.tiles().iter().collect();
@@ -41,11 +41,11 @@ impl TileStore {
         Ok(())
     }
 
-    /// Looks whether one of a tile's files is there, as long as the log says.
+    /// Checks that a tile's file exists and has the length in the log.
     ///
     /// # Errors
     ///
-    /// A file that is missing or of another length, a disk that refuses.
+    /// A file that is missing or of another length, or an I/O error.
     pub(in crate::store) fn check_length(&self, tile: TileIndex, file: TileFile) -> Result<()> {
         let path = self.layout().current(tile, file);
         let damaged = |reason: String| Err(FormatError::at_offset(0, reason).in_map(&path, Some(tile)));
@@ -60,11 +60,11 @@ impl TileStore {
         }
     }
 
-    /// Writes a copy of one of a tile's files as the next version elsewhere.
+    /// Copies a tile's file with `writer`, as a next version in another map.
     ///
     /// # Errors
     ///
-    /// A file that is not what the log says, a disk that refuses.
+    /// A file that differs from the log, or an I/O error.
     pub fn copy_file(&self, writer: &TileWriter, tile: TileIndex, file: TileFile) -> Result<FileChecksum> {
         let wanted = self.version_to_copy(tile)?.of(file);
         let path = self.layout().current(tile, file);
@@ -87,11 +87,11 @@ impl TileStore {
         }
     }
 
-    /// Puts a table that is kept under another name, and is the one that the log names, in place.
+    /// Replaces the current table by a kept one, which must be the table that the log names.
     ///
     /// # Errors
     ///
-    /// A disk that refuses.
+    /// An I/O error.
     pub fn put_kept_in_place(&mut self, tile: TileIndex, table: &Path) -> Result<()> {
         self.link_next(tile, table)?;
         let layout = self.layout();
@@ -101,12 +101,11 @@ impl TileStore {
         self.files.sync_folder(&layout.tile_folder(tile))
     }
 
-    /// Makes a table of the tile that is whole under another name its next version: the same file where the file system
-    /// has hard links, else a copy.
+    /// Makes another valid table of the tile its next version, as a hard link if possible, else as a copy.
     ///
     /// # Errors
     ///
-    /// A disk that refuses.
+    /// An I/O error.
     pub fn link_next(&mut self, tile: TileIndex, table: &Path) -> Result<()> {
         self.finish_earlier_work()?;
         if self.disk().link(table, &self.layout().next(tile, TileFile::Table)).is_ok() {

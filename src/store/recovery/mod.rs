@@ -1,4 +1,4 @@
-//! What crashes, damage and interrupted work leave behind: recovered, salvaged, staged, moved or put to quarantine.
+//! Handling of crashes, damage and interrupted work: recovery, salvage, staging, moves and quarantine.
 
 pub(super) mod moved_map;
 pub(super) mod quarantine;

@@ -11,25 +11,24 @@ use crate::store::tile_store::TileStore;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Moves a map that nobody writes to, to a place that is free, and makes all of it durable there, whether the map's
-/// writer did so or not ([`UnsyncedDisk`](crate::store::UnsyncedDisk)). As a
-/// [`StagedMap`](super::staged_map::StagedMap) the map is there whole, or not at all; each file is synced once, after
-/// all have been written.
+/// Moves a map without a writer to an unused path and makes it durable there, even if its own writes were not synced
+/// ([`UnsyncedDisk`](crate::store::UnsyncedDisk)). The move is atomic, as with
+/// [`StagedMap`](super::staged_map::StagedMap), and each file is synced once.
 ///
-/// `false` if the file system cannot move it there, or if an attempt that was killed left something beside that place:
-/// it is where it was, then. Of each file of a tile the length alone is compared with the log.
+/// Returns `false`, with the map unchanged, if the file system cannot move it, or if a killed attempt left a folder at
+/// the staging path. Only the lengths of tiles' files are compared with the log.
 ///
 /// # Errors
 ///
-/// A place that is not free, a map that somebody writes to, a file that is missing or of another length, a disk that
-/// refuses. The map is gone, then, unless it was never moved.
+/// An existing destination, a map with a writer, a file that is missing or of another length, or an I/O error. If the
+/// map was moved already, it is lost.
 pub fn move_map(disk: &Arc<dyn Disk>, map: &Path, folder: &Path) -> Result<bool> {
     place::check_place(&**disk, folder)?;
     check_is_free(&**disk, folder)?;
     let unfinished = staging_folder(folder)?;
     let parent = map_folder::parent_of(folder);
     map_folder::create_folders(&**disk, parent)?;
-    // It goes along with the folder, and keeps others from taking that for something left behind.
+    // The lock moves with the folder and protects it from being removed as the remains of an interrupted attempt.
     let lock = WriterLock::take(&**disk, &Layout::new(map))?;
     let store = TileStore::open_read_only(disk.clone(), map)?;
     let mut tiles: Vec<_> = store.tiles().iter().collect();
@@ -52,7 +51,7 @@ pub fn move_map(disk: &Arc<dyn Disk>, map: &Path, folder: &Path) -> Result<bool>
     Ok(true)
 }
 
-/// Makes the files of a map durable, and their names.
+/// Makes the files of a map and their names durable.
 fn sync_map(disk: &dyn Disk, layout: &Layout, tiles: &[TileIndex]) -> Result<()> {
     let mut own = vec![layout.metadata(), layout.commit_log()];
     if disk.kind_at(&layout.scans())?.is_some() {

@@ -4,7 +4,7 @@ use crate::store::layout::Layout;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// The folder in a map that takes what repair takes out: nothing is deleted.
+/// Folder in a map for files that repair removes from it. Nothing is deleted.
 #[derive(Debug)]
 pub struct Quarantine<'a> {
     disk: &'a dyn Disk,
@@ -12,16 +12,16 @@ pub struct Quarantine<'a> {
 }
 
 impl<'a> Quarantine<'a> {
-    /// The quarantine of a map.
+    /// Returns the quarantine of a map.
     pub fn new(disk: &'a dyn Disk, layout: &'a Layout) -> Self {
         Self { disk, layout }
     }
 
-    /// Moves a file or folder of the map; returns where to.
+    /// Moves a file or folder of the map to quarantine. Returns the new path.
     ///
     /// # Errors
     ///
-    /// A disk that refuses.
+    /// An I/O error.
     pub fn take(&self, path: &Path) -> Result<PathBuf> {
         let to = self.place_for(path)?;
         self.disk.rename(path, &to).map_err(|error| Error::io(path, "move to quarantine", error))?;
@@ -32,12 +32,12 @@ impl<'a> Quarantine<'a> {
         Ok(to)
     }
 
-    /// Copies a file that is about to be replaced; returns where to, `None` if there is no file. What is none, or
-    /// cannot be read, is moved as it is.
+    /// Copies a file that is about to be replaced to quarantine. Returns the path of the copy, or `None` if there is no
+    /// file. Anything that is not a regular file, or cannot be read, is moved.
     ///
     /// # Errors
     ///
-    /// A disk that refuses.
+    /// An I/O error.
     pub fn take_copy(&self, path: &Path) -> Result<Option<PathBuf>> {
         match self.copy(path) {
             Err(error) if is_of_file(&error) => self.take(path).map(Some),
@@ -45,13 +45,13 @@ impl<'a> Quarantine<'a> {
         }
     }
 
-    /// Copies a file whose readable rest is still needed where it is; one that cannot be read gets another name here,
-    /// too. Returns where to; `None` if there is no file, or neither can be done: then it is to be taken once it is no
-    /// longer needed.
+    /// Copies a file to quarantine that is still needed in place. A file that cannot be read gets a hard link in
+    /// quarantine instead. Returns the new path. Returns `None` if there is no file, or if neither is possible: then
+    /// the caller must move it later.
     ///
     /// # Errors
     ///
-    /// A disk that refuses.
+    /// An I/O error.
     pub fn keep(&self, path: &Path) -> Result<Option<PathBuf>> {
         match self.copy(path) {
             Err(error) if is_of_file(&error) => self.link(path),
@@ -59,11 +59,11 @@ impl<'a> Quarantine<'a> {
         }
     }
 
-    /// Gives a file another name here; returns which. `None` where a file has one name only.
+    /// Adds a hard link to a file in quarantine. Returns its path, or `None` if the file system has no hard links.
     ///
     /// # Errors
     ///
-    /// A disk that refuses.
+    /// An I/O error.
     pub fn link(&self, path: &Path) -> Result<Option<PathBuf>> {
         let to = self.place_for(path)?;
         if self.disk.link(path, &to).is_err() {
@@ -73,11 +73,11 @@ impl<'a> Quarantine<'a> {
         Ok(Some(to))
     }
 
-    /// Copies a file; returns where to, `None` if there is no file.
+    /// Copies a file to quarantine. Returns the path of the copy, or `None` if there is no file.
     ///
     /// # Errors
     ///
-    /// A disk that refuses, among other things to give the file back.
+    /// An I/O error, including a file that cannot be read.
     pub fn copy(&self, path: &Path) -> Result<Option<PathBuf>> {
         let mut input = match self.disk.open(path) {
             Ok(input) => input,
@@ -98,14 +98,14 @@ impl<'a> Quarantine<'a> {
         Ok(Some(to))
     }
 
-    /// A name in quarantine that nothing has.
+    /// Returns an unused path in quarantine.
     fn place_for(&self, path: &Path) -> Result<PathBuf> {
         let folder = self.layout.quarantine();
         if self.kind(&folder)?.is_none() {
             self.disk.create_folder(&folder).map_err(|error| Error::io(&folder, "create", error))?;
             self.sync(self.layout.folder())?;
         }
-        // What was in a tile's folder keeps that folder's name before its own.
+        // The name of a file from a tile's folder is prefixed with the name of that folder.
         let inside = path.strip_prefix(self.layout.folder()).unwrap_or(path);
         let parts: Vec<_> = inside.iter().map(|part| part.to_string_lossy()).collect();
         let name = parts.join(".");
@@ -128,7 +128,7 @@ impl<'a> Quarantine<'a> {
     }
 }
 
-/// Whether an error is about a file by itself: it cannot be read, or is none.
+/// Returns whether an error is specific to one file: it is unreadable or not a regular file.
 fn is_of_file(error: &Error) -> bool {
     matches!(error, Error::Io { cause, .. } if is_of_medium(cause) || cause.kind() == io::ErrorKind::InvalidInput)
 }

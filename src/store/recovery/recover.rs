@@ -15,27 +15,27 @@ use std::collections::BTreeSet;
 use std::io;
 use std::path::Path;
 
-/// What a crash left behind that is not to be removed.
+/// Files to keep after a crash, and the number of removed ones.
 #[derive(Debug, Default)]
 pub(in crate::store) struct Leftovers {
     /// Committed versions that still have their `*.next` names.
     pub unrenamed: TileTable<()>,
-    /// Tiles of the last commit that have their names, but perhaps not on the medium.
+    /// Tiles of the last commit that are renamed, but perhaps not durably.
     pub renamed: TileTable<()>,
-    /// Tile folders that hold files and are not in the log.
+    /// Tile folders with files that the log does not name.
     pub orphans: FxHashSet<TileIndex>,
-    /// What the map's snapshots see.
+    /// Tables that the snapshots of the map use.
     pub snapshots: SeenTables,
-    /// How many files were removed.
+    /// Number of removed files.
     pub removed: u64,
 }
 
-/// Looks through the folders of a map for what a writer left when it ended: removes versions that were never
-/// committed and tables kept for readers, and finds the committed ones that wait for their names.
+/// Searches the folders of a map for the remains of a terminated writer. Removes uncommitted versions and tables kept
+/// for readers, and finds committed versions that are not renamed yet.
 ///
-/// Safe to repeat and to break off anywhere.
+/// Can be repeated, and interrupted at any point.
 ///
-/// A file or folder that the medium refuses to show is left as it is: reading its tile tells, and the others go on.
+/// Unreadable files and folders are left unchanged, and recovery continues. They are reported when their tile is read.
 pub(in crate::store) fn recover(
     disk: &dyn Disk,
     layout: &Layout,
@@ -57,7 +57,7 @@ pub(in crate::store) fn recover(
             kept.insert(tile, flushes);
         }
         match state {
-            // Its names may not be on the medium yet, if the writer was killed before it could see to that.
+            // The names may not be durable if the writer was killed before it synced them.
             State::Whole if is_of_last_commit => {
                 leftovers.renamed.insert(tile, ());
             }
@@ -65,10 +65,10 @@ pub(in crate::store) fn recover(
             State::Unrenamed => {
                 leftovers.unrenamed.insert(tile, ());
             }
-            // Made for a tile that was never committed, or of one that is no part of the map any more.
+            // Created for a tile that was never committed, or left of a removed tile.
             State::Empty if version.is_none() => empty_folders.push(tile),
             State::Empty => {}
-            // The store goes on with its removal.
+            // The store completes its removal.
             State::Orphan if removed.contains(&tile) => {}
             State::Orphan => {
                 leftovers.orphans.insert(tile);
@@ -85,8 +85,8 @@ pub(in crate::store) fn recover(
     Ok(leftovers)
 }
 
-/// Removes what was to take the place of the map's own files and did not, except for a list of scans whose predecessor
-/// is in quarantine: that gets its name. Returns how many files were removed.
+/// Removes unused replacements of the map's own files. A replacement of a list of scans whose original is in quarantine
+/// is renamed instead. Returns the number of removed files.
 pub(in crate::store) fn settle_own_files(disk: &dyn Disk, layout: &Layout) -> Result<u64> {
     let mut removed = 0;
     for name in OWN_NEXT {
@@ -94,7 +94,7 @@ pub(in crate::store) fn settle_own_files(disk: &dyn Disk, layout: &Layout) -> Re
     }
     let (scans, next) = (layout.scans(), layout.scans_next());
     match kind(disk, &scans)? {
-        // It was synced before the damaged one was taken away.
+        // It was synced before the damaged file was moved.
         None if matches!(kind(disk, &next)?, Some(EntryKind::File(_))) => {
             tolerate(disk.rename(&next, &scans), &next, "rename")?;
             tolerate(disk.sync_folder(layout.folder()), layout.folder(), "sync")?;
@@ -104,7 +104,7 @@ pub(in crate::store) fn settle_own_files(disk: &dyn Disk, layout: &Layout) -> Re
     Ok(removed)
 }
 
-/// Gives a snapshot that was made its name, as the log says.
+/// Renames the file of a snapshot that the log names, and removes one that it does not name.
 fn settle_snapshots(
     disk: &dyn Disk,
     layout: &Layout,
@@ -128,13 +128,13 @@ fn settle_snapshots(
             None => remove(disk, &next, removed)?,
         }
     }
-    // In a map that lists none, a deletion that a killed writer could not make durable would come back and miss its
-    // tables.
+    // Without a list of snapshots, a deletion that a killed writer did not sync could be undone by a power failure, and
+    // the snapshot would lack its tables.
     tolerate(disk.sync_folder(&folder), &folder, "sync")
 }
 
-/// Whether a file of the folder of snapshots is what a deletion left that did not come to its end: it says itself that
-/// it is the snapshot, and the log does not list it. What somebody else put there stays.
+/// Returns whether a file in the folder of snapshots remains of an interrupted deletion: it contains its own name, and
+/// the log does not list it. Foreign files are kept.
 fn is_deleted_snapshot(
     disk: &dyn Disk,
     layout: &Layout,
@@ -146,8 +146,8 @@ fn is_deleted_snapshot(
     !listed.contains(name) && file().is_ok_and(|file| file.is_some_and(|file| file.has_own_name()))
 }
 
-/// Removes the files of deleted snapshots, after all that was kept for them: as long as the file is there, the same
-/// command completes the deletion. Returns which.
+/// Removes the files of deleted snapshots, after everything that was kept for them. As long as the file exists, the
+/// deletion can be resumed. Returns the names.
 pub(in crate::store) fn remove_deleted_snapshots(
     disk: &dyn Disk,
     layout: &Layout,
@@ -169,7 +169,7 @@ pub(in crate::store) fn remove_deleted_snapshots(
     Ok(names)
 }
 
-/// Removes what an attempt to give tiles of the original format their trailers left. Returns how many files.
+/// Removes the remains of an interrupted upgrade of tiles of the original format. Returns the number of removed files.
 pub(in crate::store) fn remove_uncommitted(
     disk: &dyn Disk,
     layout: &Layout,
@@ -188,7 +188,7 @@ pub(in crate::store) fn remove_uncommitted(
     Ok(removed)
 }
 
-/// Removes kept tables that no snapshot sees: they were kept for readers, or for a snapshot that is deleted.
+/// Removes kept tables that no snapshot uses: they were kept for readers or for a deleted snapshot.
 fn remove_unseen(
     disk: &dyn Disk,
     layout: &Layout,
@@ -221,7 +221,7 @@ fn look_at_tile(
 ) -> Result<(State, BTreeSet<u64>)> {
     let folder = layout.tile_folder(tile);
     if kind(disk, &folder)? != Some(EntryKind::Folder) {
-        // A file or a link with a tile's name: reading the tile, if there is one, tells.
+        // A file or a link with a tile's name. If the log names the tile, reading it reports the error.
         return Ok((State::Orphan, BTreeSet::new()));
     }
     let mut names = match disk.list(&folder) {
@@ -244,14 +244,14 @@ fn look_at_tile(
             if waits == Content::Committed || is_of_last_commit {
                 let in_place = content_of(disk, &layout.current(tile, file), committed)?;
                 if in_place != Content::Committed {
-                    // If neither is what was committed: damage, which is reported when the tile is read. Keep both.
+                    // If neither is the committed version, the tile is damaged, which reading it reports. Keep both.
                     unrenamed |= waits.is_committed_beside(in_place);
                     continue;
                 }
             }
         }
-        // Never committed; also where it has the bytes of the committed file in place, for it may not be on the medium:
-        // octrees often stay the same while the evidence changes.
+        // Not committed, even if its bytes equal the current file: octrees often do not change with the evidence, and
+        // these bytes may not be durable.
         remove(disk, &next, removed)?;
         names.swap_remove(at);
     }
@@ -260,7 +260,7 @@ fn look_at_tile(
     }
     let is_kept = |name: &mut String| layout.flush_of_kept(name).is_some();
     let kept = names.extract_if(.., is_kept).filter_map(|name| layout.flush_of_kept(&name)).collect();
-    // Somebody else's files make no tile: what a file manager leaves in a folder keeps no scan out of it.
+    // Foreign files do not make a tile: a file that a file manager leaves in a folder must not block the tile.
     let is_of_tile = |name: &String| {
         let storage = layout.storage();
         layout.files().iter().any(|file| [file.name(storage), file.next_name(storage)].contains(&&**name))
@@ -274,8 +274,7 @@ fn look_at_tile(
     Ok((state, kept))
 }
 
-/// The state of a tile of which nobody can list what there is: what was committed last may wait for its name all the
-/// same.
+/// Returns the state of a tile whose folder cannot be listed. Its last committed version may still be unrenamed.
 fn look_without_names(
     disk: &dyn Disk,
     layout: &Layout,
@@ -295,7 +294,7 @@ fn look_without_names(
     Ok(State::Unreadable)
 }
 
-/// What has a name; something that is no part of a map where the medium does not tell.
+/// Returns the kind of a directory entry; `Other` if it cannot be read.
 fn kind(disk: &dyn Disk, path: &Path) -> Result<Option<EntryKind>> {
     match disk.kind(path) {
         Err(error) if is_of_medium(&error) => Ok(Some(EntryKind::Other)),
@@ -303,7 +302,7 @@ fn kind(disk: &dyn Disk, path: &Path) -> Result<Option<EntryKind>> {
     }
 }
 
-/// Goes on where the medium refuses a step that another opening can make good.
+/// Ignores a media error of a step that the next opening repeats.
 fn tolerate(result: io::Result<()>, path: &Path, action: &'static str) -> Result<()> {
     match result {
         Err(error) if is_of_medium(&error) => {
@@ -318,7 +317,7 @@ fn list(disk: &dyn Disk, folder: &Path) -> Result<Vec<String>> {
     disk.list(folder).map_err(|error| Error::io(folder, "list", error))
 }
 
-/// Removes a file; what has its name and is none is not voxtile's, and stays.
+/// Removes a file. Anything but a regular file is foreign and is kept.
 fn remove(disk: &dyn Disk, path: &Path, removed: &mut u64) -> Result<()> {
     if !matches!(kind(disk, path)?, Some(EntryKind::File(_))) {
         return Ok(());
@@ -327,20 +326,20 @@ fn remove(disk: &dyn Disk, path: &Path, removed: &mut u64) -> Result<()> {
     tolerate(disk.remove_file(path), path, "remove")
 }
 
-/// Content of a file, compared with the log.
+/// Content of a file compared with the log.
 #[derive(Clone, Copy, PartialEq)]
 enum Content {
-    /// What the log says of it.
+    /// The version that the log names.
     Committed,
-    /// Something else, or it is not there.
+    /// Another version, or no file.
     Other,
-    /// Nobody can tell: the medium does not give it back.
+    /// Unknown: the file cannot be read.
     Unreadable,
 }
 
 impl Content {
-    /// Whether a `*.next` file is the committed version while the file in place is not. An unreadable one counts, since
-    /// nothing else can be.
+    /// Returns whether a `*.next` file is the committed version and the current file is not. An unreadable `*.next`
+    /// file counts if the current file is another version, because no other file can be the committed version.
     fn is_committed_beside(self, in_place: Self) -> bool {
         self == Self::Committed || self == Self::Unreadable && in_place == Self::Other
     }

@@ -9,25 +9,25 @@ use crate::store::map_folder;
 use std::io;
 use std::path::Path;
 
-/// What can still be read of the two files that say what a map is, when they cannot be read together.
+/// Readable content of `metadata.json` and `commits.log`, when one of them is damaged.
 #[derive(Debug)]
 pub struct Salvage {
-    /// `metadata.json`, or what is wrong with it.
+    /// `metadata.json`, or the error.
     pub metadata: Result<Metadata>,
-    /// What is wrong with `commits.log`, if anything is.
+    /// Error of `commits.log`, if any.
     pub log_error: Option<Error>,
-    /// Id in the header of the log, if that can be read.
+    /// Map id in the header of the log, if readable.
     pub log_map_id: Option<[u8; 16]>,
-    /// The records of the log before the first that cannot be read.
+    /// Records of the log before the first unreadable one.
     pub commits: Commits,
 }
 
 impl Salvage {
-    /// Reads what can be read.
+    /// Reads both files.
     ///
     /// # Errors
     ///
-    /// A disk that refuses; damage is no error here.
+    /// An I/O error. Damage is not an error here.
     pub fn read(disk: &dyn Disk, layout: &Layout) -> Result<Self> {
         let metadata = match map_folder::read_metadata(disk, layout) {
             Err(error @ Error::Io { .. }) if !is_no_file(&error) && !error.is_of_medium() => {
@@ -60,8 +60,8 @@ impl Salvage {
         Ok(Self { metadata, log_error, log_map_id, commits })
     }
 
-    /// Where the files of the map in `folder` are: its tiles are stored as these two files say, or where they say
-    /// nothing or contradict each other, as most tiles are.
+    /// Returns the layout of the map in `folder`, with the storage in these two files. If they do not contain it, or
+    /// disagree, the storage of most tiles is used.
     pub fn layout_of_tiles(&self, disk: &dyn Disk, folder: &Path) -> Layout {
         let written = self.metadata.as_ref().ok().filter(|metadata| metadata.ext.is_some());
         let logged = self.commits.metadata.as_ref();
@@ -77,11 +77,11 @@ impl Salvage {
         }
     }
 
-    /// Writes `commits.log` and then `metadata.json` anew, each in place of what there is.
+    /// Replaces `commits.log` and then `metadata.json`.
     ///
     /// # Errors
     ///
-    /// A disk that refuses; calling again goes on.
+    /// An I/O error. The next call resumes.
     pub fn write(
         &self,
         disk: &dyn Disk,
@@ -104,14 +104,14 @@ impl Salvage {
     }
 }
 
-/// Whether an error is about a link, or anything else that is no file.
+/// Returns whether the error reports something other than a regular file.
 fn is_no_file(error: &Error) -> bool {
     matches!(error, Error::Io { cause, .. } if cause.kind() == io::ErrorKind::InvalidInput)
 }
 
-/// Number of tiles that have a table, or one that waits for its name.
+/// Counts the tiles with a table of this layout, renamed or not.
 fn count_tables(disk: &dyn Disk, layout: &Layout) -> usize {
-    // What cannot be listed is told by whoever reads it next.
+    // Errors are ignored: the next read of the folder reports them.
     let names = disk.list(layout.folder()).unwrap_or_default();
     let is_there = |path: &Path| matches!(disk.kind(path), Ok(Some(_)));
     let has_table = |&tile: &_| {

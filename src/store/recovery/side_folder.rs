@@ -5,8 +5,8 @@ use crate::store::layout::Layout;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// A folder beside a map for a second map, out of which the first takes tiles over: `MAP.remapping`. Nobody needs it
-/// afterwards: it goes when this value is dropped, or with the next attempt.
+/// Folder `MAP.remapping` next to a map, for a temporary second map whose tiles are moved into the first. It is removed
+/// when this value is dropped, or by the next attempt.
 #[derive(Debug)]
 pub struct SideFolder {
     disk: Arc<dyn Disk>,
@@ -14,12 +14,12 @@ pub struct SideFolder {
 }
 
 impl SideFolder {
-    /// Makes room for a map beside `map`; [`TileStore::create`](crate::store::TileStore::create) makes the folder.
+    /// Prepares the folder next to `map`, without creating it: [`TileStore::create`](crate::store::TileStore::create)
+    /// does.
     ///
     /// # Errors
     ///
-    /// A path without a name; something that is not of a map in its place; another process that is at work there; a
-    /// disk that refuses.
+    /// A path without a name, foreign content in the folder, another process that uses it, or an I/O error.
     pub fn begin(disk: Arc<dyn Disk>, map: &Path) -> Result<Self> {
         if map.file_name().is_none() {
             let reason = format!("{} has no name of its own; name the map's folder", map.display());
@@ -30,7 +30,7 @@ impl SideFolder {
         Ok(Self { disk, path })
     }
 
-    /// Where the second map is.
+    /// Path of the second map.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -38,7 +38,7 @@ impl SideFolder {
 
 impl Drop for SideFolder {
     fn drop(&mut self) {
-        // What stays after all is removed by the next attempt.
+        // The next attempt removes whatever remains.
         let _ = remove_content(&*self.disk, &Layout::new(&self.path), true);
         let _ = self.disk.remove_folder(&self.path);
     }

@@ -10,39 +10,39 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// A new map in `MAP.unfinished` beside its final place. [`StagedMap::finish`] renames it, and the rename is the
-/// commit, so nobody finds an incomplete map.
+/// New map in `MAP.unfinished`, next to its final path. [`StagedMap::finish`] renames it. The rename is the commit, so
+/// an incomplete map is never visible.
 ///
-/// What an interrupted attempt left is removed by the next one, and when this value is dropped before
-/// [`StagedMap::finish`].
+/// If this value is dropped before [`StagedMap::finish`], the folder is removed. The next attempt removes the remains
+/// of a killed one.
 #[derive(Debug)]
 pub struct StagedMap<W = TileStore> {
     disk: Arc<dyn Disk>,
     folder: PathBuf,
-    /// Who writes; it holds the lock of the unfinished folder. `None` once the map has its name.
+    /// Writer of the map, which holds the lock of the unfinished folder. `None` after the rename.
     writer: Option<W>,
 }
 
 impl StagedMap {
-    /// Begins a map that will be in `folder`, which does not exist yet or is empty.
+    /// Begins a map that will be in `folder`, which must be missing or empty.
     ///
     /// # Errors
     ///
-    /// A folder with other content, another process that makes the same map, a disk that refuses.
+    /// A folder with other content, another process that creates the same map, or an I/O error.
     pub fn begin(disk: Arc<dyn Disk>, folder: &Path, metadata: Metadata, map_id: [u8; 16]) -> Result<Self> {
         let create = |unfinished: &Path| TileStore::create(disk.clone(), unfinished, metadata, map_id);
         Self::begin_by(disk.clone(), folder, create)
     }
 
-    /// The map's tiles, to be written and committed; a commit makes them durable, and nothing else.
+    /// Tiles of the map, to be written. Only committed tiles become part of the map.
     pub fn store(&mut self) -> &mut TileStore {
         self.writer()
     }
 }
 
 impl<W> StagedMap<W> {
-    /// Begins a map that will be in `folder`, which does not exist yet or is empty. `create` makes it in the folder that
-    /// it is told, and holds that folder's lock from then on.
+    /// Begins a map that will be in `folder`, which must be missing or empty. `create` creates it at the path in its
+    /// argument, and must hold the lock of that folder.
     ///
     /// # Errors
     ///
@@ -57,7 +57,7 @@ impl<W> StagedMap<W> {
         let unfinished = staging_folder(folder)?;
         remove_unfinished(&*disk, &unfinished)?;
         let writer = create(&unfinished).inspect_err(|_| {
-            // What it has begun, unless somebody else makes that map now.
+            // Remove the incomplete map, unless another process uses it now.
             if remove_unfinished(&*disk, &unfinished).is_ok() {
                 let _ = disk.remove_file(&Layout::new(&unfinished).lock());
                 let _ = disk.remove_folder(&unfinished);
@@ -66,22 +66,22 @@ impl<W> StagedMap<W> {
         Ok(Self { disk, folder: folder.to_owned(), writer: Some(writer) })
     }
 
-    /// Where the map will be.
+    /// Final path of the map.
     pub fn folder(&self) -> &Path {
         &self.folder
     }
 
-    /// Who writes the map.
+    /// Writer of the map.
     pub fn writer(&mut self) -> &mut W {
         self.writer.as_mut().expect("taken by finish alone, which takes the map")
     }
 
-    /// Gives the map its name: all that was committed is there from then on, and durable when this returns.
+    /// Renames the map to its final path. All commits are visible from then on, and durable when this returns.
     ///
     /// # Errors
     ///
-    /// Something that has the name by now, or a disk that refuses. Only the last of all steps, to make the name
-    /// durable, can fail when the map has it.
+    /// An existing file or folder with that name, or an I/O error. After an error of the last step, the sync of the
+    /// parent folder, the map has its final name.
     pub fn finish(mut self) -> Result<()> {
         check_is_free(&*self.disk, &self.folder)?;
         let unfinished = staging_folder(&self.folder)?;
@@ -92,7 +92,7 @@ impl<W> StagedMap<W> {
                 .map_err(|error| Error::io(&self.folder, "replace", error))?;
         }
         if cfg!(windows) {
-            // A folder with an open file cannot be renamed there. Elsewhere nobody else begins meanwhile.
+            // Windows cannot rename a folder with an open file. Elsewhere the lock is held until the rename.
             self.writer = None;
         }
         if let Err(error) = self.disk.rename(&unfinished, &self.folder) {
@@ -107,14 +107,14 @@ impl<W> StagedMap<W> {
 impl<W> Drop for StagedMap<W> {
     fn drop(&mut self) {
         if let (Some(_lock), Ok(unfinished)) = (&self.writer, staging_folder(&self.folder)) {
-            // What stays after all is removed by the next attempt.
+            // The next attempt removes whatever remains.
             let _ = remove_content(&*self.disk, &Layout::new(&unfinished), true);
             let _ = self.disk.remove_folder(&unfinished);
         }
     }
 }
 
-/// Where a map is made that will be in `folder`.
+/// Returns the path at which a map for `folder` is created.
 ///
 /// # Errors
 ///
@@ -144,7 +144,7 @@ pub(super) fn check_is_free(disk: &dyn Disk, folder: &Path) -> Result<()> {
     Err(Error::AlreadyExists { path: folder.to_owned(), hint })
 }
 
-/// Removes what an interrupted attempt left; what is not of a map stays, and is an error.
+/// Removes the remains of an interrupted attempt. Foreign content is kept and is an error.
 pub(super) fn remove_unfinished(disk: &dyn Disk, folder: &Path) -> Result<()> {
     match disk.kind_at(folder)? {
         None => return Ok(()),
@@ -152,13 +152,13 @@ pub(super) fn remove_unfinished(disk: &dyn Disk, folder: &Path) -> Result<()> {
         Some(_) => return Err(not_of_a_map(folder)),
     }
     let layout = Layout::new(folder);
-    // Before the lock, which leaves a file behind.
+    // Before the lock, which creates a file.
     check_content(disk, &layout)?;
     let _lock = WriterLock::take(disk, &layout)?;
     remove_content(disk, &layout, false)
 }
 
-/// The files that a map has beside its tiles, at any moment of its making.
+/// Files outside tile folders that a map can have while it is created.
 const OWN_FILES: [&str; 6] =
     ["metadata.json", "metadata.json.next", "commits.log", "commits.log.next", "scans.bin", "writer.lock"];
 
@@ -185,7 +185,7 @@ fn check_kept_scans(disk: &dyn Disk, layout: &Layout) -> Result<()> {
     }
 }
 
-/// Removes the files of a map and the folders of its tiles, those that tell what it is first.
+/// Removes the files of a map and its tile folders, `metadata.json` and `commits.log` first.
 pub(super) fn remove_content(disk: &dyn Disk, layout: &Layout, with_lock: bool) -> Result<()> {
     check_content(disk, layout)?;
     let remove = |path: &Path| match disk.remove_file(path) {
@@ -200,7 +200,7 @@ pub(super) fn remove_content(disk: &dyn Disk, layout: &Layout, with_lock: bool) 
     let tiles = names.iter().filter_map(|name| tile_of_folder(name)).map(|tile| layout.tile_folder(tile));
     for folder in tiles.chain(kept_scans) {
         if disk.kind_at(&folder)? != Some(EntryKind::Folder) {
-            // A link could lead anywhere.
+            // A symbolic link could lead out of the map.
             return Err(not_of_a_map(&folder));
         }
         for name in list(disk, &folder)? {

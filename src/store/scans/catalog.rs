@@ -15,17 +15,17 @@ pub(super) const HEADER: [u8; 16] = *b"VXTKEPT\0\x01\0\0\0\0\0\0\0";
 /// Length, its complement and checksum of a record.
 pub(super) const FRAME_BYTES: u64 = 12;
 
-/// Reads a catalog in order, up to a flush.
+/// Reader of a catalog in order, up to a flush.
 #[derive(Debug)]
 struct CatalogReader {
     path: PathBuf,
     input: Input,
     flush_number: u64,
-    /// What the log names of the file, if it does.
+    /// Version that the log names, if any.
     named: Option<CatalogVersion>,
     /// Checksum of the bytes before the next record.
     crc: crc32fast::Hasher,
-    /// Where the next record begins.
+    /// Offset of the next record.
     at: u64,
     /// Number of the last scan so far.
     last: u64,
@@ -33,25 +33,25 @@ struct CatalogReader {
 }
 
 struct Input {
-    // A map that is read by several threads is `Sync`.
+    // A `Mutex` because maps are `Sync`.
     file: std::sync::Mutex<BufReader<Box<dyn DiskRead>>>,
     file_bytes: u64,
 }
 
 impl CatalogReader {
-    /// Opens the catalog of a generation. Where the log names it, it is checked as a whole before anything of it is
-    /// passed on.
+    /// Opens the catalog of a generation. If the log names it, its checksum is verified before the first entry is
+    /// returned.
     ///
     /// # Errors
     ///
-    /// None there, damage, or a disk that refuses.
+    /// A missing or damaged catalog, or an I/O error.
     fn open(disk: &dyn Disk, layout: &Layout, generation: u64, as_of: KeptAsOf) -> Result<Self> {
         let mut reader = Self::begin(disk, layout, generation, as_of)?;
         let Some(named) = as_of.catalog else { return Ok(reader) };
         if checksum_of_front(disk, &reader.path, named.bytes)? == named.checksum() {
             return Ok(reader);
         }
-        // The first record that is damaged tells more than the checksum of the whole.
+        // The error of the first damaged record is more specific than a wrong checksum of the file.
         while reader.next()?.is_some() {}
         let (found, wanted) = (reader.input.file_bytes, named.bytes);
         let error = match found < wanted {
@@ -87,11 +87,11 @@ impl CatalogReader {
         Ok(())
     }
 
-    /// The next entry; `None` after the last one of the flush.
+    /// Returns the next entry; `None` after the last entry of the flush.
     ///
     /// # Errors
     ///
-    /// Damage, or a disk that refuses.
+    /// Damage or an I/O error.
     fn next(&mut self) -> Result<Option<CatalogEntry>> {
         match self.read_entry() {
             Ok(entry) => Ok(entry),
@@ -99,7 +99,7 @@ impl CatalogReader {
         }
     }
 
-    /// After the last entry: checks that every scan up to this number was there.
+    /// Checks, after the last entry, that the catalog contains every scan up to this number.
     fn check_end(&self, scan_number: u64) -> Result<()> {
         if self.last == scan_number {
             return Ok(());
@@ -124,7 +124,7 @@ impl CatalogReader {
             .map(|at| u32::from_le_bytes([lengths[at], lengths[at + 1], lengths[at + 2], lengths[at + 3]]));
         self.payload.clear();
         if length != !complement || u64::from(length) > left - FRAME_BYTES {
-            // As far as the number of its flush.
+            // Read as far as the flush number.
             self.payload.resize(size_of::<u64>().min((left - FRAME_BYTES) as usize), 0);
             self.input.read(&mut self.payload)?;
             return self.end_or_damage("a record of no possible length");
@@ -159,9 +159,9 @@ impl CatalogReader {
 }
 
 impl CatalogReader {
-    /// What a record is that is not whole, by what is left of it: the end, if a flush that did not come to its commit
-    /// has begun to write it (zeros where nothing reached the medium, or the number of a later flush), else damage.
-    /// What the log names was committed.
+    /// Classifies an invalid record. It is the end of the catalog if an uncommitted flush may have begun to write it:
+    /// it has the number of a later flush, or zeros, which never reached the disk. Otherwise it is damage, as is any
+    /// invalid record in the part that the log names.
     fn end_or_damage(&self, reason: &str) -> std::result::Result<Option<CatalogEntry>, DecodeError> {
         let number = self.payload.first_chunk().map_or(0, |bytes| u64::from_le_bytes(*bytes));
         if self.named.is_none() && (number == 0 || number > self.flush_number) {
@@ -172,7 +172,7 @@ impl CatalogReader {
 }
 
 impl Input {
-    /// Fills a buffer; false at the end of the file.
+    /// Fills a buffer. Returns false at the end of the file.
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<bool> {
         let file = self.file.get_mut().unwrap_or_else(std::sync::PoisonError::into_inner);
         match file.read_exact(buffer) {
@@ -188,7 +188,7 @@ impl std::fmt::Debug for Input {
     }
 }
 
-/// Writes records to a catalog.
+/// Writer of records to a catalog.
 pub(super) struct CatalogWriter {
     out: BufWriter<Box<dyn DiskWrite>>,
     generation: u64,
@@ -198,7 +198,7 @@ pub(super) struct CatalogWriter {
 }
 
 impl CatalogWriter {
-    /// Begins a catalog.
+    /// Creates a catalog.
     pub(super) fn create(disk: &dyn Disk, layout: &Layout, generation: u64) -> io::Result<Self> {
         let mut out = BufWriter::new(disk.create(&layout.catalog(generation))?);
         out.write_all(&HEADER)?;
@@ -207,7 +207,7 @@ impl CatalogWriter {
         Ok(Self { out, generation, bytes: HEADER_BYTES, crc, payload: Vec::new() })
     }
 
-    /// Goes on with a catalog; what is behind the bytes that count is cut off.
+    /// Opens a catalog for appending, and truncates it to this version.
     pub(super) fn append(disk: &dyn Disk, layout: &Layout, catalog: CatalogVersion) -> io::Result<Self> {
         let CatalogVersion { generation, bytes, crc32 } = catalog;
         let out = BufWriter::new(disk.append(&layout.catalog(generation), bytes)?);
@@ -215,7 +215,7 @@ impl CatalogWriter {
         Ok(Self { out, generation, bytes, crc, payload: Vec::new() })
     }
 
-    /// Writes the record of an entry, as of a flush.
+    /// Writes the record of an entry with the number of its flush.
     pub(super) fn put(&mut self, entry: &CatalogEntry, flush_number: u64) -> io::Result<()> {
         self.payload.clear();
         entry.write(flush_number, &mut self.payload);
@@ -229,7 +229,7 @@ impl CatalogWriter {
         Ok(())
     }
 
-    /// Makes all of it durable; returns what the log is to name.
+    /// Makes the catalog durable. Returns the version to be named in the log.
     pub(super) fn finish(self) -> io::Result<CatalogVersion> {
         let mut out = self.out.into_inner().map_err(io::IntoInnerError::into_error)?;
         out.sync()?;
@@ -237,7 +237,7 @@ impl CatalogWriter {
     }
 }
 
-/// Why a catalog cannot be opened.
+/// Returns the error of a catalog that cannot be opened.
 fn refusal(path: &Path, error: io::Error) -> Error {
     match error.kind() {
         io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => {
@@ -247,11 +247,11 @@ fn refusal(path: &Path, error: io::Error) -> Error {
     }
 }
 
-/// Length, at most `bytes`, and checksum of the beginning of a file.
+/// Returns length and checksum of the first `bytes` bytes of a file, or of the whole file if it is shorter.
 ///
 /// # Errors
 ///
-/// None there, as damage: a writer may have removed it since it was opened. A disk that refuses.
+/// A missing file, reported as damage because a writer may have removed it, or an I/O error.
 pub(super) fn checksum_of_front(disk: &dyn Disk, path: &Path, bytes: u64) -> Result<FileChecksum> {
     let input = disk.open(path).map_err(|error| refusal(path, error))?;
     let mut input = Checksumming::new(input.take(bytes));
@@ -259,13 +259,13 @@ pub(super) fn checksum_of_front(disk: &dyn Disk, path: &Path, bytes: u64) -> Res
     Ok(input.finish().0)
 }
 
-/// Which of these beginnings of one catalog are whole; the file is read once.
+/// Returns which of these versions of one catalog are valid. The file is read once.
 pub(crate) fn whole_fronts(disk: &dyn Disk, layout: &Layout, fronts: &[CatalogVersion]) -> Vec<bool> {
     let mut are_whole = vec![false; fronts.len()];
     let mut order: Vec<_> = (0..fronts.len()).filter(|&at| fronts[at].is_there()).collect();
     order.sort_unstable_by_key(|&at| fronts[at].bytes);
     let Some(&first) = order.first() else { return are_whole };
-    // What cannot be read is told by whoever opens it.
+    // Errors are ignored: the next opening of the catalog reports them.
     let Ok(input) = disk.open(&layout.catalog(fronts[first].generation)) else { return are_whole };
     let (mut input, mut read, mut crc) = (input, 0, crc32fast::Hasher::new());
     let mut buffer = vec![0; 1 << 16];
@@ -287,12 +287,12 @@ pub(crate) fn whole_fronts(disk: &dyn Disk, layout: &Layout, fronts: &[CatalogVe
     are_whole
 }
 
-/// What is wrong with a catalog that the log names.
+/// Errors of catalogs that the log names.
 pub(super) const IS_MISSING: &str = "the file is missing";
 pub(super) const IS_ANOTHER: &str = "the file does not match its checksum in commits.log";
 pub(super) const IS_OF_ANOTHER: &str = "a record of another catalog";
 
-/// The newest generation up to a flush; `None` if there is none.
+/// Returns the newest generation up to a flush; `None` if there is none.
 fn newest_generation(disk: &dyn Disk, layout: &Layout, flush_number: u64) -> Result<Option<u64>> {
     let folder = layout.kept_scans();
     match disk.list(&folder) {
@@ -305,7 +305,7 @@ fn newest_generation(disk: &dyn Disk, layout: &Layout, flush_number: u64) -> Res
     }
 }
 
-/// The generations of the catalogs in a map's folder, in order; none where the folder cannot be listed.
+/// Lists the generations of the catalogs in a map's folder, in order. Empty if the folder cannot be listed.
 pub(crate) fn catalog_generations(disk: &dyn Disk, layout: &Layout) -> Vec<u64> {
     let names = disk.list(&layout.kept_scans()).unwrap_or_default();
     let generations = names.iter().filter_map(|name| Layout::generation_of(name));
@@ -314,27 +314,28 @@ pub(crate) fn catalog_generations(disk: &dyn Disk, layout: &Layout) -> Vec<u64> 
     generations
 }
 
-/// A flush of a map that keeps its scans.
+/// Kept scans of a map as of a flush.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct KeptAsOf {
     pub(in crate::store) flush_number: u64,
-    /// Number of its last scan.
+    /// Number of the last scan of the flush.
     pub(crate) scan_number: u64,
-    /// Its catalog; `None` where nothing names it.
+    /// Catalog of the flush; `None` if neither log nor metadata names it.
     pub(crate) catalog: Option<CatalogVersion>,
 }
 
 impl KeptAsOf {
-    /// Later than every flush.
+    /// A flush later than all others.
     pub(crate) const NEWEST: Self = Self { flush_number: MAX_NUMBER, scan_number: MAX_NUMBER, catalog: None };
 
-    /// The flush that a log ends with.
+    /// Returns the kept scans as of the last commit.
     pub(in crate::store) fn last_of(commits: &Commits) -> Self {
         let Commits { flush_number, scan_number, catalog, .. } = *commits;
         Self { flush_number, scan_number, catalog }
     }
 
-    /// The generation of its catalog: the one that is named, or else the newest up to the flush. `None` if it has none.
+    /// Returns the generation of the catalog: the named one, otherwise the newest up to the flush. `None` if there is
+    /// none.
     ///
     /// # Errors
     ///
@@ -346,14 +347,14 @@ impl KeptAsOf {
         }
     }
 
-    /// The error of one that has no catalog, although it has scans.
+    /// Returns the error of a flush with scans but without a catalog.
     pub(super) fn no_catalog(layout: &Layout) -> Error {
         let reason = "the catalog of its kept scans is missing";
         FormatError::at_offset(0, reason).in_map(&layout.kept_scans(), None)
     }
 }
 
-/// The kept scans of a map as of a flush, in order, without their points.
+/// Iterator over the kept scans of a map as of a flush, in order, without their points.
 #[derive(Debug)]
 pub(crate) struct KeptRecords(Option<(CatalogReader, u64)>);
 
@@ -367,8 +368,7 @@ impl KeptRecords {
         Ok(Self(Some((reader, as_of.scan_number))))
     }
 
-    /// What was read so far of the catalog of a generation, and whether there is more in the file. `None` if there is
-    /// none.
+    /// Returns the part of a catalog read so far, and whether the file is longer. `None` if there is no catalog.
     pub(super) fn extent(&self, generation: u64) -> Option<(CatalogVersion, bool)> {
         self.0.as_ref().map(|(reader, _)| {
             let (bytes, crc32) = (reader.at, reader.crc.clone().finalize());
@@ -376,11 +376,11 @@ impl KeptRecords {
         })
     }
 
-    /// The next entry of the catalog, `None` after the last.
+    /// Returns the next entry of the catalog; `None` after the last.
     ///
     /// # Errors
     ///
-    /// Damage, or a disk that refuses.
+    /// Damage or an I/O error.
     pub(crate) fn next_entry(&mut self) -> Result<Option<CatalogEntry>> {
         let Some((reader, scan_number)) = &mut self.0 else { return Ok(None) };
         let entry = reader.next()?;
@@ -390,11 +390,11 @@ impl KeptRecords {
         Ok(entry)
     }
 
-    /// The next kept scan; other entries are passed over.
+    /// Returns the next kept scan, and skips other entries.
     ///
     /// # Errors
     ///
-    /// Damage, or a disk that refuses.
+    /// Damage or an I/O error.
     pub(crate) fn next_kept(&mut self) -> Result<Option<KeptRecord>> {
         loop {
             match self.next_entry()? {

@@ -2,61 +2,61 @@ use super::scan_record::ScanRecord;
 use crate::config::RayConfig;
 use crate::space::{Point, TileIndex, put_number};
 
-/// Where the points of a kept scan lie: bytes of a segment.
+/// Location of the points of a kept scan in a segment.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SegmentPlace {
     /// Number of the segment.
     pub segment: u64,
-    /// Where the scan begins in it.
+    /// Offset of the scan in bytes.
     pub offset: u64,
-    /// Bytes of the scan.
+    /// Length of the scan in bytes.
     pub bytes: u64,
 }
 
-/// The frame that the points of a kept scan are in.
+/// Frame of the points of a kept scan.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum KeptFrame {
-    /// The sensor's, whose pose was: position in metres, and quaternion x, y, z, w.
+    /// The sensor's frame, with its pose in the world: position in metres and quaternion x, y, z, w.
     Sensor([f64; 7]),
-    /// The world's; the sensor was at this position in metres.
+    /// The world frame, with the position of the sensor in metres.
     World(Point),
 }
 
-/// What a map knows of a scan that it keeps.
+/// Record of a kept scan.
 #[derive(Clone, Debug, PartialEq)]
 pub struct KeptRecord {
-    /// Its number in the map, from 1.
+    /// Number of the scan in the map, from 1.
     pub number: u64,
-    /// When it was taken, in nanoseconds since the epoch of its source, if that is known.
+    /// Time of the scan in nanoseconds since the epoch of its source, if known.
     pub stamp_ns: Option<i64>,
-    /// The frame of its points.
+    /// Frame of the points.
     pub frame: KeptFrame,
-    /// Which part of its rays counted.
+    /// Ray settings.
     pub rays: RayConfig,
     /// Number of points.
     pub points: u64,
-    /// Whether each has an intensity.
+    /// Whether the points have intensities.
     pub has_intensities: bool,
-    /// Voxels that it updated when it was mapped, each as often as it was.
+    /// Number of voxel updates when the scan was mapped. A voxel may be counted repeatedly.
     pub updates: u64,
-    /// Where its points are.
+    /// Location of the points.
     pub place: SegmentPlace,
-    /// The tiles that it touched, in order.
+    /// Tiles that the scan changes, in order.
     pub tiles: Vec<TileIndex>,
 }
 
-/// What a record of the catalog says.
+/// Entry of the catalog.
 #[derive(Clone, Debug, PartialEq)]
 pub enum CatalogEntry {
     /// A scan whose points are kept.
     Kept(Box<KeptRecord>),
-    /// A scan whose points are not.
+    /// A scan whose points are not kept.
     Listed(ScanRecord),
-    /// Numbers, first and last, of batches, and of scans of which nothing is known.
+    /// First and last number of scans without a record, such as those of a batch.
     Unlisted(u64, u64),
-    /// Numbers, first and last, of scans that were removed.
+    /// First and last number of removed scans.
     Removed(u64, u64),
-    /// A change of the map that was no scan, such as `clear`.
+    /// A change of the map by an operation such as `clear`.
     Operation(String),
 }
 
@@ -71,7 +71,7 @@ const HAS_INTENSITIES: u8 = 2;
 const HAS_STAMP: u8 = 4;
 
 impl KeptRecord {
-    /// Where the sensor was, in metres in the world frame.
+    /// Position of the sensor in the world frame, in metres.
     pub fn origin_m(&self) -> Point {
         match self.frame {
             KeptFrame::Sensor([x, y, z, ..]) | KeptFrame::World([x, y, z]) => [x, y, z],
@@ -80,7 +80,7 @@ impl KeptRecord {
 }
 
 impl CatalogEntry {
-    /// The first and the last number that it is about; `None` for none.
+    /// Returns the first and last scan number of the entry; `None` for an operation.
     pub fn numbers(&self) -> Option<(u64, u64)> {
         match self {
             Self::Kept(scan) => Some((scan.number, scan.number)),
@@ -90,7 +90,7 @@ impl CatalogEntry {
         }
     }
 
-    /// Bytes of memory on the heap, about.
+    /// Approximate heap memory in bytes.
     pub(super) fn heap_bytes(&self) -> usize {
         match self {
             Self::Kept(scan) => size_of::<KeptRecord>() + scan.tiles.capacity() * size_of::<TileIndex>(),
@@ -99,7 +99,7 @@ impl CatalogEntry {
         }
     }
 
-    /// Appends the payload of the record, as of a flush.
+    /// Appends the payload of the record with the number of its flush.
     pub(super) fn write(&self, flush_number: u64, out: &mut Vec<u8>) {
         out.extend(flush_number.to_le_bytes());
         match self {
@@ -121,7 +121,7 @@ impl CatalogEntry {
         }
     }
 
-    /// Reads the payload of a record: its flush and the entry; `None` where it is none.
+    /// Parses the payload of a record into its flush and entry; `None` if it is invalid.
     pub(super) fn read(payload: &[u8]) -> Option<(u64, Self)> {
         let mut input = Input(payload);
         let flush_number = input.number()?;
@@ -177,7 +177,7 @@ fn read_kept(input: &mut Input<'_>) -> Option<KeptRecord> {
     let rays_bytes = input.packed_u64()?;
     let rays = serde_json::from_slice(input.take(usize::try_from(rays_bytes).ok()?)?).ok()?;
     let count = input.packed_u64()?;
-    // A tile takes three bytes at least.
+    // A tile takes at least three bytes.
     let count = usize::try_from(count).ok().filter(|&count| count <= input.0.len() / 3)?;
     let mut tiles = Vec::with_capacity(count);
     let mut before = [0_i64; 3];
@@ -206,7 +206,7 @@ fn write_stamp(stamp_ns: Option<i64>, out: &mut Vec<u8>) {
     out.extend(stamp_ns.unwrap_or_default().to_le_bytes());
 }
 
-/// What is left of a payload.
+/// Unread part of a payload.
 struct Input<'a>(&'a [u8]);
 
 impl Input<'_> {

@@ -1,4 +1,4 @@
-//! What can still be read of a catalog that is damaged.
+//! Reading of damaged catalogs.
 
 use super::catalog::{
     FRAME_BYTES, HEADER, IS_ANOTHER, IS_MISSING, IS_OF_ANOTHER, KeptAsOf, checksum_of_front,
@@ -10,26 +10,25 @@ use crate::store::layout::Layout;
 use std::io::{self, BufReader, Read};
 use std::path::PathBuf;
 
-/// How far behind a record of no possible length the next one is looked for: no record is as long.
+/// Length of the search for the next record after one with an invalid length. No record is longer.
 const SEARCHED_BYTES: u64 = 16 << 20;
 
-/// An entry of a catalog that is damaged.
+/// Entry of a damaged catalog.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Salvaged {
-    /// One that is whole.
+    /// An intact entry.
     Whole(CatalogEntry),
-    /// What stands for those that are not.
+    /// A placeholder for damaged entries.
     Lost(CatalogEntry),
 }
 
-/// Passes on what can be read of the catalog as of a flush, in order. Records that are damaged are passed over, and
-/// where scans are missing for it, their numbers are passed on as those of unknown scans: numbers follow each other
-/// without a gap up to that of the flush. Of a file that is not the one that the log names, nothing is passed on: it
-/// may have scans that were removed. Returns what is damaged.
+/// Passes the readable entries of the catalog as of a flush to `put`, in order. Damaged records are skipped. Missing
+/// scans are passed as unlisted, so that scan numbers are contiguous up to that of the flush. A file that is not the
+/// catalog named in the log is skipped as a whole, because it may contain removed scans. Returns the errors found.
 ///
 /// # Errors
 ///
-/// A disk that refuses more than the catalog; errors of `put`.
+/// An I/O error outside the catalog, and errors of `put`.
 pub(crate) fn salvage_entries(
     disk: &dyn Disk,
     layout: &Layout,
@@ -78,20 +77,20 @@ struct Salvage<'a> {
     as_of: KeptAsOf,
     /// Number of the last scan so far.
     last: u64,
-    /// A damaged record that may be of a flush that did not come to its commit: whether a committed one follows tells.
+    /// Error of a damaged record that may belong to an uncommitted flush. It is damage if a committed record follows.
     doubtful: Option<Error>,
-    /// Whether something is missing before the next entry.
+    /// Whether entries are missing before the next one.
     has_hole: bool,
-    /// Whether it has records of another catalog.
+    /// Whether the file has records of another catalog.
     is_another: bool,
     damage: Vec<Error>,
 }
 
-/// What is found where a record begins.
+/// Content at the expected start of a record.
 enum Found {
-    /// A record, the flush that commits it, and where the next one begins.
+    /// A record, its flush, and the offset of the next record.
     Record(CatalogEntry, u64, u64),
-    /// Damage, the number of the flush by what is left of it, and where the next record begins if its length tells.
+    /// Damage, the flush number if readable, and the offset of the next record if its length is readable.
     Damage(&'static str, u64, Option<u64>),
     End,
 }
@@ -102,7 +101,7 @@ impl Salvage<'_> {
         let Some(mut input) = self.begin()? else { return Ok(()) };
         let (named, last_flush) = (self.as_of.catalog, self.as_of.flush_number);
         loop {
-            // What the log names was committed, and nothing behind it.
+            // The log names committed records only.
             if named.is_some_and(|named| at >= named.bytes) {
                 return Ok(());
             }
@@ -149,7 +148,7 @@ impl Salvage<'_> {
         }
     }
 
-    /// Opens the catalog behind its header, which says nothing that its name does not say.
+    /// Opens the catalog after its header. A damaged header is reported, but its content is known from the file's name.
     fn begin(&mut self) -> Result<Option<BufReader<Box<dyn DiskRead>>>> {
         let opened = self.disk.open(&self.path).map(BufReader::new);
         if let Err(error) = &opened
@@ -169,7 +168,7 @@ impl Salvage<'_> {
         Ok(is_there.then_some(input))
     }
 
-    /// Passes an entry on that is whole, behind what stands for those that are missing before it.
+    /// Passes an intact entry to `put`, after a placeholder for missing ones before it.
     fn take(
         &mut self,
         at: u64,
@@ -198,7 +197,7 @@ impl Salvage<'_> {
         put(Salvaged::Whole(entry))
     }
 
-    /// After what can be read: passes on what stands for the rest.
+    /// Passes a placeholder for the rest, after the last readable entry.
     fn end(&mut self, put: &mut dyn FnMut(Salvaged) -> Result<()>) -> Result<()> {
         let (last, scan_number) = (self.last, self.as_of.scan_number);
         if last < scan_number {
@@ -216,20 +215,20 @@ impl Salvage<'_> {
         }
     }
 
-    /// Looks for the next whole record behind damage.
+    /// Searches for the next intact record after damage.
     fn look_for_record(&mut self, from: u64) -> Result<Option<u64>> {
         let mut bytes = Vec::new();
         let read = self
             .disk
             .open_at(&self.path, from)
             .and_then(|input| input.take(SEARCHED_BYTES).read_to_end(&mut bytes));
-        // What comes before that is searched all the same.
+        // Even if the read failed, the bytes before the error are searched.
         self.unless_unreadable(read, "read")?;
         let is_record = |at: &usize| bytes.get(*at..).is_some_and(begins_with_record);
         Ok((0..bytes.len()).find(is_record).map(|at| from + at as u64))
     }
 
-    /// What was read; where the medium does not give it back, that is damage.
+    /// Returns the result of a read, or records a media error as damage and returns `None`.
     fn unless_unreadable<T>(&mut self, read: io::Result<T>, action: &'static str) -> Result<Option<T>> {
         match read {
             Ok(read) => Ok(Some(read)),
@@ -251,12 +250,12 @@ impl Salvage<'_> {
     }
 }
 
-/// What stands for a damaged record that no scan is missing for.
+/// Returns the placeholder for a damaged record that has no scans.
 fn lost_operation() -> CatalogEntry {
     CatalogEntry::Operation("one whose record was damaged".to_owned())
 }
 
-/// Reads what begins at an offset, which the input has come to.
+/// Reads the record at an offset, which must be the position of the input.
 fn find_record(input: &mut BufReader<Box<dyn DiskRead>>, at: u64) -> io::Result<Found> {
     let left = input.get_ref().file_bytes().saturating_sub(at);
     let mut lengths = [0; 8];
@@ -264,7 +263,7 @@ fn find_record(input: &mut BufReader<Box<dyn DiskRead>>, at: u64) -> io::Result<
         return Ok(Found::End);
     }
     let length = length_of(lengths).filter(|&length| u64::from(length) <= left - FRAME_BYTES);
-    // As far as the number of its flush, where nothing tells how long it is.
+    // With an invalid length, read as far as the flush number.
     let bytes = length.map_or(size_of::<u64>().min((left - FRAME_BYTES) as usize), |length| length as usize);
     let (mut payload, mut checksum) = (vec![0; bytes], [0; 4]);
     if !read_whole(input, &mut payload)? || !read_whole(input, &mut checksum)? {
@@ -295,14 +294,14 @@ fn begins_with_record(bytes: &[u8]) -> bool {
     whole().is_some()
 }
 
-/// The length of a record, if its complement agrees.
+/// Returns the length of a record if it matches its complement.
 fn length_of(lengths: [u8; 8]) -> Option<u32> {
     let [a, b, c, d, complement @ ..] = lengths;
     let length = u32::from_le_bytes([a, b, c, d]);
     (length == !u32::from_le_bytes(complement)).then_some(length)
 }
 
-/// Fills a buffer; false at the end of the file.
+/// Fills a buffer. Returns false at the end of the file.
 fn read_whole(input: &mut impl Read, buffer: &mut [u8]) -> io::Result<bool> {
     match input.read_exact(buffer) {
         Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => Ok(false),

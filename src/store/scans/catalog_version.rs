@@ -1,35 +1,35 @@
 use crate::store::tiles::file_checksum::FileChecksum;
 use serde::{Deserialize, Serialize};
 
-/// The catalog of kept scans as of a flush: a file, and how far it counts. Later flushes append to it.
+/// Catalog of kept scans as of a flush: a file and the length of its valid part. Later flushes append to the file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct CatalogVersion {
-    /// The number in its name; 0 where the map keeps its scans and has no catalog yet.
+    /// Number in the file's name; 0 if the map keeps its scans but has no catalog yet.
     pub generation: u64,
-    /// How many of its bytes count.
+    /// Length of the valid part in bytes.
     pub bytes: u64,
-    /// CRC-32 of these bytes.
+    /// CRC-32 of the valid part.
     pub crc32: u32,
 }
 
 impl CatalogVersion {
-    /// That of a map without a catalog.
+    /// Version of a map without a catalog.
     pub const NONE: Self = Self { generation: 0, bytes: 0, crc32: 0 };
     /// Length in a record of the log.
     pub(in crate::store) const BYTES: usize = 20;
 
-    /// Whether a record of a flush can be among those that a flush sees: they are as old as the catalog at most. One
-    /// that a repair gave a snapshot is of one flush.
+    /// Returns whether this catalog, as of flush `last`, can contain a record of a flush: it is not older than the
+    /// catalog. A catalog that repair wrote for a snapshot has only records of one flush, its generation.
     pub(super) fn has_flush(self, flush_number: u64, last: u64) -> bool {
         (self.generation..=last.max(self.generation)).contains(&flush_number)
     }
 
-    /// Length and checksum of the bytes that count.
+    /// Length and checksum of the valid part.
     pub(super) fn checksum(self) -> FileChecksum {
         FileChecksum { bytes: self.bytes, crc: self.crc32 }
     }
 
-    /// Whether there is a catalog.
+    /// Returns whether there is a catalog.
     pub(in crate::store) fn is_there(self) -> bool {
         self != Self::NONE
     }

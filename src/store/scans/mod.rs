@@ -1,13 +1,13 @@
-//! Which scans a map was built from: number, time and origin of each, in `scans.bin`.
+//! Scans of a map: number, time and origin of each in `scans.bin`; points of kept scans in `kept_scans/`.
 //!
 //! ```text
 //! header  magic, version
 //! record  scan    flush, number, time stamp, origin, checksum
-//!         rewind  flush, number of an earlier one: the map was reverted to it, and its list of scans, too
+//!         rewind  flush, number of the earlier flush to which the map and its list of scans were reverted
 //! ```
 //!
-//! Records are synced before the commit that they belong to. One of a later flush than the last commit was left behind
-//! by a crash: readers pass over it, and the next writer cuts it off.
+//! Records are synced before their commit. Records of flushes after the last commit remain after a crash: readers
+//! ignore them, and the next writer truncates the file.
 
 mod catalog;
 mod catalog_entry;

@@ -1,4 +1,4 @@
-//! Which catalogs and segments a map and its snapshots need.
+//! Finds the catalogs and segments that a map and its snapshots need.
 
 use super::catalog::{KeptAsOf, KeptRecords, whole_fronts};
 use super::catalog_entry::CatalogEntry;
@@ -16,21 +16,21 @@ use std::io;
 use std::path::PathBuf;
 
 impl TileStore {
-    /// Removes catalogs and segments that neither the map nor a snapshot needs. What the disk refuses remains until the
-    /// map is next opened for writing.
+    /// Removes catalogs and segments that neither the map nor a snapshot needs. After an I/O error they remain until
+    /// the map is next opened for writing.
     pub(in crate::store) fn remove_unneeded_scans(&mut self) {
         if let Err(error) = self.release_scans() {
             log::warn!("kept scans that nothing needs remain: {error:#}");
         }
     }
 
-    /// Removes catalogs and segments that neither the map nor a snapshot needs, durably.
+    /// Durably removes catalogs and segments that neither the map nor a snapshot needs.
     ///
     /// # Errors
     ///
-    /// A disk that refuses; a catalog that cannot be read, which may need any.
+    /// An I/O error, or an unreadable catalog, which may need any segment.
     pub fn release_scans(&mut self) -> Result<()> {
-        // A snapshot that cannot be read may need any.
+        // An unreadable snapshot may need any of them.
         let Some(flushes) = self.kept.snapshots().kept_scans_of(self.committer.snapshots()) else {
             return Ok(());
         };
@@ -41,7 +41,8 @@ impl TileStore {
             self.files.remove_file(path)?;
             self.leftovers_removed += 1;
         }
-        // Also what an attempt before could not make durable: a power cut would bring the scans back.
+        // Even if nothing was removed now: an earlier removal may not be durable, and a power failure would restore the
+        // scans.
         match self.is_keeping_scans() || !files.is_empty() {
             true if self.files.kind(&self.layout().kept_scans())?.is_some() => {
                 self.files.sync_folder(&self.layout().kept_scans())
@@ -50,16 +51,16 @@ impl TileStore {
         }
     }
 
-    /// Whether the map keeps its scans as of the last commit; one that begins to has no catalog yet.
+    /// Returns whether the map keeps its scans as of the last commit. There may be no catalog yet.
     fn is_keeping_scans(&self) -> bool {
         self.metadata().ext.as_ref().is_some_and(|ext| ext.keeps_scans)
     }
 
-    /// The catalogs and segments that the last commit or one of these snapshots needs, in order.
+    /// Returns the catalogs and segments that the last commit or one of these snapshots needs, in order.
     ///
     /// # Errors
     ///
-    /// A catalog that is damaged or missing, a segment that is missing or too short; a disk that refuses.
+    /// A damaged or missing catalog, a missing or truncated segment, or an I/O error.
     pub(in crate::store) fn needed_scan_files(&self, snapshots: &[Snapshot]) -> Result<Vec<PathBuf>> {
         let (disk, layout) = (&**self.disk(), self.layout());
         let mut flushes: Vec<_> = snapshots.iter().filter_map(kept_as_of).collect();
@@ -80,8 +81,8 @@ impl TileStore {
         Ok(files.into_iter().collect())
     }
 
-    /// The catalogs and segments that neither the last commit needs nor one of these flushes, and the highest segment
-    /// that one needs.
+    /// Returns the catalogs and segments that neither the last commit nor one of these flushes needs, and the highest
+    /// segment that is needed.
     pub(in crate::store) fn unneeded_scans(
         &self,
         mut flushes: Vec<KeptAsOf>,
@@ -93,8 +94,8 @@ impl TileStore {
         unneeded(&**self.disk(), self.layout(), &flushes, is_new)
     }
 
-    /// Notes the catalog of the last commit for the next record, if none is named yet: a later one must not be taken for
-    /// it.
+    /// Records the catalog of the last commit for the next log record, if none is named yet, so that no later catalog
+    /// is mistaken for it.
     pub(in crate::store) fn try_to_name_own_catalog(&mut self) -> Result<()> {
         if self.is_keeping_scans() && self.commits().catalog.is_none() {
             let own = self.archive.find_committed()?;
@@ -104,19 +105,19 @@ impl TileStore {
         Ok(())
     }
 
-    /// The same; a damaged catalog remains unnamed.
+    /// Like [`Self::try_to_name_own_catalog`], but a damaged catalog remains unnamed.
     pub(in crate::store) fn name_own_catalog(&mut self) {
         if let Err(error) = self.try_to_name_own_catalog() {
             log::warn!("the catalog of the kept scans is not named: {error:#}");
         }
     }
 
-    /// The segments and catalogs that neither the map nor one of its snapshots needs, as far as their catalogs can be
-    /// read; a map that keeps its scans needs these segments, or if none are given, those of its catalog.
+    /// Returns the catalogs and segments that neither the map nor one of its snapshots needs, as far as their catalogs
+    /// are readable. `segments` overrides the segments that the map itself needs.
     ///
     /// # Errors
     ///
-    /// A disk that refuses more than single files.
+    /// An I/O error that is not specific to one file.
     pub(crate) fn unneeded_scan_files(
         &self,
         snapshots: &[Snapshot],
@@ -146,19 +147,19 @@ impl TileStore {
         let mut names = disk.list(&folder).map_err(|error| Error::io(&folder, "list", error))?;
         names.sort_unstable();
         names.retain(|name| match (Layout::generation_of(name), Layout::segment_of(name)) {
-            // A later one is being written.
+            // A catalog that is being written is newer.
             (Some(generation), _) => {
                 let is_new = self.archive.is_on() && generation > last_commit.flush_number;
                 !is_new && !generations.contains(&generation)
             }
             (_, Some(segment)) => !needed.contains(&segment) && !self.archive.is_writing(segment),
-            // Not voxtile's.
+            // A foreign file.
             _ => false,
         });
         Ok(names.iter().map(|name| folder.join(name)).collect())
     }
 
-    /// Whether the scans of the last commit are those of another state of the map with the same metadata.
+    /// Returns whether the scans of the last commit equal those of `past`, a state of the map with the same metadata.
     pub(in crate::store) fn has_scans_of(&self, past: &Self) -> Result<bool> {
         if !self.is_keeping_scans() {
             let listed = |store: &Self| {
@@ -171,18 +172,18 @@ impl TileStore {
     }
 }
 
-/// The flush of a snapshot, if it keeps its scans.
+/// Returns the kept scans of a snapshot, if it keeps any.
 pub(crate) fn kept_as_of(snapshot: &Snapshot) -> Option<KeptAsOf> {
     let keeps_scans = snapshot.metadata.ext.as_ref().is_some_and(|ext| ext.keeps_scans);
     keeps_scans.then(|| KeptAsOf::last_of(&snapshot.commits))
 }
 
-/// The catalogs and segments that no flush in `flushes` needs, in order; new segments are left out. Also returns the
-/// highest segment that one needs.
+/// Returns the catalogs and segments that no flush in `flushes` needs, in order, without new segments, and the highest
+/// segment that is needed.
 ///
 /// # Errors
 ///
-/// A catalog that cannot be read to its end: it may need any segment. A disk that refuses.
+/// An unreadable catalog, which may need any segment, or an I/O error.
 fn unneeded(
     disk: &dyn Disk,
     layout: &Layout,
@@ -191,7 +192,7 @@ fn unneeded(
 ) -> Result<(Vec<PathBuf>, u64)> {
     let folder = layout.kept_scans();
     let mut names = match disk.list(&folder) {
-        // A map that keeps scans and lacks the folder is damaged.
+        // A missing folder is damage if the map keeps scans.
         Err(error) if error.kind() == io::ErrorKind::NotFound && flushes.is_empty() => {
             return Ok((Vec::new(), 0));
         }
@@ -209,7 +210,7 @@ fn unneeded(
     names.retain(|name| match (Layout::generation_of(name), Layout::segment_of(name)) {
         (Some(generation), _) => !generations.contains(&generation),
         (_, Some(segment)) => !segments.contains(&segment) && !is_new(segment),
-        // Not voxtile's.
+        // A foreign file.
         _ => false,
     });
     names.sort_unstable();
@@ -217,11 +218,11 @@ fn unneeded(
     Ok((names.iter().map(|name| folder.join(name)).collect(), highest))
 }
 
-/// Those of some flushes whose catalogs have the records of all: where several see the beginning of one, the last.
+/// Selects the flushes whose catalogs contain the records of all: of several versions of one catalog, the longest.
 ///
 /// # Errors
 ///
-/// A catalog that is not whole as of one of the others.
+/// A catalog that is damaged in the part that one of the other flushes needs.
 fn with_all_records(disk: &dyn Disk, layout: &Layout, flushes: &[KeptAsOf]) -> Result<Vec<KeptAsOf>> {
     let (mut left, mut named) = (Vec::new(), BTreeMap::<u64, Vec<(CatalogVersion, KeptAsOf)>>::new());
     for &as_of in flushes {
@@ -242,11 +243,11 @@ fn with_all_records(disk: &dyn Disk, layout: &Layout, flushes: &[KeptAsOf]) -> R
     Ok(left)
 }
 
-/// Checks that a segment is there and as long as the scans in it need.
+/// Checks that a segment exists and has at least `end` bytes.
 ///
 /// # Errors
 ///
-/// If it is not; a disk that refuses.
+/// A missing or truncated segment, or an I/O error.
 pub(crate) fn check_segment(disk: &dyn Disk, layout: &Layout, segment: u64, end: u64) -> Result<()> {
     let path = layout.segment(segment);
     let error = match disk.kind_at(&path)? {

@@ -14,57 +14,56 @@ use std::io;
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 
-/// The scans that a map keeps: a catalog of them, and segments with their points.
+/// Kept scans of a map: a catalog, and segments with points.
 ///
-/// A scan is written block by block, what is in a block is its writer's to know; it is kept once its entry is noted and
-/// committed. [`TileStore::commit`](crate::store::TileStore::commit) commits what was noted.
+/// A scan is written in blocks, whose content is opaque to the store. It is part of the archive once its entry is noted
+/// and committed by [`TileStore::commit`](crate::store::TileStore::commit).
 #[derive(Debug)]
 pub struct ScanArchive {
     files: MapFiles,
     /// Whether the map keeps its scans.
     is_on: bool,
-    /// The last commit, as far as kept scans go.
+    /// Kept scans as of the last commit.
     last_commit: KeptAsOf,
-    /// The catalog as of the last commit, nothing before the first; `None` before it was looked for.
+    /// Catalog as of the last commit, if there is one; `None` before it was searched for.
     committed: Option<Option<Catalog>>,
-    /// Entries of the next commit, behind the committed ones or, if there is one, the replacement.
+    /// Entries of the next commit, to be appended to the replacement if there is one, else to the committed catalog.
     pending: Vec<CatalogEntry>,
-    /// How many of these belong to a commit that has begun.
+    /// Number of pending entries that belong to a commit in progress.
     begun_entries: usize,
-    /// The catalog that takes the place of the committed one.
+    /// New catalog that replaces the committed one.
     replacement: Option<Replacement>,
     segment: Option<SegmentWriter>,
-    /// Where the scan begins that is being written, or was written and is not noted yet.
+    /// Start of the scan that is being written, or is written and not noted yet.
     scan_start: Option<ScanStart>,
     /// Segments with scans that are not durable.
     unsynced: BTreeSet<u64>,
-    /// What the disk says of these proves nothing any more: it failed to sync them.
+    /// Segments whose sync failed. A later successful sync of them proves nothing.
     suspects: BTreeSet<u64>,
-    /// Whether that came while a replacement was made.
+    /// Whether a sync failed while a replacement was written.
     is_replacement_suspect: bool,
     has_new_names: bool,
-    /// The highest segment that a catalog names, as far as catalogs were read: one that is lost gets no other's scans.
+    /// Highest segment in all catalogs read so far. New segments get higher numbers, also if that segment is lost.
     highest_segment: u64,
-    /// A catalog that was begun for a commit, which may not have come.
+    /// Generation of a catalog that was created for a commit, which may have failed.
     begun: Option<u64>,
 }
 
-/// A catalog's file, up to where it counts.
+/// Valid part of a catalog's file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::store) struct Catalog {
     version: CatalogVersion,
-    /// Whether the file may go on behind that.
+    /// Whether the file may be longer.
     has_excess: bool,
 }
 
 impl Catalog {
-    /// What the log names.
     pub(in crate::store) fn version(self) -> CatalogVersion {
         self.version
     }
 }
 
-/// Where a scan begins among the segments.
+/// Start of a scan in a segment.
 #[derive(Clone, Copy, Debug)]
 struct ScanStart {
     segment: u64,
@@ -76,7 +75,7 @@ enum Replacement {
         generation: u64,
         out: Mutex<CatalogWriter>,
     },
-    /// Synced, and not committed yet.
+    /// Synced, but not committed yet.
     Whole(Catalog),
 }
 
@@ -96,7 +95,7 @@ impl fmt::Debug for SegmentWriter {
 }
 
 impl ScanArchive {
-    /// The archive of a map that was opened.
+    /// Returns the archive of an opened map.
     pub(in crate::store) fn new(files: MapFiles, is_on: bool, last_commit: KeptAsOf) -> Self {
         Self {
             files,
@@ -117,31 +116,32 @@ impl ScanArchive {
         }
     }
 
-    /// Whether the map keeps its scans.
+    /// Returns whether the map keeps its scans.
     pub fn is_on(&self) -> bool {
         self.is_on
     }
 
-    /// The last commit, as far as kept scans go.
+    /// Kept scans as of the last commit.
     pub(crate) fn last_commit(&self) -> KeptAsOf {
         self.last_commit
     }
 
-    /// Notes that there is another last commit.
+    /// Sets the last commit.
     pub(in crate::store) fn set_last_commit(&mut self, commits: &Commits) {
         self.last_commit = KeptAsOf::last_of(commits);
     }
 
-    /// The scans as of the last commit, in order.
+    /// Returns the entries of scans as of the last commit, in order.
     ///
     /// # Errors
     ///
-    /// Damage, a disk that refuses.
+    /// Damage or an I/O error.
     pub(crate) fn records(&self) -> Result<KeptRecords> {
         KeptRecords::open(&**self.files.disk(), self.files.layout(), self.last_commit)
     }
 
-    /// The catalog that they are in. Scans add to it; what changes earlier entries makes another one.
+    /// Returns the generation of the committed catalog. New scans are appended to it. Changes of earlier entries need a
+    /// new catalog.
     ///
     /// # Errors
     ///
@@ -150,7 +150,7 @@ impl ScanArchive {
         self.last_commit.generation(&**self.files.disk(), self.files.layout())
     }
 
-    /// The file of the catalog of a flush, if it has one.
+    /// Returns the path of the catalog of a flush, if it has one.
     ///
     /// # Errors
     ///
@@ -160,34 +160,34 @@ impl ScanArchive {
         Ok(generation.map(|generation| self.files.layout().catalog(generation)))
     }
 
-    /// From the next commit on the map keeps the scans that it takes.
+    /// Starts keeping scans from the next commit on.
     pub fn begin(&mut self) {
         if !self.is_on {
             self.is_on = true;
-            // Catalogs that are there belong to snapshots.
+            // Existing catalogs belong to snapshots.
             self.committed = Some(None);
         }
     }
 
-    /// Whether a segment may have scans that no commit names yet.
+    /// Returns whether a segment may contain scans that no commit names yet.
     pub(in crate::store) fn is_writing(&self, segment: u64) -> bool {
-        // Of suspects what is noted is copied by the next commit.
+        // The next commit copies noted scans out of segments whose sync failed.
         self.unsynced.contains(&segment)
             || self.suspects.contains(&segment)
             || self.segment.as_ref().is_some_and(|open| open.segment == segment)
     }
 
-    /// Notes that a catalog names segments up to this one.
+    /// Records that a catalog names segments up to this one.
     pub(in crate::store) fn note_segment(&mut self, segment: u64) {
         self.highest_segment = self.highest_segment.max(segment);
     }
 
-    /// Whether there is something for the next commit.
+    /// Returns whether there are changes for the next commit.
     pub(in crate::store) fn has_news(&self) -> bool {
         !self.pending.is_empty() || self.replacement.is_some()
     }
 
-    /// Bytes of memory.
+    /// Memory in bytes.
     pub(in crate::store) fn bytes(&self) -> usize {
         let heap: usize = self.pending.iter().map(CatalogEntry::heap_bytes).sum();
         self.pending.capacity() * size_of::<CatalogEntry>() + heap
@@ -195,20 +195,20 @@ impl ScanArchive {
 
     // Points.
 
-    /// Begins to write the points of a scan, in place of one that was begun before and not noted.
+    /// Begins to write the points of a scan. Discards a scan that was begun and not noted.
     ///
     /// # Errors
     ///
-    /// A catalog that is damaged, a disk that refuses.
+    /// A damaged catalog or an I/O error.
     pub fn begin_scan(&mut self) -> Result<()> {
         let (_, start) = self.open_segment()?;
         self.scan_start = Some(start);
         Ok(())
     }
 
-    /// The segment that scans are written to, and where the next one begins.
+    /// Returns the segment that new scans are written to, and the start of the next scan.
     fn open_segment(&mut self) -> Result<(&mut SegmentWriter, ScanStart)> {
-        // A catalog that is damaged is told before anything is written.
+        // Report a damaged catalog before anything is written.
         if self.replacement.is_none() {
             self.find_committed()?;
         }
@@ -232,12 +232,12 @@ impl ScanArchive {
     ///
     /// # Errors
     ///
-    /// A disk that refuses.
+    /// An I/O error.
     pub fn push_block(&mut self, block: &[u8]) -> Result<()> {
         self.segment.as_mut().map_or(Ok(()), |segment| segment.push(block))
     }
 
-    /// Ends the scan. It is nothing until it is noted.
+    /// Ends the scan. It takes effect when its entry is noted.
     pub fn end_scan(&mut self) -> SegmentPlace {
         let (Some(segment), Some(start)) = (&mut self.segment, self.scan_start) else {
             return SegmentPlace::default();
@@ -246,38 +246,38 @@ impl ScanArchive {
         segment.place_from(start.offset)
     }
 
-    /// Takes back the scan that was begun last and is not noted.
+    /// Discards the last begun scan, if it is not noted.
     pub fn give_up_scan(&mut self) {
         if let Some(start) = self.scan_start.take() {
             self.cut(start);
         }
     }
 
-    /// Cuts the open segment, if it is this one.
+    /// Truncates the segment being written, if it is this one.
     fn cut(&mut self, start: ScanStart) {
         let disk = &**self.files.disk();
         if let Some(segment) = self.segment.as_mut().filter(|segment| segment.segment == start.segment)
             && segment.cut(disk, start.offset).is_err()
         {
-            // What lies in it and is noted stays; the next scan goes to another.
+            // Noted scans in this segment remain valid. The next scan starts a new segment.
             self.segment = None;
         }
     }
 
-    /// Copies the points of a scan to the segment that is being written, which no catalog names yet.
+    /// Copies the points of a scan to the segment being written, which no catalog names yet.
     ///
     /// # Errors
     ///
-    /// Damage, a disk that refuses.
+    /// Damage or an I/O error.
     pub fn copy(&mut self, place: SegmentPlace) -> Result<SegmentPlace> {
         let mut scan = SegmentReader::open(&**self.files.disk(), self.files.layout(), place)?;
         let (segment, start) = self.open_segment()?;
         let copied = segment.copy(&mut scan);
         self.unsynced.insert(start.segment);
         match copied {
-            // What a scan's owner may still give up lies before it now, and stays.
+            // A begun scan before the copy can no longer be discarded by truncation.
             Ok(_) => self.scan_start = self.scan_start.filter(|begun| begun.segment != start.segment),
-            // Half a scan must not move those that follow.
+            // A partial copy must not remain before later scans.
             Err(_) => self.cut(start),
         }
         copied
@@ -285,7 +285,7 @@ impl ScanArchive {
 
     // Entries.
 
-    /// Records an entry of the next commit, if the map keeps its scans.
+    /// Adds an entry to the next commit, if the map keeps its scans.
     pub fn note(&mut self, entry: CatalogEntry) {
         if !self.is_on {
             return;
@@ -293,7 +293,7 @@ impl ScanArchive {
         if matches!(entry, CatalogEntry::Kept(_)) {
             self.scan_start = None;
         }
-        // What a commit has begun to take along stays as it is.
+        // Entries of a commit in progress must not change.
         let own = self.pending.get_mut(self.begun_entries..).unwrap_or_default();
         if let (Some(CatalogEntry::Unlisted(_, last)), CatalogEntry::Unlisted(first, new_last)) =
             (own.last_mut(), &entry)
@@ -305,11 +305,11 @@ impl ScanArchive {
         self.pending.push(entry);
     }
 
-    /// Begins a catalog that takes the place of the committed one with the next commit.
+    /// Begins a new catalog, which replaces the committed one at the next commit.
     ///
     /// # Errors
     ///
-    /// A disk that refuses.
+    /// An I/O error.
     pub fn begin_catalog(&mut self) -> Result<()> {
         self.make_folder()?;
         let files = &self.files;
@@ -323,11 +323,11 @@ impl ScanArchive {
         Ok(())
     }
 
-    /// Adds an entry to that catalog; the number of each scan follows that of the one before.
+    /// Adds an entry to the new catalog. Scan numbers must be contiguous.
     ///
     /// # Errors
     ///
-    /// A disk that refuses.
+    /// An I/O error.
     pub fn put(&mut self, entry: &CatalogEntry) -> Result<()> {
         let Some(Replacement::Open { generation, out }) = &mut self.replacement else { return Ok(()) };
         let out = out.get_mut().unwrap_or_else(PoisonError::into_inner);
@@ -335,7 +335,7 @@ impl ScanArchive {
             .map_err(|error| Error::io(&self.files.layout().catalog(*generation), "write", error))
     }
 
-    /// Writes a catalog that neither the map nor a snapshot names yet, synced: of the generation of the next commit.
+    /// Writes and syncs a catalog of the next generation that neither the map nor a snapshot names yet.
     pub(in crate::store) fn write_other(
         &self,
         write: impl FnOnce(&mut dyn FnMut(&CatalogEntry) -> Result<()>) -> Result<()>,
@@ -351,7 +351,7 @@ impl ScanArchive {
         Ok(catalog)
     }
 
-    /// Makes the kept scans those of an earlier commit again.
+    /// Resets the kept scans to those of an earlier commit.
     pub(in crate::store) fn rewind(&mut self, past: &Self) -> Result<()> {
         self.is_on = past.is_on;
         if !past.is_on {
@@ -365,7 +365,7 @@ impl ScanArchive {
         Ok(())
     }
 
-    /// Whether the scans of the last commit are those of another state.
+    /// Returns whether the scans of the last commit equal those of another state.
     pub(in crate::store) fn has_scans_of(&self, past: &Self) -> Result<bool> {
         let (mut now, mut then) = (self.records()?, past.records()?);
         loop {
@@ -379,28 +379,27 @@ impl ScanArchive {
 
     // Commits.
 
-    /// Begins a commit: it takes along the entries that there are now.
+    /// Begins a commit of the entries noted so far.
     pub(in crate::store) fn begin_commit(&mut self) {
         self.begun_entries = self.pending.len();
     }
 
-    /// The segments with scans that are not durable.
+    /// Segments with scans that are not durable.
     pub(in crate::store) fn unsynced(&self) -> Vec<u64> {
         self.unsynced.iter().copied().collect()
     }
 
-    /// Writes what belongs to the next commit, synced. `has_tiles` tells whether the map has any as of the last one.
-    /// Returns what [`ScanArchive::commit`] is to be
-    /// told.
+    /// Writes and syncs the scans of the next commit. `has_tiles` states that the map had tiles at the last commit.
+    /// Returns the argument for [`ScanArchive::commit`].
     ///
     /// # Errors
     ///
-    /// A disk that refuses: the next call writes it again.
+    /// An I/O error. The next call writes them again.
     pub(in crate::store) fn write(&mut self, has_tiles: bool) -> Result<Option<Catalog>> {
         if !self.is_on {
             return Ok(None);
         }
-        // Where another takes its place, the committed one may be damaged.
+        // A committed catalog that will be replaced may be damaged.
         let committed = if self.replacement.is_some() { None } else { self.find_committed()? };
         self.move_suspects()?;
         self.sync_segments()?;
@@ -425,7 +424,7 @@ impl ScanArchive {
                 Some(whole)
             }
             Some(Replacement::Whole(whole)) => {
-                // Of a commit that failed behind it, perhaps with more entries.
+                // Written for a commit that failed later, perhaps with more entries.
                 self.replacement = Some(Replacement::Whole(whole));
                 Some(Catalog { has_excess: true, ..whole })
             }
@@ -441,7 +440,7 @@ impl ScanArchive {
         self.make_folder()?;
         let (disk, layout) = (&**self.files.disk(), self.files.layout());
         if let Some(begun) = self.begun.take().filter(|&begun| begun != flush_number) {
-            // Another commit came in between.
+            // Another commit was made in between.
             self.files.remove_file(&layout.catalog(begun))?;
         }
         self.begun = in_place.is_none().then_some(flush_number);
@@ -463,7 +462,7 @@ impl ScanArchive {
         Ok(Some(Catalog { version: version?, has_excess: false }))
     }
 
-    /// Notes that what was written is committed.
+    /// Records that the written catalog is committed.
     pub(in crate::store) fn commit(&mut self, written: Option<Catalog>) {
         if self.is_on {
             self.committed = Some(written);
@@ -472,14 +471,14 @@ impl ScanArchive {
         (self.begun_entries, self.replacement, self.begun) = (0, None, None);
     }
 
-    /// Notes that what was written is not committed: its records may be in the file.
+    /// Records that the commit failed. Its records may be in the file.
     pub(in crate::store) fn not_committed(&mut self) {
         if let Some(Some(committed)) = &mut self.committed {
             committed.has_excess = true;
         }
     }
 
-    /// What a map had before its scans were kept: its list of scans, and what is not in it.
+    /// Returns the entries for scans before the map kept scans: its list of scans, and unlisted ones.
     fn entries_before(&self, has_tiles: bool) -> Result<Vec<CatalogEntry>> {
         let KeptAsOf { flush_number, scan_number, .. } = self.last_commit;
         let mut entries = Vec::new();
@@ -503,7 +502,7 @@ impl ScanArchive {
         Ok(entries)
     }
 
-    /// The catalog as of the last commit. What is behind it in the file may be cut off; what is damaged may not.
+    /// Returns the catalog as of the last commit. Later records in the file may be truncated, damaged ones may not.
     pub(in crate::store) fn find_committed(&mut self) -> Result<Option<Catalog>> {
         if let Some(committed) = self.committed {
             return Ok(committed);
@@ -519,7 +518,7 @@ impl ScanArchive {
         Ok(found)
     }
 
-    /// Notes that a sync has failed: what is not durable is copied before a commit names it.
+    /// Records a failed sync: scans that are not durable are copied to another segment before the next commit.
     pub(in crate::store) fn suspect_unsynced(&mut self) {
         self.is_replacement_suspect |= !self.unsynced.is_empty();
         self.suspects.append(&mut self.unsynced);
@@ -538,7 +537,7 @@ impl ScanArchive {
         Ok(())
     }
 
-    /// Copies scans of segments that could not be synced to another: what can still be read of them is checked.
+    /// Copies scans out of segments whose sync failed. Checksums verify what is read.
     fn move_suspects(&mut self) -> Result<()> {
         if self.replacement.is_some() && self.is_replacement_suspect {
             let error = io::Error::other("an earlier sync failed; begin again");
@@ -557,7 +556,7 @@ impl ScanArchive {
             }
         }
         self.pending = pending;
-        // They stay suspects: a scan may be noted yet that was written before.
+        // Keep these segments in the list: scans in them may be noted later.
         moved
     }
 
@@ -572,7 +571,7 @@ impl ScanArchive {
     }
 }
 
-/// Removes catalogs of commits that never happened.
+/// Removes catalogs of uncommitted flushes.
 fn remove_catalogs_after(files: &MapFiles, committed_flush: u64) -> Result<()> {
     let folder = files.layout().kept_scans();
     let names = match files.disk().list(&folder) {
@@ -587,7 +586,7 @@ fn remove_catalogs_after(files: &MapFiles, committed_flush: u64) -> Result<()> {
     Ok(())
 }
 
-/// The segments of a map, in order.
+/// Lists the segments of a map, in order.
 fn segments_in(disk: &dyn Disk, layout: &Layout) -> Result<Vec<u64>> {
     let folder = layout.kept_scans();
     let names = disk.list(&folder).map_err(|error| Error::io(&folder, "list", error))?;

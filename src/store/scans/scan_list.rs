@@ -12,35 +12,35 @@ const HEADER_BYTES: usize = 16;
 /// Magic, version, zeros.
 const HEADER: [u8; HEADER_BYTES] = *b"VXTSCANS\x01\0\0\0\0\0\0\0";
 
-/// What a writer knows of the file.
+/// State of `scans.bin` in a writer.
 #[derive(Debug, Default)]
 pub(in crate::store) struct ScanList {
     /// Scans and rewinds of the next commit.
     pending: Vec<Entry>,
-    /// What is committed, nothing if there is no file; `None` before the file was looked at.
+    /// Committed part, empty without a file; `None` before the file was read.
     committed: Option<Extent>,
-    /// Whether there may be more in the file.
+    /// Whether the file may be longer than the committed part.
     has_excess: bool,
-    /// Where the file is as it was before damage was cut off.
+    /// Path of a copy of the file before damage was truncated.
     quarantined: Option<PathBuf>,
 }
 
-/// What is found in the file.
+/// Result of reading the file.
 struct Found {
     committed: Extent,
     has_excess: bool,
     quarantined: Option<PathBuf>,
 }
 
-/// A beginning of the file.
+/// Leading part of the file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(in crate::store) struct Extent {
-    /// Records.
+    /// Number of records.
     pub(in crate::store) records: u64,
 }
 
 impl Extent {
-    /// Its bytes, the header among them.
+    /// Length in bytes, including the header.
     fn bytes(self) -> u64 {
         if self.records == 0 { 0 } else { HEADER_BYTES as u64 + self.records * RECORD_BYTES as u64 }
     }
@@ -55,23 +55,23 @@ impl ScanList {
         self.pending.push(Entry::Rewind(to_flush));
     }
 
-    /// Bytes of memory.
+    /// Memory in bytes.
     pub(in crate::store) fn bytes(&self) -> usize {
         self.pending.capacity() * size_of::<Entry>()
     }
 
-    /// How many entries there are for the next commit.
+    /// Number of entries for the next commit.
     pub(in crate::store) fn pending(&self) -> usize {
         self.pending.len()
     }
 
-    /// Writes what belongs to a commit, the first `count` entries, synced; `committed` is the flush before it, which has
-    /// `records` in the list if that is known. Returns what [`ScanList::commit`] is to be told. A list that is damaged
-    /// is copied to quarantine before it is cut.
+    /// Writes and syncs the first `count` entries, which belong to a commit. `committed` is the last flush before it,
+    /// and `records` the number of its records, if known. Returns the argument for [`ScanList::commit`]. A damaged list
+    /// is copied to quarantine before it is truncated.
     ///
     /// # Errors
     ///
-    /// A disk that refuses: the next call writes it again.
+    /// An I/O error. The next call writes them again.
     pub(in crate::store) fn write(
         &mut self,
         files: &MapFiles,
@@ -97,7 +97,7 @@ impl ScanList {
             self.has_excess = false;
             return Ok(before);
         }
-        // Until this is committed.
+        // True until these entries are committed.
         self.has_excess = true;
         let write = || -> io::Result<()> {
             let mut out = match before.bytes() {
@@ -121,12 +121,12 @@ impl ScanList {
         Ok(Extent { records: before.records + pending.len() as u64 })
     }
 
-    /// Writes what can be read of the file, from its beginning, to one that takes its place; the file itself goes to
-    /// quarantine. Returns what is in the list now, and where the file is.
+    /// Replaces the file by its readable leading part and moves the original to quarantine. Returns the extent of the
+    /// new list, and the path in quarantine.
     ///
     /// # Errors
     ///
-    /// A disk that refuses.
+    /// An I/O error.
     fn rewrite(&mut self, files: &MapFiles, committed: u64) -> Result<(Extent, Option<PathBuf>)> {
         let (disk, layout) = (&**files.disk(), files.layout());
         let (path, next, mut found) = (layout.scans(), layout.scans_next(), Extent::default());
@@ -148,7 +148,7 @@ impl ScanList {
         if found.records > 0 {
             copy().map_err(|error| Error::io(&next, "write", error))?;
             files.sync_map_folder()?;
-            // With another name it stays in place until the other takes its own.
+            // With a hard link in quarantine, the original remains in place until it is replaced.
             quarantined = quarantine.link(&path)?;
         }
         if quarantined.is_none() && files.kind(&path)?.is_some() {
@@ -162,12 +162,12 @@ impl ScanList {
         Ok((found, quarantined))
     }
 
-    /// Where the file is as it was before damage was cut off, if it was.
+    /// Path of a copy of the file before damage was truncated, if it was.
     pub(in crate::store) fn quarantined(&self) -> Option<&Path> {
         self.quarantined.as_deref()
     }
 
-    /// Notes that what was written is committed.
+    /// Records that the written entries are committed.
     pub(in crate::store) fn commit(&mut self, written: Extent, count: usize) {
         (self.committed, self.has_excess) = (Some(written), false);
         self.pending = self.pending.split_off(count.min(self.pending.len()));
@@ -175,12 +175,12 @@ impl ScanList {
 }
 
 impl TileStore {
-    /// Writes what can be read of the list of scans, from its beginning, to a file that takes the place of one that the
-    /// medium does not give back; returns where that is.
+    /// Replaces an unreadable list of scans by its readable leading part. Returns the path of the original in
+    /// quarantine.
     ///
     /// # Errors
     ///
-    /// A disk that refuses.
+    /// An I/O error.
     pub(crate) fn rewrite_scans(&mut self) -> Result<Option<PathBuf>> {
         let (list, quarantined) = self.scans.rewrite(&self.files, self.versions.commits().flush_number)?;
         self.committer.set_scan_records(list.records);
@@ -189,7 +189,7 @@ impl TileStore {
     }
 }
 
-/// What is committed. What is damaged is copied to quarantine.
+/// Finds the committed part. A damaged list is copied to quarantine.
 fn find_end(disk: &dyn Disk, layout: &Layout, committed: u64, records: Option<u64>) -> Result<Found> {
     let (mut found, path) = (Extent::default(), layout.scans());
     let read = for_each_record(disk, layout, committed, &mut |_, _| found.records += 1);
@@ -202,7 +202,7 @@ fn find_end(disk: &dyn Disk, layout: &Layout, committed: u64, records: Option<u6
         Err(DecodeError::Io(error)) => return Err(Error::io(&path, "read", error)),
         Err(DecodeError::Format(error)) => error.to_string(),
     };
-    // Not moved where it cannot be copied: what is whole of it stays in place.
+    // The file is not moved if it cannot be copied, because its intact part is needed in place.
     let quarantined = Quarantine::new(disk, layout).copy(&path)?;
     log::warn!(
         "{}: {damage}; the list goes on behind record {}{}",
@@ -213,11 +213,11 @@ fn find_end(disk: &dyn Disk, layout: &Layout, committed: u64, records: Option<u6
     Ok(Found { committed: found, has_excess: true, quarantined })
 }
 
-/// The scans of a map as of a flush, in order; none for a map that keeps no list.
+/// Returns the scans of a map as of a flush, in order. Empty for a map without a list.
 ///
 /// # Errors
 ///
-/// A disk that refuses, damage.
+/// Damage or an I/O error.
 pub(crate) fn read_scans(
     disk: &dyn Disk,
     layout: &Layout,
@@ -228,7 +228,7 @@ pub(crate) fn read_scans(
     for_each_committed(disk, layout, flush_number, records, &mut |flush, entry| {
         entries.push((flush, entry))
     })?;
-    // Backwards from revert to revert: before each, the list is that of the flush that it went back to.
+    // Backwards over reverts: before each revert, the list is that of the flush to which it reverted.
     let (mut parts, mut end) = (Vec::new(), entries.len());
     loop {
         let before = &entries[..end];
@@ -247,11 +247,11 @@ pub(crate) fn read_scans(
     Ok(scans.collect())
 }
 
-/// Whether the list is whole as of a flush; as [`read_scans`], in constant memory.
+/// Checks that the list is complete as of a flush. Like [`read_scans`], but in constant memory.
 ///
 /// # Errors
 ///
-/// A disk that refuses, damage.
+/// Damage or an I/O error.
 pub(crate) fn check_scans(
     disk: &dyn Disk,
     layout: &Layout,
@@ -261,7 +261,7 @@ pub(crate) fn check_scans(
     for_each_committed(disk, layout, flush_number, records, &mut |_, _| ())
 }
 
-/// Visits the records up to a flush, of which there are so many, if that is known.
+/// Visits the records up to a flush. `records` is their number, if known.
 fn for_each_committed(
     disk: &dyn Disk,
     layout: &Layout,
@@ -285,8 +285,8 @@ fn for_each_committed(
     }
 }
 
-/// Visits the records up to a flush; returns the file's length, `None` without a file. What a later flush has written,
-/// or a crash has left half written behind these, is passed over.
+/// Visits the records up to a flush. Returns the length of the file, or `None` without a file. Records of later
+/// flushes, and incomplete records after a crash, are ignored.
 fn for_each_record(
     disk: &dyn Disk,
     layout: &Layout,
@@ -303,7 +303,7 @@ fn for_each_record(
     let mut header = Vec::new();
     input.by_ref().take(HEADER_BYTES as u64).read_to_end(&mut header)?;
     if header.len() < HEADER_BYTES {
-        // A crash while it was begun, or damage: the number of records tells.
+        // A crash while the file was created, or damage. The number of records distinguishes them.
         return Ok(Some(file_bytes));
     }
     if header.iter().zip(HEADER).any(|(&byte, wanted)| byte != wanted && byte != 0) {
@@ -314,7 +314,7 @@ fn for_each_record(
         return Err(FormatError::at_offset(0, reason).into());
     }
     if header != HEADER {
-        // Of what a crash interrupted not all reached the medium; if records are missing, their number tells.
+        // After a crash a part of the header may be missing on the disk. If records are missing, their number shows it.
         return Ok(Some(file_bytes));
     }
     let mut at = HEADER_BYTES as u64;
@@ -334,14 +334,14 @@ fn for_each_record(
     Ok(Some(file_bytes))
 }
 
-/// Whether a damaged record is of a flush that did not come to its commit, by what is left of it: zeros where nothing
-/// reached the medium, or the number of a later flush.
+/// Returns whether a damaged record may belong to an uncommitted flush: it has the number of a later flush, or zeros,
+/// which never reached the disk.
 fn is_uncommitted(record: &[u8; RECORD_BYTES], flush_number: u64) -> bool {
     let flush = <[u8; 8]>::try_from(&record[8..16]).map(u64::from_le_bytes).unwrap_or_default();
     flush == 0 || flush > flush_number
 }
 
-/// Whether a record of a commit up to a flush follows: then what comes before it was committed, too.
+/// Returns whether a record of a committed flush follows. Then the records before it were committed too.
 fn has_committed(input: &mut impl Read, flush_number: u64) -> io::Result<bool> {
     let mut record = [0; RECORD_BYTES];
     loop {

@@ -1,42 +1,41 @@
 use crate::space::Point;
 use serde::Serialize;
 
-/// A scan of a map.
+/// Record of a scan of a map.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct ScanRecord {
-    /// Its number in the map, from 1.
+    /// Number of the scan in the map, from 1.
     pub number: u64,
-    /// When it was taken, in nanoseconds since the epoch of its source, if that is known.
+    /// Time of the scan in nanoseconds since the epoch of its source, if known.
     pub stamp_ns: Option<i64>,
-    /// Where the sensor was, in metres in the world frame.
+    /// Position of the sensor in the world frame, in metres.
     pub origin_m: Point,
 }
 
-/// What a record of the file says.
+/// Record of the file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Entry {
     Scan(ScanRecord),
-    /// The map is again as of this flush: its list of scans, too.
+    /// A revert of the map and its list of scans to this flush.
     Rewind(u64),
 }
 
-/// Bytes of a record.
 pub(super) const RECORD_BYTES: usize = 64;
 const SCAN: u8 = 1;
 const REWIND: u8 = 2;
-/// Stands for an unknown time.
+/// Represents an unknown time.
 const NO_STAMP: i64 = i64::MIN;
 
 impl ScanRecord {
-    /// A scan with its number, time and origin.
+    /// Returns the record of a scan.
     pub fn new(number: u64, stamp_ns: Option<i64>, origin_m: Point) -> Self {
         Self { number, stamp_ns, origin_m }
     }
 }
 
 impl Entry {
-    /// The record of this entry, as of a flush.
+    /// Encodes the entry with the number of its flush.
     pub(super) fn to_bytes(self, flush_number: u64) -> [u8; RECORD_BYTES] {
         let (kind, number, stamp_ns, origin_m) = match self {
             Self::Scan(scan) => (SCAN, scan.number, scan.stamp_ns.unwrap_or(NO_STAMP), scan.origin_m),
@@ -55,7 +54,7 @@ impl Entry {
         bytes
     }
 
-    /// The flush and the entry of a record; `None` for one that is damaged.
+    /// Decodes a record into its flush and entry; `None` if it is damaged.
     pub(super) fn from_bytes(bytes: &[u8; RECORD_BYTES]) -> Option<(u64, Self)> {
         let word =
             |at: usize| <[u8; 8]>::try_from(&bytes[at..at + 8]).map(u64::from_le_bytes).unwrap_or_default();

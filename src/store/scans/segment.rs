@@ -6,51 +6,50 @@ use std::io::{self, Read, Write};
 use std::path::PathBuf;
 use std::sync::Mutex;
 
-/// A segment that is longer is followed by another.
+/// Length from which a new segment is begun.
 const MAX_BYTES: u64 = 256 << 20;
 /// Length and checksum of a block.
 const BLOCK_FRAME_BYTES: u64 = 8;
-/// Most bytes of a block.
+/// Maximum length of a block.
 pub(crate) const MAX_BLOCK_BYTES: usize = 7 << 19;
 
-/// Appends scans to a segment, block by block. What no catalog names is nothing.
+/// Writer that appends scans to a segment in blocks. Bytes that no catalog references are ignored.
 pub(super) struct SegmentWriter {
     pub(super) segment: u64,
     path: PathBuf,
-    /// A store that is read by several threads is `Sync`.
+    /// A `Mutex` because stores are `Sync`.
     out: Mutex<Box<dyn DiskWrite>>,
     bytes: u64,
 }
 
 impl SegmentWriter {
-    /// Begins a segment.
+    /// Creates a segment.
     pub(super) fn create(disk: &dyn Disk, layout: &Layout, segment: u64) -> Result<Self> {
         let path = layout.segment(segment);
         let out = disk.create(&path).map_err(|error| Error::io(&path, "create", error))?;
         Ok(Self { segment, path, out: Mutex::new(out), bytes: 0 })
     }
 
-    /// Where the next scan begins.
+    /// Offset of the next scan.
     pub(super) fn bytes(&self) -> u64 {
         self.bytes
     }
 
-    /// Whether the next scan goes to another segment.
+    /// Returns whether the next scan belongs in a new segment.
     pub(super) fn is_full(&self) -> bool {
         self.bytes >= MAX_BYTES
     }
 
-    /// Adds a block to the scan.
     pub(super) fn push(&mut self, block: &[u8]) -> Result<()> {
         self.write(block).map_err(|error| Error::io(&self.path, "write", error))
     }
 
-    /// The scan that began at `offset`, as far as it is written.
+    /// Returns the location of the scan that began at `offset`, as far as it is written.
     pub(super) fn place_from(&self, offset: u64) -> SegmentPlace {
         SegmentPlace { segment: self.segment, offset, bytes: self.bytes - offset }
     }
 
-    /// Copies a scan that lies elsewhere, block by block, checked.
+    /// Copies a scan from another segment in blocks, and verifies their checksums.
     pub(super) fn copy(&mut self, scan: &mut SegmentReader) -> Result<SegmentPlace> {
         let offset = self.bytes;
         while let Some(block) = scan.next_block()? {
@@ -71,7 +70,7 @@ impl SegmentWriter {
         Ok(())
     }
 
-    /// Takes back a scan that is given up: what comes next begins where it began.
+    /// Discards the scan that began at `offset`. The next scan starts there.
     pub(super) fn cut(&mut self, disk: &dyn Disk, offset: u64) -> io::Result<()> {
         *self.out.get_mut().unwrap_or_else(std::sync::PoisonError::into_inner) =
             disk.append(&self.path, offset)?;
@@ -80,21 +79,21 @@ impl SegmentWriter {
     }
 }
 
-/// Reads one scan from its segment, block by block, and nothing else of it.
+/// Reader of one scan in its segment, in blocks.
 pub(crate) struct SegmentReader {
     input: io::Take<Box<dyn DiskRead>>,
     path: PathBuf,
-    /// Where the next block begins in the segment.
+    /// Offset of the next block in the segment.
     at: u64,
     block: Vec<u8>,
 }
 
 impl SegmentReader {
-    /// Goes to where a scan begins.
+    /// Opens a scan in its segment.
     ///
     /// # Errors
     ///
-    /// A segment that is missing or too short, a disk that refuses.
+    /// A missing or truncated segment, or an I/O error.
     pub(crate) fn open(disk: &dyn Disk, layout: &Layout, place: SegmentPlace) -> Result<Self> {
         let path = layout.segment(place.segment);
         let input = disk.open_at(&path, place.offset).map_err(|error| match error.kind() {
@@ -106,21 +105,21 @@ impl SegmentReader {
         Ok(Self { input: input.take(place.bytes), path, at: place.offset, block: Vec::new() })
     }
 
-    /// Where the next block begins in the segment.
+    /// Offset of the next block in the segment.
     pub(crate) fn at(&self) -> u64 {
         self.at
     }
 
-    /// The error of what is found at an offset of the segment.
+    /// Returns the error of damage at an offset of the segment.
     pub(crate) fn damaged(&self, at: u64, reason: &str) -> Error {
         FormatError::at_offset(at, reason).in_map(&self.path, None)
     }
 
-    /// The next block as it is encoded; `None` after the last.
+    /// Returns the next encoded block; `None` after the last.
     ///
     /// # Errors
     ///
-    /// Damage, or a disk that refuses.
+    /// Damage or an I/O error.
     pub(crate) fn next_block(&mut self) -> Result<Option<&[u8]>> {
         self.read_block().map_err(|error| error.in_map(&self.path, None))?;
         Ok((!self.block.is_empty()).then_some(&*self.block))

@@ -1,4 +1,4 @@
-//! Tables that stay when they are replaced: for snapshots, until these are deleted, and for readers beside the writer.
+//! Snapshots, and replaced tables that are kept for them and for readers.
 
 pub(super) mod kept_tables;
 pub(super) mod readers;

@@ -5,23 +5,22 @@ use crate::store::layout::Layout;
 use rustc_hash::FxHashMap;
 use std::io;
 
-/// The readers of a map, and the replaced tables kept for them: for each tile, one version per flush that is being
-/// read.
+/// Readers of a map, and the replaced tables kept for them: for each tile, one version per flush that is read.
 ///
-/// A reader holds `metadata.json` open as it was when it opened the map. Every flush puts another file in its place,
-/// so the writer, which watches over all of these files, knows which flushes are being read.
+/// A reader keeps the `metadata.json` open that it found when it opened the map. Every flush replaces this file, and
+/// the writer watches all versions. So it knows which flushes are read.
 #[derive(Default)]
 pub(in crate::store) struct Readers {
-    /// The `metadata.json` of past flushes and of the present one, in order.
+    /// Versions of `metadata.json` from past flushes and the current one, in order.
     watched: Vec<Watched>,
-    /// Tables that were kept for readers alone.
+    /// Tables that are kept only for readers.
     kept: KeptFlushes,
-    /// Tiles that were added while an earlier flush was being read, with the flush that added them.
+    /// Tiles added while an earlier flush was read, with the flush that added them.
     added: FxHashMap<TileIndex, u64>,
 }
 
-/// A `metadata.json`, and the flushes that those who hold it may see: its own, and where it fell behind the log, later
-/// ones.
+/// A version of `metadata.json`, and the range of flushes that its readers may use: its own, and later ones if the file
+/// was older than the log.
 struct Watched {
     first: u64,
     last: u64,
@@ -29,35 +28,35 @@ struct Watched {
 }
 
 impl Readers {
-    /// Watches over the present `metadata.json`, which a flush has written.
+    /// Watches for readers of the current `metadata.json`, which a flush has written.
     pub(in crate::store) fn watch(&mut self, flush_number: u64, metadata: Box<dyn ReaderWatch>) {
         self.watched.push(Watched { first: flush_number, last: flush_number, watch: metadata });
     }
 
-    /// Notes that the present `metadata.json` could not be replaced after a flush, so that who holds it may see that
-    /// one.
+    /// Records that the current `metadata.json` could not be replaced after a flush, so that its readers may use that
+    /// flush.
     pub(in crate::store) fn may_see(&mut self, flush_number: u64) {
         if let Some(present) = self.watched.last_mut() {
             present.last = present.last.max(flush_number);
         }
     }
 
-    /// Records that a flush adds a tile: a reader of an earlier flush does not see it.
+    /// Records that a flush adds a tile, which readers of earlier flushes do not use.
     pub(in crate::store) fn note_added(&mut self, tile: TileIndex, flush_number: u64) {
         self.added.insert(tile, flush_number);
     }
 
-    /// Whether anybody reads the map.
+    /// Returns whether a reader has the map open.
     pub(in crate::store) fn are_there(&self) -> bool {
         self.watched.iter().any(|watched| watched.watch.has_readers())
     }
 
-    /// Bytes of memory, about.
+    /// Approximate memory in bytes.
     pub(in crate::store) fn bytes(&self) -> usize {
         kept_flushes_bytes(&self.kept) + hash_table_bytes::<(TileIndex, u64)>(self.added.capacity())
     }
 
-    /// Looks who is still there.
+    /// Removes the entries of flushes without readers.
     pub(in crate::store) fn look(&mut self) {
         let present = self.watched.last().map(|present| present.first);
         self.watched.retain(|watched| Some(watched.first) == present || watched.watch.has_readers());
@@ -65,11 +64,11 @@ impl Readers {
         self.added.retain(|_, flush_number| *flush_number > oldest);
     }
 
-    /// Whether a reader sees the table in place, which was the last version as of this flush.
+    /// Returns whether a reader uses the current table, which was the last version as of this flush.
     pub(in crate::store) fn see(&self, tile: TileIndex, flush_number: u64, snapshots: &SeenTables) -> bool {
         let flushes = [self.kept.get(&tile), snapshots.pinned().get(&tile)];
         let before = flushes.into_iter().flatten().filter_map(|kept| kept.range(..flush_number).next_back());
-        // Who reads a flush up to that one sees an earlier table; so does who reads one from before the tile was there.
+        // Readers of earlier flushes use an earlier kept table. Readers from before the tile was added use none.
         let lowest = before.max().map_or(0, |&kept| kept + 1);
         let added = self.added.get(&tile).copied().filter(|&added| added <= flush_number);
         let lowest = lowest.max(added.unwrap_or(0));
@@ -78,12 +77,12 @@ impl Readers {
         })
     }
 
-    /// Notes that a table as of a flush was kept.
+    /// Records that a table was kept as of a flush.
     pub(in crate::store) fn keep(&mut self, tile: TileIndex, flush_number: u64) {
         self.kept.entry(tile).or_default().insert(flush_number);
     }
 
-    /// Removes the tables that no reader sees any more.
+    /// Removes the tables that no reader uses any more.
     pub(in crate::store) fn release(&mut self, disk: &dyn Disk, layout: &Layout, snapshots: &SeenTables) {
         self.look();
         let mut unseen = Vec::new();

@@ -10,37 +10,36 @@ use crate::store::scans::{KeptAsOf, kept_as_of};
 use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Tables that were kept when they were replaced: for each tile, the flushes that they were the last version of.
+/// For each tile, the flushes as of which its replaced tables were kept.
 pub(in crate::store) type KeptFlushes = FxHashMap<TileIndex, BTreeSet<u64>>;
 
-/// Which tables a map's snapshots see, so that its writer keeps them.
+/// Tables that a map's snapshots use, so that its writer keeps them.
 ///
-/// A snapshot of flush `n` sees of each of its tiles the table that was kept as of the first flush not before `n`, and
-/// if none was, the one in place: it is readers' rule, and needs nothing but names.
+/// A snapshot of flush `n` uses, for each of its tiles, the table that was kept as of the first flush not before `n`.
+/// If there is none, it uses the current table. Readers follow the same rule. It only needs file names.
 #[derive(Debug, Default)]
 pub(in crate::store) struct SeenTables {
-    /// Tiles of which a snapshot sees the table in place.
+    /// Tiles whose current table a snapshot uses.
     shared: TileTable<()>,
-    /// Kept tables that a snapshot sees.
+    /// Kept tables that a snapshot uses.
     pinned: KeptFlushes,
-    /// Whether there is a snapshot that cannot be read, and of which nothing is known: it may see anything.
+    /// Whether a snapshot is unreadable and its flush is unknown: it may use any table.
     see_all: bool,
-    /// The snapshots themselves.
+    /// Snapshots that were found.
     found: SnapshotList,
-    /// For each snapshot that was read, the scans that it keeps, if it keeps any.
+    /// Kept scans of each snapshot that was read, if it has any.
     kept_scans: BTreeMap<SnapshotName, Option<KeptAsOf>>,
 }
 
 impl SeenTables {
-    /// Looks which of the kept tables the snapshots of a map see, and which snapshots there are. One is in memory at a
-    /// time.
+    /// Finds the snapshots of a map and the kept tables that they use. One snapshot is in memory at a time.
     ///
-    /// A snapshot that is missing or cannot be read is no error: it counts as one that saw every tile as of its flush,
-    /// and where nothing tells its flush, as one that sees everything.
+    /// A missing or unreadable snapshot is not an error. It is assumed to use every tile as of its flush, or every
+    /// table if its flush is unknown.
     ///
     /// # Errors
     ///
-    /// A disk that refuses more than one file.
+    /// An I/O error that is not specific to one file.
     pub(in crate::store) fn read_all(
         disk: &dyn Disk,
         layout: &Layout,
@@ -104,7 +103,7 @@ impl SeenTables {
         Ok(())
     }
 
-    /// The snapshots that were found, and the flushes that they are of.
+    /// Snapshots that were found, with their flushes.
     pub(in crate::store) fn found(&self) -> &SnapshotList {
         &self.found
     }
@@ -114,7 +113,7 @@ impl SeenTables {
         self.kept_scans.insert(snapshot.name.clone(), kept_as_of(snapshot));
     }
 
-    /// The kept scans that the snapshots of this list need; `None` if that is not known of each.
+    /// Returns the kept scans that the snapshots of this list need; `None` if one of them is unknown.
     pub(in crate::store) fn kept_scans_of(&self, listed: Option<&SnapshotList>) -> Option<Vec<KeptAsOf>> {
         let names = listed.into_iter().flat_map(SnapshotList::names);
         let needed = names.map(|name| self.kept_scans.get(name).copied());
@@ -130,50 +129,50 @@ impl SeenTables {
         }
     }
 
-    /// Notes that there is a snapshot of the map as it is.
+    /// Records a snapshot of the current map.
     pub(in crate::store) fn share(&mut self, tiles: impl Iterator<Item = TileIndex>) {
         self.shared.extend(tiles.map(|tile| (tile, ())));
     }
 
-    /// Whether a snapshot sees the table in place.
+    /// Returns whether a snapshot uses the current table.
     pub(in crate::store) fn sees_present(&self, tile: TileIndex) -> bool {
         self.see_all || self.shared.contains(tile)
     }
 
-    /// Whether a snapshot sees the table that was kept as of a flush.
+    /// Returns whether a snapshot uses the table that was kept as of a flush.
     pub(in crate::store) fn sees_kept(&self, tile: TileIndex, flush_number: u64) -> bool {
         self.pinned.get(&tile).is_some_and(|flushes| flushes.contains(&flush_number))
     }
 
-    /// Notes that the table in place was kept as of a flush for the snapshots that see it.
+    /// Records that the current table was kept as of a flush, for the snapshots that use it.
     pub(in crate::store) fn pin(&mut self, tile: TileIndex, flush_number: u64) {
         self.pinned.entry(tile).or_default().insert(flush_number);
     }
 
-    /// Notes that what was kept of the table in place is durable: what takes its place is seen by no snapshot yet.
+    /// Records that a kept table is durable. No snapshot uses its replacement yet.
     pub(in crate::store) fn unshare(&mut self, tile: TileIndex) {
         self.shared.remove(tile);
     }
 
-    /// Every kept table that a snapshot sees.
+    /// Kept tables that a snapshot uses.
     pub(in crate::store) fn pinned(&self) -> &KeptFlushes {
         &self.pinned
     }
 
-    /// Bytes of memory, about.
+    /// Approximate memory in bytes.
     pub(in crate::store) fn bytes(&self) -> usize {
         self.shared.bytes() + kept_flushes_bytes(&self.pinned)
     }
 }
 
-/// Bytes of memory of what is known of kept tables, about.
+/// Approximate memory of a list of kept tables in bytes.
 pub(in crate::store) fn kept_flushes_bytes(kept: &KeptFlushes) -> usize {
-    // A set of few numbers takes a leaf of its tree.
+    // A small set takes one leaf of its tree.
     const FLUSHES_BYTES: usize = 120;
     hash_table_bytes::<(TileIndex, BTreeSet<u64>)>(kept.capacity()) + kept.len() * FLUSHES_BYTES
 }
 
-/// Which of a tile's kept tables a snapshot of a flush sees; `None` if the one in place.
+/// Returns which of a tile's kept tables a snapshot of a flush uses; `None` if it uses the current table.
 pub(in crate::store) fn seen_by(kept: Option<&BTreeSet<u64>>, flush_number: u64) -> Option<u64> {
     kept?.range(flush_number..).next().copied()
 }

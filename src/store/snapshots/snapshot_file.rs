@@ -1,4 +1,4 @@
-//! The files in `snapshots/`: each a commit log of one record, the whole map as of a flush.
+//! Files in `snapshots/`. Each is a commit log with one record: the whole map as of a flush.
 
 use super::snapshot_list::SnapshotList;
 use super::snapshot_name::SnapshotName;
@@ -12,27 +12,27 @@ use crate::store::tile_store::hex;
 use std::io;
 use std::path::Path;
 
-/// What a snapshot says: every tile and the metadata as of a flush.
+/// Content of a snapshot: all tiles and the metadata as of a flush.
 #[derive(Clone, Debug)]
 pub struct Snapshot {
-    /// Its name.
+    /// Name of the snapshot.
     pub name: SnapshotName,
-    /// The map that it is of.
+    /// Id of its map.
     pub map_id: [u8; 16],
-    /// The metadata as of then.
+    /// Metadata as of the flush.
     pub metadata: Metadata,
     /// Flush, scan and tiles.
     pub commits: Commits,
-    /// Length of its file in bytes.
+    /// Length of the file in bytes.
     pub bytes: u64,
 }
 
 impl Snapshot {
-    /// The names in the folder of snapshots, in order. Files with names that no snapshot may have are left out.
+    /// Lists the names in the folder of snapshots, in order. Invalid names are omitted.
     ///
     /// # Errors
     ///
-    /// A disk that refuses.
+    /// An I/O error.
     pub fn list(disk: &dyn Disk, layout: &Layout) -> Result<Vec<SnapshotName>> {
         if !Self::has_folder(disk, layout)? {
             return Ok(Vec::new());
@@ -44,11 +44,12 @@ impl Snapshot {
         Ok(names)
     }
 
-    /// Whether a map has a folder for snapshots. A link that has its name is none: it could lead anywhere.
+    /// Returns whether a map has a folder for snapshots. A symbolic link is an error because it could lead out of the
+    /// map.
     ///
     /// # Errors
     ///
-    /// Something else that has the name of the folder; a disk that refuses.
+    /// An entry with the folder's name that is not a folder, or an I/O error.
     pub(in crate::store) fn has_folder(disk: &dyn Disk, layout: &Layout) -> Result<bool> {
         let folder = layout.snapshots();
         match disk.kind_at(&folder)? {
@@ -61,13 +62,13 @@ impl Snapshot {
         }
     }
 
-    /// Reads a snapshot of the map with this id. Where `listed` says which snapshots the map has, it must be the one
-    /// that is meant there.
+    /// Reads a snapshot of the map with this id. If `listed` is given, it must contain the snapshot, and the flush must
+    /// match.
     ///
     /// # Errors
     ///
-    /// [`Error::InvalidArgument`] if there is none of this name; damage, to which belongs a file that is missing or is
-    /// another snapshot's; a disk that refuses.
+    /// [`Error::InvalidArgument`] if there is no snapshot of this name; damage, including a missing file and a file of
+    /// another snapshot; or an I/O error.
     pub fn read(
         disk: &dyn Disk,
         layout: &Layout,
@@ -86,7 +87,7 @@ impl Snapshot {
         let path = layout.snapshot(name);
         let read = match Self::read_file(disk, &path, name, map_id)? {
             Some(snapshot) => Some(snapshot),
-            // Committed, and without its name still.
+            // Committed, but not renamed yet.
             None if listed.is_some() => Self::read_file(disk, &layout.snapshot_next(), name, map_id)
                 .ok()
                 .flatten()
@@ -119,11 +120,11 @@ impl Snapshot {
         Ok(snapshot)
     }
 
-    /// Reads the file of a snapshot, whoever it is; `None` if there is none.
+    /// Reads a snapshot's file without checking its name; `None` if it does not exist.
     ///
     /// # Errors
     ///
-    /// Damage; a disk that refuses.
+    /// Damage or an I/O error.
     pub fn read_file(
         disk: &dyn Disk,
         path: &Path,
@@ -157,12 +158,12 @@ impl Snapshot {
         }
     }
 
-    /// The name in the file itself; `None` in files of versions that did not write it.
+    /// Returns the name recorded in the file; `None` in files of versions that did not write it.
     pub fn name_inside(&self) -> Option<&SnapshotName> {
         self.metadata.ext.as_ref()?.snapshots.as_ref()?.names().next()
     }
 
-    /// Whether the file has the name that is in it.
+    /// Returns whether the file's name matches the name recorded in it.
     pub(in crate::store) fn has_own_name(&self) -> bool {
         self.name_inside() == Some(&self.name)
     }

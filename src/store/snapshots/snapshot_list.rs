@@ -2,57 +2,57 @@ use super::snapshot_name::SnapshotName;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Which snapshots a map has, by name, as its log says: a file of the folder of snapshots is none unless it is named
-/// here, and one that is named and has no file is missing.
+/// Names of a map's snapshots, as recorded in its log. Other files in the folder of snapshots are ignored. A listed
+/// snapshot without a file is missing.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct SnapshotList(BTreeMap<SnapshotName, Option<u64>>);
 
-/// Most snapshots of a map: the list is part of `metadata.json`, which is read whole.
+/// Maximum number of snapshots of a map: the list is part of `metadata.json`, which is read at once.
 pub(in crate::store) const MAX_SNAPSHOTS: usize = 4096;
 
 impl SnapshotList {
-    /// A list of one.
+    /// Returns a list with one snapshot.
     pub(in crate::store) fn of(name: SnapshotName, flush_number: u64) -> Self {
         Self(BTreeMap::from([(name, Some(flush_number))]))
     }
 
-    /// Names a snapshot, and the flush that it is of if that is known.
+    /// Adds a snapshot with its flush, if known.
     pub fn insert(&mut self, name: SnapshotName, flush_number: Option<u64>) {
         self.0.insert(name, flush_number);
     }
 
-    /// Takes a name off the list; whether it was there.
+    /// Removes a name. Returns whether it was listed.
     pub(in crate::store) fn remove(&mut self, name: &SnapshotName) -> bool {
         self.0.remove(name).is_some()
     }
 
-    /// Whether the map has a snapshot of this name.
+    /// Returns whether the map has a snapshot of this name.
     pub fn contains(&self, name: &SnapshotName) -> bool {
         self.0.contains_key(name)
     }
 
-    /// The flush that a snapshot is of, if that is known.
+    /// Flush of a snapshot, if known.
     pub fn flush_of(&self, name: &SnapshotName) -> Option<u64> {
         self.0.get(name).copied().flatten()
     }
 
-    /// The names, in order.
+    /// Names in order.
     pub fn names(&self) -> impl Iterator<Item = &SnapshotName> {
         self.0.keys()
     }
 
-    /// How many there are.
+    /// Number of snapshots.
     pub fn len(&self) -> usize {
         self.0.len()
     }
 
-    /// Whether there are none.
+    /// Returns whether the list is empty.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
-    /// Every flush that is named.
+    /// All known flushes.
     pub(in crate::store) fn flushes(&self) -> impl Iterator<Item = u64> {
         self.0.values().copied().flatten()
     }

@@ -3,21 +3,21 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
 
-/// The name of a snapshot, which is a file's name too: 1 to 64 letters of `A-Z a-z 0-9 . _ -`, the first of them no
-/// dot, and not `now`, which means the map as it is.
+/// Name of a snapshot and of its file: 1 to 64 characters of `A-Z a-z 0-9 . _ -`, not starting with a dot. `now` is
+/// reserved for the current map.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct SnapshotName(String);
 
-/// What the map as it is is called among snapshots.
+/// Reserved name of the current map.
 const NOW: &str = "now";
 
 impl SnapshotName {
-    /// Takes a name.
+    /// Validates a name.
     ///
     /// # Errors
     ///
-    /// A name that no snapshot may have.
+    /// An invalid name.
     pub fn new(name: impl Into<String>) -> Result<Self> {
         const MAX_LETTERS: usize = 64;
         let name = name.into();
@@ -36,7 +36,7 @@ impl SnapshotName {
         Err(Error::argument("snapshot", reason))
     }
 
-    /// The name as text.
+    /// Returns the name as text.
     pub fn as_str(&self) -> &str {
         &self.0
     }

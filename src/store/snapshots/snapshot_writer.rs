@@ -11,23 +11,23 @@ use crate::store::scans::{CatalogEntry, CatalogVersion};
 use crate::store::tile_store::TileStore;
 use std::io;
 
-/// Makes and deletes the snapshots of a map: each a commit of its own, in which nothing else changes.
+/// Creates and deletes the snapshots of a map. Each change is a commit of its own, without other changes.
 #[derive(Debug)]
 pub struct SnapshotWriter<'a> {
     pub(super) store: &'a mut TileStore,
 }
 
 impl SnapshotWriter<'_> {
-    /// Keeps the last commit under a name, until the snapshot is deleted: from here on its tables stay when they are
-    /// replaced. What is written and not committed is no part of it. When this returns it is durable; after an error
+    /// Keeps the last commit under a name until the snapshot is deleted. Its tables are kept when they are replaced.
+    /// Uncommitted changes are not part of the snapshot. When this returns the snapshot is durable; after an error
     /// there is none.
     ///
-    /// Where there is one of this name and of this very state, an earlier attempt made it: nothing is done.
+    /// If a snapshot of this name and this state exists, nothing is done.
     ///
     /// # Errors
     ///
-    /// [`Error::AlreadyExists`] if there is one of this name and of another state; a map of the original format, which
-    /// must be upgraded first; a disk that refuses.
+    /// [`Error::AlreadyExists`] if a snapshot of this name and another state exists; a map of the original format,
+    /// which must be upgraded first; or an I/O error.
     pub fn create(&mut self, name: &SnapshotName) -> Result<()> {
         self.store.finish_earlier_work()?;
         let map_id = self.store.committer.logged_map_id()?;
@@ -50,7 +50,7 @@ impl SnapshotWriter<'_> {
         if !has_folder {
             self.store.disk().create_folder(&folder).map_err(|error| Error::io(&folder, "create", error))?;
         }
-        // Perhaps made by an attempt that could not.
+        // An earlier attempt may have created the folder without a sync.
         self.store.files.sync_map_folder()?;
         let next = self.store.layout().snapshot_next();
         let flush_number = self.store.commits().flush_number;
@@ -59,7 +59,7 @@ impl SnapshotWriter<'_> {
         self.store.files.sync_folder(&folder)?;
         listed.insert(name.clone(), Some(flush_number));
         if let Err(error) = self.store.commit_snapshots(listed) {
-            // Also if it stays, nothing names it.
+            // If the file remains, no record names it.
             let _ = self.store.disk().remove_file(&next);
             return Err(error);
         }
@@ -70,7 +70,7 @@ impl SnapshotWriter<'_> {
         Ok(())
     }
 
-    /// Whether a snapshot of this name can be read and keeps the state of the last commit.
+    /// Returns whether a snapshot of this name is readable and has the state of the last commit.
     fn is_kept_as(&self, name: &SnapshotName) -> bool {
         self.store
             .snapshots()
@@ -79,11 +79,11 @@ impl SnapshotWriter<'_> {
             .unwrap_or(false)
     }
 
-    /// Writes what a snapshot says in place of what it said before.
+    /// Replaces the content of a snapshot.
     ///
     /// # Errors
     ///
-    /// A disk that refuses.
+    /// An I/O error.
     pub fn replace(&mut self, snapshot: &Snapshot) -> Result<()> {
         let Snapshot { name, map_id, metadata, commits, .. } = snapshot;
         let (next, path) = (self.store.layout().snapshot_next(), self.store.layout().snapshot(name));
@@ -92,7 +92,7 @@ impl SnapshotWriter<'_> {
         self.store.files.sync_folder(&self.store.layout().snapshots())
     }
 
-    /// Puts the files of snapshots in order after a commit; what the disk refuses is made good by the next call.
+    /// Finishes a commit. After an I/O error the next call resumes.
     fn finish_commit(&mut self) {
         if let Err(error) = self.store.finish_commit() {
             log::warn!("{}: committed, but not tidied up: {error:#}", self.store.folder().display());
@@ -116,15 +116,15 @@ impl SnapshotWriter<'_> {
         Ok(())
     }
 
-    /// Deletes a snapshot, and the tables that no other one sees. One that is damaged, cannot be read or is missing can
-    /// be deleted too: from then on nothing is kept for it. One whose deletion was interrupted after its commit is gone
-    /// since the map was opened: that is no error.
+    /// Deletes a snapshot, and the tables that no other one uses. Damaged, unreadable and missing snapshots can be
+    /// deleted too. If a deletion was interrupted after its commit, opening the map has finished it, and this returns
+    /// without an error.
     ///
     /// # Errors
     ///
-    /// [`Error::InvalidArgument`] if there is none of this name; a disk that refuses. Where kept scans that nothing
-    /// needs could not be removed, as the disk refused or a catalog is damaged, the snapshot is deleted all the same, and
-    /// another call tries again to remove them.
+    /// [`Error::InvalidArgument`] if there is no snapshot of this name, or an I/O error. If unneeded kept scans could
+    /// not be removed, because of an I/O error or a damaged catalog, the snapshot is deleted, and the next call tries
+    /// to remove them.
     pub fn delete(&mut self, name: &SnapshotName) -> Result<()> {
         self.store.finish_earlier_work()?;
         let path = self.store.layout().snapshot(name);
@@ -136,9 +136,9 @@ impl SnapshotWriter<'_> {
                 return Err(FormatError::at_offset(0, reason).in_map(&path, None));
             }
             _ if is_listed => {}
-            // By an attempt that was killed after its commit.
+            // Deleted by an attempt that was killed after its commit.
             Ok(_) if self.store.snapshots_removed.contains(name) => return Ok(()),
-            // Says which ones there are.
+            // Returns the error for an unknown snapshot.
             Ok(_) => return self.store.snapshots().read(name).map(drop),
             Err(error) => return Err(Error::io(&path, "look at", error)),
         }
@@ -148,7 +148,7 @@ impl SnapshotWriter<'_> {
             self.store.commit_snapshots(listed)?;
         }
         self.finish_commit();
-        // As long as the file is there, the same command completes a deletion that was killed or refused.
+        // As long as the file exists, this call can be repeated to finish the deletion.
         if let Err(error) = self.release_unseen_tables() {
             log::warn!("deleted, but its tables stay until the map is opened again: {error:#}");
         }
@@ -158,11 +158,11 @@ impl SnapshotWriter<'_> {
         Ok(())
     }
 
-    /// Takes snapshots off the list whose files are not there any more, and what was kept for them.
+    /// Removes snapshots without files from the list, and the files that were kept for them.
     ///
     /// # Errors
     ///
-    /// A disk that refuses.
+    /// An I/O error.
     pub fn give_up(&mut self, names: &[SnapshotName]) -> Result<()> {
         self.store.finish_earlier_work()?;
         let mut listed = self.store.committer.snapshots().cloned().unwrap_or_default();
@@ -178,12 +178,11 @@ impl SnapshotWriter<'_> {
         Ok(())
     }
 
-    /// Looks at the snapshots anew, and removes the kept tables and kept scans that none of them and no reader needs
-    /// any more.
+    /// Reads the snapshots again, and removes kept tables and kept scans that neither they nor readers need.
     ///
     /// # Errors
     ///
-    /// A disk that refuses.
+    /// An I/O error.
     pub fn release_unseen(&mut self) -> Result<()> {
         self.release_unseen_tables()?;
         self.store.remove_unneeded_scans();
@@ -205,24 +204,23 @@ impl SnapshotWriter<'_> {
         self.store.kept.set_snapshots(snapshots);
         self.store.kept.release(&self.store.files);
         for tile in tiles.into_iter().filter(|tile| !self.store.commits().tiles.contains(*tile)) {
-            // Of a removed tile: it goes if that was all that was in it.
+            // Folder of a removed tile. It is removed if it is empty now.
             let _ = self.store.disk().remove_folder(&self.store.layout().tile_folder(tile));
         }
         Ok(())
     }
 
-    /// Writes a catalog that a snapshot is to name in place of its own, in a commit of its own; as long as it is not
-    /// named, it is a leftover.
+    /// Writes a catalog for a snapshot in a commit of its own. Until the snapshot names it, it is unreferenced.
     ///
     /// # Errors
     ///
-    /// A disk that refuses; a damaged catalog of the map itself, in a map of a version that did not name it.
+    /// An I/O error, or a damaged catalog of the map itself in a map of a version that did not name it.
     pub(crate) fn write_catalog(
         &mut self,
         write: impl FnOnce(&mut dyn FnMut(&CatalogEntry) -> Result<()>) -> Result<()>,
     ) -> Result<CatalogVersion> {
         self.store.finish_earlier_work()?;
-        // From here on the newest is no longer the map's own.
+        // Afterwards the newest catalog is not that of the map.
         self.store.try_to_name_own_catalog()?;
         let catalog = self.store.archive.write_other(write)?;
         let listed = self.store.snapshots().list().cloned().unwrap_or_default();
@@ -232,7 +230,7 @@ impl SnapshotWriter<'_> {
     }
 }
 
-/// The error of a deletion after which kept scans remain that nothing needs, with what to do.
+/// Returns the error of a deletion after which unneeded kept scans remain, with the remedy.
 fn scans_remain(error: Error, name: &SnapshotName) -> Error {
     let hint = format!("the snapshot {name} is deleted, but points of scans that only it kept may remain");
     match error {

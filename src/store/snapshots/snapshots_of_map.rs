@@ -1,4 +1,4 @@
-//! The snapshots of a map: opened like the map itself, listed and read.
+//! Snapshots of a map: opened like the map itself, listed and read.
 
 use super::snapshot_file::Snapshot;
 use super::snapshot_list::SnapshotList;
@@ -15,28 +15,28 @@ use crate::store::tile_store::{TileStore, id_from_hex};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// The snapshots of a map, for reading.
+/// Snapshots of a map, for reading.
 #[derive(Clone, Copy, Debug)]
 pub struct Snapshots<'a> {
     store: &'a TileStore,
 }
 
 impl TileStore {
-    /// The snapshots of the map.
+    /// Returns the snapshots of the map.
     pub fn snapshots(&self) -> Snapshots<'_> {
         Snapshots { store: self }
     }
 
-    /// What makes and deletes them.
+    /// Returns a writer of snapshots.
     pub fn snapshot_writer(&mut self) -> SnapshotWriter<'_> {
         SnapshotWriter { store: self }
     }
 
-    /// Opens a snapshot for reading, beside a writer too: takes no lock and writes nothing.
+    /// Opens a snapshot for reading, without a lock and without writing. A writer may be active.
     ///
     /// # Errors
     ///
-    /// No map or no snapshot of this name there; damage; a disk that refuses.
+    /// No map, no snapshot of this name, damage, or an I/O error.
     pub fn open_snapshot(disk: Arc<dyn Disk>, folder: &Path, name: &SnapshotName) -> Result<Self> {
         let layout = Layout::new(folder);
         let metadata = map_folder::read_metadata(&*disk, &layout)?;
@@ -46,7 +46,7 @@ impl TileStore {
                 format!("{map} has none with the name {name}: a map of the original format has no snapshots");
             return Err(Error::argument("snapshot", reason));
         };
-        // The log may be ahead of the file; where it cannot be read, the file is what there is.
+        // The log may be newer than `metadata.json`. If it is unreadable, use `metadata.json`.
         let listed = match Self::read(disk.clone(), layout.clone(), metadata.clone()) {
             Ok(store) => store.committer.snapshots().cloned(),
             Err(_) => metadata.ext.and_then(|ext| ext.snapshots),
@@ -62,22 +62,22 @@ impl TileStore {
         store
     }
 
-    /// The map as a snapshot of it says, for reading.
+    /// Returns the map as of one of its snapshots, for reading.
     pub fn at(&self, snapshot: &Snapshot) -> Self {
         Self::of_snapshot(self.disk().clone(), self.layout().clone(), snapshot.clone())
     }
 
-    /// The snapshot that this store was opened as.
+    /// Opened snapshot; `None` for the current map.
     pub fn opened_snapshot(&self) -> Option<&SnapshotName> {
         self.opened_snapshot.as_ref()
     }
 
-    /// Whether the last commit left the map as `past`, a snapshot of it, says: the same tiles, scans, parameters and
-    /// inputs. Flush numbers may differ: creating and deleting snapshots are flushes, too.
+    /// Returns whether the last commit equals `past`, a snapshot of this map: the same tiles, scans, parameters and
+    /// inputs. Flush numbers may differ, because creating and deleting snapshots are flushes.
     ///
     /// # Errors
     ///
-    /// A list of scans that is damaged; a disk that refuses.
+    /// A damaged list of scans or an I/O error.
     pub fn is_as(&self, past: &Self) -> Result<bool> {
         let without_snapshots = |store: &Self| {
             let mut metadata = store.metadata().clone();
@@ -90,8 +90,8 @@ impl TileStore {
         Ok(is_same && self.has_scans_of(past)?)
     }
 
-    /// Commits which snapshots the map has, and nothing else: what is written of tiles stays uncommitted. It is a flush
-    /// of its own in the log, so that whatever ends the process is found like any other.
+    /// Commits a new list of snapshots and nothing else. Written tiles remain uncommitted. This is a flush of its own
+    /// in the log, so that recovery handles a crash like at any other flush.
     pub(in crate::store) fn commit_snapshots(&mut self, listed: SnapshotList) -> Result<()> {
         self.committer.check_lock()?;
         self.name_own_catalog();
@@ -108,11 +108,11 @@ impl TileStore {
 }
 
 impl<'a> Snapshots<'a> {
-    /// The names of the map's snapshots, in order, also of those whose file is missing.
+    /// Returns the names of the map's snapshots, in order, including those without a file.
     ///
     /// # Errors
     ///
-    /// A disk that refuses.
+    /// An I/O error.
     pub fn names(self) -> Result<Vec<SnapshotName>> {
         match self.store.committer.snapshots() {
             Some(listed) => Ok(listed.names().cloned().collect()),
@@ -120,12 +120,12 @@ impl<'a> Snapshots<'a> {
         }
     }
 
-    /// Which snapshots the map has, as its log says; `None` if it does not.
+    /// List of snapshots in the log; `None` if the log has none.
     pub fn list(self) -> Option<&'a SnapshotList> {
         self.store.committer.snapshots()
     }
 
-    /// Reads what a snapshot of this map says.
+    /// Reads a snapshot of this map.
     ///
     /// # Errors
     ///
@@ -141,7 +141,7 @@ impl<'a> Snapshots<'a> {
         )
     }
 
-    /// All snapshots of the map.
+    /// Reads all snapshots of the map.
     ///
     /// # Errors
     ///
@@ -153,19 +153,19 @@ impl<'a> Snapshots<'a> {
         self.names()?.iter().map(|name| self.read(name)).collect()
     }
 
-    /// Every kept table that a snapshot sees; where one cannot be read, every kept table.
+    /// Returns the kept tables that snapshots use. An unreadable snapshot uses all.
     pub fn kept_tables(self) -> impl Iterator<Item = (TileIndex, u64)> + use<'a> {
         let pinned = self.store.kept.snapshots().pinned().iter();
         pinned.flat_map(|(&tile, flushes)| flushes.iter().map(move |&flush_number| (tile, flush_number)))
     }
 
-    /// The catalogs and segments that neither the last commit nor a snapshot needs, in order: a writer that ended early
-    /// did not remove them, or one at work has not committed them yet. `None` where a snapshot cannot be read, which
-    /// may need any of them.
+    /// Returns the catalogs and segments that neither the last commit nor a snapshot needs, in order. A killed writer
+    /// did not remove them, or an active one has not committed them yet. Returns `None` if a snapshot is unreadable,
+    /// because it may need any of them.
     ///
     /// # Errors
     ///
-    /// A disk that refuses; a catalog that cannot be read, which may need any.
+    /// An I/O error, or an unreadable catalog, which may need any of them.
     pub(crate) fn idle_scan_files(self) -> Result<Option<Vec<PathBuf>>> {
         match self.read_all() {
             Ok(snapshots) => {
@@ -178,12 +178,12 @@ impl<'a> Snapshots<'a> {
         }
     }
 
-    /// Checks that the catalogs of the snapshots are whole, before points are taken out of the map: if one is not,
-    /// nothing tells which files may go. A snapshot whose own file is damaged is passed over, and keeps all.
+    /// Checks the catalogs of the snapshots before points are removed from the map: a damaged catalog would hide which
+    /// files are needed. A snapshot whose own file is damaged is skipped, and keeps all files.
     ///
     /// # Errors
     ///
-    /// A catalog that is damaged or missing, and what to do about it; a disk that refuses.
+    /// A damaged or missing catalog, with the remedy, or an I/O error.
     pub(crate) fn check_catalogs(self) -> Result<()> {
         let (disk, layout) = (&**self.store.disk(), self.store.layout());
         let mut needed = Vec::new();
@@ -195,7 +195,7 @@ impl<'a> Snapshots<'a> {
                 Err(error) => return Err(error),
             }
         }
-        // Of those that are the beginning of one catalog, the longest first: of the others the checksum says enough.
+        // Longest first among versions of one catalog: for the shorter ones the checksum suffices.
         needed.sort_by_key(|(_, as_of)| std::cmp::Reverse(as_of.catalog));
         for of_one in needed.chunk_by(|(_, a), (_, b)| {
             a.catalog.map(|catalog| catalog.generation) == b.catalog.map(|catalog| catalog.generation)
@@ -219,7 +219,7 @@ impl<'a> Snapshots<'a> {
     }
 }
 
-/// The error of a catalog that a snapshot needs, with what to do.
+/// Returns the error of a catalog that a snapshot needs, with the remedy.
 fn needed_by(error: Error, name: &SnapshotName) -> Error {
     let Error::Damaged { path, tile, mut cause } = error else { return error };
     cause.reason.push_str(&format!(

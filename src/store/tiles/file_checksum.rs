@@ -9,7 +9,7 @@ pub struct FileChecksum {
     pub crc: u32,
 }
 
-/// A stream that computes the checksum of the bytes that pass through it.
+/// Stream that computes the checksum of the bytes read or written through it.
 pub struct Checksumming<S> {
     stream: S,
     bytes: u64,
@@ -18,17 +18,17 @@ pub struct Checksumming<S> {
 }
 
 impl<S> Checksumming<S> {
-    /// Starts at the current position of the stream.
+    /// Wraps a stream at its current position.
     pub fn new(stream: S) -> Self {
         Self { stream, bytes: 0, crc: crc32fast::Hasher::new(), has_failed: false }
     }
 
-    /// The checksum of all that passed, and the stream.
+    /// Returns the checksum of all bytes so far, and the stream.
     pub fn finish(self) -> (FileChecksum, S) {
         (FileChecksum { bytes: self.bytes, crc: self.crc.finalize() }, self.stream)
     }
 
-    /// Whether a read has failed: who copies from one stream to another cannot tell otherwise whose error it got.
+    /// Returns whether a read has failed. After a failed copy this distinguishes a read error from a write error.
     pub fn has_failed(&self) -> bool {
         self.has_failed
     }

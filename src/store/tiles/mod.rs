@@ -1,4 +1,4 @@
-//! Tiles as the store sees them: which there are, where their files lie, and what the log records of them.
+//! Tiles in the store: their list, their files, and their versions in the log.
 
 pub(super) mod file_checksum;
 pub(super) mod spill_file;

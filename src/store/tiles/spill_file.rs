@@ -7,8 +7,7 @@ use std::io::{BufRead, BufReader, Read, Write};
 
 const BUFFER_BYTES: usize = 1 << 16;
 
-/// How much of a tile's spill file counts: so many bytes with this checksum. What stands behind them is left by an
-/// attempt that was given up.
+/// Length and checksum of the valid part of a tile's spill file. Later bytes were left by a failed append.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SpillFile {
     /// Length in bytes.
@@ -28,26 +27,26 @@ impl TileValue for SpillFile {
     }
 }
 
-/// Updates of tiles in files of their folders, because memory is short. They are no part of the map on disk: a commit
-/// does not know these files, and opening the map removes them.
+/// Updates of tiles that exceed memory, in files in the tile folders. These files are not part of the map: no commit
+/// names them, and opening the map removes them.
 #[derive(Clone, Debug)]
 pub struct SpillFiles {
     files: MapFiles,
 }
 
 impl TileStore {
-    /// Where updates of tiles go that memory has no room for.
+    /// Returns the spill files of the map.
     pub fn spill_files(&self) -> SpillFiles {
         SpillFiles { files: self.files.clone() }
     }
 }
 
 impl SpillFiles {
-    /// Appends updates to those of `file`, and returns what is there then. After an error `file` still counts.
+    /// Appends updates to `file`. Returns the new valid part. After an error `file` is still valid.
     ///
     /// # Errors
     ///
-    /// A disk that refuses.
+    /// An I/O error.
     pub fn append(&self, tile: TileIndex, file: SpillFile, updates: &[u8]) -> Result<SpillFile> {
         let path = self.files.layout().spill(tile);
         make_folder(&**self.files.disk(), &self.files.layout().tile_folder(tile))?;
@@ -69,12 +68,12 @@ impl SpillFiles {
     ///
     /// # Errors
     ///
-    /// A disk that refuses, and a file that is not what was written.
+    /// An I/O error, or a file that does not match its checksum.
     pub fn open(&self, tile: TileIndex, file: SpillFile) -> Result<impl BufRead + use<>> {
         self.files.open_spill(tile, file)
     }
 
-    /// Cuts off what stands behind the updates that count. A failure costs disk space and does no other harm.
+    /// Truncates the file to its valid part. A failure only wastes disk space.
     pub fn cut(&self, tile: TileIndex, file: SpillFile) {
         if file.bytes == 0 {
             return self.remove(tile);
@@ -85,8 +84,7 @@ impl SpillFiles {
         }
     }
 
-    /// Removes a tile's spill file: its updates were applied, or nobody wants them any more. A file that stays does no
-    /// harm.
+    /// Removes a tile's spill file after its updates were applied or discarded. A failure only wastes disk space.
     pub fn remove(&self, tile: TileIndex) {
         let path = self.files.layout().spill(tile);
         if let Err(error) = self.files.disk().remove_file(&path) {
@@ -96,12 +94,11 @@ impl SpillFiles {
 }
 
 impl MapFiles {
-    /// Opens the updates in a tile's spill file, whose checksum was compared: there may be more than memory has room
-    /// for.
+    /// Checks the updates in a tile's spill file, and opens them as a stream: they may exceed memory.
     ///
     /// # Errors
     ///
-    /// A disk that refuses, and a file that is not what was written.
+    /// An I/O error, or a file that does not match its checksum.
     pub(super) fn open_spill(&self, tile: TileIndex, file: SpillFile) -> Result<impl BufRead + use<>> {
         let path = self.layout().spill(tile);
         let open = || {

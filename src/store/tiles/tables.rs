@@ -10,7 +10,7 @@ use std::collections::BTreeSet;
 use std::io;
 use std::path::PathBuf;
 
-/// The tables of a map's tiles, to be read: as of the snapshot that the store was opened as, or else the latest.
+/// Reader of tables: of the opened snapshot, otherwise of the latest versions.
 #[derive(Clone, Copy, Debug)]
 pub struct Tables<'a> {
     store: &'a TileStore,
@@ -25,12 +25,12 @@ impl<'a> Tables<'a> {
     ///
     /// # Errors
     ///
-    /// A file that the log names and that is missing, and a tile folder that the log does not name.
+    /// A file that the log names and that is missing, or a tile folder that the log does not name.
     pub fn open(self, tile: TileIndex) -> Result<Option<StoredTile>> {
         self.open_at(tile, self.path(tile)?)
     }
 
-    /// Where a reader finds the table of a tile, to read a part of it; `None` if no log names it.
+    /// Returns the location of the table of a tile for partial reads; `None` if no log names it.
     ///
     /// # Errors
     ///
@@ -47,7 +47,7 @@ impl<'a> Tables<'a> {
         }
     }
 
-    /// Where a snapshot's version of a table is while no writer is at work.
+    /// Returns the path of a snapshot's version of a table, unless a writer moves it.
     fn path_in_snapshot(self, tile: TileIndex) -> Result<PathBuf> {
         let kept = self.kept(tile)?;
         Ok(match seen_by(Some(&kept), self.store.commits().flush_number) {
@@ -56,7 +56,7 @@ impl<'a> Tables<'a> {
         })
     }
 
-    /// The flushes as of which tables of a tile are kept beside the one in place.
+    /// Returns the flushes as of which replaced tables of a tile are kept.
     ///
     /// # Errors
     ///
@@ -64,7 +64,7 @@ impl<'a> Tables<'a> {
     pub fn kept(self, tile: TileIndex) -> Result<BTreeSet<u64>> {
         let folder = self.store.layout().tile_folder(tile);
         match self.store.disk().list(&folder) {
-            // It tells when the table is opened.
+            // Opening the table reports this error.
             Err(error) if matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => {
                 Ok(BTreeSet::new())
             }
@@ -75,8 +75,8 @@ impl<'a> Tables<'a> {
         }
     }
 
-    /// Other places where a reader beside a writer may find the version of a tile's table that it sees: committed and
-    /// waiting for its name, or already replaced and kept for readers. Empty for a writer.
+    /// Returns alternative paths of the version that a reader uses while a writer is active: the committed `*.next`
+    /// file, or the replaced table that was kept. Empty for a writer.
     ///
     /// # Errors
     ///
@@ -111,14 +111,14 @@ impl<'a> Tables<'a> {
         self.location_at(tile, path, version).open().map(Some)
     }
 
-    /// Where the latest version of a tile's table is that is known to be there, for another thread to open it before
-    /// the next commit.
+    /// Returns the location of the latest version of a tile's table, so that another thread can open it before the next
+    /// commit.
     pub fn location(self, tile: TileIndex) -> Option<TileLocation> {
         let version = self.store.versions.version(tile)?;
         Some(self.location_at(tile, self.latest_path(tile), Some(version)))
     }
 
-    /// What finds tables beside this store; for a map with an id.
+    /// Returns a reader of tables for other threads.
     ///
     /// # Errors
     ///

@@ -8,7 +8,7 @@ use std::io;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// Where a tile's table is, and what is known of it.
+/// Location and identity of a tile's table.
 #[derive(Clone, Debug)]
 pub struct TileLocation {
     pub(in crate::store) disk: Arc<dyn Disk>,
@@ -20,57 +20,57 @@ pub struct TileLocation {
     pub(in crate::store) storage: Storage,
 }
 
-/// A tile's table as it is stored, ready to be read.
+/// Opened table of a tile.
 pub struct StoredTile {
-    /// Where it is.
+    /// Path of the file.
     pub path: PathBuf,
-    /// The bytes; their checksum is computed as they pass.
+    /// Content. Reading it computes the checksum.
     pub input: Checksumming<Box<dyn DiskRead>>,
     /// Length of the file in bytes.
     pub bytes: u64,
-    /// Id of the map that the file must name; `None` if it is of the original format.
+    /// Map id that the file must contain; `None` for the original format.
     pub map_id: Option<[u8; 16]>,
-    /// What the log says of the tile, if it does.
+    /// Version in the log, if any.
     pub version: Option<TileVersion>,
-    /// Its storage form.
+    /// Storage of the tile.
     pub storage: Storage,
 }
 
 impl TileLocation {
-    /// Which tile.
+    /// Index of the tile.
     pub fn tile(&self) -> TileIndex {
         self.tile
     }
 
-    /// What the log says of the tile, if it does.
+    /// Version in the log, if any.
     pub fn version(&self) -> Option<TileVersion> {
         self.version
     }
 
-    /// Id of the map that the file must name; `None` if it is of the original format.
+    /// Map id that the file must contain; `None` for the original format.
     pub fn map_id(&self) -> Option<[u8; 16]> {
         self.map_id
     }
 
-    /// Its storage form.
+    /// Storage of the tile.
     pub fn storage(&self) -> Storage {
         self.storage
     }
 
-    /// Whether the tile's folder is one, and no link.
+    /// Returns whether the tile's folder is a folder, not a symbolic link.
     ///
     /// # Errors
     ///
-    /// A disk that refuses.
+    /// An I/O error.
     pub fn is_in_folder(&self) -> Result<bool> {
         Ok(self.disk.kind_at(&self.folder)? == Some(EntryKind::Folder))
     }
 
-    /// Reads some bytes of the table's file, fewer if it ends before.
+    /// Reads up to `bytes` bytes of the file at `offset`.
     ///
     /// # Errors
     ///
-    /// A file that is missing or none, and a disk that refuses.
+    /// A missing file, anything but a regular file, or an I/O error.
     pub fn read_at(&self, offset: u64, bytes: usize) -> io::Result<Vec<u8>> {
         self.disk.read_at(&self.path, offset, bytes)
     }
@@ -79,7 +79,7 @@ impl TileLocation {
     ///
     /// # Errors
     ///
-    /// A file or folder that is missing or none, and a disk that refuses.
+    /// A missing file or folder, anything but a regular file, or an I/O error.
     pub fn open(self) -> Result<StoredTile> {
         let Self { disk, tile, folder, path, map_id, version, storage } = self;
         let damaged = |reason| Err(FormatError::at_offset(0, reason).in_map(&path, Some(tile)));

@@ -8,9 +8,9 @@ use crate::store::map_files::MapFiles;
 use std::io::BufRead;
 use std::path::Path;
 
-/// Finds versions of tables beside the map's writer, from another thread of its process.
+/// Reader of tables that runs concurrently with the map's writer, on another thread of its process.
 ///
-/// It is told which version: what it reads is that version or an error.
+/// The caller gives the version, so a read returns that version or an error.
 #[derive(Clone, Debug)]
 pub struct TileReader {
     files: MapFiles,
@@ -22,8 +22,8 @@ impl TileReader {
         Self { files, map_id }
     }
 
-    /// Where the latest version of a table may be: under the name of a next version until it is committed, and then
-    /// under its own, which a commit gives it at any moment.
+    /// Returns the possible locations of the latest version of a table: its `*.next` name, and its final name after a
+    /// commit, which can rename it at any time.
     pub fn places(&self, tile: TileIndex, version: TileVersion) -> [TileLocation; 2] {
         let layout = self.files.layout();
         let at = |path| TileLocation {
@@ -38,11 +38,11 @@ impl TileReader {
         [at(layout.next(tile, TileFile::Table)), at(layout.current(tile, TileFile::Table))]
     }
 
-    /// Opens the updates in a tile's spill file, whose checksum was compared.
+    /// Checks the updates in a tile's spill file, and opens them as a stream.
     ///
     /// # Errors
     ///
-    /// A disk that refuses, and a file that is not what was written.
+    /// An I/O error, or a file that does not match its checksum.
     pub fn open_spill(&self, tile: TileIndex, file: SpillFile) -> Result<impl BufRead + use<>> {
         self.files.open_spill(tile, file)
     }

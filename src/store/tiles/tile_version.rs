@@ -2,28 +2,28 @@ use super::file_checksum::FileChecksum;
 use crate::space::{TileValue, put_number, take_number, take_u32};
 use crate::store::layout::TileFile;
 
-/// What the log knows of one version of a tile: enough to recognise its files and to count without reading them.
+/// Version of a tile in the log: identifies its files, and has its voxel counts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TileVersion {
-    /// Number of the last scan that the map had taken when the version was written.
+    /// Number of the last scan in the map when the version was written.
     pub scan_number: u64,
-    /// The table's file: `iwlo_meta.bin`, or `tile.vxt` with compact storage.
+    /// File of the table: `iwlo_meta.bin`, or `tile.vxt` with compact storage.
     pub table: FileChecksum,
-    /// `octree.bt`; zero with compact storage, which has none.
+    /// `octree.bt`; zero with compact storage, which has no octree file.
     pub octree: FileChecksum,
-    /// Observed voxels.
+    /// Number of observed voxels.
     pub voxels: u64,
-    /// Occupied voxels.
+    /// Number of occupied voxels.
     pub occupied: u64,
 }
 
-/// The highest number of a scan or flush that is read: nobody counts that far, and one more always fits.
+/// Highest valid number of a scan or flush. Numbers below it can be incremented without overflow.
 pub(crate) const MAX_NUMBER: u64 = 1 << 62;
 
 impl TileVersion {
     pub(in crate::store) const BYTES: usize = 48;
 
-    /// The checksum of one of the tile's files.
+    /// Returns the checksum of one of the tile's files.
     pub const fn of(&self, file: TileFile) -> FileChecksum {
         match file {
             TileFile::Table => self.table,
@@ -43,7 +43,7 @@ impl TileVersion {
         bytes
     }
 
-    /// `None` for numbers that no tile has; sums over all tiles of a map fit those that a tile can have.
+    /// Returns `None` for impossible numbers. The limits also keep sums over all tiles of a map in range.
     pub(in crate::store) fn from_bytes(bytes: &[u8; Self::BYTES]) -> Option<Self> {
         const MAX_FILE_BYTES: u64 = 1 << 36;
         const MAX_VOXELS: u64 = 1 << 30;

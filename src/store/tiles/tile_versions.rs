@@ -4,25 +4,24 @@ use crate::store::commit::commits::Commits;
 use crate::store::scans::CatalogVersion;
 use rustc_hash::FxHashSet;
 
-/// Which tiles a map has on disk and which version of each is the latest: the last commit, and what was written or
-/// removed since.
+/// List of a map's tiles on disk with their latest versions: the last commit, and the changes since.
 #[derive(Debug, Default)]
 pub struct TileVersions {
     commits: Commits,
     /// Versions written since the last commit.
     next: TileTable<TileVersion>,
-    /// Versions of which a sync failed: the medium may hold anything, whatever later syncs say.
+    /// Tiles whose sync failed. Their files may have any content, even if a later sync succeeds.
     suspect: FxHashSet<TileIndex>,
-    /// Tiles that the next commit takes out of the map.
+    /// Tiles that the next commit removes.
     removed: FxHashSet<TileIndex>,
-    /// Tile folders that the log does not know: never read, never overwritten.
+    /// Tile folders that the log does not name. They are neither read nor overwritten.
     orphans: FxHashSet<TileIndex>,
     /// Tiles of a map of the original format, which has no log.
     foreign: FxHashSet<TileIndex>,
 }
 
-/// Bytes that a commit takes for each tile that it changes, beside the index: its place among those that the last
-/// record names, among those that are synced and among those that wait for their names.
+/// Memory of a commit in bytes per changed tile, in addition to the index: entries in the last record, the tiles to
+/// sync and the tiles to rename.
 const COMMIT_BYTES_OF_TILE: usize = 42;
 
 impl TileVersions {
@@ -30,7 +29,6 @@ impl TileVersions {
         Self { commits, ..Self::default() }
     }
 
-    /// The tiles of a map of the original format.
     pub(in crate::store) fn of_foreign(foreign: FxHashSet<TileIndex>) -> Self {
         Self { foreign, ..Self::default() }
     }
@@ -39,30 +37,29 @@ impl TileVersions {
         self.orphans = orphans;
     }
 
-    /// The last commit.
     pub(in crate::store) fn commits(&self) -> &Commits {
         &self.commits
     }
 
-    /// What is known of the latest version of a tile.
+    /// Latest version of a tile.
     pub fn version(&self, tile: TileIndex) -> Option<TileVersion> {
         let committed = || self.commits.tiles.get(tile).filter(|_| !self.removed.contains(&tile));
         self.next.get(tile).or_else(committed)
     }
 
-    /// What is known of the latest version of each tile, in no particular order.
+    /// Latest versions of all tiles, in no particular order.
     pub fn versions(&self) -> impl Iterator<Item = TileVersion> {
         let is_latest = |tile: TileIndex| !self.removed.contains(&tile) && !self.next.contains(tile);
         let committed = self.commits.tiles.iter().filter(move |(tile, _)| is_latest(*tile));
         self.next.values().chain(committed.map(|(_, version)| version))
     }
 
-    /// Whether the tile has a version on disk, committed or not.
+    /// Returns whether the tile has a version on disk, committed or not.
     pub fn contains(&self, tile: TileIndex) -> bool {
         self.version(tile).is_some() || self.foreign.contains(&tile) || self.orphans.contains(&tile)
     }
 
-    /// The tiles that have a version on disk, in no particular order.
+    /// Tiles that have a version on disk, in no particular order.
     pub fn iter(&self) -> impl Iterator<Item = TileIndex> {
         let uncommitted = self.next.tiles().filter(|tile| !self.commits.tiles.contains(*tile));
         let committed = self.commits.tiles.tiles().filter(|tile| !self.removed.contains(tile));
@@ -75,7 +72,6 @@ impl TileVersions {
         self.commits.tiles.len() - self.removed.len() + self.foreign.len() + uncommitted
     }
 
-    /// Whether the latest version of a tile is not committed.
     pub(in crate::store) fn is_uncommitted(&self, tile: TileIndex) -> bool {
         self.next.contains(tile)
     }
@@ -92,12 +88,11 @@ impl TileVersions {
         self.orphans.contains(&tile)
     }
 
-    /// The tile folders that the log does not name, in order.
+    /// Tile folders that the log does not name, in order.
     pub fn orphans(&self) -> Vec<TileIndex> {
         sorted(&self.orphans)
     }
 
-    /// Bytes of memory.
     pub(in crate::store) fn bytes(&self) -> usize {
         self.commits.tiles.bytes()
             + self.commits.last_changed.bytes()
@@ -105,27 +100,27 @@ impl TileVersions {
             + hash_table_bytes::<TileIndex>(self.foreign.capacity() + self.orphans.capacity())
     }
 
-    /// Bytes of memory that the next commit takes on top.
+    /// Additional memory of the next commit in bytes.
     pub(in crate::store) fn commit_bytes(&self) -> usize {
         self.next.len() * COMMIT_BYTES_OF_TILE
     }
 
-    // What was written since the last commit.
+    // Changes since the last commit.
 
-    /// Notes that the next version of a tile is written.
+    /// Records that the next version of a tile is written.
     pub fn note_next(&mut self, tile: TileIndex, version: TileVersion) {
         self.suspect.remove(&tile);
         self.removed.remove(&tile);
         self.next.insert(tile, version);
     }
 
-    /// Forgets the next version of a tile, as if it had not been written.
+    /// Discards the next version of a tile.
     pub fn drop_next(&mut self, tile: TileIndex) {
         self.suspect.remove(&tile);
         self.next.remove(tile);
     }
 
-    /// Notes that the next commit takes a tile out of the map.
+    /// Records that the next commit removes a tile.
     pub(in crate::store) fn remove(&mut self, tile: TileIndex) {
         self.drop_next(tile);
         if self.commits.tiles.contains(tile) {
@@ -133,30 +128,30 @@ impl TileVersions {
         }
     }
 
-    /// The versions written since the last commit.
+    /// Versions written since the last commit.
     pub(in crate::store) fn next(&self) -> &TileTable<TileVersion> {
         &self.next
     }
 
-    /// The tiles that the next commit takes out of the map, in order.
+    /// Tiles that the next commit removes, in order.
     pub(in crate::store) fn removed(&self) -> Vec<TileIndex> {
         sorted(&self.removed)
     }
 
-    /// Notes that the next version of a tile could not be synced.
+    /// Records that the sync of a tile's next version failed.
     pub(in crate::store) fn suspect(&mut self, tile: TileIndex) {
         self.suspect.insert(tile);
     }
 
-    /// The tiles whose next version must be written again before the next commit, in order: the disk failed to sync it,
-    /// and what it says of these files from then on proves nothing.
+    /// Tiles whose next version must be written again before the next commit, in order. Their sync failed, so a later
+    /// successful sync proves nothing.
     pub fn suspects(&self) -> Vec<TileIndex> {
         sorted(&self.suspect)
     }
 
-    // What is committed.
+    // Commits.
 
-    /// Notes that all that was written and removed is committed. Returns what was written.
+    /// Records that all changes are committed. Returns the written versions.
     pub(in crate::store) fn committed(
         &mut self,
         number: u64,
@@ -178,22 +173,22 @@ impl TileVersions {
         changed
     }
 
-    /// Notes a tile that the next commit names and whose files have their names already.
+    /// Records a tile of the next commit whose files have their final names already.
     pub(in crate::store) fn note_committed(&mut self, tile: TileIndex, version: TileVersion) {
         self.commits.tiles.insert(tile, version);
     }
 
-    /// Notes a commit that changes no tile.
+    /// Records a commit that changes no tile.
     pub(in crate::store) fn committed_nothing(&mut self, number: u64) {
         self.commits.flush_number = number;
     }
 
-    /// Names the catalog of the last commit, where the log does not.
+    /// Sets the catalog of the last commit if the log does not name it.
     pub(in crate::store) fn set_catalog(&mut self, catalog: CatalogVersion) {
         self.commits.catalog = Some(catalog);
     }
 
-    /// Takes tiles out of the map, whatever the log says of them.
+    /// Removes tiles from the list, even if the log names them.
     pub(in crate::store) fn forget(&mut self, tiles: &[TileIndex]) {
         for &tile in tiles {
             self.commits.tiles.remove(tile);
@@ -201,7 +196,7 @@ impl TileVersions {
         }
     }
 
-    /// Notes that nothing is left of the tiles that the last commit removed.
+    /// Records that the files of tiles removed by the last commit are deleted durably.
     pub(in crate::store) fn removals_are_durable(&mut self) {
         self.commits.last_removed.clear();
     }

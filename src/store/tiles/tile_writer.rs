@@ -8,10 +8,10 @@ use crate::store::map_files::MapFiles;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
-/// Writes next versions of tiles, beside the committed ones. Another thread may do so while the map goes on.
+/// Writer of next versions of tiles, which can run on another thread while the map is used.
 ///
-/// It is got from [`TileStore::writer`](crate::store::TileStore::writer), which makes sure that no committed version
-/// still has the name that is written to. Not to be used any more once the map has committed.
+/// [`TileStore::writer`](crate::store::TileStore::writer) returns it, after all committed versions are renamed. It must
+/// not be used after the next commit.
 #[derive(Clone, Debug)]
 pub struct TileWriter {
     files: MapFiles,
@@ -24,28 +24,27 @@ impl TileWriter {
         Self { files, map_id, keeps_earlier: false }
     }
 
-    /// Leaves an earlier next version as it is until the new one is whole: it can be read meanwhile, and an error loses
-    /// nothing.
+    /// Keeps an earlier next version until the new one is complete: it can be read meanwhile, and an error does not
+    /// lose it.
     pub fn keeping_earlier(self) -> Self {
         Self { keeps_earlier: true, ..self }
     }
 
-    /// The map's id.
+    /// Id of the map.
     pub fn map_id(&self) -> [u8; 16] {
         self.map_id
     }
 
-    /// How the map's tiles are stored.
+    /// Storage of the map's tiles.
     pub fn storage(&self) -> Storage {
         self.files.layout().storage()
     }
 
-    /// Writes the next version of one of a tile's files; the committed version stays as it is.
+    /// Writes the next version of a tile's file. The committed version is unchanged.
     ///
     /// # Errors
     ///
-    /// A disk that refuses; what there was of an earlier next version is lost then, unless it is kept
-    /// ([`TileWriter::keeping_earlier`]).
+    /// An I/O error. An earlier next version is lost then, except with [`TileWriter::keeping_earlier`].
     pub fn write_next(
         &self,
         tile: TileIndex,
@@ -71,7 +70,7 @@ impl TileWriter {
     }
 }
 
-/// Makes the folder of a tile if it is not there.
+/// Creates the folder of a tile if it is missing.
 pub(in crate::store) fn make_folder(disk: &dyn Disk, folder: &Path) -> Result<()> {
     match disk.kind_at(folder)? {
         Some(EntryKind::Folder) => Ok(()),
