@@ -8,14 +8,14 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 pub use storage::Storage;
 
-/// Texts of coordinate reference systems are far shorter.
+/// Valid texts are far shorter.
 const MAX_CRS_BYTES: usize = 1 << 16;
 
-/// How a map is made and how much memory it may use.
+/// Parameters of a map, and limits of its use of memory.
 ///
-/// Resolution, tile size, sensor model and occupancy threshold belong to the map: they are stored with it, and opening
-/// it with others is an error. So does its storage, which an opened map keeps, whatever is asked for. The rest may
-/// change from run to run.
+/// Resolution, tile size, sensor model and occupancy threshold are stored with the map. Opening it with other values is
+/// an error. The storage is stored too, but an opened map ignores the value given here. All other settings can change
+/// from run to run.
 ///
 /// ```
 /// use voxtile::{InsertMode, MapConfig};
@@ -34,79 +34,80 @@ const MAX_CRS_BYTES: usize = 1 << 16;
 pub struct MapConfig {
     /// Voxels and tiles. Default: 0.1 m and 10 m.
     pub grid: Grid,
-    /// How observations become evidence. Default: OctoMap's log-odds.
+    /// Sensor model. Default: OctoMap's log-odds.
     pub sensor_model: SensorModel,
     /// Probability in (0, 1) from which a voxel counts as occupied. Default: 0.5.
     pub occupancy_threshold: f64,
-    /// Which part of a ray counts, and how often.
+    /// Ray settings.
     pub rays: RayConfig,
-    /// What each tile keeps for coarse queries. Default: a view of the table's bricks.
+    /// Octree of each tile, for coarse queries. Default: a view of the table's bricks.
     pub octree: OctreeConfig,
-    /// How much an out-of-core mapper keeps in memory. Default: 512 MiB, or what tiles of this size need at least.
+    /// Memory limit of an out-of-core mapper. Default: 512 MiB, or the minimum for tiles of this size if that is more.
     pub memory: MemoryLimit,
-    /// How the tiles of a new map are stored. Default: the original files.
+    /// Storage of the tiles of a new map. Default: the original files.
     pub storage: Storage,
-    /// The coordinate reference system of the map's frame: well-known text, or `EPSG:25832`. It changes no voxel;
-    /// exports that can say it do. Default: none.
+    /// Coordinate reference system of the map's frame: well-known text, or for example `EPSG:25832`. It does not affect
+    /// voxels, but is written to exports whose format supports it. Default: none.
     pub crs: Option<String>,
-    /// Whether the map keeps the scans that it takes, so that it can be mapped again when poses change. A map that
-    /// does goes on doing so, whatever is asked for. Default: no.
+    /// Whether the map keeps its scans, so that it can be remapped when poses change. A map that keeps scans continues
+    /// to, regardless of this setting. Default: no.
     pub keeps_scans: bool,
 }
 
-/// How much an out-of-core mapper keeps in memory. The map does not depend on it, only the work to make it.
+/// Memory limit of an out-of-core mapper. It affects the duration of a build, but not the map.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum MemoryLimit {
     /// [`MemoryLimit::DEFAULT_BYTES`], or [`MemoryLimit::least_bytes`] if that is more.
     #[default]
     Default,
-    /// Tiles are counted, however large they are.
+    /// A number of tiles, regardless of their size.
     #[non_exhaustive]
     Tiles {
-        /// Most tiles, at least 1.
+        /// Maximum number of tiles, at least 1.
         tiles: usize,
-        /// Most bytes of updates that wait for tiles on disk before those are fetched; one scan may come on top.
-        /// Larger: fewer reads and writes.
+        /// Maximum bytes of pending updates for tiles on disk. Beyond it these tiles are loaded. One scan can exceed
+        /// it. A larger value reduces reads and writes.
         write_buffer_bytes: usize,
     },
-    /// Most bytes of all that grows: tiles in use, others in the compact form, updates that wait for tiles, what a scan
-    /// takes while it is inserted, tiles on their way to and from disk, what is known of the tiles there (some 250
-    /// bytes a tile). Tiles are written and fetched by threads of their own. At least [`MemoryLimit::least_bytes`].
+    /// Maximum bytes of all variable memory: active tiles, tiles in the compact form, pending updates, buffers of scan
+    /// insertion, tiles in transfer from and to disk, and the index of tiles on disk (about 250 bytes per tile).
+    /// Separate threads read and write tiles. At least [`MemoryLimit::least_bytes`].
     Bytes(usize),
     /// See [`MapConfig::with_tight_memory_bytes`].
     #[doc(hidden)]
     Tight(usize),
 }
 
-/// Which part of a ray counts, and how often.
+/// Ray settings: ranges, region, and number of updates per voxel.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct RayConfig {
-    /// Points nearer to the sensor than this many metres are skipped. Default: 0.
+    /// Minimum range in metres. Nearer points are skipped. Default: 0.
     pub min_range_m: f64,
-    /// Rays are cut at this many metres: what lies before is free, nothing is hit. Default: no limit.
+    /// Maximum range in metres. Longer rays are truncated: they mark free space only, without a hit. Default: no limit.
     pub max_range_m: Option<f64>,
-    /// Rays without a return are free up to so many metres, or up to the max range if that is less. Such a ray is a
-    /// point 1e9 m away or more: see [`no_return`](crate::scan::no_return). Default: they are treated as other points.
+    /// Rays without a return mark free space up to this range in metres, or up to the maximum range if that is less.
+    /// Such a ray is a point at a distance of 1e9 m or more, see [`no_return`](crate::scan::no_return). Default: they
+    /// are treated as other points.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub no_return_range_m: Option<f64>,
-    /// Only these tiles are mapped: what scans say about others is left out. Default: all of space.
+    /// Region of tiles to map. Updates outside are discarded. Default: all of space.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub region: Option<TileBox>,
-    /// How often a voxel is updated by one scan. Default: once.
+    /// Number of updates of a voxel per scan. Default: one.
     pub insert_mode: InsertMode,
 }
 
-/// How often a voxel is updated by one scan.
+/// Number of updates of a voxel per scan.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum InsertMode {
-    /// Once; a hit wins over any miss (OctoMap's `insertPointCloud`).
+    /// One update. A hit overrides any miss (OctoMap's `insertPointCloud`).
     #[default]
     PerScan,
-    /// Once a ray, in the order of the points (OctoMap's `insertPointCloudRays`).
+    /// One update per ray, in the order of the points (OctoMap's `insertPointCloudRays`).
     PerRay,
 }
 
@@ -119,36 +120,37 @@ impl fmt::Display for InsertMode {
     }
 }
 
-/// What each tile keeps for coarse queries. The answers and the files are the same.
+/// Octree of each tile, for coarse queries. It does not affect results or files.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum OctreeConfig {
-    /// A view of the table's bricks: a few bytes a brick, and an update costs it nothing.
+    /// A view of the table's bricks: a few bytes per brick, without cost for updates.
     #[default]
     Bricks,
-    /// OctoMap's pointer tree, which must be told of updates: the form of the literature, for study and comparison.
+    /// OctoMap's pointer tree, which every update must modify. For research and comparison.
     Pointers(VoxelCacheMode),
 }
 
-/// What stands between the updates of a tile and its pointer tree.
+/// Path of a tile's updates to its pointer tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum VoxelCacheMode {
-    /// Nothing: every update goes straight into the tree, one by one (OctoMap).
+    /// Direct: every update modifies the tree individually (OctoMap).
     Off,
-    /// A voxel cache; after each scan, what leaves it goes into the tree (OctoCache, serial).
+    /// A voxel cache. After each scan, evicted voxels are written to the tree (OctoCache, serial).
     Serial(VoxelCacheConfig),
-    /// The same, and the trees are written by a thread of their own, one a mapper (OctoCache, parallel).
+    /// Like `Serial`, with one thread per mapper that writes the trees (OctoCache, parallel).
     Parallel(VoxelCacheConfig),
 }
 
-/// Shape of the voxel cache in front of each tile's pointer tree.
+/// Shape of the voxel cache of each tile's pointer tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct VoxelCacheConfig {
-    /// Most voxels that a bucket keeps after a scan, 1 to 65536. Default: 4.
+    /// Maximum number of voxels that a bucket keeps after a scan, 1 to 65536. Default: 4.
     pub tau: usize,
-    /// Number of buckets of each tile's cache, a power of two up to 2^24; `None` fits it to the scans that a tile
-    /// sees: the fewest with which `tau * buckets` is three times the distinct voxels of one. Default: `None`.
+    /// Number of buckets of each tile's cache, a power of two up to 2^24. `None` adapts it to the scans: the smallest
+    /// number for which `tau * buckets` is at least three times the distinct voxels of a scan in the tile. Default:
+    /// `None`.
     pub buckets: Option<usize>,
 }
 
@@ -187,7 +189,7 @@ impl Default for VoxelCacheConfig {
 }
 
 impl MapConfig {
-    /// The defaults with another resolution and tile size, both in metres.
+    /// Returns the default configuration with another resolution and tile size, both in metres.
     ///
     /// # Errors
     ///
@@ -196,47 +198,47 @@ impl MapConfig {
         Ok(Self { grid: Grid::new(resolution_m, tile_size_m)?, ..Self::default() })
     }
 
-    /// The same with another sensor model.
+    /// Sets the sensor model.
     pub fn with_sensor_model(self, sensor_model: SensorModel) -> Self {
         Self { sensor_model, ..self }
     }
 
-    /// The same with rays without a return, which are free up to so many metres.
+    /// Sets the range in metres up to which rays without a return mark free space.
     pub fn with_no_return_range(mut self, range_m: impl Into<Option<f64>>) -> Self {
         self.rays.no_return_range_m = range_m.into();
         self
     }
 
-    /// The same with rays from `min_range_m` to `max_range_m`, in metres.
+    /// Sets the minimum and maximum range of rays in metres.
     pub fn with_range(mut self, min_range_m: f64, max_range_m: impl Into<Option<f64>>) -> Self {
         (self.rays.min_range_m, self.rays.max_range_m) = (min_range_m, max_range_m.into());
         self
     }
 
-    /// The same with a region: only these tiles are mapped.
+    /// Sets the region: only these tiles are mapped.
     pub fn with_region(mut self, region: impl Into<Option<TileBox>>) -> Self {
         self.rays.region = region.into();
         self
     }
 
-    /// The same, keeping the scans that the map takes or not.
+    /// Sets whether the map keeps its scans.
     pub fn with_kept_scans(self, keeps_scans: bool) -> Self {
         Self { keeps_scans, ..self }
     }
 
-    /// The same with another insert mode.
+    /// Sets the insert mode.
     pub fn with_insert_mode(mut self, insert_mode: InsertMode) -> Self {
         self.rays.insert_mode = insert_mode;
         self
     }
 
-    /// The same with at most so many tiles in memory.
+    /// Limits the number of tiles in memory.
     pub fn with_cache_tiles(self, cache_tiles: usize) -> Self {
         let write_buffer_bytes = self.write_buffer_bytes();
         Self { memory: MemoryLimit::Tiles { tiles: cache_tiles, write_buffer_bytes }, ..self }
     }
 
-    /// The same with at most so many bytes of updates waiting for tiles on disk.
+    /// Limits the bytes of pending updates for tiles on disk.
     pub fn with_write_buffer_bytes(self, write_buffer_bytes: usize) -> Self {
         let tiles = match self.memory {
             MemoryLimit::Tiles { tiles, .. } => tiles,
@@ -245,24 +247,24 @@ impl MapConfig {
         Self { memory: MemoryLimit::Tiles { tiles, write_buffer_bytes }, ..self }
     }
 
-    /// Most bytes of all that grows; `None` where tiles are counted.
+    /// Maximum bytes of all variable memory; `None` if the limit is a number of tiles.
     pub fn memory_bytes(&self) -> Option<usize> {
         self.memory.bytes(&self.grid)
     }
 
-    /// The same with at most so many bytes for all that grows.
+    /// Limits all variable memory to this number of bytes.
     pub fn with_memory_bytes(self, bytes: usize) -> Self {
         Self { memory: MemoryLimit::Bytes(bytes), ..self }
     }
 
-    /// [`MapConfig::with_memory_bytes`] below what is the least, for tests of maps that are short of memory: the map is
-    /// the same, but the limit does not hold.
+    /// Like [`MapConfig::with_memory_bytes`], but accepts less than the minimum, for tests of low memory: the map is
+    /// the same, but the limit can be exceeded.
     #[doc(hidden)]
     pub fn with_tight_memory_bytes(self, bytes: usize) -> Self {
         Self { memory: MemoryLimit::Tight(bytes), ..self }
     }
 
-    /// The same with another storage for a new map.
+    /// Sets the storage of a new map.
     pub fn with_storage(self, storage: Storage) -> Self {
         Self { storage, ..self }
     }
@@ -274,17 +276,17 @@ impl MapConfig {
         }
     }
 
-    /// The same with another form of octree.
+    /// Sets the form of the octree.
     pub fn with_octree(self, octree: OctreeConfig) -> Self {
         Self { octree, ..self }
     }
 
-    /// The same with pointer trees, behind voxel caches or not.
+    /// Selects pointer trees with this voxel cache.
     pub fn with_voxel_cache(self, mode: VoxelCacheMode) -> Self {
         self.with_octree(OctreeConfig::Pointers(mode))
     }
 
-    /// The configuration, or the first argument that is wrong.
+    /// Returns the configuration, or the first invalid argument.
     ///
     /// # Errors
     ///
@@ -323,8 +325,8 @@ impl MapConfig {
         Ok(self)
     }
 
-    /// The same for a map that is to be made: there is no coordinate reference system with control characters, which a
-    /// file or a terminal would take for something else. A map that has one keeps it.
+    /// Like [`Self::validated`], for a new map: rejects a coordinate reference system with control characters, which
+    /// could corrupt files and terminals. An existing map with such a text can be opened.
     pub(crate) fn validated_as_new(self) -> Result<Self> {
         // Well-known text may have several lines.
         let is_wrong = |c: &char| c.is_control() && !matches!(c, '\t' | '\n' | '\r');
@@ -340,13 +342,13 @@ impl MapConfig {
     /// Log-odds from which a voxel counts as occupied.
     #[inline]
     pub fn occupied_log_odds(&self) -> f64 {
-        // Used by every query: the default needs no logarithm.
+        // Every query calls this. The default needs no logarithm.
         if self.occupancy_threshold == 0.5 { 0.0 } else { logit(self.occupancy_threshold) }
     }
 }
 
 impl VoxelCacheMode {
-    /// The shape of the caches, if there are any.
+    /// Shape of the caches, if there are any.
     pub fn cache(self) -> Option<VoxelCacheConfig> {
         match self {
             Self::Off => None,
@@ -356,7 +358,7 @@ impl VoxelCacheMode {
 }
 
 impl VoxelCacheConfig {
-    /// Caches with this `tau` and number of buckets; what they may be is checked with the [`MapConfig`].
+    /// Returns a shape with this `tau` and number of buckets. [`MapConfig::validated`] checks the values.
     pub fn new(tau: usize, buckets: impl Into<Option<usize>>) -> Self {
         Self { tau, buckets: buckets.into() }
     }
@@ -373,26 +375,26 @@ impl VoxelCacheConfig {
     }
 }
 
-/// Bytes of updates that wait, unless something else is asked for.
+/// Default limit of pending updates in bytes.
 const DEFAULT_WRITE_BUFFER_BYTES: usize = 32 << 20;
 
 impl MemoryLimit {
-    /// What library, command and Python use unless something else is asked for.
+    /// Default limit in bytes of library, command and Python package.
     pub const DEFAULT_BYTES: usize = 512 << 20;
 
-    /// So many tiles, however large they are.
+    /// Returns a limit of this number of tiles, regardless of their size.
     pub fn tiles(tiles: usize) -> Self {
         Self::Tiles { tiles, write_buffer_bytes: DEFAULT_WRITE_BUFFER_BYTES }
     }
 
-    /// The least number of bytes that will do, whatever is mapped: `16 MiB + 2 (12 n^3 + 256 b^3)` for tiles of `n`
-    /// voxels and `b = ceil(n / 8) + 1` bricks along their edge. That is two tiles of which every voxel is observed and
-    /// no two alike, one at work and one on its way in or out, and what a scan takes.
+    /// Minimum number of bytes for any map: `16 MiB + 2 (12 n^3 + 256 b^3)` for tiles with `n` voxels and `b = ceil(n /
+    /// 8) + 1` bricks along their edge. This is the memory of a scan and of two tiles in which every voxel is observed
+    /// and all differ: one active, and one in transfer.
     pub fn least_bytes(grid: &Grid) -> usize {
         least_bytes(grid.voxels_per_tile_edge() as usize)
     }
 
-    /// Most bytes of all that grows in a map with this grid; `None` where tiles are counted.
+    /// Maximum bytes of all variable memory of a map with this grid; `None` if the limit is a number of tiles.
     pub fn bytes(self, grid: &Grid) -> Option<usize> {
         match self {
             Self::Default => Some(Self::DEFAULT_BYTES.max(Self::least_bytes(grid))),
@@ -425,7 +427,7 @@ impl MemoryLimit {
 }
 
 fn least_bytes(voxels_per_edge: usize) -> usize {
-    // One more, for tiles that begin in the midst of a brick.
+    // One more brick, for tiles that do not begin at the edge of a brick.
     let bricks_per_edge = voxels_per_edge.div_ceil(8) + 1;
     (16 << 20) + 2 * (12 * voxels_per_edge.pow(3) + 256 * bricks_per_edge.pow(3))
 }

@@ -10,161 +10,161 @@ use std::{fmt, io};
 use thiserror::Error;
 pub use unanswered::Unanswered;
 
-/// A result whose error is voxtile's [`Error`](enum@Error).
+/// A result with voxtile's [`Error`](enum@Error).
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// What went wrong, one variant for each thing a caller can do about it.
+/// Error of a voxtile operation, with one variant for each way to handle it.
 ///
-/// Every message names the path, tile, offset or argument it is about and says what to do.
+/// Every message names the path, tile, offset or argument, and the remedy.
 ///
-/// Some have a cause, the operating system's or the place in a file:
-/// [`source`](std::error::Error::source) gives it, so that a program need not look for it in a text. `{error}` is the
-/// message without it and `{error:#}` the one with it, `message: cause`. So whoever prints a chain of errors, as `{:#}`
-/// of anyhow does, tells each cause once; whoever prints one of these by itself wants `{error:#}`.
+/// Some errors have a cause, from the operating system or at a position in a file, which
+/// [`source`](std::error::Error::source) returns. `{error}` is the message without the cause, and `{error:#}` includes
+/// it as `message: cause`. Printers of error chains, such as anyhow's `{:#}`, therefore print each cause once. To print
+/// a single error, use `{error:#}`.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// An argument is wrong: pass another.
+    /// An argument is invalid: pass another value.
     #[error("{argument}: {reason}")]
     InvalidArgument {
-        /// Which argument, as the caller spells it.
+        /// Name of the argument, as the caller knows it.
         argument: String,
-        /// What is wrong with it and what would be right.
+        /// Problem and valid values.
         reason: String,
     },
-    /// The lengths of the grid are wrong: choose others.
+    /// The lengths of the grid are invalid: choose others.
     #[error(transparent)]
     Grid(#[from] GridError),
-    /// The operating system refused: look at the path, the disk, the rights; then try again.
+    /// An operation of the operating system failed: check the path, the disk and the permissions, then retry.
     #[error(fmt = fmt_io)]
     Io {
-        /// The file or folder.
+        /// File or folder.
         path: PathBuf,
-        /// What was tried, as a verb with its object.
+        /// Failed operation: a verb, perhaps with its object.
         action: &'static str,
-        /// The refusal.
+        /// Error of the operating system.
         #[source]
         cause: io::Error,
     },
-    /// A file of a map is damaged or not the one that belongs there: restore or repair it.
+    /// A file of a map is damaged or belongs elsewhere: restore or repair it.
     #[error(fmt = fmt_damaged)]
     Damaged {
-        /// The file.
+        /// Damaged file.
         path: PathBuf,
-        /// The tile it belongs to, if to one.
+        /// Tile of the file, if it belongs to one.
         tile: Option<TileIndex>,
-        /// Where and what.
+        /// Position and problem.
         #[source]
         cause: FormatError,
     },
-    /// A file that was given to be read is not what it should be: give another.
+    /// An input file is malformed: use another file.
     #[error(fmt = fmt_malformed)]
     Malformed {
-        /// The file.
+        /// Input file.
         path: PathBuf,
-        /// Where and what.
+        /// Position and problem.
         #[source]
         cause: FormatError,
     },
-    /// There is no map at the path: create one or name another path.
+    /// There is no map at the path: create one or use another path.
     #[error("{}: no map here (metadata.json is missing); `voxtile build` makes one", path.display())]
     NoMap {
-        /// The folder.
+        /// Folder.
         path: PathBuf,
     },
-    /// There is a map at the path already: open it, or choose another path.
+    /// A map or other content already exists at the path: open it, or choose another path.
     #[error("{}: there is a map or other content already; {hint}", path.display())]
     AlreadyExists {
-        /// The folder.
+        /// Folder or file.
         path: PathBuf,
-        /// What to do instead.
+        /// Remedy.
         hint: &'static str,
     },
-    /// The map was made with other parameters: open it with its own.
+    /// The map has other parameters: use the map's own.
     #[error("{}: the map has {what} {found}, not {wanted}; go on with its own or build another map", path.display())]
     Mismatch {
-        /// The folder of the map.
+        /// Folder of the map.
         path: PathBuf,
-        /// Which parameter.
+        /// Name of the parameter.
         what: &'static str,
-        /// The map's value.
+        /// Value of the map.
         found: String,
-        /// The value that was asked for.
+        /// Requested value.
         wanted: String,
     },
-    /// Another process writes to the map: wait for it or end it.
+    /// Another process writes the map: wait for it or stop it.
     #[error("{}: another process is writing to this map; readers may open it beside that one", path.display())]
     Locked {
-        /// The folder of the map.
+        /// Folder of the map.
         path: PathBuf,
     },
-    /// The file that keeps other writers out was removed or replaced, so that another may be at work: close the map,
-    /// and open it again to go on from its last flush.
+    /// The lock file was removed or replaced, so another process may write the map: close and reopen the map to
+    /// continue from its last flush.
     #[error(
         "{}: the file was removed or replaced while this process held it locked, so another may be writing to the map; \
          nothing was written since; open the map again to go on from its last flush",
         path.display()
     )]
     LockLost {
-        /// The file.
+        /// Lock file.
         path: PathBuf,
     },
-    /// A writer flushed the map while it was being read: open it again.
+    /// A writer flushed the map during the read: open it again.
     #[error("{}: the map was flushed while it was being read; open it again", path.display())]
     Changed {
-        /// The folder of the map.
+        /// Folder of the map.
         path: PathBuf,
     },
-    /// A view of the map was held while so much changed that what it saw had to be let go: take a new view.
+    /// A view of the map is too old, and its data was released: take a new view.
     #[error("the view of the map was held for too long: what it saw has changed; take a new one")]
     Expired,
-    /// What was under way was to be given up, and is: nothing of it is in the map.
+    /// The operation was stopped on request. It has not changed the map.
     #[error("stopped as asked; the map is as before")]
     Stopped,
-    /// A server stopped answering: look at the network and the server, then try again.
+    /// A server stopped responding: check the network and the server, then retry.
     #[error(fmt = fmt_no_answer)]
     NoAnswer {
-        /// The URL of the bucket.
+        /// URL of the bucket.
         path: PathBuf,
-        /// What was asked, how often and for how long.
+        /// Request, number of attempts and duration.
         unanswered: Box<Unanswered>,
-        /// How the last attempt failed.
+        /// Error of the last attempt.
         #[source]
         cause: io::Error,
     },
-    /// The operation would undo unsaved work: flush first, or say that it may be lost.
+    /// The operation would discard unsaved updates: flush first, or request to discard them.
     #[error("tile {tile} has updates that are not on disk; flush first, or ask to discard them")]
     UnsavedChanges {
-        /// The tile.
+        /// Tile with unsaved updates.
         tile: TileIndex,
     },
-    /// The answer would be larger than a stated limit: ask for less.
+    /// The result would exceed a limit: request less.
     #[error("{what} would be {size}, more than the limit of {limit}; {hint}")]
     TooLarge {
-        /// What would be too large.
+        /// Quantity that would be too large.
         what: &'static str,
-        /// How large.
+        /// Its value.
         size: u64,
-        /// What is allowed.
+        /// Limit.
         limit: u64,
-        /// What to do.
+        /// Remedy.
         hint: &'static str,
     },
 }
 
 impl Error {
-    /// A wrong argument.
+    /// Returns the error of an invalid argument.
     pub fn argument(argument: impl Into<String>, reason: impl Into<String>) -> Self {
         Self::InvalidArgument { argument: argument.into(), reason: reason.into() }
     }
 
-    /// Whether the medium refused: a sector that cannot be read or written, or a damaged file system. It concerns one
-    /// file, and stays.
+    /// Returns whether the storage medium failed: an unreadable or unwritable sector, or a damaged file system. Such an
+    /// error affects one file and is permanent.
     pub fn is_of_medium(&self) -> bool {
         matches!(self, Self::Io { cause, .. } if is_of_medium(cause))
     }
 
-    /// The variant in one word that later versions keep: its name in snake case, `no_map` for [`Error::NoMap`].
+    /// Name of the variant in snake case, such as `no_map` for [`Error::NoMap`]. Later versions keep these names.
     pub fn kind(&self) -> &'static str {
         match self {
             Self::InvalidArgument { .. } => "invalid_argument",
@@ -186,7 +186,7 @@ impl Error {
         }
     }
 
-    /// The file or folder that it is about, if it is about one.
+    /// File or folder of the error, if any.
     pub fn path(&self) -> Option<&Path> {
         match self {
             Self::Io { path, .. }
@@ -208,7 +208,7 @@ impl Error {
         }
     }
 
-    /// The tile that it is about, if it is about one.
+    /// Tile of the error, if any.
     pub fn tile(&self) -> Option<TileIndex> {
         match *self {
             Self::Damaged { tile, .. } => tile,
@@ -217,7 +217,7 @@ impl Error {
         }
     }
 
-    /// The place in the file that it is about, if it is about one.
+    /// Position in the file of the error, if any.
     pub fn place(&self) -> Option<(Place, u64)> {
         match self {
             Self::Damaged { cause, .. } | Self::Malformed { cause, .. } => Some((cause.place, cause.at)),
@@ -225,8 +225,8 @@ impl Error {
         }
     }
 
-    /// A refusal of the operating system about a path. An [`Error::NoAnswer`] or [`Error::Stopped`] that a
-    /// [`Disk`](crate::store::Disk) has put into the cause is returned as it is.
+    /// Returns the error of a failed I/O operation on a path. If a [`Disk`](crate::store::Disk) has wrapped an
+    /// [`Error::NoAnswer`] or [`Error::Stopped`] in the cause, that error is returned.
     pub fn io(path: &Path, action: &'static str, cause: io::Error) -> Self {
         let kind = cause.kind();
         match cause.downcast() {
@@ -271,13 +271,13 @@ fn fmt_malformed(path: &Path, cause: &FormatError, f: &mut fmt::Formatter<'_>) -
     fmt_cause(cause, f)
 }
 
-/// With `{:#}` the cause is part of the message; printers of chains ask for `{}` and tell it themselves.
+/// Appends the cause for `{:#}`. Printers of error chains use `{}` and print the cause themselves.
 fn fmt_cause(cause: &impl fmt::Display, f: &mut fmt::Formatter<'_>) -> fmt::Result {
     if f.alternate() { write!(f, ": {cause:#}") } else { Ok(()) }
 }
 
-/// Whether an error is of the medium: a sector that cannot be read or written, or a file system that finds itself
-/// damaged. Such an error concerns one file and stays; others, such as too many open files, say nothing of the file.
+/// Returns whether the storage medium failed: an unreadable or unwritable sector, or a damaged file system. Such an
+/// error affects one file and is permanent. Other errors, such as too many open files, do not depend on the file.
 pub(crate) fn is_of_medium(error: &io::Error) -> bool {
     // EIO, ENXIO, ENODATA, EBADMSG, EUCLEAN and EREMOTEIO.
     #[cfg(unix)]
@@ -287,7 +287,7 @@ pub(crate) fn is_of_medium(error: &io::Error) -> bool {
     const OF_MEDIUM: [i32; 6] = [23, 27, 30, 1117, 1392, 1393];
     error.raw_os_error().is_some_and(|code| OF_MEDIUM.contains(&code))
 }
-/// The beginning of a text that is not another one; where both begin alike, the part that differs.
+/// Returns the beginning of `text`, or the part that differs from `other` if both begin alike.
 #[doc(hidden)]
 pub fn beginning_or_difference(text: &str, other: &str) -> String {
     const MAX_CHARS: usize = 80;

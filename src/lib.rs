@@ -1,8 +1,8 @@
-//! Probabilistic 3D occupancy mapping whose map is bounded by the disk, never by memory.
+//! Probabilistic 3D occupancy mapping with maps that can exceed memory.
 //!
-//! Scans of a lidar, depth camera or sonar become a map of voxels that are occupied, free or unknown, with the exact
-//! evidence of each. Space is cut into tiles; an LRU keeps the active ones in memory, the others are on disk. What was
-//! flushed survives a crash, and the map is the same to the bit whatever the cache.
+//! Scans of a lidar, depth camera or sonar become a map of occupied, free and unknown voxels, with exact evidence for
+//! each. Space is divided into tiles: recently used ones are in memory, the others on disk. Flushed scans survive a
+//! crash, and the size of the cache does not change a bit of the map.
 //!
 //! ```
 //! use voxtile::{MapConfig, MapReader, Mapper, OutOfCoreTileMapper, Pose, Queries, ScanRef};
@@ -15,7 +15,7 @@
 //! let pose = Pose::from_quaternion([0.0, 0.0, 1.8], [0.0, 0.0, 0.0, 1.0])?;
 //! let points: Vec<[f32; 3]> = vec![[4.25, 1.05, -1.45]]; // In the sensor's frame.
 //! mapper.insert_points(&ScanRef::in_sensor(pose, &points))?;
-//! mapper.flush()?; // From here on it survives a crash.
+//! mapper.flush()?; // The scan now survives a crash.
 //!
 //! let map = MapReader::open(&folder, 64 << 20)?;
 //! assert!(map.occupancy_at([4.25, 1.05, 0.35])?.is_occupied());
@@ -23,7 +23,7 @@
 //! # }
 //! ```
 //!
-//! # The flow
+//! # Data flow
 //!
 //! ```text
 //! Scan, ScanRef -> Mapper::insert_points                   scan, mapper
@@ -34,28 +34,28 @@
 //! queries <- tile by tile <- memory or disk                query
 //! ```
 //!
-//! # Words
+//! # Terms
 //!
-//! - **voxel**: a cube of the map's resolution, named by its index; **tile**: a cube of voxels with its own files;
-//!   **brick**: 8 x 8 x 8 voxels, the unit of the tables.
+//! - **voxel**: a cube with the map's resolution as its edge, identified by its index; **tile**: a cube of voxels with
+//!   its own files; **brick**: 8 x 8 x 8 voxels, the unit of the tables.
 //! - **evidence**: log-odds and number of updates of an observed voxel; *unknown* is the absence of evidence.
-//! - **flush**: the one commit point; **digest**: a number for the whole content, equal for equal maps.
+//! - **flush**: the only commit point; **digest**: a hash of the whole content, equal for equal maps.
 //!
-//! # It is not
+//! # Out of scope
 //!
-//! A localisation or SLAM system (poses come with the scans), a mesh or distance field, a database for points, or a
-//! map that several processes write to at once.
+//! Localisation and SLAM (scans must have poses), meshes and distance fields, databases of points, concurrent writers
+//! of one map.
 //!
 //! # Limits
 //!
-//! Tiles of 2 to 1024 voxels along an edge; voxel indices of 32 bits; rays of at most a million steps. One writer a
-//! map, any number of readers.
+//! Tiles of 2 to 1024 voxels along an edge; 32-bit voxel indices; at most a million steps per ray. One writer per map,
+//! and any number of readers.
 //!
 //! # Other crates
 //!
-//! This is the engine. Above it: `voxtile-formats` reads scans from files and writes voxels to them, `voxtile-local` is
-//! the map around the robot, `voxtile-share` sends what is occupied to other robots, `voxtile-bucket` has maps in an
-//! object store, `voxtile-render` makes pictures and levels of detail, and `voxtile-cli` is the command `voxtile`.
+//! This crate is the engine. `voxtile-formats` reads scans and writes voxels, `voxtile-local` is the local map around a
+//! robot, `voxtile-share` shares occupied voxels with other robots, `voxtile-bucket` stores maps in an object store,
+//! `voxtile-render` creates pictures and levels of detail, and `voxtile-cli` is the command `voxtile`.
 
 mod config;
 mod error;

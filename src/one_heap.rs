@@ -1,15 +1,15 @@
-//! One heap for all threads, so that a limit of memory holds.
+//! Restricts glibc to one heap, so that a memory limit holds.
 
-/// What glibc reads when a process begins, and only then.
+/// glibc reads this variable only when a process starts.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 const HEAPS: &str = "MALLOC_ARENA_MAX";
 
-/// Begins the process anew with one heap, unless its user has chosen a number of them (`MALLOC_ARENA_MAX`).
+/// Restarts the process with a single heap, unless `MALLOC_ARENA_MAX` is set.
 ///
-/// For programs with a limit of memory: call it first in `main`, before there is a second thread and before anything is
-/// read from standard input. glibc gives threads heaps of their own, and what is free in one is of no use to the others:
-/// a build that keeps to 64 MiB took 133 MiB of the system with heaps for two threads, 89 MiB with one, and no more
-/// time. If it cannot be, the program goes on as it is. With other C libraries nothing is done.
+/// For programs with a memory limit: call it first in `main`, before starting threads or reading standard input. glibc
+/// gives each thread its own heap, and threads cannot use free memory of other heaps. A build limited to 64 MiB used
+/// 133 MiB of system memory with two heaps and 89 MiB with one, in the same time. If the restart fails, the program
+/// continues unchanged. With other C libraries this does nothing.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 pub fn begin_with_one_heap() {
     use std::os::unix::process::CommandExt;
@@ -26,6 +26,6 @@ pub fn begin_with_one_heap() {
     log::debug!("the heaps stay as they are: {error}");
 }
 
-/// Other systems' heaps are left as they are.
+/// Does nothing on other systems.
 #[cfg(not(all(target_os = "linux", target_env = "gnu")))]
 pub fn begin_with_one_heap() {}

@@ -1,9 +1,9 @@
-//! Paths in JSON, for the command too.
+//! Serialization of paths to JSON, also for the command.
 
 use serde::Serializer;
 use std::path::Path;
 
-/// A path as text, which is all that JSON knows: what is not UTF-8 becomes a replacement character.
+/// Serializes a path as text. Bytes that are not UTF-8 become replacement characters.
 ///
 /// # Errors
 ///

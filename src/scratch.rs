@@ -1,20 +1,20 @@
 use std::io;
 use voxtile_scratch::ScratchFile;
 
-/// A file of nobody else's, for what has no room in memory for a while: it has no name, and goes when it is dropped.
+/// Unnamed file for data that temporarily exceeds memory. It is deleted when it is dropped.
 pub trait Scratch: Send {
-    /// Appends bytes. After an error nothing was appended.
+    /// Appends bytes. After an error nothing is appended.
     ///
     /// # Errors
     ///
-    /// A disk that refuses.
+    /// An I/O error.
     fn append(&mut self, bytes: &[u8]) -> io::Result<()>;
 
-    /// Bytes at a place, of those that were appended.
+    /// Returns `count` of the appended bytes, from offset `at`.
     ///
     /// # Errors
     ///
-    /// A disk that refuses; [`io::ErrorKind::UnexpectedEof`] behind the end.
+    /// An I/O error, or [`io::ErrorKind::UnexpectedEof`] beyond the end.
     fn bytes(&mut self, at: u64, count: usize) -> io::Result<&[u8]>;
 }
 
@@ -28,7 +28,7 @@ impl Scratch for ScratchFile {
     }
 }
 
-/// In memory.
+/// Scratch data in memory.
 impl Scratch for Vec<u8> {
     fn append(&mut self, bytes: &[u8]) -> io::Result<()> {
         self.extend_from_slice(bytes);

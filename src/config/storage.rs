@@ -1,16 +1,15 @@
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// How the tiles of a map are stored. It belongs to the map from its beginning; content, answers and digest do not
-/// depend on it.
+/// Storage of the tiles of a map, chosen at its creation. It does not affect content, query results or digest.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Storage {
-    /// Two files per tile, the original format: `iwlo_meta.bin` (18 bytes per voxel) and `octree.bt`, which OctoMap
-    /// programs read.
+    /// Two files per tile, the original format: `iwlo_meta.bin` (18 bytes per voxel), and `octree.bt`, which OctoMap
+    /// programs can read.
     #[default]
     OctoMap,
-    /// One file a tile, `tile.vxt`: the table in the compact form, in a twentieth to a fortieth of the bytes.
+    /// One file per tile, `tile.vxt`: the table in the compact form, 20 to 40 times smaller.
     Compact,
 }
 
@@ -24,7 +23,7 @@ impl fmt::Display for Storage {
 }
 
 impl Storage {
-    /// Whether this is the storage of a map that does not say.
+    /// Returns whether this is the original storage, which metadata omits.
     pub(crate) fn is_octomap(&self) -> bool {
         *self == Self::OctoMap
     }

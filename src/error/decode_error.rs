@@ -3,20 +3,20 @@ use crate::space::TileIndex;
 use std::io;
 use std::path::Path;
 
-/// Why a stream could not be decoded: the stream failed, or its content is wrong.
+/// Error of decoding a stream: a failed read or invalid content.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DecodeError {
-    /// Reading failed.
+    /// A read failed.
     #[error(transparent)]
     Io(#[from] io::Error),
-    /// What was read is wrong.
+    /// The content is invalid.
     #[error(transparent)]
     Format(#[from] FormatError),
 }
 
 impl DecodeError {
-    /// The same of a part that begins so many bytes into the file.
+    /// Adds `bytes` to the offset, for an error in a part that begins there.
     pub(crate) fn further_by(self, bytes: u64) -> Self {
         match self {
             Self::Format(FormatError { place: Place::Offset, at, reason }) => {
@@ -26,7 +26,7 @@ impl DecodeError {
         }
     }
 
-    /// The error of a file that was given to be read.
+    /// Returns the error for an input file.
     pub fn in_input(self, path: &Path) -> Error {
         match self {
             Self::Io(source) => Error::io(path, "read", source),
@@ -34,7 +34,7 @@ impl DecodeError {
         }
     }
 
-    /// The error of a file of a map.
+    /// Returns the error for a file of a map.
     pub fn in_map(self, path: &Path, tile: Option<TileIndex>) -> Error {
         match self {
             Self::Io(source) => Error::io(path, "read", source),

@@ -4,15 +4,15 @@ use std::time::Duration;
 /// A request that a server did not answer in time.
 #[derive(Clone, Debug)]
 pub struct Unanswered {
-    /// What was asked for: `GET`, `PUT`, `HEAD`, `DELETE` or `LIST`, and the object.
+    /// Method (`GET`, `PUT`, `HEAD`, `DELETE` or `LIST`) and object.
     pub request: String,
-    /// The server that was asked, if that is known.
+    /// Server, if known.
     pub server: Option<String>,
-    /// Since the request began.
+    /// Time since the start of the request.
     pub waited: Duration,
-    /// How often it was tried.
+    /// Number of attempts.
     pub attempts: u32,
-    /// The bound on the time without progress.
+    /// Limit of the time without progress.
     pub limit: Duration,
 }
 

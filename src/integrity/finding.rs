@@ -4,32 +4,32 @@ use serde::Serialize;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// Something about a map's files that a person should know.
+/// Finding about the files of a map.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct Finding {
-    /// How bad it is.
+    /// Severity.
     pub severity: Severity,
-    /// The file or folder.
+    /// File or folder.
     #[serde(serialize_with = "crate::path_text::serialize")]
     pub path: PathBuf,
-    /// The tile it belongs to, if to one.
+    /// Tile of the file, if it belongs to one.
     pub tile: Option<[i32; 3]>,
-    /// Where in the file, in bytes from its beginning.
+    /// Position in the file, in bytes from its beginning.
     pub offset: Option<u64>,
-    /// Where in the file, as a line, the first being 1.
+    /// Position in the file as a line, from 1.
     pub line: Option<u64>,
-    /// What it is.
+    /// Description.
     pub reason: String,
 }
 
-/// How bad a [`Finding`] is.
+/// Severity of a [`Finding`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {
-    /// The map, or a part of it, is not as it was flushed.
+    /// The map, or a part of it, differs from what was flushed.
     Damage,
-    /// Nothing is wrong: leftovers, or files that are no part of a map.
+    /// No damage: remains of an interrupted process, or foreign files.
     Note,
 }
 
@@ -51,13 +51,13 @@ impl Finding {
         }
     }
 
-    /// Whether an error is about a file by itself: a link or anything else that is no file, or what the medium refuses.
+    /// Returns whether an error is specific to one file: it is not a regular file, or the medium failed.
     pub(super) fn is_of_file(error: &Error) -> bool {
         matches!(error, Error::Io { cause, .. } if cause.kind() == std::io::ErrorKind::InvalidInput)
             || error.is_of_medium()
     }
 
-    /// The finding that an error stands for, if it is damage; other errors are passed back.
+    /// Converts an error to a finding if it reports damage. Returns other errors unchanged.
     pub(super) fn of(error: Error) -> Result<Self, Error> {
         match error {
             Error::Damaged { path, tile, cause } => Ok(Self::damage(&path, tile, &cause)),
@@ -69,7 +69,7 @@ impl Finding {
         }
     }
 
-    /// The finding that an error of the medium stands for.
+    /// Converts an error of the medium to a finding.
     fn unreadable(error: &Error, tile: Option<TileIndex>) -> Self {
         let Error::Io { path, action, cause } = error else {
             return Self::damage(Path::new(""), tile, &FormatError::at_offset(0, format!("{error:#}")));
@@ -80,7 +80,7 @@ impl Finding {
         finding
     }
 
-    /// The same finding, of a tile.
+    /// Sets the tile of the finding, if it has none.
     pub(super) fn in_tile(self, tile: TileIndex) -> Self {
         Self { tile: Some(self.tile.unwrap_or(tile.to_array())), ..self }
     }

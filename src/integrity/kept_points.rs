@@ -3,14 +3,14 @@ use crate::persistence::check_points;
 use crate::store::{Disk, KeptRecord, Layout, SegmentPlace};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Segment, offset and bytes of points.
+/// Segment, offset and length of points in bytes.
 type Place = (u64, u64, u64);
 
 fn place_of(place: SegmentPlace) -> Place {
     (place.segment, place.offset, place.bytes)
 }
 
-/// Where the points of some kept scans are.
+/// Set of locations of kept points.
 #[derive(Debug, Default)]
 pub(super) struct KeptPlaces(BTreeSet<Place>);
 
@@ -32,11 +32,11 @@ impl KeptPlaces {
     }
 }
 
-/// Points that were read and are whole, so that those which a map and its snapshots share are read once. Scans lie
-/// behind each other, so there are few ranges.
+/// Points that were read and are intact, so that points which a map and its snapshots share are read once. Scans are
+/// contiguous, so there are few ranges.
 #[derive(Debug, Default)]
 pub(super) struct WholePoints {
-    /// Where each range ends, by segment and where it begins.
+    /// End of each range, by segment and start.
     ranges: BTreeMap<(u64, u64), u64>,
 }
 
@@ -45,7 +45,7 @@ impl WholePoints {
     ///
     /// # Errors
     ///
-    /// Damage, or a disk that refuses.
+    /// Damage or an I/O error.
     pub(super) fn check(&mut self, disk: &dyn Disk, layout: &Layout, scan: &KeptRecord) -> Result<()> {
         let SegmentPlace { segment, offset, bytes } = scan.place;
         let end = offset.saturating_add(bytes);

@@ -9,19 +9,19 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// A catalog of kept scans as of a flush, and the snapshot that needs it; `None` for the map itself.
+/// Catalog of kept scans as of a flush, and the snapshot that needs it; `None` for the map itself.
 #[derive(Debug)]
 struct Needed {
     as_of: KeptAsOf,
     by: Option<SnapshotName>,
 }
 
-/// Reads every scan that a map and its snapshots keep, or those of them with points in some places. Each catalog and
-/// the points of each scan are read once, whoever needs them. `found` is told each finding, and of which points it is.
+/// Checks all scans that a map and its snapshots keep, or with `only` those at some locations. Each catalog and each
+/// scan is read once. `found` receives each finding, with the location of its points.
 ///
 /// # Errors
 ///
-/// A disk that refuses more than single files.
+/// An I/O error that is not specific to one file.
 pub(super) fn check_kept_scans(
     disk: &dyn Disk,
     store: &TileStore,
@@ -37,7 +37,7 @@ pub(super) fn check_kept_scans(
     Ok(())
 }
 
-/// The catalogs that a map and its snapshots need: those that are the beginning of one in a list, the longest first.
+/// Returns the catalogs that a map and its snapshots need. Versions of one catalog are in one list, the longest first.
 fn needed_catalogs(store: &TileStore) -> Result<Vec<Vec<Needed>>> {
     let (mut unnamed, mut named) = (Vec::new(), BTreeMap::<u64, Vec<Needed>>::new());
     let mut add = |as_of: KeptAsOf, by: Option<SnapshotName>| match as_of.catalog {
@@ -48,7 +48,7 @@ fn needed_catalogs(store: &TileStore) -> Result<Vec<Vec<Needed>>> {
         add(store.archive().last_commit(), None);
     }
     for name in store.snapshots().names().unwrap_or_default() {
-        // One that cannot be read is told by the look at the snapshots.
+        // The check of the snapshots reports unreadable ones.
         if let Ok(snapshot) = store.snapshots().read(&name)
             && let Some(as_of) = kept_as_of(&snapshot)
         {
@@ -67,20 +67,20 @@ struct Check<'a> {
     layout: &'a Layout,
     only: Option<&'a KeptPlaces>,
     whole: &'a mut WholePoints,
-    /// Damaged points that have been told.
+    /// Damaged points that were reported already.
     told: KeptPlaces,
     found: &'a mut dyn FnMut(Finding, Option<SegmentPlace>),
 }
 
 impl Check<'_> {
-    /// Reads a catalog, as of several flushes.
+    /// Reads the versions of a catalog.
     fn read(&mut self, catalogs: Vec<Needed>) -> Result<()> {
         let fronts: Vec<_> = catalogs.iter().filter_map(|needed| needed.as_of.catalog).collect();
         let are_whole = whole_fronts(self.disk, self.layout, &fronts);
         let mut is_read = false;
         for (at, needed) in catalogs.iter().enumerate() {
             let is_whole = are_whole.get(at).copied().unwrap_or(false);
-            // What is in the beginning was read with a longer one.
+            // The shorter version was read as a part of a longer one.
             if is_whole && is_read {
                 continue;
             }
@@ -119,12 +119,13 @@ impl Check<'_> {
     }
 }
 
-/// The files of scans that neither the last flush nor a snapshot needs. `store` may be behind a writer by now, so they
-/// are looked for a second time. None where a catalog or a snapshot is damaged, which may need any.
+/// Returns files of kept scans that neither the last flush nor a snapshot needs. A writer may have committed since
+/// `store` was opened, so candidates are checked a second time. Returns none if a catalog or a snapshot is damaged,
+/// because it may need any file.
 ///
 /// # Errors
 ///
-/// A disk that refuses more than single files.
+/// An I/O error that is not specific to one file.
 pub(super) fn find_idle(disk: &Arc<dyn Disk>, store: &TileStore) -> Result<Vec<PathBuf>> {
     let idle_in = |store: &TileStore| -> Result<Vec<PathBuf>> {
         match store.snapshots().idle_scan_files() {
@@ -135,7 +136,7 @@ pub(super) fn find_idle(disk: &Arc<dyn Disk>, store: &TileStore) -> Result<Vec<P
     };
     let mut idle = idle_in(store)?;
     if !idle.is_empty() {
-        // One that cannot be opened any more is being changed.
+        // If the map cannot be opened now, it is being changed.
         let now = TileStore::open_read_only(disk.clone(), store.folder()).ok();
         let idle_now = now.as_ref().map(idle_in).transpose()?.unwrap_or_default();
         idle.retain(|path| idle_now.contains(path));
@@ -143,23 +144,23 @@ pub(super) fn find_idle(disk: &Arc<dyn Disk>, store: &TileStore) -> Result<Vec<P
     Ok(idle)
 }
 
-/// What is whole of the scans that a map keeps.
+/// Intact part of the scans that a map keeps.
 #[derive(Debug, Default)]
 pub(super) struct WholeEntries {
-    /// What is not.
+    /// Errors of the damaged part.
     pub damage: Vec<Error>,
-    /// How many scans the map can no longer be mapped from for it.
+    /// Number of scans from which the map can no longer be replayed.
     pub scans_lost: u64,
-    /// The segments that the others are in.
+    /// Segments of the intact scans.
     pub segments: BTreeSet<u64>,
 }
 
-/// Passes on the entries of a catalog as it should be, where any of it is damaged: a scan with damaged points is one
-/// whose points are not kept, and one whose record is damaged an unknown one.
+/// Passes the entries of a repaired catalog to `put`: a scan with damaged points becomes a scan without points, and a
+/// scan with a damaged record becomes an unlisted one.
 ///
 /// # Errors
 ///
-/// A disk that refuses more than single files; errors of `put`.
+/// An I/O error that is not specific to one file, and errors of `put`.
 pub(super) fn whole_entries(
     disk: &dyn Disk,
     layout: &Layout,
@@ -193,11 +194,11 @@ pub(super) fn whole_entries(
     Ok(whole)
 }
 
-/// Number of scans in the newest catalog of a map, whether a flush committed it or not.
+/// Counts the kept scans in the newest catalog of a map, committed or not.
 ///
 /// # Errors
 ///
-/// A disk that refuses more than single files.
+/// An I/O error that is not specific to one file.
 pub(super) fn count_kept(disk: &dyn Disk, layout: &Layout) -> Result<u64> {
     let mut count = 0;
     salvage_entries(disk, layout, KeptAsOf::NEWEST, &mut |entry| {
@@ -207,7 +208,7 @@ pub(super) fn count_kept(disk: &dyn Disk, layout: &Layout) -> Result<u64> {
     Ok(count)
 }
 
-/// The error, if it is about a file by itself.
+/// Returns the error as `Ok` if it is specific to one file.
 fn only_damage(error: Error) -> Result<Error> {
     match matches!(error, Error::Damaged { .. }) || Finding::is_of_file(&error) {
         true => Ok(error),

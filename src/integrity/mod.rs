@@ -1,13 +1,13 @@
-//! Looking after a map on disk: is everything whole, and what can be put right?
+//! Verification and repair of a map on disk.
 //!
 //! ```text
 //! verify  metadata.json, commits.log, then tile by tile: table, octree; then snapshots  -> findings
-//! repair  index (metadata.json, commits.log) from whatever is left      -> actions
-//!         lists of scans: what can be read of them goes on
+//! repair  index (metadata.json, commits.log) from the remaining files                   -> actions
+//!         lists of scans: the readable part
 //!         tile by tile: octree from its table, table from a kept one, damaged tiles to quarantine/
 //! ```
 //!
-//! Both need memory for the list of tiles and one tile. What is promised is in `docs/durability.md`.
+//! Both need memory for the list of tiles and one tile. `docs/durability.md` states the guarantees.
 
 mod finding;
 mod kept_points;

@@ -1,4 +1,4 @@
-//! What a map is, told from whatever is left of it: `metadata.json`, `commits.log`, and the tiles themselves.
+//! Rebuilds the index of a map from the readable remains of `metadata.json`, `commits.log` and tiles.
 
 use super::snapshots::last_known_flush;
 use crate::config::{MapConfig, Storage};
@@ -15,38 +15,38 @@ use rustc_hash::FxHashMap;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-/// A map's index, put together again.
+/// Rebuilt index of a map.
 pub(super) struct Index {
     pub map_id: [u8; 16],
     pub metadata: Metadata,
     pub commits: Commits,
-    /// Tiles whose table is the one under the name that waits for a commit, and what it takes the place of.
+    /// Tiles whose valid table is the `*.next` file, with the state of the table that it replaces.
     pub waiting: BTreeMap<TileIndex, Replaced>,
-    /// Tiles whose table cannot be used.
+    /// Tiles without a usable table.
     pub damaged: Vec<(TileIndex, Error)>,
-    /// Whether the tiles may be of different flushes, because no log says what belongs together.
+    /// Whether the tiles may be of different flushes, because there is no log.
     pub is_from_tiles: bool,
-    /// Whether nothing tells whether the map keeps its scans: neither of its files can be read, or there are catalogs
-    /// that neither the map nor a snapshot names.
+    /// Whether it is unknown if the map keeps scans: neither of its files is readable, or there are catalogs that
+    /// neither the map nor a snapshot names.
     pub are_scans_unknown: bool,
-    /// How many inputs the map no longer knows, because nothing tells whether all their scans are in its tiles.
+    /// Number of inputs removed from the metadata, because the tiles may lack some of their scans.
     pub inputs_forgotten: u64,
 }
 
-/// The table in place of which another one waits.
+/// State of a table that a `*.next` file replaces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Replaced {
-    /// Whole, and of an earlier flush.
+    /// Intact, and of an earlier flush.
     Older,
     /// Damaged or missing.
     Unusable,
 }
 
-/// Puts the index together. `None` for a map of the original format, which has none.
+/// Rebuilds the index. Returns `None` for a map of the original format, which has none.
 ///
 /// # Errors
 ///
-/// Too little left to tell what the map is; a disk that refuses.
+/// Too few remains to identify the map, or an I/O error.
 pub(super) fn index_of(
     disk: &dyn Disk,
     layout: &Layout,
@@ -75,26 +75,26 @@ pub(super) fn index_of(
     index_from_tiles(disk, layout, remains, progress).map(Some)
 }
 
-/// How many records the list of scans had is not known of a state that is put together.
+/// Clears the number of records in the list of scans, which is unknown for a rebuilt index.
 fn forget_scan_records(metadata: &mut Metadata) {
     if let Some(ext) = &mut metadata.ext {
         ext.scan_records = None;
     }
 }
 
-/// Id and metadata of a log that leads to the last flush.
+/// Returns id and metadata of the log, if the log ends with the last flush.
 fn told_by_log(disk: &dyn Disk, layout: &Layout, remains: &Salvage) -> Result<Option<([u8; 16], Metadata)>> {
     let (Some(map_id), Some(logged)) = (remains.log_map_id, &remains.commits.metadata) else {
         return Ok(None);
     };
     let Some(logged_id) = id_of(logged) else { return Ok(None) };
-    // What is torn off may be a flush that never happened, or one that did.
+    // The torn record may belong to a flush that was committed or to one that was not.
     let is_whole = remains.commits.torn.is_none();
     let is_last = match &remains.metadata {
         Ok(Metadata { ext: Some(ext), .. }) if ext.map_id == hex(&map_id) => {
             ext.flush_number <= remains.commits.flush_number
         }
-        // One of the two files is of another map. The tiles tell which.
+        // One of the two files belongs to another map. The tiles decide which.
         Ok(Metadata { ext: Some(_), .. }) => {
             is_whole && logged_id == map_id && {
                 let trailers = Trailers::of(disk, layout, &tiles_of(disk, layout)?);
@@ -106,12 +106,12 @@ fn told_by_log(disk: &dyn Disk, layout: &Layout, remains: &Salvage) -> Result<Op
     Ok(is_last.then(|| (map_id, logged.clone())))
 }
 
-/// The id in some metadata; `None` in that of the original format.
+/// Returns the id in the metadata; `None` in the original format.
 fn id_of(metadata: &Metadata) -> Option<[u8; 16]> {
     id_from_hex(&metadata.ext.as_ref()?.map_id)
 }
 
-/// The tiles that have a folder, in order.
+/// Lists the tiles that have a folder, in order.
 fn tiles_of(disk: &dyn Disk, layout: &Layout) -> Result<Vec<TileIndex>> {
     let names = disk.list(layout.folder()).map_err(|error| Error::io(layout.folder(), "list", error))?;
     let mut tiles: Vec<_> = names.iter().filter_map(|name| tile_of_folder(name)).collect();
@@ -130,7 +130,7 @@ fn index_from_tiles(
     let (map_id, mut metadata) = identity(layout, remains, &trailers)?;
     forget_scan_records(&mut metadata);
     let config = crate::persistence::config_from(&metadata, &layout.metadata())?;
-    // What the files of another map count is nothing to this one.
+    // Ignore the numbers in files of another map.
     let written = remains.metadata.as_ref().ok().filter(|metadata| id_of(metadata) == Some(map_id));
     let logged_id = remains.log_map_id.or_else(|| id_of(remains.commits.metadata.as_ref()?));
     let logged = Some(&remains.commits).filter(|_| logged_id.is_none_or(|id| id == map_id));
@@ -139,8 +139,8 @@ fn index_from_tiles(
     let known_scan = written.and_then(|metadata| metadata.ext.as_ref()).map(|ext| ext.scan_number);
     let written_flush = written.and_then(|metadata| metadata.ext.as_ref()).map(|ext| ext.flush_number);
     let known_flush = last_known_flush(disk, layout, map_id, &tiles);
-    // A tile of an earlier flush looks like one that the last scans did not touch. So nothing tells how many scans of
-    // an input are in the tiles, and it cannot be gone on with.
+    // A tile of an earlier flush is indistinguishable from one that the last scans did not change. So the number of
+    // ingested scans is unknown, and the inputs cannot be resumed.
     let inputs = metadata.ext.as_mut().map(|ext| std::mem::take(&mut ext.inputs)).unwrap_or_default();
     let mut index = Index {
         map_id,
@@ -167,7 +167,8 @@ fn index_from_tiles(
     if files.into_iter().flatten().all(|metadata| metadata.ext.is_none())
         && let Some(ext) = &mut index.metadata.ext
     {
-        // Tiles do not say how much of their evidence has faded: rather too little of it fades than some of it twice.
+        // Tiles do not record their decay. Assume that all evidence has decayed: too little decay is better than
+        // repeated decay.
         ext.decayed_scan = index.commits.scan_number;
         index.are_scans_unknown = true;
     }
@@ -175,8 +176,8 @@ fn index_from_tiles(
 }
 
 impl Index {
-    /// The snapshots that `metadata.json` names, and those that are there: a log that cannot be read does not tell
-    /// which of them were deleted, and without a list all of them count.
+    /// Sets the snapshots to those that `metadata.json` names and those that exist: without the log, deleted ones
+    /// cannot be excluded. Without a list all files in the folder count.
     fn join_snapshots(&mut self, disk: &dyn Disk, layout: &Layout, written: Option<&Metadata>) {
         let Some(ext) = &mut self.metadata.ext else { return };
         ext.snapshots = written.and_then(|metadata| metadata.ext.as_ref()?.snapshots.clone());
@@ -190,9 +191,9 @@ impl Index {
         }
     }
 
-    /// Chooses the catalog of kept scans: the newest that was committed for certain, by the files of the map or by a
-    /// snapshot. Where there is a newer one, scans may have been removed since: then all scans are unknown, and no
-    /// catalog is named.
+    /// Chooses the catalog of kept scans: the newest one that the map's files or a snapshot prove to be committed. If
+    /// there is a newer file, scans may have been removed since: then the kept scans are unknown, and no catalog is
+    /// named.
     fn choose_catalog(&mut self, disk: &dyn Disk, layout: &Layout, named: [Option<CatalogVersion>; 2]) {
         let mut chosen = named.into_iter().flatten().max().map(|catalog| (catalog, 0));
         let (mut of_snapshots, mut of_repairs) = (BTreeSet::new(), BTreeSet::new());
@@ -203,14 +204,14 @@ impl Index {
             };
             of_snapshots.insert(catalog.generation);
             if catalog.generation > flush_number {
-                // A repair gave it to the snapshot: it was never the map's.
+                // Written by a repair for the snapshot: it never belonged to the map.
                 of_repairs.insert(catalog.generation);
             } else if chosen.is_none_or(|(chosen, _)| chosen < catalog) {
                 chosen = Some((catalog, scan_number));
             }
         }
         let generations = catalog_generations(disk, layout);
-        // No later catalog gets the name of one that is there.
+        // Later catalogs must not reuse the name of an existing one.
         let newest = generations.last().copied().unwrap_or_default();
         self.commits.flush_number = self.commits.flush_number.max(newest + 1);
         if !self.metadata.ext.as_ref().is_some_and(|ext| ext.keeps_scans) {
@@ -239,8 +240,7 @@ impl Index {
         let read = |file: &Path| read_alone(disk, file, layout.storage(), &config.grid, self.map_id, tile);
         let (current, next) = (layout.current(tile, TileFile::Table), layout.next(tile, TileFile::Table));
         let table = match (read(&current)?, read(&next)?) {
-            // Written before the last flush that is known of, so it was part of it, and was to take the place of the
-            // other.
+            // Written before the last known flush, so it was part of it and should have replaced the other table.
             (Some(Ok(table)), Some(Ok(next)))
                 if scan_number_of(&table) < scan_number_of(&next) && scan_number_of(&next) <= known_scan =>
             {
@@ -261,7 +261,7 @@ impl Index {
                 let is_kept = |name: &String| layout.flush_of_kept(name).is_some();
                 let (path, reason) = match next_table {
                     Some(_) => (&next, "nothing tells whether this version was committed"),
-                    // Of a removed tile that a snapshot sees, perhaps.
+                    // Perhaps a removed tile that a snapshot uses.
                     None if disk.list(&folder).is_ok_and(|names| names.iter().all(is_kept)) => return Ok(()),
                     None => (&current, "the file is missing"),
                 };
@@ -276,7 +276,7 @@ impl Index {
     }
 }
 
-/// The catalog of kept scans that `metadata.json` names.
+/// Returns the catalog of kept scans that `metadata.json` names.
 fn catalog_of(written: Option<&Metadata>) -> Option<CatalogVersion> {
     written?.ext.as_ref()?.catalog
 }
@@ -285,7 +285,8 @@ fn scan_number_of(table: &ReadTable) -> Option<u64> {
     table.trailer.as_ref().map(|trailer| trailer.scan_number)
 }
 
-/// A table by itself, without a log: whole, of this map and tile; `None` if there is no file.
+/// Reads a table without the log. It must be intact and belong to this map and tile. Returns `None` if there is no
+/// file.
 pub(super) fn read_alone(
     disk: &dyn Disk,
     path: &Path,
@@ -318,7 +319,7 @@ fn version_of(table: &ReadTable, config: &MapConfig) -> TileVersion {
     let occupied = table.table.iter().filter(|(_, evidence)| evidence.log_odds >= threshold).count();
     let trailer = table.trailer.as_ref();
     TileVersion {
-        // What a file says of itself is no reason to count from there if nobody counts that far.
+        // The number in a file may be invalid. Limit it, so that numbering can continue.
         scan_number: trailer.map_or(0, |trailer| trailer.scan_number.min(MAX_NUMBER)),
         table: table.file,
         octree: trailer.map_or(FileChecksum::default(), |trailer| FileChecksum {
@@ -330,9 +331,9 @@ fn version_of(table: &ReadTable, config: &MapConfig) -> TileVersion {
     }
 }
 
-/// Which map the tiles say they belong to.
+/// Map ids in the trailers of tiles.
 struct Trailers {
-    /// By map: a trailer, and how many there are.
+    /// For each map id, one trailer and the number of tiles.
     by_map: FxHashMap<[u8; 16], (Trailer, u64)>,
 }
 
@@ -356,30 +357,30 @@ impl Trailers {
         Self { by_map }
     }
 
-    /// Whether no tile is of a map, and some are of others.
+    /// Returns whether the tiles belong only to other maps, and there are some.
     fn are_of_others(&self, map_id: [u8; 16]) -> bool {
         !self.by_map.is_empty() && !self.by_map.contains_key(&map_id)
     }
 
-    /// The map that most tiles belong to.
+    /// Returns a trailer of the map that most tiles belong to.
     fn most(&self) -> Option<&Trailer> {
         let most = self.by_map.values().max_by_key(|(trailer, count)| (*count, trailer.map_id));
         most.map(|(trailer, _)| trailer)
     }
 }
 
-/// Id and metadata, from the best that is left.
+/// Returns id and metadata from the best remaining source.
 fn identity(layout: &Layout, remains: &Salvage, trailers: &Trailers) -> Result<([u8; 16], Metadata)> {
     let written = remains.metadata.as_ref().ok().filter(|metadata| metadata.ext.is_some());
     let logged = remains.commits.metadata.as_ref().filter(|metadata| metadata.ext.is_some());
     let of_tiles = trailers.most();
-    // Where the two files contradict each other, the tiles decide.
+    // If the two files disagree, the tiles decide.
     let candidates =
         [written, logged].into_iter().flatten().filter_map(|metadata| Some((id_of(metadata)?, metadata)));
     let mut candidates: Vec<_> = candidates.collect();
     candidates.sort_by_key(|(id, _)| of_tiles.is_some_and(|trailer| trailer.map_id != *id));
     match &candidates[..] {
-        // A single file that no tile belongs to is that of another map.
+        // A single file that matches no tile belongs to another map.
         [(id, _)] if trailers.are_of_others(*id) => {}
         [(id, metadata), ..] => return Ok((*id, (*metadata).clone())),
         [] => {}

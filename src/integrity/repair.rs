@@ -18,65 +18,65 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// One thing that a repair did.
+/// Action of a repair.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct Action {
-    /// What was done.
+    /// Kind of action.
     pub kind: ActionKind,
-    /// To which file or folder.
+    /// Affected file or folder.
     #[serde(serialize_with = "crate::path_text::serialize")]
     pub path: PathBuf,
-    /// Why, and where something was put.
+    /// Reason, and new location if the file was moved.
     pub reason: String,
 }
 
-/// What a repair can do.
+/// Kind of an [`Action`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum ActionKind {
-    /// Written anew from what else the map holds.
+    /// Written again from other files of the map.
     Derived,
     /// Moved to `quarantine/`.
     Quarantined,
-    /// Given its committed name.
+    /// Renamed to its committed name.
     Renamed,
-    /// Removed, because the log proves that it was never committed or has been replaced.
+    /// Removed, because the log proves that it is uncommitted or replaced.
     Removed,
-    /// No longer named by the log, because its files are missing; or by a snapshot, because they are missing or
-    /// damaged. Of `metadata.json`: the inputs.
+    /// Removed from the log because its files are missing, or from a snapshot because they are missing or damaged. For
+    /// `metadata.json`: the inputs were removed.
     Forgotten,
-    /// Nothing: the medium refused.
+    /// Unchanged, because the medium failed.
     Left,
 }
 
-/// What a repair did.
+/// Result of a repair.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct Repair {
-    /// Tiles of the map now.
+    /// Number of tiles in the map after the repair.
     pub tiles: u64,
-    /// Tiles that are no longer part of some snapshot.
+    /// Number of tiles lost from snapshots.
     pub snapshot_tiles_lost: u64,
-    /// Snapshots that the map no longer has.
+    /// Number of lost snapshots.
     pub snapshots_lost: u64,
-    /// Scans that the map kept and whose record or points are damaged: it cannot be mapped again from them.
+    /// Number of kept scans with a damaged record or damaged points. The map can no longer be replayed from them.
     pub scans_lost: u64,
-    /// The same of snapshots.
+    /// Like `scans_lost`, for the kept scans of snapshots.
     pub snapshot_scans_lost: u64,
-    /// Tiles that are no longer part of the map: their space is unknown again.
+    /// Number of tiles lost from the map. Their space is unknown again.
     pub tiles_lost: u64,
-    /// Inputs that the map no longer knows, because nothing tells whether all their scans are in its tiles.
+    /// Number of inputs removed from the metadata, because the tiles may lack some of their scans.
     pub inputs_forgotten: u64,
-    /// Damage that is still there, because the medium refused.
+    /// Number of damaged files that remain, because the medium failed.
     pub left: u64,
-    /// Number of things done; 0 if the map was whole.
+    /// Number of actions; 0 if the map was intact.
     pub actions: u64,
 }
 
 impl Repair {
-    /// Whether all that the map and its snapshots held is there, and nothing is damaged any more.
+    /// Returns whether nothing was lost from the map and its snapshots, and no damage remains.
     pub fn is_complete(&self) -> bool {
         let scans_lost = self.scans_lost + self.snapshot_scans_lost;
         let lost = self.tiles_lost + scans_lost + self.snapshot_tiles_lost + self.snapshots_lost;
@@ -84,14 +84,14 @@ impl Repair {
     }
 }
 
-/// Does what is possible for a damaged map: index and octrees are derived, damaged tiles go to `quarantine/`, what a
-/// crash left behind is removed. No data is deleted, and a repair that was cut short is finished by another.
+/// Repairs a damaged map: rebuilds the index and octrees, moves damaged tiles to `quarantine/`, and removes the remains
+/// of a crash. No data is deleted. An interrupted repair can be repeated.
 ///
-/// `done` is told each action, `progress` the tiles done and all.
+/// `done` receives each action, and `progress` the number of tiles done and in total.
 ///
 /// # Errors
 ///
-/// No map there, another writer, a disk that refuses, or too little left to tell what the map is.
+/// No map, another writer, too few remains to identify the map, or an I/O error.
 pub fn repair(
     folder: impl Into<MapPath>,
     done: impl FnMut(&Action),
@@ -131,9 +131,9 @@ pub(super) struct Repairer<'a, F, P> {
     done: F,
     progress: P,
     pub(super) counts: Repair,
-    /// Points of kept scans that were read and are whole.
+    /// Points of kept scans that were read and are intact.
     pub(super) points: WholePoints,
-    /// Catalogs of kept scans of which quarantine has a copy.
+    /// Catalogs of kept scans that were copied to quarantine.
     pub(super) catalogs_kept: BTreeSet<PathBuf>,
 }
 
@@ -149,7 +149,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         Ok(())
     }
 
-    /// Takes a tile out of the map; tables that snapshots see stay.
+    /// Removes a tile from the map. Tables that snapshots use remain.
     fn quarantine_tile(&mut self, tile: TileIndex, why: &str) -> Result<()> {
         let folder = self.layout.tile_folder(tile);
         let names = match self.kind(&folder)? {
@@ -177,7 +177,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         self.disk.kind_at(path)
     }
 
-    /// Makes way for the lock, which any file can be.
+    /// Moves anything that is not a regular file out of the way of the lock file.
     fn repair_lock(&mut self) -> Result<()> {
         let path = self.layout.lock();
         match self.kind(&path)? {
@@ -188,7 +188,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         }
     }
 
-    /// Keeps what is whole of the list of scans, from its beginning.
+    /// Truncates the list of scans to its intact part.
     fn repair_scans(&mut self, store: &mut TileStore) -> Result<()> {
         let path = self.layout.scans();
         let flush_number = store.commits().flush_number;
@@ -200,7 +200,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         };
         let settled = match &damage {
             Error::Damaged { .. } => store.settle_scans(),
-            // Cut where it is, it could be unreadable still.
+            // Truncation would leave an unreadable file.
             _ => store.rewrite_scans(),
         };
         let quarantined = match settled {
@@ -218,14 +218,14 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         Ok(())
     }
 
-    /// Writes `commits.log` and `metadata.json` anew from what is left of them and from the tiles.
+    /// Replaces `commits.log` and `metadata.json`, from their remains and from the tiles.
     fn repair_index(&mut self, disk: &Arc<dyn Disk>) -> Result<()> {
         let _lock = WriterLock::take(self.disk, &self.layout)?;
         let remains = Salvage::read(self.disk, &self.layout)?;
         self.layout = remains.layout_of_tiles(self.disk, self.layout.folder());
         let index = rebuild::index_of(self.disk, &self.layout, &remains, &mut self.progress)?;
         let Some(index) = index else {
-            // Of the original format, but with a log that cannot be read: the log is no part of it.
+            // A map of the original format with an unreadable log, which is not part of it.
             if self.kind(&self.layout.kept_scans())?.is_some() {
                 self.quarantine(&self.layout.kept_scans(), "metadata.json is of the original format")?;
             }
@@ -279,12 +279,12 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         Ok(())
     }
 
-    /// Without a log nothing proves that a `*.next` was never committed: those that are no part of the map now are kept
-    /// in quarantine.
+    /// Renames or quarantines `*.next` files. Without a log none of them is known to be uncommitted, so those that are
+    /// not part of the rebuilt map are kept in quarantine.
     fn settle_waiting(&mut self, commits: &Commits, waiting: &BTreeMap<TileIndex, Replaced>) -> Result<()> {
         let mut tiles: Vec<_> = commits.tiles.tiles().collect();
         tiles.sort_unstable();
-        // What they see is known once the map opens again.
+        // The tables that snapshots use are known only after the map is opened again.
         let has_snapshots = Snapshot::list(self.disk, &self.layout).is_ok_and(|names| !names.is_empty());
         for tile in tiles {
             let kept = self.layout.kept(tile, commits.flush_number.saturating_sub(1));
@@ -303,7 +303,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
                 };
                 let is_seen = has_snapshots && file == TileFile::Table && *replaced == Replaced::Older;
                 if is_seen && self.kind(&kept)?.is_none() {
-                    // As the flush would have kept it, had it got that far.
+                    // Keep the table as the flush would have.
                     self.quarantine_copy(&current, why)?;
                     self.disk
                         .rename(&current, &kept)
@@ -347,7 +347,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         }
         if !lost.is_empty() {
             if store.map_id().is_none() {
-                // The original own file, and perhaps with keys that voxtile does not know.
+                // It may have keys that voxtile does not know.
                 self.quarantine_copy(&self.layout.metadata(), "its bounds change")?;
             }
             store.forget(&lost)?;
@@ -368,11 +368,11 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         Ok(())
     }
 
-    /// Repairs a tile that the map holds; false if it cannot stay in the map.
+    /// Repairs a tile of the map. Returns false if it must be removed.
     fn repair_tile(&mut self, store: &mut TileStore, config: &MapConfig, tile: TileIndex) -> Result<bool> {
         let mut check = check_tile(self.disk, store, config, tile)?;
         if matches!(&check.table, Err(error) if error.is_of_medium()) {
-            // Not for what passes.
+            // Retry, in case the error is temporary.
             check = check_tile(self.disk, store, config, tile)?;
         }
         if let Err(error) = &check.table
@@ -396,7 +396,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         let Some(Err(cause)) = check.octree else { return Ok(true) };
         let path = self.layout.current(tile, TileFile::Octree);
         match self.quarantine_copy(&path, &cause.reason) {
-            // What can be derived is replaced all the same.
+            // The octree is replaced even if it cannot be copied.
             Err(error) if error.is_of_medium() => {}
             copied => copied?,
         }
@@ -408,7 +408,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         if Some(written) == expected {
             store.place_octree(tile)?;
         } else {
-            // Another writer's octree cannot be had again: the tile is written anew with the present one.
+            // The octree of another writer cannot be reproduced, so the tile is written again with the current one.
             let scan_number = table.trailer.map_or(0, |trailer| trailer.scan_number);
             let tile = Tile::from_table(&config.grid, &OctreeFactory::default(), tile, table.table);
             TileSaver::new(config).save(store, &tile, scan_number)?;
@@ -419,11 +419,11 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         Ok(true)
     }
 
-    /// Puts a kept table in place of a damaged one, where it is the very version that the log names: a revert leaves a
-    /// tile with both. False if there is none.
+    /// Replaces a damaged table by a kept one if that is the version in the log, as a revert can leave it. Returns
+    /// false if there is none.
     fn restore_table(&mut self, store: &mut TileStore, tile: TileIndex, why: &str) -> Result<bool> {
         let Some(version) = store.tiles().version(tile) else { return Ok(false) };
-        // What cannot be listed or read is not there.
+        // Unreadable files are skipped.
         for flush_number in store.tables().kept(tile).unwrap_or_default() {
             let (kept, current) =
                 (self.layout.kept(tile, flush_number), self.layout.current(tile, TileFile::Table));

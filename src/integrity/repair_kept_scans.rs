@@ -8,9 +8,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
-    /// Lists scans whose points are damaged as scans without points, and those whose records are as unknown ones, so
-    /// that the map can be mapped on. What neither the map nor a snapshot needs then goes to quarantine: the next
-    /// writer would remove it.
+    /// Repairs the catalog of the map: scans with damaged points become scans without points, and scans with damaged
+    /// records become unlisted ones, so that more scans can be added. Files that neither the map nor a snapshot needs
+    /// then move to quarantine, because the next writer would remove them.
     pub(super) fn repair_kept_scans(&mut self, store: &mut TileStore) -> Result<()> {
         let (folder, as_of) = (self.layout.kept_scans(), store.archive().last_commit());
         self.repair_folder_of_scans(&folder)?;
@@ -27,11 +27,11 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         store.archive_mut().begin_catalog()?;
         let (disk, layout, points) = (self.disk, &self.layout, &mut self.points);
         let left = whole_entries(disk, layout, as_of, points, |entry| store.archive_mut().put(entry))?;
-        // Where a snapshot cannot be read it may need any, and no writer removes any: they go with the snapshot.
+        // An unreadable snapshot may need any file, so no writer removes any. They are moved when the snapshot is.
         let snapshots = known_snapshots(store);
         if let Some(snapshots) = &snapshots {
-            // Before the commit: as long as the catalog is the damaged one, nobody removes anything, and a repair that
-            // begins again finds the same scans.
+            // Before the commit: as long as the damaged catalog is current, no writer removes any file, and a repeated
+            // repair finds the same scans.
             for path in store.unneeded_scan_files(snapshots, Some(&left.segments))? {
                 self.quarantine(&path, reasons.of_file(&path))?;
             }
@@ -58,7 +58,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         Ok(())
     }
 
-    /// Makes way for the folder of kept scans.
+    /// Moves anything that is not a readable folder out of the way of the folder of kept scans.
     fn repair_folder_of_scans(&mut self, folder: &Path) -> Result<()> {
         if let Some(EntryKind::File(_) | EntryKind::Other) = self.kind(folder)? {
             return self.quarantine(folder, "no folder");
@@ -69,7 +69,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         }
     }
 
-    /// Keeps a catalog in quarantine of which another takes the place; whether it is there.
+    /// Keeps a catalog in quarantine before it is replaced. Returns whether quarantine has it.
     fn keep_catalog(&mut self, catalog: Option<&Path>, reasons: &Reasons) -> Result<bool> {
         let Some(catalog) = catalog else { return Ok(false) };
         if self.catalogs_kept.contains(catalog) {
@@ -82,8 +82,8 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         Ok(true)
     }
 
-    /// Gives snapshots whose kept scans are damaged other catalogs: as for the map itself, they list a scan with
-    /// damaged points as one without points, and one whose record is damaged as an unknown one.
+    /// Replaces the catalogs of snapshots whose kept scans are damaged. As for the map, scans with damaged points
+    /// become scans without points, and scans with damaged records become unlisted ones.
     pub(super) fn repair_scans_of_snapshots(
         &mut self,
         store: &mut TileStore,
@@ -106,7 +106,8 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         if replaced.is_empty() {
             return Ok(());
         }
-        // Before the snapshots name the new catalogs: as long as one names a damaged one, no writer removes anything.
+        // Before the snapshots name the new catalogs: as long as one names a damaged catalog, no writer removes any
+        // file.
         self.quarantine_unneeded(store, snapshots, &reasons, |path| {
             replaced.iter().any(|replaced| replaced.old.as_deref() == Some(path))
         })?;
@@ -135,8 +136,8 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         Ok(())
     }
 
-    /// Writes another catalog of the scans that a snapshot keeps. Its file does not name it yet. Returns the number of
-    /// scans that are not in it because they are damaged.
+    /// Writes a repaired catalog of the scans that a snapshot keeps. The snapshot's file does not name it yet. Returns
+    /// the number of damaged scans that it omits.
     fn write_other_catalog(
         &mut self,
         store: &mut TileStore,
@@ -171,8 +172,8 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         Ok(())
     }
 
-    /// Where nothing tells whether the map keeps its scans, moves those that no snapshot needs to quarantine. The next
-    /// writer would remove them; without a log nothing tells which of the catalogs the last flush committed.
+    /// Moves scans that no snapshot needs to quarantine if it is unknown whether the map keeps its scans. The next
+    /// writer would remove them, and without a log the last committed catalog is unknown.
     pub(super) fn quarantine_unlisted_scans(&mut self, disk: &Arc<dyn Disk>, index: &Index) -> Result<()> {
         let Index { map_id, metadata, commits, .. } = index;
         let folder = self.layout.folder();
@@ -182,18 +183,18 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         }
         let kept = count_kept(self.disk, &self.layout)?;
         self.counts.scans_lost += kept;
-        // Where a snapshot cannot be read it may need any, and no writer removes any: they go with the snapshot.
+        // An unreadable snapshot may need any file, so no writer removes any. They are moved when the snapshot is.
         let Some(snapshots) = known_snapshots(&store) else { return Ok(()) };
         let unneeded = store.unneeded_scan_files(&snapshots, None)?;
         for path in &unneeded {
             self.quarantine(path, "neither metadata.json nor commits.log tells whether the map needs it")?;
         }
-        // Segments without a catalog have an unknown number of scans.
+        // The number of scans in segments without a catalog is unknown. Count one.
         self.counts.scans_lost += u64::from(kept == 0 && !unneeded.is_empty());
         Ok(())
     }
 
-    /// Moves what was kept of scans for snapshots that are no more to quarantine.
+    /// Moves scans that were kept for lost snapshots to quarantine.
     pub(super) fn quarantine_unneeded_scans(
         &mut self,
         store: &TileStore,
@@ -206,18 +207,18 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
     }
 }
 
-/// A snapshot whose damaged catalog of kept scans has been replaced.
+/// Snapshot whose damaged catalog of kept scans was replaced.
 struct Replaced {
-    /// Its place in the list of snapshots.
+    /// Index in the list of snapshots.
     at: usize,
-    /// The damaged catalog; `None` if it is missing.
+    /// Path of the damaged catalog; `None` if it is missing.
     old: Option<PathBuf>,
-    /// Whether quarantine has a copy of that.
+    /// Whether quarantine has a copy of the damaged catalog.
     is_old_kept: bool,
     scans_lost: u64,
 }
 
-/// What is wrong with files of kept scans.
+/// Reasons for damage of files of kept scans.
 #[derive(Default)]
 struct Reasons(BTreeMap<PathBuf, String>);
 
@@ -241,7 +242,7 @@ impl Reasons {
     }
 }
 
-/// The snapshots of a map; `None` if one cannot be read.
+/// Returns the snapshots of a map; `None` if one is unreadable.
 fn known_snapshots(store: &TileStore) -> Option<Vec<Snapshot>> {
     store.snapshots().names().ok()?.iter().map(|name| store.snapshots().read(name).ok()).collect()
 }

@@ -9,9 +9,8 @@ use crate::store::{Snapshot, SnapshotName, TileStore};
 use std::collections::BTreeMap;
 
 impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
-    /// Snapshots that are found under another name get their own again. Those that cannot be read go to quarantine, and
-    /// with them and with those that are missing the kept tables that no other one sees. Of the others, tiles go whose
-    /// tables cannot be read.
+    /// Repairs the snapshots: renames misnamed ones, and moves unreadable ones to quarantine. Kept tables that only
+    /// lost snapshots used are moved too. Tiles with unreadable tables are removed from the other snapshots.
     pub(super) fn repair_snapshots(&mut self, store: &mut TileStore, config: &MapConfig) -> Result<()> {
         if store.map_id().is_none() {
             return Ok(());
@@ -39,7 +38,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         for snapshot in &mut snapshots {
             self.repair_snapshot(store, config, snapshot, &mut whole)?;
         }
-        // Before the log forgets them: from then on a writer removes what none of the others needs.
+        // Before the log drops these snapshots: afterwards a writer removes files that no other one needs.
         self.quarantine_unneeded_scans(store, &snapshots)?;
         if !gone.is_empty() {
             self.counts.snapshots_lost += gone.len() as u64;
@@ -49,7 +48,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         self.repair_scans_of_snapshots(store, &mut snapshots)
     }
 
-    /// Puts snapshots that the log names and that lie under other names back under their own.
+    /// Renames snapshots that the log names and that have another file name.
     fn put_names_right(&mut self, store: &mut TileStore) -> Result<()> {
         let (Some(map_id), Some(listed)) = (store.map_id(), store.snapshots().list().cloned()) else {
             return Ok(());
@@ -70,7 +69,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
                 misnamed.push(name);
             }
         }
-        // What an earlier repair, which was cut short, has taken there.
+        // Files that an interrupted repair has moved to quarantine.
         let quarantine = self.layout.quarantine();
         for file in self.disk.list(&quarantine).unwrap_or_default() {
             if let Some(name) = file.strip_prefix("snapshots.").and_then(|name| SnapshotName::new(name).ok())
@@ -91,7 +90,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
             store.snapshot_writer().replace(&Snapshot { name: own, ..snapshot })?;
             self.note(ActionKind::Renamed, &path, "the snapshot had another name");
         }
-        // Copied already, and no snapshot.
+        // Copied already, and not listed.
         for name in misnamed.iter().filter(|name| !listed.contains(name)) {
             self.quarantine(&self.layout.snapshot(name), "commits.log names no such snapshot")?;
         }
@@ -122,7 +121,8 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         Ok(())
     }
 
-    /// Where the table that a snapshot saw is missing, names lead it to another version, which is whole and others'.
+    /// Moves a damaged kept table to quarantine. If the snapshot's own table is missing, its name refers to another
+    /// version, which is intact and belongs to others.
     fn quarantine_if_damaged(
         &mut self,
         store: &TileStore,
@@ -141,7 +141,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         }
     }
 
-    /// Kept tables that none of the snapshots sees: one that cannot be read may have.
+    /// Moves kept tables that none of the readable snapshots uses to quarantine: an unreadable one may have used them.
     fn quarantine_unseen(&mut self, store: &TileStore, snapshots: &[Snapshot]) -> Result<()> {
         let mut kept: Vec<_> = store.snapshots().kept_tables().collect();
         kept.sort_unstable();

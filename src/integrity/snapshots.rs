@@ -1,4 +1,4 @@
-//! What the snapshots of a map see beside what the map itself does.
+//! Checks the tables that only snapshots of a map use.
 
 use crate::config::MapConfig;
 use crate::error::{Error, Result};
@@ -7,16 +7,16 @@ use crate::space::TileIndex;
 use crate::store::{Disk, Layout, MAX_NUMBER, Snapshot, TileStore, TileVersion};
 use std::collections::BTreeMap;
 
-/// Kept tables that have been looked at and are whole, and as which version: several snapshots may see one. A snapshot
-/// whose own is lost is led to one that it does not mean.
+/// Kept tables that were read and are intact, with their versions. Several snapshots may use one table. A snapshot
+/// whose own table is missing may refer to another version.
 pub(super) type WholeTables = BTreeMap<(TileIndex, u64), TileVersion>;
 
-/// The tiles of a snapshot whose tables cannot be read as the snapshot names them. Tables that are the map's own too
-/// are left to whoever looks at the map.
+/// Returns the tiles of a snapshot whose tables are not readable as the version that it names. Tables that the map also
+/// uses are omitted: the check of the map reports them.
 ///
 /// # Errors
 ///
-/// A disk that refuses.
+/// An I/O error.
 pub(super) fn lost_tiles(
     store: &TileStore,
     config: &MapConfig,
@@ -45,8 +45,8 @@ pub(super) fn lost_tiles(
     Ok(lost)
 }
 
-/// The highest flush that snapshots and names of kept tables know of: flushes must go on from there, whatever else is
-/// lost.
+/// Returns the highest flush number in snapshots and in names of kept tables. New flushes must have higher numbers,
+/// even if the log is lost.
 pub(super) fn last_known_flush(
     disk: &dyn Disk,
     layout: &Layout,
@@ -60,7 +60,7 @@ pub(super) fn last_known_flush(
         }
     }
     for &tile in tiles {
-        // What cannot be listed is told by whoever reads it next.
+        // Errors are ignored: the next read of the folder reports them.
         let names = disk.list(&layout.tile_folder(tile)).unwrap_or_default();
         let kept = names.iter().filter_map(|name| layout.flush_of_kept(name));
         last = kept.filter(|&flush_number| flush_number < MAX_NUMBER).fold(last, u64::max);

@@ -10,30 +10,30 @@ use crate::store::{
 use std::io;
 use std::path::Path;
 
-/// Of a file that waits to take the place of another.
+/// Note on a file that will replace another.
 const LEFT: &str = "left behind by a process that was killed or that the disk refused, or being written";
 
-/// Of points and lists of scans that no flush needs.
+/// Note on points and lists of scans that no flush needs.
 pub(super) const IDLE_SCANS: &str = "points or a list of scans that neither the map nor a snapshot uses. A killed process left \
                           them, or a writer is about to commit them. They may hold removed scans.";
 
-/// Of `MAP.remapping`.
+/// Note on `MAP.remapping`.
 const SECOND_MAP: &str = "the second map of an online remap that is running or was killed. The next online remap \
                           removes it, and so do `remove-scans` and `remove-points`.";
 
-/// Of `MAP.unfinished`.
+/// Note on `MAP.unfinished`.
 const UNFINISHED_MAP: &str = "a map that `voxtile pull --replace` is making, or the old map that it replaced. The \
                               next `voxtile pull --replace` removes it.";
 
-/// What is no part of the map in its folder and beside it.
+/// Search for foreign and left-over files in the map's folder and next to it.
 impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
-    /// Reports a file that the next writer removes or renames; what has its name and is no file stays.
+    /// Reports a file that the next writer removes or renames. Anything but a regular file is reported as foreign.
     pub(super) fn leftover(&mut self, path: &Path, tile: Option<TileIndex>, reason: &str) {
         if self.is_again {
             return;
         }
         let reason = match self.disk.kind(path) {
-            // Renamed or removed since the folder was listed.
+            // Renamed or removed after the folder was listed.
             Ok(None) => return,
             Ok(Some(EntryKind::File(_))) => reason.to_owned(),
             Ok(Some(_)) => return self.report(Finding::note(path, tile, "no part of a map")),
@@ -50,7 +50,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
                 self.damage(folder, None, "something else has the name of the folder of snapshots");
                 return Ok(());
             }
-            // Where the log lists snapshots, or nobody knows whether it does, that has been told.
+            // Otherwise the missing snapshots, or the unreadable log, were reported.
             _ => return Ok(()),
         }
         for name in self.list(folder)? {
@@ -69,7 +69,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         Ok(())
     }
 
-    /// Looks for what is no part of the map.
+    /// Reports entries that are not part of the map.
     pub(super) fn look_around(
         &mut self,
         store: &TileStore,
@@ -85,7 +85,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
                         self.damage(&path, None, "no regular file: nobody can lock the map to write to it");
                     }
                 }
-                // What was pushed or pulled (`bucket::known_states`).
+                // Pushed and pulled states (`bucket::known_states`).
                 ("bucket_states", _) => {}
                 (KEPT_SCANS, _) => self.look_into_kept_scans(&path)?,
                 (SNAPSHOTS, _) => self.look_into_snapshots(&path)?,
@@ -111,7 +111,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         Ok(())
     }
 
-    /// Looks for a second map that a change of this one makes beside it. Where that cannot be told there is none.
+    /// Reports a second map next to this one. I/O errors are ignored.
     fn look_beside(&mut self, folder: &Path) {
         let reasons = [("remapping", SECOND_MAP), ("unfinished", UNFINISHED_MAP)];
         for (extension, reason) in reasons.into_iter().filter(|_| folder.file_name().is_some()) {
@@ -134,7 +134,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         Ok(())
     }
 
-    /// Looks into the folder of a tile, which the map has or not.
+    /// Checks the entries in the folder of a tile.
     pub(super) fn look_into(
         &mut self,
         store: &TileStore,
@@ -151,7 +151,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
                 self.report_if_seen_twice(finding, Suspect::Folder(tile));
                 return Ok(());
             }
-            // The look at the tile tells.
+            // The check of the tile reports this.
             _ => return Ok(()),
         }
         let mut is_orphan = false;
@@ -188,16 +188,16 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         Ok(())
     }
 
-    /// What has a name; nothing, and a finding, where the medium does not tell.
+    /// Returns the kind of a directory entry. A media error is reported as a finding, and the result is `None`.
     fn kind(&mut self, path: &Path) -> Result<Option<EntryKind>> {
         let kind = self.disk.kind_at(path);
         self.unless_unreadable(kind)
     }
 
-    /// The names in a folder; none, and a finding, where it cannot be read.
+    /// Lists the names in a folder. A media error is reported as a finding, and the result is empty.
     fn list(&mut self, folder: &Path) -> Result<Vec<String>> {
         let names = match self.disk.list(folder) {
-            // Removed since it was seen.
+            // Removed after its parent was listed.
             Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(Vec::new()),
             names => names.map_err(|error| Error::io(folder, "list", error)),
         };

@@ -3,7 +3,7 @@ use crate::space::TileIndex;
 use crate::store::{Disk, EntryKind, Layout, SegmentPlace};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What seemed damaged.
+/// Part of a map that may be damaged and is checked again.
 pub(super) enum Suspect {
     /// The list of scans.
     List,
@@ -13,13 +13,12 @@ pub(super) enum Suspect {
     Catalog,
     /// The points of a kept scan.
     Points(SegmentPlace),
-    /// A tile of the map, and whether its table is whole and counted.
+    /// A tile of the map, and whether its table is intact and counted.
     Tile(TileIndex, bool),
-    /// The folder of a tile that the map has not got.
+    /// The folder of a tile that is not in the map.
     Folder(TileIndex),
 }
 
-/// Several of them.
 #[derive(Debug, Default)]
 pub(super) struct Suspects {
     pub(super) list: bool,
@@ -42,7 +41,7 @@ impl Suspects {
         }
     }
 
-    /// How many there are.
+    /// Number of parts.
     pub(super) fn len(&self) -> u64 {
         let some = [self.list, self.snapshots, self.catalogs].into_iter().filter(|&is_one| is_one).count();
         (some + self.points.len() + self.tiles.len() + self.folders.len()) as u64
@@ -53,14 +52,14 @@ impl Suspects {
     }
 }
 
-/// Length of a log, and its last bytes. The checksum of the last record is among them, so that no two states of a log
-/// have the same.
+/// Length of a log and its last bytes. They include the checksum of the last record, so they identify the state of the
+/// log.
 pub(super) type LogEnd = (u64, Vec<u8>);
 
-/// How many bytes of its end tell that a log is the same.
+/// Number of bytes compared at the end of the log.
 const LOG_END_BYTES: usize = 64;
 
-/// The current end of the log; `None` if there is no log or it cannot be read.
+/// Returns the current end of the log; `None` if there is no readable log.
 pub(super) fn log_end(disk: &dyn Disk, layout: &Layout) -> Option<LogEnd> {
     let path = layout.commit_log();
     let Ok(Some(EntryKind::File(bytes))) = disk.kind(&path) else { return None };
@@ -68,10 +67,10 @@ pub(super) fn log_end(disk: &dyn Disk, layout: &Layout) -> Option<LogEnd> {
     Some((bytes, disk.read_at(&path, offset, LOG_END_BYTES).ok()?))
 }
 
-/// The beginning of `metadata.json`; `None` where it cannot be read.
+/// Returns the beginning of `metadata.json`; `None` if it is unreadable.
 pub(super) fn metadata_text(disk: &dyn Disk, layout: &Layout) -> Option<Vec<u8>> {
     disk.read_at(&layout.metadata(), 0, METADATA_BYTES).ok()
 }
 
-/// How many bytes of `metadata.json` are compared: its numbers are at its beginning.
+/// Number of bytes of `metadata.json` that are compared. The flush number is near its beginning.
 const METADATA_BYTES: usize = 1 << 16;

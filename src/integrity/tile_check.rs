@@ -6,18 +6,18 @@ use crate::store::{Checksumming, Disk, FileChecksum, TileFile, TileStore, TileVe
 use std::io::{self, Read, Write};
 use std::path::Path;
 
-/// What a look at both files of a tile gave.
+/// Result of checking both files of a tile.
 pub(super) struct TileCheck {
     pub table: Result<ReadTable>,
-    /// `None` where there is none, or nothing tells what it must be.
+    /// `None` if there is no octree file, or if its expected content is unknown.
     pub octree: Option<std::result::Result<(), FormatError>>,
 }
 
-/// Reads both files of a tile that the map holds.
+/// Checks both files of a tile of the map.
 ///
 /// # Errors
 ///
-/// A disk that refuses; damage is part of the answer.
+/// An I/O error. Damage is part of the result.
 pub(super) fn check_tile(
     disk: &dyn Disk,
     store: &TileStore,
@@ -56,7 +56,7 @@ fn check_octree(
         }
         found => found?,
     };
-    // A writer beside this reader may have committed it without renaming it yet.
+    // A concurrent writer may have committed the octree without renaming it yet.
     if found == Some(version.octree)
         || checksum_of(disk, &layout.next(tile, TileFile::Octree))
             .is_ok_and(|next| next == Some(version.octree))
@@ -76,13 +76,13 @@ fn check_octree(
     }))
 }
 
-/// The octree file of a table, written to `out`.
+/// Writes the octree file of a table.
 pub(super) fn write_octree(config: &MapConfig, table: &ReadTable, out: &mut dyn Write) -> io::Result<()> {
     let threshold = config.occupied_log_odds() as f32;
     table.table.write_bt(config.grid.resolution_m(), threshold, &mut &mut *out)
 }
 
-/// Length and checksum of a file; `None` if there is none.
+/// Returns length and checksum of a file; `None` if it does not exist.
 pub(super) fn checksum_of(disk: &dyn Disk, path: &Path) -> Result<Option<FileChecksum>> {
     let input = match disk.open(path) {
         Ok(input) => input,
@@ -96,7 +96,7 @@ pub(super) fn checksum_of(disk: &dyn Disk, path: &Path) -> Result<Option<FileChe
     Ok(Some(input.finish().0))
 }
 
-/// The first byte in which a file differs from what it should be, for people who look for the cause.
+/// Returns the offset of the first byte that differs from the expected content, as a hint at the cause.
 pub(super) fn first_difference(disk: &dyn Disk, path: &Path, expected: &[u8]) -> Option<u64> {
     let mut found = Vec::new();
     disk.open(path).ok()?.take(expected.len() as u64 + 1).read_to_end(&mut found).ok()?;

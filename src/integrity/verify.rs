@@ -16,55 +16,54 @@ use serde::Serialize;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-/// What a look at every byte of a map gave.
+/// Result of a verification.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct Verification {
-    /// Whether the map has the checksums that let damage be found; a map of the original format has none.
+    /// Whether the map has checksums. A map of the original format has none.
     pub verified: bool,
-    /// Number of the flush that was looked at.
+    /// Number of the verified flush.
     pub flush_number: u64,
-    /// Number of the last scan in it.
+    /// Number of the last scan in the flush.
     pub scan_number: u64,
-    /// Tiles that were looked at: those of the map, or of the scope.
+    /// Number of verified tiles: of the map, or of the scope.
     pub tiles: u64,
-    /// Snapshots of the map.
+    /// Number of snapshots of the map.
     pub snapshots: u64,
-    /// Observed voxels in the tiles that are whole.
+    /// Number of observed voxels in the intact tiles.
     pub voxels: u64,
-    /// Bytes of the tables that are whole.
+    /// Bytes of the intact tables.
     pub table_bytes: u64,
-    /// Findings that are damage: each holds for one flush.
+    /// Number of findings of damage. Each was confirmed for one flush.
     pub damage: u64,
-    /// Findings that are none.
+    /// Number of other findings.
     pub notes: u64,
-    /// Those of them that are files which no flush needs: left behind by a process that was killed or that the disk
-    /// refused, or of one at work. The next process that opens the map for writing removes them or gives them their
-    /// names.
+    /// Number of notes on files that no flush needs: remains of a process that was killed or had an I/O error, or
+    /// temporary files of an active one. The next process that opens the map for writing removes or renames them.
     pub leftovers: u64,
-    /// Findings of which nothing tells whether they are damage, because other processes changed the map faster than it
-    /// was looked at: one of the notes says so.
+    /// Number of possible faults that could not be confirmed, because other processes changed the map faster than it
+    /// was checked. A note reports them.
     pub unsettled: u64,
 }
 
 impl Verification {
-    /// Whether nothing is damaged, and every possible fault could be decided.
+    /// Returns whether nothing is damaged, and no possible fault is undecided.
     pub fn is_whole(&self) -> bool {
         self.damage == 0 && self.unsettled == 0
     }
 }
 
-/// Checks every file of a map, beside a writer too. Takes no lock and writes nothing. What seems damaged is read a
-/// second time. It is damage if both looks find it as of the same flush; if the map was changed in between, it is looked
-/// at again as of the last flush.
+/// Checks every file of a map, without a lock and without writing. A writer may be active: possible damage is read a
+/// second time, and reported if both reads find it for the same flush. If the map has changed meanwhile, the check is
+/// repeated for the last flush.
 ///
-/// `found` is told each finding, `progress` the tiles done and all. Memory: the list of tiles, where there is damage a
-/// second one, and one tile.
+/// `found` receives each finding, and `progress` the number of tiles done and in total. Memory: the list of tiles, a
+/// second list if there is damage, and one tile.
 ///
 /// # Errors
 ///
-/// No map there, or a disk that refuses more than single files. Damage is a finding, and so is a file or folder that
-/// the medium does not give back; the others are looked at all the same.
+/// No map, or an I/O error that is not specific to one file. Damage and unreadable files are findings, and the check
+/// continues.
 pub fn verify(
     folder: impl Into<MapPath>,
     found: impl FnMut(&Finding),
@@ -73,15 +72,15 @@ pub fn verify(
     verify_scope(folder, &VerifyScope::All, found, progress)
 }
 
-/// Which part of a map is checked: the scopes of several processes may add up to the whole.
+/// Part of a map to check. Several processes can share the work.
 #[derive(Clone, Debug, Default)]
 pub enum VerifyScope {
-    /// All of it.
+    /// The whole map.
     #[default]
     All,
-    /// The files of these tiles as of the last flush; those that the map has not got are left out.
+    /// The files of these tiles as of the last flush. Tiles that are not in the map are ignored.
     Tiles(FxHashSet<TileIndex>),
-    /// All but the files of tiles as of the last flush: lists, scans, snapshots, what lies around.
+    /// Everything except the files of tiles as of the last flush: lists, scans, snapshots, and foreign files.
     AllButTiles,
 }
 
@@ -99,7 +98,7 @@ impl VerifyScope {
     }
 }
 
-/// The same for a part of the map. What is wrong with the list of tiles itself is found in every part.
+/// Like [`verify`], for a part of the map. Damage of the list of tiles is found in every part.
 ///
 /// # Errors
 ///
@@ -147,34 +146,34 @@ pub(super) struct Verifier<'a, F, P> {
     found: F,
     progress: P,
     pub(super) counts: Verification,
-    /// The snapshots that the log names; `None` if it names none.
+    /// Snapshots in the log; `None` if the log has no list.
     pub(super) listed: Option<SnapshotList>,
-    /// Tiles that are no longer in the list of tiles because they are damaged, which has been told.
+    /// Damaged tiles that are missing in the rebuilt index and were reported already.
     pub(super) told: BTreeSet<TileIndex>,
-    /// Tables that only snapshots see and that are whole.
+    /// Intact tables that only snapshots use.
     pub(super) whole: WholeTables,
-    /// Points of kept scans that are whole as of the flush that is looked at.
+    /// Points of kept scans that are intact as of the current flush.
     points: WholePoints,
-    /// How the log ended before the store was opened; `None` where nothing tells whether the map has changed since.
+    /// End of the log before the store was opened; `None` if it is unreadable, so that changes cannot be detected.
     opened: Option<LogEnd>,
-    /// The same of the look before.
+    /// End of the log at the previous check.
     before: Option<LogEnd>,
-    /// What may be damaged, or was being changed when it was looked at.
+    /// Parts that may be damaged, or were being changed when they were checked.
     suspects: Suspects,
-    /// Damage that was reported when these were looked at again.
+    /// Damage that was reported by repeated checks.
     reported: FxHashSet<String>,
-    /// Whether these are looked at again: notes have been told.
+    /// Whether this is a repeated check. Notes were reported by the first one.
     pub(super) is_again: bool,
 }
 
-/// Upper bound on the looks at possible faults. Each takes as long as reading the files concerned.
+/// Maximum number of checks of possible damage. Each reads the affected files.
 const MAX_LOOKS: usize = 30;
 
-/// Upper bound on the pauses before such a look.
+/// Maximum number of pauses before a repeated check.
 const MAX_PAUSES: usize = 10;
 
 impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
-    /// Opens the map; where metadata or log cannot be read, as far as its remains tell what it is.
+    /// Opens the map. If metadata or log is unreadable, rebuilds them from the remains.
     fn open(&mut self) -> Result<Option<TileStore>> {
         let store = match self.open_unchanged() {
             Ok((store, end)) => {
@@ -196,8 +195,8 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         Ok(Some(store))
     }
 
-    /// Opens the map, and returns how its log ended before. An error holds for a map that did not change
-    /// meanwhile: next to a pull that replaces the map, metadata and log may be of two folders.
+    /// Opens the map, and returns the end of its log from before. Errors are returned only if the map did not change
+    /// meanwhile: while a pull replaces the map, metadata and log may be read from different folders.
     ///
     /// # Errors
     ///
@@ -234,7 +233,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
 
     pub(super) fn report(&mut self, finding: Finding) {
         match finding.severity {
-            // A list of snapshots is looked at again as a whole, though parts of it are decided.
+            // A list of snapshots is checked again as a whole, including parts that were decided.
             Severity::Damage if self.is_again && !self.reported.insert(finding.to_string()) => return,
             Severity::Damage => self.counts.damage += 1,
             Severity::Note if self.is_again => return,
@@ -243,8 +242,8 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         (self.found)(&finding);
     }
 
-    /// Reports damage at the second look as of one flush. At the first, a writer may have been about to replace, rename
-    /// or remove what is missing or not as it should be.
+    /// Reports damage if two checks find it for one flush. At the first check, a writer may have been replacing,
+    /// renaming or removing the file.
     pub(super) fn report_if_seen_twice(&mut self, finding: Finding, suspect: Suspect) {
         let is_first = self.opened.is_some() && self.before != self.opened;
         if is_first || self.opened.is_some() && log_end(&*self.disk, &self.layout) != self.opened {
@@ -287,7 +286,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         self.verify_kept_scans(store, None)
     }
 
-    /// Looks for what is no part of the map.
+    /// Reports entries that are not part of the map.
     fn verify_surroundings(&mut self, store: &TileStore) -> Result<()> {
         if !self.scope.has_rest() {
             return Ok(());
@@ -299,14 +298,14 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         self.look_around(store, |tile| store.tiles().contains(tile))
     }
 
-    /// Looks again at what seemed damaged, until each is damaged or whole as of one flush.
+    /// Repeats the checks of possible damage until each part is found damaged or intact for one flush.
     fn look_again(&mut self) -> Result<()> {
         self.is_again = true;
         for look in 0..MAX_LOOKS {
             if self.suspects.is_empty() {
                 return Ok(());
             }
-            // Longer each time: a writer at work may be between two flushes then.
+            // Longer each time, to reach a pause between two flushes.
             (0..look.min(MAX_PAUSES)).for_each(|_| self.disk.pause());
             let suspects = std::mem::take(&mut self.suspects);
             let (store, end) = match self.open_unchanged() {
@@ -316,7 +315,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
                     continue;
                 }
                 Err(error) => {
-                    // Without the map's own files nothing decides the others.
+                    // Without the map's own files the other parts cannot be decided.
                     self.counts.unsettled += suspects.len();
                     let finding = Finding::of(error)?;
                     self.report(finding);
@@ -325,7 +324,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
             };
             self.before = std::mem::replace(&mut self.opened, end);
             if self.before != self.opened {
-                // Segments that were removed since may have others with their numbers.
+                // New segments may have the numbers of removed ones.
                 self.points = WholePoints::default();
             }
             self.listed = store.snapshots().list().cloned();
@@ -377,7 +376,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         Ok(())
     }
 
-    /// Looks at the scans that the map and its snapshots keep, or at the points of some of them.
+    /// Checks the scans that the map and its snapshots keep, or the points of some of them.
     fn verify_kept_scans(&mut self, store: &TileStore, only: Option<&KeptPlaces>) -> Result<()> {
         let disk = self.disk.clone();
         let mut whole = std::mem::take(&mut self.points);
@@ -388,7 +387,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         checked
     }
 
-    /// Looks at a tile; where `is_counted` its table has been counted.
+    /// Checks a tile. With `is_counted` its table was counted before.
     fn verify_tile(
         &mut self,
         store: &TileStore,
@@ -421,7 +420,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         Ok(())
     }
 
-    /// Where metadata or log cannot be read, the tiles are checked against what else tells of them.
+    /// Rebuilds an unreadable index from the remains, so that the tiles can be checked.
     fn index_from_remains(&mut self) -> Result<Option<TileStore>> {
         let remains = Salvage::read(&*self.disk, &self.layout)?;
         self.layout = remains.layout_of_tiles(&*self.disk, self.layout.folder());
@@ -444,7 +443,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         }
     }
 
-    /// Looks at the snapshots, and at the tables that only they see.
+    /// Checks the snapshots, and the tables that only they use.
     fn verify_snapshots(&mut self, store: &TileStore, config: &MapConfig) -> Result<()> {
         self.counts.snapshots = 0;
         let names = match store.snapshots().names() {

@@ -8,32 +8,32 @@ use crate::store::MapPath;
 use crate::tile::Table;
 use serde::Serialize;
 
-/// What a map took from its parts.
+/// Result of [`adopt`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct Adopted {
-    /// Tiles that the map did not have before.
+    /// Number of new tiles.
     pub tiles_added: u64,
-    /// Tiles that are others now.
+    /// Number of replaced tiles.
     pub tiles_changed: u64,
-    /// Tiles of the parts that are in the map as they were.
+    /// Number of tiles that are equal in the map and in the parts.
     pub tiles_equal: u64,
     /// Number of the map's last scan.
     pub scan_number: u64,
-    /// Number of the flush that made all of this durable.
+    /// Number of the flush that committed the tiles.
     pub flush_number: u64,
 }
 
-/// Puts the tiles of parts in the place of a map's own, in one commit: readers see all of it, or nothing.
+/// Replaces tiles of a map by those of parts, in one commit.
 ///
-/// Parts are made of the map as of the flush `of_flush`, each with other tiles: a crop of the map that took more scans.
-/// `scans` says how many scans the map has more, then; it does not get their list. Tiles that no part has stay.
-/// `progress` is told the tiles done and all.
+/// Each part is a crop of the map as of flush `of_flush`, into which more scans were inserted. No two parts have a tile
+/// in common. `scans` is the number of these scans; the map gets no list of them. Tiles that no part has are unchanged.
+/// `progress` receives the number of tiles done and in total.
 ///
 /// # Errors
 ///
-/// No map there, another writer, a map that was flushed since `of_flush`, a map that keeps its scans, parts of another
-/// grid or model or with a common tile, a damaged tile, a disk that refuses; the map is as before then.
+/// No map, another writer, a map that was flushed after `of_flush`, a map that keeps its scans, parts with another grid
+/// or sensor model or with a common tile, a damaged tile, or an I/O error. The map is unchanged then.
 pub fn adopt(
     map: impl Into<MapPath>,
     parts: &[MapReader],
@@ -57,7 +57,7 @@ pub fn adopt(
         return Err(Error::argument("parts", "two of them have the same tile; make parts of other regions"));
     }
     edit(disk, map, |editor| {
-        // Under the map's lock: what was flushed before it was taken is seen here.
+        // The map is locked, so this includes all earlier flushes.
         let flush_number = editor.flush_number();
         if flush_number != of_flush {
             let reason = format!(
@@ -88,7 +88,7 @@ pub fn adopt(
     })
 }
 
-/// A tile that is as it was is not written: readers and snapshots need no copy of it.
+/// Writes a tile if it has changed. For an equal tile, readers and snapshots need no copy.
 fn adopt_tile(editor: &mut MapEditor, tile: TileIndex, table: &Table, adopted: &mut Adopted) -> Result<()> {
     if editor.version(tile).is_none() {
         adopted.tiles_added += 1;
@@ -101,7 +101,7 @@ fn adopt_tile(editor: &mut MapEditor, tile: TileIndex, table: &Table, adopted: &
     editor.replace(tile, table)
 }
 
-/// Whether two tables have the same evidence, to the bit.
+/// Returns whether two tables have the same evidence, bit by bit.
 fn is_same(a: &Table, b: &Table) -> bool {
     let bits = |(code, evidence): (MortonCode, Evidence)| {
         (code, evidence.log_odds.to_bits(), evidence.observation_count)

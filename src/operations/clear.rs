@@ -6,27 +6,27 @@ use crate::space::TileIndex;
 use crate::store::MapPath;
 use serde::Serialize;
 
-/// What clearing a part of a map did.
+/// Result of [`clear`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct Cleared {
-    /// Voxels that are unknown now and were not before.
+    /// Number of voxels that became unknown.
     pub voxels_cleared: u64,
-    /// Tiles that lost some of their voxels.
+    /// Number of tiles that lost some of their voxels.
     pub tiles_changed: u64,
-    /// Tiles that lost all of their voxels, and are no longer part of the map.
+    /// Number of tiles that lost all voxels and were removed from the map.
     pub tiles_removed: u64,
-    /// Tiles that the map still has.
+    /// Number of tiles in the map now.
     pub tiles: u64,
 }
 
-/// Makes the voxels of a part of space unknown, in place and in one commit: all of it is cleared, or nothing.
+/// Makes the voxels in a part of space unknown, in place and in one commit.
 ///
-/// A tile that is cleared whole is not read. `progress` is told the tiles done and all.
+/// A tile that is entirely in the part is not read. `progress` receives the number of tiles done and in total.
 ///
 /// # Errors
 ///
-/// No map there, another writer, a box that is none, a damaged tile, a disk that refuses; the map is as before then.
+/// No map, another writer, an invalid box, a damaged tile, or an I/O error. The map is unchanged then.
 pub fn clear(map: impl Into<MapPath>, part: &Part, mut progress: impl FnMut(u64, u64)) -> Result<Cleared> {
     let (disk, map) = map.into().into_parts();
     let map = &*map;

@@ -5,17 +5,16 @@ use crate::mapper::{MapReader, MapView};
 use crate::persistence::{new_map_id, new_metadata};
 use std::path::Path;
 
-/// Writes a map anew with another storage, or the same: a new map in `folder`, which does not exist yet or is empty,
-/// with the same content to the bit. In memory are one tile and some 200 bytes a tile.
+/// Copies a map to a new one with another or the same storage, in `folder`, which must be missing or empty. The content
+/// is identical bit by bit. Memory: one tile, and about 200 bytes per tile.
 ///
-/// It is the same map in another form: its id, its number of scans, each tile's, and the input that a build goes on
-/// with are kept, so that a build can be resumed on either, and a merge of both is warned of. Only flushes are counted
-/// anew; snapshots are not taken along. A map of the original format, which has no id, gets one, as it would before its
-/// first change. `progress` is told the tiles done and all.
+/// The copy keeps the map's id, its number of scans and that of each tile, and the inputs. So a build can be resumed on
+/// either, and a merge of both reports their relation. Flush numbers restart, and snapshots are not copied. A map of
+/// the original format gets an id. `progress` receives the number of tiles done and in total.
 ///
 /// # Errors
 ///
-/// A folder with other content, a damaged tile, which is named, a disk that refuses: there is no new map then.
+/// A folder with other content, a damaged tile, or an I/O error. There is no new map then.
 pub fn convert(
     map: &MapReader,
     folder: impl AsRef<Path>,

@@ -8,15 +8,15 @@ use crate::store::{MapPath, Metadata, UnsyncedDisk};
 use std::path::Path;
 use std::sync::Arc;
 
-/// Makes a map of the voxels of another that are in a part of space.
+/// Creates a map of the voxels of another map in a part of space.
 ///
-/// The new one has the parameters, storage and number of scans of the other, but an id of its own and no input to go on
-/// with: it is a part of what the scans have said. It is there as a whole or not at all, see [`MapWriter`]. `progress`
-/// is told the tiles done and all.
+/// The new map has the parameters, storage and number of scans of the other, but its own id and no inputs to resume,
+/// because it lacks a part of the scans. It appears only when it is complete, see [`MapWriter`]. `progress` receives
+/// the number of tiles done and in total.
 ///
 /// # Errors
 ///
-/// A box that is none, a damaged tile, an output with other content, a disk that refuses.
+/// An invalid box, a damaged tile, an output with other content, or an I/O error.
 pub fn crop(
     map: &MapReader,
     part: &Part,
@@ -26,8 +26,8 @@ pub fn crop(
     crop_to(map, part, MapPath::on(map.disk(), output), new_map_id(), progress)
 }
 
-/// The same for a map that is to become a piece of another one, whose id it gets ([`move_piece`](super::move_piece())).
-/// It is not durable before: whoever crashes makes it again.
+/// Like [`crop`], for a shard of a future map with the id `map_id` ([`move_piece`](super::move_piece())). The shard is
+/// not durable before that: after a crash it must be created again.
 ///
 /// # Errors
 ///
@@ -70,7 +70,7 @@ fn crop_to(
     writer.finish()
 }
 
-/// What a part says of itself: what the whole says, but for its identity and its input.
+/// Returns the metadata of the whole map, without its identity and inputs.
 fn metadata_of_part(map: &MapReader, map_id: [u8; 16]) -> Metadata {
     let mut metadata = new_metadata(map.config(), map_id, &[]);
     if let (Some(ext), Some(whole)) = (&mut metadata.ext, &map.metadata().ext) {

@@ -6,68 +6,68 @@ use crate::sensor::Evidence;
 use crate::store::MapPath;
 use serde::Serialize;
 
-/// How evidence fades: the log-odds of every voxel times `2^(-n / halflife)`, where `n` is the number of scans that the
-/// map has taken since its evidence last faded, or since its beginning. Counts of observations stay.
+/// Rule for the decay of evidence: multiplies the log-odds of every voxel by `2^(-n / halflife)`, where `n` is the
+/// number of scans since the last decay, or since the beginning. Observation counts are unchanged.
 ///
-/// So what was seen becomes less certain the more scans have come after, wherever they looked; new scans outweigh it
-/// sooner. The rule knows nothing of when a voxel was last seen, because a map does not: it depends on the number of
-/// scans alone, and not on how the map was kept in memory or when it was flushed.
+/// So older evidence becomes less certain with each scan, regardless of where that scan was taken, and new scans
+/// outweigh it sooner. A map does not record when a voxel was last observed, so the rule depends only on the number of
+/// scans, and not on caching or flushes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Decay {
-    /// After so many scans log-odds are half of what they were.
+    /// Half-life in scans.
     pub halflife_scans: f64,
-    /// Takes so many scans in place of those that came since the last time.
+    /// Number of scans to use instead of those since the last decay.
     pub scans: Option<u64>,
-    /// Voxels whose log-odds then are nearer to 0 than this become unknown; 0 keeps all.
+    /// Voxels with a smaller absolute log-odds after the decay become unknown; 0 keeps all.
     pub forget_below: f64,
 }
 
-/// What a decay did.
+/// Result of [`decay`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct Decayed {
-    /// The number of scans for which evidence faded.
+    /// Number of scans of the decay.
     pub scans: u64,
-    /// What log-odds were multiplied by.
+    /// Factor by which log-odds were multiplied.
     pub factor: f64,
-    /// Voxels that the map has.
+    /// Number of voxels in the map now.
     pub voxels: u64,
-    /// Voxels that are unknown now and were not before.
+    /// Number of voxels that became unknown.
     pub voxels_forgotten: u64,
-    /// Tiles that the map has.
+    /// Number of tiles in the map now.
     pub tiles: u64,
-    /// Tiles that lost all of their voxels, and are no longer part of the map.
+    /// Number of tiles that lost all voxels and were removed from the map.
     pub tiles_removed: u64,
 }
 
-/// Log-odds do not fade below this: as `f32`, which octrees have, they would become 0, and what is free would count as
-/// occupied.
+/// Lower limit of the absolute log-odds after a decay. As `f32`, which octrees store, smaller values would become 0,
+/// and free voxels would count as occupied.
 const MIN_LOG_ODDS: f64 = f32::MIN_POSITIVE as f64;
 
 impl Decay {
-    /// The rule with a half-life in scans.
+    /// Returns the rule with a half-life in scans.
     pub fn new(halflife_scans: f64) -> Self {
         Self { halflife_scans, scans: None, forget_below: 0.0 }
     }
 
-    /// The same for a number of scans.
+    /// Sets the number of scans.
     pub fn with_scans(self, scans: u64) -> Self {
         Self { scans: Some(scans), ..self }
     }
 
-    /// The same, and log-odds nearer to 0 than this are forgotten.
+    /// Sets the absolute log-odds below which voxels become unknown.
     pub fn with_forget_below(self, forget_below: f64) -> Self {
         Self { forget_below, ..self }
     }
 
-    /// What log-odds are multiplied by after so many scans. In `f64`, from the pure-Rust `libm`: the same bits on every
-    /// machine.
+    /// Returns the factor of log-odds after `scans` scans. It is computed in `f64` by the pure-Rust `libm`, so it has
+    /// the same bits on every machine.
     pub fn factor(&self, scans: u64) -> f64 {
         exp2(-(scans as f64) / self.halflife_scans)
     }
 
-    /// A voxel's evidence after it has faded by a factor; `None` if it is forgotten.
+    /// Applies a factor to a voxel's evidence. Returns `None` if the voxel becomes unknown.
     pub fn faded(&self, evidence: Evidence, factor: f64) -> Option<Evidence> {
         let least = evidence.log_odds.abs().min(MIN_LOG_ODDS);
         let faded = (evidence.log_odds * factor).abs().max(least);
@@ -88,15 +88,14 @@ impl Decay {
     }
 }
 
-/// Lets the evidence of a map fade, in place and in one commit: all of it has faded, or nothing. The map remembers how
-/// far, so that asking again at once changes nothing, unless it names a number of scans.
+/// Applies a decay to a map, in place and in one commit. The map records the last decay, so a repeated call changes
+/// nothing, unless the rule has a number of scans.
 ///
-/// `progress` is told the tiles done and all.
+/// `progress` receives the number of tiles done and in total.
 ///
 /// # Errors
 ///
-/// No map there, another writer, a rule that makes no sense, a damaged tile, a disk that refuses; the map is as before
-/// then.
+/// No map, another writer, an invalid rule, a damaged tile, or an I/O error. The map is unchanged then.
 pub fn decay(map: impl Into<MapPath>, decay: &Decay, mut progress: impl FnMut(u64, u64)) -> Result<Decayed> {
     let (disk, map) = map.into().into_parts();
     let map = &*map;

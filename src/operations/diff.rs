@@ -7,29 +7,29 @@ use crate::space::TileIndex;
 use crate::tile::Table;
 use serde::Serialize;
 
-/// In what two maps, or two states of a map, differ: what became of the first on the way to the second.
+/// Difference from a first map, or state of a map, to a second one.
 ///
-/// *Flipped* are voxels that were free and are occupied now, or the other way, each by its own map's threshold;
-/// *changed* are those whose log-odds or count differ and nothing more.
+/// *Flipped* voxels changed from free to occupied or back, each by its own map's threshold. *Changed* voxels differ
+/// only in log-odds or count.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct Diff {
-    /// Tiles that only the second has.
+    /// Number of tiles that only the second map has.
     pub tiles_appeared: u64,
-    /// Tiles that only the first has.
+    /// Number of tiles that only the first map has.
     pub tiles_gone: u64,
-    /// Tiles that both have, with other voxels or evidence.
+    /// Number of tiles in both maps with different voxels or evidence.
     pub tiles_changed: u64,
-    /// Tiles that are the same in both.
+    /// Number of tiles that are equal in both maps.
     pub tiles_equal: u64,
-    /// Tiles that had to be read, because nothing else tells that they are the same.
+    /// Number of tiles that were read, because the index does not show that they are equal.
     pub tiles_read: u64,
-    /// Voxels, in all tiles that differ.
+    /// Number of different voxels in all tiles.
     #[serde(flatten)]
     pub voxels: VoxelDiff,
 }
 
-/// Numbers of voxels that differ.
+/// Numbers of different voxels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct VoxelDiff {
@@ -41,42 +41,42 @@ pub struct VoxelDiff {
     pub to_occupied: u64,
     /// Occupied in the first, free in the second.
     pub to_free: u64,
-    /// Of another log-odds or count, and occupied in both or free in both.
+    /// Occupied in both or free in both, with other log-odds or count.
     pub changed: u64,
 }
 
-/// In what a tile differs.
+/// Difference of a tile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct TileDiff {
-    /// Which tile.
+    /// Index of the tile.
     pub tile: [i32; 3],
-    /// Whether both have it.
+    /// Presence of the tile in the two maps.
     pub change: TileChange,
-    /// Its voxels.
+    /// Numbers of different voxels.
     #[serde(flatten)]
     pub voxels: VoxelDiff,
 }
 
-/// What became of a tile.
+/// Change of a tile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum TileChange {
-    /// Only the second has it.
+    /// Only the second map has it.
     Appeared,
-    /// Only the first has it.
+    /// Only the first map has it.
     Gone,
-    /// Both have it.
+    /// Both maps have it.
     Changed,
 }
 
-/// Compares two maps, or states of a map, tile by tile. Tiles of which the index tells that they are the same version
-/// of the same map are not read. `found` is told each tile that differs, in order, `progress` the tiles done and all.
-/// Memory: the lists of tiles, and one tile of each.
+/// Compares two maps, or states of a map, tile by tile. Tiles whose index entries prove the same version of the same
+/// map are not read. `found` receives each different tile, in order, and `progress` the number of tiles done and in
+/// total. Memory: the lists of tiles, and one tile of each map.
 ///
 /// # Errors
 ///
-/// [`Error::Mismatch`] if resolution, tile size or coordinate reference system differ; a tile that cannot be read.
+/// [`Error::Mismatch`] if resolution, tile size or coordinate reference system differ; an unreadable tile.
 pub fn diff(
     first: &MapReader,
     second: &MapReader,
@@ -151,7 +151,7 @@ fn tile_diff(first: &MapReader, second: &MapReader, index: TileIndex) -> Result<
 }
 
 impl VoxelDiff {
-    /// Goes through both tables side by side, in Morton order.
+    /// Compares two tables in Morton order.
     fn of(config_a: &MapConfig, a: &Table, config_b: &MapConfig, b: &Table) -> Self {
         let thresholds = [config_a, config_b].map(MapConfig::occupied_log_odds);
         let mut diff = Self::default();

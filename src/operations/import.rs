@@ -4,14 +4,14 @@ use crate::error::Result;
 use crate::mapper::{MapView, OctreeMap};
 use crate::store::MapPath;
 
-/// Makes a map of a file of OctoMap: the same voxels with the same log-odds, no observation counts (0), no scans.
+/// Creates a map from a file of OctoMap: the same voxels with the same log-odds, observation counts of 0, and no scans.
 ///
-/// In memory are the file's tree and one tile. The map is there as a whole or not at all, see [`MapWriter`]. `progress`
-/// is told the tiles done and all.
+/// Memory: the file's tree and one tile. The map appears only when it is complete, see [`MapWriter`]. `progress`
+/// receives the number of tiles done and in total.
 ///
 /// # Errors
 ///
-/// An output with other content, a disk that refuses.
+/// An output with other content, or an I/O error.
 pub fn import(
     map: &OctreeMap,
     output: impl Into<MapPath>,

@@ -6,19 +6,19 @@ use crate::mapper::{MapReader, MapView};
 use crate::store::{MapPath, hex};
 use std::path::Path;
 
-/// Makes one map of pieces ([`make_piece`](super::make_piece), [`move_piece`](super::move_piece())) of the same id,
-/// which it gets.
+/// Joins shards ([`make_piece`](super::make_piece), [`move_piece`](super::move_piece())) with the same id to one map
+/// with that id.
 ///
-/// The map is what [`merge`](super::merge()) would make of the pieces, but no tile is read: its files get a second name
-/// in the map, or are copied where the file system has no such names. Pieces are opened one at a time, and stay whole,
-/// so an attempt that was killed is made again; what it left is removed then. They are not to be written to; removing
-/// them leaves the map as it is. It is there as a whole or not at all, see [`MapWriter`](super::MapWriter); it is made
-/// on the disk of the pieces. `progress` is told the tiles done and all.
+/// The result equals that of [`merge`](super::merge()), but no tile is read: the files get hard links in the map, or
+/// are copied if the file system has none. Shards are opened one at a time and are unchanged. So a killed attempt can
+/// be repeated, which removes its remains. The shards must not have a writer. Removing them does not affect the map.
+/// The map appears only when it is complete, see [`MapWriter`](super::MapWriter), on the disk of the shards. `progress`
+/// receives the number of tiles done and in total.
 ///
 /// # Errors
 ///
-/// No piece, pieces of other ids, parameters or storage, two with the same tile, a tile's file that is missing or of
-/// another length than the log of its piece says, an output with other content, a disk that refuses.
+/// No shard, shards with other ids, parameters or storage, or with a common tile, a file that is missing or of another
+/// length than in the log of its shard, an output with other content, or an I/O error.
 pub fn join(
     pieces: &[MapPath],
     output: impl AsRef<Path>,

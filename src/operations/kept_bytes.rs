@@ -4,27 +4,27 @@ use crate::store::{EntryKind, MapPath, TileStore, tile_of_folder};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What is on disk of a map beside the map as it is: tables that were replaced and that somebody still sees.
+/// Replaced tables on disk that readers or snapshots still use.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct KeptBytes {
-    /// Tables that readers see and no snapshot does. They go with the flush after the last of these readers, or when
-    /// the map is next opened for writing.
+    /// Number of tables that only readers use. They are removed by the first flush after these readers end, or when the
+    /// map is next opened for writing.
     pub reader_tables: u64,
-    /// Their bytes.
+    /// Bytes of these tables.
     pub reader_bytes: u64,
-    /// Tables that snapshots see.
+    /// Number of tables that snapshots use.
     pub snapshot_tables: u64,
-    /// Their bytes.
+    /// Bytes of these tables.
     pub snapshot_bytes: u64,
 }
 
-/// Counts the tables that are kept beside the map in `folder`. Looks into every tile's folder; takes no lock, and
-/// beside a writer the numbers may be those of a moment.
+/// Counts the replaced tables in `folder` that are kept. Lists the folder of every tile. Takes no lock, so next to a
+/// writer the numbers can be inconsistent.
 ///
 /// # Errors
 ///
-/// No map there, damage to what tells which tiles there are, a disk that refuses.
+/// No map, a damaged index, or an I/O error.
 pub fn kept_bytes(folder: impl Into<MapPath>) -> Result<KeptBytes> {
     let (disk, folder) = folder.into().into_parts();
     let folder = &*folder;
@@ -41,7 +41,7 @@ pub fn kept_bytes(folder: impl Into<MapPath>) -> Result<KeptBytes> {
     let mut counts = KeptBytes::default();
     for (tile, flush_number) in kept.iter().flat_map(|(tile, flushes)| flushes.iter().map(|n| (*tile, *n))) {
         let path = store.layout().kept(tile, flush_number);
-        // Gone since it was listed, or not to be told.
+        // Removed after it was listed, or unreadable.
         let Ok(Some(EntryKind::File(bytes))) = disk.kind(&path) else { continue };
         let (tables, all_bytes) = match seen.contains(&(tile, flush_number)) {
             true => (&mut counts.snapshot_tables, &mut counts.snapshot_bytes),
@@ -53,7 +53,7 @@ pub fn kept_bytes(folder: impl Into<MapPath>) -> Result<KeptBytes> {
     Ok(counts)
 }
 
-/// Which of the kept tables snapshots see; what cannot be read may have seen any as of its flush.
+/// Returns the kept tables that snapshots use. An unreadable snapshot is assumed to use all tables as of its flush.
 fn seen_by_snapshots(
     store: &TileStore,
     kept: &BTreeMap<TileIndex, BTreeSet<u64>>,

@@ -9,21 +9,21 @@ use crate::tile::Table;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Changes a map in place, tile by tile, with one commit for all of it: until then the map is as it was, whatever
-/// happens.
+/// Editor that changes a map in place, tile by tile, with one commit for all changes. Until the commit the map is
+/// unchanged.
 #[derive(Debug)]
 pub(super) struct MapEditor {
     /// Holds the map's lock.
     store: TileStore,
     config: MapConfig,
     saver: TileSaver,
-    /// Scans that the map gets with the next commit.
+    /// Number of scans that the next commit adds to the map.
     added_scans: u64,
     is_written_to: bool,
 }
 
-/// Opens a map, takes its lock, and lets `change` change it. If that fails, what it wrote beside the map's files is
-/// removed; after a crash the next opening of the map does so.
+/// Opens a map for writing and calls `change`. After an error the uncommitted files are removed. After a crash the next
+/// opening of the map does that.
 pub(super) fn edit<T>(
     disk: Arc<dyn Disk>,
     folder: &Path,
@@ -47,17 +47,16 @@ impl MapEditor {
         &self.config
     }
 
-    /// Number of the last scan in the map, with those that the next commit adds.
+    /// Number of the last scan in the map, including those that the next commit adds.
     pub(super) fn scan_number(&self) -> u64 {
         self.store.commits().scan_number + self.added_scans
     }
 
-    /// Number of the last commit.
     pub(super) fn flush_number(&self) -> u64 {
         self.store.commits().flush_number
     }
 
-    /// Says that what is written from now on has so many scans more.
+    /// Increases the scan number of the tiles written from now on, and of the next commit.
     pub(super) fn add_scans(&mut self, scans: u64) -> Result<()> {
         let before = self.store.commits().scan_number;
         if before.checked_add(scans).is_none_or(|all| all > MAX_NUMBER) {
@@ -67,30 +66,30 @@ impl MapEditor {
         Ok(())
     }
 
-    /// What voxtile adds to the original metadata, if the map is voxtile's own.
+    /// Metadata that voxtile adds to the original format; `None` in the original format.
     pub(super) fn ext(&self) -> Option<&Extension> {
         self.store.metadata().ext.as_ref()
     }
 
-    /// The map's tiles, in order.
+    /// Returns the map's tiles, in order.
     pub(super) fn tiles(&self) -> Vec<TileIndex> {
         let mut tiles: Vec<_> = self.store.tiles().iter().collect();
         tiles.sort_unstable();
         tiles
     }
 
-    /// What is known of a tile without reading it.
+    /// Version of a tile.
     pub(super) fn version(&self, tile: TileIndex) -> Option<TileVersion> {
         self.store.tiles().version(tile)
     }
 
-    /// The table of a tile; an empty one where there is none.
+    /// Reads the table of a tile; empty if there is no tile.
     pub(super) fn table(&self, tile: TileIndex) -> Result<Table> {
         let read = load::load_table(&self.store, &self.config.grid, tile)?;
         Ok(read.map(|read| read.table).unwrap_or_default())
     }
 
-    /// Puts another table in a tile's place; an empty one takes the tile out of the map.
+    /// Replaces a tile. An empty table removes it.
     pub(super) fn replace(&mut self, tile: TileIndex, table: &Table) -> Result<()> {
         if table.is_empty() {
             return self.remove(tile);
@@ -101,13 +100,13 @@ impl MapEditor {
         Ok(())
     }
 
-    /// Takes a tile out of the map.
+    /// Removes a tile from the map.
     pub(super) fn remove(&mut self, tile: TileIndex) -> Result<()> {
         self.begin_writing()?;
         self.store.remove(tile)
     }
 
-    /// Commits every change, and what `note` changes in the map's metadata. `what` names the change.
+    /// Commits all changes, and those of `note` to the metadata. `what` is the name of the operation.
     pub(super) fn commit(&mut self, what: &str, note: impl FnOnce(&mut Extension)) -> Result<()> {
         self.begin_writing()?;
         self.store.archive_mut().note(CatalogEntry::Operation(what.to_owned()));
@@ -120,7 +119,7 @@ impl MapEditor {
         Ok(())
     }
 
-    /// Before the first change a map of the original format becomes one of voxtile's own.
+    /// Upgrades a map of the original format before its first change.
     fn begin_writing(&mut self) -> Result<()> {
         self.is_written_to = true;
         let Self { saver, config, store, .. } = self;

@@ -9,12 +9,11 @@ use serde::Serialize;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Makes a new map from the tables of its tiles, one at a time: in memory are the table at hand and some 200 bytes a
-/// tile.
+/// Writer of a new map from the tables of its tiles, one at a time. Memory: one table, and about 200 bytes per tile.
 ///
-/// Until [`MapWriter::finish`] the map lies beside its place, as `MAP.unfinished`, where no command takes it for the
-/// one that was asked for. A process that is killed leaves that folder behind, and the next attempt to make the same
-/// map removes it; so does a writer that is dropped.
+/// Until [`MapWriter::finish`] the map is in `MAP.unfinished`, next to its final path, so no command opens an
+/// incomplete map. Dropping the writer removes that folder. If the process is killed, the next attempt to create the
+/// map does.
 #[derive(Debug)]
 pub struct MapWriter {
     map: StagedMap,
@@ -23,29 +22,28 @@ pub struct MapWriter {
     metadata: Metadata,
     scan_number: u64,
     last: Option<TileIndex>,
-    /// Tiles put since the last commit.
+    /// Number of tiles written since the last commit.
     uncommitted: usize,
     written: WrittenMap,
 }
 
-/// What a [`MapWriter`] wrote.
+/// Result of writing a map.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct WrittenMap {
-    /// Tiles with an observed voxel.
+    /// Number of tiles with an observed voxel.
     pub tiles: u64,
-    /// Observed voxels.
+    /// Number of observed voxels.
     pub voxels: u64,
-    /// Occupied voxels.
+    /// Number of occupied voxels.
     pub occupied: u64,
-    /// Bytes of the tables' files.
+    /// Bytes of the files of tables.
     pub table_bytes: u64,
-    /// Bytes of the octrees' files.
+    /// Bytes of the files of octrees.
     pub octree_bytes: u64,
 }
 
 impl WrittenMap {
-    /// Adds a tile.
     pub(super) fn add(&mut self, version: TileVersion) {
         self.tiles += 1;
         self.voxels += version.voxels;
@@ -55,17 +53,17 @@ impl WrittenMap {
     }
 }
 
-/// Tiles that are made durable together. A commit of the unfinished map means nothing to anybody; it keeps the list of
-/// files to sync short, and the disk at work from the beginning.
+/// Number of tiles per commit. Commits of the unfinished map are not visible. They limit the number of files to sync at
+/// the end, and start disk writes early.
 const COMMIT_TILES: usize = 256;
 
 impl MapWriter {
-    /// Begins an empty map with an id of its own, without scans, in a folder that does not exist yet or is empty.
+    /// Begins an empty map with a new id and without scans, in a folder that must be missing or empty.
     ///
     /// # Errors
     ///
-    /// A wrong configuration, a folder with other content, another process that makes the same map, a disk that
-    /// refuses.
+    /// An invalid configuration, a folder with other content, another process that creates the same map, or an I/O
+    /// error.
     pub fn create(folder: impl Into<MapPath>, config: &MapConfig) -> Result<Self> {
         let (disk, folder) = folder.into().into_parts();
         let folder = &*folder;
@@ -73,16 +71,16 @@ impl MapWriter {
         Self::create_as(disk, folder, new_metadata(&config, new_map_id(), &[]))
     }
 
-    /// Begins a map that says of itself what `metadata` says: parameters, id, number of scans, input. Tiles, bounds and
-    /// number of flushes are its own.
+    /// Begins a map with the parameters, id, number of scans and inputs in `metadata`. Tiles, bounds and flush numbers
+    /// are its own.
     ///
     /// # Errors
     ///
-    /// As for [`MapWriter::create`], and metadata of the original format, which does not say it all.
+    /// As for [`MapWriter::create`], and metadata of the original format, which is incomplete.
     pub fn create_as(disk: Arc<dyn Disk>, folder: &Path, metadata: Metadata) -> Result<Self> {
         let mut metadata = metadata;
         if let Some(ext) = &mut metadata.ext {
-            // Of the map that it is made of, whose scans are not copied.
+            // The scans of the source map are not copied.
             ext.keeps_scans = false;
         }
         let config = config_from(&metadata, folder)?;
@@ -98,33 +96,33 @@ impl MapWriter {
         Ok(Self { map, saver, config, metadata, scan_number, last, uncommitted, written })
     }
 
-    /// How the map is made.
+    /// The map's configuration.
     pub fn config(&self) -> &MapConfig {
         &self.config
     }
 
-    /// Records the scans that the map is said to consist of.
+    /// Copies the list of scans of another map.
     ///
     /// # Errors
     ///
-    /// A list that is damaged or cannot be read.
+    /// A damaged or unreadable list.
     pub(super) fn take_scans_of(&mut self, map: &MapReader) -> Result<()> {
         let store = self.map.store();
         map.scans()?.into_iter().for_each(|scan| store.note_scan(scan));
         Ok(())
     }
 
-    /// Adds a tile. One without voxels is left out, for a map has none.
+    /// Adds a tile. A tile without voxels is ignored.
     ///
     /// # Errors
     ///
-    /// A tile that does not come after the one before it, by x, then y, then z; a disk that refuses: the map cannot be
-    /// finished then.
+    /// A tile that does not follow the previous one, by x, then y, then z, or an I/O error. The map cannot be finished
+    /// after an I/O error.
     pub fn put(&mut self, tile: TileIndex, table: &Table) -> Result<()> {
         self.put_as_of(tile, table, self.scan_number)
     }
 
-    /// The same for a tile whose file is to say that it was written after another scan than the map's last.
+    /// Like [`MapWriter::put`], with the scan number that is recorded in the tile's file.
     ///
     /// # Errors
     ///
@@ -140,8 +138,8 @@ impl MapWriter {
         self.added(tile, version)
     }
 
-    /// The same for a tile of another map of the same parameters and storage, which nobody writes to: its bytes are
-    /// compared with that map's log, and no voxel is looked at.
+    /// Like [`MapWriter::put_as_of`], for a tile of another map with the same parameters and storage, and without a
+    /// writer. The copied bytes are compared with that map's log, but not decoded.
     pub(super) fn copy_as_of(&mut self, tile: TileIndex, map: &MapReader, scan_number: u64) -> Result<()> {
         self.check_order(tile)?;
         let store = self.map.store();
@@ -150,12 +148,12 @@ impl MapWriter {
         self.added(tile, version)
     }
 
-    /// Adds the tiles of other maps of the same id, parameters and storage by other names for their files
-    /// ([`LinkedTiles`](crate::store::LinkedTiles)), to a map without tiles.
+    /// Adds the tiles of other maps of the same id, parameters and storage by hard links
+    /// ([`LinkedTiles`](crate::store::LinkedTiles)). This map must not have tiles.
     ///
     /// # Errors
     ///
-    /// A map that cannot be opened, a tile that is in two of them, a damaged one, a disk that refuses.
+    /// A map that cannot be opened, a tile in two of them, a damaged tile, or an I/O error.
     pub(super) fn link_all(
         &mut self,
         maps: impl Iterator<Item = Result<MapReader>>,
@@ -191,15 +189,14 @@ impl MapWriter {
         if self.uncommitted == COMMIT_TILES { self.commit() } else { Ok(()) }
     }
 
-    /// Makes the map whole and gives it its name.
+    /// Completes the map and renames it to its final path.
     ///
     /// # Errors
     ///
-    /// A disk that refuses: there is no map then, unless it was the name of the finished one that could not be made
-    /// durable.
+    /// An I/O error. There is no map then, unless only the last step, the sync of its name, has failed.
     pub fn finish(mut self) -> Result<WrittenMap> {
         self.commit()?;
-        // What a commit may leave to the next opening of the map is not left here: nobody else is to see it.
+        // Finish the commit now, so that the map has no remaining work when it becomes visible.
         self.map.store().checkpoint()?;
         self.map.finish()?;
         Ok(self.written)

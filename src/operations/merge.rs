@@ -12,41 +12,42 @@ use serde::Serialize;
 use std::collections::BTreeSet;
 use std::path::Path;
 
-/// What a merge did.
+/// Result of [`merge`].
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct Merged {
-    /// The map that it made.
+    /// The new map.
     #[serde(flatten)]
     pub written: WrittenMap,
-    /// Voxels that two maps or more know.
+    /// Number of voxels that are observed in two or more maps.
     pub common_voxels: u64,
-    /// Maps that are the same or go back to the same map, by their places in the list, the earlier one first: what they
-    /// have in common is in both.
+    /// Pairs of maps that are the same or share history, as indices with the lower one first. Both contain their common
+    /// evidence.
     pub related: Vec<(usize, usize)>,
-    /// Whether evidence was added, so that what related maps have in common counts twice.
+    /// Whether evidence was added, so that common evidence of related maps counts twice.
     pub is_added: bool,
-    /// Whether the maps are regions of one build, which can go on with the new map: that has their scans.
+    /// Whether the maps are regions of one build, which the new map can resume because it has their scans.
     pub is_one_build: bool,
 }
 
-/// Makes one map of several: of a voxel that one map knows its evidence, of one that several know what `prefer` says.
+/// Merges maps. A voxel that one map has observed keeps its evidence; for a voxel that several have observed, `prefer`
+/// decides.
 ///
-/// Without a preference log-odds are added, in the order of the maps, and clamped once; counts are added, too. That is
-/// what one map of all scans would have, but for the clamps on the way and the order of additions. It takes maps of the
-/// model [`LogOdds`](crate::sensor::LogOdds) with equal parameters, because evidence of the other model depends on what
-/// was there before, unless no tile is in two maps. With a preference any models go together; sensor model, occupancy
+/// Without `prefer`, log-odds are added in the order of the maps and clamped once, and counts are added. The result is
+/// that of one map of all scans, apart from intermediate clamping and the order of additions. It requires maps with the
+/// model [`LogOdds`](crate::sensor::LogOdds) and equal parameters, because evidence of the other model depends on
+/// earlier evidence, unless no tile is in two maps. With `prefer` the sensor models may differ. Sensor model, occupancy
 /// threshold and storage are those of the first map.
 ///
-/// The new map has an id of its own and no scans, unless the maps are regions of one build
-/// ([`RayConfig::region`](crate::RayConfig)) that together are a box: then it is what one build of that box would
-/// be, which goes on with it. It is there as a whole or not at all, see [`MapWriter`]; it is made
-/// on the disk of the first. `progress` is told the tiles done and all.
+/// The new map has its own id and no scans, unless the maps are regions of one build
+/// ([`RayConfig::region`](crate::RayConfig)) that together form a box: then the result equals one build of that box,
+/// and can be resumed. The map appears only when it is complete, see [`MapWriter`], on the disk of the first map.
+/// `progress` receives the number of tiles done and in total.
 ///
 /// # Errors
 ///
-/// Fewer than two maps, maps of different grids, maps that do not go together without a preference, a damaged tile, an
-/// output with other content, a disk that refuses.
+/// Fewer than two maps, maps with different grids, maps that need `prefer`, a damaged tile, an output with other
+/// content, or an I/O error.
 pub fn merge(
     maps: &[MapReader],
     output: impl AsRef<Path>,
@@ -83,8 +84,8 @@ pub fn merge(
     })
 }
 
-/// What becomes of voxels that several maps know. With no tile in common there is nothing to prefer, as with maps of
-/// regions.
+/// Returns the rule for voxels that several maps have observed. Maps without a common tile, such as regions, need no
+/// preference.
 fn rule_for(maps: &[MapReader], first: &MapReader, prefer: Option<Prefer>) -> Result<MergeRule> {
     let model = &first.config().sensor_model;
     let checked = match prefer {
@@ -107,7 +108,7 @@ fn rule_for(maps: &[MapReader], first: &MapReader, prefer: Option<Prefer>) -> Re
     })
 }
 
-/// Begins the map of several, of which `first` is one: without scans, or as one build of all would have made it.
+/// Begins the merged map: without scans, or as one build of all regions would have created it.
 pub(super) fn begin(
     first: &MapReader,
     output: &Path,
@@ -131,19 +132,19 @@ pub(super) fn begin(
     Ok(writer)
 }
 
-/// Whether every tile is in one map only.
+/// Returns whether every tile is in one map only.
 pub(super) fn have_no_common_tile(maps: &[MapReader]) -> bool {
     let mut seen = BTreeSet::new();
     maps.iter().flat_map(MapView::tile_indices).all(|tile| seen.insert(tile))
 }
 
-/// The coordinate reference system of maps, if one names it. What is in one place in one system is elsewhere in another;
-/// a map that names none goes with any.
+/// Returns the common coordinate reference system of maps, if one has any. Different systems are an error, because
+/// coordinates would not match. A map without a system matches any.
 pub(super) fn common_crs<'a>(maps: impl IntoIterator<Item = &'a MapReader>) -> Result<Option<String>> {
     maps.into_iter().try_fold(None, with_crs_of)
 }
 
-/// The coordinate reference system of some maps, and of one more.
+/// Combines a common coordinate reference system with that of another map.
 pub(super) fn with_crs_of(common: Option<String>, map: &MapReader) -> Result<Option<String>> {
     match (common, &map.config().crs) {
         (Some(wanted), Some(found)) if *found != wanted => {
@@ -172,8 +173,8 @@ fn put_merged(
     }
 }
 
-/// Whether the rule leaves the voxels as they are that only this table has. Log-odds beyond the clamps come from other
-/// programs only.
+/// Returns whether the rule does not change voxels that only this table has. Only maps of other programs contain
+/// log-odds beyond the limits.
 fn is_left_alone(table: &Table, rule: MergeRule) -> bool {
     match rule {
         MergeRule::Take(_) => true,
@@ -198,7 +199,7 @@ pub(super) fn check_grid(map: &MapReader, first: &MapReader) -> Result<()> {
     Ok(())
 }
 
-/// Whether evidence of a map can be added to that of the first.
+/// Checks that evidence of a map can be added to that of the first.
 pub(super) fn check_model(map: &MapReader, first: &MapReader) -> Result<()> {
     let (config, wanted) = (map.config(), first.config());
     let first = first.folder().display();

@@ -1,28 +1,28 @@
 use crate::config::MapConfig;
 use crate::sensor::{Evidence, LogOdds, SensorModel};
 
-/// Whose evidence a merged map has of a voxel that several maps know.
+/// Preferred map for a voxel that several maps have observed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Prefer {
-    /// That of the map that was named first.
+    /// The first map.
     First,
-    /// That of the map that was named last.
+    /// The last map.
     Last,
-    /// That with more observations; of as many, that of the map that was named first.
+    /// The map with more observations of the voxel; if equal, the earlier map.
     MoreObserved,
 }
 
-/// What becomes of the evidence that several maps have of a voxel.
+/// Rule for the evidence of a voxel that several maps have observed.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum MergeRule {
-    /// Log-odds are added in the order of the maps and clamped once, at the end; so are counts, up to the largest.
+    /// Adds log-odds in the order of the maps and clamps the sum. Adds counts, up to the maximum.
     Add { min: f64, max: f64 },
-    /// One map's evidence, as it is.
+    /// Takes the evidence of one map.
     Take(Prefer),
 }
 
 impl MergeRule {
-    /// The rule for maps of the same configuration; `None` if it takes a preference and there is none.
+    /// Returns the rule for maps of the same configuration; `None` if a preference is required and missing.
     pub(super) fn of(config: &MapConfig, prefer: Option<Prefer>) -> Option<Self> {
         match (prefer, config.sensor_model) {
             (Some(prefer), _) => Some(Self::Take(prefer)),
@@ -31,11 +31,11 @@ impl MergeRule {
         }
     }
 
-    /// The evidence of a voxel, from that of the maps that know it, in their order; there is at least one.
+    /// Combines the evidence of a voxel in the maps that have observed it, in their order. There is at least one.
     pub(super) fn evidence(self, known: &[Evidence]) -> Option<Evidence> {
         match self {
             Self::Add { min, max } => {
-                // From the first value on, not from 0: that would turn -0 into 0.
+                // Start with the first value, not with 0, which would turn -0 into 0.
                 let sum = known.iter().copied().reduce(|sum, next| Evidence {
                     log_odds: sum.log_odds + next.log_odds,
                     observation_count: sum.observation_count.saturating_add(next.observation_count),

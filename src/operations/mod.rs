@@ -1,21 +1,21 @@
-//! What is done with whole maps on disk, tile by tile in constant memory.
+//! Operations on whole maps on disk, tile by tile in constant memory.
 //!
 //! ```text
 //! tables, in tile order -> MapWriter -> MAP.unfinished -> MAP
-//! merge   k readers, the tiles of one place at a time -> MapWriter
+//! merge   k readers, one tile index at a time -> MapWriter
 //! crop    one reader -> MapWriter
 //! import  a file of OctoMap -> MapWriter
-//! make_piece, move_piece   a map -> a piece of a map to come, by copying it or by moving it
-//! join    pieces -> MapWriter, by other names for their files
-//! adopt   readers of parts -> MapEditor: tiles in the place of a map's own -> one commit
-//! clear, decay   MapEditor: tiles read, changed, written beside -> one commit
-//! a flush  -> snapshot -> snapshots/NAME, and the tables that it sees stay
+//! make_piece, move_piece   a map -> a shard of a future map, by copying or moving
+//! join    shards -> MapWriter, by hard links
+//! adopt   readers of parts -> MapEditor: replaces tiles of a map -> one commit
+//! clear, decay   MapEditor: tiles read, changed, written as next versions -> one commit
+//! a flush  -> snapshot -> snapshots/NAME; its tables are kept
 //! snapshot -> revert   -> one commit
-//! kept scans, some moved or gone -> remapping: tiles mapped again -> one commit
+//! kept scans with new poses, or removed -> remapping: affected tiles replayed -> one commit
 //! two maps, or snapshots of one, tile by tile -> diff
 //! ```
 //!
-//! What each is for, and its rules: `docs/life_of_a_map.md`.
+//! `docs/life_of_a_map.md` describes their purpose and rules.
 
 mod adopt;
 mod clear;

@@ -1,23 +1,23 @@
 use crate::error::{Error, Result};
 use crate::space::{Aabb, Grid, VoxelBox};
 
-/// A part of space: the voxels whose center is in a box, half-open, as for queries of a region; or all others.
+/// Part of space: the voxels whose centers are in a half-open box, as for region queries, or all others.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Part {
-    /// What is in the box.
+    /// The voxels in the box.
     Inside(Aabb),
-    /// All but what is in the box.
+    /// The voxels outside the box.
     Outside(Aabb),
 }
 
-/// A part of space in voxels.
+/// Part of space in voxels.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct VoxelPart {
     pub(super) voxels: VoxelBox,
     pub(super) is_outside: bool,
 }
 
-/// How much of a tile belongs to a part.
+/// Share of a tile that belongs to a part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Share {
     Nothing,
@@ -26,11 +26,11 @@ pub(super) enum Share {
 }
 
 impl Part {
-    /// The part in voxels of a grid.
+    /// Converts the part to voxels of a grid.
     ///
     /// # Errors
     ///
-    /// A box that is empty, has no voxel's center in it, or has a corner that is no number.
+    /// An empty box, a box without a voxel's center, or coordinates that are not finite.
     pub(super) fn voxels(&self, grid: &Grid) -> Result<VoxelPart> {
         let (region, is_outside) = match self {
             Self::Inside(region) => (region, false),
@@ -50,12 +50,12 @@ impl Part {
 }
 
 impl VoxelPart {
-    /// All that is not of this part.
+    /// Returns the complement of the part.
     pub(super) fn rest(self) -> Self {
         Self { is_outside: !self.is_outside, ..self }
     }
 
-    /// How much of a tile belongs to the part, told from the tile's voxels.
+    /// Returns the share of a tile with these voxels.
     pub(super) fn share_of(&self, tile: &VoxelBox) -> Share {
         let common = self.voxels.intersection(tile);
         match (common.is_empty(), common == *tile) {

@@ -4,17 +4,17 @@ use crate::mapper::{MapReader, MapView};
 use crate::store::{MapPath, hex, move_map};
 use std::path::Path;
 
-/// Makes a piece of a map to come: a copy of a map that nobody writes to, with the id that the other is to have.
+/// Creates a shard of a future map: a copy of a map without a writer, with the id of the future map.
 ///
-/// Pieces of one id that have no tile in common become a map by [`join`](super::join()), which reads none of their
-/// tiles. So it is here that every byte is compared with the map's log, and what this returns for is durable. No table
-/// is decoded. Tiles say that they are of scan 0, for the map to come may number scans otherwise. `progress` is told
-/// the tiles done and all.
+/// [`join`](super::join()) combines shards with one id and without common tiles to a map, without reading their tiles.
+/// Therefore this function compares every byte with the map's log, and the shard is durable when it returns. Tables are
+/// not decoded. The tiles get scan number 0, because the future map may number scans differently. `progress` receives
+/// the number of tiles done and in total.
 ///
 /// # Errors
 ///
-/// A map of the original format, a snapshot, a damaged tile, an output with other content, a disk that refuses; there
-/// is no piece then.
+/// A map of the original format, a snapshot, a damaged tile, an output with other content, or an I/O error. There is no
+/// shard then.
 pub fn make_piece(
     map: &MapReader,
     output: impl AsRef<Path>,
@@ -39,17 +39,17 @@ pub fn make_piece(
     writer.finish()
 }
 
-/// Makes a map that is no longer needed where it is a piece of a map to come, as [`make_piece`] does, but by moving it:
-/// no tile is read or written, and each file is synced once.
+/// Like [`make_piece`], but moves a map that is no longer needed: no tile is read or written, and each file is synced
+/// once.
 ///
-/// That needs a map with the id `map_id` and a place in the same file system. Nobody else has seen the map; it may have
-/// been written without syncs ([`UnsyncedDisk`](crate::store::UnsyncedDisk)). Of its tiles' files the length is
-/// compared with the log, and they go on to say of which of the map's scans they are. A map that cannot be moved is
-/// copied, and every byte is compared; it stays where it is then.
+/// The map must have the id `map_id`, be on the same file system, and not be used by another process. It may have been
+/// written without syncs ([`UnsyncedDisk`](crate::store::UnsyncedDisk)). The lengths of its tiles' files are compared
+/// with the log, and the tiles keep their scan numbers. If the map cannot be moved, it is copied, every byte is
+/// compared, and the source remains.
 ///
 /// # Errors
 ///
-/// As for [`make_piece`], and a map that somebody writes to. There is no piece then, and the map may be gone.
+/// As for [`make_piece`], and a map with a writer. There is no shard then, and the map may be lost.
 pub fn move_piece(
     map: impl Into<MapPath>,
     output: impl AsRef<Path>,

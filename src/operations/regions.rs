@@ -1,23 +1,23 @@
-//! Maps of the same scans, each of a region of its own: parts of one build.
+//! Detects maps that are regions of one build.
 
 use crate::error::Result;
 use crate::mapper::{MapReader, MapView};
 use crate::space::{Grid, LAST_VOXEL_INDEX, TileBox};
 use crate::store::{Extension, InputContent, ScanRecord};
 
-/// What maps are parts of: one build with this region, `None` for all of space.
+/// Build that maps are regions of, with the united region; `None` for all of space.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct OneBuild {
     pub(super) region: Option<TileBox>,
 }
 
 impl OneBuild {
-    /// The build that these maps are parts of, if they are: the same scans of the same inputs in the same way, in boxes
-    /// of tiles that have none in common and are together a box.
+    /// Returns the build that these maps are regions of, if there is one: the same scans of the same inputs with the
+    /// same settings, in disjoint boxes of tiles that together form a box.
     ///
     /// # Errors
     ///
-    /// A list of scans that cannot be read or is damaged.
+    /// A damaged or unreadable list of scans.
     pub(super) fn of(maps: &[MapReader]) -> Result<Option<Self>> {
         let Some(first) = maps.first() else { return Ok(None) };
         let mut regions = Regions::of(first)?;
@@ -26,21 +26,21 @@ impl OneBuild {
     }
 }
 
-/// The regions of maps that are looked at one after the other, for [`OneBuild`].
+/// Collector of the regions of maps, for [`OneBuild`].
 #[derive(Debug)]
 pub(super) struct Regions {
-    /// What the first map says of its scans, and their list. `None` once a map has no part in their build.
+    /// Metadata of the first map, and its list of scans. `None` after a map that is not from the same build.
     scans: Option<(Extension, Vec<ScanRecord>)>,
     grid: Grid,
     regions: Vec<TileBox>,
 }
 
 impl Regions {
-    /// None yet; those of parts of the build that `first` is a part of can be added, `first` too.
+    /// Starts without regions. Maps of the same build as `first` can be added, including `first`.
     ///
     /// # Errors
     ///
-    /// A list of scans that cannot be read or is damaged.
+    /// A damaged or unreadable list of scans.
     pub(super) fn of(first: &MapReader) -> Result<Self> {
         let scans = first.metadata().ext.clone().filter(|ext| !ext.inputs.is_empty() && are_known(ext));
         let scans = match scans {
@@ -56,7 +56,7 @@ impl Regions {
     pub(super) fn add(&mut self, map: &MapReader) -> Result<()> {
         let Some((ext, list)) = &self.scans else { return Ok(()) };
         let are_same = map.metadata().ext.as_ref().is_some_and(|other| are_same_scans(other, ext));
-        // Their list tells of scans that were taken out of one of the maps since.
+        // The lists differ if scans were removed from one of the maps.
         match own_region(map).filter(|_| are_same) {
             Some(region) if map.scans()? == *list => self.regions.push(region),
             _ => self.scans = None,
@@ -71,13 +71,13 @@ impl Regions {
     }
 }
 
-/// The region of a map that has tiles nowhere else.
+/// Returns the region of a map, if all its tiles are in it.
 fn own_region(map: &MapReader) -> Option<TileBox> {
     let region = map.config().rays.region?;
     map.tile_indices().into_iter().all(|tile| region.contains(tile)).then_some(region)
 }
 
-/// Whether it is known where the scans came from and with which poses; maps that were mapped again have others.
+/// Returns whether the inputs and poses of all scans are known. They are not after a remap.
 fn are_known(scans: &Extension) -> bool {
     let is_known = |content: &InputContent| !content.pose_chain.is_empty();
     scans.inputs.iter().all(|input| input.content.as_ref().is_some_and(is_known))
@@ -95,7 +95,7 @@ fn are_same_scans(a: &Extension, b: &Extension) -> bool {
         && a.crs == b.crs
 }
 
-/// The box that these are together, if they are one and have no tile in common.
+/// Returns the box that these boxes form together, if they are disjoint and form one.
 fn united(regions: &[TileBox]) -> Option<TileBox> {
     let are_apart =
         regions.iter().enumerate().all(|(k, a)| regions[..k].iter().all(|b| a.intersection(*b).is_none()));
@@ -104,7 +104,7 @@ fn united(regions: &[TileBox]) -> Option<TileBox> {
         let (min, max) = (region.min().to_array(), region.max().to_array());
         (0..3).map(|k| u128::from(min[k].abs_diff(max[k])) + 1).product::<u128>()
     };
-    // Boxes without a tile in common fill their hull when they have as many tiles.
+    // Disjoint boxes fill their bounding box if the numbers of tiles are equal.
     (are_apart && regions.iter().map(|region| tiles(*region)).sum::<u128>() == tiles(hull)).then_some(hull)
 }
 
@@ -128,7 +128,7 @@ mod tests {
         assert!(is_all_of_space(all, &grid) && !is_all_of_space(east, &grid));
         let (a, b) = (tiles([0; 3], [1, 0, 0]), tiles([2, 0, 0], [2, 0, 0]));
         assert_eq!(united(&[a, b]), Some(tiles([0; 3], [2, 0, 0])));
-        // One twice, and a hole between two.
+        // A duplicate box, and a hole between two boxes.
         assert_eq!(united(&[a, b, a]), None);
         assert_eq!(united(&[a, tiles([3, 0, 0], [3, 0, 0])]), None);
         assert_eq!(united(&[a, tiles([1, 0, 0], [2, 0, 0])]), None);

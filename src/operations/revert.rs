@@ -9,7 +9,7 @@ use crate::store::{
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// What a revert did.
+/// Result of [`revert`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct Reverted {
@@ -17,35 +17,34 @@ pub struct Reverted {
     pub scan_number_before: u64,
     /// Number of the last scan in the map now.
     pub scan_number: u64,
-    /// Number of the flush that the revert is.
+    /// Number of the flush of the revert.
     pub flush_number: u64,
-    /// Tiles that the map has now.
+    /// Number of tiles in the map now.
     pub tiles: u64,
-    /// Tiles that had changed since and are as of then again.
+    /// Number of tiles that had changed since the snapshot and were restored.
     pub tiles_restored: u64,
-    /// Tiles that were not there then, and are not any more.
+    /// Number of tiles that were added since the snapshot and removed.
     pub tiles_removed: u64,
-    /// The map was as of the snapshot already, and the name `keep_as` was taken: nothing was done. An earlier call did
-    /// it, or nothing has changed since.
+    /// Whether nothing was done, because the map already equalled the snapshot and the name `keep_as` was taken: an
+    /// earlier call has done it, or nothing has changed since.
     pub was_done: bool,
 }
 
-/// Makes the map in `folder` again what it was when a snapshot was made: tiles, scan number and input. It is one commit
-/// like any other, so that it has happened or not; flushes go on being counted upward. All snapshots stay, and readers
-/// go on seeing what they see.
+/// Resets the map in `folder` to a snapshot: tiles, scan number and inputs. The revert is one commit with a new flush
+/// number. Snapshots and open readers are unaffected.
 ///
-/// What came after the snapshot is in no map any more, unless `keep_as` names a snapshot to be made of it before.
-/// A call that was killed can be repeated. If the snapshot `keep_as` already holds the current state, it is reused. If
-/// the map already equals `name` and the name `keep_as` is taken, nothing is done.
+/// Changes since the snapshot are lost, unless `keep_as` names a new snapshot to keep them. A killed call can be
+/// repeated. If the snapshot `keep_as` already has the current state, it is reused. If the map already equals `name`
+/// and the name `keep_as` is taken, nothing is done.
 ///
-/// `progress` is told the tiles done and all. Memory: the lists of tiles of the map and of the snapshot, and one tile.
+/// `progress` receives the number of tiles done and in total. Memory: the lists of tiles of the map and of the
+/// snapshot, and one tile.
 ///
 /// # Errors
 ///
-/// [`Error::InvalidArgument`] if there is no such snapshot, [`Error::AlreadyExists`] if there is one with the name
-/// `keep_as` and of another state; no map there, another writer, a damaged table, damaged kept scans of the snapshot, a
-/// disk that refuses. The map is as it was then; a snapshot `keep_as` may have been made, unless kept scans are
-/// damaged.
+/// [`Error::InvalidArgument`] if there is no such snapshot, [`Error::AlreadyExists`] if the snapshot `keep_as` exists
+/// with another state; no map, another writer, a damaged table, damaged kept scans of the snapshot, or an I/O error.
+/// The map is unchanged then. A snapshot `keep_as` may have been created, unless kept scans are damaged.
 pub fn revert(
     folder: impl Into<MapPath>,
     name: &SnapshotName,
@@ -84,7 +83,7 @@ pub fn revert(
         log::warn!("{}: kept scans that nothing needs remain: {error:#}", folder.display());
     }
     drop(store);
-    // What was written in vain gives its room back.
+    // Removes uncommitted files.
     if outcome.is_err()
         && let Err(error) = TileStore::open(disk, folder)
     {
@@ -120,7 +119,7 @@ fn revert_to(
     Ok(reverted)
 }
 
-/// Whether a snapshot says what a map can be made again, with nothing else in the way.
+/// Checks that a map can be reverted to a snapshot.
 fn check_is_of_map(store: &TileStore, past: &TileStore) -> Result<()> {
     let lengths = |metadata: &Metadata| [metadata.resolution_m, metadata.tile_size_m].map(f64::to_bits);
     if lengths(store.metadata()) != lengths(past.metadata())
@@ -139,8 +138,8 @@ fn check_is_of_map(store: &TileStore, past: &TileStore) -> Result<()> {
     Ok(())
 }
 
-/// Checks that the scans which a snapshot keeps are there. Those that the map keeps, too, are not read: they are as
-/// whole after a revert as before it.
+/// Checks that the scans of a snapshot exist. Scans that the map keeps too are not read, because the revert does not
+/// affect them.
 fn check_kept_scans(store: &TileStore, past: &TileStore) -> Result<()> {
     let (disk, layout) = (&**past.disk(), past.layout());
     let mut own = store.archive().is_on().then(|| store.archive().records().ok()).flatten();
@@ -153,7 +152,7 @@ fn check_kept_scans(store: &TileStore, past: &TileStore) -> Result<()> {
         {
             match some.next_kept() {
                 Ok(Some(known)) => next_own = Some(known),
-                // What is damaged of the map itself goes with the revert.
+                // The revert drops the damaged part of the map's own catalog.
                 Ok(None) | Err(_) => own = None,
             }
         }
@@ -181,7 +180,7 @@ impl<'a> Reverter<'a> {
         Ok(Self { store, past, config, saver })
     }
 
-    /// Makes the snapshot's version of a tile the next one; false if it is the present one.
+    /// Makes the snapshot's version of a tile the next one. Returns false if it is the current one.
     fn restore(&mut self, tile: TileIndex) -> Result<bool> {
         let Some(version) = self
             .past
@@ -193,13 +192,13 @@ impl<'a> Reverter<'a> {
         };
         let stored = self.past.tables().open(tile)?.ok_or_else(|| self.missing(tile))?;
         let path = stored.path.clone();
-        // Whole and the one that the snapshot names, or an error before anything has changed.
+        // Verified against the snapshot, before anything is changed.
         let read = read_stored_table(&self.config.grid, tile, stored)?;
         if self.has_octree_of(tile, &read.table, version)? {
             self.store.link_next(tile, &path)?;
             self.store.tiles_mut().note_next(tile, version);
         } else {
-            // The table names an octree that another version of the program derived: both are written anew.
+            // Another version of the program built the octree that the table names, so both are written again.
             let scan_number = read.trailer.map_or(version.scan_number, |trailer| trailer.scan_number);
             let version = self.saver.write(&self.store.writer()?, tile, &read.table, scan_number)?;
             self.store.tiles_mut().note_next(tile, version);
@@ -207,7 +206,7 @@ impl<'a> Reverter<'a> {
         Ok(true)
     }
 
-    /// Derives the octree, and tells whether it is the one that the snapshot's table names.
+    /// Builds the octree, and returns whether it is the one that the snapshot's table names.
     fn has_octree_of(
         &mut self,
         tile: TileIndex,

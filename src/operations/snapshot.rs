@@ -7,41 +7,39 @@ use serde::Serialize;
 use std::collections::BTreeSet;
 use std::collections::hash_map::Entry;
 
-/// A snapshot of a map: the map as of a flush, under a name.
+/// Snapshot of a map: its state as of a flush, with a name.
 ///
-/// A snapshot is one small file that says which tiles the map had, and what a reader is that never leaves: the tables
-/// that it sees stay when they are replaced. So it costs next to nothing when it is made, and from then on the bytes of
-/// the tables that have changed since.
+/// A snapshot is one small file with the list of tiles. It acts like a permanent reader: its tables are kept when they
+/// are replaced. So it initially needs almost no disk space, and later that of the replaced tables.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct SnapshotInfo {
-    /// Its name.
+    /// Name of the snapshot.
     pub name: String,
-    /// Number of the flush that it keeps.
+    /// Number of its flush.
     pub flush_number: u64,
-    /// Number of the last scan in it.
+    /// Number of its last scan.
     pub scan_number: u64,
-    /// Tiles in it.
+    /// Number of its tiles.
     pub tiles: u64,
-    /// Observed voxels in it.
+    /// Number of its observed voxels.
     pub voxels: u64,
-    /// Bytes of the tables that it sees.
+    /// Bytes of its tables.
     pub table_bytes: u64,
-    /// Bytes that no other snapshot and not the present map names: at most so many are free when it is deleted. Fewer
-    /// are where a revert has linked a table, so that it is there under two names.
+    /// Bytes of tables that only this snapshot uses: upper bound of the disk space freed by its deletion. It is less if
+    /// a revert has linked a table.
     pub own_bytes: u64,
-    /// Why it cannot be read, if it cannot; the numbers are 0 then.
+    /// Error if the snapshot is unreadable; all numbers are 0 then.
     pub damage: Option<String>,
 }
 
-/// Keeps the last flush of the map in `folder` under a name. A map of the original format gets an id and checksums
-/// first, as before any change. A snapshot of this name that keeps this very state is left as it is, so a call that was
-/// killed can be repeated.
+/// Keeps the last flush of the map in `folder` under a name. A map of the original format is upgraded first. An
+/// existing snapshot of this name and this state is kept, so a killed call can be repeated.
 ///
 /// # Errors
 ///
-/// [`Error::AlreadyExists`] if there is a snapshot of this name and of another state; no map there, another writer, a
-/// disk that refuses: there is no such snapshot then.
+/// [`Error::AlreadyExists`] if a snapshot of this name and another state exists; no map, another writer, or an I/O
+/// error. There is no new snapshot then.
 pub fn snapshot(folder: impl Into<MapPath>, name: &SnapshotName) -> Result<()> {
     let (disk, folder) = folder.into().into_parts();
     let folder = &*folder;
@@ -54,24 +52,23 @@ pub fn snapshot(folder: impl Into<MapPath>, name: &SnapshotName) -> Result<()> {
     OutOfCoreTileMapper::open(MapPath::on(disk, folder), config)?.snapshot(name)
 }
 
-/// Deletes a snapshot, and the tables that no other one and no reader sees. A call that was killed can be repeated: it
-/// completes the deletion.
+/// Deletes a snapshot, and the tables that no other snapshot and no reader uses. A killed call can be repeated.
 ///
 /// # Errors
 ///
-/// [`Error::InvalidArgument`] if there is none of this name; no map there, another writer, a disk that refuses.
+/// [`Error::InvalidArgument`] if there is no snapshot of this name; no map, another writer, or an I/O error.
 pub fn delete_snapshot(folder: impl Into<MapPath>, name: &SnapshotName) -> Result<()> {
     let (disk, folder) = folder.into().into_parts();
     let folder = &*folder;
     TileStore::open(disk, folder)?.snapshot_writer().delete(name)
 }
 
-/// The snapshots of a map, by flush and then by name, those that cannot be read first. Takes no lock; beside a writer
-/// the bytes may be those of a moment.
+/// Lists the snapshots of a map, by flush and then by name, unreadable ones first. Takes no lock, so next to a writer
+/// the numbers of bytes can be inconsistent.
 ///
 /// # Errors
 ///
-/// No map there, or a disk that refuses. Damage is part of the answer.
+/// No map, or an I/O error. Damage is part of the result.
 pub fn snapshots(folder: impl Into<MapPath>) -> Result<Vec<SnapshotInfo>> {
     let (disk, folder) = folder.into().into_parts();
     let folder = &*folder;
@@ -86,7 +83,7 @@ pub fn snapshots(folder: impl Into<MapPath>) -> Result<Vec<SnapshotInfo>> {
             Err(error @ (Error::Damaged { .. } | Error::Io { .. })) => {
                 infos.push(SnapshotInfo::damaged(&name, &error));
             }
-            // Deleted since they were listed.
+            // Deleted after they were listed.
             Err(Error::InvalidArgument { .. }) => {}
             Err(error) => return Err(error),
         }
@@ -100,22 +97,22 @@ pub fn snapshots(folder: impl Into<MapPath>) -> Result<Vec<SnapshotInfo>> {
     Ok(infos)
 }
 
-/// A snapshot that was just made: nothing has changed since, and no other is looked at.
+/// Returns the information of a new snapshot. Assumes that the map is unchanged since, and ignores other snapshots.
 ///
 /// # Errors
 ///
-/// No map there, none of this name, damage, or a disk that refuses.
+/// No map, no snapshot of this name, damage, or an I/O error.
 pub fn new_snapshot(folder: impl Into<MapPath>, name: &SnapshotName) -> Result<SnapshotInfo> {
     let (disk, folder) = folder.into().into_parts();
     let store = TileStore::open_read_only(disk, &folder)?;
     Ok(SnapshotInfo::of(&store.snapshots().read(name)?))
 }
 
-/// Who sees each of the kept tables.
+/// Snapshots that use each kept table.
 #[derive(Default)]
 struct Owners {
     owners: FxHashMap<(TileIndex, u64), Owner>,
-    /// The flushes as of which tables of a tile are kept: snapshots have many tiles in common.
+    /// Flushes as of which tables of a tile are kept. A cache, because snapshots have many tiles in common.
     kept: FxHashMap<TileIndex, BTreeSet<u64>>,
 }
 
@@ -128,7 +125,7 @@ impl Owners {
     fn count(&mut self, store: &TileStore, number: usize, snapshot: &Snapshot) -> Result<()> {
         for (tile, version) in snapshot.commits.tiles.iter() {
             if store.tiles().version(tile) == Some(version) {
-                continue; // It is the present one, under whatever names.
+                continue; // The current version of the tile.
             }
             let kept = match self.kept.entry(tile) {
                 Entry::Occupied(kept) => kept.into_mut(),

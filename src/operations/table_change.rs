@@ -1,16 +1,16 @@
-//! Tables made of others, voxel by voxel.
+//! Derives tables from others, voxel by voxel.
 
 use super::part::VoxelPart;
 use crate::sensor::Evidence;
 use crate::space::{BRICK_EDGE, BrickMask, VoxelBox, VoxelIndex, mask_of_box};
 use crate::tile::Table;
 
-/// The table of the voxels that belong to a part of space; `tile` are the voxels of the tile.
+/// Returns the table of the voxels in a part of space. `tile` contains the voxels of the tile.
 pub(super) fn voxels_of_part(table: &Table, tile: &VoxelBox, part: &VoxelPart) -> Table {
     let mut kept = Table::default();
     let mut run = Vec::new();
     for brick in table.bricks() {
-        // A brick may reach beyond the tile: its place follows from a voxel that is inside.
+        // A brick can extend beyond the tile, so its position is computed from a voxel inside.
         let Some((code, _)) = table.voxels_of_brick(brick).next() else { continue };
         let first = code.to_key().to_index_from(tile.min).map(|k| k & !(BRICK_EDGE - 1));
         let mask = mask_of_part(first, part);
@@ -22,14 +22,14 @@ pub(super) fn voxels_of_part(table: &Table, tile: &VoxelBox, part: &VoxelPart) -
     kept
 }
 
-/// The places of a brick, named by its lowest voxel, that belong to a part.
+/// Returns the voxels of a brick that belong to a part. `first` is the lowest voxel of the brick.
 fn mask_of_part(first: VoxelIndex, part: &VoxelPart) -> BrickMask {
     let local = |of: VoxelIndex| std::array::from_fn(|k| of[k].saturating_sub(first[k]));
     let mask = mask_of_box(local(part.voxels.min), local(part.voxels.end));
     if part.is_outside { mask.map(|word| !word) } else { mask }
 }
 
-/// The table with each voxel's evidence changed; without those for which `change` gives none.
+/// Applies `change` to each voxel's evidence. Voxels without a result are removed.
 pub(super) fn changed(table: &Table, mut change: impl FnMut(Evidence) -> Option<Evidence>) -> Table {
     let mut after = Table::default();
     let mut run = Vec::new();

@@ -4,16 +4,16 @@ use crate::space::{BRICK_VOXELS, BrickCode, BrickMask, add_to_mask, is_in_mask, 
 use crate::tile::Table;
 use std::collections::BTreeSet;
 
-/// Merges the tables that several maps have of a tile. The room for it is kept from one tile to the next: 8 KiB a map.
+/// Merges the tables of a tile in several maps. Its buffers are reused: 8 KiB per map.
 #[derive(Debug)]
 pub(super) struct TableMerge {
     rule: MergeRule,
-    /// What each map has of the brick at hand.
+    /// Current brick in each map.
     bricks: Vec<MapBrick>,
-    /// What the maps have of the voxel at hand.
+    /// Evidence of the current voxel.
     known: Vec<Evidence>,
     run: Vec<(usize, Evidence)>,
-    /// Voxels so far that two maps or more know.
+    /// Number of voxels so far that are in two or more maps.
     pub(super) common: u64,
 }
 
@@ -28,7 +28,7 @@ impl TableMerge {
         Self { rule, bricks: Vec::new(), known: Vec::new(), run: Vec::new(), common: 0 }
     }
 
-    /// The table of all voxels that the tables have, which come in the order of their maps.
+    /// Merges the tables, which are in the order of their maps.
     pub(super) fn merge(&mut self, tables: &[&Table]) -> Table {
         let unused = MapBrick { observed: [0; 8], evidence: vec![Evidence::PRIOR; BRICK_VOXELS] };
         self.bricks.resize(tables.len().max(self.bricks.len()), unused);

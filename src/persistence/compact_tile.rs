@@ -5,23 +5,24 @@ use crate::tile::format::read_compact;
 use crate::tile::{Table, Tile};
 use std::sync::Arc;
 
-/// A tile in the compact form, and what is known of it without decoding.
+/// Tile in the compact form, with the counts that are needed without decoding.
 #[derive(Clone, Debug)]
 pub(crate) struct CompactTile {
     bytes: Arc<[u8]>,
     voxels: u64,
-    /// Occupied voxels, where the map stores tiles in the compact form.
+    /// Number of occupied voxels, if the map stores tiles in the compact form.
     occupied: Option<u64>,
-    /// Bytes of memory of the table that it was made of.
+    /// Memory of the source table in bytes.
     table_bytes: usize,
 }
 
 impl CompactTile {
-    /// Encodes a tile. Where the map stores tiles in this form, voxels from `occupied_from` log-odds on are counted.
+    /// Encodes a tile. If the map stores tiles in this form, also counts voxels with log-odds of at least
+    /// `occupied_from`.
     ///
     /// # Errors
     ///
-    /// A lack of memory.
+    /// Out of memory.
     pub(crate) fn encode(packer: &mut Packer, tile: &Tile, occupied_from: Option<f64>) -> Result<Self> {
         let table = tile.table();
         Ok(Self {
@@ -32,7 +33,7 @@ impl CompactTile {
         })
     }
 
-    /// Decodes the table of the tile with this index.
+    /// Decodes the table. `index` must be the index of the tile.
     ///
     /// # Errors
     ///
@@ -42,27 +43,25 @@ impl CompactTile {
             .map_err(|error| error.in_map("memory".as_ref(), Some(index)))
     }
 
-    /// The encoded bytes.
     pub(crate) fn bytes(&self) -> &[u8] {
         &self.bytes
     }
 
-    /// Number of voxels.
     pub(crate) fn voxels(&self) -> u64 {
         self.voxels
     }
 
-    /// Number of occupied voxels, where the map stores tiles in this form.
+    /// Number of occupied voxels, if the map stores tiles in this form.
     pub(crate) fn occupied(&self) -> Option<u64> {
         self.occupied
     }
 
-    /// Bytes of memory that saving takes beside the tile's own: a map that stores full tables has to decode it.
+    /// Additional memory for saving the tile in bytes. A map that stores full tables must decode the tile.
     pub(crate) fn bytes_to_save(&self) -> usize {
         if self.occupied.is_some() { 0 } else { self.table_bytes }
     }
 
-    /// Whether both are the same encoding in memory, not only equal ones.
+    /// Returns whether both share the same memory, not only equal content.
     pub(crate) fn is_same(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.bytes, &other.bytes)
     }

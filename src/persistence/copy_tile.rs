@@ -1,4 +1,4 @@
-//! A tile of one map as a tile of another.
+//! Copies a tile from one map to another.
 
 use crate::config::Storage;
 use crate::error::{DecodeError, Error, FormatError, Result};
@@ -7,9 +7,9 @@ use crate::store::{FileChecksum, StoredTile, TileFile, TileStore, TileVersion, T
 use crate::tile::format::{Trailer, renew_compact_file, renew_table};
 use std::io;
 
-/// Writes the next version of a tile's files from those of another map with the same parameters and storage, which
-/// nobody writes to: the bytes but for what names the map, each of them compared with that map's log. The new files say
-/// that they were written after so many scans.
+/// Writes the next version of a tile's files from those of another map with the same parameters and storage, and
+/// without a writer. Copies all bytes except the map's identity, and compares them with that map's log. The new files
+/// have the given scan number.
 pub(crate) fn copy_tile(
     from: &TileStore,
     writer: &TileWriter,

@@ -9,20 +9,20 @@ use crate::store::{TileLocation, TileVersion, TileWriter};
 use rustc_hash::FxHashMap;
 use std::collections::VecDeque;
 
-/// The two I/O threads of a mapper: one saves tiles, one loads them ahead of use.
+/// The two I/O threads of a mapper: one saves tiles, the other prefetches tiles.
 #[derive(Debug)]
 pub(crate) struct IoThreads {
     saver: Worker<Save, Saved>,
     loader: Worker<Load, Loaded>,
-    /// Bytes of memory that each tile that is being loaded is expected to take.
+    /// Expected memory in bytes of each tile that is being loaded.
     loading: FxHashMap<TileIndex, usize>,
     loading_bytes: usize,
-    /// The tiles that are being saved, in order. One may be there twice, an older and a newer version.
+    /// Tiles that are being saved, in order. An older and a newer version of a tile can be present.
     saving: VecDeque<TileIndex>,
     saving_bytes: usize,
 }
 
-/// Most tiles in flight in each direction. More would only take memory: a disk does one after the other.
+/// Maximum number of tiles in flight in each direction. A disk handles one at a time, so more would only use memory.
 const MAX_IN_FLIGHT: usize = 4;
 
 struct Save {
@@ -32,7 +32,7 @@ struct Save {
     scan_number: u64,
 }
 
-/// A save that has ended: the files' checksums, or why it failed.
+/// Result of a save: the checksums of the files, or the error.
 pub(crate) struct Saved {
     pub(crate) index: TileIndex,
     pub(crate) tile: CompactTile,
@@ -43,7 +43,7 @@ struct Load {
     location: TileLocation,
 }
 
-/// A load that has ended: the table, or why it failed.
+/// Result of a load: the table, or the error.
 pub(crate) struct Loaded {
     pub(crate) index: TileIndex,
     pub(crate) result: Result<ReadTable>,
@@ -62,36 +62,36 @@ impl IoThreads {
         }
     }
 
-    /// Bytes of memory of all tiles in flight, beside their compact form.
+    /// Additional memory of all tiles in flight in bytes, without their compact form.
     pub(crate) fn bytes(&self) -> usize {
         self.loading_bytes + self.saving_bytes
     }
 
-    /// Whether another tile may be saved.
+    /// Returns whether another tile can be saved now.
     pub(crate) fn can_save(&self) -> bool {
         self.saver.in_flight() < MAX_IN_FLIGHT
     }
 
-    /// Begins to save a tile.
+    /// Starts to save a tile.
     pub(crate) fn save(&mut self, writer: TileWriter, index: TileIndex, tile: CompactTile, scan_number: u64) {
         self.saving_bytes += tile.bytes_to_save();
         self.saving.push_back(index);
         self.saver.give(Save { writer, index, tile, scan_number });
     }
 
-    /// Whether some version of a tile is being saved.
+    /// Returns whether a version of the tile is being saved.
     pub(crate) fn is_saving(&self, index: TileIndex) -> bool {
         self.saving.contains(&index)
     }
 
-    /// A save that has ended, if there is one.
+    /// Returns a finished save, if there is one.
     pub(crate) fn take_saved(&mut self) -> Option<Saved> {
         let saved = self.saver.take()?;
         self.save_ended(&saved);
         Some(saved)
     }
 
-    /// Waits for a save to end; `None` if none is in flight.
+    /// Waits for a save to finish; `None` if none is in flight.
     pub(crate) fn wait_saved(&mut self) -> Option<Saved> {
         match self.saver.wait() {
             Some(saved) => {
@@ -111,31 +111,31 @@ impl IoThreads {
         self.saving.pop_front();
     }
 
-    /// Whether another tile may be loaded.
+    /// Returns whether another tile can be loaded now.
     pub(crate) fn can_load(&self) -> bool {
         self.loader.in_flight() < MAX_IN_FLIGHT
     }
 
-    /// Whether a tile is being loaded.
+    /// Returns whether the tile is being loaded.
     pub(crate) fn is_loading(&self, index: TileIndex) -> bool {
         self.loading.contains_key(&index)
     }
 
-    /// Begins to load a tile that will take about so many bytes of memory.
+    /// Starts to load a tile. `bytes` is its expected memory.
     pub(crate) fn load(&mut self, location: TileLocation, bytes: usize) {
         self.loading.insert(location.tile(), bytes);
         self.loading_bytes += bytes;
         self.loader.give(Load { location });
     }
 
-    /// A load that has ended, if there is one.
+    /// Returns a finished load, if there is one.
     pub(crate) fn take_loaded(&mut self) -> Option<Loaded> {
         let loaded = self.loader.take()?;
         self.load_ended(loaded.index);
         Some(loaded)
     }
 
-    /// Waits for a load to end; `None` if none is in flight.
+    /// Waits for a load to finish; `None` if none is in flight.
     pub(crate) fn wait_loaded(&mut self) -> Option<Loaded> {
         match self.loader.wait() {
             Some(loaded) => {

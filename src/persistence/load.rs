@@ -1,4 +1,4 @@
-//! Tiles from their files. How they get there is `tile_saver.rs`.
+//! Reads tiles from their files, which `tile_saver.rs` writes.
 
 use crate::config::Storage;
 use crate::error::{DecodeError, Error, FormatError, Result};
@@ -9,7 +9,7 @@ use crate::tile::format::{
 };
 use crate::tile::{OctreeFactory, Table, Tile};
 
-/// Reads the latest version of a tile; `None` if there is none. The octree is derived from the table.
+/// Reads the latest version of a tile; `None` if there is none. The octree is built from the table.
 pub(crate) fn load(
     store: &TileStore,
     grid: &Grid,
@@ -20,7 +20,7 @@ pub(crate) fn load(
     Ok(Some((Tile::from_table(grid, octrees, index, read.table), read.file.bytes)))
 }
 
-/// [`load`] for a tile that is looked at once.
+/// Like [`load`], for a tile that is used only once.
 pub(crate) fn load_uncached(store: &TileStore, grid: &Grid, index: TileIndex) -> Result<Option<(Tile, u64)>> {
     let Some(read) = load_table(store, grid, index)? else { return Ok(None) };
     Ok(Some((Tile::uncached(grid, index, read.table), read.file.bytes)))
@@ -31,8 +31,8 @@ pub(crate) fn load_table(store: &TileStore, grid: &Grid, index: TileIndex) -> Re
     load_made(store, index, |stored| read_stored_table(grid, index, stored))
 }
 
-/// Reads the observed voxels of a tile's latest version whose log-odds are at least `from`, in Morton order. The file
-/// is checked as for a table, but none is built.
+/// Reads the observed voxels with log-odds of at least `from` in a tile's latest version, in Morton order. The file is
+/// verified as for a table, but no table is built.
 pub(crate) fn load_voxels_from(
     store: &TileStore,
     grid: &Grid,
@@ -70,7 +70,7 @@ fn load_made<T>(
     loaded
 }
 
-/// A table, or what else was made of it, that was read from its file and belongs there.
+/// Verified table, or a value decoded from it.
 pub(crate) struct Read<T> {
     pub table: T,
     pub file: FileChecksum,
@@ -78,10 +78,10 @@ pub(crate) struct Read<T> {
     pub trailer: Option<Trailer>,
 }
 
-/// A table that was read from its file and belongs there.
 pub(crate) type ReadTable = Read<Table>;
 
-/// Reads a tile's table. In a map with an id it must be that map's, and the version that the log names, if it does.
+/// Reads a tile's table. In a map with an id the file must belong to that map, and must be the version in the log, if
+/// there is one.
 pub(crate) fn read_stored_table(grid: &Grid, index: TileIndex, stored: StoredTile) -> Result<ReadTable> {
     let voxels = grid.voxels_of_tile(index);
     read_stored(index, stored, |stored| match stored.storage {
@@ -90,7 +90,7 @@ pub(crate) fn read_stored_table(grid: &Grid, index: TileIndex, stored: StoredTil
     })
 }
 
-/// The same for the voxels whose log-odds are at least `from`.
+/// Like [`read_stored_table`], for the voxels with log-odds of at least `from`.
 fn read_stored_voxels_from(
     grid: &Grid,
     index: TileIndex,

@@ -1,16 +1,16 @@
-//! Tiles and configurations to files and back: the only layer that knows both tiles and the store.
+//! Conversion of tiles and configurations to files and back: the only layer that uses both tiles and the store.
 //!
 //! ```text
 //! load          store -> table, checked against the log -> Tile
 //! one_voxel     store -> the evidence of one voxel, from a part of its tile's file
 //! tile_saver    Tile or CompactTile -> table and octree files -> store
-//! copy_tile     a tile of one map -> another map's store, its bytes but for the map's id
-//! compact_tile  a tile in the compact form, in memory; packer makes it
+//! copy_tile     a tile of one map -> another map's store, with that map's id
+//! compact_tile  a tile in the compact form, in memory; encoded by packer
 //! io_threads    one saving and one loading thread, each a `Worker`
 //! point_reader  store -> the points of a kept scan
-//! priority      threads that give way to the mapper's
+//! priority      lower priority for background threads
 //! upgrade       a map of the original format -> the same map with id, log and checksums
-//! parameters    MapConfig <-> metadata.json; map_id makes ids
+//! parameters    MapConfig <-> metadata.json; map_id creates ids
 //! ```
 
 mod compact_tile;

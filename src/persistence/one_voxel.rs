@@ -6,22 +6,22 @@ use crate::store::{FileChecksum, TileLocation, TileStore};
 use crate::tile::format::CompactFileIndex;
 use std::io::{self, BufReader, Read};
 
-/// What is known of a voxel.
+/// Result of reading one voxel.
 pub(crate) struct FoundVoxel {
-    /// `None` if it was never observed.
+    /// `None` if the voxel was never observed.
     pub evidence: Option<Evidence>,
-    /// Bytes that were read.
+    /// Number of bytes read.
     pub bytes: u64,
 }
 
-/// Files up to this length are read at once: a request more, to a bucket, takes longer.
+/// Files up to this length are read at once, because another request to a bucket would take longer.
 const SMALL_FILE_BYTES: u64 = 64 << 10;
 
-/// Bytes of a longer one that are read first: with real scans they hold all that stands before the groups.
+/// Bytes of a longer file that are read first. With real scans they contain everything before the groups.
 const FIRST_BYTES: usize = 8 << 10;
 
-/// Reads one voxel from a part of its tile's file that matches the log. `None` if the file has no parts, or if anything
-/// is wrong with it: whoever loads the tile hears what.
+/// Reads one voxel from the part of its tile's file that contains it, and compares that part with the log. Returns
+/// `None` if the file has no parts, or after any error: loading the tile reports it.
 pub(crate) fn read_voxel(store: &TileStore, grid: &Grid, voxel: VoxelIndex) -> Option<FoundVoxel> {
     let tile = grid.tile_of_voxel(voxel);
     let location = store.tables().location_to_read(tile).ok()??;
@@ -49,10 +49,10 @@ pub(crate) fn read_voxel(store: &TileStore, grid: &Grid, voxel: VoxelIndex) -> O
     Some(FoundVoxel { evidence: index.evidence(code, &group).ok()?, bytes: bytes + group.len() as u64 })
 }
 
-/// A file from its beginning, read piece by piece.
+/// Stream of a file from its beginning.
 struct FileStart<'a> {
     location: &'a TileLocation,
-    /// Bytes so far.
+    /// Number of bytes read so far.
     read: u64,
 }
 

@@ -2,17 +2,17 @@ use crate::error::{Error, Result};
 use crate::tile::Table;
 use crate::tile::format::{CompactEffort, CompactWriter};
 
-/// Encodes tables in the compact form. Its buffers are made with the first table and kept: making them takes longer
-/// than encoding a small tile.
+/// Encoder of tables in the compact form. Its buffers are allocated with the first table and reused, because allocation
+/// takes longer than encoding a small tile.
 #[derive(Debug, Default)]
 pub(crate) struct Packer(Option<CompactWriter>);
 
 impl Packer {
-    /// The bytes of a table.
+    /// Encodes a table.
     ///
     /// # Errors
     ///
-    /// A lack of memory.
+    /// Out of memory.
     pub(crate) fn pack(&mut self, table: &Table) -> Result<Vec<u8>> {
         let failed = |error| Error::io("memory".as_ref(), "pack a tile in", error);
         let writer = match &mut self.0 {

@@ -1,11 +1,11 @@
-//! A map's configuration, and what `metadata.json` keeps of it.
+//! Conversion between a map's configuration and `metadata.json`.
 
 use crate::config::MapConfig;
 use crate::error::{FormatError, Result};
 use crate::store::{Extension, InputRecord, MapParameters, Metadata, hex};
 use std::path::Path;
 
-/// The metadata of a map; the store fills in bounds and numbers.
+/// Returns the metadata of a new map. The store fills in bounds and numbers.
 pub(crate) fn new_metadata(config: &MapConfig, map_id: [u8; 16], inputs: &[InputRecord]) -> Metadata {
     let ext = Extension {
         empty: true,
@@ -28,11 +28,11 @@ pub(crate) fn new_metadata(config: &MapConfig, map_id: [u8; 16], inputs: &[Input
     Metadata { resolution_m, tile_size_m, bounds: None, ext: Some(ext) }
 }
 
-/// The configuration in a map's metadata; a map of the original format has the default sensor model.
+/// Returns the configuration in a map's metadata. A map of the original format has the default sensor model.
 ///
 /// # Errors
 ///
-/// Parameters that no map can have; `path` is the file that says them.
+/// Invalid parameters; `path` is the file that contains them.
 pub(crate) fn config_from(metadata: &Metadata, path: &Path) -> Result<MapConfig> {
     let wrong = |error: String| FormatError::at_offset(0, error).in_map(path, None);
     let config = MapConfig::new(metadata.resolution_m, metadata.tile_size_m);
@@ -47,7 +47,7 @@ pub(crate) fn config_from(metadata: &Metadata, path: &Path) -> Result<MapConfig>
     config.validated().map_err(|error| wrong(error.to_string()))
 }
 
-/// The parameters that every tile's file repeats.
+/// Returns the parameters that every tile's file contains.
 pub(crate) fn map_parameters(config: &MapConfig) -> MapParameters {
     MapParameters {
         resolution: config.grid.resolution_m(),

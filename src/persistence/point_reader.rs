@@ -3,7 +3,7 @@ use crate::scan::{MAX_BLOCK_BYTES, PointDecoder};
 use crate::space::Point;
 use crate::store::{self, Disk, KeptRecord, Layout, SegmentPlace, SegmentReader};
 
-/// Reads the points of one kept scan, block by block, and nothing else of its segment.
+/// Reader of the points of one kept scan, in blocks.
 pub(crate) struct PointReader {
     blocks: SegmentReader,
     decoder: PointDecoder,
@@ -12,20 +12,20 @@ pub(crate) struct PointReader {
 const _: () = assert!(MAX_BLOCK_BYTES == store::MAX_BLOCK_BYTES, "a block that is written can be read");
 
 impl PointReader {
-    /// Goes to where a scan begins.
+    /// Opens a kept scan.
     ///
     /// # Errors
     ///
-    /// A segment that is missing or too short, a disk that refuses.
+    /// A missing or truncated segment, or an I/O error.
     pub(crate) fn open(disk: &dyn Disk, layout: &Layout, place: SegmentPlace) -> Result<Self> {
         Ok(Self { blocks: SegmentReader::open(disk, layout, place)?, decoder: PointDecoder::default() })
     }
 
-    /// Reads the next block's points in place of those in the lists; false after the last block.
+    /// Replaces the content of the lists by the points of the next block. Returns false after the last block.
     ///
     /// # Errors
     ///
-    /// Damage, or a disk that refuses.
+    /// Damage or an I/O error.
     pub(crate) fn next(&mut self, points: &mut Vec<Point>, intensities: &mut Vec<f32>) -> Result<bool> {
         points.clear();
         intensities.clear();
@@ -36,7 +36,7 @@ impl PointReader {
         Ok(true)
     }
 
-    /// After a block: whether it has as many intensities as it should.
+    /// Checks the number of intensities of a block.
     pub(crate) fn check_intensities(&self, points: usize, intensities: usize, has_any: bool) -> Result<()> {
         match intensities == if has_any { points } else { 0 } {
             true => Ok(()),
@@ -47,7 +47,7 @@ impl PointReader {
         }
     }
 
-    /// After the last block: whether as many points were there as the catalog says.
+    /// Checks, after the last block, the number of points against the catalog.
     pub(crate) fn check_count(&self, points: u64, scan: &KeptRecord) -> Result<()> {
         match points == scan.points {
             true => Ok(()),
@@ -60,7 +60,7 @@ impl PointReader {
     }
 }
 
-/// Checks that the points of a kept scan are whole.
+/// Checks that the points of a kept scan are intact.
 pub(crate) fn check_points(disk: &dyn Disk, layout: &Layout, scan: &KeptRecord) -> Result<()> {
     let mut input = PointReader::open(disk, layout, scan.place)?;
     let (mut points, mut intensities, mut count) = (Vec::new(), Vec::new(), 0);

@@ -1,17 +1,17 @@
-/// Lets all threads of normal priority go before this one, for good. On a computer with few cores, what is written to
-/// disk beside the mapper then takes the time that scans leave; it never comes to a standstill.
+/// Permanently lowers the priority of this thread below that of normal threads. With few cores, writing to disk then
+/// uses the time that scans leave, but never stops.
 ///
-/// A system that refuses leaves the thread as it is.
+/// If the system refuses, the priority is unchanged.
 #[cfg(target_os = "linux")]
 pub(crate) fn give_way() {
-    /// Beside a thread that never waits, a tenth of a core is left (`sched(7)`: 110 parts of 1024 + 110).
+    /// Next to a busy thread, the low-priority thread gets a tenth of a core (`sched(7)`: 110 parts of 1024 + 110).
     const NICENESS: i32 = 10;
-    // The niceness of Linux is that of the thread, not of the process.
+    // On Linux the nice value applies to the thread, not to the process.
     if let Err(error) = rustix::process::nice(NICENESS) {
         log::debug!("no lower priority for this thread: {error}");
     }
 }
 
-/// Other systems have no niceness of threads.
+/// Other systems have no nice value per thread.
 #[cfg(not(target_os = "linux"))]
 pub(crate) fn give_way() {}

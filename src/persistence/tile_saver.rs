@@ -1,4 +1,4 @@
-//! Tiles to their files. How they come back is `load.rs`.
+//! Writes tiles to their files, which `load.rs` reads.
 
 use super::compact_tile::CompactTile;
 use super::packer::Packer;
@@ -10,7 +10,7 @@ use crate::store::{FileChecksum, TileFile, TileStore, TileVersion, TileWriter};
 use crate::tile::format::{Trailer, write_compact_file, write_table};
 use crate::tile::{Table, Tile};
 
-/// Writes the files of a map's tiles. What packing takes is kept from one tile to the next.
+/// Writer of tiles' files. Its buffers are reused.
 #[derive(Debug)]
 pub(crate) struct TileSaver {
     resolution_m: f64,
@@ -30,7 +30,7 @@ impl TileSaver {
         }
     }
 
-    /// Writes the next version of a tile's files.
+    /// Writes the next version of a tile's files, and records it in the store.
     pub(crate) fn save(
         &mut self,
         store: &mut TileStore,
@@ -42,7 +42,7 @@ impl TileSaver {
         Ok(version)
     }
 
-    /// Writes the next version of a tile's files, of which the store is still to be told.
+    /// Writes the next version of a tile's files. The caller must record it in the store.
     pub(crate) fn write(
         &mut self,
         writer: &TileWriter,
@@ -60,7 +60,7 @@ impl TileSaver {
         }
     }
 
-    /// [`TileSaver::write`] of a tile in the compact form.
+    /// Like [`TileSaver::write`], for a tile in the compact form.
     pub(crate) fn write_compact(
         &self,
         writer: &TileWriter,
@@ -91,7 +91,7 @@ impl TileSaver {
         Ok(TileVersion { scan_number, table, octree: FileChecksum::default(), voxels, occupied })
     }
 
-    /// [`TileSaver::write`] in a map with the original storage.
+    /// Like [`TileSaver::write`], for a map with the original storage.
     fn write_octomap(
         &self,
         writer: &TileWriter,

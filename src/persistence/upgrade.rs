@@ -6,8 +6,8 @@ use crate::error::Result;
 use crate::store::{Metadata, TileStore};
 use std::collections::BTreeSet;
 
-/// Upgrades a map of the original format before its first change: gives it an id and a log, rewrites every tile with a
-/// trailer, and commits. Until that commit it stays in the original format. Does nothing for other maps.
+/// Upgrades a map of the original format before its first change: adds an id and a log, rewrites every tile with a
+/// trailer, and commits. Until then the map remains in the original format. Does nothing for other maps.
 pub(crate) fn upgrade(
     store: &mut TileStore,
     saver: &mut TileSaver,
@@ -20,7 +20,7 @@ pub(crate) fn upgrade(
     log::info!("{}: a map of the original format; its tiles get checksums", store.folder().display());
     let map_id = store.upgrade(new_map_id())?;
     for index in store.tiles().suspects() {
-        // What an earlier attempt wrote of it cannot be trusted: it is written again from the tile's own file.
+        // An earlier sync of this version failed, so it is written again from the tile's own file.
         store.tiles_mut().drop_next(index);
     }
     for index in store.tiles().iter().collect::<BTreeSet<_>>() {

@@ -6,11 +6,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::{self, JoinHandle};
 
-/// A background thread for one kind of job, done in the order given. The thread starts with the first job, sleeps while
-/// there is none, and ends with its owner; jobs not begun by then are dropped. Where the system refuses a thread, the
-/// caller's does the job at once.
+/// Background thread for one kind of job, which runs jobs in order. It starts with the first job, sleeps while there
+/// are none, and ends with its owner. Jobs not started by then are dropped. If the system cannot start a thread, jobs
+/// run on the caller's thread.
 ///
-/// The owner limits how many jobs are in flight.
+/// The owner limits the number of jobs in flight.
 pub(crate) struct Worker<Job, Done> {
     name: &'static str,
     work: Arc<dyn Fn(Job) -> Done + Send + Sync>,
@@ -34,17 +34,17 @@ impl<Job: Send + 'static, Done: Send + 'static> Worker<Job, Done> {
         Self { name, work, thread: None, has_no_thread: false, gives_way: false, done_here, in_flight: 0 }
     }
 
-    /// The same for work that nobody waits for as long as there is other work.
+    /// Runs the jobs at low priority.
     pub(crate) fn giving_way(self) -> Self {
         Self { gives_way: true, ..self }
     }
 
-    /// How many jobs were given of which the result was not taken.
+    /// Number of submitted jobs whose result was not taken yet.
     pub(crate) fn in_flight(&self) -> usize {
         self.in_flight
     }
 
-    /// Gives a job.
+    /// Submits a job.
     pub(crate) fn give(&mut self, job: Job) {
         self.in_flight += 1;
         if self.thread.is_none() && !self.has_no_thread {
@@ -60,7 +60,7 @@ impl<Job: Send + 'static, Done: Send + 'static> Worker<Job, Done> {
         }
     }
 
-    /// A result, if there is one already.
+    /// Returns a result, if one is available.
     pub(crate) fn take(&mut self) -> Option<Done> {
         let there = self.thread.as_ref().and_then(|thread| thread.done.try_recv().ok());
         let done = there.or_else(|| self.done_here.pop_front())?;
@@ -68,7 +68,7 @@ impl<Job: Send + 'static, Done: Send + 'static> Worker<Job, Done> {
         Some(done)
     }
 
-    /// The next result, waited for; `None` if none will come.
+    /// Waits for the next result; `None` if there are no jobs.
     pub(crate) fn wait(&mut self) -> Option<Done> {
         if self.in_flight > self.done_here.len()
             && let Some(thread) = &self.thread
@@ -79,7 +79,7 @@ impl<Job: Send + 'static, Done: Send + 'static> Worker<Job, Done> {
                     return Some(done);
                 }
                 Err(_) => {
-                    // A thread that panicked took its jobs with it.
+                    // A thread that panicked loses its jobs.
                     self.thread = None;
                     self.in_flight = self.done_here.len();
                 }
@@ -120,7 +120,7 @@ impl<Job, Done> Drop for Thread<Job, Done> {
         self.is_over.store(true, Ordering::Relaxed);
         self.jobs = None;
         if let Some(handle) = self.handle.take() {
-            // One that panicked is gone, too.
+            // The thread may have panicked.
             let _ = handle.join();
         }
     }

@@ -1,5 +1,5 @@
-//! Temporary files without a name, for what has no room in memory for a while. What was appended is read back in order as
-//! memory ([`Window`]), or at any place.
+//! Unnamed temporary files for data that exceeds memory. Appended bytes can be read in order as a memory map
+//! ([`Window`]), or at any offset.
 
 mod mapping;
 mod scratch_file;

@@ -1,4 +1,4 @@
-//! The one place that maps files.
+//! Memory mapping of files, the only unsafe code.
 
 use memmap2::{Mmap, MmapOptions};
 use std::fs::File;
@@ -6,10 +6,10 @@ use std::io;
 
 /// Maps a part of a file, read-only.
 ///
-/// The file must have no name, be no other process's, never get shorter, and never change where it was written: a
-/// [`ScratchFile`](crate::ScratchFile) only appends.
+/// The file must be unnamed, not shared with other processes, never truncated, and never changed where it was written.
+/// A [`ScratchFile`](crate::ScratchFile) only appends.
 #[expect(unsafe_code, reason = "nobody else can cut or change the file below the mapping")]
 pub(crate) fn map(file: &File, at: u64, bytes: usize) -> io::Result<Mmap> {
-    // SAFETY: see above.
+    // SAFETY: no other process can access the file, and its owner only appends, as required above.
     unsafe { MmapOptions::new().offset(at).len(bytes).map(file) }
 }

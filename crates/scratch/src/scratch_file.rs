@@ -4,47 +4,47 @@ use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
-/// A file without a name: it goes when it is dropped, or with the process. It is written at its end only.
+/// Unnamed file that is only appended to. It is deleted when it is dropped, or when the process ends.
 #[derive(Debug)]
 pub struct ScratchFile {
     file: File,
     len: u64,
-    /// Whether the file's own position is its end.
+    /// Whether the position of `file` is its end.
     is_at_end: bool,
-    /// What was read last, and where it stands.
+    /// Buffer of the last read; `read_at` is its offset in the file.
     read: Vec<u8>,
     read_at: u64,
 }
 
-/// Bytes that are read at a time: a small record comes with its header.
+/// Bytes per read, so that a small record is read with its header.
 const READ_BYTES: usize = 4096;
 
 impl ScratchFile {
-    /// An empty file on the file system of a folder.
+    /// Creates an empty file on the file system of a folder.
     ///
     /// # Errors
     ///
-    /// A file system that refuses.
+    /// An I/O error.
     pub fn in_folder(folder: &Path) -> io::Result<Self> {
         let file = tempfile::tempfile_in(folder)?;
         Ok(Self { file, len: 0, is_at_end: true, read: Vec::new(), read_at: 0 })
     }
 
-    /// Bytes of the file.
+    /// Length in bytes.
     pub fn len(&self) -> u64 {
         self.len
     }
 
-    /// Whether nothing was appended.
+    /// Returns whether the file is empty.
     pub fn is_empty(&self) -> bool {
         self.len == 0
     }
 
-    /// Appends bytes. After an error the file is as long as before.
+    /// Appends bytes. After an error the length is unchanged.
     ///
     /// # Errors
     ///
-    /// A file system that refuses.
+    /// An I/O error.
     pub fn append(&mut self, bytes: &[u8]) -> io::Result<()> {
         if !self.is_at_end {
             self.file.seek(SeekFrom::Start(self.len))?;
@@ -56,16 +56,16 @@ impl ScratchFile {
         Ok(())
     }
 
-    /// Bytes at any place, as a copy of them. A mapping is faster but keeps up to a MiB around each place in memory.
+    /// Returns a copy of bytes at any offset. A mapping is faster, but keeps up to 1 MiB around each access in memory.
     ///
     /// # Errors
     ///
-    /// [`io::ErrorKind::UnexpectedEof`] behind the end; a medium that refuses.
+    /// [`io::ErrorKind::UnexpectedEof`] beyond the end, or an I/O error.
     pub fn bytes(&mut self, at: u64, count: usize) -> io::Result<&[u8]> {
         self.check(at, count)?;
         let end = at + count as u64;
         if at < self.read_at || end > self.read_at + self.read.len() as u64 {
-            // At most what is asked for, or a few KiB.
+            // At most the requested bytes, or a few KiB.
             let there = usize::try_from(self.len - at).unwrap_or(usize::MAX);
             self.read.resize(count.max(READ_BYTES).min(there), 0);
             self.is_at_end = false;
@@ -80,12 +80,11 @@ impl ScratchFile {
         Ok(&self.read[first..first + count])
     }
 
-    /// A part of the file as memory, for reading it in order. All of it counts as memory of the process until it is
-    /// dropped.
+    /// Maps a part of the file for reading it in order. All of it counts as memory of the process until it is dropped.
     ///
     /// # Errors
     ///
-    /// [`io::ErrorKind::UnexpectedEof`] behind the end; a system that does not map the file.
+    /// [`io::ErrorKind::UnexpectedEof`] beyond the end, or an error of the mapping.
     pub fn window(&self, at: u64, count: usize) -> io::Result<Window> {
         self.check(at, count)?;
         let mapping = (count > 0).then(|| map(&self.file, at, count)).transpose()?;

@@ -1,10 +1,10 @@
 use memmap2::Mmap;
 use std::ops::Deref;
 
-/// A part of a file as memory. It outlives the file.
+/// Memory map of a part of a file. It can outlive the file.
 #[derive(Debug)]
 pub struct Window {
-    /// An empty part has none.
+    /// `None` for an empty part.
     pub(crate) mapping: Option<Mmap>,
 }
 

@@ -1,4 +1,4 @@
-//! What a change of scans leaves to do: points that are gone from the map must be in none of its files.
+//! Completes changes of scans: removed points must not remain in any file of the map.
 
 use crate::error::{Error, Result};
 use crate::store::{Disk, EntryKind, Layout, Metadata, Salvage, SideFolder, TileStore, id_from_hex};
@@ -6,19 +6,18 @@ use std::io;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Does what a commit leaves to do, and removes what nothing needs any more of kept scans, durably.
+/// Finishes the last commit, and durably removes kept scans that are no longer needed.
 pub(super) fn release(store: &mut TileStore) -> Result<()> {
     store.checkpoint()?;
     store.release_scans()
 }
 
-/// Removes the second map that a remapping beside a mapper left when it was killed: it has the evidence of all scans.
-/// Another map that has this name by chance has another id, and stays. A killed removal leaves a folder without the files
-/// that have the id.
+/// Removes the shadow map of a killed online remap, because it has the evidence of all scans. A map that happens to
+/// have this name has another id and is kept. A killed removal leaves a folder without the files that contain the id.
 ///
 /// # Errors
 ///
-/// A disk that refuses; a file in the second map that is of no map.
+/// A foreign file in the folder, or an I/O error.
 pub(super) fn remove_second_map(disk: Arc<dyn Disk>, folder: &Path) -> Result<()> {
     let second = folder.with_added_extension("remapping");
     if !matches!(disk.kind(&second), Ok(Some(EntryKind::Folder))) {
@@ -36,27 +35,26 @@ pub(super) fn remove_second_map(disk: Arc<dyn Disk>, folder: &Path) -> Result<()
         }
     }
     match SideFolder::begin(disk, folder) {
-        // At work, or a path without a name that none could be beside.
+        // Another process uses it, or the path has no name, so there can be no such folder.
         Ok(_) | Err(Error::Locked { .. } | Error::InvalidArgument { .. }) => Ok(()),
-        // A folder that has this name by chance: a removal begins only where all is of a map.
+        // A folder that happens to have this name: a removal starts only if all its content belongs to a map.
         Err(Error::AlreadyExists { .. }) if !has_id => Ok(()),
         Err(error) => Err(error),
     }
 }
 
-/// Completes what an earlier call may have left of a removal: what it took out of the map is in no file any more, except
-/// for snapshots. Returns how many files with kept scans are gone by this. A map without such files need not be opened
-/// for writing, so another writer is no error there.
+/// Completes an interrupted removal, so that removed scans remain only in snapshots. Returns the number of removed
+/// files with kept scans. A map without such files is not opened for writing, so another writer is not an error then.
 ///
 /// # Errors
 ///
-/// Damage, a disk that refuses; with files that are to be gone, another writer.
+/// Damage, an I/O error, or, if files must be removed, another writer.
 pub(super) fn complete_earlier(disk: Arc<dyn Disk>, folder: &Path) -> Result<u64> {
     let second = remove_second_map(disk.clone(), folder);
     let idle =
         TileStore::open_read_only(disk.clone(), folder)?.snapshots().idle_scan_files()?.unwrap_or_default();
     match TileStore::open(disk.clone(), folder) {
-        // The other writer has done it when it opened the map.
+        // The other writer has removed them when it opened the map.
         Err(_) if idle.is_empty() => {}
         opened => opened.and_then(|mut store| release(&mut store)).map_err(with_hint)?,
     }
@@ -68,12 +66,12 @@ pub(super) fn complete_earlier(disk: Arc<dyn Disk>, folder: &Path) -> Result<u64
     Ok(removed)
 }
 
-/// Completes a removal that was committed and could not remove its files durably.
+/// Completes a committed removal whose files could not be removed durably.
 pub(super) fn complete(disk: Arc<dyn Disk>, folder: &Path) -> Result<()> {
     TileStore::open(disk, folder).and_then(|mut store| release(&mut store)).map_err(with_hint)
 }
 
-/// The error of a removal that was not completed, with what to do.
+/// Adds the remedy to the error of an incomplete removal.
 fn with_hint(error: Error) -> Error {
     match error {
         Error::Io { path, action, cause } => {

@@ -4,7 +4,7 @@ use crate::scan::{Pose, ScanPoints, TakePoints};
 use crate::space::{Aabb, Point};
 use std::ops::Range;
 
-/// The points of a kept scan that are in a box, or those that are not. They are picked out each time they are read.
+/// View of the points of a kept scan that are inside or outside a box. Points are filtered at each read.
 pub(super) struct FilteredScan<'a> {
     scan: &'a KeptScan,
     region: Aabb,

@@ -7,30 +7,28 @@ use crate::store::{InputRecord, MapPath, StagedMap, TileStore};
 use serde::Serialize;
 use std::path::Path;
 
-/// What came of mapping the scans of a map anew.
+/// Result of [`map_anew`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct MappedAnew {
-    /// Scans of the new map.
+    /// Number of scans in the new map.
     pub scans: u64,
-    /// What happened to their points.
+    /// Counts of their points.
     #[serde(flatten)]
     pub report: ScanReport,
 }
 
-/// Makes another map of the scans that a map keeps, with other parameters. Each scan's rays are those that it was
-/// mapped with, as `rays` changes them. So is the region of the new map that of the map, whatever `config` says; where
-/// its tiles have another size, it is said in these.
+/// Creates another map from the scans that a map keeps, with other parameters. `rays` changes the ray settings of each
+/// scan. The region is that of the source map, regardless of `config`, converted to the new tile size.
 ///
-/// `progress` is told the scans done and all. The new map keeps scans if `config` says so. It is there whole or not at
-/// all: until the end it lies beside its place, as `MAP.unfinished`.
+/// `progress` receives the number of scans done and in total. The new map keeps scans if `config` says so. It appears
+/// only when it is complete; until then it is in `MAP.unfinished`.
 ///
 /// # Errors
 ///
-/// A map that keeps no scans or consists of more than these; a region with borders that the new tiles do not have; a
-/// wrong configuration; a folder with other content; another process that makes the same map; damage; a disk that
-/// refuses; a request to stop. There is no map then, unless it was the name of the finished one that could not be made
-/// durable.
+/// A map that keeps no scans or has other scans too; a region whose borders are not borders of the new tiles; an
+/// invalid configuration; a folder with other content; another process that creates the same map; damage; an I/O error;
+/// a request to stop. There is no map then, unless only the last step, the sync of its name, has failed.
 pub fn map_anew(
     map: &MapReader,
     output: impl Into<MapPath>,
@@ -43,7 +41,7 @@ pub fn map_anew(
     let rays = |own: &RayConfig| retiling.rays(own).map(|own| rays(&own));
     let of_map = RayConfig { region: map.config().rays.region, ..config.rays };
     let config = MapConfig { rays: rays(&of_map)?, ..config };
-    // What their rays cannot become is refused before anything is made.
+    // Report invalid ray settings before anything is created.
     let scans = map.kept_summary_with(|record| rays(&record.rays).map(drop))?;
     scans.check_keeps_all()?;
     let count = scans.scans().len() as u64;
@@ -57,7 +55,7 @@ pub fn map_anew(
     Ok(mapped)
 }
 
-/// Maps all scans, and flushes.
+/// Inserts all scans, and flushes.
 fn map_scans(
     map: &MapReader,
     mapper: &mut OutOfCoreTileMapper,
@@ -79,7 +77,7 @@ fn map_scans(
         progress(mapped.scans, count);
     }
     mapper.flush()?;
-    // What a flush may leave to the next opening of the map is not left here: nobody else is to see it.
+    // Finish the commit now, so that the map has no remaining work when it becomes visible.
     mapper.with_store(TileStore::checkpoint)?;
     Ok(mapped)
 }

@@ -1,11 +1,11 @@
-//! Maps that follow their scans: poses move, scans or points go, and what that touches is mapped again.
+//! Changes of scans after mapping: new poses, and removal of scans or points. Affected tiles are replayed.
 //!
 //! ```text
-//! change of scans -> revision: which tiles? -> those tiles, from all scans that touch them, in order -> one commit
+//! change of scans -> revision: affected tiles -> replay of all scans in these tiles, in order -> one commit
 //! ```
 //!
-//! The map is afterwards as if it had been built from the scans as they are now, to the bit: a tile depends on the
-//! scans that touch it, and on nothing else.
+//! Afterwards the map equals, bit by bit, a map built from the changed scans: the content of a tile depends only on the
+//! scans that touch it.
 
 mod completion;
 mod filtered_scan;

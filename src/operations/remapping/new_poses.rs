@@ -3,25 +3,25 @@ use crate::mapper::{KeptScanHead, KeptSummary};
 use crate::scan::Pose;
 use rustc_hash::{FxHashMap, FxHashSet};
 
-/// Poses that the scans of a map get.
+/// New poses of a map's scans.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub enum NewPoses {
-    /// One a scan that the map keeps, in order.
+    /// One pose per kept scan, in order.
     InOrder(Vec<Pose>),
-    /// By the numbers of the scans in the map; scans that are not named stay.
+    /// Poses by the number of the scan in the map. Other scans keep their pose.
     Numbered(Vec<(u64, Pose)>),
 }
 
-/// Most scans that an error names.
+/// Maximum number of scans named in an error.
 const MAX_NAMED: usize = 5;
 
 impl NewPoses {
-    /// The new poses, by the numbers of their scans.
+    /// Returns the new poses by scan number.
     ///
     /// # Errors
     ///
-    /// A scan without a pose, a pose without a scan, numbers that are not finite: named.
+    /// A scan without a pose, a pose without a scan, or a pose that is not finite.
     pub fn by_number(&self, scans: &KeptSummary) -> Result<FxHashMap<u64, Pose>> {
         let scans = scans.scans();
         match self {
@@ -51,7 +51,7 @@ fn in_order(scans: &[KeptScanHead], poses: &[Pose]) -> Result<FxHashMap<u64, Pos
     Err(Error::argument("poses", reason))
 }
 
-/// An error that names what there is; none if there is nothing.
+/// Returns an error with the first of these numbers, if there are any.
 fn refuse(reason: &str, mut named: impl Iterator<Item = u64>) -> Result<()> {
     let first: Vec<_> = named.by_ref().take(MAX_NAMED).map(|number| number.to_string()).collect();
     if first.is_empty() {

@@ -6,51 +6,51 @@ use crate::mapper::{KeptScanHead, KeptSummary};
 use crate::scan::Pose;
 use serde::Serialize;
 
-/// How a map follows new poses.
+/// Options of a remap.
 #[derive(Clone, Debug, Default)]
 #[non_exhaustive]
 #[must_use]
 pub struct Remap {
-    /// What every rework can do.
+    /// Options of the replay.
     pub rework: Rework,
-    /// Scans that move by no more than so many metres and turn by no more than so many radians stay where they are.
-    /// Default: every scan gets its new pose.
+    /// Maximum translation in metres and rotation in radians of scans that keep their pose. Default: every scan gets
+    /// its new pose.
     pub tolerance: Option<(f64, f64)>,
 }
 
 impl Remap {
-    /// Remaps in this way.
+    /// Returns the options with this replay.
     pub fn new(rework: Rework) -> Self {
         Self { rework, tolerance: None }
     }
 
-    /// The same, leaving scans alone that hardly move: metres and radians.
+    /// Sets the tolerance in metres and radians.
     pub fn with_tolerance(self, tolerance: impl Into<Option<(f64, f64)>>) -> Self {
         Self { tolerance: tolerance.into(), ..self }
     }
 }
 
-/// What became of a map by new poses.
+/// Result of a remap.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct Remapped {
-    /// What was mapped again.
+    /// Counts of the replay.
     #[serde(flatten)]
     pub mapped: MappedAgain,
-    /// Scans whose new pose differs by no more than the tolerance; they keep the pose that they had.
+    /// Number of scans that kept their pose, because the new one is within the tolerance.
     pub scans_within_tolerance: u64,
-    /// The longest way between an old and a new pose, in metres.
+    /// Largest translation between an old and a new pose, in metres.
     pub largest_move_m: f64,
-    /// The largest angle between an old and a new pose, in degrees.
+    /// Largest rotation between an old and a new pose, in degrees.
     pub largest_turn_deg: f64,
-    /// The same of the scans that kept their pose: how far the map is from the new poses at most, in metres.
+    /// Largest translation of the scans that kept their pose, in metres: bound of the deviation from the new poses.
     pub largest_move_left_m: f64,
-    /// Likewise, in degrees.
+    /// Largest rotation of the scans that kept their pose, in degrees.
     pub largest_turn_left_deg: f64,
 }
 
-/// Gives the scans of a map new poses: what they touch under the old or the new ones is mapped again, from all scans
-/// that touch it. One commit; the map is then as if it had been built with these poses, to the bit.
+/// Assigns new poses to the scans of a map. Tiles that these scans touch with the old or new poses are replayed from
+/// all scans that touch them. In one commit the map becomes equal, bit by bit, to one built with the new poses.
 ///
 /// ```no_run
 /// use voxtile::mapper::KeptSummary;
@@ -64,14 +64,15 @@ pub struct Remapped {
 /// # }
 /// ```
 ///
-/// Work: the tiles touched, in the memory that `how` allows. `progress` is told the scans done and all.
+/// The cost depends on the affected tiles; `how` limits the memory. `progress` receives the number of scans done and in
+/// total.
 ///
 /// # Errors
 ///
-/// A map that keeps no scans or consists of more than these; poses that are not finite, missing or too many; scans
-/// whose points are in the world frame, which no pose moves; a damaged segment or catalog; another writer, and
-/// [`Error::Changed`] if one has flushed before the map was locked; a disk that refuses; a request to stop. The map is
-/// as it was then; the snapshot that keeps it may have been made.
+/// A map that keeps no scans or has other scans too; missing, surplus or non-finite poses; scans whose points are in
+/// the world frame, which poses cannot move; a damaged segment or catalog; another writer, or [`Error::Changed`] if one
+/// has flushed before the map was locked; an I/O error; a request to stop. The map is unchanged then. A snapshot
+/// `keep_as` may have been created.
 pub fn remap(
     scans: &KeptSummary,
     poses: &NewPoses,
@@ -84,7 +85,7 @@ pub fn remap(
 }
 
 impl Remapped {
-    /// Which scans of the map get a new pose, and how far they move.
+    /// Returns the changes of scans by new poses, and how far they move.
     pub(super) fn by_poses(scans: &KeptSummary, poses: &NewPoses, how: &Remap) -> Result<(Self, Changes)> {
         if let Some((moved_m, turned)) = how.tolerance
             && !(moved_m >= 0.0 && turned >= 0.0)
@@ -107,7 +108,7 @@ impl Remapped {
         Ok((remapped, changes))
     }
 
-    /// Whether a scan gets a new pose.
+    /// Returns whether a scan gets a new pose.
     fn moves(&mut self, scan: &KeptScanHead, new: &Pose, tolerance: Option<(f64, f64)>) -> Result<bool> {
         let Some(old) = scan.world_from_sensor else {
             let reason = format!(

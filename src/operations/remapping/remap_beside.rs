@@ -11,46 +11,45 @@ use rayon::ThreadPool;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// A [`remap`](super::remap()) beside the mapper of the map: what takes long is done while scans go on, in threads of
-/// lower priority, and the map changes in one short commit at the end.
+/// Online [`remap`](super::remap()), which runs concurrently with the mapper of the map: the long part runs in threads
+/// of low priority while scans are inserted, and one short commit at the end changes the map.
 ///
 /// ```text
 /// mapper:  scan, scan, scan, flush, scan ... flush | closed     | opened again
-/// beside:  begin -> follow -> follow -> follow ... | -> finish  |
+/// remap:   begin -> follow -> follow -> follow ... | -> finish  |
 /// ```
 ///
-/// Tiles that moved scans touch are mapped again into a map beside the first, `MAP.remapping`: first from the scans
-/// that there are, then from those that were flushed meanwhile, which keep their poses. In the end the map takes these
-/// tiles over. It is then, to the bit, what `remap` would have made of it with the same poses for the same scans.
+/// Tiles that moved scans touch are replayed into a shadow map, `MAP.remapping`: first from the existing scans, then
+/// from scans that are flushed meanwhile, which keep their poses. At the end these tiles are moved into the map. The
+/// result equals, bit by bit, that of `remap` with the same poses and scans.
 ///
-/// Memory: [`Rework::memory`](super::Rework::memory), beside what the mapper takes. Disk: the touched tiles
-/// once more. Dropping it gives both back; the map is as it was.
+/// Memory: [`Rework::memory`](super::Rework::memory), in addition to the mapper's. Disk: a second copy of the affected
+/// tiles. Dropping this value frees both, and the map is unchanged.
 pub struct RemapBeside {
     disk: Arc<dyn Disk>,
     folder: PathBuf,
     how: Remap,
-    /// Where scans come from is mapped again in these, so that the mapper's threads go first.
+    /// Threads that trace scans, with low priority so that the mapper's threads run first.
     threads: ThreadPool,
     revision: Revision,
     touched: Touched,
     remapped: Remapped,
     /// `None` if no scan moves.
     side: Option<SideMapper>,
-    /// The catalog that it reads, and how many of its entries it has gone over.
+    /// Generation of the catalog, and number of its entries processed.
     catalog: Option<u64>,
     entries: u64,
 }
 
-/// Entries of scans that wait in memory to be written.
+/// Maximum number of scan entries in memory before they are written.
 const MAX_ENTRIES: u64 = 256;
 
 impl RemapBeside {
-    /// Finds out what the new poses of some scans touch. Scans that were flushed since `scans` was read keep their
-    /// poses.
+    /// Finds the tiles that the new poses affect. Scans that were flushed after `scans` was read keep their poses.
     ///
     /// # Errors
     ///
-    /// As for [`remap`](super::remap()); a dry run, which is that function's; another remapping of the same map.
+    /// As for [`remap`](super::remap()); a dry run, which only `remap` supports; another remap of the same map.
     pub fn begin(scans: &KeptSummary, poses: &NewPoses, how: &Remap) -> Result<Self> {
         let (disk, folder) = scans.place();
         if how.rework.is_dry_run {
@@ -70,35 +69,35 @@ impl RemapBeside {
         let is_needed = revision.counts.scans_changed > 0;
         let begin = || SideMapper::begin(&store, touched.config.clone(), how.rework.stop.clone());
         let side = is_needed.then(begin).transpose()?;
-        // Counted again as they are gone over.
+        // They are counted again while the scans are processed.
         (revision.counts.scans, revision.counts.updates) = (0, 0);
         drop(store);
         let (folder, how, catalog) = (folder.to_owned(), how.clone(), scans.catalog());
         Ok(Self { disk, folder, how, threads, revision, touched, remapped, side, catalog, entries: 0 })
     }
 
-    /// Removes what one that was killed has left beside the map; the next one would do so, too.
+    /// Removes the shadow map of a killed online remap, as the next one would.
     ///
     /// # Errors
     ///
-    /// [`Error::Locked`] if one is at work; something that is not of a map in its place; a disk that refuses.
+    /// [`Error::Locked`] if an online remap is running, foreign content in the folder, or an I/O error.
     pub fn remove_leftovers(map: impl Into<MapPath>) -> Result<()> {
         let (disk, folder) = map.into().into_parts();
         SideFolder::begin(disk, &folder).map(drop)
     }
 
-    /// Whether the poses move any scan; if not, there is nothing to follow and to finish.
+    /// Returns whether the poses move any scan. If not, there is nothing to follow and to finish.
     pub fn moves_scans(&self) -> bool {
         self.side.is_some()
     }
 
-    /// Goes over the scans that were flushed since the last call; the first call over all. Returns how many these were.
-    /// `progress` is told the scans gone over in this call.
+    /// Processes the scans that were flushed since the last call; the first call processes all. Returns their number.
+    /// `progress` receives the number of scans processed in this call.
     ///
     /// # Errors
     ///
-    /// [`Error::Changed`] if the scans of the map have been changed by something else meanwhile; damage; a disk that
-    /// refuses; a request to stop. Nothing can be gone on with then.
+    /// [`Error::Changed`] if another operation has changed the scans of the map; damage; an I/O error; a request to
+    /// stop. The remap cannot continue then.
     pub fn follow(&mut self, mut progress: impl FnMut(u64) + Send) -> Result<u64> {
         let Some(side) = &mut self.side else { return Ok(0) };
         let store = TileStore::open_read_only(self.disk.clone(), &self.folder)?;
@@ -108,13 +107,13 @@ impl RemapBeside {
         self.threads.install(&mut follow)
     }
 
-    /// Changes the map: its mapper has flushed and is closed. What was flushed since [`RemapBeside::follow`] is mapped
-    /// before; the rest is a commit of the tiles that were touched.
+    /// Changes the map, after its mapper has flushed and was closed. First processes scans that were flushed since
+    /// [`RemapBeside::follow`]; then one commit replaces the affected tiles.
     ///
     /// # Errors
     ///
-    /// As for [`RemapBeside::follow`] and for [`remap`](super::remap()). The map is as it was then; the snapshot that
-    /// keeps it may have been made.
+    /// As for [`RemapBeside::follow`] and [`remap`](super::remap()). The map is unchanged then. A snapshot `keep_as`
+    /// may have been created.
     pub fn finish(mut self) -> Result<Remapped> {
         let Some(side) = self.side.take() else {
             self.remapped.mapped = self.revision.counts;
@@ -143,7 +142,7 @@ impl RemapBeside {
     }
 }
 
-/// Maps what the scans that come after so many entries say about touched tiles.
+/// Inserts the scans after the first `entries` entries into the affected tiles.
 fn follow_scans(
     store: &TileStore,
     catalog: Option<u64>,
@@ -193,7 +192,7 @@ fn follow_scans(
     Ok(scans)
 }
 
-/// Scans add to the catalog that was read; what changes earlier entries makes another one.
+/// Checks that the catalog is the same. New scans extend it; changes of earlier entries create another one.
 fn check_catalog(store: &TileStore, catalog: Option<u64>) -> Result<()> {
     match store.archive().generation()? == catalog {
         true => Ok(()),

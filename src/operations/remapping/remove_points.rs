@@ -10,25 +10,26 @@ use crate::store::MapPath;
 use serde::Serialize;
 use std::path::Path;
 
-/// What was removed.
+/// Result of [`remove_points`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct PointsRemoved {
-    /// What was mapped again.
+    /// Counts of the replay.
     #[serde(flatten)]
     pub mapped: MappedAgain,
-    /// Points that are gone.
+    /// Number of removed points.
     pub points_removed: u64,
 }
 
-/// Takes all points in a box out of the scans that a map keeps, as if they had never been measured: what their rays
-/// touched is mapped again from the rest. Metres, world frame; the upper faces are outside. Snapshots stay.
+/// Removes all points in a box from the kept scans of a map, as if they had never been measured: tiles that their rays
+/// touch are replayed from the other points. The box is in metres in the world frame, and excludes its upper faces.
+/// Snapshots are unchanged.
 ///
-/// `progress` is told the scans done and all.
+/// `progress` receives the number of scans done and in total.
 ///
 /// # Errors
 ///
-/// As for [`remap`](super::remap()); a box that is none.
+/// As for [`remap`](super::remap()), and an invalid box.
 pub fn remove_points(
     map: impl Into<MapPath>,
     region: &Aabb,
@@ -61,7 +62,7 @@ pub fn remove_points(
     Ok(PointsRemoved { mapped, points_removed })
 }
 
-/// A box as an argument.
+/// Checks the argument `region`.
 fn check_region(region: &Aabb, map: &Path) -> Result<()> {
     let is_box = (0..3).all(|axis| region.min[axis] < region.max[axis]);
     if is_box {

@@ -7,35 +7,35 @@ use crate::operations::snapshot::delete_snapshot;
 use crate::store::{InputRecord, MapPath, SnapshotName, TileStore};
 use serde::Serialize;
 
-/// Scans of a map.
+/// Selection of scans of a map.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum ScanSelection {
-    /// By their numbers in the map, first and last.
+    /// First and last number of the scans in the map.
     Numbers(u64, u64),
-    /// By their time stamps in nanoseconds, first and last.
+    /// First and last time stamp in nanoseconds.
     Time(i64, i64),
-    /// By the input that they came from, as the map names it.
+    /// Name of their input in the map.
     Input(String),
 }
 
-/// What was removed.
+/// Result of [`remove_scans`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct ScansRemoved {
-    /// What was mapped again; nothing where the map kept none of them any more.
+    /// Counts of the replay; all 0 if the map kept none of the scans any more.
     #[serde(flatten)]
     pub mapped: MappedAgain,
-    /// Scans that are gone from the map.
+    /// Number of scans removed from the map.
     pub scans_removed: u64,
-    /// Files with removed scans that an earlier, interrupted removal left and that this call removed. 0 if this call
+    /// Number of files with removed scans that an interrupted removal left and that this call removed. 0 if this call
     /// removed scans itself.
     pub files_removed: u64,
-    /// Snapshots that still hold some of them.
+    /// Snapshots that still contain some of the scans.
     pub snapshots_with_them: Vec<SnapshotName>,
-    /// Snapshots that held some of them and were deleted.
+    /// Snapshots that contained some of the scans and were deleted.
     pub snapshots_deleted: Vec<SnapshotName>,
-    /// Snapshots that may still hold some of them: they could not be read, or not be deleted.
+    /// Snapshots that could not be read or deleted, and may still contain some of the scans.
     pub snapshots_failed: Vec<SnapshotFailure>,
 }
 
@@ -43,28 +43,28 @@ pub struct ScansRemoved {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct SnapshotFailure {
-    /// Its name.
+    /// Name of the snapshot.
     pub name: SnapshotName,
-    /// Why, and what to do.
+    /// Reason and remedy.
     pub reason: String,
 }
 
-/// Takes scans out of a map, as if they had never been inserted, and their points out of its files. They keep their
-/// numbers, which no other scan gets.
+/// Removes scans from a map, as if they had never been inserted, and their points from its files. Their numbers are not
+/// reused.
 ///
-/// A removal that was killed after it had changed the map is completed by the same call, as by the next process that
-/// opens the map for writing: the files of the removed scans go. A call whose scans were removed before succeeds and
-/// removes no scan; of times that the map has none of, nothing tells whether it had, unless files are left.
+/// If a removal was killed after its commit, the same call, or the next process that opens the map for writing, removes
+/// the remaining files. A call whose scans were removed before succeeds and removes no scan. For a time range without
+/// scans it cannot be known whether scans were removed, unless files remain.
 ///
-/// Snapshots stay what they are, with what they hold of these scans, unless `from_snapshots`: then those that hold any
-/// are deleted, one by one after the scans are gone from the map. Where that was interrupted, or is asked for later,
-/// the same call deletes those that are left. `progress` is told the scans done and all.
+/// Snapshots are unchanged and keep these scans, unless `from_snapshots` is set: then those that contain any of the
+/// scans are deleted individually, after the scans are removed from the map. After an interruption, or at any later
+/// time, the same call deletes the rest. `progress` receives the number of scans done and in total.
 ///
 /// # Errors
 ///
-/// As for [`remap`](super::remap()); no scan that is selected; a disk that refuses to remove files of scans that are no
-/// longer in the map, which the same call tries again. A snapshot that cannot be read or deleted is an error only if
-/// nothing was done: else it is in [`ScansRemoved::snapshots_failed`].
+/// As for [`remap`](super::remap()); no selected scan; an I/O error while removing files of scans that are no longer in
+/// the map, which the same call retries. A snapshot that cannot be read or deleted is an error only if nothing was
+/// done. Otherwise it is listed in [`ScansRemoved::snapshots_failed`].
 pub fn remove_scans(
     map: impl Into<MapPath>,
     scans: &ScanSelection,
@@ -77,7 +77,7 @@ pub fn remove_scans(
     let (mut removed, is_repeated) = remove_from_map(path, scans, from_snapshots, how, progress)?;
     let (mut first_error, is_to_go) = (None, from_snapshots && !how.is_dry_run);
     for name in TileStore::open_read_only(disk.clone(), &folder)?.snapshots().names()? {
-        // The one that was asked for keeps them.
+        // The snapshot `keep_as` is not deleted.
         let is_to_go = is_to_go && how.keep_as.as_ref() != Some(&name);
         if let Err(error) = removed.look_at_snapshot(path, name.clone(), scans, is_to_go) {
             removed.snapshots_failed.push(SnapshotFailure { name, reason: format!("{error:#}") });
@@ -97,8 +97,8 @@ pub fn remove_scans(
     Ok(removed)
 }
 
-/// Takes the scans out of the map itself. Where only snapshots hold any, and these are to go, the map stays. Also
-/// returns whether an earlier call did it.
+/// Removes the scans from the map itself. If only snapshots contain them, and these are to be deleted, the map is
+/// unchanged. Also returns whether an earlier call has removed the scans.
 fn remove_from_map(
     path: impl Fn() -> MapPath,
     scans: &ScanSelection,
@@ -110,7 +110,7 @@ fn remove_from_map(
     let (summary, selection) = (reader.kept_summary()?, Selection::of(scans, &reader));
     let changes = selection.removals(&summary);
     let refusal = none_selected(scans, &reader);
-    // A reader would have the tables kept that the removal replaces.
+    // While the reader is open, replaced tables would be kept for it.
     drop(reader);
     let was_removed = selection.has_removed(&summary);
     if !changes.is_empty() || !from_snapshots && !was_removed {
@@ -135,7 +135,7 @@ fn remove_from_map(
 }
 
 impl ScansRemoved {
-    /// Notes a snapshot that holds any of the scans, and deletes it if it is to go.
+    /// Records a snapshot that contains any of the scans, and deletes it if requested.
     fn look_at_snapshot(
         &mut self,
         path: impl Fn() -> MapPath,
@@ -160,7 +160,7 @@ impl ScansRemoved {
     }
 }
 
-/// A selection that needs no list of inputs any more: that of a map or of one of its snapshots.
+/// Selection with the numbers of inputs resolved, for a map or one of its snapshots.
 enum Selection {
     Numbers(Vec<(u64, u64)>),
     Time(i64, i64),
@@ -186,13 +186,13 @@ impl Selection {
         }
     }
 
-    /// The removal of each scan that is kept and selected.
+    /// Returns the removal of each kept and selected scan.
     fn removals(&self, scans: &KeptSummary) -> Changes {
         let selected = scans.scans().iter().filter(|scan| self.has(scan));
         selected.map(|scan| (scan.number, Change::Remove)).collect()
     }
 
-    /// Whether it has numbers of scans that were removed before; of times nothing tells.
+    /// Returns whether it includes numbers of removed scans. Unknown for times.
     fn has_removed(&self, scans: &KeptSummary) -> bool {
         let Self::Numbers(ranges) = self else { return false };
         scans
@@ -206,14 +206,14 @@ fn inputs_of(reader: &MapReader) -> &[InputRecord] {
     reader.metadata().ext.as_ref().map_or(&[], |ext| &ext.inputs)
 }
 
-/// The numbers of the scans of an input, first and last; the map may have gone back to it later.
+/// Returns the first and last scan numbers of an input. A map can have several ranges of one input.
 fn ranges_of(name: &str, inputs: &[InputRecord], scan_number: u64) -> Vec<(u64, u64)> {
     let ends = inputs.iter().skip(1).map(|next| next.first_scan).chain([scan_number]);
     let of_inputs = inputs.iter().zip(ends).filter(|(input, _)| input.is_named(name));
     of_inputs.map(|(input, end)| (input.first_scan + 1, end)).collect()
 }
 
-/// The error of a selection that has no scan.
+/// Returns the error of a selection without scans.
 fn none_selected(scans: &ScanSelection, reader: &MapReader) -> Error {
     let described = match scans {
         ScanSelection::Numbers(first, last) => format!("with numbers from {first} to {last}"),
@@ -230,14 +230,14 @@ fn none_selected(scans: &ScanSelection, reader: &MapReader) -> Error {
     Error::argument("scans", format!("the map keeps none {described}"))
 }
 
-/// Whether a snapshot keeps any of these scans.
+/// Returns whether a snapshot keeps any of these scans.
 fn holds_any(map: MapPath, name: &SnapshotName, scans: &ScanSelection) -> Result<bool> {
     let past = MapReader::open_snapshot(map, name, 0)?;
     let selection = Selection::of(scans, &past);
     Ok(past.kept_summary()?.scans().iter().any(|scan| selection.has(scan)))
 }
 
-/// The error of a snapshot that cannot be read, with what to do about it.
+/// Adds the remedy to the error of an unreadable snapshot.
 fn may_hold_some(error: Error) -> Error {
     match error {
         Error::Damaged { path, tile, mut cause } => {

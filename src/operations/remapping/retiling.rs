@@ -2,13 +2,13 @@ use crate::config::RayConfig;
 use crate::error::{Error, Result};
 use crate::space::{Grid, TileBox};
 
-/// From tiles of one size to tiles of another. A region is said in tiles, and stays where it is in space.
+/// Conversion of regions between tile sizes. A region is given in tiles, and keeps its place in space.
 pub(super) struct Retiling {
     from_m: f64,
     to_m: f64,
 }
 
-/// How far a border may be from one of the other tiles, in these: what rounding makes of the largest numbers.
+/// Tolerance of a border, in new tiles: the rounding error of the largest indices.
 const TOLERANCE: f64 = 1e-6;
 
 impl Retiling {
@@ -16,11 +16,11 @@ impl Retiling {
         Self { from_m: from.tile_size_m(), to_m: to.tile_size_m() }
     }
 
-    /// The same rays, their region said in the other tiles.
+    /// Converts the region of ray settings to the other tiles.
     ///
     /// # Errors
     ///
-    /// A region with a border where the other tiles have none.
+    /// A region whose border is not a border of the other tiles.
     pub(super) fn rays(&self, rays: &RayConfig) -> Result<RayConfig> {
         let region = rays.region.map(|region| self.region(region)).transpose()?;
         Ok(RayConfig { region, ..*rays })
@@ -38,15 +38,15 @@ impl Retiling {
         }
     }
 
-    /// The first and the last of the other tiles along an axis. The ends of the range stand for a region without a
-    /// border there.
+    /// Returns the first and last of the other tiles along an axis. The limits of the index range represent a region
+    /// without a border.
     fn edge(&self, first: i32, last: i32) -> Option<(i32, i32)> {
         let begin = if first == i32::MIN { first } else { self.border(i64::from(first))? };
         let end = if last >= i32::MAX - 1 { i32::MAX } else { self.border(i64::from(last) + 1)? };
         (begin < end).then(|| (begin, end - 1))
     }
 
-    /// The tile that begins where the tile of this number does.
+    /// Returns the tile that begins at the lower border of this one.
     fn border(&self, number: i64) -> Option<i32> {
         let exact = number as f64 * self.from_m / self.to_m;
         let whole = exact.round();

@@ -13,37 +13,37 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// What becomes of a scan. One without a change stays as it is.
+/// Change of a scan. Other scans are unchanged.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Change {
     Move(Pose),
     Remove,
-    /// Its points in a box go.
+    /// Removes the points in a box.
     Filter(Aabb),
 }
 
-/// The changes of a map's scans, by their numbers.
+/// Changes of scans by their numbers.
 pub(super) type Changes = FxHashMap<u64, Change>;
 
-/// Where more than this part of all updates is of scans that changed, all is mapped again: looking for what they touch
-/// would cost more than it spares.
+/// If more than one third of all updates belong to changed scans, all tiles are replayed: finding the affected tiles
+/// would cost more than it saves.
 const PART_FOR_ALL: u64 = 3;
-/// Points of a kept scan that are read into memory; those of a larger one are read again when needed.
+/// Maximum number of points of a kept scan in memory. Larger scans are read again when needed.
 const MAX_POINTS_IN_MEMORY: u64 = 1 << 18;
 
-/// A change of scans, and what it comes to.
+/// Change of scans, and its effects.
 pub(super) struct Revision {
     disk: Arc<dyn Disk>,
     how: Rework,
     changes: Changes,
-    /// Segments with points that go.
+    /// Segments of points that are removed.
     segments: BTreeSet<u64>,
-    /// Updates of the scans that change.
+    /// Updates of the changed scans.
     changed_updates: u64,
     pub(super) counts: MappedAgain,
 }
 
-/// What has to be mapped again.
+/// Tiles to replay.
 pub(super) struct Touched {
     pub(super) config: MapConfig,
     /// `None` for all.
@@ -78,12 +78,12 @@ impl Revision {
         Self { disk: scans.place().0, how: how.clone(), changes, segments, changed_updates, counts }
     }
 
-    /// Whether points are to be taken out of the map.
+    /// Returns whether points are removed from the map.
     pub(super) fn takes_points(&self) -> bool {
         !self.segments.is_empty()
     }
 
-    /// Finds out what the change touches.
+    /// Finds the tiles that the change affects.
     pub(super) fn look(&mut self, store: &TileStore) -> Result<Touched> {
         let config = self.config_of(store)?;
         self.counts.tiles = store.tiles().count() as u64;
@@ -102,7 +102,8 @@ impl Revision {
         Ok(touched)
     }
 
-    /// The tiles that scans touch which change, before and after. Adds the updates of those that were traced for it.
+    /// Returns the tiles that changed scans touch before and after. Adds the updates of scans that were traced to find
+    /// them to `looked_at`.
     fn tiles_of_changes(
         &self,
         store: &TileStore,
@@ -136,7 +137,7 @@ impl Revision {
         Ok(tiles)
     }
 
-    /// What is to be done, by what is known without doing it.
+    /// Estimates the work without doing it.
     fn estimate(&mut self, store: &TileStore, touched: &Touched, took_s: f64, looked_at: u64) -> Result<()> {
         let mut records = store.archive().records()?;
         let (mut updates, mut scans) = (0.0, 0);
@@ -151,7 +152,7 @@ impl Revision {
             }
         }
         (self.counts.scans_mapped, self.counts.updates_mapped) = (scans, updates as u64);
-        // Some 20 million updates a second where nothing was timed; applying and writing take a half on top.
+        // Without a measurement, assume 20 million updates per second. Applying and writing add one half.
         let rate = if looked_at > 0 { looked_at as f64 / took_s.max(1e-6) } else { 20e6 };
         self.counts.estimated_s = Some(1.5 * updates / rate);
         Ok(())
@@ -173,8 +174,8 @@ impl Revision {
         self.how.stop.check()
     }
 
-    /// Does what happens to a scan by `map`, which maps its points in a selection of tiles or in all; returns its new
-    /// entry. Nothing but poses may change.
+    /// Applies the change of a scan with `map`, which inserts its points into a selection of tiles or into all. Returns
+    /// its new entry. Only poses may change.
     pub(super) fn map_beside(
         &mut self,
         layout: &Layout,
@@ -194,7 +195,7 @@ impl Revision {
         self.map_points(scan.record().clone(), touched, pose.is_some(), |selection| map(&scan, selection))
     }
 
-    /// Maps the touched tiles again and commits. Returns what became of the files that nothing needs any more, too.
+    /// Replays the affected tiles and commits. Also returns the result of removing files that are no longer needed.
     pub(super) fn map(
         mut self,
         store: TileStore,
@@ -235,7 +236,7 @@ impl Revision {
         Ok((self.counts, released))
     }
 
-    /// Maps what a scan says about touched tiles; returns its new record.
+    /// Inserts a scan into the affected tiles. Returns its new record.
     fn map_scan(
         &mut self,
         remapper: &mut Remapper,
@@ -269,7 +270,7 @@ impl Revision {
         self.map_points(record, touched, is_moved, map)
     }
 
-    /// Maps the points of a scan in the touched ones of its tiles, and brings its record up to date.
+    /// Inserts the points of a scan into those of its tiles that are affected, and updates its record.
     fn map_points(
         &mut self,
         mut record: KeptRecord,
@@ -277,7 +278,7 @@ impl Revision {
         is_moved: bool,
         map: impl FnOnce(Option<&TileSelection>) -> Result<(ScanReport, Vec<TileIndex>)>,
     ) -> Result<KeptRecord> {
-        // All tiles of a scan that moved are touched.
+        // All tiles of a moved scan are affected.
         let selection = touched.tiles.as_ref().filter(|_| !is_moved).map(|tiles| {
             record.tiles.iter().copied().filter(|tile| tiles.contains(tile)).collect::<TileSelection>()
         });

@@ -9,67 +9,67 @@ use serde::Serialize;
 use std::path::Path;
 use std::sync::Arc;
 
-/// How a map is mapped again.
+/// Options of a replay.
 #[derive(Clone, Debug, Default)]
 #[non_exhaustive]
 #[must_use]
 pub struct Rework {
-    /// How much memory it may use.
+    /// Memory limit.
     pub memory: MemoryLimit,
-    /// Name of a snapshot that keeps the map as it was. Default: none.
+    /// Name of a new snapshot of the map before the change. Default: none.
     pub keep_as: Option<SnapshotName>,
-    /// Tells what would be done, and does nothing. Default: no.
+    /// Whether only to report the work without doing it. Default: no.
     pub is_dry_run: bool,
-    /// Ends the work when it is set; the map is as it was then.
+    /// Request to stop. After a stop the map is unchanged.
     pub stop: Stop,
 }
 
 impl Rework {
-    /// The same with another limit of memory.
+    /// Sets the memory limit.
     pub fn with_memory(self, memory: MemoryLimit) -> Self {
         Self { memory, ..self }
     }
 
-    /// The same with a snapshot that keeps the map as it was.
+    /// Sets the name of a new snapshot of the map before the change.
     pub fn with_keep_as(self, keep_as: impl Into<Option<SnapshotName>>) -> Self {
         Self { keep_as: keep_as.into(), ..self }
     }
 
-    /// The same, only telling what would be done.
+    /// Sets whether only to report the work.
     pub fn with_dry_run(self, is_dry_run: bool) -> Self {
         Self { is_dry_run, ..self }
     }
 
-    /// The same with a request to stop.
+    /// Sets the request to stop.
     pub fn with_stop(self, stop: Stop) -> Self {
         Self { stop, ..self }
     }
 }
 
-/// What was mapped again, or would be.
+/// Counts of a replay, or of its dry run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct MappedAgain {
-    /// Scans that the map keeps.
+    /// Number of scans that the map keeps.
     pub scans: u64,
-    /// Scans that differ from what they were: moved, removed, or without some of their points.
+    /// Number of changed scans: moved, removed, or without some of their points.
     pub scans_changed: u64,
-    /// Scans that were mapped again, in whole or in part.
+    /// Number of scans that were replayed, in whole or in part.
     pub scans_mapped: u64,
-    /// Tiles that the map had.
+    /// Number of tiles in the map before.
     pub tiles: u64,
-    /// Tiles that were emptied and mapped again.
+    /// Number of tiles that were cleared and replayed.
     pub tiles_mapped: u64,
-    /// Updates of voxels of all scans that the map kept.
+    /// Number of voxel updates of all kept scans.
     pub updates: u64,
-    /// Updates of voxels that were done again; of a dry run an estimate.
+    /// Number of replayed voxel updates; estimated in a dry run.
     pub updates_mapped: u64,
-    /// Of a dry run: about how many seconds the rest takes.
+    /// Estimated duration of the replay in seconds; only in a dry run.
     pub estimated_s: Option<f64>,
 }
 
-/// Maps again what scans touch that change. The changes were decided by `scans`: the map must not have been flushed
-/// since. `progress` is told the scans done and all.
+/// Replays the tiles that changed scans touch. The changes must be based on `scans`: a flush of the map since then is
+/// an error. `progress` receives the number of scans done and in total.
 pub(super) fn rework(
     scans: &KeptSummary,
     changes: Changes,
@@ -84,7 +84,7 @@ pub(super) fn rework(
     let mut revision = Revision::new(scans, how, changes);
     let takes_points = revision.takes_points();
     if takes_points {
-        // Before the look, which may take long.
+        // Before the search for affected tiles, which can take long.
         store.snapshots().check_catalogs()?;
     }
     let touched = revision.look(&store)?;
@@ -95,7 +95,7 @@ pub(super) fn rework(
     let (counts, released) = tidied(disk.clone(), folder, revision.map(store, touched, &mut progress))?;
     let second = if takes_points { remove_second_map(disk.clone(), folder) } else { Ok(()) };
     match released {
-        // Points that are to be gone must not remain: once more, by another opening of the map.
+        // Removed points must not remain: retry after reopening the map.
         Err(_) if takes_points => complete(disk, folder)?,
         Err(error) => log::warn!("{}: committed, but not tidied up: {error:#}", folder.display()),
         Ok(()) => {}
@@ -104,13 +104,13 @@ pub(super) fn rework(
     Ok(counts)
 }
 
-/// Makes the snapshot of the map as it is, if there is to be one. One of this state that is there already counts.
+/// Creates the snapshot `keep_as` of the current map, if requested. An existing one of this state is reused.
 pub(super) fn keep_as_it_is(store: &mut TileStore, how: &Rework) -> Result<()> {
     let Some(name) = &how.keep_as else { return Ok(()) };
     store.snapshot_writer().create(name)
 }
 
-/// Gives room back that was written to in vain.
+/// Removes uncommitted files after an error.
 pub(super) fn tidied<T>(disk: Arc<dyn Disk>, folder: &Path, outcome: Result<T>) -> Result<T> {
     if outcome.is_err()
         && let Err(error) = TileStore::open(disk, folder)
