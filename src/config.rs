@@ -313,7 +313,7 @@ impl MapConfig {
             return Err(wrong("max range", max, "a length above the min range, in metres"));
         }
         if self.crs.as_ref().is_some_and(|crs| crs.len() > MAX_CRS_BYTES) {
-            let reason = format!("a coordinate reference system of more than {MAX_CRS_BYTES} bytes");
+            let reason = format!("the coordinate reference system exceeds {MAX_CRS_BYTES} bytes");
             return Err(Error::argument("crs", reason));
         }
         self.memory.check(&self.grid)?;
@@ -332,7 +332,7 @@ impl MapConfig {
         let is_wrong = |c: &char| c.is_control() && !matches!(c, '\t' | '\n' | '\r');
         if let Some(c) = self.crs.iter().flat_map(|crs| crs.chars()).find(is_wrong) {
             let reason = format!(
-                "has the control character {c:?}; name it as plain text, EPSG:25832 or well-known text"
+                "contains the control character {c:?}; use plain text, such as EPSG:25832 or well-known text"
             );
             return Err(Error::argument("crs", reason));
         }
@@ -366,7 +366,7 @@ impl VoxelCacheConfig {
     fn check(&self) -> Result<()> {
         let Self { tau, buckets } = *self;
         if tau == 0 || tau > 1 << 16 {
-            return Err(wrong("tau", tau, "1 to 65536 voxels a bucket"));
+            return Err(wrong("tau", tau, "1 to 65536 voxels per bucket"));
         }
         if buckets.is_some_and(|buckets| !buckets.is_power_of_two() || buckets > 1 << 24) {
             return Err(wrong("buckets", buckets.unwrap_or_default(), "a power of two up to 2^24"));
@@ -411,10 +411,10 @@ impl MemoryLimit {
                 let fits = (2..grid.voxels_per_tile_edge()).rev().find(|&n| least_bytes(n as usize) <= bytes);
                 let hint = fits.map_or(String::new(), |n| {
                     let length_m = (f64::from(n) * grid.resolution_m() * 1e6).round() / 1e6;
-                    format!(", or make tiles of at most {length_m} m")
+                    format!(", or use tiles of at most {length_m} m")
                 });
                 let reason = format!(
-                    "{bytes} bytes are too few for tiles of {} m at {} m: give at least {least} ({} MiB){hint}",
+                    "{bytes} bytes are too few for tiles of {} m at {} m: allow at least {least} ({} MiB){hint}",
                     grid.tile_size_m(),
                     grid.resolution_m(),
                     least.div_ceil(1 << 20)
@@ -433,5 +433,5 @@ fn least_bytes(voxels_per_edge: usize) -> usize {
 }
 
 fn wrong(argument: &str, value: impl std::fmt::Display, right: &str) -> Error {
-    Error::argument(argument, format!("{value} is not {right}"))
+    Error::argument(argument, format!("must be {right}, not {value}"))
 }

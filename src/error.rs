@@ -67,7 +67,7 @@ pub enum Error {
         cause: FormatError,
     },
     /// There is no map at the path: create one or use another path.
-    #[error("{}: no map here (metadata.json is missing); `voxtile build` makes one", path.display())]
+    #[error("{}: no map here (metadata.json is missing); `voxtile build` creates one", path.display())]
     NoMap {
         /// Folder.
         path: PathBuf,
@@ -81,7 +81,7 @@ pub enum Error {
         hint: &'static str,
     },
     /// The map has other parameters: use the map's own.
-    #[error("{}: the map has {what} {found}, not {wanted}; go on with its own or build another map", path.display())]
+    #[error("{}: the map has {what} {found}, not {wanted}; use the map's value or build another map", path.display())]
     Mismatch {
         /// Folder of the map.
         path: PathBuf,
@@ -93,7 +93,7 @@ pub enum Error {
         wanted: String,
     },
     /// Another process writes the map: wait for it or stop it.
-    #[error("{}: another process is writing to this map; readers may open it beside that one", path.display())]
+    #[error("{}: another process is writing to this map; wait for it, or open the map for reading", path.display())]
     Locked {
         /// Folder of the map.
         path: PathBuf,
@@ -101,8 +101,8 @@ pub enum Error {
     /// The lock file was removed or replaced, so another process may write the map: close and reopen the map to
     /// continue from its last flush.
     #[error(
-        "{}: the file was removed or replaced while this process held it locked, so another may be writing to the map; \
-         nothing was written since; open the map again to go on from its last flush",
+        "{}: the lock file was removed or replaced, so another process may be writing to the map; nothing was written \
+         since; open the map again to continue from its last flush",
         path.display()
     )]
     LockLost {
@@ -116,10 +116,10 @@ pub enum Error {
         path: PathBuf,
     },
     /// A view of the map is too old, and its data was released: take a new view.
-    #[error("the view of the map was held for too long: what it saw has changed; take a new one")]
+    #[error("the view of the map is too old: its data was replaced; take a new view")]
     Expired,
     /// The operation was stopped on request. It has not changed the map.
-    #[error("stopped as asked; the map is as before")]
+    #[error("stopped on request; the map is unchanged")]
     Stopped,
     /// A server stopped responding: check the network and the server, then retry.
     #[error(fmt = fmt_no_answer)]
@@ -133,7 +133,7 @@ pub enum Error {
         cause: io::Error,
     },
     /// The operation would discard unsaved updates: flush first, or request to discard them.
-    #[error("tile {tile} has updates that are not on disk; flush first, or ask to discard them")]
+    #[error("tile {tile} has updates that are not on disk; flush first, or request to discard them")]
     UnsavedChanges {
         /// Tile with unsaved updates.
         tile: TileIndex,

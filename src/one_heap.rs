@@ -23,7 +23,7 @@ pub fn begin_with_one_heap() {
         command.arg0(name);
     }
     let error = command.args(arguments).env(HEAPS, "1").exec();
-    log::debug!("the heaps stay as they are: {error}");
+    log::debug!("cannot restart with one heap: {error}");
 }
 
 /// Does nothing on other systems.

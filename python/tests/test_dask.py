@@ -556,7 +556,7 @@ def test_an_update_of_a_map_that_somebody_changes_is_an_error(client: object, dr
             voxtile.clear(city, [-1, -1, -1, 1, 1, 1])
             changed.append(voxtile.digest(city))
 
-    with pytest.raises(errors.ArgumentError, match="somebody has changed it"):
+    with pytest.raises(errors.ArgumentError, match="the map has changed meanwhile"):
         voxtile_dask.build(
             again, city, update=True, region_size=5.0, client=client, progress=change, **OPTIONS
         )

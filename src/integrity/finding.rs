@@ -74,7 +74,7 @@ impl Finding {
         let Error::Io { path, action, cause } = error else {
             return Self::damage(Path::new(""), tile, &FormatError::at_offset(0, format!("{error:#}")));
         };
-        let reason = format!("cannot {action}: {cause}; the medium refuses, or its file system is damaged");
+        let reason = format!("cannot {action}: {cause}; the storage medium or its file system is damaged");
         let mut finding = Self::damage(path, tile, &FormatError::at_offset(0, reason));
         finding.offset = None;
         finding

@@ -260,7 +260,7 @@ impl Index {
                 let folder = layout.tile_folder(tile);
                 let is_kept = |name: &String| layout.flush_of_kept(name).is_some();
                 let (path, reason) = match next_table {
-                    Some(_) => (&next, "nothing tells whether this version was committed"),
+                    Some(_) => (&next, "it is unknown whether this version was committed"),
                     // Perhaps a removed tile that a snapshot uses.
                     None if disk.list(&folder).is_ok_and(|names| names.iter().all(is_kept)) => return Ok(()),
                     None => (&current, "the file is missing"),
@@ -386,7 +386,7 @@ fn identity(layout: &Layout, remains: &Salvage, trailers: &Trailers) -> Result<(
         [] => {}
     }
     let Some(trailer) = of_tiles else {
-        let reason = "neither metadata.json nor commits.log nor a tile with a trailer tells what the map is; \
+        let reason = "no readable metadata.json, commits.log or tile with a trailer identifies the map; \
                       write metadata.json with its resolution and tile size by hand";
         return Err(FormatError::at_offset(0, reason).in_map(&layout.metadata(), None));
     };

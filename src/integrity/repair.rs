@@ -145,7 +145,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
 
     pub(super) fn quarantine(&mut self, path: &Path, why: &str) -> Result<()> {
         let to = Quarantine::new(self.disk, &self.layout).take(path)?;
-        self.note(ActionKind::Quarantined, path, format!("{why}; now {}", to.display()));
+        self.note(ActionKind::Quarantined, path, format!("{why}; moved to {}", to.display()));
         Ok(())
     }
 
@@ -182,7 +182,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         let path = self.layout.lock();
         match self.kind(&path)? {
             Some(EntryKind::Folder | EntryKind::Other) if self.kind(&self.layout.metadata())?.is_some() => {
-                self.quarantine(&path, "no regular file: nobody could lock the map")
+                self.quarantine(&path, "not a regular file: the map could not be locked")
             }
             _ => Ok(()),
         }
@@ -214,7 +214,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
             };
             self.note(ActionKind::Quarantined, &path, reason);
         }
-        self.note(ActionKind::Derived, &path, "cut where the damage begins");
+        self.note(ActionKind::Derived, &path, "truncated at the start of the damage");
         Ok(())
     }
 
@@ -246,21 +246,21 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         let paths = [self.layout.commit_log(), self.layout.metadata()];
         if is_from_tiles {
             let why = remains.log_error.as_ref().map(|error| format!("{error:#}"));
-            let why = why.unwrap_or("it does not lead to the flush that metadata.json names".into());
+            let why = why.unwrap_or("it does not contain the flush in metadata.json".into());
             self.quarantine_copy(&paths[0], &why)?;
         }
         let written_id =
             remains.metadata.as_ref().map(|metadata| metadata.ext.as_ref().map(|ext| &*ext.map_id));
         match written_id {
             Err(error) => self.quarantine_copy(&paths[1], &format!("{error:#}"))?,
-            Ok(id) if id != Some(&hex(&map_id)) => self.quarantine_copy(&paths[1], "it is of another map")?,
+            Ok(id) if id != Some(&hex(&map_id)) => {
+                self.quarantine_copy(&paths[1], "it belongs to another map")?
+            }
             Ok(_) => {}
         }
         remains.write(self.disk, &self.layout, map_id, &commits, &metadata)?;
         let (source, tiles) = match is_from_tiles {
-            true => {
-                ("the tiles; without the log nothing tells whether all are of one flush", commits.tiles.len())
-            }
+            true => ("the tiles; without the log they may be from different flushes", commits.tiles.len()),
             false => ("commits.log", commits.tiles.len()),
         };
         self.note(
@@ -270,10 +270,8 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         );
         if inputs_forgotten > 0 {
             self.counts.inputs_forgotten += inputs_forgotten;
-            let reason = format!(
-                "what the map was built from ({inputs_forgotten} inputs): nothing tells whether all their scans are in \
-                 the tiles"
-            );
+            let reason =
+                format!("{inputs_forgotten} inputs: it is unknown whether all their scans are in the tiles");
             self.note(ActionKind::Forgotten, &paths[1], reason);
         }
         Ok(())
@@ -294,12 +292,12 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
                     continue;
                 }
                 let Some(replaced) = waiting.get(&tile) else {
-                    self.quarantine(&next, "nothing tells whether it was committed")?;
+                    self.quarantine(&next, "it is unknown whether it was committed")?;
                     continue;
                 };
                 let why = match replaced {
-                    Replaced::Older => "of an earlier flush than the version that waited for its name",
-                    Replaced::Unusable => "damaged; the version that waited for its name is whole",
+                    Replaced::Older => "from an earlier flush than the version that was not renamed yet",
+                    Replaced::Unusable => "damaged; the version that was not renamed yet is intact",
                 };
                 let is_seen = has_snapshots && file == TileFile::Table && *replaced == Replaced::Older;
                 if is_seen && self.kind(&kept)?.is_none() {
@@ -312,7 +310,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
                     self.quarantine(&current, why)?;
                 }
                 self.disk.rename(&next, &current).map_err(|error| Error::io(&next, "rename", error))?;
-                self.note(ActionKind::Renamed, &next, "whole, and of the last flush or one before");
+                self.note(ActionKind::Renamed, &next, "intact, and from the last flush or an earlier one");
             }
             let folder = self.layout.tile_folder(tile);
             self.disk.sync_folder(&folder).map_err(|error| Error::io(&folder, "sync", error))?;
@@ -322,8 +320,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
 
     fn repair_tiles(&mut self, store: &mut TileStore, config: &MapConfig) -> Result<()> {
         if store.leftovers_removed() > 0 {
-            let reason =
-                format!("{} files that were never committed or had been replaced", store.leftovers_removed());
+            let reason = format!("{} files that were uncommitted or replaced", store.leftovers_removed());
             let folder = self.layout.folder().to_owned();
             self.note(ActionKind::Removed, &folder, reason);
         }
@@ -348,7 +345,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         if !lost.is_empty() {
             if store.map_id().is_none() {
                 // It may have keys that voxtile does not know.
-                self.quarantine_copy(&self.layout.metadata(), "its bounds change")?;
+                self.quarantine_copy(&self.layout.metadata(), "its bounds will change")?;
             }
             store.forget(&lost)?;
         } else if store.commits().torn.is_some()
@@ -359,7 +356,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
             self.note(
                 ActionKind::Derived,
                 &self.layout.metadata(),
-                "brought up to the last flush in commits.log",
+                "updated to the last flush in commits.log",
             );
         }
         self.repair_snapshots(store, config)?;
@@ -401,7 +398,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
             copied => copied?,
         }
         if !matches!(self.kind(&path)?, None | Some(EntryKind::File(_))) {
-            self.quarantine(&path, "no file")?;
+            self.quarantine(&path, "not a regular file")?;
         }
         let expected = store.tiles().version(tile).map(|version| version.octree);
         let written = store.write_next(tile, TileFile::Octree, |out| write_octree(config, &table, out))?;

@@ -44,14 +44,14 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
                 }
             }
             if let Err(error) = store.release_scans() {
-                log::warn!("kept scans that nothing needs remain: {error:#}");
+                log::warn!("unneeded kept scans remain: {error:#}");
             }
         }
         self.counts.scans_lost += left.scans_lost;
         let reason = match left.scans_lost {
-            0 => "a record that is damaged is no longer in its catalog".to_owned(),
+            0 => "a damaged record was dropped from its catalog".to_owned(),
             lost => {
-                format!("{lost} scans that are damaged are no longer kept; the map cannot be mapped again")
+                format!("{lost} damaged scans are no longer kept; the map cannot be replayed")
             }
         };
         self.note(ActionKind::Forgotten, &folder, reason);
@@ -61,7 +61,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
     /// Moves anything that is not a readable folder out of the way of the folder of kept scans.
     fn repair_folder_of_scans(&mut self, folder: &Path) -> Result<()> {
         if let Some(EntryKind::File(_) | EntryKind::Other) = self.kind(folder)? {
-            return self.quarantine(folder, "no folder");
+            return self.quarantine(folder, "not a folder");
         }
         match self.disk.list(folder) {
             Err(error) if is_of_medium(&error) => self.quarantine(folder, &format!("cannot list: {error}")),
@@ -77,7 +77,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         }
         let Some(to) = Quarantine::new(self.disk, &self.layout).keep(catalog)? else { return Ok(false) };
         self.catalogs_kept.insert(catalog.to_owned());
-        let why = reasons.0.get(catalog).map_or("another takes its place", String::as_str);
+        let why = reasons.0.get(catalog).map_or("it is replaced", String::as_str);
         self.note(ActionKind::Quarantined, catalog, format!("{why}; kept as {}", to.display()));
         Ok(true)
     }
@@ -120,7 +120,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         store.snapshot_writer().release_unseen()
     }
 
-    /// Moves files of kept scans that neither the map nor these snapshots need to quarantine, except some.
+    /// Moves files of kept scans to quarantine that neither the map nor these snapshots need, unless `is_excepted`.
     fn quarantine_unneeded(
         &mut self,
         store: &TileStore,
@@ -163,9 +163,9 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         store.snapshot_writer().replace(snapshot)?;
         self.counts.snapshot_scans_lost += scans_lost;
         let reason = match scans_lost {
-            0 => "a record that is damaged is no longer in the catalog of its kept scans".to_owned(),
+            0 => "a damaged record was dropped from the catalog of its kept scans".to_owned(),
             lost => {
-                format!("{lost} scans that are damaged are no longer kept; it cannot be mapped again")
+                format!("{lost} damaged scans are no longer kept; the snapshot cannot be replayed")
             }
         };
         self.note(ActionKind::Forgotten, &self.layout.snapshot(&snapshot.name), reason);
@@ -187,7 +187,10 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         let Some(snapshots) = known_snapshots(&store) else { return Ok(()) };
         let unneeded = store.unneeded_scan_files(&snapshots, None)?;
         for path in &unneeded {
-            self.quarantine(path, "neither metadata.json nor commits.log tells whether the map needs it")?;
+            self.quarantine(
+                path,
+                "without metadata.json and commits.log it is unknown whether the map needs it",
+            )?;
         }
         // The number of scans in segments without a catalog is unknown. Count one.
         self.counts.scans_lost += u64::from(kept == 0 && !unneeded.is_empty());
@@ -201,7 +204,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         snapshots: &[Snapshot],
     ) -> Result<()> {
         for path in store.unneeded_scan_files(snapshots, None)? {
-            self.quarantine(&path, "only a snapshot that cannot be read may need it")?;
+            self.quarantine(&path, "only an unreadable snapshot may need it")?;
         }
         Ok(())
     }
@@ -238,7 +241,7 @@ impl Reasons {
     }
 
     fn of_file(&self, path: &Path) -> &str {
-        self.0.get(path).map_or("no scan that can be read needs it", String::as_str)
+        self.0.get(path).map_or("no readable scan needs it", String::as_str)
     }
 }
 

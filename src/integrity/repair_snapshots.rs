@@ -64,7 +64,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
             if let Ok(Some(snapshot)) = Snapshot::read_file(self.disk, &path, &name, map_id)
                 && let Some(own) = is_wanted(&snapshot).filter(|own| *own != name)
             {
-                self.quarantine_copy(&path, &format!("the file is that of the snapshot {own}"))?;
+                self.quarantine_copy(&path, &format!("the file belongs to the snapshot {own}"))?;
                 found.insert(own, snapshot);
                 misnamed.push(name);
             }
@@ -84,7 +84,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
             let path = self.layout.snapshot(&own);
             let is_there = self.kind(&path)?.is_some();
             if is_there && !misnamed.contains(&own) {
-                self.quarantine(&path, "it cannot be read; the snapshot is whole under another name")?;
+                self.quarantine(&path, "it is unreadable; the snapshot is intact under another name")?;
             }
             misnamed.retain(|name| *name != own);
             store.snapshot_writer().replace(&Snapshot { name: own, ..snapshot })?;
@@ -92,7 +92,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         }
         // Copied already, and not listed.
         for name in misnamed.iter().filter(|name| !listed.contains(name)) {
-            self.quarantine(&self.layout.snapshot(name), "commits.log names no such snapshot")?;
+            self.quarantine(&self.layout.snapshot(name), "commits.log does not list this snapshot")?;
         }
         Ok(())
     }
@@ -152,7 +152,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
                 snapshot.commits.tiles.contains(tile) && first == Some(&flush_number)
             };
             if flushes.contains(&flush_number) && !snapshots.iter().any(is_seen) {
-                let why = "only a snapshot that cannot be read may see it";
+                let why = "only an unreadable snapshot may use it";
                 self.quarantine(&self.layout.kept(tile, flush_number), why)?;
             }
         }

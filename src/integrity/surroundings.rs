@@ -11,18 +11,19 @@ use std::io;
 use std::path::Path;
 
 /// Note on a file that will replace another.
-const LEFT: &str = "left behind by a process that was killed or that the disk refused, or being written";
+const LEFT: &str = "left by a process that was killed or had an I/O error, or being written";
 
 /// Note on points and lists of scans that no flush needs.
-pub(super) const IDLE_SCANS: &str = "points or a list of scans that neither the map nor a snapshot uses. A killed process left \
-                          them, or a writer is about to commit them. They may hold removed scans.";
+pub(super) const IDLE_SCANS: &str = "points or a list of scans that neither the map nor a snapshot uses. A killed \
+                                     process left them, or a writer is about to commit them. They may contain \
+                                     removed scans.";
 
 /// Note on `MAP.remapping`.
 const SECOND_MAP: &str = "the second map of an online remap that is running or was killed. The next online remap \
                           removes it, and so do `remove-scans` and `remove-points`.";
 
 /// Note on `MAP.unfinished`.
-const UNFINISHED_MAP: &str = "a map that `voxtile pull --replace` is making, or the old map that it replaced. The \
+const UNFINISHED_MAP: &str = "a map that `voxtile pull --replace` is downloading, or the old map that it replaced. The \
                               next `voxtile pull --replace` removes it.";
 
 /// Search for foreign and left-over files in the map's folder and next to it.
@@ -36,7 +37,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
             // Renamed or removed after the folder was listed.
             Ok(None) => return,
             Ok(Some(EntryKind::File(_))) => reason.to_owned(),
-            Ok(Some(_)) => return self.report(Finding::note(path, tile, "no part of a map")),
+            Ok(Some(_)) => return self.report(Finding::note(path, tile, "not part of a map")),
             Err(error) => format!("{reason} ({error})"),
         };
         self.counts.leftovers += 1;
@@ -47,7 +48,11 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         match self.kind(folder)? {
             Some(EntryKind::Folder) => {}
             Some(_) if self.listed.as_ref().is_some_and(SnapshotList::is_empty) => {
-                self.damage(folder, None, "something else has the name of the folder of snapshots");
+                self.damage(
+                    folder,
+                    None,
+                    "not a folder, although it has the name of the folder of snapshots",
+                );
                 return Ok(());
             }
             // Otherwise the missing snapshots, or the unreadable log, were reported.
@@ -57,10 +62,10 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
             let path = folder.join(&name);
             let reason = match SnapshotName::new(&*name) {
                 Ok(name) if self.listed.as_ref().is_none_or(|listed| listed.contains(&name)) => continue,
-                Ok(_) => "no snapshot of the map: commits.log does not name it",
+                Ok(_) => "not a snapshot of this map: commits.log does not list it",
                 Err(_) if name == SNAPSHOT_NEXT => LEFT,
                 Err(_) => {
-                    self.report(Finding::note(&path, None, "no snapshot: it has no name of one"));
+                    self.report(Finding::note(&path, None, "not a snapshot: the name is not valid for one"));
                     continue;
                 }
             };
@@ -82,7 +87,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
                 ("metadata.json" | "commits.log" | "scans.bin", _) => {}
                 ("writer.lock", _) => {
                     if matches!(self.kind(&path)?, Some(EntryKind::Folder | EntryKind::Other)) {
-                        self.damage(&path, None, "no regular file: nobody can lock the map to write to it");
+                        self.damage(&path, None, "not a regular file: the map cannot be locked for writing");
                     }
                 }
                 // Pushed and pulled states (`bucket::known_states`).
@@ -90,7 +95,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
                 (KEPT_SCANS, _) => self.look_into_kept_scans(&path)?,
                 (SNAPSHOTS, _) => self.look_into_snapshots(&path)?,
                 (QUARANTINE, _) => {
-                    let reason = "moved here by a repair. It may hold scans that were removed later. Delete it when \
+                    let reason = "moved here by a repair. It may contain scans that were removed later. Delete it when \
                                   you need nothing in it.";
                     self.report(Finding::note(&path, None, reason));
                 }
@@ -100,11 +105,10 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
                 }
                 (name, None) if Layout::is_next_of_map(name) => self.leftover(&path, None, LEFT),
                 ("bucket_states.next", None) => {
-                    let reason =
-                        "left behind by a push that was killed, or being written; the next push replaces it";
+                    let reason = "left by a killed push, or being written; the next push replaces it";
                     self.report(Finding::note(&path, None, reason));
                 }
-                _ => self.report(Finding::note(&path, None, "no part of a map")),
+                _ => self.report(Finding::note(&path, None, "not part of a map")),
             }
         }
         self.look_beside(&folder);
@@ -128,7 +132,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         }
         for name in self.list(folder)? {
             if !Layout::is_of_kept_scans(&name) {
-                self.report(Finding::note(&folder.join(&name), None, "no part of a map"));
+                self.report(Finding::note(&folder.join(&name), None, "not part of a map"));
             }
         }
         Ok(())
@@ -147,7 +151,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         match self.kind(folder)? {
             Some(EntryKind::Folder) => {}
             Some(_) if !is_known => {
-                let finding = wrong(folder, "something with a tile's name that is no folder");
+                let finding = wrong(folder, "not a folder, although it has the name of a tile");
                 self.report_if_seen_twice(finding, Suspect::Folder(tile));
                 return Ok(());
             }
@@ -164,9 +168,9 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
             if self.layout.is_next_of_tile(&name) {
                 self.leftover(&path, Some(tile), LEFT);
             } else if kept.is_some() {
-                self.leftover(&path, Some(tile), "replaced; kept for a reader, or left behind");
+                self.leftover(&path, Some(tile), "replaced; kept for a reader, or left by a killed process");
             } else if self.layout.files().iter().all(|file| file.name(self.layout.storage()) != name) {
-                self.report(Finding::note(&path, Some(tile), "no part of a map"));
+                self.report(Finding::note(&path, Some(tile), "not part of a map"));
             } else {
                 is_orphan |= !is_known;
             }
@@ -176,7 +180,8 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         }
         if store.commits().last_removed.contains(&tile) {
             if !self.is_again {
-                let reason = "taken out of the map; its files go when the map is next opened for writing";
+                let reason =
+                    "removed from the map; its files are deleted when the map is next opened for writing";
                 self.counts.leftovers += 1;
                 self.report(Finding::note(folder, Some(tile), reason));
             }

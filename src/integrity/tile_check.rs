@@ -28,7 +28,7 @@ pub(super) fn check_tile(
         Ok(Some(table)) => Ok(table),
         Ok(None) => {
             let path = store.layout().current(tile, TileFile::Table);
-            Err(FormatError::at_offset(0, "the map does not hold this tile").in_map(&path, Some(tile)))
+            Err(FormatError::at_offset(0, "the map does not contain this tile").in_map(&path, Some(tile)))
         }
         Err(error) if matches!(error, Error::Damaged { .. }) || error.is_of_medium() => Err(error),
         Err(error) => return Err(error),
@@ -51,7 +51,7 @@ fn check_octree(
     let current = layout.current(tile, TileFile::Octree);
     let found = match checksum_of(disk, &current) {
         Err(Error::Io { action, cause, .. }) if is_of_medium(&cause) => {
-            let reason = format!("cannot {action}: {cause}; it is derived from the table");
+            let reason = format!("cannot {action}: {cause}; it can be derived from the table");
             return Ok(Err(FormatError::at_offset(0, reason)));
         }
         found => found?,
@@ -65,12 +65,12 @@ fn check_octree(
     }
     Ok(Err(match found {
         None if matches!(disk.kind(&current), Ok(Some(_))) => {
-            FormatError::at_offset(0, "no regular file; it is derived from the table")
+            FormatError::at_offset(0, "not a regular file; it can be derived from the table")
         }
-        None => FormatError::at_offset(0, "the file is missing; it is derived from the table"),
+        None => FormatError::at_offset(0, "the file is missing; it can be derived from the table"),
         Some(FileChecksum { bytes, .. }) if bytes != version.octree.bytes => {
             let wanted = version.octree.bytes;
-            FormatError::at_offset(bytes.min(wanted), format!("{bytes} bytes, and the log names {wanted}"))
+            FormatError::at_offset(bytes.min(wanted), format!("{bytes} bytes, but the log records {wanted}"))
         }
         Some(_) => FormatError::at_offset(0, "the file does not match its checksum in the log"),
     }))

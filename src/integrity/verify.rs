@@ -259,13 +259,12 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         self.counts.scan_number = store.commits().scan_number;
         if !self.counts.verified {
             let reason =
-                "a map of the original format: no checksums, so only the form of its tables is checked";
+                "a map of the original format: no checksums, so only the format of its tables is checked";
             self.report(Finding::note(&self.layout.metadata(), None, reason));
         }
         if let Some(torn) = &store.commits().torn {
             let mut note = Finding::note(&self.layout.commit_log(), None, torn.reason.clone());
-            (note.offset, note.reason) =
-                (Some(torn.at), format!("a flush that never happened: {}", torn.reason));
+            (note.offset, note.reason) = (Some(torn.at), format!("an uncommitted flush: {}", torn.reason));
             self.report(note);
         }
         if self.scope.has_rest() {
@@ -335,7 +334,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         if unsettled > 0 {
             self.counts.unsettled += unsettled;
             let reason = format!(
-                "other processes changed the map during each of {MAX_LOOKS} looks at {unsettled} possible \
+                "other processes changed the map during each of {MAX_LOOKS} checks of {unsettled} possible \
                  faults; run verify while no process writes"
             );
             self.is_again = false;

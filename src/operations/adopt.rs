@@ -50,19 +50,19 @@ pub fn adopt(
     }
     common_crs(parts.iter().chain([&before]))?;
     if before.keeps_scans() {
-        let reason = "the map keeps its scans, and the tiles of parts come without theirs; use `voxtile build --append`";
+        let reason = "the map keeps its scans, but parts have no kept scans; use `voxtile build --append`";
         return Err(Error::argument(map.display().to_string(), reason));
     }
     if !have_no_common_tile(parts) {
-        return Err(Error::argument("parts", "two of them have the same tile; make parts of other regions"));
+        return Err(Error::argument("parts", "two parts have the same tile; crop disjoint regions"));
     }
     edit(disk, map, |editor| {
         // The map is locked, so this includes all earlier flushes.
         let flush_number = editor.flush_number();
         if flush_number != of_flush {
             let reason = format!(
-                "the map is at flush {flush_number}, and the parts are of flush {of_flush}: somebody has changed it \
-                 meanwhile; make the parts again"
+                "the map is at flush {flush_number}, but the parts are of flush {of_flush}: the map has changed \
+                 meanwhile; create the parts again"
             );
             return Err(Error::argument("of_flush", reason));
         }

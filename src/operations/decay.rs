@@ -77,11 +77,11 @@ impl Decay {
 
     fn check(&self) -> Result<()> {
         if !(self.halflife_scans > 0.0 && self.halflife_scans.is_finite()) {
-            let reason = format!("{} is no number of scans above 0", self.halflife_scans);
+            let reason = format!("{} is not a number of scans above 0", self.halflife_scans);
             return Err(Error::argument("halflife", reason));
         }
         if !(self.forget_below >= 0.0 && self.forget_below.is_finite()) {
-            let reason = format!("{} is no log-odds of at least 0", self.forget_below);
+            let reason = format!("{} is not a log-odds value of at least 0", self.forget_below);
             return Err(Error::argument("forget_below", reason));
         }
         Ok(())

@@ -30,7 +30,7 @@ pub fn join(
     };
     let first = open(first)?;
     let Some(map_id) = first.map_id() else {
-        let reason = "of the original format, and no piece of a map to come";
+        let reason = "a map of the original format; shards need an id";
         return Err(Error::argument(first.folder().display().to_string(), reason));
     };
     let (mut config, mut regions, mut all) = (first.config().clone(), Regions::of(&first)?, 0);

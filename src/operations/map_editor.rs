@@ -37,7 +37,7 @@ pub(super) fn edit<T>(
     let leaves_something = editor.is_written_to && outcome.is_err();
     drop(editor);
     if leaves_something && let Err(error) = TileStore::open(disk, folder) {
-        log::warn!("{}: not tidied up after an error: {error:#}", folder.display());
+        log::warn!("{}: the cleanup after an error failed: {error:#}", folder.display());
     }
     outcome
 }
@@ -60,7 +60,8 @@ impl MapEditor {
     pub(super) fn add_scans(&mut self, scans: u64) -> Result<()> {
         let before = self.store.commits().scan_number;
         if before.checked_add(scans).is_none_or(|all| all > MAX_NUMBER) {
-            return Err(Error::argument("scans", format!("{scans} are more than can follow scan {before}")));
+            let reason = format!("{scans} scans after scan {before} exceed the maximum scan number");
+            return Err(Error::argument("scans", reason));
         }
         self.added_scans = scans;
         Ok(())

@@ -86,7 +86,7 @@ impl MapWriter {
         let config = config_from(&metadata, folder)?;
         let ext = metadata.ext.as_ref();
         let Some((map_id, ext)) = ext.and_then(|ext| Some((id_from_hex(&ext.map_id)?, ext))) else {
-            let reason = "without an id and parameters of voxtile's own no map can be made";
+            let reason = "the original format lacks the id and the parameters of a new map";
             return Err(Error::argument("metadata", reason));
         };
         let scan_number = ext.scan_number;
@@ -164,8 +164,9 @@ impl MapWriter {
             let map = map?;
             for tile in map.tile_indices() {
                 if linked.contains(tile) {
-                    let reason =
-                        format!("it has {tile}, and another piece has it, too; make pieces of other regions");
+                    let reason = format!(
+                        "it contains {tile}, and so does another shard; create shards of disjoint regions"
+                    );
                     return Err(Error::argument(map.folder().display().to_string(), reason));
                 }
                 self.written.add(linked.link(map.store(), tile)?);
@@ -177,7 +178,9 @@ impl MapWriter {
 
     fn check_order(&self, tile: TileIndex) -> Result<()> {
         match self.last.filter(|&last| last >= tile) {
-            Some(last) => Err(Error::argument("tile", format!("{tile} does not come after {last}"))),
+            Some(last) => {
+                Err(Error::argument("tile", format!("{tile} does not follow {last} in tile order")))
+            }
             None => Ok(()),
         }
     }

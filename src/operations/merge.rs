@@ -55,7 +55,7 @@ pub fn merge(
     mut progress: impl FnMut(u64, u64),
 ) -> Result<Merged> {
     let [first, .., _] = maps else {
-        return Err(Error::argument("maps", "name two maps or more to be merged"));
+        return Err(Error::argument("maps", "name at least two maps"));
     };
     let mut config = first.config().clone();
     if maps.iter().any(|map| map.config().rays.region != config.rays.region) {
@@ -95,7 +95,7 @@ fn rule_for(maps: &[MapReader], first: &MapReader, prefer: Option<Prefer>) -> Re
     let rule = checked.and_then(|()| {
         MergeRule::of(first.config(), prefer).ok_or_else(|| {
             let reason = format!(
-                "the maps' sensor model is {}, whose evidence does not add up: say which map's voxels to take with \
+                "the maps' sensor model is {}, whose evidence cannot be added: select the map of common voxels with \
                  `prefer` first, last or more-observed",
                 model.name()
             );
@@ -204,16 +204,17 @@ pub(super) fn check_model(map: &MapReader, first: &MapReader) -> Result<()> {
     let (config, wanted) = (map.config(), first.config());
     let first = first.folder().display();
     let what = if !map.is_verified() {
-        "it is of the original format, which does not tell the sensor model".to_owned()
+        "it has the original format, which does not contain the sensor model".to_owned()
     } else if config.sensor_model != wanted.sensor_model {
         format!("its sensor model is {}, that of {first} is {}", config.sensor_model, wanted.sensor_model)
     } else if config.occupancy_threshold != wanted.occupancy_threshold {
         let (found, wanted) = (config.occupancy_threshold, wanted.occupancy_threshold);
-        format!("its voxels are occupied from probability {found}, those of {first} from {wanted}")
+        format!("its occupancy threshold is {found}, that of {first} is {wanted}")
     } else {
         return Ok(());
     };
-    let hint = "so that evidence does not add up: say which map's voxels to take with `prefer` first, last or more-observed";
+    let hint = "so evidence cannot be added: select the map of common voxels with `prefer` first, last or \
+                more-observed";
     Err(Error::argument(map.folder().display().to_string(), format!("{what}, {hint}")))
 }
 

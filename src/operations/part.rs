@@ -42,7 +42,8 @@ impl Part {
         }
         let voxels = grid.voxels_in(region);
         if voxels.is_empty() {
-            let reason = format!("between {:?} and {:?} there is no voxel's center", region.min, region.max);
+            let reason =
+                format!("the box from {:?} to {:?} contains no center of a voxel", region.min, region.max);
             return Err(Error::argument("region", reason));
         }
         Ok(VoxelPart { voxels, is_outside })

@@ -23,8 +23,8 @@ pub fn make_piece(
 ) -> Result<WrittenMap> {
     let mut metadata = map.metadata().clone();
     let Some(ext) = metadata.ext.as_mut().filter(|_| map.snapshot().is_none()) else {
-        let reason =
-            "a snapshot or of the original format; a piece is made of a map with checksums, as it is now";
+        let reason = "a snapshot or a map of the original format; create a shard from the current state of a map with \
+             checksums";
         return Err(Error::argument(map.folder().display().to_string(), reason));
     };
     ext.map_id = hex(&map_id);

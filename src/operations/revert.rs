@@ -80,14 +80,14 @@ pub fn revert(
     if outcome.is_ok()
         && let Err(error) = store.release_scans()
     {
-        log::warn!("{}: kept scans that nothing needs remain: {error:#}", folder.display());
+        log::warn!("{}: unneeded kept scans remain: {error:#}", folder.display());
     }
     drop(store);
     // Removes uncommitted files.
     if outcome.is_err()
         && let Err(error) = TileStore::open(disk, folder)
     {
-        log::warn!("{}: not tidied up after an error: {error:#}", folder.display());
+        log::warn!("{}: the cleanup after an error failed: {error:#}", folder.display());
     }
     outcome
 }
@@ -131,7 +131,7 @@ fn check_is_of_map(store: &TileStore, past: &TileStore) -> Result<()> {
     }
     for tile in store.tiles().orphans() {
         if past.tiles().version(tile).is_some() {
-            let hint = "it is no part of the map as it is; `voxtile repair` moves it out of the way";
+            let hint = "it is not part of the map; `voxtile repair` moves it to quarantine";
             return Err(Error::AlreadyExists { path: store.layout().tile_folder(tile), hint });
         }
     }
@@ -225,6 +225,6 @@ impl<'a> Reverter<'a> {
 
     fn missing(&self, tile: TileIndex) -> Error {
         let path = self.past.layout().current(tile, TileFile::Table);
-        FormatError::at_offset(0, "the snapshot does not hold this tile").in_map(&path, Some(tile))
+        FormatError::at_offset(0, "the snapshot does not contain this tile").in_map(&path, Some(tile))
     }
 }

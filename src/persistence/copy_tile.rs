@@ -50,7 +50,7 @@ pub(crate) fn copy_tile(
         written => written,
     }?;
     if input.finish().0 != version.table {
-        let reason = "the file is not the one that commits.log names";
+        let reason = "the file does not match commits.log";
         return Err(FormatError::at_offset(0, reason).in_map(&path, Some(tile)));
     }
     Ok(TileVersion { scan_number, table, octree, ..version })

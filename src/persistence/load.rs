@@ -149,8 +149,9 @@ pub(super) fn check(
     match version {
         Some(version) if file != version.table => {
             let (found, wanted) = (trailer.scan_number, version.scan_number);
-            let reason =
-                format!("the file is of scan {found}, commits.log names the version of scan {wanted}");
+            let reason = format!(
+                "the file is from scan {found}, but commits.log records the version from scan {wanted}"
+            );
             damaged(36, reason)
         }
         _ => Ok(()),

@@ -53,7 +53,7 @@ impl PointReader {
             true => Ok(()),
             false => {
                 let reason =
-                    format!("scan {} has {points} points, its record says {}", scan.number, scan.points);
+                    format!("scan {} has {points} points, but its record says {}", scan.number, scan.points);
                 Err(self.blocks.damaged(self.blocks.at(), &reason))
             }
         }

@@ -8,7 +8,7 @@ pub(crate) fn give_way() {
     const NICENESS: i32 = 10;
     // On Linux the nice value applies to the thread, not to the process.
     if let Err(error) = rustix::process::nice(NICENESS) {
-        log::debug!("no lower priority for this thread: {error}");
+        log::debug!("cannot lower the priority of this thread: {error}");
     }
 }
 

@@ -17,7 +17,10 @@ pub(crate) fn upgrade(
     if store.metadata().ext.is_some() {
         return Ok(());
     }
-    log::info!("{}: a map of the original format; its tiles get checksums", store.folder().display());
+    log::info!(
+        "{}: upgrading a map of the original format; its tiles get checksums",
+        store.folder().display()
+    );
     let map_id = store.upgrade(new_map_id())?;
     for index in store.tiles().suspects() {
         // An earlier sync of this version failed, so it is written again from the tile's own file.

@@ -108,7 +108,10 @@ impl<Job: Send + 'static, Done: Send + 'static> Worker<Job, Done> {
                 self.thread = Some(Thread { jobs: Some(jobs), done, is_over, handle: Some(handle) });
             }
             Err(error) => {
-                log::warn!("no thread for {}; its work runs on the caller's thread: {error}", self.name);
+                log::warn!(
+                    "cannot start a thread for {}; its work runs on the caller's thread: {error}",
+                    self.name
+                );
                 self.has_no_thread = true;
             }
         }

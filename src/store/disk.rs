@@ -97,7 +97,7 @@ pub trait Disk: Debug + Send + Sync {
 impl dyn Disk + '_ {
     /// Like [`Disk::kind`], with an error that names the path.
     pub fn kind_at(&self, path: &Path) -> Result<Option<EntryKind>> {
-        self.kind(path).map_err(|error| Error::io(path, "look at", error))
+        self.kind(path).map_err(|error| Error::io(path, "access", error))
     }
 }
 

@@ -63,7 +63,7 @@ impl Disk for FsDisk {
         let file = OpenOptions::new().append(true).open(only_a_file(path)?)?;
         let bytes = file.metadata()?.len();
         if bytes < offset {
-            let reason = format!("{bytes} bytes, {offset} expected: somebody else changed the file");
+            let reason = format!("{bytes} bytes, {offset} expected: another program changed the file");
             return Err(io::Error::other(reason));
         }
         if bytes > offset {
@@ -270,7 +270,7 @@ fn at_once(paths: &[PathBuf], sync: impl Fn(&Path) -> io::Result<()> + Sync) -> 
         }
         sync_next();
     });
-    let never_tried = || Err(io::Error::other("the sync was not tried"));
+    let never_tried = || Err(io::Error::other("the sync was not attempted"));
     results.into_iter().map(|result| result.into_inner().unwrap_or_else(never_tried)).collect()
 }
 

@@ -59,7 +59,7 @@ impl Layout {
         Self { storage, ..self }
     }
 
-    /// How the tiles are stored.
+    /// Storage of the tiles.
     pub fn storage(&self) -> Storage {
         self.storage
     }

@@ -18,7 +18,7 @@ pub(super) fn check_is_free(disk: &dyn Disk, folder: &Path) -> Result<()> {
     if names.iter().all(|name| leftovers.contains(&name.as_str())) {
         return Ok(());
     }
-    let hint = "open it, name `append` to add scans to it, or choose an empty folder";
+    let hint = "open it, use `append` to add scans, or choose an empty folder";
     Err(Error::AlreadyExists { path: folder.to_owned(), hint })
 }
 
@@ -132,7 +132,7 @@ fn without_metadata(disk: &dyn Disk, layout: &Layout, error: io::Error) -> Error
     }
     let names = disk.list(layout.folder()).unwrap_or_default();
     if names.iter().any(|name| tile_of_folder(name).is_some()) {
-        let reason = "the file is missing, and the folder holds tiles";
+        let reason = "the file is missing, but the folder contains tiles";
         return FormatError::at_offset(0, reason).in_map(&path, None);
     }
     Error::NoMap { path: layout.folder().to_owned() }

@@ -17,15 +17,20 @@ pub fn check_outside_of_maps(path: &Path) -> Result<()> {
 
 pub(super) fn check_place(disk: &dyn Disk, path: &Path) -> Result<()> {
     if path.to_str().is_some_and(|path| path.contains("://")) {
-        let reason =
-            format!("{} is a URL; maps are made in folders, and `voxtile push` copies one", path.display());
+        let reason = format!(
+            "{} is a URL; create the map in a local folder and upload it with `voxtile push`",
+            path.display()
+        );
         return Err(Error::argument("output", reason));
     }
-    let resolved = disk.resolve(path).map_err(|error| Error::io(path, "look for", error))?;
+    let resolved = disk.resolve(path).map_err(|error| Error::io(path, "resolve", error))?;
     for outer in resolved.ancestors().skip(1) {
         if is_map(disk, outer)? {
-            let reason =
-                format!("{} lies in the map {}; choose a place outside", path.display(), outer.display());
+            let reason = format!(
+                "{} is inside the map {}; choose a path outside of it",
+                path.display(),
+                outer.display()
+            );
             return Err(Error::argument("output", reason));
         }
     }

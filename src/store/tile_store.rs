@@ -138,7 +138,7 @@ impl TileStore {
         self.run_checkpoint()?;
         if let Err(error) = self.release_scans() {
             // Files of deleted snapshots remain until this succeeds, so the deletion is resumed at the next opening.
-            log::warn!("kept scans that nothing needs remain: {error:#}");
+            log::warn!("unneeded kept scans remain: {error:#}");
             return Ok(());
         }
         let listed = self.committer.snapshots();

@@ -29,7 +29,7 @@ impl WriterLock {
     ///
     /// [`Error::LockLost`] if the lock file was removed, or an I/O error.
     pub fn check(&self) -> Result<()> {
-        match self.lock.is_in_place().map_err(|error| Error::io(&self.path, "look at", error))? {
+        match self.lock.is_in_place().map_err(|error| Error::io(&self.path, "access", error))? {
             true => Ok(()),
             false => Err(Error::LockLost { path: self.path.clone() }),
         }

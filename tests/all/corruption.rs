@@ -221,7 +221,7 @@ fn check_files_that_do_not_belong(storage: Storage) {
                 let octree = tables[1].with_file_name("octree.bt");
                 disk.put(&table.with_file_name("octree.bt"), &files[&octree]);
             }),
-            "the log names ",
+            "the log records ",
             false,
         ),
         (

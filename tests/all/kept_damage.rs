@@ -347,11 +347,11 @@ fn a_snapshot_that_cannot_be_read_is_part_of_the_answer_of_a_removal() {
     let removed = remove(2).unwrap();
     assert_eq!((removed.scans_removed, removed.snapshots_deleted), (1, vec![name("s")]));
     let [failed] = &*removed.snapshots_failed else { panic!("{:?}", removed.snapshots_failed) };
-    assert!(failed.name == name("t") && failed.reason.contains("may hold some"), "{failed:?}");
+    assert!(failed.name == name("t") && failed.reason.contains("may contain scans"), "{failed:?}");
     assert_eq!(kept(&disk).unwrap(), [1, 4, 5]);
     // Nothing else is left to do.
     let message = testkit::support::message_of(remove(2));
-    assert!(message.contains("snapshots/t") && message.contains("may hold some"), "{message}");
+    assert!(message.contains("snapshots/t") && message.contains("may contain scans"), "{message}");
 }
 
 /// Ways in which a log is damaged: lost, cut, or a bit of it changed.

@@ -131,7 +131,7 @@ fn what_is_no_scan_is_named_and_refused() {
     mapper.insert_scan(&Taken::new(3).in_world()).unwrap();
     mapper.flush().unwrap();
     drop(mapper);
-    assert!(refused(&disk).contains("scan 1 has its points in the world frame"), "{}", refused(&disk));
+    assert!(refused(&disk).contains("the points of scan 1 are in the world frame"), "{}", refused(&disk));
     let region = region(-9.0, 9.0);
     let removed = remove_points(at(&disk), &region, &rework(), |_, _| ()).unwrap();
     assert!(removed.points_removed > 0);
@@ -145,7 +145,7 @@ fn new_poses_that_do_not_fit_are_named() {
     };
     let identity = Pose::identity();
     let message = wrong(NewPoses::InOrder(vec![identity; 3]));
-    assert!(message.contains("3 poses for 5 scans: none from scan 4 of the map on"), "{message}");
+    assert!(message.contains("3 poses for 5 scans: none for scan 4 of the map and later ones"), "{message}");
     let message = wrong(NewPoses::InOrder(vec![identity; 7]));
     assert!(message.contains("7 poses for 5 scans: 2 too many"), "{message}");
     let message = wrong(NewPoses::Numbered(vec![(2, identity), (9, identity)]));
@@ -312,7 +312,8 @@ fn a_snapshot_that_cannot_be_read_is_told_after_the_others_are_gone() {
     disk.put(&map().join("snapshots/second"), b"nothing");
     let scans = ScanSelection::Numbers(4, 5);
     let remove = || remove_scans(at(&disk), &scans, true, &rework(), |_, _| ());
-    let is_told = |message: &str| message.contains("snapshots/second") && message.contains("may hold some");
+    let is_told =
+        |message: &str| message.contains("snapshots/second") && message.contains("may contain scans");
     let removed = remove().unwrap();
     let [failed] = &*removed.snapshots_failed else { panic!("{removed:?}") };
     assert!(is_told(&failed.reason) && failed.name == name("second"), "{failed:?}");

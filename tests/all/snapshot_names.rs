@@ -53,7 +53,7 @@ fn swapped_snapshots_are_found_refused_and_put_back() {
     swap(&disk);
     assert_eq!(damage_in(&disk), BTreeSet::from(["s1", "s2"].map(path)));
     let error = message_of(revert(at(&disk), &name("s1"), None, |_, _| ()));
-    assert!(error.contains("that of the snapshot s2"), "{error}");
+    assert!(error.contains("belongs to the snapshot s2"), "{error}");
     assert!(digest_of(&disk, Some("s2")).is_err());
     assert_eq!(digest_of(&disk, None).unwrap(), now);
     // Mapping goes on, and what both see stays.

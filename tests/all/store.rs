@@ -324,7 +324,10 @@ fn an_older_version_of_a_tile_is_damage() {
     drop(mapper);
     fs::write(&file, old).unwrap();
     let error = message_of(MapReader::open(&path, 1 << 20).unwrap().digest());
-    assert!(error.contains("the file is of scan 3, commits.log names the version of scan 4"), "{error}");
+    assert!(
+        error.contains("the file is from scan 3, but commits.log records the version from scan 4"),
+        "{error}"
+    );
 }
 
 #[test]

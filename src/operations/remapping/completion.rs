@@ -75,12 +75,12 @@ pub(super) fn complete(disk: Arc<dyn Disk>, folder: &Path) -> Result<()> {
 fn with_hint(error: Error) -> Error {
     match error {
         Error::Io { path, action, cause } => {
-            let hint = "points that were removed from the map are still in its files; run this again";
+            let hint = "removed points are still in the files of the map; run this again";
             Error::Io { path, action, cause: io::Error::new(cause.kind(), format!("{cause}; {hint}")) }
         }
         Error::Damaged { path, tile, mut cause } => {
             cause.reason.push_str(
-                "; points that were removed from the map are still in its files; repair the map, and run this again",
+                "; removed points are still in the files of the map; repair the map and run this again",
             );
             Error::Damaged { path, tile, cause }
         }

@@ -44,7 +44,11 @@ fn in_order(scans: &[KeptScanHead], poses: &[Pose]) -> Result<FxHashMap<u64, Pos
     let surplus = poses.len().saturating_sub(scans.len());
     let reason = match scans.get(poses.len()) {
         Some(KeptScanHead { number, .. }) => {
-            format!("{} poses for {} scans: none from scan {number} of the map on", poses.len(), scans.len())
+            format!(
+                "{} poses for {} scans: none for scan {number} of the map and later ones",
+                poses.len(),
+                scans.len()
+            )
         }
         None => format!("{} poses for {} scans: {surplus} too many", poses.len(), scans.len()),
     };

@@ -92,7 +92,7 @@ impl Remapped {
         {
             return Err(Error::argument(
                 "tolerance",
-                "two lengths that are not negative: metres and an angle",
+                "must be a distance in metres and an angle, both not negative",
             ));
         }
         let (mut remapped, mut changes) = (Self::default(), Changes::default());
@@ -112,8 +112,8 @@ impl Remapped {
     fn moves(&mut self, scan: &KeptScanHead, new: &Pose, tolerance: Option<(f64, f64)>) -> Result<bool> {
         let Some(old) = scan.world_from_sensor else {
             let reason = format!(
-                "scan {} has its points in the world frame, so that no pose moves it; insert scans in the frame of \
-                 their sensor",
+                "the points of scan {} are in the world frame, so a pose cannot move them; insert scans in the \
+                 sensor's frame",
                 scan.number
             );
             return Err(Error::argument("poses", reason));

@@ -53,14 +53,11 @@ impl RemapBeside {
     pub fn begin(scans: &KeptSummary, poses: &NewPoses, how: &Remap) -> Result<Self> {
         let (disk, folder) = scans.place();
         if how.rework.is_dry_run {
-            return Err(Error::argument(
-                "is_dry_run",
-                "not beside a mapper; `remap` tells what would be done",
-            ));
+            return Err(Error::argument("is_dry_run", "not supported online; use `remap` for a dry run"));
         }
         let threads = rayon::ThreadPoolBuilder::new().start_handler(|_| give_way()).build();
         let threads =
-            threads.map_err(|error| Error::io(folder, "start threads for", std::io::Error::other(error)))?;
+            threads.map_err(|error| Error::io(folder, "start threads", std::io::Error::other(error)))?;
         let (remapped, changes) = Remapped::by_poses(scans, poses, how)?;
         let mut revision = Revision::new(scans, &how.rework, changes);
         let store = TileStore::open_read_only(disk.clone(), folder)?;
@@ -136,7 +133,7 @@ impl RemapBeside {
         let mut remapper = Remapper::begin(store, touched.config.clone(), tiles, stop)?;
         remapper.take_over(&mut side)?;
         if let Err(error) = remapper.finish(true, TileStore::release_scans)? {
-            log::warn!("{}: committed, but not tidied up: {error:#}", self.folder.display());
+            log::warn!("{}: committed, but the cleanup failed: {error:#}", self.folder.display());
         }
         Ok(self.remapped)
     }

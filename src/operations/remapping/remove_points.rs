@@ -68,6 +68,6 @@ fn check_region(region: &Aabb, map: &Path) -> Result<()> {
     if is_box {
         return Ok(());
     }
-    let reason = format!("of {}: not a box; the lower corner comes first", map.display());
+    let reason = format!("not a box (map {}); give the lower corner first", map.display());
     Err(Error::argument("region", reason))
 }

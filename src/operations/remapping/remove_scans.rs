@@ -221,7 +221,7 @@ fn none_selected(scans: &ScanSelection, reader: &MapReader) -> Error {
         ScanSelection::Input(name) => {
             let names: Vec<_> = inputs_of(reader).iter().map(|input| &*input.name).collect();
             if !names.contains(&&**name) {
-                let reason = format!("the map has none of {name:?}; it has {}", names.join(", "));
+                let reason = format!("the map has no input {name:?}; its inputs are {}", names.join(", "));
                 return Error::argument("input", reason);
             }
             format!("of input {name:?}")
@@ -242,8 +242,7 @@ fn may_hold_some(error: Error) -> Error {
     match error {
         Error::Damaged { path, tile, mut cause } => {
             cause.reason.push_str(
-                "; this snapshot may hold some of the scans that are to go: delete it, or repair the map, and run \
-                 this again",
+                "; this snapshot may contain scans to be removed: delete it or repair the map and run this again",
             );
             Error::Damaged { path, tile, cause }
         }

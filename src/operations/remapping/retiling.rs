@@ -58,8 +58,8 @@ impl Retiling {
     fn refuse(&self, region: TileBox) -> Error {
         let Self { from_m, to_m } = self;
         let reason = format!(
-            "{to_m} m does not fit the region that the map was built of, tiles {} to {} of {from_m} m: a border of it \
-             would be inside a tile; keep the tile size, or take one that divides {from_m} m",
+            "{to_m} m does not fit the region of the map, tiles {} to {} of {from_m} m: its border would be inside a \
+             tile; keep the tile size, or use one that divides {from_m} m",
             region.min(),
             region.max()
         );

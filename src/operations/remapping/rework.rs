@@ -97,7 +97,7 @@ pub(super) fn rework(
     match released {
         // Removed points must not remain: retry after reopening the map.
         Err(_) if takes_points => complete(disk, folder)?,
-        Err(error) => log::warn!("{}: committed, but not tidied up: {error:#}", folder.display()),
+        Err(error) => log::warn!("{}: committed, but the cleanup failed: {error:#}", folder.display()),
         Ok(()) => {}
     }
     second?;
@@ -115,7 +115,7 @@ pub(super) fn tidied<T>(disk: Arc<dyn Disk>, folder: &Path, outcome: Result<T>) 
     if outcome.is_err()
         && let Err(error) = TileStore::open(disk, folder)
     {
-        log::warn!("{}: not tidied up after an error: {error:#}", folder.display());
+        log::warn!("{}: the cleanup after an error failed: {error:#}", folder.display());
     }
     outcome
 }

@@ -123,7 +123,7 @@ impl Commits {
 
     fn take(&mut self, record: Record, offset: u64) -> Result<(), FormatError> {
         if record.flush_number < self.flush_number {
-            let reason = "the flush number is lower than in the record before";
+            let reason = "the flush number is lower than in the previous record";
             return Err(FormatError::at_offset(offset, reason));
         }
         self.flush_number = record.flush_number;

@@ -98,7 +98,7 @@ impl<'a> Flush<'a> {
         let (Ok(payload_bytes), Ok(changed)) =
             (u32::try_from(payload_bytes), u32::try_from(self.changed.len()))
         else {
-            return Err(io::Error::other("more tiles than one record of the log can name"));
+            return Err(io::Error::other("more tiles than one record of the log can contain"));
         };
         let mut out = Chunks { out, waiting: front.to_vec(), crc: crc32fast::Hasher::new() };
         out.waiting.extend_from_slice(&payload_bytes.to_le_bytes());
@@ -160,7 +160,7 @@ impl Next {
         let wrong = |reason| FormatError::at_offset(offset, reason);
         let remaining = file_bytes - offset;
         if remaining < LENGTHS_BYTES {
-            let torn = || Self::Torn(wrong("the record is not whole"));
+            let torn = || Self::Torn(wrong("the record is incomplete"));
             return Ok(if remaining == 0 { Self::End } else { torn() });
         }
         let [length, complement] = [read_u32(input)?, read_u32(input)?];
@@ -169,7 +169,7 @@ impl Next {
         }
         let record_bytes = LENGTHS_BYTES + u64::from(length) + CRC_BYTES;
         if remaining < record_bytes {
-            return Ok(Self::Torn(wrong("the record is longer than what is left of the file")));
+            return Ok(Self::Torn(wrong("the record is longer than the rest of the file")));
         }
         let mut payload =
             Payload { input: Checksumming::new(input), left: u64::from(length), at: offset + LENGTHS_BYTES };

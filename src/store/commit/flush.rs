@@ -132,7 +132,7 @@ impl TileStore {
         self.committer.logged_map_id()?;
         if let Some(&tile) = self.versions.suspects().first() {
             let folder = self.layout().tile_folder(tile);
-            return Err(Error::io(&folder, "trust", io::Error::other("an earlier sync failed")));
+            return Err(Error::io(&folder, "commit", io::Error::other("an earlier sync failed")));
         }
         self.archive.begin_commit();
         Ok(BegunCommit { metadata, scan_number, listed_scans: self.scans.pending() })
@@ -216,7 +216,7 @@ impl TileStore {
     /// Finishes the last commit. After an I/O error the rest is done later.
     pub fn tidy_up(&mut self) {
         if let Err(error) = self.finish_commit() {
-            log::warn!("flushed, but not tidied up: {error:#}");
+            log::warn!("committed, but the cleanup failed: {error:#}");
         }
     }
 

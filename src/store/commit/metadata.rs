@@ -163,7 +163,7 @@ impl Metadata {
         })
     }
 
-    /// How the tiles are stored.
+    /// Storage of the tiles.
     pub fn storage(&self) -> Storage {
         self.ext.as_ref().map_or(Storage::OctoMap, |ext| ext.storage)
     }

@@ -29,7 +29,7 @@ impl TileStore {
         let Some(version) = other.tiles().version(tile) else { return Ok(()) };
         let folder = self.layout().tile_folder(tile);
         if self.versions.is_orphan(tile) {
-            let hint = "it is no part of the map as it is; `voxtile repair` moves it out of the way";
+            let hint = "it is not part of the map; `voxtile repair` moves it to quarantine";
             return Err(Error::AlreadyExists { path: folder, hint });
         }
         make_folder(&**self.disk(), &folder)?;
@@ -53,10 +53,10 @@ impl TileStore {
         match self.disk().kind_at(&path)? {
             Some(EntryKind::File(bytes)) if bytes == wanted => Ok(()),
             Some(EntryKind::File(bytes)) => {
-                damaged(format!("{bytes} bytes where commits.log names {wanted}"))
+                damaged(format!("{bytes} bytes, but commits.log records {wanted}"))
             }
             Some(_) => damaged("not a regular file; links inside a map are not followed".into()),
-            None => damaged("the file is missing, and the map holds this tile".into()),
+            None => damaged("the file is missing, but the map contains this tile".into()),
         }
     }
 
@@ -71,7 +71,7 @@ impl TileStore {
         let damaged = |reason| Err(FormatError::at_offset(0, reason).in_map(&path, Some(tile)));
         let input = match self.disk().open(&path) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => {
-                return damaged("the file is missing, and the map holds this tile");
+                return damaged("the file is missing, but the map contains this tile");
             }
             input => input.map_err(|error| Error::io(&path, "open", error))?,
         };
@@ -80,11 +80,7 @@ impl TileStore {
             Err(Error::Io { cause, .. }) if input.has_failed() => Err(Error::io(&path, "read", cause)),
             written => written,
         }?;
-        if written == wanted {
-            Ok(written)
-        } else {
-            damaged("the file is not the one that commits.log names")
-        }
+        if written == wanted { Ok(written) } else { damaged("the file does not match commits.log") }
     }
 
     /// Replaces the current table by a kept one, which must be the table that the log names.

@@ -298,7 +298,7 @@ fn look_without_names(
 fn kind(disk: &dyn Disk, path: &Path) -> Result<Option<EntryKind>> {
     match disk.kind(path) {
         Err(error) if is_of_medium(&error) => Ok(Some(EntryKind::Other)),
-        kind => kind.map_err(|error| Error::io(path, "look at", error)),
+        kind => kind.map_err(|error| Error::io(path, "access", error)),
     }
 }
 

@@ -22,7 +22,10 @@ impl SideFolder {
     /// A path without a name, foreign content in the folder, another process that uses it, or an I/O error.
     pub fn begin(disk: Arc<dyn Disk>, map: &Path) -> Result<Self> {
         if map.file_name().is_none() {
-            let reason = format!("{} has no name of its own; name the map's folder", map.display());
+            let reason = format!(
+                "{} does not end with a folder name; give the map's path with its name",
+                map.display()
+            );
             return Err(Error::argument("map", reason));
         }
         let path = map.with_added_extension("remapping");

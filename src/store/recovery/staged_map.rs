@@ -123,7 +123,10 @@ pub fn staging_folder(folder: &Path) -> Result<PathBuf> {
     match folder.file_name() {
         Some(_) => Ok(folder.with_added_extension("unfinished")),
         None => {
-            let reason = format!("{} has no name of its own; name a folder to be made", folder.display());
+            let reason = format!(
+                "{} does not end with a folder name; give the path of a new folder",
+                folder.display()
+            );
             Err(Error::argument("output", reason))
         }
     }
@@ -140,7 +143,7 @@ pub(super) fn check_is_free(disk: &dyn Disk, folder: &Path) -> Result<()> {
     if is_free {
         return Ok(());
     }
-    let hint = "choose a folder that does not exist yet, or remove it first";
+    let hint = "choose a folder that does not exist yet, or remove this one first";
     Err(Error::AlreadyExists { path: folder.to_owned(), hint })
 }
 
@@ -212,7 +215,7 @@ pub(super) fn remove_content(disk: &dyn Disk, layout: &Layout, with_lock: bool) 
 }
 
 fn not_of_a_map(path: &Path) -> Error {
-    let hint = "it is in the way of a map that is to be made beside it; move or remove it";
+    let hint = "this path is needed for a temporary map; move or remove the existing content";
     Error::AlreadyExists { path: path.to_owned(), hint }
 }
 

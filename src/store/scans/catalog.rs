@@ -55,7 +55,7 @@ impl CatalogReader {
         while reader.next()?.is_some() {}
         let (found, wanted) = (reader.input.file_bytes, named.bytes);
         let error = match found < wanted {
-            true => FormatError::at_offset(found, format!("{found} bytes, and commits.log names {wanted}")),
+            true => FormatError::at_offset(found, format!("{found} bytes, but commits.log records {wanted}")),
             false => FormatError::at_offset(0, IS_ANOTHER),
         };
         Err(reader.wrong(error.into()))
@@ -104,7 +104,7 @@ impl CatalogReader {
         if self.last == scan_number {
             return Ok(());
         }
-        let reason = format!("it ends with scan {}, the map with scan {scan_number}", self.last);
+        let reason = format!("the catalog ends with scan {}, but the map with scan {scan_number}", self.last);
         Err(self.wrong(FormatError::at_offset(self.at, reason).into()))
     }
 
@@ -127,7 +127,7 @@ impl CatalogReader {
             // Read as far as the flush number.
             self.payload.resize(size_of::<u64>().min((left - FRAME_BYTES) as usize), 0);
             self.input.read(&mut self.payload)?;
-            return self.end_or_damage("a record of no possible length");
+            return self.end_or_damage("a record with an invalid length");
         }
         self.payload.resize(length as usize, 0);
         self.input.read(&mut self.payload)?;
@@ -148,7 +148,7 @@ impl CatalogReader {
         }
         if let Some((first, last)) = entry.numbers() {
             if first != self.last + 1 || last < first {
-                return Err(wrong("its scans are not in order").into());
+                return Err(wrong("the scan numbers are not in order").into());
             }
             self.last = last;
         }

@@ -122,7 +122,7 @@ impl Salvage<'_> {
                     at = next;
                 }
                 Found::End if named.is_some() => {
-                    self.damage.push(self.wrong(at, "its end is missing"));
+                    self.damage.push(self.wrong(at, "the end of the file is missing"));
                     self.has_hole = true;
                     return Ok(());
                 }
@@ -182,7 +182,7 @@ impl Salvage<'_> {
         if let Some((first, last)) = entry.numbers() {
             let is_possible = first > self.last && last >= first && last <= self.as_of.scan_number;
             if !is_possible || first > self.last + 1 && !self.has_hole {
-                self.damage.push(self.wrong(at, "its scans are not in order"));
+                self.damage.push(self.wrong(at, "the scan numbers are not in order"));
             }
             if !is_possible {
                 return Ok(());
@@ -203,7 +203,8 @@ impl Salvage<'_> {
         if last < scan_number {
             if !self.has_hole {
                 let doubtful = self.doubtful.take();
-                let reason = format!("it ends with scan {last}, the map with scan {scan_number}");
+                let reason =
+                    format!("the catalog ends with scan {last}, but the map with scan {scan_number}");
                 let error = doubtful.unwrap_or_else(|| self.wrong(0, &reason));
                 self.damage.push(error);
             }
@@ -252,7 +253,7 @@ impl Salvage<'_> {
 
 /// Returns the placeholder for a damaged record that has no scans.
 fn lost_operation() -> CatalogEntry {
-    CatalogEntry::Operation("one whose record was damaged".to_owned())
+    CatalogEntry::Operation("an operation with a damaged record".to_owned())
 }
 
 /// Reads the record at an offset, which must be the position of the input.
@@ -271,7 +272,7 @@ fn find_record(input: &mut BufReader<Box<dyn DiskRead>>, at: u64) -> io::Result<
     }
     let flush_number = payload.first_chunk().map_or(0, |bytes| u64::from_le_bytes(*bytes));
     let Some(length) = length else {
-        return Ok(Found::Damage("a record of no possible length", flush_number, None));
+        return Ok(Found::Damage("a record with an invalid length", flush_number, None));
     };
     let next = at + FRAME_BYTES + u64::from(length);
     if crc32fast::hash(&payload) != u32::from_le_bytes(checksum) {

@@ -20,7 +20,7 @@ impl TileStore {
     /// the map is next opened for writing.
     pub(in crate::store) fn remove_unneeded_scans(&mut self) {
         if let Err(error) = self.release_scans() {
-            log::warn!("kept scans that nothing needs remain: {error:#}");
+            log::warn!("unneeded kept scans remain: {error:#}");
         }
     }
 
@@ -108,7 +108,7 @@ impl TileStore {
     /// Like [`Self::try_to_name_own_catalog`], but a damaged catalog remains unnamed.
     pub(in crate::store) fn name_own_catalog(&mut self) {
         if let Err(error) = self.try_to_name_own_catalog() {
-            log::warn!("the catalog of the kept scans is not named: {error:#}");
+            log::warn!("the catalog of kept scans is not recorded: {error:#}");
         }
     }
 

@@ -497,7 +497,7 @@ impl ScanArchive {
             entries.push(CatalogEntry::Unlisted(last + 1, scan_number));
         }
         if scan_number == 0 && has_tiles {
-            entries.push(CatalogEntry::Operation("what it had before its scans were kept".to_owned()));
+            entries.push(CatalogEntry::Operation("content from before scans were kept".to_owned()));
         }
         Ok(entries)
     }
@@ -540,8 +540,8 @@ impl ScanArchive {
     /// Copies scans out of segments whose sync failed. Checksums verify what is read.
     fn move_suspects(&mut self) -> Result<()> {
         if self.replacement.is_some() && self.is_replacement_suspect {
-            let error = io::Error::other("an earlier sync failed; begin again");
-            return Err(Error::io(&self.files.layout().kept_scans(), "trust", error));
+            let error = io::Error::other("an earlier sync failed; start the operation again");
+            return Err(Error::io(&self.files.layout().kept_scans(), "commit", error));
         }
         let mut pending = std::mem::take(&mut self.pending);
         let mut moved = Ok(());

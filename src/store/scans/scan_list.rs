@@ -194,7 +194,9 @@ fn find_end(disk: &dyn Disk, layout: &Layout, committed: u64, records: Option<u6
     let (mut found, path) = (Extent::default(), layout.scans());
     let read = for_each_record(disk, layout, committed, &mut |_, _| found.records += 1);
     let damage = match read {
-        Ok(_) if records.is_some_and(|records| found.records < records) => "its end is missing".to_owned(),
+        Ok(_) if records.is_some_and(|records| found.records < records) => {
+            "the end of the file is missing".to_owned()
+        }
         Ok(file_bytes) => {
             let has_excess = file_bytes.is_some_and(|bytes| bytes != found.bytes());
             return Ok(Found { committed: found, has_excess, quarantined: None });
@@ -205,10 +207,10 @@ fn find_end(disk: &dyn Disk, layout: &Layout, committed: u64, records: Option<u6
     // The file is not moved if it cannot be copied, because its intact part is needed in place.
     let quarantined = Quarantine::new(disk, layout).copy(&path)?;
     log::warn!(
-        "{}: {damage}; the list goes on behind record {}{}",
+        "{}: {damage}; the list continues after record {}{}",
         path.display(),
         found.records,
-        quarantined.as_ref().map_or(String::new(), |to| format!(", and is as it was in {}", to.display()))
+        quarantined.as_ref().map_or(String::new(), |to| format!("; the original is now {}", to.display()))
     );
     Ok(Found { committed: found, has_excess: true, quarantined })
 }
@@ -278,7 +280,7 @@ fn for_each_committed(
     read.map_err(in_map)?;
     match records {
         Some(records) if records != found.records => {
-            let reason = format!("{} records, metadata.json says {records}", found.records);
+            let reason = format!("{} records, but metadata.json records {records}", found.records);
             Err(in_map(FormatError::at_offset(found.bytes(), reason).into()))
         }
         _ => Ok(()),

@@ -142,7 +142,7 @@ impl SegmentReader {
             [0, 4].map(|at| u32::from_le_bytes([frame[at], frame[at + 1], frame[at + 2], frame[at + 3]]));
         let length = length as usize;
         if length == 0 || length > MAX_BLOCK_BYTES || length as u64 > self.input.limit() {
-            return Err(wrong("a block of no possible length"));
+            return Err(wrong("a block with an invalid length"));
         }
         self.block.resize(length, 0);
         match self.input.read_exact(&mut self.block) {

@@ -56,7 +56,7 @@ impl Snapshot {
             Some(EntryKind::Folder) => Ok(true),
             None => Ok(false),
             Some(_) => {
-                let reason = "something else has the name of the folder of snapshots";
+                let reason = "not a folder, although it has the name of the folder of snapshots";
                 Err(FormatError::at_offset(0, reason).in_map(&folder, None))
             }
         }
@@ -79,9 +79,7 @@ impl Snapshot {
         let map = layout.folder().display();
         let unknown = |reason: String| Err(Error::argument("snapshot", reason));
         if listed.is_some_and(|listed| !listed.contains(name)) {
-            return unknown(format!(
-                "{map} has none with the name {name}; `voxtile snapshots {map}` lists them"
-            ));
+            return unknown(format!("{map} has no snapshot {name}; `voxtile snapshots {map}` lists them"));
         }
         Self::has_folder(disk, layout)?;
         let path = layout.snapshot(name);
@@ -98,23 +96,23 @@ impl Snapshot {
         let Some(snapshot) = read else {
             return match listed {
                 Some(_) => damaged(format!(
-                    "the snapshot's file is missing, and the map has this snapshot; put the file back, or give the snapshot \
-                     up with `voxtile snapshot {map} {name} --delete`"
+                    "the file of this snapshot is missing; restore it, or delete the snapshot with `voxtile \
+                     snapshot {map} {name} --delete`"
                 )),
-                None => unknown(format!(
-                    "{map} has none with the name {name}; `voxtile snapshots {map}` lists them"
-                )),
+                None => {
+                    unknown(format!("{map} has no snapshot {name}; `voxtile snapshots {map}` lists them"))
+                }
             };
         };
         if let Some(own) = snapshot.name_inside().filter(|own| *own != name) {
-            return damaged(format!("the file is that of the snapshot {own}; put it back under that name"));
+            return damaged(format!("the file belongs to the snapshot {own}; rename it back"));
         }
         if let Some(flush_number) = listed.and_then(|listed| listed.flush_of(name))
             && flush_number != snapshot.commits.flush_number
         {
             let found = snapshot.commits.flush_number;
             return damaged(format!(
-                "the file is of flush {found}, and this snapshot is of flush {flush_number}"
+                "the file is from flush {found}, but the snapshot is of flush {flush_number}"
             ));
         }
         Ok(snapshot)
@@ -148,13 +146,13 @@ impl Snapshot {
         }
         if log.map_id() != map_id {
             let (found, wanted) = (hex(&log.map_id()), hex(&map_id));
-            return damaged(12, format!("the snapshot is of map {found}, not of {wanted}"));
+            return damaged(12, format!("the snapshot belongs to map {found}, not to {wanted}"));
         }
         let is_of_map =
             |metadata: &Metadata| metadata.ext.as_ref().is_some_and(|ext| ext.map_id == hex(&map_id));
         match commits.metadata.clone().filter(is_of_map) {
             Some(metadata) => Ok(Some(Self { name: name.clone(), map_id, metadata, commits, bytes })),
-            None => damaged(bytes, "the snapshot does not say what the map was".into()),
+            None => damaged(bytes, "the snapshot has no metadata of the map".into()),
         }
     }
 

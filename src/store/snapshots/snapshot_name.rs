@@ -30,8 +30,8 @@ impl SnapshotName {
             return Ok(Self(name));
         }
         let reason = format!(
-            "{name:?} cannot be a snapshot's name; 1 to {MAX_LETTERS} of A-Z a-z 0-9 . _ - can, beginning with no dot, \
-             but for {NOW:?}, which is the map as it is"
+            "{name:?} is not a valid snapshot name; use 1 to {MAX_LETTERS} characters of A-Z a-z 0-9 . _ -, not \
+             starting with a dot; {NOW:?} is reserved for the current map"
         );
         Err(Error::argument("snapshot", reason))
     }
@@ -81,7 +81,10 @@ mod tests {
         }
         for bad in ["", ".", "..", ".next", "a/b", "a\\b", "a b", "a@b", "ä", "now", "a\0", &"x".repeat(65)]
         {
-            assert!(SnapshotName::new(bad).unwrap_err().to_string().contains("cannot be"), "{bad:?}");
+            assert!(
+                SnapshotName::new(bad).unwrap_err().to_string().contains("not a valid snapshot name"),
+                "{bad:?}"
+            );
         }
     }
 }

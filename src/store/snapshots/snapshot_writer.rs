@@ -35,7 +35,7 @@ impl SnapshotWriter<'_> {
         let has_folder = Snapshot::has_folder(&**self.store.disk(), self.store.layout())?;
         let mut listed = self.store.committer.snapshots().cloned().unwrap_or_default();
         if listed.contains(name) && self.is_kept_as(name) {
-            log::info!("{}: the snapshot {name} is of this state already", self.store.folder().display());
+            log::info!("{}: the snapshot {name} already has this state", self.store.folder().display());
             return Ok(());
         }
         if listed.contains(name) || has_folder && self.store.files.kind(&path)?.is_some() {
@@ -44,7 +44,7 @@ impl SnapshotWriter<'_> {
         }
         if listed.len() >= MAX_SNAPSHOTS {
             let (size, limit) = (listed.len() as u64 + 1, MAX_SNAPSHOTS as u64);
-            let hint = "delete some first";
+            let hint = "delete snapshots first";
             return Err(Error::TooLarge { what: "the number of snapshots", size, limit, hint });
         }
         if !has_folder {
@@ -95,7 +95,7 @@ impl SnapshotWriter<'_> {
     /// Finishes a commit. After an I/O error the next call resumes.
     fn finish_commit(&mut self) {
         if let Err(error) = self.store.finish_commit() {
-            log::warn!("{}: committed, but not tidied up: {error:#}", self.store.folder().display());
+            log::warn!("{}: committed, but the cleanup failed: {error:#}", self.store.folder().display());
         }
     }
 
@@ -132,7 +132,7 @@ impl SnapshotWriter<'_> {
         match self.store.disk().kind(&path) {
             Ok(Some(EntryKind::File(_))) => {}
             Ok(Some(_)) if Snapshot::has_folder(&**self.store.disk(), self.store.layout()).is_ok() => {
-                let reason = "no regular file; `voxtile repair` moves it out of the map";
+                let reason = "not a regular file; `voxtile repair` moves it to quarantine";
                 return Err(FormatError::at_offset(0, reason).in_map(&path, None));
             }
             _ if is_listed => {}
@@ -140,7 +140,7 @@ impl SnapshotWriter<'_> {
             Ok(_) if self.store.snapshots_removed.contains(name) => return Ok(()),
             // Returns the error for an unknown snapshot.
             Ok(_) => return self.store.snapshots().read(name).map(drop),
-            Err(error) => return Err(Error::io(&path, "look at", error)),
+            Err(error) => return Err(Error::io(&path, "access", error)),
         }
         let mut listed = self.store.committer.snapshots().cloned().unwrap_or_default();
         listed.remove(name);
@@ -150,7 +150,7 @@ impl SnapshotWriter<'_> {
         self.finish_commit();
         // As long as the file exists, this call can be repeated to finish the deletion.
         if let Err(error) = self.release_unseen_tables() {
-            log::warn!("deleted, but its tables stay until the map is opened again: {error:#}");
+            log::warn!("deleted, but its tables remain until the map is opened again: {error:#}");
         }
         self.store.release_scans().map_err(|error| scans_remain(error, name))?;
         self.store.checkpoint.remove_snapshot(name);

@@ -43,7 +43,7 @@ impl TileStore {
         let Some(map_id) = metadata.ext.as_ref().and_then(|ext| id_from_hex(&ext.map_id)) else {
             let map = folder.display();
             let reason =
-                format!("{map} has none with the name {name}: a map of the original format has no snapshots");
+                format!("{map} has no snapshot {name}: maps of the original format have no snapshots");
             return Err(Error::argument("snapshot", reason));
         };
         // The log may be newer than `metadata.json`. If it is unreadable, use `metadata.json`.
@@ -223,7 +223,7 @@ impl<'a> Snapshots<'a> {
 fn needed_by(error: Error, name: &SnapshotName) -> Error {
     let Error::Damaged { path, tile, mut cause } = error else { return error };
     cause.reason.push_str(&format!(
-        "; the snapshot {name} needs it; nothing was changed: repair the map or delete the snapshot, and run this again"
+        "; the snapshot {name} needs it; nothing was changed; repair the map or delete the snapshot, and run this again"
     ));
     Error::Damaged { path, tile, cause }
 }

@@ -80,7 +80,7 @@ impl SpillFiles {
         }
         let path = self.files.layout().spill(tile);
         if let Err(error) = self.files.disk().append(&path, file.bytes) {
-            log::debug!("{}: not cut: {error}", path.display());
+            log::debug!("{}: cannot truncate: {error}", path.display());
         }
     }
 
@@ -88,7 +88,7 @@ impl SpillFiles {
     pub fn remove(&self, tile: TileIndex) {
         let path = self.files.layout().spill(tile);
         if let Err(error) = self.files.disk().remove_file(&path) {
-            log::debug!("{}: not removed: {error}", path.display());
+            log::debug!("{}: cannot remove: {error}", path.display());
         }
     }
 }

@@ -126,7 +126,7 @@ impl<'a> Tables<'a> {
     pub fn reader(self) -> Result<TileReader> {
         match self.store.map_id() {
             Some(map_id) => Ok(TileReader::new(self.store.files.clone(), map_id)),
-            None => Err(Error::argument("map", "of the original format; its versions have no checksums")),
+            None => Err(Error::argument("map", "a map of the original format; its tiles have no checksums")),
         }
     }
 

@@ -88,7 +88,7 @@ impl TileLocation {
             Some(_) => {
                 return damaged("the tile's folder is a file or a link, not a folder");
             }
-            None => return damaged("the tile's folder is missing, and the map holds this tile"),
+            None => return damaged("the tile's folder is missing, but the map contains this tile"),
         }
         match disk.open(&path) {
             Ok(input) => {
@@ -96,7 +96,7 @@ impl TileLocation {
                 Ok(StoredTile { path, input: Checksumming::new(input), bytes, map_id, version, storage })
             }
             Err(error) if error.kind() == io::ErrorKind::NotFound => {
-                damaged("the file is missing, and the map holds this tile")
+                damaged("the file is missing, but the map contains this tile")
             }
             Err(error) if error.kind() == io::ErrorKind::InvalidInput => {
                 damaged("not a regular file; links inside a map are not followed")

@@ -76,7 +76,7 @@ pub(in crate::store) fn make_folder(disk: &dyn Disk, folder: &Path) -> Result<()
         Some(EntryKind::Folder) => Ok(()),
         None => disk.create_folder(folder).map_err(|error| Error::io(folder, "create", error)),
         Some(_) => {
-            let cause = io::Error::new(io::ErrorKind::NotADirectory, "something else has the folder's name");
+            let cause = io::Error::new(io::ErrorKind::NotADirectory, "a file or link has the folder's name");
             Err(Error::io(folder, "create", cause))
         }
     }

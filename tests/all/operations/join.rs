@@ -197,7 +197,7 @@ fn pieces_that_do_not_go_together_are_no_map() {
         ("other", config.clone(), [8; 16], "the id"),
         ("coarse", MapConfig::new(0.25, 2.5).unwrap(), ID, "resolution"),
         ("compact", config.clone().with_storage(Storage::Compact), ID, "the storage"),
-        ("same", config.clone(), ID, "another piece has it"),
+        ("same", config.clone(), ID, "so does another shard"),
     ] {
         let refused = join(&disk, &[one.clone(), make(name, &config, id)]).unwrap_err();
         assert!(refused.to_string().contains(said), "{refused}");

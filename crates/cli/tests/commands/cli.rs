@@ -285,17 +285,17 @@ fn bad_inputs_get_one_line_that_says_what_to_do() {
         (
             vec!["build", scans, "-o", new, "--max-range", "0"],
             2,
-            "max range: 0 is not a length above the min range",
+            "max range: must be a length above the min range, in metres, not 0",
         ),
-        (vec!["build", scans, "-o", new, "--cache-tiles", "0"], 2, "cache tiles: 0 is not at least 1"),
+        (vec!["build", scans, "-o", new, "--cache-tiles", "0"], 2, "cache tiles: must be at least 1, not 0"),
         (vec!["build", scans, "-o", new, "--memory", "0"], 2, "0 bytes are too few for tiles of 10 m"),
         (vec!["build", scans, "-o", new, "--memory", "1 mile"], 2, "--memory"),
         (vec!["build", scans, "-o", new, "--memory", "64MiB", "--cache-tiles", "3"], 2, "--cache-tiles"),
         (
             vec!["build", scans, "-o", new, "--memory", "20MiB"],
             2,
-            "20971520 bytes are too few for tiles of 10 m at 0.1 m: give at least 42182144 (41 MiB), \
-             or make tiles of at most 5.4 m",
+            "20971520 bytes are too few for tiles of 10 m at 0.1 m: allow at least 42182144 (41 MiB), \
+             or use tiles of at most 5.4 m",
         ),
         (vec!["build", scans, "-o", new, "--octree", "trees"], 2, "--octree"),
         (vec!["build", scans, "-o", new, "--voxel-cache", "maybe"], 2, "--voxel-cache"),
@@ -304,17 +304,17 @@ fn bad_inputs_get_one_line_that_says_what_to_do() {
         (
             vec!["build", scans, "-o", new, "--voxel-cache", "serial", "--tau", "0"],
             2,
-            "tau: 0 is not 1 to 65536",
+            "tau: must be 1 to 65536 voxels per bucket, not 0",
         ),
         (
             vec!["build", scans, "-o", new, "--voxel-cache", "parallel", "--buckets", "48"],
             2,
-            "buckets: 48 is not a power of two up to 2^24",
+            "buckets: must be a power of two up to 2^24, not 48",
         ),
         (
             vec!["build", scans, "-o", new, "--voxel-cache", "serial", "--buckets", "33554432"],
             2,
-            "buckets: 33554432 is not a power of two up to 2^24",
+            "buckets: must be a power of two up to 2^24, not 33554432",
         ),
         (vec!["build", scans, "-o", new, "--tau", "4"], 2, "--tau, --buckets: only voxel caches have these"),
         (

@@ -149,7 +149,7 @@ fn what_cannot_be_is_told_in_a_line() {
         (&[&["crop", map, "-o", map], &BOX[..]].concat(), 2, "choose a folder"),
         (&[&["crop", map, "-o", out], &flat[..]].concat(), 2, "needs X0 < X1"),
         (&[&["clear", map], &flat[..]].concat(), 2, "needs X0 < X1"),
-        (&["decay", map, "--halflife", "0"], 2, "halflife: 0 is no number of scans above 0"),
+        (&["decay", map, "--halflife", "0"], 2, "halflife: 0 is not a number of scans above 0"),
         (&["decay", map, "--halflife", "3", "--forget-below", "-1"], 2, "--forget-below"),
     ];
     for (arguments, code, reason) in cases {

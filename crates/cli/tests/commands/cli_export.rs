@@ -205,7 +205,7 @@ fn nothing_is_made_inside_of_a_map() {
         for extension in ["ply", "bt"] {
             let file = place.with_extension(extension);
             let (code, stderr) = failure(&["export", text(&map), "-o", text(&file)]);
-            assert!(code == 2 && stderr.contains("lies in the map"), "{stderr}");
+            assert!(code == 2 && stderr.contains("is inside the map"), "{stderr}");
         }
         let crop = [&["crop", text(&map), "-o", text(place)][..], &region].concat();
         let picture = place.with_extension("png");
@@ -218,7 +218,7 @@ fn nothing_is_made_inside_of_a_map() {
             vec!["local", text(&folder.path().join("scans")), "-o", text(&picture)],
         ] {
             let (code, stderr) = failure(&arguments);
-            assert!(code == 2 && stderr.contains("lies in the map"), "{arguments:?}: {stderr}");
+            assert!(code == 2 && stderr.contains("is inside the map"), "{arguments:?}: {stderr}");
         }
     }
     assert_eq!(names(&map), before);

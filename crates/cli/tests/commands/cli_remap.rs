@@ -148,7 +148,7 @@ fn scans_and_points_are_removed_as_if_they_had_never_been() {
     assert_eq!((&gone["points_removed"], &gone["tiles"]), (&41.into(), &gone["tiles_mapped"]));
     assert_eq!(json(&["info", &kept.map, "--json"])["voxels"], 0);
     let message = fails(&["remove-scans", &kept.map, "--input", "nothing"], 2);
-    assert!(message.contains("the map has none of"), "{message}");
+    assert!(message.contains("the map has no input"), "{message}");
 }
 
 #[test]

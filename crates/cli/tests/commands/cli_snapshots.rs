@@ -68,12 +68,12 @@ fn wrong_snapshots_are_told_what_is_wrong() {
     output(&["snapshot", map, "a"]);
     let (past, present) = (format!("{map}@none"), format!("{map}@a"));
     for (arguments, message) in [
-        (&["snapshot", map, "now"][..], "cannot be a snapshot's name"),
-        (&["snapshot", map, "../a"], "cannot be a snapshot's name"),
+        (&["snapshot", map, "now"][..], "is not a valid snapshot name"),
+        (&["snapshot", map, "../a"], "is not a valid snapshot name"),
         (&["snapshot", map, "b", "--delete"], "lists them"),
         (&["revert", map, "b"], "lists them"),
-        (&["digest", &past], "has none with the name none"),
-        (&["diff", map, "a", "b"], "has none with the name b"),
+        (&["digest", &past], "has no snapshot none"),
+        (&["diff", map, "a", "b"], "has no snapshot b"),
         (&["clear", &present, "--region", "0", "0", "0", "1", "1", "1"], "can be read and not changed"),
         (&["decay", &present, "--halflife", "10"], "can be read and not changed"),
         (&["verify", &present], "can be read and not changed"),
