@@ -305,7 +305,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn two_long_texts_that_begin_alike_are_shown_where_they_differ() {
+    fn long_texts_with_a_common_beginning_show_the_difference() {
         let [a, b] = ["a", "b"].map(|end| "x".repeat(200) + end);
         let parts = [beginning_or_difference(&a, &b), beginning_or_difference(&b, &a)];
         assert!(parts[0] != parts[1] && parts[0].ends_with("xa (from character 161 on)"), "{parts:?}");

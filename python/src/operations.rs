@@ -156,7 +156,7 @@ pub fn move_piece<'py>(
 ) -> PyResult<Bound<'py, PyAny>> {
     let id = map_id_of(py, "map_id", map_id)?;
     told(py, progress, |_, progress| {
-        operations::move_piece(&map, &output, id, |done, all| progress.tell(done, all))
+        operations::move_shard(&map, &output, id, |done, all| progress.tell(done, all))
     })
 }
 
@@ -199,7 +199,7 @@ pub fn adopt<'py>(
             .iter()
             .map(|part| MapReader::open(part, MemoryLimit::DEFAULT_BYTES))
             .collect::<Result<Vec<_>>>()?;
-        operations::adopt(&map, &parts, of_flush, scans, |done, all| progress.tell(done, all))
+        operations::replace_tiles(&map, &parts, of_flush, scans, |done, all| progress.tell(done, all))
     })
 }
 
@@ -255,7 +255,7 @@ pub fn crop<'py>(
         let tell = |done, all| progress.tell(done, all);
         match piece_of {
             None => operations::crop(&map.open()?, &part, &output, tell),
-            Some(map_id) => operations::crop_piece(&map.open()?, &part, &output, map_id, tell),
+            Some(map_id) => operations::crop_shard(&map.open()?, &part, &output, map_id, tell),
         }
     })
 }

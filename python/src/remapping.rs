@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::PathBuf;
 use voxtile::mapper::KeptSummary;
-use voxtile::operations::{self, NewPoses, Remap, Rework, ScanSelection};
+use voxtile::operations::{self, NewPoses, Remap, Replay, ScanSelection};
 use voxtile::space::Grid;
 use voxtile::{InsertMode, MapView};
 
@@ -19,9 +19,9 @@ fn rework_of(
     keep_as: Option<&str>,
     dry_run: bool,
     memory: Option<&Bound<'_, PyAny>>,
-) -> PyResult<Rework> {
+) -> PyResult<Replay> {
     let keep_as = keep_as.map(|name| name_of(py, name)).transpose()?;
-    Ok(Rework::default().with_memory(memory_of(memory)?).with_keep_as(keep_as).with_dry_run(dry_run))
+    Ok(Replay::default().with_memory(memory_of(memory)?).with_keep_as(keep_as).with_dry_run(dry_run))
 }
 
 /// Gives the scans that a map keeps new poses, and maps again what they touch: one commit, after which the map is as if
@@ -104,7 +104,7 @@ pub fn remap_as<'py>(
             rays.insert_mode = insert_mode.unwrap_or(rays.insert_mode);
             rays
         };
-        operations::map_anew(&reader, &output, config, rays, stop, |done, all| progress.tell(done, all))
+        operations::rebuild(&reader, &output, config, rays, stop, |done, all| progress.tell(done, all))
     })
 }
 

@@ -4,23 +4,23 @@ use crate::store::{Disk, KeptRecord, Layout, SegmentPlace};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Segment, offset and length of points in bytes.
-type Place = (u64, u64, u64);
+type Location = (u64, u64, u64);
 
-fn place_of(place: SegmentPlace) -> Place {
+fn location_of(place: SegmentPlace) -> Location {
     (place.segment, place.offset, place.bytes)
 }
 
 /// Set of locations of kept points.
 #[derive(Debug, Default)]
-pub(super) struct KeptPlaces(BTreeSet<Place>);
+pub(super) struct KeptLocations(BTreeSet<Location>);
 
-impl KeptPlaces {
+impl KeptLocations {
     pub(super) fn insert(&mut self, place: SegmentPlace) {
-        self.0.insert(place_of(place));
+        self.0.insert(location_of(place));
     }
 
     pub(super) fn contains(&self, place: SegmentPlace) -> bool {
-        self.0.contains(&place_of(place))
+        self.0.contains(&location_of(place))
     }
 
     pub(super) fn len(&self) -> usize {

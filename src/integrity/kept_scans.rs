@@ -1,5 +1,5 @@
 use super::finding::Finding;
-use super::kept_points::{KeptPlaces, WholePoints};
+use super::kept_points::{KeptLocations, WholePoints};
 use crate::error::{Error, Result};
 use crate::store::{
     CatalogEntry, Disk, KeptAsOf, KeptRecords, Layout, Salvaged, ScanRecord, SegmentPlace, SnapshotName,
@@ -25,12 +25,12 @@ struct Needed {
 pub(super) fn check_kept_scans(
     disk: &dyn Disk,
     store: &TileStore,
-    only: Option<&KeptPlaces>,
+    only: Option<&KeptLocations>,
     whole: &mut WholePoints,
     found: &mut dyn FnMut(Finding, Option<SegmentPlace>),
 ) -> Result<()> {
     let layout = store.layout();
-    let mut check = Check { disk, layout, only, whole, told: KeptPlaces::default(), found };
+    let mut check = Check { disk, layout, only, whole, reported: KeptLocations::default(), found };
     for needed in needed_catalogs(store)? {
         check.read(needed)?;
     }
@@ -65,10 +65,10 @@ fn needed_catalogs(store: &TileStore) -> Result<Vec<Vec<Needed>>> {
 struct Check<'a> {
     disk: &'a dyn Disk,
     layout: &'a Layout,
-    only: Option<&'a KeptPlaces>,
+    only: Option<&'a KeptLocations>,
     whole: &'a mut WholePoints,
     /// Damaged points that were reported already.
-    told: KeptPlaces,
+    reported: KeptLocations,
     found: &'a mut dyn FnMut(Finding, Option<SegmentPlace>),
 }
 
@@ -95,11 +95,12 @@ impl Check<'_> {
     fn read_scans(&mut self, needed: &Needed) -> Result<()> {
         let mut records = KeptRecords::open(self.disk, self.layout, needed.as_of)?;
         while let Some(scan) = records.next_kept()? {
-            if self.only.is_some_and(|only| !only.contains(scan.place)) || self.told.contains(scan.place) {
+            if self.only.is_some_and(|only| !only.contains(scan.place)) || self.reported.contains(scan.place)
+            {
                 continue;
             }
             if let Err(error) = self.whole.check(self.disk, self.layout, &scan) {
-                self.told.insert(scan.place);
+                self.reported.insert(scan.place);
                 self.report(error, needed, Some((scan.number, scan.place)))?;
             }
         }

@@ -13,12 +13,12 @@ mod finding;
 mod kept_points;
 mod kept_scans;
 mod rebuild;
+mod rechecks;
 mod repair;
 mod repair_kept_scans;
 mod repair_snapshots;
 mod snapshots;
 mod surroundings;
-mod suspects;
 mod tile_check;
 mod verify;
 

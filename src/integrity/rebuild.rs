@@ -53,8 +53,8 @@ pub(super) fn index_of(
     remains: &Salvage,
     progress: &mut dyn FnMut(u64, u64),
 ) -> Result<Option<Index>> {
-    if let Some((map_id, mut metadata)) = told_by_log(disk, layout, remains)? {
-        forget_scan_records(&mut metadata);
+    if let Some((map_id, mut metadata)) = identity_from_log(disk, layout, remains)? {
+        clear_scan_records(&mut metadata);
         let commits = remains.commits.clone();
         return Ok(Some(Index {
             map_id,
@@ -76,14 +76,18 @@ pub(super) fn index_of(
 }
 
 /// Clears the number of records in the list of scans, which is unknown for a rebuilt index.
-fn forget_scan_records(metadata: &mut Metadata) {
+fn clear_scan_records(metadata: &mut Metadata) {
     if let Some(ext) = &mut metadata.ext {
         ext.scan_records = None;
     }
 }
 
 /// Returns id and metadata of the log, if the log ends with the last flush.
-fn told_by_log(disk: &dyn Disk, layout: &Layout, remains: &Salvage) -> Result<Option<([u8; 16], Metadata)>> {
+fn identity_from_log(
+    disk: &dyn Disk,
+    layout: &Layout,
+    remains: &Salvage,
+) -> Result<Option<([u8; 16], Metadata)>> {
     let (Some(map_id), Some(logged)) = (remains.log_map_id, &remains.commits.metadata) else {
         return Ok(None);
     };
@@ -128,7 +132,7 @@ fn index_from_tiles(
     let tiles = tiles_of(disk, layout)?;
     let trailers = Trailers::of(disk, layout, &tiles);
     let (map_id, mut metadata) = identity(layout, remains, &trailers)?;
-    forget_scan_records(&mut metadata);
+    clear_scan_records(&mut metadata);
     let config = crate::persistence::config_from(&metadata, &layout.metadata())?;
     // Ignore the numbers in files of another map.
     let written = remains.metadata.as_ref().ok().filter(|metadata| id_of(metadata) == Some(map_id));

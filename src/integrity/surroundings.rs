@@ -1,5 +1,5 @@
 use super::finding::Finding;
-use super::suspects::Suspect;
+use super::rechecks::Recheck;
 use super::verify::Verifier;
 use crate::error::{Error, FormatError, Result};
 use crate::space::TileIndex;
@@ -44,7 +44,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         self.report(Finding::note(path, tile, reason));
     }
 
-    fn look_into_snapshots(&mut self, folder: &Path) -> Result<()> {
+    fn check_snapshots_folder(&mut self, folder: &Path) -> Result<()> {
         match self.kind(folder)? {
             Some(EntryKind::Folder) => {}
             Some(_) if self.listed.as_ref().is_some_and(SnapshotList::is_empty) => {
@@ -75,7 +75,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
     }
 
     /// Reports entries that are not part of the map.
-    pub(super) fn look_around(
+    pub(super) fn check_map_folder(
         &mut self,
         store: &TileStore,
         is_known: impl Fn(TileIndex) -> bool,
@@ -92,16 +92,16 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
                 }
                 // Pushed and pulled states (`bucket::known_states`).
                 ("bucket_states", _) => {}
-                (KEPT_SCANS, _) => self.look_into_kept_scans(&path)?,
-                (SNAPSHOTS, _) => self.look_into_snapshots(&path)?,
+                (KEPT_SCANS, _) => self.check_kept_scans_folder(&path)?,
+                (SNAPSHOTS, _) => self.check_snapshots_folder(&path)?,
                 (QUARANTINE, _) => {
                     let reason = "moved here by a repair. It may contain scans that were removed later. Delete it when \
                                   you need nothing in it.";
                     self.report(Finding::note(&path, None, reason));
                 }
                 (_, Some(tile)) => {
-                    let is_known = is_known(tile) || self.told.contains(&tile);
-                    self.look_into(store, &path, tile, is_known)?;
+                    let is_known = is_known(tile) || self.reported_tiles.contains(&tile);
+                    self.check_tile_folder(store, &path, tile, is_known)?;
                 }
                 (name, None) if Layout::is_next_of_map(name) => self.leftover(&path, None, LEFT),
                 ("bucket_states.next", None) => {
@@ -111,12 +111,12 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
                 _ => self.report(Finding::note(&path, None, "not part of a map")),
             }
         }
-        self.look_beside(&folder);
+        self.check_siblings(&folder);
         Ok(())
     }
 
     /// Reports a second map next to this one. I/O errors are ignored.
-    fn look_beside(&mut self, folder: &Path) {
+    fn check_siblings(&mut self, folder: &Path) {
         let reasons = [("remapping", SECOND_MAP), ("unfinished", UNFINISHED_MAP)];
         for (extension, reason) in reasons.into_iter().filter(|_| folder.file_name().is_some()) {
             let path = folder.with_added_extension(extension);
@@ -126,7 +126,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         }
     }
 
-    fn look_into_kept_scans(&mut self, folder: &Path) -> Result<()> {
+    fn check_kept_scans_folder(&mut self, folder: &Path) -> Result<()> {
         if self.kind(folder)? != Some(EntryKind::Folder) {
             return Ok(());
         }
@@ -139,7 +139,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
     }
 
     /// Checks the entries in the folder of a tile.
-    pub(super) fn look_into(
+    pub(super) fn check_tile_folder(
         &mut self,
         store: &TileStore,
         folder: &Path,
@@ -152,7 +152,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
             Some(EntryKind::Folder) => {}
             Some(_) if !is_known => {
                 let finding = wrong(folder, "not a folder, although it has the name of a tile");
-                self.report_if_seen_twice(finding, Suspect::Folder(tile));
+                self.report_if_confirmed(finding, Recheck::Folder(tile));
                 return Ok(());
             }
             // The check of the tile reports this.
@@ -189,7 +189,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         }
         let path = self.layout.current(tile, TileFile::Table);
         let finding = wrong(&path, "commits.log does not name this tile");
-        self.report_if_seen_twice(finding, Suspect::Folder(tile));
+        self.report_if_confirmed(finding, Recheck::Folder(tile));
         Ok(())
     }
 

@@ -1,10 +1,10 @@
 use super::finding::{Finding, Severity};
-use super::kept_points::{KeptPlaces, WholePoints};
+use super::kept_points::{KeptLocations, WholePoints};
 use super::kept_scans::{check_kept_scans, find_idle};
 use super::rebuild::{self, Index};
+use super::rechecks::{LogEnd, Recheck, Rechecks, log_end, metadata_text};
 use super::snapshots::{WholeTables, lost_tiles};
 use super::surroundings::IDLE_SCANS;
-use super::suspects::{LogEnd, Suspect, Suspects, log_end, metadata_text};
 use super::tile_check::{check_tile, first_difference, write_octree};
 use crate::config::MapConfig;
 use crate::error::{Error, FormatError, Result};
@@ -118,12 +118,12 @@ pub fn verify_scope(
         progress,
         counts: Verification::default(),
         listed: None,
-        told: BTreeSet::new(),
+        reported_tiles: BTreeSet::new(),
         whole: WholeTables::new(),
         points: WholePoints::default(),
         opened: None,
         before: None,
-        suspects: Suspects::default(),
+        rechecks: Rechecks::default(),
         reported: FxHashSet::default(),
         is_again: false,
     };
@@ -131,10 +131,10 @@ pub fn verify_scope(
     if let Some(config) = verifier.config_of(&store)? {
         verifier.verify_map(&store, &config)?;
         let first = verifier.opened.clone();
-        verifier.look_again()?;
+        verifier.recheck()?;
         (verifier.opened, verifier.before, verifier.is_again) = (first, None, false);
         verifier.verify_surroundings(&store)?;
-        verifier.look_again()?;
+        verifier.recheck()?;
     }
     Ok(verifier.counts)
 }
@@ -149,7 +149,7 @@ pub(super) struct Verifier<'a, F, P> {
     /// Snapshots in the log; `None` if the log has no list.
     pub(super) listed: Option<SnapshotList>,
     /// Damaged tiles that are missing in the rebuilt index and were reported already.
-    pub(super) told: BTreeSet<TileIndex>,
+    pub(super) reported_tiles: BTreeSet<TileIndex>,
     /// Intact tables that only snapshots use.
     pub(super) whole: WholeTables,
     /// Points of kept scans that are intact as of the current flush.
@@ -159,7 +159,7 @@ pub(super) struct Verifier<'a, F, P> {
     /// End of the log at the previous check.
     before: Option<LogEnd>,
     /// Parts that may be damaged, or were being changed when they were checked.
-    suspects: Suspects,
+    rechecks: Rechecks,
     /// Damage that was reported by repeated checks.
     reported: FxHashSet<String>,
     /// Whether this is a repeated check. Notes were reported by the first one.
@@ -167,7 +167,7 @@ pub(super) struct Verifier<'a, F, P> {
 }
 
 /// Maximum number of checks of possible damage. Each reads the affected files.
-const MAX_LOOKS: usize = 30;
+const MAX_CHECKS: usize = 30;
 
 /// Maximum number of pauses before a repeated check.
 const MAX_PAUSES: usize = 10;
@@ -204,7 +204,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
     fn open_unchanged(&self) -> Result<(TileStore, Option<LogEnd>)> {
         let state = || (log_end(&*self.disk, &self.layout), metadata_text(&*self.disk, &self.layout));
         let mut before = state();
-        for _ in 1..MAX_LOOKS {
+        for _ in 1..MAX_CHECKS {
             let error = match TileStore::open_read_only(self.disk.clone(), self.layout.folder()) {
                 Ok(store) => return Ok((store, before.0)),
                 Err(error) => error,
@@ -244,10 +244,10 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
 
     /// Reports damage if two checks find it for one flush. At the first check, a writer may have been replacing,
     /// renaming or removing the file.
-    pub(super) fn report_if_seen_twice(&mut self, finding: Finding, suspect: Suspect) {
+    pub(super) fn report_if_confirmed(&mut self, finding: Finding, part: Recheck) {
         let is_first = self.opened.is_some() && self.before != self.opened;
         if is_first || self.opened.is_some() && log_end(&*self.disk, &self.layout) != self.opened {
-            self.suspects.add(suspect);
+            self.rechecks.add(part);
         } else {
             self.report(finding);
         }
@@ -294,28 +294,28 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         for path in find_idle(&self.disk, store)? {
             self.leftover(&path, None, IDLE_SCANS);
         }
-        self.look_around(store, |tile| store.tiles().contains(tile))
+        self.check_map_folder(store, |tile| store.tiles().contains(tile))
     }
 
     /// Repeats the checks of possible damage until each part is found damaged or intact for one flush.
-    fn look_again(&mut self) -> Result<()> {
+    fn recheck(&mut self) -> Result<()> {
         self.is_again = true;
-        for look in 0..MAX_LOOKS {
-            if self.suspects.is_empty() {
+        for look in 0..MAX_CHECKS {
+            if self.rechecks.is_empty() {
                 return Ok(());
             }
             // Longer each time, to reach a pause between two flushes.
             (0..look.min(MAX_PAUSES)).for_each(|_| self.disk.pause());
-            let suspects = std::mem::take(&mut self.suspects);
+            let rechecks = std::mem::take(&mut self.rechecks);
             let (store, end) = match self.open_unchanged() {
                 Ok(opened) => opened,
                 Err(Error::Changed { .. }) => {
-                    self.suspects = suspects;
+                    self.rechecks = rechecks;
                     continue;
                 }
                 Err(error) => {
                     // Without the map's own files the other parts cannot be decided.
-                    self.counts.unsettled += suspects.len();
+                    self.counts.unsettled += rechecks.len();
                     let finding = Finding::of(error)?;
                     self.report(finding);
                     return Ok(());
@@ -328,13 +328,13 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
             }
             self.listed = store.snapshots().list().cloned();
             let Some(config) = self.config_of(&store)? else { return Ok(()) };
-            self.verify_suspects(&store, &config, suspects)?;
+            self.verify_rechecks(&store, &config, rechecks)?;
         }
-        let unsettled = std::mem::take(&mut self.suspects).len();
+        let unsettled = std::mem::take(&mut self.rechecks).len();
         if unsettled > 0 {
             self.counts.unsettled += unsettled;
             let reason = format!(
-                "other processes changed the map during each of {MAX_LOOKS} checks of {unsettled} possible \
+                "other processes changed the map during each of {MAX_CHECKS} checks of {unsettled} possible \
                  faults; run verify while no process writes"
             );
             self.is_again = false;
@@ -343,8 +343,8 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         Ok(())
     }
 
-    fn verify_suspects(&mut self, store: &TileStore, config: &MapConfig, suspects: Suspects) -> Result<()> {
-        let Suspects { list, snapshots, catalogs, points, tiles, folders } = suspects;
+    fn verify_rechecks(&mut self, store: &TileStore, config: &MapConfig, rechecks: Rechecks) -> Result<()> {
+        let Rechecks { list, snapshots, catalogs, points, tiles, folders } = rechecks;
         if list {
             self.verify_list(store)?;
         }
@@ -361,7 +361,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         }
         for tile in folders {
             let folder = self.layout.tile_folder(tile);
-            self.look_into(store, &folder, tile, store.tiles().version(tile).is_some())?;
+            self.check_tile_folder(store, &folder, tile, store.tiles().version(tile).is_some())?;
         }
         Ok(())
     }
@@ -370,17 +370,17 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         let (flush_number, records) = (store.commits().flush_number, store.listed_records());
         if let Err(error) = check_scans(&*self.disk, &self.layout, flush_number, records) {
             let finding = Finding::of(error)?;
-            self.report_if_seen_twice(finding, Suspect::List);
+            self.report_if_confirmed(finding, Recheck::List);
         }
         Ok(())
     }
 
     /// Checks the scans that the map and its snapshots keep, or the points of some of them.
-    fn verify_kept_scans(&mut self, store: &TileStore, only: Option<&KeptPlaces>) -> Result<()> {
+    fn verify_kept_scans(&mut self, store: &TileStore, only: Option<&KeptLocations>) -> Result<()> {
         let disk = self.disk.clone();
         let mut whole = std::mem::take(&mut self.points);
         let checked = check_kept_scans(&*disk, store, only, &mut whole, &mut |finding, place| {
-            self.report_if_seen_twice(finding, place.map_or(Suspect::Catalog, Suspect::Points));
+            self.report_if_confirmed(finding, place.map_or(Recheck::Catalog, Recheck::Points));
         });
         self.points = whole;
         checked
@@ -399,7 +399,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
             Ok(table) => table,
             Err(error) => {
                 let finding = Finding::of(error)?;
-                self.report_if_seen_twice(finding.in_tile(tile), Suspect::Tile(tile, is_counted));
+                self.report_if_confirmed(finding.in_tile(tile), Recheck::Tile(tile, is_counted));
                 return Ok(());
             }
         };
@@ -414,7 +414,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
                 cause.at = first_difference(&*self.disk, &path, &expected).unwrap_or(cause.at);
             }
             let finding = Finding::damage(&path, Some(tile), &cause);
-            self.report_if_seen_twice(finding, Suspect::Tile(tile, true));
+            self.report_if_confirmed(finding, Recheck::Tile(tile, true));
         }
         Ok(())
     }
@@ -426,7 +426,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         match rebuild::index_of(&*self.disk, &self.layout, &remains, &mut |_, _| ()) {
             Ok(Some(Index { map_id, metadata, commits, damaged, .. })) => {
                 for (tile, error) in damaged {
-                    self.told.insert(tile);
+                    self.reported_tiles.insert(tile);
                     let finding = Finding::of(error)?;
                     self.report(finding.in_tile(tile));
                 }
@@ -448,7 +448,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         let names = match store.snapshots().names() {
             Err(error) => {
                 let finding = Finding::of(error)?;
-                self.report_if_seen_twice(finding, Suspect::Snapshots);
+                self.report_if_confirmed(finding, Recheck::Snapshots);
                 return Ok(());
             }
             Ok(names) => names,
@@ -466,7 +466,7 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
             for error in errors {
                 let mut finding = Finding::of(error)?;
                 finding.reason += &format!("; the snapshot {name} needs it");
-                self.report_if_seen_twice(finding, Suspect::Snapshots);
+                self.report_if_confirmed(finding, Recheck::Snapshots);
             }
         }
         Ok(())

@@ -59,7 +59,7 @@ impl OutOfCoreTileMapper {
     }
 
     /// The same with an id that the caller names: a map that is to be a piece of another
-    /// ([`operations::move_piece`](crate::operations::move_piece())). Otherwise two maps of an id are taken for the
+    /// ([`operations::move_shard`](crate::operations::move_shard())). Otherwise two maps of an id are taken for the
     /// same.
     ///
     /// # Errors

@@ -65,7 +65,7 @@ impl Remapper {
                 }
                 // What a commit may leave to the next opening is not left here: the files need their names.
                 side.checkpoint()?;
-                store.take_over(side)
+                store.swap_in(side)
             })
         })
     }

@@ -26,13 +26,13 @@ pub fn crop(
     crop_to(map, part, MapPath::on(map.disk(), output), new_map_id(), progress)
 }
 
-/// Like [`crop`], for a shard of a future map with the id `map_id` ([`move_piece`](super::move_piece())). The shard is
+/// Like [`crop`], for a shard of a future map with the id `map_id` ([`move_shard`](super::move_shard())). The shard is
 /// not durable before that: after a crash it must be created again.
 ///
 /// # Errors
 ///
 /// As for [`crop`].
-pub fn crop_piece(
+pub fn crop_shard(
     map: &MapReader,
     part: &Part,
     output: impl AsRef<Path>,

@@ -6,7 +6,7 @@ use crate::mapper::{MapReader, MapView};
 use crate::store::{MapPath, hex};
 use std::path::Path;
 
-/// Joins shards ([`make_piece`](super::make_piece), [`move_piece`](super::move_piece())) with the same id to one map
+/// Joins shards ([`make_shard`](super::make_shard), [`move_shard`](super::move_shard())) with the same id to one map
 /// with that id.
 ///
 /// The result equals that of [`merge`](super::merge()), but no tile is read: the files get hard links in the map, or

@@ -5,9 +5,9 @@
 //! merge   k readers, one tile index at a time -> MapWriter
 //! crop    one reader -> MapWriter
 //! import  a file of OctoMap -> MapWriter
-//! make_piece, move_piece   a map -> a shard of a future map, by copying or moving
+//! make_shard, move_shard   a map -> a shard of a future map, by copying or moving
 //! join    shards -> MapWriter, by hard links
-//! adopt   readers of parts -> MapEditor: replaces tiles of a map -> one commit
+//! replace_tiles   readers of parts -> MapEditor: replaces tiles of a map -> one commit
 //! clear, decay   MapEditor: tiles read, changed, written as next versions -> one commit
 //! a flush  -> snapshot -> snapshots/NAME; its tables are kept
 //! snapshot -> revert   -> one commit
@@ -17,7 +17,6 @@
 //!
 //! `docs/life_of_a_map.md` describes their purpose and rules.
 
-mod adopt;
 mod clear;
 mod convert;
 mod crop;
@@ -31,18 +30,18 @@ mod map_writer;
 mod merge;
 mod merge_rule;
 mod part;
-mod piece;
 mod regions;
 mod remapping;
+mod replace_tiles;
 mod revert;
+mod shard;
 mod snapshot;
 mod table_change;
 mod table_merge;
 
-pub use adopt::{Adopted, adopt};
 pub use clear::{Cleared, clear};
 pub use convert::convert;
-pub use crop::{crop, crop_piece};
+pub use crop::{crop, crop_shard};
 pub use decay::{Decay, Decayed, decay};
 pub use diff::{Diff, TileChange, TileDiff, VoxelDiff, diff};
 pub use import::import;
@@ -52,10 +51,11 @@ pub use map_writer::{MapWriter, WrittenMap};
 pub use merge::{Merged, merge};
 pub use merge_rule::Prefer;
 pub use part::Part;
-pub use piece::{make_piece, move_piece};
 pub use remapping::{
-    MappedAgain, MappedAnew, NewPoses, PointsRemoved, Remap, RemapBeside, Remapped, Rework, ScanSelection,
-    ScansRemoved, SnapshotFailure, map_anew, remap, remove_points, remove_scans,
+    NewPoses, OnlineRemap, PointsRemoved, Rebuilt, Remap, Remapped, Replay, Replayed, ScanSelection,
+    ScansRemoved, SnapshotFailure, rebuild, remap, remove_points, remove_scans,
 };
+pub use replace_tiles::{TilesReplaced, replace_tiles};
 pub use revert::{Reverted, revert};
+pub use shard::{make_shard, move_shard};
 pub use snapshot::{SnapshotInfo, delete_snapshot, new_snapshot, snapshot, snapshots};

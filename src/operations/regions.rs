@@ -118,7 +118,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn boxes_that_fill_a_box_are_one() {
+    fn disjoint_boxes_that_fill_a_box_are_united() {
         let tiles = |min: [i32; 3], max: [i32; 3]| TileBox::new(min.into(), max.into());
         let (low, high) = (i32::MIN, i32::MAX - 1);
         let west = tiles([low; 3], [-1, high, high]);

@@ -53,7 +53,7 @@ impl IoThreads {
     pub(crate) fn new(config: &MapConfig) -> Self {
         let (saver, grid) = (TileSaver::new(config), config.grid);
         Self {
-            saver: Worker::new("voxtile-save", move |save: Save| save.run(&grid, &saver)).giving_way(),
+            saver: Worker::new("voxtile-save", move |save: Save| save.run(&grid, &saver)).with_low_priority(),
             loader: Worker::new("voxtile-load", move |load: Load| load.run(&grid)),
             loading: FxHashMap::default(),
             loading_bytes: 0,

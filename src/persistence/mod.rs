@@ -34,7 +34,7 @@ pub(crate) use map_id::new_map_id;
 pub(crate) use packer::Packer;
 pub(crate) use parameters::{config_from, new_metadata};
 pub(crate) use point_reader::{PointReader, check_points};
-pub(crate) use priority::give_way;
+pub(crate) use priority::lower_priority;
 pub(crate) use tile_saver::TileSaver;
 pub(crate) use upgrade::upgrade;
 pub(crate) use worker::Worker;

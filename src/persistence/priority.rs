@@ -3,7 +3,7 @@
 ///
 /// If the system refuses, the priority is unchanged.
 #[cfg(target_os = "linux")]
-pub(crate) fn give_way() {
+pub(crate) fn lower_priority() {
     /// Next to a busy thread, the low-priority thread gets a tenth of a core (`sched(7)`: 110 parts of 1024 + 110).
     const NICENESS: i32 = 10;
     // On Linux the nice value applies to the thread, not to the process.
@@ -14,4 +14,4 @@ pub(crate) fn give_way() {
 
 /// Other systems have no nice value per thread.
 #[cfg(not(target_os = "linux"))]
-pub(crate) fn give_way() {}
+pub(crate) fn lower_priority() {}

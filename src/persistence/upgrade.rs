@@ -22,7 +22,7 @@ pub(crate) fn upgrade(
         store.folder().display()
     );
     let map_id = store.upgrade(new_map_id())?;
-    for index in store.tiles().suspects() {
+    for index in store.tiles().failed_syncs() {
         // An earlier sync of this version failed, so it is written again from the tile's own file.
         store.tiles_mut().drop_next(index);
     }

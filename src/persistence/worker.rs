@@ -1,4 +1,4 @@
-use super::priority::give_way;
+use super::priority::lower_priority;
 use std::collections::VecDeque;
 use std::fmt;
 use std::sync::Arc;
@@ -16,7 +16,7 @@ pub(crate) struct Worker<Job, Done> {
     work: Arc<dyn Fn(Job) -> Done + Send + Sync>,
     thread: Option<Thread<Job, Done>>,
     has_no_thread: bool,
-    gives_way: bool,
+    has_low_priority: bool,
     done_here: VecDeque<Done>,
     in_flight: usize,
 }
@@ -31,12 +31,20 @@ struct Thread<Job, Done> {
 impl<Job: Send + 'static, Done: Send + 'static> Worker<Job, Done> {
     pub(crate) fn new(name: &'static str, work: impl Fn(Job) -> Done + Send + Sync + 'static) -> Self {
         let (work, done_here) = (Arc::new(work), VecDeque::new());
-        Self { name, work, thread: None, has_no_thread: false, gives_way: false, done_here, in_flight: 0 }
+        Self {
+            name,
+            work,
+            thread: None,
+            has_no_thread: false,
+            has_low_priority: false,
+            done_here,
+            in_flight: 0,
+        }
     }
 
     /// Runs the jobs at low priority.
-    pub(crate) fn giving_way(self) -> Self {
-        Self { gives_way: true, ..self }
+    pub(crate) fn with_low_priority(self) -> Self {
+        Self { has_low_priority: true, ..self }
     }
 
     /// Number of submitted jobs whose result was not taken yet.
@@ -92,10 +100,11 @@ impl<Job: Send + 'static, Done: Send + 'static> Worker<Job, Done> {
         let (jobs, jobs_in) = channel::<Job>();
         let (done_out, done) = channel();
         let is_over = Arc::new(AtomicBool::new(false));
-        let (work, is_over_there, gives_way) = (self.work.clone(), is_over.clone(), self.gives_way);
+        let (work, is_over_there, has_low_priority) =
+            (self.work.clone(), is_over.clone(), self.has_low_priority);
         let handle = thread::Builder::new().name(self.name.to_owned()).spawn(move || {
-            if gives_way {
-                give_way();
+            if has_low_priority {
+                lower_priority();
             }
             for job in jobs_in {
                 if is_over_there.load(Ordering::Relaxed) || done_out.send(work(job)).is_err() {
@@ -143,7 +152,7 @@ mod tests {
     use std::time::Duration;
 
     #[test]
-    fn what_is_given_is_done_in_order() {
+    fn jobs_run_in_order() {
         let mut worker = Worker::new("doubling", |number: u32| 2 * number);
         assert_eq!(worker.wait(), None);
         (0..100).for_each(|number| worker.give(number));
@@ -154,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn without_a_thread_the_work_is_done_at_once() {
+    fn without_a_thread_jobs_run_on_the_caller() {
         let mut worker = Worker::new("doubling", |number: u32| 2 * number);
         worker.has_no_thread = true;
         (0..5).for_each(|number| worker.give(number));
@@ -164,11 +173,11 @@ mod tests {
 
     #[cfg(target_os = "linux")]
     #[test]
-    fn a_worker_that_gives_way_has_less_priority_than_its_owner_and_no_other_has() {
+    fn only_a_low_priority_worker_runs_below_its_owner() {
         let niceness = || rustix::process::getpriority_process(None).unwrap();
         let own = niceness();
         let mut equal = Worker::new("equal", move |()| niceness());
-        let mut behind = Worker::new("behind", move |()| niceness()).giving_way();
+        let mut behind = Worker::new("behind", move |()| niceness()).with_low_priority();
         equal.give(());
         behind.give(());
         assert_eq!((equal.wait(), niceness()), (Some(own), own));
@@ -176,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn dropping_does_not_wait_for_what_was_not_begun() {
+    fn dropping_does_not_wait_for_jobs_not_started() {
         let count = Arc::new(AtomicUsize::new(0));
         let counted = count.clone();
         let mut worker = Worker::new("slow", move |()| {
@@ -189,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn a_thread_that_is_gone_is_not_waited_for() {
+    fn waiting_for_a_panicked_thread_returns() {
         let mut worker = Worker::new("failing", |fails: bool| assert!(!fails));
         worker.give(true);
         while worker.wait().is_some() {}

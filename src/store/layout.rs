@@ -246,7 +246,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_kept_table_is_known_by_its_name() {
+    fn kept_tables_are_recognized_by_name() {
         let tile = TileIndex::new(0, 1, -1);
         for storage in [Storage::OctoMap, Storage::Compact] {
             let layout = Layout::new("map").with_storage(storage);
@@ -259,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn only_the_one_spelling_of_a_folder_is_a_tile() {
+    fn only_canonical_folder_names_are_tiles() {
         let tile = TileIndex::new(0, 1, -1);
         assert_eq!(folder_name(tile), "tile_0_1_-1");
         assert_eq!(tile_of_folder("tile_0_1_-1"), Some(tile));

@@ -23,7 +23,7 @@ mod layout;
 mod map_files;
 mod map_folder;
 mod map_path;
-mod place;
+mod path_check;
 mod recovery;
 mod scans;
 mod snapshots;
@@ -49,7 +49,7 @@ pub use layout::{
 };
 pub use map_folder::read_log;
 pub use map_path::MapPath;
-pub use place::check_outside_of_maps;
+pub use path_check::check_outside_of_maps;
 pub use recovery::moved_map::move_map;
 pub use recovery::quarantine::Quarantine;
 pub use recovery::salvage::Salvage;

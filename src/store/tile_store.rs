@@ -7,7 +7,7 @@ use super::disk::{Disk, DiskRead};
 use super::layout::Layout;
 use super::map_files::MapFiles;
 use super::map_folder;
-use super::place;
+use super::path_check;
 use super::recovery::recover::{recover, remove_deleted_snapshots, remove_uncommitted, settle_own_files};
 use super::scans::{KeptAsOf, ScanArchive, ScanList};
 use super::snapshots::kept_tables::KeptTables;
@@ -62,7 +62,7 @@ impl TileStore {
     /// Creates an empty map in a folder that is missing, empty, or has only the remains of an interrupted creation.
     pub fn create(disk: Arc<dyn Disk>, folder: &Path, metadata: Metadata, map_id: [u8; 16]) -> Result<Self> {
         let layout = Layout::new(folder);
-        place::check_place(&*disk, folder)?;
+        path_check::check_path(&*disk, folder)?;
         map_folder::create_folders(&*disk, folder)?;
         // Before the lock, which creates a file, and again after it, when no other process can create a map here.
         map_folder::check_is_free(&*disk, folder)?;

@@ -7,7 +7,7 @@ use std::sync::Arc;
 /// Wraps a disk and ignores all syncs: writes are not durable, and no flush waits.
 ///
 /// For maps that are built again after a crash, such as the shards of a cluster build
-/// ([`operations::move_piece`](crate::operations::move_piece()) later syncs each file once). Do not use it for a
+/// ([`operations::move_shard`](crate::operations::move_shard()) later syncs each file once). Do not use it for a
 /// permanent map: after a power failure its files may have any mixture of states.
 #[derive(Clone, Debug)]
 pub struct UnsyncedDisk {

@@ -9,7 +9,7 @@ use testkit::random_scans::{Random, random_scan};
 use testkit::support::{message_of, some_of};
 use voxtile::integrity::{Verification, repair, verify};
 use voxtile::operations::{
-    Decay, NewPoses, Part, Remap, RemapBeside, ScanSelection, clear, decay, delete_snapshot, kept_bytes,
+    Decay, NewPoses, OnlineRemap, Part, Remap, ScanSelection, clear, decay, delete_snapshot, kept_bytes,
     remap, remove_points, remove_scans, revert, snapshot,
 };
 use voxtile::store::TileStore;
@@ -108,7 +108,7 @@ fn moved(disk: &FaultyDisk) -> Result<()> {
 
 fn moved_beside(disk: &FaultyDisk) -> Result<()> {
     let how = Remap::new(rework().with_keep_as(name("before")));
-    let mut beside = RemapBeside::begin(&scans(disk)?, &new_poses(), &how)?;
+    let mut beside = OnlineRemap::begin(&scans(disk)?, &new_poses(), &how)?;
     beside.follow(|_| ())?;
     beside.finish().map(drop)
 }
@@ -445,7 +445,7 @@ fn a_revert_leaves_no_kept_scans_that_nothing_needs() {
 #[test]
 fn a_removal_completes_the_removal_of_a_second_map() {
     let start = four_scans(Storage::Compact, true);
-    let beside = RemapBeside::begin(&scans(&start).unwrap(), &new_poses(), &Remap::new(rework())).unwrap();
+    let beside = OnlineRemap::begin(&scans(&start).unwrap(), &new_poses(), &Remap::new(rework())).unwrap();
     let start = start.after_kill();
     drop(beside);
     let second = Path::new("/city/map.remapping");
@@ -465,7 +465,7 @@ fn a_removal_completes_the_removal_of_a_second_map() {
 fn a_removal_removes_the_second_map_of_a_remapping_that_was_killed() {
     let start = four_scans(Storage::Compact, true);
     delete_snapshot(at(&start), &name("third")).unwrap();
-    let beside = RemapBeside::begin(&scans(&start).unwrap(), &new_poses(), &Remap::new(rework())).unwrap();
+    let beside = OnlineRemap::begin(&scans(&start).unwrap(), &new_poses(), &Remap::new(rework())).unwrap();
     let disk = start.after_kill();
     drop(beside);
     let second = Path::new("/city/map.remapping");

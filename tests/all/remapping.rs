@@ -10,7 +10,7 @@ use testkit::reference_map::voxels_of;
 use testkit::support::message_of;
 use voxtile::integrity::{repair, verify};
 use voxtile::operations::{
-    NewPoses, Part, Remap, Rework, ScanSelection, clear, delete_snapshot, remap, remove_points, remove_scans,
+    NewPoses, Part, Remap, Replay, ScanSelection, clear, delete_snapshot, remap, remove_points, remove_scans,
 };
 use voxtile::scan::{PointBatch, Stop};
 use voxtile::{Aabb, Error, MapReader, MapView, Mapper, OutOfCoreTileMapper, Pose, ScanRef};
@@ -270,7 +270,7 @@ fn scans_that_the_map_has_no_more_are_removed_from_its_snapshots() {
     for scans in selections {
         let disk = a_map_with_snapshots();
         let remove =
-            |from_snapshots, how: &Rework| remove_scans(at(&disk), &scans, from_snapshots, how, |_, _| ());
+            |from_snapshots, how: &Replay| remove_scans(at(&disk), &scans, from_snapshots, how, |_, _| ());
         let removed = remove(false, &rework()).unwrap();
         assert_eq!((removed.scans_removed, removed.snapshots_with_them.len()), (2, 2), "{scans:?}");
         // The map does not keep the times of removed scans.

@@ -7,7 +7,7 @@ use testkit::support::message_of;
 use voxtile::integrity::{Finding, Severity, verify};
 use voxtile::mapper::KeptSummary;
 use voxtile::operations::{
-    NewPoses, Part, Remap, RemapBeside, Rework, ScanSelection, clear, remap, remove_scans,
+    NewPoses, OnlineRemap, Part, Remap, Replay, ScanSelection, clear, remap, remove_scans,
 };
 use voxtile::scan::Stop;
 use voxtile::store::SnapshotName;
@@ -26,7 +26,7 @@ fn scans(folder: impl AsRef<Path>) -> Result<KeptSummary> {
 }
 
 fn how() -> Remap {
-    Remap::new(Rework::default().with_memory(MemoryLimit::Bytes(20 << 20)))
+    Remap::new(Replay::default().with_memory(MemoryLimit::Bytes(20 << 20)))
 }
 
 fn insert(mapper: &mut OutOfCoreTileMapper, number: u64) {
@@ -70,7 +70,7 @@ fn scans_go_on_while_the_map_is_mapped_again() {
         let place = tempfile::tempdir().unwrap();
         let folder = place.path().join("map");
         let mut mapper = with_scans(&folder, config().with_storage(storage), 40);
-        let beside = RemapBeside::begin(&scans(&folder).unwrap(), &moved(moving), &how()).unwrap();
+        let beside = OnlineRemap::begin(&scans(&folder).unwrap(), &moved(moving), &how()).unwrap();
         assert!(beside.moves_scans());
         let (is_over, mut followed) = (AtomicBool::new(false), 0);
         let beside = std::thread::scope(|scope| {
@@ -113,7 +113,7 @@ fn scans_go_on_while_the_map_is_mapped_again() {
             insert(&mut mapper, 92);
             mapper.flush().unwrap();
             drop(mapper);
-            remove_scans(&**map, &ScanSelection::Numbers(3, 50), false, &Rework::default(), |_, _| ())
+            remove_scans(&**map, &ScanSelection::Numbers(3, 50), false, &Replay::default(), |_, _| ())
                 .unwrap();
         }
         assert_eq!(digest_of(&folder), digest_of(&other), "{storage:?}, without some scans");
@@ -127,7 +127,7 @@ fn poses_that_move_nothing_leave_the_map_alone() {
     drop(with_scans(&folder, config(), 5));
     let commits = std::fs::read(folder.join("commits.log")).unwrap();
     let same = NewPoses::Numbered((1..=5).map(|number| (number, pose(number, 0.0))).collect());
-    let mut beside = RemapBeside::begin(&scans(&folder).unwrap(), &same, &how()).unwrap();
+    let mut beside = OnlineRemap::begin(&scans(&folder).unwrap(), &same, &how()).unwrap();
     assert!(!beside.moves_scans());
     assert_eq!(beside.follow(|_| ()).unwrap(), 0);
     assert_eq!(beside.finish().unwrap().mapped.scans_changed, 0);
@@ -141,19 +141,19 @@ fn scans_that_were_changed_meanwhile_are_not_overwritten() {
     let folder = place.path().join("map");
     drop(with_scans(&folder, config(), 6));
     let begun = || {
-        let mut beside = RemapBeside::begin(&scans(&folder).unwrap(), &moved(6), &how()).unwrap();
+        let mut beside = OnlineRemap::begin(&scans(&folder).unwrap(), &moved(6), &how()).unwrap();
         beside.follow(|_| ()).unwrap();
         beside
     };
     let beside = begun();
-    remove_scans(&*folder, &ScanSelection::Numbers(2, 2), false, &Rework::default(), |_, _| ()).unwrap();
+    remove_scans(&*folder, &ScanSelection::Numbers(2, 2), false, &Replay::default(), |_, _| ()).unwrap();
     let digest = digest_of(&folder);
     assert!(matches!(beside.finish(), Err(Error::Changed { .. })));
     assert_eq!(digest_of(&folder), digest);
     nothing_is_left_beside(&folder);
 
     let moved = moved(1);
-    let beside = RemapBeside::begin(&scans(&folder).unwrap(), &moved, &how()).unwrap();
+    let beside = OnlineRemap::begin(&scans(&folder).unwrap(), &moved, &how()).unwrap();
     let region = voxtile::Aabb { min: [0.0; 3], max: [1.0; 3] };
     clear(&*folder, &Part::Inside(region), |_, _| ()).unwrap();
     let digest = digest_of(&folder);
@@ -170,9 +170,9 @@ fn one_at_a_time_and_a_stop_or_a_drop_leaves_nothing() {
     let digest = digest_of(&folder);
     let stop = Stop::default();
     let mut stoppable = how();
-    stoppable.rework = stoppable.rework.with_stop(stop.clone());
-    let mut beside = RemapBeside::begin(&scans(&folder).unwrap(), &moved(6), &stoppable).unwrap();
-    let second = RemapBeside::begin(&scans(&folder).unwrap(), &moved(6), &how());
+    stoppable.replay = stoppable.replay.with_stop(stop.clone());
+    let mut beside = OnlineRemap::begin(&scans(&folder).unwrap(), &moved(6), &stoppable).unwrap();
+    let second = OnlineRemap::begin(&scans(&folder).unwrap(), &moved(6), &how());
     assert!(matches!(second, Err(Error::Locked { .. })), "{second:?}");
     assert!(place.path().join("map.remapping").exists());
     assert!(matches!(
@@ -186,24 +186,24 @@ fn one_at_a_time_and_a_stop_or_a_drop_leaves_nothing() {
     insert(&mut mapper, 7);
     mapper.flush().unwrap();
     // Not while the mapper has the map.
-    let beside = RemapBeside::begin(&scans(&folder).unwrap(), &moved(6), &how()).unwrap();
+    let beside = OnlineRemap::begin(&scans(&folder).unwrap(), &moved(6), &how()).unwrap();
     assert!(matches!(beside.finish(), Err(Error::Locked { .. })));
     nothing_is_left_beside(&folder);
     drop(mapper);
     assert_ne!(digest_of(&folder), digest);
 
-    let message = message_of(scans(&folder).and_then(|scans| RemapBeside::begin(&scans, &moved(8), &how())));
+    let message = message_of(scans(&folder).and_then(|scans| OnlineRemap::begin(&scans, &moved(8), &how())));
     assert!(message.contains("no scan with the number 8"), "{message}");
     let mut dry = how();
-    dry.rework = dry.rework.with_dry_run(true);
+    dry.replay = dry.replay.with_dry_run(true);
     assert!(
-        message_of(scans(&folder).and_then(|scans| RemapBeside::begin(&scans, &moved(6), &dry)))
+        message_of(scans(&folder).and_then(|scans| OnlineRemap::begin(&scans, &moved(6), &dry)))
             .contains("dry_run")
     );
     // What is not of a map stays, and is in the way.
     std::fs::create_dir_all(place.path().join("map.remapping/kept_scans")).unwrap();
     std::fs::write(place.path().join("map.remapping/kept_scans/letter.txt"), "dear").unwrap();
-    let message = message_of(scans(&folder).and_then(|scans| RemapBeside::begin(&scans, &moved(6), &how())));
+    let message = message_of(scans(&folder).and_then(|scans| OnlineRemap::begin(&scans, &moved(6), &how())));
     assert!(message.contains("letter.txt"), "{message}");
     assert!(place.path().join("map.remapping/kept_scans/letter.txt").exists());
 }
@@ -215,8 +215,8 @@ fn a_snapshot_keeps_the_map_as_it_was_before_the_end() {
     let mut mapper = with_scans(&folder, config(), 6);
     let name = SnapshotName::new("before").unwrap();
     let mut keeping = how();
-    keeping.rework = keeping.rework.with_keep_as(name.clone());
-    let beside = RemapBeside::begin(&scans(&folder).unwrap(), &moved(6), &keeping).unwrap();
+    keeping.replay = keeping.replay.with_keep_as(name.clone());
+    let beside = OnlineRemap::begin(&scans(&folder).unwrap(), &moved(6), &keeping).unwrap();
     insert(&mut mapper, 7);
     mapper.flush().unwrap();
     drop(mapper);

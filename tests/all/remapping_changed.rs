@@ -5,7 +5,7 @@ use std::fmt;
 use testkit::faulty_disk::{Fault, FaultyDisk};
 use testkit::support::message_of;
 use voxtile::mapper::KeptSummary;
-use voxtile::operations::{NewPoses, Remap, Rework, ScanSelection, remap, remove_points, remove_scans};
+use voxtile::operations::{NewPoses, Remap, Replay, ScanSelection, remap, remove_points, remove_scans};
 use voxtile::{Aabb, MapPath, Mapper, OutOfCoreTileMapper, Pose, Result, ScanRef};
 
 fn insert(mapper: &mut OutOfCoreTileMapper, x: f64) {
@@ -33,18 +33,18 @@ fn is_refused<T: fmt::Debug>(work: impl FnOnce(MapPath) -> Result<T>) {
 #[test]
 fn points_that_came_meanwhile_are_not_passed_over() {
     let region = Aabb { min: [0.0; 3], max: [5.0; 3] };
-    is_refused(|map| remove_points(map, &region, &Rework::default(), |_, _| ()));
+    is_refused(|map| remove_points(map, &region, &Replay::default(), |_, _| ()));
 }
 
 #[test]
 fn scans_that_came_meanwhile_are_not_removed_uncounted() {
     let scans = ScanSelection::Numbers(1, 9);
-    is_refused(|map| remove_scans(map, &scans, false, &Rework::default(), |_, _| ()));
+    is_refused(|map| remove_scans(map, &scans, false, &Replay::default(), |_, _| ()));
 }
 
 #[test]
 fn scans_that_came_meanwhile_do_not_keep_poses_unasked() {
     let pose = Pose::from_quaternion([1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]).unwrap();
     let poses = NewPoses::InOrder(vec![pose]);
-    is_refused(|map| remap(&KeptSummary::read(map)?, &poses, &Remap::new(Rework::default()), |_, _| ()));
+    is_refused(|map| remap(&KeptSummary::read(map)?, &poses, &Remap::new(Replay::default()), |_, _| ()));
 }

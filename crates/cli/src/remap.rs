@@ -11,7 +11,7 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 use voxtile::mapper::{KeptSummary, MapReader, MapView};
-use voxtile::operations::{Remap, Remapped, map_anew, remap};
+use voxtile::operations::{Remap, Remapped, rebuild, remap};
 use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::space::Grid;
 use voxtile::{Error, InsertMode, MapConfig, MemoryLimit, RayConfig};
@@ -111,7 +111,7 @@ fn run_anew(args: &RemapArgs) -> anyhow::Result<ExitCode> {
     let reader = MapAt::of(&args.map)?.open()?;
     let config = config_of(args, reader.config(), job.rework.memory)?;
     let rays = |rays: &RayConfig| rays_of(args, rays);
-    let outcome = map_anew(&reader, whole_map(output)?, config, rays, &job.rework.stop, |done, all| {
+    let outcome = rebuild(&reader, whole_map(output)?, config, rays, &job.rework.stop, |done, all| {
         job.progress.set(done, all)
     });
     let mapped = match job.ended(outcome)? {

@@ -8,12 +8,12 @@ use crate::stop_signal;
 use indicatif::HumanCount;
 use std::io::Write;
 use std::process::ExitCode;
-use voxtile::operations::{MappedAgain, Rework};
+use voxtile::operations::{Replay, Replayed};
 use voxtile::scan::Stop;
 
 /// How a map is mapped again, and its progress.
 pub struct Job {
-    pub rework: Rework,
+    pub rework: Replay,
     pub progress: Progress,
     stop: Stop,
 }
@@ -21,7 +21,7 @@ pub struct Job {
 impl Job {
     pub fn of(args: &ReworkArgs) -> anyhow::Result<Self> {
         let stop = stop_signal::catch_undone()?;
-        let rework = Rework::default()
+        let rework = Replay::default()
             .with_memory(memory_of(args.memory))
             .with_keep_as(args.keep_as.clone())
             .with_dry_run(args.dry_run)
@@ -42,10 +42,9 @@ impl Job {
 }
 
 /// Two lines for people.
-pub fn print(mapped: &MappedAgain, is_dry_run: bool, out: &mut impl Write) -> std::io::Result<()> {
-    let MappedAgain {
-        scans, scans_changed, scans_mapped, tiles, tiles_mapped, updates, updates_mapped, ..
-    } = *mapped;
+pub fn print(mapped: &Replayed, is_dry_run: bool, out: &mut impl Write) -> std::io::Result<()> {
+    let Replayed { scans, scans_changed, scans_mapped, tiles, tiles_mapped, updates, updates_mapped, .. } =
+        *mapped;
     let would = if is_dry_run { "would be " } else { "" };
     let share = 100.0 * updates_mapped as f64 / updates.max(1) as f64;
     writeln!(

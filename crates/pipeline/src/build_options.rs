@@ -74,7 +74,7 @@ pub struct BuildOptions {
     /// What tiles keep for coarse queries; no answer and no file depends on it.
     pub octree: OctreeConfig,
     /// The map is made as a piece with this id, and is not durable. Whoever crashes makes it again, and
-    /// [`operations::move_piece`](voxtile::operations::move_piece()) makes it durable.
+    /// [`operations::move_shard`](voxtile::operations::move_shard()) makes it durable.
     pub piece_of: Option<[u8; 16]>,
 }
 

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
-use voxtile::operations::{self, Part, RemapBeside};
+use voxtile::operations::{self, OnlineRemap, Part};
 use voxtile::{
     Aabb, Error, MapConfig, MapReader, MapView, Mapper, MemoryLimit, OutOfCoreTileMapper, Point, Stop,
 };
@@ -105,7 +105,7 @@ impl Mapping {
             ByteSize::b(4 * least_bytes as u64)
         );
         // What a remapping has left that was killed.
-        if let Err(error) = RemapBeside::remove_leftovers(&*args.output) {
+        if let Err(error) = OnlineRemap::remove_leftovers(&*args.output) {
             log::warn!("{error}");
         }
         let (sensor_m, stamp_ns) = last_place(&args.output);

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 use voxtile::mapper::KeptSummary;
-use voxtile::operations::{NewPoses, Remap, RemapBeside, Rework};
+use voxtile::operations::{NewPoses, OnlineRemap, Remap, Replay};
 use voxtile::{MemoryLimit, Point, Stop};
 use voxtile_formats::ros::messages::StampedPose;
 
@@ -26,7 +26,7 @@ pub struct Remapping {
 /// What a thread has made.
 pub struct Remapped {
     /// To be finished while the map is closed.
-    pub beside: RemapBeside,
+    pub beside: OnlineRemap,
     /// The last scan that a path was about, and where the sensor was then, as is known now.
     pub last: (u64, Option<Point>),
 }
@@ -114,8 +114,8 @@ fn follow(
     }
     log::info!("remapping beside the mapper: a path moves scans, by {:.2} m at most", found.most_moved_m);
     let sensor_m = found.poses.last().map(|(_, pose)| pose.position_m());
-    let rework = Rework::default().with_memory(MemoryLimit::Bytes(order.memory_bytes)).with_stop(stop);
-    let mut beside = RemapBeside::begin(&scans, &NewPoses::Numbered(found.poses), &Remap::new(rework))?;
+    let rework = Replay::default().with_memory(MemoryLimit::Bytes(order.memory_bytes)).with_stop(stop);
+    let mut beside = OnlineRemap::begin(&scans, &NewPoses::Numbered(found.poses), &Remap::new(rework))?;
     while beside.follow(|_| ())? > 0 {}
     has_caught_up.store(true, Ordering::Relaxed);
     // An error means that nobody waits for the map any more.

@@ -116,7 +116,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_was_appended_comes_back_at_any_place(
+        fn appended_bytes_are_read_at_any_offset(
             parts in prop::collection::vec((0..9000_usize, any::<u8>()), 1..20),
             looks in prop::collection::vec((any::<u16>(), any::<u16>()), 1..30),
         ) {

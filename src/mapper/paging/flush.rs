@@ -177,7 +177,7 @@ impl TilePager<'_> {
 
     /// Writes tiles anew that the disk has failed to sync.
     fn write_suspects(&mut self) -> Result<()> {
-        for index in self.store().tiles().suspects() {
+        for index in self.store().tiles().failed_syncs() {
             // Its file may not be on the medium; what can be read of it is checked as always.
             if !self.contents.cache.is_resident(index) {
                 self.load(index)?;

@@ -68,7 +68,7 @@ const NOTED_BYTES: u64 = 256 << 10;
 impl Flusher {
     pub(super) fn new(config: &MapConfig) -> Self {
         let config = config.clone();
-        let worker = Worker::new("voxtile-flush", move |job: FlushJob| job.run(&config)).giving_way();
+        let worker = Worker::new("voxtile-flush", move |job: FlushJob| job.run(&config)).with_low_priority();
         Self { worker: Mutex::new(worker), progress: Mutex::new(None) }
     }
 

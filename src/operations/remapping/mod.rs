@@ -9,20 +9,20 @@
 
 mod completion;
 mod filtered_scan;
-mod map_anew;
 mod new_poses;
+mod online_remap;
+mod rebuild;
 mod remap;
-mod remap_beside;
 mod remove_points;
 mod remove_scans;
+mod replay;
 mod retiling;
 mod revision;
-mod rework;
 
-pub use map_anew::{MappedAnew, map_anew};
 pub use new_poses::NewPoses;
+pub use online_remap::OnlineRemap;
+pub use rebuild::{Rebuilt, rebuild};
 pub use remap::{Remap, Remapped, remap};
-pub use remap_beside::RemapBeside;
 pub use remove_points::{PointsRemoved, remove_points};
 pub use remove_scans::{ScanSelection, ScansRemoved, SnapshotFailure, remove_scans};
-pub use rework::{MappedAgain, Rework};
+pub use replay::{Replay, Replayed};

@@ -1,6 +1,6 @@
 use super::new_poses::NewPoses;
+use super::replay::{Replay, Replayed, replay};
 use super::revision::{Change, Changes};
-use super::rework::{MappedAgain, Rework, rework};
 use crate::error::{Error, Result};
 use crate::mapper::{KeptScanHead, KeptSummary};
 use crate::scan::Pose;
@@ -12,7 +12,7 @@ use serde::Serialize;
 #[must_use]
 pub struct Remap {
     /// Options of the replay.
-    pub rework: Rework,
+    pub replay: Replay,
     /// Maximum translation in metres and rotation in radians of scans that keep their pose. Default: every scan gets
     /// its new pose.
     pub tolerance: Option<(f64, f64)>,
@@ -20,8 +20,8 @@ pub struct Remap {
 
 impl Remap {
     /// Returns the options with this replay.
-    pub fn new(rework: Rework) -> Self {
-        Self { rework, tolerance: None }
+    pub fn new(replay: Replay) -> Self {
+        Self { replay, tolerance: None }
     }
 
     /// Sets the tolerance in metres and radians.
@@ -36,7 +36,7 @@ impl Remap {
 pub struct Remapped {
     /// Counts of the replay.
     #[serde(flatten)]
-    pub mapped: MappedAgain,
+    pub mapped: Replayed,
     /// Number of scans that kept their pose, because the new one is within the tolerance.
     pub scans_within_tolerance: u64,
     /// Largest translation between an old and a new pose, in metres.
@@ -80,7 +80,7 @@ pub fn remap(
     progress: impl FnMut(u64, u64),
 ) -> Result<Remapped> {
     let (mut remapped, changes) = Remapped::by_poses(scans, poses, how)?;
-    remapped.mapped = rework(scans, changes, &how.rework, progress)?;
+    remapped.mapped = replay(scans, changes, &how.replay, progress)?;
     Ok(remapped)
 }
 

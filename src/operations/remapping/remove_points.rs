@@ -1,7 +1,7 @@
 use super::completion::complete_earlier;
 use super::filtered_scan::FilteredScan;
+use super::replay::{Replay, Replayed, replay};
 use super::revision::{Change, Changes};
-use super::rework::{MappedAgain, Rework, rework};
 use crate::error::{Error, Result};
 use crate::mapper::MapReader;
 use crate::scan::ScanPoints;
@@ -16,7 +16,7 @@ use std::path::Path;
 pub struct PointsRemoved {
     /// Counts of the replay.
     #[serde(flatten)]
-    pub mapped: MappedAgain,
+    pub mapped: Replayed,
     /// Number of removed points.
     pub points_removed: u64,
 }
@@ -33,7 +33,7 @@ pub struct PointsRemoved {
 pub fn remove_points(
     map: impl Into<MapPath>,
     region: &Aabb,
-    how: &Rework,
+    how: &Replay,
     progress: impl FnMut(u64, u64),
 ) -> Result<PointsRemoved> {
     let (disk, folder) = map.into().into_parts();
@@ -54,7 +54,7 @@ pub fn remove_points(
         }
         summary
     };
-    let mapped = rework(&summary, changes, how, progress)?;
+    let mapped = replay(&summary, changes, how, progress)?;
     if mapped.scans_changed == 0 && !how.is_dry_run {
         // An earlier call may have been killed after its commit.
         complete_earlier(disk, &folder)?;

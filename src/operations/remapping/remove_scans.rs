@@ -1,6 +1,6 @@
 use super::completion::complete_earlier;
+use super::replay::{Replay, Replayed, replay};
 use super::revision::{Change, Changes};
-use super::rework::{MappedAgain, Rework, rework};
 use crate::error::{Error, Result};
 use crate::mapper::{KeptScanHead, KeptSummary, MapReader, MapView};
 use crate::operations::snapshot::delete_snapshot;
@@ -25,7 +25,7 @@ pub enum ScanSelection {
 pub struct ScansRemoved {
     /// Counts of the replay; all 0 if the map kept none of the scans any more.
     #[serde(flatten)]
-    pub mapped: MappedAgain,
+    pub mapped: Replayed,
     /// Number of scans removed from the map.
     pub scans_removed: u64,
     /// Number of files with removed scans that an interrupted removal left and that this call removed. 0 if this call
@@ -69,7 +69,7 @@ pub fn remove_scans(
     map: impl Into<MapPath>,
     scans: &ScanSelection,
     from_snapshots: bool,
-    how: &Rework,
+    how: &Replay,
     progress: impl FnMut(u64, u64),
 ) -> Result<ScansRemoved> {
     let (disk, folder) = map.into().into_parts();
@@ -103,7 +103,7 @@ fn remove_from_map(
     path: impl Fn() -> MapPath,
     scans: &ScanSelection,
     from_snapshots: bool,
-    how: &Rework,
+    how: &Replay,
     progress: impl FnMut(u64, u64),
 ) -> Result<(ScansRemoved, bool)> {
     let reader = MapReader::open(path(), 0)?;
@@ -118,7 +118,7 @@ fn remove_from_map(
     }
     if !changes.is_empty() {
         let scans_removed = changes.len() as u64;
-        let mapped = rework(&summary, changes, how, progress)?;
+        let mapped = replay(&summary, changes, how, progress)?;
         return Ok((ScansRemoved { mapped, scans_removed, ..ScansRemoved::default() }, false));
     }
     let (disk, folder) = path().into_parts();

@@ -77,7 +77,7 @@ mod tests {
     }
 
     #[test]
-    fn a_region_stays_where_it_is_or_is_refused() {
+    fn regions_are_converted_or_refused() {
         let tiles = |min: [i32; 3], max: [i32; 3]| Some(TileBox::new(min.into(), max.into()));
         let (min, max) = ([-2, 0, 4], [1, 0, 5]);
         assert_eq!(retiled(10.0, 2.5, min, max), tiles([-8, 0, 16], [7, 3, 23]));
@@ -89,7 +89,7 @@ mod tests {
     }
 
     #[test]
-    fn a_region_without_borders_keeps_none_and_numbers_stay_in_their_range() {
+    fn unbounded_regions_stay_unbounded_and_in_range() {
         let all = ([i32::MIN, i32::MIN, 0], [i32::MAX - 1, -1, i32::MAX - 1]);
         let tiles = TileBox::new(all.0.into(), all.1.into());
         assert_eq!(retiled(10.0, 2.5, all.0, all.1), Some(tiles));

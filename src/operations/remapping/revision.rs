@@ -1,6 +1,6 @@
 use super::completion::release;
 use super::filtered_scan::FilteredScan;
-use super::rework::{MappedAgain, Rework};
+use super::replay::{Replay, Replayed};
 use crate::config::MapConfig;
 use crate::error::Result;
 use crate::mapper::{KeptScan, KeptSummary, Remapper, TileFinder};
@@ -34,13 +34,13 @@ const MAX_POINTS_IN_MEMORY: u64 = 1 << 18;
 /// Change of scans, and its effects.
 pub(super) struct Revision {
     disk: Arc<dyn Disk>,
-    how: Rework,
+    how: Replay,
     changes: Changes,
     /// Segments of points that are removed.
     segments: BTreeSet<u64>,
     /// Updates of the changed scans.
     changed_updates: u64,
-    pub(super) counts: MappedAgain,
+    pub(super) counts: Replayed,
 }
 
 /// Tiles to replay.
@@ -61,9 +61,8 @@ impl Touched {
 }
 
 impl Revision {
-    pub(super) fn new(scans: &KeptSummary, how: &Rework, changes: Changes) -> Self {
-        let (mut counts, mut segments, mut changed_updates) =
-            (MappedAgain::default(), BTreeSet::new(), 0_u64);
+    pub(super) fn new(scans: &KeptSummary, how: &Replay, changes: Changes) -> Self {
+        let (mut counts, mut segments, mut changed_updates) = (Replayed::default(), BTreeSet::new(), 0_u64);
         for scan in scans.scans() {
             counts.scans += 1;
             counts.updates = counts.updates.saturating_add(scan.updates);
@@ -176,7 +175,7 @@ impl Revision {
 
     /// Applies the change of a scan with `map`, which inserts its points into a selection of tiles or into all. Returns
     /// its new entry. Only poses may change.
-    pub(super) fn map_beside(
+    pub(super) fn apply_change(
         &mut self,
         layout: &Layout,
         record: KeptRecord,
@@ -201,7 +200,7 @@ impl Revision {
         store: TileStore,
         touched: Touched,
         progress: &mut impl FnMut(u64, u64),
-    ) -> Result<(MappedAgain, Result<()>)> {
+    ) -> Result<(Replayed, Result<()>)> {
         let layout = store.layout().clone();
         let mut records = store.archive().records()?;
         let tiles: Vec<_> = store.tiles().iter().filter(|&tile| touched.has(tile)).collect();

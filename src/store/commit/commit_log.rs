@@ -180,7 +180,7 @@ mod tests {
 
     /// The records exceed the sizes of read and write buffers.
     #[test]
-    fn a_log_cut_anywhere_ends_with_its_last_whole_record_and_a_wrong_byte_is_found() {
+    fn truncated_logs_end_with_a_complete_record_and_wrong_bytes_are_found() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("commits.log");
         let tiles = |of: std::ops::Range<i32>| {

@@ -130,7 +130,7 @@ impl TileStore {
         self.finish_earlier_work()?;
         self.keep_for_late_readers();
         self.committer.logged_map_id()?;
-        if let Some(&tile) = self.versions.suspects().first() {
+        if let Some(&tile) = self.versions.failed_syncs().first() {
             let folder = self.layout().tile_folder(tile);
             return Err(Error::io(&folder, "commit", io::Error::other("an earlier sync failed")));
         }
@@ -169,9 +169,9 @@ impl TileStore {
     ///
     /// The error of the sync, and those of [`TileStore::commit`].
     pub fn commit_synced(&mut self, begun: &BegunCommit, synced: Synced) -> Result<()> {
-        synced.failed.into_iter().for_each(|tile| self.versions.suspect(tile));
+        synced.failed.into_iter().for_each(|tile| self.versions.note_failed_sync(tile));
         if synced.has_lost_scans {
-            self.archive.suspect_unsynced();
+            self.archive.note_failed_sync();
         }
         synced.result?;
         let number = self.commits().flush_number + 1;

@@ -295,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn text_and_back() {
+    fn metadata_round_trips() {
         let written = metadata();
         let text = written.to_text();
         let seed = "{\n  \"version\": \"1.0\",\n  \"resolution\": 0.05,\n  \"tile_size\": 10.0,\n  \"bounds\": {\n    \
@@ -305,7 +305,7 @@ mod tests {
     }
 
     #[test]
-    fn inputs_are_kept_with_their_content_and_those_of_earlier_versions_are_read() {
+    fn inputs_round_trip_and_earlier_versions_are_read() {
         let mut written = metadata();
         let content = InputContent {
             scans: 12,
@@ -338,7 +338,7 @@ mod tests {
     }
 
     #[test]
-    fn a_decay_is_named_where_there_was_one() {
+    fn decayed_scan_is_written_only_after_a_decay() {
         let mut written = metadata();
         assert!(!written.to_text().contains("decayed"));
         if let Some(ext) = &mut written.ext {
@@ -349,7 +349,7 @@ mod tests {
     }
 
     #[test]
-    fn a_storage_is_named_where_it_is_not_the_seeds() {
+    fn storage_is_written_only_if_not_original() {
         let mut written = metadata();
         assert!(!written.to_text().contains("storage"));
         if let Some(ext) = &mut written.ext {
@@ -360,7 +360,7 @@ mod tests {
     }
 
     #[test]
-    fn the_seeds_own_file_is_read_and_has_no_ext() {
+    fn original_files_are_read_without_ext() {
         let text = r#"{"version": "1.0", "resolution": 0.05, "tile_size": 10.0,
             "bounds": {"min": [0, -1, 0], "max": [5, 3, 2]}}"#;
         let read = Metadata::from_text(text).unwrap();

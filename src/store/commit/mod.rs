@@ -9,4 +9,4 @@ pub(super) mod flush;
 pub(super) mod input_record;
 pub(super) mod linked_tiles;
 pub(super) mod metadata;
-mod take_over;
+mod tile_transfer;

@@ -6,7 +6,7 @@ use crate::store::commit::checkpoint::TILES_SYNCED_AT_ONCE;
 use crate::store::disk::Disk;
 use crate::store::layout::Layout;
 use crate::store::map_folder;
-use crate::store::place;
+use crate::store::path_check;
 use crate::store::tile_store::TileStore;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -23,7 +23,7 @@ use std::sync::Arc;
 /// An existing destination, a map with a writer, a file that is missing or of another length, or an I/O error. If the
 /// map was moved already, it is lost.
 pub fn move_map(disk: &Arc<dyn Disk>, map: &Path, folder: &Path) -> Result<bool> {
-    place::check_place(&**disk, folder)?;
+    path_check::check_path(&**disk, folder)?;
     check_is_free(&**disk, folder)?;
     let unfinished = staging_folder(folder)?;
     let parent = map_folder::parent_of(folder);

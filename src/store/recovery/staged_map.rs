@@ -4,7 +4,7 @@ use crate::store::commit::metadata::Metadata;
 use crate::store::disk::{Disk, EntryKind};
 use crate::store::layout::{Layout, tile_of_folder};
 use crate::store::map_folder;
-use crate::store::place;
+use crate::store::path_check;
 use crate::store::tile_store::TileStore;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -52,7 +52,7 @@ impl<W> StagedMap<W> {
         folder: &Path,
         create: impl FnOnce(&Path) -> Result<W>,
     ) -> Result<Self> {
-        place::check_place(&*disk, folder)?;
+        path_check::check_path(&*disk, folder)?;
         check_is_free(&*disk, folder)?;
         let unfinished = staging_folder(folder)?;
         remove_unfinished(&*disk, &unfinished)?;

@@ -292,7 +292,7 @@ mod tests {
     }
 
     #[test]
-    fn entries_come_back_as_they_were_written() {
+    fn entries_round_trip() {
         for entry in entries() {
             let mut payload = Vec::new();
             entry.write(5, &mut payload);
@@ -304,7 +304,7 @@ mod tests {
     }
 
     #[test]
-    fn bytes_cut_or_changed_anywhere_are_entries_or_none() {
+    fn damaged_entries_never_panic() {
         for entry in entries() {
             let mut payload = Vec::new();
             entry.write(5, &mut payload);

@@ -39,9 +39,9 @@ pub struct ScanArchive {
     /// Segments with scans that are not durable.
     unsynced: BTreeSet<u64>,
     /// Segments whose sync failed. A later successful sync of them proves nothing.
-    suspects: BTreeSet<u64>,
+    failed_segments: BTreeSet<u64>,
     /// Whether a sync failed while a replacement was written.
-    is_replacement_suspect: bool,
+    has_replacement_failed: bool,
     has_new_names: bool,
     /// Highest segment in all catalogs read so far. New segments get higher numbers, also if that segment is lost.
     highest_segment: u64,
@@ -108,8 +108,8 @@ impl ScanArchive {
             segment: None,
             scan_start: None,
             unsynced: BTreeSet::new(),
-            suspects: BTreeSet::new(),
-            is_replacement_suspect: false,
+            failed_segments: BTreeSet::new(),
+            has_replacement_failed: false,
             has_new_names: false,
             highest_segment: 0,
             begun: None,
@@ -173,7 +173,7 @@ impl ScanArchive {
     pub(in crate::store) fn is_writing(&self, segment: u64) -> bool {
         // The next commit copies noted scans out of segments whose sync failed.
         self.unsynced.contains(&segment)
-            || self.suspects.contains(&segment)
+            || self.failed_segments.contains(&segment)
             || self.segment.as_ref().is_some_and(|open| open.segment == segment)
     }
 
@@ -318,7 +318,7 @@ impl ScanArchive {
         let out = CatalogWriter::create(&**files.disk(), files.layout(), generation)
             .map_err(|error| Error::io(&files.layout().catalog(generation), "create", error))?;
         self.has_new_names = true;
-        self.is_replacement_suspect = false;
+        self.has_replacement_failed = false;
         self.replacement = Some(Replacement::Open { generation, out: Mutex::new(out) });
         Ok(())
     }
@@ -401,7 +401,7 @@ impl ScanArchive {
         }
         // A committed catalog that will be replaced may be damaged.
         let committed = if self.replacement.is_some() { None } else { self.find_committed()? };
-        self.move_suspects()?;
+        self.copy_failed_segments()?;
         self.sync_segments()?;
         let written = self.write_catalog(committed, has_tiles)?;
         if self.has_new_names {
@@ -519,9 +519,9 @@ impl ScanArchive {
     }
 
     /// Records a failed sync: scans that are not durable are copied to another segment before the next commit.
-    pub(in crate::store) fn suspect_unsynced(&mut self) {
-        self.is_replacement_suspect |= !self.unsynced.is_empty();
-        self.suspects.append(&mut self.unsynced);
+    pub(in crate::store) fn note_failed_sync(&mut self) {
+        self.has_replacement_failed |= !self.unsynced.is_empty();
+        self.failed_segments.append(&mut self.unsynced);
         self.segment = None;
     }
 
@@ -529,7 +529,7 @@ impl ScanArchive {
         for &segment in &self.unsynced {
             let path = self.files.layout().segment(segment);
             if let Err(error) = self.files.disk().sync_file(&path) {
-                self.suspect_unsynced();
+                self.note_failed_sync();
                 return Err(Error::io(&path, "sync", error));
             }
         }
@@ -538,8 +538,8 @@ impl ScanArchive {
     }
 
     /// Copies scans out of segments whose sync failed. Checksums verify what is read.
-    fn move_suspects(&mut self) -> Result<()> {
-        if self.replacement.is_some() && self.is_replacement_suspect {
+    fn copy_failed_segments(&mut self) -> Result<()> {
+        if self.replacement.is_some() && self.has_replacement_failed {
             let error = io::Error::other("an earlier sync failed; start the operation again");
             return Err(Error::io(&self.files.layout().kept_scans(), "commit", error));
         }
@@ -547,7 +547,7 @@ impl ScanArchive {
         let mut moved = Ok(());
         for entry in &mut pending {
             if let CatalogEntry::Kept(scan) = entry
-                && self.suspects.contains(&scan.place.segment)
+                && self.failed_segments.contains(&scan.place.segment)
             {
                 moved = self.copy(scan.place).map(|place| scan.place = place);
                 if moved.is_err() {

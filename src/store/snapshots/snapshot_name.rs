@@ -75,7 +75,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_names_that_are_safe_as_files_are_taken() {
+    fn only_safe_file_names_are_accepted() {
         for good in ["a", "before-lunch", "2026.11.21_a", "-", "a.next", &"x".repeat(64)] {
             assert_eq!(SnapshotName::new(good).unwrap().as_str(), good);
         }

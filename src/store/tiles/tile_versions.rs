@@ -11,7 +11,7 @@ pub struct TileVersions {
     /// Versions written since the last commit.
     next: TileTable<TileVersion>,
     /// Tiles whose sync failed. Their files may have any content, even if a later sync succeeds.
-    suspect: FxHashSet<TileIndex>,
+    failed_syncs: FxHashSet<TileIndex>,
     /// Tiles that the next commit removes.
     removed: FxHashSet<TileIndex>,
     /// Tile folders that the log does not name. They are neither read nor overwritten.
@@ -109,14 +109,14 @@ impl TileVersions {
 
     /// Records that the next version of a tile is written.
     pub fn note_next(&mut self, tile: TileIndex, version: TileVersion) {
-        self.suspect.remove(&tile);
+        self.failed_syncs.remove(&tile);
         self.removed.remove(&tile);
         self.next.insert(tile, version);
     }
 
     /// Discards the next version of a tile.
     pub fn drop_next(&mut self, tile: TileIndex) {
-        self.suspect.remove(&tile);
+        self.failed_syncs.remove(&tile);
         self.next.remove(tile);
     }
 
@@ -139,14 +139,14 @@ impl TileVersions {
     }
 
     /// Records that the sync of a tile's next version failed.
-    pub(in crate::store) fn suspect(&mut self, tile: TileIndex) {
-        self.suspect.insert(tile);
+    pub(in crate::store) fn note_failed_sync(&mut self, tile: TileIndex) {
+        self.failed_syncs.insert(tile);
     }
 
     /// Tiles whose next version must be written again before the next commit, in order. Their sync failed, so a later
     /// successful sync proves nothing.
-    pub fn suspects(&self) -> Vec<TileIndex> {
-        sorted(&self.suspect)
+    pub fn failed_syncs(&self) -> Vec<TileIndex> {
+        sorted(&self.failed_syncs)
     }
 
     // Commits.

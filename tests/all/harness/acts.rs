@@ -4,7 +4,7 @@ use super::scans::{Taken, new_poses};
 use std::ops::Range;
 use testkit::faulty_disk::FaultyDisk;
 use voxtile::operations::{
-    NewPoses, Remap, RemapBeside, ScanSelection, delete_snapshot, remap, remove_points, remove_scans, revert,
+    NewPoses, OnlineRemap, Remap, ScanSelection, delete_snapshot, remap, remove_points, remove_scans, revert,
     snapshot,
 };
 use voxtile::space::TileIndex;
@@ -55,7 +55,7 @@ pub fn perform(disk: &FaultyDisk, config: &MapConfig, before: &State, act: &Act)
         }
         Act::MoveBeside { seed, rest, meanwhile } => {
             let mut mapper = open_or_create(disk, config)?;
-            let mut beside = RemapBeside::begin(&scans(disk)?, &poses(*seed, *rest), &Remap::new(rework()))?;
+            let mut beside = OnlineRemap::begin(&scans(disk)?, &poses(*seed, *rest), &Remap::new(rework()))?;
             for number in meanwhile.clone() {
                 if number % 3 > 0 {
                     beside.follow(|_| ())?;

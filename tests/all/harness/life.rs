@@ -7,7 +7,7 @@ use std::collections::BTreeSet;
 use std::path::PathBuf;
 use testkit::faulty_disk::{Fault, FaultyDisk};
 use voxtile::integrity::verify;
-use voxtile::operations::{NewPoses, Remap, RemapBeside};
+use voxtile::operations::{NewPoses, OnlineRemap, Remap};
 use voxtile::store::{TileStore, tile_of_folder};
 use voxtile::{MapConfig, MapReader, MapView, Mapper};
 
@@ -47,7 +47,7 @@ impl Life {
                 let poses = NewPoses::Numbered(new_poses(&before.now.scans, *seed, *rest));
                 let mut mapper = open_or_create(disk, &self.config).unwrap();
                 let mut beside =
-                    RemapBeside::begin(&scans(disk).unwrap(), &poses, &Remap::new(rework())).unwrap();
+                    OnlineRemap::begin(&scans(disk).unwrap(), &poses, &Remap::new(rework())).unwrap();
                 (next..meanwhile.end).for_each(|seed| Taken::new(seed).insert_into(&mut mapper).unwrap());
                 mapper.flush().unwrap();
                 drop(mapper);
@@ -89,7 +89,7 @@ impl Subject for Life {
     }
 
     fn check_end(&self, disk: &FaultyDisk, what: &str) {
-        RemapBeside::remove_leftovers(at(disk)).unwrap();
+        OnlineRemap::remove_leftovers(at(disk)).unwrap();
         // What a crash in the last act left goes when the map is opened.
         drop(TileStore::open(disk.shared(), map()).unwrap());
         assert!(self.states.last().unwrap().is_on(disk), "{what}: another end");

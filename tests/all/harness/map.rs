@@ -3,7 +3,7 @@ use std::path::{Path, PathBuf};
 use testkit::faulty_disk::FaultyDisk;
 use voxtile::integrity::{Finding, Severity, verify};
 use voxtile::mapper::KeptSummary;
-use voxtile::operations::{Rework, snapshots};
+use voxtile::operations::{Replay, snapshots};
 use voxtile::store::SnapshotName;
 use voxtile::{
     Digest, Error, MapConfig, MapPath, MapQueries, MapReader, MemoryLimit, OutOfCoreTileMapper, Result,
@@ -34,8 +34,8 @@ pub fn keeping_scans() -> MapConfig {
 }
 
 /// Replays kept scans in the least memory.
-pub fn rework() -> Rework {
-    Rework::default().with_memory(MemoryLimit::Bytes(MemoryLimit::least_bytes(&config().grid)))
+pub fn rework() -> Replay {
+    Replay::default().with_memory(MemoryLimit::Bytes(MemoryLimit::least_bytes(&config().grid)))
 }
 
 /// A mapper of the map, which is created if there is none.

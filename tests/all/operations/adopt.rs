@@ -4,13 +4,19 @@ use testkit::faulty_disk::FaultyDisk;
 use testkit::random_scans::Random;
 use testkit::reference_map::Voxels;
 use voxtile::mapper::MapView;
-use voxtile::operations::Adopted;
+use voxtile::operations::TilesReplaced;
 use voxtile::space::TileIndex;
 use voxtile::{Error, MapConfig, MapPath, MapQueries, Result};
 
-fn adopt(disk: &FaultyDisk, parts: &[&str], of_flush: u64, scans: u64) -> Result<Adopted> {
+fn adopt(disk: &FaultyDisk, parts: &[&str], of_flush: u64, scans: u64) -> Result<TilesReplaced> {
     let parts = parts.iter().map(|part| open(disk, &path(part))).collect::<Result<Vec<_>>>()?;
-    voxtile::operations::adopt(MapPath::on(disk.shared(), path("map")), &parts, of_flush, scans, |_, _| {})
+    voxtile::operations::replace_tiles(
+        MapPath::on(disk.shared(), path("map")),
+        &parts,
+        of_flush,
+        scans,
+        |_, _| {},
+    )
 }
 
 fn flush_number(disk: &FaultyDisk) -> u64 {

@@ -45,15 +45,15 @@ fn crop(disk: &FaultyDisk) -> Result<()> {
 
 const ID: [u8; 16] = [7; 16];
 
-fn make_piece(disk: &FaultyDisk) -> Result<()> {
-    operations::make_piece(&open(disk, &path("a"))?, path("out"), ID, |_, _| {}).map(drop)
+fn make_shard(disk: &FaultyDisk) -> Result<()> {
+    operations::make_shard(&open(disk, &path("a"))?, path("out"), ID, |_, _| {}).map(drop)
 }
 
 /// Makes a map that is not durable and moves it to its place, as a task does.
-fn move_piece(disk: &FaultyDisk) -> Result<()> {
+fn move_shard(disk: &FaultyDisk) -> Result<()> {
     disk.take(&path("local"));
     let made = make_local(disk).and_then(|()| {
-        operations::move_piece(MapPath::on(disk.shared(), path("local")), path("out"), ID, |_, _| {})
+        operations::move_shard(MapPath::on(disk.shared(), path("local")), path("out"), ID, |_, _| {})
     });
     // A task's folder goes with the task.
     disk.take(&path("local"));
@@ -75,9 +75,9 @@ fn make_local(disk: &FaultyDisk) -> Result<()> {
 fn move_crop(disk: &FaultyDisk) -> Result<()> {
     disk.take(&path("local"));
     let crop = open(disk, &path("a"))
-        .and_then(|map| operations::crop_piece(&map, &Part::Inside(region()), path("local"), ID, |_, _| {}));
+        .and_then(|map| operations::crop_shard(&map, &Part::Inside(region()), path("local"), ID, |_, _| {}));
     let made = crop.and_then(|_| {
-        operations::move_piece(MapPath::on(disk.shared(), path("local")), path("out"), ID, |_, _| {})
+        operations::move_shard(MapPath::on(disk.shared(), path("local")), path("out"), ID, |_, _| {})
     });
     disk.take(&path("local"));
     disk.take(&path("local.unfinished"));
@@ -91,7 +91,7 @@ fn two_pieces(storage: Storage) -> FaultyDisk {
     let west = Aabb { min: [-100.0; 3], max: [3.2, 100.0, 100.0] };
     for (name, part) in [("inside", Part::Inside(west)), ("outside", Part::Outside(west))] {
         operations::crop(&open(&disk, &path("a")).unwrap(), &part, path("crop"), |_, _| {}).unwrap();
-        operations::make_piece(&open(&disk, &path("crop")).unwrap(), path(name), ID, |_, _| {}).unwrap();
+        operations::make_shard(&open(&disk, &path("crop")).unwrap(), path(name), ID, |_, _| {}).unwrap();
         disk.take(&path("crop"));
     }
     disk.copy()
@@ -110,7 +110,7 @@ fn adopt(disk: &FaultyDisk) -> Result<()> {
         return TileStore::open(disk.shared(), &path("a")).map(drop);
     }
     let map = MapPath::on(disk.shared(), path("a"));
-    operations::adopt(map, &[open(disk, &path("b"))?], OF_FLUSH, 3, |_, _| {}).map(drop)
+    operations::replace_tiles(map, &[open(disk, &path("b"))?], OF_FLUSH, 3, |_, _| {}).map(drop)
 }
 
 /// A disk with a map of the same scans that keeps them.
@@ -129,12 +129,12 @@ fn a_map_with_kept_scans(storage: Storage) -> FaultyDisk {
 }
 
 /// With room for one tile, so that others are written before the end.
-fn map_anew(disk: &FaultyDisk) -> Result<()> {
+fn rebuild(disk: &FaultyDisk) -> Result<()> {
     let map = open(disk, &path("a"))?;
     let config = MapConfig::new(0.2, 3.2)?.with_range(0.0, 3.0).with_storage(map.config().storage);
     let config = config.with_kept_scans(true).with_cache_tiles(1).with_write_buffer_bytes(600);
     let output = MapPath::on(disk.shared(), path("out"));
-    operations::map_anew(&map, output, config, |rays| *rays, &Stop::default(), |_, _| ()).map(drop)
+    operations::rebuild(&map, output, config, |rays| *rays, &Stop::default(), |_, _| ()).map(drop)
 }
 
 fn clear(disk: &FaultyDisk) -> Result<()> {
@@ -184,14 +184,14 @@ fn a_merge_is_there_whole_or_not_at_all() {
 
 #[test]
 fn a_piece_is_there_whole_or_not_at_all() {
-    check(Storage::OctoMap, "out", make_piece);
-    check(Storage::Compact, "out", make_piece);
+    check(Storage::OctoMap, "out", make_shard);
+    check(Storage::Compact, "out", make_shard);
 }
 
 #[test]
 fn a_piece_that_is_moved_is_there_whole_and_durable_or_not_at_all() {
     for storage in [Storage::OctoMap, Storage::Compact] {
-        check(storage, "out", move_piece);
+        check(storage, "out", move_shard);
         check(storage, "out", move_crop);
     }
 }
@@ -205,8 +205,8 @@ fn pieces_are_one_map_or_as_they_were() {
 
 #[test]
 fn a_map_of_kept_scans_is_there_whole_or_not_at_all() {
-    check_from(a_map_with_kept_scans(Storage::OctoMap), "out", map_anew);
-    check_from(a_map_with_kept_scans(Storage::Compact), "out", map_anew);
+    check_from(a_map_with_kept_scans(Storage::OctoMap), "out", rebuild);
+    check_from(a_map_with_kept_scans(Storage::Compact), "out", rebuild);
 }
 
 /// A request to stop leaves nothing behind, and no map that could be taken for the one that was asked for.
@@ -216,7 +216,7 @@ fn a_map_of_kept_scans_that_is_given_up_is_not_there() {
     let map = open(&disk, &path("a")).unwrap();
     let (stop, output) = (Stop::default(), MapPath::on(disk.shared(), path("out")));
     let config = map.config().clone();
-    let made = operations::map_anew(
+    let made = operations::rebuild(
         &map,
         output,
         config,

@@ -5,7 +5,7 @@ use testkit::random_scans::Random;
 use testkit::reference_map::Voxels;
 use voxtile::integrity::verify;
 use voxtile::mapper::MapView;
-use voxtile::operations::{self, WrittenMap, make_piece};
+use voxtile::operations::{self, WrittenMap, make_shard};
 use voxtile::store::tile_of_folder;
 use voxtile::{Error, MapConfig, MapPath, Result, Storage};
 
@@ -18,7 +18,7 @@ fn join(disk: &FaultyDisk, pieces: &[PathBuf]) -> Result<WrittenMap> {
 
 fn piece(disk: &FaultyDisk, map: &Path, id: [u8; 16]) -> Result<PathBuf> {
     let piece = map.with_extension("piece");
-    make_piece(&open(disk, map)?, &piece, id, |_, _| {}).map(|_| piece)
+    make_shard(&open(disk, map)?, &piece, id, |_, _| {}).map(|_| piece)
 }
 
 fn damage(disk: &FaultyDisk, map: &Path) -> Vec<String> {
@@ -69,7 +69,7 @@ fn pieces_become_the_map_that_a_merge_makes_of_them() {
         assert_eq!(damage(&disk, &path("joined")), Vec::<String>::new(), "seed {seed}");
         assert_eq!((written.tiles, written.voxels), (whole.tile_indices().len() as u64, voxels.len() as u64));
         // Nothing but the id tells them from each other, and the map needs no piece.
-        make_piece(&whole, path("same"), ID, |_, _| {}).unwrap();
+        make_shard(&whole, path("same"), ID, |_, _| {}).unwrap();
         assert_eq!(tiles(&disk, &path("joined")), tiles(&disk, &path("same")), "seed {seed}");
         pieces.iter().for_each(|piece| disk.take(piece));
         assert_eq!(damage(&disk, &path("joined")), Vec::<String>::new(), "seed {seed}");
@@ -133,9 +133,9 @@ fn a_piece_without_a_file_or_with_a_shorter_one_is_named_and_there_is_no_map() {
     }
 }
 
-fn move_piece(disk: &FaultyDisk, map: &Path, id: [u8; 16]) -> Result<PathBuf> {
+fn move_shard(disk: &FaultyDisk, map: &Path, id: [u8; 16]) -> Result<PathBuf> {
     let piece = map.with_extension("moved");
-    operations::move_piece(MapPath::on(disk.shared(), map), &piece, id, |_, _| {}).map(|_| piece)
+    operations::move_shard(MapPath::on(disk.shared(), map), &piece, id, |_, _| {}).map(|_| piece)
 }
 
 #[test]
@@ -145,17 +145,17 @@ fn a_map_that_is_moved_is_the_piece_that_a_copy_is() {
         let copy = piece(&disk, &path("map"), ID).unwrap();
         let files = tiles(&disk, &copy);
         // It has another id, so that it is copied, too.
-        let moved = move_piece(&disk, &path("map"), ID).unwrap();
+        let moved = move_shard(&disk, &path("map"), ID).unwrap();
         assert_eq!(tiles(&disk, &moved), files);
         assert_eq!(open(&disk, &moved).unwrap().metadata().ext.as_ref().unwrap().map_id, "07".repeat(16));
         assert!(!tiles(&disk, &path("map")).is_empty());
         disk.take(&moved);
-        let moved = move_piece(&disk, &copy, ID).unwrap();
+        let moved = move_shard(&disk, &copy, ID).unwrap();
         assert_eq!(tiles(&disk, &moved), files);
         assert!(disk.files().into_keys().all(|file| !file.starts_with(&copy)));
         assert_eq!(damage(&disk, &moved), Vec::<String>::new());
         let taken = path("map.moved");
-        let error = operations::move_piece(MapPath::on(disk.shared(), &moved), taken, ID, |_, _| {});
+        let error = operations::move_shard(MapPath::on(disk.shared(), &moved), taken, ID, |_, _| {});
         assert!(matches!(error, Err(Error::AlreadyExists { .. })), "{error:?}");
         assert_eq!(tiles(&disk, &moved), files);
     }
@@ -173,13 +173,13 @@ fn a_map_without_a_file_or_with_a_shorter_one_is_named_and_not_moved() {
                     true => disk.take(&place),
                     false => disk.put(&place, &bytes[..bytes.len() - 1]),
                 }
-                let error = move_piece(&disk, &map, ID).unwrap_err();
+                let error = move_shard(&disk, &map, ID).unwrap_err();
                 assert!(matches!(error, Error::Damaged { .. }) && error.path() == Some(&*place), "{error:#}");
                 assert!(disk.files().into_keys().all(|file| !file.starts_with(path("map.moved"))));
             }
             disk.put(&place, &bytes);
         }
-        move_piece(&disk, &map, ID).unwrap();
+        move_shard(&disk, &map, ID).unwrap();
     }
 }
 

@@ -1,10 +1,10 @@
-use super::kept_points::KeptPlaces;
+use super::kept_points::KeptLocations;
 use crate::space::TileIndex;
 use crate::store::{Disk, EntryKind, Layout, SegmentPlace};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Part of a map that may be damaged and is checked again.
-pub(super) enum Suspect {
+pub(super) enum Recheck {
     /// The list of scans.
     List,
     /// A snapshot, or a table that only snapshots see.
@@ -20,24 +20,24 @@ pub(super) enum Suspect {
 }
 
 #[derive(Debug, Default)]
-pub(super) struct Suspects {
+pub(super) struct Rechecks {
     pub(super) list: bool,
     pub(super) snapshots: bool,
     pub(super) catalogs: bool,
-    pub(super) points: KeptPlaces,
+    pub(super) points: KeptLocations,
     pub(super) tiles: BTreeMap<TileIndex, bool>,
     pub(super) folders: BTreeSet<TileIndex>,
 }
 
-impl Suspects {
-    pub(super) fn add(&mut self, suspect: Suspect) {
-        match suspect {
-            Suspect::List => self.list = true,
-            Suspect::Snapshots => self.snapshots = true,
-            Suspect::Catalog => self.catalogs = true,
-            Suspect::Points(place) => self.points.insert(place),
-            Suspect::Tile(tile, is_counted) => drop(self.tiles.insert(tile, is_counted)),
-            Suspect::Folder(tile) => drop(self.folders.insert(tile)),
+impl Rechecks {
+    pub(super) fn add(&mut self, part: Recheck) {
+        match part {
+            Recheck::List => self.list = true,
+            Recheck::Snapshots => self.snapshots = true,
+            Recheck::Catalog => self.catalogs = true,
+            Recheck::Points(place) => self.points.insert(place),
+            Recheck::Tile(tile, is_counted) => drop(self.tiles.insert(tile, is_counted)),
+            Recheck::Folder(tile) => drop(self.folders.insert(tile)),
         }
     }
 

@@ -15,7 +15,7 @@ use std::path::Path;
 ///
 /// A map of the original format, a snapshot, a damaged tile, an output with other content, or an I/O error. There is no
 /// shard then.
-pub fn make_piece(
+pub fn make_shard(
     map: &MapReader,
     output: impl AsRef<Path>,
     map_id: [u8; 16],
@@ -39,7 +39,7 @@ pub fn make_piece(
     writer.finish()
 }
 
-/// Like [`make_piece`], but moves a map that is no longer needed: no tile is read or written, and each file is synced
+/// Like [`make_shard`], but moves a map that is no longer needed: no tile is read or written, and each file is synced
 /// once.
 ///
 /// The map must have the id `map_id`, be on the same file system, and not be used by another process. It may have been
@@ -49,8 +49,8 @@ pub fn make_piece(
 ///
 /// # Errors
 ///
-/// As for [`make_piece`], and a map with a writer. There is no shard then, and the map may be lost.
-pub fn move_piece(
+/// As for [`make_shard`], and a map with a writer. There is no shard then, and the map may be lost.
+pub fn move_shard(
     map: impl Into<MapPath>,
     output: impl AsRef<Path>,
     map_id: [u8; 16],
@@ -59,7 +59,7 @@ pub fn move_piece(
     let (disk, folder) = map.into().into_parts();
     let map = MapReader::open(MapPath::on(disk.clone(), &folder), 0)?;
     if map.map_id() != Some(map_id) || map.keeps_scans() {
-        return make_piece(&map, output, map_id, progress);
+        return make_shard(&map, output, map_id, progress);
     }
     let mut written = WrittenMap::default();
     let versions = map.tile_indices().into_iter().filter_map(|tile| map.version_of_tile(tile));
@@ -68,5 +68,5 @@ pub fn move_piece(
     if move_map(&disk, &folder, output.as_ref())? {
         return Ok(written);
     }
-    make_piece(&MapReader::open(MapPath::on(disk, &folder), 0)?, output, map_id, progress)
+    make_shard(&MapReader::open(MapPath::on(disk, &folder), 0)?, output, map_id, progress)
 }

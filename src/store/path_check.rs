@@ -12,10 +12,10 @@ use std::path::Path;
 ///
 /// [`Error::InvalidArgument`] if the path is in a map at any depth, or an I/O error.
 pub fn check_outside_of_maps(path: &Path) -> Result<()> {
-    check_place(&FsDisk, path)
+    check_path(&FsDisk, path)
 }
 
-pub(super) fn check_place(disk: &dyn Disk, path: &Path) -> Result<()> {
+pub(super) fn check_path(disk: &dyn Disk, path: &Path) -> Result<()> {
     if path.to_str().is_some_and(|path| path.contains("://")) {
         let reason = format!(
             "{} is a URL; create the map in a local folder and upload it with `voxtile push`",

@@ -8,10 +8,10 @@ use crate::store::MapPath;
 use crate::tile::Table;
 use serde::Serialize;
 
-/// Result of [`adopt`].
+/// Result of [`replace_tiles`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
-pub struct Adopted {
+pub struct TilesReplaced {
     /// Number of new tiles.
     pub tiles_added: u64,
     /// Number of replaced tiles.
@@ -34,13 +34,13 @@ pub struct Adopted {
 ///
 /// No map, another writer, a map that was flushed after `of_flush`, a map that keeps its scans, parts with another grid
 /// or sensor model or with a common tile, a damaged tile, or an I/O error. The map is unchanged then.
-pub fn adopt(
+pub fn replace_tiles(
     map: impl Into<MapPath>,
     parts: &[MapReader],
     of_flush: u64,
     scans: u64,
     mut progress: impl FnMut(u64, u64),
-) -> Result<Adopted> {
+) -> Result<TilesReplaced> {
     let (disk, map) = map.into().into_parts();
     let map = &*map;
     let before = MapReader::open(MapPath::on(disk.clone(), map), 0)?;
@@ -68,35 +68,40 @@ pub fn adopt(
         }
         editor.add_scans(scans)?;
         let all = parts.iter().map(|part| part.tile_indices().len() as u64).sum();
-        let mut adopted = Adopted::default();
+        let mut replaced = TilesReplaced::default();
         let mut done = 0;
         for part in parts {
             for tile in part.tile_indices() {
                 progress(done, all);
                 done += 1;
                 if let Some(found) = part.tile_uncached(tile)? {
-                    adopt_tile(editor, tile, found.table(), &mut adopted)?;
+                    replace_tile(editor, tile, found.table(), &mut replaced)?;
                 }
             }
         }
         progress(all, all);
-        if scans > 0 || adopted.tiles_added + adopted.tiles_changed > 0 {
+        if scans > 0 || replaced.tiles_added + replaced.tiles_changed > 0 {
             editor.commit("adopt", |_| {})?;
         }
-        (adopted.scan_number, adopted.flush_number) = (editor.scan_number(), editor.flush_number());
-        Ok(adopted)
+        (replaced.scan_number, replaced.flush_number) = (editor.scan_number(), editor.flush_number());
+        Ok(replaced)
     })
 }
 
 /// Writes a tile if it has changed. For an equal tile, readers and snapshots need no copy.
-fn adopt_tile(editor: &mut MapEditor, tile: TileIndex, table: &Table, adopted: &mut Adopted) -> Result<()> {
+fn replace_tile(
+    editor: &mut MapEditor,
+    tile: TileIndex,
+    table: &Table,
+    replaced: &mut TilesReplaced,
+) -> Result<()> {
     if editor.version(tile).is_none() {
-        adopted.tiles_added += 1;
+        replaced.tiles_added += 1;
     } else if is_same(&editor.table(tile)?, table) {
-        adopted.tiles_equal += 1;
+        replaced.tiles_equal += 1;
         return Ok(());
     } else {
-        adopted.tiles_changed += 1;
+        replaced.tiles_changed += 1;
     }
     editor.replace(tile, table)
 }

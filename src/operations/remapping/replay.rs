@@ -13,7 +13,7 @@ use std::sync::Arc;
 #[derive(Clone, Debug, Default)]
 #[non_exhaustive]
 #[must_use]
-pub struct Rework {
+pub struct Replay {
     /// Memory limit.
     pub memory: MemoryLimit,
     /// Name of a new snapshot of the map before the change. Default: none.
@@ -24,7 +24,7 @@ pub struct Rework {
     pub stop: Stop,
 }
 
-impl Rework {
+impl Replay {
     /// Sets the memory limit.
     pub fn with_memory(self, memory: MemoryLimit) -> Self {
         Self { memory, ..self }
@@ -49,7 +49,7 @@ impl Rework {
 /// Counts of a replay, or of its dry run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 #[non_exhaustive]
-pub struct MappedAgain {
+pub struct Replayed {
     /// Number of scans that the map keeps.
     pub scans: u64,
     /// Number of changed scans: moved, removed, or without some of their points.
@@ -70,12 +70,12 @@ pub struct MappedAgain {
 
 /// Replays the tiles that changed scans touch. The changes must be based on `scans`: a flush of the map since then is
 /// an error. `progress` receives the number of scans done and in total.
-pub(super) fn rework(
+pub(super) fn replay(
     scans: &KeptSummary,
     changes: Changes,
-    how: &Rework,
+    how: &Replay,
     mut progress: impl FnMut(u64, u64),
-) -> Result<MappedAgain> {
+) -> Result<Replayed> {
     let (disk, folder) = scans.place();
     let mut store = TileStore::open(disk.clone(), folder)?;
     if store.commits().flush_number != scans.flush_number() {
@@ -91,8 +91,9 @@ pub(super) fn rework(
     if how.is_dry_run || revision.counts.scans_changed == 0 {
         return Ok(revision.counts);
     }
-    keep_as_it_is(&mut store, how)?;
-    let (counts, released) = tidied(disk.clone(), folder, revision.map(store, touched, &mut progress))?;
+    create_snapshot(&mut store, how)?;
+    let (counts, released) =
+        clean_up_after_error(disk.clone(), folder, revision.map(store, touched, &mut progress))?;
     let second = if takes_points { remove_second_map(disk.clone(), folder) } else { Ok(()) };
     match released {
         // Removed points must not remain: retry after reopening the map.
@@ -105,13 +106,13 @@ pub(super) fn rework(
 }
 
 /// Creates the snapshot `keep_as` of the current map, if requested. An existing one of this state is reused.
-pub(super) fn keep_as_it_is(store: &mut TileStore, how: &Rework) -> Result<()> {
+pub(super) fn create_snapshot(store: &mut TileStore, how: &Replay) -> Result<()> {
     let Some(name) = &how.keep_as else { return Ok(()) };
     store.snapshot_writer().create(name)
 }
 
 /// Removes uncommitted files after an error.
-pub(super) fn tidied<T>(disk: Arc<dyn Disk>, folder: &Path, outcome: Result<T>) -> Result<T> {
+pub(super) fn clean_up_after_error<T>(disk: Arc<dyn Disk>, folder: &Path, outcome: Result<T>) -> Result<T> {
     if outcome.is_err()
         && let Err(error) = TileStore::open(disk, folder)
     {

@@ -1,10 +1,10 @@
 use super::new_poses::NewPoses;
 use super::remap::{Remap, Remapped};
+use super::replay::{clean_up_after_error, create_snapshot};
 use super::revision::{Revision, Touched};
-use super::rework::{keep_as_it_is, tidied};
 use crate::error::{Error, Result};
 use crate::mapper::{KeptScan, KeptSummary, Remapper, SideMapper, no_kept_scan};
-use crate::persistence::give_way;
+use crate::persistence::lower_priority;
 use crate::space::TileSelection;
 use crate::store::{CatalogEntry, Disk, MapPath, SideFolder, TileStore};
 use rayon::ThreadPool;
@@ -23,9 +23,9 @@ use std::sync::Arc;
 /// from scans that are flushed meanwhile, which keep their poses. At the end these tiles are moved into the map. The
 /// result equals, bit by bit, that of `remap` with the same poses and scans.
 ///
-/// Memory: [`Rework::memory`](super::Rework::memory), in addition to the mapper's. Disk: a second copy of the affected
+/// Memory: [`Replay::memory`](super::Replay::memory), in addition to the mapper's. Disk: a second copy of the affected
 /// tiles. Dropping this value frees both, and the map is unchanged.
-pub struct RemapBeside {
+pub struct OnlineRemap {
     disk: Arc<dyn Disk>,
     folder: PathBuf,
     how: Remap,
@@ -44,7 +44,7 @@ pub struct RemapBeside {
 /// Maximum number of scan entries in memory before they are written.
 const MAX_ENTRIES: u64 = 256;
 
-impl RemapBeside {
+impl OnlineRemap {
     /// Finds the tiles that the new poses affect. Scans that were flushed after `scans` was read keep their poses.
     ///
     /// # Errors
@@ -52,19 +52,19 @@ impl RemapBeside {
     /// As for [`remap`](super::remap()); a dry run, which only `remap` supports; another remap of the same map.
     pub fn begin(scans: &KeptSummary, poses: &NewPoses, how: &Remap) -> Result<Self> {
         let (disk, folder) = scans.place();
-        if how.rework.is_dry_run {
+        if how.replay.is_dry_run {
             return Err(Error::argument("is_dry_run", "not supported online; use `remap` for a dry run"));
         }
-        let threads = rayon::ThreadPoolBuilder::new().start_handler(|_| give_way()).build();
+        let threads = rayon::ThreadPoolBuilder::new().start_handler(|_| lower_priority()).build();
         let threads =
             threads.map_err(|error| Error::io(folder, "start threads", std::io::Error::other(error)))?;
         let (remapped, changes) = Remapped::by_poses(scans, poses, how)?;
-        let mut revision = Revision::new(scans, &how.rework, changes);
+        let mut revision = Revision::new(scans, &how.replay, changes);
         let store = TileStore::open_read_only(disk.clone(), folder)?;
         check_catalog(&store, scans.catalog())?;
         let touched = threads.install(|| revision.look(&store))?;
         let is_needed = revision.counts.scans_changed > 0;
-        let begin = || SideMapper::begin(&store, touched.config.clone(), how.rework.stop.clone());
+        let begin = || SideMapper::begin(&store, touched.config.clone(), how.replay.stop.clone());
         let side = is_needed.then(begin).transpose()?;
         // They are counted again while the scans are processed.
         (revision.counts.scans, revision.counts.updates) = (0, 0);
@@ -105,11 +105,11 @@ impl RemapBeside {
     }
 
     /// Changes the map, after its mapper has flushed and was closed. First processes scans that were flushed since
-    /// [`RemapBeside::follow`]; then one commit replaces the affected tiles.
+    /// [`OnlineRemap::follow`]; then one commit replaces the affected tiles.
     ///
     /// # Errors
     ///
-    /// As for [`RemapBeside::follow`] and [`remap`](super::remap()). The map is unchanged then. A snapshot `keep_as`
+    /// As for [`OnlineRemap::follow`] and [`remap`](super::remap()). The map is unchanged then. A snapshot `keep_as`
     /// may have been created.
     pub fn finish(mut self) -> Result<Remapped> {
         let Some(side) = self.side.take() else {
@@ -117,19 +117,19 @@ impl RemapBeside {
             return Ok(self.remapped);
         };
         let mut store = TileStore::open(self.disk.clone(), &self.folder)?;
-        keep_as_it_is(&mut store, &self.how.rework)?;
+        create_snapshot(&mut store, &self.how.replay)?;
         let (disk, folder) = (self.disk.clone(), self.folder.clone());
-        tidied(disk, &folder, self.take_over(store, side))
+        clean_up_after_error(disk, &folder, self.swap_in(store, side))
     }
 
-    fn take_over(mut self, store: TileStore, mut side: SideMapper) -> Result<Remapped> {
+    fn swap_in(mut self, store: TileStore, mut side: SideMapper) -> Result<Remapped> {
         let (revision, touched) = (&mut self.revision, &self.touched);
         follow_scans(&store, self.catalog, &mut self.entries, revision, touched, &mut side, &mut |_| ())?;
         let tiles: Vec<_> = store.tiles().iter().filter(|&tile| touched.has(tile)).collect();
         revision.counts.tiles = store.tiles().count() as u64;
         revision.counts.tiles_mapped = tiles.len() as u64;
         self.remapped.mapped = revision.counts;
-        let stop = self.how.rework.stop.clone();
+        let stop = self.how.replay.stop.clone();
         let mut remapper = Remapper::begin(store, touched.config.clone(), tiles, stop)?;
         remapper.take_over(&mut side)?;
         if let Err(error) = remapper.finish(true, TileStore::release_scans)? {
@@ -165,7 +165,7 @@ fn follow_scans(
                 revision.counts.scans += 1;
                 revision.counts.updates += record.updates;
                 let map = |scan: &KeptScan, selection: Option<&TileSelection>| side.map_kept(scan, selection);
-                let record = revision.map_beside(store.layout(), *record, touched, map)?;
+                let record = revision.apply_change(store.layout(), *record, touched, map)?;
                 CatalogEntry::Kept(Box::new(record))
             }
             other => match no_kept_scan(&other) {
@@ -197,10 +197,10 @@ fn check_catalog(store: &TileStore, catalog: Option<u64>) -> Result<()> {
     }
 }
 
-impl std::fmt::Debug for RemapBeside {
+impl std::fmt::Debug for OnlineRemap {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self { folder, remapped, entries, .. } = self;
-        let mut out = f.debug_struct("RemapBeside");
+        let mut out = f.debug_struct("OnlineRemap");
         out.field("folder", folder)
             .field("remapped", remapped)
             .field("entries", entries)

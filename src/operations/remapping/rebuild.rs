@@ -7,10 +7,10 @@ use crate::store::{InputRecord, MapPath, StagedMap, TileStore};
 use serde::Serialize;
 use std::path::Path;
 
-/// Result of [`map_anew`].
+/// Result of [`rebuild`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 #[non_exhaustive]
-pub struct MappedAnew {
+pub struct Rebuilt {
     /// Number of scans in the new map.
     pub scans: u64,
     /// Counts of their points.
@@ -29,14 +29,14 @@ pub struct MappedAnew {
 /// A map that keeps no scans or has other scans too; a region whose borders are not borders of the new tiles; an
 /// invalid configuration; a folder with other content; another process that creates the same map; damage; an I/O error;
 /// a request to stop. There is no map then, unless only the last step, the sync of its name, has failed.
-pub fn map_anew(
+pub fn rebuild(
     map: &MapReader,
     output: impl Into<MapPath>,
     config: MapConfig,
     rays: impl Fn(&RayConfig) -> RayConfig,
     stop: &Stop,
     progress: impl FnMut(u64, u64),
-) -> Result<MappedAnew> {
+) -> Result<Rebuilt> {
     let retiling = Retiling::between(&map.config().grid, &config.grid);
     let rays = |own: &RayConfig| retiling.rays(own).map(|own| rays(&own));
     let of_map = RayConfig { region: map.config().rays.region, ..config.rays };
@@ -63,11 +63,11 @@ fn map_scans(
     stop: &Stop,
     count: u64,
     mut progress: impl FnMut(u64, u64),
-) -> Result<MappedAnew> {
+) -> Result<Rebuilt> {
     mapper.stop_with(stop.clone());
     let name = map.folder().file_name().map(|name| name.to_string_lossy().into_owned());
     mapper.begin_input(InputRecord::from(name.unwrap_or_default()))?;
-    let mut mapped = MappedAnew::default();
+    let mut mapped = Rebuilt::default();
     for scan in map.kept_scans()? {
         stop.check()?;
         let scan = scan?;

@@ -18,14 +18,14 @@ impl TileStore {
     /// # Errors
     ///
     /// An existing folder that the log does not name, or an I/O error. `other` may have lost some of its tiles then.
-    pub fn take_over(&mut self, other: &Self) -> Result<()> {
+    pub fn swap_in(&mut self, other: &Self) -> Result<()> {
         self.finish_earlier_work()?;
         let mut tiles: Vec<_> = other.tiles().iter().collect();
         tiles.sort_unstable();
-        tiles.into_iter().try_for_each(|tile| self.take_tile(other, tile))
+        tiles.into_iter().try_for_each(|tile| self.swap_in_tile(other, tile))
     }
 
-    fn take_tile(&mut self, other: &Self, tile: TileIndex) -> Result<()> {
+    fn swap_in_tile(&mut self, other: &Self, tile: TileIndex) -> Result<()> {
         let Some(version) = other.tiles().version(tile) else { return Ok(()) };
         let folder = self.layout().tile_folder(tile);
         if self.versions.is_orphan(tile) {
