@@ -58,7 +58,7 @@ pub struct MapConfig {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum MemoryLimit {
-    /// [`MemoryLimit::DEFAULT_BYTES`], or [`MemoryLimit::least_bytes`] if that is more.
+    /// [`MemoryLimit::DEFAULT_BYTES`], or [`MemoryLimit::min_bytes`] if that is more.
     #[default]
     Default,
     /// A number of tiles, regardless of their size.
@@ -72,7 +72,7 @@ pub enum MemoryLimit {
     },
     /// Maximum bytes of all variable memory: active tiles, tiles in the compact form, pending updates, buffers of scan
     /// insertion, tiles in transfer from and to disk, and the index of tiles on disk (about 250 bytes per tile).
-    /// Separate threads read and write tiles. At least [`MemoryLimit::least_bytes`].
+    /// Separate threads read and write tiles. At least [`MemoryLimit::min_bytes`].
     Bytes(usize),
     /// See [`MapConfig::with_tight_memory_bytes`].
     #[doc(hidden)]
@@ -157,7 +157,7 @@ pub struct VoxelCacheConfig {
 impl Default for MapConfig {
     fn default() -> Self {
         Self {
-            grid: Grid::new(0.1, 10.0).expect("the default lengths make a grid"),
+            grid: Grid::new(0.1, 10.0).expect("the default lengths are valid"),
             sensor_model: SensorModel::default(),
             occupancy_threshold: 0.5,
             rays: RayConfig::default(),
@@ -390,14 +390,14 @@ impl MemoryLimit {
     /// Minimum number of bytes for any map: `16 MiB + 2 (12 n^3 + 256 b^3)` for tiles with `n` voxels and `b = ceil(n /
     /// 8) + 1` bricks along their edge. This is the memory of a scan and of two tiles in which every voxel is observed
     /// and all differ: one active, and one in transfer.
-    pub fn least_bytes(grid: &Grid) -> usize {
-        least_bytes(grid.voxels_per_tile_edge() as usize)
+    pub fn min_bytes(grid: &Grid) -> usize {
+        min_bytes(grid.voxels_per_tile_edge() as usize)
     }
 
     /// Maximum bytes of all variable memory of a map with this grid; `None` if the limit is a number of tiles.
     pub fn bytes(self, grid: &Grid) -> Option<usize> {
         match self {
-            Self::Default => Some(Self::DEFAULT_BYTES.max(Self::least_bytes(grid))),
+            Self::Default => Some(Self::DEFAULT_BYTES.max(Self::min_bytes(grid))),
             Self::Bytes(bytes) | Self::Tight(bytes) => Some(bytes),
             Self::Tiles { .. } => None,
         }
@@ -406,9 +406,9 @@ impl MemoryLimit {
     fn check(self, grid: &Grid) -> Result<()> {
         match self {
             Self::Tiles { tiles: 0, .. } => Err(wrong("cache tiles", 0, "at least 1")),
-            Self::Bytes(bytes) if bytes < Self::least_bytes(grid) => {
-                let least = Self::least_bytes(grid);
-                let fits = (2..grid.voxels_per_tile_edge()).rev().find(|&n| least_bytes(n as usize) <= bytes);
+            Self::Bytes(bytes) if bytes < Self::min_bytes(grid) => {
+                let least = Self::min_bytes(grid);
+                let fits = (2..grid.voxels_per_tile_edge()).rev().find(|&n| min_bytes(n as usize) <= bytes);
                 let hint = fits.map_or(String::new(), |n| {
                     let length_m = (f64::from(n) * grid.resolution_m() * 1e6).round() / 1e6;
                     format!(", or use tiles of at most {length_m} m")
@@ -426,7 +426,7 @@ impl MemoryLimit {
     }
 }
 
-fn least_bytes(voxels_per_edge: usize) -> usize {
+fn min_bytes(voxels_per_edge: usize) -> usize {
     // One more brick, for tiles that do not begin at the edge of a brick.
     let bricks_per_edge = voxels_per_edge.div_ceil(8) + 1;
     (16 << 20) + 2 * (12 * voxels_per_edge.pow(3) + 256 * bricks_per_edge.pow(3))

@@ -46,7 +46,7 @@ pub(super) enum Replaced {
 ///
 /// # Errors
 ///
-/// Too few remains to identify the map, or an I/O error.
+/// Too little data to identify the map, or an I/O error.
 pub(super) fn index_of(
     disk: &dyn Disk,
     layout: &Layout,

@@ -91,7 +91,7 @@ impl Repair {
 ///
 /// # Errors
 ///
-/// No map, another writer, too few remains to identify the map, or an I/O error.
+/// No map, another writer, too little data to identify the map, or an I/O error.
 pub fn repair(
     folder: impl Into<MapPath>,
     done: impl FnMut(&Action),
@@ -301,7 +301,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
                 };
                 let is_seen = has_snapshots && file == TileFile::Table && *replaced == Replaced::Older;
                 if is_seen && self.kind(&kept)?.is_none() {
-                    // Keep the table as the flush would have.
+                    // Keep the table for the snapshots, as the flush would have done.
                     self.quarantine_copy(&current, why)?;
                     self.disk
                         .rename(&current, &kept)

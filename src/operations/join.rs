@@ -20,13 +20,13 @@ use std::path::Path;
 /// No shard, shards with other ids, parameters or storage, or with a common tile, a file that is missing or of another
 /// length than in the log of its shard, an output with other content, or an I/O error.
 pub fn join(
-    pieces: &[MapPath],
+    shards: &[MapPath],
     output: impl AsRef<Path>,
     mut progress: impl FnMut(u64, u64),
 ) -> Result<WrittenMap> {
-    let open = |piece: &MapPath| MapReader::open(piece.clone(), 0);
-    let [first, ..] = pieces else {
-        return Err(Error::argument("pieces", "name one or more"));
+    let open = |shard: &MapPath| MapReader::open(shard.clone(), 0);
+    let [first, ..] = shards else {
+        return Err(Error::argument("shards", "name one or more"));
     };
     let first = open(first)?;
     let Some(map_id) = first.map_id() else {
@@ -34,19 +34,19 @@ pub fn join(
         return Err(Error::argument(first.folder().display().to_string(), reason));
     };
     let (mut config, mut regions, mut all) = (first.config().clone(), Regions::of(&first)?, 0);
-    for piece in pieces {
-        let piece = open(piece)?;
-        check_goes_with(&piece, &first)?;
-        config.crs = with_crs_of(config.crs, &piece)?;
-        if piece.config().rays.region != first.config().rays.region {
+    for shard in shards {
+        let shard = open(shard)?;
+        check_matches(&shard, &first)?;
+        config.crs = with_crs_of(config.crs, &shard)?;
+        if shard.config().rays.region != first.config().rays.region {
             config.rays.region = None;
         }
-        regions.add(&piece)?;
-        all += piece.tile_indices().len() as u64;
+        regions.add(&shard)?;
+        all += shard.tile_indices().len() as u64;
     }
     let mut writer = begin(&first, output.as_ref(), config, regions.one_build(), map_id)?;
     let mut done = 0;
-    writer.link_all(pieces.iter().map(open), || {
+    writer.link_all(shards.iter().map(open), || {
         progress(done, all);
         done += 1;
     })?;
@@ -54,12 +54,12 @@ pub fn join(
     writer.finish()
 }
 
-fn check_goes_with(piece: &MapReader, first: &MapReader) -> Result<()> {
-    check_grid(piece, first)?;
-    check_model(piece, first)?;
-    let [found, wanted] = [piece, first].map(|map| map.map_id().map(|id| hex(&id)).unwrap_or_default());
-    let [storage, wanted_storage] = [piece, first].map(|map| map.config().storage);
-    let path = piece.folder().to_owned();
+fn check_matches(shard: &MapReader, first: &MapReader) -> Result<()> {
+    check_grid(shard, first)?;
+    check_model(shard, first)?;
+    let [found, wanted] = [shard, first].map(|map| map.map_id().map(|id| hex(&id)).unwrap_or_default());
+    let [storage, wanted_storage] = [shard, first].map(|map| map.config().storage);
+    let path = shard.folder().to_owned();
     if found != wanted {
         Err(Error::Mismatch { path, what: "the id", found, wanted })
     } else if storage != wanted_storage {

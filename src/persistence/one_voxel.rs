@@ -58,9 +58,9 @@ struct FileStart<'a> {
 
 impl Read for FileStart<'_> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        let piece = self.location.read_at(self.read, buffer.len())?;
-        buffer[..piece.len()].copy_from_slice(&piece);
-        self.read += piece.len() as u64;
-        Ok(piece.len())
+        let bytes = self.location.read_at(self.read, buffer.len())?;
+        buffer[..bytes.len()].copy_from_slice(&bytes);
+        self.read += bytes.len() as u64;
+        Ok(bytes.len())
     }
 }

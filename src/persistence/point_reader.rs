@@ -9,7 +9,7 @@ pub(crate) struct PointReader {
     decoder: PointDecoder,
 }
 
-const _: () = assert!(MAX_BLOCK_BYTES == store::MAX_BLOCK_BYTES, "a block that is written can be read");
+const _: () = assert!(MAX_BLOCK_BYTES == store::MAX_BLOCK_BYTES, "writer and reader have the same limit");
 
 impl PointReader {
     /// Opens a kept scan.

@@ -128,7 +128,7 @@ impl TileStore {
         let found = recover(&**self.disk(), self.layout(), self.commits(), map_id, listed)?;
         if listed.is_none() && !found.snapshots.found().is_empty() {
             // A version without a list of snapshots wrote the map. The next commit adds it.
-            self.committer.adopt_snapshots(found.snapshots.found().clone());
+            self.committer.set_snapshots(found.snapshots.found().clone());
         }
         self.kept.set_snapshots(found.snapshots);
         self.versions.set_orphans(found.orphans);
@@ -308,7 +308,7 @@ impl TileStore {
         self.committer.is_metadata_behind(self.commits().flush_number)
     }
 
-    /// Returns whether a map of the original format has got a log since it was opened: a writer has upgraded it.
+    /// Returns whether a writer has upgraded a map of the original format since it was opened: the map has a log now.
     pub fn is_upgraded_meanwhile(&self) -> Result<bool> {
         if self.map_id().is_some() {
             return Ok(false);

@@ -146,7 +146,7 @@ fn a_scan_of_more_tiles_than_memory_can_know_of_is_refused_and_the_map_goes_on()
     let folder = memory_folder();
     let config = MapConfig::new(0.1, 0.2).unwrap();
     let mut expected = InMemoryMapper::new(config.clone()).unwrap();
-    let bytes = MemoryLimit::least_bytes(&config.grid);
+    let bytes = MemoryLimit::min_bytes(&config.grid);
     let mut mapper =
         OutOfCoreTileMapper::create(folder.path().join("map"), config.with_memory_bytes(bytes)).unwrap();
     let mut random = Random(3);

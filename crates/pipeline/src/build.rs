@@ -482,7 +482,7 @@ fn config_of_map(options: &BuildOptions, config: &MapConfig) -> MapConfig {
     if let Some(bytes) = config.memory_bytes()
         && !is_standard_input(&options.scans)
     {
-        let least = MemoryLimit::least_bytes(&config.grid).min(bytes);
+        let least = MemoryLimit::min_bytes(&config.grid).min(bytes);
         config.memory = MemoryLimit::Bytes((bytes - (for_reading(bytes) - MIN_FOR_READING)).max(least));
     }
     config

@@ -98,7 +98,7 @@ impl Mapping {
             }
             Err(error) => return Err(error.into()),
         };
-        let least_bytes = MemoryLimit::least_bytes(&mapper.config().grid);
+        let least_bytes = MemoryLimit::min_bytes(&mapper.config().grid);
         ensure!(
             !is_followed || args.remapping_bytes() >= least_bytes,
             "--memory: --path needs {} for maps with such tiles, to have a quarter of it for remapping",

@@ -60,7 +60,7 @@ pub fn set_aside(path: &Path) -> io::Result<PathBuf> {
 /// Opens a map to write to, in about so much memory, or makes one with the voxels of a grid.
 pub fn open_map(folder: &Path, grid: &Grid, memory_bytes: usize) -> anyhow::Result<OutOfCoreTileMapper> {
     let limit = |config: MapConfig| {
-        let least = MemoryLimit::least_bytes(&config.grid);
+        let least = MemoryLimit::min_bytes(&config.grid);
         config.with_memory_bytes(memory_bytes.max(least))
     };
     match MapReader::config_of(folder) {

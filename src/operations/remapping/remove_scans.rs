@@ -75,11 +75,11 @@ pub fn remove_scans(
     let (disk, folder) = map.into().into_parts();
     let path = || MapPath::on(disk.clone(), &folder);
     let (mut removed, is_repeated) = remove_from_map(path, scans, from_snapshots, how, progress)?;
-    let (mut first_error, is_to_go) = (None, from_snapshots && !how.is_dry_run);
+    let (mut first_error, deletes) = (None, from_snapshots && !how.is_dry_run);
     for name in TileStore::open_read_only(disk.clone(), &folder)?.snapshots().names()? {
         // The snapshot `keep_as` is not deleted.
-        let is_to_go = is_to_go && how.keep_as.as_ref() != Some(&name);
-        if let Err(error) = removed.look_at_snapshot(path, name.clone(), scans, is_to_go) {
+        let deletes = deletes && how.keep_as.as_ref() != Some(&name);
+        if let Err(error) = removed.handle_snapshot(path, name.clone(), scans, deletes) {
             removed.snapshots_failed.push(SnapshotFailure { name, reason: format!("{error:#}") });
             first_error.get_or_insert(error);
         }
@@ -136,17 +136,17 @@ fn remove_from_map(
 
 impl ScansRemoved {
     /// Records a snapshot that contains any of the scans, and deletes it if requested.
-    fn look_at_snapshot(
+    fn handle_snapshot(
         &mut self,
         path: impl Fn() -> MapPath,
         name: SnapshotName,
         scans: &ScanSelection,
-        is_to_go: bool,
+        deletes: bool,
     ) -> Result<()> {
         if !holds_any(path(), &name, scans).map_err(may_hold_some)? {
             return Ok(());
         }
-        if is_to_go {
+        if deletes {
             delete_snapshot(path(), &name)?;
             self.snapshots_deleted.push(name);
         } else {

@@ -80,9 +80,9 @@ impl Checkpoint {
         self.finish_snapshots(files)
     }
 
-    /// Returns up to `most` tiles whose committed versions still have their `*.next` names.
-    pub(in crate::store) fn some_unrenamed(&self, most: usize) -> Vec<TileIndex> {
-        self.unrenamed.tiles().take(most).collect()
+    /// Returns up to `max` tiles whose committed versions still have their `*.next` names.
+    pub(in crate::store) fn some_unrenamed(&self, max: usize) -> Vec<TileIndex> {
+        self.unrenamed.tiles().take(max).collect()
     }
 
     /// Keeps the current tables of those tiles that the last commit replaces or removes, if a reader or a snapshot uses

@@ -105,7 +105,7 @@ impl Committer {
     }
 
     /// Sets the list of snapshots to those found. The next commit records it.
-    pub(in crate::store) fn adopt_snapshots(&mut self, found: SnapshotList) {
+    pub(in crate::store) fn set_snapshots(&mut self, found: SnapshotList) {
         self.listed = Some(found);
         self.is_list_logged = false;
     }

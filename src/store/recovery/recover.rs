@@ -245,7 +245,7 @@ fn look_at_tile(
                 let in_place = content_of(disk, &layout.current(tile, file), committed)?;
                 if in_place != Content::Committed {
                     // If neither is the committed version, the tile is damaged, which reading it reports. Keep both.
-                    unrenamed |= waits.is_committed_beside(in_place);
+                    unrenamed |= waits.is_only_committed(in_place);
                     continue;
                 }
             }
@@ -287,7 +287,7 @@ fn look_without_names(
         let committed = version.of(file);
         let waits = content_of(disk, &layout.next(tile, file), committed)?;
         let in_place = content_of(disk, &layout.current(tile, file), committed)?;
-        if in_place != Content::Committed && waits.is_committed_beside(in_place) {
+        if in_place != Content::Committed && waits.is_only_committed(in_place) {
             return Ok(State::Unrenamed);
         }
     }
@@ -340,7 +340,7 @@ enum Content {
 impl Content {
     /// Returns whether a `*.next` file is the committed version and the current file is not. An unreadable `*.next`
     /// file counts if the current file is another version, because no other file can be the committed version.
-    fn is_committed_beside(self, in_place: Self) -> bool {
+    fn is_only_committed(self, in_place: Self) -> bool {
         self == Self::Committed || self == Self::Unreadable && in_place == Self::Other
     }
 }

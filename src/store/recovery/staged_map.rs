@@ -73,7 +73,7 @@ impl<W> StagedMap<W> {
 
     /// Writer of the map.
     pub fn writer(&mut self) -> &mut W {
-        self.writer.as_mut().expect("taken by finish alone, which takes the map")
+        self.writer.as_mut().expect("only `finish` takes the writer, and it consumes the map")
     }
 
     /// Renames the map to its final path. All commits are visible from then on, and durable when this returns.

@@ -271,8 +271,8 @@ pub(crate) fn whole_fronts(disk: &dyn Disk, layout: &Layout, fronts: &[CatalogVe
     let mut buffer = vec![0; 1 << 16];
     for at in order {
         while read < fronts[at].bytes {
-            let most = (fronts[at].bytes - read).min(buffer.len() as u64) as usize;
-            match input.read(&mut buffer[..most]) {
+            let length = (fronts[at].bytes - read).min(buffer.len() as u64) as usize;
+            match input.read(&mut buffer[..length]) {
                 Ok(0) => return are_whole,
                 Ok(bytes) => {
                     crc.update(&buffer[..bytes]);

@@ -35,7 +35,7 @@ pub fn keeping_scans() -> MapConfig {
 
 /// Replays kept scans in the least memory.
 pub fn rework() -> Replay {
-    Replay::default().with_memory(MemoryLimit::Bytes(MemoryLimit::least_bytes(&config().grid)))
+    Replay::default().with_memory(MemoryLimit::Bytes(MemoryLimit::min_bytes(&config().grid)))
 }
 
 /// A mapper of the map, which is created if there is none.

@@ -87,7 +87,7 @@ impl Case {
     ///
     /// As for [`Case::config`].
     pub fn least_bytes(&self) -> Result<usize> {
-        Ok(MemoryLimit::least_bytes(&self.config(Limit::InMemory)?.grid))
+        Ok(MemoryLimit::min_bytes(&self.config(Limit::InMemory)?.grid))
     }
 
     /// Whether the scans follow each other along a way, so that its length says how far the map has come.

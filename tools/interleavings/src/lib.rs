@@ -99,7 +99,7 @@ mod persistence {
     }
     /// The scheduler has threads of its own, and no order among them is to be left out.
     mod priority {
-        pub(super) fn give_way() {}
+        pub(super) fn lower_priority() {}
     }
     mod tile_saver {
         source!("tile_saver.rs");

@@ -21,7 +21,7 @@ pub fn answer(setting: &Setting) -> Result<Findings> {
         let resolution_m = [0.05, 0.1, 0.2, 0.5][random.below(4) as usize];
         let tile_voxels = [2.0, 3.0, 4.0, 9.0, 16.0, 31.0, 50.0, 64.0][random.below(8) as usize];
         let tile_size_m = tile_voxels * resolution_m;
-        let least = MemoryLimit::least_bytes(&Grid::new(resolution_m, tile_size_m)?).div_ceil(1 << 20);
+        let least = MemoryLimit::min_bytes(&Grid::new(resolution_m, tile_size_m)?).div_ceil(1 << 20);
         // Voxels of all rays, so that each takes a second or two.
         let voxels = random.between(1e5, setting.size(2e8, 1e7));
         let rays = 10_f64.powf(random.between(1.0, 5.3)).min(voxels);
