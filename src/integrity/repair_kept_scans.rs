@@ -172,7 +172,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         Ok(())
     }
 
-    /// Moves scans that no snapshot needs to quarantine if it is unknown whether the map keeps its scans. The next
+    /// Moves scans to quarantine that no snapshot needs, if it is unknown whether the map keeps its scans. The next
     /// writer would remove them, and without a log the last committed catalog is unknown.
     pub(super) fn quarantine_unlisted_scans(&mut self, disk: &Arc<dyn Disk>, index: &Index) -> Result<()> {
         let Index { map_id, metadata, commits, .. } = index;
@@ -197,7 +197,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         Ok(())
     }
 
-    /// Moves scans that were kept for lost snapshots to quarantine.
+    /// Moves scans to quarantine that were kept for lost snapshots.
     pub(super) fn quarantine_unneeded_scans(
         &mut self,
         store: &TileStore,

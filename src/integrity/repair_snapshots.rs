@@ -141,7 +141,7 @@ impl<F: FnMut(&Action), P: FnMut(u64, u64)> Repairer<'_, F, P> {
         }
     }
 
-    /// Moves kept tables that none of the readable snapshots uses to quarantine: an unreadable one may have used them.
+    /// Moves kept tables to quarantine that no readable snapshot uses. An unreadable snapshot may have used them.
     fn quarantine_unseen(&mut self, store: &TileStore, snapshots: &[Snapshot]) -> Result<()> {
         let mut kept: Vec<_> = store.snapshots().kept_tables().collect();
         kept.sort_unstable();

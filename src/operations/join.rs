@@ -12,8 +12,8 @@ use std::path::Path;
 /// The result equals that of [`merge`](super::merge()), but no tile is read: the files get hard links in the map, or
 /// are copied if the file system has none. Shards are opened one at a time and are unchanged. So a killed attempt can
 /// be repeated, which removes its remains. The shards must not have a writer. Removing them does not affect the map.
-/// The map appears only when it is complete, see [`MapWriter`](super::MapWriter), on the disk of the shards. `progress`
-/// receives the number of tiles done and in total.
+/// The map is created on the disk of the shards, and appears only when it is complete, see
+/// [`MapWriter`](super::MapWriter). `progress` receives the number of tiles done and in total.
 ///
 /// # Errors
 ///

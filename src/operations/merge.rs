@@ -41,8 +41,8 @@ pub struct Merged {
 ///
 /// The new map has its own id and no scans, unless the maps are regions of one build
 /// ([`RayConfig::region`](crate::RayConfig)) that together form a box: then the result equals one build of that box,
-/// and can be resumed. The map appears only when it is complete, see [`MapWriter`], on the disk of the first map.
-/// `progress` receives the number of tiles done and in total.
+/// and can be resumed. The map is created on the disk of the first map, and appears only when it is complete, see
+/// [`MapWriter`]. `progress` receives the number of tiles done and in total.
 ///
 /// # Errors
 ///

@@ -92,7 +92,7 @@ impl TileStore {
                     files.push(self.at_places(octree, vec![self.layout().next(tile, TileFile::Octree)]));
                 }
             }
-            // A map of the original format has no log, hence no versions.
+            // A map of the original format has no log and no versions.
             None if self.tiles().contains(tile) => {
                 for file in self.layout().files() {
                     let path = self.layout().current(tile, *file);

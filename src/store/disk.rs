@@ -9,7 +9,7 @@ use std::time::Duration;
 
 /// Interface to the file system, with one method for each operation on a map's files.
 ///
-/// [`FsDisk`](super::FsDisk) is the file system. Tests use disks that fail, fill up or crash.
+/// [`FsDisk`](super::FsDisk) implements it with the operating system. Tests use disks that fail, fill up or crash.
 pub trait Disk: Debug + Send + Sync {
     /// Opens a regular file for reading. Other kinds of files, including symbolic links, are an error of kind
     /// `InvalidInput`.

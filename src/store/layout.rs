@@ -99,7 +99,7 @@ impl Layout {
         self.folder.join(KEPT_SCANS)
     }
 
-    /// A catalog of kept scans. Each flush that changes the kept scans names one.
+    /// A catalog of kept scans. `generation` is the number of the flush that created it.
     pub(super) fn catalog(&self, generation: u64) -> PathBuf {
         self.kept_scans().join(format!("{CATALOG_PREFIX}{generation}"))
     }

@@ -293,7 +293,7 @@ impl TileStore {
     /// Does the steps after the commit record: `metadata.json`, renames, removals, log compaction. After an I/O error
     /// the next call resumes.
     pub(in crate::store) fn finish_commit(&mut self) -> Result<()> {
-        // First: a reader that opens the map before this cannot report which flush it reads.
+        // First, because the writer cannot detect which flush is read by readers that open the map before this.
         if self.committer.written_flush() != Some(self.commits().flush_number) {
             self.write_metadata()?;
         }

@@ -70,7 +70,7 @@ pub struct Extension {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scan_records: Option<u64>,
     /// Snapshots of the map; in the file of a snapshot, only itself. `None` before the first snapshot, and in maps of
-    /// versions that had no list: every file in the folder of snapshots is one then.
+    /// versions without a list: then every file in the folder of snapshots is a snapshot.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub snapshots: Option<SnapshotList>,
 }

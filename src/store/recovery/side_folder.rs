@@ -14,8 +14,7 @@ pub struct SideFolder {
 }
 
 impl SideFolder {
-    /// Prepares the folder next to `map`, without creating it: [`TileStore::create`](crate::store::TileStore::create)
-    /// does.
+    /// Prepares the path next to `map`. [`TileStore::create`](crate::store::TileStore::create) creates the folder.
     ///
     /// # Errors
     ///

@@ -214,7 +214,8 @@ impl SnapshotWriter<'_> {
     ///
     /// # Errors
     ///
-    /// An I/O error, or a damaged catalog of the map itself in a map of a version that did not name it.
+    /// An I/O error, or a damaged catalog of the map itself, if an older version wrote the map and did not record its
+    /// catalog.
     pub(crate) fn write_catalog(
         &mut self,
         write: impl FnOnce(&mut dyn FnMut(&CatalogEntry) -> Result<()>) -> Result<()>,
