@@ -69,7 +69,6 @@ impl Finding {
         }
     }
 
-    /// Converts an error of the medium to a finding.
     fn unreadable(error: &Error, tile: Option<TileIndex>) -> Self {
         let Error::Io { path, action, cause } = error else {
             return Self::damage(Path::new(""), tile, &FormatError::at_offset(0, format!("{error:#}")));

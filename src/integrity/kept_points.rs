@@ -10,7 +10,6 @@ fn location_of(place: SegmentPlace) -> Location {
     (place.segment, place.offset, place.bytes)
 }
 
-/// Set of locations of kept points.
 #[derive(Debug, Default)]
 pub(super) struct KeptLocations(BTreeSet<Location>);
 

@@ -73,7 +73,6 @@ struct Check<'a> {
 }
 
 impl Check<'_> {
-    /// Reads the versions of a catalog.
     fn read(&mut self, catalogs: Vec<Needed>) -> Result<()> {
         let fronts: Vec<_> = catalogs.iter().filter_map(|needed| needed.as_of.catalog).collect();
         let are_whole = whole_fronts(self.disk, self.layout, &fronts);

@@ -280,7 +280,6 @@ impl Index {
     }
 }
 
-/// Returns the catalog of kept scans that `metadata.json` names.
 fn catalog_of(written: Option<&Metadata>) -> Option<CatalogVersion> {
     written?.ext.as_ref()?.catalog
 }

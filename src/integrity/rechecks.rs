@@ -41,7 +41,6 @@ impl Rechecks {
         }
     }
 
-    /// Number of parts.
     pub(super) fn len(&self) -> u64 {
         let some = [self.list, self.snapshots, self.catalogs].into_iter().filter(|&is_one| is_one).count();
         (some + self.points.len() + self.tiles.len() + self.folders.len()) as u64

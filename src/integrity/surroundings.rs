@@ -18,11 +18,9 @@ pub(super) const IDLE_SCANS: &str = "points or a list of scans that neither the 
                                      process left them, or a writer is about to commit them. They may contain \
                                      removed scans.";
 
-/// Note on `MAP.remapping`.
 const SECOND_MAP: &str = "the second map of an online remap that is running or was killed. The next online remap \
                           removes it, and so do `remove-scans` and `remove-points`.";
 
-/// Note on `MAP.unfinished`.
 const UNFINISHED_MAP: &str = "a map that `voxtile pull --replace` is downloading, or the old map that it replaced. The \
                               next `voxtile pull --replace` removes it.";
 

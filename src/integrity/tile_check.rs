@@ -76,7 +76,6 @@ fn check_octree(
     }))
 }
 
-/// Writes the octree file of a table.
 pub(super) fn write_octree(config: &MapConfig, table: &ReadTable, out: &mut dyn Write) -> io::Result<()> {
     let threshold = config.occupied_log_odds() as f32;
     table.table.write_bt(config.grid.resolution_m(), threshold, &mut &mut *out)

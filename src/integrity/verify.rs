@@ -285,7 +285,6 @@ impl<F: FnMut(&Finding), P: FnMut(u64, u64)> Verifier<'_, F, P> {
         self.verify_kept_scans(store, None)
     }
 
-    /// Reports entries that are not part of the map.
     fn verify_surroundings(&mut self, store: &TileStore) -> Result<()> {
         if !self.scope.has_rest() {
             return Ok(());

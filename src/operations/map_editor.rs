@@ -72,14 +72,12 @@ impl MapEditor {
         self.store.metadata().ext.as_ref()
     }
 
-    /// Returns the map's tiles, in order.
     pub(super) fn tiles(&self) -> Vec<TileIndex> {
         let mut tiles: Vec<_> = self.store.tiles().iter().collect();
         tiles.sort_unstable();
         tiles
     }
 
-    /// Version of a tile.
     pub(super) fn version(&self, tile: TileIndex) -> Option<TileVersion> {
         self.store.tiles().version(tile)
     }
@@ -101,7 +99,6 @@ impl MapEditor {
         Ok(())
     }
 
-    /// Removes a tile from the map.
     pub(super) fn remove(&mut self, tile: TileIndex) -> Result<()> {
         self.begin_writing()?;
         self.store.remove(tile)

@@ -132,7 +132,6 @@ pub(super) fn begin(
     Ok(writer)
 }
 
-/// Returns whether every tile is in one map only.
 pub(super) fn have_no_common_tile(maps: &[MapReader]) -> bool {
     let mut seen = BTreeSet::new();
     maps.iter().flat_map(MapView::tile_indices).all(|tile| seen.insert(tile))

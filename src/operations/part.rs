@@ -56,7 +56,6 @@ impl VoxelPart {
         Self { is_outside: !self.is_outside, ..self }
     }
 
-    /// Returns the share of a tile with these voxels.
     pub(super) fn share_of(&self, tile: &VoxelBox) -> Share {
         let common = self.voxels.intersection(tile);
         match (common.is_empty(), common == *tile) {

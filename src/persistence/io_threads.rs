@@ -67,12 +67,10 @@ impl IoThreads {
         self.loading_bytes + self.saving_bytes
     }
 
-    /// Returns whether another tile can be saved now.
     pub(crate) fn can_save(&self) -> bool {
         self.saver.in_flight() < MAX_IN_FLIGHT
     }
 
-    /// Starts to save a tile.
     pub(crate) fn save(&mut self, writer: TileWriter, index: TileIndex, tile: CompactTile, scan_number: u64) {
         self.saving_bytes += tile.bytes_to_save();
         self.saving.push_back(index);
@@ -84,7 +82,6 @@ impl IoThreads {
         self.saving.contains(&index)
     }
 
-    /// Returns a finished save, if there is one.
     pub(crate) fn take_saved(&mut self) -> Option<Saved> {
         let saved = self.saver.take()?;
         self.save_ended(&saved);
@@ -111,12 +108,10 @@ impl IoThreads {
         self.saving.pop_front();
     }
 
-    /// Returns whether another tile can be loaded now.
     pub(crate) fn can_load(&self) -> bool {
         self.loader.in_flight() < MAX_IN_FLIGHT
     }
 
-    /// Returns whether the tile is being loaded.
     pub(crate) fn is_loading(&self, index: TileIndex) -> bool {
         self.loading.contains_key(&index)
     }
@@ -128,7 +123,6 @@ impl IoThreads {
         self.loader.give(Load { location });
     }
 
-    /// Returns a finished load, if there is one.
     pub(crate) fn take_loaded(&mut self) -> Option<Loaded> {
         let loaded = self.loader.take()?;
         self.load_ended(loaded.index);

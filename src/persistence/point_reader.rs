@@ -36,7 +36,6 @@ impl PointReader {
         Ok(true)
     }
 
-    /// Checks the number of intensities of a block.
     pub(crate) fn check_intensities(&self, points: usize, intensities: usize, has_any: bool) -> Result<()> {
         match intensities == if has_any { points } else { 0 } {
             true => Ok(()),

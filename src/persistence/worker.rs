@@ -52,7 +52,6 @@ impl<Job: Send + 'static, Done: Send + 'static> Worker<Job, Done> {
         self.in_flight
     }
 
-    /// Submits a job.
     pub(crate) fn give(&mut self, job: Job) {
         self.in_flight += 1;
         if self.thread.is_none() && !self.has_no_thread {

@@ -37,7 +37,6 @@ impl MapFiles {
         }
     }
 
-    /// Removes a file if it exists.
     pub(super) fn remove_file(&self, path: &Path) -> Result<()> {
         match self.disk.remove_file(path) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
@@ -53,7 +52,6 @@ impl MapFiles {
         self.disk.sync_folder(folder).map_err(|error| Error::io(folder, "sync", error))
     }
 
-    /// Makes the names in the map's folder durable.
     pub(super) fn sync_map_folder(&self) -> Result<()> {
         self.sync_folder(self.folder())
     }

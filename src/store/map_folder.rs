@@ -82,14 +82,12 @@ pub(super) fn remove_unless_used(disk: &dyn Disk, folder: &Path) -> io::Result<(
     }
 }
 
-/// Writes and syncs a text file.
 pub(super) fn write_text(disk: &dyn Disk, path: &Path, text: &str) -> io::Result<()> {
     let mut out = disk.create(path)?;
     out.write_all(text.as_bytes())?;
     out.sync()
 }
 
-/// Reads `metadata.json`.
 pub(super) fn read_metadata(disk: &dyn Disk, layout: &Layout) -> Result<Metadata> {
     let path = layout.metadata();
     match disk.open(&path) {

@@ -34,9 +34,7 @@ pub struct TileStore {
     pub(super) committer: Committer,
     /// Work that the last commit left.
     pub(super) checkpoint: Checkpoint,
-    /// Scans in the map.
     pub(super) scans: ScanList,
-    /// Kept scans.
     pub(super) archive: ScanArchive,
     /// Replaced tables that readers and snapshots use. Only a writer fills it.
     pub(super) kept: KeptTables,

@@ -21,8 +21,8 @@ pub struct Rebuilt {
 /// Creates another map from the scans that a map keeps, with other parameters. `rays` changes the ray settings of each
 /// scan. The region is that of the source map, regardless of `config`, converted to the new tile size.
 ///
-/// `progress` receives the number of scans done and in total. The new map keeps scans if `config.keeps_scans` is set. It
-/// appears only when it is complete; until then it is in `MAP.unfinished`.
+/// `progress` receives the number of scans done and in total. The new map keeps scans if `config.keeps_scans` is set.
+/// It appears only when it is complete; until then it is in `MAP.unfinished`.
 ///
 /// # Errors
 ///

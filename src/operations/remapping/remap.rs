@@ -108,7 +108,6 @@ impl Remapped {
         Ok((remapped, changes))
     }
 
-    /// Returns whether a scan gets a new pose.
     fn moves(&mut self, scan: &KeptScanHead, new: &Pose, tolerance: Option<(f64, f64)>) -> Result<bool> {
         let Some(old) = scan.world_from_sensor else {
             let reason = format!(

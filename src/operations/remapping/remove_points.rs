@@ -62,7 +62,6 @@ pub fn remove_points(
     Ok(PointsRemoved { mapped, points_removed })
 }
 
-/// Checks the argument `region`.
 fn check_region(region: &Aabb, map: &Path) -> Result<()> {
     let is_box = (0..3).all(|axis| region.min[axis] < region.max[axis]);
     if is_box {

@@ -186,7 +186,6 @@ impl Selection {
         }
     }
 
-    /// Returns the removal of each kept and selected scan.
     fn removals(&self, scans: &KeptSummary) -> Changes {
         let selected = scans.scans().iter().filter(|scan| self.has(scan));
         selected.map(|scan| (scan.number, Change::Remove)).collect()
@@ -230,7 +229,6 @@ fn none_selected(scans: &ScanSelection, reader: &MapReader) -> Error {
     Error::argument("scans", format!("the map keeps none {described}"))
 }
 
-/// Returns whether a snapshot keeps any of these scans.
 fn holds_any(map: MapPath, name: &SnapshotName, scans: &ScanSelection) -> Result<bool> {
     let past = MapReader::open_snapshot(map, name, 0)?;
     let selection = Selection::of(scans, &past);

@@ -111,7 +111,6 @@ pub(super) fn create_snapshot(store: &mut TileStore, how: &Replay) -> Result<()>
     store.snapshot_writer().create(name)
 }
 
-/// Removes uncommitted files after an error.
 pub(super) fn clean_up_after_error<T>(disk: Arc<dyn Disk>, folder: &Path, outcome: Result<T>) -> Result<T> {
     if outcome.is_err()
         && let Err(error) = TileStore::open(disk, folder)

@@ -22,7 +22,6 @@ pub(super) enum Change {
     Filter(Aabb),
 }
 
-/// Changes of scans by their numbers.
 pub(super) type Changes = FxHashMap<u64, Change>;
 
 /// If more than one third of all updates belong to changed scans, all tiles are replayed: finding the affected tiles
@@ -77,7 +76,6 @@ impl Revision {
         Self { disk: scans.place().0, how: how.clone(), changes, segments, changed_updates, counts }
     }
 
-    /// Returns whether points are removed from the map.
     pub(super) fn takes_points(&self) -> bool {
         !self.segments.is_empty()
     }

@@ -65,7 +65,6 @@ pub(in crate::store) fn whole_map_bytes(tiles: usize) -> u64 {
 }
 
 impl<'a> Flush<'a> {
-    /// Returns the whole map as of its last flush.
     pub(in crate::store) fn of_all(commits: &'a Commits, metadata_text: &'a str) -> Self {
         Self {
             number: commits.flush_number,

@@ -50,12 +50,10 @@ impl Committer {
         self.is_log_settled = !is_torn;
     }
 
-    /// Returns whether the map may be written.
     pub(in crate::store) fn is_writer(&self) -> bool {
         self.lock.is_some()
     }
 
-    /// Checks that the lock is still effective.
     pub(in crate::store) fn check_lock(&self) -> Result<()> {
         self.lock.as_ref().map_or(Ok(()), WriterLock::check)
     }
@@ -79,7 +77,6 @@ impl Committer {
         self.log.ok_or_else(|| Error::argument("map", reason))
     }
 
-    /// Metadata as last read or written.
     pub(in crate::store) fn metadata(&self) -> &Metadata {
         &self.metadata
     }

@@ -71,7 +71,6 @@ impl InputRecord {
         self.content.as_ref()?.begins_with.as_deref()
     }
 
-    /// Truncates a name that is too long.
     pub(crate) fn cut_name(&mut self) {
         self.name.truncate(beginning_of(&self.name).len());
     }

@@ -98,7 +98,6 @@ impl<'a> Quarantine<'a> {
         Ok(Some(to))
     }
 
-    /// Returns an unused path in quarantine.
     fn place_for(&self, path: &Path) -> Result<PathBuf> {
         let folder = self.layout.quarantine();
         if self.kind(&folder)?.is_none() {

@@ -188,7 +188,6 @@ impl std::fmt::Debug for Input {
     }
 }
 
-/// Writer of records to a catalog.
 pub(super) struct CatalogWriter {
     out: BufWriter<Box<dyn DiskWrite>>,
     generation: u64,
@@ -198,7 +197,6 @@ pub(super) struct CatalogWriter {
 }
 
 impl CatalogWriter {
-    /// Creates a catalog.
     pub(super) fn create(disk: &dyn Disk, layout: &Layout, generation: u64) -> io::Result<Self> {
         let mut out = BufWriter::new(disk.create(&layout.catalog(generation))?);
         out.write_all(&HEADER)?;
@@ -328,7 +326,6 @@ impl KeptAsOf {
     /// A flush later than all others.
     pub(crate) const NEWEST: Self = Self { flush_number: MAX_NUMBER, scan_number: MAX_NUMBER, catalog: None };
 
-    /// Returns the kept scans as of the last commit.
     pub(in crate::store) fn last_of(commits: &Commits) -> Self {
         let Commits { flush_number, scan_number, catalog, .. } = *commits;
         Self { flush_number, scan_number, catalog }
@@ -359,7 +356,6 @@ impl KeptAsOf {
 pub(crate) struct KeptRecords(Option<(CatalogReader, u64)>);
 
 impl KeptRecords {
-    /// Opens the list as of a flush.
     pub(crate) fn open(disk: &dyn Disk, layout: &Layout, as_of: KeptAsOf) -> Result<Self> {
         let Some(generation) = as_of.generation(disk, layout)? else {
             return if as_of.scan_number == 0 { Ok(Self(None)) } else { Err(KeptAsOf::no_catalog(layout)) };

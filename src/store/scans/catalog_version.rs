@@ -24,12 +24,10 @@ impl CatalogVersion {
         (self.generation..=last.max(self.generation)).contains(&flush_number)
     }
 
-    /// Length and checksum of the valid part.
     pub(super) fn checksum(self) -> FileChecksum {
         FileChecksum { bytes: self.bytes, crc: self.crc32 }
     }
 
-    /// Returns whether there is a catalog.
     pub(in crate::store) fn is_there(self) -> bool {
         self != Self::NONE
     }

@@ -95,7 +95,6 @@ impl fmt::Debug for SegmentWriter {
 }
 
 impl ScanArchive {
-    /// Returns the archive of an opened map.
     pub(in crate::store) fn new(files: MapFiles, is_on: bool, last_commit: KeptAsOf) -> Self {
         Self {
             files,
@@ -121,12 +120,10 @@ impl ScanArchive {
         self.is_on
     }
 
-    /// Kept scans as of the last commit.
     pub(crate) fn last_commit(&self) -> KeptAsOf {
         self.last_commit
     }
 
-    /// Sets the last commit.
     pub(in crate::store) fn set_last_commit(&mut self, commits: &Commits) {
         self.last_commit = KeptAsOf::last_of(commits);
     }
@@ -182,12 +179,10 @@ impl ScanArchive {
         self.highest_segment = self.highest_segment.max(segment);
     }
 
-    /// Returns whether there are changes for the next commit.
     pub(in crate::store) fn has_news(&self) -> bool {
         !self.pending.is_empty() || self.replacement.is_some()
     }
 
-    /// Memory in bytes.
     pub(in crate::store) fn bytes(&self) -> usize {
         let heap: usize = self.pending.iter().map(CatalogEntry::heap_bytes).sum();
         self.pending.capacity() * size_of::<CatalogEntry>() + heap
@@ -384,7 +379,6 @@ impl ScanArchive {
         self.begun_entries = self.pending.len();
     }
 
-    /// Segments with scans that are not durable.
     pub(in crate::store) fn unsynced(&self) -> Vec<u64> {
         self.unsynced.iter().copied().collect()
     }
@@ -586,7 +580,6 @@ fn remove_catalogs_after(files: &MapFiles, committed_flush: u64) -> Result<()> {
     Ok(())
 }
 
-/// Lists the segments of a map, in order.
 fn segments_in(disk: &dyn Disk, layout: &Layout) -> Result<Vec<u64>> {
     let folder = layout.kept_scans();
     let names = disk.list(&folder).map_err(|error| Error::io(&folder, "list", error))?;

@@ -25,7 +25,6 @@ pub(in crate::store) struct ScanList {
     quarantined: Option<PathBuf>,
 }
 
-/// Result of reading the file.
 struct Found {
     committed: Extent,
     has_excess: bool,
@@ -35,7 +34,6 @@ struct Found {
 /// Leading part of the file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(in crate::store) struct Extent {
-    /// Number of records.
     pub(in crate::store) records: u64,
 }
 
@@ -55,12 +53,10 @@ impl ScanList {
         self.pending.push(Entry::Rewind(to_flush));
     }
 
-    /// Memory in bytes.
     pub(in crate::store) fn bytes(&self) -> usize {
         self.pending.capacity() * size_of::<Entry>()
     }
 
-    /// Number of entries for the next commit.
     pub(in crate::store) fn pending(&self) -> usize {
         self.pending.len()
     }

@@ -13,7 +13,6 @@ pub struct ScanRecord {
     pub origin_m: Point,
 }
 
-/// Record of the file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Entry {
     Scan(ScanRecord),

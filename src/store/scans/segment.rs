@@ -23,7 +23,6 @@ pub(super) struct SegmentWriter {
 }
 
 impl SegmentWriter {
-    /// Creates a segment.
     pub(super) fn create(disk: &dyn Disk, layout: &Layout, segment: u64) -> Result<Self> {
         let path = layout.segment(segment);
         let out = disk.create(&path).map_err(|error| Error::io(&path, "create", error))?;

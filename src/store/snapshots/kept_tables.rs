@@ -17,7 +17,6 @@ impl KeptTables {
         self.readers.look();
     }
 
-    /// Returns whether a reader has the map open.
     pub(in crate::store) fn has_readers(&self) -> bool {
         self.readers.are_there()
     }
@@ -32,7 +31,6 @@ impl KeptTables {
         self.readers.may_see(flush_number);
     }
 
-    /// Tables that snapshots use.
     pub(in crate::store) fn snapshots(&self) -> &SeenTables {
         &self.snapshots
     }
@@ -89,7 +87,6 @@ impl KeptTables {
         self.readers.release(disk, files.layout(), &self.snapshots);
     }
 
-    /// Approximate memory in bytes.
     pub(in crate::store) fn bytes(&self) -> usize {
         self.snapshots.bytes() + self.readers.bytes()
     }

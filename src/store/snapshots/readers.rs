@@ -46,12 +46,10 @@ impl Readers {
         self.added.insert(tile, flush_number);
     }
 
-    /// Returns whether a reader has the map open.
     pub(in crate::store) fn are_there(&self) -> bool {
         self.watched.iter().any(|watched| watched.watch.has_readers())
     }
 
-    /// Approximate memory in bytes.
     pub(in crate::store) fn bytes(&self) -> usize {
         kept_flushes_bytes(&self.kept) + hash_table_bytes::<(TileIndex, u64)>(self.added.capacity())
     }

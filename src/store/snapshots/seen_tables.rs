@@ -103,7 +103,6 @@ impl SeenTables {
         Ok(())
     }
 
-    /// Snapshots that were found, with their flushes.
     pub(in crate::store) fn found(&self) -> &SnapshotList {
         &self.found
     }
@@ -154,12 +153,10 @@ impl SeenTables {
         self.shared.remove(tile);
     }
 
-    /// Kept tables that a snapshot uses.
     pub(in crate::store) fn pinned(&self) -> &KeptFlushes {
         &self.pinned
     }
 
-    /// Approximate memory in bytes.
     pub(in crate::store) fn bytes(&self) -> usize {
         self.shared.bytes() + kept_flushes_bytes(&self.pinned)
     }

@@ -12,7 +12,6 @@ pub struct SnapshotList(BTreeMap<SnapshotName, Option<u64>>);
 pub(in crate::store) const MAX_SNAPSHOTS: usize = 4096;
 
 impl SnapshotList {
-    /// Returns a list with one snapshot.
     pub(in crate::store) fn of(name: SnapshotName, flush_number: u64) -> Self {
         Self(BTreeMap::from([(name, Some(flush_number))]))
     }
@@ -52,7 +51,6 @@ impl SnapshotList {
         self.0.is_empty()
     }
 
-    /// All known flushes.
     pub(in crate::store) fn flushes(&self) -> impl Iterator<Item = u64> {
         self.0.values().copied().flatten()
     }

@@ -120,7 +120,6 @@ impl TileVersions {
         self.next.remove(tile);
     }
 
-    /// Records that the next commit removes a tile.
     pub(in crate::store) fn remove(&mut self, tile: TileIndex) {
         self.drop_next(tile);
         if self.commits.tiles.contains(tile) {
@@ -128,12 +127,10 @@ impl TileVersions {
         }
     }
 
-    /// Versions written since the last commit.
     pub(in crate::store) fn next(&self) -> &TileTable<TileVersion> {
         &self.next
     }
 
-    /// Tiles that the next commit removes, in order.
     pub(in crate::store) fn removed(&self) -> Vec<TileIndex> {
         sorted(&self.removed)
     }
