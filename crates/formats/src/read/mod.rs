@@ -8,6 +8,7 @@ pub(crate) mod bin;
 mod bin_columns;
 pub(crate) mod cloud;
 mod columns;
+#[cfg(any(feature = "las", feature = "e57"))]
 mod crs_unit;
 pub(crate) mod depth;
 mod depth_frames;
@@ -54,7 +55,6 @@ mod laz_head;
 #[cfg(feature = "las")]
 mod laz_points;
 mod left_out;
-#[cfg(any(feature = "las", feature = "e57"))]
 pub(crate) mod lines;
 pub(crate) mod listing;
 mod lzf;
