@@ -9,8 +9,8 @@ use crate::space::{TileBox, TileIndex, TileSelection, VoxelIndex};
 use crate::tile::{OctreeFactory, Tile};
 use rayon::prelude::*;
 
-/// A map that lives in memory and ends with it. It has tiles too, and gives the answers of an
-/// [`OutOfCoreTileMapper`](super::OutOfCoreTileMapper) to the bit.
+/// Map that is kept in memory only. It is divided into tiles and gives bit-identical answers to an
+/// [`OutOfCoreTileMapper`](super::OutOfCoreTileMapper).
 ///
 /// ```
 /// use voxtile::{InMemoryMapper, MapConfig, Mapper, Queries, Scan};
@@ -27,18 +27,18 @@ use rayon::prelude::*;
 pub struct InMemoryMapper {
     config: MapConfig,
     tiles: TileMap,
-    /// After the tiles: what is in flight to octrees goes with these, and need not be written any more.
+    /// Declared after `tiles`, so that the tiles are dropped first and discard updates still queued for octrees.
     octrees: OctreeFactory,
     tracer: ScanTracer,
     scan_number: u64,
 }
 
 impl InMemoryMapper {
-    /// An empty map.
+    /// Creates an empty map.
     ///
     /// # Errors
     ///
-    /// The first argument of the configuration that is wrong.
+    /// Fails with the first invalid argument of the configuration.
     pub fn new(config: MapConfig) -> Result<Self> {
         let config = config.validated()?;
         let tiles = TileMap::new(&config.grid);

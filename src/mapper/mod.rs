@@ -1,4 +1,4 @@
-//! Maps: two mappers behind one trait with equal answers, and a reader that works beside a writer.
+//! Maps: two mappers with one trait and identical answers, and a reader that may be used while a writer is active.
 //!
 //! | | [`InMemoryMapper`] | [`OutOfCoreTileMapper`] | [`MapReader`] |
 //! |---|---|---|---|
@@ -10,9 +10,9 @@
 //! insert_points -> scan::trace -> updates by tile -> paging: resident tiles, write buffer -> persistence -> store
 //! ```
 //!
-//! A file of OctoMap is a map to be asked, too: [`OctreeMap`].
+//! [`OctreeMap`] makes an OctoMap file queryable as a map.
 //!
-//! How tiles move between memory and disk is in `paging`.
+//! `paging` moves tiles between memory and disk.
 
 mod in_memory;
 mod kept_scan;

@@ -4,7 +4,7 @@ use crate::tile::Tile;
 use lru::LruCache;
 use std::sync::Arc;
 
-/// Tiles that readers made of a stored form without updates, in the order of their last use.
+/// Cache of tiles that readers built from a stored form without updates, in the order of their last use.
 #[derive(Debug)]
 pub(super) struct ReadTiles {
     tiles: LruCache<TileIndex, ReadTile>,
@@ -24,7 +24,7 @@ impl ReadTiles {
         Self { tiles: LruCache::unbounded(), bytes: 0, most_bytes }
     }
 
-    /// The tile made of this form, if it is here.
+    /// Returns the tile built from this form, if it is cached.
     pub(super) fn get(&mut self, index: TileIndex, base: &Base) -> Option<Arc<Tile>> {
         let read = self.tiles.get(&index).filter(|read| read.made_of.is_same(base))?;
         Some(read.tile.clone())

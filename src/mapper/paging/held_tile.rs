@@ -3,8 +3,8 @@ use crate::space::TileIndex;
 use crate::tile::Tile;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// A resident tile that a flush beside the mapper is to write. Until that begins, the mapper may leave it the compact
-/// form instead: then the tile itself can leave memory.
+/// Resident tile that a background flush will write. Until the write begins, the mapper may replace it by its compact
+/// form and evict the tile.
 #[derive(Debug)]
 pub(super) struct HeldTile {
     index: TileIndex,
@@ -17,7 +17,7 @@ struct Held {
     is_being_written: bool,
 }
 
-/// What of a tile is held.
+/// Form in which a tile is held.
 #[derive(Clone, Debug)]
 pub(super) enum HeldForm {
     Resident(Arc<Tile>),
@@ -35,7 +35,6 @@ impl HeldTile {
         self.index
     }
 
-    /// Bytes of memory.
     pub(super) fn bytes(&self) -> usize {
         match &self.lock().form {
             HeldForm::Resident(tile) => tile.bytes(),
@@ -43,7 +42,7 @@ impl HeldTile {
         }
     }
 
-    /// The tile, unless it has the compact form.
+    /// The tile, unless only its compact form is held.
     pub(super) fn resident(&self) -> Option<Arc<Tile>> {
         match &self.lock().form {
             HeldForm::Resident(tile) => Some(tile.clone()),
@@ -51,7 +50,7 @@ impl HeldTile {
         }
     }
 
-    /// Holds a copy instead; `false` if it has the compact form by now.
+    /// Replaces the tile by a copy; returns `false` if only the compact form is held.
     pub(super) fn hold_copy(&self, copy: Tile) -> bool {
         let mut held = self.lock();
         let is_resident = matches!(held.form, HeldForm::Resident(_));
@@ -61,12 +60,12 @@ impl HeldTile {
         is_resident
     }
 
-    /// Whether it may have the compact form from now on.
+    /// Returns whether the tile may still be replaced by its compact form.
     pub(super) fn may_be_packed(&self) -> bool {
         !self.lock().is_being_written
     }
 
-    /// Holds the compact form instead; `false` if the tile is being written.
+    /// Replaces the tile by its compact form; returns `false` if the tile is being written.
     pub(super) fn hold_packed(&self, packed: CompactTile) -> bool {
         let mut held = self.lock();
         if !held.is_being_written {
@@ -75,7 +74,7 @@ impl HeldTile {
         !held.is_being_written
     }
 
-    /// What is to be written, which stays from now on.
+    /// Returns the form to write, and fixes it from now on.
     pub(super) fn begin_write(&self) -> HeldForm {
         let mut held = self.lock();
         held.is_being_written = true;
