@@ -1,4 +1,4 @@
-//! Scans under a memory limit give the same updates as without.
+//! Scans under a memory limit give the same updates as without a limit.
 
 use super::updates::brick_code;
 use super::{
@@ -17,8 +17,8 @@ use std::collections::BTreeMap;
 use std::io;
 use std::path::Path;
 
-/// The updates of each voxel, in order: `None` for a miss, the bits of the intensity for a hit. By tile, code of the
-/// brick and place in it.
+/// Updates of each voxel, in order: `None` for a miss, the bits of the intensity for a hit. The key is the tile, the
+/// brick code and the position in the brick.
 type Said = BTreeMap<(TileIndex, u64, usize), Vec<Option<u32>>>;
 
 fn add(said: &mut Said, grid: &Grid, tile: TileIndex, updates: &TileUpdates) {
@@ -68,7 +68,7 @@ struct Setting {
     model: SensorModel,
     rays: RayConfig,
     order: UpdateOrder,
-    /// `None` for all of space.
+    /// `None` for the whole space.
     tiles: Option<TileSelection>,
 }
 
@@ -84,7 +84,7 @@ impl Setting {
         (said, updates.report)
     }
 
-    /// The same with so many bytes for marks, and for updates; also, how often updates were spilled.
+    /// Traces with the given limits in bytes for marks and for updates; also returns the number of spills.
     fn in_parts(
         &self,
         tracer: &mut ScanTracer,
@@ -127,7 +127,7 @@ fn settings(tile_size_m: f64) -> Vec<Setting> {
     modes.map(setting).into()
 }
 
-/// Rays all around, many of them alike.
+/// Rays in all directions, many of them similar.
 fn dense(rays: u32, reach_m: f64) -> Scan {
     let origin = [0.03, -0.02, 0.05];
     let point = |k: u32| -> Point {
@@ -181,7 +181,7 @@ fn scans_beside_each_other_say_what_each_says_by_itself_and_those_too_large_are_
                     assert!((&said, &updates.report) == (&alone.0, &alone.1), "{threads} {bytes:?} {number}");
                 }
             }
-            // No collector is lost, and none is made twice.
+            // No collector is lost or created twice.
             assert!(tracer.collectors() <= threads.max(scans.len()));
         }
     }
@@ -195,7 +195,7 @@ fn long_rays_keep_to_their_memory() {
         let mut tracer = ScanTracer::with_memory_bytes(bytes);
         let (said, report, times) = setting.in_parts(&mut tracer, &scan, bytes / 16).unwrap();
         assert!(times > 0);
-        // The memory kept from scan to scan; page numbers and marked prefixes are 1 MiB and some.
+        // The memory kept between scans; page numbers and marked prefixes take slightly more than 1 MiB.
         assert!(tracer.bytes() < bytes + (2 << 20), "{}", tracer.bytes());
         assert!((said, report) == setting.whole(&scan));
     }
@@ -217,7 +217,7 @@ fn a_file_that_cannot_be_had_is_an_error_that_names_the_folder() {
     }
 }
 
-/// What a whole scan says about a selection of tiles, which counts the updates anew.
+/// Restricts the updates of a whole scan to selected tiles, and counts them again.
 fn restricted(whole: &(Said, ScanReport), tiles: &TileSelection) -> (Said, ScanReport) {
     let (said, mut report) = whole.clone();
     let said: Said = said.into_iter().filter(|((tile, ..), _)| tiles.contains(*tile)).collect();
@@ -230,7 +230,7 @@ fn restricted(whole: &(Said, ScanReport), tiles: &TileSelection) -> (Said, ScanR
     (said, report)
 }
 
-/// Boxes and sets of tiles near to and far from the origin, and none at all.
+/// Boxes and sets of tiles close to and far from the origin, and an empty selection.
 fn selections(center: TileIndex, sparse: u32) -> Vec<TileSelection> {
     let at = |x, y, z| {
         let [a, b, c] = center.to_array();
@@ -256,7 +256,7 @@ fn selections(center: TileIndex, sparse: u32) -> Vec<TileSelection> {
 #[test]
 fn dense_rays_say_of_some_tiles_what_they_say_of_them_as_a_whole() {
     let mut scan = dense(9_000, 5.0);
-    // Rays that end far outside the pages around the sensor.
+    // Rays that end far outside the window around the sensor.
     scan.points[100] = [900.0, 20.0, -7.0];
     scan.points[4_500] = [-3.0, 1000.0, 800.0];
     for mut setting in settings(1.6) {

@@ -1,4 +1,4 @@
-//! The table against a naive map from voxels to evidence; its octree view and its files against those of the pointer
+//! Compares the table with a naive map from voxels to evidence, and its octree view and files with those of the pointer
 //! tree.
 
 use super::octree::BrickOctree;
@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 
 type Naive = BTreeMap<MortonCode, Evidence>;
 
-/// A palette that holds all states, ones that drop states now and then, and ones that are soon too small.
+/// A palette that contains all states, that occasionally drops states, or that is soon too small.
 fn any_palette() -> impl Strategy<Value = Palette> {
     prop_oneof![
         Just(Palette::default()),
@@ -24,7 +24,7 @@ fn any_model() -> impl Strategy<Value = SensorModel> {
     prop_oneof![Just(SensorModel::default()), Just(SensorModel::Iwlo(Iwlo::default()))]
 }
 
-/// Words that are empty, full, sparse or anything.
+/// Words that are empty, full, sparse or arbitrary.
 fn any_mask() -> impl Strategy<Value = BrickMask> {
     let word = prop_oneof![
         4 => Just(0),
@@ -89,7 +89,7 @@ proptest! {
         }
         assert_is(&table, &naive);
 
-        // As a file is read: brick by brick.
+        // Brick by brick, as when reading a file.
         let mut read = Table::with_palette(Palette::limited(4, 64));
         for brick in table.bricks() {
             let voxels: Vec<_> =
@@ -126,9 +126,9 @@ fn evidence_is_kept_once_and_dropped_when_no_voxel_has_it() {
     let mut table = Table::default();
     table.update_brick(&model, &all);
     let bytes = table.bytes();
-    // A palette, a block of the directory, and two bytes per voxel: half of what plain evidence would take.
+    // A palette, a block of the directory, and two bytes per voxel: half the size of plain evidence.
     assert!(bytes < 6 * 512, "{bytes} bytes for 512 voxels");
-    // Each time the whole brick is in a state that no voxel was in before.
+    // Each time, the whole brick enters a state that no voxel had before.
     for _ in 0..100_000 {
         table.update_brick(&model, &all);
     }
@@ -170,7 +170,7 @@ fn any_run() -> impl Strategy<Value = (u64, u64, f64)> {
     (run, value).prop_map(|((first, span), value)| (first, span, value))
 }
 
-/// A table with these runs, later ones over earlier ones, and the tree that it represents.
+/// A table with these runs, where later ones override earlier ones, and the tree that it represents.
 fn table_of(runs: &[(u64, u64, f64)], palette: Palette) -> (Table, Octree) {
     let mut voxels = BTreeMap::new();
     for &(first, span, value) in runs {
@@ -180,7 +180,7 @@ fn table_of(runs: &[(u64, u64, f64)], palette: Palette) -> (Table, Octree) {
     let mut table = Table::with_palette(palette);
     for brick in voxels.chunk_by(|a, b| a.0.brick() == b.0.brick()) {
         let evidence = |&(code, log_odds): &(MortonCode, f64)| {
-            // Equal values of different age are one value to an octree.
+            // Equal log-odds with different observation counts are one value in an octree.
             let observation_count = (code.0 % 3) as i32;
             (code.place_in_brick(), Evidence { log_odds, observation_count })
         };

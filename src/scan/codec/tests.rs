@@ -8,7 +8,7 @@ fn encoded(points: &[Point], intensities: Option<&[f32]>) -> Vec<u8> {
     block
 }
 
-/// Bytes of a block, which comes back to the bit.
+/// Returns the encoded size in bytes after checking a lossless round trip.
 fn round_trip(points: &[Point], intensities: Option<&[f32]>) -> usize {
     let block = encoded(points, intensities);
     let (mut decoded, mut of_decoded) = (Vec::new(), Vec::new());
@@ -21,7 +21,7 @@ fn round_trip(points: &[Point], intensities: Option<&[f32]>) -> usize {
     block.len()
 }
 
-/// A generator of numbers (SplitMix64).
+/// Random number generator (SplitMix64).
 fn random(state: &mut u64) -> u64 {
     *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
     let z = (*state ^ *state >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -33,7 +33,7 @@ fn unit(state: &mut u64) -> f64 {
     (random(state) >> 11) as f64 / (1_u64 << 53) as f64
 }
 
-/// A lidar's turn: neighbours are alike, and ranges have noise.
+/// Points of one lidar revolution: similar neighbours and noisy ranges.
 fn turn(points: usize, state: &mut u64) -> Vec<Point> {
     let point = |k: usize| {
         let (angle, up) = (k as f64 * 1e-3, (k % 16) as f64 * 0.03 - 0.2);
@@ -121,7 +121,7 @@ fn bytes_cut_or_changed_are_damage_or_points_and_nothing_else() {
     }
 }
 
-/// Numbers as sensors give them, and as nobody does.
+/// Numbers as sensors return them, and arbitrary ones.
 fn number() -> impl Strategy<Value = f64> {
     prop_oneof![
         any::<u64>().prop_map(f64::from_bits),
@@ -156,9 +156,10 @@ proptest! {
     }
 }
 
-/// Bytes a point and times on the real sets: `cargo test --release --lib codec -- --ignored --nocapture`.
+/// Prints bytes per point and times for the real data sets: `cargo test --release --lib codec -- --ignored
+/// --nocapture`.
 #[test]
-#[ignore = "a table, by hand"]
+#[ignore = "prints a table; run manually"]
 fn a_table_of_real_sets() {
     use std::time::Instant;
     use voxtile_formats::{ReadOptions, open_scans};

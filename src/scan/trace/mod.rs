@@ -1,4 +1,4 @@
-//! Tracing a scan: the range rule for each point, the rays on all threads, and the updates at the end.
+//! Tracing of scans: the range rule for each point, the rays on all threads, and the updates at the end.
 
 mod scan_rays;
 mod scan_tracer;

@@ -9,28 +9,28 @@ use crate::space::{
     place_of_voxel,
 };
 
-/// Decodes entries in Morton order, as in a file with a trailer; what a brick's entries share is checked once per
+/// Decodes entries in Morton order, as in a file with a trailer. Properties common to a brick are checked once per
 /// brick.
 pub(super) struct AscendingEntries<'a, G> {
     voxels: &'a VoxelBox,
     gather: G,
     brick: OpenBrick,
-    /// One more than the place of the last voxel in the open brick; 0 if there is none.
+    /// One more than the position of the last voxel in the open brick; 0 if there is none.
     behind: usize,
-    /// The voxels of the open brick that are needed.
+    /// Selected voxels of the open brick.
     run: Vec<(usize, Evidence)>,
 }
 
 struct OpenBrick {
     /// `None` before the first one.
     code: Option<BrickCode>,
-    /// The common upper bits of its voxels' keys; before the first brick, those of no key.
+    /// Common upper bits of its voxels' keys; before the first brick, bits that no key has.
     upper: [u16; 3],
-    /// Its voxels that belong to the tile.
+    /// Voxels of the brick that belong to the tile.
     inside: BrickMask,
 }
 
-/// The bits of a coordinate that differ within a brick.
+/// Bits of a coordinate that differ within a brick.
 const LOWER: u16 = BRICK_EDGE as u16 - 1;
 
 impl<'a, G: Gather> AscendingEntries<'a, G> {
@@ -68,7 +68,7 @@ impl<'a, G: Gather> AscendingEntries<'a, G> {
         if !self.voxels.contains(voxel) {
             return Err(of_another_tile(key, offset));
         }
-        // Errors of the entry itself come first.
+        // Errors of the entry itself take precedence.
         check_evidence(evidence, offset)?;
         let code = Some(key.morton().brick());
         if self.brick.code >= code {
@@ -79,7 +79,7 @@ impl<'a, G: Gather> AscendingEntries<'a, G> {
         Ok(())
     }
 
-    /// The tile's voxels in the brick of `voxel`.
+    /// Mask of the tile's voxels in the brick of `voxel`.
     fn inside(&self, voxel: VoxelIndex) -> BrickMask {
         let first = voxel.map(|k| k & !(BRICK_EDGE - 1));
         let local = |of: VoxelIndex| std::array::from_fn(|k| of[k].saturating_sub(first[k]));
@@ -148,14 +148,14 @@ mod tests {
     }
 
     fn read<E: TakeEntries>(mut entries: E, bytes: &[EntryBytes]) -> Result<E::Made, FormatError> {
-        // In two chunks, as when a file is read.
+        // In two chunks, as when reading a file.
         let (first, second) = bytes.split_at(bytes.len() / 3);
         entries.take(first, 16)?;
         entries.take(second, 16 + first.len() as u64 * ENTRY_BYTES)?;
         entries.end()
     }
 
-    /// The first entry that is not above the one before.
+    /// Returns the offset of the first entry that is not greater than the previous one.
     fn disorder(bytes: &[EntryBytes]) -> Option<u64> {
         let codes: Vec<_> = bytes.iter().map(|entry| Entry::of(entry).key.morton()).collect();
         let wrong = codes.windows(2).position(|pair| pair[0] >= pair[1])?;
@@ -170,7 +170,7 @@ mod tests {
             let mut bytes = random_entries(&mut random, round % 40 * 20);
             if !bytes.is_empty() && random.chance(0.7) {
                 let entry = random.below(bytes.len() as u64) as usize;
-                // Mostly in the key, where most flips are damage.
+                // Mostly in the key, where most bit flips are damage.
                 let end = if random.chance(0.7) { 6 } else { ENTRY_BYTES };
                 bytes[entry][random.below(end) as usize] ^= 1 << random.below(8);
             }
@@ -193,7 +193,7 @@ mod tests {
                     damaged += 1;
                 }
                 (Err(fast), naive, Some(at)) => {
-                    // The first error; within an entry, an error of the entry itself comes first.
+                    // The first error; within an entry, an error of the entry itself takes precedence.
                     let alone = naive.err().filter(|error| !error.reason.contains("twice"));
                     match alone.filter(|error| error.at < at + ENTRY_BYTES) {
                         Some(naive) => assert_eq!(fast, naive),

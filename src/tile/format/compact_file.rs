@@ -1,6 +1,6 @@
 //! `tile.vxt`: a front part like the trailer of `iwlo_meta.bin`, then the table in compact form without its checksum.
-//! The checksum is in the front part: a checksum directly behind its data would make the checksum of the whole file a
-//! constant. The checksums of a table's parts stand in its index, before the parts, for the same reason.
+//! The checksum is in the front part, because with a checksum directly after its data the checksum of the whole file
+//! would be a constant. For the same reason the index contains the checksums of a table's parts before the parts.
 
 use super::compact::{CRC_BYTES, CompactIndex, joined_crc, read_compact, sift_compact};
 use super::gather::SiftedVoxels;
@@ -12,12 +12,12 @@ use crate::space::{MortonCode, VoxelBox};
 use std::io::{self, BufReader, Read, Write};
 use std::ops::Range;
 
-/// Writes a table in compact form as `tile.vxt`. The checksum in `front.table_crc` is computed here; the caller's value
-/// is ignored. There is no octree.
+/// Writes a table in compact form as `tile.vxt`. The checksum `front.table_crc` is computed here; the given value is
+/// ignored. The file has no octree.
 ///
 /// # Errors
 ///
-/// Those of `out`, and `compact` shorter than a compact table.
+/// Returns errors of `out`, and fails if `compact` is too short for a compact table.
 pub fn write_compact_file(compact: &[u8], front: Trailer, out: &mut impl Write) -> io::Result<()> {
     let Some((body, crc)) = compact.split_last_chunk::<{ CRC_BYTES as usize }>() else {
         return Err(io::Error::new(io::ErrorKind::InvalidInput, "no table in the compact form"));
@@ -31,7 +31,7 @@ pub fn write_compact_file(compact: &[u8], front: Trailer, out: &mut impl Write) 
 ///
 /// # Errors
 ///
-/// Anything that violates the format, with its offset.
+/// Fails if the file violates the format; the error contains the offset.
 pub fn read_compact_file(
     input: &mut impl Read,
     file_bytes: u64,
@@ -40,12 +40,12 @@ pub fn read_compact_file(
     read_behind_front(input, file_bytes, |input, bytes| read_compact(&mut { input }, bytes, voxels))
 }
 
-/// Reads a `tile.vxt` like [`read_compact_file`], and makes of it the observed voxels whose log-odds are at least
-/// `from`, in Morton order, without a table.
+/// Reads the observed voxels of a `tile.vxt` whose log-odds are at least `from`, in Morton order, without building a
+/// table.
 ///
 /// # Errors
 ///
-/// Those of [`read_compact_file`].
+/// Fails as [`read_compact_file`].
 pub fn read_compact_voxels_from(
     input: &mut impl Read,
     file_bytes: u64,
@@ -74,7 +74,7 @@ fn read_behind_front<T>(
 ///
 /// # Errors
 ///
-/// Anything that violates the format.
+/// Fails if the front part violates the format.
 pub fn read_compact_front(input: &mut impl Read, file_bytes: u64) -> Result<Trailer, DecodeError> {
     let front = Trailer::read_in_front(input, file_bytes)?;
     if (front.octree_crc, front.octree_bytes) != (0, 0) {
@@ -83,23 +83,24 @@ pub fn read_compact_front(input: &mut impl Read, file_bytes: u64) -> Result<Trai
     Ok(front)
 }
 
-/// What a `tile.vxt` has before its groups.
+/// Part of a `tile.vxt` before its groups.
 #[derive(Debug)]
 pub struct CompactFileIndex {
-    /// The front part.
+    /// Front part of the file.
     pub front: Trailer,
-    /// CRC-32 of the whole file, from those of its parts: if it is the right one, so are they.
+    /// CRC-32 of the whole file, computed from those of its parts. If it matches the recorded one, the parts are also
+    /// valid.
     pub crc: u32,
     index: CompactIndex,
 }
 
 impl CompactFileIndex {
-    /// Reads it from the beginning of a `tile.vxt` of `file_bytes` bytes that belongs to the tile of `voxels`; `None`
-    /// if the table is of version 1, of which all has to be read.
+    /// Reads the index from the beginning of a `tile.vxt` of `file_bytes` bytes that belongs to the tile of `voxels`;
+    /// `None` for a table of version 1, which has to be read completely.
     ///
     /// # Errors
     ///
-    /// Anything in these parts that violates the format, with its offset.
+    /// Fails if these parts violate the format; the error contains the offset.
     pub fn read(
         input: &mut impl Read,
         file_bytes: u64,
@@ -118,17 +119,17 @@ impl CompactFileIndex {
         Ok(Some(Self { front, crc, index }))
     }
 
-    /// Where in the file the group is that has a voxel, if one has it.
+    /// Returns the byte range in the file of the group that contains a voxel, if one can contain it.
     pub fn group_of(&self, voxel: MortonCode) -> Option<Range<u64>> {
         let group = self.index.group_of(voxel)?;
         Some(group.start + self.front.bytes()..group.end + self.front.bytes())
     }
 
-    /// The evidence of a voxel, from the bytes of its group; `None` if it was not observed.
+    /// Returns the evidence of a voxel, read from the bytes of its group; `None` if it was not observed.
     ///
     /// # Errors
     ///
-    /// Other bytes than those that the index tells of; anything that violates the format.
+    /// Fails if the bytes do not match the index or violate the format.
     pub fn evidence(&self, voxel: MortonCode, group: &[u8]) -> Result<Option<Evidence>, DecodeError> {
         self.index.evidence(voxel, group)
     }
@@ -215,7 +216,7 @@ mod tests {
         }
     }
 
-    /// A checksum behind its data would make that of the whole file a constant.
+    /// With a checksum directly after its data, the checksum of the whole file would be a constant.
     #[test]
     fn files_of_other_content_have_other_checksums() {
         let files = [0.5, 0.75].map(|log_odds| file(&table(log_odds), 77));

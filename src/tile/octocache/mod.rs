@@ -5,7 +5,7 @@
 //!                 \___ cache off ___________________________________________________/
 //! ```
 //!
-//! Queries combine the tree with the cache and with the batches in flight. Whatever is lost here can be derived from
+//! Queries combine the tree with the cache and with the pending batches. If any of these is lost, it is rebuilt from
 //! the table.
 
 mod octree_statistics;

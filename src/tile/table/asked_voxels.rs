@@ -6,13 +6,13 @@ use super::unpadded_evidence::UnpaddedEvidence;
 use crate::sensor::Evidence;
 use crate::space::VoxelKey;
 
-/// Voxels of any tables that are looked up together, one stage after the other for all of them: in a loop of one stage
-/// the CPU waits for the memory of many voxels at once.
+/// Batch of voxels of any tables that are looked up together, one stage after the other for all of them, so that the
+/// CPU waits for the memory of many voxels at once.
 pub(crate) struct AskedVoxels<'a> {
     voxels: Vec<(&'a Table, Address)>,
 }
 
-/// What a voxel's brick says of it.
+/// Result of the look-up in a voxel's brick.
 #[derive(Clone, Copy)]
 enum Found<'a> {
     State(&'a StateId),
@@ -20,7 +20,7 @@ enum Found<'a> {
 }
 
 impl<'a> AskedVoxels<'a> {
-    /// As many as are worth it: the memory that they wait for must stay in the nearest cache until the last stage.
+    /// Maximum batch size: the memory must remain in the L1 cache until the last stage.
     pub(crate) const MOST: usize = 64;
 
     pub(crate) fn new() -> Self {
@@ -33,8 +33,8 @@ impl<'a> AskedVoxels<'a> {
         self.voxels.push((table, Address::of_key(key)));
     }
 
-    /// Looks the voxels up and forgets them. Takes each one's evidence, in their order; `None` if it was never
-    /// observed.
+    /// Looks the voxels up and clears the batch. Passes the evidence of each to `take`, in order; `None` if the voxel
+    /// was never observed.
     pub(crate) fn take(&mut self, mut take: impl FnMut(Option<Evidence>)) {
         for voxels in self.voxels.chunks(Self::MOST) {
             let mut blocks = [0; Self::MOST];

@@ -1,10 +1,10 @@
-//! The exact table of a tile: bricks of 8 x 8 x 8 voxels that number their states in the tile's palette.
+//! Exact table of a tile: bricks of 8 x 8 x 8 voxels that contain state numbers of the tile's palette.
 //!
 //! ```text
-//! BrickDirectory --brick's number--> Brick: mask of observed voxels, Cells of state numbers --> Palette: evidence
+//! BrickDirectory --brick number--> Brick: mask of observed voxels, Cells of state numbers --> Palette: evidence
 //! ```
 //!
-//! A step (state, observation) -> state is computed once a palette; [`MissRuns`](miss_runs::MissRuns) caches long
+//! A step (state, observation) -> state is computed once per palette; [`MissRuns`](miss_runs::MissRuns) caches long
 //! runs of them. A brick has a [`Summary`], from which the upper nodes of an octree are computed.
 
 mod asked_voxels;

@@ -7,12 +7,12 @@ use crate::tile::format::entry::fault_of;
 use crate::tile::table::Palette;
 use std::io::Read;
 
-/// The states of a [`Codebook`](super::codebook::Codebook), read. None was looked at.
+/// States of a [`Codebook`](super::codebook::Codebook) that was read, not validated yet.
 #[derive(Debug)]
 pub(super) struct CodebookStates {
-    /// Where it begins.
+    /// Offset of the codebook in the table.
     offset: u64,
-    /// For [`state_at`].
+    /// Encoded for [`state_at`].
     states: Vec<u8>,
 }
 
@@ -37,7 +37,6 @@ impl CodebookStates {
         self.states.len() / STATE_BYTES
     }
 
-    /// The state of a number.
     pub(super) fn state(&self, number: usize) -> Result<Evidence, String> {
         let state = state_at(&self.states, number);
         match fault_of(state) {
@@ -46,7 +45,7 @@ impl CodebookStates {
         }
     }
 
-    /// All as a palette: they are numbered from 1.
+    /// Returns all states as a palette, in which they are numbered from 1.
     pub(super) fn palette(&self) -> Result<Palette, FormatError> {
         let wrong = |reason| FormatError::at_offset(self.offset, reason);
         let mut palette = Palette::with_all_room();

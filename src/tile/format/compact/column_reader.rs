@@ -9,18 +9,18 @@ pub(super) struct ColumnReader {
     compressed: Vec<u8>,
 }
 
-/// A column to read.
+/// Column to be read.
 pub(super) struct Column<'a> {
     pub(super) name: &'static str,
-    /// Most bytes of the column.
+    /// Maximum size of the column in bytes.
     pub(super) most: usize,
-    /// Receives its bytes.
+    /// Receives the decompressed bytes.
     pub(super) bytes: &'a mut Vec<u8>,
 }
 
 impl ColumnReader {
     pub(super) fn new() -> io::Result<Self> {
-        // `zstd::bulk` would panic.
+        // `zstd::bulk` would panic if this fails.
         let zstd = DCtx::try_create().ok_or(io::ErrorKind::OutOfMemory)?;
         Ok(Self { zstd, compressed: Vec::new() })
     }

@@ -10,10 +10,10 @@ use crate::space::{BRICK_VOXELS, BrickCode, BrickMask};
 use crate::tile::format::entry::fault_of;
 use std::io::Read;
 
-/// The columns of a group, read; see [`Group`](super::group::Group).
+/// Decoded columns of a group; see [`Group`](super::group::Group).
 #[derive(Default)]
 pub(super) struct Columns {
-    /// Where the group begins.
+    /// Offset of the group.
     pub(super) offset: u64,
     pub(super) bricks: usize,
     steps: Vec<u8>,
@@ -24,7 +24,7 @@ pub(super) struct Columns {
     rares: Vec<u8>,
 }
 
-/// Limits of a group.
+/// Limits for the size of a group.
 pub(super) struct Room {
     pub(super) bricks: usize,
     pub(super) voxels: usize,
@@ -38,7 +38,7 @@ impl Columns {
         column_reader: &mut ColumnReader,
         input: &mut Input<impl Read>,
     ) -> Result<(), DecodeError> {
-        /// Bytes of the largest step.
+        /// Size of the largest step in bytes.
         const STEP_BYTES: usize = 6;
         self.offset = input.offset;
         let bricks = input.number("bricks of a group", GROUP_BRICKS.min(room.bricks))?;
@@ -61,7 +61,7 @@ impl Columns {
 
 const FEWER_SECONDS: &str = "fewer second bytes than prefixes";
 
-/// The unread rest of the columns of a group.
+/// Unread rest of the columns of a group.
 #[derive(Clone, Copy)]
 pub(super) struct Rest<'a> {
     steps: &'a [u8],
@@ -79,14 +79,14 @@ impl<'a> Rest<'a> {
         Self { steps, words, masks: masks.as_chunks().0, symbols, seconds, rares, rares_done: 0 }
     }
 
-    /// Whether all columns are read to their ends.
+    /// Returns whether all columns are read completely.
     pub(super) fn is_empty(&self) -> bool {
         let Self { steps, words, masks, symbols, seconds, rares, rares_done } = *self;
         let is_done = [steps, words, symbols, seconds].iter().all(|column| column.is_empty());
         is_done && masks.is_empty() && rares_done * STATE_BYTES == rares.len()
     }
 
-    /// The code of the next brick, which must be larger than the previous one.
+    /// Reads the code of the next brick, which must be greater than the previous one.
     pub(super) fn take_code(&mut self, before: Option<BrickCode>) -> Result<BrickCode, String> {
         let step = take_number(|| {
             let (&byte, rest) = self.steps.split_first()?;
@@ -98,7 +98,7 @@ impl<'a> Rest<'a> {
         code.map(BrickCode).ok_or_else(|| "a step leads to no brick".into())
     }
 
-    /// The mask of the next brick, which must not be empty.
+    /// Reads the mask of the next brick, which must not be empty.
     pub(super) fn take_mask(&mut self) -> Result<BrickMask, String> {
         const SHORT: &str = "a group has less than its bricks";
         let (&words, rest) = self.words.split_first().ok_or(SHORT)?;
@@ -115,7 +115,7 @@ impl<'a> Rest<'a> {
         Ok(observed)
     }
 
-    /// The symbols of the next `count` voxels.
+    /// Reads the symbols of the next `voxels` voxels.
     #[inline]
     pub(super) fn take_symbols(&mut self, voxels: usize) -> Result<&'a [u8], String> {
         let (symbols, rest) = self.symbols.split_at_checked(voxels).ok_or("fewer symbols than voxels")?;
@@ -129,7 +129,7 @@ impl<'a> Rest<'a> {
         Ok(second)
     }
 
-    /// Leaves out the second bytes and rare states of symbols.
+    /// Skips the second bytes and rare states that belong to the given symbols.
     pub(super) fn pass(&mut self, passed: &[u8], symbols: Symbols) -> Result<(), String> {
         let count = |from| passed.iter().filter(|&&symbol| symbol >= from).count();
         let rares = count(RARE);

@@ -6,19 +6,20 @@ use super::symbol::Symbols;
 use crate::tile::format::SiftedVoxels;
 use crate::tile::table::Palette;
 
-/// Finds the voxels of groups whose log-odds are at least a threshold. Others are passed over by their symbols, 64 at a
+/// Finds the voxels of groups whose log-odds are at least a threshold. Others are skipped by their symbols, 64 at a
 /// time.
 pub(super) struct GroupSieve {
-    /// The codebook.
+    /// Palette with the codebook.
     palette: Palette,
     from: f64,
-    /// By symbol, whether a voxel must be looked at: the symbol is of a state that passes, or not of a state alone.
+    /// By symbol, whether voxels must be examined: its state reaches the threshold, or the symbol alone does not
+    /// identify a state.
     is_looked_at: [bool; 256],
     found: SiftedVoxels,
 }
 
 impl GroupSieve {
-    /// The palette holds the codebook.
+    /// Creates a filter. The palette must contain the codebook.
     pub(super) fn new(palette: Palette, from: f64) -> Self {
         let mut is_looked_at = [true; 256];
         for symbol in 0..Symbols::of(palette.len() - 1).direct() {

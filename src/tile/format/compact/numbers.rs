@@ -7,8 +7,8 @@ pub(super) fn put_number(mut number: u64, out: &mut Vec<u8>) {
     out.push(number as u8);
 }
 
-/// Reads the output of [`put_number`] byte by byte: `None` if the bytes end, if the number exceeds 64 bits, or if it
-/// takes more bytes than necessary.
+/// Reads the output of [`put_number`] byte by byte. Returns `None` if the bytes end, the number exceeds 64 bits, or its
+/// encoding is not the shortest.
 pub(super) fn take_number(mut next: impl FnMut() -> Option<u8>) -> Option<u64> {
     let mut number = 0;
     for shift in (0..64).step_by(7) {

@@ -1,4 +1,4 @@
-//! Tables of every kind survive the compact form to the bit; damaged input is an error.
+//! Tables of every kind survive the compact form bit by bit; damaged input is an error.
 
 use super::{
     CompactEffort, CompactIndex, CompactReader, CompactWriter, read_compact, sift_compact, write_compact,
@@ -17,7 +17,7 @@ fn state(log_odds: f64, observation_count: i32) -> Evidence {
     Evidence { log_odds, observation_count }
 }
 
-/// Tiles small and large, on and off the borders of bricks, where keys begin anew, and at the ends of `i32`.
+/// Small and large tiles, on and off the borders of bricks, at the wrap-around of keys and at the limits of `i32`.
 fn any_tile(random: &mut Random) -> VoxelBox {
     let n = [2, 3, 7, 8, 16, 21, 40][random.below(7) as usize];
     let min = std::array::from_fn(|_| match random.below(4) {
@@ -29,7 +29,7 @@ fn any_tile(random: &mut Random) -> VoxelBox {
     VoxelBox { min, end: min.map(|k| k + n) }
 }
 
-/// Few states, many, or one per voxel; now and then one that is rare.
+/// Few states, many, or one per voxel; occasionally a rare one.
 fn any_state(random: &mut Random, kind: u64) -> Evidence {
     const ODD: [f64; 8] =
         [0.0, -0.0, f64::MIN_POSITIVE / 3.0, -5e-324, f64::MAX, f64::MIN, 1.0 + f64::EPSILON, -2.0];
@@ -58,7 +58,7 @@ fn any_voxels(random: &mut Random, tile: &VoxelBox) -> Voxels {
     voxels
 }
 
-/// A table of these voxels, built in some order, with a palette that holds all states or is soon too small.
+/// Builds a table of these voxels in random order, with a palette that contains all states or is soon too small.
 fn table_of(voxels: &Voxels, random: &mut Random) -> Table {
     let limit = 1 << random.between(2.0, 12.0) as usize;
     let palette = [Palette::default(), Palette::limited(limit, limit)][random.below(2) as usize].clone();
@@ -105,7 +105,7 @@ fn read(bytes: &[u8], tile: &VoxelBox) -> Result<Table, FormatError> {
     table
 }
 
-/// Some voxels, observed and not, are what the table says when each is read from its group alone.
+/// Checks that some voxels, observed and not, are the same when each is read from its group alone.
 fn assert_is_found_alone(bytes: &[u8], tile: &VoxelBox, table: &Table) {
     let index = CompactIndex::read(&mut &bytes[..], bytes.len() as u64, tile).unwrap().unwrap();
     let middle = (table.len() / 2).saturating_sub(1);
@@ -150,7 +150,7 @@ fn tables_come_back_to_the_bit_and_equal_ones_have_equal_bytes() {
     assert!(plain > 100, "{plain}");
 }
 
-/// A tile whose voxels have more states than a palette holds, some of them twice.
+/// A tile whose voxels have more states than fit in a palette, some of them twice.
 #[test]
 fn bricks_that_do_without_the_palette_come_back() {
     let mut random = Random::of(8, &[]);
@@ -193,7 +193,7 @@ fn what_is_read_goes_on_as_any_table() {
     assert_is(&again, &table.iter().collect());
 }
 
-/// The index of a table, and all its voxels from one group each.
+/// Checks the index of a table, and reads all its voxels individually from their groups.
 fn assert_is_voxel_by_voxel(bytes: &[u8], tile: &VoxelBox, voxels: &Voxels) {
     let index = CompactIndex::read(&mut &bytes[..], bytes.len() as u64, tile).unwrap().unwrap();
     let crc = bytes.last_chunk().unwrap();
@@ -248,7 +248,7 @@ fn a_voxel_is_read_from_its_group_alone() {
     assert!(groups.len() > 1);
 }
 
-/// What one voxel is read from is compared with the checksum of the whole.
+/// Reading one voxel verifies its parts against the checksum of the whole.
 #[test]
 fn every_wrong_bit_before_the_groups_and_in_the_group_is_noticed() {
     let (tile, table) = small();
@@ -270,7 +270,7 @@ fn every_wrong_bit_before_the_groups_and_in_the_group_is_noticed() {
     }
 }
 
-/// Adds the checksum, and makes those of the parts right, as far as there are parts.
+/// Adds the checksum, and corrects those of the parts that exist.
 fn sealed(mut bytes: Vec<u8>) -> Vec<u8> {
     let u32_at = |bytes: &[u8], at: usize| {
         bytes.get(at..at + 4).map_or(0, |bytes| u32::from_le_bytes(bytes.try_into().unwrap())) as usize
@@ -352,7 +352,7 @@ fn three_groups() -> (VoxelBox, Table) {
     (tile, table_of(&voxels, &mut Random::of(1, &[])))
 }
 
-/// With valid checksums: what the index says of groups must be so, and of one group that is read alone too.
+/// With valid checksums: groups must match the index, also when one group is read alone.
 #[test]
 fn an_index_that_does_not_fit_its_groups_is_an_error() {
     let (tile, table) = three_groups();
@@ -405,12 +405,12 @@ fn every_truncation_and_every_wrong_bit_is_an_error() {
         read(&wrong, &tile).unwrap_err();
     }
     read(&[&bytes[..], &[0]].concat(), &tile).unwrap_err();
-    // A stream that is shorter than announced.
+    // A stream that is shorter than its declared length.
     let longer = read_compact(&mut &bytes[..bytes.len() - 1], bytes.len() as u64, &tile);
     assert!(matches!(longer, Err(DecodeError::Io(_))));
 }
 
-/// With a valid checksum: an error, or a table of this tile.
+/// With a valid checksum, the result is an error or a table of this tile.
 #[test]
 fn hostile_bytes_are_an_error_or_a_table_of_the_tile() {
     hostile_bytes_of(small(), 20_000, 200);
