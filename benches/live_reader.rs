@@ -1,5 +1,5 @@
-//! What does it cost a mapper that somebody asks beside it? The same scans with no reader, with one that asks nothing,
-//! and with one that asks 40 times a second: 20 rays of 50 m and 20 collisions each time, all as of one scan.
+//! Measures the effect of a live reader on a mapper. The same scans are inserted with no reader, with an idle one, and
+//! with one that queries 40 times a second: 20 rays of 50 m and 20 collisions each time, all as of one scan.
 
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
@@ -11,7 +11,7 @@ use voxtile::mapper::LiveReader;
 use voxtile::{MapConfig, Mapper, OutOfCoreTileMapper, Queries, RayQuery, Scan, Shape, UnknownAs};
 use voxtile_simulation::Survey;
 
-/// Scans that are there before, and those that are measured.
+/// Number of scans inserted before the measurement, and during it.
 const SCANS: [usize; 2] = [20, 60];
 const EVERY: Duration = Duration::from_millis(25);
 

@@ -1,4 +1,4 @@
-//! The tree against a naive map from voxels to values.
+//! Compares the tree with a naive map from voxels to values.
 
 use super::{Leaf, Octree};
 use crate::space::MortonCode;
@@ -8,13 +8,13 @@ use std::collections::BTreeMap;
 type Model = BTreeMap<u64, f32>;
 type Voxel = (MortonCode, f32);
 
-/// Codes of a few clusters, small enough that nodes are often complete.
+/// Codes from a few clusters, small enough that nodes are often complete.
 fn any_code() -> impl Strategy<Value = u64> {
     let cluster = prop_oneof![Just(0), Just(0x1234_5678_9a00), Just(MortonCode::END - 512)];
     (cluster, prop_oneof![4 => 0..16_u64, 3 => 0..64_u64, 1 => 0..512_u64]).prop_map(|(base, low)| base + low)
 }
 
-/// Few values, so that neighbours are often equal; both zeros, which are equal but not to the bit.
+/// Few values, so that neighbours are often equal; both zeros, which are equal but not bit-identical.
 fn any_value() -> impl Strategy<Value = f32> {
     prop_oneof![6 => Just(1.5_f32), 3 => Just(-2.0), 1 => Just(0.0), 1 => Just(-0.0), 1 => -3.0..3.0_f32]
 }
@@ -38,7 +38,7 @@ fn max_of(model: &Model, code: u64, depth: u8) -> Option<f32> {
     model.range(first..first + MortonCode::span(depth)).map(|(_, &value)| value).reduce(f32::max)
 }
 
-/// Leaves and number of nodes of the one minimal tree of these voxels: the largest aligned cubes of one value.
+/// Leaves and number of nodes of the unique minimal tree of these voxels: the largest aligned cubes of one value.
 fn minimal_tree(model: &Model) -> (Vec<Leaf>, u64) {
     fn grow(voxels: &[Voxel], depth: u8, leaves: &mut Vec<Leaf>) -> u64 {
         let Some(&(code, value)) = voxels.first() else { return 0 };

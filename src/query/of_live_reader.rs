@@ -1,14 +1,14 @@
-//! Queries of the map beside its mapper: each sees the map as of one scan.
+//! Queries of a map during its mapping, each as of one scan.
 
 use super::{Hit, Occupancy, Queries, RayQuery, Shape, UnknownAs, Voxels};
 use crate::error::{Error, Result};
 use crate::mapper::{LiveReader, LiveView, MapView};
 use crate::space::{Aabb, Grid, Point, VoxelIndex};
 
-/// How often a question is asked anew because its view expired.
+/// Number of attempts when the view of a query expires.
 const ATTEMPTS: usize = 8;
 
-/// Asks a view of the latest scan, and a later one if so much changed meanwhile that it expired.
+/// Runs a query on a view of the latest scan, and again on a later one if the view expires.
 fn ask<A>(reader: &LiveReader, question: impl Fn(&LiveView) -> Result<A>) -> Result<A> {
     let mut answer = question(&reader.view());
     for _ in 1..ATTEMPTS {
@@ -30,7 +30,7 @@ impl Queries for LiveReader {
         ask(self, |view| Ok(Occupancy::of(view.config(), view.evidence(voxel)?)))
     }
 
-    /// All of them are of one scan, and in memory: take a box that a planner looks at.
+    /// All voxels are of one scan and are collected in memory, so use a box of moderate size.
     fn voxels_in(&self, region: &Aabb) -> Voxels<'_> {
         match ask(self, |view| view.voxels_in(region).collect::<Result<Vec<_>>>()) {
             Ok(voxels) => Box::new(voxels.into_iter().map(Ok)),

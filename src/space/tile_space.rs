@@ -1,36 +1,35 @@
 use super::{TileBox, TileIndex};
 use rustc_hash::FxHashSet;
 
-/// Where the tiles of a map are, in little memory: a box around all of them, and aligned cubes of 16, 256, .. tiles
-/// along an edge that may hold one. A ray passes a cube without tiles in one step, so its cost depends on the number of
+/// Compact index of the space with tiles: a box around all tiles of a map, and aligned cubes of 16, 256, .. tiles along
+/// an edge that may contain one. A ray passes a cube without tiles in one step, so its cost depends on the number of
 /// tiles near it, not on the distance between them.
 ///
-/// Tiles are added and never removed. A level of too many cubes is given up: fine levels of a large map, which takes
-/// 200 kB then, and coarse ones where tens of thousands of tiles lie more than 40 km apart (10 MB).
+/// Tiles are added and never removed. A level with too many cubes is disabled: fine levels of a large map, which then
+/// takes 200 kB, and coarse ones if tens of thousands of tiles are more than 40 km apart (10 MB).
 #[derive(Clone, Debug, Default)]
 pub struct TileSpace {
     bounds: Option<TileBox>,
-    /// From fine to coarse. A cube that may hold a tile lies in one of the next level that may, too.
+    /// From fine to coarse. A cube that may contain a tile is in one of the next level that may, too.
     levels: [Level; SHIFTS.len()],
 }
 
 /// Edges of the cubes of each level, in tiles, as powers of two.
 const SHIFTS: [u32; 7] = [4, 8, 12, 16, 20, 24, 28];
 
-/// Upper bound on the cubes of a level. Maps of one region have few cubes in the coarse levels, so that these may be
-/// many where tiles are scattered: to give one up would cost each ray thousands of steps.
+/// Maximum number of cubes per level. Coarse levels have a higher maximum: maps of one region have few such cubes, and
+/// disabling the level for scattered tiles would cost each ray thousands of steps.
 const MAX_CUBES: [usize; SHIFTS.len()] = [1 << 11, 1 << 11, 1 << 16, 1 << 16, 1 << 16, 1 << 16, 1 << 16];
 
 #[derive(Clone, Debug, Default)]
 struct Level {
-    /// The cubes that may hold a tile.
+    /// Cubes that may contain a tile.
     cubes: FxHashSet<[i32; 3]>,
-    /// Whether there were too many: then every cube may hold one.
+    /// Whether the level was disabled; then each cube may contain a tile.
     is_given_up: bool,
 }
 
 impl TileSpace {
-    /// Adds a tile.
     pub fn insert(&mut self, tile: TileIndex) {
         let own = TileBox::new(tile, tile);
         self.bounds = Some(self.bounds.map_or(own, |bounds| bounds.union(own)));
@@ -39,7 +38,7 @@ impl TileSpace {
                 continue;
             }
             if !level.cubes.insert(cube_of(tile, shift)) {
-                // Coarser levels have its cubes as well.
+                // Coarser levels already contain its cubes.
                 return;
             }
             if level.cubes.len() > max_cubes {
@@ -53,7 +52,7 @@ impl TileSpace {
         self.bounds
     }
 
-    /// A large box around a tile that holds no tile; `None` if none is known.
+    /// Returns a large box around a tile that contains no tile; `None` if none is known.
     pub fn empty_around(&self, tile: TileIndex) -> Option<TileBox> {
         self.levels.iter().zip(SHIFTS).rev().find_map(|(level, shift)| {
             let cube = cube_of(tile, shift);
@@ -87,7 +86,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Tiles near each other, and anywhere.
+    /// Tiles close to each other, and anywhere.
     fn any_tile() -> impl Strategy<Value = TileIndex> {
         let ends = prop_oneof![Just(i32::MIN), Just(i32::MAX), any::<i32>()];
         prop::array::uniform3(prop_oneof![4 => -40..40_i32, 1 => -100_000..100_000_i32, 1 => ends])

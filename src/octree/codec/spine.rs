@@ -2,32 +2,32 @@ use super::node_encoder::NodeEncoder;
 use crate::space::MortonCode;
 use std::io::{self, Read, Write};
 
-/// A node whose bytes are in a spool.
+/// Node whose bytes are in a spool.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Block<N> {
     pub(super) first: MortonCode,
     pub(super) depth: u8,
     pub(super) node: N,
-    /// Bytes of the node and all below it.
+    /// Size of the node and its descendants in bytes.
     pub(super) bytes: u64,
 }
 
-/// The nodes above the blocks of a tree.
+/// Nodes above the blocks of a tree.
 pub(super) enum Spine<E: NodeEncoder> {
     Unknown,
-    /// The next block of the spool.
+    /// The next block of the spool, with its size in bytes.
     Block(E::Node, u64),
     /// An inner node with its children, or a leaf into which they were pruned.
     Joined(E::Node, Box<[Self; 8]>),
 }
 
 impl<E: NodeEncoder> Spine<E> {
-    /// The spine of blocks in Morton order.
+    /// Creates the spine of blocks in Morton order.
     pub(super) fn of(encoder: &mut E, blocks: &[Block<E::Node>]) -> Self {
         Self::below(encoder, blocks, 0)
     }
 
-    /// The node at `depth` above these blocks.
+    /// Creates the node at `depth` above these blocks.
     fn below(encoder: &mut E, blocks: &[Block<E::Node>], depth: u8) -> Self {
         match blocks {
             [] => return Self::Unknown,
