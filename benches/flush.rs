@@ -24,7 +24,7 @@ fn config() -> MapConfig {
 
 /// In the build folder, because the system's folder for temporary files may be in memory.
 fn temporary_folder() -> TempDir {
-    tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).expect("a folder beside the build")
+    tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).expect("a folder in the build directory")
 }
 
 fn new_mapper(disk: &Arc<dyn Disk>, folder: &TempDir) -> OutOfCoreTileMapper {

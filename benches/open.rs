@@ -13,7 +13,7 @@ const TILES_A_FLUSH: i32 = 10_000;
 
 fn open(criterion: &mut Criterion) {
     // In the build folder, because the system's folder for temporary files may be in memory.
-    let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).expect("a folder beside the build");
+    let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).expect("a folder in the build directory");
     let path = folder.path().join("map");
     let start = Instant::now();
     let config = make_map(&path);
@@ -26,10 +26,10 @@ fn open(criterion: &mut Criterion) {
     group.sample_size(10).sampling_mode(SamplingMode::Flat);
     group.warm_up_time(Duration::from_secs(1)).measurement_time(Duration::from_secs(5));
     // Batches exclude the drop of the opened map from the time.
-    group.bench_function("to be asked", |bencher| {
+    group.bench_function("reader", |bencher| {
         bencher.iter_batched(|| (), |()| open_reader(), BatchSize::PerIteration);
     });
-    group.bench_function("to go on with it", |bencher| {
+    group.bench_function("mapper", |bencher| {
         bencher.iter_batched(|| (), |()| open_mapper(), BatchSize::PerIteration);
     });
     group.finish();

@@ -17,7 +17,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         _ => 3,
     };
     println!(
-        "| map | tiles | voxels | table (B a voxel) | fast (B a voxel) | small | below 18 B | made fast (ns a voxel) | made small | read | its octree |"
+        "| map | tiles | voxels | table (B/voxel) | fast (B/voxel) | small | below 18 B | encode fast (ns/voxel) | encode small | decode | octree |"
     );
     println!("|---|---|---|---|---|---|---|---|---|---|---|");
     for map in maps {

@@ -35,7 +35,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         if stop.load(Ordering::Relaxed) {
             drop(out);
             std::fs::remove_file(file)?;
-            return Err("stopped as asked; nothing is written".into());
+            return Err("stopped; no file was written".into());
         }
         for voxel in tile?.voxels() {
             let found = Occupancy::of(map.config(), Some(voxel.evidence));

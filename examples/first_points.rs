@@ -14,9 +14,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         Some("--passes") => maps.drain(..2).nth(1).ok_or("a number of passes")?.parse()?,
         _ => 5,
     };
-    println!(
-        "| map | points | kB read (median) | most | CPU us (median) | most of 99 % | wall us (median) | most of 99 % |"
-    );
+    println!("| map | points | kB read (median) | max | CPU us (median) | 99 % | wall us (median) | 99 % |");
     println!("|---|---:|---:|---:|---:|---:|---:|---:|");
     for map in maps {
         println!("{}", row(Path::new(&map), passes)?);

@@ -47,7 +47,7 @@ fn main() -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
         }
         drop(goal);
         let (asked, blocked) = planner.join().map_err(|_| "the planner panicked")??;
-        println!("{SCANS} scans mapped; {blocked} of {asked} ways blocked");
+        println!("{SCANS} scans mapped; {blocked} of {asked} paths blocked");
         Ok::<_, Box<dyn std::error::Error + Send + Sync>>(())
     })?;
     std::fs::remove_dir_all(&folder)?;

@@ -41,8 +41,7 @@ pub struct KeptScanHead {
 }
 
 /// Error text for a map without kept scans.
-const NOT_KEPT: &str =
-    "keeps no scans, so that it cannot be mapped again; build it with `keep_scans` to have them";
+const NOT_KEPT: &str = "keeps no scans and cannot be replayed; build it with `keep_scans`";
 
 impl KeptSummary {
     /// Reads the summary of a map.
@@ -151,9 +150,11 @@ pub(crate) fn no_kept_scan(entry: &CatalogEntry) -> Option<String> {
     let what = match entry {
         CatalogEntry::Kept(_) | CatalogEntry::Removed(..) => return None,
         CatalogEntry::Listed(scan) => format!("scan {}, whose points are not kept", scan.number),
-        CatalogEntry::Unlisted(first, last) if first == last => format!("number {first}, which is no scan"),
-        CatalogEntry::Unlisted(first, last) => format!("numbers {first} to {last}, which are no scans"),
-        CatalogEntry::Operation(what) => format!("a change that is no scan: {what}"),
+        CatalogEntry::Unlisted(first, last) if first == last => {
+            format!("number {first}, which is not a scan")
+        }
+        CatalogEntry::Unlisted(first, last) => format!("numbers {first} to {last}, which are not scans"),
+        CatalogEntry::Operation(what) => format!("a change by another operation: {what}"),
     };
-    Some(format!("cannot be mapped again from its scans, for it also consists of {what}"))
+    Some(format!("cannot be replayed from its scans, because it also contains {what}"))
 }

@@ -194,8 +194,8 @@ fn tiles_of(config: &MapConfig, tree: &Octree) -> Result<Vec<TileIndex>> {
         let covered = TileBox::new(grid.tile_of_voxel(first), grid.tile_of_voxel(last));
         let count = covered.count();
         if tiles.len() as u64 + count > MAX_TILES {
-            let hint = "such a file is made by pruning large cubes; cut it with OctoMap's tools first";
-            let what = "number of tiles that the file stands for";
+            let hint = "the file contains large pruned cubes; crop it with OctoMap's tools first";
+            let what = "number of tiles covered by the file";
             return Err(Error::TooLarge { what, size: count, limit: MAX_TILES, hint });
         }
         if count == 1 && tiles.last() == Some(&covered.min()) {

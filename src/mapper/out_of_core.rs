@@ -129,7 +129,7 @@ impl OutOfCoreTileMapper {
                 self.check_rays(&input)?;
                 return Ok(done);
             }
-            Some(input) if input.is_named(name) => format!("{name}, which is known by its content"),
+            Some(input) if input.is_named(name) => format!("{name}, which is identified by its content"),
             Some(input) => input.name,
             None if scan_number == 0 => {
                 self.begin_input(name)?;

@@ -23,8 +23,9 @@ impl SideMapper {
     /// Fails if another process is remapping the map, the folder has other content, the map is of the original format
     /// or a disk operation fails.
     pub(crate) fn begin(map: &TileStore, config: MapConfig, stop: Stop) -> Result<Self> {
-        let map_id =
-            map.map_id().ok_or_else(|| Error::argument("map", "of the original format; convert it first"))?;
+        let map_id = map
+            .map_id()
+            .ok_or_else(|| Error::argument("map", "is of the original format; convert it first"))?;
         let folder = SideFolder::begin(map.disk().clone(), map.folder())?;
         let store = TileStore::create(map.disk().clone(), folder.path(), map.metadata().clone(), map_id)?;
         let mut mapper = OutOfCoreTileMapper::without_tiles(store, config, [])?;

@@ -9,7 +9,7 @@ const FINEST_DEPTH: u8 = 16;
 
 pub(super) fn occupancy_at_depth(view: &impl MapView, point: Point, depth: u8) -> Result<Occupancy> {
     if !(1..=FINEST_DEPTH).contains(&depth) {
-        return Err(Error::argument("depth", format!("{depth} is not from 1 to {FINEST_DEPTH}, the finest")));
+        return Err(Error::argument("depth", format!("{depth} is not in the range 1 to {FINEST_DEPTH}")));
     }
     let config = view.config();
     let Some(voxel) = config.grid.voxel_of(point) else { return Ok(Occupancy::Unknown) };

@@ -58,7 +58,7 @@ pub(crate) fn first_not_free(
     let size: u64 =
         (0..3).map(|k| u64::from(around.end[k].abs_diff(around.min[k]))).fold(1, u64::saturating_mul);
     if size > MAX_UNKNOWN_VOXELS {
-        let hint = "take a smaller body, or count unknown as free";
+        let hint = "use a smaller body, or treat unknown space as free";
         return Err(Error::TooLarge {
             what: "number of voxels in the body",
             size,

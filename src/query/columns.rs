@@ -144,8 +144,7 @@ fn spread(bricks: &FxHashMap<[i32; 2], BrickColumns>, resolution_m: f64) -> Resu
     let [width, height] = [0, 1].map(|k| last[k] - first[k] + 1);
     let too_many = || {
         let reason = format!(
-            "{width} x {height} columns of {resolution_m} m; an answer has at most {MAX_COLUMNS}: ask for a smaller \
-             region"
+            "{width} x {height} columns of {resolution_m} m exceed the limit of {MAX_COLUMNS}; use a smaller region"
         );
         Error::argument("region", reason)
     };

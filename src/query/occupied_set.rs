@@ -188,8 +188,9 @@ pub(crate) fn check_resolutions(resolutions_m: impl Iterator<Item = f64>) -> Res
     for resolution_m in resolutions_m {
         let first = *first.get_or_insert(resolution_m);
         if first.to_bits() != resolution_m.to_bits() {
-            let reason =
-                format!("{first} m in one map, {resolution_m} m in another; unite maps of one resolution");
+            let reason = format!(
+                "{first} m in one map, {resolution_m} m in another; all maps need the same resolution"
+            );
             return Err(Error::argument("resolution", reason));
         }
     }

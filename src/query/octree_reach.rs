@@ -11,18 +11,18 @@ pub(super) fn out_of_reach(grid: &Grid, voxel: VoxelIndex, tiles: Option<&[TileI
     let half_m = f64::from(REACH.end[0]) * grid.resolution_m();
     let (center, width_m) = (grid.center_m(voxel), 2.0 * half_m);
     let hint = match tiles.map(|tiles| origin_for(grid, tiles)) {
-        None => "name a region (`region`) inside".to_owned(),
+        None => "export a region (`region`) inside".to_owned(),
         Some(Some([x, y, z])) => {
-            format!("`origin` {x} {y} {z} brings all of it into reach, a region (`region`) a part")
+            format!("`origin` {x} {y} {z} makes the whole map fit, a region (`region`) a part of it")
         }
         Some(None) => format!(
-            "no `origin` helps, for the map is wider than the {width_m} m that they reach in all: export it region by region \
-             (`region`), each with an `origin` inside"
+            "no `origin` is sufficient, because the map is wider than the {width_m} m of the whole key range: export \
+             regions (`region`), each with an `origin` inside"
         ),
     };
     let reason = format!(
-        "the voxel at {center:?} m is outside the {half_m} m around the origin that OctoMap's keys reach at this \
-         resolution; {hint}"
+        "the voxel at {center:?} m is outside of OctoMap's key range, {half_m} m around the origin at this resolution; \
+         {hint}"
     );
     Error::argument("octree", reason)
 }

@@ -132,7 +132,10 @@ pub(crate) fn walk_segment(
     };
     let mut walk = RayWalk::between(grid.to_voxel_units(from), start, grid.to_voxel_units(to), last);
     if walk.steps() > MAX_RAY_STEPS {
-        let reason = format!("meets {} voxels; ask for at most {MAX_RAY_STEPS}", walk.steps());
+        let reason = format!(
+            "crosses {} voxels, more than the limit of {MAX_RAY_STEPS}; use a shorter one",
+            walk.steps()
+        );
         return Err(Error::argument("segment", reason));
     }
     let length_m = (0..3).map(|k| (to[k] - from[k]).powi(2)).sum::<f64>().sqrt();

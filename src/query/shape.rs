@@ -44,7 +44,7 @@ impl Shape {
         if let Self::SweptSphere { from, to, .. } = self
             && !from.iter().chain(to).all(|coordinate| coordinate.is_finite())
         {
-            return Err(Error::argument("body", format!("its way from {from:?} to {to:?} m is not finite")));
+            return Err(Error::argument("body", format!("the path from {from:?} to {to:?} m is not finite")));
         }
         let bounds = match *self {
             Self::Sphere { center, radius_m } => grown(center, center, checked_radius(radius_m)?),
@@ -54,13 +54,16 @@ impl Shape {
             }
             Self::Box(bounds) => {
                 if (0..3).any(|k| bounds.min[k] > bounds.max[k]) {
-                    return Err(Error::argument("body", format!("{bounds} ends below its beginning")));
+                    return Err(Error::argument(
+                        "body",
+                        format!("{bounds} has its upper corner below the lower one"),
+                    ));
                 }
                 bounds
             }
             Self::OrientedBox { world_from_box, half_extents_m } => {
                 if half_extents_m.iter().any(|extent| extent.is_nan() || *extent < 0.0) {
-                    let reason = format!("{half_extents_m:?} m are not lengths of at least 0");
+                    let reason = format!("{half_extents_m:?} m must not be negative");
                     return Err(Error::argument("half extents", reason));
                 }
                 let (center, axes) = axes_of(&world_from_box);

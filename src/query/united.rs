@@ -48,7 +48,7 @@ impl<'a> United<'a> {
     /// Fails with [`Error::InvalidArgument`] if there is no map or the maps have different resolutions.
     pub fn new(maps: &[&'a dyn Queries]) -> Result<Self> {
         let Some(first) = maps.first() else {
-            return Err(Error::argument("maps", "there are none; unite at least one"));
+            return Err(Error::argument("maps", "none given; at least one is needed"));
         };
         check_resolutions(maps.iter().map(|map| map.grid().resolution_m()))?;
         Ok(Self { maps: maps.to_vec(), grid: first.grid() })

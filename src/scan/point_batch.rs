@@ -28,8 +28,11 @@ impl PointBatch<'_> {
     pub fn updates(&self, grid: &Grid, model: &SensorModel) -> Result<ScanUpdates> {
         check_intensities(model, self.points.len(), self.intensities)?;
         if self.is_occupied.len() != self.points.len() {
-            let reason =
-                format!("{} for {} points; give one a point", self.is_occupied.len(), self.points.len());
+            let reason = format!(
+                "{} for {} points; one per point is needed",
+                self.is_occupied.len(),
+                self.points.len()
+            );
             return Err(Error::argument("is_occupied", reason));
         }
         let mut collector = BatchCollector::new(grid, model, self.points.len());

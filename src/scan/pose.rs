@@ -21,7 +21,7 @@ use nalgebra::{Isometry3, Matrix3, Quaternion, Rotation3, Translation3, UnitQuat
 /// assert_eq!(level.position_m(), pose.position_m());
 ///
 /// let error = Pose::from_quaternion([0.0; 3], [0.0; 4]).unwrap_err();
-/// assert_eq!(error.to_string(), "pose: a quaternion of no length");
+/// assert_eq!(error.to_string(), "pose: a quaternion of length 0");
 /// # Ok(())
 /// # }
 /// ```
@@ -75,7 +75,7 @@ impl Pose {
         if !quaternion.norm_squared().is_finite() {
             return Err("a quaternion too long to be a rotation".to_owned());
         }
-        let rotation = UnitQuaternion::try_new(quaternion, 1e-9).ok_or("a quaternion of no length")?;
+        let rotation = UnitQuaternion::try_new(quaternion, 1e-9).ok_or("a quaternion of length 0")?;
         Ok(Self { world_from_sensor: Isometry3::from_parts(Translation3::from(position_m), rotation) })
     }
 
@@ -93,7 +93,7 @@ impl Pose {
         };
         let is_near = |(number, wanted): (&f64, f64)| (number - wanted).abs() <= LAST_ROW_TOLERANCE;
         if last.is_some_and(|last| !last.iter().zip([0.0, 0.0, 0.0, 1.0]).all(is_near)) {
-            return Err("the last row of the matrix is not 0 0 0 1; rows come first, not columns".to_owned());
+            return Err("the last row of the matrix is not 0 0 0 1; use row-major order".to_owned());
         }
         let matrix = Matrix3::new(a, b, c, d, e, f, g, h, i);
         let deviation = matrix * matrix.transpose() - Matrix3::identity();

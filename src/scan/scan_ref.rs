@@ -176,7 +176,9 @@ fn convert<P: Copy>(
 
 fn part<'s, T>(all: &'s [T], range: &Range<usize>) -> Result<&'s [T]> {
     let part = all.get(range.clone());
-    part.ok_or_else(|| Error::argument("points", format!("{range:?} of {}; there are no such", all.len())))
+    part.ok_or_else(|| {
+        Error::argument("points", format!("the range {range:?} exceeds the {} points", all.len()))
+    })
 }
 
 #[cfg(test)]

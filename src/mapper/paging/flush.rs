@@ -146,7 +146,7 @@ impl TilePager<'_> {
         unlocked(contents, || shared_disk::unlocked(disk, || while flusher.wait() {}));
         self.disk.note_stall(since.elapsed());
         if self.contents.is_flushing() {
-            let lost = std::io::Error::other("the thread that flushed has ended early");
+            let lost = std::io::Error::other("the flush thread ended unexpectedly");
             let error = Error::io(self.store().folder(), "flush", lost);
             self.contents.end_flight(Err(error));
             self.contents.cache.no_save_in_flight();

@@ -179,7 +179,7 @@ impl FlushJob {
             }
             let Some(flight) = &mut contents.flight else { return Ok(()) };
             if flight.waits_for_saves() {
-                let lost = std::io::Error::other("the thread that saved tiles has ended early");
+                let lost = std::io::Error::other("the save thread ended unexpectedly");
                 return Err(Error::io(disk.store().folder(), "flush", lost));
             }
             let unsaved = flight.take_unsaved().into_iter();

@@ -86,7 +86,7 @@ fn read_node(
     let codes = Code::unpack(input.take("the children of a node")?);
     if codes == [Code::Unknown; 8] {
         if depth > 0 {
-            return Err(FormatError::at_offset(begin, "a node that should have children has none").into());
+            return Err(FormatError::at_offset(begin, "an inner node has no children").into());
         }
         growing.tree.add_leaf(depth);
         return Ok(Node::Leaf(OCTOMAP_MAX_LOG_ODDS));
@@ -98,7 +98,7 @@ fn read_node(
             Code::Free => Node::Leaf(OCTOMAP_MIN_LOG_ODDS),
             Code::Occupied => Node::Leaf(OCTOMAP_MAX_LOG_ODDS),
             Code::Inner if depth + 1 == DEPTH => {
-                let reason = "a node of the finest level should have no children";
+                let reason = "a node at the finest level has children";
                 return Err(FormatError::at_offset(begin, reason).into());
             }
             Code::Inner => read_node(input, growing, depth + 1)?,

@@ -51,7 +51,7 @@ fn read_node(
         return Ok(Node::Leaf(value));
     }
     if depth == DEPTH {
-        let reason = "a node of the finest level should have no children";
+        let reason = "a node at the finest level has children";
         return Err(FormatError::at_offset(mask_at, reason).into());
     }
     let block = growing.add_inner(input)?;

@@ -85,7 +85,10 @@ fn nodes_of<E: NodeEncoder>(children: &[Spine<E>; 8]) -> [E::Node; 8] {
 
 fn copy(spool: &mut impl Read, bytes: u64, out: &mut impl Write) -> io::Result<()> {
     if io::copy(&mut spool.take(bytes), out)? < bytes {
-        return Err(io::Error::new(io::ErrorKind::UnexpectedEof, "the spool lost what was written to it"));
+        return Err(io::Error::new(
+            io::ErrorKind::UnexpectedEof,
+            "the spool is shorter than the data written to it",
+        ));
     }
     Ok(())
 }

@@ -258,7 +258,7 @@ impl ColumnReader {
                 camera.values(&self.words, depths, values);
                 self.camera = Some(camera);
             }
-            _ => return Err(input.wrong("a column of no known form")),
+            _ => return Err(input.wrong("a column of unknown form")),
         }
         Ok(())
     }

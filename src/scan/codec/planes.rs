@@ -251,7 +251,7 @@ impl PlaneReader {
                 decompress(&mut self.zstd, input.bytes(length)?, &mut self.plane, input)?;
             }
             GROUPED if self.above.len() == self.plane.len() => self.take_groups(input)?,
-            _ => return Err(input.wrong("a plane of no known form")),
+            _ => return Err(input.wrong("a plane of unknown form")),
         }
         Ok(())
     }
@@ -290,7 +290,9 @@ fn decompress(
 ) -> Result<(), FormatError> {
     let zstd = match zstd {
         Some(zstd) => zstd,
-        none => none.insert(DCtx::try_create().ok_or_else(|| input.wrong("no memory to decompress it"))?),
+        none => {
+            none.insert(DCtx::try_create().ok_or_else(|| input.wrong("not enough memory for decompression"))?)
+        }
     };
     match zstd.decompress(plane, bytes) {
         Ok(length) if length == plane.len() => Ok(()),

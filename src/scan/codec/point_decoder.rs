@@ -50,7 +50,7 @@ impl PointDecoder {
         }
         match input.is_at_end() {
             true => Ok(has_intensities),
-            false => Err(input.wrong("bytes behind a block of points")),
+            false => Err(input.wrong("extra bytes after a block of points")),
         }
     }
 }

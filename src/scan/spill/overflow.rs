@@ -25,13 +25,13 @@ pub(crate) struct Overflow<'a> {
 impl Overflow<'_> {
     pub(crate) fn too_many_tiles(&self) -> Error {
         let reason = format!(
-            "too few for a scan that touches more than {} tiles; go on with more memory, or build with larger tiles",
+            "too few for a scan that changes more than {} tiles; use more memory or larger tiles",
             self.max_tiles
         );
         Error::argument("memory", reason)
     }
 
     pub(crate) fn error(&self, error: io::Error) -> Error {
-        Error::io(self.folder, "keep the updates of a scan for a while in a temporary file in", error)
+        Error::io(self.folder, "store updates of a scan in a temporary file in", error)
     }
 }

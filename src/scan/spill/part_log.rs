@@ -32,7 +32,7 @@ impl<'a> PartLog<'a> {
     /// Fails if the file cannot be created or written.
     pub(crate) fn append(&mut self, before: u64, record: &[u8]) -> io::Result<u64> {
         let length = u32::try_from(record.len())
-            .map_err(|_| io::Error::other("more than 4 GiB of updates of one tile at a time"))?;
+            .map_err(|_| io::Error::other("more than 4 GiB of updates for one tile"))?;
         if !self.tail.is_empty() && self.tail.len() + HEADER_BYTES + record.len() > self.max_tail_bytes {
             self.write_tail()?;
         }

@@ -202,12 +202,13 @@ pub(crate) fn check_count(points: usize, intensities: &[f32]) -> Result<()> {
     if intensities.len() == points {
         return Ok(());
     }
-    let reason = format!("{} for {points} points; give one a point", intensities.len());
+    let reason = format!("{} for {points} points; one per point is needed", intensities.len());
     Err(Error::argument("intensities", reason))
 }
 
 fn no_intensities() -> Error {
-    let reason = "the sensor model iwlo needs an intensity a point; use log-odds for data without";
+    let reason =
+        "the sensor model iwlo needs an intensity per point; use log-odds for data without intensities";
     Error::argument("intensities", reason)
 }
 

@@ -206,7 +206,7 @@ impl<R: BufRead> Unpacker<R> {
                 TileUpdates::Ordered(OrderedUpdates::from_parts(voxels, intensities))
             }
             other => {
-                let reason = format!("{other} is no kind of updates");
+                let reason = format!("unknown kind of updates: {other}");
                 return Err(io::Error::new(io::ErrorKind::InvalidData, reason));
             }
         }))

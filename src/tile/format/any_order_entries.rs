@@ -33,7 +33,7 @@ impl<'a> AnyOrderEntries<'a> {
             self.end_run()?;
         }
         if self.run.len() >= BRICK_VOXELS {
-            let reason = format!("key {:?} or another of its 8 x 8 x 8 voxels comes twice", key.0);
+            let reason = format!("duplicate key: {:?} or another one of its 8 x 8 x 8 voxels", key.0);
             return Err(FormatError::at_offset(offset, reason));
         }
         self.run.push((code, evidence, offset));
@@ -51,7 +51,7 @@ impl<'a> AnyOrderEntries<'a> {
             may_be.then(|| self.run.iter().find(known)).flatten().map(|&(.., offset)| offset)
         };
         if let Some(offset) = in_run.or_else(in_table) {
-            return Err(FormatError::at_offset(offset, "the key comes twice"));
+            return Err(FormatError::at_offset(offset, "duplicate key"));
         }
         self.voxels_of_run.clear();
         self.voxels_of_run

@@ -20,7 +20,7 @@ use std::ops::Range;
 /// Returns errors of `out`, and fails if `compact` is too short for a compact table.
 pub fn write_compact_file(compact: &[u8], front: Trailer, out: &mut impl Write) -> io::Result<()> {
     let Some((body, crc)) = compact.split_last_chunk::<{ CRC_BYTES as usize }>() else {
-        return Err(io::Error::new(io::ErrorKind::InvalidInput, "no table in the compact form"));
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, "not a table in the compact form"));
     };
     let front = Trailer { table_crc: u32::from_le_bytes(*crc), octree_crc: 0, octree_bytes: 0, ..front };
     out.write_all(&front.to_bytes())?;
@@ -78,7 +78,11 @@ fn read_behind_front<T>(
 pub fn read_compact_front(input: &mut impl Read, file_bytes: u64) -> Result<Trailer, DecodeError> {
     let front = Trailer::read_in_front(input, file_bytes)?;
     if (front.octree_crc, front.octree_bytes) != (0, 0) {
-        return Err(FormatError::at_offset(48, "an octree is named, and compact tiles have none").into());
+        return Err(FormatError::at_offset(
+            48,
+            "the front part lists an octree, but compact tiles have none",
+        )
+        .into());
     }
     Ok(front)
 }

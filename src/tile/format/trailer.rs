@@ -67,14 +67,14 @@ impl Trailer {
     pub fn read(input: &mut impl Read, offset: u64, bytes: u64) -> Result<Self, DecodeError> {
         let is_long_enough = bytes >= TRAILER_BYTES as u64;
         if !is_long_enough || bytes - TRAILER_BYTES as u64 > MAX_PARAMETERS_BYTES {
-            let reason = "there must be none or a trailer of voxtile's";
+            let reason = "there must be none or a voxtile trailer";
             let reason = format!("{bytes} bytes follow the last entry; {reason}");
             return Err(FormatError::at_offset(offset, reason).into());
         }
         let fixed = Fixed::read(input, offset)?;
         if bytes != fixed.all_bytes() {
             let (found, wanted) = (bytes - TRAILER_BYTES as u64, fixed.parameters_bytes());
-            let reason = format!("{found} bytes of parameters where the trailer names {wanted}");
+            let reason = format!("{found} bytes of parameters instead of {wanted}");
             return Err(FormatError::at_offset(offset + 60, reason).into());
         }
         fixed.with_parameters(input, offset)
@@ -87,7 +87,7 @@ impl Trailer {
     /// Fails if the length, magic number, version or checksum is wrong.
     pub fn read_in_front(input: &mut impl Read, file_bytes: u64) -> Result<Self, DecodeError> {
         let too_short = |wanted: u64| {
-            let reason = format!("{file_bytes} bytes are too few for the {wanted} that stand in front");
+            let reason = format!("{file_bytes} bytes are too few for a front part of {wanted} bytes");
             Err(FormatError::at_offset(0, reason).into())
         };
         if file_bytes < TRAILER_BYTES as u64 {
@@ -114,10 +114,10 @@ impl Fixed {
             return wrong(0, "the trailer does not match its checksum");
         }
         if (fixed.u32_at(0), fixed.u32_at(4)) != (MAGIC, VERSION) {
-            return wrong(0, "no trailer of version 1 is here");
+            return wrong(0, "not a trailer of version 1");
         }
         if u64::from(fixed.parameters_bytes()) > MAX_PARAMETERS_BYTES {
-            return wrong(60, "the parameters are longer than any");
+            return wrong(60, "the parameters are too long");
         }
         Ok(fixed)
     }

@@ -34,7 +34,9 @@ impl OctreeFactory {
         let worker = match config {
             OctreeConfig::Pointers(VoxelCacheMode::Parallel(_)) => {
                 let worker = OctreeWorker::start(limit_voxels, ledger.clone());
-                worker.map_err(|error| log::warn!("no thread for octrees, which takes longer: {error}")).ok()
+                worker
+                    .map_err(|error| log::warn!("no thread for octrees, so updates take longer: {error}"))
+                    .ok()
             }
             _ => None,
         };

@@ -61,8 +61,8 @@ impl ColumnReader {
         let wrong = |reason| Err(FormatError::at_offset(offset, format!("{}: {reason}", column.name)).into());
         match decompressed {
             Ok(length) if length == column.bytes.len() => Ok(()),
-            Ok(length) => wrong(format!("{length} bytes where {} are announced", column.bytes.len())),
-            Err(code) => wrong(format!("cannot be unpacked: {}", get_error_name(code))),
+            Ok(length) => wrong(format!("{length} bytes instead of {}", column.bytes.len())),
+            Err(code) => wrong(format!("cannot be decompressed: {}", get_error_name(code))),
         }
     }
 }

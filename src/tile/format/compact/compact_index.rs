@@ -62,7 +62,7 @@ impl CompactIndex {
         let Some(number) = self.index.group_of(voxel.brick()) else { return Ok(None) };
         let announced = self.index.announced(number);
         if group.len() as u64 != announced.bytes {
-            let reason = format!("a group of {} bytes where {} are announced", group.len(), announced.bytes);
+            let reason = format!("a group of {} bytes instead of {}", group.len(), announced.bytes);
             return Err(FormatError::at_offset(0, reason).into());
         }
         let finder = VoxelFinder::new(&self.codebook, voxel);

@@ -95,12 +95,12 @@ impl<'a> Rest<'a> {
         });
         let code = step.and_then(|step| before.map_or(0, |before| before.0 + 1).checked_add(step));
         let code = code.filter(|&code| code < BrickCode::END);
-        code.map(BrickCode).ok_or_else(|| "a step leads to no brick".into())
+        code.map(BrickCode).ok_or_else(|| "an invalid step between bricks".into())
     }
 
     /// Reads the mask of the next brick, which must not be empty.
     pub(super) fn take_mask(&mut self) -> Result<BrickMask, String> {
-        const SHORT: &str = "a group has less than its bricks";
+        const SHORT: &str = "a group ends before its last brick";
         let (&words, rest) = self.words.split_first().ok_or(SHORT)?;
         self.words = rest;
         let (masks, rest) = self.masks.split_at_checked(words.count_ones() as usize).ok_or(SHORT)?;
@@ -110,7 +110,7 @@ impl<'a> Rest<'a> {
             std::array::from_fn(|word| if words >> word & 1 == 1 { masks.next().unwrap_or(0) } else { 0 });
         let is_set = |word: usize| (words >> word & 1 == 1) == (observed[word] != 0);
         if words == 0 || !(0..8).all(is_set) {
-            return Err("a mask in which nothing is set".into());
+            return Err("a brick with an empty mask".into());
         }
         Ok(observed)
     }
@@ -142,7 +142,7 @@ impl<'a> Rest<'a> {
     pub(super) fn take_rare(&mut self) -> Result<Evidence, String> {
         let states = self.rares.len() / STATE_BYTES;
         if self.rares_done >= states || states * STATE_BYTES != self.rares.len() {
-            return Err("fewer rare states than their symbols".into());
+            return Err("fewer rare states than rare symbols".into());
         }
         let state = state_at(self.rares, self.rares_done);
         self.rares_done += 1;

@@ -37,7 +37,7 @@ impl GroupIndex {
     pub(super) fn read(header: &Header, input: &mut Input<impl Read>) -> Result<Self, DecodeError> {
         let offset = input.offset;
         let too_many =
-            || input.wrong(format!("{} groups where {} bytes follow", header.groups, input.left()));
+            || input.wrong(format!("{} groups do not fit into {} bytes", header.groups, input.left()));
         let bytes = header.groups.checked_mul(ENTRY_BYTES).filter(|&bytes| bytes as u64 <= input.left());
         let mut index = vec![0; bytes.ok_or_else(too_many)?];
         input.read(&mut index)?;
@@ -49,9 +49,9 @@ impl GroupIndex {
         {
             return wrong("the first bricks of the groups do not ascend".to_owned());
         }
-        let announced = header.codebook_bytes as u64 + index.bytes_before(index.groups.len());
-        if announced != input.left() {
-            return wrong(format!("{announced} bytes are announced where {} follow", input.left()));
+        let wanted = header.codebook_bytes as u64 + index.bytes_before(index.groups.len());
+        if wanted != input.left() {
+            return wrong(format!("the parts should have {wanted} bytes, but {} bytes follow", input.left()));
         }
         Ok(index)
     }

@@ -69,7 +69,7 @@ impl<'a, T: TakeBricks> GroupReader<'a, T> {
             self.take_brick(code, &mut rest)?;
         }
         if !rest.is_empty() {
-            return Err("a group has more than its bricks".into());
+            return Err("a group has data after its last brick".into());
         }
         match announced {
             Some(group) if self.before >= Some(group.end) => Err("a group has bricks of the next one".into()),
@@ -95,11 +95,11 @@ impl<'a, T: TakeBricks> GroupReader<'a, T> {
     pub(super) fn check_is_all(&self) -> Result<(), FormatError> {
         let Header { bricks, voxels, .. } = *self.header;
         if self.bricks != bricks {
-            let reason = format!("{} bricks where {bricks} are announced", self.bricks);
+            let reason = format!("{} bricks instead of {bricks}", self.bricks);
             return Err(FormatError::at_offset(16, reason));
         }
         if self.voxels != voxels {
-            let reason = format!("{} voxels where {voxels} are announced", self.voxels);
+            let reason = format!("{} voxels instead of {voxels}", self.voxels);
             return Err(FormatError::at_offset(8, reason));
         }
         Ok(())

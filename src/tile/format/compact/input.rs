@@ -60,7 +60,7 @@ impl<R: Read> Input<R> {
         let (begin, found) = (self.part, self.offset - self.part);
         let wrong = |reason| Err(FormatError::at_offset(begin, reason).into());
         if found != bytes {
-            return wrong(format!("the {what} takes {found} bytes where {bytes} are announced"));
+            return wrong(format!("the {what} has {found} bytes instead of {bytes}"));
         }
         match self.end_part() == crc {
             true => Ok(()),
@@ -76,7 +76,7 @@ impl<R: Read> Input<R> {
     pub(super) fn read(&mut self, bytes: &mut [u8]) -> Result<(), DecodeError> {
         let left = self.left();
         if bytes.len() as u64 > left {
-            return Err(self.wrong(format!("{} bytes should follow, and {left} do", bytes.len())));
+            return Err(self.wrong(format!("{} bytes are expected, but only {left} follow", bytes.len())));
         }
         self.input.read_exact(bytes)?;
         self.crc.update(bytes);
@@ -103,7 +103,7 @@ impl<R: Read> Input<R> {
     /// Checks that only the correct checksum follows.
     pub(super) fn end(mut self) -> Result<(), DecodeError> {
         if self.offset != self.end {
-            return Err(self.wrong(format!("{} bytes stand behind the last voxel", self.left())));
+            return Err(self.wrong(format!("{} bytes follow the last voxel", self.left())));
         }
         let mut crc = [0; CRC_BYTES as usize];
         self.input.read_exact(&mut crc)?;

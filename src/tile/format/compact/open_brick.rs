@@ -140,7 +140,7 @@ impl OpenBrick {
         } else {
             self.symbols.number(symbol, rest.take_second()?)
         };
-        let number = number.ok_or_else(|| format!("symbol {symbol} stands for no state"))?;
+        let number = number.ok_or_else(|| format!("symbol {symbol} has no state"))?;
         Ok(number as u16)
     }
 }

@@ -372,7 +372,7 @@ fn an_index_that_does_not_fit_its_groups_is_an_error() {
     type Changes<'a> = &'a [(usize, &'a [u8])];
     let cases: [(Changes<'_>, u64, &str, bool); 3] = [
         (&[(entry(1), &last)], places[0].start, "bricks of the next one", true),
-        (&[(entry(0) + 8, &shorter), (entry(1) + 8, &longer)], places[0].start, "are announced", true),
+        (&[(entry(0) + 8, &shorter), (entry(1) + 8, &longer)], places[0].start, "bytes instead of", true),
         (&[(16, &1025_u32.to_le_bytes())], places[1].start, "at most 1", false),
     ];
     for (changes, place, reason, is_seen_alone) in cases {
@@ -464,9 +464,9 @@ fn what_is_wrong_is_said_where_it_is() {
         (20, &[1], 52, "codebook"),
         (24, &all[..4], 24, "groups"),
         (24, &[0], 24, "0 groups"),
-        (28, &all[..4], 36, "bytes are announced"),
+        (28, &all[..4], 36, "the parts should have"),
         (36, &all, 36, "ascend"),
-        (44, &all[..4], 36, "bytes are announced"),
+        (44, &all[..4], 36, "the parts should have"),
     ] {
         let error = wrong(at, with);
         assert_eq!(error.at, place, "{error}");
