@@ -64,7 +64,7 @@ fn live_reader(criterion: &mut Criterion) {
         };
         bencher.iter_batched(open, |(mapper, reader)| (all(mapper), reader), BatchSize::PerIteration);
     });
-    let (asked, micros) = (AtomicU64::new(0), AtomicU64::new(0));
+    let (queries, micros) = (AtomicU64::new(0), AtomicU64::new(0));
     group.bench_function("reader at 40 Hz", |bencher| {
         bencher.iter_batched(
             || mapper(before),
@@ -76,7 +76,7 @@ fn live_reader(criterion: &mut Criterion) {
                         while !is_over.load(Ordering::Relaxed) {
                             let since = Instant::now();
                             black_box(ask(&reader, measured[0].origin));
-                            asked.fetch_add(1, Ordering::Relaxed);
+                            queries.fetch_add(1, Ordering::Relaxed);
                             micros.fetch_add(since.elapsed().as_micros() as u64, Ordering::Relaxed);
                             thread::sleep(EVERY.saturating_sub(since.elapsed()));
                         }
@@ -90,8 +90,8 @@ fn live_reader(criterion: &mut Criterion) {
         );
     });
     group.finish();
-    let (asked, micros) = (asked.into_inner(), micros.into_inner());
-    println!("asked {asked} times, {} us each", micros / asked.max(1));
+    let (queries, micros) = (queries.into_inner(), micros.into_inner());
+    println!("queries {queries} times, {} us each", micros / queries.max(1));
 }
 
 criterion_group!(benches, live_reader);

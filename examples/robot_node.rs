@@ -23,19 +23,19 @@ fn main() -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
 
         // Planner, 40 times a second. It does not wait for flushes.
         let planner = scope.spawn(move || -> voxtile::Result<(u32, u32)> {
-            let (mut asked, mut blocked) = (0, 0);
+            let (mut checked, mut blocked) = (0, 0);
             while let Some(at) = goals.iter().next() {
                 let at: [f64; 3] = at;
                 let view = reader.view(); // All queries of this round see the same scan.
                 for ahead_m in [2.0, 5.0, 10.0] {
                     let body =
                         Shape::SweptSphere { from: at, to: [at[0], at[1] + ahead_m, at[2]], radius_m: 0.4 };
-                    asked += 1;
+                    checked += 1;
                     blocked += u32::from(view.collision(&body, UnknownAs::Free)?.is_some());
                 }
                 thread::sleep(Duration::from_millis(25));
             }
-            Ok((asked, blocked))
+            Ok((checked, blocked))
         });
 
         for (number, scan) in scans.iter().enumerate() {
@@ -46,8 +46,8 @@ fn main() -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
             }
         }
         drop(goal);
-        let (asked, blocked) = planner.join().map_err(|_| "the planner panicked")??;
-        println!("{SCANS} scans mapped; {blocked} of {asked} paths blocked");
+        let (checked, blocked) = planner.join().map_err(|_| "the planner panicked")??;
+        println!("{SCANS} scans mapped; {blocked} of {checked} paths blocked");
         Ok::<_, Box<dyn std::error::Error + Send + Sync>>(())
     })?;
     std::fs::remove_dir_all(&folder)?;

@@ -110,7 +110,7 @@ impl MapView for InMemoryMapper {
     }
 
     #[inline]
-    fn tile_at_hand(&self, index: TileIndex) -> Option<&Tile> {
+    fn resident_tile(&self, index: TileIndex) -> Option<&Tile> {
         Some(self.tiles.get_or_nothing(index))
     }
 
@@ -140,8 +140,8 @@ impl Mapper for InMemoryMapper {
     }
 
     fn insert_all(&mut self, scans: &[&dyn ScanPoints], reports: &mut Vec<ScanReport>) -> Result<()> {
-        for some in scans.chunks(self.tracer.count_beside(scans.len())) {
-            let traced = self.tracer.trace_beside(trace_rules(&self.config, None), some);
+        for some in scans.chunks(self.tracer.max_concurrent(scans.len())) {
+            let traced = self.tracer.trace_concurrently(trace_rules(&self.config, None), some);
             for (scan, updates) in some.iter().zip(traced) {
                 reports.push(match updates? {
                     Some(updates) => self.accept(updates),

@@ -26,7 +26,7 @@ enum Points {
 }
 
 impl KeptScan {
-    /// Opens a scan. If it has at most `most_points` points, they are read into memory.
+    /// Opens a scan. If it has at most `max_points` points, they are read into memory.
     ///
     /// # Errors
     ///
@@ -35,7 +35,7 @@ impl KeptScan {
         disk: &Arc<dyn Disk>,
         layout: &Layout,
         record: KeptRecord,
-        most_points: u64,
+        max_points: u64,
     ) -> Result<Self> {
         let world_from_sensor = match record.frame {
             KeptFrame::Sensor(pose) => Some(pose_of_numbers(&pose)),
@@ -43,7 +43,7 @@ impl KeptScan {
         };
         let points = Points::OnDisk(disk.clone(), layout.clone());
         let mut scan = Self { record, world_from_sensor, points };
-        if scan.record.points <= most_points {
+        if scan.record.points <= max_points {
             let (mut points, mut intensities) = (Vec::new(), Vec::new());
             scan.for_each_own_chunk(0..scan.len(), &mut |some, of_some| {
                 points.extend_from_slice(some);

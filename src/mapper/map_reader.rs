@@ -46,12 +46,12 @@ struct ReaderCache {
     max_tiles: usize,
     max_bytes: usize,
     /// Tiles not in memory of which one voxel was read.
-    asked_once: LruCache<TileIndex, ()>,
+    read_once: LruCache<TileIndex, ()>,
     io: IoCounts,
 }
 
-/// Largest number of tiles in `asked_once`.
-const MAX_ASKED_ONCE: NonZeroUsize = NonZeroUsize::new(1024).unwrap();
+/// Largest number of tiles in `read_once`.
+const MAX_READ_ONCE: NonZeroUsize = NonZeroUsize::new(1024).unwrap();
 
 impl ReaderCache {
     fn new(memory: MemoryLimit, grid: &Grid) -> Self {
@@ -64,7 +64,7 @@ impl ReaderCache {
             bytes: 0,
             max_tiles,
             max_bytes: memory.bytes(grid).unwrap_or(usize::MAX),
-            asked_once: LruCache::new(MAX_ASKED_ONCE),
+            read_once: LruCache::new(MAX_READ_ONCE),
             io: IoCounts::default(),
         }
     }
@@ -83,7 +83,7 @@ impl ReaderCache {
     fn put(&mut self, tile: Arc<Tile>) {
         let (index, bytes) = (tile.index(), tile.bytes());
         self.remove(index);
-        self.asked_once.pop(&index);
+        self.read_once.pop(&index);
         while (self.tiles.len() >= self.max_tiles || self.bytes.saturating_add(bytes) > self.max_bytes)
             && let Some((_, (_, dropped))) = self.tiles.pop_lru()
         {
@@ -441,7 +441,7 @@ impl MapView for MapReader {
         let index = self.config.grid.tile_of_voxel(voxel);
         let (tile, is_first) = self.found(|cache| {
             let tile = cache.get(index);
-            let is_first = tile.is_none() && cache.asked_once.put(index, ()).is_none();
+            let is_first = tile.is_none() && cache.read_once.put(index, ()).is_none();
             (tile, is_first)
         });
         if let Some(tile) = tile {

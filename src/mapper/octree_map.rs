@@ -187,7 +187,7 @@ impl TileCache {
 fn tiles_of(config: &MapConfig, tree: &Octree) -> Result<Vec<TileIndex>> {
     let grid = &config.grid;
     let mut tiles: Vec<TileIndex> = Vec::new();
-    let mut most_before_sorting = 1 << 16;
+    let mut max_before_sorting = 1 << 16;
     for Leaf { code, depth, .. } in tree.leaves() {
         let first = code.to_key().to_index_from(FIRST_VOXEL);
         let last = first.map(|k| k + ((1 << (16 - i32::from(depth))) - 1));
@@ -202,10 +202,10 @@ fn tiles_of(config: &MapConfig, tree: &Octree) -> Result<Vec<TileIndex>> {
             continue;
         }
         tiles.extend(covered.tiles());
-        if tiles.len() > most_before_sorting {
+        if tiles.len() > max_before_sorting {
             tiles.sort_unstable();
             tiles.dedup();
-            most_before_sorting = 2 * tiles.len().max(1 << 15);
+            max_before_sorting = 2 * tiles.len().max(1 << 15);
         }
     }
     tiles.sort_unstable();

@@ -45,7 +45,7 @@ pub struct OutOfCoreTileMapper {
     live: OnceLock<LiveReader>,
     tracer: ScanTracer,
     /// Scans with fewer points are traced concurrently with others.
-    fewest_points_alone: usize,
+    min_points_alone: usize,
 }
 
 impl OutOfCoreTileMapper {
@@ -98,7 +98,7 @@ impl OutOfCoreTileMapper {
         let scan_bytes = MemoryPlan::of(&config).scan_bytes;
         let tiles = PagedTiles::new(config.clone(), store);
         let tracer = ScanTracer::with_memory_bytes(scan_bytes);
-        Self { tiles, live: OnceLock::new(), config, tracer, fewest_points_alone: usize::MAX }
+        Self { tiles, live: OnceLock::new(), config, tracer, min_points_alone: usize::MAX }
     }
 
     /// Begins a new input: the `n`-th scan inserted from now on is the `n`-th scan of this input. Flushes, so that
@@ -304,7 +304,7 @@ impl OutOfCoreTileMapper {
             }
             Err(error) => {
                 if place.is_some() {
-                    pager.give_up_kept();
+                    pager.discard_kept();
                 }
                 Err(error)
             }
@@ -313,15 +313,19 @@ impl OutOfCoreTileMapper {
 
     /// Inserts scans that are traced concurrently, up to the first that must be traced alone; returns the number of
     /// inserted scans.
-    fn insert_beside(&mut self, scans: &[&dyn ScanPoints], reports: &mut Vec<ScanReport>) -> Result<usize> {
+    fn insert_concurrently(
+        &mut self,
+        scans: &[&dyn ScanPoints],
+        reports: &mut Vec<ScanReport>,
+    ) -> Result<usize> {
         let mut traced = Vec::with_capacity(scans.len());
         for (scan, updates) in
-            scans.iter().zip(self.tracer.trace_beside(trace_rules(&self.config, None), scans))
+            scans.iter().zip(self.tracer.trace_concurrently(trace_rules(&self.config, None), scans))
         {
             match updates {
                 Ok(Some(updates)) => traced.push(updates),
                 Ok(None) => {
-                    self.fewest_points_alone = scan.len().min(self.fewest_points_alone);
+                    self.min_points_alone = scan.len().min(self.min_points_alone);
                     break;
                 }
                 // Inserted alone after the scans before it, it fails again with its own error.
@@ -371,7 +375,7 @@ impl OutOfCoreTileMapper {
         let tiles = &self.tiles;
         let (disk, folder, max_tiles) = {
             let pager = tiles.pager();
-            (pager.store().disk().clone(), pager.store().folder().to_owned(), pager.most_tiles_of_scan())
+            (pager.store().disk().clone(), pager.store().folder().to_owned(), pager.max_tiles_of_scan())
         };
         let make_scratch = &|| disk.scratch(&folder);
         let spill = &mut |part| tiles.pager().stage(part);
@@ -423,7 +427,7 @@ impl OutOfCoreTileMapper {
     }
 
     /// Replays a kept scan within the selected tiles, or all; also returns the tiles that it changed.
-    pub(super) fn map_again(
+    pub(super) fn replay_scan(
         &mut self,
         number: u64,
         scan: &dyn ScanPoints,
@@ -441,12 +445,12 @@ impl OutOfCoreTileMapper {
     }
 
     /// Writes the points of a scan to the archive of kept scans.
-    pub(super) fn pager_keep(&self, scan: &dyn ScanPoints) -> Result<SegmentPlace> {
+    pub(super) fn write_points(&self, scan: &dyn ScanPoints) -> Result<SegmentPlace> {
         self.pager().keep(scan)
     }
 
     /// Commits a replay; the number of scans does not change.
-    pub(super) fn commit_again(&mut self, scan_number: u64, have_poses_changed: bool) -> Result<()> {
+    pub(super) fn commit_replay(&mut self, scan_number: u64, have_poses_changed: bool) -> Result<()> {
         let mut pager = self.pager();
         if have_poses_changed {
             pager.forget_poses_of_inputs();
@@ -519,9 +523,9 @@ impl Mapper for OutOfCoreTileMapper {
     fn insert_all(&mut self, scans: &[&dyn ScanPoints], reports: &mut Vec<ScanReport>) -> Result<()> {
         let mut left = scans;
         while !left.is_empty() {
-            let most = self.tracer.count_beside(left.len());
-            let beside = left[..most].iter().take_while(|scan| scan.len() < self.fewest_points_alone).count();
-            let inserted = if beside > 1 { self.insert_beside(&left[..beside], reports)? } else { 0 };
+            let most = self.tracer.max_concurrent(left.len());
+            let beside = left[..most].iter().take_while(|scan| scan.len() < self.min_points_alone).count();
+            let inserted = if beside > 1 { self.insert_concurrently(&left[..beside], reports)? } else { 0 };
             left = &left[inserted..];
             if inserted < beside.max(1)
                 && let Some((alone, others)) = left.split_first()
@@ -655,7 +659,7 @@ mod tests {
     }
 
     #[test]
-    fn no_new_map_has_control_characters_in_its_coordinate_system() {
+    fn new_maps_reject_control_characters_in_the_coordinate_system() {
         let folder = tempfile::tempdir().unwrap();
         let config = |crs: &str| MapConfig { crs: Some(crs.into()), ..MapConfig::new(0.1, 1.6).unwrap() };
         for crs in ["EPSG:25832\0", "a\u{1b}[2Jb", "a\u{9b}b"] {
@@ -671,7 +675,7 @@ mod tests {
     }
 
     #[test]
-    fn hits_in_little_memory_are_those_of_one_batch() {
+    fn hits_in_little_memory_equal_those_of_one_batch() {
         let cloud = |count: i32, shift: f64| {
             let point = |k: i32| [7, 11, 13].map(|step| f64::from(k * step % 97) * 0.05 + shift);
             let mut points: Vec<_> = (0..count).map(point).collect();

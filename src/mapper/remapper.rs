@@ -1,4 +1,4 @@
-use super::{OutOfCoreTileMapper, SideMapper};
+use super::{OutOfCoreTileMapper, ShadowMapper};
 use crate::config::{MapConfig, RayConfig};
 use crate::error::Result;
 use crate::scan::{ScanPoints, ScanReport, Stop};
@@ -37,7 +37,7 @@ impl Remapper {
         rays: &RayConfig,
         selection: Option<&TileSelection>,
     ) -> Result<(ScanReport, Vec<TileIndex>)> {
-        self.mapper.map_again(number, scan, rays, selection)
+        self.mapper.replay_scan(number, scan, rays, selection)
     }
 
     /// Adds an entry to the new catalog; each scan of the map has one.
@@ -52,11 +52,11 @@ impl Remapper {
 
     /// Writes points that replace those of a scan.
     pub(crate) fn write_points(&mut self, scan: &dyn ScanPoints) -> Result<SegmentPlace> {
-        self.mapper.pager_keep(scan)
+        self.mapper.write_points(scan)
     }
 
     /// Swaps in the committed content of a shadow map: its tiles, and its entries as the new catalog.
-    pub(crate) fn take_over(&mut self, side: &mut SideMapper) -> Result<()> {
+    pub(crate) fn take_over(&mut self, side: &mut ShadowMapper) -> Result<()> {
         self.mapper.with_store(|store| {
             side.with_store(|side| {
                 let mut records = side.archive().records()?;
@@ -77,7 +77,7 @@ impl Remapper {
         have_poses_changed: bool,
         release: impl FnOnce(&mut TileStore) -> T,
     ) -> Result<T> {
-        self.mapper.commit_again(self.scan_number, have_poses_changed)?;
+        self.mapper.commit_replay(self.scan_number, have_poses_changed)?;
         Ok(self.mapper.with_store(release))
     }
 }

@@ -72,8 +72,8 @@ impl<V: MapView + ?Sized> MapView for Stoppable<'_, V> {
     }
 
     // No check, for the same reason.
-    fn tile_at_hand(&self, index: TileIndex) -> Option<&Tile> {
-        self.view.tile_at_hand(index)
+    fn resident_tile(&self, index: TileIndex) -> Option<&Tile> {
+        self.view.resident_tile(index)
     }
 
     fn voxels_of_tile_hint(&self, index: TileIndex) -> Option<u64> {

@@ -81,7 +81,7 @@ pub trait MapView: Sync {
     /// Returns a tile, or an empty one if it contains no observations, if all tiles of the map are permanently in
     /// memory: looking up a tile is then cheaper than grouping queries by tile. `None` for other maps.
     #[inline]
-    fn tile_at_hand(&self, index: TileIndex) -> Option<&Tile> {
+    fn resident_tile(&self, index: TileIndex) -> Option<&Tile> {
         let _ = index;
         None
     }

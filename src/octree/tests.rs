@@ -65,9 +65,9 @@ fn assert_is(tree: &Octree, model: &Model) {
 
 proptest! {
     #[test]
-    fn whatever_is_written_the_tree_is_minimal_and_every_node_the_maximum_of_its_voxels(
+    fn trees_are_minimal_and_nodes_are_the_maximum_of_their_voxels(
         batches in prop::collection::vec((any::<bool>(), any_batch()), 1..12),
-        asked in prop::collection::vec(any_code(), 1..20),
+        queried in prop::collection::vec(any_code(), 1..20),
     ) {
         let (mut tree, mut model) = (Octree::new(), Model::new());
         for (at_once, batch) in batches {
@@ -79,7 +79,7 @@ proptest! {
             model.extend(batch);
             assert_is(&tree, &model);
         }
-        for code in asked {
+        for code in queried {
             for depth in 0..=16 {
                 assert_eq!(tree.get(MortonCode(code), depth), max_of(&model, code, depth));
             }
@@ -91,16 +91,16 @@ proptest! {
     }
 
     #[test]
-    fn overrides_answer_as_if_they_had_been_written(
+    fn overrides_give_the_same_values_as_writes(
         before in prop::collection::vec(any_batch(), 0..4),
         overrides in any_batch(),
-        asked in prop::collection::vec(any_code(), 1..20),
+        queried in prop::collection::vec(any_code(), 1..20),
     ) {
         let tree = Octree::from_sorted(voxels_of(&before.iter().flatten().map(|(&c, &v)| (c, v)).collect()));
         let overrides = voxels_of(&overrides);
         let mut written = tree.clone();
         written.write_sorted(&overrides);
-        for code in asked.into_iter().map(MortonCode) {
+        for code in queried.into_iter().map(MortonCode) {
             for depth in 0..=16 {
                 assert_eq!(tree.max_with_overrides(code, depth, &overrides), written.get(code, depth));
             }
@@ -108,7 +108,7 @@ proptest! {
     }
 
     #[test]
-    fn a_walk_may_begin_anywhere_and_be_kept_to_a_node(
+    fn leaves_can_start_anywhere_and_be_limited_to_a_node(
         batches in prop::collection::vec(any_batch(), 0..4),
         code in any_code(),
         depth in 0..=16_u8,
@@ -129,7 +129,7 @@ proptest! {
     }
 
     #[test]
-    fn any_order_and_any_number_is_taken(
+    fn any_order_and_any_value_is_accepted(
         voxels in prop::collection::vec((any::<u64>(), any::<f32>()), 0..50), depth in any::<u8>(),
     ) {
         let voxels: Vec<_> = voxels.into_iter().map(|(code, value)| (MortonCode(code), value)).collect();

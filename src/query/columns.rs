@@ -171,7 +171,7 @@ mod tests {
     use crate::space::{BRICK_EDGE, add_to_mask, place_of_voxel};
 
     #[test]
-    fn each_voxel_of_a_brick_is_in_its_column() {
+    fn voxels_of_a_brick_are_in_their_columns() {
         for x in 0..BRICK_EDGE {
             for y in 0..BRICK_EDGE {
                 for z in 0..BRICK_EDGE {

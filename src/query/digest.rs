@@ -16,6 +16,7 @@ impl Digest {
         Self(bytes)
     }
 
+    /// The bytes of the digest.
     pub const fn to_bytes(self) -> [u8; 32] {
         self.0
     }

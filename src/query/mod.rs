@@ -24,6 +24,7 @@ mod coarse;
 mod collision;
 mod columns;
 mod digest;
+mod filtered_tiles;
 mod hit;
 mod map_queries;
 mod merged;
@@ -43,7 +44,6 @@ mod queries;
 mod ray;
 mod region;
 mod shape;
-mod sifted_tiles;
 mod tile_cursor;
 mod united;
 

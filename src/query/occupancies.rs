@@ -24,7 +24,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_kept_is_what_is_computed() {
+    fn cached_values_equal_computed_ones() {
         let config = MapConfig::new(0.1, 10.0).unwrap();
         let mut occupancies = Occupancies::new(&config);
         // More values than fit in the cache, each several times.

@@ -51,7 +51,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_origin_that_is_proposed_is_round_and_brings_all_tiles_into_reach() {
+    fn the_suggested_origin_is_round_and_makes_all_tiles_fit() {
         let grid = Grid::new(0.1, 10.0).unwrap();
         let tiles = [TileIndex::new(50_000, 400_012, 1), TileIndex::new(50_200, 400_100, -2)];
         assert_eq!(origin_for(&grid, &tiles), Some([501_000.0, 4_001_000.0, 0.0]));

@@ -97,7 +97,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_voxel_comes_to_the_place_of_its_shifted_index() {
+    fn voxels_are_moved_to_their_shifted_indices() {
         for origin in [[0; 3], [8, -16, 65536], [1, -2, 7], [-63_781_373, 5, 2_000_000_001]] {
             for corner in [[0; 3], [40, -48, 8]] {
                 // Voxels close to the octree's origin, which is anywhere in the map.

@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::mapper::MapView;
 use crate::sensor::Evidence;
 use crate::space::{Grid, Point, TileIndex, VoxelKey};
-use crate::tile::{AskedVoxels, Tile, Voxel};
+use crate::tile::{Tile, Voxel, VoxelBatch};
 use rayon::prelude::*;
 
 #[inline]
@@ -30,9 +30,9 @@ fn at_points<V: MapView, A: Copy + Send + Sync, F: FnMut(Evidence) -> A>(
     answer: impl Fn() -> F + Sync,
 ) -> Result<Vec<A>> {
     let mut answers = vec![unknown; points.len()];
-    if view.tile_at_hand(TileIndex::default()).is_some() {
+    if view.resident_tile(TileIndex::default()).is_some() {
         let chunks = points.par_chunks(POINTS_AT_A_TIME).zip(answers.par_chunks_mut(POINTS_AT_A_TIME));
-        chunks.for_each(|(points, answers)| at_hand(view, points, answers, answer()));
+        chunks.for_each(|(points, answers)| in_memory(view, points, answers, answer()));
         return Ok(answers);
     }
     for (points, answers) in points.chunks(MAX_GROUPED).zip(answers.chunks_mut(MAX_GROUPED)) {
@@ -42,20 +42,22 @@ fn at_points<V: MapView, A: Copy + Send + Sync, F: FnMut(Evidence) -> A>(
 }
 
 /// Processes points in their order if all tiles are in memory.
-fn at_hand<V: MapView, A>(
+fn in_memory<V: MapView, A>(
     view: &V,
     points: &[Point],
     answers: &mut [A],
     mut answer: impl FnMut(Evidence) -> A,
 ) {
     let grid = view.config().grid;
-    let mut voxels = AskedVoxels::new();
-    for (points, answers) in points.chunks(AskedVoxels::MOST).zip(answers.chunks_mut(AskedVoxels::MOST)) {
-        let mut places = [0_u8; AskedVoxels::MOST];
+    let mut voxels = VoxelBatch::new();
+    for (points, answers) in
+        points.chunks(VoxelBatch::MAX_VOXELS).zip(answers.chunks_mut(VoxelBatch::MAX_VOXELS))
+    {
+        let mut places = [0_u8; VoxelBatch::MAX_VOXELS];
         let mut count = 0;
         for (place, &point) in points.iter().enumerate() {
             let Some(voxel) = grid.voxel_of(point) else { continue };
-            let Some(tile) = view.tile_at_hand(grid.tile_of_voxel(voxel)) else { continue };
+            let Some(tile) = view.resident_tile(grid.tile_of_voxel(voxel)) else { continue };
             voxels.push(tile.table(), VoxelKey::from_index(voxel));
             places[count] = place as u8;
             count += 1;
@@ -137,9 +139,9 @@ fn by_tile<V: MapView, A: Copy + Send + Sync, F: FnMut(Evidence) -> A>(
 
 impl<A> PartOfTile<'_, A> {
     fn answer(&mut self, grid: &Grid, tile: &Tile, mut answer: impl FnMut(Evidence) -> A) {
-        let mut voxels = AskedVoxels::new();
+        let mut voxels = VoxelBatch::new();
         let mut place = self.first;
-        for answers in self.answers.chunks_mut(AskedVoxels::MOST) {
+        for answers in self.answers.chunks_mut(VoxelBatch::MAX_VOXELS) {
             for place in place..place + answers.len() {
                 // Each of them has a voxel, because it is in a tile.
                 let voxel = grid.voxel_of(self.points[self.group.number_at(place)]).unwrap_or_default();

@@ -90,7 +90,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn every_point_has_one_place_beside_those_of_its_tile(
+        fn points_of_a_tile_are_grouped(
             points in prop::collection::vec(
                 prop::array::uniform3(prop_oneof![9 => -3.0..3.0, 1 => Just(f64::NAN)]), 0..300
             ),

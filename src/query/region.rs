@@ -1,5 +1,5 @@
+use super::filtered_tiles::for_each_from;
 use super::ray::brick_of;
-use super::sifted_tiles::for_each_from;
 use crate::config::MapConfig;
 use crate::error::Result;
 use crate::mapper::{MapView, TileRef};
@@ -7,7 +7,7 @@ use crate::maths::least_logit;
 use crate::space::{
     Aabb, BRICK_EDGE, BrickCode, BrickMask, Grid, TileBox, TileIndex, VoxelBox, VoxelIndex, mask_of_box,
 };
-use crate::tile::{BrickLook, Tile, Voxel};
+use crate::tile::{BrickView, Tile, Voxel};
 
 pub(super) fn evidence_in<'a, V: MapView + ?Sized>(
     view: &'a V,
@@ -176,7 +176,7 @@ impl BrickPart {
         found.map(|(code, evidence)| Voxel { index: tile.index_of(code), evidence })
     }
 
-    pub(super) fn look<'a>(&self, tile: &'a Tile) -> Option<BrickLook<'a>> {
+    pub(super) fn look<'a>(&self, tile: &'a Tile) -> Option<BrickView<'a>> {
         let table = tile.table();
         table.number_of_brick(self.code).and_then(|number| table.numbered(number))
     }

@@ -148,7 +148,7 @@ fn distance_squared_to_segment(bounds: &Aabb, from: Point, to: Point) -> f64 {
     }
     pieces.sort_unstable_by(f64::total_cmp);
     let at = |time: f64| bounds.distance_squared(std::array::from_fn(|k| from[k] + time * along[k]));
-    let least_between = |begin: f64, end: f64| {
+    let min_between = |begin: f64, end: f64| {
         // Outside of the same faces along the whole piece: the sum of (offset + time * along)^2 over those coordinates.
         let middle = 0.5 * (begin + end);
         let (mut slope, mut square) = (0.0, 0.0);
@@ -167,7 +167,7 @@ fn distance_squared_to_segment(bounds: &Aabb, from: Point, to: Point) -> f64 {
         let lowest = if square > 0.0 { (-slope / square).clamp(begin, end) } else { begin };
         at(lowest)
     };
-    let inner = pieces.windows(2).map(|piece| least_between(piece[0], piece[1]));
+    let inner = pieces.windows(2).map(|piece| min_between(piece[0], piece[1]));
     inner.fold(at(0.0).min(at(1.0)), f64::min)
 }
 

@@ -2,7 +2,7 @@ use super::ray::brick_of;
 use crate::error::Result;
 use crate::mapper::{MapView, TileRef};
 use crate::space::{BrickCode, TileIndex, VoxelBox, VoxelIndex};
-use crate::tile::{BrickLook, Tile};
+use crate::tile::{BrickView, Tile};
 
 /// Keeps the last tile, so that neighbouring voxels load it once.
 pub(super) struct TileCursor<'a, V: ?Sized> {
@@ -27,7 +27,7 @@ pub(super) enum Around<'a> {
     /// No observations in this box around the voxel.
     Nothing(VoxelBox),
     /// The brick of the voxel, which has observations, and the brick's voxels that belong to the tile.
-    Brick(BrickLook<'a>, VoxelBox),
+    Brick(BrickView<'a>, VoxelBox),
 }
 
 impl<'a, V: MapView + ?Sized> TileCursor<'a, V> {

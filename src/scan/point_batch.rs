@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn hits_that_exceed_the_limit_go_out_in_their_order() {
+    fn hits_beyond_the_limit_are_spilled_in_order() {
         const MAX_BYTES: usize = 8 << 10;
         let config = MapConfig::new(0.1, 1.6).unwrap();
         let mut points: Vec<Point> =

@@ -186,7 +186,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn points_come_in_chunks_with_their_intensities() {
+    fn points_are_passed_in_chunks_with_their_intensities() {
         let count = POINTS_AT_A_TIME + 77;
         let points: Vec<[f32; 3]> = (0..count).map(|k| [k as f32, 0.5, -1.5]).collect();
         let intensities: Vec<f32> = (0..count).map(|k| k as f32).collect();

@@ -211,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn a_first_hit_has_full_weight_and_a_first_miss_too_at_even_odds() {
+    fn first_hits_and_misses_have_full_weight_at_even_odds() {
         // P = P_th = 0.5 is not below the threshold, and not above 1 - P_th.
         let model = Iwlo::default();
         let weight = model.weight(255.0);
@@ -220,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn intensity_decides_the_weight() {
+    fn intensity_determines_the_weight() {
         let model = Iwlo::default();
         assert_eq!(model.weight(35.0), 0.0);
         assert_eq!(model.weight(-5.0), 0.0);
@@ -230,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn parameters_that_divide_by_zero_are_refused() {
+    fn parameters_that_divide_by_zero_are_rejected() {
         for model in [
             Iwlo { intensity_max: 35.0, ..Iwlo::default() },
             Iwlo { adaptive_probability: 0.0, ..Iwlo::default() },

@@ -110,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn a_model_that_makes_no_sense_is_refused() {
+    fn invalid_parameters_are_rejected() {
         assert!(LogOdds::from_probabilities(0.4, 0.7, 0.1, 0.9).is_err());
         assert!(LogOdds::from_probabilities(0.7, 0.4, 0.9, 0.1).is_err());
         assert!(LogOdds::from_probabilities(f64::NAN, 0.4, 0.1, 0.9).is_err());

@@ -98,7 +98,7 @@ impl SensorModel {
 
     /// Largest log-odds that a miss can lead to, unless they were larger before: those of a first miss, or the lower
     /// clamp.
-    pub(crate) fn most_after_miss(&self) -> f64 {
+    pub(crate) fn max_after_miss(&self) -> f64 {
         let min = match self {
             Self::LogOdds(model) => model.min,
             Self::Iwlo(model) => model.min,
@@ -148,7 +148,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn many_misses_are_as_many_single_ones(
+        fn combined_misses_equal_single_ones(
             model in any_model(),
             log_odds in -12.0..12.0_f64,
             observation_count in prop_oneof![0..50_i32, i32::MAX - 50..=i32::MAX],

@@ -36,7 +36,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_kept_is_what_is_computed() {
+    fn cached_values_equal_computed_ones() {
         let mut probabilities = Probabilities::default();
         // More values than fit in the cache, each several times.
         for number in 0..20_000_u32 {

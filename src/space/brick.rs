@@ -127,7 +127,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn brick_and_place_make_the_morton_code() {
+    fn brick_and_position_form_the_morton_code() {
         for voxel in [[0, 0, 0], [-1, -8, 7], [12345, -23456, 32767], [-32768, 63, 64]] {
             let code = VoxelKey::from_index(voxel).morton();
             assert_eq!(code.place_in_brick(), place_of_voxel(voxel));
@@ -136,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn masks_hold_what_was_put_in() {
+    fn masks_contain_the_added_voxels() {
         assert_eq!(mask_of_box([0; 3], [8; 3]), [u64::MAX; 8]);
         assert_eq!(mask_of_box([3; 3], [3; 3]), [0; 8]);
         let voxels = places(mask_of_box([2, -5, 6], [5, 1, 9])).collect::<Vec<_>>();

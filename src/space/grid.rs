@@ -214,7 +214,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_floor_is_the_floor() {
+    fn floor_equals_the_library_function() {
         let whole = [-2_147_483_648.0, -7.0, -1.0, 0.0, 1.0, 6.0, 2_147_483_646.0];
         for number in whole.into_iter().flat_map(|x: f64| [x, x.next_up(), x + 0.25, x + 0.5, x + 0.75]) {
             assert_eq!(floor(number), number.floor() as i32, "{number}");
@@ -226,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn the_seeds_examples() {
+    fn example_points_have_known_voxels() {
         let grid = Grid::new(0.1, 10.0).unwrap();
         assert_eq!(grid.voxels_per_tile_edge(), 100);
         assert_eq!(grid.tile_of([5.0, 15.0, -3.0]), Some(TileIndex::new(0, 1, -1)));
@@ -235,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_point_of_the_grid_has_no_voxel() {
+    fn points_outside_the_grid_have_no_voxel() {
         let grid = Grid::new(0.1, 10.0).unwrap();
         for x in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e9, -1e9] {
             assert_eq!(grid.voxel_of([0.0, x, 0.0]), None, "{x}");
@@ -244,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tile_size_that_is_not_whole_names_its_neighbours() {
+    fn an_invalid_tile_size_suggests_valid_ones() {
         let message = Grid::new(0.3, 10.0).unwrap_err().to_string();
         assert!(message.contains("9.9 m and 10.2 m"), "{message}");
         let message = Grid::new(0.005, 10.0).unwrap_err().to_string();
@@ -259,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn tiles_are_those_of_integer_division() {
+    fn tiles_equal_integer_division() {
         for n in 2..=1024 {
             let grid = Grid::new(1.0, f64::from(n)).unwrap();
             let borders = (-5..5).flat_map(|tile| [n * tile - 1, n * tile, n * tile + 1]);
@@ -272,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn the_voxels_in_a_box_are_those_whose_center_is() {
+    fn voxels_in_a_box_are_selected_by_center() {
         let grid = Grid::new(0.1, 0.7).unwrap();
         let bounds =
             [f64::NEG_INFINITY, -3e8, -2.95, -1.0, -0.05, 0.0, 0.049, 0.05, 0.75, 2.0, 3e8, f64::INFINITY];
@@ -295,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn every_voxel_of_a_tile_is_in_that_tile() {
+    fn voxels_of_a_tile_belong_to_it() {
         let grid = Grid::new(0.1, 0.7).unwrap();
         for x in -30..30 {
             let tile = grid.tile_of_voxel([x, 0, 0]);

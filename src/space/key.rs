@@ -51,7 +51,7 @@ mod tests {
     }
 
     #[test]
-    fn a_key_comes_back_to_its_index_from_any_tile_that_holds_it() {
+    fn keys_convert_back_to_indices_within_any_tile() {
         for min in [-2_000_000_000, -32_800, -1, 0, 32_700, 63_781_370, 2_000_000_000] {
             for offset in [0, 1, 99, 1023] {
                 let index = [min + offset, min, min + offset / 2];

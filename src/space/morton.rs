@@ -68,7 +68,7 @@ mod tests {
     }
 
     #[test]
-    fn every_bit_of_every_axis_goes_to_its_place_and_back() {
+    fn each_bit_of_each_axis_round_trips() {
         for axis in 0..3 {
             for bit in 0..16 {
                 let mut key = [0; 3];

@@ -123,7 +123,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_lies_ahead_is_one_tile_further_in_the_direction_of_travel() {
+    fn tiles_ahead_are_one_tile_further_in_the_direction_of_travel() {
         let tiles = |min, max| TileBox { min, max };
         let before = tiles([0, 0, 0], [2, 1, 0]);
         assert_eq!(before.ahead(&before), []);
@@ -137,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn boxes_that_partition_space_make_boxes_of_tiles_that_do() {
+    fn boxes_that_partition_space_give_tile_boxes_that_partition_it() {
         let grid = Grid::new(0.1, 10.0).unwrap();
         let of = |from: f64, to: f64| {
             let region = Aabb { min: [from, -15.0, f64::NEG_INFINITY], max: [to, 5.0, f64::INFINITY] };
@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn the_end_of_the_world_and_the_widest_scan_are_no_trouble() {
+    fn index_limits_and_the_widest_scan_are_handled() {
         let far = TileBox { min: [i32::MAX - 1; 3], max: [i32::MAX; 3] };
         let near = TileBox { min: [0; 3], max: [1; 3] };
         assert_eq!(far.ahead(&near), []);
@@ -164,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn boxes_unite_intersect_and_list_their_tiles_in_order() {
+    fn boxes_unite_intersect_and_list_tiles_in_order() {
         let tiles = |min: [i32; 3], max: [i32; 3]| TileBox::new(min.into(), max.into());
         let (a, b) = (tiles([-1, 0, 0], [1, 2, 0]), tiles([1, 1, -3], [4, 1, 5]));
         assert_eq!(a.union(b), tiles([-1, 0, -3], [4, 2, 5]));

@@ -17,6 +17,7 @@ impl TileIndex {
         Self { x, y, z }
     }
 
+    /// The index as an array `[x, y, z]`.
     pub const fn to_array(self) -> [i32; 3] {
         [self.x, self.y, self.z]
     }

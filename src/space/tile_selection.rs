@@ -68,7 +68,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_selection_has_what_was_selected_and_nothing_else() {
+    fn a_selection_contains_exactly_the_selected_tiles() {
         let region = TileBox::new([0, -1, 2].into(), [1, 0, 2].into());
         let listed: TileSelection = region.tiles().collect();
         let of_box = TileSelection::from(region);

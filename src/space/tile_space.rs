@@ -26,15 +26,16 @@ struct Level {
     /// Cubes that may contain a tile.
     cubes: FxHashSet<[i32; 3]>,
     /// Whether the level was disabled; then each cube may contain a tile.
-    is_given_up: bool,
+    is_disabled: bool,
 }
 
 impl TileSpace {
+    /// Adds a tile.
     pub fn insert(&mut self, tile: TileIndex) {
         let own = TileBox::new(tile, tile);
         self.bounds = Some(self.bounds.map_or(own, |bounds| bounds.union(own)));
         for ((level, shift), max_cubes) in self.levels.iter_mut().zip(SHIFTS).zip(MAX_CUBES) {
-            if level.is_given_up {
+            if level.is_disabled {
                 continue;
             }
             if !level.cubes.insert(cube_of(tile, shift)) {
@@ -42,7 +43,7 @@ impl TileSpace {
                 return;
             }
             if level.cubes.len() > max_cubes {
-                *level = Level { cubes: FxHashSet::default(), is_given_up: true };
+                *level = Level { cubes: FxHashSet::default(), is_disabled: true };
             }
         }
     }
@@ -56,7 +57,7 @@ impl TileSpace {
     pub fn empty_around(&self, tile: TileIndex) -> Option<TileBox> {
         self.levels.iter().zip(SHIFTS).rev().find_map(|(level, shift)| {
             let cube = cube_of(tile, shift);
-            let is_empty = !level.is_given_up && !level.cubes.contains(&cube);
+            let is_empty = !level.is_disabled && !level.cubes.contains(&cube);
             let first = cube.map(|k| k << shift);
             is_empty.then(|| TileBox::new(first.into(), first.map(|k| k + ((1 << shift) - 1)).into()))
         })
@@ -97,11 +98,11 @@ mod tests {
         #[test]
         fn no_tile_is_in_an_empty_box(
             tiles in prop::collection::vec(any_tile(), 0..40),
-            asked in prop::collection::vec(any_tile(), 1..40),
+            queried in prop::collection::vec(any_tile(), 1..40),
         ) {
             let space: TileSpace = tiles.iter().copied().collect();
             prop_assert_eq!(space.bounds(), TileBox::of(tiles.iter().copied()));
-            for tile in asked {
+            for tile in queried {
                 let Some(empty) = space.empty_around(tile) else {
                     let cube = cube_of(tile, SHIFTS[0]);
                     prop_assert!(tiles.iter().any(|&tile| cube_of(tile, SHIFTS[0]) == cube));
@@ -114,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn a_level_of_too_many_cubes_is_given_up_and_coarser_ones_remain() {
+    fn a_level_with_too_many_cubes_is_disabled() {
         let mut space: TileSpace =
             (0..3000).map(|k| TileIndex::new(16 * (k % 60), 16 * (k / 60), 0)).collect();
         space.insert(TileIndex::new(1 << 30, 0, 0));

@@ -309,7 +309,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(40))]
         #[test]
-        fn it_is_a_map_whatever_comes_and_goes(
+        fn it_equals_a_map_after_any_changes(
             changes in prop::collection::vec((index(), prop::option::weighted(0.7, any::<u64>())), 0..6000),
         ) {
             let (mut table, mut naive) = (TileTable::default(), BTreeMap::new());
@@ -334,7 +334,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tile_takes_some_thirty_bytes_and_its_index_ten() {
+    fn a_tile_takes_less_than_40_bytes_and_its_index_less_than_10() {
         let tiles = || (0..100_000).map(|k| TileIndex::new(k / 2500, k / 10 % 250, k % 10));
         let versions: TileTable<_> =
             (0..).map(version).zip(tiles()).map(|(version, tile)| (tile, version)).collect();

@@ -162,7 +162,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn it_is_a_map(cells in prop::collection::vec((any_cell(), 1..1000_u32), 0..300)) {
+        fn it_equals_a_hash_map(cells in prop::collection::vec((any_cell(), 1..1000_u32), 0..300)) {
             let mut torus = Torus::default();
             let mut naive = HashMap::new();
             for &(cell, number) in &cells {
@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn cells_that_lie_together_need_no_hash_map() {
+    fn adjacent_cells_need_no_hash_map() {
         let mut torus = Torus::default();
         let cells = (-40..60).flat_map(|x| (10..70).flat_map(move |y| [-1, 0].map(|z| [x, y, z])));
         cells.enumerate().for_each(|(number, cell)| torus.insert(cell, number as u32 + 1));

@@ -17,7 +17,7 @@ mod tile_body;
 pub use octocache::{OctreeQueueCounts, OctreeStatistics, OctreeTimes, VoxelCache, VoxelCacheCounts};
 pub use octree::OctreeFactory;
 pub use table::Table;
-pub(crate) use table::{AskedVoxels, BrickLook};
+pub(crate) use table::{BrickView, VoxelBatch};
 pub use tile_body::{Tile, TileCounts, Voxel};
 
 #[cfg(test)]

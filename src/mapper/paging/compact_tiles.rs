@@ -187,7 +187,7 @@ impl CompactTiles {
     }
 
     /// Records that no save is running.
-    pub(super) fn no_save_in_flight(&mut self) {
+    pub(super) fn no_save_running(&mut self) {
         for (index, entry) in self.tiles.iter_mut().filter(|(_, entry)| entry.is_saving) {
             entry.is_saving = false;
             if entry.is_dirty {

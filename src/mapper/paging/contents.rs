@@ -1,6 +1,6 @@
-use super::flight::{Flight, FlightSize};
 use super::flusher::FlushedTile;
 use super::memory_plan::MemoryPlan;
+use super::pinned_tiles::{FlushSize, PinnedTiles};
 use super::tile_cache::{Cached, Eviction, TileCache};
 use super::tile_disk::TileDisk;
 use super::tile_state::{Base, StoredTileState, TileState};
@@ -31,7 +31,7 @@ pub(in crate::mapper) struct TileContents {
     pub(super) inputs: Vec<InputRecord>,
     pub(super) views: Views,
     /// Tiles that a background flush needs, while one is running.
-    pub(super) flight: Option<Flight>,
+    pub(super) pinned: Option<PinnedTiles>,
     /// Bytes of memory reserved for tiles that only a background flush holds. Zero before the first one; then slightly
     /// more than the largest so far needed, and than the tiles that one scan changes. Without the reserve, the first
     /// scan after the beginning of a flush would have to evict as much.
@@ -64,7 +64,7 @@ impl TileContents {
 
     /// Returns whether a tile can be made resident. Its spill file must not contain staged updates (those of a scan not
     /// yet accepted), because they follow the buffered ones.
-    pub(super) fn can_come_in(&self, index: TileIndex) -> bool {
+    pub(super) fn can_be_loaded(&self, index: TileIndex) -> bool {
         !self.cache.is_resident(index) && !self.buffer.is_staged(index)
     }
 
@@ -180,7 +180,7 @@ impl TileContents {
     /// Returns the tile to evict next until at most `tiles` tiles are resident and `bytes` bytes are free; see
     /// [`TileCache::next_eviction`].
     pub(super) fn next_eviction(&self, bytes: usize, tiles: usize, of_disk: usize) -> Option<Eviction> {
-        self.cache.next_eviction(bytes, tiles, self.outside_bytes(of_disk), self.flight.as_ref())
+        self.cache.next_eviction(bytes, tiles, self.outside_bytes(of_disk), self.pinned.as_ref())
     }
 
     /// Returns whether more than `tiles` tiles are resident, or fewer than `bytes` bytes are free.
@@ -190,7 +190,7 @@ impl TileContents {
 
     /// Number of scans since the last use of the resident tile to evict next; `None` if none can be evicted.
     pub(super) fn scans_since_oldest(&self) -> Option<u64> {
-        self.cache.scans_since_oldest(self.flight.as_ref())
+        self.cache.scans_since_oldest(self.pinned.as_ref())
     }
 
     /// Bytes of memory by purpose, without those of the disk.
@@ -254,12 +254,12 @@ impl TileContents {
 
     /// Returns whether a background flush is running.
     pub(super) fn is_flushing(&self) -> bool {
-        self.flight.is_some()
+        self.pinned.is_some()
     }
 
     /// Number of tiles that a flush begun now would write.
-    pub(super) fn flight_size(&self) -> FlightSize {
-        FlightSize {
+    pub(super) fn flush_size(&self) -> FlushSize {
+        FlushSize {
             resident: self.cache.used_last_first().filter(|tile| tile.is_dirty()).count(),
             compact: self.cache.dirty_compact(),
             unapplied: self.buffer.tiles().count(),
@@ -267,8 +267,8 @@ impl TileContents {
     }
 
     /// Records the beginning of a background flush.
-    pub(super) fn begin_flight(&mut self, flight: Flight) {
-        self.flight = Some(flight);
+    pub(super) fn begin_background_flush(&mut self, pinned: PinnedTiles) {
+        self.pinned = Some(pinned);
         self.flush_reserve = self.flush_reserve.max(1);
     }
 
@@ -296,24 +296,24 @@ impl TileContents {
     }
 
     /// Bytes of memory of tiles that only the flush holds.
-    pub(super) fn flight_bytes(&self) -> usize {
-        self.flight.as_ref().map_or(0, Flight::bytes)
+    pub(super) fn pinned_bytes(&self) -> usize {
+        self.pinned.as_ref().map_or(0, PinnedTiles::bytes)
     }
 
     /// Records that the cache is about to change or drop these tiles.
     pub(super) fn leave_to_flush(&mut self, tiles: impl Iterator<Item = TileIndex>) {
-        if let Some(flight) = &mut self.flight {
-            tiles.for_each(|index| flight.note_changed(index));
-            let bytes = flight.bytes();
+        if let Some(pinned) = &mut self.pinned {
+            tiles.for_each(|index| pinned.note_changed(index));
+            let bytes = pinned.bytes();
             self.reserve_for_flush(bytes);
         }
     }
 
     /// Records that a tile was packed into the compact form without a change.
     pub(super) fn leave_packed_to_flush(&mut self, index: TileIndex) {
-        if let (Some(flight), Some(packed)) = (&mut self.flight, self.cache.compact(index)) {
-            flight.note_packed(index, packed);
-            let bytes = flight.bytes();
+        if let (Some(pinned), Some(packed)) = (&mut self.pinned, self.cache.compact(index)) {
+            pinned.note_packed(index, packed);
+            let bytes = pinned.bytes();
             self.reserve_for_flush(bytes);
         }
     }
@@ -335,21 +335,21 @@ impl TileContents {
 
     /// Bytes of memory that changing these tiles needs beyond the reserve.
     pub(super) fn bytes_to_copy(&self, tiles: impl Iterator<Item = TileIndex>) -> usize {
-        let Some(flight) = &self.flight else { return 0 };
-        let with_them = flight.bytes() + flight.bytes_to_copy(tiles);
+        let Some(pinned) = &self.pinned else { return 0 };
+        let with_them = pinned.bytes() + pinned.bytes_to_copy(tiles);
         with_them.saturating_sub(self.flush_bytes())
     }
 
     /// Bytes of memory that only a flush holds, or the reserve if that is larger.
     pub(super) fn flush_bytes(&self) -> usize {
-        self.flight_bytes().max(self.flush_reserve)
+        self.pinned_bytes().max(self.flush_reserve)
     }
 
     /// Records that the flush has written a version of a tile.
     pub(super) fn note_flushed(&mut self, tile: FlushedTile, version: TileVersion, disk: &TileDisk) {
         let index = tile.index();
         self.views.note_on_disk(index, version);
-        let is_same = self.flight.as_mut().is_some_and(|flight| flight.note_written(index));
+        let is_same = self.pinned.as_mut().is_some_and(|pinned| pinned.note_written(index));
         match tile {
             FlushedTile::Resident(held) => {
                 // Dropped first: changing a tile that has other owners would copy it.
@@ -372,7 +372,7 @@ impl TileContents {
     pub(super) fn note_saved(&mut self, saved: Saved, disk: &mut TileDisk) {
         let index = saved.index;
         let is_on_disk = saved.result.is_ok();
-        if self.flight.as_mut().is_some_and(|flight| flight.note_saved(index, &saved.tile, is_on_disk)) {
+        if self.pinned.as_mut().is_some_and(|pinned| pinned.note_saved(index, &saved.tile, is_on_disk)) {
             log::debug!("tile {index}: could not be saved, so that the flush writes it");
             return;
         }
@@ -384,13 +384,13 @@ impl TileContents {
 
     /// Returns whether the flush and the cache share this tile.
     pub(super) fn is_shared_with_flush(&self, index: TileIndex) -> bool {
-        self.flight.as_ref().is_some_and(|flight| flight.is_shared(index))
+        self.pinned.as_ref().is_some_and(|pinned| pinned.is_shared(index))
     }
 
     /// Records that the flush has copied a tile.
     pub(super) fn note_copied(&mut self, index: TileIndex) {
-        if let Some(flight) = &mut self.flight {
-            flight.note_own(index);
+        if let Some(pinned) = &mut self.pinned {
+            pinned.note_own(index);
         }
     }
 
@@ -404,8 +404,8 @@ impl TileContents {
     }
 
     /// Records the end of the flush.
-    pub(super) fn end_flight(&mut self, flushed: Result<()>) {
-        for (index, tile) in self.flight.take().map(Flight::into_unsaved).unwrap_or_default() {
+    pub(super) fn end_background_flush(&mut self, flushed: Result<()>) {
+        for (index, tile) in self.pinned.take().map(PinnedTiles::into_unsaved).unwrap_or_default() {
             self.cache.save_ended(index, &tile, false);
         }
         self.flush_error = flushed.err();

@@ -39,7 +39,7 @@ impl TilePager<'_> {
     }
 
     /// Maximum number of tiles that one scan may change.
-    pub(in crate::mapper) fn most_tiles_of_scan(&self) -> usize {
+    pub(in crate::mapper) fn max_tiles_of_scan(&self) -> usize {
         let plan = self.plan();
         match plan.is_enforced {
             true => (plan.bytes / 2).saturating_sub(self.memory().index as usize) / BYTES_OF_NEW_TILE,
@@ -58,7 +58,7 @@ impl TilePager<'_> {
 
     /// Bytes of memory of tiles that are being read, saved or flushed.
     pub(super) fn in_flight_bytes(&self) -> usize {
-        self.disk.in_flight_bytes() + self.contents.flight_bytes()
+        self.disk.in_flight_bytes() + self.contents.pinned_bytes()
     }
 
     /// Returns whether `tiles` more tiles with `bytes` bytes fit.
@@ -106,7 +106,7 @@ impl TilePager<'_> {
                 Some(Eviction::Resident(index)) => self.evict(index)?,
                 // It is being written, or cannot be saved before the flush has ended.
                 Some(Eviction::Compact(index)) if is_flushing && self.contents.cache.is_dirty(index) => {
-                    self.wait_for_flight();
+                    self.wait_for_background_flush();
                 }
                 Some(Eviction::Compact(index)) => self.evict_compact(index)?,
                 None if self.contents.is_over(bytes, tiles, of_disk) => {
@@ -114,7 +114,7 @@ impl TilePager<'_> {
                     if !is_flushing {
                         return Ok(());
                     }
-                    self.wait_for_flight();
+                    self.wait_for_background_flush();
                 }
                 None => return Ok(()),
             }
@@ -137,7 +137,7 @@ impl TilePager<'_> {
     /// Drops a tile in the compact form after it was saved.
     fn evict_compact(&mut self, index: TileIndex) -> Result<()> {
         while self.contents.cache.is_dirty(index) {
-            self.end_flight();
+            self.end_background_flush();
             self.begin_save(index)?;
             if self.contents.cache.is_dirty(index) {
                 self.wait_for_save()?;
@@ -169,7 +169,7 @@ impl TilePager<'_> {
         if !self.contents.cache.needs_save(index) {
             return Ok(());
         }
-        self.end_flight();
+        self.end_background_flush();
         self.upgrade()?;
         while !self.disk.can_save() {
             self.wait_for_save()?;
@@ -205,7 +205,7 @@ impl TilePager<'_> {
         match self.wait(|disk| disk.stall(|disk| disk.wait_saved())) {
             Some(saved) => self.note_saved(saved),
             // No save is running any more; some may have been lost with their thread.
-            None => self.contents.cache.no_save_in_flight(),
+            None => self.contents.cache.no_save_running(),
         }
         self.disk.take_save_error().map_or(Ok(()), Err)
     }
@@ -242,7 +242,7 @@ impl TilePager<'_> {
         while let Some(saved) = self.wait(|disk| disk.wait_saved()) {
             self.note_saved(saved);
         }
-        self.contents.cache.no_save_in_flight();
+        self.contents.cache.no_save_running();
         self.disk.take_save_error().map_or(Ok(()), Err)
     }
 

@@ -1,8 +1,8 @@
 //! Flush of a map: applies buffered updates, writes dirty tiles and commits all of it atomically.
 
-use super::flight::Flight;
 use super::flusher::{BegunFlush, FlushedTile};
-use super::held_tile::HeldTile;
+use super::pinned_tile::PinnedTile;
+use super::pinned_tiles::PinnedTiles;
 use super::shared_contents::unlocked;
 use super::shared_disk;
 use super::tile_disk::BYTES_OF_VOXEL;
@@ -29,7 +29,7 @@ impl TilePager<'_> {
 
     /// Applies buffered updates, writes every dirty tile and commits.
     pub(in crate::mapper) fn flush(&mut self) -> Result<()> {
-        self.end_flight();
+        self.end_background_flush();
         if let Some(error) = self.contents.take_flush_error() {
             log::debug!("an earlier flush failed, and its tiles are written again: {error:#}");
         }
@@ -65,20 +65,20 @@ impl TilePager<'_> {
     /// scans that were noted. Waits first for a flush that is running. Returns `None` if the flush is complete: the
     /// lists for a background flush of many small tiles would have been too large.
     pub(super) fn begin_flush(&mut self) -> Result<Option<BegunFlush>> {
-        self.end_flight();
+        self.end_background_flush();
         self.contents.take_flush_error().map_or(Ok(()), Err)?;
-        let list_bytes = self.contents.flight_size().bytes();
-        if list_bytes > self.plan().flight_bytes {
+        let list_bytes = self.contents.flush_size().bytes();
+        if list_bytes > self.plan().flush_list_bytes {
             self.flush()?;
             return Ok(None);
         }
-        self.write_suspects()?;
+        self.rewrite_failed_syncs()?;
         self.upgrade()?;
         // A tile whose save failed remains dirty and the flush saves it again, so the error is dropped.
         self.take_saved();
         let _ = self.disk.take_save_error();
-        let flight_bytes = list_bytes + self.bytes_to_make();
-        let bytes_beyond = flight_bytes.saturating_sub(self.contents.flush_reserve);
+        let pinned_bytes = list_bytes + self.bytes_to_make();
+        let bytes_beyond = pinned_bytes.saturating_sub(self.contents.flush_reserve);
         self.evict_until(bytes_beyond, self.plan().tiles)?;
         let (inputs, scan_number) = (self.contents.inputs.clone(), self.contents.scan_number);
         let files = self.store().tables().reader()?;
@@ -87,7 +87,7 @@ impl TilePager<'_> {
         // Does not wait for running saves.
         let saving = self.contents.saving_as_they_are();
         let dirty = self.contents.cache.used_last_first().filter(|tile| tile.is_dirty());
-        tiles.extend(dirty.cloned().map(|tile| FlushedTile::Resident(Arc::new(HeldTile::new(tile)))));
+        tiles.extend(dirty.cloned().map(|tile| FlushedTile::Resident(Arc::new(PinnedTile::new(tile)))));
         let mut compact = Vec::new();
         for index in self.contents.cache.unsaved_compact().into_iter().rev() {
             if !self.contents.buffer.is_frozen(index) {
@@ -104,7 +104,11 @@ impl TilePager<'_> {
         let residents = tiles.iter().skip(after_saves).position(is_resident);
         let first = residents.map_or(tiles.len(), |first| after_saves + first);
         let soon_changed = first..tiles.len().min(first + self.contents.last_touched);
-        self.contents.begin_flight(Flight::of(tiles.iter().chain(&compact), flight_bytes, saving));
+        self.contents.begin_background_flush(PinnedTiles::of(
+            tiles.iter().chain(&compact),
+            pinned_bytes,
+            saving,
+        ));
         Ok(Some(BegunFlush { scan_number, tiles, compact, after_saves, soon_changed, writer, files, commit }))
     }
 
@@ -127,17 +131,17 @@ impl TilePager<'_> {
 
     /// Approximate bytes of memory of the largest tile that a flush has to build from buffered updates.
     fn bytes_to_make(&self) -> usize {
-        let most_voxels = (self.config.grid.voxels_per_tile_edge() as u64).saturating_pow(3);
+        let max_voxels = (self.config.grid.voxels_per_tile_edge() as u64).saturating_pow(3);
         let voxels = self.contents.buffer.tiles().map(|index| {
             let updates = self.contents.buffer.updates_of(index);
             let before = self.voxels_of_tile_hint(index).unwrap_or_default();
-            before.saturating_add(updates).min(most_voxels)
+            before.saturating_add(updates).min(max_voxels)
         });
         voxels.max().map_or(0, |voxels| BYTES_OF_VOXEL.saturating_mul(voxels as usize))
     }
 
     /// Waits for a background flush. If it failed, the next flush reports the error or writes the same tiles.
-    pub(super) fn end_flight(&mut self) {
+    pub(super) fn end_background_flush(&mut self) {
         if !self.contents.is_flushing() {
             return;
         }
@@ -148,13 +152,13 @@ impl TilePager<'_> {
         if self.contents.is_flushing() {
             let lost = std::io::Error::other("the flush thread ended unexpectedly");
             let error = Error::io(self.store().folder(), "flush", lost);
-            self.contents.end_flight(Err(error));
-            self.contents.cache.no_save_in_flight();
+            self.contents.end_background_flush(Err(error));
+            self.contents.cache.no_save_running();
         }
     }
 
     /// Waits until a background flush has released some tiles or has ended.
-    pub(super) fn wait_for_flight(&mut self) {
+    pub(super) fn wait_for_background_flush(&mut self) {
         // The end of a save that the flush waits for also releases a tile.
         if self.take_saved() {
             return;
@@ -164,19 +168,19 @@ impl TilePager<'_> {
         let goes_on = unlocked(contents, || shared_disk::unlocked(disk, || flusher.wait_for_some()));
         self.disk.note_stall(since.elapsed());
         if !goes_on {
-            self.end_flight();
+            self.end_background_flush();
         }
     }
 
     /// Completes all reads and saves and applies all buffered updates.
     fn settle(&mut self) -> Result<()> {
         self.end_io()?;
-        self.write_suspects()?;
+        self.rewrite_failed_syncs()?;
         self.contents.buffered_tiles().into_iter().try_for_each(|index| self.flush_buffered(index))
     }
 
     /// Rewrites the tiles whose files failed to sync.
-    fn write_suspects(&mut self) -> Result<()> {
+    fn rewrite_failed_syncs(&mut self) -> Result<()> {
         for index in self.store().tiles().suspects() {
             // The file may be incomplete on the medium; the load verifies it.
             if !self.contents.cache.is_resident(index) {
@@ -211,7 +215,7 @@ impl TilePager<'_> {
 
     /// Writes a resident tile; after an error the tile is dirty.
     pub(super) fn write(&mut self, index: TileIndex) -> Result<()> {
-        self.end_flight();
+        self.end_background_flush();
         self.upgrade()?;
         self.end_saves_of(index);
         let Some(tile) = self.contents.begin_write(index) else { return Ok(()) };

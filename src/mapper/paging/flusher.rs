@@ -3,7 +3,7 @@
 //! Until the commit, the mapper saves no tile: a file with a later version must not take the name of one that the
 //! commit references. If the compact form has no memory left for another dirty tile, the mapper waits for the flush.
 
-use super::held_tile::{HeldForm, HeldTile};
+use super::pinned_tile::{PinnedForm, PinnedTile};
 use super::shared_contents::SharedContents;
 use super::shared_disk::SharedDisk;
 use super::unapplied_tile::UnappliedTile;
@@ -52,7 +52,7 @@ pub(super) struct BegunFlush {
 
 /// Tile to be written.
 pub(super) enum FlushedTile {
-    Resident(Arc<HeldTile>),
+    Resident(Arc<PinnedTile>),
     Compact(TileIndex, CompactTile),
     /// Built from its updates for writing only.
     Unapplied(Box<UnappliedTile>),
@@ -102,7 +102,7 @@ impl FlushJob {
         for tile in self.begun.tiles.into_iter().chain(self.begun.compact) {
             contents.note_not_flushed(tile, &disk);
         }
-        contents.end_flight(flushed);
+        contents.end_background_flush(flushed);
     }
 
     /// Copies the tiles that the next scan will likely change, to save it this work.
@@ -177,12 +177,12 @@ impl FlushJob {
                 contents.note_saved(saved, &mut disk);
                 continue;
             }
-            let Some(flight) = &mut contents.flight else { return Ok(()) };
-            if flight.waits_for_saves() {
+            let Some(pinned) = &mut contents.pinned else { return Ok(()) };
+            if pinned.waits_for_saves() {
                 let lost = std::io::Error::other("the save thread ended unexpectedly");
                 return Err(Error::io(disk.store().folder(), "flush", lost));
             }
-            let unsaved = flight.take_unsaved().into_iter();
+            let unsaved = pinned.take_unsaved().into_iter();
             self.begun.compact.extend(unsaved.map(|(index, tile)| FlushedTile::Compact(index, tile)));
             self.begun.after_saves = 0;
             return Ok(());
@@ -242,8 +242,8 @@ impl BegunFlush {
         let (writer, scan_number) = (&self.writer, self.scan_number);
         match tile {
             FlushedTile::Resident(held) => match held.begin_write() {
-                HeldForm::Resident(tile) => saver.write(writer, tile.index(), tile.table(), scan_number),
-                HeldForm::Compact(tile) => {
+                PinnedForm::Resident(tile) => saver.write(writer, tile.index(), tile.table(), scan_number),
+                PinnedForm::Compact(tile) => {
                     saver.write_compact(writer, &config.grid, held.index(), &tile, scan_number)
                 }
             },

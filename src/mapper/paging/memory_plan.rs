@@ -15,7 +15,7 @@ pub(in crate::mapper) struct MemoryPlan {
     /// Maximum bytes of packed updates of a scan; the rest is spilled to files.
     pub(in crate::mapper) updates_bytes: usize,
     /// Bytes that are reserved for inserting scans from the beginning.
-    pub(super) least_scan_bytes: usize,
+    pub(super) min_scan_bytes: usize,
     /// Whether the limit is enforced: memory of a scan counts, and a map whose index does not fit is rejected. False
     /// only for [`MemoryLimit::Tight`], which tests use.
     pub(super) is_enforced: bool,
@@ -32,7 +32,7 @@ pub(in crate::mapper) struct MemoryPlan {
     /// Maximum bytes of old states kept for views.
     pub(super) view_bytes: usize,
     /// Maximum bytes of the lists of a background flush.
-    pub(super) flight_bytes: usize,
+    pub(super) flush_list_bytes: usize,
 }
 
 const OFTEN_SCANS: u32 = 8;
@@ -47,8 +47,8 @@ impl MemoryPlan {
         match (config.memory, config.memory_bytes()) {
             // For tests: the limit is below the smallest that works, so it is not enforced.
             (MemoryLimit::Tight(bytes), _) => {
-                let (is_enforced, least_scan_bytes, flight_bytes) = (false, 0, usize::MAX);
-                Self { least_scan_bytes, is_enforced, flight_bytes, ..Self::of_bytes(bytes) }
+                let (is_enforced, min_scan_bytes, flush_list_bytes) = (false, 0, usize::MAX);
+                Self { min_scan_bytes, is_enforced, flush_list_bytes, ..Self::of_bytes(bytes) }
             }
             (MemoryLimit::Tiles { tiles, write_buffer_bytes }, _) => {
                 Self::of_tiles(tiles, write_buffer_bytes)
@@ -65,7 +65,7 @@ impl MemoryPlan {
             buffer_bytes: write_buffer_bytes,
             scan_bytes: usize::MAX,
             updates_bytes: usize::MAX,
-            least_scan_bytes: 0,
+            min_scan_bytes: 0,
             is_enforced: true,
             spare_bytes: 0,
             often_scans: OFTEN_SCANS,
@@ -73,7 +73,7 @@ impl MemoryPlan {
             index_bytes: 0,
             reader_bytes: 64 << 20,
             view_bytes: usize::MAX,
-            flight_bytes: usize::MAX,
+            flush_list_bytes: usize::MAX,
         }
     }
 
@@ -112,7 +112,7 @@ impl MemoryPlan {
             buffer_bytes: bytes / 4,
             scan_bytes: bytes / 4,
             updates_bytes: bytes / 8,
-            least_scan_bytes: bytes / 8,
+            min_scan_bytes: bytes / 8,
             is_enforced: true,
             spare_bytes: bytes / 4,
             often_scans: OFTEN_SCANS,
@@ -120,7 +120,7 @@ impl MemoryPlan {
             index_bytes: 0,
             reader_bytes: bytes / 16,
             view_bytes: bytes / 8,
-            flight_bytes: bytes / 16,
+            flush_list_bytes: bytes / 16,
         }
     }
 }
@@ -130,7 +130,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_index_takes_from_every_share_alike() {
+    fn the_index_reduces_all_shares_equally() {
         let mut plan = MemoryPlan::of_bytes(64 << 20);
         assert_eq!((plan.buffer_bytes(), plan.compact_bytes()), (16 << 20, 24 << 20));
         plan.note_index(8 << 20);

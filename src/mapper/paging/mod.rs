@@ -9,19 +9,19 @@
 //!
 //! A tile is resident, compact, or neither. A resident tile has no buffered updates: they are applied when it is
 //! loaded. `eviction` moves tiles towards the disk, `prefetch` loads tiles ahead of use, `flush` commits. A `Flusher`
-//! flushes in the background: it shares the tiles as of a scan with the cache, and a `Flight` counts the tiles that
+//! flushes in the background: it shares the tiles as of a scan with the cache, and a `PinnedTiles` counts the tiles that
 //! only the flush holds.
 
 mod buffered_updates;
 mod compact_tiles;
 mod contents;
 mod eviction;
-mod flight;
 mod flush;
 mod flusher;
-mod held_tile;
 mod memory_plan;
 mod paged_tiles;
+mod pinned_tile;
+mod pinned_tiles;
 mod prefetch;
 mod resident_tiles;
 mod shared_contents;

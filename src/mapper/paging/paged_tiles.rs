@@ -34,7 +34,7 @@ impl PagedTiles {
             space: store.tiles().iter().chain(store.tiles().orphans()).collect(),
             inputs: store.metadata().ext.as_ref().map_or(Vec::new(), |ext| ext.inputs.clone()),
             views: Views::default(),
-            flight: None,
+            pinned: None,
             flush_reserve: 0,
             flush_error: None,
         };
@@ -72,7 +72,7 @@ impl PagedTiles {
         while self.flusher.wait() {}
         let mut pager = self.pager();
         // A thread that panicked has not reported its failure.
-        pager.end_flight();
+        pager.end_background_flush();
         pager.contents.take_flush_error().map_or(Ok(()), Err)
     }
 
@@ -91,13 +91,13 @@ impl Drop for PagedTiles {
 
 #[cfg(test)]
 mod tests {
-    use super::super::flight::Flight;
+    use super::super::pinned_tiles::PinnedTiles;
     use super::*;
     use crate::persistence::{new_map_id, new_metadata};
     use crate::store::FsDisk;
 
     #[test]
-    fn a_flush_whose_thread_is_gone_has_failed() {
+    fn a_flush_without_a_thread_fails() {
         let folder = tempfile::tempdir().unwrap();
         let (config, map_id) = (MapConfig::new(0.1, 1.0).unwrap(), new_map_id());
         let metadata = new_metadata(&config, map_id, &[]);
@@ -106,7 +106,7 @@ mod tests {
         let tiles = PagedTiles::new(config, store);
         assert!(tiles.end_flush().is_ok());
         // The state that a panicked thread leaves.
-        tiles.contents.lock().flight = Some(Flight::default());
+        tiles.contents.lock().pinned = Some(PinnedTiles::default());
         let error = tiles.end_flush().unwrap_err().to_string();
         assert!(error.contains("flush"), "{error}");
         assert!(tiles.end_flush().is_ok(), "reported once");

@@ -42,7 +42,7 @@ impl TilePager<'_> {
     }
 
     /// Makes compact tiles resident that many recent scans have changed.
-    pub(super) fn bring_in_packed(&mut self, updates: &ScanUpdates) -> Result<()> {
+    pub(super) fn unpack_often_changed(&mut self, updates: &ScanUpdates) -> Result<()> {
         let mut brought_in = 0;
         for &(tile, _) in &updates.tiles {
             let is_wanted = self.is_often_changed(tile)

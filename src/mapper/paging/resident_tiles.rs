@@ -83,20 +83,20 @@ impl ResidentTiles {
     }
 
     /// The least recently used tile that has no other owner, or only one that releases it.
-    pub(super) fn least_recently_used(&self, lets_go: impl Fn(TileIndex) -> bool) -> Option<TileIndex> {
-        self.oldest(lets_go).map(|resident| resident.tile.index())
+    pub(super) fn least_recently_used(&self, releases: impl Fn(TileIndex) -> bool) -> Option<TileIndex> {
+        self.oldest(releases).map(|resident| resident.tile.index())
     }
 
     /// Number of scans since the last use of that tile.
-    pub(super) fn scans_since_oldest(&self, lets_go: impl Fn(TileIndex) -> bool) -> Option<u64> {
-        self.oldest(lets_go).map(|resident| self.scans - resident.used)
+    pub(super) fn scans_since_oldest(&self, releases: impl Fn(TileIndex) -> bool) -> Option<u64> {
+        self.oldest(releases).map(|resident| self.scans - resident.used)
     }
 
-    fn oldest(&self, lets_go: impl Fn(TileIndex) -> bool) -> Option<&Resident> {
+    fn oldest(&self, releases: impl Fn(TileIndex) -> bool) -> Option<&Resident> {
         let mut oldest_first = self.tiles.iter().rev().map(|(_, resident)| resident);
         oldest_first.find(|resident| match Arc::strong_count(&resident.tile) {
             1 => true,
-            2 => lets_go(resident.tile.index()),
+            2 => releases(resident.tile.index()),
             _ => false,
         })
     }

@@ -44,7 +44,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn waits_are_counted_and_ranked() {
+    fn waits_are_counted_with_percentiles() {
         let mut stalls = Stalls::default();
         assert_eq!(stalls.counts(), StallCounts::default());
         (1..=1000).for_each(|ms| stalls.note(Duration::from_millis(ms)));

@@ -1,6 +1,6 @@
 use super::compact_tiles::CompactTiles;
-use super::flight::Flight;
 use super::memory_plan::MemoryPlan;
+use super::pinned_tiles::PinnedTiles;
 use super::resident_tiles::ResidentTiles;
 use super::tile_threads::TileThreads;
 use crate::config::{MapConfig, Storage};
@@ -57,7 +57,7 @@ impl TileCache {
             octrees: OctreeFactory::new(config.octree),
             compact: CompactTiles::default(),
             threads: TileThreads::default(),
-            scan_bytes: plan.least_scan_bytes,
+            scan_bytes: plan.min_scan_bytes,
             hits: 0,
             encoded: 0,
             decoded: 0,
@@ -96,13 +96,13 @@ impl TileCache {
     }
 
     /// Number of scans since the last use of the resident tile to evict next; `None` if none can be evicted.
-    pub(super) fn scans_since_oldest(&self, flight: Option<&Flight>) -> Option<u64> {
-        self.resident.scans_since_oldest(|index| self.lets_go(flight, index))
+    pub(super) fn scans_since_oldest(&self, pinned: Option<&PinnedTiles>) -> Option<u64> {
+        self.resident.scans_since_oldest(|index| self.releases(pinned, index))
     }
 
     /// Returns whether a flush that holds a resident tile will accept its compact form instead.
-    fn lets_go(&self, flight: Option<&Flight>, index: TileIndex) -> bool {
-        self.has_compact_tier() && flight.is_some_and(|flight| flight.may_be_packed(index))
+    fn releases(&self, pinned: Option<&PinnedTiles>, index: TileIndex) -> bool {
+        self.has_compact_tier() && pinned.is_some_and(|pinned| pinned.may_be_packed(index))
     }
 
     pub(super) fn is_resident(&self, index: TileIndex) -> bool {
@@ -280,8 +280,8 @@ impl TileCache {
     }
 
     /// Records that no save is running.
-    pub(super) fn no_save_in_flight(&mut self) {
-        self.compact.no_save_in_flight();
+    pub(super) fn no_save_running(&mut self) {
+        self.compact.no_save_running();
     }
 
     // Memory limit. `outside` is the number of bytes outside of the cache that count towards it.
@@ -321,14 +321,14 @@ impl TileCache {
         bytes: usize,
         tiles: usize,
         outside: usize,
-        flight: Option<&Flight>,
+        pinned: Option<&PinnedTiles>,
     ) -> Option<Eviction> {
         let is_short = self.is_short(bytes, outside);
         if !self.is_over(bytes, tiles, outside) {
             return None;
         }
-        let clean = flight.and_then(|_| self.compact.oldest_clean());
-        let resident = self.resident.least_recently_used(|index| self.lets_go(flight, index));
+        let clean = pinned.and_then(|_| self.compact.oldest_clean());
+        let resident = self.resident.least_recently_used(|index| self.releases(pinned, index));
         match (resident, clean.or_else(|| self.compact.oldest())) {
             (_, Some(index)) if is_short && self.compact.bytes() > self.plan.compact_bytes() => {
                 Some(Eviction::Compact(index))

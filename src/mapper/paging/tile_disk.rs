@@ -323,7 +323,7 @@ impl TileDisk {
     }
 
     /// Discards the points of a scan that were written by [`Self::keep`] but not recorded.
-    pub(super) fn give_up_kept(&mut self) {
+    pub(super) fn discard_kept(&mut self) {
         self.store.archive_mut().give_up_scan();
     }
 

@@ -89,11 +89,11 @@ impl TilePager<'_> {
         self.drain_buffer()?;
         for (tile, _) in &updates.tiles {
             let is_wanted = self.disk.is_unread(*tile) || (self.exists(*tile) && self.has_room_to_spare());
-            if is_wanted && self.contents.can_come_in(*tile) {
+            if is_wanted && self.contents.can_be_loaded(*tile) {
                 self.load(*tile)?;
             }
         }
-        self.bring_in_packed(updates)?;
+        self.unpack_often_changed(updates)?;
         let all: usize = updates.tiles.iter().map(|(_, updates)| updates.len()).sum();
         let copied = self.contents.bytes_to_copy(updates.tiles.iter().map(|(tile, _)| *tile));
         // A tile that the updates create is an additional tile.
@@ -146,15 +146,15 @@ impl TilePager<'_> {
         self.store().archive().is_on()
     }
 
-    /// Writes the points of a scan to be kept. The caller then records the scan or calls [`Self::give_up_kept`].
+    /// Writes the points of a scan to be kept. The caller then records the scan or calls [`Self::discard_kept`].
     pub(in crate::mapper) fn keep(&mut self, scan: &dyn ScanPoints) -> Result<SegmentPlace> {
         self.upgrade()?;
         self.wait(|disk| disk.keep(scan))
     }
 
     /// Discards the points of a scan that were written but not recorded.
-    pub(in crate::mapper) fn give_up_kept(&mut self) {
-        self.disk.give_up_kept();
+    pub(in crate::mapper) fn discard_kept(&mut self) {
+        self.disk.discard_kept();
     }
 
     /// Records the last scan: origin and time stamp, or the record of the kept scan.
@@ -220,8 +220,8 @@ impl TilePager<'_> {
 
     /// Shrinks the write buffer to its share of the memory: updates are applied, or spilled if that is cheaper.
     fn drain_buffer(&mut self) -> Result<()> {
-        let most_bytes = self.plan().buffer_bytes();
-        for tile in self.contents.heaviest_beyond(most_bytes) {
+        let max_bytes = self.plan().buffer_bytes();
+        for tile in self.contents.heaviest_beyond(max_bytes) {
             // A background flush is about to apply the frozen updates.
             if self.contents.buffer.is_staged(tile) || self.contents.buffer.is_frozen(tile) {
                 continue;
@@ -235,8 +235,8 @@ impl TilePager<'_> {
             }
         }
         // Even a short spill file has an entry in memory, so their number is limited.
-        let most_files = most_bytes / 2 / WriteBuffer::BYTES_OF_FILE;
-        let too_many = self.contents.buffer.spill_files().saturating_sub(most_files);
+        let max_files = max_bytes / 2 / WriteBuffer::BYTES_OF_FILE;
+        let too_many = self.contents.buffer.spill_files().saturating_sub(max_files);
         for tile in self.contents.buffer.longest_files(MAX_SPILLED_BYTES, too_many) {
             self.load_buffered(tile)?;
         }
@@ -250,7 +250,7 @@ impl TilePager<'_> {
     /// Fails if the write fails; the updates then remain in memory.
     fn spill(&mut self, index: TileIndex) -> Result<()> {
         if self.contents.buffer.is_frozen(index) {
-            self.end_flight();
+            self.end_background_flush();
         }
         let (before, updates) = self.contents.buffer.of(index);
         if let Some(updates) = updates.filter(|updates| !updates.is_empty()) {
@@ -390,7 +390,7 @@ impl TilePager<'_> {
         let mut read = self.wait(|disk| disk.read(index));
         if read.is_err() && self.contents.buffer.is_frozen(index) {
             // A background flush may have rewritten the tile without having recorded it yet.
-            self.end_flight();
+            self.end_background_flush();
             read = self.wait(|disk| disk.read(index));
         }
         Ok((read?.unwrap_or_default(), false))
@@ -451,7 +451,7 @@ impl TilePager<'_> {
         if self.is_dirty(index) && !discard_changes {
             return Err(Error::UnsavedChanges { tile: index });
         }
-        self.end_flight();
+        self.end_background_flush();
         self.end_io()?;
         // Steps that may fail precede the removal.
         let table = self.wait(|disk| disk.read(index))?;
@@ -499,7 +499,7 @@ impl TilePager<'_> {
     ///
     /// Fails if the name is in use or a disk operation fails.
     pub(in crate::mapper) fn create_snapshot(&mut self, name: &SnapshotName) -> Result<()> {
-        self.end_flight();
+        self.end_background_flush();
         self.wait(|disk| disk.create_snapshot(name))
     }
 

@@ -3,7 +3,7 @@ use super::remap::{Remap, Remapped};
 use super::revision::{Revision, Touched};
 use super::rework::{keep_as_it_is, tidied};
 use crate::error::{Error, Result};
-use crate::mapper::{KeptScan, KeptSummary, Remapper, SideMapper, no_kept_scan};
+use crate::mapper::{KeptScan, KeptSummary, Remapper, ShadowMapper, no_kept_scan};
 use crate::persistence::give_way;
 use crate::space::TileSelection;
 use crate::store::{CatalogEntry, Disk, MapPath, SideFolder, TileStore};
@@ -35,7 +35,7 @@ pub struct RemapBeside {
     touched: Touched,
     remapped: Remapped,
     /// `None` if no scan moves.
-    side: Option<SideMapper>,
+    side: Option<ShadowMapper>,
     /// The catalog that it reads, and how many of its entries it has gone over.
     catalog: Option<u64>,
     entries: u64,
@@ -68,7 +68,7 @@ impl RemapBeside {
         check_catalog(&store, scans.catalog())?;
         let touched = threads.install(|| revision.look(&store))?;
         let is_needed = revision.counts.scans_changed > 0;
-        let begin = || SideMapper::begin(&store, touched.config.clone(), how.rework.stop.clone());
+        let begin = || ShadowMapper::begin(&store, touched.config.clone(), how.rework.stop.clone());
         let side = is_needed.then(begin).transpose()?;
         // Counted again as they are gone over.
         (revision.counts.scans, revision.counts.updates) = (0, 0);
@@ -126,7 +126,7 @@ impl RemapBeside {
         tidied(disk, &folder, self.take_over(store, side))
     }
 
-    fn take_over(mut self, store: TileStore, mut side: SideMapper) -> Result<Remapped> {
+    fn take_over(mut self, store: TileStore, mut side: ShadowMapper) -> Result<Remapped> {
         let (revision, touched) = (&mut self.revision, &self.touched);
         follow_scans(&store, self.catalog, &mut self.entries, revision, touched, &mut side, &mut |_| ())?;
         let tiles: Vec<_> = store.tiles().iter().filter(|&tile| touched.has(tile)).collect();
@@ -150,7 +150,7 @@ fn follow_scans(
     entries: &mut u64,
     revision: &mut Revision,
     touched: &Touched,
-    side: &mut SideMapper,
+    side: &mut ShadowMapper,
     progress: &mut (dyn FnMut(u64) + Send),
 ) -> Result<u64> {
     check_catalog(store, catalog)?;

@@ -29,7 +29,7 @@ const IS_WIDE: u8 = 0x80;
 /// Distances between points with similar values: neighbours, and the beams of sensors that fire in turn.
 const LAGS: [u8; 3] = [1, 2, 4];
 /// Number of values from which the form of a column is chosen.
-const LOOKED_AT: usize = 1 << 14;
+const SAMPLE_SIZE: usize = 1 << 14;
 /// Number of consecutive blocks that reuse a form before other forms are tried again.
 const BLOCKS_ALIKE: u32 = 32;
 /// Number of columns whose forms are remembered.
@@ -80,8 +80,8 @@ impl ColumnWriter {
 
     /// Chooses the form with the smallest encoding of a sample; falls back to one that is not a grid.
     fn choose(&mut self, values: &[f64], width: Width, may_be_grid: bool) -> io::Result<Form> {
-        let first = values.len().saturating_sub(LOOKED_AT) / 2;
-        let part = &values[first..values.len().min(first + LOOKED_AT)];
+        let first = values.len().saturating_sub(SAMPLE_SIZE) / 2;
+        let part = &values[first..values.len().min(first + SAMPLE_SIZE)];
         let grids = Grid::of(values, width).filter(|_| may_be_grid).map(|grid| Form::Steps(width, grid));
         let differences = LAGS.map(|lag| Form::Differences(width, lag));
         let mut best = (usize::MAX, Form::Bits(width));

@@ -36,9 +36,9 @@ const STEPS: [f64; 30] = [
     0.000_001,
 ];
 /// Number of values that are sampled before all are checked.
-const LOOKED_AT: usize = 48;
+const SAMPLE_SIZE: usize = 48;
 /// Bound of the multiples: 2^51. Products of larger ones are not exact.
-const MOST: f64 = 2_251_799_813_685_248.0;
+const MAX_STEPS: f64 = 2_251_799_813_685_248.0;
 /// Maximum deviation of a value from the product, in units in the last place; readers add offsets.
 const MAX_ULPS: u64 = 100;
 
@@ -54,7 +54,7 @@ pub(super) enum Grid {
 impl Grid {
     /// Returns the coarsest grid of each kind on which the sampled values approximately lie.
     pub(super) fn of(values: &[f64], width: Width) -> impl Iterator<Item = Self> {
-        let every = values.len().div_ceil(LOOKED_AT).max(1);
+        let every = values.len().div_ceil(SAMPLE_SIZE).max(1);
         let is_on =
             |grid: &Self| values.iter().step_by(every).all(|value| grid.place(*value, width).is_some());
         let times = STEPS.into_iter().map(Self::Times).find(is_on);
@@ -79,7 +79,7 @@ impl Grid {
             Self::Over(parts) => value * parts,
         });
         // False for NaN.
-        let is_whole = steps.abs() < MOST;
+        let is_whole = steps.abs() < MAX_STEPS;
         if !is_whole {
             return None;
         }

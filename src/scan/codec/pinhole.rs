@@ -4,9 +4,9 @@ use super::grid::rounded;
 use super::words::{unzigzag, zigzag};
 
 /// Number of points from which a camera is estimated.
-const LOOKED_AT: usize = 4096;
+const SAMPLE_SIZE: usize = 4096;
 /// Number of points that a camera must reproduce bit by bit before all are checked.
-const TRIED: usize = 24;
+const CHECKED_POINTS: usize = 24;
 /// Maximum number of pixels along an edge of an image.
 const MAX_PIXELS: usize = 4096;
 /// Candidate numbers of decimals in the camera parameters.
@@ -34,8 +34,8 @@ impl Pinhole {
     pub(super) fn of(values: &[f64], depths: &[f64]) -> Option<Self> {
         let pairs: Vec<(f64, f64)> =
             values.iter().copied().zip(depths.iter().copied()).filter(|(_, z)| *z > 0.0).collect();
-        let mut ratios: Vec<f64> = pairs.iter().take(LOOKED_AT).map(|(value, z)| value / z).collect();
-        if ratios.len() < TRIED || !ratios.iter().all(|ratio| ratio.abs() < 100.0) {
+        let mut ratios: Vec<f64> = pairs.iter().take(SAMPLE_SIZE).map(|(value, z)| value / z).collect();
+        if ratios.len() < CHECKED_POINTS || !ratios.iter().all(|ratio| ratio.abs() < 100.0) {
             return None;
         }
         ratios.sort_unstable_by(f64::total_cmp);
@@ -55,7 +55,8 @@ impl Pinhole {
         if !(10.0..1e5).contains(&focal) {
             return None;
         }
-        let tried: Vec<_> = pairs.iter().step_by((pairs.len() / TRIED).max(1)).take(TRIED).collect();
+        let tried: Vec<_> =
+            pairs.iter().step_by((pairs.len() / CHECKED_POINTS).max(1)).take(CHECKED_POINTS).collect();
         let makes = |focal: f64, center: f64| {
             tried.iter().all(|&&(value, z)| {
                 let pixel = (value / z * focal + center).round();

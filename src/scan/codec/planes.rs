@@ -20,7 +20,7 @@ const TABLE_BYTES: f64 = 80.0;
 /// Entropy in bits per byte above which bytes are stored uncompressed.
 const NOISE_BITS: f64 = 7.85;
 /// Number of sampled bytes for detecting noise.
-const LOOKED_AT: usize = 2048;
+const SAMPLE_SIZE: usize = 2048;
 
 /// Writes words as planes of bytes, the most significant first.
 #[derive(Default)]
@@ -60,10 +60,10 @@ impl PlaneWriter {
     fn put_plane(&mut self, plane: &[u8], above: Option<&[u8]>, out: &mut Vec<u8>) -> io::Result<()> {
         let Some(&first) = plane.first() else { return Ok(()) };
         let noise_bits = |bytes: usize| NOISE_BITS * bytes as f64;
-        if above.is_none() && plane.len() > 2 * LOOKED_AT {
+        if above.is_none() && plane.len() > 2 * SAMPLE_SIZE {
             // A part of the plane suffices to detect noise.
-            let part = &plane[..LOOKED_AT];
-            if entropy(&histogram(part), LOOKED_AT as u32) > noise_bits(LOOKED_AT) {
+            let part = &plane[..SAMPLE_SIZE];
+            if entropy(&histogram(part), SAMPLE_SIZE as u32) > noise_bits(SAMPLE_SIZE) {
                 out.push(STORED);
                 out.extend_from_slice(plane);
                 return Ok(());

@@ -57,7 +57,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_point_is_in_one_pass() {
+    fn each_point_is_in_one_pass() {
         for points in [0..0, 5..6, 0..2047, 100..2148, 3..5000] {
             let mut taken: Vec<usize> =
                 sampling_passes(points.clone()).iter().flat_map(SamplingPass::points).collect();

@@ -142,7 +142,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn counts_go_beyond_a_byte_and_are_taken_whole() {
+    fn counts_exceed_a_byte_and_are_taken_completely() {
         let mut page = CountedPage::default();
         // Two voxels of one brick, one of another.
         for (place, rays) in [(3, 70), (7, 300), (512 * 9 + 7, MAX_RAYS)] {

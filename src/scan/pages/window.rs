@@ -84,7 +84,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_window_reaches_as_far_as_it_may_have_pages() {
+    fn a_window_has_the_largest_reach_within_its_page_limit() {
         let pages = |low: Point, high: Point| Window::around([0; 3], (low, high)).pages();
         assert_eq!(pages([-6000.0, -100.0, -10.0], [8000.0, 100.0, 10.0]), [220, 4, 2]);
         assert_eq!(pages([-9e9; 3], [9e9; 3]), [63; 3]);

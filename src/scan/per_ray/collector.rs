@@ -66,11 +66,11 @@ impl PerRayCollector {
     #[inline]
     pub(crate) fn is_full_for(&mut self, ray: &SlabRay) -> bool {
         let new_bytes = BYTES_PER_RAY + BYTES_PER_SLAB * ray.slabs_after(0) as usize;
-        self.allowance.is_spent_by(new_bytes) && self.look_whether_full(new_bytes)
+        self.allowance.is_spent_by(new_bytes) && self.is_full_measured(new_bytes)
     }
 
     #[cold]
-    fn look_whether_full(&mut self, new_bytes: usize) -> bool {
+    fn is_full_measured(&mut self, new_bytes: usize) -> bool {
         let pages: usize =
             self.pages.pages().iter().map(|page| size_of::<CountedPage>() + page.heap_bytes()).sum();
         let far = self.far.as_ref().map_or(0, FarRuns::bytes);

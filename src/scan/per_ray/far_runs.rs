@@ -101,7 +101,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rays_that_are_cut_in_one_tile_are_packed_on_the_way() {
+    fn clipped_rays_in_one_tile_are_packed_early() {
         let mut far = FarRuns::new(Grid::new(0.1, 10.0).unwrap());
         let rays = 40 * MAX_PENDING / 100;
         for _ in 0..rays {

@@ -160,7 +160,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn parts_together_say_what_the_whole_scan_says(a in part(), b in part()) {
+        fn merged_parts_equal_the_whole_scan(a in part(), b in part()) {
             let expected = naive(&[&a, &b]);
             let united = merge_bricks(a, b);
             prop_assert!(united.is_sorted_by(|a, b| a.brick < b.brick));

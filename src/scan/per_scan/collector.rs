@@ -278,7 +278,7 @@ mod tests {
     }
 
     #[test]
-    fn rays_to_the_far_end_of_the_window_leave_the_marks_of_whole_rays() {
+    fn rays_to_the_end_of_the_window_mark_all_voxels() {
         let origin = [12.3, -45.6, 7.75];
         let ends = ends_of_rays(origin, 80, 5_000.0, 0.25, 0.005);
         let origin = &RayOrigin::new(origin, origin.map(|x| x.floor() as i32));
@@ -298,7 +298,7 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(64))]
 
         #[test]
-        fn rays_that_begin_after_what_is_shared_leave_the_marks_of_whole_rays(
+        fn skipping_marked_prefixes_does_not_change_the_marks(
             origin in prop::array::uniform3(-100.0..100.0_f64),
             is_on_border in prop::array::uniform3(prop::bool::ANY),
             reach in 3.0..40.0_f64,

@@ -153,7 +153,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn pages_give_the_updates_of_their_bricks(
+        fn updates_of_pages_equal_those_of_their_bricks(
             base in prop::sample::select(vec![[0; 3], [32_700, -90, 32_760], [i32::MAX - 201; 3], [i32::MIN; 3]]),
             marks in prop::collection::vec((prop::array::uniform3(0..200_i32), any::<bool>()), 0..60),
             edge in prop::sample::select(vec![32, 50, 64, 100, 1024]),

@@ -112,7 +112,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rays_without_a_return_are_cut_where_they_count_as_free() {
+    fn rays_without_a_return_are_clipped_at_their_free_range() {
         let at = |rays: RayConfig| match RangeRule::new(&rays, [1.0; 3])
             .apply(no_return([1.0; 3], [0.0, 0.0, -2.0]).unwrap(), &mut SkippedPoints::default())
         {
@@ -142,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn at_exactly_the_ranges_a_point_is_a_hit() {
+    fn points_at_exactly_the_ranges_are_hits() {
         let mut rays = RayConfig { min_range_m: 0.3, max_range_m: Some(2.0), ..RayConfig::default() };
         let rule = RangeRule::new(&rays, [0.0; 3]);
         let points =

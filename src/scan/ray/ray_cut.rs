@@ -214,7 +214,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_left_of_rays_holds_the_selected_tiles_and_little_else() {
+    fn clipped_rays_contain_the_selected_tiles_and_few_other_voxels() {
         let grid = Grid::new(0.1, 10.0).unwrap();
         let near = TileBox::new([1, -2, -1].into(), [3, 0, 0].into());
         let selections: [TileSelection; 4] = [

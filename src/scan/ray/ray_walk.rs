@@ -358,7 +358,7 @@ mod tests {
     }
 
     #[test]
-    fn ties_go_to_the_lowest_axis_first() {
+    fn ties_cross_the_lowest_axis_first() {
         assert_eq!(
             voxels(walk([0.5; 3], [2.5; 3])),
             [[0, 0, 0], [1, 0, 0], [1, 1, 0], [1, 1, 1], [2, 1, 1], [2, 2, 1], [2, 2, 2]]
@@ -366,12 +366,12 @@ mod tests {
     }
 
     #[test]
-    fn a_ray_inside_one_voxel_takes_no_step() {
+    fn a_ray_inside_one_voxel_has_no_steps() {
         assert_eq!(voxels(walk([0.1, 0.2, 0.3], [0.9, 0.2, 0.4])), [[0, 0, 0]]);
     }
 
     #[test]
-    fn a_border_through_the_origin_is_left_at_once_however_slowly_the_ray_moves() {
+    fn a_border_through_the_origin_is_crossed_at_time_0() {
         let least = f64::from_bits(1);
         for slow in [-1e-310, -least, -f64::MIN_POSITIVE, -1e-300] {
             let visited = voxels(walk([0.5, 0.0, 0.5], [2.5, slow, 0.5]));
@@ -386,7 +386,7 @@ mod tests {
     }
 
     #[test]
-    fn a_box_that_reaches_the_last_voxels_is_walked_to_its_end() {
+    fn a_box_at_the_index_limit_is_left_correctly() {
         let region = VoxelBox { min: [i32::MAX - 50, -50, -50], end: [i32::MAX, 50, 50] };
         for slow in [0.0, 1e-310, -1e-310, 1e-307, -3e-308, f64::from_bits(1)] {
             let start = [i32::MAX - 40, 0, 0];
@@ -404,7 +404,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn every_step_is_to_a_neighbour_nearer_to_the_end_through_voxels_the_ray_meets(
+        fn each_step_approaches_the_end_through_voxels_on_the_ray(
             from in prop::array::uniform3(-40.0..40.0_f64),
             to in prop::array::uniform3(-40.0..40.0_f64),
         ) {
@@ -427,7 +427,7 @@ mod tests {
         }
 
         #[test]
-        fn a_box_is_entered_where_single_steps_enter_it(
+        fn entering_a_box_equals_single_steps(
             from in prop::array::uniform3(-60.0..60.0_f64),
             to in prop::array::uniform3(-60.0..60.0_f64),
             snap in prop::bool::ANY,
@@ -451,7 +451,7 @@ mod tests {
         }
 
         #[test]
-        fn leaving_a_box_ends_where_single_steps_end(
+        fn leaving_a_box_equals_single_steps(
             from in prop::array::uniform3(0.0..16.0_f64),
             to in prop::array::uniform3(-40.0..40.0_f64),
             snap in prop::bool::ANY,

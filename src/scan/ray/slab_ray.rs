@@ -426,7 +426,7 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(500))]
 
         #[test]
-        fn the_voxels_are_those_of_the_exact_walk(
+        fn voxels_equal_those_of_the_exact_walk(
             origin in prop::array::uniform3(-100.0..100.0_f64),
             ends in prop::collection::vec(prop::array::uniform3(-150.0..150.0_f64), 1..8),
         ) {
@@ -434,7 +434,7 @@ mod tests {
         }
 
         #[test]
-        fn rays_through_edges_and_corners_are_right_or_left_to_the_exact_walk(
+        fn rays_through_edges_and_corners_are_exact(
             origin in prop::array::uniform3(-40..40_i32),
             ends in prop::collection::vec(prop::array::uniform3(-60..60_i32), 1..8),
             nudge in prop::array::uniform3(prop::sample::select(vec![0.0, 1e-7, -1e-7, 5e-7, -5e-7, 1e-12, 0.25])),
@@ -446,7 +446,7 @@ mod tests {
         }
 
         #[test]
-        fn far_from_zero_and_for_long_rays_too(
+        fn long_rays_far_from_zero_are_exact(
             origin in prop::array::uniform3(-1.0e8..1.0e8_f64),
             reach in prop::array::uniform3(-1900.0..1900.0_f64),
         ) {
@@ -455,7 +455,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sensor_on_a_corner_of_voxels_leaves_few_rays_to_the_exact_walk() {
+    fn a_sensor_on_a_voxel_corner_needs_few_exact_walks() {
         let directions = (0..1000).map(|k| {
             let (azimuth, up) = (f64::from(k) * 0.618, f64::from(k % 37) * 0.05 - 0.87);
             [3.0 + 30.0 * azimuth.cos(), -4.0 + 30.0 * azimuth.sin(), 9.0 + 20.0 * up]
@@ -465,7 +465,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sensor_beside_a_border_leaves_few_rays_to_the_exact_walk() {
+    fn a_sensor_close_to_a_border_needs_few_exact_walks() {
         // 0.9 m and 1.4 m at a resolution of 0.05 m, converted from `f32`.
         let origin = [17.999999523162842, 200.0, 27.999999523162842];
         let ends = (0..1000).map(|k| {

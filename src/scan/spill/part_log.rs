@@ -98,7 +98,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn every_list_comes_back_in_order_wherever_it_lies(
+        fn lists_are_read_in_order_from_memory_and_file(
             records in prop::collection::vec((0..4_usize, prop::collection::vec(any::<u8>(), 0..40)), 0..60),
             max_tail_bytes in 0..300_usize,
         ) {

@@ -38,7 +38,7 @@ pub(crate) struct ScanRays<'a> {
     window: Window,
     range: RangeRule,
     /// Maximum number of threads.
-    most_threads: usize,
+    max_threads: usize,
     stop: &'a Stop,
 }
 
@@ -54,7 +54,7 @@ impl<'a> ScanRays<'a> {
     pub(crate) fn new(
         rules: TraceRules<'a>,
         points: &'a dyn ScanPoints,
-        most_threads: usize,
+        max_threads: usize,
         stop: &'a Stop,
     ) -> Result<Self> {
         let TraceRules { mapped, model, rays, .. } = rules;
@@ -67,7 +67,7 @@ impl<'a> ScanRays<'a> {
         let range = RangeRule::new(rays, origin_m);
         let window = Window::default();
         let mut scan_rays =
-            Self { mapped, model, rays, points, origin_m, origin, cut, window, range, most_threads, stop };
+            Self { mapped, model, rays, points, origin_m, origin, cut, window, range, max_threads, stop };
         scan_rays.window = Window::around(voxel, scan_rays.bounds()?);
         Ok(scan_rays)
     }
@@ -134,7 +134,7 @@ impl<'a> ScanRays<'a> {
                         if batch.len() == BATCH {
                             collector.take(&self.origin, &batch, needs_intensity, parts);
                             batch.clear();
-                            if !self.goes_on(parts) {
+                            if !self.continues(parts) {
                                 return false;
                             }
                         }
@@ -142,7 +142,7 @@ impl<'a> ScanRays<'a> {
                     collector.take(&self.origin, &batch, needs_intensity, parts);
                     batch.clear();
                 }
-                self.goes_on(parts)
+                self.continues(parts)
             })?;
             Ok(report)
         })
@@ -169,11 +169,11 @@ impl<'a> ScanRays<'a> {
         parts: &ScanParts<'_>,
     ) -> Result<ScanReport> {
         let all = self.points.len();
-        let threads = limit.collectors(self.most_threads);
+        let threads = limit.collectors(self.max_threads);
         let each = limit.of_collector(threads);
         let mut report = ScanReport::default();
         let (mut next, mut at_a_time) = (0, FIRST_RAYS);
-        while next < all && self.goes_on(Some(parts)) {
+        while next < all && self.continues(Some(parts)) {
             let some = next..all.min(next + threads * at_a_time.min(MAX_RAYS));
             let threads = threads.min(some.len().div_ceil(FIRST_RAYS));
             let reports = self.collect_each(collectors, some.clone(), threads, |collector, range| {
@@ -279,10 +279,10 @@ impl<'a> ScanRays<'a> {
 
     /// Number of parts into which the points are divided, each with its own collector.
     fn threads(&self) -> usize {
-        self.most_threads.min(self.points.len() / MIN_RAYS_PER_THREAD).max(1)
+        self.max_threads.min(self.points.len() / MIN_RAYS_PER_THREAD).max(1)
     }
 
-    fn goes_on(&self, parts: Option<&ScanParts<'_>>) -> bool {
+    fn continues(&self, parts: Option<&ScanParts<'_>>) -> bool {
         !self.stop.is_set() && !parts.is_some_and(ScanParts::has_failed)
     }
 
@@ -438,7 +438,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn bounds_are_those_of_all_points_if_all_are_finite(
+        fn bounds_of_finite_points_are_exact(
             points in prop::collection::vec(prop::array::uniform3(-1e9..1e9_f64), 0..9),
             wrong in prop::option::of((0..9_usize, 0..3_usize, prop::sample::select(vec![
                 f64::NAN, f64::INFINITY, f64::NEG_INFINITY,

@@ -364,7 +364,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_was_packed_comes_back_in_order(
+        fn packed_updates_round_trip_in_order(
             all in prop::collection::vec(prop_oneof![masks(), runs(), ordered()], 0..8),
         ) {
             let mut packed = PackedUpdates::default();
@@ -376,7 +376,7 @@ mod tests {
     }
 
     #[test]
-    fn misses_after_the_runs_come_back_as_runs() {
+    fn misses_after_the_runs_are_unpacked_as_runs() {
         let (run, passed) = (Run { place: 4, misses: 2, hit: Some(1.0) }, Misses { place: 4, misses: 300 });
         let mut runs = TileRuns::default();
         runs.push(BrickRuns { brick: BrickCode(7), runs: &[run], misses: &[passed] });

@@ -73,7 +73,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bricks_are_divided_by_tiles_as_often_as_is_expected() {
+    fn tiles_divide_bricks_as_estimated() {
         for edge in [2, 3, 4, 5, 6, 7, 8, 9, 12, 20, 31, 32, 100] {
             let grid = Grid::new(1.0, f64::from(edge)).unwrap();
             let along_axis: usize = (-edge..edge).map(|k| tiles_of_brick(&grid, [k, 0, 0]).count()).sum();

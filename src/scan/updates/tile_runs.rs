@@ -158,7 +158,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bricks_come_back_as_they_were_pushed() {
+    fn bricks_are_returned_as_pushed() {
         let run = |place, hit| Run { place, misses: 3, hit };
         let (hit, missed) = ([run(5, Some(2.0)), run(5, None)], [Misses { place: 5, misses: 7 }]);
         let bricks = [(3, &hit[..], &missed[..]), (3, &[], &[]), (8, &hit[..1], &[]), (9, &[], &missed)];
@@ -171,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn of_merged_parts_the_earlier_runs_of_a_brick_come_first() {
+    fn merged_parts_keep_earlier_runs_of_a_brick_first() {
         let part = |codes: &[u64], misses| {
             let mut part = TileRuns::default();
             for &code in codes {

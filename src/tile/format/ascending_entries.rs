@@ -117,7 +117,7 @@ fn out_of_order(key: VoxelKey, offset: u64) -> FormatError {
 #[cfg(test)]
 mod tests {
     use super::super::any_order_entries::AnyOrderEntries;
-    use super::super::gather::VoxelSieve;
+    use super::super::gather::VoxelFilter;
     use super::*;
     use crate::tile::Table;
     use crate::tile::format::encode_entries;
@@ -163,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn entries_in_order_give_the_table_and_the_errors_of_entries_in_any_order() {
+    fn both_decoders_give_the_same_tables_and_errors() {
         let mut random = Random::of(5, &[]);
         let (mut whole, mut damaged) = (0, 0);
         for round in 0..600 {
@@ -177,10 +177,10 @@ mod tests {
             let fast = read(AscendingEntries::new(&VOXELS, Table::default()), &bytes);
             let naive = read(AnyOrderEntries::new(&VOXELS), &bytes);
             for from in [f64::NEG_INFINITY, -0.25, 0.5, 9.0] {
-                match (read(AscendingEntries::new(&VOXELS, VoxelSieve::from(from)), &bytes), &fast) {
-                    (Ok(sifted), Ok(table)) => assert!(table.iter_from(from).eq(sifted)),
-                    (Err(sifted), Err(table)) => assert_eq!(sifted, *table),
-                    (sifted, _) => panic!("{sifted:?}"),
+                match (read(AscendingEntries::new(&VOXELS, VoxelFilter::from(from)), &bytes), &fast) {
+                    (Ok(filtered), Ok(table)) => assert!(table.iter_from(from).eq(filtered)),
+                    (Err(filtered), Err(table)) => assert_eq!(filtered, *table),
+                    (filtered, _) => panic!("{filtered:?}"),
                 }
             }
             match (fast, naive, disorder(&bytes)) {

@@ -2,8 +2,8 @@
 //! The checksum is in the front part, because with a checksum directly after its data the checksum of the whole file
 //! would be a constant. For the same reason the index contains the checksums of a table's parts before the parts.
 
-use super::compact::{CRC_BYTES, CompactIndex, joined_crc, read_compact, sift_compact};
-use super::gather::SiftedVoxels;
+use super::compact::{CRC_BYTES, CompactIndex, filter_compact, joined_crc, read_compact};
+use super::gather::FilteredVoxels;
 use super::reader::{Decoded, DecodedTable};
 use super::trailer::Trailer;
 use crate::error::{DecodeError, FormatError};
@@ -37,7 +37,7 @@ pub fn read_compact_file(
     file_bytes: u64,
     voxels: &VoxelBox,
 ) -> Result<DecodedTable, DecodeError> {
-    read_behind_front(input, file_bytes, |input, bytes| read_compact(&mut { input }, bytes, voxels))
+    read_after_front(input, file_bytes, |input, bytes| read_compact(&mut { input }, bytes, voxels))
 }
 
 /// Reads the observed voxels of a `tile.vxt` whose log-odds are at least `from`, in Morton order, without building a
@@ -51,11 +51,11 @@ pub fn read_compact_voxels_from(
     file_bytes: u64,
     voxels: &VoxelBox,
     from: f64,
-) -> Result<Decoded<SiftedVoxels>, DecodeError> {
-    read_behind_front(input, file_bytes, |input, bytes| sift_compact(&mut { input }, bytes, voxels, from))
+) -> Result<Decoded<FilteredVoxels>, DecodeError> {
+    read_after_front(input, file_bytes, |input, bytes| filter_compact(&mut { input }, bytes, voxels, from))
 }
 
-fn read_behind_front<T>(
+fn read_after_front<T>(
     input: &mut impl Read,
     file_bytes: u64,
     read: impl FnOnce(&mut dyn Read, u64) -> Result<T, DecodeError>,
@@ -173,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn a_table_comes_back_with_what_stands_in_front() {
+    fn a_table_and_its_front_part_round_trip() {
         let (table, file) = (table(0.5), file(&table(0.5), 77));
         let decoded = read(&file).unwrap();
         assert!(decoded.table.iter().eq(table.iter()));
@@ -183,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn every_flipped_bit_and_every_other_length_is_an_error() {
+    fn flipped_bits_and_wrong_lengths_are_errors() {
         let file = file(&table(0.5), 77);
         for at in 0..file.len() {
             for bit in 0..8 {
@@ -197,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn the_parts_tell_the_checksum_of_the_whole() {
+    fn the_checksum_of_the_file_follows_from_its_parts() {
         let (table, file) = (table(0.5), file(&table(0.5), 77));
         let index = CompactFileIndex::read(&mut &file[..], file.len() as u64, &VOXELS).unwrap().unwrap();
         assert_eq!(index.crc, crc32fast::hash(&file));
@@ -210,7 +210,7 @@ mod tests {
     }
 
     #[test]
-    fn an_error_behind_the_front_says_where_in_the_file() {
+    fn errors_after_the_front_part_have_file_offsets() {
         let mut file = file(&table(0.5), 77);
         let front_bytes = 74;
         file[front_bytes] ^= 1;
@@ -222,14 +222,14 @@ mod tests {
 
     /// With a checksum directly after its data, the checksum of the whole file would be a constant.
     #[test]
-    fn files_of_other_content_have_other_checksums() {
+    fn files_with_different_content_have_different_checksums() {
         let files = [0.5, 0.75].map(|log_odds| file(&table(log_odds), 77));
         assert_eq!(files[0].len(), files[1].len());
         assert_ne!(crc32fast::hash(&files[0]), crc32fast::hash(&files[1]));
     }
 
     #[test]
-    fn what_is_no_compact_form_is_not_written() {
+    fn bytes_that_are_not_a_compact_table_are_rejected() {
         let front = read(&file(&table(0.5), 1)).unwrap().trailer.unwrap();
         assert!(write_compact_file(&[1, 2, 3], front, &mut Vec::new()).is_err());
     }

@@ -42,22 +42,22 @@ impl Gather for Table {
 }
 
 /// Voxels selected while a file was read, in Morton order.
-pub type SiftedVoxels = Vec<(MortonCode, Evidence)>;
+pub type FilteredVoxels = Vec<(MortonCode, Evidence)>;
 
 /// Selects the voxels whose log-odds are at least a threshold.
-pub(super) struct VoxelSieve {
+pub(super) struct VoxelFilter {
     pub(super) from: f64,
-    pub(super) found: SiftedVoxels,
+    pub(super) found: FilteredVoxels,
 }
 
-impl From<f64> for VoxelSieve {
+impl From<f64> for VoxelFilter {
     fn from(from: f64) -> Self {
         Self { from, found: Vec::new() }
     }
 }
 
-impl Gather for VoxelSieve {
-    type Made = SiftedVoxels;
+impl Gather for VoxelFilter {
+    type Made = FilteredVoxels;
 
     #[inline]
     fn wants(&self, evidence: Evidence) -> bool {
@@ -68,11 +68,11 @@ impl Gather for VoxelSieve {
         self.found.extend(voxels.iter().map(|&(place, evidence)| (brick.voxel(place), evidence)));
     }
 
-    fn made(self) -> SiftedVoxels {
+    fn made(self) -> FilteredVoxels {
         self.found
     }
 
-    fn of_table(self, table: Table) -> SiftedVoxels {
+    fn of_table(self, table: Table) -> FilteredVoxels {
         table.iter_from(self.from).collect()
     }
 }

@@ -28,7 +28,7 @@ pub use compact_file::{
     CompactFileIndex, read_compact_file, read_compact_front, read_compact_voxels_from, write_compact_file,
 };
 pub use entries::encode_entries;
-pub use gather::SiftedVoxels;
+pub use gather::FilteredVoxels;
 pub use reader::{Decoded, DecodedTable, read_table, read_trailer, read_voxels_from};
 pub use renewed::{renew_compact_file, renew_table};
 pub use trailer::{TRAILER_BYTES, Trailer};

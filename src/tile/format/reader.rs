@@ -1,6 +1,6 @@
 use super::any_order_entries::AnyOrderEntries;
 use super::ascending_entries::AscendingEntries;
-use super::gather::{Gather, SiftedVoxels, VoxelSieve};
+use super::gather::{FilteredVoxels, Gather, VoxelFilter};
 use super::trailer::Trailer;
 use super::{ENTRY_BYTES, EntryBytes, HEADER_BYTES, MAGIC, VERSION};
 use crate::error::{DecodeError, FormatError};
@@ -59,8 +59,8 @@ pub fn read_voxels_from(
     file_bytes: u64,
     voxels: &VoxelBox,
     from: f64,
-) -> Result<Decoded<SiftedVoxels>, DecodeError> {
-    read_made(input, file_bytes, voxels, VoxelSieve::from(from))
+) -> Result<Decoded<FilteredVoxels>, DecodeError> {
+    read_made(input, file_bytes, voxels, VoxelFilter::from(from))
 }
 
 fn read_made<G: Gather>(

@@ -81,7 +81,7 @@ fn batches_in_flight(tile: &Tile) -> usize {
 }
 
 #[test]
-fn queries_see_what_is_in_flight_the_newest_first() {
+fn queries_see_pending_batches_newest_first() {
     let octrees = factory(1 << 20);
     let mut tile = empty_tile(&octrees);
     let gate = hold(&octrees);
@@ -125,7 +125,7 @@ fn queries_do_not_wait_for_a_tree_that_is_being_written() {
 }
 
 #[test]
-fn a_panic_while_a_tree_is_written_loses_nothing() {
+fn a_panic_during_a_write_loses_no_updates() {
     let octrees = factory(1 << 20);
     let mut tile = empty_tile(&octrees);
     update(&mut tile, 0..200, true);
@@ -150,7 +150,7 @@ fn a_panic_while_a_tree_is_written_loses_nothing() {
 }
 
 #[test]
-fn a_sync_takes_what_is_in_flight_without_waiting_for_the_worker() {
+fn a_sync_writes_pending_batches_without_waiting() {
     let octrees = factory(1 << 20);
     let mut tile = empty_tile(&octrees);
     let gate = hold(&octrees);
@@ -166,7 +166,7 @@ fn a_sync_takes_what_is_in_flight_without_waiting_for_the_worker() {
 }
 
 #[test]
-fn a_clone_has_its_own_tree_and_what_was_in_flight() {
+fn a_clone_has_its_own_tree_and_pending_batches() {
     let octrees = factory(1 << 20);
     let mut tile = empty_tile(&octrees);
     let gate = hold(&octrees);
@@ -184,7 +184,7 @@ fn a_clone_has_its_own_tree_and_what_was_in_flight() {
 }
 
 #[test]
-fn the_queue_never_holds_more_than_its_limit_and_who_puts_in_too_much_waits() {
+fn senders_wait_when_the_queue_is_full() {
     let octrees = factory(150);
     let gate = hold(&octrees);
     thread::scope(|scope| {
@@ -217,7 +217,7 @@ fn the_queue_never_holds_more_than_its_limit_and_who_puts_in_too_much_waits() {
 }
 
 #[test]
-fn a_batch_larger_than_the_limit_goes_alone() {
+fn a_batch_above_the_limit_is_queued_alone() {
     let octrees = factory(10);
     let mut tile = empty_tile(&octrees);
     for step in 0..5 {
@@ -230,7 +230,7 @@ fn a_batch_larger_than_the_limit_goes_alone() {
 }
 
 #[test]
-fn what_is_in_flight_goes_with_its_tile() {
+fn pending_batches_are_dropped_with_their_tile() {
     let octrees = factory(1 << 20);
     let gate = hold(&octrees);
     let mut tile = empty_tile(&octrees);
@@ -244,7 +244,7 @@ fn what_is_in_flight_goes_with_its_tile() {
 }
 
 #[test]
-fn an_end_while_the_queue_is_full_writes_what_is_there_and_leaves_no_thread() {
+fn closing_a_full_queue_writes_its_batches_and_ends_the_thread() {
     let octrees = factory(100);
     let queue = Arc::downgrade(octrees.worker().queue());
     let gate = hold(&octrees);

@@ -60,7 +60,7 @@ impl<'a> UpdateStream<'a> {
                 }
             }
             TileUpdates::Ordered(updates) => {
-                table.update_in_order_and_tell(model, first, updates, |code, log_odds| {
+                table.update_in_order_with(model, first, updates, |code, log_odds| {
                     self.push(code, log_odds);
                 });
             }

@@ -217,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn the_earliest_inserted_leave_in_morton_order_and_a_hit_makes_no_voxel_younger() {
+    fn the_earliest_voxels_are_evicted_in_morton_order_and_hits_do_not_renew_them() {
         let mut cache = VoxelCache::new(2, Some(4));
         for code in [16, 1, 8, 12, 5, 4, 16] {
             cache.put(MortonCode(code), code as f32);
@@ -234,7 +234,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cache_that_fits_itself_holds_a_repeated_scan() {
+    fn an_adaptive_cache_holds_a_repeated_scan() {
         let mut cache = VoxelCache::new(4, None);
         for _ in 0..2 {
             for code in 0..1000 {
@@ -247,7 +247,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cache_that_fits_itself_has_three_to_six_times_the_room_of_the_largest_scan() {
+    fn an_adaptive_cache_has_three_to_six_times_the_capacity_of_the_largest_scan() {
         for tau in [1, 4, 6] {
             let mut cache = VoxelCache::new(tau, None);
             for voxels in [1000, 37, 1750, 600] {
@@ -262,7 +262,7 @@ mod tests {
     }
 
     #[test]
-    fn under_finds_the_cached_voxels_of_a_node() {
+    fn under_returns_the_cached_voxels_of_a_node() {
         let mut cache = VoxelCache::new(4, Some(16));
         for code in [3, 63, 64, 70, 127, 128, 1000] {
             cache.put(MortonCode(code), 0.5);

@@ -53,13 +53,13 @@ impl Brick {
 
     /// Reads the brick to load it into the CPU cache.
     #[inline]
-    pub(crate) fn look_at_storage(&self) {
+    pub(crate) fn prefetch_storage(&self) {
         std::hint::black_box((self.observed[0], self.heap_bytes()));
     }
 
     /// Reads each line of the cells to load them into the CPU cache.
     #[inline]
-    pub(crate) fn look_at_cells(&self) {
+    pub(crate) fn prefetch_cells(&self) {
         if let Storage::Interned(cells) = &self.evidence {
             let look = |cell: &[StateId; CELL_VOXELS]| cell[0] ^ cell[CELL_VOXELS / 2];
             std::hint::black_box(cells.all().iter().fold(0, |all, cell| all ^ look(cell)));

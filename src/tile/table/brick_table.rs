@@ -1,6 +1,6 @@
 use super::brick::Brick;
 use super::brick_directory::{Address, BLOCK_EDGE, BrickDirectory};
-use super::brick_look::BrickLook;
+use super::brick_view::BrickView;
 use super::palette::Palette;
 use super::summary::{Summary, larger};
 use crate::octree::write_bt_of_bricks;
@@ -79,8 +79,8 @@ impl Table {
 
     /// View of the brick with a number, for reading many of its voxels.
     #[inline]
-    pub(crate) fn numbered(&self, number: u32) -> Option<BrickLook<'_>> {
-        Some(BrickLook { brick: self.bricks.get(number as usize)?, palette: &self.palette })
+    pub(crate) fn numbered(&self, number: u32) -> Option<BrickView<'_>> {
+        Some(BrickView { brick: self.bricks.get(number as usize)?, palette: &self.palette })
     }
 
     /// Returns a cube of 8, 16 or 32 voxels around a voxel in which all log-odds are below a threshold; `None` if the

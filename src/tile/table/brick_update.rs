@@ -44,7 +44,7 @@ impl Brick {
     pub(crate) fn update(&mut self, rest: &mut Rest<'_>, palette: &mut Palette) -> (usize, Result<(), Full>) {
         // Not by comparison, which would be a function call.
         let has_hits = rest.hits.iter().fold(0, |all, word| all | word) != 0;
-        self.summary.note_change(if has_hits { f32::INFINITY } else { palette.most_after_miss() });
+        self.summary.note_change(if has_hits { f32::INFINITY } else { palette.max_after_miss() });
         match &mut self.evidence {
             Storage::Interned(cells) => update_interned(cells, &mut self.observed, rest, palette),
             Storage::Plain(cells) => (update_plain(cells, &mut self.observed, rest, palette.model()), Ok(())),
@@ -61,7 +61,7 @@ impl Brick {
         palette: &mut Palette,
     ) -> Option<bool> {
         let bound = match observation {
-            Observation::Miss => palette.most_after_miss(),
+            Observation::Miss => palette.max_after_miss(),
             Observation::Hit(_) => f32::INFINITY,
         };
         self.step(place, bound, |before| match observation {
@@ -79,7 +79,7 @@ impl Brick {
         known: &mut MissRuns,
     ) -> usize {
         let has_hits = left.runs.iter().any(|run| run.hit.is_some());
-        self.summary.note_change(if has_hits { f32::INFINITY } else { palette.most_after_miss() });
+        self.summary.note_change(if has_hits { f32::INFINITY } else { palette.max_after_miss() });
         let Storage::Interned(cells) = &mut self.evidence else { return 0 };
         let word_of = |place: u16| 1 << (place / 64);
         let of_runs = left.runs.iter().fold(0, |words, run| words | word_of(run.place));

@@ -21,7 +21,7 @@ pub(crate) const UNKNOWN: StateId = 0;
 pub(crate) struct Palette {
     model: SensorModel,
     /// Largest log-odds that a miss can lead to, unless they were larger before.
-    most_after_miss: f32,
+    max_after_miss: f32,
     evidence: Vec<Evidence>,
     next: Vec<Next>,
     /// Log-odds as `f32`, as in the octree; negative infinity for unknown voxels.
@@ -48,8 +48,8 @@ pub(crate) struct Full;
 const FIRST_LIMIT: usize = 1 << 10;
 const MAX_STATES: usize = 1 << 16;
 
-fn most_after_miss(model: &SensorModel) -> f32 {
-    (model.most_after_miss() as f32).next_up()
+fn max_after_miss(model: &SensorModel) -> f32 {
+    (model.max_after_miss() as f32).next_up()
 }
 
 impl Default for Palette {
@@ -64,7 +64,7 @@ impl Palette {
         let model = SensorModel::default();
         Self {
             model,
-            most_after_miss: most_after_miss(&model),
+            max_after_miss: max_after_miss(&model),
             evidence: vec![Evidence::PRIOR],
             next: vec![Next::default()],
             values: vec![f32::NEG_INFINITY],
@@ -76,7 +76,7 @@ impl Palette {
     }
 
     /// Creates a palette with the largest limit, until [`limit_by_use`](Self::limit_by_use) is called.
-    pub(crate) fn with_all_room() -> Self {
+    pub(crate) fn with_max_limit() -> Self {
         Self::limited(MAX_STATES, MAX_STATES)
     }
 
@@ -94,15 +94,15 @@ impl Palette {
     pub(crate) fn use_model(&mut self, model: &SensorModel) {
         if self.model != *model {
             self.model = *model;
-            self.most_after_miss = most_after_miss(model);
+            self.max_after_miss = max_after_miss(model);
             self.next.fill(Next::default());
         }
     }
 
     /// Largest log-odds that a miss can lead to, unless they were larger before.
     #[inline]
-    pub(crate) fn most_after_miss(&self) -> f32 {
-        self.most_after_miss
+    pub(crate) fn max_after_miss(&self) -> f32 {
+        self.max_after_miss
     }
 
     /// Number of states, including the unknown state.

@@ -8,7 +8,7 @@ use crate::sensor::{Evidence, Observation, SensorModel};
 use crate::space::{BrickCode, MortonCode, VoxelIndex, VoxelKey, place_of_voxel};
 
 /// Number of bricks that are updated together, stage by stage.
-const TOGETHER: usize = 16;
+const GROUP_SIZE: usize = 16;
 
 impl Table {
     /// Applies updates of any form; `first` is the tile's lowest voxel.
@@ -34,15 +34,15 @@ impl Table {
     /// the CPU then waits for the cache lines of many bricks at once.
     pub fn update_bricks(&mut self, model: &SensorModel, updates: &[BrickUpdate]) {
         self.palette.use_model(model);
-        let mut numbers = [None; TOGETHER];
-        for updates in updates.chunks(TOGETHER) {
+        let mut numbers = [None; GROUP_SIZE];
+        for updates in updates.chunks(GROUP_SIZE) {
             for (number, update) in numbers.iter_mut().zip(updates) {
                 let is_empty = (0..8).fold(0, |all, word| all | update.hits[word] | update.misses[word]) == 0;
                 *number = (!is_empty).then(|| self.number_of(update.brick));
             }
             let present = numbers[..updates.len()].iter().flatten();
-            present.clone().for_each(|&number| self.bricks[number].look_at_storage());
-            present.clone().for_each(|&number| self.bricks[number].look_at_cells());
+            present.clone().for_each(|&number| self.bricks[number].prefetch_storage());
+            present.clone().for_each(|&number| self.bricks[number].prefetch_cells());
             for (number, update) in numbers.iter().zip(updates) {
                 if let Some(number) = *number {
                     self.update_rest(number, &mut Rest::of(update));
@@ -56,12 +56,12 @@ impl Table {
         self.palette.use_model(model);
         let mut known = MissRuns::new();
         let mut bricks = runs.bricks().peekable();
-        let mut some = Vec::with_capacity(TOGETHER);
+        let mut some = Vec::with_capacity(GROUP_SIZE);
         while bricks.peek().is_some() {
             some.clear();
-            some.extend(bricks.by_ref().take(TOGETHER).map(|runs| (self.number_of(runs.brick), runs)));
-            some.iter().for_each(|&(number, _)| self.bricks[number].look_at_storage());
-            some.iter().for_each(|&(number, _)| self.bricks[number].look_at_cells());
+            some.extend(bricks.by_ref().take(GROUP_SIZE).map(|runs| (self.number_of(runs.brick), runs)));
+            some.iter().for_each(|&(number, _)| self.bricks[number].prefetch_storage());
+            some.iter().for_each(|&(number, _)| self.bricks[number].prefetch_cells());
             some.iter().for_each(|&(number, runs)| self.update_runs_at(number, runs, &mut known));
         }
     }
@@ -110,7 +110,7 @@ impl Table {
     }
 
     /// As [`Table::update_in_order`]; passes each update's voxel and resulting log-odds to `visit`.
-    pub(crate) fn update_in_order_and_tell(
+    pub(crate) fn update_in_order_with(
         &mut self,
         model: &SensorModel,
         first: VoxelIndex,

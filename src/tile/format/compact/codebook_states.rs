@@ -48,7 +48,7 @@ impl CodebookStates {
     /// Returns all states as a palette, in which they are numbered from 1.
     pub(super) fn palette(&self) -> Result<Palette, FormatError> {
         let wrong = |reason| FormatError::at_offset(self.offset, reason);
-        let mut palette = Palette::with_all_room();
+        let mut palette = Palette::with_max_limit();
         for number in 0..self.len() {
             match palette.intern(self.state(number).map_err(wrong)?) {
                 Ok(id) if usize::from(id) == number + 1 => {}

@@ -25,7 +25,7 @@ pub(super) struct Columns {
 }
 
 /// Limits for the size of a group.
-pub(super) struct Room {
+pub(super) struct GroupLimits {
     pub(super) bricks: usize,
     pub(super) voxels: usize,
 }
@@ -34,15 +34,15 @@ impl Columns {
     /// Reads the next group.
     pub(super) fn read(
         &mut self,
-        room: &Room,
+        limits: &GroupLimits,
         column_reader: &mut ColumnReader,
         input: &mut Input<impl Read>,
     ) -> Result<(), DecodeError> {
         /// Size of the largest step in bytes.
         const STEP_BYTES: usize = 6;
         self.offset = input.offset;
-        let bricks = input.number("bricks of a group", GROUP_BRICKS.min(room.bricks))?;
-        let voxels = room.voxels.min(MAX_GROUP_VOXELS).min(bricks * BRICK_VOXELS);
+        let bricks = input.number("bricks of a group", GROUP_BRICKS.min(limits.bricks))?;
+        let voxels = limits.voxels.min(MAX_GROUP_VOXELS).min(bricks * BRICK_VOXELS);
         self.bricks = bricks;
         let column = |name, most, bytes| Column { name, most, bytes };
         column_reader.take_columns(

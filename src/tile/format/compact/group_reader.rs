@@ -1,5 +1,5 @@
 use super::column_reader::ColumnReader;
-use super::group_columns::{Columns, Rest, Room};
+use super::group_columns::{Columns, GroupLimits, Rest};
 use super::group_index::AnnouncedGroup;
 use super::header::Header;
 use super::input::Input;
@@ -47,8 +47,8 @@ impl<'a, T: TakeBricks> GroupReader<'a, T> {
         input: &mut Input<impl Read>,
     ) -> Result<(), DecodeError> {
         let Header { bricks, voxels, .. } = *self.header;
-        let room = Room { bricks: bricks - self.bricks, voxels: voxels - self.voxels };
-        columns.read(&room, column_reader, input)?;
+        let limits = GroupLimits { bricks: bricks - self.bricks, voxels: voxels - self.voxels };
+        columns.read(&limits, column_reader, input)?;
         if let Some(AnnouncedGroup { bytes, crc, .. }) = announced {
             input.end_part_as("group", bytes, crc)?;
         }

@@ -35,7 +35,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_come_back_and_have_one_spelling() {
+    fn numbers_round_trip_and_have_one_encoding() {
         for number in (0..64).flat_map(|bit| [(1_u64 << bit) - 1, 1 << bit, u64::MAX - (1 << bit)]) {
             let mut bytes = Vec::new();
             put_number(number, &mut bytes);

@@ -1,14 +1,14 @@
 use super::column_reader::ColumnReader;
 use super::group_columns::Columns;
+use super::group_filter::GroupFilter;
 use super::group_reader::{GroupReader, TakeBricks};
-use super::group_sieve::GroupSieve;
 use super::head::Head;
 use super::input::Input;
 use super::table_builder::TableBuilder;
 use crate::error::DecodeError;
 use crate::space::VoxelBox;
 use crate::tile::Table;
-use crate::tile::format::gather::SiftedVoxels;
+use crate::tile::format::gather::FilteredVoxels;
 use crate::tile::table::Palette;
 use std::io::{self, Read};
 
@@ -89,11 +89,11 @@ pub fn read_compact(input: &mut impl Read, bytes: u64, voxels: &VoxelBox) -> Res
 /// # Errors
 ///
 /// Fails as [`CompactReader::read`].
-pub(in crate::tile::format) fn sift_compact(
+pub(in crate::tile::format) fn filter_compact(
     input: &mut impl Read,
     bytes: u64,
     voxels: &VoxelBox,
     from: f64,
-) -> Result<SiftedVoxels, DecodeError> {
-    CompactReader::new()?.read_into(input, bytes, voxels, |palette| GroupSieve::new(palette, from))
+) -> Result<FilteredVoxels, DecodeError> {
+    CompactReader::new()?.read_into(input, bytes, voxels, |palette| GroupFilter::new(palette, from))
 }

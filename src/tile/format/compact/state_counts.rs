@@ -10,7 +10,7 @@ pub(super) struct StateCounts {
     /// For states that are not in the palette.
     pub(super) others: FxHashMap<StateKey, u32>,
     /// Number of further states that can be counted.
-    room: usize,
+    remaining: usize,
 }
 
 /// Bits of a state.
@@ -39,7 +39,7 @@ impl From<StateKey> for Evidence {
 impl StateCounts {
     pub(super) fn of(table: &Table) -> Self {
         let interned = vec![0; table.palette.len()];
-        let mut all = Self { interned, others: FxHashMap::default(), room: MAX_COUNTED };
+        let mut all = Self { interned, others: FxHashMap::default(), remaining: MAX_COUNTED };
         if table.bricks.iter().all(|brick| matches!(brick.evidence, Storage::Interned(_))) {
             // All are counted, so the order is irrelevant.
             let mut counts = vec![[0; LANES]; table.palette.len()];
@@ -66,8 +66,8 @@ impl StateCounts {
 
     fn count_interned(&mut self, state: StateId) {
         let count = &mut self.interned[usize::from(state)];
-        if *count > 0 || self.room > 0 {
-            self.room -= usize::from(*count == 0);
+        if *count > 0 || self.remaining > 0 {
+            self.remaining -= usize::from(*count == 0);
             *count += 1;
         }
     }
@@ -75,8 +75,8 @@ impl StateCounts {
     fn count_other(&mut self, evidence: Evidence) {
         if let Some(count) = self.others.get_mut(&evidence.into()) {
             *count += 1;
-        } else if self.room > 0 {
-            self.room -= 1;
+        } else if self.remaining > 0 {
+            self.remaining -= 1;
             self.others.insert(evidence.into(), 1);
         }
     }

@@ -51,7 +51,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_state_has_its_symbol_and_no_symbol_two_states() {
+    fn states_and_symbols_correspond_one_to_one() {
         for states in [0, 1, 254, 255, 256, 509, 510, 511, 5000, MAX_STATES] {
             let symbols = Symbols::of(states);
             assert!(symbols.first_prefix >= 128);

@@ -1,7 +1,7 @@
 //! Tables of every kind survive the compact form bit by bit; damaged input is an error.
 
 use super::{
-    CompactEffort, CompactIndex, CompactReader, CompactWriter, read_compact, sift_compact, write_compact,
+    CompactEffort, CompactIndex, CompactReader, CompactWriter, filter_compact, read_compact, write_compact,
 };
 use crate::error::{DecodeError, FormatError};
 use crate::sensor::Evidence;
@@ -92,11 +92,11 @@ fn read(bytes: &[u8], tile: &VoxelBox) -> Result<Table, FormatError> {
     };
     let table = read_compact(&mut &bytes[..], bytes.len() as u64, tile).map_err(format_error);
     for from in [f64::NEG_INFINITY, -1.0, 0.0, f64::MAX] {
-        let sifted = sift_compact(&mut &bytes[..], bytes.len() as u64, tile, from).map_err(format_error);
-        match (&table, sifted) {
-            (Ok(table), Ok(sifted)) => assert!(table.iter_from(from).eq(sifted)),
-            (Err(table), Err(sifted)) => assert_eq!(*table, sifted),
-            (_, sifted) => panic!("{sifted:?}"),
+        let filtered = filter_compact(&mut &bytes[..], bytes.len() as u64, tile, from).map_err(format_error);
+        match (&table, filtered) {
+            (Ok(table), Ok(filtered)) => assert!(table.iter_from(from).eq(filtered)),
+            (Err(table), Err(filtered)) => assert_eq!(*table, filtered),
+            (_, filtered) => panic!("{filtered:?}"),
         }
     }
     if let Ok(table) = &table {
@@ -131,7 +131,7 @@ fn assert_is(table: &Table, voxels: &Voxels) {
 }
 
 #[test]
-fn tables_come_back_to_the_bit_and_equal_ones_have_equal_bytes() {
+fn tables_round_trip_and_equal_tables_have_equal_bytes() {
     let mut random = Random::of(7, &[]);
     let mut plain = 0;
     for _ in 0..150 {
@@ -152,7 +152,7 @@ fn tables_come_back_to_the_bit_and_equal_ones_have_equal_bytes() {
 
 /// A tile whose voxels have more states than fit in a palette, some of them twice.
 #[test]
-fn bricks_that_do_without_the_palette_come_back() {
+fn plain_bricks_round_trip() {
     let mut random = Random::of(8, &[]);
     let tile = VoxelBox { min: [0; 3], end: [50; 3] };
     let states: Vec<_> = (0..90_000).map(|_| any_state(&mut random, 3)).collect();
@@ -175,7 +175,7 @@ fn bricks_that_do_without_the_palette_come_back() {
 }
 
 #[test]
-fn what_is_read_goes_on_as_any_table() {
+fn decoded_tables_can_be_updated() {
     use crate::sensor::{Observation, SensorModel};
     let mut random = Random::of(9, &[]);
     let tile = VoxelBox { min: [0; 3], end: [16; 3] };
@@ -214,7 +214,7 @@ fn assert_is_voxel_by_voxel(bytes: &[u8], tile: &VoxelBox, voxels: &Voxels) {
 }
 
 #[test]
-fn a_voxel_is_read_from_its_group_alone() {
+fn single_voxels_are_read_from_their_groups() {
     let mut random = Random::of(10, &[]);
     for _ in 0..40 {
         let mut tile = any_tile(&mut random);
@@ -250,7 +250,7 @@ fn a_voxel_is_read_from_its_group_alone() {
 
 /// Reading one voxel verifies its parts against the checksum of the whole.
 #[test]
-fn every_wrong_bit_before_the_groups_and_in_the_group_is_noticed() {
+fn flipped_bits_are_detected_when_reading_one_voxel() {
     let (tile, table) = small();
     let bytes = written(&table, CompactEffort::Fast);
     let (&code, _) =
@@ -303,7 +303,7 @@ impl std::io::Write for FullDisk {
 }
 
 #[test]
-fn writers_and_readers_are_as_new_after_each_table_and_each_failure() {
+fn writers_and_readers_can_be_reused_after_failures() {
     let mut random = Random::of(4, &[]);
     let (mut writer, mut reader) =
         (CompactWriter::new(CompactEffort::Fast).unwrap(), CompactReader::new().unwrap());
@@ -354,7 +354,7 @@ fn three_groups() -> (VoxelBox, Table) {
 
 /// With valid checksums: groups must match the index, also when one group is read alone.
 #[test]
-fn an_index_that_does_not_fit_its_groups_is_an_error() {
+fn an_index_that_does_not_match_its_groups_is_an_error() {
     let (tile, table) = three_groups();
     let bytes = written(&table, CompactEffort::Fast);
     read(&bytes, &tile).unwrap();
@@ -392,7 +392,7 @@ fn an_index_that_does_not_fit_its_groups_is_an_error() {
 }
 
 #[test]
-fn every_truncation_and_every_wrong_bit_is_an_error() {
+fn truncations_and_flipped_bits_are_errors() {
     let (tile, table) = small();
     let bytes = written(&table, CompactEffort::Small);
     assert!(read(&bytes, &tile).is_ok());
@@ -417,7 +417,7 @@ fn hostile_bytes_are_an_error_or_a_table_of_the_tile() {
     hostile_bytes_of(three_groups(), 1_000, 25);
 }
 
-fn hostile_bytes_of((tile, table): (VoxelBox, Table), times: usize, least_read_well: usize) {
+fn hostile_bytes_of((tile, table): (VoxelBox, Table), times: usize, min_read_well: usize) {
     let bytes = written(&table, CompactEffort::Fast);
     let mut random = Random::of(3, &[]);
     let (mut refused, mut read_well) = (0, 0);
@@ -440,11 +440,11 @@ fn hostile_bytes_of((tile, table): (VoxelBox, Table), times: usize, least_read_w
         assert!(voxels.values().all(is_evidence));
         assert_is(&read(&written(&table, CompactEffort::Fast), &tile).unwrap(), &voxels);
     }
-    assert!(refused > times / 4 && read_well > least_read_well, "{refused} {read_well}");
+    assert!(refused > times / 4 && read_well > min_read_well, "{refused} {read_well}");
 }
 
 #[test]
-fn what_is_wrong_is_said_where_it_is() {
+fn errors_have_the_offset_of_their_cause() {
     let (tile, table) = small();
     let bytes = written(&table, CompactEffort::Fast);
     let wrong = |at: usize, with: &[u8]| {
@@ -478,7 +478,7 @@ fn what_is_wrong_is_said_where_it_is() {
 }
 
 #[test]
-fn an_empty_table_and_a_full_brick_have_their_bytes() {
+fn an_empty_table_and_a_full_brick_have_fixed_bytes() {
     let tile = VoxelBox { min: [0; 3], end: [8; 3] };
     let empty = written(&Table::default(), CompactEffort::Fast);
     assert_eq!(empty.len(), 42);

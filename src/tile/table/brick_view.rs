@@ -5,12 +5,12 @@ use crate::space::BrickMask;
 
 /// View of a brick of a table, for reading many of its voxels.
 #[derive(Clone, Copy)]
-pub(crate) struct BrickLook<'a> {
+pub(crate) struct BrickView<'a> {
     pub(super) brick: &'a Brick,
     pub(super) palette: &'a Palette,
 }
 
-impl BrickLook<'_> {
+impl BrickView<'_> {
     /// Evidence of a voxel by its position; `None` if it was never observed.
     #[inline]
     pub(crate) fn get(&self, place: usize) -> Option<Evidence> {
@@ -33,7 +33,7 @@ impl BrickLook<'_> {
         self.brick.mask_from(log_odds, self.palette)
     }
 
-    /// One word of [`BrickLook::mask_from`]: an octant of the brick.
+    /// One word of [`BrickView::mask_from`]: an octant of the brick.
     pub(crate) fn word_from(&self, word: usize, log_odds: f64) -> u64 {
         self.brick.word_from(word, log_odds, self.palette)
     }

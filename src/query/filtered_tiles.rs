@@ -10,7 +10,7 @@ const MAX_VOXELS: u64 = 1 << 18;
 const MAX_TILES: usize = 64;
 
 /// Upper bound on the number of a tile's voxels with log-odds of at least `from`, known without reading it.
-fn most_from(view: &impl MapView, tile: TileIndex, from: f64) -> Option<u64> {
+fn max_count_from(view: &impl MapView, tile: TileIndex, from: f64) -> Option<u64> {
     let version = view.version_of_tile(tile)?;
     Some(if from >= view.config().occupied_log_odds() { version.occupied } else { version.voxels })
 }
@@ -18,10 +18,10 @@ fn most_from(view: &impl MapView, tile: TileIndex, from: f64) -> Option<u64> {
 /// Returns the first of `tiles` that are read together; empty if the first one has too many voxels or an unknown
 /// number.
 fn first_together<'a>(view: &impl MapView, tiles: &'a [TileIndex], from: f64) -> &'a [TileIndex] {
-    let mut room = MAX_VOXELS;
+    let mut budget = MAX_VOXELS;
     let fits = |&&tile: &&TileIndex| {
-        let left = most_from(view, tile, from).and_then(|most| room.checked_sub(most));
-        room = left.unwrap_or(0);
+        let left = max_count_from(view, tile, from).and_then(|most| budget.checked_sub(most));
+        budget = left.unwrap_or(0);
         left.is_some()
     };
     &tiles[..tiles.iter().take(MAX_TILES).take_while(fits).count()]

@@ -9,13 +9,13 @@ use crate::store::{CatalogEntry, SideFolder, TileStore};
 /// while the map's own mapper continues. The map then [takes over](super::Remapper::take_over) its tiles and scan
 /// entries.
 #[derive(Debug)]
-pub(crate) struct SideMapper {
+pub(crate) struct ShadowMapper {
     mapper: OutOfCoreTileMapper,
     /// Declared after the mapper, so that the folder is removed once its files are closed.
     _folder: SideFolder,
 }
 
-impl SideMapper {
+impl ShadowMapper {
     /// Begins an empty shadow map in `MAP.remapped` next to the map; the remains of an earlier attempt are removed.
     ///
     /// # Errors
@@ -39,7 +39,7 @@ impl SideMapper {
         scan: &KeptScan,
         selection: Option<&TileSelection>,
     ) -> Result<(ScanReport, Vec<TileIndex>)> {
-        self.mapper.map_again(scan.number(), scan, scan.rays(), selection)
+        self.mapper.replay_scan(scan.number(), scan, scan.rays(), selection)
     }
 
     /// Records the catalog entry of a scan; entries are added in the order of their numbers.
@@ -49,7 +49,7 @@ impl SideMapper {
 
     /// Commits the replayed tiles and entries up to the scan of this number.
     pub(crate) fn commit(&mut self, scan_number: u64) -> Result<()> {
-        self.mapper.commit_again(scan_number, false)
+        self.mapper.commit_replay(scan_number, false)
     }
 
     /// The committed store, for the map to take over.

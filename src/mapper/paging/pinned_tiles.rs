@@ -1,5 +1,5 @@
 use super::flusher::FlushedTile;
-use super::held_tile::HeldTile;
+use super::pinned_tile::PinnedTile;
 use super::unapplied_tile::UnappliedTile;
 use crate::persistence::CompactTile;
 use crate::space::{TileIndex, hash_table_bytes};
@@ -12,8 +12,8 @@ use std::sync::Arc;
 /// old one (copy on write), which then counts as additional memory. To avoid this delay in the next scan, the flush
 /// copies in advance the tiles that it will change. If a tile is evicted meanwhile, the flush keeps its compact form.
 #[derive(Debug, Default)]
-pub(super) struct Flight {
-    tiles: FxHashMap<TileIndex, FlightTile>,
+pub(super) struct PinnedTiles {
+    tiles: FxHashMap<TileIndex, PinnedEntry>,
     /// Bytes of memory of tiles that only the flush holds.
     own_bytes: usize,
     /// Bytes of memory of its lists and of one tile that it builds.
@@ -27,13 +27,13 @@ pub(super) struct Flight {
 
 /// Number of tiles that a flush writes, by the form in which it holds them.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct FlightSize {
+pub(super) struct FlushSize {
     pub(super) resident: usize,
     pub(super) compact: usize,
     pub(super) unapplied: usize,
 }
 
-impl FlightSize {
+impl FlushSize {
     /// Bytes of memory of the lists without the tiles; for small tiles the lists are larger.
     pub(super) fn bytes(self) -> usize {
         /// Overhead of the allocator per block.
@@ -42,24 +42,24 @@ impl FlightSize {
         const COUNTS: usize = 16;
         let all = self.resident + self.compact + self.unapplied;
         // A list or table that has just grown is half empty.
-        let slots = 2 * (size_of::<FlushedTile>() + hash_table_bytes::<(TileIndex, FlightTile)>(1));
+        let slots = 2 * (size_of::<FlushedTile>() + hash_table_bytes::<(TileIndex, PinnedEntry)>(1));
         all * slots
-            + self.resident * (size_of::<HeldTile>() + COUNTS + BLOCK)
+            + self.resident * (size_of::<PinnedTile>() + COUNTS + BLOCK)
             + self.unapplied * (UnappliedTile::OWN_BYTES + BLOCK)
     }
 }
 
 #[derive(Debug)]
-struct FlightTile {
+struct PinnedEntry {
     bytes: usize,
     is_shared: bool,
     /// The tile to write, if it was resident when the flush began.
-    held: Option<Arc<HeldTile>>,
+    held: Option<Arc<PinnedTile>>,
     /// Whether the cache may hold another version by now.
     has_changed: bool,
 }
 
-impl Flight {
+impl PinnedTiles {
     /// Creates the record of a flush of `tiles`, and of others that are being saved. `other_bytes` is the memory of its
     /// lists and of one tile that it builds.
     pub(super) fn of<'a>(
@@ -67,7 +67,7 @@ impl Flight {
         other_bytes: usize,
         saving: Vec<(TileIndex, CompactTile)>,
     ) -> Self {
-        let tiles = tiles.map(|tile| (tile.index(), FlightTile::of(tile))).collect();
+        let tiles = tiles.map(|tile| (tile.index(), PinnedEntry::of(tile))).collect();
         Self { tiles, other_bytes, saving, ..Self::default() }
     }
 
@@ -141,7 +141,7 @@ impl Flight {
     }
 
     /// Records that the cache has changed or dropped a tile. A tile that was only packed into the compact form has not
-    /// changed ([`Flight::note_packed`]).
+    /// changed ([`PinnedTiles::note_packed`]).
     pub(super) fn note_changed(&mut self, index: TileIndex) {
         self.note_own(index);
         if let Some(tile) = self.tiles.get_mut(&index) {
@@ -161,7 +161,7 @@ impl Flight {
     }
 }
 
-impl FlightTile {
+impl PinnedEntry {
     fn of(tile: &FlushedTile) -> Self {
         let held = match tile {
             FlushedTile::Resident(held) => Some(held.clone()),

@@ -16,19 +16,19 @@ impl ScanTracer {
     /// # Errors
     ///
     /// Fails for each scan as [`ScanTracer::trace`].
-    pub(crate) fn trace_beside(
+    pub(crate) fn trace_concurrently(
         &mut self,
         rules: TraceRules<'_>,
         scans: &[&dyn ScanPoints],
     ) -> Vec<Result<Option<ScanUpdates>>> {
         let selection = rules.selection();
         let rules = rules.with_selection(selection.as_deref());
-        let most_threads = (rayon::current_num_threads() / scans.len().max(1)).max(1);
-        let mut tracers = self.divided(scans.len(), most_threads);
+        let max_threads = (rayon::current_num_threads() / scans.len().max(1)).max(1);
+        let mut tracers = self.divided(scans.len(), max_threads);
         let traced = tracers
             .par_iter_mut()
             .zip(scans)
-            .map(|(tracer, scan)| tracer.trace_whole(rules, *scan, most_threads))
+            .map(|(tracer, scan)| tracer.trace_whole(rules, *scan, max_threads))
             .collect();
         for mut tracer in tracers {
             self.per_scan.append(&mut tracer.per_scan);
@@ -44,7 +44,7 @@ impl ScanTracer {
     }
 
     /// Number of scans, of `scans` given ones, that may be traced concurrently.
-    pub(crate) fn count_beside(&self, scans: usize) -> usize {
+    pub(crate) fn max_concurrent(&self, scans: usize) -> usize {
         self.limit.collectors(scans.min(rayon::current_num_threads()))
     }
 
@@ -65,9 +65,9 @@ impl ScanTracer {
         &mut self,
         rules: TraceRules<'_>,
         scan: &dyn ScanPoints,
-        most_threads: usize,
+        max_threads: usize,
     ) -> Result<Option<ScanUpdates>> {
-        let scan_rays = ScanRays::new(rules, scan, most_threads, &self.stop)?;
+        let scan_rays = ScanRays::new(rules, scan, max_threads, &self.stop)?;
         let updates = match (rules.rays.insert_mode, self.limit.is_none()) {
             (InsertMode::PerScan, true) => scan_rays.per_scan(&mut self.per_scan)?,
             (InsertMode::PerScan, false) => {
