@@ -152,8 +152,8 @@ impl MapReader {
     ///
     /// # Errors
     ///
-    /// Fails as [`MapReader::open`], or with [`Error::Mismatch`] if the folder contains another map now. After an error
-    /// the reader still sees its earlier flush.
+    /// Same errors as [`MapReader::open`]; also fails with [`Error::Mismatch`] if the folder contains another map now.
+    /// After an error the reader still sees its earlier flush.
     pub fn refresh(&mut self) -> Result<bool> {
         if self.snapshot().is_some() {
             return Ok(false);
@@ -296,7 +296,7 @@ impl MapReader {
         self.kept_summary_with(|_| Ok(()))
     }
 
-    /// As [`Self::kept_summary`]; also passes each record to `each`.
+    /// Like [`Self::kept_summary`]; also passes each record to `each`.
     pub(crate) fn kept_summary_with(
         &self,
         each: impl FnMut(&KeptRecord) -> Result<()>,

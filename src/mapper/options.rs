@@ -109,7 +109,7 @@ impl MapOptions {
     ///
     /// # Errors
     ///
-    /// Fails as [`MapOptions::open_read_only`], or if there is no such snapshot or it is damaged.
+    /// Same errors as [`MapOptions::open_read_only`]; also fails if there is no such snapshot or it is damaged.
     pub fn open_snapshot(&self, map: impl Into<MapPath>, name: &SnapshotName) -> Result<MapReader> {
         MapReader::open_snapshot_within(map.into(), name, self.reader_memory())
     }

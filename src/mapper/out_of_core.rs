@@ -64,7 +64,7 @@ impl OutOfCoreTileMapper {
     ///
     /// # Errors
     ///
-    /// Fails as [`OutOfCoreTileMapper::create`].
+    /// Same errors as [`OutOfCoreTileMapper::create`].
     pub fn create_as(folder: impl Into<MapPath>, config: MapConfig, map_id: [u8; 16]) -> Result<Self> {
         let (disk, folder) = folder.into().into_parts();
         let folder = &*folder;
@@ -106,7 +106,7 @@ impl OutOfCoreTileMapper {
     ///
     /// # Errors
     ///
-    /// Fails as [`Mapper::flush`].
+    /// Same errors as [`Mapper::flush`].
     pub fn begin_input(&mut self, input: impl Into<InputRecord>) -> Result<()> {
         let mut input = InputRecord { first_scan: self.scan_number(), ..input.into() };
         input.cut_name();
@@ -119,7 +119,7 @@ impl OutOfCoreTileMapper {
     /// # Errors
     ///
     /// Fails with [`Error::Mismatch`] if the map was last built from another input, or with other ranges or another
-    /// insert mode; otherwise as [`Mapper::flush`].
+    /// insert mode. Otherwise same errors as [`Mapper::flush`].
     pub fn resume_input(&mut self, name: &str) -> Result<u64> {
         let scan_number = self.scan_number();
         let last = self.pager().inputs().last().cloned();
@@ -179,7 +179,8 @@ impl OutOfCoreTileMapper {
     ///
     /// # Errors
     ///
-    /// Fails with [`Error::AlreadyExists`] if there is a snapshot of this name; otherwise as [`Mapper::flush`].
+    /// Fails with [`Error::AlreadyExists`] if there is a snapshot of this name. Otherwise same errors as
+    /// [`Mapper::flush`].
     pub fn snapshot(&mut self, name: &SnapshotName) -> Result<()> {
         self.flush()?;
         self.pager().create_snapshot(name)
@@ -357,7 +358,7 @@ impl OutOfCoreTileMapper {
     ///
     /// # Errors
     ///
-    /// Fails as [`Mapper::batch_update`], if points cannot be read, or with [`Error::Stopped`].
+    /// Same errors as [`Mapper::batch_update`]; also fails if points cannot be read, or with [`Error::Stopped`].
     pub fn insert_hits(&mut self, scan: &dyn ScanPoints) -> Result<ScanReport> {
         let (report, _) = self.accept_within_limit(|config, tracer, overflow| {
             updates_of_hits(config, scan, tracer.stop(), overflow)

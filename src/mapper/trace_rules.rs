@@ -8,7 +8,7 @@ pub(super) fn trace_rules<'a>(config: &'a MapConfig, tiles: Option<&'a TileSelec
     let MapConfig { grid, sensor_model: model, rays, .. } = config;
     let order = match config.octree {
         OctreeConfig::Bricks => UpdateOrder::OfVoxels,
-        // The purpose of a voxel cache, and of the mode it is compared with, is the order in which rays update voxels.
+        // The voxel cache, and the mode that it is compared with, depend on the order in which rays update voxels.
         OctreeConfig::Pointers(_) => UpdateOrder::OfRays,
     };
     let mapped = MappedTiles { grid, selection: tiles };

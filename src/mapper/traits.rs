@@ -50,7 +50,7 @@ pub trait MapView: Sync {
     /// Fails if the tile cannot be read, or an evicted one cannot be written.
     fn tile(&self, index: TileIndex) -> Result<Option<TileRef<'_>>>;
 
-    /// As [`MapView::tile`], for operations on the whole map: the tile is not cached and evicts no others.
+    /// Like [`MapView::tile`], for operations on the whole map: the tile is not cached and evicts no others.
     ///
     /// # Errors
     ///
@@ -72,7 +72,7 @@ pub trait MapView: Sync {
     ///
     /// # Errors
     ///
-    /// Fails as [`MapView::tile`].
+    /// Same errors as [`MapView::tile`].
     fn evidence(&self, voxel: VoxelIndex) -> Result<Option<Evidence>> {
         let tile = self.tile(self.config().grid.tile_of_voxel(voxel))?;
         Ok(tile.and_then(|tile| tile.evidence(voxel)))
@@ -133,7 +133,7 @@ pub trait Mapper: MapView + Send {
     ///
     /// # Errors
     ///
-    /// Fails as [`Mapper::insert_points`].
+    /// Same errors as [`Mapper::insert_points`].
     fn insert_points_in(&mut self, scan: &dyn ScanPoints, tiles: &TileSelection) -> Result<ScanReport>;
 
     /// Inserts scans in order. The map is bit-identical to that after inserting them one by one. Scans that are passed
@@ -142,7 +142,7 @@ pub trait Mapper: MapView + Send {
     ///
     /// # Errors
     ///
-    /// Fails as [`Mapper::insert_points`]. Scans before the failed one are in the map, and have reports.
+    /// Same errors as [`Mapper::insert_points`]. Scans before the failed one are in the map, and have reports.
     fn insert_all(&mut self, scans: &[&dyn ScanPoints], reports: &mut Vec<ScanReport>) -> Result<()> {
         for scan in scans {
             reports.push(self.insert_points(*scan)?);
@@ -150,11 +150,11 @@ pub trait Mapper: MapView + Send {
         Ok(())
     }
 
-    /// As [`Mapper::insert_points`], for a [`Scan`].
+    /// Like [`Mapper::insert_points`], for a [`Scan`].
     ///
     /// # Errors
     ///
-    /// Fails as [`Mapper::insert_points`].
+    /// Same errors as [`Mapper::insert_points`].
     fn insert_scan(&mut self, scan: &Scan) -> Result<ScanReport> {
         self.insert_points(scan)
     }

@@ -48,7 +48,7 @@ pub(super) fn collision<V: MapView + ?Sized>(
 ///
 /// # Errors
 ///
-/// Fails if the body is invalid or covers too many voxels; returns errors of `occupancy`.
+/// Fails if the body is invalid or covers too many voxels; returns errors from `occupancy`.
 pub(crate) fn first_not_free(
     grid: &Grid,
     body: &Shape,

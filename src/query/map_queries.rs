@@ -28,7 +28,7 @@ pub trait MapQueries: MapView + Sized {
     ///
     /// # Errors
     ///
-    /// Fails as [`MapQueries::voxel_at`].
+    /// Same errors as [`MapQueries::voxel_at`].
     fn evidence_at_points(&self, points: &[Point]) -> Result<Vec<Option<Evidence>>> {
         point::evidence_at_points(self, points)
     }
@@ -134,7 +134,7 @@ pub trait MapQueries: MapView + Sized {
     ///
     /// # Errors
     ///
-    /// Fails if a voxel is outside OctoMap's key range; returns errors of the spool or of `out`.
+    /// Fails if a voxel is outside OctoMap's key range; returns errors from the spool or `out`.
     fn write_octree<E: From<Error> + From<io::Error>>(
         &self,
         export: &OctreeExport<'_>,

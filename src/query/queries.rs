@@ -64,7 +64,7 @@ pub trait Queries: Sync {
     /// Fails if the origin is outside of the map's space, the direction is zero or the range is invalid.
     fn cast_ray(&self, ray: &RayQuery) -> Result<Option<Hit>>;
 
-    /// As [`Queries::cast_ray`], between two points, including the voxels of both.
+    /// Like [`Queries::cast_ray`], between two points, including the voxels of both.
     ///
     /// # Errors
     ///
@@ -111,7 +111,7 @@ pub trait Queries: Sync {
     ///
     /// # Errors
     ///
-    /// Fails as [`Queries::cast_ray`]; of several errors, that of the first ray is returned.
+    /// Same errors as [`Queries::cast_ray`]; of several errors, that of the first ray is returned.
     fn cast_rays(&self, rays: &[RayQuery]) -> Result<Vec<Option<Hit>>> {
         on_all_cores(rays, |ray| self.cast_ray(ray))
     }

@@ -97,7 +97,7 @@ pub(super) fn tiles_in<V: MapView + ?Sized>(view: &V, voxels: &VoxelBox) -> Vec<
     tiles_of_list_in(view, voxels, &mut None)
 }
 
-/// As [`tiles_in`], for several boxes: if the tiles of the map have to be listed, the list is stored in `all` for
+/// Like [`tiles_in`], for several boxes: if the tiles of the map have to be listed, the list is stored in `all` for
 /// reuse.
 pub(super) fn tiles_of_list_in<V: MapView + ?Sized>(
     view: &V,

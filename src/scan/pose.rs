@@ -64,11 +64,11 @@ impl Pose {
         Self::of_matrix(rows).map_err(wrong)
     }
 
-    /// As [`Pose::from_quaternion`], but the error is the reason as text.
+    /// Like [`Pose::from_quaternion`], but the error is the reason as text.
     ///
     /// # Errors
     ///
-    /// Fails as [`Pose::from_quaternion`].
+    /// Same errors as [`Pose::from_quaternion`].
     pub fn of_quaternion(position_m: Point, [x, y, z, w]: [f64; 4]) -> std::result::Result<Self, String> {
         check_finite(position_m.iter().chain(&[x, y, z, w]))?;
         let quaternion = Quaternion::new(w, x, y, z);
@@ -79,11 +79,11 @@ impl Pose {
         Ok(Self { world_from_sensor: Isometry3::from_parts(Translation3::from(position_m), rotation) })
     }
 
-    /// As [`Pose::from_matrix`], but the error is the reason as text.
+    /// Like [`Pose::from_matrix`], but the error is the reason as text.
     ///
     /// # Errors
     ///
-    /// Fails as [`Pose::from_matrix`].
+    /// Same errors as [`Pose::from_matrix`].
     pub fn of_matrix(rows: &[[f64; 4]]) -> std::result::Result<Self, String> {
         check_finite(rows.iter().flatten())?;
         let ([[a, b, c, x], [d, e, f, y], [g, h, i, z]], last) = match *rows {

@@ -41,12 +41,12 @@ pub trait ScanPoints: Sync {
         None
     }
 
-    /// As [`ScanPoints::for_each_chunk`], but in the sensor frame if [`ScanPoints::world_from_sensor`] is known.
+    /// Like [`ScanPoints::for_each_chunk`], but in the sensor frame if [`ScanPoints::world_from_sensor`] is known.
     /// Transforming these points by the pose gives bit-identical world points.
     ///
     /// # Errors
     ///
-    /// Fails as [`ScanPoints::for_each_chunk`].
+    /// Same errors as [`ScanPoints::for_each_chunk`].
     fn for_each_own_chunk(&self, range: Range<usize>, take: &mut TakePoints<'_>) -> Result<()> {
         self.for_each_chunk(range, take)
     }

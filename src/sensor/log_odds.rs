@@ -45,7 +45,8 @@ impl LogOdds {
     ///
     /// # Errors
     ///
-    /// Fails with [`InvalidArgument`](crate::Error::InvalidArgument) for other numbers, and as [`LogOdds::validated`].
+    /// Fails with [`InvalidArgument`](crate::Error::InvalidArgument) for other numbers. Otherwise same errors as
+    /// [`LogOdds::validated`].
     pub fn from_probabilities(hit: f64, miss: f64, min: f64, max: f64) -> Result<Self> {
         Self { hit: logit(hit), miss: logit(miss), min: logit(min), max: logit(max) }.validated()
     }

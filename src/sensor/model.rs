@@ -44,7 +44,7 @@ impl SensorModel {
     ///
     /// # Errors
     ///
-    /// Fails as [`LogOdds::validated`] and [`Iwlo::validated`].
+    /// Same errors as [`LogOdds::validated`] and [`Iwlo::validated`].
     pub fn validated(self) -> Result<Self> {
         Ok(match self {
             Self::LogOdds(model) => Self::LogOdds(model.validated()?),

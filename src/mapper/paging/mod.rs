@@ -9,8 +9,8 @@
 //!
 //! A tile is resident, compact, or neither. A resident tile has no buffered updates: they are applied when it is
 //! loaded. `eviction` moves tiles towards the disk, `prefetch` loads tiles ahead of use, `flush` commits. A `Flusher`
-//! flushes in the background: it shares the tiles as of a scan with the cache, and a `PinnedTiles` counts the tiles that
-//! only the flush holds.
+//! flushes in the background: it shares the tiles as of a scan with the cache, and a `PinnedTiles` counts the tiles
+//! that only the flush holds.
 
 mod buffered_updates;
 mod compact_tiles;

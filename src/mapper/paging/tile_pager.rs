@@ -478,7 +478,7 @@ impl TilePager<'_> {
     ///
     /// # Errors
     ///
-    /// Fails as [`TilePager::upgrade`] for a map of the original format, or if threads cannot be started.
+    /// Same errors as [`TilePager::upgrade`] for a map of the original format; also fails if threads cannot be started.
     pub(in crate::mapper) fn open_to_readers(&mut self, bytes: usize) -> Result<TileReader> {
         self.upgrade()?;
         let threads = TileThreads::own(self.store().folder())?;

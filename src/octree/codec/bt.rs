@@ -118,7 +118,7 @@ fn read_node(
 ///
 /// # Errors
 ///
-/// Returns errors of `out`, and [`io::ErrorKind::InvalidInput`] if the resolution is not a positive, finite length.
+/// Returns errors from `out`, and [`io::ErrorKind::InvalidInput`] if the resolution is not a positive, finite length.
 pub fn write_bt(
     tree: &Octree,
     resolution_m: f64,
@@ -136,7 +136,7 @@ pub fn write_bt(
 ///
 /// # Errors
 ///
-/// Fails as [`write_bt`].
+/// Same errors as [`write_bt`].
 pub fn write_bt_unpruned(
     tree: &Octree,
     resolution_m: f64,

@@ -14,7 +14,7 @@ use std::io::{self, Write};
 ///
 /// # Errors
 ///
-/// Fails as [`write_bt`](super::write_bt).
+/// Same errors as [`write_bt`](super::write_bt).
 pub fn write_bt_of_bricks(
     bricks: &[BrickCode],
     nodes_of: impl Fn(usize) -> BrickNodes,

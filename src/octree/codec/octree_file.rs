@@ -65,7 +65,7 @@ pub fn read(input: impl BufRead) -> Result<OctreeFile, DecodeError> {
 ///
 /// # Errors
 ///
-/// Fails as [`read`], or with [`DecodeError::Format`] at the node that exceeds the limit.
+/// Same errors as [`read`]; also fails with [`DecodeError::Format`] at the node that exceeds the limit.
 pub fn read_with_limit(input: impl BufRead, max_bytes: usize) -> Result<OctreeFile, DecodeError> {
     read_format(input, None, max_bytes)
 }
@@ -74,7 +74,7 @@ pub fn read_with_limit(input: impl BufRead, max_bytes: usize) -> Result<OctreeFi
 ///
 /// # Errors
 ///
-/// Fails as [`read`], or if the file is an `.ot` file.
+/// Same errors as [`read`]; also fails if the file is an `.ot` file.
 pub fn read_bt(input: impl BufRead) -> Result<OctreeFile, DecodeError> {
     read_format(input, Some(OctreeFormat::Bt), usize::MAX)
 }
@@ -83,7 +83,7 @@ pub fn read_bt(input: impl BufRead) -> Result<OctreeFile, DecodeError> {
 ///
 /// # Errors
 ///
-/// Fails as [`read`], or if the file is a `.bt` file.
+/// Same errors as [`read`]; also fails if the file is a `.bt` file.
 pub fn read_ot(input: impl BufRead) -> Result<OctreeFile, DecodeError> {
     read_format(input, Some(OctreeFormat::Ot), usize::MAX)
 }

@@ -72,7 +72,7 @@ impl<S: Read + Write + Seek> OctreeStream<S> {
     ///
     /// # Errors
     ///
-    /// Returns errors of the spool.
+    /// Returns errors from the spool.
     pub fn add_block(&mut self, first: MortonCode, depth: u8, values: &mut BrickValues) -> io::Result<()> {
         if values.is_empty() {
             return Ok(());
@@ -111,7 +111,7 @@ impl<S: Read + Write + Seek> OctreeStream<S> {
     ///
     /// # Errors
     ///
-    /// Returns errors of the spool or of `out`, and [`io::ErrorKind::InvalidInput`] if the resolution is not a
+    /// Returns errors from the spool or `out`, and [`io::ErrorKind::InvalidInput`] if the resolution is not a
     /// positive, finite length.
     pub fn finish(self, resolution_m: f64, out: &mut impl Write) -> io::Result<StreamOutcome> {
         let Self { blocks, spool, voxels, .. } = self;

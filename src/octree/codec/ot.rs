@@ -66,7 +66,7 @@ fn read_node(
 ///
 /// # Errors
 ///
-/// Returns errors of `out`, and [`io::ErrorKind::InvalidInput`] if the resolution is not a positive, finite length.
+/// Returns errors from `out`, and [`io::ErrorKind::InvalidInput`] if the resolution is not a positive, finite length.
 pub fn write_ot(tree: &Octree, resolution_m: f64, out: &mut impl Write) -> io::Result<()> {
     // Buffered, because nodes have five bytes and `out` may be a file.
     let mut out = BufWriter::new(out);

@@ -26,7 +26,7 @@ impl PointBlocks {
     ///
     /// # Errors
     ///
-    /// Returns errors of `put`, and fails if memory is exhausted.
+    /// Returns errors from `put`, and fails if memory is exhausted.
     pub fn push(&mut self, points: &[Point], intensities: Option<&[f32]>, put: &mut Put<'_>) -> Result<()> {
         let mut at = 0;
         while at < points.len() {
@@ -51,7 +51,7 @@ impl PointBlocks {
     ///
     /// # Errors
     ///
-    /// Fails as [`PointBlocks::push`].
+    /// Same errors as [`PointBlocks::push`].
     pub fn end(&mut self, has_intensities: bool, put: &mut Put<'_>) -> Result<()> {
         if self.points.is_empty() {
             return Ok(());

@@ -9,7 +9,7 @@ const PLACES: [&[u8]; 3] = [&[0], &[7, 14, 4], &[1, 2, 3, 5, 6, 8, 9, 10, 11, 12
 /// Edges of the squares of cones by which prefixes are extended before each pass.
 const SQUARES: [&[usize]; 3] = [&[], &[8, 4, 2], &[4, 2, 1]];
 
-/// As `SQUARES`, for fewer than [`MANY_POINTS`]: such sparse rays share too little to justify the smallest squares.
+/// Like `SQUARES`, for fewer than [`MANY_POINTS`]: such sparse rays share too little to justify the smallest squares.
 const SQUARES_OF_FEW: [&[usize]; 3] = [&[], &[8, 4], &[4, 2]];
 
 /// About three rays per smallest square.

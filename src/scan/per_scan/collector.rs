@@ -132,7 +132,7 @@ impl PerScanCollector {
             .map(|page| size_of::<MarkedPage>() + page.heap_bytes())
             .sum();
         let bytes = pages_bytes + self.far.bytes() + self.intensities_bytes();
-        // A minimum is required, because otherwise the next ray would measure again.
+        // Requires a minimum of free bytes; otherwise the next ray would measure again.
         let least = new_bytes.max(self.max_small_bytes / 8);
         if bytes + least <= self.max_small_bytes {
             return self.allowance.grant(self.max_small_bytes - bytes);

@@ -75,7 +75,7 @@ impl<'a> SlabRay<'a> {
         self.for_each_from(self.origin.voxel, visit);
     }
 
-    /// As [`Self::for_each_exactly`], starting at a voxel that the ray visits.
+    /// Like [`Self::for_each_exactly`], starting at a voxel that the ray visits.
     fn for_each_from(&self, from: VoxelIndex, visit: impl FnMut(VoxelIndex)) {
         let mut walk = self.walk().resumed_at(from);
         if self.span == SlabSpan::WHOLE {
@@ -133,7 +133,7 @@ impl<'a> SlabRay<'a> {
         }
     }
 
-    /// As [`Self::pass`], by the closed form and starting at voxel `from`.
+    /// Like [`Self::pass`], by the closed form and starting at voxel `from`.
     #[cold]
     fn pass_exactly<F: Footprint>(
         &self,

@@ -144,7 +144,7 @@ impl<'a> ScanParts<'a> {
     ///
     /// # Errors
     ///
-    /// Returns errors of the spill and of the log's file, and [`Error::Stopped`](crate::error::Error::Stopped).
+    /// Returns errors from the spill and from the log's file, and [`Error::Stopped`](crate::error::Error::Stopped).
     pub(crate) fn into_updates(
         self,
         mut report: ScanReport,

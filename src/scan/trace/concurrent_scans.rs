@@ -15,7 +15,7 @@ impl ScanTracer {
     ///
     /// # Errors
     ///
-    /// Fails for each scan as [`ScanTracer::trace`].
+    /// Same errors as [`ScanTracer::trace`], for each scan.
     pub(crate) fn trace_concurrently(
         &mut self,
         rules: TraceRules<'_>,

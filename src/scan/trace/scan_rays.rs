@@ -81,7 +81,7 @@ impl<'a> ScanRays<'a> {
         Ok(self.merge(collectors, report))
     }
 
-    /// As [`Self::per_scan`], under a memory limit: updates that do not fit are all added to `parts`.
+    /// Like [`Self::per_scan`], under a memory limit: updates that do not fit are all added to `parts`.
     pub(crate) fn per_scan_in_parts(
         &self,
         collectors: &mut Vec<PerScanCollector>,
@@ -160,7 +160,7 @@ impl<'a> ScanRays<'a> {
         Ok(updates_in_order(self.mapped, collectors, report))
     }
 
-    /// As [`Self::per_ray`], under a memory limit: as many rays at a time as fit. A part is added after the parts of
+    /// Like [`Self::per_ray`], under a memory limit: as many rays at a time as fit. A part is added after the parts of
     /// all earlier rays.
     pub(crate) fn per_ray_in_parts(
         &self,
@@ -236,7 +236,7 @@ impl<'a> ScanRays<'a> {
         Ok(collector.into_updates(report))
     }
 
-    /// As [`Self::per_ray_in_order`], under a memory limit.
+    /// Like [`Self::per_ray_in_order`], under a memory limit.
     pub(crate) fn per_ray_in_order_in_parts(
         &self,
         limit: &TraceLimit,

@@ -49,7 +49,7 @@ impl ScanTracer {
     ///
     /// # Errors
     ///
-    /// Fails as [`ScanTracer::trace`].
+    /// Same errors as [`ScanTracer::trace`].
     pub fn check(grid: &Grid, model: &SensorModel, scan: &dyn ScanPoints) -> Result<()> {
         if model.needs_intensity() && !scan.has_intensities() {
             return Err(no_intensities());
@@ -76,12 +76,12 @@ impl ScanTracer {
         self.trace_points(TraceRules { mapped, model, rays, order: UpdateOrder::OfVoxels }, scan, None)
     }
 
-    /// As [`ScanTracer::trace`], but in insertion per ray the updates of a tile are in the order of the rays. Octrees
+    /// Like [`ScanTracer::trace`], but in insertion per ray the updates of a tile are in the order of the rays. Octrees
     /// with a cache need this, because it depends on the order of different voxels.
     ///
     /// # Errors
     ///
-    /// Fails as [`ScanTracer::trace`].
+    /// Same errors as [`ScanTracer::trace`].
     pub fn trace_in_order(
         &mut self,
         grid: &Grid,
@@ -93,13 +93,13 @@ impl ScanTracer {
         self.trace_points(TraceRules { mapped, model, rays, order: UpdateOrder::OfRays }, scan, None)
     }
 
-    /// As [`ScanTracer::trace`], for any source of points and only for the mapped tiles, whose updates are those of the
-    /// whole scan. With `overflow`, updates that exceed the memory limit are spilled and the rest is returned. The
+    /// Like [`ScanTracer::trace`], for any source of points and only for the mapped tiles, whose updates are those of
+    /// the whole scan. With `overflow`, updates that exceed the memory limit are spilled and the rest is returned. The
     /// report covers both.
     ///
     /// # Errors
     ///
-    /// Fails as [`ScanTracer::trace`], if points cannot be read or updates cannot be spilled.
+    /// Same errors as [`ScanTracer::trace`]; also fails if points cannot be read or updates cannot be spilled.
     pub(crate) fn trace_points(
         &mut self,
         rules: TraceRules<'_>,

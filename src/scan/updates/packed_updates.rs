@@ -273,7 +273,7 @@ impl<R: BufRead> Unpacker<R> {
         Ok(all)
     }
 
-    /// As [`Unpacker::many`], but appends to `all`.
+    /// Like [`Unpacker::many`], but appends to `all`.
     fn many_to<T>(
         &mut self,
         all: &mut Vec<T>,

@@ -17,7 +17,7 @@ use std::ops::Range;
 ///
 /// # Errors
 ///
-/// Returns errors of `out`, and fails if `compact` is too short for a compact table.
+/// Returns errors from `out`, and fails if `compact` is too short for a compact table.
 pub fn write_compact_file(compact: &[u8], front: Trailer, out: &mut impl Write) -> io::Result<()> {
     let Some((body, crc)) = compact.split_last_chunk::<{ CRC_BYTES as usize }>() else {
         return Err(io::Error::new(io::ErrorKind::InvalidInput, "not a table in the compact form"));
@@ -45,7 +45,7 @@ pub fn read_compact_file(
 ///
 /// # Errors
 ///
-/// Fails as [`read_compact_file`].
+/// Same errors as [`read_compact_file`].
 pub fn read_compact_voxels_from(
     input: &mut impl Read,
     file_bytes: u64,

@@ -53,7 +53,7 @@ pub fn read_table(
 ///
 /// # Errors
 ///
-/// Fails as [`read_table`].
+/// Same errors as [`read_table`].
 pub fn read_voxels_from(
     input: &mut impl Read,
     file_bytes: u64,

@@ -12,7 +12,7 @@ use std::io::{self, Read, Write};
 ///
 /// # Errors
 ///
-/// Fails if the header or trailer violates the format or the trailer is missing. Returns errors of both streams.
+/// Fails if the header or trailer violates the format or the trailer is missing. Returns errors from both streams.
 pub fn renew_table(
     input: &mut impl Read,
     file_bytes: u64,
@@ -40,7 +40,7 @@ pub fn renew_table(
 ///
 /// # Errors
 ///
-/// Fails if the front part violates the format. Returns errors of both streams.
+/// Fails if the front part violates the format. Returns errors from both streams.
 pub fn renew_compact_file(
     input: &mut impl Read,
     file_bytes: u64,

@@ -20,7 +20,7 @@ struct Node {
     /// Upper bits of its voxels' codes: three per level.
     prefix: u64,
     max: f32,
-    /// Number of children that are leaves with the value of the first.
+    /// Number of children that are leaves and have the value of the first child.
     like_first: u8,
 }
 

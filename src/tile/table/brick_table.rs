@@ -202,7 +202,7 @@ impl Table {
     ///
     /// # Errors
     ///
-    /// Fails as [`write_bt`](crate::octree::write_bt).
+    /// Same errors as [`write_bt`](crate::octree::write_bt).
     pub fn write_bt(&self, resolution_m: f64, threshold: f32, out: &mut impl Write) -> io::Result<()> {
         let bricks: Vec<&Brick> = self.bricks_in_order().collect();
         let codes: Vec<BrickCode> = bricks.iter().map(|brick| brick.code()).collect();

@@ -5,7 +5,7 @@
 //! ```
 //!
 //! A step (state, observation) -> state is computed once per palette; [`MissRuns`](miss_runs::MissRuns) caches long
-//! runs of them. A brick has a [`Summary`], from which the upper nodes of an octree are computed.
+//! runs of them. A brick has a [`Summary`](summary::Summary), from which the upper nodes of an octree are computed.
 
 mod brick;
 mod brick_directory;

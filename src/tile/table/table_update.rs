@@ -109,7 +109,7 @@ impl Table {
         self.update_each(model, first, updates, |_, _, _| {});
     }
 
-    /// As [`Table::update_in_order`]; passes each update's voxel and resulting log-odds to `visit`.
+    /// Like [`Table::update_in_order`]; passes each update's voxel and resulting log-odds to `visit`.
     pub(crate) fn update_in_order_with(
         &mut self,
         model: &SensorModel,

@@ -24,7 +24,7 @@ impl CompactReader {
     ///
     /// # Errors
     ///
-    /// Returns errors of zstd.
+    /// Returns errors from zstd.
     pub fn new() -> io::Result<Self> {
         Ok(Self { column_reader: ColumnReader::new()?, columns: Columns::default() })
     }
@@ -78,7 +78,7 @@ impl CompactReader {
 ///
 /// # Errors
 ///
-/// Fails as [`CompactReader::read`].
+/// Same errors as [`CompactReader::read`].
 pub fn read_compact(input: &mut impl Read, bytes: u64, voxels: &VoxelBox) -> Result<Table, DecodeError> {
     CompactReader::new()?.read(input, bytes, voxels)
 }
@@ -88,7 +88,7 @@ pub fn read_compact(input: &mut impl Read, bytes: u64, voxels: &VoxelBox) -> Res
 ///
 /// # Errors
 ///
-/// Fails as [`CompactReader::read`].
+/// Same errors as [`CompactReader::read`].
 pub(in crate::tile::format) fn filter_compact(
     input: &mut impl Read,
     bytes: u64,

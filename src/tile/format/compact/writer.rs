@@ -21,7 +21,7 @@ impl CompactWriter {
     ///
     /// # Errors
     ///
-    /// Returns errors of zstd.
+    /// Returns errors from zstd.
     pub fn new(effort: CompactEffort) -> io::Result<Self> {
         Ok(Self { column_writer: ColumnWriter::new(effort)?, group: Group::default() })
     }
@@ -33,7 +33,7 @@ impl CompactWriter {
     ///
     /// # Errors
     ///
-    /// Returns errors of `out` and of zstd.
+    /// Returns errors from `out` and of zstd.
     pub fn write(&mut self, table: &Table, out: &mut impl Write) -> io::Result<u64> {
         let bytes = self.bytes(table)?;
         out.write_all(&bytes)?;
@@ -44,7 +44,7 @@ impl CompactWriter {
     ///
     /// # Errors
     ///
-    /// Returns errors of zstd.
+    /// Returns errors from zstd.
     pub fn bytes(&mut self, table: &Table) -> io::Result<Vec<u8>> {
         let Self { column_writer, group } = self;
         let codebook = Codebook::of(table);
@@ -95,7 +95,7 @@ impl fmt::Debug for CompactWriter {
 ///
 /// # Errors
 ///
-/// Returns errors of `out` and of zstd.
+/// Returns errors from `out` and of zstd.
 pub fn write_compact(table: &Table, effort: CompactEffort, out: &mut impl Write) -> io::Result<u64> {
     CompactWriter::new(effort)?.write(table, out)
 }
