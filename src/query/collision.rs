@@ -43,7 +43,7 @@ pub(super) fn collision<V: MapView + ?Sized>(
     Ok(None)
 }
 
-/// Returns the first voxel, by index order, that a body touches and that is not free according to `occupancy`. Bricks
+/// Returns the first voxel, brick by brick, that a body touches and that is not free according to `occupancy`. Bricks
 /// that the body does not touch are skipped.
 ///
 /// # Errors

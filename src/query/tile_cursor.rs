@@ -12,7 +12,7 @@ pub(super) struct TileCursor<'a, V: ?Sized> {
     one_by_one: u32,
 }
 
-/// Short gaps between tiles are common, and looking up an absent tile is cheap.
+/// Number of absent tiles in a row that are looked up individually. Short gaps are common, and a look-up is cheap.
 const FEW_ABSENT: u32 = 8;
 
 struct CurrentTile<'a> {

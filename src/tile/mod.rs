@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! updates -> table/ (exact evidence) -> octree/ (coarse queries), or octocache/ (OctoMap's tree, for comparison)
-//!              \\-> format/ (content of the tile's files)
+//!              \-> format/ (content of the tile's files)
 //! ```
 //!
 //! The table answers all queries at voxel resolution. The octree is derived from it and answers coarse queries. Code in

@@ -269,7 +269,7 @@ impl FlushedTile {
         }
     }
 
-    /// Bytes of memory that this tile adds if it is no longer shared.
+    /// Bytes of memory of the tile.
     pub(super) fn bytes(&self) -> usize {
         match self {
             Self::Resident(tile) => tile.bytes(),

@@ -37,9 +37,10 @@ pub(in crate::mapper) struct MemoryPlan {
 
 const OFTEN_SCANS: u32 = 8;
 
-/// Divisor for the share of the limit that allocator fragmentation may take if tiles are smaller than a brick: hundreds
-/// of thousands of blocks of a few hundred bytes are allocated and freed. Measured: up to 3 MiB over a limit of 81 MiB.
-const LOST_BETWEEN_BLOCKS: usize = 12;
+/// If tiles are smaller than a brick, the limit is reduced by one part in this number to allow for fragmentation by the
+/// allocator: hundreds of thousands of blocks of a few hundred bytes are allocated and freed. Measured: up to 3 MiB over
+/// a limit of 81 MiB.
+const FRAGMENTATION_PART: usize = 12;
 
 impl MemoryPlan {
     pub(in crate::mapper) fn of(config: &MapConfig) -> Self {
@@ -53,7 +54,7 @@ impl MemoryPlan {
             (MemoryLimit::Tiles { tiles, write_buffer_bytes }, _) => {
                 Self::of_tiles(tiles, write_buffer_bytes)
             }
-            (_, Some(bytes)) if has_tiny_tiles => Self::of_bytes(bytes - bytes / LOST_BETWEEN_BLOCKS),
+            (_, Some(bytes)) if has_tiny_tiles => Self::of_bytes(bytes - bytes / FRAGMENTATION_PART),
             (_, bytes) => Self::of_bytes(bytes.unwrap_or(usize::MAX)),
         }
     }

@@ -100,7 +100,7 @@ impl Pinhole {
     }
 
     /// Converts coordinates to words: differences between each pixel and the one predicted from those before it. If the
-    /// depth is missing, the word is the coordinate itself.
+    /// depth is missing, the coordinate must equal it. Returns `false` if a coordinate has no pixel.
     pub(super) fn words(&self, values: &[f64], depths: &[f64], words: &mut Vec<u64>) -> bool {
         let mut row = Expected::default();
         for (value, z) in values.iter().zip(depths) {

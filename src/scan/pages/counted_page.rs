@@ -5,8 +5,8 @@ use rustc_hash::FxHashMap;
 
 /// Page with a counter per voxel: the number of rays that passed it since its last hit.
 ///
-/// Counts rarely reach 256, so the lower byte of a count is stored with those of its brick, and the upper byte
-/// separately. Bricks of bytes take half as long to write, clear and read.
+/// Counts rarely reach 256, so the lower bytes of a brick's counts are stored together, and the upper bytes separately.
+/// Bricks of bytes take half as long to write, clear and read as bricks of 16-bit counts.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct CountedPage {
     low: SparsePage<Bytes>,

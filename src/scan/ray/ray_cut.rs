@@ -16,8 +16,8 @@ pub(crate) struct RayCut<'a> {
     /// Box around the selected tiles, relative to the origin, in units of voxels and enlarged by [`MARGIN`] on all
     /// sides; `None` if no tile is selected.
     around: Option<(Point, Point)>,
-    /// Box of the ray ends whose rays may reach `around`. It is unbounded on both sides along axes on which the origin
-    /// is not clearly outside of `around`.
+    /// Box of the ends of all rays that may reach `around`. Along each axis on which the origin is outside of `around`,
+    /// it is bounded by the near side of `around`; otherwise it is unbounded.
     ends: (Point, Point),
     /// Voxels of a box around the selected tiles.
     voxels: VoxelBox,
