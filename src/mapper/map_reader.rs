@@ -348,8 +348,8 @@ impl MapReader {
             return;
         }
         let order = self.order.get_or_init(|| self.tile_indices());
-        let behind = order.partition_point(|tile| *tile <= index);
-        for tile in order.iter().skip(behind).take(files) {
+        let first = order.partition_point(|tile| *tile <= index);
+        for tile in order.iter().skip(first).take(files) {
             self.disk.read_ahead(&self.store.layout().current(*tile, TileFile::Table));
         }
     }

@@ -1,7 +1,7 @@
 use crate::space::{BrickCode, BrickMask};
 
-/// Nodes of a tree under one node of 8 x 8 x 8 voxels (depth 13), as masks: byte `k` of a mask is the `k`-th node of 2
-/// x 2 x 2 voxels (depth 15), word `k` the `k`-th node of 4 x 4 x 4 (depth 14).
+/// Nodes of a tree under one node of 8 x 8 x 8 voxels (depth 13), as masks. Byte `k` of a mask is the `k`-th node of
+/// 2 x 2 x 2 voxels (depth 15), word `k` the `k`-th node of 4 x 4 x 4 (depth 14).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BrickNodes {
     /// Code of the brick.

@@ -110,7 +110,7 @@ fn both(a: &BrickMask, b: &BrickMask) -> BrickMask {
 
 /// Returns the columns of a brick that have a voxel in a mask.
 fn from_above(mask: &BrickMask) -> u64 {
-    // Bits three, six and nine of a position are those of z; voxels that differ only in these are in one column.
+    // Bits three, six and nine of a position belong to z; voxels that differ only in these bits are in one column.
     (0..8).fold(0, |columns, word| {
         let low = mask[word] | mask[word] >> 4;
         let low = (low | low >> 32) & 0x0f0f_0f0f;

@@ -12,7 +12,7 @@ use crate::error::{Error, Result};
 use crate::scan::RayWalk;
 use crate::space::{Aabb, Grid, Point, VoxelBox, VoxelIndex};
 
-/// Probability of a voxel of which only its being occupied is known.
+/// Probability that is reported for occupied voxels.
 const OCCUPIED: f64 = 1.0;
 
 /// Set of occupied voxels; all others are unknown.

@@ -37,8 +37,8 @@ impl<E: NodeEncoder> Spine<E> {
         let mut rest = blocks;
         let children = std::array::from_fn(|child| {
             let end = rest.partition_point(|block| block.first.child_at(depth) <= child);
-            let (here, behind) = rest.split_at(end);
-            rest = behind;
+            let (here, later) = rest.split_at(end);
+            rest = later;
             Self::below(encoder, here, depth + 1)
         });
         let node = encoder.join(depth, &nodes_of(&children));

@@ -16,7 +16,7 @@ pub(super) struct AscendingEntries<'a, G> {
     gather: G,
     brick: OpenBrick,
     /// One more than the position of the last voxel in the open brick; 0 if there is none.
-    behind: usize,
+    after_last: usize,
     /// Selected voxels of the open brick.
     run: Vec<(usize, Evidence)>,
 }
@@ -36,7 +36,7 @@ const LOWER: u16 = BRICK_EDGE as u16 - 1;
 impl<'a, G: Gather> AscendingEntries<'a, G> {
     pub(super) fn new(voxels: &'a VoxelBox, gather: G) -> Self {
         let brick = OpenBrick { code: None, upper: [u16::MAX; 3], inside: [0; 8] };
-        Self { voxels, gather, brick, behind: 0, run: Vec::with_capacity(BRICK_VOXELS) }
+        Self { voxels, gather, brick, after_last: 0, run: Vec::with_capacity(BRICK_VOXELS) }
     }
 
     #[inline]
@@ -51,10 +51,10 @@ impl<'a, G: Gather> AscendingEntries<'a, G> {
             return Err(of_another_tile(key, offset));
         }
         check_evidence(evidence, offset)?;
-        if self.behind > place {
+        if self.after_last > place {
             return Err(out_of_order(key, offset));
         }
-        self.behind = place + 1;
+        self.after_last = place + 1;
         if self.gather.wants(evidence) {
             self.run.push((place, evidence));
         }
@@ -87,7 +87,7 @@ impl<'a, G: Gather> AscendingEntries<'a, G> {
     }
 
     fn close(&mut self) {
-        self.behind = 0;
+        self.after_last = 0;
         if let Some(code) = self.brick.code
             && !self.run.is_empty()
         {

@@ -1,4 +1,4 @@
-//! OctoMap's pointer tree behind the cache of OctoCache (Chen et al., ASPLOS 2025).
+//! OctoMap's pointer tree with the cache of OctoCache (Chen et al., ASPLOS 2025).
 //!
 //! ```text
 //! updates -> table -> VoxelCache -evicted voxels-> WorkQueue -> OctreeWorker, a thread -> SharedTree

@@ -28,9 +28,9 @@ pub(crate) struct Palette {
     values: Vec<f32>,
     /// Hash table of the states by evidence, with open addressing; [`UNKNOWN`] marks a free slot.
     slots: Vec<StateId>,
-    /// Number of states at which unused ones are dropped; at most `most`.
+    /// Number of states at which unused ones are dropped; at most `max_states`.
     limit: usize,
-    most: usize,
+    max_states: usize,
     renumberings: u64,
 }
 
@@ -59,8 +59,8 @@ impl Default for Palette {
 }
 
 impl Palette {
-    /// Creates a palette with an initial limit of `limit` states and a maximum of `most`; both must be powers of two.
-    pub(crate) fn limited(limit: usize, most: usize) -> Self {
+    /// Creates a palette with an initial limit of `limit` states and a maximum of `max_states`; both must be powers of two.
+    pub(crate) fn limited(limit: usize, max_states: usize) -> Self {
         let model = SensorModel::default();
         Self {
             model,
@@ -70,7 +70,7 @@ impl Palette {
             values: vec![f32::NEG_INFINITY],
             slots: Vec::new(),
             limit,
-            most,
+            max_states,
             renumberings: 0,
         }
     }
@@ -82,7 +82,7 @@ impl Palette {
 
     /// Sets the limit that would result if the states had been added one by one.
     pub(crate) fn limit_by_use(&mut self) {
-        self.limit = (2 * self.len()).next_power_of_two().clamp(FIRST_LIMIT, self.most);
+        self.limit = (2 * self.len()).next_power_of_two().clamp(FIRST_LIMIT, self.max_states);
     }
 
     /// Sensor model that computes the steps.
@@ -247,7 +247,7 @@ impl Palette {
         self.values = self.evidence.iter().map(|evidence| evidence.log_odds as f32).collect();
         self.values[usize::from(UNKNOWN)] = f32::NEG_INFINITY;
         if self.len() > self.limit / 2 {
-            self.limit = (self.limit * 2).min(self.most);
+            self.limit = (self.limit * 2).min(self.max_states);
         }
         self.rehash();
         self.renumberings += 1;
@@ -266,7 +266,7 @@ impl Palette {
 
     /// Returns whether the limit can be raised.
     pub(crate) fn can_grow(&self) -> bool {
-        self.limit < self.most
+        self.limit < self.max_states
     }
 
     /// Rebuilds the hash table, at most half full.

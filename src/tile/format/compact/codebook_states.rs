@@ -24,7 +24,7 @@ impl CodebookStates {
     ) -> Result<Self, DecodeError> {
         let offset = input.offset;
         let mut bytes = Vec::new();
-        let column = Column { name: "codebook", most: states * STATE_BYTES, bytes: &mut bytes };
+        let column = Column { name: "codebook", max_bytes: states * STATE_BYTES, bytes: &mut bytes };
         column_reader.take_columns([column], input)?;
         if bytes.len() != states * STATE_BYTES {
             let reason = format!("a codebook of {} bytes for {states} states", bytes.len());

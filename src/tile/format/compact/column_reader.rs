@@ -13,7 +13,7 @@ pub(super) struct ColumnReader {
 pub(super) struct Column<'a> {
     pub(super) name: &'static str,
     /// Maximum size of the column in bytes.
-    pub(super) most: usize,
+    pub(super) max_bytes: usize,
     /// Receives the decompressed bytes.
     pub(super) bytes: &'a mut Vec<u8>,
 }
@@ -34,7 +34,7 @@ impl ColumnReader {
         let mut compressed_lengths = [0; N];
         let mut columns = columns;
         for (column, compressed_length) in columns.iter_mut().zip(&mut compressed_lengths) {
-            let length = input.number(column.name, column.most)?;
+            let length = input.number(column.name, column.max_bytes)?;
             *compressed_length = input.number(column.name, length)?;
             column.bytes.clear();
             column.bytes.resize(length, 0);

@@ -44,7 +44,7 @@ impl Columns {
         let bricks = input.number("bricks of a group", GROUP_BRICKS.min(limits.bricks))?;
         let voxels = limits.voxels.min(MAX_GROUP_VOXELS).min(bricks * BRICK_VOXELS);
         self.bricks = bricks;
-        let column = |name, most, bytes| Column { name, most, bytes };
+        let column = |name, max_bytes, bytes| Column { name, max_bytes, bytes };
         column_reader.take_columns(
             [
                 column("steps", bricks * STEP_BYTES, &mut self.steps),

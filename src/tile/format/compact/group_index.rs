@@ -109,8 +109,8 @@ impl GroupEntry {
 }
 
 /// Combines the CRC-32 of some bytes with that of the bytes that follow them.
-pub(in crate::tile::format) fn joined_crc(crc: u32, behind: u32, bytes_behind: u64) -> u32 {
+pub(in crate::tile::format) fn joined_crc(crc: u32, following: u32, following_bytes: u64) -> u32 {
     let mut all = crc32fast::Hasher::new_with_initial(crc);
-    all.combine(&crc32fast::Hasher::new_with_initial_len(behind, bytes_behind));
+    all.combine(&crc32fast::Hasher::new_with_initial_len(following, following_bytes));
     all.finalize()
 }

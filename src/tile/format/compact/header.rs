@@ -54,9 +54,9 @@ impl Header {
             }
         };
         let count = u64::from(u32_at(8)) | u64::from(u32_at(12)) << 32;
-        let most = voxels_in(voxels);
-        let Some(count) = usize::try_from(count).ok().filter(|&count| count as u64 <= most) else {
-            return wrong(8, format!("{count} voxels in a tile of {most}"));
+        let capacity = voxels_in(voxels);
+        let Some(count) = usize::try_from(count).ok().filter(|&count| count as u64 <= capacity) else {
+            return wrong(8, format!("{count} voxels in a tile of {capacity}"));
         };
         let [bricks, states] = [u32_at(16), u32_at(20)].map(|count| count as usize);
         if bricks > count || (bricks == 0) != (count == 0) {

@@ -84,8 +84,8 @@ impl<R: Read> Input<R> {
         Ok(())
     }
 
-    /// Reads a number of at most `most`.
-    pub(super) fn number(&mut self, what: &str, most: usize) -> Result<usize, DecodeError> {
+    /// Reads a number of at most `max`.
+    pub(super) fn number(&mut self, what: &str, max: usize) -> Result<usize, DecodeError> {
         let offset = self.offset;
         let mut failed = None;
         let number = take_number(|| {
@@ -95,8 +95,8 @@ impl<R: Read> Input<R> {
         if let Some(error) = failed {
             return Err(error);
         }
-        let number = number.and_then(|number| usize::try_from(number).ok()).filter(|&number| number <= most);
-        let reason = || format!("the {what} must be a number of at most {most}");
+        let number = number.and_then(|number| usize::try_from(number).ok()).filter(|&number| number <= max);
+        let reason = || format!("the {what} must be a number of at most {max}");
         Ok(number.ok_or_else(|| FormatError::at_offset(offset, reason()))?)
     }
 

@@ -35,14 +35,14 @@ impl Symbols {
     pub(super) fn code(self, number: usize) -> u16 {
         match number.checked_sub(self.first_prefix) {
             None => number as u16,
-            Some(behind) => (self.first_prefix + behind / 256) as u16 | ((behind % 256) as u16) << 8,
+            Some(index) => (self.first_prefix + index / 256) as u16 | ((index % 256) as u16) << 8,
         }
     }
 
     /// State number of a prefix and a second byte; `None` if the codebook has no such state.
     pub(super) fn number(self, prefix: u8, second: u8) -> Option<usize> {
-        let behind = (usize::from(prefix) - self.first_prefix) * 256 + usize::from(second);
-        Some(self.first_prefix + behind).filter(|&number| number < self.states)
+        let index = (usize::from(prefix) - self.first_prefix) * 256 + usize::from(second);
+        Some(self.first_prefix + index).filter(|&number| number < self.states)
     }
 }
 

@@ -9,8 +9,8 @@ use crate::tile::Table;
 use std::fmt;
 use std::io::{self, Write};
 
-/// Writer of tables in compact form. It reuses its buffers: 0.7 MB, or 1.7 MB for [`CompactEffort::Small`], and up to 3
-/// MB more after a table in which almost every voxel had a state of its own.
+/// Writer of tables in compact form. It reuses its buffers: 0.7 MB, or 1.7 MB for [`CompactEffort::Small`], and up to
+/// 3 MB more after a table in which almost every voxel had a state of its own.
 pub struct CompactWriter {
     column_writer: ColumnWriter,
     group: Group,
