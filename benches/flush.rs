@@ -1,4 +1,4 @@
-//! What does durability cost: how long does a flush take, and how much of it is waiting for the medium?
+//! Measures the cost of durability: the time of a flush, and the part of it that waits for the storage medium.
 
 use criterion::{BatchSize, Criterion, SamplingMode, criterion_group, criterion_main};
 use std::sync::Arc;
@@ -17,14 +17,14 @@ fn disks() -> [(&'static str, Arc<dyn Disk>); 3] {
     ]
 }
 
-/// Room for every tile, so that nothing is written but by a flush.
+/// The cache holds all tiles, so that only flushes write.
 fn config() -> MapConfig {
     MapConfig::new(0.2, 10.0).expect("whole voxels").with_range(0.0, 30.0).with_cache_tiles(1000)
 }
 
-/// Beside the build: the system's folder for temporary files may be in memory.
+/// In the build folder, because the system's folder for temporary files may be in memory.
 fn temporary_folder() -> TempDir {
-    tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).expect("a folder beside the build")
+    tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).expect("a folder in the build directory")
 }
 
 fn new_mapper(disk: &Arc<dyn Disk>, folder: &TempDir) -> OutOfCoreTileMapper {
@@ -77,7 +77,7 @@ fn flush(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// Maps the street, a scan every 10 m, until the tiles in memory have so many bytes.
+/// Maps the street, one scan every 10 m, until the tiles in memory have `bytes` bytes.
 fn grow(mapper: &mut OutOfCoreTileMapper, bytes: u64) -> Vec<Scan> {
     let mut scans = Vec::new();
     for scan in Survey::street(1).step_by(10) {
@@ -95,7 +95,7 @@ fn grow(mapper: &mut OutOfCoreTileMapper, bytes: u64) -> Vec<Scan> {
     scans
 }
 
-/// A flush of every tile, as dirty as its scans make it: they are inserted again before.
+/// Measures a flush of all tiles, which the scans make dirty again before.
 fn time_flush(mapper: &mut OutOfCoreTileMapper, scans: &[Scan]) -> Duration {
     for scan in scans {
         mapper.insert_scan(scan).expect("a scan that can be mapped");

@@ -1,5 +1,5 @@
-//! How long does a scan take into the map: in memory, a quarter of its tiles, out of core with room and with next to
-//! none?
+//! Measures the insertion of a scan: in memory, into a quarter of its tiles, and out of core with much and with very
+//! little memory.
 
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use voxtile::mapper::MapView;

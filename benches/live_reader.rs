@@ -1,5 +1,5 @@
-//! What does it cost a mapper that somebody asks beside it? The same scans with no reader, with one that asks nothing,
-//! and with one that asks 40 times a second: 20 rays of 50 m and 20 collisions each time, all as of one scan.
+//! Measures the effect of a live reader on a mapper. The same scans are inserted with no reader, with an idle one, and
+//! with one that queries 40 times a second: 20 rays of 50 m and 20 collisions each time, all as of one scan.
 
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
@@ -11,7 +11,7 @@ use voxtile::mapper::LiveReader;
 use voxtile::{MapConfig, Mapper, OutOfCoreTileMapper, Queries, RayQuery, Scan, Shape, UnknownAs};
 use voxtile_simulation::Survey;
 
-/// Scans that are there before, and those that are measured.
+/// Number of scans inserted before the measurement, and during it.
 const SCANS: [usize; 2] = [20, 60];
 const EVERY: Duration = Duration::from_millis(25);
 
@@ -64,7 +64,7 @@ fn live_reader(criterion: &mut Criterion) {
         };
         bencher.iter_batched(open, |(mapper, reader)| (all(mapper), reader), BatchSize::PerIteration);
     });
-    let (asked, micros) = (AtomicU64::new(0), AtomicU64::new(0));
+    let (queries, micros) = (AtomicU64::new(0), AtomicU64::new(0));
     group.bench_function("reader at 40 Hz", |bencher| {
         bencher.iter_batched(
             || mapper(before),
@@ -76,7 +76,7 @@ fn live_reader(criterion: &mut Criterion) {
                         while !is_over.load(Ordering::Relaxed) {
                             let since = Instant::now();
                             black_box(ask(&reader, measured[0].origin));
-                            asked.fetch_add(1, Ordering::Relaxed);
+                            queries.fetch_add(1, Ordering::Relaxed);
                             micros.fetch_add(since.elapsed().as_micros() as u64, Ordering::Relaxed);
                             thread::sleep(EVERY.saturating_sub(since.elapsed()));
                         }
@@ -90,8 +90,8 @@ fn live_reader(criterion: &mut Criterion) {
         );
     });
     group.finish();
-    let (asked, micros) = (asked.into_inner(), micros.into_inner());
-    println!("asked {asked} times, {} us each", micros / asked.max(1));
+    let (queries, micros) = (queries.into_inner(), micros.into_inner());
+    println!("queries {queries} times, {} us each", micros / queries.max(1));
 }
 
 criterion_group!(benches, live_reader);

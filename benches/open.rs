@@ -1,4 +1,4 @@
-//! What does it cost to open a map of 100 000 tiles: how long does it take, and how much memory does a tile occupy?
+//! Measures the time to open a map of 100 000 tiles, and the memory per tile.
 
 use criterion::{BatchSize, Criterion, SamplingMode, criterion_group, criterion_main};
 use std::path::Path;
@@ -12,8 +12,8 @@ const TILES: i32 = 100_000;
 const TILES_A_FLUSH: i32 = 10_000;
 
 fn open(criterion: &mut Criterion) {
-    // Beside the build: the system's folder for temporary files may be in memory.
-    let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).expect("a folder beside the build");
+    // In the build folder, because the system's folder for temporary files may be in memory.
+    let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).expect("a folder in the build directory");
     let path = folder.path().join("map");
     let start = Instant::now();
     let config = make_map(&path);
@@ -25,19 +25,19 @@ fn open(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("open 100 000 tiles");
     group.sample_size(10).sampling_mode(SamplingMode::Flat);
     group.warm_up_time(Duration::from_secs(1)).measurement_time(Duration::from_secs(5));
-    // The batches leave the drop of what was opened out of the time.
-    group.bench_function("to be asked", |bencher| {
+    // Batches exclude the drop of the opened map from the time.
+    group.bench_function("reader", |bencher| {
         bencher.iter_batched(|| (), |()| open_reader(), BatchSize::PerIteration);
     });
-    group.bench_function("to go on with it", |bencher| {
+    group.bench_function("mapper", |bencher| {
         bencher.iter_batched(|| (), |()| open_mapper(), BatchSize::PerIteration);
     });
     group.finish();
 }
 
-/// A map whose tiles hold one voxel each.
+/// Creates a map whose tiles have one voxel each.
 fn make_map(path: &Path) -> MapConfig {
-    // All updates of a flush wait, so that each tile comes in once.
+    // All updates of a flush are buffered, so that each tile is loaded once.
     let config = MapConfig::new(0.2, 10.0).expect("whole voxels").with_write_buffer_bytes(1 << 30);
     let disk = UnsyncedDisk::shared();
     let mut mapper =
@@ -58,7 +58,7 @@ fn make_map(path: &Path) -> MapConfig {
 fn print_memory(path: &Path) {
     const READERS: usize = 10;
     let mut readers = vec![MapReader::open(path, 0).expect("a map")];
-    // The first reader took what the allocator had left of making the map; the others show what one takes.
+    // The first reader may reuse memory freed during the creation of the map; the others show the memory per reader.
     let Some(before) = resident_bytes() else {
         eprintln!("memory of an open map: skipped, there is no /proc/self/status here");
         return;

@@ -1,5 +1,5 @@
-//! Does a query cost the same on a map of a hundred tiles and on one of a million? The voxels around the query are the
-//! same; all other tiles hold one voxel each, in memory.
+//! Measures whether the time of a query depends on the number of tiles, from a hundred to a million. The voxels around
+//! the query are the same; all other tiles have one voxel each, in memory.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
@@ -10,7 +10,7 @@ use voxtile::{InMemoryMapper, MapConfig, Mapper, Queries};
 use voxtile_simulation::Survey;
 
 const TILE_M: f64 = 10.0;
-/// Tiles along each edge of the square that all others lie in, far from the scans.
+/// Tiles along each edge of the square that contains the other tiles, far from the scans.
 const EDGES: [usize; 3] = [10, 100, 1000];
 
 fn query(criterion: &mut Criterion) {
@@ -41,7 +41,8 @@ fn query(criterion: &mut Criterion) {
     }
 }
 
-/// A few blocks, and far from them a square of tiles with one voxel each. Returns where the sensor was, too.
+/// Creates a map of a few blocks and, far from them, a square of tiles with one voxel each. Also returns the position
+/// of the sensor.
 fn make_map(edge: usize) -> (InMemoryMapper, Point) {
     let config = MapConfig::new(0.2, TILE_M).expect("whole voxels").with_range(0.5, 60.0);
     let mut map = InMemoryMapper::new(config).expect("a configuration that holds");

@@ -1,4 +1,4 @@
-//! How long does a voxel take in a tile's table: to be updated, and to be put into the compact form and back?
+//! Measures the time per voxel for updating a tile's table, and for encoding and decoding its compact form.
 
 use criterion::measurement::WallTime;
 use criterion::{BatchSize, BenchmarkGroup, Criterion, Throughput, criterion_group, criterion_main};
@@ -56,7 +56,7 @@ fn street(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// The tables of a drive of twenty scans, written and read again.
+/// Tables of a drive of twenty scans, written and read again.
 fn compact(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("the compact form of a street at 0.2 m");
     group.sample_size(20);

@@ -1,4 +1,4 @@
-//! How small is the compact form of a map's tiles, and how fast is it made and read? One row a map, for
+//! Measures size and speed of the compact form of a map's tiles. Prints one row per map, for
 //! `docs/measurements/sizes.md`.
 //!
 //! `compact_form [--repeat N] MAP...`
@@ -17,7 +17,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         _ => 3,
     };
     println!(
-        "| map | tiles | voxels | table (B a voxel) | fast (B a voxel) | small | below 18 B | made fast (ns a voxel) | made small | read | its octree |"
+        "| map | tiles | voxels | table (B/voxel) | fast (B/voxel) | small | below 18 B | encode fast (ns/voxel) | encode small | decode | octree |"
     );
     println!("|---|---|---|---|---|---|---|---|---|---|---|");
     for map in maps {
@@ -60,7 +60,7 @@ fn row(map: &Path, repeats: usize) -> Result<String, Box<dyn Error>> {
     ))
 }
 
-/// What it takes to make tiles of tables, with octrees that are up to date.
+/// Returns the time to create tiles from tables, with up-to-date octrees.
 fn octree_seconds(map: &Path, tables: &[(Table, VoxelBox)], repeats: usize) -> Result<f64, Box<dyn Error>> {
     let (reader, octrees) = (MapReader::open(map, 0)?, OctreeFactory::default());
     let grid = reader.config().grid;
@@ -77,7 +77,7 @@ fn octree_seconds(map: &Path, tables: &[(Table, VoxelBox)], repeats: usize) -> R
     Ok(least)
 }
 
-/// The tables of a map's tiles, and the voxels that belong to each.
+/// Returns the tables of a map's tiles, and the voxels that belong to each.
 fn tables(map: &Path) -> Result<Vec<(Table, VoxelBox)>, Box<dyn Error>> {
     let mut tables = Vec::new();
     for tile in MapReader::open(map, 0)?.tiles() {
@@ -107,7 +107,7 @@ fn made(
     Ok((made, seconds))
 }
 
-/// The least of the times that something takes on this thread, in seconds of its processor.
+/// Returns the smallest CPU time that `work` takes on this thread, in seconds.
 fn least_seconds(
     repeats: usize,
     mut work: impl FnMut() -> Result<(), Box<dyn Error>>,

@@ -1,5 +1,5 @@
-//! Writes the occupied voxels of a map as PLY, with progress and a way to stop:
-//! `cargo run --release --example exporter -- map_tiles_example occupied.ply`.
+//! Exports the occupied voxels of a map as PLY, with progress output and a way to stop: `cargo run --release --example
+//! exporter -- map_tiles_example occupied.ply`.
 
 use std::error::Error;
 use std::path::Path;
@@ -20,7 +20,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let stop = Arc::new(AtomicBool::new(false));
     let asked = stop.clone();
     thread::spawn(move || {
-        // An end of the input is no wish to stop.
+        // The end of the input does not stop the export.
         let is_line = std::io::stdin().read_line(&mut String::new()).is_ok_and(|bytes| bytes > 0);
         asked.store(is_line, Ordering::Relaxed);
     });
@@ -35,7 +35,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         if stop.load(Ordering::Relaxed) {
             drop(out);
             std::fs::remove_file(file)?;
-            return Err("stopped as asked; nothing is written".into());
+            return Err("stopped; no file was written".into());
         }
         for voxel in tile?.voxels() {
             let found = Occupancy::of(map.config(), Some(voxel.evidence));

@@ -1,4 +1,4 @@
-//! What does the first point asked of a tile on disk take? One row a map, for `docs/performance.md`.
+//! Measures the first query of a point in each tile on disk. Prints one row per map, for `docs/performance.md`.
 //!
 //! `first_points [--passes N] MAP...`
 
@@ -14,9 +14,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         Some("--passes") => maps.drain(..2).nth(1).ok_or("a number of passes")?.parse()?,
         _ => 5,
     };
-    println!(
-        "| map | points | kB read (median) | most | CPU us (median) | most of 99 % | wall us (median) | most of 99 % |"
-    );
+    println!("| map | points | kB read (median) | max | CPU us (median) | 99 % | wall us (median) | 99 % |");
     println!("|---|---:|---:|---:|---:|---:|---:|---:|");
     for map in maps {
         println!("{}", row(Path::new(&map), passes)?);
@@ -27,7 +25,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 fn row(map: &Path, passes: usize) -> Result<String, Box<dyn Error>> {
     let points = points(map)?;
     let (mut bytes, mut cpu, mut wall) = (Vec::new(), Vec::new(), Vec::new());
-    // The first pass brings the files into the page cache.
+    // The first pass loads the files into the page cache.
     for pass in 0..=passes {
         let reader = MapReader::open(map, 0)?;
         for &point in &points {
@@ -53,7 +51,7 @@ fn row(map: &Path, passes: usize) -> Result<String, Box<dyn Error>> {
     ))
 }
 
-/// The voxel in the middle of each tile's observed ones.
+/// Returns the middle one of each tile's observed voxels.
 fn points(map: &Path) -> Result<Vec<VoxelIndex>, Box<dyn Error>> {
     let mut points = Vec::new();
     for tile in MapReader::open(map, 0)?.tiles() {
@@ -68,7 +66,7 @@ fn quantile(values: &mut [f64], share: f64) -> f64 {
     values.get((values.len().saturating_sub(1) as f64 * share) as usize).copied().unwrap_or(f64::NAN)
 }
 
-/// Of this thread's processor.
+/// CPU time of this thread.
 fn cpu_seconds() -> f64 {
     let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
     time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9

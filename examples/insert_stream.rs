@@ -1,4 +1,4 @@
-//! Maps a stream of world points, as `tools/octomap_compat/points.py` writes it, into a folder of tiles.
+//! Inserts a stream of world points, as written by `tools/octomap_compat/points.py`, into a folder of tiles.
 //!
 //! ```text
 //! insert_stream STREAM RESOLUTION_M MAP_FOLDER
@@ -15,7 +15,7 @@ use voxtile::{MapConfig, OutOfCoreTileMapper, ScanRef};
 type Point = [f32; 3];
 type Points = Vec<Point>;
 
-/// What OctoMap is given too.
+/// The same value is passed to OctoMap.
 const MAX_RANGE_M: f64 = 60.0;
 const TILE_SIZE_M: f64 = 10.0;
 
@@ -24,7 +24,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let [stream, resolution_m, folder] = arguments.as_slice() else {
         return Err("usage: insert_stream STREAM RESOLUTION_M MAP_FOLDER".into());
     };
-    // All tiles stay in memory: what is compared is the map, not the way to the disk.
+    // All tiles remain in memory, because the comparison is about the map and not about disk access.
     let config = MapConfig::new(resolution_m.parse()?, TILE_SIZE_M)?
         .with_range(0.0, MAX_RANGE_M)
         .with_cache_tiles(1 << 20);
@@ -47,7 +47,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Origin and points of the next scan; `None` at the end of the stream.
+/// Reads origin and points of the next scan; `None` at the end of the stream.
 fn read_scan(input: &mut impl Read) -> io::Result<Option<(Point, Points)>> {
     let mut count = [0; 4];
     match input.read_exact(&mut count) {

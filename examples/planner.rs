@@ -1,4 +1,4 @@
-//! A path, checked against the archive, the local map and both as one: `cargo run --release --example planner`.
+//! Checks a path against the archive, the local map and both combined: `cargo run --release --example planner`.
 
 use voxtile::{InMemoryMapper, MapConfig, Mapper, Queries, Shape, United, UnknownAs};
 use voxtile_local::{LocalMap, LocalParameters, Obstacle};
@@ -6,7 +6,7 @@ use voxtile_simulation::Survey;
 
 const ROBOT_RADIUS_M: f64 = 0.4;
 
-/// The first leg of a path that the robot cannot go, and what is in its way.
+/// Returns the first blocked leg of a path, and the voxel that blocks it.
 fn blocked(map: &dyn Queries, path: &[[f64; 3]]) -> voxtile::Result<Option<(usize, [f64; 3])>> {
     for (leg, ends) in path.windows(2).enumerate() {
         let body = Shape::SweptSphere { from: ends[0], to: ends[1], radius_m: ROBOT_RADIUS_M };
@@ -23,7 +23,7 @@ fn main() -> voxtile::Result<()> {
     let scans: Vec<_> = Survey::demo(1).take(20).collect();
     for (number, scan) in scans.iter().enumerate() {
         archive.insert_scan(scan)?;
-        // The local map has seen the end of the drive alone.
+        // The local map receives only the end of the drive.
         if number >= 15 {
             local.insert_scan(scan)?;
         }

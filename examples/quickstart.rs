@@ -1,4 +1,4 @@
-//! Builds a map out of core, asks it, opens it again: `cargo run --release --example quickstart`.
+//! Builds a map out of core, queries it and opens it again: `cargo run --release --example quickstart`.
 
 use voxtile::query::{RayQuery, UnknownAs};
 use voxtile::{MapConfig, MapQueries, MapReader, MapView, Mapper, OutOfCoreTileMapper, Queries};

@@ -1,4 +1,4 @@
-//! A robot's node: scans come in one thread, a planner asks in another: `cargo run --release --example robot_node`.
+//! A robot node: one thread receives scans, another one plans: `cargo run --release --example robot_node`.
 
 use std::sync::mpsc;
 use std::thread;
@@ -18,36 +18,36 @@ fn main() -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
     let (goal, goals) = mpsc::channel();
 
     thread::scope(|scope| {
-        // The lidar's driver. It waits if mapping falls behind.
+        // Driver of the lidar, which waits if mapping falls behind.
         scope.spawn(move || Survey::demo(1).take(SCANS).try_for_each(|scan| sensor.send(scan)));
 
-        // The planner, 40 times a second: it waits for no flush.
+        // Planner, 40 times a second. It does not wait for flushes.
         let planner = scope.spawn(move || -> voxtile::Result<(u32, u32)> {
-            let (mut asked, mut blocked) = (0, 0);
+            let (mut checked, mut blocked) = (0, 0);
             while let Some(at) = goals.iter().next() {
                 let at: [f64; 3] = at;
-                let view = reader.view(); // One scan for all questions of this round.
+                let view = reader.view(); // All queries of this round see the same scan.
                 for ahead_m in [2.0, 5.0, 10.0] {
                     let body =
                         Shape::SweptSphere { from: at, to: [at[0], at[1] + ahead_m, at[2]], radius_m: 0.4 };
-                    asked += 1;
+                    checked += 1;
                     blocked += u32::from(view.collision(&body, UnknownAs::Free)?.is_some());
                 }
                 thread::sleep(Duration::from_millis(25));
             }
-            Ok((asked, blocked))
+            Ok((checked, blocked))
         });
 
         for (number, scan) in scans.iter().enumerate() {
             mapper.insert_scan(&scan)?;
             goal.send(scan.origin)?;
             if number % 10 == 9 {
-                mapper.flush()?; // What is mapped up to here survives a crash.
+                mapper.flush()?; // The scans so far survive a crash.
             }
         }
         drop(goal);
-        let (asked, blocked) = planner.join().map_err(|_| "the planner panicked")??;
-        println!("{SCANS} scans mapped; {blocked} of {asked} ways blocked");
+        let (checked, blocked) = planner.join().map_err(|_| "the planner panicked")??;
+        println!("{SCANS} scans mapped; {blocked} of {checked} paths blocked");
         Ok::<_, Box<dyn std::error::Error + Send + Sync>>(())
     })?;
     std::fs::remove_dir_all(&folder)?;

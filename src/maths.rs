@@ -1,15 +1,15 @@
-//! Deterministic mathematics: the same bits on every platform.
+//! Deterministic mathematics: bit-identical on all platforms.
 //!
-//! IEEE 754 fixes `+ - * /` and `sqrt`; everything else comes from the pure-Rust `libm`, never from the
-//! platform's library, and nothing is contracted into a fused multiply-add.
+//! IEEE 754 specifies `+ - * /` and `sqrt`; all other functions are from the pure-Rust `libm`, never from the
+//! platform's library, and no operations are contracted into a fused multiply-add.
 
 /// Log-odds of a probability in (0, 1): `ln(p / (1 - p))`.
 pub fn logit(probability: f64) -> f64 {
     libm::log(probability / (1.0 - probability))
 }
 
-/// The least log-odds that count as a probability: those of it in double or in single precision, whichever is less.
-/// OctoMap's files have the second.
+/// Smallest log-odds that count as a probability: the smaller of its logit in double and in single precision. OctoMap's
+/// files contain the latter.
 pub fn least_logit(probability: f64) -> f64 {
     let exact = logit(probability);
     exact.min(f64::from(exact as f32))

@@ -9,8 +9,8 @@ use crate::space::{TileBox, TileIndex, TileSelection, VoxelIndex};
 use crate::tile::{OctreeFactory, Tile};
 use rayon::prelude::*;
 
-/// A map that lives in memory and ends with it. It has tiles too, and gives the answers of an
-/// [`OutOfCoreTileMapper`](super::OutOfCoreTileMapper) to the bit.
+/// Map that is kept in memory only. It is divided into tiles and gives bit-identical answers to an
+/// [`OutOfCoreTileMapper`](super::OutOfCoreTileMapper).
 ///
 /// ```
 /// use voxtile::{InMemoryMapper, MapConfig, Mapper, Queries, Scan};
@@ -27,18 +27,18 @@ use rayon::prelude::*;
 pub struct InMemoryMapper {
     config: MapConfig,
     tiles: TileMap,
-    /// After the tiles: what is in flight to octrees goes with these, and need not be written any more.
+    /// Declared after `tiles`, so that the tiles are dropped first and discard updates still queued for octrees.
     octrees: OctreeFactory,
     tracer: ScanTracer,
     scan_number: u64,
 }
 
 impl InMemoryMapper {
-    /// An empty map.
+    /// Creates an empty map.
     ///
     /// # Errors
     ///
-    /// The first argument of the configuration that is wrong.
+    /// Fails with the first invalid argument of the configuration.
     pub fn new(config: MapConfig) -> Result<Self> {
         let config = config.validated()?;
         let tiles = TileMap::new(&config.grid);
@@ -110,7 +110,7 @@ impl MapView for InMemoryMapper {
     }
 
     #[inline]
-    fn tile_at_hand(&self, index: TileIndex) -> Option<&Tile> {
+    fn resident_tile(&self, index: TileIndex) -> Option<&Tile> {
         Some(self.tiles.get_or_nothing(index))
     }
 
@@ -140,8 +140,8 @@ impl Mapper for InMemoryMapper {
     }
 
     fn insert_all(&mut self, scans: &[&dyn ScanPoints], reports: &mut Vec<ScanReport>) -> Result<()> {
-        for some in scans.chunks(self.tracer.count_beside(scans.len())) {
-            let traced = self.tracer.trace_beside(trace_rules(&self.config, None), some);
+        for some in scans.chunks(self.tracer.max_concurrent(scans.len())) {
+            let traced = self.tracer.trace_concurrently(trace_rules(&self.config, None), some);
             for (scan, updates) in some.iter().zip(traced) {
                 reports.push(match updates? {
                     Some(updates) => self.accept(updates),

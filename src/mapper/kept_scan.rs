@@ -8,9 +8,9 @@ use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use std::ops::Range;
 use std::sync::Arc;
 
-/// A scan that a map keeps: what it was inserted as, to the bit.
+/// Scan that a map keeps, bit-identical to the inserted one.
 ///
-/// As [`ScanPoints`] its points are in the world frame, by the pose that it has now.
+/// As [`ScanPoints`], its points are in the world frame, transformed by its current pose.
 #[derive(Clone, Debug)]
 pub struct KeptScan {
     record: KeptRecord,
@@ -18,25 +18,24 @@ pub struct KeptScan {
     points: Points,
 }
 
-/// Where the points are.
 #[derive(Clone, Debug)]
 enum Points {
     InMemory(Vec<Point>, Vec<f32>),
-    /// Read again each time.
+    /// Read from disk at each use.
     OnDisk(Arc<dyn Disk>, Layout),
 }
 
 impl KeptScan {
-    /// Opens a scan; if it has at most so many points, they are read into memory.
+    /// Opens a scan. If it has at most `max_points` points, they are read into memory.
     ///
     /// # Errors
     ///
-    /// Damage, or a disk that refuses.
+    /// Fails if the scan is damaged or a read fails.
     pub(crate) fn open(
         disk: &Arc<dyn Disk>,
         layout: &Layout,
         record: KeptRecord,
-        most_points: u64,
+        max_points: u64,
     ) -> Result<Self> {
         let world_from_sensor = match record.frame {
             KeptFrame::Sensor(pose) => Some(pose_of_numbers(&pose)),
@@ -44,7 +43,7 @@ impl KeptScan {
         };
         let points = Points::OnDisk(disk.clone(), layout.clone());
         let mut scan = Self { record, world_from_sensor, points };
-        if scan.record.points <= most_points {
+        if scan.record.points <= max_points {
             let (mut points, mut intensities) = (Vec::new(), Vec::new());
             scan.for_each_own_chunk(0..scan.len(), &mut |some, of_some| {
                 points.extend_from_slice(some);
@@ -56,22 +55,22 @@ impl KeptScan {
         Ok(scan)
     }
 
-    /// Its number in the map, from 1.
+    /// Scan number in the map, from 1.
     pub fn number(&self) -> u64 {
         self.record.number
     }
 
-    /// Which part of its rays counted.
+    /// Ray settings that the scan was inserted with.
     pub fn rays(&self) -> &RayConfig {
         &self.record.rays
     }
 
-    /// What the map knows of it without its points.
+    /// Record of the scan in the catalog, without its points.
     pub fn record(&self) -> &KeptRecord {
         &self.record
     }
 
-    /// The same scan, taken with another pose.
+    /// Returns the same scan with another pose.
     #[must_use]
     pub fn with_pose(mut self, world_from_sensor: Pose) -> Self {
         self.world_from_sensor = Some(world_from_sensor);
@@ -145,13 +144,13 @@ impl ScanPoints for KeptScan {
     }
 }
 
-/// A pose as a catalog has it: position in metres, quaternion x, y, z, w.
+/// Returns a pose as the catalog stores it: position in metres, then quaternion x, y, z, w.
 pub(crate) fn pose_numbers(pose: &Pose) -> [f64; 7] {
     let ([x, y, z], [qx, qy, qz, qw]) = (pose.position_m(), pose.quaternion());
     [x, y, z, qx, qy, qz, qw]
 }
 
-/// The pose of the numbers of a [`KeptFrame::Sensor`], to the bit.
+/// Returns the pose of a [`KeptFrame::Sensor`], bit for bit, without normalising the quaternion again.
 pub(super) fn pose_of_numbers(&[x, y, z, qx, qy, qz, qw]: &[f64; 7]) -> Pose {
     let rotation = UnitQuaternion::new_unchecked(Quaternion::new(qw, qx, qy, qz));
     Pose::from(Isometry3::from_parts(Translation3::new(x, y, z), rotation))

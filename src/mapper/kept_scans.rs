@@ -3,16 +3,16 @@ use crate::error::{Error, Result};
 use crate::store::{Disk, KeptRecord, KeptRecords, Layout, TileStore};
 use std::sync::Arc;
 
-/// Most points of a kept scan that are read into memory: 7 MiB. Those of a larger one are read again when needed.
+/// Largest number of points of a kept scan that are read into memory (7 MiB). Larger scans are read at each use.
 const MAX_POINTS_IN_MEMORY: u64 = 1 << 18;
 
-/// The scans that a map keeps, one at a time, in order. Reading one does not read others.
+/// Iterator over the scans that a map keeps, in order. Each scan is read on its own.
 #[derive(Debug)]
 pub struct KeptScans {
     disk: Arc<dyn Disk>,
     layout: Layout,
     records: KeptRecords,
-    /// The flush that is read; `None` for a snapshot, which does not change.
+    /// The flush that is read; `None` for a snapshot, which never changes.
     flush_number: Option<u64>,
 }
 
@@ -26,26 +26,26 @@ impl KeptScans {
         Self { disk, layout, records, flush_number }
     }
 
-    /// What is known of the next scan, without its points; [`KeptScans::open`] reads these.
+    /// Returns the record of the next scan, without its points; [`KeptScans::open`] reads them.
     ///
     /// # Errors
     ///
-    /// Damage, or a disk that refuses.
+    /// Fails if the catalog is damaged or a read fails.
     pub fn next_record(&mut self) -> Result<Option<KeptRecord>> {
         self.records.next_kept().map_err(|error| self.explain(error))
     }
 
-    /// The scan of a record.
+    /// Opens the scan of a record.
     ///
     /// # Errors
     ///
-    /// Damage, or a disk that refuses.
+    /// Fails if the scan is damaged or a read fails.
     pub fn open(&self, record: KeptRecord) -> Result<KeptScan> {
         KeptScan::open(&self.disk, &self.layout, record, MAX_POINTS_IN_MEMORY)
             .map_err(|error| self.explain(error))
     }
 
-    /// What is missing is damage, unless a writer has removed it since.
+    /// Turns damage into [`Error::Changed`] if a writer has flushed since and may have removed the file.
     fn explain(&self, error: Error) -> Error {
         let folder = self.layout.folder();
         let (Error::Damaged { .. }, Some(flush_number)) = (&error, self.flush_number) else { return error };

@@ -6,55 +6,54 @@ use crate::store::{CatalogEntry, Disk, KeptFrame, KeptRecord, MapPath};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// The scans that a map keeps, as of one flush, without points and tiles: some hundred bytes a scan.
+/// Summary of the scans that a map keeps as of one flush, without points and tiles: a few hundred bytes per scan.
 ///
-/// What changes the scans of a map decides by it. It is read once, in one pass over the catalog; a change is refused
-/// with [`Error::Changed`] if the map was flushed since.
+/// Operations that change scans are planned with it. It is read in one pass over the catalog. An operation fails with
+/// [`Error::Changed`] if the map was flushed since.
 #[derive(Clone, Debug)]
 pub struct KeptSummary {
     disk: Arc<dyn Disk>,
     folder: PathBuf,
     flush_number: u64,
-    /// The catalog that was read.
+    /// Generation of the catalog that was read.
     catalog: Option<u64>,
     heads: Vec<KeptScanHead>,
     /// First and last numbers of removed scans.
     removed: Vec<(u64, u64)>,
-    /// Why the map cannot be mapped again from its scans.
+    /// Reason why the map cannot be replayed from its scans.
     refusal: Option<String>,
 }
 
-/// A scan that a map keeps, without points and tiles.
+/// Summary of one kept scan, without points and tiles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct KeptScanHead {
-    /// Its number in the map, from 1.
+    /// Scan number in the map, from 1.
     pub number: u64,
-    /// When it was taken, in nanoseconds since the epoch of its source, if that is known.
+    /// Acquisition time in nanoseconds since the epoch of the source, if known.
     pub stamp_ns: Option<i64>,
-    /// The pose of the sensor; `None` if the points are in the world frame, so that no pose moves them.
+    /// Sensor pose; `None` if the points are in the world frame, where no pose applies.
     pub world_from_sensor: Option<Pose>,
-    /// Voxels that it updated when it was mapped, each as often as it was.
+    /// Number of voxel updates when the scan was inserted; a voxel updated twice counts twice.
     pub updates: u64,
-    /// The segment with its points.
+    /// Segment that contains its points.
     pub(crate) segment: u64,
 }
 
-/// What to do about a map without kept scans.
-const NOT_KEPT: &str =
-    "keeps no scans, so that it cannot be mapped again; build it with `keep_scans` to have them";
+/// Error text for a map without kept scans.
+const NOT_KEPT: &str = "keeps no scans and cannot be replayed; build it with `keep_scans`";
 
 impl KeptSummary {
-    /// Reads it from a map.
+    /// Reads the summary of a map.
     ///
     /// # Errors
     ///
-    /// No map there, damage, a disk that refuses. A map that keeps no scans is none.
+    /// Fails if there is no map, it is damaged, a read fails or the map keeps no scans.
     pub fn read(map: impl Into<MapPath>) -> Result<Self> {
         MapReader::open(map, 0)?.kept_summary()
     }
 
-    /// Reads it from an open map, and shows each record in passing.
+    /// Reads the summary from an open map and passes each record to `each`.
     pub(super) fn of(map: &MapReader, mut each: impl FnMut(&KeptRecord) -> Result<()>) -> Result<Self> {
         let mut summary = Self {
             disk: map.disk(),
@@ -85,11 +84,11 @@ impl KeptSummary {
         Ok(summary)
     }
 
-    /// Checks that the map consists of scans that it keeps and of nothing else: only then it can be mapped again.
+    /// Checks that the map consists of kept scans only, so that it can be replayed.
     ///
     /// # Errors
     ///
-    /// What else there is, named.
+    /// Fails if the map has other content, and names it.
     pub fn check_keeps_all(&self) -> Result<()> {
         match &self.refusal {
             None => Ok(()),
@@ -97,12 +96,12 @@ impl KeptSummary {
         }
     }
 
-    /// The scans, in order.
+    /// The kept scans, in order.
     pub fn scans(&self) -> &[KeptScanHead] {
         &self.heads
     }
 
-    /// First and last numbers of scans that were removed from the map, in order.
+    /// First and last number of each range of removed scans, in order.
     pub fn removed(&self) -> &[(u64, u64)] {
         &self.removed
     }
@@ -112,12 +111,13 @@ impl KeptSummary {
         self.flush_number
     }
 
-    /// Where the map is.
+    /// Disk and folder of the map.
     pub(crate) fn place(&self) -> (Arc<dyn Disk>, &Path) {
         (self.disk.clone(), &self.folder)
     }
 
-    /// The generation of the catalog that was read. Scans add to it; what changes earlier entries makes another one.
+    /// Generation of the catalog that was read. New scans extend this catalog; changes of earlier entries create a new
+    /// generation.
     pub(crate) fn catalog(&self) -> Option<u64> {
         self.catalog
     }
@@ -133,26 +133,28 @@ impl KeptScanHead {
         Self { number, stamp_ns, world_from_sensor, updates, segment: place.segment }
     }
 
-    /// A scan of this number, for tests of what decides by these.
+    /// Creates a head for tests.
     #[doc(hidden)]
     pub fn new(number: u64, stamp_ns: Option<i64>, world_from_sensor: Option<Pose>) -> Self {
         Self { number, stamp_ns, world_from_sensor, updates: 0, segment: 0 }
     }
 }
 
-/// The error of a map that keeps no scans.
+/// Error for a map that keeps no scans.
 pub(super) fn keeps_none(folder: &Path) -> Error {
     Error::argument(folder.display().to_string(), NOT_KEPT)
 }
 
-/// Why a map with this entry cannot be mapped again from the scans that it keeps; `None` if it can.
+/// Returns why a map with this catalog entry cannot be replayed from its kept scans; `None` if it can.
 pub(crate) fn no_kept_scan(entry: &CatalogEntry) -> Option<String> {
     let what = match entry {
         CatalogEntry::Kept(_) | CatalogEntry::Removed(..) => return None,
         CatalogEntry::Listed(scan) => format!("scan {}, whose points are not kept", scan.number),
-        CatalogEntry::Unlisted(first, last) if first == last => format!("number {first}, which is no scan"),
-        CatalogEntry::Unlisted(first, last) => format!("numbers {first} to {last}, which are no scans"),
-        CatalogEntry::Operation(what) => format!("a change that is no scan: {what}"),
+        CatalogEntry::Unlisted(first, last) if first == last => {
+            format!("number {first}, which is not a scan")
+        }
+        CatalogEntry::Unlisted(first, last) => format!("numbers {first} to {last}, which are not scans"),
+        CatalogEntry::Operation(what) => format!("a change by another operation: {what}"),
     };
-    Some(format!("cannot be mapped again from its scans, for it also consists of {what}"))
+    Some(format!("cannot be replayed from its scans, because it also contains {what}"))
 }

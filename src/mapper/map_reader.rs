@@ -19,39 +19,39 @@ use std::num::NonZeroUsize;
 use std::path::Path;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-/// A map on disk, opened to be asked: it takes no lock, beside a writer too, and never writes.
+/// Map on disk, opened for queries. It takes no lock and never writes, and may be used while a writer is active.
 ///
-/// It sees the last flush before it was opened, whole, however often a writer flushes meanwhile: the writer keeps what
-/// this reader sees. Only where the file system has no locks, or when another writer was started meanwhile, tiles that
-/// changed are answered with [`Error::Changed`]: open the map again.
+/// It sees the complete last flush before it was opened, however often a writer flushes since: the writer keeps the
+/// files that the reader sees. Only where the file system has no locks, or if another writer was started since, a read
+/// of a changed tile fails with [`Error::Changed`]: open the map again.
 #[derive(Debug)]
 pub struct MapReader {
     config: MapConfig,
     octrees: OctreeFactory,
     store: TileStore,
-    /// Where the tiles are that this reader sees.
+    /// Tiles that exist as of this reader's flush.
     space: TileSpace,
     disk: Arc<dyn Disk>,
-    /// The tiles in order, once a disk wants to know which come next.
+    /// The tiles in order; built when the disk supports read-ahead.
     order: OnceLock<Vec<TileIndex>>,
     cache: Mutex<ReaderCache>,
 }
 
-/// The tiles in memory, in the order of their last use.
+/// Cache of tiles in memory, in the order of their last use.
 #[derive(Debug)]
 struct ReaderCache {
-    /// With their bytes.
+    /// Tiles with their sizes in bytes.
     tiles: LruCache<TileIndex, (Arc<Tile>, usize)>,
     bytes: usize,
     max_tiles: usize,
     max_bytes: usize,
-    /// Tiles not in memory of which one voxel was asked.
-    asked_once: LruCache<TileIndex, ()>,
+    /// Tiles not in memory of which one voxel was read.
+    read_once: LruCache<TileIndex, ()>,
     io: IoCounts,
 }
 
-/// Most tiles that are remembered for having been asked once.
-const MAX_ASKED_ONCE: NonZeroUsize = NonZeroUsize::new(1024).unwrap();
+/// Largest number of tiles in `read_once`.
+const MAX_READ_ONCE: NonZeroUsize = NonZeroUsize::new(1024).unwrap();
 
 impl ReaderCache {
     fn new(memory: MemoryLimit, grid: &Grid) -> Self {
@@ -64,7 +64,7 @@ impl ReaderCache {
             bytes: 0,
             max_tiles,
             max_bytes: memory.bytes(grid).unwrap_or(usize::MAX),
-            asked_once: LruCache::new(MAX_ASKED_ONCE),
+            read_once: LruCache::new(MAX_READ_ONCE),
             io: IoCounts::default(),
         }
     }
@@ -79,11 +79,11 @@ impl ReaderCache {
         self.bytes -= self.tiles.pop(&index).map_or(0, |(_, bytes)| bytes);
     }
 
-    /// Puts a tile in and drops others, those used longest ago first, until all fit. One always does.
+    /// Inserts a tile and evicts the least recently used ones until all fit. The inserted tile is always kept.
     fn put(&mut self, tile: Arc<Tile>) {
         let (index, bytes) = (tile.index(), tile.bytes());
         self.remove(index);
-        self.asked_once.pop(&index);
+        self.read_once.pop(&index);
         while (self.tiles.len() >= self.max_tiles || self.bytes.saturating_add(bytes) > self.max_bytes)
             && let Some((_, (_, dropped))) = self.tiles.pop_lru()
         {
@@ -94,17 +94,17 @@ impl ReaderCache {
     }
 }
 
-/// What only concerns a run has its defaults.
+/// Returns the configuration of a map. Settings that concern only a run have their defaults.
 fn config_of_store(store: &TileStore) -> Result<MapConfig> {
     config_from(store.metadata(), &store.layout().metadata())?.validated()
 }
 
 impl MapReader {
-    /// Opens the map in a folder, keeping up to so many bytes of tiles in memory, and one tile in any case.
+    /// Opens the map in a folder. Tiles in memory take at most `memory_bytes`, but one tile is always kept.
     ///
     /// # Errors
     ///
-    /// No map there, or damage to what tells which tiles there are.
+    /// Fails if there is no map or its list of tiles is damaged.
     pub fn open(folder: impl Into<MapPath>, memory_bytes: usize) -> Result<Self> {
         Self::open_within(folder.into(), MemoryLimit::Bytes(memory_bytes))
     }
@@ -114,11 +114,11 @@ impl MapReader {
         Self::of_store(TileStore::open_read_only(disk.clone(), &folder)?, disk, memory)
     }
 
-    /// Opens a snapshot of the map in a folder: it is read like the map, as of then, and in as much memory.
+    /// Opens a snapshot of the map in a folder, with the same memory limit as [`MapReader::open`].
     ///
     /// # Errors
     ///
-    /// No map or no snapshot of this name there; a damaged snapshot.
+    /// Fails if there is no map, no such snapshot, or the snapshot is damaged.
     pub fn open_snapshot(
         folder: impl Into<MapPath>,
         name: &SnapshotName,
@@ -144,16 +144,16 @@ impl MapReader {
         Ok(Self { config, octrees, store, space, disk, order: OnceLock::new(), cache })
     }
 
-    /// Goes on to the last flush; whether there is a newer one than the one seen so far. Tiles in memory that have not
-    /// changed stay there. From then on the writer need not keep what this reader saw before: a reader that lives long
-    /// and is never refreshed costs, for each tile that is flushed anew, the bytes of the version that it sees.
+    /// Updates the reader to the last flush and returns whether it is newer than the one seen so far. Unchanged tiles
+    /// remain in memory. The writer may then remove the files of the earlier flush. A reader that is open for long and
+    /// never refreshed costs disk space: the old version of each tile that was flushed since.
     ///
-    /// A reader of a snapshot, which does not change, stays where it is.
+    /// A reader of a snapshot does not change.
     ///
     /// # Errors
     ///
-    /// As for [`MapReader::open`], and [`Error::Mismatch`] if there is another map in the folder by now. The reader
-    /// goes on seeing what it saw then.
+    /// Same errors as [`MapReader::open`]; also fails with [`Error::Mismatch`] if the folder contains another map now.
+    /// After an error the reader still sees its earlier flush.
     pub fn refresh(&mut self) -> Result<bool> {
         if self.snapshot().is_some() {
             return Ok(false);
@@ -184,27 +184,28 @@ impl MapReader {
         Ok(is_newer)
     }
 
-    /// The configuration that a map was made with, to go on with it. What only concerns a run has its defaults.
+    /// Reads the configuration that a map was created with, for example to continue it. Settings that concern only a
+    /// run have their defaults.
     ///
     /// # Errors
     ///
-    /// No map there, or metadata that cannot be read.
+    /// Fails if there is no map or its metadata cannot be read.
     pub fn config_of(folder: impl Into<MapPath>) -> Result<MapConfig> {
         let (disk, folder) = folder.into().into_parts();
         config_of_store(&TileStore::open_read_only(disk, &folder)?)
     }
 
-    /// What `metadata.json` says.
+    /// The content of `metadata.json`.
     pub fn metadata(&self) -> &Metadata {
         self.store.metadata()
     }
 
-    /// Whether the map has the checksums that let damage be found; a map of the original format has none.
+    /// Returns whether the map has checksums, so that damage can be detected. A map of the original format has none.
     pub fn is_verified(&self) -> bool {
         self.store.map_id().is_some()
     }
 
-    /// The snapshot that this reader sees; `None` if it sees the map as it was when it was opened.
+    /// The snapshot that this reader sees; `None` if it reads the map itself.
     pub fn snapshot(&self) -> Option<&SnapshotName> {
         self.store.opened_snapshot()
     }
@@ -214,17 +215,16 @@ impl MapReader {
         self.store.folder()
     }
 
-    /// Its files.
     pub(crate) fn store(&self) -> &TileStore {
         &self.store
     }
 
-    /// The map's id; `None` for a map of the original format.
+    /// The id of the map; `None` for a map of the original format.
     pub(crate) fn map_id(&self) -> Option<[u8; 16]> {
         self.store.map_id()
     }
 
-    /// What is known of a tile without reading it.
+    /// Version of a tile in the commit log; `None` if the map has no such tile.
     pub(crate) fn version(&self, index: TileIndex) -> Option<TileVersion> {
         self.store.tiles().version(index)
     }
@@ -234,7 +234,8 @@ impl MapReader {
         self.store.commits().flush_number
     }
 
-    /// Observed and occupied voxels of the whole map, from the log alone; `None` for a map of the original format.
+    /// Numbers of observed and of occupied voxels of the map, from the commit log; `None` for a map of the original
+    /// format.
     pub fn voxel_counts(&self) -> Option<(u64, u64)> {
         self.is_verified().then(|| {
             let versions = self.store.commits().tiles.values();
@@ -244,12 +245,12 @@ impl MapReader {
         })
     }
 
-    /// The scans of the map in order: number, time stamp and origin of each. Batches have none, and neither have maps
-    /// of earlier versions.
+    /// The scans of the map in order, each with number, time stamp and origin. Batch updates and maps of earlier
+    /// versions have no records.
     ///
     /// # Errors
     ///
-    /// A list that cannot be read or is damaged.
+    /// Fails if the list is damaged or cannot be read.
     pub fn scans(&self) -> Result<Vec<ScanRecord>> {
         if self.keeps_scans() {
             let (mut records, mut scans) = (self.kept_records()?, Vec::new());
@@ -268,7 +269,7 @@ impl MapReader {
         read_scans(&*self.disk, self.store.layout(), self.flush_number(), records)
     }
 
-    /// Whether the map keeps its scans.
+    /// Returns whether the map keeps its scans.
     pub fn keeps_scans(&self) -> bool {
         self.store.archive().is_on()
     }
@@ -277,7 +278,7 @@ impl MapReader {
     ///
     /// # Errors
     ///
-    /// A map that keeps none, with a hint; a list that cannot be read or is damaged.
+    /// Fails if the map keeps no scans, or if their list is damaged or cannot be read.
     pub fn kept_scans(&self) -> Result<KeptScans> {
         if !self.keeps_scans() {
             return Err(keeps_none(self.folder()));
@@ -286,16 +287,16 @@ impl MapReader {
         Ok(KeptScans::new(self.disk.clone(), self.store.layout().clone(), self.kept_records()?, flush_number))
     }
 
-    /// What is known of these scans without their points, by one pass over their list.
+    /// Reads a summary of the kept scans in one pass over their list, without points.
     ///
     /// # Errors
     ///
-    /// A list that cannot be read or is damaged. A map that keeps no scans is none.
+    /// Fails if the map keeps no scans, or if their list is damaged or cannot be read.
     pub fn kept_summary(&self) -> Result<KeptSummary> {
         self.kept_summary_with(|_| Ok(()))
     }
 
-    /// The same; `each` sees the records in passing.
+    /// Like [`Self::kept_summary`]; also passes each record to `each`.
     pub(crate) fn kept_summary_with(
         &self,
         each: impl FnMut(&KeptRecord) -> Result<()>,
@@ -307,7 +308,8 @@ impl MapReader {
         self.explained(self.store.archive().records())
     }
 
-    /// Bytes on disk in tables and in octrees, of which a snapshot has none; `None` for a map of the original format.
+    /// Bytes on disk of all tables and of all octrees; a snapshot has no octrees. `None` for a map of the original
+    /// format.
     pub fn disk_bytes(&self) -> Option<(u64, u64)> {
         self.is_verified().then(|| {
             let versions = self.store.commits().tiles.values();
@@ -318,36 +320,36 @@ impl MapReader {
         })
     }
 
-    /// Bytes on disk of a tile: its table and its octree, of which a snapshot has none; `None` if the map has no such
-    /// tile or is of the original format.
+    /// Bytes on disk of a tile's table and octree; a snapshot has no octrees. `None` if the map has no such tile or is
+    /// of the original format.
     pub fn tile_bytes(&self, index: TileIndex) -> Option<u64> {
         let version = self.version(index).filter(|_| self.is_verified())?;
         let octree_bytes = if self.snapshot().is_some() { 0 } else { version.octree.bytes };
         Some(version.table.bytes + octree_bytes)
     }
 
-    /// Where the map is.
+    /// The disk that contains the map.
     #[doc(hidden)]
     pub fn disk(&self) -> Arc<dyn Disk> {
         self.disk.clone()
     }
 
-    /// The table of a tile as it stands in its file, which is not kept in memory; `None` if the map has no such tile.
+    /// Reads the table of a tile from its file, without caching it; `None` if the map has no such tile.
     pub(crate) fn read_table(&self, index: TileIndex) -> Result<Option<ReadTable>> {
         self.read_ahead(index);
         self.explained(load::load_table(&self.store, &self.config.grid, index))
     }
 
-    /// Names the tiles behind this one to a disk that wants to know them: who looks at a tile once walks over all.
+    /// Announces the tiles after this one to a disk that reads ahead: uncached reads usually visit all tiles in order.
     fn read_ahead(&self, index: TileIndex) {
         let files = self.disk.files_ahead();
-        // A snapshot may see a kept table in place of the present one.
+        // A snapshot may see a kept table instead of the current one.
         if files == 0 || self.snapshot().is_some() {
             return;
         }
         let order = self.order.get_or_init(|| self.tile_indices());
-        let behind = order.partition_point(|tile| *tile <= index);
-        for tile in order.iter().skip(behind).take(files) {
+        let first = order.partition_point(|tile| *tile <= index);
+        for tile in order.iter().skip(first).take(files) {
             self.disk.read_ahead(&self.store.layout().current(*tile, TileFile::Table));
         }
     }
@@ -356,12 +358,12 @@ impl MapReader {
         self.explained(load::load(&self.store, &self.config.grid, &self.octrees, index))
     }
 
-    /// Looks into the cache.
+    /// Runs `look` on the cache.
     fn found<T>(&self, look: impl FnOnce(&mut ReaderCache) -> T) -> T {
         look(&mut self.cache.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
-    /// A tile that does not match the log is damage, unless a writer has flushed since and did not see this reader.
+    /// Turns damage into [`Error::Changed`] if a writer has flushed since without seeing this reader's lock.
     pub(super) fn explained<T>(&self, result: Result<T>) -> Result<T> {
         result.map_err(|error| self.explain(error))
     }
@@ -372,7 +374,7 @@ impl MapReader {
         }
         let folder = self.store.folder();
         if let Some(name) = self.snapshot() {
-            // Deleted meanwhile?
+            // The snapshot may have been deleted since.
             return TileStore::open_snapshot(self.disk.clone(), folder, name).err().unwrap_or(error);
         }
         let now =
@@ -422,7 +424,7 @@ impl MapView for MapReader {
         if let Some(tile) = self.found(|cache| cache.get(index)) {
             return Ok(Some(TileRef::shared(tile)));
         }
-        // Other threads find theirs meanwhile.
+        // Loaded without the lock, so that other threads can use the cache.
         let Some((tile, bytes)) = self.load(index)? else { return Ok(None) };
         let tile = Arc::new(tile);
         self.found(|cache| {
@@ -433,13 +435,13 @@ impl MapView for MapReader {
         Ok(Some(TileRef::shared(tile)))
     }
 
-    /// The first voxel asked of a tile that is not in memory is read from a part of its file; with the second one the
-    /// tile is loaded: where two were asked, more will be.
+    /// The first voxel of a tile that is not in memory is read from a part of its file. The second voxel loads the
+    /// tile, because more will likely follow.
     fn evidence(&self, voxel: VoxelIndex) -> Result<Option<Evidence>> {
         let index = self.config.grid.tile_of_voxel(voxel);
         let (tile, is_first) = self.found(|cache| {
             let tile = cache.get(index);
-            let is_first = tile.is_none() && cache.asked_once.put(index, ()).is_none();
+            let is_first = tile.is_none() && cache.read_once.put(index, ()).is_none();
             (tile, is_first)
         });
         if let Some(tile) = tile {

@@ -1,4 +1,4 @@
-//! Maps: two mappers behind one trait with equal answers, and a reader that works beside a writer.
+//! Maps: two mappers with one trait and identical answers, and a reader that may be used while a writer is active.
 //!
 //! | | [`InMemoryMapper`] | [`OutOfCoreTileMapper`] | [`MapReader`] |
 //! |---|---|---|---|
@@ -10,9 +10,9 @@
 //! insert_points -> scan::trace -> updates by tile -> paging: resident tiles, write buffer -> persistence -> store
 //! ```
 //!
-//! A file of OctoMap is a map to be asked, too: [`OctreeMap`].
+//! [`OctreeMap`] makes an OctoMap file queryable as a map.
 //!
-//! How tiles move between memory and disk is in `paging`.
+//! `paging` moves tiles between memory and disk.
 
 mod in_memory;
 mod kept_scan;
@@ -25,7 +25,7 @@ mod options;
 mod out_of_core;
 mod paging;
 mod remapper;
-mod side_mapper;
+mod shadow_mapper;
 mod statistics;
 mod stoppable;
 mod tile_finder;
@@ -45,7 +45,7 @@ pub use octree_map::OctreeMap;
 pub use options::MapOptions;
 pub use out_of_core::OutOfCoreTileMapper;
 pub(crate) use remapper::Remapper;
-pub(crate) use side_mapper::SideMapper;
+pub(crate) use shadow_mapper::ShadowMapper;
 pub use statistics::{IoCounts, MapStatistics, MemoryCounts, StallCounts};
 pub use stoppable::Stoppable;
 pub(crate) use tile_finder::TileFinder;

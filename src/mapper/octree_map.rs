@@ -12,10 +12,10 @@ use std::num::NonZeroUsize;
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// A file of OctoMap (`.bt` or `.ot`) as a map: it is asked like any other.
+/// OctoMap file (`.bt` or `.ot`) as a map with the usual queries.
 ///
-/// The file's tree is in memory as OctoMap would have it; tiles are made of it when somebody asks for them. Voxels have
-/// the log-odds of the file, in a `.bt` file OctoMap's clamps, and no observation count (0).
+/// The tree of the file is kept in memory, as in OctoMap. Tiles are built from it on demand. Voxels have the log-odds
+/// of the file, in a `.bt` file OctoMap's clamping values, and the observation count 0.
 ///
 /// ```
 /// use voxtile::mapper::OctreeMap;
@@ -39,40 +39,39 @@ pub struct OctreeMap {
     tree: Octree,
     format: OctreeFormat,
     id: String,
-    /// In order.
     tiles: Vec<TileIndex>,
     space: TileSpace,
     cache: Mutex<TileCache>,
 }
 
-/// Edge of the tiles that a file is cut into, about.
+/// Approximate edge of the tiles into which a file is divided.
 const TILE_SIZE_M: f64 = 10.0;
-/// Most voxels along an edge of these: all of a tile take 150 MB.
+/// Largest tile edge in voxels; a tile of this size takes 150 MB if all voxels are known.
 const MAX_TILE_EDGE: f64 = 400.0;
-/// Tiles in memory.
+/// Maximum number of tiles in memory.
 const CACHE_TILES: NonZeroUsize = NonZeroUsize::new(32).expect("more than none");
-/// Bytes of these, but for the last one.
+/// Maximum size of the cached tiles in bytes; the last tile is always kept.
 const CACHE_BYTES: usize = 128 << 20;
-/// Most tiles that the leaves of a file may stand for: one of twenty bytes can stand for 2^48 voxels.
+/// Maximum number of tiles that a file may cover: a file of twenty bytes can describe 2^48 voxels.
 const MAX_TILES: u64 = 1 << 23;
 /// Depth of bricks in OctoMap's tree.
 const BRICK_DEPTH: u8 = 13;
-/// The first voxel of OctoMap's space.
+/// Smallest voxel index in OctoMap's space.
 const FIRST_VOXEL: VoxelIndex = [-32768; 3];
 
 impl OctreeMap {
-    /// Whether a path names a file of OctoMap: by how it begins or, for files without a header, by its extension.
+    /// Returns whether a path names an OctoMap file: by its first line, or by its extension for files without a header.
     pub fn is_named_by(path: &Path) -> bool {
         let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
         let is_named = || ["bt", "ot"].iter().any(|known| extension.eq_ignore_ascii_case(known));
         path.is_file() && (is_named() || begins_as_octree(path))
     }
 
-    /// The map of a file that is in memory.
+    /// Returns the map of a decoded file.
     ///
     /// # Errors
     ///
-    /// Leaves that stand for more tiles than can be listed, a resolution that no map can have.
+    /// Fails if the leaves cover too many tiles or the resolution is invalid.
     pub fn of(file: OctreeFile) -> Result<Self> {
         let OctreeFile { tree, resolution_m, id, format, .. } = file;
         let edge = (TILE_SIZE_M / resolution_m).round().clamp(2.0, MAX_TILE_EDGE);
@@ -82,22 +81,22 @@ impl OctreeMap {
         Ok(Self { config, tree, format, id, tiles, space, cache: Mutex::default() })
     }
 
-    /// Which of OctoMap's formats the file has.
+    /// Format of the file.
     pub fn format(&self) -> OctreeFormat {
         self.format
     }
 
-    /// OctoMap's name of the tree's class.
+    /// Class name of the tree in OctoMap.
     pub fn id(&self) -> &str {
         &self.id
     }
 
-    /// The tree as it is in the file.
+    /// The tree of the file.
     pub fn tree(&self) -> &Octree {
         &self.tree
     }
 
-    /// Makes the table of a tile.
+    /// Builds the table of a tile.
     pub(crate) fn table_of(&self, index: TileIndex) -> Table {
         let end = FIRST_VOXEL.map(|first| -first);
         let voxels = self.config.grid.voxels_of_tile(index);
@@ -127,7 +126,7 @@ impl OctreeMap {
         Arc::new(Tile::uncached(&self.config.grid, index, self.table_of(index)))
     }
 
-    /// Collects the known voxels of a brick that lie in a box: place and evidence, in Morton order.
+    /// Collects the known voxels of a brick within a box, as Morton position and evidence, in Morton order.
     fn collect(&self, corner: VoxelIndex, within: &VoxelBox, known: &mut Vec<(usize, Evidence)>) {
         known.clear();
         let brick = BrickCode::of_voxel(corner);
@@ -147,16 +146,16 @@ impl OctreeMap {
     }
 }
 
-/// Whether a file can be read and begins as OctoMap's do.
+/// Returns whether a file can be read and begins like an OctoMap file.
 fn begins_as_octree(path: &Path) -> bool {
-    /// More than the first line has that counts.
+    /// Enough for the distinguishing part of the first line.
     const FIRST_BYTES: u64 = 64;
     let mut first = Vec::new();
     let read = FsDisk.open(path).and_then(|file| file.take(FIRST_BYTES).read_to_end(&mut first));
     read.is_ok() && OctreeFormat::of_first_bytes(&first).is_some()
 }
 
-/// The tiles that were made last.
+/// LRU cache of tiles.
 #[derive(Debug)]
 struct TileCache {
     tiles: LruCache<TileIndex, Arc<Tile>>,
@@ -184,29 +183,29 @@ impl TileCache {
     }
 }
 
-/// The tiles that a tree's leaves lie in, in order.
+/// Returns the tiles that the leaves of a tree overlap, in order.
 fn tiles_of(config: &MapConfig, tree: &Octree) -> Result<Vec<TileIndex>> {
     let grid = &config.grid;
     let mut tiles: Vec<TileIndex> = Vec::new();
-    let mut most_before_sorting = 1 << 16;
+    let mut max_before_sorting = 1 << 16;
     for Leaf { code, depth, .. } in tree.leaves() {
         let first = code.to_key().to_index_from(FIRST_VOXEL);
         let last = first.map(|k| k + ((1 << (16 - i32::from(depth))) - 1));
         let covered = TileBox::new(grid.tile_of_voxel(first), grid.tile_of_voxel(last));
         let count = covered.count();
         if tiles.len() as u64 + count > MAX_TILES {
-            let hint = "such a file is made by pruning large cubes; cut it with OctoMap's tools first";
-            let what = "number of tiles that the file stands for";
+            let hint = "the file contains large pruned cubes; crop it with OctoMap's tools first";
+            let what = "number of tiles covered by the file";
             return Err(Error::TooLarge { what, size: count, limit: MAX_TILES, hint });
         }
         if count == 1 && tiles.last() == Some(&covered.min()) {
             continue;
         }
         tiles.extend(covered.tiles());
-        if tiles.len() > most_before_sorting {
+        if tiles.len() > max_before_sorting {
             tiles.sort_unstable();
             tiles.dedup();
-            most_before_sorting = 2 * tiles.len().max(1 << 15);
+            max_before_sorting = 2 * tiles.len().max(1 << 15);
         }
     }
     tiles.sort_unstable();
@@ -254,7 +253,7 @@ impl MapView for OctreeMap {
         if let Some(tile) = cache().tiles.get(&index) {
             return Ok(Some(TileRef::shared(tile.clone())));
         }
-        // Other threads find theirs meanwhile.
+        // Built without the lock, so that other threads can use the cache.
         let tile = self.make_tile(index);
         cache().put(index, &tile);
         Ok(Some(TileRef::shared(tile)))

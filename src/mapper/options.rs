@@ -3,7 +3,7 @@ use crate::config::{MapConfig, MemoryLimit};
 use crate::error::{Error, Result};
 use crate::store::{MapPath, SnapshotName};
 
-/// Opens or creates a map on disk.
+/// Options for opening or creating a map on disk.
 ///
 /// ```
 /// use voxtile::{MapConfig, MapOptions, Mapper, Scan};
@@ -17,7 +17,7 @@ use crate::store::{MapPath, SnapshotName};
 /// mapper.insert_scan(&Scan { origin: [0.0; 3], points: vec![[4.0, 0.0, 0.0]], intensities: None })?;
 /// mapper.flush()?;
 ///
-/// // Beside the mapper, in this process or in another; the map knows how it was made.
+/// // While the mapper is open, in this process or another. The map stores its configuration.
 /// let reader = MapOptions::new().memory_bytes(64 << 20).open_read_only(&folder)?;
 /// assert_eq!(reader.flush_number(), 1);
 /// # Ok(())
@@ -33,45 +33,46 @@ pub struct MapOptions {
 }
 
 impl MapOptions {
-    /// Opens a map that is there, as it was made.
+    /// Options for opening an existing map with its own configuration.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// How a new map is made ([`MapConfig::default`] if this is not called). A map that is there must have the same
-    /// resolution, tile size, sensor model and occupancy threshold; the rest holds from now on.
+    /// Sets the configuration of a new map ([`MapConfig::default`] otherwise). An existing map must have the same
+    /// resolution, tile size, sensor model and occupancy threshold; the other settings apply from now on.
     pub fn config(mut self, config: MapConfig) -> Self {
         self.config = Some(config);
         self
     }
 
-    /// Most bytes of memory of all that grows with the map, instead of what the config says. See
-    /// [`MapConfig::with_memory_bytes`]. A reader takes it for tiles alone.
+    /// Sets the limit for all memory that grows with the map, instead of the limit in the configuration. See
+    /// [`MapConfig::with_memory_bytes`]. A reader uses it for tiles only.
     pub fn memory_bytes(mut self, bytes: usize) -> Self {
         self.memory_bytes = Some(bytes);
         self
     }
 
-    /// Whether a map is created where there is none.
+    /// Sets whether a missing map is created.
     pub fn create_if_missing(mut self, creates: bool) -> Self {
         self.create_if_missing = creates;
         self
     }
 
-    /// Whether a map is created, and it is an error if there is one.
+    /// Sets whether a new map is created; an existing one is then an error.
     pub fn create_new(mut self, creates: bool) -> Self {
         self.create_new = creates;
         self
     }
 
-    /// Opens the map to insert scans.
+    /// Opens the map for inserting scans.
     ///
     /// # Errors
     ///
-    /// [`Error::NoMap`] if there is none and none is to be created; [`Error::AlreadyExists`] for another folder than an
-    /// empty one, or for a map where a new one is wanted; [`Error::Locked`] if another process writes to it;
-    /// [`Error::Mismatch`] if the map has other parameters; a wrong configuration, damage to what tells which tiles
-    /// there are, a disk that refuses.
+    /// - [`Error::NoMap`] if there is no map and none is to be created;
+    /// - [`Error::AlreadyExists`] if the folder has other content, or a map where a new one is wanted;
+    /// - [`Error::Locked`] if another process writes to the map;
+    /// - [`Error::Mismatch`] if the map has other parameters;
+    /// - an invalid configuration, a damaged list of tiles, or a failed disk operation.
     pub fn open(&self, map: impl Into<MapPath>) -> Result<OutOfCoreTileMapper> {
         let map = map.into();
         if self.create_new {
@@ -85,7 +86,7 @@ impl MapOptions {
                 let config = self.config.clone().unwrap_or_default();
                 return OutOfCoreTileMapper::create(map, self.with_memory(config));
             }
-            // Opening says what else is wrong, and to whom it belongs.
+            // Without a given configuration this error is returned below; otherwise `open` reports it.
             own => own,
         };
         let config = match &self.config {
@@ -95,20 +96,20 @@ impl MapOptions {
         OutOfCoreTileMapper::open(map, self.with_memory(config))
     }
 
-    /// Opens the map to be asked, beside a writer too. What only concerns mapping does not matter.
+    /// Opens the map for queries; a writer may be active. Settings that concern only mapping have no effect.
     ///
     /// # Errors
     ///
-    /// [`Error::NoMap`] if there is none; damage to what tells which tiles there are.
+    /// Fails with [`Error::NoMap`] if there is no map, or if its list of tiles is damaged.
     pub fn open_read_only(&self, map: impl Into<MapPath>) -> Result<MapReader> {
         MapReader::open_within(map.into(), self.reader_memory())
     }
 
-    /// Opens a snapshot of the map to be asked.
+    /// Opens a snapshot of the map for queries.
     ///
     /// # Errors
     ///
-    /// As for [`MapOptions::open_read_only`]; no snapshot of this name, or a damaged one.
+    /// Same errors as [`MapOptions::open_read_only`]; also fails if there is no such snapshot or it is damaged.
     pub fn open_snapshot(&self, map: impl Into<MapPath>, name: &SnapshotName) -> Result<MapReader> {
         MapReader::open_snapshot_within(map.into(), name, self.reader_memory())
     }

@@ -17,9 +17,9 @@ use crate::store::{
 use std::path::Path;
 use std::sync::OnceLock;
 
-/// A map on disk with its active tiles in memory: bounded by the disk, never by memory.
+/// Map on disk with its active tiles in memory. Its size is limited by the disk, not by memory.
 ///
-/// What was flushed survives a crash; what came after the last flush does not. Dropping a mapper does not flush.
+/// Flushed data survive a crash; later changes do not. Dropping a mapper does not flush.
 ///
 /// ```
 /// use voxtile::{MapConfig, MapOptions, Mapper, Queries, Scan};
@@ -41,30 +41,30 @@ use std::sync::OnceLock;
 pub struct OutOfCoreTileMapper {
     config: MapConfig,
     tiles: PagedTiles,
-    /// What is given to other threads, once somebody asked for it.
+    /// Shared with other threads; created by the first call of `reader`.
     live: OnceLock<LiveReader>,
     tracer: ScanTracer,
-    /// Scans of fewer points are traced beside others.
-    fewest_points_alone: usize,
+    /// Scans with fewer points are traced concurrently with others.
+    min_points_alone: usize,
 }
 
 impl OutOfCoreTileMapper {
-    /// Makes an empty map in a folder that does not exist yet or is empty.
+    /// Creates an empty map in a folder that is empty or does not exist.
     ///
     /// # Errors
     ///
-    /// A wrong configuration, a folder with other content, a disk that refuses.
+    /// Fails if the configuration is invalid, the folder has other content or a disk operation fails.
     pub fn create(folder: impl Into<MapPath>, config: MapConfig) -> Result<Self> {
         Self::create_as(folder, config, new_map_id())
     }
 
-    /// The same with an id that the caller names: a map that is to be a piece of another
-    /// ([`operations::move_shard`](crate::operations::move_shard())). Otherwise two maps of an id are taken for the
-    /// same.
+    /// Creates an empty map with the given id, for a map that will be imported as a shard of another
+    /// ([`operations::move_shard`](crate::operations::move_shard())). Do not reuse an id otherwise: two maps with one
+    /// id are treated as the same map.
     ///
     /// # Errors
     ///
-    /// As for [`OutOfCoreTileMapper::create`].
+    /// Same errors as [`OutOfCoreTileMapper::create`].
     pub fn create_as(folder: impl Into<MapPath>, config: MapConfig, map_id: [u8; 16]) -> Result<Self> {
         let (disk, folder) = folder.into().into_parts();
         let folder = &*folder;
@@ -73,12 +73,12 @@ impl OutOfCoreTileMapper {
         Ok(Self::new(config, store))
     }
 
-    /// Opens a map to go on with it. Of `config`, grid, sensor model and occupancy threshold must be the map's own;
+    /// Opens a map to continue it. Grid, sensor model and occupancy threshold of `config` must be those of the map;
     /// [`MapReader::config_of`](super::MapReader::config_of) reads them.
     ///
     /// # Errors
     ///
-    /// No map there, another writer, other parameters, damage to what tells which tiles there are.
+    /// Fails if there is no map, another writer has it open, parameters differ or its list of tiles is damaged.
     pub fn open(folder: impl Into<MapPath>, config: MapConfig) -> Result<Self> {
         let (disk, folder) = folder.into().into_parts();
         let folder = &*folder;
@@ -90,7 +90,7 @@ impl OutOfCoreTileMapper {
     }
 
     fn new(mut config: MapConfig, mut store: TileStore) -> Self {
-        // A map of the original format gets what this needs with its first change.
+        // A map of the original format gets an archive with its first change.
         if config.keeps_scans {
             store.archive_mut().begin();
         }
@@ -98,29 +98,28 @@ impl OutOfCoreTileMapper {
         let scan_bytes = MemoryPlan::of(&config).scan_bytes;
         let tiles = PagedTiles::new(config.clone(), store);
         let tracer = ScanTracer::with_memory_bytes(scan_bytes);
-        Self { tiles, live: OnceLock::new(), config, tracer, fewest_points_alone: usize::MAX }
+        Self { tiles, live: OnceLock::new(), config, tracer, min_points_alone: usize::MAX }
     }
 
-    /// Names what the map is built from, from the next scan on: the `n`-th scan of this input becomes the `n`-th scan
-    /// from here. Flushes, so that [`OutOfCoreTileMapper::resume_input`] knows it from now on. Of its name a map keeps
-    /// 255 bytes.
+    /// Begins a new input: the `n`-th scan inserted from now on is the `n`-th scan of this input. Flushes, so that
+    /// [`OutOfCoreTileMapper::resume_input`] finds the input later. The map stores the first 255 bytes of the name.
     ///
     /// # Errors
     ///
-    /// As for [`Mapper::flush`].
+    /// Same errors as [`Mapper::flush`].
     pub fn begin_input(&mut self, input: impl Into<InputRecord>) -> Result<()> {
         let mut input = InputRecord { first_scan: self.scan_number(), ..input.into() };
         input.cut_name();
         self.pager().begin_input(input)
     }
 
-    /// Goes on with the input that the map was last built from, and returns how many of its scans are in the map: pass
-    /// over these and insert the rest. A map without scans that was built from nothing yet begins with the input.
+    /// Resumes the last input of the map and returns how many of its scans the map contains: skip these and insert the
+    /// rest. A map without scans and inputs begins the input.
     ///
     /// # Errors
     ///
-    /// [`Error::Mismatch`] with what differs, if the map was built from another input or with other ranges or another
-    /// insert mode; and as for [`Mapper::flush`].
+    /// Fails with [`Error::Mismatch`] if the map was last built from another input, or with other ranges or another
+    /// insert mode. Otherwise same errors as [`Mapper::flush`].
     pub fn resume_input(&mut self, name: &str) -> Result<u64> {
         let scan_number = self.scan_number();
         let last = self.pager().inputs().last().cloned();
@@ -130,7 +129,7 @@ impl OutOfCoreTileMapper {
                 self.check_rays(&input)?;
                 return Ok(done);
             }
-            Some(input) if input.is_named(name) => format!("{name}, which is known by its content"),
+            Some(input) if input.is_named(name) => format!("{name}, which is identified by its content"),
             Some(input) => input.name,
             None if scan_number == 0 => {
                 self.begin_input(name)?;
@@ -142,25 +141,25 @@ impl OutOfCoreTileMapper {
         Err(Error::Mismatch { path: self.folder(), what: "been built from input", found, wanted })
     }
 
-    /// What the map was built from, the latest last.
+    /// Inputs that the map was built from, oldest first.
     pub fn inputs(&self) -> Vec<InputRecord> {
         self.pager().inputs().to_vec()
     }
 
-    /// Says what has been taken of the input that the map is being built from; the next flush keeps it. To be said
-    /// after each scan, so that every flush has what belongs to it.
+    /// Records how much of the current input was read; the next flush stores it. Call this after each scan, so that
+    /// each flush stores the matching state.
     pub fn note_input_content(&mut self, content: InputContent) {
         if let Some(input) = self.pager().last_input_mut() {
             input.content = Some(content);
         }
     }
 
-    /// An input that was begun with some ranges and insert mode goes on with them.
+    /// Checks that an input is resumed with the ranges and the insert mode that it was begun with.
     ///
     /// # Errors
     ///
-    /// [`Error::Mismatch`] if the map took its scans with others: those that the record names or, if it names none, those
-    /// of the last flush.
+    /// Fails with [`Error::Mismatch`] if the scans were inserted with other settings: those in the record or, if it has
+    /// none, those of the last flush.
     pub fn check_rays(&self, input: &InputRecord) -> Result<()> {
         let pager = self.pager();
         let of_flush = pager.store().metadata().ext.as_ref().map(|ext| ext.rays);
@@ -170,57 +169,60 @@ impl OutOfCoreTileMapper {
         }
     }
 
-    /// Lets a scan that is being inserted be given up: [`Mapper::insert_points`] then ends with [`Error::Stopped`].
+    /// Sets a stop flag: an insertion that sees it raised ends with [`Error::Stopped`].
     pub fn stop_with(&mut self, stop: Stop) {
         self.tracer.stop_with(stop);
     }
 
-    /// Flushes, and keeps the map as it is then under a name: a snapshot, which stays until it is deleted
+    /// Flushes, and creates a snapshot: it keeps this state of the map under a name until it is deleted
     /// ([`operations::delete_snapshot`](crate::operations::delete_snapshot)).
     ///
     /// # Errors
     ///
-    /// [`Error::AlreadyExists`] if there is one of this name; as for [`Mapper::flush`].
+    /// Fails with [`Error::AlreadyExists`] if there is a snapshot of this name. Otherwise same errors as
+    /// [`Mapper::flush`].
     pub fn snapshot(&mut self, name: &SnapshotName) -> Result<()> {
         self.flush()?;
         self.pager().create_snapshot(name)
     }
 
-    /// Begins a flush of all that was accepted until now, beside the mapper: a thread of its own writes and commits it,
-    /// and scans go on meanwhile. [`OutOfCoreTileMapper::flushed_scan_number`] tells when it is durable, and
-    /// [`OutOfCoreTileMapper::end_flush`] waits for it. One that is under way ends first.
+    /// Begins a background flush of all changes so far: another thread writes and commits them while the mapper inserts
+    /// further scans. [`OutOfCoreTileMapper::flushed_scan_number`] reports when it is durable, and
+    /// [`OutOfCoreTileMapper::end_flush`] waits for it. If a background flush is running, this waits for it first.
     ///
-    /// Tiles that a scan changes before they are written are in memory twice; both count in the limit. A tile that has
-    /// to go waits in the compact form; the mapper waits for the flush where these fill their part of the memory. Where
-    /// the lists of very many small tiles would take more than a sixteenth of the limit, the map is flushed before this
+    /// A tile that a scan changes before it is written is in memory twice; both copies count towards the limit. Evicted
+    /// tiles wait in the compact form; if these fill their share of the memory, the mapper waits for the flush. If the
+    /// map has so many small tiles that their lists would exceed a sixteenth of the limit, this call flushes before it
     /// returns.
     ///
     /// # Errors
     ///
-    /// Why an earlier one has failed; and as for [`Mapper::flush`], for what comes before it goes on beside the mapper.
+    /// Fails with the error of an earlier background flush. The part that runs before this returns fails as
+    /// [`Mapper::flush`].
     pub fn begin_flush(&mut self) -> Result<()> {
         self.tiles.begin_flush()
     }
 
-    /// Whether a flush goes on beside the mapper.
+    /// Returns whether a background flush is running.
     pub fn is_flushing(&self) -> bool {
         self.pager().is_flushing()
     }
 
-    /// Waits for a flush beside the mapper, if there is one.
+    /// Waits for the background flush, if one is running.
     ///
     /// # Errors
     ///
-    /// Why it has failed: the map on disk is as of an earlier flush, and nothing in memory is lost.
+    /// Fails with the error of the flush. The map on disk is then that of an earlier flush, and memory still holds all
+    /// changes.
     pub fn end_flush(&mut self) -> Result<()> {
         self.tiles.end_flush()
     }
 
-    /// A handle for other threads: it answers queries while this mapper inserts scans and flushes. See [`LiveReader`].
+    /// Returns a handle for queries from other threads while this mapper inserts scans and flushes. See [`LiveReader`].
     ///
     /// # Errors
     ///
-    /// A map of the original format is upgraded first, which fails if the disk refuses.
+    /// A map of the original format is upgraded first; fails if the upgrade fails.
     pub fn reader(&self) -> Result<LiveReader> {
         if let Some(reader) = self.live.get() {
             return Ok(reader.clone());
@@ -236,37 +238,38 @@ impl OutOfCoreTileMapper {
         self.pager().store().folder().to_owned()
     }
 
-    /// The folder of a tile, whether it exists or not.
+    /// The folder of a tile, which may not exist.
     pub fn tile_folder(&self, tile: TileIndex) -> std::path::PathBuf {
         self.pager().store().layout().tile_folder(tile)
     }
 
-    /// Whether the map has updates that no flush has made durable.
+    /// Returns whether the map has updates that are not flushed.
     pub fn is_dirty(&self) -> bool {
         let pager = self.pager();
         pager.scan_number() != pager.store().commits().scan_number
     }
 
-    /// Number of the last scan in the last flush: what a crash cannot take away.
+    /// Number of the last scan that is flushed, and so survives a crash.
     pub fn flushed_scan_number(&self) -> u64 {
         self.pager().store().commits().scan_number
     }
 
-    /// Whether a tile has updates that are not on disk.
+    /// Returns whether a tile has updates that are not on disk.
     pub fn is_tile_dirty(&self, tile: TileIndex) -> bool {
         self.pager().is_dirty(tile)
     }
 
-    /// The tiles written, by eviction or flush, since the last call, in order; successful writes only.
+    /// Returns the tiles that evictions and flushes have written since the last call, in order. Failed writes are
+    /// omitted.
     pub fn take_saved_tiles(&mut self) -> Vec<TileIndex> {
         self.pager().take_written()
     }
 
-    /// Brings tiles into memory ahead of use; those that do not exist are left out. Returns how many came.
+    /// Loads tiles into memory ahead of use, and skips tiles that do not exist. Returns the number of tiles loaded.
     ///
     /// # Errors
     ///
-    /// A tile that cannot be read, or one pushed out that cannot be written.
+    /// Fails if a tile cannot be read, or an evicted one cannot be written.
     pub fn preload(&mut self, tiles: impl IntoIterator<Item = TileIndex>) -> Result<usize> {
         let mut count = 0;
         for tile in tiles {
@@ -275,16 +278,17 @@ impl OutOfCoreTileMapper {
         Ok(count)
     }
 
-    /// Reads a tile from disk again, in place of the one in memory. Returns whether it exists.
+    /// Reads a tile from disk again and replaces the one in memory. Returns whether the tile exists.
     ///
     /// # Errors
     ///
-    /// [`Error::UnsavedChanges`] if updates would be lost and `discard_changes` is false; a tile that cannot be read.
+    /// Fails with [`Error::UnsavedChanges`] if updates would be lost and `discard_changes` is false, or if the tile
+    /// cannot be read.
     pub fn reload(&mut self, tile: TileIndex, discard_changes: bool) -> Result<bool> {
         self.pager().reload(tile, discard_changes)
     }
 
-    /// Inserts a scan by `map`, and keeps it if the map keeps scans.
+    /// Inserts a scan using `map`, and stores it if the map keeps scans.
     fn insert(
         &mut self,
         scan: &dyn ScanPoints,
@@ -301,27 +305,31 @@ impl OutOfCoreTileMapper {
             }
             Err(error) => {
                 if place.is_some() {
-                    pager.give_up_kept();
+                    pager.discard_kept();
                 }
                 Err(error)
             }
         }
     }
 
-    /// Inserts scans that are traced beside each other, up to the first that has to be traced by itself; returns how many
-    /// were inserted.
-    fn insert_beside(&mut self, scans: &[&dyn ScanPoints], reports: &mut Vec<ScanReport>) -> Result<usize> {
+    /// Inserts scans that are traced concurrently, up to the first that must be traced alone; returns the number of
+    /// inserted scans.
+    fn insert_concurrently(
+        &mut self,
+        scans: &[&dyn ScanPoints],
+        reports: &mut Vec<ScanReport>,
+    ) -> Result<usize> {
         let mut traced = Vec::with_capacity(scans.len());
         for (scan, updates) in
-            scans.iter().zip(self.tracer.trace_beside(trace_rules(&self.config, None), scans))
+            scans.iter().zip(self.tracer.trace_concurrently(trace_rules(&self.config, None), scans))
         {
             match updates {
                 Ok(Some(updates)) => traced.push(updates),
                 Ok(None) => {
-                    self.fewest_points_alone = scan.len().min(self.fewest_points_alone);
+                    self.min_points_alone = scan.len().min(self.min_points_alone);
                     break;
                 }
-                // By itself it fails again, once those before it are in the map.
+                // Inserted alone after the scans before it, it fails again with its own error.
                 Err(_) => break,
             }
         }
@@ -334,7 +342,7 @@ impl OutOfCoreTileMapper {
         Ok(count)
     }
 
-    /// Maps what a scan says about a selection of tiles, or about all; returns the tiles that it touched, too.
+    /// Traces a scan within the selected tiles, or all if `None`; also returns the tiles that it changed.
     fn map(
         &mut self,
         scan: &dyn ScanPoints,
@@ -345,11 +353,12 @@ impl OutOfCoreTileMapper {
         })
     }
 
-    /// Takes the points of a scan as hits alone, as one batch; those outside of the region of the rays are left out.
+    /// Inserts the points of a scan as hits without rays, as one batch. Points outside of the mapped region are
+    /// omitted.
     ///
     /// # Errors
     ///
-    /// As for [`Mapper::batch_update`]; points that cannot be read; [`Error::Stopped`].
+    /// Same errors as [`Mapper::batch_update`]; also fails if points cannot be read, or with [`Error::Stopped`].
     pub fn insert_hits(&mut self, scan: &dyn ScanPoints) -> Result<ScanReport> {
         let (report, _) = self.accept_within_limit(|config, tracer, overflow| {
             updates_of_hits(config, scan, tracer.stop(), overflow)
@@ -358,7 +367,7 @@ impl OutOfCoreTileMapper {
         Ok(report)
     }
 
-    /// Makes the updates of a scan and accepts them. Those that exceed the memory limit go to files meanwhile.
+    /// Computes the updates of a scan and applies them. Updates that exceed the memory limit are spilled to files.
     fn accept_within_limit(
         &mut self,
         make: impl FnOnce(&MapConfig, &mut ScanTracer, Option<Overflow<'_>>) -> Result<ScanUpdates>,
@@ -367,7 +376,7 @@ impl OutOfCoreTileMapper {
         let tiles = &self.tiles;
         let (disk, folder, max_tiles) = {
             let pager = tiles.pager();
-            (pager.store().disk().clone(), pager.store().folder().to_owned(), pager.most_tiles_of_scan())
+            (pager.store().disk().clone(), pager.store().folder().to_owned(), pager.max_tiles_of_scan())
         };
         let make_scratch = &|| disk.scratch(&folder);
         let spill = &mut |part| tiles.pager().stage(part);
@@ -383,7 +392,7 @@ impl OutOfCoreTileMapper {
         inserted
     }
 
-    /// Accepts updates, while those of other scans wait and take so many bytes.
+    /// Applies updates, while updates of other scans occupy `waiting_bytes` of memory.
     fn accept(&mut self, updates: ScanUpdates, waiting_bytes: usize) -> Result<(ScanReport, Vec<TileIndex>)> {
         let report = updates.report;
         let scan_bytes = self.tracer.bytes() + updates.bytes() + waiting_bytes;
@@ -394,19 +403,19 @@ impl OutOfCoreTileMapper {
         Ok((report, tiles))
     }
 
-    /// Which part of a ray counts from the next scan on.
+    /// Sets the ray settings from the next scan on.
     ///
     /// # Errors
     ///
-    /// A wrong configuration.
+    /// Fails if the configuration is invalid.
     pub(crate) fn set_rays(&mut self, rays: RayConfig) -> Result<()> {
         self.config = MapConfig { rays, ..self.config.clone() }.validated()?;
         Ok(())
     }
 
-    // Mapping again.
+    // Replay of kept scans.
 
-    /// Opens a map of which some tiles are empty, to map them again from scans that it keeps.
+    /// Opens a map with some tiles emptied, to replay its kept scans into them.
     pub(super) fn without_tiles(
         mut store: TileStore,
         config: MapConfig,
@@ -418,8 +427,8 @@ impl OutOfCoreTileMapper {
         Ok(Self::new(config, store))
     }
 
-    /// Maps a kept scan again, in the tiles of a selection or in all; returns the tiles that it touched, too.
-    pub(super) fn map_again(
+    /// Replays a kept scan within the selected tiles, or all; also returns the tiles that it changed.
+    pub(super) fn replay_scan(
         &mut self,
         number: u64,
         scan: &dyn ScanPoints,
@@ -431,18 +440,18 @@ impl OutOfCoreTileMapper {
         self.map(scan, selection)
     }
 
-    /// The store, to write a catalog of kept scans, or to leave nothing of a commit to the next opening.
+    /// Runs `work` on the store, to write a catalog of kept scans or to complete a commit.
     pub(crate) fn with_store<T>(&mut self, work: impl FnOnce(&mut TileStore) -> T) -> T {
         work(self.pager().store_mut())
     }
 
-    /// Writes the points of a scan to where kept scans lie.
-    pub(super) fn pager_keep(&self, scan: &dyn ScanPoints) -> Result<SegmentPlace> {
+    /// Writes the points of a scan to the archive of kept scans.
+    pub(super) fn write_points(&self, scan: &dyn ScanPoints) -> Result<SegmentPlace> {
         self.pager().keep(scan)
     }
 
-    /// Commits what was mapped again; the map has as many scans as before.
-    pub(super) fn commit_again(&mut self, scan_number: u64, have_poses_changed: bool) -> Result<()> {
+    /// Commits a replay; the number of scans does not change.
+    pub(super) fn commit_replay(&mut self, scan_number: u64, have_poses_changed: bool) -> Result<()> {
         let mut pager = self.pager();
         if have_poses_changed {
             pager.forget_poses_of_inputs();
@@ -451,7 +460,7 @@ impl OutOfCoreTileMapper {
         pager.flush()
     }
 
-    /// The pager, for one call. Queries take `&self` and may load tiles.
+    /// The pager, for one call. Queries take `&self` but may load tiles.
     fn pager(&self) -> TilePager<'_> {
         self.tiles.pager()
     }
@@ -515,9 +524,9 @@ impl Mapper for OutOfCoreTileMapper {
     fn insert_all(&mut self, scans: &[&dyn ScanPoints], reports: &mut Vec<ScanReport>) -> Result<()> {
         let mut left = scans;
         while !left.is_empty() {
-            let most = self.tracer.count_beside(left.len());
-            let beside = left[..most].iter().take_while(|scan| scan.len() < self.fewest_points_alone).count();
-            let inserted = if beside > 1 { self.insert_beside(&left[..beside], reports)? } else { 0 };
+            let most = self.tracer.max_concurrent(left.len());
+            let beside = left[..most].iter().take_while(|scan| scan.len() < self.min_points_alone).count();
+            let inserted = if beside > 1 { self.insert_concurrently(&left[..beside], reports)? } else { 0 };
             left = &left[inserted..];
             if inserted < beside.max(1)
                 && let Some((alone, others)) = left.split_first()
@@ -549,7 +558,7 @@ impl Mapper for OutOfCoreTileMapper {
     }
 }
 
-/// What is kept of a scan; the number comes with its place in the map.
+/// Returns the record of a scan; the number is assigned when it is added to the map.
 fn kept_record(
     scan: &dyn ScanPoints,
     rays: &RayConfig,
@@ -602,7 +611,7 @@ fn check_rays(folder: &Path, begun: &RayConfig, rays: &RayConfig) -> Result<()> 
     Ok(())
 }
 
-/// Grid, sensor model and threshold must be the map's own.
+/// Checks that grid, sensor model and threshold are those of the map.
 fn check_parameters(folder: &Path, metadata: &Metadata, config: &MapConfig) -> Result<()> {
     let mismatch = |what, found: String, wanted: String| Error::Mismatch {
         path: folder.to_owned(),
@@ -639,7 +648,7 @@ mod tests {
     use crate::scan::Scan;
     use crate::space::TileBox;
 
-    /// A map of one scan of hits between two scans with rays.
+    /// Builds a map of one batch of hits between two scans with rays.
     fn map_of(folder: &Path, config: MapConfig, clouds: &[Scan]) -> OutOfCoreTileMapper {
         let mut mapper = OutOfCoreTileMapper::create(folder, config).unwrap();
         mapper.insert_scan(&clouds[0]).unwrap();
@@ -651,14 +660,14 @@ mod tests {
     }
 
     #[test]
-    fn no_new_map_has_control_characters_in_its_coordinate_system() {
+    fn new_maps_reject_control_characters_in_the_coordinate_system() {
         let folder = tempfile::tempdir().unwrap();
         let config = |crs: &str| MapConfig { crs: Some(crs.into()), ..MapConfig::new(0.1, 1.6).unwrap() };
         for crs in ["EPSG:25832\0", "a\u{1b}[2Jb", "a\u{9b}b"] {
             let refused = OutOfCoreTileMapper::create(folder.path().join("map"), config(crs)).unwrap_err();
             assert!(refused.to_string().contains("control character"), "{refused}");
             assert!(!folder.path().join("map").exists());
-            // As of a map that has it.
+            // A map that already has it opens.
             config(crs).validated().unwrap();
         }
         let wkt = "PROJCS[\"Gauß\",\r\n\tUNIT[\"metre\",1]]";
@@ -667,7 +676,7 @@ mod tests {
     }
 
     #[test]
-    fn hits_in_little_memory_are_those_of_one_batch() {
+    fn hits_in_little_memory_equal_those_of_one_batch() {
         let cloud = |count: i32, shift: f64| {
             let point = |k: i32| [7, 11, 13].map(|step| f64::from(k * step % 97) * 0.05 + shift);
             let mut points: Vec<_> = (0..count).map(point).collect();

@@ -1,21 +1,21 @@
-use super::{OutOfCoreTileMapper, SideMapper};
+use super::{OutOfCoreTileMapper, ShadowMapper};
 use crate::config::{MapConfig, RayConfig};
 use crate::error::Result;
 use crate::scan::{ScanPoints, ScanReport, Stop};
 use crate::space::{TileIndex, TileSelection};
 use crate::store::{CatalogEntry, SegmentPlace, TileStore};
 
-/// Maps some tiles of a map again, from scans that it keeps, and writes the catalog of these scans anew: one commit,
-/// until which the map is as it was.
+/// Replays kept scans into some tiles of a map and rewrites the catalog of the scans. All of it is one commit; until
+/// then the map is unchanged.
 #[derive(Debug)]
 pub(crate) struct Remapper {
     mapper: OutOfCoreTileMapper,
-    /// Of the map, before and after.
+    /// Number of scans in the map, which a replay does not change.
     scan_number: u64,
 }
 
 impl Remapper {
-    /// Begins with `tiles` as if nothing had been observed in them.
+    /// Begins with `tiles` emptied.
     pub(crate) fn begin(
         mut store: TileStore,
         config: MapConfig,
@@ -29,7 +29,7 @@ impl Remapper {
         Ok(Self { mapper, scan_number })
     }
 
-    /// Maps what a scan says about a selection of tiles, or about all; returns the tiles that it touched, too.
+    /// Traces a scan within the selected tiles, or all; also returns the tiles that it changed.
     pub(crate) fn map(
         &mut self,
         number: u64,
@@ -37,47 +37,47 @@ impl Remapper {
         rays: &RayConfig,
         selection: Option<&TileSelection>,
     ) -> Result<(ScanReport, Vec<TileIndex>)> {
-        self.mapper.map_again(number, scan, rays, selection)
+        self.mapper.replay_scan(number, scan, rays, selection)
     }
 
-    /// Adds an entry to the new catalog; every scan of the map has its own.
+    /// Adds an entry to the new catalog; each scan of the map has one.
     pub(crate) fn put(&mut self, entry: &CatalogEntry) -> Result<()> {
         self.mapper.with_store(|store| store.archive_mut().put(entry))
     }
 
-    /// Copies the points of a scan to where nothing lies that is to go.
+    /// Copies the points of a scan to a segment that is not going to be removed.
     pub(crate) fn copy_points(&mut self, place: SegmentPlace) -> Result<SegmentPlace> {
         self.mapper.with_store(|store| store.archive_mut().copy(place))
     }
 
-    /// Writes points in place of those that a scan has.
+    /// Writes points that replace those of a scan.
     pub(crate) fn write_points(&mut self, scan: &dyn ScanPoints) -> Result<SegmentPlace> {
-        self.mapper.pager_keep(scan)
+        self.mapper.write_points(scan)
     }
 
-    /// Takes over what was mapped beside the map and committed there: its tiles, and its entries as the new catalog.
-    pub(crate) fn take_over(&mut self, side: &mut SideMapper) -> Result<()> {
+    /// Swaps in the committed content of a shadow map: its tiles, and its entries as the new catalog.
+    pub(crate) fn take_over(&mut self, side: &mut ShadowMapper) -> Result<()> {
         self.mapper.with_store(|store| {
             side.with_store(|side| {
                 let mut records = side.archive().records()?;
                 while let Some(entry) = records.next_entry()? {
                     store.archive_mut().put(&entry)?;
                 }
-                // What a commit may leave to the next opening is not left here: the files need their names.
+                // The checkpoint gives the files their final names, which a commit may postpone.
                 side.checkpoint()?;
                 store.swap_in(side)
             })
         })
     }
 
-    /// Commits, with a note where the poses are no longer those of the map's inputs; then `release` removes what
-    /// nothing needs any more. Returns its result.
+    /// Commits; then `release` removes files that are no longer needed, and its result is returned.
+    /// `have_poses_changed` invalidates the poses recorded with the map's inputs.
     pub(crate) fn finish<T>(
         mut self,
         have_poses_changed: bool,
         release: impl FnOnce(&mut TileStore) -> T,
     ) -> Result<T> {
-        self.mapper.commit_again(self.scan_number, have_poses_changed)?;
+        self.mapper.commit_replay(self.scan_number, have_poses_changed)?;
         Ok(self.mapper.with_store(release))
     }
 }

@@ -1,17 +1,17 @@
 use crate::tile::{OctreeStatistics, TileCounts};
 use serde::Serialize;
 
-/// Sizes of a map and of what it holds in memory.
+/// Size of a map and of its content in memory.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct MapStatistics {
-    /// Scans and batches in the map.
+    /// Number of scans and batches in the map.
     pub scan_number: u64,
-    /// Tiles in which something was observed.
+    /// Tiles that contain observations.
     pub tiles: u64,
     /// Tiles in memory.
     pub cached_tiles: u64,
-    /// Tiles in memory that are not on disk as they are.
+    /// Tiles in memory that differ from their version on disk.
     pub dirty_tiles: u64,
     /// Sizes of the tiles in memory.
     pub cached: TileCounts,
@@ -19,27 +19,27 @@ pub struct MapStatistics {
     pub buffered_tiles: u64,
     /// Buffered updates of voxels.
     pub buffered_updates: u64,
-    /// Bytes of memory that these updates occupy.
+    /// Bytes of memory of the buffered updates.
     pub buffered_bytes: u64,
-    /// Bytes of such updates in files, because memory was short.
+    /// Bytes of buffered updates in spill files.
     pub spilled_bytes: u64,
-    /// Tiles in memory in the compact form: not in use, and not counted above.
+    /// Tiles in memory in the compact form; not included in the counts above.
     pub compact_tiles: u64,
-    /// Such tiles that are not on disk as they are.
+    /// Tiles in the compact form that differ from their version on disk.
     pub dirty_compact_tiles: u64,
-    /// Bytes on disk in tables and octrees, the latest version of each tile.
+    /// Bytes on disk of the tables and octrees of the latest version of each tile.
     pub disk_bytes: u64,
-    /// The work done for pointer trees since the map was opened.
+    /// Work on pointer trees since the map was opened.
     pub octrees: OctreeStatistics,
-    /// What went to disk and came back.
+    /// Disk reads and writes.
     pub io: IoCounts,
-    /// Bytes of memory, by what they hold.
+    /// Bytes of memory, by purpose.
     pub memory: MemoryCounts,
     /// Waits of the mapping thread for the disk since the map was opened.
     pub stalls: StallCounts,
 }
 
-/// Bytes of memory of all that grows with a map, by what they hold. They keep to the limit together.
+/// Bytes of memory of all data that grow with a map, by purpose. The limit applies to their sum.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct MemoryCounts {
@@ -49,32 +49,32 @@ pub struct MemoryCounts {
     pub compact_tiles: u64,
     /// Buffered updates.
     pub write_buffer: u64,
-    /// Kept free for inserting scans: what the largest so far took.
+    /// Reserved for inserting scans: the most that a scan has needed so far.
     pub scan: u64,
-    /// Tiles on their way to and from disk.
+    /// Tiles that are being read from or written to disk.
     pub in_flight: u64,
-    /// What is known of each tile without reading it.
+    /// Index of tiles.
     pub index: u64,
-    /// What is kept for readers in other threads.
+    /// Data kept for readers in other threads.
     pub readers: u64,
 }
 
-/// Waits of the mapping thread for the disk; times in microseconds, to two digits.
+/// Times that the mapping thread waited for the disk, in microseconds, to two significant digits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct StallCounts {
-    /// How many.
+    /// Number of waits.
     pub count: u64,
-    /// Half of them took no longer than this.
+    /// Median.
     pub p50_us: u64,
-    /// Of a hundred, 99 took no longer than this.
+    /// 99th percentile.
     pub p99_us: u64,
-    /// The longest took this.
+    /// Maximum.
     pub worst_us: u64,
 }
 
 impl MemoryCounts {
-    /// All together.
+    /// Sum of all.
     pub fn bytes(&self) -> u64 {
         self.tiles
             + self.compact_tiles
@@ -86,24 +86,24 @@ impl MemoryCounts {
     }
 }
 
-/// What went to disk and came back since the map was opened.
+/// Disk reads and writes since the map was opened.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct IoCounts {
     /// Tiles read.
     pub loads: u64,
-    /// Tiles read ahead of use, of those read.
+    /// Those of the tiles read that were read ahead of use.
     pub prefetches: u64,
     /// Tiles written.
     pub saves: u64,
-    /// Tiles that were brought into the compact form.
+    /// Tiles encoded into the compact form.
     pub encoded: u64,
-    /// Tiles that came back from the compact form.
+    /// Tiles decoded from the compact form.
     pub decoded: u64,
     /// Queries and updates that found their tile in memory.
     pub hits: u64,
     /// Bytes read.
     pub bytes_read: u64,
-    /// Bytes written, spilled updates included.
+    /// Bytes written, including spilled updates.
     pub bytes_written: u64,
 }

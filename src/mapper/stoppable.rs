@@ -7,8 +7,8 @@ use crate::space::{TileBox, TileIndex, VoxelIndex};
 use crate::store::TileVersion;
 use crate::tile::{Tile, Voxel};
 
-/// A map that can be asked until somebody wants it to stop: from then on each tile is answered with
-/// [`Error::Stopped`](crate::Error::Stopped), which ends whatever is asked.
+/// Map whose queries can be stopped. Once the stop flag is raised, each access to a tile fails with
+/// [`Error::Stopped`](crate::Error::Stopped), which ends the query.
 #[derive(Debug)]
 pub struct Stoppable<'a, V: ?Sized> {
     view: &'a V,
@@ -16,7 +16,7 @@ pub struct Stoppable<'a, V: ?Sized> {
 }
 
 impl<'a, V: MapView + ?Sized> Stoppable<'a, V> {
-    /// A map until the stop is set.
+    /// Wraps a map.
     pub fn new(view: &'a V, stop: &'a Stop) -> Self {
         Self { view, stop }
     }
@@ -66,14 +66,14 @@ impl<V: MapView + ?Sized> MapView for Stoppable<'_, V> {
         self.view.voxels_from(index, from)
     }
 
-    // Asked point by point: whoever asks for many looks at the stop between them.
+    // No check for single points: callers with many points check the flag between them.
     fn evidence(&self, voxel: VoxelIndex) -> Result<Option<Evidence>> {
         self.view.evidence(voxel)
     }
 
-    // Likewise.
-    fn tile_at_hand(&self, index: TileIndex) -> Option<&Tile> {
-        self.view.tile_at_hand(index)
+    // No check, for the same reason.
+    fn resident_tile(&self, index: TileIndex) -> Option<&Tile> {
+        self.view.resident_tile(index)
     }
 
     fn voxels_of_tile_hint(&self, index: TileIndex) -> Option<u64> {

@@ -8,7 +8,7 @@ use crate::store::Disk;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Finds out which tiles a scan touches, without a map.
+/// Finds the tiles that a scan changes, without a map.
 pub(crate) struct TileFinder {
     config: MapConfig,
     tracer: ScanTracer,
@@ -16,7 +16,8 @@ pub(crate) struct TileFinder {
 }
 
 impl TileFinder {
-    /// Finds tiles of maps with this configuration, in as much memory as it allows for a scan.
+    /// Creates a finder for maps with this configuration. It uses as much memory as the configuration allows for a
+    /// scan.
     pub(crate) fn new(config: &MapConfig, disk: Arc<dyn Disk>, stop: Stop) -> Self {
         let bytes = MemoryPlan::of(config).scan_bytes;
         let mut tracer = ScanTracer::with_memory_bytes(bytes);
@@ -24,7 +25,7 @@ impl TileFinder {
         Self { config: config.clone(), tracer, disk }
     }
 
-    /// The tiles that a scan touches. What memory has no room for goes to files without a name in `folder`.
+    /// Returns the tiles that a scan changes. Data that do not fit in memory are written to unnamed files in `folder`.
     pub(crate) fn tiles_of(
         &mut self,
         scan: &dyn ScanPoints,

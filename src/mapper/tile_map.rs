@@ -1,16 +1,15 @@
 use crate::space::{Grid, TileIndex, TileSpace, Torus};
 use crate::tile::{OctreeFactory, Tile};
 
-/// The tiles of a map that lives in memory.
+/// Tiles of a map in memory.
 #[derive(Debug)]
 pub(super) struct TileMap {
-    /// In order of their first update.
+    /// In the order of their first update.
     tiles: Vec<Tile>,
-    /// The number of each, from 1.
+    /// Number of each tile in `tiles`, from 1.
     directory: Torus,
-    /// Where they are.
     space: TileSpace,
-    /// In place of a tile that is not there.
+    /// Empty tile, returned for tiles that do not exist.
     nothing: Tile,
 }
 
@@ -25,13 +24,13 @@ impl TileMap {
         self.tiles.get((self.directory.get(index.to_array()) as usize).wrapping_sub(1))
     }
 
-    /// The tile, or one in which nothing was observed; without a branch, for which of them cannot be guessed.
+    /// Returns the tile, or an empty one if it does not exist. Branchless, because the branch would be unpredictable.
     #[inline]
     pub(super) fn get_or_nothing(&self, index: TileIndex) -> &Tile {
         self.get(index).unwrap_or(&self.nothing)
     }
 
-    /// The place of a tile among [`TileMap::tiles`]; it is made if it is not there.
+    /// Returns the position of a tile in [`TileMap::tiles`]; creates the tile if it does not exist.
     pub(super) fn number_of(&mut self, grid: &Grid, octrees: &OctreeFactory, index: TileIndex) -> usize {
         let mut number = self.directory.get(index.to_array());
         if number == Torus::NONE {
@@ -43,17 +42,14 @@ impl TileMap {
         number as usize - 1
     }
 
-    /// Where the tiles are.
     pub(super) fn space(&self) -> &TileSpace {
         &self.space
     }
 
-    /// The tiles.
     pub(super) fn tiles(&self) -> &[Tile] {
         &self.tiles
     }
 
-    /// The tiles, to change.
     pub(super) fn tiles_mut(&mut self) -> &mut [Tile] {
         &mut self.tiles
     }

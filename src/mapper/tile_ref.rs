@@ -2,7 +2,7 @@ use crate::tile::Tile;
 use std::ops::Deref;
 use std::sync::Arc;
 
-/// A tile of a map, held in memory while this lives.
+/// Tile of a map, pinned in memory while this value exists.
 #[derive(Debug)]
 pub struct TileRef<'a>(Held<'a>);
 

@@ -2,13 +2,13 @@ use crate::config::{MapConfig, OctreeConfig};
 use crate::scan::{MappedTiles, TraceRules, UpdateOrder};
 use crate::space::TileSelection;
 
-/// How scans are traced, for a selection of tiles or for all, so that the updates have the form that the map's tiles
-/// want.
+/// Returns the rules for tracing scans within the selected tiles, or all. The updates get the form that the map's tiles
+/// use.
 pub(super) fn trace_rules<'a>(config: &'a MapConfig, tiles: Option<&'a TileSelection>) -> TraceRules<'a> {
     let MapConfig { grid, sensor_model: model, rays, .. } = config;
     let order = match config.octree {
         OctreeConfig::Bricks => UpdateOrder::OfVoxels,
-        // A voxel cache is about the order in which rays update voxels, and so is what it is compared with.
+        // The voxel cache, and the mode that it is compared with, depend on the order in which rays update voxels.
         OctreeConfig::Pointers(_) => UpdateOrder::OfRays,
     };
     let mapped = MappedTiles { grid, selection: tiles };

@@ -7,106 +7,103 @@ use crate::space::{TileBox, TileIndex, TileSelection, VoxelIndex};
 use crate::store::TileVersion;
 use crate::tile::{Tile, Voxel};
 
-/// A map of tiles. All of [`Queries`](crate::query::Queries) and [`MapQueries`](crate::query::MapQueries) use these
-/// few.
+/// Read access to a map of tiles, on which [`Queries`](crate::query::Queries) and
+/// [`MapQueries`](crate::query::MapQueries) are built.
 ///
-/// Queries see whole scans, unsaved ones too.
+/// Queries see the map as of one scan, including unsaved changes.
 ///
-/// Other crates may implement it, for maps that wrap another one: to stop it, to count what is asked, to choose between
-/// two. Tiles come from the map inside. A method with a default is answered by the others; pass it on where the map
-/// inside knows a faster answer.
+/// Other crates may implement it for wrappers of a map, for example to stop queries, to count accesses or to choose
+/// between two maps. The inner map provides the tiles. Methods with a default use the other methods; forward them if
+/// the inner map has a faster implementation.
 pub trait MapView: Sync {
-    /// How the map is made.
+    /// Configuration of the map.
     fn config(&self) -> &MapConfig;
 
-    /// Number of the last scan or batch in the map; 0 for none.
+    /// Number of the last scan or batch in the map; 0 if there is none.
     fn scan_number(&self) -> u64;
 
-    /// The tiles in which something was observed, ordered by x, then y, then z.
+    /// The tiles that contain observations, ordered by x, then y, then z.
     fn tile_indices(&self) -> Vec<TileIndex>;
 
-    /// A box around all tiles in which something was observed, and perhaps some more; `None` for an empty map. Its cost
-    /// does not depend on the number of tiles.
+    /// A box that contains all tiles with observations, and may be larger; `None` for an empty map. The cost does not
+    /// depend on the number of tiles.
     fn tile_bounds(&self) -> Option<TileBox>;
 
-    /// Whether something was observed in a tile. Its cost does not depend on the number of tiles.
+    /// Returns whether a tile contains observations. The cost does not depend on the number of tiles.
     fn has_tile(&self, index: TileIndex) -> bool;
 
-    /// A box of tiles around this one in which nothing was observed, where the map knows one. Its cost does not depend
-    /// on the number of tiles.
+    /// A box of tiles around this one without observations, if the map knows one. The cost does not depend on the
+    /// number of tiles.
     fn empty_around(&self, index: TileIndex) -> Option<TileBox> {
         let _ = index;
         None
     }
 
-    /// The tiles held in memory, ordered likewise.
+    /// The tiles that are in memory, in the same order.
     fn cached_tile_indices(&self) -> Vec<TileIndex>;
 
-    /// A tile; `None` if nothing was observed in it. It stays in memory while the returned value lives, and may
-    /// push out others.
+    /// Returns a tile; `None` if it contains no observations. It remains in memory while the returned value exists, and
+    /// may evict others.
     ///
     /// # Errors
     ///
-    /// A tile that cannot be read, or one pushed out that cannot be written.
+    /// Fails if the tile cannot be read, or an evicted one cannot be written.
     fn tile(&self, index: TileIndex) -> Result<Option<TileRef<'_>>>;
 
-    /// The same for work on the whole map: what is read for it leaves memory with the returned value, and the
-    /// tiles in memory stay.
+    /// Like [`MapView::tile`], for operations on the whole map: the tile is not cached and evicts no others.
     ///
     /// # Errors
     ///
-    /// A tile that cannot be read.
+    /// Fails if the tile cannot be read.
     fn tile_uncached(&self, index: TileIndex) -> Result<Option<TileRef<'_>>>;
 
-    /// The observed voxels of a tile whose log-odds are at least `from`, in Morton order; what is read for it leaves
-    /// memory as with [`MapView::tile_uncached`].
+    /// Returns the observed voxels of a tile whose log-odds are at least `from`, in Morton order, without caching the
+    /// tile.
     ///
     /// # Errors
     ///
-    /// A tile that cannot be read.
+    /// Fails if the tile cannot be read.
     fn voxels_from(&self, index: TileIndex, from: f64) -> Result<Vec<Voxel>> {
         let tile = self.tile_uncached(index)?;
         Ok(tile.map_or(Vec::new(), |tile| tile.voxels_from(from).collect()))
     }
 
-    /// The evidence of a voxel; `None` if it was never observed.
+    /// Returns the evidence of a voxel; `None` if it was never observed.
     ///
     /// # Errors
     ///
-    /// As for [`MapView::tile`].
+    /// Same errors as [`MapView::tile`].
     fn evidence(&self, voxel: VoxelIndex) -> Result<Option<Evidence>> {
         let tile = self.tile(self.config().grid.tile_of_voxel(voxel))?;
         Ok(tile.and_then(|tile| tile.evidence(voxel)))
     }
 
-    /// A tile, or an empty one if nothing was observed in it, where all tiles stay in memory: then looking one up is
-    /// cheaper than grouping what is asked. `None` where tiles come and go.
+    /// Returns a tile, or an empty one if it contains no observations, if all tiles of the map are permanently in
+    /// memory: looking up a tile is then cheaper than grouping queries by tile. `None` for other maps.
     #[inline]
-    fn tile_at_hand(&self, index: TileIndex) -> Option<&Tile> {
+    fn resident_tile(&self, index: TileIndex) -> Option<&Tile> {
         let _ = index;
         None
     }
 
-    /// About how many voxels were observed in a tile, where that is known without reading it.
+    /// Approximate number of observed voxels in a tile, if known without reading it.
     fn voxels_of_tile_hint(&self, index: TileIndex) -> Option<u64>;
 
-    /// The committed version of a tile, where the map knows it without reading the tile: maps on disk that are open to
-    /// be read.
+    /// Committed version of a tile, if known without reading it: maps on disk that were opened for reading.
     fn version_of_tile(&self, index: TileIndex) -> Option<TileVersion> {
         let _ = index;
         None
     }
 
-    /// Number of the last scan that the map had taken when a tile was last flushed, where that is known without reading
-    /// it.
+    /// Number of the last scan in the map when a tile was last flushed, if known without reading the tile.
     fn last_scan_of_tile_hint(&self, index: TileIndex) -> Option<u64> {
         self.version_of_tile(index).map(|version| version.scan_number)
     }
 
-    /// Sizes of the map and of what is in memory.
+    /// Sizes of the map and of its content in memory.
     fn statistics(&self) -> MapStatistics;
 
-    /// All tiles, in the order of [`MapView::tile_indices`] and in constant memory.
+    /// Iterates over all tiles in the order of [`MapView::tile_indices`], in constant memory.
     fn tiles(&self) -> impl Iterator<Item = Result<TileRef<'_>>>
     where
         Self: Sized,
@@ -115,36 +112,37 @@ pub trait MapView: Sync {
     }
 }
 
-/// A map that takes scans.
+/// Map that scans can be inserted into.
 ///
-/// An accepted call gets the next scan number. After an error the map is as it was before the call, and the number
+/// Each accepted call uses the next scan number. After an error the map is the same as before the call, and the number
 /// is not used.
 pub trait Mapper: MapView + Send {
-    /// Adds a scan: rays from its origin to its points, wherever these lie: borrowed
+    /// Inserts a scan: rays from its origin to its points. The points may be borrowed
     /// ([`ScanRef`](crate::scan::ScanRef)), in a file (`StoredScan` of `voxtile-formats`), or in a [`Scan`].
     ///
     /// # Errors
     ///
-    /// An origin without a voxel, intensities that are missing or not one a point, points that cannot be read, a tile
+    /// Fails if the origin is outside of the map's space, intensities are missing or differ in number from the points,
+    /// or points or tiles cannot be read or written.
     /// that cannot be read or written.
     fn insert_points(&mut self, scan: &dyn ScanPoints) -> Result<ScanReport>;
 
-    /// Adds what a scan says about some tiles: these are afterwards as after [`Mapper::insert_points`], to the bit, and
-    /// all others as before. Rays are cut before they are walked, so it costs what the tiles cost. The report counts
-    /// all points, but only the updates of these tiles.
+    /// Inserts the part of a scan that is within some tiles. These tiles are afterwards bit-identical to those after
+    /// [`Mapper::insert_points`]; all others are unchanged. Rays are clipped to the tiles before they are traced, so
+    /// the cost depends on the tiles. The report counts all points, but only the updates of these tiles.
     ///
     /// # Errors
     ///
-    /// As for [`Mapper::insert_points`].
+    /// Same errors as [`Mapper::insert_points`].
     fn insert_points_in(&mut self, scan: &dyn ScanPoints, tiles: &TileSelection) -> Result<ScanReport>;
 
-    /// Adds scans in order: the map is as after [`Mapper::insert_points`] of one after the other, to the bit. Scans
-    /// that are at hand together go to the cores one each, which takes less time than to divide each among all cores.
-    /// Each accepted scan adds its report.
+    /// Inserts scans in order. The map is bit-identical to that after inserting them one by one. Scans that are passed
+    /// together are traced one per core, which is faster than dividing each scan among all cores. The report of each
+    /// accepted scan is appended to `reports`.
     ///
     /// # Errors
     ///
-    /// As for [`Mapper::insert_points`]. Scans before the one that failed are in the map, and have their reports.
+    /// Same errors as [`Mapper::insert_points`]. Scans before the failed one are in the map, and have reports.
     fn insert_all(&mut self, scans: &[&dyn ScanPoints], reports: &mut Vec<ScanReport>) -> Result<()> {
         for scan in scans {
             reports.push(self.insert_points(*scan)?);
@@ -152,29 +150,29 @@ pub trait Mapper: MapView + Send {
         Ok(())
     }
 
-    /// [`Mapper::insert_points`] for a [`Scan`].
+    /// Like [`Mapper::insert_points`], for a [`Scan`].
     ///
     /// # Errors
     ///
-    /// As for [`Mapper::insert_points`].
+    /// Same errors as [`Mapper::insert_points`].
     fn insert_scan(&mut self, scan: &Scan) -> Result<ScanReport> {
         self.insert_points(scan)
     }
 
-    /// Adds observations of single points, without rays, in order.
+    /// Inserts observations of single points, without rays, in order.
     ///
     /// # Errors
     ///
-    /// Lists of different lengths, missing intensities, a tile that cannot be read or written.
+    /// Fails if lists differ in length, intensities are missing, or a tile cannot be read or written.
     fn batch_update(&mut self, batch: &PointBatch<'_>) -> Result<ScanReport>;
 
-    /// Makes everything so far durable, as a whole; nothing to do for a map in memory.
+    /// Makes all changes so far durable, atomically. Has no effect for a map in memory.
     ///
     /// # Errors
     ///
-    /// A tile that cannot be read or written. Nothing is lost then: the call can be repeated.
+    /// Fails if a tile cannot be read or written. No data are lost then, and the call can be repeated.
     fn flush(&mut self) -> Result<()>;
 
-    /// Brings the octree of every tile in memory up to date, which queries do not need.
+    /// Updates the octrees of all tiles in memory. Queries do not need this.
     fn sync_octrees(&mut self);
 }

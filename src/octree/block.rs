@@ -1,11 +1,11 @@
-/// A node as stored in its parent (or in the tree, for the root).
+/// Node as stored in its parent, or in the tree for the root.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Node {
     /// No voxel below is known.
     Unknown,
-    /// Every voxel below has this value.
+    /// All voxels below have this value.
     Leaf(f32),
-    /// The voxels below differ or are unknown in part; the value is the maximum of the children.
+    /// The voxels below differ or are partially unknown; the value is the maximum of the children.
     Inner { value: f32, block: BlockId },
 }
 
@@ -17,7 +17,7 @@ impl Node {
         }
     }
 
-    /// Whether both are bit-identical, so that replacing one by the other changes nothing above.
+    /// Returns whether both are bit-identical, so that replacing one by the other does not affect ancestors.
     pub(super) fn is_same_as(self, other: Self) -> bool {
         match (self, other) {
             (Self::Unknown, Self::Unknown) => true,
@@ -30,32 +30,31 @@ impl Node {
     }
 }
 
-/// Place of a block in its arena.
+/// Index of a block in its arena.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct BlockId(u32);
 
-/// A link without a block: the child does not exist.
+/// Link of a child that does not exist.
 const UNKNOWN: u32 = u32::MAX;
-/// A link without a block: the child is a leaf.
+/// Link of a child that is a leaf.
 const LEAF: u32 = u32::MAX - 1;
 
 /// The eight children of an inner node: 64 bytes, one cache line.
 #[derive(Clone)]
 #[repr(align(64))]
 pub(super) struct Block {
-    /// Negative infinity where no child exists, so that the maximum needs no mask.
+    /// Negative infinity for missing children, so that the maximum needs no mask.
     values: [f32; 8],
     /// Block of each child's own children, or [`UNKNOWN`] or [`LEAF`].
     links: [u32; 8],
 }
 
 impl Block {
-    /// Size in bytes.
     pub(super) const SIZE: usize = size_of::<Self>();
 
     pub(super) const EMPTY: Self = Self { values: [f32::NEG_INFINITY; 8], links: [UNKNOWN; 8] };
 
-    /// Eight leaves of one value: an expanded leaf.
+    /// Creates eight leaves with one value: an expanded leaf.
     pub(super) fn of_leaves(value: f32) -> Self {
         Self { values: [value; 8], links: [LEAF; 8] }
     }
@@ -85,11 +84,11 @@ impl Block {
     /// Largest value of the children.
     pub(super) fn max(&self) -> f32 {
         let [a, b, c, d, e, f, g, h] = self.values;
-        // In pairs: half the chain of comparisons.
+        // In pairs, which halves the chain of comparisons.
         larger(larger(larger(a, b), larger(c, d)), larger(larger(e, f), larger(g, h)))
     }
 
-    /// The value of all eight children, if they are leaves of one bit-identical value.
+    /// The value of all eight children, if they are leaves with bit-identical values.
     pub(super) fn uniform_leaves(&self) -> Option<f32> {
         let bits = self.values[0].to_bits();
         let uniform =
@@ -106,7 +105,7 @@ fn larger(a: f32, b: f32) -> f32 {
 #[derive(Clone)]
 pub(super) struct Arena {
     blocks: Vec<Block>,
-    /// Head of the free list; the next is in `links[0]`, [`UNKNOWN`] ends it.
+    /// Head of the free list; the next block is in `links[0]`, [`UNKNOWN`] ends the list.
     released: u32,
 }
 
@@ -125,7 +124,7 @@ impl Arena {
             return id;
         }
         let id = self.blocks.len();
-        // So many blocks would fill 256 GiB: memory runs out first.
+        // This many blocks would need 256 GiB: memory is exhausted first.
         assert!(id < LEAF as usize, "an octree has at most {LEAF} blocks");
         self.blocks.push(block);
         BlockId(id as u32)
@@ -137,12 +136,11 @@ impl Arena {
         self.released = id.0;
     }
 
-    /// Bytes of heap.
     pub(super) fn bytes(&self) -> usize {
         self.blocks.capacity() * Block::SIZE
     }
 
-    /// Bytes of the blocks ever used at once.
+    /// Maximum number of bytes that were in use at once.
     pub(super) fn used_bytes(&self) -> usize {
         self.blocks.len() * Block::SIZE
     }

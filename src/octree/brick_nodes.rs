@@ -1,27 +1,28 @@
 use crate::space::{BrickCode, BrickMask};
 
-/// The nodes of a tree under one node of 8 x 8 x 8 voxels (depth 13), as masks: byte `k` of a mask is the `k`-th node
-/// of 2 x 2 x 2 voxels (depth 15), word `k` the `k`-th node of 4 x 4 x 4 (depth 14).
+/// Nodes of a tree under one node of 8 x 8 x 8 voxels (depth 13), as masks. Byte `k` of a mask is the `k`-th node of
+/// 2 x 2 x 2 voxels (depth 15), word `k` the `k`-th node of 4 x 4 x 4 (depth 14).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BrickNodes {
-    /// Which node.
+    /// Code of the brick.
     pub brick: BrickCode,
-    /// The voxels that are known.
+    /// Known voxels.
     pub known: BrickMask,
-    /// The known voxels that are occupied.
+    /// Known voxels that are occupied.
     pub occupied: BrickMask,
-    /// The nodes at depth 15 that are leaves: their eight voxels are known and have one value to the bit.
+    /// Nodes at depth 15 that are leaves: their eight voxels are known and have bit-identical values.
     pub leaves_15: u64,
-    /// The nodes at depth 14 that are leaves.
+    /// Nodes at depth 14 that are leaves.
     pub leaves_14: u8,
-    /// The value of the whole, if it is one leaf.
+    /// Value of the whole brick, if it is one leaf.
     pub leaf: Option<f32>,
 }
 
 impl BrickNodes {
-    /// The nodes of an octree under a brick, and the largest value. Voxels of at least the threshold are occupied;
-    /// without a threshold none is.
+    /// Computes the nodes of an octree under a brick, and the largest value. Voxels of at least the threshold are
+    /// occupied; without a threshold none is.
     ///
+    /// `values_of` returns the values of a word's 64 voxels, negative infinity for unknown ones.
     /// `values_of` gives the values of a word's 64 voxels, and negative infinity for those that are unknown.
     #[inline]
     pub(crate) fn of_values(
@@ -63,7 +64,7 @@ impl BrickNodes {
         if words == 0 {
             return 0;
         }
-        // The lowest bit of each byte, shifted by another amount for each word, so that one count suffices.
+        // The lowest bit of each byte, shifted by a different amount for each word, so that one count suffices.
         let bytes = (0..8).fold(0, |bytes, word| bytes | nonzero_bytes(self.known[word]) << word);
         let voxels: u32 = self.known.iter().map(|word| word.count_ones()).sum();
         let pruned =
@@ -72,21 +73,21 @@ impl BrickNodes {
     }
 }
 
-/// The lowest bit of each byte that is not zero.
+/// Returns the lowest bit of each nonzero byte.
 fn nonzero_bytes(word: u64) -> u64 {
     let word = word | word >> 4;
     let word = word | word >> 2;
     (word | word >> 1) & 0x0101_0101_0101_0101
 }
 
-/// Bit `k` for each value `k` of at least a threshold. Without branches, for the vector unit.
+/// Returns bit `k` for each value `k` of at least a threshold. Branchless, so that it is vectorized.
 #[inline]
 fn at_least(threshold: f32, values: &[f32; 8]) -> u64 {
     let bits: [u32; 8] = std::array::from_fn(|k| if values[k] >= threshold { 1 << k } else { 0 });
     u64::from(bits.iter().fold(0, |all, bit| all | bit))
 }
 
-/// Whether eight leaves have one value, to the bit.
+/// Determines whether eight leaves have bit-identical values.
 #[derive(Default)]
 struct Uniform {
     first: f32,

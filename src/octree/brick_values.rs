@@ -1,7 +1,7 @@
 use crate::space::{BRICK_VOXELS, BrickCode, BrickMask, add_to_mask};
 use std::ops::Range;
 
-/// The values of many voxels, in parts of bricks: the input of an encoded block of an octree.
+/// Values of many voxels, in parts of bricks: the input of an encoded block of an octree.
 ///
 /// Takes four bytes per voxel and 80 per part. A brick may have several parts: one on the border of two tiles has
 /// voxels of both.
@@ -15,7 +15,7 @@ pub struct BrickValues {
 struct Part {
     brick: BrickCode,
     known: BrickMask,
-    /// Where its values start: those of the known voxels, in Morton order.
+    /// Start of its values, which are those of the known voxels in Morton order.
     first: u64,
 }
 
@@ -38,7 +38,7 @@ impl BrickValues {
         self.values.len()
     }
 
-    /// Whether there is no voxel.
+    /// Returns whether there is no voxel.
     pub fn is_empty(&self) -> bool {
         self.values.is_empty()
     }
@@ -49,12 +49,12 @@ impl BrickValues {
         self.values.clear();
     }
 
-    /// Starts the next part; [`BrickValues::add`] adds its voxels, and [`BrickValues::end`] ends it.
+    /// Begins the next part; [`BrickValues::add`] adds its voxels, and [`BrickValues::end`] ends it.
     pub fn begin(&mut self, brick: BrickCode) {
         self.parts.push(Part { brick, known: [0; 8], first: self.values.len() as u64 });
     }
 
-    /// Adds a voxel to the present part, at a place (0 to 511) after those added before.
+    /// Adds a voxel to the current part. Positions (0 to 511) must ascend.
     #[inline]
     pub fn add(&mut self, place: usize, value: f32) {
         if let Some(part) = self.parts.last_mut() {
@@ -77,7 +77,7 @@ impl BrickValues {
         self.parts.iter().map(|part| part.brick).collect()
     }
 
-    /// Every voxel with its value, part by part.
+    /// All voxels with their values, part by part.
     #[cfg(test)]
     pub(crate) fn voxels(&self) -> impl Iterator<Item = (crate::space::MortonCode, f32)> {
         let codes = self
@@ -115,7 +115,6 @@ impl BrickContent {
         self.values.fill(f32::NEG_INFINITY);
     }
 
-    /// The values of a word's voxels.
     pub(super) fn word(&self, word: usize) -> [f32; 64] {
         std::array::from_fn(|bit| self.values[64 * word + bit])
     }

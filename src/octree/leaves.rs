@@ -3,10 +3,10 @@ use super::block::{BlockId, Node};
 use super::tree::DEPTH;
 use crate::space::MortonCode;
 
-/// A leaf: every voxel of the node has the value.
+/// Leaf: all voxels of the node have the value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Leaf {
-    /// The node's first voxel.
+    /// First voxel of the node.
     pub code: MortonCode,
     /// Depth of the node, 0 (the root) to 16 (a single voxel).
     pub depth: u8,
@@ -14,13 +14,14 @@ pub struct Leaf {
     pub value: f32,
 }
 
-/// The leaves of a tree, or of a part of it, in Morton order; from [`Octree::leaves`] and its kin.
+/// Iterator over the leaves of a tree, or of a part of it, in Morton order; returned by [`Octree::leaves`] and similar
+/// methods.
 #[derive(Clone)]
 pub struct Leaves<'a> {
     tree: &'a Octree,
-    /// A leaf without a block, if it is the whole answer.
+    /// A leaf without a block, if it is the only result.
     single: Option<Leaf>,
-    /// The blocks on the present path, from the outermost to the innermost.
+    /// Blocks on the current path, from the outermost to the innermost.
     path: Vec<Step>,
 }
 
@@ -35,7 +36,7 @@ struct Step {
 }
 
 impl<'a> Leaves<'a> {
-    /// The leaves of the node at `depth` that holds `code`.
+    /// Returns the leaves of the node at `depth` that contains `code`.
     pub(super) fn under(tree: &'a Octree, code: MortonCode, depth: u8) -> Self {
         let depth = depth.min(DEPTH);
         let code = MortonCode(code.ancestor(depth).0 % MortonCode::END);
@@ -50,10 +51,10 @@ impl<'a> Leaves<'a> {
         leaves
     }
 
-    /// The leaves that do not end before `code`.
+    /// Returns the leaves that do not end before `code`.
     pub(super) fn from(tree: &'a Octree, code: MortonCode) -> Self {
         let mut leaves = Self::under(tree, MortonCode(0), 0);
-        // Skips all that lies before the voxel on the way down.
+        // Skips everything before the voxel during the descent.
         while let Some(step) = leaves.path.last_mut() {
             let child = code.child_at(step.depth - 1);
             step.next_child = child;

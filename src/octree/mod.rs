@@ -1,11 +1,11 @@
-//! OctoMap's octree over voxel keys, and OctoMap's files.
+//! OctoMap's octree over voxel keys, and OctoMap's file formats.
 //!
 //! ```text
-//! Octree       16 levels below the root, f32 log-odds, pruned at once     tree, block, leaves, overrides
-//! read, write  `.bt` (occupied / free) and `.ot` (all values), by bytes   codec, brick_nodes, brick_values
+//! Octree       16 levels below the root, f32 log-odds, pruned immediately  tree, block, leaves, overrides
+//! read, write  `.bt` (occupied / free) and `.ot` (all values) files         codec, brick_nodes, brick_values
 //! ```
 //!
-//! A tree knows neither metres nor tiles: a voxel is its [`MortonCode`](crate::space::MortonCode). A file adds the
+//! A tree is independent of metres and tiles: a voxel is its [`MortonCode`](crate::space::MortonCode). A file adds the
 //! resolution.
 
 mod block;

@@ -4,7 +4,7 @@ use super::tree::{DEPTH, runs_by_child};
 use crate::space::MortonCode;
 
 impl Octree {
-    /// The value that [`Octree::get`] would return for the node at `depth` (0 to 16) over the voxel `node` if
+    /// Returns the value that [`Octree::get`] would return for the node at `depth` (0 to 16) over the voxel `node` if
     /// `overrides` were written first. The tree is unchanged.
     ///
     /// `overrides` are codes, strictly ascending and below [`MortonCode::END`], each with its log-odds; those outside
@@ -29,7 +29,7 @@ impl Octree {
         };
         let all_replaced = overrides.len() as u64 == MortonCode::span(depth);
         match node.value() {
-            // The remaining voxels are not above the node's old value.
+            // The remaining voxels do not exceed the node's old value.
             Some(value) if !all_replaced && highest < value => {}
             _ => return Some(highest),
         }

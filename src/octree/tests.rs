@@ -1,4 +1,4 @@
-//! The tree against a naive map from voxels to values.
+//! Compares the tree with a naive map from voxels to values.
 
 use super::{Leaf, Octree};
 use crate::space::MortonCode;
@@ -8,13 +8,13 @@ use std::collections::BTreeMap;
 type Model = BTreeMap<u64, f32>;
 type Voxel = (MortonCode, f32);
 
-/// Codes of a few clusters, small enough that nodes are often complete.
+/// Codes from a few clusters, small enough that nodes are often complete.
 fn any_code() -> impl Strategy<Value = u64> {
     let cluster = prop_oneof![Just(0), Just(0x1234_5678_9a00), Just(MortonCode::END - 512)];
     (cluster, prop_oneof![4 => 0..16_u64, 3 => 0..64_u64, 1 => 0..512_u64]).prop_map(|(base, low)| base + low)
 }
 
-/// Few values, so that neighbours are often equal; both zeros, which are equal but not to the bit.
+/// Few values, so that neighbours are often equal; both zeros, which are equal but not bit-identical.
 fn any_value() -> impl Strategy<Value = f32> {
     prop_oneof![6 => Just(1.5_f32), 3 => Just(-2.0), 1 => Just(0.0), 1 => Just(-0.0), 1 => -3.0..3.0_f32]
 }
@@ -38,7 +38,7 @@ fn max_of(model: &Model, code: u64, depth: u8) -> Option<f32> {
     model.range(first..first + MortonCode::span(depth)).map(|(_, &value)| value).reduce(f32::max)
 }
 
-/// Leaves and number of nodes of the one minimal tree of these voxels: the largest aligned cubes of one value.
+/// Leaves and number of nodes of the unique minimal tree of these voxels: the largest aligned cubes of one value.
 fn minimal_tree(model: &Model) -> (Vec<Leaf>, u64) {
     fn grow(voxels: &[Voxel], depth: u8, leaves: &mut Vec<Leaf>) -> u64 {
         let Some(&(code, value)) = voxels.first() else { return 0 };
@@ -65,9 +65,9 @@ fn assert_is(tree: &Octree, model: &Model) {
 
 proptest! {
     #[test]
-    fn whatever_is_written_the_tree_is_minimal_and_every_node_the_maximum_of_its_voxels(
+    fn trees_are_minimal_and_nodes_are_the_maximum_of_their_voxels(
         batches in prop::collection::vec((any::<bool>(), any_batch()), 1..12),
-        asked in prop::collection::vec(any_code(), 1..20),
+        queried in prop::collection::vec(any_code(), 1..20),
     ) {
         let (mut tree, mut model) = (Octree::new(), Model::new());
         for (at_once, batch) in batches {
@@ -79,7 +79,7 @@ proptest! {
             model.extend(batch);
             assert_is(&tree, &model);
         }
-        for code in asked {
+        for code in queried {
             for depth in 0..=16 {
                 assert_eq!(tree.get(MortonCode(code), depth), max_of(&model, code, depth));
             }
@@ -91,16 +91,16 @@ proptest! {
     }
 
     #[test]
-    fn overrides_answer_as_if_they_had_been_written(
+    fn overrides_give_the_same_values_as_writes(
         before in prop::collection::vec(any_batch(), 0..4),
         overrides in any_batch(),
-        asked in prop::collection::vec(any_code(), 1..20),
+        queried in prop::collection::vec(any_code(), 1..20),
     ) {
         let tree = Octree::from_sorted(voxels_of(&before.iter().flatten().map(|(&c, &v)| (c, v)).collect()));
         let overrides = voxels_of(&overrides);
         let mut written = tree.clone();
         written.write_sorted(&overrides);
-        for code in asked.into_iter().map(MortonCode) {
+        for code in queried.into_iter().map(MortonCode) {
             for depth in 0..=16 {
                 assert_eq!(tree.max_with_overrides(code, depth, &overrides), written.get(code, depth));
             }
@@ -108,7 +108,7 @@ proptest! {
     }
 
     #[test]
-    fn a_walk_may_begin_anywhere_and_be_kept_to_a_node(
+    fn leaves_can_start_anywhere_and_be_limited_to_a_node(
         batches in prop::collection::vec(any_batch(), 0..4),
         code in any_code(),
         depth in 0..=16_u8,
@@ -129,7 +129,7 @@ proptest! {
     }
 
     #[test]
-    fn any_order_and_any_number_is_taken(
+    fn any_order_and_any_value_is_accepted(
         voxels in prop::collection::vec((any::<u64>(), any::<f32>()), 0..50), depth in any::<u8>(),
     ) {
         let voxels: Vec<_> = voxels.into_iter().map(|(code, value)| (MortonCode(code), value)).collect();

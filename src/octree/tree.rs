@@ -3,21 +3,21 @@ use super::leaves::Leaves;
 use crate::space::MortonCode;
 use std::fmt;
 
-/// Depth of the finest voxels; the root has depth 0.
+/// Depth of the voxels; the root has depth 0.
 pub(super) const DEPTH: u8 = 16;
 
-/// OctoMap's octree: 16 levels below the root, a log-odds value (`f32`) at every known node.
+/// OctoMap's octree: 16 levels below the root, a log-odds value (`f32`) at each known node.
 ///
 /// - The value of an inner node is the maximum of its children.
-/// - Eight leaves with one parent and one value, to the bit, are pruned into the parent at once, and expanded
-///   again when one of them changes.
-/// - A voxel that was never set is unknown; it has no value.
+/// - Eight sibling leaves with bit-identical values are immediately pruned into their parent, and expanded again when
+///   one of them changes.
+/// - A voxel that was never set is unknown and has no value.
 ///
-/// A tree [read from a file](super::read) is kept as in the file, even if it breaks the first two rules. Call
+/// A tree [read from a file](super::read) is kept as in the file, even if it violates the first two rules. Call
 /// [`Octree::normalize`] before changing it.
 ///
-/// Values are any `f32` but NaN, which is not refused but has no defined place among the maxima. Only the lowest 48
-/// bits of a code count.
+/// Values may be any `f32` except NaN, which is accepted but has no defined order for the maxima. Only the lowest 48
+/// bits of a code are used.
 #[derive(Clone)]
 pub struct Octree {
     pub(super) root: Node,
@@ -27,24 +27,24 @@ pub struct Octree {
     voxels: u64,
 }
 
-/// Number of finest voxels that the leaves of a tree represent, by state.
+/// Number of voxels that the leaves of a tree represent, by state.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct VoxelCounts {
     /// Voxels with log-odds at or above the threshold.
     pub occupied: u64,
-    /// Voxels with log-odds below it.
+    /// Voxels with log-odds below the threshold.
     pub free: u64,
 }
 
 impl Octree {
-    /// An empty tree; it allocates nothing.
+    /// Creates an empty tree, without an allocation.
     pub fn new() -> Self {
         Self { root: Node::Unknown, arena: Arena::default(), nodes: 0, leaves: 0, voxels: 0 }
     }
 
-    /// The tree of these voxels, in linear time if the codes ascend.
+    /// Creates the tree of these voxels, in linear time if the codes ascend.
     ///
-    /// Equal to setting them one by one, in any order.
+    /// The result is the same as after setting them one by one.
     pub fn from_sorted(voxels: impl IntoIterator<Item = (MortonCode, f32)>) -> Self {
         const BATCH: usize = 4096;
         let mut tree = Self::new();
@@ -65,9 +65,9 @@ impl Octree {
         self.root = self.write(self.root, 0, &[(code, value)]);
     }
 
-    /// Sets the values (log-odds) of many voxels; of duplicates the last counts.
+    /// Sets the values (log-odds) of many voxels; the last of duplicates is used.
     ///
-    /// Fast for strictly ascending codes: shared paths are walked once, and each node is summarized once per batch.
+    /// Fast for strictly ascending codes: shared paths are descended once, and each node is summarized once per batch.
     /// Other batches are written voxel by voxel.
     pub fn write_sorted(&mut self, voxels: &[(MortonCode, f32)]) {
         let Some((last, _)) = voxels.last() else { return };
@@ -80,10 +80,10 @@ impl Octree {
         }
     }
 
-    /// Value (log-odds) of the node at `depth` (0, the root, to 16, the voxel) over the voxel `code`, or of the leaf
-    /// above it; `None` if unknown.
+    /// Returns the value (log-odds) of the node at `depth` (0, the root, to 16, the voxel) over the voxel `code`, or of
+    /// the leaf above it; `None` if unknown.
     ///
-    /// It is the maximum of all known voxels of the node. A depth beyond 16 counts as 16.
+    /// The value is the maximum of all known voxels of the node. A depth beyond 16 counts as 16.
     pub fn get(&self, code: MortonCode, depth: u8) -> Option<f32> {
         self.node_at(code, depth).0.value()
     }
@@ -93,14 +93,14 @@ impl Octree {
         Leaves::under(self, MortonCode(0), 0)
     }
 
-    /// The leaves of the node at `depth` (0 to 16) that holds the voxel `code`, in Morton order.
+    /// The leaves of the node at `depth` (0 to 16) that contains the voxel `code`, in Morton order.
     ///
-    /// If the node lies inside a leaf, that part of the leaf is returned.
+    /// If the node is inside a leaf, that part of the leaf is returned.
     pub fn leaves_under(&self, code: MortonCode, depth: u8) -> Leaves<'_> {
         Leaves::under(self, code, depth)
     }
 
-    /// The leaves in Morton order, from the one that holds the voxel `code`, or else from the next.
+    /// The leaves in Morton order, starting with the one that contains the voxel `code`, or otherwise the next.
     pub fn leaves_from(&self, code: MortonCode) -> Leaves<'_> {
         Leaves::from(self, code)
     }
@@ -115,14 +115,15 @@ impl Octree {
         self.leaves
     }
 
-    /// Number of finest voxels that the leaves represent, at most 2^48.
+    /// Number of voxels that the leaves represent, at most 2^48.
     ///
-    /// A few bytes of a file can represent all of them: check this before expanding the leaves of an untrusted tree.
+    /// A few bytes of a file can represent all of them: check this number before expanding the leaves of an untrusted
+    /// tree.
     pub fn expanded_leaf_count(&self) -> u64 {
         self.voxels
     }
 
-    /// The finest voxels that the leaves represent, by a threshold (log-odds). Visits every leaf.
+    /// Counts the voxels that the leaves represent, by a threshold (log-odds). Visits all leaves.
     pub fn count_voxels(&self, threshold_log_odds: f32) -> VoxelCounts {
         let mut counts = VoxelCounts::default();
         for leaf in self.leaves() {
@@ -133,22 +134,22 @@ impl Octree {
         counts
     }
 
-    /// Whether no voxel is known.
+    /// Returns whether no voxel is known.
     pub fn is_empty(&self) -> bool {
         self.nodes == 0
     }
 
-    /// Bytes of heap of the tree, including unused ones.
+    /// Bytes of memory on the heap, including unused ones.
     pub fn bytes(&self) -> usize {
         self.arena.bytes()
     }
 
-    /// Removes every voxel and frees the memory.
+    /// Removes all voxels and frees the memory.
     pub fn clear(&mut self) {
         *self = Self::new();
     }
 
-    /// Makes every inner node the maximum of its children and prunes what can be pruned, as if the voxels had been set
+    /// Sets each inner node to the maximum of its children and prunes all prunable nodes, as if the voxels had been set
     /// one by one.
     pub fn normalize(&mut self) {
         self.root = self.normalized(self.root);
@@ -196,7 +197,7 @@ impl Octree {
         if changed { self.summed_up(block) } else { node }
     }
 
-    /// The node above a block: a leaf if the block can be pruned; then the block is released.
+    /// Returns the node above a block: a leaf if the block can be pruned; the block is then released.
     fn summed_up(&mut self, block: BlockId) -> Node {
         match self.arena[block].uniform_leaves() {
             Some(value) => {
@@ -209,7 +210,7 @@ impl Octree {
         }
     }
 
-    /// Counts a new inner node, and makes its children's block.
+    /// Counts a new inner node, and allocates its children's block.
     pub(super) fn add_inner(&mut self) -> BlockId {
         self.nodes += 1;
         self.arena.allocate(Block::EMPTY)
@@ -222,7 +223,7 @@ impl Octree {
         self.voxels += MortonCode::span(depth);
     }
 
-    /// The node at `depth` that holds `code`, or the leaf or unknown node above it, with the depth found.
+    /// Returns the node at `depth` that contains `code`, or the leaf or unknown node above it, and the depth found.
     pub(super) fn node_at(&self, code: MortonCode, depth: u8) -> (Node, u8) {
         let mut node = self.root;
         for at in 0..depth.min(DEPTH) {
@@ -240,7 +241,7 @@ pub(super) fn runs_by_child(
 ) -> impl Iterator<Item = (usize, &[(MortonCode, f32)])> {
     std::iter::from_fn(move || {
         let index = voxels.first()?.0.child_at(depth);
-        // Most ancestors have all the voxels of a batch in one child.
+        // For most ancestors, all voxels of a batch are in one child.
         let run = if voxels[voxels.len() - 1].0.child_at(depth) == index {
             std::mem::take(&mut voxels)
         } else {

@@ -5,7 +5,8 @@ use crate::error::{DecodeError, Error, FormatError, Result};
 use crate::space::{Grid, TileIndex};
 use crate::store::{FileChecksum, StoredTile, TileStore, TileVersion, hex};
 use crate::tile::format::{
-    Decoded, SiftedVoxels, Trailer, read_compact_file, read_compact_voxels_from, read_table, read_voxels_from,
+    Decoded, FilteredVoxels, Trailer, read_compact_file, read_compact_voxels_from, read_table,
+    read_voxels_from,
 };
 use crate::tile::{OctreeFactory, Table, Tile};
 
@@ -38,7 +39,7 @@ pub(crate) fn load_voxels_from(
     grid: &Grid,
     index: TileIndex,
     from: f64,
-) -> Result<Option<SiftedVoxels>> {
+) -> Result<Option<FilteredVoxels>> {
     let read = |stored| read_stored_voxels_from(grid, index, stored, from);
     Ok(load_made(store, index, read)?.map(|read| read.table))
 }
@@ -96,7 +97,7 @@ fn read_stored_voxels_from(
     index: TileIndex,
     stored: StoredTile,
     from: f64,
-) -> Result<Read<SiftedVoxels>> {
+) -> Result<Read<FilteredVoxels>> {
     let voxels = grid.voxels_of_tile(index);
     read_stored(index, stored, |stored| match stored.storage {
         Storage::OctoMap => read_voxels_from(&mut stored.input, stored.bytes, &voxels, from),

@@ -4,17 +4,17 @@ use crate::error::{Error, Result};
 use crate::mapper::MapView;
 use crate::space::{Point, VoxelBox, VoxelIndex};
 
-/// Depth of a finest voxel in OctoMap's tree.
+/// Depth of a voxel in OctoMap's tree.
 const FINEST_DEPTH: u8 = 16;
 
 pub(super) fn occupancy_at_depth(view: &impl MapView, point: Point, depth: u8) -> Result<Occupancy> {
     if !(1..=FINEST_DEPTH).contains(&depth) {
-        return Err(Error::argument("depth", format!("{depth} is not from 1 to {FINEST_DEPTH}, the finest")));
+        return Err(Error::argument("depth", format!("{depth} is not in the range 1 to {FINEST_DEPTH}")));
     }
     let config = view.config();
     let Some(voxel) = config.grid.voxel_of(point) else { return Ok(Occupancy::Unknown) };
     if depth == FINEST_DEPTH {
-        // The voxel itself: the table has it exactly, the octree as `f32`.
+        // The table has the exact value of the voxel, the octree only an `f32`.
         return Ok(Occupancy::of(config, view.evidence(voxel)?));
     }
     let mut max: Option<f32> = None;
@@ -30,8 +30,8 @@ pub(super) fn occupancy_at_depth(view: &impl MapView, point: Point, depth: u8) -
     Ok(Occupancy::of_log_odds(config, max.map(f64::from)))
 }
 
-/// The voxels under the node at `depth` that holds a voxel. Nodes are aligned like keys: to multiples of their size
-/// from index -32768.
+/// Returns the voxels under the node at `depth` that contains a voxel. Like keys, nodes are aligned to multiples of
+/// their size from index -32768.
 fn voxels_of_node(voxel: VoxelIndex, depth: u8) -> VoxelBox {
     let size = 1_i64 << (FINEST_DEPTH - depth);
     let min = voxel.map(|index| i64::from(index).div_euclid(size) * size);

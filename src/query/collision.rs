@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::mapper::MapView;
 use crate::space::{BRICK_EDGE, Grid, VoxelBox, VoxelIndex};
 
-/// Unknown space is searched voxel by voxel, up to this number.
+/// Maximum number of voxels when unknown space is an obstacle, because then each voxel is examined.
 const MAX_UNKNOWN_VOXELS: u64 = 1 << 28;
 
 pub(super) fn collision<V: MapView + ?Sized>(
@@ -43,12 +43,12 @@ pub(super) fn collision<V: MapView + ?Sized>(
     Ok(None)
 }
 
-/// The first voxel that a body touches and that is not free, by `occupancy`. Bricks that the body does not touch are
-/// passed over.
+/// Returns the first voxel, brick by brick, that a body touches and that is not free according to `occupancy`. Bricks
+/// that the body does not touch are skipped.
 ///
 /// # Errors
 ///
-/// A wrong body, one around which there are too many voxels; errors of `occupancy`.
+/// Fails if the body is invalid or covers too many voxels; returns errors from `occupancy`.
 pub(crate) fn first_not_free(
     grid: &Grid,
     body: &Shape,
@@ -58,7 +58,7 @@ pub(crate) fn first_not_free(
     let size: u64 =
         (0..3).map(|k| u64::from(around.end[k].abs_diff(around.min[k]))).fold(1, u64::saturating_mul);
     if size > MAX_UNKNOWN_VOXELS {
-        let hint = "take a smaller body, or count unknown as free";
+        let hint = "use a smaller body, or treat unknown space as free";
         return Err(Error::TooLarge {
             what: "number of voxels in the body",
             size,
@@ -82,7 +82,7 @@ pub(crate) fn first_not_free(
     Ok(None)
 }
 
-/// The bricks that overlap a box, each cut to the box.
+/// Returns the bricks that overlap a box, each clipped to the box.
 fn bricks_of(voxels: &VoxelBox) -> impl Iterator<Item = VoxelBox> {
     let voxels = *voxels;
     let corners = move |k: usize| {

@@ -5,10 +5,10 @@ use crate::space::{Aabb, BrickMask, VoxelBox, ones};
 use crate::tile::Tile;
 use rustc_hash::FxHashMap;
 
-/// What is known of a column of voxels.
+/// State of a column of voxels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Column {
-    /// No voxel of it was observed.
+    /// No voxel was observed.
     Unknown,
     /// Voxels were observed, and none of them is occupied.
     Free,
@@ -16,7 +16,7 @@ pub enum Column {
     Occupied,
 }
 
-/// A part of a map seen from above: a state for each column of voxels.
+/// 2D occupancy grid of a part of a map: a state for each column of voxels.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Columns {
     first: [i32; 2],
@@ -24,21 +24,21 @@ pub struct Columns {
     states: Vec<Column>,
 }
 
-/// Most columns of an answer.
+/// Maximum number of columns in a grid.
 const MAX_COLUMNS: i64 = 1 << 31;
 
-/// The columns of a brick, one bit each, in Morton order: the bits of x and y alternate.
+/// Columns of a brick, one bit each, in Morton order: the bits of x and y alternate.
 #[derive(Clone, Copy, Debug, Default)]
 struct BrickColumns {
-    /// With an observed voxel at any height.
+    /// Columns with an observed voxel at any height.
     known: u64,
-    /// With an observed voxel between the heights.
+    /// Columns with an observed voxel between the two heights.
     seen: u64,
     occupied: u64,
 }
 
 impl Columns {
-    /// The lowest voxel index along x and y.
+    /// Lowest voxel index along x and y.
     pub fn first(&self) -> [i32; 2] {
         self.first
     }
@@ -48,7 +48,7 @@ impl Columns {
         self.size
     }
 
-    /// Row by row from the smallest y up, each from the smallest x.
+    /// States, row by row from the smallest y, each row from the smallest x.
     pub fn states(&self) -> &[Column] {
         &self.states
     }
@@ -66,7 +66,7 @@ pub(super) fn columns_in(view: &impl MapView, region: &Aabb, heights_m: [f64; 2]
                 let [_, _, center_m] = grid.center_m([0, 0, z]);
                 center_m + half_m > heights_m[0] && center_m - half_m < heights_m[1]
             };
-            // Layers that reach between the heights follow each other.
+            // The layers that reach between the heights are contiguous.
             let layers = within.min[2]..within.end[2];
             let first = layers.clone().find(|z| reaches(*z)).unwrap_or(layers.end);
             let end = (first..layers.end).find(|z| !reaches(*z)).unwrap_or(layers.end);
@@ -79,7 +79,7 @@ pub(super) fn columns_in(view: &impl MapView, region: &Aabb, heights_m: [f64; 2]
     spread(&columns, grid.resolution_m())
 }
 
-/// Adds the observed voxels of a tile that lie in a box; those `between` count.
+/// Adds the observed voxels of a tile within a box; those in `between` determine the state of their columns.
 fn collect(
     tile: &Tile,
     within: &VoxelBox,
@@ -108,10 +108,9 @@ fn both(a: &BrickMask, b: &BrickMask) -> BrickMask {
     std::array::from_fn(|word| a[word] & b[word])
 }
 
-/// The columns of a brick that have a voxel of a mask.
+/// Returns the columns of a brick that have a voxel in a mask.
 fn from_above(mask: &BrickMask) -> u64 {
-    // Of the nine bits of a place, those of z are the third, the sixth and the ninth: what differs in them alone is one
-    // column.
+    // Bits three, six and nine of a position belong to z; voxels that differ only in these bits are in one column.
     (0..8).fold(0, |columns, word| {
         let low = mask[word] | mask[word] >> 4;
         let low = (low | low >> 32) & 0x0f0f_0f0f;
@@ -121,12 +120,12 @@ fn from_above(mask: &BrickMask) -> u64 {
     })
 }
 
-/// Where a column of a brick is along x and y.
+/// Position of a column within a brick, along x and y.
 fn place_of(column: usize) -> [i64; 2] {
     [0, 1].map(|axis| (0..3).map(|k| ((column >> (2 * k + axis) & 1) << k) as i64).sum())
 }
 
-/// Puts the columns of bricks into the least rectangle around all observed voxels.
+/// Combines the columns of bricks in the smallest rectangle around all observed voxels.
 fn spread(bricks: &FxHashMap<[i32; 2], BrickColumns>, resolution_m: f64) -> Result<Columns> {
     let at = |corner: &[i32; 2], column: usize| {
         let place = place_of(column);
@@ -145,8 +144,7 @@ fn spread(bricks: &FxHashMap<[i32; 2], BrickColumns>, resolution_m: f64) -> Resu
     let [width, height] = [0, 1].map(|k| last[k] - first[k] + 1);
     let too_many = || {
         let reason = format!(
-            "{width} x {height} columns of {resolution_m} m; an answer has at most {MAX_COLUMNS}: ask for a smaller \
-             region"
+            "{width} x {height} columns of {resolution_m} m exceed the limit of {MAX_COLUMNS}; use a smaller region"
         );
         Error::argument("region", reason)
     };
@@ -163,7 +161,7 @@ fn spread(bricks: &FxHashMap<[i32; 2], BrickColumns>, resolution_m: f64) -> Resu
             states[((y - first[1]) * width + (x - first[0])) as usize] = state;
         }
     }
-    // Of voxels, whose indices are of 32 bits.
+    // These are voxel indices, which have 32 bits.
     Ok(Columns { first: first.map(|k| k as i32), size: [width as usize, height as usize], states })
 }
 
@@ -173,7 +171,7 @@ mod tests {
     use crate::space::{BRICK_EDGE, add_to_mask, place_of_voxel};
 
     #[test]
-    fn each_voxel_of_a_brick_is_in_its_column() {
+    fn voxels_of_a_brick_are_in_their_columns() {
         for x in 0..BRICK_EDGE {
             for y in 0..BRICK_EDGE {
                 for z in 0..BRICK_EDGE {

@@ -5,18 +5,18 @@ use crate::tile::format::encode_entries;
 use std::convert::Infallible;
 use std::fmt;
 
-/// The digest of the content of a map or a set: equal for equal ones, however they were built. 32 bytes of BLAKE3 over
-/// what `docs/format.md` says; printed as 64 hexadecimal digits.
+/// Digest of the content of a map or a set: equal for equal content, however it was built. 32 bytes of BLAKE3 over the
+/// data specified in `docs/format.md`; printed as 64 hexadecimal digits.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Digest([u8; 32]);
 
 impl Digest {
-    /// The digest of these bytes, as [`Digest::to_bytes`] gave them.
+    /// Creates a digest from the bytes returned by [`Digest::to_bytes`].
     pub const fn from_bytes(bytes: [u8; 32]) -> Self {
         Self(bytes)
     }
 
-    /// Its bytes.
+    /// The bytes of the digest.
     pub const fn to_bytes(self) -> [u8; 32] {
         self.0
     }
@@ -55,7 +55,7 @@ pub(super) fn digest(view: &impl MapView) -> Result<Digest> {
     Ok(Digest(*hasher.finalize().as_bytes()))
 }
 
-/// Over key, log-odds and count of every entry, as in `iwlo_meta.bin`.
+/// Hashes key, log-odds and count of each entry, as in `iwlo_meta.bin`.
 fn digest_of_tile(tile: &Tile) -> blake3::Hash {
     let mut hasher = blake3::Hasher::new();
     let Ok(()) = encode_entries(tile.table(), |entries| {

@@ -9,42 +9,44 @@ use crate::space::{Aabb, Point};
 use crate::tile::Voxel;
 use std::io::{self, Read, Seek, Write};
 
-/// What can be asked of a map of tiles beyond [`Queries`](super::Queries): exact evidence, coarse nodes, the whole map.
+/// Additional queries of maps of tiles, beyond [`Queries`](super::Queries): exact evidence, coarse nodes, the whole
+/// map.
 ///
-/// A query fails only if a tile cannot be read, or if a tile that has to go for it cannot be written.
+/// A query fails only if a tile cannot be read, or if an evicted tile cannot be written.
 pub trait MapQueries: MapView + Sized {
-    /// The observed voxel that holds a point, with its exact evidence.
+    /// Returns the observed voxel that contains a point, with its exact evidence.
     ///
     /// # Errors
     ///
-    /// A tile that cannot be read; for a mapper, one that has to go for it and cannot be written.
+    /// Fails if a tile cannot be read or, for a mapper, an evicted one cannot be written.
     #[inline]
     fn voxel_at(&self, point: Point) -> Result<Option<Voxel>> {
         point::voxel_at(self, point)
     }
 
-    /// The exact evidence at many points, in their order, on all cores: each tile is looked at once or a few times.
+    /// Returns the exact evidence at many points, in their order, on all cores. Each tile is read once or a few times.
     ///
     /// # Errors
     ///
-    /// As for [`MapQueries::voxel_at`].
+    /// Same errors as [`MapQueries::voxel_at`].
     fn evidence_at_points(&self, points: &[Point]) -> Result<Vec<Option<Evidence>>> {
         point::evidence_at_points(self, points)
     }
 
-    /// The occupancy of the octree node at `depth` that holds a point: the largest log-odds under the node as `f32`,
-    /// OctoMap's precision. Depth 1 is half of OctoMap's space, depth 15 two voxels wide. At depth 16 the node is the
-    /// voxel, and the answer is bit-identical to [`Queries::occupancy_at`](super::Queries::occupancy_at).
+    /// Returns the occupancy of the octree node at `depth` that contains a point: the largest log-odds under the node
+    /// as `f32`, OctoMap's precision. A node at depth 1 is half as wide as OctoMap's space, at depth 15 two voxels
+    /// wide. At depth 16 the node is the voxel, and the result is bit-identical to
+    /// [`Queries::occupancy_at`](super::Queries::occupancy_at).
     ///
     /// # Errors
     ///
-    /// Another depth.
+    /// Fails if the depth is not from 1 to 16.
     fn occupancy_at_depth(&self, point: Point, depth: u8) -> Result<Occupancy> {
         coarse::occupancy_at_depth(self, point, depth)
     }
 
-    /// The observed voxels whose center is in the half-open box, with their exact evidence: tile by tile, in Morton
-    /// order within each. A tile is read when its first voxel is taken.
+    /// Iterates over the observed voxels whose center is in the half-open box, with their exact evidence: tile by tile,
+    /// in Morton order within each. A tile is read when its first voxel is requested.
     fn evidence_in(&self, region: &Aabb) -> impl Iterator<Item = Result<Voxel>> + '_ {
         region::evidence_in(self, region)
     }
@@ -53,17 +55,17 @@ pub trait MapQueries: MapView + Sized {
     ///
     /// # Errors
     ///
-    /// A tile that cannot be read; for a mapper, one that has to go for it and cannot be written.
+    /// Fails if a tile cannot be read or, for a mapper, an evicted one cannot be written.
     fn for_each_voxel_in(&self, region: &Aabb, visit: impl FnMut(Voxel)) -> Result<()> {
         region::for_each_voxel_in(self, region, visit)
     }
 
     /// Visits the voxels of the whole map, or of a region, whose probability of being occupied is at least
-    /// `min_probability`; `None` takes the map's occupancy threshold.
+    /// `min_probability`; `None` uses the occupancy threshold of the map.
     ///
     /// # Errors
     ///
-    /// A tile that cannot be read.
+    /// Fails if a tile cannot be read.
     fn for_each_occupied(
         &self,
         min_probability: Option<f64>,
@@ -73,64 +75,66 @@ pub trait MapQueries: MapView + Sized {
         region::for_each_occupied(self, min_probability, region, visit)
     }
 
-    /// What is known of each column of voxels whose center is in the half-open box, for robots that drive. Voxels count
-    /// that reach between two heights in metres; the answer is the least rectangle around the observed ones of the box.
+    /// Returns a 2D occupancy grid of the half-open box, for ground robots: the state of each column of voxels whose
+    /// center is in the box. Only voxels that reach between two heights in metres determine the state. The grid is the
+    /// smallest rectangle around the observed voxels of the box.
     ///
     /// # Errors
     ///
-    /// A tile that cannot be read; more than 2^31 columns.
+    /// Fails if a tile cannot be read or the grid has more than 2^31 columns.
     fn columns_in(&self, region: &Aabb, heights_m: [f64; 2]) -> Result<Columns> {
         columns::columns_in(self, region, heights_m)
     }
 
-    /// The occupied voxels of the whole map. For large maps use [`MapQueries::for_each_occupied`].
+    /// Returns the occupied voxels of the whole map. For large maps use [`MapQueries::for_each_occupied`].
     ///
     /// # Errors
     ///
-    /// A tile that cannot be read.
+    /// Fails if a tile cannot be read.
     fn all_occupied_voxels(&self, min_probability: Option<f64>) -> Result<Vec<Voxel>> {
         let mut voxels = Vec::new();
         self.for_each_occupied(min_probability, None, |voxel| voxels.push(voxel))?;
         Ok(voxels)
     }
 
-    /// The occupied voxels of tiles in memory only; the answer depends on the cache.
+    /// Returns the occupied voxels of tiles in memory only; the result depends on the cache.
     ///
     /// # Errors
     ///
-    /// None for what is in memory; the tile that another thread evicts meanwhile is read again.
+    /// Fails if another thread evicts a tile during the query and it cannot be read again.
     fn cached_occupied_voxels(&self, min_probability: Option<f64>) -> Result<Vec<Voxel>> {
         region::cached_occupied_voxels(self, min_probability)
     }
 
-    /// The digest of the map's content: equal for equal maps, however they were built. See `docs/format.md`.
+    /// Returns the digest of the map's content: equal for equal maps, however they were built. See `docs/format.md`.
     ///
     /// # Errors
     ///
-    /// A tile that cannot be read.
+    /// Fails if a tile cannot be read.
     fn digest(&self) -> Result<Digest> {
         digest::digest(self)
     }
 
-    /// One octree of the whole map or of a region, as in OctoMap, in memory. For larger maps use
+    /// Returns one octree of the whole map or of a region, as in OctoMap, in memory. For larger maps use
     /// [`MapQueries::write_octree`].
     ///
     /// # Errors
     ///
-    /// Voxels outside OctoMap's key range of 65536 voxels per axis around the origin; more than `max_voxels`.
+    /// Fails if a voxel is outside OctoMap's key range of 65536 voxels per axis around the origin, or if there are more
+    /// than `max_voxels` voxels.
     fn merged_octree(&self, region: Option<&Aabb>, max_voxels: u64) -> Result<Octree> {
         merged::merged_octree(self, region, max_voxels)
     }
 
-    /// Writes the `.bt` or `.ot` file of [`MapQueries::merged_octree`]'s tree without building the tree, whatever its
-    /// size. Returns the number of its voxels.
+    /// Writes the tree of [`MapQueries::merged_octree`] to a `.bt` or `.ot` file without building the tree, so that its
+    /// size is not limited. Returns the number of voxels.
     ///
     /// The spool, an empty file or a [`Cursor`](std::io::Cursor), receives as many bytes as the file. `out` is written
     /// only after all tiles were read.
     ///
     /// # Errors
     ///
-    /// Voxels outside OctoMap's key range; errors of the spool or of `out`.
+    /// Fails if a voxel is outside OctoMap's key range; returns errors from the spool or `out`.
     fn write_octree<E: From<Error> + From<io::Error>>(
         &self,
         export: &OctreeExport<'_>,

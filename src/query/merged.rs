@@ -28,7 +28,7 @@ pub(super) fn merged_octree(view: &impl MapView, region: Option<&Aabb>, max_voxe
         return Err(out_of_reach(&view.config().grid, voxel, None));
     }
     if count > max_voxels {
-        let hint = "name a smaller region (`region`)";
+        let hint = "use a smaller region (`region`)";
         return Err(Error::TooLarge {
             what: "number of voxels in one octree",
             size: count,

@@ -1,28 +1,30 @@
 //! Queries of maps.
 //!
-//! | trait | of | answers |
+//! | trait | implemented by | queries |
 //! |---|---|---|
-//! | [`Queries`] | everything that can be asked, also as `dyn` | occupancy, rays, collisions, nearest voxels |
+//! | [`Queries`] | all maps and sets, also as `dyn` | occupancy, rays, collisions, nearest voxels |
 //! | [`MapQueries`] | maps of tiles ([`MapView`](crate::mapper::MapView)) | exact evidence, digests, octrees |
 //!
-//! | query | answer |
+//! | query | result |
 //! |---|---|
 //! | a point, many points | [`Occupancy`]: unknown, free or occupied, with the probability |
 //! | a point at a coarse depth | the same, for the largest log-odds under that octree node |
 //! | a region, the whole map | its voxels, streamed |
 //! | a region from above | [`Columns`]: unknown, free or occupied, for each column of voxels |
-//! | a ray, many rays, a segment | [`Hit`]: the first occupied voxel, exactly as single steps would find it |
+//! | a ray, many rays, a segment | [`Hit`]: the first occupied voxel, identical to that of single steps |
 //! | a sphere, a box, a swept sphere | [`Hit`]: an occupied voxel that it touches |
 //! | nearest occupied | [`Hit`]: the occupied voxel with the nearest center |
-//! | digest | one number for the whole content |
+//! | digest | a hash of the whole content |
 //! | merged octree | OctoMap's tree of a region, or a `.bt` or `.ot` file of the whole map, streamed |
 //!
-//! `of_map` answers for maps of tiles, `occupied_set` for local maps and layers, [`United`] for several of both.
+//! `of_map` implements the queries for maps of tiles, `occupied_set` for local maps and layers, [`United`] for several
+//! of both.
 
 mod coarse;
 mod collision;
 mod columns;
 mod digest;
+mod filtered_tiles;
 mod hit;
 mod map_queries;
 mod merged;
@@ -42,7 +44,6 @@ mod queries;
 mod ray;
 mod region;
 mod shape;
-mod sifted_tiles;
 mod tile_cursor;
 mod united;
 

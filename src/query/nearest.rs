@@ -6,7 +6,7 @@ use crate::mapper::MapView;
 use crate::space::{Aabb, BRICK_EDGE, Grid, Point, TileBox, TileIndex, VoxelBox};
 use crate::tile::Tile;
 
-/// Radius of the first ball that is searched, in edges of a brick. Each other one is twice as large as the one before.
+/// Radius of the first ball that is searched, in edges of a brick. The radius is doubled for each further ball.
 const FIRST_BRICKS: f64 = 1.0;
 
 pub(super) fn nearest_occupied<V: MapView + ?Sized>(
@@ -15,10 +15,10 @@ pub(super) fn nearest_occupied<V: MapView + ?Sized>(
     max_distance_m: f64,
 ) -> Result<Option<Hit>> {
     check(point, max_distance_m)?;
-    // Small balls first: what is near is found without a look at the rest of the map.
+    // Small balls first, so that a near voxel is found without examining the rest of the map.
     let grid = &view.config().grid;
     let brick_m = f64::from(BRICK_EDGE) * grid.resolution_m();
-    // Beyond the last tile there is nothing, and every ball that holds all of them is the same.
+    // Limited to the distance of the farthest tile, because larger balls contain no more voxels.
     let Some(tiles) = view.tile_bounds() else { return Ok(None) };
     let max_distance_m = max_distance_m.min(distance_to_farthest_m(grid, &tiles, point));
     let radii_m = std::iter::successors(Some(FIRST_BRICKS * brick_m), |radius_m| Some(2.0 * radius_m));
@@ -31,10 +31,10 @@ pub(super) fn nearest_occupied<V: MapView + ?Sized>(
     nearest_in_ball(view, point, max_distance_m, &mut all_tiles)
 }
 
-/// A distance within which all voxels of a box of tiles are.
+/// Returns a distance within which all voxels of a box of tiles are.
 fn distance_to_farthest_m(grid: &Grid, tiles: &TileBox, point: Point) -> f64 {
     let [low, high] = [grid.voxels_of_tile(tiles.min()).min, grid.voxels_of_tile(tiles.max()).end];
-    // A margin of a voxel for rounding.
+    // A margin of one voxel for rounding.
     let border_m = |voxel: i32, margin: f64| (f64::from(voxel) + margin) * grid.resolution_m();
     let farthest_m = |k: usize| {
         let (low_m, high_m) = (border_m(low[k], -1.0), border_m(high[k], 1.0));
@@ -43,9 +43,11 @@ fn distance_to_farthest_m(grid: &Grid, tiles: &TileBox, point: Point) -> f64 {
     (0..3).map(|k| farthest_m(k).powi(2)).sum::<f64>().sqrt()
 }
 
+/// Checks the arguments of a nearest-voxel query.
+///
 /// # Errors
 ///
-/// [`Error::InvalidArgument`] for a point that is not finite, and for a wrong distance.
+/// Fails with [`Error::InvalidArgument`] if the point is not finite or the distance is invalid.
 pub(super) fn check(point: Point, max_distance_m: f64) -> Result<()> {
     if max_distance_m >= 0.0 && point.iter().all(|coordinate| coordinate.is_finite()) {
         return Ok(());
@@ -86,7 +88,7 @@ fn nearest_in_ball<V: MapView + ?Sized>(
                 nearest_first.push((distance_m, brick));
             }
         };
-        // Most bricks are of free space, and are passed over without a look at their voxels.
+        // Most bricks are free space and are skipped without examining their voxels.
         if !tile.table().visit_marked(&around, threshold, |lowest| note(BrickPart::whole(lowest))) {
             bricks_around(&tile, &around).for_each(note);
         }
@@ -105,12 +107,12 @@ fn nearest_in_ball<V: MapView + ?Sized>(
     }))
 }
 
-/// Bricks of a tile that may have voxels in a box, as wholes, in no particular order.
+/// Returns the bricks of a tile that may have voxels in a box, unclipped and in no particular order.
 fn bricks_around(tile: &Tile, voxels: &VoxelBox) -> impl Iterator<Item = BrickPart> {
     let low = voxels.min.map(|k| k & !(BRICK_EDGE - 1));
     let along = move |k: usize| (low[k]..voxels.end[k]).step_by(BRICK_EDGE as usize);
     let edges: [usize; 3] = std::array::from_fn(|k| if voxels.is_empty() { 0 } else { along(k).count() });
-    // A large ball may have more places for bricks than the tile has bricks.
+    // A large ball may have room for more bricks than the tile has.
     let is_large = edges.iter().product::<usize>() > tile.table().brick_count();
     let listed =
         is_large.then(|| tile.table().bricks().filter_map(|brick| tile.voxels_of_brick(brick).next()));
@@ -120,9 +122,9 @@ fn bricks_around(tile: &Tile, voxels: &VoxelBox) -> impl Iterator<Item = BrickPa
     listed.chain(places.into_iter().flatten().map(BrickPart::whole))
 }
 
-/// A distance from which on there may be voxels of a box.
+/// Returns a lower bound for the distance of a point to the voxels of a box.
 fn distance_to_voxels_m(grid: &Grid, voxels: &VoxelBox, point: Point) -> f64 {
-    // A margin of a voxel for the rounding between voxel borders and multiples of the resolution.
+    // A margin of one voxel for the rounding between voxel borders and multiples of the resolution.
     let bounds = Aabb {
         min: voxels.min.map(|k| (f64::from(k) - 1.0) * grid.resolution_m()),
         max: voxels.end.map(|k| (f64::from(k) + 1.0) * grid.resolution_m()),

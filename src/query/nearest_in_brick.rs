@@ -4,13 +4,13 @@ use crate::sensor::Evidence;
 use crate::space::{BRICK_EDGE, Grid, Point, VoxelIndex};
 use crate::tile::Tile;
 
-/// The nearest voxel to a point among those that were looked at.
+/// Nearest voxel to a point among those examined so far.
 pub(super) struct Nearest {
     grid: Grid,
     point: Point,
-    /// Voxels are looked for whose log-odds are at least these.
+    /// Minimum log-odds of the voxels to find.
     threshold: f64,
-    /// How far away it may be.
+    /// Maximum distance of the voxel; decreases with each better one.
     limit_m: f64,
     best: Option<(Hit, Evidence)>,
 }
@@ -18,7 +18,7 @@ pub(super) struct Nearest {
 /// Voxels along an edge of an octant: a word of a brick's mask.
 const OCTANT_EDGE: usize = BRICK_EDGE as usize / 2;
 
-/// The coordinates of a bit in an octant's word.
+/// Coordinates of a bit in an octant's word.
 const OCTANT_VOXELS: [[u8; 3]; 64] = {
     let mut voxels = [[0; 3]; 64];
     let mut bit = 0;
@@ -38,7 +38,7 @@ impl Nearest {
         Self { grid, point, threshold, limit_m: max_distance_m, best: None }
     }
 
-    /// From what distance on voxels need not be looked at.
+    /// Distance in metres from which voxels need not be examined.
     pub(super) fn limit_m(&self) -> f64 {
         self.limit_m
     }
@@ -47,7 +47,7 @@ impl Nearest {
         self.best
     }
 
-    /// Looks at the voxels of a brick, the octant next to the point first.
+    /// Examines the voxels of a brick, starting with the octant closest to the point.
     pub(super) fn look_at(&mut self, tile: &Tile, brick: &BrickPart) {
         let Some(look) = brick.look(tile) else { return };
         let lowest = brick.voxels.min;
@@ -56,7 +56,7 @@ impl Nearest {
             let [low, high] = [OCTANT_EDGE - 1, OCTANT_EDGE].map(|k| squares[axis][k]);
             octant | usize::from(high < low) << axis
         });
-        // Those that share a face with it, then an edge, then a corner.
+        // First octants that share a face with it, then an edge, then a corner.
         for away in [0, 1, 2, 4, 3, 5, 6, 7] {
             let octant: usize = next_to_point ^ away;
             let first: [usize; 3] = std::array::from_fn(|axis| (octant >> axis & 1) * OCTANT_EDGE);
@@ -79,7 +79,7 @@ impl Nearest {
         }
     }
 
-    /// The squared distances along each axis to the centers of a brick's voxels.
+    /// Squared distances along each axis to the centers of a brick's voxels.
     fn squared_distances(&self, lowest: VoxelIndex) -> [[f64; BRICK_EDGE as usize]; 3] {
         let mut squares = [[0.0; BRICK_EDGE as usize]; 3];
         for step in 0..BRICK_EDGE {
@@ -91,7 +91,7 @@ impl Nearest {
         squares
     }
 
-    /// Whether a sum of squares is surely beyond what was found; a margin for the rounding of sums and roots.
+    /// Returns whether a squared distance certainly exceeds the limit, with a margin for rounding.
     fn is_too_far(&self, distance_squared: f64) -> bool {
         distance_squared > self.limit_m * self.limit_m * (1.0 + 1e-12)
     }

@@ -2,7 +2,7 @@ use super::Occupancy;
 use crate::config::MapConfig;
 use crate::sensor::{Evidence, Probabilities};
 
-/// Makes [`Occupancy::of`] of many voxels.
+/// Computes [`Occupancy::of`] for many voxels.
 pub(super) struct Occupancies<'a> {
     config: &'a MapConfig,
     probabilities: Probabilities,
@@ -13,7 +13,6 @@ impl<'a> Occupancies<'a> {
         Self { config, probabilities: Probabilities::default() }
     }
 
-    /// The occupancy of a voxel's evidence.
     #[inline]
     pub(super) fn of(&mut self, Evidence { log_odds, .. }: Evidence) -> Occupancy {
         Occupancy::with_probability(self.config, log_odds, self.probabilities.of(log_odds))
@@ -25,10 +24,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_kept_is_what_is_computed() {
+    fn cached_values_equal_computed_ones() {
         let config = MapConfig::new(0.1, 10.0).unwrap();
         let mut occupancies = Occupancies::new(&config);
-        // More than are kept, each several times.
+        // More values than fit in the cache, each several times.
         for number in 0..20_000_u32 {
             let log_odds = f64::from(number * 7919 % 1009) * 0.01 - 5.0;
             let evidence = Evidence { log_odds, observation_count: 1 };

@@ -2,7 +2,7 @@ use crate::config::MapConfig;
 use crate::maths::sigmoid;
 use crate::sensor::Evidence;
 
-/// The occupancy of a place.
+/// Occupancy of a voxel or octree node.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Occupancy {
     /// Never observed, or outside the map.
@@ -13,10 +13,10 @@ pub enum Occupancy {
     Occupied(f64),
 }
 
-/// How a query treats unknown space.
+/// Treatment of unknown space in a query.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum UnknownAs {
-    /// It is passed through.
+    /// Rays and bodies pass through it.
     #[default]
     Free,
     /// It stops a ray, and a body collides with it.
@@ -24,14 +24,14 @@ pub enum UnknownAs {
 }
 
 impl Occupancy {
-    /// The occupancy of a voxel's evidence. It is compared in log-odds, so that the rounding of a probability does not
-    /// matter.
+    /// Returns the occupancy for a voxel's evidence. The comparison uses log-odds, so it does not depend on the
+    /// rounding of a probability.
     #[inline]
     pub fn of(config: &MapConfig, evidence: Option<Evidence>) -> Self {
         Self::of_log_odds(config, evidence.map(|evidence| evidence.log_odds))
     }
 
-    /// The occupancy of log-odds.
+    /// Returns the occupancy for log-odds.
     #[inline]
     pub fn of_log_odds(config: &MapConfig, log_odds: Option<f64>) -> Self {
         match log_odds {
@@ -40,7 +40,7 @@ impl Occupancy {
         }
     }
 
-    /// The occupancy of log-odds whose probability is known.
+    /// Returns the occupancy for log-odds whose probability is known.
     #[inline]
     pub(super) fn with_probability(config: &MapConfig, log_odds: f64, probability: f64) -> Self {
         match log_odds >= config.occupied_log_odds() {
@@ -49,19 +49,19 @@ impl Occupancy {
         }
     }
 
-    /// Whether the place was observed and is free.
+    /// Returns whether the voxel was observed and is free.
     #[inline]
     pub const fn is_free(&self) -> bool {
         matches!(self, Self::Free(_))
     }
 
-    /// Whether the place was never observed.
+    /// Returns whether the voxel was never observed.
     #[inline]
     pub const fn is_unknown(&self) -> bool {
         matches!(self, Self::Unknown)
     }
 
-    /// Whether the place is known to be occupied.
+    /// Returns whether the voxel is occupied.
     pub const fn is_occupied(&self) -> bool {
         matches!(self, Self::Occupied(_))
     }

@@ -1,7 +1,8 @@
-//! Queries of sets of voxels that are occupied, of which all others are unknown.
+//! Queries of sets of occupied voxels; all other voxels are unknown.
 //!
-//! A crate that has such a set says how it is walked ([`OccupiedSet`]) and calls
-//! [`answer_as_occupied_set`](crate::answer_as_occupied_set): then the set answers [`Queries`](crate::Queries) as maps do.
+//! A crate implements [`OccupiedSet`] for its set and invokes
+//! [`answer_as_occupied_set`](crate::answer_as_occupied_set). The set then implements [`Queries`](crate::Queries) like
+//! a map.
 
 use super::collision::first_not_free;
 use super::ray::{Met, walk_ray, walk_segment};
@@ -11,33 +12,33 @@ use crate::error::{Error, Result};
 use crate::scan::RayWalk;
 use crate::space::{Aabb, Grid, Point, VoxelBox, VoxelIndex};
 
-/// Probability of a voxel that is known to be occupied, and nothing more.
+/// Probability that is reported for occupied voxels.
 const OCCUPIED: f64 = 1.0;
 
-/// Voxels that are occupied; all others are unknown.
+/// Set of occupied voxels; all others are unknown.
 pub trait OccupiedSet: Sync {
-    /// Its voxels and tiles.
+    /// Grid of voxels and tiles.
     fn grid_of_set(&self) -> Grid;
 
-    /// Whether a voxel is occupied.
+    /// Returns whether a voxel is occupied.
     fn holds(&self, voxel: VoxelIndex) -> bool;
 
-    /// A box around a voxel in which there are none; `None` if it is not known of one.
+    /// Returns a box around a voxel without occupied voxels; `None` if none is known.
     fn empty_around(&self, voxel: VoxelIndex) -> Option<VoxelBox>;
 
-    /// Boxes of one size that hold all of them.
+    /// Boxes of equal size that together contain all occupied voxels.
     fn cells(&self) -> impl Iterator<Item = VoxelBox>;
 
-    /// Visits those in a box until `visit` returns false.
+    /// Visits the occupied voxels in a box until `visit` returns `false`.
     fn visit_in(&self, voxels: &VoxelBox, visit: &mut dyn FnMut(VoxelIndex) -> bool);
 }
 
-/// What is known of a voxel.
+/// Returns the occupancy of a voxel.
 pub fn occupancy(set: &impl OccupiedSet, voxel: VoxelIndex) -> Occupancy {
     if set.holds(voxel) { Occupancy::Occupied(OCCUPIED) } else { Occupancy::Unknown }
 }
 
-/// The voxels whose centers are in a region.
+/// Returns the occupied voxels whose centers are in a region.
 pub fn voxels_in(set: &impl OccupiedSet, region: &Aabb) -> Vec<VoxelOccupancy> {
     let (grid, mut found) = (set.grid_of_set(), Vec::new());
     set.visit_in(&voxels_around(&grid, region), &mut |voxel| {
@@ -49,7 +50,7 @@ pub fn voxels_in(set: &impl OccupiedSet, region: &Aabb) -> Vec<VoxelOccupancy> {
     found
 }
 
-/// A box around all cells, and how many there are.
+/// Returns a box around all cells, and their number.
 fn hull_of(set: &impl OccupiedSet) -> (Option<VoxelBox>, usize) {
     let mut count = 0;
     let cells = set.cells().inspect(|_| count += 1);
@@ -60,7 +61,7 @@ fn hull_of(set: &impl OccupiedSet) -> (Option<VoxelBox>, usize) {
     (hull, count)
 }
 
-/// What a ray meets in the voxels of a set of so many cells.
+/// Returns the step function of a ray through a set with a number of cells.
 fn meet(
     set: &impl OccupiedSet,
     unknown: UnknownAs,
@@ -84,7 +85,7 @@ fn meet(
         if empty_in_a_row <= cells {
             return Ok(Met::Empty(empty));
         }
-        // By now a look at all cells costs no more than the way here, however far away the next one is.
+        // Scanning all cells now costs no more than the steps so far, however distant the next cell is.
         empty_in_a_row = 0;
         walk.leave(&empty);
         let ahead = set.cells().filter_map(|cell| {
@@ -101,31 +102,31 @@ fn meet(
     }
 }
 
-/// The first that a ray meets.
+/// Returns the first occupied voxel on a ray.
 ///
 /// # Errors
 ///
-/// A ray without a direction, or that is not finite.
+/// Fails if the ray has no direction or is not finite.
 pub fn cast_ray(set: &impl OccupiedSet, query: &RayQuery) -> Result<Option<Hit>> {
     let (hull, cells) = hull_of(set);
     walk_ray(&set.grid_of_set(), query, hull, meet(set, query.unknown, cells))
 }
 
-/// The first between two points.
+/// Returns the first occupied voxel between two points.
 ///
 /// # Errors
 ///
-/// A segment that is not finite or too long.
+/// Fails if the segment is not finite or too long.
 pub fn cast_segment(set: &impl OccupiedSet, ends: [Point; 2], unknown: UnknownAs) -> Result<Option<Hit>> {
-    // A segment meets no more than a million voxels.
+    // A segment crosses at most a million voxels.
     walk_segment(&set.grid_of_set(), ends, meet(set, unknown, usize::MAX))
 }
 
-/// One that a body touches.
+/// Returns an occupied voxel that a body touches.
 ///
 /// # Errors
 ///
-/// A body that is not finite or too large.
+/// Fails if the body is not finite or too large.
 pub fn collision(set: &impl OccupiedSet, body: &Shape, unknown: UnknownAs) -> Result<Option<Hit>> {
     let grid = set.grid_of_set();
     if unknown == UnknownAs::Obstacle {
@@ -141,11 +142,11 @@ pub fn collision(set: &impl OccupiedSet, body: &Shape, unknown: UnknownAs) -> Re
     Ok(found)
 }
 
-/// The one with the nearest center.
+/// Returns the occupied voxel with the nearest center.
 ///
 /// # Errors
 ///
-/// A point that is not finite, a distance that is none.
+/// Fails if the point is not finite or the distance is invalid.
 pub fn nearest_occupied(set: &impl OccupiedSet, point: Point, max_distance_m: f64) -> Result<Option<Hit>> {
     super::nearest::check(point, max_distance_m)?;
     let grid = set.grid_of_set();
@@ -158,7 +159,7 @@ pub fn nearest_occupied(set: &impl OccupiedSet, point: Point, max_distance_m: f6
         .sqrt();
     let max_distance_m = max_distance_m.min(farthest_m);
     let mut best: Option<Hit> = None;
-    // Small balls first: the first that holds a voxel holds the nearest.
+    // Small balls first: the first ball with a voxel contains the nearest one.
     let mut reach_m = grid.resolution_m() * 4.0;
     loop {
         let ball_m = reach_m.min(max_distance_m);
@@ -177,25 +178,26 @@ pub fn nearest_occupied(set: &impl OccupiedSet, point: Point, max_distance_m: f6
     }
 }
 
-/// Checks that maps have voxels of one size.
+/// Checks that maps have voxels of the same size.
 ///
 /// # Errors
 ///
-/// [`Error::InvalidArgument`] with both sizes.
+/// Fails with [`Error::InvalidArgument`], which contains both sizes.
 pub(crate) fn check_resolutions(resolutions_m: impl Iterator<Item = f64>) -> Result<()> {
     let mut first: Option<f64> = None;
     for resolution_m in resolutions_m {
         let first = *first.get_or_insert(resolution_m);
         if first.to_bits() != resolution_m.to_bits() {
-            let reason =
-                format!("{first} m in one map, {resolution_m} m in another; unite maps of one resolution");
+            let reason = format!(
+                "{first} m in one map, {resolution_m} m in another; all maps need the same resolution"
+            );
             return Err(Error::argument("resolution", reason));
         }
     }
     Ok(())
 }
 
-/// Makes an [`OccupiedSet`](crate::query::occupied_set::OccupiedSet) answer [`Queries`](crate::query::Queries).
+/// Implements [`Queries`](crate::query::Queries) for an [`OccupiedSet`](crate::query::occupied_set::OccupiedSet).
 #[macro_export]
 macro_rules! answer_as_occupied_set {
     ($set:ty) => {

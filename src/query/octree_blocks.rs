@@ -12,17 +12,17 @@ use std::io::{self, Read, Seek, Write};
 pub struct OctreeExport<'a> {
     /// `.bt` or `.ot`. In `.bt` a voxel is occupied from the map's occupancy threshold on.
     pub format: OctreeFormat,
-    /// Only the voxels whose center is in this half-open box; `None` takes the whole map.
+    /// Restricts the export to voxels whose center is in this half-open box; `None` exports the whole map.
     pub region: Option<&'a Aabb>,
-    /// The map's voxel that becomes voxel 0 of the file; the file's coordinates are those of the map minus this voxel's
-    /// lower corner. So a map far from its origin fits OctoMap's keys. `[0; 3]` shifts nothing.
+    /// The voxel of the map that becomes voxel 0 of the file. The coordinates of the file are those of the map minus
+    /// this voxel's lower corner, so that a map far from its origin fits OctoMap's keys. `[0; 3]` means no shift.
     pub origin: VoxelIndex,
-    /// Memory in bytes for the part of the tree that is built at a time, beside one tile and a few bytes per part. With
-    /// less memory tiles are read more often.
+    /// Bytes of memory for the part of the tree that is built at a time, in addition to one tile and a few bytes per
+    /// part. With less memory, tiles are read more often.
     pub memory_bytes: usize,
 }
 
-/// Depth of bricks, which are not divided further.
+/// Depth of bricks, which are not subdivided further.
 const BRICK_DEPTH: u8 = 13;
 
 pub(super) fn write_octree<E: From<Error> + From<io::Error>>(
@@ -60,8 +60,8 @@ pub(super) fn write_octree<E: From<Error> + From<io::Error>>(
     }
 }
 
-/// Visits the map's voxels as blocks of OctoMap's tree, in Morton order: first voxel, depth, values. A block has at
-/// most `block_bytes` of values, unless it is a single brick.
+/// Visits the map's voxels as blocks of OctoMap's tree, in Morton order, with the first voxel, depth and values of
+/// each. A block has at most `block_bytes` of values, unless it is a single brick.
 fn for_each_block<E: From<Error>>(
     view: &impl MapView,
     region: Option<&Aabb>,
@@ -75,7 +75,7 @@ fn for_each_block<E: From<Error>>(
     blocks.descend(MortonCode(0), 0, &tiles)
 }
 
-/// The tiles that may have voxels for the tree; an error if any is out of reach.
+/// Returns the tiles that may have voxels for the tree; fails if any exceeds the key range.
 fn tiles_of(view: &impl MapView, region: Option<&Aabb>, shift: &OctreeShift) -> Result<Vec<TileIndex>> {
     let grid = &view.config().grid;
     let around = region.map(|region| voxels_around(grid, region));
@@ -149,12 +149,12 @@ impl<V: MapView, F> Blocks<'_, V, F> {
         Ok(())
     }
 
-    /// The voxels of a tile in the octree's indices.
+    /// The voxels of a tile in the indices of the octree.
     fn voxels_of(&self, tile: TileIndex) -> VoxelBox {
         self.shift.of_box(&self.view.config().grid.voxels_of_tile(tile))
     }
 
-    /// Whether the node may fit, by what the map knows of its tiles without reading them.
+    /// Returns whether the node may fit, estimated without reading its tiles.
     fn may_fit(&self, first: MortonCode, depth: u8, tiles: &[TileIndex]) -> bool {
         let node = voxels_of_node(first, depth);
         let expected = tiles.iter().map(|&index| {
@@ -162,11 +162,11 @@ impl<V: MapView, F> Blocks<'_, V, F> {
             let share = volume(&tile.intersection(&node)) / volume(&tile);
             self.view.voxels_of_tile_hint(index).map_or(0.0, |voxels| voxels as f64 * share)
         });
-        // Values have four bytes; parts of bricks have some more.
+        // Values have four bytes; parts of bricks take slightly more.
         depth == BRICK_DEPTH || 4.0 * expected.sum::<f64>() <= self.block_bytes as f64
     }
 
-    /// Collects the voxels of a node; returns false, with some of them, if they are too many.
+    /// Collects the voxels of a node; returns `false`, with some of them collected, if they are too many.
     fn gather(&mut self, first: MortonCode, depth: u8, tiles: &[TileIndex]) -> Result<bool> {
         self.values.clear();
         let node = first.brick()..MortonCode(first.0 + MortonCode::span(depth)).brick();
@@ -195,7 +195,7 @@ impl<V: MapView, F> Blocks<'_, V, F> {
 /// The voxels of an octree node, by their indices.
 fn voxels_of_node(first: MortonCode, depth: u8) -> VoxelBox {
     let min = first.to_key().to_index_from(REACH.min);
-    // The longest edge is the root's, 65536 voxels.
+    // The longest edge is that of the root, 65536 voxels.
     let edge = BRICK_EDGE << (BRICK_DEPTH - depth);
     VoxelBox { min, end: min.map(|k| k + edge) }
 }

@@ -1,33 +1,33 @@
-//! The range of OctoMap's keys, and what to do about a map beyond it.
+//! Range of OctoMap's keys, and the error for maps that exceed it.
 
 use crate::error::Error;
 use crate::space::{Grid, Point, TileIndex, VoxelBox, VoxelIndex};
 
-/// The voxels in the range of OctoMap's keys.
+/// Voxels in the range of OctoMap's keys.
 pub(super) const REACH: VoxelBox = VoxelBox { min: [-32768; 3], end: [32768; 3] };
 
-/// The error for a voxel without an OctoMap key; given the tiles of a file to be written, it suggests an origin.
+/// Error for a voxel without an OctoMap key. If the tiles of a file are given, it suggests an origin.
 pub(super) fn out_of_reach(grid: &Grid, voxel: VoxelIndex, tiles: Option<&[TileIndex]>) -> Error {
     let half_m = f64::from(REACH.end[0]) * grid.resolution_m();
     let (center, width_m) = (grid.center_m(voxel), 2.0 * half_m);
     let hint = match tiles.map(|tiles| origin_for(grid, tiles)) {
-        None => "name a region (`region`) inside".to_owned(),
+        None => "export a region (`region`) inside".to_owned(),
         Some(Some([x, y, z])) => {
-            format!("`origin` {x} {y} {z} brings all of it into reach, a region (`region`) a part")
+            format!("`origin` {x} {y} {z} makes the whole map fit, a region (`region`) a part of it")
         }
         Some(None) => format!(
-            "no `origin` helps, for the map is wider than the {width_m} m that they reach in all: export it region by region \
-             (`region`), each with an `origin` inside"
+            "no `origin` is sufficient, because the map is wider than the {width_m} m of the whole key range: export \
+             regions (`region`), each with an `origin` inside"
         ),
     };
     let reason = format!(
-        "the voxel at {center:?} m is outside the {half_m} m around the origin that OctoMap's keys reach at this \
-         resolution; {hint}"
+        "the voxel at {center:?} m is outside of OctoMap's key range, {half_m} m around the origin at this resolution; \
+         {hint}"
     );
     Error::argument("octree", reason)
 }
 
-/// A voxel corner in metres, as round as possible, from which all tiles are in reach; `None` if there is none.
+/// Returns a voxel corner in metres, as round as possible, from which all tiles are in range; `None` if there is none.
 fn origin_for(grid: &Grid, tiles: &[TileIndex]) -> Option<Point> {
     let boxes = || tiles.iter().map(|&tile| grid.voxels_of_tile(tile));
     let mut origin_m = [0.0; 3];
@@ -51,11 +51,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_origin_that_is_proposed_is_round_and_brings_all_tiles_into_reach() {
+    fn the_suggested_origin_is_round_and_makes_all_tiles_fit() {
         let grid = Grid::new(0.1, 10.0).unwrap();
         let tiles = [TileIndex::new(50_000, 400_012, 1), TileIndex::new(50_200, 400_100, -2)];
         assert_eq!(origin_for(&grid, &tiles), Some([501_000.0, 4_001_000.0, 0.0]));
-        // Nearly as wide as the range of the keys: only the very middle works.
+        // Almost as wide as the key range: only the exact middle works.
         let wide = [TileIndex::new(1_000, 0, 0), TileIndex::new(1_654, 0, 0)];
         assert_eq!(origin_for(&grid, &wide), Some([13_275.0, 0.0, 0.0]));
         let too_wide = [TileIndex::new(0, 0, 0), TileIndex::new(656, 0, 0)];

@@ -2,16 +2,16 @@ use crate::octree::BrickValues;
 use crate::space::{BRICK_EDGE, BrickCode, MortonCode, VoxelBox, VoxelIndex, VoxelKey, place_of_voxel};
 use std::ops::Range;
 
-/// Moves a map's voxels into an octree whose origin is another voxel of the map.
+/// Shift of a map's voxels into an octree whose origin is another voxel of the map.
 ///
-/// Indices are subtracted as integers, so nothing is rounded.
+/// Indices are subtracted as integers, without rounding.
 #[derive(Debug)]
 pub(super) struct OctreeShift {
-    /// The map's voxel that has index 0 in the octree.
+    /// The voxel of the map that has index 0 in the octree.
     origin: VoxelIndex,
-    /// The offset within bricks: where in its brick the octree has the first voxel of a brick of the map.
+    /// Offset within bricks: the position, in a brick of the octree, of the first voxel of a brick of the map.
     first: VoxelIndex,
-    /// The parts of one brick of the map in each of the eight bricks of the octree, by place.
+    /// Parts of one brick of the map in each of the eight overlapping bricks of the octree, by position.
     shares: [Vec<(u16, f32)>; 8],
 }
 
@@ -21,18 +21,19 @@ impl OctreeShift {
         Self { origin, first, shares: Default::default() }
     }
 
-    /// A box of the map's voxels in the octree's indices. What exceeds `i32` is cut off: no octree reaches there.
+    /// Converts a box of the map's voxels to indices of the octree. Values beyond `i32` are clamped, because no octree
+    /// extends that far.
     pub(super) fn of_box(&self, voxels: &VoxelBox) -> VoxelBox {
         VoxelBox { min: self.of_voxel(voxels.min), end: self.of_voxel(voxels.end) }
     }
 
-    /// A voxel of the map in the octree's indices.
+    /// Converts a voxel of the map to an index of the octree.
     pub(super) fn of_voxel(&self, voxel: VoxelIndex) -> VoxelIndex {
         std::array::from_fn(|axis| voxel[axis].saturating_sub(self.origin[axis]))
     }
 
-    /// Adds the values of a brick of the map that lie in a range of the octree's bricks. `visit` yields the brick's
-    /// voxels: place and value, ascending by place.
+    /// Adds the values of a brick of the map that are in a range of the octree's bricks. `visit` passes the brick's
+    /// voxels as position and value, ascending by position.
     pub(super) fn add_brick(
         &mut self,
         brick: BrickCode,
@@ -77,7 +78,7 @@ impl OctreeShift {
     }
 }
 
-/// A voxel of the next brick along the axes whose bits are set in `share`.
+/// Returns the same voxel in the next brick along the axes whose bits are set in `share`.
 fn neighbour(code: MortonCode, share: usize) -> MortonCode {
     let VoxelKey(key) = code.to_key();
     VoxelKey(std::array::from_fn(|axis| {
@@ -86,7 +87,7 @@ fn neighbour(code: MortonCode, share: usize) -> MortonCode {
     .morton()
 }
 
-/// The voxel at a place of a brick, counted from the brick's first.
+/// Returns the voxel at a position of a brick, relative to the brick's first.
 fn local_of(place: usize) -> VoxelIndex {
     MortonCode(place as u64).to_key().0.map(i32::from)
 }
@@ -96,10 +97,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_voxel_comes_to_the_place_of_its_shifted_index() {
+    fn voxels_are_moved_to_their_shifted_indices() {
         for origin in [[0; 3], [8, -16, 65536], [1, -2, 7], [-63_781_373, 5, 2_000_000_001]] {
             for corner in [[0; 3], [40, -48, 8]] {
-                // Voxels near the octree's origin, anywhere in the map.
+                // Voxels close to the octree's origin, which is anywhere in the map.
                 let first: VoxelIndex = std::array::from_fn(|k| (origin[k] + corner[k]) & !(BRICK_EDGE - 1));
                 let mut shift = OctreeShift::by(origin);
                 let mut values = BrickValues::default();

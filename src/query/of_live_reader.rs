@@ -1,21 +1,21 @@
-//! Queries of the map beside its mapper: each sees the map as of one scan.
+//! Queries of a map during its mapping, each as of one scan.
 
 use super::{Hit, Occupancy, Queries, RayQuery, Shape, UnknownAs, Voxels};
 use crate::error::{Error, Result};
 use crate::mapper::{LiveReader, LiveView, MapView};
 use crate::space::{Aabb, Grid, Point, VoxelIndex};
 
-/// How often a question is asked anew because its view expired.
+/// Number of attempts when the view of a query expires.
 const ATTEMPTS: usize = 8;
 
-/// Asks a view of the latest scan, and a later one if so much changed meanwhile that it expired.
-fn ask<A>(reader: &LiveReader, question: impl Fn(&LiveView) -> Result<A>) -> Result<A> {
-    let mut answer = question(&reader.view());
+/// Runs a query on a view of the latest scan, and again on a later one if the view expires.
+fn query_view<A>(reader: &LiveReader, query: impl Fn(&LiveView) -> Result<A>) -> Result<A> {
+    let mut answer = query(&reader.view());
     for _ in 1..ATTEMPTS {
         if !matches!(answer, Err(Error::Expired)) {
             break;
         }
-        answer = question(&reader.view());
+        answer = query(&reader.view());
     }
     answer
 }
@@ -27,38 +27,38 @@ impl Queries for LiveReader {
     }
 
     fn occupancy(&self, voxel: VoxelIndex) -> Result<Occupancy> {
-        ask(self, |view| Ok(Occupancy::of(view.config(), view.evidence(voxel)?)))
+        query_view(self, |view| Ok(Occupancy::of(view.config(), view.evidence(voxel)?)))
     }
 
-    /// All of them are of one scan, and in memory: take a box that a planner looks at.
+    /// All voxels are of one scan and are collected in memory, so use a box of moderate size.
     fn voxels_in(&self, region: &Aabb) -> Voxels<'_> {
-        match ask(self, |view| view.voxels_in(region).collect::<Result<Vec<_>>>()) {
+        match query_view(self, |view| view.voxels_in(region).collect::<Result<Vec<_>>>()) {
             Ok(voxels) => Box::new(voxels.into_iter().map(Ok)),
             Err(error) => Box::new(std::iter::once(Err(error))),
         }
     }
 
     fn cast_ray(&self, ray: &RayQuery) -> Result<Option<Hit>> {
-        ask(self, |view| view.cast_ray(ray))
+        query_view(self, |view| view.cast_ray(ray))
     }
 
     fn cast_segment(&self, from: Point, to: Point, unknown: UnknownAs) -> Result<Option<Hit>> {
-        ask(self, |view| view.cast_segment(from, to, unknown))
+        query_view(self, |view| view.cast_segment(from, to, unknown))
     }
 
     fn collision(&self, body: &Shape, unknown: UnknownAs) -> Result<Option<Hit>> {
-        ask(self, |view| view.collision(body, unknown))
+        query_view(self, |view| view.collision(body, unknown))
     }
 
     fn nearest_occupied(&self, point: Point, max_distance_m: f64) -> Result<Option<Hit>> {
-        ask(self, |view| view.nearest_occupied(point, max_distance_m))
+        query_view(self, |view| view.nearest_occupied(point, max_distance_m))
     }
 
     fn occupancy_at_points(&self, points: &[Point]) -> Result<Vec<Occupancy>> {
-        ask(self, |view| view.occupancy_at_points(points))
+        query_view(self, |view| view.occupancy_at_points(points))
     }
 
     fn cast_rays(&self, rays: &[RayQuery]) -> Result<Vec<Option<Hit>>> {
-        ask(self, |view| view.cast_rays(rays))
+        query_view(self, |view| view.cast_rays(rays))
     }
 }

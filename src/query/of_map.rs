@@ -1,4 +1,4 @@
-//! The queries of every map of tiles.
+//! Queries of maps of tiles.
 
 use super::{Hit, Occupancy, Queries, RayQuery, Shape, UnknownAs, VoxelOccupancy, Voxels};
 use super::{collision, nearest, point, ray, region};

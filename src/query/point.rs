@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::mapper::MapView;
 use crate::sensor::Evidence;
 use crate::space::{Grid, Point, TileIndex, VoxelKey};
-use crate::tile::{AskedVoxels, Tile, Voxel};
+use crate::tile::{Tile, Voxel, VoxelBatch};
 use rayon::prelude::*;
 
 #[inline]
@@ -15,13 +15,14 @@ pub(super) fn voxel_at<V: MapView + ?Sized>(view: &V, point: Point) -> Result<Op
     Ok(view.evidence(index)?.map(|evidence| Voxel { index, evidence }))
 }
 
-/// Points that are answered by one core at a time.
+/// Number of points that one core processes at a time.
 const POINTS_AT_A_TIME: usize = 4096;
 
-/// Points that are grouped by tile before each tile is loaded for its own.
+/// Number of points that are grouped by tile before tiles are loaded.
 const MAX_GROUPED: usize = 1 << 22;
 
-/// What each of many points is answered, from the evidence of its voxel; each core makes an `answer` for some of them.
+/// Returns the results for many points, computed from the evidence of their voxels; each core creates an `answer`
+/// function for some of them.
 fn at_points<V: MapView, A: Copy + Send + Sync, F: FnMut(Evidence) -> A>(
     view: &V,
     points: &[Point],
@@ -29,9 +30,9 @@ fn at_points<V: MapView, A: Copy + Send + Sync, F: FnMut(Evidence) -> A>(
     answer: impl Fn() -> F + Sync,
 ) -> Result<Vec<A>> {
     let mut answers = vec![unknown; points.len()];
-    if view.tile_at_hand(TileIndex::default()).is_some() {
+    if view.resident_tile(TileIndex::default()).is_some() {
         let chunks = points.par_chunks(POINTS_AT_A_TIME).zip(answers.par_chunks_mut(POINTS_AT_A_TIME));
-        chunks.for_each(|(points, answers)| at_hand(view, points, answers, answer()));
+        chunks.for_each(|(points, answers)| in_memory(view, points, answers, answer()));
         return Ok(answers);
     }
     for (points, answers) in points.chunks(MAX_GROUPED).zip(answers.chunks_mut(MAX_GROUPED)) {
@@ -40,21 +41,23 @@ fn at_points<V: MapView, A: Copy + Send + Sync, F: FnMut(Evidence) -> A>(
     Ok(answers)
 }
 
-/// Answers points in their order where every tile is at hand.
-fn at_hand<V: MapView, A>(
+/// Processes points in their order if all tiles are in memory.
+fn in_memory<V: MapView, A>(
     view: &V,
     points: &[Point],
     answers: &mut [A],
     mut answer: impl FnMut(Evidence) -> A,
 ) {
     let grid = view.config().grid;
-    let mut voxels = AskedVoxels::new();
-    for (points, answers) in points.chunks(AskedVoxels::MOST).zip(answers.chunks_mut(AskedVoxels::MOST)) {
-        let mut places = [0_u8; AskedVoxels::MOST];
+    let mut voxels = VoxelBatch::new();
+    for (points, answers) in
+        points.chunks(VoxelBatch::MAX_VOXELS).zip(answers.chunks_mut(VoxelBatch::MAX_VOXELS))
+    {
+        let mut places = [0_u8; VoxelBatch::MAX_VOXELS];
         let mut count = 0;
         for (place, &point) in points.iter().enumerate() {
             let Some(voxel) = grid.voxel_of(point) else { continue };
-            let Some(tile) = view.tile_at_hand(grid.tile_of_voxel(voxel)) else { continue };
+            let Some(tile) = view.resident_tile(grid.tile_of_voxel(voxel)) else { continue };
             voxels.push(tile.table(), VoxelKey::from_index(voxel));
             places[count] = place as u8;
             count += 1;
@@ -68,28 +71,28 @@ fn at_hand<V: MapView, A>(
     }
 }
 
-/// Some of a tile's points, beside each other in the order of one group.
+/// Some of a tile's points, consecutive in the order of one group.
 struct PartOfTile<'a, A> {
     tile: TileIndex,
     group: &'a PointsByTile,
-    /// The points of the group.
+    /// Points of the group.
     points: &'a [Point],
-    /// The number of the group's first point among all.
+    /// Number of points before the group.
     before: usize,
-    /// The place of the part's first point in the group's order.
+    /// Position of the part's first point in the group's order.
     first: usize,
-    /// The part's answers, in the group's order.
+    /// Results of the part, in the group's order.
     answers: &'a mut [A],
 }
 
-/// Answers points tile by tile: each is loaded once for so many of its points.
+/// Processes points tile by tile: each tile is loaded once per group of parts.
 fn by_tile<V: MapView, A: Copy + Send + Sync, F: FnMut(Evidence) -> A>(
     view: &V,
     points: &[Point],
     answers: &mut [A],
     answer: impl Fn() -> F + Sync,
 ) -> Result<()> {
-    /// Parts of a tile that are answered by one core at a time.
+    /// Number of parts of a tile that one core processes at a time.
     const PARTS_AT_A_TIME: usize = 8;
     const OF_GROUP: usize = PointsByTile::MAX_POINTS;
     let grid = view.config().grid;
@@ -136,11 +139,11 @@ fn by_tile<V: MapView, A: Copy + Send + Sync, F: FnMut(Evidence) -> A>(
 
 impl<A> PartOfTile<'_, A> {
     fn answer(&mut self, grid: &Grid, tile: &Tile, mut answer: impl FnMut(Evidence) -> A) {
-        let mut voxels = AskedVoxels::new();
+        let mut voxels = VoxelBatch::new();
         let mut place = self.first;
-        for answers in self.answers.chunks_mut(AskedVoxels::MOST) {
+        for answers in self.answers.chunks_mut(VoxelBatch::MAX_VOXELS) {
             for place in place..place + answers.len() {
-                // Each of them has a voxel: a tile holds it.
+                // Each of them has a voxel, because it is in a tile.
                 let voxel = grid.voxel_of(self.points[self.group.number_at(place)]).unwrap_or_default();
                 voxels.push(tile.table(), VoxelKey::from_index(voxel));
             }

@@ -1,23 +1,23 @@
 use crate::space::{Grid, Point, TileIndex};
 use rustc_hash::FxHashMap;
 
-/// At most [`PointsByTile::MAX_POINTS`] points in the order of the tiles that hold them; those that no tile holds come
+/// At most [`PointsByTile::MAX_POINTS`] points in the order of the tiles that contain them; points without a tile are
 /// last.
 pub(super) struct PointsByTile {
-    /// Tiles in the order of their first points, and how many points each has.
+    /// Tiles in the order of their first points, with their numbers of points.
     tiles: Vec<(TileIndex, u32)>,
-    /// The number of each point; empty if the points are in order already.
+    /// Number of each point; empty if the points are already in order.
     numbers: Vec<u16>,
 }
 
 impl PointsByTile {
-    /// Most points that can be grouped: their answers stay in the CPU's cache until they are in the points' order.
+    /// Maximum number of points that can be grouped. Their results remain in the CPU cache until they are reordered.
     pub(super) const MAX_POINTS: usize = 1 << 15;
 
-    /// Groups points by counting: comparing tiles of points with each other takes longer than to look at all of them.
+    /// Groups points with a counting sort, which is faster than comparing their tiles.
     pub(super) fn of(grid: &Grid, points: &[Point]) -> Self {
         debug_assert!(points.len() <= Self::MAX_POINTS);
-        /// What points get that no tile holds.
+        /// Marks points without a tile.
         const NOWHERE: u16 = u16::MAX;
         let mut places: FxHashMap<TileIndex, u16> = FxHashMap::default();
         let mut tiles: Vec<(TileIndex, u32)> = Vec::new();
@@ -60,18 +60,18 @@ impl PointsByTile {
         Self { tiles, numbers }
     }
 
-    /// Tiles in the order of their first points, and how many points each has.
+    /// Tiles in the order of their first points, with their numbers of points.
     pub(super) fn tiles(&self) -> &[(TileIndex, u32)] {
         &self.tiles
     }
 
-    /// Which point has a place in the order.
+    /// Number of the point at a position of the order.
     #[inline]
     pub(super) fn number_at(&self, place: usize) -> usize {
         self.numbers.get(place).map_or(place, |&number| number.into())
     }
 
-    /// Puts answers in the order of the tiles into that of the points.
+    /// Moves results from the order of the tiles to the order of the points.
     pub(super) fn put_in_order_of_points<A: Copy>(&self, answers: &mut [A]) {
         if self.numbers.is_empty() {
             return;
@@ -90,7 +90,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn every_point_has_one_place_beside_those_of_its_tile(
+        fn points_of_a_tile_are_grouped(
             points in prop::collection::vec(
                 prop::array::uniform3(prop_oneof![9 => -3.0..3.0, 1 => Just(f64::NAN)]), 0..300
             ),

@@ -3,23 +3,23 @@ use crate::error::Result;
 use crate::space::{Aabb, Grid, Point, VoxelIndex};
 use rayon::prelude::*;
 
-/// A voxel and its occupancy.
+/// Voxel with its occupancy.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VoxelOccupancy {
-    /// The voxel's index; [`Grid::center_m`] has its place.
+    /// Index of the voxel; [`Grid::center_m`] returns its center.
     pub voxel: VoxelIndex,
     /// Occupied or free.
     pub occupancy: Occupancy,
 }
 
-/// The observed voxels of a region, one by one; take as many as wanted.
+/// Lazy iterator over the observed voxels of a region.
 pub type Voxels<'a> = Box<dyn Iterator<Item = Result<VoxelOccupancy>> + 'a>;
 
-/// What can be asked of everything that knows what is occupied: both mappers, a [`MapReader`](crate::MapReader) and its
-/// snapshots, a [`LiveReader`](crate::LiveReader) beside a mapper, the view of a local map, the layers of other robots,
-/// and several of these [`United`](super::United).
+/// Queries that all occupancy representations support: both mappers, a [`MapReader`](crate::MapReader) and its
+/// snapshots, a [`LiveReader`](crate::LiveReader) of a mapper, the view of a local map, the layers of other robots, and
+/// several of these [`United`](super::United).
 ///
-/// Points are in metres in the world frame. A planner takes `&dyn Queries` and works with any of them.
+/// Points are in metres in the world frame. A planner that uses `&dyn Queries` works with any of them.
 ///
 /// ```
 /// use voxtile::{InMemoryMapper, MapConfig, Mapper, Queries, Scan, UnknownAs};
@@ -39,70 +39,70 @@ pub type Voxels<'a> = Box<dyn Iterator<Item = Result<VoxelOccupancy>> + 'a>;
 ///
 /// # Errors
 ///
-/// Besides those that a method names: a tile that cannot be read; for a mapper, one that has to go for it and cannot be
-/// written; for a [`LiveView`](crate::LiveView), [`Error::Expired`](crate::Error::Expired).
+/// In addition to the errors of each method, a query fails if a tile cannot be read; for a mapper, also if an evicted
+/// tile cannot be written; for a [`LiveView`](crate::LiveView), also with [`Error::Expired`](crate::Error::Expired).
 pub trait Queries: Sync {
-    /// The voxels of the map.
+    /// Grid of the map.
     fn grid(&self) -> Grid;
 
-    /// The occupancy of a voxel.
+    /// Returns the occupancy of a voxel.
     ///
     /// # Errors
     ///
-    /// As for all queries.
+    /// See [`Queries`].
     fn occupancy(&self, voxel: VoxelIndex) -> Result<Occupancy>;
 
-    /// The observed voxels whose center is in the half-open box, tile by tile; a tile is read when its first voxel is
-    /// taken. Of a local map and of layers, the occupied ones.
+    /// Iterates over the observed voxels whose center is in the half-open box, tile by tile; a tile is read when its
+    /// first voxel is requested. Local maps and layers return only occupied voxels.
     fn voxels_in(&self, region: &Aabb) -> Voxels<'_>;
 
-    /// The first occupied voxel on a ray (or the first unknown one, if that is an obstacle), exactly as single steps
-    /// would find it; `None` if the ray ends first.
+    /// Returns the first occupied voxel on a ray (or the first unknown one, if unknown space is an obstacle), identical
+    /// to that of single steps; `None` if the ray ends first.
     ///
     /// # Errors
     ///
-    /// An origin without a voxel, a zero direction, a wrong range.
+    /// Fails if the origin is outside of the map's space, the direction is zero or the range is invalid.
     fn cast_ray(&self, ray: &RayQuery) -> Result<Option<Hit>>;
 
-    /// The same between two points, both of their voxels included.
+    /// Like [`Queries::cast_ray`], between two points, including the voxels of both.
     ///
     /// # Errors
     ///
-    /// An end without a voxel, a segment through more than a million voxels.
+    /// Fails if an end is outside of the map's space, or the segment crosses more than a million voxels.
     fn cast_segment(&self, from: Point, to: Point, unknown: UnknownAs) -> Result<Option<Hit>>;
 
-    /// An occupied voxel that a body touches (or an unknown one, if that is an obstacle); `None` if the body is free of
-    /// collision.
+    /// Returns an occupied voxel that a body touches (or an unknown one, if unknown space is an obstacle); `None` if
+    /// there is no collision.
     ///
     /// # Errors
     ///
-    /// A body that is not finite, or so large that its voxels have no index or, if the unknown is an obstacle, too many
-    /// to be searched.
+    /// Fails if the body is not finite or exceeds the voxel index range or, if unknown space is an obstacle, covers too
+    /// many voxels.
     fn collision(&self, body: &Shape, unknown: UnknownAs) -> Result<Option<Hit>>;
 
-    /// The occupied voxel whose center is nearest to a point and at most `max_distance_m` away; at equal distances the
-    /// one with the lowest index.
+    /// Returns the occupied voxel whose center is closest to a point and at most `max_distance_m` away; of equally
+    /// close ones, the one with the lowest index.
     ///
     /// # Errors
     ///
-    /// A point that is not finite, a wrong distance.
+    /// Fails if the point is not finite or the distance is invalid.
     fn nearest_occupied(&self, point: Point, max_distance_m: f64) -> Result<Option<Hit>>;
 
-    /// The occupancy of the voxel that holds a point; unknown for a point that is not finite.
+    /// Returns the occupancy of the voxel that contains a point; unknown for a point that is not finite.
     ///
     /// # Errors
     ///
-    /// As for all queries.
+    /// See [`Queries`].
     #[inline]
     fn occupancy_at(&self, point: Point) -> Result<Occupancy> {
         self.grid().voxel_of(point).map_or(Ok(Occupancy::Unknown), |voxel| self.occupancy(voxel))
     }
 
-    /// The occupancy at many points, in their order, on all cores.
+    /// Returns the occupancy at many points, in their order, on all cores.
     ///
     /// # Errors
     ///
-    /// As for all queries; of several, that of the first point.
+    /// See [`Queries`]; of several errors, that of the first point is returned.
     fn occupancy_at_points(&self, points: &[Point]) -> Result<Vec<Occupancy>> {
         on_all_cores(points, |point| self.occupancy_at(*point))
     }
@@ -111,13 +111,13 @@ pub trait Queries: Sync {
     ///
     /// # Errors
     ///
-    /// As for [`Queries::cast_ray`]; of several, that of the first ray.
+    /// Same errors as [`Queries::cast_ray`]; of several errors, that of the first ray is returned.
     fn cast_rays(&self, rays: &[RayQuery]) -> Result<Vec<Option<Hit>>> {
         on_all_cores(rays, |ray| self.cast_ray(ray))
     }
 }
 
-/// Asks many questions; of several errors the one of the first question is returned.
+/// Runs many queries in parallel; of several errors, that of the first query is returned.
 pub(super) fn on_all_cores<Q: Sync, A: Send>(
     questions: &[Q],
     ask: impl Fn(&Q) -> Result<A> + Sync,

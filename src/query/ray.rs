@@ -5,7 +5,7 @@ use crate::mapper::MapView;
 use crate::scan::{Advanced, MAX_RAY_STEPS, RayWalk};
 use crate::space::{BRICK_EDGE, Grid, Point, VoxelBox, VoxelIndex, place_of_voxel};
 
-/// A ray to be cast through the map.
+/// Ray to be cast through a map.
 ///
 /// ```
 /// use voxtile::{InMemoryMapper, MapConfig, Mapper, Queries, RayQuery, Scan, UnknownAs};
@@ -21,46 +21,46 @@ use crate::space::{BRICK_EDGE, Grid, Point, VoxelBox, VoxelIndex, place_of_voxel
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayQuery {
-    /// Where the ray begins, in metres.
+    /// Origin in metres.
     pub origin: Point,
-    /// Where it goes; any length but 0.
+    /// Direction; any length except 0.
     pub direction: Point,
-    /// How far it goes, in metres; `None` as far as the map reaches.
+    /// Maximum range in metres; `None` for no limit.
     pub max_range_m: Option<f64>,
     /// Whether unknown space stops the ray.
     pub unknown: UnknownAs,
 }
 
-/// What a ray meets in a voxel.
+/// Result of a step of a ray.
 pub(crate) enum Met {
-    /// Something that stops it, with the probability of being occupied; `None` for the unknown.
+    /// The voxel stops the ray; contains the probability of being occupied, `None` if unknown.
     Obstacle(Option<f64>),
-    /// Nothing that stops it.
+    /// The voxel does not stop the ray.
     Free,
-    /// Nothing that stops it in this box around the voxel.
+    /// No voxel of this box around the current one stops the ray.
     Empty(VoxelBox),
-    /// Nothing so far: it has gone on, to a voxel that is still to be met.
+    /// No voxel so far stops the ray; the walk was advanced to a voxel that is not examined yet.
     Passed,
-    /// Nothing up to the last voxel.
+    /// No voxel up to the last one stops the ray.
     End,
 }
 
-/// Meets a ray in one voxel after another.
+/// Makes a step function that examines one voxel at a time.
 pub(crate) fn voxel_by_voxel(
     mut meet: impl FnMut(VoxelIndex) -> Result<Met>,
 ) -> impl FnMut(&mut RayWalk, f64) -> Result<Met> {
     move |walk, _| meet(walk.voxel())
 }
 
-/// All voxels.
 pub(crate) const EVERYWHERE: VoxelBox = VoxelBox { min: [i32::MIN; 3], end: [i32::MAX; 3] };
 
-/// Walks a ray until it is stopped. Outside the hull everything is unknown; there is no hull around nothing. `meet` is
-/// given the walk and the time until which it matters, and may walk on itself.
+/// Walks a ray until it is stopped. Everything outside the hull is unknown; an empty map has no hull. `meet` receives
+/// the walk and the end time, and may advance the walk.
 ///
 /// # Errors
 ///
-/// An origin without a voxel, a direction without a length, a wrong range; errors of `meet`.
+/// Fails if the origin is outside of the map's space, the direction is zero or the range is invalid; returns errors of
+/// `meet`.
 pub(crate) fn walk_ray(
     grid: &Grid,
     query: &RayQuery,
@@ -81,14 +81,14 @@ pub(crate) fn walk_ray(
     let mut walk = RayWalk::along(
         grid.to_voxel_units(origin),
         start,
-        grid.to_voxel_units(direction.map(|d| d / length)), // Times come out in metres.
+        grid.to_voxel_units(direction.map(|d| d / length)), // Times are then in metres.
     );
     let enters = hull.as_ref().is_some_and(|hull| match query.unknown {
         UnknownAs::Free => walk.enter(hull),
         UnknownAs::Obstacle => hull.contains(start),
     });
     let Some(hull) = hull.filter(|_| enters) else {
-        // Only the unknown at the origin can be hit.
+        // Only unknown space at the origin can be hit.
         let blocked = query.unknown == UnknownAs::Obstacle;
         let hit = Hit { voxel: start, center_m: grid.center_m(start), distance_m: 0.0, probability: None };
         return Ok(blocked.then_some(hit));
@@ -108,18 +108,19 @@ pub(crate) fn walk_ray(
         }
         let is_over = query.unknown == UnknownAs::Free && !hull.contains(walk.voxel());
         if is_over || walk.voxel() == before {
-            // Beyond the map, or at the end of all voxels.
+            // Outside the map, or at the end of the index range.
             return Ok(None);
         }
     }
     Ok(None)
 }
 
-/// Walks from one point to another, both ends included, until it is stopped.
+/// Walks from one point to another, including both ends, until it is stopped.
 ///
 /// # Errors
 ///
-/// An end without a voxel, a segment through more than a million voxels; errors of `meet`.
+/// Fails if an end is outside of the map's space or the segment crosses more than a million voxels; returns errors of
+/// `meet`.
 pub(crate) fn walk_segment(
     grid: &Grid,
     [from, to]: [Point; 2],
@@ -131,7 +132,10 @@ pub(crate) fn walk_segment(
     };
     let mut walk = RayWalk::between(grid.to_voxel_units(from), start, grid.to_voxel_units(to), last);
     if walk.steps() > MAX_RAY_STEPS {
-        let reason = format!("meets {} voxels; ask for at most {MAX_RAY_STEPS}", walk.steps());
+        let reason = format!(
+            "crosses {} voxels, more than the limit of {MAX_RAY_STEPS}; use a shorter one",
+            walk.steps()
+        );
         return Err(Error::argument("segment", reason));
     }
     let length_m = (0..3).map(|k| (to[k] - from[k]).powi(2)).sum::<f64>().sqrt();
@@ -162,7 +166,7 @@ pub(super) fn cast_segment<V: MapView + ?Sized>(
     walk_segment(&view.config().grid, ends, meet_map(view, unknown))
 }
 
-/// What a ray meets in the voxels of a map: brick by brick.
+/// Returns the step function of a ray through a map, which examines brick by brick.
 fn meet_map<V: MapView + ?Sized>(
     view: &V,
     unknown: UnknownAs,
@@ -191,7 +195,7 @@ fn meet_map<V: MapView + ?Sized>(
             (false, _) => walk.advance_in(&voxels, until, |voxel| {
                 let log_odds = brick.get(place_of_voxel(voxel)).map(|evidence| evidence.log_odds);
                 let stops = log_odds.map_or(stops_at_unknown, |log_odds| log_odds >= occupied_from);
-                // The probability is computed for the answer alone.
+                // The probability is computed only for the result.
                 met = log_odds;
                 !stops
             }),
@@ -207,7 +211,7 @@ fn met_nothing(advanced: Advanced) -> Met {
     if advanced == Advanced::AtEnd { Met::End } else { Met::Passed }
 }
 
-/// The same direction, scaled if its squares would overflow or underflow.
+/// Scales the direction if its squares would overflow or underflow.
 fn of_usable_size(direction: Point) -> Point {
     let longest = direction.iter().fold(0.0, |longest: f64, d| longest.max(d.abs()));
     let is_usable = (1e-100..1e100).contains(&longest) || !(longest.is_finite() && longest > 0.0);
@@ -220,7 +224,7 @@ fn hull_of_map<V: MapView + ?Sized>(view: &V) -> Option<VoxelBox> {
     Some(view.config().grid.voxels_of_tiles(bounds))
 }
 
-/// The voxels of the brick that holds a voxel.
+/// The voxels of the brick that contains a voxel.
 pub fn brick_of(voxel: VoxelIndex) -> VoxelBox {
     let min = voxel.map(|k| k & !(BRICK_EDGE - 1));
     VoxelBox { min, end: min.map(|k| k.saturating_add(BRICK_EDGE)) }

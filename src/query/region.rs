@@ -1,5 +1,5 @@
+use super::filtered_tiles::for_each_from;
 use super::ray::brick_of;
-use super::sifted_tiles::for_each_from;
 use crate::config::MapConfig;
 use crate::error::Result;
 use crate::mapper::{MapView, TileRef};
@@ -7,7 +7,7 @@ use crate::maths::least_logit;
 use crate::space::{
     Aabb, BRICK_EDGE, BrickCode, BrickMask, Grid, TileBox, TileIndex, VoxelBox, VoxelIndex, mask_of_box,
 };
-use crate::tile::{BrickLook, Tile, Voxel};
+use crate::tile::{BrickView, Tile, Voxel};
 
 pub(super) fn evidence_in<'a, V: MapView + ?Sized>(
     view: &'a V,
@@ -82,7 +82,7 @@ pub(super) fn cached_occupied_voxels(
     Ok(voxels)
 }
 
-/// Log-odds of the smallest probability; at 0 and below every observed voxel passes, above 1 none.
+/// Converts the minimum probability to log-odds; at 0 and below all observed voxels pass, above 1 none.
 fn min_log_odds(config: &MapConfig, min_probability: Option<f64>) -> f64 {
     match min_probability {
         None => config.occupied_log_odds(),
@@ -97,13 +97,14 @@ pub(super) fn tiles_in<V: MapView + ?Sized>(view: &V, voxels: &VoxelBox) -> Vec<
     tiles_of_list_in(view, voxels, &mut None)
 }
 
-/// The same for several boxes: if the tiles of the map have to be listed, they are once, in `all`.
+/// Like [`tiles_in`], for several boxes: if the tiles of the map have to be listed, the list is stored in `all` for
+/// reuse.
 pub(super) fn tiles_of_list_in<V: MapView + ?Sized>(
     view: &V,
     voxels: &VoxelBox,
     all: &mut Option<Vec<TileIndex>>,
 ) -> Vec<TileIndex> {
-    /// Looking up so many is cheaper than listing all tiles of a large map.
+    /// Looking up this many tiles is cheaper than listing all tiles of a large map.
     const MAX_LOOKED_UP: u64 = 4096;
     let Some(tiles) = tile_box_around(view, voxels) else { return Vec::new() };
     if tiles.count() <= MAX_LOOKED_UP {
@@ -113,7 +114,7 @@ pub(super) fn tiles_of_list_in<V: MapView + ?Sized>(
     all.iter().copied().filter(|&tile| tiles.contains(tile)).collect()
 }
 
-/// The tiles, there or not, that overlap a box of voxels within the bounds of the map.
+/// The existing or missing tiles that overlap a box of voxels within the bounds of the map.
 fn tile_box_around<V: MapView + ?Sized>(view: &V, voxels: &VoxelBox) -> Option<TileBox> {
     if voxels.is_empty() {
         return None;
@@ -124,22 +125,22 @@ fn tile_box_around<V: MapView + ?Sized>(view: &V, voxels: &VoxelBox) -> Option<T
     view.tile_bounds()?.intersection(wanted)
 }
 
-/// The observed voxels of a tile that lie in a box, in Morton order.
+/// The observed voxels of a tile within a box, in Morton order.
 pub(super) fn voxels_in(tile: &Tile, voxels: &VoxelBox) -> impl Iterator<Item = Voxel> {
     bricks_in(tile, voxels).flat_map(move |brick| brick.voxels_from(tile, f64::NEG_INFINITY))
 }
 
-/// A brick of a tile, with those of its voxels that lie in a box.
+/// Brick of a tile, restricted to its voxels in a box.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct BrickPart {
     code: BrickCode,
-    /// All its voxels, beyond the box and the tile too.
+    /// All voxels of the brick, including those outside the box and the tile.
     pub(super) voxels: VoxelBox,
     mask: BrickMask,
 }
 
 impl BrickPart {
-    /// A whole brick, by its lowest voxel.
+    /// Creates a whole brick from its lowest voxel.
     pub(super) fn whole(lowest: VoxelIndex) -> Self {
         Self { code: BrickCode::of_voxel(lowest), voxels: brick_of(lowest), mask: [u64::MAX; 8] }
     }
@@ -149,7 +150,7 @@ impl BrickPart {
         Self { mask: part.mask_in(within), ..part }
     }
 
-    /// The places of the brick whose voxels lie in a box.
+    /// Mask of the brick's voxels in a box.
     pub(super) fn mask_in(&self, within: &VoxelBox) -> BrickMask {
         let local = |corner: VoxelIndex| {
             std::array::from_fn(|k| corner[k].saturating_sub(self.voxels.min[k]).clamp(0, BRICK_EDGE))
@@ -157,7 +158,7 @@ impl BrickPart {
         mask_of_box(local(within.min), local(within.end))
     }
 
-    /// Whether there may be voxels whose log-odds are at least a threshold.
+    /// Returns whether there may be voxels whose log-odds are at least a threshold.
     pub(super) fn may_hold(&self, tile: &Tile, threshold: f64) -> bool {
         self.look(tile).is_some_and(|brick| !brick.is_below(threshold))
     }
@@ -175,7 +176,7 @@ impl BrickPart {
         found.map(|(code, evidence)| Voxel { index: tile.index_of(code), evidence })
     }
 
-    pub(super) fn look<'a>(&self, tile: &'a Tile) -> Option<BrickLook<'a>> {
+    pub(super) fn look<'a>(&self, tile: &'a Tile) -> Option<BrickView<'a>> {
         let table = tile.table();
         table.number_of_brick(self.code).and_then(|number| table.numbered(number))
     }
@@ -193,7 +194,7 @@ pub(super) fn bricks_in(tile: &Tile, voxels: &VoxelBox) -> impl Iterator<Item = 
         let [x, y, z] = &corners;
         let corners = x.iter().flat_map(|x| y.iter().flat_map(move |y| z.iter().map(move |z| [*x, *y, *z])));
         let parts = corners.map(|corner| {
-            // A brick may extend beyond the tile: it is named by a voxel inside.
+            // A brick may extend beyond the tile, so it is identified by a voxel inside.
             let inside = std::array::from_fn(|k| corner[k].max(within.min[k]));
             BrickPart::of(inside, &within)
         });
@@ -207,9 +208,9 @@ pub(super) fn bricks_in(tile: &Tile, voxels: &VoxelBox) -> impl Iterator<Item = 
     parts.into_iter()
 }
 
-/// The voxels whose center may lie in a box, and a few around.
+/// The voxels whose center may be in a box, and a few around them.
 pub fn voxels_around(grid: &Grid, region: &Aabb) -> VoxelBox {
-    // A margin for the few around; voxels have indices up to the ends.
+    // With a margin; voxel indices extend to the limits of the range.
     let to_index =
         |coordinate: f64| coordinate.floor().clamp(f64::from(i32::MIN + 1), f64::from(i32::MAX - 2)) as i32;
     VoxelBox {

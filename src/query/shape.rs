@@ -2,49 +2,49 @@ use crate::error::{Error, Result};
 use crate::space::{Aabb, Grid, Point, VoxelBox, VoxelIndex};
 use nalgebra::Isometry3;
 
-/// A solid body; touching counts as collision. All coordinates are in metres in the world frame.
+/// Solid body for collision queries; touching counts as collision. All coordinates are in metres in the world frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shape {
-    /// A ball.
+    /// Sphere.
     Sphere {
-        /// Its center.
+        /// Center of the sphere.
         center: Point,
-        /// Its radius in metres.
+        /// Radius in metres.
         radius_m: f64,
     },
-    /// An axis-aligned box, both corners included.
+    /// Axis-aligned box, including both corners.
     Box(Aabb),
-    /// A box that is turned: a robot's body where it stands.
+    /// Oriented box, such as the body of a robot.
     OrientedBox {
-        /// Where the middle of the box is and how it is turned.
+        /// Pose of the center of the box.
         world_from_box: Isometry3<f64>,
         /// Half of its length along each of its own axes.
         half_extents_m: Point,
     },
-    /// What a ball covers on its way from one point to another along a straight line: a capsule.
+    /// Volume that a sphere covers along a straight line between two points: a capsule.
     SweptSphere {
-        /// Where its center begins.
+        /// Center at the start.
         from: Point,
-        /// Where its center ends.
+        /// Center at the end.
         to: Point,
-        /// Its radius in metres.
+        /// Radius in metres.
         radius_m: f64,
     },
 }
 
 impl Shape {
-    /// The smallest axis-aligned box around the body.
+    /// Returns the smallest axis-aligned box around the body.
     ///
     /// # Errors
     ///
-    /// [`Error::InvalidArgument`] for a body that is not finite, for a length below 0, and for a box whose upper corner
-    /// is below the lower one.
+    /// Fails with [`Error::InvalidArgument`] if the body is not finite, a length is negative, or the upper corner of a
+    /// box is below the lower one.
     pub fn bounds(&self) -> Result<Aabb> {
-        // The lower and the higher of two numbers pass over one that is none.
+        // `min` and `max` ignore NaN, so the ends are checked here.
         if let Self::SweptSphere { from, to, .. } = self
             && !from.iter().chain(to).all(|coordinate| coordinate.is_finite())
         {
-            return Err(Error::argument("body", format!("its way from {from:?} to {to:?} m is not finite")));
+            return Err(Error::argument("body", format!("the path from {from:?} to {to:?} m is not finite")));
         }
         let bounds = match *self {
             Self::Sphere { center, radius_m } => grown(center, center, checked_radius(radius_m)?),
@@ -54,13 +54,16 @@ impl Shape {
             }
             Self::Box(bounds) => {
                 if (0..3).any(|k| bounds.min[k] > bounds.max[k]) {
-                    return Err(Error::argument("body", format!("{bounds} ends below its beginning")));
+                    return Err(Error::argument(
+                        "body",
+                        format!("{bounds} has its upper corner below the lower one"),
+                    ));
                 }
                 bounds
             }
             Self::OrientedBox { world_from_box, half_extents_m } => {
                 if half_extents_m.iter().any(|extent| extent.is_nan() || *extent < 0.0) {
-                    let reason = format!("{half_extents_m:?} m are not lengths of at least 0");
+                    let reason = format!("{half_extents_m:?} m must not be negative");
                     return Err(Error::argument("half extents", reason));
                 }
                 let (center, axes) = axes_of(&world_from_box);
@@ -76,7 +79,7 @@ impl Shape {
         if finite { Ok(bounds) } else { Err(Error::argument("body", format!("{bounds} is not finite"))) }
     }
 
-    /// From where distances to what it touches are measured: its center, or where it begins.
+    /// Point from which distances to touched voxels are measured: the center, or the start of a swept body.
     pub(crate) fn reference_point(&self) -> Point {
         match self {
             Self::Sphere { center, .. } => *center,
@@ -86,13 +89,13 @@ impl Shape {
         }
     }
 
-    /// Whether the body touches a voxel.
+    /// Returns whether the body touches a voxel.
     pub(crate) fn touches_voxel(&self, grid: &Grid, voxel: VoxelIndex) -> bool {
         let end = voxel.map(|index| index.saturating_add(1));
         self.touches_voxels(grid, &VoxelBox { min: voxel, end })
     }
 
-    /// Whether the body touches a box of voxels.
+    /// Returns whether the body touches a box of voxels.
     pub(crate) fn touches_voxels(&self, grid: &Grid, voxels: &VoxelBox) -> bool {
         let corner = |index: i32| f64::from(index) * grid.resolution_m();
         self.touches(&Aabb { min: voxels.min.map(corner), max: voxels.end.map(corner) })
@@ -123,17 +126,17 @@ fn grown(min: Point, max: Point, by_m: f64) -> Aabb {
     Aabb { min: min.map(|c| c - by_m), max: max.map(|c| c + by_m) }
 }
 
-/// The middle of a turned box, and its three axes.
+/// Returns the center of an oriented box, and its three axes.
 fn axes_of(world_from_box: &Isometry3<f64>) -> (Point, [Point; 3]) {
     let rotation = world_from_box.rotation.to_rotation_matrix();
     let axis = |a: usize| std::array::from_fn(|k| rotation[(k, a)]);
     (world_from_box.translation.vector.into(), [axis(0), axis(1), axis(2)])
 }
 
-/// Squared distance between a box and a segment.
+/// Returns the squared distance between a box and a segment.
 ///
-/// Along the segment the squared distance to the box is convex, and a parabola between the places where a coordinate
-/// passes a face of the box: the least of each piece is exact.
+/// Along the segment the squared distance to the box is convex, and a parabola between the points where a coordinate
+/// passes a face of the box: the minimum of each piece is exact.
 fn distance_squared_to_segment(bounds: &Aabb, from: Point, to: Point) -> f64 {
     let along: Point = std::array::from_fn(|k| to[k] - from[k]);
     let mut pieces = [0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
@@ -145,8 +148,8 @@ fn distance_squared_to_segment(bounds: &Aabb, from: Point, to: Point) -> f64 {
     }
     pieces.sort_unstable_by(f64::total_cmp);
     let at = |time: f64| bounds.distance_squared(std::array::from_fn(|k| from[k] + time * along[k]));
-    let least_between = |begin: f64, end: f64| {
-        // Outside of the same faces all the way: the sum of (offset + time * along)^2 over those coordinates.
+    let min_between = |begin: f64, end: f64| {
+        // Outside of the same faces along the whole piece: the sum of (offset + time * along)^2 over those coordinates.
         let middle = 0.5 * (begin + end);
         let (mut slope, mut square) = (0.0, 0.0);
         for k in 0..3 {
@@ -164,12 +167,12 @@ fn distance_squared_to_segment(bounds: &Aabb, from: Point, to: Point) -> f64 {
         let lowest = if square > 0.0 { (-slope / square).clamp(begin, end) } else { begin };
         at(lowest)
     };
-    let inner = pieces.windows(2).map(|piece| least_between(piece[0], piece[1]));
+    let inner = pieces.windows(2).map(|piece| min_between(piece[0], piece[1]));
     inner.fold(at(0.0).min(at(1.0)), f64::min)
 }
 
-/// Whether a turned box touches an axis-aligned one: no axis separates them, of the 15 that can (Gottschalk, Lin and
-/// Manocha, "OBBTree", SIGGRAPH 1996).
+/// Returns whether an oriented box touches an axis-aligned one: none of the 15 candidate axes separates them
+/// (Gottschalk, Lin and Manocha, "OBBTree", SIGGRAPH 1996).
 fn boxes_touch(world_from_box: &Isometry3<f64>, half_extents_m: &Point, other: &Aabb) -> bool {
     let (center, axes) = axes_of(world_from_box);
     let other_half: Point = std::array::from_fn(|k| 0.5 * (other.max[k] - other.min[k]));

@@ -2,32 +2,32 @@ use super::ray::brick_of;
 use crate::error::Result;
 use crate::mapper::{MapView, TileRef};
 use crate::space::{BrickCode, TileIndex, VoxelBox, VoxelIndex};
-use crate::tile::{BrickLook, Tile};
+use crate::tile::{BrickView, Tile};
 
 /// Keeps the last tile, so that neighbouring voxels load it once.
 pub(super) struct TileCursor<'a, V: ?Sized> {
     view: &'a V,
     tile: Option<CurrentTile<'a>>,
-    /// So many absent tiles are passed one by one before the map is asked how far the empty space around one reaches.
+    /// Number of absent tiles that are passed one by one before the empty space around one is looked up.
     one_by_one: u32,
 }
 
-/// Absent tiles between others are few, and looking one up is cheap.
+/// Number of absent tiles in a row that are looked up individually. Short gaps are common, and a look-up is cheap.
 const FEW_ABSENT: u32 = 8;
 
 struct CurrentTile<'a> {
-    /// Its voxels; those of more tiles if nothing was observed in any of them.
+    /// Voxels of the tile, or of a box of several tiles without observations.
     voxels: VoxelBox,
-    /// `None` if nothing was observed in it.
+    /// `None` if there are no observations.
     tile: Option<TileRef<'a>>,
 }
 
-/// What there is around a voxel.
+/// Content around a voxel.
 pub(super) enum Around<'a> {
-    /// Nothing was observed in this box around it.
+    /// No observations in this box around the voxel.
     Nothing(VoxelBox),
-    /// Something was observed in its brick, of which these voxels are of its tile.
-    Brick(BrickLook<'a>, VoxelBox),
+    /// The brick of the voxel, which has observations, and the brick's voxels that belong to the tile.
+    Brick(BrickView<'a>, VoxelBox),
 }
 
 impl<'a, V: MapView + ?Sized> TileCursor<'a, V> {
@@ -35,12 +35,12 @@ impl<'a, V: MapView + ?Sized> TileCursor<'a, V> {
         Self { view, tile: None, one_by_one: FEW_ABSENT }
     }
 
-    /// The tile that holds a voxel; `None` if nothing was observed in it.
+    /// The tile that contains a voxel; `None` if it has no observations.
     pub(super) fn tile_of(&mut self, voxel: VoxelIndex) -> Result<Option<&Tile>> {
         Ok(self.current(voxel)?.tile.as_deref())
     }
 
-    /// A box around a voxel in which all log-odds, if there are any, are less than a threshold; `None` if unknown.
+    /// A box around a voxel in which all log-odds are below a threshold; `None` if none is known.
     #[inline]
     pub(super) fn below_around(&mut self, voxel: VoxelIndex, threshold: f64) -> Result<Option<VoxelBox>> {
         let CurrentTile { voxels, tile } = self.current(voxel)?;
@@ -50,7 +50,7 @@ impl<'a, V: MapView + ?Sized> TileCursor<'a, V> {
         })
     }
 
-    /// What is known around a voxel.
+    /// Returns the content around a voxel.
     #[inline]
     pub(super) fn around(&mut self, voxel: VoxelIndex) -> Result<Around<'_>> {
         let CurrentTile { voxels, tile } = self.current(voxel)?;
@@ -86,7 +86,7 @@ impl<'a, V: MapView + ?Sized> TileCursor<'a, V> {
         Ok(self.tile.insert(current))
     }
 
-    /// The voxels of a box without tiles around an absent one, if it is worth asking for.
+    /// The voxels of a box without tiles around an absent one, if the look-up is worthwhile.
     fn empty_around(&mut self, absent: TileIndex) -> Option<VoxelBox> {
         if self.one_by_one > 0 {
             self.one_by_one -= 1;

@@ -5,10 +5,10 @@ use super::{Hit, Occupancy, Queries, RayQuery, Shape, UnknownAs, VoxelOccupancy,
 use crate::error::{Error, Result};
 use crate::space::{Aabb, Grid, Point, VoxelIndex};
 
-/// Several maps asked as one: a robot's archive with its local map, or with the layers of other robots.
+/// Several maps queried as one, for example a robot's map with its local map or with the layers of other robots.
 ///
-/// A voxel is occupied if it is in any of them, else free if it is in any, else unknown. Of maps that say the same of a
-/// voxel the first is believed.
+/// A voxel is occupied if it is occupied in any of them, otherwise free if it is free in any, otherwise unknown. If
+/// several maps give the same state, the probability of the first is returned.
 ///
 /// ```
 /// use voxtile_local::{LocalMap, LocalParameters, Obstacle};
@@ -41,20 +41,20 @@ impl std::fmt::Debug for United<'_> {
 }
 
 impl<'a> United<'a> {
-    /// These maps as one.
+    /// Combines maps.
     ///
     /// # Errors
     ///
-    /// [`Error::InvalidArgument`] for no map, and for maps of different resolutions.
+    /// Fails with [`Error::InvalidArgument`] if there is no map or the maps have different resolutions.
     pub fn new(maps: &[&'a dyn Queries]) -> Result<Self> {
         let Some(first) = maps.first() else {
-            return Err(Error::argument("maps", "there are none; unite at least one"));
+            return Err(Error::argument("maps", "none given; at least one is needed"));
         };
         check_resolutions(maps.iter().map(|map| map.grid().resolution_m()))?;
         Ok(Self { maps: maps.to_vec(), grid: first.grid() })
     }
 
-    /// The hit of each map that `wins` over those before it.
+    /// Returns the best hit of all maps; `wins` compares a hit with an earlier one.
     fn best(
         &self,
         hits: impl Fn(&dyn Queries) -> Result<Option<Hit>>,
@@ -71,7 +71,7 @@ impl<'a> United<'a> {
         Ok(best)
     }
 
-    /// What a ray meets where the unknown is an obstacle.
+    /// Step function of a ray if unknown space is an obstacle.
     fn meet(&self) -> impl FnMut(VoxelIndex) -> Result<Met> {
         |voxel| {
             Ok(match self.occupancy(voxel)? {
@@ -111,7 +111,7 @@ impl Queries for United<'_> {
                     Ok(VoxelOccupancy { voxel, .. }) => voxel,
                     Err(error) => return Some(Err(error)),
                 };
-                // Each voxel once: with the first map that has it.
+                // Each voxel once, from the first map that contains it.
                 for before in &self.maps[..number] {
                     match before.occupancy(voxel) {
                         Ok(Occupancy::Unknown) => {}

@@ -1,13 +1,13 @@
 use sealed::PointSlice;
 
-/// A coordinate as people have them: `f64`, or `f32`, which is widened exactly.
+/// Type of coordinates: `f64`, or `f32`, which is widened exactly.
 pub trait Coordinate: sealed::Sealed {}
 
 impl Coordinate for f32 {}
 impl Coordinate for f64 {}
 
 pub(super) mod sealed {
-    /// Borrowed points of either kind.
+    /// Borrowed points of either type.
     #[derive(Clone, Copy, Debug)]
     pub enum PointSlice<'a> {
         F32(&'a [[f32; 3]]),

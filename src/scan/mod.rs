@@ -1,11 +1,11 @@
-//! A scan of a sensor, and the updates of voxels that follow from it.
+//! Scans of a sensor, and the voxel updates computed from them.
 //!
 //! ```text
 //! Scan, ScanRef -> rays -> marks or counts in pages -> updates, grouped by tile
 //!                  ray     pages, coherence            per_scan or per_ray, updates; spill if memory is short
 //! ```
-//!
-//! `trace` drives all of it. The updates do not depend on what a tile holds: they can be stored and applied later.
+//! `trace` coordinates all of it. Updates do not depend on the content of tiles, so they can be stored and applied
+//! later. `codec` compresses the points of kept scans.
 //! `codec` has the points of a kept scan in few bytes.
 
 mod codec;

@@ -8,28 +8,31 @@ use crate::error::{Error, Result};
 use crate::sensor::{Observation, SensorModel};
 use crate::space::{Grid, Point, TileBox};
 
-/// Observations of single points without rays, in the order in which they count.
+/// Observations of single points without rays, in order.
 #[derive(Clone, Copy, Debug)]
 pub struct PointBatch<'a> {
     /// Points in metres, world frame.
     pub points: &'a [Point],
-    /// Intensity of each point, where the sensor model needs one.
+    /// Intensity of each point, if the sensor model needs it.
     pub intensities: Option<&'a [f32]>,
-    /// Whether each point was seen occupied (a hit) or free (a miss).
+    /// Whether each point was observed occupied (a hit) or free (a miss).
     pub is_occupied: &'a [bool],
 }
 
 impl PointBatch<'_> {
-    /// The updates, one per entry, grouped by tile.
+    /// Returns the updates, one per entry, grouped by tile.
     ///
     /// # Errors
     ///
-    /// Lists of different lengths, or no intensities where the sensor model needs them.
+    /// Fails if the lists differ in length, or if intensities are missing that the sensor model needs.
     pub fn updates(&self, grid: &Grid, model: &SensorModel) -> Result<ScanUpdates> {
         check_intensities(model, self.points.len(), self.intensities)?;
         if self.is_occupied.len() != self.points.len() {
-            let reason =
-                format!("{} for {} points; give one a point", self.is_occupied.len(), self.points.len());
+            let reason = format!(
+                "{} for {} points; one per point is needed",
+                self.is_occupied.len(),
+                self.points.len()
+            );
             return Err(Error::argument("is_occupied", reason));
         }
         let mut collector = BatchCollector::new(grid, model, self.points.len());
@@ -42,13 +45,14 @@ impl PointBatch<'_> {
     }
 }
 
-/// The updates of a batch that takes the points of a scan as hits, those outside of the region left out: the same as
-/// of [`PointBatch::updates`], but chunk by chunk. With `overflow`, updates that exceed the memory limit are spilled and
-/// the rest is returned.
+/// Returns the updates of a batch with the points of a scan as hits; points outside of the mapped region are omitted.
+/// The result is that of [`PointBatch::updates`], but it is computed in chunks. With `overflow`, updates that exceed
+/// the memory limit are spilled and the rest is returned.
 ///
 /// # Errors
 ///
-/// No intensities where the sensor model needs them, points that cannot be read, errors of the spill; a stop.
+/// Fails if intensities are missing that the sensor model needs, if points cannot be read or updates cannot be spilled,
+/// or if the stop flag is raised.
 pub(crate) fn updates_of_hits(
     config: &MapConfig,
     scan: &dyn ScanPoints,
@@ -84,7 +88,7 @@ pub(crate) fn updates_of_hits(
     parts.into_updates(collector.report, false, stop, &mut overflow)
 }
 
-/// Passes points with their intensities, 0 where there are none, until `take` returns false.
+/// Passes points with their intensities (0 if they have none), until `take` returns false.
 fn for_each_hit(scan: &dyn ScanPoints, stop: &Stop, mut take: impl FnMut(Point, f32) -> bool) -> Result<()> {
     scan.for_each_chunk(0..scan.len(), &mut |points, intensities| {
         let intensity = |number: usize| intensities.map_or(0.0, |intensities| intensities[number]);
@@ -94,7 +98,7 @@ fn for_each_hit(scan: &dyn ScanPoints, stop: &Stop, mut take: impl FnMut(Point, 
     stop.check()
 }
 
-/// Takes the points of a batch one after the other.
+/// Collector of the points of a batch, in order.
 struct BatchCollector<'a> {
     grid: &'a Grid,
     model: &'a SensorModel,
@@ -123,7 +127,7 @@ impl<'a> BatchCollector<'a> {
         }
     }
 
-    /// Takes a hit unless it is outside of a region. A point without a tile is skipped and counted.
+    /// Adds a hit unless it is outside of `region`. A point outside of the map's space is skipped and counted.
     fn take_within(&mut self, region: Option<TileBox>, point: Point, intensity: f32) {
         let is_outside =
             region.zip(self.grid.tile_of(point)).is_some_and(|(region, tile)| !region.contains(tile));
@@ -146,7 +150,7 @@ mod tests {
     use std::collections::BTreeMap;
     use std::path::Path;
 
-    /// The updates of each tile, packed, in order.
+    /// Packed updates of each tile, in order.
     type ByTile = BTreeMap<TileIndex, PackedUpdates>;
 
     fn add(tiles: Vec<(TileIndex, PackedUpdates)>, all: &mut ByTile) {
@@ -166,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn hits_that_exceed_the_limit_go_out_in_their_order() {
+    fn hits_beyond_the_limit_are_spilled_in_order() {
         const MAX_BYTES: usize = 8 << 10;
         let config = MapConfig::new(0.1, 1.6).unwrap();
         let mut points: Vec<Point> =

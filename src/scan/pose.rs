@@ -2,14 +2,14 @@ use crate::error::{Error, Result};
 use crate::space::Point;
 use nalgebra::{Isometry3, Matrix3, Quaternion, Rotation3, Translation3, UnitQuaternion};
 
-/// The pose of a sensor, `world_from_sensor`: it takes points from the sensor's frame to the world's,
-/// `world = R * p + t`.
+/// Pose of a sensor, `world_from_sensor`: transforms points from the sensor frame to the world frame, `world = R * p +
+/// t`.
 ///
 /// ```
 /// use voxtile::{Pose, nalgebra};
 ///
 /// # fn main() -> voxtile::Result<()> {
-/// // 1.8 m above the ground, turned by 90 degrees to the left.
+/// // 1.8 m above the ground, rotated by 90 degrees to the left.
 /// let half = 0.5_f64.sqrt();
 /// let pose = Pose::from_quaternion([0.0, 0.0, 1.8], [0.0, 0.0, half, half])?;
 /// let same = Pose::from_matrix(&[[0.0, -1.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 1.8]])?;
@@ -21,7 +21,7 @@ use nalgebra::{Isometry3, Matrix3, Quaternion, Rotation3, Translation3, UnitQuat
 /// assert_eq!(level.position_m(), pose.position_m());
 ///
 /// let error = Pose::from_quaternion([0.0; 3], [0.0; 4]).unwrap_err();
-/// assert_eq!(error.to_string(), "pose: a quaternion of no length");
+/// assert_eq!(error.to_string(), "pose: a quaternion of length 0");
 /// # Ok(())
 /// # }
 /// ```
@@ -30,60 +30,60 @@ pub struct Pose {
     world_from_sensor: Isometry3<f64>,
 }
 
-/// How far the entries of `M * transpose(M)` may be from the identity's.
+/// Maximum deviation of the entries of `M * transpose(M)` from the identity.
 const ROTATION_TOLERANCE: f64 = 1e-3;
-/// How far the entries of the last row of a 4x4 matrix may be from 0 0 0 1.
+/// Maximum deviation of the last row of a 4x4 matrix from 0 0 0 1.
 const LAST_ROW_TOLERANCE: f64 = 1e-6;
 
 impl Pose {
-    /// The sensor's frame is the world's.
+    /// Returns the pose of a sensor whose frame is the world frame.
     pub fn identity() -> Self {
         Self { world_from_sensor: Isometry3::identity() }
     }
 
-    /// The pose of a sensor at `position_m` metres whose rotation is the quaternion x, y, z, w, in this order. The
-    /// quaternion is normalized.
+    /// Creates a pose from a position in metres and a rotation quaternion in the order x, y, z, w. The quaternion is
+    /// normalized.
     ///
     /// # Errors
     ///
-    /// Numbers that are not finite, a zero quaternion.
+    /// Fails if a number is not finite or the quaternion is zero.
     pub fn from_quaternion(position_m: Point, xyzw: [f64; 4]) -> Result<Self> {
         Self::of_quaternion(position_m, xyzw).map_err(wrong)
     }
 
-    /// The pose of a row-major matrix of 3 or 4 rows, the rotation left and the position in metres right. The rotation
-    /// may be exact to a few digits only: the pose does not scale.
+    /// Creates a pose from a row-major matrix of 3 or 4 rows, with the rotation on the left and the position in metres
+    /// on the right. A rotation that is exact only to a few digits is normalized, so that the pose does not scale.
     ///
-    /// Numbers in one list are rows by `Pose::from_matrix(numbers.as_chunks().0)`.
+    /// For numbers in one list, use `Pose::from_matrix(numbers.as_chunks().0)`.
     ///
     /// # Errors
     ///
-    /// Numbers that are not finite, a 3x3 part that is not a rotation, a fourth row other than 0 0 0 1, another number
-    /// of rows.
+    /// Fails if a number is not finite, the 3x3 part is not a rotation, the fourth row is not 0 0 0 1, or the number of
+    /// rows is not 3 or 4.
     pub fn from_matrix(rows: &[[f64; 4]]) -> Result<Self> {
         Self::of_matrix(rows).map_err(wrong)
     }
 
-    /// [`Pose::from_quaternion`], whose error is only the reason.
+    /// Like [`Pose::from_quaternion`], but the error is the reason as text.
     ///
     /// # Errors
     ///
-    /// The reason.
+    /// Same errors as [`Pose::from_quaternion`].
     pub fn of_quaternion(position_m: Point, [x, y, z, w]: [f64; 4]) -> std::result::Result<Self, String> {
         check_finite(position_m.iter().chain(&[x, y, z, w]))?;
         let quaternion = Quaternion::new(w, x, y, z);
         if !quaternion.norm_squared().is_finite() {
             return Err("a quaternion too long to be a rotation".to_owned());
         }
-        let rotation = UnitQuaternion::try_new(quaternion, 1e-9).ok_or("a quaternion of no length")?;
+        let rotation = UnitQuaternion::try_new(quaternion, 1e-9).ok_or("a quaternion of length 0")?;
         Ok(Self { world_from_sensor: Isometry3::from_parts(Translation3::from(position_m), rotation) })
     }
 
-    /// [`Pose::from_matrix`], whose error is only the reason.
+    /// Like [`Pose::from_matrix`], but the error is the reason as text.
     ///
     /// # Errors
     ///
-    /// The reason.
+    /// Same errors as [`Pose::from_matrix`].
     pub fn of_matrix(rows: &[[f64; 4]]) -> std::result::Result<Self, String> {
         check_finite(rows.iter().flatten())?;
         let ([[a, b, c, x], [d, e, f, y], [g, h, i, z]], last) = match *rows {
@@ -93,17 +93,17 @@ impl Pose {
         };
         let is_near = |(number, wanted): (&f64, f64)| (number - wanted).abs() <= LAST_ROW_TOLERANCE;
         if last.is_some_and(|last| !last.iter().zip([0.0, 0.0, 0.0, 1.0]).all(is_near)) {
-            return Err("the last row of the matrix is not 0 0 0 1; rows come first, not columns".to_owned());
+            return Err("the last row of the matrix is not 0 0 0 1; use row-major order".to_owned());
         }
         let matrix = Matrix3::new(a, b, c, d, e, f, g, h, i);
         let deviation = matrix * matrix.transpose() - Matrix3::identity();
-        // Numbers too large to be squared deviate by infinity, or by what is not a number.
+        // For entries that overflow when squared, the deviation is infinite or NaN.
         let is_rotation = deviation.iter().all(|by| by.abs() <= ROTATION_TOLERANCE);
         if !is_rotation || matrix.determinant() < 0.0 {
             return Err("the 3x3 part of the matrix is not a rotation".to_owned());
         }
         let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(matrix));
-        // The matrix is a rotation only to a few digits; a pose must not scale.
+        // The matrix is a rotation only to a few digits; normalize, because a pose must not scale.
         let rotation = UnitQuaternion::new_normalize(rotation.into_inner());
         Ok(Self { world_from_sensor: Isometry3::from_parts(Translation3::new(x, y, z), rotation) })
     }
@@ -113,28 +113,28 @@ impl Pose {
         self.world_from_sensor.translation.vector.into()
     }
 
-    /// The rotation as a quaternion x, y, z, w, in this order.
+    /// Rotation as a quaternion in the order x, y, z, w.
     pub fn quaternion(&self) -> [f64; 4] {
         self.world_from_sensor.rotation.coords.into()
     }
 
-    /// The pose for calculations with [`nalgebra`].
+    /// The pose as an isometry of [`nalgebra`].
     pub fn isometry(&self) -> &Isometry3<f64> {
         &self.world_from_sensor
     }
 
-    /// Takes points in metres from the sensor's frame to the world's.
+    /// Returns a function that transforms points in metres from the sensor frame to the world frame.
     pub fn to_world(&self) -> impl Fn(Point) -> Point + Copy + use<> {
         let rotation = self.world_from_sensor.rotation.to_rotation_matrix();
         let r: [Point; 3] = std::array::from_fn(|i| std::array::from_fn(|k| rotation[(i, k)]));
         let t = self.position_m();
-        // Spelled out, so that the order of operations, and with it the last bit, does not depend on a library.
+        // Written out, so that the order of operations, and thus the last bit, does not depend on a library.
         move |p: Point| std::array::from_fn(|i| r[i][0] * p[0] + r[i][1] * p[1] + r[i][2] * p[2] + t[i])
     }
 }
 
 impl From<Isometry3<f64>> for Pose {
-    /// Takes the pose as it is; nothing is checked.
+    /// Converts without checks.
     fn from(world_from_sensor: Isometry3<f64>) -> Self {
         Self { world_from_sensor }
     }

@@ -1,44 +1,44 @@
 use serde::Serialize;
 use std::ops::AddAssign;
 
-/// What happened to the points of a scan or batch. Reports add up with `+=`.
+/// Counts of the points and updates of a scan or batch. Reports can be added with `+=`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct ScanReport {
     /// Points received.
     pub points: u64,
-    /// Points that were skipped, by cause.
+    /// Skipped points, by cause.
     pub skipped: SkippedPoints,
-    /// Points beyond the max range, whose rays were cut there.
+    /// Points beyond the max range, whose rays were clipped there.
     pub cut_at_max_range: u64,
-    /// Updates of voxels by hits.
+    /// Voxel updates by hits.
     pub hits: u64,
-    /// Updates of voxels by misses.
+    /// Voxel updates by misses.
     pub misses: u64,
-    /// Tiles that received updates, each counted once per scan.
+    /// Tiles with updates, each counted once per scan.
     pub tiles_touched: u64,
 }
 
-/// Points that were skipped, by cause.
+/// Skipped points, by cause.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct SkippedPoints {
-    /// A coordinate is NaN or infinite.
+    /// Points with a coordinate that is NaN or infinite.
     pub not_finite: u64,
-    /// Too far away for a voxel index.
+    /// Points whose coordinates exceed the voxel index range.
     pub out_of_range: u64,
-    /// The sensor's own origin, which drivers use for "no return".
+    /// Points equal to the sensor's origin, which drivers use for "no return".
     pub no_return: u64,
-    /// Nearer than the min range.
+    /// Points closer than the min range.
     pub too_near: u64,
-    /// The ray would cross more than a million voxels.
+    /// Points whose rays would cross more than a million voxels.
     pub ray_too_long: u64,
-    /// The intensity is NaN and the sensor model needs it.
+    /// Points whose intensity is NaN although the sensor model needs it.
     pub no_intensity: u64,
 }
 
 impl SkippedPoints {
-    /// All skipped points.
+    /// Number of all skipped points.
     pub fn total(&self) -> u64 {
         self.by_cause().iter().map(|(_, count)| count).sum()
     }

@@ -3,15 +3,16 @@ use crate::error::Result;
 use crate::space::Point;
 use std::ops::Range;
 
-/// Takes a chunk of a scan's points, in metres, with their intensities if they have any. Returns whether to continue.
+/// Callback that receives a chunk of a scan's points, in metres, with their intensities if they have any. Returns
+/// whether to continue.
 pub type TakePoints<'a> = dyn FnMut(&[Point], Option<&[f32]>) -> bool + 'a;
 
-/// The points of a scan, in memory or in a file larger than memory, and where they were seen from.
+/// Points of a scan, in memory or in a file that may exceed memory, and the position of the sensor.
 pub trait ScanPoints: Sync {
-    /// Position of the sensor in metres, world frame: every ray starts here.
+    /// Position of the sensor in metres, world frame: the origin of all rays.
     fn origin(&self) -> Point;
 
-    /// When the scan was taken, in nanoseconds since the epoch of its source, if that is known.
+    /// Acquisition time in nanoseconds since the epoch of its source, if known.
     fn stamp_ns(&self) -> Option<i64> {
         None
     }
@@ -19,38 +20,38 @@ pub trait ScanPoints: Sync {
     /// Number of points.
     fn len(&self) -> usize;
 
-    /// Whether there are none.
+    /// Returns whether there are no points.
     fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Whether each point has an intensity.
+    /// Returns whether each point has an intensity.
     fn has_intensities(&self) -> bool;
 
-    /// Passes the points of a range to `take` in order, chunk by chunk: in metres, world frame, with their intensities
-    /// if they have any. `take` returns whether to continue. May be called several times and from several threads.
+    /// Passes the points of a range to `take` in order, in chunks: in metres, world frame, with their intensities if
+    /// they have any. Stops when `take` returns `false`. May be called several times and from several threads.
     ///
     /// # Errors
     ///
-    /// A file that cannot be read, intensities that do not match the points.
+    /// Fails if a file cannot be read or the intensities do not match the points.
     fn for_each_chunk(&self, range: Range<usize>, take: &mut TakePoints<'_>) -> Result<()>;
 
-    /// The pose of the sensor, if the points are known in the sensor's frame.
+    /// The pose of the sensor, if the points are also available in the sensor frame.
     fn world_from_sensor(&self) -> Option<Pose> {
         None
     }
 
-    /// As [`ScanPoints::for_each_chunk`], but in the sensor's frame where [`ScanPoints::world_from_sensor`] is known.
-    /// The pose takes these points to the others, to the bit.
+    /// Like [`ScanPoints::for_each_chunk`], but in the sensor frame if [`ScanPoints::world_from_sensor`] is known.
+    /// Transforming these points by the pose gives bit-identical world points.
     ///
     /// # Errors
     ///
-    /// As for [`ScanPoints::for_each_chunk`].
+    /// Same errors as [`ScanPoints::for_each_chunk`].
     fn for_each_own_chunk(&self, range: Range<usize>, take: &mut TakePoints<'_>) -> Result<()> {
         self.for_each_chunk(range, take)
     }
 
-    /// All points at once, if they lie in memory as [`ScanPoints::for_each_chunk`] passes them.
+    /// All points, if they are in memory in the form that [`ScanPoints::for_each_chunk`] passes.
     fn in_memory(&self) -> Option<&[Point]> {
         None
     }

@@ -6,11 +6,10 @@ use crate::error::{Error, Result};
 use crate::space::Point;
 use std::ops::Range;
 
-/// A scan whose points lie elsewhere: borrowed lists of `[f32; 3]` or `[f64; 3]` in metres, in the sensor's frame or
-/// the world's.
+/// Scan with borrowed points: slices of `[f32; 3]` or `[f64; 3]` in metres, in the sensor frame or the world frame.
 ///
-/// Nothing is copied to make one. Points that are `f64` in the world frame are used where they lie; others are
-/// converted chunk by chunk while they are traced. The map is the same to the bit as by a [`Scan`](super::Scan).
+/// Creating one copies nothing. `f64` points in the world frame are used in place; others are converted in chunks while
+/// they are traced. The map is bit-identical to that of a [`Scan`](super::Scan).
 ///
 /// ```
 /// use voxtile::{InMemoryMapper, MapConfig, Mapper, Pose, Queries, ScanRef};
@@ -18,7 +17,7 @@ use std::ops::Range;
 /// # fn main() -> voxtile::Result<()> {
 /// let mut mapper = InMemoryMapper::new(MapConfig::new(0.1, 10.0)?)?;
 ///
-/// // As a driver hands them out; (0, 0, 0) is a ray without return.
+/// // As returned by a driver; (0, 0, 0) is a ray without return.
 /// let points: Vec<[f32; 3]> = vec![[4.25, 1.05, -1.45], [0.0; 3]];
 /// let intensities = [17.0, 0.0];
 /// let pose = Pose::from_quaternion([0.0, 0.0, 1.8], [0.0, 0.0, 0.0, 1.0])?;
@@ -36,47 +35,48 @@ use std::ops::Range;
 pub struct ScanRef<'a> {
     frame: Frame,
     points: PointSlice<'a>,
-    /// One a point.
+    /// One per point.
     intensities: Option<&'a [f32]>,
     stamp_ns: Option<i64>,
 }
 
-/// The frame of the points.
+/// Frame of the points.
 #[derive(Clone, Copy, Debug)]
 enum Frame {
-    /// The world's; the sensor is at this position.
+    /// World frame, with the position of the sensor.
     World(Point),
     Sensor(Pose),
 }
 
-/// Points that are converted at a time, 6 MiB. Beam coherence works within one chunk, which should be a whole scan of
-/// most sensors.
+/// Number of points that are converted at a time (6 MiB). Beam coherence works within one chunk, which should be a
+/// whole scan of most sensors.
 const POINTS_AT_A_TIME: usize = 1 << 18;
 
 impl<'a> ScanRef<'a> {
-    /// Points in the world frame, seen from `origin`. A point equal to the origin means "no return" and is skipped.
+    /// Creates a scan from points in the world frame, seen from `origin`. A point equal to the origin means "no return"
+    /// and is skipped.
     pub fn in_world<C: Coordinate>(origin: Point, points: &'a [[C; 3]]) -> Self {
         Self { frame: Frame::World(origin), points: C::slice(points), intensities: None, stamp_ns: None }
     }
 
-    /// Points in the sensor's frame, and the pose of the sensor. The exact point (0, 0, 0) means "no return" and is
-    /// skipped.
+    /// Creates a scan from points in the sensor frame and the pose of the sensor. The exact point (0, 0, 0) means "no
+    /// return" and is skipped.
     pub fn in_sensor<C: Coordinate>(world_from_sensor: impl Into<Pose>, points: &'a [[C; 3]]) -> Self {
         let frame = Frame::Sensor(world_from_sensor.into());
         Self { frame, points: C::slice(points), intensities: None, stamp_ns: None }
     }
 
-    /// The same with an intensity per point.
+    /// Adds an intensity per point.
     ///
     /// # Errors
     ///
-    /// Another number of intensities than of points.
+    /// Fails if the number of intensities differs from that of the points.
     pub fn with_intensities(self, intensities: &'a [f32]) -> Result<Self> {
         check_count(self.len(), intensities)?;
         Ok(Self { intensities: Some(intensities), ..self })
     }
 
-    /// The same with the time at which it was taken, in nanoseconds since the epoch of its source.
+    /// Adds the acquisition time, in nanoseconds since the epoch of its source.
     #[must_use]
     pub fn with_stamp_ns(self, stamp_ns: i64) -> Self {
         Self { stamp_ns: Some(stamp_ns), ..self }
@@ -156,7 +156,7 @@ fn widened(point: [f32; 3]) -> Point {
     point.map(f64::from)
 }
 
-/// Passes points on in the world frame, chunk by chunk.
+/// Passes points in the world frame, in chunks.
 fn convert<P: Copy>(
     points: &[P],
     intensities: Option<&[f32]>,
@@ -176,7 +176,9 @@ fn convert<P: Copy>(
 
 fn part<'s, T>(all: &'s [T], range: &Range<usize>) -> Result<&'s [T]> {
     let part = all.get(range.clone());
-    part.ok_or_else(|| Error::argument("points", format!("{range:?} of {}; there are no such", all.len())))
+    part.ok_or_else(|| {
+        Error::argument("points", format!("the range {range:?} exceeds the {} points", all.len()))
+    })
 }
 
 #[cfg(test)]
@@ -184,7 +186,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn points_come_in_chunks_with_their_intensities() {
+    fn points_are_passed_in_chunks_with_their_intensities() {
         let count = POINTS_AT_A_TIME + 77;
         let points: Vec<[f32; 3]> = (0..count).map(|k| [k as f32, 0.5, -1.5]).collect();
         let intensities: Vec<f32> = (0..count).map(|k| k as f32).collect();

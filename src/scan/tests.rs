@@ -1,4 +1,4 @@
-//! Scans under a memory limit give the same updates as without.
+//! Scans under a memory limit give the same updates as without a limit.
 
 use super::updates::brick_code;
 use super::{
@@ -17,13 +17,13 @@ use std::collections::BTreeMap;
 use std::io;
 use std::path::Path;
 
-/// The updates of each voxel, in order: `None` for a miss, the bits of the intensity for a hit. By tile, code of the
-/// brick and place in it.
-type Said = BTreeMap<(TileIndex, u64, usize), Vec<Option<u32>>>;
+/// Updates of each voxel, in order: `None` for a miss, the bits of the intensity for a hit. The key is the tile, the
+/// brick code and the position in the brick.
+type UpdatesByVoxel = BTreeMap<(TileIndex, u64, usize), Vec<Option<u32>>>;
 
-fn add(said: &mut Said, grid: &Grid, tile: TileIndex, updates: &TileUpdates) {
+fn add(by_voxel: &mut UpdatesByVoxel, grid: &Grid, tile: TileIndex, updates: &TileUpdates) {
     let mut push = |brick, place, hit: Option<f32>| {
-        said.entry((tile, brick, place)).or_default().push(hit.map(f32::to_bits));
+        by_voxel.entry((tile, brick, place)).or_default().push(hit.map(f32::to_bits));
     };
     match updates {
         TileUpdates::Masks(bricks) => {
@@ -52,7 +52,7 @@ fn add(said: &mut Said, grid: &Grid, tile: TileIndex, updates: &TileUpdates) {
                 push(brick.0, place_of_voxel(voxel), intensity(observation));
             }
         }
-        TileUpdates::Packed(packed) => packed.iter().for_each(|updates| add(said, grid, tile, &updates)),
+        TileUpdates::Packed(packed) => packed.iter().for_each(|updates| add(by_voxel, grid, tile, &updates)),
     }
 }
 
@@ -68,36 +68,36 @@ struct Setting {
     model: SensorModel,
     rays: RayConfig,
     order: UpdateOrder,
-    /// `None` for all of space.
+    /// `None` for the whole space.
     tiles: Option<TileSelection>,
 }
 
 impl Setting {
-    fn whole(&self, scan: &Scan) -> (Said, ScanReport) {
+    fn whole(&self, scan: &Scan) -> (UpdatesByVoxel, ScanReport) {
         let Self { grid, model, rays, order, tiles } = self;
         let mapped = MappedTiles { grid, selection: tiles.as_ref() };
         let tracer = &mut ScanTracer::default();
         let updates =
             tracer.trace_points(TraceRules { mapped, model, rays, order: *order }, scan, None).unwrap();
-        let mut said = Said::new();
-        updates.tiles.iter().for_each(|(tile, updates)| add(&mut said, grid, *tile, updates));
-        (said, updates.report)
+        let mut by_voxel = UpdatesByVoxel::new();
+        updates.tiles.iter().for_each(|(tile, updates)| add(&mut by_voxel, grid, *tile, updates));
+        (by_voxel, updates.report)
     }
 
-    /// The same with so many bytes for marks, and for updates; also, how often updates were spilled.
+    /// Traces with the given limits in bytes for marks and for updates; also returns the number of spills.
     fn in_parts(
         &self,
         tracer: &mut ScanTracer,
         scan: &Scan,
         max_bytes: usize,
-    ) -> Result<(Said, ScanReport, usize)> {
+    ) -> Result<(UpdatesByVoxel, ScanReport, usize)> {
         let Self { grid, model, rays, order, tiles } = self;
         let mapped = MappedTiles { grid, selection: tiles.as_ref() };
-        let (mut said, mut times) = (Said::new(), 0);
+        let (mut by_voxel, mut times) = (UpdatesByVoxel::new(), 0);
         let mut spill = |part: Vec<(TileIndex, PackedUpdates)>| {
             times += 1;
             for (tile, updates) in part {
-                add(&mut said, grid, tile, &TileUpdates::Packed(updates));
+                add(&mut by_voxel, grid, tile, &TileUpdates::Packed(updates));
             }
             Ok(())
         };
@@ -106,8 +106,8 @@ impl Setting {
         let overflow = Overflow { max_bytes, max_tiles: usize::MAX, folder, make_scratch, spill: &mut spill };
         let ScanUpdates { tiles, report } =
             tracer.trace_points(TraceRules { mapped, model, rays, order: *order }, scan, Some(overflow))?;
-        tiles.iter().for_each(|(tile, updates)| add(&mut said, grid, *tile, updates));
-        Ok((said, report, times))
+        tiles.iter().for_each(|(tile, updates)| add(&mut by_voxel, grid, *tile, updates));
+        Ok((by_voxel, report, times))
     }
 }
 
@@ -127,7 +127,7 @@ fn settings(tile_size_m: f64) -> Vec<Setting> {
     modes.map(setting).into()
 }
 
-/// Rays all around, many of them alike.
+/// Rays in all directions, many of them similar.
 fn dense(rays: u32, reach_m: f64) -> Scan {
     let origin = [0.03, -0.02, 0.05];
     let point = |k: u32| -> Point {
@@ -140,24 +140,24 @@ fn dense(rays: u32, reach_m: f64) -> Scan {
 }
 
 #[test]
-fn dense_rays_in_little_memory_say_the_same_by_any_number_of_threads() {
+fn dense_rays_in_little_memory_give_the_same_updates_with_any_number_of_threads() {
     let scan = dense(9_000, 5.0);
     for setting in settings(10.0) {
-        let (said, report) = setting.whole(&scan);
+        let (by_voxel, report) = setting.whole(&scan);
         for (threads, bytes) in [(1, 1 << 20), (3, 1 << 20), (3, 16 << 20)] {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             let mut tracer = ScanTracer::with_memory_bytes(bytes);
             for _ in 0..2 {
                 let parts = pool.install(|| setting.in_parts(&mut tracer, &scan, bytes / 2)).unwrap();
                 assert_eq!(parts.1, report, "{:?} {threads} {bytes}", setting.order);
-                assert!(parts.0 == said, "{:?} {threads} {bytes}", setting.order);
+                assert!(parts.0 == by_voxel, "{:?} {threads} {bytes}", setting.order);
             }
         }
     }
 }
 
 #[test]
-fn scans_beside_each_other_say_what_each_says_by_itself_and_those_too_large_are_left() {
+fn concurrent_scans_give_the_same_updates_and_large_ones_are_rejected() {
     let scans = [dense(2_000, 3.0), dense(50, 3.0), dense(2_000, 12.0), dense(2, 1.0), dense(400, 4.0)];
     let beside: Vec<&dyn ScanPoints> = scans.iter().map(|scan| scan as _).collect();
     for setting in settings(10.0) {
@@ -170,39 +170,42 @@ fn scans_beside_each_other_say_what_each_says_by_itself_and_those_too_large_are_
             let mut tracer = bytes.map_or(ScanTracer::default(), ScanTracer::with_memory_bytes);
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             for _ in 0..2 {
-                let traced = pool.install(|| tracer.trace_beside(rules, &beside));
+                let traced = pool.install(|| tracer.trace_concurrently(rules, &beside));
                 for (number, (alone, updates)) in alone.iter().zip(traced).enumerate() {
                     let fits = bytes.is_none() || (limited && (number != 2 || bytes > Some(16 << 20)));
                     let updates = updates.unwrap();
                     assert_eq!(updates.is_some(), fits, "{threads} {bytes:?} {number}");
                     let Some(updates) = updates else { continue };
-                    let mut said = Said::new();
-                    updates.tiles.iter().for_each(|(tile, updates)| add(&mut said, grid, *tile, updates));
-                    assert!((&said, &updates.report) == (&alone.0, &alone.1), "{threads} {bytes:?} {number}");
+                    let mut by_voxel = UpdatesByVoxel::new();
+                    updates.tiles.iter().for_each(|(tile, updates)| add(&mut by_voxel, grid, *tile, updates));
+                    assert!(
+                        (&by_voxel, &updates.report) == (&alone.0, &alone.1),
+                        "{threads} {bytes:?} {number}"
+                    );
                 }
             }
-            // No collector is lost, and none is made twice.
+            // No collector is lost or created twice.
             assert!(tracer.collectors() <= threads.max(scans.len()));
         }
     }
 }
 
 #[test]
-fn long_rays_keep_to_their_memory() {
+fn long_rays_respect_the_memory_limit() {
     let scan = dense(80, 500.0);
     for setting in settings(25.6) {
         let bytes = 2 << 20;
         let mut tracer = ScanTracer::with_memory_bytes(bytes);
-        let (said, report, times) = setting.in_parts(&mut tracer, &scan, bytes / 16).unwrap();
+        let (by_voxel, report, times) = setting.in_parts(&mut tracer, &scan, bytes / 16).unwrap();
         assert!(times > 0);
-        // The memory kept from scan to scan; page numbers and marked prefixes are 1 MiB and some.
+        // The memory kept between scans; page numbers and marked prefixes take slightly more than 1 MiB.
         assert!(tracer.bytes() < bytes + (2 << 20), "{}", tracer.bytes());
-        assert!((said, report) == setting.whole(&scan));
+        assert!((by_voxel, report) == setting.whole(&scan));
     }
 }
 
 #[test]
-fn a_file_that_cannot_be_had_is_an_error_that_names_the_folder() {
+fn a_failed_scratch_file_is_an_error_with_the_folder() {
     let scan = dense(100, 200.0);
     for setting in settings(10.0) {
         let Setting { grid, model, rays, order, .. } = &setting;
@@ -217,20 +220,21 @@ fn a_file_that_cannot_be_had_is_an_error_that_names_the_folder() {
     }
 }
 
-/// What a whole scan says about a selection of tiles, which counts the updates anew.
-fn restricted(whole: &(Said, ScanReport), tiles: &TileSelection) -> (Said, ScanReport) {
-    let (said, mut report) = whole.clone();
-    let said: Said = said.into_iter().filter(|((tile, ..), _)| tiles.contains(*tile)).collect();
-    let updates = || said.values().flatten();
-    report.hits = updates().filter(|said| said.is_some()).count() as u64;
-    report.misses = updates().filter(|said| said.is_none()).count() as u64;
-    let mut touched: Vec<TileIndex> = said.keys().map(|(tile, ..)| *tile).collect();
+/// Restricts the updates of a whole scan to selected tiles, and counts them again.
+fn restricted(whole: &(UpdatesByVoxel, ScanReport), tiles: &TileSelection) -> (UpdatesByVoxel, ScanReport) {
+    let (by_voxel, mut report) = whole.clone();
+    let by_voxel: UpdatesByVoxel =
+        by_voxel.into_iter().filter(|((tile, ..), _)| tiles.contains(*tile)).collect();
+    let updates = || by_voxel.values().flatten();
+    report.hits = updates().filter(|by_voxel| by_voxel.is_some()).count() as u64;
+    report.misses = updates().filter(|by_voxel| by_voxel.is_none()).count() as u64;
+    let mut touched: Vec<TileIndex> = by_voxel.keys().map(|(tile, ..)| *tile).collect();
     touched.dedup();
     report.tiles_touched = touched.len() as u64;
-    (said, report)
+    (by_voxel, report)
 }
 
-/// Boxes and sets of tiles near to and far from the origin, and none at all.
+/// Boxes and sets of tiles close to and far from the origin, and an empty selection.
 fn selections(center: TileIndex, sparse: u32) -> Vec<TileSelection> {
     let at = |x, y, z| {
         let [a, b, c] = center.to_array();
@@ -254,9 +258,9 @@ fn selections(center: TileIndex, sparse: u32) -> Vec<TileSelection> {
 }
 
 #[test]
-fn dense_rays_say_of_some_tiles_what_they_say_of_them_as_a_whole() {
+fn selected_tiles_of_dense_rays_equal_those_of_the_whole_scan() {
     let mut scan = dense(9_000, 5.0);
-    // Rays that end far outside the pages around the sensor.
+    // Rays that end far outside the window around the sensor.
     scan.points[100] = [900.0, 20.0, -7.0];
     scan.points[4_500] = [-3.0, 1000.0, 800.0];
     for mut setting in settings(1.6) {
@@ -266,8 +270,8 @@ fn dense_rays_say_of_some_tiles_what_they_say_of_them_as_a_whole() {
             setting.tiles = Some(tiles);
             assert!(setting.whole(&scan) == wanted, "{:?} {:?}", setting.rays, setting.tiles);
             let mut tracer = ScanTracer::with_memory_bytes(1 << 20);
-            let (said, report, _) = setting.in_parts(&mut tracer, &scan, 1 << 19).unwrap();
-            assert!((said, report) == wanted, "{:?} {:?}", setting.rays, setting.tiles);
+            let (by_voxel, report, _) = setting.in_parts(&mut tracer, &scan, 1 << 19).unwrap();
+            assert!((by_voxel, report) == wanted, "{:?} {:?}", setting.rays, setting.tiles);
         }
     }
 }
@@ -276,7 +280,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(12))]
 
     #[test]
-    fn some_tiles_of_random_scans_are_as_after_the_whole_scan(
+    fn selected_tiles_of_random_scans_equal_those_of_the_whole_scan(
         origin in prop::array::uniform3(-50.0..50.0_f64),
         is_on_border in prop::array::uniform3(prop::bool::ANY),
         far in prop::sample::select(vec![0.0, 0.0, 1.0e6]),
@@ -308,14 +312,14 @@ proptest! {
                 setting.tiles = Some(tiles);
                 prop_assert!(setting.whole(&scan) == wanted, "{:?}", setting.tiles);
                 let mut tracer = ScanTracer::with_memory_bytes(1 << 16);
-                let (said, report, _) = setting.in_parts(&mut tracer, &scan, 1 << 12).unwrap();
-                prop_assert!((said, report) == wanted, "{:?}", setting.tiles);
+                let (by_voxel, report, _) = setting.in_parts(&mut tracer, &scan, 1 << 12).unwrap();
+                prop_assert!((by_voxel, report) == wanted, "{:?}", setting.tiles);
             }
         }
     }
 
     #[test]
-    fn little_memory_makes_the_same_updates(
+    fn little_memory_gives_the_same_updates(
         origin in prop::array::uniform3(-50.0..50.0_f64),
         ends in prop::collection::vec((prop::array::uniform3(-60.0..60.0_f64), 0.0..255_f32), 1..40),
         stray in any::<bool>(),
@@ -330,12 +334,12 @@ proptest! {
         let intensities = Some(ends.iter().map(|(_, intensity)| *intensity).collect());
         let scan = Scan { origin, points, intensities };
         for setting in settings(tile_size_m) {
-            let (said, report) = setting.whole(&scan);
+            let (by_voxel, report) = setting.whole(&scan);
             let mut tracer = ScanTracer::with_memory_bytes(1 << 16);
             for _ in 0..2 {
                 let parts = setting.in_parts(&mut tracer, &scan, max_bytes).unwrap();
                 prop_assert_eq!(parts.1, report);
-                prop_assert!(parts.0 == said);
+                prop_assert!(parts.0 == by_voxel);
             }
         }
     }

@@ -1,10 +1,10 @@
 use super::Pose;
 use crate::space::Point;
 
-/// A scan: where the sensor was and what it hit, in the world frame.
+/// Scan with owned points in the world frame.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Scan {
-    /// Position of the sensor in metres, world frame: every ray starts here.
+    /// Position of the sensor in metres, world frame: the origin of all rays.
     pub origin: Point,
     /// End points in metres, world frame. A point equal to the origin means "no return" and is skipped.
     pub points: Vec<Point>,
@@ -13,10 +13,11 @@ pub struct Scan {
 }
 
 impl Scan {
-    /// A scan from points in the sensor frame and the pose that maps them to the world: `world = R * p + t`.
+    /// Creates a scan from points in the sensor frame and the pose that transforms them to the world frame: `world = R
+    /// * p + t`.
     ///
-    /// The exact sensor-frame point (0, 0, 0), which drivers use for "no return", becomes the origin itself and
-    /// is skipped on insertion.
+    /// The exact sensor-frame point (0, 0, 0), which drivers use for "no return", becomes the origin and is skipped on
+    /// insertion.
     pub fn from_sensor_frame(
         points_in_sensor: &[Point],
         intensities: Option<Vec<f32>>,
@@ -27,7 +28,7 @@ impl Scan {
         Self { origin: world_from_sensor.position_m(), points, intensities }
     }
 
-    /// The same scan moved by a vector in metres.
+    /// Returns the scan translated by a vector in metres.
     pub fn translated(mut self, by_m: Point) -> Self {
         let shift = |p: &mut Point| (0..3).for_each(|k| p[k] += by_m[k]);
         shift(&mut self.origin);

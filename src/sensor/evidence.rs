@@ -1,6 +1,6 @@
-/// The evidence of one observed voxel: the exact log-odds and the number of updates.
+/// Evidence of one observed voxel: the exact log-odds and the number of updates.
 ///
-/// An unobserved voxel has no `Evidence`: it is *unknown*, which is not log-odds 0.
+/// An unobserved voxel has no `Evidence`: it is *unknown*, which differs from log-odds 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Evidence {
     /// Logarithm of the odds that the voxel is occupied.
@@ -10,7 +10,7 @@ pub struct Evidence {
 }
 
 impl Evidence {
-    /// The state before the first update.
+    /// State before the first update.
     pub(crate) const PRIOR: Self = Self { log_odds: 0.0, observation_count: 0 };
 
     /// Probability that the voxel is occupied, in [0, 1].
@@ -18,7 +18,7 @@ impl Evidence {
         crate::maths::sigmoid(self.log_odds)
     }
 
-    /// The evidence after one more update that led to `log_odds`.
+    /// Returns the evidence after one more update that resulted in `log_odds`.
     pub(crate) fn updated_to(self, log_odds: f64) -> Self {
         Self { log_odds, observation_count: self.observation_count.saturating_add(1) }
     }

@@ -4,8 +4,8 @@ use crate::maths::sigmoid;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// Intensity-weighted log-odds: a strong echo counts more than a weak one, and a new voxel learns faster than an old
-/// one. For sonar, radar and lidar intensity.
+/// Intensity-weighted log-odds: a strong echo has more weight than a weak one, and a new voxel learns faster than an
+/// old one. For sonar, radar and lidar intensity.
 ///
 /// With `n` the count before the update and `P = sigmoid(L)`:
 ///
@@ -16,7 +16,7 @@ use std::fmt;
 /// hit:  dL = occupied * w * alpha * s,  s = P / P_th * r_max                 if adaptive and P < P_th
 /// miss: dL = free * alpha * s,          s = r_max + (1 - r_max) * (1 - (P - (1 - P_th)) / P_th)
 ///                                                                            if adaptive and P > 1 - P_th
-/// L = clamp(L + dL, min, max);          s = 1 where no condition holds
+/// L = clamp(L + dL, min, max);          s = 1 if no condition holds
 /// ```
 ///
 /// A point with `w = 0` is not evidence: its voxel gets neither a hit nor a miss from it.
@@ -29,9 +29,9 @@ pub struct Iwlo {
     pub free: f64,
     /// Steepness of the weight over the intensity; at 0.1 the intensity has almost no effect.
     pub sharpness: f64,
-    /// How fast a voxel's updates lose weight with their number, per update.
+    /// Rate at which a voxel's updates lose weight with their number, per update.
     pub decay_rate: f64,
-    /// Least weight of an update by age, in [0, 1].
+    /// Minimum weight of an update by age, in [0, 1].
     pub min_alpha: f64,
     /// Lower clamp in log-odds.
     pub min: f64,
@@ -41,11 +41,11 @@ pub struct Iwlo {
     pub intensity_threshold: f64,
     /// Intensity of full weight, in the sensor's own unit.
     pub intensity_max: f64,
-    /// Whether updates that contradict the present estimate are damped.
+    /// Whether updates that contradict the current estimate are damped.
     pub adaptive: bool,
     /// Probability below which hits (and, mirrored, above which misses) are damped, in (0, 1].
     pub adaptive_probability: f64,
-    /// Largest share of a damped update, `r_max`.
+    /// Largest factor of a damped update, `r_max`.
     pub adaptive_ratio: f64,
 }
 
@@ -88,11 +88,11 @@ impl fmt::Display for Iwlo {
 }
 
 impl Iwlo {
-    /// The model, if its parameters are valid.
+    /// Returns the model, if its parameters are valid.
     ///
     /// # Errors
     ///
-    /// [`InvalidArgument`](crate::Error::InvalidArgument) with the first parameter that is not.
+    /// Fails with [`InvalidArgument`](crate::Error::InvalidArgument) and the first invalid parameter.
     pub fn validated(self) -> Result<Self> {
         let Self { occupied, free, sharpness, decay_rate, min_alpha, min, max, .. } = self;
         let numbers = [
@@ -135,7 +135,7 @@ impl Iwlo {
         Ok(self)
     }
 
-    /// Weight of an intensity in [0, 1]; 0 is not evidence.
+    /// Returns the weight of an intensity in [0, 1]; 0 is not evidence.
     #[inline]
     pub fn weight(&self, intensity: f32) -> f64 {
         let intensity = f64::from(intensity);
@@ -211,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn a_first_hit_has_full_weight_and_a_first_miss_too_at_even_odds() {
+    fn first_hits_and_misses_have_full_weight_at_even_odds() {
         // P = P_th = 0.5 is not below the threshold, and not above 1 - P_th.
         let model = Iwlo::default();
         let weight = model.weight(255.0);
@@ -220,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn intensity_decides_the_weight() {
+    fn intensity_determines_the_weight() {
         let model = Iwlo::default();
         assert_eq!(model.weight(35.0), 0.0);
         assert_eq!(model.weight(-5.0), 0.0);
@@ -230,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn parameters_that_divide_by_zero_are_refused() {
+    fn parameters_that_divide_by_zero_are_rejected() {
         for model in [
             Iwlo { intensity_max: 35.0, ..Iwlo::default() },
             Iwlo { adaptive_probability: 0.0, ..Iwlo::default() },

@@ -4,16 +4,16 @@ use crate::maths::logit;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// OctoMap's model: a constant is added for a hit, another for a miss, and the sum is clamped.
+/// OctoMap's model: a hit adds a constant, a miss adds another one, and the sum is clamped.
 ///
-/// Source: Hornung et al., "OctoMap: an efficient probabilistic 3D mapping framework based on octrees",
-/// Autonomous Robots 2013, equations 3 and 4.
+/// Source: Hornung et al., "OctoMap: an efficient probabilistic 3D mapping framework based on octrees", Autonomous
+/// Robots 2013, equations 3 and 4.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LogOdds {
-    /// Added for a hit, in log-odds, positive.
+    /// Log-odds added for a hit, positive.
     pub hit: f64,
-    /// Added for a miss, in log-odds, negative.
+    /// Log-odds added for a miss, negative.
     pub miss: f64,
     /// Lower clamp in log-odds.
     pub min: f64,
@@ -22,7 +22,7 @@ pub struct LogOdds {
 }
 
 impl Default for LogOdds {
-    /// Hit 0.7, miss 0.4, clamps 0.1192 and 0.971 as probabilities: OctoMap's defaults, as `f64` bits.
+    /// OctoMap's defaults as `f64` bits: the probabilities 0.7 (hit), 0.4 (miss), and the clamps 0.1192 and 0.971.
     fn default() -> Self {
         Self {
             hit: f64::from_bits(0x3feb_1d10_670a_ae98),
@@ -41,20 +41,21 @@ impl fmt::Display for LogOdds {
 }
 
 impl LogOdds {
-    /// A model from probabilities, each in (0, 1).
+    /// Creates a model from probabilities, each in (0, 1).
     ///
     /// # Errors
     ///
-    /// [`InvalidArgument`](crate::Error::InvalidArgument) for other numbers, and as for [`LogOdds::validated`].
+    /// Fails with [`InvalidArgument`](crate::Error::InvalidArgument) for other numbers. Otherwise same errors as
+    /// [`LogOdds::validated`].
     pub fn from_probabilities(hit: f64, miss: f64, min: f64, max: f64) -> Result<Self> {
         Self { hit: logit(hit), miss: logit(miss), min: logit(min), max: logit(max) }.validated()
     }
 
-    /// The model, if its parameters are valid.
+    /// Returns the model, if its parameters are valid.
     ///
     /// # Errors
     ///
-    /// [`InvalidArgument`](crate::Error::InvalidArgument) with what is wrong.
+    /// Fails with [`InvalidArgument`](crate::Error::InvalidArgument) and the reason.
     pub fn validated(self) -> Result<Self> {
         let finite = [self.hit, self.miss, self.min, self.max].iter().all(|value| value.is_finite());
         if !(finite && self.hit > 0.0 && self.miss < 0.0 && self.min < self.max) {
@@ -110,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn a_model_that_makes_no_sense_is_refused() {
+    fn invalid_parameters_are_rejected() {
         assert!(LogOdds::from_probabilities(0.4, 0.7, 0.1, 0.9).is_err());
         assert!(LogOdds::from_probabilities(0.7, 0.4, 0.9, 0.1).is_err());
         assert!(LogOdds::from_probabilities(f64::NAN, 0.4, 0.1, 0.9).is_err());

@@ -1,4 +1,4 @@
-//! Sensor models: how one observation changes the evidence of a voxel. Knows no space.
+//! Sensor models: the change of a voxel's evidence by one observation, independent of space.
 //!
 //! | model | for | hit | miss |
 //! |---|---|---|---|

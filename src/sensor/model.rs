@@ -3,7 +3,8 @@ use crate::error::Result;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// How observations become evidence; chosen when a map is created and stored in its `metadata.json`.
+/// Sensor model, which turns observations into evidence. It is chosen when a map is created, and stored in its
+/// `metadata.json`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "name", rename_all = "kebab-case")]
 #[non_exhaustive]
@@ -14,7 +15,7 @@ pub enum SensorModel {
     Iwlo(Iwlo),
 }
 
-/// The observation of one voxel by one ray.
+/// Observation of one voxel by one ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Observation {
     /// The ray ended in the voxel, with the intensity of its echo (ignored by models that need none).
@@ -39,11 +40,11 @@ impl fmt::Display for SensorModel {
 }
 
 impl SensorModel {
-    /// The model, if its parameters are valid.
+    /// Returns the model, if its parameters are valid.
     ///
     /// # Errors
     ///
-    /// As for [`LogOdds::validated`] and [`Iwlo::validated`].
+    /// Same errors as [`LogOdds::validated`] and [`Iwlo::validated`].
     pub fn validated(self) -> Result<Self> {
         Ok(match self {
             Self::LogOdds(model) => Self::LogOdds(model.validated()?),
@@ -51,7 +52,7 @@ impl SensorModel {
         })
     }
 
-    /// Least and most log-odds that a voxel can have.
+    /// Smallest and largest log-odds that a voxel can have.
     pub const fn limits(&self) -> [f64; 2] {
         match self {
             Self::LogOdds(model) => [model.min, model.max],
@@ -59,7 +60,7 @@ impl SensorModel {
         }
     }
 
-    /// The model's name in commands and metadata.
+    /// Name of the model in commands and metadata.
     pub const fn name(&self) -> &'static str {
         match self {
             Self::LogOdds(_) => "log-odds",
@@ -67,12 +68,12 @@ impl SensorModel {
         }
     }
 
-    /// Whether hits need an intensity.
+    /// Returns whether hits need an intensity.
     pub const fn needs_intensity(&self) -> bool {
         matches!(self, Self::Iwlo(_))
     }
 
-    /// Whether an observation is evidence; with [`Iwlo`] an echo of weight 0 is not.
+    /// Returns whether an observation is evidence; with [`Iwlo`] an echo of weight 0 is not.
     #[inline]
     pub fn is_evidence(&self, observation: Observation) -> bool {
         match (self, observation) {
@@ -81,9 +82,9 @@ impl SensorModel {
         }
     }
 
-    /// The evidence after an observation; `before` is `None` for an unobserved voxel.
+    /// Returns the evidence after an observation; `before` is `None` for an unobserved voxel.
     ///
-    /// The observation must be evidence by [`SensorModel::is_evidence`].
+    /// The observation must be evidence according to [`SensorModel::is_evidence`].
     #[inline]
     pub fn update(&self, before: Option<Evidence>, observation: Observation) -> Evidence {
         let before = before.unwrap_or(Evidence::PRIOR);
@@ -95,8 +96,9 @@ impl SensorModel {
         }
     }
 
-    /// No miss leads to larger log-odds, unless they were larger before: a first one, or the clamp.
-    pub(crate) fn most_after_miss(&self) -> f64 {
+    /// Largest log-odds that a miss can lead to, unless they were larger before: those of a first miss, or the lower
+    /// clamp.
+    pub(crate) fn max_after_miss(&self) -> f64 {
         let min = match self {
             Self::LogOdds(model) => model.min,
             Self::Iwlo(model) => model.min,
@@ -104,7 +106,7 @@ impl SensorModel {
         self.update(None, Observation::Miss).log_odds.max(min)
     }
 
-    /// The evidence after so many misses in a row, bit-identical to single updates.
+    /// Returns the evidence after a number of consecutive misses, bit-identical to single updates.
     pub fn update_misses(&self, before: Evidence, misses: u16) -> Evidence {
         let min = match self {
             Self::LogOdds(model) => model.min,
@@ -146,7 +148,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn many_misses_are_as_many_single_ones(
+        fn combined_misses_equal_single_ones(
             model in any_model(),
             log_odds in -12.0..12.0_f64,
             observation_count in prop_oneof![0..50_i32, i32::MAX - 50..=i32::MAX],

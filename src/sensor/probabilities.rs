@@ -1,17 +1,17 @@
 use crate::maths::sigmoid;
 
-/// Makes [`Evidence::probability`](super::Evidence::probability) of many voxels: few log-odds are common, and a
-/// probability takes as long to compute as its voxel to find. So the last ones are kept.
+/// Computes [`Evidence::probability`](super::Evidence::probability) for many voxels with a cache. A few log-odds are
+/// common, and computing a probability takes as long as finding its voxel.
 #[derive(Clone, Debug)]
 pub struct Probabilities {
-    /// By a hash of the log-odds, with their bits.
+    /// Log-odds bits and probability, indexed by a hash of the log-odds.
     kept: Vec<(u64, f64)>,
 }
 
 const KEPT_BITS: u32 = 8;
 
 impl Probabilities {
-    /// The probability of log-odds.
+    /// Returns the probability of log-odds.
     #[inline]
     pub fn of(&mut self, log_odds: f64) -> f64 {
         let bits = log_odds.to_bits();
@@ -26,7 +26,7 @@ impl Probabilities {
 
 impl Default for Probabilities {
     fn default() -> Self {
-        // No place is empty.
+        // All entries are valid.
         Self { kept: vec![(f64::NAN.to_bits(), sigmoid(f64::NAN)); 1 << KEPT_BITS] }
     }
 }
@@ -36,9 +36,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_kept_is_what_is_computed() {
+    fn cached_values_equal_computed_ones() {
         let mut probabilities = Probabilities::default();
-        // More than are kept, each several times.
+        // More values than fit in the cache, each several times.
         for number in 0..20_000_u32 {
             let log_odds = f64::from(number * 7919 % 1009) * 0.01 - 5.0;
             assert_eq!(probabilities.of(log_odds), sigmoid(log_odds));

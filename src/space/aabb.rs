@@ -2,7 +2,7 @@ use super::{Point, VoxelIndex};
 use serde::Serialize;
 use std::fmt;
 
-/// An axis-aligned box in metres, half-open: `min <= p < max` along every axis.
+/// Axis-aligned box in metres, half-open: `min <= p < max` along each axis.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Aabb {
     /// Lower corner in metres, included.
@@ -18,12 +18,12 @@ impl fmt::Display for Aabb {
 }
 
 impl Aabb {
-    /// The box between two corners in any order.
+    /// Creates the box between two corners in any order.
     pub fn from_corners(a: Point, b: Point) -> Self {
         Self { min: std::array::from_fn(|k| a[k].min(b[k])), max: std::array::from_fn(|k| a[k].max(b[k])) }
     }
 
-    /// Whether the box holds the point.
+    /// Returns whether the box contains the point.
     pub fn contains(&self, point: Point) -> bool {
         (0..3).all(|k| self.min[k] <= point[k] && point[k] < self.max[k])
     }
@@ -39,7 +39,7 @@ impl Aabb {
     }
 }
 
-/// A box of whole voxels, half-open: `min <= index < end` along every axis.
+/// Box of whole voxels, half-open: `min <= index < end` along each axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct VoxelBox {
     /// Lowest voxel.
@@ -49,18 +49,18 @@ pub struct VoxelBox {
 }
 
 impl VoxelBox {
-    /// Whether the box holds the voxel.
+    /// Returns whether the box contains the voxel.
     #[inline]
     pub fn contains(&self, voxel: VoxelIndex) -> bool {
         (0..3).all(|k| self.min[k] <= voxel[k] && voxel[k] < self.end[k])
     }
 
-    /// Whether no voxel is inside.
+    /// Returns whether the box contains no voxel.
     pub fn is_empty(&self) -> bool {
         (0..3).any(|k| self.min[k] >= self.end[k])
     }
 
-    /// The voxels that are in both boxes.
+    /// Returns the voxels that are in both boxes.
     pub fn intersection(&self, other: &Self) -> Self {
         Self {
             min: std::array::from_fn(|k| self.min[k].max(other.min[k])),

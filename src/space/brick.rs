@@ -6,47 +6,46 @@ pub const BRICK_EDGE: i32 = 8;
 /// Voxels in a brick.
 pub const BRICK_VOXELS: usize = 512;
 
-/// A brick: 8 x 8 x 8 voxels aligned to the octree, addressed by the upper 39 bits of their Morton code.
+/// Brick of 8 x 8 x 8 voxels aligned to the octree, addressed by the upper 39 bits of their Morton code.
 ///
 /// Bricks are aligned to keys, not to tiles: a brick on the border of two tiles exists in both, each with its own
 /// voxels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct BrickCode(pub u64);
 
-/// A set of voxels of one brick: bit `b % 64` of word `b / 64` for the voxel at place `b` of the brick's Morton
-/// order.
+/// Set of voxels of one brick: bit `b % 64` of word `b / 64` for the voxel at position `b` of the brick's Morton order.
 pub type BrickMask = [u64; 8];
 
 impl BrickCode {
     /// One more than the largest code.
     pub const END: u64 = MortonCode::END >> 9;
 
-    /// The brick that holds a voxel.
+    /// The brick that contains a voxel.
     pub const fn of_voxel(voxel: VoxelIndex) -> Self {
         VoxelKey::from_index(voxel).morton().brick()
     }
 
-    /// The voxel at a place (0 to 511) of the brick's Morton order.
+    /// The voxel at a position (0 to 511) of the brick's Morton order.
     pub const fn voxel(self, place: usize) -> MortonCode {
         MortonCode(self.0 << 9 | place as u64)
     }
 }
 
 impl MortonCode {
-    /// The brick that holds this voxel.
+    /// The brick that contains this voxel.
     #[inline]
     pub const fn brick(self) -> BrickCode {
         BrickCode(self.0 >> 9)
     }
 
-    /// This voxel's place (0 to 511) in its brick's Morton order.
+    /// The voxel's position (0 to 511) in its brick's Morton order.
     #[inline]
     pub const fn place_in_brick(self) -> usize {
         (self.0 & 511) as usize
     }
 }
 
-/// A voxel's place (0 to 511) in its brick's Morton order.
+/// A voxel's position (0 to 511) in its brick's Morton order.
 #[inline]
 pub const fn place_of_voxel(voxel: VoxelIndex) -> usize {
     const SPREAD: [u16; 8] = [0, 1, 8, 9, 64, 65, 72, 73];
@@ -55,19 +54,19 @@ pub const fn place_of_voxel(voxel: VoxelIndex) -> usize {
     (SPREAD[(x & 7) as usize] | SPREAD[(y & 7) as usize] << 1 | SPREAD[(z & 7) as usize] << 2) as usize
 }
 
-/// Whether a set has the voxel at a place (0 to 511).
+/// Returns whether a set contains the voxel at a position (0 to 511).
 #[inline]
 pub const fn is_in_mask(mask: &BrickMask, place: usize) -> bool {
     mask[place / 64] >> (place % 64) & 1 == 1
 }
 
-/// Adds the voxel at a place (0 to 511) to a set.
+/// Adds the voxel at a position (0 to 511) to a set.
 #[inline]
 pub const fn add_to_mask(mask: &mut BrickMask, place: usize) {
     mask[place / 64] |= 1 << (place % 64);
 }
 
-/// The places of the bits that are set, lowest first.
+/// The positions of the set bits, in ascending order.
 #[inline]
 pub fn ones(mut mask: u64) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {
@@ -77,7 +76,7 @@ pub fn ones(mut mask: u64) -> impl Iterator<Item = usize> {
     })
 }
 
-/// The places of a brick whose voxel satisfies `min <= local < end` along every axis, each in 0..=8.
+/// Mask of a brick's voxels that satisfy `min <= local < end` along each axis, each in 0..=8.
 pub fn mask_of_box(min: [i32; 3], end: [i32; 3]) -> BrickMask {
     let below = |axis: usize, k: i32| &BELOW[axis][k.clamp(0, BRICK_EDGE) as usize];
     let mut mask = [u64::MAX; 8];
@@ -88,14 +87,14 @@ pub fn mask_of_box(min: [i32; 3], end: [i32; 3]) -> BrickMask {
     mask
 }
 
-/// For each axis and `k` from 0 to 8, the places whose voxel's index along the axis is below `k`.
+/// For each axis and `k` from 0 to 8, the mask of the voxels whose index along the axis is below `k`.
 static BELOW: [[BrickMask; 9]; 3] = below_masks();
 
 const fn below_masks() -> [[BrickMask; 9]; 3] {
     let mut masks = [[[0; 8]; 9]; 3];
     let mut code = 0;
     while code < BRICK_VOXELS {
-        // Not a place: the order of the voxels does not matter here.
+        // `code` only enumerates the voxels; it is not a Morton position.
         let voxel = [code as i32 & 7, code as i32 >> 3 & 7, code as i32 >> 6];
         let place = place_of_voxel(voxel);
         let mut axis = 0;
@@ -112,7 +111,7 @@ const fn below_masks() -> [[BrickMask; 9]; 3] {
     masks
 }
 
-/// The places of a mask, ascending.
+/// The positions in a mask, in ascending order.
 pub fn places(mask: BrickMask) -> impl Iterator<Item = usize> {
     mask.into_iter().enumerate().flat_map(|(word, mut bits)| {
         std::iter::from_fn(move || {
@@ -128,7 +127,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn brick_and_place_make_the_morton_code() {
+    fn brick_and_position_form_the_morton_code() {
         for voxel in [[0, 0, 0], [-1, -8, 7], [12345, -23456, 32767], [-32768, 63, 64]] {
             let code = VoxelKey::from_index(voxel).morton();
             assert_eq!(code.place_in_brick(), place_of_voxel(voxel));
@@ -137,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn masks_hold_what_was_put_in() {
+    fn masks_contain_the_added_voxels() {
         assert_eq!(mask_of_box([0; 3], [8; 3]), [u64::MAX; 8]);
         assert_eq!(mask_of_box([3; 3], [3; 3]), [0; 8]);
         let voxels = places(mask_of_box([2, -5, 6], [5, 1, 9])).collect::<Vec<_>>();

@@ -2,16 +2,16 @@ use super::{Aabb, Point, TileBox, TileIndex, VoxelBox, VoxelIndex};
 use std::fmt;
 use thiserror::Error;
 
-/// Most voxels along the edge of a tile.
+/// Maximum number of voxels along the edge of a tile.
 pub const MAX_VOXELS_PER_TILE_EDGE: u32 = 1024;
 
-/// The largest index of a voxel along an axis. The next one is only the end of half-open boxes.
+/// Largest index of a voxel along an axis. The next value is only used as the end of half-open boxes.
 pub const LAST_VOXEL_INDEX: i32 = i32::MAX - 1;
 
-/// The grid: voxels of `resolution_m`, tiles of `tile_size_m`.
+/// Grid with voxels of `resolution_m` and tiles of `tile_size_m`.
 ///
-/// The voxel of a coordinate `x` is `floor(x * (1 / resolution))`, OctoMap's arithmetic: a multiple of the resolution
-/// may fall into the lower neighbour, as in OctoMap.
+/// The voxel of a coordinate `x` is `floor(x * (1 / resolution))`, as computed by OctoMap: a multiple of the resolution
+/// may be in the lower neighbour, as in OctoMap.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grid {
     resolution_m: f64,
@@ -22,7 +22,7 @@ pub struct Grid {
     tiles_per_voxel: i64,
 }
 
-/// Why two lengths are not a valid grid.
+/// Reason why two lengths are not a valid grid.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum GridError {
@@ -38,11 +38,11 @@ pub enum GridError {
          voxels from 2 to 1024: the nearest valid tile sizes are {smaller_m} m and {larger_m} m"
     )]
     NotWhole {
-        /// The refused tile size in metres.
+        /// The rejected tile size in metres.
         tile_size_m: f64,
         /// The resolution in metres.
         resolution_m: f64,
-        /// Tile size over resolution.
+        /// Tile size divided by resolution.
         ratio: f64,
         /// Nearest valid tile size below, in metres (or the smallest valid one).
         smaller_m: f64,
@@ -58,11 +58,11 @@ impl fmt::Display for Grid {
 }
 
 impl Grid {
-    /// A grid of voxels of `resolution_m` and tiles of `tile_size_m`, both in metres.
+    /// Creates a grid with voxels of `resolution_m` and tiles of `tile_size_m`, both in metres.
     ///
     /// # Errors
     ///
-    /// Lengths that are none, and a tile that is not 2 to 1024 whole voxels.
+    /// Fails if a length is not positive and finite, or a tile is not 2 to 1024 whole voxels.
     pub fn new(resolution_m: f64, tile_size_m: f64) -> Result<Self, GridError> {
         if !(resolution_m.is_normal() && resolution_m > 0.0 && (1.0 / resolution_m).is_finite()) {
             return Err(GridError::Resolution(resolution_m));
@@ -107,13 +107,13 @@ impl Grid {
         self.voxels_per_tile_edge
     }
 
-    /// A point in units of voxels: its floor is the voxel index.
+    /// Converts a point to units of voxels: its floor is the voxel index.
     #[inline]
     pub fn to_voxel_units(&self, point_m: Point) -> Point {
         point_m.map(|coordinate| coordinate * self.inv_resolution)
     }
 
-    /// The voxel that holds a point; `None` if the point is not finite or its index exceeds `i32`.
+    /// The voxel that contains a point; `None` if the point is not finite or its index exceeds `i32`.
     #[inline]
     pub fn voxel_of(&self, point_m: Point) -> Option<VoxelIndex> {
         Self::voxel_of_units(self.to_voxel_units(point_m))
@@ -127,11 +127,11 @@ impl Grid {
         point.iter().all(|&x| is_in_range(x)).then(|| point.map(floor))
     }
 
-    /// The tile that holds a voxel.
+    /// The tile that contains a voxel.
     #[inline]
     pub fn tile_of_voxel(&self, voxel: VoxelIndex) -> TileIndex {
-        // The upper half of a product, because integer division is slow. The middle of a voxel is at least 2^-11 tiles
-        // from a tile border, and the quotient is off by less than 2^-32.
+        // Uses the upper half of a product, because integer division is slow. The middle of a voxel is at least 2^-11
+        // tiles from a tile border, and the error of the quotient is below 2^-32.
         let tile_of = |index: i32| {
             let middle = 2 * i64::from(index) + 1; // In half voxels, so the product is in units of 2^-64.
             ((i128::from(middle) * i128::from(self.tiles_per_voxel)) >> 64) as i32
@@ -145,17 +145,17 @@ impl Grid {
         self.voxel_of(point_m).map(|voxel| self.tile_of_voxel(voxel))
     }
 
-    /// Centre of a voxel in metres: `(index + 0.5) * resolution`.
+    /// Center of a voxel in metres: `(index + 0.5) * resolution`.
     pub fn center_m(&self, voxel: VoxelIndex) -> Point {
         voxel.map(|index| (f64::from(index) + 0.5) * self.resolution_m)
     }
 
-    /// The lower border in metres of the voxels with this index along an axis, without rounding noise (0.3 instead of
+    /// Lower border in metres of the voxels with this index along an axis, without rounding noise (0.3 instead of
     /// 0.30000000000000004): for display and storage.
     pub fn corner_m(&self, index: i32) -> f64 {
         let corner_m = f64::from(index) * self.resolution_m;
         let readable_m = readable(corner_m);
-        // For voxels of nanometres digits would be lost.
+        // For voxels of nanometres, rounding would lose digits.
         if (readable_m - corner_m).abs() < 1e-3 * self.resolution_m { readable_m } else { corner_m }
     }
 
@@ -174,7 +174,7 @@ impl Grid {
         VoxelBox { min: region.min.map(first_from), end: region.max.map(first_from) }
     }
 
-    /// The voxels of a tile. The far edge saturates for the last tile of the `i32` range.
+    /// The voxels of a tile. The upper end saturates for the last tile of the `i32` range.
     pub fn voxels_of_tile(&self, tile: TileIndex) -> VoxelBox {
         let n = i64::from(self.voxels_per_tile_edge);
         let min = tile.to_array().map(|index| clamp_to_i32(i64::from(index) * n));
@@ -189,10 +189,10 @@ impl Grid {
     }
 }
 
-/// The floor of a number in the range of `i32`, without instructions that not every processor has.
+/// Floor of a number in the range of `i32`, without instructions that some processors lack.
 #[inline]
 fn floor(number: f64) -> i32 {
-    // Added to a number in this range, this leaves the nearest integer in the lowest bits.
+    // Adding this to a number in this range leaves the nearest integer in the lowest bits.
     const ROUND: f64 = 1.5 * (1_u64 << 52) as f64;
     let rounded = number + ROUND;
     let nearest = rounded.to_bits() as i32;
@@ -214,7 +214,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_floor_is_the_floor() {
+    fn floor_equals_the_library_function() {
         let whole = [-2_147_483_648.0, -7.0, -1.0, 0.0, 1.0, 6.0, 2_147_483_646.0];
         for number in whole.into_iter().flat_map(|x: f64| [x, x.next_up(), x + 0.25, x + 0.5, x + 0.75]) {
             assert_eq!(floor(number), number.floor() as i32, "{number}");
@@ -226,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn the_seeds_examples() {
+    fn example_points_have_known_voxels() {
         let grid = Grid::new(0.1, 10.0).unwrap();
         assert_eq!(grid.voxels_per_tile_edge(), 100);
         assert_eq!(grid.tile_of([5.0, 15.0, -3.0]), Some(TileIndex::new(0, 1, -1)));
@@ -235,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_point_of_the_grid_has_no_voxel() {
+    fn points_outside_the_grid_have_no_voxel() {
         let grid = Grid::new(0.1, 10.0).unwrap();
         for x in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e9, -1e9] {
             assert_eq!(grid.voxel_of([0.0, x, 0.0]), None, "{x}");
@@ -244,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tile_size_that_is_not_whole_names_its_neighbours() {
+    fn an_invalid_tile_size_suggests_valid_ones() {
         let message = Grid::new(0.3, 10.0).unwrap_err().to_string();
         assert!(message.contains("9.9 m and 10.2 m"), "{message}");
         let message = Grid::new(0.005, 10.0).unwrap_err().to_string();
@@ -259,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn tiles_are_those_of_integer_division() {
+    fn tiles_equal_integer_division() {
         for n in 2..=1024 {
             let grid = Grid::new(1.0, f64::from(n)).unwrap();
             let borders = (-5..5).flat_map(|tile| [n * tile - 1, n * tile, n * tile + 1]);
@@ -272,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn the_voxels_in_a_box_are_those_whose_center_is() {
+    fn voxels_in_a_box_are_selected_by_center() {
         let grid = Grid::new(0.1, 0.7).unwrap();
         let bounds =
             [f64::NEG_INFINITY, -3e8, -2.95, -1.0, -0.05, 0.0, 0.049, 0.05, 0.75, 2.0, 3e8, f64::INFINITY];
@@ -295,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn every_voxel_of_a_tile_is_in_that_tile() {
+    fn voxels_of_a_tile_belong_to_it() {
         let grid = Grid::new(0.1, 0.7).unwrap();
         for x in -30..30 {
             let tile = grid.tile_of_voxel([x, 0, 0]);

@@ -1,9 +1,9 @@
 use super::{MortonCode, VoxelIndex};
 
-/// The 16-bit key of a voxel along each axis, as OctoMap stores it: `(index + 32768) mod 65536`.
+/// 16-bit key of a voxel along each axis, as OctoMap stores it: `(index + 32768) mod 65536`.
 ///
-/// Inside OctoMap's range (indices -32768 to 32767) this *is* OctoMap's key. Beyond it the key repeats every 65536
-/// voxels; the voxel's tile resolves the ambiguity.
+/// Inside OctoMap's range (indices -32768 to 32767) this is exactly OctoMap's key. Beyond it the key repeats every
+/// 65536 voxels; the voxel's tile resolves the ambiguity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct VoxelKey(pub [u16; 3]);
 
@@ -16,7 +16,7 @@ impl VoxelKey {
 
     /// The voxel with this key among the 65536 voxels from `min` on along each axis.
     ///
-    /// With `min` the lowest voxel of a tile this is the voxel of that tile.
+    /// If `min` is the lowest voxel of a tile, this is the voxel of that tile.
     pub const fn to_index_from(self, min: VoxelIndex) -> VoxelIndex {
         let mut index = min;
         let mut axis = 0;
@@ -28,7 +28,7 @@ impl VoxelKey {
         index
     }
 
-    /// The key's Morton code.
+    /// Morton code of the key.
     #[inline]
     pub const fn morton(self) -> MortonCode {
         MortonCode::from_key(self)
@@ -51,7 +51,7 @@ mod tests {
     }
 
     #[test]
-    fn a_key_comes_back_to_its_index_from_any_tile_that_holds_it() {
+    fn keys_convert_back_to_indices_within_any_tile() {
         for min in [-2_000_000_000, -32_800, -1, 0, 32_700, 63_781_370, 2_000_000_000] {
             for offset in [0, 1, 99, 1023] {
                 let index = [min + offset, min, min + offset / 2];

@@ -1,12 +1,12 @@
-//! Metres to integers and back; this happens nowhere else.
+//! Conversions between metres and integer indices; all of them are in this module.
 //!
 //! ```text
 //! point (f64 metres) -> voxel index (i32) -> tile index (i32)      grid
 //!                                         -> key (u16) -> Morton   key, morton
 //! ```
 //!
-//! A point belongs to a voxel by arithmetic on its coordinates; a voxel belongs to a tile by integer division of its
-//! index. So every voxel belongs to exactly one tile.
+//! The voxel of a point is computed from its coordinates, the tile of a voxel by integer division of its index.
+//! Therefore each voxel belongs to exactly one tile.
 
 mod aabb;
 mod brick;
@@ -41,8 +41,8 @@ pub(crate) use tile_table::take_u32;
 pub use tile_table::{TileTable, TileValue, put_number, take_number};
 pub use torus::Torus;
 
-/// Index of a finest voxel along x, y and z: `floor(coordinate / resolution)`.
+/// Index of a voxel along x, y and z: `floor(coordinate / resolution)`.
 pub type VoxelIndex = [i32; 3];
 
-/// A point in metres, in the world frame unless a name says otherwise.
+/// Point in metres, in the world frame unless a name states another one.
 pub type Point = [f64; 3];

@@ -2,8 +2,8 @@ use super::VoxelKey;
 
 /// 48-bit Morton code of a voxel key: bit `3k` from x, `3k + 1` from y, `3k + 2` from z (OctoMap's child order).
 ///
-/// Files, voxel caches and octree updates all use this order. The lowest 9 bits address a voxel inside its
-/// brick of 8 x 8 x 8, the bits above them the brick.
+/// Files, voxel caches and octree updates use this order. The lowest 9 bits address a voxel in its brick of 8 x 8 x 8,
+/// the bits above them the brick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct MortonCode(pub u64);
 
@@ -22,7 +22,7 @@ impl MortonCode {
         VoxelKey([gather(self.0), gather(self.0 >> 1), gather(self.0 >> 2)])
     }
 
-    /// Which child (0 to 7) of its ancestor at `depth` (0, the root, to 15) leads to this voxel.
+    /// Index (0 to 7) of the child of its ancestor at `depth` (0, the root, to 15) that contains this voxel.
     pub const fn child_at(self, depth: u8) -> usize {
         ((self.0 >> (45 - 3 * depth as u32)) & 7) as usize
     }
@@ -32,7 +32,7 @@ impl MortonCode {
         Self(self.0 & !(Self::span(depth) - 1))
     }
 
-    /// Number of finest voxels under a node at `depth` (0 to 16).
+    /// Number of voxels under a node at `depth` (0 to 16).
     pub const fn span(depth: u8) -> u64 {
         1 << (3 * (16 - depth as u32))
     }
@@ -68,7 +68,7 @@ mod tests {
     }
 
     #[test]
-    fn every_bit_of_every_axis_goes_to_its_place_and_back() {
+    fn each_bit_of_each_axis_round_trips() {
         for axis in 0..3 {
             for bit in 0..16 {
                 let mut key = [0; 3];
@@ -84,7 +84,7 @@ mod tests {
 
     #[test]
     fn children_are_octomaps_children() {
-        // OctoMap: bit 15 - depth of x counts 1, of y 2, of z 4.
+        // In OctoMap, bit 15 - depth of x has the weight 1, of y 2, of z 4.
         let code = MortonCode::from_key(VoxelKey([0x8000, 0x4001, 0x8001]));
         assert_eq!((code.child_at(0), code.child_at(1), code.child_at(15)), (5, 2, 6));
         assert_eq!(code.ancestor(16), code);

@@ -1,7 +1,7 @@
 use super::{Aabb, Grid, TileIndex};
 use serde::{Deserialize, Serialize};
 
-/// The tiles from one corner to another, both included.
+/// Box of tiles between two corners, both included.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "Corners")]
 pub struct TileBox {
@@ -9,7 +9,7 @@ pub struct TileBox {
     max: [i32; 3],
 }
 
-/// The corners as they are written.
+/// Serialized form of the corners.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Corners {
@@ -28,19 +28,19 @@ impl TryFrom<Corners> for TileBox {
     }
 }
 
-/// Most tiles that lie ahead of a box; a scan that spans more is no vehicle's.
+/// Maximum number of tiles ahead of a box; no vehicle has scans that span more.
 const MAX_AHEAD: usize = 4096;
 
 impl TileBox {
-    /// The box from one corner to another, both included; `min` is not above `max` along any axis.
+    /// Creates the box from one corner to another, both included; `min` must not exceed `max` along any axis.
     pub fn new(min: TileIndex, max: TileIndex) -> Self {
         Self { min: min.to_array(), max: max.to_array() }
     }
 
-    /// The tiles whose center is in a box; `None` if there are none. So boxes that partition space make boxes of tiles
-    /// that do. Bounds of the box may be infinite.
+    /// The tiles whose center is in a box; `None` if there are none. Thus boxes that partition space yield boxes of
+    /// tiles that do. Bounds of the box may be infinite.
     pub fn with_centers_in(region: &Aabb, grid: &Grid) -> Option<Self> {
-        // Saturates: no voxel is in the last tiles of the range.
+        // Saturates, because no voxel is in the last tiles of the range.
         let first_from = |bound_m: f64| (bound_m / grid.tile_size_m() - 0.5).ceil() as i32;
         let (min, end) = (region.min.map(first_from), region.max.map(first_from));
         let is_empty = (0..3).any(|k| min[k] >= end[k]);
@@ -52,12 +52,12 @@ impl TileBox {
         tiles.map(|tile| Self::new(tile, tile)).reduce(Self::union)
     }
 
-    /// Its lowest tile.
+    /// Lowest tile.
     pub fn min(self) -> TileIndex {
         self.min.into()
     }
 
-    /// Its highest tile.
+    /// Highest tile.
     pub fn max(self) -> TileIndex {
         self.max.into()
     }
@@ -70,7 +70,7 @@ impl TileBox {
         }
     }
 
-    /// The tiles that both have; `None` if there are none.
+    /// The tiles that are in both; `None` if there are none.
     pub fn intersection(self, other: Self) -> Option<Self> {
         let (min, max): ([i32; 3], [i32; 3]) = (
             std::array::from_fn(|k| self.min[k].max(other.min[k])),
@@ -79,26 +79,27 @@ impl TileBox {
         (0..3).all(|k| min[k] <= max[k]).then_some(Self { min, max })
     }
 
-    /// Whether the box has a tile.
+    /// Returns whether the box contains a tile.
     pub fn contains(self, tile: TileIndex) -> bool {
         let tile = tile.to_array();
         (0..3).all(|k| self.min[k] <= tile[k] && tile[k] <= self.max[k])
     }
 
-    /// Number of tiles; `u64::MAX` if there are more.
+    /// Number of tiles; saturates at `u64::MAX`.
     pub fn count(self) -> u64 {
         let edge = |k: usize| u64::from(self.max[k].abs_diff(self.min[k])) + 1;
         edge(0).saturating_mul(edge(1)).saturating_mul(edge(2))
     }
 
-    /// Its tiles, in order.
+    /// The tiles, in order.
     pub fn tiles(self) -> impl Iterator<Item = TileIndex> {
         let Self { min, max } = self;
         let of_column = move |x, y| (min[2]..=max[2]).map(move |z| TileIndex::new(x, y, z));
         (min[0]..=max[0]).flat_map(move |x| (min[1]..=max[1]).flat_map(move |y| of_column(x, y)))
     }
 
-    /// The tiles that this box would gain by going one tile further in the direction in which it came from `before`.
+    /// The tiles that this box would gain if it moved by one more tile in its direction of travel, where `before` is
+    /// the previous box.
     pub fn ahead(self, before: &Self) -> Vec<TileIndex> {
         let doubled_center = |tiles: &Self, k: usize| i64::from(tiles.min[k]) + i64::from(tiles.max[k]);
         let mut ahead = Vec::new();
@@ -122,7 +123,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_lies_ahead_is_one_tile_further_in_the_direction_of_travel() {
+    fn tiles_ahead_are_one_tile_further_in_the_direction_of_travel() {
         let tiles = |min, max| TileBox { min, max };
         let before = tiles([0, 0, 0], [2, 1, 0]);
         assert_eq!(before.ahead(&before), []);
@@ -130,13 +131,13 @@ mod tests {
         assert_eq!(east.ahead(&before), [TileIndex::new(4, 0, 0), TileIndex::new(4, 1, 0)]);
         let down = tiles([0, 0, -1], [2, 0, 0]);
         let below: Vec<_> = (0..3).map(|x| TileIndex::new(x, 0, -2)).collect();
-        // Down, and south as well: the center moved by half a tile.
+        // Down, and also south: the center moved by half a tile.
         let south = (0..3).flat_map(|x| [-1, 0].map(|z| TileIndex::new(x, -1, z)));
         assert_eq!(down.ahead(&before), south.chain(below).collect::<Vec<_>>());
     }
 
     #[test]
-    fn boxes_that_partition_space_make_boxes_of_tiles_that_do() {
+    fn boxes_that_partition_space_give_tile_boxes_that_partition_it() {
         let grid = Grid::new(0.1, 10.0).unwrap();
         let of = |from: f64, to: f64| {
             let region = Aabb { min: [from, -15.0, f64::NEG_INFINITY], max: [to, 5.0, f64::INFINITY] };
@@ -154,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn the_end_of_the_world_and_the_widest_scan_are_no_trouble() {
+    fn index_limits_and_the_widest_scan_are_handled() {
         let far = TileBox { min: [i32::MAX - 1; 3], max: [i32::MAX; 3] };
         let near = TileBox { min: [0; 3], max: [1; 3] };
         assert_eq!(far.ahead(&near), []);
@@ -163,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn boxes_unite_intersect_and_list_their_tiles_in_order() {
+    fn boxes_unite_intersect_and_list_tiles_in_order() {
         let tiles = |min: [i32; 3], max: [i32; 3]| TileBox::new(min.into(), max.into());
         let (a, b) = (tiles([-1, 0, 0], [1, 2, 0]), tiles([1, 1, -3], [4, 1, 5]));
         assert_eq!(a.union(b), tiles([-1, 0, -3], [4, 2, 5]));

@@ -12,12 +12,12 @@ pub struct TileIndex {
 }
 
 impl TileIndex {
-    /// The tile at `(x, y, z)`.
+    /// Creates the index `(x, y, z)`.
     pub const fn new(x: i32, y: i32, z: i32) -> Self {
         Self { x, y, z }
     }
 
-    /// The index as an array.
+    /// The index as an array `[x, y, z]`.
     pub const fn to_array(self) -> [i32; 3] {
         [self.x, self.y, self.z]
     }

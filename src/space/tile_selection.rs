@@ -1,7 +1,7 @@
 use super::{TileBox, TileIndex};
 use rustc_hash::FxHashSet;
 
-/// Tiles that an insertion is about; all others are left as they are.
+/// Selection of tiles that an insertion may change; all others remain unchanged.
 ///
 /// ```
 /// use voxtile::{TileBox, TileIndex, TileSelection};
@@ -13,7 +13,7 @@ use rustc_hash::FxHashSet;
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TileSelection {
-    /// A box around the tiles; `None` if there are none.
+    /// Box around the tiles; `None` if there are none.
     bounds: Option<TileBox>,
     /// The tiles; `None` for all of the box.
     tiles: Option<FxHashSet<TileIndex>>,
@@ -25,19 +25,19 @@ impl TileSelection {
         self.bounds
     }
 
-    /// Whether it is all of its box.
+    /// Returns whether all tiles of the box are selected.
     pub fn is_box(&self) -> bool {
         self.tiles.is_none()
     }
 
-    /// Whether a tile is selected.
+    /// Returns whether a tile is selected.
     #[inline]
     pub fn contains(&self, tile: TileIndex) -> bool {
         self.bounds.is_some_and(|bounds| bounds.contains(tile))
             && self.tiles.as_ref().is_none_or(|tiles| tiles.contains(&tile))
     }
 
-    /// The tiles that are in a box as well.
+    /// Returns the selected tiles that are also in a box.
     #[must_use]
     pub fn within(&self, region: TileBox) -> Self {
         match &self.tiles {
@@ -68,7 +68,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_selection_has_what_was_selected_and_nothing_else() {
+    fn a_selection_contains_exactly_the_selected_tiles() {
         let region = TileBox::new([0, -1, 2].into(), [1, 0, 2].into());
         let listed: TileSelection = region.tiles().collect();
         let of_box = TileSelection::from(region);

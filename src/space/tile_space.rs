@@ -1,32 +1,32 @@
 use super::{TileBox, TileIndex};
 use rustc_hash::FxHashSet;
 
-/// Where the tiles of a map are, in little memory: a box around all of them, and aligned cubes of 16, 256, .. tiles
-/// along an edge that may hold one. A ray passes a cube without tiles in one step, so its cost depends on the number of
+/// Compact index of the space with tiles: a box around all tiles of a map, and aligned cubes of 16, 256, .. tiles along
+/// an edge that may contain one. A ray passes a cube without tiles in one step, so its cost depends on the number of
 /// tiles near it, not on the distance between them.
 ///
-/// Tiles are added and never removed. A level of too many cubes is given up: fine levels of a large map, which takes
-/// 200 kB then, and coarse ones where tens of thousands of tiles lie more than 40 km apart (10 MB).
+/// Tiles are added and never removed. A level with too many cubes is disabled: fine levels of a large map, which then
+/// takes 200 kB, and coarse ones if tens of thousands of tiles are more than 40 km apart (10 MB).
 #[derive(Clone, Debug, Default)]
 pub struct TileSpace {
     bounds: Option<TileBox>,
-    /// From fine to coarse. A cube that may hold a tile lies in one of the next level that may, too.
+    /// From fine to coarse. A cube that may contain a tile is in one of the next level that may, too.
     levels: [Level; SHIFTS.len()],
 }
 
 /// Edges of the cubes of each level, in tiles, as powers of two.
 const SHIFTS: [u32; 7] = [4, 8, 12, 16, 20, 24, 28];
 
-/// Upper bound on the cubes of a level. Maps of one region have few cubes in the coarse levels, so that these may be
-/// many where tiles are scattered: to give one up would cost each ray thousands of steps.
+/// Maximum number of cubes per level. Coarse levels have a higher maximum: maps of one region have few such cubes, and
+/// disabling the level for scattered tiles would cost each ray thousands of steps.
 const MAX_CUBES: [usize; SHIFTS.len()] = [1 << 11, 1 << 11, 1 << 16, 1 << 16, 1 << 16, 1 << 16, 1 << 16];
 
 #[derive(Clone, Debug, Default)]
 struct Level {
-    /// The cubes that may hold a tile.
+    /// Cubes that may contain a tile.
     cubes: FxHashSet<[i32; 3]>,
-    /// Whether there were too many: then every cube may hold one.
-    is_given_up: bool,
+    /// Whether the level was disabled; then each cube may contain a tile.
+    is_disabled: bool,
 }
 
 impl TileSpace {
@@ -35,15 +35,15 @@ impl TileSpace {
         let own = TileBox::new(tile, tile);
         self.bounds = Some(self.bounds.map_or(own, |bounds| bounds.union(own)));
         for ((level, shift), max_cubes) in self.levels.iter_mut().zip(SHIFTS).zip(MAX_CUBES) {
-            if level.is_given_up {
+            if level.is_disabled {
                 continue;
             }
             if !level.cubes.insert(cube_of(tile, shift)) {
-                // Coarser levels have its cubes as well.
+                // Coarser levels already contain its cubes.
                 return;
             }
             if level.cubes.len() > max_cubes {
-                *level = Level { cubes: FxHashSet::default(), is_given_up: true };
+                *level = Level { cubes: FxHashSet::default(), is_disabled: true };
             }
         }
     }
@@ -53,11 +53,11 @@ impl TileSpace {
         self.bounds
     }
 
-    /// A large box around a tile that holds no tile; `None` if none is known.
+    /// Returns a large box around a tile that contains no tile; `None` if none is known.
     pub fn empty_around(&self, tile: TileIndex) -> Option<TileBox> {
         self.levels.iter().zip(SHIFTS).rev().find_map(|(level, shift)| {
             let cube = cube_of(tile, shift);
-            let is_empty = !level.is_given_up && !level.cubes.contains(&cube);
+            let is_empty = !level.is_disabled && !level.cubes.contains(&cube);
             let first = cube.map(|k| k << shift);
             is_empty.then(|| TileBox::new(first.into(), first.map(|k| k + ((1 << shift) - 1)).into()))
         })
@@ -87,7 +87,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Tiles near each other, and anywhere.
+    /// Tiles close to each other, and anywhere.
     fn any_tile() -> impl Strategy<Value = TileIndex> {
         let ends = prop_oneof![Just(i32::MIN), Just(i32::MAX), any::<i32>()];
         prop::array::uniform3(prop_oneof![4 => -40..40_i32, 1 => -100_000..100_000_i32, 1 => ends])
@@ -98,11 +98,11 @@ mod tests {
         #[test]
         fn no_tile_is_in_an_empty_box(
             tiles in prop::collection::vec(any_tile(), 0..40),
-            asked in prop::collection::vec(any_tile(), 1..40),
+            queried in prop::collection::vec(any_tile(), 1..40),
         ) {
             let space: TileSpace = tiles.iter().copied().collect();
             prop_assert_eq!(space.bounds(), TileBox::of(tiles.iter().copied()));
-            for tile in asked {
+            for tile in queried {
                 let Some(empty) = space.empty_around(tile) else {
                     let cube = cube_of(tile, SHIFTS[0]);
                     prop_assert!(tiles.iter().any(|&tile| cube_of(tile, SHIFTS[0]) == cube));
@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn a_level_of_too_many_cubes_is_given_up_and_coarser_ones_remain() {
+    fn a_level_with_too_many_cubes_is_disabled() {
         let mut space: TileSpace =
             (0..3000).map(|k| TileIndex::new(16 * (k % 60), 16 * (k / 60), 0)).collect();
         space.insert(TileIndex::new(1 << 30, 0, 0));

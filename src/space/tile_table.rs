@@ -4,16 +4,17 @@ use rustc_hash::FxHashMap;
 use std::fmt;
 use std::iter::Peekable;
 
-/// A sorted map from tiles to values in little memory: all but recent changes are packed, some twenty bytes for a
+/// Sorted map from tiles to values in little memory: all but recent changes are packed, in about twenty bytes for a
 /// tile's file checksums and five for its index alone.
 ///
 /// ```text
-/// recent  hash map: tile -> value, or that the tile was taken out of the blocks
-/// blocks  sorted: first tile, bytes of up to 64 tiles: differences of indices and of values, as variable-length integers
+/// recent  hash map: tile -> value, or a mark that the tile was removed from the blocks
+/// blocks  sorted: first tile, bytes of up to 64 tiles: differences of indices and of values, as variable-length
+/// integers
 /// ```
 ///
-/// Once a sixteenth of the tiles is recent, these are merged into their blocks. So a change costs the packing of some
-/// sixteen tiles, and a look-up the unpacking of at most 64.
+/// Once a sixteenth of the tiles is recent, these are merged into their blocks. A change therefore costs the packing of
+/// about sixteen tiles, and a look-up the unpacking of at most 64.
 #[derive(Clone)]
 pub struct TileTable<V> {
     recent: FxHashMap<TileIndex, Option<V>>,
@@ -22,7 +23,7 @@ pub struct TileTable<V> {
     tiles: usize,
 }
 
-/// A value of a [`TileTable`].
+/// Value of a [`TileTable`].
 pub trait TileValue: Copy + Default {
     /// Appends the value as a difference from the previous one.
     fn pack(self, before: Self, out: &mut Vec<u8>);
@@ -36,13 +37,13 @@ struct Block {
     bytes: Box<[u8]>,
 }
 
-/// Most tiles of a block.
+/// Maximum number of tiles in a block.
 const BLOCK_TILES: usize = 64;
-/// So many recent tiles are always allowed.
+/// Number of recent tiles that is always allowed.
 const MIN_RECENT: usize = 1024;
-/// Most recent tiles, as a part of all.
+/// Divisor for the maximum share of recent tiles.
 const RECENT_PART: usize = 16;
-/// What the allocator adds to each block.
+/// Overhead of the allocator per block.
 const ALLOCATION_BYTES: usize = 16;
 
 impl<V: TileValue> TileTable<V> {
@@ -51,7 +52,7 @@ impl<V: TileValue> TileTable<V> {
         self.tiles
     }
 
-    /// Whether there are none.
+    /// Returns whether the table is empty.
     pub fn is_empty(&self) -> bool {
         self.tiles == 0
     }
@@ -71,7 +72,7 @@ impl<V: TileValue> TileTable<V> {
         }
     }
 
-    /// Whether the table has a tile.
+    /// Returns whether the table contains a tile.
     pub fn contains(&self, tile: TileIndex) -> bool {
         self.get(tile).is_some()
     }
@@ -83,13 +84,13 @@ impl<V: TileValue> TileTable<V> {
         self.pack_if_due();
     }
 
-    /// Removes a tile; returns whether it was there.
+    /// Removes a tile; returns whether it existed.
     pub fn remove(&mut self, tile: TileIndex) -> bool {
         if !self.contains(tile) {
             return false;
         }
         if self.tiles == 1 {
-            *self = Self::default(); // Its memory, too.
+            *self = Self::default(); // Also frees its memory.
             return true;
         }
         self.tiles -= 1;
@@ -132,7 +133,7 @@ impl<V: TileValue> TileTable<V> {
         }
     }
 
-    /// Merges recent tiles into their blocks; other blocks stay as they are.
+    /// Merges recent tiles into their blocks; other blocks are unchanged.
     fn pack(&mut self) {
         let mut recent: Vec<_> = std::mem::take(&mut self.recent).into_iter().collect();
         recent.sort_unstable_by_key(|&(tile, _)| tile);
@@ -193,14 +194,14 @@ impl Block {
     }
 }
 
-/// Appends a number as a varint; small negative numbers are short too.
+/// Appends a number as a varint; small negative numbers are also short.
 pub fn put_number(number: impl VarInt, out: &mut Vec<u8>) {
     let mut bytes = [0; 10];
     let length = number.encode_var(&mut bytes);
     out.extend_from_slice(&bytes[..length]);
 }
 
-/// Reads a number from the front. Packed bytes never leave memory, so it is always there.
+/// Reads a number from the front. Packed bytes never leave memory, so it always exists.
 pub fn take_number<N: VarInt + Default>(input: &mut &[u8]) -> N {
     let (number, length) = N::decode_var(input).unwrap_or_default();
     *input = input.get(length..).unwrap_or_default();
@@ -215,7 +216,7 @@ pub fn take_u32(input: &mut &[u8]) -> u32 {
     u32::from_le_bytes(number)
 }
 
-/// Merges two sorted sequences of tiles; recent values win.
+/// Merges two sorted sequences of tiles; recent values override packed ones.
 struct Merged<P: Iterator, R: Iterator> {
     packed: Peekable<P>,
     recent: Peekable<R>,
@@ -299,7 +300,7 @@ mod tests {
         }
     }
 
-    /// Tiles near each other and at the ends of space.
+    /// Tiles close to each other and at the limits of the index range.
     fn index() -> impl Strategy<Value = TileIndex> {
         let axis = prop_oneof![40 => -8..8_i32, 1 => Just(i32::MIN), 1 => Just(i32::MAX), 1 => any::<i32>()];
         prop::array::uniform3(axis).prop_map(TileIndex::from)
@@ -308,7 +309,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(40))]
         #[test]
-        fn it_is_a_map_whatever_comes_and_goes(
+        fn it_equals_a_map_after_any_changes(
             changes in prop::collection::vec((index(), prop::option::weighted(0.7, any::<u64>())), 0..6000),
         ) {
             let (mut table, mut naive) = (TileTable::default(), BTreeMap::new());
@@ -333,7 +334,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tile_takes_some_thirty_bytes_and_its_index_ten() {
+    fn a_tile_takes_less_than_40_bytes_and_its_index_less_than_10() {
         let tiles = || (0..100_000).map(|k| TileIndex::new(k / 2500, k / 10 % 250, k % 10));
         let versions: TileTable<_> =
             (0..).map(version).zip(tiles()).map(|(version, tile)| (tile, version)).collect();

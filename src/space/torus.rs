@@ -2,14 +2,14 @@ use super::hash_table_bytes;
 use rustc_hash::FxHashMap;
 use std::hint::select_unpredictable;
 
-/// A map from cells of an integer grid, such as tiles, to numbers.
+/// Map from cells of an integer grid, such as tiles, to numbers.
 ///
-/// The grid is wrapped around a torus whose sizes are powers of two, just large enough to keep the present cells apart.
+/// The grid is wrapped around a torus whose sizes are powers of two, just large enough to separate the current cells.
 /// Cells that are close together never share a slot, and a look-up is one comparison without an unpredictable branch. A
-/// cell that would need too large a torus goes to a hash map.
+/// cell that would need too large a torus is stored in a hash map.
 #[derive(Clone, Debug)]
 pub struct Torus {
-    /// Along each axis the size less one, and where its bits begin in a slot's number.
+    /// Along each axis, the size minus one, and the position of its bits in the index of a slot.
     masks: [u32; 3],
     shifts: [u32; 3],
     slots: Vec<Slot>,
@@ -28,10 +28,10 @@ struct Slot {
 }
 
 impl Torus {
-    /// The number of an absent cell; numbers start at 1.
+    /// Number of an absent cell; numbers start at 1.
     pub const NONE: u32 = 0;
 
-    /// Slots that a torus may have for any number of cells, and per cell.
+    /// Maximum number of slots: for any number of cells, and per cell.
     const MIN_SLOTS: usize = 64;
     const MAX_SLOTS_A_CELL: usize = 16;
 
@@ -40,7 +40,7 @@ impl Torus {
         self.len
     }
 
-    /// Whether there is no cell.
+    /// Returns whether there is no cell.
     pub fn is_empty(&self) -> bool {
         self.len == 0
     }
@@ -61,7 +61,7 @@ impl Torus {
         select_unpredictable(differ == 0, slot.number, Self::NONE)
     }
 
-    /// Apart, so that the rest is small enough to be inlined.
+    /// Separate, so that the caller is small enough to be inlined.
     #[cold]
     #[inline(never)]
     fn get_far(&self, cell: Cell) -> u32 {
@@ -94,8 +94,8 @@ impl Torus {
         is_free
     }
 
-    /// How to separate two cells that share a slot: the axis, and the number of bits to add. `None` if that takes too
-    /// many slots.
+    /// Returns how to separate two cells that share a slot: the axis, and the number of bits to add. `None` if that
+    /// takes too many slots.
     fn bits_to_part(&self, a: Cell, b: Cell) -> Option<(usize, u32)> {
         let bits_along = |axis: usize| {
             let differ = (a[axis] ^ b[axis]) as u32;
@@ -104,16 +104,16 @@ impl Torus {
         };
         let (axis, bits) = (0..3).filter_map(bits_along).min_by_key(|&(_, bits)| bits)?;
         let most = (Self::MAX_SLOTS_A_CELL * self.len).max(Self::MIN_SLOTS);
-        // In 128 bits nothing is lost: at most 32 bits are added.
+        // In 128 bits no bit is lost: at most 32 bits are added.
         ((self.slots.len() as u128) << bits <= most as u128).then_some((axis, bits))
     }
 
-    /// Enlarges the torus along an axis, and moves cells in from the hash map that now fit.
+    /// Enlarges the torus along an axis, and moves cells from the hash map that now fit.
     fn enlarge(&mut self, axis: usize, bits: u32) {
         self.masks[axis] = ((self.masks[axis] + 1) << bits) - 1;
         self.shifts = shifts(self.masks);
         let slots = vec![EMPTY; self.slots.len() << bits];
-        // Cells that were apart stay apart.
+        // Separated cells remain separated.
         for slot in std::mem::replace(&mut self.slots, slots) {
             if slot.number != Self::NONE {
                 self.put(slot.cell, slot.number);
@@ -162,7 +162,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn it_is_a_map(cells in prop::collection::vec((any_cell(), 1..1000_u32), 0..300)) {
+        fn it_equals_a_hash_map(cells in prop::collection::vec((any_cell(), 1..1000_u32), 0..300)) {
             let mut torus = Torus::default();
             let mut naive = HashMap::new();
             for &(cell, number) in &cells {
@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn cells_that_lie_together_need_no_hash_map() {
+    fn adjacent_cells_need_no_hash_map() {
         let mut torus = Torus::default();
         let cells = (-40..60).flat_map(|x| (10..70).flat_map(move |y| [-1, 0].map(|z| [x, y, z])));
         cells.enumerate().for_each(|(number, cell)| torus.insert(cell, number as u32 + 1));

@@ -1,12 +1,12 @@
 //! A tile: its exact table, its octree, and their files.
 //!
 //! ```text
-//! updates -> table/ (exact, the truth) -> octree/ (coarse queries), or octocache/ (OctoMap's tree, for comparison)
-//!              \-> format/ (the bytes of the tile's files)
+//! updates -> table/ (exact evidence) -> octree/ (coarse queries), or octocache/ (OctoMap's tree, for comparison)
+//!              \-> format/ (content of the tile's files)
 //! ```
 //!
-//! The table answers every query about a finest voxel. The octree is derived from it and answers coarse queries.
-//! Nothing here knows a path.
+//! The table answers all queries at voxel resolution. The octree is derived from it and answers coarse queries. Code in
+//! this module does not access paths.
 
 pub mod format;
 mod octocache;
@@ -17,7 +17,7 @@ mod tile_body;
 pub use octocache::{OctreeQueueCounts, OctreeStatistics, OctreeTimes, VoxelCache, VoxelCacheCounts};
 pub use octree::OctreeFactory;
 pub use table::Table;
-pub(crate) use table::{AskedVoxels, BrickLook};
+pub(crate) use table::{BrickView, VoxelBatch};
 pub use tile_body::{Tile, TileCounts, Voxel};
 
 #[cfg(test)]

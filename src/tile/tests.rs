@@ -1,4 +1,4 @@
-//! The table against a naive map from voxels to evidence; its octree view and its files against those of the pointer
+//! Compares the table with a naive map from voxels to evidence, and its octree view and files with those of the pointer
 //! tree.
 
 use super::octree::BrickOctree;
@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 
 type Naive = BTreeMap<MortonCode, Evidence>;
 
-/// A palette that holds all states, ones that drop states now and then, and ones that are soon too small.
+/// A palette that contains all states, that occasionally drops states, or that is soon too small.
 fn any_palette() -> impl Strategy<Value = Palette> {
     prop_oneof![
         Just(Palette::default()),
@@ -24,7 +24,7 @@ fn any_model() -> impl Strategy<Value = SensorModel> {
     prop_oneof![Just(SensorModel::default()), Just(SensorModel::Iwlo(Iwlo::default()))]
 }
 
-/// Words that are empty, full, sparse or anything.
+/// Words that are empty, full, sparse or arbitrary.
 fn any_mask() -> impl Strategy<Value = BrickMask> {
     let word = prop_oneof![
         4 => Just(0),
@@ -67,7 +67,7 @@ fn assert_is(table: &Table, naive: &Naive) {
 
 proptest! {
     #[test]
-    fn whatever_the_palette_holds_the_evidence_is_that_of_the_model(
+    fn evidence_is_that_of_the_model_with_any_palette(
         palette in any_palette(),
         model in any_model(),
         scans in prop::collection::vec((any::<bool>(), prop::collection::vec(any_update(), 1..24)), 1..4),
@@ -89,7 +89,7 @@ proptest! {
         }
         assert_is(&table, &naive);
 
-        // As a file is read: brick by brick.
+        // Brick by brick, as when reading a file.
         let mut read = Table::with_palette(Palette::limited(4, 64));
         for brick in table.bricks() {
             let voxels: Vec<_> =
@@ -104,7 +104,7 @@ proptest! {
 }
 
 #[test]
-fn a_step_is_forgotten_with_its_sensor_model() {
+fn steps_are_dropped_with_their_sensor_model() {
     let code = MortonCode(77);
     let (octomap, iwlo) = (SensorModel::default(), SensorModel::Iwlo(Iwlo::default()));
     let mut table = Table::default();
@@ -119,16 +119,16 @@ fn a_step_is_forgotten_with_its_sensor_model() {
 }
 
 #[test]
-fn evidence_is_kept_once_and_dropped_when_no_voxel_has_it() {
+fn evidence_is_stored_once_and_dropped_when_unused() {
     let model = SensorModel::default();
     let all =
         BrickUpdate { brick: BrickCode(5), hits: [0; 8], misses: [u64::MAX; 8], intensities: [].into() };
     let mut table = Table::default();
     table.update_brick(&model, &all);
     let bytes = table.bytes();
-    // A palette, a block of the directory, and two bytes per voxel: half of what plain evidence would take.
+    // A palette, a block of the directory, and two bytes per voxel: half the size of plain evidence.
     assert!(bytes < 6 * 512, "{bytes} bytes for 512 voxels");
-    // Each time the whole brick is in a state that no voxel was in before.
+    // Each time, the whole brick enters a state that no voxel had before.
     for _ in 0..100_000 {
         table.update_brick(&model, &all);
     }
@@ -137,7 +137,7 @@ fn evidence_is_kept_once_and_dropped_when_no_voxel_has_it() {
 }
 
 #[test]
-fn more_states_than_a_palette_holds_are_kept_by_the_bricks() {
+fn bricks_store_states_beyond_the_palette_limit() {
     let model = SensorModel::Iwlo(Iwlo::default());
     let (mut table, mut naive) = (Table::default(), Naive::new());
     for round in 0..3 {
@@ -170,7 +170,7 @@ fn any_run() -> impl Strategy<Value = (u64, u64, f64)> {
     (run, value).prop_map(|((first, span), value)| (first, span, value))
 }
 
-/// A table with these runs, later ones over earlier ones, and the tree that it represents.
+/// A table with these runs, where later ones override earlier ones, and the tree that it represents.
 fn table_of(runs: &[(u64, u64, f64)], palette: Palette) -> (Table, Octree) {
     let mut voxels = BTreeMap::new();
     for &(first, span, value) in runs {
@@ -180,7 +180,7 @@ fn table_of(runs: &[(u64, u64, f64)], palette: Palette) -> (Table, Octree) {
     let mut table = Table::with_palette(palette);
     for brick in voxels.chunk_by(|a, b| a.0.brick() == b.0.brick()) {
         let evidence = |&(code, log_odds): &(MortonCode, f64)| {
-            // Equal values of different age are one value to an octree.
+            // Equal log-odds with different observation counts are one value in an octree.
             let observation_count = (code.0 % 3) as i32;
             (code.place_in_brick(), Evidence { log_odds, observation_count })
         };
@@ -189,8 +189,8 @@ fn table_of(runs: &[(u64, u64, f64)], palette: Palette) -> (Table, Octree) {
     (table, Octree::from_sorted(voxels.into_iter().map(|(code, value)| (code, value as f32))))
 }
 
-fn assert_same_answers(octree: &BrickOctree, table: &Table, tree: &Octree, asked: &[u64]) {
-    for &code in asked {
+fn assert_same_answers(octree: &BrickOctree, table: &Table, tree: &Octree, queried: &[u64]) {
+    for &code in queried {
         let code = MortonCode(0x1234_5678_9000 + code);
         for depth in 1..=16 {
             assert_eq!(octree.max_under(table, code, depth), tree.get(code, depth), "{code:?} at {depth}");
@@ -200,18 +200,18 @@ fn assert_same_answers(octree: &BrickOctree, table: &Table, tree: &Octree, asked
 
 proptest! {
     #[test]
-    fn the_bricks_answer_as_the_pointer_tree_and_write_its_bytes(
+    fn bricks_equal_the_pointer_tree_in_answers_and_files(
         palette in any_palette(),
         runs in prop::collection::vec(any_run(), 0..16),
         more in any_update(),
         threshold in prop_oneof![Just(0.0_f32), Just(-2.0), Just(1.0), -3.0..3.0_f32],
-        asked in prop::collection::vec(0..0x4800_u64, 1..20),
+        queried in prop::collection::vec(0..0x4800_u64, 1..20),
     ) {
         let (mut table, tree) = table_of(&runs, palette);
         let mut octree = BrickOctree::default();
-        assert_same_answers(&octree, &table, &tree, &asked);
+        assert_same_answers(&octree, &table, &tree, &queried);
         octree.sync(&mut table);
-        assert_same_answers(&octree, &table, &tree, &asked);
+        assert_same_answers(&octree, &table, &tree, &queried);
         assert_eq!(octree.node_count(), tree.node_count());
 
         let (mut by_bricks, mut by_tree) = (Vec::new(), Vec::new());
@@ -225,9 +225,9 @@ proptest! {
         table.update_brick(&SensorModel::default(), &update);
         octree.note_change();
         let tree = Octree::from_sorted(table.iter().map(|(code, evidence)| (code, evidence.log_odds as f32)));
-        assert_same_answers(&octree, &table, &tree, &asked);
+        assert_same_answers(&octree, &table, &tree, &queried);
         octree.sync(&mut table);
-        assert_same_answers(&octree, &table, &tree, &asked);
+        assert_same_answers(&octree, &table, &tree, &queried);
         assert_eq!(octree.node_count(), tree.node_count());
     }
 }

@@ -9,7 +9,7 @@ use crate::space::{BrickCode, Grid, MortonCode, TileIndex, VoxelBox, VoxelIndex,
 use serde::Serialize;
 use std::ops::AddAssign;
 
-/// One tile of the map: its exact table, and its octree.
+/// Tile of a map: its exact table, and its octree.
 #[derive(Clone, Debug)]
 pub struct Tile {
     index: TileIndex,
@@ -19,12 +19,11 @@ pub struct Tile {
     is_dirty: bool,
 }
 
-/// An observed voxel.
+/// Observed voxel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Voxel {
-    /// Its index along x, y and z.
+    /// Index along x, y and z.
     pub index: VoxelIndex,
-    /// Its evidence.
     pub evidence: Evidence,
 }
 
@@ -32,45 +31,45 @@ pub struct Voxel {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct TileCounts {
-    /// Observed voxels.
+    /// Number of observed voxels.
     pub voxels: u64,
-    /// Nodes of the octrees, as far as these are up to date.
+    /// Number of nodes of the octrees that are up to date.
     pub octree_nodes: u64,
-    /// Bytes of memory in tables.
+    /// Bytes of memory of tables.
     pub table_bytes: u64,
-    /// Bytes of memory in octrees.
+    /// Bytes of memory of octrees.
     pub octree_bytes: u64,
-    /// Bytes of memory in voxel caches and in batches in flight to octrees.
+    /// Bytes of memory of voxel caches and of batches pending for octrees.
     pub voxel_cache_bytes: u64,
-    /// Counts of these tiles' voxel caches.
+    /// Counts of the voxel caches of these tiles.
     pub voxel_cache: VoxelCacheCounts,
 }
 
 impl Tile {
-    /// A tile without observed voxels.
+    /// Creates a tile without observed voxels.
     pub fn empty(grid: &Grid, octrees: &OctreeFactory, index: TileIndex) -> Self {
         Self::from_table(grid, octrees, index, Table::default())
     }
 
-    /// A tile with this table; its octree is derived.
+    /// Creates a tile from a table, and derives its octree.
     pub fn from_table(grid: &Grid, octrees: &OctreeFactory, index: TileIndex, mut table: Table) -> Self {
         let octree = octrees.octree_of(&mut table);
         Self { index, voxels: grid.voxels_of_tile(index), table, octree, is_dirty: false }
     }
 
-    /// A tile for a few queries. Its octree is a view of the bricks, whatever form the map's octrees have, and not
-    /// synced: answers are the same, but coarse ones take longer.
+    /// Creates a tile for a few queries. Its octree is always a view of the bricks, and not synced: answers are the
+    /// same, but coarse queries take longer.
     pub fn uncached(grid: &Grid, index: TileIndex, table: Table) -> Self {
         let octree = TileOctree::Bricks(BrickOctree::default());
         Self { index, voxels: grid.voxels_of_tile(index), table, octree, is_dirty: false }
     }
 
-    /// Which tile this is.
+    /// Index of the tile.
     pub fn index(&self) -> TileIndex {
         self.index
     }
 
-    /// The voxels that belong to the tile.
+    /// Box of the voxels that belong to the tile.
     pub fn voxel_box(&self) -> VoxelBox {
         self.voxels
     }
@@ -80,7 +79,7 @@ impl Tile {
         &self.table
     }
 
-    /// Whether the tile changed since it was last written or made.
+    /// Returns whether the tile has changed since it was last written or created.
     pub fn is_dirty(&self) -> bool {
         self.is_dirty
     }
@@ -107,14 +106,14 @@ impl Tile {
         self.voxels.contains(voxel).then(|| self.evidence_of_own(voxel))?
     }
 
-    /// The evidence of a voxel that belongs to this tile.
+    /// The evidence of a voxel that must belong to this tile.
     #[inline]
     pub fn evidence_of_own(&self, voxel: VoxelIndex) -> Option<Evidence> {
         self.table.get_key(VoxelKey::from_index(voxel))
     }
 
-    /// Largest log-odds, as `f32`, of this tile's voxels under the octree node at `depth` (1 to 16) that holds the
-    /// voxel; `None` if all are unknown. At depth 16, [`Tile::evidence`] gives the value without rounding.
+    /// Largest log-odds, as `f32`, of this tile's voxels under the octree node at `depth` (1 to 16) that contains the
+    /// voxel; `None` if all are unknown. At depth 16, [`Tile::evidence`] returns the value without rounding.
     pub fn max_log_odds_under(&self, voxel: VoxelIndex, depth: u8) -> Option<f32> {
         self.octree.max_under(&self.table, VoxelKey::from_index(voxel).morton(), depth)
     }
@@ -124,8 +123,7 @@ impl Tile {
         self.table.iter().map(|(code, evidence)| Voxel { index: self.index_of(code), evidence })
     }
 
-    /// The observed voxels whose log-odds are at least a threshold, in Morton order: without a look at those of bricks
-    /// of free space.
+    /// The observed voxels whose log-odds are at least a threshold, in Morton order. Bricks of free space are skipped.
     pub fn voxels_from(&self, log_odds: f64) -> impl Iterator<Item = Voxel> {
         let found = self.table.iter_from(log_odds);
         found.map(|(code, evidence)| Voxel { index: self.index_of(code), evidence })
@@ -138,17 +136,17 @@ impl Tile {
             .map(|(code, evidence)| Voxel { index: self.index_of(code), evidence })
     }
 
-    /// The voxel of this tile with the given code.
+    /// Index of the voxel of this tile with the given code.
     pub fn index_of(&self, code: MortonCode) -> VoxelIndex {
         code.to_key().to_index_from(self.voxels.min)
     }
 
-    /// Whether the octree contains all updates.
+    /// Returns whether the octree contains all updates.
     pub fn is_octree_synced(&self) -> bool {
         self.octree.is_synced()
     }
 
-    /// Brings the octree up to date. Answers are the same without; they only take longer.
+    /// Updates the octree. This does not change answers, but speeds them up.
     pub fn sync_octree(&mut self) {
         self.octree.sync(&mut self.table);
     }
@@ -184,7 +182,7 @@ impl Tile {
 }
 
 impl TileCounts {
-    /// Bytes of memory in tables, octrees and voxel caches together.
+    /// Total bytes of memory of tables, octrees and voxel caches.
     pub fn bytes(&self) -> u64 {
         self.table_bytes + self.octree_bytes + self.voxel_cache_bytes
     }

@@ -304,7 +304,7 @@ fn a_pose_is_a_rotation_and_a_position_or_an_error_that_says_why() {
         Pose::from_matrix(&[[by, 0.0, 0.0, 4.0], [0.0, by, 0.0, 5.0], [0.0, 0.0, by, 6.0]]).map(drop)
     };
     let wrong = [
-        (quaternion([0.0; 3], [0.0; 4]).map(drop), "a quaternion of no length"),
+        (quaternion([0.0; 3], [0.0; 4]).map(drop), "a quaternion of length 0"),
         (quaternion([0.0; 3], [1e300, 0.0, 0.0, 1e300]).map(drop), "too long to be a rotation"),
         (quaternion([0.0, f64::NAN, 0.0], [0.0, 0.0, 0.0, 1.0]).map(drop), "NaN in a pose"),
         (quaternion([0.0; 3], [0.0, 0.0, f64::INFINITY, 1.0]).map(drop), "inf in a pose"),

@@ -472,7 +472,7 @@ fn wrong_questions_are_told_what_is_wrong() {
     for unknown in [UnknownAs::Free, UnknownAs::Obstacle] {
         let swapped = Shape::Box(Aabb { min: [0.0, 1.0, 0.0], max: [1.0, 0.5, 1.0] });
         let message = map.collision(&swapped, unknown).unwrap_err().to_string();
-        assert!(message.contains("below its beginning"), "{message}");
+        assert!(message.contains("below the lower one"), "{message}");
     }
 }
 

@@ -99,7 +99,7 @@ fn wrong_pcd_files_are_told_what_is_wrong() {
         ("DATA ascii", "DATA zip", "DATA zip is not ascii, binary or binary_compressed"),
         ("POINTS 3", "POINTS 4", "POINTS 4 is not WIDTH times HEIGHT, 3"),
         ("VIEWPOINT 1 2 3 0 0 0 1", "VIEWPOINT 1 2", "VIEWPOINT needs seven finite numbers"),
-        ("VIEWPOINT 1 2 3 0 0 0 1", "VIEWPOINT 1 2 3 0 0 0 0", "a quaternion of no length"),
+        ("VIEWPOINT 1 2 3 0 0 0 1", "VIEWPOINT 1 2 3 0 0 0 0", "a quaternion of length 0"),
         ("VIEWPOINT 1 2 3 0 0 0 1", "VIEWPOINT 1 2 3 0 1e300 0 0", "a quaternion too long to be a rotation"),
         ("VERSION", "VERSOIN", "line 2: `VERSOIN` is no key"),
     ] {

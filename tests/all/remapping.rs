@@ -103,7 +103,7 @@ fn what_is_no_scan_is_named_and_refused() {
     };
     let (disk, _) = a_map_with_kept_scans();
     clear(at(&disk), &Part::Inside(region(0.0, 1.0)), |_, _| ()).unwrap();
-    assert!(refused(&disk).contains("a change that is no scan: clear"), "{}", refused(&disk));
+    assert!(refused(&disk).contains("a change by another operation: clear"), "{}", refused(&disk));
 
     let (disk, _) = a_map_with_kept_scans();
     let mut mapper = OutOfCoreTileMapper::open(at(&disk), config()).unwrap();
@@ -111,7 +111,7 @@ fn what_is_no_scan_is_named_and_refused() {
     mapper.batch_update(&batch).unwrap();
     mapper.flush().unwrap();
     drop(mapper);
-    assert!(refused(&disk).contains("number 6, which is no scan"), "{}", refused(&disk));
+    assert!(refused(&disk).contains("number 6, which is not a scan"), "{}", refused(&disk));
 
     // Scans from before, and a map without any.
     let disk = FaultyDisk::new(Fault::None);

@@ -158,7 +158,7 @@ fn scans_that_were_changed_meanwhile_are_not_overwritten() {
     clear(&*folder, &Part::Inside(region), |_, _| ()).unwrap();
     let digest = digest_of(&folder);
     let message = message_of(beside.finish());
-    assert!(message.contains("a change that is no scan: clear"), "{message}");
+    assert!(message.contains("a change by another operation: clear"), "{message}");
     assert_eq!(digest_of(&folder), digest);
 }
 

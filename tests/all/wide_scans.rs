@@ -155,7 +155,7 @@ fn a_scan_of_more_tiles_than_memory_can_know_of_is_refused_and_the_map_goes_on()
     let wide = Scan { points: wide.points.iter().map(|point| point.map(|x| 40.0 * x)).collect(), ..wide };
     for scan in near {
         let refused = mapper.insert_scan(&wide).unwrap_err().to_string();
-        assert!(refused.contains("too few for a scan that touches more than"), "{refused}");
+        assert!(refused.contains("too few for a scan that changes more than"), "{refused}");
         assert_eq!(mapper.insert_scan(&scan).unwrap(), expected.insert_scan(&scan).unwrap());
         assert_eq!(mapper.digest().unwrap(), expected.digest().unwrap());
     }

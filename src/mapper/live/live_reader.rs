@@ -6,16 +6,16 @@ use crate::store::TileReader;
 use parking_lot::Mutex;
 use std::sync::Arc;
 
-/// Asks a map in other threads while its mapper inserts scans and flushes: a planner beside a mapper.
+/// Handle for querying a map from other threads while its mapper inserts scans and flushes, for example from a planner.
 ///
-/// Every query sees the map as of one scan, unsaved ones too. It waits for no flush and for no disk but its own reads;
-/// it waits while the mapper changes tiles in memory, which is the shorter part of inserting a scan. Queries that
-/// belong together ask a [`LiveView`].
+/// Each query sees the map as of one scan, including unsaved changes. It does not wait for flushes, and for no disk
+/// access except its own reads. It waits while the mapper changes tiles in memory, which is the shorter part of
+/// inserting a scan. Use a [`LiveView`] for several queries about the same scan.
 ///
-/// Threads of any rayon pool may ask, and so may parallel loops over single queries: while the mapper changes tiles it
-/// uses threads of its own.
+/// Queries may run on any thread, including in parallel loops on a rayon pool: while the mapper changes tiles, it uses
+/// its own thread pool.
 ///
-/// After the mapper is dropped it goes on seeing the last scan, until another writer opens the map.
+/// After the mapper is dropped, the handle still sees the last scan until another writer opens the map.
 ///
 /// ```
 /// use voxtile::{MapOptions, Mapper, Queries, Scan, Shape, UnknownAs};
@@ -38,7 +38,7 @@ use std::sync::Arc;
 #[derive(Clone, Debug)]
 pub struct LiveReader(Arc<Shared>);
 
-/// What readers of a map share.
+/// State shared by the readers of a map.
 #[derive(Debug)]
 pub(super) struct Shared {
     pub(super) config: MapConfig,
@@ -48,7 +48,7 @@ pub(super) struct Shared {
 }
 
 impl LiveReader {
-    /// Readers may take so many bytes of memory for tiles that they make.
+    /// Creates a reader. Readers keep at most `memory_bytes` of tiles that they read from disk.
     pub(in crate::mapper) fn new(
         config: MapConfig,
         contents: Arc<SharedContents>,
@@ -59,12 +59,13 @@ impl LiveReader {
         Self(Arc::new(Shared { config, contents, files, read_tiles }))
     }
 
-    /// How the map is made.
+    /// Configuration of the map.
     pub fn config(&self) -> &MapConfig {
         &self.0.config
     }
 
-    /// The map after its latest scan. [`Queries`](crate::Queries) of the reader itself take a new view each.
+    /// Returns a view of the map after its latest scan. [`Queries`](crate::Queries) called on the reader itself open a
+    /// new view each time.
     pub fn view(&self) -> LiveView {
         LiveView::open(self.0.clone())
     }

@@ -9,12 +9,12 @@ use crate::store::TileVersion;
 use crate::tile::{Table, Tile};
 use std::sync::Arc;
 
-/// The map as it was after one scan, while its mapper goes on.
+/// Map as of one scan, while its mapper continues.
 ///
-/// It waits for no flush and for no disk but its own reads. What changes while it is held is kept for it, in memory
-/// that counts in the mapper's limit. Its queries fail with [`Error::Expired`] when that is more than an eighth of the
-/// limit, or when a tile that had no room in memory was written anew. Hold it as long as one decision takes, not for a
-/// mission.
+/// A view does not wait for flushes, and for no disk access except its own reads. Data that change while a view is open
+/// are kept for it, and count towards the mapper's memory limit. Its queries fail with [`Error::Expired`] if these data
+/// exceed an eighth of the limit, or if a tile that did not fit in memory was rewritten. Hold a view for one decision,
+/// not for a mission.
 #[derive(Debug)]
 pub struct LiveView {
     shared: Arc<Shared>,
@@ -23,7 +23,7 @@ pub struct LiveView {
     bounds: Option<TileBox>,
 }
 
-/// How often a tile is looked for again because it moved while it was being read.
+/// Number of attempts to read a tile that is moved during the read.
 const ATTEMPTS: usize = 8;
 
 impl LiveView {
@@ -47,7 +47,7 @@ impl LiveView {
             match self.shared.tile_of(index, &stored) {
                 Ok(tile) => return Ok(Some(tile)),
                 Err(_) if is_past => return Err(Error::Expired),
-                // Written anew, renamed or removed meanwhile, if it is not damaged.
+                // Rewritten, renamed or removed during the read, or damaged.
                 Err(error) => moved = Some(error),
             }
         }
@@ -62,7 +62,7 @@ impl Drop for LiveView {
 }
 
 impl Shared {
-    /// Makes a tile of its stored form, or finds it among those made before.
+    /// Builds a tile from its stored form, or returns it from the cache.
     fn tile_of(&self, index: TileIndex, stored: &StoredTileState) -> Result<Arc<Tile>> {
         let StoredTileState { base, spilled, updates } = stored;
         let is_base_alone = spilled.bytes == 0 && updates.is_none();
@@ -88,7 +88,7 @@ impl Shared {
         Ok(tile)
     }
 
-    /// Reads a version of a table from wherever it is.
+    /// Reads a version of a table from its current file.
     fn read_version(&self, index: TileIndex, version: TileVersion) -> Result<Table> {
         let [next, current] = self.files.places(index, version);
         let read =
@@ -115,7 +115,7 @@ impl MapView for LiveView {
     }
 
     fn empty_around(&self, index: TileIndex) -> Option<TileBox> {
-        // Later tiles only make it smaller.
+        // Tiles added later can only shrink the box.
         self.shared.contents.lock().space().empty_around(index)
     }
 

@@ -1,12 +1,12 @@
-//! The map beside its mapper: readers in other threads of the process see whole scans while the mapper goes on.
+//! Live queries: readers in other threads of the process see the map as of one scan while the mapper continues.
 //!
 //! ```text
-//! LiveReader   a handle, one for each thread that asks; every query sees the map as of one scan
-//!   LiveView     the map after one scan, for several queries that belong together
-//!     ReadTiles    tiles that readers have made of what is in memory or on disk
+//!   LiveReader   a handle for each querying thread; each query sees the map as of one scan
+//!     LiveView     the map as of one scan, for several queries about it
+//!       ReadTiles    tiles that readers have built from memory or disk
 //! ```
 //!
-//! What a view sees is kept in `paging::views`.
+//! `paging::views` keeps the data that views see.
 
 mod live_reader;
 mod live_view;

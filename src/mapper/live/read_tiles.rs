@@ -4,12 +4,12 @@ use crate::tile::Tile;
 use lru::LruCache;
 use std::sync::Arc;
 
-/// Tiles that readers made of a stored form without updates, in the order of their last use.
+/// Cache of tiles that readers built from a stored form without updates, in the order of their last use.
 #[derive(Debug)]
 pub(super) struct ReadTiles {
     tiles: LruCache<TileIndex, ReadTile>,
     bytes: usize,
-    most_bytes: usize,
+    max_bytes: usize,
 }
 
 #[derive(Debug)]
@@ -20,11 +20,11 @@ struct ReadTile {
 }
 
 impl ReadTiles {
-    pub(super) fn new(most_bytes: usize) -> Self {
-        Self { tiles: LruCache::unbounded(), bytes: 0, most_bytes }
+    pub(super) fn new(max_bytes: usize) -> Self {
+        Self { tiles: LruCache::unbounded(), bytes: 0, max_bytes }
     }
 
-    /// The tile made of this form, if it is here.
+    /// Returns the tile built from this form, if it is cached.
     pub(super) fn get(&mut self, index: TileIndex, base: &Base) -> Option<Arc<Tile>> {
         let read = self.tiles.get(&index).filter(|read| read.made_of.is_same(base))?;
         Some(read.tile.clone())
@@ -32,13 +32,13 @@ impl ReadTiles {
 
     pub(super) fn put(&mut self, made_of: Base, tile: Arc<Tile>) {
         let (index, bytes) = (tile.index(), tile.bytes());
-        if bytes > self.most_bytes {
+        if bytes > self.max_bytes {
             return;
         }
         self.bytes += bytes;
         let replaced = self.tiles.put(index, ReadTile { made_of, tile, bytes });
         self.bytes -= replaced.map_or(0, |replaced| replaced.bytes);
-        while self.bytes > self.most_bytes
+        while self.bytes > self.max_bytes
             && let Some((_, dropped)) = self.tiles.pop_lru()
         {
             self.bytes -= dropped.bytes;

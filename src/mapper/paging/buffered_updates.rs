@@ -6,27 +6,27 @@ use std::cmp::Reverse;
 use std::collections::hash_map::Entry;
 use std::sync::Arc;
 
-/// Updates of tiles that are not resident, in order and packed: the first of a tile's spilled to its file, if memory
-/// was short, the others in memory.
+/// Packed updates of tiles that are not resident, in order. If memory is short, the earliest updates of a tile are
+/// spilled to its file.
 #[derive(Debug, Default)]
 pub(super) struct BufferedUpdates {
     in_memory: FxHashMap<TileIndex, InMemory>,
-    /// Bytes of memory of these.
+    /// Bytes of memory of the updates in `in_memory`.
     bytes: usize,
     spilled: TileTable<Spilled>,
-    /// The sum of these.
+    /// Sum over `spilled`.
     all_spilled: Spilled,
 }
 
-/// Updates of one tile in memory.
+/// Updates of one tile that are in memory.
 #[derive(Debug, Default)]
 struct InMemory {
     updates: Arc<PackedUpdates>,
-    /// How many scans they are of.
+    /// Number of scans that these updates come from.
     scans: u32,
 }
 
-/// Updates of one tile in its spill file.
+/// Updates of one tile that are in its spill file.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Spilled {
     pub(super) file: SpillFile,
@@ -34,9 +34,9 @@ pub(super) struct Spilled {
 }
 
 impl BufferedUpdates {
-    /// What a tile takes in memory beside its updates: its place in the table, which may be half empty.
+    /// Bytes of memory of a tile in addition to its updates: a slot in a hash table that may be half empty.
     const SLOT_BYTES: usize = 2 * size_of::<(TileIndex, InMemory)>() + size_of::<PackedUpdates>() + 16;
-    /// Bytes of memory that a tile with a spill file takes, about.
+    /// Approximate bytes of memory for a tile with a spill file.
     pub(super) const BYTES_OF_FILE: usize = 24;
 
     pub(super) fn push(&mut self, tile: TileIndex, updates: &TileUpdates) {
@@ -54,7 +54,7 @@ impl BufferedUpdates {
         self.bytes += updates_so_far.bytes();
     }
 
-    /// Notes that a tile's updates in memory are in its spill file now, and perhaps more.
+    /// Records that a tile's updates in memory were moved to its spill file.
     pub(super) fn note_spilled(&mut self, tile: TileIndex, spilled: Spilled) {
         self.forget_in_memory(tile);
         self.forget_spilled(tile);
@@ -63,34 +63,33 @@ impl BufferedUpdates {
         self.spilled.insert(tile, spilled);
     }
 
-    /// Whether a tile has updates here.
+    /// Returns whether updates of a tile are buffered.
     pub(super) fn contains(&self, tile: TileIndex) -> bool {
         self.in_memory.contains_key(&tile) || self.spilled.contains(tile)
     }
 
-    /// A tile's updates in its spill file, which come before those in memory.
+    /// Updates in a tile's spill file. They precede those in memory.
     pub(super) fn spilled(&self, tile: TileIndex) -> Spilled {
         self.spilled.get(tile).unwrap_or_default()
     }
 
-    /// A tile's updates in memory.
     pub(super) fn in_memory(&self, tile: TileIndex) -> Option<&Arc<PackedUpdates>> {
         self.in_memory.get(&tile).map(|in_memory| &in_memory.updates)
     }
 
-    /// How many scans a tile's updates in memory are of.
+    /// Number of scans that a tile's updates in memory come from.
     pub(super) fn scans(&self, tile: TileIndex) -> u32 {
         self.in_memory.get(&tile).map_or(0, |in_memory| in_memory.scans)
     }
 
-    /// Forgets a tile's updates. Returns what was in its spill file.
+    /// Removes all updates of a tile. Returns those that were in its spill file.
     pub(super) fn remove(&mut self, tile: TileIndex) -> Spilled {
         self.forget_in_memory(tile);
         self.forget_spilled(tile)
     }
 
-    /// Forgets the first of a tile's updates: those in its spill file, and so many bytes of those in memory, which hold
-    /// so many updates.
+    /// Removes the earliest updates of a tile: its spill file, and the first `bytes` bytes (`updates` updates) in
+    /// memory.
     pub(super) fn remove_first(&mut self, tile: TileIndex, bytes: usize, updates: usize) {
         self.forget_spilled(tile);
         let Some(in_memory) = self.in_memory.get_mut(&tile) else { return };
@@ -128,7 +127,6 @@ impl BufferedUpdates {
         self.tiles().count()
     }
 
-    /// Bytes of memory.
     pub(super) fn bytes(&self) -> usize {
         self.bytes + self.spilled.bytes()
     }
@@ -138,19 +136,19 @@ impl BufferedUpdates {
         self.spilled.len()
     }
 
-    /// Bytes in files.
+    /// Total size of the spill files in bytes.
     pub(super) fn file_bytes(&self) -> u64 {
         self.all_spilled.file.bytes
     }
 
-    /// Number of updates.
+    /// Number of updates in memory and in files.
     pub(super) fn updates(&self) -> u64 {
         let in_memory: usize = self.in_memory.values().map(|in_memory| in_memory.updates.len()).sum();
         self.all_spilled.updates + in_memory as u64
     }
 
-    /// The tiles with a spill file of more than so many bytes, and `count` others with the longest files. The longest
-    /// comes first; of equals, the lowest tile.
+    /// Returns the tiles whose spill files exceed `bytes`, and the `count` next longest ones, in descending order; ties
+    /// are sorted by tile.
     pub(super) fn longest_files(&self, bytes: u64, count: usize) -> Vec<TileIndex> {
         let files = self.spilled.iter().map(|(tile, spilled)| (Reverse(spilled.file.bytes), tile));
         let least = if count > 0 { 0 } else { bytes };
@@ -161,8 +159,8 @@ impl BufferedUpdates {
         longest.into_iter().map(|(_, tile)| tile).collect()
     }
 
-    /// The tiles whose updates take the most memory, as many as make up so many bytes. The heaviest comes first; of
-    /// equals, the lowest tile.
+    /// Returns the tiles whose updates take the most memory, until their sum reaches `bytes`, in descending order; ties
+    /// are sorted by tile.
     pub(super) fn heaviest(&self, bytes: usize) -> Vec<TileIndex> {
         let mut heaviest: Vec<_> =
             self.in_memory.iter().map(|(tile, of)| (Reverse(of.updates.bytes()), *tile)).collect();

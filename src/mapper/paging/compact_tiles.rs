@@ -11,13 +11,12 @@ pub(super) struct CompactTiles {
     tiles: LruCache<TileIndex, Entry>,
     packer: Packer,
     bytes: usize,
-    /// Dirty tiles that are not being saved, by number. Looking for one from the oldest tile on would pass all clean
-    /// ones, again and again.
+    /// Dirty tiles that are not being saved, by number: a search in `tiles` would repeatedly pass all clean ones.
     to_save: BTreeMap<u64, TileIndex>,
     /// Clean tiles, by number.
     clean: BTreeMap<u64, TileIndex>,
     dirty: usize,
-    /// How many tiles were ever put in.
+    /// Number of tiles inserted so far.
     puts: u64,
 }
 
@@ -26,11 +25,11 @@ struct Entry {
     tile: CompactTile,
     is_dirty: bool,
     is_saving: bool,
-    /// How many tiles were put in before it.
+    /// Value of `puts` when the tile was inserted.
     number: u64,
 }
 
-/// Bytes that a tile takes beside its encoding.
+/// Bytes of memory of a tile in addition to its encoding.
 const SLOT_BYTES: usize = size_of::<(TileIndex, Entry)>() + 128;
 
 impl Default for CompactTiles {
@@ -45,12 +44,10 @@ impl CompactTiles {
         self.tiles.len()
     }
 
-    /// Bytes of memory.
     pub(super) fn bytes(&self) -> usize {
         self.bytes
     }
 
-    /// Number of dirty tiles.
     pub(super) fn dirty(&self) -> usize {
         self.dirty
     }
@@ -72,23 +69,23 @@ impl CompactTiles {
         self.tiles.iter().map(|(&index, _)| index)
     }
 
-    /// Encodes a tile and puts it in as the newest. See [`CompactTile::encode`] for `occupied_from`.
+    /// Encodes a tile and inserts it as the newest. See [`CompactTile::encode`] for `occupied_from`.
     ///
     /// # Errors
     ///
-    /// A lack of memory.
+    /// Fails if memory is exhausted.
     pub(super) fn encode(&mut self, tile: &Tile, occupied_from: Option<f64>) -> Result<()> {
         let compact = CompactTile::encode(&mut self.packer, tile, occupied_from)?;
         self.put(tile.index(), compact, tile.is_dirty());
         Ok(())
     }
 
-    /// Encodes the present content of a tile that has an earlier one here, not being saved, which keeps its place in the
-    /// order; tells whether it has.
+    /// Replaces the encoding of a tile that is here and not being saved, without changing its position in the order.
+    /// Returns whether there was such a tile.
     ///
     /// # Errors
     ///
-    /// A lack of memory.
+    /// Fails if memory is exhausted.
     pub(super) fn renew(&mut self, tile: &Tile, occupied_from: Option<f64>) -> Result<bool> {
         let index = tile.index();
         if !self.needs_save(index) {
@@ -116,7 +113,7 @@ impl CompactTiles {
         self.tiles.put(index, entry);
     }
 
-    /// Drops a tile; tells whether it was there.
+    /// Removes a tile and returns whether it was present.
     pub(super) fn remove(&mut self, index: TileIndex) -> bool {
         let Some(removed) = self.tiles.pop(&index) else { return false };
         self.bytes -= removed.bytes();
@@ -151,12 +148,12 @@ impl CompactTiles {
         self.to_save.first_key_value().map(|(_, index)| *index)
     }
 
-    /// Whether a tile is dirty and not being saved.
+    /// Returns whether a tile is dirty and not being saved.
     pub(super) fn needs_save(&self, index: TileIndex) -> bool {
         self.tiles.peek(&index).is_some_and(|entry| entry.is_dirty && !entry.is_saving)
     }
 
-    /// Notes that a tile is being saved, and returns it.
+    /// Marks a tile as being saved and returns it.
     pub(super) fn begin_save(&mut self, index: TileIndex) -> Option<CompactTile> {
         let entry = self.tiles.peek_mut(&index)?;
         entry.is_saving = true;
@@ -164,7 +161,7 @@ impl CompactTiles {
         Some(entry.tile.clone())
     }
 
-    /// Notes that a tile that is not being saved is on disk as it is.
+    /// Marks a tile that is not being saved as clean.
     pub(super) fn note_on_disk(&mut self, index: TileIndex) {
         if let Some(entry) = self.tiles.peek_mut(&index).filter(|entry| entry.is_dirty && !entry.is_saving) {
             entry.is_dirty = false;
@@ -174,7 +171,7 @@ impl CompactTiles {
         }
     }
 
-    /// Notes that a save has ended. Tells whether the tile here still is the version that was saved.
+    /// Records the end of a save. Returns whether the tile here is still the saved version.
     pub(super) fn save_ended(&mut self, index: TileIndex, saved: &CompactTile, is_on_disk: bool) -> bool {
         let current = self.tiles.peek_mut(&index).filter(|entry| entry.tile.is_same(saved));
         let Some(entry) = current else { return false };
@@ -189,8 +186,8 @@ impl CompactTiles {
         true
     }
 
-    /// Notes that no save is in flight.
-    pub(super) fn no_save_in_flight(&mut self) {
+    /// Records that no save is running.
+    pub(super) fn no_save_running(&mut self) {
         for (index, entry) in self.tiles.iter_mut().filter(|(_, entry)| entry.is_saving) {
             entry.is_saving = false;
             if entry.is_dirty {

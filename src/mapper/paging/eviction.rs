@@ -1,4 +1,4 @@
-//! How room is made: resident tiles go into the compact form, and these to disk, beside the mapper.
+//! Eviction: resident tiles move to the compact form, and compact tiles are saved to disk in the background.
 
 use super::memory_plan::MemoryPlan;
 use super::tile_cache::Eviction;
@@ -9,15 +9,15 @@ use crate::scan::ScanUpdates;
 use crate::space::TileIndex;
 use crate::tile::Tile;
 
-/// Bytes that a new tile takes besides its voxels while a scan creates it: scan parts, buffered updates and index.
+/// Bytes in addition to the voxels of a tile that a scan creates: scan parts, buffered updates and index.
 const BYTES_OF_NEW_TILE: usize = 120;
 
 impl TilePager<'_> {
-    /// Checks that the index of tiles takes at most half of the limit.
+    /// Checks that the index of tiles takes at most half of the memory limit.
     ///
     /// # Errors
     ///
-    /// [`Error::InvalidArgument`] with a sufficient limit.
+    /// Fails with [`Error::InvalidArgument`], which names a sufficient limit.
     pub(super) fn check_index(&self, updates: &ScanUpdates) -> Result<()> {
         let is_new = |tile: &&TileIndex| !self.exists(**tile) && !self.contents.buffer.is_staged(**tile);
         let tiles = updates.tiles.iter().map(|(tile, _)| tile).filter(is_new).count();
@@ -38,8 +38,8 @@ impl TilePager<'_> {
         Err(Error::argument("memory", reason))
     }
 
-    /// How many tiles one scan may touch.
-    pub(in crate::mapper) fn most_tiles_of_scan(&self) -> usize {
+    /// Maximum number of tiles that one scan may change.
+    pub(in crate::mapper) fn max_tiles_of_scan(&self) -> usize {
         let plan = self.plan();
         match plan.is_enforced {
             true => (plan.bytes / 2).saturating_sub(self.memory().index as usize) / BYTES_OF_NEW_TILE,
@@ -47,46 +47,45 @@ impl TilePager<'_> {
         }
     }
 
-    /// How the memory is shared out.
     pub(super) fn plan(&self) -> &MemoryPlan {
         self.contents.plan()
     }
 
-    /// Bytes of memory that the disk takes.
+    /// Bytes of memory that the disk uses.
     fn bytes_of_disk(&self) -> usize {
         self.disk.in_flight_bytes() + self.disk.index_bytes() + self.disk.commit_bytes()
     }
 
-    /// Bytes of memory of what is on its way to disk or from there.
+    /// Bytes of memory of tiles that are being read, saved or flushed.
     pub(super) fn in_flight_bytes(&self) -> usize {
-        self.disk.in_flight_bytes() + self.contents.flight_bytes()
+        self.disk.in_flight_bytes() + self.contents.pinned_bytes()
     }
 
-    /// Whether so many more tiles fit, and so many bytes with them.
+    /// Returns whether `tiles` more tiles with `bytes` bytes fit.
     pub(super) fn has_room_for(&self, tiles: usize, bytes: usize) -> bool {
         self.contents.has_room_for(tiles, bytes, self.bytes_of_disk())
     }
 
-    /// Whether there is room to load a tile ahead of use without evicting others soon.
+    /// Returns whether a tile can be loaded ahead of use without evicting others soon.
     pub(super) fn has_room_to_spare(&self) -> bool {
         self.has_room_for(1, self.plan().spare_bytes)
     }
 
-    /// Evicts tiles until this one fits.
+    /// Evicts tiles until `tile` fits.
     pub(super) fn make_room(&mut self, tile: &Tile) -> Result<()> {
         self.evict_until(tile.bytes(), self.plan().tiles - 1)?;
         self.save_ahead()
     }
 
-    /// Evicts tiles until so many bytes are free. Tiles in use are not evicted; if all are in use, the limit is
+    /// Evicts tiles until `bytes` bytes are free. Tiles in use are not evicted; if all are in use, the limit is
     /// exceeded.
     pub(super) fn make_room_for(&mut self, bytes: usize) -> Result<()> {
         self.evict_until(bytes, self.plan().tiles)?;
         self.save_ahead()
     }
 
-    /// Where the disk does not keep up, waits for one save with each scan: otherwise one of them would have to wait for
-    /// many. While a flush goes on nothing is saved, and it is waited for only where it has to be.
+    /// If the disk is slower than the mapper, waits for one save per scan, which spreads the waiting over the scans.
+    /// Nothing is saved while a background flush is running.
     pub(super) fn keep_pace(&mut self) {
         let is_saving = !self.contents.is_flushing() && !self.disk.can_save();
         if is_saving
@@ -98,30 +97,31 @@ impl TilePager<'_> {
         }
     }
 
-    /// Evicts tiles until at most `tiles` are resident and `bytes` are free; saves no tile that need not go.
+    /// Evicts tiles until at most `tiles` are resident and `bytes` bytes are free; saves only the tiles that must be
+    /// evicted.
     pub(super) fn evict_until(&mut self, bytes: usize, tiles: usize) -> Result<()> {
         loop {
             let (of_disk, is_flushing) = (self.bytes_of_disk(), self.contents.is_flushing());
             match self.contents.next_eviction(bytes, tiles, of_disk) {
                 Some(Eviction::Resident(index)) => self.evict(index)?,
-                // It is being written, or cannot be before the flush has ended.
+                // It is being written, or cannot be saved before the flush has ended.
                 Some(Eviction::Compact(index)) if is_flushing && self.contents.cache.is_dirty(index) => {
-                    self.wait_for_flight();
+                    self.wait_for_background_flush();
                 }
                 Some(Eviction::Compact(index)) => self.evict_compact(index)?,
                 None if self.contents.is_over(bytes, tiles, of_disk) => {
-                    // All that is left is held, and where a flush beside the mapper holds it, it lets go.
+                    // All remaining tiles are pinned; if a background flush pins them, it will release them.
                     if !is_flushing {
                         return Ok(());
                     }
-                    self.wait_for_flight();
+                    self.wait_for_background_flush();
                 }
                 None => return Ok(()),
             }
         }
     }
 
-    /// Evicts a resident tile: into the compact form, or to disk where there is no such tier.
+    /// Evicts a resident tile into the compact form, or to disk if there is no compact tier.
     pub(super) fn evict(&mut self, index: TileIndex) -> Result<()> {
         log::debug!("tile {index}: evicted");
         if self.contents.cache.has_compact_tier() {
@@ -134,10 +134,10 @@ impl TilePager<'_> {
         Ok(())
     }
 
-    /// Drops a tile in the compact form, once it is on disk.
+    /// Drops a tile in the compact form after it was saved.
     fn evict_compact(&mut self, index: TileIndex) -> Result<()> {
         while self.contents.cache.is_dirty(index) {
-            self.end_flight();
+            self.end_background_flush();
             self.begin_save(index)?;
             if self.contents.cache.is_dirty(index) {
                 self.wait_for_save()?;
@@ -147,9 +147,9 @@ impl TilePager<'_> {
         Ok(())
     }
 
-    /// Saves tiles before they have to go, as many as may be in flight.
+    /// Saves tiles that will be evicted soon, as many as may be in progress.
     fn save_ahead(&mut self) -> Result<()> {
-        // While a flush goes on beside the mapper, nothing is saved that need not be.
+        // During a background flush only necessary saves are made.
         if self.contents.is_flushing()
             || !self.contents.cache.has_compact_tier()
             || self.disk.has_save_error()
@@ -169,7 +169,7 @@ impl TilePager<'_> {
         if !self.contents.cache.needs_save(index) {
             return Ok(());
         }
-        self.end_flight();
+        self.end_background_flush();
         self.upgrade()?;
         while !self.disk.can_save() {
             self.wait_for_save()?;
@@ -185,8 +185,9 @@ impl TilePager<'_> {
         Ok(())
     }
 
-    /// Applies what is buffered for a tile in the compact form that is about to be saved. It was not used for long, so
-    /// nothing else would bring it in: the buffer would fill with a few updates of every tile that a way has passed.
+    /// Applies the buffered updates of a tile in the compact form before it is saved. The tile was not used for long,
+    /// so nothing else would apply them, and the buffer would fill with a few updates for every tile along the
+    /// trajectory.
     fn apply_before_save(&mut self, index: TileIndex) -> Result<()> {
         if !self.contents.has_applicable(index) || self.contents.buffer.is_frozen(index) {
             return Ok(());
@@ -195,16 +196,16 @@ impl TilePager<'_> {
         self.contents.renew_packed(&tile, &self.disk)
     }
 
-    /// Waits for a save to end.
+    /// Waits for one save to end.
     ///
     /// # Errors
     ///
-    /// Why a save has failed.
+    /// Fails with the error of a failed save.
     fn wait_for_save(&mut self) -> Result<()> {
         match self.wait(|disk| disk.stall(|disk| disk.wait_saved())) {
             Some(saved) => self.note_saved(saved),
-            // None is in flight any more, whatever happened to them.
-            None => self.contents.cache.no_save_in_flight(),
+            // No save is running any more; some may have been lost with their thread.
+            None => self.contents.cache.no_save_running(),
         }
         self.disk.take_save_error().map_or(Ok(()), Err)
     }
@@ -213,7 +214,7 @@ impl TilePager<'_> {
         self.contents.note_saved(saved, &mut self.disk);
     }
 
-    /// Takes note of saves that have ended; tells whether there was one.
+    /// Records the saves that have ended; returns whether there was one.
     pub(super) fn take_saved(&mut self) -> bool {
         let mut is_any = false;
         while let Some(saved) = self.disk.take_saved() {
@@ -223,7 +224,7 @@ impl TilePager<'_> {
         is_any
     }
 
-    /// Waits until no version of a tile is being saved: an older one must not come after a newer.
+    /// Waits until no version of a tile is being saved, so that an older version never overwrites a newer one.
     pub(super) fn end_saves_of(&mut self, index: TileIndex) {
         while self.disk.is_saving(index) {
             if let Some(saved) = self.wait(|disk| disk.stall(|disk| disk.wait_saved())) {
@@ -236,19 +237,19 @@ impl TilePager<'_> {
     ///
     /// # Errors
     ///
-    /// Why one of them failed.
+    /// Fails with the error of a failed save.
     pub(super) fn end_saves(&mut self) -> Result<()> {
         while let Some(saved) = self.wait(|disk| disk.wait_saved()) {
             self.note_saved(saved);
         }
-        self.contents.cache.no_save_in_flight();
+        self.contents.cache.no_save_running();
         self.disk.take_save_error().map_or(Ok(()), Err)
     }
 
-    /// Waits until nothing is in flight, to disk or from there.
+    /// Waits until no read or save is running.
     pub(super) fn end_io(&mut self) -> Result<()> {
-        // A tile that could not be saved stays dirty, and the flush saves it again; so this error is dropped: before
-        // others are brought in, too, for whose room a save is waited for.
+        // A tile whose save failed remains dirty and the flush saves it again, so the error is dropped. This precedes
+        // the loading of other tiles, which may wait for a save to get memory.
         let _ = self.end_saves();
         self.end_prefetches()?;
         let _ = self.end_saves();

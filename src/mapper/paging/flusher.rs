@@ -1,9 +1,9 @@
-//! Flushes beside the mapper: a thread writes the tiles as of a scan and commits them, while other scans go on.
+//! Background flush: a thread writes the tiles as of a scan and commits them, while the mapper inserts other scans.
 //!
-//! Until it has committed, the mapper saves no tile: a version that a later scan made must not get the name of one that
-//! the commit is to name. Where the compact form has no room for another dirty tile, the mapper waits for the flush.
+//! Until the commit, the mapper saves no tile: a file with a later version must not take the name of one that the
+//! commit references. If the compact form has no memory left for another dirty tile, the mapper waits for the flush.
 
-use super::held_tile::{HeldForm, HeldTile};
+use super::pinned_tile::{PinnedForm, PinnedTile};
 use super::shared_contents::SharedContents;
 use super::shared_disk::SharedDisk;
 use super::unapplied_tile::UnappliedTile;
@@ -17,15 +17,15 @@ use std::ops::Range;
 use std::sync::mpsc::{Receiver, Sender};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// The thread that flushes beside the mapper.
+/// Thread of the background flush.
 #[derive(Debug)]
 pub(super) struct Flusher {
     worker: Mutex<Worker<FlushJob, ()>>,
-    /// Something comes whenever the flush that goes on has let go of tiles.
+    /// Receives a message whenever the running flush has released tiles.
     progress: Mutex<Option<Receiver<()>>>,
 }
 
-/// All that a flush takes.
+/// Input of a flush.
 pub(super) struct FlushJob {
     pub(super) contents: Arc<SharedContents>,
     pub(super) disk: Arc<SharedDisk>,
@@ -33,36 +33,36 @@ pub(super) struct FlushJob {
     pub(super) progress: Sender<()>,
 }
 
-/// The map as of a scan, as far as it is to be written.
+/// Map as of a scan, reduced to what has to be written.
 pub(super) struct BegunFlush {
     pub(super) scan_number: u64,
-    /// The dirty tiles, those in the compact form apart. The last ones are written first.
+    /// Dirty tiles, except those in the compact form. Written in reverse order.
     pub(super) tiles: Vec<FlushedTile>,
     pub(super) compact: Vec<FlushedTile>,
-    /// How many of the former, the first ones, are written once no save is in flight any more: an older version of them
-    /// is being saved.
+    /// The first `after_saves` tiles are written when no save is running any more: older versions of them are being
+    /// saved.
     pub(super) after_saves: usize,
-    /// Those of the former that the next scan will change.
+    /// The part of `tiles` that the next scan will likely change.
     pub(super) soon_changed: Range<usize>,
     pub(super) writer: TileWriter,
-    /// What finds the earlier versions of tiles.
+    /// Reads the earlier versions of tiles.
     pub(super) files: TileReader,
     pub(super) commit: BegunCommit,
 }
 
-/// A tile as it is to be written.
+/// Tile to be written.
 pub(super) enum FlushedTile {
-    Resident(Arc<HeldTile>),
+    Resident(Arc<PinnedTile>),
     Compact(TileIndex, CompactTile),
-    /// It is made first, and only to be written.
+    /// Built from its updates for writing only.
     Unapplied(Box<UnappliedTile>),
 }
 
-/// Tiles that are written before the locks are taken to note them.
+/// Number of tiles that are written between two acquisitions of the locks.
 const NOTED_AT_ONCE: usize = 8;
 
-/// Bytes of files after which they are noted sooner: who waits for memory waits for them, and a slow disk takes some
-/// milliseconds for so many.
+/// Bytes of files after which written tiles are recorded sooner: a mapper that waits for memory waits for this, and a
+/// slow disk takes some milliseconds for so many bytes.
 const NOTED_BYTES: u64 = 256 << 10;
 
 impl Flusher {
@@ -72,19 +72,21 @@ impl Flusher {
         Self { worker: Mutex::new(worker), progress: Mutex::new(None) }
     }
 
-    /// Begins a flush. The caller holds no lock: where the system refuses a thread, it is done here.
+    /// Begins a flush. The caller must not hold a lock: if the system cannot create a thread, the flush runs in this
+    /// call.
     pub(super) fn give(&self, job: FlushJob, progress: Receiver<()>) {
         *self.progress.lock().unwrap_or_else(PoisonError::into_inner) = Some(progress);
         self.worker.lock().unwrap_or_else(PoisonError::into_inner).give(job);
     }
 
-    /// Waits until the flush that goes on has let go of tiles; `false` if it has ended. The caller holds no lock.
+    /// Waits until the running flush has released tiles; returns `false` if it has ended. The caller must not hold a
+    /// lock.
     pub(super) fn wait_for_some(&self) -> bool {
         let progress = self.progress.lock().unwrap_or_else(PoisonError::into_inner);
         progress.as_ref().is_some_and(|progress| progress.recv().is_ok())
     }
 
-    /// Waits for a flush to end; tells whether there was one. The caller holds no lock.
+    /// Waits for the end of a flush; returns whether there was one. The caller must not hold a lock.
     pub(super) fn wait(&self) -> bool {
         self.worker.lock().unwrap_or_else(PoisonError::into_inner).wait().is_some()
     }
@@ -94,21 +96,21 @@ impl FlushJob {
     fn run(mut self, config: &MapConfig) {
         self.copy_soon_changed();
         let flushed = self.write_tiles(config).and_then(|()| self.commit());
-        // In the order in which the mapper takes them.
+        // Same lock order as in the mapper.
         let disk = self.disk.lock();
         let mut contents = self.contents.lock();
         for tile in self.begun.tiles.into_iter().chain(self.begun.compact) {
             contents.note_not_flushed(tile, &disk);
         }
-        contents.end_flight(flushed);
+        contents.end_background_flush(flushed);
     }
 
-    /// Copies the tiles that the next scan will change, so that it needs not.
+    /// Copies the tiles that the next scan will likely change, to save it this work.
     fn copy_soon_changed(&mut self) {
         let tiles = self.begun.tiles.get_mut(self.begun.soon_changed.clone()).unwrap_or_default();
         for tile in tiles {
             let FlushedTile::Resident(held) = tile else { continue };
-            // A scan may have been first.
+            // A scan may have copied it already.
             if self.contents.lock().is_shared_with_flush(held.index())
                 && let Some(shared) = held.resident()
                 && held.hold_copy(Tile::clone(&shared))
@@ -156,7 +158,7 @@ impl FlushJob {
                 contents.note_flushed(tile, version, &disk);
             }
             is_behind = contents.cache.is_behind();
-            // Nobody may wait for it.
+            // There may be no receiver.
             let _ = progress.send(());
             outcome?;
             if is_all {
@@ -165,7 +167,7 @@ impl FlushJob {
         }
     }
 
-    /// Waits until no save is in flight. By now they have mostly ended: the mapper begins none meanwhile.
+    /// Waits until no save is running. Most have ended by now, because the mapper begins none during a flush.
     fn end_saves(&mut self) -> Result<()> {
         loop {
             let mut disk = self.disk.lock();
@@ -175,20 +177,20 @@ impl FlushJob {
                 contents.note_saved(saved, &mut disk);
                 continue;
             }
-            let Some(flight) = &mut contents.flight else { return Ok(()) };
-            if flight.waits_for_saves() {
-                let lost = std::io::Error::other("the thread that saved tiles has ended early");
+            let Some(pinned) = &mut contents.pinned else { return Ok(()) };
+            if pinned.waits_for_saves() {
+                let lost = std::io::Error::other("the save thread ended unexpectedly");
                 return Err(Error::io(disk.store().folder(), "flush", lost));
             }
-            let unsaved = flight.take_unsaved().into_iter();
+            let unsaved = pinned.take_unsaved().into_iter();
             self.begun.compact.extend(unsaved.map(|(index, tile)| FlushedTile::Compact(index, tile)));
             self.begun.after_saves = 0;
             return Ok(());
         }
     }
 
-    /// Commits what was written. The lock on the disk is held for the steps that are short; what takes long goes on
-    /// beside the mapper.
+    /// Commits the written tiles. The lock on the disk is held only for short steps, so that the mapper can continue
+    /// during the long ones.
     fn commit(&self) -> Result<()> {
         let (has_news, unsynced) = {
             let disk = self.disk.lock();
@@ -198,9 +200,9 @@ impl FlushJob {
             let synced = unsynced.sync_with_scans();
             self.disk.lock().store_mut().commit_synced(&self.begun.commit, synced)?;
         }
-        // It is committed: what the disk refuses from here on is done later.
+        // The flush is committed: steps that fail from here on are repeated later.
         if let Err(error) = self.put_in_place() {
-            log::warn!("flushed, but not tidied up: {error:#}");
+            log::warn!("flushed, but cleanup failed and will be repeated: {error:#}");
         }
         Ok(())
     }
@@ -221,8 +223,8 @@ impl FlushJob {
 }
 
 impl BegunFlush {
-    /// The next tile to write. What leaves memory next is written first: resident tiles, unless those in the compact
-    /// form have to go.
+    /// Returns the next tile to write, first those that will be evicted first: resident tiles, or compact ones if the
+    /// compact tier is full (`is_behind`).
     fn next(&mut self, is_behind: bool) -> Option<FlushedTile> {
         let compact = if is_behind { self.compact.pop() } else { None };
         if compact.is_none() && self.tiles.len() > self.after_saves {
@@ -231,7 +233,7 @@ impl BegunFlush {
         compact.or_else(|| self.compact.pop())
     }
 
-    /// Whether no tile is left but those that are written once no save is in flight.
+    /// Returns whether all remaining tiles must wait for running saves.
     fn has_only_to_wait(&self) -> bool {
         self.compact.is_empty() && self.tiles.len() <= self.after_saves
     }
@@ -240,8 +242,8 @@ impl BegunFlush {
         let (writer, scan_number) = (&self.writer, self.scan_number);
         match tile {
             FlushedTile::Resident(held) => match held.begin_write() {
-                HeldForm::Resident(tile) => saver.write(writer, tile.index(), tile.table(), scan_number),
-                HeldForm::Compact(tile) => {
+                PinnedForm::Resident(tile) => saver.write(writer, tile.index(), tile.table(), scan_number),
+                PinnedForm::Compact(tile) => {
                     saver.write_compact(writer, &config.grid, held.index(), &tile, scan_number)
                 }
             },
@@ -250,7 +252,7 @@ impl BegunFlush {
             }
             FlushedTile::Unapplied(tile) => {
                 let made = tile.make(&self.files, config)?;
-                // It may have been made of an earlier next version, which the mapper may read meanwhile.
+                // The tile may be based on an earlier next version, which the mapper may be reading: keep that file.
                 let writer = writer.clone().keeping_earlier();
                 saver.write(&writer, tile.index, made.table(), scan_number)
             }
@@ -267,7 +269,7 @@ impl FlushedTile {
         }
     }
 
-    /// Bytes of memory, as they count while it is shared.
+    /// Bytes of memory of the tile.
     pub(super) fn bytes(&self) -> usize {
         match self {
             Self::Resident(tile) => tile.bytes(),

@@ -1,59 +1,60 @@
 use crate::config::{MapConfig, MemoryLimit};
 use crate::space::BRICK_EDGE;
 
-/// How the memory that a mapper may use is shared out.
+/// Division of a mapper's memory limit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::mapper) struct MemoryPlan {
-    /// Most tiles.
+    /// Maximum number of resident tiles.
     pub(super) tiles: usize,
-    /// Most bytes of all that grows.
+    /// Limit for all data that grow with the map, in bytes.
     pub(super) bytes: usize,
-    /// Most bytes of buffered updates while there is no index; see [`MemoryPlan::buffer_bytes`].
+    /// Maximum bytes of buffered updates without an index; see [`MemoryPlan::buffer_bytes`].
     buffer_bytes: usize,
-    /// Most bytes for tracing a scan.
+    /// Maximum bytes for tracing a scan.
     pub(in crate::mapper) scan_bytes: usize,
-    /// Most bytes of packed updates of a scan; what comes on top goes to files.
+    /// Maximum bytes of packed updates of a scan; the rest is spilled to files.
     pub(in crate::mapper) updates_bytes: usize,
-    /// Bytes that are kept free for inserting scans from the beginning.
-    pub(super) least_scan_bytes: usize,
-    /// Whether the limit is enforced: a scan's memory counts, and a map whose index does not fit is refused. False only
-    /// for [`MemoryLimit::Tight`], which tests use.
+    /// Bytes that are reserved for inserting scans from the beginning.
+    pub(super) min_scan_bytes: usize,
+    /// Whether the limit is enforced: memory of a scan counts, and a map whose index does not fit is rejected. False
+    /// only for [`MemoryLimit::Tight`], which tests use.
     pub(super) is_enforced: bool,
-    /// Bytes that stay free of tiles that need not come in yet.
+    /// Bytes that prefetched tiles must leave free.
     pub(super) spare_bytes: usize,
-    /// A tile for which updates of so many scans wait is changed often.
+    /// Number of scans with buffered updates from which a tile counts as changed often.
     pub(super) often_scans: u32,
-    /// Most bytes of tiles in the compact form while there is no index; see [`MemoryPlan::compact_bytes`].
+    /// Maximum bytes of tiles in the compact form without an index; see [`MemoryPlan::compact_bytes`].
     compact_bytes: usize,
-    /// Bytes that the index of tiles takes, which grows with the map.
+    /// Bytes of the index of tiles, which grows with the map.
     index_bytes: usize,
-    /// Most bytes of tiles that readers in other threads make, once there are any.
+    /// Maximum bytes of tiles that readers in other threads cache.
     pub(in crate::mapper) reader_bytes: usize,
-    /// Most bytes of what views hold that has changed since.
+    /// Maximum bytes of old states kept for views.
     pub(super) view_bytes: usize,
-    /// Most bytes of the lists of a flush beside the mapper.
-    pub(super) flight_bytes: usize,
+    /// Maximum bytes of the lists of a background flush.
+    pub(super) flush_list_bytes: usize,
 }
 
 const OFTEN_SCANS: u32 = 8;
 
-/// The part of the limit that the allocator may lose between blocks where tiles are smaller than a brick: hundreds of
-/// thousands of blocks of a few hundred bytes come and go. Measured: up to 3 MiB beyond what is promised, of 81.
-const LOST_BETWEEN_BLOCKS: usize = 12;
+/// If tiles are smaller than a brick, the limit is reduced by one part in this number to allow for fragmentation by the
+/// allocator: hundreds of thousands of blocks of a few hundred bytes are allocated and freed. Measured: up to 3 MiB over
+/// a limit of 81 MiB.
+const FRAGMENTATION_PART: usize = 12;
 
 impl MemoryPlan {
     pub(in crate::mapper) fn of(config: &MapConfig) -> Self {
         let has_tiny_tiles = config.grid.voxels_per_tile_edge() < BRICK_EDGE;
         match (config.memory, config.memory_bytes()) {
-            // For tests: the limit is below the least that works, so it is not enforced.
+            // For tests: the limit is below the smallest that works, so it is not enforced.
             (MemoryLimit::Tight(bytes), _) => {
-                let (is_enforced, least_scan_bytes, flight_bytes) = (false, 0, usize::MAX);
-                Self { least_scan_bytes, is_enforced, flight_bytes, ..Self::of_bytes(bytes) }
+                let (is_enforced, min_scan_bytes, flush_list_bytes) = (false, 0, usize::MAX);
+                Self { min_scan_bytes, is_enforced, flush_list_bytes, ..Self::of_bytes(bytes) }
             }
             (MemoryLimit::Tiles { tiles, write_buffer_bytes }, _) => {
                 Self::of_tiles(tiles, write_buffer_bytes)
             }
-            (_, Some(bytes)) if has_tiny_tiles => Self::of_bytes(bytes - bytes / LOST_BETWEEN_BLOCKS),
+            (_, Some(bytes)) if has_tiny_tiles => Self::of_bytes(bytes - bytes / FRAGMENTATION_PART),
             (_, bytes) => Self::of_bytes(bytes.unwrap_or(usize::MAX)),
         }
     }
@@ -65,7 +66,7 @@ impl MemoryPlan {
             buffer_bytes: write_buffer_bytes,
             scan_bytes: usize::MAX,
             updates_bytes: usize::MAX,
-            least_scan_bytes: 0,
+            min_scan_bytes: 0,
             is_enforced: true,
             spare_bytes: 0,
             often_scans: OFTEN_SCANS,
@@ -73,38 +74,38 @@ impl MemoryPlan {
             index_bytes: 0,
             reader_bytes: 64 << 20,
             view_bytes: usize::MAX,
-            flight_bytes: usize::MAX,
+            flush_list_bytes: usize::MAX,
         }
     }
 
-    /// Whether there are tiles in the compact form.
+    /// Returns whether tiles are kept in the compact form.
     pub(super) fn has_compact_tier(&self) -> bool {
         self.compact_bytes > 0
     }
 
-    /// Notes how much the index of tiles takes.
+    /// Records the size of the index of tiles.
     pub(super) fn note_index(&mut self, bytes: usize) {
         self.index_bytes = bytes;
     }
 
-    /// Most bytes of buffered updates; those of one scan may come on top.
+    /// Maximum bytes of buffered updates; those of one scan may be added.
     pub(super) fn buffer_bytes(&self) -> usize {
         self.left_by_index(self.buffer_bytes)
     }
 
-    /// Most bytes of tiles in the compact form while others have to go.
+    /// Maximum bytes of tiles in the compact form while tiles are being evicted.
     pub(super) fn compact_bytes(&self) -> usize {
         self.left_by_index(self.compact_bytes)
     }
 
-    /// What the index leaves of a share. It takes from all of them: taken from the tiles ready for use alone, every scan
-    /// would encode and decode more of them the larger the map is.
+    /// Returns a share reduced in proportion to the index. All shares are reduced: if only resident tiles were, each
+    /// scan would encode and decode more tiles the larger the map.
     fn left_by_index(&self, share: usize) -> usize {
         let taken = self.index_bytes.min(self.bytes);
         share - (share as u128 * taken as u128 / self.bytes.max(1) as u128) as usize
     }
 
-    /// Buffered updates are small beside their tiles; a larger buffer saves reads and writes.
+    /// Buffered updates are small compared with their tiles; a larger buffer saves reads and writes.
     fn of_bytes(bytes: usize) -> Self {
         Self {
             tiles: usize::MAX,
@@ -112,7 +113,7 @@ impl MemoryPlan {
             buffer_bytes: bytes / 4,
             scan_bytes: bytes / 4,
             updates_bytes: bytes / 8,
-            least_scan_bytes: bytes / 8,
+            min_scan_bytes: bytes / 8,
             is_enforced: true,
             spare_bytes: bytes / 4,
             often_scans: OFTEN_SCANS,
@@ -120,7 +121,7 @@ impl MemoryPlan {
             index_bytes: 0,
             reader_bytes: bytes / 16,
             view_bytes: bytes / 8,
-            flight_bytes: bytes / 16,
+            flush_list_bytes: bytes / 16,
         }
     }
 }
@@ -130,7 +131,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_index_takes_from_every_share_alike() {
+    fn the_index_reduces_all_shares_equally() {
         let mut plan = MemoryPlan::of_bytes(64 << 20);
         assert_eq!((plan.buffer_bytes(), plan.compact_bytes()), (16 << 20, 24 << 20));
         plan.note_index(8 << 20);

@@ -1,27 +1,27 @@
-//! Keeps an out-of-core map within its memory limit. [`TilePager`] leads three owners with private state.
+//! Keeps an out-of-core map within its memory limit. [`TilePager`] coordinates three owners of private state.
 //!
 //! ```text
-//! TilePager     accepts scans, answers for tiles, flushes
+//! TilePager     accepts scans, provides tiles, flushes
 //!   TileCache     resident tiles (an LRU) and, below them, tiles in the compact form; the memory limit
-//!   WriteBuffer   updates of tiles that are not resident: in memory, and spilled to files where memory is short
-//!   TileDisk      the store, the threads that save and load, what was read and written, how long the mapper waited
+//!   WriteBuffer   updates of tiles that are not resident: in memory, or spilled to files if memory is short
+//!   TileDisk      the store, the threads that save and load, I/O counts, waiting times of the mapper
 //! ```
 //!
 //! A tile is resident, compact, or neither. A resident tile has no buffered updates: they are applied when it is
 //! loaded. `eviction` moves tiles towards the disk, `prefetch` loads tiles ahead of use, `flush` commits. A `Flusher`
-//! does so beside the mapper: it shares the tiles as of a scan with the cache, and a `Flight` counts what it holds
-//! alone.
+//! flushes in the background: it shares the tiles as of a scan with the cache, and a `PinnedTiles` counts the tiles
+//! that only the flush holds.
 
 mod buffered_updates;
 mod compact_tiles;
 mod contents;
 mod eviction;
-mod flight;
 mod flush;
 mod flusher;
-mod held_tile;
 mod memory_plan;
 mod paged_tiles;
+mod pinned_tile;
+mod pinned_tiles;
 mod prefetch;
 mod resident_tiles;
 mod shared_contents;

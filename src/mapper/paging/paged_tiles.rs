@@ -13,8 +13,8 @@ use crate::store::TileStore;
 use std::sync::Arc;
 use std::sync::mpsc::channel;
 
-/// The tiles of an out-of-core map: what it holds, which readers share, and the disk, which belongs to the mapper and
-/// to the thread that flushes beside it.
+/// Tiles of an out-of-core map: the contents, shared with readers, and the disk, shared by the mapper and the
+/// background flush.
 #[derive(Debug)]
 pub(in crate::mapper) struct PagedTiles {
     config: MapConfig,
@@ -34,7 +34,7 @@ impl PagedTiles {
             space: store.tiles().iter().chain(store.tiles().orphans()).collect(),
             inputs: store.metadata().ext.as_ref().map_or(Vec::new(), |ext| ext.inputs.clone()),
             views: Views::default(),
-            flight: None,
+            pinned: None,
             flush_reserve: 0,
             flush_error: None,
         };
@@ -43,18 +43,18 @@ impl PagedTiles {
         Self { config, contents: Arc::new(SharedContents::new(contents)), disk, flusher }
     }
 
-    /// The pager, for one call of the mapper. A second one waits until the first is dropped.
+    /// Locks the pager for one call of the mapper. A second call waits until the first pager is dropped.
     pub(in crate::mapper) fn pager(&self) -> TilePager<'_> {
         let disk = self.disk.lock();
         let Self { config, contents: shared, flusher, .. } = self;
         TilePager { config, shared, flusher, contents: shared.lock(), disk }
     }
 
-    /// Begins a flush of all that was accepted until now, beside the mapper. One that is under way ends first.
+    /// Begins a background flush of all changes so far. Waits first for a flush that is running.
     ///
     /// # Errors
     ///
-    /// Why an earlier one has failed; tiles that cannot be read, a disk that refuses.
+    /// Fails with the error of an earlier flush, or if a tile cannot be read or a disk operation fails.
     pub(in crate::mapper) fn begin_flush(&self) -> Result<()> {
         let Some(begun) = self.pager().begin_flush()? else { return Ok(()) };
         let (contents, disk) = (self.contents.clone(), self.disk.clone());
@@ -63,27 +63,27 @@ impl PagedTiles {
         Ok(())
     }
 
-    /// Waits for a flush beside the mapper, if there is one.
+    /// Waits for the background flush, if one is running.
     ///
     /// # Errors
     ///
-    /// Why it has failed.
+    /// Fails with the error of the flush.
     pub(in crate::mapper) fn end_flush(&self) -> Result<()> {
         while self.flusher.wait() {}
         let mut pager = self.pager();
-        // A thread that panicked has not said that it failed.
-        pager.end_flight();
+        // A thread that panicked has not reported its failure.
+        pager.end_background_flush();
         pager.contents.take_flush_error().map_or(Ok(()), Err)
     }
 
-    /// What readers share with the mapper.
+    /// The contents, shared by readers and the mapper.
     pub(in crate::mapper) fn contents(&self) -> &Arc<SharedContents> {
         &self.contents
     }
 }
 
 impl Drop for PagedTiles {
-    /// What was begun is committed, and the map is free for another writer.
+    /// Waits for a running flush to commit, and frees the map for another writer.
     fn drop(&mut self) {
         while self.flusher.wait() {}
     }
@@ -91,13 +91,13 @@ impl Drop for PagedTiles {
 
 #[cfg(test)]
 mod tests {
-    use super::super::flight::Flight;
+    use super::super::pinned_tiles::PinnedTiles;
     use super::*;
     use crate::persistence::{new_map_id, new_metadata};
     use crate::store::FsDisk;
 
     #[test]
-    fn a_flush_whose_thread_is_gone_has_failed() {
+    fn a_flush_without_a_thread_fails() {
         let folder = tempfile::tempdir().unwrap();
         let (config, map_id) = (MapConfig::new(0.1, 1.0).unwrap(), new_map_id());
         let metadata = new_metadata(&config, map_id, &[]);
@@ -105,11 +105,11 @@ mod tests {
             TileStore::create(Arc::new(FsDisk), &folder.path().join("map"), metadata, map_id).unwrap();
         let tiles = PagedTiles::new(config, store);
         assert!(tiles.end_flush().is_ok());
-        // What a thread that panics leaves behind.
-        tiles.contents.lock().flight = Some(Flight::default());
+        // The state that a panicked thread leaves.
+        tiles.contents.lock().pinned = Some(PinnedTiles::default());
         let error = tiles.end_flush().unwrap_err().to_string();
         assert!(error.contains("flush"), "{error}");
-        assert!(tiles.end_flush().is_ok(), "told once");
+        assert!(tiles.end_flush().is_ok(), "reported once");
         tiles.begin_flush().unwrap();
         assert!(tiles.end_flush().is_ok());
     }

@@ -1,4 +1,4 @@
-//! Tiles are fetched before they are needed: those with the most buffered updates, and those in the direction of
+//! Prefetch: loads tiles before they are needed, those with the most buffered updates and those in the direction of
 //! travel.
 
 use super::tile_cache::Cached;
@@ -9,17 +9,17 @@ use crate::space::{TileBox, TileIndex};
 use crate::tile::Table;
 use std::sync::Arc;
 
-/// So many tiles in the compact form are brought in with one scan: unpacking takes milliseconds.
+/// Maximum number of compact tiles made resident per scan: unpacking takes milliseconds.
 const MAX_PACKED_AT_ONCE: usize = 2;
 
 impl TilePager<'_> {
-    /// Prefetches tiles that will be needed, as far as there is room for them. `updates` are those of the scan that is
-    /// being inserted.
+    /// Prefetches tiles that will be needed, as far as memory permits. `updates` are those of the scan that is being
+    /// inserted.
     pub(in crate::mapper) fn prefetch(&mut self, updates: &[(TileIndex, TileUpdates)]) {
         if !self.contents.cache.has_compact_tier() {
             return;
         }
-        // Soon these will have to come in.
+        // These would have to be loaded soon.
         for tile in self.contents.heaviest_beyond(self.plan().buffer_bytes() / 4 * 3) {
             if !self.is_spilling_cheaper(tile) {
                 self.begin_prefetch(tile);
@@ -41,8 +41,8 @@ impl TilePager<'_> {
         }
     }
 
-    /// Brings in tiles in the compact form that scan after scan has changed.
-    pub(super) fn bring_in_packed(&mut self, updates: &ScanUpdates) -> Result<()> {
+    /// Makes compact tiles resident that many recent scans have changed.
+    pub(super) fn unpack_often_changed(&mut self, updates: &ScanUpdates) -> Result<()> {
         let mut brought_in = 0;
         for &(tile, _) in &updates.tiles {
             let is_wanted = self.is_often_changed(tile)
@@ -56,13 +56,13 @@ impl TilePager<'_> {
         Ok(())
     }
 
-    /// Whether updates of many scans wait for a tile.
+    /// Returns whether updates of many scans are buffered for a tile.
     fn is_often_changed(&self, tile: TileIndex) -> bool {
         self.contents.buffer.scans_of(tile) >= self.plan().often_scans
     }
 
-    /// Whether a tile that scan after scan changes may take the place of the one that was not used for longest. Where
-    /// all are used about as often, it would have to go again at once, and its updates had better wait.
+    /// Returns whether a tile that many scans change may replace the least recently used one. If all tiles are used
+    /// about equally often, it would soon be evicted again, so its updates remain buffered.
     fn may_replace_oldest(&self) -> bool {
         let often_scans = u64::from(self.plan().often_scans);
         self.contents.scans_since_oldest().is_some_and(|scans| scans > 2 * often_scans)
@@ -77,7 +77,7 @@ impl TilePager<'_> {
         }
     }
 
-    /// Takes note of saves and prefetches that have ended.
+    /// Records the saves and prefetches that have ended.
     pub(super) fn take_finished_io(&mut self) -> Result<()> {
         self.take_saved();
         while let Some((index, table)) = self.disk.take_prefetched() {
@@ -98,7 +98,7 @@ impl TilePager<'_> {
         Ok(())
     }
 
-    /// Waits until a tile that is being prefetched is there.
+    /// Waits until the prefetch of a tile has ended.
     pub(super) fn end_prefetch_of(&mut self, index: TileIndex) -> Result<()> {
         while self.disk.is_prefetching(index) {
             match self.wait(|disk| disk.stall(|disk| disk.wait_prefetched())) {
@@ -109,7 +109,6 @@ impl TilePager<'_> {
         Ok(())
     }
 
-    /// Waits until all prefetches have ended.
     pub(super) fn end_prefetches(&mut self) -> Result<()> {
         while let Some((index, table)) = self.wait(|disk| disk.wait_prefetched()) {
             self.put_prefetched(index, table)?;

@@ -5,25 +5,24 @@ use lru::LruCache;
 use rustc_hash::FxHashMap;
 use std::sync::Arc;
 
-/// The tiles in memory, in the order of their last use, and how many bytes they are.
+/// Resident tiles in the order of their last use, and their total size.
 #[derive(Debug)]
 pub(super) struct ResidentTiles {
     tiles: LruCache<TileIndex, Resident>,
     bytes: usize,
-    /// Number of scans so far.
     scans: u64,
 }
 
 #[derive(Debug)]
 struct Resident {
     tile: Arc<Tile>,
-    /// As they were counted: a tree that another thread writes grows meanwhile.
+    /// Size when it was last counted: a tree that another thread writes may have grown since.
     bytes: usize,
-    /// Number of scans when it was used last.
+    /// Value of `scans` at the last use.
     used: u64,
 }
 
-/// What a tile takes beside itself: its place in the table and in the order.
+/// Bytes of memory per tile for its slots in the table and in the LRU order.
 const SLOT_BYTES: usize = size_of::<(TileIndex, Resident)>() + 64;
 
 impl Default for ResidentTiles {
@@ -46,29 +45,29 @@ impl ResidentTiles {
         self.tiles.contains(&index)
     }
 
-    /// A tile, which becomes the one used last.
+    /// Returns a tile and marks it as the most recently used.
     pub(super) fn get(&mut self, index: TileIndex) -> Option<&Arc<Tile>> {
         let resident = self.tiles.get_mut(&index)?;
         resident.used = self.scans;
         Some(&resident.tile)
     }
 
-    /// Notes that a scan was inserted.
+    /// Counts an inserted scan.
     pub(super) fn note_scan(&mut self) {
         self.scans += 1;
     }
 
-    /// A tile, which keeps its place in the order.
+    /// Returns a tile without changing the order.
     pub(super) fn peek(&self, index: TileIndex) -> Option<&Arc<Tile>> {
         self.tiles.peek(&index).map(|resident| &resident.tile)
     }
 
-    /// The tiles, the one used last first.
+    /// The tiles, the most recently used first.
     pub(super) fn iter(&self) -> impl DoubleEndedIterator<Item = &Arc<Tile>> {
         self.tiles.iter().map(|(_, resident)| &resident.tile)
     }
 
-    /// Puts a tile in as the one used last.
+    /// Inserts a tile as the most recently used.
     pub(super) fn put(&mut self, tile: Arc<Tile>) {
         let (index, bytes) = (tile.index(), bytes_of(&tile));
         self.bytes += bytes;
@@ -83,26 +82,26 @@ impl ResidentTiles {
         }
     }
 
-    /// The tile whose last use is the longest ago, of those that nobody holds, or only one that lets go of it.
-    pub(super) fn least_recently_used(&self, lets_go: impl Fn(TileIndex) -> bool) -> Option<TileIndex> {
-        self.oldest(lets_go).map(|resident| resident.tile.index())
+    /// The least recently used tile that has no other owner, or only one that releases it.
+    pub(super) fn least_recently_used(&self, releases: impl Fn(TileIndex) -> bool) -> Option<TileIndex> {
+        self.oldest(releases).map(|resident| resident.tile.index())
     }
 
-    /// For how many scans that tile has not been used.
-    pub(super) fn scans_since_oldest(&self, lets_go: impl Fn(TileIndex) -> bool) -> Option<u64> {
-        self.oldest(lets_go).map(|resident| self.scans - resident.used)
+    /// Number of scans since the last use of that tile.
+    pub(super) fn scans_since_oldest(&self, releases: impl Fn(TileIndex) -> bool) -> Option<u64> {
+        self.oldest(releases).map(|resident| self.scans - resident.used)
     }
 
-    fn oldest(&self, lets_go: impl Fn(TileIndex) -> bool) -> Option<&Resident> {
+    fn oldest(&self, releases: impl Fn(TileIndex) -> bool) -> Option<&Resident> {
         let mut oldest_first = self.tiles.iter().rev().map(|(_, resident)| resident);
         oldest_first.find(|resident| match Arc::strong_count(&resident.tile) {
             1 => true,
-            2 => lets_go(resident.tile.index()),
+            2 => releases(resident.tile.index()),
             _ => false,
         })
     }
 
-    /// Changes a tile, which keeps its place in the order.
+    /// Changes a tile without changing the order.
     pub(super) fn change<T>(&mut self, index: TileIndex, change: impl FnOnce(&mut Tile) -> T) -> Option<T> {
         let resident = self.tiles.peek_mut(&index)?;
         self.bytes -= resident.bytes;
@@ -111,7 +110,7 @@ impl ResidentTiles {
         Some(answer)
     }
 
-    /// Changes many tiles in parallel, each with what is given for it.
+    /// Changes many tiles in parallel, each with its own argument.
     pub(super) fn change_all<T: Send>(
         &mut self,
         threads: &TileThreads,

@@ -1,11 +1,10 @@
 use super::tile_disk::TileDisk;
 use parking_lot::{Mutex, MutexGuard};
 
-/// The disk, behind the lock that the mapper shares with the thread that flushes beside it.
+/// Disk behind the lock that the mapper and the background flush share.
 #[derive(Debug)]
 pub(super) struct SharedDisk(Mutex<TileDisk>);
 
-/// The disk while it is locked.
 pub(super) type DiskGuard<'a> = MutexGuard<'a, TileDisk>;
 
 impl SharedDisk {
@@ -18,7 +17,7 @@ impl SharedDisk {
     }
 }
 
-/// Does something without the lock, which is held again afterwards.
+/// Runs `wait` with the lock released.
 pub(super) fn unlocked<T>(disk: &mut DiskGuard<'_>, wait: impl FnOnce() -> T) -> T {
     MutexGuard::unlocked(disk, wait)
 }

@@ -3,9 +3,9 @@ use hdrhistogram::Histogram;
 use std::fmt;
 use std::time::Duration;
 
-/// How long the mapping thread had to wait for the disk, each time.
+/// Histogram of the times that the mapping thread waited for the disk.
 pub(super) struct Stalls {
-    /// In microseconds, to two digits.
+    /// In microseconds, to two significant digits.
     times_us: Histogram<u32>,
 }
 
@@ -18,9 +18,8 @@ impl Default for Stalls {
 }
 
 impl Stalls {
-    /// Notes a wait.
     pub(super) fn note(&mut self, time: Duration) {
-        // Cannot fail: the histogram grows.
+        // Cannot fail, because the histogram resizes itself.
         let _ = self.times_us.record(u64::try_from(time.as_micros()).unwrap_or(u64::MAX));
     }
 
@@ -45,13 +44,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn waits_are_counted_and_ranked() {
+    fn waits_are_counted_with_percentiles() {
         let mut stalls = Stalls::default();
         assert_eq!(stalls.counts(), StallCounts::default());
         (1..=1000).for_each(|ms| stalls.note(Duration::from_millis(ms)));
         let StallCounts { count, p50_us, p99_us, worst_us } = stalls.counts();
         assert_eq!(count, 1000);
-        // Two digits.
+        // To two significant digits.
         for (found, expected) in [(p50_us, 500_000), (p99_us, 990_000), (worst_us, 1_000_000)] {
             assert!(found.abs_diff(expected) * 100 <= expected, "{found} us, {expected} expected");
         }

@@ -12,30 +12,29 @@ use crate::store::{
 use crate::tile::{Table, Tile};
 use std::time::{Duration, Instant};
 
-/// The disk as the pager sees it: the map's store, the threads that save and load beside the mapper, and the counts of
-/// both.
+/// Disk access of the pager: the map's store, the threads that save and load in the background, and counts of both.
 #[derive(Debug)]
 pub(super) struct TileDisk {
     config: MapConfig,
     store: TileStore,
     spills: SpillFiles,
-    /// Saves on the mapper's own thread.
+    /// Saves tiles on the mapper's own thread.
     saver: TileSaver,
     threads: IoThreads,
     stalls: Stalls,
     counts: IoCounts,
-    /// Tiles on disk that were neither read nor written since the map was opened: nobody knows whether they are whole.
-    /// Updates are not buffered for these, so that a damaged tile is found before a scan is accepted.
+    /// Tiles on disk that were neither read nor written since the map was opened, and may be damaged. Their updates are
+    /// not buffered, so that damage is found before a scan is accepted.
     unread: TileTable<()>,
-    /// Tiles written since the caller last asked.
+    /// Tiles written since the last call of `take_written`.
     written: TileTable<()>,
-    /// Why a save beside the mapper failed; its tile is still dirty.
+    /// Error of a failed background save, whose tile is still dirty.
     save_error: Option<Error>,
-    /// What makes blocks of the points of scans that are kept.
+    /// Encoder for the points of kept scans.
     blocks: PointBlocks,
 }
 
-/// Bytes of memory that a voxel of a tile on disk takes, about.
+/// Approximate bytes of memory per voxel of a tile on disk.
 pub(super) const BYTES_OF_VOXEL: usize = 6;
 
 impl TileDisk {
@@ -61,12 +60,12 @@ impl TileDisk {
         &self.store
     }
 
-    /// Whether a tile is on disk and nobody knows whether it is whole.
+    /// Returns whether a tile is on disk and was not verified yet.
     pub(super) fn is_unread(&self, index: TileIndex) -> bool {
         self.unread.contains(index)
     }
 
-    /// Does something that keeps the mapper waiting for the disk, and counts how long.
+    /// Runs an operation that the mapper waits for, and counts the time.
     pub(super) fn stall<T>(&mut self, wait: impl FnOnce(&mut Self) -> T) -> T {
         let since = Instant::now();
         let answer = wait(self);
@@ -74,18 +73,18 @@ impl TileDisk {
         answer
     }
 
-    /// Counts how long the mapper waited.
+    /// Counts the time of a wait.
     pub(super) fn note_stall(&mut self, time: Duration) {
         self.stalls.note(time);
     }
 
     // Reading.
 
-    /// Reads a tile's table; `None` if it is not on disk.
+    /// Reads the table of a tile; `None` if it is not on disk.
     ///
     /// # Errors
     ///
-    /// Damage, and a disk that refuses.
+    /// Fails if the tile is damaged or the read fails.
     pub(super) fn read(&mut self, index: TileIndex) -> Result<Option<Table>> {
         if !self.store.tiles().contains(index) {
             return Ok(None);
@@ -103,17 +102,17 @@ impl TileDisk {
         self.unread.remove(index);
     }
 
-    /// Whether another tile may be prefetched.
+    /// Returns whether another tile may be prefetched.
     pub(super) fn can_prefetch(&self) -> bool {
         self.threads.can_load()
     }
 
-    /// Whether a tile is being prefetched.
+    /// Returns whether a tile is being prefetched.
     pub(super) fn is_prefetching(&self, index: TileIndex) -> bool {
         self.threads.is_loading(index)
     }
 
-    /// Begins to read a tile beside the mapper, if it is on disk.
+    /// Begins to read a tile in the background, if it is on disk.
     pub(super) fn prefetch(&mut self, index: TileIndex) {
         if let Some(location) = self.store.tables().location(index) {
             let voxels = self.store.tiles().version(index).map_or(0, |version| version.voxels) as usize;
@@ -121,14 +120,14 @@ impl TileDisk {
         }
     }
 
-    /// A prefetch that has ended, if there is one; without a table if it failed. The tile is read again when it is
-    /// needed, and the error reported then.
+    /// Returns a prefetch that has ended, if any; without a table if it failed. The tile is then read again when it is
+    /// needed, which reports the error.
     pub(super) fn take_prefetched(&mut self) -> Option<(TileIndex, Option<Table>)> {
         let loaded = self.threads.take_loaded()?;
         Some(self.note_prefetched(loaded))
     }
 
-    /// Waits for a prefetch to end; `None` if none is in flight.
+    /// Waits for a prefetch to end; `None` if none is running.
     pub(super) fn wait_prefetched(&mut self) -> Option<(TileIndex, Option<Table>)> {
         let loaded = self.threads.wait_loaded()?;
         Some(self.note_prefetched(loaded))
@@ -138,7 +137,7 @@ impl TileDisk {
         let Loaded { index, result } = loaded;
         let Ok(read) = result else { return (index, None) };
         if self.store.tiles().version(index).is_some_and(|version| version.table != read.file) {
-            return (index, None); // A flush beside the mapper has written a newer one meanwhile.
+            return (index, None); // A background flush has written a newer version since.
         }
         self.note_read(index, read.file.bytes);
         self.counts.prefetches += 1;
@@ -147,25 +146,25 @@ impl TileDisk {
 
     // Writing.
 
-    /// Writes a tile's next version and returns it. No save of the tile may be in flight: an older version must not
-    /// come after this one.
+    /// Writes the next version of a tile and returns it. No save of the tile may be running, because its older version
+    /// could overwrite this one.
     ///
     /// # Errors
     ///
-    /// A disk that refuses.
+    /// Fails if the write fails.
     pub(super) fn write(&mut self, tile: &Tile, scan_number: u64) -> Result<TileVersion> {
         let version = self.saver.save(&mut self.store, tile, scan_number)?;
         self.note_written(tile.index(), version);
         Ok(version)
     }
 
-    /// Notes that a flush beside the mapper has written a tile.
+    /// Records that a background flush has written a tile.
     pub(super) fn note_flushed(&mut self, index: TileIndex, version: TileVersion) {
         self.store.tiles_mut().note_next(index, version);
         self.note_written(index, version);
     }
 
-    /// Notes that such a flush has read a tile of so many bytes to write it.
+    /// Counts a tile of `bytes` bytes that a background flush has read.
     pub(super) fn note_read_to_flush(&mut self, bytes: u64) {
         self.counts.loads += 1;
         self.counts.bytes_read += bytes;
@@ -178,47 +177,47 @@ impl TileDisk {
         self.written.insert(index, ());
     }
 
-    /// The tiles written since the last call, in order of their indices.
+    /// Returns the tiles written since the last call, sorted by index.
     pub(super) fn take_written(&mut self) -> Vec<TileIndex> {
         std::mem::take(&mut self.written).tiles().collect()
     }
 
-    /// Whether another tile may be saved beside the mapper.
+    /// Returns whether another tile may be saved in the background.
     pub(super) fn can_save(&self) -> bool {
         self.threads.can_save()
     }
 
-    /// Whether a version of a tile is being saved beside the mapper.
+    /// Returns whether a version of a tile is being saved in the background.
     pub(super) fn is_saving(&self, index: TileIndex) -> bool {
         self.threads.is_saving(index)
     }
 
-    /// What begins a save beside the mapper.
+    /// Returns a writer for a background save.
     ///
     /// # Errors
     ///
-    /// A disk that refuses to finish what the last commit left to do.
+    /// Fails if the rest of the last commit cannot be completed.
     pub(super) fn writer(&mut self) -> Result<TileWriter> {
         self.store.writer()
     }
 
-    /// Begins to save a tile beside the mapper.
+    /// Begins to save a tile in the background.
     pub(super) fn save(&mut self, writer: TileWriter, index: TileIndex, tile: CompactTile, scan_number: u64) {
         self.threads.save(writer, index, tile, scan_number);
     }
 
-    /// A save that has ended, if there is one; [`TileDisk::note_saved`] is to be told of it.
+    /// Returns a save that has ended, if any; pass it to [`TileDisk::note_saved`].
     pub(super) fn take_saved(&mut self) -> Option<Saved> {
         self.threads.take_saved()
     }
 
-    /// Waits for a save to end; `None` if none is in flight.
+    /// Waits for a save to end; `None` if none is running.
     pub(super) fn wait_saved(&mut self) -> Option<Saved> {
         self.threads.wait_saved()
     }
 
-    /// Takes note of a save that has ended; returns the version that is on disk now. `is_current` tells whether the
-    /// tile in memory still is the version that was saved: otherwise it is written again, and an error does not matter.
+    /// Records the end of a save; returns the version that is on disk now. `is_current` is whether the tile in memory
+    /// is still the saved version; otherwise it is written again, and an error is ignored.
     pub(super) fn note_saved(&mut self, saved: Saved, is_current: bool) -> Option<TileVersion> {
         let Saved { index, result, .. } = saved;
         match result {
@@ -233,23 +232,23 @@ impl TileDisk {
         None
     }
 
-    /// Whether a save beside the mapper has failed, and nobody was told.
+    /// Returns whether a background save has failed and the error was not taken.
     pub(super) fn has_save_error(&self) -> bool {
         self.save_error.is_some()
     }
 
-    /// Why a save beside the mapper has failed, told once.
+    /// Takes the error of a failed background save, so that it is reported once.
     pub(super) fn take_save_error(&mut self) -> Option<Error> {
         self.save_error.take()
     }
 
-    // Updates in files.
+    // Spilled updates.
 
-    /// Appends updates of a tile to its spill file, behind the bytes that count so far.
+    /// Appends updates of a tile to its spill file after the bytes in use.
     ///
     /// # Errors
     ///
-    /// A disk that refuses; the file is as before.
+    /// Fails if the write fails; the bytes in use are unchanged.
     pub(super) fn spill(
         &mut self,
         index: TileIndex,
@@ -266,7 +265,7 @@ impl TileDisk {
     ///
     /// # Errors
     ///
-    /// A disk that refuses, or a file that is not what was written.
+    /// Fails if the read fails or the content is not what was written.
     pub(super) fn read_spill(
         &mut self,
         index: TileIndex,
@@ -279,33 +278,32 @@ impl TileDisk {
             .map_err(|error| Error::io(&self.store.layout().spill(index), "read", error))
     }
 
-    /// Removes a tile's spill file.
     pub(super) fn remove_spill(&self, index: TileIndex) {
         self.spills.remove(index);
     }
 
-    /// Cuts a tile's spill file to the bytes that count.
+    /// Truncates a tile's spill file to the bytes in use.
     pub(super) fn cut_spill(&self, index: TileIndex, file: SpillFile) {
         self.spills.cut(index, file);
     }
 
     // Commits.
 
-    /// Makes a map of the original format, before its first change, one of voxtile's own.
+    /// Upgrades a map of the original format before its first change.
     ///
     /// # Errors
     ///
-    /// Damage, and a disk that refuses.
+    /// Fails if the map is damaged or a disk operation fails.
     pub(super) fn upgrade(&mut self, inputs: &[InputRecord]) -> Result<()> {
         let Self { store, saver, config, .. } = self;
         upgrade(store, saver, config, |map_id| new_metadata(config, map_id, inputs))
     }
 
-    /// Writes the points of a scan that is to be kept.
+    /// Writes the points of a scan to be kept.
     ///
     /// # Errors
     ///
-    /// Points that cannot be read, a disk that refuses; nothing is kept then.
+    /// Fails if points cannot be read or written; nothing is kept then.
     pub(super) fn keep(&mut self, scan: &dyn ScanPoints) -> Result<SegmentPlace> {
         let (archive, blocks) = (self.store.archive_mut(), &mut self.blocks);
         archive.begin_scan()?;
@@ -324,12 +322,12 @@ impl TileDisk {
         }
     }
 
-    /// Takes back a scan that was written and not noted.
-    pub(super) fn give_up_kept(&mut self) {
+    /// Discards the points of a scan that were written by [`Self::keep`] but not recorded.
+    pub(super) fn discard_kept(&mut self) {
         self.store.archive_mut().give_up_scan();
     }
 
-    /// Records a scan or a batch of the next commit.
+    /// Records a scan or a batch for the next commit.
     pub(super) fn note(&mut self, entry: CatalogEntry) {
         match entry {
             CatalogEntry::Listed(scan) => self.store.note_scan(scan),
@@ -337,26 +335,26 @@ impl TileDisk {
         }
     }
 
-    /// The store, to write a catalog.
+    /// The store, for writing a catalog.
     pub(super) fn store_mut(&mut self) -> &mut TileStore {
         &mut self.store
     }
 
-    /// Commits all that was written.
+    /// Commits everything written so far.
     ///
     /// # Errors
     ///
-    /// A disk that refuses; nothing is committed then.
+    /// Fails if a disk operation fails; nothing is committed then.
     pub(super) fn commit(&mut self, inputs: &[InputRecord], scan_number: u64) -> Result<()> {
         let metadata = self.metadata(inputs);
         self.store.commit(metadata, scan_number)
     }
 
-    /// Begins a commit that another thread completes, and returns what writes its tiles.
+    /// Begins a commit that another thread completes, and returns the writer for its tiles.
     ///
     /// # Errors
     ///
-    /// A disk that refuses to finish what the last commit left to do.
+    /// Fails if the rest of the last commit cannot be completed.
     pub(super) fn begin_commit(
         &mut self,
         inputs: &[InputRecord],
@@ -376,33 +374,33 @@ impl TileDisk {
         metadata
     }
 
-    /// Keeps the last commit under a name.
+    /// Creates a snapshot of the last commit.
     ///
     /// # Errors
     ///
-    /// A name that is taken, and a disk that refuses.
+    /// Fails if the name is in use or a disk operation fails.
     pub(super) fn create_snapshot(&mut self, name: &SnapshotName) -> Result<()> {
         self.store.snapshot_writer().create(name)
     }
 
     // Counts.
 
-    /// Bytes of memory of tiles in flight.
+    /// Bytes of memory of tiles that are being read or saved.
     pub(super) fn in_flight_bytes(&self) -> usize {
         self.threads.bytes()
     }
 
-    /// Bytes of the index of tiles, without what a commit takes.
+    /// Bytes of the index of tiles, without those of a commit.
     pub(super) fn index_bytes(&self) -> usize {
         self.store.index_bytes() + self.unread.bytes() + self.written.bytes()
     }
 
-    /// Bytes of memory that a commit takes now.
+    /// Bytes of memory that a commit would take now.
     pub(super) fn commit_bytes(&self) -> usize {
         self.store.commit_bytes()
     }
 
-    /// Adds the disk's part of the statistics.
+    /// Adds the counts of the disk to the statistics.
     pub(super) fn count_into(&self, statistics: &mut MapStatistics) {
         let versions = self.store.tiles().versions();
         statistics.disk_bytes = versions.map(|version| version.table.bytes + version.octree.bytes).sum();

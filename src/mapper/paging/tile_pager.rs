@@ -18,12 +18,13 @@ use crate::tile::{Table, Tile};
 use rustc_hash::FxHashMap;
 use std::sync::Arc;
 
-/// The tiles of an out-of-core map: which are in memory, and what is buffered for the others.
+/// Pager of an out-of-core map: decides which tiles are in memory and buffers updates of the others.
 ///
-/// This file accepts scans and answers for tiles. `eviction` makes room, `prefetch` fetches tiles ahead, `flush` makes
-/// the map durable.
+/// This file accepts scans and provides tiles. `eviction` frees memory, `prefetch` loads tiles ahead of use, `flush`
+/// makes the map durable.
 ///
-/// It lets go of the contents while it waits for the disk, so that readers in other threads need not wait for it.
+/// The pager releases the lock on the contents while it waits for the disk, so that readers in other threads can
+/// continue.
 #[derive(Debug)]
 pub(in crate::mapper) struct TilePager<'a> {
     pub(super) config: &'a MapConfig,
@@ -36,23 +37,23 @@ pub(in crate::mapper) struct TilePager<'a> {
 /// Expected growth of a tile or of the write buffer per update, in bytes.
 const BYTES_OF_UPDATE: usize = 4;
 
-/// A tile whose spill file is longer than this is brought in: applying so much is cheaper than keeping it.
+/// Length of a spill file from which a tile is loaded: applying so many updates is cheaper than keeping them.
 const MAX_SPILLED_BYTES: u64 = 1 << 20;
 
-/// Below so many bytes of updates a tile is never read only to apply them.
+/// A tile with fewer bytes of updates is never read only to apply them.
 const MIN_BYTES_TO_LOAD_FOR: u64 = 1 << 14;
 
-/// New tiles are made so many bytes at a time, about: then what they really take is known.
+/// New tiles are created in groups of about so many bytes, so that their actual size is known before the next group.
 const BYTES_OF_NEW_TILES: usize = 4 << 20;
 
-/// Bytes of memory that a new tile takes once it has these updates, about.
+/// Approximate bytes of memory of a new tile with these updates.
 fn bytes_of_new_tile(updates: &TileUpdates) -> usize {
     const TILE: usize = 2 << 10;
     const BRICK: usize = 384;
     TILE + match updates {
         TileUpdates::Masks(bricks) => BRICK * bricks.len(),
         TileUpdates::Runs(runs) => BRICK * runs.brick_count(),
-        // A brick of few voxels takes some 25 bytes packed, and of many as many as they.
+        // A packed brick with few voxels takes about 25 bytes; with many voxels it grows with them.
         TileUpdates::Packed(packed) => BRICK / 25 * packed.bytes(),
         TileUpdates::Ordered(updates) => 8 * updates.len(),
     }
@@ -72,14 +73,13 @@ impl TilePager<'_> {
 
     // Scans.
 
-    /// Number of scans in the map.
     pub(in crate::mapper) fn scan_number(&self) -> u64 {
         self.contents.scan_number
     }
 
-    /// Does all that may fail before the updates can be accepted. The map's content stays as it is.
+    /// Does everything that may fail before the updates are accepted, without changing the content of the map.
     ///
-    /// `scan_bytes` are the bytes of memory that inserting scans takes, with these updates.
+    /// `scan_bytes` is the memory for inserting scans, including these updates.
     pub(in crate::mapper) fn prepare(&mut self, updates: &ScanUpdates, scan_bytes: usize) -> Result<()> {
         let index_bytes = self.disk.index_bytes() + self.disk.commit_bytes();
         self.contents.cache.note_index(index_bytes);
@@ -89,21 +89,21 @@ impl TilePager<'_> {
         self.drain_buffer()?;
         for (tile, _) in &updates.tiles {
             let is_wanted = self.disk.is_unread(*tile) || (self.exists(*tile) && self.has_room_to_spare());
-            if is_wanted && self.contents.can_come_in(*tile) {
+            if is_wanted && self.contents.can_be_loaded(*tile) {
                 self.load(*tile)?;
             }
         }
-        self.bring_in_packed(updates)?;
+        self.unpack_often_changed(updates)?;
         let all: usize = updates.tiles.iter().map(|(_, updates)| updates.len()).sum();
         let copied = self.contents.bytes_to_copy(updates.tiles.iter().map(|(tile, _)| *tile));
-        // A tile that is made new by the updates is one tile more than there are.
+        // A tile that the updates create is an additional tile.
         self.make_room_for(BYTES_OF_UPDATE * all + copied)?;
         self.keep_pace();
         Ok(())
     }
 
-    /// Accepts the updates, staged parts first: resident tiles take theirs at once, those of other tiles are buffered.
-    /// Cannot fail. Returns the tiles that were touched, in order.
+    /// Accepts the updates, staged parts first: applies those of resident tiles and buffers the others. Cannot fail.
+    /// Returns the changed tiles, in order.
     pub(in crate::mapper) fn accept(&mut self, updates: ScanUpdates) -> Vec<TileIndex> {
         let touched =
             updates.tiles.iter().map(|(index, _)| *index).chain(self.contents.buffer.staged_tiles());
@@ -115,7 +115,7 @@ impl TilePager<'_> {
         let mut resident = FxHashMap::default();
         let mut others = Vec::new();
         for (index, tile_updates) in updates.tiles {
-            // The tile becomes the one used last.
+            // `get` marks the tile as the most recently used.
             match self.contents.cache.get(index) {
                 Some(_) => drop(resident.insert(index, tile_updates)),
                 None => others.push((index, tile_updates)),
@@ -142,23 +142,22 @@ impl TilePager<'_> {
         touched
     }
 
-    /// Whether the map keeps its scans.
     pub(in crate::mapper) fn keeps_scans(&self) -> bool {
         self.store().archive().is_on()
     }
 
-    /// Writes the points of a scan that is to be kept. That it is kept is to be noted, or it is given up.
+    /// Writes the points of a scan to be kept. The caller then records the scan or calls [`Self::discard_kept`].
     pub(in crate::mapper) fn keep(&mut self, scan: &dyn ScanPoints) -> Result<SegmentPlace> {
         self.upgrade()?;
         self.wait(|disk| disk.keep(scan))
     }
 
-    /// Takes back a scan that was written and not noted.
-    pub(in crate::mapper) fn give_up_kept(&mut self) {
-        self.disk.give_up_kept();
+    /// Discards the points of a scan that were written but not recorded.
+    pub(in crate::mapper) fn discard_kept(&mut self) {
+        self.disk.discard_kept();
     }
 
-    /// Notes the last scan: where and when it was taken, or what is kept of it.
+    /// Records the last scan: origin and time stamp, or the record of the kept scan.
     pub(in crate::mapper) fn note_scan(&mut self, scan: &dyn ScanPoints, kept: Option<KeptRecord>) {
         let number = self.contents.scan_number;
         self.disk.note(match kept {
@@ -167,35 +166,35 @@ impl TilePager<'_> {
         });
     }
 
-    /// Notes that the last number is that of a batch.
+    /// Records that the last number belongs to a batch.
     pub(in crate::mapper) fn note_batch(&mut self) {
         let number = self.contents.scan_number;
         self.disk.note(CatalogEntry::Unlisted(number, number));
     }
 
-    /// Goes on counting scans behind this number.
+    /// Continues the scan numbers after this one.
     pub(in crate::mapper) fn set_scan_number(&mut self, number: u64) {
         self.contents.scan_number = number;
     }
 
-    /// Notes that the poses of the map's inputs are not known any more.
+    /// Removes the poses from the records of the map's inputs, because they are no longer valid.
     pub(in crate::mapper) fn forget_poses_of_inputs(&mut self) {
         let contents = self.contents.inputs.iter_mut().filter_map(|input| input.content.as_mut());
         contents.for_each(|content| content.pose_chain.clear());
     }
 
-    /// The store, to write a catalog.
+    /// The store, for writing a catalog.
     pub(in crate::mapper) fn store_mut(&mut self) -> &mut TileStore {
         self.disk.store_mut()
     }
 
-    /// Makes tiles of what was observed first in them.
+    /// Creates tiles from their first updates.
     fn make_tiles(&mut self, new: Vec<(TileIndex, TileUpdates)>) {
         let model = &self.config.sensor_model;
         self.contents.cache.put_new(new, |tile, updates| tile.apply(model, &updates));
     }
 
-    /// Stages a part of a scan in files, until the scan is accepted or given up.
+    /// Stages a part of a scan in files, until the scan is accepted or discarded.
     pub(in crate::mapper) fn stage(&mut self, part: Vec<(TileIndex, PackedUpdates)>) -> Result<()> {
         self.upgrade()?;
         for (index, updates) in part {
@@ -214,16 +213,16 @@ impl TilePager<'_> {
         self.make_room_for(0)
     }
 
-    /// Takes back what a scan that was not accepted has staged.
+    /// Discards the staged parts of a scan that was not accepted.
     pub(in crate::mapper) fn discard_staged(&mut self) {
         self.contents.buffer.discard_staged(&self.disk);
     }
 
-    /// Shrinks the write buffer to its share of memory: updates are applied, or spilled where that is cheaper.
+    /// Shrinks the write buffer to its share of the memory: updates are applied, or spilled if that is cheaper.
     fn drain_buffer(&mut self) -> Result<()> {
-        let most_bytes = self.plan().buffer_bytes();
-        for tile in self.contents.heaviest_beyond(most_bytes) {
-            // A flush beside the mapper is about to apply what is frozen.
+        let max_bytes = self.plan().buffer_bytes();
+        for tile in self.contents.heaviest_beyond(max_bytes) {
+            // A background flush is about to apply the frozen updates.
             if self.contents.buffer.is_staged(tile) || self.contents.buffer.is_frozen(tile) {
                 continue;
             }
@@ -236,8 +235,8 @@ impl TilePager<'_> {
             }
         }
         // Even a short spill file has an entry in memory, so their number is limited.
-        let most_files = most_bytes / 2 / WriteBuffer::BYTES_OF_FILE;
-        let too_many = self.contents.buffer.spill_files().saturating_sub(most_files);
+        let max_files = max_bytes / 2 / WriteBuffer::BYTES_OF_FILE;
+        let too_many = self.contents.buffer.spill_files().saturating_sub(max_files);
         for tile in self.contents.buffer.longest_files(MAX_SPILLED_BYTES, too_many) {
             self.load_buffered(tile)?;
         }
@@ -248,10 +247,10 @@ impl TilePager<'_> {
     ///
     /// # Errors
     ///
-    /// A disk that refuses; the updates stay in memory.
+    /// Fails if the write fails; the updates then remain in memory.
     fn spill(&mut self, index: TileIndex) -> Result<()> {
         if self.contents.buffer.is_frozen(index) {
-            self.end_flight();
+            self.end_background_flush();
         }
         let (before, updates) = self.contents.buffer.of(index);
         if let Some(updates) = updates.filter(|updates| !updates.is_empty()) {
@@ -262,16 +261,16 @@ impl TilePager<'_> {
     }
 
     fn load_buffered(&mut self, tile: TileIndex) -> Result<()> {
-        // It may have come in with another.
+        // It may have been loaded by an earlier iteration.
         if self.contents.has_applicable(tile) {
             self.load(tile)?;
         }
         Ok(())
     }
 
-    /// Whether spilling a tile's updates costs less than applying them. Applying reads and writes the tile, so it pays
-    /// only once the updates are as large as the tile. Disk traffic then stays proportional to the updates, as in a
-    /// log-structured merge tree (O'Neil et al., 1996).
+    /// Returns whether spilling a tile's updates costs less than applying them. To apply them, the tile is read and
+    /// written, which pays off only once the updates are as large as the tile. Disk traffic thus remains proportional
+    /// to the updates, as in a log-structured merge tree (O'Neil et al., 1996).
     pub(super) fn is_spilling_cheaper(&self, tile: TileIndex) -> bool {
         let is_near = self.contents.cache.contains(tile) || self.disk.is_prefetching(tile);
         if !self.contents.cache.has_compact_tier() || is_near {
@@ -283,17 +282,17 @@ impl TilePager<'_> {
 
     // Tiles.
 
-    /// Whether anything was observed in a tile.
+    /// Returns whether a tile contains observations.
     pub(in crate::mapper) fn exists(&self, index: TileIndex) -> bool {
         self.store().tiles().contains(index) || self.contents.holds(index)
     }
 
-    /// Where something was observed.
+    /// The tiles that contain observations.
     pub(in crate::mapper) fn space(&self) -> &TileSpace {
         self.contents.space()
     }
 
-    /// A tile, brought into memory; `None` if nothing was observed in it.
+    /// Returns a tile and loads it into memory; `None` if it contains no observations.
     pub(in crate::mapper) fn tile(&mut self, index: TileIndex) -> Result<Option<Arc<Tile>>> {
         if let Some(tile) = self.contents.cache.get(index) {
             return Ok(Some(tile.clone()));
@@ -302,14 +301,14 @@ impl TilePager<'_> {
             return Ok(None);
         }
         let tile = Arc::new(self.read(index)?);
-        // If the disk refuses an eviction, the query is answered from a copy.
+        // If an eviction fails, the query uses a copy that is not cached.
         if self.make_room(&tile).is_ok() {
             self.put(tile.clone());
         }
         Ok(Some(tile))
     }
 
-    /// The evidence of a voxel, whose tile is brought into memory.
+    /// Returns the evidence of a voxel and loads its tile into memory.
     pub(in crate::mapper) fn evidence(&mut self, voxel: VoxelIndex) -> Result<Option<Evidence>> {
         let index = self.config.grid.tile_of_voxel(voxel);
         if let Some(tile) = self.contents.cache.get(index) {
@@ -318,7 +317,7 @@ impl TilePager<'_> {
         Ok(self.tile(index)?.and_then(|tile| tile.evidence_of_own(voxel)))
     }
 
-    /// A tile as it is now, without bringing it into memory.
+    /// Returns the current state of a tile without caching it.
     pub(in crate::mapper) fn tile_uncached(&mut self, index: TileIndex) -> Result<Option<Arc<Tile>>> {
         if let Some(tile) = self.contents.cache.peek(index) {
             return Ok(Some(tile.clone()));
@@ -332,9 +331,9 @@ impl TilePager<'_> {
         Ok(Some(Arc::new(tile)))
     }
 
-    /// Brings a tile into memory, with its buffered updates.
+    /// Loads a tile into memory, with its buffered updates applied.
     pub(super) fn load(&mut self, index: TileIndex) -> Result<()> {
-        // Read first: a tile that cannot be read evicts nothing.
+        // Read first, so that a tile that cannot be read evicts none.
         let tile = Arc::new(self.read(index)?);
         log::debug!("tile {index}: loaded");
         if !self.contents.cache.is_resident(index) {
@@ -344,17 +343,17 @@ impl TilePager<'_> {
         Ok(())
     }
 
-    /// Puts a tile into memory. Its buffered updates are applied already, so they are dropped. The caller has made
-    /// room.
+    /// Puts a tile into memory and drops its buffered updates, which it already includes. The caller has freed the
+    /// memory.
     pub(super) fn put(&mut self, tile: Arc<Tile>) {
         self.contents.put(tile, &self.disk);
     }
 
-    /// A tile that is not resident, with its buffered updates applied.
+    /// Reads a tile that is not resident and applies its buffered updates.
     pub(super) fn read(&mut self, index: TileIndex) -> Result<Tile> {
         self.end_prefetch_of(index)?;
         if let Some(tile) = self.contents.cache.peek(index) {
-            return Ok(Tile::clone(tile)); // It has just arrived.
+            return Ok(Tile::clone(tile)); // Its prefetch has just ended.
         }
         let (table, is_dirty) = self.fetch(index)?;
         let mut tile = self.make_tile(index, table)?;
@@ -364,14 +363,14 @@ impl TilePager<'_> {
         Ok(tile)
     }
 
-    /// A tile made of its table, with its buffered updates applied.
+    /// Builds a tile from its table and applies its buffered updates.
     pub(super) fn make_tile(&mut self, index: TileIndex, table: Table) -> Result<Tile> {
         let mut tile = self.contents.cache.make_tile(index, table);
         self.apply_buffered(&mut tile)?;
         Ok(tile)
     }
 
-    /// Applies a tile's buffered updates to it. They stay in the buffer.
+    /// Applies buffered updates to a tile; they also remain in the buffer.
     fn apply_buffered(&mut self, tile: &mut Tile) -> Result<()> {
         let (index, model) = (tile.index(), &self.config.sensor_model);
         let (spilled, in_memory) = self.contents.buffer.of(index);
@@ -382,22 +381,22 @@ impl TilePager<'_> {
         Ok(())
     }
 
-    /// The table of a tile that is not resident, without its buffered updates, and whether it differs from the one on
-    /// disk; an empty one if there is none yet.
+    /// Returns the table of a tile that is not resident, without its buffered updates, and whether it differs from the
+    /// version on disk. The table is empty if the tile does not exist yet.
     fn fetch(&mut self, index: TileIndex) -> Result<(Table, bool)> {
         if let Some(Cached::Compact(tile)) = self.contents.cache.find(index) {
             return Ok((tile.decode(&self.config.grid, index)?, self.contents.cache.is_dirty(index)));
         }
         let mut read = self.wait(|disk| disk.read(index));
         if read.is_err() && self.contents.buffer.is_frozen(index) {
-            // A flush beside the mapper may have written it anew, and not said so yet.
-            self.end_flight();
+            // A background flush may have rewritten the tile without having recorded it yet.
+            self.end_background_flush();
             read = self.wait(|disk| disk.read(index));
         }
         Ok((read?.unwrap_or_default(), false))
     }
 
-    /// Number of voxels of a tile in memory, or of its latest version on disk; buffered updates are left out.
+    /// Number of voxels of a tile in memory, or of its latest version on disk, without buffered updates.
     pub(in crate::mapper) fn voxels_of_tile_hint(&self, index: TileIndex) -> Option<u64> {
         match self.contents.cache.find(index) {
             Some(Cached::Resident(tile)) => Some(tile.table().len() as u64),
@@ -406,7 +405,7 @@ impl TilePager<'_> {
         }
     }
 
-    /// Every tile in which something was observed, in order.
+    /// All tiles that contain observations, in order.
     pub(in crate::mapper) fn tile_indices(&self) -> Vec<TileIndex> {
         let mut indices: Vec<_> = self.store().tiles().iter().chain(self.contents.held_tiles()).collect();
         indices.sort_unstable();
@@ -414,7 +413,7 @@ impl TilePager<'_> {
         indices
     }
 
-    /// Number of tiles in which something was observed.
+    /// Number of tiles that contain observations.
     pub(super) fn count_tiles(&self) -> usize {
         let is_new = |index: &TileIndex| !self.store().tiles().contains(*index);
         let cached = self.contents.cache.indices().filter(is_new).count();
@@ -432,28 +431,29 @@ impl TilePager<'_> {
         self.contents.cache.resident_indices()
     }
 
-    /// Whether a flush goes on beside the mapper.
+    /// Returns whether a background flush is running.
     pub(in crate::mapper) fn is_flushing(&self) -> bool {
         self.contents.is_flushing()
     }
 
-    /// Whether a tile has updates that are not on disk.
+    /// Returns whether a tile has updates that are not on disk.
     pub(in crate::mapper) fn is_dirty(&self, index: TileIndex) -> bool {
         self.contents.is_dirty(index)
     }
 
-    /// Drops a tile from memory and reads it from disk again; tells whether it is there.
+    /// Drops a tile from memory and reads it from disk again; returns whether it exists.
     ///
     /// # Errors
     ///
-    /// [`Error::UnsavedChanges`] if updates would be lost and `discard_changes` is false; a tile that cannot be read.
+    /// Fails with [`Error::UnsavedChanges`] if updates would be lost and `discard_changes` is false, or if the tile
+    /// cannot be read.
     pub(in crate::mapper) fn reload(&mut self, index: TileIndex, discard_changes: bool) -> Result<bool> {
         if self.is_dirty(index) && !discard_changes {
             return Err(Error::UnsavedChanges { tile: index });
         }
-        self.end_flight();
+        self.end_background_flush();
         self.end_io()?;
-        // All that may fail comes before anything is let go.
+        // Steps that may fail precede the removal.
         let table = self.wait(|disk| disk.read(index))?;
         let tile = table.map(|table| self.contents.cache.make_tile(index, table));
         if let Some(tile) = &tile
@@ -474,12 +474,11 @@ impl TilePager<'_> {
         self.disk.take_written()
     }
 
-    /// Begins to note what is on disk for readers in other threads. They may take so many bytes of memory for tiles
-    /// that they make.
+    /// Begins to track the tiles on disk for readers in other threads. Readers may cache `bytes` bytes of tiles.
     ///
     /// # Errors
     ///
-    /// For a map of the original format, as for [`TilePager::upgrade`]; a system that gives no threads.
+    /// Same errors as [`TilePager::upgrade`] for a map of the original format; also fails if threads cannot be started.
     pub(in crate::mapper) fn open_to_readers(&mut self, bytes: usize) -> Result<TileReader> {
         self.upgrade()?;
         let threads = TileThreads::own(self.store().folder())?;
@@ -494,27 +493,27 @@ impl TilePager<'_> {
         self.contents.cache.sync_octrees();
     }
 
-    /// Keeps the last flush under a name.
+    /// Creates a snapshot of the last flush.
     ///
     /// # Errors
     ///
-    /// A name that is taken, and a disk that refuses.
+    /// Fails if the name is in use or a disk operation fails.
     pub(in crate::mapper) fn create_snapshot(&mut self, name: &SnapshotName) -> Result<()> {
-        self.end_flight();
+        self.end_background_flush();
         self.wait(|disk| disk.create_snapshot(name))
     }
 
-    /// What the map was built from, the latest last.
+    /// Inputs that the map was built from, oldest first.
     pub(in crate::mapper) fn inputs(&self) -> &[InputRecord] {
         &self.contents.inputs
     }
 
-    /// The input that the map is being built from.
+    /// The current input.
     pub(in crate::mapper) fn last_input_mut(&mut self) -> Option<&mut InputRecord> {
         self.contents.inputs.last_mut()
     }
 
-    /// Bytes of memory of all that grows, by what they hold.
+    /// Bytes of memory that count towards the limit, by purpose.
     pub(super) fn memory(&self) -> MemoryCounts {
         MemoryCounts {
             in_flight: self.in_flight_bytes() as u64,

@@ -6,42 +6,41 @@ use crate::store::{SpillFile, TileReader, TileVersion};
 use crate::tile::Tile;
 use std::sync::Arc;
 
-/// A tile at some time, wherever it is. It is cheap to copy and does not change.
+/// State of a tile at some time. It is immutable and cheap to clone.
 #[derive(Clone, Debug)]
 pub(in crate::mapper) enum TileState {
-    /// Nothing was observed in it.
+    /// No observations.
     Nothing,
-    /// It is ready for use.
+    /// Ready for use.
     Resident(Arc<Tile>),
-    /// It has to be made.
+    /// To be built from its stored form.
     Stored(StoredTileState),
 }
 
-/// A tile that is not ready for use: what to begin with, and the updates to apply to that.
+/// Stored form of a tile: a base, and the updates to apply to it.
 #[derive(Clone, Debug)]
 pub(in crate::mapper) struct StoredTileState {
     pub(in crate::mapper) base: Base,
-    /// Updates in the tile's spill file, if it is not empty.
+    /// Updates in the tile's spill file; may be empty.
     pub(in crate::mapper) spilled: SpillFile,
-    /// Updates after these.
+    /// Updates that follow those in the spill file.
     pub(in crate::mapper) updates: Option<Arc<PackedUpdates>>,
 }
 
-/// What a stored tile is made from.
+/// Base of a stored tile.
 #[derive(Clone, Debug)]
 pub(in crate::mapper) enum Base {
-    /// Updates alone.
+    /// None: the tile consists of updates only.
     Nothing,
-    /// Its compact form in memory.
+    /// The compact form in memory.
     Compact(CompactTile),
     /// A version on disk.
     OnDisk(TileVersion),
-    /// A folder that the log does not name.
+    /// A tile folder that is missing from the commit log.
     Orphan,
 }
 
 impl TileState {
-    /// Bytes of memory.
     pub(super) fn bytes(&self) -> usize {
         size_of::<Self>()
             + match self {
@@ -56,11 +55,11 @@ impl TileState {
 }
 
 impl StoredTileState {
-    /// Applies the updates to a tile that was made of the base.
+    /// Applies the updates to a tile that was built from the base.
     ///
     /// # Errors
     ///
-    /// A disk that refuses; a spill file that is not what was written, or was removed.
+    /// Fails if a read fails, or if the spill file was removed or has other content than was written.
     pub(in crate::mapper) fn apply_updates(
         &self,
         tile: &mut Tile,
@@ -81,7 +80,7 @@ impl StoredTileState {
 }
 
 impl Base {
-    /// Whether both are the same tile in the same version.
+    /// Returns whether both are the same version of the same tile.
     pub(in crate::mapper) fn is_same(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Compact(own), Self::Compact(other)) => own.is_same(other),

@@ -7,26 +7,26 @@ use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 use std::thread;
 
-/// The threads that change tiles in parallel while the mapper holds the lock on the contents.
+/// Threads that change tiles in parallel while the mapper holds the lock on the contents.
 #[derive(Clone, Debug, Default)]
 pub(super) enum TileThreads {
-    /// Those of the caller's rayon pool: no other thread waits for the lock.
+    /// The caller's rayon pool, used while no other thread waits for the lock.
     #[default]
     OfCaller,
-    /// Threads that do no other work. If all threads of the caller's pool waited for the lock, work queued in that pool
-    /// would never start.
+    /// Dedicated threads. If all threads of the caller's pool waited for the lock, work queued in that pool would never
+    /// start.
     Own(Arc<ThreadPool>),
 }
 
-/// All maps of the process share these threads; they end with the last map that uses them.
+/// Threads shared by all maps of the process; they end with the last map that uses them.
 static SHARED: Mutex<Weak<ThreadPool>> = Mutex::new(Weak::new());
 
 impl TileThreads {
-    /// Starts threads that take no other work, as many as the caller's pool has.
+    /// Starts dedicated threads, as many as the caller's pool has.
     ///
     /// # Errors
     ///
-    /// A system that gives no threads; `folder` is the map's, for the error.
+    /// Fails if the threads cannot be started; `folder` is the map's, for the error.
     pub(super) fn own(folder: &Path) -> Result<Self> {
         let mut shared = SHARED.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(threads) = shared.upgrade() {
@@ -43,7 +43,7 @@ impl TileThreads {
         Ok(Self::Own(threads))
     }
 
-    /// Does `work` with each item in these threads; returns the results in the order of the items.
+    /// Runs `work` on each item in these threads; returns the results in the order of the items.
     pub(super) fn map<T: Send, R: Send>(&self, items: Vec<T>, work: impl Fn(T) -> R + Sync) -> Vec<R> {
         if items.len() < 2 {
             return items.into_iter().map(work).collect();
@@ -57,12 +57,12 @@ impl TileThreads {
     }
 }
 
-/// Runs `work` in the threads of a pool, and waits without doing anything else.
+/// Runs `work` in a pool and waits for it on a plain thread.
 ///
-/// A rayon worker that waits for another pool takes other work of its own pool meanwhile. That may be a question which
-/// needs the lock that the mapper holds. A plain thread only waits.
+/// A rayon worker that waits for another pool runs other jobs of its own pool meanwhile. Such a job may be a query that
+/// needs the lock held by the mapper, which would be a deadlock.
 fn install_idle<R: Send>(threads: &ThreadPool, work: impl FnOnce() -> R + Send) -> R {
-    /// The stack of a thread that only waits.
+    /// Stack size of the waiting thread.
     const STACK_BYTES: usize = 128 << 10;
     let work = Mutex::new(Some(work));
     let run = || {
@@ -73,6 +73,6 @@ fn install_idle<R: Send>(threads: &ThreadPool, work: impl FnOnce() -> R + Send) 
         let waiting = thread::Builder::new().stack_size(STACK_BYTES).spawn_scoped(scope, run);
         waiting.ok().and_then(|waiting| waiting.join().unwrap_or_else(|panic| resume_unwind(panic)))
     });
-    // If the system gives no thread, this one does not stay idle, which is better than a failure.
+    // If no thread can be started, this thread waits itself, which is better than a failure.
     done.or_else(run).expect("the work is done once, here or in the thread")
 }

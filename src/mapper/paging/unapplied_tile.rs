@@ -6,24 +6,25 @@ use crate::space::TileIndex;
 use crate::store::{TileLocation, TileReader};
 use crate::tile::{Table, Tile};
 
-/// A tile that is not in use, as of a flush beside the mapper, which makes it of its stored form and the updates that
-/// were buffered for it.
+/// Tile that is not resident, as of a background flush. The flush builds it from its stored form and its buffered
+/// updates.
 pub(super) struct UnappliedTile {
     pub(super) index: TileIndex,
     pub(super) state: StoredTileState,
-    /// Where the version on disk is, if that is the base.
+    /// Location of the version on disk, if that is the base.
     pub(super) location: Option<TileLocation>,
 }
 
 impl UnappliedTile {
-    /// Bytes of memory beside those of [`bytes`](Self::bytes), about: its location names a folder and a file.
+    /// Approximate bytes of memory in addition to [`bytes`](Self::bytes): its location contains a folder and a file
+    /// name.
     pub(super) const OWN_BYTES: usize = size_of::<Self>() + 2 * 96;
 
-    /// Makes the tile.
+    /// Builds the tile.
     ///
     /// # Errors
     ///
-    /// Damage, and a disk that refuses.
+    /// Fails if the tile is damaged or a read fails.
     pub(super) fn make(&self, files: &TileReader, config: &MapConfig) -> Result<Tile> {
         let (grid, index) = (&config.grid, self.index);
         let table = match (&self.state.base, &self.location) {
@@ -40,13 +41,13 @@ impl UnappliedTile {
         Ok(tile)
     }
 
-    /// Bytes of memory that others may let go of meanwhile.
+    /// Bytes of memory that other owners may release meanwhile.
     pub(super) fn bytes(&self) -> usize {
         let base = if let Base::Compact(tile) = &self.state.base { tile.bytes().len() } else { 0 };
         base + self.state.updates.as_ref().map_or(0, |updates| updates.bytes())
     }
 
-    /// Length of the file that is read, if one is.
+    /// Length of the file to read, if the base is on disk.
     pub(super) fn bytes_on_disk(&self) -> Option<u64> {
         match (&self.state.base, &self.location) {
             (Base::OnDisk(version), Some(_)) => Some(version.table.bytes),

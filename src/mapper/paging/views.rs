@@ -4,25 +4,25 @@ use crate::store::TileVersion;
 use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::BTreeMap;
 
-/// Who looks at the map as it was, and what they see of it that has changed since.
+/// Open views, and the old states of tiles that they see.
 ///
-/// The map does not wait for them: before a tile changes, its state is kept if somebody may still ask for it. A
-/// resident tile is kept by another reference to it, so that changing it makes a copy (copy on write).
+/// The map does not wait for views: before a tile changes, its state is kept if an open view may read it. A resident
+/// tile is kept by another reference to it, so that the change copies it (copy on write).
 #[derive(Debug, Default)]
 pub(super) struct Views {
-    /// How often the content has changed.
+    /// Number of changes of the content; serves as time.
     now: u64,
-    /// How many views were opened at each time.
+    /// Number of views opened at each time.
     open: BTreeMap<u64, usize>,
-    /// What tiles were until a time, in order.
+    /// Old states of tiles, each with the last time at which it was valid, in order.
     past: FxHashMap<TileIndex, Vec<(u64, TileState)>>,
-    /// Bytes of memory of these.
+    /// Bytes of memory of `past`.
     past_bytes: usize,
-    /// Views opened before have expired.
+    /// Views opened before this time have expired.
     kept_since: u64,
-    /// Views opened before last: nobody waits for them any more.
+    /// Views opened before this time are long-lived: scans no longer wait for them.
     lasting_before: u64,
-    /// Which version of each tile is on disk, from the first reader on: the store belongs to the mapper.
+    /// Version of each tile on disk, tracked from the first reader on, because only the mapper may use the store.
     disk: Option<DiskIndex>,
 }
 
@@ -30,26 +30,26 @@ pub(super) struct Views {
 struct DiskIndex {
     versions: TileTable<TileVersion>,
     orphans: FxHashSet<TileIndex>,
-    /// Bytes of memory that readers may take for tiles that they make.
+    /// Bytes of memory that readers may use to cache tiles.
     reader_bytes: usize,
 }
 
-/// When a view was opened.
+/// Identifies a view by the time when it was opened.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::mapper) struct ViewId(u64);
 
 impl Views {
-    /// Whether there are any.
+    /// Returns whether a view is open.
     pub(super) fn are_open(&self) -> bool {
         !self.open.is_empty()
     }
 
-    /// Whether there are any that may be closed soon.
+    /// Returns whether a view is open that may be closed soon.
     pub(super) fn may_close_soon(&self) -> bool {
         self.open.last_key_value().is_some_and(|(newest, _)| *newest >= self.lasting_before)
     }
 
-    /// Notes that those which are open will last.
+    /// Marks the open views as long-lived.
     pub(super) fn expect_no_close(&mut self) {
         self.lasting_before = self.now + 1;
     }
@@ -59,7 +59,7 @@ impl Views {
         ViewId(self.now)
     }
 
-    /// Closes a view; returns what nobody can ask for any more.
+    /// Closes a view; returns the states that no view needs any more.
     pub(super) fn close(&mut self, ViewId(view): ViewId) -> Vec<TileState> {
         let Some(count) = self.open.get_mut(&view) else { return Vec::new() };
         *count -= 1;
@@ -70,7 +70,7 @@ impl Views {
         self.release()
     }
 
-    /// Lets go of what no view can ask for any more.
+    /// Removes the states that no view needs any more.
     fn release(&mut self) -> Vec<TileState> {
         let Some((&oldest, _)) = self.open.first_key_value() else { return self.forget() };
         let mut released = Vec::new();
@@ -90,27 +90,27 @@ impl Views {
         std::mem::take(&mut self.past).into_values().flatten().map(|(_, state)| state).collect()
     }
 
-    /// Whether somebody may ask for a tile as it is now, once it has changed.
+    /// Returns whether an open view may read the current state of a tile after it has changed.
     pub(super) fn need(&self, tile: TileIndex) -> bool {
         let newest = self.open.last_key_value().map(|(view, _)| *view);
         let kept = self.past.get(&tile).and_then(|states| states.last()).map(|(until, _)| *until);
         newest.is_some_and(|newest| newest >= self.kept_since && kept.is_none_or(|until| until < newest))
     }
 
-    /// Keeps a tile as it is now.
+    /// Keeps the current state of a tile.
     pub(super) fn keep(&mut self, tile: TileIndex, state: TileState) {
         self.past_bytes += state.bytes();
         self.past.entry(tile).or_default().push((self.now, state));
     }
 
-    /// Lets go of all that is kept: whoever looks has to look anew.
+    /// Drops all kept states and so expires the open views.
     pub(super) fn expire(&mut self) {
-        log::debug!("views of the map expired: what they held took too much memory");
+        log::debug!("views of the map expired: their old tiles exceeded the memory limit");
         self.kept_since = self.now + 1;
         drop(self.forget());
     }
 
-    /// Notes that what the tiles hold is about to change.
+    /// Records that the content of tiles is about to change.
     pub(super) fn content_changes(&mut self) {
         self.now += 1;
     }
@@ -119,26 +119,26 @@ impl Views {
         view < self.kept_since
     }
 
-    /// A tile as a view sees it, if it has changed since.
+    /// Returns the old state of a tile that a view sees, if the tile has changed since.
     pub(super) fn past(&self, ViewId(view): ViewId, tile: TileIndex) -> Option<&TileState> {
         let states = self.past.get(&tile)?;
         states.get(states.partition_point(|(until, _)| *until < view)).map(|(_, state)| state)
     }
 
-    /// Bytes of memory of what is kept.
+    /// Bytes of memory of the kept states.
     pub(super) fn past_bytes(&self) -> usize {
         self.past_bytes
     }
 
-    /// Bytes of memory, with those that readers may take.
+    /// Bytes of memory, including those that readers may use.
     pub(super) fn bytes(&self) -> usize {
         let disk = self.disk.as_ref().map_or(0, |disk| disk.versions.bytes() + disk.reader_bytes);
         self.past_bytes + hash_table_bytes::<(TileIndex, Vec<(u64, TileState)>)>(self.past.capacity()) + disk
     }
 
-    // What is on disk.
+    // Tiles on disk.
 
-    /// Begins to note what is on disk, and to count the memory of readers.
+    /// Begins to track the tiles on disk, and to count the memory of readers.
     pub(super) fn watch_disk(
         &mut self,
         reader_bytes: usize,
@@ -149,14 +149,14 @@ impl Views {
         self.disk = Some(DiskIndex { versions, orphans, reader_bytes });
     }
 
-    /// Notes that a version of a tile was written.
+    /// Records that a version of a tile was written.
     pub(super) fn note_on_disk(&mut self, tile: TileIndex, version: TileVersion) {
         if let Some(disk) = &mut self.disk {
             disk.versions.insert(tile, version);
         }
     }
 
-    /// What is on disk of a tile.
+    /// Returns the version of a tile on disk.
     pub(super) fn on_disk(&self, tile: TileIndex) -> Base {
         let Some(disk) = &self.disk else { return Base::Nothing };
         match disk.versions.get(tile) {
@@ -166,7 +166,6 @@ impl Views {
         }
     }
 
-    /// The tiles on disk, in no particular order.
     pub(super) fn tiles_on_disk(&self) -> impl Iterator<Item = TileIndex> {
         let orphans = |disk: &DiskIndex| disk.orphans.iter().copied().collect::<Vec<_>>();
         self.disk.iter().flat_map(move |disk| disk.versions.tiles().chain(orphans(disk)))

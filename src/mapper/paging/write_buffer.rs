@@ -7,51 +7,47 @@ use crate::store::SpillFile;
 use rustc_hash::FxHashMap;
 use std::sync::Arc;
 
-/// Updates of tiles that are not resident, until these come in: in memory, spilled to files where memory is short, and
-/// those of the scan that is being inserted staged in files until it is accepted.
+/// Updates of tiles that are not resident, until these are loaded. They are in memory, or spilled to files if memory is
+/// short. Parts of the scan that is being inserted are staged in files until it is accepted.
 #[derive(Debug, Default)]
 pub(super) struct WriteBuffer {
     buffered: BufferedUpdates,
-    /// The spill files with the parts of the scan that is being inserted. They count once it is accepted.
+    /// Spill files with parts of the scan that is being inserted. They become valid when it is accepted.
     staged: TileTable<Spilled>,
-    /// The tiles that a flush beside the mapper makes of their updates as of its scan. These stay here until that is
-    /// done; later ones follow them.
+    /// Tiles that a background flush builds from their updates as of its scan. These updates remain here until the tile
+    /// is written; later updates follow them.
     frozen: FxHashMap<TileIndex, Frozen>,
 }
 
-/// How many of a tile's updates a flush applies: all that are in its spill file, and the first of those in memory.
+/// Number of a tile's updates that a flush applies: all in its spill file, and the first ones in memory.
 #[derive(Clone, Copy, Debug)]
 struct Frozen {
     has_file: bool,
     bytes: usize,
     updates: usize,
-    /// Whether they are here no more: the mapper has brought the tile in with them.
+    /// Whether the mapper has loaded the tile with these updates, so that they are no longer in the buffer.
     is_forgotten: bool,
 }
 
-/// A tile's updates, in order: those in its spill file, then those in memory.
+/// Updates of a tile, in order: those in its spill file, then those in memory.
 pub(super) type UpdatesOfTile = (SpillFile, Option<Arc<PackedUpdates>>);
 
 impl WriteBuffer {
-    /// Bytes of memory that a tile with a spill file takes, about.
+    /// Approximate bytes of memory for a tile with a spill file.
     pub(super) const BYTES_OF_FILE: usize = BufferedUpdates::BYTES_OF_FILE;
 
-    /// Adds updates of a tile, in memory.
     pub(super) fn push(&mut self, tile: TileIndex, updates: &TileUpdates) {
         self.buffered.push(tile, updates);
     }
 
-    /// Whether a tile has updates here.
     pub(super) fn contains(&self, tile: TileIndex) -> bool {
         self.buffered.contains(tile)
     }
 
-    /// The tiles with updates here, in no particular order.
     pub(super) fn tiles(&self) -> impl Iterator<Item = TileIndex> {
         self.buffered.tiles()
     }
 
-    /// Bytes of memory.
     pub(super) fn bytes(&self) -> usize {
         self.buffered.bytes() + hash_table_bytes::<(TileIndex, Frozen)>(self.frozen.capacity())
     }
@@ -88,12 +84,11 @@ impl WriteBuffer {
         self.buffered.longest_files(bytes, count)
     }
 
-    /// A tile's updates, in order: those in its spill file, then those in memory.
     pub(super) fn of(&self, tile: TileIndex) -> UpdatesOfTile {
         (self.buffered.spilled(tile).file, self.buffered.in_memory(tile).cloned())
     }
 
-    /// Forgets a tile's updates: they were applied, or nobody wants them any more.
+    /// Removes a tile's updates, which were applied or are not needed any more.
     pub(super) fn forget(&mut self, index: TileIndex, disk: &TileDisk) {
         let spilled = self.buffered.remove(index);
         match self.frozen.get_mut(&index) {
@@ -104,10 +99,10 @@ impl WriteBuffer {
         }
     }
 
-    // A flush beside the mapper.
+    // Background flush.
 
-    /// Leaves a tile's updates of now to a flush, and returns them. Until it is done with them nothing may be spilled
-    /// for the tile.
+    /// Hands a tile's current updates to a flush, and returns them. Until the flush has written the tile, no updates of
+    /// it may be spilled.
     pub(super) fn freeze(&mut self, index: TileIndex) -> UpdatesOfTile {
         let (file, in_memory) = self.of(index);
         let (bytes, updates) =
@@ -117,13 +112,13 @@ impl WriteBuffer {
         (file, in_memory)
     }
 
-    /// Whether a flush is to apply updates of a tile.
+    /// Returns whether a flush is going to apply updates of a tile.
     pub(super) fn is_frozen(&self, index: TileIndex) -> bool {
         self.frozen.contains_key(&index)
     }
 
-    /// Notes that a flush is done with a tile, and forgets the updates that are on disk now. Tells whether the tile is
-    /// what is on disk with the updates that are left here; otherwise the mapper has brought it in meanwhile.
+    /// Records that a flush has processed a tile, and removes the updates that are on disk now. Returns whether the
+    /// tile on disk plus the remaining updates is the current tile; otherwise the mapper has loaded the tile since.
     pub(super) fn thaw(&mut self, index: TileIndex, is_on_disk: bool, disk: &TileDisk) -> bool {
         let Some(frozen) = self.frozen.remove(&index) else { return false };
         let is_wanted = !frozen.is_forgotten && !is_on_disk;
@@ -140,14 +135,14 @@ impl WriteBuffer {
         is_here
     }
 
-    /// Notes that a tile's updates in memory are in its spill file now.
+    /// Records that a tile's updates in memory were moved to its spill file.
     pub(super) fn note_spilled(&mut self, index: TileIndex, file: SpillFile) {
         let in_memory = self.buffered.in_memory(index).map_or(0, |updates| updates.len() as u64);
         let updates = self.buffered.spilled(index).updates + in_memory;
         self.buffered.note_spilled(index, Spilled { file, updates });
     }
 
-    /// The spill file of a tile that has no updates in memory, with what is staged in it.
+    /// The spill file of a tile without updates in memory, including its staged part.
     pub(super) fn staged_file(&self, index: TileIndex) -> SpillFile {
         self.staged_of(index).file
     }
@@ -156,30 +151,29 @@ impl WriteBuffer {
         self.staged.get(index).unwrap_or_else(|| self.buffered.spilled(index))
     }
 
-    /// Notes that a part of a scan that is not accepted yet is in a tile's spill file, behind the tile's other updates.
+    /// Records that a part of a scan not yet accepted was appended to a tile's spill file.
     pub(super) fn stage(&mut self, index: TileIndex, file: SpillFile, updates: usize) {
         let updates = self.staged_of(index).updates + updates as u64;
         self.staged.insert(index, Spilled { file, updates });
     }
 
-    /// Whether parts of the scan that is being inserted are staged for a tile.
+    /// Returns whether parts of the scan that is being inserted are staged for a tile.
     pub(super) fn is_staged(&self, tile: TileIndex) -> bool {
         self.staged.contains(tile)
     }
 
-    /// The tiles with staged parts, in order.
     pub(super) fn staged_tiles(&self) -> impl Iterator<Item = TileIndex> {
         self.staged.tiles()
     }
 
-    /// Makes the staged parts count: their scan is accepted.
+    /// Makes the staged parts valid when their scan is accepted.
     pub(super) fn accept_staged(&mut self) {
         for (index, spilled) in std::mem::take(&mut self.staged).iter() {
             self.buffered.note_spilled(index, spilled);
         }
     }
 
-    /// Takes the staged parts back out of the files: their scan was not accepted, and the next flush may need the
+    /// Truncates the staged parts from the files, because their scan was not accepted and the next flush may need the
     /// space.
     pub(super) fn discard_staged(&mut self, disk: &TileDisk) {
         for index in std::mem::take(&mut self.staged).tiles() {
@@ -187,7 +181,7 @@ impl WriteBuffer {
         }
     }
 
-    /// Adds the buffer's part of the statistics.
+    /// Adds the counts of the buffer to the statistics.
     pub(super) fn count_into(&self, statistics: &mut MapStatistics) {
         statistics.buffered_tiles = self.buffered.len() as u64;
         statistics.buffered_updates = self.buffered.updates();

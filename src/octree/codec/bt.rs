@@ -14,7 +14,7 @@ pub const OCTOMAP_MIN_LOG_ODDS: f32 = f32::from_bits(0xc000_0075);
 /// Log-odds of an occupied leaf read from `.bt`: OctoMap's upper clamp, `logit(0.971)`, about 3.5.
 pub const OCTOMAP_MAX_LOG_ODDS: f32 = f32::from_bits(0x4060_b4ba);
 
-/// The two-bit code of a child.
+/// Two-bit code of a child.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Code {
     Unknown,
@@ -30,7 +30,7 @@ impl Code {
         if log_odds >= threshold { Self::Occupied } else { Self::Free }
     }
 
-    /// The codes of eight children from their two bytes.
+    /// Returns the codes of eight children from their two bytes.
     fn unpack(bytes: [u8; 2]) -> [Self; 8] {
         let bits = u16::from_le_bytes(bytes);
         std::array::from_fn(|child| Self::ALL[usize::from(bits >> (2 * child) & 3)])
@@ -40,12 +40,12 @@ impl Code {
         codes.iter().rev().fold(0, |bits: u16, &code| bits << 2 | code as u16).to_le_bytes()
     }
 
-    /// The two bytes of eight voxels, from the masks of known and of occupied ones.
+    /// Returns the two bytes of eight voxels, from the masks of known and of occupied ones.
     pub(super) fn pack_voxels(known: u8, occupied: u8) -> [u8; 2] {
         (spread(known & !occupied) | spread(occupied) << 1).to_le_bytes()
     }
 
-    /// The code of a node with these children if it can be pruned.
+    /// Returns the code of a node with these children if it can be pruned.
     pub(super) fn pruned(children: [Self; 8]) -> Option<Self> {
         let prunable = matches!(children[0], Self::Free | Self::Occupied);
         (prunable && children.iter().all(|&code| code == children[0])).then_some(children[0])
@@ -86,7 +86,7 @@ fn read_node(
     let codes = Code::unpack(input.take("the children of a node")?);
     if codes == [Code::Unknown; 8] {
         if depth > 0 {
-            return Err(FormatError::at_offset(begin, "a node that should have children has none").into());
+            return Err(FormatError::at_offset(begin, "an inner node has no children").into());
         }
         growing.tree.add_leaf(depth);
         return Ok(Node::Leaf(OCTOMAP_MAX_LOG_ODDS));
@@ -98,7 +98,7 @@ fn read_node(
             Code::Free => Node::Leaf(OCTOMAP_MIN_LOG_ODDS),
             Code::Occupied => Node::Leaf(OCTOMAP_MAX_LOG_ODDS),
             Code::Inner if depth + 1 == DEPTH => {
-                let reason = "a node of the finest level should have no children";
+                let reason = "a node at the finest level has children";
                 return Err(FormatError::at_offset(begin, reason).into());
             }
             Code::Inner => read_node(input, growing, depth + 1)?,
@@ -111,14 +111,14 @@ fn read_node(
     Ok(Node::Inner { value: growing.tree.arena[block].max(), block })
 }
 
-/// Writes the `.bt` file that OctoMap's `writeBinary` writes for this tree, without changing the tree.
+/// Writes the `.bt` file that OctoMap's `writeBinary` would write for this tree, without changing the tree.
 ///
-/// A leaf is occupied at or above `threshold_log_odds`, else free; nodes that become equal by that are pruned in the
-/// file. This takes two bytes of memory for each remaining inner node.
+/// A leaf is occupied at or above `threshold_log_odds`, otherwise free; nodes that become equal by this are pruned in
+/// the file. This takes two bytes of memory for each remaining inner node.
 ///
 /// # Errors
 ///
-/// Those of `out`, and [`io::ErrorKind::InvalidInput`] if the resolution is not a positive, finite length.
+/// Returns errors from `out`, and [`io::ErrorKind::InvalidInput`] if the resolution is not a positive, finite length.
 pub fn write_bt(
     tree: &Octree,
     resolution_m: f64,
@@ -131,12 +131,12 @@ pub fn write_bt(
     write_encoded(tree, resolution_m, threshold_log_odds, depths, out)
 }
 
-/// Writes the `.bt` file that OctoMap's `writeBinaryConst` writes for this tree: as [`write_bt`], but pruned only
-/// as far as the tree is.
+/// Writes the `.bt` file that OctoMap's `writeBinaryConst` would write for this tree: as [`write_bt`], but without
+/// further pruning.
 ///
 /// # Errors
 ///
-/// Those of [`write_bt`].
+/// Same errors as [`write_bt`].
 pub fn write_bt_unpruned(
     tree: &Octree,
     resolution_m: f64,
@@ -162,28 +162,28 @@ fn write_encoded(
     out.write_all(&encoder.payload)
 }
 
-/// Nodes at this depth and deeper are pruned if possible.
+/// Smallest depth at which nodes are pruned if possible.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct PrunedDepths(u8);
 
 impl PrunedDepths {
     const NONE: Self = Self(DEPTH);
-    /// All but the root, which is never pruned.
+    /// All depths except that of the root, which is never pruned.
     pub(super) const ALL: Self = Self(1);
 
-    /// The depths that OctoMap's `prune` reaches: from the depth above the voxels upward, up to the first depth without
-    /// a node to prune. `prunable` counts by depth the nodes that can be pruned once all below them are.
+    /// Returns the depths that OctoMap's `prune` reaches: from the depth above the voxels upward, to the first depth
+    /// without a prunable node. `prunable` is the number of nodes by depth that can be pruned once all below them are.
     pub(super) fn of(prunable: &[u64; DEPTH as usize]) -> Self {
         let lowest = (1..DEPTH).rev().take_while(|&depth| prunable[usize::from(depth)] > 0).last();
         lowest.map_or(Self::NONE, Self)
     }
 
-    /// Whether nodes at a depth are pruned.
+    /// Returns whether nodes at a depth are pruned.
     pub(super) fn include(self, depth: u8) -> bool {
         depth >= self.0
     }
 
-    /// Whether all prunable nodes below the root are pruned.
+    /// Returns whether all prunable nodes below the root are pruned.
     pub(super) fn prune_all(self, prunable: &[u64; DEPTH as usize]) -> bool {
         prunable[1..usize::from(self.0)].iter().all(|&count| count == 0)
     }
@@ -218,7 +218,7 @@ struct Encoder<'a> {
 }
 
 impl Encoder<'_> {
-    /// Appends the bytes of a node and all below it; returns its code and the number of nodes.
+    /// Appends the bytes of a node and its descendants; returns its code and the number of nodes.
     fn encode(&mut self, node: Node, depth: u8) -> (Code, u64) {
         let block = match node {
             Node::Unknown => return (Code::Unknown, 0),

@@ -14,7 +14,7 @@ use std::io::{self, Write};
 ///
 /// # Errors
 ///
-/// Those of [`write_bt`](super::write_bt).
+/// Same errors as [`write_bt`](super::write_bt).
 pub fn write_bt_of_bricks(
     bricks: &[BrickCode],
     nodes_of: impl Fn(usize) -> BrickNodes,
@@ -31,7 +31,7 @@ pub fn write_bt_of_bricks(
     let mut encoder = BtEncoder::new(PrunedDepths::ALL);
     let mut root = encode_all(&mut encoder);
     if let Some(depths) = encoder.depths_of_octomap() {
-        // OctoMap stops pruning earlier: encode again, only that far.
+        // OctoMap stops pruning earlier: encode again with its depths.
         root = encode_all(&mut BtEncoder::new(depths));
     }
     write_header(out, OctreeFormat::Bt, root.nodes, resolution_m)?;
@@ -39,35 +39,35 @@ pub fn write_bt_of_bricks(
     out.write_all(&payload)
 }
 
-/// Nodes in `.bt` form: two bits per child.
+/// Encoder of nodes in `.bt` form: two bits per child.
 #[derive(Debug)]
 pub(super) struct BtEncoder {
     depths: PrunedDepths,
     prunable: Prunable,
 }
 
-/// An encoded node with those below it.
+/// Encoded node with its descendants.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct BtNode {
     code: Code,
-    /// The value of a node that is a leaf before values are reduced to occupied and free.
+    /// Value of a node that is a leaf before values are reduced to occupied and free.
     leaf: Option<f32>,
     nodes: u64,
 }
 
 impl BtEncoder {
-    /// An encoder that prunes to these depths.
+    /// Creates an encoder that prunes to these depths.
     pub(super) fn new(depths: PrunedDepths) -> Self {
         Self { depths, prunable: [0; DEPTH as usize] }
     }
 
-    /// After pruning everything: the depths that OctoMap would have pruned, if fewer.
+    /// Returns the depths that OctoMap would prune, if these are fewer than all.
     pub(super) fn depths_of_octomap(&self) -> Option<PrunedDepths> {
         let depths = PrunedDepths::of(&self.prunable);
         (!depths.prune_all(&self.prunable)).then_some(depths)
     }
 
-    /// The bytes before the root: for a root that is a leaf, that it has no children.
+    /// Returns the bytes before the root: if the root is a leaf, a mark that it has no children.
     pub(super) fn before_root(root: &BtNode) -> &'static [u8] {
         if matches!(root.code, Code::Free | Code::Occupied) { &[0; 2] } else { &[] }
     }
@@ -93,7 +93,7 @@ impl BtEncoder {
         end_node(self, begin, BRICK_DEPTH, &children, payload)
     }
 
-    /// A node of 4 x 4 x 4 voxels; bit `k` of `leaves` tells whether its `k`-th child is a leaf.
+    /// Appends a node of 4 x 4 x 4 voxels; bit `k` of `leaves` marks its `k`-th child as a leaf.
     fn encode_word(&mut self, known: u64, occupied: u64, leaves: u8, payload: &mut Vec<u8>) -> BtNode {
         let begin = begin_node::<Self>(payload);
         let mut children = [Self::UNKNOWN; 8];
@@ -117,7 +117,7 @@ impl BtEncoder {
 }
 
 impl BtNode {
-    /// A leaf below the depth of bricks, where the brick's masks tell which values are equal.
+    /// Creates a leaf below the depth of bricks, where the masks of the brick already contain which values are equal.
     const fn leaf(code: Code) -> Self {
         Self { code, leaf: None, nodes: 1 }
     }
@@ -160,7 +160,7 @@ impl NodeEncoder for BtEncoder {
     fn append_leaf(_: &BtNode, _: &mut Vec<u8>) {}
 }
 
-/// The state of a leaf from the state of its first voxel.
+/// Returns the state of a leaf, which is that of its first voxel.
 fn state(occupied: u64) -> Code {
     if occupied & 1 == 1 { Code::Occupied } else { Code::Free }
 }

@@ -4,11 +4,11 @@ use super::number::to_six_digits;
 use crate::error::{DecodeError, FormatError};
 use std::io::{self, BufRead, ErrorKind, Write};
 
-/// The header of a file.
+/// Header of a file.
 #[derive(Debug)]
 pub(super) struct Header {
     pub format: OctreeFormat,
-    /// Name of the tree's class; `OcTree` if the file has OctoMap's earlier `1` or none (legacy).
+    /// Class name of the tree; `OcTree` if the file has OctoMap's earlier `1` or none (legacy).
     pub id: String,
     pub nodes: u64,
     pub resolution_m: f64,
@@ -17,14 +17,14 @@ pub(super) struct Header {
 const SECOND_LINES: &str =
     "\n# (feel free to add / change comments, but leave the first line as it is!)\n#\n";
 
-/// Far longer than any real header; ends the search for `data` in other files.
+/// Far longer than any real header; bounds the search for `data` in other files.
 const MAX_HEADER_BYTES: u64 = 1 << 16;
 
-/// The first field of the format before text headers.
+/// First field of the format before text headers.
 const LEGACY_TREE_TYPE: [u8; 4] = 3_i32.to_le_bytes();
 
 impl OctreeFormat {
-    /// The start of the first line.
+    /// Start of the first line.
     const fn magic(self) -> &'static str {
         match self {
             Self::Bt => "# Octomap OcTree binary file",
@@ -32,7 +32,7 @@ impl OctreeFormat {
         }
     }
 
-    /// The format of a file with a text header, by how it begins.
+    /// Detects the format of a file with a text header from its first bytes.
     pub(crate) fn of_first_bytes(bytes: &[u8]) -> Option<Self> {
         [Self::Bt, Self::Ot].into_iter().find(|format| bytes.starts_with(format.magic().as_bytes()))
     }
@@ -70,7 +70,7 @@ pub(super) fn read_header(input: &mut Input<impl BufRead>) -> Result<Header, Dec
     read_fields(input, format)
 }
 
-/// Reads the words of a text header up to the `data` line. Of duplicates the last counts.
+/// Reads the words of a text header up to the `data` line. The last of duplicates is used.
 fn read_fields(input: &mut Input<impl BufRead>, format: OctreeFormat) -> Result<Header, DecodeError> {
     let (mut id, mut nodes, mut resolution_m) = (None, 0, None);
     loop {
@@ -79,7 +79,7 @@ fn read_fields(input: &mut Input<impl BufRead>, format: OctreeFormat) -> Result<
             "size" => nodes = next_value(input, "size", "a whole number")?,
             "res" => resolution_m = Some(next_value(input, "res", "a number")?),
             "data" => break,
-            // A comment, or a word of a later OctoMap.
+            // A comment, or a word of a later OctoMap version.
             _ => skip_line(input)?,
         }
     }
@@ -112,7 +112,7 @@ fn is_resolution(length_m: f64) -> bool {
     length_m.is_finite() && length_m > 0.0
 }
 
-/// The next word of a header, without the character that ends it.
+/// Reads the next word of a header, without the character that ends it.
 fn next_word(input: &mut Input<impl BufRead>) -> Result<String, DecodeError> {
     while input.peek()?.is_some_and(is_space) {
         next_header_byte(input)?;
@@ -150,7 +150,7 @@ fn next_header_byte(input: &mut Input<impl BufRead>) -> Result<Option<u8>, Decod
     input.next()
 }
 
-/// White space as in C++ streams.
+/// Returns whether C++ streams treat a byte as white space.
 fn is_space(byte: u8) -> bool {
     byte == b' ' || (b'\t'..=b'\r').contains(&byte)
 }

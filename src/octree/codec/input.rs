@@ -1,7 +1,7 @@
 use crate::error::{DecodeError, FormatError};
 use std::io::{BufRead, ErrorKind};
 
-/// A stream with its offset, for errors.
+/// Stream that tracks its offset for errors.
 pub(super) struct Input<R> {
     reader: R,
     offset: u64,
@@ -12,12 +12,12 @@ impl<R: BufRead> Input<R> {
         Self { reader, offset: 0 }
     }
 
-    /// Bytes taken so far.
+    /// Number of bytes consumed so far.
     pub(super) fn offset(&self) -> u64 {
         self.offset
     }
 
-    /// The next byte, not consumed; `None` at the end.
+    /// Returns the next byte without consuming it; `None` at the end.
     pub(super) fn peek(&mut self) -> Result<Option<u8>, DecodeError> {
         loop {
             match self.reader.fill_buf() {
@@ -38,7 +38,7 @@ impl<R: BufRead> Input<R> {
         Ok(byte)
     }
 
-    /// Consumes exactly `N` bytes of a `part` of the file.
+    /// Consumes exactly `N` bytes; `part` names the part of the file in errors.
     pub(super) fn take<const N: usize>(&mut self, part: &str) -> Result<[u8; N], DecodeError> {
         let mut bytes = [0; N];
         self.reader.read_exact(&mut bytes).map_err(|error| match error.kind() {
@@ -49,7 +49,7 @@ impl<R: BufRead> Input<R> {
         Ok(bytes)
     }
 
-    /// An error at the present offset.
+    /// Creates an error at the current offset.
     pub(super) fn error(&self, reason: impl Into<String>) -> FormatError {
         FormatError::at_offset(self.offset, reason)
     }

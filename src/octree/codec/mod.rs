@@ -1,8 +1,8 @@
-//! OctoMap's files, byte for byte.
+//! OctoMap's file formats, reproduced byte for byte.
 //!
-//! A text header, then the nodes in preorder: `.bt` has two bits per child (unknown, free leaf, occupied leaf, inner
-//! node), `.ot` the log-odds of every node and a mask of its children. Any byte string decodes to a tree or to an
-//! error; memory grows with the bytes that were read, never with a number in the file.
+//! A file is a text header, then the nodes in preorder: `.bt` has two bits per child (unknown, free leaf, occupied
+//! leaf, inner node), `.ot` the log-odds of each node and a mask of its children. Any byte string decodes to a tree or
+//! to an error; memory grows with the bytes that were read, never with a number in the file.
 
 mod bt;
 mod bt_bricks;

@@ -5,32 +5,32 @@ use std::ops::Range;
 /// Depth of a brick's node.
 pub(super) const BRICK_DEPTH: u8 = 13;
 
-/// Encodes nodes in one of OctoMap's formats: in preorder, each inner node as a head of fixed length.
+/// Encoder of nodes in one of OctoMap's formats: in preorder, each inner node as a head of fixed size.
 pub(super) trait NodeEncoder {
-    /// What the parent and the header need of an encoded node.
+    /// Data of an encoded node that its parent and the header need.
     type Node: Copy;
-    /// The bytes of an inner node itself.
+    /// Bytes of an inner node without its descendants.
     type Head: AsRef<[u8]> + Default;
-    /// A node without known voxels.
+    /// Node without known voxels.
     const UNKNOWN: Self::Node;
 
-    /// A node with these children, one of which is known: an inner node, or a leaf if it is pruned.
+    /// Creates a node with these children, at least one of which is known: an inner node, or a leaf if it is pruned.
     fn join(&mut self, depth: u8, children: &[Self::Node; 8]) -> Self::Node;
 
-    /// Whether a known node is a leaf.
+    /// Returns whether a known node is a leaf.
     fn is_leaf(node: &Self::Node) -> bool;
 
-    /// The node itself and all nodes below it.
+    /// Number of nodes, including the node and all its descendants.
     fn node_count(node: &Self::Node) -> u64;
 
-    /// The bytes of an inner node itself.
+    /// Returns the bytes of an inner node without its descendants.
     fn head(node: &Self::Node, children: &[Self::Node; 8]) -> Self::Head;
 
-    /// Appends the bytes that a leaf has of its own, if any.
+    /// Appends the bytes of a leaf, if it has any.
     fn append_leaf(node: &Self::Node, payload: &mut Vec<u8>);
 }
 
-/// By depth, the number of nodes that could be pruned once all below them were.
+/// Number of nodes by depth that could be pruned once all below them were.
 pub(super) type Prunable = [u64; DEPTH as usize];
 
 /// Appends the bytes of the node at `depth` (at most that of a brick) over these ascending `bricks`; `encode_brick`
@@ -54,7 +54,7 @@ pub(super) fn encode<E: NodeEncoder>(
     let mut start = range.start;
     while start < range.end {
         let child = child_at(bricks[start], depth);
-        // Most ancestors have all their bricks in one child.
+        // For most ancestors, all bricks are in one child.
         let end = if child_at(bricks[range.end - 1], depth) == child {
             range.end
         } else {
@@ -67,14 +67,14 @@ pub(super) fn encode<E: NodeEncoder>(
     end_node(encoder, begin, depth, &children, payload)
 }
 
-/// Reserves room for an inner node's head; returns its position.
+/// Reserves space for an inner node's head; returns its position.
 pub(super) fn begin_node<E: NodeEncoder>(payload: &mut Vec<u8>) -> usize {
     let begin = payload.len();
     payload.extend_from_slice(E::Head::default().as_ref());
     begin
 }
 
-/// Writes a node's head, or removes all that was written of the node if it is pruned.
+/// Writes a node's head, or removes all bytes of the node if it is pruned.
 pub(super) fn end_node<E: NodeEncoder>(
     encoder: &mut E,
     begin: usize,
@@ -93,7 +93,7 @@ pub(super) fn end_node<E: NodeEncoder>(
     node
 }
 
-/// Which child of its ancestor at `depth` leads to a brick.
+/// Returns the child index of a brick's ancestor below `depth`.
 pub(super) fn child_at(brick: BrickCode, depth: u8) -> usize {
     (brick.0 >> (3 * (BRICK_DEPTH - 1 - depth)) & 7) as usize
 }

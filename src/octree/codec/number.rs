@@ -1,6 +1,6 @@
-/// A positive, finite number as a C++ stream prints it: `%g`, six significant digits.
+/// Formats a positive, finite number as a C++ stream does: `%g`, six significant digits.
 pub(super) fn to_six_digits(value: f64) -> String {
-    // Rust and C round the same way: the exact decimal value, ties to the even digit.
+    // Rust and C round identically: the exact decimal value, ties to the even digit.
     let scientific = format!("{value:.5e}");
     let (digits, exponent) = scientific.split_once('e').unwrap_or((&scientific, "0"));
     let exponent: i32 = exponent.parse().unwrap_or(0);
@@ -21,7 +21,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_look_as_c_prints_them() {
+    fn numbers_are_formatted_as_in_c() {
         for (value, text) in [
             (0.1, "0.1"),
             (0.05, "0.05"),

@@ -7,12 +7,12 @@ use crate::octree::block::{Block, BlockId};
 use std::fmt;
 use std::io::BufRead;
 
-/// One of OctoMap's two file formats.
+/// OctoMap file format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OctreeFormat {
     /// `.bt`: a voxel is free, occupied or unknown.
     Bt,
-    /// `.ot`: log-odds of every node.
+    /// `.ot`: log-odds of each node.
     Ot,
 }
 
@@ -25,46 +25,47 @@ impl fmt::Display for OctreeFormat {
     }
 }
 
-/// The content of a `.bt` or `.ot` file.
+/// Content of a `.bt` or `.ot` file.
 #[derive(Clone, Debug)]
 pub struct OctreeFile {
-    /// The nodes as in the file, pruned or not.
+    /// Nodes as in the file, pruned or not.
     ///
-    /// From `.bt` a leaf is [`OCTOMAP_MIN_LOG_ODDS`](super::OCTOMAP_MIN_LOG_ODDS) or
-    /// [`OCTOMAP_MAX_LOG_ODDS`](super::OCTOMAP_MAX_LOG_ODDS), and an inner node the maximum of its children. From `.ot`
-    /// every node has the value in the file, even an inner one that is not that maximum.
+    /// In a tree from `.bt` a leaf is [`OCTOMAP_MIN_LOG_ODDS`](super::OCTOMAP_MIN_LOG_ODDS) or
+    /// [`OCTOMAP_MAX_LOG_ODDS`](super::OCTOMAP_MAX_LOG_ODDS), and an inner node the maximum of its children. In a tree
+    /// from `.ot` each node has the value in the file, even if an inner one is not that maximum.
     pub tree: Octree,
-    /// Edge of a finest voxel in metres.
+    /// Edge of a voxel in metres.
     pub resolution_m: f64,
-    /// OctoMap's name of the tree's class, such as `OcTree` or `ColorOcTree`.
+    /// OctoMap's class name of the tree, such as `OcTree` or `ColorOcTree`.
     pub id: String,
-    /// The format that was found.
+    /// Format of the file.
     pub format: OctreeFormat,
-    /// The number of nodes in the header. In `.bt` a wrong number is an error; in `.ot` OctoMap ignores it, and so does
-    /// voxtile.
+    /// Number of nodes according to the header. In `.bt` a wrong number is an error; in `.ot` it is ignored, as in
+    /// OctoMap.
     pub stated_nodes: u64,
 }
 
-/// Reads a `.bt` or `.ot` file; the first line tells which.
+/// Reads a `.bt` or `.ot` file; the first line determines the format.
 ///
-/// Stops after the last node, like OctoMap; what follows stays in `input`. The colors of a `ColorOcTree` are dropped.
+/// Stops after the last node, like OctoMap; the rest of `input` is not read. The colors of a `ColorOcTree` are dropped.
 ///
 /// # Errors
 ///
-/// [`DecodeError::Io`] if reading fails; [`DecodeError::Format`] with the byte offset for another or a truncated file,
-/// a node below the sixteenth level, log-odds or a resolution that are not finite, or (`.bt`) a wrong number of nodes.
+/// Fails with [`DecodeError::Io`] if reading fails, and with [`DecodeError::Format`] and the byte offset if the file
+/// has another format or is truncated, a node is below the sixteenth level, log-odds or the resolution are not finite,
+/// or (`.bt`) the number of nodes is wrong.
 pub fn read(input: impl BufRead) -> Result<OctreeFile, DecodeError> {
     read_with_limit(input, usize::MAX)
 }
 
-/// Reads a `.bt` or `.ot` file as [`read`] does, but refuses one whose tree needs more than `max_bytes` of heap.
+/// Reads a `.bt` or `.ot` file as [`read`] does, but fails if the tree needs more than `max_bytes` of heap.
 ///
-/// A tree needs up to 32 times the bytes of its `.bt` and 13 times those of its `.ot`; while it grows, up to twice
-/// that.
+/// A tree needs up to 32 times the bytes of its `.bt` file and 13 times those of its `.ot` file; while it grows, up to
+/// twice that.
 ///
 /// # Errors
 ///
-/// Those of [`read`], and [`DecodeError::Format`] at the node that exceeds the limit.
+/// Same errors as [`read`]; also fails with [`DecodeError::Format`] at the node that exceeds the limit.
 pub fn read_with_limit(input: impl BufRead, max_bytes: usize) -> Result<OctreeFile, DecodeError> {
     read_format(input, None, max_bytes)
 }
@@ -73,7 +74,7 @@ pub fn read_with_limit(input: impl BufRead, max_bytes: usize) -> Result<OctreeFi
 ///
 /// # Errors
 ///
-/// Those of [`read`]; an `.ot` file is an error.
+/// Same errors as [`read`]; also fails if the file is an `.ot` file.
 pub fn read_bt(input: impl BufRead) -> Result<OctreeFile, DecodeError> {
     read_format(input, Some(OctreeFormat::Bt), usize::MAX)
 }
@@ -82,7 +83,7 @@ pub fn read_bt(input: impl BufRead) -> Result<OctreeFile, DecodeError> {
 ///
 /// # Errors
 ///
-/// Those of [`read`]; a `.bt` file is an error.
+/// Same errors as [`read`]; also fails if the file is a `.bt` file.
 pub fn read_ot(input: impl BufRead) -> Result<OctreeFile, DecodeError> {
     read_format(input, Some(OctreeFormat::Ot), usize::MAX)
 }
@@ -107,16 +108,16 @@ fn read_format(
     Ok(OctreeFile { tree, resolution_m, id, format, stated_nodes })
 }
 
-/// A tree being read, with a memory limit.
+/// Tree being read, with a memory limit.
 pub(super) struct GrowingTree {
     pub tree: Octree,
     max_bytes: usize,
 }
 
 impl GrowingTree {
-    /// A new inner node's block, if the limit allows it.
+    /// Adds an inner node's block, if the limit permits it.
     pub(super) fn add_inner(&mut self, input: &Input<impl BufRead>) -> Result<BlockId, DecodeError> {
-        // The arena is limited to 2^32 blocks; a file must not reach that.
+        // The arena is limited to 2^32 blocks, which a file must not reach.
         let max_bytes = self.max_bytes.min((u32::MAX as usize / 2).saturating_mul(Block::SIZE));
         if self.tree.arena.used_bytes() + Block::SIZE > max_bytes {
             return Err(input.error(format!("the tree needs more than {max_bytes} bytes of memory")).into());

@@ -10,16 +10,16 @@ use crate::octree::brick_values::{BrickContent, BrickValues};
 use crate::space::MortonCode;
 use std::io::{self, BufWriter, Read, Seek, Write};
 
-/// Writes the `.bt` or `.ot` file of a tree larger than memory, block by block, byte for byte as
-/// [`write_bt`](super::write_bt) or [`write_ot`](super::write_ot) would.
+/// Writes the `.bt` or `.ot` file of a tree larger than memory, block by block. The result is byte-identical to that of
+/// [`write_bt`](super::write_bt) or [`write_ot`](super::write_ot).
 ///
-/// The header, and the bytes before a block, depend on the blocks behind it. So the blocks go to a spool first, and a
-/// few bytes per block stay in memory.
+/// The header, and the bytes before a block, depend on later blocks. Therefore the blocks are first written to a spool,
+/// and a few bytes per block are kept in memory.
 #[derive(Debug)]
 pub struct OctreeStream<S: Read + Write + Seek> {
     blocks: Blocks,
     spool: BufWriter<S>,
-    /// The bytes of one block.
+    /// Bytes of one block.
     payload: Vec<u8>,
     voxels: u64,
 }
@@ -30,35 +30,35 @@ enum Blocks {
     Ot { blocks: Vec<Block<OtNode>> },
 }
 
-/// How far a `.bt` file is pruned.
+/// Extent of pruning in a `.bt` file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct BtPruning(Option<PrunedDepths>);
 
-/// The outcome of a finished [`OctreeStream`].
+/// Result of a finished [`OctreeStream`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StreamOutcome {
-    /// The file is written.
+    /// The file is complete.
     Written {
-        /// Known voxels.
+        /// Number of known voxels.
         voxels: u64,
-        /// Nodes of the tree.
+        /// Number of nodes of the tree.
         nodes: u64,
     },
-    /// OctoMap's `prune` stops at a depth without a node to prune, and more was pruned here. Nothing is written: add
-    /// all blocks again to a stream with this pruning.
+    /// OctoMap's `prune` stops at a depth without a prunable node, but the stream pruned further. No output was
+    /// written: add all blocks again to a stream with this pruning.
     Again(BtPruning),
 }
 
 impl<S: Read + Write + Seek> OctreeStream<S> {
-    /// A `.bt` stream in which voxels of at least `threshold_log_odds` are occupied. The spool must be empty; it
-    /// receives the bytes of the blocks. Start with the default pruning.
+    /// Creates a `.bt` stream in which voxels of at least `threshold_log_odds` are occupied. The spool must be empty;
+    /// it receives the bytes of the blocks. Start with the default pruning.
     pub fn bt(threshold_log_odds: f32, pruning: BtPruning, spool: S) -> Self {
         let pruned = pruning.0.unwrap_or(PrunedDepths::ALL);
         let encoder = BtEncoder::new(pruned);
         Self::new(Blocks::Bt { encoder, threshold: threshold_log_odds, pruned, blocks: Vec::new() }, spool)
     }
 
-    /// An `.ot` stream.
+    /// Creates an `.ot` stream.
     pub fn ot(spool: S) -> Self {
         Self::new(Blocks::Ot { blocks: Vec::new() }, spool)
     }
@@ -72,7 +72,7 @@ impl<S: Read + Write + Seek> OctreeStream<S> {
     ///
     /// # Errors
     ///
-    /// Errors of the spool.
+    /// Returns errors from the spool.
     pub fn add_block(&mut self, first: MortonCode, depth: u8, values: &mut BrickValues) -> io::Result<()> {
         if values.is_empty() {
             return Ok(());
@@ -111,8 +111,8 @@ impl<S: Read + Write + Seek> OctreeStream<S> {
     ///
     /// # Errors
     ///
-    /// Errors of the spool or of `out`, and [`io::ErrorKind::InvalidInput`] if the resolution is not a positive, finite
-    /// length.
+    /// Returns errors from the spool or `out`, and [`io::ErrorKind::InvalidInput`] if the resolution is not a
+    /// positive, finite length.
     pub fn finish(self, resolution_m: f64, out: &mut impl Write) -> io::Result<StreamOutcome> {
         let Self { blocks, spool, voxels, .. } = self;
         let mut spool = spool.into_inner().map_err(io::IntoInnerError::into_error)?;

@@ -23,7 +23,7 @@ pub(super) fn read_nodes(
             return Err(input.error(reason).into());
         }
     };
-    // The size may be missing. An empty tree has the size 0 and nothing behind it.
+    // The size may be missing. An empty tree has the size 0 and no nodes.
     if header.nodes > 0 || input.peek()?.is_some() {
         growing.tree.root = read_node(input, &mut growing, color_bytes, 0)?;
     }
@@ -51,7 +51,7 @@ fn read_node(
         return Ok(Node::Leaf(value));
     }
     if depth == DEPTH {
-        let reason = "a node of the finest level should have no children";
+        let reason = "a node at the finest level has children";
         return Err(FormatError::at_offset(mask_at, reason).into());
     }
     let block = growing.add_inner(input)?;
@@ -62,13 +62,13 @@ fn read_node(
     Ok(Node::Inner { value, block })
 }
 
-/// Writes the `.ot` file that OctoMap's `write` writes for this tree.
+/// Writes the `.ot` file that OctoMap's `write` would write for this tree.
 ///
 /// # Errors
 ///
-/// Those of `out`, and [`io::ErrorKind::InvalidInput`] if the resolution is not a positive, finite length.
+/// Returns errors from `out`, and [`io::ErrorKind::InvalidInput`] if the resolution is not a positive, finite length.
 pub fn write_ot(tree: &Octree, resolution_m: f64, out: &mut impl Write) -> io::Result<()> {
-    // Nodes have five bytes; `out` may be a file.
+    // Buffered, because nodes have five bytes and `out` may be a file.
     let mut out = BufWriter::new(out);
     write_header(&mut out, OctreeFormat::Ot, tree.node_count(), resolution_m)?;
     write_node(tree, tree.root, &mut out)?;

@@ -3,10 +3,10 @@ use crate::octree::brick_values::BrickContent;
 use crate::octree::tree::DEPTH;
 use crate::space::BRICK_VOXELS;
 
-/// Nodes in `.ot` form: log-odds, and a mask of the children.
+/// Encoder of nodes in `.ot` form: log-odds, and a mask of the children.
 pub(super) struct OtEncoder;
 
-/// An encoded node with those below it.
+/// Encoded node with its descendants.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct OtNode {
     /// Negative infinity if no voxel is known.
@@ -21,7 +21,7 @@ impl OtEncoder {
         self.encode_run(content, 0, BRICK_VOXELS, BRICK_DEPTH, payload)
     }
 
-    /// The node of `span` voxels from a place on.
+    /// Appends the node of `span` voxels from a position on.
     fn encode_run(
         &mut self,
         content: &BrickContent,
@@ -82,7 +82,7 @@ impl NodeEncoder for OtEncoder {
     }
 }
 
-/// The first of equals, as in a tree in memory: the two zeros are equal, but not to the bit.
+/// Returns the first of equal values, as in a tree in memory: the two zeros are equal, but not bit-identical.
 fn larger(a: f32, b: f32) -> f32 {
     if b > a { b } else { a }
 }

@@ -2,32 +2,32 @@ use super::node_encoder::NodeEncoder;
 use crate::space::MortonCode;
 use std::io::{self, Read, Write};
 
-/// A node whose bytes are in a spool.
+/// Node whose bytes are in a spool.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Block<N> {
     pub(super) first: MortonCode,
     pub(super) depth: u8,
     pub(super) node: N,
-    /// Bytes of the node and all below it.
+    /// Size of the node and its descendants in bytes.
     pub(super) bytes: u64,
 }
 
-/// The nodes above the blocks of a tree.
+/// Nodes above the blocks of a tree.
 pub(super) enum Spine<E: NodeEncoder> {
     Unknown,
-    /// The next block of the spool.
+    /// The next block of the spool, with its size in bytes.
     Block(E::Node, u64),
     /// An inner node with its children, or a leaf into which they were pruned.
     Joined(E::Node, Box<[Self; 8]>),
 }
 
 impl<E: NodeEncoder> Spine<E> {
-    /// The spine of blocks in Morton order.
+    /// Creates the spine of blocks in Morton order.
     pub(super) fn of(encoder: &mut E, blocks: &[Block<E::Node>]) -> Self {
         Self::below(encoder, blocks, 0)
     }
 
-    /// The node at `depth` above these blocks.
+    /// Creates the node at `depth` above these blocks.
     fn below(encoder: &mut E, blocks: &[Block<E::Node>], depth: u8) -> Self {
         match blocks {
             [] => return Self::Unknown,
@@ -37,8 +37,8 @@ impl<E: NodeEncoder> Spine<E> {
         let mut rest = blocks;
         let children = std::array::from_fn(|child| {
             let end = rest.partition_point(|block| block.first.child_at(depth) <= child);
-            let (here, behind) = rest.split_at(end);
-            rest = behind;
+            let (here, later) = rest.split_at(end);
+            rest = later;
             Self::below(encoder, here, depth + 1)
         });
         let node = encoder.join(depth, &nodes_of(&children));
@@ -85,7 +85,10 @@ fn nodes_of<E: NodeEncoder>(children: &[Spine<E>; 8]) -> [E::Node; 8] {
 
 fn copy(spool: &mut impl Read, bytes: u64, out: &mut impl Write) -> io::Result<()> {
     if io::copy(&mut spool.take(bytes), out)? < bytes {
-        return Err(io::Error::new(io::ErrorKind::UnexpectedEof, "the spool lost what was written to it"));
+        return Err(io::Error::new(
+            io::ErrorKind::UnexpectedEof,
+            "the spool is shorter than the data written to it",
+        ));
     }
     Ok(())
 }

@@ -3,7 +3,7 @@ use super::remap::{Remap, Remapped};
 use super::replay::{clean_up_after_error, create_snapshot};
 use super::revision::{Revision, Touched};
 use crate::error::{Error, Result};
-use crate::mapper::{KeptScan, KeptSummary, Remapper, SideMapper, no_kept_scan};
+use crate::mapper::{KeptScan, KeptSummary, Remapper, ShadowMapper, no_kept_scan};
 use crate::persistence::lower_priority;
 use crate::space::TileSelection;
 use crate::store::{CatalogEntry, Disk, MapPath, SideFolder, TileStore};
@@ -35,7 +35,7 @@ pub struct OnlineRemap {
     touched: Touched,
     remapped: Remapped,
     /// `None` if no scan moves.
-    side: Option<SideMapper>,
+    side: Option<ShadowMapper>,
     /// Generation of the catalog, and number of its entries processed.
     catalog: Option<u64>,
     entries: u64,
@@ -64,7 +64,7 @@ impl OnlineRemap {
         check_catalog(&store, scans.catalog())?;
         let touched = threads.install(|| revision.look(&store))?;
         let is_needed = revision.counts.scans_changed > 0;
-        let begin = || SideMapper::begin(&store, touched.config.clone(), how.replay.stop.clone());
+        let begin = || ShadowMapper::begin(&store, touched.config.clone(), how.replay.stop.clone());
         let side = is_needed.then(begin).transpose()?;
         // They are counted again while the scans are processed.
         (revision.counts.scans, revision.counts.updates) = (0, 0);
@@ -122,7 +122,7 @@ impl OnlineRemap {
         clean_up_after_error(disk, &folder, self.swap_in(store, side))
     }
 
-    fn swap_in(mut self, store: TileStore, mut side: SideMapper) -> Result<Remapped> {
+    fn swap_in(mut self, store: TileStore, mut side: ShadowMapper) -> Result<Remapped> {
         let (revision, touched) = (&mut self.revision, &self.touched);
         follow_scans(&store, self.catalog, &mut self.entries, revision, touched, &mut side, &mut |_| ())?;
         let tiles: Vec<_> = store.tiles().iter().filter(|&tile| touched.has(tile)).collect();
@@ -146,7 +146,7 @@ fn follow_scans(
     entries: &mut u64,
     revision: &mut Revision,
     touched: &Touched,
-    side: &mut SideMapper,
+    side: &mut ShadowMapper,
     progress: &mut (dyn FnMut(u64) + Send),
 ) -> Result<u64> {
     check_catalog(store, catalog)?;

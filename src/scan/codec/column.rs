@@ -6,14 +6,14 @@ use crate::error::FormatError;
 use std::io;
 use std::sync::Arc;
 
-/// How the values of a column are turned to words.
+/// Encoding of a column's values as words.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Form {
-    /// Their bits.
+    /// Bit patterns of the values.
     Bits(Width),
-    /// Differences from the value so many places before.
+    /// Differences from the value a given number of points before.
     Differences(Width, u8),
-    /// Differences of places on a grid from the one before; some values are a few units of the last place off.
+    /// Differences of positions on a grid from the one before; some values deviate by a few units in the last place.
     Steps(Width, Grid),
     /// Differences of pixels from the one before.
     Pixels(Arc<Pinhole>),
@@ -26,29 +26,28 @@ const PARTS: u8 = 3;
 const PIXELS: u8 = 4;
 const IS_WIDE: u8 = 0x80;
 
-/// Distances in a scan at which values are alike: neighbours, and the beams of sensors that fire in turn.
+/// Distances between points with similar values: neighbours, and the beams of sensors that fire in turn.
 const LAGS: [u8; 3] = [1, 2, 4];
-/// Values by which the form of a column is chosen.
-const LOOKED_AT: usize = 1 << 14;
-/// Blocks that take the form of the one before without a look at others.
+/// Number of values from which the form of a column is chosen.
+const SAMPLE_SIZE: usize = 1 << 14;
+/// Number of consecutive blocks that reuse a form before other forms are tried again.
 const BLOCKS_ALIKE: u32 = 32;
-/// Columns whose forms are remembered.
+/// Number of columns whose forms are remembered.
 const COLUMNS: usize = 4;
 
-/// Writes columns.
 #[derive(Default)]
 pub(super) struct ColumnWriter {
     planes: PlaneWriter,
     words: Vec<u64>,
     apart: Vec<u64>,
     sample: Vec<u8>,
-    /// The form of each column's last block, and how many blocks before it had it.
+    /// Form of each column's last block, and the number of blocks before it with the same form.
     chosen: [Option<(Form, u32)>; COLUMNS],
 }
 
 impl ColumnWriter {
-    /// Appends a column, the first, second or so of its block. `depths` are the values of z for x and y: what a camera
-    /// made is known by both.
+    /// Appends the column with index `column` of its block. `depths` are the z values for the columns x and y, which
+    /// the camera form needs.
     pub(super) fn put(
         &mut self,
         column: usize,
@@ -56,7 +55,7 @@ impl ColumnWriter {
         depths: Option<&[f64]>,
         out: &mut Vec<u8>,
     ) -> io::Result<()> {
-        // The blocks of a sensor are alike: what was best for one is tried first on those behind it.
+        // Blocks of one sensor are similar: the form of the last block is tried first.
         let chosen = self.chosen[column % COLUMNS].take();
         if let Some((form, blocks)) = chosen.filter(|(_, blocks)| *blocks < BLOCKS_ALIKE)
             && self.put_form(values, depths, &form, out)?
@@ -74,15 +73,15 @@ impl ColumnWriter {
             self.chosen[column % COLUMNS] = Some((form, 0));
             return Ok(());
         }
-        // Some values are not on the grid of the others. The next block may be.
+        // Some values are not on the grid of the others. The next block may fit again.
         let form = self.choose(values, width, false)?;
         self.put_form(values, depths, &form, out).map(drop)
     }
 
-    /// The form that makes a part of the column the smallest; every column has one that is no grid.
+    /// Chooses the form with the smallest encoding of a sample; falls back to one that is not a grid.
     fn choose(&mut self, values: &[f64], width: Width, may_be_grid: bool) -> io::Result<Form> {
-        let first = values.len().saturating_sub(LOOKED_AT) / 2;
-        let part = &values[first..values.len().min(first + LOOKED_AT)];
+        let first = values.len().saturating_sub(SAMPLE_SIZE) / 2;
+        let part = &values[first..values.len().min(first + SAMPLE_SIZE)];
         let grids = Grid::of(values, width).filter(|_| may_be_grid).map(|grid| Form::Steps(width, grid));
         let differences = LAGS.map(|lag| Form::Differences(width, lag));
         let mut best = (usize::MAX, Form::Bits(width));
@@ -98,7 +97,7 @@ impl ColumnWriter {
         Ok(best.1)
     }
 
-    /// Bytes that the words take.
+    /// Returns the encoded size of the sample in bytes.
     fn size_of_sample(&mut self, form: &Form) -> io::Result<usize> {
         self.sample.clear();
         let bytes = bytes_of(form, &self.words);
@@ -109,7 +108,7 @@ impl ColumnWriter {
         Ok(self.sample.len())
     }
 
-    /// Appends the column in a form; false if it cannot be written so.
+    /// Appends the column in a form; returns `false` if the values do not fit it.
     fn put_form(
         &mut self,
         values: &[f64],
@@ -147,7 +146,7 @@ impl ColumnWriter {
         Ok(true)
     }
 
-    /// Turns values to words; false if they have none in this form.
+    /// Converts values to words; returns `false` if the values do not fit the form.
     fn fill_words(&mut self, values: &[f64], depths: Option<&[f64]>, form: &Form) -> bool {
         let words = &mut self.words;
         words.clear();
@@ -182,7 +181,7 @@ fn flag_of(width: Width) -> u8 {
     if width == Width::Wide { IS_WIDE } else { 0 }
 }
 
-/// Bytes that count of the words of a form.
+/// Number of significant bytes in the words of a form.
 fn bytes_of(form: &Form, words: &[u64]) -> usize {
     match form {
         Form::Bits(width) | Form::Differences(width, _) => width.bytes(),
@@ -193,18 +192,17 @@ fn bytes_of(form: &Form, words: &[u64]) -> usize {
     }
 }
 
-/// Reads columns.
 #[derive(Default)]
 pub(super) struct ColumnReader {
     planes: PlaneReader,
     words: Vec<u64>,
     apart: Vec<u64>,
-    /// Of the last column of pixels.
+    /// Camera of the last column of pixels.
     camera: Option<Pinhole>,
 }
 
 impl ColumnReader {
-    /// Reads a column of `points` values in place of those in the list.
+    /// Reads a column of `points` values; replaces the content of the list.
     pub(super) fn take(
         &mut self,
         points: usize,
@@ -260,7 +258,7 @@ impl ColumnReader {
                 camera.values(&self.words, depths, values);
                 self.camera = Some(camera);
             }
-            _ => return Err(input.wrong("a column of no known form")),
+            _ => return Err(input.wrong("a column of unknown form")),
         }
         Ok(())
     }

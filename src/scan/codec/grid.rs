@@ -2,7 +2,7 @@
 
 use super::words::Width;
 
-/// Steps that are tried, the coarsest first: those of sensors and files, and powers of two.
+/// Candidate steps, the coarsest first: those of sensors and files, and powers of two.
 const STEPS: [f64; 30] = [
     1.0,
     0.5,
@@ -35,26 +35,26 @@ const STEPS: [f64; 30] = [
     0.000_01,
     0.000_001,
 ];
-/// Values that are looked at before all are.
-const LOOKED_AT: usize = 48;
-/// Larger multiples have no exact products any more.
-const MOST: f64 = 2_251_799_813_685_248.0;
-/// How far a value may be from the product, in units of its last place: readers add offsets.
+/// Number of values that are sampled before all are checked.
+const SAMPLE_SIZE: usize = 48;
+/// Bound of the multiples: 2^51. Products of larger ones are not exact.
+const MAX_STEPS: f64 = 2_251_799_813_685_248.0;
+/// Maximum deviation of a value from the product, in units in the last place; readers add offsets.
 const MAX_ULPS: u64 = 100;
 
-/// A grid: multiples of a step, or parts of a unit. Readers multiply or divide, which differs in the last place.
+/// Grid of multiples of a step, or of fractions of a unit. Readers multiply or divide, which differs in the last place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Grid {
-    /// So many times this.
+    /// Multiples of this step.
     Times(f64),
-    /// So many divided by this.
+    /// Integers divided by this number.
     Over(f64),
 }
 
 impl Grid {
-    /// The coarsest grids, of each kind, on which some of the values are, near enough.
+    /// Returns the coarsest grid of each kind on which the sampled values approximately lie.
     pub(super) fn of(values: &[f64], width: Width) -> impl Iterator<Item = Self> {
-        let every = values.len().div_ceil(LOOKED_AT).max(1);
+        let every = values.len().div_ceil(SAMPLE_SIZE).max(1);
         let is_on =
             |grid: &Self| values.iter().step_by(every).all(|value| grid.place(*value, width).is_some());
         let times = STEPS.into_iter().map(Self::Times).find(is_on);
@@ -70,19 +70,20 @@ impl Grid {
         }
     }
 
-    /// How many steps a value is, and how far it is from there in units of the last place; `None` if that is far.
+    /// Returns the number of steps of a value, and its deviation in units in the last place; `None` if the deviation is
+    /// too large.
     #[inline]
     pub(super) fn place(self, value: f64, width: Width) -> Option<(i64, i8)> {
         let steps = rounded(match self {
             Self::Times(step) => value / step,
             Self::Over(parts) => value * parts,
         });
-        // Also none of what is no number.
-        let is_whole = steps.abs() < MOST;
+        // False for NaN.
+        let is_whole = steps.abs() < MAX_STEPS;
         if !is_whole {
             return None;
         }
-        // As an integer, so that there is one zero; the other is one place below it.
+        // The integer merges both zeros; the negative one has a deviation of one unit.
         let steps = steps as i64;
         let of_steps = width.ordered(width.bits(self.value(steps)));
         let apart = width.ordered(width.bits(value)).wrapping_sub(of_steps) as i64;
@@ -90,7 +91,7 @@ impl Grid {
         (apart.unsigned_abs() <= most).then_some((steps, apart as i8))
     }
 
-    /// The value at a place.
+    /// The value at a position.
     #[inline]
     pub(super) fn value_at(self, steps: i64, apart: i8, width: Width) -> f64 {
         let of_steps = width.ordered(width.bits(self.value(steps)));
@@ -98,7 +99,7 @@ impl Grid {
     }
 }
 
-/// A whole number next to this one, which is smaller than 2^51: what `round` does, without a call.
+/// Rounds a number whose magnitude is below 2^51 to an adjacent integer, like `round` but without a call.
 #[inline]
 pub(super) fn rounded(number: f64) -> f64 {
     const SHIFT: f64 = 6_755_399_441_055_744.0;

@@ -1,12 +1,12 @@
-//! The points of a scan in few bytes, to the last bit: blocks that are encoded and decoded each by itself.
+//! Lossless compression of the points of a scan, in blocks that are encoded and decoded independently.
 //!
 //! ```text
 //! points -> columns z, x, y, intensity -> words (bits, differences, or integers of a grid) -> planes of bytes -> zstd
 //! ```
 //!
-//! The low bytes of a measured coordinate are noise and are stored as they are. What varies less is compressed: sign,
-//! exponent and high digits; differences from a point before; integers, where all values lie on a grid, such as
-//! millimetres or the pixels of a depth image. `docs/format.md` has the bytes.
+//! The low bytes of a measured coordinate are noise and are stored unchanged. Parts with less variation are compressed:
+//! sign, exponent and high digits; differences from an earlier point; integers, if all values are on a grid such as
+//! millimetres or the pixels of a depth image. `docs/format.md` specifies the bytes.
 
 mod column;
 mod grid;
@@ -25,10 +25,10 @@ use point_encoder::PointEncoder;
 
 use crate::space::Point;
 
-/// Most points of a block.
+/// Maximum number of points per block.
 const MAX_POINTS: usize = 1 << 16;
-/// No block is longer: the points as they are in memory, and some.
+/// Upper bound on the size of a block: twice the size of its points in memory.
 pub(crate) const MAX_BLOCK_BYTES: usize = 2 * MAX_POINTS * (size_of::<Point>() + size_of::<f32>());
 
-/// The first byte of a block.
+/// First byte of a block.
 const VERSION: u8 = 1;

@@ -3,24 +3,24 @@
 use super::grid::rounded;
 use super::words::{unzigzag, zigzag};
 
-/// Points from which a camera is found.
-const LOOKED_AT: usize = 4096;
-/// Points that it must give to the bit before all are tried.
-const TRIED: usize = 24;
-/// Images have fewer pixels along an edge.
+/// Number of points from which a camera is estimated.
+const SAMPLE_SIZE: usize = 4096;
+/// Number of points that a camera must reproduce bit by bit before all are checked.
+const CHECKED_POINTS: usize = 24;
+/// Maximum number of pixels along an edge of an image.
 const MAX_PIXELS: usize = 4096;
-/// How many decimals the numbers of a camera may have.
+/// Candidate numbers of decimals in the camera parameters.
 const DECIMALS: [i32; 3] = [4, 6, 8];
-/// Two ratios nearer to each other than this are one.
+/// Ratios whose difference is smaller than this are considered equal.
 const SAME: f64 = 1e-7;
 
-/// A camera along one axis.
+/// Pinhole camera along one axis.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Pinhole {
-    /// Focal length and center in pixels.
+    /// Focal length and optical centre in pixels.
     pub(super) focal: f64,
     pub(super) center: f64,
-    /// The coordinate of each pixel at a depth of one metre.
+    /// Coordinate of each pixel at a depth of one metre.
     directions: Vec<f64>,
 }
 
@@ -30,19 +30,19 @@ impl Pinhole {
         Self { focal, center, directions }
     }
 
-    /// Finds the camera that made these coordinates; its numbers have few decimals.
+    /// Estimates the camera that produced these coordinates, assuming parameters with few decimals.
     pub(super) fn of(values: &[f64], depths: &[f64]) -> Option<Self> {
         let pairs: Vec<(f64, f64)> =
             values.iter().copied().zip(depths.iter().copied()).filter(|(_, z)| *z > 0.0).collect();
-        let mut ratios: Vec<f64> = pairs.iter().take(LOOKED_AT).map(|(value, z)| value / z).collect();
-        if ratios.len() < TRIED || !ratios.iter().all(|ratio| ratio.abs() < 100.0) {
+        let mut ratios: Vec<f64> = pairs.iter().take(SAMPLE_SIZE).map(|(value, z)| value / z).collect();
+        if ratios.len() < CHECKED_POINTS || !ratios.iter().all(|ratio| ratio.abs() < 100.0) {
             return None;
         }
         ratios.sort_unstable_by(f64::total_cmp);
         ratios.dedup_by(|a, b| (*a - *b).abs() < SAME);
         let gap = ratios.windows(2).map(|pair| pair[1] - pair[0]).reduce(f64::min)?;
         let (first, last) = (*ratios.first()?, *ratios.last()?);
-        // The whole span tells the gap far more exactly than two neighbours do.
+        // The gap is much more exact from the whole span than from two neighbours.
         let (mut focal, mut reach) = (1.0 / gap, gap);
         for &ratio in &ratios {
             if ratio - first > 4.0 * reach || ratio == last {
@@ -55,7 +55,8 @@ impl Pinhole {
         if !(10.0..1e5).contains(&focal) {
             return None;
         }
-        let tried: Vec<_> = pairs.iter().step_by((pairs.len() / TRIED).max(1)).take(TRIED).collect();
+        let tried: Vec<_> =
+            pairs.iter().step_by((pairs.len() / CHECKED_POINTS).max(1)).take(CHECKED_POINTS).collect();
         let makes = |focal: f64, center: f64| {
             tried.iter().all(|&&(value, z)| {
                 let pixel = (value / z * focal + center).round();
@@ -66,8 +67,8 @@ impl Pinhole {
             let unit = 10_f64.powi(decimals);
             let focal = (focal * unit).round() / unit;
             let part = (-first * focal * unit).round().rem_euclid(unit) / unit;
-            // Rounding tells by how many whole pixels the center is further on.
-            // Pixels count from 0: what they are if the center were this part.
+            // Rounding yields the offset of the centre in whole pixels. Pixel indices start at 0: `least` is the
+            // smallest centre with this fractional part.
             let least = (-(first * focal + part)).ceil().max(0.0);
             let mut centers = (0..MAX_PIXELS).map(|pixels| least + pixels as f64 + part);
             let center = centers.find(|center| makes(focal, *center));
@@ -86,10 +87,10 @@ impl Pinhole {
         }
     }
 
-    /// The pixel of a coordinate, which is `expected` or another; `None` if it is of none, to the bit.
+    /// Returns the pixel whose coordinate equals `value` bit by bit, trying `expected` first; `None` if there is none.
     #[inline]
     fn pixel(&self, value: f64, z: f64, expected: i64) -> Option<i64> {
-        // The bits of what is no number depend on the processor.
+        // The bits of a NaN depend on the processor.
         let is_it = |pixel| self.value(pixel, z).to_bits() == value.to_bits() && !value.is_nan();
         if is_it(expected) {
             return Some(expected);
@@ -98,8 +99,8 @@ impl Pinhole {
         (pixel.abs() < 1e6 && is_it(pixel as i64)).then_some(pixel as i64)
     }
 
-    /// Words for coordinates: how far each pixel is from the one that is expected after those before it. Where the
-    /// depth is missing, the coordinate is what stands in its place.
+    /// Converts coordinates to words: differences between each pixel and the one predicted from those before it. If the
+    /// depth is missing, the coordinate must equal it. Returns `false` if a coordinate has no pixel.
     pub(super) fn words(&self, values: &[f64], depths: &[f64], words: &mut Vec<u64>) -> bool {
         let mut row = Expected::default();
         for (value, z) in values.iter().zip(depths) {
@@ -115,7 +116,7 @@ impl Pinhole {
         true
     }
 
-    /// The coordinates of such words.
+    /// Converts such words back to coordinates.
     pub(super) fn values(&self, words: &[u64], depths: &[f64], values: &mut Vec<f64>) {
         let mut row = Expected::default();
         for (word, z) in words.iter().zip(depths) {
@@ -126,7 +127,7 @@ impl Pinhole {
     }
 }
 
-/// Which pixel comes next: one further, as often as that was so, or the same one.
+/// Predicts the next pixel: the last one plus the last step, which is 0 or 1.
 #[derive(Default)]
 struct Expected {
     last: i64,
@@ -142,7 +143,7 @@ impl Expected {
     #[inline]
     fn follow(&mut self, pixel: i64) {
         let step = pixel.wrapping_sub(self.last);
-        // At the end of a row it goes back; the row that begins is like the one that ended.
+        // At the end of a row the pixel jumps back; the step of the ended row also applies to the next.
         if (0..=1).contains(&step) {
             self.step = step;
         }

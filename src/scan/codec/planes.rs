@@ -4,25 +4,25 @@ use integer_encoding::VarInt;
 use std::io;
 use zstd::zstd_safe::{CCtx, CParameter, DCtx, compress_bound, get_error_name};
 
-/// How a plane is written.
+/// Encoding of a plane.
 const STORED: u8 = 0;
 const COMPRESSED: u8 = 1;
 const CONSTANT: u8 = 2;
-/// By the byte above of each word: bytes that share it, together.
+/// Bytes grouped by the next higher byte of their words.
 const GROUPED: u8 = 3;
 
-/// Fast, and as small as the higher ones on what is left here.
+/// Fast, and compresses these planes as well as higher levels do.
 const LEVEL: i32 = 1;
-/// Groups of fewer bytes go together: each has a table of its own.
+/// Smaller groups are merged, because each group has its own entropy table.
 const MIN_GROUP: usize = 1024;
-/// What such a table takes, about, in bytes.
+/// Approximate size of such a table in bytes.
 const TABLE_BYTES: f64 = 80.0;
-/// Bytes that vary more than this, in bits a byte, are stored.
+/// Entropy in bits per byte above which bytes are stored uncompressed.
 const NOISE_BITS: f64 = 7.85;
-/// Bytes by which noise is told.
-const LOOKED_AT: usize = 2048;
+/// Number of sampled bytes for detecting noise.
+const SAMPLE_SIZE: usize = 2048;
 
-/// Writes words as planes of bytes, the highest first.
+/// Writes words as planes of bytes, the most significant first.
 #[derive(Default)]
 pub(super) struct PlaneWriter {
     zstd: Option<CCtx<'static>>,
@@ -35,10 +35,9 @@ pub(super) struct PlaneWriter {
 }
 
 impl PlaneWriter {
-    /// Appends the lowest `bytes` bytes of each word.
     pub(super) fn put(&mut self, words: &[u64], bytes: usize, out: &mut Vec<u8>) -> io::Result<()> {
         let (mut plane, mut above) = (std::mem::take(&mut self.plane), std::mem::take(&mut self.above));
-        // Half as wide, they are taken apart in half the time.
+        // Transposing words of half the width takes half the time.
         self.halves.clear();
         if bytes <= 4 {
             self.halves.extend(words.iter().map(|word| *word as u32));
@@ -49,7 +48,7 @@ impl PlaneWriter {
                 true => plane.extend(self.halves.iter().map(|word| (word >> (8 * byte)) as u8)),
                 false => plane.extend(words.iter().map(|word| (word >> (8 * byte)) as u8)),
             }
-            // What is known of a byte by the one above is most in the second: mantissas by exponents.
+            // The next higher byte is most informative for the second plane: it predicts mantissas from exponents.
             let above_it = (byte + 2 == bytes).then_some(&*above);
             self.put_plane(&plane, above_it, out)?;
             std::mem::swap(&mut plane, &mut above);
@@ -61,10 +60,10 @@ impl PlaneWriter {
     fn put_plane(&mut self, plane: &[u8], above: Option<&[u8]>, out: &mut Vec<u8>) -> io::Result<()> {
         let Some(&first) = plane.first() else { return Ok(()) };
         let noise_bits = |bytes: usize| NOISE_BITS * bytes as f64;
-        if above.is_none() && plane.len() > 2 * LOOKED_AT {
-            // Noise is known by a part of it.
-            let part = &plane[..LOOKED_AT];
-            if entropy(&histogram(part), LOOKED_AT as u32) > noise_bits(LOOKED_AT) {
+        if above.is_none() && plane.len() > 2 * SAMPLE_SIZE {
+            // A part of the plane suffices to detect noise.
+            let part = &plane[..SAMPLE_SIZE];
+            if entropy(&histogram(part), SAMPLE_SIZE as u32) > noise_bits(SAMPLE_SIZE) {
                 out.push(STORED);
                 out.extend_from_slice(plane);
                 return Ok(());
@@ -96,7 +95,7 @@ impl PlaneWriter {
         Ok(())
     }
 
-    /// Entropy of a plane where the bytes above are known, and what the tables of the groups take.
+    /// Entropy in bits of a plane given the higher bytes, plus the size of the groups' tables.
     fn bits_by_group(&mut self, plane: &[u8], above: &[u8], groups: &Groups) -> f64 {
         if groups.groups == 1 {
             return f64::INFINITY;
@@ -143,7 +142,7 @@ impl PlaneWriter {
         Ok(())
     }
 
-    /// Compresses bytes; returns how many they become.
+    /// Compresses bytes into the output buffer; returns their compressed size.
     pub(super) fn compress(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let zstd = match &mut self.zstd {
             Some(zstd) => zstd,
@@ -157,7 +156,7 @@ impl PlaneWriter {
     }
 }
 
-/// Which bytes are together: a group for each byte above that is frequent, and a last one for the others.
+/// Assignment of bytes to groups: one for each frequent higher byte, and a last one for the others.
 struct Groups {
     of_byte: [u16; 256],
     starts: [usize; 257],
@@ -187,7 +186,7 @@ impl Groups {
 }
 
 fn histogram(plane: &[u8]) -> [u32; 256] {
-    // Equal bytes that follow each other do not wait for each other.
+    // Separate counters avoid dependencies between adjacent equal bytes.
     let mut counts = [[0_u32; 256]; 4];
     let (chunks, rest) = plane.as_chunks::<4>();
     for chunk in chunks {
@@ -199,7 +198,7 @@ fn histogram(plane: &[u8]) -> [u32; 256] {
     std::array::from_fn(|byte| counts.iter().map(|counts| counts[byte]).sum())
 }
 
-/// Entropy in bits of all.
+/// Total entropy in bits.
 fn entropy(counts: &[u32], all: u32) -> f64 {
     let all = f64::from(all);
     let bits =
@@ -207,7 +206,6 @@ fn entropy(counts: &[u32], all: u32) -> f64 {
     counts.iter().map(bits).sum()
 }
 
-/// Reads planes as words.
 #[derive(Default)]
 pub(super) struct PlaneReader {
     zstd: Option<DCtx<'static>>,
@@ -217,7 +215,7 @@ pub(super) struct PlaneReader {
 }
 
 impl PlaneReader {
-    /// Reads words of `bytes` bytes in place of those in the list, whose number stays.
+    /// Reads words of `bytes` bytes; replaces the content of the list, but keeps its length.
     pub(super) fn take(
         &mut self,
         words: &mut [u64],
@@ -253,7 +251,7 @@ impl PlaneReader {
                 decompress(&mut self.zstd, input.bytes(length)?, &mut self.plane, input)?;
             }
             GROUPED if self.above.len() == self.plane.len() => self.take_groups(input)?,
-            _ => return Err(input.wrong("a plane of no known form")),
+            _ => return Err(input.wrong("a plane of unknown form")),
         }
         Ok(())
     }
@@ -292,7 +290,9 @@ fn decompress(
 ) -> Result<(), FormatError> {
     let zstd = match zstd {
         Some(zstd) => zstd,
-        none => none.insert(DCtx::try_create().ok_or_else(|| input.wrong("no memory to decompress it"))?),
+        none => {
+            none.insert(DCtx::try_create().ok_or_else(|| input.wrong("not enough memory for decompression"))?)
+        }
     };
     match zstd.decompress(plane, bytes) {
         Ok(length) if length == plane.len() => Ok(()),
@@ -300,9 +300,9 @@ fn decompress(
     }
 }
 
-/// A compressor that omits headers and checksums.
+/// Creates a compressor that omits headers and checksums.
 fn compressor() -> io::Result<CCtx<'static>> {
-    // `zstd::bulk` would panic.
+    // `zstd::bulk` would panic if this fails.
     let mut zstd = CCtx::try_create().ok_or(io::ErrorKind::OutOfMemory)?;
     for parameter in [
         CParameter::CompressionLevel(LEVEL),
@@ -315,12 +315,12 @@ fn compressor() -> io::Result<CCtx<'static>> {
     Ok(zstd)
 }
 
-/// An error of zstd, most likely a lack of memory.
+/// Converts an error of zstd, which most likely means that memory is exhausted.
 fn refused(code: usize) -> io::Error {
     io::Error::other(get_error_name(code))
 }
 
-/// What is left of a block.
+/// Input with the unread part of a block.
 pub(super) struct BlockInput<'a> {
     block: &'a [u8],
     at: usize,

@@ -3,37 +3,36 @@ use crate::error::{Error, Result};
 use crate::space::Point;
 use std::path::Path;
 
-/// Makes blocks of the points of scans. It keeps its memory from scan to scan.
+/// Encoder of scans as blocks of points. It reuses its memory between scans.
 #[derive(Debug, Default)]
 pub struct PointBlocks {
     encoder: PointEncoder,
-    /// Points of the block that is being filled.
     points: Vec<Point>,
     intensities: Vec<f32>,
     block: Vec<u8>,
 }
 
-/// Takes a block.
+/// Callback that receives an encoded block.
 type Put<'a> = dyn FnMut(&[u8]) -> Result<()> + 'a;
 
 impl PointBlocks {
-    /// Begins a scan. What is left of one that was given up is forgotten.
+    /// Begins a scan, and discards the rest of an abandoned one.
     pub fn begin(&mut self) {
         self.points.clear();
         self.intensities.clear();
     }
 
-    /// Adds points to the scan, all with intensities or all without; `put` takes each block that is full.
+    /// Adds points to the scan, all with intensities or all without; passes each full block to `put`.
     ///
     /// # Errors
     ///
-    /// Those of `put`; no memory to compress a block.
+    /// Returns errors from `put`, and fails if memory is exhausted.
     pub fn push(&mut self, points: &[Point], intensities: Option<&[f32]>, put: &mut Put<'_>) -> Result<()> {
         let mut at = 0;
         while at < points.len() {
             let count = (points.len() - at).min(MAX_POINTS - self.points.len());
             if count == MAX_POINTS {
-                // A whole block need not be copied.
+                // A full block is encoded without a copy.
                 let some = at..at + count;
                 self.encode(&points[some.clone()], intensities.map(|all| &all[some]), put)?;
             } else {
@@ -48,18 +47,18 @@ impl PointBlocks {
         Ok(())
     }
 
-    /// Ends the scan with the block of the points that are left.
+    /// Ends the scan with a block of the remaining points.
     ///
     /// # Errors
     ///
-    /// As for [`PointBlocks::push`].
+    /// Same errors as [`PointBlocks::push`].
     pub fn end(&mut self, has_intensities: bool, put: &mut Put<'_>) -> Result<()> {
         if self.points.is_empty() {
             return Ok(());
         }
         let (points, intensities) = (std::mem::take(&mut self.points), std::mem::take(&mut self.intensities));
         let ended = self.encode(&points, has_intensities.then_some(&*intensities), put);
-        // Their memory serves again.
+        // Reuse their memory.
         (self.points, self.intensities) = (points, intensities);
         self.begin();
         ended

@@ -6,7 +6,7 @@ use crate::error::FormatError;
 use crate::space::Point;
 use std::fmt;
 
-/// Decodes blocks of points. It keeps its memory from block to block.
+/// Decoder of blocks of points. It reuses its memory between blocks.
 #[derive(Default)]
 pub(crate) struct PointDecoder {
     columns: ColumnReader,
@@ -14,12 +14,12 @@ pub(crate) struct PointDecoder {
 }
 
 impl PointDecoder {
-    /// Appends the points of a block and their intensities; returns whether it has these. After an error some of the
-    /// points may be there.
+    /// Appends the points of a block and their intensities; returns whether it has intensities. After an error some of
+    /// the points may have been appended.
     ///
     /// # Errors
     ///
-    /// Damage, with its offset in the block.
+    /// Fails if the block is damaged; the error contains the offset in the block.
     pub(crate) fn decode(
         &mut self,
         block: &[u8],
@@ -50,7 +50,7 @@ impl PointDecoder {
         }
         match input.is_at_end() {
             true => Ok(has_intensities),
-            false => Err(input.wrong("bytes behind a block of points")),
+            false => Err(input.wrong("extra bytes after a block of points")),
         }
     }
 }

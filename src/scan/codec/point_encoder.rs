@@ -5,7 +5,7 @@ use crate::space::{Point, put_number};
 use std::fmt;
 use std::io;
 
-/// Encodes blocks of points. It keeps its memory from block to block.
+/// Encoder of blocks of points. It reuses its memory between blocks.
 #[derive(Default)]
 pub(crate) struct PointEncoder {
     columns: ColumnWriter,
@@ -18,7 +18,7 @@ impl PointEncoder {
     ///
     /// # Errors
     ///
-    /// No memory to compress it.
+    /// Fails if memory is exhausted.
     pub(crate) fn encode(
         &mut self,
         points: &[Point],

@@ -8,7 +8,7 @@ fn encoded(points: &[Point], intensities: Option<&[f32]>) -> Vec<u8> {
     block
 }
 
-/// Bytes of a block, which comes back to the bit.
+/// Returns the encoded size in bytes after checking a lossless round trip.
 fn round_trip(points: &[Point], intensities: Option<&[f32]>) -> usize {
     let block = encoded(points, intensities);
     let (mut decoded, mut of_decoded) = (Vec::new(), Vec::new());
@@ -21,7 +21,7 @@ fn round_trip(points: &[Point], intensities: Option<&[f32]>) -> usize {
     block.len()
 }
 
-/// A generator of numbers (SplitMix64).
+/// Random number generator (SplitMix64).
 fn random(state: &mut u64) -> u64 {
     *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
     let z = (*state ^ *state >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -33,7 +33,7 @@ fn unit(state: &mut u64) -> f64 {
     (random(state) >> 11) as f64 / (1_u64 << 53) as f64
 }
 
-/// A lidar's turn: neighbours are alike, and ranges have noise.
+/// Points of one lidar revolution: similar neighbours and noisy ranges.
 fn turn(points: usize, state: &mut u64) -> Vec<Point> {
     let point = |k: usize| {
         let (angle, up) = (k as f64 * 1e-3, (k % 16) as f64 * 0.03 - 0.2);
@@ -44,7 +44,7 @@ fn turn(points: usize, state: &mut u64) -> Vec<Point> {
 }
 
 #[test]
-fn blocks_of_every_kind_come_back_to_the_bit() {
+fn all_kinds_of_blocks_round_trip_losslessly() {
     let state = &mut 1;
     for points in [0, 1, 2, 5, 255, 4096, MAX_POINTS] {
         let turn = turn(points, state);
@@ -70,7 +70,7 @@ fn blocks_of_every_kind_come_back_to_the_bit() {
 }
 
 #[test]
-fn what_lies_on_a_grid_is_stored_as_integers() {
+fn values_on_a_grid_are_stored_as_integers() {
     let points = 30_000;
     let turn = turn(points, &mut 2);
     let a_point = |scan: &[Point]| round_trip(scan, None) as f64 / points as f64;
@@ -100,7 +100,7 @@ fn depth_images_are_stored_as_pixels() {
 }
 
 #[test]
-fn bytes_cut_or_changed_are_damage_or_points_and_nothing_else() {
+fn damaged_blocks_are_errors_or_points() {
     let turn = turn(3000, &mut 4);
     let intensities: Vec<f32> = (0..3000).map(|k| (k % 97) as f32).collect();
     let grid: Vec<Point> = turn.iter().map(|point| point.map(|x| (x * 1e3).round() * 1e-3)).collect();
@@ -121,7 +121,7 @@ fn bytes_cut_or_changed_are_damage_or_points_and_nothing_else() {
     }
 }
 
-/// Numbers as sensors give them, and as nobody does.
+/// Numbers as sensors return them, and arbitrary ones.
 fn number() -> impl Strategy<Value = f64> {
     prop_oneof![
         any::<u64>().prop_map(f64::from_bits),
@@ -136,7 +136,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(200))]
 
     #[test]
-    fn any_points_come_back_to_the_bit(
+    fn any_points_round_trip_losslessly(
         points in prop::collection::vec(prop::array::uniform3(number()), 0..300),
         is_with_intensities in prop::bool::ANY,
         seed in any::<u64>(),
@@ -147,7 +147,7 @@ proptest! {
     }
 
     #[test]
-    fn any_bytes_are_damage_or_points(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
+    fn any_bytes_decode_to_an_error_or_points(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
         let mut block = vec![1, 1];
         block.extend(&bytes);
         let (mut points, mut intensities) = (Vec::new(), Vec::new());
@@ -156,10 +156,11 @@ proptest! {
     }
 }
 
-/// Bytes a point and times on the real sets: `cargo test --release --lib codec -- --ignored --nocapture`.
+/// Prints bytes per point and times for the real data sets: `cargo test --release --lib codec -- --ignored
+/// --nocapture`.
 #[test]
-#[ignore = "a table, by hand"]
-fn a_table_of_real_sets() {
+#[ignore = "prints a table; run manually"]
+fn print_sizes_and_times_of_real_sets() {
     use std::time::Instant;
     use voxtile_formats::{ReadOptions, open_scans};
     let root = std::env::var_os("VOXTILE_DATA").unwrap_or_else(|| "../shared/data".into());

@@ -1,9 +1,9 @@
-//! Numbers as words of four or eight bytes whose order is that of the numbers, and back.
+//! Conversion between numbers and words of four or eight bytes that sort in the same order.
 
-/// How many bytes of a word count, and what a word stands for.
+/// Number of significant bytes of a word, and the type it encodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Width {
-    /// `f32`, or an `f64` that is one.
+    /// `f32`, or an `f64` that is exactly representable as `f32`.
     Narrow,
     /// `f64`.
     Wide,
@@ -17,21 +17,20 @@ impl Width {
         }
     }
 
-    /// The least width that has every bit of these numbers.
+    /// The smallest width that represents all values exactly.
     pub(super) fn of(values: &[f64]) -> Self {
         if Self::Narrow.has(values) { Self::Narrow } else { Self::Wide }
     }
 
-    /// Whether it has every bit of these numbers.
+    /// Returns whether this width represents all values exactly.
     pub(super) fn has(self, values: &[f64]) -> bool {
         let has_lost = |lost: u64, value: &f64| lost | (f64::from(*value as f32).to_bits() ^ value.to_bits());
-        // Without a branch first, for those that are numbers.
+        // The first condition is branchless and decides all cases without NaN.
         self == Self::Wide
             || values.iter().fold(0, has_lost) == 0 && !values.iter().any(|value| value.is_nan())
             || values.iter().all(|value| narrow(*value).is_some())
     }
 
-    /// The bits of a number.
     #[inline]
     pub(super) fn bits(self, value: f64) -> u64 {
         match self {
@@ -41,7 +40,6 @@ impl Width {
         }
     }
 
-    /// The number with these bits.
     #[inline]
     pub(super) fn value(self, bits: u64) -> f64 {
         match self {
@@ -58,7 +56,7 @@ impl Width {
         u64::MAX >> (64 - 8 * self.bytes())
     }
 
-    /// Bits whose order as integers is the order of the numbers.
+    /// Maps bits to integers that sort in the order of the numbers.
     #[inline]
     pub(super) fn ordered(self, bits: u64) -> u64 {
         if bits & self.sign() != 0 { !bits & self.mask() } else { bits | self.sign() }
@@ -69,7 +67,7 @@ impl Width {
         if ordered & self.sign() != 0 { ordered & !self.sign() } else { !ordered & self.mask() }
     }
 
-    /// A difference modulo the width, small ones first: 0, -1, 1, -2.
+    /// Difference modulo the width, zigzag encoded: 0, -1, 1, -2 become 0, 1, 2, 3.
     #[inline]
     pub(super) fn difference(self, value: u64, before: u64) -> u64 {
         let shift = 64 - 8 * self.bytes() as u32;
@@ -83,11 +81,11 @@ impl Width {
     }
 }
 
-/// Mantissa bits that an `f64` has more than an `f32`.
+/// Number of mantissa bits that an `f64` has more than an `f32`.
 const MORE_BITS: u32 = 29;
 
-/// The `f32` that an `f64` is, to the bit; `None` if it is none. What is no number keeps its bits, too: conversions by
-/// the processor may change them.
+/// Converts an `f64` to the identical `f32`; `None` if there is none. The bits of a NaN are preserved, which
+/// conversions by the processor do not guarantee.
 #[inline]
 fn narrow(value: f64) -> Option<u32> {
     if value.is_nan() {
@@ -100,7 +98,7 @@ fn narrow(value: f64) -> Option<u32> {
     (f64::from(narrow).to_bits() == value.to_bits()).then(|| narrow.to_bits())
 }
 
-/// An `f32` as `f64`, to the bit.
+/// Converts an `f32` to `f64`, preserving the bits of a NaN.
 #[inline]
 pub(super) fn widen(bits: u32) -> f64 {
     let value = f32::from_bits(bits);

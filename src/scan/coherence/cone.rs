@@ -2,36 +2,37 @@ use crate::scan::pages::Local;
 use crate::scan::ray::{RayOrigin, SlabRay, voxel};
 use crate::space::{Point, VoxelIndex};
 
-/// Sides of a cube around the sensor: two per axis, the lower first.
+/// Number of sides of a cube around the sensor: two per axis, the lower first.
 pub(crate) const SIDES: usize = 6;
 
-/// Cells along the edge of a side: at 16 voxels from the sensor a cell is one voxel wide.
+/// Cells along the edge of a side. At 16 voxels from the sensor a cell is one voxel wide.
 pub(crate) const CELLS: usize = 32;
 
-/// Cells of a side.
+/// Number of cells per side.
 pub(crate) const CELLS_PER_SIDE: usize = CELLS * CELLS;
 
-/// Width of a cell at a distance of 1.
+/// Width of a cell at distance 1.
 const CELL: f64 = 2.0 / CELLS as f64;
 
 /// Tolerance in voxels, far above the rounding error of a ray.
 const MARGIN: f64 = 1e-6;
 
-/// The directions from a sensor through a square of cells on one side of a cube around it.
+/// Cone of directions from a sensor through a square of cells on one side of a cube around it.
 pub(crate) struct Cone {
-    /// The sensor relative to the lowest voxel of the window, along `B` and `C`.
+    /// Position of the sensor relative to the lowest voxel of the window, along `B` and `C`.
     origin: [f64; 2],
-    /// Voxels along `B` and `C` for a voxel along `A`: the least. The most is `width` more.
+    /// Smallest slope along `B` and `C` per voxel along `A`. The largest is this plus `width`.
     slope: [f64; 2],
     width: f64,
-    /// Voxels along `A` from the sensor to where rays leave its slab.
+    /// Distance along `A` from the sensor to the border at which rays leave its slab, in voxels.
     first_slab: f64,
-    /// The sensor's slab.
+    /// Slab of the sensor.
     slab: u32,
     is_up: bool,
 }
 
-/// Number of the cell through which a ray passes, over all sides; `None` for a ray too short to have a direction.
+/// Returns the index of the cell through which a ray passes, over all sides; `None` for a ray too short to have a
+/// direction.
 #[inline]
 pub(crate) fn cell_of(ray: &SlabRay) -> Option<usize> {
     let [x, y, z] = ray.direction;
@@ -40,7 +41,7 @@ pub(crate) fn cell_of(ray: &SlabRay) -> Option<usize> {
         1 => [y, x, z],
         _ => [z, x, y],
     };
-    // From 0 to `CELLS` over the side.
+    // Position on the side, from 0 to `CELLS`.
     let place = |slope: f64| (slope * ray.per_slab + 1.0) * (CELLS / 2) as f64;
     let cell = |slope: f64| (place(slope) as i32 as usize).min(CELLS - 1);
     let side = 2 * ray.axis + usize::from(a > 0.0);
@@ -48,8 +49,8 @@ pub(crate) fn cell_of(ray: &SlabRay) -> Option<usize> {
 }
 
 impl Cone {
-    /// The cone of a square of cells on a side across axis `A`. The square is given by its lowest cell along `B` and
-    /// `C` and by its edge in cells; `base` is the lowest voxel of the window.
+    /// Creates the cone of a square of cells on a side across axis `A`. The square is defined by its lowest cell along
+    /// `B` and `C` and its edge in cells; `base` is the lowest voxel of the window.
     pub(crate) fn new<const A: usize, const B: usize, const C: usize>(
         origin: &RayOrigin,
         base: VoxelIndex,
@@ -71,7 +72,7 @@ impl Cone {
         }
     }
 
-    /// The lowest and the highest voxel that rays of the cone can cross in a slab, counted from the sensor's slab.
+    /// Returns the lowest and highest voxel that rays of the cone can cross in a slab, numbered from the sensor's slab.
     #[inline]
     pub(crate) fn in_slab<const A: usize, const B: usize, const C: usize>(
         &self,
@@ -83,7 +84,7 @@ impl Cone {
             let (least, most) = (self.slope[k], self.slope[k] + self.width);
             let low = least * if least < 0.0 { far } else { near };
             let high = most * if most < 0.0 { near } else { far };
-            // Below the window the index is 0; no ray that ends in the window gets there.
+            // Clamped to 0 below the window, where no ray that ends in the window can pass.
             let index = |at: f64| at as i32 as u32;
             (index(self.origin[k] + low - MARGIN), index(self.origin[k] + high + MARGIN))
         };

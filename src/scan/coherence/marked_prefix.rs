@@ -2,34 +2,35 @@ use super::cone::{CELLS, CELLS_PER_SIDE, Cone, SIDES, cell_of};
 use crate::scan::pages::{MarkedPage, PageMap};
 use crate::scan::ray::{RayCut, RayOrigin, SlabRay};
 
-/// How many slabs at the start of a ray are marked already, by rays of nearly the same direction.
+/// Number of slabs at the start of a ray that rays of nearly the same direction have already marked.
 ///
-/// The directions from the sensor are divided into cones. For each cone, the first slabs in which every voxel that a
-/// ray of the cone can reach is marked are its marked prefix. A ray of the cone starts behind the prefix, or is skipped
-/// if it ends within. Where rays are dense, most rays are skipped or nearly so. The resulting marks are the same.
+/// The directions from the sensor are divided into cones. The marked prefix of a cone is the longest run of slabs, from
+/// the sensor on, in which each voxel that rays of the cone can reach is marked. A ray of the cone starts after the
+/// prefix, or is skipped if it ends within. Where rays are dense, most rays are skipped or almost skipped. The marks
+/// are the same as without prefixes.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct MarkedPrefixes {
-    /// By cell, as [`cell_of`] counts them.
+    /// Indexed by [`cell_of`].
     cones: Vec<MarkedPrefix>,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
 struct MarkedPrefix {
-    /// Slabs in which every voxel that a ray of the cone can reach is marked.
+    /// Number of slabs in which each voxel that rays of the cone can reach is marked.
     slabs: u16,
-    /// The last slab of the longest ray so far, counted from 0; no slab beyond it is examined.
+    /// The last slab of the longest ray so far, numbered from 0; later slabs are not examined.
     farthest: u16,
 }
 
 impl MarkedPrefix {
-    /// Whether a ray longer than the sensor's slab has asked for the prefix.
+    /// Returns whether the prefix was queried by a ray longer than the sensor's slab.
     fn is_used(&self) -> bool {
         self.farthest > 0
     }
 }
 
 impl MarkedPrefixes {
-    /// Forgets everything; the memory is kept.
+    /// Clears the prefixes; the memory is kept.
     pub(crate) fn clear(&mut self) {
         self.cones.clear();
         self.cones.resize(SIDES * CELLS_PER_SIDE, MarkedPrefix::default());
@@ -40,7 +41,8 @@ impl MarkedPrefixes {
         self.cones.capacity() * size_of::<MarkedPrefix>()
     }
 
-    /// Number of slabs from the sensor on whose voxels along the ray are all marked; `None` if that is the whole ray.
+    /// Number of slabs from the sensor in which all voxels along the ray are marked; `None` if these are all slabs of
+    /// the ray.
     #[inline]
     pub(crate) fn of(&mut self, ray: &SlabRay) -> Option<u32> {
         let Some(cell) = cell_of(ray) else { return Some(0) };
@@ -50,9 +52,9 @@ impl MarkedPrefixes {
         (last >= cone.slabs).then_some(cone.slabs.into())
     }
 
-    /// Extends the prefixes by the present marks, in squares of cells with these edges (powers of two). Large squares
-    /// are few and quickly cover what is near the sensor; small ones go on from there. What `cut` does not select need
-    /// not be marked.
+    /// Extends the prefixes by the current marks, in squares of cells with the given edges (powers of two). Large
+    /// squares are few and quickly cover the area close to the sensor; small ones extend it. Voxels that `cut` does not
+    /// select need not be marked.
     pub(crate) fn extend(
         &mut self,
         pages: &PageMap<MarkedPage>,

@@ -1,8 +1,8 @@
-//! Beam coherence: rays of nearly the same direction cross nearly the same voxels, so most of a ray need not be walked.
+//! Beam coherence: rays of nearly the same direction cross nearly the same voxels, so most of a ray need not be traced.
 //!
-//! The points are taken in sampling passes. The first passes are spread over the whole scan; what they marked is then
-//! known by cones of directions, and the rays of later passes begin behind it. This saves time only; the marks are the
-//! same.
+//! The points are processed in sampling passes. The first passes are spread over the whole scan. Their marks are then
+//! summarised by cones of directions, and the rays of later passes start after the marked part. This saves time only;
+//! the marks are the same.
 
 mod cone;
 mod marked_prefix;

@@ -3,28 +3,27 @@ use super::sparse_page::{BrickContent, SparsePage, part_of_place};
 use crate::space::BRICK_VOXELS;
 use rustc_hash::FxHashMap;
 
-/// For each voxel of a page, the number of rays that passed it since it was last hit.
+/// Page with a counter per voxel: the number of rays that passed it since its last hit.
 ///
-/// Few voxels are passed by 256 rays, so a count is a byte, and the upper bytes of a brick's counts are apart: bricks
-/// of bytes are half as much to walk through, to clear and to read.
+/// Counts rarely reach 256, so the lower bytes of a brick's counts are stored together, and the upper bytes separately.
+/// Bricks of bytes take half as long to write, clear and read as bricks of 16-bit counts.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct CountedPage {
     low: SparsePage<Bytes>,
-    /// By number of the brick; absent as long as all are 0.
+    /// By index of the brick; absent while all are 0.
     high: FxHashMap<usize, Box<Bytes>>,
 }
 
-/// A byte of each voxel's count, in Morton order.
+/// One byte of each voxel's count, in Morton order.
 type Bytes = [u8; BRICK_VOXELS];
 
-/// The counts of a brick.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BrickCounts<'a> {
     low: &'a Bytes,
     high: Option<&'a Bytes>,
 }
 
-/// Most rays that a page can count. A ray passes a voxel at most once.
+/// Maximum number of rays that a page can count. A ray passes a voxel at most once.
 pub(crate) const MAX_RAYS: usize = u16::MAX as usize;
 
 impl BrickContent for Bytes {
@@ -32,13 +31,13 @@ impl BrickContent for Bytes {
 }
 
 impl BrickCounts<'_> {
-    /// The count of the voxel at a place.
+    /// The count of a voxel, by its Morton position.
     #[inline]
     pub(crate) fn get(&self, place: usize) -> u16 {
         u16::from_le_bytes([self.low[place], self.high.map_or(0, |high| high[place])])
     }
 
-    /// The counts, if all are below 256.
+    /// The counts as bytes, if all are below 256.
     #[inline]
     pub(crate) fn as_bytes(&self) -> Option<&Bytes> {
         if self.high.is_none() { Some(self.low) } else { None }
@@ -46,13 +45,13 @@ impl BrickCounts<'_> {
 }
 
 impl CountedPage {
-    /// A ray passes the voxel at a place.
+    /// Counts a ray that passes the voxel at a Morton position.
     #[inline]
     pub(crate) fn pass_at(&mut self, place: u32) {
         self.add(place, 1);
     }
 
-    /// Adds 0 or 1 to the count of the voxel at a place.
+    /// Adds 0 or 1 to the count of a voxel.
     #[inline]
     fn add(&mut self, place: u32, rays: u8) {
         let low = &mut self.low.brick(place)[place_in_brick(place)];
@@ -70,7 +69,7 @@ impl CountedPage {
         high[place_in_brick(place)] += 1;
     }
 
-    /// Sets the count of the voxel at a place to 0, and makes its brick if it is absent; returns the count.
+    /// Resets the count of a voxel to 0 and returns the previous one; creates its brick if it is absent.
     pub(crate) fn take(&mut self, place: u32) -> u16 {
         let low = std::mem::take(&mut self.low.brick(place)[place_in_brick(place)]);
         let high = match self.high.is_empty() {
@@ -80,23 +79,22 @@ impl CountedPage {
         u16::from_le_bytes([low, high.map_or(0, |high| std::mem::take(&mut high[place_in_brick(place)]))])
     }
 
-    /// How many bricks there are.
     pub(crate) fn brick_count(&self) -> usize {
         self.low.bricks().len()
     }
 
-    /// The bricks, by number less one.
+    /// The bricks in the order of their creation.
     pub(crate) fn bricks(&self) -> impl Iterator<Item = BrickCounts<'_>> {
         let counts = |(number, low)| BrickCounts { low, high: self.high.get(&number).map(|high| &**high) };
         self.low.bricks().iter().enumerate().map(counts)
     }
 
-    /// The places of the bricks in the page, in Morton order, with their numbers less one.
+    /// The Morton positions of the bricks in the page, in order, with the indices of the bricks.
     pub(crate) fn places(&self) -> impl Iterator<Item = (u32, usize)> {
         self.low.places()
     }
 
-    /// The number, less one, of the existing brick that holds the voxel at a place.
+    /// The index of the existing brick that contains a voxel.
     pub(crate) fn number_of(&self, place: u32) -> usize {
         self.low.number_of(place)
     }
@@ -108,7 +106,7 @@ fn place_in_brick(place: u32) -> usize {
 }
 
 impl Footprint for CountedPage {
-    /// The part of the voxel's place that comes from its indices along the slab.
+    /// The part of the Morton position that the indices along the slab determine.
     type Cell = u32;
 
     fn heap_bytes(&self) -> usize {
@@ -117,7 +115,7 @@ impl Footprint for CountedPage {
     }
 
     fn cleared(self) -> Option<Self> {
-        // The upper bytes go: most of them lie near the sensor, which goes on.
+        // The upper bytes are dropped: most of them are close to the sensor, which moves on.
         Some(Self { low: self.low.emptied(), high: FxHashMap::default() })
     }
 
@@ -144,9 +142,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn counts_go_beyond_a_byte_and_are_taken_whole() {
+    fn counts_exceed_a_byte_and_are_taken_completely() {
         let mut page = CountedPage::default();
-        // Two places of one brick, one of another.
+        // Two voxels of one brick, one of another.
         for (place, rays) in [(3, 70), (7, 300), (512 * 9 + 7, MAX_RAYS)] {
             (0..rays).for_each(|_| page.pass_at(place));
         }

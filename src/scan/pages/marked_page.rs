@@ -4,42 +4,40 @@ use super::window::Local;
 use crate::scan::ray::Stretch;
 use crate::space::{BRICK_VOXELS, BrickMask, VoxelIndex, places};
 
-/// The voxels of a page that the rays of a scan pass or end in.
+/// Page with the voxels that the rays of a scan pass or end in.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct MarkedPage {
     passed: Marks,
-    /// Few bricks have hits: those beside ground and walls.
+    /// Few bricks have hits: those close to ground and walls.
     hits: Option<Box<SparsePage<BrickMask>>>,
-    /// The bricks with marks, by place, once [`MarkedPage::find_bricks`] has looked; no mark is added after that.
+    /// Bricks with marks, by position; set by [`MarkedPage::find_bricks`], after which no mark is added.
     found: Option<BrickMask>,
 }
 
-/// Marked voxels of a page.
 #[derive(Clone, Debug)]
 enum Marks {
-    /// Fast.
+    /// Fast form.
     Words(Words),
-    /// Small, for when memory is short.
+    /// Small form, used if memory is short.
     Bricks(Box<SparsePage<BrickMask>>),
 }
 
-/// The marks of one brick.
+/// Marks of one brick.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MarkedBrick {
-    /// The voxels' indices divided by 8.
+    /// The indices of its voxels divided by 8.
     pub(crate) index: VoxelIndex,
     /// Voxels in which rays end.
     pub(crate) hits: BrickMask,
-    /// Passed voxels, whether hit or not.
+    /// Voxels that rays pass, including those that are also hit.
     pub(crate) passed: BrickMask,
 }
 
-/// A bit for each voxel of the page, in Morton order, so that eight words are the mask of a brick. Marking a voxel is
-/// one operation on one word, and its brick needs no look-up.
+/// One bit for each voxel of the page in Morton order, so that eight words are the mask of a brick. Marking a voxel is
+/// one operation on one word and needs no look-up of a brick.
 #[derive(Clone, Debug)]
 struct Words(Box<[u64; WORDS]>);
 
-/// Words of a page.
 pub(crate) const WORDS: usize = PAGE_BRICKS * BRICK_VOXELS / 64;
 
 impl Default for Words {
@@ -68,7 +66,7 @@ impl Words {
     }
 }
 
-/// The bits, in a word, of the voxels of a column along z from the first, second, third and fourth on; none.
+/// Bit masks, within a word, of a column along z from its first, second, third and fourth voxel on, and the empty mask.
 const FROM: [u64; 5] =
     [1 | 1 << 4 | 1 << 32 | 1 << 36, 1 << 4 | 1 << 32 | 1 << 36, 1 << 32 | 1 << 36, 1 << 36, 0];
 
@@ -98,7 +96,7 @@ impl Marks {
         }
     }
 
-    /// The places of bricks that have marks.
+    /// Mask of the bricks that have marks.
     fn present(&self) -> BrickMask {
         match self {
             Self::Words(words) => {
@@ -114,7 +112,7 @@ impl Marks {
         }
     }
 
-    /// The mask of the brick at a place.
+    /// Mask of the brick at a position.
     #[inline]
     fn brick(&self, place: usize) -> BrickMask {
         match self {
@@ -141,20 +139,20 @@ fn bytes_of(bricks: &SparsePage<BrickMask>) -> usize {
     size_of::<SparsePage<BrickMask>>() + bricks.bricks_bytes()
 }
 
-/// The places of a page's bricks.
+/// Mask of the bricks that exist.
 fn present_in(bricks: &SparsePage<BrickMask>) -> BrickMask {
     let mut present = [0; 8];
     bricks.places().for_each(|(place, _)| crate::space::add_to_mask(&mut present, place as usize));
     present
 }
 
-/// The place of a voxel in its page's Morton order.
+/// Morton position of a voxel in its page.
 #[inline]
 fn place_of([x, y, z]: Local) -> u32 {
     part_of_place(0, x) | part_of_place(1, y) | part_of_place(2, z)
 }
 
-// Outlined: it is used only when memory is short, and every instruction of the inner loop counts.
+// Outlined, because it is used only if memory is short, and every instruction of the inner loop counts.
 #[cold]
 #[inline(never)]
 fn mark_small(bricks: &mut SparsePage<BrickMask>, place: u32) {
@@ -177,13 +175,13 @@ fn mark(bricks: &mut SparsePage<BrickMask>, place: u32) {
 }
 
 impl MarkedPage {
-    /// A ray ends in a voxel.
+    /// Records a ray that ends in a voxel.
     pub(crate) fn hit(&mut self, voxel: VoxelIndex) {
         mark(self.hits.get_or_insert_default(), place_of(voxel.map(|k| k as u32)));
     }
 
-    /// Whether all voxels of the page from `low` to `high` are passed or hit; may be false where this is costly to
-    /// tell.
+    /// Returns whether all voxels of the page from `low` to `high` are passed or hit; may return `false` if this is
+    /// expensive to determine.
     #[inline]
     pub(crate) fn are_marked(&self, low: Local, high: Local) -> bool {
         let Marks::Words(passed) = &self.passed else { return false };
@@ -192,7 +190,7 @@ impl MarkedPage {
         for x in x0..=x1 {
             for y in y0..=y1 {
                 let column = part_of_place(0, x) | part_of_place(1, y);
-                // Up to four voxels along z are in one word.
+                // A word contains up to four voxels along z.
                 let mut z = z0;
                 while z <= z1 {
                     let last = z1.min(z | 3);
@@ -213,7 +211,6 @@ impl MarkedPage {
         self.hits.as_ref().and_then(|hits| hits.brick_at(word / 8)).map_or(0, |brick| brick[word % 8])
     }
 
-    /// Adds the marks of another page.
     pub(crate) fn absorb(&mut self, other: &Self) {
         self.passed.absorb(&other.passed);
         let Some(others) = &other.hits else { return };
@@ -229,12 +226,12 @@ impl MarkedPage {
         self.present().iter().map(|word| word.count_ones() as usize).sum()
     }
 
-    /// Looks which bricks have marks, for [`MarkedPage::found`]. No mark is added after that.
+    /// Determines the bricks with marks for [`MarkedPage::found`]. No mark may be added afterwards.
     pub(crate) fn find_bricks(&mut self) {
         self.found = Some(self.present());
     }
 
-    /// The places of the bricks that have marks, as [`MarkedPage::find_bricks`] found them.
+    /// Mask of the bricks that have marks, as determined by [`MarkedPage::find_bricks`].
     pub(crate) fn found(&self) -> BrickMask {
         self.found.unwrap_or_else(|| self.present())
     }
@@ -245,14 +242,14 @@ impl MarkedPage {
         std::array::from_fn(|word| passed[word] | hits[word])
     }
 
-    /// The marks of the brick at a place: voxels in which rays end, and passed voxels, whether hit or not.
+    /// Masks of a brick: voxels in which rays end, and voxels that rays pass, including those that are also hit.
     #[inline]
     pub(crate) fn brick(&self, place: usize) -> (BrickMask, BrickMask) {
         let hits = self.hits.as_ref().and_then(|hits| hits.brick_at(place));
         (hits.copied().unwrap_or_default(), self.passed.brick(place))
     }
 
-    /// The bricks with marks; `page` is the page's index: its voxels' indices divided by 64.
+    /// The bricks with marks. `page` is the index of the page: the indices of its voxels divided by 64.
     pub(crate) fn bricks(&self, page: VoxelIndex) -> impl Iterator<Item = MarkedBrick> {
         places(self.found()).map(move |place| {
             let (hits, passed) = self.brick(place);
@@ -262,7 +259,7 @@ impl MarkedPage {
 }
 
 impl Footprint for MarkedPage {
-    /// The part of the voxel's place that comes from its indices along the slab.
+    /// The part of the Morton position that the indices along the slab determine.
     type Cell = u32;
 
     fn heap_bytes(&self) -> usize {
@@ -273,7 +270,7 @@ impl Footprint for MarkedPage {
         Self { passed: Marks::Bricks(Box::default()), hits: None, found: None }
     }
 
-    /// Pages that are fast are kept. Only their marked bricks are cleared: most pages have few.
+    /// Fast pages are kept. Only their marked bricks are cleared, because most pages have few.
     fn cleared(mut self) -> Option<Self> {
         let Marks::Words(words) = &mut self.passed else { return None };
         match self.found.take() {
@@ -316,7 +313,7 @@ impl Footprint for MarkedPage {
 }
 
 impl Footprint for SparsePage<BrickMask> {
-    /// The part of the voxel's place that comes from its indices along the slab.
+    /// The part of the Morton position that the indices along the slab determine.
     type Cell = u32;
 
     fn heap_bytes(&self) -> usize {

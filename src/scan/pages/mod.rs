@@ -1,8 +1,8 @@
-//! Where the rays of one scan leave their marks: pages of 64 x 64 x 64 voxels.
+//! Marks of the rays of one scan, in pages of 64 x 64 x 64 voxels.
 //!
 //! A [`Window`] around the sensor finds its pages by one look-up in a table; pages outside are in a hash map. A page
-//! holds bits where a voxel counts once per scan ([`MarkedPage`]), and counters where every ray counts
-//! ([`CountedPage`]). A ray knows either only as a [`Footprint`].
+//! has bits if a voxel is updated once per scan ([`MarkedPage`]), and counters if it is updated by each ray
+//! ([`CountedPage`]). Ray tracing is generic over both through [`Footprint`].
 
 mod counted_page;
 mod footprint;

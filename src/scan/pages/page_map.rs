@@ -4,36 +4,36 @@ use super::window::{Local, PAGE_EDGE, Window};
 use crate::space::{VoxelIndex, hash_table_bytes};
 use rustc_hash::FxHashMap;
 
-/// The pages that the rays of a scan write to.
+/// Pages that the rays of a scan write to.
 ///
-/// Inside the window around the sensor, where nearly all pages are, a page is found by one look-up in a table; outside,
-/// in a hash map.
+/// In the window around the sensor, which contains almost all pages, a page is found by one look-up in a table;
+/// outside, in a hash map.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct PageMap<F> {
     window: Window,
-    /// Number of each page of the window, plus one; 0 if there is none.
+    /// Number of each page of the window, from 1; 0 if it does not exist.
     directory: Vec<u32>,
     /// Number of each page outside the window.
     far: FxHashMap<VoxelIndex, u32>,
     pages: Vec<F>,
-    /// Index of each page: its voxels' indices divided by 64.
+    /// Index of each page: the indices of its voxels divided by 64.
     indices: Vec<VoxelIndex>,
-    /// Emptied pages of earlier scans, for reuse.
+    /// Cleared pages of earlier scans, for reuse.
     spare: Vec<F>,
-    /// The first so many pages may be fast; later ones are small.
+    /// Number of pages that may have the fast form; later ones get the small form.
     max_fast: usize,
 }
 
 impl<F: Footprint> PageMap<F> {
-    /// Removes all pages and sets another window, in which up to `max_fast` pages may be fast; the memory is kept.
+    /// Removes all pages and sets another window with up to `max_fast` fast pages; the memory is kept.
     pub(crate) fn clear(&mut self, window: Window, max_fast: usize) {
         self.window = window;
         self.max_fast = max_fast;
         self.directory.clear();
         self.directory.resize(window.pages().map(|pages| pages as usize).iter().product(), 0);
         self.far.clear();
-        // At most as many as the last scan had, so a scan with stray rays far away costs no memory for good; and no more
-        // than may be fast, as those are that are kept.
+        // At most as many as the last scan had, so that a scan with distant stray rays does not occupy memory
+        // permanently; and at most `max_fast`, because only fast pages are kept.
         self.spare.clear();
         self.spare.extend(self.pages.drain(..).take(max_fast).filter_map(F::cleared));
         self.indices.clear();
@@ -70,14 +70,14 @@ impl<F: Footprint> PageMap<F> {
         &self.window
     }
 
-    /// The page that holds a voxel of the window.
+    /// The page that contains a voxel of the window.
     #[inline]
     pub(crate) fn at(&mut self, voxel: Local) -> &mut F {
         let number = self.number_at(voxel);
         &mut self.pages[number]
     }
 
-    /// The number of the page that holds a voxel of the window.
+    /// The number of the page that contains a voxel of the window.
     #[inline]
     pub(crate) fn number_at(&mut self, voxel: Local) -> usize {
         match self.directory[self.window.page_of(voxel)] {
@@ -86,7 +86,7 @@ impl<F: Footprint> PageMap<F> {
         }
     }
 
-    /// The number of the page that holds a voxel, wherever it is.
+    /// The number of the page that contains a voxel, inside or outside the window.
     pub(crate) fn number_of(&mut self, voxel: VoxelIndex) -> usize {
         if let Some(local) = self.window.local(voxel) {
             return self.number_at(local);
@@ -100,17 +100,15 @@ impl<F: Footprint> PageMap<F> {
         number
     }
 
-    /// The pages, by number.
     pub(crate) fn pages(&self) -> &[F] {
         &self.pages
     }
 
-    /// The pages, by number, mutably.
     pub(crate) fn pages_mut(&mut self) -> &mut [F] {
         &mut self.pages
     }
 
-    /// Index of each page, by number: its voxels' indices divided by 64.
+    /// Index of each page: the indices of its voxels divided by 64.
     pub(crate) fn indices(&self) -> &[VoxelIndex] {
         &self.indices
     }
@@ -134,7 +132,7 @@ impl<F: Footprint> PageMap<F> {
 }
 
 impl PageMap<MarkedPage> {
-    /// Whether all voxels from `low` to `high`, both in the window, are marked.
+    /// Returns whether all voxels from `low` to `high`, both in the window, are marked.
     #[inline]
     pub(crate) fn are_marked(&self, low: Local, high: Local) -> bool {
         let page =

@@ -1,26 +1,25 @@
 use super::window::PAGE_EDGE;
 use crate::space::{BRICK_EDGE, BRICK_VOXELS, MortonCode, VoxelIndex, VoxelKey, place_of_voxel};
 
-/// A page in which only bricks that rays write to take memory.
+/// Page in which only bricks that rays write to take memory.
 ///
-/// A ray goes from brick to brick without testing for their borders.
+/// A ray crosses from brick to brick without border tests.
 #[derive(Clone, Debug)]
 pub(crate) struct SparsePage<B> {
-    /// The number of each brick, in Morton order, counted from 1; 0 if it is absent.
+    /// Number of each brick, in Morton order, from 1; 0 if it is absent.
     numbers: [u16; PAGE_BRICKS],
     bricks: Vec<B>,
 }
 
-/// The content of a brick.
 pub(crate) trait BrickContent: Copy {
-    /// The content of a brick that no ray has written to.
+    /// Content of a brick that no ray has written to.
     const EMPTY: Self;
 }
 
 pub(crate) const PAGE_BRICKS: usize = 512;
 
-/// The part of a voxel's place in Morton order that comes from its index along an axis. Of the page's 18 bits the upper
-/// nine are the place of the brick.
+/// The part of a voxel's Morton position that its index along an axis determines. The upper nine of the 18 bits are the
+/// position of the brick in the page.
 #[inline]
 pub(crate) fn part_of_place(axis: usize, index: u32) -> u32 {
     PARTS[axis][index as usize % PAGE_EDGE as usize]
@@ -42,14 +41,14 @@ const fn parts() -> [[u32; PAGE_EDGE as usize]; 3] {
     parts
 }
 
-/// The place of a voxel in its page's Morton order.
+/// Morton position of a voxel in its page.
 #[inline]
 pub(crate) fn place_in_page(voxel: VoxelIndex) -> u32 {
     (0..3).fold(0, |place, axis| place | part_of_place(axis, voxel[axis] as u32))
 }
 
-/// The index of the brick at a place of a page: its voxels' indices divided by 8. `page` is the page's index, divided
-/// by 64.
+/// Returns the index of the brick at a position of a page: the indices of its voxels divided by 8. `page` is the index
+/// of the page: the indices of its voxels divided by 64.
 pub(crate) fn brick_in_page(page: VoxelIndex, place: u32) -> VoxelIndex {
     let VoxelKey(local) = MortonCode(place.into()).to_key();
     std::array::from_fn(|k| page[k] * 8 + i32::from(local[k]))
@@ -62,7 +61,7 @@ impl<B> Default for SparsePage<B> {
 }
 
 impl<B: BrickContent> SparsePage<B> {
-    /// The brick that holds the voxel at a place; made if it is absent.
+    /// Returns the brick that contains a voxel; creates it if it is absent.
     #[inline]
     pub(crate) fn brick(&mut self, place: u32) -> &mut B {
         let brick = place as usize / BRICK_VOXELS % PAGE_BRICKS;
@@ -73,23 +72,23 @@ impl<B: BrickContent> SparsePage<B> {
         &mut self.bricks[number - 1]
     }
 
-    /// The bricks, by number less one.
+    /// The bricks in the order of their creation.
     pub(crate) fn bricks(&self) -> &[B] {
         &self.bricks
     }
 
-    /// The brick at a place of the page, if it exists.
+    /// The brick at a position of the page, if it exists.
     pub(crate) fn brick_at(&self, place: usize) -> Option<&B> {
         self.bricks.get(usize::from(self.numbers[place]).wrapping_sub(1))
     }
 
-    /// The places of the bricks in the page, in Morton order, with their numbers less one.
+    /// The Morton positions of the bricks in the page, in order, with the indices of the bricks.
     pub(crate) fn places(&self) -> impl Iterator<Item = (u32, usize)> {
         let number = |(place, number): (u32, &u16)| Some((place, usize::from(*number).checked_sub(1)?));
         (0..).zip(&self.numbers).filter_map(number)
     }
 
-    /// The number, less one, of the existing brick that holds the voxel at a place.
+    /// The index of the existing brick that contains a voxel.
     pub(crate) fn number_of(&self, place: u32) -> usize {
         usize::from(self.numbers[place as usize / BRICK_VOXELS % PAGE_BRICKS]).saturating_sub(1)
     }
@@ -99,7 +98,7 @@ impl<B: BrickContent> SparsePage<B> {
         self.bricks.capacity() * size_of::<B>()
     }
 
-    /// The page without bricks; the memory is kept.
+    /// Removes all bricks and keeps the memory.
     pub(crate) fn emptied(mut self) -> Self {
         self.numbers.fill(0);
         self.bricks.clear();

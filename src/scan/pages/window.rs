@@ -3,19 +3,19 @@ use crate::space::{Point, VoxelIndex};
 /// Voxels along the edge of a page of 8 x 8 x 8 bricks.
 pub(crate) const PAGE_EDGE: i64 = 64;
 
-/// Candidate reaches of a window in voxels, to both sides of the sensor along each axis. The largest is taken with
-/// which the window has at most [`MAX_PAGES`], or else the smallest: a stray ray high up makes the window narrower,
-/// which costs time only.
+/// Candidate reaches of a window in voxels, to both sides of the sensor along each axis. The largest is chosen with
+/// which the window has at most [`MAX_PAGES`], otherwise the smallest. A stray ray high up makes the window narrower,
+/// which only costs time.
 const REACHES: [i64; 3] = [8128, 4032, 1984];
 
-/// The pages of a window with the smallest reach to all sides: 1 MiB of page numbers.
+/// Number of pages of a window with the smallest reach to all sides: 1 MiB of page numbers.
 const MAX_PAGES: u64 = 63 * 63 * 63;
 
-/// A voxel relative to the lowest of a window.
+/// Voxel relative to the lowest voxel of a window.
 pub(crate) type Local = [u32; 3];
 
-/// A box of whole pages around a sensor, in which the rays of a scan are marked without a hash map. Outside, rays are
-/// walked voxel by voxel.
+/// Box of whole pages around a sensor, in which the rays of a scan are marked without a hash map. Outside of it, rays
+/// are traced voxel by voxel.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Window {
     base: VoxelIndex,
@@ -23,7 +23,7 @@ pub(crate) struct Window {
 }
 
 impl Window {
-    /// The window around `center` for points with these bounds, both in units of voxels.
+    /// Returns the window around `center` for points with these bounds, both in units of voxels.
     pub(crate) fn around(center: VoxelIndex, bounds: (Point, Point)) -> Self {
         let windows = REACHES.map(|reach| Self::reaching(reach, center, bounds));
         let is_small =
@@ -34,7 +34,7 @@ impl Window {
     fn reaching(reach: i64, center: VoxelIndex, bounds: (Point, Point)) -> Self {
         let page = |axis: usize, coordinate: f64| {
             let center = i64::from(center[axis]);
-            // Saturates. NaN would become 0, but no bound is NaN.
+            // The cast saturates. It would convert NaN to 0, but no bound is NaN.
             let voxel = (coordinate.floor() as i64).clamp(center - reach, center + reach);
             voxel
                 .clamp(i64::from(i32::MIN) + PAGE_EDGE, i64::from(i32::MAX) - PAGE_EDGE)
@@ -48,30 +48,30 @@ impl Window {
         }
     }
 
-    /// Number of the page that holds a voxel.
+    /// Number of the page that contains a voxel.
     #[inline]
     pub(crate) fn page_of(&self, [x, y, z]: Local) -> usize {
         let [_, height, depth] = self.pages;
         ((x / 64 * height + y / 64) * depth + z / 64) as usize
     }
 
-    /// Pages along each axis.
+    /// Number of pages along each axis.
     pub(crate) fn pages(&self) -> [u32; 3] {
         self.pages
     }
 
-    /// The lowest voxel.
+    /// Lowest voxel of the window.
     pub(crate) fn base(&self) -> VoxelIndex {
         self.base
     }
 
-    /// Whether a voxel, relative to the lowest, is inside.
+    /// Returns whether a voxel, relative to the lowest one, is inside.
     #[inline]
     pub(crate) fn holds(&self, local: Local) -> bool {
         (0..3).all(|k| local[k] < self.pages[k] * PAGE_EDGE as u32)
     }
 
-    /// A voxel relative to the lowest; `None` outside.
+    /// Returns a voxel relative to the lowest one; `None` if it is outside.
     #[inline]
     pub(crate) fn local(&self, voxel: VoxelIndex) -> Option<Local> {
         let local: Local = std::array::from_fn(|k| voxel[k].wrapping_sub(self.base[k]) as u32);
@@ -84,11 +84,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_window_reaches_as_far_as_it_may_have_pages() {
+    fn a_window_has_the_largest_reach_within_its_page_limit() {
         let pages = |low: Point, high: Point| Window::around([0; 3], (low, high)).pages();
         assert_eq!(pages([-6000.0, -100.0, -10.0], [8000.0, 100.0, 10.0]), [220, 4, 2]);
         assert_eq!(pages([-9e9; 3], [9e9; 3]), [63; 3]);
-        // A stray ray straight up.
+        // A stray ray that points straight up.
         assert_eq!(pages([-3000.0, -3000.0, -10.0], [3000.0, 3000.0, 1e6]), [63, 63, 33]);
         assert_eq!(pages([-1500.0, -1500.0, -10.0], [1500.0, 1500.0, 1e6]), [48, 48, 65]);
     }

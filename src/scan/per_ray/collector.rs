@@ -14,46 +14,46 @@ use crate::space::{BRICK_VOXELS, BrickMask, Grid, TileIndex, VoxelIndex, is_in_m
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
-/// Collects the updates of consecutive rays, where every ray counts.
+/// Collector of the updates of consecutive rays if each ray updates the voxels it crosses.
 ///
-/// A voxel's updates are kept as runs: a number of misses, then a hit. That preserves their order, and the order
-/// between voxels does not matter.
+/// The updates of a voxel are stored as runs: a number of misses, then a hit. This preserves their order; the order
+/// between voxels is irrelevant.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct PerRayCollector {
     pages: PageMap<CountedPage>,
-    /// The runs that ended with a hit, in order.
+    /// Runs that ended with a hit, in order.
     ended: Vec<EndedRun>,
-    /// Updates outside the window, where memory is limited; otherwise pages have these, too.
+    /// Updates outside the window if memory is limited; otherwise they are in pages.
     far: Option<FarRuns>,
     max_bytes: usize,
     allowance: Allowance,
 }
 
-/// Most bytes that a ray adds per slab: three eighths of a brick of 512 bytes, and three 64ths of a page.
+/// Maximum bytes that a ray adds per slab: three eighths of a brick of 512 bytes, and three 64ths of a page.
 const BYTES_PER_SLAB: usize = 256;
-/// Most bytes that a ray adds beside its slabs: the page and the brick that it ends in.
+/// Maximum bytes that a ray adds in addition to its slabs: the page and brick that it ends in.
 const BYTES_PER_RAY: usize = 4 << 10;
 
-/// Misses, then a hit.
+/// Run of misses that ended with a hit.
 #[derive(Clone, Copy, Debug)]
 struct EndedRun {
     page: u32,
-    /// The voxel's place in the page.
+    /// Morton position of the voxel in the page.
     place: u32,
     misses: u16,
     intensity: f32,
 }
 
-/// A brick with counts or hits.
+/// Brick with counts or hits.
 struct Brick<'a> {
     counts: BrickCounts<'a>,
-    /// The runs that ended in it with a hit, in order.
+    /// Runs in the brick that ended with a hit, in order.
     ended: &'a [Run],
 }
 
 impl PerRayCollector {
     /// Clears the collector and sets another window; the memory is kept. With a limit, updates outside the window are
-    /// kept by tiles of `grid`.
+    /// grouped by tiles of `grid`.
     pub(crate) fn clear(&mut self, window: Window, limit: Option<(&CollectorLimit, &Grid)>) {
         self.pages.clear(window, usize::MAX);
         self.ended.clear();
@@ -62,21 +62,21 @@ impl PerRayCollector {
         self.allowance.grant(self.max_bytes);
     }
 
-    /// Whether another ray may exceed the limit. The first ray never does.
+    /// Returns whether another ray may exceed the limit. The first ray never does.
     #[inline]
     pub(crate) fn is_full_for(&mut self, ray: &SlabRay) -> bool {
         let new_bytes = BYTES_PER_RAY + BYTES_PER_SLAB * ray.slabs_after(0) as usize;
-        self.allowance.is_spent_by(new_bytes) && self.look_whether_full(new_bytes)
+        self.allowance.is_spent_by(new_bytes) && self.is_full_measured(new_bytes)
     }
 
     #[cold]
-    fn look_whether_full(&mut self, new_bytes: usize) -> bool {
+    fn is_full_measured(&mut self, new_bytes: usize) -> bool {
         let pages: usize =
             self.pages.pages().iter().map(|page| size_of::<CountedPage>() + page.heap_bytes()).sum();
         let far = self.far.as_ref().map_or(0, FarRuns::bytes);
         let bytes = pages + far + self.ended.len() * size_of::<EndedRun>();
         let left = self.max_bytes.saturating_sub(bytes);
-        // Otherwise the next ray would measure again.
+        // Grants an allowance, because otherwise the next ray would measure again.
         self.allowance.grant(left);
         bytes > 0 && left < new_bytes.max(self.max_bytes / 8)
     }
@@ -87,7 +87,8 @@ impl PerRayCollector {
         self.pages.bytes() + self.ended.capacity() * size_of::<EndedRun>() + far
     }
 
-    /// A ray passes all voxels before its last. Takes at most [`MAX_RAYS`](crate::scan::pages::MAX_RAYS) rays.
+    /// Records a ray that passes all voxels except its last. At most [`MAX_RAYS`](crate::scan::pages::MAX_RAYS) rays
+    /// may be recorded.
     pub(crate) fn pass(&mut self, ray: &SlabRay) {
         let Self { pages, far: Some(far), .. } = self else {
             let mut far = Vec::new();
@@ -101,7 +102,7 @@ impl PerRayCollector {
         ray.pass(pages, 0, false, |voxel| far.pass(voxel));
     }
 
-    /// A ray ends in a voxel, with an intensity if the sensor model needs one.
+    /// Records the end of a ray in a voxel, with an intensity if the sensor model needs one.
     pub(crate) fn hit(&mut self, voxel: VoxelIndex, intensity: f32) {
         if let Some(far) = &mut self.far
             && self.pages.window().local(voxel).is_none()
@@ -113,8 +114,8 @@ impl PerRayCollector {
         self.ended.push(EndedRun { page: page as u32, place, misses, intensity });
     }
 
-    /// Visits the updates by mapped tile. Bricks across a tile border are split; with more bricks than
-    /// `bricks_at_a_time` a tile may come several times, with other voxels each time.
+    /// Visits the updates by mapped tile. Bricks across a tile border are split. With more than `bricks_at_a_time`
+    /// bricks, a tile may be visited several times, each time with other voxels.
     fn for_each_tile(
         &self,
         mapped: MappedTiles<'_>,
@@ -144,7 +145,7 @@ impl PerRayCollector {
         }
     }
 
-    /// The bricks of all pages, page by page, and their indices: their voxels' indices divided by 8.
+    /// The bricks of all pages, page by page, and their indices: the indices of their voxels divided by 8.
     fn bricks(&self) -> (Vec<BrickCounts<'_>>, Vec<VoxelIndex>) {
         let bricks: Vec<BrickCounts<'_>> = self.pages.pages().iter().flat_map(CountedPage::bricks).collect();
         let mut indices = Vec::with_capacity(bricks.len());
@@ -156,7 +157,7 @@ impl PerRayCollector {
         (bricks, indices)
     }
 
-    /// The runs that ended with a hit, by brick: a counting sort in two passes.
+    /// Groups the runs that ended with a hit by brick, using a counting sort in two passes.
     fn ended_by_brick(&self, bricks: &[BrickCounts<'_>]) -> EndedByBrick {
         let mut first_of_page = Vec::with_capacity(self.pages.pages().len());
         let mut first = 0;
@@ -173,7 +174,7 @@ impl PerRayCollector {
         (1..ends.len()).for_each(|k| ends[k] += ends[k - 1]);
         let mut runs = vec![NO_RUN; self.ended.len()];
         for run in &self.ended {
-            // The start of the brick's runs advances to their end.
+            // Advances from the start of the brick's runs to their end.
             let next = &mut ends[brick_of(run)];
             runs[*next as usize] = run.run();
             *next += 1;
@@ -182,10 +183,10 @@ impl PerRayCollector {
     }
 }
 
-/// The runs that ended with a hit, brick by brick; those of a brick in the order of the rays.
+/// Runs that ended with a hit, brick by brick; those of a brick in the order of the rays.
 struct EndedByBrick {
     runs: Vec<Run>,
-    /// Where each brick's runs end.
+    /// End of each brick's runs.
     ends: Vec<u32>,
 }
 
@@ -205,16 +206,16 @@ impl EndedRun {
     }
 }
 
-/// Room for the runs of a brick, used for one after another.
+/// Reusable buffers for the runs of a brick.
 struct Scratch {
     ended: Vec<Run>,
-    /// As many as a brick has voxels, and those of a chunk that is written beyond.
+    /// One entry per voxel of a brick, plus a chunk that may be written past the end.
     misses: [Misses; BRICK_VOXELS + CHUNK],
 }
 
-/// All voxels of a brick: it lies in one tile.
+/// Mask of all voxels of a brick.
 const WHOLE: BrickMask = [u64::MAX; 8];
-/// Voxels whose counts are looked at together.
+/// Number of voxels whose counts are processed together.
 const CHUNK: usize = 8;
 
 impl Default for Scratch {
@@ -224,7 +225,7 @@ impl Default for Scratch {
 }
 
 impl<'a> Brick<'a> {
-    /// The runs of the voxels of a mask that ended with a hit, and the misses after them.
+    /// Returns the runs of the masked voxels that ended with a hit, and the misses after them.
     fn runs<'s>(&self, part: &BrickMask, scratch: &'s mut Scratch) -> (&'s [Run], &'s [Misses])
     where
         'a: 's,
@@ -240,7 +241,7 @@ impl<'a> Brick<'a> {
         (ended, &misses[..passed])
     }
 
-    /// Writes the misses since each voxel's last hit, if any, to the front of `all`; returns how many voxels have some.
+    /// Writes the misses since each voxel's last hit to the front of `all`; returns the number of voxels that have any.
     fn passed(&self, all: &mut [Misses; BRICK_VOXELS + CHUNK]) -> usize {
         let mut count = 0;
         let Some(counts) = self.counts.as_bytes() else {
@@ -251,14 +252,14 @@ impl<'a> Brick<'a> {
             }
             return count;
         };
-        // Most voxels were not passed, so a chunk at a time is skipped.
+        // Most voxels were not passed, so whole chunks are skipped.
         for (chunk, first) in counts.as_chunks::<CHUNK>().0.iter().zip((0..).step_by(CHUNK)) {
             if u64::from_ne_bytes(*chunk) == 0 {
                 continue;
             }
             let out = &mut all[count..][..CHUNK];
             let mut written = 0;
-            // Without a branch: it would be unpredictable.
+            // Branchless, because a branch would be unpredictable.
             for (&misses, place) in chunk.iter().zip(first..) {
                 out[written % CHUNK] = Misses { place, misses: misses.into() };
                 written += usize::from(misses > 0);
@@ -269,7 +270,7 @@ impl<'a> Brick<'a> {
     }
 }
 
-/// Moves the values that are to be kept to the front, in order; returns their number.
+/// Moves the values that are kept to the front, in order; returns their number.
 fn kept<T: Copy>(values: &mut [T], is_kept: impl Fn(&T) -> bool) -> usize {
     let mut count = 0;
     for k in 0..values.len() {
@@ -280,10 +281,11 @@ fn kept<T: Copy>(values: &mut [T], is_kept: impl Fn(&T) -> bool) -> usize {
     count
 }
 
-/// Tiles that divide bricks have their updates in memory so many at a time, on their way to parts.
+/// Maximum number of tiles, if tiles are smaller than bricks, whose updates are in memory at a time before they are
+/// moved to parts.
 const TILES_AT_A_TIME: usize = 4096;
 
-/// Moves the updates of several collectors to `parts`; the first collector saw the first rays.
+/// Moves the updates of several collectors to `parts`; the collectors are in the order of their rays.
 pub(crate) fn drain_in_order(
     mapped: MappedTiles<'_>,
     collectors: &mut [PerRayCollector],
@@ -306,7 +308,7 @@ pub(crate) fn drain_in_order(
     }
 }
 
-/// The updates of several collectors; the first collector saw the first rays.
+/// Returns the updates of several collectors; the collectors are in the order of their rays.
 pub(crate) fn updates_in_order(
     mapped: MappedTiles<'_>,
     collectors: &mut [PerRayCollector],

@@ -2,15 +2,14 @@ use crate::scan::PackedUpdates;
 use crate::scan::updates::{BrickRuns, Run, TileRuns, TileUpdates, brick_code};
 use crate::space::{BRICK_EDGE, Grid, TileIndex, VoxelIndex, place_of_voxel};
 
-/// Updates of consecutive rays outside the window, where every ray counts: packed, tile after tile as each ray reaches
-/// them.
+/// Updates of consecutive rays outside the window if each ray counts: packed, tile by tile as each ray reaches them.
 #[derive(Clone, Debug)]
 pub(crate) struct FarRuns {
     grid: Grid,
-    /// The tile that the present ray is in, and its updates there.
+    /// Tile of the current ray, and its updates there.
     tile: Option<TileIndex>,
     bricks: Vec<BrickOfRay>,
-    /// How many these are; they do not count as bytes.
+    /// Number of updates in `bricks`; these do not count as bytes.
     pending: usize,
     hits: u64,
     misses: u64,
@@ -18,7 +17,7 @@ pub(crate) struct FarRuns {
     bytes: usize,
 }
 
-/// Most updates that are not packed yet: half a megabyte at most.
+/// Maximum number of updates that are not packed yet: at most half a megabyte.
 const MAX_PENDING: usize = 4096;
 
 #[derive(Clone, Debug)]
@@ -27,7 +26,7 @@ struct BrickOfRay {
     runs: Vec<Run>,
 }
 
-/// The updates of a ray in one tile, with the numbers of hits and misses.
+/// Updates of a ray in one tile, with the numbers of hits and misses.
 type Done = (TileIndex, PackedUpdates, (u64, u64));
 
 impl FarRuns {
@@ -36,14 +35,14 @@ impl FarRuns {
         Self { grid, tile: None, bricks, pending: 0, hits: 0, misses: 0, done, bytes: 0 }
     }
 
-    /// A ray passes a voxel.
+    /// Records a ray that passes a voxel.
     #[inline]
     pub(crate) fn pass(&mut self, voxel: VoxelIndex) {
         self.push(voxel, Run { place: place_of_voxel(voxel) as u16, misses: 1, hit: None });
         self.misses += 1;
     }
 
-    /// A ray ends in a voxel.
+    /// Records a ray that ends in a voxel.
     pub(crate) fn hit(&mut self, voxel: VoxelIndex, intensity: f32) {
         self.push(voxel, Run { place: place_of_voxel(voxel) as u16, misses: 0, hit: Some(intensity) });
         self.hits += 1;
@@ -53,7 +52,7 @@ impl FarRuns {
 
     fn push(&mut self, voxel: VoxelIndex, run: Run) {
         let tile = self.grid.tile_of_voxel(voxel);
-        // Rays that are cut may be in one tile for as long as there are any.
+        // Clipped rays may all be in one tile.
         if self.tile != Some(tile) || self.pending == MAX_PENDING {
             self.end_tile();
             self.tile = Some(tile);
@@ -69,7 +68,7 @@ impl FarRuns {
     fn end_tile(&mut self) {
         let Some(tile) = self.tile.take() else { return };
         self.pending = 0;
-        // Stable: a voxel's runs stay in order.
+        // Stable: the runs of a voxel remain in order.
         self.bricks.sort_by_key(|brick| brick_code(brick.index));
         let mut all = TileRuns::default();
         for BrickOfRay { index, mut runs } in self.bricks.drain(..) {
@@ -102,7 +101,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rays_that_are_cut_in_one_tile_are_packed_on_the_way() {
+    fn clipped_rays_in_one_tile_are_packed_early() {
         let mut far = FarRuns::new(Grid::new(0.1, 10.0).unwrap());
         let rays = 40 * MAX_PENDING / 100;
         for _ in 0..rays {

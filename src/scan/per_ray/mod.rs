@@ -1,7 +1,8 @@
-//! Insertion per ray, as in OctoMap's `insertRay`: a voxel is updated by every ray that crosses it.
+//! Insertion per ray, as in OctoMap's `insertRay`: a voxel is updated by each ray that crosses it.
 //!
-//! The evidence of a voxel depends on the order of its own updates alone. So rays are counted, and a voxel's updates
-//! are runs: so many misses, then a hit. Only voxel caches, which see the order of all updates, get a list of them.
+//! The evidence of a voxel depends only on the order of its own updates. Therefore rays are counted, and the updates of
+//! a voxel are runs: a number of misses, then a hit. Only voxel caches, which depend on the order of all updates, use a
+//! list.
 
 mod collector;
 mod far_runs;

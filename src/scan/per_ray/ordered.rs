@@ -5,13 +5,13 @@ use crate::sensor::Observation;
 use crate::space::{TileIndex, VoxelBox, VoxelIndex};
 use rustc_hash::FxHashMap;
 
-/// Collects updates of voxels in the order in which they count, one list per tile.
+/// Collector of voxel updates in the order of the rays, one list per tile.
 pub(crate) struct OrderedCollector<'a> {
     mapped: MappedTiles<'a>,
     keep_intensities: bool,
     lists: Vec<(TileIndex, VoxelBox, OrderedUpdates)>,
     slots: FxHashMap<TileIndex, usize>,
-    /// The slot of the last update: rays mostly stay in a tile.
+    /// Slot of the last update: consecutive updates are mostly in the same tile.
     latest: usize,
     hits: u64,
     misses: u64,
@@ -19,7 +19,7 @@ pub(crate) struct OrderedCollector<'a> {
 
 /// Bytes of an update in a list that may be half empty; more with an intensity.
 const BYTES_PER_UPDATE: usize = 16;
-/// Bytes of a tile beside its updates.
+/// Bytes of a tile in addition to its updates.
 const BYTES_PER_TILE: usize = 256;
 
 impl<'a> OrderedCollector<'a> {
@@ -31,7 +31,7 @@ impl<'a> OrderedCollector<'a> {
     pub(crate) fn push(&mut self, voxel: VoxelIndex, observation: Observation) {
         let offset_in =
             |tile: &VoxelBox| -> VoxelIndex { std::array::from_fn(|k| voxel[k].wrapping_sub(tile.min[k])) };
-        // The tiles at the end of all indices are cut.
+        // Tiles at the limits of the index range are clipped.
         let in_latest = |(_, tile, _): &&mut (_, VoxelBox, _)| tile.contains(voxel);
         if let Some((_, tile, updates)) = self.lists.get_mut(self.latest).filter(in_latest) {
             updates.push(offset_in(tile), observation, self.keep_intensities);
@@ -58,12 +58,11 @@ impl<'a> OrderedCollector<'a> {
         }
     }
 
-    /// Upper bound of the bytes of memory.
+    /// Upper bound on the bytes of memory.
     pub(crate) fn bytes(&self) -> usize {
         BYTES_PER_UPDATE * (self.hits + self.misses) as usize + BYTES_PER_TILE * self.lists.len()
     }
 
-    /// Moves all updates to `parts`.
     pub(crate) fn drain_to(&mut self, parts: &ScanParts<'_>) {
         self.slots.clear();
         (self.hits, self.misses) = (0, 0);

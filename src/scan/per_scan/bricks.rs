@@ -4,10 +4,10 @@ use crate::space::{BRICK_EDGE, BrickMask, Grid, MortonCode, TileIndex, VoxelInde
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
-/// The largest intensity of every hit voxel; empty for sensor models that need none.
+/// Largest intensity of each hit voxel; empty for sensor models that need none.
 pub(crate) type Intensities = FxHashMap<VoxelIndex, f32>;
 
-/// The updates of marked bricks by mapped tile, in Morton order. Bricks across a tile border are split.
+/// Returns the updates of marked bricks by mapped tile, in Morton order. Bricks across a tile border are split.
 pub(crate) fn updates_by_tile(
     mapped: MappedTiles<'_>,
     bricks: &[MarkedBrick],
@@ -22,7 +22,7 @@ pub(crate) fn updates_by_tile(
     tiles
 }
 
-/// Adds the updates of other bricks to those of tiles.
+/// Adds the updates of further bricks to those of tiles.
 pub(crate) fn add_bricks(
     tiles: &mut Vec<(TileIndex, Vec<BrickUpdate>)>,
     others: Vec<(TileIndex, Vec<BrickUpdate>)>,
@@ -84,8 +84,8 @@ pub(crate) fn hits_and_misses(bricks: &[BrickUpdate]) -> (u64, u64) {
         .fold((0, 0), |(hits, misses), brick| (hits + ones(&brick.hits), misses + ones(&brick.misses)))
 }
 
-/// Merges two parts of one scan for a tile: each voxel once, a hit over any miss, and the largest intensity of its
-/// hits. Both parts are in Morton order with each brick once; so is the result.
+/// Merges two parts of one scan for a tile. Each voxel occurs once: a hit overrides a miss, and the largest intensity
+/// of its hits is used. Both parts and the result are in Morton order and contain each brick once.
 pub(crate) fn merge_bricks(a: Vec<BrickUpdate>, b: Vec<BrickUpdate>) -> Vec<BrickUpdate> {
     let mut all = Vec::with_capacity(a.len() + b.len());
     let (mut a, mut b) = (a.into_iter().peekable(), b.into_iter().peekable());
@@ -124,7 +124,7 @@ mod tests {
     use proptest::prelude::*;
     use std::collections::BTreeMap;
 
-    /// For each voxel a miss (`None`) or a hit's intensity.
+    /// A miss (`None`) or the intensity of a hit for each voxel.
     type Naive = BTreeMap<(u64, usize), Option<f32>>;
 
     fn naive(parts: &[&[BrickUpdate]]) -> Naive {
@@ -160,7 +160,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn parts_together_say_what_the_whole_scan_says(a in part(), b in part()) {
+        fn merged_parts_equal_the_whole_scan(a in part(), b in part()) {
             let expected = naive(&[&a, &b]);
             let united = merge_bricks(a, b);
             prop_assert!(united.is_sorted_by(|a, b| a.brick < b.brick));

@@ -11,10 +11,11 @@ use crate::scan::updates::{BrickUpdate, MappedTiles, ScanUpdates, TileUpdates, i
 use crate::space::{TileIndex, VoxelIndex, hash_table_bytes};
 use rayon::prelude::*;
 
-/// Most rays per call of [`PerScanCollector::take`].
+/// Maximum number of rays per call of [`PerScanCollector::take`].
 pub(crate) const BATCH: usize = 256;
 
-/// Collects the updates of one scan, one per voxel: a hit over any miss, and the largest intensity of its hits.
+/// Collector of the updates of one scan, one per voxel: a hit overrides a miss, and the largest intensity of its hits
+/// is used.
 ///
 /// If memory is short, only the first pages are fast; the marks in others are drained to [`ScanParts`] when they exceed
 /// the limit.
@@ -29,10 +30,10 @@ pub(crate) struct PerScanCollector {
     allowance: Allowance,
 }
 
-/// Most bytes that a ray adds per slab: three eighths of a brick of 64 bytes in a list that may be half empty, and
+/// Maximum bytes that a ray adds per slab: three eighths of a brick of 64 bytes in a list that may be half empty, and
 /// three 64ths of a page.
 const BYTES_PER_SLAB: usize = 128;
-/// Most bytes that a ray adds beside its slabs: the page and the brick that it ends in.
+/// Maximum bytes that a ray adds in addition to its slabs: the page and brick that it ends in.
 const BYTES_PER_RAY: usize = 4 << 10;
 
 impl PerScanCollector {
@@ -55,7 +56,7 @@ impl PerScanCollector {
         hash_table_bytes::<(VoxelIndex, f32)>(self.intensities.capacity())
     }
 
-    /// Bytes of the marks alone.
+    /// Bytes of the marks only.
     pub(crate) fn marks_bytes(&self) -> usize {
         self.pages.pages().iter().map(MarkedPage::heap_bytes).sum::<usize>() + self.far.bytes()
     }
@@ -65,8 +66,8 @@ impl PerScanCollector {
         self.pages.pages().iter().map(MarkedPage::count_bricks).sum::<usize>() + self.far.len()
     }
 
-    /// Takes at most [`BATCH`] rays from one origin: their hits, and the voxels before their last. What exceeds the
-    /// limit, if there is one, goes to `parts`.
+    /// Records at most [`BATCH`] rays from one origin: their hits, and the voxels before them. Marks that exceed the
+    /// limit, if there is one, are drained to `parts`.
     pub(crate) fn take(
         &mut self,
         origin: &RayOrigin,
@@ -79,7 +80,7 @@ impl PerScanCollector {
                 self.hit(end.voxel, needs_intensity.then_some(intensity));
             }
         }
-        // Selects the rays that are left to walk, without a branch: it would be unpredictable.
+        // Selects the rays that have to be traced. Branchless, because a branch would be unpredictable.
         let (mut left, mut count) = ([(0, 0); BATCH], 0);
         for (number, &end) in ends.iter().enumerate() {
             let slabs = self.prefixes.of(&SlabRay::new(origin, end));
@@ -107,7 +108,7 @@ impl PerScanCollector {
         }
     }
 
-    /// Lets later rays skip what is marked so far; see [`MarkedPrefixes::extend`] for `edges`.
+    /// Lets later rays skip the voxels marked so far; see [`MarkedPrefixes::extend`] for `edges`.
     pub(crate) fn extend_prefixes(&mut self, origin: &RayOrigin, edges: &[usize], cut: Option<&RayCut<'_>>) {
         self.prefixes.extend(&self.pages, origin, edges, cut);
     }
@@ -122,7 +123,7 @@ impl PerScanCollector {
         }
     }
 
-    /// Makes room for so many bytes: drains the small pages to `parts`, and if need be all pages.
+    /// Frees `new_bytes` bytes: drains the small pages to `parts` and, if that is not enough, all pages.
     #[cold]
     fn keep_to_limit(&mut self, new_bytes: usize, parts: &ScanParts<'_>) {
         let first_small = self.pages.first_small();
@@ -131,7 +132,7 @@ impl PerScanCollector {
             .map(|page| size_of::<MarkedPage>() + page.heap_bytes())
             .sum();
         let bytes = pages_bytes + self.far.bytes() + self.intensities_bytes();
-        // Otherwise the next ray would measure again.
+        // Requires a minimum of free bytes; otherwise the next ray would measure again.
         let least = new_bytes.max(self.max_small_bytes / 8);
         if bytes + least <= self.max_small_bytes {
             return self.allowance.grant(self.max_small_bytes - bytes);
@@ -141,7 +142,7 @@ impl PerScanCollector {
         self.allowance.grant(self.max_small_bytes - self.intensities_bytes().min(self.max_small_bytes));
     }
 
-    /// Drains the pages from this number on, and all marks outside the window. Marked prefixes stay valid.
+    /// Drains the pages from this number on, and all marks outside the window. Marked prefixes remain valid.
     fn drain_from(&mut self, first: usize, parts: &ScanParts<'_>) {
         let mut pages = self.pages.take_from(first);
         pages.sort_unstable_by_key(|(index, _)| *index);
@@ -153,7 +154,6 @@ impl PerScanCollector {
         }
     }
 
-    /// Drains everything.
     pub(crate) fn finish(&mut self, parts: &ScanParts<'_>) {
         self.drain_from(0, parts);
     }
@@ -170,9 +170,9 @@ impl PerScanCollector {
         }
     }
 
-    /// The updates. Bricks across a tile border are split.
+    /// Returns the updates. Bricks across a tile border are split.
     pub(crate) fn updates(&mut self, mapped: MappedTiles<'_>, mut report: ScanReport) -> ScanUpdates {
-        // All in one go on the pool: each way there and back is a switch of threads.
+        // One scope for all steps, because each transfer to the pool costs a thread switch.
         let tiles = rayon::scope(|_| self.updates_by_tile(mapped));
         let tiles: Vec<_> = tiles
             .into_iter()
@@ -228,7 +228,7 @@ mod tests {
         }
     }
 
-    /// Ends of rays in all directions of a part of a sphere, near and far as over a rough surface.
+    /// Ends of rays into a part of a sphere, with varying ranges as on a rough surface.
     fn ends_of_rays(origin: Point, rays: usize, reach: f64, roughness: f64, opening: f64) -> Vec<RayEnd> {
         let ray = |k: usize| {
             let (azimuth, up) =
@@ -278,7 +278,7 @@ mod tests {
     }
 
     #[test]
-    fn rays_to_the_far_end_of_the_window_leave_the_marks_of_whole_rays() {
+    fn rays_to_the_end_of_the_window_mark_all_voxels() {
         let origin = [12.3, -45.6, 7.75];
         let ends = ends_of_rays(origin, 80, 5_000.0, 0.25, 0.005);
         let origin = &RayOrigin::new(origin, origin.map(|x| x.floor() as i32));
@@ -298,7 +298,7 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(64))]
 
         #[test]
-        fn rays_that_begin_after_what_is_shared_leave_the_marks_of_whole_rays(
+        fn skipping_marked_prefixes_does_not_change_the_marks(
             origin in prop::array::uniform3(-100.0..100.0_f64),
             is_on_border in prop::array::uniform3(prop::bool::ANY),
             reach in 3.0..40.0_f64,

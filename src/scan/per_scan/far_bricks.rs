@@ -2,23 +2,23 @@ use crate::scan::pages::MarkedBrick;
 use crate::space::{BRICK_EDGE, VoxelIndex, hash_table_bytes, place_of_voxel};
 use rustc_hash::FxHashMap;
 
-/// Marks outside the window, brick by brick: a page for the few voxels of a stray ray would be too large.
+/// Marks outside the window, by brick: a page would be too large for the few voxels of a stray ray.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct FarBricks {
     bricks: FxHashMap<VoxelIndex, MarkedBrick>,
-    /// The brick that the present ray is in; not in `bricks` yet.
+    /// Brick of the current ray; not in `bricks` yet.
     latest: Option<MarkedBrick>,
 }
 
 impl FarBricks {
-    /// A ray passes a voxel.
+    /// Records a ray that passes a voxel.
     #[inline]
     pub(crate) fn pass(&mut self, voxel: VoxelIndex) {
         let (word, bit) = bit_of(voxel);
         self.brick(voxel).passed[word] |= bit;
     }
 
-    /// A ray ends in a voxel.
+    /// Records a ray that ends in a voxel.
     pub(crate) fn hit(&mut self, voxel: VoxelIndex) {
         let (word, bit) = bit_of(voxel);
         self.brick(voxel).hits[word] |= bit;
@@ -48,7 +48,6 @@ impl FarBricks {
         }
     }
 
-    /// Adds the marks of others.
     pub(crate) fn absorb(&mut self, others: &Self) {
         others.iter().for_each(|other| self.absorb_brick(other));
     }
@@ -63,7 +62,6 @@ impl FarBricks {
         std::mem::take(&mut self.bricks).into_values().collect()
     }
 
-    /// Removes all bricks.
     pub(crate) fn clear(&mut self) {
         self.bricks.clear();
         self.latest = None;

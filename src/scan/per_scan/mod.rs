@@ -1,6 +1,6 @@
-//! Insertion per scan, as in OctoMap's `insertPointCloud`: a scan updates a voxel once, and a hit wins over any miss.
+//! Insertion per scan, as in OctoMap's `insertPointCloud`: a scan updates a voxel once, and a hit overrides any miss.
 //!
-//! So rays only mark voxels, in any order and on any number of threads.
+//! Therefore rays only mark voxels, in any order and on any number of threads.
 
 mod bricks;
 mod collector;

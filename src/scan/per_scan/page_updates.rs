@@ -7,9 +7,9 @@ use crate::space::{
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
-/// The updates of the marks in pages by mapped tile, in Morton order. Bricks across a tile border are split.
+/// Returns the updates of the marks in pages by mapped tile, in Morton order. Bricks across a tile border are split.
 ///
-/// Tiles are looked up for a page, not for each of its bricks, and nothing is sorted but pages.
+/// Tiles are looked up once per page, not per brick, and only pages are sorted.
 pub(crate) fn updates_of_pages(
     mapped: MappedTiles<'_>,
     pages: &PageMap<MarkedPage>,
@@ -31,26 +31,25 @@ pub(crate) fn updates_of_pages(
     tiles
 }
 
-/// Bricks along the edge of a page.
 const PAGE_BRICKS_EDGE: i32 = PAGE_EDGE as i32 / BRICK_EDGE;
 
 #[derive(Clone, Copy)]
 struct Page<'a> {
     page: &'a MarkedPage,
-    /// Its voxels' indices divided by 64.
+    /// The indices of its voxels divided by 64.
     index: VoxelIndex,
-    /// Of its lowest brick.
+    /// Morton code of its lowest brick.
     code: BrickCode,
 }
 
 impl Page<'_> {
-    /// Its lowest voxel.
+    /// Lowest voxel of the page.
     fn min(&self) -> VoxelIndex {
         self.index.map(|k| k * PAGE_EDGE as i32)
     }
 }
 
-/// For each mapped tile the numbers of the pages that overlap it, in their order.
+/// Returns, for each mapped tile, the numbers of the pages that overlap it, in order.
 fn pages_by_tile(mapped: MappedTiles<'_>, pages: &[Page<'_>]) -> Vec<(TileIndex, Vec<u32>)> {
     let mut tiles: FxHashMap<TileIndex, Vec<u32>> = FxHashMap::default();
     for (number, page) in pages.iter().enumerate() {
@@ -99,11 +98,11 @@ fn updates_of_tile<'a>(
     updates
 }
 
-/// The part of a page that is in a tile, by the bricks' places.
+/// Bricks of a page that are in a tile, as masks.
 struct PagePart {
     /// Bricks with marks that overlap the tile.
     bricks: BrickMask,
-    /// Bricks that are wholly in the tile.
+    /// Bricks that are completely in the tile.
     whole: BrickMask,
 }
 
@@ -113,7 +112,7 @@ impl PagePart {
         let from = |k: usize| i64::from(voxels.min[k]) - i64::from(min[k]);
         let end = |k: usize| i64::from(voxels.end[k]) - i64::from(min[k]);
         let edge = i64::from(BRICK_EDGE);
-        // The places of a page's bricks are those of a brick's voxels.
+        // The bricks of a page have the same Morton positions as the voxels of a brick.
         let bricks = |voxels: i64| voxels.div_euclid(edge).clamp(0, edge) as i32;
         let up = edge - 1;
         let overlap = mask_of_box(
@@ -154,7 +153,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn pages_give_the_updates_of_their_bricks(
+        fn updates_of_pages_equal_those_of_their_bricks(
             base in prop::sample::select(vec![[0; 3], [32_700, -90, 32_760], [i32::MAX - 201; 3], [i32::MIN; 3]]),
             marks in prop::collection::vec((prop::array::uniform3(0..200_i32), any::<bool>()), 0..60),
             edge in prop::sample::select(vec![32, 50, 64, 100, 1024]),
@@ -182,7 +181,7 @@ mod tests {
             }
             prop_assert_eq!(&updates, &expected);
             prop_assert_eq!(&found, &expected);
-            // What is kept of the pages is empty.
+            // Pages that are kept for reuse are empty.
             pages.clear(Default::default(), 2);
             for index in [[0; 3], [64; 3], [128; 3]] {
                 let number = pages.number_of(index);

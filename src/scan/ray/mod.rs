@@ -1,8 +1,8 @@
-//! One ray: where it ends, and which voxels it crosses.
+//! A single ray: its end, and the voxels that it crosses.
 //!
-//! [`RayWalk`] is the definition, one voxel after the other in closed form. [`SlabRay`] crosses the same voxels many
-//! times faster, in slabs one voxel thick with fixed-point sums, and leaves to the definition what the sums cannot
-//! decide. [`RayCut`] says beforehand which slabs can be in the tiles that are asked for.
+//! [`RayWalk`] is the reference: it computes one voxel after the other in closed form. [`SlabRay`] crosses the same
+//! voxels many times faster, in slabs one voxel thick with fixed-point sums, and uses the reference where the sums are
+//! not exact enough. [`RayCut`] determines in advance which slabs can be in the selected tiles.
 
 mod range;
 mod ray_cut;

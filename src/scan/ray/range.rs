@@ -2,21 +2,22 @@ use crate::config::RayConfig;
 use crate::scan::SkippedPoints;
 use crate::space::Point;
 
-/// Outcome of the range rule for a point.
+/// Result of the range rule for a point.
 pub(crate) enum Ranged {
-    /// A ray to the point, which is a hit.
+    /// The ray ends in the point, which is a hit.
     Hit(Point),
-    /// A ray to where the max range cuts it; nothing is hit.
+    /// The ray is clipped at the max range, without a hit.
     Cut(Point),
-    /// The point is ignored.
     Skipped,
 }
 
-/// A point so many metres away or more was no return, if rays without one count: nothing that is measured is so far.
+/// Distance in metres from which a point counts as a ray without return, if such rays are used. No sensor measures so
+/// far.
 pub(crate) const NO_RETURN_M: f64 = 1e9;
 
-/// The point that stands for a ray without a return: far away along a direction of any length; `None` if that has no
-/// usable length. [`RayConfig::no_return_range_m`] says how far such a ray counts as free.
+/// Returns the point that represents a ray without return: a distant point in the given direction, which need not be
+/// normalized. `None` if the direction is zero or not finite. [`RayConfig::no_return_range_m`] sets the length of the
+/// ray that counts as free.
 ///
 /// ```
 /// use voxtile::scan::no_return;
@@ -31,7 +32,7 @@ pub fn no_return(origin: Point, direction: Point) -> Option<Point> {
     (length.is_normal() && point.iter().all(|coordinate| coordinate.is_finite())).then_some(point)
 }
 
-/// The range rule for points seen from one origin.
+/// Range rule for points seen from one origin.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RangeRule {
     /// In metres.
@@ -44,7 +45,7 @@ pub(crate) struct RangeRule {
 }
 
 impl RangeRule {
-    /// The rule of `rays` for points seen from `origin`, in metres and finite.
+    /// Creates the rule of `rays` for points seen from `origin`, in metres and finite.
     pub(crate) fn new(rays: &RayConfig, origin: Point) -> Self {
         let RayConfig { min_range_m, max_range_m, no_return_range_m, .. } = *rays;
         // Far above the rounding error of squares and square roots.
@@ -68,7 +69,7 @@ impl RangeRule {
         }
     }
 
-    /// At exactly the max range a point is a hit, as in OctoMap.
+    /// A point at exactly the max range is a hit, as in OctoMap.
     #[cold]
     fn apply_exactly(&self, point: Point, skipped: &mut SkippedPoints) -> Ranged {
         let origin = self.origin;
@@ -111,7 +112,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rays_without_a_return_are_cut_where_they_count_as_free() {
+    fn rays_without_a_return_are_clipped_at_their_free_range() {
         let at = |rays: RayConfig| match RangeRule::new(&rays, [1.0; 3])
             .apply(no_return([1.0; 3], [0.0, 0.0, -2.0]).unwrap(), &mut SkippedPoints::default())
         {
@@ -130,7 +131,7 @@ mod tests {
         assert_eq!(at(rays(Some(4.0), None)), Some(-3.0));
     }
 
-    /// Outcome for a point at `x` metres.
+    /// Result for a point at `x` metres.
     fn at(rule: &RangeRule, x: f64) -> &'static str {
         match rule.apply([x, 0.0, 0.0], &mut SkippedPoints::default()) {
             Ranged::Hit(point) if point == [x, 0.0, 0.0] => "hit",
@@ -141,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn at_exactly_the_ranges_a_point_is_a_hit() {
+    fn points_at_exactly_the_ranges_are_hits() {
         let mut rays = RayConfig { min_range_m: 0.3, max_range_m: Some(2.0), ..RayConfig::default() };
         let rule = RangeRule::new(&rays, [0.0; 3]);
         let points =

@@ -5,25 +5,25 @@ use super::slab_span::SlabSpan;
 use crate::scan::pages::{Local, Window};
 use crate::space::{Grid, Point, TileBox, TileIndex, TileSelection, VoxelBox, VoxelIndex};
 
-/// Cuts the rays of a scan to the selected tiles before they are walked.
+/// Clips the rays of a scan to the selected tiles before they are traced.
 ///
-/// What is left of a ray is one run of slabs. It holds every voxel of a selected tile that [`RayWalk`](super::RayWalk)
-/// visits, and some others at its ends and between selected tiles; who collects the marks leaves these out.
+/// A clipped ray is one run of slabs. It contains each voxel of a selected tile that [`RayWalk`](super::RayWalk)
+/// visits, and some others at its ends and between selected tiles, which the collector of the marks must filter out.
 #[derive(Clone, Debug)]
 pub(crate) struct RayCut<'a> {
     grid: &'a Grid,
     tiles: &'a TileSelection,
-    /// A box around the selected tiles, relative to the origin, in units of voxels and with [`MARGIN`] on all sides;
-    /// `None` if no tile is selected.
+    /// Box around the selected tiles, relative to the origin, in units of voxels and enlarged by [`MARGIN`] on all
+    /// sides; `None` if no tile is selected.
     around: Option<(Point, Point)>,
-    /// Where a ray has to end to come near that box, whose own sides do not say so along an axis along which the
-    /// origin is inside.
+    /// Box of the ends of all rays that may reach `around`. Along each axis on which the origin is outside of `around`,
+    /// it is bounded by the near side of `around`; otherwise it is unbounded.
     ends: (Point, Point),
-    /// The voxels of a box around the selected tiles.
+    /// Voxels of a box around the selected tiles.
     voxels: VoxelBox,
 }
 
-/// In voxels: far above what rounding moves a ray by.
+/// In voxels; far above the rounding error of a ray.
 const MARGIN: f64 = 1.0;
 
 impl<'a> RayCut<'a> {
@@ -52,10 +52,10 @@ impl<'a> RayCut<'a> {
         Self { grid, tiles, around, ends, voxels }
     }
 
-    /// The ray to `end`, cut; `None` if it says nothing about a selected tile.
+    /// Returns the clipped ray to `end`; `None` if it crosses no selected tile.
     #[inline]
     pub(crate) fn apply(&self, origin: &RayOrigin, end: RayEnd) -> Option<RayEnd> {
-        // Most rays, of most scans, are where the sensor is: those of another region are told by a look.
+        // In most scans most rays are close to the sensor: a cheap test rejects those of other regions.
         if (0..3).any(|k| end.point[k] < self.ends.0[k] || end.point[k] > self.ends.1[k]) {
             return None;
         }
@@ -67,8 +67,8 @@ impl<'a> RayCut<'a> {
         }
     }
 
-    /// Whether a condition holds for the selected voxels from `low` to `high`, both in the window: for each box of
-    /// them, also given by its lowest and highest voxel.
+    /// Returns whether a condition holds for the selected voxels from `low` to `high`, both in the window. It is
+    /// evaluated for boxes of these voxels, also given by their lowest and highest voxel.
     pub(crate) fn for_all_selected(
         &self,
         window: &Window,
@@ -80,7 +80,7 @@ impl<'a> RayCut<'a> {
         let voxel = |local: Local, k: usize| base[k] + local[k] as i32;
         let wanted = VoxelBox {
             min: std::array::from_fn(|k| voxel(low, k)),
-            // A window ends before the last voxel of the range.
+            // A window ends before the last voxel of the index range.
             end: std::array::from_fn(|k| voxel(high, k) + 1),
         };
         let wanted = wanted.intersection(&self.voxels);
@@ -105,12 +105,13 @@ impl<'a> RayCut<'a> {
 
     fn span(&self, ray: &SlabRay) -> Option<SlabSpan> {
         let (low, high) = self.around?;
-        // Times of the ray, from 0 at the origin to 1 at the end.
+        // Times along the ray, from 0 at the origin to 1 at the end.
         let (mut enter, mut leave) = (0.0_f64, 1.0_f64);
         for k in 0..3 {
             let inverse = 1.0 / ray.direction[k];
             let (first, second) = (low[k] * inverse, high[k] * inverse);
-            // NaN, of a ray along the box's border, is ignored: that is a margin away from what is selected.
+            // NaN, from a ray along a border of the box, is ignored: the border is a margin away from the selected
+            // tiles.
             enter = enter.max(first.min(second));
             leave = leave.min(first.max(second));
         }
@@ -132,8 +133,8 @@ impl<'a> RayCut<'a> {
         }
     }
 
-    /// From the first to the last slab of a span in which the ray may be in a selected tile. It is looked at one layer
-    /// of tiles after the other, along the axis `A` of the ray's largest component.
+    /// Returns the first and last slab of a span in which the ray may be in a selected tile. The span is examined layer
+    /// by layer of tiles, along the axis `A` of the ray's largest component.
     fn narrowed<const A: usize, const B: usize, const C: usize>(
         &self,
         ray: &SlabRay,
@@ -145,7 +146,7 @@ impl<'a> RayCut<'a> {
         let end = span.until.min(ray.slabs().saturating_add(1));
         let (mut from, mut found) = (span.from, None);
         while from < end {
-            // The layer of tiles of the slab `from`, and the first slab after it.
+            // The layer of tiles that contains the slab `from`, and the first slab after it.
             let slab = if is_up { sensor + i64::from(from) } else { sensor - i64::from(from) };
             let layer = slab.div_euclid(edge);
             let after = if is_up { (layer + 1) * edge - sensor } else { sensor - layer * edge + 1 };
@@ -155,11 +156,11 @@ impl<'a> RayCut<'a> {
             }
             from = until;
         }
-        // Beyond the ray's last slab nothing is left out.
+        // After the ray's last slab nothing is clipped.
         found.map(|found| if found.until == end { SlabSpan { until: span.until, ..found } } else { found })
     }
 
-    /// Whether, in these slabs, the ray may be in a selected tile of a layer.
+    /// Returns whether the ray may be in a selected tile of a layer in these slabs.
     fn may_pass_selected<const A: usize, const B: usize, const C: usize>(
         &self,
         ray: &SlabRay,
@@ -167,7 +168,7 @@ impl<'a> RayCut<'a> {
         (from, until): (u32, u32),
     ) -> bool {
         let edge = i64::from(self.grid.voxels_per_tile_edge());
-        // The distances along `A` at which the ray may be in these slabs.
+        // Distances along `A` at which the ray may be in these slabs.
         let (near, far) = (f64::from(from.saturating_sub(1)), f64::from(until));
         let tiles_along = |axis: usize| {
             let slope = ray.direction[axis] * ray.per_slab;
@@ -190,7 +191,7 @@ impl<'a> RayCut<'a> {
 mod tests {
     use super::*;
 
-    /// Rays all around from one origin, each with the slabs, first and last, in which it visits selected tiles.
+    /// Rays in all directions from one origin, each with the first and last slab in which it visits selected tiles.
     fn rays(origin: &RayOrigin, grid: &Grid, tiles: &TileSelection) -> Vec<(RayEnd, Option<(u32, u32)>)> {
         let ray = |k: u32| {
             let (azimuth, up) = (f64::from(k) * 2.399_963, f64::from(k % 199) / 99.0 - 1.0);
@@ -213,7 +214,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_left_of_rays_holds_the_selected_tiles_and_little_else() {
+    fn clipped_rays_contain_the_selected_tiles_and_few_other_voxels() {
         let grid = Grid::new(0.1, 10.0).unwrap();
         let near = TileBox::new([1, -2, -1].into(), [3, 0, 0].into());
         let selections: [TileSelection; 4] = [

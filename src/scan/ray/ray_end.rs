@@ -1,15 +1,15 @@
 use super::slab_span::SlabSpan;
 use crate::space::{Point, VoxelIndex};
 
-/// Where a ray ends.
+/// End of a ray.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RayEnd {
-    /// In units of voxels, world frame.
+    /// End point in units of voxels, world frame.
     pub(crate) point: Point,
-    /// The voxel of the point.
+    /// Voxel that contains the point.
     pub(crate) voxel: VoxelIndex,
-    /// The intensity at the end, if the end is evidence of a hit.
+    /// Intensity at the end, if it is a hit.
     pub(crate) hit: Option<f32>,
-    /// The slabs that are to be walked.
+    /// Slabs to be traced.
     pub(crate) span: SlabSpan,
 }

@@ -1,14 +1,14 @@
 use crate::space::{Point, VoxelIndex};
 
-/// Where the rays of a scan start, in units of voxels, world frame.
+/// Common origin of the rays of a scan, in units of voxels, world frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RayOrigin {
     pub(crate) point: Point,
-    /// The voxel of the point.
+    /// Voxel that contains the point.
     pub(crate) voxel: VoxelIndex,
-    /// Whether the point lies on a border between voxels: rays toward lower indices leave its voxel at once.
+    /// Whether the point is on a border between voxels: rays toward lower indices leave its voxel immediately.
     pub(crate) is_on_border: bool,
-    /// The same along each axis.
+    /// The same for each axis.
     pub(crate) is_on_border_along: [bool; 3],
 }
 

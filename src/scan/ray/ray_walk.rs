@@ -1,14 +1,15 @@
 use crate::space::{Point, VoxelBox, VoxelIndex};
 
-/// A ray that would cross more voxels than this is skipped.
+/// Maximum number of steps of a ray; longer rays are skipped.
 pub const MAX_RAY_STEPS: u64 = 1_000_000;
 
-/// The exact 6-connected walk of a ray through the voxels it meets (Amanatides and Woo, "A fast voxel
-/// traversal algorithm for ray tracing", Eurographics 1987), in closed form.
+/// Exact 6-connected walk of a ray through the voxels it meets (Amanatides and Woo, "A fast voxel traversal algorithm
+/// for ray tracing", Eurographics 1987), in closed form.
 ///
-/// In units of voxels, the time of an axis' k-th crossing is `(boundary_k - origin) * inv_direction`, computed anew
-/// each time and never accumulated; at equal times the lowest axis goes first. `inv_direction` is at most `f64::MAX`. So whether a ray visits a voxel depends
-/// on that voxel and the ray alone, and every algorithm that uses this formula visits the same voxels.
+/// In units of voxels, the time of the k-th crossing of an axis is `(boundary_k - origin) * inv_direction`. It is
+/// computed from scratch each time and never accumulated; at equal times the lowest axis is first. `inv_direction` is
+/// at most `f64::MAX`. Therefore a visit of a voxel depends only on this voxel and the ray, and every algorithm that
+/// uses this formula visits the same voxels.
 #[derive(Clone, Debug)]
 pub struct RayWalk {
     origin: Point,
@@ -17,34 +18,33 @@ pub struct RayWalk {
     voxel: VoxelIndex,
     /// Time of the next crossing along each axis; infinite if there is none.
     next: Point,
-    /// The last voxel.
     last: VoxelIndex,
-    /// Time at which the present voxel was entered.
+    /// Time at which the ray entered the current voxel.
     entry: f64,
 }
 
-/// What came of [`RayWalk::advance_in`].
+/// Result of [`RayWalk::advance_in`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Advanced {
-    /// The present voxel did not pass.
+    /// The condition is false for the current voxel.
     Stopped,
-    /// The present voxel is outside, or was entered too late; it was not looked at.
+    /// The current voxel is outside, or was entered too late; the condition was not evaluated for it.
     Left,
-    /// The present voxel passed, and is the last.
+    /// The condition is true for the current voxel, which is the last one.
     AtEnd,
 }
 
 impl RayWalk {
-    /// The walk from `origin` to `end`, both in units of voxels and inside `start` and `last`, their voxels.
+    /// Creates the walk from `origin` to `end`, both in units of voxels and inside `start` and `last`, their voxels.
     ///
-    /// Times run from 0 at the origin to 1 at the end.
+    /// Times range from 0 at the origin to 1 at the end.
     pub fn between(origin: Point, start: VoxelIndex, end: Point, last: VoxelIndex) -> Self {
         let direction = std::array::from_fn(|k| end[k] - origin[k]);
         Self::new(origin, start, direction, last)
     }
 
-    /// The walk from `origin`, in units of voxels and inside the voxel `start`, along `direction`, in voxels per unit
-    /// of time, up to the limits of `i32`.
+    /// Creates the walk from `origin`, in units of voxels and inside the voxel `start`, along `direction`, in voxels
+    /// per unit of time, up to the limits of `i32`.
     pub fn along(origin: Point, start: VoxelIndex, direction: Point) -> Self {
         let last = std::array::from_fn(|k| match direction[k] {
             d if d > 0.0 => i32::MAX - 1,
@@ -57,7 +57,8 @@ impl RayWalk {
     fn new(origin: Point, start: VoxelIndex, direction: Point, last: VoxelIndex) -> Self {
         let mut walk = Self {
             origin,
-            // Finite, so that a border through the origin is crossed at time 0 however slowly the ray moves.
+            // Clamped to finite values, so that a border through the origin is crossed at time 0 even by a very slow
+            // ray.
             inv_direction: direction.map(|d| (1.0 / d).clamp(-f64::MAX, f64::MAX)),
             step: std::array::from_fn(|k| (i64::from(last[k]) - i64::from(start[k])).signum() as i32),
             voxel: start,
@@ -69,34 +70,34 @@ impl RayWalk {
         walk
     }
 
-    /// The same walk, continued from a later voxel that it visits.
+    /// Returns the same walk, continued from a later voxel that it visits.
     pub(crate) fn resumed_at(mut self, voxel: VoxelIndex) -> Self {
         self.voxel = voxel;
         self.next = std::array::from_fn(|axis| self.crossing(axis, voxel[axis]));
         self
     }
 
-    /// Number of steps from the present voxel to the last.
+    /// Number of steps from the current voxel to the last.
     pub fn steps(&self) -> u64 {
         (0..3).map(|k| u64::from(self.voxel[k].abs_diff(self.last[k]))).sum()
     }
 
-    /// Number of steps from the present voxel to another one that the walk visits, ahead or behind.
+    /// Number of steps between the current voxel and another one that the walk visits, before or after it.
     pub(crate) fn steps_to(&self, voxel: VoxelIndex) -> u64 {
         (0..3).map(|k| u64::from(self.voxel[k].abs_diff(voxel[k]))).sum()
     }
 
-    /// The present voxel.
+    /// The current voxel.
     pub fn voxel(&self) -> VoxelIndex {
         self.voxel
     }
 
-    /// Time at which the ray entered the present voxel.
+    /// Time at which the ray entered the current voxel.
     pub fn entry_time(&self) -> f64 {
         self.entry
     }
 
-    /// Steps to the next voxel; stays at the last one.
+    /// Advances to the next voxel; has no effect at the last one.
     #[inline]
     pub fn advance(&mut self) {
         let axis = self.next_axis();
@@ -107,16 +108,17 @@ impl RayWalk {
         }
     }
 
-    /// Visits every voxel from the present one up to, not including, the last.
+    /// Visits each voxel from the current one up to, but excluding, the last.
     ///
-    /// The same steps as [`RayWalk::advance`], with everything in registers: a scan takes millions of them.
+    /// Takes the same steps as [`RayWalk::advance`], with all state in registers, because a scan takes millions of
+    /// steps.
     #[inline]
     pub fn for_each_before_end(self, visit: impl FnMut(VoxelIndex)) {
         let steps = self.steps();
         self.for_each_of_next(steps, visit);
     }
 
-    /// Visits so many voxels, from the present one on; no more than there are before the last.
+    /// Visits `steps` voxels, starting at the current one; there must be as many before the last.
     #[inline]
     pub(crate) fn for_each_of_next(self, steps: u64, mut visit: impl FnMut(VoxelIndex)) {
         let [ox, oy, oz] = self.origin;
@@ -141,10 +143,10 @@ impl RayWalk {
         }
     }
 
-    /// Steps on from the present voxel, which is inside `region`, as long as voxels pass, to the first one outside or
-    /// entered after `until`.
+    /// Advances from the current voxel, which is inside `region`, while the condition is true, to the first voxel that
+    /// is outside or entered after `until`.
     ///
-    /// The same steps as [`RayWalk::advance`], with everything in registers.
+    /// Takes the same steps as [`RayWalk::advance`], with all state in registers.
     #[inline]
     pub(crate) fn advance_in(
         &mut self,
@@ -160,7 +162,8 @@ impl RayWalk {
         let [mut x, mut y, mut z] = self.voxel;
         let [mut tx, mut ty, mut tz] = self.next;
         let mut entry = self.entry;
-        // The first coordinates outside; what the walk never leaves along is never equal to it.
+        // First coordinate outside per axis; along an axis that the walk never leaves, a coordinate that it never
+        // reaches.
         let [ex, ey, ez]: VoxelIndex = std::array::from_fn(|k| match self.step[k] {
             1 => region.end[k],
             -1 => region.min[k].wrapping_sub(1),
@@ -198,15 +201,15 @@ impl RayWalk {
         advanced
     }
 
-    /// Whether the present voxel is the last.
+    /// Returns whether the current voxel is the last.
     pub fn is_at_end(&self) -> bool {
         self.voxel == self.last
     }
 
-    /// Jumps to the first voxel outside `region`, which holds the present voxel, as single steps would. Stops at the
-    /// last voxel if that comes first.
+    /// Jumps to the first voxel outside `region`, which contains the current voxel, with the same result as single
+    /// steps. Stops at the last voxel if that is reached first.
     pub fn leave(&mut self, region: &VoxelBox) {
-        // Along each axis, the last voxel inside the region; its crossing leaves the region.
+        // The last voxel inside the region along each axis; its crossing leaves the region.
         let border: VoxelIndex = std::array::from_fn(|k| match self.step[k] {
             1 => (region.end[k] - 1).min(self.last[k]),
             -1 => region.min[k].max(self.last[k]),
@@ -227,14 +230,13 @@ impl RayWalk {
         self.entry = exit;
     }
 
-    /// Jumps to the last voxel that single steps reach, which is none beyond `border`: crossings at infinite time never
-    /// happen.
+    /// Jumps to the last voxel within `border` that single steps reach; crossings at infinite time never happen.
     fn advance_to_end(&mut self, border: VoxelIndex) {
         let end: VoxelIndex =
             std::array::from_fn(|axis| self.voxel_before(axis, border[axis], f64::INFINITY, false));
         for (axis, &last) in end.iter().enumerate() {
             if last != self.voxel[axis] {
-                // Times ascend: the latest of the last crossings is the last of all.
+                // Times are ascending: the latest of the axes' last crossings is the last of all.
                 self.entry = self.entry.max(self.crossing(axis, last - self.step[axis]));
             }
         }
@@ -242,14 +244,14 @@ impl RayWalk {
         self.next = std::array::from_fn(|axis| self.crossing(axis, self.voxel[axis]));
     }
 
-    /// Jumps to the first voxel inside `region`, as single steps would; stays if the present one is inside. Returns
-    /// `false`, without moving, if the rest of the ray never meets the region.
+    /// Jumps to the first voxel inside `region`, with the same result as single steps; has no effect if the current one
+    /// is inside. Returns `false`, without moving, if the rest of the ray never meets the region.
     pub fn enter(&mut self, region: &VoxelBox) -> bool {
         if region.is_empty() {
             return false;
         }
-        // Along each axis that is not inside yet, the crossing that enters the region's range. The last of these enters
-        // the region; at equal times the highest axis goes last.
+        // For each axis that is not inside yet, the crossing that enters the region's range. The last of these enters
+        // the region; at equal times the highest axis is last.
         let mut entry: Option<(f64, usize)> = None;
         for axis in 0..3 {
             let (voxel, first, last) = (self.voxel[axis], region.min[axis], region.end[axis] - 1);
@@ -284,8 +286,8 @@ impl RayWalk {
         true
     }
 
-    /// The voxel along `axis`, between the present one and `border`, at time `exit`: crossings before `exit` are done,
-    /// and those at `exit` if `ties_first`. Times ascend along the ray, so bisection finds the voxel.
+    /// Returns the voxel along `axis`, between the current one and `border`, at time `exit`: crossings before `exit`
+    /// have happened, and those at `exit` if `ties_first`. Times ascend along the ray, so bisection finds the voxel.
     fn voxel_before(&self, axis: usize, border: i32, exit: f64, ties_first: bool) -> i32 {
         let done = |voxel: i32| {
             let time = self.crossing(axis, voxel);
@@ -320,7 +322,7 @@ impl RayWalk {
     }
 }
 
-/// The axis with the least time, the lowest at equal times.
+/// Returns the axis with the smallest time, the lowest at equal times.
 #[inline]
 fn earliest(times: Point) -> usize {
     let [x, y, z] = times;
@@ -356,7 +358,7 @@ mod tests {
     }
 
     #[test]
-    fn ties_go_to_the_lowest_axis_first() {
+    fn ties_cross_the_lowest_axis_first() {
         assert_eq!(
             voxels(walk([0.5; 3], [2.5; 3])),
             [[0, 0, 0], [1, 0, 0], [1, 1, 0], [1, 1, 1], [2, 1, 1], [2, 2, 1], [2, 2, 2]]
@@ -364,12 +366,12 @@ mod tests {
     }
 
     #[test]
-    fn a_ray_inside_one_voxel_takes_no_step() {
+    fn a_ray_inside_one_voxel_has_no_steps() {
         assert_eq!(voxels(walk([0.1, 0.2, 0.3], [0.9, 0.2, 0.4])), [[0, 0, 0]]);
     }
 
     #[test]
-    fn a_border_through_the_origin_is_left_at_once_however_slowly_the_ray_moves() {
+    fn a_border_through_the_origin_is_crossed_at_time_0() {
         let least = f64::from_bits(1);
         for slow in [-1e-310, -least, -f64::MIN_POSITIVE, -1e-300] {
             let visited = voxels(walk([0.5, 0.0, 0.5], [2.5, slow, 0.5]));
@@ -384,7 +386,7 @@ mod tests {
     }
 
     #[test]
-    fn a_box_that_reaches_the_last_voxels_is_walked_to_its_end() {
+    fn a_box_at_the_index_limit_is_left_correctly() {
         let region = VoxelBox { min: [i32::MAX - 50, -50, -50], end: [i32::MAX, 50, 50] };
         for slow in [0.0, 1e-310, -1e-310, 1e-307, -3e-308, f64::from_bits(1)] {
             let start = [i32::MAX - 40, 0, 0];
@@ -402,7 +404,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn every_step_is_to_a_neighbour_nearer_to_the_end_through_voxels_the_ray_meets(
+        fn each_step_approaches_the_end_through_voxels_on_the_ray(
             from in prop::array::uniform3(-40.0..40.0_f64),
             to in prop::array::uniform3(-40.0..40.0_f64),
         ) {
@@ -411,7 +413,7 @@ mod tests {
             let visited = voxels(ray);
             prop_assert_eq!(visited.len(), steps + 1);
             for voxel in &visited {
-                // The slab test, with a margin for rounding.
+                // Slab test with a margin for rounding.
                 let (mut enter, mut leave) = (0.0_f64, 1.0_f64);
                 for k in 0..3 {
                     let d = to[k] - from[k];
@@ -425,12 +427,12 @@ mod tests {
         }
 
         #[test]
-        fn a_box_is_entered_where_single_steps_enter_it(
+        fn entering_a_box_equals_single_steps(
             from in prop::array::uniform3(-60.0..60.0_f64),
             to in prop::array::uniform3(-60.0..60.0_f64),
             snap in prop::bool::ANY,
         ) {
-            // Snapped, many crossings are ties, and some rays go along an axis.
+            // With snapping, many crossings are ties, and some rays are parallel to an axis.
             let grid = |p: Point| if snap { p.map(|x| (x / 8.0).round() * 8.0 + 0.5) } else { p };
             let (from, to) = (grid(from), grid(to));
             let region = VoxelBox { min: [-9, -20, 0], end: [17, 19, 30] };
@@ -449,7 +451,7 @@ mod tests {
         }
 
         #[test]
-        fn leaving_a_box_ends_where_single_steps_end(
+        fn leaving_a_box_equals_single_steps(
             from in prop::array::uniform3(0.0..16.0_f64),
             to in prop::array::uniform3(-40.0..40.0_f64),
             snap in prop::bool::ANY,

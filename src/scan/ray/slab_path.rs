@@ -2,37 +2,36 @@ use super::slab_ray::SlabRay;
 use crate::scan::pages::{Footprint, PAGE_EDGE, WORDS, part_of_place};
 use crate::space::VoxelIndex;
 
-/// Voxels along the edge of a page.
 const EDGE: u32 = PAGE_EDGE as u32;
 
-/// A crossing closer than this to a voxel border, in units of 2^-32 voxels, is left to the exact walk.
+/// Crossings closer than this to a voxel border, in units of 2^-32 voxels, are computed by the exact walk.
 ///
-/// That is 2^-18 voxels. A position is off by less than 2^-33 voxels per slab, with at most 8192 slabs to either side
-/// of a window; the closed form's times, rounded to `f64`, are off by less than 2^-36 voxels.
+/// The value is 2^-18 voxels. The error of a position is below 2^-33 voxels per slab, with at most 8192 slabs to either
+/// side of a window; the error of the closed form's times, rounded to `f64`, is below 2^-36 voxels.
 const NEAR_BORDER: u32 = 1 << 14;
 
-/// Two crossings in one slab that are closer to each other than this, in units of 2^-32 voxels, are left to the exact
-/// walk: a position is off by less than 2^14 units.
+/// If two crossings in one slab are closer to each other than this, in units of 2^-32 voxels, the exact walk is used:
+/// the error of a position is below 2^14 units.
 const NEAR_EDGE: u64 = 1 << 16;
 
-/// [`NEAR_BORDER`] within a page: positions there have six bits less, and are off by one more unit for each of the
-/// page's 64 slabs.
+/// [`NEAR_BORDER`] within a page: positions there have six bits less, and an additional error of one unit for each of
+/// the page's 64 slabs.
 const NEAR_BORDER_IN_PAGE: u64 = 1 << 14;
 
-/// Where a ray crosses from one slab to the next, in units of 2^-32 voxels relative to the window's lowest voxel.
+/// Crossing of a ray from one slab to the next, in units of 2^-32 voxels relative to the window's lowest voxel.
 #[derive(Clone, Copy)]
 pub(crate) struct SlabPath {
     at_b: i64,
     at_c: i64,
     slope_b: i64,
     slope_c: i64,
-    /// Voxels along `B` and `C` for a voxel along `A`.
+    /// Slopes along `B` and `C` in voxels per voxel along `A`.
     slopes: [f64; 2],
     is_up: bool,
 }
 
 impl SlabPath {
-    /// The first crossing of a ray that starts in slab `a`, and the increment from crossing to crossing.
+    /// Returns the first crossing of a ray that starts in slab `a`, with the increment per crossing.
     #[inline]
     pub(crate) fn along<const A: usize, const B: usize, const C: usize>(
         ray: &SlabRay,
@@ -44,7 +43,7 @@ impl SlabPath {
         let first = (f64::from(base[A]) + f64::from(a) + f64::from(is_up) - origin[A]).abs();
         let slope = |axis: usize| ray.direction[axis] * ray.per_slab;
         let at = |axis: usize| origin[axis] - f64::from(base[axis]) + first * slope(axis);
-        // Added to a number below 2^51, this leaves the nearest integer in the lowest bits.
+        // Adding this to a number below 2^51 leaves the nearest integer in the lowest bits.
         const ROUND: f64 = 1.5 * (1_u64 << 52) as f64;
         let fixed = |voxels: f64| {
             (voxels * (1_u64 << 32) as f64 + ROUND).to_bits().wrapping_sub(ROUND.to_bits()) as i64
@@ -59,7 +58,7 @@ impl SlabPath {
         }
     }
 
-    /// The crossing `crossings` slabs later.
+    /// Returns the crossing `crossings` slabs later.
     #[inline]
     pub(crate) fn after(&self, crossings: u32) -> Self {
         let crossings = i64::from(crossings);
@@ -67,14 +66,13 @@ impl SlabPath {
         Self { at_b, at_c, ..*self }
     }
 
-    /// Indices of the voxels along `B` and `C`.
     #[inline]
     pub(crate) fn voxel(&self) -> (u32, u32) {
         ((self.at_b >> 32) as u32, (self.at_c >> 32) as u32)
     }
 
-    /// The slabs after `done` of `slabs` that the ray passes in the page of `[a, b, c]`, by which it enters the first;
-    /// it ends in the voxel `last`.
+    /// Returns the slabs after `done` of `slabs` that the ray passes in the page of `[a, b, c]`, the voxel through
+    /// which it enters the first; the ray ends in the voxel `last`.
     #[inline]
     pub(crate) fn stretch(&self, [a, b, c]: [u32; 3], last: [u32; 3], done: u32, slabs: u32) -> Stretch {
         let first = self.after(done);
@@ -96,12 +94,12 @@ impl SlabPath {
         }
     }
 
-    /// How many of `slabs` slabs from here on the ray passes in the page of `[a, b, c]`, and whether it leaves the page
-    /// within the next one.
+    /// Returns how many of `slabs` slabs from here on the ray passes in the page of `[a, b, c]`, and whether it leaves
+    /// the page within the next one.
     fn slabs_in_page(&self, [a, b, c]: [u32; 3], slabs: u32) -> (u32, bool) {
         let to_end = if self.is_up { EDGE - (a & (EDGE - 1)) } else { (a & (EDGE - 1)) + 1 };
         let most = to_end.min(slabs);
-        // How many crossings are certainly in the page, by the distance of its side.
+        // Number of crossings that are certainly in the page, from the distance to its side.
         let crossings = |at: i64, slope: f64, index: u32| {
             let low = i64::from(index & !(EDGE - 1)) << 32;
             let high = low + (i64::from(EDGE) << 32);
@@ -110,22 +108,22 @@ impl SlabPath {
                 return 0;
             }
             let left_voxels = left as f64 * (1.0 / (1_u64 << 32) as f64);
-            // A little less, so that rounding does not add one too many.
+            // Slightly reduced, so that rounding does not add one too many.
             ((left_voxels / slope.abs() * (1.0 - 1e-6)) as u32).saturating_add(1)
         };
         let sideways = crossings(self.at_b, self.slopes[0], b).min(crossings(self.at_c, self.slopes[1], c));
         (most.min(sideways), sideways < most)
     }
 
-    /// Whether the crossing is too close to a voxel border to tell its voxel without the closed form.
+    /// Returns whether the crossing is too close to a voxel border to determine its voxel without the closed form.
     #[inline]
     pub(crate) fn is_near_border(&self) -> bool {
         let is_near = |at: i64| (at as u32).wrapping_add(NEAR_BORDER) < 2 * NEAR_BORDER;
         is_near(self.at_b) || is_near(self.at_c)
     }
 
-    /// The voxel between the entry and the exit of a slab, if these differ along both axes. `None` if crossings are too
-    /// close to a border, or to each other, to tell without the closed form.
+    /// Returns the voxel between the entry and the exit of a slab, if these differ along both axes. `None` if crossings
+    /// are too close to a border, or to each other, to determine it without the closed form.
     #[inline]
     pub(crate) fn between(&self, (b, c): (u32, u32)) -> Option<Option<(u32, u32)>> {
         if self.is_near_border() {
@@ -141,14 +139,14 @@ impl SlabPath {
     }
 }
 
-/// Slabs that a ray passes in one page.
+/// Run of slabs that a ray passes in one page.
 pub(crate) struct Stretch {
-    /// Where the ray leaves the first slab, relative to the page: along `B` in the upper half, along `C` in the lower,
+    /// Exit of the ray from the first slab, relative to the page: along `B` in the upper half, along `C` in the lower,
     /// each with as many integer bits as an index within the page has.
     at: u64,
-    /// The increment from slab to slab.
+    /// Increment from slab to slab.
     slope: u64,
-    /// The voxel in the page by which the ray enters.
+    /// Voxel in the page through which the ray enters.
     entry: (u32, u32),
     pub(crate) slabs: u32,
     /// Whether the ray leaves the page within the next slab, not between slabs.
@@ -157,7 +155,7 @@ pub(crate) struct Stretch {
 }
 
 impl Stretch {
-    /// Passes the voxels. Returns the number of slabs for which that is certain.
+    /// Passes the voxels. Returns the number of slabs that could be decided.
     #[inline]
     pub(crate) fn pass<const A: usize, const B: usize, const C: usize, F: Footprint>(
         &self,
@@ -165,7 +163,7 @@ impl Stretch {
         mut a: u32,
     ) -> u32 {
         let bits = EDGE.trailing_zeros();
-        // For both halves, the bits of the fraction that tell whether it is next to a border.
+        // For both halves, the bits of the fraction that show whether it is close to a border.
         let near = NEAR_BORDER_IN_PAGE >> bits;
         let fraction = ((1_u64 << (32 - bits)) - 1) & !(2 * near - 1);
         let near_border = near << 32 | near;
@@ -179,7 +177,7 @@ impl Stretch {
                 return done;
             }
             let exit = indices(at);
-            // One branch that is seldom taken instead of two that are often mispredicted.
+            // One branch that is rarely taken is faster than two that are often mispredicted.
             if (exit.0 ^ entry.0) * (exit.1 ^ entry.1) != 0 {
                 let slopes = [(self.slope as i64) >> 32, self.slope as i32 as i64];
                 let past = [(at >> 32 << bits) as u32, (at << bits) as u32];
@@ -196,11 +194,11 @@ impl Stretch {
         self.slabs
     }
 
-    /// Marks the voxels in the words of a page, in Morton order. Returns the number of slabs for which that is certain;
-    /// of the next one, the first voxel may be marked, too.
+    /// Marks the voxels in the words of a page, in Morton order. Returns the number of slabs that could be decided; the
+    /// first voxel of the next one may also be marked.
     ///
-    /// At a crossing the ray passes two voxels along `A`, mostly of one word: they are marked together.
-    // Not inlined: on its own, most of what the loop needs is in registers.
+    /// At a crossing the ray passes two voxels along `A`, mostly in one word: they are marked together.
+    // Not inlined: as a function of its own, most of the loop's data is in registers.
     #[inline(never)]
     pub(crate) fn mark<const A: usize, const B: usize, const C: usize>(
         &self,
@@ -210,7 +208,7 @@ impl Stretch {
         const BITS: u32 = EDGE.trailing_zeros();
         const NEAR: u64 = NEAR_BORDER_IN_PAGE >> BITS;
         const RAISED: u64 = NEAR << 32 | NEAR;
-        // Of a raised position next to a border all these bits are 0.
+        // All these bits are 0 in a raised position close to a border.
         const FRACTION: u64 = ((1_u64 << (32 - BITS)) - 1) & !(2 * NEAR - 1);
         let b_of = |at: u64| (at >> (64 - BITS)) as u32;
         let c_of = |at: u64| (at as u32) >> (32 - BITS);
@@ -222,13 +220,13 @@ impl Stretch {
         let mut before = u64::from(self.entry.0) << (64 - BITS) | u64::from(self.entry.1) << (32 - BITS);
         let mut at = self.at.wrapping_add(RAISED);
         mark(part_of_place(A, a) | cell(before), 1);
-        // Of the word's lowest slab.
+        // For the lowest slab of the word.
         let mut part = part_of_place(A, a & !3);
         for done in 0..=last {
             if at & (FRACTION << 32) == 0 || at & FRACTION == 0 {
                 return done;
             }
-            // One branch that is seldom taken instead of two that are often mispredicted.
+            // One branch that is rarely taken is faster than two that are often mispredicted.
             let differ = at ^ before;
             if b_of(differ) * c_of(differ) != 0 {
                 let slopes = [(self.slope as i64) >> 32, self.slope as i32 as i64];
@@ -258,8 +256,8 @@ impl Stretch {
     }
 }
 
-/// For rays down and up, along each axis and for each of the four slabs of a word: the bits of the slab and of the next,
-/// if that is in the word, too.
+/// For rays down and up, for each axis and each of the four slabs of a word: the bits of the slab and of the next, if
+/// that is also in the word.
 static PAIRS: [[[u64; 4]; 3]; 2] = pairs();
 
 const fn pairs() -> [[[u64; 4]; 3]; 2] {
@@ -274,16 +272,16 @@ const fn pairs() -> [[[u64; 4]; 3]; 2] {
     pairs
 }
 
-/// Whether a ray crossed the first of two borders, along two axes, before the second; `None` if the crossings are too
-/// close to tell without the closed form. `past` are the fractions of a voxel behind each border below, in units of
-/// 2^-32.
+/// Returns whether a ray crossed the first of two borders, along two axes, before the second; `None` if the crossings
+/// are too close to decide without the closed form. `past` are the fractions of a voxel past each lower border, in
+/// units of 2^-32.
 #[inline]
 fn is_b_crossed_first(past: [u32; 2], slopes: [i64; 2]) -> Option<bool> {
-    // Distance past the border over slope is the time since the crossing.
+    // Distance past the border divided by slope is the time since the crossing.
     let past = |k: usize| u64::from(if slopes[k] < 0 { !past[k] } else { past[k] });
     let b = past(0) * slopes[1].unsigned_abs();
     let c = past(1) * slopes[0].unsigned_abs();
-    // The error if positions and slopes are off by a unit each.
+    // The error if positions and slopes are off by one unit each.
     let near = NEAR_EDGE * slopes[0].unsigned_abs().max(slopes[1].unsigned_abs()) + (1 << 34);
     (b.abs_diff(c) > near).then_some(b > c)
 }

@@ -6,27 +6,27 @@ use super::slab_span::SlabSpan;
 use crate::scan::pages::{Footprint, Local, PageMap};
 use crate::space::{Point, VoxelBox, VoxelIndex};
 
-/// A ray from a scan's origin, in units of voxels, world frame; see [`RayWalk`].
+/// Ray from the origin of a scan, in units of voxels, world frame; see [`RayWalk`].
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SlabRay<'a> {
     pub(crate) origin: &'a RayOrigin,
     pub(crate) end: Point,
     pub(crate) last: VoxelIndex,
-    /// From the origin to the end.
+    /// Vector from the origin to the end.
     pub(crate) direction: Point,
-    /// The axis of the largest component; slabs lie across it.
+    /// Axis of the largest component; slabs are perpendicular to it.
     pub(crate) axis: usize,
-    /// One over the largest component; infinite if that is almost 0.
+    /// Inverse of the largest component; infinite if that is almost 0.
     pub(crate) per_slab: f64,
-    /// The slabs that are to be walked.
+    /// Slabs to be traced.
     pub(crate) span: SlabSpan,
 }
 
-/// At most so many slabs of a ray are walked by the closed form one at a time; after that, the rest of the ray is.
+/// Maximum number of slabs of a ray that are walked one at a time by the closed form; after that, it walks the rest of
+/// the ray.
 const MAX_WALKED: u32 = 4;
 
 impl<'a> SlabRay<'a> {
-    /// The ray from `origin` to `end`.
     #[inline]
     pub(crate) fn new(origin: &'a RayOrigin, RayEnd { point: end, voxel: last, span, .. }: RayEnd) -> Self {
         let direction: Point = std::array::from_fn(|k| end[k] - origin.point[k]);
@@ -41,11 +41,11 @@ impl<'a> SlabRay<'a> {
         Self { origin, end, last, direction, axis, per_slab: 1.0 / longest, span }
     }
 
-    /// Number of slabs after the origin's.
+    /// Number of slabs after that of the origin.
     #[inline]
     pub(crate) fn slabs(&self) -> u32 {
         let [x, y, z]: [u32; 3] = std::array::from_fn(|k| self.last[k].abs_diff(self.origin.voxel[k]));
-        // Not by index: that would go through memory.
+        // Not by index, which would access memory.
         match self.axis {
             0 => x,
             1 => y,
@@ -53,13 +53,13 @@ impl<'a> SlabRay<'a> {
         }
     }
 
-    /// The last slab to be walked, counted from the origin's.
+    /// The last slab to be traced, numbered from that of the origin.
     #[inline]
     pub(crate) fn last_slab(&self) -> u32 {
         self.slabs().min(self.span.until.saturating_sub(1))
     }
 
-    /// Number of slabs to be walked if the first `skipped`, counted from the origin's, are left out, too.
+    /// Number of slabs to be traced if the first `skipped`, numbered from that of the origin, are also omitted.
     #[inline]
     pub(crate) fn slabs_after(&self, skipped: u32) -> u32 {
         self.slabs().min(self.span.until).saturating_sub(skipped.max(self.span.from))
@@ -70,12 +70,12 @@ impl<'a> SlabRay<'a> {
         RayWalk::between(self.origin.point, self.origin.voxel, self.end, self.last)
     }
 
-    /// Visits, by the closed form, the voxels of the ray's span, in order and without the ray's last.
+    /// Visits the voxels of the ray's span by the closed form, in order and without the ray's last voxel.
     pub(crate) fn for_each_exactly(&self, visit: impl FnMut(VoxelIndex)) {
         self.for_each_from(self.origin.voxel, visit);
     }
 
-    /// The same from a voxel on that the ray visits.
+    /// Like [`Self::for_each_exactly`], starting at a voxel that the ray visits.
     fn for_each_from(&self, from: VoxelIndex, visit: impl FnMut(VoxelIndex)) {
         let mut walk = self.walk().resumed_at(from);
         if self.span == SlabSpan::WHOLE {
@@ -98,7 +98,7 @@ impl<'a> SlabRay<'a> {
         walk.for_each_of_next(steps, visit);
     }
 
-    /// All voxels of space in the origin's slab and those before this one.
+    /// Box of all voxels in the slabs from that of the origin up to, but excluding, this one.
     fn first_slabs(&self, until: u32) -> VoxelBox {
         let (mut min, mut end) = ([i32::MIN; 3], [i32::MAX; 3]);
         let at = self.origin.voxel[self.axis];
@@ -109,11 +109,11 @@ impl<'a> SlabRay<'a> {
         VoxelBox { min, end }
     }
 
-    /// Passes the voxels that [`RayWalk`] visits from the first up to, not including, the last. Voxels outside the
-    /// pages' window go to `pass_far`.
+    /// Passes the voxels that [`RayWalk`] visits from the first up to, but excluding, the last. Voxels outside the
+    /// window of the pages are passed to `pass_far`.
     ///
-    /// Slabs outside the ray's span, and the first `skipped`, counted from the origin's, may be left out. With
-    /// `may_pass_last` the last voxel may be passed, too.
+    /// Slabs outside the ray's span, and the first `skipped`, numbered from that of the origin, may be omitted. With
+    /// `may_pass_last` the last voxel may also be passed.
     #[inline]
     pub(crate) fn pass<F: Footprint>(
         &self,
@@ -133,7 +133,7 @@ impl<'a> SlabRay<'a> {
         }
     }
 
-    /// The same by the closed form, from voxel `from` on.
+    /// Like [`Self::pass`], by the closed form and starting at voxel `from`.
     #[cold]
     fn pass_exactly<F: Footprint>(
         &self,
@@ -147,14 +147,14 @@ impl<'a> SlabRay<'a> {
         });
     }
 
-    /// Passes the voxels from the first on, in order, as far as they can be told without the closed form. The error is
-    /// the first voxel that cannot.
+    /// Passes the voxels in order as far as they can be determined without the closed form. The error is the first
+    /// voxel that cannot.
     ///
-    /// The walk goes in slabs, one voxel thick, along the axis of the ray's largest component. The crossing from slab
-    /// to slab is a sum of fixed-point numbers. In a slab the ray crosses the entry voxel, the exit voxel and, if these
-    /// differ along both other axes, the one between them. This agrees with the closed form as long as no crossing is
-    /// next to a border and no two are next to each other. A few slabs where this fails, such as the first of a sensor
-    /// beside a border, are walked by the closed form.
+    /// The walk advances in slabs, one voxel thick, along the axis of the ray's largest component. The crossing from
+    /// slab to slab is a sum of fixed-point numbers. In a slab the ray crosses the entry voxel, the exit voxel and, if
+    /// these differ along both other axes, one between them. This agrees with the closed form if no crossing is close
+    /// to a border and no two are close to each other. A few slabs where this is not so, such as the first one of a
+    /// sensor close to a border, are walked by the closed form.
     ///
     /// `A` is the axis of the largest component, `B` and `C` are the others, the lower first.
     fn pass_slabs<const A: usize, const B: usize, const C: usize, F: Footprint>(
@@ -186,7 +186,7 @@ impl<'a> SlabRay<'a> {
             if done > 0 {
                 let crossing = path.after(done - 1);
                 if crossing.is_near_border() {
-                    // No voxel may be left out.
+                    // No voxel may be omitted.
                     done = 0;
                 } else {
                     (b, c) = crossing.voxel();
@@ -207,7 +207,7 @@ impl<'a> SlabRay<'a> {
                 if done == slabs || leaves_page && !stretch.leaves_sideways {
                     continue;
                 }
-                // The ray leaves the page within a slab, or it is not certain where it leaves the slab.
+                // The ray leaves the page within a slab, or its exit from the slab is uncertain.
                 let crossing = path.after(done);
                 let certain = leaves_page.then(|| Self::pass_slab::<A, B, C, F>(pages, &crossing, [a, b, c]));
                 let exit = certain.flatten().or_else(|| {
@@ -243,8 +243,8 @@ impl<'a> SlabRay<'a> {
         Ok(())
     }
 
-    /// Passes the voxels of a slab, from `[a, b, c]` on, in any page. Returns where the ray enters the next slab by
-    /// this crossing; `None`, with nothing passed, if that is not certain.
+    /// Passes the voxels of a slab, from `[a, b, c]` on, in any page. Returns the voxel through which the ray enters
+    /// the next slab; `None`, with nothing passed, if that is uncertain.
     #[inline]
     fn pass_slab<const A: usize, const B: usize, const C: usize, F: Footprint>(
         pages: &mut PageMap<F>,
@@ -264,8 +264,8 @@ impl<'a> SlabRay<'a> {
         Some(exit)
     }
 
-    /// Passes the voxels of a slab, from `[a, b, c]` on, by the closed form. Returns where the ray enters the next
-    /// slab; `None`, with nothing passed, if it ends before.
+    /// Passes the voxels of a slab, from `[a, b, c]` on, by the closed form. Returns the voxel through which the ray
+    /// enters the next slab; `None`, with nothing passed, if the ray ends before.
     #[cold]
     fn walk_slab<const A: usize, const B: usize, const C: usize, F: Footprint>(
         &self,
@@ -275,7 +275,7 @@ impl<'a> SlabRay<'a> {
         let base = pages.window().base();
         let first = voxel::<A, B, C>(a, b, c);
         let mut walk = self.walk().resumed_at(std::array::from_fn(|k| base[k] + first[k] as i32));
-        // Except for rounding, a ray crosses at most one border along `B` and one along `C` in a slab.
+        // Apart from rounding, a ray crosses at most one border along `B` and one along `C` in a slab.
         let mut voxels = [first; 5];
         for passed in 1..=voxels.len() {
             walk.advance();
@@ -291,8 +291,8 @@ impl<'a> SlabRay<'a> {
         None
     }
 
-    /// The crossings at time 0. An origin on a border between voxels belongs to the upper voxel, and a ray toward lower
-    /// indices leaves it at once, the lowest axis first. Returns the voxel after these crossings.
+    /// Handles the crossings at time 0. An origin on a border between voxels belongs to the upper voxel, and a ray
+    /// toward lower indices leaves it immediately, the lowest axis first. Returns the voxel after these crossings.
     fn leave_borders<F: Footprint>(&self, pages: &mut PageMap<F>) -> Result<Local, VoxelIndex> {
         let origin = self.origin;
         let mut voxel = pages.window().local(origin.voxel).ok_or(origin.voxel)?;
@@ -311,7 +311,7 @@ impl<'a> SlabRay<'a> {
         Ok(voxel)
     }
 
-    /// Whether, by the closed form, the border below voxel `b` along `B` is crossed before the one below voxel `c`
+    /// Returns whether, by the closed form, the lower border of voxel `b` along `B` is crossed before that of voxel `c`
     /// along `C`. At equal times the lower axis is first, and `B` is lower.
     fn crosses_first<const B: usize, const C: usize>(&self, base: VoxelIndex, b: u32, c: u32) -> bool {
         let time = |axis: usize, border: u32| {
@@ -322,7 +322,7 @@ impl<'a> SlabRay<'a> {
     }
 }
 
-/// The voxel with these indices along the axes `A`, `B` and `C`.
+/// Returns the voxel with these indices along the axes `A`, `B` and `C`.
 #[inline]
 pub(crate) fn voxel<const A: usize, const B: usize, const C: usize>(a: u32, b: u32, c: u32) -> Local {
     let mut voxel = [0; 3];
@@ -345,7 +345,7 @@ mod tests {
         point.map(|x| x.floor() as i32)
     }
 
-    /// How often each voxel was passed.
+    /// Number of passes of each voxel.
     type Passes = BTreeMap<VoxelIndex, u32>;
 
     fn add(passes: &mut Passes, brick: VoxelIndex, passes_at: impl Fn(usize) -> u32) {
@@ -375,8 +375,8 @@ mod tests {
         passed.is_err()
     }
 
-    /// Passes along the rays from one origin, and compares with the exact walk. Returns the number of rays for which
-    /// the slabs alone did not suffice.
+    /// Passes along the rays from one origin, and compares with the exact walk. Returns the number of rays that the
+    /// slabs alone could not decide.
     fn check(origin: Point, ends: &[Point]) -> usize {
         let bounds = ends.iter().fold((origin, origin), |(low, high), end| {
             (std::array::from_fn(|k| low[k].min(end[k])), std::array::from_fn(|k| high[k].max(end[k])))
@@ -426,7 +426,7 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(500))]
 
         #[test]
-        fn the_voxels_are_those_of_the_exact_walk(
+        fn voxels_equal_those_of_the_exact_walk(
             origin in prop::array::uniform3(-100.0..100.0_f64),
             ends in prop::collection::vec(prop::array::uniform3(-150.0..150.0_f64), 1..8),
         ) {
@@ -434,7 +434,7 @@ mod tests {
         }
 
         #[test]
-        fn rays_through_edges_and_corners_are_right_or_left_to_the_exact_walk(
+        fn rays_through_edges_and_corners_are_exact(
             origin in prop::array::uniform3(-40..40_i32),
             ends in prop::collection::vec(prop::array::uniform3(-60..60_i32), 1..8),
             nudge in prop::array::uniform3(prop::sample::select(vec![0.0, 1e-7, -1e-7, 5e-7, -5e-7, 1e-12, 0.25])),
@@ -446,7 +446,7 @@ mod tests {
         }
 
         #[test]
-        fn far_from_zero_and_for_long_rays_too(
+        fn long_rays_far_from_zero_are_exact(
             origin in prop::array::uniform3(-1.0e8..1.0e8_f64),
             reach in prop::array::uniform3(-1900.0..1900.0_f64),
         ) {
@@ -455,7 +455,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sensor_on_a_corner_of_voxels_leaves_few_rays_to_the_exact_walk() {
+    fn a_sensor_on_a_voxel_corner_needs_few_exact_walks() {
         let directions = (0..1000).map(|k| {
             let (azimuth, up) = (f64::from(k) * 0.618, f64::from(k % 37) * 0.05 - 0.87);
             [3.0 + 30.0 * azimuth.cos(), -4.0 + 30.0 * azimuth.sin(), 9.0 + 20.0 * up]
@@ -465,8 +465,8 @@ mod tests {
     }
 
     #[test]
-    fn a_sensor_beside_a_border_leaves_few_rays_to_the_exact_walk() {
-        // 0.9 m and 1.4 m at 0.05 m, by way of `f32`.
+    fn a_sensor_close_to_a_border_needs_few_exact_walks() {
+        // 0.9 m and 1.4 m at a resolution of 0.05 m, converted from `f32`.
         let origin = [17.999999523162842, 200.0, 27.999999523162842];
         let ends = (0..1000).map(|k| {
             let (azimuth, up) = (f64::from(k) * 0.618, f64::from(k % 37) * 0.05 - 0.87);

@@ -1,7 +1,7 @@
-//! Scans whose updates exceed the memory limit.
+//! Spilling of scans whose updates exceed the memory limit.
 //!
-//! Collectors that are full drain to [`ScanParts`], whose older half is an unnamed file. At the end the parts of each
-//! tile are merged; updates that still exceed the limit go to the caller ([`Overflow`]).
+//! Full collectors drain to [`ScanParts`], whose older part is in an unnamed file. At the end the parts of each tile
+//! are merged; updates that still exceed the limit are passed to the caller ([`Overflow`]).
 
 mod overflow;
 mod part_log;

@@ -1,21 +1,21 @@
 use crate::scratch::Scratch;
 use std::io;
 
-/// Makes the file to which a [`PartLog`] spills.
+/// Callback that creates the file to which a [`PartLog`] spills.
 pub(crate) type MakeScratch<'a> = dyn Fn() -> io::Result<Box<dyn Scratch>> + Sync + 'a;
 
-/// An append-only log of records: the tail is in memory, the rest in a file if it is too large. Each record links to
-/// the previous record of its list, so a list is given by its last record.
+/// Append-only log of records. Its tail is in memory, the rest in a file if the log is too large. Each record links to
+/// the previous record of its list, so a list is identified by its last record.
 pub(crate) struct PartLog<'a> {
     tail: Vec<u8>,
     max_tail_bytes: usize,
-    /// Where the tail begins.
+    /// Position of the first byte of the tail.
     tail_at: u64,
     make_file: &'a MakeScratch<'a>,
     file: Option<Box<dyn Scratch>>,
 }
 
-/// The link of the first record of a list.
+/// Link of the first record of a list.
 pub(crate) const NONE: u64 = u64::MAX;
 
 const HEADER_BYTES: usize = 12;
@@ -29,10 +29,10 @@ impl<'a> PartLog<'a> {
     ///
     /// # Errors
     ///
-    /// The file cannot be made or written to.
+    /// Fails if the file cannot be created or written.
     pub(crate) fn append(&mut self, before: u64, record: &[u8]) -> io::Result<u64> {
         let length = u32::try_from(record.len())
-            .map_err(|_| io::Error::other("more than 4 GiB of updates of one tile at a time"))?;
+            .map_err(|_| io::Error::other("more than 4 GiB of updates for one tile"))?;
         if !self.tail.is_empty() && self.tail.len() + HEADER_BYTES + record.len() > self.max_tail_bytes {
             self.write_tail()?;
         }
@@ -54,20 +54,20 @@ impl<'a> PartLog<'a> {
         Ok(())
     }
 
-    /// Position of the previous record of the list.
+    /// Returns the position of the previous record of the list.
     ///
     /// # Errors
     ///
-    /// A file that cannot be read.
+    /// Fails if the file cannot be read.
     pub(crate) fn before(&mut self, at: u64) -> io::Result<u64> {
         Ok(self.header(at)?.0)
     }
 
-    /// The record at a position.
+    /// Returns the record at a position.
     ///
     /// # Errors
     ///
-    /// A file that cannot be read.
+    /// Fails if the file cannot be read.
     pub(crate) fn record(&mut self, at: u64) -> io::Result<&[u8]> {
         let (_, length) = self.header(at)?;
         self.bytes(at + HEADER_BYTES as u64, length)
@@ -98,7 +98,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn every_list_comes_back_in_order_wherever_it_lies(
+        fn lists_are_read_in_order_from_memory_and_file(
             records in prop::collection::vec((0..4_usize, prop::collection::vec(any::<u8>(), 0..40)), 0..60),
             max_tail_bytes in 0..300_usize,
         ) {

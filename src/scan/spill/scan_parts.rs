@@ -12,11 +12,10 @@ use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-/// The updates of one scan in parts, packed, by tile: any number of them in little memory. Threads add parts
-/// concurrently.
+/// Packed updates of one scan in any number of parts, by tile, with little memory. Threads add parts concurrently.
 ///
-/// Per scan, a voxel may be in several parts, which are merged at the end. Per ray, the parts of a tile follow each
-/// other.
+/// With insertion per scan, a voxel may be in several parts, which are merged at the end. With insertion per ray, the
+/// parts of a tile are concatenated.
 pub(crate) struct ScanParts<'a> {
     mapped: MappedTiles<'a>,
     parts: Mutex<Parts<'a>>,
@@ -27,7 +26,7 @@ pub(crate) struct ScanParts<'a> {
 
 struct Parts<'a> {
     log: PartLog<'a>,
-    /// The record being made: number of updates, then the packed updates.
+    /// The record under construction: number of updates, then the packed updates.
     record: Vec<u8>,
     lists: TileTable<PartList>,
     max_tiles: usize,
@@ -40,7 +39,7 @@ enum Failure {
     TooManyTiles,
 }
 
-/// The parts of a tile.
+/// List of the parts of a tile.
 #[derive(Clone, Copy)]
 struct PartList {
     /// Position of the last part in the log.
@@ -70,11 +69,12 @@ impl TileValue for PartList {
     }
 }
 
-/// Bricks that are converted to updates at a time, if each lies in one tile.
+/// Number of bricks that are converted to updates at a time, if each is in one tile.
 const BRICKS_AT_A_TIME: usize = 4096;
 
 impl<'a> ScanParts<'a> {
-    /// Parts of more than `max_bytes` go to a file that is made then. Once `stop` is set, parts are dropped.
+    /// Creates a collection that spills parts beyond `max_bytes` to a file, which is created on demand. Once `stop` is
+    /// raised, parts are dropped.
     pub(crate) fn new(
         mapped: MappedTiles<'a>,
         stop: &'a Stop,
@@ -93,17 +93,16 @@ impl<'a> ScanParts<'a> {
         }
     }
 
-    /// No parts: adding one fails, and collecting ends.
+    /// Creates a collection that accepts no parts: adding one fails, and collecting ends.
     pub(crate) fn refused(mapped: MappedTiles<'a>, stop: &'a Stop) -> Self {
         Self::new(mapped, stop, 0, 0, &|| Err(io::ErrorKind::Unsupported.into()))
     }
 
-    /// Whether no part was added.
     pub(crate) fn is_empty(&self) -> bool {
         self.is_empty.load(Ordering::Relaxed)
     }
 
-    /// Whether adding failed; further parts are dropped.
+    /// Returns whether adding failed; further parts are dropped.
     #[inline]
     pub(crate) fn has_failed(&self) -> bool {
         self.has_failed.load(Ordering::Relaxed)
@@ -125,7 +124,7 @@ impl<'a> ScanParts<'a> {
         }
     }
 
-    /// Adds updates of tiles, the mapped ones of these, with their numbers of hits and misses.
+    /// Adds updates of tiles, restricted to mapped tiles, with their numbers of hits and misses.
     pub(crate) fn add(&self, tiles: impl Iterator<Item = (TileIndex, TileUpdates, (u64, u64))>) {
         if self.has_failed() {
             return;
@@ -141,11 +140,11 @@ impl<'a> ScanParts<'a> {
         }
     }
 
-    /// The merged updates. `report` is about the points; updates that exceed the memory limit are spilled.
+    /// Returns the merged updates. `report` covers the points; updates that exceed the memory limit are spilled.
     ///
     /// # Errors
     ///
-    /// Errors of the spill and of the log's file; [`Error::Stopped`](crate::error::Error::Stopped).
+    /// Returns errors from the spill and from the log's file, and [`Error::Stopped`](crate::error::Error::Stopped).
     pub(crate) fn into_updates(
         self,
         mut report: ScanReport,
@@ -243,17 +242,17 @@ impl Parts<'_> {
     }
 }
 
-/// Updates of tiles that are complete, in memory.
+/// Complete updates of tiles, in memory.
 struct OutputBuffer {
     tiles: Vec<(TileIndex, PackedUpdates)>,
     bytes: usize,
 }
 
-/// Bytes of a tile beside its updates.
+/// Bytes of a tile in addition to its updates.
 const SLOT_BYTES: usize = 2 * size_of::<(TileIndex, PackedUpdates)>();
 
 impl OutputBuffer {
-    /// Appends the next updates of a tile. Above the limit, all are spilled.
+    /// Appends the next updates of a tile. If the limit is exceeded, all are spilled.
     fn push(
         &mut self,
         tile: TileIndex,

@@ -1,8 +1,8 @@
-//! Tracing a scan: the range rule for each point, the rays on all threads, and the updates at the end.
+//! Tracing of scans: the range rule for each point, the rays on all threads, and the updates at the end.
 
+mod concurrent_scans;
 mod scan_rays;
 mod scan_tracer;
-mod scans_beside;
 mod trace_limit;
 
 pub use scan_tracer::ScanTracer;

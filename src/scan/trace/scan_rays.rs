@@ -19,13 +19,13 @@ use crate::space::{Grid, Point};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Fewest rays per thread: fewer do not pay for a thread's own pages.
+/// Minimum number of rays per thread: fewer do not justify a thread with its own pages.
 const MIN_RAYS_PER_THREAD: usize = 4096;
 
-/// Rays that a collector takes at first under a memory limit, before their size is known.
+/// Number of rays that a collector first receives under a memory limit, before their size is known.
 const FIRST_RAYS: usize = 1024;
 
-/// The rays of a scan, from one origin.
+/// Rays of a scan, from one origin.
 pub(crate) struct ScanRays<'a> {
     mapped: MappedTiles<'a>,
     model: &'a SensorModel,
@@ -33,20 +33,20 @@ pub(crate) struct ScanRays<'a> {
     points: &'a dyn ScanPoints,
     origin_m: Point,
     origin: RayOrigin,
-    /// What is left of a ray in the mapped tiles; `None` if that is all of space.
+    /// Clips rays to the mapped tiles; `None` if the whole space is mapped.
     cut: Option<RayCut<'a>>,
     window: Window,
     range: RangeRule,
-    /// Most threads that take part.
-    most_threads: usize,
+    /// Maximum number of threads.
+    max_threads: usize,
     stop: &'a Stop,
 }
 
-/// The outcome of an insertion per scan under a memory limit.
+/// Result of an insertion per scan under a memory limit.
 pub(crate) enum PerScanUpdates {
-    /// All updates fit into memory.
+    /// All updates fitted in memory.
     Whole(ScanUpdates),
-    /// They did not fit: all went to the parts. The report is about the points.
+    /// They did not fit and were all added to the parts. The report covers the points.
     InParts(ScanReport),
 }
 
@@ -54,7 +54,7 @@ impl<'a> ScanRays<'a> {
     pub(crate) fn new(
         rules: TraceRules<'a>,
         points: &'a dyn ScanPoints,
-        most_threads: usize,
+        max_threads: usize,
         stop: &'a Stop,
     ) -> Result<Self> {
         let TraceRules { mapped, model, rays, .. } = rules;
@@ -67,13 +67,13 @@ impl<'a> ScanRays<'a> {
         let range = RangeRule::new(rays, origin_m);
         let window = Window::default();
         let mut scan_rays =
-            Self { mapped, model, rays, points, origin_m, origin, cut, window, range, most_threads, stop };
+            Self { mapped, model, rays, points, origin_m, origin, cut, window, range, max_threads, stop };
         scan_rays.window = Window::around(voxel, scan_rays.bounds()?);
         Ok(scan_rays)
     }
 
-    /// Insertion per scan: one update per voxel, a hit over any miss. The result does not depend on the order of the
-    /// rays, so each thread walks some of them.
+    /// Insertion per scan: one update per voxel, a hit overrides any miss. The result does not depend on the order of
+    /// the rays, so they are divided among threads.
     pub(crate) fn per_scan(&self, collectors: &mut Vec<PerScanCollector>) -> Result<ScanUpdates> {
         let (collectors, report) =
             self.collect_per_scan(collectors, self.threads(), &CollectorLimit::NONE, None)?;
@@ -81,7 +81,7 @@ impl<'a> ScanRays<'a> {
         Ok(self.merge(collectors, report))
     }
 
-    /// The same under a memory limit: the updates if they fit, otherwise all of them go to `parts`.
+    /// Like [`Self::per_scan`], under a memory limit: updates that do not fit are all added to `parts`.
     pub(crate) fn per_scan_in_parts(
         &self,
         collectors: &mut Vec<PerScanCollector>,
@@ -119,7 +119,7 @@ impl<'a> ScanRays<'a> {
             let mut batch = Vec::with_capacity(BATCH);
             let (mut seen, mut extend_at) = (0, 0);
             self.points.for_each_chunk(range, &mut |points, intensities| {
-                // Each chunk adds less to the prefixes, and extending them takes as long each time.
+                // Each chunk adds less to the prefixes, but extending them takes equally long each time.
                 let extends = seen >= extend_at;
                 if extends {
                     extend_at = 2 * (seen + points.len());
@@ -134,7 +134,7 @@ impl<'a> ScanRays<'a> {
                         if batch.len() == BATCH {
                             collector.take(&self.origin, &batch, needs_intensity, parts);
                             batch.clear();
-                            if !self.goes_on(parts) {
+                            if !self.continues(parts) {
                                 return false;
                             }
                         }
@@ -142,7 +142,7 @@ impl<'a> ScanRays<'a> {
                     collector.take(&self.origin, &batch, needs_intensity, parts);
                     batch.clear();
                 }
-                self.goes_on(parts)
+                self.continues(parts)
             })?;
             Ok(report)
         })
@@ -160,8 +160,8 @@ impl<'a> ScanRays<'a> {
         Ok(updates_in_order(self.mapped, collectors, report))
     }
 
-    /// The same under a memory limit: as many rays at a time as fit. A part is added after the parts of all earlier
-    /// rays.
+    /// Like [`Self::per_ray`], under a memory limit: as many rays at a time as fit. A part is added after the parts of
+    /// all earlier rays.
     pub(crate) fn per_ray_in_parts(
         &self,
         collectors: &mut Vec<PerRayCollector>,
@@ -169,11 +169,11 @@ impl<'a> ScanRays<'a> {
         parts: &ScanParts<'_>,
     ) -> Result<ScanReport> {
         let all = self.points.len();
-        let threads = limit.collectors(self.most_threads);
+        let threads = limit.collectors(self.max_threads);
         let each = limit.of_collector(threads);
         let mut report = ScanReport::default();
         let (mut next, mut at_a_time) = (0, FIRST_RAYS);
-        while next < all && self.goes_on(Some(parts)) {
+        while next < all && self.continues(Some(parts)) {
             let some = next..all.min(next + threads * at_a_time.min(MAX_RAYS));
             let threads = threads.min(some.len().div_ceil(FIRST_RAYS));
             let reports = self.collect_each(collectors, some.clone(), threads, |collector, range| {
@@ -182,7 +182,7 @@ impl<'a> ScanRays<'a> {
                 self.take_rays(collector, range, PerRayCollector::is_full_for, &mut report)?;
                 Ok(report)
             })?;
-            // Rays behind a collector that was full are taken again.
+            // Rays after a collector that was full are traced again.
             let mut used = 0;
             for (part, of_part) in reports.into_iter().enumerate() {
                 let wanted = part_of(&some, part, threads);
@@ -202,7 +202,7 @@ impl<'a> ScanRays<'a> {
         Ok(report)
     }
 
-    /// Takes the rays to the points of a range until the collector is full.
+    /// Adds the rays to the points of a range until the collector is full.
     fn take_rays(
         &self,
         collector: &mut PerRayCollector,
@@ -236,7 +236,7 @@ impl<'a> ScanRays<'a> {
         Ok(collector.into_updates(report))
     }
 
-    /// The same under a memory limit.
+    /// Like [`Self::per_ray_in_order`], under a memory limit.
     pub(crate) fn per_ray_in_order_in_parts(
         &self,
         limit: &TraceLimit,
@@ -277,12 +277,12 @@ impl<'a> ScanRays<'a> {
         Ok(report)
     }
 
-    /// Into how many parts the points are divided, each with its own collector.
+    /// Number of parts into which the points are divided, each with its own collector.
     fn threads(&self) -> usize {
-        self.most_threads.min(self.points.len() / MIN_RAYS_PER_THREAD).max(1)
+        self.max_threads.min(self.points.len() / MIN_RAYS_PER_THREAD).max(1)
     }
 
-    fn goes_on(&self, parts: Option<&ScanParts<'_>>) -> bool {
+    fn continues(&self, parts: Option<&ScanParts<'_>>) -> bool {
         !self.stop.is_set() && !parts.is_some_and(ScanParts::has_failed)
     }
 
@@ -313,7 +313,7 @@ impl<'a> ScanRays<'a> {
         collectors.map(|(part, collector)| collect(collector, part_of(&points, part, parts))).collect()
     }
 
-    /// Bounds of the points, cut at the max range, in units of voxels, without the points that are not finite.
+    /// Bounds of the finite points, clipped at the max range, in units of voxels.
     fn bounds(&self) -> Result<(Point, Point)> {
         let (mut low, mut high) = (self.origin_m, self.origin_m);
         let mut has_no_return = false;
@@ -353,7 +353,7 @@ impl<'a> ScanRays<'a> {
         Ok((grid.to_voxel_units(low), grid.to_voxel_units(high)))
     }
 
-    /// Where the ray to a point ends; `None` if the point is skipped, or its ray is nowhere in the mapped tiles.
+    /// Returns the end of the ray to a point; `None` if the point is skipped or its ray crosses no mapped tile.
     #[inline]
     fn ray(&self, point: Point, intensity: f32, report: &mut ScanReport) -> Option<RayEnd> {
         if self.stop.is_set() {
@@ -390,10 +390,11 @@ impl<'a> ScanRays<'a> {
     }
 }
 
-/// Bounds of points that are all finite; `None` if one is not. Two points at a time, in vectors of any width.
+/// Returns the bounds of points that are all finite; `None` if one is not. Processes two points at a time, for vector
+/// instructions.
 fn bounds_of_finite(points: &[Point]) -> Option<(Point, Point)> {
     let (mut low, mut high) = ([[f64::INFINITY; 3]; 2], [[f64::NEG_INFINITY; 3]; 2]);
-    // Zero as long as all are finite, then NaN.
+    // Zero while all are finite, then NaN.
     let mut all = [[0.0; 3]; 2];
     let (pairs, rest) = points.as_chunks::<2>();
     let last = rest.first().map(|&point| [point; 2]);
@@ -408,7 +409,7 @@ fn bounds_of_finite(points: &[Point]) -> Option<(Point, Point)> {
     is_finite.then(|| (smaller(low[0], low[1]), larger(high[0], high[1])))
 }
 
-// Without the library's care for NaN, each is one instruction.
+// Without the library's handling of NaN, each is one instruction.
 #[inline]
 fn smaller(a: Point, b: Point) -> Point {
     std::array::from_fn(|axis| if b[axis] < a[axis] { b[axis] } else { a[axis] })
@@ -419,7 +420,7 @@ fn larger(a: Point, b: Point) -> Point {
     std::array::from_fn(|axis| if b[axis] > a[axis] { b[axis] } else { a[axis] })
 }
 
-/// The points of part `part` of `parts` equal parts of a range.
+/// Returns part `part` of `parts` equal parts of a range.
 fn part_of(points: &Range<usize>, part: usize, parts: usize) -> Range<usize> {
     let at = |part| points.start + points.len() * part / parts;
     at(part)..at(part + 1)
@@ -437,7 +438,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn bounds_are_those_of_all_points_if_all_are_finite(
+        fn bounds_of_finite_points_are_exact(
             points in prop::collection::vec(prop::array::uniform3(-1e9..1e9_f64), 0..9),
             wrong in prop::option::of((0..9_usize, 0..3_usize, prop::sample::select(vec![
                 f64::NAN, f64::INFINITY, f64::NEG_INFINITY,

@@ -13,7 +13,7 @@ use crate::sensor::SensorModel;
 use crate::space::{Grid, Point, TileSelection, VoxelIndex};
 use std::borrow::Cow;
 
-/// Computes the updates of scans. It keeps its memory from scan to scan.
+/// Computes the updates of scans. It reuses its memory between scans.
 #[derive(Clone, Debug, Default)]
 pub struct ScanTracer {
     /// One per thread.
@@ -24,22 +24,22 @@ pub struct ScanTracer {
     pub(super) stop: Stop,
 }
 
-/// How the scans of a map are traced.
+/// Settings for tracing the scans of a map.
 #[derive(Clone, Copy)]
 pub(crate) struct TraceRules<'a> {
-    /// The tiles whose updates are wanted.
+    /// Tiles for which updates are computed.
     pub(crate) mapped: MappedTiles<'a>,
     pub(crate) model: &'a SensorModel,
     pub(crate) rays: &'a RayConfig,
     pub(crate) order: UpdateOrder,
 }
 
-/// The order of a tile's updates in insertion per ray.
+/// Order of a tile's updates in insertion per ray.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum UpdateOrder {
     /// The updates of each voxel are in order.
     OfVoxels,
-    /// All updates are in the order of the rays, one by one.
+    /// All updates are in the order of the rays.
     OfRays,
 }
 
@@ -49,7 +49,7 @@ impl ScanTracer {
     ///
     /// # Errors
     ///
-    /// As for [`ScanTracer::trace`].
+    /// Same errors as [`ScanTracer::trace`].
     pub fn check(grid: &Grid, model: &SensorModel, scan: &dyn ScanPoints) -> Result<()> {
         if model.needs_intensity() && !scan.has_intensities() {
             return Err(no_intensities());
@@ -57,13 +57,14 @@ impl ScanTracer {
         origin_voxel(grid, scan.origin()).map(drop)
     }
 
-    /// Walks the rays of a scan; returns the updates, grouped by tile.
+    /// Traces the rays of a scan and returns the updates, grouped by tile.
     ///
-    /// Points that are not usable are skipped and reported.
+    /// Unusable points are skipped and reported.
     ///
     /// # Errors
     ///
-    /// An origin without a voxel, intensities that do not match the points, or none where the sensor model needs them.
+    /// Fails if the origin is outside of the map's space, or if the intensities do not match the points or are missing
+    /// although the sensor model needs them.
     pub fn trace(
         &mut self,
         grid: &Grid,
@@ -75,12 +76,12 @@ impl ScanTracer {
         self.trace_points(TraceRules { mapped, model, rays, order: UpdateOrder::OfVoxels }, scan, None)
     }
 
-    /// The same, but in insertion per ray a tile's updates are in the order of the rays, one by one: for octrees whose
-    /// cache depends on the order of different voxels.
+    /// Like [`ScanTracer::trace`], but in insertion per ray the updates of a tile are in the order of the rays. Octrees
+    /// with a cache need this, because it depends on the order of different voxels.
     ///
     /// # Errors
     ///
-    /// As for [`ScanTracer::trace`].
+    /// Same errors as [`ScanTracer::trace`].
     pub fn trace_in_order(
         &mut self,
         grid: &Grid,
@@ -92,13 +93,13 @@ impl ScanTracer {
         self.trace_points(TraceRules { mapped, model, rays, order: UpdateOrder::OfRays }, scan, None)
     }
 
-    /// The same for any source of points and for the mapped tiles alone: their updates are those of the whole scan.
-    /// With `overflow`, updates that exceed the memory limit are spilled and the rest is returned. The report covers
-    /// both.
+    /// Like [`ScanTracer::trace`], for any source of points and only for the mapped tiles, whose updates are those of
+    /// the whole scan. With `overflow`, updates that exceed the memory limit are spilled and the rest is returned. The
+    /// report covers both.
     ///
     /// # Errors
     ///
-    /// As for [`ScanTracer::trace`], points that cannot be read, and errors of the spill.
+    /// Same errors as [`ScanTracer::trace`]; also fails if points cannot be read or updates cannot be spilled.
     pub(crate) fn trace_points(
         &mut self,
         rules: TraceRules<'_>,
@@ -136,22 +137,21 @@ impl ScanTracer {
         parts.into_updates(report, is_per_scan, &self.stop, &mut overflow)
     }
 
-    /// A tracer that takes at most `bytes` of memory when it is given an [`Overflow`].
+    /// Creates a tracer that uses at most `bytes` of memory if it is given an [`Overflow`].
     pub(crate) fn with_memory_bytes(bytes: usize) -> Self {
         Self { limit: TraceLimit::new(bytes), ..Self::default() }
     }
 
-    /// Sets the stop request. Once it is set, the remaining rays are left out and the updates are incomplete.
+    /// Sets the stop request. Once it is raised, the remaining rays are skipped and the updates are incomplete.
     pub(crate) fn stop_with(&mut self, stop: Stop) {
         self.stop = stop;
     }
 
-    /// The stop request.
     pub(crate) fn stop(&self) -> &Stop {
         &self.stop
     }
 
-    /// Bytes of memory that are kept.
+    /// Bytes of memory that are kept between scans.
     pub fn bytes(&self) -> usize {
         let per_scan =
             self.per_scan.iter().map(|collector| size_of::<PerScanCollector>() + collector.bytes());
@@ -161,7 +161,7 @@ impl ScanTracer {
 }
 
 impl<'a> TraceRules<'a> {
-    /// The wanted tiles that are in the region of the rays, or all.
+    /// The mapped tiles that are in the region of the rays; `None` for the whole space.
     pub(super) fn selection(&self) -> Option<Cow<'a, TileSelection>> {
         match (self.mapped.selection, self.rays.region) {
             (Some(tiles), Some(region)) => Some(Cow::Owned(tiles.within(region))),
@@ -170,7 +170,7 @@ impl<'a> TraceRules<'a> {
         }
     }
 
-    /// The same rules for the tiles of a selection.
+    /// The same rules for other selected tiles.
     pub(super) fn with_selection<'b>(self, selection: Option<&'b TileSelection>) -> TraceRules<'b>
     where
         'a: 'b,
@@ -178,7 +178,7 @@ impl<'a> TraceRules<'a> {
         TraceRules { mapped: MappedTiles { grid: self.mapped.grid, selection }, ..self }
     }
 
-    /// Whether all updates of a tile are to be in the order of the rays, one by one.
+    /// Returns whether all updates of a tile must be in the order of the rays.
     pub(super) fn are_rays_in_order(&self) -> bool {
         self.rays.insert_mode != InsertMode::PerScan && self.order == UpdateOrder::OfRays
     }
@@ -202,16 +202,17 @@ pub(crate) fn check_count(points: usize, intensities: &[f32]) -> Result<()> {
     if intensities.len() == points {
         return Ok(());
     }
-    let reason = format!("{} for {points} points; give one a point", intensities.len());
+    let reason = format!("{} for {points} points; one per point is needed", intensities.len());
     Err(Error::argument("intensities", reason))
 }
 
 fn no_intensities() -> Error {
-    let reason = "the sensor model iwlo needs an intensity a point; use log-odds for data without";
+    let reason =
+        "the sensor model iwlo needs an intensity per point; use log-odds for data without intensities";
     Error::argument("intensities", reason)
 }
 
-/// The voxel of the sensor.
+/// Returns the voxel that contains the sensor.
 pub(crate) fn origin_voxel(grid: &Grid, origin: Point) -> Result<VoxelIndex> {
     grid.voxel_of(origin).ok_or_else(|| {
         let reason = format!("{origin:?} m is not finite or too far away for a voxel index");

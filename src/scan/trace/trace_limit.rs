@@ -2,26 +2,26 @@ use crate::scan::per_scan::PerScanCollector;
 use crate::scan::updates::mean_tiles_of_brick;
 use crate::space::Grid;
 
-/// The memory limit for tracing a scan.
+/// Memory limit for tracing a scan.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TraceLimit {
     bytes: usize,
 }
 
-/// The share of one collector.
+/// Share of one collector.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct CollectorLimit {
-    /// How many pages may be fast, which makes them large.
+    /// Maximum number of fast pages, which are large.
     pub(crate) fast_pages: usize,
-    /// Most bytes of all other marks. Converting these to updates takes about as much again.
+    /// Maximum bytes of all other marks. Converting them to updates takes about as much again.
     pub(crate) small_bytes: usize,
 }
 
-/// A fast page: a bit a voxel, and at most as much again for hits and the numbers of their bricks.
+/// Size of a fast page: one bit per voxel, and at most as much again for hits and the numbers of their bricks.
 const FAST_PAGE_BYTES: usize = 66 << 10;
-/// Bytes of a brick while its marks are converted to updates, three times in lists.
+/// Bytes of a brick while its marks are converted to updates, which are in three lists.
 const UPDATE_BYTES: usize = 450;
-/// With less, a collector would be drained all the time.
+/// With less memory, a collector would be drained constantly.
 const MIN_COLLECTOR_BYTES: usize = 4 << 20;
 
 impl Default for TraceLimit {
@@ -35,31 +35,31 @@ impl TraceLimit {
         Self { bytes }
     }
 
-    /// Whether there is no limit.
+    /// Returns whether there is no limit.
     pub(crate) fn is_none(&self) -> bool {
         self.bytes == usize::MAX
     }
 
-    /// The limit of each of so many tracers.
+    /// The limit of each of `tracers` tracers.
     pub(crate) fn divided(self, tracers: usize) -> Self {
         if self.is_none() { self } else { Self::new(self.bytes / tracers.max(1)) }
     }
 
-    /// How many of the wanted collectors fit.
+    /// Number of collectors that fit, at most `wanted`.
     pub(crate) fn collectors(&self, wanted: usize) -> usize {
         wanted.min(self.bytes / MIN_COLLECTOR_BYTES).max(1)
     }
 
-    /// Whether the updates of these collectors fit, by tile of `grid`.
+    /// Returns whether the updates of these collectors fit in memory, by tile of `grid`.
     pub(crate) fn has_room_for(&self, collectors: &[PerScanCollector], grid: &Grid) -> bool {
         let max_bricks = self.bytes / 2 / UPDATE_BYTES / mean_tiles_of_brick(grid);
         let marks_bytes: usize = collectors.iter().map(PerScanCollector::marks_bytes).sum();
-        // A page has at most 512 bricks; they are counted only if that might be too many.
+        // A page has at most 512 bricks; they are counted only if that could be too many.
         marks_bytes / FAST_PAGE_BYTES * 2 * 512 < max_bricks
             || collectors.iter().map(PerScanCollector::count_bricks).sum::<usize>() < max_bricks
     }
 
-    /// The limit of each of so many collectors.
+    /// The limit of each of `collectors` collectors.
     pub(crate) fn of_collector(&self, collectors: usize) -> CollectorLimit {
         let bytes = self.bytes / collectors.max(1);
         CollectorLimit { fast_pages: bytes / 2 / FAST_PAGE_BYTES, small_bytes: bytes / 4 }
@@ -67,11 +67,10 @@ impl TraceLimit {
 }
 
 impl CollectorLimit {
-    /// No limit.
     pub(crate) const NONE: Self = Self { fast_pages: usize::MAX, small_bytes: usize::MAX };
 }
 
-/// A budget of bytes, spent by upper bounds, so that the memory itself is seldom measured.
+/// Budget of bytes that is charged with upper bounds, so that memory is rarely measured.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Allowance {
     bytes: usize,
@@ -83,7 +82,7 @@ impl Allowance {
         self.bytes = bytes;
     }
 
-    /// Spends bytes; returns whether they exceed the budget, so that the memory must be measured.
+    /// Charges bytes; returns whether they exceed the budget, so that memory must be measured.
     #[inline]
     pub(crate) fn is_spent_by(&mut self, bytes: usize) -> bool {
         let is_spent = self.bytes < bytes;

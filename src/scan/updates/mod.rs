@@ -1,4 +1,4 @@
-//! The updates of a scan or batch: grouped by tile, in brick masks, runs or lists, and packed while they are stored.
+//! Updates of a scan or batch, grouped by tile: brick masks, runs or lists, and a packed form for storage.
 
 mod mapped_tiles;
 mod packed_updates;

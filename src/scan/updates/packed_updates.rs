@@ -3,9 +3,9 @@ use super::tile_updates::{BrickUpdate, OrderedUpdates, TileUpdates};
 use crate::space::{BrickCode, BrickMask};
 use std::io::{self, BufRead};
 
-/// Updates of one tile from any number of scans, in order and packed: a fourth to a tenth of the unpacked size.
+/// Packed updates of one tile from any number of scans, in order. They take a fourth to a tenth of the unpacked size.
 ///
-/// Numbers take seven bits per byte; of masks only the bytes that are not 0 are stored.
+/// Numbers are encoded with seven bits per byte; of masks only the nonzero bytes are stored.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PackedUpdates {
     bytes: Vec<u8>,
@@ -59,14 +59,14 @@ impl PackedUpdates {
         }
     }
 
-    /// The packed updates of one scan.
+    /// Packs the updates of one scan.
     pub(crate) fn of(updates: &TileUpdates) -> Self {
         let mut packed = Self::default();
         packed.push(updates);
         packed
     }
 
-    /// The inverse of [`PackedUpdates::as_bytes`]; `updates` is their number. Takes no other bytes.
+    /// Inverse of [`PackedUpdates::as_bytes`]; `updates` is their number. The bytes must come from there.
     pub(crate) fn from_parts(bytes: Vec<u8>, updates: usize) -> Self {
         Self { bytes, updates }
     }
@@ -77,7 +77,7 @@ impl PackedUpdates {
         self.updates += others.updates;
     }
 
-    /// Takes away the first so many bytes, which hold so many updates: they are the earlier part of what was appended.
+    /// Removes the first `bytes` bytes, which must contain exactly the first `updates` updates.
     pub fn drop_first(&mut self, bytes: usize, updates: usize) {
         self.bytes.drain(..bytes.min(self.bytes.len()));
         self.updates = self.updates.saturating_sub(updates);
@@ -88,7 +88,7 @@ impl PackedUpdates {
         self.bytes.shrink_to_fit();
     }
 
-    /// The updates as bytes. Appending leaves earlier bytes unchanged.
+    /// The updates as bytes. Appending does not change earlier bytes.
     pub fn as_bytes(&self) -> &[u8] {
         &self.bytes
     }
@@ -106,7 +106,7 @@ impl PackedUpdates {
     ///
     /// # Errors
     ///
-    /// An `input` that cannot be read, ends too soon, or was not written by [`PackedUpdates`].
+    /// Fails if `input` cannot be read, is truncated, or was not written by [`PackedUpdates`].
     pub fn unpack(input: impl BufRead, mut take: impl FnMut(TileUpdates)) -> io::Result<()> {
         let mut input = Unpacker { input };
         while let Some(updates) = input.next()? {
@@ -120,7 +120,7 @@ impl PackedUpdates {
         self.updates
     }
 
-    /// Whether nothing was appended.
+    /// Returns whether nothing was appended.
     pub fn is_empty(&self) -> bool {
         self.bytes.is_empty()
     }
@@ -140,7 +140,7 @@ impl Packer<'_> {
         self.bytes.push(byte);
     }
 
-    /// Seven bits per byte, the lowest first; the eighth bit is set if more bytes follow.
+    /// Writes seven bits per byte, the lowest first; the eighth bit is set if more bytes follow.
     fn number(&mut self, mut number: u64) {
         while number >= 0x80 {
             self.byte(number as u8 | 0x80);
@@ -153,13 +153,13 @@ impl Packer<'_> {
         self.bytes.extend(number.to_le_bytes());
     }
 
-    /// A brick's code, as the difference from the previous one: bricks are in order.
+    /// Writes a brick's code as the difference from the previous one, because bricks are in order.
     fn brick(&mut self, BrickCode(code): BrickCode, last: &mut u64) {
         self.number(code.wrapping_sub(*last));
         *last = code;
     }
 
-    /// Which words are not 0; for each of these, which bytes are not 0, and these bytes.
+    /// Writes the set of nonzero words; for each of these, the set of nonzero bytes, and these bytes.
     fn mask(&mut self, mask: &BrickMask) {
         self.byte(set_of(mask.map(|word| word != 0)));
         for word in mask.iter().filter(|word| **word != 0) {
@@ -178,21 +178,21 @@ impl Packer<'_> {
     }
 }
 
-/// Bit `k` for the `k`-th of eight.
+/// Returns a byte in which bit `k` is the `k`-th flag.
 fn set_of(are_in: [bool; 8]) -> u8 {
     (0..8).fold(0, |set, k| set | u8::from(are_in[k]) << k)
 }
 
-/// Reads what [`Packer`] wrote.
+/// Reader for the output of [`Packer`].
 struct Unpacker<R> {
     input: R,
 }
 
-/// Most items that are reserved at once for a count in the input.
+/// Maximum number of items that are reserved at once for a count in the input.
 const MAX_RESERVED: usize = 1 << 12;
 
 impl<R: BufRead> Unpacker<R> {
-    /// The updates of one scan; `None` at the end.
+    /// Reads the updates of one scan; `None` at the end.
     fn next(&mut self) -> io::Result<Option<TileUpdates>> {
         if self.input.fill_buf()?.is_empty() {
             return Ok(None);
@@ -206,7 +206,7 @@ impl<R: BufRead> Unpacker<R> {
                 TileUpdates::Ordered(OrderedUpdates::from_parts(voxels, intensities))
             }
             other => {
-                let reason = format!("{other} is no kind of updates");
+                let reason = format!("unknown kind of updates: {other}");
                 return Err(io::Error::new(io::ErrorKind::InvalidData, reason));
             }
         }))
@@ -228,7 +228,7 @@ impl<R: BufRead> Unpacker<R> {
         Ok(BrickUpdate { brick, hits, misses, intensities: self.many(Self::float)?.into() })
     }
 
-    /// All as runs: what came after the last of a voxel is one, too.
+    /// Reads all as runs, including the misses after the last run of a voxel.
     fn tile_runs(&mut self) -> io::Result<TileRuns> {
         let mut all = TileRuns::default();
         let (mut last, mut runs) = (0_u64, Vec::new());
@@ -266,14 +266,14 @@ impl<R: BufRead> Unpacker<R> {
         Ok(u64::from_le_bytes(bytes))
     }
 
-    /// A list behind its length. It grows as items are read, so a wrong length reserves no memory.
+    /// Reads a list after its length. It grows as items are read, so a wrong length reserves no memory.
     fn many<T>(&mut self, one: impl FnMut(&mut Self) -> io::Result<T>) -> io::Result<Vec<T>> {
         let mut all = Vec::new();
         self.many_to(&mut all, one)?;
         Ok(all)
     }
 
-    /// [`Unpacker::many`], appended to `all`.
+    /// Like [`Unpacker::many`], but appends to `all`.
     fn many_to<T>(
         &mut self,
         all: &mut Vec<T>,
@@ -364,7 +364,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_was_packed_comes_back_in_order(
+        fn packed_updates_round_trip_in_order(
             all in prop::collection::vec(prop_oneof![masks(), runs(), ordered()], 0..8),
         ) {
             let mut packed = PackedUpdates::default();
@@ -376,7 +376,7 @@ mod tests {
     }
 
     #[test]
-    fn misses_after_the_runs_come_back_as_runs() {
+    fn misses_after_the_runs_are_unpacked_as_runs() {
         let (run, passed) = (Run { place: 4, misses: 2, hit: Some(1.0) }, Misses { place: 4, misses: 300 });
         let mut runs = TileRuns::default();
         runs.push(BrickRuns { brick: BrickCode(7), runs: &[run], misses: &[passed] });

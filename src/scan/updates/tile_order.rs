@@ -4,8 +4,8 @@ use crate::scan::ScanReport;
 use crate::space::{BRICK_EDGE, BrickCode, BrickMask, Grid, TileIndex, VoxelIndex, VoxelKey, mask_of_box};
 use rustc_hash::FxHashMap;
 
-/// For each mapped tile the numbers of the bricks that overlap it, in Morton order. `indices` are the bricks': their
-/// voxels' indices divided by 8.
+/// Returns, for each mapped tile, the numbers of the bricks that overlap it, in Morton order. `indices` are the indices
+/// of the bricks: the indices of their voxels divided by 8.
 pub(crate) fn bricks_by_tile(mapped: MappedTiles<'_>, indices: &[VoxelIndex]) -> Vec<(TileIndex, Vec<u32>)> {
     let mut tiles: FxHashMap<TileIndex, Vec<(BrickCode, u32)>> = FxHashMap::default();
     for (number, &index) in indices.iter().enumerate() {
@@ -21,31 +21,31 @@ pub(crate) fn bricks_by_tile(mapped: MappedTiles<'_>, indices: &[VoxelIndex]) ->
     tiles.into_iter().map(in_order).collect()
 }
 
-/// Into how many parts the tiles divide a brick, on average over the bricks of a map, rounded: 1 for tiles that are much
-/// larger than bricks.
+/// Returns the number of parts into which tiles divide a brick, averaged over the bricks of a map and rounded: 1 for
+/// tiles that are much larger than bricks.
 ///
-/// Lists by tile take so many times the memory of the bricks that they are made of.
+/// Lists by tile take this multiple of the memory of the original bricks.
 pub(crate) fn mean_tiles_of_brick(grid: &Grid) -> usize {
     let (tile, brick) = (grid.voxels_per_tile_edge() as usize, BRICK_EDGE as usize);
-    // Bricks begin in tiles at all multiples of this, equally often.
+    // Bricks begin equally often at all multiples of this within tiles.
     let step = 1 << tile.trailing_zeros().min(BRICK_EDGE.trailing_zeros());
     let parts_by_tile = (tile + brick - step).pow(3);
     (parts_by_tile as f64 / tile.pow(3) as f64).round() as usize
 }
 
-/// Code of the brick with this index.
+/// Returns the code of the brick with this index.
 pub(crate) fn brick_code(index: VoxelIndex) -> BrickCode {
     BrickCode::of_voxel(index.map(|k| k * BRICK_EDGE))
 }
 
-/// The places of a brick that lie in a tile.
+/// Returns the mask of a brick's voxels that are in a tile.
 pub(crate) fn part_in_tile(grid: &Grid, tile: TileIndex, brick: VoxelIndex) -> BrickMask {
     let voxels = grid.voxels_of_tile(tile);
     let local = |corner: VoxelIndex| std::array::from_fn(|k| corner[k].saturating_sub(brick[k] * BRICK_EDGE));
     mask_of_box(local(voxels.min), local(voxels.end))
 }
 
-/// The tiles that a brick overlaps.
+/// Returns the tiles that a brick overlaps.
 fn tiles_of_brick(grid: &Grid, brick: VoxelIndex) -> impl Iterator<Item = TileIndex> {
     let min = brick.map(|k| k * BRICK_EDGE);
     let first = grid.tile_of_voxel(min).to_array();
@@ -55,7 +55,7 @@ fn tiles_of_brick(grid: &Grid, brick: VoxelIndex) -> impl Iterator<Item = TileIn
     })
 }
 
-/// Sorts tiles in Morton order of their lowest voxels; far apart, where the codes repeat, by index.
+/// Sorts tiles in Morton order of their lowest voxels; distant tiles, whose codes repeat, by index.
 pub(crate) fn in_order_of_tiles(
     grid: &Grid,
     mut tiles: Vec<(TileIndex, TileUpdates)>,
@@ -73,7 +73,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bricks_are_divided_by_tiles_as_often_as_is_expected() {
+    fn tiles_divide_bricks_as_estimated() {
         for edge in [2, 3, 4, 5, 6, 7, 8, 9, 12, 20, 31, 32, 100] {
             let grid = Grid::new(1.0, f64::from(edge)).unwrap();
             let along_axis: usize = (-edge..edge).map(|k| tiles_of_brick(&grid, [k, 0, 0]).count()).sum();

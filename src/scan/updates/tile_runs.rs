@@ -2,17 +2,17 @@ use crate::space::BrickCode;
 
 /// Updates of voxels of one tile, any number per voxel: runs by brick.
 ///
-/// The runs of all bricks lie in two lists. Most bricks have few, and a list for each would take longer to make than to
-/// apply.
+/// The runs of all bricks are in two lists. Most bricks have few runs, and a list for each would take longer to create
+/// than to apply.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TileRuns {
-    /// In Morton order; a brick may come several times, its earlier runs first.
+    /// In Morton order; a brick may occur several times, its earlier runs first.
     bricks: Vec<BrickEnd>,
     runs: Vec<Run>,
     misses: Vec<Misses>,
 }
 
-/// Where the runs of a brick end; they begin where those of the brick before end.
+/// End of the runs of a brick; they begin at the end of the previous brick's runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct BrickEnd {
     brick: BrickCode,
@@ -23,31 +23,31 @@ struct BrickEnd {
 /// Updates of voxels of one brick, any number per voxel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BrickRuns<'a> {
-    /// Which brick.
+    /// Code of the brick.
     pub brick: BrickCode,
-    /// Those of a voxel in the order in which they count.
+    /// Runs; those of one voxel are in order.
     pub runs: &'a [Run],
-    /// What comes after the runs, at most once per voxel, in Morton order.
+    /// Misses that follow the runs, at most once per voxel, in Morton order.
     pub misses: &'a [Misses],
 }
 
-/// Consecutive updates of one voxel: misses, and then a hit or nothing.
+/// Consecutive updates of one voxel: misses, then a hit or nothing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Run {
-    /// The voxel's place in its brick's Morton order.
+    /// The voxel's position in its brick's Morton order.
     pub place: u16,
     /// Number of misses before the hit.
     pub misses: u16,
-    /// The hit after them, if any: its intensity, which some sensor models use.
+    /// Hit after the misses, if any: its intensity, which some sensor models use.
     pub hit: Option<f32>,
 }
 
-/// Misses of one voxel: a run without a hit, in a third of its memory.
+/// Misses of one voxel: a run without a hit that takes a third of the memory.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Misses {
-    /// The voxel's place in its brick's Morton order.
+    /// The voxel's position in its brick's Morton order.
     pub place: u16,
-    /// Their number.
+    /// Number of misses.
     pub misses: u16,
 }
 
@@ -57,7 +57,7 @@ impl Run {
         usize::from(self.misses) + usize::from(self.hit.is_some())
     }
 
-    /// Whether there is no update.
+    /// Returns whether there is no update.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -70,12 +70,12 @@ impl From<Misses> for Run {
 }
 
 impl<'a> BrickRuns<'a> {
-    /// All of them as runs; those of a voxel in the order in which they count.
+    /// All updates as runs; those of one voxel are in order.
     pub fn iter(&self) -> impl Iterator<Item = Run> + use<'a> {
         self.runs.iter().copied().chain(self.misses.iter().copied().map(Run::from))
     }
 
-    /// Takes the first away.
+    /// Removes and returns the first run.
     pub(crate) fn take_first(&mut self) -> Option<Run> {
         if let Some((run, later)) = self.runs.split_first() {
             self.runs = later;
@@ -88,20 +88,20 @@ impl<'a> BrickRuns<'a> {
 }
 
 impl TileRuns {
-    /// Appends the runs of a brick that does not come before the last one in Morton order.
+    /// Appends the runs of a brick that does not precede the last one in Morton order.
     pub fn push(&mut self, BrickRuns { brick, runs, misses }: BrickRuns<'_>) {
         self.runs.extend_from_slice(runs);
         self.misses.extend_from_slice(misses);
         self.bricks.push(BrickEnd { brick, runs: self.runs.len(), misses: self.misses.len() });
     }
 
-    /// The runs of several parts of the rays, those of the first rays first.
+    /// Merges the runs of several parts of the rays, given in the order of the rays.
     pub(crate) fn merged(mut parts: Vec<Self>) -> Self {
         if parts.len() == 1 {
             return parts.remove(0);
         }
         let mut bricks: Vec<BrickRuns<'_>> = parts.iter().flat_map(Self::bricks).collect();
-        // Stable: a brick's runs of earlier parts stay first.
+        // Stable: runs of earlier parts remain first in a brick.
         bricks.sort_by_key(|runs| runs.brick);
         let mut merged = Self::default();
         bricks.into_iter().for_each(|runs| merged.push(runs));
@@ -122,7 +122,7 @@ impl TileRuns {
         })
     }
 
-    /// Number of bricks; one that comes several times counts as often.
+    /// Number of bricks; a brick that occurs several times is counted as often.
     pub fn brick_count(&self) -> usize {
         self.bricks.len()
     }
@@ -133,7 +133,7 @@ impl TileRuns {
         (hits + misses) as usize
     }
 
-    /// Whether there is no update.
+    /// Returns whether there is no update.
     pub fn is_empty(&self) -> bool {
         self.runs.iter().all(Run::is_empty) && self.misses.iter().all(|passed| passed.misses == 0)
     }
@@ -158,7 +158,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bricks_come_back_as_they_were_pushed() {
+    fn bricks_are_returned_as_pushed() {
         let run = |place, hit| Run { place, misses: 3, hit };
         let (hit, missed) = ([run(5, Some(2.0)), run(5, None)], [Misses { place: 5, misses: 7 }]);
         let bricks = [(3, &hit[..], &missed[..]), (3, &[], &[]), (8, &hit[..1], &[]), (9, &[], &missed)];
@@ -171,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn of_merged_parts_the_earlier_runs_of_a_brick_come_first() {
+    fn merged_parts_keep_earlier_runs_of_a_brick_first() {
         let part = |codes: &[u64], misses| {
             let mut part = TileRuns::default();
             for &code in codes {

@@ -6,9 +6,9 @@ use crate::space::{BrickCode, BrickMask, TileIndex, VoxelIndex, is_in_mask, plac
 /// All updates of one accepted call, grouped by tile in Morton order of the tiles.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ScanUpdates {
-    /// The updates of each tile.
+    /// Updates of each tile.
     pub tiles: Vec<(TileIndex, TileUpdates)>,
-    /// What happened to the points.
+    /// Counts of the points and updates.
     pub report: ScanReport,
 }
 
@@ -19,7 +19,7 @@ impl ScanUpdates {
     }
 }
 
-/// The updates of one call for one tile, in a form that can be stored and applied later.
+/// Updates of one call for one tile, in a form that can be stored and applied later.
 #[derive(Clone, Debug, PartialEq)]
 pub enum TileUpdates {
     /// At most one update per voxel: masks per brick, in Morton order.
@@ -32,10 +32,10 @@ pub enum TileUpdates {
     Packed(PackedUpdates),
 }
 
-/// The voxels of one brick that one scan updates, each once.
+/// Voxels of one brick that one scan updates, each once.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BrickUpdate {
-    /// Which brick.
+    /// Code of the brick.
     pub brick: BrickCode,
     /// Voxels that were hit.
     pub hits: BrickMask,
@@ -45,19 +45,19 @@ pub struct BrickUpdate {
     pub intensities: Box<[f32]>,
 }
 
-/// Updates of voxels of one tile in the order in which they count.
+/// Updates of voxels of one tile, all in order.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct OrderedUpdates {
-    /// The voxel relative to the tile's lowest, 10 bits an axis from x at bit 0; bit 31 is set for a hit.
+    /// Voxel relative to the tile's lowest, 10 bits per axis from x at bit 0; bit 31 is set for a hit.
     voxels: Vec<u32>,
-    /// The intensity of each hit, in order; empty for sensor models that need none.
+    /// Intensity of each hit, in order; empty for sensor models that need none.
     intensities: Vec<f32>,
 }
 
 const HIT: u32 = 1 << 31;
 
 impl OrderedUpdates {
-    /// Appends an update. `offset` is the voxel relative to the tile's lowest, below 1024 along every axis.
+    /// Appends an update. `offset` is the voxel relative to the tile's lowest, below 1024 along each axis.
     pub(crate) fn push(&mut self, offset: VoxelIndex, observation: Observation, keep_intensity: bool) {
         let [x, y, z] = offset.map(|k| k as u32 & 1023);
         let voxel = x | y << 10 | z << 20;
@@ -81,7 +81,7 @@ impl OrderedUpdates {
         Self { voxels, intensities }
     }
 
-    /// The updates in order: the voxel relative to the tile's lowest, and what was observed.
+    /// The updates in order: the voxel relative to the tile's lowest, and the observation.
     pub fn iter(&self) -> impl Iterator<Item = (VoxelIndex, Observation)> {
         let mut intensities = self.intensities.iter();
         self.voxels.iter().map(move |packed| {
@@ -106,19 +106,19 @@ impl OrderedUpdates {
         self.voxels.len()
     }
 
-    /// Whether there is no update.
+    /// Returns whether there is no update.
     pub fn is_empty(&self) -> bool {
         self.voxels.is_empty()
     }
 }
 
 impl BrickUpdate {
-    /// The voxels that are updated.
+    /// Mask of the updated voxels.
     pub fn touched(&self) -> BrickMask {
         std::array::from_fn(|word| self.hits[word] | self.misses[word])
     }
 
-    /// What was observed of each touched voxel, in Morton order.
+    /// Observation of each updated voxel, in Morton order.
     pub fn observations(&self) -> impl Iterator<Item = Observation> {
         let mut intensities = self.intensities.iter();
         places(self.touched()).map(move |place| {
@@ -146,7 +146,7 @@ impl TileUpdates {
         }
     }
 
-    /// Whether there is no update.
+    /// Returns whether there is no update.
     pub fn is_empty(&self) -> bool {
         match self {
             Self::Masks(bricks) => bricks.iter().all(|brick| brick.touched() == [0; 8]),

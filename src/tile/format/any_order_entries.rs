@@ -6,13 +6,13 @@ use crate::sensor::Evidence;
 use crate::space::{BRICK_VOXELS, MortonCode, VoxelBox};
 use crate::tile::Table;
 
-/// Decodes entries in any order, as in a file without a trailer; runs of one brick are gathered.
+/// Decodes entries in any order, as in a file without a trailer. Consecutive entries of one brick are grouped.
 pub(super) struct AnyOrderEntries<'a> {
     voxels: &'a VoxelBox,
     table: Table,
-    /// The entries of one brick, with their offsets.
+    /// Entries of one brick, with their offsets.
     run: Vec<(MortonCode, Evidence, u64)>,
-    /// The same for [`Table::insert`]: place and evidence.
+    /// The same entries as position and evidence, for [`Table::insert`].
     voxels_of_run: Vec<(usize, Evidence)>,
 }
 
@@ -33,14 +33,14 @@ impl<'a> AnyOrderEntries<'a> {
             self.end_run()?;
         }
         if self.run.len() >= BRICK_VOXELS {
-            let reason = format!("key {:?} or another of its 8 x 8 x 8 voxels comes twice", key.0);
+            let reason = format!("duplicate key: {:?} or another one of its 8 x 8 x 8 voxels", key.0);
             return Err(FormatError::at_offset(offset, reason));
         }
         self.run.push((code, evidence, offset));
         Ok(())
     }
 
-    /// Moves the run into the table, all voxels of the brick at once.
+    /// Moves the grouped entries into the table, all voxels of the brick at once.
     fn end_run(&mut self) -> Result<(), FormatError> {
         let Some(&(first, ..)) = self.run.first() else { return Ok(()) };
         self.run.sort_unstable_by_key(|&(code, _, offset)| (code, offset));
@@ -51,7 +51,7 @@ impl<'a> AnyOrderEntries<'a> {
             may_be.then(|| self.run.iter().find(known)).flatten().map(|&(.., offset)| offset)
         };
         if let Some(offset) = in_run.or_else(in_table) {
-            return Err(FormatError::at_offset(offset, "the key comes twice"));
+            return Err(FormatError::at_offset(offset, "duplicate key"));
         }
         self.voxels_of_run.clear();
         self.voxels_of_run

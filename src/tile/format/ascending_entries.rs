@@ -9,34 +9,34 @@ use crate::space::{
     place_of_voxel,
 };
 
-/// Decodes entries in Morton order, as in a file with a trailer; what a brick's entries share is checked once per
+/// Decodes entries in Morton order, as in a file with a trailer. Properties common to a brick are checked once per
 /// brick.
 pub(super) struct AscendingEntries<'a, G> {
     voxels: &'a VoxelBox,
     gather: G,
     brick: OpenBrick,
-    /// One more than the place of the last voxel in the open brick; 0 if there is none.
-    behind: usize,
-    /// The voxels of the open brick that are needed.
+    /// One more than the position of the last voxel in the open brick; 0 if there is none.
+    after_last: usize,
+    /// Selected voxels of the open brick.
     run: Vec<(usize, Evidence)>,
 }
 
 struct OpenBrick {
     /// `None` before the first one.
     code: Option<BrickCode>,
-    /// The common upper bits of its voxels' keys; before the first brick, those of no key.
+    /// Common upper bits of its voxels' keys; before the first brick, bits that no key has.
     upper: [u16; 3],
-    /// Its voxels that belong to the tile.
+    /// Voxels of the brick that belong to the tile.
     inside: BrickMask,
 }
 
-/// The bits of a coordinate that differ within a brick.
+/// Bits of a coordinate that differ within a brick.
 const LOWER: u16 = BRICK_EDGE as u16 - 1;
 
 impl<'a, G: Gather> AscendingEntries<'a, G> {
     pub(super) fn new(voxels: &'a VoxelBox, gather: G) -> Self {
         let brick = OpenBrick { code: None, upper: [u16::MAX; 3], inside: [0; 8] };
-        Self { voxels, gather, brick, behind: 0, run: Vec::with_capacity(BRICK_VOXELS) }
+        Self { voxels, gather, brick, after_last: 0, run: Vec::with_capacity(BRICK_VOXELS) }
     }
 
     #[inline]
@@ -51,10 +51,10 @@ impl<'a, G: Gather> AscendingEntries<'a, G> {
             return Err(of_another_tile(key, offset));
         }
         check_evidence(evidence, offset)?;
-        if self.behind > place {
+        if self.after_last > place {
             return Err(out_of_order(key, offset));
         }
-        self.behind = place + 1;
+        self.after_last = place + 1;
         if self.gather.wants(evidence) {
             self.run.push((place, evidence));
         }
@@ -68,7 +68,7 @@ impl<'a, G: Gather> AscendingEntries<'a, G> {
         if !self.voxels.contains(voxel) {
             return Err(of_another_tile(key, offset));
         }
-        // Errors of the entry itself come first.
+        // Errors of the entry itself take precedence.
         check_evidence(evidence, offset)?;
         let code = Some(key.morton().brick());
         if self.brick.code >= code {
@@ -79,7 +79,7 @@ impl<'a, G: Gather> AscendingEntries<'a, G> {
         Ok(())
     }
 
-    /// The tile's voxels in the brick of `voxel`.
+    /// Mask of the tile's voxels in the brick of `voxel`.
     fn inside(&self, voxel: VoxelIndex) -> BrickMask {
         let first = voxel.map(|k| k & !(BRICK_EDGE - 1));
         let local = |of: VoxelIndex| std::array::from_fn(|k| of[k].saturating_sub(first[k]));
@@ -87,7 +87,7 @@ impl<'a, G: Gather> AscendingEntries<'a, G> {
     }
 
     fn close(&mut self) {
-        self.behind = 0;
+        self.after_last = 0;
         if let Some(code) = self.brick.code
             && !self.run.is_empty()
         {
@@ -117,7 +117,7 @@ fn out_of_order(key: VoxelKey, offset: u64) -> FormatError {
 #[cfg(test)]
 mod tests {
     use super::super::any_order_entries::AnyOrderEntries;
-    use super::super::gather::VoxelSieve;
+    use super::super::gather::VoxelFilter;
     use super::*;
     use crate::tile::Table;
     use crate::tile::format::encode_entries;
@@ -148,14 +148,14 @@ mod tests {
     }
 
     fn read<E: TakeEntries>(mut entries: E, bytes: &[EntryBytes]) -> Result<E::Made, FormatError> {
-        // In two chunks, as when a file is read.
+        // In two chunks, as when reading a file.
         let (first, second) = bytes.split_at(bytes.len() / 3);
         entries.take(first, 16)?;
         entries.take(second, 16 + first.len() as u64 * ENTRY_BYTES)?;
         entries.end()
     }
 
-    /// The first entry that is not above the one before.
+    /// Returns the offset of the first entry that is not greater than the previous one.
     fn disorder(bytes: &[EntryBytes]) -> Option<u64> {
         let codes: Vec<_> = bytes.iter().map(|entry| Entry::of(entry).key.morton()).collect();
         let wrong = codes.windows(2).position(|pair| pair[0] >= pair[1])?;
@@ -163,24 +163,24 @@ mod tests {
     }
 
     #[test]
-    fn entries_in_order_give_the_table_and_the_errors_of_entries_in_any_order() {
+    fn both_decoders_give_the_same_tables_and_errors() {
         let mut random = Random::of(5, &[]);
         let (mut whole, mut damaged) = (0, 0);
         for round in 0..600 {
             let mut bytes = random_entries(&mut random, round % 40 * 20);
             if !bytes.is_empty() && random.chance(0.7) {
                 let entry = random.below(bytes.len() as u64) as usize;
-                // Mostly in the key, where most flips are damage.
+                // Mostly in the key, where most bit flips are damage.
                 let end = if random.chance(0.7) { 6 } else { ENTRY_BYTES };
                 bytes[entry][random.below(end) as usize] ^= 1 << random.below(8);
             }
             let fast = read(AscendingEntries::new(&VOXELS, Table::default()), &bytes);
             let naive = read(AnyOrderEntries::new(&VOXELS), &bytes);
             for from in [f64::NEG_INFINITY, -0.25, 0.5, 9.0] {
-                match (read(AscendingEntries::new(&VOXELS, VoxelSieve::from(from)), &bytes), &fast) {
-                    (Ok(sifted), Ok(table)) => assert!(table.iter_from(from).eq(sifted)),
-                    (Err(sifted), Err(table)) => assert_eq!(sifted, *table),
-                    (sifted, _) => panic!("{sifted:?}"),
+                match (read(AscendingEntries::new(&VOXELS, VoxelFilter::from(from)), &bytes), &fast) {
+                    (Ok(filtered), Ok(table)) => assert!(table.iter_from(from).eq(filtered)),
+                    (Err(filtered), Err(table)) => assert_eq!(filtered, *table),
+                    (filtered, _) => panic!("{filtered:?}"),
                 }
             }
             match (fast, naive, disorder(&bytes)) {
@@ -193,8 +193,8 @@ mod tests {
                     damaged += 1;
                 }
                 (Err(fast), naive, Some(at)) => {
-                    // The first error; within an entry, an error of the entry itself comes first.
-                    let alone = naive.err().filter(|error| !error.reason.contains("twice"));
+                    // The first error; within an entry, an error of the entry itself takes precedence.
+                    let alone = naive.err().filter(|error| !error.reason.contains("duplicate"));
                     match alone.filter(|error| error.at < at + ENTRY_BYTES) {
                         Some(naive) => assert_eq!(fast, naive),
                         None => assert_eq!(fast.at, at),

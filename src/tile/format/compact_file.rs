@@ -1,9 +1,9 @@
 //! `tile.vxt`: a front part like the trailer of `iwlo_meta.bin`, then the table in compact form without its checksum.
-//! The checksum is in the front part: a checksum directly behind its data would make the checksum of the whole file a
-//! constant. The checksums of a table's parts stand in its index, before the parts, for the same reason.
+//! The checksum is in the front part, because with a checksum directly after its data the checksum of the whole file
+//! would be a constant. For the same reason the index contains the checksums of a table's parts before the parts.
 
-use super::compact::{CRC_BYTES, CompactIndex, joined_crc, read_compact, sift_compact};
-use super::gather::SiftedVoxels;
+use super::compact::{CRC_BYTES, CompactIndex, filter_compact, joined_crc, read_compact};
+use super::gather::FilteredVoxels;
 use super::reader::{Decoded, DecodedTable};
 use super::trailer::Trailer;
 use crate::error::{DecodeError, FormatError};
@@ -12,15 +12,15 @@ use crate::space::{MortonCode, VoxelBox};
 use std::io::{self, BufReader, Read, Write};
 use std::ops::Range;
 
-/// Writes a table in compact form as `tile.vxt`. The checksum in `front.table_crc` is computed here; the caller's value
-/// is ignored. There is no octree.
+/// Writes a table in compact form as `tile.vxt`. The checksum `front.table_crc` is computed here; the given value is
+/// ignored. The file has no octree.
 ///
 /// # Errors
 ///
-/// Those of `out`, and `compact` shorter than a compact table.
+/// Returns errors from `out`, and fails if `compact` is too short for a compact table.
 pub fn write_compact_file(compact: &[u8], front: Trailer, out: &mut impl Write) -> io::Result<()> {
     let Some((body, crc)) = compact.split_last_chunk::<{ CRC_BYTES as usize }>() else {
-        return Err(io::Error::new(io::ErrorKind::InvalidInput, "no table in the compact form"));
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, "not a table in the compact form"));
     };
     let front = Trailer { table_crc: u32::from_le_bytes(*crc), octree_crc: 0, octree_bytes: 0, ..front };
     out.write_all(&front.to_bytes())?;
@@ -31,31 +31,31 @@ pub fn write_compact_file(compact: &[u8], front: Trailer, out: &mut impl Write) 
 ///
 /// # Errors
 ///
-/// Anything that violates the format, with its offset.
+/// Fails if the file violates the format; the error contains the offset.
 pub fn read_compact_file(
     input: &mut impl Read,
     file_bytes: u64,
     voxels: &VoxelBox,
 ) -> Result<DecodedTable, DecodeError> {
-    read_behind_front(input, file_bytes, |input, bytes| read_compact(&mut { input }, bytes, voxels))
+    read_after_front(input, file_bytes, |input, bytes| read_compact(&mut { input }, bytes, voxels))
 }
 
-/// Reads a `tile.vxt` like [`read_compact_file`], and makes of it the observed voxels whose log-odds are at least
-/// `from`, in Morton order, without a table.
+/// Reads the observed voxels of a `tile.vxt` whose log-odds are at least `from`, in Morton order, without building a
+/// table.
 ///
 /// # Errors
 ///
-/// Those of [`read_compact_file`].
+/// Same errors as [`read_compact_file`].
 pub fn read_compact_voxels_from(
     input: &mut impl Read,
     file_bytes: u64,
     voxels: &VoxelBox,
     from: f64,
-) -> Result<Decoded<SiftedVoxels>, DecodeError> {
-    read_behind_front(input, file_bytes, |input, bytes| sift_compact(&mut { input }, bytes, voxels, from))
+) -> Result<Decoded<FilteredVoxels>, DecodeError> {
+    read_after_front(input, file_bytes, |input, bytes| filter_compact(&mut { input }, bytes, voxels, from))
 }
 
-fn read_behind_front<T>(
+fn read_after_front<T>(
     input: &mut impl Read,
     file_bytes: u64,
     read: impl FnOnce(&mut dyn Read, u64) -> Result<T, DecodeError>,
@@ -74,32 +74,37 @@ fn read_behind_front<T>(
 ///
 /// # Errors
 ///
-/// Anything that violates the format.
+/// Fails if the front part violates the format.
 pub fn read_compact_front(input: &mut impl Read, file_bytes: u64) -> Result<Trailer, DecodeError> {
     let front = Trailer::read_in_front(input, file_bytes)?;
     if (front.octree_crc, front.octree_bytes) != (0, 0) {
-        return Err(FormatError::at_offset(48, "an octree is named, and compact tiles have none").into());
+        return Err(FormatError::at_offset(
+            48,
+            "the front part lists an octree, but compact tiles have none",
+        )
+        .into());
     }
     Ok(front)
 }
 
-/// What a `tile.vxt` has before its groups.
+/// Part of a `tile.vxt` before its groups.
 #[derive(Debug)]
 pub struct CompactFileIndex {
-    /// The front part.
+    /// Front part of the file.
     pub front: Trailer,
-    /// CRC-32 of the whole file, from those of its parts: if it is the right one, so are they.
+    /// CRC-32 of the whole file, computed from those of its parts. If it matches the recorded one, the parts are also
+    /// valid.
     pub crc: u32,
     index: CompactIndex,
 }
 
 impl CompactFileIndex {
-    /// Reads it from the beginning of a `tile.vxt` of `file_bytes` bytes that belongs to the tile of `voxels`; `None`
-    /// if the table is of version 1, of which all has to be read.
+    /// Reads the index from the beginning of a `tile.vxt` of `file_bytes` bytes that belongs to the tile of `voxels`;
+    /// `None` for a table of version 1, which has to be read completely.
     ///
     /// # Errors
     ///
-    /// Anything in these parts that violates the format, with its offset.
+    /// Fails if these parts violate the format; the error contains the offset.
     pub fn read(
         input: &mut impl Read,
         file_bytes: u64,
@@ -118,17 +123,17 @@ impl CompactFileIndex {
         Ok(Some(Self { front, crc, index }))
     }
 
-    /// Where in the file the group is that has a voxel, if one has it.
+    /// Returns the byte range in the file of the group that contains a voxel, if one can contain it.
     pub fn group_of(&self, voxel: MortonCode) -> Option<Range<u64>> {
         let group = self.index.group_of(voxel)?;
         Some(group.start + self.front.bytes()..group.end + self.front.bytes())
     }
 
-    /// The evidence of a voxel, from the bytes of its group; `None` if it was not observed.
+    /// Returns the evidence of a voxel, read from the bytes of its group; `None` if it was not observed.
     ///
     /// # Errors
     ///
-    /// Other bytes than those that the index tells of; anything that violates the format.
+    /// Fails if the bytes do not match the index or violate the format.
     pub fn evidence(&self, voxel: MortonCode, group: &[u8]) -> Result<Option<Evidence>, DecodeError> {
         self.index.evidence(voxel, group)
     }
@@ -168,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn a_table_comes_back_with_what_stands_in_front() {
+    fn a_table_and_its_front_part_round_trip() {
         let (table, file) = (table(0.5), file(&table(0.5), 77));
         let decoded = read(&file).unwrap();
         assert!(decoded.table.iter().eq(table.iter()));
@@ -178,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn every_flipped_bit_and_every_other_length_is_an_error() {
+    fn flipped_bits_and_wrong_lengths_are_errors() {
         let file = file(&table(0.5), 77);
         for at in 0..file.len() {
             for bit in 0..8 {
@@ -192,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn the_parts_tell_the_checksum_of_the_whole() {
+    fn the_checksum_of_the_file_follows_from_its_parts() {
         let (table, file) = (table(0.5), file(&table(0.5), 77));
         let index = CompactFileIndex::read(&mut &file[..], file.len() as u64, &VOXELS).unwrap().unwrap();
         assert_eq!(index.crc, crc32fast::hash(&file));
@@ -205,7 +210,7 @@ mod tests {
     }
 
     #[test]
-    fn an_error_behind_the_front_says_where_in_the_file() {
+    fn errors_after_the_front_part_have_file_offsets() {
         let mut file = file(&table(0.5), 77);
         let front_bytes = 74;
         file[front_bytes] ^= 1;
@@ -215,16 +220,16 @@ mod tests {
         }
     }
 
-    /// A checksum behind its data would make that of the whole file a constant.
+    /// With a checksum directly after its data, the checksum of the whole file would be a constant.
     #[test]
-    fn files_of_other_content_have_other_checksums() {
+    fn files_with_different_content_have_different_checksums() {
         let files = [0.5, 0.75].map(|log_odds| file(&table(log_odds), 77));
         assert_eq!(files[0].len(), files[1].len());
         assert_ne!(crc32fast::hash(&files[0]), crc32fast::hash(&files[1]));
     }
 
     #[test]
-    fn what_is_no_compact_form_is_not_written() {
+    fn bytes_that_are_not_a_compact_table_are_rejected() {
         let front = read(&file(&table(0.5), 1)).unwrap().trailer.unwrap();
         assert!(write_compact_file(&[1, 2, 3], front, &mut Vec::new()).is_err());
     }

@@ -3,17 +3,17 @@ use crate::sensor::Evidence;
 use crate::space::{BRICK_VOXELS, BrickCode, MortonCode};
 use crate::tile::Table;
 
-/// Bytes of a chunk, more or less.
+/// Approximate size of a chunk in bytes.
 const CHUNK_BYTES: usize = 1 << 16;
 
-/// Most bytes of the entries of one brick.
+/// Maximum size of the entries of one brick in bytes.
 const BRICK_BYTES: usize = BRICK_VOXELS * ENTRY_BYTES as usize;
 
-/// Encodes the entries of a table, some bricks at a time; a chunk passed to `take` has whole entries.
+/// Encodes the entries of a table in chunks of some bricks; a chunk passed to `take` contains complete entries.
 ///
 /// # Errors
 ///
-/// The first of `take`.
+/// Returns the first error of `take`.
 pub fn encode_entries<E>(table: &Table, mut take: impl FnMut(&[u8]) -> Result<(), E>) -> Result<(), E> {
     let mut chunk = Vec::with_capacity((table.len() * ENTRY_BYTES as usize).min(CHUNK_BYTES + BRICK_BYTES));
     for brick in table.bricks() {
@@ -35,7 +35,7 @@ const fn packed_key(brick: BrickCode, place: usize) -> u64 {
     x as u64 | (y as u64) << 16 | (z as u64) << 32
 }
 
-/// The keys of the first brick's voxels; any other's differ from them by the bits of its first voxel.
+/// Keys of the first brick's voxels; those of other bricks differ from them by the bits of their first voxel.
 static KEYS_IN_BRICK: [u64; BRICK_VOXELS] = {
     let mut keys = [0; BRICK_VOXELS];
     let mut place = 0;

@@ -3,7 +3,6 @@ use crate::error::FormatError;
 use crate::sensor::Evidence;
 use crate::space::VoxelKey;
 
-/// A decoded entry.
 #[derive(Clone, Copy)]
 pub(super) struct Entry {
     pub(super) key: VoxelKey,
@@ -24,12 +23,12 @@ impl Entry {
     }
 }
 
-/// The error of an entry at `offset` whose key is that of another tile.
+/// Error for an entry at `offset` whose key belongs to another tile.
 pub(super) fn of_another_tile(key: VoxelKey, offset: u64) -> FormatError {
     FormatError::at_offset(offset, format!("key {:?} belongs to another tile", key.0))
 }
 
-/// Whether the values of an entry at `offset` can be evidence.
+/// Checks that the values of an entry at `offset` are valid evidence.
 #[inline]
 pub(super) fn check_evidence(evidence: Evidence, offset: u64) -> Result<(), FormatError> {
     match fault_of(evidence) {
@@ -38,7 +37,7 @@ pub(super) fn check_evidence(evidence: Evidence, offset: u64) -> Result<(), Form
     }
 }
 
-/// Why the values are not evidence, and the offset of the wrong one in the entry.
+/// Returns the offset in the entry of an invalid value, and the reason; `None` if the values are valid evidence.
 #[inline]
 pub(super) fn fault_of(Evidence { log_odds, observation_count }: Evidence) -> Option<(u64, String)> {
     if !log_odds.is_finite() {

@@ -2,22 +2,21 @@ use crate::sensor::Evidence;
 use crate::space::{BrickCode, MortonCode};
 use crate::tile::Table;
 
-/// What is made of a tile's observed voxels while its file is read.
+/// Consumer of a tile's observed voxels while its file is read.
 pub(super) trait Gather {
-    /// The result.
+    /// Type of the result.
     type Made;
 
-    /// Whether it needs a voxel of this evidence.
+    /// Returns whether a voxel with this evidence is selected.
     fn wants(&self, evidence: Evidence) -> bool;
 
-    /// Takes the voxels of a brick that it needs, in Morton order: place and evidence. Bricks come in Morton order,
-    /// too.
+    /// Takes the selected voxels of a brick in Morton order, as position and evidence. Bricks are also in Morton order.
     fn add(&mut self, brick: BrickCode, voxels: &[(usize, Evidence)]);
 
-    /// What was made of all voxels.
+    /// Returns the result for all voxels.
     fn made(self) -> Self::Made;
 
-    /// What is made of a table that had to be built.
+    /// Returns the result for a table that had to be built.
     fn of_table(self, table: Table) -> Self::Made;
 }
 
@@ -42,23 +41,23 @@ impl Gather for Table {
     }
 }
 
-/// Voxels that were chosen while a file was read, in Morton order.
-pub type SiftedVoxels = Vec<(MortonCode, Evidence)>;
+/// Voxels selected while a file was read, in Morton order.
+pub type FilteredVoxels = Vec<(MortonCode, Evidence)>;
 
-/// Chooses the voxels whose log-odds are at least a threshold.
-pub(super) struct VoxelSieve {
+/// Selects the voxels whose log-odds are at least a threshold.
+pub(super) struct VoxelFilter {
     pub(super) from: f64,
-    pub(super) found: SiftedVoxels,
+    pub(super) found: FilteredVoxels,
 }
 
-impl From<f64> for VoxelSieve {
+impl From<f64> for VoxelFilter {
     fn from(from: f64) -> Self {
         Self { from, found: Vec::new() }
     }
 }
 
-impl Gather for VoxelSieve {
-    type Made = SiftedVoxels;
+impl Gather for VoxelFilter {
+    type Made = FilteredVoxels;
 
     #[inline]
     fn wants(&self, evidence: Evidence) -> bool {
@@ -69,11 +68,11 @@ impl Gather for VoxelSieve {
         self.found.extend(voxels.iter().map(|&(place, evidence)| (brick.voxel(place), evidence)));
     }
 
-    fn made(self) -> SiftedVoxels {
+    fn made(self) -> FilteredVoxels {
         self.found
     }
 
-    fn of_table(self, table: Table) -> SiftedVoxels {
+    fn of_table(self, table: Table) -> FilteredVoxels {
         table.iter_from(self.from).collect()
     }
 }

@@ -1,14 +1,15 @@
-//! A tile's exact table as the bytes of `iwlo_meta.bin`, written and read as a stream.
+//! Files of a tile's exact table: `iwlo_meta.bin`, written and read as a stream.
 //!
 //! ```text
 //! header   16 bytes   magic "IWLO", version 1, count
 //! entries  18 bytes   each: key 3 x u16, log-odds f64, observation count i32, in Morton order
 //! trailer  72 bytes   magic, version, map id, tile index, scan number, checksums
-//! text                the map's parameters
+//! text                parameters of the map
 //! ```
 //!
-//! All little-endian. A reader of version 1 stops after `count` entries and never sees the trailer. The byte
-//! tables are in `docs/format.md`. With compact storage the same table is the `tile.vxt` of `compact_file.rs`.
+//! All numbers are little-endian. A reader of version 1 stops after `count` entries and ignores the trailer.
+//! `docs/format.md` has the byte tables. With compact storage the same table is written as `tile.vxt`, see
+//! `compact_file.rs`.
 
 mod any_order_entries;
 mod ascending_entries;
@@ -27,7 +28,7 @@ pub use compact_file::{
     CompactFileIndex, read_compact_file, read_compact_front, read_compact_voxels_from, write_compact_file,
 };
 pub use entries::encode_entries;
-pub use gather::SiftedVoxels;
+pub use gather::FilteredVoxels;
 pub use reader::{Decoded, DecodedTable, read_table, read_trailer, read_voxels_from};
 pub use renewed::{renew_compact_file, renew_table};
 pub use trailer::{TRAILER_BYTES, Trailer};
@@ -38,5 +39,4 @@ const MAGIC: u32 = 0x4957_4C4F;
 const VERSION: u32 = 1;
 const HEADER_BYTES: u64 = 16;
 const ENTRY_BYTES: u64 = 18;
-/// The bytes of an entry.
 type EntryBytes = [u8; ENTRY_BYTES as usize];

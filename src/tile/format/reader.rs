@@ -1,6 +1,6 @@
 use super::any_order_entries::AnyOrderEntries;
 use super::ascending_entries::AscendingEntries;
-use super::gather::{Gather, SiftedVoxels, VoxelSieve};
+use super::gather::{FilteredVoxels, Gather, VoxelFilter};
 use super::trailer::Trailer;
 use super::{ENTRY_BYTES, EntryBytes, HEADER_BYTES, MAGIC, VERSION};
 use crate::error::{DecodeError, FormatError};
@@ -8,28 +8,28 @@ use crate::space::VoxelBox;
 use crate::tile::Table;
 use std::io::{self, Read};
 
-/// Decodes entries.
+/// Decoder of entries.
 pub(super) trait TakeEntries {
-    /// What is made of them.
+    /// Type of the result.
     type Made;
 
     /// Takes the next entries, which start at `offset` in the file.
     fn take(&mut self, entries: &[EntryBytes], offset: u64) -> Result<(), FormatError>;
 
-    /// What was made of all entries.
+    /// Returns the result for all entries.
     fn end(self) -> Result<Self::Made, FormatError>;
 }
 
-/// The content of an `iwlo_meta.bin` or a `tile.vxt`.
+/// Content of an `iwlo_meta.bin` or a `tile.vxt`.
 #[derive(Debug)]
 pub struct Decoded<T> {
-    /// The exact table, or what else was made of it.
+    /// The exact table, or a value derived from it.
     pub table: T,
     /// The trailer; `None` for a file of the original format, which cannot be verified.
     pub trailer: Option<Trailer>,
 }
 
-/// A tile's exact table, and what the file says beside it.
+/// Exact table and trailer of a tile.
 pub type DecodedTable = Decoded<Table>;
 
 /// Reads an `iwlo_meta.bin` of `file_bytes` bytes that belongs to the tile of `voxels`.
@@ -38,8 +38,8 @@ pub type DecodedTable = Decoded<Table>;
 ///
 /// # Errors
 ///
-/// Anything that violates the format, with its offset: wrong magic or version, a count that does not fit the length,
-/// keys of another tile, duplicate keys, values that are not evidence, a wrong checksum.
+/// Fails if the file violates the format; the error contains the offset. Examples are a wrong magic or version, a count
+/// that does not match the length, keys of another tile, duplicate keys, invalid evidence, a wrong checksum.
 pub fn read_table(
     input: &mut impl Read,
     file_bytes: u64,
@@ -48,19 +48,19 @@ pub fn read_table(
     read_made(input, file_bytes, voxels, Table::default())
 }
 
-/// Reads an `iwlo_meta.bin` like [`read_table`], and makes of it the observed voxels whose log-odds are at least
-/// `from`, in Morton order, without a table where the entries are in order.
+/// Reads the observed voxels of an `iwlo_meta.bin` whose log-odds are at least `from`, in Morton order, without
+/// building a table if the entries are in order.
 ///
 /// # Errors
 ///
-/// Those of [`read_table`].
+/// Same errors as [`read_table`].
 pub fn read_voxels_from(
     input: &mut impl Read,
     file_bytes: u64,
     voxels: &VoxelBox,
     from: f64,
-) -> Result<Decoded<SiftedVoxels>, DecodeError> {
-    read_made(input, file_bytes, voxels, VoxelSieve::from(from))
+) -> Result<Decoded<FilteredVoxels>, DecodeError> {
+    read_made(input, file_bytes, voxels, VoxelFilter::from(from))
 }
 
 fn read_made<G: Gather>(
@@ -102,11 +102,11 @@ fn read_entries<E: TakeEntries>(
     Ok(entries.end()?)
 }
 
-/// Reads only the trailer of an `iwlo_meta.bin`; `None` for a file of the original format. The entries are skipped.
+/// Reads only the trailer of an `iwlo_meta.bin`, skipping the entries; `None` for a file of the original format.
 ///
 /// # Errors
 ///
-/// A header or a trailer that violates the format.
+/// Fails if the header or the trailer violates the format.
 pub fn read_trailer(input: &mut impl Read, file_bytes: u64) -> Result<Option<Trailer>, DecodeError> {
     let (count, trailer_bytes) = read_header(input, file_bytes, &mut crc32fast::Hasher::new())?;
     if trailer_bytes == 0 {
@@ -116,7 +116,7 @@ pub fn read_trailer(input: &mut impl Read, file_bytes: u64) -> Result<Option<Tra
     Trailer::read(input, HEADER_BYTES + count * ENTRY_BYTES, trailer_bytes).map(Some)
 }
 
-/// The count of entries, checked against the length of the file, and the number of bytes that follow them.
+/// Reads the count of entries, checked against the length of the file, and the number of bytes that follow them.
 pub(super) fn read_header(
     input: &mut impl Read,
     file_bytes: u64,

@@ -1,4 +1,4 @@
-//! Files of tables with another trailer: the same table in another map, of which no entry is decoded.
+//! Copies of table files with another trailer, for the same table in another map; entries are not decoded.
 
 use super::compact_file::read_compact_front;
 use super::reader::read_header;
@@ -7,11 +7,12 @@ use super::{ENTRY_BYTES, HEADER_BYTES, MAGIC, VERSION};
 use crate::error::{DecodeError, FormatError};
 use std::io::{self, Read, Write};
 
-/// Copies an `iwlo_meta.bin` of `file_bytes` bytes with what `renew` makes of its trailer. Its entries are not checked.
+/// Copies an `iwlo_meta.bin` of `file_bytes` bytes and replaces its trailer by the result of `renew`. Its entries are
+/// not checked.
 ///
 /// # Errors
 ///
-/// A header or trailer that violates the format, a file without a trailer, and those of both streams.
+/// Fails if the header or trailer violates the format or the trailer is missing. Returns errors from both streams.
 pub fn renew_table(
     input: &mut impl Read,
     file_bytes: u64,
@@ -34,11 +35,12 @@ pub fn renew_table(
     Ok(())
 }
 
-/// Copies a `tile.vxt` of `file_bytes` bytes with what `renew` makes of its front part. The table is not checked.
+/// Copies a `tile.vxt` of `file_bytes` bytes and replaces its front part by the result of `renew`. The table is not
+/// checked.
 ///
 /// # Errors
 ///
-/// A front part that violates the format, and those of both streams.
+/// Fails if the front part violates the format. Returns errors from both streams.
 pub fn renew_compact_file(
     input: &mut impl Read,
     file_bytes: u64,

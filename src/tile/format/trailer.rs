@@ -2,23 +2,23 @@ use crate::error::{DecodeError, FormatError};
 use crate::space::TileIndex;
 use std::io::Read;
 
-/// Length in bytes of the trailer without the parameters behind it.
+/// Size of the trailer in bytes, without the parameters after it.
 pub const TRAILER_BYTES: usize = 72;
 
-/// The longest parameters that are read, in bytes.
+/// Maximum size of parameters that are read, in bytes.
 const MAX_PARAMETERS_BYTES: u64 = 1 << 16;
 
 /// "VXTR", little-endian.
 const MAGIC: u32 = 0x5254_5856;
 const VERSION: u32 = 1;
 
-/// The trailer of `iwlo_meta.bin`, which is the front part of `tile.vxt`: map, tile and scan number of the file, and
-/// checksums of the tile's files.
+/// Trailer of `iwlo_meta.bin`, and front part of `tile.vxt`: map, tile and scan number of the file, and checksums of
+/// the tile's files.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Trailer {
     /// Id of the map.
     pub map_id: [u8; 16],
-    /// Which tile.
+    /// Index of the tile.
     pub tile: TileIndex,
     /// Number of the last scan in the map when the file was written.
     pub scan_number: u64,
@@ -26,14 +26,14 @@ pub struct Trailer {
     pub table_crc: u32,
     /// CRC-32 of the tile's `octree.bt`; 0 with compact storage.
     pub octree_crc: u32,
-    /// Length of the tile's `octree.bt` in bytes; 0 with compact storage.
+    /// Size of the tile's `octree.bt` in bytes; 0 with compact storage.
     pub octree_bytes: u64,
-    /// The map's parameters as text, behind the trailer: a map can be rebuilt from its tiles.
+    /// Parameters of the map as text, stored after the trailer, so that a map can be rebuilt from its tiles.
     pub parameters: String,
 }
 
 impl Trailer {
-    /// The trailer as bytes with a CRC-32, then the parameters.
+    /// Returns the trailer as bytes with a CRC-32, followed by the parameters.
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut bytes = vec![0; TRAILER_BYTES];
         bytes[0..4].copy_from_slice(&MAGIC.to_le_bytes());
@@ -54,7 +54,7 @@ impl Trailer {
         bytes
     }
 
-    /// Length in bytes, including the parameters.
+    /// Size in bytes, including the parameters.
     pub fn bytes(&self) -> u64 {
         (TRAILER_BYTES + self.parameters.len()) as u64
     }
@@ -63,31 +63,31 @@ impl Trailer {
     ///
     /// # Errors
     ///
-    /// A wrong length, magic number, version or checksum.
+    /// Fails if the length, magic number, version or checksum is wrong.
     pub fn read(input: &mut impl Read, offset: u64, bytes: u64) -> Result<Self, DecodeError> {
         let is_long_enough = bytes >= TRAILER_BYTES as u64;
         if !is_long_enough || bytes - TRAILER_BYTES as u64 > MAX_PARAMETERS_BYTES {
-            let reason = "there must be none or a trailer of voxtile's";
+            let reason = "there must be none or a voxtile trailer";
             let reason = format!("{bytes} bytes follow the last entry; {reason}");
             return Err(FormatError::at_offset(offset, reason).into());
         }
         let fixed = Fixed::read(input, offset)?;
         if bytes != fixed.all_bytes() {
             let (found, wanted) = (bytes - TRAILER_BYTES as u64, fixed.parameters_bytes());
-            let reason = format!("{found} bytes of parameters where the trailer names {wanted}");
+            let reason = format!("{found} bytes of parameters instead of {wanted}");
             return Err(FormatError::at_offset(offset + 60, reason).into());
         }
         fixed.with_parameters(input, offset)
     }
 
-    /// Reads the trailer and its parameters from the start of a file of so many bytes.
+    /// Reads the trailer and its parameters from the start of a file of `file_bytes` bytes.
     ///
     /// # Errors
     ///
-    /// A wrong length, magic number, version or checksum.
+    /// Fails if the length, magic number, version or checksum is wrong.
     pub fn read_in_front(input: &mut impl Read, file_bytes: u64) -> Result<Self, DecodeError> {
         let too_short = |wanted: u64| {
-            let reason = format!("{file_bytes} bytes are too few for the {wanted} that stand in front");
+            let reason = format!("{file_bytes} bytes are too few for a front part of {wanted} bytes");
             Err(FormatError::at_offset(0, reason).into())
         };
         if file_bytes < TRAILER_BYTES as u64 {
@@ -101,7 +101,7 @@ impl Trailer {
     }
 }
 
-/// The fixed part of a trailer, with checksum, magic number and version checked.
+/// Fixed part of a trailer, with checksum, magic number and version checked.
 struct Fixed([u8; TRAILER_BYTES]);
 
 impl Fixed {
@@ -114,10 +114,10 @@ impl Fixed {
             return wrong(0, "the trailer does not match its checksum");
         }
         if (fixed.u32_at(0), fixed.u32_at(4)) != (MAGIC, VERSION) {
-            return wrong(0, "no trailer of version 1 is here");
+            return wrong(0, "not a trailer of version 1");
         }
         if u64::from(fixed.parameters_bytes()) > MAX_PARAMETERS_BYTES {
-            return wrong(60, "the parameters are longer than any");
+            return wrong(60, "the parameters are too long");
         }
         Ok(fixed)
     }

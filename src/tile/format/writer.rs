@@ -9,11 +9,11 @@ use std::io::{self, Write};
 pub struct TableChecksums {
     /// CRC-32 of header and entries.
     pub table_crc: u32,
-    /// Bytes written, the trailer included.
+    /// Number of bytes written, including the trailer.
     pub bytes: u64,
 }
 
-/// Streams a table as `iwlo_meta.bin`. The checksum in `trailer.table_crc` is computed here; the caller's value is
+/// Writes a table as the stream `iwlo_meta.bin`. The checksum `trailer.table_crc` is computed here; the given value is
 /// ignored.
 pub fn write_table(table: &Table, trailer: Trailer, out: &mut impl Write) -> io::Result<TableChecksums> {
     let mut crc = crc32fast::Hasher::new();

@@ -1,11 +1,11 @@
-//! OctoMap's pointer tree behind the cache of OctoCache (Chen et al., ASPLOS 2025).
+//! OctoMap's pointer tree with the cache of OctoCache (Chen et al., ASPLOS 2025).
 //!
 //! ```text
 //! updates -> table -> VoxelCache -evicted voxels-> WorkQueue -> OctreeWorker, a thread -> SharedTree
 //!                 \___ cache off ___________________________________________________/
 //! ```
 //!
-//! Queries combine the tree with the cache and with the batches in flight. Whatever is lost here can be derived from
+//! Queries combine the tree with the cache and with the pending batches. If any of these is lost, it is rebuilt from
 //! the table.
 
 mod octree_statistics;

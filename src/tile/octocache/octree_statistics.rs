@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 pub struct OctreeStatistics {
     /// Counts of the voxel caches.
     pub voxel_cache: VoxelCacheCounts,
-    /// Updates of voxels written to the trees.
+    /// Number of voxel updates written to the trees.
     pub voxels_written: u64,
     /// Counts of the queue to the thread that writes the trees.
     pub queue: OctreeQueueCounts,
@@ -19,8 +19,8 @@ pub struct OctreeStatistics {
     pub times: OctreeTimes,
 }
 
-/// Counts of the queue between mapping and the thread that writes the trees. A batch is what one tile's voxel cache
-/// evicts after one scan.
+/// Counts of the queue between the mapper and the thread that writes the trees. A batch contains the voxels that one
+/// tile's voxel cache evicts after one scan.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct OctreeQueueCounts {
@@ -28,17 +28,17 @@ pub struct OctreeQueueCounts {
     pub batches_in: u64,
     /// Voxels enqueued.
     pub voxels_in: u64,
-    /// Batches dequeued, including those that a sync wrote meanwhile or that left memory with their tile.
+    /// Batches dequeued, including those that a sync had already written or whose tile was evicted.
     pub batches_out: u64,
     /// Voxels dequeued, likewise.
     pub voxels_out: u64,
-    /// Most batches in the queue at once, the one being written included.
+    /// Maximum number of batches in the queue, including the one being written.
     pub peak_batches: u64,
-    /// Most voxels in the queue at once, likewise.
+    /// Maximum number of voxels in the queue, likewise.
     pub peak_voxels: u64,
-    /// Voxels from which on the queue is full; a single batch may be larger.
+    /// Number of voxels from which the queue is full; a single batch may be larger.
     pub limit_voxels: u64,
-    /// Batches that waited for room in the queue.
+    /// Batches that waited for space in the queue.
     pub waits: u64,
 }
 
@@ -52,15 +52,15 @@ pub struct OctreeTimes {
     pub cache_insertion_ns: u64,
     /// Evicting from voxel caches, in Morton order.
     pub eviction_ns: u64,
-    /// Enqueueing batches, including the wait for room.
+    /// Enqueueing batches, including the wait for space.
     pub enqueue_ns: u64,
-    /// Waiting for room in the queue.
+    /// Waiting for space in the queue.
     pub enqueue_wait_ns: u64,
-    /// Writing the trees, in whichever thread.
+    /// Writing the trees, in any thread.
     pub octree_update_ns: u64,
     /// Writing the trees in the worker thread.
     pub worker_update_ns: u64,
-    /// Idle time of the worker thread; a wait counts when it is over.
+    /// Idle time of the worker thread; a wait is counted when it ends.
     pub worker_wait_ns: u64,
 }
 
@@ -82,7 +82,6 @@ impl AddAssign for OctreeTimes {
 pub(crate) struct OctreeLedger(Mutex<OctreeStatistics>);
 
 impl OctreeLedger {
-    /// The sum so far.
     pub(crate) fn sum(&self) -> OctreeStatistics {
         *self.lock()
     }
@@ -102,12 +101,12 @@ impl OctreeLedger {
     }
 
     fn lock(&self) -> MutexGuard<'_, OctreeStatistics> {
-        // Nothing that can panic happens under the lock.
+        // No code that can panic runs under the lock.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-/// Measures stage after stage.
+/// Measures consecutive stages.
 pub(crate) struct Stopwatch(Instant);
 
 impl Stopwatch {
@@ -122,7 +121,7 @@ impl Stopwatch {
     }
 }
 
-/// A duration in nanoseconds; 64 bits are 584 years.
+/// Converts a duration to nanoseconds; 64 bits suffice for 584 years.
 pub(crate) fn nanoseconds(duration: Duration) -> u64 {
     u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX)
 }

@@ -5,8 +5,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::thread::{Builder, JoinHandle};
 
-/// The thread that writes the pointer trees of a mapper. It sleeps while there is nothing to write. Dropping this value
-/// ends it, once the queue is empty.
+/// Thread that writes the pointer trees of a mapper. It sleeps while the queue is empty. Dropping this value ends the
+/// thread after the queue was emptied.
 #[derive(Debug)]
 pub(crate) struct OctreeWorker {
     queue: Arc<WorkQueue>,
@@ -14,11 +14,11 @@ pub(crate) struct OctreeWorker {
 }
 
 impl OctreeWorker {
-    /// Starts the thread, with a queue of so many voxels.
+    /// Starts the thread, with a queue of `limit_voxels` voxels.
     ///
     /// # Errors
     ///
-    /// The system cannot start a thread.
+    /// Fails if the system cannot start a thread.
     pub(crate) fn start(limit_voxels: u64, ledger: Arc<OctreeLedger>) -> io::Result<Self> {
         let queue = Arc::new(WorkQueue::new(limit_voxels));
         let thread = Builder::new().name("voxtile-octrees".to_owned()).spawn({
@@ -37,7 +37,7 @@ impl Drop for OctreeWorker {
     fn drop(&mut self) {
         self.queue.close();
         if let Some(thread) = self.thread.take() {
-            // It cannot have panicked: panics of jobs are caught.
+            // It cannot have panicked, because panics of jobs are caught.
             thread.join().unwrap_or_default();
         }
     }
@@ -46,9 +46,9 @@ impl Drop for OctreeWorker {
 fn work(queue: &WorkQueue, ledger: &OctreeLedger) {
     let do_job = |job: Job, worker_wait_ns| {
         ledger.add_times(OctreeTimes { worker_wait_ns, ..OctreeTimes::default() });
-        // A half-written tree counts as broken and is derived anew (`SharedTree`).
+        // A partially written tree counts as broken and is rebuilt (`SharedTree`).
         if catch_unwind(AssertUnwindSafe(job)).is_err() {
-            log::error!("an octree could not be updated; it is derived from its table at the next sync");
+            log::error!("an octree could not be updated; it will be rebuilt from its table at the next sync");
         }
     };
     while queue.do_next(do_job) {}

@@ -12,8 +12,8 @@ use crate::tile::table::Table;
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-/// OctoMap's pointer tree of a tile, behind a voxel cache or not. Queries are answered as if every update had gone
-/// straight into the tree.
+/// OctoMap's pointer tree of a tile, with or without a voxel cache. Queries give the same answers as if each update had
+/// been written directly to the tree.
 #[derive(Debug)]
 pub(crate) struct PointerOctree {
     cache: Option<VoxelCache>,
@@ -21,16 +21,16 @@ pub(crate) struct PointerOctree {
     writer: TreeWriter,
 }
 
-/// The writer of a map's trees, and its counts.
+/// Writer of a map's trees, and its counts.
 #[derive(Clone, Debug)]
 pub(crate) struct TreeWriter {
-    /// To the thread that writes trees; `None` if the mapping threads do.
+    /// Queue to the thread that writes trees; `None` if the mapping threads do.
     pub(crate) queue: Option<Arc<WorkQueue>>,
     pub(crate) ledger: Arc<OctreeLedger>,
 }
 
 impl PointerOctree {
-    /// The octree of a table behind an empty cache.
+    /// Creates the octree of a table, with an empty cache.
     pub(crate) fn of_table(cache: Option<VoxelCache>, table: &Table, writer: TreeWriter) -> Self {
         Self { cache, tree: Arc::new(SharedTree::new(tree_of(table))), writer }
     }
@@ -58,18 +58,18 @@ impl PointerOctree {
         }
     }
 
-    /// Writes evicted voxels to the tree, here or in its thread.
+    /// Writes evicted voxels to the tree, in this thread or the worker.
     fn write(&self, evicted: Batch) {
         let mut watch = Stopwatch::start();
         let voxels = evicted.len();
-        // From here on queries find the batch, whatever happens to the job.
+        // From here on queries see the batch, even if the job fails.
         self.tree.send(evicted);
         let Some(queue) = &self.writer.queue else {
             write_in_flight(&self.tree, &self.writer.ledger, false);
             return;
         };
         let job = {
-            // Weak: an evicted tile takes its batches along.
+            // Weak, so that pending batches of an evicted tile are dropped.
             let (tree, ledger) = (Arc::downgrade(&self.tree), self.writer.ledger.clone());
             move || {
                 if let Some(tree) = tree.upgrade() {
@@ -86,32 +86,32 @@ impl PointerOctree {
                     ..OctreeTimes::default()
                 });
             }
-            // The thread has ended with its mapper, but this tile lives on.
+            // The thread has ended with its mapper, but this tile is still in use.
             Err(_) => {
                 write_in_flight(&self.tree, &self.writer.ledger, false);
             }
         }
     }
 
-    /// Largest log-odds of the voxels under the node at `depth` (1 to 16) that holds `code`; `None` if all are
-    /// unknown.
+    /// Returns the largest log-odds of the voxels under the node at `depth` (1 to 16) that contains `code`; `None` if
+    /// all are unknown.
     pub(crate) fn max_under(&self, table: &Table, code: MortonCode, depth: u8) -> Option<f32> {
         let (first, span) = (code.ancestor(depth), MortonCode::span(depth));
         let max = self.tree.try_read(|tree, in_flight| {
             let cached = self.cache.as_ref().map(|cache| cache.under(first, span)).unwrap_or_default();
             tree.max_with_overrides(first, depth, &newest_under(first, span, in_flight, cached))
         });
-        // A query does not wait for a tree that is being written: the table has the answer too.
+        // A query does not wait for a tree that is being written, because the table has the same answer.
         max.unwrap_or_else(|| max_in_table(table, code, depth))
     }
 
-    /// Whether the tree contains all updates.
+    /// Returns whether the tree contains all updates.
     pub(crate) fn is_synced(&self) -> bool {
         self.cache.as_ref().is_none_or(VoxelCache::is_empty)
             && self.tree.try_read(|_, in_flight| in_flight.is_empty()).unwrap_or(false)
     }
 
-    /// Writes the cache and all batches in flight to the tree, without waiting for the queue.
+    /// Writes the cache and all pending batches to the tree, without waiting for the queue.
     pub(crate) fn sync(&mut self, table: &Table) {
         if self.is_synced() {
             return;
@@ -128,23 +128,23 @@ impl PointerOctree {
         }
     }
 
-    /// A copy of the tree, up to date.
+    /// Returns an up-to-date copy of the tree.
     pub(crate) fn tree(&self, table: &Table) -> Octree {
         let tree = self.is_synced().then(|| self.tree.read(Octree::clone)).flatten();
         tree.unwrap_or_else(|| tree_of(table))
     }
 
-    /// Counts of the cache, if there is one.
+    /// Counts of the cache; zero without a cache.
     pub(crate) fn cache_counts(&self) -> VoxelCacheCounts {
         self.cache.as_ref().map(VoxelCache::counts).unwrap_or_default()
     }
 
-    /// Nodes of the tree, without the cache and the batches in flight.
+    /// Number of nodes of the tree, without the cache and pending batches.
     pub(crate) fn node_count(&self) -> u64 {
         self.tree.node_count()
     }
 
-    /// Bytes of memory on the heap: of the tree; of the cache and the batches in flight.
+    /// Bytes of memory on the heap: of the tree, and of the cache with pending batches.
     pub(crate) fn bytes(&self) -> (usize, usize) {
         let cache = self.cache.as_ref().map_or(0, VoxelCache::bytes);
         (size_of::<SharedTree>() + self.tree.bytes(), cache + self.tree.in_flight_bytes())
@@ -157,7 +157,7 @@ impl PointerOctree {
 }
 
 impl Clone for PointerOctree {
-    /// An octree of its own; the writer is shared.
+    /// The clone has its own octree; the writer is shared.
     fn clone(&self) -> Self {
         let tree = Arc::new(SharedTree::clone(&self.tree));
         Self { cache: self.cache.clone(), tree, writer: self.writer.clone() }
@@ -168,7 +168,7 @@ fn tree_of(table: &Table) -> Octree {
     Octree::from_sorted(table.iter().map(|(code, evidence)| (code, evidence.log_odds as f32)))
 }
 
-/// Writes all batches in flight. Returns whether the tree is intact, and so up to date.
+/// Writes all pending batches. Returns whether the tree is intact, and so up to date.
 fn write_in_flight(tree: &SharedTree, ledger: &OctreeLedger, is_worker: bool) -> bool {
     let mut watch = Stopwatch::start();
     let written = tree.write_all();
@@ -179,8 +179,8 @@ fn write_in_flight(tree: &SharedTree, ledger: &OctreeLedger, is_worker: bool) ->
     written.is_some()
 }
 
-/// The voxels of a node that are in flight or cached, each with its newest value, in Morton order. `first` is the
-/// node's first code, `span` its voxels.
+/// Returns the voxels of a node that are pending or cached, each with its latest value, in Morton order. `first` is the
+/// node's first code, `span` its number of voxels.
 fn newest_under(first: MortonCode, span: u64, in_flight: &VecDeque<Batch>, cached: Batch) -> Batch {
     if in_flight.is_empty() {
         return cached;
@@ -191,7 +191,7 @@ fn newest_under(first: MortonCode, span: u64, in_flight: &VecDeque<Batch>, cache
         let position = |code: MortonCode| batch.partition_point(|&(other, _)| other < code);
         newest.extend_from_slice(&batch[position(first)..position(end)]);
     }
-    // Stable: for the same voxel the newest value comes first, and stays.
+    // Stable: for the same voxel the latest value is first, and is kept.
     newest.sort_by_key(|&(code, _)| code);
     newest.dedup_by_key(|&mut (code, _)| code);
     newest

@@ -7,18 +7,18 @@ use std::sync::{Mutex, MutexGuard, PoisonError, RwLock, RwLockReadGuard, RwLockW
 /// Voxels and their new log-odds, in strictly ascending Morton order.
 pub(crate) type Batch = Vec<(MortonCode, f32)>;
 
-/// A pointer tree that one thread writes while others read it, and the batches in flight to it.
+/// Pointer tree that one thread writes while others read it, and its pending batches.
 ///
-/// Batches belong to the tree, whoever writes them: queries read them, a sync writes them, and they are dropped with
-/// the tree.
+/// Batches belong to the tree: queries read them, a sync writes them, and they are dropped with the tree.
 #[derive(Debug)]
 pub(crate) struct SharedTree {
-    /// `None` while it is being written, and after a panic in a write: then it must be derived from the table.
+    /// `None` while the tree is being written, and after a panic during a write; it must then be rebuilt from the
+    /// table.
     tree: RwLock<Option<Octree>>,
-    /// The oldest first. Removing a batch from an intact tree needs the tree's write lock, so a holder of the read lock
-    /// finds every update in one of the two. Lock order: the tree, then this.
+    /// Pending batches, the oldest first. Removing a batch from an intact tree needs the tree's write lock, so a holder
+    /// of the read lock finds each update in the tree or here. Lock order: the tree, then this.
     in_flight: Mutex<VecDeque<Batch>>,
-    /// Nodes and bytes of the tree as of its last change, readable without a lock.
+    /// Number of nodes and bytes of the tree as of its last change, readable without a lock.
     nodes: AtomicU64,
     bytes: AtomicUsize,
 }
@@ -29,12 +29,11 @@ impl SharedTree {
         Self { tree: RwLock::new(Some(tree)), in_flight: Mutex::default(), nodes, bytes }
     }
 
-    /// Appends a batch to those in flight.
     pub(crate) fn send(&self, batch: Batch) {
         self.in_flight().push_back(batch);
     }
 
-    /// Writes all batches in flight and returns their voxels; `None` if the tree is broken.
+    /// Writes all pending batches and returns the number of their voxels; `None` if the tree is broken.
     pub(crate) fn write_all(&self) -> Option<usize> {
         let written = self.change(|tree| {
             let mut voxels = 0;
@@ -45,7 +44,7 @@ impl SharedTree {
             voxels
         });
         if written.is_none() {
-            // The table has these updates, and the tree will be derived from it.
+            // The table has these updates, and the tree will be rebuilt from it.
             self.in_flight().clear();
         }
         written
@@ -60,15 +59,15 @@ impl SharedTree {
         Some(outcome)
     }
 
-    /// Replaces the tree by one that includes everything in flight.
+    /// Replaces the tree by one that includes all pending batches.
     pub(crate) fn replace(&self, tree: Octree) {
         let mut place = self.write_lock();
         self.in_flight().clear();
         self.put(&mut place, tree);
     }
 
-    /// Reads the tree and the batches in flight, the oldest first. Returns `None` at once if the tree is being written
-    /// or broken.
+    /// Reads the tree and the pending batches, the oldest first. Returns `None` immediately if the tree is being
+    /// written or broken.
     pub(crate) fn try_read<T>(&self, read: impl FnOnce(&Octree, &VecDeque<Batch>) -> T) -> Option<T> {
         let place = match self.tree.try_read() {
             Ok(place) => place,
@@ -83,7 +82,7 @@ impl SharedTree {
         self.read_lock().as_ref().map(read)
     }
 
-    /// Nodes of the tree, without batches in flight.
+    /// Number of nodes of the tree, without pending batches.
     pub(crate) fn node_count(&self) -> u64 {
         self.nodes.load(Ordering::Relaxed)
     }
@@ -93,7 +92,7 @@ impl SharedTree {
         self.bytes.load(Ordering::Relaxed)
     }
 
-    /// Bytes of memory of the batches in flight.
+    /// Bytes of memory of pending batches.
     pub(crate) fn in_flight_bytes(&self) -> usize {
         let in_flight = self.in_flight();
         let voxels: usize = in_flight.iter().map(Batch::capacity).sum();
@@ -110,7 +109,7 @@ impl SharedTree {
         self.in_flight().pop_front()
     }
 
-    // Poison is ignored: a panic leaves no half-written tree in this place.
+    // Poisoning is ignored: after a panic the value is `None`, never a partially written tree.
     fn read_lock(&self) -> RwLockReadGuard<'_, Option<Octree>> {
         self.tree.read().unwrap_or_else(PoisonError::into_inner)
     }
@@ -125,7 +124,7 @@ impl SharedTree {
 }
 
 impl Clone for SharedTree {
-    /// A copy of the tree, with the batches in flight to the original.
+    /// The clone has a copy of the tree and of the pending batches.
     fn clone(&self) -> Self {
         let place = self.read_lock();
         let in_flight = self.in_flight().clone();

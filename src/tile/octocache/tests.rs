@@ -1,4 +1,4 @@
-//! Pointer octrees whose trees are written by another thread, stopped at the worst moments.
+//! Pointer octrees whose trees are written by another thread, which is stopped at critical moments.
 
 use super::shared_tree::SharedTree;
 use crate::config::{MapConfig, OctreeConfig, VoxelCacheConfig, VoxelCacheMode};
@@ -14,7 +14,7 @@ use std::time::Duration;
 
 const TILE: TileIndex = TileIndex::new(0, 0, 0);
 
-/// A factory whose tiles cache one voxel each, so that all others go to the worker.
+/// A factory whose tiles cache one voxel each, so that all others are sent to the worker.
 fn factory(limit_voxels: u64) -> OctreeFactory {
     let cache = VoxelCacheConfig::new(1, 1);
     OctreeFactory::with_queue(OctreeConfig::Pointers(VoxelCacheMode::Parallel(cache)), limit_voxels)
@@ -36,7 +36,7 @@ fn hold(octrees: &OctreeFactory) -> Sender<()> {
     release
 }
 
-/// Waits until the worker has done all jobs so far.
+/// Waits until the worker has completed all jobs so far.
 fn wait_for_worker(octrees: &OctreeFactory) {
     let is_done = |counts: OctreeQueueCounts| counts.batches_in == counts.batches_out;
     while !is_done(octrees.worker().queue().counts()) {
@@ -44,7 +44,7 @@ fn wait_for_worker(octrees: &OctreeFactory) {
     }
 }
 
-/// Updates of voxels along a diagonal, each one a miss or hit.
+/// Updates voxels along a diagonal, each by a miss or a hit.
 fn update(tile: &mut Tile, voxels: impl Iterator<Item = i32>, is_hit: bool) {
     let config = MapConfig::default();
     let points: Vec<_> = voxels.map(|k| config.grid.center_m([k % 100, k / 7 % 100, k / 3 % 100])).collect();
@@ -55,7 +55,7 @@ fn update(tile: &mut Tile, voxels: impl Iterator<Item = i32>, is_hit: bool) {
     tile.apply(&config.sensor_model, &updates[&TILE]);
 }
 
-/// Every node of every depth against the table's voxels.
+/// Compares the nodes of all depths with the table's voxels.
 fn assert_answers(tile: &Tile) {
     for depth in 1..=16 {
         let mut maxima: BTreeMap<MortonCode, (VoxelIndex, f32)> = BTreeMap::new();
@@ -77,11 +77,11 @@ fn tree_of(tile: &Tile) -> Arc<SharedTree> {
 }
 
 fn batches_in_flight(tile: &Tile) -> usize {
-    tree_of(tile).try_read(|_, in_flight| in_flight.len()).expect("a tree that nobody writes")
+    tree_of(tile).try_read(|_, in_flight| in_flight.len()).expect("no thread is writing the tree")
 }
 
 #[test]
-fn queries_see_what_is_in_flight_the_newest_first() {
+fn queries_see_pending_batches_newest_first() {
     let octrees = factory(1 << 20);
     let mut tile = empty_tile(&octrees);
     let gate = hold(&octrees);
@@ -125,7 +125,7 @@ fn queries_do_not_wait_for_a_tree_that_is_being_written() {
 }
 
 #[test]
-fn a_panic_while_a_tree_is_written_loses_nothing() {
+fn a_panic_during_a_write_loses_no_updates() {
     let octrees = factory(1 << 20);
     let mut tile = empty_tile(&octrees);
     update(&mut tile, 0..200, true);
@@ -135,13 +135,13 @@ fn a_panic_while_a_tree_is_written_loses_nothing() {
     };
     assert!(octrees.worker().queue().push(0, Box::new(job)).is_ok());
     wait_for_worker(&octrees);
-    // The worker lives, and all queries are answered.
+    // The worker is still running, and all queries are answered.
     assert_answers(&tile);
     update(&mut tile, 100..300, false);
     wait_for_worker(&octrees);
     assert_answers(&tile);
     assert!(!tile.is_octree_synced());
-    assert!(tree_of(&tile).in_flight_bytes() < 1000, "what no tree will take is not kept");
+    assert!(tree_of(&tile).in_flight_bytes() < 1000, "batches of a broken tree are not kept");
     assert_answers(&tile.clone());
     tile.sync_octree();
     assert!(tile.is_octree_synced());
@@ -150,7 +150,7 @@ fn a_panic_while_a_tree_is_written_loses_nothing() {
 }
 
 #[test]
-fn a_sync_takes_what_is_in_flight_without_waiting_for_the_worker() {
+fn a_sync_writes_pending_batches_without_waiting() {
     let octrees = factory(1 << 20);
     let mut tile = empty_tile(&octrees);
     let gate = hold(&octrees);
@@ -166,7 +166,7 @@ fn a_sync_takes_what_is_in_flight_without_waiting_for_the_worker() {
 }
 
 #[test]
-fn a_clone_has_its_own_tree_and_what_was_in_flight() {
+fn a_clone_has_its_own_tree_and_pending_batches() {
     let octrees = factory(1 << 20);
     let mut tile = empty_tile(&octrees);
     let gate = hold(&octrees);
@@ -184,7 +184,7 @@ fn a_clone_has_its_own_tree_and_what_was_in_flight() {
 }
 
 #[test]
-fn the_queue_never_holds_more_than_its_limit_and_who_puts_in_too_much_waits() {
+fn senders_wait_when_the_queue_is_full() {
     let octrees = factory(150);
     let gate = hold(&octrees);
     thread::scope(|scope| {
@@ -217,7 +217,7 @@ fn the_queue_never_holds_more_than_its_limit_and_who_puts_in_too_much_waits() {
 }
 
 #[test]
-fn a_batch_larger_than_the_limit_goes_alone() {
+fn a_batch_above_the_limit_is_queued_alone() {
     let octrees = factory(10);
     let mut tile = empty_tile(&octrees);
     for step in 0..5 {
@@ -230,7 +230,7 @@ fn a_batch_larger_than_the_limit_goes_alone() {
 }
 
 #[test]
-fn what_is_in_flight_goes_with_its_tile() {
+fn pending_batches_are_dropped_with_their_tile() {
     let octrees = factory(1 << 20);
     let gate = hold(&octrees);
     let mut tile = empty_tile(&octrees);
@@ -244,7 +244,7 @@ fn what_is_in_flight_goes_with_its_tile() {
 }
 
 #[test]
-fn an_end_while_the_queue_is_full_writes_what_is_there_and_leaves_no_thread() {
+fn closing_a_full_queue_writes_its_batches_and_ends_the_thread() {
     let octrees = factory(100);
     let queue = Arc::downgrade(octrees.worker().queue());
     let gate = hold(&octrees);
@@ -264,7 +264,7 @@ fn an_end_while_the_queue_is_full_writes_what_is_there_and_leaves_no_thread() {
     });
     drop(octrees);
     opening.join().unwrap();
-    // Threads that waited for room when the queue was closed write for themselves.
+    // Threads that were waiting for space when the queue was closed write the trees themselves.
     let mut late = waiting.join().unwrap();
     for tile in [&mut tile, &mut late] {
         assert_eq!(batches_in_flight(tile), 0);

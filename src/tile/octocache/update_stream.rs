@@ -6,10 +6,10 @@ use crate::sensor::SensorModel;
 use crate::space::{MortonCode, VoxelIndex};
 use crate::tile::table::Table;
 
-/// Passes the updates of one scan from the table to the voxel cache, or to the tree if there is no cache: every single
-/// one, in order, each with its resulting log-odds.
+/// Passes all updates of one scan from the table to the voxel cache, or to the tree if there is no cache: in order,
+/// each with its resulting log-odds.
 ///
-/// They go in chunks, so that timing each stage costs little.
+/// Updates are passed in chunks, so that timing each stage costs little.
 pub(crate) struct UpdateStream<'a> {
     cache: Option<&'a mut VoxelCache>,
     tree: &'a SharedTree,
@@ -17,11 +17,11 @@ pub(crate) struct UpdateStream<'a> {
     watch: Stopwatch,
     /// Time spent in each stage.
     pub(crate) times: OctreeTimes,
-    /// Updates written to the tree.
+    /// Number of updates written to the tree.
     pub(crate) written: usize,
 }
 
-/// Updates at a time: 16 KiB.
+/// Number of updates per chunk: 16 KiB.
 const CHUNK: usize = 1024;
 
 impl<'a> UpdateStream<'a> {
@@ -47,7 +47,7 @@ impl<'a> UpdateStream<'a> {
                     }
                 }
             }
-            // Runs do not keep the order of rays or intermediate log-odds, so a run is one update.
+            // Runs contain neither the order of rays nor intermediate log-odds, so a run is one update.
             TileUpdates::Runs(runs) => {
                 for update in runs.bricks() {
                     table.update_runs_of_brick(model, update);
@@ -60,7 +60,7 @@ impl<'a> UpdateStream<'a> {
                 }
             }
             TileUpdates::Ordered(updates) => {
-                table.update_in_order_and_tell(model, first, updates, |code, log_odds| {
+                table.update_in_order_with(model, first, updates, |code, log_odds| {
                     self.push(code, log_odds);
                 });
             }

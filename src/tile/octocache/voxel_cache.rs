@@ -2,23 +2,23 @@ use crate::space::MortonCode;
 use serde::Serialize;
 use std::ops::{AddAssign, Sub};
 
-/// The cache of OctoCache (Chen et al., ASPLOS 2025, sections 4.1 to 4.3): it absorbs the updates of voxels, and only
-/// evicted voxels reach the octree.
+/// Cache of OctoCache (Chen et al., ASPLOS 2025, sections 4.1 to 4.3): it absorbs the updates of voxels, and only
+/// evicted voxels are written to the octree.
 ///
-/// A voxel's bucket is its Morton code modulo the number of buckets. A cell holds the *accumulated* log-odds, so the
-/// cache answers for its voxels alone. During a scan buckets may grow; after it each keeps its `tau` latest cells, and
-/// the earliest are evicted in Morton order.
+/// The bucket of a voxel is its Morton code modulo the number of buckets. A cell contains the *accumulated* log-odds,
+/// so queries for cached voxels need only the cache. During a scan buckets may grow; after it each bucket keeps its
+/// `tau` latest cells, and the earliest are evicted in Morton order.
 #[derive(Clone, Debug)]
 pub struct VoxelCache {
     tau: usize,
-    /// Whether the number of buckets follows the scans.
+    /// Whether the number of buckets adapts to the scans.
     fits_itself: bool,
     buckets: Box<[Vec<Cell>]>,
     len: usize,
     cell_bytes: usize,
     /// Buckets with more than `tau` cells.
     overfull: Vec<u32>,
-    /// Number of the present scan, and the distinct voxels that it inserted.
+    /// Number of the current scan, and the number of distinct voxels that it inserted.
     scan: u32,
     voxels_of_scan: usize,
     counts: VoxelCacheCounts,
@@ -30,7 +30,7 @@ pub struct VoxelCache {
 pub struct VoxelCacheCounts {
     /// Updates of voxels that were in the cache.
     pub hits: u64,
-    /// Updates of voxels that were not.
+    /// Updates of voxels that were not in the cache.
     pub misses: u64,
     /// Voxels evicted to the octree because their buckets were full.
     pub evictions: u64,
@@ -39,7 +39,7 @@ pub struct VoxelCacheCounts {
 }
 
 impl VoxelCacheCounts {
-    /// Hits among all updates, 0 to 1; 0 if there were none.
+    /// Share of hits among all updates, from 0 to 1; 0 without updates.
     pub fn hit_rate(&self) -> f64 {
         self.hits as f64 / (self.hits + self.misses).max(1) as f64
     }
@@ -49,16 +49,16 @@ impl VoxelCacheCounts {
 struct Cell {
     code: MortonCode,
     log_odds: f32,
-    /// The scan that inserted or changed the voxel last.
+    /// The scan that last inserted or changed the voxel.
     scan: u32,
 }
 
-/// Cells of a self-sizing cache, as a multiple of the voxels of a scan; the paper's section 5.2 uses 3 to 4.
+/// Cells of an adaptive cache, as a multiple of the voxels of a scan; the paper uses 3 to 4 in section 5.2.
 const CELLS_PER_SCAN_VOXEL: usize = 3;
 
 impl VoxelCache {
-    /// A cache whose buckets keep `tau` voxels between scans. `buckets` must be a power of two; `None` sizes it by the
-    /// scans.
+    /// Creates a cache whose buckets keep `tau` voxels between scans. `buckets` must be a power of two; `None` adapts
+    /// it to the scans.
     pub fn new(tau: usize, buckets: Option<usize>) -> Self {
         Self {
             tau,
@@ -78,12 +78,12 @@ impl VoxelCache {
         self.counts
     }
 
-    /// Voxels in the cache.
+    /// Number of voxels in the cache.
     pub fn len(&self) -> usize {
         self.len
     }
 
-    /// Whether the cache is empty.
+    /// Returns whether the cache is empty.
     pub fn is_empty(&self) -> bool {
         self.len == 0
     }
@@ -114,19 +114,19 @@ impl VoxelCache {
             self.cell_bytes += (bucket.capacity() - capacity) * size_of::<Cell>();
             self.len += 1;
         }
-        // Also during a scan: buckets that hold a whole first scan would be slow to search.
+        // Also during a scan, because buckets with a whole first scan would be slow to search.
         if self.fits_itself && self.voxels_of_scan * CELLS_PER_SCAN_VOXEL > self.buckets.len() * self.tau {
             self.grow(self.buckets.len() * 2);
         }
     }
 
-    /// The accumulated log-odds of a voxel, if it is in the cache.
+    /// The accumulated log-odds of a voxel, if it is cached.
     pub fn get(&self, code: MortonCode) -> Option<f32> {
         let bucket = &self.buckets[code.0 as usize & (self.buckets.len() - 1)];
         bucket.iter().find(|cell| cell.code == code).map(|cell| cell.log_odds)
     }
 
-    /// The cached voxels under a node, in Morton order. `first` is the node's first code, `span` its voxels.
+    /// The cached voxels under a node, in Morton order. `first` is the node's first code, `span` its number of voxels.
     pub fn under(&self, first: MortonCode, span: u64) -> Vec<(MortonCode, f32)> {
         let count = (span as usize).min(self.buckets.len());
         // A node's codes are consecutive, and so are their buckets.
@@ -169,7 +169,7 @@ impl VoxelCache {
         evicted
     }
 
-    /// Spreads the cells over more buckets; within a bucket they keep their order.
+    /// Distributes the cells over more buckets, preserving their order within a bucket.
     fn grow(&mut self, buckets: usize) {
         let old = std::mem::replace(&mut self.buckets, empty_buckets(buckets));
         for cell in old.iter().flatten() {
@@ -184,7 +184,7 @@ impl VoxelCache {
 impl Sub for VoxelCacheCounts {
     type Output = Self;
 
-    /// The counts since `before`.
+    /// Returns the difference to earlier counts.
     fn sub(self, before: Self) -> Self {
         Self {
             hits: self.hits - before.hits,
@@ -217,13 +217,13 @@ mod tests {
     }
 
     #[test]
-    fn the_earliest_inserted_leave_in_morton_order_and_a_hit_makes_no_voxel_younger() {
+    fn the_earliest_voxels_are_evicted_in_morton_order_and_hits_do_not_renew_them() {
         let mut cache = VoxelCache::new(2, Some(4));
         for code in [16, 1, 8, 12, 5, 4, 16] {
             cache.put(MortonCode(code), code as f32);
         }
         cache.put(MortonCode(8), 80.0);
-        // Bucket 0 got 16, 8, 12, 4 in this order; bucket 1 got 1, 5.
+        // Bucket 0 received 16, 8, 12, 4 in this order; bucket 1 received 1, 5.
         assert_eq!(cache.evict(), [(MortonCode(8), 80.0), (MortonCode(16), 16.0)]);
         assert_eq!(cache.get(MortonCode(12)), Some(12.0));
         assert_eq!(cache.get(MortonCode(16)), None);
@@ -234,7 +234,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cache_that_fits_itself_holds_a_repeated_scan() {
+    fn an_adaptive_cache_holds_a_repeated_scan() {
         let mut cache = VoxelCache::new(4, None);
         for _ in 0..2 {
             for code in 0..1000 {
@@ -247,7 +247,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cache_that_fits_itself_has_three_to_six_times_the_room_of_the_largest_scan() {
+    fn an_adaptive_cache_has_three_to_six_times_the_capacity_of_the_largest_scan() {
         for tau in [1, 4, 6] {
             let mut cache = VoxelCache::new(tau, None);
             for voxels in [1000, 37, 1750, 600] {
@@ -262,7 +262,7 @@ mod tests {
     }
 
     #[test]
-    fn under_finds_the_cached_voxels_of_a_node() {
+    fn under_returns_the_cached_voxels_of_a_node() {
         let mut cache = VoxelCache::new(4, Some(16));
         for code in [3, 63, 64, 70, 127, 128, 1000] {
             cache.put(MortonCode(code), 0.5);

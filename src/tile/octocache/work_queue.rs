@@ -4,7 +4,7 @@ use std::fmt;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-/// A bounded queue of jobs on voxels for one thread. A sender sleeps while the queue is full, the thread while it is
+/// Bounded queue of jobs on voxels for one thread. A sender sleeps while the queue is full, the thread while it is
 /// empty.
 pub(crate) struct WorkQueue {
     state: Mutex<State>,
@@ -12,13 +12,12 @@ pub(crate) struct WorkQueue {
     has_room: Condvar,
 }
 
-/// A job.
 pub(crate) type Job = Box<dyn FnOnce() + Send>;
 
 #[derive(Default)]
 struct State {
     jobs: VecDeque<(Job, u64)>,
-    /// Voxels of the jobs, including the one being done.
+    /// Voxels of the jobs, including the one being executed.
     voxels: u64,
     is_busy: bool,
     is_closed: bool,
@@ -26,7 +25,7 @@ struct State {
 }
 
 impl WorkQueue {
-    /// A queue that is full once it holds `limit_voxels`.
+    /// Creates a queue that is full once it contains `limit_voxels`.
     pub(crate) fn new(limit_voxels: u64) -> Self {
         let counts = OctreeQueueCounts { limit_voxels, ..OctreeQueueCounts::default() };
         Self {
@@ -40,8 +39,8 @@ impl WorkQueue {
         self.lock().counts
     }
 
-    /// Enqueues a job of so many voxels, once there is room for it or the queue is empty. Returns the wait in
-    /// nanoseconds, or the job if the queue is closed.
+    /// Enqueues a job for a number of voxels once there is space for it or the queue is empty. Returns the waiting time
+    /// in nanoseconds, or the job if the queue is closed.
     pub(crate) fn push(&self, voxels: usize, job: Job) -> Result<u64, Job> {
         let voxels = voxels as u64;
         let mut state = self.lock();
@@ -68,8 +67,8 @@ impl WorkQueue {
         Ok(wait_ns)
     }
 
-    /// Waits for a job and does it; `do_job` is given the wait in nanoseconds. Returns `false` once the queue is closed
-    /// and empty.
+    /// Waits for a job and passes it to `do_job` with the waiting time in nanoseconds. Returns `false` once the queue
+    /// is closed and empty.
     pub(crate) fn do_next(&self, do_job: impl FnOnce(Job, u64)) -> bool {
         let since = Instant::now();
         let is_idle = |state: &mut State| state.jobs.is_empty() && !state.is_closed;
@@ -84,12 +83,12 @@ impl WorkQueue {
         state.counts.batches_out += 1;
         state.counts.voxels_out += voxels;
         drop(state);
-        // All: there may be room for a small job while the one that has waited longest is large.
+        // Notify all, because there may be space for a small job while the one that has waited longest is large.
         self.has_room.notify_all();
         true
     }
 
-    /// Closes the queue: nothing more is enqueued, and what is queued can still be done.
+    /// Closes the queue: no more jobs are accepted, and queued ones can still be executed.
     pub(crate) fn close(&self) {
         self.lock().is_closed = true;
         self.has_work.notify_all();
@@ -97,7 +96,7 @@ impl WorkQueue {
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {
-        // No job runs under the lock, and nothing else can panic.
+        // No job runs under the lock, and no other code here can panic.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -3,13 +3,13 @@ use crate::tile::table::{Table, larger};
 
 /// OctoMap's octree as a view of a table's bricks.
 ///
-/// From depth 13 (a brick) downward a node is a run of a brick's voxels. The nodes above are stored here, level by
-/// level. [`BrickOctree::sync`] brings them up to date; until then queries read the bricks.
+/// From depth 13 (a brick) on, a node is a run of a brick's voxels. The nodes above are stored here, level by level.
+/// [`BrickOctree::sync`] updates them; until then queries read the bricks.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct BrickOctree {
-    /// The nodes of depth 12, then those of depth 11 and so on to the root, each level in Morton order.
+    /// The nodes of depth 12, then those of depth 11 and so on up to the root, each level in Morton order.
     nodes: Vec<Node>,
-    /// Where each level ends, depth 12 first.
+    /// End of each level, depth 12 first.
     ends: [u32; LEVELS],
     node_count: u64,
     is_synced: bool,
@@ -17,21 +17,21 @@ pub(crate) struct BrickOctree {
 
 #[derive(Clone, Copy, Debug)]
 struct Node {
-    /// The upper bits of its voxels' codes: three per level.
+    /// Upper bits of its voxels' codes: three per level.
     prefix: u64,
     max: f32,
-    /// Number of children that are leaves with the value of the first.
+    /// Number of children that are leaves and have the value of the first child.
     like_first: u8,
 }
 
 /// Depth of a brick.
 const BRICK_DEPTH: u8 = 13;
 
-/// Depths above the bricks.
+/// Number of levels above the bricks.
 const LEVELS: usize = BRICK_DEPTH as usize;
 
 impl BrickOctree {
-    /// Whether nothing has changed since the last [`sync`](Self::sync).
+    /// Returns whether the table is unchanged since the last [`sync`](Self::sync).
     pub(crate) fn is_synced(&self) -> bool {
         self.is_synced
     }
@@ -41,7 +41,7 @@ impl BrickOctree {
         self.is_synced = false;
     }
 
-    /// Nodes of OctoMap's tree, pruned, as of the last [`sync`](Self::sync).
+    /// Number of nodes of OctoMap's pruned tree, as of the last [`sync`](Self::sync).
     pub(crate) fn node_count(&self) -> u64 {
         self.node_count
     }
@@ -51,7 +51,7 @@ impl BrickOctree {
         self.nodes.capacity() * size_of::<Node>()
     }
 
-    /// Brings the summaries of changed bricks and the nodes above the bricks up to date.
+    /// Updates the summaries of changed bricks and the nodes above the bricks.
     pub(crate) fn sync(&mut self, table: &mut Table) {
         if self.is_synced {
             return;
@@ -69,7 +69,7 @@ impl BrickOctree {
             for number in begin..self.nodes.len() {
                 let Node { prefix, max, like_first } = self.nodes[number];
                 let is_leaf = like_first == 8;
-                // A leaf's children do not count as nodes.
+                // The children of a leaf do not count as nodes.
                 self.node_count += 1;
                 self.node_count -= if is_leaf { 8 } else { 0 };
                 if level + 1 < LEVELS {
@@ -92,7 +92,8 @@ impl BrickOctree {
         }
     }
 
-    /// Largest log-odds under the node at `depth` (1 to 16) that holds `code`; `None` if all are unknown.
+    /// Returns the largest log-odds under the node at `depth` (1 to 16) that contains `code`; `None` if all are
+    /// unknown.
     pub(crate) fn max_under(&self, table: &Table, code: MortonCode, depth: u8) -> Option<f32> {
         if self.is_synced && depth < BRICK_DEPTH {
             let level = usize::from(BRICK_DEPTH - 1 - depth);
@@ -109,8 +110,8 @@ impl BrickOctree {
     }
 }
 
-/// Largest log-odds of a table's voxels under the node at `depth` (1 to 16) that holds `code`, from the voxels
-/// themselves; `None` if all are unknown.
+/// Returns the largest log-odds of a table's voxels under the node at `depth` (1 to 16) that contains `code`, computed
+/// from the voxels; `None` if all are unknown.
 pub(crate) fn max_in_table(table: &Table, code: MortonCode, depth: u8) -> Option<f32> {
     if depth >= BRICK_DEPTH {
         return table.max_under(code, depth);

@@ -1,7 +1,7 @@
-//! The octree of a tile, derived from the table, in the form that `OctreeConfig` names.
+//! Octree of a tile, derived from the table, in the form selected by `OctreeConfig`.
 //!
-//! [`BrickOctree`] is a view of the table's bricks, and the default. The other form, a tree of pointers with or
-//! without OctoCache's voxel cache, is in `tile/octocache/`.
+//! [`BrickOctree`], the default, is a view of the table's bricks. The other form, a tree of pointers with or without
+//! OctoCache's voxel cache, is in `tile/octocache/`.
 
 mod brick_octree;
 mod octree_factory;

@@ -6,9 +6,10 @@ use crate::tile::octocache::{OctreeLedger, OctreeWorker, PointerOctree, TreeWrit
 use crate::tile::table::Table;
 use std::sync::Arc;
 
-/// Makes the octrees of a map's tiles, and owns what they share: the worker thread, if there is one, and the counts.
+/// Creates the octrees of a map's tiles, and owns their shared state: the worker thread, if there is one, and the
+/// counts.
 ///
-/// The default makes views of the tables' bricks.
+/// The default creates views of the tables' bricks.
 #[derive(Debug, Default)]
 pub struct OctreeFactory {
     config: OctreeConfig,
@@ -20,7 +21,7 @@ pub struct OctreeFactory {
 const QUEUE_VOXELS: u64 = 1 << 18;
 
 impl OctreeFactory {
-    /// A factory of octrees of this form.
+    /// Creates a factory for octrees of this form.
     ///
     /// With [`VoxelCacheMode::Parallel`] it starts a thread, which ends with the factory. If the system cannot start a
     /// thread, the mapping threads write the octrees.
@@ -33,20 +34,22 @@ impl OctreeFactory {
         let worker = match config {
             OctreeConfig::Pointers(VoxelCacheMode::Parallel(_)) => {
                 let worker = OctreeWorker::start(limit_voxels, ledger.clone());
-                worker.map_err(|error| log::warn!("no thread for octrees, which takes longer: {error}")).ok()
+                worker
+                    .map_err(|error| log::warn!("no thread for octrees, so updates take longer: {error}"))
+                    .ok()
             }
             _ => None,
         };
         Self { config, ledger, worker }
     }
 
-    /// Work on all octrees made here, including those that are gone.
+    /// Statistics of all octrees created here, including dropped ones.
     pub fn statistics(&self) -> OctreeStatistics {
         let queue = self.worker.as_ref().map(|worker| worker.queue().counts()).unwrap_or_default();
         OctreeStatistics { queue, ..self.ledger.sum() }
     }
 
-    /// The octree of a table, up to date.
+    /// Creates the octree of a table.
     pub(crate) fn octree_of(&self, table: &mut Table) -> TileOctree {
         match self.config {
             OctreeConfig::Bricks => {

@@ -6,7 +6,7 @@ use crate::space::{MortonCode, VoxelIndex};
 use crate::tile::octocache::{PointerOctree, VoxelCacheCounts};
 use crate::tile::table::Table;
 
-/// The octree of a tile in the configured form. Both forms give the same answers.
+/// Octree of a tile in the configured form. Both forms give the same answers.
 #[derive(Clone, Debug)]
 pub(crate) enum TileOctree {
     Bricks(BrickOctree),
@@ -31,8 +31,8 @@ impl TileOctree {
         }
     }
 
-    /// Largest log-odds of the voxels under the node at `depth` (1 to 16) that holds `code`; `None` if all are
-    /// unknown.
+    /// Returns the largest log-odds of the voxels under the node at `depth` (1 to 16) that contains `code`; `None` if
+    /// all are unknown.
     pub(crate) fn max_under(&self, table: &Table, code: MortonCode, depth: u8) -> Option<f32> {
         match self {
             Self::Bricks(octree) => octree.max_under(table, code, depth),
@@ -40,7 +40,7 @@ impl TileOctree {
         }
     }
 
-    /// Whether the octree contains all updates.
+    /// Returns whether the octree contains all updates.
     pub(crate) fn is_synced(&self) -> bool {
         match self {
             Self::Bricks(octree) => octree.is_synced(),
@@ -48,7 +48,7 @@ impl TileOctree {
         }
     }
 
-    /// Brings the octree up to date.
+    /// Updates the octree.
     pub(crate) fn sync(&mut self, table: &mut Table) {
         match self {
             Self::Bricks(octree) => octree.sync(table),
@@ -56,7 +56,7 @@ impl TileOctree {
         }
     }
 
-    /// OctoMap's tree, up to date.
+    /// Returns OctoMap's tree, up to date.
     pub(crate) fn tree(&self, table: &Table) -> Octree {
         match self {
             Self::Bricks(_) => {
@@ -67,7 +67,7 @@ impl TileOctree {
         }
     }
 
-    /// Nodes of the tree as of the last sync or eviction from the cache.
+    /// Number of nodes of the tree as of the last sync or eviction from the cache.
     pub(crate) fn node_count(&self) -> u64 {
         match self {
             Self::Bricks(octree) => octree.node_count(),
@@ -86,7 +86,7 @@ impl TileOctree {
         }
     }
 
-    /// Counts of the voxel cache, if there is one.
+    /// Counts of the voxel cache; zero without a cache.
     pub(crate) fn cache_counts(&self) -> VoxelCacheCounts {
         match self {
             Self::Bricks(_) => VoxelCacheCounts::default(),

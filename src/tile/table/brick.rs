@@ -6,7 +6,7 @@ use crate::octree::BrickNodes;
 use crate::sensor::Evidence;
 use crate::space::{BrickCode, BrickMask, places};
 
-/// The evidence of the observed voxels of one brick.
+/// Evidence of the observed voxels of one brick.
 #[derive(Clone, Debug)]
 pub(crate) struct Brick {
     code: BrickCode,
@@ -17,24 +17,23 @@ pub(crate) struct Brick {
 
 #[derive(Clone, Debug)]
 pub(crate) enum Storage {
-    /// The number of each voxel's state in the tile's palette; [`UNKNOWN`](super::palette::UNKNOWN) where nothing was
-    /// observed.
+    /// Number of each voxel's state in the tile's palette; [`UNKNOWN`](super::palette::UNKNOWN) for unobserved voxels.
     Interned(Cells<StateId>),
-    /// The evidence itself, if there are too many states for a palette; arbitrary where nothing was observed.
+    /// The evidence of each voxel, if there are too many states for a palette; arbitrary for unobserved voxels.
     Plain(Cells<UnpaddedEvidence>),
 }
 
 impl Brick {
-    /// Stands for an absent brick.
+    /// Represents absent bricks.
     pub(crate) const ABSENT_BRICK: &Self = &Self::new(BrickCode(0));
 
-    /// A brick without observed voxels.
+    /// Creates a brick without observed voxels.
     pub(crate) const fn new(code: BrickCode) -> Self {
         let evidence = Storage::Interned(Cells::empty());
         Self { code, observed: [0; 8], evidence, summary: Summary::EMPTY }
     }
 
-    /// A brick with voxels.
+    /// Creates a brick with voxels.
     pub(crate) const fn with(code: BrickCode, observed: BrickMask, evidence: Storage) -> Self {
         Self { code, observed, evidence, summary: Summary::STALE }
     }
@@ -52,15 +51,15 @@ impl Brick {
         }
     }
 
-    /// Reads the brick, so that it is in the cache.
+    /// Reads the brick to load it into the CPU cache.
     #[inline]
-    pub(crate) fn look_at_storage(&self) {
+    pub(crate) fn prefetch_storage(&self) {
         std::hint::black_box((self.observed[0], self.heap_bytes()));
     }
 
-    /// Reads of every line of the cells, so that they are in the cache.
+    /// Reads each line of the cells to load them into the CPU cache.
     #[inline]
-    pub(crate) fn look_at_cells(&self) {
+    pub(crate) fn prefetch_cells(&self) {
         if let Storage::Interned(cells) = &self.evidence {
             let look = |cell: &[StateId; CELL_VOXELS]| cell[0] ^ cell[CELL_VOXELS / 2];
             std::hint::black_box(cells.all().iter().fold(0, |all, cell| all ^ look(cell)));
@@ -79,12 +78,12 @@ impl Brick {
         }
     }
 
-    /// The observed voxels in Morton order: place and evidence.
+    /// The observed voxels in Morton order, as position and evidence.
     pub(crate) fn iter(&self, palette: &Palette) -> impl Iterator<Item = (usize, Evidence)> {
         places(self.observed).filter_map(|place| Some((place, self.get(place, palette)?)))
     }
 
-    /// Visits the items of [`Brick::iter`], a cell at a time.
+    /// Visits the items of [`Brick::iter`], one cell at a time.
     pub(crate) fn for_each(&self, palette: &Palette, mut visit: impl FnMut(usize, Evidence)) {
         match &self.evidence {
             Storage::Interned(cells) => {
@@ -96,7 +95,7 @@ impl Brick {
         }
     }
 
-    /// The observed voxels whose log-odds are at least a threshold.
+    /// Mask of the observed voxels whose log-odds are at least a threshold.
     pub(crate) fn mask_from(&self, threshold: f64, palette: &Palette) -> BrickMask {
         std::array::from_fn(|word| self.word_from(word, threshold, palette))
     }
@@ -112,14 +111,14 @@ impl Brick {
         from_threshold.unwrap_or(0) & self.observed[word]
     }
 
-    /// Makes the brick hold its evidence itself, without the palette.
+    /// Stores the evidence in the brick itself, without the palette.
     pub(crate) fn make_plain(&mut self, palette: &Palette) {
         if let Storage::Interned(cells) = &self.evidence {
             self.evidence = Storage::Plain(cells.map(|state| palette.evidence(state).into()));
         }
     }
 
-    /// Largest log-odds of the observed voxels among `span` (a power of eight) places from `first` on.
+    /// Largest log-odds of the observed voxels among `span` (a power of eight) positions from `first` on.
     pub(crate) fn max_of(&self, first: usize, span: usize, palette: &Palette) -> Option<f32> {
         let run = if span < 64 { ((1 << span) - 1) << (first % 64) } else { u64::MAX };
         let words = first / 64..(first + span).div_ceil(64);
@@ -137,12 +136,13 @@ impl Brick {
         max
     }
 
-    /// Largest log-odds of all observed voxels, of which there is at least one.
+    /// Largest log-odds of all observed voxels. There must be at least one.
     pub(crate) fn max(&self, palette: &Palette) -> Option<f32> {
         if self.summary.is_stale { self.max_of(0, 512, palette) } else { Some(self.summary.max) }
     }
 
-    /// The nodes of an octree under the brick, and the largest value. Voxels of at least the threshold are occupied.
+    /// Returns the nodes of an octree under the brick, and the largest value. Voxels of at least the threshold are
+    /// occupied.
     pub(crate) fn nodes(&self, threshold: Option<f32>, palette: &Palette) -> (BrickNodes, f32) {
         const NONE: f32 = f32::NEG_INFINITY;
         match &self.evidence {
@@ -161,31 +161,31 @@ impl Brick {
         }
     }
 
-    /// No voxel has larger log-odds, but for rounding.
+    /// Upper bound of the voxels' log-odds, apart from rounding.
     #[inline]
     pub(crate) fn bound(&self) -> f32 {
         self.summary.max
     }
 
-    /// Whether no voxel is known to have log-odds of a threshold or more.
+    /// Returns whether all log-odds are known to be below a threshold.
     #[inline]
     pub(crate) fn is_below(&self, threshold: f64) -> bool {
         self.summary.is_below(threshold)
     }
 
-    /// The summary of the brick, as of the last [`Brick::sum_up`].
+    /// Summary of the brick, as of the last [`Brick::sum_up`].
     pub(crate) fn summary(&self) -> Summary {
         self.summary
     }
 
-    /// Brings the summary up to date.
+    /// Updates the summary.
     pub(crate) fn sum_up(&mut self, palette: &Palette) {
         if self.summary.is_stale {
             self.summary = self.nodes(None, palette).into();
         }
     }
 
-    /// Number of observed voxels whose state is one of `states`, or whose own evidence satisfies `holds`.
+    /// Number of observed voxels whose state is selected in `states`, or whose own evidence satisfies `holds`.
     pub(crate) fn count(&self, states: &[bool], holds: impl Fn(Evidence) -> bool) -> usize {
         match &self.evidence {
             Storage::Interned(cells) => {
@@ -199,10 +199,10 @@ impl Brick {
         }
     }
 
-    /// Notes what the largest log-odds are of a brick that was made as a whole.
+    /// Records the largest log-odds of a brick that was created as a whole.
     pub(crate) fn note_max(&mut self, palette: &Palette) {
         if let Storage::Interned(cells) = &self.evidence {
-            // Each comparison waits for the one before, so several go beside each other.
+            // Several independent comparisons, because each would otherwise wait for the one before.
             const LANES: usize = 16;
             let mut largest = [f32::NEG_INFINITY; LANES];
             for cell in cells.all() {
@@ -214,7 +214,7 @@ impl Brick {
         }
     }
 
-    /// Marks the states that the brick's voxels are in.
+    /// Marks the states of the brick's voxels as used.
     pub(crate) fn mark_states(&self, in_use: &mut [bool]) {
         if let Storage::Interned(cells) = &self.evidence {
             cells.all().iter().flatten().for_each(|&state| in_use[usize::from(state)] = true);
@@ -229,7 +229,7 @@ impl Brick {
     }
 }
 
-/// Which values of a cell have log-odds of at least a threshold: without a branch, for they are hard to predict.
+/// Bits of the values of a cell whose log-odds are at least a threshold. Branchless, because they are hard to predict.
 #[inline]
 fn bits_of<T: Copy>(cell: &[T; CELL_VOXELS], evidence: impl Fn(T) -> Evidence, threshold: f64) -> u64 {
     let bit = |(bit, &value): (usize, &T)| u64::from(evidence(value).log_odds >= threshold) << bit;

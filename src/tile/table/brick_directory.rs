@@ -1,13 +1,13 @@
 use crate::space::{BrickCode, MortonCode, Torus, VoxelKey};
 
-/// Finds the bricks of a tile, by blocks of 4 x 4 x 4 bricks, of which a tile has few.
+/// Directory of the bricks of a tile, by blocks of 4 x 4 x 4 bricks, of which a tile has few.
 #[derive(Clone, Debug)]
 pub(crate) struct BrickDirectory {
     blocks: Torus,
-    /// The number of each brick of a block, in Morton order, counted from 1; 0 if it is absent. The first block stands
-    /// for all absent blocks.
+    /// Number of each brick of a block, in Morton order, from 1; 0 if it is absent. The first block represents all
+    /// absent blocks.
     numbers: Vec<[u32; BLOCK_BRICKS]>,
-    /// The bricks of each block that may hold occupied voxels, in Morton order, a bit each.
+    /// One bit for each brick of each block, in Morton order: whether it may contain occupied voxels.
     marks: Vec<u64>,
 }
 
@@ -22,11 +22,11 @@ impl Default for BrickDirectory {
     }
 }
 
-/// Where a voxel is: its block, the brick in the block, and the place in the brick.
+/// Address of a voxel: its block, the brick in the block, and the position in the brick.
 #[derive(Clone, Copy)]
 pub(crate) struct Address {
     block: [i32; 3],
-    /// The place of the brick in its block.
+    /// Position of the brick in its block.
     pub(crate) brick: usize,
     pub(crate) place: usize,
 }
@@ -34,7 +34,8 @@ pub(crate) struct Address {
 impl Address {
     #[inline]
     pub(crate) fn of_key(key: VoxelKey) -> Self {
-        // Of the lowest five bits, the lower three are the place in a brick, the others the brick in its block.
+        // The lower three of the lowest five bits are the position in a brick, the others that of the brick in its
+        // block.
         let part = |k: usize| SPREAD[usize::from(key.0[k] & 31)] << k;
         let code = usize::from(part(0) | part(1) | part(2));
         Self { block: key.0.map(|k| i32::from(k >> 5)), brick: code >> 9, place: code & 511 }
@@ -51,7 +52,7 @@ impl Address {
     }
 }
 
-/// Bit `k` of an index at bit `3k`.
+/// Moves bit `k` of an index to bit `3k`.
 const SPREAD: [u16; 32] = spread();
 
 const fn spread() -> [u16; 32] {
@@ -72,32 +73,32 @@ impl BrickDirectory {
             + self.marks.capacity() * size_of::<u64>()
     }
 
-    /// The number of the brick at an address, or 0.
+    /// Number of the brick at an address, or 0.
     #[inline]
     pub(crate) fn get(&self, at: Address) -> u32 {
-        // Without a branch: presence is unpredictable.
+        // Branchless, because presence is unpredictable.
         self.in_block(self.block(at), at)
     }
 
-    /// The number of the block at an address.
+    /// Number of the block at an address.
     #[inline]
     pub(crate) fn block(&self, at: Address) -> u32 {
         self.blocks.get(at.block)
     }
 
-    /// [`BrickDirectory::get`], with the number of the block.
+    /// [`BrickDirectory::get`] with a known block number.
     #[inline]
     pub(crate) fn in_block(&self, block: u32, at: Address) -> u32 {
         self.numbers[block as usize][at.brick]
     }
 
-    /// The marks of the bricks of the block at an address, in Morton order, a bit each.
+    /// Marks of the bricks of the block at an address, one bit each in Morton order.
     #[inline]
     pub(crate) fn marks(&self, at: Address) -> u64 {
         self.marks[self.blocks.get(at.block) as usize]
     }
 
-    /// Marks a brick that is there.
+    /// Marks a brick that exists.
     pub(crate) fn mark(&mut self, at: Address) {
         let block = self.blocks.get(at.block);
         if block != Torus::NONE {
@@ -105,7 +106,7 @@ impl BrickDirectory {
         }
     }
 
-    /// The entry for the brick at an address.
+    /// Entry for the brick at an address.
     pub(crate) fn entry(&mut self, at: Address) -> &mut u32 {
         let mut block = self.blocks.get(at.block);
         if block == Torus::NONE {

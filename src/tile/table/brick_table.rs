@@ -1,6 +1,6 @@
 use super::brick::Brick;
 use super::brick_directory::{Address, BLOCK_EDGE, BrickDirectory};
-use super::brick_look::BrickLook;
+use super::brick_view::BrickView;
 use super::palette::Palette;
 use super::summary::{Summary, larger};
 use crate::octree::write_bt_of_bricks;
@@ -9,23 +9,23 @@ use crate::space::{BRICK_EDGE, BrickCode, BrickMask, MortonCode, VoxelBox, Voxel
 use std::io::{self, Write};
 use std::ops::Range;
 
-/// The exact evidence of every observed voxel of a tile: the truth, from which all else is derived.
+/// Exact evidence of each observed voxel of a tile. All other data of a tile are derived from it.
 ///
-/// It consists of bricks of 8 x 8 x 8 voxels, in which a voxel is the number of its state in the tile's palette: four
-/// to five bytes per observed voxel in total. If there are too many states for a palette (intensities that never
-/// repeat), bricks hold the evidence itself.
+/// The table consists of bricks of 8 x 8 x 8 voxels, in which a voxel is the number of its state in the tile's palette:
+/// four to five bytes per observed voxel in total. If there are too many states for a palette (intensities that never
+/// repeat), bricks contain the evidence itself.
 #[derive(Clone, Debug, Default)]
 pub struct Table {
-    /// In order of their first update.
+    /// In the order of their first update.
     pub(crate) bricks: Vec<Brick>,
     pub(crate) directory: BrickDirectory,
-    /// The numbers of the bricks in Morton order, as of the last [`Table::sum_up`].
+    /// Numbers of the bricks in Morton order, as of the last [`Table::sum_up`].
     order: Vec<u32>,
     pub(crate) palette: Palette,
     pub(crate) len: usize,
     /// Bytes of the bricks' cells; [`Table::bytes`] adds the rest.
     pub(crate) cell_bytes: usize,
-    /// Bricks that stopped using the palette since its last clean-up.
+    /// Number of bricks that stopped using the palette since its last clean-up.
     pub(crate) made_plain: usize,
 }
 
@@ -35,7 +35,7 @@ impl Table {
         self.len
     }
 
-    /// Whether no voxel was observed.
+    /// Returns whether no voxel was observed.
     pub fn is_empty(&self) -> bool {
         self.len == 0
     }
@@ -61,30 +61,30 @@ impl Table {
         self.at(Address::of_key(key))
     }
 
-    /// Number of bricks that hold an observed voxel.
+    /// Number of bricks with an observed voxel.
     pub(crate) fn brick_count(&self) -> usize {
         self.bricks.len()
     }
 
-    /// Whether any voxel of a brick was observed.
+    /// Returns whether any voxel of a brick was observed.
     pub fn has_brick(&self, brick: BrickCode) -> bool {
         self.brick(brick).is_some()
     }
 
-    /// The number of a brick that holds an observed voxel. It stays until the table changes.
+    /// Number of a brick with an observed voxel. It is valid until the table changes.
     #[inline]
     pub(crate) fn number_of_brick(&self, brick: BrickCode) -> Option<u32> {
         self.directory.get(Address::of_brick(brick)).checked_sub(1)
     }
 
-    /// The brick with a number, to look at many of its voxels.
+    /// View of the brick with a number, for reading many of its voxels.
     #[inline]
-    pub(crate) fn numbered(&self, number: u32) -> Option<BrickLook<'_>> {
-        Some(BrickLook { brick: self.bricks.get(number as usize)?, palette: &self.palette })
+    pub(crate) fn numbered(&self, number: u32) -> Option<BrickView<'_>> {
+        Some(BrickView { brick: self.bricks.get(number as usize)?, palette: &self.palette })
     }
 
-    /// A cube of 8, 16 or 32 voxels around a voxel without any whose log-odds are at least a threshold; `None` if there
-    /// may be one in the voxel's brick. It may extend beyond the tile.
+    /// Returns a cube of 8, 16 or 32 voxels around a voxel in which all log-odds are below a threshold; `None` if the
+    /// voxel's brick may reach the threshold. The cube may extend beyond the tile.
     #[inline]
     pub(crate) fn below_around(&self, voxel: VoxelIndex, threshold: f64) -> Option<VoxelBox> {
         if !Summary::are_marks_for(threshold) {
@@ -92,7 +92,7 @@ impl Table {
         }
         let at = Address::of_key(VoxelKey::from_index(voxel));
         let marks = self.directory.marks(at);
-        // Eight bricks in a row of the Morton order are a cube.
+        // Eight consecutive bricks in Morton order form a cube.
         let octant = marks >> (at.brick & !7) & 0xff;
         let edge = match (marks, octant, octant >> (at.brick & 7) & 1) {
             (0, ..) => BLOCK_EDGE,
@@ -104,8 +104,8 @@ impl Table {
         Some(VoxelBox { min, end: min.map(|k| k.saturating_add(edge)) })
     }
 
-    /// Visits the lowest voxels of bricks that meet a box and may hold log-odds of at least a threshold. Says `false`,
-    /// and visits none, if nobody knows which these are.
+    /// Visits the lowest voxels of bricks that intersect a box and may contain log-odds of at least a threshold.
+    /// Returns `false` without visiting any if these bricks are not tracked.
     pub(crate) fn visit_marked(
         &self,
         voxels: &VoxelBox,
@@ -126,7 +126,7 @@ impl Table {
                         let place = marks.trailing_zeros();
                         marks &= marks - 1;
                         visit(std::array::from_fn(|k| {
-                            // Two bits a coordinate, interleaved.
+                            // Two bits per coordinate, interleaved.
                             let steps = (place >> k & 1) | (place >> (k + 3) & 1) << 1;
                             block[k].saturating_add(BRICK_EDGE * steps as i32)
                         }));
@@ -137,7 +137,8 @@ impl Table {
         true
     }
 
-    /// Notes which of the bricks may hold occupied voxels since a change; `before` is the bound of its log-odds before.
+    /// Marks a brick if a change may have made voxels occupied; `before` is the bound of its log-odds before the
+    /// change.
     #[inline]
     pub(crate) fn note_raised(&mut self, number: usize, before: f32) {
         let brick = &self.bricks[number];
@@ -146,7 +147,7 @@ impl Table {
         }
     }
 
-    /// The bricks that hold an observed voxel, in Morton order.
+    /// The bricks with observed voxels, in Morton order.
     pub fn bricks(&self) -> impl Iterator<Item = BrickCode> {
         self.bricks_in_order().map(Brick::code)
     }
@@ -156,7 +157,7 @@ impl Table {
         self.brick(brick).into_iter().flat_map(|brick| self.voxels_in(brick))
     }
 
-    /// Visits the observed voxels of one brick, in Morton order: place and evidence.
+    /// Visits the observed voxels of one brick in Morton order, as position and evidence.
     pub fn for_each_in(&self, brick: BrickCode, visit: impl FnMut(usize, Evidence)) {
         if let Some(brick) = self.brick(brick) {
             brick.for_each(&self.palette, visit);
@@ -180,8 +181,8 @@ impl Table {
         self.bricks_in_order().flat_map(|brick| self.voxels_in(brick))
     }
 
-    /// The observed voxels whose log-odds are at least a threshold, in Morton order. Bricks of free space are passed
-    /// over as wholes.
+    /// The observed voxels whose log-odds are at least a threshold, in Morton order. Bricks of free space are skipped
+    /// as a whole.
     pub fn iter_from(&self, threshold: f64) -> impl Iterator<Item = (MortonCode, Evidence)> {
         self.bricks_in_order().filter(move |brick| !brick.is_below(threshold)).flat_map(move |brick| {
             let found = places(brick.mask_from(threshold, &self.palette));
@@ -196,12 +197,12 @@ impl Table {
         self.bricks.iter().map(|brick| brick.count(&states, holds)).sum()
     }
 
-    /// Writes the `.bt` file that OctoMap's `writeBinary` writes for the octree of the table. A voxel is occupied
+    /// Writes the `.bt` file that OctoMap's `writeBinary` would write for the octree of the table. A voxel is occupied
     /// if its log-odds as `f32` are at least the threshold.
     ///
     /// # Errors
     ///
-    /// Those of [`write_bt`](crate::octree::write_bt).
+    /// Same errors as [`write_bt`](crate::octree::write_bt).
     pub fn write_bt(&self, resolution_m: f64, threshold: f32, out: &mut impl Write) -> io::Result<()> {
         let bricks: Vec<&Brick> = self.bricks_in_order().collect();
         let codes: Vec<BrickCode> = bricks.iter().map(|brick| brick.code()).collect();
@@ -209,7 +210,7 @@ impl Table {
         write_bt_of_bricks(&codes, nodes_of, resolution_m, out)
     }
 
-    /// Largest log-odds under the octree node at `depth` (13, a brick, to 16) that holds a voxel; `None` if all are
+    /// Largest log-odds under the octree node at `depth` (13, a brick, to 16) that contains a voxel; `None` if all are
     /// unknown.
     pub(crate) fn max_under(&self, code: MortonCode, depth: u8) -> Option<f32> {
         let brick = self.brick(code.brick())?;
@@ -230,7 +231,7 @@ impl Table {
         bricks.filter_map(|brick| brick.max(&self.palette)).reduce(larger)
     }
 
-    /// Brings the bricks' summaries up to date, and their order.
+    /// Updates the bricks' summaries and their order.
     pub(crate) fn sum_up(&mut self) {
         self.bricks.iter_mut().for_each(|brick| brick.sum_up(&self.palette));
         if !self.is_in_order() {
@@ -278,12 +279,12 @@ impl Table {
         self.bricks.get((self.directory.get(at) as usize).wrapping_sub(1))
     }
 
-    /// An empty table with a palette.
+    /// Creates an empty table with a palette.
     pub(crate) fn with_palette(palette: Palette) -> Self {
         Self { palette, ..Self::default() }
     }
 
-    /// The value of [`Table::bytes`], counted anew.
+    /// Value of [`Table::bytes`], recomputed.
     #[cfg(test)]
     pub(crate) fn counted_bytes(&self) -> usize {
         self.bytes() - self.cell_bytes + self.bricks.iter().map(Brick::heap_bytes).sum::<usize>()

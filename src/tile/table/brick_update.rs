@@ -7,7 +7,7 @@ use crate::scan::{BrickRuns, BrickUpdate, Misses};
 use crate::sensor::{Evidence, Observation, SensorModel};
 use crate::space::{BrickMask, places};
 
-/// The part of a brick's update that is not applied yet.
+/// Part of a brick's update that is not applied yet.
 pub(crate) struct Rest<'a> {
     hits: BrickMask,
     misses: BrickMask,
@@ -32,19 +32,19 @@ impl<'a> Rest<'a> {
         }
     }
 
-    /// The words with remaining updates, bit `k` for word `k`.
+    /// Set of words with remaining updates: bit `k` for word `k`.
     fn words(&self) -> u8 {
         (0..8).fold(0, |words, word| words | u8::from(self.hits[word] | self.misses[word] != 0) << word)
     }
 }
 
 impl Brick {
-    /// Applies an update. Returns how many voxels are observed for the first time. If the palette is full, the
-    /// remainder stays in `rest`; the caller makes room, or makes the brick plain, and tries again.
+    /// Applies an update. Returns the number of voxels observed for the first time. If the palette is full, the
+    /// remainder is left in `rest`; the caller frees states, or makes the brick plain, and calls this again.
     pub(crate) fn update(&mut self, rest: &mut Rest<'_>, palette: &mut Palette) -> (usize, Result<(), Full>) {
-        // Not by comparison: that is a call.
+        // Not by comparison, which would be a function call.
         let has_hits = rest.hits.iter().fold(0, |all, word| all | word) != 0;
-        self.summary.note_change(if has_hits { f32::INFINITY } else { palette.most_after_miss() });
+        self.summary.note_change(if has_hits { f32::INFINITY } else { palette.max_after_miss() });
         match &mut self.evidence {
             Storage::Interned(cells) => update_interned(cells, &mut self.observed, rest, palette),
             Storage::Plain(cells) => (update_plain(cells, &mut self.observed, rest, palette.model()), Ok(())),
@@ -52,7 +52,7 @@ impl Brick {
     }
 
     /// Applies one update of one voxel whose cell exists. Returns whether the voxel is observed for the first time;
-    /// `None`, with nothing done, if the palette is full.
+    /// `None`, without an update, if the palette is full.
     #[inline]
     pub(crate) fn update_one(
         &mut self,
@@ -61,7 +61,7 @@ impl Brick {
         palette: &mut Palette,
     ) -> Option<bool> {
         let bound = match observation {
-            Observation::Miss => palette.most_after_miss(),
+            Observation::Miss => palette.max_after_miss(),
             Observation::Hit(_) => f32::INFINITY,
         };
         self.step(place, bound, |before| match observation {
@@ -70,8 +70,8 @@ impl Brick {
         })
     }
 
-    /// Applies runs, and takes away those that are done: all of them, unless the palette is full or the brick does not
-    /// use it. Returns how many voxels are observed for the first time.
+    /// Applies runs and removes them from the list: all of them, unless the palette is full or the brick does not use
+    /// it. Returns the number of voxels observed for the first time.
     pub(crate) fn update_runs(
         &mut self,
         left: &mut BrickRuns<'_>,
@@ -79,7 +79,7 @@ impl Brick {
         known: &mut MissRuns,
     ) -> usize {
         let has_hits = left.runs.iter().any(|run| run.hit.is_some());
-        self.summary.note_change(if has_hits { f32::INFINITY } else { palette.most_after_miss() });
+        self.summary.note_change(if has_hits { f32::INFINITY } else { palette.max_after_miss() });
         let Storage::Interned(cells) = &mut self.evidence else { return 0 };
         let word_of = |place: u16| 1 << (place / 64);
         let of_runs = left.runs.iter().fold(0, |words, run| words | word_of(run.place));
@@ -125,8 +125,8 @@ impl Brick {
         Some(is_new)
     }
 
-    /// Inserts voxels that were not observed yet, in Morton order. Returns how many were inserted before the palette
-    /// was full.
+    /// Inserts voxels that were not observed yet, in Morton order. Returns the number inserted before the palette was
+    /// full.
     pub(crate) fn insert(&mut self, voxels: &[(usize, Evidence)], palette: &mut Palette) -> usize {
         for (_, evidence) in voxels {
             self.summary.note_change((evidence.log_odds as f32).next_up());
@@ -136,7 +136,7 @@ impl Brick {
             Storage::Interned(cells) => cells.make(words, UNKNOWN),
             Storage::Plain(cells) => cells.make(words, UnpaddedEvidence::from(Evidence::PRIOR)),
         }
-        // Neighbors are often equal.
+        // Adjacent voxels often have the same state.
         let mut last = (Evidence::PRIOR, UNKNOWN);
         for (done, &(place, evidence)) in voxels.iter().enumerate() {
             let (word, bit) = (place / 64, place % 64);
@@ -156,7 +156,7 @@ impl Brick {
     }
 }
 
-/// Applies misses, and takes away those that are done. Returns how many voxels are observed for the first time.
+/// Applies misses and removes them from the list. Returns the number of voxels observed for the first time.
 fn update_misses(
     cells: &mut Cells<StateId>,
     observed: &mut BrickMask,
@@ -166,7 +166,7 @@ fn update_misses(
 ) -> usize {
     let mut new = 0;
     while let Some(first) = left.first() {
-        // Those of one cell, which is looked up once.
+        // The misses of one cell, which is looked up once.
         let word = usize::from(first.place / 64);
         let cell = cells.cell_mut(word).expect(MADE);
         let (mut passed, mut done) = (0_u64, 0);
@@ -175,7 +175,7 @@ fn update_misses(
             left.iter().take_while(|misses| usize::from(misses.place / 64) == word)
         {
             let state = &mut cell[usize::from(place % 64)];
-            // Without misses an unknown voxel stays unknown.
+            // Without misses an unknown voxel remains unknown.
             if misses > 0 {
                 let Ok(after) = palette.after_misses(*state, misses, known) else {
                     is_full = true;
@@ -196,13 +196,13 @@ fn update_misses(
     new
 }
 
-/// Whether both are equal to the bit.
+/// Returns whether both are bit-identical.
 #[inline]
 fn is_same(a: Evidence, b: Evidence) -> bool {
     a.log_odds.to_bits() == b.log_odds.to_bits() && a.observation_count == b.observation_count
 }
 
-const MADE: &str = "the cells of the touched words were made before";
+const MADE: &str = "the cells of the updated words were created before";
 
 fn update_interned(
     cells: &mut Cells<StateId>,
@@ -218,7 +218,7 @@ fn update_interned(
         let (mut misses, mut hits) = (rest.misses[word], rest.hits[word]);
         let touched = misses | hits;
         let mut result = Ok(());
-        // An unobserved voxel needs no case of its own: its state has steps like any other.
+        // An unobserved voxel needs no special case: its state has steps like any other.
         while misses != 0 {
             let state = &mut cell[misses.trailing_zeros() as usize];
             match palette.after_miss(*state) {

@@ -1,14 +1,14 @@
 use crate::space::BrickMask;
 
-/// Voxels of a cell: one word of a brick's mask.
+/// Number of voxels of a cell: one word of a brick's mask.
 pub(crate) const CELL_VOXELS: usize = 64;
 
-/// A value for every voxel of a brick, in cells of 4 x 4 x 4. A cell takes memory once one of its voxels is set.
+/// Values for all voxels of a brick, in cells of 4 x 4 x 4. A cell takes memory once one of its voxels is set.
 ///
-/// Smaller cells would save a third of the memory on a street, but every update would have to count bits.
+/// Smaller cells would save a third of the memory on a street, but each update would have to count bits.
 #[derive(Clone, Debug)]
 pub(crate) struct Cells<T> {
-    /// The cell of each word of a mask, or [`ABSENT`].
+    /// Position in `cells` for each word of a mask, or [`ABSENT`].
     places: [u8; 8],
     cells: Vec<[T; CELL_VOXELS]>,
 }
@@ -20,7 +20,7 @@ impl<T: Copy> Cells<T> {
         Self { places: [ABSENT; 8], cells: Vec::new() }
     }
 
-    /// Cells for the non-zero words of a mask, in their order, filled with `value`.
+    /// Creates cells for the nonzero words of a mask, in order, filled with `value`.
     pub(crate) fn of_words(mask: &BrickMask, value: T) -> Self {
         let mut places = [ABSENT; 8];
         let mut count = 0;
@@ -36,19 +36,19 @@ impl<T: Copy> Cells<T> {
         self.cells.capacity() * size_of::<[T; CELL_VOXELS]>()
     }
 
-    /// The cell of a word, if it is there.
+    /// The cell of a word, if it exists.
     #[inline]
     pub(crate) fn cell(&self, word: usize) -> Option<&[T; CELL_VOXELS]> {
         self.cells.get(usize::from(self.places[word]))
     }
 
-    /// The cell of a word, if it is there.
+    /// The cell of a word, if it exists.
     #[inline]
     pub(crate) fn cell_mut(&mut self, word: usize) -> Option<&mut [T; CELL_VOXELS]> {
         self.cells.get_mut(usize::from(self.places[word]))
     }
 
-    /// Makes the missing cells of the given words (bit `k` for word `k`), filled with `value`.
+    /// Creates the missing cells of the given words (bit `k` for word `k`), filled with `value`.
     pub(crate) fn make(&mut self, words: u8, value: T) {
         let missing = (0..8).fold(0, |missing, word| {
             missing | (words >> word & 1 & u8::from(self.places[word] == ABSENT)) << word
@@ -56,7 +56,7 @@ impl<T: Copy> Cells<T> {
         if missing == 0 {
             return;
         }
-        // No slack: this happens at most eight times in a brick's life.
+        // Exact, because this happens at most eight times per brick.
         self.cells.reserve_exact(missing.count_ones() as usize);
         for word in (0..8).filter(|word| missing >> word & 1 == 1) {
             self.places[word] = self.cells.len() as u8;
@@ -64,7 +64,7 @@ impl<T: Copy> Cells<T> {
         }
     }
 
-    /// Visits the values of a mask whose cells exist, in Morton order: place and value.
+    /// Visits the values of a mask whose cells exist, in Morton order, as position and value.
     #[inline]
     pub(crate) fn for_each(&self, mask: BrickMask, mut visit: impl FnMut(usize, T)) {
         for (word, mut bits) in mask.into_iter().enumerate() {
@@ -82,12 +82,11 @@ impl<T: Copy> Cells<T> {
         &self.cells
     }
 
-    /// All cells, in no particular order.
     pub(crate) fn all_mut(&mut self) -> &mut [[T; CELL_VOXELS]] {
         &mut self.cells
     }
 
-    /// The same cells with other values.
+    /// Converts the values of all cells.
     pub(crate) fn map<U: Copy>(&self, value: impl Fn(T) -> U) -> Cells<U> {
         Cells { places: self.places, cells: self.cells.iter().map(|cell| cell.map(&value)).collect() }
     }

@@ -1,7 +1,7 @@
 use super::palette::StateId;
 
-/// Caches where runs of misses lead. The states within a run are seldom met again, but runs of equal length are:
-/// equally many rays pass neighbouring voxels.
+/// Cache of the states after runs of misses. The states within a run seldom recur, but runs of equal length do: equally
+/// many rays pass adjacent voxels.
 ///
 /// Valid as long as the states keep their numbers.
 pub(crate) struct MissRuns(Vec<Entry>);
@@ -13,7 +13,7 @@ struct Entry {
     after: StateId,
 }
 
-/// Matches no run: a run has at least one miss.
+/// Matches no run, because a run has at least one miss.
 const NONE: Entry = Entry { before: 0, misses: 0, after: 0 };
 const ENTRIES: usize = 1 << 11;
 
@@ -22,12 +22,11 @@ impl MissRuns {
         Self(vec![NONE; ENTRIES])
     }
 
-    /// Clears the cache.
     pub(crate) fn clear(&mut self) {
         self.0.fill(NONE);
     }
 
-    /// The state after `misses`, at least one.
+    /// The cached state after `misses`, at least one.
     #[inline]
     pub(crate) fn get(&self, before: StateId, misses: u16) -> Option<StateId> {
         let entry = &self.0[place(before, misses)];
@@ -40,7 +39,7 @@ impl MissRuns {
     }
 }
 
-/// Differs for runs of different lengths from one state.
+/// Index of a run; differs for runs of different lengths from one state.
 #[inline]
 fn place(before: StateId, misses: u16) -> usize {
     usize::from(before.wrapping_mul(0x9e35) ^ misses) % ENTRIES

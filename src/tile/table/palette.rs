@@ -5,51 +5,51 @@ use crate::sensor::{Evidence, Observation, SensorModel};
 /// Number of a state in a [`Palette`].
 pub(crate) type StateId = u16;
 
-/// The state of an unobserved voxel. As a *next* state it means that the step is not computed yet: no update leads back
-/// to it.
+/// State of an unobserved voxel. As a *next* state it means that the step was not computed yet: no update leads back to
+/// it.
 pub(crate) const UNKNOWN: StateId = 0;
 
-/// The distinct states of evidence of a tile's voxels, each stored once, with the steps between them.
+/// Distinct states of evidence of a tile's voxels, each stored once, with the steps between them.
 ///
-/// Voxels with the same history have the same evidence, and few histories are common: a tile of a million voxels has
-/// some hundreds of states. A step (state, observation) -> state is a pure function, so it is computed once and
-/// looked up from then on: an update is one read and one write of two bytes.
+/// Voxels with the same history have the same evidence, and most voxels share a few histories: a tile of a million
+/// voxels has some hundreds of states. A step (state, observation) -> state is a pure function, so it is computed once
+/// and looked up from then on: an update is one read and one write of two bytes.
 ///
-/// The number of states is limited. The limit follows the number in use, so that unused states do not pile up: at the
-/// limit the owner calls [`retain`](Palette::retain) with the states in use.
+/// The number of states is limited. The limit depends on the number in use, so that unused states do not accumulate: at
+/// the limit the owner calls [`retain`](Palette::retain) with the states in use.
 #[derive(Clone, Debug)]
 pub(crate) struct Palette {
     model: SensorModel,
-    /// No miss leads to larger log-odds, unless they were larger before.
-    most_after_miss: f32,
+    /// Largest log-odds that a miss can lead to, unless they were larger before.
+    max_after_miss: f32,
     evidence: Vec<Evidence>,
     next: Vec<Next>,
-    /// The log-odds as `f32`, as the octree has them; negative infinity for unknown voxels.
+    /// Log-odds as `f32`, as in the octree; negative infinity for unknown voxels.
     values: Vec<f32>,
     /// Hash table of the states by evidence, with open addressing; [`UNKNOWN`] marks a free slot.
     slots: Vec<StateId>,
-    /// Most states before unused ones are dropped; at most `most`.
+    /// Number of states at which unused ones are dropped; at most `max_states`.
     limit: usize,
-    most: usize,
+    max_states: usize,
     renumberings: u64,
 }
 
-/// The state after an observation, or [`UNKNOWN`].
+/// State after an observation, or [`UNKNOWN`].
 #[derive(Clone, Copy, Debug, Default)]
 struct Next {
     miss: StateId,
     hit: StateId,
 }
 
-/// The palette is full.
+/// Error: the palette is full.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Full;
 
 const FIRST_LIMIT: usize = 1 << 10;
 const MAX_STATES: usize = 1 << 16;
 
-fn most_after_miss(model: &SensorModel) -> f32 {
-    (model.most_after_miss() as f32).next_up()
+fn max_after_miss(model: &SensorModel) -> f32 {
+    (model.max_after_miss() as f32).next_up()
 }
 
 impl Default for Palette {
@@ -59,33 +59,33 @@ impl Default for Palette {
 }
 
 impl Palette {
-    /// A palette of `limit` states at first and at most `most`; both powers of two.
-    pub(crate) fn limited(limit: usize, most: usize) -> Self {
+    /// Creates a palette with an initial limit of `limit` states and a maximum of `max_states`; both must be powers of two.
+    pub(crate) fn limited(limit: usize, max_states: usize) -> Self {
         let model = SensorModel::default();
         Self {
             model,
-            most_after_miss: most_after_miss(&model),
+            max_after_miss: max_after_miss(&model),
             evidence: vec![Evidence::PRIOR],
             next: vec![Next::default()],
             values: vec![f32::NEG_INFINITY],
             slots: Vec::new(),
             limit,
-            most,
+            max_states,
             renumberings: 0,
         }
     }
 
-    /// A palette with the largest limit, until [`limit_by_use`](Self::limit_by_use).
-    pub(crate) fn with_all_room() -> Self {
+    /// Creates a palette with the largest limit, until [`limit_by_use`](Self::limit_by_use) is called.
+    pub(crate) fn with_max_limit() -> Self {
         Self::limited(MAX_STATES, MAX_STATES)
     }
 
-    /// Sets the limit that would result if the states had come one by one.
+    /// Sets the limit that would result if the states had been added one by one.
     pub(crate) fn limit_by_use(&mut self) {
-        self.limit = (2 * self.len()).next_power_of_two().clamp(FIRST_LIMIT, self.most);
+        self.limit = (2 * self.len()).next_power_of_two().clamp(FIRST_LIMIT, self.max_states);
     }
 
-    /// The sensor model that computes steps.
+    /// Sensor model that computes the steps.
     pub(crate) fn model(&self) -> &SensorModel {
         &self.model
     }
@@ -94,15 +94,15 @@ impl Palette {
     pub(crate) fn use_model(&mut self, model: &SensorModel) {
         if self.model != *model {
             self.model = *model;
-            self.most_after_miss = most_after_miss(model);
+            self.max_after_miss = max_after_miss(model);
             self.next.fill(Next::default());
         }
     }
 
-    /// No miss leads to larger log-odds, unless they were larger before.
+    /// Largest log-odds that a miss can lead to, unless they were larger before.
     #[inline]
-    pub(crate) fn most_after_miss(&self) -> f32 {
-        self.most_after_miss
+    pub(crate) fn max_after_miss(&self) -> f32 {
+        self.max_after_miss
     }
 
     /// Number of states, including the unknown state.
@@ -118,13 +118,12 @@ impl Palette {
             + self.slots.capacity() * size_of::<StateId>()
     }
 
-    /// The evidence of a state.
     #[inline]
     pub(crate) fn evidence(&self, state: StateId) -> Evidence {
         self.evidence[usize::from(state)]
     }
 
-    /// The log-odds of states as `f32`; negative infinity where a voxel is unknown.
+    /// Log-odds of states as `f32`; negative infinity for unknown voxels.
     #[inline]
     pub(crate) fn values(&self, states: &[StateId; CELL_VOXELS]) -> [f32; CELL_VOXELS] {
         states.map(|state| self.values[usize::from(state)])
@@ -137,7 +136,7 @@ impl Palette {
         states
     }
 
-    /// The state after a miss.
+    /// State after a miss.
     #[inline]
     pub(crate) fn after_miss(&mut self, before: StateId) -> Result<StateId, Full> {
         match self.next[usize::from(before)].miss {
@@ -146,7 +145,7 @@ impl Palette {
         }
     }
 
-    /// The state after so many misses.
+    /// State after a number of misses.
     #[inline]
     pub(crate) fn after_misses(
         &mut self,
@@ -162,7 +161,7 @@ impl Palette {
         Ok(after)
     }
 
-    /// The state after a hit.
+    /// State after a hit.
     #[inline]
     pub(crate) fn after_hit(&mut self, before: StateId, intensity: f32) -> Result<StateId, Full> {
         match self.next[usize::from(before)].hit {
@@ -183,14 +182,14 @@ impl Palette {
     fn first_hit(&mut self, before: StateId, intensity: f32) -> Result<StateId, Full> {
         let hit = Observation::Hit(intensity);
         let after = self.intern(self.model.update(Some(self.evidence(before)), hit))?;
-        // If the intensity counts, the next hit leads to another state.
+        // If the intensity is used, the next hit leads to another state.
         if !self.model.needs_intensity() {
             self.next[usize::from(before)].hit = after;
         }
         Ok(after)
     }
 
-    /// The state of this evidence, if it has one.
+    /// State with this evidence, if it exists.
     pub(crate) fn find(&self, evidence: Evidence) -> Option<StateId> {
         if self.slots.is_empty() {
             return None;
@@ -205,7 +204,7 @@ impl Palette {
         }
     }
 
-    /// The state of this evidence, made if need be.
+    /// State with this evidence; created if it does not exist.
     pub(crate) fn intern(&mut self, evidence: Evidence) -> Result<StateId, Full> {
         if 4 * self.len() >= 3 * self.slots.len() {
             self.rehash();
@@ -230,7 +229,7 @@ impl Palette {
     }
 
     /// Drops unused states. Returns the new number of each state, [`UNKNOWN`] for dropped ones. If most states are in
-    /// use, the limit rises.
+    /// use, raises the limit.
     pub(crate) fn retain(&mut self, in_use: &[bool]) -> Vec<StateId> {
         let mut kept = 0;
         let number = |(state, &in_use): (usize, &bool)| {
@@ -248,26 +247,26 @@ impl Palette {
         self.values = self.evidence.iter().map(|evidence| evidence.log_odds as f32).collect();
         self.values[usize::from(UNKNOWN)] = f32::NEG_INFINITY;
         if self.len() > self.limit / 2 {
-            self.limit = (self.limit * 2).min(self.most);
+            self.limit = (self.limit * 2).min(self.max_states);
         }
         self.rehash();
         self.renumberings += 1;
         numbers
     }
 
-    /// How often states were renumbered.
+    /// Number of times that states were renumbered.
     pub(crate) fn renumberings(&self) -> u64 {
         self.renumberings
     }
 
-    /// Whether there is room for another state.
+    /// Returns whether another state can be added.
     pub(crate) fn has_room(&self) -> bool {
         self.len() < self.limit
     }
 
-    /// Whether the limit can rise.
+    /// Returns whether the limit can be raised.
     pub(crate) fn can_grow(&self) -> bool {
-        self.limit < self.most
+        self.limit < self.max_states
     }
 
     /// Rebuilds the hash table, at most half full.
@@ -290,7 +289,7 @@ impl Palette {
     }
 }
 
-/// Whether both are equal to the bit.
+/// Returns whether both are bit-identical.
 fn is_same(a: Evidence, b: Evidence) -> bool {
     a.log_odds.to_bits() == b.log_odds.to_bits() && a.observation_count == b.observation_count
 }

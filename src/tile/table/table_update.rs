@@ -7,8 +7,8 @@ use crate::scan::{BrickRuns, BrickUpdate, OrderedUpdates, Run, TileRuns, TileUpd
 use crate::sensor::{Evidence, Observation, SensorModel};
 use crate::space::{BrickCode, MortonCode, VoxelIndex, VoxelKey, place_of_voxel};
 
-/// Bricks that are updated stage by stage.
-const TOGETHER: usize = 16;
+/// Number of bricks that are updated together, stage by stage.
+const GROUP_SIZE: usize = 16;
 
 impl Table {
     /// Applies updates of any form; `first` is the tile's lowest voxel.
@@ -30,19 +30,19 @@ impl Table {
 
     /// Applies the updates of bricks, in insertion per scan.
     ///
-    /// The bricks of a map lie apart in memory, so each stage of an update is done for some of them before the next:
-    /// the CPU waits for the lines of many bricks at once.
+    /// Bricks are scattered in memory, so each stage of an update is executed for several bricks before the next stage:
+    /// the CPU then waits for the cache lines of many bricks at once.
     pub fn update_bricks(&mut self, model: &SensorModel, updates: &[BrickUpdate]) {
         self.palette.use_model(model);
-        let mut numbers = [None; TOGETHER];
-        for updates in updates.chunks(TOGETHER) {
+        let mut numbers = [None; GROUP_SIZE];
+        for updates in updates.chunks(GROUP_SIZE) {
             for (number, update) in numbers.iter_mut().zip(updates) {
                 let is_empty = (0..8).fold(0, |all, word| all | update.hits[word] | update.misses[word]) == 0;
                 *number = (!is_empty).then(|| self.number_of(update.brick));
             }
             let present = numbers[..updates.len()].iter().flatten();
-            present.clone().for_each(|&number| self.bricks[number].look_at_storage());
-            present.clone().for_each(|&number| self.bricks[number].look_at_cells());
+            present.clone().for_each(|&number| self.bricks[number].prefetch_storage());
+            present.clone().for_each(|&number| self.bricks[number].prefetch_cells());
             for (number, update) in numbers.iter().zip(updates) {
                 if let Some(number) = *number {
                     self.update_rest(number, &mut Rest::of(update));
@@ -56,12 +56,12 @@ impl Table {
         self.palette.use_model(model);
         let mut known = MissRuns::new();
         let mut bricks = runs.bricks().peekable();
-        let mut some = Vec::with_capacity(TOGETHER);
+        let mut some = Vec::with_capacity(GROUP_SIZE);
         while bricks.peek().is_some() {
             some.clear();
-            some.extend(bricks.by_ref().take(TOGETHER).map(|runs| (self.number_of(runs.brick), runs)));
-            some.iter().for_each(|&(number, _)| self.bricks[number].look_at_storage());
-            some.iter().for_each(|&(number, _)| self.bricks[number].look_at_cells());
+            some.extend(bricks.by_ref().take(GROUP_SIZE).map(|runs| (self.number_of(runs.brick), runs)));
+            some.iter().for_each(|&(number, _)| self.bricks[number].prefetch_storage());
+            some.iter().for_each(|&(number, _)| self.bricks[number].prefetch_cells());
             some.iter().for_each(|&(number, runs)| self.update_runs_at(number, runs, &mut known));
         }
     }
@@ -89,7 +89,7 @@ impl Table {
         }
     }
 
-    /// Applies a run of updates one by one.
+    /// Applies the updates of a run one by one.
     fn update_run(&mut self, number: usize, run: Run) {
         let hit = run.hit.map(Observation::Hit);
         for observation in std::iter::repeat_n(Observation::Miss, run.misses.into()).chain(hit) {
@@ -109,8 +109,8 @@ impl Table {
         self.update_each(model, first, updates, |_, _, _| {});
     }
 
-    /// The same; `visit` is given each update's voxel and resulting log-odds.
-    pub(crate) fn update_in_order_and_tell(
+    /// Like [`Table::update_in_order`]; passes each update's voxel and resulting log-odds to `visit`.
+    pub(crate) fn update_in_order_with(
         &mut self,
         model: &SensorModel,
         first: VoxelIndex,
@@ -125,7 +125,8 @@ impl Table {
         });
     }
 
-    /// Applies updates of single voxels in their order; `visit` is given the brick's number and the place after each.
+    /// Applies updates of single voxels in their order; passes the brick's number and the position to `visit` after
+    /// each.
     fn update_each(
         &mut self,
         model: &SensorModel,
@@ -135,7 +136,7 @@ impl Table {
     ) {
         self.palette.use_model(model);
         let first = VoxelKey::from_index(first).0;
-        // Rays return to the same few bricks again and again; nearby bricks have different entries.
+        // Rays visit the same few bricks repeatedly; nearby bricks have different entries.
         let mut recent = [(u64::MAX, 0); 512];
         for (offset, observation) in updates.iter() {
             let key: [u16; 3] = std::array::from_fn(|k| first[k].wrapping_add(offset[k] as u16));
@@ -164,7 +165,7 @@ impl Table {
         }
     }
 
-    /// Inserts voxels of a brick, in Morton order, none of which was observed before: place and evidence.
+    /// Inserts voxels of a brick that were not observed before, in Morton order, as position and evidence.
     pub fn insert(&mut self, brick: BrickCode, mut voxels: &[(usize, Evidence)]) {
         if voxels.is_empty() {
             return;
@@ -185,7 +186,7 @@ impl Table {
         }
     }
 
-    /// Adds a brick that is absent so far, with the palette's state numbers.
+    /// Adds an absent brick, with state numbers of this palette.
     pub(crate) fn add_brick(&mut self, mut brick: Brick) {
         brick.note_max(&self.palette);
         let number = self.number_of(brick.code());
@@ -195,7 +196,7 @@ impl Table {
         self.note_raised(number, f32::NEG_INFINITY);
     }
 
-    /// The number of a brick, made if it is absent.
+    /// Number of a brick; creates the brick if it is absent.
     fn number_of(&mut self, code: BrickCode) -> usize {
         let number = self.directory.entry(Address::of_brick(code));
         if *number == 0 {
@@ -224,12 +225,12 @@ impl Table {
         }
     }
 
-    /// Makes room for a brick's new states when the palette is full: drops unused states, or else makes the brick
-    /// plain.
+    /// Makes new states possible for a brick when the palette is full: drops unused states, or otherwise makes the
+    /// brick plain.
     #[cold]
     fn make_room_for(&mut self, number: usize) {
         // At the largest limit, unused states are searched for only after enough bricks became plain, so that the cost
-        // stays proportional.
+        // remains proportional.
         if self.palette.can_grow() || self.made_plain * 8 >= self.bricks.len() {
             let mut in_use = vec![false; self.palette.len()];
             self.bricks.iter().for_each(|brick| brick.mark_states(&mut in_use));

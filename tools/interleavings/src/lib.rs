@@ -140,8 +140,8 @@ mod mapper {
         mod eviction {
             source!("eviction.rs");
         }
-        mod flight {
-            source!("flight.rs");
+        mod pinned_tiles {
+            source!("pinned_tiles.rs");
         }
         mod flush {
             source!("flush.rs");
@@ -149,8 +149,8 @@ mod mapper {
         mod flusher {
             source!("flusher.rs");
         }
-        mod held_tile {
-            source!("held_tile.rs");
+        mod pinned_tile {
+            source!("pinned_tile.rs");
         }
         mod memory_plan;
         mod paged_tiles {

@@ -238,7 +238,7 @@ fn bad_inputs_get_one_line_that_says_what_to_do() {
         (vec!["build", scans, "-o", new, "--poses", &many], 2, "4 poses for 3 clouds"),
         (vec!["build", &wrong_header, "-o", new], 1, "line 7: the points have no field z"),
         (vec!["build", &truncated, "-o", new], 1, "the file ends after 0 of 9 points"),
-        (vec!["build", &plain, "-o", new, "--sensor-model", "iwlo"], 2, "needs an intensity a point"),
+        (vec!["build", &plain, "-o", new, "--sensor-model", "iwlo"], 2, "needs an intensity per point"),
         (vec!["build", scans, "-o", new, "--intensity-max", "9"], 2, "add --sensor-model iwlo"),
         (
             vec![

@@ -278,7 +278,7 @@ fn a_far_map_becomes_an_octree_file_with_an_origin() {
         let (code, stderr) = failure(&["export", map, "-o", text(&file), "--origin", "0", bad, "0"]);
         assert!(code == 2 && stderr.contains("--origin"), "{stderr}");
     }
-    // Of a map that is wider than all keys, no origin helps.
+    // Of a map that is wider than all keys, no origin is sufficient.
     let wide = folder.path().join("wide");
     let (again, cloud) = (folder.path().join("again"), folder.path().join("far.pcd"));
     let content = fs::read_to_string(&cloud).unwrap().replace("500123.4", "600123.4");
@@ -286,7 +286,10 @@ fn a_far_map_becomes_an_octree_file_with_an_origin() {
     output(&["build", text(&cloud), "-o", text(&again)]);
     output(&["merge", map, text(&again), "-o", text(&wide)]);
     let (code, stderr) = failure(&["export", text(&wide), "-o", text(&file)]);
-    assert!(code == 2 && stderr.contains("no --origin helps") && stderr.contains("--region"), "{stderr}");
+    assert!(
+        code == 2 && stderr.contains("no --origin is sufficient") && stderr.contains("--region"),
+        "{stderr}"
+    );
 }
 
 #[test]

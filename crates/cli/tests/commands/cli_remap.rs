@@ -175,7 +175,7 @@ fn what_cannot_be_mapped_again_is_refused_with_what_to_do() {
     output(&["clear", &kept.map, "--region", "0", "0", "0", "1", "1", "1"]);
     let poses = kept.poses("poses.txt", 0.1);
     let message = refused(&["remap", &kept.map, "--poses", &poses]);
-    assert!(message.contains("a change that is no scan: clear"), "{message}");
+    assert!(message.contains("a change by another operation: clear"), "{message}");
 }
 
 /// Another map is made of all scans or not at all, just as a map follows its poses.
@@ -196,7 +196,7 @@ fn another_map_is_refused_where_the_map_is_more_than_its_kept_scans() {
     assert!(message.contains("scan 1, whose points are not kept"), "{message}");
     output(&["clear", &kept.map, "--region", "0", "0", "0", "1", "1", "1"]);
     let message = refused(&kept.map);
-    assert!(message.contains("a change that is no scan: clear"), "{message}");
+    assert!(message.contains("a change by another operation: clear"), "{message}");
 }
 
 /// A region is said in tiles: of another size it stays where it is in space, or is refused.

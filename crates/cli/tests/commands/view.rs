@@ -631,5 +631,5 @@ fn a_question_that_is_wrong_is_the_clients_error() {
     }
     let far = viewer.get("maps/0/raycast?from=0,0,0&to=1e6,0,0");
     let said = String::from_utf8_lossy(&far.body).into_owned();
-    assert!(far.status == 400 && said.contains("ask for at most"), "{}: {said}", far.status);
+    assert!(far.status == 400 && said.contains("more than the limit of"), "{}: {said}", far.status);
 }

@@ -6,26 +6,26 @@ use crate::tile::table::{Palette, StateId};
 use rustc_hash::FxHashMap;
 use std::cmp::Reverse;
 
-/// The states that more than one voxel of a table is in, numbered, and their symbols.
+/// Numbered states that occur in more than one voxel of a table, and their symbols.
 pub(super) struct Codebook {
     pub(super) states: Vec<Evidence>,
     pub(super) symbols: Symbols,
-    /// By number in the table's palette, see [`Symbols::code`]; [`RARE`] for all other states.
+    /// Code of each state by its number in the table's palette, see [`Symbols::code`]; [`RARE`] for all other states.
     pub(super) interned: Vec<u16>,
-    /// For states that are not in the palette.
+    /// Codes of states that are not in the palette.
     others: FxHashMap<StateKey, u16>,
 }
 
-/// A state of the codebook.
+/// State of the codebook.
 struct Common {
     voxels: u32,
     state: StateKey,
-    /// Its number in the table's palette.
+    /// Number of the state in the table's palette.
     interned: Option<StateId>,
 }
 
 impl Common {
-    /// A strict order in which neighbours have much in common.
+    /// Sort key of a total order in which adjacent states are similar.
     fn rank(&self) -> (i32, u64) {
         let bits = self.state.log_odds_bits;
         (self.state.observation_count, if bits >> 63 == 1 { !bits } else { bits | 1 << 63 })
@@ -39,7 +39,7 @@ impl Codebook {
         commons.sort_unstable_by_key(|common| (Reverse(common.voxels), common.rank()));
         commons.truncate(MAX_STATES);
         let symbols = Symbols::of(commons.len());
-        // Within the one-byte symbols and within the two-byte symbols, any order takes the same space.
+        // Any order within the one-byte symbols and within the two-byte symbols takes the same space.
         let (one_byte, two_bytes) = commons.split_at_mut(symbols.direct().into());
         one_byte.sort_unstable_by_key(|common| common.rank());
         two_bytes.sort_unstable_by_key(|common| common.rank());
@@ -55,7 +55,7 @@ impl Codebook {
         Self { states: commons.iter().map(|common| common.state.into()).collect(), symbols, interned, others }
     }
 
-    /// The symbol of a state that may not be in the palette.
+    /// Returns the code of a state that may not be in the palette.
     pub(super) fn code(&self, evidence: Evidence, palette: &Palette) -> u16 {
         match palette.find(evidence) {
             Some(state) => self.interned[usize::from(state)],

@@ -7,12 +7,12 @@ use crate::tile::format::entry::fault_of;
 use crate::tile::table::Palette;
 use std::io::Read;
 
-/// The states of a [`Codebook`](super::codebook::Codebook), read. None was looked at.
+/// States of a [`Codebook`](super::codebook::Codebook) that was read, not validated yet.
 #[derive(Debug)]
 pub(super) struct CodebookStates {
-    /// Where it begins.
+    /// Offset of the codebook in the table.
     offset: u64,
-    /// For [`state_at`].
+    /// Encoded for [`state_at`].
     states: Vec<u8>,
 }
 
@@ -24,7 +24,7 @@ impl CodebookStates {
     ) -> Result<Self, DecodeError> {
         let offset = input.offset;
         let mut bytes = Vec::new();
-        let column = Column { name: "codebook", most: states * STATE_BYTES, bytes: &mut bytes };
+        let column = Column { name: "codebook", max_bytes: states * STATE_BYTES, bytes: &mut bytes };
         column_reader.take_columns([column], input)?;
         if bytes.len() != states * STATE_BYTES {
             let reason = format!("a codebook of {} bytes for {states} states", bytes.len());
@@ -37,7 +37,6 @@ impl CodebookStates {
         self.states.len() / STATE_BYTES
     }
 
-    /// The state of a number.
     pub(super) fn state(&self, number: usize) -> Result<Evidence, String> {
         let state = state_at(&self.states, number);
         match fault_of(state) {
@@ -46,14 +45,14 @@ impl CodebookStates {
         }
     }
 
-    /// All as a palette: they are numbered from 1.
+    /// Returns all states as a palette, in which they are numbered from 1.
     pub(super) fn palette(&self) -> Result<Palette, FormatError> {
         let wrong = |reason| FormatError::at_offset(self.offset, reason);
-        let mut palette = Palette::with_all_room();
+        let mut palette = Palette::with_max_limit();
         for number in 0..self.len() {
             match palette.intern(self.state(number).map_err(wrong)?) {
                 Ok(id) if usize::from(id) == number + 1 => {}
-                _ => return Err(wrong(format!("state {number} of the codebook comes twice"))),
+                _ => return Err(wrong(format!("state {number} of the codebook is a duplicate"))),
             }
         }
         Ok(palette)

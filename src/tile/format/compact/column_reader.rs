@@ -9,18 +9,18 @@ pub(super) struct ColumnReader {
     compressed: Vec<u8>,
 }
 
-/// A column to read.
+/// Column to be read.
 pub(super) struct Column<'a> {
     pub(super) name: &'static str,
-    /// Most bytes of the column.
-    pub(super) most: usize,
-    /// Receives its bytes.
+    /// Maximum size of the column in bytes.
+    pub(super) max_bytes: usize,
+    /// Receives the decompressed bytes.
     pub(super) bytes: &'a mut Vec<u8>,
 }
 
 impl ColumnReader {
     pub(super) fn new() -> io::Result<Self> {
-        // `zstd::bulk` would panic.
+        // `zstd::bulk` would panic if this fails.
         let zstd = DCtx::try_create().ok_or(io::ErrorKind::OutOfMemory)?;
         Ok(Self { zstd, compressed: Vec::new() })
     }
@@ -34,7 +34,7 @@ impl ColumnReader {
         let mut compressed_lengths = [0; N];
         let mut columns = columns;
         for (column, compressed_length) in columns.iter_mut().zip(&mut compressed_lengths) {
-            let length = input.number(column.name, column.most)?;
+            let length = input.number(column.name, column.max_bytes)?;
             *compressed_length = input.number(column.name, length)?;
             column.bytes.clear();
             column.bytes.resize(length, 0);
@@ -61,8 +61,8 @@ impl ColumnReader {
         let wrong = |reason| Err(FormatError::at_offset(offset, format!("{}: {reason}", column.name)).into());
         match decompressed {
             Ok(length) if length == column.bytes.len() => Ok(()),
-            Ok(length) => wrong(format!("{length} bytes where {} are announced", column.bytes.len())),
-            Err(code) => wrong(format!("cannot be unpacked: {}", get_error_name(code))),
+            Ok(length) => wrong(format!("{length} bytes instead of {}", column.bytes.len())),
+            Err(code) => wrong(format!("cannot be decompressed: {}", get_error_name(code))),
         }
     }
 }

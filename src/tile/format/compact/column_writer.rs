@@ -3,15 +3,14 @@ use super::numbers::put_number;
 use std::io;
 use zstd::zstd_safe::{CCtx, CParameter, compress_bound, get_error_name};
 
-/// Compresses columns.
 pub(super) struct ColumnWriter {
     /// One per level.
     zstd: Vec<CCtx<'static>>,
-    /// The smallest form of a column so far, and the one being tried.
+    /// Smallest encoding of a column so far, and the one being tried.
     compressed: [Vec<u8>; 2],
 }
 
-/// Shorter columns are not compressed.
+/// Columns shorter than this are not compressed.
 const MIN_BYTES: usize = 24;
 
 impl ColumnWriter {
@@ -20,8 +19,8 @@ impl ColumnWriter {
         Ok(Self { zstd: zstd?, compressed: Default::default() })
     }
 
-    /// Appends columns: first each column's length and written length, then their bytes. A column that does not become
-    /// smaller is written as it is.
+    /// Appends columns: first each column's length and stored length, then their bytes. A column that does not become
+    /// smaller is stored uncompressed.
     pub(super) fn put_columns<const N: usize>(
         &mut self,
         columns: [&[u8]; N],
@@ -59,9 +58,9 @@ impl ColumnWriter {
     }
 }
 
-/// A compressor that omits headers and checksums.
+/// Creates a compressor that omits headers and checksums.
 fn compressor(level: i32) -> io::Result<CCtx<'static>> {
-    // `zstd::bulk` would panic.
+    // `zstd::bulk` would panic if this fails.
     let mut zstd = CCtx::try_create().ok_or(io::ErrorKind::OutOfMemory)?;
     for parameter in [
         CParameter::CompressionLevel(level),
@@ -74,7 +73,7 @@ fn compressor(level: i32) -> io::Result<CCtx<'static>> {
     Ok(zstd)
 }
 
-/// An error of zstd, most likely a lack of memory.
+/// Converts an error of zstd, which most likely means that memory is exhausted.
 fn refused(code: usize) -> io::Error {
     io::Error::other(get_error_name(code))
 }

@@ -1,6 +1,6 @@
 use crate::sensor::Evidence;
 
-/// Bytes of a state.
+/// Size of a state in bytes.
 pub(super) const STATE_BYTES: usize = 12;
 
 /// Appends states as byte planes: the lowest bytes of all counts, their next bytes, ..., the highest bytes of all
@@ -14,7 +14,7 @@ pub(super) fn put_states(states: impl Iterator<Item = Evidence> + Clone, out: &m
     }
 }
 
-/// The state at a place of the output of [`put_states`], whose length is a multiple of a state's.
+/// Returns the state with a number from the output of [`put_states`], whose length is a multiple of a state's.
 pub(super) fn state_at(states: &[u8], place: usize) -> Evidence {
     let count = states.len() / STATE_BYTES;
     let byte = |column: usize| states[column * count + place];

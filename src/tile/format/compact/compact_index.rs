@@ -14,7 +14,7 @@ use crate::space::{MortonCode, VoxelBox};
 use std::io::Read;
 use std::ops::Range;
 
-/// What a compact table has before its groups: any of these is checked and read with it, without the others.
+/// Header, index and codebook of a compact table. With these, each group can be checked and read without the others.
 #[derive(Debug)]
 pub struct CompactIndex {
     voxels: VoxelBox,
@@ -25,12 +25,12 @@ pub struct CompactIndex {
 }
 
 impl CompactIndex {
-    /// Reads header, index and codebook of a table of `bytes` bytes that belongs to the tile of `voxels`; `None` if it
-    /// is of version 1, which has no index.
+    /// Reads header, index and codebook of a table of `bytes` bytes that belongs to the tile of `voxels`; `None` for
+    /// version 1, which has no index.
     ///
     /// # Errors
     ///
-    /// Anything in these parts that violates the format, with the offset of the part.
+    /// Fails if any of these parts violates the format; the error contains the offset of the part.
     pub fn read(input: &mut impl Read, bytes: u64, voxels: &VoxelBox) -> Result<Option<Self>, DecodeError> {
         let mut input = Input::of_table(input, bytes)?;
         let head = Head::read(voxels, &mut ColumnReader::new()?, &mut input)?;
@@ -39,12 +39,13 @@ impl CompactIndex {
         Ok(Some(Self { voxels: *voxels, header, index, codebook, crc }))
     }
 
-    /// The checksum that the table ends with, from those of its parts: if it is the right one, so are they.
+    /// Checksum of the whole table, computed from those of its parts. If it matches the stored one, the parts are also
+    /// valid.
     pub fn crc(&self) -> u32 {
         self.crc
     }
 
-    /// Where in the table the group is that has a voxel, if one has it.
+    /// Returns the byte range of the group that contains a voxel, if one can contain it.
     pub fn group_of(&self, voxel: MortonCode) -> Option<Range<u64>> {
         let number = self.index.group_of(voxel.brick())?;
         let head = HEADER_BYTES + self.index.groups.len() * ENTRY_BYTES + self.header.codebook_bytes;
@@ -52,17 +53,16 @@ impl CompactIndex {
         Some(begin..begin + u64::from(self.index.groups[number].bytes))
     }
 
-    /// The evidence of a voxel, from the bytes of its group; `None` if it was not observed.
+    /// Returns the evidence of a voxel, read from the bytes of its group; `None` if it was not observed.
     ///
     /// # Errors
     ///
-    /// Other bytes than those that the index tells of; anything that violates the format. Offsets are those in the
-    /// group.
+    /// Fails if the bytes do not match the index or violate the format. Offsets are relative to the group.
     pub fn evidence(&self, voxel: MortonCode, group: &[u8]) -> Result<Option<Evidence>, DecodeError> {
         let Some(number) = self.index.group_of(voxel.brick()) else { return Ok(None) };
         let announced = self.index.announced(number);
         if group.len() as u64 != announced.bytes {
-            let reason = format!("a group of {} bytes where {} are announced", group.len(), announced.bytes);
+            let reason = format!("a group of {} bytes instead of {}", group.len(), announced.bytes);
             return Err(FormatError::at_offset(0, reason).into());
         }
         let finder = VoxelFinder::new(&self.codebook, voxel);

@@ -1,15 +1,15 @@
-/// How much time the [compact form](super::write_compact) of a table may take. Any reader reads the result.
+/// Trade-off between time and size of the [compact form](super::write_compact) of a table. Readers accept both.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum CompactEffort {
     /// For tiles in memory.
     #[default]
     Fast,
-    /// For files: some percent smaller in several times the time.
+    /// For files: some percent smaller, but takes several times as long.
     Small,
 }
 
 impl CompactEffort {
-    /// The zstd levels that are tried. A higher one finds more repetitions, which now and then takes more space.
+    /// The zstd levels to try. A higher one finds more repetitions, but occasionally takes more space.
     pub(super) const fn levels(self) -> &'static [i32] {
         match self {
             Self::Fast => &[1],

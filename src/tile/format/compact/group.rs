@@ -9,32 +9,32 @@ use crate::space::{BRICK_VOXELS, BrickCode};
 use crate::tile::table::{Brick, CELL_VOXELS, Palette, StateId, Storage, UnpaddedEvidence};
 use std::io;
 
-/// A group ends with the brick that reaches this many voxels: one voxel is read with all of its group.
+/// Number of voxels that completes a group: reading one voxel decodes its whole group.
 const GROUP_VOXELS: usize = 1 << 15;
 
-/// What a reader takes; version 1 was written so.
+/// Maximum that a reader accepts; version 1 wrote such groups.
 pub(super) const MAX_GROUP_VOXELS: usize = (1 << 16) + BRICK_VOXELS - 1;
 
-/// Most bricks of a group.
+/// Maximum number of bricks in a group.
 pub(super) const GROUP_BRICKS: usize = 1 << 10;
 
 /// Consecutive bricks of a table in Morton order, as columns.
 #[derive(Default)]
 pub(super) struct Group {
     bricks: usize,
-    /// Per brick but the first, the difference of its code from the previous brick's.
+    /// For each brick but the first, the difference of its code from the previous one.
     steps: Vec<u8>,
-    /// Per brick, which words of its mask are not 0.
+    /// For each brick, the set of nonzero words in its mask.
     words: Vec<u8>,
-    /// These words.
+    /// The nonzero words.
     masks: Vec<u8>,
-    /// Per voxel.
+    /// One symbol per voxel.
     symbols: Vec<u8>,
-    /// Per voxel whose symbol is a prefix, the second byte.
+    /// The second byte of each voxel whose symbol is a prefix.
     seconds: Vec<u8>,
-    /// Per voxel whose state is not in the codebook.
+    /// The state of each voxel whose state is not in the codebook.
     rares: Vec<Evidence>,
-    /// The first and the last brick.
+    /// First and last brick.
     ends: Option<[BrickCode; 2]>,
 }
 
@@ -115,7 +115,7 @@ impl Group {
         }
     }
 
-    /// Appends a voxel's data beside its symbol.
+    /// Appends the data of a voxel that follow its symbol.
     fn push_rest(&mut self, code: u16, codebook: &Codebook, evidence: impl Fn() -> Evidence) {
         let [symbol, second] = code.to_le_bytes();
         if symbol == RARE {
@@ -125,7 +125,7 @@ impl Group {
         }
     }
 
-    /// Appends the group's bytes and empties the group, if there is a brick in it; what the index says of it.
+    /// Appends the encoded group and clears it; returns its index entry, or `None` if the group is empty.
     pub(super) fn end(
         &mut self,
         column_writer: &mut ColumnWriter,
@@ -144,7 +144,6 @@ impl Group {
         Ok(Some(GroupEntry { first, bytes: group.len() as u32, crc: crc32fast::hash(group) }))
     }
 
-    /// Removes the bricks.
     pub(super) fn clear(&mut self) {
         let Self { bricks, steps, words, masks, symbols, seconds, rares, ends } = self;
         (*bricks, *ends) = (0, None);
@@ -153,17 +152,17 @@ impl Group {
     }
 }
 
-/// How many groups bricks make.
+/// Counts the groups into which bricks are divided.
 #[derive(Default)]
 pub(super) struct GroupSizes {
     full: usize,
-    /// Of the last one, which may be empty.
+    /// Counts of the last group, which may be empty.
     bricks: usize,
     voxels: usize,
 }
 
 impl GroupSizes {
-    /// Adds a brick of so many voxels.
+    /// Adds a brick with the given number of voxels.
     pub(super) fn push(&mut self, voxels: usize) {
         self.bricks += 1;
         self.voxels += voxels;
@@ -181,7 +180,7 @@ fn is_full(bricks: usize, voxels: usize) -> bool {
     bricks == GROUP_BRICKS || voxels >= GROUP_VOXELS
 }
 
-/// The bits that are set, ascending.
+/// Iterates over the set bits in ascending order.
 pub(super) fn bits(mut mask: u64) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {
         let bit = mask.trailing_zeros() as usize;

@@ -10,10 +10,10 @@ use crate::space::{BRICK_VOXELS, BrickCode, BrickMask};
 use crate::tile::format::entry::fault_of;
 use std::io::Read;
 
-/// The columns of a group, read; see [`Group`](super::group::Group).
+/// Decoded columns of a group; see [`Group`](super::group::Group).
 #[derive(Default)]
 pub(super) struct Columns {
-    /// Where the group begins.
+    /// Offset of the group.
     pub(super) offset: u64,
     pub(super) bricks: usize,
     steps: Vec<u8>,
@@ -24,8 +24,8 @@ pub(super) struct Columns {
     rares: Vec<u8>,
 }
 
-/// Limits of a group.
-pub(super) struct Room {
+/// Limits for the size of a group.
+pub(super) struct GroupLimits {
     pub(super) bricks: usize,
     pub(super) voxels: usize,
 }
@@ -34,17 +34,17 @@ impl Columns {
     /// Reads the next group.
     pub(super) fn read(
         &mut self,
-        room: &Room,
+        limits: &GroupLimits,
         column_reader: &mut ColumnReader,
         input: &mut Input<impl Read>,
     ) -> Result<(), DecodeError> {
-        /// Bytes of the largest step.
+        /// Size of the largest step in bytes.
         const STEP_BYTES: usize = 6;
         self.offset = input.offset;
-        let bricks = input.number("bricks of a group", GROUP_BRICKS.min(room.bricks))?;
-        let voxels = room.voxels.min(MAX_GROUP_VOXELS).min(bricks * BRICK_VOXELS);
+        let bricks = input.number("bricks of a group", GROUP_BRICKS.min(limits.bricks))?;
+        let voxels = limits.voxels.min(MAX_GROUP_VOXELS).min(bricks * BRICK_VOXELS);
         self.bricks = bricks;
-        let column = |name, most, bytes| Column { name, most, bytes };
+        let column = |name, max_bytes, bytes| Column { name, max_bytes, bytes };
         column_reader.take_columns(
             [
                 column("steps", bricks * STEP_BYTES, &mut self.steps),
@@ -61,7 +61,7 @@ impl Columns {
 
 const FEWER_SECONDS: &str = "fewer second bytes than prefixes";
 
-/// The unread rest of the columns of a group.
+/// Unread rest of the columns of a group.
 #[derive(Clone, Copy)]
 pub(super) struct Rest<'a> {
     steps: &'a [u8],
@@ -79,14 +79,14 @@ impl<'a> Rest<'a> {
         Self { steps, words, masks: masks.as_chunks().0, symbols, seconds, rares, rares_done: 0 }
     }
 
-    /// Whether all columns are read to their ends.
+    /// Returns whether all columns are read completely.
     pub(super) fn is_empty(&self) -> bool {
         let Self { steps, words, masks, symbols, seconds, rares, rares_done } = *self;
         let is_done = [steps, words, symbols, seconds].iter().all(|column| column.is_empty());
         is_done && masks.is_empty() && rares_done * STATE_BYTES == rares.len()
     }
 
-    /// The code of the next brick, which must be larger than the previous one.
+    /// Reads the code of the next brick, which must be greater than the previous one.
     pub(super) fn take_code(&mut self, before: Option<BrickCode>) -> Result<BrickCode, String> {
         let step = take_number(|| {
             let (&byte, rest) = self.steps.split_first()?;
@@ -95,12 +95,12 @@ impl<'a> Rest<'a> {
         });
         let code = step.and_then(|step| before.map_or(0, |before| before.0 + 1).checked_add(step));
         let code = code.filter(|&code| code < BrickCode::END);
-        code.map(BrickCode).ok_or_else(|| "a step leads to no brick".into())
+        code.map(BrickCode).ok_or_else(|| "an invalid step between bricks".into())
     }
 
-    /// The mask of the next brick, which must not be empty.
+    /// Reads the mask of the next brick, which must not be empty.
     pub(super) fn take_mask(&mut self) -> Result<BrickMask, String> {
-        const SHORT: &str = "a group has less than its bricks";
+        const SHORT: &str = "a group ends before its last brick";
         let (&words, rest) = self.words.split_first().ok_or(SHORT)?;
         self.words = rest;
         let (masks, rest) = self.masks.split_at_checked(words.count_ones() as usize).ok_or(SHORT)?;
@@ -110,12 +110,12 @@ impl<'a> Rest<'a> {
             std::array::from_fn(|word| if words >> word & 1 == 1 { masks.next().unwrap_or(0) } else { 0 });
         let is_set = |word: usize| (words >> word & 1 == 1) == (observed[word] != 0);
         if words == 0 || !(0..8).all(is_set) {
-            return Err("a mask in which nothing is set".into());
+            return Err("a brick with an empty mask".into());
         }
         Ok(observed)
     }
 
-    /// The symbols of the next `count` voxels.
+    /// Reads the symbols of the next `voxels` voxels.
     #[inline]
     pub(super) fn take_symbols(&mut self, voxels: usize) -> Result<&'a [u8], String> {
         let (symbols, rest) = self.symbols.split_at_checked(voxels).ok_or("fewer symbols than voxels")?;
@@ -129,7 +129,7 @@ impl<'a> Rest<'a> {
         Ok(second)
     }
 
-    /// Leaves out the second bytes and rare states of symbols.
+    /// Skips the second bytes and rare states that belong to the given symbols.
     pub(super) fn pass(&mut self, passed: &[u8], symbols: Symbols) -> Result<(), String> {
         let count = |from| passed.iter().filter(|&&symbol| symbol >= from).count();
         let rares = count(RARE);
@@ -142,7 +142,7 @@ impl<'a> Rest<'a> {
     pub(super) fn take_rare(&mut self) -> Result<Evidence, String> {
         let states = self.rares.len() / STATE_BYTES;
         if self.rares_done >= states || states * STATE_BYTES != self.rares.len() {
-            return Err("fewer rare states than their symbols".into());
+            return Err("fewer rare states than rare symbols".into());
         }
         let state = state_at(self.rares, self.rares_done);
         self.rares_done += 1;

@@ -4,40 +4,40 @@ use crate::error::{DecodeError, FormatError};
 use crate::space::BrickCode;
 use std::io::Read;
 
-/// Bytes of an entry.
+/// Size of an entry in bytes.
 pub(super) const ENTRY_BYTES: usize = 16;
 
-/// What the index says of a group.
+/// Index entry of a group.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct GroupEntry {
-    /// Its first brick.
+    /// Code of the first brick.
     pub(super) first: BrickCode,
     pub(super) bytes: u32,
     pub(super) crc: u32,
 }
 
-/// What must be true of a group that is read.
+/// Properties that a group must have according to the index.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct AnnouncedGroup {
     pub(super) first: BrickCode,
-    /// Behind all its bricks.
+    /// Exclusive upper bound of its brick codes.
     pub(super) end: BrickCode,
     pub(super) bytes: u64,
     pub(super) crc: u32,
 }
 
-/// The groups of a table, in order.
+/// Index of the groups of a table, in order.
 #[derive(Debug, Default)]
 pub(super) struct GroupIndex {
     pub(super) groups: Vec<GroupEntry>,
 }
 
 impl GroupIndex {
-    /// Reads the index behind a header. First bricks ascend, and all parts together are as long as what follows.
+    /// Reads the index after a header. Checks that first bricks ascend, and that the lengths of all parts add up.
     pub(super) fn read(header: &Header, input: &mut Input<impl Read>) -> Result<Self, DecodeError> {
         let offset = input.offset;
         let too_many =
-            || input.wrong(format!("{} groups where {} bytes follow", header.groups, input.left()));
+            || input.wrong(format!("{} groups do not fit into {} bytes", header.groups, input.left()));
         let bytes = header.groups.checked_mul(ENTRY_BYTES).filter(|&bytes| bytes as u64 <= input.left());
         let mut index = vec![0; bytes.ok_or_else(too_many)?];
         input.read(&mut index)?;
@@ -49,9 +49,9 @@ impl GroupIndex {
         {
             return wrong("the first bricks of the groups do not ascend".to_owned());
         }
-        let announced = header.codebook_bytes as u64 + index.bytes_before(index.groups.len());
-        if announced != input.left() {
-            return wrong(format!("{announced} bytes are announced where {} follow", input.left()));
+        let wanted = header.codebook_bytes as u64 + index.bytes_before(index.groups.len());
+        if wanted != input.left() {
+            return wrong(format!("the parts should have {wanted} bytes, but {} bytes follow", input.left()));
         }
         Ok(index)
     }
@@ -60,29 +60,29 @@ impl GroupIndex {
         self.groups.iter().flat_map(|group| group.to_bytes())
     }
 
-    /// Bytes of the first `number` groups.
+    /// Size of the first `number` groups in bytes.
     pub(super) fn bytes_before(&self, number: usize) -> u64 {
         self.groups.iter().take(number).map(|group| u64::from(group.bytes)).sum()
     }
 
-    /// What the index announces of a group.
+    /// Expected properties of a group.
     pub(super) fn announced(&self, number: usize) -> AnnouncedGroup {
         let GroupEntry { first, bytes, crc } = self.groups[number];
         let end = self.groups.get(number + 1).map_or(BrickCode(BrickCode::END), |next| next.first);
         AnnouncedGroup { first, end, bytes: bytes.into(), crc }
     }
 
-    /// What it announces of all groups, in order.
+    /// Expected properties of all groups, in order.
     pub(super) fn all_announced(&self) -> impl Iterator<Item = AnnouncedGroup> {
         (0..self.groups.len()).map(|number| self.announced(number))
     }
 
-    /// The number of the group that a brick is in, if it is in any.
+    /// Returns the number of the group that can contain a brick, if there is one.
     pub(super) fn group_of(&self, brick: BrickCode) -> Option<usize> {
         self.groups.partition_point(|group| group.first <= brick).checked_sub(1)
     }
 
-    /// The checksum of the whole table, from that of header and index.
+    /// Checksum of the whole table, computed from that of header and index.
     pub(super) fn crc_of_all(&self, head_crc: u32, header: &Header) -> u32 {
         let codebook = (header.codebook_crc, header.codebook_bytes as u64);
         let parts = self.groups.iter().map(|group| (group.crc, group.bytes.into()));
@@ -108,9 +108,9 @@ impl GroupEntry {
     }
 }
 
-/// The CRC-32 of some bytes and those behind them, from that of each.
-pub(in crate::tile::format) fn joined_crc(crc: u32, behind: u32, bytes_behind: u64) -> u32 {
+/// Combines the CRC-32 of some bytes with that of the bytes that follow them.
+pub(in crate::tile::format) fn joined_crc(crc: u32, following: u32, following_bytes: u64) -> u32 {
     let mut all = crc32fast::Hasher::new_with_initial(crc);
-    all.combine(&crc32fast::Hasher::new_with_initial_len(behind, bytes_behind));
+    all.combine(&crc32fast::Hasher::new_with_initial_len(following, following_bytes));
     all.finalize()
 }

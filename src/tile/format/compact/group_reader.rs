@@ -1,5 +1,5 @@
 use super::column_reader::ColumnReader;
-use super::group_columns::{Columns, Rest, Room};
+use super::group_columns::{Columns, GroupLimits, Rest};
 use super::group_index::AnnouncedGroup;
 use super::header::Header;
 use super::input::Input;
@@ -9,27 +9,26 @@ use crate::error::{DecodeError, FormatError};
 use crate::space::{BrickCode, VoxelBox};
 use std::io::Read;
 
-/// What is made of bricks while their groups are read.
+/// Consumer of the bricks of groups that are read.
 pub(super) trait TakeBricks {
     type Made;
 
-    /// Takes the next brick. What is known of its voxels comes next in `rest`, and all of that is taken.
+    /// Takes the next brick. The data of its voxels are next in `rest`, and must be read completely.
     fn take(&mut self, brick: OpenBrick, rest: &mut Rest<'_>) -> Result<(), String>;
 
-    /// What was made of all bricks.
+    /// Returns the result for all bricks.
     fn made(self) -> Self::Made;
 }
 
-/// Reads groups of bricks, all in order or one of them: bricks ascend and belong to the tile.
+/// Reads groups of bricks, either all in order or a single one. Checks that bricks ascend and belong to the tile.
 pub(super) struct GroupReader<'a, T> {
     header: &'a Header,
     tile: &'a VoxelBox,
     symbols: Symbols,
     taker: T,
-    /// Bricks and voxels so far.
+    /// Numbers of bricks and voxels read so far.
     bricks: usize,
     voxels: usize,
-    /// The previous brick.
     before: Option<BrickCode>,
 }
 
@@ -39,7 +38,7 @@ impl<'a, T: TakeBricks> GroupReader<'a, T> {
         Self { header, tile, symbols, taker, bricks: 0, voxels: 0, before: None }
     }
 
-    /// Reads the next group, which must be the one that the index announces, if there is an index.
+    /// Reads the next group, which must match the index, if there is one.
     pub(super) fn read(
         &mut self,
         announced: Option<AnnouncedGroup>,
@@ -48,8 +47,8 @@ impl<'a, T: TakeBricks> GroupReader<'a, T> {
         input: &mut Input<impl Read>,
     ) -> Result<(), DecodeError> {
         let Header { bricks, voxels, .. } = *self.header;
-        let room = Room { bricks: bricks - self.bricks, voxels: voxels - self.voxels };
-        columns.read(&room, column_reader, input)?;
+        let limits = GroupLimits { bricks: bricks - self.bricks, voxels: voxels - self.voxels };
+        columns.read(&limits, column_reader, input)?;
         if let Some(AnnouncedGroup { bytes, crc, .. }) = announced {
             input.end_part_as("group", bytes, crc)?;
         }
@@ -63,14 +62,14 @@ impl<'a, T: TakeBricks> GroupReader<'a, T> {
             return Err("a group without bricks".into());
         }
         let mut rest = Rest::of(columns);
-        // Without an index, a step leads to the first one, too.
+        // Without an index, the first brick is also encoded as a step.
         let mut first = announced.map(|group| group.first);
         for _ in 0..columns.bricks {
             let code = first.take().map_or_else(|| rest.take_code(self.before), Ok)?;
             self.take_brick(code, &mut rest)?;
         }
         if !rest.is_empty() {
-            return Err("a group has more than its bricks".into());
+            return Err("a group has data after its last brick".into());
         }
         match announced {
             Some(group) if self.before >= Some(group.end) => Err("a group has bricks of the next one".into()),
@@ -87,26 +86,26 @@ impl<'a, T: TakeBricks> GroupReader<'a, T> {
         self.taker.take(brick, rest)
     }
 
-    /// Whether all announced bricks were read.
+    /// Returns whether as many bricks were read as the header specifies.
     pub(super) fn has_all_bricks(&self) -> bool {
         self.bricks >= self.header.bricks
     }
 
-    /// Checks that all was read that the header announces.
+    /// Checks that the numbers of bricks and voxels match the header.
     pub(super) fn check_is_all(&self) -> Result<(), FormatError> {
         let Header { bricks, voxels, .. } = *self.header;
         if self.bricks != bricks {
-            let reason = format!("{} bricks where {bricks} are announced", self.bricks);
+            let reason = format!("{} bricks instead of {bricks}", self.bricks);
             return Err(FormatError::at_offset(16, reason));
         }
         if self.voxels != voxels {
-            let reason = format!("{} voxels where {voxels} are announced", self.voxels);
+            let reason = format!("{} voxels instead of {voxels}", self.voxels);
             return Err(FormatError::at_offset(8, reason));
         }
         Ok(())
     }
 
-    /// What was made of the groups.
+    /// Returns the result for all groups.
     pub(super) fn made(self) -> T::Made {
         self.taker.made()
     }

@@ -7,7 +7,7 @@ use crate::error::DecodeError;
 use crate::space::VoxelBox;
 use std::io::Read;
 
-/// What a compact table has before its groups.
+/// Part of a compact table before its groups.
 #[derive(Debug)]
 pub(super) struct Head {
     pub(super) header: Header,
@@ -19,7 +19,7 @@ pub(super) struct Head {
 }
 
 impl Head {
-    /// Reads the head of a table of the tile of `voxels`. The index and the codebook's checksum are checked.
+    /// Reads the head of a table of the tile of `voxels`. Checks the index and the codebook's checksum.
     pub(super) fn read(
         voxels: &VoxelBox,
         column_reader: &mut ColumnReader,

@@ -5,25 +5,25 @@ use crate::error::{DecodeError, FormatError};
 use crate::space::VoxelBox;
 use std::io::Read;
 
-/// Bytes of the header.
+/// Size of the header in bytes.
 pub(super) const HEADER_BYTES: usize = 36;
 
-/// Bytes of the header of version 1, with which every version begins.
+/// Size in bytes of the header of version 1, with which every version begins.
 pub(super) const HEADER_1_BYTES: usize = 24;
 
-/// What a compact table begins with.
+/// Header of a compact table.
 #[derive(Debug)]
 pub(super) struct Header {
     pub(super) voxels: usize,
     pub(super) bricks: usize,
     pub(super) states: usize,
-    /// 0 in version 1, like what follows.
+    /// This and the following fields are 0 in version 1.
     pub(super) groups: usize,
     pub(super) codebook_bytes: usize,
     pub(super) codebook_crc: u32,
 }
 
-/// What versions differ in.
+/// Version of the format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Version {
     /// Groups without an index, each beginning with the step from the previous one.
@@ -54,9 +54,9 @@ impl Header {
             }
         };
         let count = u64::from(u32_at(8)) | u64::from(u32_at(12)) << 32;
-        let most = voxels_in(voxels);
-        let Some(count) = usize::try_from(count).ok().filter(|&count| count as u64 <= most) else {
-            return wrong(8, format!("{count} voxels in a tile of {most}"));
+        let capacity = voxels_in(voxels);
+        let Some(count) = usize::try_from(count).ok().filter(|&count| count as u64 <= capacity) else {
+            return wrong(8, format!("{count} voxels in a tile of {capacity}"));
         };
         let [bricks, states] = [u32_at(16), u32_at(20)].map(|count| count as usize);
         if bricks > count || (bricks == 0) != (count == 0) {
@@ -73,7 +73,7 @@ impl Header {
         Ok((version, header))
     }
 
-    /// Reads what version 1 has not.
+    /// Reads the fields that version 1 does not have.
     fn read_rest(&mut self, input: &mut Input<impl Read>) -> Result<(), DecodeError> {
         let offset = input.offset;
         let mut rest = [0; HEADER_BYTES - HEADER_1_BYTES];
@@ -109,7 +109,6 @@ impl Header {
     }
 }
 
-/// Number of voxels of a tile.
 fn voxels_in(voxels: &VoxelBox) -> u64 {
     (0..3).map(|k| u64::from(voxels.end[k].abs_diff(voxels.min[k]))).product()
 }

@@ -5,23 +5,23 @@ use super::numbers::take_number;
 use crate::error::{DecodeError, FormatError};
 use std::io::Read;
 
-/// Reads the bytes of a compact table, with the number of bytes left and the checksum.
+/// Reader for the bytes of a compact table. It tracks the number of bytes left and the checksum.
 pub(super) struct Input<R> {
     input: R,
-    /// Bytes read so far.
+    /// Number of bytes read so far.
     pub(super) offset: u64,
-    /// Bytes before the checksum.
+    /// Number of bytes before the checksum.
     end: u64,
-    /// Of the part that is being read.
+    /// Checksum of the current part.
     crc: crc32fast::Hasher,
-    /// Where it begins.
+    /// Offset of the current part.
     part: u64,
-    /// Of the parts before.
+    /// Checksum of all earlier parts.
     crc_before: u32,
 }
 
 impl<R: Read> Input<R> {
-    /// An input of `bytes` bytes, at least those of a checksum.
+    /// Creates an input of `bytes` bytes, which must include a checksum.
     pub(super) fn new(input: R, bytes: u64) -> Self {
         Self {
             input,
@@ -33,7 +33,7 @@ impl<R: Read> Input<R> {
         }
     }
 
-    /// The input of a table of `bytes` bytes.
+    /// Creates the input of a table of `bytes` bytes.
     pub(super) fn of_table(input: R, bytes: u64) -> Result<Self, FormatError> {
         if bytes < HEADER_1_BYTES as u64 + CRC_BYTES {
             let reason = format!("{bytes} bytes are too few for a compact table");
@@ -42,12 +42,12 @@ impl<R: Read> Input<R> {
         Ok(Self::new(input, bytes))
     }
 
-    /// Bytes that follow before the checksum.
+    /// Number of unread bytes before the checksum.
     pub(super) fn left(&self) -> u64 {
         self.end - self.offset
     }
 
-    /// Ends a part; its checksum.
+    /// Ends a part and returns its checksum.
     pub(super) fn end_part(&mut self) -> u32 {
         let crc = std::mem::take(&mut self.crc).finalize();
         self.crc_before = joined_crc(self.crc_before, crc, self.offset - self.part);
@@ -55,12 +55,12 @@ impl<R: Read> Input<R> {
         crc
     }
 
-    /// Ends a part, which must be so long and have this checksum.
+    /// Ends a part, which must have the given length and checksum.
     pub(super) fn end_part_as(&mut self, what: &str, bytes: u64, crc: u32) -> Result<(), DecodeError> {
         let (begin, found) = (self.part, self.offset - self.part);
         let wrong = |reason| Err(FormatError::at_offset(begin, reason).into());
         if found != bytes {
-            return wrong(format!("the {what} takes {found} bytes where {bytes} are announced"));
+            return wrong(format!("the {what} has {found} bytes instead of {bytes}"));
         }
         match self.end_part() == crc {
             true => Ok(()),
@@ -68,7 +68,7 @@ impl<R: Read> Input<R> {
         }
     }
 
-    /// An error at the present offset.
+    /// Creates an error at the current offset.
     pub(super) fn wrong(&self, reason: impl Into<String>) -> DecodeError {
         FormatError::at_offset(self.offset, reason).into()
     }
@@ -76,7 +76,7 @@ impl<R: Read> Input<R> {
     pub(super) fn read(&mut self, bytes: &mut [u8]) -> Result<(), DecodeError> {
         let left = self.left();
         if bytes.len() as u64 > left {
-            return Err(self.wrong(format!("{} bytes should follow, and {left} do", bytes.len())));
+            return Err(self.wrong(format!("{} bytes are expected, but only {left} follow", bytes.len())));
         }
         self.input.read_exact(bytes)?;
         self.crc.update(bytes);
@@ -84,8 +84,8 @@ impl<R: Read> Input<R> {
         Ok(())
     }
 
-    /// A number of at most `most`.
-    pub(super) fn number(&mut self, what: &str, most: usize) -> Result<usize, DecodeError> {
+    /// Reads a number of at most `max`.
+    pub(super) fn number(&mut self, what: &str, max: usize) -> Result<usize, DecodeError> {
         let offset = self.offset;
         let mut failed = None;
         let number = take_number(|| {
@@ -95,15 +95,15 @@ impl<R: Read> Input<R> {
         if let Some(error) = failed {
             return Err(error);
         }
-        let number = number.and_then(|number| usize::try_from(number).ok()).filter(|&number| number <= most);
-        let reason = || format!("the {what} must be a number of at most {most}");
+        let number = number.and_then(|number| usize::try_from(number).ok()).filter(|&number| number <= max);
+        let reason = || format!("the {what} must be a number of at most {max}");
         Ok(number.ok_or_else(|| FormatError::at_offset(offset, reason()))?)
     }
 
-    /// Checks that only the right checksum follows.
+    /// Checks that only the correct checksum follows.
     pub(super) fn end(mut self) -> Result<(), DecodeError> {
         if self.offset != self.end {
-            return Err(self.wrong(format!("{} bytes stand behind the last voxel", self.left())));
+            return Err(self.wrong(format!("{} bytes follow the last voxel", self.left())));
         }
         let mut crc = [0; CRC_BYTES as usize];
         self.input.read_exact(&mut crc)?;

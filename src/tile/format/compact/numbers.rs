@@ -7,8 +7,8 @@ pub(super) fn put_number(mut number: u64, out: &mut Vec<u8>) {
     out.push(number as u8);
 }
 
-/// Reads the output of [`put_number`] byte by byte: `None` if the bytes end, if the number exceeds 64 bits, or if it
-/// takes more bytes than necessary.
+/// Reads the output of [`put_number`] byte by byte. Returns `None` if the bytes end, the number exceeds 64 bits, or its
+/// encoding is not the shortest.
 pub(super) fn take_number(mut next: impl FnMut() -> Option<u8>) -> Option<u64> {
     let mut number = 0;
     for shift in (0..64).step_by(7) {
@@ -35,7 +35,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_come_back_and_have_one_spelling() {
+    fn numbers_round_trip_and_have_one_encoding() {
         for number in (0..64).flat_map(|bit| [(1_u64 << bit) - 1, 1 << bit, u64::MAX - (1 << bit)]) {
             let mut bytes = Vec::new();
             put_number(number, &mut bytes);

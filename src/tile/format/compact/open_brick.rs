@@ -7,14 +7,14 @@ use crate::tile::table::{
     Brick, CELL_VOXELS, Cells, Full, Palette, StateId, Storage, UNKNOWN, UnpaddedEvidence,
 };
 
-/// A brick whose voxels are being read.
+/// Brick whose voxels are being read.
 pub(super) struct OpenBrick {
     pub(super) code: BrickCode,
     pub(super) observed: BrickMask,
     pub(super) symbols: Symbols,
 }
 
-/// Why a brick cannot be read as palette states.
+/// Reason why a brick cannot be read as palette states.
 pub(super) enum Refusal {
     /// The palette is full.
     Full,
@@ -34,12 +34,12 @@ impl From<Full> for Refusal {
 }
 
 impl OpenBrick {
-    /// Number of its observed voxels.
+    /// Number of observed voxels.
     pub(super) fn voxels(&self) -> usize {
         self.observed.iter().map(|word| word.count_ones() as usize).sum()
     }
 
-    /// Whether all voxels belong to a tile.
+    /// Checks that all voxels belong to a tile.
     pub(super) fn check_is_inside(&self, tile: &VoxelBox) -> Result<(), String> {
         let other = || format!("voxels of brick {:#x} belong to another tile", self.code.0);
         let place = places(self.observed).next().ok_or_else(other)?;
@@ -57,12 +57,12 @@ impl OpenBrick {
         if is_inside { Ok(()) } else { Err(other()) }
     }
 
-    /// The finished brick.
+    /// Completes the brick.
     pub(super) fn closed(self, evidence: Storage) -> Brick {
         Brick::with(self.code, self.observed, evidence)
     }
 
-    /// The states of the voxels; missing ones are added to the palette.
+    /// Reads the states of the voxels; missing ones are added to the palette.
     pub(super) fn interned(
         &self,
         rest: &mut Rest<'_>,
@@ -91,7 +91,7 @@ impl OpenBrick {
         Ok(self.common(symbol, rest)?)
     }
 
-    /// The evidence of the voxels, if the palette is full.
+    /// Reads the evidence of the voxels without adding states; used if the palette is full.
     pub(super) fn plain(
         &self,
         rest: &mut Rest<'_>,
@@ -108,7 +108,7 @@ impl OpenBrick {
         Ok(cells)
     }
 
-    /// The evidence of the next voxel, whose symbol is taken already; the palette holds the codebook.
+    /// Reads the evidence of the next voxel, whose symbol was read already; the palette must contain the codebook.
     pub(super) fn evidence(
         &self,
         symbol: u8,
@@ -121,17 +121,17 @@ impl OpenBrick {
         }
     }
 
-    /// The palette's state of a codebook number.
+    /// Palette state of a codebook number.
     pub(super) const fn state_of(number: u16) -> StateId {
         number + 1
     }
 
-    /// The palette's state of a symbol that is not rare.
+    /// Palette state of a symbol that is not rare.
     fn common(&self, symbol: u8, rest: &mut Rest<'_>) -> Result<StateId, String> {
         Ok(Self::state_of(self.number(symbol, rest)?))
     }
 
-    /// The codebook number of a symbol that is not rare.
+    /// Codebook number of a symbol that is not rare.
     pub(super) fn number(&self, symbol: u8, rest: &mut Rest<'_>) -> Result<u16, String> {
         let number = if symbol < self.symbols.direct() {
             Some(usize::from(symbol))
@@ -140,7 +140,7 @@ impl OpenBrick {
         } else {
             self.symbols.number(symbol, rest.take_second()?)
         };
-        let number = number.ok_or_else(|| format!("symbol {symbol} stands for no state"))?;
+        let number = number.ok_or_else(|| format!("symbol {symbol} has no state"))?;
         Ok(number as u16)
     }
 }

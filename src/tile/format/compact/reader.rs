@@ -1,30 +1,30 @@
 use super::column_reader::ColumnReader;
 use super::group_columns::Columns;
+use super::group_filter::GroupFilter;
 use super::group_reader::{GroupReader, TakeBricks};
-use super::group_sieve::GroupSieve;
 use super::head::Head;
 use super::input::Input;
 use super::table_builder::TableBuilder;
 use crate::error::DecodeError;
 use crate::space::VoxelBox;
 use crate::tile::Table;
-use crate::tile::format::gather::SiftedVoxels;
+use crate::tile::format::gather::FilteredVoxels;
 use crate::tile::table::Palette;
 use std::io::{self, Read};
 
-/// Reads tables in compact form. Its buffers are kept from table to table: 0.4 MB, and up to 1.5 MB more after a table
-/// in which hardly two voxels were in one state.
+/// Reader of tables in compact form. It reuses its buffers: 0.4 MB, and up to 1.5 MB more after a table in which almost
+/// every voxel had a state of its own.
 pub struct CompactReader {
     column_reader: ColumnReader,
     columns: Columns,
 }
 
 impl CompactReader {
-    /// A reader.
+    /// Creates a reader.
     ///
     /// # Errors
     ///
-    /// Those of zstd.
+    /// Returns errors from zstd.
     pub fn new() -> io::Result<Self> {
         Ok(Self { column_reader: ColumnReader::new()?, columns: Columns::default() })
     }
@@ -34,9 +34,9 @@ impl CompactReader {
     ///
     /// # Errors
     ///
-    /// Anything that violates the format, with the offset of the part: wrong magic or version, lengths and counts that
-    /// do not fit, bricks out of order or of another tile, duplicate or invalid states, bytes after the end, a wrong
-    /// checksum.
+    /// Fails if the input violates the format; the error contains the offset of the part. Examples are a wrong magic or
+    /// version, inconsistent lengths and counts, bricks out of order or of another tile, duplicate or invalid states,
+    /// bytes after the end, a wrong checksum.
     pub fn read(
         &mut self,
         input: &mut impl Read,
@@ -46,7 +46,7 @@ impl CompactReader {
         self.read_into(input, bytes, voxels, TableBuilder::new)
     }
 
-    /// Reads all groups into what begins with the codebook's palette.
+    /// Reads all groups into a consumer that is created from the codebook's palette.
     fn read_into<T: TakeBricks>(
         &mut self,
         input: &mut impl Read,
@@ -78,21 +78,22 @@ impl CompactReader {
 ///
 /// # Errors
 ///
-/// Those of [`CompactReader::read`].
+/// Same errors as [`CompactReader::read`].
 pub fn read_compact(input: &mut impl Read, bytes: u64, voxels: &VoxelBox) -> Result<Table, DecodeError> {
     CompactReader::new()?.read(input, bytes, voxels)
 }
 
-/// Reads the observed voxels of a table whose log-odds are at least `from`, in Morton order, without the table.
+/// Reads the observed voxels of a table whose log-odds are at least `from`, in Morton order, without building the
+/// table.
 ///
 /// # Errors
 ///
-/// Those of [`CompactReader::read`].
-pub(in crate::tile::format) fn sift_compact(
+/// Same errors as [`CompactReader::read`].
+pub(in crate::tile::format) fn filter_compact(
     input: &mut impl Read,
     bytes: u64,
     voxels: &VoxelBox,
     from: f64,
-) -> Result<SiftedVoxels, DecodeError> {
-    CompactReader::new()?.read_into(input, bytes, voxels, |palette| GroupSieve::new(palette, from))
+) -> Result<FilteredVoxels, DecodeError> {
+    CompactReader::new()?.read_into(input, bytes, voxels, |palette| GroupFilter::new(palette, from))
 }

@@ -3,25 +3,25 @@ use crate::tile::Table;
 use crate::tile::table::{Brick, Palette, StateId, Storage};
 use rustc_hash::FxHashMap;
 
-/// Counts the voxels of a table per state.
+/// Number of voxels per state of a table.
 pub(super) struct StateCounts {
     /// By number in the table's palette.
     pub(super) interned: Vec<u32>,
     /// For states that are not in the palette.
     pub(super) others: FxHashMap<StateKey, u32>,
-    /// How many more states are counted.
-    room: usize,
+    /// Number of further states that can be counted.
+    remaining: usize,
 }
 
-/// A state's bits.
+/// Bits of a state.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub(super) struct StateKey {
     pub(super) log_odds_bits: u64,
     pub(super) observation_count: i32,
 }
 
-/// Most states that are counted, the first in Morton order: as many as a palette holds. Only a table with plain bricks
-/// can have more.
+/// Maximum number of states that are counted, the first in Morton order: as many as a palette can contain. Only a table
+/// with plain bricks can have more.
 const MAX_COUNTED: usize = (1 << 16) - 1;
 
 impl From<Evidence> for StateKey {
@@ -39,9 +39,9 @@ impl From<StateKey> for Evidence {
 impl StateCounts {
     pub(super) fn of(table: &Table) -> Self {
         let interned = vec![0; table.palette.len()];
-        let mut all = Self { interned, others: FxHashMap::default(), room: MAX_COUNTED };
+        let mut all = Self { interned, others: FxHashMap::default(), remaining: MAX_COUNTED };
         if table.bricks.iter().all(|brick| matches!(brick.evidence, Storage::Interned(_))) {
-            // All are counted, so the order does not matter.
+            // All are counted, so the order is irrelevant.
             let mut counts = vec![[0; LANES]; table.palette.len()];
             table.bricks.iter().for_each(|brick| count_all(brick, &mut counts));
             all.interned = counts.iter().map(|lanes| lanes.iter().sum()).collect();
@@ -66,8 +66,8 @@ impl StateCounts {
 
     fn count_interned(&mut self, state: StateId) {
         let count = &mut self.interned[usize::from(state)];
-        if *count > 0 || self.room > 0 {
-            self.room -= usize::from(*count == 0);
+        if *count > 0 || self.remaining > 0 {
+            self.remaining -= usize::from(*count == 0);
             *count += 1;
         }
     }
@@ -75,14 +75,14 @@ impl StateCounts {
     fn count_other(&mut self, evidence: Evidence) {
         if let Some(count) = self.others.get_mut(&evidence.into()) {
             *count += 1;
-        } else if self.room > 0 {
-            self.room -= 1;
+        } else if self.remaining > 0 {
+            self.remaining -= 1;
             self.others.insert(evidence.into(), 1);
         }
     }
 }
 
-/// Neighbours are often in one state; several lanes avoid waiting for a count just written.
+/// Adjacent voxels often have the same state; several lanes avoid waiting for a count just written.
 const LANES: usize = 4;
 
 fn count_all(brick: &Brick, counts: &mut [[u32; LANES]]) {

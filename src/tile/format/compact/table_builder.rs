@@ -4,13 +4,13 @@ use super::open_brick::{OpenBrick, Refusal};
 use crate::tile::Table;
 use crate::tile::table::{Palette, Storage};
 
-/// Builds a table of bricks.
+/// Builds a table from bricks.
 pub(super) struct TableBuilder {
     table: Table,
 }
 
 impl TableBuilder {
-    /// The palette holds the codebook.
+    /// Creates a builder. The palette must contain the codebook.
     pub(super) fn new(palette: Palette) -> Self {
         Self { table: Table::with_palette(palette) }
     }

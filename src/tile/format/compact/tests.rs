@@ -1,7 +1,7 @@
-//! Tables of every kind survive the compact form to the bit; damaged input is an error.
+//! Tables of every kind survive the compact form bit by bit; damaged input is an error.
 
 use super::{
-    CompactEffort, CompactIndex, CompactReader, CompactWriter, read_compact, sift_compact, write_compact,
+    CompactEffort, CompactIndex, CompactReader, CompactWriter, filter_compact, read_compact, write_compact,
 };
 use crate::error::{DecodeError, FormatError};
 use crate::sensor::Evidence;
@@ -17,7 +17,7 @@ fn state(log_odds: f64, observation_count: i32) -> Evidence {
     Evidence { log_odds, observation_count }
 }
 
-/// Tiles small and large, on and off the borders of bricks, where keys begin anew, and at the ends of `i32`.
+/// Small and large tiles, on and off the borders of bricks, at the wrap-around of keys and at the limits of `i32`.
 fn any_tile(random: &mut Random) -> VoxelBox {
     let n = [2, 3, 7, 8, 16, 21, 40][random.below(7) as usize];
     let min = std::array::from_fn(|_| match random.below(4) {
@@ -29,7 +29,7 @@ fn any_tile(random: &mut Random) -> VoxelBox {
     VoxelBox { min, end: min.map(|k| k + n) }
 }
 
-/// Few states, many, or one per voxel; now and then one that is rare.
+/// Few states, many, or one per voxel; occasionally a rare one.
 fn any_state(random: &mut Random, kind: u64) -> Evidence {
     const ODD: [f64; 8] =
         [0.0, -0.0, f64::MIN_POSITIVE / 3.0, -5e-324, f64::MAX, f64::MIN, 1.0 + f64::EPSILON, -2.0];
@@ -58,7 +58,7 @@ fn any_voxels(random: &mut Random, tile: &VoxelBox) -> Voxels {
     voxels
 }
 
-/// A table of these voxels, built in some order, with a palette that holds all states or is soon too small.
+/// Builds a table of these voxels in random order, with a palette that contains all states or is soon too small.
 fn table_of(voxels: &Voxels, random: &mut Random) -> Table {
     let limit = 1 << random.between(2.0, 12.0) as usize;
     let palette = [Palette::default(), Palette::limited(limit, limit)][random.below(2) as usize].clone();
@@ -92,11 +92,11 @@ fn read(bytes: &[u8], tile: &VoxelBox) -> Result<Table, FormatError> {
     };
     let table = read_compact(&mut &bytes[..], bytes.len() as u64, tile).map_err(format_error);
     for from in [f64::NEG_INFINITY, -1.0, 0.0, f64::MAX] {
-        let sifted = sift_compact(&mut &bytes[..], bytes.len() as u64, tile, from).map_err(format_error);
-        match (&table, sifted) {
-            (Ok(table), Ok(sifted)) => assert!(table.iter_from(from).eq(sifted)),
-            (Err(table), Err(sifted)) => assert_eq!(*table, sifted),
-            (_, sifted) => panic!("{sifted:?}"),
+        let filtered = filter_compact(&mut &bytes[..], bytes.len() as u64, tile, from).map_err(format_error);
+        match (&table, filtered) {
+            (Ok(table), Ok(filtered)) => assert!(table.iter_from(from).eq(filtered)),
+            (Err(table), Err(filtered)) => assert_eq!(*table, filtered),
+            (_, filtered) => panic!("{filtered:?}"),
         }
     }
     if let Ok(table) = &table {
@@ -105,7 +105,7 @@ fn read(bytes: &[u8], tile: &VoxelBox) -> Result<Table, FormatError> {
     table
 }
 
-/// Some voxels, observed and not, are what the table says when each is read from its group alone.
+/// Checks that some voxels, observed and not, are the same when each is read from its group alone.
 fn assert_is_found_alone(bytes: &[u8], tile: &VoxelBox, table: &Table) {
     let index = CompactIndex::read(&mut &bytes[..], bytes.len() as u64, tile).unwrap().unwrap();
     let middle = (table.len() / 2).saturating_sub(1);
@@ -131,7 +131,7 @@ fn assert_is(table: &Table, voxels: &Voxels) {
 }
 
 #[test]
-fn tables_come_back_to_the_bit_and_equal_ones_have_equal_bytes() {
+fn tables_round_trip_and_equal_tables_have_equal_bytes() {
     let mut random = Random::of(7, &[]);
     let mut plain = 0;
     for _ in 0..150 {
@@ -150,9 +150,9 @@ fn tables_come_back_to_the_bit_and_equal_ones_have_equal_bytes() {
     assert!(plain > 100, "{plain}");
 }
 
-/// A tile whose voxels have more states than a palette holds, some of them twice.
+/// A tile whose voxels have more states than fit in a palette, some of them twice.
 #[test]
-fn bricks_that_do_without_the_palette_come_back() {
+fn plain_bricks_round_trip() {
     let mut random = Random::of(8, &[]);
     let tile = VoxelBox { min: [0; 3], end: [50; 3] };
     let states: Vec<_> = (0..90_000).map(|_| any_state(&mut random, 3)).collect();
@@ -175,7 +175,7 @@ fn bricks_that_do_without_the_palette_come_back() {
 }
 
 #[test]
-fn what_is_read_goes_on_as_any_table() {
+fn decoded_tables_can_be_updated() {
     use crate::sensor::{Observation, SensorModel};
     let mut random = Random::of(9, &[]);
     let tile = VoxelBox { min: [0; 3], end: [16; 3] };
@@ -193,7 +193,7 @@ fn what_is_read_goes_on_as_any_table() {
     assert_is(&again, &table.iter().collect());
 }
 
-/// The index of a table, and all its voxels from one group each.
+/// Checks the index of a table, and reads all its voxels individually from their groups.
 fn assert_is_voxel_by_voxel(bytes: &[u8], tile: &VoxelBox, voxels: &Voxels) {
     let index = CompactIndex::read(&mut &bytes[..], bytes.len() as u64, tile).unwrap().unwrap();
     let crc = bytes.last_chunk().unwrap();
@@ -214,7 +214,7 @@ fn assert_is_voxel_by_voxel(bytes: &[u8], tile: &VoxelBox, voxels: &Voxels) {
 }
 
 #[test]
-fn a_voxel_is_read_from_its_group_alone() {
+fn single_voxels_are_read_from_their_groups() {
     let mut random = Random::of(10, &[]);
     for _ in 0..40 {
         let mut tile = any_tile(&mut random);
@@ -248,9 +248,9 @@ fn a_voxel_is_read_from_its_group_alone() {
     assert!(groups.len() > 1);
 }
 
-/// What one voxel is read from is compared with the checksum of the whole.
+/// Reading one voxel verifies its parts against the checksum of the whole.
 #[test]
-fn every_wrong_bit_before_the_groups_and_in_the_group_is_noticed() {
+fn flipped_bits_are_detected_when_reading_one_voxel() {
     let (tile, table) = small();
     let bytes = written(&table, CompactEffort::Fast);
     let (&code, _) =
@@ -270,7 +270,7 @@ fn every_wrong_bit_before_the_groups_and_in_the_group_is_noticed() {
     }
 }
 
-/// Adds the checksum, and makes those of the parts right, as far as there are parts.
+/// Adds the checksum, and corrects those of the parts that exist.
 fn sealed(mut bytes: Vec<u8>) -> Vec<u8> {
     let u32_at = |bytes: &[u8], at: usize| {
         bytes.get(at..at + 4).map_or(0, |bytes| u32::from_le_bytes(bytes.try_into().unwrap())) as usize
@@ -303,7 +303,7 @@ impl std::io::Write for FullDisk {
 }
 
 #[test]
-fn writers_and_readers_are_as_new_after_each_table_and_each_failure() {
+fn writers_and_readers_can_be_reused_after_failures() {
     let mut random = Random::of(4, &[]);
     let (mut writer, mut reader) =
         (CompactWriter::new(CompactEffort::Fast).unwrap(), CompactReader::new().unwrap());
@@ -352,9 +352,9 @@ fn three_groups() -> (VoxelBox, Table) {
     (tile, table_of(&voxels, &mut Random::of(1, &[])))
 }
 
-/// With valid checksums: what the index says of groups must be so, and of one group that is read alone too.
+/// With valid checksums: groups must match the index, also when one group is read alone.
 #[test]
-fn an_index_that_does_not_fit_its_groups_is_an_error() {
+fn an_index_that_does_not_match_its_groups_is_an_error() {
     let (tile, table) = three_groups();
     let bytes = written(&table, CompactEffort::Fast);
     read(&bytes, &tile).unwrap();
@@ -372,7 +372,7 @@ fn an_index_that_does_not_fit_its_groups_is_an_error() {
     type Changes<'a> = &'a [(usize, &'a [u8])];
     let cases: [(Changes<'_>, u64, &str, bool); 3] = [
         (&[(entry(1), &last)], places[0].start, "bricks of the next one", true),
-        (&[(entry(0) + 8, &shorter), (entry(1) + 8, &longer)], places[0].start, "are announced", true),
+        (&[(entry(0) + 8, &shorter), (entry(1) + 8, &longer)], places[0].start, "bytes instead of", true),
         (&[(16, &1025_u32.to_le_bytes())], places[1].start, "at most 1", false),
     ];
     for (changes, place, reason, is_seen_alone) in cases {
@@ -392,7 +392,7 @@ fn an_index_that_does_not_fit_its_groups_is_an_error() {
 }
 
 #[test]
-fn every_truncation_and_every_wrong_bit_is_an_error() {
+fn truncations_and_flipped_bits_are_errors() {
     let (tile, table) = small();
     let bytes = written(&table, CompactEffort::Small);
     assert!(read(&bytes, &tile).is_ok());
@@ -405,19 +405,19 @@ fn every_truncation_and_every_wrong_bit_is_an_error() {
         read(&wrong, &tile).unwrap_err();
     }
     read(&[&bytes[..], &[0]].concat(), &tile).unwrap_err();
-    // A stream that is shorter than announced.
+    // A stream that is shorter than its declared length.
     let longer = read_compact(&mut &bytes[..bytes.len() - 1], bytes.len() as u64, &tile);
     assert!(matches!(longer, Err(DecodeError::Io(_))));
 }
 
-/// With a valid checksum: an error, or a table of this tile.
+/// With a valid checksum, the result is an error or a table of this tile.
 #[test]
 fn hostile_bytes_are_an_error_or_a_table_of_the_tile() {
     hostile_bytes_of(small(), 20_000, 200);
     hostile_bytes_of(three_groups(), 1_000, 25);
 }
 
-fn hostile_bytes_of((tile, table): (VoxelBox, Table), times: usize, least_read_well: usize) {
+fn hostile_bytes_of((tile, table): (VoxelBox, Table), times: usize, min_read_well: usize) {
     let bytes = written(&table, CompactEffort::Fast);
     let mut random = Random::of(3, &[]);
     let (mut refused, mut read_well) = (0, 0);
@@ -440,11 +440,11 @@ fn hostile_bytes_of((tile, table): (VoxelBox, Table), times: usize, least_read_w
         assert!(voxels.values().all(is_evidence));
         assert_is(&read(&written(&table, CompactEffort::Fast), &tile).unwrap(), &voxels);
     }
-    assert!(refused > times / 4 && read_well > least_read_well, "{refused} {read_well}");
+    assert!(refused > times / 4 && read_well > min_read_well, "{refused} {read_well}");
 }
 
 #[test]
-fn what_is_wrong_is_said_where_it_is() {
+fn errors_have_the_offset_of_their_cause() {
     let (tile, table) = small();
     let bytes = written(&table, CompactEffort::Fast);
     let wrong = |at: usize, with: &[u8]| {
@@ -464,9 +464,9 @@ fn what_is_wrong_is_said_where_it_is() {
         (20, &[1], 52, "codebook"),
         (24, &all[..4], 24, "groups"),
         (24, &[0], 24, "0 groups"),
-        (28, &all[..4], 36, "bytes are announced"),
+        (28, &all[..4], 36, "the parts should have"),
         (36, &all, 36, "ascend"),
-        (44, &all[..4], 36, "bytes are announced"),
+        (44, &all[..4], 36, "the parts should have"),
     ] {
         let error = wrong(at, with);
         assert_eq!(error.at, place, "{error}");
@@ -478,7 +478,7 @@ fn what_is_wrong_is_said_where_it_is() {
 }
 
 #[test]
-fn an_empty_table_and_a_full_brick_have_their_bytes() {
+fn an_empty_table_and_a_full_brick_have_fixed_bytes() {
     let tile = VoxelBox { min: [0; 3], end: [8; 3] };
     let empty = written(&Table::default(), CompactEffort::Fast);
     assert_eq!(empty.len(), 42);

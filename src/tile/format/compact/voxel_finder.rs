@@ -6,7 +6,7 @@ use super::symbol::RARE;
 use crate::sensor::Evidence;
 use crate::space::{BrickMask, MortonCode, is_in_mask};
 
-/// Finds one voxel. The states of others are passed over without a look.
+/// Finds one voxel. The states of other voxels are skipped without decoding.
 pub(super) struct VoxelFinder<'a> {
     codebook: &'a CodebookStates,
     wanted: MortonCode,
@@ -20,7 +20,7 @@ impl<'a> VoxelFinder<'a> {
 }
 
 impl TakeBricks for VoxelFinder<'_> {
-    /// `None` if it was not observed.
+    /// `None` if the voxel was not observed.
     type Made = Option<Evidence>;
 
     fn take(&mut self, brick: OpenBrick, rest: &mut Rest<'_>) -> Result<(), String> {
@@ -43,7 +43,7 @@ impl TakeBricks for VoxelFinder<'_> {
     }
 }
 
-/// How many voxels of a mask are before a place.
+/// Number of voxels in a mask before a position.
 fn rank(mask: &BrickMask, place: usize) -> usize {
     let whole: u32 = mask[..place / 64].iter().map(|word| word.count_ones()).sum();
     let part = mask[place / 64] & ((1 << (place % 64)) - 1);

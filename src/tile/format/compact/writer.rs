@@ -9,46 +9,46 @@ use crate::tile::Table;
 use std::fmt;
 use std::io::{self, Write};
 
-/// Writes tables in compact form. Its buffers are kept from table to table: 0.7 MB, or 1.7 MB for
-/// [`CompactEffort::Small`], and up to 3 MB more after a table in which hardly two voxels were in one state.
+/// Writer of tables in compact form. It reuses its buffers: 0.7 MB, or 1.7 MB for [`CompactEffort::Small`], and up to
+/// 3 MB more after a table in which almost every voxel had a state of its own.
 pub struct CompactWriter {
     column_writer: ColumnWriter,
     group: Group,
 }
 
 impl CompactWriter {
-    /// A writer of this effort.
+    /// Creates a writer.
     ///
     /// # Errors
     ///
-    /// Those of zstd.
+    /// Returns errors from zstd.
     pub fn new(effort: CompactEffort) -> io::Result<Self> {
         Ok(Self { column_writer: ColumnWriter::new(effort)?, group: Group::default() })
     }
 
     /// Writes a table in compact form. Returns the number of bytes.
     ///
-    /// Equal tables give equal bytes. Writing takes memory for these, 8 bytes per brick, up to 80 bytes per state of
-    /// the palette, and up to 12 MB if some bricks do not use the palette.
+    /// Equal tables give equal bytes. Writing needs memory for the output, 8 bytes per brick, up to 80 bytes per state
+    /// of the palette, and up to 12 MB if some bricks do not use the palette.
     ///
     /// # Errors
     ///
-    /// Those of `out` and of zstd.
+    /// Returns errors from `out` and of zstd.
     pub fn write(&mut self, table: &Table, out: &mut impl Write) -> io::Result<u64> {
         let bytes = self.bytes(table)?;
         out.write_all(&bytes)?;
         Ok(bytes.len() as u64)
     }
 
-    /// The bytes of [`CompactWriter::write`].
+    /// Returns the bytes that [`CompactWriter::write`] writes.
     ///
     /// # Errors
     ///
-    /// Those of zstd.
+    /// Returns errors from zstd.
     pub fn bytes(&mut self, table: &Table) -> io::Result<Vec<u8>> {
         let Self { column_writer, group } = self;
         let codebook = Codebook::of(table);
-        // A failed write may have left something behind.
+        // A failed write may have left bricks in the group.
         group.clear();
         let bricks: Vec<_> = table.bricks_in_order().collect();
         let mut sizes = GroupSizes::default();
@@ -95,7 +95,7 @@ impl fmt::Debug for CompactWriter {
 ///
 /// # Errors
 ///
-/// Those of `out` and of zstd.
+/// Returns errors from `out` and of zstd.
 pub fn write_compact(table: &Table, effort: CompactEffort, out: &mut impl Write) -> io::Result<u64> {
     CompactWriter::new(effort)?.write(table, out)
 }

@@ -7,13 +7,13 @@ pub(in crate::mapper) struct MemoryPlan {
     pub(super) tiles: usize,
     pub(super) bytes: usize,
     buffer_bytes: usize,
-    pub(super) least_scan_bytes: usize,
+    pub(super) min_scan_bytes: usize,
     pub(super) is_enforced: bool,
     pub(super) spare_bytes: usize,
     pub(super) often_scans: u32,
     compact_bytes: usize,
     pub(super) view_bytes: usize,
-    pub(super) flight_bytes: usize,
+    pub(super) flush_list_bytes: usize,
 }
 
 impl MemoryPlan {
@@ -22,13 +22,13 @@ impl MemoryPlan {
             tiles: 3,
             bytes: 20 << 10,
             buffer_bytes: 2 << 10,
-            least_scan_bytes: 0,
+            min_scan_bytes: 0,
             is_enforced: false,
             spare_bytes: 2 << 10,
             often_scans: 1,
             compact_bytes: 1 << 10,
             view_bytes: 2 << 10,
-            flight_bytes: usize::MAX,
+            flush_list_bytes: usize::MAX,
         }
     }
 

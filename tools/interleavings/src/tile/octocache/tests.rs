@@ -66,7 +66,7 @@ fn nobody_waits_for_a_closed_queue() {
 
 const VOXEL: MortonCode = MortonCode(77);
 
-/// What the tree and what is in flight say of the voxel together; nothing while the tree is being written.
+/// What the tree and what is in pinned say of the voxel together; nothing while the tree is being written.
 fn value_of(tree: &SharedTree) -> Option<f32> {
     tree.try_read(|tree, in_flight| {
         let latest = in_flight.iter().flatten().rfind(|(code, _)| *code == VOXEL);

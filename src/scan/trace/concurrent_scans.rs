@@ -8,27 +8,27 @@ use crate::scan::updates::ScanUpdates;
 use rayon::prelude::*;
 
 impl ScanTracer {
-    /// Traces scans beside each other, each on its share of the cores: scans have nothing in common, while parts of one
-    /// scan mark the same voxels, which are to be merged.
+    /// Traces scans concurrently, each on its share of the cores. Different scans share nothing, whereas parts of one
+    /// scan mark the same voxels and have to be merged.
     ///
-    /// `None` for a scan that does not fit into its share of the memory limit: it is to be traced by itself.
+    /// Returns `None` for a scan that does not fit into its share of the memory limit and must be traced alone.
     ///
     /// # Errors
     ///
-    /// For each scan as for [`ScanTracer::trace`].
-    pub(crate) fn trace_beside(
+    /// Same errors as [`ScanTracer::trace`], for each scan.
+    pub(crate) fn trace_concurrently(
         &mut self,
         rules: TraceRules<'_>,
         scans: &[&dyn ScanPoints],
     ) -> Vec<Result<Option<ScanUpdates>>> {
         let selection = rules.selection();
         let rules = rules.with_selection(selection.as_deref());
-        let most_threads = (rayon::current_num_threads() / scans.len().max(1)).max(1);
-        let mut tracers = self.divided(scans.len(), most_threads);
+        let max_threads = (rayon::current_num_threads() / scans.len().max(1)).max(1);
+        let mut tracers = self.divided(scans.len(), max_threads);
         let traced = tracers
             .par_iter_mut()
             .zip(scans)
-            .map(|(tracer, scan)| tracer.trace_whole(rules, *scan, most_threads))
+            .map(|(tracer, scan)| tracer.trace_whole(rules, *scan, max_threads))
             .collect();
         for mut tracer in tracers {
             self.per_scan.append(&mut tracer.per_scan);
@@ -37,18 +37,18 @@ impl ScanTracer {
         traced
     }
 
-    /// How many collectors are kept.
+    /// Number of collectors kept.
     #[cfg(test)]
     pub(crate) fn collectors(&self) -> usize {
         self.per_scan.len().max(self.per_ray.len())
     }
 
-    /// How many of so many scans may be traced beside each other.
-    pub(crate) fn count_beside(&self, scans: usize) -> usize {
+    /// Number of scans, of `scans` given ones, that may be traced concurrently.
+    pub(crate) fn max_concurrent(&self, scans: usize) -> usize {
         self.limit.collectors(scans.min(rayon::current_num_threads()))
     }
 
-    /// Tracers with equal shares of the memory, which take the collectors with them.
+    /// Divides the tracer into tracers with equal shares of the memory and of the collectors.
     fn divided(&mut self, parts: usize, collectors: usize) -> Vec<Self> {
         let limit = self.limit.divided(parts);
         let divided = (0..parts).map(|_| Self {
@@ -65,9 +65,9 @@ impl ScanTracer {
         &mut self,
         rules: TraceRules<'_>,
         scan: &dyn ScanPoints,
-        most_threads: usize,
+        max_threads: usize,
     ) -> Result<Option<ScanUpdates>> {
-        let scan_rays = ScanRays::new(rules, scan, most_threads, &self.stop)?;
+        let scan_rays = ScanRays::new(rules, scan, max_threads, &self.stop)?;
         let updates = match (rules.rays.insert_mode, self.limit.is_none()) {
             (InsertMode::PerScan, true) => scan_rays.per_scan(&mut self.per_scan)?,
             (InsertMode::PerScan, false) => {
@@ -79,7 +79,7 @@ impl ScanTracer {
             }
             (InsertMode::PerRay, true) if rules.are_rays_in_order() => scan_rays.per_ray_in_order()?,
             (InsertMode::PerRay, true) => scan_rays.per_ray(&mut self.per_ray)?,
-            // Their size is not known before they are collected, so that they go to parts.
+            // Their size is unknown before they are collected, so the caller must trace the scan in parts.
             (InsertMode::PerRay, false) => return Ok(None),
         };
         self.stop.check()?;

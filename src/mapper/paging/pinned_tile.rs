@@ -3,31 +3,31 @@ use crate::space::TileIndex;
 use crate::tile::Tile;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// A resident tile that a flush beside the mapper is to write. Until that begins, the mapper may leave it the compact
-/// form instead: then the tile itself can leave memory.
+/// Resident tile that a background flush will write. Until the write begins, the mapper may replace it by its compact
+/// form and evict the tile.
 #[derive(Debug)]
-pub(super) struct HeldTile {
+pub(super) struct PinnedTile {
     index: TileIndex,
     held: Mutex<Held>,
 }
 
 #[derive(Debug)]
 struct Held {
-    form: HeldForm,
+    form: PinnedForm,
     is_being_written: bool,
 }
 
-/// What of a tile is held.
+/// Form in which a tile is held.
 #[derive(Clone, Debug)]
-pub(super) enum HeldForm {
+pub(super) enum PinnedForm {
     Resident(Arc<Tile>),
     Compact(CompactTile),
 }
 
-impl HeldTile {
+impl PinnedTile {
     pub(super) fn new(tile: Arc<Tile>) -> Self {
         let index = tile.index();
-        let held = Held { form: HeldForm::Resident(tile), is_being_written: false };
+        let held = Held { form: PinnedForm::Resident(tile), is_being_written: false };
         Self { index, held: Mutex::new(held) }
     }
 
@@ -35,48 +35,47 @@ impl HeldTile {
         self.index
     }
 
-    /// Bytes of memory.
     pub(super) fn bytes(&self) -> usize {
         match &self.lock().form {
-            HeldForm::Resident(tile) => tile.bytes(),
-            HeldForm::Compact(tile) => tile.bytes().len(),
+            PinnedForm::Resident(tile) => tile.bytes(),
+            PinnedForm::Compact(tile) => tile.bytes().len(),
         }
     }
 
-    /// The tile, unless it has the compact form.
+    /// The tile, unless only its compact form is held.
     pub(super) fn resident(&self) -> Option<Arc<Tile>> {
         match &self.lock().form {
-            HeldForm::Resident(tile) => Some(tile.clone()),
-            HeldForm::Compact(_) => None,
+            PinnedForm::Resident(tile) => Some(tile.clone()),
+            PinnedForm::Compact(_) => None,
         }
     }
 
-    /// Holds a copy instead; `false` if it has the compact form by now.
+    /// Replaces the tile by a copy; returns `false` if only the compact form is held.
     pub(super) fn hold_copy(&self, copy: Tile) -> bool {
         let mut held = self.lock();
-        let is_resident = matches!(held.form, HeldForm::Resident(_));
+        let is_resident = matches!(held.form, PinnedForm::Resident(_));
         if is_resident {
-            held.form = HeldForm::Resident(Arc::new(copy));
+            held.form = PinnedForm::Resident(Arc::new(copy));
         }
         is_resident
     }
 
-    /// Whether it may have the compact form from now on.
+    /// Returns whether the tile may still be replaced by its compact form.
     pub(super) fn may_be_packed(&self) -> bool {
         !self.lock().is_being_written
     }
 
-    /// Holds the compact form instead; `false` if the tile is being written.
+    /// Replaces the tile by its compact form; returns `false` if the tile is being written.
     pub(super) fn hold_packed(&self, packed: CompactTile) -> bool {
         let mut held = self.lock();
         if !held.is_being_written {
-            held.form = HeldForm::Compact(packed);
+            held.form = PinnedForm::Compact(packed);
         }
         !held.is_being_written
     }
 
-    /// What is to be written, which stays from now on.
-    pub(super) fn begin_write(&self) -> HeldForm {
+    /// Returns the form to write, and fixes it from now on.
+    pub(super) fn begin_write(&self) -> PinnedForm {
         let mut held = self.lock();
         held.is_being_written = true;
         held.form.clone()

@@ -4,30 +4,32 @@ use crate::space::TileIndex;
 use crate::tile::Voxel;
 use rayon::prelude::*;
 
-/// Most voxels of tiles that are read together, unless one tile has more: 8 MB.
+/// Maximum number of voxels of tiles that are read together, unless a single tile has more: 8 MB.
 const MAX_VOXELS: u64 = 1 << 18;
-/// Most tiles that are read together.
+/// Maximum number of tiles that are read together.
 const MAX_TILES: usize = 64;
 
-/// At most how many voxels of a tile have log-odds of `from` or more, where that is known without reading it.
-fn most_from(view: &impl MapView, tile: TileIndex, from: f64) -> Option<u64> {
+/// Upper bound on the number of a tile's voxels with log-odds of at least `from`, known without reading it.
+fn max_count_from(view: &impl MapView, tile: TileIndex, from: f64) -> Option<u64> {
     let version = view.version_of_tile(tile)?;
     Some(if from >= view.config().occupied_log_odds() { version.occupied } else { version.voxels })
 }
 
-/// The first of `tiles` that are read together: none if the first one has too many voxels, or nobody knows how many.
+/// Returns the first of `tiles` that are read together; empty if the first one has too many voxels or an unknown
+/// number.
 fn first_together<'a>(view: &impl MapView, tiles: &'a [TileIndex], from: f64) -> &'a [TileIndex] {
-    let mut room = MAX_VOXELS;
+    let mut budget = MAX_VOXELS;
     let fits = |&&tile: &&TileIndex| {
-        let left = most_from(view, tile, from).and_then(|most| room.checked_sub(most));
-        room = left.unwrap_or(0);
+        let left = max_count_from(view, tile, from).and_then(|most| budget.checked_sub(most));
+        budget = left.unwrap_or(0);
         left.is_some()
     };
     &tiles[..tiles.iter().take(MAX_TILES).take_while(fits).count()]
 }
 
 /// Visits the observed voxels of tiles whose log-odds are at least `from`: tile by tile in their order, in Morton order
-/// within each. Small tiles are read on all cores; `whole` visits those of one that may be too large to be held twice.
+/// within each. Small tiles are read on all cores; `whole` visits the voxels of a tile that may be too large to be in
+/// memory twice.
 pub(super) fn for_each_from<F: FnMut(Voxel)>(
     view: &impl MapView,
     tiles: &[TileIndex],

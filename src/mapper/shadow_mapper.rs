@@ -5,25 +5,27 @@ use crate::scan::{ScanReport, Stop};
 use crate::space::{TileIndex, TileSelection};
 use crate::store::{CatalogEntry, SideFolder, TileStore};
 
-/// Maps tiles of a map again beside it, while its own mapper goes on: into a map of the same id in a folder of its own,
-/// whose tiles and entries of scans the map can [take over](super::Remapper::take_over).
+/// Mapper of a shadow map, for an online remap: it replays tiles into a map of the same id in a folder of its own,
+/// while the map's own mapper continues. The map then [takes over](super::Remapper::take_over) its tiles and scan
+/// entries.
 #[derive(Debug)]
-pub(crate) struct SideMapper {
+pub(crate) struct ShadowMapper {
     mapper: OutOfCoreTileMapper,
-    /// Behind the mapper: it goes once nobody has a file in it.
+    /// Declared after the mapper, so that the folder is removed once its files are closed.
     _folder: SideFolder,
 }
 
-impl SideMapper {
-    /// Begins with no tile and no scan, in `MAP.remapped` beside the map; what an earlier attempt left there goes.
+impl ShadowMapper {
+    /// Begins an empty shadow map in `MAP.remapped` next to the map; the remains of an earlier attempt are removed.
     ///
     /// # Errors
     ///
-    /// Another process that does the same, something else in that place, a map of the original format, a disk that
-    /// refuses.
+    /// Fails if another process is remapping the map, the folder has other content, the map is of the original format
+    /// or a disk operation fails.
     pub(crate) fn begin(map: &TileStore, config: MapConfig, stop: Stop) -> Result<Self> {
-        let map_id =
-            map.map_id().ok_or_else(|| Error::argument("map", "of the original format; convert it first"))?;
+        let map_id = map
+            .map_id()
+            .ok_or_else(|| Error::argument("map", "is of the original format; convert it first"))?;
         let folder = SideFolder::begin(map.disk().clone(), map.folder())?;
         let store = TileStore::create(map.disk().clone(), folder.path(), map.metadata().clone(), map_id)?;
         let mut mapper = OutOfCoreTileMapper::without_tiles(store, config, [])?;
@@ -31,26 +33,26 @@ impl SideMapper {
         Ok(Self { mapper, _folder: folder })
     }
 
-    /// Maps what a scan says about a selection of tiles, or about all; returns the tiles that it touched, too.
+    /// Traces a scan within the selected tiles, or all; also returns the tiles that it changed.
     pub(crate) fn map_kept(
         &mut self,
         scan: &KeptScan,
         selection: Option<&TileSelection>,
     ) -> Result<(ScanReport, Vec<TileIndex>)> {
-        self.mapper.map_again(scan.number(), scan, scan.rays(), selection)
+        self.mapper.replay_scan(scan.number(), scan, scan.rays(), selection)
     }
 
-    /// Notes the entry that a scan is to have; the number of each follows that of the one before.
+    /// Records the catalog entry of a scan; entries are added in the order of their numbers.
     pub(crate) fn note(&mut self, entry: CatalogEntry) {
         self.mapper.with_store(|store| store.archive_mut().note(entry));
     }
 
-    /// Writes what was mapped and noted, up to the scan of this number.
+    /// Commits the replayed tiles and entries up to the scan of this number.
     pub(crate) fn commit(&mut self, scan_number: u64) -> Result<()> {
-        self.mapper.commit_again(scan_number, false)
+        self.mapper.commit_replay(scan_number, false)
     }
 
-    /// What was committed, for the map to take over.
+    /// The committed store, for the map to take over.
     pub(crate) fn with_store<T>(&mut self, work: impl FnOnce(&mut TileStore) -> T) -> T {
         self.mapper.with_store(work)
     }

@@ -6,51 +6,51 @@ use super::unpadded_evidence::UnpaddedEvidence;
 use crate::sensor::Evidence;
 use crate::space::VoxelKey;
 
-/// Voxels of any tables that are looked up together, one stage after the other for all of them: in a loop of one stage
-/// the CPU waits for the memory of many voxels at once.
-pub(crate) struct AskedVoxels<'a> {
+/// Batch of voxels of any tables that are looked up together, one stage after the other for all of them, so that the
+/// CPU waits for the memory of many voxels at once.
+pub(crate) struct VoxelBatch<'a> {
     voxels: Vec<(&'a Table, Address)>,
 }
 
-/// What a voxel's brick says of it.
+/// Result of the look-up in a voxel's brick.
 #[derive(Clone, Copy)]
 enum Found<'a> {
     State(&'a StateId),
     Evidence(&'a UnpaddedEvidence),
 }
 
-impl<'a> AskedVoxels<'a> {
-    /// As many as are worth it: the memory that they wait for must stay in the nearest cache until the last stage.
-    pub(crate) const MOST: usize = 64;
+impl<'a> VoxelBatch<'a> {
+    /// Maximum batch size: the memory must remain in the L1 cache until the last stage.
+    pub(crate) const MAX_VOXELS: usize = 64;
 
     pub(crate) fn new() -> Self {
-        Self { voxels: Vec::with_capacity(Self::MOST) }
+        Self { voxels: Vec::with_capacity(Self::MAX_VOXELS) }
     }
 
-    /// Adds a voxel of the tile with this table; at most [`AskedVoxels::MOST`].
+    /// Adds a voxel of the tile with this table; at most [`VoxelBatch::MAX_VOXELS`].
     #[inline]
     pub(crate) fn push(&mut self, table: &'a Table, key: VoxelKey) {
         self.voxels.push((table, Address::of_key(key)));
     }
 
-    /// Looks the voxels up and forgets them. Takes each one's evidence, in their order; `None` if it was never
-    /// observed.
+    /// Looks the voxels up and clears the batch. Passes the evidence of each to `take`, in order; `None` if the voxel
+    /// was never observed.
     pub(crate) fn take(&mut self, mut take: impl FnMut(Option<Evidence>)) {
-        for voxels in self.voxels.chunks(Self::MOST) {
-            let mut blocks = [0; Self::MOST];
+        for voxels in self.voxels.chunks(Self::MAX_VOXELS) {
+            let mut blocks = [0; Self::MAX_VOXELS];
             for (block, (table, at)) in blocks.iter_mut().zip(voxels) {
                 *block = table.directory.block(*at);
             }
-            let mut numbers = [0; Self::MOST];
+            let mut numbers = [0; Self::MAX_VOXELS];
             for ((number, block), (table, at)) in numbers.iter_mut().zip(blocks).zip(voxels) {
                 *number = table.directory.in_block(block, *at);
             }
-            let mut found = [Found::NOTHING; Self::MOST];
+            let mut found = [Found::NOTHING; Self::MAX_VOXELS];
             for ((found, number), (table, at)) in found.iter_mut().zip(numbers).zip(voxels) {
                 let brick = table.bricks.get((number as usize).wrapping_sub(1));
                 *found = Found::of(brick.unwrap_or(Brick::ABSENT_BRICK), at.place);
             }
-            let mut evidences = [None; Self::MOST];
+            let mut evidences = [None; Self::MAX_VOXELS];
             for ((evidence, found), (table, _)) in evidences.iter_mut().zip(found).zip(voxels) {
                 *evidence = match found {
                     Found::State(&UNKNOWN) => None,
@@ -90,7 +90,7 @@ mod tests {
     use voxtile_simulation::Random;
 
     #[test]
-    fn many_voxels_are_what_each_of_them_is() {
+    fn batched_and_single_look_ups_are_equal() {
         let mut random = Random::of(5, &[]);
         let mut tables = vec![Table::default(); 3];
         for table in &mut tables[1..] {
@@ -110,20 +110,20 @@ mod tests {
         }
         let palette = tables[2].palette.clone();
         tables[2].bricks.iter_mut().step_by(2).for_each(|brick| brick.make_plain(&palette));
-        let mut voxels = AskedVoxels::new();
+        let mut voxels = VoxelBatch::new();
         let mut found = 0;
         for count in [0, 1, 63, 64].into_iter().cycle().take(400) {
-            let asked: Vec<(&Table, VoxelKey)> = (0..count)
+            let queried: Vec<(&Table, VoxelKey)> = (0..count)
                 .map(|_| {
                     let brick = [0, 1, 2, 9, 64, 700][random.below(6) as usize];
                     let code = BrickCode(brick).voxel(random.below(512) as usize);
                     (&tables[random.below(3) as usize], code.to_key())
                 })
                 .collect();
-            asked.iter().for_each(|&(table, key)| voxels.push(table, key));
+            queried.iter().for_each(|&(table, key)| voxels.push(table, key));
             let mut answers = Vec::new();
             voxels.take(|evidence| answers.push(evidence));
-            let one_by_one: Vec<_> = asked.iter().map(|&(table, key)| table.get_key(key)).collect();
+            let one_by_one: Vec<_> = queried.iter().map(|&(table, key)| table.get_key(key)).collect();
             assert_eq!(answers, one_by_one);
             found += answers.iter().flatten().count();
         }
