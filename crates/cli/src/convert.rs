@@ -16,7 +16,7 @@ use voxtile::operations::{WrittenMap, convert};
 use voxtile::{Result, Storage};
 use voxtile_pipeline::memory;
 
-/// What became of what.
+/// Summary of a conversion.
 #[derive(Serialize)]
 struct Conversion<'a> {
     from: Form<'a>,
@@ -30,13 +30,13 @@ struct Conversion<'a> {
     peak_rss_bytes: Option<u64>,
 }
 
-/// A map, and how it is stored.
+/// Storage of a map.
 #[derive(Serialize)]
 struct Form<'a> {
     #[serde(serialize_with = "voxtile::path_text::serialize")]
     map: &'a Path,
     storage: Storage,
-    /// `None` for a map of the original format, which does not say.
+    /// `None` for a map of the original format, which does not record it.
     table_bytes: Option<u64>,
     octree_bytes: Option<u64>,
 }

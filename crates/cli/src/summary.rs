@@ -9,7 +9,7 @@ use voxtile::scan::ScanReport;
 use voxtile::tile::{OctreeStatistics, TileCounts};
 use voxtile_pipeline::{OctreeWork, Summary};
 
-/// Prints what a build did, for a person or as JSON.
+/// Prints the summary of a build as text or JSON.
 pub fn print(mut summary: Summary, json: bool) -> anyhow::Result<()> {
     for text in summary.remarks.iter_mut().chain(&mut summary.unread) {
         *text = with_options(text).into_owned();
@@ -42,7 +42,7 @@ pub fn print(mut summary: Summary, json: bool) -> anyhow::Result<()> {
     }
     if summary.left_out > 0 {
         let left_out = HumanCount(summary.left_out);
-        writeln!(out, "left out  {left_out} scans, which came faster than they could be mapped")?;
+        writeln!(out, "left out  {left_out} scans, which arrived faster than they could be mapped")?;
     }
     writeln!(out, "points    {}, {} cut at the max range", HumanCount(points), HumanCount(cut_at_max_range))?;
     for (cause, count) in skipped.by_cause().into_iter().filter(|&(_, count)| count > 0) {
@@ -64,7 +64,7 @@ pub fn print(mut summary: Summary, json: bool) -> anyhow::Result<()> {
     }
     print_io(&summary, &mut out)?;
     if let Some(bytes) = summary.peak_rss_bytes {
-        writeln!(out, "memory    {} at most", HumanBytes(bytes))?;
+        writeln!(out, "memory    {} peak", HumanBytes(bytes))?;
     }
     Ok(())
 }

@@ -9,10 +9,10 @@ use voxtile_bucket::object_store::{
     ObjectMeta, ObjectStore, PutMultipartOptions, PutOptions, PutPayload, PutResult, Result,
 };
 
-/// What becomes of a request, after so many others.
+/// Selects the fault for a request, given the number of earlier requests.
 type Faults = dyn Fn(&Asked, usize) -> Fault + Send + Sync;
 
-/// A store in memory that notes what it is asked for, and does to some of it what a test wants.
+/// Store in memory that records requests and injects faults.
 pub struct FaultyStore {
     inner: Arc<InMemory>,
     asked: Mutex<Vec<Asked>>,
@@ -24,7 +24,7 @@ pub struct FaultyStore {
 pub struct Asked {
     pub kind: Kind,
     pub key: String,
-    /// Bytes that are put, or that are asked for; `None` for all.
+    /// Number of bytes written or read; `None` for all.
     pub bytes: Option<u64>,
 }
 
@@ -35,21 +35,21 @@ pub enum Kind {
     Head,
 }
 
-/// What becomes of a request.
+/// Effect on a request.
 pub enum Fault {
     None,
-    /// It is refused for good.
+    /// Refused permanently.
     Refused,
-    /// It fails, as a broken connection does.
+    /// Fails like a broken connection.
     Fails,
-    /// It is done, and made again by the client, for whom it is too late then.
+    /// Succeeds, but the client repeats it and the repetition fails its precondition.
     DoneBefore,
-    /// Half of the answer comes.
+    /// Returns half of the response.
     CutOff,
 }
 
 impl FaultyStore {
-    /// `fault` hears of each request, and how many were made before.
+    /// Creates a store. `fault` receives each request and the number of earlier ones.
     pub fn new(
         inner: Arc<InMemory>,
         fault: impl Fn(&Asked, usize) -> Fault + Send + Sync + 'static,
@@ -57,7 +57,7 @@ impl FaultyStore {
         Arc::new(Self { inner, asked: Mutex::default(), fault: Box::new(fault) })
     }
 
-    /// All requests of a kind so far.
+    /// Returns all requests of a kind so far.
     pub fn asked(&self, kind: Kind) -> Vec<Asked> {
         self.asked.lock().unwrap().iter().filter(|asked| asked.kind == kind).cloned().collect()
     }

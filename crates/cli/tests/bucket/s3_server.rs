@@ -6,8 +6,7 @@ use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// A server of the part of S3 that maps need, on this machine, that does to requests what a test wants. It ends with
-/// the process.
+/// Local server with the part of S3 that voxtile uses, and with injected faults. It ends with the process.
 pub struct S3Server {
     pub address: SocketAddr,
     state: Arc<State>,
@@ -19,37 +18,37 @@ struct State {
     trouble: Mutex<Arc<Troubles>>,
 }
 
-/// What becomes of a request, after so many others.
+/// Selects the fault for a request, given the number of earlier requests.
 type Troubles = dyn Fn(&Asked, usize) -> Trouble + Send + Sync;
 
 /// One request.
 #[derive(Clone, Debug)]
 pub struct Asked {
     pub method: String,
-    /// The path, with the bucket.
+    /// Path, including the bucket.
     pub key: String,
-    /// Bytes that are put.
+    /// Number of bytes written.
     pub bytes: usize,
-    /// The first byte that is asked for.
+    /// First requested byte.
     pub from: Option<usize>,
 }
 
 #[derive(Clone, Copy, PartialEq)]
 pub enum Trouble {
     None,
-    /// The request is read and not answered.
+    /// Reads the request without a response.
     Silent,
-    /// The request is done and answered after so many milliseconds.
+    /// Responds after a delay in milliseconds.
     Late(u64),
-    /// The connection is reset before the request is read.
+    /// Resets the connection before reading the request.
     Reset,
-    /// The request is done, and the connection closed without an answer.
+    /// Executes the request and closes the connection without a response.
     AnswerLost,
-    /// So many bytes of the content are sent each 20 ms.
+    /// Sends this number of content bytes every 20 ms.
     Drips(usize),
-    /// Half of the content is sent, and nothing more.
+    /// Sends half of the content and then stalls.
     Stalls,
-    /// Half of the content is sent, and the connection closed.
+    /// Sends half of the content and closes the connection.
     CutOff,
 }
 
@@ -66,20 +65,20 @@ impl S3Server {
         thread::spawn(move || {
             for stream in listener.incoming() {
                 let (stream, state) = (stream.unwrap(), serving.clone());
-                // A client that ends early is none of its business.
+                // Ignore errors of clients that disconnect early.
                 thread::spawn(move || state.serve(stream).unwrap_or_default());
             }
         });
         Self { address, state }
     }
 
-    /// From here on, `trouble` decides about requests, the first of which is number 0.
+    /// Sets the faults of all later requests, numbered from 0.
     pub fn trouble(&self, trouble: impl Fn(&Asked, usize) -> Trouble + Send + Sync + 'static) {
         self.state.asked.lock().unwrap().clear();
         *self.state.trouble.lock().unwrap() = Arc::new(trouble);
     }
 
-    /// The requests since then.
+    /// Returns the requests since the last call of `trouble`.
     pub fn asked(&self) -> Vec<Asked> {
         self.state.asked.lock().unwrap().clone()
     }
@@ -92,9 +91,9 @@ impl S3Server {
         self.state.objects.lock().unwrap().keys().any(|key| key.ends_with("manifest.json"))
     }
 
-    /// A command that finds its buckets here.
+    /// Returns a command with this server as endpoint.
     pub fn voxtile(&self, arguments: &[&str]) -> Command {
-        // A shell that runs tests in the background ignores SIGINT, and so would the command.
+        // A shell that runs tests in the background ignores SIGINT, and the child would inherit that.
         let mut command = Command::new("env");
         command.arg("--default-signal=INT").arg(assert_cmd::cargo::cargo_bin("voxtile"));
         let endpoint = format!("http://{}", self.address);
@@ -108,7 +107,7 @@ impl S3Server {
 
 impl State {
     fn serve(&self, mut stream: TcpStream) -> std::io::Result<()> {
-        // What is not read when a connection ends makes it a reset.
+        // Read the rest of the request: closing with unread data resets the connection.
         let mut head = [0; 4096];
         let mut peeked = 0;
         let since = Instant::now();
@@ -188,7 +187,7 @@ impl State {
         Ok(())
     }
 
-    /// Status, content and the header of the range.
+    /// Returns status, content and the range header.
     fn answer(
         &self,
         asked: &Asked,

@@ -1,4 +1,4 @@
-//! The command and the library against servers that do not answer, break off, drip or lose answers.
+//! Tests with servers that are silent, disconnect, send slowly or drop responses.
 
 use crate::city::{KEEP, city, digest, message_of};
 use crate::s3_server::{Asked, S3Server, Trouble};
@@ -40,7 +40,7 @@ fn is_object(asked: &Asked, method: &str) -> bool {
 }
 
 #[test]
-fn a_put_without_an_answer_is_reported_and_given_up() {
+fn a_put_without_a_response_is_reported_and_fails() {
     let (server, folder) = (S3Server::new(), TempDir::new().unwrap());
     let map = a_map(&folder);
     server.trouble(|asked, _| if is_object(asked, "PUT") { Trouble::Silent } else { Trouble::None });
@@ -59,7 +59,7 @@ fn a_put_without_an_answer_is_reported_and_given_up() {
         assert!(message.contains(part), "{part}: {message}");
     }
     assert!(!server.has_manifest());
-    // With -q only the error.
+    // With -q only the error is printed.
     let (quiet, _) = run(&server, &["push", &map, URL, "--bucket-timeout", "1", "-q"]);
     assert_eq!(texts(&quiet)[1].lines().count(), 1, "{:?}", texts(&quiet));
 
@@ -68,9 +68,9 @@ fn a_put_without_an_answer_is_reported_and_given_up() {
     assert_eq!(texts(&run(&server, &["digest", URL]).0)[0].trim(), digest(map.as_ref()));
 }
 
-/// Sent bytes may still be in the buffers of a slow link when the client counts them.
+/// The client counts bytes as sent when they are still in the buffer of a slow link.
 #[test]
-fn an_upload_may_take_the_whole_timeout() {
+fn an_upload_may_use_the_whole_timeout() {
     let (server, folder) = (S3Server::new(), TempDir::new().unwrap());
     let map = a_map(&folder);
     server.trouble(|asked, _| if is_object(asked, "PUT") { Trouble::Late(1_400) } else { Trouble::None });
@@ -83,9 +83,9 @@ fn an_upload_may_take_the_whole_timeout() {
     assert_eq!(sent.len(), all, "no object was sent twice");
 }
 
-/// What is sent again is no progress.
+/// Repeated uploads do not count as progress.
 #[test]
-fn a_long_object_without_an_answer_is_given_up() {
+fn a_long_object_without_a_response_fails() {
     let (server, folder) = (S3Server::new(), TempDir::new().unwrap());
     let map = folder.path().join("map");
     let config = MapConfig::new(0.05, 3.2).unwrap().with_range(0.0, 3.0);
@@ -113,7 +113,7 @@ fn a_third_of_the_connections_may_be_reset() {
     let [out, said] = texts(&found);
     assert_eq!(out.trim(), digest(map.as_ref()), "{said}");
     assert!(began.elapsed() < Duration::from_secs(30), "{:?}", began.elapsed());
-    // Content that breaks off is continued.
+    // Interrupted content resumes.
     server.trouble(|asked, _| if asked.from.is_none() { Trouble::CutOff } else { Trouble::None });
     let (found, _) = run(&server, &["digest", URL, "--bucket-timeout", "1"]);
     assert_ne!(found.status.code(), Some(0), "the manifest is never whole");
@@ -127,10 +127,10 @@ fn a_third_of_the_connections_may_be_reset() {
 }
 
 #[test]
-fn an_answer_that_is_cut_off_refuses_nothing() {
+fn a_truncated_response_is_no_refusal() {
     let (server, folder) = (S3Server::new(), TempDir::new().unwrap());
     let map = a_map(&folder);
-    // The first answer says that there is no manifest yet.
+    // The first response reports that there is no manifest yet.
     server.trouble(|_, number| if number == 0 { Trouble::CutOff } else { Trouble::None });
     push_all(&server, &map);
     let [first, second] = [0, 1].map(|number| server.asked()[number].clone());
@@ -138,7 +138,7 @@ fn an_answer_that_is_cut_off_refuses_nothing() {
 }
 
 #[test]
-fn an_object_that_drips_is_given_up_and_a_slow_one_is_not() {
+fn a_trickling_object_fails_and_a_slow_one_does_not() {
     let (server, folder) = (S3Server::new(), TempDir::new().unwrap());
     let map = a_map(&folder);
     push_all(&server, &map);
@@ -149,7 +149,7 @@ fn an_object_that_drips_is_given_up_and_a_slow_one_is_not() {
     assert!(said.contains("no answer to GET maps/city/objects/") && said.contains("waiting for"), "{said}");
     assert!(took < Duration::from_secs(20), "{took:?}");
 
-    // 200 kB at 8 kB each 20 ms, which takes longer than the bound; and once nothing comes after the half.
+    // 200 kB at 8 kB every 20 ms, longer than the timeout; then content that stalls after half.
     let place = TempDir::new().unwrap();
     let content: Vec<u8> = (0..300_000_u32).map(|at| ((at * 31) >> 7) as u8).collect();
     server.put("long.bin", content.clone());
@@ -167,9 +167,9 @@ fn an_object_that_drips_is_given_up_and_a_slow_one_is_not() {
     assert_eq!(from, [content.len() / 2]);
 }
 
-/// The state there decides whether a push came through, and nothing is put twice over another push.
+/// The state in the bucket decides whether a push succeeded, and nothing overwrites another push.
 #[test]
-fn a_manifest_whose_answer_is_lost_is_there_once() {
+fn a_manifest_with_a_lost_response_is_written_once() {
     let (server, folder) = (S3Server::new(), TempDir::new().unwrap());
     let map = a_map(&folder);
     for lost in [Trouble::AnswerLost, Trouble::Reset, Trouble::Silent] {
@@ -187,10 +187,10 @@ fn a_manifest_whose_answer_is_lost_is_there_once() {
     }
 }
 
-/// Whatever hangs: commands that catch the signal, and those that do not.
+/// For commands with and without a signal handler, whatever the server does.
 #[cfg(unix)]
 #[test]
-fn a_signal_ends_a_command_that_waits_for_a_bucket() {
+fn a_signal_ends_a_command_waiting_for_a_bucket() {
     use std::os::unix::process::ExitStatusExt;
     let (server, folder) = (S3Server::new(), TempDir::new().unwrap());
     let map = a_map(&folder);
@@ -232,9 +232,9 @@ fn a_signal_ends_a_command_that_waits_for_a_bucket() {
     assert!(!folder.path().join("city.ply").exists() && !folder.path().join("built").exists());
 }
 
-/// A server that was never reached is not waited for.
+/// A server that was never reached fails fast.
 #[test]
-fn a_wrong_address_is_found_soon() {
+fn a_wrong_address_fails_soon() {
     let closed = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
     let bucket = Bucket::open(&format!("http://{closed}/city")).unwrap();
     let began = Instant::now();
@@ -244,9 +244,9 @@ fn a_wrong_address_is_found_soon() {
     assert!(began.elapsed() < Duration::from_secs(10), "{:?}", began.elapsed());
 }
 
-/// A store of a program's own is bounded as well, and can be stopped.
+/// Custom stores have timeouts and can be stopped, too.
 #[test]
-fn a_store_that_hangs_is_given_up_or_stopped() {
+fn a_hanging_store_times_out_or_is_stopped() {
     let (server, folder) = (Server::new(), TempDir::new().unwrap());
     let map = a_map(&folder);
     let wait_put_per_call = Duration::from_secs(60);

@@ -1,4 +1,4 @@
-//! Files of other programs, in and out, by the command.
+//! Tests of reading and writing files of other programs with the command.
 
 use crate::cli::json;
 use assert_cmd::Command;
@@ -35,7 +35,7 @@ fn text(path: &Path) -> &str {
     path.to_str().unwrap()
 }
 
-/// Three scans of a wall, as float32, in folders of three formats with the same poses.
+/// Writes three scans of a wall as float32 to folders of three formats with the same poses.
 fn make_inputs(folder: &Path) -> Vec<PathBuf> {
     let clouds: Vec<Vec<[f32; 3]>> = (0..3)
         .map(|scan| (0..60).map(|k| [4.0 + 0.01 * scan as f32, 0.1 * k as f32 - 3.0, 0.3]).collect())
@@ -95,9 +95,9 @@ fn recordings_of_either_ros_make_the_same_map() {
     assert!(!map.exists());
 }
 
-/// The shell's `drive_*.bag`.
+/// The shell expands `drive_*.bag` to several arguments.
 #[test]
-fn several_files_for_one_input_name_the_way() {
+fn several_files_for_one_input_give_a_hint() {
     let folder = TempDir::new().unwrap();
     let parts = ["0.bag", "1.bag"].map(|name| folder.path().join(name));
     parts.iter().for_each(|part| fs::write(part, "").unwrap());
@@ -108,7 +108,7 @@ fn several_files_for_one_input_name_the_way() {
     assert!(refused.contains("gone.bag") && !refused.contains("give the folder"), "{refused}");
 }
 
-/// A backup is still a recording; what it says itself is not asked of anybody.
+/// A renamed copy is still recognised as a recording, without an option.
 #[cfg(feature = "ros")]
 #[test]
 fn recordings_are_known_by_their_content() {
@@ -127,7 +127,7 @@ fn recordings_are_known_by_their_content() {
     }
 }
 
-/// Depth images without their camera.
+/// Depth images without intrinsics.
 #[test]
 fn the_option_for_a_camera_is_named() {
     let (_outer, folder) = lone_folder();
@@ -136,14 +136,14 @@ fn the_option_for_a_camera_is_named() {
     assert!(refused.contains("--intrinsics FILE") && refused.contains("camera-intrinsics.txt"), "{refused}");
 }
 
-/// A recording and a file of poses go by one rule.
+/// Transforms of a recording and poses of a file follow one rule.
 #[cfg(feature = "ros")]
 #[test]
 fn gaps_between_poses_are_filled_up_to_twice_the_tolerance() {
     let folder = TempDir::new().unwrap();
     let (bag, poses) =
         (repository("crates/formats/tests/data/ros/none.bag"), folder.path().join("poses.txt"));
-    // As its transforms: five a second, with the stamps of the clouds between them.
+    // Poses as in its transforms: five per second, with the stamps of the clouds between them.
     let rows = (0..4).map(|k| format!("1700000000.{:02} 0 0 1 0 0 0 1\n", 20 * k + 6));
     fs::write(&poses, rows.collect::<String>()).unwrap();
     for own in [&[][..], &["--poses", text(&poses)]] {
@@ -162,7 +162,7 @@ fn gaps_between_poses_are_filled_up_to_twice_the_tolerance() {
 }
 
 #[test]
-fn what_would_be_read_is_told_and_nothing_is_mapped() {
+fn scans_lists_an_input_without_mapping() {
     let folder = TempDir::new().unwrap();
     let inputs = make_inputs(folder.path());
     let told = output(&["scans", text(&inputs[0]), "--json"]);
@@ -177,7 +177,7 @@ fn what_would_be_read_is_told_and_nothing_is_mapped() {
 }
 
 #[test]
-fn a_map_lists_where_its_scans_were_taken() {
+fn a_map_lists_the_origins_of_its_scans() {
     let folder = TempDir::new().unwrap();
     let (inputs, map) = (make_inputs(folder.path()), folder.path().join("map"));
     output(&["build", text(&inputs[2]), "-o", text(&map), "--resolution", "0.2"]);
@@ -192,7 +192,7 @@ fn a_map_lists_where_its_scans_were_taken() {
 }
 
 #[test]
-fn points_are_left_out_and_taken_without_rays() {
+fn points_are_skipped_in_a_box_and_inserted_without_rays() {
     let folder = TempDir::new().unwrap();
     let (inputs, map) = (make_inputs(folder.path()), folder.path().join("map"));
     let count = |options: &[&str], key: &str| {
@@ -212,7 +212,7 @@ fn points_are_left_out_and_taken_without_rays() {
 }
 
 #[test]
-fn a_file_of_octomap_is_imported_and_asked_as_it_is() {
+fn an_octomap_file_is_imported_and_queried_directly() {
     let folder = TempDir::new().unwrap();
     let place = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     let (bt, ot) = (place("map.bt"), place("map.ot"));
@@ -237,7 +237,7 @@ fn a_file_of_octomap_is_imported_and_asked_as_it_is() {
 }
 
 #[test]
-fn voxels_are_written_for_other_programs_whole_or_not_at_all() {
+fn exports_are_atomic() {
     let folder = TempDir::new().unwrap();
     let place = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     let map = repository("map_tiles_example");
@@ -265,7 +265,7 @@ fn voxels_are_written_for_other_programs_whole_or_not_at_all() {
     ] {
         output(&["export", &map, "-o", &place(name)]);
         assert!(fs::metadata(place(name)).unwrap().len() > 0, "{name}");
-        // Over itself, too.
+        // Also over itself.
         output(&["export", &map, "-o", &place(name)]);
     }
     assert!(Path::new(&place("map.yaml")).exists() && Path::new(&place("map.pgw")).exists());
@@ -277,9 +277,9 @@ fn voxels_are_written_for_other_programs_whole_or_not_at_all() {
     assert!(left.into_iter().all(|name| !name.to_string_lossy().starts_with('.')));
 }
 
-/// A `.yaml` or a world file beside the output would replace an output of that name.
+/// A `.yaml` or a world file next to the output would replace an output of that name.
 #[test]
-fn outputs_named_as_what_lies_beside_them_are_refused() {
+fn outputs_with_the_name_of_their_second_file_are_refused() {
     let folder = TempDir::new().unwrap();
     let map = repository("map_tiles_example");
     for (format, name, hint) in
@@ -292,9 +292,9 @@ fn outputs_named_as_what_lies_beside_them_are_refused() {
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
 }
 
-/// Only the output was named: what has the name of a file beside it may be of another program.
+/// The user named only the output: a file with the name of its second file may belong to another program.
 #[test]
-fn what_lies_beside_an_output_is_replaced_with_it_alone() {
+fn the_second_file_is_replaced_only_with_its_output() {
     let folder = TempDir::new().unwrap();
     let map = repository("map_tiles_example");
     let path = |name: &str| folder.path().join(name);
@@ -311,7 +311,7 @@ fn what_lies_beside_an_output_is_replaced_with_it_alone() {
         (names(), fs::read(path("package.json")).unwrap()),
         (vec!["package.json".into()], b"{}".to_vec())
     );
-    // The last name is refused before the first is taken.
+    // The last name is refused before the first is written.
     fs::create_dir(path("h.pgw")).unwrap();
     let told = refusal(&["export", &map, "-o", text(&path("h.png"))]);
     assert!(told.contains("h.pgw"), "{told}");
@@ -320,19 +320,19 @@ fn what_lies_beside_an_output_is_replaced_with_it_alone() {
 
     output(&["export", &map, "-o", text(&path("h.png"))]);
     let written = fs::read(path("h.json")).unwrap();
-    // As a killed export leaves it.
+    // Leftover of a killed export.
     fs::remove_file(path("h.png")).unwrap();
     output(&["export", &map, "-o", text(&path("h.png"))]);
-    // Of an earlier output.
+    // From an earlier output.
     fs::write(path("h.json"), "{}").unwrap();
     output(&["export", &map, "-o", text(&path("h.png"))]);
     assert_eq!(fs::read(path("h.json")).unwrap(), written);
     assert_eq!(names(), ["h.json", "h.pgw", "h.png", "package.json"]);
 }
 
-/// A set as it is handed around: clouds in `scans`, what belongs to them beside it.
+/// A usual layout: clouds in `scans`, their metadata next to it.
 #[test]
-fn texts_beside_clouds_are_none() {
+fn text_files_next_to_clouds_are_no_clouds() {
     let folder = tempfile::tempdir().unwrap();
     let scans = folder.path().join("set/scans");
     fs::create_dir_all(&scans).unwrap();
@@ -351,7 +351,7 @@ fn texts_beside_clouds_are_none() {
     }
 }
 
-/// The poses of texts lie among them under any name.
+/// Pose files in text format are among the clouds under any name.
 #[test]
 fn a_file_of_poses_is_no_cloud() {
     let folder = tempfile::tempdir().unwrap();
@@ -379,9 +379,9 @@ fn a_file_of_poses_is_no_cloud() {
     assert!(refused.contains("2 poses for 3 clouds (0.txt to 2.txt), "), "{refused}");
 }
 
-/// Clouds and poses by clocks that differ: a map of nothing would be no answer.
+/// Clouds and poses have different clocks: an empty map would be misleading.
 #[test]
-fn clouds_of_which_none_has_a_pose_make_no_map() {
+fn clouds_without_any_pose_make_no_map() {
     let folder = tempfile::tempdir().unwrap();
     let scans = folder.path().join("scans");
     fs::create_dir(&scans).unwrap();
@@ -395,7 +395,7 @@ fn clouds_of_which_none_has_a_pose_make_no_map() {
     for part in ["none of its 2 clouds has a pose", "315964790.000 s after the last pose", "clocks differ"] {
         assert!(told.contains(part), "{told}");
     }
-    // One is enough.
+    // One pose is enough.
     fs::write(&poses, "1599999999.5 0 0 1 0 0 0 1\n1600000000.5 0 0 1 0 0 0 1\n").unwrap();
     let map = folder.path().join("other");
     output(&["build", text(&scans), "--poses", text(&poses), "-o", text(&map)]);
@@ -405,9 +405,9 @@ fn clouds_of_which_none_has_a_pose_make_no_map() {
     assert!(output(&["scans", text(&map)]).contains("1600000000"), "{}", output(&["scans", text(&map)]));
 }
 
-/// A cloud that cannot be opened has a number and a pose as the others do; poses that are left at the end are told.
+/// A cloud that cannot be opened keeps its number and pose; unused poses are reported.
 #[test]
-fn poses_by_number_stay_with_their_clouds() {
+fn poses_by_number_belong_to_their_clouds() {
     let folder = tempfile::tempdir().unwrap();
     let scans = folder.path().join("scans");
     fs::create_dir(&scans).unwrap();
@@ -425,7 +425,7 @@ fn poses_by_number_stay_with_their_clouds() {
     let origins: Vec<f64> = scans.filter_map(|scan| scan["origin_m"][0].as_f64()).collect();
     assert_eq!(origins, [0.0, 20.0]);
 
-    // The scans of a folder of E57 are not counted before they are read.
+    // The number of scans in a folder of E57 is unknown before they are read.
     let several = folder.path().join("several");
     fs::create_dir(&several).unwrap();
     fs::copy(repository("crates/formats/tests/data/scans.e57"), several.join("a.e57")).unwrap();
@@ -435,7 +435,7 @@ fn poses_by_number_stay_with_their_clouds() {
     assert!(told.contains("more poses than clouds"), "{told}");
 }
 
-/// A recorder of ROS 1 that was killed leaves its file as `.bag.active`, perhaps as the only one.
+/// A killed recorder of ROS 1 leaves `.bag.active`, possibly as the only file.
 #[test]
 fn a_recording_that_was_not_closed_is_found_in_its_folder() {
     let folder = tempfile::tempdir().unwrap();
@@ -447,7 +447,7 @@ fn a_recording_that_was_not_closed_is_found_in_its_folder() {
     assert_eq!(told.lines().count(), 4 + 1);
 }
 
-/// Far clouds with a coordinate reference system: the map keeps it, and files that can say it do.
+/// Far clouds with a coordinate reference system: the map keeps it, and exports record it if the format can.
 #[test]
 fn coordinate_reference_systems_are_kept_and_written_back() {
     let (_outer, folder) = lone_folder();
@@ -457,7 +457,7 @@ fn coordinate_reference_systems_are_kept_and_written_back() {
     let (plain, other) = (path("plain"), path("other"));
     output(&["build", text(&points), "-o", text(&plain), "--no-rays", "--resolution", "0.5"]);
     assert!(!output(&["info", text(&plain)]).contains("crs"));
-    // A map that names one, by a file that does.
+    // The map has one, and so does the file.
     let named = path("named.las");
     output(&["export", text(&plain), "-o", text(&named), "-q"]);
     name_crs(&named, "EPSG:25832");
@@ -469,7 +469,7 @@ fn coordinate_reference_systems_are_kept_and_written_back() {
     let third = path("third");
     output(&["build", text(&again), "-o", text(&third), "--no-rays", "--resolution", "0.5"]);
     assert!(output(&["info", text(&third), "--json"]).contains("25832"));
-    // Points of another one are elsewhere.
+    // Coordinates in another system would be at another place.
     let mixed = path("mixed.las");
     output(&["export", text(&plain), "-o", text(&mixed), "-q"]);
     name_crs(&mixed, "EPSG:25833");
@@ -479,7 +479,7 @@ fn coordinate_reference_systems_are_kept_and_written_back() {
     output(&["build", text(&mixed), "-o", text(&fourth), "--no-rays", "--resolution", "0.5"]);
     let told = refusal(&["merge", text(&other), text(&fourth), "-o", text(&path("merged"))]);
     assert!(told.contains("coordinate reference system") && told.contains("25833"), "{told}");
-    // A map that names none goes with any, and parts of a map keep it.
+    // A map without a system accepts any, and parts of a map keep theirs.
     output(&["merge", text(&other), text(&plain), "-o", text(&path("merged"))]);
     output(&[
         "crop",
@@ -499,7 +499,7 @@ fn coordinate_reference_systems_are_kept_and_written_back() {
     }
 }
 
-/// Gives a LAS file that our writer made without a coordinate reference system one, as GeoTIFF keys.
+/// Adds a coordinate reference system as GeoTIFF keys to a LAS file without one.
 fn name_crs(file: &Path, crs: &str) {
     let mut bytes = fs::read(file).unwrap();
     let number: u16 = crs.strip_prefix("EPSG:").unwrap().parse().unwrap();
@@ -516,12 +516,12 @@ fn name_crs(file: &Path, crs: &str) {
     bytes[96..100].copy_from_slice(&points.to_le_bytes());
     bytes[100..104].copy_from_slice(&records.to_le_bytes());
     bytes.splice(header..header, record);
-    // The flag that says WKT.
+    // Clear the WKT flag.
     bytes[6] &= !16;
     fs::write(file, bytes).unwrap();
 }
 
-/// Clouds of one point, by number; some of them damaged.
+/// Writes numbered clouds of one point each; those in `bad` are damaged.
 fn numbered(folder: &Path, count: usize, bad: &[usize]) -> (PathBuf, PathBuf) {
     let scans = folder.join("scans");
     fs::create_dir(&scans).unwrap();
@@ -546,7 +546,7 @@ fn origins_of(map: &Path) -> Vec<f64> {
     scans.filter_map(|scan| scan["origin_m"][0].as_f64()).collect()
 }
 
-/// One that is passed over has a number as the others do, and cannot end a build that never asked for it.
+/// A damaged cloud has a number too, and does not end a build that never reads it.
 #[test]
 fn damaged_clouds_shift_no_others_of_a_selection() {
     let folder = tempfile::tempdir().unwrap();
@@ -564,9 +564,9 @@ fn damaged_clouds_shift_no_others_of_a_selection() {
     assert!(told.contains("1 of the scans that were passed over cannot be read"), "{told}");
 }
 
-/// The decoder of LAZ panics on these bytes.
+/// These bytes make the LAZ decoder panic.
 #[test]
-fn a_decoder_that_panics_is_one_line_that_names_the_file() {
+fn a_panic_of_a_decoder_prints_one_line_with_the_file() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("damaged.laz");
     let whole = fs::read(repository("crates/formats/tests/data/withheld.laz")).unwrap();
@@ -581,9 +581,9 @@ fn a_decoder_that_panics_is_one_line_that_names_the_file() {
     }
 }
 
-/// LAS keeps what it has and says so; PLY is a bad cloud, which says where.
+/// A truncated LAS file keeps its points with a remark; a truncated PLY file is a bad cloud with an offset.
 #[test]
-fn clouds_that_were_cut_off_are_kept_or_say_where() {
+fn truncated_clouds_are_kept_or_reported_with_an_offset() {
     let folder = tempfile::tempdir().unwrap();
     let inputs = make_inputs(folder.path());
     let path = |name: &str| folder.path().join(name);
@@ -599,7 +599,7 @@ fn clouds_that_were_cut_off_are_kept_or_say_where() {
         let map = path(map);
         json(&["build", text(file), "-o", text(&map), "--no-rays", "--skip-bad", "--json"])
     };
-    // Points of 42 bytes.
+    // Points have 42 bytes.
     let las = cut("voxels.las");
     let told = json(&["scans", text(&las), "--json"]);
     let points = told["points"].as_u64().unwrap();
@@ -615,9 +615,9 @@ fn clouds_that_were_cut_off_are_kept_or_say_where() {
     assert_eq!(build(&ply, "ply.map")["points"], 0);
 }
 
-/// Points that stay where they are, and clouds that know no times, are not passed over in silence.
+/// Points that deskewing cannot move, and clouds without times, give a remark.
 #[test]
-fn what_deskewing_does_not_move_is_told() {
+fn points_not_moved_by_deskewing_are_reported() {
     let folder = tempfile::tempdir().unwrap();
     let scans = folder.path().join("scans");
     fs::create_dir(&scans).unwrap();
@@ -639,10 +639,10 @@ fn what_deskewing_does_not_move_is_told() {
     assert!(refused.contains("--deskew") && refused.contains("--world-frame"), "{refused}");
 }
 
-/// The system may keep its temporary files in memory: a build has a disk at hand.
+/// The system's temporary folder may be in memory, so builds unpack next to the map.
 #[cfg(feature = "ros")]
 #[test]
-fn packed_recordings_are_unpacked_beside_the_map() {
+fn packed_recordings_are_unpacked_next_to_the_map() {
     let folder = tempfile::tempdir().unwrap();
     let bag = folder.path().join("bag");
     fs::create_dir(&bag).unwrap();
@@ -650,7 +650,7 @@ fn packed_recordings_are_unpacked_beside_the_map() {
     fs::write(bag.join("a.mcap.zstd"), zstd::encode_all(plain.as_slice(), 3).unwrap()).unwrap();
     let metadata = "rosbag2_bagfile_information:\n  relative_file_paths:\n  - a.mcap.zstd\n";
     fs::write(bag.join("metadata.yaml"), metadata).unwrap();
-    // One whose folder is there, one whose folder is made, and one that is there itself.
+    // Its folder exists, its folder is created, or the map exists.
     let maps = ["map", "new/folder/map", "map"].map(|map| folder.path().join(map));
     for (map, again) in maps.iter().zip([&[][..], &[], &["--append", "--again"]]) {
         let build = ["build", text(&bag), "--topic", "/points", "-o", text(map)];
@@ -661,7 +661,7 @@ fn packed_recordings_are_unpacked_beside_the_map() {
     }
 }
 
-/// A day in parts of a minute is more files than a process may have open.
+/// A day in parts of a minute has more files than a process may open.
 #[cfg(all(feature = "ros", unix))]
 #[test]
 fn a_recording_may_have_more_parts_than_files_may_be_open() {
@@ -682,9 +682,9 @@ fn a_recording_may_have_more_parts_than_files_may_be_open() {
     }
 }
 
-/// Pixels without depth are rays without a return, also when the range comes from the map.
+/// Pixels without depth are rays without a return, even if the range is from the map.
 #[test]
-fn a_resumed_build_takes_rays_without_a_return_as_it_did_before() {
+fn a_resumed_build_keeps_clearing_rays_without_a_return() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
     let depth = path("depth");
@@ -719,7 +719,7 @@ fn a_resumed_build_takes_rays_without_a_return_as_it_did_before() {
     assert_ne!(digest("whole"), digest("without"));
 }
 
-/// What the table of formats says, the help, the page and the Python package say too.
+/// The registry of formats, the help, the document and the Python package list the same formats.
 #[test]
 fn output_formats_are_the_same_in_help_pages_and_python() {
     let formats = OutputFormats::default();

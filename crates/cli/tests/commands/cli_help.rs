@@ -2,7 +2,7 @@ use crate::cli::{failure, output, text};
 use std::fs;
 use tempfile::TempDir;
 
-/// The commands that the help lists.
+/// Returns the commands in the help.
 fn commands() -> Vec<String> {
     let help = output(&["help"]);
     let (_, rest) = help.split_once("Commands:\n").unwrap();
@@ -12,7 +12,7 @@ fn commands() -> Vec<String> {
 }
 
 #[test]
-fn every_shell_gets_a_script_that_knows_every_command() {
+fn every_completion_script_contains_every_command() {
     let commands = commands();
     assert!(commands.len() > 20, "{commands:?}");
     for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {
@@ -45,7 +45,7 @@ fn every_command_has_a_man_page() {
     assert!(code == 1 && said.contains(text(&occupied)), "{said}");
 }
 
-/// Not on a terminal, so in as many columns as help has by default.
+/// Standard output is no terminal, so the default width applies.
 #[test]
 fn help_fits_in_a_hundred_columns() {
     for command in commands().iter().filter(|command| !["help", "share"].contains(&command.as_str())) {
@@ -58,7 +58,7 @@ fn help_fits_in_a_hundred_columns() {
 
 #[cfg(not(feature = "bucket"))]
 #[test]
-fn a_command_that_was_left_out_names_its_feature() {
+fn a_command_missing_in_this_build_names_its_feature() {
     for command in [&["push", "map", "s3://a/b", "--prune"][..], &["pull", "--help"], &["push"]] {
         let (code, said) = failure(command);
         let named =

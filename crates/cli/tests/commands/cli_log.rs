@@ -2,7 +2,7 @@ use crate::cli::{scans, text, voxtile};
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
-/// How much a run is asked to say, and what of it must be there and must not.
+/// Settings of the log, with texts that the log must and must not contain.
 struct Case {
     options: &'static [&'static str],
     rust_log: Option<&'static str>,
@@ -28,7 +28,7 @@ const CASES: [Case; 11] = [
     case(&[], Some("voxtile::mapper=debug"), [false, true]),
 ];
 
-/// Exit code, standard output and standard error.
+/// Returns exit code, standard output and standard error.
 fn run(arguments: &[&str], case: &Case) -> (i32, String, String) {
     let mut command = voxtile(&[arguments, case.options].concat());
     command.env_remove("RUST_LOG");
@@ -40,7 +40,7 @@ fn run(arguments: &[&str], case: &Case) -> (i32, String, String) {
     (output.status.code().unwrap(), text(output.stdout), text(output.stderr))
 }
 
-/// Tiles of two metres of which two are in memory, so that they come and go.
+/// Builds with tiles of two metres, two of them in memory, so that tiles are evicted and loaded.
 fn build(scans: &Path, map: &Path, case: &Case) -> (String, String) {
     let small = ["--resolution", "0.1", "--tile-size", "2", "--cache-tiles", "2", "--flush-every", "1"];
     let build = [&["build", text(scans), "-o", text(map)][..], &small].concat();
@@ -49,12 +49,12 @@ fn build(scans: &Path, map: &Path, case: &Case) -> (String, String) {
     (out, said)
 }
 
-/// Whether a run prints errors and answers alone.
+/// Returns whether a run prints only errors and results.
 fn is_quiet(case: &Case) -> bool {
     matches!(case.options, ["-q" | "--quiet"])
 }
 
-/// What a build prints, less times and the name of the map.
+/// Returns the output of a build without times and the map's name.
 fn lasting(out: &str) -> Vec<&str> {
     let is_lasting =
         |line: &&str| ["points", "skipped", "voxels", "tiles "].iter().any(|word| line.starts_with(word));
@@ -64,7 +64,7 @@ fn lasting(out: &str) -> Vec<&str> {
 }
 
 #[test]
-fn options_and_environment_choose_what_is_said_and_nothing_else() {
+fn options_and_environment_change_only_the_log() {
     let folder = TempDir::new().unwrap();
     let scans = scans(&folder);
     let mut before: Option<(String, PathBuf)> = None;
@@ -83,7 +83,7 @@ fn options_and_environment_choose_what_is_said_and_nothing_else() {
             true => assert_eq!(out, "", "{what}"),
             false => assert_eq!(lasting(&out), lasting(earlier), "{what}"),
         }
-        // A command whose answer has no times says the same to the byte.
+        // The output of a command without times is identical.
         let ask = |map: &Path, case| {
             let (code, out, said) = run(&["query", text(map), "4.1", "-0.5", "0.6", "--json"], case);
             assert_eq!((code, said.as_str()), (0, ""), "{what}");
@@ -96,7 +96,7 @@ fn options_and_environment_choose_what_is_said_and_nothing_else() {
 }
 
 #[test]
-fn quiet_leaves_out_warnings_and_summaries_beside_a_file_and_no_error() {
+fn quiet_suppresses_warnings_and_summaries_but_no_errors() {
     let folder = TempDir::new().unwrap();
     let scans = scans(&folder);
     let map = folder.path().join("map");
@@ -108,7 +108,7 @@ fn quiet_leaves_out_warnings_and_summaries_beside_a_file_and_no_error() {
     assert!(said.contains("counts twice") && out.contains("counts twice"), "{said}");
     let (_, out, said) = merge(&merged("quiet"), quiet);
     assert!(said.is_empty() && out.contains("counts twice"), "{said}");
-    // Without JSON nothing is printed of work, and answers are.
+    // Without JSON no summaries are printed, but results are.
     let plain = |arguments: &[&str]| run(arguments, quiet);
     for work in [
         &["crop", text(&map), "-o", text(&merged("crop")), "--region", "0", "0", "0", "5", "5", "5"][..],

@@ -1,4 +1,4 @@
-//! Poses that may mean something else, by the command.
+//! Tests of ambiguous poses with the command.
 
 use assert_cmd::Command;
 use serde_json::Value;
@@ -16,7 +16,7 @@ fn text(path: &Path) -> &str {
     path.to_str().unwrap()
 }
 
-/// PCD files of these points.
+/// Writes PCD files of these points.
 fn write_scans(folder: &Path, scans: &[(String, Vec<[f64; 3]>)]) -> PathBuf {
     let folder = folder.join("scans");
     fs::create_dir_all(&folder).unwrap();
@@ -30,12 +30,12 @@ fn write_scans(folder: &Path, scans: &[(String, Vec<[f64; 3]>)]) -> PathBuf {
     folder
 }
 
-/// A robot that drives a bend between posts: where it is, and its turn about z.
+/// Positions and headings of a robot that drives a bend between posts.
 fn way() -> Vec<([f64; 2], f64)> {
     (0..10).map(f64::from).map(|k| ([2.0 * k, 0.12 * k * k], 0.12 * k)).collect()
 }
 
-/// What it sees.
+/// Scans of the posts in the sensor frame.
 fn seen() -> Vec<(String, Vec<[f64; 3]>)> {
     let posts: Vec<[f64; 2]> = (0..90)
         .map(|k: u64| [k * 7919 % 61, k * 104_729 % 53].map(|n| n as f64))
@@ -63,7 +63,7 @@ fn remarks(output: &std::process::Output) -> String {
 }
 
 #[test]
-fn poses_that_do_not_fit_are_remarked_and_strictly_refused() {
+fn misfitting_poses_give_a_remark_or_fail_with_strict() {
     let folder = TempDir::new().unwrap();
     let scans = write_scans(folder.path(), &seen());
     let (poses, map) = (folder.path().join("poses.txt"), folder.path().join("map"));
@@ -103,7 +103,7 @@ fn poses_that_do_not_fit_are_remarked_and_strictly_refused() {
 }
 
 #[test]
-fn w_first_is_read_by_evidence_and_printed() {
+fn w_first_quaternions_are_detected_and_reported() {
     let folder = TempDir::new().unwrap();
     let scans = write_scans(folder.path(), &seen());
     let map = folder.path().join("map");
@@ -162,14 +162,14 @@ fn a_calib_beside_poses_of_a_camera_is_named() {
     assert!(told.contains("these go along z") && !told.contains("own z"), "{told}");
     let told = overview(&["--calib", text(&calib)]);
     assert!(!told.contains("note"), "{told}");
-    // Where nothing moves, it is not known.
+    // Without motion the axis is unknown.
     fs::write(&poses, along(2, 0.0)).unwrap();
     let told = overview(&[]);
     assert!(told.contains("need --calib") && !told.contains("these go"), "{told}");
-    // Poses of the lidar go along x.
+    // Lidar poses move along x.
     fs::write(&poses, along(0, 1.0)).unwrap();
     assert!(!overview(&[]).contains("note"));
-    // With a calib that is not theirs, along -y.
+    // With a wrong calib they move along -y.
     let told = overview(&["--calib", text(&calib)]);
     assert!(told.contains("with --calib the poses go along their own -y"), "{told}");
     fs::write(&poses, "1 0 0 0 0 -1 0 0 0 0 -1 0\n".repeat(3)).unwrap();
@@ -209,7 +209,7 @@ fn times_in_names_may_lack_zeros_or_points() {
             "{number}: {x_m:?}"
         );
     }
-    // Names that tell no time are told.
+    // Names without a time are reported.
     let scans = write_scans(&folder.path().join("none"), &seen()[..3]);
     let told = voxtile(&["scans", text(&scans), "--poses", text(&file)]).output().unwrap();
     let told = String::from_utf8(told.stderr).unwrap();
@@ -220,7 +220,7 @@ fn times_in_names_may_lack_zeros_or_points() {
 }
 
 #[test]
-fn a_scan_whose_pose_was_lost_is_left_out_and_named() {
+fn a_scan_without_a_pose_is_skipped_and_named() {
     let folder = TempDir::new().unwrap();
     let named = |stamp: &dyn Fn(usize) -> String| -> Vec<_> {
         (0..4).map(|k| (stamp(k), vec![[4.0, 0.0, 0.0]])).collect()

@@ -7,7 +7,7 @@ use tempfile::TempDir;
 
 const START_NS: i64 = 1_700_000_000_000_000_000;
 
-/// A recording of clouds in a frame, and of a sensor that moves along x in `camera_init`, by these topics.
+/// Writes a recording of clouds in `frame` and of a sensor that moves along x in `camera_init`, on these topics.
 fn write_bag(path: &Path, frame: &str, odometries: &[&str]) {
     let topics: Vec<(&str, &str)> = odometries
         .iter()
@@ -63,7 +63,7 @@ fn registered_clouds_make_the_map_of_their_poses_in_the_world() {
 }
 
 #[test]
-fn errors_name_the_options_that_lead_to_poses() {
+fn errors_name_the_options_for_poses() {
     let folder = TempDir::new().unwrap();
     let (bag, map) = (folder.path().join("a.bag"), folder.path().join("map"));
     for (frame, odometries, told) in [
@@ -79,7 +79,7 @@ fn errors_name_the_options_that_lead_to_poses() {
         let (_, error) = failure(&["build", text(&bag), "-o", text(&map)]);
         assert!(error.contains(told), "{error}");
         assert!(!map.exists());
-        // What the error says works.
+        // The suggested options work.
         let option = told.split("--odometry ").nth(1).unwrap();
         let options: Vec<&str> = ["--odometry"].into_iter().chain(option.split(' ')).collect();
         let built = json(&[&["build", text(&bag), "-o", text(&map), "--json"], &options[..]].concat());
