@@ -32,7 +32,7 @@ pub struct PictureArgs {
     /// Draw no trajectory
     #[arg(long)]
     pub no_path: bool,
-    /// Draw the changes since a snapshot of the map or since another map: appeared, removed, unchanged
+    /// Draw the changes since a snapshot of the map or since another map: appeared, vanished, unchanged
     #[arg(long, value_name = "SNAPSHOT|MAP", conflicts_with = "color")]
     pub since: Option<PathBuf>,
     #[arg(long, help = help::JSON)]

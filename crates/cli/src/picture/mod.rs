@@ -175,6 +175,6 @@ fn caption(args: &PictureArgs, drawn: &Drawn) -> String {
         (Some([least, most]), ColorName::Count) => format!("; count {least:.0} (dark) to {most:.0}"),
         (Some([least, most]), ColorName::LastScan) => format!("; last scan {least:.0} (dark) to {most:.0}"),
     };
-    let changes = if args.since.is_some() { "; blue appeared, orange removed, grey unchanged" } else { "" };
+    let changes = if args.since.is_some() { "; blue appeared, orange vanished, grey unchanged" } else { "" };
     format!("{across:.1} x {up:.1} m, {:.3} m a cell{scale}{changes}", drawn.cell_m)
 }

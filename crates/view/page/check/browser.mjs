@@ -1,4 +1,4 @@
-// Chromium without a screen, driven by its own protocol over a pipe: no package is needed.
+// Headless Chromium, controlled by its DevTools protocol over a pipe, without packages.
 
 import { spawn } from 'node:child_process';
 import { mkdtempSync, rmSync } from 'node:fs';
@@ -49,7 +49,7 @@ export class Browser {
 
   async open(url) {
     if (!this.session) {
-      // A tab of our own: the one that Chromium opens may still be replaced.
+      // Open a new tab, because Chromium may replace its first one.
       const { targetId } = await this.call('Target.createTarget', { url: 'about:blank' }, undefined);
       ({ sessionId: this.session } = await this.call('Target.attachToTarget', { targetId, flatten: true }, undefined));
       for (const domain of ['Page', 'Runtime', 'Log']) await this.call(`${domain}.enable`);
@@ -62,14 +62,14 @@ export class Browser {
     await this.call('Emulation.setEmulatedMedia', { features: [{ name: 'prefers-color-scheme', value: dark ? 'dark' : 'light' }] });
   }
 
-  // The value of an expression, or of its promise, in the page.
+  // Returns the value of an expression, or of its promise, in the page.
   async value(expression) {
     const { result, exceptionDetails } = await this.call('Runtime.evaluate', { expression, awaitPromise: true, returnByValue: true });
     if (exceptionDetails) throw new Error(`${expression}: ${exceptionDetails.exception?.description ?? exceptionDetails.text}`);
     return result.value;
   }
 
-  // Waits until the page says so itself.
+  // Waits until an expression holds in the page.
   async until(expression, seconds = 120) {
     const since = Date.now();
     for (;;) {
@@ -100,7 +100,7 @@ export class Browser {
     try {
       rmSync(this.profile, { recursive: true, force: true, maxRetries: 10, retryDelay: 200 });
     } catch {
-      // Processes of Chromium that end a little later still write there: what is left is the system's to clear.
+      // Processes of Chromium that end later may still write there: the system removes the rest.
     }
   }
 }

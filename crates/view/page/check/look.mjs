@@ -1,4 +1,4 @@
-// Saves a picture of a page: node crates/view/page/check/look.mjs URL FILE.png [WIDTHxHEIGHT] [dark] [SCRIPT]
+// Saves a screenshot of a page: node crates/view/page/check/look.mjs URL FILE.png [WIDTHxHEIGHT] [dark] [SCRIPT]
 
 import { writeFileSync } from 'node:fs';
 import { Browser } from './browser.mjs';

@@ -21,7 +21,7 @@ async function view(...args) {
   throw new Error('the server did not start');
 }
 
-// A room of 4 m x 3 m with a box in it; later scans have a second one.
+// A room of 4 m x 3 m with a box; later scans have a second box.
 function scan(number) {
   const folder = join(work, `scan${number}`);
   mkdirSync(folder);
@@ -46,7 +46,7 @@ const shown = async (browser) => {
   return new Set(centers.map((center) => center.map((k) => Math.round(1000 * k)).join(' ')));
 };
 
-// Fingers on the screen: each list is where they are next.
+// Moves fingers on the screen; each list has their next positions.
 async function fingers(...places) {
   const touchPoints = (points) => points.map(([x, y], id) => ({ x, y, id }));
   for (const [k, points] of places.entries()) {
@@ -100,7 +100,7 @@ try {
   await browser.value('voxtile.detail = 0.1');
   await browser.until(`voxtile.voxels().edges.length === 1 && voxtile.voxels().edges[0] < 0.11 && document.getElementById('state').textContent === 'ready'`);
   assert.deepEqual(await shown(browser), exported(map));
-  assert.deepEqual(browser.told, [], 'the browser has nothing to complain of');
+  assert.deepEqual(browser.told, [], 'no errors in the browser');
   step('what the page shows is what export writes, to the last voxel');
 
   const told = await browser.value(`(async () => {
@@ -112,7 +112,7 @@ try {
   const asked = JSON.parse(run('query', map, ...told.point_m.map(String), '--json'));
   for (const [name, value] of Object.entries(asked)) assert.deepEqual(told[name], value, name);
   assert.equal(told.state, 'occupied');
-  step(`a click says what query says: ${told.state}, probability ${told.probability.toFixed(3)}`);
+  step(`a click shows the result of query: ${told.state}, probability ${told.probability.toFixed(3)}`);
 
   await browser.value('voxtile.setThreshold(255)');
   const certain = await shown(browser);
@@ -128,7 +128,7 @@ try {
   await browser.value('document.getElementById("free").click(); document.getElementById("unknown").click()');
   await browser.ready();
   assert.deepEqual(await browser.value('voxtile.near()'), {});
-  step(`free space and where knowledge ends: ${near.free} and ${near.unknown} voxels`);
+  step(`free space and frontier: ${near.free} and ${near.unknown} voxels`);
 
   await browser.call('Browser.setDownloadBehavior', { behavior: 'allow', downloadPath: work }, undefined);
   await browser.value('document.getElementById("shot").click()');
@@ -165,7 +165,7 @@ try {
   await browser.until('document.getElementById("since")?.options.length === 2');
   await browser.value(`document.getElementById('since').value = 'monday'; document.getElementById('since').dispatchEvent(new Event('change'))`);
   await browser.ready();
-  assert.match(await browser.value('document.getElementById("legend-ends").textContent'), /appeared.*vanished.*same/);
+  assert.match(await browser.value('document.getElementById("legend-ends").textContent'), /appeared.*vanished.*unchanged/);
   step('what changed since a snapshot is shown');
 
   for (const [width, height, dark] of [[360, 640, false], [1280, 720, true]]) {
@@ -184,12 +184,12 @@ try {
   const gone = new Promise((resolve) => server.once('exit', resolve));
   server.kill();
   await gone;
-  await browser.until('document.getElementById("state").textContent === "server gone"');
+  await browser.until('document.getElementById("state").textContent === "disconnected"');
   const [, address, token] = /\/\/([^/]+)\/([^/]+)\//.exec(url);
   await view(map, '--listen', address, '--token', token);
   await browser.ready();
   step('a server that comes back is noticed');
-  // That it was gone, the browser says as well.
+  // The browser also reports the disconnection.
   assert.ok(browser.told.splice(0).every((line) => /Failed to load|net::ERR/.test(line)));
 
   const isShown = (...ids) => `JSON.stringify(voxtile.shown) === '${JSON.stringify(ids)}' && document.getElementById('state').textContent === 'ready'`;
@@ -205,7 +205,7 @@ try {
   await browser.call('Network.enable');
   await browser.call('Network.setBlockedURLs', { urls: ['*tileset.json*'] });
   run('build', scan(2), '-o', map, '--append', '-q');
-  await browser.until('document.getElementById("message").textContent.includes("was not loaded")');
+  await browser.until('document.getElementById("message").textContent.includes("Cannot load")');
   await browser.call('Network.setBlockedURLs', { urls: [] });
   await follows(map);
   assert.ok(browser.told.splice(0).every((line) => /Failed to load|net::ERR/.test(line)));
@@ -234,7 +234,7 @@ try {
   run('snapshot', map, 'monday', '--delete');
   await browser.until(isShown('0', '1'), 60);
   await follows(map, other);
-  // Both at once: what is told of the first says nothing of the second.
+  // Both at once: the event of the first does not include the second.
   const grown = [scan(5), scan(6)];
   await Promise.all([map, other].map((one, k) => new Promise((resolve, reject) => {
     const build = spawn(voxtile, ['build', grown[k], '-o', one, '--append', '-q'], { stdio: ['ignore', 'ignore', 'inherit'] });
@@ -259,7 +259,7 @@ try {
     await browser.ready(300);
     const [calls, bytes] = [await browser.value('voxtile.drawCalls()'), await browser.value('voxtile.bytes()')];
     assert.ok(calls <= 200 && bytes <= 256 * 2 ** 20);
-    // Nor meanwhile.
+    // Also not in between.
     const most = await browser.value('voxtile.mostDrawCalls()');
     assert.ok(most >= calls && most <= 200, `${most} draw calls`);
     const { tiles } = await maps();
