@@ -64,13 +64,13 @@ pub fn run(args: &RemapArgs) -> anyhow::Result<ExitCode> {
     let moved = if args.replay.dry_run { "would move" } else { "moved" };
     writeln!(
         out,
-        "poses     {} scans {moved}, by {largest_move_m:.3} m and {largest_turn_deg:.3} degrees at most",
+        "poses     {} scans {moved}, by up to {largest_move_m:.3} m and {largest_turn_deg:.3} degrees",
         HumanCount(mapped.scans_changed)
     )?;
     if remapped.scans_within_tolerance > 0 {
         writeln!(
             out,
-            "left      {} scans unchanged: new poses differ by {:.3} m and {:.3} degrees at most",
+            "left      {} scans unchanged: new poses differ by up to {:.3} m and {:.3} degrees",
             HumanCount(remapped.scans_within_tolerance),
             remapped.largest_move_left_m,
             remapped.largest_turn_left_deg
@@ -125,7 +125,7 @@ fn build_another(args: &RemapArgs) -> anyhow::Result<ExitCode> {
         return Ok(ExitCode::SUCCESS);
     }
     let (scans, points) = (HumanCount(mapped.scans), HumanCount(mapped.report.points));
-    writeln!(out, "mapped    {scans} scans, {points} points, into {}", output.display())?;
+    writeln!(out, "mapped    {scans} scans, {points} points, to {}", output.display())?;
     let (voxels, occupied) = MapReader::open(output, 0)?.voxel_counts().unwrap_or_default();
     writeln!(out, "map       {} voxels, {} occupied", HumanCount(voxels), HumanCount(occupied))?;
     Ok(ExitCode::SUCCESS)

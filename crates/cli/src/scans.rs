@@ -169,7 +169,7 @@ impl Overview {
         writeln!(out, "scans     {}{points}", HumanCount(self.scans))?;
         if let (Some(bytes), Some(points)) = (self.kept_bytes, self.points) {
             let a_point = bytes as f64 / points.max(1) as f64;
-            writeln!(out, "kept      {}, {a_point:.2} bytes a point", HumanBytes(bytes))?;
+            writeln!(out, "kept      {}, {a_point:.2} bytes per point", HumanBytes(bytes))?;
         }
         if let (Some(first), Some(last)) = (self.first_stamp_ns, self.last_stamp_ns) {
             let (first, span) = (seconds(first), last.saturating_sub(first));

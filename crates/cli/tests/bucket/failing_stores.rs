@@ -32,7 +32,7 @@ fn an_unreachable_store_is_not_a_missing_map() {
     }
     // Without permission to list, S3 refuses to read a missing object. A file is no map.
     let refuses =
-        FaultyStore::new(server.store.clone(), |asked, _| match asked.key.ends_with("manifest.json") {
+        FaultyStore::new(server.store.clone(), |request, _| match request.key.ends_with("manifest.json") {
             true => Fault::Refused,
             false => Fault::None,
         });
@@ -54,8 +54,8 @@ fn a_push_with_a_lost_last_response_succeeds() {
     let (server, folder) = (Server::new(), TempDir::new().unwrap());
     let map = folder.path().join("map");
     drop(city(&map, Storage::OctoMap, false));
-    let store = FaultyStore::new(server.store.clone(), |asked, _| {
-        let is_last = asked.kind == Kind::Put && asked.key.ends_with("manifest.json");
+    let store = FaultyStore::new(server.store.clone(), |request, _| {
+        let is_last = request.kind == Kind::Put && request.key.ends_with("manifest.json");
         if is_last { Fault::DoneBefore } else { Fault::None }
     });
     let bucket = Bucket::on(store, "maps/city", "s3://test/maps/city").unwrap();
@@ -95,12 +95,12 @@ fn a_map_damaged_in_the_bucket_is_resent() {
                 Some(content) => server.put(&key, content),
                 None => server.delete(&key),
             }
-            let said = message_of(pull(&bucket, &pulled, false, |_, _| {}));
-            assert!(said.contains("push --resend"), "{said}");
+            let printed = message_of(pull(&bucket, &pulled, false, |_, _| {}));
+            assert!(printed.contains("push --resend"), "{printed}");
             let _ = std::fs::remove_dir_all(folder.path().join("pulled.unfinished"));
             if is_page {
-                let said = message_of(push(map.as_path(), &bucket, KEEP, |_, _| {}));
-                assert!(said.contains("push --resend"), "{said}");
+                let printed = message_of(push(map.as_path(), &bucket, KEEP, |_, _| {}));
+                assert!(printed.contains("push --resend"), "{printed}");
             }
             let sent = resend().unwrap();
             assert_eq!((sent.objects_sent, sent.bytes_sent), (first.objects_sent, first.bytes_sent));
@@ -137,7 +137,7 @@ fn an_interrupted_push_resumes() {
     assert!(whole > 100, "{whole}");
     let most = whole as usize / 2;
     let puts = std::sync::atomic::AtomicUsize::new(0);
-    let breaks = FaultyStore::new(server.store.clone(), move |asked, _| match asked.kind {
+    let breaks = FaultyStore::new(server.store.clone(), move |request, _| match request.kind {
         Kind::Put if puts.fetch_add(1, std::sync::atomic::Ordering::Relaxed) >= most => Fault::Refused,
         _ => Fault::None,
     });
@@ -145,7 +145,7 @@ fn an_interrupted_push_resumes() {
         |store: &Arc<FaultyStore>| Bucket::on(store.clone(), "maps/city", "s3://test/maps/city").unwrap();
     push(map.as_path(), &at(&breaks), KEEP, |_, _| {}).unwrap_err();
     // A first push checks only its first objects for existence.
-    assert!(breaks.asked(Kind::Head).len() < 48, "{}", breaks.asked(Kind::Head).len());
+    assert!(breaks.requests(Kind::Head).len() < 48, "{}", breaks.requests(Kind::Head).len());
     // Requests in flight complete.
     std::thread::sleep(Duration::from_millis(200));
     let there = server.objects().len();
@@ -156,17 +156,18 @@ fn an_interrupted_push_resumes() {
     let again = push_now(&map, &bucket);
     assert_eq!(again.objects_sent + there as u64, whole);
     assert!(0 < again.tiles_sent && again.tiles_sent < again.tiles, "{again:?}");
-    assert_eq!(store.asked(Kind::Put).len() as u64, again.objects_sent + 1);
+    assert_eq!(store.requests(Kind::Put).len() as u64, again.objects_sent + 1);
     assert_eq!(digest_there(&bucket).unwrap(), digest(&map));
-    let asked = store.asked(Kind::Head).len();
-    let before = store.asked(Kind::Put).len();
+    let request = store.requests(Kind::Head).len();
+    let before = store.requests(Kind::Put).len();
     let mut keeping = config(Storage::OctoMap);
     keeping.keeps_scans = true;
     let mut mapper = OutOfCoreTileMapper::open(&map, keeping).unwrap();
     mapper.insert_scan(&scan_at(50, 30.0)).unwrap();
     mapper.flush().unwrap();
     push_now(&map, &bucket);
-    let [heads, puts] = [store.asked(Kind::Head).len() - asked, store.asked(Kind::Put).len() - before];
+    let [heads, puts] =
+        [store.requests(Kind::Head).len() - request, store.requests(Kind::Put).len() - before];
     assert!(0 < puts && heads <= puts, "{heads} of {puts}");
     assert_eq!(digest_there(&bucket).unwrap(), digest(&map));
 }

@@ -10,18 +10,18 @@ use voxtile_bucket::object_store::{
 };
 
 /// Selects the fault for a request, given the number of earlier requests.
-type Faults = dyn Fn(&Asked, usize) -> Fault + Send + Sync;
+type Faults = dyn Fn(&SeenRequest, usize) -> Fault + Send + Sync;
 
 /// Store in memory that records requests and injects faults.
 pub struct FaultyStore {
     inner: Arc<InMemory>,
-    asked: Mutex<Vec<Asked>>,
+    requests: Mutex<Vec<SeenRequest>>,
     fault: Box<Faults>,
 }
 
 /// One request.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Asked {
+pub struct SeenRequest {
     pub kind: Kind,
     pub key: String,
     /// Number of bytes written or read; `None` for all.
@@ -52,23 +52,23 @@ impl FaultyStore {
     /// Creates a store. `fault` receives each request and the number of earlier ones.
     pub fn new(
         inner: Arc<InMemory>,
-        fault: impl Fn(&Asked, usize) -> Fault + Send + Sync + 'static,
+        fault: impl Fn(&SeenRequest, usize) -> Fault + Send + Sync + 'static,
     ) -> Arc<Self> {
-        Arc::new(Self { inner, asked: Mutex::default(), fault: Box::new(fault) })
+        Arc::new(Self { inner, requests: Mutex::default(), fault: Box::new(fault) })
     }
 
     /// Returns all requests of a kind so far.
-    pub fn asked(&self, kind: Kind) -> Vec<Asked> {
-        self.asked.lock().unwrap().iter().filter(|asked| asked.kind == kind).cloned().collect()
+    pub fn requests(&self, kind: Kind) -> Vec<SeenRequest> {
+        self.requests.lock().unwrap().iter().filter(|request| request.kind == kind).cloned().collect()
     }
 
-    fn note(&self, asked: Asked) -> Fault {
+    fn note(&self, request: SeenRequest) -> Fault {
         let before = {
-            let mut all = self.asked.lock().unwrap();
-            all.push(asked.clone());
+            let mut all = self.requests.lock().unwrap();
+            all.push(request.clone());
             all.len() - 1
         };
-        (self.fault)(&asked, before)
+        (self.fault)(&request, before)
     }
 }
 
@@ -101,7 +101,7 @@ impl ObjectStore for FaultyStore {
     {
         Box::pin(async move {
             let bytes = Some(payload.content_length() as u64);
-            match self.note(Asked { kind: Kind::Put, key: key.to_string(), bytes }) {
+            match self.note(SeenRequest { kind: Kind::Put, key: key.to_string(), bytes }) {
                 Fault::None | Fault::CutOff => self.inner.put_opts(key, payload, options).await,
                 Fault::Refused => Err(refused(key)),
                 Fault::Fails => Err(failed()),
@@ -136,7 +136,7 @@ impl ObjectStore for FaultyStore {
                 _ => None,
             };
             let kind = if options.head { Kind::Head } else { Kind::Get };
-            match self.note(Asked { kind, key: key.to_string(), bytes }) {
+            match self.note(SeenRequest { kind, key: key.to_string(), bytes }) {
                 Fault::None | Fault::DoneBefore => self.inner.get_opts(key, options).await,
                 Fault::Refused => Err(refused(key)),
                 Fault::Fails => Err(failed()),

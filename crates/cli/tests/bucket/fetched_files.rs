@@ -30,12 +30,12 @@ fn files_are_fetched_and_removed_after_use() {
     server.put(&Key::from("drive2/other.pcd"), vec![1]);
     server.put(&Key::from("drive/scans"), Vec::new());
     let at = |prefix: &str| Bucket::on(server.store.clone(), prefix, "s3://test/drive").unwrap();
-    let mut told = Vec::new();
+    let mut reported = Vec::new();
     let fetched =
-        FetchedFiles::fetch(&at("drive"), place.path(), &|| false, |done, all| told.push((done, all)))
+        FetchedFiles::fetch(&at("drive"), place.path(), &|| false, |done, all| reported.push((done, all)))
             .unwrap();
     assert_eq!((fetched.files(), fetched.bytes()), (3, 100_005));
-    assert_eq!(told.last(), Some(&(100_005, 100_005)));
+    assert_eq!(reported.last(), Some(&(100_005, 100_005)));
     for (name, content) in &files {
         assert_eq!(&std::fs::read(fetched.path().join(name)).unwrap(), content, "{name}");
     }
@@ -80,7 +80,7 @@ fn recording(server: &Server, bytes: usize) -> Vec<u8> {
 fn a_long_file_is_fetched_in_ranges() {
     let (server, place) = (Server::new(), TempDir::new().unwrap());
     let content = recording(&server, (33 << 20) + 5);
-    let store = FaultyStore::new(server.store.clone(), |asked, before| match asked.kind {
+    let store = FaultyStore::new(server.store.clone(), |request, before| match request.kind {
         Kind::Get if before % 3 == 0 => Fault::CutOff,
         Kind::Get if before % 3 == 1 => Fault::Fails,
         _ => Fault::None,
@@ -88,8 +88,8 @@ fn a_long_file_is_fetched_in_ranges() {
     let bucket = Bucket::on(store.clone(), "drive", "s3://test/drive").unwrap();
     let fetched = FetchedFiles::fetch(&bucket, place.path(), &|| false, |_, _| ()).unwrap();
     assert!(std::fs::read(fetched.path().join("long.mcap")).unwrap() == content);
-    for asked in store.asked(Kind::Get) {
-        assert!(asked.bytes.is_some_and(|bytes| bytes <= 16 << 20), "{asked:?}");
+    for request in store.requests(Kind::Get) {
+        assert!(request.bytes.is_some_and(|bytes| bytes <= 16 << 20), "{request:?}");
     }
 }
 
@@ -99,10 +99,10 @@ fn a_file_changed_between_two_ranges_is_not_mixed() {
     let mut content = recording(&server, 20 << 20);
     content.reverse();
     let (inner, other) = (server.store.clone(), std::sync::Mutex::new(Some(content)));
-    let store = FaultyStore::new(server.store.clone(), move |asked, _| {
+    let store = FaultyStore::new(server.store.clone(), move |request, _| {
         // After the first range.
-        if asked.kind == Kind::Get
-            && asked.bytes.is_some_and(|bytes| bytes < 16 << 20)
+        if request.kind == Kind::Get
+            && request.bytes.is_some_and(|bytes| bytes < 16 << 20)
             && let Some(content) = other.lock().unwrap().take()
         {
             let key = Key::from("drive/long.mcap");

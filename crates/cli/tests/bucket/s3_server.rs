@@ -14,16 +14,16 @@ pub struct S3Server {
 
 struct State {
     objects: Mutex<BTreeMap<String, Vec<u8>>>,
-    asked: Mutex<Vec<Asked>>,
+    requests: Mutex<Vec<SeenRequest>>,
     trouble: Mutex<Arc<Troubles>>,
 }
 
 /// Selects the fault for a request, given the number of earlier requests.
-type Troubles = dyn Fn(&Asked, usize) -> Trouble + Send + Sync;
+type Troubles = dyn Fn(&SeenRequest, usize) -> Trouble + Send + Sync;
 
 /// One request.
 #[derive(Clone, Debug)]
-pub struct Asked {
+pub struct SeenRequest {
     pub method: String,
     /// Path, including the bucket.
     pub key: String,
@@ -60,7 +60,7 @@ impl S3Server {
         let address = listener.local_addr().unwrap();
         let trouble: Arc<Troubles> = Arc::new(|_, _| Trouble::None);
         let trouble = Mutex::new(trouble);
-        let state = Arc::new(State { objects: Mutex::default(), asked: Mutex::default(), trouble });
+        let state = Arc::new(State { objects: Mutex::default(), requests: Mutex::default(), trouble });
         let serving = state.clone();
         thread::spawn(move || {
             for stream in listener.incoming() {
@@ -73,14 +73,14 @@ impl S3Server {
     }
 
     /// Sets the faults of all later requests, numbered from 0.
-    pub fn trouble(&self, trouble: impl Fn(&Asked, usize) -> Trouble + Send + Sync + 'static) {
-        self.state.asked.lock().unwrap().clear();
+    pub fn trouble(&self, trouble: impl Fn(&SeenRequest, usize) -> Trouble + Send + Sync + 'static) {
+        self.state.requests.lock().unwrap().clear();
         *self.state.trouble.lock().unwrap() = Arc::new(trouble);
     }
 
     /// Returns the requests since the last call of `trouble`.
-    pub fn asked(&self) -> Vec<Asked> {
-        self.state.asked.lock().unwrap().clone()
+    pub fn requests(&self) -> Vec<SeenRequest> {
+        self.state.requests.lock().unwrap().clone()
     }
 
     pub fn put(&self, key: &str, content: Vec<u8>) {
@@ -127,13 +127,13 @@ impl State {
             value.split(|letter: char| !letter.is_ascii_digit()).next()?.parse().ok()
         };
         let (bytes, from) = (number("\ncontent-length: ").unwrap_or(0), number("\nrange: bytes="));
-        let asked = Asked { method: method.to_owned(), key, bytes, from };
+        let request = SeenRequest { method: method.to_owned(), key, bytes, from };
         let (trouble, number) = {
-            let mut all = self.asked.lock().unwrap();
-            all.push(asked.clone());
+            let mut all = self.requests.lock().unwrap();
+            all.push(request.clone());
             (self.trouble.lock().unwrap().clone(), all.len() - 1)
         };
-        let trouble = trouble(&asked, number);
+        let trouble = trouble(&request, number);
         if trouble == Trouble::Reset {
             return Ok(());
         }
@@ -156,11 +156,12 @@ impl State {
         if let Trouble::Late(milliseconds) = trouble {
             thread::sleep(Duration::from_millis(milliseconds));
         }
-        let (status, content, range) = self.answer(&asked, &headers, body);
+        let (status, content, range) = self.answer(&request, &headers, body);
         if trouble == Trouble::AnswerLost {
             return Ok(());
         }
-        let e_tag = blake3::hash(&self.objects.lock().unwrap().get(&asked.key).cloned().unwrap_or_default());
+        let e_tag =
+            blake3::hash(&self.objects.lock().unwrap().get(&request.key).cloned().unwrap_or_default());
         write!(
             stream,
             "HTTP/1.1 {status} Told\r\nContent-Length: {}\r\nETag: \"{}\"\r\n{range}\
@@ -168,7 +169,7 @@ impl State {
             content.len(),
             e_tag.to_hex()
         )?;
-        if asked.method == "HEAD" {
+        if request.method == "HEAD" {
             return Ok(());
         }
         match trouble {
@@ -190,21 +191,21 @@ impl State {
     /// Returns status, content and the range header.
     fn answer(
         &self,
-        asked: &Asked,
+        request: &SeenRequest,
         headers: &BTreeMap<String, String>,
         body: Vec<u8>,
     ) -> (u16, Vec<u8>, String) {
         let mut objects = self.objects.lock().unwrap();
-        let there = objects.get(&asked.key).cloned();
+        let there = objects.get(&request.key).cloned();
         let e_tag = there.as_ref().map(|there| format!("\"{}\"", blake3::hash(there).to_hex()));
         if headers.get("if-match").is_some_and(|wanted| e_tag.as_ref() != Some(wanted)) {
             return (412, Vec::new(), String::new());
         }
-        if asked.method == "PUT" {
+        if request.method == "PUT" {
             if headers.contains_key("if-none-match") && there.is_some() {
                 return (412, Vec::new(), String::new());
             }
-            objects.insert(asked.key.clone(), body);
+            objects.insert(request.key.clone(), body);
             return (200, Vec::new(), String::new());
         }
         let Some(content) = there else {
@@ -216,7 +217,7 @@ impl State {
         let (from, to) = range.split_once('-').unwrap();
         let (from, to): (usize, usize) = (from.parse().unwrap(), to.parse().unwrap());
         let to = to.min(content.len() - 1);
-        let told = format!("Content-Range: bytes {from}-{to}/{}\r\n", content.len());
-        (206, content[from..=to].to_vec(), told)
+        let reported = format!("Content-Range: bytes {from}-{to}/{}\r\n", content.len());
+        (206, content[from..=to].to_vec(), reported)
     }
 }

@@ -189,14 +189,14 @@ fn the_digest_does_not_depend_on_the_octree_and_its_cache() {
     }
     assert!(digests.windows(2).all(|pair| pair[0] == pair[1]));
 
-    let map = folder.path().join("told");
-    let told = output(&["build", text(&scans), "-o", text(&map), "--voxel-cache", "parallel"]);
+    let map = folder.path().join("reported");
+    let reported = output(&["build", text(&scans), "-o", text(&map), "--voxel-cache", "parallel"]);
     for line in ["cache     ", "hit rate", "octrees   ", "queue     ", "stages    "] {
-        assert!(told.contains(line), "{told}");
+        assert!(reported.contains(line), "{reported}");
     }
-    let told =
+    let reported =
         output(&["build", text(&scans), "-o", text(&map), "--append", "--again", "--voxel-cache", "serial"]);
-    assert!(told.contains("hit rate") && !told.contains("queue"), "{told}");
+    assert!(reported.contains("hit rate") && !reported.contains("queue"), "{reported}");
     let out = folder.path().join("demo");
     let demo = ["demo", "--out", text(&out), "--length", "4", "--voxel-cache", "parallel", "--json"];
     assert!(json(&demo).pointer("/octrees/voxel_cache/misses").and_then(Value::as_u64) > Some(0));
@@ -516,18 +516,18 @@ fn share_runs_the_program_next_to_this_one_or_explains_its_installation() {
     let run = || share(&["--subscribe", "-o", "map", "--help"]);
     for help in [&["--help"][..], &["-h"], &["--subscribe", "--help"], &[]] {
         let helped = share(help);
-        let said = String::from_utf8_lossy(&helped.stdout).into_owned();
+        let printed = String::from_utf8_lossy(&helped.stdout).into_owned();
         assert!(helped.status.success() && helped.stderr.is_empty(), "{help:?}");
         for word in
             ["--publish", "--subscribe", "cargo install --locked --path crates/share-node", "not here"]
         {
-            assert!(said.contains(word), "{help:?}: {said}");
+            assert!(printed.contains(word), "{help:?}: {printed}");
         }
     }
     let missing = share(&["--subscribe", "-o", "map"]);
-    let said = String::from_utf8_lossy(&missing.stderr).into_owned();
+    let printed = String::from_utf8_lossy(&missing.stderr).into_owned();
     assert!(!missing.status.success());
-    assert!(said.contains("cannot run voxtile-share") && said.lines().count() == 1, "{said}");
+    assert!(printed.contains("cannot run voxtile-share") && printed.lines().count() == 1, "{printed}");
 
     let program = folder.path().join("voxtile-share");
     shell(r##"printf '#!/bin/sh\necho "$@"\nexit 7\n' >"$1" && chmod +x "$1""##, &program);
@@ -551,11 +551,11 @@ fn a_compact_map_is_built_converted_and_extended() {
     assert_eq!(json(&["info", text(&map), "--json"])["storage"], "octomap");
 
     let (to_small, to_seed) = (folder.path().join("to_small"), folder.path().join("to_seed"));
-    let said = json(&["convert", text(&map), "-o", text(&to_small), "--storage", "compact", "--json"]);
-    assert_eq!(said["from"]["octree_bytes"], json(&["info", text(&map), "--json"])["octree_bytes"]);
-    assert!(said["to"]["table_bytes"].as_u64() < said["from"]["table_bytes"].as_u64());
-    let said = output(&["convert", text(&small), "-o", text(&to_seed), "--storage", "octomap"]);
-    assert!(said.contains("with compact storage"), "{said}");
+    let printed = json(&["convert", text(&map), "-o", text(&to_small), "--storage", "compact", "--json"]);
+    assert_eq!(printed["from"]["octree_bytes"], json(&["info", text(&map), "--json"])["octree_bytes"]);
+    assert!(printed["to"]["table_bytes"].as_u64() < printed["from"]["table_bytes"].as_u64());
+    let printed = output(&["convert", text(&small), "-o", text(&to_seed), "--storage", "octomap"]);
+    assert!(printed.contains("with compact storage"), "{printed}");
     for map in [&to_small, &to_seed] {
         assert_eq!(output(&["digest", text(map)]), digest);
         // The map has all scans of this input already.

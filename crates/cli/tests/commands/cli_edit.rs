@@ -56,8 +56,8 @@ fn cropped_parts_merge_to_the_whole() {
         let (map, inside) = (text(&map), text(&out));
         let cropped = json(&[&["crop", map, "-o", inside, "--json"], &BOX[..]].concat());
         let outside = format!("{inside}_rest");
-        let told = output(&[&["crop", map, "-o", &outside, "--outside"], &BOX[..]].concat());
-        assert!(told.starts_with("map       ") && told.contains("occupied"), "{told}");
+        let reported = output(&[&["crop", map, "-o", &outside, "--outside"], &BOX[..]].concat());
+        assert!(reported.starts_with("map       ") && reported.contains("occupied"), "{reported}");
         let [all, some, rest] = [map, inside, &outside].map(|map| json(&["info", map, "--json"]));
         assert_eq!(cropped["voxels"], some["voxels"]);
         let sum = some["voxels"].as_u64().unwrap() + rest["voxels"].as_u64().unwrap();
@@ -91,8 +91,8 @@ fn a_part_is_cleared_in_place() {
     let scans = folder.path().join("scans");
     output(&["build", text(&scans), "-o", map, "--append", "--again"]);
     assert_eq!(json(&["info", map, "--json"])["scan_number"].as_u64(), Some(6));
-    let told = output(&[&["clear", map, "--outside"], &ELSEWHERE[..]].concat());
-    assert!(told.contains("tiles     0; "), "{told}");
+    let reported = output(&[&["clear", map, "--outside"], &ELSEWHERE[..]].concat());
+    assert!(reported.contains("tiles     0; "), "{reported}");
     assert_eq!(json(&["info", map, "--json"])["voxels"].as_u64(), Some(0));
 }
 
@@ -107,8 +107,8 @@ fn log_odds_decay_once_per_new_scan() {
     assert_eq!((decayed["scans"].as_u64(), decayed["factor"].as_f64()), (Some(3), Some(0.5)));
     assert_eq!(log_odds(), before / 2.0);
     assert_eq!(json(&["info", map, "--json"])["decayed_scan"].as_u64(), Some(3));
-    let told = output(&["decay", map, "--halflife", "3"]);
-    assert!(told.contains("by 0 scans"), "{told}");
+    let reported = output(&["decay", map, "--halflife", "3"]);
+    assert!(reported.contains("by 0 scans"), "{reported}");
     assert_eq!(log_odds(), before / 2.0);
     output(&["decay", map, "--halflife", "3", "--scans", "3", "--forget-below", "0.4"]);
     assert_eq!(log_odds(), before / 4.0);

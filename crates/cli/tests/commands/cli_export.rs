@@ -168,8 +168,8 @@ fn standard_output_pipes_and_devices_receive_the_complete_file() {
         let summary = json(&["export", map, "-o", text(&file), "--json"]);
         let run = voxtile(&["export", map, "-o", "-", "--format", format, "--json"]).assert().success();
         assert_eq!(run.get_output().stdout, fs::read(&file).unwrap(), "{format}");
-        let told: Value = serde_json::from_slice(&run.get_output().stderr).unwrap();
-        assert_eq!(told["voxels"], summary["voxels"]);
+        let reported: Value = serde_json::from_slice(&run.get_output().stderr).unwrap();
+        assert_eq!(reported["voxels"], summary["voxels"]);
     }
     let (code, stderr) = failure(&["export", map, "-o", "-"]);
     assert!(code == 2 && stderr.contains("--format"), "{stderr}");
@@ -239,8 +239,8 @@ fn a_far_map_becomes_an_octree_file_with_an_origin() {
     assert_eq!(names(folder.path()), ["far", "far.pcd"]);
     // The remedy in the message works.
     let origin = ["--origin", "500000", "4182000", "0"];
-    let said = output(&[&["export", map, "-o", text(&file)], &origin[..]].concat());
-    assert!(said.contains("origin 500000 4182000 0 m"), "{said}");
+    let printed = output(&[&["export", map, "-o", text(&file)], &origin[..]].concat());
+    assert!(printed.contains("origin 500000 4182000 0 m"), "{printed}");
     let beside = origin_beside(&file).unwrap();
     assert_eq!(beside["origin_m"], serde_json::json!([500000.0, 4182000.0, 0.0]));
     assert_eq!(beside["origin_voxel"], serde_json::json!([5_000_000, 41_820_000, 0]));
@@ -267,8 +267,11 @@ fn a_far_map_becomes_an_octree_file_with_an_origin() {
 
     // The requested origin is no voxel corner: the nearest corner is used and reported.
     let arguments = ["export", map, "-o", text(&file), "--origin", "500000.04", "4182000.06", "-0.01"];
-    let said = output(&arguments);
-    assert!(said.contains("origin 500000 4182000.1 0 m") && said.contains("nearest to 500000.04"), "{said}");
+    let printed = output(&arguments);
+    assert!(
+        printed.contains("origin 500000 4182000.1 0 m") && printed.contains("nearest to 500000.04"),
+        "{printed}"
+    );
     assert_eq!(origin_beside(&file).unwrap()["origin_m"][1], 4182000.1);
     let summary = json(&[&arguments[..], &["--json"]].concat());
     assert_eq!(summary["origin_m"], serde_json::json!([500000.0, 4182000.1, 0.0]));
@@ -464,8 +467,8 @@ fn every_format_selects_the_same_voxels() {
         vec!["-o", "a.csv", "--cell", "5"],
     ] {
         let output = run(&refused);
-        let told = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert!(!output.status.success() && told.contains(refused[2]), "{refused:?}: {told}");
+        let reported = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(!output.status.success() && reported.contains(refused[2]), "{refused:?}: {reported}");
     }
     // Squares are exact in single precision, even far from the origin.
     let squares = path("squares");
@@ -486,7 +489,7 @@ fn a_3d_tiles_folder_is_complete() {
     let (map, tiles) = (folder.path().join("map"), folder.path().join("tiles"));
     let scans = points.to_str().unwrap();
     output(&["build", scans, "-o", map.to_str().unwrap(), "--max-range", "60"]);
-    let told = output(&[
+    let reported = output(&[
         "export",
         map.to_str().unwrap(),
         "-o",
@@ -495,7 +498,7 @@ fn a_3d_tiles_folder_is_complete() {
         "3dtiles",
         "--json",
     ]);
-    let told: Value = serde_json::from_str(&told).unwrap();
+    let reported: Value = serde_json::from_str(&reported).unwrap();
     let read = |path: &Path| -> Value { serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap() };
     let mut open = vec![(read(&tiles.join("tileset.json"))["root"].clone(), tiles.clone(), [0.0; 3])];
     let mut nodes = 0;
@@ -534,8 +537,8 @@ fn a_3d_tiles_folder_is_complete() {
         }
         nodes += 1;
     }
-    assert_eq!(told["nodes"], nodes);
-    assert!(told["voxels"].as_u64().unwrap() > 300);
+    assert_eq!(reported["nodes"], nodes);
+    assert!(reported["voxels"].as_u64().unwrap() > 300);
 }
 
 /// The probability of these voxels is exactly 0.5, the default threshold of occupied voxels.

@@ -149,9 +149,17 @@ fn gaps_between_poses_are_filled_up_to_twice_the_tolerance() {
     for own in [&[][..], &["--poses", text(&poses)]] {
         for (tolerance, is_filled) in [("0.1", true), ("0.09", false)] {
             let input = ["scans", &bag, "--topic", "/points", "--pose-tolerance", tolerance, "--json"];
-            let told = output(&[&input, own].concat());
-            assert_eq!(told.contains("4 clouds have no pose"), !is_filled, "{own:?} {tolerance}: {told}");
-            assert_eq!(told.contains("apart; --pose-tolerance allows for more"), !is_filled, "{told}");
+            let reported = output(&[&input, own].concat());
+            assert_eq!(
+                reported.contains("4 clouds have no pose"),
+                !is_filled,
+                "{own:?} {tolerance}: {reported}"
+            );
+            assert_eq!(
+                reported.contains("apart; --pose-tolerance allows for more"),
+                !is_filled,
+                "{reported}"
+            );
         }
         let map = folder.path().join("map");
         let input = ["build", &bag, "--topic", "/points", "--pose-tolerance", "0.01", "-o", text(&map)];
@@ -165,9 +173,9 @@ fn gaps_between_poses_are_filled_up_to_twice_the_tolerance() {
 fn scans_lists_an_input_without_mapping() {
     let folder = TempDir::new().unwrap();
     let inputs = make_inputs(folder.path());
-    let told = output(&["scans", text(&inputs[0]), "--json"]);
-    let told: serde_json::Value = serde_json::from_str(&told).unwrap();
-    assert_eq!((&told["scans"], &told["points"]), (&3.into(), &180.into()), "{told}");
+    let reported = output(&["scans", text(&inputs[0]), "--json"]);
+    let reported: serde_json::Value = serde_json::from_str(&reported).unwrap();
+    assert_eq!((&reported["scans"], &reported["points"]), (&3.into(), &180.into()), "{reported}");
     let each = output(&["scans", text(&inputs[1]), "--each", "--first", "1", "--every", "2"]);
     assert!(each.contains("scans     1, 60 points"), "{each}");
     let unknown = folder.path().join("file.pcap");
@@ -286,8 +294,8 @@ fn outputs_with_the_name_of_their_second_file_are_refused() {
         [("nav2", "map.yaml", "map.pgm"), ("heightmap", "h.json", "h.png"), ("heightmap", "h.pgw", "h.png")]
     {
         let path = folder.path().join(name);
-        let told = refusal(&["export", &map, "-o", text(&path), "--format", format]);
-        assert!(told.contains(name) && told.contains(hint), "{told}");
+        let reported = refusal(&["export", &map, "-o", text(&path), "--format", format]);
+        assert!(reported.contains(name) && reported.contains(hint), "{reported}");
     }
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
 }
@@ -305,16 +313,16 @@ fn the_second_file_is_replaced_only_with_its_output() {
         names
     };
     fs::write(path("package.json"), "{}").unwrap();
-    let told = refusal(&["export", &map, "-o", text(&path("package.png"))]);
-    assert!(told.contains("package.json") && told.contains("move or remove"), "{told}");
+    let reported = refusal(&["export", &map, "-o", text(&path("package.png"))]);
+    assert!(reported.contains("package.json") && reported.contains("move or remove"), "{reported}");
     assert_eq!(
         (names(), fs::read(path("package.json")).unwrap()),
         (vec!["package.json".into()], b"{}".to_vec())
     );
     // The last name is refused before the first is written.
     fs::create_dir(path("h.pgw")).unwrap();
-    let told = refusal(&["export", &map, "-o", text(&path("h.png"))]);
-    assert!(told.contains("h.pgw"), "{told}");
+    let reported = refusal(&["export", &map, "-o", text(&path("h.png"))]);
+    assert!(reported.contains("h.pgw"), "{reported}");
     assert_eq!(names(), ["h.pgw", "package.json"]);
     fs::remove_dir(path("h.pgw")).unwrap();
 
@@ -346,8 +354,8 @@ fn text_files_next_to_clouds_are_no_clouds() {
     }
     let set = folder.path().join("set");
     for arguments in [vec!["scans", text(&set)], vec!["scans", text(&set), "--format", "ply"]] {
-        let told = output(&arguments);
-        assert!(told.contains("PLY") && told.contains("set/poses_tum.txt"), "{told}");
+        let reported = output(&arguments);
+        assert!(reported.contains("PLY") && reported.contains("set/poses_tum.txt"), "{reported}");
     }
 }
 
@@ -364,15 +372,16 @@ fn a_file_of_poses_is_no_cloud() {
     fs::write(&poses, "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 1 0 1 0 0 0 0 1 0\n").unwrap();
     for format in [&[][..], &["--format", "xyz"]] {
         let input = ["scans", text(&scans), "--poses", text(&poses), "--json"];
-        let told: serde_json::Value = serde_json::from_str(&output(&[&input, format].concat())).unwrap();
-        assert_eq!((&told["scans"], &told["points"]), (&2.into(), &2.into()), "{told}");
+        let reported: serde_json::Value = serde_json::from_str(&output(&[&input, format].concat())).unwrap();
+        assert_eq!((&reported["scans"], &reported["points"]), (&2.into(), &2.into()), "{reported}");
     }
     let other = folder.path().join("other.txt");
     fs::copy(&poses, &other).unwrap();
-    let told = output(&["scans", text(&scans), "--poses", text(&other)]);
+    let reported = output(&["scans", text(&scans), "--poses", text(&other)]);
     assert!(
-        told.contains("scans     2,") && told.contains("optimized.txt (poses: its rows are matrices)"),
-        "{told}"
+        reported.contains("scans     2,")
+            && reported.contains("optimized.txt (poses: its rows are matrices)"),
+        "{reported}"
     );
     fs::write(scans.join("2.txt"), "4 0 0\n").unwrap();
     let refused = refusal(&["scans", text(&scans), "--poses", text(&other)]);
@@ -391,17 +400,17 @@ fn clouds_without_any_pose_make_no_map() {
     let poses = folder.path().join("gps.txt");
     fs::write(&poses, "1284035200 0 0 1 0 0 0 1\n1284035210 0 0 1 0 0 0 1\n").unwrap();
     let map = folder.path().join("map");
-    let told = refusal(&["build", text(&scans), "--poses", text(&poses), "-o", text(&map)]);
+    let reported = refusal(&["build", text(&scans), "--poses", text(&poses), "-o", text(&map)]);
     for part in ["none of its 2 clouds has a pose", "315964790.000 s after the last pose", "clocks differ"] {
-        assert!(told.contains(part), "{told}");
+        assert!(reported.contains(part), "{reported}");
     }
     // One pose is enough.
     fs::write(&poses, "1599999999.5 0 0 1 0 0 0 1\n1600000000.5 0 0 1 0 0 0 1\n").unwrap();
     let map = folder.path().join("other");
     output(&["build", text(&scans), "--poses", text(&poses), "-o", text(&map)]);
-    let told = output(&["scans", text(&scans), "--poses", text(&poses)]);
+    let reported = output(&["scans", text(&scans), "--poses", text(&poses)]);
     let named = "1 cloud has no pose, left out (1600000001.000000000.xyz: it is 0.500 s after the last pose)";
-    assert!(told.contains(named), "{told}");
+    assert!(reported.contains(named), "{reported}");
     assert!(output(&["scans", text(&map)]).contains("1600000000"), "{}", output(&["scans", text(&map)]));
 }
 
@@ -420,8 +429,8 @@ fn poses_by_number_belong_to_their_clouds() {
     fs::write(&poses, rows.concat()).unwrap();
     let map = folder.path().join("map");
     output(&["build", text(&scans), "--poses", text(&poses), "-o", text(&map), "--skip-bad"]);
-    let told = output(&["scans", text(&map), "--each", "--json"]);
-    let scans = told.lines().map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap());
+    let reported = output(&["scans", text(&map), "--each", "--json"]);
+    let scans = reported.lines().map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap());
     let origins: Vec<f64> = scans.filter_map(|scan| scan["origin_m"][0].as_f64()).collect();
     assert_eq!(origins, [0.0, 20.0]);
 
@@ -431,8 +440,8 @@ fn poses_by_number_belong_to_their_clouds() {
     fs::copy(repository("crates/formats/tests/data/scans.e57"), several.join("a.e57")).unwrap();
     fs::copy(repository("crates/formats/tests/data/scans.e57"), several.join("b.e57")).unwrap();
     fs::write(&poses, rows.concat().repeat(10)).unwrap();
-    let told = output(&["scans", text(&several), "--poses", text(&poses)]);
-    assert!(told.contains("more poses than clouds"), "{told}");
+    let reported = output(&["scans", text(&several), "--poses", text(&poses)]);
+    assert!(reported.contains("more poses than clouds"), "{reported}");
 }
 
 /// A killed recorder of ROS 1 leaves `.bag.active`, possibly as the only file.
@@ -442,9 +451,9 @@ fn a_recording_that_was_not_closed_is_found_in_its_folder() {
     let bag = PathBuf::from(repository("crates/formats/tests/data/ros/none.bag"));
     let alone = output(&["scans", text(&bag), "--topic", "/points", "--each", "--json"]);
     fs::copy(&bag, folder.path().join("drive.bag.active")).unwrap();
-    let told = output(&["scans", text(folder.path()), "--topic", "/points", "--each", "--json"]);
-    assert_eq!(told, alone);
-    assert_eq!(told.lines().count(), 4 + 1);
+    let reported = output(&["scans", text(folder.path()), "--topic", "/points", "--each", "--json"]);
+    assert_eq!(reported, alone);
+    assert_eq!(reported.lines().count(), 4 + 1);
 }
 
 /// Far clouds with a coordinate reference system: the map keeps it, and exports record it if the format can.
@@ -473,12 +482,12 @@ fn coordinate_reference_systems_are_kept_and_written_back() {
     let mixed = path("mixed.las");
     output(&["export", text(&plain), "-o", text(&mixed), "-q"]);
     name_crs(&mixed, "EPSG:25833");
-    let told = refusal(&["build", text(&mixed), "-o", text(&other), "--no-rays", "--append"]);
-    assert!(told.contains("25833") && told.contains("25832"), "{told}");
+    let reported = refusal(&["build", text(&mixed), "-o", text(&other), "--no-rays", "--append"]);
+    assert!(reported.contains("25833") && reported.contains("25832"), "{reported}");
     let fourth = path("fourth");
     output(&["build", text(&mixed), "-o", text(&fourth), "--no-rays", "--resolution", "0.5"]);
-    let told = refusal(&["merge", text(&other), text(&fourth), "-o", text(&path("merged"))]);
-    assert!(told.contains("coordinate reference system") && told.contains("25833"), "{told}");
+    let reported = refusal(&["merge", text(&other), text(&fourth), "-o", text(&path("merged"))]);
+    assert!(reported.contains("coordinate reference system") && reported.contains("25833"), "{reported}");
     // A map without a system accepts any, and parts of a map keep theirs.
     output(&["merge", text(&other), text(&plain), "-o", text(&path("merged"))]);
     output(&[
@@ -541,8 +550,8 @@ fn numbered(folder: &Path, count: usize, bad: &[usize]) -> (PathBuf, PathBuf) {
 }
 
 fn origins_of(map: &Path) -> Vec<f64> {
-    let told = output(&["scans", text(map), "--each", "--json"]);
-    let scans = told.lines().map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap());
+    let reported = output(&["scans", text(map), "--each", "--json"]);
+    let scans = reported.lines().map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap());
     scans.filter_map(|scan| scan["origin_m"][0].as_f64()).collect()
 }
 
@@ -560,8 +569,8 @@ fn damaged_clouds_shift_no_others_of_a_selection() {
     assert_eq!(build(&map("a"), &["--every", "10", "--skip-bad"]), [0.0, 10.0, 30.0]);
     assert_eq!(build(&map("b"), &["--every", "12"]), [0.0, 12.0, 24.0, 36.0]);
     assert_eq!(build(&map("c"), &["--first", "7", "--count", "2"]), [7.0, 8.0]);
-    let told = output(&["scans", text(&scans), "--poses", text(&poses), "--first", "7", "--count", "2"]);
-    assert!(told.contains("1 of the scans that were passed over cannot be read"), "{told}");
+    let reported = output(&["scans", text(&scans), "--poses", text(&poses), "--first", "7", "--count", "2"]);
+    assert!(reported.contains("1 of the scans that were passed over cannot be read"), "{reported}");
 }
 
 /// These bytes make the LAZ decoder panic.
@@ -575,9 +584,12 @@ fn a_panic_of_a_decoder_prints_one_line_with_the_file() {
         let mut bytes = whole.clone();
         bytes[points_at + at..points_at + at + 16].fill(0xff);
         fs::write(&file, bytes).unwrap();
-        let said = refusal(&["scans", text(&file)]);
-        assert!(said.contains("damaged.laz") && said.contains("its decoder gave up (decoders.rs:"), "{said}");
-        assert!(said.lines().count() == 1 && !said.contains("panicked"), "{said}");
+        let printed = refusal(&["scans", text(&file)]);
+        assert!(
+            printed.contains("damaged.laz") && printed.contains("its decoder gave up (decoders.rs:"),
+            "{printed}"
+        );
+        assert!(printed.lines().count() == 1 && !printed.contains("panicked"), "{printed}");
     }
 }
 
@@ -601,15 +613,15 @@ fn truncated_clouds_are_kept_or_reported_with_an_offset() {
     };
     // Points have 42 bytes.
     let las = cut("voxels.las");
-    let told = json(&["scans", text(&las), "--json"]);
-    let points = told["points"].as_u64().unwrap();
+    let reported = json(&["scans", text(&las), "--json"]);
+    let points = reported["points"].as_u64().unwrap();
     let remark = format!("the file is cut off: {points} of {} points are there and are read", points + 3);
-    assert!(told["remarks"].to_string().contains(&remark), "{told}");
+    assert!(reported["remarks"].to_string().contains(&remark), "{reported}");
     assert_eq!(build(&las, "las.map")["points"], points);
     let ply = cut("voxels.ply");
     let run = voxtile(&["scans", text(&ply), "--json"]).assert().failure().code(1);
-    let told: serde_json::Value = serde_json::from_slice(&run.get_output().stdout).unwrap();
-    let error = &told["error"];
+    let reported: serde_json::Value = serde_json::from_slice(&run.get_output().stdout).unwrap();
+    let error = &reported["error"];
     assert_eq!((&error["kind"], error["path"].as_str()), (&"malformed".into(), Some(text(&ply))));
     assert!(error["offset"].as_u64() > Some(0) && error["record"].is_null(), "{error}");
     assert_eq!(build(&ply, "ply.map")["points"], 0);
@@ -627,12 +639,12 @@ fn points_not_moved_by_deskewing_are_reported() {
     let poses = folder.path().join("poses.txt");
     fs::write(&poses, "1599999999.9 0 0 1 0 0 0 1\n1600000000.6 7 0 1 0 0 0 1\n").unwrap();
     let input = ["scans", text(&scans), "--poses", text(&poses), "--pose-tolerance", "2"];
-    let told = output(&[&input[..], &["--deskew"]].concat());
+    let reported = output(&[&input[..], &["--deskew"]].concat());
     for part in [
         "1 cloud has no times of points, or no stamp: --deskew moved nothing there",
         "2 points stayed: no pose is known at their own times (--deskew)",
     ] {
-        assert!(told.contains(part), "{told}");
+        assert!(reported.contains(part), "{reported}");
     }
     assert!(!output(&input).contains("--deskew"));
     let refused = refusal(&[&input[..], &["--deskew", "--world-frame"]].concat());
@@ -675,10 +687,10 @@ fn a_recording_may_have_more_parts_than_files_may_be_open() {
         limited
             .args(["-c", "ulimit -n 40 && exec \"$@\"", "sh"])
             .arg(assert_cmd::cargo::cargo_bin("voxtile"));
-        let told = limited.args(["scans", text(folder.path()), "--topic", "/points"]).output().unwrap();
-        let said = String::from_utf8_lossy(&told.stdout);
-        assert!(told.status.success(), "{extension}: {}", String::from_utf8_lossy(&told.stderr));
-        assert!(said.contains("240"), "{extension}: 4 scans a part: {said}");
+        let reported = limited.args(["scans", text(folder.path()), "--topic", "/points"]).output().unwrap();
+        let printed = String::from_utf8_lossy(&reported.stdout);
+        assert!(reported.status.success(), "{extension}: {}", String::from_utf8_lossy(&reported.stderr));
+        assert!(printed.contains("240"), "{extension}: 4 scans a part: {printed}");
     }
 }
 
@@ -710,8 +722,8 @@ fn a_resumed_build_keeps_clearing_rays_without_a_return() {
     (0..2).for_each(add);
     build(&path("map"), &["--clear-no-return", "3"]);
     add(2);
-    let told: serde_json::Value = serde_json::from_str(&build(&path("map"), &["--resume"])).unwrap();
-    assert_eq!((&told["resumed_after"], &told["scans"]), (&2.into(), &1.into()), "{told}");
+    let reported: serde_json::Value = serde_json::from_str(&build(&path("map"), &["--resume"])).unwrap();
+    assert_eq!((&reported["resumed_after"], &reported["scans"]), (&2.into(), &1.into()), "{reported}");
     build(&path("whole"), &["--clear-no-return", "3"]);
     build(&path("without"), &[]);
     let digest = |name: &str| output(&["digest", text(&path(name))]);

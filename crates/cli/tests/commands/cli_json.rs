@@ -85,13 +85,13 @@ fn every_object_has_the_version_and_the_same_shapes() {
 fn failed(arguments: &[&str]) -> (i32, Value, String) {
     let run = voxtile(arguments).assert().failure();
     let run = run.get_output();
-    let said = String::from_utf8(run.stderr.clone()).unwrap();
-    let mut told: Value = serde_json::from_slice(&run.stdout).unwrap();
-    assert_eq!(told["version"], 1);
-    check("", &told);
-    let error = told["error"].take();
-    assert!(said.ends_with(&format!("voxtile: {}\n", error["message"].as_str().unwrap())), "{said}");
-    (run.status.code().unwrap(), error, said)
+    let printed = String::from_utf8(run.stderr.clone()).unwrap();
+    let mut reported: Value = serde_json::from_slice(&run.stdout).unwrap();
+    assert_eq!(reported["version"], 1);
+    check("", &reported);
+    let error = reported["error"].take();
+    assert!(printed.ends_with(&format!("voxtile: {}\n", error["message"].as_str().unwrap())), "{printed}");
+    (run.status.code().unwrap(), error, printed)
 }
 
 #[test]
@@ -119,11 +119,11 @@ fn a_failure_prints_an_object_and_a_line() {
     let scan = scans.join("001.pcd");
     let whole = fs::read_to_string(&scan).unwrap();
     fs::write(&scan, whole.replacen("4.05 ", "", 1)).unwrap();
-    let (code, error, said) = failed(&["build", text(&scans), "-o", none, "--json"]);
+    let (code, error, printed) = failed(&["build", text(&scans), "-o", none, "--json"]);
     assert_eq!((code, &error["kind"], &error["path"]), (1, &"malformed".into(), &text(&scan).into()));
     assert_eq!(error["line"], 10);
-    assert!(said.contains("after 1 scans") && said.contains("malformed: line 10: "), "{said}");
-    assert_eq!(said.matches("line 10").count(), 1, "{said}");
+    assert!(printed.contains("after 1 scans") && printed.contains("malformed: line 10: "), "{printed}");
+    assert_eq!(printed.matches("line 10").count(), 1, "{printed}");
 
     // Without --json standard output is empty; also for an invalid command line.
     for (arguments, code) in [(&["info", "/no/map"][..], 1), (&["info", map, "--json", "--never"], 2)] {
@@ -136,9 +136,9 @@ fn a_failure_prints_an_object_and_a_line() {
     let no_map = &format!("{none}/no_map");
     let run = voxtile(&["export", no_map, "-o", "-", "--format", "csv", "--json"]).assert().failure();
     let run = run.get_output();
-    let said = String::from_utf8(run.stderr.clone()).unwrap();
-    let error: Value = serde_json::from_str(said.lines().last().unwrap()).unwrap();
-    assert!(run.stdout.is_empty() && said.starts_with("voxtile: "), "{said}");
+    let printed = String::from_utf8(run.stderr.clone()).unwrap();
+    let error: Value = serde_json::from_str(printed.lines().last().unwrap()).unwrap();
+    assert!(run.stdout.is_empty() && printed.starts_with("voxtile: "), "{printed}");
     assert_eq!((&error["version"], &error["error"]["kind"]), (&1.into(), &"no_map".into()));
 }
 
@@ -150,12 +150,12 @@ fn a_failure_reports_file_tile_and_offset_of_damage() {
     output(&["build", text(&scans), "-o", text(&map)]);
     let table = map.join("tile_0_0_0/iwlo_meta.bin");
     fs::write(&table, b"OLWI").unwrap();
-    let (code, error, said) = failed(&["digest", text(&map), "--json"]);
+    let (code, error, printed) = failed(&["digest", text(&map), "--json"]);
     assert_eq!((code, &error["kind"]), (1, &"damaged".into()));
     assert_eq!(error["path"], text(&table));
     assert_eq!(error["tile"], serde_json::json!([0, 0, 0]));
     assert!(error["offset"].is_number());
-    assert!(said.contains("`voxtile repair`") && said.contains("offset "), "{said}");
+    assert!(printed.contains("`voxtile repair`") && printed.contains("offset "), "{printed}");
     // Damage is the result of verify, not an error.
     let run = voxtile(&["verify", text(&map), "--json"]).assert().code(1);
     let report: Value = serde_json::from_slice(&run.get_output().stdout).unwrap();

@@ -10,8 +10,8 @@ struct Case {
     tiles: bool,
 }
 
-const fn case(options: &'static [&'static str], rust_log: Option<&'static str>, said: [bool; 2]) -> Case {
-    Case { options, rust_log, flushes: said[0], tiles: said[1] }
+const fn case(options: &'static [&'static str], rust_log: Option<&'static str>, text_out: [bool; 2]) -> Case {
+    Case { options, rust_log, flushes: text_out[0], tiles: text_out[1] }
 }
 
 const CASES: [Case; 11] = [
@@ -44,9 +44,9 @@ fn run(arguments: &[&str], case: &Case) -> (i32, String, String) {
 fn build(scans: &Path, map: &Path, case: &Case) -> (String, String) {
     let small = ["--resolution", "0.1", "--tile-size", "2", "--cache-tiles", "2", "--flush-every", "1"];
     let build = [&["build", text(scans), "-o", text(map)][..], &small].concat();
-    let (code, out, said) = run(&build, case);
-    assert_eq!(code, 0, "{said}");
-    (out, said)
+    let (code, out, text_out) = run(&build, case);
+    assert_eq!(code, 0, "{text_out}");
+    (out, text_out)
 }
 
 /// Returns whether a run prints only errors and results.
@@ -71,13 +71,13 @@ fn options_and_environment_change_only_the_log() {
     for (number, case) in CASES.iter().enumerate() {
         let what = format!("{:?}, RUST_LOG {:?}", case.options, case.rust_log);
         let map = folder.path().join(format!("map{number}"));
-        let (out, said) = build(&scans, &map, case);
+        let (out, text_out) = build(&scans, &map, case);
         for (word, is_said) in
             [(": flush ", case.flushes), (": loaded", case.tiles), (": evicted", case.tiles)]
         {
-            assert_eq!(said.contains(word), is_said, "{what}: {word}: {said}");
+            assert_eq!(text_out.contains(word), is_said, "{what}: {word}: {text_out}");
         }
-        assert!(case.flushes || case.tiles || said.is_empty(), "{what}: {said}");
+        assert!(case.flushes || case.tiles || text_out.is_empty(), "{what}: {text_out}");
         let (earlier, earlier_map) = before.get_or_insert_with(|| (out.clone(), map.clone()));
         match is_quiet(case) {
             true => assert_eq!(out, "", "{what}"),
@@ -85,8 +85,8 @@ fn options_and_environment_change_only_the_log() {
         }
         // The output of a command without times is identical.
         let ask = |map: &Path, case| {
-            let (code, out, said) = run(&["query", text(map), "4.1", "-0.5", "0.6", "--json"], case);
-            assert_eq!((code, said.as_str()), (0, ""), "{what}");
+            let (code, out, text_out) = run(&["query", text(map), "4.1", "-0.5", "0.6", "--json"], case);
+            assert_eq!((code, text_out.as_str()), (0, ""), "{what}");
             out
         };
         assert_eq!(ask(&map, case), ask(earlier_map, &CASES[0]), "{what}");
@@ -104,10 +104,10 @@ fn quiet_suppresses_warnings_and_summaries_but_no_errors() {
     build(&scans, &map, loud);
     let merged = |name: &str| folder.path().join(name);
     let merge = |into: &Path, case| run(&["merge", text(&map), text(&map), "-o", text(into), "--json"], case);
-    let (_, out, said) = merge(&merged("loud"), loud);
-    assert!(said.contains("counts twice") && out.contains("counts twice"), "{said}");
-    let (_, out, said) = merge(&merged("quiet"), quiet);
-    assert!(said.is_empty() && out.contains("counts twice"), "{said}");
+    let (_, out, text_out) = merge(&merged("loud"), loud);
+    assert!(text_out.contains("counts twice") && out.contains("counts twice"), "{text_out}");
+    let (_, out, text_out) = merge(&merged("quiet"), quiet);
+    assert!(text_out.is_empty() && out.contains("counts twice"), "{text_out}");
     // Without JSON no summaries are printed, but results are.
     let plain = |arguments: &[&str]| run(arguments, quiet);
     for work in [
@@ -120,25 +120,25 @@ fn quiet_suppresses_warnings_and_summaries_but_no_errors() {
         assert_eq!(plain(work), (0, String::new(), String::new()), "{work:?}");
     }
     for answer in [&["info", text(&map)][..], &["snapshots", text(&map)], &["verify", text(&map)]] {
-        let (code, out, said) = plain(answer);
-        assert!(code == 0 && !out.is_empty() && said.is_empty(), "{answer:?}: {out}{said}");
+        let (code, out, text_out) = plain(answer);
+        assert!(code == 0 && !out.is_empty() && text_out.is_empty(), "{answer:?}: {out}{text_out}");
     }
 
     let export = ["export", text(&map), "-o", "-", "--format", "csv"];
-    let [(_, file, said), (_, same, nothing)] = [loud, quiet].map(|case| run(&export, case));
-    assert!(said.contains("voxels in standard output") && nothing.is_empty(), "{said}{nothing}");
+    let [(_, file, text_out), (_, same, nothing)] = [loud, quiet].map(|case| run(&export, case));
+    assert!(text_out.contains("voxels in standard output") && nothing.is_empty(), "{text_out}{nothing}");
     assert!(!file.is_empty() && file == same);
 
     for case in [loud, quiet] {
-        let (code, out, said) = run(&["info", "/no/map"], case);
+        let (code, out, text_out) = run(&["info", "/no/map"], case);
         assert_eq!((code, out.as_str()), (1, ""));
-        assert!(said.starts_with("voxtile: /no/map: no map here"), "{said}");
+        assert!(text_out.starts_with("voxtile: /no/map: no map here"), "{text_out}");
     }
 }
 
 #[test]
 fn quiet_and_verbose_exclude_each_other() {
-    let (code, out, said) = run(&["info", "/no/map", "-q", "-v"], &CASES[0]);
+    let (code, out, text_out) = run(&["info", "/no/map", "-q", "-v"], &CASES[0]);
     assert_eq!((code, out.as_str()), (2, ""));
-    assert!(said.contains("cannot be used with"), "{said}");
+    assert!(text_out.contains("cannot be used with"), "{text_out}");
 }

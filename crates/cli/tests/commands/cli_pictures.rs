@@ -27,13 +27,13 @@ fn pixels_of(path: &Path) -> (usize, usize, Vec<[u8; 3]>) {
 fn a_picture_matches_its_json() {
     let folder = TempDir::new().unwrap();
     let (map, file) = (map(&folder), folder.path().join("map.png"));
-    let said = json(&["picture", text(&map), "-o", text(&file), "--json"]);
+    let printed = json(&["picture", text(&map), "-o", text(&file), "--json"]);
     let (width, height, pixels) = pixels_of(&file);
     assert_eq!(
-        (said["width_px"].as_u64(), said["height_px"].as_u64()),
+        (printed["width_px"].as_u64(), printed["height_px"].as_u64()),
         (Some(width as u64), Some(height as u64))
     );
-    assert_eq!((said["color"].as_str(), said["from"].as_str()), (Some("height"), Some("above")));
+    assert_eq!((printed["color"].as_str(), printed["from"].as_str()), (Some("height"), Some("above")));
     // The trajectory from the map's list of scans.
     assert!(pixels.contains(&voxtile_render::colors::PATH));
     let without = folder.path().join("without.png");
@@ -46,12 +46,12 @@ fn a_picture_matches_its_json() {
         &["--color", "last-scan", "--region", "-1", "-1", "-1", "9", "9", "9"],
         &["--slice", "0.5", "--thickness", "1", "--size", "300"],
     ] {
-        let said = json(&[&["picture", text(&map), "-o", text(&file), "--json"], more].concat());
-        assert!(said["known_cells"].as_u64() > Some(0), "{more:?}: {said}");
-        let [left, top, wide, high] = [0, 1, 2, 3].map(|k| said["map_px"][k].as_u64().unwrap() as usize);
+        let printed = json(&[&["picture", text(&map), "-o", text(&file), "--json"], more].concat());
+        assert!(printed["known_cells"].as_u64() > Some(0), "{more:?}: {printed}");
+        let [left, top, wide, high] = [0, 1, 2, 3].map(|k| printed["map_px"][k].as_u64().unwrap() as usize);
         let (width, height, _) = pixels_of(&file);
-        assert!(left + wide <= width && top + high <= height, "{said}");
-        assert!(wide.max(high) <= if more.contains(&"--size") { 300 } else { 2048 }, "{said}");
+        assert!(left + wide <= width && top + high <= height, "{printed}");
+        assert!(wide.max(high) <= if more.contains(&"--size") { 300 } else { 2048 }, "{printed}");
     }
     // On standard output; the summary is on standard error.
     let run = voxtile(&["picture", text(&map), "-o", "-", "--json"]).assert().success();
@@ -76,8 +76,8 @@ fn changes_since_a_snapshot_are_drawn() {
     assert!(count(VANISHED, &pixels) > 10 * count(APPEARED, &pixels), "the cleared half of the wall");
     assert!(count(SAME, &pixels) > 10 * count(APPEARED, &pixels), "the other half");
     let snapshot = format!("{}@before", text(&map));
-    let said = json(&["picture", &snapshot, "-o", text(&file), "--since", text(&map), "--json"]);
-    assert!(said["color"].is_null());
+    let printed = json(&["picture", &snapshot, "-o", text(&file), "--since", text(&map), "--json"]);
+    assert!(printed["color"].is_null());
     let (.., pixels) = pixels_of(&file);
     assert!(count(APPEARED, &pixels) > 10 * count(VANISHED, &pixels));
     let (code, error) = failure(&["picture", text(&map), "-o", text(&file), "--since", "nothing"]);
@@ -107,8 +107,12 @@ fn impossible_pictures_are_refused() {
     assert!(!file.exists());
     // The report has everything else and names the damage.
     let page = folder.path().join("page.html");
-    let said = json(&["report", text(&map), "-o", text(&page), "--json"]);
-    assert_eq!((said["readable"].as_bool(), said["damage"].as_u64()), (Some(true), Some(1)), "{said}");
+    let printed = json(&["report", text(&map), "-o", text(&page), "--json"]);
+    assert_eq!(
+        (printed["readable"].as_bool(), printed["damage"].as_u64()),
+        (Some(true), Some(1)),
+        "{printed}"
+    );
     let page = fs::read_to_string(&page).unwrap();
     assert!(page.contains("Damaged: 1 findings") && page.contains("iwlo_meta.bin"), "{page}");
     assert!(page.contains("1 tiles cannot be read"));
@@ -119,9 +123,9 @@ fn a_file_of_octomap_has_a_picture_and_no_counts() {
     let folder = TempDir::new().unwrap();
     let (map, tree, file) = (map(&folder), folder.path().join("a.bt"), folder.path().join("a.png"));
     output(&["export", text(&map), "-o", text(&tree)]);
-    let said = json(&["picture", text(&tree), "-o", text(&file), "--json"]);
+    let printed = json(&["picture", text(&tree), "-o", text(&file), "--json"]);
     let of_map = json(&["picture", text(&map), "-o", text(&file), "--json"]);
-    assert_eq!(said["solid_cells"], of_map["solid_cells"]);
+    assert_eq!(printed["solid_cells"], of_map["solid_cells"]);
     let (code, error) = failure(&["picture", text(&tree), "-o", text(&file), "--color", "count"]);
     assert!(code == 2 && error.contains("counts"), "{error}");
 }
@@ -190,8 +194,8 @@ fn maps_without_voxels_and_with_one_have_pictures_and_reports() {
     let one = folder.path().join("one");
     output(&["build", text(&cloud), "-o", text(&one), "--no-rays"]);
     for (map, cells) in [(&empty, 0), (&one, 1)] {
-        let said = json(&["picture", text(map), "-o", text(&png), "--json"]);
-        assert_eq!(said["known_cells"], cells, "{said}");
+        let printed = json(&["picture", text(map), "-o", text(&png), "--json"]);
+        assert_eq!(printed["known_cells"], cells, "{printed}");
         assert!(pixels_of(&png).0 > 100);
         output(&["report", text(map), "-o", text(&page)]);
         check_markup(&fs::read_to_string(&page).unwrap());
@@ -206,8 +210,8 @@ fn a_map_that_does_not_open_has_a_report_of_its_damage() {
     let mut bytes = fs::read(&log).unwrap();
     bytes.iter_mut().for_each(|byte| *byte = !*byte);
     fs::write(&log, bytes).unwrap();
-    let said = json(&["report", text(&map), "-o", text(&page), "--json"]);
-    assert!(said["damage"].as_u64() > Some(0), "{said}");
+    let printed = json(&["report", text(&map), "-o", text(&page), "--json"]);
+    assert!(printed["damage"].as_u64() > Some(0), "{printed}");
     let page = fs::read_to_string(&page).unwrap();
     check_markup(&page);
     assert!(page.contains("commits.log"), "{page}");

@@ -26,9 +26,9 @@ fn origins_m(folder: &TempDir, input: &Path, options: &[&str]) -> Vec<f64> {
     let map = folder.path().join("map");
     let built = voxtile(&[&["build", text(input), "-o", text(&map)], options].concat()).output().unwrap();
     assert!(built.status.success(), "{options:?}: {}", String::from_utf8_lossy(&built.stderr));
-    let told = voxtile(&["scans", text(&map), "--each", "--json"]).output().unwrap().stdout;
+    let reported = voxtile(&["scans", text(&map), "--each", "--json"]).output().unwrap().stdout;
     fs::remove_dir_all(&map).unwrap();
-    let scans = std::str::from_utf8(&told).unwrap().lines();
+    let scans = std::str::from_utf8(&reported).unwrap().lines();
     let scans = scans.map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap());
     scans.filter_map(|scan| scan["origin_m"][0].as_f64()).collect()
 }
@@ -116,13 +116,13 @@ fn pcd_files_accept_every_format_of_poses() {
     assert_eq!(origins_m(&folder, &scans, &option), [5.0]);
     let map = folder.path().join("map");
     fs::write(&file, "1 five 0 0 0 0 0 1\n2 six 0 0 0 0 0 1\n").unwrap();
-    let told = refusal(&["build", text(&scans), "--poses", text(&file), "-o", text(&map)]);
-    assert!(told.contains("line 1") && told.contains("`five` is not a number"), "{told}");
+    let reported = refusal(&["build", text(&scans), "--poses", text(&file), "-o", text(&map)]);
+    assert!(reported.contains("line 1") && reported.contains("`five` is not a number"), "{reported}");
     // A file that is no scan is often first or last in the list.
     let three = "1 0 0 5\n0 1 0 0\n0 0 1 0\n0 0 0 1\n".repeat(3);
     fs::write(&file, three).unwrap();
-    let told = refusal(&["build", text(&scans), "--poses", text(&file), "-o", text(&map)]);
-    assert!(told.contains("3 poses for 2 clouds (0.pcd to 1.pcd)"), "{told}");
+    let reported = refusal(&["build", text(&scans), "--poses", text(&file), "-o", text(&map)]);
+    assert!(reported.contains("3 poses for 2 clouds (0.pcd to 1.pcd)"), "{reported}");
 }
 
 #[test]
@@ -151,8 +151,8 @@ fn rays_of_pcd_files_begin_at_the_viewpoint() {
     );
     // The point is unchanged and the ray begins at the sensor.
     let state = |x: &str| {
-        let told = voxtile(&["query", text(&map), x, "0", "0", "--json"]).output().unwrap().stdout;
-        serde_json::from_slice::<serde_json::Value>(&told).unwrap()["state"].clone()
+        let reported = voxtile(&["query", text(&map), x, "0", "0", "--json"]).output().unwrap().stdout;
+        serde_json::from_slice::<serde_json::Value>(&reported).unwrap()["state"].clone()
     };
     assert_eq!([state("4.1"), state("3.1"), state("1.1")], ["occupied", "free", "unknown"]);
 }
@@ -162,13 +162,14 @@ fn pcd_files_without_poses_are_listed_and_mapped_without_rays() {
     let folder = TempDir::new().unwrap();
     let scans = pcd_files(folder.path(), &[("0", 0.0), ("1", 0.0)]);
     let map = folder.path().join("map");
-    let told = refusal(&["build", text(&scans), "-o", text(&map)]);
-    assert!(told.contains("has no poses"), "{told}");
+    let reported = refusal(&["build", text(&scans), "-o", text(&map)]);
+    assert!(reported.contains("has no poses"), "{reported}");
     let built = voxtile(&["build", text(&scans), "-o", text(&map), "--no-rays"]).output().unwrap();
-    let told = String::from_utf8_lossy(&built.stdout).into_owned() + &String::from_utf8_lossy(&built.stderr);
-    assert!(built.status.success() && told.contains("1 occupied"), "{told}");
-    let told = voxtile(&["scans", text(&scans)]).output().unwrap();
-    assert!(told.status.success(), "{}", String::from_utf8_lossy(&told.stderr));
+    let reported =
+        String::from_utf8_lossy(&built.stdout).into_owned() + &String::from_utf8_lossy(&built.stderr);
+    assert!(built.status.success() && reported.contains("1 occupied"), "{reported}");
+    let reported = voxtile(&["scans", text(&scans)]).output().unwrap();
+    assert!(reported.status.success(), "{}", String::from_utf8_lossy(&reported.stderr));
 }
 
 /// The reason is printed once, and no empty map remains.
@@ -183,8 +184,8 @@ fn an_input_without_any_pose_makes_no_map_of_bad_scans() {
     let poses = folder.path().join("poses.txt");
     fs::write(&poses, "1284035200 0 0 1 0 0 0 1\n1284035210 0 0 1 0 0 0 1\n").unwrap();
     let map = folder.path().join("map");
-    let told = refusal(&["build", text(&scans), "--poses", text(&poses), "-o", text(&map), "--skip-bad"]);
-    assert_eq!(told.matches("none of its 2 clouds has a pose").count(), 1, "{told}");
+    let reported = refusal(&["build", text(&scans), "--poses", text(&poses), "-o", text(&map), "--skip-bad"]);
+    assert_eq!(reported.matches("none of its 2 clouds has a pose").count(), 1, "{reported}");
     assert!(!map.exists());
 }
 

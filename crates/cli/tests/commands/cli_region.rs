@@ -35,8 +35,8 @@ fn maps_of_adjacent_regions_merge_to_the_whole_map() {
             assert_eq!(built["region_tiles"][bound][0], index);
         }
         let merged = path("merged");
-        let told = json(&["merge", &parts[0], &parts[1], &parts[2], "-o", &merged, "--json"]);
-        assert_eq!(told["is_one_build"], true);
+        let reported = json(&["merge", &parts[0], &parts[1], &parts[2], "-o", &merged, "--json"]);
+        assert_eq!(reported["is_one_build"], true);
         assert_eq!(digest(&merged), digest(&whole), "{mode:?}");
         let [merged, whole] = [merged, whole].map(|map| json(&["info", &map, "--json"]));
         for same in ["scan_number", "inputs", "voxels", "occupied", "region_tiles"] {
@@ -51,8 +51,8 @@ fn the_summary_prints_the_tiles_of_a_region() {
     let folder = TempDir::new().unwrap();
     let (scans, map) = (scans(&folder), folder.path().join("map"));
     let box_m = ["--region", "0.4", "-1.6", "-inf", "3.6", "1", "1.5"];
-    let told = output(&build(&scans, text(&map), &box_m));
-    assert!(told.contains("region    whole tiles: x 0 to 4, y -2 to 1, z -inf to 1 m"), "{told}");
+    let reported = output(&build(&scans, text(&map), &box_m));
+    assert!(reported.contains("region    whole tiles: x 0 to 4, y -2 to 1, z -inf to 1 m"), "{reported}");
 }
 
 /// Runs `does` while the last scan is missing.
@@ -81,8 +81,8 @@ fn a_build_resumes_on_the_merged_map_of_its_regions() {
     });
     // Two of three parts that form a box: a map of that region.
     output(&["merge", &south_east, &north_east, "-o", &east]);
-    let told = output(&["merge", &east, &west, "-o", &merged]);
-    assert!(told.contains("scans     those of each map"), "{told}");
+    let reported = output(&["merge", &east, &west, "-o", &merged]);
+    assert!(reported.contains("scans     those of each map"), "{reported}");
     assert_eq!(output(&["scans", &merged]).lines().count(), output(&["scans", &west]).lines().count());
     output(&build(&scans, &merged, &["--resume"]));
     let at_once = path("at_once");

@@ -10,8 +10,8 @@ fn a_bad_session_is_reverted_and_snapshots_are_readable() {
     for storage in ["octomap", "compact"] {
         output(&["build", text(&scans), "-o", map, "--storage", storage]);
         let before = output(&["digest", map]);
-        let said = output(&["snapshot", map, "good"]);
-        assert!(said.contains("kept      good: flush") && said.contains("scan 3"), "{said}");
+        let printed = output(&["snapshot", map, "good"]);
+        assert!(printed.contains("kept      good: flush") && printed.contains("scan 3"), "{printed}");
         output(&["build", text(&scans), "-o", map, "--append", "--again"]);
         let after = output(&["digest", map]);
         assert_ne!(before, after);
@@ -47,8 +47,11 @@ fn a_bad_session_is_reverted_and_snapshots_are_readable() {
             "{same}"
         );
 
-        let said = output(&["revert", map, "good", "--keep-as", "bad"]);
-        assert!(said.contains("reverted  to good: scan 3") && said.contains("kept as bad"), "{said}");
+        let printed = output(&["revert", map, "good", "--keep-as", "bad"]);
+        assert!(
+            printed.contains("reverted  to good: scan 3") && printed.contains("kept as bad"),
+            "{printed}"
+        );
         assert_eq!(output(&["digest", map]), before);
         assert_eq!(output(&["digest", &format!("{map}@bad")]), after);
         let report = json(&["verify", map, "--json"]);
@@ -83,23 +86,23 @@ fn wrong_snapshot_names_are_reported() {
         (&["convert", map, "-o", &present, "--storage", "compact"], "can be read and not changed"),
         (&["build", text(&scans), "-o", &present], "can be read and not changed"),
     ] {
-        let (code, said) = failure(arguments);
-        assert_eq!(code, 2, "{arguments:?}: {said}");
-        assert!(said.contains(message), "{arguments:?}: {said}");
+        let (code, printed) = failure(arguments);
+        assert_eq!(code, 2, "{arguments:?}: {printed}");
+        assert!(printed.contains(message), "{arguments:?}: {printed}");
     }
     // A snapshot of the same state with this name is no error: an earlier call may have been killed.
     assert!(output(&["snapshot", map, "a"]).contains("already existed"));
     assert!(output(&["revert", map, "a", "--keep-as", "a"]).contains("the map already equals a"));
     output(&["clear", map, "--region", "0", "0", "0", "1", "1", "1"]);
     for arguments in [&["snapshot", map, "a"][..], &["revert", map, "a", "--keep-as", "a"]] {
-        let (code, said) = failure(arguments);
-        assert!(code == 2 && said.contains("delete that snapshot first"), "{said}");
+        let (code, printed) = failure(arguments);
+        assert!(code == 2 && printed.contains("delete that snapshot first"), "{printed}");
     }
     let other = folder.path().join("other");
     output(&["build", text(&scans), "-o", text(&other), "--resolution", "0.2"]);
-    let (code, said) = failure(&["diff", map, text(&other)]);
+    let (code, printed) = failure(&["diff", map, text(&other)]);
     assert_eq!(code, 2);
-    assert!(said.contains("resolution 0.2 m, not 0.1 m"), "{said}");
+    assert!(printed.contains("resolution 0.2 m, not 0.1 m"), "{printed}");
     // A folder of that name has precedence.
     let odd = folder.path().join("odd@a");
     fs::rename(text(&other), &odd).unwrap();

@@ -66,7 +66,7 @@ fn registered_clouds_make_the_map_of_their_poses_in_the_world() {
 fn errors_name_the_options_for_poses() {
     let folder = TempDir::new().unwrap();
     let (bag, map) = (folder.path().join("a.bag"), folder.path().join("map"));
-    for (frame, odometries, told) in [
+    for (frame, odometries, reported) in [
         ("camera_init", &["/a", "/b"][..], "name one, as with --odometry /a --world-frame"),
         (
             "body",
@@ -77,10 +77,10 @@ fn errors_name_the_options_for_poses() {
     ] {
         write_bag(&bag, frame, odometries);
         let (_, error) = failure(&["build", text(&bag), "-o", text(&map)]);
-        assert!(error.contains(told), "{error}");
+        assert!(error.contains(reported), "{error}");
         assert!(!map.exists());
         // The suggested options work.
-        let option = told.split("--odometry ").nth(1).unwrap();
+        let option = reported.split("--odometry ").nth(1).unwrap();
         let options: Vec<&str> = ["--odometry"].into_iter().chain(option.split(' ')).collect();
         let built = json(&[&["build", text(&bag), "-o", text(&map), "--json"], &options[..]].concat());
         assert_eq!(built["scans"], 4, "{built}");

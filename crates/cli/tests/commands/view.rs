@@ -49,9 +49,9 @@ impl Viewer {
         let mut process = command.stdout(Stdio::piped()).spawn().unwrap();
         let mut line = String::new();
         BufReader::new(process.stdout.take().unwrap()).read_line(&mut line).unwrap();
-        let said: Value = serde_json::from_str(&line).unwrap();
-        let address: SocketAddr = said["listen"].as_str().unwrap().parse().unwrap();
-        assert_eq!(said["url"], format!("http://{address}/{TOKEN}/"));
+        let printed: Value = serde_json::from_str(&line).unwrap();
+        let address: SocketAddr = printed["listen"].as_str().unwrap().parse().unwrap();
+        assert_eq!(printed["url"], format!("http://{address}/{TOKEN}/"));
         assert!(address.ip().is_loopback());
         Self { process, address }
     }
@@ -224,15 +224,15 @@ fn the_server_shows_the_map() {
     assert!(tops > 0);
     for voxel in wanted.iter().step_by(101) {
         let [x, y, z] = voxel.map(|c| c as f64 / 1000.0);
-        let asked = viewer.json(&format!("maps/0/query?x={x}&y={y}&z={z}"));
+        let answer = viewer.json(&format!("maps/0/query?x={x}&y={y}&z={z}"));
         let line = run(&["query", text(&map), &x.to_string(), &y.to_string(), &z.to_string(), "--json"]);
         let wanted: Value = serde_json::from_str(&line).unwrap();
         for (name, value) in wanted.as_object().unwrap() {
-            assert_eq!(asked[name], *value, "{name}");
+            assert_eq!(answer[name], *value, "{name}");
         }
-        assert_eq!(asked["state"], "occupied");
-        let low = asked["voxel_m"]["min"][0].as_f64().unwrap();
-        assert!(low < x && x < asked["voxel_m"]["max"][0].as_f64().unwrap());
+        assert_eq!(answer["state"], "occupied");
+        let low = answer["voxel_m"]["min"][0].as_f64().unwrap();
+        assert!(low < x && x < answer["voxel_m"]["max"][0].as_f64().unwrap());
     }
     let way = viewer.json("maps/0/trajectory.json");
     assert_eq!(way["points"], serde_json::json!([[0.0, 0.0, 1.0], [12.0, 0.0, 1.0], [24.0, 0.0, 1.0]]));
@@ -286,10 +286,10 @@ fn strangers_get_nothing() {
     fs::write(&secret, "secret").unwrap();
     let viewer = Viewer::ready(&[&map], &folder.path().join("cache"));
     let host = viewer.address;
-    let asked =
+    let reply_to =
         |line: &str, host: &str| viewer.send(&format!("{line}\r\nhost: {host}\r\nconnection: close\r\n\r\n"));
     let host = host.to_string();
-    assert_eq!(asked(&format!("GET /{TOKEN}/maps.json HTTP/1.1"), &host).status, 200);
+    assert_eq!(reply_to(&format!("GET /{TOKEN}/maps.json HTTP/1.1"), &host).status, 200);
     // Unauthorised clients get no persistent connection; others do.
     let is_closed = |token: &str| {
         let mut stream = viewer.connect();
@@ -311,7 +311,7 @@ fn strangers_get_nothing() {
         format!("/{TOKEN}{}", secret.display()),
         format!("http://elsewhere/{TOKEN}x/maps.json"),
     ] {
-        let reply = asked(&format!("GET {path} HTTP/1.1"), &host);
+        let reply = reply_to(&format!("GET {path} HTTP/1.1"), &host);
         assert!(reply.status == 404 || reply.status == 400, "{path}: {}", reply.status);
         let body = String::from_utf8_lossy(&reply.body).into_owned();
         assert!(
@@ -320,14 +320,14 @@ fn strangers_get_nothing() {
         );
     }
     for method in ["POST", "PUT", "DELETE", "OPTIONS", "PATCH"] {
-        assert_eq!(asked(&format!("{method} /{TOKEN}/maps.json HTTP/1.1"), &host).status, 405, "{method}");
+        assert_eq!(reply_to(&format!("{method} /{TOKEN}/maps.json HTTP/1.1"), &host).status, 405, "{method}");
     }
     // A page of another site with a DNS name for this machine.
     for name in ["elsewhere.example", "elsewhere.example:80", "", "127.0.0.1.elsewhere.example"] {
-        assert_eq!(asked(&format!("GET /{TOKEN}/maps.json HTTP/1.1"), name).status, 403, "{name}");
+        assert_eq!(reply_to(&format!("GET /{TOKEN}/maps.json HTTP/1.1"), name).status, 403, "{name}");
     }
-    assert_eq!(asked(&format!("GET /{TOKEN}/maps.json HTTP/1.1"), "localhost:1").status, 200);
-    let head = asked(&format!("HEAD /{TOKEN}/maps.json HTTP/1.1"), &host);
+    assert_eq!(reply_to(&format!("GET /{TOKEN}/maps.json HTTP/1.1"), "localhost:1").status, 200);
+    let head = reply_to(&format!("HEAD /{TOKEN}/maps.json HTTP/1.1"), &host);
     assert_eq!((head.status, head.body.len()), (200, 0));
     let page = viewer.get("");
     assert_eq!(page.status, 200);
@@ -369,8 +369,8 @@ fn many_or_stalled_clients_do_no_harm() {
             let (viewer, nodes) = (&viewer, &nodes);
             scope.spawn(move || viewer.get(&nodes[number % nodes.len()]))
         };
-        let asked: Vec<_> = (0..200).map(ask).collect();
-        for (number, reply) in asked.into_iter().enumerate() {
+        let replies: Vec<_> = (0..200).map(ask).collect();
+        for (number, reply) in replies.into_iter().enumerate() {
             let reply = reply.join().unwrap();
             assert_eq!(reply.status, 200);
             if number % nodes.len() == 0 {
@@ -503,9 +503,9 @@ fn a_damaged_tile_is_omitted_and_reported() {
     bytes[middle] ^= 1;
     fs::write(&tables[0], bytes).unwrap();
     let viewer = Viewer::ready(&[&map], &folder.path().join("cache"));
-    let said = viewer.json("maps.json")["maps"][0]["unreadable"].to_string();
+    let printed = viewer.json("maps.json")["maps"][0]["unreadable"].to_string();
     let folder_name = tables[0].parent().unwrap().file_name().unwrap().to_str().unwrap().to_owned();
-    assert!(said.contains(&folder_name), "{said}");
+    assert!(printed.contains(&folder_name), "{printed}");
     let shown = viewer.finest("0").into_iter().map(|(voxel, _)| voxel).collect::<BTreeSet<_>>();
     assert!(shown.len() < all.len() && shown.is_subset(&all));
 }
@@ -629,6 +629,6 @@ fn an_invalid_request_is_a_client_error() {
         assert!(reply.status < 500, "{path}: {} {}", reply.status, String::from_utf8_lossy(&reply.body));
     }
     let far = viewer.get("maps/0/raycast?from=0,0,0&to=1e6,0,0");
-    let said = String::from_utf8_lossy(&far.body).into_owned();
-    assert!(far.status == 400 && said.contains("ask for at most"), "{}: {said}", far.status);
+    let printed = String::from_utf8_lossy(&far.body).into_owned();
+    assert!(far.status == 400 && printed.contains("ask for at most"), "{}: {printed}", far.status);
 }

@@ -60,7 +60,7 @@ impl Drive {
 
     fn build_whole(&self, map: &Path, storage: &str) {
         let output = self.build(map, storage).stdin(self.stdin()).output().unwrap();
-        assert!(output.status.success(), "{}", said(&output));
+        assert!(output.status.success(), "{}", printed(&output));
         assert_eq!(digest(map), Ok((SCANS, self.digests[SCANS].clone())));
     }
 }
@@ -83,13 +83,14 @@ fn run(command: &Command, limit_kib: u64, stdin: Stdio) -> Output {
     let mut child = command.stdin(stdin).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     wait_until("a process without addresses ends", || child.try_wait().unwrap().is_some());
     let output = child.wait_with_output().unwrap();
-    let said = said(&output);
-    let is_panic = said.contains("panicked") && !said.contains("failed to allocate an alternative stack");
-    assert!(!is_panic, "{limit_kib} KiB: {said}");
+    let printed = printed(&output);
+    let is_panic =
+        printed.contains("panicked") && !printed.contains("failed to allocate an alternative stack");
+    assert!(!is_panic, "{limit_kib} KiB: {printed}");
     output
 }
 
-fn said(output: &Output) -> String {
+fn printed(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
@@ -148,7 +149,7 @@ fn a_build_with_failing_allocations_keeps_its_flushes_and_resumes() {
 /// Returns the number of scans in the map after a build with a limit in KiB, if there is a map.
 fn scans_of_build(drive: &Drive, map: &Path, storage: &str, limit_kib: u64) -> Option<usize> {
     let output = run(&drive.build(map, storage), limit_kib, drive.stdin());
-    let what = format!("{storage}, {limit_kib} KiB: {}", said(&output));
+    let what = format!("{storage}, {limit_kib} KiB: {}", printed(&output));
     let is_success = output.status.success();
     let Some(flushed) = flushed_scans(map) else {
         assert!(!is_success, "{what}");
@@ -194,7 +195,7 @@ fn verify_and_repair_with_failing_allocations_report_and_change_nothing_wrong() 
                         answers += 1;
                     }
                     Err(_) => {
-                        assert!(!output.status.success(), "{what}: {}", said(&output));
+                        assert!(!output.status.success(), "{what}: {}", printed(&output));
                         failures += 1;
                     }
                 }
@@ -250,7 +251,7 @@ fn an_export_with_failing_allocations_leaves_the_old_or_the_new_file() {
                 fs::write(&target, OLD).unwrap();
                 let output = run(&export, limit_kib, Stdio::null());
                 let found = fs::read(&target).unwrap();
-                let what = format!("{storage}, {extension}, {limit_kib} KiB: {}", said(&output));
+                let what = format!("{storage}, {extension}, {limit_kib} KiB: {}", printed(&output));
                 assert!(found == whole || (found == OLD && !output.status.success()), "{what}");
                 if found == OLD { failed += 1 } else { made += 1 }
             }

@@ -67,12 +67,12 @@ fn a_removal_killed_after_its_commit_is_completed_by_the_same_command() {
         if !was_killed || !first(&map).exists() {
             continue;
         }
-        let told = answer(&["verify", text]);
-        assert!(told.contains("leftovers: ") && told.contains("intact"), "{told}");
+        let reported = answer(&["verify", text]);
+        assert!(reported.contains("leftovers: ") && reported.contains("intact"), "{reported}");
         let output = command(&remove).output().unwrap();
-        let told = String::from_utf8_lossy(&output.stdout).into_owned();
+        let reported = String::from_utf8_lossy(&output.stdout).into_owned();
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-        assert!(told.contains("completed") || told.contains("2 scans removed"), "{told}");
+        assert!(reported.contains("completed") || reported.contains("2 scans removed"), "{reported}");
         assert!(!first(&map).exists(), "the points are still there");
         assert!(!answer(&["verify", text]).contains("leftovers"));
         return;

@@ -147,14 +147,14 @@ fn a_signal_to_share_ends_voxtile_share() {
     assert!(shell.status().unwrap().success());
     let mut command = std::process::Command::new(folder.path().join("voxtile"));
     let mut child = command.arg("share").stdout(Stdio::piped()).spawn().unwrap();
-    let mut said = BufReader::new(child.stdout.take().unwrap());
+    let mut printed = BufReader::new(child.stdout.take().unwrap());
     let mut line = String::new();
-    said.read_line(&mut line).unwrap();
+    printed.read_line(&mut line).unwrap();
     assert_eq!(line, "begun\n");
     signal(&child, "TERM");
     assert_eq!(child.wait().unwrap().code(), Some(7));
     line.clear();
-    said.read_to_string(&mut line).unwrap();
+    printed.read_to_string(&mut line).unwrap();
     assert_eq!(line, "ended\n");
 }
 

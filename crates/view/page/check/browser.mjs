@@ -15,7 +15,7 @@ export class Browser {
       { stdio: ['ignore', 'ignore', 'ignore', 'pipe', 'pipe'] });
     this.waiting = new Map();
     this.number = 0;
-    this.told = [];
+    this.errors = [];
     let rest = '';
     this.process.stdio[4].on('data', (data) => {
       const parts = (rest + data).split('\0');
@@ -27,11 +27,11 @@ export class Browser {
   take(message) {
     if (message.method === 'Runtime.exceptionThrown') {
       const { text, exception } = message.params.exceptionDetails;
-      this.told.push(exception?.description ?? text);
+      this.errors.push(exception?.description ?? text);
     }
     if (message.method === 'Log.entryAdded' && message.params.entry.level === 'error') {
       const { text, url } = message.params.entry;
-      this.told.push(`${text} ${url ?? ''}`);
+      this.errors.push(`${text} ${url ?? ''}`);
     }
     const waits = this.waiting.get(message.id);
     if (!waits) return;
@@ -78,7 +78,7 @@ export class Browser {
       const hasFailed = await this.value('document.getElementById("state")?.textContent === "failed"').catch(() => false);
       if (hasFailed || Date.now() - since > 1000 * seconds) {
         const state = await this.value('document.getElementById("state").textContent + " " + document.getElementById("message").textContent').catch(() => '');
-        throw new Error(`not within ${seconds} s: ${expression} (the page says: ${state}; ${this.told.join('; ')})`);
+        throw new Error(`not within ${seconds} s: ${expression} (the page says: ${state}; ${this.errors.join('; ')})`);
       }
       await new Promise((resolve) => setTimeout(resolve, 100));
     }

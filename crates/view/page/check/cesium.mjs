@@ -76,7 +76,7 @@ try {
   if (found.failed.length) throw new Error(`Cesium could not read ${found.failed.join('; ')}`);
   if (!found.loaded || !found.triangles) throw new Error('Cesium drew nothing');
 } catch (error) {
-  console.error(error.message, browser.told.join('\n'));
+  console.error(error.message, browser.errors.join('\n'));
   process.exitCode = 1;
 } finally {
   await browser.close();

@@ -100,23 +100,23 @@ try {
   await browser.value('voxtile.detail = 0.1');
   await browser.until(`voxtile.voxels().edges.length === 1 && voxtile.voxels().edges[0] < 0.11 && document.getElementById('state').textContent === 'ready'`);
   assert.deepEqual(await shown(browser), exported(map));
-  assert.deepEqual(browser.told, [], 'no errors in the browser');
+  assert.deepEqual(browser.errors, [], 'no errors in the browser');
   step('what the page shows is what export writes, to the last voxel');
 
-  const told = await browser.value(`(async () => {
+  const result = await browser.value(`(async () => {
     const at = [1.05, 0.05, -0.25];
     voxtile.lookAt([-1.5, 0.02, 0.1], at);
     await new Promise((resolve) => setTimeout(resolve, 1500));
     return voxtile.clickAt(...voxtile.screenOf(at));
   })()`);
-  const asked = JSON.parse(run('query', map, ...told.point_m.map(String), '--json'));
-  for (const [name, value] of Object.entries(asked)) assert.deepEqual(told[name], value, name);
-  assert.equal(told.state, 'occupied');
-  step(`a click shows the result of query: ${told.state}, probability ${told.probability.toFixed(3)}`);
+  const expected = JSON.parse(run('query', map, ...result.point_m.map(String), '--json'));
+  for (const [name, value] of Object.entries(expected)) assert.deepEqual(result[name], value, name);
+  assert.equal(result.state, 'occupied');
+  step(`a click shows the result of query: ${result.state}, probability ${result.probability.toFixed(3)}`);
 
   await browser.value('voxtile.setThreshold(255)');
   const certain = await shown(browser);
-  const log = run('query', map, ...told.point_m.map(String));
+  const log = run('query', map, ...result.point_m.map(String));
   assert.ok(certain.size < exported(map).size, `${certain.size} voxels are certain; ${log}`);
   await browser.value('voxtile.setThreshold(0)');
   step('the slider of probability hides voxels, and shows them again');
@@ -175,7 +175,7 @@ try {
     assert.equal(over, false, `${width} x ${height} fits`);
   }
   step('small and large screens, light and dark');
-  assert.deepEqual(browser.told, []);
+  assert.deepEqual(browser.errors, []);
 
   const atRest = await browser.value('voxtile.drawCalls()');
   await browser.value('voxtile.lookAt(...Object.values(voxtile.camera()))');
@@ -190,7 +190,7 @@ try {
   await browser.ready();
   step('a server that comes back is noticed');
   // The browser also reports the disconnection.
-  assert.ok(browser.told.splice(0).every((line) => /Failed to load|net::ERR/.test(line)));
+  assert.ok(browser.errors.splice(0).every((line) => /Failed to load|net::ERR/.test(line)));
 
   const isShown = (...ids) => `JSON.stringify(voxtile.shown) === '${JSON.stringify(ids)}' && document.getElementById('state').textContent === 'ready'`;
   const follows = async (...maps) => {
@@ -208,8 +208,8 @@ try {
   await browser.until('document.getElementById("message").textContent.includes("Cannot load")');
   await browser.call('Network.setBlockedURLs', { urls: [] });
   await follows(map);
-  assert.ok(browser.told.splice(0).every((line) => /Failed to load|net::ERR/.test(line)));
-  step('a flush that did not come is asked for again');
+  assert.ok(browser.errors.splice(0).every((line) => /Failed to load|net::ERR/.test(line)));
+  step('a flush that did not come is expected for again');
 
   const hide = (isHidden) => browser.value(`Object.defineProperty(document, 'hidden', { value: ${isHidden}, configurable: true }); document.dispatchEvent(new Event('visibilitychange'))`);
   await hide(true);
@@ -241,7 +241,7 @@ try {
     build.once('exit', (code) => (code ? reject(new Error(`build: ${code}`)) : resolve()));
   })));
   await follows(map, other);
-  assert.deepEqual(browser.told, []);
+  assert.deepEqual(browser.errors, []);
   step('of several maps one without the snapshot is shown as it is; one that is deleted is left; all follow');
 
   if (process.argv[2]) {
@@ -267,7 +267,7 @@ try {
   }
 } catch (error) {
   writeFileSync(join(tmpdir(), 'voxtile-view-failed.png'), await browser.picture().catch(() => ''));
-  console.error(error, browser.told);
+  console.error(error, browser.errors);
   process.exitCode = 1;
 } finally {
   for (const end of ended.reverse()) await end();

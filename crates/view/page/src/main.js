@@ -168,14 +168,14 @@ function paint() {
   }[viewer.colour];
   $('legend').hidden = isChange;
   if (isChange) {
-    const told = ['appeared', 'vanished', 'unchanged'].map((name, k) => {
+    const names = ['appeared', 'vanished', 'unchanged'].map((name, k) => {
       const [span, swatch] = [document.createElement('span'), document.createElement('span')];
       swatch.className = 'swatch';
       swatch.style.background = `rgb(${CHANGES[k]})`;
       span.append(swatch, name);
       return span;
     });
-    $('legend-ends').replaceChildren(...told);
+    $('legend-ends').replaceChildren(...names);
   } else {
     $('legend-ends').replaceChildren(...ends.map((text) => Object.assign(document.createElement('span'), { textContent: text })));
   }
@@ -220,17 +220,17 @@ async function click(x, y) {
 async function ask(layer, node, center) {
   const isCoarse = node.edge > 1.5 * layer.map.resolution_m;
   try {
-    const told = await json(`maps/${layer.id.split('~')[0]}/query?x=${center[0]}&y=${center[1]}&z=${center[2]}`);
-    answered = { ...told, isCoarse };
+    const result = await json(`maps/${layer.id.split('~')[0]}/query?x=${center[0]}&y=${center[1]}&z=${center[2]}`);
+    answered = { ...result, isCoarse };
     const number = (k, digits) => (k === null ? 'unknown' : k.toFixed(digits));
     answer([
       ['at', place(center)],
       ...(isCoarse ? [['voxel', `of ${metres(node.edge)} (zoom in for single voxels)`]] : []),
-      ['state', told.state],
-      ['probability', number(told.probability, 4)],
-      ['log-odds', number(told.log_odds, 4)],
-      ['observations', told.observation_count === null ? 'none' : `${told.observation_count}`],
-      ['tile', told.tile?.join(' ') ?? 'none'],
+      ['state', result.state],
+      ['probability', number(result.probability, 4)],
+      ['log-odds', number(result.log_odds, 4)],
+      ['observations', result.observation_count === null ? 'none' : `${result.observation_count}`],
+      ['tile', result.tile?.join(' ') ?? 'none'],
     ]);
     $('copy').hidden = false;
     return answered;
@@ -251,20 +251,20 @@ async function mark(layer, center) {
   const [from, to] = marks;
   const way = to.map((k, axis) => k - from[axis]);
   const rows = [['from', place(from)], ['to', place(to)], ['distance', metres(Math.hypot(...way))], ['dx dy dz', place(way)]];
-  let told = null;
+  let result = null;
   if (tool === 'sight') {
     try {
-      told = await json(`maps/${layer.id.split('~')[0]}/raycast?from=${from}&to=${to}`);
-      rows.push(['line of sight', told.visible ? 'free' : `blocked at ${metres(told.hit.distance_m)}`]);
-      if (told.unknown_from_m !== null) rows.push(['unknown', `from ${metres(told.unknown_from_m)} on`]);
-      viewer.overlays.path('measure', told.visible ? marks : [from, told.hit.center_m], told.visible ? 0x2fbf71 : 0xe5484d);
+      result = await json(`maps/${layer.id.split('~')[0]}/raycast?from=${from}&to=${to}`);
+      rows.push(['line of sight', result.visible ? 'free' : `blocked at ${metres(result.hit.distance_m)}`]);
+      if (result.unknown_from_m !== null) rows.push(['unknown', `from ${metres(result.unknown_from_m)} on`]);
+      viewer.overlays.path('measure', result.visible ? marks : [from, result.hit.center_m], result.visible ? 0x2fbf71 : 0xe5484d);
     } catch (error) {
       say(`The request failed: ${error.message}`);
     }
   }
   answer(rows);
   viewer.wake();
-  return { marks, ...told };
+  return { marks, ...result };
 }
 
 function choose(name) {
@@ -317,13 +317,13 @@ window.addEventListener('hashchange', () => {
 
 const RETRY_MS = 1000;
 // Latest generation of each map by server: another server restarts at 0.
-const told = new Map();
-let teller = null;
+const latest = new Map();
+let lastServer = null;
 let events = null;
 let isChanging = false;
 
-const isBehind = (layer) => told.has(layer.map.id) && layer.generation !== told.get(layer.map.id);
-const tell = (id, generation) => { if (generation > 0) told.set(id, Math.max(generation, told.get(id) ?? 0)); };
+const isBehind = (layer) => latest.has(layer.map.id) && layer.generation !== latest.get(layer.map.id);
+const record = (id, generation) => { if (generation > 0) latest.set(id, Math.max(generation, latest.get(id) ?? 0)); };
 
 // One change at a time: each reads the state of all maps.
 async function catchUp() {
@@ -343,7 +343,7 @@ async function change() {
   const before = maps;
   await readMaps();
   await readExtents().catch(() => {});
-  for (const { id, generation } of maps) tell(id, generation);
+  for (const { id, generation } of maps) record(id, generation);
   const behind = viewer.layers.filter(isBehind);
   for (const layer of viewer.layers) layer.map = maps.find(({ id }) => id === layer.map.id) ?? layer.map;
   if (viewer.layers.some((layer) => layer.id !== idOf(layer.map))) {
@@ -384,12 +384,12 @@ function follow() {
   events.addEventListener('error', () => { $('state').textContent = 'disconnected'; });
   events.addEventListener('changed', ({ data }) => {
     const { map: id, generation, server } = JSON.parse(data);
-    if (teller !== null && teller !== server) {
-      told.clear();
+    if (lastServer !== null && lastServer !== server) {
+      latest.clear();
       for (const layer of viewer.layers) layer.generation = null;
     }
-    teller = server;
-    tell(id, generation);
+    lastServer = server;
+    record(id, generation);
     catchUp();
   });
 }
