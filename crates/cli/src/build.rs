@@ -39,7 +39,6 @@ pub fn memory_of(memory: Option<ByteSize>) -> MemoryLimit {
     })
 }
 
-/// Returns the build options from the command line.
 fn options_of(args: &BuildArgs) -> voxtile::Result<BuildOptions> {
     let mut options = BuildOptions::new(&args.scans, &args.output);
     options.read = read_options(&args.read)?;

@@ -16,7 +16,6 @@ use voxtile::operations::{WrittenMap, convert};
 use voxtile::{Result, Storage};
 use voxtile_pipeline::memory;
 
-/// Summary of a conversion.
 #[derive(Serialize)]
 struct Conversion<'a> {
     from: Form<'a>,
@@ -30,7 +29,6 @@ struct Conversion<'a> {
     peak_rss_bytes: Option<u64>,
 }
 
-/// Storage of a map.
 #[derive(Serialize)]
 struct Form<'a> {
     #[serde(serialize_with = "voxtile::path_text::serialize")]

@@ -39,7 +39,6 @@ pub fn run(args: &ExportArgs, is_quiet: bool) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Returns the export options from the command line.
 fn options_of(args: &ExportArgs) -> voxtile::Result<ExportOptions> {
     let mut options = ExportOptions::new(&args.map, &args.output);
     options.format.clone_from(&args.format);

@@ -14,7 +14,6 @@ use voxtile_pipeline::memory;
 use voxtile_pipeline::octree_file;
 use voxtile_pipeline::whole_map;
 
-/// Summary of an import.
 #[derive(Serialize)]
 struct Imported<'a> {
     #[serde(serialize_with = "voxtile::path_text::serialize")]

@@ -13,7 +13,6 @@ struct Versioned<'a, T> {
     object: &'a T,
 }
 
-/// Prints an object as one line.
 pub fn print(object: &impl Serialize, out: &mut impl Write) -> anyhow::Result<()> {
     let line = serde_json::to_string(&Versioned { version: VERSION, object })?;
     Ok(writeln!(out, "{line}")?)

@@ -81,7 +81,6 @@ impl Row {
         }
     }
 
-    /// Adds an update.
     pub fn add(&mut self, report: &LocalReport, cpu_seconds: f64, map: &LocalMap) {
         self.scans += 1;
         self.points += report.points;

@@ -1,7 +1,6 @@
 use crate::args::{OctreeArgs, OctreeName, VoxelCacheName};
 use voxtile::{Error, OctreeConfig, VoxelCacheConfig, VoxelCacheMode};
 
-/// Returns the octree configuration from the command line.
 pub fn octree_config(args: &OctreeArgs) -> voxtile::Result<OctreeConfig> {
     let shape = VoxelCacheConfig::new(args.tau.unwrap_or(VoxelCacheConfig::default().tau), args.buckets);
     let cache = match args.voxel_cache {

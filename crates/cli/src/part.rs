@@ -4,7 +4,6 @@ use voxtile::operations::Part;
 use voxtile::space::{Aabb, Point};
 use voxtile_pipeline::numbers;
 
-/// Returns the box of `--region`.
 pub fn region_of(corners: &[f64]) -> Result<Aabb> {
     numbers::region_of("region", corners)
 }

@@ -47,7 +47,6 @@ impl Write for AboveBar {
 }
 
 impl Progress {
-    /// Returns a bar over scans.
     pub fn over_scans(scans: Option<usize>) -> Self {
         let (bar, template) = match scans {
             Some(scans) => (
@@ -59,12 +58,10 @@ impl Progress {
         Self::styled(bar, template)
     }
 
-    /// Returns a bar over tiles.
     pub fn over_tiles(tiles: usize) -> Self {
         Self::styled(ProgressBar::new(tiles as u64), "{bar:30} {pos}/{len} tiles  {eta} left")
     }
 
-    /// Returns a bar over bytes.
     pub fn over_bytes() -> Self {
         Self::styled(ProgressBar::new(0), "{bar:30} {bytes}/{total_bytes}  {bytes_per_sec}  {eta} left")
     }
@@ -84,7 +81,6 @@ impl Progress {
         self.bar.reset_eta();
     }
 
-    /// Advances by one step.
     pub fn step(&self) {
         self.bar.inc(1);
     }
@@ -119,7 +115,6 @@ impl Progress {
         self.bar.set_message(format!("{tiles} tiles, {cached_tiles} in memory{memory}{waiting}{stalls}"));
     }
 
-    /// Shows a message.
     pub fn show_message(&self, message: &'static str) {
         self.bar.set_message(message);
     }

@@ -26,7 +26,6 @@ const POINTS_BYTES: usize = 64 << 20;
 /// Memory for the rows of a map, in bytes; longer lists use a temporary file.
 const ROWS_BYTES: usize = 4 << 20;
 
-/// Scans of an input or a map.
 #[derive(Debug, Default, Serialize)]
 struct Overview {
     format: String,
@@ -39,11 +38,9 @@ struct Overview {
     last_stamp_ns: Option<i64>,
     fields: Vec<String>,
     poses: Option<String>,
-    /// Remarks for the user.
     remarks: Vec<String>,
 }
 
-/// One scan.
 #[derive(Debug, Serialize)]
 struct Row {
     number: u64,

@@ -19,7 +19,7 @@ pub struct Walk {
 }
 
 const SENSOR_HEIGHT_M: f64 = 1.4;
-/// Maximum angle of looking to either side, and the distance between two looks.
+/// Maximum yaw to either side while walking, and the distance per cycle.
 const LOOK_RAD: f64 = 0.4;
 const LOOK_EVERY_M: f64 = 7.3;
 
@@ -101,7 +101,6 @@ impl Iterator for Walk {
     }
 }
 
-/// Returns -1, 0 or 1.
 fn sign(x: f64) -> f64 {
     if x == 0.0 { 0.0 } else { x.signum() }
 }

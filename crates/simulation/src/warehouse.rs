@@ -78,7 +78,6 @@ impl World for Warehouse {
     }
 }
 
-/// Builds the uprights, boards and goods of a bay.
 fn build_bay(random: &mut Random, x_m: f64, row_m: f64, solids: &mut Vec<Solid>) {
     let [near, far] = [row_m - 0.5 * ROW_M, row_m + 0.5 * ROW_M];
     for y_m in [near, far - 0.1] {

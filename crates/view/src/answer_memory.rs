@@ -26,7 +26,7 @@ struct Held {
     bytes: Bytes,
     client: Client,
     memory: AnswerMemory,
-    /// For the connection.
+    /// The same share, counted for the connection.
     _held: HeldBytes,
 }
 

@@ -7,7 +7,6 @@ use voxtile_render::levels::{Kind, NodeKey};
 /// Resource of a request.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Route {
-    /// File of the page.
     Page(&'static str),
     /// Page without the trailing slash that its relative links need.
     Slash,
@@ -16,24 +15,20 @@ pub enum Route {
     Of(MapId, Thing),
 }
 
-/// Map and state.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MapId {
-    /// Number of the map.
     pub number: usize,
     pub at: At,
     /// State to compare with.
     pub since: Option<At>,
 }
 
-/// State of a map.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum At {
     Now,
     Snapshot(SnapshotName),
 }
 
-/// Resource of a map.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Thing {
     Tileset,

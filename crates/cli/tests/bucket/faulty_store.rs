@@ -19,7 +19,6 @@ pub struct FaultyStore {
     fault: Box<Faults>,
 }
 
-/// One request.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SeenRequest {
     pub kind: Kind,
@@ -35,10 +34,8 @@ pub enum Kind {
     Head,
 }
 
-/// Effect on a request.
 pub enum Fault {
     None,
-    /// Refused permanently.
     Refused,
     /// Fails like a broken connection.
     Fails,
@@ -57,7 +54,6 @@ impl FaultyStore {
         Arc::new(Self { inner, requests: Mutex::default(), fault: Box::new(fault) })
     }
 
-    /// Returns all requests of a kind so far.
     pub fn requests(&self, kind: Kind) -> Vec<SeenRequest> {
         self.requests.lock().unwrap().iter().filter(|request| request.kind == kind).cloned().collect()
     }

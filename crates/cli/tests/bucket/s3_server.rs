@@ -21,7 +21,6 @@ struct State {
 /// Selects the fault for a request, given the number of earlier requests.
 type Troubles = dyn Fn(&SeenRequest, usize) -> Trouble + Send + Sync;
 
-/// One request.
 #[derive(Clone, Debug)]
 pub struct SeenRequest {
     pub method: String,

@@ -135,7 +135,7 @@ fn a_slow_scan_is_cancelled() {
 
 #[test]
 fn a_signal_to_share_ends_voxtile_share() {
-    // It would run for a minute.
+    // It would run for a minute without a signal.
     const PROGRAM: &str = "#!/bin/sh\ntrap 'echo ended; exit 7' TERM\necho begun\n\
         for k in $(seq 600); do sleep 0.1; done\n";
     let folder = tempfile::tempdir().unwrap();

@@ -10,7 +10,6 @@ pub struct Canvas {
 }
 
 impl Canvas {
-    /// Returns a canvas of one color.
     pub fn new(width: usize, height: usize, color: Rgb) -> Self {
         Self { width, height, bytes: opaque(color).repeat(width * height) }
     }
@@ -80,7 +79,6 @@ impl Canvas {
         self.text(right.saturating_sub(font::width_of(text) * dot), top, dot, color, text);
     }
 
-    /// Returns the image.
     pub fn into_image(self) -> Image {
         Image::new(self.width, self.height, self.bytes)
     }

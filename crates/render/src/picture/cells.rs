@@ -56,7 +56,6 @@ impl Rank {
 }
 
 impl Cells {
-    /// Returns unknown cells.
     pub fn new(count: usize) -> Self {
         let mut cells = Self { best: Vec::new(), near: Vec::new() };
         cells.best.resize_with(count, Default::default);
@@ -81,14 +80,12 @@ impl Cells {
         }
     }
 
-    /// Returns the cell at an index.
     pub fn at(&self, place: usize) -> Cell {
         let best = self.best[place].load(Ordering::Relaxed);
         let near = (self.near[place].load(Ordering::Relaxed) ^ SIGN) as i32;
         Cell { rank: Rank::of(best >> 32), value: unordered(best as u32), near }
     }
 
-    /// Returns all cells in order.
     pub fn iter(&self) -> impl Iterator<Item = Cell> {
         (0..self.best.len()).map(|place| self.at(place))
     }

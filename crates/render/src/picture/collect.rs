@@ -9,12 +9,9 @@ use voxtile::mapper::MapView;
 use voxtile::space::{Grid, TileIndex, VoxelBox, VoxelIndex};
 use voxtile::{Error, Result};
 
-/// Map or maps to draw.
 #[derive(Clone, Copy)]
 pub(super) enum Source<'a> {
-    /// One map.
     One(&'a dyn MapView),
-    /// Two states to compare.
     Two { before: &'a dyn MapView, after: &'a dyn MapView },
 }
 

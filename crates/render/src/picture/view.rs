@@ -7,7 +7,7 @@ pub enum View {
     /// From above: x to the right, y up.
     #[default]
     Above,
-    /// From above, of a layer alone: voxels whose center is at most half of the thickness from a height.
+    /// From above, one layer: voxels whose center is at most half of the thickness from a height.
     Slice {
         /// Middle of the layer in metres.
         z_m: f64,

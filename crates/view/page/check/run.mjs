@@ -101,7 +101,7 @@ try {
   await browser.until(`voxtile.voxels().edges.length === 1 && voxtile.voxels().edges[0] < 0.11 && document.getElementById('state').textContent === 'ready'`);
   assert.deepEqual(await shown(browser), exported(map));
   assert.deepEqual(browser.errors, [], 'no errors in the browser');
-  step('what the page shows is what export writes, to the last voxel');
+  step('the page shows exactly the voxels that export writes');
 
   const result = await browser.value(`(async () => {
     const at = [1.05, 0.05, -0.25];
@@ -148,7 +148,7 @@ try {
   step(`a picture of ${width} x ${height} is saved`);
 
   await touch();
-  step('a touch screen turns, comes near, asks and walks');
+  step('a touch screen rotates, zooms, queries and walks');
 
   run('snapshot', map, 'monday');
   run('build', scan(1), '-o', map, '--append', '-q');
@@ -166,7 +166,7 @@ try {
   await browser.value(`document.getElementById('since').value = 'monday'; document.getElementById('since').dispatchEvent(new Event('change'))`);
   await browser.ready();
   assert.match(await browser.value('document.getElementById("legend-ends").textContent'), /appeared.*vanished.*unchanged/);
-  step('what changed since a snapshot is shown');
+  step('changes since a snapshot are shown');
 
   for (const [width, height, dark] of [[360, 640, false], [1280, 720, true]]) {
     await browser.size(width, height, dark);
@@ -188,7 +188,7 @@ try {
   const [, address, token] = /\/\/([^/]+)\/([^/]+)\//.exec(url);
   await view(map, '--listen', address, '--token', token);
   await browser.ready();
-  step('a server that comes back is noticed');
+  step('the page reconnects to a restarted server');
   // The browser also reports the disconnection.
   assert.ok(browser.errors.splice(0).every((line) => /Failed to load|net::ERR/.test(line)));
 
@@ -209,7 +209,7 @@ try {
   await browser.call('Network.setBlockedURLs', { urls: [] });
   await follows(map);
   assert.ok(browser.errors.splice(0).every((line) => /Failed to load|net::ERR/.test(line)));
-  step('a flush that did not come is expected for again');
+  step('a failed request of a flush is retried');
 
   const hide = (isHidden) => browser.value(`Object.defineProperty(document, 'hidden', { value: ${isHidden}, configurable: true }); document.dispatchEvent(new Event('visibilitychange'))`);
   await hide(true);
@@ -220,7 +220,7 @@ try {
   assert.equal(await browser.value('voxtile.generation[0]'), generation, 'a hidden page keeps no connection');
   await hide(false);
   await follows(map);
-  step('a hidden page keeps no connection, and catches up');
+  step('a hidden page closes its connection and catches up later');
 
   const other = join(work, 'other');
   run('build', scan(4), '-o', other, '--resolution', '0.1', '-q');
@@ -242,7 +242,7 @@ try {
   })));
   await follows(map, other);
   assert.deepEqual(browser.errors, []);
-  step('of several maps one without the snapshot is shown as it is; one that is deleted is left; all follow');
+  step('a map without the snapshot shows its current state, a deleted snapshot is left, and all maps are updated');
 
   if (process.argv[2]) {
     const city = await view(process.argv[2]);
