@@ -110,7 +110,7 @@ pub enum Command {
     Remap(RemapArgs),
     /// Remove scans from a map that keeps its scans, as if they had never been added, in place
     RemoveScans(RemoveScansArgs),
-    /// Remove all points in a box from the scans that a map keeps and replay the scans that contained them, in place
+    /// Remove all points in a box from the scans that a map keeps and rebuild the affected tiles, in place
     RemovePoints(RemovePointsArgs),
     /// Copy a map to a new map with another storage format and the same content, without its snapshots and kept scans
     Convert(ConvertArgs),

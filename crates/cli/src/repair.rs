@@ -54,8 +54,8 @@ pub fn run(args: &RepairArgs) -> anyhow::Result<ExitCode> {
                 (HumanCount(repair.scans_lost), HumanCount(repair.snapshot_scans_lost));
             writeln!(
                 out,
-                "kept scans: {scans} of the map and {of_snapshots} of snapshots are lost; a map or snapshot that lost some \
-                 cannot be replayed"
+                "kept scans: {scans} of the map and {of_snapshots} of snapshots are lost; a map or snapshot that lost \
+                 some cannot be replayed"
             )?;
         }
         if repair.inputs_forgotten > 0 {

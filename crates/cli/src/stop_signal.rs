@@ -23,7 +23,7 @@ static STOP: OnceLock<Stop> = OnceLock::new();
 /// A separate thread waits for the signals, so that other work cannot delay the response.
 pub fn catch() -> anyhow::Result<Stop> {
     catch_with_messages(
-        "stopping after a flush of the scans so far; a second Ctrl-C or SIGTERM stops at once and loses unflushed scans",
+        "stopping after a flush of the scans so far; a second Ctrl-C or SIGTERM stops at once and loses them",
         "stopped at once: scans since the last flush are not in the map",
     )
 }

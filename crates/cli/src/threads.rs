@@ -4,8 +4,8 @@ use std::num::NonZero;
 use std::sync::mpsc::{Sender, channel};
 use std::thread::{self, available_parallelism};
 
-/// Starts the mapping threads: `count`, or one per core, or as many as the system allows. If it allows none, the current
-/// thread does all the work.
+/// Starts the mapping threads: `count`, or one per core, or as many as the system allows. If it allows none, the
+/// current thread does all the work.
 ///
 /// Threads start before the pool is built: if a pool fails to start a thread itself, it is unusable for the rest of the
 /// process.

@@ -41,7 +41,7 @@ pub struct PullArgs {
     pub url: String,
     /// Folder of the map; must not exist yet, except with --replace
     pub map: PathBuf,
-    /// Replace the map in the folder by the same map in the bucket; changes since its last push are lost
+    /// Replace the map in the folder by the same map in the bucket; changes that were not pushed are lost
     #[arg(long)]
     pub replace: bool,
     #[arg(long, help = help::JSON)]

@@ -26,10 +26,10 @@ pub struct BuildArgs {
     /// Maximum number of tiles in memory, whatever their size; replaces --memory
     #[arg(long, value_name = "N")]
     pub cache_tiles: Option<usize>,
-    /// Skip points nearer to the sensor than this, in metres [default: 0; with --resume as before]
+    /// Skip points nearer to the sensor than this, in metres [default: 0; with --resume, the earlier value]
     #[arg(long, value_name = "M")]
     pub min_range: Option<f64>,
-    /// Cut rays at this range, in metres: free up to it, no hit [default: 100; with --resume as before]
+    /// Cut rays at this range, in metres: free up to it, no hit [default: 100; with --resume, the earlier value]
     #[arg(long, value_name = "M")]
     pub max_range: Option<f64>,
     /// Sensor model that turns observations into log-odds [default: log-odds, or the map's]
@@ -48,7 +48,7 @@ pub struct BuildArgs {
     /// iwlo model: intensity of full weight, in the sensor's unit [default: 255]
     #[arg(long, value_name = "I")]
     pub intensity_max: Option<f64>,
-    /// Number of updates of a voxel per scan [default: per-scan; with --resume as before]
+    /// Number of updates of a voxel per scan [default: per-scan; with --resume, the earlier value]
     #[arg(long, value_name = "MODE")]
     pub insert: Option<InsertName>,
     /// Keep the scans in the map, compressed to about 10 bytes per point, for remap, remove-scans and remove-points. A
@@ -56,11 +56,12 @@ pub struct BuildArgs {
     #[arg(long)]
     pub keep_scans: bool,
     /// Map only tiles whose center is in this box (X0 <= x < X1, same for y and z), in metres; -inf and inf are
-    /// allowed. Maps of adjacent boxes merge to the map of the whole [default: all of space; with --resume as before]
+    /// allowed. Maps of adjacent boxes merge to the map of the whole [default: all of space; with --resume, the earlier
+    /// value]
     #[arg(long, value_names = ["X0", "Y0", "Z0", "X1", "Y1", "Z1"], num_args = 6, allow_hyphen_values = true)]
     pub region: Option<Vec<f64>>,
     /// Clear rays without a return up to this range, in metres, at most --max-range; for laser scans, depth images and
-    /// e57 [default: no clearing; with --resume as before]
+    /// e57 [default: no clearing; with --resume, the earlier value]
     #[arg(long, value_name = "M")]
     pub clear_no_return: Option<f64>,
     /// Insert points as hits only, without clearing rays; needs no poses

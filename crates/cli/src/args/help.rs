@@ -18,15 +18,15 @@ pub const MIN_RANGE: &str = "Skip points nearer to the sensor than this, in metr
 pub const CALIB: &str = "KITTI's calib.txt, for poses of the camera such as KITTI's own";
 pub const EXTRINSIC: &str = "Pose of the sensor in the body frame of the poses: tx ty tz qx qy qz qw, or a 3x4 matrix \
                              row by row";
-pub const POSE_TOLERANCE: &str = "Maximum time from a scan to the nearest pose, in seconds; poses are interpolated over \
-                                  gaps of up to twice this time";
+pub const POSE_TOLERANCE: &str = "Maximum time from a scan to the nearest pose, in seconds; poses are interpolated \
+                                  over gaps of up to twice this time";
 pub const RESOLUTION: &str = "Edge length of a voxel, in metres";
 macro_rules! scans {
     ($more:literal) => {
         concat!(
-            "Scans: a folder of point clouds in the sensor's frame (PCD, PLY, LAS, KITTI .bin, depth images), or one with a \
-             subfolder scans/; a recording (.bag .mcap .db3, rosbag2 folder); a file (.laz .e57 .xyz ...); OctoMap's .graph \
-             or .log; ",
+            "Scans: a folder of point clouds in the sensor's frame (PCD, PLY, LAS, KITTI .bin, depth images), or one \
+             with a subfolder scans/; a recording (.bag .mcap .db3, rosbag2 folder); a file (.laz .e57 .xyz ...); OctoMap's \
+             .graph or .log; ",
             $more,
             "a scan stream (.scans, or - for standard input)"
         )

@@ -31,7 +31,14 @@ pub struct RemapArgs {
     pub poses: Option<PathBuf>,
     #[arg(long, value_name = "FILE", requires = "poses", help = help::CALIB)]
     pub calib: Option<PathBuf>,
-    #[arg(long, value_name = "N", num_args = 7..=12, allow_hyphen_values = true, requires = "poses", help = help::EXTRINSIC)]
+    #[arg(
+        long,
+        value_name = "N",
+        num_args = 7..=12,
+        allow_hyphen_values = true,
+        requires = "poses",
+        help = help::EXTRINSIC
+    )]
     pub extrinsic: Option<Vec<f64>>,
     #[arg(long, value_name = "S", default_value_t = 0.5, help = help::POSE_TOLERANCE)]
     pub pose_tolerance: f64,
@@ -41,28 +48,28 @@ pub struct RemapArgs {
     /// Build another map from the same scans with other parameters instead of changing this one
     #[arg(short = 'o', long = "output", value_name = "MAP2")]
     pub output: Option<PathBuf>,
-    /// -o: edge length of a voxel, in metres [default: the map's]
+    /// With -o: edge length of a voxel, in metres [default: the map's]
     #[arg(long, value_name = "M", requires = "output")]
     pub resolution: Option<f64>,
-    /// -o: edge length of a tile, in metres [default: the map's]
+    /// With -o: edge length of a tile, in metres [default: the map's]
     #[arg(long, value_name = "M", requires = "output")]
     pub tile_size: Option<f64>,
-    /// -o: skip points nearer to the sensor than this, in metres [default: as each scan was mapped]
+    /// With -o: skip points nearer to the sensor than this, in metres [default: as each scan was mapped]
     #[arg(long, value_name = "M", requires = "output")]
     pub min_range: Option<f64>,
-    /// -o: cut rays at this range, in metres [default: as each scan was mapped]
+    /// With -o: cut rays at this range, in metres [default: as each scan was mapped]
     #[arg(long, value_name = "M", requires = "output")]
     pub max_range: Option<f64>,
-    /// -o: number of updates of a voxel per scan [default: as each scan was mapped]
+    /// With -o: number of updates of a voxel per scan [default: as each scan was mapped]
     #[arg(long, value_name = "MODE", requires = "output")]
     pub insert: Option<InsertName>,
-    /// -o: sensor model that turns observations into log-odds [default: the map's]
+    /// With -o: sensor model that turns observations into log-odds [default: the map's]
     #[arg(long, value_name = "MODEL", requires = "output")]
     pub sensor_model: Option<ModelName>,
-    /// -o: storage format of the tiles of the new map [default: the map's]
+    /// With -o: storage format of the tiles of the new map [default: the map's]
     #[arg(long, value_name = "FORM", requires = "output")]
     pub storage: Option<StorageName>,
-    /// -o: keep the scans in the new map, too
+    /// With -o: keep the scans in the new map, too
     #[arg(long, requires = "output")]
     pub keep_scans: bool,
     #[command(flatten)]

@@ -62,7 +62,7 @@ fn an_idle_input_blocks_neither_flushes_nor_a_stop() {
     // The input stays open without data.
     wait_until("the timer flushes", || flushed_scans(&map) == Some(5));
     signal(&build.child, "TERM");
-    let mut lines = read_until(&mut build.child, "a second Ctrl-C or SIGTERM ends at once");
+    let mut lines = read_until(&mut build.child, "a second Ctrl-C or SIGTERM stops at once");
     let status = build.child.wait().unwrap();
     let mut rest = String::new();
     lines.read_to_string(&mut rest).unwrap();
@@ -99,7 +99,7 @@ fn a_stopped_demo_resumes_when_run_again() {
     let mut child = demo().spawn().unwrap();
     wait_until("the map is begun", || flushed_scans(&map).is_some());
     signal(&child, "INT");
-    let mut lines = read_until(&mut child, "the same command goes on");
+    let mut lines = read_until(&mut child, "run the same command to continue");
     lines.read_to_string(&mut String::new()).unwrap();
     assert_eq!(child.wait().unwrap().code(), Some(130));
     for _ in 0..2 {
