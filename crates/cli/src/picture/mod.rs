@@ -176,5 +176,5 @@ fn caption(args: &PictureArgs, drawn: &Drawn) -> String {
         (Some([least, most]), ColorName::LastScan) => format!("; last scan {least:.0} (dark) to {most:.0}"),
     };
     let changes = if args.since.is_some() { "; blue appeared, orange vanished, grey unchanged" } else { "" };
-    format!("{across:.1} x {up:.1} m, {:.3} m a cell{scale}{changes}", drawn.cell_m)
+    format!("{across:.1} x {up:.1} m, {:.3} m per cell{scale}{changes}", drawn.cell_m)
 }
