@@ -3,6 +3,7 @@ mod bucket;
 mod build;
 mod edit;
 mod export;
+mod help;
 mod local;
 mod picture;
 mod read;
@@ -22,7 +23,7 @@ pub use local::{LocalArgs, PresetName};
 use log::LevelFilter;
 pub use picture::{PictureArgs, ReportArgs, ViewName};
 pub use read::{FrameName, ReadArgs};
-pub use remap::{RemapArgs, RemovePointsArgs, RemoveScansArgs, ReworkArgs};
+pub use remap::{RemapArgs, RemovePointsArgs, RemoveScansArgs, ReplayArgs};
 pub use snapshot::{DiffArgs, RevertArgs, SnapshotArgs, SnapshotsArgs};
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -31,33 +32,32 @@ use std::time::Duration;
 #[cfg(feature = "view")]
 pub use view::ViewArgs;
 
-/// Probabilistic 3D occupancy mapping whose map is bounded by the disk, never by memory.
+/// Probabilistic 3D occupancy mapping for maps larger than memory.
 ///
-/// Lengths are metres, coordinates are in the world frame.
+/// Lengths are in metres, coordinates in the world frame.
 #[derive(Debug, Parser)]
 #[command(name = "voxtile", version, propagate_version = true, max_term_width = 80)]
 pub struct Cli {
     #[command(subcommand)]
     pub command: Command,
-    /// Most threads to work with; the result is the same for any number [default: one a core]
+    /// Maximum number of worker threads; the result is the same for any number [default: one per core]
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
-    /// Say what is done: -v flushes and the like, -vv each tile that comes and goes. RUST_LOG chooses by module
+    /// Log flushes and other steps; -vv also logs each tile read or written. RUST_LOG selects by module
     #[arg(short, long, global = true, action = clap::ArgAction::Count)]
     pub verbose: u8,
-    /// Print nothing but errors, answers and JSON: no warnings, summaries or progress bars
+    /// Print only errors, results and JSON: no warnings, summaries or progress bars
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     pub quiet: bool,
-    /// Fail a bucket request after this many seconds without progress (16 KiB transferred, or an answer); an upload
-    /// after twice as many [default:
-    /// VOXTILE_BUCKET_TIMEOUT, or 60]
+    /// Fail a bucket request after this many seconds without progress (16 KiB transferred or a response), an upload
+    /// after twice as many [default: VOXTILE_BUCKET_TIMEOUT, or 60]
     #[cfg(feature = "bucket")]
     #[arg(long, global = true, value_name = "SECONDS", value_parser = bucket::timeout_of)]
     pub bucket_timeout: Option<Duration>,
 }
 
 impl Cli {
-    /// What the command line says of the log; warnings if nothing.
+    /// Log level from `--quiet` and `--verbose`; warnings by default.
     pub fn log_level(&self) -> LevelFilter {
         match (self.quiet, self.verbose) {
             (true, _) => LevelFilter::Error,
@@ -70,93 +70,90 @@ impl Cli {
 
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Build a map from scans, or add scans to one
+    /// Build a map from scans, or add scans to a map
     Build(BuildArgs),
-    /// Say what would be read of an input, or list the scans of a map
+    /// List the scans of an input or of a map
     Scans(ScansArgs),
-    /// Make a map of a file of OctoMap (.bt .ot)
+    /// Create a map from an OctoMap file (.bt .ot)
     Import(ImportArgs),
-    /// Say what a map holds
+    /// Print the properties of a map: grid, extent, inputs, sizes
     Info(InfoArgs),
-    /// Ask whether places are occupied, free or unknown
+    /// Print whether points are occupied, free or unknown
     Query(QueryArgs),
     /// Find the first occupied voxel on a ray
     Raycast(RaycastArgs),
-    /// Write a map's voxels to a file for other programs, or its surface, or its octree
+    /// Export voxels, their surface or the octree of a map to a file for other programs
     Export(ExportArgs),
-    /// Draw a map: from above, cut at a height, from a side, or what has changed; as PNG
+    /// Draw a map as PNG: from above, as a slice, from a side, or its changes
     Picture(PictureArgs),
-    /// Write a page about a map: pictures, numbers, histograms, damage; one file that needs no network
+    /// Write a report on a map with pictures, statistics and damage, as one HTML file
     Report(ReportArgs),
-    /// Print the digest of a map's content: equal for equal maps
+    /// Print the digest of a map's content; equal maps have equal digests
     Digest(DigestArgs),
-    /// Keep a map as it is under a name, at next to no cost; or delete such a snapshot
+    /// Create a snapshot of a map without copying its data, or delete one
     Snapshot(SnapshotArgs),
     /// List a map's snapshots
     Snapshots(SnapshotsArgs),
-    /// Say in what two maps differ, or two snapshots of a map
+    /// Compare two maps, or two snapshots of a map
     Diff(DiffArgs),
-    /// Make a map again what it was when a snapshot was made, in place
+    /// Restore a map to a snapshot, in place
     Revert(RevertArgs),
-    /// Make one map of several, without their snapshots and kept scans
+    /// Merge several maps into a new one, without their snapshots and kept scans
     Merge(MergeArgs),
-    /// Make a map of a part of another, without its snapshots and kept scans
+    /// Copy a part of a map to a new map, without its snapshots and kept scans
     Crop(CropArgs),
     /// Make a part of a map unknown, in place
     Clear(ClearArgs),
-    /// Let the evidence of a map fade by the scans that have come since, in place
+    /// Decay the log-odds of all voxels by the number of scans since the last decay, in place
     Decay(DecayArgs),
-    /// Give the scans that a map keeps new poses, and map again what that touches, in place; or make another map of the
-    /// same scans
+    /// Apply new poses to the scans that a map keeps, in place, or build another map from these scans
     Remap(RemapArgs),
-    /// Take scans out of a map that keeps them, as if they had never been, in place
+    /// Remove scans from a map that keeps its scans, as if they had never been added, in place
     RemoveScans(RemoveScansArgs),
-    /// Take all points in a box out of the scans that a map keeps, and map again what their rays touched, in place
+    /// Remove all points in a box from the scans that a map keeps and rebuild the affected tiles, in place
     RemovePoints(RemovePointsArgs),
-    /// Write a map anew with another storage: small, or as other programs read it; the content stays, to the bit, and
-    /// snapshots and kept scans are not taken along
+    /// Copy a map to a new map with another storage format and the same content, without its snapshots and kept scans
     Convert(ConvertArgs),
-    /// Copy a map into a bucket of an object store; only what has changed since the last push is sent
+    /// Upload a map to a bucket of an object store; sends only changes since the last push
     #[cfg(feature = "bucket")]
     Push(PushArgs),
     /// Not in this build
     #[cfg(not(feature = "bucket"))]
     #[command(hide = true, disable_help_flag = true)]
     Push(LeftOutArgs),
-    /// Make a map in a folder of one in a bucket
+    /// Download a map from a bucket to a folder
     #[cfg(feature = "bucket")]
     Pull(PullArgs),
     /// Not in this build
     #[cfg(not(feature = "bucket"))]
     #[command(hide = true, disable_help_flag = true)]
     Pull(LeftOutArgs),
-    /// Check every file of a map for damage; exit code 1 if there is any
+    /// Check every file of a map for damage; exit code 1 if any is damaged
     Verify(VerifyArgs),
-    /// Do what is possible for a damaged map; what cannot stay goes to quarantine/, nothing is deleted; exit code 1 if
-    /// there is such a thing
+    /// Repair a damaged map; unrecoverable files move to quarantine/; exit code 1 if data is lost or still damaged
     Repair(RepairArgs),
-    /// Look at maps in a browser: a server on this machine, and a page that needs no network
+    /// Show maps in a browser with a local server; needs no network
     #[cfg(feature = "view")]
     View(ViewArgs),
     /// Not in this build
     #[cfg(not(feature = "view"))]
     #[command(hide = true, disable_help_flag = true)]
     View(LeftOutArgs),
-    /// Run scans through a local map, as a planner needs it: sizes and times in a table, and a picture
+    /// Run scans through a local map for planning; prints sizes and times, and draws a picture
     Local(LocalArgs),
-    /// Share what is occupied with other robots over a network; runs voxtile-share, which comes separately
+    /// Share occupied space with other robots over a network; runs voxtile-share, which is installed separately
     #[command(disable_help_flag = true)]
     Share(ShareArgs),
-    /// Map a small made-up city and draw it: a first look, no data needed
+    /// Map a small synthetic city and draw it; needs no data
     Demo(DemoArgs),
-    /// Print the completion script of a shell
+    /// Print a completion script for a shell
     Completions(CompletionsArgs),
-    /// Write the man pages into a folder
+    /// Write the man pages to a folder
     Man(ManArgs),
 }
 
 impl Command {
-    /// Whether it was asked for JSON.
+    /// Returns whether `--json` is set.
     pub fn is_json(&self) -> bool {
         match self {
             Self::Build(args) => args.json,
@@ -178,9 +175,9 @@ impl Command {
             Self::Clear(args) => args.json,
             Self::Decay(args) => args.json,
             Self::Convert(args) => args.json,
-            Self::Remap(args) => args.rework.json,
-            Self::RemoveScans(args) => args.rework.json,
-            Self::RemovePoints(args) => args.rework.json,
+            Self::Remap(args) => args.replay.json,
+            Self::RemoveScans(args) => args.replay.json,
+            Self::RemovePoints(args) => args.replay.json,
             #[cfg(feature = "bucket")]
             Self::Push(args) => args.json,
             #[cfg(feature = "bucket")]
@@ -195,7 +192,7 @@ impl Command {
             Self::View(args) => args.is_json(),
             Self::Local(args) => args.json,
             Self::Demo(args) => args.json,
-            // What voxtile-share is asked for is its own to say.
+            // voxtile-share parses its own arguments.
             Self::Share(_) | Self::Completions(_) | Self::Man(_) => false,
         }
     }
@@ -222,15 +219,15 @@ pub enum ColorName {
     Height,
     /// Highest probability in the column
     Probability,
-    /// Most observations of a voxel in the column
+    /// Highest observation count of a voxel in the column
     Count,
-    /// Number of the scan after which its tile was last flushed
+    /// Number of the last scan in the tile's latest flush
     LastScan,
 }
 
 #[derive(Debug, Args)]
 pub struct ShareArgs {
-    /// Handed to voxtile-share as they are; --help lists them
+    /// Arguments of voxtile-share; --help lists them
     #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
     pub arguments: Vec<OsString>,
 }
@@ -238,13 +235,13 @@ pub struct ShareArgs {
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 pub struct ScansArgs {
-    /// An input as for build, a map, or MAP@SNAPSHOT; nothing is mapped
+    /// Input of scans as in build, a map, or MAP@SNAPSHOT
     #[arg(value_name = "DATA")]
     pub data: PathBuf,
     /// List each scan: number, time stamp in seconds, origin in metres, points, name
     #[arg(long)]
     pub each: bool,
-    /// Print JSON; with --each one object a scan, and the summary last
+    /// Print the result as JSON; with --each, one object per scan and then the summary
     #[arg(long)]
     pub json: bool,
     #[command(flatten)]
@@ -253,45 +250,41 @@ pub struct ScansArgs {
 
 #[derive(Debug, Args)]
 pub struct ImportArgs {
-    /// A file of OctoMap: .bt has free and occupied voxels, .ot their log-odds
+    /// OctoMap file: .bt with free and occupied voxels, or .ot with log-odds
     pub file: PathBuf,
-    /// Folder of the new map, which does not exist yet
-    #[arg(short = 'o', long = "output", value_name = "MAP")]
+    #[arg(short = 'o', long = "output", value_name = "MAP", help = help::NEW_MAP)]
     pub output: PathBuf,
-    /// How the tiles of the map are stored
-    #[arg(long, value_name = "FORM", default_value = "octomap")]
+    #[arg(long, value_name = "FORM", default_value = "octomap", help = help::STORAGE)]
     pub storage: StorageName,
-    /// Refuse a file that stands for more voxels: pruned cubes of a few bytes can stand for 2^48
+    /// Refuse a file that expands to more voxels than this; a few bytes can represent up to 2^48
     #[arg(long, value_name = "N", default_value_t = 1 << 32)]
     pub max_voxels: u64,
-    /// Print JSON; sizes in bytes
-    #[arg(long)]
+    #[arg(long, help = help::JSON)]
     pub json: bool,
 }
 
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 pub struct InfoArgs {
-    /// Folder of the map, FOLDER@SNAPSHOT, or an OctoMap file (.bt .ot)
+    #[arg(help = help::ANY_MAP)]
     pub map: PathBuf,
-    /// Print JSON
-    #[arg(long)]
+    #[arg(long, help = help::JSON)]
     pub json: bool,
 }
 
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 pub struct QueryArgs {
-    /// Folder of the map, FOLDER@SNAPSHOT, or an OctoMap file (.bt .ot)
+    #[arg(help = help::ANY_MAP)]
     pub map: PathBuf,
-    /// A point: X Y Z in metres
+    /// Point to query: X Y Z in metres
     #[arg(value_names = ["X", "Y", "Z"], num_args = 3, required_unless_present = "points")]
     pub point: Vec<f64>,
-    /// A file of points, one a line: x y z in metres, separated by blanks, commas, semicolons or tabs; - for standard
-    /// input
+    /// File of points to query, one x y z per line in metres, separated by blanks, commas, semicolons or tabs; - is
+    /// standard input
     #[arg(long, value_name = "FILE", conflicts_with = "point")]
     pub points: Option<PathBuf>,
-    /// Print JSON, one object a line
+    /// Print the result as JSON, one object per line
     #[arg(long)]
     pub json: bool,
 }
@@ -299,65 +292,58 @@ pub struct QueryArgs {
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 pub struct RaycastArgs {
-    /// Folder of the map, FOLDER@SNAPSHOT, or an OctoMap file (.bt .ot)
+    #[arg(help = help::ANY_MAP)]
     pub map: PathBuf,
-    /// Where the ray begins, in metres
+    /// Start of the ray, in metres
     #[arg(long, value_names = ["X", "Y", "Z"], num_args = 3, required = true)]
     pub origin: Vec<f64>,
-    /// Where it goes; any length but 0
+    /// Direction of the ray; any length except 0
     #[arg(long, value_names = ["X", "Y", "Z"], num_args = 3, required = true)]
     pub direction: Vec<f64>,
-    /// How far it goes, in metres [default: as far as the map reaches]
+    /// Maximum length of the ray, in metres [default: to the boundary of the map]
     #[arg(long, value_name = "M")]
     pub max_range: Option<f64>,
-    /// Let unknown space stop the ray
+    /// Stop the ray at unknown space
     #[arg(long)]
     pub unknown_blocks: bool,
-    /// Print JSON
-    #[arg(long)]
+    #[arg(long, help = help::JSON)]
     pub json: bool,
 }
 
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 pub struct DigestArgs {
-    /// Folder of the map, FOLDER@SNAPSHOT, or an OctoMap file (.bt .ot)
+    #[arg(help = help::ANY_MAP)]
     pub map: PathBuf,
-    /// Print JSON
-    #[arg(long)]
+    #[arg(long, help = help::JSON)]
     pub json: bool,
 }
 
 #[derive(Debug, Args)]
 pub struct VerifyArgs {
-    /// Folder of the map, whose snapshots are checked too; a writer may be at work on it
+    /// Folder of the map; its snapshots are checked too. Another process may be writing to it
     pub map: PathBuf,
-    /// Print JSON
-    #[arg(long)]
+    #[arg(long, help = help::JSON)]
     pub json: bool,
 }
 
 #[derive(Debug, Args)]
 pub struct ConvertArgs {
-    /// Folder of the map, or FOLDER@SNAPSHOT
+    #[arg(help = help::MAP_OR_SNAPSHOT)]
     pub map: PathBuf,
-    /// Folder of the new map, which does not exist yet
-    #[arg(short = 'o', long = "output", value_name = "MAP")]
+    #[arg(short = 'o', long = "output", value_name = "MAP", help = help::NEW_MAP)]
     pub output: PathBuf,
-    /// How the tiles of the new map are stored
-    #[arg(long, value_name = "FORM")]
+    #[arg(long, value_name = "FORM", help = help::STORAGE)]
     pub storage: StorageName,
-    /// Print JSON; sizes in bytes
-    #[arg(long)]
+    #[arg(long, help = help::JSON)]
     pub json: bool,
 }
 
 #[derive(Debug, Args)]
 pub struct RepairArgs {
-    /// Folder of the map
+    #[arg(help = help::MAP)]
     pub map: PathBuf,
-    /// Print JSON
-    #[arg(long)]
+    #[arg(long, help = help::JSON)]
     pub json: bool,
 }
 
@@ -367,26 +353,22 @@ pub struct DemoArgs {
     /// Folder for the map and the picture
     #[arg(long, value_name = "DIR", default_value = "voxtile_demo")]
     pub out: PathBuf,
-    /// Which city
+    /// Random seed of the city
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
-    /// Length of the drive in metres, a scan every two metres
+    /// Length of the drive, in metres; one scan every two metres
     #[arg(long, value_name = "M", default_value_t = 400)]
     pub length: u32,
-    /// Edge of a voxel in metres
-    #[arg(long, value_name = "M", default_value_t = 0.2)]
+    #[arg(long, value_name = "M", default_value_t = 0.2, help = help::RESOLUTION)]
     pub resolution: f64,
-    /// How the tiles of the map are stored
-    #[arg(long, value_name = "FORM", default_value = "octomap")]
+    #[arg(long, value_name = "FORM", default_value = "octomap", help = help::STORAGE)]
     pub storage: StorageName,
-    /// What the colors of the picture show
-    #[arg(long, value_name = "WHAT", default_value = "height")]
+    #[arg(long, value_name = "WHAT", default_value = "height", help = help::COLOR)]
     pub color: ColorName,
-    /// Most tiles kept in memory
+    /// Maximum number of tiles in memory
     #[arg(long, value_name = "N", default_value_t = 24)]
     pub cache_tiles: usize,
-    /// Print the summary as JSON
-    #[arg(long)]
+    #[arg(long, help = help::JSON)]
     pub json: bool,
     #[command(flatten)]
     pub octree: OctreeArgs,
@@ -394,13 +376,13 @@ pub struct DemoArgs {
 
 #[derive(Debug, Args)]
 pub struct CompletionsArgs {
-    /// Shell that reads the script
+    /// Shell of the script
     pub shell: Shell,
 }
 
 #[derive(Debug, Args)]
 pub struct ManArgs {
-    /// Folder of the pages; made if it is absent
+    /// Folder of the pages; created if missing
     #[arg(short = 'o', long = "output", value_name = "FOLDER")]
     pub output: PathBuf,
 }

@@ -4,7 +4,7 @@ use crate::octree_choice::octree_config;
 use crate::part::region_of;
 use crate::progress::at_terminal;
 use crate::read_options::read_options;
-use crate::run::{INTERRUPTED, say};
+use crate::run::{INTERRUPTED, print_message};
 use crate::{stop_signal, summary};
 use bytesize::ByteSize;
 use std::process::ExitCode;
@@ -17,27 +17,28 @@ pub fn run(args: &BuildArgs) -> anyhow::Result<ExitCode> {
     let (interrupted, all) = (built.interrupted, built.resumed_after + built.scans);
     summary::print(built, args.json)?;
     if interrupted {
-        say(format_args!("stopped after {all} scans; all of them are in the map; --resume goes on"));
+        print_message(format_args!(
+            "stopped after {all} scans; all of them are in the map; continue with --resume"
+        ));
         return Ok(ExitCode::from(INTERRUPTED));
     }
     Ok(ExitCode::SUCCESS)
 }
 
-/// It was asked to stop while nothing had been mapped.
+/// Reports a stop before the first scan was mapped.
 fn stopped_early(args: &BuildArgs) -> ExitCode {
-    let message = "stopped before the first scan; the map is as it was";
-    JsonTo::output_if(args.json).tell_stopped(message);
+    let message = "stopped before the first scan; the map has not changed";
+    JsonTo::output_if(args.json).report_stopped(message);
     ExitCode::from(INTERRUPTED)
 }
 
-/// The limit of `--memory`, or the default.
+/// Returns the limit of `--memory`, or the default.
 pub fn memory_of(memory: Option<ByteSize>) -> MemoryLimit {
     memory.map_or(MemoryLimit::Default, |memory| {
         MemoryLimit::Bytes(usize::try_from(memory.as_u64()).unwrap_or(usize::MAX))
     })
 }
 
-/// What the command line asks for.
 fn options_of(args: &BuildArgs) -> voxtile::Result<BuildOptions> {
     let mut options = BuildOptions::new(&args.scans, &args.output);
     options.read = read_options(&args.read)?;

@@ -39,7 +39,7 @@ pub fn run(args: &ClearArgs) -> anyhow::Result<ExitCode> {
         )?;
         writeln!(
             out,
-            "tiles     {}; {} are empty now and gone",
+            "tiles     {}; {} became empty and were removed",
             HumanCount(tiles),
             HumanCount(tiles_removed)
         )?;

@@ -4,7 +4,7 @@ use std::io::Write;
 use std::process::ExitCode;
 
 pub fn run(args: &CompletionsArgs) -> anyhow::Result<ExitCode> {
-    // Into memory first: the generator panics where it cannot write.
+    // Generate into memory first, because the generator panics on write errors.
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut Cli::command(), "voxtile", &mut script);
     std::io::stdout().lock().write_all(&script)?;

@@ -16,7 +16,6 @@ use voxtile::operations::{WrittenMap, convert};
 use voxtile::{Result, Storage};
 use voxtile_pipeline::memory;
 
-/// What became of what.
 #[derive(Serialize)]
 struct Conversion<'a> {
     from: Form<'a>,
@@ -30,13 +29,12 @@ struct Conversion<'a> {
     peak_rss_bytes: Option<u64>,
 }
 
-/// A map, and how it is stored.
 #[derive(Serialize)]
 struct Form<'a> {
     #[serde(serialize_with = "voxtile::path_text::serialize")]
     map: &'a Path,
     storage: Storage,
-    /// `None` for a map of the original format, which does not say.
+    /// `None` for a map of the original format, which does not record it.
     table_bytes: Option<u64>,
     octree_bytes: Option<u64>,
 }

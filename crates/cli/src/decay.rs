@@ -34,12 +34,12 @@ pub fn run(args: &DecayArgs) -> anyhow::Result<ExitCode> {
         let Decayed { scans, factor, voxels, voxels_forgotten, tiles, tiles_removed, .. } = decayed;
         writeln!(out, "decayed   by {} scans: log-odds times {factor:.6}", HumanCount(scans))?;
         if scans == 0 {
-            writeln!(out, "          the map has taken none since it last faded; --scans N names a number")?;
+            writeln!(out, "          no scans since the last decay; --scans N sets the number")?;
         }
         writeln!(out, "voxels    {}; {} forgotten", HumanCount(voxels), HumanCount(voxels_forgotten))?;
         writeln!(
             out,
-            "tiles     {}; {} are empty now and gone",
+            "tiles     {}; {} became empty and were removed",
             HumanCount(tiles),
             HumanCount(tiles_removed)
         )?;

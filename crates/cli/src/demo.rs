@@ -19,14 +19,14 @@ use voxtile_pipeline::Summary;
 use voxtile_render::Picture;
 use voxtile_simulation::{City, Drive, Lidar, Survey};
 
-/// From scan to scan.
+/// Distance between scans.
 const SPACING_M: u32 = 2;
 
 pub fn run(args: &DemoArgs) -> anyhow::Result<ExitCode> {
     let started = Instant::now();
     let stop = stop_signal::catch()?;
     let map = args.out.join("map_tiles");
-    // Few tiles and little room for what waits, so that the demo shows the disk at work.
+    // Small limits, so that the demo pages tiles to disk.
     let config = MapConfig::new(args.resolution, 10.0)?
         .with_range(0.0, 40.0)
         .with_octree(octree_config(&args.octree)?)
@@ -46,7 +46,7 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<ExitCode> {
         path.push(scan.origin);
         progress.step();
         if number < done {
-            // In the map already; the picture wants to know where it was taken.
+            // In the map already; only its position is needed, for the picture.
             continue;
         }
         match mapper.insert_scan(&scan) {
@@ -57,14 +57,15 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<ExitCode> {
         inserted += 1;
         progress.show(&|| mapper.statistics());
     }
-    progress.say("flushing");
+    progress.show_message("flushing");
     mapper.flush()?;
     drop(progress);
     if stop.is_set() {
         let all = done + inserted;
-        let message =
-            format!("stopped after {all} scans; all of them are in the map; the same command goes on");
-        JsonTo::output_if(args.json).tell_stopped(&message);
+        let message = format!(
+            "stopped after {all} scans; all of them are in the map; run the same command to continue"
+        );
+        JsonTo::output_if(args.json).report_stopped(&message);
         return Ok(ExitCode::from(INTERRUPTED));
     }
     let mut built = Summary::of(&map, inserted, report, &mapper, started.elapsed())?;
@@ -75,12 +76,12 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<ExitCode> {
     let picture = args.out.join("map.png");
     draw(args, &map, &path, &picture)?;
     if !args.json {
-        say_what_next(&args.out, &map, &picture, path.first().copied().unwrap_or_default())?;
+        print_next_steps(&args.out, &map, &picture, path.first().copied().unwrap_or_default())?;
     }
     Ok(ExitCode::SUCCESS)
 }
 
-/// Begins the demo's map, or goes on with one that was interrupted; returns how many of its scans are there.
+/// Creates the demo's map or resumes an interrupted one; returns it with the number of its scans.
 fn begin(args: &DemoArgs, map: &Path, config: MapConfig) -> anyhow::Result<(OutOfCoreTileMapper, u64)> {
     let name = format!("demo city {} over {} m", args.seed, args.length);
     let mut mapper = match MapReader::open(map, 0) {
@@ -99,11 +100,11 @@ fn begin(args: &DemoArgs, map: &Path, config: MapConfig) -> anyhow::Result<(OutO
 
 fn another_demo(map: &Path) -> Error {
     let hint =
-        "the demo goes on only with its own map of the same options; remove it or choose another --out";
+        "the demo resumes only its own map with the same options; remove the map or choose another --out";
     Error::AlreadyExists { path: map.to_owned(), hint }
 }
 
-/// Draws a map on disk from above, tile by tile, and the way of the sensor.
+/// Draws a map and the trajectory from above, tile by tile.
 fn draw(args: &DemoArgs, map: &Path, path: &[Point], file: &Path) -> anyhow::Result<()> {
     let reader = MapReader::open(map, 0)?;
     let grid = reader.config().grid;
@@ -113,11 +114,11 @@ fn draw(args: &DemoArgs, map: &Path, path: &[Point], file: &Path) -> anyhow::Res
     write_png(&picture.draw(&reader, |_, _| {})?, file)
 }
 
-fn say_what_next(folder: &Path, map: &Path, picture: &Path, [x, y, z]: Point) -> std::io::Result<()> {
+fn print_next_steps(folder: &Path, map: &Path, picture: &Path, [x, y, z]: Point) -> std::io::Result<()> {
     let mut out = summary_out(false);
     let (folder, map) = (folder.display(), map.display());
     writeln!(out, "picture   {}", picture.display())?;
-    writeln!(out, "\nWhat to try next:")?;
+    writeln!(out, "\nNext steps:")?;
     writeln!(out, "  voxtile info {map}")?;
     writeln!(out, "  voxtile query {map} {x:.1} {y:.1} {z:.1}")?;
     writeln!(out, "  voxtile raycast {map} --origin {x:.1} {y:.1} {z:.1} --direction 0 1 0")?;

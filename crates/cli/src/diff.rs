@@ -23,7 +23,7 @@ struct Report {
     peak_rss_bytes: Option<u64>,
 }
 
-/// One of the two.
+/// One side of the comparison.
 #[derive(Serialize)]
 struct Side {
     #[serde(serialize_with = "voxtile::path_text::serialize")]
@@ -66,7 +66,7 @@ fn sides(sides: &[PathBuf]) -> voxtile::Result<[MapAt; 2]> {
     match sides {
         [map, from, to] => Ok([side(map, from)?, side(map, to)?]),
         [from, to] => Ok([MapAt::of(from)?, MapAt::of(to)?]),
-        _ => Err(voxtile::Error::argument("MAP", "two maps, or a map and two of its snapshots")),
+        _ => Err(voxtile::Error::argument("MAP", "give two maps, or a map and two of its snapshots")),
     }
 }
 
@@ -94,13 +94,13 @@ impl Report {
         writeln!(out, "to        {}", self.to.name())?;
         writeln!(
             out,
-            "tiles     {} appeared, {} gone, {} changed, {} equal",
+            "tiles     {} appeared, {} removed, {} changed, {} equal",
             HumanCount(tiles_appeared),
             HumanCount(tiles_gone),
             HumanCount(tiles_changed),
             HumanCount(tiles_equal)
         )?;
-        writeln!(out, "voxels    {} appeared, {} gone", HumanCount(appeared), HumanCount(gone))?;
+        writeln!(out, "voxels    {} appeared, {} removed", HumanCount(appeared), HumanCount(gone))?;
         writeln!(
             out,
             "flipped   {} from free to occupied, {} from occupied to free",

@@ -15,7 +15,7 @@ use voxtile_pipeline::{
     ExportOptions, ExportSummary, ExportedScans, POSES_NAME, WhichVoxels, Written, export, export_scans,
 };
 
-/// Writes the file and says what it is unless `is_quiet`; on standard error where standard output is the file.
+/// Writes the file and prints a summary unless `is_quiet`, on standard error if the file is standard output.
 pub fn run(args: &ExportArgs, is_quiet: bool) -> anyhow::Result<ExitCode> {
     let watch = at_terminal(stop_signal::catch_unfinished()?);
     if let Some(folder) = &args.scans {
@@ -26,7 +26,7 @@ pub fn run(args: &ExportArgs, is_quiet: bool) -> anyhow::Result<ExitCode> {
     let options = options_of(args)?;
     let is_stream = is_standard_output(&options.output);
     if is_stream && !options.checked_format()?.is_text && io::stdout().is_terminal() {
-        let reason = "standard output is a terminal; send it to a file or a pipe";
+        let reason = "standard output is a terminal; redirect it to a file or a pipe";
         return Err(Error::argument("output", reason).into());
     }
     let summary = export(&options, &watch)?;
@@ -39,7 +39,6 @@ pub fn run(args: &ExportArgs, is_quiet: bool) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// What the command line asks for.
 fn options_of(args: &ExportArgs) -> voxtile::Result<ExportOptions> {
     let mut options = ExportOptions::new(&args.map, &args.output);
     options.format.clone_from(&args.format);
@@ -80,18 +79,18 @@ fn text_of(summary: &ExportSummary) -> String {
     match &summary.written {
         Written::Stream { origin_m: [x, y, z], origin_voxel, origin_file, asked_m } => {
             if *origin_voxel != [0; 3] || asked_m.is_some() {
-                text += &format!("origin {x} {y} {z} m: to be added to the file's coordinates");
+                text += &format!("origin {x} {y} {z} m: add it to the file's coordinates");
                 if let Some([x, y, z]) = asked_m {
-                    text += &format!("; the voxel's corner next to {x} {y} {z}");
+                    text += &format!("; the voxel corner nearest to {x} {y} {z}");
                 }
                 if let Some(path) = origin_file {
-                    text += &format!("; {} says so, too", path.display());
+                    text += &format!("; also in {}", path.display());
                 }
                 text.push('\n');
             }
         }
         Written::Files { files_beside, .. } => {
-            files_beside.iter().for_each(|path| text += &format!("beside it {}\n", path.display()));
+            files_beside.iter().for_each(|path| text += &format!("also wrote {}\n", path.display()));
         }
         Written::Tileset { nodes, .. } => {
             text = format!("{voxels} voxels in {} nodes in {file}/tileset.json\n", HumanCount(*nodes));
@@ -105,7 +104,7 @@ fn text_of_scans(exported: &ExportedScans, folder: &Path) -> String {
     let mut text =
         format!("exported  {scans} scans, {points} points, and {POSES_NAME}, to {}\n", folder.display());
     if exported.world_frame {
-        text += "note      the points are in the world frame: build them with --world-frame\n";
+        text += "note      the points are in the world frame: use --world-frame in build\n";
     }
     text
 }

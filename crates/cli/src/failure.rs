@@ -1,25 +1,25 @@
 use crate::args::Command;
 use crate::json;
 use crate::option_names::{option_of, with_options};
-use crate::run::{INTERRUPTED, say};
+use crate::run::{INTERRUPTED, print_message};
 use serde::Serialize;
 use std::io;
 use std::process::ExitCode;
 use voxtile::{Error, Place};
 use voxtile_pipeline::output::is_standard_output;
 
-/// Where a command that fails says so for a program, beside the line for a person.
+/// Destination of the JSON object for an error, in addition to the text on standard error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum JsonTo {
-    /// Nowhere: it was not asked for.
+    /// No JSON was requested.
     Nowhere,
-    /// Standard output, where the answer would be.
+    /// Standard output, in place of the result.
     Output,
-    /// Standard error, because standard output is for a file.
+    /// Standard error, because standard output is the output file.
     Error,
 }
 
-/// What a program gets to know of a failure; what does not apply is missing.
+/// JSON object of an error, without fields that do not apply.
 #[derive(Serialize)]
 struct Failure<'a> {
     kind: &'a str,
@@ -39,7 +39,7 @@ struct Failure<'a> {
 }
 
 impl JsonTo {
-    /// What the command line asks for.
+    /// Returns the destination for a command line.
     pub fn of(command: &Command) -> Self {
         match command {
             Command::Export(args)
@@ -53,32 +53,32 @@ impl JsonTo {
         }
     }
 
-    /// Standard output, if it was asked for.
+    /// Returns standard output if JSON is requested.
     pub fn output_if(json: bool) -> Self {
         if json { Self::Output } else { Self::Nowhere }
     }
 
-    /// Says that a command failed, and returns its exit code.
-    pub fn tell(self, error: &anyhow::Error) -> ExitCode {
+    /// Reports an error and returns its exit code.
+    pub fn report(self, error: &anyhow::Error) -> ExitCode {
         if is_closed_pipe(error) {
             return ExitCode::SUCCESS;
         }
         let message = message_of(error);
-        say(format_args!("{message}"));
+        print_message(format_args!("{message}"));
         let known = error.downcast_ref::<Error>();
         self.print(&Failure::of(known, &message));
         exit_code_of(known)
     }
 
-    /// Says that a command was stopped before it had anything to print.
-    pub fn tell_stopped(self, message: &str) {
-        say(format_args!("{message}"));
+    /// Reports a stop before the command has a result.
+    pub fn report_stopped(self, message: &str) {
+        print_message(format_args!("{message}"));
         self.print(&Failure::of(Some(&Error::Stopped), message));
     }
 
     fn print(self, failure: &Failure) {
         let object = serde_json::json!({ "error": failure });
-        // Where it is refused there is nobody to tell.
+        // A failed write cannot be reported.
         let _ = match self {
             Self::Nowhere => Ok(()),
             Self::Output => json::print(&object, &mut io::stdout().lock()),
@@ -107,7 +107,8 @@ impl<'a> Failure<'a> {
     }
 }
 
-/// The error with its causes, and fields as options. Of files and programs, errors tell the name.
+/// Returns the error with its causes and with options in place of field names. A bare I/O error concerns standard
+/// output, because errors of files and programs contain their names.
 pub fn message_of(error: &anyhow::Error) -> String {
     if let Some(error) = error.chain().next().and_then(|first| first.downcast_ref::<io::Error>()) {
         return format!("standard output: cannot write: {error}");
@@ -121,7 +122,7 @@ pub fn message_of(error: &anyhow::Error) -> String {
     causes.collect::<Vec<_>>().join(": ")
 }
 
-/// 2 for what the user can put right on the command line, 1 for everything else.
+/// Returns 2 for errors that the user can fix on the command line, 1 for all others.
 fn exit_code_of(error: Option<&Error>) -> ExitCode {
     match error {
         Some(
@@ -135,7 +136,8 @@ fn exit_code_of(error: Option<&Error>) -> ExitCode {
     }
 }
 
-/// `voxtile ... | head` is no error; a reader of another pipe, which the error names, is.
+/// Returns whether the reader of standard output is gone, as in `voxtile ... | head`. Errors of other pipes name their
+/// file.
 fn is_closed_pipe(error: &anyhow::Error) -> bool {
     error
         .chain()

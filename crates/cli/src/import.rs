@@ -14,7 +14,6 @@ use voxtile_pipeline::memory;
 use voxtile_pipeline::octree_file;
 use voxtile_pipeline::whole_map;
 
-/// What became of a file.
 #[derive(Serialize)]
 struct Imported<'a> {
     #[serde(serialize_with = "voxtile::path_text::serialize")]
@@ -23,7 +22,7 @@ struct Imported<'a> {
     map: &'a Path,
     resolution_m: f64,
     tile_size_m: f64,
-    /// Finest voxels that the file's leaves stand for.
+    /// Number of voxels at full resolution after expansion of the leaves.
     expanded_voxels: u64,
     #[serde(flatten)]
     written: WrittenMap,
@@ -37,7 +36,7 @@ pub fn run(args: &ImportArgs) -> anyhow::Result<ExitCode> {
     let most = args.max_voxels;
     if expanded_voxels > most {
         let reason = format!(
-            "its leaves stand for {expanded_voxels} voxels, more than --max-voxels {most}; each takes some 4 bytes of disk \
+            "expands to {expanded_voxels} voxels, more than --max-voxels {most}; each takes about 4 bytes of disk \
              or less in compact storage, 18 in octomap storage"
         );
         return Err(Error::argument(args.file.display().to_string(), reason).into());

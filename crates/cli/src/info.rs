@@ -14,10 +14,10 @@ use voxtile::store::{Bounds, InputRecord, MapPath};
 use voxtile::{MapQueries, Result, Storage};
 use voxtile_pipeline::read_map;
 
-/// Inputs that are shown to people; JSON has them all.
+/// Maximum number of inputs in text; JSON lists all.
 const INPUTS_SHOWN: usize = 5;
 
-/// What the map knows of itself, without reading a tile.
+/// Properties of a map from its metadata, without reading tiles.
 #[derive(Debug, Serialize)]
 pub struct Info {
     pub map_id: Option<String>,
@@ -29,13 +29,12 @@ pub struct Info {
     pub storage: Storage,
     pub scan_number: u64,
     pub flush_number: u64,
-    /// What it was built from, the latest last.
     pub crs: Option<String>,
     pub inputs: Vec<InputRecord>,
-    /// Number of the last scan when evidence last faded; 0 if it never has.
+    /// Number of the last scan at the latest decay; 0 without decay.
     pub decayed_scan: u64,
     pub tiles: u64,
-    /// The tiles that are mapped; missing where that is all of space.
+    /// Mapped tiles; absent if the region is all of space.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub region_tiles: Option<TileBox>,
     pub tile_bounds: Option<Bounds>,
@@ -44,7 +43,7 @@ pub struct Info {
     pub occupied: u64,
     pub table_bytes: u64,
     pub octree_bytes: u64,
-    /// What is kept beside the map as it is; `None` for a snapshot.
+    /// Data stored in addition to the current map; `None` for a snapshot.
     pub kept: Option<KeptBytes>,
 }
 
@@ -64,7 +63,7 @@ pub fn run(args: &InfoArgs) -> anyhow::Result<ExitCode> {
 }
 
 impl Info {
-    /// Asks a map.
+    /// Reads the properties of a map.
     pub fn of(reader: &MapReader) -> Result<Self> {
         let config = reader.config();
         let ext = reader.metadata().ext.as_ref();
@@ -107,10 +106,8 @@ impl Info {
     }
 
     fn print(&self, out: &mut impl Write) -> std::io::Result<()> {
-        let id = self
-            .map_id
-            .as_deref()
-            .unwrap_or("none: the original format, without checksums, cannot be verified");
+        let id =
+            self.map_id.as_deref().unwrap_or("none (original format without checksums, cannot be verified)");
         writeln!(out, "map id       {id}")?;
         writeln!(out, "resolution   {} m, tiles of {} m", self.resolution_m, self.tile_size_m)?;
         let model = self.sensor_model.name();
@@ -133,7 +130,7 @@ impl Info {
             writeln!(out, "crs          {crs:.100}")?;
         }
         if self.decayed_scan > 0 {
-            writeln!(out, "faded        last after scan {}", HumanCount(self.decayed_scan))?;
+            writeln!(out, "decayed      last after scan {}", HumanCount(self.decayed_scan))?;
         }
         writeln!(out, "tiles        {}", HumanCount(self.tiles))?;
         if let Some(Aabb { min, max }) = self.bounds_m {
@@ -148,20 +145,17 @@ impl Info {
         let Some(kept) = &self.kept else { return Ok(()) };
         if kept.snapshot_tables > 0 {
             let (bytes, tables) = (HumanBytes(kept.snapshot_bytes), HumanCount(kept.snapshot_tables));
-            writeln!(out, "snapshots    {bytes} in {tables} tables that only they see")?;
+            writeln!(out, "snapshots    {bytes} in {tables} tables used only by snapshots")?;
         }
         if kept.reader_tables > 0 {
             let (bytes, tables) = (HumanBytes(kept.reader_bytes), HumanCount(kept.reader_tables));
-            writeln!(
-                out,
-                "readers      {bytes} in {tables} tables that were flushed anew while somebody reads"
-            )?;
+            writeln!(out, "readers      {bytes} in {tables} older tables in use by readers")?;
         }
         Ok(())
     }
 }
 
-/// Observed and occupied voxels, tile by tile.
+/// Counts observed and occupied voxels, tile by tile.
 fn count(reader: &MapReader) -> Result<(u64, u64)> {
     let (mut voxels, mut occupied) = (0, 0);
     reader.for_each_occupied(Some(0.0), None, |_| voxels += 1)?;

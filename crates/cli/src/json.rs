@@ -1,9 +1,9 @@
-//! What `--json` prints: objects of one line, with the version of what their fields mean.
+//! Output of `--json`: one object per line, with the version of its fields.
 
 use serde::Serialize;
 use std::io::Write;
 
-/// Rises when a field goes or means something else; docs/json.md says what it promises.
+/// Incremented when a field is removed or changes its meaning; see docs/json.md.
 const VERSION: u32 = 1;
 
 #[derive(Serialize)]
@@ -13,7 +13,6 @@ struct Versioned<'a, T> {
     object: &'a T,
 }
 
-/// Prints an object.
 pub fn print(object: &impl Serialize, out: &mut impl Write) -> anyhow::Result<()> {
     let line = serde_json::to_string(&Versioned { version: VERSION, object })?;
     Ok(writeln!(out, "{line}")?)

@@ -1,7 +1,6 @@
-//! The command `voxtile`: parse, run one command, exit code.
+//! The command `voxtile`, one module per subcommand: parses options, calls the library and prints the result.
 //!
-//! One file a subcommand: it maps options to typed fields, calls what does the work, and prints. It is a library so that
-//! other programs can carry the command; the Python package does.
+//! It is a library so that other programs, such as the Python package, can embed the command.
 
 mod args;
 mod build;
@@ -42,9 +41,9 @@ mod remap;
 mod remove_points;
 mod remove_scans;
 mod repair;
+mod replay;
 mod report;
 mod revert;
-mod rework;
 mod run;
 mod scans;
 mod share;

@@ -14,15 +14,15 @@ use voxtile_pipeline::{LocalScans, Watch};
 use voxtile_pipeline::{is_standard_input, open_scans};
 use voxtile_render::{OverTime, Panel};
 
-/// Times at which the picture shows the map.
+/// Number of panels in the picture.
 const PANELS: usize = 6;
 
 pub fn run(args: &LocalArgs) -> anyhow::Result<ExitCode> {
     if is_standard_input(&args.scans) && args.repeat > 1 {
-        let reason = "scans from standard input come once: leave out --repeat, or give a file";
+        let reason = "scans from standard input can be read only once: omit --repeat, or give a file";
         return Err(Error::argument("SCANS", reason).into());
     }
-    // All arguments before the first scan.
+    // Check all arguments before the first scan.
     OutputFile::check_picture(&args.output)?;
     let (preset, parameters) = parameters(args);
     LocalMap::new(args.resolution, parameters)?;
@@ -30,7 +30,7 @@ pub fn run(args: &LocalArgs) -> anyhow::Result<ExitCode> {
     let mut panels = Vec::new();
     let mut row = run_scans(args, &input, Row::new(preset, &parameters), Some(&mut panels))?;
     for _ in 1..args.repeat {
-        row.take_least(&run_scans(args, &input, Row::new(preset, &parameters), None)?);
+        row.take_minimum(&run_scans(args, &input, Row::new(preset, &parameters), None)?);
     }
     row.finish();
     let title = format!("voxtile local: {} m voxels, setup {preset}", args.resolution);
@@ -49,7 +49,7 @@ pub fn run(args: &LocalArgs) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// The preset's name, and its parameters with what the arguments change.
+/// Returns the preset's name, and its parameters with the changes from the command line.
 fn parameters(args: &LocalArgs) -> (&'static str, LocalParameters) {
     let (name, mut parameters) = match args.preset {
         PresetName::Local => ("local", LocalParameters::local_mapping()),
@@ -67,7 +67,7 @@ fn parameters(args: &LocalArgs) -> (&'static str, LocalParameters) {
     (name, parameters)
 }
 
-/// The scans, which all runs read.
+/// Scans for all runs.
 struct Input {
     scans: LocalScans,
     watch: Watch,
@@ -113,13 +113,13 @@ fn run_scans(
     Ok(row)
 }
 
-/// Whether the picture shows the map after so many scans.
+/// Returns whether the picture has a panel after this number of scans.
 fn is_shown(number: usize, scans: Option<usize>) -> bool {
     let Some(scans) = scans else { return false };
     (1..=PANELS).any(|panel| number == (scans * panel).div_ceil(PANELS))
 }
 
-/// The next scan, in the world frame, with about so many points.
+/// Returns the next scan in the world frame, with about `points` points.
 fn next_scan(source: &mut dyn ScanSource, points: Option<u32>) -> voxtile::Result<Option<Scan>> {
     let Some(scan) = source.next_scan()? else { return Ok(None) };
     let mut scan = scan.into_scan();
@@ -131,7 +131,7 @@ fn next_scan(source: &mut dyn ScanSource, points: Option<u32>) -> voxtile::Resul
     Ok(Some(scan))
 }
 
-/// Seconds that this thread has worked: on a busy machine the time on the wall says little.
+/// Returns the processor time of this thread in seconds; the wall clock depends on other programs.
 fn cpu_seconds() -> f64 {
     let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
     time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9

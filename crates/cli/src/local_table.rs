@@ -3,7 +3,7 @@ use std::io::{self, Write};
 use std::time::Duration;
 use voxtile_local::{LocalMap, LocalParameters, LocalReport, StageTimes};
 
-/// What a run of scans through a map came to, in the terms of the voxel mapping paper.
+/// Results of a run of scans through a map, with the terms of the voxel mapping paper.
 #[derive(Debug, Serialize)]
 pub struct Row {
     pub setup: &'static str,
@@ -11,25 +11,25 @@ pub struct Row {
     pub scans: u64,
     pub points: u64,
     pub skipped: u64,
-    /// Voxels with occupancy at the end.
+    /// Number of voxels with occupancy at the end.
     pub n_occ: usize,
-    /// Inflated voxels, on average.
+    /// Mean number of inflated voxels.
     pub n_inf: f64,
-    /// Milliseconds of processor time an update.
+    /// Processor time of an update in milliseconds.
     pub cpu_ms: Distribution,
-    /// Milliseconds on the clock an update.
+    /// Wall-clock time of an update in milliseconds.
     pub t_tot_ms: Distribution,
-    /// Milliseconds on the clock of each stage, on average.
+    /// Mean wall-clock time of each stage in milliseconds.
     pub stages_ms: Stages,
-    /// Most bytes of memory.
+    /// Peak memory of the map in bytes.
     pub bytes: usize,
-    /// Bytes for each voxel in the occupancy or inflation map, at the end.
+    /// Bytes per voxel with occupancy or inflation, at the end.
     pub bytes_per_voxel: f64,
     #[serde(skip)]
     updates: Vec<Times>,
 }
 
-/// How long one update took, in milliseconds.
+/// Duration of an update in milliseconds.
 #[derive(Clone, Copy, Debug)]
 struct Times {
     cpu: f64,
@@ -37,7 +37,7 @@ struct Times {
     stages: Stages,
 }
 
-/// What is known of many times.
+/// Statistics of many durations.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Distribution {
     pub mean: f64,
@@ -45,7 +45,7 @@ pub struct Distribution {
     pub max: f64,
 }
 
-/// Mean of each stage.
+/// Mean duration of each stage.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Stages {
     pub input: f64,
@@ -56,7 +56,7 @@ pub struct Stages {
     pub publishing: f64,
 }
 
-/// Memory is counted, which takes a look at everything, after so many scans.
+/// Number of scans between two measurements of memory, which visit the whole map.
 const COUNT_EVERY: u64 = 16;
 
 impl Row {
@@ -81,7 +81,6 @@ impl Row {
         }
     }
 
-    /// Adds an update.
     pub fn add(&mut self, report: &LocalReport, cpu_seconds: f64, map: &LocalMap) {
         self.scans += 1;
         self.points += report.points;
@@ -94,7 +93,7 @@ impl Row {
         }
     }
 
-    /// Counts the memory of the map after the last update.
+    /// Measures the memory of the map after the last update.
     pub fn count_memory(&mut self, map: &LocalMap) {
         self.n_occ = map.stored_voxels();
         let bytes = map.bytes();
@@ -102,8 +101,8 @@ impl Row {
         self.bytes_per_voxel = bytes as f64 / map.voxels().max(1) as f64;
     }
 
-    /// Takes over the times of another run of the same scans, where they are less.
-    pub fn take_least(&mut self, other: &Self) {
+    /// Replaces times by those of another run of the same scans where these are shorter.
+    pub fn take_minimum(&mut self, other: &Self) {
         for (times, other) in self.updates.iter_mut().zip(&other.updates) {
             times.cpu = times.cpu.min(other.cpu);
             times.clock = times.clock.min(other.clock);
@@ -111,7 +110,7 @@ impl Row {
         }
     }
 
-    /// Turns sums and times into means.
+    /// Computes means and distributions from the updates.
     pub fn finish(&mut self) {
         let scans = self.scans.max(1) as f64;
         self.n_inf /= scans;
@@ -123,7 +122,7 @@ impl Row {
             self.updates.iter().fold(Stages::default(), |sum, times| sum.with(&times.stages, share));
     }
 
-    /// Prints the row for a person; times in milliseconds an update.
+    /// Prints the row as text; times in milliseconds per update.
     pub fn print(&self, out: &mut impl Write) -> io::Result<()> {
         writeln!(
             out,
@@ -189,7 +188,7 @@ impl Stages {
         }
     }
 
-    /// Stage by stage, what `join` makes of both.
+    /// Combines each stage of both with `join`.
     fn with(&self, other: &Self, join: impl Fn(f64, f64) -> f64) -> Self {
         Self {
             input: join(self.input, other.input),
@@ -229,7 +228,7 @@ mod tests {
             row
         };
         let mut least = row([1.0, 5.0]);
-        least.take_least(&row([4.0, 2.0]));
+        least.take_minimum(&row([4.0, 2.0]));
         least.finish();
         assert_eq!((least.cpu_ms.mean, least.cpu_ms.max, least.t_tot_ms.mean), (1.5, 2.0, 3.0));
         assert_eq!((least.stages_ms.rays, least.stages_ms.input), (1.5, 0.0));

@@ -4,7 +4,7 @@ use clap::CommandFactory;
 use std::fs;
 use std::process::ExitCode;
 
-/// Writes `voxtile.1`, and `voxtile-COMMAND.1` for each command.
+/// Writes `voxtile.1` and one `voxtile-COMMAND.1` per command.
 pub fn run(args: &ManArgs) -> anyhow::Result<ExitCode> {
     let folder = &args.output;
     let cannot = || format!("{}: cannot write the man pages", folder.display());

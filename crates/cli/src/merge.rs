@@ -51,7 +51,7 @@ pub fn run(args: &MergeArgs) -> anyhow::Result<ExitCode> {
         if merged.is_one_build {
             writeln!(
                 out,
-                "scans     those of each map: regions of one build, which build --resume goes on with"
+                "scans     those of each map: regions of one build, which build --resume can continue"
             )?;
         }
     }
@@ -62,7 +62,7 @@ fn warnings_of(maps: &[PathBuf], merged: &Merged) -> Vec<String> {
     let related = merged.related.iter().filter(|_| merged.is_added);
     let warning = |&(earlier, later): &(usize, usize)| {
         format!(
-            "{} and {} go back to the same map: evidence that both have counts twice; --prefer takes it once",
+            "{} and {} share history: common evidence counts twice; use --prefer to count it once",
             maps[earlier].display(),
             maps[later].display()
         )

@@ -15,7 +15,7 @@ struct Info {
     occupied_voxels: u64,
 }
 
-/// Says what an octree file holds; nothing is expanded for it.
+/// Prints the properties of an octree file without expanding it.
 pub fn print_info(path: &Path, json: bool, out: &mut impl Write) -> anyhow::Result<()> {
     let OctreeFile { tree, resolution_m, id, .. } = read(path)?;
     let voxels = tree.count_voxels(0.0);

@@ -1,9 +1,9 @@
-//! A shell makes many arguments of `drive_*.bag`; an input is one.
+//! Hint for arguments such as `drive_*.bag`: the shell expands them to several files, but a command takes one input.
 
 use clap::error::{ContextKind, ContextValue, Error, ErrorKind};
 use std::path::Path;
 
-/// An error of the command line, with what to do about several files where one input belongs.
+/// Adds a hint to a command-line error about several files given as one input.
 pub fn explained(mut error: Error) -> Error {
     let is_file = match error.get(ContextKind::InvalidArg) {
         Some(ContextValue::String(argument)) => Path::new(argument).exists(),

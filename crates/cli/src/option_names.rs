@@ -1,4 +1,4 @@
-//! The library names fields; the command line has options. `` `max_range` `` is `--max-range` here.
+//! Replaces field names in messages of the library by options: `` `max_range` `` becomes `--max-range`.
 
 use super::args::Cli;
 use clap::CommandFactory as _;
@@ -6,12 +6,12 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::sync::{LazyLock, OnceLock};
 
-/// The name of the subcommand that runs.
+/// Name of the running subcommand.
 static SUBCOMMAND: OnceLock<String> = OnceLock::new();
 
-/// The option of each field.
+/// Options of all subcommands by field name.
 static OPTIONS: LazyLock<BTreeMap<String, String>> = LazyLock::new(|| options_of(|_| true));
-/// The same, of the subcommand that runs.
+/// Options of the running subcommand by field name.
 static OWN_OPTIONS: LazyLock<BTreeMap<String, String>> =
     LazyLock::new(|| options_of(|subcommand| SUBCOMMAND.get().is_none_or(|name| name == subcommand)));
 
@@ -26,12 +26,12 @@ fn options_of(is_wanted: impl Fn(&str) -> bool) -> BTreeMap<String, String> {
     options
 }
 
-/// Says which subcommand runs, before anything is named.
+/// Sets the running subcommand, before the first use of option names.
 pub fn name_options_of(subcommand: &str) {
     SUBCOMMAND.get_or_init(|| subcommand.to_owned());
 }
 
-/// A text with fields between backticks as one with options, be they of another subcommand.
+/// Replaces field names between backticks by options of any subcommand.
 pub fn with_options(text: &str) -> Cow<'_, str> {
     if !text.contains('`') {
         return text.into();
@@ -54,8 +54,8 @@ pub fn with_options(text: &str) -> Cow<'_, str> {
     (named + rest).into()
 }
 
-/// An argument by the name of its field, or several after commas, as options; a value may follow a name. What is no option
-/// of the subcommand stays.
+/// Replaces field names in a comma-separated list by options of the running subcommand. A value may follow a name.
+/// Other names are unchanged.
 pub fn option_of(argument: &str) -> String {
     let named = |part: &str| {
         let (name, value) = part.split_at(part.find(' ').unwrap_or(part.len()));

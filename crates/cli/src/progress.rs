@@ -9,12 +9,12 @@ use voxtile::scan::Stop;
 use voxtile_pipeline::memory::resident_bytes;
 use voxtile_pipeline::{Gauge, Unit, Watch};
 
-/// A bar on standard error for long work; nothing where that is no terminal.
+/// Progress bar on standard error; invisible if standard error is no terminal.
 pub struct Progress {
     bar: ProgressBar,
 }
 
-/// A person who sees bars.
+/// Returns a `Watch` with progress bars on the terminal.
 pub fn at_terminal(stop: Stop) -> Watch {
     let bar = |unit, all: Option<u64>| -> Box<dyn Gauge> {
         let all = all.map(|all| usize::try_from(all).unwrap_or(usize::MAX));
@@ -27,10 +27,10 @@ pub fn at_terminal(stop: Stop) -> Watch {
     Watch::new(stop, Arc::new(bar))
 }
 
-/// The bar that was made last, if it is still there.
+/// The latest bar, if it still exists.
 static SHOWN: Mutex<Option<ProgressBar>> = Mutex::new(None);
 
-/// Standard error for the log, whose lines go above the bar and name options.
+/// Standard error of the log: writes above the bar, with field names replaced by options.
 pub struct AboveBar;
 
 impl Write for AboveBar {
@@ -47,7 +47,6 @@ impl Write for AboveBar {
 }
 
 impl Progress {
-    /// A bar over scans.
     pub fn over_scans(scans: Option<usize>) -> Self {
         let (bar, template) = match scans {
             Some(scans) => (
@@ -59,12 +58,10 @@ impl Progress {
         Self::styled(bar, template)
     }
 
-    /// A bar over tiles.
     pub fn over_tiles(tiles: usize) -> Self {
         Self::styled(ProgressBar::new(tiles as u64), "{bar:30} {pos}/{len} tiles  {eta} left")
     }
 
-    /// A bar over bytes.
     pub fn over_bytes() -> Self {
         Self::styled(ProgressBar::new(0), "{bar:30} {bytes}/{total_bytes}  {bytes_per_sec}  {eta} left")
     }
@@ -78,18 +75,17 @@ impl Progress {
         Self { bar }
     }
 
-    /// So many were done before.
+    /// Sets the number of steps done before this run.
     pub fn pass(&self, done: u64) {
         self.bar.set_position(done);
         self.bar.reset_eta();
     }
 
-    /// One more is done.
     pub fn step(&self) {
         self.bar.inc(1);
     }
 
-    /// So many of all are done.
+    /// Sets the numbers of finished and of all steps.
     pub fn set(&self, done: u64, all: u64) {
         self.bar.set_length(all);
         self.bar.set_position(done);
@@ -97,11 +93,11 @@ impl Progress {
 
     /// Prints a line on standard output, above the bar.
     pub fn print(&self, line: &str) {
-        // A reader that has gone away, as in `| head`, is no reason to stop.
+        // Ignores closed pipes such as `| head`: work continues.
         self.bar.suspend(|| writeln!(std::io::stdout(), "{line}").unwrap_or_default());
     }
 
-    /// Shows what a mapper holds. Asked for a few times a second at most.
+    /// Shows the mapper's tiles and memory, a few times a second at most.
     pub fn show(&self, statistics: &dyn Fn() -> MapStatistics) {
         if self.bar.is_hidden() || !self.bar.position().is_multiple_of(8) {
             return;
@@ -110,7 +106,7 @@ impl Progress {
         let memory = resident_bytes().map_or(String::new(), |bytes| format!(", {}", HumanBytes(bytes)));
         let waiting = match buffered_tiles {
             0 => String::new(),
-            tiles => format!(", updates wait for {tiles}"),
+            tiles => format!(", updates waiting for {tiles}"),
         };
         let stalls = match stalls.count {
             0 => String::new(),
@@ -119,8 +115,7 @@ impl Progress {
         self.bar.set_message(format!("{tiles} tiles, {cached_tiles} in memory{memory}{waiting}{stalls}"));
     }
 
-    /// Says what is going on when it is no step.
-    pub fn say(&self, message: &'static str) {
+    pub fn show_message(&self, message: &'static str) {
         self.bar.set_message(message);
     }
 }
@@ -139,7 +134,7 @@ impl Gauge for Progress {
     }
 
     fn say(&self, message: &'static str) {
-        self.say(message);
+        self.show_message(message);
     }
 
     fn show(&self, statistics: &dyn Fn() -> MapStatistics) {

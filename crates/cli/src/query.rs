@@ -22,7 +22,7 @@ pub fn run(args: &QueryArgs) -> anyhow::Result<ExitCode> {
     }
     let answers = read_any_map(&args.map, |reader| {
         let grid = reader.config().grid;
-        // In tile order each tile is read once; the answers go back to the order of the points.
+        // Query in tile order, so that each tile is read once, then restore the order of the points.
         let mut order: Vec<usize> = (0..points.len()).collect();
         order.sort_by_key(|&number| grid.tile_of(points[number]));
         let mut answers: Vec<(usize, Answer)> = Vec::with_capacity(points.len());

@@ -1,22 +1,21 @@
-//! What `--quiet` leaves out: progress bars and summaries. Answers, JSON and errors are printed.
+//! `--quiet` suppresses progress bars and summaries. Results, JSON and errors are still printed.
 
 use std::io::{Write, sink, stdout};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 static IS_QUIET: AtomicBool = AtomicBool::new(false);
 
-/// Prints no progress bars and summaries from here on.
+/// Suppresses progress bars and summaries.
 pub fn be_quiet() {
     IS_QUIET.store(true, Ordering::Relaxed);
 }
 
-/// Whether progress bars and summaries are left out.
+/// Returns whether progress bars and summaries are suppressed.
 pub fn is_quiet() -> bool {
     IS_QUIET.load(Ordering::Relaxed)
 }
 
-/// Standard output for the summary of a command whose result is elsewhere; nothing if it is quiet, unless the summary
-/// `is_asked_for`, as JSON is.
-pub fn summary_out(is_asked_for: bool) -> Box<dyn Write> {
-    if is_asked_for || !is_quiet() { Box::new(stdout().lock()) } else { Box::new(sink()) }
+/// Returns standard output for a summary, or a sink with `--quiet`, unless the summary `is_requested`, such as JSON.
+pub fn summary_out(is_requested: bool) -> Box<dyn Write> {
+    if is_requested || !is_quiet() { Box::new(stdout().lock()) } else { Box::new(sink()) }
 }

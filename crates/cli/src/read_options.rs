@@ -3,7 +3,6 @@ use voxtile::Result;
 use voxtile_formats::ReadOptions;
 use voxtile_pipeline::numbers::{Mount, point_of, region_of, set_mount, tolerance_ns};
 
-/// What the command line says of the input.
 pub fn read_options(args: &ReadArgs) -> Result<ReadOptions> {
     let mut options = ReadOptions::default();
     options.format.clone_from(&args.format);

@@ -1,8 +1,8 @@
-//! The tiles of a region that a map is built of, for people.
+//! Text for the tile region of a map.
 
 use voxtile::space::{Grid, TileBox};
 
-/// The tiles in metres; what reaches beyond all voxels is infinite.
+/// Formats the tiles in metres. Bounds beyond the last possible voxel print as infinite.
 pub fn text(tiles: TileBox, grid: &Grid) -> String {
     let (min, max) = (tiles.min().to_array(), tiles.max().to_array());
     let edge = i64::from(grid.voxels_per_tile_edge());

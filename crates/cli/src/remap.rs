@@ -3,7 +3,7 @@ use crate::json;
 use voxtile_pipeline::{MapAt, whole_map};
 
 use crate::quiet::summary_out;
-use crate::rework::{self, Job};
+use crate::replay::{self, Job};
 use indicatif::HumanCount;
 use serde::Serialize;
 use std::io::Write;
@@ -33,26 +33,26 @@ struct Summary<'a> {
 }
 
 pub fn run(args: &RemapArgs) -> anyhow::Result<ExitCode> {
-    let Some(file) = &args.poses else { return run_anew(args) };
+    let Some(file) = &args.poses else { return build_another(args) };
     let map = whole_map(&args.map)?;
     let started = Instant::now();
     let tolerance = args.tolerance.as_deref().map(tolerance_of).transpose()?;
-    let job = Job::of(&args.rework)?;
+    let job = Job::of(&args.replay)?;
     let scans = KeptSummary::read(map)?;
     let poses = poses_for(&pose_file(args, file)?, &scans)?;
-    let how = Remap::new(job.rework.clone()).with_tolerance(tolerance);
+    let how = Remap::new(job.replay.clone()).with_tolerance(tolerance);
     let outcome = remap(&scans, &poses, &how, |done, all| job.progress.set(done, all));
     let remapped = match job.ended(outcome)? {
         Ok(remapped) => remapped,
         Err(code) => return Ok(code),
     };
     drop(job);
-    let mut out = summary_out(args.rework.json || args.rework.dry_run);
-    if args.rework.json {
+    let mut out = summary_out(args.replay.json || args.replay.dry_run);
+    if args.replay.json {
         let summary = Summary {
             map,
-            dry_run: args.rework.dry_run,
-            kept_as: args.rework.keep_as.as_ref().map(|name| name.as_str()),
+            dry_run: args.replay.dry_run,
+            kept_as: args.replay.keep_as.as_ref().map(|name| name.as_str()),
             remapped,
             seconds: started.elapsed().as_secs_f64(),
             peak_rss_bytes: memory::peak_bytes(),
@@ -61,31 +61,31 @@ pub fn run(args: &RemapArgs) -> anyhow::Result<ExitCode> {
         return Ok(ExitCode::SUCCESS);
     }
     let Remapped { mapped, largest_move_m, largest_turn_deg, .. } = remapped;
-    let moved = if args.rework.dry_run { "would move" } else { "moved" };
+    let moved = if args.replay.dry_run { "would move" } else { "moved" };
     writeln!(
         out,
-        "poses     {} scans {moved}, by {largest_move_m:.3} m and {largest_turn_deg:.3} degrees at most",
+        "poses     {} scans {moved}, by up to {largest_move_m:.3} m and {largest_turn_deg:.3} degrees",
         HumanCount(mapped.scans_changed)
     )?;
     if remapped.scans_within_tolerance > 0 {
         writeln!(
             out,
-            "left      {} scans where they are: new poses differ by {:.3} m and {:.3} degrees at most",
+            "left      {} scans unchanged: new poses differ by up to {:.3} m and {:.3} degrees",
             HumanCount(remapped.scans_within_tolerance),
             remapped.largest_move_left_m,
             remapped.largest_turn_left_deg
         )?;
     }
-    rework::print(&mapped, args.rework.dry_run, &mut out)?;
+    replay::print(&mapped, args.replay.dry_run, &mut out)?;
     if let Some(name) =
-        args.rework.keep_as.as_ref().filter(|_| mapped.scans_changed > 0 && !args.rework.dry_run)
+        args.replay.keep_as.as_ref().filter(|_| mapped.scans_changed > 0 && !args.replay.dry_run)
     {
         writeln!(out, "before    kept as {name}")?;
     }
     Ok(ExitCode::SUCCESS)
 }
 
-/// Two lengths such as `0.02m,0.1deg`: metres and, returned as radians, degrees.
+/// Parses two tolerances such as `0.02m,0.1deg`. Returns metres and radians.
 fn tolerance_of(text: &str) -> voxtile::Result<(f64, f64)> {
     let number = |part: &str, unit: &str| -> Option<f64> {
         part.trim().strip_suffix(unit)?.trim().parse().ok().filter(|&x: &f64| x >= 0.0 && x.is_finite())
@@ -93,25 +93,25 @@ fn tolerance_of(text: &str) -> voxtile::Result<(f64, f64)> {
     let parts = text.split_once(',');
     let tolerance = parts.and_then(|(moved, turned)| Some((number(moved, "m")?, number(turned, "deg")?)));
     let (moved_m, turned_deg) = tolerance.ok_or_else(|| {
-        Error::argument("--tolerance", format!("{text:?} is no length and angle such as 0.02m,0.1deg"))
+        Error::argument("--tolerance", format!("{text:?} is not a length and an angle such as 0.02m,0.1deg"))
     })?;
     Ok((moved_m, turned_deg.to_radians()))
 }
 
-/// Makes another map of the same scans.
-fn run_anew(args: &RemapArgs) -> anyhow::Result<ExitCode> {
+/// Builds another map from the same scans.
+fn build_another(args: &RemapArgs) -> anyhow::Result<ExitCode> {
     let Some(output) = &args.output else {
-        return Err(Error::argument("--poses", "name a file of new poses, or another map with -o").into());
+        return Err(Error::argument("--poses", "give a file of new poses, or another map with -o").into());
     };
-    if args.rework.keep_as.is_some() || args.rework.dry_run {
-        let reason = "go with --poses; with -o the map stays as it is";
+    if args.replay.keep_as.is_some() || args.replay.dry_run {
+        let reason = "need --poses; with -o the map does not change";
         return Err(Error::argument("--keep-as, --dry-run", reason).into());
     }
-    let job = Job::of(&args.rework)?;
+    let job = Job::of(&args.replay)?;
     let reader = MapAt::of(&args.map)?.open()?;
-    let config = config_of(args, reader.config(), job.rework.memory)?;
+    let config = config_of(args, reader.config(), job.replay.memory)?;
     let rays = |rays: &RayConfig| rays_of(args, rays);
-    let outcome = rebuild(&reader, whole_map(output)?, config, rays, &job.rework.stop, |done, all| {
+    let outcome = rebuild(&reader, whole_map(output)?, config, rays, &job.replay.stop, |done, all| {
         job.progress.set(done, all)
     });
     let mapped = match job.ended(outcome)? {
@@ -119,13 +119,13 @@ fn run_anew(args: &RemapArgs) -> anyhow::Result<ExitCode> {
         Err(code) => return Ok(code),
     };
     drop(job);
-    let mut out = summary_out(args.rework.json);
-    if args.rework.json {
+    let mut out = summary_out(args.replay.json);
+    if args.replay.json {
         json::print(&mapped, &mut out)?;
         return Ok(ExitCode::SUCCESS);
     }
     let (scans, points) = (HumanCount(mapped.scans), HumanCount(mapped.report.points));
-    writeln!(out, "mapped    {scans} scans, {points} points, into {}", output.display())?;
+    writeln!(out, "mapped    {scans} scans, {points} points, to {}", output.display())?;
     let (voxels, occupied) = MapReader::open(output, 0)?.voxel_counts().unwrap_or_default();
     writeln!(out, "map       {} voxels, {} occupied", HumanCount(voxels), HumanCount(occupied))?;
     Ok(ExitCode::SUCCESS)
@@ -164,11 +164,11 @@ fn rays_of(args: &RemapArgs, own: &RayConfig) -> RayConfig {
     rays
 }
 
-/// How the new poses are read.
+/// Returns the options for reading the new poses.
 fn pose_file<'a>(args: &'a RemapArgs, path: &'a Path) -> voxtile::Result<PoseFile<'a>> {
     let body_from_sensor = args.extrinsic.as_deref().map(Mount::of).transpose()?.map(|mount| mount.rigid);
     let tolerance_ns = tolerance_ns(args.pose_tolerance)?;
-    // Where builds put what they cannot hold: the system's folder may be in memory.
+    // Next to the map, as in builds: the system's temporary folder may be in memory.
     let scratch = args.map.ancestors().skip(1).find(|folder| folder.is_dir()).unwrap_or(Path::new("."));
     let budget = Budget { scratch: Some(scratch.to_owned()), ..Budget::default() };
     Ok(PoseFile { path, calib: args.calib.as_deref(), body_from_sensor, tolerance_ns, budget })

@@ -2,7 +2,7 @@ use crate::args::RemovePointsArgs;
 use crate::json;
 use crate::part::region_of;
 use crate::quiet::summary_out;
-use crate::rework::{self, Job};
+use crate::replay::{self, Job};
 use indicatif::HumanCount;
 use serde::Serialize;
 use std::io::Write;
@@ -28,19 +28,19 @@ struct Summary<'a> {
 pub fn run(args: &RemovePointsArgs) -> anyhow::Result<ExitCode> {
     let map = whole_map(&args.map)?;
     let started = Instant::now();
-    let (job, region) = (Job::of(&args.rework)?, region_of(&args.region)?);
-    let outcome = remove_points(map, &region, &job.rework, |done, all| job.progress.set(done, all));
+    let (job, region) = (Job::of(&args.replay)?, region_of(&args.region)?);
+    let outcome = remove_points(map, &region, &job.replay, |done, all| job.progress.set(done, all));
     let removed = match job.ended(outcome)? {
         Ok(removed) => removed,
         Err(code) => return Ok(code),
     };
     drop(job);
-    let mut out = summary_out(args.rework.json || args.rework.dry_run);
-    if args.rework.json {
+    let mut out = summary_out(args.replay.json || args.replay.dry_run);
+    if args.replay.json {
         let summary = Summary {
             map,
-            dry_run: args.rework.dry_run,
-            kept_as: args.rework.keep_as.as_ref().map(|name| name.as_str()),
+            dry_run: args.replay.dry_run,
+            kept_as: args.replay.keep_as.as_ref().map(|name| name.as_str()),
             removed,
             seconds: started.elapsed().as_secs_f64(),
             peak_rss_bytes: memory::peak_bytes(),
@@ -48,10 +48,10 @@ pub fn run(args: &RemovePointsArgs) -> anyhow::Result<ExitCode> {
         json::print(&summary, &mut out)?;
         return Ok(ExitCode::SUCCESS);
     }
-    let would = if args.rework.dry_run { "would be " } else { "" };
+    let would = if args.replay.dry_run { "would be " } else { "" };
     let PointsRemoved { mapped, points_removed, .. } = removed;
     let (points, scans) = (HumanCount(points_removed), HumanCount(mapped.scans_changed));
-    writeln!(out, "removed   {points} points of {scans} scans {would}gone")?;
-    rework::print(&mapped, args.rework.dry_run, &mut out)?;
+    writeln!(out, "removed   {points} points of {scans} scans {would}removed")?;
+    replay::print(&mapped, args.replay.dry_run, &mut out)?;
     Ok(ExitCode::SUCCESS)
 }

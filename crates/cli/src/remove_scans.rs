@@ -1,8 +1,8 @@
 use crate::args::RemoveScansArgs;
 use crate::json;
 use crate::quiet::summary_out;
-use crate::rework::{self, Job};
-use crate::run::say;
+use crate::replay::{self, Job};
+use crate::run::print_message;
 use indicatif::HumanCount;
 use serde::Serialize;
 use std::io::Write;
@@ -29,9 +29,9 @@ struct Summary<'a> {
 pub fn run(args: &RemoveScansArgs) -> anyhow::Result<ExitCode> {
     let map = whole_map(&args.map)?;
     let started = Instant::now();
-    let (job, scans) = (Job::of(&args.rework)?, selection_of(args)?);
+    let (job, scans) = (Job::of(&args.replay)?, selection_of(args)?);
     let progress = |done, all| job.progress.set(done, all);
-    let outcome = remove_scans(map, &scans, args.from_snapshots, &job.rework, progress);
+    let outcome = remove_scans(map, &scans, args.from_snapshots, &job.replay, progress);
     let removed = match job.ended(outcome)? {
         Ok(removed) => removed,
         Err(code) => return Ok(code),
@@ -42,19 +42,19 @@ pub fn run(args: &RemoveScansArgs) -> anyhow::Result<ExitCode> {
         failed => {
             let names: Vec<_> = failed.iter().map(|failed| failed.name.as_str()).collect();
             let names = names.join(", ");
-            say(format_args!(
-                "{}: Scans removed from the map. These snapshots may still contain some: {names}",
+            print_message(format_args!(
+                "{}: scans are removed from the map, but these snapshots may still contain some of them: {names}",
                 map.display()
             ));
             ExitCode::FAILURE
         }
     };
-    let mut out = summary_out(args.rework.json || args.rework.dry_run);
-    if args.rework.json {
+    let mut out = summary_out(args.replay.json || args.replay.dry_run);
+    if args.replay.json {
         let summary = Summary {
             map,
-            dry_run: args.rework.dry_run,
-            kept_as: args.rework.keep_as.as_ref().map(|name| name.as_str()),
+            dry_run: args.replay.dry_run,
+            kept_as: args.replay.keep_as.as_ref().map(|name| name.as_str()),
             removed,
             seconds: started.elapsed().as_secs_f64(),
             peak_rss_bytes: memory::peak_bytes(),
@@ -62,23 +62,23 @@ pub fn run(args: &RemoveScansArgs) -> anyhow::Result<ExitCode> {
         json::print(&summary, &mut out)?;
         return Ok(code);
     }
-    let would = if args.rework.dry_run { "would be " } else { "" };
-    writeln!(out, "removed   {} scans {would}gone", HumanCount(removed.scans_removed))?;
+    let would = if args.replay.dry_run { "would be " } else { "" };
+    writeln!(out, "removed   {} scans {would}removed", HumanCount(removed.scans_removed))?;
     if removed.files_removed > 0 {
         let files = HumanCount(removed.files_removed);
-        writeln!(out, "completed an earlier removal: {files} files with removed scans are gone")?;
+        writeln!(out, "completed an earlier removal: deleted {files} files with removed scans")?;
     }
     if removed.scans_removed > 0 {
-        rework::print(&removed.mapped, args.rework.dry_run, &mut out)?;
+        replay::print(&removed.mapped, args.replay.dry_run, &mut out)?;
     }
     for name in &removed.snapshots_deleted {
-        writeln!(out, "snapshot  {name} held some of them and is deleted")?;
+        writeln!(out, "snapshot  {name} contained some of them and is deleted")?;
     }
     for name in &removed.snapshots_with_them {
-        writeln!(out, "snapshot  {name} still holds some of them; --from-snapshots deletes such")?;
+        writeln!(out, "snapshot  {name} still contains some of them; --from-snapshots deletes it")?;
     }
     for failed in &removed.snapshots_failed {
-        writeln!(out, "snapshot  {} may hold some of them: {}", failed.name, failed.reason)?;
+        writeln!(out, "snapshot  {} may contain some of them: {}", failed.name, failed.reason)?;
     }
     Ok(code)
 }
@@ -94,11 +94,11 @@ fn selection_of(args: &RemoveScansArgs) -> voxtile::Result<ScanSelection> {
     let (first, last) = text.split_once("..").unwrap_or((text, text));
     match (first.trim().parse(), last.trim().parse()) {
         (Ok(first), Ok(last)) if first <= last => Ok(ScanSelection::Numbers(first, last)),
-        _ => Err(Error::argument("--scans", format!("{text:?} is no range of numbers such as 120..180"))),
+        _ => Err(Error::argument("--scans", format!("{text:?} is not a range of numbers such as 120..180"))),
     }
 }
 
-/// Seconds as nanoseconds, exactly.
+/// Parses seconds to nanoseconds, exactly.
 fn stamp_of(text: &str) -> voxtile::Result<i64> {
     let (whole, rest) = text.split_once('.').unwrap_or((text, ""));
     let is_number = !rest.starts_with(['-', '+']) && rest.len() <= 9;
@@ -109,5 +109,5 @@ fn stamp_of(text: &str) -> voxtile::Result<i64> {
         let rest_ns = if whole.starts_with('-') { -rest_ns } else { rest_ns };
         whole_s.checked_mul(1_000_000_000)?.checked_add(rest_ns)
     });
-    stamp.ok_or_else(|| Error::argument("--time", format!("{text:?} is no time in seconds")))
+    stamp.ok_or_else(|| Error::argument("--time", format!("{text:?} is not a time in seconds")))
 }

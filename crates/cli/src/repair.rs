@@ -8,7 +8,7 @@ use std::process::ExitCode;
 use voxtile::integrity::{Action, Repair, repair};
 use voxtile_pipeline::whole_map;
 
-/// More actions than a person reads; the rest are counted.
+/// Maximum number of actions in JSON; the summary counts all.
 const MAX_ACTIONS: usize = 10_000;
 
 #[derive(Serialize)]
@@ -43,39 +43,36 @@ pub fn run(args: &RepairArgs) -> anyhow::Result<ExitCode> {
         writeln!(out, "nothing to repair in {} tiles", HumanCount(repair.tiles))?;
     } else {
         let (tiles, lost) = (HumanCount(repair.tiles), HumanCount(repair.tiles_lost));
-        writeln!(
-            out,
-            "repaired: the map has {tiles} tiles; {lost} could not stay, their space is unknown again"
-        )?;
+        writeln!(out, "repaired: the map has {tiles} tiles; {lost} were lost and their space is unknown")?;
         if repair.snapshots_lost + repair.snapshot_tiles_lost > 0 {
             let (snapshots, tiles) =
                 (HumanCount(repair.snapshots_lost), HumanCount(repair.snapshot_tiles_lost));
-            writeln!(out, "snapshots: {snapshots} could not stay; others lost {tiles} tiles")?;
+            writeln!(out, "snapshots: {snapshots} were lost; others lost {tiles} tiles")?;
         }
         if repair.scans_lost + repair.snapshot_scans_lost > 0 {
             let (scans, of_snapshots) =
                 (HumanCount(repair.scans_lost), HumanCount(repair.snapshot_scans_lost));
             writeln!(
                 out,
-                "kept scans: {scans} of the map and {of_snapshots} of snapshots are lost; what lost any cannot be mapped \
-                 again"
+                "kept scans: {scans} of the map and {of_snapshots} of snapshots are lost; a map or snapshot that lost \
+                 some cannot be replayed"
             )?;
         }
         if repair.inputs_forgotten > 0 {
             let inputs = HumanCount(repair.inputs_forgotten);
             writeln!(
                 out,
-                "inputs: {inputs} forgotten; nothing tells how many of their scans are in the map"
+                "inputs: {inputs} removed from the list, because the number of their scans in the map is unknown"
             )?;
         }
         if repair.left > 0 {
             let left = HumanCount(repair.left);
             writeln!(
                 out,
-                "still damaged: {left} tiles, because the disk refuses; copy the map to another one"
+                "still damaged: {left} tiles, because the disk reports errors; copy the map to another disk"
             )?;
         }
     }
-    // A script must not take a map with holes for a whole one.
+    // Scripts must not treat an incomplete map as intact.
     Ok(if is_complete { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }

@@ -38,11 +38,11 @@ pub fn run(args: &RevertArgs) -> anyhow::Result<ExitCode> {
     let Reverted { scan_number_before, scan_number, tiles, tiles_restored, tiles_removed, .. } = reverted;
     let (restored, removed) = (HumanCount(tiles_restored), HumanCount(tiles_removed));
     if reverted.was_done {
-        writeln!(out, "reverted  nothing: the map is as of {} already, scan {scan_number}", args.name)?;
+        writeln!(out, "reverted  nothing: the map already equals {}, scan {scan_number}", args.name)?;
         return Ok(ExitCode::SUCCESS);
     }
     writeln!(out, "reverted  to {}: scan {scan_number}, {} tiles", args.name, HumanCount(tiles))?;
-    writeln!(out, "tiles     {restored} as they were, {removed} gone again")?;
+    writeln!(out, "tiles     {restored} restored, {removed} removed")?;
     match keep_as {
         Some(name) => writeln!(out, "before    scan {scan_number_before}; kept as {name}")?,
         None => writeln!(out, "before    scan {scan_number_before}; not kept")?,

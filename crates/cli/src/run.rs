@@ -1,4 +1,4 @@
-//! From a command line to an exit code.
+//! Runs a command line and returns its exit code.
 
 use super::args::{Cli, Command};
 use super::failure::JsonTo;
@@ -19,19 +19,19 @@ use voxtile::begin_with_one_heap;
 #[cfg(feature = "bucket")]
 use voxtile_pipeline::place;
 
-/// The command with the arguments of this process.
+/// Runs the command with the arguments of this process.
 pub fn main() -> ExitCode {
     run(std::env::args_os())
 }
 
-/// The command with `arguments`, the program's name first. It ends the process where they make no sense or ask for
-/// help, and it expects a process of its own: it sets up logging, threads and signals.
+/// Runs the command with `arguments`, the program's name first. Exits the process for invalid arguments and for help.
+/// Requires a process of its own, because it sets up logging, threads and signal handlers.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     let matches = Cli::command().try_get_matches_from(with_plain_numbers(arguments));
     let matches = matches.unwrap_or_else(|error| one_input::explained(error).exit());
     option_names::name_options_of(matches.subcommand_name().unwrap_or_default());
     let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
-    // The command line before the environment, where it says something.
+    // Command-line levels override the environment.
     let mut log = env_logger::Builder::new();
     log.filter_level(cli.log_level()).format_timestamp(None);
     log.target(env_logger::Target::Pipe(Box::new(progress::AboveBar)));
@@ -49,13 +49,13 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         quiet::be_quiet();
     }
     if keeps_to_bytes(&command) {
-        // Before there is a second thread, and before anything is read from standard input.
+        // Before the second thread starts and before standard input is read.
         begin_with_one_heap();
     }
     if is_parallel(&command)
         && let Err(error) = threads::start(threads)
     {
-        return json_to.tell(&error);
+        return json_to.report(&error);
     }
     let outcome = match command {
         Command::Build(args) => build::run(&args),
@@ -100,20 +100,20 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Command::Completions(args) => completions::run(&args),
         Command::Man(args) => man::run(&args),
     };
-    outcome.unwrap_or_else(|error| json_to.tell(&error))
+    outcome.unwrap_or_else(|error| json_to.report(&error))
 }
 
-/// The error of a subcommand that this build leaves out.
+/// Returns the error for a subcommand that is not in this build.
 #[cfg(not(all(feature = "bucket", feature = "view")))]
 fn left_out(subcommand: &str, feature: &str) -> anyhow::Error {
     let reason = format!(
         "this voxtile was built without the feature `{feature}`; `cargo install --locked --path crates/cli --features \
-         {feature}` makes one with it"
+         {feature}` installs one with it"
     );
     voxtile::Error::argument(subcommand, reason).into()
 }
 
-/// Negative numbers as programs print them (`-1e-05`, `-.5`, `-inf`), which would be taken for options.
+/// Rewrites negative numbers such as `-1e-05`, `-.5` and `-inf`, which clap would parse as options.
 fn with_plain_numbers(arguments: impl IntoIterator<Item = OsString>) -> Vec<OsString> {
     let mut are_options_over = false;
     let plain = |argument: OsString| {
@@ -126,7 +126,7 @@ fn with_plain_numbers(arguments: impl IntoIterator<Item = OsString>) -> Vec<OsSt
     arguments.into_iter().map(plain).collect()
 }
 
-/// A negative number in digits alone, if it is one in another form.
+/// Returns a negative number in plain digits if it has another form.
 fn plain_number(text: &str) -> Option<String> {
     let digits = text.strip_prefix('-')?;
     if digits.bytes().all(|byte| byte.is_ascii_digit()) {
@@ -138,7 +138,7 @@ fn plain_number(text: &str) -> Option<String> {
     }
 }
 
-/// Whether the command maps within a limit of bytes.
+/// Returns whether the command maps within a memory budget in bytes.
 const fn keeps_to_bytes(command: &Command) -> bool {
     match command {
         Command::Build(args) => args.cache_tiles.is_none(),
@@ -147,7 +147,7 @@ const fn keeps_to_bytes(command: &Command) -> bool {
     }
 }
 
-/// Whether a command works on several threads.
+/// Returns whether the command uses several threads.
 fn is_parallel(command: &Command) -> bool {
     match command {
         Command::Build(_)
@@ -165,10 +165,10 @@ fn is_parallel(command: &Command) -> bool {
     }
 }
 
-/// One line for a person. Where standard error refuses it there is nobody to tell.
-pub fn say(line: std::fmt::Arguments<'_>) {
+/// Prints a line on standard error. Ignores a failed write, which cannot be reported.
+pub fn print_message(line: std::fmt::Arguments<'_>) {
     let _ = writeln!(std::io::stderr().lock(), "voxtile: {line}");
 }
 
-/// Ended by Ctrl-C or SIGTERM, after everything so far was flushed.
+/// Exit code after Ctrl-C or SIGTERM; all scans so far were flushed.
 pub const INTERRUPTED: u8 = 130;

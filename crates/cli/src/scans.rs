@@ -20,39 +20,36 @@ use voxtile_pipeline::place::url_of;
 use voxtile_pipeline::read_map;
 use voxtile_pipeline::{LocalScans, open_scans};
 
-/// Bytes of memory for the points of one scan; more go to a temporary file.
-const ROOM_BYTES: usize = 64 << 20;
+/// Memory for the points of a scan, in bytes; larger scans use a temporary file.
+const POINTS_BYTES: usize = 64 << 20;
 
-/// Bytes of memory for the rows of a map; more go to a temporary file.
+/// Memory for the rows of a map, in bytes; longer lists use a temporary file.
 const ROWS_BYTES: usize = 4 << 20;
 
-/// What an input or a map has of scans.
 #[derive(Debug, Default, Serialize)]
 struct Overview {
     format: String,
     scans: u64,
-    /// `None` for a map that does not keep them.
+    /// `None` for a map without kept scans.
     points: Option<u64>,
-    /// Bytes on disk of the scans that a map keeps.
+    /// Size on disk of the kept scans, in bytes.
     kept_bytes: Option<u64>,
     first_stamp_ns: Option<i64>,
     last_stamp_ns: Option<i64>,
     fields: Vec<String>,
     poses: Option<String>,
-    /// What a person should know beside.
     remarks: Vec<String>,
 }
 
-/// One scan.
 #[derive(Debug, Serialize)]
 struct Row {
     number: u64,
     name: Option<String>,
     stamp_ns: Option<i64>,
     points: Option<u64>,
-    /// How many tiles it touched, if the map keeps it.
+    /// Number of tiles that the scan updated, if the map keeps the scan.
     tiles: Option<u64>,
-    /// Bytes on disk, if the map keeps it.
+    /// Size on disk in bytes, if the map keeps the scan.
     kept_bytes: Option<u64>,
     origin_m: Point,
 }
@@ -73,14 +70,14 @@ fn is_map(path: &Path) -> voxtile::Result<bool> {
     let has_metadata = |path: &Path| path.join("metadata.json").is_file();
     let text = path.to_str().and_then(|text| text.rsplit_once('@'));
     match url_of(path) {
-        // Nothing is to be removed yet: signals do what they always do.
+        // There are no temporary files to remove yet, so signals keep their default action.
         Some(_) => voxtile_pipeline::is_map(path, &Stop::default()),
         None => Ok(has_metadata(path) || text.is_some_and(|(map, _)| has_metadata(Path::new(map)))),
     }
 }
 
 fn of_map(args: &ScansArgs, out: &mut impl Write) -> anyhow::Result<Overview> {
-    // What an attempt lists is printed once it has come to its end.
+    // An attempt may fail and be repeated: print only after it succeeds.
     let (overview, mut rows) = read_map(&args.data, |reader| {
         let mut rows = BufWriter::new(SpooledTempFile::new(ROWS_BYTES));
         let overview = listed(reader, args, &mut rows)?;
@@ -91,11 +88,11 @@ fn of_map(args: &ScansArgs, out: &mut impl Write) -> anyhow::Result<Overview> {
     Ok(overview)
 }
 
-/// The scans of one state of a map.
+/// Lists the scans of one state of a map.
 fn listed(reader: &MapReader, args: &ScansArgs, rows: &mut impl Write) -> anyhow::Result<Overview> {
     let mut overview = Overview { format: "map".to_owned(), ..Overview::default() };
     if !reader.keeps_scans() {
-        overview.remarks.push("it keeps no scans; build with --keep-scans to have them".to_owned());
+        overview.remarks.push("the map keeps no scans; build with --keep-scans to list them".to_owned());
         reader.scans()?.iter().try_for_each(|scan| overview.add(&Row::of(scan), args, rows))?;
         return Ok(overview);
     }
@@ -110,20 +107,20 @@ fn listed(reader: &MapReader, args: &ScansArgs, rows: &mut impl Write) -> anyhow
     }
     let not_kept = (reader.scans()?.len() as u64).saturating_sub(overview.scans);
     if not_kept > 0 {
-        overview.remarks.push(format!("{not_kept} more scans are in the map, whose points are not kept"));
+        overview.remarks.push(format!("{not_kept} more scans are in the map, but not kept"));
     }
     Ok(overview)
 }
 
 fn of_input(args: &ScansArgs, out: &mut impl Write) -> anyhow::Result<Overview> {
     let mut options = read_options(&args.read)?;
-    // What a build would leave out is listed all the same, and said.
+    // List clouds without poses too, with a remark; a build would skip them.
     options.clouds.may_lack_poses = true;
     let watch = at_terminal(stop_signal::catch_if_fetched(&args.data)?);
     let local = LocalScans::of(&args.data, &watch)?;
     let mut source: Box<dyn ScanSource + Send> = open_scans(local.path(), &options, &watch)?;
     let progress = Progress::over_scans(source.len_hint());
-    let room = PointRoom::new(ROOM_BYTES, &std::env::temp_dir());
+    let room = PointRoom::new(POINTS_BYTES, &std::env::temp_dir());
     let mut overview = Overview { format: source.format(), points: Some(0), ..Overview::default() };
     overview.poses = Some(source.pose_source().to_string());
     while let Some(scan) =
@@ -169,7 +166,7 @@ impl Overview {
         writeln!(out, "scans     {}{points}", HumanCount(self.scans))?;
         if let (Some(bytes), Some(points)) = (self.kept_bytes, self.points) {
             let a_point = bytes as f64 / points.max(1) as f64;
-            writeln!(out, "kept      {}, {a_point:.2} bytes a point", HumanBytes(bytes))?;
+            writeln!(out, "kept      {}, {a_point:.2} bytes per point", HumanBytes(bytes))?;
         }
         if let (Some(first), Some(last)) = (self.first_stamp_ns, self.last_stamp_ns) {
             let (first, span) = (seconds(first), last.saturating_sub(first));
@@ -212,7 +209,7 @@ impl Row {
     }
 }
 
-/// Nanoseconds as seconds, exactly.
+/// Formats nanoseconds as seconds, exactly.
 fn seconds(stamp_ns: i64) -> String {
     let (whole, rest) = (stamp_ns.div_euclid(1_000_000_000), stamp_ns.rem_euclid(1_000_000_000));
     format!("{whole}.{rest:09}")

@@ -5,59 +5,59 @@ use std::io;
 use std::path::PathBuf;
 use std::process::{Command, ExitCode};
 
-/// Runs `voxtile-share`, which lies beside this program or on the PATH: its network library would make this one six
-/// times as large.
+/// Runs `voxtile-share` from the folder of this program or from PATH. It is a separate program because its network
+/// library would make this one six times as large.
 pub fn run(args: &ShareArgs) -> anyhow::Result<ExitCode> {
-    let program = beside_this_program().unwrap_or_else(|| PathBuf::from(name()));
-    match become_it(Command::new(program).args(&args.arguments)) {
+    let program = next_to_this_program().unwrap_or_else(|| PathBuf::from(name()));
+    match replace_process(Command::new(program).args(&args.arguments)) {
         Err(error) if error.kind() == io::ErrorKind::NotFound && asks_for_help(&args.arguments) => {
             println!("{HELP}");
             Ok(ExitCode::SUCCESS)
         }
         ran => ran.with_context(|| {
             let hint =
-                "put it beside voxtile or on the PATH (cargo install --path crates/share-node installs it)";
+                "install it next to voxtile or on PATH with `cargo install --locked --path crates/share-node`";
             format!("cannot run {}: {hint}", name())
         }),
     }
 }
 
-/// Runs a program in place of this one, which ends here: signals that are sent to this process are the program's.
+/// Replaces this process by the program, so that the program receives signals directly.
 #[cfg(unix)]
-fn become_it(program: &mut Command) -> io::Result<ExitCode> {
+fn replace_process(program: &mut Command) -> io::Result<ExitCode> {
     Err(std::os::unix::process::CommandExt::exec(program))
 }
 
-/// Runs a program and ends as it does.
+/// Runs a program and returns its exit code.
 #[cfg(not(unix))]
-fn become_it(program: &mut Command) -> io::Result<ExitCode> {
-    // Ended from outside: there may be no code.
+fn replace_process(program: &mut Command) -> io::Result<ExitCode> {
+    // There is no exit code after a signal.
     let code = program.status()?.code().and_then(|code| u8::try_from(code).ok());
     Ok(code.map_or(ExitCode::FAILURE, ExitCode::from))
 }
 
-/// What there is to say without the program, whose own help has all options.
+/// Help if the program is missing; its own help lists all options.
 const HELP: &str = "\
-Share what is occupied with other robots: publish a map or scans, subscribe to others
+Share occupied space with other robots: publish a map or scans, subscribe to others
 
 Usage: voxtile share --publish <MAP_OR_SCANS> --robot <NAME> [OPTIONS]
        voxtile share --subscribe -o <MAP> [OPTIONS]
        voxtile share --fold <LAYER> -o <MAP>
        voxtile share --measure <SCANS>...
 
-The work is done by the program voxtile-share, which is not here: neither beside voxtile nor on the PATH. It comes
-separately, since its network library is six times as large as voxtile. To install it, in the sources of voxtile:
+The program voxtile-share was not found next to voxtile or on PATH. It is installed separately, because its network
+library is six times as large as voxtile. To install it from the sources of voxtile:
 
     cargo install --locked --path crates/share-node
 
-Then this help lists all options. docs/sharing.md says what is shared, and how.";
+After that, this help lists all options. See docs/sharing.md for the protocol.";
 
 fn asks_for_help(arguments: &[OsString]) -> bool {
     arguments.first().is_none_or(|first| first == "help")
         || arguments.iter().any(|argument| argument == "--help" || argument == "-h")
 }
 
-fn beside_this_program() -> Option<PathBuf> {
+fn next_to_this_program() -> Option<PathBuf> {
     let program = std::env::current_exe().ok()?.with_file_name(name());
     program.is_file().then_some(program)
 }

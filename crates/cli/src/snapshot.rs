@@ -10,13 +10,13 @@ pub fn run(args: &SnapshotArgs) -> anyhow::Result<ExitCode> {
     let map = whole_map(&args.map)?;
     let was_there = !args.delete && new_snapshot(map, &args.name).is_ok();
     let info = if args.delete {
-        // What it was, before it is gone.
+        // Read before it is deleted.
         let info = snapshots(map)?.into_iter().find(|info| info.name == args.name.as_str());
         delete_snapshot(map, &args.name)?;
         info
     } else {
         snapshot(map, &args.name)?;
-        // It is there, whatever becomes of this.
+        // The snapshot exists even if this read fails.
         new_snapshot(map, &args.name).inspect_err(|error| log::warn!("{error:#}")).ok()
     };
     let mut out = summary_out(args.json);
@@ -28,7 +28,7 @@ pub fn run(args: &SnapshotArgs) -> anyhow::Result<ExitCode> {
     } else if info.is_none() {
         writeln!(out, "kept      {}", args.name)?;
     } else if let Some(SnapshotInfo { name, flush_number, scan_number, tiles, .. }) = info {
-        let before = if was_there { "; it was there already" } else { "" };
+        let before = if was_there { "; already existed" } else { "" };
         writeln!(out, "kept      {name}: flush {flush_number}, scan {scan_number}, {tiles} tiles{before}")?;
     }
     Ok(ExitCode::SUCCESS)

@@ -34,6 +34,6 @@ fn print(info: &SnapshotInfo, width: usize, out: &mut impl Write) -> std::io::Re
     let (tiles, own) = (HumanCount(*tiles), HumanBytes(*own_bytes));
     writeln!(
         out,
-        "{name:width$}  flush {flush_number}, scan {scan_number}, {tiles} tiles, {own} for it alone"
+        "{name:width$}  flush {flush_number}, scan {scan_number}, {tiles} tiles, {own} used only by it"
     )
 }

@@ -11,88 +11,88 @@ use std::time::{Duration, Instant};
 use voxtile::scan::Stop;
 use voxtile_pipeline::place::{stop_buckets_with, url_of};
 
-/// A signal so soon after the first is no second one: a shell and what runs in it may both send one.
+/// Ignore a second signal within this time: a shell and its child may both send the same one.
 const GRACE: Duration = Duration::from_millis(500);
 
-/// The stop of the signals that are caught.
-static ASKED: OnceLock<Stop> = OnceLock::new();
+/// Stop flag of the caught signals.
+static STOP: OnceLock<Stop> = OnceLock::new();
 
-/// Catches Ctrl-C and SIGTERM. The first asks to stop and says what a second will lose; the second ends the process at
-/// once.
+/// Catches Ctrl-C and SIGTERM. The first signal requests a stop and logs what a second one would lose; the second exits
+/// the process at once.
 ///
-/// A thread of its own waits for them, so that nothing else that goes on keeps it from answering.
+/// A separate thread waits for the signals, so that other work cannot delay the response.
 pub fn catch() -> anyhow::Result<Stop> {
-    catch_saying(
-        "stopping: what is mapped so far is made durable first; a second Ctrl-C or SIGTERM ends at once and loses what is not",
-        "ended at once: scans since the last flush are not in the map",
+    catch_with_messages(
+        "stopping after a flush of the scans so far; a second Ctrl-C or SIGTERM stops at once and loses them",
+        "stopped at once: scans since the last flush are not in the map",
     )
 }
 
-/// The same for work that is done as a whole or not at all.
+/// Same as `catch`, for changes that are applied completely or not at all.
 pub fn catch_undone() -> anyhow::Result<Stop> {
-    catch_saying("stopping: the map stays as it was", "ended at once: the map is as it was")
+    catch_with_messages("stopping; the map does not change", "stopped at once; the map has not changed")
 }
 
-/// The same for a file or folder that is made beside its place, and takes it at the end.
+/// Same as `catch`, for output that is written next to its final path and renamed at the end.
 pub fn catch_unfinished() -> anyhow::Result<Stop> {
-    catch_saying(
-        "stopping: the output stays as it was",
-        "ended at once: the output is as it was; a temporary file or folder beside it may stay",
+    catch_with_messages(
+        "stopping; the output does not change",
+        "stopped at once; the output has not changed, but a temporary file or folder may remain next to it",
     )
 }
 
-/// The same for work that only reads. Where that is the files of a folder, nothing is to be removed in the end, and
-/// signals do what they always do.
+/// Same as `catch`, for reading. If the scans are in a local folder, there is nothing to remove and signals keep their
+/// default action.
 pub fn catch_if_fetched(scans: &Path) -> anyhow::Result<Stop> {
     match url_of(scans) {
-        Some(_) => catch_saying(
-            "stopping: what was fetched is removed first",
-            "ended at once: what was fetched stays",
+        Some(_) => catch_with_messages(
+            "stopping after removing the downloaded files",
+            "stopped at once; the downloaded files remain",
         ),
         None => Ok(Stop::default()),
     }
 }
 
-fn catch_saying(first_answer: &'static str, second_answer: &'static str) -> anyhow::Result<Stop> {
-    let stop = ASKED.get_or_init(Stop::default).clone();
+fn catch_with_messages(first_message: &'static str, second_message: &'static str) -> anyhow::Result<Stop> {
+    let stop = STOP.get_or_init(Stop::default).clone();
     stop_buckets_with(&stop);
     let mut signals = Signals::new([SIGINT, SIGTERM])?;
-    let asked = stop.clone();
-    let answer = move || {
+    let stop_flag = stop.clone();
+    let handle = move || {
         let mut first: Option<Instant> = None;
         for _ in signals.forever() {
             match first {
                 None => {
                     first = Some(Instant::now());
-                    asked.set();
-                    say(first_answer);
+                    stop_flag.set();
+                    print_message(first_message);
                 }
                 Some(first) if first.elapsed() < GRACE => {}
                 Some(_) => {
-                    say(second_answer);
+                    print_message(second_message);
                     std::process::exit(i32::from(INTERRUPTED));
                 }
             }
         }
     };
-    if let Err(error) = thread::Builder::new().name("voxtile-signals".to_owned()).spawn(answer) {
-        log::warn!("no thread for signals, which are answered a little later: {error}");
+    if let Err(error) = thread::Builder::new().name("voxtile-signals".to_owned()).spawn(handle) {
+        log::warn!("cannot start the signal thread, stopping may take longer: {error}");
         catch_without_thread(&stop)?;
     }
     Ok(stop)
 }
 
-/// The first signal asks to stop, unannounced; the second ends the process.
+/// Sets the stop flag at the first signal, without a message; the second exits the process.
 fn catch_without_thread(stop: &Stop) -> anyhow::Result<()> {
-    let asked: Arc<AtomicBool> = stop.flag();
+    let stop_flag: Arc<AtomicBool> = stop.flag();
     for signal in [SIGINT, SIGTERM] {
-        flag::register_conditional_shutdown(signal, i32::from(INTERRUPTED), asked.clone())?;
-        flag::register(signal, asked.clone())?;
+        flag::register_conditional_shutdown(signal, i32::from(INTERRUPTED), stop_flag.clone())?;
+        flag::register(signal, stop_flag.clone())?;
     }
     Ok(())
 }
 
-fn say(line: &str) {
-    // Where nobody listens there is nothing else to do.
+fn print_message(line: &str) {
+    // A failed write to standard error cannot be reported.
     writeln!(std::io::stderr(), "voxtile: {line}").unwrap_or_default();
 }

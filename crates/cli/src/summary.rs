@@ -9,7 +9,7 @@ use voxtile::scan::ScanReport;
 use voxtile::tile::{OctreeStatistics, TileCounts};
 use voxtile_pipeline::{OctreeWork, Summary};
 
-/// Prints what a build did, for a person or as JSON.
+/// Prints the summary of a build as text or JSON.
 pub fn print(mut summary: Summary, json: bool) -> anyhow::Result<()> {
     for text in summary.remarks.iter_mut().chain(&mut summary.unread) {
         *text = with_options(text).into_owned();
@@ -23,7 +23,7 @@ pub fn print(mut summary: Summary, json: bool) -> anyhow::Result<()> {
     writeln!(out, "map       {}", summary.map.display())?;
     writeln!(
         out,
-        "scans     {} in {:.1} s ({rate:.1} a second)",
+        "scans     {} in {:.1} s ({rate:.1} per second)",
         HumanCount(summary.scans),
         summary.seconds
     )?;
@@ -42,9 +42,14 @@ pub fn print(mut summary: Summary, json: bool) -> anyhow::Result<()> {
     }
     if summary.left_out > 0 {
         let left_out = HumanCount(summary.left_out);
-        writeln!(out, "left out  {left_out} scans, which came faster than they could be mapped")?;
+        writeln!(out, "dropped   {left_out} scans, which arrived faster than they could be mapped")?;
     }
-    writeln!(out, "points    {}, {} cut at the max range", HumanCount(points), HumanCount(cut_at_max_range))?;
+    writeln!(
+        out,
+        "points    {}, {} cut at the maximum range",
+        HumanCount(points),
+        HumanCount(cut_at_max_range)
+    )?;
     for (cause, count) in skipped.by_cause().into_iter().filter(|&(_, count)| count > 0) {
         writeln!(out, "skipped   {} {cause}", HumanCount(count))?;
     }
@@ -64,7 +69,7 @@ pub fn print(mut summary: Summary, json: bool) -> anyhow::Result<()> {
     }
     print_io(&summary, &mut out)?;
     if let Some(bytes) = summary.peak_rss_bytes {
-        writeln!(out, "memory    {} at most", HumanBytes(bytes))?;
+        writeln!(out, "memory    {} peak", HumanBytes(bytes))?;
     }
     Ok(())
 }
@@ -88,7 +93,7 @@ fn print_io(summary: &Summary, out: &mut impl Write) -> std::io::Result<()> {
         let count = HumanCount(count);
         writeln!(
             out,
-            "stalls    {count}: half within {p50:.1} ms, 99 % within {p99:.1}, at most {worst:.1}"
+            "stalls    {count}: half within {p50:.1} ms, 99 % within {p99:.1}, maximum {worst:.1}"
         )?;
     }
     Ok(())
@@ -106,10 +111,7 @@ fn print_octrees(octrees: &OctreeWork, out: &mut impl Write) -> std::io::Result<
     if queue.limit_voxels > 0 {
         let (batches, voxels) = (HumanCount(queue.batches_in), HumanCount(queue.voxels_in));
         let (peak, waits) = (HumanCount(queue.peak_voxels), HumanCount(queue.waits));
-        writeln!(
-            out,
-            "queue     {batches} batches of {voxels} voxels, {peak} at most at once, {waits} waits"
-        )?;
+        writeln!(out, "queue     {batches} batches of {voxels} voxels, peak {peak}, {waits} waits")?;
     }
     let stages = [
         ("tables", times.table_update_ns),

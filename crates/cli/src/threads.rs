@@ -4,13 +4,13 @@ use std::num::NonZero;
 use std::sync::mpsc::{Sender, channel};
 use std::thread::{self, available_parallelism};
 
-/// Starts the threads that scans are mapped with: so many, or one a core, or as many as the system gives; where it
-/// gives none, this one does all the work.
+/// Starts the mapping threads: `count`, or one per core, or as many as the system allows. If it allows none, the
+/// current thread does all the work.
 ///
-/// They are there before the pool is told of them. A pool that asks for a thread itself and gets none is no pool for
-/// the rest of the process.
-pub fn start(most: Option<u16>) -> anyhow::Result<()> {
-    let wanted = most.map_or_else(default_threads, usize::from);
+/// Threads start before the pool is built: if a pool fails to start a thread itself, it is unusable for the rest of the
+/// process.
+pub fn start(count: Option<u16>) -> anyhow::Result<()> {
+    let wanted = count.map_or_else(default_threads, usize::from);
     let mut waiting: Vec<Sender<rayon::ThreadBuilder>> = Vec::new();
     for number in 0..wanted {
         let (work, work_in) = channel::<rayon::ThreadBuilder>();
@@ -41,9 +41,9 @@ pub fn start(most: Option<u16>) -> anyhow::Result<()> {
     started.with_context(|| format!("cannot start {wanted} threads"))
 }
 
-/// What rayon takes unless something else is asked for.
+/// Returns rayon's default number of threads.
 fn default_threads() -> usize {
-    let asked_for = std::env::var("RAYON_NUM_THREADS").ok().and_then(|number| number.parse().ok());
+    let from_environment = std::env::var("RAYON_NUM_THREADS").ok().and_then(|number| number.parse().ok());
     let cores = || available_parallelism().map_or(1, NonZero::get);
-    asked_for.filter(|&number| (1..=1024).contains(&number)).unwrap_or_else(cores)
+    from_environment.filter(|&number| (1..=1024).contains(&number)).unwrap_or_else(cores)
 }

@@ -10,7 +10,7 @@ use voxtile_pipeline::memory;
 use voxtile_pipeline::place::{place_of, url_of};
 use voxtile_pipeline::whole_map;
 
-/// More findings than a person reads; the rest are counted.
+/// Maximum number of findings in JSON; the summary counts all.
 const MAX_FINDINGS: usize = 10_000;
 
 #[derive(Serialize)]
@@ -83,23 +83,23 @@ fn print(args: &VerifyArgs, verification: &Verification, out: &mut impl Write) -
         let (leftovers, map) = (HumanCount(*leftovers), args.map.display());
         writeln!(
             out,
-            "leftovers: {leftovers} files, named above, are waiting to be removed or to get their final names. The \
-             next process that opens the map for writing does that, and so does `voxtile repair {map}`."
+            "leftovers: {leftovers} files, named above, must still be removed or renamed. The \
+             next process that opens the map for writing completes this, and so does `voxtile repair {map}`."
         )?;
     }
     match (damage, verified) {
         (0, _) if *unsettled > 0 => writeln!(
             out,
-            "undecided: {} possible faults; the map kept changing. Run verify while no process writes.",
+            "undecided: {} possible faults, because the map kept changing; run verify while no process writes",
             HumanCount(*unsettled)
         ),
-        (0, true) => writeln!(out, "whole: every checksum matches"),
-        (0, false) => writeln!(out, "unverified: the map has no checksums; the form of its tables is right"),
+        (0, true) => writeln!(out, "intact: all checksums match"),
+        (0, false) => writeln!(out, "unverified: the map has no checksums; its tables are well-formed"),
         (damage, _) => {
             let map = args.map.display();
             writeln!(
                 out,
-                "damaged: {damage} findings; put files back from a copy, or run `voxtile repair {map}`"
+                "damaged: {damage} findings; restore files from a backup, or run `voxtile repair {map}`"
             )
         }
     }

@@ -15,18 +15,18 @@ pub fn run(args: &ViewArgs) -> anyhow::Result<ExitCode> {
         keeps_levels: !args.no_cache,
         progress: bar(),
     })?;
-    tell(args, &view)?;
+    report(args, &view)?;
     if !args.no_browser && !args.json && std::io::stdout().is_terminal() && has_screen() {
-        // A browser that does not start is no reason to stop: the URL is on the screen.
+        // The URL is printed, so continue if no browser starts.
         if let Err(error) = open::that_detached(view.url()) {
-            log::info!("no browser: {error}");
+            log::info!("cannot start a browser: {error}");
         }
     }
     view.serve()?;
     Ok(ExitCode::SUCCESS)
 }
 
-/// Shows a bar from the first tiles to the last.
+/// Returns a progress callback that shows a bar over tiles.
 fn bar() -> voxtile_view::Progress {
     let shown: Mutex<Option<Progress>> = Mutex::new(None);
     Arc::new(move |done, all| {
@@ -40,7 +40,7 @@ fn bar() -> voxtile_view::Progress {
     })
 }
 
-fn tell(args: &ViewArgs, view: &View) -> anyhow::Result<()> {
+fn report(args: &ViewArgs, view: &View) -> anyhow::Result<()> {
     let (mut out, url, address) = (std::io::stdout().lock(), view.url(), view.address());
     if args.json {
         json::print(&serde_json::json!({ "url": url, "listen": address.to_string() }), &mut out)?;
@@ -49,13 +49,13 @@ fn tell(args: &ViewArgs, view: &View) -> anyhow::Result<()> {
     writeln!(out, "open {url}")?;
     if address.ip().is_loopback() && std::env::var_os("SSH_CONNECTION").is_some() {
         let port = address.port();
-        writeln!(out, "from another machine, after: ssh -L {port}:127.0.0.1:{port} THIS_MACHINE")?;
+        writeln!(out, "from another machine: ssh -L {port}:127.0.0.1:{port} THIS_MACHINE")?;
     }
-    writeln!(out, "Ctrl-C ends it")?;
+    writeln!(out, "press Ctrl-C to stop")?;
     Ok(out.flush()?)
 }
 
-/// Whether there is a screen that a browser could use.
+/// Returns whether there is a screen for a browser.
 fn has_screen() -> bool {
     let is_set = |name| std::env::var_os(name).is_some_and(|value| !value.is_empty());
     !cfg!(target_os = "linux") || is_set("DISPLAY") || is_set("WAYLAND_DISPLAY")

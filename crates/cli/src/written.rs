@@ -4,12 +4,12 @@ use std::path::Path;
 use voxtile::mapper::MapReader;
 use voxtile::operations::WrittenMap;
 
-/// Warns, and returns the warnings, of maps that keep scans: a new map that is made of their tiles gets none.
+/// Warns about maps that keep scans, and returns the warnings: a new map made from their tiles has no scans.
 pub fn warn_of_scans_left<'a>(maps: impl IntoIterator<Item = &'a MapReader>) -> Vec<String> {
     let keep_scans = maps.into_iter().filter(|map| map.keeps_scans());
     let warning = |map: &MapReader| {
         let warning = format!(
-            "{} keeps its scans, and the new map gets none of them: it cannot be remapped, and no scan removed from it",
+            "{} keeps its scans, but they are not copied: `remap` and `remove-scans` do not work on the new map",
             map.folder().display()
         );
         log::warn!("{warning}");
@@ -18,7 +18,7 @@ pub fn warn_of_scans_left<'a>(maps: impl IntoIterator<Item = &'a MapReader>) -> 
     keep_scans.map(warning).collect()
 }
 
-/// Says for a person what a new map is.
+/// Prints the summary of a new map.
 pub fn print_written(map: &Path, written: &WrittenMap, out: &mut impl Write) -> std::io::Result<()> {
     let WrittenMap { tiles, voxels, occupied, table_bytes, octree_bytes, .. } = *written;
     writeln!(out, "map       {}", map.display())?;

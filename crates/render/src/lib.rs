@@ -1,10 +1,9 @@
-//! Pictures of maps, and numbers to go with them: from above, cut at a height, from a side, or what became of one state
-//! on the way to another. [`levels`] are for viewers that load only what is near.
+//! Draws pictures of maps, from above, as a slice, from a side, or of the changes between two states, and counts their
+//! content. [`levels`] are for viewers that load only what the view needs.
 //!
-//! A [`Picture`] says what to draw and how; it draws anything that is a [`MapView`](voxtile::MapView): maps on disk,
-//! snapshots, maps in memory, files of OctoMap. It reads a map of any size tile by tile, on the threads of the caller's
-//! rayon pool, and keeps the cells of the picture and one tile a thread. The picture is the same to the byte for any
-//! number of threads. Nothing here knows a terminal, a page or a file.
+//! A [`Picture`] has the options and draws any [`MapView`](voxtile::MapView): maps on disk, snapshots, maps in memory,
+//! OctoMap files. It reads a map tile by tile on the caller's rayon pool and keeps only the cells of the picture and
+//! one tile per thread. The image does not depend on the number of threads. The crate does no file or terminal I/O.
 //!
 //! ```
 //! use voxtile_render::{ColorBy, Picture, View};

@@ -6,57 +6,57 @@ use voxtile::sensor::Evidence;
 use voxtile::space::{TileBox, TileIndex};
 use voxtile::{Error, Result};
 
-/// What a map holds, counted voxel by voxel.
+/// Counts of the content of a map, voxel by voxel.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct Survey {
-    /// Observed voxels.
+    /// Number of observed voxels.
     pub voxels: u64,
-    /// Occupied voxels.
+    /// Number of occupied voxels.
     pub occupied: u64,
-    /// Columns of voxels in which something was observed.
+    /// Number of columns with an observed voxel.
     pub columns: u64,
-    /// Columns in which something is occupied.
+    /// Number of columns with an occupied voxel.
     pub occupied_columns: u64,
-    /// Area of the columns in which something was observed, in square metres.
+    /// Area of the columns with an observed voxel, in square metres.
     pub area_m2: f64,
     /// Volume of the observed voxels, in cubic metres.
     pub volume_m3: f64,
-    /// Observed voxels by probability: twenty bins of 0.05 from 0 on, the last with 1.
+    /// Observed voxels by probability: twenty bins of 0.05 from 0; the last includes 1.
     pub probabilities: [u64; 20],
-    /// Occupied voxels by height, from the lowest bin on.
+    /// Occupied voxels by height, from the lowest bin.
     pub heights: Vec<HeightBin>,
     /// Tiles that could not be read and are not counted.
     pub unread: Vec<[i32; 3]>,
 }
 
-/// Occupied voxels between two heights.
+/// Number of occupied voxels between two heights.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct HeightBin {
     /// Lower border in metres.
     pub from_m: f64,
     /// Upper border in metres.
     pub to_m: f64,
-    /// Occupied voxels.
+    /// Number of occupied voxels.
     pub occupied: u64,
 }
 
-/// Most bins of heights.
+/// Maximum number of height bins.
 const MAX_BINS: u64 = 40;
 
 impl Survey {
-    /// Counts a map, tile by tile, on the threads of the caller's rayon pool; damaged tiles are left out. `progress`
-    /// is told the tiles done and all, from any thread. Memory: the list of tiles, and one tile a thread.
+    /// Counts a map tile by tile on the caller's rayon pool; damaged tiles are skipped. `progress` receives the numbers
+    /// of finished and of all tiles, from any thread. Memory: the list of tiles, and one tile per thread.
     ///
     /// # Errors
     ///
-    /// What is not about one tile alone, such as [`Error::Changed`].
+    /// Fails on errors that do not concern a single tile, such as [`Error::Changed`].
     pub fn of(map: &dyn MapView, progress: impl Fn(u64, u64) + Sync) -> Result<Self> {
         let tiles = map.tile_indices();
         let Some(bounds) = TileBox::of(tiles.iter().copied()) else { return Ok(Self::default()) };
         let counter = Counter::of(map, bounds);
         let (done, all) = (AtomicU64::new(0), tiles.len() as u64);
-        // Tiles above each other share their columns. They follow each other: tiles are in order of x, y and z.
+        // Tiles of one stack share their columns. They are adjacent in the list, which is sorted by x, y and z.
         let stacks: Vec<&[TileIndex]> =
             tiles.chunk_by(|a, b| a.to_array()[..2] == b.to_array()[..2]).collect();
         let counts = stacks
@@ -71,7 +71,7 @@ struct Counter<'a> {
     map: &'a dyn MapView,
     /// Lowest voxel of the lowest tile.
     bottom: i64,
-    /// Voxels that a bin of heights is high.
+    /// Height of a bin in voxels.
     bin: i64,
 }
 
@@ -95,12 +95,12 @@ impl<'a> Counter<'a> {
         Self { map, bottom, bin }
     }
 
-    /// Counts tiles above each other.
+    /// Counts the tiles of one stack.
     fn count(&self, stack: &[TileIndex], step: impl Fn()) -> Result<Counts> {
         let config = self.map.config();
         let occupied_from = config.occupied_log_odds();
         let edge = config.grid.voxels_per_tile_edge();
-        // By column: 1 is observed, 2 is occupied.
+        // By column: bit 1 is observed, bit 2 is occupied.
         let mut columns = vec![0_u8; (edge * edge) as usize];
         let mut counts = Counts::default();
         for &index in stack {

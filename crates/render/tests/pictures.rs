@@ -1,4 +1,4 @@
-//! Pictures of known maps, pixel by pixel, and counts of what a map holds.
+//! Checks pictures of known maps pixel by pixel, and counts of maps.
 
 use std::sync::Mutex;
 use voxtile::mapper::{MapStatistics, MapView, TileRef};
@@ -9,7 +9,7 @@ use voxtile_render::{ColorBy, Drawn, Image, Picture, SideAxis, Survey, View, col
 
 const RESOLUTION_M: f64 = 0.5;
 
-/// A map of single observations: the voxels of these centers, occupied or free.
+/// Returns a map with these occupied and free voxels, by their centers.
 fn map_of(occupied: &[Point], free: &[Point]) -> InMemoryMapper {
     let mut map = InMemoryMapper::new(MapConfig::new(RESOLUTION_M, 4.0).unwrap()).unwrap();
     for (points, is_occupied) in [(occupied, true), (free, false)] {
@@ -19,7 +19,7 @@ fn map_of(occupied: &[Point], free: &[Point]) -> InMemoryMapper {
     map
 }
 
-/// A wall of 12 voxels along x and 4 along z, with a free voxel in front of each end.
+/// Returns a wall of 12 voxels along x and 4 along z, with a free voxel in front of each end.
 fn wall() -> InMemoryMapper {
     let mut wall = Vec::new();
     for x in 0..12 {
@@ -34,7 +34,7 @@ fn center(voxel: [i32; 3]) -> Point {
     voxel.map(|index| (f64::from(index) + 0.5) * RESOLUTION_M)
 }
 
-/// Cells as pixels: no margin, no grid.
+/// Options for one pixel per cell: no margin, no grid.
 fn plain() -> Picture {
     Picture::new().with_legend(false).with_grid(false).with_size_px([240; 2])
 }
@@ -43,7 +43,7 @@ fn draw(picture: &Picture, map: &impl MapView) -> Drawn {
     picture.draw(map, |_, _| {}).unwrap()
 }
 
-/// The color in the middle of a cell, counted from the lower left.
+/// Returns the color at the center of a cell, numbered from the lower left.
 fn cell(drawn: &Drawn, [across, up]: [usize; 2]) -> [u8; 3] {
     let [left, top, _, height] = drawn.map_px;
     let half = drawn.cell_px / 2;
@@ -54,14 +54,14 @@ fn cell(drawn: &Drawn, [across, up]: [usize; 2]) -> [u8; 3] {
 }
 
 #[test]
-fn a_wall_from_above_is_where_it_is() {
+fn a_wall_from_above_has_the_right_cells() {
     let drawn = draw(&plain(), &wall());
     assert_eq!((drawn.cell_px, drawn.cell_m), (20, RESOLUTION_M));
     assert_eq!(drawn.region_m.unwrap().max[..2], [6.0, 2.0]);
     assert_eq!((drawn.image.width_px(), drawn.image.height_px()), (240, 80));
     assert_eq!((drawn.solid_cells, drawn.known_cells), (12, 14));
     for x in 0..12 {
-        // One height has one color: that of the lowest.
+        // A single height has the lowest color.
         assert_eq!(cell(&drawn, [x, 3]), colors::color_of(0.0), "{x}");
         let below = if x == 0 || x == 11 { colors::FREE } else { colors::UNKNOWN };
         assert_eq!(cell(&drawn, [x, 0]), below, "{x}");
@@ -77,7 +77,7 @@ fn a_wall_from_the_side_rises_in_color() {
     for z in 0..4 {
         assert_eq!(cell(&drawn, [5, z]), colors::color_of(z as f64 / 3.0), "{z}");
     }
-    // From the other side the wall is a line, and what is free lies beside it.
+    // From the other side the wall is a line, with free voxels next to it.
     let drawn = draw(&plain().with_view(View::Side(SideAxis::Y)), &wall());
     assert_eq!(cell(&drawn, [3, 3]), colors::color_of(1.0));
     assert_eq!(cell(&drawn, [0, 0]), colors::FREE);
@@ -85,7 +85,7 @@ fn a_wall_from_the_side_rises_in_color() {
 }
 
 #[test]
-fn a_slice_cuts_what_is_above_and_below() {
+fn a_slice_excludes_voxels_above_and_below() {
     let map = map_of(&[center([0, 0, 0]), center([1, 0, 1]), center([2, 0, 2]), center([3, 0, 3])], &[]);
     let known = |z_m, thickness_m| {
         let drawn = draw(&plain().with_view(View::Slice { z_m, thickness_m }), &map);
@@ -105,7 +105,7 @@ fn a_slice_cuts_what_is_above_and_below() {
 }
 
 #[test]
-fn a_region_is_all_that_is_drawn() {
+fn only_the_region_is_drawn() {
     let region = Aabb { min: [1.0, 1.5, 0.0], max: [2.5, 2.0, 0.5] };
     let drawn = draw(&plain().with_region(region), &wall());
     let drawn_region = drawn.region_m.unwrap();
@@ -118,7 +118,7 @@ fn a_region_is_all_that_is_drawn() {
 }
 
 #[test]
-fn what_changed_has_a_color_of_its_own() {
+fn changes_have_their_own_colors() {
     let places: Vec<Point> = (0..3).map(|x| center([2 * x, 0, 0])).collect();
     let before = map_of(&places[..2], &[]);
     let after = map_of(&places[1..], &places[..1]);
@@ -133,21 +133,21 @@ fn what_changed_has_a_color_of_its_own() {
 }
 
 #[test]
-fn the_way_of_the_sensor_is_a_line() {
+fn the_trajectory_is_a_line() {
     let path = vec![center([1, 1, 0]), center([3, 1, 0]), center([5, 1, 0])];
     let drawn = draw(&plain().with_path(path), &wall());
     for x in 1..=5 {
         assert_eq!(cell(&drawn, [x, 1]), colors::PATH, "{x}");
     }
     assert_eq!(cell(&drawn, [6, 1]), colors::UNKNOWN);
-    // What lies outside is left out, also what is no number.
+    // Positions outside and invalid ones are skipped.
     let stray = vec![[f64::NAN; 3], [1e300; 3], [-1e9, 0.0, 0.0], [f64::INFINITY, 1.0, 1.0]];
     let stray = draw(&plain().with_path(stray), &wall());
     assert_eq!(stray.image, draw(&plain(), &wall()).image);
 }
 
 #[test]
-fn probability_and_count_have_scales_of_their_own() {
+fn probability_and_count_have_their_own_scales() {
     let twice = [center([0, 0, 0]), center([0, 0, 0]), center([1, 0, 0])];
     let map = map_of(&twice, &[]);
     let drawn = draw(&plain().with_color(ColorBy::Probability), &map);
@@ -175,7 +175,7 @@ fn any_map_has_a_picture() {
     assert_eq!(draw(&plain(), &far).solid_cells, 2);
 }
 
-/// Scattered scans over many tiles.
+/// Returns a map of scattered scans over many tiles.
 fn survey_map() -> InMemoryMapper {
     let mut map = InMemoryMapper::new(MapConfig::new(0.2, 2.0).unwrap().with_range(0.0, 30.0)).unwrap();
     for scan in 0..6 {
@@ -214,10 +214,10 @@ fn rayon_pool(threads: usize) -> rayon::ThreadPool {
     rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap()
 }
 
-/// A map that knows how many of its tiles were out at once.
+/// Map that counts the reads of its tiles.
 struct Counting<'a> {
     map: &'a InMemoryMapper,
-    asked: Mutex<u64>,
+    reads: Mutex<u64>,
 }
 
 impl MapView for Counting<'_> {
@@ -240,10 +240,10 @@ impl MapView for Counting<'_> {
         Vec::new()
     }
     fn tile(&self, _: TileIndex) -> Result<Option<TileRef<'_>>> {
-        panic!("a picture pushes no tile out of a cache")
+        panic!("a picture must not evict tiles from a cache")
     }
     fn tile_uncached(&self, index: TileIndex) -> Result<Option<TileRef<'_>>> {
-        *self.asked.lock().unwrap() += 1;
+        *self.reads.lock().unwrap() += 1;
         self.map.tile_uncached(index)
     }
     fn voxels_of_tile_hint(&self, index: TileIndex) -> Option<u64> {
@@ -258,12 +258,12 @@ impl MapView for Counting<'_> {
 }
 
 #[test]
-fn tiles_outside_of_what_is_drawn_are_not_read() {
+fn tiles_outside_the_picture_are_not_read() {
     let map = survey_map();
-    let counting = Counting { map: &map, asked: Mutex::new(0) };
+    let counting = Counting { map: &map, reads: Mutex::new(0) };
     let region = Aabb { min: [0.1, 0.1, 0.1], max: [1.9, 1.9, 1.9] };
     let drawn = draw(&plain().with_region(region), &counting);
-    assert_eq!((drawn.tiles, *counting.asked.lock().unwrap()), (1, 1));
+    assert_eq!((drawn.tiles, *counting.reads.lock().unwrap()), (1, 1));
     let by_scan = draw(&plain().with_color(ColorBy::LastScan), &counting);
     assert!(by_scan.range.unwrap()[1] > 1.0);
     let error = plain().with_color(ColorBy::LastScan).draw(&map, |_, _| {}).unwrap_err();
@@ -271,7 +271,7 @@ fn tiles_outside_of_what_is_drawn_are_not_read() {
 }
 
 #[test]
-fn a_survey_counts_what_the_map_holds() {
+fn a_survey_counts_the_content_of_a_map() {
     let map = survey_map();
     let survey = Survey::of(&map, |_, _| {}).unwrap();
     let (mut voxels, mut occupied, mut columns) = (0, 0, std::collections::BTreeSet::new());

@@ -1,19 +1,19 @@
 use super::{Random, Solid};
 
-/// Metres from one street's middle line to the next: the edge of a block with half of each street around it.
+/// Distance between the middle lines of two streets in metres: a block with half of the streets around it.
 pub(super) const BLOCK_M: f64 = 60.0;
 
-// Distances from the middle line of a street, in metres. Traffic keeps within 4 m of it.
+// Distances from the middle line of a street, in metres. Traffic stays within 4 m of it.
 const CAR_MIDDLE_M: f64 = 5.75;
 const KERB_M: f64 = 7.0;
 const LAMP_M: f64 = 7.6;
 const TREE_M: f64 = 8.6;
 const FRONT_M: f64 = 10.0;
 
-/// Deepest house, in metres from the building line.
+/// Maximum depth of a house, in metres from the building line.
 const DEEPEST_M: f64 = 15.0;
 
-/// Adds all boxes of the block at integer coordinates; none reaches out of the block.
+/// Adds all boxes of the block at integer coordinates; none extends beyond the block.
 pub(super) fn build(seed: u64, block: [i64; 2], solids: &mut Vec<Solid>) {
     let mut random = Random::of(seed, &block);
     let corner_m = block.map(|i| i as f64 * BLOCK_M);
@@ -46,7 +46,7 @@ enum Side {
     East,
 }
 
-/// One side of a block, seen from its street: `along` it, and how far `off` the street's middle line.
+/// One side of a block, in coordinates `along` its street and `off` the street's middle line.
 struct Edge {
     side: Side,
     corner_m: [f64; 2],
@@ -68,21 +68,21 @@ impl Edge {
         self.solids.push(Solid::new(corner(0), corner(1), reflectivity));
     }
 
-    /// A box given by its middle and its size along and off the street.
+    /// Adds a box, given by its middle and size along and off the street.
     fn add_at(&mut self, middle_m: [f64; 2], size_m: [f64; 2], z_m: [f64; 2], reflectivity: f64) {
         let span = |k: usize| [middle_m[k] - 0.5 * size_m[k], middle_m[k] + 0.5 * size_m[k]];
         self.add(span(0), span(1), z_m, reflectivity);
     }
 }
 
-/// A row of houses along the side. South and north rows reach from corner to corner, the others fill between.
+/// Adds a row of houses. South and north rows reach from corner to corner, the others fill the gaps.
 fn houses(random: &mut Random, edge: &mut Edge) {
     let between = matches!(edge.side, Side::West | Side::East);
     let inset_m = FRONT_M + if between { DEEPEST_M + 0.5 } else { 0.0 };
     let end = BLOCK_M - inset_m;
     let mut along = inset_m;
     if between && random.chance(0.3) {
-        // An open yard behind a wall.
+        // Open yard behind a wall.
         edge.add([along, end], [FRONT_M, FRONT_M + 0.25], [0.15, random.between(0.8, 2.0)], 0.5);
         return;
     }
@@ -122,7 +122,7 @@ fn house(random: &mut Random, edge: &mut Edge, along_m: [f64; 2], front_m: f64) 
     }
 }
 
-/// Lamps, signs, trees and bins on the pavement.
+/// Adds lamps, signs, trees and bins on the pavement.
 fn furniture(random: &mut Random, edge: &mut Edge) {
     for slot in 0..3 {
         let along = 12.0 + 18.0 * f64::from(slot);
@@ -175,7 +175,7 @@ fn parked_cars(random: &mut Random, edge: &mut Edge) {
     }
 }
 
-/// Trees on a jittered grid and a pavilion.
+/// Adds trees on a jittered grid and a pavilion.
 fn park(random: &mut Random, edge: &mut Edge) {
     for row in 0..4 {
         for column in 0..4 {
@@ -194,7 +194,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn no_box_leaves_its_block_or_stands_in_the_way_of_traffic() {
+    fn no_box_leaves_its_block_or_blocks_traffic() {
         for index in 0..400 {
             let block = [index % 20 - 10, index / 20 - 10];
             let mut solids = Vec::new();

@@ -1,16 +1,16 @@
 use super::{Random, Scene, Solid, World};
 use voxtile::space::Point;
 
-/// A made-up floor of offices: 40 x 20 x 3 m, a corridor, eight rooms on either side, doors, pillars, furniture.
+/// Synthetic office floor of 40 x 20 x 3 m: a corridor, eight rooms on either side, doors, pillars, furniture.
 ///
-/// One corner is the world's origin; the floor is the plane z = 0. The walls are the same for every seed, doors
-/// and furniture are not.
+/// One corner is the world's origin; the floor is the plane z = 0. The walls are the same for all seeds, doors and
+/// furniture differ.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Building {
     seed: u64,
 }
 
-/// One of the rooms of a [`Building`]: its own frame begins at its far corner from the corridor.
+/// Room of a [`Building`]; its frame begins at its corner farthest from the corridor.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Room {
     column: u32,
@@ -33,12 +33,12 @@ impl Building {
     /// Length, depth and height in metres.
     pub const SIZE_M: [f64; 3] = [40.0, 20.0, 3.0];
 
-    /// The building of a seed.
+    /// Returns the building of a seed.
     pub fn new(seed: u64) -> Self {
         Self { seed }
     }
 
-    /// Every room, in the order of a walk along the corridor.
+    /// Returns all rooms in order of a walk along the corridor.
     pub(super) fn rooms(self) -> impl Iterator<Item = Room> {
         (0..2 * Room::COLUMNS).map(move |number| {
             let mut random = Random::of(self.seed, &[3, i64::from(number)]);
@@ -73,12 +73,12 @@ impl Room {
     pub(super) const WIDTH_M: f64 = Building::SIZE_M[0] / Self::COLUMNS as f64;
     pub(super) const DEPTH_M: f64 = 0.5 * (Building::SIZE_M[1] - CORRIDOR_M);
 
-    /// Middle of its door along its width, in metres.
+    /// Returns the middle of the door along the room's width, in metres.
     pub(super) fn door_m(&self) -> f64 {
         self.door_m
     }
 
-    /// World coordinates in plan of a point of the room: along its width, and from its outer wall to the corridor.
+    /// Converts room coordinates, along its width and from its outer wall to the corridor, to world x and y.
     pub(super) fn in_world(&self, along_m: f64, deep_m: f64) -> [f64; 2] {
         let y = if self.is_south { deep_m } else { Building::SIZE_M[1] - deep_m };
         [f64::from(self.column) * Self::WIDTH_M + along_m, y]
@@ -92,7 +92,7 @@ impl Room {
             solids.push(Solid::new([x0, y0, z_m[0]], [x1, y1, z_m[1]], reflectivity));
         };
         let (width, depth) = (Self::WIDTH_M, Self::DEPTH_M);
-        // The wall to the next room, and the one to the corridor with its door.
+        // Wall to the next room, and wall to the corridor with the door.
         if self.column + 1 < Self::COLUMNS {
             add([width - HALF_WALL_M, width + HALF_WALL_M], [0.0, depth], [0.0, height], WALL);
         }
@@ -101,10 +101,10 @@ impl Room {
         add([0.0, door[0]], front, [0.0, height], WALL);
         add([door[1], width], front, [0.0, height], WALL);
         add(door, front, [DOOR_HEIGHT_M, height], WALL);
-        // A pillar stands in the middle: a walk goes around it.
+        // Pillar in the middle; a walk goes around it.
         let middle = [0.5 * width, 0.5 * depth];
         add([middle[0] - 0.22, middle[0] + 0.22], [middle[1] - 0.22, middle[1] + 0.22], [0.0, height], 0.6);
-        // Furniture keeps to the walls.
+        // Furniture is at the walls.
         for (wall, inwards) in [(0.25, 1.0), (width - 0.25, -1.0)] {
             let mut deep = 1.6;
             while deep < depth - 2.2 {

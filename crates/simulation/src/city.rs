@@ -2,24 +2,24 @@ use super::scene::bounded;
 use super::{Scene, World, block};
 use voxtile::space::Point;
 
-/// An endless made-up city: streets on a square grid, houses, parks, parked cars, lamps, trees.
+/// Unbounded synthetic city: streets on a square grid, houses, parks, parked cars, lamps, trees.
 ///
-/// A block is generated from the seed and its integer coordinates whenever a ray comes near, and forgotten
-/// afterwards, so a city takes the memory of its seed. The ground is the plane z = 0; the middle lines of the
-/// streets lie at multiples of [`City::BLOCK_M`].
+/// Blocks are generated from the seed and their integer coordinates when a ray needs them, and are not stored, so a
+/// city needs no memory but its seed. The ground is the plane z = 0; the middle lines of the streets are at multiples
+/// of [`City::BLOCK_M`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct City {
     seed: u64,
 }
 
-/// Asphalt is dark.
+/// Asphalt.
 const GROUND_REFLECTIVITY: f64 = 0.22;
 
 impl City {
-    /// Metres from one street's middle line to the next.
+    /// Distance between the middle lines of two streets, in metres.
     pub const BLOCK_M: f64 = block::BLOCK_M;
 
-    /// The city of a seed.
+    /// Returns the city of a seed.
     pub fn new(seed: u64) -> Self {
         Self { seed }
     }
@@ -29,8 +29,8 @@ impl World for City {
     fn scene(&self, center: Point, radius_m: f64) -> Scene {
         let radius_m = bounded(radius_m);
         let mut solids = Vec::new();
-        // A block's boxes never leave it, so the blocks that meet the square are all there is. The casts saturate:
-        // out there no metre can be told from the next, and the ranges are single blocks.
+        // A block's boxes never leave it, so the blocks that meet the square are sufficient. The casts saturate; at
+        // such distances f64 cannot resolve metres and the ranges are single blocks.
         let range = |k: usize| {
             let block_of = |x: f64| (x / Self::BLOCK_M).floor() as i64;
             block_of(center[k] - radius_m)..=block_of(center[k] + radius_m)
@@ -49,7 +49,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_block_is_the_same_from_wherever_it_is_seen() {
+    fn a_block_does_not_depend_on_the_scene() {
         let city = City::new(5);
         let origin = [2.0, 30.0, 1.8];
         let wide = city.scene([100.0, -50.0, 0.0], 300.0);
@@ -64,7 +64,7 @@ mod tests {
     }
 
     #[test]
-    fn every_hit_lies_on_the_surface_of_an_object() {
+    fn every_hit_is_on_the_surface_of_an_object() {
         let city = City::new(8);
         let origin = [2.0, 31.0, 1.8];
         let scene = city.scene(origin, 80.0);
@@ -91,14 +91,14 @@ mod tests {
     }
 
     #[test]
-    fn other_seeds_are_other_cities() {
+    fn other_seeds_give_other_cities() {
         let solids = |seed| City::new(seed).scene([0.0; 3], 50.0).solids().to_vec();
         assert_eq!(solids(1), solids(1));
         assert_ne!(solids(1), solids(2));
     }
 
     #[test]
-    fn any_place_and_range_is_answered() {
+    fn any_position_and_range_is_valid() {
         for x in [1e9, -1e18, 1e300, f64::NAN, f64::INFINITY] {
             City::new(1).cast([x, 0.0, 1.0], [1.0, 0.2, 0.0], 1e300);
             City::new(1).cast([0.0, 0.0, 1.0], [1.0, x, 0.0], x);

@@ -3,45 +3,45 @@ use super::plan::Plan;
 use super::route::{Route, sound_spacing};
 use voxtile::scan::Pose;
 
-/// An endless seeded drive through the streets of a [`City`](super::City), on the right.
+/// Endless seeded drive through the streets of a [`City`](super::City), on the right-hand side.
 ///
-/// It keeps nothing but where it is; skipping ahead costs some ten nanoseconds a street. As an iterator it yields the
-/// sensor's poses (`world_from_sensor`) and never ends. Every drive begins at the world's origin, along x.
+/// Memory is constant; skipping ahead costs about ten nanoseconds per street. The iterator yields the sensor's poses
+/// (`world_from_sensor`) without end. Every drive begins at the world's origin, along x.
 #[derive(Clone, Debug)]
 pub struct Drive {
     spacing_m: f64,
     next: u64,
-    /// As it was at the beginning.
+    /// Plan at the beginning.
     plan: Plan,
-    /// What comes after the leg.
+    /// Plan after the current leg.
     ahead: Plan,
     leg: Leg,
-    /// Metres driven before the leg.
+    /// Distance driven before the leg, in metres.
     start_m: f64,
 }
 
-/// After a million kilometres the car parks, so that no index takes forever to find.
+/// The car parks after a million kilometres, so that finding any index takes bounded time.
 const FARTHEST_M: f64 = 1e9;
 
 impl Drive {
-    /// A drive with turns and loops that finds its way by chance: a quarter of the time the car goes once around a
-    /// block, otherwise it turns as it likes, so it comes back to streets it knows from both sides.
+    /// Returns a random drive with turns and loops: a quarter of the decisions is a loop around a block, the rest are
+    /// random turns, so it revisits streets in both directions.
     ///
-    /// A pose every `spacing_m` metres (1 m if that is not a positive length).
+    /// There is a pose every `spacing_m` metres (1 m if that is not a positive length).
     pub fn new(seed: u64, spacing_m: f64) -> Self {
         Self::by(Plan::wander(seed), spacing_m)
     }
 
-    /// A drive that gets somewhere: mostly new streets, some old ones.
+    /// Returns a drive on mostly new streets.
     ///
-    /// It goes on in stages, east and north in turn, each of 2 to 11 streets. One stage in four has a lap: around 2 to
-    /// 7 blocks to the side, back over streets of earlier stages, and its own streets once more. So a good fifth of
-    /// the way is driven again, after one or two kilometres, and the rest is new however long the drive is.
+    /// It consists of stages, east and north in turn, each of 2 to 11 streets. One stage in four has a lap: around 2 to
+    /// 7 blocks to the side, back on streets of earlier stages, and its own streets again. A good fifth of the distance
+    /// is driven again after one or two kilometres; the rest is new for any length of the drive.
     pub fn tour(seed: u64, spacing_m: f64) -> Self {
         Self::by(Plan::tour(seed), spacing_m)
     }
 
-    /// The same round without end: `edge_blocks` (at least 1) streets ahead, to the left, and so on.
+    /// Returns endless laps of the same round: `edge_blocks` (at least 1) streets ahead, a left turn, and so on.
     pub fn laps(edge_blocks: u64, spacing_m: f64) -> Self {
         Self::by(Plan::laps(edge_blocks), spacing_m)
     }
@@ -52,7 +52,7 @@ impl Drive {
         Self { spacing_m: sound_spacing(spacing_m), next: 0, plan, ahead, leg, start_m: 0.0 }
     }
 
-    /// Metres from one pose to the next, along the way.
+    /// Returns the distance between two poses along the route, in metres.
     pub fn spacing_m(&self) -> f64 {
         self.spacing_m
     }
@@ -117,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pose_alone_is_the_pose_in_sequence() {
+    fn a_single_pose_equals_the_pose_in_sequence() {
         for mut drive in drives(9, 1.0) {
             let sequence: Vec<_> = drive.clone().take(2_000).collect();
             assert_eq!(drive.clone().nth(1_500), Some(sequence[1_500]));
@@ -128,7 +128,7 @@ mod tests {
         }
     }
 
-    /// Of the streets that a drive takes, from crossing to crossing, how many it has not taken before, in percent.
+    /// Returns the percentage of new streets among the first `streets` of a drive.
     fn new_streets(drive: Drive, streets: usize) -> usize {
         let mut seen = BTreeSet::new();
         let mut taken = 0;
@@ -137,7 +137,7 @@ mod tests {
         });
         let mut before = None;
         for place in places {
-            // A street is named by the middle between its crossings, in half blocks.
+            // A street is identified by the middle between its crossings, in half blocks.
             let street = place.map(|x| (2.0 * x).round() as i64);
             let in_street = street.iter().filter(|half| *half % 2 != 0).count() == 1;
             if !in_street || before == Some(street) {
@@ -154,13 +154,13 @@ mod tests {
     }
 
     #[test]
-    fn a_drive_comes_back_to_streets_and_finds_new_ones() {
+    fn a_drive_has_old_and_new_streets() {
         let new = new_streets(Drive::new(2, 5.0), 200);
         assert!((30..95).contains(&new), "{new} % are new");
     }
 
     #[test]
-    fn a_tour_finds_mostly_new_streets_however_long_it_is() {
+    fn a_tour_of_any_length_has_mostly_new_streets() {
         for seed in [1, 2, 3] {
             for streets in [400, 4_000] {
                 let new = new_streets(Drive::tour(seed, 5.0), streets);
@@ -170,13 +170,13 @@ mod tests {
     }
 
     #[test]
-    fn laps_are_the_same_streets_again_and_again() {
+    fn laps_repeat_the_same_streets() {
         assert_eq!(new_streets(Drive::laps(2, 5.0), 800), 1);
         assert_eq!(new_streets(Drive::laps(25, 5.0), 100), 100);
     }
 
     #[test]
-    fn a_drive_never_touches_anything() {
+    fn a_drive_has_no_collisions() {
         let city = City::new(6);
         for pose in drives(6, 2.0).into_iter().flat_map(|drive| drive.take(1_000)) {
             let at = pose.isometry().translation;

@@ -4,18 +4,19 @@ use std::f64::consts::FRAC_PI_2;
 use voxtile::maths;
 use voxtile::scan::Pose;
 
-/// From one crossing's far side, along a street of a [`City`], through the next crossing; on the right.
+/// Leg of a drive on the right-hand side: from the end of one crossing of a [`City`], along a street, through the next
+/// crossing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Leg {
-    /// The crossing that it begins at, in blocks.
+    /// Crossing at the start, in blocks.
     from: [i64; 2],
-    /// Along x or y, as a unit vector.
+    /// Unit vector along x or y.
     heading: [i64; 2],
-    /// At the crossing at its end.
+    /// Turn at the crossing at the end.
     turn: Turn,
 }
 
-/// What a car does at a crossing.
+/// Manoeuvre at a crossing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Turn {
     Ahead,
@@ -25,20 +26,20 @@ pub(super) enum Turn {
 
 /// Height of the sensor above the ground, in metres.
 pub(super) const SENSOR_HEIGHT_M: f64 = 1.8;
-/// Lane, in metres to the right of the street's middle line.
+/// Distance of the lane from the street's middle line to the right, in metres.
 const LANE_M: f64 = 2.0;
-/// Half the edge of the square of a crossing, in metres: within it the car turns.
+/// Half the edge length of a crossing, in metres; cars turn inside it.
 const CROSSING_M: f64 = 8.0;
 
 impl Leg {
-    /// Metres from one crossing's far side to the next crossing.
+    /// Distance between two crossings along a street, in metres.
     pub(super) const STREET_M: f64 = City::BLOCK_M - 2.0 * CROSSING_M;
 
     pub(super) fn new(from: [i64; 2], heading: [i64; 2], turn: Turn) -> Self {
         Self { from, heading, turn }
     }
 
-    /// The leg after this one, with the turn at its own end.
+    /// Returns the next leg, with the turn at its end.
     pub(super) fn following(&self, turn: Turn) -> Self {
         let [hx, hy] = self.heading;
         let heading = match self.turn {
@@ -58,16 +59,16 @@ impl Leg {
             }
     }
 
-    /// The pose so many metres after the leg's beginning.
+    /// Returns the pose at a distance from the leg's start, in metres.
     pub(super) fn pose(&self, driven_m: f64) -> Pose {
         let [hx, hy] = self.heading.map(|h| h as f64);
         let in_crossing_m = driven_m - Self::STREET_M;
-        // Ahead and to the right of the crossing that the leg begins at, and how far it has turned left.
+        // Position ahead and to the right of the first crossing, and the left turn so far.
         let (ahead, right, turned_rad) = if in_crossing_m <= 0.0 || self.turn == Turn::Ahead {
             (CROSSING_M + driven_m, LANE_M, 0.0)
         } else {
             let before = CROSSING_M + Self::STREET_M;
-            // Around the corner of the crossing on the side that the car turns to.
+            // Arc around the crossing's corner on the side of the turn.
             let (radius, sign) = match self.turn {
                 Turn::Left => (CROSSING_M + LANE_M, 1.0),
                 _ => (CROSSING_M - LANE_M, -1.0),

@@ -1,14 +1,14 @@
-//! A made-up world to map: seeded, endless, and the same to the last bit on every platform.
+//! Synthetic worlds for tests and benchmarks: seeded, unbounded, and bit-identical on all platforms.
 //!
 //! ```text
-//! City, Building, Warehouse  (World)  what there is: boxes and a ground plane   block, solid, scene
-//! Drive, Teleport, Walk  (Route)  where the sensor is at step k      leg, plan
-//! Lidar                    what it sees from there: a Scan in the world frame
-//! Survey                   the three together: scan k, or one scan after another
+//! City, Building, Warehouse  (World)  boxes and a ground plane                  block, solid, scene
+//! Drive, Teleport, Walk      (Route)  pose of the sensor at each step           leg, plan
+//! Lidar                               scans in the world frame, from a pose
+//! Survey                              world, route and lidar: a sequence of scans
 //! ```
 //!
-//! Everything is a function of a seed and an index. Nothing is stored that grows with the distance driven, and
-//! scan k comes out the same whether or not the scans before it were made.
+//! Everything is a function of a seed and an index. Memory does not grow with the distance, and scan k does not depend
+//! on whether earlier scans were generated.
 //!
 //! ```
 //! use voxtile_simulation::Survey;

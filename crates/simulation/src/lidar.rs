@@ -4,28 +4,28 @@ use voxtile::maths;
 use voxtile::scan::{Pose, Scan};
 use voxtile::space::Point;
 
-/// A spinning lidar: beams at fixed elevations, each fired at even steps around the full circle.
+/// Spinning lidar: beams at fixed elevations, each fired at equal angles over a full turn.
 ///
-/// Its frame has x ahead, y to the left, z up.
+/// Sensor frame: x ahead, y left, z up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Lidar {
-    /// Beams above each other.
+    /// Number of beams.
     pub beams: u32,
-    /// Rays of each beam in a turn.
+    /// Number of rays of each beam per turn.
     pub rays_per_beam: u32,
-    /// Elevation of the lowest and the highest beam in degrees, up is positive; the others lie evenly between.
+    /// Elevation of the lowest and the highest beam in degrees, positive upwards; the others are evenly spaced.
     pub elevation_deg: [f64; 2],
-    /// Farther surfaces are not seen, in metres; at most [`Scene::MAX_RADIUS_M`](super::Scene::MAX_RADIUS_M).
+    /// Maximum range in metres, at most [`Scene::MAX_RADIUS_M`](super::Scene::MAX_RADIUS_M).
     pub max_range_m: f64,
-    /// Standard deviation of a measured distance in metres; 0 measures exactly.
+    /// Standard deviation of the range noise in metres; 0 for exact ranges.
     pub range_noise_m: f64,
-    /// Whether a ray that meets nothing still gives a point: the sensor's own position, which maps skip and count.
+    /// Whether a ray without a hit returns a point at the sensor, which maps skip and count.
     pub reports_misses: bool,
 }
 
 impl Lidar {
-    /// The lidar of the *street* workload: 64 beams of 1024 rays. In a [`City`](super::City) its mean range is
+    /// Returns the lidar of the *street* workload: 64 beams of 1024 rays. In a [`City`](super::City) its mean range is
     /// about 12 m.
     pub fn street() -> Self {
         Self {
@@ -38,7 +38,7 @@ impl Lidar {
         }
     }
 
-    /// The lidar of the *indoor* workload: 90 000 rays. In a [`Building`](super::Building) its mean range is
+    /// Returns the lidar of the *indoor* workload: 90 000 rays. In a [`Building`](super::Building) its mean range is
     /// about 2.3 m.
     pub fn indoor() -> Self {
         Self {
@@ -51,13 +51,13 @@ impl Lidar {
         }
     }
 
-    /// A small lidar for a quick look: 16 beams of 360 rays.
+    /// Returns a small lidar for demos: 16 beams of 360 rays.
     pub fn demo() -> Self {
         Self { beams: 16, rays_per_beam: 360, max_range_m: 40.0, ..Self::street() }
     }
 
-    /// The street lidar with about so many rays a turn (at least 1): 64 beams from 32 768 rays on, else 32 from 4096
-    /// on, else 16.
+    /// Returns the street lidar with about `rays` rays per turn (at least 1): 64 beams from 32 768 rays, 32 beams from
+    /// 4096, else 16.
     pub fn of_rays(rays: u32) -> Self {
         let beams = match rays {
             32_768.. => 64,
@@ -67,8 +67,8 @@ impl Lidar {
         Self { beams, rays_per_beam: (rays.saturating_add(beams / 2) / beams).max(1), ..Self::street() }
     }
 
-    /// A lidar on a mast of [`Lidar::MAST_M`], with about so many rays a turn: it looks down on the city around, as far
-    /// as [`Scene::MAX_RADIUS_M`](super::Scene::MAX_RADIUS_M).
+    /// Returns a lidar for a mast of [`Lidar::MAST_M`] with about `rays` rays per turn. It looks down on the city, up
+    /// to [`Scene::MAX_RADIUS_M`](super::Scene::MAX_RADIUS_M).
     pub fn mast(rays: u32) -> Self {
         Self { elevation_deg: [-40.0, -4.0], max_range_m: super::Scene::MAX_RADIUS_M, ..Self::of_rays(rays) }
     }
@@ -76,10 +76,10 @@ impl Lidar {
     /// Height of the mast of [`Lidar::mast`] above the ground, in metres: above all roofs.
     pub const MAST_M: f64 = 50.0;
 
-    /// What the lidar sees from a pose: points in the world frame, intensities from 0 to 255.
+    /// Returns the scan from a pose: points in the world frame, intensities from 0 to 255.
     ///
-    /// The points come in the order of a turn, all beams of one direction together. The noise is that of
-    /// `seed` and `scan_number`, so it is another one at the next visit.
+    /// Points are ordered by angle, with all beams of one angle together. The noise depends on `seed` and
+    /// `scan_number`, so a second visit has other noise.
     pub fn scan(&self, world: &impl World, world_from_sensor: &Pose, seed: u64, scan_number: u64) -> Scan {
         let origin = world_from_sensor.position_m();
         let rotation = world_from_sensor.isometry().rotation.to_rotation_matrix();
@@ -96,7 +96,7 @@ impl Lidar {
                 let d = [flat * cos_azimuth, flat * sin_azimuth, up];
                 let direction =
                     std::array::from_fn(|i| r[(i, 0)] * d[0] + r[(i, 1)] * d[1] + r[(i, 2)] * d[2]);
-                // Drawn for every ray, so that a ray's noise does not depend on what others met.
+                // One number per ray, so that a ray's noise does not depend on the hits of others.
                 let error_m = self.range_noise_m * noise.bell();
                 match scene.cast(origin, direction, self.max_range_m) {
                     Some(hit) => {
@@ -115,7 +115,7 @@ impl Lidar {
         Scan { origin, points, intensities: Some(intensities) }
     }
 
-    /// Sine and cosine of a beam's elevation.
+    /// Returns sine and cosine of a beam's elevation.
     fn elevation(&self, beam: u32) -> (f64, f64) {
         let [low, high] = self.elevation_deg;
         let share = if self.beams > 1 { f64::from(beam) / f64::from(self.beams - 1) } else { 0.5 };
@@ -123,11 +123,11 @@ impl Lidar {
     }
 }
 
-/// The echo as a lidar reports it, a whole number from 0 to 255: dimmer from afar and at a grazing angle.
+/// Returns the intensity as an integer from 0 to 255, which decreases with range and grazing angle.
 fn intensity(hit: &Hit) -> f32 {
     let distance = hit.distance_m / 40.0;
     let echo = hit.reflectivity * (0.5 + 0.5 * hit.cos_incidence) / (1.0 + distance * distance);
-    // Near and bright surfaces saturate, as they do in a real one.
+    // Near and bright surfaces saturate, as in a real lidar.
     (400.0 * echo + 0.5).floor().clamp(0.0, 255.0) as f32
 }
 
@@ -147,12 +147,12 @@ mod tests {
         for point in &scan.points {
             let box_m = scene.solids().iter().map(|solid| solid.bounds.distance_squared(*point).sqrt());
             let nearest_m = box_m.fold(point[2].abs(), f64::min);
-            assert!(nearest_m < 1e-9, "{point:?} hangs {nearest_m} m from everything");
+            assert!(nearest_m < 1e-9, "{point:?} is {nearest_m} m from any surface");
         }
     }
 
     #[test]
-    fn rays_that_meet_nothing_give_a_point_only_if_asked() {
+    fn rays_without_a_hit_give_a_point_only_on_request() {
         let lidar = Lidar { elevation_deg: [80.0, 90.0], beams: 4, ..Lidar::street() };
         let pose = level_pose([0.0, 0.0, 1.8], 0.0);
         let city = City::new(3);
@@ -162,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn intensities_are_whole_numbers_of_a_byte_and_spread() {
+    fn intensities_are_integers_of_a_byte_and_vary() {
         let scan = Lidar::indoor().scan(&Building::new(3), &level_pose([2.0, 10.0, 1.4], 0.0), 1, 0);
         let intensities = scan.intensities.expect("a lidar has intensities");
         assert_eq!(intensities.len(), scan.points.len());
@@ -172,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lidar_has_about_as_many_rays_as_asked_for() {
+    fn a_lidar_has_about_the_requested_number_of_rays() {
         for rays in [0, 1, 100, 4_000, 8_000, 65_536, 1_000_000] {
             let lidar = Lidar::of_rays(rays);
             let has = lidar.beams * lidar.rays_per_beam;

@@ -1,27 +1,27 @@
 use super::Random;
 use super::leg::Turn;
 
-/// Which way a drive goes: the turn at each crossing, in their order.
+/// Sequence of turns of a drive, one per crossing.
 #[derive(Clone, Debug)]
 pub(super) enum Plan {
-    /// A quarter of the time once around a block, otherwise as it likes.
+    /// A quarter of the decisions is a loop around a block, the rest are random turns.
     Wander { seed: u64, crossing: u64 },
-    /// On to new streets, and now and then once around some blocks and over old ones.
+    /// Mostly new streets, with occasional laps around some blocks.
     Tour(Tour),
-    /// Around a square of blocks, left, without end.
+    /// Endless rounds around a square of blocks, with left turns.
     Laps { edge: u64, crossing: u64 },
 }
 
-/// Stages that lead east and north in turn, so that no stage meets an earlier one but by its own laps.
+/// Stages that lead east and north in turn, so that a stage meets earlier ones only in its own lap.
 ///
-/// A stage is `ahead` streets straight on and a turn. One in four drives a lap first: from the far end once around
-/// `ahead` x `across` blocks on the side where the tour came from, and again the `ahead` streets.
+/// A stage is `ahead` streets straight on and a turn. One stage in four drives a lap first: from its far end once
+/// around `ahead` x `across` blocks on the side of the earlier stages, and then the `ahead` streets again.
 #[derive(Clone, Debug)]
 pub(super) struct Tour {
     seed: u64,
     number: u64,
     stage: Stage,
-    /// Crossings of the stage that are behind.
+    /// Number of crossings of the stage that were passed.
     passed: u64,
 }
 
@@ -33,7 +33,7 @@ struct Stage {
     turn: Turn,
 }
 
-/// Turns of a wandering drive are decided so many at a time, so that a drive around the block is one decision.
+/// Number of turns per decision of a wandering drive, so that a loop around a block is one decision.
 const TURNS_A_MANOEUVRE: u64 = 4;
 
 impl Plan {
@@ -49,7 +49,7 @@ impl Plan {
         Self::Laps { edge: edge.max(1), crossing: 0 }
     }
 
-    /// What to do at the next crossing.
+    /// Returns the turn at the next crossing.
     pub(super) fn next_turn(&mut self) -> Turn {
         match self {
             Self::Wander { seed, crossing } => {
@@ -65,7 +65,7 @@ impl Plan {
     }
 }
 
-/// What a wandering drive does at its crossing of a number.
+/// Returns the turn of a wandering drive at a crossing by its number.
 fn wandering(seed: u64, crossing: u64) -> Turn {
     let manoeuvre = crossing / TURNS_A_MANOEUVRE;
     let mut whole = Random::of(seed, &[1, manoeuvre as i64]);
@@ -108,13 +108,13 @@ impl Stage {
         self.ahead + if self.has_lap { 2 * (self.ahead + self.across) } else { 0 }
     }
 
-    /// The turn at the stage's crossing of a number, the first being 1.
+    /// Returns the turn at a crossing of the stage, numbered from 1.
     fn turn_at(&self, crossing: u64) -> Turn {
         if crossing == self.crossings() {
             return self.turn;
         }
         let Self { ahead, across, .. } = *self;
-        // Only a stage with a lap gets to these.
+        // Only stages with a lap have these corners.
         let corners = [ahead, ahead + across, 2 * ahead + across, 2 * (ahead + across)];
         match (corners.contains(&crossing), self.turn) {
             (false, _) => Turn::Ahead,

@@ -1,45 +1,46 @@
-/// A small seeded generator of random numbers (SplitMix64), the same on every platform.
+/// Seeded pseudorandom numbers (SplitMix64), identical on all platforms.
 #[derive(Clone, Debug)]
 pub struct Random {
     state: u64,
 }
 
-/// The odd constant by which SplitMix64 steps: 2^64 over the golden ratio.
+/// Odd increment of SplitMix64: 2^64 divided by the golden ratio.
 const STEP: u64 = 0x9E37_79B9_7F4A_7C15;
 
 impl Random {
-    /// The generator of one thing, named by numbers: another thing, or another seed, gets an unrelated one.
+    /// Returns the generator for one object, identified by numbers; generators of other objects or seeds are
+    /// independent.
     pub fn of(seed: u64, name: &[i64]) -> Self {
         let fold = |state: u64, part: &i64| mixed(state.wrapping_add(STEP) ^ mixed(*part as u64));
         Self { state: name.iter().fold(mixed(seed.wrapping_add(STEP)), fold) }
     }
 
-    /// 64 random bits.
+    /// Returns 64 random bits.
     pub fn bits(&mut self) -> u64 {
         self.state = self.state.wrapping_add(STEP);
         mixed(self.state)
     }
 
-    /// A number from `low` up to, not including, `high` (or `low`, where the two are equal).
+    /// Returns a number in `low..high` (or `low` if both are equal).
     pub fn between(&mut self, low: f64, high: f64) -> f64 {
-        // The upper 53 bits are a whole number that an f64 holds exactly.
+        // The upper 53 bits are an integer that an f64 represents exactly.
         let unit = (self.bits() >> 11) as f64 * (1.0 / 9_007_199_254_740_992.0);
         low + (high - low) * unit
     }
 
-    /// A whole number from 0 up to, not including, `end` (0 where `end` is 0).
+    /// Returns an integer in `0..end` (0 if `end` is 0).
     pub fn below(&mut self, end: u64) -> u64 {
         ((u128::from(self.bits()) * u128::from(end)) >> 64) as u64
     }
 
-    /// True with this probability.
+    /// Returns true with this probability.
     pub fn chance(&mut self, probability: f64) -> bool {
         self.between(0.0, 1.0) < probability
     }
 
-    /// A number of mean 0 and standard deviation 1, bell-shaped, never beyond 3.47.
+    /// Returns a bell-shaped number with mean 0 and standard deviation 1, between -3.47 and 3.47.
     ///
-    /// The sum of four uniform numbers: it needs no logarithm, so it is exact everywhere.
+    /// It is the sum of four uniform numbers: without a logarithm it is exact on all platforms.
     pub fn bell(&mut self) -> f64 {
         let bits = self.bits();
         let sum: u64 = (0..4).map(|quarter| (bits >> (16 * quarter)) & 0xFFFF).sum();
@@ -48,7 +49,7 @@ impl Random {
     }
 }
 
-/// SplitMix64's finaliser: every input bit changes about half of the output bits.
+/// Finaliser of SplitMix64: every input bit changes about half of the output bits.
 fn mixed(mut bits: u64) -> u64 {
     bits = (bits ^ (bits >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     bits = (bits ^ (bits >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
@@ -61,7 +62,7 @@ mod tests {
 
     #[test]
     fn bits_are_those_of_splitmix64() {
-        // The first numbers of the reference implementation for state 0.
+        // First numbers of the reference implementation for state 0.
         let mut random = Random { state: 0 };
         assert_eq!(random.bits(), 0xE220_A839_7B1D_CDAF);
         assert_eq!(random.bits(), 0x6E78_9E6A_A1B9_65F4);
@@ -90,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn things_of_other_names_are_unrelated() {
+    fn generators_of_other_objects_are_independent() {
         let first = |seed, name: &[i64]| Random::of(seed, name).bits();
         assert_ne!(first(1, &[0, 1]), first(1, &[1, 0]));
         assert_ne!(first(1, &[0]), first(1, &[0, 0]));

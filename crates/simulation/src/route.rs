@@ -2,23 +2,24 @@ use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use voxtile::maths;
 use voxtile::scan::Pose;
 
-/// Where a sensor is, step after step.
+/// Pose of a sensor, step by step.
 pub trait Route {
-    /// Pose of the sensor at a step: takes the sensor frame (x ahead, y left, z up, metres) to the world's.
+    /// Returns the pose of the sensor at a step: the transform from the sensor frame (x ahead, y left, z up, metres) to
+    /// the world frame.
     ///
-    /// The same for the same index, whatever was asked before; in rising order it is quickest.
+    /// It depends only on the index, not on earlier calls; ascending order is fastest.
     fn pose(&mut self, index: u64) -> Pose;
 }
 
-/// The pose of a level sensor whose x axis points to `yaw_rad`, counted from the world's x axis towards y.
+/// Returns the pose of a level sensor whose x axis is turned by `yaw_rad` from the world's x axis towards y.
 pub(super) fn level_pose(position_m: [f64; 3], yaw_rad: f64) -> Pose {
-    // nalgebra's own constructors from angles call the platform's sine.
+    // The constructors of nalgebra call the platform's sine, which is not identical everywhere.
     let (sin, cos) = maths::sin_cos(0.5 * yaw_rad);
     let rotation = UnitQuaternion::new_unchecked(Quaternion::new(cos, 0.0, 0.0, sin));
     Isometry3::from_parts(Translation3::from(position_m), rotation).into()
 }
 
-/// A spacing that can be driven: positive and finite, else 1 m.
+/// Returns a spacing that is positive and finite, or else 1 m.
 pub(super) fn sound_spacing(spacing_m: f64) -> f64 {
     if spacing_m > 0.0 && spacing_m.is_finite() { spacing_m } else { 1.0 }
 }

@@ -2,42 +2,42 @@ use super::Solid;
 use super::solid::{Contact, Ray};
 use voxtile::space::Point;
 
-/// The part of a world around one place: its boxes in a grid of square cells, and the ground plane z = 0.
+/// Part of a world around one position: boxes in a grid of square cells, and the ground plane z = 0.
 #[derive(Clone, Debug)]
 pub struct Scene {
     solids: Vec<Solid>,
     ground_reflectivity: f64,
-    /// Lower corner in plan, metres, world frame.
+    /// Lower corner along x and y in metres, world frame.
     min: [f64; 2],
-    /// Cells along x and y.
+    /// Number of cells along x and y.
     cells: [usize; 2],
-    /// Where each cell's part of `members` begins; one more at the end.
+    /// Start of each cell's range in `members`, and the end of the last.
     starts: Vec<u32>,
-    /// Indices of the boxes that touch a cell, cell after cell.
+    /// Indices of the boxes that touch a cell, cell by cell.
     members: Vec<u32>,
 }
 
-/// What a ray met.
+/// Hit of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
-    /// Metres from the ray's origin.
+    /// Distance from the ray's origin in metres.
     pub distance_m: f64,
-    /// Share of the light that comes back from the surface, 0 to 1.
+    /// Share of reflected light, 0 to 1.
     pub reflectivity: f64,
     /// Cosine of the angle between ray and surface normal: 1 head-on, 0 grazing.
     pub cos_incidence: f64,
 }
 
-/// Edge of a cell in metres: a street ray of 12 m crosses about four, each with a few boxes.
+/// Edge length of a cell in metres: a street ray of 12 m crosses about four, each with a few boxes.
 const CELL_M: f64 = 4.0;
-/// Boxes are entered into every cell within this many metres, so that rounding cannot hide one from a ray.
+/// Margin in metres by which boxes extend into cells, so that rounding cannot hide a box from a ray.
 const MARGIN_M: f64 = 1e-6;
 
 impl Scene {
-    /// Largest radius of a scene, and so the longest range of a ray, in metres.
+    /// Maximum radius of a scene, and maximum range of a ray, in metres.
     pub const MAX_RADIUS_M: f64 = 400.0;
 
-    /// A scene of the boxes that meet the square of `radius_m` metres around a point; the others are left out.
+    /// Builds a scene of the boxes that meet the square of `radius_m` metres around a point; others are ignored.
     pub fn new(mut solids: Vec<Solid>, ground_reflectivity: f64, center: Point, radius_m: f64) -> Self {
         let radius_m = bounded(radius_m);
         let min = [center[0] - radius_m, center[1] - radius_m];
@@ -51,7 +51,7 @@ impl Scene {
             members: Vec::new(),
         };
         solids.retain(|solid| scene.span(solid).is_some());
-        // Count, then place: each cell's boxes lie side by side.
+        // Count first, then fill, so that the boxes of a cell are contiguous.
         for solid in &solids {
             scene.each_cell_of(solid, |scene, cell| scene.starts[cell + 1] += 1);
         }
@@ -70,19 +70,19 @@ impl Scene {
         scene
     }
 
-    /// The boxes, in no particular order.
+    /// Returns the boxes in no particular order.
     pub fn solids(&self) -> &[Solid] {
         &self.solids
     }
 
-    /// Whether a point (metres, world frame) is inside a box or below the ground.
+    /// Returns whether a point (metres, world frame) is inside a box or below the ground.
     pub fn is_solid(&self, point: Point) -> bool {
         point[2] < 0.0 || self.solids.iter().any(|solid| solid.bounds.contains(point))
     }
 
-    /// The first surface on a ray, up to and including `max_range_m` metres (world frame).
+    /// Returns the first hit of a ray up to and including `max_range_m` metres (world frame).
     ///
-    /// Boxes outside the scene are not seen, the ground is seen everywhere.
+    /// Boxes outside the scene are invisible, the ground is visible everywhere.
     pub fn cast(&self, origin: Point, direction: Point, max_range_m: f64) -> Option<Hit> {
         let ray = Ray::new(origin, direction)?;
         let mut best = self.ground(&ray).filter(|hit| hit.distance_m <= max_range_m);
@@ -96,7 +96,7 @@ impl Scene {
         (distance_m >= 0.0 && distance_m.is_finite()).then(|| hit(ray, contact, self.ground_reflectivity))
     }
 
-    /// Goes through the cells in the order in which the ray meets them, until no nearer hit can come.
+    /// Visits cells along the ray until no nearer hit is possible.
     fn walk(&self, ray: &Ray, max_range_m: f64, best: &mut Option<Hit>) {
         let Some((entry_m, exit_m)) = self.interval(ray) else { return };
         let mut limit_m = best.map_or(max_range_m, |hit| hit.distance_m).min(exit_m);
@@ -105,7 +105,7 @@ impl Scene {
         let mut next_m = [f64::INFINITY; 2];
         let mut step_m = [f64::INFINITY; 2];
         for axis in 0..2 {
-            // A cast of a negative number saturates at 0: the first cell.
+            // A cast of a negative number saturates at 0, the first cell.
             cell[axis] = (((start[axis] - self.min[axis]) / CELL_M) as usize).min(self.cells[axis] - 1);
             let direction = ray.direction[axis];
             if direction != 0.0 {
@@ -138,7 +138,7 @@ impl Scene {
         }
     }
 
-    /// From where to where the ray is within the cells, in metres.
+    /// Returns the interval of the ray inside the grid, in metres.
     fn interval(&self, ray: &Ray) -> Option<(f64, f64)> {
         let (mut entry_m, mut exit_m) = (0.0_f64, f64::INFINITY);
         for axis in 0..2 {
@@ -157,7 +157,7 @@ impl Scene {
         (entry_m <= exit_m).then_some((entry_m, exit_m))
     }
 
-    /// First and last cell along x and y that a box touches.
+    /// Returns the first and the last cell along x and y that a box touches.
     fn span(&self, solid: &Solid) -> Option<[(usize, usize); 2]> {
         let along = |axis: usize| {
             let low = (solid.bounds.min[axis] - MARGIN_M - self.min[axis]) / CELL_M;
@@ -179,7 +179,7 @@ impl Scene {
     }
 }
 
-/// The radius that a scene really has: not negative, not NaN, not beyond the largest.
+/// Clamps the radius of a scene; NaN and negative values give 0.
 pub(super) fn bounded(radius_m: f64) -> f64 {
     if radius_m > 0.0 { radius_m.min(Scene::MAX_RADIUS_M) } else { 0.0 }
 }
@@ -199,7 +199,7 @@ mod tests {
     }
 
     #[test]
-    fn the_grid_finds_what_a_test_of_every_box_finds() {
+    fn the_grid_finds_the_same_hits_as_a_test_of_all_boxes() {
         let mut random = Random::of(3, &[]);
         let solids: Vec<Solid> = (0..300)
             .map(|_| {
@@ -218,7 +218,7 @@ mod tests {
             let Some(ray) = Ray::new(origin, direction) else { continue };
             let boxes = scene.solids.iter().filter_map(|solid| solid.contact(&ray)).map(|c| c.distance_m);
             let ground = scene.ground(&ray).map(|hit| hit.distance_m);
-            // A box that reaches out of the scene counts as far as the scene goes.
+            // Boxes that extend beyond the scene count only inside it.
             let inside = |d: &f64| (0..2).all(|k| ray.at(*d)[k].abs() < 30.0);
             let naive = boxes.filter(inside).chain(ground).filter(|&d| d <= 50.0).min_by(f64::total_cmp);
             let found = scene.cast(origin, direction, 50.0).map(|hit| hit.distance_m);

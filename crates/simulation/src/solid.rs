@@ -1,36 +1,36 @@
 use voxtile::space::{Aabb, Point};
 
-/// A box that reflects light: every object of a simulated world is made of these.
+/// Reflecting box; all objects of simulated worlds consist of boxes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Solid {
-    /// Its extent in metres, world frame.
+    /// Extent in metres, world frame.
     pub bounds: Aabb,
-    /// Share of the light that comes back from it, 0 to 1.
+    /// Share of reflected light, 0 to 1.
     pub reflectivity: f64,
 }
 
-/// A ray made ready to be tested against many boxes.
+/// Ray prepared for tests against many boxes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ray {
-    /// Where it begins in metres, world frame.
+    /// Origin in metres, world frame.
     pub origin: Point,
     /// Unit vector, world frame.
     pub direction: Point,
-    /// One over each coordinate of the direction; infinite where that is 0.
+    /// Inverse of each coordinate of the direction; infinite for 0.
     inverse: Point,
 }
 
-/// Where a ray meets a box.
+/// Intersection of a ray with a box.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Contact {
-    /// Metres from the ray's origin.
+    /// Distance from the ray's origin in metres.
     pub distance_m: f64,
-    /// The axis of the face's normal: 0, 1, 2 for x, y, z.
+    /// Axis of the face's normal: 0, 1, 2 for x, y, z.
     pub axis: usize,
 }
 
 impl Ray {
-    /// A ray, unless a number is not finite or the direction has no length.
+    /// Returns a ray, or `None` if a number is not finite or the direction is zero.
     pub fn new(origin: Point, direction: Point) -> Option<Self> {
         let length =
             (direction[0] * direction[0] + direction[1] * direction[1] + direction[2] * direction[2]).sqrt();
@@ -41,19 +41,19 @@ impl Ray {
         Some(Self { origin, direction, inverse: direction.map(|x| 1.0 / x) })
     }
 
-    /// The point on the ray so many metres from its origin.
+    /// Returns the point at a distance from the origin in metres.
     pub fn at(&self, distance_m: f64) -> Point {
         std::array::from_fn(|k| self.origin[k] + self.direction[k] * distance_m)
     }
 }
 
 impl Solid {
-    /// A box between two corners in metres.
+    /// Returns a box between two corners in metres.
     pub fn new(min: Point, max: Point, reflectivity: f64) -> Self {
         Self { bounds: Aabb::from_corners(min, max), reflectivity }
     }
 
-    /// The nearest point where the ray meets the surface; from inside, the point where it leaves.
+    /// Returns the nearest intersection with the surface; from inside, the exit point.
     #[inline]
     pub(super) fn contact(&self, ray: &Ray) -> Option<Contact> {
         let mut enter = Contact { distance_m: f64::NEG_INFINITY, axis: 0 };
@@ -96,20 +96,20 @@ mod tests {
     }
 
     #[test]
-    fn a_ray_meets_the_face_before_it() {
+    fn a_ray_hits_the_face_in_front() {
         assert_eq!(contact([0.0, 0.0, 0.5], [3.0, 0.0, 0.0]), Some(Contact { distance_m: 1.0, axis: 0 }));
         assert_eq!(contact([1.5, 0.0, 3.0], [0.0, 0.0, -1.0]), Some(Contact { distance_m: 2.0, axis: 2 }));
     }
 
     #[test]
-    fn a_ray_beside_or_away_meets_nothing() {
+    fn a_ray_past_or_away_from_a_box_has_no_hit() {
         assert_eq!(contact([0.0, 0.6, 0.5], [1.0, 0.0, 0.0]), None);
         assert_eq!(contact([0.0, 0.0, 0.5], [-1.0, 0.0, 0.0]), None);
         assert_eq!(contact([0.0, 0.0, 0.5], [1.0, 1.0, 0.0]), None);
     }
 
     #[test]
-    fn a_ray_from_inside_meets_the_face_where_it_leaves() {
+    fn a_ray_from_inside_hits_the_exit_face() {
         assert_eq!(contact([1.25, 0.0, 0.5], [1.0, 0.0, 0.0]), Some(Contact { distance_m: 0.75, axis: 0 }));
     }
 

@@ -1,10 +1,10 @@
 use super::{Building, City, Drive, Lidar, Route, Teleport, Walk, Warehouse, World};
 use voxtile::scan::Scan;
 
-/// A world, a way through it and a lidar: the scans of a whole drive, made one at a time.
+/// A world, a route and a lidar: the scans of a whole drive, generated one at a time.
 ///
-/// As an iterator it yields scan after scan and never ends (`take` a number of them); [`Survey::scan_at`] and `nth`
-/// give any one without those before it.
+/// The iterator yields scans without end (use `take`); [`Survey::scan_at`] and `nth` return any scan without generating
+/// earlier ones.
 #[derive(Clone, Debug)]
 pub struct Survey<W, R> {
     world: W,
@@ -15,17 +15,17 @@ pub struct Survey<W, R> {
 }
 
 impl<W: World, R: Route> Survey<W, R> {
-    /// A survey whose sensor noise has this seed.
+    /// Returns a survey with this seed of the sensor noise.
     pub fn new(world: W, route: R, lidar: Lidar, seed: u64) -> Self {
         Self { world, route, lidar, seed, next: 0 }
     }
 
-    /// The world that is surveyed.
+    /// Returns the world.
     pub fn world(&self) -> &W {
         &self.world
     }
 
-    /// The scan at a step of the way, the first being 0.
+    /// Returns the scan at a step of the route, from 0.
     pub fn scan_at(&mut self, index: u64) -> Scan {
         let world_from_sensor = self.route.pose(index);
         self.lidar.scan(&self.world, &world_from_sensor, self.seed, index)
@@ -33,38 +33,38 @@ impl<W: World, R: Route> Survey<W, R> {
 }
 
 impl Survey<City, Drive> {
-    /// The *street* workload: [`Lidar::street`] every metre of a drive through a city.
+    /// Returns the *street* workload: [`Lidar::street`] every metre of a drive through a city.
     pub fn street(seed: u64) -> Self {
         Self::new(City::new(seed), Drive::new(seed, 1.0), Lidar::street(), seed)
     }
 
-    /// A quick look: [`Lidar::demo`] every metre of the same drive.
+    /// Returns a small demo: [`Lidar::demo`] every metre of the same drive.
     pub fn demo(seed: u64) -> Self {
         Self::new(City::new(seed), Drive::new(seed, 1.0), Lidar::demo(), seed)
     }
 }
 
-/// For maps of any length: scans of about `rays` rays.
+/// Drives of any length, with about `rays` rays per scan.
 impl Survey<City, Drive> {
-    /// A scan every metre of a drive over mostly new streets: [`Drive::tour`].
+    /// Returns a scan every metre of a drive on mostly new streets: [`Drive::tour`].
     pub fn tour(seed: u64, rays: u32) -> Self {
         Self::new(City::new(seed), Drive::tour(seed, 1.0), Lidar::of_rays(rays), seed)
     }
 
-    /// A scan every metre of the same round, again and again: [`Drive::laps`].
+    /// Returns a scan every metre of the same round, repeated: [`Drive::laps`].
     pub fn laps(seed: u64, edge_blocks: u64, rays: u32) -> Self {
         Self::new(City::new(seed), Drive::laps(edge_blocks, 1.0), Lidar::of_rays(rays), seed)
     }
 }
 
-/// Scans of about `rays` rays, each from somewhere else within `reach_m` metres of the origin.
+/// Scans of about `rays` rays from unrelated positions within `reach_m` metres of the origin.
 impl Survey<City, Teleport> {
-    /// From streets.
+    /// Returns scans from streets.
     pub fn teleports(seed: u64, reach_m: f64, rays: u32) -> Self {
         Self::new(City::new(seed), Teleport::new(seed, reach_m), Lidar::of_rays(rays), seed)
     }
 
-    /// From masts, over all roofs and far: a scan touches more than a thousand tiles of ten metres.
+    /// Returns scans from masts above all roofs; each touches more than a thousand tiles of ten metres.
     pub fn masts(seed: u64, reach_m: f64, rays: u32) -> Self {
         let places = Teleport::new(seed, reach_m).at_height(Lidar::MAST_M);
         Self::new(City::new(seed), places, Lidar::mast(rays), seed)
@@ -72,16 +72,16 @@ impl Survey<City, Teleport> {
 }
 
 impl Survey<Building, Walk> {
-    /// The *indoor* workload: [`Lidar::indoor`] every half metre of a walk through a building.
+    /// Returns the *indoor* workload: [`Lidar::indoor`] every half metre of a walk through a building.
     pub fn indoor(seed: u64) -> Self {
         let building = Building::new(seed);
         Self::new(building, Walk::new(building, 0.5), Lidar::indoor(), seed)
     }
 }
 
-/// Scans of about `rays` rays.
+/// Rounds through a warehouse, with about `rays` rays per scan.
 impl Survey<Warehouse, Walk> {
-    /// A scan every ten centimetres of rounds through a warehouse, without end: a metre a second, ten scans a second.
+    /// Returns a scan every ten centimetres of endless rounds: one metre and ten scans per second.
     pub fn warehouse(seed: u64, rays: u32) -> Self {
         Self::new(Warehouse::new(seed), Walk::in_warehouse(0.1), Lidar::of_rays(rays), seed)
     }
@@ -105,7 +105,7 @@ impl<W: World, R: Route> Iterator for Survey<W, R> {
 mod tests {
     use super::*;
 
-    /// BLAKE3 of the bits of every number of a scan.
+    /// Returns the BLAKE3 hash of the bits of every number of a scan.
     fn digest(scan: &Scan) -> String {
         let mut hasher = blake3::Hasher::new();
         for number in scan.origin.iter().chain(scan.points.iter().flatten()) {
@@ -129,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn the_same_seed_is_the_same_scan_on_every_platform() {
+    fn a_seed_gives_the_same_scan_on_every_platform() {
         let digests =
             [Survey::street(1).scan_at(17), Survey::indoor(1).scan_at(17), Survey::demo(1).scan_at(4_321)]
                 .map(|scan| digest(&scan));
@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn other_seeds_and_numbers_are_other_scans() {
+    fn other_seeds_and_numbers_give_other_scans() {
         assert_ne!(Survey::demo(1).scan_at(3), Survey::demo(2).scan_at(3));
         assert_ne!(Survey::demo(1).scan_at(3), Survey::demo(1).scan_at(4));
     }
@@ -159,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn the_street_is_seen_at_twelve_metres_on_average() {
+    fn the_mean_range_in_a_street_is_twelve_metres() {
         for seed in [1, 2, 3] {
             let mean_m = mean_range_m(Survey::street(seed), 20);
             assert!((10.0..14.0).contains(&mean_m), "{mean_m} m");
@@ -175,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn the_building_is_seen_at_two_point_three_metres_on_average() {
+    fn the_mean_range_in_the_building_is_two_point_three_metres() {
         for seed in [1, 2, 3] {
             let mean_m = mean_range_m(Survey::indoor(seed), 20);
             assert!((2.15..2.45).contains(&mean_m), "{mean_m} m");

@@ -2,10 +2,10 @@ use super::leg::{Leg, SENSOR_HEIGHT_M, Turn};
 use super::{City, Random, Route};
 use voxtile::scan::Pose;
 
-/// A sensor that is somewhere else at every step: in any street within some distance of the world's origin.
+/// Sensor at an unrelated position at every step: in any street within some distance of the world's origin.
 ///
-/// No two steps are near each other, which is the worst that can happen to what keeps near things in memory. As an
-/// iterator it yields the sensor's poses (`world_from_sensor`) and never ends.
+/// No two steps are near each other, the worst case for caches of near tiles. The iterator yields the sensor's poses
+/// (`world_from_sensor`) without end.
 #[derive(Clone, Debug)]
 pub struct Teleport {
     seed: u64,
@@ -14,19 +14,19 @@ pub struct Teleport {
     next: u64,
 }
 
-/// Farther away than a sensor is ever put, in metres.
+/// Maximum distance of a position from the origin, in metres.
 const FARTHEST_M: f64 = 1e9;
 
 impl Teleport {
-    /// Places whose streets begin at most `reach_m` metres from the origin along either axis, at the height of a car's
-    /// sensor.
+    /// Returns positions in streets at most `reach_m` metres from the origin along either axis, at the height of a
+    /// car's sensor.
     pub fn new(seed: u64, reach_m: f64) -> Self {
-        // Of a length that is no number nothing is left.
+        // NaN becomes 0.
         let reach_blocks = (reach_m.clamp(0.0, FARTHEST_M) / City::BLOCK_M) as i64;
         Self { seed, reach_blocks, height_m: SENSOR_HEIGHT_M, next: 0 }
     }
 
-    /// The same places at another height above the ground, in metres.
+    /// Sets the height of the positions above the ground, in metres.
     pub fn at_height(self, height_m: f64) -> Self {
         Self { height_m, ..self }
     }

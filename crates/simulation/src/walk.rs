@@ -5,26 +5,26 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use voxtile::maths;
 use voxtile::scan::Pose;
 
-/// An endless walk through a [`Building`]: along the corridor, through every door, around every pillar, and again. Or
-/// through a [`Warehouse`]: along every aisle.
+/// Endless walk through a [`Building`], along the corridor, through every door and around every pillar, or through a
+/// [`Warehouse`], along every aisle.
 ///
-/// As an iterator it yields the sensor's poses (`world_from_sensor`) and never ends.
+/// The iterator yields the sensor's poses (`world_from_sensor`) without end.
 #[derive(Clone, Debug)]
 pub struct Walk {
     spacing_m: f64,
     next: u64,
-    /// Corners of the closed way in metres, world frame; every piece is along x or y.
+    /// Corners of the closed path in metres, world frame; all segments are parallel to x or y.
     corners: Vec<[f64; 2]>,
     round_m: f64,
 }
 
 const SENSOR_HEIGHT_M: f64 = 1.4;
-/// How far the walker looks to either side, and the metres between one look and the next.
+/// Maximum yaw to either side while walking, and the distance per cycle.
 const LOOK_RAD: f64 = 0.4;
 const LOOK_EVERY_M: f64 = 7.3;
 
 impl Walk {
-    /// A walk through a building with a pose every `spacing_m` metres (1 m if that is not a positive length).
+    /// Returns a walk through a building with a pose every `spacing_m` metres (1 m if that is not a positive length).
     pub fn new(building: Building, spacing_m: f64) -> Self {
         let middle = 0.5 * Building::SIZE_M[1];
         let mut corners = vec![[0.9, middle]];
@@ -42,13 +42,13 @@ impl Walk {
         Self::along(corners, spacing_m)
     }
 
-    /// A round through a warehouse with a pose every `spacing_m` metres (1 m if that is not a positive length).
+    /// Returns a round through a warehouse with a pose every `spacing_m` metres (1 m if that is not a positive length).
     pub fn in_warehouse(spacing_m: f64) -> Self {
         let [west, east] = Warehouse::AISLE_ENDS_M;
         let ways = [[west, east], [east, west]].into_iter().cycle();
         let mut corners: Vec<_> =
             Warehouse::aisles_m().zip(ways).flat_map(|(y, ends)| ends.map(|x| [x, y])).collect();
-        // The number of aisles is even: the last one ends where the first begins, across.
+        // The number of aisles is even, so the last one ends opposite the start of the first.
         corners.extend(corners.first().copied());
         Self::along(corners, spacing_m)
     }
@@ -101,12 +101,11 @@ impl Iterator for Walk {
     }
 }
 
-/// -1, 0 or 1.
 fn sign(x: f64) -> f64 {
     if x == 0.0 { 0.0 } else { x.signum() }
 }
 
-/// Length of a piece that is along x or y.
+/// Returns the length of a segment parallel to x or y.
 fn length_m(from: [f64; 2], to: [f64; 2]) -> f64 {
     (to[0] - from[0]).abs() + (to[1] - from[1]).abs()
 }
@@ -117,7 +116,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_walk_never_touches_anything() {
+    fn a_walk_has_no_collisions() {
         let building = Building::new(6);
         let scene = building.scene([20.0, 10.0, 1.0], 60.0);
         for pose in Walk::new(building, 0.25).take(2_500) {
@@ -131,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn a_round_through_a_warehouse_is_closed_and_touches_nothing() {
+    fn a_round_through_a_warehouse_is_closed_and_free_of_collisions() {
         let scene = Warehouse::new(6).scene([100.0, 50.0, 1.0], 300.0);
         let walk = Walk::in_warehouse(0.5);
         assert_eq!(walk.corners.first(), walk.corners.last());
@@ -148,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn a_walk_sees_all_rooms_and_begins_again() {
+    fn a_walk_visits_all_rooms_and_repeats() {
         let mut walk = Walk::new(Building::new(6), 0.5);
         let round = (walk.round_m / 0.5) as usize;
         let (mut seen, columns) = ([[false; 2]; 8], Building::SIZE_M[0] / 8.0);
@@ -164,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn steps_are_as_long_as_asked() {
+    fn steps_have_the_requested_length() {
         let poses: Vec<_> = Walk::new(Building::new(1), 0.2).take(4_000).collect();
         for pair in poses.windows(2) {
             let step = pair[1].isometry().translation.vector - pair[0].isometry().translation.vector;

@@ -1,10 +1,10 @@
 use super::{Random, Scene, Solid, World};
 use voxtile::space::Point;
 
-/// A made-up warehouse: 200 x 100 x 8 m, rows of racks with goods on their boards, aisles between them.
+/// Synthetic warehouse of 200 x 100 x 8 m: rows of racks with goods on boards, and aisles between them.
 ///
-/// One corner is the world's origin; the floor is the plane z = 0. The racks are the same for every seed, the goods are
-/// not.
+/// One corner is the world's origin; the floor is the plane z = 0. The racks are the same for all seeds, the goods
+/// differ.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Warehouse {
     seed: u64,
@@ -13,11 +13,11 @@ pub struct Warehouse {
 const WALL_M: f64 = 0.3;
 /// Depth of a row: two racks back to back.
 const ROW_M: f64 = 2.4;
-/// From the middle of a row to that of the next.
+/// Distance between the middles of two rows.
 const ROW_EVERY_M: f64 = 8.0;
-/// Where racks are along a row: the gaps are the aisles across.
+/// Extent of the racks along a row; the gap is the cross aisle.
 const BLOCKS_M: [[f64; 2]; 2] = [[12.0, 94.0], [106.0, 188.0]];
-/// Length of one bay between two uprights.
+/// Length of a bay between two uprights.
 const BAY_M: f64 = 4.1;
 /// Heights of the boards.
 const BOARDS_M: [f64; 3] = [0.15, 2.1, 4.0];
@@ -32,22 +32,22 @@ impl Warehouse {
     /// Length, depth and height in metres.
     pub const SIZE_M: [f64; 3] = [200.0, 100.0, 8.0];
 
-    /// The warehouse of a seed.
+    /// Returns the warehouse of a seed.
     pub fn new(seed: u64) -> Self {
         Self { seed }
     }
 
-    /// Middles of the rows, in metres along y.
+    /// Returns the middles of the rows, in metres along y.
     fn rows_m() -> impl Iterator<Item = f64> {
         (1..12).map(|row| ROW_EVERY_M * f64::from(row) + 2.0)
     }
 
-    /// Middles of the aisles along the rows, in metres along y, in order.
+    /// Returns the middles of the aisles between rows, in metres along y, ascending.
     pub(super) fn aisles_m() -> impl Iterator<Item = f64> {
         (0..12).map(|aisle| ROW_EVERY_M * f64::from(aisle) + 0.5 * ROW_EVERY_M + 2.0)
     }
 
-    /// The ends of the aisles, in metres along x: beyond the racks.
+    /// Ends of the aisles beyond the racks, in metres along x.
     pub(super) const AISLE_ENDS_M: [f64; 2] = [8.0, 192.0];
 
     fn solids(self) -> Vec<Solid> {
@@ -78,7 +78,6 @@ impl World for Warehouse {
     }
 }
 
-/// Uprights, boards and goods between one upright and the next.
 fn build_bay(random: &mut Random, x_m: f64, row_m: f64, solids: &mut Vec<Solid>) {
     let [near, far] = [row_m - 0.5 * ROW_M, row_m + 0.5 * ROW_M];
     for y_m in [near, far - 0.1] {
@@ -87,7 +86,7 @@ fn build_bay(random: &mut Random, x_m: f64, row_m: f64, solids: &mut Vec<Solid>)
     for board_m in BOARDS_M {
         solids.push(Solid::new([x_m, near, board_m - 0.1], [x_m + BAY_M, far, board_m], STEEL));
         for side in [near, row_m] {
-            // Some places are empty.
+            // Some storage places are empty.
             if random.below(4) > 0 {
                 let (begin, end) = (random.between(0.2, 0.6), random.between(3.2, 3.9));
                 let height_m = random.between(0.6, 1.6);
@@ -116,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn goods_differ_by_seed_and_keep_out_of_the_aisles() {
+    fn goods_differ_by_seed_and_stay_out_of_the_aisles() {
         let [some, others] = [1, 2].map(|seed| Warehouse::new(seed).solids());
         assert_ne!(some, others);
         let is_free = |y_m: f64| {

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# Makes crates/view/page/dist, which goes into the command: the page, with all that it needs, in four files.
+# Builds crates/view/page/dist, which is embedded in the command: the page with its dependencies, in four files.
 #
 #   crates/view/page/bundle.sh            with the packages of package-lock.json
-#   crates/view/page/bundle.sh --check    says whether crates/view/page/dist is what it would make, and small enough
+#   crates/view/page/bundle.sh --check    checks that crates/view/page/dist is up to date and small enough
 set -euo pipefail
 cd "$(dirname "$0")"
 most_gzip=260000

@@ -4,15 +4,15 @@ use parking_lot::Mutex;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-/// The memory of answers that are being sent: a client that reads nothing holds its answer until it is disconnected.
+/// Memory budget of responses in flight: a client that does not read holds its response until it is disconnected.
 #[derive(Clone, Default)]
 pub struct AnswerMemory(Arc<Mutex<Taken>>);
 
-/// All large answers together.
+/// Maximum size of all large responses together.
 const MAX_BYTES: usize = 64 << 20;
-/// Those of one client.
+/// Maximum size of the responses to one client.
 const MAX_BYTES_OF_CLIENT: usize = MAX_BYTES / 2;
-/// Smaller answers do not count: there is one a connection.
+/// Smaller responses do not count, because each connection has only one.
 const SMALL_BYTES: usize = 16 << 10;
 
 #[derive(Default)]
@@ -21,12 +21,12 @@ struct Taken {
     of: HashMap<Client, usize>,
 }
 
-/// An answer and its share of the memory, which is given back with the last slice.
+/// A response in flight; releases its share of the budget when its last slice is dropped.
 struct Held {
     bytes: Bytes,
     client: Client,
     memory: AnswerMemory,
-    /// For the connection.
+    /// The same share, counted for the connection.
     _held: HeldBytes,
 }
 
@@ -50,8 +50,8 @@ impl Drop for Held {
 }
 
 impl AnswerMemory {
-    /// Takes the share of an answer on a connection; `None` if other answers to its client hold too much, or those of all clients.
-    /// An answer that is larger than that is sent where there is no other.
+    /// Reserves memory for a response on a connection. Returns `None` if responses to its client or to all clients use
+    /// too much. A response larger than the budget is sent if there is no other.
     pub fn hold(&self, connection: &Connection, bytes: Bytes) -> Option<Bytes> {
         let client = connection.client();
         let length = bytes.len();
@@ -82,7 +82,7 @@ mod tests {
     }
 
     #[test]
-    fn the_share_of_an_answer_is_given_back_with_its_last_slice() {
+    fn memory_of_a_response_is_released_with_its_last_slice() {
         let memory = AnswerMemory::default();
         let answer = || Bytes::from(vec![1; MAX_BYTES / 2]);
         let first = memory.hold(&connection(1), answer()).unwrap();
@@ -95,7 +95,7 @@ mod tests {
         drop(slice);
         assert!(memory.hold(&connection(3), answer()).is_some());
         drop(first);
-        // One that is larger than all is sent alone.
+        // A response larger than the budget is sent alone.
         let largest = memory.hold(&connection(1), Bytes::from(vec![1; MAX_BYTES + 1])).unwrap();
         assert!(memory.hold(&connection(2), answer()).is_none());
         drop(largest);
@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn a_client_leaves_memory_to_others() {
+    fn a_client_cannot_use_all_memory() {
         let memory = AnswerMemory::default();
         let answer = || Bytes::from(vec![1; MAX_BYTES / 8]);
         let of_one: Vec<_> = (0..8).filter_map(|_| memory.hold(&connection(1), answer())).collect();

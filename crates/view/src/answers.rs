@@ -1,4 +1,4 @@
-//! What is computed for a request: it may read tiles, so a thread that may wait does it.
+//! Computes responses. This may read tiles, so it runs on blocking threads.
 
 use super::map_state::Shown;
 use super::response::{Answer, Keep};
@@ -14,10 +14,10 @@ use voxtile::{Error, Point, Queries, Result};
 use voxtile_pipeline::AnyMap;
 use voxtile_pipeline::answer_at;
 
-/// Most places of a trajectory.
+/// Maximum number of positions in a trajectory.
 const TRAJECTORY: usize = 20_000;
 
-/// `maps.json`: which maps there are.
+/// Returns `maps.json`, the list of maps.
 pub fn maps(maps: &[Arc<ServedMap>]) -> Answer {
     let maps: Vec<Value> = maps.iter().enumerate().map(|(number, map)| describe(number, map)).collect();
     Answer::json(json!({ "maps": maps }))
@@ -48,7 +48,7 @@ fn describe(number: usize, map: &ServedMap) -> Value {
     })
 }
 
-/// What is asked of a map; `None` if that takes levels which are to be made first, and this may not.
+/// Responds to a request for a map. Returns `None` if it needs levels that are not built yet and may not be built here.
 pub fn of_map(
     maps: &[Arc<ServedMap>],
     id: &MapId,
@@ -56,7 +56,7 @@ pub fn of_map(
     version: Option<u64>,
     makes: Makes,
 ) -> Option<Answer> {
-    let nothing = || Answer::error(StatusCode::NOT_FOUND, "there is no such map, snapshot or node");
+    let nothing = || Answer::error(StatusCode::NOT_FOUND, "no such map, snapshot or node");
     let Some(map) = maps.get(id.number) else { return Some(nothing()) };
     let answer = if thing.takes_levels() {
         match map.shown(id, makes) {
@@ -66,8 +66,8 @@ pub fn of_map(
             Err(error) => Err(error),
         }
     } else {
-        map.asked(id).and_then(|asked| match asked {
-            Some(asked) => question(asked.map(), thing),
+        map.query_map(id).and_then(|found| match found {
+            Some(found) => query_result(found.map(), thing),
             None => Ok(None),
         })
     };
@@ -83,7 +83,7 @@ pub fn of_map(
     })
 }
 
-/// Whose error it is: of the request, of the moment, of a bucket, or of the map.
+/// Maps an error to a status: the request, a temporary condition, a bucket, or the map.
 fn status_of(error: &Error) -> StatusCode {
     match error {
         Error::InvalidArgument { .. } | Error::TooLarge { .. } => StatusCode::BAD_REQUEST,
@@ -93,7 +93,8 @@ fn status_of(error: &Error) -> StatusCode {
     }
 }
 
-/// `version` is that which the request asks for: an answer of another one, of a newer state, is not kept as if it were.
+/// Responds from the levels. `version` is the requested version: a response with a newer state must not be cached under
+/// it.
 fn of_levels(shown: &Shown, thing: &Thing, version: Option<u64>) -> Result<Option<Answer>> {
     let keep = match thing {
         Thing::Node(key, _) | Thing::Subtree(key) if version.is_some() && shown.version(*key)? == version => {
@@ -110,8 +111,8 @@ fn of_levels(shown: &Shown, thing: &Thing, version: Option<u64>) -> Result<Optio
     })
 }
 
-/// What a map says without its levels.
-fn question(map: &AnyMap, thing: &Thing) -> Result<Option<Answer>> {
+/// Responds from the map alone, without levels.
+fn query_result(map: &AnyMap, thing: &Thing) -> Result<Option<Answer>> {
     let answer = match thing {
         Thing::Query(point) => query(map, *point)?,
         Thing::Raycast(from, to) => raycast(map, *from, *to)?,
@@ -124,7 +125,7 @@ fn question(map: &AnyMap, thing: &Thing) -> Result<Option<Answer>> {
     Ok(Some(Answer::json(answer)))
 }
 
-/// Where the sensor was, scan by scan, at most so many places; and how many scans there are.
+/// Returns the number of scans and at most `most` positions of the sensor.
 fn trajectory(map: &AnyMap, most: usize) -> Result<(u64, Vec<Point>)> {
     let AnyMap::Map(map) = map else { return Ok((0, Vec::new())) };
     let scans = map.scans()?;
@@ -134,7 +135,7 @@ fn trajectory(map: &AnyMap, most: usize) -> Result<(u64, Vec<Point>)> {
     Ok((scans.len() as u64, points))
 }
 
-/// As `voxtile query --json`, and which voxel and tile it is.
+/// Returns the result of `voxtile query --json`, with the indices of voxel and tile.
 fn query(map: &AnyMap, point: Point) -> Result<Value> {
     let grid = map.config().grid;
     let mut answer = json!(answer_at(map, point)?);
@@ -149,7 +150,7 @@ fn extent(grid: &voxtile::Grid, voxel: VoxelIndex) -> Aabb {
     Aabb { min: voxel.map(|k| grid.corner_m(k)), max: voxel.map(|k| grid.corner_m(k.saturating_add(1))) }
 }
 
-/// Whether one point is seen from another: the voxel of the second may be occupied itself.
+/// Returns whether one point is visible from another; the voxel of the second may be occupied.
 fn raycast(map: &AnyMap, from: Point, to: Point) -> Result<Value> {
     let grid = map.config().grid;
     let is_end = |center: Point| grid.voxel_of(center) == grid.voxel_of(to);
@@ -162,7 +163,7 @@ fn raycast(map: &AnyMap, from: Point, to: Point) -> Result<Value> {
         "to_m": to,
         "visible": blocked.is_none(),
         "hit": blocked,
-        // How far the way is known; null if all of it is.
+        // Distance from which the line of sight is unknown; null if it is completely known.
         "unknown_from_m": unknown.map(|hit| hit.distance_m),
     }))
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::task::{Context, Poll};
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 
-/// The bytes of a connection, which notes when some are read or written.
+/// Stream of a connection that records when bytes are read or written.
 pub struct ClientStream<S> {
     stream: S,
     connection: Arc<Connection>,

@@ -6,19 +6,20 @@ use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 use tokio::sync::Notify;
 
-/// Connections of all clients at once.
+/// Maximum number of connections of all clients.
 const MAX_CONNECTIONS: usize = 512;
-/// Those of one client. A further one takes the place of the one without progress for longest.
+/// Maximum number of connections of one client. A further one closes the connection that has had no progress for
+/// longest.
 const MAX_OF_CLIENT: usize = 256;
-/// Streams of events of one client, which may be a proxy. A further one takes the place of the oldest: a browser asks
-/// again.
+/// Maximum number of event streams of one client, which may be a proxy. A further one closes the oldest; browsers
+/// reconnect.
 const MAX_EVENTS_OF_CLIENT: usize = MAX_OF_CLIENT / 2;
-/// One without progress for less is not idle: its request may be on its way.
+/// A connection is idle after this time without progress; before, its request may be in transit.
 const IDLE: Duration = Duration::from_secs(1);
-/// If memory for answers is short, connections whose answers have stalled this long are closed.
+/// If memory for responses is short, connections whose response made no progress for this time are closed.
 const STALLED: Duration = Duration::from_secs(5);
 
-/// Who connects: an IPv4 address, an IPv6 address of a local network, or the 64 bits of another one that name a network.
+/// Identity of a client: an IPv4 address, a local IPv6 address, or the 64-bit network of a global IPv6 address.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Client(IpAddr);
 
@@ -37,7 +38,7 @@ impl Client {
     }
 }
 
-/// The open connections, so that one client does not keep others out.
+/// Open connections, limited so that one client cannot block others.
 #[derive(Clone)]
 pub struct Connections {
     open: Arc<Mutex<Open>>,
@@ -46,7 +47,7 @@ pub struct Connections {
 
 #[derive(Default)]
 struct Open {
-    /// By their numbers, which ascend.
+    /// By connection number, ascending.
     of: HashMap<Client, BTreeMap<u64, Arc<State>>>,
     count: usize,
     last: u64,
@@ -55,18 +56,18 @@ struct Open {
 
 #[derive(Default)]
 struct State {
-    /// When bytes were last read or written, in milliseconds.
+    /// Time of the last read or write in milliseconds.
     progress_ms: AtomicU64,
-    /// Whether an answer is being computed.
+    /// Whether a response is being computed.
     is_busy: AtomicBool,
-    /// Order in which its stream of events began, from 1; 0 for other connections.
+    /// Sequence number of its event stream, from 1; 0 for other connections.
     stream: AtomicU64,
-    /// Bytes of memory of its answers that were not taken yet.
+    /// Bytes of its responses that the client has not read yet.
     held_bytes: AtomicUsize,
     end: Notify,
 }
 
-/// The place of one connection, which is given back with it.
+/// Slot of one connection, released on drop.
 pub struct Connection {
     connections: Connections,
     client: Client,
@@ -79,8 +80,8 @@ impl Connections {
         Self { open: Arc::default(), since: Instant::now() }
     }
 
-    /// A place for another connection. Where there are too many, one ends for it: the client's own, or else one of the
-    /// client with most.
+    /// Registers a connection. If there are too many, another one is closed: one of the same client, or else one of the
+    /// client with most connections.
     pub fn enter(&self, client: Client) -> Connection {
         let mut open = self.open.lock();
         let largest = || open.of.iter().max_by_key(|(_, of)| of.len()).map(|(client, _)| *client);
@@ -110,7 +111,7 @@ impl Connections {
 }
 
 impl State {
-    /// Whether nothing was read or written for some time, although no answer is being computed.
+    /// Returns whether nothing was read or written for some time, while no response is being computed.
     fn is_stalled(&self, now_ms: u64, time: Duration) -> bool {
         let since = Duration::from_millis(now_ms.saturating_sub(self.progress_ms()));
         since >= time && !self.is_busy.load(Ordering::Relaxed)
@@ -122,8 +123,7 @@ impl State {
 }
 
 impl Open {
-    /// The connection of a client whose end matters least: the one without progress for longest, of those that are idle
-    /// if there are any.
+    /// Returns the connection of a client to close: the one without progress for longest, preferably an idle one.
     fn least_active(&self, client: Client, now_ms: u64) -> Option<u64> {
         let of_client = self.of.get(&client)?.iter();
         let least = of_client
@@ -133,7 +133,7 @@ impl Open {
 
     fn end(&mut self, client: Client, number: u64) {
         if let Some(state) = self.remove(client, number) {
-            log::debug!("a connection is closed for another one");
+            log::debug!("closed a connection to accept another one");
             state.end.notify_one();
         }
     }
@@ -154,17 +154,17 @@ impl Connection {
         self.client
     }
 
-    /// Notes that bytes were read or written.
+    /// Records that bytes were read or written.
     pub fn note_progress(&self) {
         self.state.progress_ms.store(self.connections.now_ms(), Ordering::Relaxed);
     }
 
-    /// Notes whether an answer is being computed.
+    /// Records whether a response is being computed.
     pub fn set_busy(&self, is_busy: bool) {
         self.state.is_busy.store(is_busy, Ordering::Relaxed);
     }
 
-    /// Notes that the connection is a stream of events from now on.
+    /// Marks the connection as an event stream.
     pub fn begin_events(&self) {
         let mut open = self.connections.open.lock();
         open.last_stream += 1;
@@ -179,7 +179,7 @@ impl Connection {
         }
     }
 
-    /// Closes stalled connections of all clients whose unsent answers are held in memory.
+    /// Closes stalled connections of all clients that hold unsent responses in memory.
     pub fn end_stalled(&self) {
         let now_ms = self.connections.now_ms();
         let mut open = self.connections.open.lock();
@@ -194,19 +194,19 @@ impl Connection {
         stalled.into_iter().for_each(|(client, number)| open.end(client, number));
     }
 
-    /// Counts bytes of an answer as held by this connection, until what is returned is dropped.
+    /// Counts bytes of a response as held by this connection until the returned value is dropped.
     pub fn hold(&self, bytes: usize) -> HeldBytes {
         self.state.held_bytes.fetch_add(bytes, Ordering::Relaxed);
         HeldBytes { state: self.state.clone(), bytes }
     }
 
-    /// Waits until its place is taken.
+    /// Waits until the connection must be closed.
     pub async fn ended(&self) {
         self.state.end.notified().await;
     }
 }
 
-/// Bytes of an answer that a connection has not taken yet.
+/// Bytes of a response that the client has not read yet.
 pub struct HeldBytes {
     state: Arc<State>,
     bytes: usize,
@@ -237,7 +237,7 @@ mod tests {
         open.of.get(&connection.client).is_some_and(|of| of.contains_key(&connection.number))
     }
 
-    /// Connections that were opened ten seconds ago.
+    /// Returns connections opened ten seconds ago.
     fn long_ago() -> Connections {
         let now = Instant::now();
         Connections { since: now.checked_sub(Duration::from_secs(10)).unwrap_or(now), ..Connections::new() }
@@ -248,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn a_client_with_too_many_connections_loses_its_own_idle_ones() {
+    fn too_many_connections_of_a_client_close_its_idle_ones() {
         let connections = long_ago();
         let other = connections.enter(client(2));
         let of_client: Vec<_> = (0..MAX_OF_CLIENT).map(|_| connections.enter(client(1))).collect();
@@ -261,27 +261,27 @@ mod tests {
         let closed: Vec<_> = (0..MAX_OF_CLIENT).filter(|&k| !is_open(&of_client[k])).collect();
         assert_eq!(closed, [7]);
         assert!(is_open(&other) && is_open(&next));
-        // What was closed gives no second place back.
+        // Dropping a closed connection releases no second slot.
         drop(of_client);
         assert_eq!(connections.open.lock().count, 2);
     }
 
     #[test]
-    fn a_client_whose_connections_all_wait_for_answers_loses_the_oldest() {
+    fn without_idle_connections_the_oldest_is_closed() {
         let connections = long_ago();
         let busy: Vec<_> = (0..MAX_OF_CLIENT).map(|_| connections.enter(client(1))).collect();
         for (number, connection) in busy.iter().enumerate() {
             connection.set_busy(true);
             set_progress(connection, 1000 + number as u64);
         }
-        // One whose request has not been read yet is no idle one.
+        // A connection with an unread request is not idle.
         let (next, one_more) = (connections.enter(client(1)), connections.enter(client(1)));
         assert!(is_open(&next) && is_open(&one_more));
         assert!(!is_open(&busy[0]) && !is_open(&busy[1]) && busy[2..].iter().all(is_open));
     }
 
     #[test]
-    fn where_all_places_are_taken_the_client_with_most_gives_one() {
+    fn without_free_slots_the_client_with_most_connections_loses_one() {
         let connections = Connections::new();
         let most: Vec<_> = (0..MAX_OF_CLIENT).map(|_| connections.enter(client(1))).collect();
         let others: Vec<_> = (0..MAX_CONNECTIONS - MAX_OF_CLIENT)
@@ -294,7 +294,7 @@ mod tests {
     }
 
     #[test]
-    fn the_oldest_stream_of_events_ends_for_another_one() {
+    fn the_oldest_event_stream_is_closed_for_a_new_one() {
         let connections = Connections::new();
         let plain = connections.enter(client(1));
         let streams: Vec<_> = (0..=MAX_EVENTS_OF_CLIENT)
@@ -305,13 +305,13 @@ mod tests {
             })
             .collect();
         assert!(!is_open(&streams[0]) && streams[1..].iter().all(is_open) && is_open(&plain));
-        // The age of a stream counts, not that of its connection.
+        // The age of the stream counts, not that of the connection.
         plain.begin_events();
         assert!(!is_open(&streams[1]) && streams[2..].iter().all(is_open) && is_open(&plain));
     }
 
     #[test]
-    fn where_memory_is_short_those_end_who_take_nothing_of_it() {
+    fn stalled_connections_are_closed_when_memory_is_short() {
         let connections = long_ago();
         let [asks, idle, stream, takes, stalled] =
             [1, 1, 1, 2, 3].map(|number| connections.enter(client(number)));

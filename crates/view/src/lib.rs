@@ -1,16 +1,16 @@
-//! Maps in a browser: an HTTP server, and the page that it serves.
+//! Shows maps in a browser: an HTTP server and its page.
 //!
 //! ```text
 //! request -> server    timeouts, threads                            server, work
-//!                      connections, and how many a client has       connections, client_stream
-//!                      what answers that are being sent hold        answer_memory
-//!         -> Route     what a path asks for, or nothing             route, token
+//!                      connections and limits per client            connections, client_stream
+//!                      memory of responses in flight                answer_memory
+//!         -> Route     parsing of paths                             route, token
 //!         -> answers   JSON of a query, a tileset, bytes of a node  answers
-//!            ServedMap one map, followed while somebody writes it   served_map
-//!            MapState  one state of it: a flush, a snapshot         map_state, node_cache
+//!            ServedMap one map that another process may write       served_map
+//!            MapState  one state of it: a flush or a snapshot       map_state, node_cache
 //! ```
 //!
-//! The page is `page/dist`, made by `page/bundle.sh`. docs/view.md has the interface.
+//! The page is `page/dist`, built by `page/bundle.sh`. docs/view.md describes the HTTP interface.
 
 mod answer_memory;
 mod answers;

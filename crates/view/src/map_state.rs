@@ -5,31 +5,31 @@ use voxtile_render::levels::{
     Difference, Kind, Levels, LevelsOf, NodeKey, NodeStore, TilesetContent, TilesetNodes, subtree, tileset,
 };
 
-/// One state of a map: as of a flush, or a snapshot.
+/// One state of a map: a flush or a snapshot.
 pub struct MapState {
     pub map: AnyMap,
     pub levels: Levels,
     /// Coarse nodes of this and other states of the map.
     pub store: Arc<NodeStore>,
-    /// Rises with every state of the map that was shown.
+    /// Increases with each state that was shown.
     pub generation: u64,
-    /// Tiles that are not in the coarse levels yet.
+    /// Number of tiles that are not in the coarse levels yet.
     pub pending_tiles: u64,
 }
 
-/// A state, or what changed between two.
+/// One state, or the changes between two.
 pub enum Shown {
     State(Arc<MapState>),
     Change { before: Arc<MapState>, after: Arc<MapState> },
 }
 
-/// A map that questions are asked of, which takes no levels.
-pub enum Asked {
+/// Map for queries that need no levels.
+pub enum QueryMap {
     State(Arc<MapState>),
     Opened(AnyMap),
 }
 
-impl Asked {
+impl QueryMap {
     pub fn map(&self) -> &AnyMap {
         match self {
             Self::State(state) => &state.map,
@@ -39,7 +39,7 @@ impl Asked {
 }
 
 impl Shown {
-    /// The state that questions are asked of.
+    /// Returns the state for queries.
     pub fn state(&self) -> &MapState {
         match self {
             Self::State(state) | Self::Change { after: state, .. } => state,
@@ -67,7 +67,7 @@ impl Shown {
         }
     }
 
-    /// The version of a node, or of the tile that it is a part of.
+    /// Returns the version of a node, or of the tile that contains it.
     pub fn version(&self, key: NodeKey) -> Result<Option<u64>> {
         match self {
             Self::State(state) => Ok(state.nodes().version_of(key)),
@@ -75,7 +75,7 @@ impl Shown {
         }
     }
 
-    /// The compressed bytes of a node.
+    /// Returns the compressed bytes of a node.
     pub fn node(&self, key: NodeKey, kind: Kind) -> Result<Option<Vec<u8>>> {
         match self {
             Self::State(state) => state.levels.node(&state.map, &state.store, key, kind),

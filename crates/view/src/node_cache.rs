@@ -3,20 +3,20 @@ use std::path::{Path, PathBuf};
 use voxtile::{Error, Result};
 use voxtile_render::levels::NodeStore;
 
-/// A file that would get larger than this is begun anew: most of it is of states that nobody looks at any more.
+/// Maximum size of the file; then it is restarted, because most nodes in it belong to obsolete states.
 const MAX_BYTES: u64 = 4 << 30;
 
-/// Where the coarse nodes of a map are kept: in the user's cache folder, under the map's id, or in a file that goes
-/// with the program where there is no such folder, another program has it, or nothing is to be kept.
+/// Opens the store of a map's coarse nodes: in the user's cache folder by the map's id, or else in a temporary file if
+/// there is no such folder, another process uses the file, or caching is off.
 pub fn open(map_id: Option<&str>) -> Result<NodeStore> {
     if let Some(path) = map_id.and_then(path_of) {
         match open_kept(&path) {
             Ok(Some(file)) => match open_limited(file, &path) {
                 Ok(store) => return Ok(store),
-                Err(error) => log::warn!("{error:#}; nothing is kept for the next time"),
+                Err(error) => log::warn!("{error:#}; levels are not cached"),
             },
-            Ok(None) => log::info!("{} is in use; nothing is kept for the next time", path.display()),
-            Err(error) => log::info!("{}: {error}; nothing is kept for the next time", path.display()),
+            Ok(None) => log::info!("{} is in use; levels are not cached", path.display()),
+            Err(error) => log::info!("{}: {error}; levels are not cached", path.display()),
         }
     }
     let folder = std::env::temp_dir();
@@ -25,13 +25,13 @@ pub fn open(map_id: Option<&str>) -> Result<NodeStore> {
     open_limited(file, &folder)
 }
 
-/// A store that begins its file anew before it gets too large.
+/// Opens a store with a limited file size.
 fn open_limited(file: File, path: &Path) -> Result<NodeStore> {
     let same = file.try_clone().map_err(|error| Error::io(path, "open", error))?;
     Ok(NodeStore::open(file, path)?.with_limit(MAX_BYTES, move || same.set_len(0)))
 }
 
-/// `None` if another program has it.
+/// Returns `None` if another process uses the file.
 fn open_kept(path: &Path) -> std::io::Result<Option<File>> {
     if let Some(folder) = path.parent() {
         std::fs::create_dir_all(folder)?;
@@ -49,7 +49,7 @@ fn open_kept(path: &Path) -> std::io::Result<Option<File>> {
 }
 
 fn path_of(map_id: &str) -> Option<PathBuf> {
-    // An id comes from a file: it names a file only if it is what ids are.
+    // The id is read from a file: use it as a file name only if it is well-formed.
     if map_id.is_empty() || !map_id.bytes().all(|letter| letter.is_ascii_hexdigit() || letter == b'-') {
         return None;
     }

@@ -1,16 +1,16 @@
 use bytes::Bytes;
 use std::sync::LazyLock;
 
-/// A file of the page.
+/// One file of the page.
 pub struct PageFile {
     pub name: &'static str,
     pub kind: &'static str,
     pub plain: Bytes,
-    /// Compressed as gzip.
+    /// Content, compressed with gzip.
     pub gzip: Bytes,
 }
 
-/// Made by `page/bundle.sh`.
+/// Built by `page/bundle.sh`.
 const FILES: [(&str, &str, &[u8]); 4] = [
     ("index.html", "text/html; charset=utf-8", include_bytes!("../page/dist/index.html")),
     ("page.js", "text/javascript; charset=utf-8", include_bytes!("../page/dist/page.js")),

@@ -13,40 +13,40 @@ use std::io::{Read, Write};
 
 pub type Body = UnsyncBoxBody<Bytes, Infallible>;
 
-/// How long a browser may keep an answer.
+/// Caching of a response in the browser.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Keep {
-    /// It is another the next time.
+    /// Not cached: it may change.
     No,
-    /// Its URL names its version.
+    /// Cached for ever: its URL contains its version.
     ForEver,
 }
 
-/// What is sent, before it is known whether the other side understands gzip.
+/// Response before content negotiation.
 pub struct Answer {
     pub status: StatusCode,
     pub kind: &'static str,
-    /// Compressed as gzip.
+    /// Content, compressed with gzip.
     pub gzip: Bytes,
-    /// Not compressed, of an answer that all clients share: it takes no memory of its own.
+    /// Uncompressed content that all clients share and that needs no extra memory.
     pub shared: Option<Bytes>,
     pub keep: Keep,
 }
 
 const JSON: &str = "application/json";
-/// Nothing but the page's own files runs or is loaded, and nobody may put the page into another.
+/// Only the page's own files are loaded, and other pages cannot embed it.
 const POLICY: &str = "default-src 'self'; style-src 'self'; img-src 'self' data: blob:; worker-src 'self' blob:; \
                       connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
 pub fn gzip(bytes: &[u8]) -> Vec<u8> {
     let mut gzip = GzEncoder::new(Vec::new(), Compression::default());
-    // Memory takes everything.
+    // Writes to memory cannot fail.
     gzip.write_all(bytes).and_then(|()| gzip.finish()).unwrap_or_default()
 }
 
 impl Answer {
     pub fn json(mut value: serde_json::Value) -> Self {
-        // As in all that the command prints.
+        // Same version as in the JSON of the command.
         if let Some(object) = value.as_object_mut().filter(|object| !object.contains_key("asset")) {
             object.insert("version".into(), 1.into());
         }
@@ -65,7 +65,7 @@ impl Answer {
         Self { status, ..Self::json(serde_json::json!({ "error": reason })) }
     }
 
-    /// The response; another one if other answers hold too much memory.
+    /// Returns the response, or an error if responses in flight use too much memory.
     pub fn into_response(
         self,
         takes_gzip: bool,
@@ -81,7 +81,7 @@ impl Answer {
         };
         let Some(bytes) = bytes else {
             connection.end_stalled();
-            let reason = "clients that do not read hold the memory for answers; ask again in some seconds";
+            let reason = "memory for responses is in use by slow clients; retry in some seconds";
             let error = Self::error(StatusCode::SERVICE_UNAVAILABLE, reason);
             let mut response = error.into_response(takes_gzip, memory, connection);
             response.headers_mut().insert(RETRY_AFTER, HeaderValue::from_static("5"));
@@ -103,7 +103,7 @@ impl Answer {
     }
 }
 
-/// A response with the headers of all.
+/// Returns a response with the common headers.
 pub fn empty(status: StatusCode) -> Response<Body> {
     let mut response = Response::new(Full::default().boxed_unsync());
     *response.status_mut() = status;
@@ -121,7 +121,7 @@ pub fn empty(status: StatusCode) -> Response<Body> {
 
 fn plain(gzip: &[u8]) -> Vec<u8> {
     let mut bytes = Vec::new();
-    // Own bytes, whole.
+    // Built by this server, so decoding cannot fail.
     GzDecoder::new(gzip).read_to_end(&mut bytes).unwrap_or_default();
     bytes
 }

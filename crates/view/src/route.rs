@@ -4,36 +4,31 @@ use voxtile::Point;
 use voxtile::store::SnapshotName;
 use voxtile_render::levels::{Kind, NodeKey};
 
-/// What a request asks for.
+/// Resource of a request.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Route {
-    /// A file of the page.
     Page(&'static str),
-    /// The page without the slash that makes its links work.
+    /// Page without the trailing slash that its relative links need.
     Slash,
     Maps,
     Events,
     Of(MapId, Thing),
 }
 
-/// Which map, and which state of it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MapId {
-    /// Number of the map.
     pub number: usize,
     pub at: At,
-    /// The state to compare with.
+    /// State to compare with.
     pub since: Option<At>,
 }
 
-/// A state of a map.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum At {
     Now,
     Snapshot(SnapshotName),
 }
 
-/// What of a map.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Thing {
     Tileset,
@@ -45,8 +40,7 @@ pub enum Thing {
 }
 
 impl Route {
-    /// The route of a path and what follows its question mark; `None` if there is nothing for it, which a wrong token
-    /// has as well.
+    /// Parses a path and a query string; `None` for unknown resources and for a wrong token.
     pub fn of(path: &str, question: Option<&str>, token: &Token) -> Option<Self> {
         let (given, rest) = match path.strip_prefix('/')?.split_once('/') {
             Some((given, rest)) => (given, Some(rest)),
@@ -71,7 +65,7 @@ impl Route {
 }
 
 impl Thing {
-    /// Whether it is of the levels of a state; everything else is asked of the map itself.
+    /// Returns whether the resource needs the levels of a state.
     pub fn takes_levels(&self) -> bool {
         matches!(self, Self::Tileset | Self::Subtree(_) | Self::Node(..))
     }
@@ -105,17 +99,17 @@ impl Thing {
     }
 }
 
-/// The version that a URL names, `v=0123456789abcdef`.
+/// Parses the version in a query string, `v=0123456789abcdef`.
 pub fn version_in(question: &str) -> Option<u64> {
     u64::from_str_radix(field(question, "v")?, 16).ok()
 }
 
-/// The value of a name in `a=1&b=2`.
+/// Returns the value of a name in `a=1&b=2`.
 fn field<'a>(question: &'a str, name: &str) -> Option<&'a str> {
     question.split('&').find_map(|part| part.strip_prefix(name)?.strip_prefix('='))
 }
 
-/// `X,Y,Z`; the comma may be written as `%2C`.
+/// Parses `X,Y,Z`; the comma may be encoded as `%2C`.
 fn point(text: &str) -> Option<Point> {
     let text = text.replace("%2C", ",").replace("%2c", ",");
     let mut numbers = text.split(',').map(|number| number.parse().ok());
@@ -127,7 +121,7 @@ fn finite(point: Point) -> Option<Point> {
     point.iter().all(|coordinate| coordinate.is_finite()).then_some(point)
 }
 
-/// `0`, `0@monday`, and both with `~monday` for what changed since.
+/// Formats are `0` and `0@monday`, and both with `~monday` for the changes since a snapshot.
 impl FromStr for MapId {
     type Err = ();
 
@@ -153,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn paths_ask_for_what_is_there_and_nothing_else() {
+    fn valid_paths_are_parsed() {
         assert_eq!(route("/sesame_42/", None), Some(Route::Page("index.html")));
         assert_eq!(route("/sesame_42", None), Some(Route::Slash));
         assert_eq!(route("/sesame_42/maps.json", None), Some(Route::Maps));
@@ -175,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_else_is_served() {
+    fn invalid_paths_are_refused() {
         for path in [
             "",
             "/",

@@ -1,4 +1,4 @@
-use super::map_state::{Asked, MapState, Shown};
+use super::map_state::{MapState, QueryMap, Shown};
 use super::node_cache;
 use super::route::{At, MapId};
 use voxtile_pipeline::{AnyMap, MapAt, open_any_map};
@@ -18,22 +18,22 @@ use voxtile::store::SnapshotName;
 use voxtile_pipeline::place::place_of;
 use voxtile_render::levels::{Levels, NodeStore};
 
-/// A map that is shown, followed while somebody writes it.
+/// Map that is shown while other processes may write it.
 pub struct ServedMap {
     path: PathBuf,
     at: MapAt,
     name: String,
     store: Arc<NodeStore>,
     now: RwLock<Arc<MapState>>,
-    /// Which snapshots there are, and when that was so.
+    /// List of snapshots, and the state of the files when it was read.
     listed: Mutex<Option<(Stamp, Arc<Vec<Listed>>)>>,
-    /// Snapshots that were looked at, those used last at the end.
+    /// Snapshots in use, the most recently used last.
     snapshots: Mutex<Vec<(Listed, Arc<MapState>)>>,
-    /// Hears how far the first look at all tiles is.
+    /// Receives the progress of the first read of all tiles.
     progress: Progress,
 }
 
-/// A snapshot of the map. One that was deleted and made again is another: its flush tells.
+/// Snapshot of the map. Its flush number distinguishes it from a deleted one of the same name.
 #[derive(Clone, PartialEq)]
 pub struct Listed {
     pub name: String,
@@ -41,37 +41,36 @@ pub struct Listed {
     pub tiles: u64,
 }
 
-/// What a request may have made on its way.
+/// Work that a request may trigger.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Makes {
     Nothing,
-    /// The levels of snapshots: one request at a time does, so that memory stays bounded and none are made twice.
+    /// Levels of snapshots, built for one request at a time to bound memory and avoid duplicate work.
     Levels,
 }
 
-/// What there is of a state that a path names.
+/// Result of looking up a state.
 pub enum Found<T> {
     Here(T),
-    /// Its levels are to be made first.
+    /// Its levels must be built first.
     NotMade,
     Nothing,
 }
 
-/// How often a map is looked at for a new flush.
-const LOOK_EVERY: Duration = Duration::from_millis(500);
-/// Tiles of the first coarse levels of a large map, which are shown while the others are read.
+/// Interval of checks for a new flush.
+const POLL_INTERVAL: Duration = Duration::from_millis(500);
+/// Number of tiles in the first coarse levels of a large map, shown while the rest is read.
 const FIRST_TILES: usize = 512;
-/// Each time so many times as many.
+/// Factor between successive numbers of tiles.
 const GROWTH: usize = 4;
-/// What is not complete is shown this often at most.
+/// Minimum interval between incomplete states.
 const SHOW_EVERY: Duration = Duration::from_secs(1);
-/// Tiles whose coarse nodes are made together, along each axis, as a power of two.
+/// Tiles per axis whose coarse nodes are built together, as a power of two.
 const GROUP: u32 = 3;
-/// Snapshots whose levels stay in memory.
+/// Maximum number of snapshots with levels in memory.
 const SNAPSHOTS_KEPT: usize = 4;
 
-/// What tells whether a map was flushed, or a snapshot of it made or deleted: length and time of its log, its metadata,
-/// and the folder of its snapshots.
+/// Detects flushes and changes of snapshots: length and time of the log, the metadata, and the folder of snapshots.
 #[derive(PartialEq)]
 struct Stamp([Option<(u64, SystemTime)>; 3]);
 
@@ -85,7 +84,7 @@ impl Stamp {
 }
 
 impl ServedMap {
-    /// Opens a map; its levels come with [`ServedMap::follow`].
+    /// Opens a map; [`ServedMap::follow`] builds its levels.
     pub fn open(path: &Path, is_kept: bool, progress: Progress) -> anyhow::Result<Self> {
         let map = open_any_map(path).with_context(|| format!("cannot show {}", path.display()))?;
         let id = match &map {
@@ -114,25 +113,25 @@ impl ServedMap {
         &self.name
     }
 
-    /// The map as it is known now.
+    /// Returns the current state.
     pub fn now(&self) -> Arc<MapState> {
         self.now.read().clone()
     }
 
-    /// The snapshots that can be shown; none of a map that is shown as one.
+    /// Returns the snapshots that can be shown; none if the map itself was opened as a snapshot.
     pub fn snapshots(&self) -> Arc<Vec<Listed>> {
         let is_map = self.at.snapshot.is_none() && matches!(self.now().map, AnyMap::Map(_));
         if !is_map {
             return Arc::default();
         }
-        // From before they are read: one that is made in between is seen the next time.
+        // Taken before the list is read, so that a snapshot created in between is found next time.
         let stamp = Stamp::of(&self.at.map);
         if let Some((at, listed)) = &*self.listed.lock()
             && *at == stamp
         {
             return listed.clone();
         }
-        // What cannot be read now may be the next time.
+        // The list may be readable next time.
         let Ok(found) = place_of(&self.at.map).and_then(snapshots) else { return Arc::default() };
         let whole = found.into_iter().filter(|info| info.damage.is_none());
         let listed =
@@ -142,7 +141,7 @@ impl ServedMap {
         listed
     }
 
-    /// The state that a path names.
+    /// Returns the state of a path.
     pub fn shown(&self, id: &MapId, makes: Makes) -> voxtile::Result<Found<Shown>> {
         let after = match self.state(&id.at, makes)? {
             Found::Here(state) => state,
@@ -157,19 +156,19 @@ impl ServedMap {
         })
     }
 
-    /// The map that a path names, for questions: nobody waits for the levels of a snapshot. `None` if there is no such
+    /// Returns the map of a path for queries, without waiting for levels of a snapshot. `None` if there is no such
     /// snapshot.
-    pub fn asked(&self, id: &MapId) -> voxtile::Result<Option<Asked>> {
+    pub fn query_map(&self, id: &MapId) -> voxtile::Result<Option<QueryMap>> {
         if let Some(At::Snapshot(since)) = &id.since
             && self.listed(since).is_none()
         {
             return Ok(None);
         }
-        let At::Snapshot(name) = &id.at else { return Ok(Some(Asked::State(self.now()))) };
+        let At::Snapshot(name) = &id.at else { return Ok(Some(QueryMap::State(self.now()))) };
         let Some(listed) = self.listed(name) else { return Ok(None) };
         Ok(Some(match self.kept(&listed) {
-            Some(state) => Asked::State(state),
-            None => Asked::Opened(self.opened(name)?),
+            Some(state) => QueryMap::State(state),
+            None => QueryMap::Opened(self.opened(name)?),
         }))
     }
 
@@ -188,7 +187,7 @@ impl ServedMap {
         }
         let Some(state) = self.made(name)? else { return Ok(Found::Nothing) };
         let mut kept = self.snapshots.lock();
-        // One of this name that was deleted is of no use any more.
+        // Drop a deleted snapshot with this name.
         kept.retain(|(known, _)| known.name != listed.name);
         if kept.len() == SNAPSHOTS_KEPT {
             kept.remove(0);
@@ -197,7 +196,7 @@ impl ServedMap {
         Ok(Found::Here(state))
     }
 
-    /// A snapshot that was looked at, which becomes the one used last.
+    /// Returns a snapshot in use and marks it as most recently used.
     fn kept(&self, listed: &Listed) -> Option<Arc<MapState>> {
         let mut kept = self.snapshots.lock();
         let at = kept.iter().position(|(known, _)| known == listed)?;
@@ -211,7 +210,7 @@ impl ServedMap {
         Ok(AnyMap::Map(Box::new(at.open()?)))
     }
 
-    /// A snapshot with its levels.
+    /// Returns a snapshot with its levels.
     fn made(&self, name: &SnapshotName) -> voxtile::Result<Option<Arc<MapState>>> {
         let map = self.opened(name)?;
         let tiles = map.tile_indices();
@@ -222,11 +221,10 @@ impl ServedMap {
         Ok(Some(Arc::new(state)))
     }
 
-    /// Makes the levels, and makes them anew whenever the map was flushed, in a thread of its own that ends with the
-    /// process.
+    /// Builds the levels, and rebuilds them after each flush, in a thread that runs until the process ends.
     pub fn follow(self: Arc<Self>, changes: watch::Sender<u64>) -> anyhow::Result<()> {
         let work = move || {
-            // From before it is read: a flush in between is seen the next time.
+            // Taken before the map is read, so that a flush in between is found next time.
             let mut seen = None;
             let mut told = String::new();
             loop {
@@ -234,7 +232,7 @@ impl ServedMap {
                 if seen.as_ref() != Some(&stamp) {
                     match self.show_newest(&changes) {
                         Ok(()) => seen = Some(stamp),
-                        // Flushed again meanwhile, or gone: what is shown stays, and the next look may find more.
+                        // The map was flushed again or removed: keep the shown state and retry.
                         Err(error) => {
                             let error = format!("{error:#}");
                             if told != error {
@@ -244,13 +242,13 @@ impl ServedMap {
                         }
                     }
                 }
-                thread::sleep(LOOK_EVERY);
+                thread::sleep(POLL_INTERVAL);
             }
         };
         thread::Builder::new()
             .name("voxtile-follow".into())
             .spawn(work)
-            .context("no thread to read the map")?;
+            .context("cannot start the thread that reads the map")?;
         Ok(())
     }
 
@@ -284,7 +282,7 @@ impl ServedMap {
 
     fn show(&self, map: AnyMap, levels: Levels, pending_tiles: u64, changes: &watch::Sender<u64>) {
         for reason in levels.unreadable() {
-            log::warn!("not shown: {reason}");
+            log::warn!("tile not shown: {reason}");
         }
         let generation = self.now().generation + 1;
         let state = MapState { map, levels, store: self.store.clone(), generation, pending_tiles };
@@ -293,8 +291,8 @@ impl ServedMap {
     }
 }
 
-/// Tiles without versions, as those of OctoMap's files: a browser keeps their nodes for ever, and this server may have
-/// shown another file before, or the next one may.
+/// Returns an origin for tiles without versions, such as those of OctoMap files. Browsers cache nodes for ever, so it
+/// must differ from that of any file that a server showed earlier or will show later.
 fn new_origin() -> u64 {
     RandomState::new().build_hasher().finish()
 }

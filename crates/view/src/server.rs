@@ -26,26 +26,26 @@ use std::time::Duration;
 use tokio::sync::watch;
 use tokio_io_timeout::TimeoutStream;
 
-/// A connection that sends no request for so long is closed: whoever holds connections back holds them no longer.
-const SILENCE: Duration = Duration::from_secs(5);
-/// One that takes nothing of an answer for so long, too.
-const PATIENCE: Duration = Duration::from_secs(30);
-/// What a connection may hold of a request; of an answer, what is on its way beside the answer itself.
+/// A connection without a request for this time is closed, so that silent clients cannot hold connections.
+const REQUEST_TIMEOUT: Duration = Duration::from_secs(5);
+/// A connection that reads nothing of its response for this time is closed.
+const WRITE_TIMEOUT: Duration = Duration::from_secs(30);
+/// Buffer sizes of a connection for the request, and for the response in addition to its content.
 const BUFFER_BYTES: usize = 32 << 10;
-/// Something is sent this often to those who wait for events.
-const ALIVE_EVERY: Duration = Duration::from_secs(15);
+/// Interval of keep-alive messages in event streams.
+const KEEP_ALIVE_INTERVAL: Duration = Duration::from_secs(15);
 
-/// Answers requests until a signal.
+/// HTTP server that runs until a signal.
 pub struct Server {
     maps: Vec<Arc<ServedMap>>,
     token: Token,
     address: SocketAddr,
     changed: watch::Receiver<u64>,
-    /// Tells a page whether generations are counted anew.
+    /// Identifies this server to the page, because generations restart with each server.
     id: String,
-    /// Each of its answers may hold a tile.
+    /// Limits concurrent work, as each response may hold a tile.
     work: Work,
-    /// Levels of snapshots: one at a time, on all cores. It takes seconds, so whoever waits holds no other work back.
+    /// Builds levels of snapshots, one at a time on all cores. This takes seconds, so it must not block other work.
     making: Work,
     memory: AnswerMemory,
 }
@@ -75,7 +75,7 @@ impl Server {
             }
             anyhow::Ok(())
         })?;
-        // Answers that are being computed are of no use any more.
+        // Responses in progress are not needed any more.
         runtime.shutdown_background();
         Ok(())
     }
@@ -85,16 +85,16 @@ impl Server {
         loop {
             let (stream, address) = match listener.accept().await {
                 Ok(accepted) => accepted,
-                // Too many open files, or a connection that is gone already.
+                // Too many open files, or the client has disconnected.
                 Err(error) => {
-                    log::warn!("a connection was not accepted: {error}");
+                    log::warn!("cannot accept a connection: {error}");
                     tokio::time::sleep(Duration::from_millis(50)).await;
                     continue;
                 }
             };
             let connection = Arc::new(connections.enter(Client::of(address.ip())));
             let mut stream = TimeoutStream::new(stream);
-            stream.set_write_timeout(Some(PATIENCE));
+            stream.set_write_timeout(Some(WRITE_TIMEOUT));
             let stream = ClientStream::new(Box::pin(stream), connection.clone());
             let server = self.clone();
             tokio::spawn(async move {
@@ -105,12 +105,12 @@ impl Server {
                 });
                 let served = http1::Builder::new()
                     .timer(TokioTimer::new())
-                    .header_read_timeout(SILENCE)
+                    .header_read_timeout(REQUEST_TIMEOUT)
                     .max_buf_size(BUFFER_BYTES)
                     .serve_connection(TokioIo::new(stream), service);
                 tokio::select! {
                     served = served => if let Err(error) = served {
-                        log::debug!("a connection ended: {error}");
+                        log::debug!("connection closed: {error}");
                     },
                     () = connection.ended() => {}
                 }
@@ -152,7 +152,7 @@ impl Server {
             Err(answer) => {
                 let is_wrong_method = answer.status == StatusCode::METHOD_NOT_ALLOWED;
                 let mut response = answer.into_response(takes_gzip, &self.memory, connection);
-                // Strangers keep no connection.
+                // Unauthorised clients get no persistent connection.
                 response.headers_mut().insert(CONNECTION, HeaderValue::from_static("close"));
                 if is_wrong_method {
                     response.headers_mut().insert(ALLOW, HeaderValue::from_static("GET, HEAD"));
@@ -168,18 +168,17 @@ impl Server {
 
     fn route(&self, request: &Request<Incoming>) -> Result<Route, Answer> {
         if ![Method::GET, Method::HEAD].contains(request.method()) {
-            return Err(Answer::error(StatusCode::METHOD_NOT_ALLOWED, "only GET and HEAD are answered"));
+            return Err(Answer::error(StatusCode::METHOD_NOT_ALLOWED, "only GET and HEAD are supported"));
         }
-        if !self.is_asked_by_its_name(request) {
-            return Err(Answer::error(StatusCode::FORBIDDEN, "this server has another name"));
+        if !self.has_own_host(request) {
+            return Err(Answer::error(StatusCode::FORBIDDEN, "wrong host name"));
         }
-        Route::of(request.uri().path(), request.uri().query(), &self.token).ok_or_else(|| {
-            Answer::error(StatusCode::NOT_FOUND, "there is nothing here; is the URL complete?")
-        })
+        Route::of(request.uri().path(), request.uri().query(), &self.token)
+            .ok_or_else(|| Answer::error(StatusCode::NOT_FOUND, "not found; check that the URL is complete"))
     }
 
-    /// On this machine alone: a page of elsewhere whose name was made to mean 127.0.0.1 gets no answer.
-    fn is_asked_by_its_name(&self, request: &Request<Incoming>) -> bool {
+    /// Checks the Host header on a loopback address: prevents DNS rebinding by pages of other sites.
+    fn has_own_host(&self, request: &Request<Incoming>) -> bool {
         if !self.address.ip().is_loopback() {
             return true;
         }
@@ -202,7 +201,7 @@ impl Server {
                     shared: Some(file.plain.clone()),
                     keep: Keep::No,
                 },
-                None => Answer::error(StatusCode::NOT_FOUND, "there is no such file"),
+                None => Answer::error(StatusCode::NOT_FOUND, "no such file"),
             };
         }
         let Route::Of(id, thing) = route else {
@@ -215,14 +214,14 @@ impl Server {
             move || answers::of_map(&server.maps, &id, &thing, version, makes)
         };
         let answer = match self.work.run(ask(Makes::Nothing)).await {
-            // Levels that are to be made first.
+            // Build the levels first.
             Some(None) => self.making.run(ask(Makes::Levels)).await,
             answer => answer,
         };
         answer.flatten().unwrap_or_else(ending)
     }
 
-    /// What changes, as it does.
+    /// Returns the event stream of changes.
     fn events(&self) -> Response<Body> {
         let (mut sender, body) = Channel::<Bytes, Infallible>::new(4);
         let (id, maps, mut changed) = (self.id.clone(), self.maps.clone(), self.changed.clone());
@@ -245,8 +244,8 @@ impl Server {
                 if sender.send_data(text.into()).await.is_err() {
                     return;
                 }
-                // Nobody sends any more: the server ends.
-                if let Ok(Err(_)) = tokio::time::timeout(ALIVE_EVERY, changed.changed()).await {
+                // The sender is gone: the server stops.
+                if let Ok(Err(_)) = tokio::time::timeout(KEEP_ALIVE_INTERVAL, changed.changed()).await {
                     return;
                 }
             }
@@ -260,7 +259,7 @@ impl Server {
 }
 
 fn ending() -> Answer {
-    Answer::error(StatusCode::SERVICE_UNAVAILABLE, "the server is ending")
+    Answer::error(StatusCode::SERVICE_UNAVAILABLE, "the server is stopping")
 }
 
 fn takes_gzip(request: &Request<Incoming>) -> bool {
@@ -300,7 +299,7 @@ mod tests {
     use voxtile::{MapConfig, Mapper, Scan};
 
     #[test]
-    fn who_waits_for_levels_of_a_snapshot_holds_nobody_back() {
+    fn building_levels_of_a_snapshot_does_not_block_other_requests() {
         let folder = tempfile::tempdir().unwrap();
         let (path, name) = (folder.path().join("map"), SnapshotName::new("monday").unwrap());
         let mut map = OutOfCoreTileMapper::create(&path, MapConfig::new(0.1, 1.0).unwrap()).unwrap();

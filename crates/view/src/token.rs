@@ -1,6 +1,6 @@
 use voxtile::{Error, Result};
 
-/// The first part of every path: whoever knows it may look.
+/// Secret first component of every path; grants access.
 pub struct Token(String);
 
 impl Token {
@@ -9,14 +9,14 @@ impl Token {
         if (8..=128).contains(&token.len()) && token.bytes().all(is_letter) {
             return Ok(Self(token.to_owned()));
         }
-        Err(Error::argument("token", "8 to 128 of A-Z a-z 0-9 _ - can be one"))
+        Err(Error::argument("token", "must be 8 to 128 characters of A-Z a-z 0-9 _ -"))
     }
 
-    /// 128 random bits.
+    /// Returns 128 random bits as text.
     pub fn random() -> Result<Self> {
         let mut bytes = [0; 16];
         getrandom::fill(&mut bytes).map_err(|error| {
-            Error::argument("token", format!("no random one can be made ({error}); pass one"))
+            Error::argument("token", format!("cannot create a random token ({error}); pass one"))
         })?;
         Ok(Self(bytes.iter().map(|byte| format!("{byte:02x}")).collect()))
     }
@@ -25,7 +25,7 @@ impl Token {
         &self.0
     }
 
-    /// In the same time whatever is right about it, so that nobody finds it letter by letter.
+    /// Compares in constant time, so that response times reveal nothing about the token.
     pub fn is(&self, text: &str) -> bool {
         blake3::hash(text.as_bytes()) == blake3::hash(self.0.as_bytes())
     }

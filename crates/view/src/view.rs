@@ -8,26 +8,26 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use tokio::sync::watch;
 
-/// Hears how many tiles of a map have been read, and of how many; from any thread.
+/// Receives the numbers of tiles read and of all tiles of a map, from any thread.
 pub type Progress = Arc<dyn Fn(u64, u64) + Send + Sync>;
 
-/// What is shown, to whom.
+/// Maps to show and the address of the server.
 pub struct ViewOptions {
-    /// Folders of maps, `FOLDER@SNAPSHOT`, OctoMap files, or URLs of maps; several are shown as layers.
+    /// Folders of maps, `FOLDER@SNAPSHOT`, OctoMap files, or URLs of maps; each is a layer.
     pub maps: Vec<PathBuf>,
-    /// Address and port to listen on; port 0 takes a free one.
+    /// Address and port of the server; port 0 selects a free one.
     pub listen: SocketAddr,
-    /// Secret part of the URL, 8 to 128 of `A-Z a-z 0-9 _ -`; `None` for a random one.
+    /// Secret part of the URL, 8 to 128 characters of `A-Z a-z 0-9 _ -`; `None` for a random one.
     pub token: Option<String>,
-    /// Whether coarse levels are kept in the user's cache folder for the next time.
+    /// Whether coarse levels are stored in the user's cache folder for the next time.
     pub keeps_levels: bool,
-    /// Hears how far the first look at a map is.
+    /// Receives the progress of the first read of each map.
     pub progress: Progress,
 }
 
 impl fmt::Debug for ViewOptions {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        // The token is a secret.
+        // Omit the secret token.
         let Self { maps, listen, keeps_levels, .. } = self;
         let mut out = formatter.debug_struct("ViewOptions");
         out.field("maps", maps).field("listen", listen).field("keeps_levels", keeps_levels);
@@ -35,7 +35,7 @@ impl fmt::Debug for ViewOptions {
     }
 }
 
-/// Opened maps and a listening socket. Requests are answered by [`View::serve`].
+/// Open maps and a listening socket; [`View::serve`] runs the server.
 pub struct View {
     server: Server,
     listener: TcpListener,
@@ -50,17 +50,17 @@ impl fmt::Debug for View {
 }
 
 impl View {
-    /// Opens the maps and begins to listen. Threads read the maps from here on, and follow what others write.
+    /// Opens the maps and starts to listen. Threads read the maps from here on and follow changes by other processes.
     ///
     /// # Errors
     ///
-    /// A map that cannot be opened, a token that is none, an address that cannot be listened on.
+    /// Fails if a map cannot be opened, the token is invalid, or the address is not available.
     pub fn open(options: &ViewOptions) -> anyhow::Result<Self> {
         let token = match &options.token {
             Some(token) => Token::new(token)?,
             None => Token::random()?,
         };
-        // Counts whatever becomes visible, in any map.
+        // Counts visible changes of all maps.
         let (changes, changed) = watch::channel(0_u64);
         let maps = options
             .maps
@@ -78,21 +78,21 @@ impl View {
         Ok(Self { server: Server::new(maps, token, address, changed), listener, address, url })
     }
 
-    /// The URL of the page, with its secret part.
+    /// Returns the URL of the page, including its secret part.
     pub fn url(&self) -> &str {
         &self.url
     }
 
-    /// Address and port that are listened on.
+    /// Returns the address and port of the server.
     pub fn address(&self) -> SocketAddr {
         self.address
     }
 
-    /// Answers until a signal.
+    /// Runs the server until a signal.
     ///
     /// # Errors
     ///
-    /// An operating system that gives no threads or no connections.
+    /// Fails if the system provides no threads or no connections.
     pub fn serve(self) -> anyhow::Result<()> {
         self.server.run(self.listener)
     }

@@ -1,7 +1,7 @@
 use std::sync::Arc;
 use tokio::sync::Semaphore;
 
-/// What computes answers, so many at once, in threads that may wait.
+/// Runs blocking work in threads, limited in number.
 pub struct Work(Arc<Semaphore>);
 
 impl Work {
@@ -9,10 +9,10 @@ impl Work {
         Self(Arc::new(Semaphore::new(at_once)))
     }
 
-    /// Waits for its turn; `None` if the server is ending, or the work failed.
+    /// Waits for a free thread; `None` if the server is stopping or the work panicked.
     pub async fn run<T: Send + 'static>(&self, work: impl FnOnce() -> T + Send + 'static) -> Option<T> {
         let permit = self.0.clone().acquire_owned().await.ok()?;
-        // Nothing stops a thread: if nobody waits for it any more, its place is taken until it has ended.
+        // A thread cannot be cancelled: its slot remains in use until it ends, even without a receiver.
         let thread = tokio::task::spawn_blocking(move || {
             let done = work();
             drop(permit);
@@ -30,7 +30,7 @@ mod tests {
     use tokio::time::timeout;
 
     #[test]
-    fn work_that_nobody_waits_for_keeps_its_place_until_it_ends() {
+    fn abandoned_work_keeps_its_slot_until_it_ends() {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
         runtime.block_on(async {
             let work = Work::new(1);
@@ -40,13 +40,13 @@ mod tests {
                 begun.send(()).unwrap();
                 may_end.recv().unwrap();
             });
-            // Whoever asked goes away.
+            // The receiver is dropped.
             assert!(timeout(Duration::from_millis(50), long).await.is_err());
             has_begun.recv().unwrap();
             assert!(timeout(Duration::from_millis(50), work.run(|| 1)).await.is_err(), "two at once");
             end.send(()).unwrap();
             assert_eq!(work.run(|| 2).await, Some(2));
-            // Work that fails holds no place.
+            // Panicked work releases its slot.
             assert_eq!(work.run(|| panic!("on purpose")).await, None::<u8>);
             assert_eq!(work.run(|| 3).await, Some(3));
         });

@@ -1,8 +1,9 @@
+use super::help;
 use clap::Args;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// A number of seconds from 0.1 to a day.
+/// Parses a number of seconds from 0.1 to 86400 (a day).
 pub fn timeout_of(text: &str) -> Result<Duration, String> {
     let seconds: f64 = text.parse().map_err(|_| "not a number of seconds".to_owned())?;
     match (0.1..=86_400.0).contains(&seconds) {
@@ -13,38 +14,36 @@ pub fn timeout_of(text: &str) -> Result<Duration, String> {
 
 #[derive(Debug, Args)]
 pub struct PushArgs {
-    /// Folder of the map; a writer may be at work on it, and its last flush is pushed
+    /// Folder of the map; pushes its last flush. Another process may be writing to it
     pub map: PathBuf,
-    /// Where the map goes: s3://BUCKET/MAP, gs://BUCKET/MAP or az://CONTAINER/MAP; keys, region and endpoint come from
-    /// the environment (AWS_ACCESS_KEY_ID, AWS_ENDPOINT_URL and so on)
+    /// Address of the map: s3://BUCKET/MAP, gs://BUCKET/MAP or az://CONTAINER/MAP. Keys, region and endpoint are read
+    /// from the environment (AWS_ACCESS_KEY_ID, AWS_ENDPOINT_URL and so on)
     #[arg(value_name = "URL")]
     pub url: String,
-    /// Remove the objects there that the map does not need any more; who reads an earlier push has to open it anew
+    /// Remove objects in the bucket that the map no longer needs; readers of an earlier push must reopen it
     #[arg(long)]
     pub prune: bool,
-    /// Replace a state there that a copy of this map went to on a way of its own; what only that state has is lost
+    /// Replace the map in the bucket even if another copy of this map was changed and pushed; its changes are lost
     #[arg(long)]
     pub replace: bool,
-    /// Send everything, also what should be there already: mends a map there of which objects were lost or damaged; a
-    /// manifest there that cannot be read is replaced, whatever map it was of
+    /// Upload everything, even objects that already exist; repairs missing or damaged objects. Replaces a manifest that
+    /// cannot be read, even one of another map
     #[arg(long)]
     pub resend: bool,
-    /// Print JSON; sizes in bytes
-    #[arg(long)]
+    #[arg(long, help = help::JSON)]
     pub json: bool,
 }
 
 #[derive(Debug, Args)]
 pub struct PullArgs {
-    /// Where the map is: as for push, or https://HOST/MAP
+    /// Address of the map, as for push, or https://HOST/MAP
     #[arg(value_name = "URL")]
     pub url: String,
-    /// Folder of the map; it does not exist yet, or --replace is given
+    /// Folder of the map; must not exist yet, except with --replace
     pub map: PathBuf,
-    /// Replace the state of the same map that is in the folder; what it has and the bucket lacks is lost
+    /// Replace the map in the folder by the same map in the bucket; changes that were not pushed are lost
     #[arg(long)]
     pub replace: bool,
-    /// Print JSON; sizes in bytes
-    #[arg(long)]
+    #[arg(long, help = help::JSON)]
     pub json: bool,
 }

@@ -1,31 +1,30 @@
+use super::help;
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 use voxtile::operations::Prefer;
 
 #[derive(Debug, Args)]
 pub struct MergeArgs {
-    /// Folders of the maps, two or more, of the same resolution and tile size; MAP@SNAPSHOT for a snapshot
+    /// Folders of two or more maps with equal resolution and tile size, or MAP@SNAPSHOT
     #[arg(value_name = "MAP", num_args = 2.., required = true)]
     pub maps: Vec<PathBuf>,
-    /// Folder of the map to make; it is not there before all of it is
-    #[arg(short = 'o', long = "output", value_name = "MAP")]
+    #[arg(short = 'o', long = "output", value_name = "MAP", help = help::NEW_MAP)]
     pub output: PathBuf,
-    /// Whose voxel to take where several maps have one [default: log-odds and counts are added, which takes maps of the
-    /// model log-odds with equal parameters]
+    /// Voxel to keep where several maps have one [default: add log-odds and counts; needs the log-odds model with equal
+    /// parameters]
     #[arg(long, value_name = "WHICH")]
     pub prefer: Option<PreferName>,
-    /// Print the summary as JSON
-    #[arg(long)]
+    #[arg(long, help = help::JSON)]
     pub json: bool,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub enum PreferName {
-    /// That of the map named first
+    /// From the first map named
     First,
-    /// That of the map named last
+    /// From the last map named
     Last,
-    /// That with more observations; of as many, that of the map named first
+    /// With the most observations; if equal, from the first map named
     MoreObserved,
 }
 
@@ -42,36 +41,33 @@ impl From<PreferName> for Prefer {
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 pub struct CropArgs {
-    /// Folder of the map; MAP@SNAPSHOT for a snapshot of it
+    #[arg(help = help::MAP_OR_SNAPSHOT)]
     pub map: PathBuf,
     #[command(flatten)]
     pub part: PartArgs,
-    /// Folder of the map to make; it is not there before all of it is
-    #[arg(short = 'o', long = "output", value_name = "MAP")]
+    #[arg(short = 'o', long = "output", value_name = "MAP", help = help::NEW_MAP)]
     pub output: PathBuf,
-    /// Print the summary as JSON
-    #[arg(long)]
+    #[arg(long, help = help::JSON)]
     pub json: bool,
 }
 
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 pub struct ClearArgs {
-    /// Folder of the map
+    #[arg(help = help::MAP)]
     pub map: PathBuf,
     #[command(flatten)]
     pub part: PartArgs,
-    /// Print the summary as JSON
-    #[arg(long)]
+    #[arg(long, help = help::JSON)]
     pub json: bool,
 }
 
 #[derive(Debug, Args)]
 pub struct PartArgs {
-    /// Voxels whose center is in this box: X0 <= x < X1 and so on, in metres
+    /// Box of voxels by their centers (X0 <= x < X1, same for y and z), in metres
     #[arg(long, value_names = ["X0", "Y0", "Z0", "X1", "Y1", "Z1"], num_args = 6, required = true)]
     pub region: Vec<f64>,
-    /// All other voxels instead
+    /// Select all voxels outside the box instead
     #[arg(long)]
     pub outside: bool,
 }
@@ -79,18 +75,17 @@ pub struct PartArgs {
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 pub struct DecayArgs {
-    /// Folder of the map
+    #[arg(help = help::MAP)]
     pub map: PathBuf,
-    /// After so many scans log-odds are half of what they were
+    /// Number of scans after which log-odds are halved
     #[arg(long, value_name = "SCANS")]
     pub halflife: f64,
-    /// For so many scans, whether they came or not [default: those since the last decay, or since the map's beginning]
+    /// Decay as if N scans had passed [default: scans since the last decay, or since the map was created]
     #[arg(long, value_name = "N")]
     pub scans: Option<u64>,
-    /// Voxels whose log-odds are then nearer to 0 than this become unknown, 0.4 say [default: none do]
+    /// Make voxels unknown whose decayed log-odds are nearer to 0 than this, for example 0.4 [default: none]
     #[arg(long, value_name = "L")]
     pub forget_below: Option<f64>,
-    /// Print the summary as JSON
-    #[arg(long)]
+    #[arg(long, help = help::JSON)]
     pub json: bool,
 }

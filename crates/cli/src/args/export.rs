@@ -1,3 +1,4 @@
+use super::help;
 use bytesize::ByteSize;
 use clap::builder::{ArgPredicate, PossibleValue, PossibleValuesParser};
 use clap::{Args, ValueEnum};
@@ -7,11 +8,11 @@ use voxtile_formats::write::OutputFormats;
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 pub struct ExportArgs {
-    /// Folder of the map, FOLDER@SNAPSHOT, or an OctoMap file (.bt .ot)
+    #[arg(help = help::ANY_MAP)]
     pub map: PathBuf,
-    /// File to write; its extension says what: .ply .pcd .csv .xyz .npz .las .laz .copc.laz .e57 .parquet .mcap hold
-    /// voxels, .glb their surface, .pgm a flat map of nav2, .png heights, .bt .ot the whole octree. - is standard
-    /// output (.ply .pcd .csv .bt .ot)
+    /// File to write. The extension selects the format: .ply .pcd .csv .xyz .npz .las .laz .copc.laz .e57 .parquet
+    /// .mcap voxels, .glb their surface, .pgm a 2D occupancy grid for nav2, .png heights, .bt .ot the octree. - is
+    /// standard output (.ply .pcd .csv .bt .ot)
     #[arg(
         short = 'o',
         long = "output",
@@ -21,16 +22,16 @@ pub struct ExportArgs {
         default_value_if("scans", ArgPredicate::IsPresent, "-")
     )]
     pub output: PathBuf,
-    /// In place of voxels, write the scans that the map keeps into this folder: a .pcd each, and poses_tum.txt
+    /// Export the kept scans to this folder instead of voxels: one .pcd per scan, and poses_tum.txt
     #[arg(long, value_name = "DIR", conflicts_with_all = ["output", "format", "what", "region", "origin"])]
     pub scans: Option<PathBuf>,
-    /// What to write, whatever the extension
+    /// Format to write, whatever the extension
     #[arg(long, value_name = "FORMAT", value_parser = format_names())]
     pub format: Option<String>,
-    /// Voxels of at least this probability; 0 takes all observed ones [default: the map's occupancy threshold]
+    /// Only voxels of at least this probability; 0 exports all observed voxels [default: the map's threshold]
     #[arg(long, value_name = "P")]
     pub min_probability: Option<f64>,
-    /// Which voxels [default: occupied; all for .pgm]
+    /// Voxels to export [default: occupied; all for .pgm]
     #[arg(long, value_name = "WHICH", conflicts_with = "min_probability")]
     pub what: Option<WhatName>,
     /// .pgm, .png: only voxels that reach above this height, in metres
@@ -39,31 +40,28 @@ pub struct ExportArgs {
     /// .pgm, .png: only voxels that reach below this height, in metres
     #[arg(long, value_name = "M")]
     pub z_max: Option<f64>,
-    /// autoware: edge of the square of a file, in whole metres [default: 20]
+    /// autoware: edge length of a square, one file each, in whole metres [default: 20]
     #[arg(long, value_name = "M")]
     pub cell: Option<f64>,
-    /// .glb: positions as 16-bit numbers (KHR_mesh_quantization) where these suffice, for a fifth less of a file;
-    /// Open3D and other programs misread them
+    /// .glb: positions as 16-bit numbers (KHR_mesh_quantization) where they suffice, for files a fifth smaller; Open3D
+    /// and other programs misread them
     #[arg(long)]
     pub quantize: bool,
-    /// Only voxels whose center is in this box: X0 <= x < X1 and so on, in metres
-    #[arg(long, value_names = ["X0", "Y0", "Z0", "X1", "Y1", "Z1"], num_args = 6)]
+    #[arg(long, value_names = ["X0", "Y0", "Z0", "X1", "Y1", "Z1"], num_args = 6, help = help::VOXELS_IN_BOX)]
     pub region: Option<Vec<f64>>,
-    /// Coordinates in the file are those of the map less this, in metres: the nearest corner of a voxel, said in the
-    /// summary and in FILE.origin.json. A map far from its origin needs it as .bt or .ot; a .pcd chooses one where
-    /// float32 is too coarse [default: 0 0 0]
+    /// Origin of the file in the map, in metres, moved to the nearest voxel corner: subtracted from all coordinates and
+    /// recorded in the summary and FILE.origin.json. A map far from its origin needs it for .bt and .ot; .pcd chooses
+    /// one if float32 is too coarse [default: 0 0 0]
     #[arg(long, value_names = ["X", "Y", "Z"], num_args = 3)]
     pub origin: Option<Vec<f64>>,
-    /// Memory for putting a .bt or .ot file together, beside that of one tile (64MiB, 1GiB)
-    /// [default: 64MiB]
+    /// Memory for assembling a .bt or .ot file, in addition to one tile, such as 64MiB or 1GiB [default: 64MiB]
     #[arg(long, value_name = "SIZE")]
     pub memory: Option<ByteSize>,
-    /// Print the summary as JSON
-    #[arg(long)]
+    #[arg(long, help = help::JSON)]
     pub json: bool,
 }
 
-/// The names of all formats, with what they are.
+/// Names and help texts of all formats.
 fn format_names() -> PossibleValuesParser {
     let formats = OutputFormats::default();
     formats.all().iter().map(|format| PossibleValue::new(format.name).help(format.help)).into()
@@ -71,10 +69,10 @@ fn format_names() -> PossibleValuesParser {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum WhatName {
-    /// From the map's threshold on
+    /// Voxels from the map's threshold on
     Occupied,
-    /// Observed and below it
+    /// Observed voxels below the threshold
     Free,
-    /// All that were observed
+    /// All observed voxels
     All,
 }

@@ -1,44 +1,41 @@
-use super::ColorName;
+use super::{ColorName, help};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 pub struct PictureArgs {
-    /// Folder of the map, FOLDER@SNAPSHOT, or an OctoMap file (.bt .ot)
+    #[arg(help = help::ANY_MAP)]
     pub map: PathBuf,
-    /// PNG to write; - is standard output
+    /// PNG file to write; - is standard output
     #[arg(short = 'o', long = "output", value_name = "FILE")]
     pub output: PathBuf,
-    /// From where to look
+    /// Viewing direction
     #[arg(long, value_name = "VIEW", default_value = "above")]
     pub from: ViewName,
-    /// Draw from above only the layer at this height, in metres
+    /// Draw only the layer at this height from above, in metres
     #[arg(long, value_name = "Z")]
     pub slice: Option<f64>,
-    /// Thickness of that layer in metres [default: one voxel]
+    /// Thickness of the layer, in metres [default: one voxel]
     #[arg(long, value_name = "M", requires = "slice")]
     pub thickness: Option<f64>,
-    /// What the colors show
-    #[arg(long, value_name = "WHAT", default_value = "height")]
+    #[arg(long, value_name = "WHAT", default_value = "height", help = help::COLOR)]
     pub color: ColorName,
-    /// Only voxels whose center is in this box: X0 <= x < X1 and so on, in metres
-    #[arg(long, value_names = ["X0", "Y0", "Z0", "X1", "Y1", "Z1"], num_args = 6)]
+    #[arg(long, value_names = ["X0", "Y0", "Z0", "X1", "Y1", "Z1"], num_args = 6, help = help::VOXELS_IN_BOX)]
     pub region: Option<Vec<f64>>,
-    /// Most pixels along an edge of the map, 16 to 8192
+    /// Maximum length of the map's longer edge, in pixels, 16 to 8192
     #[arg(long, value_name = "PIXELS", default_value = "2048", value_parser = clap::value_parser!(u16).range(16..=8192))]
     pub size: u16,
-    /// Leave out the borders of tiles
+    /// Draw no tile borders
     #[arg(long)]
     pub no_grid: bool,
-    /// Leave out the way of the sensor
+    /// Draw no trajectory
     #[arg(long)]
     pub no_path: bool,
-    /// Draw what has changed since a snapshot of the map, or since another map: what appeared, vanished, stayed
+    /// Draw the changes since a snapshot of the map or since another map: appeared, vanished, unchanged
     #[arg(long, value_name = "SNAPSHOT|MAP", conflicts_with = "color")]
     pub since: Option<PathBuf>,
-    /// Print what was drawn as JSON
-    #[arg(long)]
+    #[arg(long, help = help::JSON)]
     pub json: bool,
 }
 
@@ -54,15 +51,14 @@ pub enum ViewName {
 
 #[derive(Debug, Args)]
 pub struct ReportArgs {
-    /// Folder of the map, or FOLDER@SNAPSHOT
+    #[arg(help = help::MAP_OR_SNAPSHOT)]
     pub map: PathBuf,
-    /// Page to write; - is standard output
+    /// HTML file to write; - is standard output
     #[arg(short = 'o', long = "output", value_name = "FILE")]
     pub output: PathBuf,
-    /// Do not check every file of the map for damage, which reads the whole map once more
+    /// Skip the check of every file for damage, which reads the whole map once more
     #[arg(long)]
     pub no_verify: bool,
-    /// Print what was written as JSON
-    #[arg(long)]
+    #[arg(long, help = help::JSON)]
     pub json: bool,
 }

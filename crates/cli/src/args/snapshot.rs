@@ -1,41 +1,38 @@
+use super::help;
 use clap::Args;
 use std::path::PathBuf;
 use voxtile::store::SnapshotName;
 
 #[derive(Debug, Args)]
 pub struct SnapshotArgs {
-    /// Folder of the map; no other process may be writing to it
+    #[arg(help = help::MAP_TO_WRITE)]
     pub map: PathBuf,
-    /// Name of the snapshot: 1 to 64 of A-Z a-z 0-9 . _ -, beginning with no dot, and not `now`
+    /// Name of the snapshot: 1 to 64 characters of A-Z a-z 0-9 . _ -, not beginning with a dot, not `now`
     pub name: SnapshotName,
-    /// Delete the snapshot, and the bytes on disk that are there for it alone
+    /// Delete the snapshot and the data that only it uses
     #[arg(long)]
     pub delete: bool,
-    /// Print JSON
-    #[arg(long)]
+    #[arg(long, help = help::JSON)]
     pub json: bool,
 }
 
 #[derive(Debug, Args)]
 pub struct SnapshotsArgs {
-    /// Folder of the map
+    #[arg(help = help::MAP)]
     pub map: PathBuf,
-    /// Print JSON
-    #[arg(long)]
+    #[arg(long, help = help::JSON)]
     pub json: bool,
 }
 
 #[derive(Debug, Args)]
 pub struct RevertArgs {
-    /// Folder of the map; no other process may be writing to it
+    #[arg(help = help::MAP_TO_WRITE)]
     pub map: PathBuf,
     /// Name of the snapshot
     pub name: SnapshotName,
-    /// Keep the map as it is now under this name first; without it, what came after the snapshot is gone
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help = help::KEEP_AS)]
     pub keep_as: Option<SnapshotName>,
-    /// Print JSON
-    #[arg(long)]
+    #[arg(long, help = help::JSON)]
     pub json: bool,
 }
 
@@ -44,11 +41,10 @@ pub struct RevertArgs {
     override_usage = "voxtile diff [OPTIONS] <FROM> <TO>\n       voxtile diff [OPTIONS] <MAP> <SNAPSHOT|now> <SNAPSHOT|now>"
 )]
 pub struct DiffArgs {
-    /// Two maps, each a folder or FOLDER@SNAPSHOT; or a folder and the names of two of its snapshots, `now` being the
-    /// map as it is
+    /// Two maps, each a folder or FOLDER@SNAPSHOT; or a folder and two of its snapshots, where `now` is the current map
     #[arg(value_name = "MAP", num_args = 2..=3, required = true)]
     pub sides: Vec<PathBuf>,
-    /// Print JSON, with every tile that differs
+    /// Print the result as JSON, including every tile that differs
     #[arg(long)]
     pub json: bool,
 }

@@ -4,23 +4,23 @@ use std::path::PathBuf;
 
 #[derive(Debug, Args)]
 pub struct ViewArgs {
-    /// Folders of maps, FOLDER@SNAPSHOT, or OctoMap files (.bt .ot); several are shown as layers
+    /// Folders of maps, FOLDER@SNAPSHOT, or OctoMap files (.bt .ot); each map is a layer
     #[arg(required = true, value_name = "MAP")]
     pub maps: Vec<PathBuf>,
-    /// Address and port to listen on; port 0 takes a free one. Beyond this machine, say 0.0.0.0:8000: whoever knows the
-    /// token sees the maps, and nothing is encrypted
+    /// Address and port of the server; port 0 selects a free one. Use 0.0.0.0:8000 for access from other machines: any
+    /// client with the token can read the maps, unencrypted
     #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:0")]
     pub listen: SocketAddr,
-    /// Secret part of the URL, 8 to 128 of A-Z a-z 0-9 _ - [default: a random one]
+    /// Secret part of the URL, 8 to 128 characters of A-Z a-z 0-9 _ - [default: random]
     #[arg(long, value_name = "TOKEN")]
     pub token: Option<String>,
-    /// Open no browser; say where to look
+    /// Print the URL without opening a browser
     #[arg(long)]
     pub no_browser: bool,
-    /// Keep nothing for the next time; otherwise coarse levels of the map are kept in the user's cache folder
+    /// Do not store coarse levels of the map in the user's cache folder for the next time
     #[arg(long)]
     pub no_cache: bool,
-    /// Print JSON: the URL
+    /// Print the URL as JSON
     #[arg(long)]
     pub json: bool,
 }

@@ -6,23 +6,23 @@ use voxtile::space::Aabb;
 use voxtile_pipeline::memory;
 use voxtile_render::Drawn;
 
-/// What was drawn, for a program.
+/// JSON summary of a picture.
 #[derive(Serialize)]
 pub struct DrawnJson {
     file: String,
     from: String,
     slice_m: Option<f64>,
-    /// `None` for a difference.
+    /// `None` for a picture of changes.
     color: Option<String>,
     since: Option<String>,
     width_px: usize,
     height_px: usize,
-    /// Where in the image the map is: left, top, width, height.
+    /// Map's rectangle in the image: left, top, width, height.
     map_px: [usize; 4],
     region_m: Option<Aabb>,
     cell_m: f64,
     cell_px: usize,
-    /// What the first and the last color stand for.
+    /// Values of the first and the last color.
     range: Option<[f64; 2]>,
     known_cells: u64,
     solid_cells: u64,
@@ -61,7 +61,7 @@ fn color_name(color: ColorName) -> String {
     name(&color)
 }
 
-/// As it is typed.
+/// Returns the name of the value on the command line.
 fn name(value: &impl ValueEnum) -> String {
     value.to_possible_value().map_or(String::new(), |value| value.get_name().to_owned())
 }

@@ -1,4 +1,4 @@
-//! `voxtile picture`: a map as a PNG.
+//! `voxtile picture`: draws a map as a PNG.
 
 mod drawn_json;
 
@@ -19,11 +19,11 @@ use voxtile_pipeline::output::{OutputFile, is_standard_output};
 use voxtile_pipeline::{AnyMap, read_any_map};
 use voxtile_render::{ColorBy, Drawn, Picture, SideAxis, View};
 
-/// Draws a map; says what was drawn unless `is_quiet`, on standard error where standard output is the picture.
+/// Draws a map and prints a summary unless `is_quiet`, on standard error if the picture is on standard output.
 pub fn run(args: &PictureArgs, is_quiet: bool) -> anyhow::Result<ExitCode> {
     let is_stream = is_standard_output(&args.output);
     if is_stream && io::stdout().is_terminal() {
-        let reason = "standard output is a terminal; send it to a file or a pipe";
+        let reason = "standard output is a terminal; redirect it to a file or a pipe";
         return Err(Error::argument("output", reason).into());
     }
     let picture = picture_of(args)?;
@@ -40,8 +40,8 @@ pub fn run(args: &PictureArgs, is_quiet: bool) -> anyhow::Result<ExitCode> {
                 read_any_map(&before, |before| {
                     let progress = Progress::over_tiles(0);
                     let picture = complete(&picture, args, after);
-                    let tell = |done, all| progress.set(done, all);
-                    Ok((picture.draw_difference(before, after, tell)?, picture))
+                    let on_progress = |done, all| progress.set(done, all);
+                    Ok((picture.draw_difference(before, after, on_progress)?, picture))
                 })
             })
         }
@@ -60,7 +60,7 @@ pub fn run(args: &PictureArgs, is_quiet: bool) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Writes a picture, whole or not at all.
+/// Writes a picture atomically.
 pub fn write_png(drawn: &Drawn, path: &Path) -> anyhow::Result<()> {
     let mut file = OutputFile::create(path)?;
     let written = drawn.image.write_png(file.out());
@@ -68,19 +68,19 @@ pub fn write_png(drawn: &Drawn, path: &Path) -> anyhow::Result<()> {
     file.finish()
 }
 
-/// Where the sensor was, as far as the map knows it. A list that is damaged costs the line and not the picture.
+/// Returns the sensor's positions that the map records. A damaged list of scans gives a warning and no trajectory.
 pub fn path_of(map: &AnyMap) -> Vec<Point> {
     let AnyMap::Map(reader) = map else { return Vec::new() };
     match reader.scans() {
         Ok(scans) => scans.iter().map(|scan| scan.origin_m).collect(),
         Err(error) => {
-            log::warn!("the way of the sensor is left out: {error:#}");
+            log::warn!("the trajectory is not drawn: {error:#}");
             Vec::new()
         }
     }
 }
 
-/// The name of a map for a title: its last part.
+/// Returns the last component of a map's path, for a title.
 pub fn name_of(map: &Path) -> String {
     let full = map.canonicalize().unwrap_or_else(|_| map.to_owned());
     full.file_name().unwrap_or(full.as_os_str()).to_string_lossy().into_owned()
@@ -103,7 +103,7 @@ fn picture_of(args: &PictureArgs) -> Result<Picture> {
         (Some(_), _) => {
             return Err(Error::argument(
                 "--slice",
-                "is seen from above; leave --from out, or cut with --region",
+                "needs the view from above; omit --from, or use --region",
             ));
         }
         (None, ViewName::Above) => View::Above,
@@ -119,7 +119,7 @@ fn picture_of(args: &PictureArgs) -> Result<Picture> {
     Ok(picture)
 }
 
-/// Adds what the map knows.
+/// Adds the trajectory, the title and the colors from the map.
 fn complete(picture: &Picture, args: &PictureArgs, map: &AnyMap) -> Picture {
     let path = if args.no_path { Vec::new() } else { path_of(map) };
     let resolution_m = map.config().grid.resolution_m();
@@ -136,14 +136,14 @@ fn complete(picture: &Picture, args: &PictureArgs, map: &AnyMap) -> Picture {
 fn check_color(map: &AnyMap, color: ColorName) -> Result<()> {
     match (map, color) {
         (AnyMap::Octree(_), ColorName::Count | ColorName::LastScan) => {
-            let reason = "a file of OctoMap keeps no counts and no scans; choose height or probability";
+            let reason = "an OctoMap file has no counts and no scan numbers; use height or probability";
             Err(Error::argument("--color", reason))
         }
         _ => Ok(()),
     }
 }
 
-/// A snapshot of the map, unless something else has that name.
+/// Returns the snapshot of this name in the map, unless another map has this path.
 fn state_before(map: &Path, since: &Path) -> PathBuf {
     if since.exists() || since.to_string_lossy().contains(['@', std::path::MAIN_SEPARATOR]) {
         return since.to_owned();
@@ -159,9 +159,9 @@ fn state_before(map: &Path, since: &Path) -> PathBuf {
     name.into()
 }
 
-/// One line for a person.
+/// Returns a one-line summary of the picture.
 fn caption(args: &PictureArgs, drawn: &Drawn) -> String {
-    let Some(region) = drawn.region_m else { return "nothing was observed here".to_owned() };
+    let Some(region) = drawn.region_m else { return "no observed voxels here".to_owned() };
     let axes = match args.from {
         ViewName::Above => [0, 1],
         ViewName::SideX => [0, 2],
@@ -175,6 +175,6 @@ fn caption(args: &PictureArgs, drawn: &Drawn) -> String {
         (Some([least, most]), ColorName::Count) => format!("; count {least:.0} (dark) to {most:.0}"),
         (Some([least, most]), ColorName::LastScan) => format!("; last scan {least:.0} (dark) to {most:.0}"),
     };
-    let changes = if args.since.is_some() { "; blue appeared, orange vanished, grey stayed" } else { "" };
-    format!("{across:.1} x {up:.1} m, {:.3} m a cell{scale}{changes}", drawn.cell_m)
+    let changes = if args.since.is_some() { "; blue appeared, orange vanished, grey unchanged" } else { "" };
+    format!("{across:.1} x {up:.1} m, {:.3} m per cell{scale}{changes}", drawn.cell_m)
 }

@@ -1,7 +1,6 @@
 use std::fmt;
 
-/// Text of a map, a file or a person, as a page shows it: nothing in it is markup, and control characters, which no
-/// page may have, are replaced.
+/// Text escaped for HTML. Control characters, which HTML forbids, are replaced.
 pub struct Text<T>(pub T);
 
 impl<T: fmt::Display> fmt::Display for Text<T> {

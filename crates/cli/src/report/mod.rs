@@ -1,4 +1,4 @@
-//! `voxtile report`: a page about a map, in one file.
+//! `voxtile report`: writes an HTML report on a map as one file.
 
 mod html;
 mod page;
@@ -23,17 +23,17 @@ use voxtile_pipeline::place::place_of;
 use voxtile_pipeline::{AnyMap, MapAt, read_any_map};
 use voxtile_render::{Drawn, Picture, SideAxis, Survey, View};
 
-/// All that the page tells.
+/// Content of the report.
 struct Report {
     name: String,
-    /// Why the map could not be read at all, if so.
+    /// Reason why the map could not be read.
     unreadable: Option<String>,
     content: Option<Content>,
     snapshots: std::result::Result<Vec<SnapshotInfo>, String>,
     damage: Damage,
 }
 
-/// What can be told of a map that opens.
+/// Content for a map that opens.
 struct Content {
     info: Info,
     survey: Survey,
@@ -43,17 +43,17 @@ struct Content {
     sizes: Sizes,
 }
 
-/// Bytes of the tiles; empty for a map of the original format.
+/// Table sizes of the tiles; empty for a map of the original format.
 struct Sizes {
     largest: Vec<(TileIndex, u64, Option<u64>)>,
-    /// All of them, ascending.
+    /// Sizes of all tiles, ascending.
     bytes: Vec<u64>,
 }
 
-/// What `verify` says.
+/// Result of `verify`.
 enum Damage {
-    NotAsked,
-    /// Snapshots are checked with their map.
+    NotVerified,
+    /// Not checked: snapshots are verified with their map.
     OfSnapshot,
     Checked {
         verification: Verification,
@@ -62,15 +62,15 @@ enum Damage {
     Failed(String),
 }
 
-/// Pixels of the pictures: sharp on paper, and a page of a megabyte or two.
+/// Sizes of the pictures in pixels: sharp in print, with a page of one to two megabytes.
 const ABOVE_PX: [usize; 2] = [1400, 1400];
 const SIDE_PX: [usize; 2] = [1400, 500];
-/// Findings on the page; the others are counted.
+/// Maximum number of findings on the page; the rest are counted.
 const MAX_FINDINGS: usize = 200;
-/// Tiles on the page.
+/// Maximum number of tiles on the page.
 const MAX_TILES: usize = 10;
 
-/// Writes the page; says where it is unless `is_quiet`, on standard error where standard output is the page.
+/// Writes the page and prints its path unless `is_quiet`, on standard error if the page is on standard output.
 pub fn run(args: &ReportArgs, is_quiet: bool) -> anyhow::Result<ExitCode> {
     let report = Report::of(args)?;
     let mut file = OutputFile::create(&args.output)?;
@@ -83,8 +83,8 @@ pub fn run(args: &ReportArgs, is_quiet: bool) -> anyhow::Result<ExitCode> {
         json::print(&report.to_json(args), &mut { out })?;
     } else if !is_quiet {
         let damage = report.damage_count().filter(|&count| count > 0);
-        let damage = damage.map_or(String::new(), |count| format!("; the map is damaged: {count} findings"));
-        writeln!(out, "{}: a report of {}{damage}", args.output.display(), args.map.display())?;
+        let damage = damage.map_or(String::new(), |count| format!("; the map is damaged, {count} findings"));
+        writeln!(out, "{}: report on {}{damage}", args.output.display(), args.map.display())?;
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -100,7 +100,7 @@ impl Report {
             },
         };
         let damage = match &snapshot {
-            _ if args.no_verify => Damage::NotAsked,
+            _ if args.no_verify => Damage::NotVerified,
             Some(_) => Damage::OfSnapshot,
             None => Damage::of(&map),
         };
@@ -131,25 +131,25 @@ impl Content {
     fn of(map: &AnyMap, path: &Path) -> anyhow::Result<Self> {
         let AnyMap::Map(reader) = map else {
             let reason =
-                "is a file of OctoMap; `voxtile import` makes a map of it, `voxtile picture` draws it";
+                "is an OctoMap file; convert it with `voxtile import`, or draw it with `voxtile picture`";
             return Err(Error::argument(path.display().to_string(), reason).into());
         };
         let progress = Progress::over_tiles(0);
-        let tell = |done, all| progress.set(done, all);
+        let on_progress = |done, all| progress.set(done, all);
         let info = Info::of(reader)?;
         let resolution_m = info.resolution_m;
         let picture = Picture::new().with_path(path_of(map)).skipping_unreadable();
         let title = |what: &str| format!("{} {what}: {resolution_m} m voxels", name_of(path));
         let above = picture.clone().with_size_px(ABOVE_PX).with_title(title("from above"));
-        // The longer side says more.
+        // Look along the shorter side, which shows the longer one.
         let is_long_in_y = info.bounds_m.is_some_and(|b| b.max[1] - b.min[1] > b.max[0] - b.min[0]);
         let axis = if is_long_in_y { SideAxis::Y } else { SideAxis::X };
         let side =
             picture.with_view(View::Side(axis)).with_size_px(SIDE_PX).with_title(title("from the side"));
         Ok(Self {
-            above: above.draw(reader.as_ref(), tell)?,
-            side: side.draw(reader.as_ref(), tell)?,
-            survey: Survey::of(reader.as_ref(), tell)?,
+            above: above.draw(reader.as_ref(), on_progress)?,
+            side: side.draw(reader.as_ref(), on_progress)?,
+            survey: Survey::of(reader.as_ref(), on_progress)?,
             scans: reader.scans().map_err(|error| format!("{error:#}")),
             sizes: Sizes::of(reader),
             info,

@@ -13,7 +13,7 @@ const STYLE: &str = include_str!("style.css");
 const SECONDS_A_NS: f64 = 1e-9;
 
 impl Report {
-    /// Writes the page: HTML that is XML, too, without a script and without a link.
+    /// Writes the page as HTML that is also valid XML, without scripts and links.
     pub fn write(&self, out: &mut impl Write) -> io::Result<()> {
         let name = Text(&self.name);
         write!(
@@ -36,13 +36,13 @@ impl Report {
         writeln!(out, "</body>\n</html>")
     }
 
-    /// One line: is the map whole?
+    /// Writes one line on the state of the files.
     fn write_state(&self, out: &mut impl Write) -> io::Result<()> {
         if let Some(reason) = &self.unreadable {
             writeln!(out, "<p class=\"bad\">The map cannot be read: {}</p>", Text(reason))?;
         }
         match &self.damage {
-            Damage::NotAsked => writeln!(out, "<p class=\"faint\">The files were not verified.</p>"),
+            Damage::NotVerified => writeln!(out, "<p class=\"faint\">The files were not verified.</p>"),
             Damage::OfSnapshot => {
                 writeln!(out, "<p class=\"faint\">A snapshot is verified with its map.</p>")
             }
@@ -50,7 +50,7 @@ impl Report {
                 writeln!(out, "<p class=\"bad\">Verifying failed: {}</p>", Text(reason))
             }
             Damage::Checked { verification, .. } => match (verification.damage, verification.verified) {
-                (0, true) => writeln!(out, "<p class=\"good\">Whole: every checksum matches.</p>"),
+                (0, true) => writeln!(out, "<p class=\"good\">Intact: all checksums match.</p>"),
                 (0, false) => writeln!(out, "<p>Unverified: the map has no checksums.</p>"),
                 (count, _) => {
                     writeln!(out, "<p class=\"bad\">Damaged: {} findings, see below.</p>", HumanCount(count))
@@ -170,7 +170,7 @@ impl Content {
             let count = survey.unread.len();
             writeln!(
                 out,
-                "<p class=\"bad\">{count} tiles cannot be read: pictures, columns and histograms are without them.</p>"
+                "<p class=\"bad\">{count} tiles cannot be read and are missing in pictures, columns and histograms.</p>"
             )?;
         }
         Ok(())
@@ -185,7 +185,7 @@ fn write_scans(out: &mut impl Write, scans: &[ScanRecord]) -> io::Result<()> {
         squares.sum::<f64>().sqrt()
     };
     let length_m: f64 = scans.windows(2).map(step_m).sum();
-    row(out, "way of the sensor", format!("{} m, from scan to scan", rounded(length_m)))?;
+    row(out, "trajectory", format!("{} m", rounded(length_m)))?;
     if let (Some(from_ns), Some(to_ns)) = (first.stamp_ns, last.stamp_ns) {
         let seconds = (to_ns as f64 - from_ns as f64) * SECONDS_A_NS;
         row(out, "time span", format!("{seconds:.1} s"))?;
@@ -270,7 +270,7 @@ impl Sizes {
     }
 }
 
-/// Begins a table below a heading. Columns that begin with # have numbers.
+/// Begins a table below a heading. A column name with a leading # is numeric.
 fn begin_table(out: &mut impl Write, heading: &str, columns: &[&str]) -> io::Result<()> {
     write!(out, "<h2>{heading}</h2>\n<div class=\"scroll\"><table>")?;
     if !columns.is_empty() {
@@ -302,7 +302,7 @@ fn area(area_m2: f64) -> String {
     if area_m2 >= 1e6 { format!("{:.2} km²", area_m2 / 1e6) } else { format!("{} m²", rounded(area_m2)) }
 }
 
-/// Whole numbers where they are large, and three digits where they are not.
+/// Rounds large numbers to integers and small ones to three digits.
 fn rounded(number: f64) -> String {
     match number {
         100.0.. => HumanCount(number.round() as u64).to_string(),
@@ -311,7 +311,7 @@ fn rounded(number: f64) -> String {
     }
 }
 
-/// Without rounding noise, and without the sign of a zero.
+/// Rounds to tenths, without the sign of a zero.
 fn tenths(height_m: f64) -> f64 {
     (height_m * 100.0).round() / 100.0 + 0.0
 }

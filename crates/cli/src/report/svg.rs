@@ -2,7 +2,7 @@ use super::html::Text;
 use indicatif::HumanCount;
 use std::fmt::{self, Write};
 
-/// A bar of a histogram.
+/// Bar of a histogram.
 pub struct Bar {
     pub from: String,
     pub to: String,
@@ -13,14 +13,14 @@ pub struct Bar {
 
 const WIDTH: f64 = 640.0;
 const HEIGHT: f64 = 180.0;
-/// Below the bars, for what they stand for.
+/// Height below the bars, for their labels.
 const FOOT: f64 = 24.0;
-/// Above the highest, for its count.
+/// Height above the highest bar, for its count.
 const HEAD: f64 = 20.0;
-/// Labels under the bars, about.
+/// Approximate number of labels under the bars.
 const LABELS: usize = 8;
 
-/// A histogram as inline SVG. Each bar says its numbers when pointed at.
+/// Returns a histogram as inline SVG. Each bar has a tooltip with its numbers.
 pub fn histogram(bars: &[Bar], what: &str) -> Result<String, fmt::Error> {
     let mut svg = String::new();
     let most = bars.iter().map(|bar| bar.count).max().unwrap_or_default().max(1);

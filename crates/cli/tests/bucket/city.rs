@@ -1,4 +1,4 @@
-//! A small map, and what tests ask of it in its folder and in a bucket.
+//! A small map, and queries that tests run on its folder and on its copy in a bucket.
 
 use std::path::{Path, PathBuf};
 use testkit::random_scans::{Random, random_scan};
@@ -19,7 +19,7 @@ pub fn scan_at(seed: u64, x: f64) -> Scan {
     random_scan(&mut Random(seed), [x, 0.0, 0.0], 20)
 }
 
-/// A mapper of a new map with some scans in it, flushed.
+/// Returns a mapper of a new map with some scans, flushed.
 pub fn city(map: &Path, storage: Storage, keeps_scans: bool) -> OutOfCoreTileMapper {
     let mut config = config(storage);
     config.keeps_scans = keeps_scans;
@@ -47,7 +47,7 @@ pub fn push_now(map: &Path, bucket: &Bucket) -> Pushed {
     push(map, bucket, KEEP, |_, _| {}).unwrap()
 }
 
-/// Every file of a map, but the lock.
+/// Returns all files of a map except the lock.
 pub fn files_of(map: &Path) -> Vec<(PathBuf, Vec<u8>)> {
     let mut files = Vec::new();
     let mut folders = vec![map.to_owned()];
@@ -70,7 +70,7 @@ pub fn assert_whole(map: &Path) {
     assert!(found.is_whole());
 }
 
-/// Goes on with a map by some scans, each a flush.
+/// Adds scans to a map, with a flush after each.
 pub fn go_on(map: &Path, seed: u64, flushes: u64) {
     let mut mapper = OutOfCoreTileMapper::open(map, config(Storage::OctoMap)).unwrap();
     for number in 0..flushes {

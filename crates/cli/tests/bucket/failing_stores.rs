@@ -1,4 +1,4 @@
-//! Maps in stores that fail, refuse, lose answers or have lost objects.
+//! Tests with stores that fail, refuse requests, drop responses or lack objects.
 
 use crate::city::{KEEP, RESEND, city, config, digest, digest_there, go_on, message_of, push_now, scan_at};
 use crate::faulty_store::{Fault, FaultyStore, Kind};
@@ -14,9 +14,9 @@ use voxtile_bucket::object_store::path::Path as Key;
 use voxtile_bucket::object_store::throttle::{ThrottleConfig, ThrottledStore};
 use voxtile_bucket::{Bucket, BucketDisk, pull, push};
 
-/// A store that does not answer does not say that there is no map.
+/// A store without a response is an error, not a missing map.
 #[test]
-fn whether_there_is_a_map_is_known_or_an_error() {
+fn an_unreachable_store_is_not_a_missing_map() {
     let server = Server::new();
     server.put(&Key::from("maps/city/manifest.json"), b"{}".to_vec());
     server.put(&Key::from("drive/one.pcd"), b"points".to_vec());
@@ -30,9 +30,9 @@ fn whether_there_is_a_map_is_known_or_an_error() {
         let error = message_of(on(fails.clone(), prefix).has_map(&|| false));
         assert!(error.contains("manifest.json") && error.contains("connection broke"), "{error}");
     }
-    // Who may not list is not told that an object is missing. What is a file is no map.
+    // Without permission to list, S3 refuses to read a missing object. A file is no map.
     let refuses =
-        FaultyStore::new(server.store.clone(), |asked, _| match asked.key.ends_with("manifest.json") {
+        FaultyStore::new(server.store.clone(), |request, _| match request.key.ends_with("manifest.json") {
             true => Fault::Refused,
             false => Fault::None,
         });
@@ -48,14 +48,14 @@ fn whether_there_is_a_map_is_known_or_an_error() {
     assert!(began.elapsed() < Duration::from_secs(10));
 }
 
-/// The manifest is there, and the answer that says so is not.
+/// The manifest is stored, but its response is lost.
 #[test]
-fn a_push_whose_last_answer_is_lost_came_through() {
+fn a_push_with_a_lost_last_response_succeeds() {
     let (server, folder) = (Server::new(), TempDir::new().unwrap());
     let map = folder.path().join("map");
     drop(city(&map, Storage::OctoMap, false));
-    let store = FaultyStore::new(server.store.clone(), |asked, _| {
-        let is_last = asked.kind == Kind::Put && asked.key.ends_with("manifest.json");
+    let store = FaultyStore::new(server.store.clone(), |request, _| {
+        let is_last = request.kind == Kind::Put && request.key.ends_with("manifest.json");
         if is_last { Fault::DoneBefore } else { Fault::None }
     });
     let bucket = Bucket::on(store, "maps/city", "s3://test/maps/city").unwrap();
@@ -67,9 +67,9 @@ fn a_push_whose_last_answer_is_lost_came_through() {
     assert!(std::fs::read_to_string(map.join("bucket_states")).unwrap().contains("there"));
 }
 
-/// What was lost or damaged there comes back, and the messages say how.
+/// Missing or damaged objects are uploaded again, as the error message suggests.
 #[test]
-fn a_map_that_was_damaged_there_is_sent_again() {
+fn a_map_damaged_in_the_bucket_is_resent() {
     let (server, folder) = (Server::new(), TempDir::new().unwrap());
     let (map, bucket) = (folder.path().join("map"), server.bucket());
     drop(city(&map, Storage::OctoMap, true));
@@ -86,7 +86,7 @@ fn a_map_that_was_damaged_there_is_sent_again() {
     let pulled = folder.path().join("pulled");
     for (number, key) in server.objects().into_iter().enumerate() {
         let is_page = key.as_ref().ends_with(&page);
-        // Some are enough.
+        // A sample is enough.
         if number % 29 != 0 && !is_page {
             continue;
         }
@@ -95,12 +95,12 @@ fn a_map_that_was_damaged_there_is_sent_again() {
                 Some(content) => server.put(&key, content),
                 None => server.delete(&key),
             }
-            let said = message_of(pull(&bucket, &pulled, false, |_, _| {}));
-            assert!(said.contains("push --resend"), "{said}");
+            let printed = message_of(pull(&bucket, &pulled, false, |_, _| {}));
+            assert!(printed.contains("push --resend"), "{printed}");
             let _ = std::fs::remove_dir_all(folder.path().join("pulled.unfinished"));
             if is_page {
-                let said = message_of(push(map.as_path(), &bucket, KEEP, |_, _| {}));
-                assert!(said.contains("push --resend"), "{said}");
+                let printed = message_of(push(map.as_path(), &bucket, KEEP, |_, _| {}));
+                assert!(printed.contains("push --resend"), "{printed}");
             }
             let sent = resend().unwrap();
             assert_eq!((sent.objects_sent, sent.bytes_sent), (first.objects_sent, first.bytes_sent));
@@ -113,7 +113,7 @@ fn a_map_that_was_damaged_there_is_sent_again() {
         resend().unwrap();
         check("the manifest");
     }
-    // What a later version wrote is not damaged, and another map is not this one.
+    // A manifest of a later version is not damaged, and another map has another id.
     let text = String::from_utf8(server.get(&manifest)).unwrap();
     server.put(&manifest, text.replace("\"version\": 1", "\"version\": 2").into_bytes());
     assert!(message_of(resend()).contains("version is 2"));
@@ -124,9 +124,9 @@ fn a_map_that_was_damaged_there_is_sent_again() {
     assert!(matches!(refused, Err(Error::Mismatch { what: "the id", .. })));
 }
 
-/// What an interrupted push has sent is not sent again, and a push that goes on asks for little.
+/// A resumed push does not upload objects again and makes few requests.
 #[test]
-fn an_interrupted_push_goes_on() {
+fn an_interrupted_push_resumes() {
     let (server, folder) = (Server::new(), TempDir::new().unwrap());
     let map = folder.path().join("map");
     drop(city(&map, Storage::OctoMap, true));
@@ -137,16 +137,16 @@ fn an_interrupted_push_goes_on() {
     assert!(whole > 100, "{whole}");
     let most = whole as usize / 2;
     let puts = std::sync::atomic::AtomicUsize::new(0);
-    let breaks = FaultyStore::new(server.store.clone(), move |asked, _| match asked.kind {
+    let breaks = FaultyStore::new(server.store.clone(), move |request, _| match request.kind {
         Kind::Put if puts.fetch_add(1, std::sync::atomic::Ordering::Relaxed) >= most => Fault::Refused,
         _ => Fault::None,
     });
     let at =
         |store: &Arc<FaultyStore>| Bucket::on(store.clone(), "maps/city", "s3://test/maps/city").unwrap();
     push(map.as_path(), &at(&breaks), KEEP, |_, _| {}).unwrap_err();
-    // Of a first push only the first objects are asked for.
-    assert!(breaks.asked(Kind::Head).len() < 48, "{}", breaks.asked(Kind::Head).len());
-    // What was on its way comes to its end.
+    // A first push checks only its first objects for existence.
+    assert!(breaks.requests(Kind::Head).len() < 48, "{}", breaks.requests(Kind::Head).len());
+    // Requests in flight complete.
     std::thread::sleep(Duration::from_millis(200));
     let there = server.objects().len();
     assert_eq!(there, most);
@@ -156,24 +156,25 @@ fn an_interrupted_push_goes_on() {
     let again = push_now(&map, &bucket);
     assert_eq!(again.objects_sent + there as u64, whole);
     assert!(0 < again.tiles_sent && again.tiles_sent < again.tiles, "{again:?}");
-    assert_eq!(store.asked(Kind::Put).len() as u64, again.objects_sent + 1);
+    assert_eq!(store.requests(Kind::Put).len() as u64, again.objects_sent + 1);
     assert_eq!(digest_there(&bucket).unwrap(), digest(&map));
-    let asked = store.asked(Kind::Head).len();
-    let before = store.asked(Kind::Put).len();
+    let request = store.requests(Kind::Head).len();
+    let before = store.requests(Kind::Put).len();
     let mut keeping = config(Storage::OctoMap);
     keeping.keeps_scans = true;
     let mut mapper = OutOfCoreTileMapper::open(&map, keeping).unwrap();
     mapper.insert_scan(&scan_at(50, 30.0)).unwrap();
     mapper.flush().unwrap();
     push_now(&map, &bucket);
-    let [heads, puts] = [store.asked(Kind::Head).len() - asked, store.asked(Kind::Put).len() - before];
+    let [heads, puts] =
+        [store.requests(Kind::Head).len() - request, store.requests(Kind::Put).len() - before];
     assert!(0 < puts && heads <= puts, "{heads} of {puts}");
     assert_eq!(digest_there(&bucket).unwrap(), digest(&map));
 }
 
-/// An object of another length is not the one that is to be sent.
+/// An object with another length is not the expected one.
 #[test]
-fn an_object_of_another_length_is_sent() {
+fn an_object_of_another_length_is_replaced() {
     let (server, folder) = (Server::new(), TempDir::new().unwrap());
     let (map, bucket) = (folder.path().join("map"), server.bucket());
     drop(city(&map, Storage::OctoMap, false));

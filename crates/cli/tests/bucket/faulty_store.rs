@@ -9,22 +9,21 @@ use voxtile_bucket::object_store::{
     ObjectMeta, ObjectStore, PutMultipartOptions, PutOptions, PutPayload, PutResult, Result,
 };
 
-/// What becomes of a request, after so many others.
-type Faults = dyn Fn(&Asked, usize) -> Fault + Send + Sync;
+/// Selects the fault for a request, given the number of earlier requests.
+type Faults = dyn Fn(&SeenRequest, usize) -> Fault + Send + Sync;
 
-/// A store in memory that notes what it is asked for, and does to some of it what a test wants.
+/// Store in memory that records requests and injects faults.
 pub struct FaultyStore {
     inner: Arc<InMemory>,
-    asked: Mutex<Vec<Asked>>,
+    requests: Mutex<Vec<SeenRequest>>,
     fault: Box<Faults>,
 }
 
-/// One request.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Asked {
+pub struct SeenRequest {
     pub kind: Kind,
     pub key: String,
-    /// Bytes that are put, or that are asked for; `None` for all.
+    /// Number of bytes written or read; `None` for all.
     pub bytes: Option<u64>,
 }
 
@@ -35,40 +34,37 @@ pub enum Kind {
     Head,
 }
 
-/// What becomes of a request.
 pub enum Fault {
     None,
-    /// It is refused for good.
     Refused,
-    /// It fails, as a broken connection does.
+    /// Fails like a broken connection.
     Fails,
-    /// It is done, and made again by the client, for whom it is too late then.
+    /// Succeeds, but the client repeats it and the repetition fails its precondition.
     DoneBefore,
-    /// Half of the answer comes.
+    /// Returns half of the response.
     CutOff,
 }
 
 impl FaultyStore {
-    /// `fault` hears of each request, and how many were made before.
+    /// Creates a store. `fault` receives each request and the number of earlier ones.
     pub fn new(
         inner: Arc<InMemory>,
-        fault: impl Fn(&Asked, usize) -> Fault + Send + Sync + 'static,
+        fault: impl Fn(&SeenRequest, usize) -> Fault + Send + Sync + 'static,
     ) -> Arc<Self> {
-        Arc::new(Self { inner, asked: Mutex::default(), fault: Box::new(fault) })
+        Arc::new(Self { inner, requests: Mutex::default(), fault: Box::new(fault) })
     }
 
-    /// All requests of a kind so far.
-    pub fn asked(&self, kind: Kind) -> Vec<Asked> {
-        self.asked.lock().unwrap().iter().filter(|asked| asked.kind == kind).cloned().collect()
+    pub fn requests(&self, kind: Kind) -> Vec<SeenRequest> {
+        self.requests.lock().unwrap().iter().filter(|request| request.kind == kind).cloned().collect()
     }
 
-    fn note(&self, asked: Asked) -> Fault {
+    fn note(&self, request: SeenRequest) -> Fault {
         let before = {
-            let mut all = self.asked.lock().unwrap();
-            all.push(asked.clone());
+            let mut all = self.requests.lock().unwrap();
+            all.push(request.clone());
             all.len() - 1
         };
-        (self.fault)(&asked, before)
+        (self.fault)(&request, before)
     }
 }
 
@@ -101,7 +97,7 @@ impl ObjectStore for FaultyStore {
     {
         Box::pin(async move {
             let bytes = Some(payload.content_length() as u64);
-            match self.note(Asked { kind: Kind::Put, key: key.to_string(), bytes }) {
+            match self.note(SeenRequest { kind: Kind::Put, key: key.to_string(), bytes }) {
                 Fault::None | Fault::CutOff => self.inner.put_opts(key, payload, options).await,
                 Fault::Refused => Err(refused(key)),
                 Fault::Fails => Err(failed()),
@@ -136,7 +132,7 @@ impl ObjectStore for FaultyStore {
                 _ => None,
             };
             let kind = if options.head { Kind::Head } else { Kind::Get };
-            match self.note(Asked { kind, key: key.to_string(), bytes }) {
+            match self.note(SeenRequest { kind, key: key.to_string(), bytes }) {
                 Fault::None | Fault::DoneBefore => self.inner.get_opts(key, options).await,
                 Fault::Refused => Err(refused(key)),
                 Fault::Fails => Err(failed()),

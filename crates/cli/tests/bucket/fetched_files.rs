@@ -1,4 +1,4 @@
-//! Files of a bucket that are no map, fetched for the commands that read files.
+//! Files in a bucket that are no map, fetched for commands that read files.
 
 use crate::city::message_of;
 use crate::faulty_store::{Fault, FaultyStore, Kind};
@@ -13,9 +13,10 @@ use voxtile_bucket::object_store::path::Path as Key;
 use voxtile_bucket::object_store::throttle::{ThrottleConfig, ThrottledStore};
 use voxtile_bucket::{Bucket, FetchedFiles};
 
-/// Files of a bucket in a folder of their own, which goes when nobody needs it; the URL of a file is that file.
+/// Files of a bucket are fetched to a temporary folder, removed after the last use; the URL of a file means only that
+/// file.
 #[test]
-fn files_are_fetched_as_they_lie_and_go_again() {
+fn files_are_fetched_and_removed_after_use() {
     let (server, place) = (Server::new(), TempDir::new().unwrap());
     let files: [(&str, Vec<u8>); 3] = [
         ("poses.txt", b"1 2 3".to_vec()),
@@ -25,16 +26,16 @@ fn files_are_fetched_as_they_lie_and_go_again() {
     for (name, content) in &files {
         server.put(&Key::from(format!("drive/{name}")), content.clone());
     }
-    // Neither of another drive nor what stands for a folder.
+    // Not files of another drive, and no placeholder objects of folders.
     server.put(&Key::from("drive2/other.pcd"), vec![1]);
     server.put(&Key::from("drive/scans"), Vec::new());
     let at = |prefix: &str| Bucket::on(server.store.clone(), prefix, "s3://test/drive").unwrap();
-    let mut told = Vec::new();
+    let mut reported = Vec::new();
     let fetched =
-        FetchedFiles::fetch(&at("drive"), place.path(), &|| false, |done, all| told.push((done, all)))
+        FetchedFiles::fetch(&at("drive"), place.path(), &|| false, |done, all| reported.push((done, all)))
             .unwrap();
     assert_eq!((fetched.files(), fetched.bytes()), (3, 100_005));
-    assert_eq!(told.last(), Some(&(100_005, 100_005)));
+    assert_eq!(reported.last(), Some(&(100_005, 100_005)));
     for (name, content) in &files {
         assert_eq!(&std::fs::read(fetched.path().join(name)).unwrap(), content, "{name}");
     }
@@ -49,9 +50,9 @@ fn files_are_fetched_as_they_lie_and_go_again() {
     assert!(nothing.contains("s3://test/drive: there is nothing"), "{nothing}");
 }
 
-/// Whoever is asked to stop while the content of files does not come does so soon, and leaves nothing.
+/// A stopped fetch ends soon and leaves no files.
 #[test]
-fn a_fetch_that_is_stopped_ends_soon_and_leaves_nothing() {
+fn a_stopped_fetch_ends_soon_and_leaves_no_files() {
     let (server, place) = (Server::new(), TempDir::new().unwrap());
     for number in 0..20 {
         server.put(&Key::from(format!("drive/{number}.pcd")), vec![1; 100]);
@@ -67,19 +68,19 @@ fn a_fetch_that_is_stopped_ends_soon_and_leaves_nothing() {
     assert_eq!(std::fs::read_dir(place.path()).unwrap().count(), 0);
 }
 
-/// A drive of one long file.
+/// Stores a drive of one long file.
 fn recording(server: &Server, bytes: usize) -> Vec<u8> {
     let content: Vec<u8> = (0..bytes).map(|at| ((at * 31) >> 7) as u8).collect();
     server.put(&Key::from("drive/long.mcap"), content.clone());
     content
 }
 
-/// No request takes as long as the whole file would, and what came before it broke off is kept.
+/// No request is as long as the whole file, and data received before an error is kept.
 #[test]
-fn a_long_file_comes_range_by_range() {
+fn a_long_file_is_fetched_in_ranges() {
     let (server, place) = (Server::new(), TempDir::new().unwrap());
     let content = recording(&server, (33 << 20) + 5);
-    let store = FaultyStore::new(server.store.clone(), |asked, before| match asked.kind {
+    let store = FaultyStore::new(server.store.clone(), |request, before| match request.kind {
         Kind::Get if before % 3 == 0 => Fault::CutOff,
         Kind::Get if before % 3 == 1 => Fault::Fails,
         _ => Fault::None,
@@ -87,21 +88,21 @@ fn a_long_file_comes_range_by_range() {
     let bucket = Bucket::on(store.clone(), "drive", "s3://test/drive").unwrap();
     let fetched = FetchedFiles::fetch(&bucket, place.path(), &|| false, |_, _| ()).unwrap();
     assert!(std::fs::read(fetched.path().join("long.mcap")).unwrap() == content);
-    for asked in store.asked(Kind::Get) {
-        assert!(asked.bytes.is_some_and(|bytes| bytes <= 16 << 20), "{asked:?}");
+    for request in store.requests(Kind::Get) {
+        assert!(request.bytes.is_some_and(|bytes| bytes <= 16 << 20), "{request:?}");
     }
 }
 
 #[test]
-fn a_file_that_changes_between_two_ranges_is_no_mixture() {
+fn a_file_changed_between_two_ranges_is_not_mixed() {
     let (server, place) = (Server::new(), TempDir::new().unwrap());
     let mut content = recording(&server, 20 << 20);
     content.reverse();
     let (inner, other) = (server.store.clone(), std::sync::Mutex::new(Some(content)));
-    let store = FaultyStore::new(server.store.clone(), move |asked, _| {
+    let store = FaultyStore::new(server.store.clone(), move |request, _| {
         // After the first range.
-        if asked.kind == Kind::Get
-            && asked.bytes.is_some_and(|bytes| bytes < 16 << 20)
+        if request.kind == Kind::Get
+            && request.bytes.is_some_and(|bytes| bytes < 16 << 20)
             && let Some(content) = other.lock().unwrap().take()
         {
             let key = Key::from("drive/long.mcap");
@@ -117,7 +118,7 @@ fn a_file_that_changes_between_two_ranges_is_no_mixture() {
 }
 
 #[test]
-fn a_long_file_comes_from_a_server_without_ranges() {
+fn a_long_file_is_fetched_from_a_server_without_ranges() {
     let place = TempDir::new().unwrap();
     let content: Vec<u8> = (0..17_usize << 20).map(|at| ((at * 31) >> 7) as u8).collect();
     let address = serve_whole(content.clone());

@@ -1,5 +1,4 @@
-//! Maps and files in a bucket: a store in memory, one that fails, a web server, an S3 server that
-//! makes trouble.
+//! Tests of maps and files in buckets: a store in memory, a faulty store, a web server and a faulty S3 server.
 
 mod city;
 mod failing_stores;

@@ -1,4 +1,4 @@
-//! Maps in a bucket: pushed, read there and pulled, against the map in its folder.
+//! Push, remote read and pull of maps, compared with the map in its folder.
 
 use crate::city::{
     KEEP, PRUNE, REPLACE, assert_whole, city, config, digest, digest_there, files_of, go_on, message_of,
@@ -16,14 +16,14 @@ use voxtile_bucket::object_store::path::Path as Key;
 use voxtile_bucket::{Bucket, BucketDisk, pull, push};
 
 #[test]
-fn what_is_pushed_is_read_there_and_pulled() {
+fn a_pushed_map_is_readable_and_can_be_pulled() {
     for (storage, keeps_scans) in
         [(Storage::OctoMap, false), (Storage::Compact, false), (Storage::OctoMap, true)]
     {
         let (server, folder) = (Server::new(), TempDir::new().unwrap());
         let (map, bucket) = (folder.path().join("map"), server.bucket());
         assert!(matches!(open(&bucket), Err(Error::NoMap { .. })));
-        // The mapper stays open: a push goes on beside it.
+        // The mapper remains open: a push runs concurrently.
         let mut mapper = city(&map, storage, keeps_scans);
         let pushed = push_now(&map, &bucket);
         assert_eq!((pushed.tiles, pushed.tiles_sent), (mapper.statistics().tiles, pushed.tiles));
@@ -47,7 +47,7 @@ fn what_is_pushed_is_read_there_and_pulled() {
         pull(&bucket, &pulled, false, |_, _| {}).unwrap();
         assert_whole(&pulled);
         assert_eq!(digest(&pulled), digest(&map));
-        // It goes on like the original.
+        // A build continues on it as on the original.
         let mut other = OutOfCoreTileMapper::open(&pulled, mapper.config().clone()).unwrap();
         for mapper in [&mut mapper, &mut other] {
             mapper.insert_scan(&scan_at(99, 7.0)).unwrap();
@@ -60,7 +60,7 @@ fn what_is_pushed_is_read_there_and_pulled() {
 }
 
 #[test]
-fn any_bytes_of_a_file_are_read_there() {
+fn arbitrary_ranges_of_a_file_are_readable() {
     let (server, folder) = (Server::new(), TempDir::new().unwrap());
     let (map, bucket) = (folder.path().join("map"), server.bucket());
     drop(city(&map, Storage::Compact, false));
@@ -80,7 +80,7 @@ fn any_bytes_of_a_file_are_read_there() {
 }
 
 #[test]
-fn only_what_changed_is_sent_and_a_reader_goes_on_with_what_it_saw() {
+fn a_push_sends_only_changes_and_readers_keep_their_state() {
     let (server, folder) = (Server::new(), TempDir::new().unwrap());
     let (map, bucket) = (folder.path().join("map"), server.bucket());
     let mut mapper = city(&map, Storage::OctoMap, false);
@@ -93,7 +93,7 @@ fn only_what_changed_is_sent_and_a_reader_goes_on_with_what_it_saw() {
     mapper.flush().unwrap();
     let second = push_now(&map, &bucket);
     assert!(0 < second.tiles_sent && second.tiles_sent < first.tiles_sent / 2, "{second:?}");
-    // Every object is named by its content, and what an earlier push put stays until it is pruned.
+    // Objects are named by content, and those of an earlier push remain until pruned.
     assert_eq!(reader.digest().unwrap().to_string(), before);
     assert!(reader.refresh().unwrap());
     assert_eq!(reader.digest().unwrap().to_string(), digest(&map));
@@ -107,14 +107,14 @@ fn only_what_changed_is_sent_and_a_reader_goes_on_with_what_it_saw() {
     assert!(pruned.objects_pruned > 0);
     assert_eq!(server.objects().len() as u64, objects as u64 + pruned.objects_sent - pruned.objects_pruned);
     assert_eq!(digest_there(&bucket).unwrap(), digest(&map));
-    // What it saw is gone, and it says so; it never answers with something else.
+    // Its state is gone, so it returns an error, never another state.
     let error = reader.digest().unwrap_err();
     let message = format!("{:#}", anyhow::Error::from(error));
     assert!(message.contains("objects/") && message.contains("--prune"), "{message}");
 }
 
 #[test]
-fn a_pull_replaces_an_earlier_state_and_fetches_what_is_new() {
+fn a_pull_replaces_an_earlier_state_and_fetches_only_changes() {
     let (server, folder) = (Server::new(), TempDir::new().unwrap());
     let (map, pulled, bucket) = (folder.path().join("map"), folder.path().join("pulled"), server.bucket());
     let mut mapper = city(&map, Storage::OctoMap, true);
@@ -130,7 +130,7 @@ fn a_pull_replaces_an_earlier_state_and_fetches_what_is_new() {
     assert_whole(&pulled);
     assert!(!folder.path().join("pulled.unfinished").exists());
 
-    // A later state than the bucket's is not replaced, and neither is another map.
+    // Neither a later state nor another map is replaced.
     let mut ahead = OutOfCoreTileMapper::open(&pulled, mapper.config().clone()).unwrap();
     ahead.insert_scan(&scan_at(60, 0.0)).unwrap();
     ahead.flush().unwrap();
@@ -150,9 +150,9 @@ fn a_pull_replaces_an_earlier_state_and_fetches_what_is_new() {
     ));
 }
 
-/// Two robots go on with copies of one map: neither's way is lost, neither there nor on its own disk.
+/// Two robots extend copies of one map: no changes are lost, neither in the bucket nor on disk.
 #[test]
-fn copies_that_went_different_ways_do_not_replace_each_other() {
+fn diverged_copies_do_not_replace_each_other() {
     let (server, folder) = (Server::new(), TempDir::new().unwrap());
     let [map, ours, theirs] = ["map", "ours", "theirs"].map(|name| folder.path().join(name));
     let bucket = server.bucket();
@@ -163,7 +163,7 @@ fn copies_that_went_different_ways_do_not_replace_each_other() {
     }
     go_on(&ours, 100, 2);
     go_on(&theirs, 200, 5);
-    // What was never there is not replaced by an earlier state, and not by that of another.
+    // A state that was never pushed is not replaced by an earlier state or one of another copy.
     push_now(&ours, &bucket);
     let (ours_pushed, theirs_now) = (digest(&ours), digest(&theirs));
     let refused = message_of(push(theirs.as_path(), &bucket, KEEP, |_, _| {}));
@@ -174,19 +174,20 @@ fn copies_that_went_different_ways_do_not_replace_each_other() {
     let refused = message_of(pull(&bucket, &theirs, true, |_, _| {}));
     assert!(refused.contains("voxtile merge") && refused.contains("theirs"), "{refused}");
     assert_eq!(digest(&theirs), theirs_now);
-    // The first copy did not go on: it takes what is there, and goes on from it.
+    // The first copy has no changes of its own: it pulls the remote state and continues from it.
     pull(&bucket, &map, true, |_, _| {}).unwrap();
     assert_eq!(digest(&map), digest(&ours));
     assert_whole(&map);
     go_on(&map, 300, 1);
     push_now(&map, &bucket);
-    // Whoever insists loses what is there.
+    // --replace discards the remote state.
     go_on(&theirs, 210, 20);
     push(theirs.as_path(), &bucket, REPLACE, |_, _| {}).unwrap();
     assert_eq!(digest_there(&bucket).unwrap(), digest(&theirs));
 }
 
-/// Earlier versions noted nothing: of two states of one flush only the one that is there may be pushed.
+/// Earlier versions recorded no pushes: of two states with the same flush number, only the one in the bucket may be
+/// pushed.
 #[test]
 fn another_state_of_the_same_flush_is_refused() {
     let (server, folder) = (Server::new(), TempDir::new().unwrap());
@@ -209,9 +210,9 @@ fn another_state_of_the_same_flush_is_refused() {
     assert_eq!(digest_there(&bucket).unwrap(), digest(&map));
 }
 
-/// What a push or a pull notes in the folder is of no map, and in nobody's way.
+/// The records of push and pull in the folder are not part of the map.
 #[test]
-fn what_is_noted_in_the_folder_is_in_nobodys_way() {
+fn records_of_pushes_do_not_affect_the_map() {
     let (server, folder) = (Server::new(), TempDir::new().unwrap());
     let (map, pulled, bucket) = (folder.path().join("map"), folder.path().join("pulled"), server.bucket());
     drop(city(&map, Storage::OctoMap, false));
@@ -223,7 +224,7 @@ fn what_is_noted_in_the_folder_is_in_nobodys_way() {
         voxtile::integrity::repair(at.as_path(), |_| {}, |_, _| {}).unwrap();
         assert_whole(at);
     }
-    // A push that ends before it has noted that it came through finds itself there.
+    // A push interrupted before it recorded its success recognises its own state in the bucket.
     go_on(&map, 100, 1);
     push_now(&map, &bucket);
     let path = map.join("bucket_states");
@@ -235,9 +236,9 @@ fn what_is_noted_in_the_folder_is_in_nobodys_way() {
     push_now(&map, &bucket);
 }
 
-/// A file that was damaged in the folder is fetched and not taken along.
+/// A pull with --replace downloads a file whose local copy is damaged.
 #[test]
-fn a_pull_takes_no_damaged_file_along() {
+fn a_pull_does_not_reuse_damaged_files() {
     let (server, folder) = (Server::new(), TempDir::new().unwrap());
     let (map, pulled, bucket) = (folder.path().join("map"), folder.path().join("pulled"), server.bucket());
     drop(city(&map, Storage::Compact, false));
@@ -249,15 +250,15 @@ fn a_pull_takes_no_damaged_file_along() {
     content[middle] ^= 1;
     std::fs::write(pulled.join(&name), content).unwrap();
     let again = pull(&bucket, &pulled, true, |_, _| {}).unwrap();
-    // It, and the files that belong to no tile.
+    // That file, and the files that belong to no tile.
     assert!(again.files_fetched < again.files / 2, "{again:?}");
     assert_whole(&pulled);
     assert_eq!(digest(&pulled), digest(&map));
 }
 
-/// What is in the way of the map that is to be replaced is told before anything is fetched.
+/// Obstacles in the target folder are reported before the download.
 #[test]
-fn what_is_in_the_way_is_told_before_anything_is_fetched() {
+fn obstacles_are_reported_before_the_download() {
     let (server, folder) = (Server::new(), TempDir::new().unwrap());
     let (map, pulled, bucket) = (folder.path().join("map"), folder.path().join("pulled"), server.bucket());
     drop(city(&map, Storage::OctoMap, false));
@@ -273,12 +274,12 @@ fn what_is_in_the_way_is_told_before_anything_is_fetched() {
 }
 
 #[test]
-fn an_interrupted_pull_goes_on() {
+fn an_interrupted_pull_resumes() {
     let (server, folder) = (Server::new(), TempDir::new().unwrap());
     let (map, pulled, bucket) = (folder.path().join("map"), folder.path().join("pulled"), server.bucket());
     drop(city(&map, Storage::Compact, false));
     push_now(&map, &bucket);
-    // Something that is needed late is missing for now.
+    // An object that is read late is missing for now.
     let manifest = server.get(&"maps/city/manifest.json".into());
     let manifest: serde_json::Value = serde_json::from_slice(&manifest).unwrap();
     let log = manifest["files"]["commits.log"]["parts"][0].as_str().unwrap();
@@ -291,13 +292,13 @@ fn an_interrupted_pull_goes_on() {
     server.put(&key, content);
     let again = pull(&bucket, &pulled, false, |_, _| {}).unwrap();
     assert!(again.files_fetched < again.files / 2, "{again:?}");
-    // And what the pull notes.
+    // And the record of the pull.
     assert_eq!(files_of(&pulled).len(), again.files as usize + 1);
     assert_eq!(digest(&pulled), digest(&map));
 }
 
 #[test]
-fn snapshots_are_taken_along() {
+fn snapshots_are_pushed_and_pulled() {
     let (server, folder) = (Server::new(), TempDir::new().unwrap());
     let (map, pulled, bucket) = (folder.path().join("map"), folder.path().join("pulled"), server.bucket());
     drop(city(&map, Storage::OctoMap, false));
@@ -323,7 +324,7 @@ fn snapshots_are_taken_along() {
 }
 
 #[test]
-fn of_two_pushes_at_once_one_loses() {
+fn one_of_two_concurrent_pushes_fails() {
     let (server, folder) = (Server::new(), TempDir::new().unwrap());
     let (map, copy, bucket) = (folder.path().join("map"), folder.path().join("copy"), server.bucket());
     drop(city(&map, Storage::OctoMap, false));
@@ -334,7 +335,7 @@ fn of_two_pushes_at_once_one_loses() {
         mapper.insert_scan(&scan_at(seed, 20.0)).unwrap();
         mapper.flush().unwrap();
     }
-    // The second push begins and ends while the first is under way, and prunes what it does not know.
+    // The second push runs completely during the first, and prunes unknown objects.
     let mut other = None;
     let lost = push(map.as_path(), &bucket, KEEP, |_, _| {
         other.get_or_insert_with(|| push(copy.as_path(), &bucket, PRUNE, |_, _| {}).unwrap());
@@ -345,7 +346,7 @@ fn of_two_pushes_at_once_one_loses() {
 }
 
 #[test]
-fn every_object_that_is_missing_cut_or_changed_is_named() {
+fn missing_truncated_and_changed_objects_are_named() {
     let (server, folder) = (Server::new(), TempDir::new().unwrap());
     let (map, bucket) = (folder.path().join("map"), server.bucket());
     drop(city(&map, Storage::OctoMap, true));
@@ -353,7 +354,7 @@ fn every_object_that_is_missing_cut_or_changed_is_named() {
     let whole = digest(&map);
     let pulled = folder.path().join("pulled");
     let mut refused = 0;
-    // Each fifth is enough: pages, tables, octrees and scans are among them.
+    // Every fifth object is enough: pages, tables, octrees and scans are among them.
     let manifest = Key::from("maps/city/manifest.json");
     for key in server.objects().into_iter().step_by(5).chain([manifest]) {
         let content = server.get(&key);
@@ -369,7 +370,7 @@ fn every_object_that_is_missing_cut_or_changed_is_named() {
             }
             let name = key.filename().unwrap();
             match digest_there(&bucket) {
-                // Of octrees and scans nobody asks here, and a manifest may end with a blank.
+                // Queries read no octrees and scans, and a manifest may end with a blank.
                 Ok(found) => assert_eq!(found, whole, "{key} {how}"),
                 Err(error) => {
                     refused += 1;
@@ -378,13 +379,13 @@ fn every_object_that_is_missing_cut_or_changed_is_named() {
                     assert!(message.contains(name) || is_no_map, "{key} {how}: {message}");
                 }
             }
-            // A pull needs everything.
+            // A pull reads all objects.
             if !(name == "manifest.json" && how >= 2) {
                 let error = pull(&bucket, &pulled, false, |_, _| {}).unwrap_err();
                 let message = format!("{:#}", anyhow::Error::from(error));
                 assert!(message.contains(name) || message.contains("no map here"), "{key} {how}: {message}");
                 assert!(!pulled.exists());
-                // What it has fetched would not be asked for again.
+                // Otherwise it would not request the files that it already has.
                 let _ = std::fs::remove_dir_all(folder.path().join("pulled.unfinished"));
             }
             server.put(&key, content.clone());
@@ -396,7 +397,7 @@ fn every_object_that_is_missing_cut_or_changed_is_named() {
     assert_eq!(digest(&pulled), whole);
 }
 
-/// A manifest with the checksum that belongs to it.
+/// Appends the checksum of a manifest.
 fn with_checksum(text: &str) -> Vec<u8> {
     let (rest, _) = text.rsplit_once(",\n  \"checksum\"").unwrap();
     let compact: String = rest.split('\n').map(|line| line.trim_start().replace("\": ", "\":")).collect();
@@ -414,7 +415,7 @@ fn a_hostile_manifest_writes_nothing_outside() {
     let text = String::from_utf8(server.get(&key)).unwrap();
     assert_eq!(with_checksum(&text), text.as_bytes());
     for path in ["../escaped", "/tmp/escaped", "a/../../escaped", "tile_0_0_0/../../escaped", "writer.lock"] {
-        // The files of a manifest are in order.
+        // The files in a manifest are sorted.
         let replaced = if path < "metadata.json" { "\"commits.log\"" } else { "\"scans.bin\"" };
         let hostile = text.replace(replaced, &format!("{path:?}"));
         assert_ne!(hostile, text);
@@ -427,7 +428,7 @@ fn a_hostile_manifest_writes_nothing_outside() {
 }
 
 #[test]
-fn a_map_in_a_bucket_is_not_written_to_and_a_web_server_not_pushed_to() {
+fn maps_in_buckets_are_read_only_and_web_servers_accept_no_push() {
     let (server, folder) = (Server::new(), TempDir::new().unwrap());
     let (map, bucket) = (folder.path().join("map"), server.bucket());
     drop(city(&map, Storage::OctoMap, false));
@@ -442,9 +443,9 @@ fn a_map_in_a_bucket_is_not_written_to_and_a_web_server_not_pushed_to() {
     }
 }
 
-/// Kept scans that only a snapshot needs are part of the map.
+/// Kept scans that only a snapshot uses are part of the map.
 #[test]
-fn scans_that_only_a_snapshot_keeps_are_pushed() {
+fn scans_used_only_by_a_snapshot_are_pushed() {
     let (server, folder) = (Server::new(), TempDir::new().unwrap());
     let (map, bucket) = (folder.path().join("map"), server.bucket());
     drop(city(&map, Storage::Compact, false));
@@ -465,7 +466,7 @@ fn scans_that_only_a_snapshot_keeps_are_pushed() {
     assert_eq!(reader.kept_scans().unwrap().filter(Result::is_ok).count(), 1);
 }
 
-/// What is in the bucket may be the only good copy.
+/// The copy in the bucket may be the only intact one.
 #[test]
 fn a_map_with_damaged_catalogs_or_lost_segments_is_not_pushed() {
     let (server, folder) = (Server::new(), TempDir::new().unwrap());

@@ -6,8 +6,7 @@ use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// A server of the part of S3 that maps need, on this machine, that does to requests what a test wants. It ends with
-/// the process.
+/// Local server with the part of S3 that voxtile uses, and with injected faults. It ends with the process.
 pub struct S3Server {
     pub address: SocketAddr,
     state: Arc<State>,
@@ -15,41 +14,40 @@ pub struct S3Server {
 
 struct State {
     objects: Mutex<BTreeMap<String, Vec<u8>>>,
-    asked: Mutex<Vec<Asked>>,
+    requests: Mutex<Vec<SeenRequest>>,
     trouble: Mutex<Arc<Troubles>>,
 }
 
-/// What becomes of a request, after so many others.
-type Troubles = dyn Fn(&Asked, usize) -> Trouble + Send + Sync;
+/// Selects the fault for a request, given the number of earlier requests.
+type Troubles = dyn Fn(&SeenRequest, usize) -> Trouble + Send + Sync;
 
-/// One request.
 #[derive(Clone, Debug)]
-pub struct Asked {
+pub struct SeenRequest {
     pub method: String,
-    /// The path, with the bucket.
+    /// Path, including the bucket.
     pub key: String,
-    /// Bytes that are put.
+    /// Number of bytes written.
     pub bytes: usize,
-    /// The first byte that is asked for.
+    /// First requested byte.
     pub from: Option<usize>,
 }
 
 #[derive(Clone, Copy, PartialEq)]
 pub enum Trouble {
     None,
-    /// The request is read and not answered.
+    /// Reads the request without a response.
     Silent,
-    /// The request is done and answered after so many milliseconds.
+    /// Responds after a delay in milliseconds.
     Late(u64),
-    /// The connection is reset before the request is read.
+    /// Resets the connection before reading the request.
     Reset,
-    /// The request is done, and the connection closed without an answer.
+    /// Executes the request and closes the connection without a response.
     AnswerLost,
-    /// So many bytes of the content are sent each 20 ms.
+    /// Sends this number of content bytes every 20 ms.
     Drips(usize),
-    /// Half of the content is sent, and nothing more.
+    /// Sends half of the content and then stalls.
     Stalls,
-    /// Half of the content is sent, and the connection closed.
+    /// Sends half of the content and closes the connection.
     CutOff,
 }
 
@@ -61,27 +59,27 @@ impl S3Server {
         let address = listener.local_addr().unwrap();
         let trouble: Arc<Troubles> = Arc::new(|_, _| Trouble::None);
         let trouble = Mutex::new(trouble);
-        let state = Arc::new(State { objects: Mutex::default(), asked: Mutex::default(), trouble });
+        let state = Arc::new(State { objects: Mutex::default(), requests: Mutex::default(), trouble });
         let serving = state.clone();
         thread::spawn(move || {
             for stream in listener.incoming() {
                 let (stream, state) = (stream.unwrap(), serving.clone());
-                // A client that ends early is none of its business.
+                // Ignore errors of clients that disconnect early.
                 thread::spawn(move || state.serve(stream).unwrap_or_default());
             }
         });
         Self { address, state }
     }
 
-    /// From here on, `trouble` decides about requests, the first of which is number 0.
-    pub fn trouble(&self, trouble: impl Fn(&Asked, usize) -> Trouble + Send + Sync + 'static) {
-        self.state.asked.lock().unwrap().clear();
+    /// Sets the faults of all later requests, numbered from 0.
+    pub fn trouble(&self, trouble: impl Fn(&SeenRequest, usize) -> Trouble + Send + Sync + 'static) {
+        self.state.requests.lock().unwrap().clear();
         *self.state.trouble.lock().unwrap() = Arc::new(trouble);
     }
 
-    /// The requests since then.
-    pub fn asked(&self) -> Vec<Asked> {
-        self.state.asked.lock().unwrap().clone()
+    /// Returns the requests since the last call of `trouble`.
+    pub fn requests(&self) -> Vec<SeenRequest> {
+        self.state.requests.lock().unwrap().clone()
     }
 
     pub fn put(&self, key: &str, content: Vec<u8>) {
@@ -92,9 +90,9 @@ impl S3Server {
         self.state.objects.lock().unwrap().keys().any(|key| key.ends_with("manifest.json"))
     }
 
-    /// A command that finds its buckets here.
+    /// Returns a command with this server as endpoint.
     pub fn voxtile(&self, arguments: &[&str]) -> Command {
-        // A shell that runs tests in the background ignores SIGINT, and so would the command.
+        // A shell that runs tests in the background ignores SIGINT, and the child would inherit that.
         let mut command = Command::new("env");
         command.arg("--default-signal=INT").arg(assert_cmd::cargo::cargo_bin("voxtile"));
         let endpoint = format!("http://{}", self.address);
@@ -108,7 +106,7 @@ impl S3Server {
 
 impl State {
     fn serve(&self, mut stream: TcpStream) -> std::io::Result<()> {
-        // What is not read when a connection ends makes it a reset.
+        // Read the rest of the request: closing with unread data resets the connection.
         let mut head = [0; 4096];
         let mut peeked = 0;
         let since = Instant::now();
@@ -128,13 +126,13 @@ impl State {
             value.split(|letter: char| !letter.is_ascii_digit()).next()?.parse().ok()
         };
         let (bytes, from) = (number("\ncontent-length: ").unwrap_or(0), number("\nrange: bytes="));
-        let asked = Asked { method: method.to_owned(), key, bytes, from };
+        let request = SeenRequest { method: method.to_owned(), key, bytes, from };
         let (trouble, number) = {
-            let mut all = self.asked.lock().unwrap();
-            all.push(asked.clone());
+            let mut all = self.requests.lock().unwrap();
+            all.push(request.clone());
             (self.trouble.lock().unwrap().clone(), all.len() - 1)
         };
-        let trouble = trouble(&asked, number);
+        let trouble = trouble(&request, number);
         if trouble == Trouble::Reset {
             return Ok(());
         }
@@ -157,11 +155,12 @@ impl State {
         if let Trouble::Late(milliseconds) = trouble {
             thread::sleep(Duration::from_millis(milliseconds));
         }
-        let (status, content, range) = self.answer(&asked, &headers, body);
+        let (status, content, range) = self.answer(&request, &headers, body);
         if trouble == Trouble::AnswerLost {
             return Ok(());
         }
-        let e_tag = blake3::hash(&self.objects.lock().unwrap().get(&asked.key).cloned().unwrap_or_default());
+        let e_tag =
+            blake3::hash(&self.objects.lock().unwrap().get(&request.key).cloned().unwrap_or_default());
         write!(
             stream,
             "HTTP/1.1 {status} Told\r\nContent-Length: {}\r\nETag: \"{}\"\r\n{range}\
@@ -169,7 +168,7 @@ impl State {
             content.len(),
             e_tag.to_hex()
         )?;
-        if asked.method == "HEAD" {
+        if request.method == "HEAD" {
             return Ok(());
         }
         match trouble {
@@ -188,24 +187,24 @@ impl State {
         Ok(())
     }
 
-    /// Status, content and the header of the range.
+    /// Returns status, content and the range header.
     fn answer(
         &self,
-        asked: &Asked,
+        request: &SeenRequest,
         headers: &BTreeMap<String, String>,
         body: Vec<u8>,
     ) -> (u16, Vec<u8>, String) {
         let mut objects = self.objects.lock().unwrap();
-        let there = objects.get(&asked.key).cloned();
+        let there = objects.get(&request.key).cloned();
         let e_tag = there.as_ref().map(|there| format!("\"{}\"", blake3::hash(there).to_hex()));
         if headers.get("if-match").is_some_and(|wanted| e_tag.as_ref() != Some(wanted)) {
             return (412, Vec::new(), String::new());
         }
-        if asked.method == "PUT" {
+        if request.method == "PUT" {
             if headers.contains_key("if-none-match") && there.is_some() {
                 return (412, Vec::new(), String::new());
             }
-            objects.insert(asked.key.clone(), body);
+            objects.insert(request.key.clone(), body);
             return (200, Vec::new(), String::new());
         }
         let Some(content) = there else {
@@ -217,7 +216,7 @@ impl State {
         let (from, to) = range.split_once('-').unwrap();
         let (from, to): (usize, usize) = (from.parse().unwrap(), to.parse().unwrap());
         let to = to.min(content.len() - 1);
-        let told = format!("Content-Range: bytes {from}-{to}/{}\r\n", content.len());
-        (206, content[from..=to].to_vec(), told)
+        let reported = format!("Content-Range: bytes {from}-{to}/{}\r\n", content.len());
+        (206, content[from..=to].to_vec(), reported)
     }
 }

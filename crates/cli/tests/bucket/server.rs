@@ -6,7 +6,7 @@ use voxtile_bucket::object_store::memory::InMemory;
 use voxtile_bucket::object_store::path::Path as Key;
 use voxtile_bucket::object_store::{ObjectStore, ObjectStoreExt};
 
-/// A store in memory and what tests do to it.
+/// Store in memory with methods for tests.
 pub struct Server {
     pub store: Arc<InMemory>,
     runtime: Runtime,

@@ -1,7 +1,7 @@
-//! The command and the library against servers that do not answer, break off, drip or lose answers.
+//! Tests with servers that are silent, disconnect, send slowly or drop responses.
 
 use crate::city::{KEEP, city, digest, message_of};
-use crate::s3_server::{Asked, S3Server, Trouble};
+use crate::s3_server::{S3Server, SeenRequest, Trouble};
 use crate::server::Server;
 use std::process::{Command, Output};
 use std::sync::Arc;
@@ -35,20 +35,21 @@ fn push_all(server: &S3Server, map: &str) {
     assert!(pushed.status.success(), "{:?}", texts(&pushed));
 }
 
-fn is_object(asked: &Asked, method: &str) -> bool {
-    asked.method == method && asked.key.contains("/objects/")
+fn is_object(request: &SeenRequest, method: &str) -> bool {
+    request.method == method && request.key.contains("/objects/")
 }
 
 #[test]
-fn a_put_without_an_answer_is_reported_and_given_up() {
+fn a_put_without_a_response_is_reported_and_fails() {
     let (server, folder) = (S3Server::new(), TempDir::new().unwrap());
     let map = a_map(&folder);
-    server.trouble(|asked, _| if is_object(asked, "PUT") { Trouble::Silent } else { Trouble::None });
+    server.trouble(|request, _| if is_object(request, "PUT") { Trouble::Silent } else { Trouble::None });
     let (failed, took) = run(&server, &["push", &map, URL, "--bucket-timeout", "2", "--json"]);
-    let [out, said] = texts(&failed);
-    assert_eq!(failed.status.code(), Some(1), "{said}");
+    let [out, text_out] = texts(&failed);
+    assert_eq!(failed.status.code(), Some(1), "{text_out}");
     assert!(Duration::from_secs(2) <= took && took < Duration::from_secs(20), "{took:?}");
-    let waiting = said.lines().find(|line| line.contains("waiting for")).unwrap_or_else(|| panic!("{said}"));
+    let waiting =
+        text_out.lines().find(|line| line.contains("waiting for")).unwrap_or_else(|| panic!("{text_out}"));
     for part in [URL, "PUT maps/city/objects/", &server.address.to_string(), "attempt 1", "begun"] {
         assert!(waiting.contains(part), "{part}: {waiting}");
     }
@@ -59,7 +60,7 @@ fn a_put_without_an_answer_is_reported_and_given_up() {
         assert!(message.contains(part), "{part}: {message}");
     }
     assert!(!server.has_manifest());
-    // With -q only the error.
+    // With -q only the error is printed.
     let (quiet, _) = run(&server, &["push", &map, URL, "--bucket-timeout", "1", "-q"]);
     assert_eq!(texts(&quiet)[1].lines().count(), 1, "{:?}", texts(&quiet));
 
@@ -68,24 +69,25 @@ fn a_put_without_an_answer_is_reported_and_given_up() {
     assert_eq!(texts(&run(&server, &["digest", URL]).0)[0].trim(), digest(map.as_ref()));
 }
 
-/// Sent bytes may still be in the buffers of a slow link when the client counts them.
+/// The client counts bytes as sent when they are still in the buffer of a slow link.
 #[test]
-fn an_upload_may_take_the_whole_timeout() {
+fn an_upload_may_use_the_whole_timeout() {
     let (server, folder) = (S3Server::new(), TempDir::new().unwrap());
     let map = a_map(&folder);
-    server.trouble(|asked, _| if is_object(asked, "PUT") { Trouble::Late(1_400) } else { Trouble::None });
+    server.trouble(|request, _| if is_object(request, "PUT") { Trouble::Late(1_400) } else { Trouble::None });
     let (pushed, _) = run(&server, &["push", &map, URL, "--bucket-timeout", "2"]);
     assert!(pushed.status.success(), "{}", texts(&pushed)[1]);
-    let mut sent: Vec<_> = server.asked().into_iter().filter(|asked| is_object(asked, "PUT")).collect();
+    let mut sent: Vec<_> =
+        server.requests().into_iter().filter(|request| is_object(request, "PUT")).collect();
     let all = sent.len();
     sent.sort_by(|a, b| a.key.cmp(&b.key));
     sent.dedup_by(|a, b| a.key == b.key);
     assert_eq!(sent.len(), all, "no object was sent twice");
 }
 
-/// What is sent again is no progress.
+/// Repeated uploads do not count as progress.
 #[test]
-fn a_long_object_without_an_answer_is_given_up() {
+fn a_long_object_without_a_response_fails() {
     let (server, folder) = (S3Server::new(), TempDir::new().unwrap());
     let map = folder.path().join("map");
     let config = MapConfig::new(0.05, 3.2).unwrap().with_range(0.0, 3.0);
@@ -93,12 +95,12 @@ fn a_long_object_without_an_answer_is_given_up() {
     mapper.insert_scan(&random_scan(&mut Random(1), [0.0; 3], 3_000)).unwrap();
     mapper.flush().unwrap();
     drop(mapper);
-    let is_long = |asked: &Asked| asked.method == "PUT" && asked.bytes > 100_000;
-    server.trouble(move |asked, _| if is_long(asked) { Trouble::Silent } else { Trouble::None });
+    let is_long = |request: &SeenRequest| request.method == "PUT" && request.bytes > 100_000;
+    server.trouble(move |request, _| if is_long(request) { Trouble::Silent } else { Trouble::None });
     let (failed, took) = run(&server, &["push", map.to_str().unwrap(), URL, "--bucket-timeout", "2"]);
-    let said = texts(&failed)[1].clone();
-    assert!(server.asked().iter().any(is_long), "{:?}", server.asked());
-    assert!(said.contains("no answer to PUT") && said.contains("s and 2 attempts"), "{said}");
+    let text_out = texts(&failed)[1].clone();
+    assert!(server.requests().iter().any(is_long), "{:?}", server.requests());
+    assert!(text_out.contains("no answer to PUT") && text_out.contains("s and 2 attempts"), "{text_out}");
     assert!(took < Duration::from_secs(20), "{took:?}");
 }
 
@@ -110,50 +112,53 @@ fn a_third_of_the_connections_may_be_reset() {
     let began = Instant::now();
     push_all(&server, &map);
     let (found, _) = run(&server, &["digest", URL]);
-    let [out, said] = texts(&found);
-    assert_eq!(out.trim(), digest(map.as_ref()), "{said}");
+    let [out, text_out] = texts(&found);
+    assert_eq!(out.trim(), digest(map.as_ref()), "{text_out}");
     assert!(began.elapsed() < Duration::from_secs(30), "{:?}", began.elapsed());
-    // Content that breaks off is continued.
-    server.trouble(|asked, _| if asked.from.is_none() { Trouble::CutOff } else { Trouble::None });
+    // Interrupted content resumes.
+    server.trouble(|request, _| if request.from.is_none() { Trouble::CutOff } else { Trouble::None });
     let (found, _) = run(&server, &["digest", URL, "--bucket-timeout", "1"]);
     assert_ne!(found.status.code(), Some(0), "the manifest is never whole");
-    server.trouble(|asked, _| match is_object(asked, "GET") && asked.from.is_none() {
+    server.trouble(|request, _| match is_object(request, "GET") && request.from.is_none() {
         true => Trouble::CutOff,
         false => Trouble::None,
     });
     let (found, _) = run(&server, &["digest", URL]);
     assert_eq!(texts(&found)[0].trim(), digest(map.as_ref()));
-    assert!(server.asked().iter().any(|asked| asked.from.is_some_and(|from| from > 0)));
+    assert!(server.requests().iter().any(|request| request.from.is_some_and(|from| from > 0)));
 }
 
 #[test]
-fn an_answer_that_is_cut_off_refuses_nothing() {
+fn a_truncated_response_is_no_refusal() {
     let (server, folder) = (S3Server::new(), TempDir::new().unwrap());
     let map = a_map(&folder);
-    // The first answer says that there is no manifest yet.
+    // The first response reports that there is no manifest yet.
     server.trouble(|_, number| if number == 0 { Trouble::CutOff } else { Trouble::None });
     push_all(&server, &map);
-    let [first, second] = [0, 1].map(|number| server.asked()[number].clone());
-    assert_eq!((&first.method, &first.key), (&second.method, &second.key), "it was asked again");
+    let [first, second] = [0, 1].map(|number| server.requests()[number].clone());
+    assert_eq!((&first.method, &first.key), (&second.method, &second.key), "the request was repeated");
 }
 
 #[test]
-fn an_object_that_drips_is_given_up_and_a_slow_one_is_not() {
+fn a_trickling_object_fails_and_a_slow_one_does_not() {
     let (server, folder) = (S3Server::new(), TempDir::new().unwrap());
     let map = a_map(&folder);
     push_all(&server, &map);
-    server.trouble(|asked, _| if is_object(asked, "GET") { Trouble::Drips(1) } else { Trouble::None });
+    server.trouble(|request, _| if is_object(request, "GET") { Trouble::Drips(1) } else { Trouble::None });
     let (failed, took) = run(&server, &["digest", URL, "--bucket-timeout", "1"]);
-    let said = texts(&failed)[1].clone();
-    assert_eq!(failed.status.code(), Some(1), "{said}");
-    assert!(said.contains("no answer to GET maps/city/objects/") && said.contains("waiting for"), "{said}");
+    let text_out = texts(&failed)[1].clone();
+    assert_eq!(failed.status.code(), Some(1), "{text_out}");
+    assert!(
+        text_out.contains("no answer to GET maps/city/objects/") && text_out.contains("waiting for"),
+        "{text_out}"
+    );
     assert!(took < Duration::from_secs(20), "{took:?}");
 
-    // 200 kB at 8 kB each 20 ms, which takes longer than the bound; and once nothing comes after the half.
+    // 200 kB at 8 kB every 20 ms, longer than the timeout; then content that stalls after half.
     let place = TempDir::new().unwrap();
     let content: Vec<u8> = (0..300_000_u32).map(|at| ((at * 31) >> 7) as u8).collect();
     server.put("long.bin", content.clone());
-    server.trouble(|asked, _| match (&*asked.method, asked.from) {
+    server.trouble(|request, _| match (&*request.method, request.from) {
         ("GET", None) => Trouble::Stalls,
         _ => Trouble::Drips(4_000),
     });
@@ -163,19 +168,19 @@ fn an_object_that_drips_is_given_up_and_a_slow_one_is_not() {
     let fetched = FetchedFiles::fetch(&bucket, place.path(), &|| false, |_, _| ()).unwrap();
     assert!(began.elapsed() > Duration::from_millis(700), "{:?}", began.elapsed());
     assert!(std::fs::read(fetched.path()).unwrap() == content);
-    let from: Vec<_> = server.asked().iter().filter_map(|asked| asked.from).collect();
+    let from: Vec<_> = server.requests().iter().filter_map(|request| request.from).collect();
     assert_eq!(from, [content.len() / 2]);
 }
 
-/// The state there decides whether a push came through, and nothing is put twice over another push.
+/// The state in the bucket decides whether a push succeeded, and nothing overwrites another push.
 #[test]
-fn a_manifest_whose_answer_is_lost_is_there_once() {
+fn a_manifest_with_a_lost_response_is_written_once() {
     let (server, folder) = (S3Server::new(), TempDir::new().unwrap());
     let map = a_map(&folder);
     for lost in [Trouble::AnswerLost, Trouble::Reset, Trouble::Silent] {
         let is_first = AtomicBool::new(true);
-        server.trouble(move |asked, _| {
-            let is_manifest = asked.method == "PUT" && asked.key.ends_with("manifest.json");
+        server.trouble(move |request, _| {
+            let is_manifest = request.method == "PUT" && request.key.ends_with("manifest.json");
             if is_manifest && is_first.swap(false, Ordering::Relaxed) { lost } else { Trouble::None }
         });
         crate::city::go_on(map.as_ref(), 100, 1);
@@ -187,14 +192,14 @@ fn a_manifest_whose_answer_is_lost_is_there_once() {
     }
 }
 
-/// Whatever hangs: commands that catch the signal, and those that do not.
+/// For commands with and without a signal handler, whatever the server does.
 #[cfg(unix)]
 #[test]
-fn a_signal_ends_a_command_that_waits_for_a_bucket() {
+fn a_signal_ends_a_command_waiting_for_a_bucket() {
     use std::os::unix::process::ExitStatusExt;
     let (server, folder) = (S3Server::new(), TempDir::new().unwrap());
     let map = a_map(&folder);
-    server.trouble(|asked, _| if asked.method == "PUT" { Trouble::Silent } else { Trouble::None });
+    server.trouble(|request, _| if request.method == "PUT" { Trouble::Silent } else { Trouble::None });
     let out = folder.path().join("city.ply");
     let out = out.to_str().unwrap();
     let built = folder.path().join("built");
@@ -202,7 +207,7 @@ fn a_signal_ends_a_command_that_waits_for_a_bucket() {
     let check = |arguments: &[&str], signal: &str, is_caught: bool, method: &str| {
         let child = server.voxtile(arguments).spawn().unwrap();
         let since = Instant::now();
-        while !server.asked().iter().any(|asked| is_object(asked, method)) {
+        while !server.requests().iter().any(|request| is_object(request, method)) {
             assert!(since.elapsed() < Duration::from_secs(60), "{arguments:?}");
             std::thread::sleep(Duration::from_millis(20));
         }
@@ -211,10 +216,10 @@ fn a_signal_ends_a_command_that_waits_for_a_bucket() {
         Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap();
         let ended = child.wait_with_output().unwrap();
         assert!(sent.elapsed() < Duration::from_secs(2), "{arguments:?}: {:?}", sent.elapsed());
-        let said = texts(&ended);
+        let text_out = texts(&ended);
         match is_caught {
-            true => assert_eq!(ended.status.code(), Some(130), "{arguments:?}: {said:?}"),
-            false => assert!(ended.status.signal().is_some(), "{arguments:?}: {said:?}"),
+            true => assert_eq!(ended.status.code(), Some(130), "{arguments:?}: {text_out:?}"),
+            false => assert!(ended.status.signal().is_some(), "{arguments:?}: {text_out:?}"),
         }
     };
     check(&["push", &map, URL], "-INT", false, "PUT");
@@ -222,31 +227,34 @@ fn a_signal_ends_a_command_that_waits_for_a_bucket() {
     server.trouble(|_, _| Trouble::None);
     push_all(&server, &map);
     for signal in ["-INT", "-TERM"] {
-        server.trouble(|asked, _| if is_object(asked, "GET") { Trouble::Silent } else { Trouble::None });
+        server.trouble(|request, _| if is_object(request, "GET") { Trouble::Silent } else { Trouble::None });
         check(&["digest", URL], signal, false, "GET");
-        server.trouble(|asked, _| if is_object(asked, "GET") { Trouble::Silent } else { Trouble::None });
+        server.trouble(|request, _| if is_object(request, "GET") { Trouble::Silent } else { Trouble::None });
         check(&["export", URL, "-o", out], signal, true, "GET");
-        server.trouble(|asked, _| if is_object(asked, "GET") { Trouble::Silent } else { Trouble::None });
+        server.trouble(|request, _| if is_object(request, "GET") { Trouble::Silent } else { Trouble::None });
         check(&["build", URL, "-o", built, "--resolution", "0.4"], signal, true, "GET");
     }
     assert!(!folder.path().join("city.ply").exists() && !folder.path().join("built").exists());
 }
 
-/// A server that was never reached is not waited for.
+/// A server that was never reached fails fast.
 #[test]
-fn a_wrong_address_is_found_soon() {
+fn a_wrong_address_fails_soon() {
     let closed = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
     let bucket = Bucket::open(&format!("http://{closed}/city")).unwrap();
     let began = Instant::now();
-    let said = message_of(bucket.has_map(&|| false));
-    assert!(said.contains("no answer to HEAD city/manifest.json") && said.contains("4 attempts"), "{said}");
-    assert!(said.contains(&closed.to_string()), "{said}");
+    let text_out = message_of(bucket.has_map(&|| false));
+    assert!(
+        text_out.contains("no answer to HEAD city/manifest.json") && text_out.contains("4 attempts"),
+        "{text_out}"
+    );
+    assert!(text_out.contains(&closed.to_string()), "{text_out}");
     assert!(began.elapsed() < Duration::from_secs(10), "{:?}", began.elapsed());
 }
 
-/// A store of a program's own is bounded as well, and can be stopped.
+/// Custom stores have timeouts and can be stopped, too.
 #[test]
-fn a_store_that_hangs_is_given_up_or_stopped() {
+fn a_hanging_store_times_out_or_is_stopped() {
     let (server, folder) = (Server::new(), TempDir::new().unwrap());
     let map = a_map(&folder);
     let wait_put_per_call = Duration::from_secs(60);

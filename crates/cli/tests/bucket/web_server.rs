@@ -3,7 +3,7 @@ use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::sync::Arc;
 use std::thread;
 
-/// A web server with one file, whatever the path; it knows no ranges. It ends with the process.
+/// Starts a web server that returns one file for every path and ignores ranges. It ends with the process.
 pub fn serve_whole(content: Vec<u8>) -> SocketAddr {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap();
@@ -29,7 +29,7 @@ fn answer(mut stream: TcpStream, content: &[u8]) {
          Connection: close\r\n\r\n",
         content.len()
     );
-    // Who has heard enough hangs up.
+    // The client may disconnect early.
     let _ = stream.write_all(head.as_bytes());
     if !first.starts_with("HEAD") {
         let _ = stream.write_all(content);

@@ -14,7 +14,7 @@ pub fn text(path: &Path) -> &str {
     path.to_str().unwrap()
 }
 
-/// Standard output of a run that must succeed.
+/// Runs a command that must succeed and returns its standard output.
 pub fn output(arguments: &[&str]) -> String {
     String::from_utf8(voxtile(arguments).assert().success().get_output().stdout.clone()).unwrap()
 }
@@ -25,14 +25,14 @@ pub fn json(arguments: &[&str]) -> Value {
     object
 }
 
-/// Exit code and standard error of a run that must fail.
+/// Runs a command that must fail and returns its exit code and standard error.
 pub fn failure(arguments: &[&str]) -> (i32, String) {
     let assert = voxtile(arguments).assert().failure();
     let run = assert.get_output();
     (run.status.code().unwrap(), String::from_utf8(run.stderr.clone()).unwrap())
 }
 
-/// A folder of three small ascii scans of a wall, the sensor a metre further each time.
+/// Writes a folder of three small ascii scans of a wall; the sensor advances by a metre per scan.
 pub fn scans(folder: &TempDir) -> PathBuf {
     let path = folder.path().join("scans");
     fs::create_dir(&path).unwrap();
@@ -57,7 +57,7 @@ fn built(folder: &TempDir) -> (PathBuf, PathBuf) {
 }
 
 #[test]
-fn a_map_is_built_asked_exported_and_added_to() {
+fn a_map_is_built_queried_exported_and_extended() {
     let folder = TempDir::new().unwrap();
     let (scans, map) = (scans(&folder), folder.path().join("deep/down/map"));
     let map = text(&map);
@@ -127,7 +127,7 @@ fn a_map_is_built_asked_exported_and_added_to() {
 }
 
 #[test]
-fn the_example_answers_as_the_readme_says() {
+fn the_example_prints_the_output_in_the_readme() {
     let example = testkit::support::repository("map_tiles_example");
     let example = example.to_str().unwrap();
     let answer = output(&["raycast", example, "--origin", "8", "-2", "1.8", "--direction", "1", "1", "0"]);
@@ -136,7 +136,7 @@ fn the_example_answers_as_the_readme_says() {
 }
 
 #[test]
-fn the_same_scans_give_the_same_digest_whatever_the_cache() {
+fn the_digest_does_not_depend_on_the_cache() {
     let folder = TempDir::new().unwrap();
     let scans = scans(&folder);
     let digests: Vec<String> = ["1", "3", "1000"]
@@ -153,7 +153,7 @@ fn the_same_scans_give_the_same_digest_whatever_the_cache() {
 }
 
 #[test]
-fn the_same_scans_give_the_same_digest_whatever_the_octree_and_its_cache() {
+fn the_digest_does_not_depend_on_the_octree_and_its_cache() {
     let folder = TempDir::new().unwrap();
     let scans = scans(&folder);
     let choices: [(&[&str], _); 7] = [
@@ -189,22 +189,22 @@ fn the_same_scans_give_the_same_digest_whatever_the_octree_and_its_cache() {
     }
     assert!(digests.windows(2).all(|pair| pair[0] == pair[1]));
 
-    let map = folder.path().join("told");
-    let told = output(&["build", text(&scans), "-o", text(&map), "--voxel-cache", "parallel"]);
+    let map = folder.path().join("reported");
+    let reported = output(&["build", text(&scans), "-o", text(&map), "--voxel-cache", "parallel"]);
     for line in ["cache     ", "hit rate", "octrees   ", "queue     ", "stages    "] {
-        assert!(told.contains(line), "{told}");
+        assert!(reported.contains(line), "{reported}");
     }
-    let told =
+    let reported =
         output(&["build", text(&scans), "-o", text(&map), "--append", "--again", "--voxel-cache", "serial"]);
-    assert!(told.contains("hit rate") && !told.contains("queue"), "{told}");
+    assert!(reported.contains("hit rate") && !reported.contains("queue"), "{reported}");
     let out = folder.path().join("demo");
     let demo = ["demo", "--out", text(&out), "--length", "4", "--voxel-cache", "parallel", "--json"];
     assert!(json(&demo).pointer("/octrees/voxel_cache/misses").and_then(Value::as_u64) > Some(0));
 }
 
-/// What was typed, the exit code, and what the message must say.
+/// Cases of arguments, exit code and a part of the message.
 #[test]
-fn bad_inputs_get_one_line_that_says_what_to_do() {
+fn bad_inputs_print_one_line_with_a_remedy() {
     let folder = TempDir::new().unwrap();
     let (scans, map) = built(&folder);
     let (scans, map) = (text(&scans), text(&map));
@@ -316,7 +316,7 @@ fn bad_inputs_get_one_line_that_says_what_to_do() {
             2,
             "buckets: must be a power of two up to 2^24, not 33554432",
         ),
-        (vec!["build", scans, "-o", new, "--tau", "4"], 2, "--tau, --buckets: only voxel caches have these"),
+        (vec!["build", scans, "-o", new, "--tau", "4"], 2, "--tau, --buckets: need a voxel cache"),
         (
             vec!["build", scans, "-o", new, "--octree", "pointers", "--voxel-cache", "off", "--buckets", "4"],
             2,
@@ -327,7 +327,7 @@ fn bad_inputs_get_one_line_that_says_what_to_do() {
             2,
             "--voxel-cache: bricks have no voxel cache",
         ),
-        (vec!["demo", "--out", new, "--tau", "4"], 2, "--tau, --buckets: only voxel caches have these"),
+        (vec!["demo", "--out", new, "--tau", "4"], 2, "--tau, --buckets: need a voxel cache"),
         (
             vec!["build", scans, "-o", map, "--append", "--resolution", "0.2"],
             2,
@@ -361,7 +361,7 @@ fn bad_inputs_get_one_line_that_says_what_to_do() {
 }
 
 #[test]
-fn a_stray_point_far_away_is_cut_or_skipped_and_told() {
+fn a_stray_far_point_is_cut_or_skipped_and_reported() {
     let folder = TempDir::new().unwrap();
     let path = folder.path().join("stray.pcd");
     let header = "FIELDS x y z\nSIZE 8 8 8\nTYPE F F F\nWIDTH 2\nHEIGHT 1\nDATA ascii\n";
@@ -375,7 +375,7 @@ fn a_stray_point_far_away_is_cut_or_skipped_and_told() {
 }
 
 #[test]
-fn a_second_writer_and_damage_are_told_with_the_path() {
+fn a_second_writer_and_damage_are_reported_with_the_path() {
     let folder = TempDir::new().unwrap();
     let (scans, map) = built(&folder);
     let config = voxtile::MapReader::config_of(&map).unwrap();
@@ -401,14 +401,14 @@ fn a_second_writer_and_damage_are_told_with_the_path() {
 
 #[cfg(unix)]
 #[test]
-fn a_folder_that_cannot_be_written_to_is_told() {
+fn a_read_only_folder_is_reported() {
     use std::os::unix::fs::PermissionsExt;
     let folder = TempDir::new().unwrap();
     let scans = scans(&folder);
     let closed = folder.path().join("closed");
     fs::create_dir(&closed).unwrap();
     fs::set_permissions(&closed, fs::Permissions::from_mode(0o555)).unwrap();
-    // Root may write anywhere: ask in a place where nobody may.
+    // Root can write to any directory, so use /proc.
     let target =
         if fs::write(closed.join("probe"), "").is_ok() { "/proc/map".into() } else { closed.join("map") };
     let (code, stderr) = failure(&["build", text(&scans), "-o", text(&target)]);
@@ -431,7 +431,7 @@ fn a_merged_octree_beyond_octomaps_keys_names_the_region() {
 }
 
 #[test]
-fn octomaps_files_are_told_and_exported_and_a_bomb_is_refused() {
+fn octomap_files_are_described_and_exported_and_a_bomb_is_refused() {
     let folder = TempDir::new().unwrap();
     let (_, map) = built(&folder);
     let [bt, ot, csv] = ["a.bt", "a.ot", "a.csv"].map(|name| folder.path().join(name));
@@ -467,10 +467,10 @@ fn the_demo_makes_a_map_and_a_picture() {
 
 #[cfg(unix)]
 #[test]
-fn ctrl_c_flushes_and_says_how_far_it_got() {
+fn ctrl_c_flushes_and_reports_the_number_of_scans() {
     let folder = TempDir::new().unwrap();
     let scans = scans(&folder);
-    // Enough copies that the build takes a while.
+    // Enough copies for a build of some seconds.
     for number in 3..4000 {
         fs::hard_link(scans.join("000.pcd"), scans.join(format!("{number:04}.pcd"))).unwrap();
     }
@@ -498,11 +498,11 @@ fn ctrl_c_flushes_and_says_how_far_it_got() {
 
 #[cfg(unix)]
 #[test]
-fn share_runs_the_program_beside_this_one_or_says_where_to_put_it() {
+fn share_runs_the_program_next_to_this_one_or_explains_its_installation() {
     let folder = tempfile::tempdir().unwrap();
     let voxtile = folder.path().join("voxtile");
-    // By a process of its own: what this one writes cannot be run while a process that another test has just begun
-    // still holds it open.
+    // Write the program in a separate process: a file that a forked child of another test still has open for writing
+    // cannot be executed.
     let shell = |line: &str, path: &std::path::Path| {
         let program = env!("CARGO_BIN_EXE_voxtile");
         let status = std::process::Command::new("sh").args(["-c", line, program]).arg(path).status();
@@ -516,18 +516,18 @@ fn share_runs_the_program_beside_this_one_or_says_where_to_put_it() {
     let run = || share(&["--subscribe", "-o", "map", "--help"]);
     for help in [&["--help"][..], &["-h"], &["--subscribe", "--help"], &[]] {
         let helped = share(help);
-        let said = String::from_utf8_lossy(&helped.stdout).into_owned();
+        let printed = String::from_utf8_lossy(&helped.stdout).into_owned();
         assert!(helped.status.success() && helped.stderr.is_empty(), "{help:?}");
         for word in
             ["--publish", "--subscribe", "cargo install --locked --path crates/share-node", "not here"]
         {
-            assert!(said.contains(word), "{help:?}: {said}");
+            assert!(printed.contains(word), "{help:?}: {printed}");
         }
     }
     let missing = share(&["--subscribe", "-o", "map"]);
-    let said = String::from_utf8_lossy(&missing.stderr).into_owned();
+    let printed = String::from_utf8_lossy(&missing.stderr).into_owned();
     assert!(!missing.status.success());
-    assert!(said.contains("cannot run voxtile-share") && said.lines().count() == 1, "{said}");
+    assert!(printed.contains("cannot run voxtile-share") && printed.lines().count() == 1, "{printed}");
 
     let program = folder.path().join("voxtile-share");
     shell(r##"printf '#!/bin/sh\necho "$@"\nexit 7\n' >"$1" && chmod +x "$1""##, &program);
@@ -537,28 +537,28 @@ fn share_runs_the_program_beside_this_one_or_says_where_to_put_it() {
 }
 
 #[test]
-fn a_map_is_built_small_converted_and_gone_on_with() {
+fn a_compact_map_is_built_converted_and_extended() {
     let folder = TempDir::new().unwrap();
     let (scans, map) = built(&folder);
     let small = folder.path().join("small");
     output(&["build", text(&scans), "-o", text(&small), "--storage", "compact"]);
     let digest = output(&["digest", text(&map)]);
     assert_eq!(output(&["digest", text(&small)]), digest);
-    assert!(output(&["verify", text(&small)]).contains("whole"));
+    assert!(output(&["verify", text(&small)]).contains("intact"));
     let info = json(&["info", text(&small), "--json"]);
     assert_eq!((info["storage"].as_str(), info["octree_bytes"].as_u64()), (Some("compact"), Some(0)));
     assert!(output(&["info", text(&small)]).contains("in compact tables"));
     assert_eq!(json(&["info", text(&map), "--json"])["storage"], "octomap");
 
     let (to_small, to_seed) = (folder.path().join("to_small"), folder.path().join("to_seed"));
-    let said = json(&["convert", text(&map), "-o", text(&to_small), "--storage", "compact", "--json"]);
-    assert_eq!(said["from"]["octree_bytes"], json(&["info", text(&map), "--json"])["octree_bytes"]);
-    assert!(said["to"]["table_bytes"].as_u64() < said["from"]["table_bytes"].as_u64());
-    let said = output(&["convert", text(&small), "-o", text(&to_seed), "--storage", "octomap"]);
-    assert!(said.contains("with compact storage"), "{said}");
+    let printed = json(&["convert", text(&map), "-o", text(&to_small), "--storage", "compact", "--json"]);
+    assert_eq!(printed["from"]["octree_bytes"], json(&["info", text(&map), "--json"])["octree_bytes"]);
+    assert!(printed["to"]["table_bytes"].as_u64() < printed["from"]["table_bytes"].as_u64());
+    let printed = output(&["convert", text(&small), "-o", text(&to_seed), "--storage", "octomap"]);
+    assert!(printed.contains("with compact storage"), "{printed}");
     for map in [&to_small, &to_seed] {
         assert_eq!(output(&["digest", text(map)]), digest);
-        // All scans of this input are in it.
+        // The map has all scans of this input already.
         assert_eq!(json(&["build", text(&scans), "-o", text(map), "--resume", "--json"])["resumed_after"], 3);
     }
     let (code, message) = failure(&["convert", text(&map), "-o", text(&small), "--storage", "compact"]);
@@ -571,7 +571,7 @@ fn a_map_is_built_small_converted_and_gone_on_with() {
     output(&[&again[..], &["compact"]].concat());
 }
 
-/// Numbers as programs print them are no options.
+/// Numbers in the notation of other programs are not parsed as options.
 #[test]
 fn negative_numbers_may_have_any_form() {
     let folder = TempDir::new().unwrap();
@@ -590,14 +590,14 @@ fn negative_numbers_may_have_any_form() {
     let extrinsic = ["--extrinsic", "0", "0", "0", "0", "0", "-1e-17", "1"];
     output(&[&["build", text(&scans), "-o", &new("turned")], &extrinsic[..]].concat());
     assert_eq!(output(&["digest", &new("turned")]), output(&["digest", map]));
-    // What stands behind -- is a name, and what is no number is as it was.
+    // After `--` an argument is a name, and text that is no number is unchanged.
     let (code, stderr) = failure(&["info", "--", "-1e5"]);
     assert!(code == 1 && stderr.contains("-1e5: no map"), "{stderr}");
     voxtile(&["query", map, "-x", "0", "0"]).assert().code(2);
 }
 
 #[test]
-fn files_are_known_by_what_they_hold() {
+fn files_are_recognised_by_content() {
     let folder = TempDir::new().unwrap();
     let (_, map) = built(&folder);
     let [ot, renamed, ply] = ["a.ot", "map.octomap", "a.ply"].map(|name| folder.path().join(name));
@@ -612,9 +612,9 @@ fn files_are_known_by_what_they_hold() {
     }
 }
 
-/// OctoMap's files have single precision: a voxel of exactly one hit is of the probability of a hit there, too.
+/// OctoMap's files have single precision, but a voxel of exactly one hit still has the probability of a hit.
 #[test]
-fn every_format_has_the_same_voxels_of_a_probability() {
+fn every_format_has_the_same_voxels_above_a_probability() {
     let folder = TempDir::new().unwrap();
     let (scans, _) = built(&folder);
     let map = folder.path().join("one_scan");

@@ -5,7 +5,7 @@ use tempfile::TempDir;
 const BOX: [&str; 7] = ["--region", "-1", "-2.5", "0", "4", "0.05", "1"];
 const ELSEWHERE: [&str; 7] = ["--region", "100", "100", "100", "101", "101", "101"];
 
-/// A map of three scans of a wall, and the name of a place beside it.
+/// Builds a map of three scans of a wall; also returns a free path next to it.
 fn built(folder: &TempDir, how: &[&str]) -> (PathBuf, PathBuf) {
     let (scans, map) = (scans(folder), folder.path().join("map"));
     let build = ["build", text(&scans), "-o", text(&map), "--tile-size", "2"];
@@ -17,9 +17,9 @@ fn digest(map: &str) -> String {
     output(&["digest", map])
 }
 
-/// Commands that need the files of a folder name what a file of OctoMap is, and the way to a map.
+/// Commands that need a map folder explain how to convert an OctoMap file.
 #[test]
-fn files_of_octomap_are_named_where_a_folder_is_needed() {
+fn octomap_files_are_refused_with_a_hint_where_a_folder_is_needed() {
     let folder = TempDir::new().unwrap();
     let [tree, other] = ["a.bt", "a.txt"].map(|name| folder.path().join(name));
     output(&["export", text(&built(&folder, &[]).0), "-o", text(&tree)]);
@@ -49,15 +49,15 @@ fn files_of_octomap_are_named_where_a_folder_is_needed() {
 }
 
 #[test]
-fn what_is_cropped_apart_is_merged_to_the_whole() {
+fn cropped_parts_merge_to_the_whole() {
     for storage in ["octomap", "compact"] {
         let folder = TempDir::new().unwrap();
         let (map, out) = built(&folder, &["--storage", storage]);
         let (map, inside) = (text(&map), text(&out));
         let cropped = json(&[&["crop", map, "-o", inside, "--json"], &BOX[..]].concat());
         let outside = format!("{inside}_rest");
-        let told = output(&[&["crop", map, "-o", &outside, "--outside"], &BOX[..]].concat());
-        assert!(told.starts_with("map       ") && told.contains("occupied"), "{told}");
+        let reported = output(&[&["crop", map, "-o", &outside, "--outside"], &BOX[..]].concat());
+        assert!(reported.starts_with("map       ") && reported.contains("occupied"), "{reported}");
         let [all, some, rest] = [map, inside, &outside].map(|map| json(&["info", map, "--json"]));
         assert_eq!(cropped["voxels"], some["voxels"]);
         let sum = some["voxels"].as_u64().unwrap() + rest["voxels"].as_u64().unwrap();
@@ -67,7 +67,7 @@ fn what_is_cropped_apart_is_merged_to_the_whole() {
         assert_eq!(merged["common_voxels"].as_u64(), Some(0));
         assert_eq!(merged["warnings"].as_array().map(Vec::len), Some(0));
         assert_eq!(digest(&again), digest(map));
-        assert!(output(&["verify", &again]).contains("whole"));
+        assert!(output(&["verify", &again]).contains("intact"));
     }
 }
 
@@ -86,18 +86,18 @@ fn a_part_is_cleared_in_place() {
         "{cleared}"
     );
     assert_eq!(digest(map), digest(out));
-    assert!(output(&["verify", map]).contains("whole"));
-    // What is unknown now can be mapped again.
+    assert!(output(&["verify", map]).contains("intact"));
+    // Unknown voxels can be mapped again.
     let scans = folder.path().join("scans");
     output(&["build", text(&scans), "-o", map, "--append", "--again"]);
     assert_eq!(json(&["info", map, "--json"])["scan_number"].as_u64(), Some(6));
-    let told = output(&[&["clear", map, "--outside"], &ELSEWHERE[..]].concat());
-    assert!(told.contains("tiles     0; "), "{told}");
+    let reported = output(&[&["clear", map, "--outside"], &ELSEWHERE[..]].concat());
+    assert!(reported.contains("tiles     0; "), "{reported}");
     assert_eq!(json(&["info", map, "--json"])["voxels"].as_u64(), Some(0));
 }
 
 #[test]
-fn evidence_fades_once_by_the_scans_that_came() {
+fn log_odds_decay_once_per_new_scan() {
     let folder = TempDir::new().unwrap();
     let (map, _) = built(&folder, &[]);
     let map = text(&map);
@@ -107,17 +107,17 @@ fn evidence_fades_once_by_the_scans_that_came() {
     assert_eq!((decayed["scans"].as_u64(), decayed["factor"].as_f64()), (Some(3), Some(0.5)));
     assert_eq!(log_odds(), before / 2.0);
     assert_eq!(json(&["info", map, "--json"])["decayed_scan"].as_u64(), Some(3));
-    let told = output(&["decay", map, "--halflife", "3"]);
-    assert!(told.contains("by 0 scans"), "{told}");
+    let reported = output(&["decay", map, "--halflife", "3"]);
+    assert!(reported.contains("by 0 scans"), "{reported}");
     assert_eq!(log_odds(), before / 2.0);
     output(&["decay", map, "--halflife", "3", "--scans", "3", "--forget-below", "0.4"]);
     assert_eq!(log_odds(), before / 4.0);
     assert!(output(&["query", map, "2", "-0.1", "0.3"]).contains("unknown"), "was free, and is forgotten");
-    assert!(output(&["verify", map]).contains("whole"));
+    assert!(output(&["verify", map]).contains("intact"));
 }
 
 #[test]
-fn related_maps_are_warned_of_and_counted_twice() {
+fn related_maps_give_a_warning_and_count_twice() {
     let folder = TempDir::new().unwrap();
     let (map, out) = built(&folder, &[]);
     let (map, out) = (text(&map), text(&out));
@@ -136,7 +136,7 @@ fn related_maps_are_warned_of_and_counted_twice() {
 }
 
 #[test]
-fn what_cannot_be_is_told_in_a_line() {
+fn impossible_requests_print_one_line() {
     let folder = TempDir::new().unwrap();
     let (map, out) = built(&folder, &[]);
     let (map, out) = (text(&map), text(&out));

@@ -6,14 +6,14 @@ use tempfile::TempDir;
 use voxtile::space::Grid;
 use voxtile_formats::read_pcd;
 
-/// A map of three scans of a wall.
+/// Builds a map of three scans of a wall.
 fn near_map(folder: &TempDir) -> PathBuf {
     let map = folder.path().join("map");
     output(&["build", text(&scans(folder)), "-o", text(&map)]);
     map
 }
 
-/// A map of twenty points around a place in the world.
+/// Builds a map of twenty points around a position.
 fn far_map(folder: &TempDir, place: &str) -> PathBuf {
     let (cloud, map) = (folder.path().join("far.pcd"), folder.path().join("far"));
     let mut content = format!(
@@ -27,7 +27,7 @@ fn far_map(folder: &TempDir, place: &str) -> PathBuf {
     map
 }
 
-/// The names in a folder, sorted.
+/// Returns the names in a folder, sorted.
 fn names(folder: &Path) -> Vec<String> {
     let mut names: Vec<String> = fs::read_dir(folder)
         .unwrap()
@@ -42,7 +42,7 @@ fn origin_beside(file: &Path) -> Option<Value> {
     fs::read(beside).ok().map(|text| serde_json::from_slice(&text).unwrap())
 }
 
-/// The voxels of a CSV, in metres from the file's origin.
+/// Returns the voxel centers of a CSV file in metres, relative to the file's origin.
 fn centers(file: &Path) -> Vec<[f64; 3]> {
     let text = fs::read_to_string(file).unwrap();
     let rows = text.lines().skip(1).map(|line| {
@@ -53,14 +53,14 @@ fn centers(file: &Path) -> Vec<[f64; 3]> {
 }
 
 #[test]
-fn exports_at_once_to_one_name_leave_one_whole_file() {
+fn concurrent_exports_to_one_name_leave_one_complete_file() {
     let folder = TempDir::new().unwrap();
     let map = near_map(&folder);
     let out = folder.path().join("out");
     fs::create_dir(&out).unwrap();
     for extension in ["ply", "bt", "csv"] {
         let file = out.join("a").with_extension(extension);
-        // Files of different lengths, so that a mixture is none of them.
+        // The files differ in length, so that a mixture equals none of them.
         let regions: Vec<Vec<String>> = (1..=6)
             .map(|k| ["-9", "-9", "-9", &k.to_string(), "9", "9"].map(String::from).to_vec())
             .collect();
@@ -100,7 +100,7 @@ fn exports_at_once_to_one_name_leave_one_whole_file() {
 }
 
 #[test]
-fn what_a_killed_export_leaves_is_in_nobodys_way() {
+fn leftovers_of_a_killed_export_do_not_block_the_next() {
     let folder = TempDir::new().unwrap();
     let map = near_map(&folder);
     let out = folder.path().join("out");
@@ -125,14 +125,14 @@ fn what_a_killed_export_leaves_is_in_nobodys_way() {
 
 #[cfg(unix)]
 #[test]
-fn no_link_is_followed_and_what_is_no_file_is_told() {
+fn links_are_not_followed_and_non_files_are_reported() {
     use std::os::unix::fs::{PermissionsExt, symlink};
     let folder = TempDir::new().unwrap();
     let map = near_map(&folder);
     let map = text(&map);
     let of = |name: &str| folder.path().join(name);
     fs::write(of("precious"), "precious").unwrap();
-    // Names that an export might choose for its parts.
+    // Possible temporary names of an export.
     for name in ["a.bt.part", "a.bt.spool", "a.ply.part", "a.bt.next", "a.bt.tmp"] {
         symlink(of("precious"), of(name)).unwrap();
     }
@@ -152,14 +152,14 @@ fn no_link_is_followed_and_what_is_no_file_is_told() {
     fs::create_dir(of("folder.ply")).unwrap();
     let (code, stderr) = failure(&["export", map, "-o", text(&of("folder.ply"))]);
     assert!(code == 2 && stderr.contains("folder.ply is a folder"), "{stderr}");
-    // Who may read a new file is for the umask to say.
+    // The umask sets the permissions of a new file.
     let mode = |name| fs::metadata(of(name)).unwrap().permissions().mode() & 0o777;
     assert_eq!(mode("a.ply"), mode("precious"));
 }
 
 #[cfg(unix)]
 #[test]
-fn standard_output_a_pipe_and_a_device_get_the_whole_file() {
+fn standard_output_pipes_and_devices_receive_the_complete_file() {
     let folder = TempDir::new().unwrap();
     let map = near_map(&folder);
     let map = text(&map);
@@ -168,8 +168,8 @@ fn standard_output_a_pipe_and_a_device_get_the_whole_file() {
         let summary = json(&["export", map, "-o", text(&file), "--json"]);
         let run = voxtile(&["export", map, "-o", "-", "--format", format, "--json"]).assert().success();
         assert_eq!(run.get_output().stdout, fs::read(&file).unwrap(), "{format}");
-        let told: Value = serde_json::from_slice(&run.get_output().stderr).unwrap();
-        assert_eq!(told["voxels"], summary["voxels"]);
+        let reported: Value = serde_json::from_slice(&run.get_output().stderr).unwrap();
+        assert_eq!(reported["voxels"], summary["voxels"]);
     }
     let (code, stderr) = failure(&["export", map, "-o", "-"]);
     assert!(code == 2 && stderr.contains("--format"), "{stderr}");
@@ -188,7 +188,7 @@ fn standard_output_a_pipe_and_a_device_get_the_whole_file() {
 }
 
 #[test]
-fn nothing_is_made_inside_of_a_map() {
+fn nothing_is_created_inside_a_map() {
     let folder = TempDir::new().unwrap();
     let map = near_map(&folder);
     let before = names(&map);
@@ -223,7 +223,7 @@ fn nothing_is_made_inside_of_a_map() {
     }
     assert_eq!(names(&map), before);
     output(&["verify", text(&map)]);
-    // A folder beside it, by way of one of its own.
+    // A folder next to the map, with a path through one of its tiles.
     let beside = map.join(tile).join("../../a.ply");
     output(&["export", text(&map), "-o", text(&beside)]);
     assert!(folder.path().join("a.ply").exists());
@@ -237,17 +237,17 @@ fn a_far_map_becomes_an_octree_file_with_an_origin() {
     let (code, stderr) = failure(&["export", map, "-o", text(&file)]);
     assert!(code == 2 && stderr.contains("--origin 500000 4182000 0"), "{stderr}");
     assert_eq!(names(folder.path()), ["far", "far.pcd"]);
-    // What it says helps.
+    // The remedy in the message works.
     let origin = ["--origin", "500000", "4182000", "0"];
-    let said = output(&[&["export", map, "-o", text(&file)], &origin[..]].concat());
-    assert!(said.contains("origin 500000 4182000 0 m"), "{said}");
+    let printed = output(&[&["export", map, "-o", text(&file)], &origin[..]].concat());
+    assert!(printed.contains("origin 500000 4182000 0 m"), "{printed}");
     let beside = origin_beside(&file).unwrap();
     assert_eq!(beside["origin_m"], serde_json::json!([500000.0, 4182000.0, 0.0]));
     assert_eq!(beside["origin_voxel"], serde_json::json!([5_000_000, 41_820_000, 0]));
     let hash = blake3::hash(&fs::read(&file).unwrap()).to_hex();
     assert_eq!(beside["blake3"], hash.as_str());
 
-    // The file's voxels are the map's, moved by whole voxels.
+    // The voxels of the file are those of the map, moved by whole voxels.
     let (there, here) = (folder.path().join("there.csv"), folder.path().join("here.csv"));
     output(&["export", map, "-o", text(&there)]);
     output(&["export", text(&file), "-o", text(&here)]);
@@ -265,10 +265,13 @@ fn a_far_map_becomes_an_octree_file_with_an_origin() {
     assert!(found.len() >= 20);
     assert_eq!(found, moved);
 
-    // Asked for a place that is no voxel's corner: the nearest, and that is said.
+    // The requested origin is no voxel corner: the nearest corner is used and reported.
     let arguments = ["export", map, "-o", text(&file), "--origin", "500000.04", "4182000.06", "-0.01"];
-    let said = output(&arguments);
-    assert!(said.contains("origin 500000 4182000.1 0 m") && said.contains("next to 500000.04"), "{said}");
+    let printed = output(&arguments);
+    assert!(
+        printed.contains("origin 500000 4182000.1 0 m") && printed.contains("nearest to 500000.04"),
+        "{printed}"
+    );
     assert_eq!(origin_beside(&file).unwrap()["origin_m"][1], 4182000.1);
     let summary = json(&[&arguments[..], &["--json"]].concat());
     assert_eq!(summary["origin_m"], serde_json::json!([500000.0, 4182000.1, 0.0]));
@@ -278,7 +281,7 @@ fn a_far_map_becomes_an_octree_file_with_an_origin() {
         let (code, stderr) = failure(&["export", map, "-o", text(&file), "--origin", "0", bad, "0"]);
         assert!(code == 2 && stderr.contains("--origin"), "{stderr}");
     }
-    // Of a map that is wider than all keys, no origin is sufficient.
+    // A map wider than the range of OctoMap's keys needs more than an origin.
     let wide = folder.path().join("wide");
     let (again, cloud) = (folder.path().join("again"), folder.path().join("far.pcd"));
     let content = fs::read_to_string(&cloud).unwrap().replace("500123.4", "600123.4");
@@ -293,7 +296,7 @@ fn a_far_map_becomes_an_octree_file_with_an_origin() {
 }
 
 #[test]
-fn what_lies_beside_a_file_is_of_that_file() {
+fn files_next_to_an_output_belong_to_it() {
     let folder = TempDir::new().unwrap();
     let map = near_map(&folder);
     let (map, file) = (text(&map), folder.path().join("a.csv"));
@@ -301,14 +304,14 @@ fn what_lies_beside_a_file_is_of_that_file() {
     output(&[&["export", map, "-o", text(&file)], &origin[..]].concat());
     assert!(origin_beside(&file).is_some());
     let moved = centers(&file);
-    // Without an origin nothing may say that there is one.
+    // Without an origin, an origin file of an earlier export must not remain.
     output(&["export", map, "-o", text(&file)]);
     assert!(origin_beside(&file).is_none());
     for (moved, center) in moved.iter().zip(centers(&file)) {
         let back: [f64; 3] = std::array::from_fn(|k| moved[k] + [1.0, 2.0, 3.0][k] - center[k]);
         assert!(back.iter().all(|x| x.abs() < 1e-9), "{back:?}");
     }
-    // A stranger's file of that name stays, and nothing is written.
+    // A foreign file of that name is kept, and nothing is written.
     let beside = folder.path().join("a.csv.origin.json");
     fs::write(&beside, "{}").unwrap();
     let before = fs::read(&file).unwrap();
@@ -320,7 +323,7 @@ fn what_lies_beside_a_file_is_of_that_file() {
 }
 
 #[test]
-fn points_of_a_pcd_are_float32_and_come_back_to_their_voxels_wherever_the_map_is() {
+fn float32_points_of_a_pcd_map_to_their_voxels_at_any_distance() {
     let grid = Grid::new(0.1, 10.0).unwrap();
     for (place, is_moved) in [
         ("0 0 0", false),
@@ -341,7 +344,7 @@ fn points_of_a_pcd_are_float32_and_come_back_to_their_voxels_wherever_the_map_is
         let read = read_pcd(&bytes).unwrap();
         let origin = read.world_from_sensor.position_m();
         assert_eq!(serde_json::json!(origin), summary["origin_m"]);
-        // PCL has VIEWPOINT as float32, too.
+        // PCL also stores VIEWPOINT as float32.
         assert_eq!(origin.map(|x| f64::from(x as f32)), origin);
         let expected: Vec<_> = centers(&table).into_iter().map(|center| grid.voxel_of(center)).collect();
         let found: Vec<_> = read
@@ -352,7 +355,7 @@ fn points_of_a_pcd_are_float32_and_come_back_to_their_voxels_wherever_the_map_is
         assert!(found.len() >= 20 && found.iter().all(Option::is_some));
         assert_eq!(found, expected, "{place}");
     }
-    // Two places too far apart for one origin.
+    // Two positions too far apart for one origin.
     let folder = TempDir::new().unwrap();
     let (first, second) = (far_map(&folder, "0 0 0"), folder.path().join("second"));
     fs::rename(&first, &second).unwrap();
@@ -391,7 +394,7 @@ fn names_may_be_any_bytes() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn outputs_that_refuse_are_told_and_no_panic() {
+fn failing_outputs_are_reported_without_a_panic() {
     use std::process::{Command, Stdio};
     let folder = TempDir::new().unwrap();
     let map = near_map(&folder);
@@ -419,7 +422,7 @@ fn outputs_that_refuse_are_told_and_no_panic() {
         let stderr = String::from_utf8_lossy(&refused.stderr);
         assert_eq!(refused.status.code(), Some(1), "{arguments:?}: {stderr}");
         assert!(stderr.contains("standard output: cannot write: No space left"), "{arguments:?}: {stderr}");
-        // A reader that has seen enough is no error.
+        // A closed pipe is no error.
         let unread = run(arguments, closed(), Stdio::piped());
         assert_eq!((unread.status.code(), unread.stderr.len()), (Some(0), 0), "{arguments:?}");
     }
@@ -429,9 +432,9 @@ fn outputs_that_refuse_are_told_and_no_panic() {
     assert!(output(&ray).contains("hit at"));
 }
 
-/// What is asked for is what is written, in every format; what a format does not take is refused, not ignored.
+/// Every format writes exactly the selected voxels. Options that a format does not support are refused, not ignored.
 #[test]
-fn which_voxels_are_written_is_for_every_format() {
+fn every_format_selects_the_same_voxels() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     let map = testkit::support::repository("map_tiles_example");
@@ -467,21 +470,21 @@ fn which_voxels_are_written_is_for_every_format() {
         vec!["-o", "a.csv", "--cell", "5"],
     ] {
         let output = run(&refused);
-        let told = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert!(!output.status.success() && told.contains(refused[2]), "{refused:?}: {told}");
+        let reported = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(!output.status.success() && reported.contains(refused[2]), "{refused:?}: {reported}");
     }
-    // Squares in single precision, of a map that may be far away.
+    // Squares are exact in single precision, even far from the origin.
     let squares = path("squares");
     let output = run(&["-o", &squares, "--format", "autoware", "--origin", "10", "0", "0"]);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }
 
-/// Every file that a tileset names is there, and its mesh is within the node's box, through all transforms.
+/// Every file in a tileset exists, and its mesh is inside the node's box after all transforms.
 #[test]
-fn a_folder_of_3d_tiles_is_whole() {
+fn a_3d_tiles_folder_is_complete() {
     let folder = tempfile::tempdir().unwrap();
     let points = folder.path().join("0.xyz");
-    // A wall, and rays far through tiles where nothing is hit.
+    // A wall, and long rays through tiles without a hit.
     let rows: Vec<String> = (0..400)
         .map(|k| format!("{} {} 1.5", 12.3 + f64::from(k % 20) * 0.1, 0.1 * f64::from(k / 20)))
         .collect();
@@ -489,7 +492,7 @@ fn a_folder_of_3d_tiles_is_whole() {
     let (map, tiles) = (folder.path().join("map"), folder.path().join("tiles"));
     let scans = points.to_str().unwrap();
     output(&["build", scans, "-o", map.to_str().unwrap(), "--max-range", "60"]);
-    let told = output(&[
+    let reported = output(&[
         "export",
         map.to_str().unwrap(),
         "-o",
@@ -498,7 +501,7 @@ fn a_folder_of_3d_tiles_is_whole() {
         "3dtiles",
         "--json",
     ]);
-    let told: Value = serde_json::from_str(&told).unwrap();
+    let reported: Value = serde_json::from_str(&reported).unwrap();
     let read = |path: &Path| -> Value { serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap() };
     let mut open = vec![(read(&tiles.join("tileset.json"))["root"].clone(), tiles.clone(), [0.0; 3])];
     let mut nodes = 0;
@@ -525,30 +528,30 @@ fn a_folder_of_3d_tiles_is_whole() {
         let number = |value: &Value| value.as_f64().unwrap();
         let (at, scale) = (&mesh["nodes"][0]["translation"], number(&mesh["nodes"][0]["scale"][0]));
         let bound = |end: &str, k: usize| number(&at[k]) + scale * number(&mesh["accessors"][0][end][k]);
-        // glTF has y up: its z is -y.
+        // glTF has y up: z of the map is -y.
         let low = [bound("min", 0), -bound("max", 2), bound("min", 1)];
         let high = [bound("max", 0), -bound("min", 2), bound("max", 1)];
         let around = &node["boundingVolume"]["box"];
         for k in 0..3 {
             let (middle, half) = (number(&around[k]), number(&around[3 + 4 * k]));
             assert!(middle - half <= low[k] + 1e-9 && high[k] <= middle + half + 1e-9, "{}", path.display());
-            // In the map's frame: the wall, and what the long rays hit.
+            // In the map's frame: the wall, and the hits of the long rays.
             assert!((-61.0..61.0).contains(&(offset[k] + low[k])), "{}", path.display());
         }
         nodes += 1;
     }
-    assert_eq!(told["nodes"], nodes);
-    assert!(told["voxels"].as_u64().unwrap() > 300);
+    assert_eq!(reported["nodes"], nodes);
+    assert!(reported["voxels"].as_u64().unwrap() > 300);
 }
 
-/// Their probability is 0.5 exactly, from which voxels are occupied.
+/// The probability of these voxels is exactly 0.5, the default threshold of occupied voxels.
 #[test]
-fn what_is_free_stays_free_in_files_from_above_however_much_has_faded() {
+fn decayed_free_voxels_stay_free_in_files_from_above() {
     let folder = TempDir::new().unwrap();
     let map = near_map(&folder);
     let files = |when: &str| {
         ["pgm", "png", "glb"].map(|extension| {
-            // The picture is named in a file beside it.
+            // A file next to the picture contains its name.
             let out = folder.path().join(when);
             fs::create_dir_all(&out).unwrap();
             let out = out.join(format!("map.{extension}"));

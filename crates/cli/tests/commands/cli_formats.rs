@@ -1,4 +1,4 @@
-//! Files of other programs, in and out, by the command.
+//! Tests of reading and writing files of other programs with the command.
 
 use crate::cli::json;
 use assert_cmd::Command;
@@ -35,7 +35,7 @@ fn text(path: &Path) -> &str {
     path.to_str().unwrap()
 }
 
-/// Three scans of a wall, as float32, in folders of three formats with the same poses.
+/// Writes three scans of a wall as float32 to folders of three formats with the same poses.
 fn make_inputs(folder: &Path) -> Vec<PathBuf> {
     let clouds: Vec<Vec<[f32; 3]>> = (0..3)
         .map(|scan| (0..60).map(|k| [4.0 + 0.01 * scan as f32, 0.1 * k as f32 - 3.0, 0.3]).collect())
@@ -95,9 +95,9 @@ fn recordings_of_either_ros_make_the_same_map() {
     assert!(!map.exists());
 }
 
-/// The shell's `drive_*.bag`.
+/// The shell expands `drive_*.bag` to several arguments.
 #[test]
-fn several_files_for_one_input_name_the_way() {
+fn several_files_for_one_input_give_a_hint() {
     let folder = TempDir::new().unwrap();
     let parts = ["0.bag", "1.bag"].map(|name| folder.path().join(name));
     parts.iter().for_each(|part| fs::write(part, "").unwrap());
@@ -108,7 +108,7 @@ fn several_files_for_one_input_name_the_way() {
     assert!(refused.contains("gone.bag") && !refused.contains("give the folder"), "{refused}");
 }
 
-/// A backup is still a recording; what it says itself is not asked of anybody.
+/// A renamed copy is still recognised as a recording, without an option.
 #[cfg(feature = "ros")]
 #[test]
 fn recordings_are_known_by_their_content() {
@@ -127,7 +127,7 @@ fn recordings_are_known_by_their_content() {
     }
 }
 
-/// Depth images without their camera.
+/// Depth images without intrinsics.
 #[test]
 fn the_option_for_a_camera_is_named() {
     let (_outer, folder) = lone_folder();
@@ -136,22 +136,30 @@ fn the_option_for_a_camera_is_named() {
     assert!(refused.contains("--intrinsics FILE") && refused.contains("camera-intrinsics.txt"), "{refused}");
 }
 
-/// A recording and a file of poses go by one rule.
+/// Transforms of a recording and poses of a file follow one rule.
 #[cfg(feature = "ros")]
 #[test]
 fn gaps_between_poses_are_filled_up_to_twice_the_tolerance() {
     let folder = TempDir::new().unwrap();
     let (bag, poses) =
         (repository("crates/formats/tests/data/ros/none.bag"), folder.path().join("poses.txt"));
-    // As its transforms: five a second, with the stamps of the clouds between them.
+    // Poses as in its transforms: five per second, with the stamps of the clouds between them.
     let rows = (0..4).map(|k| format!("1700000000.{:02} 0 0 1 0 0 0 1\n", 20 * k + 6));
     fs::write(&poses, rows.collect::<String>()).unwrap();
     for own in [&[][..], &["--poses", text(&poses)]] {
         for (tolerance, is_filled) in [("0.1", true), ("0.09", false)] {
             let input = ["scans", &bag, "--topic", "/points", "--pose-tolerance", tolerance, "--json"];
-            let told = output(&[&input, own].concat());
-            assert_eq!(told.contains("4 clouds have no pose"), !is_filled, "{own:?} {tolerance}: {told}");
-            assert_eq!(told.contains("apart; --pose-tolerance allows for more"), !is_filled, "{told}");
+            let reported = output(&[&input, own].concat());
+            assert_eq!(
+                reported.contains("4 clouds have no pose"),
+                !is_filled,
+                "{own:?} {tolerance}: {reported}"
+            );
+            assert_eq!(
+                reported.contains("apart; --pose-tolerance allows for more"),
+                !is_filled,
+                "{reported}"
+            );
         }
         let map = folder.path().join("map");
         let input = ["build", &bag, "--topic", "/points", "--pose-tolerance", "0.01", "-o", text(&map)];
@@ -162,12 +170,12 @@ fn gaps_between_poses_are_filled_up_to_twice_the_tolerance() {
 }
 
 #[test]
-fn what_would_be_read_is_told_and_nothing_is_mapped() {
+fn scans_lists_an_input_without_mapping() {
     let folder = TempDir::new().unwrap();
     let inputs = make_inputs(folder.path());
-    let told = output(&["scans", text(&inputs[0]), "--json"]);
-    let told: serde_json::Value = serde_json::from_str(&told).unwrap();
-    assert_eq!((&told["scans"], &told["points"]), (&3.into(), &180.into()), "{told}");
+    let reported = output(&["scans", text(&inputs[0]), "--json"]);
+    let reported: serde_json::Value = serde_json::from_str(&reported).unwrap();
+    assert_eq!((&reported["scans"], &reported["points"]), (&3.into(), &180.into()), "{reported}");
     let each = output(&["scans", text(&inputs[1]), "--each", "--first", "1", "--every", "2"]);
     assert!(each.contains("scans     1, 60 points"), "{each}");
     let unknown = folder.path().join("file.pcap");
@@ -177,7 +185,7 @@ fn what_would_be_read_is_told_and_nothing_is_mapped() {
 }
 
 #[test]
-fn a_map_lists_where_its_scans_were_taken() {
+fn a_map_lists_the_origins_of_its_scans() {
     let folder = TempDir::new().unwrap();
     let (inputs, map) = (make_inputs(folder.path()), folder.path().join("map"));
     output(&["build", text(&inputs[2]), "-o", text(&map), "--resolution", "0.2"]);
@@ -192,7 +200,7 @@ fn a_map_lists_where_its_scans_were_taken() {
 }
 
 #[test]
-fn points_are_left_out_and_taken_without_rays() {
+fn points_are_skipped_in_a_box_and_inserted_without_rays() {
     let folder = TempDir::new().unwrap();
     let (inputs, map) = (make_inputs(folder.path()), folder.path().join("map"));
     let count = |options: &[&str], key: &str| {
@@ -212,7 +220,7 @@ fn points_are_left_out_and_taken_without_rays() {
 }
 
 #[test]
-fn a_file_of_octomap_is_imported_and_asked_as_it_is() {
+fn an_octomap_file_is_imported_and_queried_directly() {
     let folder = TempDir::new().unwrap();
     let place = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     let (bt, ot) = (place("map.bt"), place("map.ot"));
@@ -237,7 +245,7 @@ fn a_file_of_octomap_is_imported_and_asked_as_it_is() {
 }
 
 #[test]
-fn voxels_are_written_for_other_programs_whole_or_not_at_all() {
+fn exports_are_atomic() {
     let folder = TempDir::new().unwrap();
     let place = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     let map = repository("map_tiles_example");
@@ -265,7 +273,7 @@ fn voxels_are_written_for_other_programs_whole_or_not_at_all() {
     ] {
         output(&["export", &map, "-o", &place(name)]);
         assert!(fs::metadata(place(name)).unwrap().len() > 0, "{name}");
-        // Over itself, too.
+        // Also over itself.
         output(&["export", &map, "-o", &place(name)]);
     }
     assert!(Path::new(&place("map.yaml")).exists() && Path::new(&place("map.pgw")).exists());
@@ -277,24 +285,24 @@ fn voxels_are_written_for_other_programs_whole_or_not_at_all() {
     assert!(left.into_iter().all(|name| !name.to_string_lossy().starts_with('.')));
 }
 
-/// A `.yaml` or a world file beside the output would replace an output of that name.
+/// A `.yaml` or a world file next to the output would replace an output of that name.
 #[test]
-fn outputs_named_as_what_lies_beside_them_are_refused() {
+fn outputs_with_the_name_of_their_second_file_are_refused() {
     let folder = TempDir::new().unwrap();
     let map = repository("map_tiles_example");
     for (format, name, hint) in
         [("nav2", "map.yaml", "map.pgm"), ("heightmap", "h.json", "h.png"), ("heightmap", "h.pgw", "h.png")]
     {
         let path = folder.path().join(name);
-        let told = refusal(&["export", &map, "-o", text(&path), "--format", format]);
-        assert!(told.contains(name) && told.contains(hint), "{told}");
+        let reported = refusal(&["export", &map, "-o", text(&path), "--format", format]);
+        assert!(reported.contains(name) && reported.contains(hint), "{reported}");
     }
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
 }
 
-/// Only the output was named: what has the name of a file beside it may be of another program.
+/// The user named only the output: a file with the name of its second file may belong to another program.
 #[test]
-fn what_lies_beside_an_output_is_replaced_with_it_alone() {
+fn the_second_file_is_replaced_only_with_its_output() {
     let folder = TempDir::new().unwrap();
     let map = repository("map_tiles_example");
     let path = |name: &str| folder.path().join(name);
@@ -305,34 +313,34 @@ fn what_lies_beside_an_output_is_replaced_with_it_alone() {
         names
     };
     fs::write(path("package.json"), "{}").unwrap();
-    let told = refusal(&["export", &map, "-o", text(&path("package.png"))]);
-    assert!(told.contains("package.json") && told.contains("move or remove"), "{told}");
+    let reported = refusal(&["export", &map, "-o", text(&path("package.png"))]);
+    assert!(reported.contains("package.json") && reported.contains("move or remove"), "{reported}");
     assert_eq!(
         (names(), fs::read(path("package.json")).unwrap()),
         (vec!["package.json".into()], b"{}".to_vec())
     );
-    // The last name is refused before the first is taken.
+    // The last name is refused before the first is written.
     fs::create_dir(path("h.pgw")).unwrap();
-    let told = refusal(&["export", &map, "-o", text(&path("h.png"))]);
-    assert!(told.contains("h.pgw"), "{told}");
+    let reported = refusal(&["export", &map, "-o", text(&path("h.png"))]);
+    assert!(reported.contains("h.pgw"), "{reported}");
     assert_eq!(names(), ["h.pgw", "package.json"]);
     fs::remove_dir(path("h.pgw")).unwrap();
 
     output(&["export", &map, "-o", text(&path("h.png"))]);
     let written = fs::read(path("h.json")).unwrap();
-    // As a killed export leaves it.
+    // Leftover of a killed export.
     fs::remove_file(path("h.png")).unwrap();
     output(&["export", &map, "-o", text(&path("h.png"))]);
-    // Of an earlier output.
+    // From an earlier output.
     fs::write(path("h.json"), "{}").unwrap();
     output(&["export", &map, "-o", text(&path("h.png"))]);
     assert_eq!(fs::read(path("h.json")).unwrap(), written);
     assert_eq!(names(), ["h.json", "h.pgw", "h.png", "package.json"]);
 }
 
-/// A set as it is handed around: clouds in `scans`, what belongs to them beside it.
+/// A usual layout: clouds in `scans`, their metadata next to it.
 #[test]
-fn texts_beside_clouds_are_none() {
+fn text_files_next_to_clouds_are_no_clouds() {
     let folder = tempfile::tempdir().unwrap();
     let scans = folder.path().join("set/scans");
     fs::create_dir_all(&scans).unwrap();
@@ -346,12 +354,12 @@ fn texts_beside_clouds_are_none() {
     }
     let set = folder.path().join("set");
     for arguments in [vec!["scans", text(&set)], vec!["scans", text(&set), "--format", "ply"]] {
-        let told = output(&arguments);
-        assert!(told.contains("PLY") && told.contains("set/poses_tum.txt"), "{told}");
+        let reported = output(&arguments);
+        assert!(reported.contains("PLY") && reported.contains("set/poses_tum.txt"), "{reported}");
     }
 }
 
-/// The poses of texts lie among them under any name.
+/// Pose files in text format are among the clouds under any name.
 #[test]
 fn a_file_of_poses_is_no_cloud() {
     let folder = tempfile::tempdir().unwrap();
@@ -364,24 +372,25 @@ fn a_file_of_poses_is_no_cloud() {
     fs::write(&poses, "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 1 0 1 0 0 0 0 1 0\n").unwrap();
     for format in [&[][..], &["--format", "xyz"]] {
         let input = ["scans", text(&scans), "--poses", text(&poses), "--json"];
-        let told: serde_json::Value = serde_json::from_str(&output(&[&input, format].concat())).unwrap();
-        assert_eq!((&told["scans"], &told["points"]), (&2.into(), &2.into()), "{told}");
+        let reported: serde_json::Value = serde_json::from_str(&output(&[&input, format].concat())).unwrap();
+        assert_eq!((&reported["scans"], &reported["points"]), (&2.into(), &2.into()), "{reported}");
     }
     let other = folder.path().join("other.txt");
     fs::copy(&poses, &other).unwrap();
-    let told = output(&["scans", text(&scans), "--poses", text(&other)]);
+    let reported = output(&["scans", text(&scans), "--poses", text(&other)]);
     assert!(
-        told.contains("scans     2,") && told.contains("optimized.txt (poses: its rows are matrices)"),
-        "{told}"
+        reported.contains("scans     2,")
+            && reported.contains("optimized.txt (poses: its rows are matrices)"),
+        "{reported}"
     );
     fs::write(scans.join("2.txt"), "4 0 0\n").unwrap();
     let refused = refusal(&["scans", text(&scans), "--poses", text(&other)]);
     assert!(refused.contains("2 poses for 3 clouds (0.txt to 2.txt), "), "{refused}");
 }
 
-/// Clouds and poses by clocks that differ: a map of nothing would be no answer.
+/// Clouds and poses have different clocks: an empty map would be misleading.
 #[test]
-fn clouds_of_which_none_has_a_pose_make_no_map() {
+fn clouds_without_any_pose_make_no_map() {
     let folder = tempfile::tempdir().unwrap();
     let scans = folder.path().join("scans");
     fs::create_dir(&scans).unwrap();
@@ -391,23 +400,23 @@ fn clouds_of_which_none_has_a_pose_make_no_map() {
     let poses = folder.path().join("gps.txt");
     fs::write(&poses, "1284035200 0 0 1 0 0 0 1\n1284035210 0 0 1 0 0 0 1\n").unwrap();
     let map = folder.path().join("map");
-    let told = refusal(&["build", text(&scans), "--poses", text(&poses), "-o", text(&map)]);
+    let reported = refusal(&["build", text(&scans), "--poses", text(&poses), "-o", text(&map)]);
     for part in ["none of its 2 clouds has a pose", "315964790.000 s after the last pose", "clocks differ"] {
-        assert!(told.contains(part), "{told}");
+        assert!(reported.contains(part), "{reported}");
     }
-    // One is enough.
+    // One pose is enough.
     fs::write(&poses, "1599999999.5 0 0 1 0 0 0 1\n1600000000.5 0 0 1 0 0 0 1\n").unwrap();
     let map = folder.path().join("other");
     output(&["build", text(&scans), "--poses", text(&poses), "-o", text(&map)]);
-    let told = output(&["scans", text(&scans), "--poses", text(&poses)]);
+    let reported = output(&["scans", text(&scans), "--poses", text(&poses)]);
     let named = "1 cloud has no pose, left out (1600000001.000000000.xyz: it is 0.500 s after the last pose)";
-    assert!(told.contains(named), "{told}");
+    assert!(reported.contains(named), "{reported}");
     assert!(output(&["scans", text(&map)]).contains("1600000000"), "{}", output(&["scans", text(&map)]));
 }
 
-/// A cloud that cannot be opened has a number and a pose as the others do; poses that are left at the end are told.
+/// A cloud that cannot be opened keeps its number and pose; unused poses are reported.
 #[test]
-fn poses_by_number_stay_with_their_clouds() {
+fn poses_by_number_belong_to_their_clouds() {
     let folder = tempfile::tempdir().unwrap();
     let scans = folder.path().join("scans");
     fs::create_dir(&scans).unwrap();
@@ -420,34 +429,34 @@ fn poses_by_number_stay_with_their_clouds() {
     fs::write(&poses, rows.concat()).unwrap();
     let map = folder.path().join("map");
     output(&["build", text(&scans), "--poses", text(&poses), "-o", text(&map), "--skip-bad"]);
-    let told = output(&["scans", text(&map), "--each", "--json"]);
-    let scans = told.lines().map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap());
+    let reported = output(&["scans", text(&map), "--each", "--json"]);
+    let scans = reported.lines().map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap());
     let origins: Vec<f64> = scans.filter_map(|scan| scan["origin_m"][0].as_f64()).collect();
     assert_eq!(origins, [0.0, 20.0]);
 
-    // The scans of a folder of E57 are not counted before they are read.
+    // The number of scans in a folder of E57 is unknown before they are read.
     let several = folder.path().join("several");
     fs::create_dir(&several).unwrap();
     fs::copy(repository("crates/formats/tests/data/scans.e57"), several.join("a.e57")).unwrap();
     fs::copy(repository("crates/formats/tests/data/scans.e57"), several.join("b.e57")).unwrap();
     fs::write(&poses, rows.concat().repeat(10)).unwrap();
-    let told = output(&["scans", text(&several), "--poses", text(&poses)]);
-    assert!(told.contains("more poses than clouds"), "{told}");
+    let reported = output(&["scans", text(&several), "--poses", text(&poses)]);
+    assert!(reported.contains("more poses than clouds"), "{reported}");
 }
 
-/// A recorder of ROS 1 that was killed leaves its file as `.bag.active`, perhaps as the only one.
+/// A killed recorder of ROS 1 leaves `.bag.active`, possibly as the only file.
 #[test]
 fn a_recording_that_was_not_closed_is_found_in_its_folder() {
     let folder = tempfile::tempdir().unwrap();
     let bag = PathBuf::from(repository("crates/formats/tests/data/ros/none.bag"));
     let alone = output(&["scans", text(&bag), "--topic", "/points", "--each", "--json"]);
     fs::copy(&bag, folder.path().join("drive.bag.active")).unwrap();
-    let told = output(&["scans", text(folder.path()), "--topic", "/points", "--each", "--json"]);
-    assert_eq!(told, alone);
-    assert_eq!(told.lines().count(), 4 + 1);
+    let reported = output(&["scans", text(folder.path()), "--topic", "/points", "--each", "--json"]);
+    assert_eq!(reported, alone);
+    assert_eq!(reported.lines().count(), 4 + 1);
 }
 
-/// Far clouds with a coordinate reference system: the map keeps it, and files that can say it do.
+/// Far clouds with a coordinate reference system: the map keeps it, and exports record it if the format can.
 #[test]
 fn coordinate_reference_systems_are_kept_and_written_back() {
     let (_outer, folder) = lone_folder();
@@ -457,7 +466,7 @@ fn coordinate_reference_systems_are_kept_and_written_back() {
     let (plain, other) = (path("plain"), path("other"));
     output(&["build", text(&points), "-o", text(&plain), "--no-rays", "--resolution", "0.5"]);
     assert!(!output(&["info", text(&plain)]).contains("crs"));
-    // A map that names one, by a file that does.
+    // The map has one, and so does the file.
     let named = path("named.las");
     output(&["export", text(&plain), "-o", text(&named), "-q"]);
     name_crs(&named, "EPSG:25832");
@@ -469,17 +478,17 @@ fn coordinate_reference_systems_are_kept_and_written_back() {
     let third = path("third");
     output(&["build", text(&again), "-o", text(&third), "--no-rays", "--resolution", "0.5"]);
     assert!(output(&["info", text(&third), "--json"]).contains("25832"));
-    // Points of another one are elsewhere.
+    // Coordinates in another system would be at another place.
     let mixed = path("mixed.las");
     output(&["export", text(&plain), "-o", text(&mixed), "-q"]);
     name_crs(&mixed, "EPSG:25833");
-    let told = refusal(&["build", text(&mixed), "-o", text(&other), "--no-rays", "--append"]);
-    assert!(told.contains("25833") && told.contains("25832"), "{told}");
+    let reported = refusal(&["build", text(&mixed), "-o", text(&other), "--no-rays", "--append"]);
+    assert!(reported.contains("25833") && reported.contains("25832"), "{reported}");
     let fourth = path("fourth");
     output(&["build", text(&mixed), "-o", text(&fourth), "--no-rays", "--resolution", "0.5"]);
-    let told = refusal(&["merge", text(&other), text(&fourth), "-o", text(&path("merged"))]);
-    assert!(told.contains("coordinate reference system") && told.contains("25833"), "{told}");
-    // A map that names none goes with any, and parts of a map keep it.
+    let reported = refusal(&["merge", text(&other), text(&fourth), "-o", text(&path("merged"))]);
+    assert!(reported.contains("coordinate reference system") && reported.contains("25833"), "{reported}");
+    // A map without a system accepts any, and parts of a map keep theirs.
     output(&["merge", text(&other), text(&plain), "-o", text(&path("merged"))]);
     output(&[
         "crop",
@@ -499,7 +508,7 @@ fn coordinate_reference_systems_are_kept_and_written_back() {
     }
 }
 
-/// Gives a LAS file that our writer made without a coordinate reference system one, as GeoTIFF keys.
+/// Adds a coordinate reference system as GeoTIFF keys to a LAS file without one.
 fn name_crs(file: &Path, crs: &str) {
     let mut bytes = fs::read(file).unwrap();
     let number: u16 = crs.strip_prefix("EPSG:").unwrap().parse().unwrap();
@@ -516,12 +525,12 @@ fn name_crs(file: &Path, crs: &str) {
     bytes[96..100].copy_from_slice(&points.to_le_bytes());
     bytes[100..104].copy_from_slice(&records.to_le_bytes());
     bytes.splice(header..header, record);
-    // The flag that says WKT.
+    // Clear the WKT flag.
     bytes[6] &= !16;
     fs::write(file, bytes).unwrap();
 }
 
-/// Clouds of one point, by number; some of them damaged.
+/// Writes numbered clouds of one point each; those in `bad` are damaged.
 fn numbered(folder: &Path, count: usize, bad: &[usize]) -> (PathBuf, PathBuf) {
     let scans = folder.join("scans");
     fs::create_dir(&scans).unwrap();
@@ -541,12 +550,12 @@ fn numbered(folder: &Path, count: usize, bad: &[usize]) -> (PathBuf, PathBuf) {
 }
 
 fn origins_of(map: &Path) -> Vec<f64> {
-    let told = output(&["scans", text(map), "--each", "--json"]);
-    let scans = told.lines().map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap());
+    let reported = output(&["scans", text(map), "--each", "--json"]);
+    let scans = reported.lines().map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap());
     scans.filter_map(|scan| scan["origin_m"][0].as_f64()).collect()
 }
 
-/// One that is passed over has a number as the others do, and cannot end a build that never asked for it.
+/// A damaged cloud has a number too, and does not end a build that never reads it.
 #[test]
 fn damaged_clouds_shift_no_others_of_a_selection() {
     let folder = tempfile::tempdir().unwrap();
@@ -560,13 +569,13 @@ fn damaged_clouds_shift_no_others_of_a_selection() {
     assert_eq!(build(&map("a"), &["--every", "10", "--skip-bad"]), [0.0, 10.0, 30.0]);
     assert_eq!(build(&map("b"), &["--every", "12"]), [0.0, 12.0, 24.0, 36.0]);
     assert_eq!(build(&map("c"), &["--first", "7", "--count", "2"]), [7.0, 8.0]);
-    let told = output(&["scans", text(&scans), "--poses", text(&poses), "--first", "7", "--count", "2"]);
-    assert!(told.contains("1 of the scans that were passed over cannot be read"), "{told}");
+    let reported = output(&["scans", text(&scans), "--poses", text(&poses), "--first", "7", "--count", "2"]);
+    assert!(reported.contains("1 of the scans that were passed over cannot be read"), "{reported}");
 }
 
-/// The decoder of LAZ panics on these bytes.
+/// These bytes make the LAZ decoder panic.
 #[test]
-fn a_decoder_that_panics_is_one_line_that_names_the_file() {
+fn a_panic_of_a_decoder_prints_one_line_with_the_file() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("damaged.laz");
     let whole = fs::read(repository("crates/formats/tests/data/withheld.laz")).unwrap();
@@ -575,15 +584,18 @@ fn a_decoder_that_panics_is_one_line_that_names_the_file() {
         let mut bytes = whole.clone();
         bytes[points_at + at..points_at + at + 16].fill(0xff);
         fs::write(&file, bytes).unwrap();
-        let said = refusal(&["scans", text(&file)]);
-        assert!(said.contains("damaged.laz") && said.contains("its decoder gave up (decoders.rs:"), "{said}");
-        assert!(said.lines().count() == 1 && !said.contains("panicked"), "{said}");
+        let printed = refusal(&["scans", text(&file)]);
+        assert!(
+            printed.contains("damaged.laz") && printed.contains("its decoder gave up (decoders.rs:"),
+            "{printed}"
+        );
+        assert!(printed.lines().count() == 1 && !printed.contains("panicked"), "{printed}");
     }
 }
 
-/// LAS keeps what it has and says so; PLY is a bad cloud, which says where.
+/// A truncated LAS file keeps its points with a remark; a truncated PLY file is a bad cloud with an offset.
 #[test]
-fn clouds_that_were_cut_off_are_kept_or_say_where() {
+fn truncated_clouds_are_kept_or_reported_with_an_offset() {
     let folder = tempfile::tempdir().unwrap();
     let inputs = make_inputs(folder.path());
     let path = |name: &str| folder.path().join(name);
@@ -599,25 +611,25 @@ fn clouds_that_were_cut_off_are_kept_or_say_where() {
         let map = path(map);
         json(&["build", text(file), "-o", text(&map), "--no-rays", "--skip-bad", "--json"])
     };
-    // Points of 42 bytes.
+    // Points have 42 bytes.
     let las = cut("voxels.las");
-    let told = json(&["scans", text(&las), "--json"]);
-    let points = told["points"].as_u64().unwrap();
+    let reported = json(&["scans", text(&las), "--json"]);
+    let points = reported["points"].as_u64().unwrap();
     let remark = format!("the file is cut off: {points} of {} points are there and are read", points + 3);
-    assert!(told["remarks"].to_string().contains(&remark), "{told}");
+    assert!(reported["remarks"].to_string().contains(&remark), "{reported}");
     assert_eq!(build(&las, "las.map")["points"], points);
     let ply = cut("voxels.ply");
     let run = voxtile(&["scans", text(&ply), "--json"]).assert().failure().code(1);
-    let told: serde_json::Value = serde_json::from_slice(&run.get_output().stdout).unwrap();
-    let error = &told["error"];
+    let reported: serde_json::Value = serde_json::from_slice(&run.get_output().stdout).unwrap();
+    let error = &reported["error"];
     assert_eq!((&error["kind"], error["path"].as_str()), (&"malformed".into(), Some(text(&ply))));
     assert!(error["offset"].as_u64() > Some(0) && error["record"].is_null(), "{error}");
     assert_eq!(build(&ply, "ply.map")["points"], 0);
 }
 
-/// Points that stay where they are, and clouds that know no times, are not passed over in silence.
+/// Points that deskewing cannot move, and clouds without times, give a remark.
 #[test]
-fn what_deskewing_does_not_move_is_told() {
+fn points_not_moved_by_deskewing_are_reported() {
     let folder = tempfile::tempdir().unwrap();
     let scans = folder.path().join("scans");
     fs::create_dir(&scans).unwrap();
@@ -627,22 +639,22 @@ fn what_deskewing_does_not_move_is_told() {
     let poses = folder.path().join("poses.txt");
     fs::write(&poses, "1599999999.9 0 0 1 0 0 0 1\n1600000000.6 7 0 1 0 0 0 1\n").unwrap();
     let input = ["scans", text(&scans), "--poses", text(&poses), "--pose-tolerance", "2"];
-    let told = output(&[&input[..], &["--deskew"]].concat());
+    let reported = output(&[&input[..], &["--deskew"]].concat());
     for part in [
         "1 cloud has no times of points, or no stamp: --deskew moved nothing there",
         "2 points stayed: no pose is known at their own times (--deskew)",
     ] {
-        assert!(told.contains(part), "{told}");
+        assert!(reported.contains(part), "{reported}");
     }
     assert!(!output(&input).contains("--deskew"));
     let refused = refusal(&[&input[..], &["--deskew", "--world-frame"]].concat());
     assert!(refused.contains("--deskew") && refused.contains("--world-frame"), "{refused}");
 }
 
-/// The system may keep its temporary files in memory: a build has a disk at hand.
+/// The system's temporary folder may be in memory, so builds unpack next to the map.
 #[cfg(feature = "ros")]
 #[test]
-fn packed_recordings_are_unpacked_beside_the_map() {
+fn packed_recordings_are_unpacked_next_to_the_map() {
     let folder = tempfile::tempdir().unwrap();
     let bag = folder.path().join("bag");
     fs::create_dir(&bag).unwrap();
@@ -650,7 +662,7 @@ fn packed_recordings_are_unpacked_beside_the_map() {
     fs::write(bag.join("a.mcap.zstd"), zstd::encode_all(plain.as_slice(), 3).unwrap()).unwrap();
     let metadata = "rosbag2_bagfile_information:\n  relative_file_paths:\n  - a.mcap.zstd\n";
     fs::write(bag.join("metadata.yaml"), metadata).unwrap();
-    // One whose folder is there, one whose folder is made, and one that is there itself.
+    // Its folder exists, its folder is created, or the map exists.
     let maps = ["map", "new/folder/map", "map"].map(|map| folder.path().join(map));
     for (map, again) in maps.iter().zip([&[][..], &[], &["--append", "--again"]]) {
         let build = ["build", text(&bag), "--topic", "/points", "-o", text(map)];
@@ -661,7 +673,7 @@ fn packed_recordings_are_unpacked_beside_the_map() {
     }
 }
 
-/// A day in parts of a minute is more files than a process may have open.
+/// A day in parts of a minute has more files than a process may open.
 #[cfg(all(feature = "ros", unix))]
 #[test]
 fn a_recording_may_have_more_parts_than_files_may_be_open() {
@@ -675,16 +687,16 @@ fn a_recording_may_have_more_parts_than_files_may_be_open() {
         limited
             .args(["-c", "ulimit -n 40 && exec \"$@\"", "sh"])
             .arg(assert_cmd::cargo::cargo_bin("voxtile"));
-        let told = limited.args(["scans", text(folder.path()), "--topic", "/points"]).output().unwrap();
-        let said = String::from_utf8_lossy(&told.stdout);
-        assert!(told.status.success(), "{extension}: {}", String::from_utf8_lossy(&told.stderr));
-        assert!(said.contains("240"), "{extension}: 4 scans a part: {said}");
+        let reported = limited.args(["scans", text(folder.path()), "--topic", "/points"]).output().unwrap();
+        let printed = String::from_utf8_lossy(&reported.stdout);
+        assert!(reported.status.success(), "{extension}: {}", String::from_utf8_lossy(&reported.stderr));
+        assert!(printed.contains("240"), "{extension}: 4 scans a part: {printed}");
     }
 }
 
-/// Pixels without depth are rays without a return, also when the range comes from the map.
+/// Pixels without depth are rays without a return, even if the range is from the map.
 #[test]
-fn a_resumed_build_takes_rays_without_a_return_as_it_did_before() {
+fn a_resumed_build_keeps_clearing_rays_without_a_return() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
     let depth = path("depth");
@@ -710,8 +722,8 @@ fn a_resumed_build_takes_rays_without_a_return_as_it_did_before() {
     (0..2).for_each(add);
     build(&path("map"), &["--clear-no-return", "3"]);
     add(2);
-    let told: serde_json::Value = serde_json::from_str(&build(&path("map"), &["--resume"])).unwrap();
-    assert_eq!((&told["resumed_after"], &told["scans"]), (&2.into(), &1.into()), "{told}");
+    let reported: serde_json::Value = serde_json::from_str(&build(&path("map"), &["--resume"])).unwrap();
+    assert_eq!((&reported["resumed_after"], &reported["scans"]), (&2.into(), &1.into()), "{reported}");
     build(&path("whole"), &["--clear-no-return", "3"]);
     build(&path("without"), &[]);
     let digest = |name: &str| output(&["digest", text(&path(name))]);
@@ -719,7 +731,7 @@ fn a_resumed_build_takes_rays_without_a_return_as_it_did_before() {
     assert_ne!(digest("whole"), digest("without"));
 }
 
-/// What the table of formats says, the help, the page and the Python package say too.
+/// The registry of formats, the help, the document and the Python package list the same formats.
 #[test]
 fn output_formats_are_the_same_in_help_pages_and_python() {
     let formats = OutputFormats::default();

@@ -3,12 +3,13 @@ use serde_json::Value;
 use std::fs;
 use tempfile::TempDir;
 
-/// The objects that a run prints on standard output, which must succeed.
+/// Runs a command that must succeed and returns the objects on its standard output.
 fn objects(arguments: &[&str]) -> Vec<Value> {
     output(arguments).lines().map(|line| serde_json::from_str(line).unwrap()).collect()
 }
 
-/// What every object keeps to: a place is `[x, y, z]`, a box has `min` and `max`, and metres say so in their name.
+/// Checks the conventions of all objects: a position is `[x, y, z]`, a box has `min` and `max`, and names of lengths
+/// end with their unit.
 fn check(name: &str, value: &Value) {
     let is_place = |value: &Value| {
         value.as_array().is_some_and(|numbers| numbers.len() == 3 && numbers.iter().all(Value::is_number))
@@ -80,21 +81,21 @@ fn every_object_has_the_version_and_the_same_shapes() {
     assert!(info["bounds_m"]["min"][0].is_number() && info["tile_bounds"]["max"][2].is_number(), "{info}");
 }
 
-/// Exit code, the error on standard output and the line for a person of a run that must fail.
+/// Runs a command that must fail; returns exit code, error object and text on standard error.
 fn failed(arguments: &[&str]) -> (i32, Value, String) {
     let run = voxtile(arguments).assert().failure();
     let run = run.get_output();
-    let said = String::from_utf8(run.stderr.clone()).unwrap();
-    let mut told: Value = serde_json::from_slice(&run.stdout).unwrap();
-    assert_eq!(told["version"], 1);
-    check("", &told);
-    let error = told["error"].take();
-    assert!(said.ends_with(&format!("voxtile: {}\n", error["message"].as_str().unwrap())), "{said}");
-    (run.status.code().unwrap(), error, said)
+    let printed = String::from_utf8(run.stderr.clone()).unwrap();
+    let mut reported: Value = serde_json::from_slice(&run.stdout).unwrap();
+    assert_eq!(reported["version"], 1);
+    check("", &reported);
+    let error = reported["error"].take();
+    assert!(printed.ends_with(&format!("voxtile: {}\n", error["message"].as_str().unwrap())), "{printed}");
+    (run.status.code().unwrap(), error, printed)
 }
 
 #[test]
-fn a_failure_is_an_object_beside_the_line_for_a_person() {
+fn a_failure_prints_an_object_and_a_line() {
     let folder = TempDir::new().unwrap();
     let scans = scans(&folder);
     let (map, none) = (folder.path().join("map"), folder.path().join("none"));
@@ -118,44 +119,44 @@ fn a_failure_is_an_object_beside_the_line_for_a_person() {
     let scan = scans.join("001.pcd");
     let whole = fs::read_to_string(&scan).unwrap();
     fs::write(&scan, whole.replacen("4.05 ", "", 1)).unwrap();
-    let (code, error, said) = failed(&["build", text(&scans), "-o", none, "--json"]);
+    let (code, error, printed) = failed(&["build", text(&scans), "-o", none, "--json"]);
     assert_eq!((code, &error["kind"], &error["path"]), (1, &"malformed".into(), &text(&scan).into()));
     assert_eq!(error["line"], 10);
-    assert!(said.contains("after 1 scans") && said.contains("malformed: line 10: "), "{said}");
-    assert_eq!(said.matches("line 10").count(), 1, "{said}");
+    assert!(printed.contains("after 1 scans") && printed.contains("malformed: line 10: "), "{printed}");
+    assert_eq!(printed.matches("line 10").count(), 1, "{printed}");
 
-    // One without --json says nothing on standard output; neither does a wrong command line.
+    // Without --json standard output is empty; also for an invalid command line.
     for (arguments, code) in [(&["info", "/no/map"][..], 1), (&["info", map, "--json", "--never"], 2)] {
         let run = voxtile(arguments).assert().failure();
         let run = run.get_output();
         assert_eq!((run.status.code(), run.stdout.len()), (Some(code), 0), "{arguments:?}");
         assert!(!run.stderr.is_empty());
     }
-    // Standard output is for the file.
+    // Standard output is the file.
     let no_map = &format!("{none}/no_map");
     let run = voxtile(&["export", no_map, "-o", "-", "--format", "csv", "--json"]).assert().failure();
     let run = run.get_output();
-    let said = String::from_utf8(run.stderr.clone()).unwrap();
-    let error: Value = serde_json::from_str(said.lines().last().unwrap()).unwrap();
-    assert!(run.stdout.is_empty() && said.starts_with("voxtile: "), "{said}");
+    let printed = String::from_utf8(run.stderr.clone()).unwrap();
+    let error: Value = serde_json::from_str(printed.lines().last().unwrap()).unwrap();
+    assert!(run.stdout.is_empty() && printed.starts_with("voxtile: "), "{printed}");
     assert_eq!((&error["version"], &error["error"]["kind"]), (&1.into(), &"no_map".into()));
 }
 
 #[test]
-fn a_failure_names_file_tile_and_place_of_damage() {
+fn a_failure_reports_file_tile_and_offset_of_damage() {
     let folder = TempDir::new().unwrap();
     let scans = scans(&folder);
     let map = folder.path().join("map");
     output(&["build", text(&scans), "-o", text(&map)]);
     let table = map.join("tile_0_0_0/iwlo_meta.bin");
     fs::write(&table, b"OLWI").unwrap();
-    let (code, error, said) = failed(&["digest", text(&map), "--json"]);
+    let (code, error, printed) = failed(&["digest", text(&map), "--json"]);
     assert_eq!((code, &error["kind"]), (1, &"damaged".into()));
     assert_eq!(error["path"], text(&table));
     assert_eq!(error["tile"], serde_json::json!([0, 0, 0]));
     assert!(error["offset"].is_number());
-    assert!(said.contains("`voxtile repair`") && said.contains("offset "), "{said}");
-    // Damage is what verify looks for, and so its answer.
+    assert!(printed.contains("`voxtile repair`") && printed.contains("offset "), "{printed}");
+    // Damage is the result of verify, not an error.
     let run = voxtile(&["verify", text(&map), "--json"]).assert().code(1);
     let report: Value = serde_json::from_slice(&run.get_output().stdout).unwrap();
     assert_eq!((&report["whole"], report.get("error")), (&false.into(), None));

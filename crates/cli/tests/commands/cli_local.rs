@@ -3,12 +3,12 @@ use std::fs;
 use tempfile::TempDir;
 
 #[test]
-fn scans_run_through_a_local_map_give_a_table_and_a_picture() {
+fn local_prints_a_table_and_draws_a_picture() {
     let folder = TempDir::new().unwrap();
     let (scans, picture) = (scans(&folder), folder.path().join("local.png"));
     let row = json(&["local", text(&scans), "-o", text(&picture), "--json"]);
     assert_eq!((row["setup"].as_str(), row["scans"].as_u64()), (Some("local"), Some(3)));
-    // A wall of 40 points a tenth of a metre apart; every scan has a point that is none and one at the sensor.
+    // A wall of 40 points, 0.1 m apart; every scan has an invalid point and one at the sensor.
     assert_eq!((row["n_occ"].as_u64(), row["skipped"].as_u64()), (Some(40), Some(6)));
     assert!(row["n_inf"].as_f64().unwrap() > 40.0 && row["bytes"].as_u64().unwrap() > 0);
     assert!(fs::read(&picture).unwrap().starts_with(b"\x89PNG"));
@@ -31,7 +31,7 @@ fn scans_run_through_a_local_map_give_a_table_and_a_picture() {
 }
 
 #[test]
-fn wrong_parameters_end_with_usage_and_no_picture() {
+fn wrong_parameters_are_refused_without_a_picture() {
     let folder = TempDir::new().unwrap();
     let (scans, picture) = (scans(&folder), folder.path().join("local.png"));
     for wrong in [["--radius", "5"], ["--d-in", "-1"], ["--p-init", "1"], ["--resolution", "0"]] {

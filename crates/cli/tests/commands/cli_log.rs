@@ -2,7 +2,7 @@ use crate::cli::{scans, text, voxtile};
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
-/// How much a run is asked to say, and what of it must be there and must not.
+/// Settings of the log, with texts that the log must and must not contain.
 struct Case {
     options: &'static [&'static str],
     rust_log: Option<&'static str>,
@@ -10,8 +10,8 @@ struct Case {
     tiles: bool,
 }
 
-const fn case(options: &'static [&'static str], rust_log: Option<&'static str>, said: [bool; 2]) -> Case {
-    Case { options, rust_log, flushes: said[0], tiles: said[1] }
+const fn case(options: &'static [&'static str], rust_log: Option<&'static str>, text_out: [bool; 2]) -> Case {
+    Case { options, rust_log, flushes: text_out[0], tiles: text_out[1] }
 }
 
 const CASES: [Case; 11] = [
@@ -28,7 +28,7 @@ const CASES: [Case; 11] = [
     case(&[], Some("voxtile::mapper=debug"), [false, true]),
 ];
 
-/// Exit code, standard output and standard error.
+/// Returns exit code, standard output and standard error.
 fn run(arguments: &[&str], case: &Case) -> (i32, String, String) {
     let mut command = voxtile(&[arguments, case.options].concat());
     command.env_remove("RUST_LOG");
@@ -40,21 +40,21 @@ fn run(arguments: &[&str], case: &Case) -> (i32, String, String) {
     (output.status.code().unwrap(), text(output.stdout), text(output.stderr))
 }
 
-/// Tiles of two metres of which two are in memory, so that they come and go.
+/// Builds with tiles of two metres, two of them in memory, so that tiles are evicted and loaded.
 fn build(scans: &Path, map: &Path, case: &Case) -> (String, String) {
     let small = ["--resolution", "0.1", "--tile-size", "2", "--cache-tiles", "2", "--flush-every", "1"];
     let build = [&["build", text(scans), "-o", text(map)][..], &small].concat();
-    let (code, out, said) = run(&build, case);
-    assert_eq!(code, 0, "{said}");
-    (out, said)
+    let (code, out, text_out) = run(&build, case);
+    assert_eq!(code, 0, "{text_out}");
+    (out, text_out)
 }
 
-/// Whether a run prints errors and answers alone.
+/// Returns whether a run prints only errors and results.
 fn is_quiet(case: &Case) -> bool {
     matches!(case.options, ["-q" | "--quiet"])
 }
 
-/// What a build prints, less times and the name of the map.
+/// Returns the output of a build without times and the map's name.
 fn lasting(out: &str) -> Vec<&str> {
     let is_lasting =
         |line: &&str| ["points", "skipped", "voxels", "tiles "].iter().any(|word| line.starts_with(word));
@@ -64,29 +64,29 @@ fn lasting(out: &str) -> Vec<&str> {
 }
 
 #[test]
-fn options_and_environment_choose_what_is_said_and_nothing_else() {
+fn options_and_environment_change_only_the_log() {
     let folder = TempDir::new().unwrap();
     let scans = scans(&folder);
     let mut before: Option<(String, PathBuf)> = None;
     for (number, case) in CASES.iter().enumerate() {
         let what = format!("{:?}, RUST_LOG {:?}", case.options, case.rust_log);
         let map = folder.path().join(format!("map{number}"));
-        let (out, said) = build(&scans, &map, case);
+        let (out, text_out) = build(&scans, &map, case);
         for (word, is_said) in
             [(": flush ", case.flushes), (": loaded", case.tiles), (": evicted", case.tiles)]
         {
-            assert_eq!(said.contains(word), is_said, "{what}: {word}: {said}");
+            assert_eq!(text_out.contains(word), is_said, "{what}: {word}: {text_out}");
         }
-        assert!(case.flushes || case.tiles || said.is_empty(), "{what}: {said}");
+        assert!(case.flushes || case.tiles || text_out.is_empty(), "{what}: {text_out}");
         let (earlier, earlier_map) = before.get_or_insert_with(|| (out.clone(), map.clone()));
         match is_quiet(case) {
             true => assert_eq!(out, "", "{what}"),
             false => assert_eq!(lasting(&out), lasting(earlier), "{what}"),
         }
-        // A command whose answer has no times says the same to the byte.
+        // The output of a command without times is identical.
         let ask = |map: &Path, case| {
-            let (code, out, said) = run(&["query", text(map), "4.1", "-0.5", "0.6", "--json"], case);
-            assert_eq!((code, said.as_str()), (0, ""), "{what}");
+            let (code, out, text_out) = run(&["query", text(map), "4.1", "-0.5", "0.6", "--json"], case);
+            assert_eq!((code, text_out.as_str()), (0, ""), "{what}");
             out
         };
         assert_eq!(ask(&map, case), ask(earlier_map, &CASES[0]), "{what}");
@@ -96,7 +96,7 @@ fn options_and_environment_choose_what_is_said_and_nothing_else() {
 }
 
 #[test]
-fn quiet_leaves_out_warnings_and_summaries_beside_a_file_and_no_error() {
+fn quiet_suppresses_warnings_and_summaries_but_no_errors() {
     let folder = TempDir::new().unwrap();
     let scans = scans(&folder);
     let map = folder.path().join("map");
@@ -104,11 +104,11 @@ fn quiet_leaves_out_warnings_and_summaries_beside_a_file_and_no_error() {
     build(&scans, &map, loud);
     let merged = |name: &str| folder.path().join(name);
     let merge = |into: &Path, case| run(&["merge", text(&map), text(&map), "-o", text(into), "--json"], case);
-    let (_, out, said) = merge(&merged("loud"), loud);
-    assert!(said.contains("counts twice") && out.contains("counts twice"), "{said}");
-    let (_, out, said) = merge(&merged("quiet"), quiet);
-    assert!(said.is_empty() && out.contains("counts twice"), "{said}");
-    // Without JSON nothing is printed of work, and answers are.
+    let (_, out, text_out) = merge(&merged("loud"), loud);
+    assert!(text_out.contains("counts twice") && out.contains("counts twice"), "{text_out}");
+    let (_, out, text_out) = merge(&merged("quiet"), quiet);
+    assert!(text_out.is_empty() && out.contains("counts twice"), "{text_out}");
+    // Without JSON no summaries are printed, but results are.
     let plain = |arguments: &[&str]| run(arguments, quiet);
     for work in [
         &["crop", text(&map), "-o", text(&merged("crop")), "--region", "0", "0", "0", "5", "5", "5"][..],
@@ -120,25 +120,25 @@ fn quiet_leaves_out_warnings_and_summaries_beside_a_file_and_no_error() {
         assert_eq!(plain(work), (0, String::new(), String::new()), "{work:?}");
     }
     for answer in [&["info", text(&map)][..], &["snapshots", text(&map)], &["verify", text(&map)]] {
-        let (code, out, said) = plain(answer);
-        assert!(code == 0 && !out.is_empty() && said.is_empty(), "{answer:?}: {out}{said}");
+        let (code, out, text_out) = plain(answer);
+        assert!(code == 0 && !out.is_empty() && text_out.is_empty(), "{answer:?}: {out}{text_out}");
     }
 
     let export = ["export", text(&map), "-o", "-", "--format", "csv"];
-    let [(_, file, said), (_, same, nothing)] = [loud, quiet].map(|case| run(&export, case));
-    assert!(said.contains("voxels in standard output") && nothing.is_empty(), "{said}{nothing}");
+    let [(_, file, text_out), (_, same, nothing)] = [loud, quiet].map(|case| run(&export, case));
+    assert!(text_out.contains("voxels in standard output") && nothing.is_empty(), "{text_out}{nothing}");
     assert!(!file.is_empty() && file == same);
 
     for case in [loud, quiet] {
-        let (code, out, said) = run(&["info", "/no/map"], case);
+        let (code, out, text_out) = run(&["info", "/no/map"], case);
         assert_eq!((code, out.as_str()), (1, ""));
-        assert!(said.starts_with("voxtile: /no/map: no map here"), "{said}");
+        assert!(text_out.starts_with("voxtile: /no/map: no map here"), "{text_out}");
     }
 }
 
 #[test]
 fn quiet_and_verbose_exclude_each_other() {
-    let (code, out, said) = run(&["info", "/no/map", "-q", "-v"], &CASES[0]);
+    let (code, out, text_out) = run(&["info", "/no/map", "-q", "-v"], &CASES[0]);
     assert_eq!((code, out.as_str()), (2, ""));
-    assert!(said.contains("cannot be used with"), "{said}");
+    assert!(text_out.contains("cannot be used with"), "{text_out}");
 }

@@ -3,14 +3,14 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
-/// A map of three scans of a wall.
+/// Builds a map of three scans of a wall.
 fn map(folder: &TempDir) -> PathBuf {
     let map = folder.path().join("map");
     output(&["build", text(&scans(folder)), "-o", text(&map)]);
     map
 }
 
-/// Width, height and pixels of a PNG.
+/// Returns width, height and pixels of a PNG.
 fn decoded(png: &[u8]) -> (usize, usize, Vec<[u8; 3]>) {
     let mut reader = png::Decoder::new(std::io::Cursor::new(png)).read_info().unwrap();
     let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
@@ -24,17 +24,17 @@ fn pixels_of(path: &Path) -> (usize, usize, Vec<[u8; 3]>) {
 }
 
 #[test]
-fn a_picture_is_what_its_json_says() {
+fn a_picture_matches_its_json() {
     let folder = TempDir::new().unwrap();
     let (map, file) = (map(&folder), folder.path().join("map.png"));
-    let said = json(&["picture", text(&map), "-o", text(&file), "--json"]);
+    let printed = json(&["picture", text(&map), "-o", text(&file), "--json"]);
     let (width, height, pixels) = pixels_of(&file);
     assert_eq!(
-        (said["width_px"].as_u64(), said["height_px"].as_u64()),
+        (printed["width_px"].as_u64(), printed["height_px"].as_u64()),
         (Some(width as u64), Some(height as u64))
     );
-    assert_eq!((said["color"].as_str(), said["from"].as_str()), (Some("height"), Some("above")));
-    // The way of the sensor, which the map knows.
+    assert_eq!((printed["color"].as_str(), printed["from"].as_str()), (Some("height"), Some("above")));
+    // The trajectory from the map's list of scans.
     assert!(pixels.contains(&voxtile_render::colors::PATH));
     let without = folder.path().join("without.png");
     output(&["picture", text(&map), "-o", text(&without), "--no-path", "--no-grid"]);
@@ -46,14 +46,14 @@ fn a_picture_is_what_its_json_says() {
         &["--color", "last-scan", "--region", "-1", "-1", "-1", "9", "9", "9"],
         &["--slice", "0.5", "--thickness", "1", "--size", "300"],
     ] {
-        let said = json(&[&["picture", text(&map), "-o", text(&file), "--json"], more].concat());
-        assert!(said["known_cells"].as_u64() > Some(0), "{more:?}: {said}");
-        let [left, top, wide, high] = [0, 1, 2, 3].map(|k| said["map_px"][k].as_u64().unwrap() as usize);
+        let printed = json(&[&["picture", text(&map), "-o", text(&file), "--json"], more].concat());
+        assert!(printed["known_cells"].as_u64() > Some(0), "{more:?}: {printed}");
+        let [left, top, wide, high] = [0, 1, 2, 3].map(|k| printed["map_px"][k].as_u64().unwrap() as usize);
         let (width, height, _) = pixels_of(&file);
-        assert!(left + wide <= width && top + high <= height, "{said}");
-        assert!(wide.max(high) <= if more.contains(&"--size") { 300 } else { 2048 }, "{said}");
+        assert!(left + wide <= width && top + high <= height, "{printed}");
+        assert!(wide.max(high) <= if more.contains(&"--size") { 300 } else { 2048 }, "{printed}");
     }
-    // On standard output, where what is said goes elsewhere.
+    // On standard output; the summary is on standard error.
     let run = voxtile(&["picture", text(&map), "-o", "-", "--json"]).assert().success();
     let bytes = run.get_output();
     assert_eq!(decoded(&bytes.stdout).0, width);
@@ -61,7 +61,7 @@ fn a_picture_is_what_its_json_says() {
 }
 
 #[test]
-fn what_changed_since_a_snapshot_is_drawn() {
+fn changes_since_a_snapshot_are_drawn() {
     let folder = TempDir::new().unwrap();
     let (map, file) = (map(&folder), folder.path().join("map.png"));
     output(&["snapshot", text(&map), "before"]);
@@ -72,12 +72,12 @@ fn what_changed_since_a_snapshot_is_drawn() {
     let (.., pixels) = pixels_of(&file);
     let count = |color: [u8; 3], pixels: &[[u8; 3]]| pixels.iter().filter(|&&pixel| pixel == color).count();
     use voxtile_render::colors::{APPEARED, SAME, VANISHED};
-    // The swatches of the legend have all three.
+    // The legend has a swatch of each color.
     assert!(count(VANISHED, &pixels) > 10 * count(APPEARED, &pixels), "the cleared half of the wall");
     assert!(count(SAME, &pixels) > 10 * count(APPEARED, &pixels), "the other half");
     let snapshot = format!("{}@before", text(&map));
-    let said = json(&["picture", &snapshot, "-o", text(&file), "--since", text(&map), "--json"]);
-    assert!(said["color"].is_null());
+    let printed = json(&["picture", &snapshot, "-o", text(&file), "--since", text(&map), "--json"]);
+    assert!(printed["color"].is_null());
     let (.., pixels) = pixels_of(&file);
     assert!(count(APPEARED, &pixels) > 10 * count(VANISHED, &pixels));
     let (code, error) = failure(&["picture", text(&map), "-o", text(&file), "--since", "nothing"]);
@@ -85,7 +85,7 @@ fn what_changed_since_a_snapshot_is_drawn() {
 }
 
 #[test]
-fn a_picture_that_cannot_be_drawn_says_what_to_do() {
+fn impossible_pictures_are_refused() {
     let folder = TempDir::new().unwrap();
     let (map, file) = (map(&folder), folder.path().join("map.png"));
     let (code, error) = failure(&["picture", text(&map)]);
@@ -105,10 +105,14 @@ fn a_picture_that_cannot_be_drawn_says_what_to_do() {
     let (code, error) = failure(&["picture", text(&map), "-o", text(&file)]);
     assert!(code == 1 && error.contains("tile (0, 0, 0)"), "{error}");
     assert!(!file.exists());
-    // The page has all the rest, and says what is missing.
+    // The report has everything else and names the damage.
     let page = folder.path().join("page.html");
-    let said = json(&["report", text(&map), "-o", text(&page), "--json"]);
-    assert_eq!((said["readable"].as_bool(), said["damage"].as_u64()), (Some(true), Some(1)), "{said}");
+    let printed = json(&["report", text(&map), "-o", text(&page), "--json"]);
+    assert_eq!(
+        (printed["readable"].as_bool(), printed["damage"].as_u64()),
+        (Some(true), Some(1)),
+        "{printed}"
+    );
     let page = fs::read_to_string(&page).unwrap();
     assert!(page.contains("Damaged: 1 findings") && page.contains("iwlo_meta.bin"), "{page}");
     assert!(page.contains("1 tiles cannot be read"));
@@ -119,16 +123,16 @@ fn a_file_of_octomap_has_a_picture_and_no_counts() {
     let folder = TempDir::new().unwrap();
     let (map, tree, file) = (map(&folder), folder.path().join("a.bt"), folder.path().join("a.png"));
     output(&["export", text(&map), "-o", text(&tree)]);
-    let said = json(&["picture", text(&tree), "-o", text(&file), "--json"]);
+    let printed = json(&["picture", text(&tree), "-o", text(&file), "--json"]);
     let of_map = json(&["picture", text(&map), "-o", text(&file), "--json"]);
-    assert_eq!(said["solid_cells"], of_map["solid_cells"]);
+    assert_eq!(printed["solid_cells"], of_map["solid_cells"]);
     let (code, error) = failure(&["picture", text(&tree), "-o", text(&file), "--color", "count"]);
     assert!(code == 2 && error.contains("counts"), "{error}");
 }
 
-/// The page is XML, has the numbers of `info`, and nothing in it comes from elsewhere.
+/// The report is valid XML with the numbers of `info`, and refers to no other resource.
 #[test]
-fn a_report_holds_what_info_says() {
+fn a_report_has_the_numbers_of_info() {
     let folder = TempDir::new().unwrap();
     let (map, page) = (map(&folder), folder.path().join("page.html"));
     output(&["snapshot", text(&map), "before"]);
@@ -149,7 +153,7 @@ fn a_report_holds_what_info_says() {
         assert_eq!(value, info[key].to_string(), "{name}");
     }
     assert!(page.contains(info["map_id"].as_str().unwrap()));
-    assert!(page.contains("Whole: every checksum matches") && page.contains("<td>before</td>"));
+    assert!(page.contains("Intact: all checksums match") && page.contains("<td>before</td>"));
     assert_eq!(page.matches("data:image/png;base64,").count(), 2);
     for outside in ["http://", "https://", "<script", "<link", "@import", "url("] {
         let page = page.replace("http://www.w3.org/1999/xhtml", "");
@@ -162,7 +166,7 @@ fn a_report_holds_what_info_says() {
 }
 
 #[test]
-fn hostile_names_are_text_in_a_report() {
+fn hostile_names_are_escaped_in_a_report() {
     let folder = TempDir::new().unwrap();
     let scans = scans(&folder);
     let input = folder.path().join("<img src=x onerror=alert(1)>&");
@@ -190,8 +194,8 @@ fn maps_without_voxels_and_with_one_have_pictures_and_reports() {
     let one = folder.path().join("one");
     output(&["build", text(&cloud), "-o", text(&one), "--no-rays"]);
     for (map, cells) in [(&empty, 0), (&one, 1)] {
-        let said = json(&["picture", text(map), "-o", text(&png), "--json"]);
-        assert_eq!(said["known_cells"], cells, "{said}");
+        let printed = json(&["picture", text(map), "-o", text(&png), "--json"]);
+        assert_eq!(printed["known_cells"], cells, "{printed}");
         assert!(pixels_of(&png).0 > 100);
         output(&["report", text(map), "-o", text(&page)]);
         check_markup(&fs::read_to_string(&page).unwrap());
@@ -206,8 +210,8 @@ fn a_map_that_does_not_open_has_a_report_of_its_damage() {
     let mut bytes = fs::read(&log).unwrap();
     bytes.iter_mut().for_each(|byte| *byte = !*byte);
     fs::write(&log, bytes).unwrap();
-    let said = json(&["report", text(&map), "-o", text(&page), "--json"]);
-    assert!(said["damage"].as_u64() > Some(0), "{said}");
+    let printed = json(&["report", text(&map), "-o", text(&page), "--json"]);
+    assert!(printed["damage"].as_u64() > Some(0), "{printed}");
     let page = fs::read_to_string(&page).unwrap();
     check_markup(&page);
     assert!(page.contains("commits.log"), "{page}");
@@ -216,13 +220,13 @@ fn a_map_that_does_not_open_has_a_report_of_its_damage() {
     assert!(code != 0 && error.contains("no map here"), "{error}");
 }
 
-/// Every element ends where it should, and every letter that could be markup is.
+/// Checks that all elements are closed and all special characters are escaped.
 fn check_markup(page: &str) {
     let mut open: Vec<&str> = Vec::new();
     let body = page.strip_prefix("<!DOCTYPE html>").unwrap();
     for piece in body.split('<').skip(1) {
         let (tag, content) = piece.split_once('>').unwrap();
-        // No attribute holds an angle bracket, or the tag would end within a quote.
+        // No attribute contains an angle bracket; otherwise the check for tags would be wrong.
         assert_eq!(tag.matches('"').count() % 2, 0, "<{tag}>");
         if let Some(name) = tag.strip_prefix('/') {
             assert_eq!(open.pop(), Some(name));

@@ -1,4 +1,4 @@
-//! Poses that may mean something else, by the command.
+//! Tests of ambiguous poses with the command.
 
 use assert_cmd::Command;
 use serde_json::Value;
@@ -16,7 +16,7 @@ fn text(path: &Path) -> &str {
     path.to_str().unwrap()
 }
 
-/// PCD files of these points.
+/// Writes PCD files of these points.
 fn write_scans(folder: &Path, scans: &[(String, Vec<[f64; 3]>)]) -> PathBuf {
     let folder = folder.join("scans");
     fs::create_dir_all(&folder).unwrap();
@@ -30,12 +30,12 @@ fn write_scans(folder: &Path, scans: &[(String, Vec<[f64; 3]>)]) -> PathBuf {
     folder
 }
 
-/// A robot that drives a bend between posts: where it is, and its turn about z.
+/// Positions and headings of a robot that drives a bend between posts.
 fn way() -> Vec<([f64; 2], f64)> {
     (0..10).map(f64::from).map(|k| ([2.0 * k, 0.12 * k * k], 0.12 * k)).collect()
 }
 
-/// What it sees.
+/// Scans of the posts in the sensor frame.
 fn seen() -> Vec<(String, Vec<[f64; 3]>)> {
     let posts: Vec<[f64; 2]> = (0..90)
         .map(|k: u64| [k * 7919 % 61, k * 104_729 % 53].map(|n| n as f64))
@@ -63,7 +63,7 @@ fn remarks(output: &std::process::Output) -> String {
 }
 
 #[test]
-fn poses_that_do_not_fit_are_remarked_and_strictly_refused() {
+fn misfitting_poses_give_a_remark_or_fail_with_strict() {
     let folder = TempDir::new().unwrap();
     let scans = write_scans(folder.path(), &seen());
     let (poses, map) = (folder.path().join("poses.txt"), folder.path().join("map"));
@@ -91,23 +91,23 @@ fn poses_that_do_not_fit_are_remarked_and_strictly_refused() {
     fs::remove_dir_all(&map).unwrap();
     fs::write(&poses, inverse).unwrap();
     let refused = build(&["--strict"]);
-    let told =
+    let reported =
         String::from_utf8_lossy(&refused.stdout).into_owned() + &String::from_utf8_lossy(&refused.stderr);
-    assert!(!refused.status.success() && !map.exists(), "{told}");
+    assert!(!refused.status.success() && !map.exists(), "{reported}");
     assert!(
-        told.contains("they are the inverse, world to sensor") && told.contains("without --strict"),
-        "{told}"
+        reported.contains("they are the inverse, world to sensor") && reported.contains("without --strict"),
+        "{reported}"
     );
-    let told = remarks(&build(&[]));
-    assert!(told.contains("they are the inverse, world to sensor"), "{told}");
+    let reported = remarks(&build(&[]));
+    assert!(reported.contains("they are the inverse, world to sensor"), "{reported}");
 }
 
 #[test]
-fn w_first_is_read_by_evidence_and_printed() {
+fn w_first_quaternions_are_detected_and_reported() {
     let folder = TempDir::new().unwrap();
     let scans = write_scans(folder.path(), &seen());
     let map = folder.path().join("map");
-    let digest = |lines: &dyn Fn(usize, [f64; 2], f64) -> String, told: &str| {
+    let digest = |lines: &dyn Fn(usize, [f64; 2], f64) -> String, reported: &str| {
         let poses = folder.path().join("poses.json");
         let all: String =
             way().into_iter().enumerate().map(|(k, ([x, y], yaw))| lines(k, [x, y], yaw / 2.0)).collect();
@@ -116,7 +116,7 @@ fn w_first_is_read_by_evidence_and_printed() {
             .output()
             .unwrap();
         let remarks = remarks(&built);
-        assert!(remarks.contains(told) && (remarks == "[]") == told.is_empty(), "{remarks}");
+        assert!(remarks.contains(reported) && (remarks == "[]") == reported.is_empty(), "{remarks}");
         let digest = voxtile(&["digest", text(&map)]).output().unwrap().stdout;
         fs::remove_dir_all(&map).unwrap();
         digest
@@ -137,10 +137,10 @@ fn a_calib_beside_poses_of_a_camera_is_named() {
     let scans = write_scans(folder.path(), &seen()[..3]);
     let poses = folder.path().join("poses.txt");
     let overview = |options: &[&str]| {
-        let told =
+        let reported =
             voxtile(&[&["scans", text(&scans), "--poses", text(&poses)], options].concat()).output().unwrap();
-        assert!(told.status.success(), "{}", String::from_utf8_lossy(&told.stderr));
-        String::from_utf8(told.stdout).unwrap()
+        assert!(reported.status.success(), "{}", String::from_utf8_lossy(&reported.stderr));
+        String::from_utf8(reported.stdout).unwrap()
     };
     let along = |axis: usize, step: f64| -> String {
         let line = |k: i32| {
@@ -151,27 +151,27 @@ fn a_calib_beside_poses_of_a_camera_is_named() {
         (0..3).map(line).collect()
     };
     fs::write(&poses, along(2, 1.0)).unwrap();
-    let told = overview(&[]);
-    assert!(told.contains("go along their own z") && told.contains("--calib FILE"), "{told}");
+    let reported = overview(&[]);
+    assert!(reported.contains("go along their own z") && reported.contains("--calib FILE"), "{reported}");
     let calib = folder.path().join("calib.txt");
     fs::write(&calib, "P0: 1 0 0 0 0 1 0 0 0 0 1 0\n").unwrap();
     assert!(!overview(&[]).contains("calib.txt"), "it has no Tr");
     fs::write(&calib, "Tr: 0 -1 0 0 0 0 -1 -0.1 1 0 0 -0.3\n").unwrap();
-    let told = overview(&[]);
-    assert!(told.contains(&format!("need --calib {}", calib.display())), "{told}");
-    assert!(told.contains("these go along z") && !told.contains("own z"), "{told}");
-    let told = overview(&["--calib", text(&calib)]);
-    assert!(!told.contains("note"), "{told}");
-    // Where nothing moves, it is not known.
+    let reported = overview(&[]);
+    assert!(reported.contains(&format!("need --calib {}", calib.display())), "{reported}");
+    assert!(reported.contains("these go along z") && !reported.contains("own z"), "{reported}");
+    let reported = overview(&["--calib", text(&calib)]);
+    assert!(!reported.contains("note"), "{reported}");
+    // Without motion the axis is unknown.
     fs::write(&poses, along(2, 0.0)).unwrap();
-    let told = overview(&[]);
-    assert!(told.contains("need --calib") && !told.contains("these go"), "{told}");
-    // Poses of the lidar go along x.
+    let reported = overview(&[]);
+    assert!(reported.contains("need --calib") && !reported.contains("these go"), "{reported}");
+    // Lidar poses move along x.
     fs::write(&poses, along(0, 1.0)).unwrap();
     assert!(!overview(&[]).contains("note"));
-    // With a calib that is not theirs, along -y.
-    let told = overview(&["--calib", text(&calib)]);
-    assert!(told.contains("with --calib the poses go along their own -y"), "{told}");
+    // With a wrong calib they move along -y.
+    let reported = overview(&["--calib", text(&calib)]);
+    assert!(reported.contains("with --calib the poses go along their own -y"), "{reported}");
     fs::write(&poses, "1 0 0 0 0 -1 0 0 0 0 -1 0\n".repeat(3)).unwrap();
     assert!(overview(&[]).contains("upside down"));
 }
@@ -195,10 +195,10 @@ fn times_in_names_may_lack_zeros_or_points() {
         let own = folder.path().join(number.to_string());
         let named: Vec<_> = nanoseconds.iter().map(|ns| (name(*ns), vec![[4.0, 0.0, 0.0]])).collect();
         let scans = write_scans(&own, &named);
-        let told =
+        let reported =
             voxtile(&["scans", text(&scans), "--poses", text(&file), "--each", "--json"]).output().unwrap();
-        assert!(told.status.success(), "{}", String::from_utf8_lossy(&told.stderr));
-        let lines = std::str::from_utf8(&told.stdout).unwrap().lines();
+        assert!(reported.status.success(), "{}", String::from_utf8_lossy(&reported.stderr));
+        let lines = std::str::from_utf8(&reported.stdout).unwrap().lines();
         let x_m: Vec<f64> = lines
             .filter_map(|line| serde_json::from_str::<Value>(line).unwrap()["origin_m"][0].as_f64())
             .collect();
@@ -209,18 +209,18 @@ fn times_in_names_may_lack_zeros_or_points() {
             "{number}: {x_m:?}"
         );
     }
-    // Names that tell no time are told.
+    // Names without a time are reported.
     let scans = write_scans(&folder.path().join("none"), &seen()[..3]);
-    let told = voxtile(&["scans", text(&scans), "--poses", text(&file)]).output().unwrap();
-    let told = String::from_utf8(told.stderr).unwrap();
+    let reported = voxtile(&["scans", text(&scans), "--poses", text(&file)]).output().unwrap();
+    let reported = String::from_utf8(reported.stderr).unwrap();
     assert!(
-        told.contains("200 poses for 3 clouds") && told.contains("names of the clouds tell no times"),
-        "{told}"
+        reported.contains("200 poses for 3 clouds") && reported.contains("names of the clouds tell no times"),
+        "{reported}"
     );
 }
 
 #[test]
-fn a_scan_whose_pose_was_lost_is_left_out_and_named() {
+fn a_scan_without_a_pose_is_skipped_and_named() {
     let folder = TempDir::new().unwrap();
     let named = |stamp: &dyn Fn(usize) -> String| -> Vec<_> {
         (0..4).map(|k| (stamp(k), vec![[4.0, 0.0, 0.0]])).collect()
@@ -236,14 +236,17 @@ fn a_scan_whose_pose_was_lost_is_left_out_and_named() {
             let map = folder.path().join("map");
             let built = voxtile(&["build", text(scans), "--poses", text(&file), "-o", text(&map), "--json"]);
             let built = { built }.output().unwrap();
-            let told = remarks(&built);
+            let reported = remarks(&built);
             fs::remove_dir_all(&map).unwrap();
             let summary: Value = serde_json::from_slice(&built.stdout).unwrap();
             assert_eq!(summary["scans"], 3, "{row}");
-            assert!(told.contains("1 row of poses is left out") && told.contains("line 3"), "{row}: {told}");
             assert!(
-                told.contains("1 cloud has no pose, left out (") && told.contains(" was lost)"),
-                "{row}: {told}"
+                reported.contains("1 row of poses is left out") && reported.contains("line 3"),
+                "{row}: {reported}"
+            );
+            assert!(
+                reported.contains("1 cloud has no pose, left out (") && reported.contains(" was lost)"),
+                "{row}: {reported}"
             );
         }
     }

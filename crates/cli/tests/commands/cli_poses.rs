@@ -1,4 +1,4 @@
-//! Poses that come with files, beside them or by options, by the command.
+//! Tests of poses in an input, next to it, or given by an option.
 
 use assert_cmd::Command;
 use std::fs::{self, File};
@@ -21,19 +21,19 @@ fn refusal(arguments: &[&str]) -> String {
     String::from_utf8(output.stderr).unwrap()
 }
 
-/// Where the scans of an input were taken, along x, after it was mapped.
+/// Maps an input and returns the x of its scan origins.
 fn origins_m(folder: &TempDir, input: &Path, options: &[&str]) -> Vec<f64> {
     let map = folder.path().join("map");
     let built = voxtile(&[&["build", text(input), "-o", text(&map)], options].concat()).output().unwrap();
     assert!(built.status.success(), "{options:?}: {}", String::from_utf8_lossy(&built.stderr));
-    let told = voxtile(&["scans", text(&map), "--each", "--json"]).output().unwrap().stdout;
+    let reported = voxtile(&["scans", text(&map), "--each", "--json"]).output().unwrap().stdout;
     fs::remove_dir_all(&map).unwrap();
-    let scans = std::str::from_utf8(&told).unwrap().lines();
+    let scans = std::str::from_utf8(&reported).unwrap().lines();
     let scans = scans.map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap());
     scans.filter_map(|scan| scan["origin_m"][0].as_f64()).collect()
 }
 
-/// PCD files of one point, each with its name and the x of its `VIEWPOINT`.
+/// Writes PCD files of one point, each with a name and the x of its `VIEWPOINT`.
 fn pcd_files(folder: &Path, files: &[(&str, f64)]) -> PathBuf {
     let scans = folder.join("scans");
     fs::create_dir(&scans).unwrap();
@@ -46,7 +46,7 @@ fn pcd_files(folder: &Path, files: &[(&str, f64)]) -> PathBuf {
 }
 
 #[test]
-fn depth_images_of_7_scenes_have_the_poses_beside_them() {
+fn depth_images_of_7_scenes_use_the_poses_next_to_them() {
     let folder = TempDir::new().unwrap();
     let scans = folder.path().join("seq-01");
     fs::create_dir(&scans).unwrap();
@@ -61,7 +61,7 @@ fn depth_images_of_7_scenes_have_the_poses_beside_them() {
         fs::write(scans.join(format!("frame-00000{number}.pose.txt")), pose).unwrap();
     }
     assert_eq!(origins_m(&folder, &scans, &[]), [0.0, 1.0, 2.0]);
-    // One image, too.
+    // Also with a single image.
     for number in [0, 2] {
         fs::remove_file(scans.join(format!("frame-00000{number}.depth.png"))).unwrap();
     }
@@ -72,7 +72,7 @@ fn depth_images_of_7_scenes_have_the_poses_beside_them() {
     assert_eq!(origins_m(&folder, &scans, &[]), [0.0]);
 }
 
-/// As many poses as files, which begin later: a file takes the pose at its time, not that of its number.
+/// There are as many poses as files, but they begin later: a file has the pose at its time, not at its number.
 #[test]
 fn pcd_files_with_stamps_take_poses_by_time() {
     let folder = TempDir::new().unwrap();
@@ -89,16 +89,16 @@ fn pcd_files_with_stamps_take_poses_by_time() {
     assert_eq!(origins_m(&folder, &scans, &["--poses", text(&file)]), [2.0, 3.0]);
     fs::write(&file, poses(0)).unwrap();
     assert_eq!(origins_m(&folder, &scans, &["--poses", text(&file)]), [0.0, 1.0, 2.0, 3.0]);
-    // More poses than files, beside them.
+    // More poses than files, next to them.
     fs::write(folder.path().join("poses_tum.txt"), poses(0) + &poses(4)).unwrap();
     assert_eq!(origins_m(&folder, &scans, &[]), [0.0, 1.0, 2.0, 3.0]);
-    // Clocks that know nothing of each other.
+    // Unrelated clocks.
     fs::write(&file, "5 7 0 0 0 0 0 1\n6 8 0 0 0 0 0 1\n7 9 0 0 0 0 0 1\n8 10 0 0 0 0 0 1\n").unwrap();
     assert_eq!(origins_m(&folder, &scans, &["--poses", text(&file)]), [7.0, 8.0, 9.0, 10.0]);
 }
 
 #[test]
-fn pcd_files_take_every_form_of_poses() {
+fn pcd_files_accept_every_format_of_poses() {
     let folder = TempDir::new().unwrap();
     let scans = pcd_files(folder.path(), &[("0", 0.0), ("1", 0.0)]);
     let file = folder.path().join("poses.csv");
@@ -116,17 +116,17 @@ fn pcd_files_take_every_form_of_poses() {
     assert_eq!(origins_m(&folder, &scans, &option), [5.0]);
     let map = folder.path().join("map");
     fs::write(&file, "1 five 0 0 0 0 0 1\n2 six 0 0 0 0 0 1\n").unwrap();
-    let told = refusal(&["build", text(&scans), "--poses", text(&file), "-o", text(&map)]);
-    assert!(told.contains("line 1") && told.contains("`five` is not a number"), "{told}");
-    // A file that is no scan is often at an end of the list.
+    let reported = refusal(&["build", text(&scans), "--poses", text(&file), "-o", text(&map)]);
+    assert!(reported.contains("line 1") && reported.contains("`five` is not a number"), "{reported}");
+    // A file that is no scan is often first or last in the list.
     let three = "1 0 0 5\n0 1 0 0\n0 0 1 0\n0 0 0 1\n".repeat(3);
     fs::write(&file, three).unwrap();
-    let told = refusal(&["build", text(&scans), "--poses", text(&file), "-o", text(&map)]);
-    assert!(told.contains("3 poses for 2 clouds (0.pcd to 1.pcd)"), "{told}");
+    let reported = refusal(&["build", text(&scans), "--poses", text(&file), "-o", text(&map)]);
+    assert!(reported.contains("3 poses for 2 clouds (0.pcd to 1.pcd)"), "{reported}");
 }
 
 #[test]
-fn a_viewpoint_is_the_pose_whatever_else_is_said() {
+fn a_viewpoint_is_the_default_pose() {
     let folder = TempDir::new().unwrap();
     let scans = pcd_files(folder.path(), &[("0", 3.0), ("1", 5.0)]);
     assert_eq!(origins_m(&folder, &scans, &[]), [3.0, 5.0]);
@@ -135,7 +135,7 @@ fn a_viewpoint_is_the_pose_whatever_else_is_said() {
 }
 
 #[test]
-fn pcd_files_are_seen_from_where_the_sensor_stood() {
+fn rays_of_pcd_files_begin_at_the_viewpoint() {
     let folder = TempDir::new().unwrap();
     let scans = pcd_files(folder.path(), &[("0", 0.0), ("1", 0.0)]);
     let map = folder.path().join("map");
@@ -149,10 +149,10 @@ fn pcd_files_are_seen_from_where_the_sensor_stood() {
             .status
             .success()
     );
-    // The point stays where it is, and the ray begins at the sensor.
+    // The point is unchanged and the ray begins at the sensor.
     let state = |x: &str| {
-        let told = voxtile(&["query", text(&map), x, "0", "0", "--json"]).output().unwrap().stdout;
-        serde_json::from_slice::<serde_json::Value>(&told).unwrap()["state"].clone()
+        let reported = voxtile(&["query", text(&map), x, "0", "0", "--json"]).output().unwrap().stdout;
+        serde_json::from_slice::<serde_json::Value>(&reported).unwrap()["state"].clone()
     };
     assert_eq!([state("4.1"), state("3.1"), state("1.1")], ["occupied", "free", "unknown"]);
 }
@@ -162,16 +162,17 @@ fn pcd_files_without_poses_are_listed_and_mapped_without_rays() {
     let folder = TempDir::new().unwrap();
     let scans = pcd_files(folder.path(), &[("0", 0.0), ("1", 0.0)]);
     let map = folder.path().join("map");
-    let told = refusal(&["build", text(&scans), "-o", text(&map)]);
-    assert!(told.contains("has no poses"), "{told}");
+    let reported = refusal(&["build", text(&scans), "-o", text(&map)]);
+    assert!(reported.contains("has no poses"), "{reported}");
     let built = voxtile(&["build", text(&scans), "-o", text(&map), "--no-rays"]).output().unwrap();
-    let told = String::from_utf8_lossy(&built.stdout).into_owned() + &String::from_utf8_lossy(&built.stderr);
-    assert!(built.status.success() && told.contains("1 occupied"), "{told}");
-    let told = voxtile(&["scans", text(&scans)]).output().unwrap();
-    assert!(told.status.success(), "{}", String::from_utf8_lossy(&told.stderr));
+    let reported =
+        String::from_utf8_lossy(&built.stdout).into_owned() + &String::from_utf8_lossy(&built.stderr);
+    assert!(built.status.success() && reported.contains("1 occupied"), "{reported}");
+    let reported = voxtile(&["scans", text(&scans)]).output().unwrap();
+    assert!(reported.status.success(), "{}", String::from_utf8_lossy(&reported.stderr));
 }
 
-/// The reason is told once, and no empty map is left.
+/// The reason is printed once, and no empty map remains.
 #[test]
 fn an_input_without_any_pose_makes_no_map_of_bad_scans() {
     let folder = TempDir::new().unwrap();
@@ -183,18 +184,18 @@ fn an_input_without_any_pose_makes_no_map_of_bad_scans() {
     let poses = folder.path().join("poses.txt");
     fs::write(&poses, "1284035200 0 0 1 0 0 0 1\n1284035210 0 0 1 0 0 0 1\n").unwrap();
     let map = folder.path().join("map");
-    let told = refusal(&["build", text(&scans), "--poses", text(&poses), "-o", text(&map), "--skip-bad"]);
-    assert_eq!(told.matches("none of its 2 clouds has a pose").count(), 1, "{told}");
+    let reported = refusal(&["build", text(&scans), "--poses", text(&poses), "-o", text(&map), "--skip-bad"]);
+    assert_eq!(reported.matches("none of its 2 clouds has a pose").count(), 1, "{reported}");
     assert!(!map.exists());
 }
 
-/// A FIFO that nothing writes to.
+/// Creates a FIFO without a writer.
 #[cfg(unix)]
 fn fifo(path: &Path) {
     assert!(std::process::Command::new("mkfifo").arg(path).status().unwrap().success());
 }
 
-/// A command that waits for a FIFO would be killed, and say nothing.
+/// Runs a command that must fail. A command that waits for a FIFO is killed and prints nothing.
 #[cfg(unix)]
 fn refusal_in_time(arguments: &[&str]) -> String {
     let output = voxtile(arguments).timeout(std::time::Duration::from_secs(30)).output().unwrap();
@@ -204,7 +205,7 @@ fn refusal_in_time(arguments: &[&str]) -> String {
 
 #[cfg(unix)]
 #[test]
-fn nothing_waits_for_a_fifo_among_clouds() {
+fn fifos_among_clouds_do_not_block() {
     let folder = TempDir::new().unwrap();
     let scans = pcd_files(folder.path(), &[("0", 0.0), ("1", 1.0)]);
     let clouds = folder.path().join("clouds");
@@ -219,7 +220,7 @@ fn nothing_waits_for_a_fifo_among_clouds() {
             assert!(message.contains(name) && message.contains("is a FIFO"), "{options:?}: {message}");
         }
     }
-    // Alone.
+    // As the only input.
     for (path, hint) in [(clouds.join("1.xyz"), "--format"), (scans.join("2.pcd"), "save its contents")] {
         let message = refusal_in_time(&["scans", text(&path)]);
         assert!(message.contains("is a FIFO") && message.contains(hint), "{message}");
@@ -228,7 +229,7 @@ fn nothing_waits_for_a_fifo_among_clouds() {
 
 #[cfg(unix)]
 #[test]
-fn a_fifo_that_is_named_is_read_as_it_comes() {
+fn a_fifo_given_as_input_is_streamed() {
     let folder = TempDir::new().unwrap();
     let [clouds, poses, cloud] = ["clouds", "poses", "cloud"].map(|name| folder.path().join(name));
     fs::create_dir(&clouds).unwrap();
@@ -254,7 +255,7 @@ fn a_fifo_that_is_named_is_read_as_it_comes() {
     written.join().unwrap();
 }
 
-/// Some programs write what they did into one line.
+/// Some programs write a long comment into one line.
 #[test]
 fn long_comments_in_a_file_of_poses_are_skipped() {
     let folder = TempDir::new().unwrap();

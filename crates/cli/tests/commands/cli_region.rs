@@ -15,7 +15,7 @@ fn digest(map: &str) -> String {
 }
 
 #[test]
-fn maps_of_regions_that_partition_space_merge_to_the_map_of_the_whole() {
+fn maps_of_adjacent_regions_merge_to_the_whole_map() {
     let modes: [&[&str]; 4] = [&[], &["--insert", "per-ray"], &["--sensor-model", "iwlo"], &["--no-rays"]];
     for mode in modes {
         let folder = TempDir::new().unwrap();
@@ -28,15 +28,15 @@ fn maps_of_regions_that_partition_space_merge_to_the_map_of_the_whole() {
             let built = json(&build(&scans, part, &[mode, &region, &["--json"]].concat()));
             assert_eq!(built["points"], 126, "{mode:?}");
             assert_eq!(built["scan_number"], 3);
-            // Tiles with the center at 2.5 m are west, those at 3.5 m east.
+            // Tiles centered at 2.5 m are in the western part, those at 3.5 m in the eastern part.
             assert_eq!(json(&["info", part, "--json"])["region_tiles"], built["region_tiles"]);
             assert!(output(&["info", part]).contains("region       whole tiles: x "));
             let (bound, index) = if *part == parts[0] { ("max", 2) } else { ("min", 3) };
             assert_eq!(built["region_tiles"][bound][0], index);
         }
         let merged = path("merged");
-        let told = json(&["merge", &parts[0], &parts[1], &parts[2], "-o", &merged, "--json"]);
-        assert_eq!(told["is_one_build"], true);
+        let reported = json(&["merge", &parts[0], &parts[1], &parts[2], "-o", &merged, "--json"]);
+        assert_eq!(reported["is_one_build"], true);
         assert_eq!(digest(&merged), digest(&whole), "{mode:?}");
         let [merged, whole] = [merged, whole].map(|map| json(&["info", &map, "--json"]));
         for same in ["scan_number", "inputs", "voxels", "occupied", "region_tiles"] {
@@ -47,15 +47,15 @@ fn maps_of_regions_that_partition_space_merge_to_the_map_of_the_whole() {
 }
 
 #[test]
-fn the_summary_says_which_whole_tiles_a_region_is_made_of() {
+fn the_summary_prints_the_tiles_of_a_region() {
     let folder = TempDir::new().unwrap();
     let (scans, map) = (scans(&folder), folder.path().join("map"));
     let box_m = ["--region", "0.4", "-1.6", "-inf", "3.6", "1", "1.5"];
-    let told = output(&build(&scans, text(&map), &box_m));
-    assert!(told.contains("region    whole tiles: x 0 to 4, y -2 to 1, z -inf to 1 m"), "{told}");
+    let reported = output(&build(&scans, text(&map), &box_m));
+    assert!(reported.contains("region    whole tiles: x 0 to 4, y -2 to 1, z -inf to 1 m"), "{reported}");
 }
 
-/// Does something while the last scan is not there yet.
+/// Runs `does` while the last scan is missing.
 fn before_the_last_scan(scans: &Path, does: impl FnOnce()) {
     let (last, poses) = (scans.join("002.pcd"), scans.join("poses_kitti.txt"));
     let [scan, all_poses] = [&last, &poses].map(|path| std::fs::read_to_string(path).unwrap());
@@ -68,7 +68,7 @@ fn before_the_last_scan(scans: &Path, does: impl FnOnce()) {
 }
 
 #[test]
-fn a_build_goes_on_with_the_merged_map_of_its_regions() {
+fn a_build_resumes_on_the_merged_map_of_its_regions() {
     let folder = TempDir::new().unwrap();
     let scans = scans(&folder);
     let path = |name: &str| text(&folder.path().join(name)).to_owned();
@@ -79,18 +79,18 @@ fn a_build_goes_on_with_the_merged_map_of_its_regions() {
         output(&build(&scans, &south_east, &SOUTH_EAST));
         output(&build(&scans, &north_east, &NORTH_EAST));
     });
-    // Two of three, together a box: a map of that region.
+    // Two of three parts that form a box: a map of that region.
     output(&["merge", &south_east, &north_east, "-o", &east]);
-    let told = output(&["merge", &east, &west, "-o", &merged]);
-    assert!(told.contains("scans     those of each map"), "{told}");
+    let reported = output(&["merge", &east, &west, "-o", &merged]);
+    assert!(reported.contains("scans     those of each map"), "{reported}");
     assert_eq!(output(&["scans", &merged]).lines().count(), output(&["scans", &west]).lines().count());
     output(&build(&scans, &merged, &["--resume"]));
     let at_once = path("at_once");
     output(&build(&scans, &at_once, &[]));
     assert_eq!(digest(&merged), digest(&at_once));
-    assert!(output(&["verify", &merged]).contains("whole"));
+    assert!(output(&["verify", &merged]).contains("intact"));
 
-    // Regions that are no box together, or are as of different scans, are maps like any others.
+    // Regions that form no box, or of different scan numbers, merge like unrelated maps.
     let is_other = |name: &str, parts: [&str; 2]| {
         let other = json(&["merge", parts[0], parts[1], "-o", &path(name), "--json"]);
         assert_eq!(other["is_one_build"], false, "{name}");
@@ -102,7 +102,7 @@ fn a_build_goes_on_with_the_merged_map_of_its_regions() {
 }
 
 #[test]
-fn a_map_of_a_region_goes_on_with_its_region_and_no_other() {
+fn a_map_of_a_region_resumes_only_with_its_region() {
     let folder = TempDir::new().unwrap();
     let (scans, map) = (scans(&folder), folder.path().join("map"));
     before_the_last_scan(&scans, || drop(output(&build(&scans, text(&map), &WEST))));
@@ -132,10 +132,10 @@ fn a_region_without_a_tile_is_refused() {
     voxtile(&build(&scans, text(&map), &["--region", "0", "0"])).assert().code(2);
 }
 
-/// Parts of one build are maps like any others once scans were taken out of one, or once they were mapped again: their
-/// poses may have the same positions.
+/// After removed scans or a replay, parts of one build merge like unrelated maps, because their scans may have other
+/// poses.
 #[test]
-fn parts_that_were_changed_are_no_parts_of_one_build() {
+fn changed_parts_are_no_parts_of_one_build() {
     let folder = TempDir::new().unwrap();
     let scans = scans(&folder);
     let path = |name: &str| text(&folder.path().join(name)).to_owned();
@@ -167,7 +167,7 @@ fn parts_that_were_changed_are_no_parts_of_one_build() {
         };
         let before = merged("before");
         assert_eq!(before["is_one_build"], true);
-        // That is said: nobody throws the parts away without knowing.
+        // A warning is printed, so that the user does not delete the parts.
         let warnings = before["warnings"].as_array().unwrap();
         assert!(warnings.len() == 2 && warnings[0].as_str().unwrap().contains("keeps its scans"), "{before}");
         change(number, &parts[0], &parts[1]);

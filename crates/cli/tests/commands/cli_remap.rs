@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 use voxtile::MapReader;
 
-/// A map of three scans that it keeps, the scans, and where both are.
+/// A map of three kept scans, with the paths of both.
 struct Kept {
     folder: TempDir,
     scans: PathBuf,
@@ -26,7 +26,7 @@ impl Kept {
         text(&self.folder.path().join(name)).to_owned()
     }
 
-    /// A file with the poses of the scans, moved by so much per scan.
+    /// Writes a file with the poses of the scans, moved by `by_m` more per scan.
     fn poses(&self, name: &str, by_m: f64) -> String {
         let path = self.path(name);
         let own = fs::read_to_string(self.scans.join("poses_kitti.txt")).unwrap();
@@ -39,7 +39,7 @@ impl Kept {
         path
     }
 
-    /// The digest of a build from nothing with other poses.
+    /// Returns the digest of a new build with other poses.
     fn digest_with(&self, poses: &str, map: &str) -> String {
         let map = self.path(map);
         output(&[&["build", text(&self.scans), "-o", &map, "--poses", poses][..], &TILES].concat());
@@ -47,7 +47,7 @@ impl Kept {
     }
 }
 
-/// What a command says that must end with this code.
+/// Runs a command that must fail with this code and returns its message.
 fn fails(arguments: &[&str], code: i32) -> String {
     let (found, message) = failure(arguments);
     assert_eq!(found, code, "{message}");
@@ -59,7 +59,7 @@ fn digest(map: &str) -> String {
 }
 
 #[test]
-fn a_map_follows_its_poses_and_is_then_as_if_built_with_them() {
+fn a_remapped_map_equals_a_build_with_the_new_poses() {
     let kept = Kept::new();
     let before = digest(&kept.map);
     let moved = kept.poses("moved.txt", 0.3);
@@ -72,21 +72,24 @@ fn a_map_follows_its_poses_and_is_then_as_if_built_with_them() {
     assert!((done["largest_move_m"].as_f64().unwrap() - 0.6).abs() < 1e-9);
     assert_eq!(digest(&kept.map), kept.digest_with(&moved, "again"));
     assert_eq!(digest(&format!("{}@before", kept.map)), before);
-    assert!(output(&["verify", &kept.map]).contains("whole"));
-    // A build goes on with them, and no scan comes twice.
+    assert!(output(&["verify", &kept.map]).contains("intact"));
+    // A build resumes with them, and no scan counts twice.
     let resume = ["build", text(&kept.scans), "-o", &kept.map, "--poses", &moved, "--resume", "--json"];
     assert_eq!(json(&resume)["resumed_after"], 3);
-    // Back again, by less than the tolerance for one of them.
+    // Back again; one of the moves is within the tolerance.
     let own = kept.poses("own.txt", 0.0);
-    let told = output(&["remap", &kept.map, "--poses", &own, "--tolerance", "0.4m,1deg"]);
-    assert!(told.contains("1 scans moved, by 0.600 m") && told.contains("1 scans where they are"), "{told}");
+    let reported = output(&["remap", &kept.map, "--poses", &own, "--tolerance", "0.4m,1deg"]);
+    assert!(
+        reported.contains("1 scans moved, by up to 0.600 m") && reported.contains("1 scans unchanged"),
+        "{reported}"
+    );
     output(&["remap", &kept.map, "--poses", &own]);
     assert_eq!(digest(&kept.map), before);
-    let told = output(&["remap", &kept.map, "--poses", &own]);
-    assert!(told.contains("0 scans moved"), "{told}");
+    let reported = output(&["remap", &kept.map, "--poses", &own]);
+    assert!(reported.contains("0 scans moved"), "{reported}");
 }
 
-/// The map that keeps the scans stays as it is; another one has the new poses.
+/// The original map does not change; another one has the new poses.
 #[test]
 fn another_map_is_built_from_kept_scans_with_other_poses() {
     let kept = Kept::new();
@@ -104,10 +107,13 @@ fn another_map_is_built_from_kept_scans_with_other_poses() {
 }
 
 #[test]
-fn kept_scans_are_told_exported_and_built_again() {
+fn kept_scans_are_listed_exported_and_rebuilt() {
     let kept = Kept::new();
-    let told = output(&["scans", &kept.map, "--each"]);
-    assert!(told.contains(" points") && told.contains(" tiles") && told.contains("bytes a point"), "{told}");
+    let reported = output(&["scans", &kept.map, "--each"]);
+    assert!(
+        reported.contains(" points") && reported.contains(" tiles") && reported.contains("bytes per point"),
+        "{reported}"
+    );
     let summary = json(&["scans", &kept.map, "--json"]);
     assert_eq!((&summary["scans"], &summary["points"]), (&3.into(), &126.into()));
     let out = kept.path("out");
@@ -120,7 +126,7 @@ fn kept_scans_are_told_exported_and_built_again() {
     let third = kept.path("third");
     output(&[&["build", &kept.map, "-o", &third][..], &TILES].concat());
     assert_eq!(digest(&third), digest(&kept.map));
-    // Other parameters, without the files.
+    // Other parameters, without the original files.
     fs::remove_dir_all(&out).unwrap();
     let (coarse, wanted) = (kept.path("coarse"), kept.path("wanted"));
     let how = ["--resolution", "0.2", "--max-range", "2"];
@@ -133,18 +139,21 @@ fn kept_scans_are_told_exported_and_built_again() {
 fn scans_and_points_are_removed_as_if_they_had_never_been() {
     let kept = Kept::new();
     output(&["snapshot", &kept.map, "all"]);
-    let told = output(&["remove-scans", &kept.map, "--scans", "2..3"]);
-    assert!(told.contains("2 scans gone") && told.contains("all still holds some of them"), "{told}");
+    let reported = output(&["remove-scans", &kept.map, "--scans", "2..3"]);
+    assert!(
+        reported.contains("2 scans removed") && reported.contains("all still contains some of them"),
+        "{reported}"
+    );
     let first = kept.path("first");
     output(&[&["build", text(&kept.scans), "-o", &first, "--count", "1"][..], &TILES].concat());
     assert_eq!(digest(&kept.map), digest(&first));
     assert_eq!(json(&["scans", &kept.map, "--json"])["scans"], 1);
-    // They are not taken again.
+    // Removed scans are not added again.
     let resumed = json(&["build", text(&kept.scans), "-o", &kept.map, "--resume", "--json"]);
     assert_eq!((&resumed["scans"], digest(&kept.map)), (&0.into(), digest(&first)));
     let all = ["--region", "-99", "-99", "-99", "99", "99", "99"];
     let gone = json(&[&["remove-points", &kept.map, "--json"][..], &all].concat());
-    // One of its 42 points is nowhere.
+    // One of its 42 points is invalid.
     assert_eq!((&gone["points_removed"], &gone["tiles"]), (&41.into(), &gone["tiles_mapped"]));
     assert_eq!(json(&["info", &kept.map, "--json"])["voxels"], 0);
     let message = fails(&["remove-scans", &kept.map, "--input", "nothing"], 2);
@@ -152,7 +161,7 @@ fn scans_and_points_are_removed_as_if_they_had_never_been() {
 }
 
 #[test]
-fn what_cannot_be_mapped_again_is_refused_with_what_to_do() {
+fn impossible_replays_are_refused_with_a_remedy() {
     let kept = Kept::new();
     let refused = |arguments: &[&str]| fails(arguments, 2);
     let three = kept.poses("poses.txt", 0.1);
@@ -163,7 +172,7 @@ fn what_cannot_be_mapped_again_is_refused_with_what_to_do() {
     let message = refused(&["remap", &kept.map, "--poses", &three, "--tolerance", "1"]);
     assert!(message.contains("0.02m,0.1deg"), "{message}");
     let message = refused(&["remove-scans", &kept.map, "--scans", "3..1"]);
-    assert!(message.contains("no range of numbers"), "{message}");
+    assert!(message.contains("not a range of numbers"), "{message}");
     let without = kept.path("without");
     output(&[&["build", text(&kept.scans), "-o", &without][..], &TILES].concat());
     let message = refused(&["remap", &without, "--poses", &three]);
@@ -178,9 +187,9 @@ fn what_cannot_be_mapped_again_is_refused_with_what_to_do() {
     assert!(message.contains("a change by another operation: clear"), "{message}");
 }
 
-/// Another map is made of all scans or not at all, just as a map follows its poses.
+/// As with new poses in place, another map needs all scans.
 #[test]
-fn another_map_is_refused_where_the_map_is_more_than_its_kept_scans() {
+fn another_map_is_refused_if_scans_are_not_kept() {
     let kept = Kept::new();
     let fine = kept.path("fine");
     let refused = |map: &str| {
@@ -199,9 +208,9 @@ fn another_map_is_refused_where_the_map_is_more_than_its_kept_scans() {
     assert!(message.contains("a change by another operation: clear"), "{message}");
 }
 
-/// A region is said in tiles: of another size it stays where it is in space, or is refused.
+/// A region is stored in tiles: with another tile size it keeps its bounds or is refused.
 #[test]
-fn another_map_has_the_region_of_the_map_in_tiles_of_any_size() {
+fn another_map_keeps_the_region_for_any_tile_size() {
     let kept = Kept::new();
     let (part, wanted, found) = (kept.path("part"), kept.path("wanted"), kept.path("found"));
     let region = ["--region", "1", "-inf", "-inf", "inf", "inf", "inf"];
@@ -242,7 +251,7 @@ fn a_damaged_segment_is_named_and_repaired_around() {
     let found = voxtile(&["verify", &kept.map]).assert().code(1);
     assert!(String::from_utf8_lossy(&found.get_output().stdout).contains("(scan 3)"));
     voxtile(&["repair", &kept.map]).assert().code(1);
-    assert!(output(&["verify", &kept.map]).contains("whole"));
+    assert!(output(&["verify", &kept.map]).contains("intact"));
     assert_eq!(digest(&kept.map), before);
     let message = fails(&["remap", &kept.map, "--poses", &poses], 2);
     assert!(message.contains("scan 3, whose points are not kept"), "{message}");
@@ -251,7 +260,7 @@ fn a_damaged_segment_is_named_and_repaired_around() {
 }
 
 #[test]
-fn a_tolerance_that_is_no_time_is_refused() {
+fn an_invalid_tolerance_is_refused() {
     let kept = Kept::new();
     let poses = kept.poses("poses.txt", 0.1);
     for tolerance in ["nan", "-1", "inf", "-inf", "1e300"] {
@@ -261,9 +270,9 @@ fn a_tolerance_that_is_no_time_is_refused() {
     }
 }
 
-/// Lines that go back in time belong to scans by their stamps; without stamps of scans nothing says to which.
+/// Unordered lines match scans by stamps; without stamps of scans their order is ambiguous.
 #[test]
-fn poses_in_another_order_than_time_are_not_taken_line_by_line() {
+fn unordered_poses_are_not_matched_by_line() {
     let kept = Kept::new();
     let poses = kept.path("tum.txt");
     let line = |stamp: i32| format!("{stamp} {stamp} 0 0 0 0 0 1\n");
@@ -272,7 +281,7 @@ fn poses_in_another_order_than_time_are_not_taken_line_by_line() {
     assert!(message.contains("its time stamps go back"), "{message}");
     assert_eq!(digest(&kept.map), kept.digest_with(&kept.poses("own.txt", 0.0), "same"));
 
-    // Clouds whose names are their stamps.
+    // Clouds with stamps as names.
     let clouds = kept.folder.path().join("clouds");
     fs::create_dir(&clouds).unwrap();
     for second in 1..4 {
@@ -296,7 +305,7 @@ fn poses_in_another_order_than_time_are_not_taken_line_by_line() {
     let moved = build(&tum("moved.txt", [1, 2, 3], 0.5), "moved");
     output(&["remap", &map, "--poses", &tum("back.txt", [3, 1, 2], 0.5)]);
     assert_eq!(digest(&map), digest(&moved));
-    // Clouds without stamps take no such lines either.
+    // Clouds without stamps refuse such lines too.
     for second in 1..4 {
         let name = |name: &str| clouds.join(format!("{name}{second}.ply"));
         fs::rename(clouds.join(format!("170000000{second}.000000.ply")), name("scan")).unwrap();

@@ -30,10 +30,10 @@ fn a_map_is_built_from_standard_input_and_resumed_with_the_same_scans() {
         voxtile(&arguments)
     };
     build(&map, &[]).write_stdin(drive("drive 1", 3)).assert().success();
-    // Another stream does not go on with it, whatever it is called.
+    // Another stream cannot resume it, whatever its name.
     let other = build(&map, &["--resume"]).write_stdin(drive_of(2, "drive 1", 5)).assert().code(2);
     assert!(String::from_utf8_lossy(&other.get_output().stderr).contains("drive 1"));
-    // The same, longer, does: its first three scans are passed over.
+    // A longer version of the same stream can: its first three scans are skipped.
     let longer = build(&map, &["--resume"]).write_stdin(drive("", 5)).assert().success();
     let summary: serde_json::Value = serde_json::from_slice(&longer.get_output().stdout).unwrap();
     assert_eq!((summary["scans"].as_u64(), summary["resumed_after"].as_u64()), (Some(2), Some(3)));
@@ -49,7 +49,7 @@ fn a_map_is_built_from_standard_input_and_resumed_with_the_same_scans() {
 }
 
 #[test]
-fn scans_that_come_too_fast_are_left_out_if_asked_counted_and_not_taken_later() {
+fn dropped_scans_are_counted_and_not_added_later() {
     const SCANS: usize = 60;
     let folder = TempDir::new().unwrap();
     let (map, again, file) =
@@ -59,17 +59,17 @@ fn scans_that_come_too_fast_are_left_out_if_asked_counted_and_not_taken_later() 
         let _ = std::fs::remove_dir_all(&again);
         let arguments = ["build", "-", "-o", text(&map), "--resolution", "0.5", "--keep-scans", "--json"];
         let arguments = [&arguments[..], &["--when-behind", how]].concat();
-        // All at once.
+        // All scans at once.
         let built = voxtile(&arguments).write_stdin(drive("", SCANS)).assert().success();
         let summary: serde_json::Value = serde_json::from_slice(&built.get_output().stdout).unwrap();
         let [scans, left_out] = ["scans", "left_out_scans"].map(|key| summary[key].as_u64().unwrap());
         assert_eq!(scans + left_out, SCANS as u64);
         assert!(scans > 0 && left_out > 0, "{summary}");
-        // The map is that of the scans which it keeps.
+        // The map equals a build of the scans that it keeps.
         json(&["build", text(&map), "-o", text(&again), "--resolution", "0.5", "--json"]);
         assert_eq!(digest(&map), digest(&again));
         assert_eq!(json(&["info", text(&map), "--json"])["scan_number"], scans);
-        // The same input goes on behind what came: nothing that was left out is taken.
+        // The same input resumes after the last scan; dropped scans are not added.
         let arguments = ["build", "-", "-o", text(&map), "--resolution", "0.5", "--resume", "--json"];
         let resumed = voxtile(&arguments).write_stdin(drive("", SCANS + 2)).assert().success();
         let summary: serde_json::Value = serde_json::from_slice(&resumed.get_output().stdout).unwrap();
@@ -83,7 +83,7 @@ fn scans_that_come_too_fast_are_left_out_if_asked_counted_and_not_taken_later() 
 }
 
 #[test]
-fn a_local_map_takes_scans_from_standard_input_once() {
+fn a_local_map_reads_scans_from_standard_input() {
     let folder = TempDir::new().unwrap();
     let (file, picture) = (folder.path().join("drive.scans"), folder.path().join("local.png"));
     let local = |scans: &str, how: &[&str]| {
@@ -100,5 +100,5 @@ fn a_local_map_takes_scans_from_standard_input_once() {
     assert_eq!(piped[0], 6);
     assert!(picture.exists());
     let refused = local("-", &["--repeat", "2"]).write_stdin(drive("", 6)).assert().code(2);
-    assert!(String::from_utf8_lossy(&refused.get_output().stderr).contains("come once"));
+    assert!(String::from_utf8_lossy(&refused.get_output().stderr).contains("only once"));
 }

@@ -3,15 +3,15 @@ use std::fs;
 use tempfile::TempDir;
 
 #[test]
-fn a_bad_session_is_undone_and_the_past_can_be_looked_at() {
+fn a_bad_session_is_reverted_and_snapshots_are_readable() {
     let folder = TempDir::new().unwrap();
     let (scans, map) = (scans(&folder), folder.path().join("map"));
     let map = text(&map);
     for storage in ["octomap", "compact"] {
         output(&["build", text(&scans), "-o", map, "--storage", storage]);
         let before = output(&["digest", map]);
-        let said = output(&["snapshot", map, "good"]);
-        assert!(said.contains("kept      good: flush") && said.contains("scan 3"), "{said}");
+        let printed = output(&["snapshot", map, "good"]);
+        assert!(printed.contains("kept      good: flush") && printed.contains("scan 3"), "{printed}");
         output(&["build", text(&scans), "-o", map, "--append", "--again"]);
         let after = output(&["digest", map]);
         assert_ne!(before, after);
@@ -28,7 +28,7 @@ fn a_bad_session_is_undone_and_the_past_can_be_looked_at() {
         let listed = json(&["snapshots", map, "--json"]);
         assert_eq!(listed["snapshots"][0]["name"], "good");
         assert!(listed["snapshots"][0]["own_bytes"].as_u64().unwrap() > 200);
-        assert!(output(&["snapshots", map]).contains("for it alone"));
+        assert!(output(&["snapshots", map]).contains("used only by it"));
 
         let changed = json(&["diff", &past, map, "--json"]);
         let again = json(&["diff", map, "good", "now", "--json"]);
@@ -42,10 +42,16 @@ fn a_bad_session_is_undone_and_the_past_can_be_looked_at() {
             changed["tiles_changed"].as_u64().unwrap()
         );
         let same = output(&["diff", map, map]);
-        assert!(same.contains("0 appeared, 0 gone, 0 changed") && same.contains("0 in value only"), "{same}");
+        assert!(
+            same.contains("0 appeared, 0 removed, 0 changed") && same.contains("0 in value only"),
+            "{same}"
+        );
 
-        let said = output(&["revert", map, "good", "--keep-as", "bad"]);
-        assert!(said.contains("reverted  to good: scan 3") && said.contains("kept as bad"), "{said}");
+        let printed = output(&["revert", map, "good", "--keep-as", "bad"]);
+        assert!(
+            printed.contains("reverted  to good: scan 3") && printed.contains("kept as bad"),
+            "{printed}"
+        );
         assert_eq!(output(&["digest", map]), before);
         assert_eq!(output(&["digest", &format!("{map}@bad")]), after);
         let report = json(&["verify", map, "--json"]);
@@ -60,7 +66,7 @@ fn a_bad_session_is_undone_and_the_past_can_be_looked_at() {
 }
 
 #[test]
-fn wrong_snapshots_are_told_what_is_wrong() {
+fn wrong_snapshot_names_are_reported() {
     let folder = TempDir::new().unwrap();
     let (scans, map) = (scans(&folder), folder.path().join("map"));
     output(&["build", text(&scans), "-o", text(&map)]);
@@ -80,24 +86,24 @@ fn wrong_snapshots_are_told_what_is_wrong() {
         (&["convert", map, "-o", &present, "--storage", "compact"], "can be read and not changed"),
         (&["build", text(&scans), "-o", &present], "can be read and not changed"),
     ] {
-        let (code, said) = failure(arguments);
-        assert_eq!(code, 2, "{arguments:?}: {said}");
-        assert!(said.contains(message), "{arguments:?}: {said}");
+        let (code, printed) = failure(arguments);
+        assert_eq!(code, 2, "{arguments:?}: {printed}");
+        assert!(printed.contains(message), "{arguments:?}: {printed}");
     }
-    // A name that is taken by this very state is no error: the command may have been killed before.
-    assert!(output(&["snapshot", map, "a"]).contains("it was there already"));
-    assert!(output(&["revert", map, "a", "--keep-as", "a"]).contains("the map is as of a already"));
+    // A snapshot of the same state with this name is no error: an earlier call may have been killed.
+    assert!(output(&["snapshot", map, "a"]).contains("already existed"));
+    assert!(output(&["revert", map, "a", "--keep-as", "a"]).contains("the map already equals a"));
     output(&["clear", map, "--region", "0", "0", "0", "1", "1", "1"]);
     for arguments in [&["snapshot", map, "a"][..], &["revert", map, "a", "--keep-as", "a"]] {
-        let (code, said) = failure(arguments);
-        assert!(code == 2 && said.contains("delete that snapshot first"), "{said}");
+        let (code, printed) = failure(arguments);
+        assert!(code == 2 && printed.contains("delete that snapshot first"), "{printed}");
     }
     let other = folder.path().join("other");
     output(&["build", text(&scans), "-o", text(&other), "--resolution", "0.2"]);
-    let (code, said) = failure(&["diff", map, text(&other)]);
+    let (code, printed) = failure(&["diff", map, text(&other)]);
     assert_eq!(code, 2);
-    assert!(said.contains("resolution 0.2 m, not 0.1 m"), "{said}");
-    // A folder that is named like that is that folder.
+    assert!(printed.contains("resolution 0.2 m, not 0.1 m"), "{printed}");
+    // A folder of that name has precedence.
     let odd = folder.path().join("odd@a");
     fs::rename(text(&other), &odd).unwrap();
     assert_eq!(json(&["info", text(&odd), "--json"])["resolution_m"], 0.2);

@@ -3,7 +3,7 @@ use crate::message::{F32, MessageWriter};
 use std::fs;
 use tempfile::TempDir;
 
-/// A record of an MCAP file.
+/// Returns a record of an MCAP file.
 fn record(kind: u8, contents: &[u8]) -> Vec<u8> {
     [&[kind][..], &(contents.len() as u64).to_le_bytes(), contents].concat()
 }
@@ -12,8 +12,8 @@ fn sized(bytes: &[u8]) -> Vec<u8> {
     [&(bytes.len() as u32).to_le_bytes()[..], bytes].concat()
 }
 
-/// An MCAP file that was not closed, of chunks with so many clouds each. A checksum of 0 stands for none, and others
-/// are wrong.
+/// Returns an unfinished MCAP file of chunks with a checksum and a number of clouds. A checksum of 0 means none, any
+/// other is wrong.
 fn recording(chunks: &[(u32, u32)]) -> Vec<u8> {
     let schema =
         [&1_u16.to_le_bytes()[..], &sized(b"sensor_msgs/msg/PointCloud2"), &sized(b"ros2msg"), &sized(b"")];
@@ -42,7 +42,7 @@ fn recording(chunks: &[(u32, u32)]) -> Vec<u8> {
 }
 
 #[test]
-fn a_damaged_chunk_counts_once_among_the_scans_that_may_be_skipped() {
+fn a_damaged_chunk_counts_as_one_skipped_scan() {
     let folder = TempDir::new().unwrap();
     let [few, many, map, other] =
         ["few.mcap", "many.mcap", "map", "other"].map(|name| folder.path().join(name));
@@ -53,7 +53,7 @@ fn a_damaged_chunk_counts_once_among_the_scans_that_may_be_skipped() {
     let resumed = json(&[&build[..], &["--resume"]].concat());
     assert_eq!((&resumed["scans"], &resumed["resumed_after"]), (&1.into(), &2.into()));
     assert_eq!(resumed["unread_scans"].as_array().unwrap().len(), 202);
-    // More damaged chunks than that are too many, and the error says what to do.
+    // More damaged chunks than the limit fail with a remedy.
     fs::write(&many, recording(&[&[(1, 0)][..], &[(1, 1); 1001]].concat())).unwrap();
     let (code, stderr) =
         failure(&["build", text(&many), "-o", text(&other), "--no-rays", "--skip-bad", "--quiet"]);

@@ -1,4 +1,4 @@
-//! Texts and raw numbers of other programs, by the command.
+//! Tests of text and raw files of other programs with the command.
 
 use assert_cmd::Command;
 use std::fs;
@@ -70,7 +70,7 @@ fn guesses_are_printed() {
 }
 
 #[test]
-fn a_camera_beside_a_folder_of_depths_is_no_cloud() {
+fn intrinsics_next_to_depth_images_are_no_cloud() {
     let folder = tempfile::tempdir().unwrap();
     fs::create_dir(folder.path().join("depth")).unwrap();
     fs::write(folder.path().join("cam.txt"), "525 525 31.5 23.5\n").unwrap();

@@ -3,7 +3,7 @@ use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
 
-/// Takes a scan and its pose from an input of three.
+/// Removes a scan and its pose from an input of three.
 fn drop_first(scans: &Path) {
     fs::remove_file(scans.join("000.pcd")).unwrap();
     let poses = fs::read_to_string(scans.join("poses_kitti.txt")).unwrap();
@@ -15,7 +15,7 @@ fn digest(map: &str) -> String {
 }
 
 #[test]
-fn a_resumed_build_takes_every_scan_once_and_refuses_anything_else() {
+fn a_resumed_build_adds_every_scan_once_and_refuses_other_input() {
     let folder = TempDir::new().unwrap();
     let input = scans(&folder);
     let (path, whole) = (folder.path().join("map"), folder.path().join("whole"));
@@ -23,7 +23,7 @@ fn a_resumed_build_takes_every_scan_once_and_refuses_anything_else() {
     let build = |map, more: &[&str]| json(&[&["build", scans, "-o", map, "--json"], more].concat());
     let parameters = ["--resolution", "0.2", "--max-range", "9", "--insert", "per-ray"];
     build(whole, &parameters);
-    // Begun by --resume; ended after it, nothing is left to do, with the parameters or without.
+    // Started with --resume; after the end nothing is left to do, with or without the parameters.
     let begun = build(map, &[&["--resume", "--flush-every", "1"], &parameters[..]].concat());
     assert_eq!((&begun["scans"], &begun["resumed_after"]), (&3.into(), &0.into()));
     for parameters in [&parameters[..], &[]] {
@@ -58,7 +58,7 @@ fn a_resumed_build_takes_every_scan_once_and_refuses_anything_else() {
     assert_eq!(digest(map), digest(whole), "what is refused changes nothing");
 }
 
-/// A folder of scans, each at its own place along x in metres, that differ from those of other seeds.
+/// Writes scans at different x, in metres, that differ between seeds.
 fn numbered(folder: &Path, seed: u32, numbers: std::ops::Range<u32>) {
     fs::create_dir_all(folder).unwrap();
     for number in numbers {
@@ -73,7 +73,7 @@ fn numbered(folder: &Path, seed: u32, numbers: std::ops::Range<u32>) {
 }
 
 #[test]
-fn inputs_are_known_again_gone_on_with_when_they_grow_and_refused_when_they_change() {
+fn known_inputs_resume_when_grown_and_are_refused_when_changed() {
     let folder = TempDir::new().unwrap();
     let [a, b, map, whole] = ["a", "b", "map", "whole"].map(|name| folder.path().join(name));
     numbered(&a, 1, 1..6);
@@ -81,11 +81,11 @@ fn inputs_are_known_again_gone_on_with_when_they_grow_and_refused_when_they_chan
     let map = text(&map);
     let build =
         |input: &Path, how: &[&str]| json(&[&["build", text(input), "-o", map, "--json"], how].concat());
-    // One command line, with a map or without one.
+    // The same command line creates and extends the map.
     let once = ["--append", "--resume"];
     assert_eq!(build(&a, &once)["scans"], 5);
     assert_eq!((&build(&b, &once)["scans"], &build(&a, &once)["scans"]), (&3.into(), &0.into()));
-    // It has grown by scans whose names come last only when people count.
+    // New scans whose names are last in numeric order, but not in byte order.
     numbered(&a, 1, 1..13);
     let grown = build(&a, &once);
     assert_eq!(
@@ -95,7 +95,7 @@ fn inputs_are_known_again_gone_on_with_when_they_grow_and_refused_when_they_chan
     assert_eq!(build(&a, &["--resume"])["scans"], 0);
     assert_eq!(build(&b, &once)["scans"], 0);
 
-    // The same as without all that: hits and misses of these scans do not depend on the order of the inputs.
+    // Equal to a build without interruptions, because hits and misses of these scans commute.
     let parts = [("b", 1..4, 2), ("a", 1..13, 1)];
     let [first, second] = parts.map(|(name, numbers, seed)| {
         let again = folder.path().join(format!("again_{name}"));
@@ -111,7 +111,7 @@ fn inputs_are_known_again_gone_on_with_when_they_grow_and_refused_when_they_chan
     output(&["build", text(&b), "-o", text(&whole), "--append"]);
     assert_eq!(json(&["info", text(&whole), "--json"])["voxels"], json(&["info", map, "--json"])["voxels"]);
 
-    // A scan among those that were taken, and then a pose.
+    // Change an added scan, and then a pose.
     let third = a.join("scan3.pcd");
     let good = fs::read_to_string(&third).unwrap();
     fs::write(&third, good.replacen("4 0.03", "4 0.04", 1)).unwrap();
@@ -125,7 +125,7 @@ fn inputs_are_known_again_gone_on_with_when_they_grow_and_refused_when_they_chan
 }
 
 #[test]
-fn scans_that_cannot_be_read_are_skipped_named_and_stay_skipped() {
+fn unreadable_scans_are_skipped_named_and_remain_skipped() {
     let folder = TempDir::new().unwrap();
     let [a, good, map, whole] = ["a", "good", "map", "whole"].map(|name| folder.path().join(name));
     numbered(&a, 1, 0..8);
@@ -146,7 +146,7 @@ fn scans_that_cannot_be_read_are_skipped_named_and_stay_skipped() {
     output(&["build", text(&good), "-o", text(&whole)]);
     assert_eq!(digest(map), digest(text(&whole)));
 
-    // It grows; what was skipped stays so, also when it can be read, and without being asked for again.
+    // The input grows; a skipped scan remains skipped even if it becomes readable, without --skip-bad.
     numbered(&a, 1, 2..3);
     numbered(&a, 1, 8..10);
     numbered(&good, 1, 8..10);
@@ -156,9 +156,9 @@ fn scans_that_cannot_be_read_are_skipped_named_and_stay_skipped() {
     assert_eq!(digest(map), digest(text(&whole)));
 }
 
-/// Maps of earlier versions know one input, by its files.
+/// Maps of earlier versions record one input, by its files.
 #[test]
-fn an_input_of_an_earlier_version_is_gone_on_with() {
+fn an_input_of_an_earlier_version_resumes() {
     let folder = TempDir::new().unwrap();
     let [a, map, whole] = ["a", "map", "whole"].map(|name| folder.path().join(name));
     numbered(&a, 1, 0..6);
@@ -179,13 +179,13 @@ fn an_input_of_an_earlier_version_is_gone_on_with() {
     assert_eq!((&resumed["scans"], &resumed["resumed_after"]), (&2.into(), &4.into()));
     output(&["build", text(&a), "-o", whole]);
     assert_eq!(digest(map), digest(whole));
-    // From now on it is known scan by scan.
+    // From here on it is recorded scan by scan.
     numbered(&a, 1, 6..7);
     assert_eq!(json(&["build", text(&a), "-o", map, "--resume", "--json"])["scans"], 1);
 }
 
 #[test]
-fn what_was_added_can_be_resumed_too() {
+fn an_appended_input_can_be_resumed() {
     let (first, second, folder) = (TempDir::new().unwrap(), TempDir::new().unwrap(), TempDir::new().unwrap());
     let first = scans(&first);
     let second = second.path().join("scans");
@@ -203,7 +203,7 @@ fn what_was_added_can_be_resumed_too() {
     numbered(&third, 2, 0..2);
     let (code, stderr) = failure(&["build", text(&third), "-o", map, "--resume"]);
     assert!(code == 2 && stderr.contains("been built from input"), "{stderr}");
-    // Another input of the same name.
+    // Another input with the same name.
     for file in fs::read_dir(&third).unwrap().map(|file| file.unwrap().path()) {
         fs::copy(&file, second.join(file.file_name().unwrap())).unwrap();
     }
@@ -220,13 +220,13 @@ fn what_was_added_can_be_resumed_too() {
 }
 
 #[test]
-fn damage_has_an_exit_code_and_a_line_and_is_repaired() {
+fn damage_is_reported_with_an_exit_code_and_repaired() {
     let folder = TempDir::new().unwrap();
     let input = scans(&folder);
     let path = folder.path().join("map");
     let map = text(&path);
     output(&["build", text(&input), "-o", map, "--resolution", "0.2"]);
-    assert!(output(&["verify", map]).contains("whole: every checksum matches"));
+    assert!(output(&["verify", map]).contains("intact: all checksums match"));
     let whole = json(&["verify", map, "--json"]);
     assert_eq!(
         (&whole["whole"], &whole["verified"], &whole["damage"]),
@@ -263,7 +263,7 @@ fn damage_has_an_exit_code_and_a_line_and_is_repaired() {
     let damaged: serde_json::Value = serde_json::from_str(&damaged).unwrap();
     let finding = &damaged["findings"][0];
     assert_eq!((&finding["path"], &finding["offset"]), (&text(&table).into(), &0.into()));
-    // A script must not take a map with holes for a whole one.
+    // Scripts must not treat an incomplete map as intact.
     let repaired: serde_json::Value =
         serde_json::from_str(&failing_output(&["repair", map, "--json"]).1).unwrap();
     assert_eq!(repaired["tiles_lost"], 1);
@@ -290,7 +290,7 @@ fn a_map_of_the_seeds_own_format_is_unverified_and_not_damaged() {
     assert!(output(&["repair", map]).contains("nothing to repair"));
 }
 
-/// Takes from a map all that is not the original.
+/// Removes everything that is not in the original format.
 fn strip(map: &Path) {
     fs::remove_file(map.join("commits.log")).unwrap();
     let metadata = r#"{"version": "1.0", "resolution": 0.2, "tile_size": 10.0, "bounds": {"min": [0,0,0], "max": [0,0,0]}}"#;
@@ -311,10 +311,10 @@ fn failing_output(arguments: &[&str]) -> (i32, String) {
 }
 
 #[test]
-fn a_build_that_begins_with_resume_is_the_build_without() {
+fn a_build_started_with_resume_equals_a_plain_build() {
     let folder = TempDir::new().unwrap();
     let cloud = folder.path().join("far.pcd");
-    // Beyond the range at which rays are cut unless something else is asked for.
+    // Beyond the default maximum range.
     let far = "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 1\nHEIGHT 1\nPOINTS 1\nDATA \
                ascii\n150 0 0\n";
     fs::write(&cloud, far).unwrap();
@@ -324,7 +324,7 @@ fn a_build_that_begins_with_resume_is_the_build_without() {
     assert_eq!(output(&["digest", text(&plain)]), output(&["digest", text(&resumed)]));
 }
 
-/// A pose from where no ray can begin is as a scan that cannot be read: the build ends there, or goes past it.
+/// A scan with a pose too far from the origin fails like an unreadable scan, or is skipped with --skip-bad.
 #[test]
 fn a_scan_with_a_pose_too_far_away_can_be_skipped() {
     let folder = TempDir::new().unwrap();
@@ -350,7 +350,7 @@ fn a_scan_with_a_pose_too_far_away_can_be_skipped() {
     assert_eq!((&went_on["scans"], &went_on["resumed_after"]), (&1.into(), &2.into()));
     output(&["build", text(&good), "-o", text(&whole)]);
     assert_eq!(digest(map), digest(text(&whole)));
-    // The first one, too; and points alone need no place to begin from.
+    // Also as the first scan. Points without rays need no valid origin.
     fs::rename(folder.path().join("scan0.pcd"), a.join("scan0.pcd")).unwrap();
     let other = folder.path().join("other");
     output(&["build", text(&a), "-o", text(&other), "--skip-bad"]);
@@ -359,9 +359,9 @@ fn a_scan_with_a_pose_too_far_away_can_be_skipped() {
     assert_eq!(json(&["build", text(&a), "-o", text(&points), "--no-rays", "--json"])["scans"], 5);
 }
 
-/// Another input may have come behind it, with other ranges.
+/// A later input may have other ranges.
 #[test]
-fn an_input_goes_on_as_it_was_begun() {
+fn an_input_resumes_with_its_own_settings() {
     let folder = TempDir::new().unwrap();
     let [a, b, map] = ["a", "b", "map"].map(|name| folder.path().join(name));
     numbered(&a, 1, 0..3);
@@ -379,7 +379,7 @@ fn an_input_goes_on_as_it_was_begun() {
     let (code, stderr) = failure(&["build", text(&a), "-o", map, "--resume", "--max-range", "1"]);
     assert!(code == 2 && stderr.contains("ranges of 0 m to 50 m, not 0 m to 1 m"), "{stderr}");
     assert_eq!(build(&a, &["--resume", "--max-range", "50"])["scans"], 1);
-    // The other one goes on with its own, by itself, too.
+    // The other input also resumes with its own.
     numbered(&b, 2, 2..3);
     let resumed = build(&b, &["--resume"]);
     assert_eq!((&resumed["resumed_after"], &resumed["hits"]), (&2.into(), &0.into()));
@@ -405,7 +405,7 @@ fn points_alone_and_rays_of_one_input_do_not_mix() {
 }
 
 #[test]
-fn an_input_of_which_only_empty_scans_were_taken_is_resumed() {
+fn an_input_of_only_empty_scans_is_resumed() {
     let folder = TempDir::new().unwrap();
     let [input, map, whole] = ["a", "map", "whole"].map(|name| folder.path().join(name));
     numbered(&input, 1, 2..5);
@@ -416,7 +416,7 @@ fn an_input_of_which_only_empty_scans_were_taken_is_resumed() {
     }
     let [input, map] = [text(&input), text(&map)];
     output(&["build", input, "-o", map, "--count", "2"]);
-    // Another input that begins like it is another one.
+    // Another input with the same beginning is not the same input.
     let other = folder.path().join("b");
     fs::create_dir(&other).unwrap();
     for number in 0..5 {
@@ -432,7 +432,7 @@ fn an_input_of_which_only_empty_scans_were_taken_is_resumed() {
     output(&["build", input, "-o", text(&whole)]);
     assert_eq!(digest(map), digest(text(&whole)));
 
-    // One of the empty scans is skipped; a later attempt that took nothing hides none of them.
+    // One of the empty scans is skipped; a later attempt that adds nothing still reports them.
     let first = Path::new(input).join("scan0.pcd");
     let far = fs::read_to_string(&first).unwrap().replacen("VIEWPOINT 0 ", "VIEWPOINT 1e12 ", 1);
     fs::write(&first, far).unwrap();

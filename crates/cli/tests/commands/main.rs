@@ -1,54 +1,54 @@
-//! The command, as a person or a program runs it.
+//! Tests of the command with small inputs.
 
-/// Recordings of ROS 1 that tests make.
+/// Synthetic ROS 1 recordings.
 #[cfg(feature = "ros")]
 #[path = "../../../formats/tests/made/bag1.rs"]
 mod bag1;
-/// The command as a person types it.
+/// Main commands.
 mod cli;
-/// The commands that merge, crop, clear and fade.
+/// merge, crop, clear and decay.
 mod cli_edit;
-/// Exported files: written as a whole or not at all, and never over other files.
+/// Exports: atomic, never over other files.
 mod cli_export;
-/// Files of other programs, in and out.
+/// Files of other programs as input and output.
 mod cli_formats;
 /// Help, man pages and completion scripts.
 mod cli_help;
-/// What `--json` prints: the version, shapes of places and boxes, failures.
+/// Output of `--json`.
 mod cli_json;
-/// The local map, by the command.
+/// `local`.
 mod cli_local;
-/// What `-q`, `-v` and `RUST_LOG` say beside the answer.
+/// Effects of `-q`, `-v` and `RUST_LOG`.
 mod cli_log;
-/// Pictures, in files and for terminals, and reports.
+/// Pictures and reports.
 mod cli_pictures;
-/// Poses that may mean something else.
+/// Ambiguous poses.
 mod cli_pose_guess;
-/// Poses that come with files, beside them or by options.
+/// Poses in an input, next to it, or given by an option.
 mod cli_poses;
-/// Maps of a region from the command line.
+/// Maps of regions.
 mod cli_region;
-/// Maps that follow new poses, by the command.
+/// `remap` and removals.
 mod cli_remap;
-/// The stream of scans, from standard input.
+/// Scan streams from standard input.
 mod cli_scan_stream;
-/// Snapshots from the command line.
+/// Snapshots.
 mod cli_snapshots;
 /// Recordings with damaged chunks.
 #[cfg(feature = "ros")]
 mod damaged_recordings;
-/// Texts and raw numbers of other programs.
+/// Text and raw files of other programs.
 mod foreign_texts;
-/// Builds that are resumed, maps that are verified and repaired, from the command line.
+/// Resumed builds, `verify` and `repair`.
 mod interrupted;
-/// Messages of ROS that tests make.
+/// Synthetic ROS messages.
 #[cfg(feature = "ros")]
 #[allow(dead_code)]
 #[path = "../../../formats/tests/made/message.rs"]
 mod message;
-/// Recordings of programs for odometry.
+/// Recordings of odometry programs.
 #[cfg(feature = "ros")]
 mod registered_clouds;
-/// Maps in a browser, by what the server sends.
+/// `view`, tested through its server.
 #[cfg(all(feature = "view", target_os = "linux"))]
 mod view;

@@ -7,7 +7,7 @@ use tempfile::TempDir;
 
 const START_NS: i64 = 1_700_000_000_000_000_000;
 
-/// A recording of clouds in a frame, and of a sensor that moves along x in `camera_init`, by these topics.
+/// Writes a recording of clouds in `frame` and of a sensor that moves along x in `camera_init`, on these topics.
 fn write_bag(path: &Path, frame: &str, odometries: &[&str]) {
     let topics: Vec<(&str, &str)> = odometries
         .iter()
@@ -63,10 +63,10 @@ fn registered_clouds_make_the_map_of_their_poses_in_the_world() {
 }
 
 #[test]
-fn errors_name_the_options_that_lead_to_poses() {
+fn errors_name_the_options_for_poses() {
     let folder = TempDir::new().unwrap();
     let (bag, map) = (folder.path().join("a.bag"), folder.path().join("map"));
-    for (frame, odometries, told) in [
+    for (frame, odometries, reported) in [
         ("camera_init", &["/a", "/b"][..], "name one, as with --odometry /a --world-frame"),
         (
             "body",
@@ -77,10 +77,10 @@ fn errors_name_the_options_that_lead_to_poses() {
     ] {
         write_bag(&bag, frame, odometries);
         let (_, error) = failure(&["build", text(&bag), "-o", text(&map)]);
-        assert!(error.contains(told), "{error}");
+        assert!(error.contains(reported), "{error}");
         assert!(!map.exists());
-        // What the error says works.
-        let option = told.split("--odometry ").nth(1).unwrap();
+        // The suggested options work.
+        let option = reported.split("--odometry ").nth(1).unwrap();
         let options: Vec<&str> = ["--odometry"].into_iter().chain(option.split(' ')).collect();
         let built = json(&[&["build", text(&bag), "-o", text(&map), "--json"], &options[..]].concat());
         assert_eq!(built["scans"], 4, "{built}");

@@ -1,5 +1,4 @@
-//! `voxtile view`, by its server: what it serves is the map, and nothing else, to nobody else, whatever the other side
-//! does.
+//! `voxtile view` serves exactly the map to authorised clients, whatever other clients do.
 
 use assert_cmd::cargo::cargo_bin;
 use serde_json::Value;
@@ -15,7 +14,7 @@ use tempfile::TempDir;
 const TOKEN: &str = "open_sesame";
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// A running `voxtile view`, ended with its value.
+/// A running `voxtile view`; stopped on drop.
 struct Viewer {
     process: Child,
     address: SocketAddr,
@@ -50,14 +49,14 @@ impl Viewer {
         let mut process = command.stdout(Stdio::piped()).spawn().unwrap();
         let mut line = String::new();
         BufReader::new(process.stdout.take().unwrap()).read_line(&mut line).unwrap();
-        let said: Value = serde_json::from_str(&line).unwrap();
-        let address: SocketAddr = said["listen"].as_str().unwrap().parse().unwrap();
-        assert_eq!(said["url"], format!("http://{address}/{TOKEN}/"));
+        let printed: Value = serde_json::from_str(&line).unwrap();
+        let address: SocketAddr = printed["listen"].as_str().unwrap().parse().unwrap();
+        assert_eq!(printed["url"], format!("http://{address}/{TOKEN}/"));
         assert!(address.ip().is_loopback());
         Self { process, address }
     }
 
-    /// As [`Viewer::of`], once the levels of all maps are there.
+    /// Same as [`Viewer::of`], but waits for the levels of all maps.
     fn ready(maps: &[&Path], cache: &Path) -> Self {
         let viewer = Self::of(maps, cache);
         viewer.wait(|maps| maps.iter().all(|map| map["generation"] != 0 && map["pending_tiles"] == 0));
@@ -78,14 +77,14 @@ impl Viewer {
         stream
     }
 
-    /// A request of these very bytes.
+    /// Sends these bytes as a request.
     fn send(&self, request: &str) -> Reply {
         let mut stream = self.connect();
         stream.write_all(request.as_bytes()).unwrap();
         read_reply(stream)
     }
 
-    /// A path as it is, with the token in front.
+    /// Requests a raw path after the token.
     fn get(&self, path: &str) -> Reply {
         self.send(&format!(
             "GET /{TOKEN}/{path} HTTP/1.1\r\nhost: {}\r\nconnection: close\r\n\r\n",
@@ -100,7 +99,7 @@ impl Viewer {
         serde_json::from_str(&text).unwrap_or_else(|error| panic!("{path}: {error}: {text}"))
     }
 
-    /// Paths of all nodes with their versions, by the tileset and the files below it.
+    /// Returns the paths of all nodes with their versions, from the tileset and its subtrees.
     fn nodes(&self, map: &str) -> Vec<String> {
         let mut nodes = Vec::new();
         let mut open = vec![self.json(&format!("maps/{map}/tileset.json"))["root"].clone()];
@@ -117,7 +116,7 @@ impl Viewer {
         nodes
     }
 
-    /// The voxels of a node: centers in millimetres, and values.
+    /// Returns the voxels of a node: centers in millimetres, and values.
     fn voxels(&self, node: &str) -> Vec<([i64; 3], u8)> {
         let reply = self.get(node);
         assert_eq!(reply.status, 200, "{node}");
@@ -138,7 +137,7 @@ impl Viewer {
         (0..count).map(voxel).collect()
     }
 
-    /// The voxels of the finest nodes.
+    /// Returns the voxels of the finest nodes.
     fn finest(&self, map: &str) -> Vec<([i64; 3], u8)> {
         let is_finest = |path: &&String| path.contains("/node/0/");
         self.nodes(map).iter().filter(is_finest).flat_map(|path| self.voxels(path)).collect()
@@ -166,7 +165,7 @@ fn text(path: &Path) -> &str {
     path.to_str().unwrap()
 }
 
-/// Scans of walls, from `first` on, into a map: each scan of another wall.
+/// Adds scans of different walls to a map.
 fn build(folder: &Path, map: &Path, walls: std::ops::Range<usize>) {
     for wall in walls {
         let scans = folder.join(format!("wall{wall}"));
@@ -205,14 +204,14 @@ fn a_map() -> (TempDir, PathBuf) {
 }
 
 #[test]
-fn what_is_shown_is_the_map() {
+fn the_server_shows_the_map() {
     let (folder, map) = a_map();
     let viewer = Viewer::ready(&[&map], &folder.path().join("cache"));
     let shown = viewer.finest("0");
     let wanted = exported(folder.path(), text(&map));
     assert_eq!(shown.len(), wanted.len());
     assert_eq!(shown.iter().map(|(voxel, _)| *voxel).collect::<BTreeSet<_>>(), wanted);
-    // A browser keeps what its URL names the version of, and nothing else.
+    // Browsers cache only URLs with a version.
     let node = &viewer.nodes("0")[0];
     let (path, version) = node.split_once("?v=").unwrap();
     assert!(viewer.get(node).head.contains("immutable"));
@@ -220,24 +219,24 @@ fn what_is_shown_is_the_map() {
     for path in [path.to_owned(), format!("{path}?v={other}"), format!("{path}?v=x")] {
         assert!(viewer.get(&path).head.contains("no-store"), "{path}");
     }
-    // The coarsest are there at once: few, and around everything.
+    // The coarsest nodes are available at once: few, around the whole map.
     let tops: u64 = viewer.nodes("0").iter().filter(|path| !path.contains("/node/0/")).count() as u64;
     assert!(tops > 0);
     for voxel in wanted.iter().step_by(101) {
         let [x, y, z] = voxel.map(|c| c as f64 / 1000.0);
-        let asked = viewer.json(&format!("maps/0/query?x={x}&y={y}&z={z}"));
+        let answer = viewer.json(&format!("maps/0/query?x={x}&y={y}&z={z}"));
         let line = run(&["query", text(&map), &x.to_string(), &y.to_string(), &z.to_string(), "--json"]);
         let wanted: Value = serde_json::from_str(&line).unwrap();
         for (name, value) in wanted.as_object().unwrap() {
-            assert_eq!(asked[name], *value, "{name}");
+            assert_eq!(answer[name], *value, "{name}");
         }
-        assert_eq!(asked["state"], "occupied");
-        let low = asked["voxel_m"]["min"][0].as_f64().unwrap();
-        assert!(low < x && x < asked["voxel_m"]["max"][0].as_f64().unwrap());
+        assert_eq!(answer["state"], "occupied");
+        let low = answer["voxel_m"]["min"][0].as_f64().unwrap();
+        assert!(low < x && x < answer["voxel_m"]["max"][0].as_f64().unwrap());
     }
     let way = viewer.json("maps/0/trajectory.json");
     assert_eq!(way["points"], serde_json::json!([[0.0, 0.0, 1.0], [12.0, 0.0, 1.0], [24.0, 0.0, 1.0]]));
-    // From the first place to its wall, and beyond it.
+    // From the first position to its wall, and beyond it.
     assert_eq!(viewer.json("maps/0/raycast?from=0,0,1&to=3.5,0,1.5")["visible"], true);
     assert_eq!(viewer.json("maps/0/raycast?from=0,0,1&to=4.05,0.02,1.55")["visible"], true);
     let beyond = viewer.json("maps/0/raycast?from=0,0,1.55&to=6,0,1.55");
@@ -257,7 +256,7 @@ fn octomap_files_and_several_maps_are_shown() {
     assert_eq!(viewer.get("maps/2/tileset.json").status, 404);
 }
 
-/// A browser keeps nodes for ever: another file at the same address must not have them under the same URLs.
+/// Browsers cache nodes for ever, so another file at the same address must have other URLs.
 #[test]
 fn another_octomap_file_has_other_nodes() {
     let (folder, map) = a_map();
@@ -287,11 +286,11 @@ fn strangers_get_nothing() {
     fs::write(&secret, "secret").unwrap();
     let viewer = Viewer::ready(&[&map], &folder.path().join("cache"));
     let host = viewer.address;
-    let asked =
+    let reply_to =
         |line: &str, host: &str| viewer.send(&format!("{line}\r\nhost: {host}\r\nconnection: close\r\n\r\n"));
     let host = host.to_string();
-    assert_eq!(asked(&format!("GET /{TOKEN}/maps.json HTTP/1.1"), &host).status, 200);
-    // Strangers keep no connection, whatever they ask for; others do.
+    assert_eq!(reply_to(&format!("GET /{TOKEN}/maps.json HTTP/1.1"), &host).status, 200);
+    // Unauthorised clients get no persistent connection; others do.
     let is_closed = |token: &str| {
         let mut stream = viewer.connect();
         write!(stream, "GET /{token}/maps.json HTTP/1.1\r\nhost: {host}\r\n\r\n").unwrap();
@@ -312,7 +311,7 @@ fn strangers_get_nothing() {
         format!("/{TOKEN}{}", secret.display()),
         format!("http://elsewhere/{TOKEN}x/maps.json"),
     ] {
-        let reply = asked(&format!("GET {path} HTTP/1.1"), &host);
+        let reply = reply_to(&format!("GET {path} HTTP/1.1"), &host);
         assert!(reply.status == 404 || reply.status == 400, "{path}: {}", reply.status);
         let body = String::from_utf8_lossy(&reply.body).into_owned();
         assert!(
@@ -321,14 +320,14 @@ fn strangers_get_nothing() {
         );
     }
     for method in ["POST", "PUT", "DELETE", "OPTIONS", "PATCH"] {
-        assert_eq!(asked(&format!("{method} /{TOKEN}/maps.json HTTP/1.1"), &host).status, 405, "{method}");
+        assert_eq!(reply_to(&format!("{method} /{TOKEN}/maps.json HTTP/1.1"), &host).status, 405, "{method}");
     }
-    // A page of elsewhere, whose name was made to mean this machine.
+    // A page of another site with a DNS name for this machine.
     for name in ["elsewhere.example", "elsewhere.example:80", "", "127.0.0.1.elsewhere.example"] {
-        assert_eq!(asked(&format!("GET /{TOKEN}/maps.json HTTP/1.1"), name).status, 403, "{name}");
+        assert_eq!(reply_to(&format!("GET /{TOKEN}/maps.json HTTP/1.1"), name).status, 403, "{name}");
     }
-    assert_eq!(asked(&format!("GET /{TOKEN}/maps.json HTTP/1.1"), "localhost:1").status, 200);
-    let head = asked(&format!("HEAD /{TOKEN}/maps.json HTTP/1.1"), &host);
+    assert_eq!(reply_to(&format!("GET /{TOKEN}/maps.json HTTP/1.1"), "localhost:1").status, 200);
+    let head = reply_to(&format!("HEAD /{TOKEN}/maps.json HTTP/1.1"), &host);
     assert_eq!((head.status, head.body.len()), (200, 0));
     let page = viewer.get("");
     assert_eq!(page.status, 200);
@@ -337,19 +336,19 @@ fn strangers_get_nothing() {
         "{}",
         page.head
     );
-    // Without the slash at the end the page's own links would lead nowhere.
+    // Without the trailing slash the page's relative links would be wrong.
     let slash = viewer.send(&format!("GET /{TOKEN} HTTP/1.1\r\nhost: {host}\r\nconnection: close\r\n\r\n"));
     assert!(slash.status == 308 && slash.head.contains(&format!("location: /{TOKEN}/")), "{}", slash.head);
 }
 
 #[test]
-fn many_at_once_and_those_who_stop_in_the_middle_are_no_harm() {
+fn many_or_stalled_clients_do_no_harm() {
     let (folder, map) = a_map();
     let viewer = Viewer::ready(&[&map], &folder.path().join("cache"));
     let nodes = viewer.nodes("0");
     let alone = viewer.get(&nodes[0]).body;
-    // Some send half a request, some ask and never read, some go away at once; all of them stay. They are more than the
-    // server takes at once.
+    // Some send half a request, some never read, some shut down their socket. All sockets remain open, more than the
+    // server accepts at once.
     let silent: Vec<TcpStream> = (0..560)
         .map(|number| {
             let mut stream = viewer.connect();
@@ -362,7 +361,7 @@ fn many_at_once_and_those_who_stop_in_the_middle_are_no_harm() {
             stream
         })
         .collect();
-    // Until the server takes them for idle. A connection that is as new as those that ask might be closed in their place.
+    // Wait until the server treats them as idle; before, it might close a newer connection instead.
     std::thread::sleep(Duration::from_millis(1500));
     let before = viewer.resident_bytes();
     std::thread::scope(|scope| {
@@ -370,8 +369,8 @@ fn many_at_once_and_those_who_stop_in_the_middle_are_no_harm() {
             let (viewer, nodes) = (&viewer, &nodes);
             scope.spawn(move || viewer.get(&nodes[number % nodes.len()]))
         };
-        let asked: Vec<_> = (0..200).map(ask).collect();
-        for (number, reply) in asked.into_iter().enumerate() {
+        let replies: Vec<_> = (0..200).map(ask).collect();
+        for (number, reply) in replies.into_iter().enumerate() {
             let reply = reply.join().unwrap();
             assert_eq!(reply.status, 200);
             if number % nodes.len() == 0 {
@@ -386,7 +385,7 @@ fn many_at_once_and_those_who_stop_in_the_middle_are_no_harm() {
 }
 
 #[test]
-fn a_flush_is_told_and_only_what_changed_is_another_node() {
+fn a_flush_is_announced_and_changes_only_its_nodes() {
     let (folder, map) = a_map();
     let viewer = Viewer::ready(&[&map], &folder.path().join("cache"));
     let mut events = viewer.connect();
@@ -417,12 +416,12 @@ fn a_flush_is_told_and_only_what_changed_is_another_node() {
 }
 
 #[test]
-fn snapshots_and_what_changed_since_are_shown() {
+fn snapshots_and_changes_since_them_are_shown() {
     let (folder, map) = a_map();
     let before = exported(folder.path(), text(&map));
     run(&["snapshot", text(&map), "monday"]);
     build(folder.path(), &map, 3..4);
-    // A wall is taken away, one was added.
+    // One wall was removed, one added.
     run(&["clear", text(&map), "--region", "3", "-5", "-1", "5", "5", "3", "-q"]);
     let after = exported(folder.path(), text(&map));
     let viewer = Viewer::ready(&[&map], &folder.path().join("cache"));
@@ -449,14 +448,14 @@ fn snapshots_and_what_changed_since_are_shown() {
     assert!([1, 2, 3].iter().all(|value| wanted.iter().any(|(_, found)| found == value)));
     assert_eq!(change, wanted);
     assert_eq!(viewer.get("maps/0@tuesday/tileset.json").status, 404);
-    // A snapshot by itself.
+    // Only a snapshot.
     let path = PathBuf::from(format!("{}@monday", map.display()));
     let viewer = Viewer::ready(&[&path], &folder.path().join("cache"));
     assert_eq!(viewer.finest("0").into_iter().map(|(voxel, _)| voxel).collect::<BTreeSet<_>>(), before);
 }
 
 #[test]
-fn a_snapshot_that_is_made_again_under_its_name_is_the_new_one() {
+fn a_recreated_snapshot_replaces_the_old_one() {
     let (folder, map) = a_map();
     let before = exported(folder.path(), text(&map));
     run(&["snapshot", text(&map), "monday"]);
@@ -475,7 +474,7 @@ fn a_snapshot_that_is_made_again_under_its_name_is_the_new_one() {
     assert_eq!(shown(), after);
 }
 
-/// A request about one snapshot does not read what there is of all.
+/// A request for one snapshot does not read the list of all.
 #[test]
 fn snapshots_are_not_read_for_every_request() {
     let (folder, map) = a_map();
@@ -493,7 +492,7 @@ fn snapshots_are_not_read_for_every_request() {
 }
 
 #[test]
-fn a_damaged_tile_is_left_out_and_said() {
+fn a_damaged_tile_is_omitted_and_reported() {
     let (folder, map) = a_map();
     let tables = fs::read_dir(&map).unwrap().map(|entry| entry.unwrap().path().join("iwlo_meta.bin"));
     let mut tables: Vec<PathBuf> = tables.filter(|path| path.exists()).collect();
@@ -504,15 +503,15 @@ fn a_damaged_tile_is_left_out_and_said() {
     bytes[middle] ^= 1;
     fs::write(&tables[0], bytes).unwrap();
     let viewer = Viewer::ready(&[&map], &folder.path().join("cache"));
-    let said = viewer.json("maps.json")["maps"][0]["unreadable"].to_string();
+    let printed = viewer.json("maps.json")["maps"][0]["unreadable"].to_string();
     let folder_name = tables[0].parent().unwrap().file_name().unwrap().to_str().unwrap().to_owned();
-    assert!(said.contains(&folder_name), "{said}");
+    assert!(printed.contains(&folder_name), "{printed}");
     let shown = viewer.finest("0").into_iter().map(|(voxel, _)| voxel).collect::<BTreeSet<_>>();
     assert!(shown.len() < all.len() && shown.is_subset(&all));
 }
 
 #[test]
-fn what_is_kept_serves_the_next_time_and_damage_of_it_does_not_show() {
+fn the_cache_is_reused_and_its_damage_has_no_effect() {
     let (folder, map) = a_map();
     let cache = folder.path().join("cache");
     let wanted: BTreeSet<(String, Vec<u8>)> = {
@@ -525,7 +524,7 @@ fn what_is_kept_serves_the_next_time_and_damage_of_it_does_not_show() {
         viewer.nodes("0").into_iter().map(|path| (path.clone(), viewer.get(&path).body)).collect()
     };
     {
-        // Two at once: the second keeps nothing.
+        // Two at once: the second does not write to the cache.
         let (one, other) = (Viewer::ready(&[&map], &cache), Viewer::ready(&[&map], &cache));
         assert_eq!((shown(&one), shown(&other)), (wanted.clone(), wanted.clone()));
     }
@@ -544,7 +543,7 @@ fn what_is_kept_serves_the_next_time_and_damage_of_it_does_not_show() {
 }
 
 #[test]
-fn what_cannot_be_shown_is_refused_at_once() {
+fn invalid_inputs_are_refused_at_once() {
     let folder = tempfile::tempdir().unwrap();
     let refused = |arguments: &[&str]| {
         let output = Command::new(cargo_bin("voxtile")).arg("view").args(arguments).output().unwrap();
@@ -562,7 +561,7 @@ fn what_cannot_be_shown_is_refused_at_once() {
     );
 }
 
-/// The page's script is the largest answer that needs no map; the memory for it is that of one.
+/// The page's script is the largest response without a map, and is in memory only once.
 #[cfg(target_os = "linux")]
 #[test]
 fn clients_that_read_nothing_hold_little_memory() {
@@ -570,9 +569,9 @@ fn clients_that_read_nothing_hold_little_memory() {
     let viewer = Viewer::ready(&[&map], &folder.path().join("cache"));
     assert!(viewer.get("page.js").body.len() > 500_000);
     let before = viewer.resident_bytes();
-    // More than the system's own buffers take.
+    // More than the system's socket buffers hold.
     let request = format!("GET /{TOKEN}/page.js HTTP/1.1\r\nhost: {}\r\n\r\n", viewer.address).repeat(12);
-    // A client has at most 256 connections.
+    // A client may have at most 256 connections.
     let silent: Vec<TcpStream> = (0..250)
         .map(|_| {
             let mut stream = viewer.connect();
@@ -580,7 +579,7 @@ fn clients_that_read_nothing_hold_little_memory() {
             stream
         })
         .collect();
-    // All of them are being answered.
+    // The server is responding to all of them.
     for stream in &silent {
         assert_eq!(stream.peek(&mut [0; 12]).unwrap(), 12);
     }
@@ -591,7 +590,7 @@ fn clients_that_read_nothing_hold_little_memory() {
 }
 
 #[test]
-fn streams_of_events_and_silent_connections_shut_nobody_out() {
+fn event_streams_and_silent_connections_block_no_client() {
     let (folder, map) = a_map();
     let viewer = Viewer::ready(&[&map], &folder.path().join("cache"));
     let ask = |path: &str| {
@@ -603,7 +602,7 @@ fn streams_of_events_and_silent_connections_shut_nobody_out() {
     let begun = Instant::now();
     let mut open: Vec<TcpStream> = (0..520).map(|_| ask("events")).collect();
     assert_eq!(viewer.get("maps.json").status, 200);
-    // The newest ones go on.
+    // The newest ones continue.
     assert_eq!(open[519].peek(&mut [0; 12]).unwrap(), 12);
     open.extend((0..520).map(|_| ask("page.js")));
     open.extend((0..520).map(|_| viewer.connect()));
@@ -614,7 +613,7 @@ fn streams_of_events_and_silent_connections_shut_nobody_out() {
 }
 
 #[test]
-fn a_question_that_is_wrong_is_the_clients_error() {
+fn an_invalid_request_is_a_client_error() {
     let (folder, map) = a_map();
     let viewer = Viewer::ready(&[&map], &folder.path().join("cache"));
     for path in [
@@ -630,6 +629,6 @@ fn a_question_that_is_wrong_is_the_clients_error() {
         assert!(reply.status < 500, "{path}: {} {}", reply.status, String::from_utf8_lossy(&reply.body));
     }
     let far = viewer.get("maps/0/raycast?from=0,0,0&to=1e6,0,0");
-    let said = String::from_utf8_lossy(&far.body).into_owned();
-    assert!(far.status == 400 && said.contains("more than the limit of"), "{}: {said}", far.status);
+    let printed = String::from_utf8_lossy(&far.body).into_owned();
+    assert!(far.status == 400 && printed.contains("more than the limit of"), "{}: {printed}", far.status);
 }

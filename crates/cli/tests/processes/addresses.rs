@@ -15,11 +15,11 @@ const SCANS: usize = 16;
 const RESOLUTION_M: f64 = 0.2;
 const MAX_RANGE_M: f64 = 20.0;
 
-/// KiB of addresses with which every command comes to its end, and with which none starts.
+/// Limits of address space in KiB: with the first every command succeeds, with the second no process starts.
 const PLENTY_KIB: f64 = 200.0 * 1024.0;
 const TOO_FEW_KIB: f64 = 8.0 * 1024.0;
 
-/// A stream of scans, and the digest of their map after each number of them.
+/// A stream of scans, and the digest of the map after each number of scans.
 struct Drive {
     stream: NamedTempFile,
     digests: Vec<String>,
@@ -44,7 +44,7 @@ impl Drive {
         Self { stream, digests }
     }
 
-    /// One command for a map that is there and for one that is not.
+    /// Returns the command that creates or extends the map.
     fn build(&self, map: &Path, storage: &str) -> Command {
         let mut command = voxtile();
         let [resolution, range] = [RESOLUTION_M, MAX_RANGE_M].map(|metres| metres.to_string());
@@ -60,12 +60,12 @@ impl Drive {
 
     fn build_whole(&self, map: &Path, storage: &str) {
         let output = self.build(map, storage).stdin(self.stdin()).output().unwrap();
-        assert!(output.status.success(), "{}", said(&output));
+        assert!(output.status.success(), "{}", printed(&output));
         assert_eq!(digest(map), Ok((SCANS, self.digests[SCANS].clone())));
     }
 }
 
-/// Falling limits, in KiB, from plenty to too few: most of them where processes are about to fail.
+/// Returns decreasing limits in KiB, most of them near the point where processes start to fail.
 fn falling_limits(seed: u64) -> impl Iterator<Item = u64> {
     let steps = setting("VOXTILE_LIMITS", 16);
     let mut random = Random(setting("VOXTILE_SEED", 1) + seed);
@@ -76,20 +76,21 @@ fn falling_limits(seed: u64) -> impl Iterator<Item = u64> {
     })
 }
 
-/// Runs a command with so many KiB of addresses: it ends, in whatever way, but does not panic. Where a thread gets its
-/// stack and then not the pages for its signals, Rust itself does, and aborts: there is nothing to be done about that.
+/// Runs a command with a limit of address space in KiB. It may fail but must not panic. Exception: if a thread has its
+/// stack but no memory for its signal stack, the Rust runtime aborts.
 fn run(command: &Command, limit_kib: u64, stdin: Stdio) -> Output {
     let mut command = limited(command, 'v', limit_kib);
     let mut child = command.stdin(stdin).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     wait_until("a process without addresses ends", || child.try_wait().unwrap().is_some());
     let output = child.wait_with_output().unwrap();
-    let said = said(&output);
-    let is_panic = said.contains("panicked") && !said.contains("failed to allocate an alternative stack");
-    assert!(!is_panic, "{limit_kib} KiB: {said}");
+    let printed = printed(&output);
+    let is_panic =
+        printed.contains("panicked") && !printed.contains("failed to allocate an alternative stack");
+    assert!(!is_panic, "{limit_kib} KiB: {printed}");
     output
 }
 
-fn said(output: &Output) -> String {
+fn printed(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
@@ -99,15 +100,15 @@ fn copy(map: &Path, to: &Path) {
 }
 
 #[test]
-fn a_build_whose_allocations_fail_leaves_what_it_flushed_and_goes_on_from_there() {
+fn a_build_with_failing_allocations_keeps_its_flushes_and_resumes() {
     let drive = Drive::new();
     for (seed, storage) in (0..).zip(["octomap", "compact"]) {
         let (mut whole, mut cut, mut in_vain) = (0, 0, 0);
-        // The least limit with which all was mapped, and the largest with which nothing was.
+        // Smallest limit of a complete build, and largest limit of a build without any scan.
         let (mut enough_kib, mut too_few_kib) = (u64::MAX, 0);
         let mut try_with = |limit_kib: u64| {
             let (_folder, map) = folder_for_maps();
-            // The second goes on with what the first left.
+            // The second build resumes from the first.
             match [(); 2].map(|()| scans_of_build(&drive, &map, storage, limit_kib)) {
                 [None, None] => {
                     in_vain += 1;
@@ -130,7 +131,7 @@ fn a_build_whose_allocations_fail_leaves_what_it_flushed_and_goes_on_from_there(
         for limit_kib in falling_limits(seed) {
             (_, between_kib) = try_with(limit_kib);
         }
-        // What is cut short lies between, in a range that may be small.
+        // Builds that end early are between these limits, in a range that may be small.
         for _ in 0..8 {
             match try_with(between_kib) {
                 (0, next_kib) => between_kib = next_kib,
@@ -145,10 +146,10 @@ fn a_build_whose_allocations_fail_leaves_what_it_flushed_and_goes_on_from_there(
     }
 }
 
-/// How many scans a map has, if there is one, after a build with so many KiB of addresses.
+/// Returns the number of scans in the map after a build with a limit in KiB, if there is a map.
 fn scans_of_build(drive: &Drive, map: &Path, storage: &str, limit_kib: u64) -> Option<usize> {
     let output = run(&drive.build(map, storage), limit_kib, drive.stdin());
-    let what = format!("{storage}, {limit_kib} KiB: {}", said(&output));
+    let what = format!("{storage}, {limit_kib} KiB: {}", printed(&output));
     let is_success = output.status.success();
     let Some(flushed) = flushed_scans(map) else {
         assert!(!is_success, "{what}");
@@ -162,9 +163,9 @@ fn scans_of_build(drive: &Drive, map: &Path, storage: &str, limit_kib: u64) -> O
     Some(found)
 }
 
-/// A lack of memory is never taken for damage, and of damage no more is lost than has to be.
+/// Out of memory is never reported as damage, and repair removes only damaged data.
 #[test]
-fn verify_and_repair_whose_allocations_fail_tell_and_do_nothing_that_is_wrong() {
+fn verify_and_repair_with_failing_allocations_report_and_change_nothing_wrong() {
     let drive = Drive::new();
     for (seed, storage) in (10..).zip(["octomap", "compact"]) {
         let (_folder, map) = folder_for_maps();
@@ -194,7 +195,7 @@ fn verify_and_repair_whose_allocations_fail_tell_and_do_nothing_that_is_wrong() 
                         answers += 1;
                     }
                     Err(_) => {
-                        assert!(!output.status.success(), "{what}: {}", said(&output));
+                        assert!(!output.status.success(), "{what}: {}", printed(&output));
                         failures += 1;
                     }
                 }
@@ -214,7 +215,7 @@ fn verify_and_repair_whose_allocations_fail_tell_and_do_nothing_that_is_wrong() 
     }
 }
 
-/// Changes a byte in the middle of some tile's table.
+/// Changes a byte in the middle of one tile's table.
 fn damage_a_tile(map: &Path) {
     let tiles = fs::read_dir(map).unwrap().map(|entry| entry.unwrap().path());
     let mut tables: Vec<_> = tiles
@@ -230,7 +231,7 @@ fn damage_a_tile(map: &Path) {
 }
 
 #[test]
-fn an_export_whose_allocations_fail_leaves_the_old_file_or_the_whole_new_one() {
+fn an_export_with_failing_allocations_leaves_the_old_or_the_new_file() {
     const OLD: &[u8] = b"what was there before";
     let drive = Drive::new();
     for (seed, storage) in (20..).zip(["octomap", "compact"]) {
@@ -250,7 +251,7 @@ fn an_export_whose_allocations_fail_leaves_the_old_file_or_the_whole_new_one() {
                 fs::write(&target, OLD).unwrap();
                 let output = run(&export, limit_kib, Stdio::null());
                 let found = fs::read(&target).unwrap();
-                let what = format!("{storage}, {extension}, {limit_kib} KiB: {}", said(&output));
+                let what = format!("{storage}, {extension}, {limit_kib} KiB: {}", printed(&output));
                 assert!(found == whole || (found == OLD && !output.status.success()), "{what}");
                 if found == OLD { failed += 1 } else { made += 1 }
             }

@@ -9,14 +9,14 @@ fn command(arguments: &[&str]) -> Command {
     command
 }
 
-/// What a command says that must succeed.
+/// Runs a command that must succeed and returns its output.
 fn answer(arguments: &[&str]) -> String {
     let output = command(arguments).output().unwrap();
     assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
     String::from_utf8_lossy(&output.stdout).into_owned()
 }
 
-/// Kills a process with SIGKILL as soon as something is so; false if it ended before.
+/// Kills a process with SIGKILL when `is_so` holds. Returns false if the process ended before.
 fn kill_when(mut child: Child, mut is_so: impl FnMut() -> bool) -> bool {
     let mut has_ended = false;
     wait_until("the moment of the kill", || {
@@ -43,12 +43,13 @@ fn log_bytes(map: &Path) -> u64 {
     fs::metadata(map.join("commits.log")).unwrap().len()
 }
 
-/// Killed between its commit and the removal of the files: `verify` reports these, and the same command removes them.
+/// After a kill between the commit and the removal of files, `verify` reports the files and the same command removes
+/// them.
 #[test]
-fn a_removal_that_is_killed_after_its_commit_is_reported_and_completed_by_the_same_command() {
+fn a_removal_killed_after_its_commit_is_completed_by_the_same_command() {
     let scans = Scans::new(12, 1);
     let (folder, map) = folder_for_maps();
-    // Small tiles: after the commit each has to get its name.
+    // Small tiles: each tile's files are renamed after the commit, which takes time.
     assert!(scans.build(&map, &["--keep-scans", "--tile-size", "2"]).status().unwrap().success());
     let first = |map: &Path| map.join("kept_scans/segment.1");
     assert!(first(&map).exists());
@@ -61,17 +62,17 @@ fn a_removal_that_is_killed_after_its_commit_is_reported_and_completed_by_the_sa
         let text = map.to_str().unwrap();
         let remove = ["remove-scans", text, "--scans", "2..3"];
         let before = log_bytes(&map);
-        // Longer by a record, or compacted.
+        // The commit appends a record or compacts the log.
         let was_killed = kill_when(command(&remove).spawn().unwrap(), || log_bytes(&map) != before);
         if !was_killed || !first(&map).exists() {
             continue;
         }
-        let told = answer(&["verify", text]);
-        assert!(told.contains("leftovers: ") && told.contains("whole"), "{told}");
+        let reported = answer(&["verify", text]);
+        assert!(reported.contains("leftovers: ") && reported.contains("intact"), "{reported}");
         let output = command(&remove).output().unwrap();
-        let told = String::from_utf8_lossy(&output.stdout).into_owned();
+        let reported = String::from_utf8_lossy(&output.stdout).into_owned();
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-        assert!(told.contains("completed") || told.contains("2 scans gone"), "{told}");
+        assert!(reported.contains("completed") || reported.contains("2 scans removed"), "{reported}");
         assert!(!first(&map).exists(), "the points are still there");
         assert!(!answer(&["verify", text]).contains("leftovers"));
         return;
@@ -79,9 +80,9 @@ fn a_removal_that_is_killed_after_its_commit_is_reported_and_completed_by_the_sa
     panic!("the command was faster than the kill, 20 times");
 }
 
-/// Killed between the snapshot that it makes and its commit.
+/// Killed between its snapshot and its commit.
 #[test]
-fn a_removal_that_is_killed_after_its_snapshot_is_completed_by_the_same_command() {
+fn a_removal_killed_after_its_snapshot_is_completed_by_the_same_command() {
     let scans = Scans::new(12, 1);
     let (_folder, map) = folder_for_maps();
     assert!(scans.build(&map, &["--keep-scans"]).status().unwrap().success());
@@ -90,7 +91,7 @@ fn a_removal_that_is_killed_after_its_snapshot_is_completed_by_the_same_command(
     let snapshot = map.join("snapshots/before");
     let was_killed = kill_when(command(&remove).spawn().unwrap(), || snapshot.exists());
     assert!(was_killed, "the command was faster than the kill");
-    assert!(answer(&remove).contains("2 scans gone"));
+    assert!(answer(&remove).contains("2 scans removed"));
     assert_eq!(digest(Path::new(&format!("{text}@before"))), Ok(before.clone()));
     assert_ne!(digest(&map), Ok(before));
 }

@@ -1,7 +1,7 @@
 use crate::survey::{StreamedBuild, digest, flushed_scans, folder_for_maps, inputs, is_whole, wait_until};
 use std::path::Path;
 
-/// What a script repeats until it succeeds.
+/// Options of a command that a script repeats until it succeeds.
 const HOW: [&str; 2] = ["--append", "--resume"];
 
 fn build_whole(map: &Path, scans: &[voxtile::Scan]) {
@@ -11,7 +11,7 @@ fn build_whole(map: &Path, scans: &[voxtile::Scan]) {
 }
 
 #[test]
-fn one_command_that_is_repeated_until_it_succeeds_takes_every_scan_of_every_input_once() {
+fn a_repeated_command_adds_every_scan_of_every_input_once() {
     let (first, second) = (StreamedBuild::scans(1, 12), StreamedBuild::scans(2, 9));
     let all: Vec<_> = first.iter().chain(&second).cloned().collect();
     let expected = (21, StreamedBuild::digest_of(&all));
@@ -19,14 +19,14 @@ fn one_command_that_is_repeated_until_it_succeeds_takes_every_scan_of_every_inpu
     build_whole(&map, &first);
     assert_eq!(flushed_scans(&map), Some(12));
 
-    // Killed once it has begun, before its first flush.
+    // Killed after its start and before its first flush.
     let mut build = StreamedBuild::spawn(&map, &[&HOW[..], &["--flush-every", "end"]].concat());
     build.write(&second[..4]);
     wait_until("the second input is begun", || inputs(&map) == 2);
     build.kill();
     assert_eq!(flushed_scans(&map), Some(12));
 
-    // After it, twice: the scans of the first flush are passed over.
+    // Then twice after it: the scans of the first flush are skipped.
     for flushed in [3, 6] {
         let mut build = StreamedBuild::spawn(&map, &[&HOW[..], &["--flush-every", "3"]].concat());
         build.write(&second[..flushed + 1]);
@@ -35,7 +35,7 @@ fn one_command_that_is_repeated_until_it_succeeds_takes_every_scan_of_every_inpu
     }
     build_whole(&map, &second);
     assert_eq!(digest(&map).unwrap(), expected);
-    // And once more, though there is nothing left to do.
+    // Once more, with nothing left to do.
     for scans in [&second, &first, &second] {
         build_whole(&map, scans);
     }

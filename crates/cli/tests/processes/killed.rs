@@ -6,7 +6,7 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 #[test]
-fn a_build_that_is_killed_again_and_again_ends_as_if_it_had_not_been() {
+fn a_build_killed_repeatedly_gives_the_same_map() {
     let scans = Scans::new(24, 1);
     let hows = ["octomap", "compact"].map(|storage| ["--resume", "--flush-every", "2", "--storage", storage]);
     let whole_us = {
@@ -24,8 +24,8 @@ fn a_build_that_is_killed_again_and_again_ends_as_if_it_had_not_been() {
         let mut attempts = 0;
         loop {
             let mut child = scans.build(&map, &hows[lives % 2]).spawn().unwrap();
-            // Most of them while the process begins, makes or opens the map and recovers it.
-            // It may take longer than it did when it was measured: each life gets to its end by and by.
+            // Most kills hit the start of the process and the creation, opening or recovery of the map.
+            // Builds may be slower than when measured, so the time grows with the attempts.
             attempts += 1;
             let within_us = (whole_us + whole_us * attempts / 20) / [2, 8, 64][random.below(3) as usize];
             sleep(Duration::from_micros(random.below(within_us.max(1))));
@@ -50,7 +50,7 @@ fn a_build_that_is_killed_again_and_again_ends_as_if_it_had_not_been() {
 }
 
 #[test]
-fn a_conversion_that_is_killed_leaves_no_new_map_or_the_whole_one() {
+fn a_killed_conversion_leaves_no_new_map_or_a_complete_one() {
     let scans = Scans::new(12, 1);
     let (_folder, map) = folder_for_maps();
     assert!(scans.build(&map, &[]).status().unwrap().success());

@@ -9,15 +9,14 @@ use std::time::{Duration, Instant};
 const SCANS: usize = 8;
 const ROUNDS: usize = 12;
 
-/// What a map may be by now: the number of scans in it, and of those in each snapshot.
+/// Expected state of a map: the number of scans in it and in each snapshot.
 #[derive(Clone, Debug, Default)]
 struct Expected {
     scans: usize,
     snapshots: BTreeMap<&'static str, usize>,
 }
 
-/// One map from its making on. Whatever is killed, its state is that before the command or after it, or for a build one
-/// in between.
+/// One map over its lifetime. After a kill its state is that before or after the command, or in between for a build.
 struct Life<'a> {
     scans: &'a Scans,
     map: PathBuf,
@@ -28,7 +27,7 @@ struct Life<'a> {
 }
 
 impl Life<'_> {
-    /// Runs a command to its end, or kills it on the way; whether it ended.
+    /// Runs a command to its end or kills it. Returns whether it ended.
     fn run(&mut self, mut child: Child) -> bool {
         if self.random.below(3) > 0 {
             let output = child.wait_with_output().unwrap();
@@ -43,7 +42,7 @@ impl Life<'_> {
         false
     }
 
-    /// Adds the scans once more, with any options that change nothing of the map.
+    /// Adds the scans once more, with random options that do not change the map.
     fn build(&mut self) {
         let from = self.expected.scans;
         let mut how = vec!["--append", "--again"];
@@ -58,7 +57,7 @@ impl Life<'_> {
         self.run(child);
         let (found, _) = digest(&self.map).unwrap_or_else(|error| panic!("{}: {error}", self.what));
         assert!((from..=from + SCANS).contains(&found), "{}: {found} scans after {from}", self.what);
-        // Where it was killed, the rest of the round is added, so that rounds stay whole.
+        // After a kill, adds the rest of the round, so that rounds are complete.
         if found < from + SCANS {
             let output = self.scans.build(&self.map, &["--resume"]).output().unwrap();
             let message = String::from_utf8_lossy(&output.stderr);
@@ -77,7 +76,7 @@ impl Life<'_> {
         let before = self.expected.clone();
         self.expected = match self.run(child) {
             true => after,
-            // Asked of the map what became of it.
+            // Read the outcome from the map.
             false => {
                 let mut now = Expected { scans: digest(&self.map).unwrap().0, ..Expected::default() };
                 for name in before.snapshots.keys().chain(after.snapshots.keys()) {
@@ -129,9 +128,9 @@ impl Life<'_> {
     }
 }
 
-/// Long random lives: `VOXTILE_LIVES_SECONDS=3600` for an hour of them.
+/// Random lifetimes of maps; `VOXTILE_LIVES_SECONDS=3600` runs for an hour.
 #[test]
-fn a_map_is_what_it_must_be_after_any_life_of_commands_kills_and_readers() {
+fn a_map_has_the_expected_state_after_random_commands_kills_and_reads() {
     let until = Instant::now() + Duration::from_secs(setting("VOXTILE_LIVES_SECONDS", 12));
     let scans = Scans::new(SCANS, ROUNDS);
     let seed = setting("VOXTILE_SEED", 1);
@@ -149,7 +148,7 @@ fn a_map_is_what_it_must_be_after_any_life_of_commands_kills_and_readers() {
                 break;
             }
             life.what = format!("seed {}, step {step}", seed + lives);
-            // Somebody reads meanwhile, and is never told anything but a state that was.
+            // A concurrent reader sees only states that existed.
             let reader =
                 voxtile().arg("digest").arg(&map).arg("--json").stdout(Stdio::piped()).spawn().unwrap();
             life.step();

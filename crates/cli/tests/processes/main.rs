@@ -1,6 +1,6 @@
-//! Real processes: killed, ended, reading beside a writer.
+//! Tests with real processes: kills, signals, and readers concurrent with a writer.
 //!
-//! The short form takes part in every test run. The long form:
+//! The short form is part of every test run. The long form:
 //!
 //! ```text
 //! VOXTILE_KILLS=1000 VOXTILE_LIMITS=1000 VOXTILE_READER_SECONDS=60 VOXTILE_LIVES_SECONDS=3600 \
@@ -8,36 +8,36 @@
 //! ```
 #![cfg(unix)]
 
-/// Less and less room for addresses, until a process cannot even start.
+/// Decreasing limits of address space, until no process can start.
 #[cfg(target_os = "linux")]
 mod addresses;
-/// Commands that are killed after a commit or a snapshot, and repeated.
+/// Commands killed after a commit or a snapshot, and repeated.
 mod completed;
-/// Inputs that are added by one command, repeated until it succeeds.
+/// Inputs added by one command that is repeated until it succeeds.
 mod exactly_once;
-/// SIGKILL at random times, resumed until the end.
+/// Builds killed with SIGKILL at random times and resumed to the end.
 mod killed;
-/// Random lives of maps: commands, kills and readers, against an expected state.
+/// Random lifetimes of maps: commands, kills and readers, compared with an expected state.
 mod lives;
-/// What a command takes of memory, told by itself.
+/// Memory of a command, as it reports it.
 mod memory;
-/// Merges that are killed: no map, or the whole one.
+/// Killed merges leave no map or a complete one.
 mod merged;
-/// The thread that writes octrees: one, asleep when idle, gone with its mapper.
+/// The thread that writes octrees is the only one, sleeps when idle and ends with its mapper.
 #[cfg(target_os = "linux")]
 mod octree_worker;
 mod random;
-/// Readers beside a writer see one flush whole.
+/// Readers concurrent with a writer see consistent flushes.
 mod readers;
-/// What inputs of other programs take of memory, whatever they claim.
+/// Memory for inputs of other programs, whatever sizes their headers contain.
 #[cfg(target_os = "linux")]
 mod recordings;
-/// A disk that is full or only for reading, and too many open files.
+/// Full disks, read-only disks and too many open files.
 mod refused;
-/// Snapshots and reverts that are killed.
+/// Killed snapshots and reverts.
 mod snapshots;
-/// SIGTERM and Ctrl-C: flushed and ended, whatever the input does.
+/// SIGTERM and Ctrl-C flush and end a build, whatever the input does.
 mod stopped;
 mod survey;
-/// Maps that are verified while other processes change them.
+/// Maps verified while other processes change them.
 mod verified;

@@ -8,13 +8,13 @@ use voxtile::Scan;
 use voxtile_formats::ScanStreamWriter;
 use voxtile_simulation::Survey;
 
-/// Builds a map from a drive of so many metres, streamed into the command; the answer of the command.
+/// Builds a map from a drive of `length_m` metres on standard input. Returns the command's JSON.
 fn build(map: &Path, length_m: usize) -> Value {
     let mut command = voxtile();
     command.args(["build", "-", "--resolution", "0.2", "--cache-tiles", "8", "--json", "-o"]).arg(map);
     let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
     let mut writer = ScanStreamWriter::new(child.stdin.take().unwrap(), "drive", true).unwrap();
-    // Every fifth scan: the same streets in less time.
+    // Every fifth scan: same streets, less time.
     Survey::tour(1, 1_500).step_by(5).take(length_m / 5).for_each(|scan| writer.write_world(&scan).unwrap());
     drop(writer);
     let output = child.wait_with_output().unwrap();
@@ -33,7 +33,7 @@ fn peak(answer: &Value) -> u64 {
     answer["peak_rss_bytes"].as_u64().expect("this system tells the peak")
 }
 
-/// A build keeps to its limit, whatever it maps, and maps the same: what it may use beside the limit are 48 MiB.
+/// A build stays within its budget plus 48 MiB, whatever it maps, and the map does not depend on the budget.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_build_keeps_to_its_memory() {
@@ -66,12 +66,12 @@ fn a_build_keeps_to_its_memory() {
     }
 }
 
-/// A brick of a scan is divided into 64 tiles of two voxels, each with its own lists: they count in the limit.
+/// A brick of a scan is divided into 64 tiles of two voxels with their own lists, which count in the budget.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_build_of_tiles_of_two_voxels_keeps_to_its_memory() {
     const MEMORY: u64 = 20 << 20;
-    /// Half of what is promised: the scan is small, so that the test is quick.
+    /// Half of the guaranteed size: the scan is small to keep the test fast.
     const BESIDE: u64 = 24 << 20;
     let (folder, map) = folder_for_maps();
     let mut random = Random(1);
@@ -95,11 +95,11 @@ fn a_build_of_tiles_of_two_voxels_keeps_to_its_memory() {
     assert!(peak(&built) < MEMORY + BESIDE, "{} bytes", peak(&built));
 }
 
-/// What looks at a whole map takes no more memory for a long drive than for a short one, and octree files keep to the
-/// memory that they are given.
+/// Commands that read a whole map need no more memory for a long drive than for a short one, and octree files are
+/// written within their memory option.
 #[cfg(target_os = "linux")]
 #[test]
-fn whole_maps_are_looked_at_in_constant_memory() {
+fn whole_maps_are_read_in_constant_memory() {
     const MEMORY: u64 = 2 << 20;
     let (folder, _) = folder_for_maps();
     let (short, long) = (folder.path().join("short"), folder.path().join("long"));
@@ -120,15 +120,15 @@ fn whole_maps_are_looked_at_in_constant_memory() {
     ];
     for (command, how, memory) in cases {
         let (few, many) = (peak(&answer(command, &short, how)), peak(&answer(command, &long, how)));
-        // A tile of the long drive may be fuller, and allocators keep some of what they had.
+        // A tile of the long drive may have more voxels, and allocators keep freed memory.
         assert!(many < few + memory + (2 << 20), "{command} {how:?}: {few} bytes, then {many}");
     }
 }
 
-/// What makes or changes whole maps takes no more memory for a long drive than for a short one.
+/// Commands that create or change whole maps need no more memory for a long drive than for a short one.
 #[cfg(target_os = "linux")]
 #[test]
-fn whole_maps_are_merged_cropped_cleared_and_fade_in_constant_memory() {
+fn whole_maps_are_merged_cropped_cleared_and_decayed_in_constant_memory() {
     const MORE: u64 = 3 << 20;
     let (folder, _) = folder_for_maps();
     let path = |name: &str| folder.path().join(name);

@@ -12,7 +12,7 @@ fn merge(maps: [&Path; 2], output: &Path) -> Command {
 }
 
 #[test]
-fn a_merge_that_is_killed_leaves_no_map_and_goes_the_next_time() {
+fn a_killed_merge_leaves_no_map_and_succeeds_later() {
     let (folder, a) = folder_for_maps();
     let b = folder.path().join("b");
     for (map, scans) in [(&a, 20), (&b, 30)] {
@@ -28,7 +28,7 @@ fn a_merge_that_is_killed_leaves_no_map_and_goes_the_next_time() {
     let (mut killed, mut ended) = (0, 0);
     while killed < kills {
         let mut child = merge([&a, &b], &output).spawn().unwrap();
-        // Evenly over the time that it takes, and a little beyond.
+        // Evenly over the duration of a merge and a little longer.
         sleep(Duration::from_micros(whole_us * ((killed + ended) * 7 % 24) / 20));
         child.kill().unwrap();
         let run = child.wait_with_output().unwrap();
@@ -39,7 +39,7 @@ fn a_merge_that_is_killed_leaves_no_map_and_goes_the_next_time() {
             assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
         }
         match digest(&output) {
-            // Killed after it was done, perhaps.
+            // The kill may be after the end of the work.
             Ok(found) => {
                 assert_eq!(found, expected);
                 assert!(is_whole(&output));
@@ -56,5 +56,5 @@ fn a_merge_that_is_killed_leaves_no_map_and_goes_the_next_time() {
         .unwrap()
         .map(|entry| entry.unwrap().file_name().into_string().unwrap());
     assert!(left.into_iter().all(|name| !name.contains("unfinished")));
-    println!("{killed} kills, {ended} came too late");
+    println!("{killed} kills, {ended} too late");
 }

@@ -5,11 +5,11 @@ use std::time::Duration;
 use voxtile::{InMemoryMapper, MapConfig, MapView, Mapper, VoxelCacheConfig, VoxelCacheMode};
 use voxtile_simulation::Survey;
 
-/// The threads of this process that write octrees, each with the nanoseconds that it has run.
+/// Returns the running time in nanoseconds of each thread of this process that writes octrees.
 fn workers() -> Vec<u64> {
     let threads = fs::read_dir("/proc/self/task").unwrap().map(|thread| thread.unwrap().path());
     let run_ns = threads.filter_map(|thread| {
-        // A thread may end between two looks.
+        // A thread may end between listing and reading.
         let name = fs::read_to_string(thread.join("comm")).ok()?;
         let times = fs::read_to_string(thread.join("schedstat")).ok()?;
         (name.trim() == "voxtile-octrees").then(|| times.split(' ').next().unwrap().parse().unwrap())
@@ -18,7 +18,7 @@ fn workers() -> Vec<u64> {
 }
 
 #[test]
-fn one_thread_writes_the_octrees_of_all_tiles_sleeps_when_idle_and_ends_with_its_mapper() {
+fn one_thread_writes_all_octrees_sleeps_when_idle_and_ends_with_its_mapper() {
     assert_eq!(workers(), [0; 0]);
     let mode = VoxelCacheMode::Parallel(VoxelCacheConfig::new(1, 64));
     let config = MapConfig::new(0.2, 3.2).unwrap().with_range(0.0, 30.0).with_voxel_cache(mode);
@@ -33,8 +33,8 @@ fn one_thread_writes_the_octrees_of_all_tiles_sleeps_when_idle_and_ends_with_its
         queue.batches_in == queue.batches_out
     };
     wait_until("all octrees are written", || is_done(&mapper));
-    // It comes to rest, however late a busy machine lets it: one that spins would run on between any two looks.
-    wait_until("it runs no more while there is nothing to do", || {
+    // A busy machine may delay it, but it must become idle; the time of a spinning thread would always grow.
+    wait_until("the thread is idle", || {
         let before = workers();
         assert_eq!(before.len(), 1);
         sleep(Duration::from_millis(300));
@@ -42,6 +42,6 @@ fn one_thread_writes_the_octrees_of_all_tiles_sleeps_when_idle_and_ends_with_its
     });
 
     drop(mapper);
-    // The system takes a moment to forget a thread that has been joined.
+    // The system may list a joined thread for a moment.
     wait_until("the thread is gone", || workers().is_empty());
 }

@@ -1,4 +1,4 @@
-/// Numbers from a seed (SplitMix64).
+/// Pseudorandom numbers (SplitMix64).
 pub struct Random(pub u64);
 
 impl Random {

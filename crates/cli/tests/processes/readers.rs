@@ -13,7 +13,7 @@ const SCANS: usize = 40;
 const READERS: usize = 3;
 
 #[test]
-fn every_digest_that_a_reader_sees_is_that_of_some_flush() {
+fn readers_see_only_digests_of_flushes() {
     let seconds = setting("VOXTILE_READER_SECONDS", 4);
     let rounds = 2 + 2 * seconds as usize;
     let scans = Scans::new(SCANS, rounds);
@@ -38,7 +38,7 @@ fn every_digest_that_a_reader_sees_is_that_of_some_flush() {
             })
             .collect();
         let mut round = 1;
-        // On a busy machine until the readers have seen something of it.
+        // On a busy machine, continue until the readers have seen several flushes.
         let is_enough = || Instant::now() >= until && different.lock().unwrap().len() > 3;
         while !is_enough() && round < rounds {
             let how = ["--append", "--again", "--flush-every", "1"];
@@ -59,9 +59,9 @@ fn every_digest_that_a_reader_sees_is_that_of_some_flush() {
     assert!(is_whole(&map));
 }
 
-/// The list of scans is read while a writer flushes and what is not read yet goes: it is read again, and printed once.
+/// A list of scans is read while a writer flushes and removes unread files: it is read again, but printed once.
 #[test]
-fn a_list_of_scans_that_is_read_again_is_printed_once() {
+fn a_retried_list_of_scans_is_printed_once() {
     const COUNT: u64 = 3000;
     let (_folder, map) = folder_for_maps();
     let config = MapConfig::new(0.5, 5.0).unwrap().with_kept_scans(true);
@@ -74,7 +74,7 @@ fn a_list_of_scans_that_is_read_again_is_printed_once() {
     let mut command = voxtile();
     command.args(["scans", map.to_str().unwrap(), "--each", "--json"]);
     let mut child = command.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
-    // It prints more than fits into the pipe.
+    // The output is larger than the pipe's buffer.
     let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
     let first = lines.next();
     mapper.insert_scan(&scan).unwrap();

@@ -6,9 +6,9 @@ use std::path::Path;
 use std::process::Command;
 
 const MEMORY: u64 = 64 << 20;
-/// What a process may take beside its limit.
+/// Memory of a process in addition to its budget, in bytes.
 const BESIDE: u64 = 48 << 20;
-/// More than both.
+/// More than budget and overhead together.
 const LARGE_BYTES: usize = 120 << 20;
 const STAMP_S: u32 = 1_700_000_000;
 
@@ -20,7 +20,7 @@ fn build(input: &Path, map: &Path, memory: u64, how: &[&str]) -> Command {
     command
 }
 
-/// Builds a map, which must keep to its limit; its digest.
+/// Builds a map, checks that the process stays within its budget, and returns the digest.
 fn keeps_to_its_memory(input: &Path, how: &[&str]) -> String {
     let (_folder, map) = folder_for_maps();
     let output = build(input, &map, MEMORY, how).output().unwrap();
@@ -33,7 +33,7 @@ fn keeps_to_its_memory(input: &Path, how: &[&str]) -> String {
     digest(&map).unwrap().1
 }
 
-/// The same, and the map is that of much memory.
+/// Same, and checks that the map equals one built with much memory.
 fn keeps_to_its_memory_and_maps_the_same(input: &Path, how: &[&str]) {
     let found = keeps_to_its_memory(input, how);
     let (_folder, map) = folder_for_maps();
@@ -49,12 +49,12 @@ fn numbers(numbers: &[u32]) -> Vec<u8> {
     numbers.iter().flat_map(|number| number.to_le_bytes()).collect()
 }
 
-/// A `std_msgs/Header` of ROS 1.
+/// Returns a `std_msgs/Header` of ROS 1.
 fn header(frame: &str) -> Vec<u8> {
     [numbers(&[0, STAMP_S, 0]), sized(frame.as_bytes())].concat()
 }
 
-/// A `sensor_msgs/PointCloud2` of ROS 1. All points are at 1 2 3.
+/// Returns a `sensor_msgs/PointCloud2` of ROS 1 with all points at (1, 2, 3).
 fn cloud(points: usize, point_bytes: usize) -> Vec<u8> {
     let fields = ["x", "y", "z"]
         .iter()
@@ -77,7 +77,7 @@ fn cloud(points: usize, point_bytes: usize) -> Vec<u8> {
     message
 }
 
-/// A `tf2_msgs/TFMessage` of ROS 1: from a second before the cloud to a second behind it.
+/// Returns a `tf2_msgs/TFMessage` of ROS 1, from one second before to one second after the cloud.
 fn transforms(count: u32) -> Vec<u8> {
     let mut message = numbers(&[count]);
     for k in 0..count {
@@ -92,7 +92,7 @@ fn transforms(count: u32) -> Vec<u8> {
     message
 }
 
-/// Topics and types of the recordings.
+/// Topics and types in the recordings.
 const TOPICS: [(&str, &str); 3] =
     [("/points", "sensor_msgs/PointCloud2"), ("/tf", "tf2_msgs/TFMessage"), ("/other", "std_msgs/String")];
 
@@ -104,7 +104,7 @@ fn bag_record(fields: &[Vec<u8>], data: &[u8]) -> Vec<u8> {
     [sized(&fields.concat()), sized(data)].concat()
 }
 
-/// A bag of ROS 1 without an index: messages by the number of their topic in one packed chunk.
+/// Returns a ROS 1 bag without an index: messages with their topic numbers in one compressed chunk.
 fn bag(messages: &[(u32, Vec<u8>)]) -> Vec<u8> {
     let mut chunk = Vec::new();
     for ((topic, type_name), id) in TOPICS.iter().zip(0_u32..) {
@@ -127,7 +127,7 @@ fn mcap_record(kind: u8, contents: &[u8]) -> Vec<u8> {
     [&[kind][..], &(contents.len() as u64).to_le_bytes(), contents].concat()
 }
 
-/// An MCAP file without a summary: the same messages in one packed chunk.
+/// Returns an MCAP file without a summary: the same messages in one compressed chunk.
 fn mcap(messages: &[(u32, Vec<u8>)]) -> Vec<u8> {
     let mut chunk = Vec::new();
     for ((topic, type_name), id) in TOPICS.iter().zip(1_u16..) {
@@ -151,7 +151,7 @@ fn mcap(messages: &[(u32, Vec<u8>)]) -> Vec<u8> {
     [b"\x89MCAP0\r\n".to_vec(), header, mcap_record(6, &contents)].concat()
 }
 
-/// A message beside the cloud that a few bytes become.
+/// A message next to the cloud that is tiny when compressed.
 #[test]
 fn a_packed_chunk_keeps_to_the_memory() {
     let (folder, _) = folder_for_maps();
@@ -178,7 +178,7 @@ fn many_transforms_are_sorted_in_a_file() {
     let path = folder.path().join("a.bag");
     let message = transforms(100_000);
     let mut messages: Vec<(u32, Vec<u8>)> = (0..8).map(|_| (1, message.clone())).collect();
-    // Stamps of their own, a hundred seconds further on.
+    // Each with its own stamp, a hundred seconds later.
     for (number, (_, message)) in messages.iter_mut().enumerate().skip(1) {
         for transform in message[4..].chunks_exact_mut(84) {
             transform[4..8].copy_from_slice(&(STAMP_S + 100 * number as u32).to_le_bytes());
@@ -209,7 +209,7 @@ fn many_poses_are_in_a_file() {
 }
 
 #[test]
-fn records_of_las_are_passed_over() {
+fn records_of_las_are_skipped() {
     const RECORDS: u64 = 1000;
     const RECORD_BYTES: u64 = 54 + 0xffff;
     let (folder, _) = folder_for_maps();
@@ -239,7 +239,7 @@ fn records_of_las_are_passed_over() {
     keeps_to_its_memory(&path, &[]);
 }
 
-/// A process that held the file, or its first line, would have no room for it.
+/// A process with the whole file or its first line in memory would exceed its limit.
 #[test]
 fn a_gigabyte_of_zeros_is_no_poses() {
     let (folder, map) = folder_for_maps();
@@ -251,6 +251,6 @@ fn a_gigabyte_of_zeros_is_no_poses() {
     File::create(&poses).unwrap().set_len(1 << 30).unwrap();
     let command = build(&scans, &map, MEMORY, &["--poses", poses.to_str().unwrap()]);
     let output = limited(&command, 'v', 1 << 20).output().unwrap();
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert!(said.contains("is binary, not a text of poses"), "{said}");
+    let printed = String::from_utf8_lossy(&output.stderr);
+    assert!(printed.contains("is binary, not a text of poses"), "{printed}");
 }

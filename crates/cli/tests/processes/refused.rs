@@ -3,11 +3,11 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use tempfile::TempDir;
 
-/// A small file system in memory; taken away when dropped.
+/// Small tmpfs, unmounted on drop.
 struct SmallDisk(TempDir);
 
 impl SmallDisk {
-    /// `None` where this process may not mount.
+    /// Returns `None` if this process may not mount.
     fn new(bytes: u32) -> Option<Self> {
         let disk = Self(TempDir::new().unwrap());
         disk.mount(&format!("size={bytes}")).then_some(disk)
@@ -31,7 +31,7 @@ impl Drop for SmallDisk {
 }
 
 #[test]
-fn a_full_disk_keeps_the_last_flush_and_the_build_goes_on_when_there_is_room() {
+fn a_full_disk_keeps_the_last_flush_and_the_build_resumes_later() {
     let scans = Scans::new(30, 1);
     let Some(disk) = SmallDisk::new(1500 << 10) else {
         println!("skipped: this process may not mount a small disk");
@@ -56,9 +56,9 @@ fn a_full_disk_keeps_the_last_flush_and_the_build_goes_on_when_there_is_room() {
     assert!(is_whole(&map));
 }
 
-/// The first flush is the only one: nothing is in the map.
+/// The disk is full at the first flush, so the map is empty.
 #[test]
-fn a_disk_that_is_full_at_the_first_flush_is_as_empty_as_before() {
+fn a_disk_full_at_the_first_flush_leaves_no_map() {
     let scans = Scans::new(30, 1);
     let Some(disk) = SmallDisk::new(300 << 10) else {
         println!("skipped: this process may not mount a small disk");
@@ -82,7 +82,7 @@ fn a_disk_that_is_full_at_the_first_flush_is_as_empty_as_before() {
 }
 
 #[test]
-fn a_disk_that_is_only_for_reading_answers_and_is_not_written_to() {
+fn a_read_only_disk_is_readable_and_never_written() {
     let scans = Scans::new(6, 1);
     let Some(disk) = SmallDisk::new(64 << 20) else {
         println!("skipped: this process may not mount a small disk");
@@ -99,10 +99,10 @@ fn a_disk_that_is_only_for_reading_answers_and_is_not_written_to() {
     assert!(message.contains("Read-only file system"), "{message}");
 }
 
-/// Threads with more stack than there are addresses: the system gives none, or one, and then no other.
+/// Stacks larger than the address space: no thread starts, or only one.
 #[cfg(all(target_os = "linux", target_pointer_width = "64"))]
 #[test]
-fn without_threads_there_are_fewer_and_the_map_is_the_same() {
+fn the_map_is_the_same_if_threads_cannot_start() {
     let scans = Scans::new(8, 1);
     let (folder, _) = folder_for_maps();
     for (number, stack_bytes) in [1_u64 << 47, 1 << 46, (1 << 46) / 3].into_iter().enumerate() {

@@ -11,7 +11,7 @@ fn command(arguments: &[&str]) -> Command {
 }
 
 #[test]
-fn a_snapshot_a_revert_and_a_deletion_that_are_killed_have_happened_or_not() {
+fn killed_snapshots_reverts_and_deletions_are_atomic() {
     let scans = Scans::new(16, 2);
     let (_folder, map) = folder_for_maps();
     assert!(scans.build(&map, &[]).status().unwrap().success());

@@ -9,7 +9,7 @@ use std::time::Duration;
 use voxtile::Scan;
 
 #[test]
-fn a_signal_ends_a_build_with_all_of_its_scans_in_the_map() {
+fn a_signal_ends_a_build_with_all_its_scans_in_the_map() {
     let scans = Scans::new(60, 1);
     for name in ["TERM", "INT"] {
         let (_folder, map) = folder_for_maps();
@@ -19,7 +19,7 @@ fn a_signal_ends_a_build_with_all_of_its_scans_in_the_map() {
             wait_until("signals are caught", || {
                 signals_are_caught(child.id()) || child.try_wait().unwrap().is_some()
             });
-            // Now or later, so that it is met at all kinds of work, and gets to its end.
+            // Different delays, so that the signal arrives during different work.
             sleep(Duration::from_millis(7 * stopped));
             signal(&child, name);
             let output = child.wait_with_output().unwrap();
@@ -42,7 +42,7 @@ fn a_signal_ends_a_build_with_all_of_its_scans_in_the_map() {
     }
 }
 
-/// Reads what a process says until a line holds a text.
+/// Reads the output of a process until a line contains `text`.
 fn read_until(child: &mut Child, text: &str) -> BufReader<impl Read + use<>> {
     let mut lines = BufReader::new(child.stderr.take().unwrap());
     let mut line = String::new();
@@ -54,15 +54,15 @@ fn read_until(child: &mut Child, text: &str) -> BufReader<impl Read + use<>> {
 }
 
 #[test]
-fn an_input_that_is_quiet_keeps_nothing_from_being_flushed_and_nobody_from_stopping() {
+fn an_idle_input_blocks_neither_flushes_nor_a_stop() {
     let scans = StreamedBuild::scans(1, 5);
     let (_folder, map) = folder_for_maps();
     let mut build = StreamedBuild::spawn(&map, &["--flush-every", "0.3s"]);
     build.write(&scans);
-    // The input stays open from here on, and says nothing.
+    // The input stays open without data.
     wait_until("the timer flushes", || flushed_scans(&map) == Some(5));
     signal(&build.child, "TERM");
-    let mut lines = read_until(&mut build.child, "a second Ctrl-C or SIGTERM ends at once");
+    let mut lines = read_until(&mut build.child, "a second Ctrl-C or SIGTERM stops at once");
     let status = build.child.wait().unwrap();
     let mut rest = String::new();
     lines.read_to_string(&mut rest).unwrap();
@@ -72,7 +72,7 @@ fn an_input_that_is_quiet_keeps_nothing_from_being_flushed_and_nobody_from_stopp
     assert_eq!(digest(&map).unwrap(), (5, expected));
     drop(build);
 
-    // Before there is a first scan, there is no map.
+    // There is no map before the first scan.
     let (_folder, map) = folder_for_maps();
     let mut build = StreamedBuild::spawn(&map, &[]);
     wait_until("signals are caught", || signals_are_caught(build.child.id()));
@@ -83,7 +83,7 @@ fn an_input_that_is_quiet_keeps_nothing_from_being_flushed_and_nobody_from_stopp
 }
 
 #[test]
-fn a_demo_that_is_stopped_goes_on_when_it_is_run_again() {
+fn a_stopped_demo_resumes_when_run_again() {
     let (folder, _) = folder_for_maps();
     let out = folder.path().join("demo");
     let map = out.join("map_tiles");
@@ -99,7 +99,7 @@ fn a_demo_that_is_stopped_goes_on_when_it_is_run_again() {
     let mut child = demo().spawn().unwrap();
     wait_until("the map is begun", || flushed_scans(&map).is_some());
     signal(&child, "INT");
-    let mut lines = read_until(&mut child, "the same command goes on");
+    let mut lines = read_until(&mut child, "run the same command to continue");
     lines.read_to_string(&mut String::new()).unwrap();
     assert_eq!(child.wait().unwrap().code(), Some(130));
     for _ in 0..2 {
@@ -110,7 +110,7 @@ fn a_demo_that_is_stopped_goes_on_when_it_is_run_again() {
     }
 }
 
-/// A scan of long rays in all directions, which takes long to follow at this resolution.
+/// Returns a scan of long rays in all directions, which is slow to insert at this resolution.
 fn endless_scan(rays: u32) -> Scan {
     let point = |k: u32| {
         let (azimuth, up) = (f64::from(k) * 2.399_963, 2.0 * f64::from(k) / f64::from(rays) - 1.0);
@@ -121,7 +121,7 @@ fn endless_scan(rays: u32) -> Scan {
 }
 
 #[test]
-fn a_scan_that_takes_minutes_is_given_up() {
+fn a_slow_scan_is_cancelled() {
     let (_folder, map) = folder_for_maps();
     let how = ["--max-range", "1000", "--resolution", "0.02", "--tile-size", "4", "--memory", "256MiB"];
     let mut build = StreamedBuild::spawn_with(&map, &how);
@@ -134,31 +134,32 @@ fn a_scan_that_takes_minutes_is_given_up() {
 }
 
 #[test]
-fn a_signal_to_share_ends_the_program_that_shares() {
-    // It would run for a minute.
+fn a_signal_to_share_ends_voxtile_share() {
+    // It would run for a minute without a signal.
     const PROGRAM: &str = "#!/bin/sh\ntrap 'echo ended; exit 7' TERM\necho begun\n\
         for k in $(seq 600); do sleep 0.1; done\n";
     let folder = tempfile::tempdir().unwrap();
-    // By processes of their own: what this one writes cannot be run while a child of another test holds it open.
+    // Write the program in a separate process: a file that a child of another test still has open for writing cannot be
+    // executed.
     let line = r#"cp "$0" "$1/voxtile"; printf '%s' "$2" >"$1/voxtile-share"; chmod +x "$1/voxtile-share""#;
     let mut shell = std::process::Command::new("sh");
     shell.args(["-c", line, env!("CARGO_BIN_EXE_voxtile")]).arg(folder.path()).arg(PROGRAM);
     assert!(shell.status().unwrap().success());
     let mut command = std::process::Command::new(folder.path().join("voxtile"));
     let mut child = command.arg("share").stdout(Stdio::piped()).spawn().unwrap();
-    let mut said = BufReader::new(child.stdout.take().unwrap());
+    let mut printed = BufReader::new(child.stdout.take().unwrap());
     let mut line = String::new();
-    said.read_line(&mut line).unwrap();
+    printed.read_line(&mut line).unwrap();
     assert_eq!(line, "begun\n");
     signal(&child, "TERM");
     assert_eq!(child.wait().unwrap().code(), Some(7));
     line.clear();
-    said.read_to_string(&mut line).unwrap();
+    printed.read_to_string(&mut line).unwrap();
     assert_eq!(line, "ended\n");
 }
 
 #[test]
-fn an_export_that_is_stopped_leaves_nothing_beside_the_output() {
+fn a_stopped_export_leaves_no_temporary_files() {
     let (folder, _) = folder_for_maps();
     let (demo, out) = (folder.path().join("demo"), folder.path().join("out"));
     let made = voxtile().args(["demo", "--length", "60", "--out"]).arg(&demo).output().unwrap();
@@ -187,7 +188,7 @@ fn an_export_that_is_stopped_leaves_nothing_beside_the_output() {
                 break;
             }
             assert_eq!(output.status.code(), Some(130), "{message}");
-            assert!(message.contains("stopping: the output stays as it was"), "{message}");
+            assert!(message.contains("stopping; the output does not change"), "{message}");
             assert!(left.iter().eq([&file]), "{left:?}");
             assert_eq!(std::fs::read_to_string(&file).unwrap(), "as it was");
             stopped += 1;

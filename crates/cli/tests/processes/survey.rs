@@ -8,11 +8,11 @@ use voxtile::{InMemoryMapper, MapConfig, MapQueries, Mapper, Scan};
 use voxtile_formats::{ReadOptions, ScanStreamWriter, open_scans};
 use voxtile_simulation::{City, Drive, Lidar, Survey};
 
-/// A folder of scans, and the digest of their map after each number of them.
+/// A folder of scans, and the digest of the map after each number of scans.
 pub struct Scans {
     pub folder: TempDir,
     pub digests: Vec<String>,
-    /// Around the folder: poses that somebody left among temporary files are not beside it.
+    /// Parent folder of its own, so that poses among other temporary files are not found.
     _around: TempDir,
 }
 
@@ -20,7 +20,7 @@ pub const RESOLUTION_M: f64 = 0.5;
 const MAX_RANGE_M: f64 = 20.0;
 
 impl Scans {
-    /// So many scans of a drive through a made-up city, mapped `rounds` times one after the other.
+    /// Writes `count` scans of a drive through a synthetic city; builds map them `rounds` times.
     pub fn new(count: usize, rounds: usize) -> Self {
         let around = TempDir::new().unwrap();
         let folder = TempDir::new_in(around.path()).unwrap();
@@ -42,7 +42,7 @@ impl Scans {
         Self { folder, digests, _around: around }
     }
 
-    /// The command that builds the map with little memory, so that it evicts all the while.
+    /// Returns the command that builds the map with little memory, so that it evicts tiles all the time.
     pub fn build(&self, map: &Path, how: &[&str]) -> Command {
         let mut command = voxtile();
         let resolution = RESOLUTION_M.to_string();
@@ -54,13 +54,13 @@ impl Scans {
     }
 }
 
-/// The command under test.
+/// Returns the tested command.
 pub fn voxtile() -> Command {
     Command::new(env!("CARGO_BIN_EXE_voxtile"))
 }
 
-/// The same command, with a limit of the shell's (`ulimit`): files (`n`), KiB of addresses (`v`). What it aborts with
-/// stays short.
+/// Returns the same command with a limit of the shell's `ulimit`: open files (`n`) or address space in KiB (`v`). Core
+/// dumps are disabled.
 pub fn limited(command: &Command, of: char, limit: u64) -> Command {
     let mut limited = Command::new("sh");
     limited.args(["-c", &format!("ulimit -c 0; ulimit -{of} $0 && exec \"$@\"")]).arg(limit.to_string());
@@ -69,7 +69,7 @@ pub fn limited(command: &Command, of: char, limit: u64) -> Command {
     limited
 }
 
-/// Scan number and digest of a map, from a process of its own.
+/// Reads the number of scans and the digest of a map in a separate process.
 pub fn digest(map: &Path) -> Result<(usize, String), String> {
     let output = voxtile().arg("digest").arg(map).arg("--json").output().unwrap();
     if !output.status.success() {
@@ -80,17 +80,17 @@ pub fn digest(map: &Path) -> Result<(usize, String), String> {
     Ok((scan_number, answer["digest"].as_str().unwrap().to_owned()))
 }
 
-/// Whether `voxtile verify` finds the map whole.
+/// Returns whether `voxtile verify` finds no damage.
 pub fn is_whole(map: &Path) -> bool {
     voxtile().arg("verify").arg(map).stdout(Stdio::null()).status().unwrap().success()
 }
 
-/// A number from the environment, or the short form's.
+/// Returns a number from the environment, or the default of the short form.
 pub fn setting(name: &str, short: u64) -> u64 {
     std::env::var(name).map_or(short, |value| value.parse().expect("a number"))
 }
 
-/// A place for maps on the disk that is built on, which syncs are real on.
+/// Returns a folder on the disk of the build folder, where syncs are real.
 pub fn folder_for_maps() -> (TempDir, PathBuf) {
     let folder = TempDir::new_in(env!("CARGO_TARGET_TMPDIR")).unwrap();
     let map = folder.path().join("map");
@@ -113,19 +113,19 @@ fn pcd(origin: [f64; 3], points_in_world: &[&[f64; 3]]) -> Vec<u8> {
     bytes
 }
 
-/// A build of scans that this process writes into it, one by one.
+/// A build from scans on standard input.
 pub struct StreamedBuild {
     pub child: Child,
     writer: ScanStreamWriter<ChildStdin>,
 }
 
 impl StreamedBuild {
-    /// So many scans of a drive, as their stream keeps them: to a few digits.
+    /// Returns scans of a drive, rounded as in a scan stream.
     pub fn scans(seed: u64, count: usize) -> Vec<Scan> {
         Survey::tour(seed, 300).take(count).collect()
     }
 
-    /// A build that keeps few tiles in memory.
+    /// Starts a build with few tiles in memory.
     pub fn spawn(map: &Path, how: &[&str]) -> Self {
         let resolution = RESOLUTION_M.to_string();
         let few = ["--resolution", &resolution, "--cache-tiles", "4"];
@@ -146,7 +146,7 @@ impl StreamedBuild {
         self.writer.flush().unwrap();
     }
 
-    /// Ends the input and waits for the build.
+    /// Closes the input and waits for the build.
     pub fn end(self) -> ExitStatus {
         let Self { mut child, writer } = self;
         drop(writer);
@@ -158,7 +158,7 @@ impl StreamedBuild {
         self.child.wait().unwrap();
     }
 
-    /// The digest of the map of these scans, from a build that nothing disturbs.
+    /// Returns the digest of an undisturbed build of these scans.
     pub fn digest_of(scans: &[Scan]) -> String {
         let (_folder, map) = folder_for_maps();
         let mut build = Self::spawn(&map, &[]);
@@ -168,7 +168,7 @@ impl StreamedBuild {
     }
 }
 
-/// Waits for something that comes sooner or later, on a busy machine much later.
+/// Waits for a condition; on a busy machine this may take long.
 pub fn wait_until(what: &str, mut is_so: impl FnMut() -> bool) {
     const PATIENCE: Duration = Duration::from_secs(300);
     let begun = Instant::now();
@@ -178,25 +178,24 @@ pub fn wait_until(what: &str, mut is_so: impl FnMut() -> bool) {
     }
 }
 
-/// What a map's metadata says, if there is a map: it is replaced whole.
+/// Returns the metadata of a map, if there is one. The file is replaced atomically.
 fn metadata(map: &Path) -> Option<serde_json::Value> {
     let text = fs::read_to_string(map.join("metadata.json")).ok()?;
     Some(serde_json::from_str(&text).expect("metadata are JSON at all times"))
 }
 
-/// Number of the last scan in a map's last flush; `None` while there is no map.
+/// Number of the last scan in the map's last flush; `None` without a map.
 pub fn flushed_scans(map: &Path) -> Option<u64> {
     metadata(map)?.pointer("/ext/scan_number")?.as_u64()
 }
 
-/// How many inputs a map knows.
+/// Returns the number of inputs in a map's metadata.
 pub fn inputs(map: &Path) -> usize {
     let inputs = metadata(map).and_then(|metadata| Some(metadata.pointer("/ext/inputs")?.as_array()?.len()));
     inputs.unwrap_or(0)
 }
 
-/// Whether a process has said that it wants to hear of SIGINT and SIGTERM; where the system does not tell, it is waited
-/// for a while.
+/// Returns whether a process catches SIGINT and SIGTERM. On systems that do not report this, waits for a while.
 pub fn signals_are_caught(process: u32) -> bool {
     let Ok(status) = fs::read_to_string(format!("/proc/{process}/status")) else {
         sleep(Duration::from_millis(500));
@@ -207,7 +206,7 @@ pub fn signals_are_caught(process: u32) -> bool {
     [2, 15].iter().all(|signal| caught & (1 << (signal - 1)) != 0)
 }
 
-/// Sends a signal to a process of ours.
+/// Sends a signal to a child process.
 pub fn signal(child: &Child, name: &str) {
     let status = Command::new("kill").args([&format!("-{name}"), &child.id().to_string()]).status();
     assert!(status.is_ok());

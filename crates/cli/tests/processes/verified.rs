@@ -9,7 +9,7 @@ use testkit::memory_folder::memory_folder;
 use voxtile::MapReader;
 use voxtile::integrity::{Finding, Severity, verify};
 
-/// The poses of a map's scans, moved, as lines of a file.
+/// Returns the poses of a map's scans, moved, as lines of a file.
 fn poses(map: &Path, by_m: f64) -> String {
     let scans = MapReader::open(map, 0).unwrap().scans().unwrap();
     let line = |[x, y, z]: [f64; 3]| format!("1 0 0 {} 0 1 0 {y} 0 0 1 {z}\n", x + by_m);
@@ -21,7 +21,7 @@ fn run(arguments: &[&str]) {
     assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
 }
 
-/// What is damaged by a look at the map, and what could not be settled.
+/// Returns the damage that a verification finds, and the number of unsettled places.
 fn damage_in(map: &Path) -> (Vec<String>, u64) {
     let mut damage = Vec::new();
     let note = |finding: &Finding| {
@@ -33,12 +33,12 @@ fn damage_in(map: &Path) -> (Vec<String>, u64) {
     (damage, verification.unsettled)
 }
 
-/// For `VOXTILE_READER_SECONDS`: processes change a map, each of which removes what the one before has kept for
+/// For `VOXTILE_READER_SECONDS`, processes change a map, and each removes the files that the previous one kept for
 /// readers.
 #[test]
-fn verify_finds_no_damage_in_a_map_that_is_remapped_and_reverted_meanwhile() {
+fn verify_finds_no_damage_during_concurrent_remaps_and_reverts() {
     let scans = Scans::new(8, 1);
-    // Without waits for syncs there are more changes.
+    // No syncs, to make more changes in the same time.
     let folder = memory_folder();
     let map = folder.path().join("map");
     assert!(scans.build(&map, &["--keep-scans", "--tile-size", "4"]).status().unwrap().success());

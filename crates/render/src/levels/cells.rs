@@ -6,21 +6,21 @@ use voxtile::MapConfig;
 use voxtile::sensor::Evidence;
 use voxtile::tile::Tile;
 
-/// What the voxels of a node are.
+/// Kind of the voxels of a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Kind {
     /// Occupied, by the map's threshold.
     Occupied,
     /// Observed, and below the threshold.
     Free,
-    /// Never observed, with a free voxel of the same tile beside it: where knowledge ends.
+    /// Never observed, next to a free voxel of the same tile: the boundary of the unknown (frontier).
     Unknown,
 }
 
-/// A voxel of a node.
+/// One voxel of a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Cell {
-    /// Place in the node: z in bits 16 to 23, y in 8 to 15, x in 0 to 7. Cells are in this order.
+    /// Position in the node: z in bits 16 to 23, y in 8 to 15, x in 0 to 7. Cells are sorted by it.
     pub(super) place: u32,
     /// Log-odds, from 0 to 255 on a [`Scale`].
     pub(super) value: u8,
@@ -28,15 +28,15 @@ pub(super) struct Cell {
     pub(super) count: u8,
 }
 
-/// The voxels of a node, in order.
+/// Voxels of a node, sorted by position.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Cells {
     pub(super) cells: Vec<Cell>,
-    /// The last scan that may have changed them; 0 where nobody knows.
+    /// Last scan that may have changed them; 0 if unknown.
     pub(super) last_scan: u64,
 }
 
-/// What values stand for: log-odds along a line.
+/// Linear scale of the values in log-odds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Scale {
     pub(super) least: f64,
@@ -44,7 +44,7 @@ pub(super) struct Scale {
 }
 
 impl Scale {
-    /// The scale of a kind of voxels: from the threshold to the clamp on its side.
+    /// Returns the scale for a kind of voxels: from the threshold to the clamp on its side.
     pub(super) fn of(config: &MapConfig, kind: Kind) -> Self {
         let [min, max] = config.sensor_model.limits();
         let threshold = config.occupied_log_odds();
@@ -68,13 +68,13 @@ pub(super) fn place(cell: [i64; 3]) -> u32 {
     cell.iter().rev().fold(0, |place, &k| place << 8 | (k as u32 & 0xff))
 }
 
-/// The place along x, y and z.
+/// Returns the position along x, y and z.
 pub(super) fn axes(place: u32) -> [i64; 3] {
     [0, 8, 16].map(|shift| i64::from(place >> shift & 0xff))
 }
 
 impl Cells {
-    /// The voxels of a kind in a node that is a tile or a part of one.
+    /// Returns the voxels of a kind in a node that is a tile or a part of one.
     pub(super) fn of_tile(
         scheme: Scheme,
         key: NodeKey,
@@ -92,7 +92,7 @@ impl Cells {
         let mut cells = Vec::new();
         match kind {
             Kind::Unknown => {
-                let unknown = unknown_beside_free(tile, threshold);
+                let unknown = unknown_next_to_free(tile, threshold);
                 cells.extend(unknown.into_iter().filter_map(own).map(|cell| Cell {
                     place: place(cell),
                     value: 0,
@@ -114,7 +114,7 @@ impl Cells {
         Self { cells: merged(cells), last_scan }
     }
 
-    /// The occupied voxels of all nodes of a tile: of itself, and of each block of it.
+    /// Returns the occupied voxels of all nodes of a tile: of the tile itself and of each block of it.
     pub(super) fn of_nodes_of_tile(
         scheme: Scheme,
         tile: &Tile,
@@ -142,15 +142,15 @@ impl Cells {
         nodes
     }
 
-    /// Takes in the voxels of a node within this one's: each becomes a part of a coarser one, which has the largest of
-    /// its values. Call [`Cells::sort`] after the last.
+    /// Adds the voxels of a child node. Each maps to a coarser voxel, which keeps the maximum value. Call
+    /// [`Cells::sort`] after the last child.
     pub(super) fn add_child(&mut self, scheme: Scheme, own: NodeKey, child: NodeKey, cells: &Self) {
         let (from, first, edges) = (scheme.first_voxel(child), scheme.first_voxel(own), scheme.edges(own));
         let width = 1 << child.level;
         for cell in &cells.cells {
             let at = axes(cell.place);
             let low = [0, 1, 2].map(|k| from[k] - first[k] + (at[k] << child.level));
-            // One coarser voxel; two where the edge of a tile is not a multiple of them.
+            // One coarser voxel, or two at the edge of a tile whose size is not a multiple of theirs.
             let [xs, ys, zs] = [0, 1, 2].map(|k| {
                 let last = ((low[k] + width - 1) >> own.level).min(edges[k] - 1);
                 (low[k] >> own.level)..=last
@@ -167,7 +167,7 @@ impl Cells {
         self.last_scan = self.last_scan.max(cells.last_scan);
     }
 
-    /// The lowest and the highest place along each axis that has a voxel; `None` if there are no voxels.
+    /// Returns the lowest and the highest position along each axis; `None` without voxels.
     pub(super) fn bounds(&self) -> Option<[[u8; 3]; 2]> {
         let mut bounds = None;
         for cell in &self.cells {
@@ -182,7 +182,7 @@ impl Cells {
     }
 }
 
-/// Sorted, one of each place, with the largest of their values.
+/// Sorts cells and merges those of one position, keeping the maximum values.
 fn merged(mut cells: Vec<Cell>) -> Vec<Cell> {
     cells.sort_unstable_by_key(|cell| cell.place);
     cells.dedup_by(|later, kept| {
@@ -196,8 +196,8 @@ fn merged(mut cells: Vec<Cell>) -> Vec<Cell> {
     cells
 }
 
-/// The voxels of a tile that were never observed and have a free voxel of the tile beside them.
-fn unknown_beside_free(tile: &Tile, threshold: f64) -> FxHashSet<[i32; 3]> {
+/// Returns the voxels of a tile that were never observed and have a free neighbour in the tile.
+fn unknown_next_to_free(tile: &Tile, threshold: f64) -> FxHashSet<[i32; 3]> {
     let bounds = tile.voxel_box();
     let mut unknown = FxHashSet::default();
     for voxel in tile.voxels().filter(|voxel| voxel.evidence.log_odds < threshold) {

@@ -9,15 +9,15 @@ use voxtile::mapper::MapView;
 use voxtile::space::{Aabb, Point};
 use voxtile::{Error, Result};
 
-/// What changed from one state of a map to another, node by node: voxels that appeared (1), vanished (2), or are
-/// occupied in both (3).
+/// Difference of two states of a map, node by node: voxels that appeared (1), vanished (2), or are occupied in both
+/// (3).
 pub struct Difference<'a, V> {
     before: LevelsOf<'a, V>,
     after: LevelsOf<'a, V>,
 }
 
 impl<'a, V: MapView> Difference<'a, V> {
-    /// Compares two states, each with the map that it is of.
+    /// Compares two states, each with its map.
     ///
     /// # Errors
     ///
@@ -30,11 +30,11 @@ impl<'a, V: MapView> Difference<'a, V> {
         Ok(Self { before: of(before), after: of(after) })
     }
 
-    /// The bytes of a node, as [`Levels::node`] gives them; `None` if neither state has it.
+    /// Returns the bytes of a node as [`Levels::node`] does; `None` if neither state has it.
     ///
     /// # Errors
     ///
-    /// A tile that cannot be read, a store that cannot be read.
+    /// Fails if a tile or the store cannot be read.
     pub fn node(&self, store: &NodeStore, key: NodeKey) -> Result<Option<Vec<u8>>> {
         if self.version_of(key).is_none() {
             return Ok(None);
@@ -55,7 +55,7 @@ impl<'a, V: MapView> Difference<'a, V> {
     }
 }
 
-/// Both in one, in order.
+/// Merges the voxels of both states, sorted.
 fn compared(before: &Cells, after: &Cells) -> Cells {
     let (mut old, mut new) = (before.cells.iter().peekable(), after.cells.iter().peekable());
     let mut cells = Vec::new();
@@ -77,7 +77,7 @@ fn compared(before: &Cells, after: &Cells) -> Cells {
 
 impl<V: MapView> TilesetNodes for Difference<'_, V> {
     fn tops(&self) -> Vec<NodeKey> {
-        // The states may begin at different levels: those of the coarser cover the other's.
+        // The states may begin at different levels: the coarser ones cover the others.
         let (before, after) = (self.before.tops(), self.after.tops());
         let level = before.iter().chain(&after).map(|key| key.level).max().unwrap_or(0);
         let lifted = before.into_iter().chain(after).map(|mut key| {

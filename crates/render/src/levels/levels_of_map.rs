@@ -12,7 +12,7 @@ use voxtile::mapper::MapView;
 use voxtile::space::{Aabb, Point, TileBox, TileIndex};
 use voxtile::{Error, Result};
 
-/// The levels of detail of one state of a map, or of some of its tiles.
+/// Levels of detail of one state of a map, or of some of its tiles.
 ///
 /// ```
 /// use voxtile_render::levels::{Kind, Levels, NodeStore};
@@ -32,45 +32,45 @@ use voxtile::{Error, Result};
 pub struct Levels {
     config: MapConfig,
     pub(super) scheme: Scheme,
-    /// From the level of tiles on, those without occupied voxels only where one beside them has some.
+    /// From the tile level up. Nodes without occupied voxels are included only if a sibling has some.
     nodes: FxHashMap<NodeKey, Node>,
     tops: Vec<NodeKey>,
-    /// Around all tiles.
+    /// Bounds of all tiles.
     tile_box: Option<TileBox>,
     unreadable: Vec<String>,
 }
 
-/// What is known of a node without its bytes.
+/// Properties of a node that are known without its bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Node {
-    /// A hash of the tiles below it, of the threshold, and of how nodes are made.
+    /// Hash of the tiles below the node, the threshold and [`NODE_FORMAT`].
     pub(super) version: u64,
-    /// Whether it has occupied voxels.
+    /// Whether the node has occupied voxels.
     pub(super) is_occupied: bool,
-    /// The last scan that may have changed it; 0 where nobody knows.
+    /// Last scan that may have changed the node; 0 if unknown.
     last_scan: u64,
 }
 
-/// Another number whenever nodes are made in another way.
-const HOW_NODES_ARE_MADE: u64 = 1;
-/// The coarsest level has no more voxels than this, so that it is there at once.
+/// Increment when nodes are computed differently.
+const NODE_FORMAT: u64 = 1;
+/// Maximum number of voxels in the coarsest level, so that it loads at once.
 const MAX_TOP_VOXELS: u64 = 4096;
 
 impl Levels {
-    /// Makes the coarse nodes of these tiles of a map, those that the store does not have yet, on all cores. `progress`
-    /// is told how many tiles were read since the last call; if it returns `false` the work stops, and the result is
-    /// `None`. What was made until then stays in the store.
+    /// Builds the coarse nodes of these tiles that the store lacks, on all cores. `progress` receives the number of
+    /// tiles read since its last call; if it returns `false`, the build stops and returns `None`. Nodes built until
+    /// then remain in the store.
     ///
-    /// Tiles that are damaged are left out; [`Levels::unreadable`] says which.
+    /// Damaged tiles are skipped and listed by [`Levels::unreadable`].
     ///
-    /// Nodes are known by the versions of their tiles. Tiles of OctoMap's files and of maps without a log have none:
-    /// `origin` stands for what is in them, another number for every map, and for the same map at another time.
+    /// Nodes are identified by the versions of their tiles. Tiles of OctoMap files and of maps without a log have no
+    /// versions: for these, `origin` must be different for each map and each state of it.
     ///
-    /// Memory: some sixty bytes a tile, and a few tiles for each thread.
+    /// Memory: about sixty bytes per tile, and a few tiles per thread.
     ///
     /// # Errors
     ///
-    /// A tile that cannot be read for other reasons than damage, a store that cannot be read or written.
+    /// Fails if a tile cannot be read for other reasons than damage, or if the store cannot be read or written.
     pub fn build<V: MapView>(
         map: &V,
         tiles: &[TileIndex],
@@ -153,17 +153,17 @@ impl Levels {
             if is_coarsest || (voxels <= MAX_TOP_VOXELS && is_small(&level)) {
                 levels.tops =
                     level.iter().filter(|(_, node)| node.is_occupied).map(|(key, _)| *key).collect();
-                levels.leave_out_empty_regions();
+                levels.remove_empty_regions();
                 return Ok(Some(levels));
             }
         }
     }
 
-    /// What the index of the map tells of a tile.
+    /// Returns the node of a tile from the map's index.
     fn node_of_tile<V: MapView>(&self, map: &V, tile: TileIndex, origin: u64) -> Node {
         let version = map.version_of_tile(tile);
         let mut hasher = blake3::Hasher::new();
-        hasher.update(&HOW_NODES_ARE_MADE.to_le_bytes());
+        hasher.update(&NODE_FORMAT.to_le_bytes());
         hasher.update(&self.config.occupied_log_odds().to_le_bytes());
         hasher.update(tile.to_array().map(i32::to_le_bytes).as_flattened());
         match version {
@@ -182,8 +182,8 @@ impl Levels {
         }
     }
 
-    /// Tiles where everything is free are of no use by themselves.
-    fn leave_out_empty_regions(&mut self) {
+    /// Removes free tiles without an occupied sibling, which no viewer needs.
+    fn remove_empty_regions(&mut self) {
         let parents: FxHashMap<NodeKey, bool> =
             self.nodes.iter().map(|(&key, node)| (key, node.is_occupied)).collect();
         self.nodes.retain(|key, node| {
@@ -191,7 +191,7 @@ impl Levels {
         });
     }
 
-    /// Makes a node of several tiles and stores it; `None` if a tile below it is damaged.
+    /// Builds and stores a node of several tiles; `None` if a tile below it is damaged.
     fn make<V: MapView>(
         &self,
         map: &V,
@@ -214,7 +214,7 @@ impl Levels {
         stored.map(Some).map_err(Stop::Failed)
     }
 
-    /// The occupied voxels of a node, from those of its children.
+    /// Computes the occupied voxels of a node from its children.
     fn pooled<V: MapView>(&self, map: &V, store: &NodeStore, key: NodeKey) -> Result<Cells> {
         let mut cells = Cells::default();
         for child in key.children() {
@@ -225,7 +225,7 @@ impl Levels {
         Ok(cells)
     }
 
-    /// The occupied voxels of a node.
+    /// Returns the occupied voxels of a node.
     pub(super) fn cells<V: MapView>(&self, map: &V, store: &NodeStore, key: NodeKey) -> Result<Cells> {
         let tile = self.scheme.tile_of(key);
         let Some(node) = self.get(tile.map_or(key, |tile| self.scheme.key_of_tile(tile))) else {
@@ -236,7 +236,7 @@ impl Levels {
         match (kept.map(|bytes| node_bytes::decode(&bytes)), tile) {
             (Some(Ok(cells)), _) => Ok(cells),
             (_, Some(tile)) => self.cells_of_tile(map, key, tile, Kind::Occupied),
-            // What is kept for later may have been damaged: it is made again.
+            // A stored node may be damaged: build it again.
             _ => {
                 let cells = self.pooled(map, store, key)?;
                 Ok(Cells { last_scan: node.last_scan, ..cells })
@@ -250,7 +250,7 @@ impl Levels {
         Ok(Cells::of_tile(self.scheme, key, &tile, &self.config, kind, last_scan))
     }
 
-    /// The store for nodes of a tile, if its version tells what is in them: those of OctoMap's files have none.
+    /// Returns the store for nodes of a tile, or `None` for tiles without versions, such as those of OctoMap files.
     fn store_of_tile<'s, V: MapView>(
         map: &V,
         store: &'s NodeStore,
@@ -259,8 +259,8 @@ impl Levels {
         map.version_of_tile(tile).map(|_| store)
     }
 
-    /// Makes and stores all nodes of a tile; whoever asks for one of them will ask for the others. The bytes of each,
-    /// and how many voxels it has.
+    /// Builds and stores all nodes of a tile, because a viewer that loads one of them usually loads the others. Returns
+    /// the bytes and the number of voxels of each.
     fn make_nodes_of_tile<V: MapView>(
         &self,
         map: &V,
@@ -274,7 +274,7 @@ impl Levels {
         let made = made.map(|(key, cells)| {
             let bytes = node_bytes::encode(&self.head(key, Kind::Occupied), &cells);
             let (bounds, voxels) = (cells.bounds().unwrap_or_default(), cells.cells.len());
-            // They can be made again: a full disk is no reason to show nothing.
+            // Nodes can be rebuilt, so continue if the disk is full.
             let put = store.map(|store| store.put(key, node.version, &bytes, bounds, voxels as u32));
             if let Some(Err(error)) = put {
                 log::debug!("{error:#}");
@@ -284,12 +284,12 @@ impl Levels {
         Ok(made.collect())
     }
 
-    /// The bytes of a node (`docs/view.md`), compressed as gzip; `None` if there is no such node. Only nodes that are
-    /// tiles, or parts of them, know free and unknown voxels.
+    /// Returns the gzip-compressed bytes of a node (`docs/view.md`); `None` if there is no such node. Only nodes that
+    /// are tiles or parts of tiles have free and unknown voxels.
     ///
     /// # Errors
     ///
-    /// A tile that cannot be read, a store that cannot be read.
+    /// Fails if a tile or the store cannot be read.
     pub fn node<V: MapView>(
         &self,
         map: &V,
@@ -323,29 +323,28 @@ impl Levels {
         Ok(Some(node_bytes::encode(&head, &cells)))
     }
 
-    /// The occupied voxels of a node: the places of each along the axes, counted from the node's lower corner in voxels
-    /// of
+    /// Returns the positions of the occupied voxels of a node, from its lower corner, in voxels of
     /// [`Levels::voxel_edge_m`].
     ///
     /// # Errors
     ///
-    /// A tile that cannot be read, a store that cannot be read.
+    /// Fails if a tile or the store cannot be read.
     pub fn voxels<V: MapView>(&self, map: &V, store: &NodeStore, key: NodeKey) -> Result<Vec<[u8; 3]>> {
         let cells = self.cells(map, store, key)?.cells;
         Ok(cells.iter().map(|cell| axes(cell.place).map(|at| at as u8)).collect())
     }
 
-    /// Whether a node is a tile.
+    /// Returns whether a node is a tile.
     pub fn is_tile(&self, key: NodeKey) -> bool {
         key.level == self.scheme.tile_level()
     }
 
-    /// The lower corner of a node, in metres.
+    /// Returns the lower corner of a node in metres.
     pub fn corner_m(&self, key: NodeKey) -> Point {
         self.head(key, Kind::Occupied).corner_m
     }
 
-    /// The nodes that have occupied voxels, in order, but for those within tiles.
+    /// Returns the nodes with occupied voxels in order, except those inside tiles.
     pub fn keys(&self) -> Vec<NodeKey> {
         let occupied = self.nodes.iter().filter(|(_, node)| node.is_occupied);
         let mut keys: Vec<_> = occupied.map(|(key, _)| *key).collect();
@@ -353,11 +352,11 @@ impl Levels {
         keys
     }
 
-    /// The nodes within a tile that is divided, which is one itself; none of a tile that is not.
+    /// Returns the nodes inside a tile, including the tile, if the tile is divided; otherwise none.
     ///
     /// # Errors
     ///
-    /// A tile that cannot be read.
+    /// Fails if a tile cannot be read.
     pub fn keys_within<V: MapView>(&self, map: &V, store: &NodeStore, tile: NodeKey) -> Result<Vec<NodeKey>> {
         match self.scheme.tile_of(tile).filter(|_| tile.level == self.scheme.tile_level() && tile.level > 0) {
             Some(index) => Ok(self.blocks_of_tile(map, store, index)?.into_iter().collect()),
@@ -365,7 +364,7 @@ impl Levels {
         }
     }
 
-    /// The blocks of a tile that have occupied voxels, at every level.
+    /// Returns the blocks of a tile with occupied voxels at every level.
     pub(super) fn blocks_of_tile<V: MapView>(
         &self,
         map: &V,
@@ -406,27 +405,28 @@ impl Levels {
         }
     }
 
-    /// Edge of the voxels of a level, in metres.
+    /// Edge length of the voxels of a level, in metres.
     pub fn voxel_edge_m(&self, level: u8) -> f64 {
         self.config.grid.resolution_m() * (1_u64 << level) as f64
     }
 
-    /// The coarsest nodes, at most eight: all of the map in few voxels. None for a map without occupied voxels.
+    /// Returns the coarsest nodes, at most eight, which cover the map in few voxels. Empty for a map without occupied
+    /// voxels.
     pub fn tops(&self) -> &[NodeKey] {
         &self.tops
     }
 
-    /// Tiles that are damaged and were left out: an error each.
+    /// Returns an error for each damaged tile, which the levels skip.
     pub fn unreadable(&self) -> &[String] {
         &self.unreadable
     }
 
-    /// Number of nodes that are tiles.
+    /// Returns the number of nodes that are tiles.
     pub fn tiles(&self) -> usize {
         self.nodes.keys().filter(|key| key.level == self.scheme.tile_level()).count()
     }
 
-    /// What is known of a node, also of one above the coarsest, which stands for those below it.
+    /// Returns the properties of a node. A node above the coarsest level represents those below it.
     pub(super) fn get(&self, key: NodeKey) -> Option<Node> {
         let top_level = self.tops.first().map_or(MAX_LEVEL, |top| top.level);
         if key.level <= top_level {
@@ -444,7 +444,7 @@ impl Levels {
         })
     }
 
-    /// A box around the occupied voxels of a node, in metres: as tight as is known without reading a tile.
+    /// Returns a box around the occupied voxels of a node in metres, as tight as possible without reading a tile.
     pub fn bounds_m(&self, store: &NodeStore, key: NodeKey) -> Aabb {
         let head = self.head(key, Kind::Occupied);
         let stored = self.nodes.get(&key).and_then(|node| store.find(key, node.version));
@@ -453,7 +453,7 @@ impl Levels {
             None => [[0; 3], self.scheme.edges(key).map(|edge| (edge - 1).clamp(0, 255) as u8)],
         };
         let [min, max] = node_bytes::bounds_m(&head, bounds);
-        // Coarse voxels reach beyond the tiles.
+        // Coarse voxels may extend beyond the tiles.
         let Some(tiles) = self.tile_box else { return Aabb { min, max } };
         let edge_m = self.config.grid.tile_size_m();
         let (low, high) = (tiles.min().to_array(), tiles.max().to_array());
@@ -475,7 +475,7 @@ impl From<Error> for Stop {
     }
 }
 
-/// The nodes above those of a level, which are in order, with their versions.
+/// Returns the parents of a sorted level, with their versions.
 fn parents_of(level: &[(NodeKey, Node)]) -> Vec<(NodeKey, Node)> {
     let mut children: Vec<_> = level.iter().map(|&(key, node)| (key.parent(), key, node)).collect();
     children.sort_unstable_by_key(|&(parent, key, _)| (parent, key));
@@ -498,7 +498,7 @@ fn first_eight(hasher: &blake3::Hasher) -> u64 {
     hash.as_bytes().iter().take(8).fold(0, |number, &byte| number << 8 | u64::from(byte))
 }
 
-/// Whether the nodes of a level are at most two along each axis.
+/// Returns whether a level has at most two nodes along each axis.
 fn is_small(level: &[(NodeKey, Node)]) -> bool {
     (0..3).all(|k| {
         let places = level.iter().map(|(key, _)| i64::from(key.index[k]));

@@ -1,20 +1,20 @@
-//! Levels of detail: a map of any size as nodes of a bounded number of voxels, coarser and coarser, for viewers that
-//! load only what is near.
+//! Levels of detail: divides a map of any size into nodes of bounded size at several resolutions, so that viewers load
+//! only what the view needs.
 //!
 //! ```text
-//! Scheme        which nodes there are, and which voxels each covers          scheme, node_key
-//! Cells         the voxels of a node; eight nodes become one of coarser      cells
-//!               voxels, each the maximum of those in it (OctoMap's rule)
-//! node_bytes    cells as bytes, and back                                     node_bytes
-//! NodeStore     coarse nodes that were made once, in a file                  node_store
-//! Levels        the nodes of one state of a map, by the versions of          levels
-//!               its tiles: what has not changed is not made again
-//! Difference    two states node by node                                      difference
+//! Scheme        nodes, and the voxels that each covers                       scheme, node_key
+//! Cells         voxels of a node; eight nodes become one of coarser          cells
+//!               voxels, each the maximum of its children (OctoMap's rule)
+//! node_bytes    encoding of cells                                            node_bytes
+//! NodeStore     file of coarse nodes                                         node_store
+//! Levels        nodes of one state of a map, identified by the versions      levels
+//!               of their tiles, so that unchanged nodes are reused
+//! Difference    two states compared node by node                             difference
 //! tileset       nodes as 3D Tiles                                            tileset
 //! ```
 //!
-//! The finest nodes are the map's tiles, or parts of them where a tile has more than 128 voxels along an edge. They are
-//! made when they are asked for; coarser nodes are kept in the store.
+//! The finest nodes are the map's tiles, or parts of them if a tile has more than 128 voxels along an edge. They are
+//! computed on request; coarser nodes are stored.
 
 mod cells;
 mod difference;

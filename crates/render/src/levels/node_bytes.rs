@@ -1,4 +1,4 @@
-//! The bytes of a node, which a viewer gets as well:
+//! Encoding of a node, which viewers also read:
 //!
 //! ```text
 //!  0  [u8; 4] "VXN1"                 44  u16  voxels along the edge
@@ -6,10 +6,10 @@
 //!  8  [f64;3] lower corner, metres   47  u8   0
 //! 32  f64     edge of a voxel, m     48  f32  log-odds of value 0, and of 255, and of the map's threshold
 //! 40  u32     last scan              60  u32  0
-//! 64  x[n] y[n] z[n] value[n] count[n], one byte each; x, y and z as the wrapping difference to the voxel before
+//! 64  x[n] y[n] z[n] value[n] count[n], one byte each; x, y and z as wrapping differences to the previous voxel
 //! ```
 //!
-//! Little endian, compressed as gzip: neighbours differ by little, so that a voxel takes some two bytes.
+//! Little endian, compressed with gzip. Neighbours differ little, so a voxel takes about two bytes.
 
 use super::cells::{Cell, Cells, Scale, place};
 use flate2::Compression;
@@ -19,14 +19,14 @@ use std::io::{self, Read, Write};
 
 const MAGIC: [u8; 4] = *b"VXN1";
 const HEADER_BYTES: usize = 64;
-/// Bytes of a voxel before they are compressed.
+/// Uncompressed size of a voxel in bytes.
 const VOXEL_BYTES: usize = 5;
-/// More voxels than a node can have.
+/// Upper bound on the number of voxels of a node.
 const MAX_VOXELS: usize = 1 << 24;
-/// The number of a scan that nobody knows.
+/// Value of `last scan` if it is unknown.
 const NO_SCAN: u32 = u32::MAX;
 
-/// What the header says beside the voxels.
+/// Header of a node, without its voxels.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Head {
     pub(super) corner_m: [f64; 3],
@@ -37,7 +37,7 @@ pub(super) struct Head {
     pub(super) threshold: f64,
 }
 
-/// The compressed bytes of a node.
+/// Returns the compressed bytes of a node.
 pub(super) fn encode(head: &Head, cells: &Cells) -> Vec<u8> {
     let count = cells.cells.len();
     let mut bytes = Vec::with_capacity(HEADER_BYTES + VOXEL_BYTES * count);
@@ -66,18 +66,18 @@ pub(super) fn encode(head: &Head, cells: &Cells) -> Vec<u8> {
     gzip.write_all(&bytes).and_then(|()| gzip.finish()).unwrap_or_default()
 }
 
-/// The voxels of [`encode`]'s bytes.
+/// Decodes the voxels from the bytes of [`encode`].
 pub(super) fn decode(compressed: &[u8]) -> io::Result<Cells> {
     let wrong = |reason| io::Error::new(io::ErrorKind::InvalidData, reason);
     let mut bytes = Vec::new();
     let most = HEADER_BYTES + VOXEL_BYTES * MAX_VOXELS;
     GzDecoder::new(compressed).take(most as u64).read_to_end(&mut bytes)?;
     let (head, voxels) =
-        bytes.split_at_checked(HEADER_BYTES).ok_or_else(|| wrong("a node without a head"))?;
+        bytes.split_at_checked(HEADER_BYTES).ok_or_else(|| wrong("node without a header"))?;
     let word = |at: usize| u32::from_le_bytes([head[at], head[at + 1], head[at + 2], head[at + 3]]);
     let count = word(4) as usize;
     if head[..4] != MAGIC || count.checked_mul(VOXEL_BYTES) != Some(voxels.len()) {
-        return Err(wrong("not a node, or one of another length than it says"));
+        return Err(wrong("not a node, or a node with a wrong length"));
     }
     let plane = |number: usize| voxels[number * count..(number + 1) * count].iter().copied();
     let mut at = [0_u8; 3];
@@ -93,7 +93,7 @@ pub(super) fn decode(compressed: &[u8]) -> io::Result<Cells> {
     Ok(Cells { cells: cells.collect(), last_scan })
 }
 
-/// A node without voxels covers nothing; anything else covers this box of places.
+/// Returns the box of a range of positions, in metres.
 pub(super) fn bounds_m(head: &Head, bounds: [[u8; 3]; 2]) -> [[f64; 3]; 2] {
     let [low, high] = bounds;
     let at = |k: usize, place: i64| head.corner_m[k] + place as f64 * head.voxel_edge_m;

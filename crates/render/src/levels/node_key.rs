@@ -1,26 +1,26 @@
 use std::fmt;
 use std::str::FromStr;
 
-/// Names a node: its level, and its place among the nodes of the level. A node of level `n` has voxels of `2^n` times
-/// the map's resolution, and its eight children are those of level `n - 1` at twice its index, and one more.
+/// Level of a node and its index in this level. A node of level `n` has voxels of `2^n` times the map's resolution. Its
+/// eight children are in level `n - 1`, at twice its index and the next one along each axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct NodeKey {
-    /// 0 is the map's own resolution.
+    /// Level; 0 has the map's resolution.
     pub level: u8,
-    /// Place along x, y and z.
+    /// Index along x, y and z.
     pub index: [i32; 3],
 }
 
-/// The highest level: there, all indices are 0 or -1.
+/// Highest level, where all indices are 0 or -1.
 pub(super) const MAX_LEVEL: u8 = 42;
 
 impl NodeKey {
-    /// The node of the next level that covers this one.
+    /// Returns the node of the next coarser level that covers this one.
     pub(super) fn parent(self) -> Self {
         Self { level: self.level + 1, index: self.index.map(|k| k >> 1) }
     }
 
-    /// The eight nodes of the level below that this one covers, x fastest; none below level 0.
+    /// Returns the eight nodes of the next finer level, x fastest; none at level 0.
     pub(super) fn children(self) -> impl Iterator<Item = Self> {
         let numbers = if self.level == 0 { 0..0 } else { 0..8 };
         numbers.filter_map(move |number| {
@@ -31,7 +31,7 @@ impl NodeKey {
     }
 }
 
-/// `L/X/Y/Z`, as in URLs and folders.
+/// Formats as `L/X/Y/Z`, as in URLs and paths.
 impl fmt::Display for NodeKey {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [x, y, z] = self.index;
@@ -51,7 +51,7 @@ impl FromStr for NodeKey {
             *k = next()?.parse().map_err(|_| ())?;
         }
         let key = Self { level, index };
-        // One name for each node: no signs or zeros in front.
+        // Each node has only one name, without signs or leading zeros.
         if parts.next().is_some() || level > MAX_LEVEL || key.to_string() != text { Err(()) } else { Ok(key) }
     }
 }

@@ -1,12 +1,12 @@
-//! Coarse nodes that were made once.
+//! File of coarse nodes.
 //!
 //! ```text
 //! header  "VXLEVELS", version
-//! record  level, index, version, box of its voxels, number of voxels, length, checksum of all of it; the node's bytes
+//! record  level, index, version, bounds of its voxels, number of voxels, length, checksum of all; the node's bytes
 //! ```
 //!
-//! A node is known by its key and its version, which is a hash of all tiles below it: what is here is never wrong, only
-//! of no use any more. So a store can be kept for the next time, be shared by the states of a map, and be cut anywhere.
+//! A node is identified by its key and its version, a hash of all tiles below it. So a stored node can be obsolete but
+//! never wrong: a file can be reused later, shared by states of a map, and truncated anywhere.
 
 use super::node_key::{MAX_LEVEL, NodeKey};
 use parking_lot::Mutex;
@@ -17,18 +17,18 @@ use voxtile::{Error, Result};
 
 const HEADER: [u8; 16] = *b"VXLEVELS\x01\0\0\0\0\0\0\0";
 const RECORD_BYTES: usize = 48;
-/// More bytes than a node can have.
+/// Upper bound on the size of a node in bytes.
 const MAX_BYTES: u32 = 1 << 27;
 
-/// Nodes of any state of a map, in a file that may be kept for later or go with the program.
+/// Nodes of all states of a map, in a permanent or temporary file.
 pub struct NodeStore {
     spool: Mutex<Spool>,
     nodes: Mutex<Nodes>,
-    /// How errors name the file.
+    /// Name of the file in errors.
     path: PathBuf,
 }
 
-/// By key and version.
+/// Nodes by key and version.
 type Nodes = FxHashMap<(NodeKey, u64), Stored>;
 
 struct Spool {
@@ -37,34 +37,34 @@ struct Spool {
     limit: Option<Limit>,
 }
 
-/// A file that may be kept for the next time.
+/// File that may be reopened later.
 trait Reopenable: Read + Write + Seek + Send {}
 
 impl<T: Read + Write + Seek + Send> Reopenable for T {}
 
-/// How long the file may be, and what empties it.
+/// Maximum length of the file, and a function that empties it.
 struct Limit {
     most_bytes: u64,
     empty: Box<dyn FnMut() -> io::Result<()> + Send>,
 }
 
-/// Where a node is.
+/// Location of a node in the file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Stored {
     offset: u64,
     bytes: u32,
-    /// Of its voxels; the lowest and the highest place.
+    /// Lowest and highest position of its voxels.
     pub(super) bounds: [[u8; 3]; 2],
     pub(super) voxels: u32,
 }
 
 impl NodeStore {
-    /// A store in a file that is open for reading and writing: empty, or with what an earlier one left there. What
-    /// cannot be read of it is overwritten. `path` is how errors name the file, which must be nobody else's meanwhile.
+    /// Opens a store in a file that is open for reading and writing, empty or with nodes of an earlier store.
+    /// Unreadable records are overwritten. `path` names the file in errors. No other process may use the file.
     ///
     /// # Errors
     ///
-    /// A file that cannot be read or written.
+    /// Fails if the file cannot be read or written.
     pub fn open(
         mut file: impl Read + Write + Seek + Send + 'static,
         path: impl Into<PathBuf>,
@@ -75,14 +75,14 @@ impl NodeStore {
         Ok(Self { spool, nodes: Mutex::new(nodes), path })
     }
 
-    /// The same with a file that has at most so many bytes: before it gets longer, `empty` empties it and it is begun
-    /// anew. Most of it is of states that nobody looks at any more, and all of it can be made again.
+    /// Limits the size of the file: before it exceeds `most_bytes`, `empty` truncates it and the store starts again.
+    /// Most nodes in it are obsolete by then, and all can be rebuilt.
     pub fn with_limit(self, most_bytes: u64, empty: impl FnMut() -> io::Result<()> + Send + 'static) -> Self {
         self.spool.lock().limit = Some(Limit { most_bytes, empty: Box::new(empty) });
         self
     }
 
-    /// Bytes of the file.
+    /// Returns the size of the file in bytes.
     pub fn bytes(&self) -> u64 {
         self.spool.lock().end
     }
@@ -91,9 +91,9 @@ impl NodeStore {
         self.nodes.lock().get(&(key, version)).copied()
     }
 
-    /// The bytes of a node; `None` if it is not here or no longer what it was.
+    /// Returns the bytes of a node; `None` if it is missing or damaged.
     pub(super) fn get(&self, key: NodeKey, version: u64) -> Result<Option<Vec<u8>>> {
-        // Nobody begins the file anew between the look for the node and the look at it.
+        // Hold the lock for lookup and read, so that the file is not restarted in between.
         let mut spool = self.spool.lock();
         let Some(stored) = self.find(key, version) else { return Ok(None) };
         let mut record = vec![0; RECORD_BYTES + stored.bytes as usize];
@@ -130,7 +130,7 @@ impl NodeStore {
         let crc = checksum(&record);
         record[44..48].copy_from_slice(&crc.to_le_bytes());
         let mut spool = self.spool.lock();
-        self.make_room(&mut spool, record.len() as u64)?;
+        self.restart_if_full(&mut spool, record.len() as u64)?;
         let start = spool.end;
         let written = (|| {
             spool.file.seek(SeekFrom::Start(start))?;
@@ -149,8 +149,8 @@ impl NodeStore {
         Ok(stored)
     }
 
-    /// Begins the file anew if it would get too long.
-    fn make_room(&self, spool: &mut Spool, bytes: u64) -> Result<()> {
+    /// Restarts the file if it would get too long.
+    fn restart_if_full(&self, spool: &mut Spool, bytes: u64) -> Result<()> {
         let end = spool.end.max(HEADER.len() as u64);
         let Some(limit) = spool.limit.as_mut().filter(|limit| end + bytes > limit.most_bytes) else {
             return Ok(());
@@ -162,7 +162,7 @@ impl NodeStore {
     }
 }
 
-/// Finds the nodes of a file, up to the first that is not whole, and where it ends.
+/// Reads the index of a file. Returns the nodes before the first incomplete record, and the end of the last one.
 fn read_all(file: &mut (impl Read + Seek)) -> io::Result<(Nodes, u64)> {
     let mut nodes = Nodes::default();
     let length = file.seek(SeekFrom::End(0))?;
@@ -181,7 +181,7 @@ fn read_all(file: &mut (impl Read + Seek)) -> io::Result<(Nodes, u64)> {
         if offset + u64::from(stored.bytes) > length {
             break;
         }
-        // The checksum is looked at when the node is read.
+        // The checksum is verified when the node is read.
         nodes.insert(node, Stored { offset, ..stored });
         end = offset + u64::from(stored.bytes);
         file.seek_relative(i64::from(stored.bytes))?;
@@ -200,7 +200,7 @@ fn is_whole(record: &[u8]) -> bool {
     record[44..48] == checksum(record).to_le_bytes()
 }
 
-/// The head of a record; the offset is not in it.
+/// Parses the header of a record; the caller adds the offset.
 fn parse(record: &[u8]) -> Option<((NodeKey, u64), Stored)> {
     let word = |at: usize| Some(u32::from_le_bytes(record.get(at..at + 4)?.try_into().ok()?));
     let level = u8::try_from(word(0)?).ok().filter(|&level| level <= MAX_LEVEL)?;
@@ -231,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_would_get_too_long_is_begun_anew() {
+    fn a_file_is_restarted_before_it_exceeds_its_limit() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("nodes");
         let open = || {
@@ -245,7 +245,7 @@ mod tests {
         for number in 0..100 {
             let bytes = vec![number as u8; 100 + number as usize];
             store.put(key_of(number), 7, &bytes, [[0; 3]; 2], 1).unwrap();
-            // What was put last is there, whatever went.
+            // The latest node is present, whatever was removed.
             assert_eq!(store.get(key_of(number), 7).unwrap(), Some(bytes));
             assert!(store.bytes() <= MOST && std::fs::metadata(&path).unwrap().len() <= MOST, "{number}");
         }

@@ -1,10 +1,10 @@
 use super::node_key::NodeKey;
 use voxtile::space::{Grid, TileIndex};
 
-/// How the voxels of a map are divided into nodes.
+/// Division of the voxels of a map into nodes.
 ///
-/// From [`Scheme::tile_level`] on a node covers `2^k` tiles along each axis. Below, it is a block of a tile, 128 of its
-/// voxels wide, the last of a row perhaps less.
+/// From [`Scheme::tile_level`] up, a node covers `2^k` tiles along each axis. Below, it is a block of 128 voxels in a
+/// tile; the last one along an axis may be smaller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Scheme {
     /// Voxels along the edge of a tile.
@@ -12,7 +12,7 @@ pub(super) struct Scheme {
     tile_level: u8,
 }
 
-/// Most voxels along the edge of a node.
+/// Maximum number of voxels along the edge of a node.
 pub(super) const MAX_EDGE: i64 = 128;
 
 impl Scheme {
@@ -25,7 +25,7 @@ impl Scheme {
         Self { tile_edge, tile_level }
     }
 
-    /// The level at which a tile is one node.
+    /// Returns the level at which a tile is one node.
     pub(super) fn tile_level(self) -> u8 {
         self.tile_level
     }
@@ -34,13 +34,13 @@ impl Scheme {
         NodeKey { level: self.tile_level, index: tile.to_array() }
     }
 
-    /// The tile of which a node is a part, or that it is; `None` for a node of several tiles.
+    /// Returns the tile that is or contains a node; `None` for a node of several tiles.
     pub(super) fn tile_of(self, key: NodeKey) -> Option<TileIndex> {
         let finer = self.tile_level.checked_sub(key.level)?;
         Some(key.index.map(|k| k >> finer).into())
     }
 
-    /// The nodes of a tile: itself and all blocks of it, at every level.
+    /// Returns the nodes of a tile: the tile and all its blocks at every level.
     pub(super) fn nodes_of_tile(self, tile: TileIndex) -> Vec<NodeKey> {
         let mut keys = vec![self.key_of_tile(tile)];
         let mut next = 0;
@@ -51,7 +51,7 @@ impl Scheme {
         keys
     }
 
-    /// The node of a level that a voxel of a tile is in, and its place there.
+    /// Returns the node of a level that contains a voxel of a tile, and the position in the node.
     pub(super) fn node_of_voxel(self, tile: TileIndex, voxel: [i32; 3], level: u8) -> (NodeKey, [i64; 3]) {
         let index = tile.to_array();
         let own = [0, 1, 2].map(|k| (i64::from(voxel[k]) - i64::from(index[k]) * self.tile_edge) >> level);
@@ -61,7 +61,7 @@ impl Scheme {
         (key, own.map(|k| k % MAX_EDGE))
     }
 
-    /// The lowest voxel of a node, in voxels of the map.
+    /// Returns the lowest voxel of a node, in voxels of the map.
     pub(super) fn first_voxel(self, key: NodeKey) -> [i64; 3] {
         match self.tile_level.checked_sub(key.level) {
             Some(finer) => key.index.map(|k| {
@@ -72,7 +72,7 @@ impl Scheme {
         }
     }
 
-    /// Voxels of the node's own size along each of its edges; 0 or less for blocks beyond the tile.
+    /// Returns the number of voxels of the node's size along each edge; 0 or less for blocks outside the tile.
     pub(super) fn edges(self, key: NodeKey) -> [i64; 3] {
         match self.tile_level.checked_sub(key.level) {
             Some(finer) => key.index.map(|k| {
@@ -84,7 +84,7 @@ impl Scheme {
     }
 }
 
-/// A number of voxels, in voxels `2^level` times as wide.
+/// Converts a number of voxels to voxels `2^level` times as wide, rounded up.
 fn ceil_shift(voxels: i64, level: u8) -> i64 {
     (voxels + (1 << level) - 1) >> level
 }

@@ -11,7 +11,7 @@ use voxtile::query::MapQueries;
 use voxtile::scan::{PointBatch, Scan};
 use voxtile::space::VoxelIndex;
 
-/// A file that can be looked at, damaged and opened again.
+/// In-memory file that can be inspected, damaged and reopened.
 #[derive(Clone, Default)]
 struct SharedFile(Arc<Mutex<Vec<u8>>>);
 
@@ -49,7 +49,7 @@ impl std::io::Seek for Opened {
 
 fn map_of(edge: i32, points: &[[f64; 3]]) -> InMemoryMapper {
     let mut map = InMemoryMapper::new(MapConfig::new(0.5, 0.5 * f64::from(edge)).unwrap()).unwrap();
-    // Some voxels are more certain than others.
+    // Observe some voxels more often than others.
     for points in [points, &points[points.len() / 3..], &points[points.len() / 2..]] {
         let is_occupied = vec![true; points.len()];
         map.batch_update(&PointBatch { points, intensities: None, is_occupied: &is_occupied }).unwrap();
@@ -65,7 +65,7 @@ fn levels_of(map: &InMemoryMapper, store: &NodeStore) -> Levels {
     Levels::build(map, &map.tile_indices(), 0, store, &|_| true).unwrap().unwrap()
 }
 
-/// The voxels of a node by the map's own indices: the lowest of each of its cells.
+/// Returns the voxels of a node by the map's indices: the lowest voxel of each cell.
 fn voxels_of(
     levels: &Levels,
     map: &InMemoryMapper,
@@ -83,7 +83,7 @@ fn voxels_of(
     cells.cells.iter().map(|cell| (voxel(cell.place), cell.value)).collect()
 }
 
-/// All nodes that a viewer can reach by a tileset's files.
+/// Returns all nodes that a viewer can reach through the tileset's files.
 fn reached(levels: &Levels, map: &InMemoryMapper, store: &NodeStore) -> Vec<NodeKey> {
     let nodes = LevelsOf { levels, map };
     let mut uris = BTreeSet::new();
@@ -117,10 +117,10 @@ fn points() -> impl Strategy<Value = Vec<[f64; 3]>> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
-    /// Whatever the size of the tiles: the finest nodes hold each occupied voxel once, and each coarser voxel has the
-    /// largest value of those in it; it is there if and only if one of them is.
+    /// For any size of tiles, the finest nodes contain each occupied voxel once. A coarser voxel exists if and only if
+    /// it contains an occupied one, and has the maximum of their values.
     #[test]
-    fn nodes_are_the_voxels_of_the_map(edge in prop_oneof![Just(2), Just(5), Just(100), Just(130), Just(256), Just(333)], points in points()) {
+    fn nodes_match_the_voxels_of_the_map(edge in prop_oneof![Just(2), Just(5), Just(100), Just(130), Just(256), Just(333)], points in points()) {
         let map = map_of(edge, &points);
         let store = memory_store();
         let levels = levels_of(&map, &store);
@@ -132,7 +132,7 @@ proptest! {
             let voxels = voxels_of(&levels, &map, &store, key);
             let bounds = levels.bounds_m(&store, key);
             for voxel in voxels.keys() {
-                // Of a coarse voxel, the part that is in the map's tiles.
+                // Part of a coarse voxel inside the tiles of the map.
                 let low = voxel.map(|at| 0.5 * at as f64);
                 let high = voxel.map(|at| 0.5 * (at + (1 << key.level)) as f64);
                 prop_assert!((0..3).all(|k| bounds.min[k] < high[k] && low[k] < bounds.max[k]));
@@ -152,7 +152,7 @@ proptest! {
             for (voxel, value) in &voxels {
                 let within = |fine: &[i64; 3]| (0..3).all(|k| (voxel[k]..voxel[k] + width).contains(&fine[k]));
                 let most = finest.iter().filter(|(fine, _)| within(fine)).map(|(_, value)| value).max();
-                // Beside the edge of a tile that is not a multiple of it, a voxel may stand for its neighbour.
+                // At the edge of a tile whose size is not a multiple, a voxel may have the value of its neighbour.
                 prop_assert!(most == Some(value) || edge == 333, "level {level}, {voxel:?}: {value}, not {most:?}");
             }
             for fine in &wanted {
@@ -163,9 +163,9 @@ proptest! {
         prop_assert!(levels.tops().len() <= 8);
     }
 
-    /// A store from before, damaged anywhere or cut, gives the same nodes as none.
+    /// An older store that is damaged or truncated anywhere gives the same nodes as an empty one.
     #[test]
-    fn what_was_kept_is_never_wrong(points in points(), damage in 0.0..1.0, is_cut in any::<bool>()) {
+    fn damaged_stores_give_correct_nodes(points in points(), damage in 0.0..1.0, is_cut in any::<bool>()) {
         let map = map_of(20, &points);
         let fresh = memory_store();
         let wanted = levels_of(&map, &fresh);
@@ -187,13 +187,13 @@ proptest! {
         }
     }
 
-    /// The difference of two maps, at every level: what only one of them has, and what both have.
+    /// The difference of two maps at every level: voxels in one of them, and voxels in both.
     #[test]
-    fn differences_are_those_of_the_nodes(edge in prop_oneof![Just(20), Just(256)], first in points(), second in points()) {
+    fn differences_match_the_nodes(edge in prop_oneof![Just(20), Just(256)], first in points(), second in points()) {
         let (before, after) = (map_of(edge, &first), map_of(edge, &second));
         let (old_store, store) = (memory_store(), memory_store());
         let (old, new) = (levels_of(&before, &old_store), levels_of(&after, &store));
-        // One store for both would need versions.
+        // A shared store would need versions.
         let difference = Difference::new((&old, &before), (&new, &after)).unwrap();
         let mut found = BTreeMap::new();
         for tile in before.tile_indices().into_iter().chain(after.tile_indices()) {
@@ -222,7 +222,7 @@ proptest! {
 }
 
 #[test]
-fn free_and_unknown_voxels_are_those_of_the_map() {
+fn free_and_unknown_voxels_match_the_map() {
     let mut map = InMemoryMapper::new(MapConfig::new(0.5, 10.0).unwrap()).unwrap();
     let points = vec![[8.0, 1.2, 1.2], [3.0, 8.0, 2.0]];
     map.insert_scan(&Scan { origin: [1.0; 3], points, intensities: None }).unwrap();
@@ -269,7 +269,7 @@ fn an_empty_map_has_no_nodes() {
 }
 
 #[test]
-fn what_is_no_key_is_refused() {
+fn invalid_keys_are_refused() {
     for text in [
         "",
         "1/2/3",
@@ -288,9 +288,9 @@ fn what_is_no_key_is_refused() {
     assert!(key.children().all(|child| child.parent() == key));
 }
 
-/// Such tiles have no versions: a store, or a browser, that has nodes of one map must not take them for the other's.
+/// Such tiles have no versions: stores and browsers must not mix nodes of two maps.
 #[test]
-fn nodes_of_tiles_without_versions_are_known_by_their_origin() {
+fn nodes_of_tiles_without_versions_differ_by_origin() {
     let (one, other) = (map_of(8, &[[1.0; 3]]), map_of(8, &[[2.0; 3]]));
     let store = memory_store();
     let levels = |map: &InMemoryMapper, origin| {

@@ -1,5 +1,5 @@
-//! Nodes as [3D Tiles 1.1](https://docs.ogc.org/cs/22-025r4/22-025r4.html): trees of boxes, cut into files of three
-//! levels.
+//! Writes nodes as [3D Tiles 1.1](https://docs.ogc.org/cs/22-025r4/22-025r4.html): trees of boxes, divided into files
+//! of three levels.
 
 use super::levels_of_map::Levels;
 use super::node_key::NodeKey;
@@ -10,61 +10,61 @@ use voxtile::Result;
 use voxtile::mapper::MapView;
 use voxtile::space::{Aabb, Point};
 
-/// In what form a tileset's nodes are.
+/// Format of a tileset's nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TilesetContent {
-    /// [`Levels::node`]'s bytes, `.vox`.
+    /// Bytes of [`Levels::node`], `.vox`.
     Voxels,
-    /// Meshes, `.glb`, whose coordinates begin at the node's corner: `f32` is fine enough anywhere.
+    /// Meshes, `.glb`, with coordinates relative to the node's corner, so that `f32` is precise anywhere.
     Meshes,
 }
 
-/// Nodes that a tileset can be made of.
+/// Source of the nodes of a tileset.
 pub trait TilesetNodes {
-    /// The coarsest nodes.
+    /// Returns the coarsest nodes.
     fn tops(&self) -> Vec<NodeKey>;
 
-    /// Whether there is such a node, and a number that changes with its content.
+    /// Returns a number that changes with the node's content; `None` if there is no such node.
     fn version(&self, key: NodeKey) -> Option<u64>;
 
-    /// Whether a node has occupied voxels. Some tiles have only free ones, which a viewer may ask for.
+    /// Returns whether a node has occupied voxels. Some tiles have only free voxels, which a viewer may request.
     fn is_occupied(&self, key: NodeKey) -> bool;
 
-    /// The version of a node, or of the tile that it is a part of.
+    /// Returns the version of a node, or of the tile that contains it.
     fn version_of(&self, key: NodeKey) -> Option<u64> {
         let level = key.level.max(self.tile_level());
         self.version(NodeKey { level, index: key.index.map(|k| k >> (level - key.level)) })
     }
 
-    /// A box around the node, in metres.
+    /// Returns a box around the node's voxels in metres.
     fn bounds_m(&self, store: &NodeStore, key: NodeKey) -> Aabb;
 
-    /// The lower corner of a node, in metres.
+    /// Returns the lower corner of a node in metres.
     fn corner_m(&self, key: NodeKey) -> Point;
 
-    /// Edge of the voxels of a level, in metres.
+    /// Returns the edge length of the voxels of a level in metres.
     fn voxel_edge_m(&self, level: u8) -> f64;
 
-    /// The level of nodes that are tiles.
+    /// Returns the level of nodes that are tiles.
     fn tile_level(&self) -> u8;
 
-    /// The nodes within a tile that is itself a node, if it is divided.
+    /// Returns the nodes inside a tile that is divided.
     ///
     /// # Errors
     ///
-    /// A tile that cannot be read.
+    /// Fails if a tile cannot be read.
     fn within_tile(&self, store: &NodeStore, key: NodeKey) -> Result<BTreeSet<NodeKey>>;
 }
 
-/// Levels of a file.
+/// Number of levels per file.
 const FILE_LEVELS: u8 = 3;
 
-/// The tileset of all nodes, to be served or written as `tileset.json`; files of further levels are at
-/// `subtree/L/X/Y/Z.json`, nodes at `node/L/X/Y/Z.vox` or `.glb` beside it.
+/// Returns the tileset of all nodes, for `tileset.json`. Files of further levels are at `subtree/L/X/Y/Z.json`, nodes
+/// at `node/L/X/Y/Z.vox` or `.glb`.
 ///
 /// # Errors
 ///
-/// A tile that cannot be read.
+/// Fails if a tile cannot be read.
 pub fn tileset(
     nodes: &dyn TilesetNodes,
     store: &NodeStore,
@@ -79,7 +79,7 @@ pub fn tileset(
     let top_level = tops.first().map_or(0, |key| key.level);
     let children =
         tops.iter().map(|&key| writer.node(key, [0.0; 3], FILE_LEVELS, None)).collect::<Result<Vec<_>>>()?;
-    // Larger than that of any child, so that the empty root is always refined.
+    // Larger than any child's error, so that the empty root is always refined.
     let error_m = 4.0 * nodes.voxel_edge_m(top_level) + length(&around);
     let mut root = json!({
         "boundingVolume": { "box": box_of(&around) },
@@ -96,11 +96,11 @@ pub fn tileset(
     }))
 }
 
-/// The file of a node at which one begins, `subtree/L/X/Y/Z.json`; `None` if there is no such node.
+/// Returns the file `subtree/L/X/Y/Z.json` of a node; `None` if there is no such node.
 ///
 /// # Errors
 ///
-/// A tile that cannot be read.
+/// Fails if a tile cannot be read.
 pub fn subtree(
     nodes: &dyn TilesetNodes,
     store: &NodeStore,
@@ -124,12 +124,12 @@ struct Writer<'a> {
     nodes: &'a dyn TilesetNodes,
     store: &'a NodeStore,
     content: TilesetContent,
-    /// From the file to the folder of `tileset.json`.
+    /// Relative path from the file to the folder of `tileset.json`.
     to_root: &'static str,
 }
 
 impl Writer<'_> {
-    /// Whether a node is there; a mesh of no voxels is not.
+    /// Returns whether a node exists; a mesh without voxels does not.
     fn is_written(&self, key: NodeKey) -> bool {
         match self.content {
             TilesetContent::Voxels => self.nodes.version(key).is_some(),
@@ -137,8 +137,8 @@ impl Writer<'_> {
         }
     }
 
-    /// A node and those below it that belong into the same file. `within` has the nodes below a tile.
-    /// `corner_m` is that of the node above it, which coordinates of meshes are relative to.
+    /// Returns a node with its descendants in the same file. `within` contains the nodes inside a tile. `corner_m` is
+    /// the corner of the parent, to which coordinates of meshes are relative.
     fn node(
         &self,
         key: NodeKey,
@@ -147,12 +147,12 @@ impl Writer<'_> {
         within: Option<&BTreeSet<NodeKey>>,
     ) -> Result<Value> {
         let version = match within {
-            // Parts of a tile change with it.
+            // Parts of a tile have the tile's version.
             Some(_) => self.nodes.version_of(key),
             None => self.nodes.version(key),
         }
         .unwrap_or_default();
-        // Files have no question marks.
+        // File names contain no question mark.
         let version = match self.content {
             TilesetContent::Voxels => format!("?v={version:016x}"),
             TilesetContent::Meshes => String::new(),
@@ -197,12 +197,12 @@ impl Writer<'_> {
     }
 }
 
-/// A map's levels, with the map to read tiles from.
+/// Levels of a map, with the map for reading tiles.
 #[derive(Debug)]
 pub struct LevelsOf<'a, V> {
-    /// The levels.
+    /// Levels of the map.
     pub levels: &'a Levels,
-    /// The map that they are of.
+    /// Map of the levels.
     pub map: &'a V,
 }
 
@@ -256,7 +256,7 @@ fn length(around: &Aabb) -> f64 {
     (0..3).map(|k| (around.max[k] - around.min[k]).powi(2)).sum::<f64>().sqrt()
 }
 
-/// Center, and half of the three edges as vectors.
+/// Returns the center and half of each edge as vectors.
 fn box_of(around: &Aabb) -> [f64; 12] {
     let center = |k: usize| 0.5 * (around.min[k] + around.max[k]);
     let half = |k: usize| 0.5 * (around.max[k] - around.min[k]);

@@ -2,7 +2,7 @@ use super::font;
 use super::image::Image;
 use super::palette::{self, Rgb, mixed};
 
-/// Pixels with alpha, row by row from the top. What is drawn outside is cut off.
+/// Pixels with alpha, row by row from the top. Drawing outside is clipped.
 pub struct Canvas {
     width: usize,
     height: usize,
@@ -10,7 +10,6 @@ pub struct Canvas {
 }
 
 impl Canvas {
-    /// A canvas of one color.
     pub fn new(width: usize, height: usize, color: Rgb) -> Self {
         Self { width, height, bytes: opaque(color).repeat(width * height) }
     }
@@ -24,7 +23,7 @@ impl Canvas {
         self.height
     }
 
-    /// Lays a color over a box of pixels; `cover` 1 hides what was there, 0 leaves it.
+    /// Blends a color over a box of pixels; `cover` is the opacity from 0 to 1.
     pub fn fill(&mut self, left: usize, top: usize, size: [usize; 2], color: Rgb, cover: f64) {
         for y in top.min(self.height)..top.saturating_add(size[1]).min(self.height) {
             for x in left.min(self.width)..left.saturating_add(size[0]).min(self.width) {
@@ -37,7 +36,7 @@ impl Canvas {
         }
     }
 
-    /// A filled disc around the middle of a pixel.
+    /// Draws a filled disc around the center of a pixel.
     pub fn disc(&mut self, middle: [usize; 2], radius: usize, color: Rgb) {
         for dy in 0..=2 * radius {
             let up = dy as f64 - radius as f64;
@@ -50,10 +49,10 @@ impl Canvas {
         }
     }
 
-    /// The way of the sensor: a disc around the middle of each pixel, with a dark rim, so that it shows on any color.
+    /// Draws the trajectory: a disc around each pixel with a dark rim, visible on any color.
     pub fn path(&mut self, middles: impl Iterator<Item = [usize; 2]>, radius: usize, color: Rgb) {
         let middles: Vec<[usize; 2]> = middles.collect();
-        // All rims first: where discs lie close, they make one line.
+        // Draw all rims first, so that close discs form one line.
         for (radius, color) in
             [(radius + usize::from(radius > 0) + radius / 2, palette::UNKNOWN), (radius, color)]
         {
@@ -61,7 +60,7 @@ impl Canvas {
         }
     }
 
-    /// Writes text whose upper left corner is given, each dot of a letter `dot` pixels wide.
+    /// Writes text from its upper left corner, with dots of `dot` pixels.
     pub fn text(&mut self, left: usize, top: usize, dot: usize, color: Rgb, text: &str) {
         for (index, letter) in text.chars().enumerate() {
             for (row, bits) in font::glyph(letter).into_iter().enumerate() {
@@ -80,7 +79,6 @@ impl Canvas {
         self.text(right.saturating_sub(font::width_of(text) * dot), top, dot, color, text);
     }
 
-    /// What was drawn.
     pub fn into_image(self) -> Image {
         Image::new(self.width, self.height, self.bytes)
     }
@@ -95,7 +93,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn drawing_outside_is_cut_off() {
+    fn drawing_outside_is_clipped() {
         let mut canvas = Canvas::new(4, 3, [0; 3]);
         canvas.fill(3, 2, [10, 10], [9; 3], 1.0);
         canvas.fill(usize::MAX, 0, [2, 2], [9; 3], 1.0);

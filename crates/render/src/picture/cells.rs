@@ -1,23 +1,23 @@
 use super::view::Change;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
-/// What is known of each cell, written by any number of threads: each cell keeps its highest rank, its highest value of
-/// that rank, and what is nearest of it. The order of writing does not matter.
+/// Cells of a picture, written by any number of threads. Each cell keeps its highest rank, the highest value of this
+/// rank, and the nearest distance. The order of writes does not matter.
 pub(super) struct Cells {
     best: Vec<AtomicU64>,
     near: Vec<AtomicU32>,
 }
 
-/// A cell, once all is written.
+/// Content of a cell after all writes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Cell {
     pub rank: Rank,
     pub value: f32,
-    /// In voxels toward who looks; of what is occupied alone.
+    /// Distance towards the viewer in voxels; only of occupied voxels.
     pub near: i32,
 }
 
-/// What a cell shows: the higher hides the lower.
+/// State of a cell; a higher rank hides a lower one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Rank {
     Unknown,
@@ -49,14 +49,13 @@ impl Rank {
         }
     }
 
-    /// Whether something is, or was, in the way.
+    /// Returns whether the cell is or was occupied.
     pub fn is_solid(self) -> bool {
         self > Self::Free
     }
 }
 
 impl Cells {
-    /// Unknown cells.
     pub fn new(count: usize) -> Self {
         let mut cells = Self { best: Vec::new(), near: Vec::new() };
         cells.best.resize_with(count, Default::default);
@@ -64,12 +63,12 @@ impl Cells {
         cells
     }
 
-    /// Adds what was found at a place.
+    /// Adds an observation of the cell at an index.
     #[inline]
     pub fn add(&self, place: usize, cell: Cell) {
         let (Some(best), Some(near)) = (self.best.get(place), self.near.get(place)) else { return };
         let packed = cell.rank.number() << 32 | u64::from(ordered(cell.value));
-        // Most come to nothing: looking first spares the writing.
+        // Most observations change nothing, so read before writing.
         if best.load(Ordering::Relaxed) < packed {
             best.fetch_max(packed, Ordering::Relaxed);
         }
@@ -81,14 +80,12 @@ impl Cells {
         }
     }
 
-    /// The cell at a place.
     pub fn at(&self, place: usize) -> Cell {
         let best = self.best[place].load(Ordering::Relaxed);
         let near = (self.near[place].load(Ordering::Relaxed) ^ SIGN) as i32;
         Cell { rank: Rank::of(best >> 32), value: unordered(best as u32), near }
     }
 
-    /// All cells in order.
     pub fn iter(&self) -> impl Iterator<Item = Cell> {
         (0..self.best.len()).map(|place| self.at(place))
     }
@@ -96,7 +93,7 @@ impl Cells {
 
 const SIGN: u32 = 1 << 31;
 
-/// The bits of a number as an integer of the same order.
+/// Maps a float to an integer of the same order.
 fn ordered(value: f32) -> u32 {
     let bits = value.to_bits();
     if bits & SIGN == 0 { bits | SIGN } else { !bits }

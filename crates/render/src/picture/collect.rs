@@ -9,26 +9,23 @@ use voxtile::mapper::MapView;
 use voxtile::space::{Grid, TileIndex, VoxelBox, VoxelIndex};
 use voxtile::{Error, Result};
 
-/// What is drawn.
 #[derive(Clone, Copy)]
 pub(super) enum Source<'a> {
-    /// A map.
     One(&'a dyn MapView),
-    /// What became of one on the way to another.
     Two { before: &'a dyn MapView, after: &'a dyn MapView },
 }
 
-/// The cells of a picture, and which of them are known.
+/// Cells of a picture, and the known part of them.
 pub(super) struct Collected {
-    /// `None` if nothing was observed.
+    /// `None` if no voxel was observed.
     pub known: Option<Known>,
     pub is_difference: bool,
     pub tiles: u64,
-    /// Tiles that could not be read, in order.
+    /// Unreadable tiles, in order.
     pub unread: Vec<TileIndex>,
 }
 
-/// Cells, and the box around those in which something is known.
+/// Cells, and the bounds of the known ones.
 pub(super) struct Known {
     pub frame: Frame,
     pub cells: Cells,
@@ -36,12 +33,12 @@ pub(super) struct Known {
     pub count: [usize; 2],
 }
 
-/// Tiles beyond which the cells are not made finer by a second look.
+/// Maximum number of tiles to read a second time for finer cells.
 const MAX_TILES_READ_TWICE: usize = 4096;
 
 impl Collected {
-    /// Reads all tiles. If the box around what is known turns out to be so much smaller than its tiles that cells can
-    /// be finer, reads them once more.
+    /// Reads all tiles. If the known area is much smaller than its tiles, so that cells can be finer, reads them once
+    /// more.
     pub fn of(picture: &Picture, source: Source, progress: &(dyn Fn(u64, u64) + Sync)) -> Result<Self> {
         let mut collector = Collector { picture, source, grid: source.grid(), unread: Mutex::default() };
         let tiles = collector.tiles();
@@ -102,7 +99,7 @@ struct Collector<'a> {
 }
 
 impl Collector<'_> {
-    /// The voxels that are asked for.
+    /// Returns the selected voxels.
     fn wanted(&self) -> VoxelBox {
         let all = VoxelBox { min: [i32::MIN; 3], end: [i32::MAX; 3] };
         let mut wanted = self.picture.region.as_ref().map_or(all, |region| self.grid.voxels_in(region));
@@ -122,7 +119,7 @@ impl Collector<'_> {
         wanted
     }
 
-    /// The tiles that have some of these voxels, in order.
+    /// Returns the tiles that contain some of these voxels, in order.
     fn tiles(&self) -> Vec<TileIndex> {
         let mut tiles = match self.source {
             Source::One(map) => map.tile_indices(),
@@ -155,7 +152,7 @@ impl Collector<'_> {
             progress.step();
             added.or_else(|error| self.skip(tile, error))
         });
-        // The first in order, so that the error is the same for any number of threads.
+        // Return the first error in tile order, so that it does not depend on the number of threads.
         if let Some(failed) = outcomes.find_first(Result::is_err) {
             failed?;
         }
@@ -213,7 +210,7 @@ impl Collector<'_> {
                     continue;
                 }
                 let here = voxel.evidence.log_odds >= occupied_from[side];
-                // What is free here is on the other side's list if it is occupied there.
+                // A free voxel here is in the other side's list if it is occupied there.
                 let rank = match (here, here && is_occupied(1 - side, voxel.index)) {
                     (false, _) => Rank::Free,
                     (true, true) => Rank::Changed(Change::Same),
@@ -228,7 +225,7 @@ impl Collector<'_> {
     }
 }
 
-/// First cell and number of cells of the box around all that is known; `None` if nothing is.
+/// Returns the first cell and the number of cells of the bounds of all known cells; `None` if there are none.
 fn seen(frame: &Frame, cells: &Cells) -> Option<([usize; 2], [usize; 2])> {
     let (mut low, mut high) = (frame.cells, [0; 2]);
     for (place, cell) in cells.iter().enumerate() {

@@ -9,44 +9,44 @@ use super::palette::{self, Rgb, color_of, lit, mixed};
 use super::view::{Change, ColorBy};
 use voxtile::space::{Aabb, Grid, TileIndex};
 
-/// A picture, and what it shows.
+/// A picture with its scale and extent.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Drawn {
-    /// The pixels.
+    /// Pixels.
     pub image: Image,
-    /// Upper left pixel of the map, and its width and height: margins are left out.
+    /// Rectangle of the map without margins: upper left pixel, width and height.
     pub map_px: [usize; 4],
-    /// What the map's part of the image covers in metres; along the line of sight, what was looked at. `None` if there
-    /// was nothing to draw.
+    /// Box covered by the map's part of the image, in metres; along the line of sight, the range that was searched.
+    /// `None` if there was nothing to draw.
     pub region_m: Option<Aabb>,
-    /// Edge of a cell in metres: one voxel or several.
+    /// Edge length of a cell in metres: one voxel or several.
     pub cell_m: f64,
-    /// Edge of a cell in pixels.
+    /// Edge length of a cell in pixels.
     pub cell_px: usize,
-    /// What the first and the last color stand for; `None` for a difference, and where nothing is occupied.
+    /// Values of the first and the last color; `None` for a difference, and without occupied voxels.
     pub range: Option<[f64; 2]>,
-    /// Cells in which something is occupied, in either state for a difference.
+    /// Number of cells with an occupied voxel, in either state for a difference.
     pub solid_cells: u64,
-    /// Cells in which something was observed.
+    /// Number of cells with an observed voxel.
     pub known_cells: u64,
-    /// Tiles that were looked at.
+    /// Number of tiles that were read.
     pub tiles: u64,
     /// Tiles that could not be read and are missing.
     pub unread: Vec<TileIndex>,
 }
 
-/// The part of the picture that shows the map: which cells, and where.
+/// Visible cells and their position in the image.
 struct Pane {
     first: [usize; 2],
     cells: [usize; 2],
-    /// Pixels along a cell's edge.
+    /// Edge length of a cell in pixels.
     zoom: usize,
     left: usize,
     top: usize,
 }
 
-/// Cells turned into pixels.
+/// Conversion of cells to pixels.
 pub(super) struct Drawing<'a> {
     picture: &'a Picture,
     grid: Grid,
@@ -54,11 +54,11 @@ pub(super) struct Drawing<'a> {
     range: Option<[f64; 2]>,
 }
 
-/// The legend needs this width.
+/// Minimum width of the legend.
 const MIN_WIDTH: usize = 760;
-/// Pixels of a voxel in a picture of few.
+/// Maximum size of a voxel in pixels, for small maps.
 const LARGEST_ZOOM: usize = 48;
-/// Where there is nothing to draw.
+/// Size of an image without a map.
 const EMPTY_SIZE: [usize; 2] = [MIN_WIDTH, 240];
 
 impl Pane {
@@ -66,13 +66,13 @@ impl Pane {
         self.cells.map(|n| n * self.zoom)
     }
 
-    /// Upper left pixel of a cell: rows count down.
+    /// Returns the upper left pixel of a cell; rows are numbered downwards.
     fn pixel(&self, [across, up]: [usize; 2]) -> [usize; 2] {
         let row = self.cells[1] - 1 - (up - self.first[1]);
         [self.left + (across - self.first[0]) * self.zoom, self.top + row * self.zoom]
     }
 
-    /// The pixel of a position in cells, if it is inside.
+    /// Returns the pixel of a position in cells, if it is inside.
     fn pixel_of(&self, position: [f64; 2]) -> Option<[usize; 2]> {
         let at: [f64; 2] = std::array::from_fn(|k| (position[k] - self.first[k] as f64) * self.zoom as f64);
         let size = self.size();
@@ -133,13 +133,13 @@ impl<'a> Drawing<'a> {
         }
     }
 
-    /// A map without a voxel, or a region of it.
+    /// Draws a picture without cells.
     fn draw_nothing(self) -> Drawn {
         let size = if self.picture.has_legend { EMPTY_SIZE } else { [1; 2] };
         let mut canvas = Canvas::new(size[0], size[1], palette::UNKNOWN);
         if self.picture.has_legend {
             canvas.text(20, 20, 2, palette::INK, &self.picture.title);
-            let text = "nothing was observed here";
+            let text = "no observed voxels here";
             let left = (size[0] - 2 * font::width_of(text)) / 2;
             canvas.text(left, size[1] / 2, 2, palette::FAINT_INK, text);
         }
@@ -169,9 +169,9 @@ impl<'a> Drawing<'a> {
         }
     }
 
-    /// What the first and the last color stand for: one cell in a hundred may lie outside either.
+    /// Returns the values of the first and the last color: one cell in a hundred may be outside at either end.
     ///
-    /// Probabilities always span the same range, so that two pictures can be compared.
+    /// Probabilities always have the same range, so that pictures can be compared.
     fn range(&self) -> Option<[f64; 2]> {
         let known = self.collected.known.as_ref()?;
         let least = match self.picture.color_by {
@@ -200,13 +200,13 @@ impl<'a> Drawing<'a> {
         }
     }
 
-    /// The color of a cell before light falls on it; `None` if nothing is known of it.
+    /// Returns the color of a cell before shading; `None` if it is unknown.
     fn color(&self, cell: Cell) -> Option<Rgb> {
         let value_color = || {
             let [least, most] = self.range.unwrap_or([0.0, 1.0]);
             let value = f64::from(cell.value);
             color_of(match self.picture.color_by {
-                // Most voxels are seen a few times, and some very often.
+                // Logarithmic: most voxels have few observations, some have very many.
                 ColorBy::Count => ((value + 1.0) / (least + 1.0)).ln() / ((most + 1.0) / (least + 1.0)).ln(),
                 _ => (value - least) / (most - least),
             })
@@ -225,7 +225,7 @@ impl<'a> Drawing<'a> {
         }
     }
 
-    /// Light from the upper left: an edge that faces it is brighter, one that looks away is darker.
+    /// Shading by light from the upper left: edges towards the light are brighter, edges away from it are darker.
     fn light(&self, known: &Known, [across, up]: [usize; 2], near: i32) -> f64 {
         let rise_m = |at: [usize; 2]| {
             let other = known.cell(at);
@@ -259,7 +259,8 @@ impl<'a> Drawing<'a> {
         }
     }
 
-    /// Metres from one line to the next: a tile, or ten, a hundred of them where lines would be a haze over the map.
+    /// Returns the distance between grid lines in metres: one tile, or ten or a hundred of them if lines would be too
+    /// dense.
     fn line_spacing_m(&self, pixels_a_metre: f64) -> f64 {
         let mut every_m = self.grid.tile_size_m();
         while every_m * pixels_a_metre < 16.0 {
@@ -268,7 +269,7 @@ impl<'a> Drawing<'a> {
         every_m
     }
 
-    /// The sensor's way as a line. Where it jumps, as from one recording to the next, there is a gap.
+    /// Draws the trajectory as a line, with gaps at jumps such as the start of another recording.
     fn draw_path(&self, canvas: &mut Canvas, known: &Known, pane: &Pane, dot: usize) {
         let resolution_m = self.grid.resolution_m();
         let positions: Vec<[f64; 2]> =
@@ -282,7 +283,7 @@ impl<'a> Drawing<'a> {
             positions.first().and_then(|&at| pane.pixel_of(at)).into_iter().collect();
         for pair in positions.windows(2) {
             let length = length(pair);
-            // A pixel a step, and no more than the longest line inside of the picture has.
+            // One step per pixel, at most the longest line inside the picture.
             let parts =
                 (length * pane.zoom as f64).ceil().clamp(1.0, 4.0 * super::options::MAX_PX as f64) as usize;
             let parts = if length <= longest { parts } else { 1 };
@@ -296,11 +297,11 @@ impl<'a> Drawing<'a> {
                 }
             }
         }
-        // A pixel that is passed often is drawn once: a day of standing still costs nothing.
+        // Draw each pixel once: a sensor at rest all day costs no more.
         middles.sort_unstable();
         middles.dedup();
         let pixels_a_metre = pane.zoom as f64 / (known.frame.voxels_a_cell as f64 * resolution_m);
-        // As wide as a street lane needs, and no wider: on a large map it would hide the streets.
+        // As wide as a street lane, because more would hide the streets of a large map.
         let most = if self.picture.has_legend { dot + 1 } else { 1 };
         let radius = ((0.2 * pixels_a_metre) as usize).clamp(usize::from(self.picture.has_legend), most);
         let color = if self.collected.is_difference { palette::INK } else { palette::PATH };
@@ -314,7 +315,7 @@ impl Known {
     }
 }
 
-/// The cells to show: all that are known, with a little air.
+/// Returns the cells to show: all known ones with a margin.
 fn with_air(known: &Known) -> ([usize; 2], [usize; 2]) {
     let air = known.count[0].max(known.count[1]) / 60;
     let first: [usize; 2] = std::array::from_fn(|k| known.first[k].saturating_sub(air));
@@ -322,16 +323,16 @@ fn with_air(known: &Known) -> ([usize; 2], [usize; 2]) {
     (first, std::array::from_fn(|k| end(k) - first[k]))
 }
 
-/// Where everything is, in pixels.
+/// Layout of the image in pixels.
 struct Layout {
     width: usize,
     height: usize,
     margin: usize,
     left: usize,
     top: usize,
-    /// Where the legend begins.
+    /// First row of the legend.
     foot: usize,
-    /// Pixels of a letter's dot.
+    /// Size of a letter's dot in pixels.
     dot: usize,
 }
 

@@ -1,17 +1,17 @@
-/// Dots of a letter's row.
+/// Width of a letter in dots.
 pub const WIDTH: usize = 5;
-/// Dots from one letter to the next.
+/// Distance between letters in dots.
 pub const ADVANCE: usize = 6;
-/// Rows of a letter.
+/// Height of a letter in dots.
 pub const HEIGHT: usize = 7;
 
-/// Dots that a text is wide.
+/// Returns the width of a text in dots.
 pub fn width_of(text: &str) -> usize {
     (text.chars().count() * ADVANCE).saturating_sub(ADVANCE - WIDTH)
 }
 
-/// The rows of a letter from the top, the leftmost dot in bit 4. Capitals look like small letters, and what is
-/// not there is blank.
+/// Returns the rows of a letter from the top, with the leftmost dot in bit 4. Capitals are drawn as small letters, and
+/// unknown characters as blanks.
 #[rustfmt::skip]
 pub fn glyph(letter: char) -> [u8; HEIGHT] {
     match letter.to_ascii_lowercase() {

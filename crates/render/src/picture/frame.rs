@@ -1,21 +1,21 @@
 use super::view::View;
 use voxtile::space::{Point, VoxelBox, VoxelIndex};
 
-/// How a box of voxels is cut into square cells of whole voxels, as seen from somewhere. All in integers, so that it is
-/// exact however far from the origin.
+/// Division of a box of voxels into square cells of whole voxels, for a view. Uses integers only, so it is exact at any
+/// distance from the origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Frame {
     pub view: View,
-    /// The voxels that are drawn.
+    /// Voxels to draw.
     pub voxels: VoxelBox,
     /// Voxels along a cell's edge.
     pub voxels_a_cell: i64,
-    /// Cells to the right and up.
+    /// Number of cells to the right and up.
     pub cells: [usize; 2],
 }
 
 impl Frame {
-    /// The frame of a box that is not empty, with at most `most` cells to the right and up.
+    /// Returns the frame of a non-empty box with at most `most` cells to the right and up.
     pub fn new(view: View, voxels: VoxelBox, most: [usize; 2]) -> Self {
         let size = view.axes().map(|axis| i64::from(voxels.end[axis]) - i64::from(voxels.min[axis]));
         let needed = |k: usize| size[k].max(1).unsigned_abs().div_ceil(most[k].max(1) as u64);
@@ -24,7 +24,7 @@ impl Frame {
         Self { view, voxels, voxels_a_cell: voxels_a_cell as i64, cells }
     }
 
-    /// The place of the cell that a voxel of the box belongs to.
+    /// Returns the index of the cell of a voxel in the box.
     #[inline]
     pub fn place_of(&self, voxel: VoxelIndex) -> usize {
         let [across, up] = self.view.axes().map(|axis| {
@@ -33,20 +33,20 @@ impl Frame {
         across + up * self.cells[0]
     }
 
-    /// Where a point lies, in cells from the lower left corner.
+    /// Returns the position of a point in cells from the lower left corner.
     pub fn position_of(&self, point_m: Point, resolution_m: f64) -> [f64; 2] {
         self.view.axes().map(|axis| {
             (point_m[axis] / resolution_m - f64::from(self.voxels.min[axis])) / self.voxels_a_cell as f64
         })
     }
 
-    /// The voxels of some of the cells: the first, and how many.
+    /// Returns the voxels of a range of cells.
     pub fn voxels_of(&self, first: [usize; 2], cells: [usize; 2]) -> VoxelBox {
         let mut voxels = self.voxels;
         for (k, axis) in self.view.axes().into_iter().enumerate() {
             let from = i64::from(self.voxels.min[axis]) + first[k] as i64 * self.voxels_a_cell;
             let end = from + cells[k] as i64 * self.voxels_a_cell;
-            // Both lie in a box of indices of 32 bits.
+            // Both are in a box with 32-bit indices.
             voxels.min[axis] = from.min(i64::from(i32::MAX)) as i32;
             voxels.end[axis] = end.min(i64::from(self.voxels.end[axis])) as i32;
         }

@@ -1,6 +1,6 @@
 use std::{fmt, io};
 
-/// Opaque pixels in sRGB.
+/// Opaque image in sRGB.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Image {
     width_px: usize,
@@ -10,7 +10,7 @@ pub struct Image {
 
 impl fmt::Debug for Image {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        // Millions of pixels tell nobody anything.
+        // Omit the pixels, of which there may be millions.
         write!(f, "Image of {} x {} px", self.width_px, self.height_px)
     }
 }
@@ -21,12 +21,12 @@ impl Image {
         Self { width_px, height_px, rgba }
     }
 
-    /// Pixels in a row.
+    /// Width in pixels.
     pub fn width_px(&self) -> usize {
         self.width_px
     }
 
-    /// Rows.
+    /// Height in pixels.
     pub fn height_px(&self) -> usize {
         self.height_px
     }
@@ -47,13 +47,13 @@ impl Image {
     ///
     /// # Errors
     ///
-    /// What `out` refuses; an image too large for PNG.
+    /// Fails if `out` fails or the image is too large for PNG.
     pub fn write_png(&self, out: &mut impl io::Write) -> io::Result<()> {
         let too_large = |_| io::Error::other("the picture is too large for PNG");
         let width = u32::try_from(self.width_px).map_err(too_large)?;
         let height = u32::try_from(self.height_px).map_err(too_large)?;
         let mut encoder = png::Encoder::new(out, width, height);
-        // Alpha says nothing here, and costs a tenth of the file.
+        // Alpha is constant and would add a tenth to the file.
         encoder.set_color(png::ColorType::Rgb);
         encoder.set_depth(png::BitDepth::Eight);
         let mut writer = encoder.write_header()?;

@@ -4,29 +4,28 @@ use super::palette::{self, color_of};
 use super::scale::{length_label, round_length_m};
 use super::view::ColorBy;
 
-/// What a reader needs to know below the map.
+/// Legend below the map.
 pub struct Legend {
     pub metres_a_pixel: f64,
-    /// Metres from one line over the map to the next, if there are any.
+    /// Distance between grid lines in metres, if there are any.
     pub lines_m: Option<f64>,
-    /// The axes that run to the right and up: 0 is x.
+    /// Axes to the right and up: 0 is x.
     pub axes: [usize; 2],
-    /// Whether the sensor's way is drawn.
+    /// Whether the trajectory is drawn.
     pub has_path: bool,
     pub scale: Scale,
 }
 
-/// What the colors stand for.
+/// Meaning of the colors.
 pub enum Scale {
-    /// A value, and what its first and last color stand for if there is one.
+    /// Quantity, with the values of the first and the last color if there are any.
     Values { color_by: ColorBy, range: Option<[f64; 2]> },
-    /// What became of one state on the way to another.
+    /// Change from one state to another.
     Change,
 }
 
 impl Legend {
-    /// Draws it below the row `foot`, each dot of a letter `dot` pixels wide: axes, scale bar, what is free and
-    /// unknown, the colors.
+    /// Draws the legend below the row `foot` with dots of `dot` pixels: axes, scale bar, free and unknown, colors.
     pub fn draw(&self, canvas: &mut Canvas, foot: usize, dot: usize) {
         let margin = 10 * dot;
         let bottom = foot + 22 * dot;
@@ -63,7 +62,7 @@ impl Legend {
         let right = canvas.width() - margin;
         let bar = self.bar_width(canvas.width(), dot);
         self.draw_scale(canvas, [right, bar], foot, dot);
-        // What is not occupied.
+        // Not occupied.
         let swatch = right.saturating_sub(bar + 74 * dot);
         for (top, color, label) in
             [(foot + 4 * dot, palette::FREE, "free"), (line, palette::UNKNOWN, "unknown")]
@@ -102,7 +101,7 @@ impl Legend {
         }
     }
 
-    /// Pixels that the colors take: a quarter of the picture, and up to half of it for what is written above them.
+    /// Returns the width of the color bar: a quarter of the picture, or up to half of it if its labels need more.
     fn bar_width(&self, width: usize, dot: usize) -> usize {
         let needed = match &self.scale {
             Scale::Values { color_by, range: Some(range) } => {
@@ -115,7 +114,7 @@ impl Legend {
     }
 }
 
-/// What is written above the colors: what they stand for, and the value of the first and the last.
+/// Returns the labels above the color bar: its quantity, and the first and the last value.
 fn labels(color_by: ColorBy, [least, most]: [f64; 2]) -> (&'static str, [String; 2]) {
     match color_by {
         ColorBy::Height => ("height", [least, most].map(height_label)),
@@ -125,7 +124,7 @@ fn labels(color_by: ColorBy, [least, most]: [f64; 2]) -> (&'static str, [String;
     }
 }
 
-/// Pixels of a name between two values, with gaps.
+/// Returns the width of a name between two values in pixels, with gaps.
 fn needed_width(name: &str, ends: [&str; 2], dot: usize) -> usize {
     let letters = font::width_of(name) + ends.map(font::width_of).iter().sum::<usize>();
     (letters + 2 * 6) * dot
@@ -142,7 +141,7 @@ fn name_of(axis: usize) -> &'static str {
 }
 
 fn height_label(height_m: f64) -> String {
-    // Adding 0 turns the -0 that a height just below the ground is rounded to into 0.
+    // Adding 0 converts -0, for example of a height just below the ground, to 0.
     format!("{:.1} m", (height_m * 10.0).round() / 10.0 + 0.0)
 }
 

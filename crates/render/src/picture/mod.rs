@@ -1,12 +1,12 @@
-//! Pictures.
+//! Pictures of maps.
 //!
 //! ```text
-//! Picture   what to draw, and how                              options, view
-//! Frame     which voxels become which cell                     frame
-//! Cells     the best of each cell, whoever comes first         cells, collect
-//! Drawing   cells, lines, the sensor's way, legend             drawing, legend, scale
+//! Picture   options                                            options, view
+//! Frame     voxels of each cell                                frame
+//! Cells     the best observation of each cell                  cells, collect
+//! Drawing   cells, grid, trajectory, legend                    drawing, legend, scale
 //! Canvas    pixels, boxes, letters                             canvas, font, palette, image
-//! OverTime  a local map at several times, side by side         over_time
+//! OverTime  panels of a local map at several times             over_time
 //! ```
 
 mod canvas;
@@ -29,7 +29,7 @@ pub use options::Picture;
 pub use over_time::{OverTime, Panel};
 pub use view::{Change, ColorBy, SideAxis, View};
 
-/// The colors of pictures, as red, green and blue of sRGB.
+/// Colors of pictures, as red, green and blue in sRGB.
 pub mod colors {
     pub use super::palette::{APPEARED, FREE, PATH, Rgb, SAME, UNKNOWN, VANISHED, color_of};
 }

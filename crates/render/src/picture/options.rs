@@ -5,9 +5,9 @@ use voxtile::mapper::MapView;
 use voxtile::space::{Aabb, Point};
 use voxtile::{Error, Result};
 
-/// What to draw of a map, and how.
+/// Options of a picture of a map.
 ///
-/// Memory: 12 bytes a cell, 4 a pixel, and one tile a thread, whatever the size of the map.
+/// Memory: 12 bytes per cell, 4 per pixel, and one tile per thread, whatever the size of the map.
 #[derive(Clone, Debug)]
 pub struct Picture {
     pub(super) view: View,
@@ -21,7 +21,7 @@ pub struct Picture {
     pub(super) skips_unreadable: bool,
 }
 
-/// Most pixels along an edge of a map, which need 1.2 GB; more are cut to it.
+/// Maximum number of pixels along an edge, which needs 1.2 GB.
 pub(super) const MAX_PX: usize = 8192;
 
 impl Default for Picture {
@@ -41,17 +41,17 @@ impl Default for Picture {
 }
 
 impl Picture {
-    /// A picture from above, colored by height, 2048 pixels wide or high, with a grid of tiles and a legend.
+    /// Returns the default: from above, colored by height, 2048 pixels wide or high, with a tile grid and a legend.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// From where the map is looked at.
+    /// Sets the view.
     pub fn with_view(self, view: View) -> Self {
         Self { view, ..self }
     }
 
-    /// What the colors stand for. A difference has colors of its own.
+    /// Sets the meaning of the colors. A difference has its own colors.
     pub fn with_color(self, color_by: ColorBy) -> Self {
         Self { color_by, ..self }
     }
@@ -61,62 +61,62 @@ impl Picture {
         Self { region: Some(region), ..self }
     }
 
-    /// Most pixels of the map to the right and up, 8192 at most; title and legend come on top. A small map is enlarged
-    /// as far as whole pixels a voxel allow, of a large one a pixel covers many voxels.
+    /// Sets the maximum size of the map in pixels to the right and up, at most 8192; title and legend are added. A
+    /// small map is enlarged to whole pixels per voxel; in a large map a pixel covers several voxels.
     pub fn with_size_px(self, most_px: [usize; 2]) -> Self {
         Self { most_px: most_px.map(|px| px.clamp(1, MAX_PX)), ..self }
     }
 
-    /// Whether the borders of tiles are drawn: of ten, a hundred where they would lie too close.
+    /// Sets whether tile borders are drawn; only every tenth or hundredth if they would be too dense.
     pub fn with_grid(self, has_grid: bool) -> Self {
         Self { has_grid, ..self }
     }
 
-    /// Whether there is a margin, with title, axes, scale bar and colors.
+    /// Sets whether there is a margin with title, axes, scale bar and colors.
     pub fn with_legend(self, has_legend: bool) -> Self {
         Self { has_legend, ..self }
     }
 
-    /// The way of the sensor: places in metres in the order of time, such as
-    /// [`MapReader::scans`](voxtile::MapReader::scans) gives.
+    /// Sets the trajectory: positions in metres in order of time, for example from
+    /// [`MapReader::scans`](voxtile::MapReader::scans).
     pub fn with_path(self, path: Vec<Point>) -> Self {
         Self { path, ..self }
     }
 
-    /// A line above the map. What no letter is known for is left blank.
+    /// Sets the title above the map. Characters that the font lacks are blank.
     pub fn with_title(self, title: impl Into<String>) -> Self {
         Self { title: title.into(), ..self }
     }
 
-    /// Draws what can be read, and lists the tiles that cannot in [`Drawn::unread`], in place of an error.
+    /// Skips unreadable tiles and lists them in [`Drawn::unread`], instead of failing.
     pub fn skipping_unreadable(self) -> Self {
         Self { skips_unreadable: true, ..self }
     }
 
-    /// Draws a map. `progress` is told the tiles done and all, from any thread.
+    /// Draws a map. `progress` receives the numbers of finished and of all tiles, from any thread.
     ///
     /// # Errors
     ///
-    /// A tile that cannot be read; a color that the map knows nothing of; a height or region that is no number.
+    /// Fails if a tile cannot be read, if the map has no values for the color, or if a height or region is invalid.
     pub fn draw(&self, map: &dyn MapView, progress: impl Fn(u64, u64) + Sync) -> Result<Drawn> {
         self.check()?;
         let knows_scans =
             || map.tile_indices().first().is_none_or(|&tile| map.last_scan_of_tile_hint(tile).is_some());
         if self.color_by == ColorBy::LastScan && !knows_scans() {
-            let reason = "the map does not know the last scan of its tiles; choose another color";
+            let reason = "the map does not record the last scan of its tiles; choose another color";
             return Err(Error::argument("color", reason));
         }
         let collected = Collected::of(self, Source::One(map), &progress)?;
         Ok(Drawing::new(self, map.config().grid, collected).draw())
     }
 
-    /// Draws what became of one map, or state of a map, on the way to another: voxels that are occupied in both, in
-    /// one, or in the other, in three colors. Where a cell has several, what appeared hides what vanished, and that
-    /// what stayed. `progress` is told the tiles done and all, from any thread.
+    /// Draws the difference of two maps or states of a map: voxels occupied in both, only before, or only after, in
+    /// three colors. If a cell has several, appeared voxels hide vanished ones, and these hide unchanged ones.
+    /// `progress` receives the numbers of finished and of all tiles, from any thread.
     ///
     /// # Errors
     ///
-    /// Maps of different resolution or tile size; and as for [`Picture::draw`].
+    /// Fails if resolution or tile size differ, and as [`Picture::draw`].
     pub fn draw_difference(
         &self,
         before: &dyn MapView,

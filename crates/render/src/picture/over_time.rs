@@ -8,36 +8,37 @@ use voxtile::Result;
 use voxtile::space::{Aabb, Point};
 use voxtile_local::{LocalState, LocalView};
 
-/// A local map at several times, from above, side by side.
+/// A local map at several times, from above, in panels.
 #[derive(Debug)]
 pub struct OverTime {
-    /// Edge of a voxel in metres.
+    /// Edge length of a voxel in metres.
     pub resolution_m: f64,
-    /// A line above all.
+    /// Title above the panels.
     pub title: String,
-    /// In the order of time.
+    /// Panels in order of time.
     pub panels: Vec<Panel>,
 }
 
-/// A local map at one time: its columns.
+/// Columns of a local map at one time.
 #[derive(Debug)]
 pub struct Panel {
     scan: usize,
     occupied: usize,
     path: Vec<Point>,
-    /// By voxel index along x and y: the topmost occupied voxel along z, or that some are inflated.
+    /// By voxel index along x and y: z index of the topmost occupied voxel, or `None` if there are only inflated
+    /// voxels.
     columns: HashMap<[i32; 2], Option<i32>>,
 }
 
-/// Panels beside each other.
+/// Number of panels per row.
 const ACROSS: usize = 3;
-/// Most cells along the edge of a panel.
+/// Maximum number of cells along the edge of a panel.
 const MAX_CELLS: usize = 640;
 const DOT: usize = 2;
 const MARGIN: usize = 16;
 
 impl Panel {
-    /// The map after `scan` scans, with the sensor's way so far.
+    /// Returns the panel of a map after `scan` scans, with the trajectory so far.
     pub fn of(view: &LocalView, scan: usize, path: Vec<Point>) -> Self {
         let mut columns: HashMap<[i32; 2], Option<i32>> = HashMap::new();
         view.for_each(|[x, y, z], state| {
@@ -51,7 +52,7 @@ impl Panel {
 }
 
 impl OverTime {
-    /// Draws everything.
+    /// Draws all panels.
     pub fn draw(&self) -> Image {
         self.canvas().into_image()
     }
@@ -60,7 +61,7 @@ impl OverTime {
         let frame = self.frame();
         let Ok(frame) = frame else { return Canvas::new(8, 8, palette::UNKNOWN) };
         let zoom = (MAX_CELLS / frame.cells[0].max(frame.cells[1])).clamp(1, 8);
-        // The label needs a width.
+        // Minimum width of the label.
         let size = [(frame.cells[0] * zoom).max(260), frame.cells[1] * zoom];
         let across = self.panels.len().clamp(1, ACROSS);
         let down = self.panels.len().div_ceil(across);
@@ -97,7 +98,7 @@ impl OverTime {
             let [x, y] = frame.cell_of(x_m, y_m)?;
             Some([left + x * zoom, top + (frame.cells[1] - 1 - y) * zoom])
         };
-        // Inflated columns first: where a cell stands for several, what is occupied hides them.
+        // Inflated columns first: if a cell has several columns, occupied ones hide them.
         for wants_occupied in [false, true] {
             for ([x, y], column) in panel.columns.iter().filter(|(_, top)| top.is_some() == wants_occupied) {
                 let [x_m, y_m] = [x, y].map(|k| (f64::from(*k) + 0.5) * self.resolution_m);
@@ -116,7 +117,8 @@ impl OverTime {
         (f64::from(z) + 0.5) * self.resolution_m
     }
 
-    /// The cells of all panels: around all columns and the way, but for one column in two hundred on each side.
+    /// Returns the frame of all panels: around all columns and the trajectory, except one column in two hundred on each
+    /// side.
     fn frame(&self) -> Result<PlaneFrame> {
         let path = self.panels.iter().flat_map(|panel| &panel.path);
         let mut bounds = path.fold(Aabb { min: [f64::MAX; 3], max: [f64::MIN; 3] }, |bounds, at| Aabb {
@@ -136,7 +138,7 @@ impl OverTime {
         PlaneFrame::new(&bounds, self.resolution_m, MAX_CELLS)
     }
 
-    /// Voxel indices along z that the first and the last color stand for.
+    /// Returns the z indices of the first and the last color.
     fn heights(&self) -> [i32; 2] {
         let columns = self.panels.iter().flat_map(|panel| panel.columns.values());
         let mut tops: Vec<i32> = columns.copied().flatten().collect();
@@ -146,7 +148,7 @@ impl OverTime {
     }
 }
 
-/// Scale bar, colors, and what is not occupied.
+/// Draws the scale bar, the colors, and the swatches of cells that are not occupied.
 fn draw_foot(canvas: &mut Canvas, foot: usize, metres_a_pixel: f64, [low_m, high_m]: [f64; 2]) {
     let length_m = round_length_m(120.0 * metres_a_pixel);
     let length = ((length_m / metres_a_pixel).round() as usize).max(1);

@@ -1,38 +1,38 @@
 use std::sync::LazyLock;
 
-/// Red, green and blue of sRGB.
+/// Red, green and blue in sRGB.
 pub type Rgb = [u8; 3];
 
-/// Where nothing has been seen, and the paper around the map.
+/// Unknown space, and the background of the map.
 pub const UNKNOWN: Rgb = [13, 16, 22];
-/// Where only free space has been seen.
+/// Free space.
 pub const FREE: Rgb = [36, 43, 54];
-/// Around what is occupied: without a hue, so that no height has this color, and far from the paper.
+/// Inflated space: gray, unlike any height, and distinct from the background.
 pub(super) const INFLATED: Rgb = [92, 98, 108];
 /// Letters and bars.
 pub(super) const INK: Rgb = [226, 230, 236];
-/// Letters that should not shout.
+/// Secondary text.
 pub(super) const FAINT_INK: Rgb = [140, 149, 163];
-/// The lines between tiles, blended over what they cross.
+/// Grid lines between tiles, blended over the map.
 pub(super) const TILE_LINE: Rgb = [160, 178, 204];
-/// The way of the sensor.
+/// Trajectory.
 pub const PATH: Rgb = [255, 112, 67];
-/// Occupied before and after. Grey, blue and orange are told apart by all who see colors in other ways, too.
+/// Occupied before and after. Grey, blue and orange are also distinct with color blindness.
 pub const SAME: Rgb = [118, 124, 134];
-/// Occupied before alone.
+/// Occupied only before.
 pub const VANISHED: Rgb = [255, 153, 31];
-/// Occupied after alone.
+/// Occupied only after.
 pub const APPEARED: Rgb = [74, 144, 255];
 
-/// Lightness of the lowest and of the highest color in OKLab: the lowest must be told from the paper.
+/// Lightness of the lowest and of the highest color in OKLab. The lowest must be distinct from the background.
 const LIGHTNESS: [f64; 2] = [0.36, 0.94];
-/// Hue in degrees of the lowest and of the highest: from violet over green to yellow.
+/// Hue of the lowest and of the highest color in degrees: from violet over green to yellow.
 const HUE: [f64; 2] = [305.0, 103.0];
-/// Each color is as vivid as a screen can show it, up to this: more leaves kinks where the screen's colors end.
+/// Maximum chroma; with more, the limits of the sRGB gamut cause kinks in the scale.
 const CHROMA: f64 = 0.13;
 
-/// From low to high, so that lightness rises evenly to the eye: also for readers who do not see red and green apart,
-/// and on grey paper.
+/// Colors from low to high with evenly rising perceived lightness, also readable with red-green color blindness and in
+/// grayscale.
 static SCALE: LazyLock<[Rgb; 256]> = LazyLock::new(|| {
     std::array::from_fn(|step| {
         let share = step as f64 / 255.0;
@@ -41,13 +41,13 @@ static SCALE: LazyLock<[Rgb; 256]> = LazyLock::new(|| {
     })
 });
 
-/// The color of a share from 0 (low) to 1 (high); other numbers are cut there.
+/// Returns the color of a share from 0 (low) to 1 (high); other values are clamped.
 pub fn color_of(share: f64) -> Rgb {
     let share = if share.is_nan() { 0.0 } else { share.clamp(0.0, 1.0) };
     SCALE[(share * 255.0).round() as usize]
 }
 
-/// The most vivid color that a screen has, up to [`CHROMA`].
+/// Returns the most vivid color in sRGB, up to [`CHROMA`].
 fn vivid(lightness: f64, hue: f64) -> Rgb {
     let (mut low, mut high) = (0.0, CHROMA);
     for _ in 0..20 {
@@ -63,7 +63,7 @@ fn vivid(lightness: f64, hue: f64) -> Rgb {
     })
 }
 
-/// Linear sRGB of a color in OKLab (Björn Ottosson, 2020), by lightness, chroma and hue in radians.
+/// Converts OKLab (Björn Ottosson, 2020), as lightness, chroma and hue in radians, to linear sRGB.
 fn linear_rgb(lightness: f64, chroma: f64, hue: f64) -> [f64; 3] {
     let (a, b) = (chroma * hue.cos(), chroma * hue.sin());
     let long = (lightness + 0.396_337_777_4 * a + 0.215_803_757_3 * b).powi(3);
@@ -76,7 +76,7 @@ fn linear_rgb(lightness: f64, chroma: f64, hue: f64) -> [f64; 3] {
     ]
 }
 
-/// A color between two: `share` 0 is the first, 1 the second.
+/// Mixes two colors: `share` 0 is the first, 1 the second.
 pub(super) fn mixed(first: Rgb, second: Rgb, share: f64) -> Rgb {
     std::array::from_fn(|k| {
         let (a, b) = (f64::from(first[k]), f64::from(second[k]));
@@ -84,7 +84,7 @@ pub(super) fn mixed(first: Rgb, second: Rgb, share: f64) -> Rgb {
     })
 }
 
-/// A color made lighter (above 1) or darker (below 1).
+/// Makes a color lighter (above 1) or darker (below 1).
 pub(super) fn lit(color: Rgb, light: f64) -> Rgb {
     if light > 1.0 { mixed(color, [255; 3], light - 1.0) } else { mixed([0; 3], color, light) }
 }
@@ -93,7 +93,7 @@ pub(super) fn lit(color: Rgb, light: f64) -> Rgb {
 mod tests {
     use super::*;
 
-    /// CIE lightness, 0 to 100.
+    /// Returns the CIE lightness, 0 to 100.
     fn lightness(rgb: Rgb) -> f64 {
         let [red, green, blue] = rgb.map(|value| {
             let value = f64::from(value) / 255.0;
@@ -113,9 +113,9 @@ mod tests {
         assert_eq!(color_of(f64::NAN), color_of(0.0));
     }
 
-    /// Who sees no red and green apart is left with blue against yellow, and with lightness.
+    /// With red-green color blindness only blue against yellow and lightness remain.
     #[test]
-    fn changes_are_told_apart_without_red_against_green() {
+    fn changes_are_distinct_with_red_green_color_blindness() {
         let seen =
             |rgb: Rgb| [f64::from(rgb[2]) - f64::from(rgb[0]).midpoint(f64::from(rgb[1])), lightness(rgb)];
         let colors = [SAME, VANISHED, APPEARED].map(seen);

@@ -1,19 +1,19 @@
 use voxtile::space::Aabb;
 use voxtile::{Error, Result};
 
-/// How the ground plan is cut into square cells of whole voxels, and what a length looks like in pixels.
+/// Division of the ground plane into square cells of whole voxels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlaneFrame {
     /// Lower corner in metres, world frame.
     pub min_m: [f64; 2],
-    /// Edge of a cell in metres: one voxel, or more where the map would be too large.
+    /// Edge length of a cell in metres: one voxel, or several for large maps.
     pub cell_m: f64,
-    /// Cells along x and y.
+    /// Number of cells along x and y.
     pub cells: [usize; 2],
 }
 
 impl PlaneFrame {
-    /// The frame of the bounds with at most `max_edge` cells along an edge.
+    /// Returns the frame of the bounds with at most `max_edge` cells along an edge.
     pub fn new(bounds: &Aabb, resolution_m: f64, max_edge: usize) -> Result<Self> {
         let size_m: [f64; 2] = std::array::from_fn(|k| bounds.max[k] - bounds.min[k]);
         let longest_m = size_m[0].max(size_m[1]);
@@ -31,7 +31,7 @@ impl PlaneFrame {
         Ok(Self { min_m: [bounds.min[0], bounds.min[1]], cell_m, cells })
     }
 
-    /// The cell of a point in metres, unless it lies outside.
+    /// Returns the cell of a point in metres, unless it is outside.
     pub fn cell_of(&self, x_m: f64, y_m: f64) -> Option<[usize; 2]> {
         let along = |k: usize, m: f64| {
             let cell = ((m - self.min_m[k]) / self.cell_m).floor();
@@ -41,13 +41,13 @@ impl PlaneFrame {
     }
 }
 
-/// The longest round length (1, 2 or 5 times a power of ten, in metres) of at most `longest_m`.
+/// Returns the longest round length (1, 2 or 5 times a power of ten, in metres) up to `longest_m`.
 pub fn round_length_m(longest_m: f64) -> f64 {
     let power = 10_f64.powi(longest_m.log10().floor().clamp(-6.0, 9.0) as i32);
     [5.0, 2.0, 1.0].map(|digit| digit * power).into_iter().find(|&m| m <= longest_m).unwrap_or(power)
 }
 
-/// A round length as people write it: `50 cm`, `10 m`, `2 km`.
+/// Formats a round length: `50 cm`, `10 m`, `2 km`.
 pub fn length_label(length_m: f64) -> String {
     if length_m >= 1000.0 {
         format!("{} km", length_m / 1000.0)
@@ -93,7 +93,7 @@ mod tests {
     }
 
     #[test]
-    fn scale_bars_are_round_and_not_longer_than_asked() {
+    fn scale_bars_are_round_and_within_the_maximum() {
         for (longest_m, length_m, label) in [
             (12.0, 10.0, "10 m"),
             (49.0, 20.0, "20 m"),

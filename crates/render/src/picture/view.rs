@@ -1,24 +1,24 @@
 use voxtile::space::VoxelIndex;
 
-/// From where a map is looked at.
+/// Viewing direction.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub enum View {
     /// From above: x to the right, y up.
     #[default]
     Above,
-    /// From above, of a layer alone: voxels whose center is at most half of the thickness from a height.
+    /// From above, one layer: voxels whose center is at most half of the thickness from a height.
     Slice {
-        /// The middle of the layer in metres.
+        /// Middle of the layer in metres.
         z_m: f64,
-        /// Its thickness in metres; less than a voxel, such as 0, is the one layer of voxels at that height.
+        /// Thickness in metres; less than a voxel, such as 0, selects the single layer of voxels at this height.
         thickness_m: f64,
     },
     /// From a side, z up.
     Side(SideAxis),
 }
 
-/// What runs to the right in a view from a side.
+/// Axis to the right in a view from a side.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SideAxis {
     /// x to the right, seen along +y.
@@ -27,7 +27,7 @@ pub enum SideAxis {
     Y,
 }
 
-/// What the color of a cell stands for.
+/// Quantity shown by the color of a cell.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ColorBy {
@@ -36,13 +36,13 @@ pub enum ColorBy {
     Height,
     /// Highest probability of an occupied voxel.
     Probability,
-    /// Most observations of an occupied voxel; where none is occupied, of a free one.
+    /// Highest observation count of an occupied voxel; of a free one if none is occupied.
     Count,
-    /// Number of the last scan that its tile was flushed with.
+    /// Number of the last scan in the tile's latest flush.
     LastScan,
 }
 
-/// What became of a place on the way from one state of a map to another.
+/// Change of a voxel between two states of a map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Change {
     /// Occupied before and after.
@@ -54,7 +54,7 @@ pub enum Change {
 }
 
 impl View {
-    /// The axes that run to the right and up.
+    /// Returns the axes to the right and up.
     pub(super) fn axes(self) -> [usize; 2] {
         match self {
             Self::Above | Self::Slice { .. } => [0, 1],
@@ -63,11 +63,11 @@ impl View {
         }
     }
 
-    /// A number of voxels that rises toward who looks.
+    /// Returns a number that increases towards the viewer.
     pub(super) fn nearness(self, voxel: VoxelIndex) -> i32 {
         match self {
             Self::Above | Self::Slice { .. } => voxel[2],
-            // The complement turns the order round, and every index has one.
+            // The complement reverses the order and exists for every index.
             Self::Side(SideAxis::X) => !voxel[1],
             Self::Side(SideAxis::Y) => voxel[0],
         }

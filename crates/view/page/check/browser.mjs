@@ -1,4 +1,4 @@
-// Chromium without a screen, driven by its own protocol over a pipe: no package is needed.
+// Headless Chromium, controlled by its DevTools protocol over a pipe, without packages.
 
 import { spawn } from 'node:child_process';
 import { mkdtempSync, rmSync } from 'node:fs';
@@ -15,7 +15,7 @@ export class Browser {
       { stdio: ['ignore', 'ignore', 'ignore', 'pipe', 'pipe'] });
     this.waiting = new Map();
     this.number = 0;
-    this.told = [];
+    this.errors = [];
     let rest = '';
     this.process.stdio[4].on('data', (data) => {
       const parts = (rest + data).split('\0');
@@ -27,11 +27,11 @@ export class Browser {
   take(message) {
     if (message.method === 'Runtime.exceptionThrown') {
       const { text, exception } = message.params.exceptionDetails;
-      this.told.push(exception?.description ?? text);
+      this.errors.push(exception?.description ?? text);
     }
     if (message.method === 'Log.entryAdded' && message.params.entry.level === 'error') {
       const { text, url } = message.params.entry;
-      this.told.push(`${text} ${url ?? ''}`);
+      this.errors.push(`${text} ${url ?? ''}`);
     }
     const waits = this.waiting.get(message.id);
     if (!waits) return;
@@ -49,7 +49,7 @@ export class Browser {
 
   async open(url) {
     if (!this.session) {
-      // A tab of our own: the one that Chromium opens may still be replaced.
+      // Open a new tab, because Chromium may replace its first one.
       const { targetId } = await this.call('Target.createTarget', { url: 'about:blank' }, undefined);
       ({ sessionId: this.session } = await this.call('Target.attachToTarget', { targetId, flatten: true }, undefined));
       for (const domain of ['Page', 'Runtime', 'Log']) await this.call(`${domain}.enable`);
@@ -62,14 +62,14 @@ export class Browser {
     await this.call('Emulation.setEmulatedMedia', { features: [{ name: 'prefers-color-scheme', value: dark ? 'dark' : 'light' }] });
   }
 
-  // The value of an expression, or of its promise, in the page.
+  // Returns the value of an expression, or of its promise, in the page.
   async value(expression) {
     const { result, exceptionDetails } = await this.call('Runtime.evaluate', { expression, awaitPromise: true, returnByValue: true });
     if (exceptionDetails) throw new Error(`${expression}: ${exceptionDetails.exception?.description ?? exceptionDetails.text}`);
     return result.value;
   }
 
-  // Waits until the page says so itself.
+  // Waits until an expression holds in the page.
   async until(expression, seconds = 120) {
     const since = Date.now();
     for (;;) {
@@ -78,7 +78,7 @@ export class Browser {
       const hasFailed = await this.value('document.getElementById("state")?.textContent === "failed"').catch(() => false);
       if (hasFailed || Date.now() - since > 1000 * seconds) {
         const state = await this.value('document.getElementById("state").textContent + " " + document.getElementById("message").textContent').catch(() => '');
-        throw new Error(`not within ${seconds} s: ${expression} (the page says: ${state}; ${this.told.join('; ')})`);
+        throw new Error(`not within ${seconds} s: ${expression} (the page says: ${state}; ${this.errors.join('; ')})`);
       }
       await new Promise((resolve) => setTimeout(resolve, 100));
     }
@@ -100,7 +100,7 @@ export class Browser {
     try {
       rmSync(this.profile, { recursive: true, force: true, maxRetries: 10, retryDelay: 200 });
     } catch {
-      // Processes of Chromium that end a little later still write there: what is left is the system's to clear.
+      // Processes of Chromium that end later may still write there: the system removes the rest.
     }
   }
 }

@@ -2,7 +2,7 @@
 //
 //   npm install --prefix FOLDER cesium; node crates/view/page/check/cesium.mjs TILES FOLDER/node_modules/cesium [PICTURE.png]
 //
-// It fails where a tile cannot be read and where nothing is drawn.
+// Fails if a tile cannot be read or nothing is drawn.
 
 import { createServer } from 'node:http';
 import { readFile } from 'node:fs/promises';
@@ -36,14 +36,14 @@ const PAGE = `<!doctype html><meta charset="utf-8"><title>3D Tiles</title>
     });
     tileset.tileVisible.addEventListener((tile) => found.levels.add(tile.geometricError));
     const { center, radius } = tileset.boundingSphere;
-    // Coordinates are metres with z up, far from where the Earth would be: the camera looks along them.
+    // Coordinates are metres with z up, not on the Earth's surface.
     camera.frustum.near = 0.1;
     camera.setView({ destination: Cesium.Cartesian3.add(center, new Cesium.Cartesian3(0, -1.2 * radius, 1.2 * radius), new Cesium.Cartesian3()),
       orientation: { direction: Cesium.Cartesian3.normalize(new Cesium.Cartesian3(0, 1, -1), new Cesium.Cartesian3()),
         up: Cesium.Cartesian3.normalize(new Cesium.Cartesian3(0, 1, 1), new Cesium.Cartesian3()) } });
     tileset.allTilesLoaded.addEventListener(() => {
       window.found = JSON.stringify({ ...found, levels: [...found.levels].sort((a, b) => a - b) });
-      // Draws once more, with all of them.
+      // Draw once more with all tiles.
       requestAnimationFrame(() => requestAnimationFrame(() => say('ready')));
     });
   } catch (error) {
@@ -76,7 +76,7 @@ try {
   if (found.failed.length) throw new Error(`Cesium could not read ${found.failed.join('; ')}`);
   if (!found.loaded || !found.triangles) throw new Error('Cesium drew nothing');
 } catch (error) {
-  console.error(error.message, browser.told.join('\n'));
+  console.error(error.message, browser.errors.join('\n'));
   process.exitCode = 1;
 } finally {
   await browser.close();

@@ -1,4 +1,4 @@
-// Saves a picture of a page: node crates/view/page/check/look.mjs URL FILE.png [WIDTHxHEIGHT] [dark] [SCRIPT]
+// Saves a screenshot of a page: node crates/view/page/check/look.mjs URL FILE.png [WIDTHxHEIGHT] [dark] [SCRIPT]
 
 import { writeFileSync } from 'node:fs';
 import { Browser } from './browser.mjs';
@@ -17,10 +17,10 @@ try {
     await browser.ready(180);
   }
   writeFileSync(file, await browser.picture());
-  const said = await browser.value('JSON.stringify({ first: voxtile.firstPictureMs, faces: voxtile.faces(), calls: voxtile.drawCalls(), bytes: voxtile.bytes(), message: document.getElementById("message").textContent })');
-  console.log(said, browser.told.join('\n'));
+  const printed = await browser.value('JSON.stringify({ first: voxtile.firstPictureMs, faces: voxtile.faces(), calls: voxtile.drawCalls(), bytes: voxtile.bytes(), message: document.getElementById("message").textContent })');
+  console.log(printed, browser.errors.join('\n'));
 } catch (error) {
-  console.log(error.message, browser.told.join('\n'));
+  console.log(error.message, browser.errors.join('\n'));
   writeFileSync(file, await browser.picture());
   process.exitCode = 1;
 } finally {

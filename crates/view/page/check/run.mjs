@@ -21,7 +21,7 @@ async function view(...args) {
   throw new Error('the server did not start');
 }
 
-// A room of 4 m x 3 m with a box in it; later scans have a second one.
+// A room of 4 m x 3 m with a box; later scans have a second box.
 function scan(number) {
   const folder = join(work, `scan${number}`);
   mkdirSync(folder);
@@ -46,7 +46,7 @@ const shown = async (browser) => {
   return new Set(centers.map((center) => center.map((k) => Math.round(1000 * k)).join(' ')));
 };
 
-// Fingers on the screen: each list is where they are next.
+// Moves fingers on the screen; each list has their next positions.
 async function fingers(...places) {
   const touchPoints = (points) => points.map(([x, y], id) => ({ x, y, id }));
   for (const [k, points] of places.entries()) {
@@ -100,23 +100,23 @@ try {
   await browser.value('voxtile.detail = 0.1');
   await browser.until(`voxtile.voxels().edges.length === 1 && voxtile.voxels().edges[0] < 0.11 && document.getElementById('state').textContent === 'ready'`);
   assert.deepEqual(await shown(browser), exported(map));
-  assert.deepEqual(browser.told, [], 'the browser has nothing to complain of');
-  step('what the page shows is what export writes, to the last voxel');
+  assert.deepEqual(browser.errors, [], 'no errors in the browser');
+  step('the page shows exactly the voxels that export writes');
 
-  const told = await browser.value(`(async () => {
+  const result = await browser.value(`(async () => {
     const at = [1.05, 0.05, -0.25];
     voxtile.lookAt([-1.5, 0.02, 0.1], at);
     await new Promise((resolve) => setTimeout(resolve, 1500));
     return voxtile.clickAt(...voxtile.screenOf(at));
   })()`);
-  const asked = JSON.parse(run('query', map, ...told.point_m.map(String), '--json'));
-  for (const [name, value] of Object.entries(asked)) assert.deepEqual(told[name], value, name);
-  assert.equal(told.state, 'occupied');
-  step(`a click says what query says: ${told.state}, probability ${told.probability.toFixed(3)}`);
+  const expected = JSON.parse(run('query', map, ...result.point_m.map(String), '--json'));
+  for (const [name, value] of Object.entries(expected)) assert.deepEqual(result[name], value, name);
+  assert.equal(result.state, 'occupied');
+  step(`a click shows the result of query: ${result.state}, probability ${result.probability.toFixed(3)}`);
 
   await browser.value('voxtile.setThreshold(255)');
   const certain = await shown(browser);
-  const log = run('query', map, ...told.point_m.map(String));
+  const log = run('query', map, ...result.point_m.map(String));
   assert.ok(certain.size < exported(map).size, `${certain.size} voxels are certain; ${log}`);
   await browser.value('voxtile.setThreshold(0)');
   step('the slider of probability hides voxels, and shows them again');
@@ -128,7 +128,7 @@ try {
   await browser.value('document.getElementById("free").click(); document.getElementById("unknown").click()');
   await browser.ready();
   assert.deepEqual(await browser.value('voxtile.near()'), {});
-  step(`free space and where knowledge ends: ${near.free} and ${near.unknown} voxels`);
+  step(`free space and frontier: ${near.free} and ${near.unknown} voxels`);
 
   await browser.call('Browser.setDownloadBehavior', { behavior: 'allow', downloadPath: work }, undefined);
   await browser.value('document.getElementById("shot").click()');
@@ -148,7 +148,7 @@ try {
   step(`a picture of ${width} x ${height} is saved`);
 
   await touch();
-  step('a touch screen turns, comes near, asks and walks');
+  step('a touch screen rotates, zooms, queries and walks');
 
   run('snapshot', map, 'monday');
   run('build', scan(1), '-o', map, '--append', '-q');
@@ -165,8 +165,8 @@ try {
   await browser.until('document.getElementById("since")?.options.length === 2');
   await browser.value(`document.getElementById('since').value = 'monday'; document.getElementById('since').dispatchEvent(new Event('change'))`);
   await browser.ready();
-  assert.match(await browser.value('document.getElementById("legend-ends").textContent'), /appeared.*vanished.*same/);
-  step('what changed since a snapshot is shown');
+  assert.match(await browser.value('document.getElementById("legend-ends").textContent'), /appeared.*vanished.*unchanged/);
+  step('changes since a snapshot are shown');
 
   for (const [width, height, dark] of [[360, 640, false], [1280, 720, true]]) {
     await browser.size(width, height, dark);
@@ -175,7 +175,7 @@ try {
     assert.equal(over, false, `${width} x ${height} fits`);
   }
   step('small and large screens, light and dark');
-  assert.deepEqual(browser.told, []);
+  assert.deepEqual(browser.errors, []);
 
   const atRest = await browser.value('voxtile.drawCalls()');
   await browser.value('voxtile.lookAt(...Object.values(voxtile.camera()))');
@@ -184,13 +184,13 @@ try {
   const gone = new Promise((resolve) => server.once('exit', resolve));
   server.kill();
   await gone;
-  await browser.until('document.getElementById("state").textContent === "server gone"');
+  await browser.until('document.getElementById("state").textContent === "disconnected"');
   const [, address, token] = /\/\/([^/]+)\/([^/]+)\//.exec(url);
   await view(map, '--listen', address, '--token', token);
   await browser.ready();
-  step('a server that comes back is noticed');
-  // That it was gone, the browser says as well.
-  assert.ok(browser.told.splice(0).every((line) => /Failed to load|net::ERR/.test(line)));
+  step('the page reconnects to a restarted server');
+  // The browser also reports the disconnection.
+  assert.ok(browser.errors.splice(0).every((line) => /Failed to load|net::ERR/.test(line)));
 
   const isShown = (...ids) => `JSON.stringify(voxtile.shown) === '${JSON.stringify(ids)}' && document.getElementById('state').textContent === 'ready'`;
   const follows = async (...maps) => {
@@ -205,11 +205,11 @@ try {
   await browser.call('Network.enable');
   await browser.call('Network.setBlockedURLs', { urls: ['*tileset.json*'] });
   run('build', scan(2), '-o', map, '--append', '-q');
-  await browser.until('document.getElementById("message").textContent.includes("was not loaded")');
+  await browser.until('document.getElementById("message").textContent.includes("Cannot load")');
   await browser.call('Network.setBlockedURLs', { urls: [] });
   await follows(map);
-  assert.ok(browser.told.splice(0).every((line) => /Failed to load|net::ERR/.test(line)));
-  step('a flush that did not come is asked for again');
+  assert.ok(browser.errors.splice(0).every((line) => /Failed to load|net::ERR/.test(line)));
+  step('a failed request of a flush is retried');
 
   const hide = (isHidden) => browser.value(`Object.defineProperty(document, 'hidden', { value: ${isHidden}, configurable: true }); document.dispatchEvent(new Event('visibilitychange'))`);
   await hide(true);
@@ -220,7 +220,7 @@ try {
   assert.equal(await browser.value('voxtile.generation[0]'), generation, 'a hidden page keeps no connection');
   await hide(false);
   await follows(map);
-  step('a hidden page keeps no connection, and catches up');
+  step('a hidden page closes its connection and catches up later');
 
   const other = join(work, 'other');
   run('build', scan(4), '-o', other, '--resolution', '0.1', '-q');
@@ -234,15 +234,15 @@ try {
   run('snapshot', map, 'monday', '--delete');
   await browser.until(isShown('0', '1'), 60);
   await follows(map, other);
-  // Both at once: what is told of the first says nothing of the second.
+  // Both at once: the event of the first does not include the second.
   const grown = [scan(5), scan(6)];
   await Promise.all([map, other].map((one, k) => new Promise((resolve, reject) => {
     const build = spawn(voxtile, ['build', grown[k], '-o', one, '--append', '-q'], { stdio: ['ignore', 'ignore', 'inherit'] });
     build.once('exit', (code) => (code ? reject(new Error(`build: ${code}`)) : resolve()));
   })));
   await follows(map, other);
-  assert.deepEqual(browser.told, []);
-  step('of several maps one without the snapshot is shown as it is; one that is deleted is left; all follow');
+  assert.deepEqual(browser.errors, []);
+  step('a map without the snapshot shows its current state, a deleted snapshot is left, and all maps are updated');
 
   if (process.argv[2]) {
     const city = await view(process.argv[2]);
@@ -259,7 +259,7 @@ try {
     await browser.ready(300);
     const [calls, bytes] = [await browser.value('voxtile.drawCalls()'), await browser.value('voxtile.bytes()')];
     assert.ok(calls <= 200 && bytes <= 256 * 2 ** 20);
-    // Nor meanwhile.
+    // Also not in between.
     const most = await browser.value('voxtile.mostDrawCalls()');
     assert.ok(most >= calls && most <= 200, `${most} draw calls`);
     const { tiles } = await maps();
@@ -267,7 +267,7 @@ try {
   }
 } catch (error) {
   writeFileSync(join(tmpdir(), 'voxtile-view-failed.png'), await browser.picture().catch(() => ''));
-  console.error(error, browser.told);
+  console.error(error, browser.errors);
   process.exitCode = 1;
 } finally {
   for (const end of ended.reverse()) await end();

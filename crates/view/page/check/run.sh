@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
-# The page in a real browser: what it shows is the map, clicks say what `voxtile query` says, and it follows a build.
+# Tests the page in a real browser: it shows the map, clicks match `voxtile query`, and it follows a build.
 #
-#   crates/view/page/check/run.sh [CITY_MAP]     CITY_MAP: a large map, whose first picture is timed
+#   crates/view/page/check/run.sh [CITY_MAP]     CITY_MAP: a large map, to time its first frame
 #
-# Needs node and Chromium (CHROMIUM names the program). VOXTILE_BIN is a folder of programs that are built already.
+# Needs node and Chromium (CHROMIUM names the program). VOXTILE_BIN is a folder of existing programs.
 set -euo pipefail
 cd "$(dirname "$0")/../../../.."
 target=${CARGO_TARGET_DIR:-target}

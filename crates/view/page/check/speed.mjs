@@ -1,7 +1,9 @@
-// How fast the server makes and sends nodes: VOXTILE=PROGRAM node crates/view/page/check/speed.mjs MAP [MOST_NODES]
+// Measures how fast the server builds and sends nodes:
 //
-// It begins with an empty cache: the coarse levels are made, then every node is asked for, eight at a time, twice.
-// The second time only what the first has left in the cache is sent.
+//   VOXTILE=PROGRAM node crates/view/page/check/speed.mjs MAP [MOST_NODES]
+//
+// Starts with an empty cache: builds the coarse levels, then requests every node twice, eight at a time.
+// The second time, nodes are read from the cache.
 
 import { spawn } from 'node:child_process';
 import { mkdtempSync, readFileSync, rmSync } from 'node:fs';
@@ -28,7 +30,7 @@ const text = async (url) => {
   return JSON.parse((body[0] === 0x1f ? gunzipSync(body) : body).toString());
 };
 
-// Seconds of processors that the server has used.
+// Processor time of the server in seconds.
 const cpu = () => {
   const fields = readFileSync(`/proc/${server.pid}/stat`, 'utf8').split(') ')[1].split(' ');
   return (Number(fields[11]) + Number(fields[12])) / 100;

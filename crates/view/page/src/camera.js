@@ -3,7 +3,7 @@ import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 
 const KEYS = { KeyW: [0, 1], ArrowUp: [0, 1], KeyS: [0, -1], ArrowDown: [0, -1], KeyD: [1, 0], KeyA: [-1, 0] };
 
-// Orbit around a point, or walk: the same camera, two ways to move it.
+// Camera with two modes: orbit around a point, or walk.
 export class Flight {
   constructor(camera, canvas, wake) {
     Object.assign(this, { camera, canvas, wake });
@@ -39,7 +39,7 @@ export class Flight {
     this.wake();
   }
 
-  // Two fingers go ahead, three go back: a touch screen has no keys.
+  // On a touch screen, two fingers move forward and three move back.
   touch(event, isDown) {
     if (event.pointerType !== 'touch') return;
     if (isDown) this.fingers.set(event.pointerId, [event.clientX, event.clientY]);
@@ -51,7 +51,7 @@ export class Flight {
 
   look(event) {
     if (!this.walks || event.buttons === 0) return;
-    // Browsers tell no movement of fingers.
+    // Touch events have no movement fields.
     const before = this.fingers.get(event.pointerId) ?? [event.clientX - event.movementX, event.clientY - event.movementY];
     if (this.fingers.has(event.pointerId)) this.fingers.set(event.pointerId, [event.clientX, event.clientY]);
     const [right, down] = [event.clientX - before[0], event.clientY - before[1]];
@@ -63,7 +63,7 @@ export class Flight {
     this.wake();
   }
 
-  // Moves while keys are down; whether it moved.
+  // Moves while keys are down. Returns whether the camera moved.
   update(seconds) {
     if (!this.walks || this.keys.size === 0) return false;
     const speed = this.step * (this.keys.has('ShiftLeft') || this.keys.has('ShiftRight') ? 25 : 5) * Math.min(seconds, 0.1);
@@ -88,7 +88,7 @@ export class Flight {
     this.wake();
   }
 
-  // All of a box, from a direction.
+  // Fits a box into the view from a direction.
   fit(box, from = [-0.6, -1, 0.8]) {
     const center = box.getCenter(new THREE.Vector3());
     const half = box.getSize(new THREE.Vector3()).multiplyScalar(0.5).max(new THREE.Vector3(0.25, 0.25, 0.25));
@@ -96,7 +96,7 @@ export class Flight {
     const right = new THREE.Vector3().crossVectors(this.camera.up, back).normalize();
     const up = new THREE.Vector3().crossVectors(back, right);
     const high = Math.tan(THREE.MathUtils.degToRad(this.camera.fov / 2));
-    // As near as every corner allows.
+    // Minimum distance with all corners in view.
     let distance = 0;
     for (let corner = 0; corner < 8; corner++) {
       const at = half.clone().multiply(new THREE.Vector3(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1));

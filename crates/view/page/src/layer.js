@@ -8,13 +8,13 @@ const MOST_BYTES = 256 * 2 ** 20;
 const MOST_DRAWN = 180;
 const BEST_ERROR = 2;
 const MOST_ERROR = 4096;
-// Tiles whose free or unknown voxels are shown at once.
+// Maximum number of tiles with free or unknown voxels.
 const MOST_NEAR = 24;
-// What did not come is asked for again, later each time.
+// Failed requests are retried with increasing delay.
 const FIRST_RETRY_MS = 2000;
 const LAST_RETRY_MS = 60000;
 
-// One map, or one state of it: nodes come and go as the camera moves.
+// One state of a map; nodes are loaded and removed as the camera moves.
 export class Layer {
   constructor(viewer, map, id, hue) {
     Object.assign(this, { viewer, map, id, hue });
@@ -25,9 +25,9 @@ export class Layer {
     this.material = makeMaterial(kind, viewer.shared);
     this.materials = { free: makeMaterial(KIND.free, viewer.shared), unknown: makeMaterial(KIND.unknown, viewer.shared) };
     if (hue) tintLayer(this.material, hue);
-    // By URL: a mesh, or the load of it that is under way.
+    // By URL: a mesh, or its pending load.
     this.extra = new Map();
-    // URLs of free and unknown voxels that were not loaded.
+    // URLs of free and unknown voxels that failed to load.
     this.lostNear = new Set();
     this.retryMs = FIRST_RETRY_MS;
     this.generation = map.generation;
@@ -64,15 +64,15 @@ export class Layer {
     return tiles;
   }
 
-  // A tile did not come, or the root where there is none.
+  // Handles a failed request of a tile, or of the root if there is no tile.
   lose(tiles, tile, error) {
     const isNext = tiles === this.next;
     if (this.isGone || (tiles !== this.tiles && !isNext)) return;
-    this.viewer.say(`A part of the map was not loaded: ${error.message}`);
+    this.viewer.say(`Cannot load a part of the map: ${error.message}`);
     if (tile) {
       tiles.lost.add(tile);
     } else if (isNext) {
-      // It would never be complete, and whatever is flushed would wait for it.
+      // Otherwise it would never be complete and would delay later updates.
       this.close(tiles);
       [this.next, this.again, this.isBehind] = [null, false, true];
     }
@@ -89,7 +89,7 @@ export class Layer {
     this.retryTimer = null;
     for (const tiles of [this.tiles, this.next]) {
       if (!tiles) continue;
-      // What is in the cache is not asked for, not even if it failed.
+      // Tiles in the cache are not requested again, even if they failed.
       for (const tile of tiles.lost) if (tile.internal.loadingState === FAILED) tiles.lruCache.remove(tile);
       tiles.lost.clear();
       tiles.resetFailedTiles();
@@ -105,7 +105,7 @@ export class Layer {
     tiles.dispose();
   }
 
-  // Loads the map as it is now beside what is shown, and swaps when what is in view has come.
+  // Loads the current state in the background, and swaps when the tiles in view are loaded.
   refresh() {
     this.isBehind = false;
     if (this.next) {
@@ -124,7 +124,7 @@ export class Layer {
       if (!tiles) continue;
       tiles.setResolutionFromRenderer(camera, renderer);
       tiles.update();
-      // A file that has come asks for others at the next update.
+      // A loaded file requests others at the next update.
       tiles.calm = tiles.rootTileset && Layer.isIdle(tiles) ? (tiles.calm ?? 0) + 1 : 0;
     }
     if (this.next && Layer.isQuiet(this.next)) {
@@ -142,7 +142,7 @@ export class Layer {
     this.adapt();
   }
 
-  // Keeps within the limits of what is drawn and kept, by coarser levels; `adapts` while it is not at rest.
+  // Keeps draw calls and memory within limits by selecting coarser levels; `adapts` until stable.
   adapt() {
     const { tiles, viewer } = this;
     const opened = viewer.layers.reduce((sum, layer) => sum + (layer.next ? 2 : 1), 0);
@@ -151,7 +151,7 @@ export class Layer {
       one.lruCache.maxBytesSize = MOST_BYTES / opened;
       one.lruCache.minBytesSize = 0.75 * one.lruCache.maxBytesSize;
     }
-    // What was too fine once is not tried again until the view changes: no level comes and goes.
+    // Does not retry a level that was too fine until the view changes, to avoid flicker.
     const view = [...viewer.camera.matrixWorld.elements, viewer.canvas.width, viewer.canvas.height].join();
     if (view !== this.view) [this.view, this.finest] = [view, BEST_ERROR];
     const before = tiles.errorTarget;
@@ -175,7 +175,7 @@ export class Layer {
     return tiles.calm > (tiles.visibleTiles.size > 0 || isEmpty ? 2 : 20);
   }
 
-  // Whether everything that the view needs is here.
+  // Returns whether everything in view is loaded.
   get isReady() {
     return Layer.isQuiet(this.tiles) && !this.adapts && !this.next && !this.waits;
   }
@@ -194,7 +194,7 @@ export class Layer {
     return meshes;
   }
 
-  // Free and unknown voxels of the tiles in view, the nearest ones.
+  // Loads free and unknown voxels of the nearest tiles in view.
   updateNear() {
     const kinds = ['free', 'unknown'].filter((kind) => this.viewer.shows[kind]);
     const wanted = new Set();
@@ -220,7 +220,7 @@ export class Layer {
   }
 
   async loadNear(url, kind) {
-    // What left the view and came back has another load by now, which this one must not replace.
+    // A tile that left the view and returned has a newer load, which this one must not replace.
     const load = { isMesh: false };
     const isCurrent = () => this.extra.get(url) === load;
     this.extra.set(url, load);
@@ -238,7 +238,7 @@ export class Layer {
       if (this.lostNear.size === 0 && this.tiles.lost.size === 0) this.retryMs = FIRST_RETRY_MS;
     } catch (error) {
       if (!isCurrent() || this.isGone) return;
-      this.viewer.say(`Voxels of a tile were not loaded: ${error.message}`);
+      this.viewer.say(`Cannot load the voxels of a tile: ${error.message}`);
       this.lostNear.add(url);
       this.retryLater();
     } finally {

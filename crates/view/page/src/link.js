@@ -1,4 +1,4 @@
-// What is looked at, in the URL, so that a link shows the same place.
+// Stores the view in the URL, so that a link opens the same view.
 
 let timer = 0;
 

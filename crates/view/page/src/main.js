@@ -1,4 +1,4 @@
-// The page: what its controls do, and what they show.
+// Controls of the page.
 
 import { readLink, writeLink } from './link.js';
 import { logOddsOf, observationsOf, probabilityOf } from './node.js';
@@ -10,7 +10,7 @@ const $ = (id) => document.getElementById(id);
 const json = async (url) => {
   const response = await fetch(url);
   const answer = await response.json();
-  if (!response.ok) throw new Error(answer.error ?? `the server answered ${response.status}`);
+  if (!response.ok) throw new Error(answer.error ?? `HTTP status ${response.status}`);
   return answer;
 };
 const metres = (k) => `${k.toFixed(Math.abs(k) < 1000 ? 2 : 1)} m`;
@@ -29,7 +29,7 @@ try {
   viewer = new Viewer($('scene'), say);
 } catch (error) {
   $('state').textContent = 'no WebGL';
-  say(`This browser draws no 3D: ${error.message}`);
+  say(`Cannot draw 3D in this browser: ${error.message}`);
   throw error;
 }
 let link = readLink();
@@ -39,11 +39,11 @@ let marks = [];
 let answered = null;
 let path = [];
 let pathNumber = 0;
-// The sliders of the cut, and where they leave the map whole.
+// Sliders of the cut, and their positions without a cut.
 const CUTS = ['x0', 'x1', 'y0', 'y1', 'z0', 'z1'];
 const OPEN = ['0', '1000', '0', '1000', '0', '1000'];
 
-// The names are those of the first map: another that has no such snapshot is shown as it is now.
+// The names are those of the first map. A map without a snapshot of this name is shown in its current state.
 const idOf = (map) => {
   const [at, since] = ['snapshot', 'since'].map((id) => $(id).value)
     .map((chosen) => map.snapshots.some(({ name }) => name === chosen) && chosen);
@@ -78,7 +78,7 @@ function describe() {
     label.append(box, ' ', swatch, one.name);
     return label;
   }));
-  for (const [id, first] of [['snapshot', 'as it is now'], ['since', 'none']]) {
+  for (const [id, first] of [['snapshot', 'current'], ['since', 'none']]) {
     const chosen = $(id).value;
     $(id).replaceChildren(new Option(first, ''), ...map.snapshots.map(({ name }) => new Option(name, name)));
     $(id).value = map.snapshots.some(({ name }) => name === chosen) ? chosen : '';
@@ -102,7 +102,7 @@ function allBounds() {
   return { min: end('min', Math.min), max: end('max', Math.max) };
 }
 
-// Where something is occupied, by the tileset's root: for colours, cuts and the first look.
+// Reads the occupied extent from the tileset's root, for colours, cuts and the first view.
 async function readExtents() {
   await Promise.all(maps.map(async (map) => {
     const { root } = await json(`maps/${map.id}/tileset.json`);
@@ -128,9 +128,9 @@ async function readPath() {
   try {
     ({ points } = await json(`maps/${idOf(maps[0]).split('~')[0]}/trajectory.json`));
   } catch (error) {
-    say(`The way of the sensor is not known: ${error.message}`);
+    say(`Cannot load the trajectory: ${error.message}`);
   }
-  // An answer to an older question comes too late.
+  // Ignore the response to an older request.
   if (number !== pathNumber) return;
   path = points;
   $('scan').max = Math.max(path.length - 1, 0);
@@ -168,14 +168,14 @@ function paint() {
   }[viewer.colour];
   $('legend').hidden = isChange;
   if (isChange) {
-    const told = ['appeared', 'vanished', 'same'].map((name, k) => {
+    const names = ['appeared', 'vanished', 'unchanged'].map((name, k) => {
       const [span, swatch] = [document.createElement('span'), document.createElement('span')];
       swatch.className = 'swatch';
       swatch.style.background = `rgb(${CHANGES[k]})`;
       span.append(swatch, name);
       return span;
     });
-    $('legend-ends').replaceChildren(...told);
+    $('legend-ends').replaceChildren(...names);
   } else {
     $('legend-ends').replaceChildren(...ends.map((text) => Object.assign(document.createElement('span'), { textContent: text })));
   }
@@ -201,12 +201,12 @@ function cut() {
   remember();
 }
 
-// --- Questions
+// --- Queries
 
 async function click(x, y) {
   const found = pick(viewer, x, y);
   if (!found) {
-    answer([['', 'nothing there']]);
+    answer([['', 'no voxel here']]);
     return null;
   }
   const center = centerOf(found);
@@ -220,22 +220,22 @@ async function click(x, y) {
 async function ask(layer, node, center) {
   const isCoarse = node.edge > 1.5 * layer.map.resolution_m;
   try {
-    const told = await json(`maps/${layer.id.split('~')[0]}/query?x=${center[0]}&y=${center[1]}&z=${center[2]}`);
-    answered = { ...told, isCoarse };
+    const result = await json(`maps/${layer.id.split('~')[0]}/query?x=${center[0]}&y=${center[1]}&z=${center[2]}`);
+    answered = { ...result, isCoarse };
     const number = (k, digits) => (k === null ? 'unknown' : k.toFixed(digits));
     answer([
       ['at', place(center)],
-      ...(isCoarse ? [['voxel', `of ${metres(node.edge)}: come nearer for single ones`]] : []),
-      ['state', told.state],
-      ['probability', number(told.probability, 4)],
-      ['log-odds', number(told.log_odds, 4)],
-      ['seen', told.observation_count === null ? 'never' : `${told.observation_count} times`],
-      ['tile', told.tile?.join(' ') ?? 'none'],
+      ...(isCoarse ? [['voxel', `of ${metres(node.edge)} (zoom in for single voxels)`]] : []),
+      ['state', result.state],
+      ['probability', number(result.probability, 4)],
+      ['log-odds', number(result.log_odds, 4)],
+      ['observations', result.observation_count === null ? 'none' : `${result.observation_count}`],
+      ['tile', result.tile?.join(' ') ?? 'none'],
     ]);
     $('copy').hidden = false;
     return answered;
   } catch (error) {
-    say(`The server did not answer: ${error.message}`);
+    say(`The request failed: ${error.message}`);
     return null;
   }
 }
@@ -245,26 +245,26 @@ async function mark(layer, center) {
   marks.push(center);
   viewer.overlays.path('measure', marks.length === 2 ? marks : [], 0xffb000);
   if (marks.length < 2) {
-    answer([['from', place(center)], ['to', 'click the other end']]);
+    answer([['from', place(center)], ['to', 'click the second point']]);
     return marks;
   }
   const [from, to] = marks;
   const way = to.map((k, axis) => k - from[axis]);
   const rows = [['from', place(from)], ['to', place(to)], ['distance', metres(Math.hypot(...way))], ['dx dy dz', place(way)]];
-  let told = null;
+  let result = null;
   if (tool === 'sight') {
     try {
-      told = await json(`maps/${layer.id.split('~')[0]}/raycast?from=${from}&to=${to}`);
-      rows.push(['sight', told.visible ? 'free' : `blocked after ${metres(told.hit.distance_m)}`]);
-      if (told.unknown_from_m !== null) rows.push(['unknown', `from ${metres(told.unknown_from_m)} on`]);
-      viewer.overlays.path('measure', told.visible ? marks : [from, told.hit.center_m], told.visible ? 0x2fbf71 : 0xe5484d);
+      result = await json(`maps/${layer.id.split('~')[0]}/raycast?from=${from}&to=${to}`);
+      rows.push(['line of sight', result.visible ? 'free' : `blocked at ${metres(result.hit.distance_m)}`]);
+      if (result.unknown_from_m !== null) rows.push(['unknown', `from ${metres(result.unknown_from_m)} on`]);
+      viewer.overlays.path('measure', result.visible ? marks : [from, result.hit.center_m], result.visible ? 0x2fbf71 : 0xe5484d);
     } catch (error) {
-      say(`The server did not answer: ${error.message}`);
+      say(`The request failed: ${error.message}`);
     }
   }
   answer(rows);
   viewer.wake();
-  return { marks, ...told };
+  return { marks, ...result };
 }
 
 function choose(name) {
@@ -292,7 +292,7 @@ function remember() {
   }));
 }
 
-// What a link says, in the controls; a colour, snapshot or number that there is not changes nothing.
+// Sets the controls from a link; unknown colours, snapshots and numbers are ignored.
 function applyLink() {
   const choose = (id, value) => {
     const select = $(id);
@@ -316,26 +316,26 @@ window.addEventListener('hashchange', () => {
 // --- Live
 
 const RETRY_MS = 1000;
-// The state of each map that the server told of last, and which server that was: another one counts anew.
-const told = new Map();
-let teller = null;
+// Latest generation of each map by server: another server restarts at 0.
+const latest = new Map();
+let lastServer = null;
 let events = null;
 let isChanging = false;
 
-const isBehind = (layer) => told.has(layer.map.id) && layer.generation !== told.get(layer.map.id);
-const tell = (id, generation) => { if (generation > 0) told.set(id, Math.max(generation, told.get(id) ?? 0)); };
+const isBehind = (layer) => latest.has(layer.map.id) && layer.generation !== latest.get(layer.map.id);
+const record = (id, generation) => { if (generation > 0) latest.set(id, Math.max(generation, latest.get(id) ?? 0)); };
 
-// One change after the other: each reads what there is of all maps.
+// One change at a time: each reads the state of all maps.
 async function catchUp() {
   if (isChanging || !viewer.layers.some(isBehind)) return;
   isChanging = true;
   try {
     await change();
   } catch (error) {
-    say(`The change was not loaded: ${error.message}`);
+    say(`Cannot load the change: ${error.message}`);
   }
   isChanging = false;
-  // It failed, or there is more meanwhile.
+  // The update failed, or there are newer changes.
   if (viewer.layers.some(isBehind)) setTimeout(catchUp, RETRY_MS);
 }
 
@@ -343,15 +343,15 @@ async function change() {
   const before = maps;
   await readMaps();
   await readExtents().catch(() => {});
-  for (const { id, generation } of maps) tell(id, generation);
+  for (const { id, generation } of maps) record(id, generation);
   const behind = viewer.layers.filter(isBehind);
   for (const layer of viewer.layers) layer.map = maps.find(({ id }) => id === layer.map.id) ?? layer.map;
   if (viewer.layers.some((layer) => layer.id !== idOf(layer.map))) {
-    // A snapshot that is shown was deleted.
+    // A shown snapshot was deleted.
     showMaps();
   } else {
     for (const layer of behind) {
-      // A snapshot stays as it is, unless another server has one of that name.
+      // A snapshot never changes, but another server may have one with this name.
       if (!layer.id.includes('@') || layer.generation === null) layer.refresh();
       layer.generation = layer.map.generation;
     }
@@ -359,7 +359,7 @@ async function change() {
   const changed = before.filter((was) => maps.some(({ id, generation }) => id === was.id && generation !== was.generation));
   if (changed.some(({ generation, low, high }) => generation === 0 || low === high)) start();
   else viewer.surround(allBounds());
-  // Before that, the map was only being read.
+  // Before, the map was still being read.
   if (changed.some((was) => was.pending_tiles === 0 && was.generation > 0)) {
     $('live').hidden = false;
     $('live').title = `flush ${Math.max(...maps.map(({ generation }) => generation))}`;
@@ -369,32 +369,32 @@ async function change() {
   readPath();
 }
 
-// Whoever looks elsewhere keeps no connection: a browser has six for all pages of a server. What changes meanwhile is
-// told when it begins again.
+// A hidden page closes its connection, because a browser has only six for all pages of a server. It receives missed
+// changes when it reconnects.
 function follow() {
   events?.close();
   events = null;
   if (document.hidden) return;
   events = new EventSource('events');
   events.addEventListener('open', () => {
-    if ($('state').textContent !== 'server gone') return;
+    if ($('state').textContent !== 'disconnected') return;
     $('state').textContent = 'loading';
     viewer.wake();
   });
-  events.addEventListener('error', () => { $('state').textContent = 'server gone'; });
+  events.addEventListener('error', () => { $('state').textContent = 'disconnected'; });
   events.addEventListener('changed', ({ data }) => {
     const { map: id, generation, server } = JSON.parse(data);
-    if (teller !== null && teller !== server) {
-      told.clear();
+    if (lastServer !== null && lastServer !== server) {
+      latest.clear();
       for (const layer of viewer.layers) layer.generation = null;
     }
-    teller = server;
-    tell(id, generation);
+    lastServer = server;
+    record(id, generation);
     catchUp();
   });
 }
 document.addEventListener('visibilitychange', () => {
-  // Not before the maps are shown.
+  // Only after the maps are shown.
   if (viewer.layers.length > 0) follow();
 });
 
@@ -499,7 +499,7 @@ function clickAt(x, y) {
 viewer.listeners.push(() => {
   const isRead = maps.every((map) => map.pending_tiles === 0 && map.generation > 0);
   const isReady = viewer.settled && viewer.layers.length > 0 && isRead && !viewer.layers.some(isBehind);
-  if ($('state').textContent !== 'server gone') $('state').textContent = isReady ? 'ready' : 'loading';
+  if ($('state').textContent !== 'disconnected') $('state').textContent = isReady ? 'ready' : 'loading';
   if (viewer.layers[0]?.scale && !viewer.scaled) {
     viewer.scaled = true;
     paint();
@@ -507,7 +507,7 @@ viewer.listeners.push(() => {
 });
 viewer.flight.orbit.addEventListener('change', remember);
 
-// For tests, and for whoever opens the console.
+// For tests and the console.
 window.voxtile = {
   voxels() {
     const meshes = viewer.layers.flatMap((layer) => layer.meshes().map(([mesh]) => [layer, mesh.userData.node]));
@@ -563,5 +563,5 @@ try {
   follow();
 } catch (error) {
   $('state').textContent = 'failed';
-  say(`The map was not loaded: ${error.message}`);
+  say(`Cannot load the map: ${error.message}`);
 }

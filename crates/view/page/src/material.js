@@ -23,7 +23,7 @@ void main() {
   if (!isSeen) { gl_Position = vec4(2.0, 2.0, 2.0, 1.0); return; }
   vec2 uv = position.xy;
   vec3 at;
-  // Seen from outside, corners go around counterclockwise.
+  // Corners are counterclockwise seen from outside.
   if (side == 0) { at = vec3(1.0, uv); light = 0.86; }
   else if (side == 1) { at = vec3(0.0, uv.y, uv.x); light = 0.66; }
   else if (side == 2) { at = vec3(uv.y, 1.0, uv.x); light = 0.78; }
@@ -50,7 +50,7 @@ void main() {
   vec3 colour = texture2D(ramp, vec2(share, 0.5)).rgb;
   if (kind == 3) colour = change < 1.5 ? changes[0] : change < 2.5 ? changes[1] : changes[2];
   else if (tint.a > 0.0) colour = tint.rgb * (0.55 + 0.45 * share);
-  // Borders, where a voxel is large enough on the screen.
+  // Draw borders if a voxel is large enough on the screen.
   vec2 pixel = fwidth(corner);
   vec2 inside = min(corner, 1.0 - corner) / max(pixel, vec2(1e-6));
   float border = 1.0 - smoothstep(0.0, 1.5, min(inside.x, inside.y));
@@ -61,7 +61,7 @@ void main() {
 
 const linear = (rgb) => new THREE.Color().setRGB(...rgb.map((k) => k / 255), THREE.SRGBColorSpace);
 
-// One for each layer and kind; what is common to all is shared.
+// Returns a material for a layer and kind, with shared uniforms.
 export function makeMaterial(kind, shared) {
   const isClear = kind === KIND.free || kind === KIND.unknown;
   const tint = kind === KIND.free ? [70, 150, 220] : kind === KIND.unknown ? [200, 120, 200] : null;

@@ -4,7 +4,7 @@ import { facesOf } from './node.js';
 const corners = new THREE.BufferAttribute(new Float32Array([0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0]), 3);
 const quad = new THREE.BufferAttribute(new Uint16Array([0, 1, 2, 0, 2, 3]), 1);
 
-// One draw call: a quad for each face.
+// Returns a mesh with one quad per face in one draw call.
 export function meshOf(node, material) {
   const faces = facesOf(node);
   const geometry = new THREE.InstancedBufferGeometry();
@@ -29,5 +29,5 @@ export function meshOf(node, material) {
   return mesh;
 }
 
-// What the bytes of a node take here: faces, and voxels for clicks.
+// Returns the memory of a node in bytes: faces, and voxels for picking.
 export const bytesOf = (node, faces) => 8 * faces + 5 * node.count;

@@ -1,7 +1,7 @@
-// A node of a map: the bytes that the server sends (docs/view.md), and the faces of its voxels.
+// Decodes map nodes (docs/view.md) and computes the faces of their voxels.
 
 const HEAD = 64;
-// One more on each side, so that every voxel has neighbours.
+// Maximum edge length, with a margin on each side for neighbours.
 const MOST = 130;
 const grid = new Uint16Array(MOST * MOST * MOST);
 
@@ -19,9 +19,9 @@ function steps(bytes) {
 
 export function parseNode(buffer) {
   const view = new DataView(buffer);
-  if (buffer.byteLength < HEAD || view.getUint32(0, false) !== 0x56584e31) throw new Error('this is no node of a map');
+  if (buffer.byteLength < HEAD || view.getUint32(0, false) !== 0x56584e31) throw new Error('not a map node');
   const count = view.getUint32(4, true);
-  if (buffer.byteLength !== HEAD + 5 * count) throw new Error('a node of another length than it says');
+  if (buffer.byteLength !== HEAD + 5 * count) throw new Error('map node with a wrong length');
   const plane = (k) => new Uint8Array(buffer, HEAD + k * count, count);
   return {
     count,
@@ -41,8 +41,8 @@ export function parseNode(buffer) {
 const cell = (x, y, z) => x + 1 + MOST * (y + 1 + MOST * (z + 1));
 const BESIDE = [1, -1, MOST, -MOST, MOST * MOST, -MOST * MOST];
 
-// The faces that any threshold can make visible: place and direction (+x -x +y -y +z -z), the value of the voxel, that of
-// its neighbour plus one (0: there is none), and the count. Only kind 0 has values to compare.
+// Returns the faces that any threshold can make visible: position and direction (+x -x +y -y +z -z), the value of the
+// voxel, that of its neighbour plus one (0 without a neighbour), and the count. Only kind 0 has values to compare.
 export function facesOf(node) {
   const { count, x, y, z, value, counts, kind } = node;
   for (let i = 0; i < count; i++) grid[cell(x[i], y[i], z[i])] = kind === KIND.occupied ? value[i] + 1 : 256;
@@ -68,7 +68,7 @@ export function facesOf(node) {
   return { places, levels, count: n };
 }
 
-// Where the voxels of a node are, for rays: made when it is first asked for.
+// Returns the positions of a node's voxels for ray casting, computed on first use.
 export function placesOf(node) {
   if (!node.places) {
     node.places = new Map();

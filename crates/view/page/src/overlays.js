@@ -8,7 +8,7 @@ const line = (points, colour, closed = false) => {
 
 const EDGES = [[0, 1], [2, 3], [4, 5], [6, 7], [0, 2], [1, 3], [4, 6], [5, 7], [0, 4], [1, 5], [2, 6], [3, 7]];
 
-// What is drawn over the map, in metres of the map.
+// Overlays in map coordinates, in metres.
 export class Overlays {
   constructor(parent) {
     this.group = new THREE.Group();
@@ -33,7 +33,7 @@ export class Overlays {
     if (object) object.visible = on;
   }
 
-  // Lines relative to their first point: coordinates of millions of metres do not fit `f32`.
+  // Lines are relative to their first point, because `f32` is too coarse for coordinates of millions of metres.
   path(name, points, colour) {
     if (points.length === 0) return this.set(name, null);
     const base = points[0];
@@ -59,7 +59,7 @@ export class Overlays {
     this.set(name, ball);
   }
 
-  // Borders of tiles at the foot of the map; too many are left out.
+  // Draws tile borders at the bottom of the map, unless there are too many.
   tiles(name, bounds, size, colour) {
     const [x0, y0, z] = bounds.min;
     const counts = [0, 1].map((k) => Math.round((bounds.max[k] - bounds.min[k]) / size));

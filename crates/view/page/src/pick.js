@@ -6,7 +6,7 @@ const local = new THREE.Ray();
 const box = new THREE.Box3();
 const entry = new THREE.Vector3();
 
-// Where a ray enters the first voxel of a mesh that is seen: a walk from voxel to voxel, as in ray casting.
+// Returns the entry point of a ray into the first visible voxel of a mesh, by voxel traversal.
 function walk(mesh, isSeen) {
   const node = mesh.userData.node;
   const places = placesOf(node);
@@ -32,7 +32,7 @@ function walk(mesh, isSeen) {
   return null;
 }
 
-// The nearest voxel under a place of the screen, from -1 to 1 along both axes.
+// Returns the nearest voxel at a screen position, from -1 to 1 along both axes.
 export function pick(viewer, x, y) {
   const caster = new THREE.Raycaster();
   caster.setFromCamera(new THREE.Vector2(x, y), viewer.camera);

@@ -7,10 +7,10 @@ import { KIND } from './node.js';
 import { Overlays } from './overlays.js';
 
 const MOST_CALLS = 200;
-// Way, sensor, marks, grid, bounding box.
+// Trajectory, sensor, marks, grid, bounding box.
 const OVERLAY_CALLS = 8;
 
-// The scene: layers, what lies over them, the camera. It draws only when something changed.
+// Scene with layers, overlays and camera. Draws only after changes.
 export class Viewer {
   constructor(canvas, say) {
     this.say = say;
@@ -18,7 +18,7 @@ export class Viewer {
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true });
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     this.scene = new THREE.Scene();
-    // Coordinates of a map may be millions of metres: the scene's own begin at its middle.
+    // Scene coordinates are relative to the middle of the maps, which may be millions of metres from the origin.
     this.world = new THREE.Group();
     this.scene.add(this.world);
     this.camera = new THREE.PerspectiveCamera(60, 1, 0.05, 1e6);
@@ -45,7 +45,7 @@ export class Viewer {
     return this.world.position.toArray().map((k) => -k);
   }
 
-  // Whole metres in the middle of the maps; they are there from the first map on.
+  // Sets the scene's origin to whole metres in the middle of the maps, once.
   center(bounds) {
     const middle = [0, 1, 2].map((k) => Math.round((bounds.min[k] + bounds.max[k]) / 2));
     this.world.position.set(...middle.map((k) => -k));
@@ -53,7 +53,7 @@ export class Viewer {
     this.surround(bounds);
   }
 
-  // What `All` shows.
+  // Sets the box shown by `Fit`.
   surround(bounds) {
     this.box = new THREE.Box3(...['min', 'max'].map((end) => new THREE.Vector3(...this.toScene(bounds[end]))));
   }
@@ -85,7 +85,7 @@ export class Viewer {
     this.wake();
   }
 
-  // Draws soon.
+  // Requests a frame.
   wake() {
     if (this.settled) {
       this.settled = false;
@@ -112,7 +112,7 @@ export class Viewer {
     this.mostCalls = Math.max(this.mostCalls, this.renderer.info.render.calls);
     const meshes = this.layers.reduce((sum, layer) => sum + layer.tiles.visibleTiles.size, 0);
     if (this.firstPictureMs === null && meshes > 0) this.firstPictureMs = performance.now();
-    // A picture of all that was loaded, and nothing left to load.
+    // The frame shows all loaded nodes, and none are pending.
     const isReady = this.layers.every((layer) => layer.isReady);
     this.settled = isReady && this.wasReady && !moved;
     this.wasReady = isReady;
@@ -120,7 +120,7 @@ export class Viewer {
     if (!this.settled) this.waitAWhile(moved);
   }
 
-  // Where a view needs more nodes than may be drawn, the farthest are left out until coarser ones are there.
+  // If a view needs more nodes than the limit, hides the farthest until coarser ones are loaded.
   leaveOutFarthest() {
     const near = this.layers.reduce((sum, layer) => sum + (layer.isShown ? layer.near.children.length : 0), 0);
     const shown = this.layers.filter((layer) => layer.isShown).flatMap((layer) => layer.meshes());
@@ -129,7 +129,7 @@ export class Viewer {
     shown.forEach(([mesh], k) => { mesh.visible = k < most; });
   }
 
-  // Depth is told apart where the map is, not before and behind it.
+  // Fits the depth range to the map, for depth precision.
   fitDepth() {
     const far = this.box ? this.box.getSize(new THREE.Vector3()).length() : 100;
     const away = this.box ? this.box.distanceToPoint(this.camera.position) : 0;
@@ -147,7 +147,7 @@ export class Viewer {
     else setTimeout(again, 30);
   }
 
-  // What the uniforms say, from what is chosen.
+  // Sets the uniforms from the controls.
   paint() {
     this.shared.colourBy.value = ['height', 'probability', 'count', 'scan'].indexOf(this.colour);
     this.shared.low.value.set(...this.toScene(this.cut.low));
@@ -161,7 +161,7 @@ export class Viewer {
     }
   }
 
-  // Whether a voxel is drawn: above the threshold, and within the cut.
+  // Returns whether a voxel is drawn: above the threshold and within the cut.
   isSeen(layer, node, voxel, at) {
     if (!this.shows.occupied) return false;
     if (node.kind === KIND.occupied && node.value[voxel] < this.threshold) return false;

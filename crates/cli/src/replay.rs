@@ -1,9 +1,9 @@
-//! What the commands share that map a part of a map again.
+//! Shared code of the commands that replay kept scans.
 
-use crate::args::ReworkArgs;
+use crate::args::ReplayArgs;
 use crate::build::memory_of;
 use crate::progress::Progress;
-use crate::run::{INTERRUPTED, say};
+use crate::run::{INTERRUPTED, print_message};
 use crate::stop_signal;
 use indicatif::HumanCount;
 use std::io::Write;
@@ -11,29 +11,29 @@ use std::process::ExitCode;
 use voxtile::operations::{Replay, Replayed};
 use voxtile::scan::Stop;
 
-/// How a map is mapped again, and its progress.
+/// A replay with its progress bar.
 pub struct Job {
-    pub rework: Replay,
+    pub replay: Replay,
     pub progress: Progress,
     stop: Stop,
 }
 
 impl Job {
-    pub fn of(args: &ReworkArgs) -> anyhow::Result<Self> {
+    pub fn of(args: &ReplayArgs) -> anyhow::Result<Self> {
         let stop = stop_signal::catch_undone()?;
-        let rework = Replay::default()
+        let replay = Replay::default()
             .with_memory(memory_of(args.memory))
             .with_keep_as(args.keep_as.clone())
             .with_dry_run(args.dry_run)
             .with_stop(stop.clone());
-        Ok(Self { rework, progress: Progress::over_scans(Some(0)), stop })
+        Ok(Self { replay, progress: Progress::over_scans(Some(0)), stop })
     }
 
-    /// What a request to stop leads to: the map is as it was.
+    /// Maps a requested stop to its exit code; the map has not changed.
     pub fn ended<T>(&self, outcome: voxtile::Result<T>) -> anyhow::Result<Result<T, ExitCode>> {
         match outcome {
             Err(voxtile::Error::Stopped) if self.stop.is_set() => {
-                say(format_args!("stopped; the map is as it was"));
+                print_message(format_args!("stopped; the map has not changed"));
                 Ok(Err(ExitCode::from(INTERRUPTED)))
             }
             outcome => Ok(Ok(outcome?)),
@@ -41,7 +41,7 @@ impl Job {
     }
 }
 
-/// Two lines for people.
+/// Prints two lines on replayed scans and tiles.
 pub fn print(mapped: &Replayed, is_dry_run: bool, out: &mut impl Write) -> std::io::Result<()> {
     let Replayed { scans, scans_changed, scans_mapped, tiles, tiles_mapped, updates, updates_mapped, .. } =
         *mapped;
@@ -49,13 +49,13 @@ pub fn print(mapped: &Replayed, is_dry_run: bool, out: &mut impl Write) -> std::
     let share = 100.0 * updates_mapped as f64 / updates.max(1) as f64;
     writeln!(
         out,
-        "scans     {} of {}: {scans_changed} changed, {would}mapped again where that touches them",
+        "scans     {} of {} {would}replayed; {scans_changed} changed",
         HumanCount(scans_mapped),
         HumanCount(scans)
     )?;
     writeln!(
         out,
-        "tiles     {} of {} {would}mapped again, by {share:.1} % of the voxel updates of all scans",
+        "tiles     {} of {} {would}rebuilt, with {share:.1} % of the voxel updates of all scans",
         HumanCount(tiles_mapped),
         HumanCount(tiles)
     )?;
