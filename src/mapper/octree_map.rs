@@ -96,7 +96,6 @@ impl OctreeMap {
         &self.tree
     }
 
-    /// Builds the table of a tile.
     pub(crate) fn table_of(&self, index: TileIndex) -> Table {
         let end = FIRST_VOXEL.map(|first| -first);
         let voxels = self.config.grid.voxels_of_tile(index);

@@ -1,7 +1,6 @@
 use crate::space::{Grid, TileIndex, TileSpace, Torus};
 use crate::tile::{OctreeFactory, Tile};
 
-/// Tiles of a map in memory.
 #[derive(Debug)]
 pub(super) struct TileMap {
     /// In the order of their first update.

@@ -216,7 +216,6 @@ impl Octree {
         self.arena.allocate(Block::EMPTY)
     }
 
-    /// Counts a new leaf.
     pub(super) fn add_leaf(&mut self, depth: u8) {
         self.nodes += 1;
         self.leaves += 1;

@@ -40,7 +40,6 @@ pub struct ScanRef<'a> {
     stamp_ns: Option<i64>,
 }
 
-/// Frame of the points.
 #[derive(Clone, Copy, Debug)]
 enum Frame {
     /// World frame, with the position of the sensor.

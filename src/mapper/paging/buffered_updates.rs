@@ -131,7 +131,6 @@ impl BufferedUpdates {
         self.bytes + self.spilled.bytes()
     }
 
-    /// Number of tiles with a spill file.
     pub(super) fn files(&self) -> usize {
         self.spilled.len()
     }

@@ -13,7 +13,6 @@ pub(super) struct CompactTiles {
     bytes: usize,
     /// Dirty tiles that are not being saved, by number: a search in `tiles` would repeatedly pass all clean ones.
     to_save: BTreeMap<u64, TileIndex>,
-    /// Clean tiles, by number.
     clean: BTreeMap<u64, TileIndex>,
     dirty: usize,
     /// Number of tiles inserted so far.
@@ -138,7 +137,6 @@ impl CompactTiles {
         self.indices().next_back()
     }
 
-    /// The oldest clean tile.
     pub(super) fn oldest_clean(&self) -> Option<TileIndex> {
         self.clean.first_key_value().map(|(_, index)| *index)
     }
@@ -186,7 +184,6 @@ impl CompactTiles {
         true
     }
 
-    /// Records that no save is running.
     pub(super) fn no_save_running(&mut self) {
         for (index, entry) in self.tiles.iter_mut().filter(|(_, entry)| entry.is_saving) {
             entry.is_saving = false;

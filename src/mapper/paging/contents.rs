@@ -146,7 +146,6 @@ impl TileContents {
         self.cache.peek(index).cloned()
     }
 
-    /// Records that a tile was written.
     pub(super) fn end_write(&mut self, index: TileIndex, version: TileVersion) {
         self.views.note_on_disk(index, version);
         self.cache.change(index, Tile::mark_clean);
@@ -202,7 +201,6 @@ impl TileContents {
         }
     }
 
-    /// Adds the counts of the contents to the statistics.
     pub(super) fn count_into(&self, statistics: &mut MapStatistics) {
         statistics.scan_number = self.scan_number;
         self.buffer.count_into(statistics);
@@ -252,7 +250,6 @@ impl TileContents {
 
     // Background flush.
 
-    /// Returns whether a background flush is running.
     pub(super) fn is_flushing(&self) -> bool {
         self.pinned.is_some()
     }
@@ -266,7 +263,6 @@ impl TileContents {
         }
     }
 
-    /// Records the beginning of a background flush.
     pub(super) fn begin_background_flush(&mut self, pinned: PinnedTiles) {
         self.pinned = Some(pinned);
         self.flush_reserve = self.flush_reserve.max(1);
@@ -345,7 +341,6 @@ impl TileContents {
         self.pinned_bytes().max(self.flush_reserve)
     }
 
-    /// Records that the flush has written a version of a tile.
     pub(super) fn note_flushed(&mut self, tile: FlushedTile, version: TileVersion, disk: &TileDisk) {
         let index = tile.index();
         self.views.note_on_disk(index, version);
@@ -382,12 +377,10 @@ impl TileContents {
         }
     }
 
-    /// Returns whether the flush and the cache share this tile.
     pub(super) fn is_shared_with_flush(&self, index: TileIndex) -> bool {
         self.pinned.as_ref().is_some_and(|pinned| pinned.is_shared(index))
     }
 
-    /// Records that the flush has copied a tile.
     pub(super) fn note_copied(&mut self, index: TileIndex) {
         if let Some(pinned) = &mut self.pinned {
             pinned.note_own(index);
@@ -403,7 +396,6 @@ impl TileContents {
         }
     }
 
-    /// Records the end of the flush.
     pub(super) fn end_background_flush(&mut self, flushed: Result<()>) {
         for (index, tile) in self.pinned.take().map(PinnedTiles::into_unsaved).unwrap_or_default() {
             self.cache.save_ended(index, &tile, false);
@@ -451,7 +443,6 @@ impl TileContents {
         tiles
     }
 
-    /// The resident tiles, in order.
     pub(in crate::mapper) fn resident_tiles(&self) -> Vec<TileIndex> {
         self.cache.resident_indices()
     }

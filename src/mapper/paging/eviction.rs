@@ -51,7 +51,6 @@ impl TilePager<'_> {
         self.contents.plan()
     }
 
-    /// Bytes of memory that the disk uses.
     fn bytes_of_disk(&self) -> usize {
         self.disk.in_flight_bytes() + self.disk.index_bytes() + self.disk.commit_bytes()
     }

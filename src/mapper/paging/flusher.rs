@@ -50,7 +50,6 @@ pub(super) struct BegunFlush {
     pub(super) commit: BegunCommit,
 }
 
-/// Tile to be written.
 pub(super) enum FlushedTile {
     Resident(Arc<PinnedTile>),
     Compact(TileIndex, CompactTile),
@@ -269,7 +268,6 @@ impl FlushedTile {
         }
     }
 
-    /// Bytes of memory of the tile.
     pub(super) fn bytes(&self) -> usize {
         match self {
             Self::Resident(tile) => tile.bytes(),

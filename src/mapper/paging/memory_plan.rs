@@ -25,7 +25,6 @@ pub(in crate::mapper) struct MemoryPlan {
     pub(super) often_scans: u32,
     /// Maximum bytes of tiles in the compact form without an index; see [`MemoryPlan::compact_bytes`].
     compact_bytes: usize,
-    /// Bytes of the index of tiles, which grows with the map.
     index_bytes: usize,
     /// Maximum bytes of tiles that readers in other threads cache.
     pub(in crate::mapper) reader_bytes: usize,
@@ -78,12 +77,10 @@ impl MemoryPlan {
         }
     }
 
-    /// Returns whether tiles are kept in the compact form.
     pub(super) fn has_compact_tier(&self) -> bool {
         self.compact_bytes > 0
     }
 
-    /// Records the size of the index of tiles.
     pub(super) fn note_index(&mut self, bytes: usize) {
         self.index_bytes = bytes;
     }

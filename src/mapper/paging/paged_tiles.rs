@@ -76,7 +76,6 @@ impl PagedTiles {
         pager.contents.take_flush_error().map_or(Ok(()), Err)
     }
 
-    /// The contents, shared by readers and the mapper.
     pub(in crate::mapper) fn contents(&self) -> &Arc<SharedContents> {
         &self.contents
     }

@@ -17,7 +17,6 @@ struct Held {
     is_being_written: bool,
 }
 
-/// Form in which a tile is held.
 #[derive(Clone, Debug)]
 pub(super) enum PinnedForm {
     Resident(Arc<Tile>),

@@ -84,7 +84,6 @@ impl PinnedTiles {
         !is_on_disk
     }
 
-    /// Returns whether the flush waits for saves.
     pub(super) fn waits_for_saves(&self) -> bool {
         !self.saving.is_empty()
     }
@@ -105,7 +104,6 @@ impl PinnedTiles {
         shared.map(|tile| tile.bytes).sum()
     }
 
-    /// Returns whether a tile is shared with the cache.
     pub(super) fn is_shared(&self, index: TileIndex) -> bool {
         self.tiles.get(&index).is_some_and(|tile| tile.is_shared)
     }

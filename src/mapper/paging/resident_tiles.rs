@@ -36,7 +36,6 @@ impl ResidentTiles {
         self.tiles.len()
     }
 
-    /// Bytes of memory of all tiles.
     pub(super) fn bytes(&self) -> usize {
         self.bytes
     }
@@ -52,7 +51,6 @@ impl ResidentTiles {
         Some(&resident.tile)
     }
 
-    /// Counts an inserted scan.
     pub(super) fn note_scan(&mut self) {
         self.scans += 1;
     }

@@ -39,7 +39,6 @@ impl SharedContents {
         }
     }
 
-    /// Closes a view.
     pub(in crate::mapper) fn close_view(&self, view: ViewId) {
         let mut contents = self.lock();
         let dropped = contents.views.close(view);

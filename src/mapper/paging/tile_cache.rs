@@ -90,7 +90,6 @@ impl TileCache {
         self.resident.peek(index)
     }
 
-    /// Counts an inserted scan.
     pub(super) fn note_scan(&mut self) {
         self.resident.note_scan();
     }
@@ -109,7 +108,6 @@ impl TileCache {
         self.resident.contains(index)
     }
 
-    /// The resident tiles, sorted by index.
     pub(super) fn resident_indices(&self) -> Vec<TileIndex> {
         let mut indices: Vec<_> = self.resident.iter().map(|tile| tile.index()).collect();
         indices.sort_unstable();
@@ -279,14 +277,12 @@ impl TileCache {
         self.compact.save_ended(index, saved, is_on_disk)
     }
 
-    /// Records that no save is running.
     pub(super) fn no_save_running(&mut self) {
         self.compact.no_save_running();
     }
 
     // Memory limit. `outside` is the number of bytes outside of the cache that count towards it.
 
-    /// Records the size of the index of tiles.
     pub(super) fn note_index(&mut self, bytes: usize) {
         self.plan.note_index(bytes);
     }
@@ -346,7 +342,6 @@ impl TileCache {
         self.resident.bytes() + compact + self.scan_bytes + outside
     }
 
-    /// Memory counts of the cache.
     pub(super) fn memory(&self) -> MemoryCounts {
         MemoryCounts {
             tiles: self.resident.bytes() as u64,
@@ -356,7 +351,6 @@ impl TileCache {
         }
     }
 
-    /// Adds the counts of the cache to the statistics.
     pub(super) fn count_into(&self, statistics: &mut MapStatistics) {
         statistics.cached_tiles = self.resident.len() as u64;
         statistics.dirty_tiles = self.resident.iter().filter(|tile| tile.is_dirty()).count() as u64;

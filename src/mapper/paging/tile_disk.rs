@@ -55,7 +55,6 @@ impl TileDisk {
         }
     }
 
-    /// The store, for reading.
     pub(super) fn store(&self) -> &TileStore {
         &self.store
     }
@@ -73,7 +72,6 @@ impl TileDisk {
         answer
     }
 
-    /// Counts the time of a wait.
     pub(super) fn note_stall(&mut self, time: Duration) {
         self.stalls.note(time);
     }
@@ -102,12 +100,10 @@ impl TileDisk {
         self.unread.remove(index);
     }
 
-    /// Returns whether another tile may be prefetched.
     pub(super) fn can_prefetch(&self) -> bool {
         self.threads.can_load()
     }
 
-    /// Returns whether a tile is being prefetched.
     pub(super) fn is_prefetching(&self, index: TileIndex) -> bool {
         self.threads.is_loading(index)
     }
@@ -182,12 +178,10 @@ impl TileDisk {
         std::mem::take(&mut self.written).tiles().collect()
     }
 
-    /// Returns whether another tile may be saved in the background.
     pub(super) fn can_save(&self) -> bool {
         self.threads.can_save()
     }
 
-    /// Returns whether a version of a tile is being saved in the background.
     pub(super) fn is_saving(&self, index: TileIndex) -> bool {
         self.threads.is_saving(index)
     }
@@ -400,7 +394,6 @@ impl TileDisk {
         self.store.commit_bytes()
     }
 
-    /// Adds the counts of the disk to the statistics.
     pub(super) fn count_into(&self, statistics: &mut MapStatistics) {
         let versions = self.store.tiles().versions();
         statistics.disk_bytes = versions.map(|version| version.table.bytes + version.octree.bytes).sum();

@@ -66,7 +66,6 @@ impl TilePager<'_> {
         unlocked(contents, || wait(disk))
     }
 
-    /// The store, for reading.
     pub(in crate::mapper) fn store(&self) -> &TileStore {
         self.disk.store()
     }
@@ -431,7 +430,6 @@ impl TilePager<'_> {
         self.contents.cache.resident_indices()
     }
 
-    /// Returns whether a background flush is running.
     pub(in crate::mapper) fn is_flushing(&self) -> bool {
         self.contents.is_flushing()
     }

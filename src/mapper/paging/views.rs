@@ -16,7 +16,6 @@ pub(super) struct Views {
     open: BTreeMap<u64, usize>,
     /// Old states of tiles, each with the last time at which it was valid, in order.
     past: FxHashMap<TileIndex, Vec<(u64, TileState)>>,
-    /// Bytes of memory of `past`.
     past_bytes: usize,
     /// Views opened before this time have expired.
     kept_since: u64,
@@ -39,7 +38,6 @@ struct DiskIndex {
 pub(in crate::mapper) struct ViewId(u64);
 
 impl Views {
-    /// Returns whether a view is open.
     pub(super) fn are_open(&self) -> bool {
         !self.open.is_empty()
     }
@@ -149,7 +147,6 @@ impl Views {
         self.disk = Some(DiskIndex { versions, orphans, reader_bytes });
     }
 
-    /// Records that a version of a tile was written.
     pub(super) fn note_on_disk(&mut self, tile: TileIndex, version: TileVersion) {
         if let Some(disk) = &mut self.disk {
             disk.versions.insert(tile, version);

@@ -52,7 +52,6 @@ impl WriteBuffer {
         self.buffered.bytes() + hash_table_bytes::<(TileIndex, Frozen)>(self.frozen.capacity())
     }
 
-    /// Number of tiles with a spill file.
     pub(super) fn spill_files(&self) -> usize {
         self.buffered.files()
     }
@@ -181,7 +180,6 @@ impl WriteBuffer {
         }
     }
 
-    /// Adds the counts of the buffer to the statistics.
     pub(super) fn count_into(&self, statistics: &mut MapStatistics) {
         statistics.buffered_tiles = self.buffered.len() as u64;
         statistics.buffered_updates = self.buffered.updates();

@@ -4,7 +4,6 @@ use super::number::to_six_digits;
 use crate::error::{DecodeError, FormatError};
 use std::io::{self, BufRead, ErrorKind, Write};
 
-/// Header of a file.
 #[derive(Debug)]
 pub(super) struct Header {
     pub format: OctreeFormat,

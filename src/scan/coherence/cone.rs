@@ -8,7 +8,6 @@ pub(crate) const SIDES: usize = 6;
 /// Cells along the edge of a side. At 16 voxels from the sensor a cell is one voxel wide.
 pub(crate) const CELLS: usize = 32;
 
-/// Number of cells per side.
 pub(crate) const CELLS_PER_SIDE: usize = CELLS * CELLS;
 
 /// Width of a cell at distance 1.
@@ -26,7 +25,6 @@ pub(crate) struct Cone {
     width: f64,
     /// Distance along `A` from the sensor to the border at which rays leave its slab, in voxels.
     first_slab: f64,
-    /// Slab of the sensor.
     slab: u32,
     is_up: bool,
 }

@@ -36,7 +36,6 @@ impl MarkedPrefixes {
         self.cones.resize(SIDES * CELLS_PER_SIDE, MarkedPrefix::default());
     }
 
-    /// Bytes of memory on the heap.
     pub(crate) fn bytes(&self) -> usize {
         self.cones.capacity() * size_of::<MarkedPrefix>()
     }

@@ -9,7 +9,6 @@ pub(crate) trait Footprint: Default {
     /// Voxel of a slab.
     type Cell: Copy;
 
-    /// Bytes of memory on the heap.
     fn heap_bytes(&self) -> usize;
 
     /// Creates an empty page that takes little memory while few rays cross it.

@@ -22,7 +22,6 @@ enum Marks {
     Bricks(Box<SparsePage<BrickMask>>),
 }
 
-/// Marks of one brick.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MarkedBrick {
     /// The indices of its voxels divided by 8.
@@ -221,7 +220,6 @@ impl MarkedPage {
         }
     }
 
-    /// Number of bricks with marks.
     pub(crate) fn count_bricks(&self) -> usize {
         self.present().iter().map(|word| word.count_ones() as usize).sum()
     }

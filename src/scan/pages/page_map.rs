@@ -57,7 +57,6 @@ impl<F: Footprint> PageMap<F> {
         self.max_fast.min(self.pages.len())
     }
 
-    /// Bytes of memory on the heap.
     pub(crate) fn bytes(&self) -> usize {
         self.directory.capacity() * size_of::<u32>()
             + hash_table_bytes::<(VoxelIndex, u32)>(self.far.capacity())

@@ -93,7 +93,6 @@ impl<B: BrickContent> SparsePage<B> {
         usize::from(self.numbers[place as usize / BRICK_VOXELS % PAGE_BRICKS]).saturating_sub(1)
     }
 
-    /// Bytes of memory on the heap.
     pub(crate) fn bricks_bytes(&self) -> usize {
         self.bricks.capacity() * size_of::<B>()
     }

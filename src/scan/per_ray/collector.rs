@@ -81,7 +81,6 @@ impl PerRayCollector {
         bytes > 0 && left < new_bytes.max(self.max_bytes / 8)
     }
 
-    /// Bytes of memory on the heap.
     pub(crate) fn bytes(&self) -> usize {
         let far = self.far.as_ref().map_or(0, FarRuns::bytes);
         self.pages.bytes() + self.ended.capacity() * size_of::<EndedRun>() + far

@@ -90,7 +90,6 @@ impl FarRuns {
         done.map(|(tile, packed, counts)| (tile, TileUpdates::Packed(packed), counts))
     }
 
-    /// Bytes of memory on the heap.
     pub(crate) fn bytes(&self) -> usize {
         self.bytes
     }

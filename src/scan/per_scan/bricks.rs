@@ -76,7 +76,6 @@ pub(crate) fn intensities_of(brick: VoxelIndex, hits: &BrickMask, intensities: &
     places(*hits).map(intensity).collect()
 }
 
-/// Number of hits and of misses.
 pub(crate) fn hits_and_misses(bricks: &[BrickUpdate]) -> (u64, u64) {
     let ones = |mask: &BrickMask| u64::from(mask.map(u64::count_ones).iter().sum::<u32>());
     bricks

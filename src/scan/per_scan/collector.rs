@@ -47,7 +47,6 @@ impl PerScanCollector {
         self.allowance.grant(limit.small_bytes);
     }
 
-    /// Bytes of memory on the heap.
     pub(crate) fn bytes(&self) -> usize {
         self.pages.bytes() + self.prefixes.bytes() + self.far.bytes() + self.intensities_bytes()
     }
@@ -56,12 +55,10 @@ impl PerScanCollector {
         hash_table_bytes::<(VoxelIndex, f32)>(self.intensities.capacity())
     }
 
-    /// Bytes of the marks only.
     pub(crate) fn marks_bytes(&self) -> usize {
         self.pages.pages().iter().map(MarkedPage::heap_bytes).sum::<usize>() + self.far.bytes()
     }
 
-    /// Number of bricks with marks.
     pub(crate) fn count_bricks(&self) -> usize {
         self.pages.pages().iter().map(MarkedPage::count_bricks).sum::<usize>() + self.far.len()
     }

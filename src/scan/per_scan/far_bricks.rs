@@ -77,7 +77,6 @@ impl FarBricks {
         self.bricks.len() + usize::from(self.latest.is_some())
     }
 
-    /// Bytes of memory on the heap.
     pub(crate) fn bytes(&self) -> usize {
         hash_table_bytes::<(VoxelIndex, MarkedBrick)>(self.bricks.capacity())
     }

@@ -1,7 +1,6 @@
 use super::slab_span::SlabSpan;
 use crate::space::{Point, VoxelIndex};
 
-/// End of a ray.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RayEnd {
     /// End point in units of voxels, world frame.

@@ -39,7 +39,6 @@ enum Failure {
     TooManyTiles,
 }
 
-/// List of the parts of a tile.
 #[derive(Clone, Copy)]
 struct PartList {
     /// Position of the last part in the log.

@@ -37,7 +37,6 @@ impl ScanTracer {
         traced
     }
 
-    /// Number of collectors kept.
     #[cfg(test)]
     pub(crate) fn collectors(&self) -> usize {
         self.per_scan.len().max(self.per_ray.len())

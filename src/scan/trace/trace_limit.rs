@@ -35,7 +35,6 @@ impl TraceLimit {
         Self { bytes }
     }
 
-    /// Returns whether there is no limit.
     pub(crate) fn is_none(&self) -> bool {
         self.bytes == usize::MAX
     }

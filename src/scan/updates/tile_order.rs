@@ -33,7 +33,6 @@ pub(crate) fn mean_tiles_of_brick(grid: &Grid) -> usize {
     (parts_by_tile as f64 / tile.pow(3) as f64).round() as usize
 }
 
-/// Returns the code of the brick with this index.
 pub(crate) fn brick_code(index: VoxelIndex) -> BrickCode {
     BrickCode::of_voxel(index.map(|k| k * BRICK_EDGE))
 }
@@ -45,7 +44,6 @@ pub(crate) fn part_in_tile(grid: &Grid, tile: TileIndex, brick: VoxelIndex) -> B
     mask_of_box(local(voxels.min), local(voxels.end))
 }
 
-/// Returns the tiles that a brick overlaps.
 fn tiles_of_brick(grid: &Grid, brick: VoxelIndex) -> impl Iterator<Item = TileIndex> {
     let min = brick.map(|k| k * BRICK_EDGE);
     let first = grid.tile_of_voxel(min).to_array();

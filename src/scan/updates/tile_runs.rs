@@ -75,7 +75,6 @@ impl<'a> BrickRuns<'a> {
         self.runs.iter().copied().chain(self.misses.iter().copied().map(Run::from))
     }
 
-    /// Removes and returns the first run.
     pub(crate) fn take_first(&mut self) -> Option<Run> {
         if let Some((run, later)) = self.runs.split_first() {
             self.runs = later;
@@ -138,7 +137,6 @@ impl TileRuns {
         self.runs.iter().all(Run::is_empty) && self.misses.iter().all(|passed| passed.misses == 0)
     }
 
-    /// Number of hits and of misses.
     pub(crate) fn hits_and_misses(&self) -> (u64, u64) {
         let hits = self.runs.iter().filter(|run| run.hit.is_some()).count() as u64;
         let before_hits: u64 = self.runs.iter().map(|run| u64::from(run.misses)).sum();

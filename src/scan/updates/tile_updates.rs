@@ -95,7 +95,6 @@ impl OrderedUpdates {
         })
     }
 
-    /// Number of hits and of misses.
     pub(crate) fn hits_and_misses(&self) -> (u64, u64) {
         let hits = self.voxels.iter().filter(|packed| **packed & HIT != 0).count() as u64;
         (hits, self.voxels.len() as u64 - hits)

@@ -87,7 +87,6 @@ impl SharedTree {
         self.nodes.load(Ordering::Relaxed)
     }
 
-    /// Bytes of memory on the heap of the tree.
     pub(crate) fn bytes(&self) -> usize {
         self.bytes.load(Ordering::Relaxed)
     }

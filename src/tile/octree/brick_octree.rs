@@ -24,10 +24,8 @@ struct Node {
     like_first: u8,
 }
 
-/// Depth of a brick.
 const BRICK_DEPTH: u8 = 13;
 
-/// Number of levels above the bricks.
 const LEVELS: usize = BRICK_DEPTH as usize;
 
 impl BrickOctree {
@@ -36,7 +34,6 @@ impl BrickOctree {
         self.is_synced
     }
 
-    /// Marks the octree as stale.
     pub(crate) fn note_change(&mut self) {
         self.is_synced = false;
     }
@@ -46,7 +43,6 @@ impl BrickOctree {
         self.node_count
     }
 
-    /// Bytes of memory on the heap.
     pub(crate) fn bytes(&self) -> usize {
         self.nodes.capacity() * size_of::<Node>()
     }

@@ -49,7 +49,6 @@ impl OctreeFactory {
         OctreeStatistics { queue, ..self.ledger.sum() }
     }
 
-    /// Creates the octree of a table.
     pub(crate) fn octree_of(&self, table: &mut Table) -> TileOctree {
         match self.config {
             OctreeConfig::Bricks => {

@@ -27,13 +27,11 @@ impl Brick {
     /// Represents absent bricks.
     pub(crate) const ABSENT_BRICK: &Self = &Self::new(BrickCode(0));
 
-    /// Creates a brick without observed voxels.
     pub(crate) const fn new(code: BrickCode) -> Self {
         let evidence = Storage::Interned(Cells::empty());
         Self { code, observed: [0; 8], evidence, summary: Summary::EMPTY }
     }
 
-    /// Creates a brick with voxels.
     pub(crate) const fn with(code: BrickCode, observed: BrickMask, evidence: Storage) -> Self {
         Self { code, observed, evidence, summary: Summary::STALE }
     }
@@ -42,7 +40,6 @@ impl Brick {
         self.code
     }
 
-    /// Bytes of memory on the heap.
     #[inline]
     pub(crate) fn heap_bytes(&self) -> usize {
         match &self.evidence {
@@ -214,7 +211,6 @@ impl Brick {
         }
     }
 
-    /// Marks the states of the brick's voxels as used.
     pub(crate) fn mark_states(&self, in_use: &mut [bool]) {
         if let Storage::Interned(cells) = &self.evidence {
             cells.all().iter().flatten().for_each(|&state| in_use[usize::from(state)] = true);

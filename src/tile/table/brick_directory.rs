@@ -66,7 +66,6 @@ const fn spread() -> [u16; 32] {
 }
 
 impl BrickDirectory {
-    /// Bytes of memory on the heap.
     pub(crate) fn bytes(&self) -> usize {
         self.blocks.bytes()
             + self.numbers.capacity() * size_of::<[u32; BLOCK_BRICKS]>()
@@ -80,7 +79,6 @@ impl BrickDirectory {
         self.in_block(self.block(at), at)
     }
 
-    /// Number of the block at an address.
     #[inline]
     pub(crate) fn block(&self, at: Address) -> u32 {
         self.blocks.get(at.block)
@@ -98,7 +96,6 @@ impl BrickDirectory {
         self.marks[self.blocks.get(at.block) as usize]
     }
 
-    /// Marks a brick that exists.
     pub(crate) fn mark(&mut self, at: Address) {
         let block = self.blocks.get(at.block);
         if block != Torus::NONE {
@@ -106,7 +103,6 @@ impl BrickDirectory {
         }
     }
 
-    /// Entry for the brick at an address.
     pub(crate) fn entry(&mut self, at: Address) -> &mut u32 {
         let mut block = self.blocks.get(at.block);
         if block == Torus::NONE {

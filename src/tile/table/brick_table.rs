@@ -61,7 +61,6 @@ impl Table {
         self.at(Address::of_key(key))
     }
 
-    /// Number of bricks with an observed voxel.
     pub(crate) fn brick_count(&self) -> usize {
         self.bricks.len()
     }
@@ -279,7 +278,6 @@ impl Table {
         self.bricks.get((self.directory.get(at) as usize).wrapping_sub(1))
     }
 
-    /// Creates an empty table with a palette.
     pub(crate) fn with_palette(palette: Palette) -> Self {
         Self { palette, ..Self::default() }
     }

@@ -17,13 +17,11 @@ impl BrickView<'_> {
         self.brick.get(place, self.palette)
     }
 
-    /// Returns whether a voxel was observed.
     #[inline]
     pub(crate) fn is_observed(&self, place: usize) -> bool {
         self.brick.observed[place / 64] >> (place % 64) & 1 == 1
     }
 
-    /// Mask of the observed voxels.
     pub(crate) fn observed(&self) -> BrickMask {
         self.brick.observed
     }

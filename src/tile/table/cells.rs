@@ -31,18 +31,15 @@ impl<T: Copy> Cells<T> {
         Self { places, cells: vec![[value; CELL_VOXELS]; count.into()] }
     }
 
-    /// Bytes of memory on the heap.
     pub(crate) fn bytes(&self) -> usize {
         self.cells.capacity() * size_of::<[T; CELL_VOXELS]>()
     }
 
-    /// The cell of a word, if it exists.
     #[inline]
     pub(crate) fn cell(&self, word: usize) -> Option<&[T; CELL_VOXELS]> {
         self.cells.get(usize::from(self.places[word]))
     }
 
-    /// The cell of a word, if it exists.
     #[inline]
     pub(crate) fn cell_mut(&mut self, word: usize) -> Option<&mut [T; CELL_VOXELS]> {
         self.cells.get_mut(usize::from(self.places[word]))

@@ -110,7 +110,6 @@ impl Palette {
         self.evidence.len()
     }
 
-    /// Bytes of memory on the heap.
     pub(crate) fn bytes(&self) -> usize {
         self.evidence.capacity() * size_of::<Evidence>()
             + self.next.capacity() * size_of::<Next>()
@@ -136,7 +135,6 @@ impl Palette {
         states
     }
 
-    /// State after a miss.
     #[inline]
     pub(crate) fn after_miss(&mut self, before: StateId) -> Result<StateId, Full> {
         match self.next[usize::from(before)].miss {
@@ -161,7 +159,6 @@ impl Palette {
         Ok(after)
     }
 
-    /// State after a hit.
     #[inline]
     pub(crate) fn after_hit(&mut self, before: StateId, intensity: f32) -> Result<StateId, Full> {
         match self.next[usize::from(before)].hit {
@@ -264,7 +261,6 @@ impl Palette {
         self.len() < self.limit
     }
 
-    /// Returns whether the limit can be raised.
     pub(crate) fn can_grow(&self) -> bool {
         self.limit < self.max_states
     }

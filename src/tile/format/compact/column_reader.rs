@@ -9,7 +9,6 @@ pub(super) struct ColumnReader {
     compressed: Vec<u8>,
 }
 
-/// Column to be read.
 pub(super) struct Column<'a> {
     pub(super) name: &'static str,
     /// Maximum size of the column in bytes.

@@ -13,7 +13,6 @@ use std::io::Read;
 /// Decoded columns of a group; see [`Group`](super::group::Group).
 #[derive(Default)]
 pub(super) struct Columns {
-    /// Offset of the group.
     pub(super) offset: u64,
     pub(super) bricks: usize,
     steps: Vec<u8>,

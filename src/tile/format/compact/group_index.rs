@@ -4,10 +4,8 @@ use crate::error::{DecodeError, FormatError};
 use crate::space::BrickCode;
 use std::io::Read;
 
-/// Size of an entry in bytes.
 pub(super) const ENTRY_BYTES: usize = 16;
 
-/// Index entry of a group.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct GroupEntry {
     /// Code of the first brick.

@@ -5,7 +5,6 @@ use crate::error::{DecodeError, FormatError};
 use crate::space::VoxelBox;
 use std::io::Read;
 
-/// Size of the header in bytes.
 pub(super) const HEADER_BYTES: usize = 36;
 
 /// Size in bytes of the header of version 1, with which every version begins.
@@ -23,7 +22,6 @@ pub(super) struct Header {
     pub(super) codebook_crc: u32,
 }
 
-/// Version of the format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Version {
     /// Groups without an index, each beginning with the step from the previous one.

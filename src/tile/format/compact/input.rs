@@ -33,7 +33,6 @@ impl<R: Read> Input<R> {
         }
     }
 
-    /// Creates the input of a table of `bytes` bytes.
     pub(super) fn of_table(input: R, bytes: u64) -> Result<Self, FormatError> {
         if bytes < HEADER_1_BYTES as u64 + CRC_BYTES {
             let reason = format!("{bytes} bytes are too few for a compact table");
@@ -68,7 +67,6 @@ impl<R: Read> Input<R> {
         }
     }
 
-    /// Creates an error at the current offset.
     pub(super) fn wrong(&self, reason: impl Into<String>) -> DecodeError {
         FormatError::at_offset(self.offset, reason).into()
     }

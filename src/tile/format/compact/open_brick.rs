@@ -34,7 +34,6 @@ impl From<Full> for Refusal {
 }
 
 impl OpenBrick {
-    /// Number of observed voxels.
     pub(super) fn voxels(&self) -> usize {
         self.observed.iter().map(|word| word.count_ones() as usize).sum()
     }

@@ -21,7 +21,6 @@ impl Symbols {
         Self { states, first_prefix: 255 - prefixes }
     }
 
-    /// The first symbol that is a prefix.
     pub(super) fn first_prefix(self) -> u8 {
         self.first_prefix as u8
     }

@@ -4,7 +4,6 @@ use super::open_brick::{OpenBrick, Refusal};
 use crate::tile::Table;
 use crate::tile::table::{Palette, Storage};
 
-/// Builds a table from bricks.
 pub(super) struct TableBuilder {
     table: Table,
 }
