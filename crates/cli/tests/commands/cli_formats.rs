@@ -151,13 +151,13 @@ fn gaps_between_poses_are_filled_up_to_twice_the_tolerance() {
             let input = ["scans", &bag, "--topic", "/points", "--pose-tolerance", tolerance, "--json"];
             let told = output(&[&input, own].concat());
             assert_eq!(told.contains("4 clouds have no pose"), !is_filled, "{own:?} {tolerance}: {told}");
-            assert_eq!(told.contains("apart; --pose-tolerance allows for more"), !is_filled, "{told}");
+            assert_eq!(told.contains("apart; --pose-tolerance permits larger gaps"), !is_filled, "{told}");
         }
         let map = folder.path().join("map");
         let input = ["build", &bag, "--topic", "/points", "--pose-tolerance", "0.01", "-o", text(&map)];
         let refused = refusal(&[&input, own].concat());
         assert!(refused.contains("none of its 4 clouds has a pose"), "{refused}");
-        assert!(refused.contains("apart; --pose-tolerance allows for more"), "{refused}");
+        assert!(refused.contains("apart; --pose-tolerance permits larger gaps"), "{refused}");
     }
 }
 
@@ -400,7 +400,7 @@ fn clouds_of_which_none_has_a_pose_make_no_map() {
     let map = folder.path().join("other");
     output(&["build", text(&scans), "--poses", text(&poses), "-o", text(&map)]);
     let told = output(&["scans", text(&scans), "--poses", text(&poses)]);
-    let named = "1 cloud has no pose, left out (1600000001.000000000.xyz: it is 0.500 s after the last pose)";
+    let named = "1 cloud has no pose: skipped (1600000001.000000000.xyz: it is 0.500 s after the last pose)";
     assert!(told.contains(named), "{told}");
     assert!(output(&["scans", text(&map)]).contains("1600000000"), "{}", output(&["scans", text(&map)]));
 }
@@ -561,7 +561,7 @@ fn damaged_clouds_shift_no_others_of_a_selection() {
     assert_eq!(build(&map("b"), &["--every", "12"]), [0.0, 12.0, 24.0, 36.0]);
     assert_eq!(build(&map("c"), &["--first", "7", "--count", "2"]), [7.0, 8.0]);
     let told = output(&["scans", text(&scans), "--poses", text(&poses), "--first", "7", "--count", "2"]);
-    assert!(told.contains("1 of the scans that were passed over cannot be read"), "{told}");
+    assert!(told.contains("1 of the skipped scans cannot be read"), "{told}");
 }
 
 /// The decoder of LAZ panics on these bytes.
@@ -576,7 +576,7 @@ fn a_decoder_that_panics_is_one_line_that_names_the_file() {
         bytes[points_at + at..points_at + at + 16].fill(0xff);
         fs::write(&file, bytes).unwrap();
         let said = refusal(&["scans", text(&file)]);
-        assert!(said.contains("damaged.laz") && said.contains("its decoder gave up (decoders.rs:"), "{said}");
+        assert!(said.contains("damaged.laz") && said.contains("its decoder failed (decoders.rs:"), "{said}");
         assert!(said.lines().count() == 1 && !said.contains("panicked"), "{said}");
     }
 }
@@ -603,7 +603,7 @@ fn clouds_that_were_cut_off_are_kept_or_say_where() {
     let las = cut("voxels.las");
     let told = json(&["scans", text(&las), "--json"]);
     let points = told["points"].as_u64().unwrap();
-    let remark = format!("the file is cut off: {points} of {} points are there and are read", points + 3);
+    let remark = format!("the file is truncated: {points} of {} points exist and are read", points + 3);
     assert!(told["remarks"].to_string().contains(&remark), "{told}");
     assert_eq!(build(&las, "las.map")["points"], points);
     let ply = cut("voxels.ply");
@@ -629,8 +629,8 @@ fn what_deskewing_does_not_move_is_told() {
     let input = ["scans", text(&scans), "--poses", text(&poses), "--pose-tolerance", "2"];
     let told = output(&[&input[..], &["--deskew"]].concat());
     for part in [
-        "1 cloud has no times of points, or no stamp: --deskew moved nothing there",
-        "2 points stayed: no pose is known at their own times (--deskew)",
+        "1 cloud has no point times or no stamp: --deskew had no effect there",
+        "2 points not deskewed: there is no pose at their own times",
     ] {
         assert!(told.contains(part), "{told}");
     }

@@ -123,7 +123,7 @@ fn w_first_is_read_by_evidence_and_printed() {
     };
     let w_last = digest(&|_, [x, y], half| format!("{x} {y} 0 0 0 {} {}\n", half.sin(), half.cos()), "");
     let w_first = |_, [x, y]: [f64; 2], half: f64| format!("{x} {y} 0 {} 0 0 {}\n", half.cos(), half.sin());
-    assert_eq!(digest(&w_first, "w first (qw qx qy qz)"), w_last);
+    assert_eq!(digest(&w_first, "qw qx qy qz, because"), w_last);
     let named = |k, p: [f64; 2], half| {
         let head = if k == 0 { "# tx ty tz qw qx qy qz\n" } else { "" };
         head.to_owned() + &w_first(k, p, half)
@@ -152,26 +152,26 @@ fn a_calib_beside_poses_of_a_camera_is_named() {
     };
     fs::write(&poses, along(2, 1.0)).unwrap();
     let told = overview(&[]);
-    assert!(told.contains("go along their own z") && told.contains("--calib FILE"), "{told}");
+    assert!(told.contains("moves along its z axis") && told.contains("--calib FILE"), "{told}");
     let calib = folder.path().join("calib.txt");
     fs::write(&calib, "P0: 1 0 0 0 0 1 0 0 0 0 1 0\n").unwrap();
     assert!(!overview(&[]).contains("calib.txt"), "it has no Tr");
     fs::write(&calib, "Tr: 0 -1 0 0 0 0 -1 -0.1 1 0 0 -0.3\n").unwrap();
     let told = overview(&[]);
-    assert!(told.contains(&format!("need --calib {}", calib.display())), "{told}");
-    assert!(told.contains("these go along z") && !told.contains("own z"), "{told}");
+    assert!(told.contains(&format!("add --calib {}", calib.display())), "{told}");
+    assert!(told.contains("these move along z") && !told.contains("its z axis"), "{told}");
     let told = overview(&["--calib", text(&calib)]);
     assert!(!told.contains("note"), "{told}");
     // Where nothing moves, it is not known.
     fs::write(&poses, along(2, 0.0)).unwrap();
     let told = overview(&[]);
-    assert!(told.contains("need --calib") && !told.contains("these go"), "{told}");
+    assert!(told.contains("add --calib") && !told.contains("these move"), "{told}");
     // Poses of the lidar go along x.
     fs::write(&poses, along(0, 1.0)).unwrap();
     assert!(!overview(&[]).contains("note"));
     // With a calib that is not theirs, along -y.
     let told = overview(&["--calib", text(&calib)]);
-    assert!(told.contains("with --calib the poses go along their own -y"), "{told}");
+    assert!(told.contains("with --calib the sensor moves along its -y axis"), "{told}");
     fs::write(&poses, "1 0 0 0 0 -1 0 0 0 0 -1 0\n".repeat(3)).unwrap();
     assert!(overview(&[]).contains("upside down"));
 }
@@ -214,7 +214,7 @@ fn times_in_names_may_lack_zeros_or_points() {
     let told = voxtile(&["scans", text(&scans), "--poses", text(&file)]).output().unwrap();
     let told = String::from_utf8(told.stderr).unwrap();
     assert!(
-        told.contains("200 poses for 3 clouds") && told.contains("names of the clouds tell no times"),
+        told.contains("200 poses for 3 clouds") && told.contains("names of the clouds contain no times"),
         "{told}"
     );
 }
@@ -240,9 +240,12 @@ fn a_scan_whose_pose_was_lost_is_left_out_and_named() {
             fs::remove_dir_all(&map).unwrap();
             let summary: Value = serde_json::from_slice(&built.stdout).unwrap();
             assert_eq!(summary["scans"], 3, "{row}");
-            assert!(told.contains("1 row of poses is left out") && told.contains("line 3"), "{row}: {told}");
             assert!(
-                told.contains("1 cloud has no pose, left out (") && told.contains(" was lost)"),
+                told.contains("1 row of poses is invalid and skipped") && told.contains("line 3"),
+                "{row}: {told}"
+            );
+            assert!(
+                told.contains("1 cloud has no pose: skipped (") && told.contains(" was lost)"),
                 "{row}: {told}"
             );
         }

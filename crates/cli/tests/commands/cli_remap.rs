@@ -100,7 +100,10 @@ fn another_map_is_built_from_kept_scans_with_other_poses() {
     let lines: Vec<_> = fs::read_to_string(&moved).unwrap().lines().take(2).map(str::to_owned).collect();
     fs::write(&moved, lines.join("\n")).unwrap();
     let message = fails(&["build", &kept.map, "-o", &kept.path("none"), "--poses", &moved], 2);
-    assert!(message.contains("2 poses for 3 scans that the map keeps: none from scan 3 on"), "{message}");
+    assert!(
+        message.contains("2 poses for 3 kept scans of the map: they are missing from scan 3 on"),
+        "{message}"
+    );
 }
 
 #[test]
@@ -116,7 +119,7 @@ fn kept_scans_are_told_exported_and_built_again() {
     output(&[&["build", &out, "-o", &again][..], &TILES].concat());
     assert_eq!(digest(&again), digest(&kept.map));
     let message = fails(&["export", &kept.map, "--scans", &out], 2);
-    assert!(message.contains("is a folder with content; name another"), "{message}");
+    assert!(message.contains("is a folder that is not empty: choose another"), "{message}");
     let third = kept.path("third");
     output(&[&["build", &kept.map, "-o", &third][..], &TILES].concat());
     assert_eq!(digest(&third), digest(&kept.map));
@@ -159,7 +162,10 @@ fn what_cannot_be_mapped_again_is_refused_with_what_to_do() {
     let two = fs::read_to_string(&three).unwrap().lines().take(2).collect::<Vec<_>>().join("\n");
     fs::write(&three, two).unwrap();
     let message = refused(&["remap", &kept.map, "--poses", &three]);
-    assert!(message.contains("2 poses for 3 scans that the map keeps: none from scan 3 on"), "{message}");
+    assert!(
+        message.contains("2 poses for 3 kept scans of the map: they are missing from scan 3 on"),
+        "{message}"
+    );
     let message = refused(&["remap", &kept.map, "--poses", &three, "--tolerance", "1"]);
     assert!(message.contains("0.02m,0.1deg"), "{message}");
     let message = refused(&["remove-scans", &kept.map, "--scans", "3..1"]);
@@ -269,7 +275,7 @@ fn poses_in_another_order_than_time_are_not_taken_line_by_line() {
     let line = |stamp: i32| format!("{stamp} {stamp} 0 0 0 0 0 1\n");
     fs::write(&poses, [3, 2, 1].map(line).concat()).unwrap();
     let message = fails(&["remap", &kept.map, "--poses", &poses], 2);
-    assert!(message.contains("its time stamps go back"), "{message}");
+    assert!(message.contains("its time stamps are not in order"), "{message}");
     assert_eq!(digest(&kept.map), kept.digest_with(&kept.poses("own.txt", 0.0), "same"));
 
     // Clouds whose names are their stamps.
@@ -304,7 +310,7 @@ fn poses_in_another_order_than_time_are_not_taken_line_by_line() {
     let build = ["build", text(&clouds), "-o", &kept.path("x"), "--poses", &kept.path("back.txt")];
     for more in [&[][..], &["--skip-bad"]] {
         let message = fails(&[&build[..], more].concat(), 2);
-        assert!(message.contains("its time stamps go back (pose 2 is earlier"), "{message}");
+        assert!(message.contains("its time stamps are not in order (pose 2 is earlier"), "{message}");
         assert!(!message.contains("is skipped"), "{message}");
     }
 }
