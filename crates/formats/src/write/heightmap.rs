@@ -138,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn only_heights_that_are_asked_for_count() {
+    fn only_requested_heights_are_used() {
         let folder = tempfile::tempdir().unwrap();
         let all = WriteOptions::beside(&folder.path().join("heights.png"));
         // The voxel at 2.75 m is excluded, so the one below it is the topmost.
@@ -147,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn the_topmost_occupied_voxel_counts() {
+    fn topmost_occupied_voxel_is_used() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("heights.png");
         assert_eq!(values(&WriteOptions::beside(&path)), [0, 4, 0, 0, 9, 0]);
