@@ -287,7 +287,7 @@ fn quaternion_order_is_detected_by_upright_sensors() {
             assert_eq!(found, wanted);
         }
         let remarks = trajectory.remarks().join("\n");
-        assert_eq!(remarks.contains("are read qw qx qy qz, because"), is_guess, "{remarks}");
+        assert_eq!(remarks.contains("are read as qw qx qy qz"), is_guess, "{remarks}");
     }
 }
 
