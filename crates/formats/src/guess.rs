@@ -1,4 +1,4 @@
-use crate::input_format::{InputFormat, Mark, Open};
+use crate::input_format::{Detection, InputFormat, Open};
 use crate::read::foreign;
 use crate::read::glance::first_bytes;
 use crate::read::listing::{Listing, extension_of};
@@ -11,11 +11,12 @@ use std::path::{Path, PathBuf};
 use voxtile::{Error, Result};
 
 impl Registry {
-    /// What a file or a folder is: by its content first, by its name second. Of a folder, `not_clouds` are left out.
+    /// Detects the format of a file or folder from its content, then from its name. In a folder, files listed in
+    /// `not_clouds` are ignored.
     ///
     /// # Errors
     ///
-    /// It cannot be read; it is of no known format, or of one that must be converted first.
+    /// The path cannot be read, its format is unknown, or the format must be converted first.
     pub fn guess(&self, path: &Path, not_clouds: &[PathBuf]) -> Result<&InputFormat> {
         let meta = std::fs::metadata(path).map_err(|error| match error.kind() {
             ErrorKind::NotFound => argument(path, why_missing(path)),
@@ -24,14 +25,15 @@ impl Registry {
         if meta.is_dir() { self.guess_folder(path, not_clouds) } else { self.guess_file(path) }
     }
 
-    /// The input itself, which may be a folder `scans` in the one that was named, and its format.
+    /// Returns the path to read and its format. If `path` has a subfolder `scans` with the clouds, that subfolder is
+    /// the path.
     pub(crate) fn find(&self, path: &Path, options: &ReadOptions) -> Result<(PathBuf, &InputFormat)> {
         let named = options.format.as_deref().map(|name| self.named(name)).transpose()?;
         let not_clouds = options.not_clouds();
         let inner = path.join("scans");
         let packed = self.packed_recording(path).map(|format| format.name);
         if named.is_some_and(|named| packed != Some(named.name)) && path.is_file() {
-            // What is packed is named, whatever it was called.
+            // Archives are rejected by their content, whatever format was requested.
             if let Some(archive) = foreign::archive_of(&first_bytes(path)?) {
                 return Err(archive.error(path));
             }
@@ -42,7 +44,7 @@ impl Registry {
         let pcd = self.named("pcd")?;
         let is_pcd =
             |folder| named.is_none_or(|named| named.name == pcd.name) && pcd_scans::is_folder(folder);
-        // Texts of any kind lie beside a folder of PCD.
+        // A folder of PCD files often contains unrelated text files.
         if !is_pcd(path) && is_pcd(&inner) {
             return Ok((inner, pcd));
         }
@@ -53,22 +55,22 @@ impl Registry {
         }
     }
 
-    /// What starts with these bytes, if that tells it.
+    /// Returns the format that has this signature at the start of the file, if any.
     pub(crate) fn of_start(&self, start: &[u8]) -> Option<&InputFormat> {
-        let start = foreign::without_mark(start);
-        self.formats().iter().find(|format| match format.mark {
-            Mark::Start(is_it) | Mark::StartOrName(is_it) => is_it(start),
+        let start = foreign::without_bom(start);
+        self.formats().iter().find(|format| match format.detection {
+            Detection::Start(is_it) | Detection::StartOrName(is_it) => is_it(start),
             _ => false,
         })
     }
 
     fn guess_file(&self, path: &Path) -> Result<&InputFormat> {
         let extension = extension_of(path);
-        let of = |is_it: fn(&Mark) -> bool| {
+        let of = |is_it: fn(&Detection) -> bool| {
             let mut formats = self.formats().iter();
-            formats.find(|format| is_it(&format.mark) && format.has_extension(&extension))
+            formats.find(|format| is_it(&format.detection) && format.has_extension(&extension))
         };
-        if let Some(named) = of(|mark| matches!(mark, Mark::Name)) {
+        if let Some(named) = of(|detection| matches!(detection, Detection::Name)) {
             return Ok(named);
         }
         let start = first_bytes(path)?;
@@ -81,7 +83,7 @@ impl Registry {
         if let Some(foreign) = foreign::of_bytes(&start) {
             return Err(foreign.error(path));
         }
-        if let Some(named) = of(|mark| matches!(mark, Mark::StartOrName(_))) {
+        if let Some(named) = of(|detection| matches!(detection, Detection::StartOrName(_))) {
             return Ok(named);
         }
         if let Some(foreign) = foreign::of_extension(&extension) {
@@ -89,7 +91,7 @@ impl Registry {
         }
         let mut why_not = None;
         for format in self.formats() {
-            let Mark::Look(check) = format.mark else { continue };
+            let Detection::Look(check) = format.detection else { continue };
             let is_named = format.has_extension(&extension);
             match check(&start, is_named) {
                 Ok(()) => return Ok(format),
@@ -99,14 +101,17 @@ impl Registry {
         }
         let beginning = foreign::beginning_of(&start);
         Err(match (why_not, of(|_| true)) {
-            (Some((title, reason)), _) => argument(path, format!("is no {title}: {reason}")),
+            (Some((title, reason)), _) => argument(path, format!("is not a valid {title}: {reason}")),
             (None, Some(_)) => argument(
                 path,
                 format!(
-                    "is called .{extension}, but does not start like such a file: is it damaged?{beginning}"
+                    "has the extension .{extension}, but its content is not of that format: is it damaged?{beginning}"
                 ),
             ),
-            _ => argument(path, format!("is of no known format{beginning}; known are {}", self.names(", "))),
+            _ => argument(
+                path,
+                format!("has an unknown format{beginning}; known formats: {}", self.names(", ")),
+            ),
         })
     }
 
@@ -122,7 +127,8 @@ impl Registry {
                 counts.entry(format.name).or_insert((format, file, 0_u64)).2 += 1;
             }
         }
-        // Lists, times and poses lie beside clouds, and so do pictures. Between the two, a camera decides.
+        // Lists, time stamps, poses and pictures often accompany clouds. If there are only pictures and text clouds,
+        // the pictures are the input if camera intrinsics are known.
         let mut aside: Vec<&str> =
             self.formats().iter().filter(|format| format.is_aside).map(|format| format.name).collect();
         if !listing.has_depths() {
@@ -136,19 +142,19 @@ impl Registry {
         let mut found = counts.values();
         match (found.next(), found.next()) {
             (Some((format, ..)), None) if matches!(format.open, Open::Folder(_)) => Ok(format),
-            (Some((format, ..)), None) if matches!(format.mark, Mark::Look(_)) => {
+            (Some((format, ..)), None) if matches!(format.detection, Detection::Look(_)) => {
                 let texts = listing.texts(format);
                 match texts.clouds.first() {
                     Some(file) => self.guess_file(file),
                     None => Err(argument(path, listing.why_nothing(&self.names(", "), &texts.others))),
                 }
             }
-            // The first file tells LAS from LAZ, and is checked early.
+            // The first file distinguishes LAS from LAZ; this also reports a damaged file early.
             (Some((_, file, _)), None) => self.guess_file(file),
             (Some((one, _, count)), Some((other, _, others))) => {
                 let (one, other) = (one.name, other.name);
                 let reason = format!(
-                    "holds {count} files of {one} and {others} of {other}; name the format that is meant"
+                    "contains {count} files of format {one} and {others} of format {other}; select one with `format`"
                 );
                 Err(argument(path, reason))
             }
@@ -156,7 +162,7 @@ impl Registry {
         }
     }
 
-    /// The format of a recording whose file is compressed as a whole: `a.mcap.zstd`.
+    /// Returns the format of a recording that is compressed as a whole, such as `a.mcap.zstd`.
     fn packed_recording(&self, path: &Path) -> Option<&InputFormat> {
         let is_packed = matches!(extension_of(path).as_str(), "zst" | "zstd");
         let inner = extension_of(Path::new(path.file_stem().filter(|_| is_packed)?));
@@ -166,10 +172,11 @@ impl Registry {
         self.formats().iter().find(is_it)
     }
 
-    /// The format of files with an extension, in lower case, in a folder of clouds.
+    /// Returns the format of files with this extension (lower case) in a folder of clouds.
     fn in_folder(&self, extension: &str) -> Option<&InputFormat> {
-        let may_be =
-            |format: &&InputFormat| !matches!(format.mark, Mark::Name) && format.has_extension(extension);
+        let may_be = |format: &&InputFormat| {
+            !matches!(format.detection, Detection::Name) && format.has_extension(extension)
+        };
         self.formats().iter().find(may_be)
     }
 }
@@ -178,13 +185,13 @@ fn argument(path: &Path, reason: impl Into<String>) -> Error {
     Error::argument(path.display().to_string(), reason)
 }
 
-/// Why there is no file.
+/// Returns the error text for a path that does not exist.
 fn why_missing(path: &Path) -> String {
     match std::fs::read_link(path) {
         Err(_) => "there is no such file or folder".to_owned(),
         Ok(target) if target.to_string_lossy().contains(".git/annex/") => {
-            "is a link of git-annex to a file that is not here: fetch it with `git annex get`".to_owned()
+            "is a git-annex link to a file that was not downloaded: get it with `git annex get`".to_owned()
         }
-        Ok(target) => format!("is a link to {}, and there is no such file or folder", target.display()),
+        Ok(target) => format!("is a link to {}, which does not exist", target.display()),
     }
 }

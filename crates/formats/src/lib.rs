@@ -1,15 +1,16 @@
-//! Files of other programs, one format per file, and voxtile's scan stream. Knows no mapper.
+//! Readers and writers of the file formats of other programs, one format per file, and of voxtile's scan stream. This
+//! crate does not depend on the mapper.
 //!
 //! ```text
-//! path -> registry.rs, guess.rs: which format
-//!      -> read/, ros/: CloudSource -> CloudHead, then CloudPoint after CloudPoint
-//!      -> poses/: a pose for each cloud
+//! path -> registry.rs, guess.rs: format detection
+//!      -> read/, ros/: CloudSource -> CloudHead, then a sequence of CloudPoint
+//!      -> poses/: one pose per cloud
 //!      -> scans/: ScanSource -> SensorScan, StoredScan
-//! VoxelRow after VoxelRow -> write/: VoxelSink -> .ply .las .npz ..
+//! sequence of VoxelRow -> write/: VoxelSink -> .ply .las .npz ..
 //! ```
 //!
-//! `spill/` has what exceeds the memory of a reader. Formats that need many crates stand behind features: `las`, `e57`,
-//! `ros`, `sqlite`.
+//! `spill/` holds temporary files for data that exceeds the memory budget. The features `las`, `e57`, `ros` and
+//! `sqlite` enable formats with many dependencies.
 
 mod guess;
 mod input_format;
@@ -24,7 +25,7 @@ mod scans;
 mod spill;
 pub mod write;
 
-pub use input_format::{InputFormat, Mark, Open, OpenCloud, OpenClouds, OpenScans};
+pub use input_format::{Detection, InputFormat, Open, OpenCloud, OpenClouds, OpenScans};
 pub use open::{open_clouds, open_scans};
 pub use poses::{CloudOptions, Deskew, PoseSource, RigidPose};
 pub use read::{
@@ -34,7 +35,7 @@ pub use read::{
 pub use read_options::{ReadOptions, RecordingOptions};
 pub use registry::Registry;
 pub use scans::{
-    PointRoom, PointStore, ScanChain, ScanHead, ScanMark, ScanReach, ScanSource, ScanStreamWriter, Selection,
-    SensorScan, StoredScan,
+    PointBudget, PointStore, ScanChain, ScanFingerprint, ScanHead, ScanReach, ScanSource, ScanStreamWriter,
+    Selection, SensorScan, StoredScan,
 };
 pub use spill::Budget;

@@ -1,5 +1,5 @@
 use crate::CloudSource;
-use crate::input_format::{InputFormat, Mark, Open};
+use crate::input_format::{Detection, InputFormat, Open};
 use crate::poses::PoseSource;
 use crate::poses::PosedClouds;
 use crate::poses::Rules;
@@ -17,32 +17,32 @@ use crate::scans::{GuardedScans, ScanSource};
 use std::path::Path;
 use voxtile::{Error, Result};
 
-/// Opens scans of any known format: a file, a folder of files, or the folder that holds such a folder as `scans`. Its
-/// content tells the format first, its name second.
+/// Opens scans of any known format: a file, a folder of files, or a folder that contains such a folder named `scans`.
+/// The format is detected from the content first, then from the name.
 ///
-/// Files of a folder are in natural order of their names (`scan2` before `scan10`). Scans without poses of their own
-/// take them from [`ReadOptions::poses`], or from `poses_tum.txt` or `poses_kitti.txt` in or beside the folder; see
-/// [`ScanSource::pose_source`].
+/// Files of a folder are read in natural order of their names (`scan2` before `scan10`). Scans without poses of their
+/// own take them from [`ReadOptions::poses`], or from `poses_tum.txt` or `poses_kitti.txt` in the folder or in its
+/// parent; see [`ScanSource::pose_source`].
 ///
 /// # Errors
 ///
-/// Nothing that is known, options that do not fit, a file that cannot be read; scans without any poses, poses that do
+/// The format is unknown, the options do not fit it, a file cannot be read, the scans have no poses, or the poses do
 /// not match the scans.
 pub fn open_scans(path: &Path, options: &ReadOptions) -> Result<Box<dyn ScanSource + Send>> {
     Registry::default().open_scans(path, options)
 }
 
-/// Opens clouds of any known format, without the poses that are beside them.
+/// Opens clouds of any known format, ignoring pose files.
 ///
 /// # Errors
 ///
-/// As for [`open_scans`]; a format that has no clouds without poses.
+/// As for [`open_scans`]. Also fails for a format that contains only scans with poses.
 pub fn open_clouds(path: &Path, options: &ReadOptions) -> Result<Box<dyn CloudSource>> {
     Registry::default().open_clouds(path, options)
 }
 
 impl Registry {
-    /// [`open_scans`] of these formats.
+    /// As the free function [`open_scans`], for the formats of this registry.
     ///
     /// # Errors
     ///
@@ -56,7 +56,7 @@ impl Registry {
         let has_poses = (format.has_poses)(&path);
         let scans = match format.open {
             Open::Scans(_) if has_poses && options.poses.is_some() => {
-                let reason = format!("a {} has its own poses; leave the option out", format.title);
+                let reason = format!("a {} has its own poses; omit the option", format.title);
                 return Err(Error::argument("poses", reason));
             }
             Open::Scans(open) => open(&path, options)?,
@@ -71,7 +71,7 @@ impl Registry {
         Ok(options.selection.clone().of(scans))
     }
 
-    /// [`open_clouds`] of these formats.
+    /// As the free function [`open_clouds`], for the formats of this registry.
     ///
     /// # Errors
     ///
@@ -88,11 +88,13 @@ fn open_as(path: &Path, format: &InputFormat, options: &ReadOptions) -> Result<B
     let is_folder = path.is_dir();
     let source = match format.open {
         Open::Recording(open) => return open(path, options),
-        Open::Scans(_) => return wrong(format!("is {}: it has scans, not clouds alone", format.title)),
-        Open::LeftOut(feature) => {
+        Open::Scans(_) => {
+            return wrong(format!("is {}, which contains scans with poses: open it as scans", format.title));
+        }
+        Open::Disabled(feature) => {
             let title = format.title;
             return wrong(format!(
-                "is {title}, which this build leaves out: build with the feature `{feature}`"
+                "is {title}, which this build does not support: build with the feature `{feature}`"
             ));
         }
         Open::Folder(open) if is_folder => open(path, options)?,
@@ -110,19 +112,22 @@ fn check(options: &ReadOptions) -> Result<()> {
     if !(options.scan_period_s >= 0.0 && options.scan_period_s.is_finite()) {
         return Err(Error::argument(
             "scan period",
-            "must be seconds from 0 on; 0 leaves a file in one cloud",
+            "must be at least 0 seconds; 0 reads a file as one cloud",
         ));
     }
     if options.depth_scale.is_some_and(|scale| !(scale > 0.0 && scale.is_finite())) {
-        return Err(Error::argument("depth scale", "must be above 0: the units of a depth image in a metre"));
+        return Err(Error::argument(
+            "depth scale",
+            "must be above 0: it is the number of depth units per metre",
+        ));
     }
     Ok(())
 }
 
 fn open_folder(path: &Path, format: InputFormat, options: &ReadOptions) -> Result<Box<dyn CloudSource>> {
     let listing = Listing::read(path, &options.not_clouds())?;
-    let (paths, others) = match format.mark {
-        Mark::Look(_) => {
+    let (paths, others) = match format.detection {
+        Detection::Look(_) => {
             let texts = listing.texts(&format);
             (texts.clouds, texts.others)
         }
@@ -142,12 +147,12 @@ fn open_folder(path: &Path, format: InputFormat, options: &ReadOptions) -> Resul
     let open = Box::new(move |path: &Path| {
         check_regular(path)?;
         if matches!(format.open, Open::Clouds(_)) {
-            // Readers of libraries open the file themselves.
+            // Some libraries open the file themselves: check here that it can be opened.
             open_input(path)?;
         }
         open_file(path, &format, stamps, &options)
     });
-    let others = others.into_iter().map(|other| format!("{other} is no cloud, left out"));
+    let others = others.into_iter().map(|other| format!("{other} is not a cloud and was skipped"));
     let remarks = stamps.remark().into_iter().chain(others).collect();
     Ok(Box::new(Files::new(name, paths, is_one_each, open).with_remarks(remarks)))
 }
@@ -166,6 +171,9 @@ fn open_file(
             Ok(Box::new(OneCloud::new(format.title, open(path, stamps.head_of(path), options)?)))
         }
         Open::Clouds(open) => open(path, options),
-        _ => Err(Error::argument(path.display().to_string(), format!("{} has no such files", format.title))),
+        _ => Err(Error::argument(
+            path.display().to_string(),
+            format!("{} cannot be read from a single file", format.title),
+        )),
     }
 }

@@ -1,27 +1,27 @@
-use crate::input_format::{InputFormat, Mark, Open};
+use crate::input_format::{Detection, InputFormat, Open};
 use crate::read::{self, pcd_scans};
 use voxtile::{Error, Result};
 
 #[cfg(feature = "las")]
 const LAS: Open = Open::Clouds(read::las::open);
 #[cfg(not(feature = "las"))]
-const LAS: Open = Open::LeftOut("las");
+const LAS: Open = Open::Disabled("las");
 #[cfg(feature = "e57")]
 const E57: Open = Open::Clouds(read::e57::open);
 #[cfg(not(feature = "e57"))]
-const E57: Open = Open::LeftOut("e57");
+const E57: Open = Open::Disabled("e57");
 #[cfg(feature = "ros")]
 const ROS: Open = Open::Recording(crate::ros::recording_clouds::open);
 #[cfg(not(feature = "ros"))]
-const ROS: Open = Open::LeftOut("ros");
+const ROS: Open = Open::Disabled("ros");
 
-/// Every format that is read: a row here and the file that opens it are all that a format needs.
+/// All supported input formats. A new format needs a row here and a file that opens it.
 const FORMATS: [InputFormat; 17] = [
     InputFormat {
         name: "pcd",
         title: "PCD",
         extensions: &["pcd"],
-        mark: Mark::StartOrName(read::pcd_header::is_start),
+        detection: Detection::StartOrName(read::pcd_header::is_start),
         is_folder: pcd_scans::is_folder,
         open: Open::Scans(pcd_scans::open),
         ..InputFormat::UNNAMED
@@ -30,7 +30,7 @@ const FORMATS: [InputFormat; 17] = [
         name: "ply",
         title: "PLY",
         extensions: &["ply"],
-        mark: Mark::Start(read::ply_header::is_start),
+        detection: Detection::Start(read::ply_header::is_start),
         open: Open::Stream(read::ply::open),
         ..InputFormat::UNNAMED
     },
@@ -39,7 +39,7 @@ const FORMATS: [InputFormat; 17] = [
         aliases: &["txt", "csv", "pts", "asc"],
         title: "text of points",
         extensions: &["xyz", "txt", "csv", "pts", "asc", "xyzi", "tsv"],
-        mark: Mark::Look(read::text::check_start),
+        detection: Detection::Look(read::text::check_start),
         is_aside: true,
         open: Open::Stream(read::text::open),
         ..InputFormat::UNNAMED
@@ -49,16 +49,16 @@ const FORMATS: [InputFormat; 17] = [
         aliases: &["kitti", "nuscenes"],
         title: "raw floats (KITTI .bin)",
         extensions: &["bin", "velodyne"],
-        mark: Mark::StartOrName(|_| false),
+        detection: Detection::StartOrName(|_| false),
         open: Open::Cloud(read::bin::open),
         ..InputFormat::UNNAMED
     },
-    // One may be called the other; the header says which it is.
+    // LAS and LAZ files share extensions; the header distinguishes them.
     InputFormat {
         name: "las",
         title: "LAS",
         extensions: &["las", "laz"],
-        mark: Mark::Start(|start| is_las(start) && !is_laz(start)),
+        detection: Detection::Start(|start| is_las(start) && !is_laz(start)),
         open: LAS,
         ..InputFormat::UNNAMED
     },
@@ -66,7 +66,7 @@ const FORMATS: [InputFormat; 17] = [
         name: "laz",
         title: "LAZ",
         extensions: &["las", "laz"],
-        mark: Mark::Start(|start| is_las(start) && is_laz(start) && !is_copc(start)),
+        detection: Detection::Start(|start| is_las(start) && is_laz(start) && !is_copc(start)),
         open: LAS,
         ..InputFormat::UNNAMED
     },
@@ -74,7 +74,7 @@ const FORMATS: [InputFormat; 17] = [
         name: "copc",
         title: "COPC",
         extensions: &["las", "laz"],
-        mark: Mark::Start(|start| is_las(start) && is_copc(start)),
+        detection: Detection::Start(|start| is_las(start) && is_copc(start)),
         open: LAS,
         ..InputFormat::UNNAMED
     },
@@ -82,7 +82,7 @@ const FORMATS: [InputFormat; 17] = [
         name: "e57",
         title: "E57",
         extensions: &["e57"],
-        mark: Mark::Start(|start| start.starts_with(b"ASTM-E57")),
+        detection: Detection::Start(|start| start.starts_with(b"ASTM-E57")),
         has_poses: |_| true,
         open: E57,
         ..InputFormat::UNNAMED
@@ -107,9 +107,9 @@ const FORMATS: [InputFormat; 17] = [
     InputFormat {
         name: "bag",
         title: "ROS 1 bag",
-        // A recorder that is killed leaves `.bag.active`.
+        // A killed recorder leaves `.bag.active`.
         extensions: &["bag", "active"],
-        mark: Mark::Start(|start| start.starts_with(b"#ROSBAG V2.0")),
+        detection: Detection::Start(|start| start.starts_with(b"#ROSBAG V2.0")),
         has_poses: |_| true,
         open: ROS,
         ..InputFormat::UNNAMED
@@ -118,7 +118,7 @@ const FORMATS: [InputFormat; 17] = [
         name: "mcap",
         title: "MCAP",
         extensions: &["mcap"],
-        mark: Mark::Start(|start| start.starts_with(b"\x89MCAP0\r\n")),
+        detection: Detection::Start(|start| start.starts_with(b"\x89MCAP0\r\n")),
         has_poses: |_| true,
         open: ROS,
         ..InputFormat::UNNAMED
@@ -127,7 +127,7 @@ const FORMATS: [InputFormat; 17] = [
         name: "db3",
         title: "ROS 2 bag (SQLite)",
         extensions: &["db3"],
-        mark: Mark::Start(|start| start.starts_with(b"SQLite format 3\0")),
+        detection: Detection::Start(|start| start.starts_with(b"SQLite format 3\0")),
         has_poses: |_| true,
         open: ROS,
         ..InputFormat::UNNAMED
@@ -144,7 +144,7 @@ const FORMATS: [InputFormat; 17] = [
         name: "graph",
         title: "OctoMap scan graph",
         extensions: &["graph"],
-        mark: Mark::Name,
+        detection: Detection::Name,
         has_poses: |_| true,
         open: Open::Scans(read::scan_graph::open),
         ..InputFormat::UNNAMED
@@ -153,7 +153,7 @@ const FORMATS: [InputFormat; 17] = [
         name: "log",
         title: "OctoMap scan log",
         extensions: &["log"],
-        mark: Mark::Name,
+        detection: Detection::Name,
         has_poses: |_| true,
         open: Open::Scans(read::scan_log::open),
         ..InputFormat::UNNAMED
@@ -162,7 +162,7 @@ const FORMATS: [InputFormat; 17] = [
         name: "scans",
         title: "scan stream",
         extensions: &["scans"],
-        mark: Mark::Name,
+        detection: Detection::Name,
         has_poses: |_| true,
         open: Open::Scans(read::scan_stream::open),
         ..InputFormat::UNNAMED
@@ -173,57 +173,57 @@ fn is_las(start: &[u8]) -> bool {
     start.starts_with(b"LASF")
 }
 
-/// Whether the points of a LAS file are compressed: a format number above 127.
+/// Returns whether the points of a LAS file are compressed: bit 7 of the point format is set.
 fn is_laz(start: &[u8]) -> bool {
     is_copc(start) || start.get(104).is_some_and(|format| format & 0x80 != 0)
 }
 
-/// Whether the first record of a LAS file is COPC's own.
+/// Returns whether the first record of a LAS file is the COPC record.
 fn is_copc(start: &[u8]) -> bool {
     start.get(377..382) == Some(b"copc\0")
 }
 
-/// The formats that are read.
+/// Registry of input formats.
 #[derive(Clone, Debug)]
 pub struct Registry {
     formats: Vec<InputFormat>,
 }
 
 impl Default for Registry {
-    /// Every format of this crate.
+    /// All formats of this crate.
     fn default() -> Self {
         Self { formats: FORMATS.to_vec() }
     }
 }
 
 impl Registry {
-    /// These formats and one more, which others of the same name hide.
+    /// Adds a format. It is hidden by an existing format with the same name.
     pub fn with(mut self, format: InputFormat) -> Self {
         self.formats.push(format);
         self
     }
 
-    /// The formats, also those that this build leaves out.
+    /// Returns all formats, including those disabled in this build.
     pub fn formats(&self) -> &[InputFormat] {
         &self.formats
     }
 
-    /// The format of a name or another name of it, in letters of either case.
+    /// Returns the format with this name or alias, in any case.
     ///
     /// # Errors
     ///
-    /// There is none.
+    /// There is no such format.
     pub fn named(&self, name: &str) -> Result<&InputFormat> {
         let lower = name.to_lowercase();
         let is_it = |format: &&InputFormat| format.name == lower || format.aliases.contains(&&*lower);
         let unknown = || {
-            let reason = format!("is not known; known are {}", self.names(", "));
+            let reason = format!("is unknown; known formats: {}", self.names(", "));
             Error::argument(format!("format `{name}`"), reason)
         };
         self.formats.iter().find(is_it).ok_or_else(unknown)
     }
 
-    /// The names of all formats.
+    /// Returns the names of all formats.
     pub fn names(&self, separator: &str) -> String {
         self.formats.iter().map(|format| format.name).collect::<Vec<_>>().join(separator)
     }

@@ -2,11 +2,11 @@ use crate::build_config::{config_to_create, config_to_go_on};
 use crate::build_options::BuildOptions;
 use crate::failed_flush::FailedFlush;
 use crate::flush_schedule::FlushSchedule;
-use crate::intake::{Intake, Next, RayNeeds, Taken};
+use crate::ingest::{Ingest, Next, RayNeeds, Taken};
 use crate::pose_check::{Doubt, PoseCheck, check_ahead};
 use crate::scan_input::is_standard_input;
 use crate::scan_queue::{ScanQueue, WhenBehind};
-use crate::scan_reader::{Marking, ScanReader};
+use crate::scan_reader::{FingerprintFn, ScanReader};
 use crate::summary::Summary;
 use crate::watch::{Gauge, Watch};
 use crate::whole_map;
@@ -18,26 +18,26 @@ use voxtile::mapper::{MapReader, MapView, Mapper, OutOfCoreTileMapper};
 use voxtile::scan::{ScanPoints, ScanReport};
 use voxtile::store::{FsDisk, InputContent, InputRecord, UnsyncedDisk};
 use voxtile::{Error, MapConfig, MapPath, MemoryLimit};
-use voxtile_formats::{PointRoom, ReadOptions, ScanMark};
+use voxtile_formats::{PointBudget, ReadOptions, ScanFingerprint};
 
-/// The share of the limit of memory that reading may take, beside the points of scans: chunks and messages of
-/// recordings, poses, the sorting of LAS.
+/// Divisor of the memory limit that gives the share for reading, without the points of scans: chunks and messages of
+/// recordings, poses, sorting of LAS files.
 const PARTS_FOR_READING: usize = 32;
-/// Reading has so much at least. What it has beyond that is taken from the map.
+/// Minimum memory for reading. What exceeds the share is taken from the map's memory.
 const MIN_FOR_READING: usize = 4 << 20;
 
-/// The share of the limit of memory that the points of scans may take, as they are read and as they are mapped.
+/// Divisor of the memory limit that gives the share for the points of scans that are being read or inserted.
 const PARTS_OF_MEMORY: usize = 32;
 
-/// Scans are taken together where there is so much room for the points of each, a lidar's of 128 beams.
-const ROOM_TO_GO_TOGETHER: usize = 3 << 20;
+/// Minimum memory per scan for inserting several scans at once: the points of a lidar with 128 beams.
+const MIN_BATCH_BYTES: usize = 3 << 20;
 
-/// Makes the map, or goes on with it; `None` if it was asked to stop before the first scan. What was accepted is in the
-/// map then, whatever ended the build.
+/// Builds or continues a map. Returns `None` if it was stopped before the first scan. All accepted scans are flushed,
+/// however the build ends.
 ///
 /// # Errors
 ///
-/// Options that do not fit the map or the input, an input or a map that cannot be read or written.
+/// The options do not fit the map or the input, or an input or a map cannot be read or written.
 pub fn build(options: &BuildOptions, watch: &Watch) -> anyhow::Result<Option<Summary>> {
     let started = Instant::now();
     let stop = watch.stop();
@@ -46,66 +46,70 @@ pub fn build(options: &BuildOptions, watch: &Watch) -> anyhow::Result<Option<Sum
     let config = if exists { config_to_go_on(options)? } else { config_to_create(options)? };
     check_no_rays(options, &config)?;
     check_when_behind(options)?;
-    // Nobody goes on with a piece, or asks whether it has a scan.
-    let mark: Marking =
-        if options.piece_of.is_none() { ScanMark::of } else { |scan| Ok(ScanMark::without_content(scan)) };
-    let room = room(options, &config);
-    let most_together = most_together(options, &config);
+    // A shard is never resumed or compared, so its scans are not hashed.
+    let fingerprint: FingerprintFn = if options.piece_of.is_none() {
+        ScanFingerprint::of
+    } else {
+        |scan| Ok(ScanFingerprint::without_content(scan))
+    };
+    let point_budget = point_budget(options, &config);
+    let max_batch = max_batch(options, &config);
     let read = read_options(options, &config);
-    let is_checked = options.strict && check_ahead(&options.scans, &read, &room, watch)?;
-    let opened = ScanReader::open(options.scans.clone(), read.clone(), room, mark, watch.clone())?;
+    let is_checked = options.strict && check_ahead(&options.scans, &read, &point_budget, watch)?;
+    let opened =
+        ScanReader::open(options.scans.clone(), read.clone(), point_budget, fingerprint, watch.clone())?;
     let Some((reader, input)) = opened else { return Ok(None) };
     let pose_check = if is_checked { None } else { PoseCheck::of(&read, &input.poses, &options.scans) };
     let config = config_of_map(options, &config);
     let needs = RayNeeds { grid: config.grid, sensor_model: config.sensor_model };
-    let mut intake =
-        Intake::new(reader, options.scans.clone(), options.skip_bad, (!options.no_rays).then_some(needs));
+    let mut ingest =
+        Ingest::new(reader, options.scans.clone(), options.skip_bad, (!options.no_rays).then_some(needs));
     let mut opened_map = match exists {
-        true => Some(OutOfCoreTileMapper::open(place_of_map(options), config.clone())?),
+        true => Some(OutOfCoreTileMapper::open(map_path(options), config.clone())?),
         false => None,
     };
-    if !intake.read_lead()? {
+    if !ingest.read_lookahead()? {
         return Ok(None);
     }
-    let crs = intake.crs();
+    let crs = ingest.crs();
     let mapper = match &mut opened_map {
         Some(mapper) => {
             check_crs(options, crs.as_ref(), config.crs.as_ref())?;
             mapper
         }
         none => {
-            // A first scan that cannot be mapped should not leave an empty map behind.
-            intake.check_first()?;
+            // If the first scan cannot be mapped, no empty map must be created.
+            ingest.check_first()?;
             let mut config = config;
             config.crs = crs;
             whole_map(&options.output)?;
             none.insert(match options.piece_of {
                 None => OutOfCoreTileMapper::create(&options.output, config)?,
-                Some(map_id) => OutOfCoreTileMapper::create_as(place_of_map(options), config, map_id)?,
+                Some(map_id) => OutOfCoreTileMapper::create_as(map_path(options), config, map_id)?,
             })
         }
     };
     mapper.stop_with(stop.clone());
-    let Some(resumed_after) = begin(options, mapper, &mut intake, &input.name)? else {
+    let Some(resumed_after) = begin(options, mapper, &mut ingest, &input.name)? else {
         return Ok(None);
     };
 
     if options.when_behind != WhenBehind::Wait {
-        intake.read_ahead(ScanQueue::new(options.when_behind, ScanQueue::MAX_SCANS));
-    } else if most_together > 1 {
-        intake.read_ahead(ScanQueue::new(options.when_behind, most_together));
+        ingest.read_ahead(ScanQueue::new(options.when_behind, ScanQueue::MAX_SCANS));
+    } else if max_batch > 1 {
+        ingest.read_ahead(ScanQueue::new(options.when_behind, max_batch));
     }
     let gauge = watch.over_scans(input.scans);
-    gauge.pass(intake.content().scans);
+    gauge.pass(ingest.content().scans);
     let mut build = Build {
         mapper,
-        intake,
+        ingest,
         schedule: FlushSchedule::new(options.flush_every),
         gauge,
         report: ScanReport::default(),
         scans: 0,
         has_rays: !options.no_rays,
-        most_together,
+        max_batch,
         notes_content: options.piece_of.is_none(),
         pose_check,
         doubt: None,
@@ -113,24 +117,24 @@ pub fn build(options: &BuildOptions, watch: &Watch) -> anyhow::Result<Option<Sum
     };
     let outcome = build.insert_all();
     build.gauge.say("flushing");
-    // What was accepted is kept, whatever ended the build.
+    // Accepted scans are flushed, however the build ended.
     let flushed = build.mapper.flush();
-    let Build { report, scans, mut intake, gauge, doubt, .. } = build;
+    let Build { report, scans, mut ingest, gauge, doubt, .. } = build;
     drop(gauge);
-    let mut remarks = intake.remarks();
+    let mut remarks = ingest.remarks();
     remarks.iter_mut().for_each(|remark| *remark = format!("{}: {remark}", options.scans.display()));
     remarks.extend(doubt.map(|doubt| doubt.remark()));
-    remarks.extend(all_is_cut(&report, mapper.config()));
+    remarks.extend(all_rays_cut(&report, mapper.config()));
     remarks.iter().for_each(|remark| log::warn!("{remark}"));
     if let Err(flush_error) = flushed {
         let (config, scan_number) = (mapper.config().clone(), mapper.flushed_scan_number());
-        let (is_new, is_piece) = (!exists, options.piece_of.is_some());
-        let failed = FailedFlush { folder: &options.output, config, scan_number, is_new, is_piece };
+        let (is_new, is_shard) = (!exists, options.piece_of.is_some());
+        let failed = FailedFlush { folder: &options.output, config, scan_number, is_new, is_shard };
         drop(opened_map);
         let flush_error = failed.clean(flush_error);
         return Err(match outcome {
             Ok(()) => flush_error,
-            Err(error) => error.context(format!("{flush_error:#}; before that")),
+            Err(error) => error.context(format!("{flush_error:#}; the previous error")),
         });
     }
     if let Err(error) = outcome {
@@ -139,22 +143,22 @@ pub fn build(options: &BuildOptions, watch: &Watch) -> anyhow::Result<Option<Sum
     }
     let interrupted = stop.is_set();
     let summary = Summary::of(&options.output, scans, report, mapper, started.elapsed())?;
-    let (poses, unread, left_out) = (Some(input.poses.to_string()), intake.unread, intake.left_out);
+    let (poses, unread, left_out) = (Some(input.poses.to_string()), ingest.unread, ingest.left_out);
     Ok(Some(Summary { interrupted, resumed_after, poses, unread, left_out, remarks, ..summary }))
 }
 
 struct Build<'a> {
     mapper: &'a mut OutOfCoreTileMapper,
-    intake: Intake,
+    ingest: Ingest,
     schedule: FlushSchedule,
     gauge: Box<dyn Gauge>,
     report: ScanReport,
     scans: u64,
     has_rays: bool,
-    /// Most scans that are mapped together.
-    most_together: usize,
+    /// Maximum number of scans to insert at once.
+    max_batch: usize,
     notes_content: bool,
-    /// Whether the poses fit, while that is not known.
+    /// Check of the poses, until its result is known.
     pose_check: Option<PoseCheck>,
     doubt: Option<Doubt>,
     is_strict: bool,
@@ -164,16 +168,16 @@ impl Build<'_> {
     fn insert_all(&mut self) -> anyhow::Result<()> {
         loop {
             let (mapper, schedule) = (&mut *self.mapper, &mut self.schedule);
-            let most = self.most_together.min(schedule.scans_until_due());
-            // An input that is quiet does not keep what came from being made durable.
+            let most = self.max_batch.min(schedule.scans_until_due());
+            // While the input is idle, pending scans are still flushed on schedule.
             let next =
-                self.intake.next(most, &mut || flush_if(schedule.is_due_waiting(), mapper, schedule))?;
+                self.ingest.next(most, &mut || flush_if(schedule.is_due_waiting(), mapper, schedule))?;
             let taken = match next {
                 Next::Scans(taken) => taken,
                 Next::Stopped => return Ok(()),
                 Next::End => {
                     // The last scans may have been skipped.
-                    self.note_content(self.intake.content());
+                    self.note_content(self.ingest.content());
                     self.check_poses(PoseCheck::finish)?;
                     return Ok(());
                 }
@@ -212,7 +216,7 @@ impl Build<'_> {
         Ok(())
     }
 
-    /// Compares a scan with those before. What cannot be compared is no reason to end.
+    /// Compares a scan with the previous ones. A failed comparison does not end the build.
     fn check_poses(
         &mut self,
         look: impl FnOnce(&mut PoseCheck) -> voxtile::Result<Option<Doubt>>,
@@ -236,10 +240,10 @@ impl Build<'_> {
     }
 }
 
-/// How the input is read; without rays no poses are needed.
+/// Returns the settings for reading. Poses are not needed without rays.
 fn read_options(options: &BuildOptions, config: &MapConfig) -> ReadOptions {
     let mut read = options.read.clone();
-    read.scratch = Some(folder_beside(options).to_owned());
+    read.scratch = Some(scratch_folder(options).to_owned());
     if let Some(bytes) = config.memory_bytes() {
         read.memory_bytes = for_reading(bytes);
     }
@@ -251,35 +255,34 @@ fn read_options(options: &BuildOptions, config: &MapConfig) -> ReadOptions {
     read
 }
 
-/// Batches have no rays to map again.
+/// Batches of points have no rays to replay.
 fn check_no_rays(options: &BuildOptions, config: &MapConfig) -> voxtile::Result<()> {
     if !(options.no_rays && config.keeps_scans) {
         return Ok(());
     }
-    let reason = "points without rays are no scans, which a map could keep; leave one of the two out, or build \
-                  another map";
+    let reason =
+        "points without rays cannot be kept as scans: omit one of the two options, or build another map";
     Err(Error::argument("no_rays, keep_scans", reason))
 }
 
-/// What makes sense only beside something else.
+/// Checks options that require other options.
 fn check_combinations(options: &BuildOptions) -> voxtile::Result<()> {
     if options.again && (options.resume || !options.append) {
-        return Err(Error::argument("again", "goes with `append`, and without `resume`"));
+        return Err(Error::argument("again", "requires `append`, and excludes `resume`"));
     }
     if options.read.calib.is_some() && options.read.poses.is_none() {
-        return Err(Error::argument("calib", "belongs to a file of poses; name it with `poses`"));
+        return Err(Error::argument("calib", "requires a pose file: add `poses`"));
     }
     Ok(())
 }
 
-/// Only scans that come by themselves can come too fast.
+/// Checks that the input is a stream, because only streams can be faster than the mapper.
 fn check_when_behind(options: &BuildOptions) -> voxtile::Result<()> {
     let is_file = options.scans.is_file() || options.scans.is_dir();
     if options.when_behind == WhenBehind::Wait || !is_file {
         return Ok(());
     }
-    let reason =
-        "files wait until they are read: leave it out, or give the scans as they come, as - or a pipe";
+    let reason = "has no effect on files: omit it, or read a live stream from - or a pipe";
     Err(Error::argument("when_behind", reason))
 }
 
@@ -294,37 +297,37 @@ fn flush_if(
     if !schedule.is_by_time() {
         mapper.flush()?;
     } else if mapper.is_flushing() {
-        // The disk is slower than the clock: the next flush begins once this one has ended.
+        // The disk is slower than the schedule: the next flush begins after the current one.
         return Ok(());
     } else {
-        // Scans go on meanwhile.
+        // Scans are inserted during the flush.
         mapper.begin_flush()?;
     }
     schedule.flushed();
     Ok(())
 }
 
-/// Where the map is made. A piece of a map is made again after a crash, and made durable when it is handed over.
-fn place_of_map(options: &BuildOptions) -> MapPath {
+/// Returns the path of the map. A shard is not durable until it is imported; after a crash it is built again.
+fn map_path(options: &BuildOptions) -> MapPath {
     match options.piece_of {
         None => MapPath::from(&options.output),
         Some(_) => MapPath::on(Arc::new(UnsyncedDisk::of(Arc::new(FsDisk))), &options.output),
     }
 }
 
-/// Whether there is a map to go on with.
+/// Returns whether there is a map to continue.
 fn exists(options: &BuildOptions) -> anyhow::Result<bool> {
     if options.output.is_file() {
-        let reason = "is a file; a map is a folder, name another `output`";
+        let reason = "is a file, but a map is a folder: choose another `output`";
         return Err(Error::argument(options.output.display().to_string(), reason).into());
     }
     let exists = match MapReader::open(&options.output, 0) {
         Err(Error::NoMap { .. }) => false,
-        // Damage is told by the mapper, which opens the map next.
+        // Damage is reported by the mapper, which opens the map next.
         _ => true,
     };
     if exists && !options.append && !options.resume {
-        let hint = "use `resume` to go on with these scans, `append` to add them to it, or another `output`";
+        let hint = "use `resume` to continue with these scans, `append` to add them, or another `output`";
         return Err(Error::AlreadyExists { path: options.output.clone(), hint }.into());
     }
     if !exists && options.append && !options.resume {
@@ -333,34 +336,34 @@ fn exists(options: &BuildOptions) -> anyhow::Result<bool> {
     Ok(exists)
 }
 
-/// Goes on with an input of which the map has scans, or begins with one that it does not know; returns how many of its
-/// scans the map has, `None` if it was asked to stop.
+/// Resumes an input of which the map has scans, or begins a new one. Returns the number of its scans that the map has,
+/// or `None` if the build was stopped.
 fn begin(
     options: &BuildOptions,
     mapper: &mut OutOfCoreTileMapper,
-    intake: &mut Intake,
+    ingest: &mut Ingest,
     name: &str,
 ) -> anyhow::Result<Option<u64>> {
     let inputs = mapper.inputs();
-    // Of inputs that begin with many scans without points nothing tells one from another but what comes later, and their
-    // names, where the map has nothing else.
+    // Inputs that begin with many empty scans cannot be distinguished by content, only by later scans or by their
+    // names.
     let is_this = |input: &InputRecord| {
         let is_known = |content: &InputContent| content.begins_with.is_some() || input.is_named(name);
         let is_same = |content: &InputContent| {
-            content.begins_with.as_deref() == intake.begins_with()
-                || (is_known(content) && intake.begins_as(content))
+            content.begins_with.as_deref() == ingest.begins_with()
+                || (is_known(content) && ingest.begins_as(content))
         };
         input.content.as_ref().is_some_and(is_same)
     };
     if let Some(at) = inputs.iter().rposition(is_this).filter(|_| !options.again) {
         let content = inputs[at].content.clone().unwrap_or_default();
         if options.resume {
-            if !intake.pass_over(&content)? {
+            if !ingest.pass_over(&content)? {
                 return Ok(None);
             }
             check_begun(options, &inputs[at], mapper)?;
             if at + 1 < inputs.len() {
-                // Other inputs came between.
+                // The map has other inputs after this one.
                 mapper.begin_input(inputs[at].clone())?;
             }
             return Ok(Some(content.scans - content.skipped.len() as u64));
@@ -370,34 +373,34 @@ fn begin(
         }
     }
     if let Some(last) = inputs.last().filter(|last| last.content.is_none() && !options.again) {
-        // Of an earlier version: one name for all of it.
-        let Some(fingerprint) = intake.fingerprint()? else { return Ok(None) };
+        // A map of an older version identifies the whole input by a fingerprint.
+        let Some(fingerprint) = ingest.fingerprint()? else { return Ok(None) };
         if fingerprint.is_ok_and(|fingerprint| fingerprint == last.name) {
             let done = mapper.scan_number().saturating_sub(last.first_scan);
             if !options.resume {
                 return Err(taken_before(options, name, done));
             }
             check_begun(options, last, mapper)?;
-            return Ok(intake.pass(done)?.then_some(done));
+            return Ok(ingest.pass(done)?.then_some(done));
         }
     }
-    // A map that was merged of others has tiles, and knows of no scans.
+    // A merged map has tiles but no scan count.
     let is_empty = mapper.scan_number() == 0 && mapper.tile_bounds().is_none();
     if options.resume && !options.append && !is_empty {
         let same = inputs.iter().rfind(|input| input.is_named(name) && input.content.is_some());
         let (found, wanted) = match same.or(inputs.last()) {
-            None => ("that it does not know".to_owned(), name.to_owned()),
+            None => ("of unknown origin".to_owned(), name.to_owned()),
             Some(known) => match known.content {
-                // Its name is a fingerprint.
+                // The recorded name is a fingerprint.
                 None => {
-                    let Some(fingerprint) = intake.fingerprint()? else { return Ok(None) };
+                    let Some(fingerprint) = ingest.fingerprint()? else { return Ok(None) };
                     (known.name.clone(), fingerprint.map_or(name.to_owned(), |of| format!("{of} ({name})")))
                 }
                 Some(_) if known.is_named(name) => (
                     beginning(&known.name, known.begins_with()),
                     format!(
                         "{}: the input was replaced or its beginning has changed",
-                        beginning(name, intake.begins_with())
+                        beginning(name, ingest.begins_with())
                     ),
                 ),
                 Some(_) => (known.name.clone(), name.to_owned()),
@@ -405,17 +408,16 @@ fn begin(
         };
         let (path, what) = (options.output.clone(), "been built from input");
         let error = anyhow::Error::from(Error::Mismatch { path, what, found, wanted });
-        return Err(error.context(
-            "`resume` takes what came since of an input that the map has; `append` adds another one",
-        ));
+        return Err(error
+            .context("`resume` continues an input that the map already has; `append` adds another input"));
     }
-    let content = options.piece_of.is_none().then(|| intake.content());
+    let content = options.piece_of.is_none().then(|| ingest.content());
     let (rays, is_hits_alone) = (Some(mapper.config().rays), Some(options.no_rays));
     mapper.begin_input(InputRecord { content, rays, is_hits_alone, ..InputRecord::from(name) })?;
     Ok(Some(0))
 }
 
-/// An input by what tells it from others of its name.
+/// Describes an input by its name and its content.
 fn beginning(name: &str, begins_with: Option<&str>) -> String {
     match begins_with {
         Some(fingerprint) => {
@@ -425,7 +427,7 @@ fn beginning(name: &str, begins_with: Option<&str>) -> String {
     }
 }
 
-/// An input goes on as it was begun.
+/// Checks that an input continues with its original settings.
 fn check_begun(
     options: &BuildOptions,
     input: &InputRecord,
@@ -433,21 +435,21 @@ fn check_begun(
 ) -> voxtile::Result<()> {
     match input.is_hits_alone {
         Some(begun) if begun != options.no_rays => {
-            let how = |is_hits_alone| if is_hits_alone { "points alone (`no_rays`)" } else { "rays" };
+            let how = |is_hits_alone| if is_hits_alone { "points without rays (`no_rays`)" } else { "rays" };
             let (found, wanted) = (how(begun).to_owned(), how(options.no_rays).to_owned());
-            let what = "been built of this input with";
+            let what = "been built from this input with";
             Err(Error::Mismatch { path: options.output.clone(), what, found, wanted })
         }
         _ => mapper.check_rays(input),
     }
 }
 
-/// Points of another coordinate reference system are elsewhere.
+/// Checks that the coordinate reference systems of input and map agree.
 fn check_crs(options: &BuildOptions, found: Option<&String>, own: Option<&String>) -> voxtile::Result<()> {
     match (found, own) {
         (Some(found), Some(own)) if found != own => {
             let reason = format!(
-                "its coordinates are in {}, those of the map in {}; convert them first, for instance with pdal",
+                "its coordinates are in {}, but the map is in {}: convert them first, for instance with pdal",
                 beginning_or_difference(found, own),
                 beginning_or_difference(own, found)
             );
@@ -459,24 +461,24 @@ fn check_crs(options: &BuildOptions, found: Option<&String>, own: Option<&String
 
 fn taken_before(options: &BuildOptions, name: &str, scans: u64) -> anyhow::Error {
     let reason = format!(
-        "the map has {scans} scans of an input that begins as this one does ({name}); `resume` takes what came since, \
-         and `append` `again` adds all of them once more"
+        "the map already has {scans} scans of an input with the same beginning ({name}); use `resume` to add the later \
+         scans, or `append` `again` to add all scans again"
     );
     Error::argument(options.scans.display().to_string(), reason).into()
 }
 
-/// For temporary files: the map's folder or, where that is still to be made, the nearest folder around it. The system
-/// may keep its own in memory.
-fn folder_beside(options: &BuildOptions) -> &Path {
+/// Returns the folder for temporary files: the map's folder, or its nearest existing ancestor. The system's temporary
+/// folder may be in memory.
+fn scratch_folder(options: &BuildOptions) -> &Path {
     options.output.ancestors().find(|folder| folder.is_dir()).unwrap_or(Path::new("."))
 }
 
-/// The memory for reading, of a limit of so many bytes.
+/// Returns the memory for reading, given the memory limit.
 fn for_reading(bytes: usize) -> usize {
     (bytes / PARTS_FOR_READING).max(MIN_FOR_READING)
 }
 
-/// The configuration of the map, which leaves the memory for reading alone.
+/// Returns the configuration of the map with its memory reduced by the share for reading.
 fn config_of_map(options: &BuildOptions, config: &MapConfig) -> MapConfig {
     let mut config = config.clone();
     if let Some(bytes) = config.memory_bytes()
@@ -488,18 +490,18 @@ fn config_of_map(options: &BuildOptions, config: &MapConfig) -> MapConfig {
     config
 }
 
-/// Points of a scan that the limit of memory has no room for go to a file.
-fn room(options: &BuildOptions, config: &MapConfig) -> PointRoom {
-    let folder = folder_beside(options);
+/// Returns the memory limit for the points of a scan. Further points go to a file.
+fn point_budget(options: &BuildOptions, config: &MapConfig) -> PointBudget {
+    let folder = scratch_folder(options);
     match config.memory_bytes() {
-        Some(bytes) => PointRoom::new(bytes / PARTS_OF_MEMORY / scans_in_memory(options, config), folder),
-        None => PointRoom::default(),
+        Some(bytes) => PointBudget::new(bytes / PARTS_OF_MEMORY / scans_in_memory(options, config), folder),
+        None => PointBudget::default(),
     }
 }
 
-/// How many scans there may be at a time: those that are mapped, those that wait, and the one that is read.
+/// Returns the number of scans that can exist at once: being inserted, queued, and being read.
 fn scans_in_memory(options: &BuildOptions, config: &MapConfig) -> usize {
-    let together = most_together(options, config);
+    let together = max_batch(options, config);
     match options.when_behind {
         WhenBehind::Wait if together == 1 => 1,
         WhenBehind::Wait => 2 * together + 1,
@@ -507,23 +509,27 @@ fn scans_in_memory(options: &BuildOptions, config: &MapConfig) -> usize {
     }
 }
 
-/// How many scans are taken together if they are at hand: one for each core, as far as there is room for their points.
-fn most_together(options: &BuildOptions, config: &MapConfig) -> usize {
-    let room =
-        config.memory_bytes().map_or(usize::MAX, |bytes| bytes / PARTS_OF_MEMORY / ROOM_TO_GO_TOGETHER);
-    if options.no_rays { 1 } else { rayon::current_num_threads().min(room.saturating_sub(1) / 2).max(1) }
+/// Returns the maximum number of scans to insert at once: one per core, limited by the memory for their points.
+fn max_batch(options: &BuildOptions, config: &MapConfig) -> usize {
+    let point_budget =
+        config.memory_bytes().map_or(usize::MAX, |bytes| bytes / PARTS_OF_MEMORY / MIN_BATCH_BYTES);
+    if options.no_rays {
+        1
+    } else {
+        rayon::current_num_threads().min(point_budget.saturating_sub(1) / 2).max(1)
+    }
 }
 
-/// Free space alone is rarely what was wanted.
-fn all_is_cut(report: &ScanReport, config: &MapConfig) -> Option<String> {
+/// Returns a warning if all rays were cut, which leaves only free space.
+fn all_rays_cut(report: &ScanReport, config: &MapConfig) -> Option<String> {
     let ScanReport { points, skipped, cut_at_max_range, .. } = *report;
     let skipped: u64 = skipped.by_cause().into_iter().map(|(_, count)| count).sum();
     let range_m = config.rays.max_range_m?;
     (cut_at_max_range > 0 && cut_at_max_range + skipped == points).then(|| {
         format!(
-            "all {cut_at_max_range} rays were cut at {range_m} m, so that nothing is occupied: raise `max_range`; are \
-             the points in metres? Points that are in the world frame already, far from 0 0 0, need `world_frame` \
-             with poses, `sensor_origin` or `no_rays`"
+            "all {cut_at_max_range} rays were cut at {range_m} m, so nothing is occupied: raise `max_range`, or check \
+             that the points are in metres. Points already in the world frame, far from 0 0 0, need `world_frame` with \
+             poses, `sensor_origin` or `no_rays`"
         )
     })
 }

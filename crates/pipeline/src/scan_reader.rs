@@ -10,56 +10,57 @@ use std::thread;
 use std::time::Duration;
 use voxtile::Error;
 use voxtile::scan::Stop;
-use voxtile_formats::{PointRoom, PoseSource, ReadOptions, ScanMark, ScanSource, StoredScan};
+use voxtile_formats::{PointBudget, PoseSource, ReadOptions, ScanFingerprint, ScanSource, StoredScan};
 
-/// How long an input may keep us waiting before we look up.
+/// Maximum time to wait for the input before checking for a stop request.
 const PATIENCE: Duration = Duration::from_millis(100);
 
-/// A panic in a reader of a format must end the build, not leave it waiting.
-const READER_IS_GONE: &str = "the thread that reads the scans ended before the input did";
+/// Error for a reading thread that ended unexpectedly, for instance by a panic.
+const READER_IS_GONE: &str = "the thread that reads the scans ended before the end of the input";
 
-/// Reads an input on a thread of its own, scan by scan: whoever asks can stop waiting, whatever the input does. Scans are
-/// read when they are asked for, or a few of them ahead. Where the system gives no thread, it reads here.
+/// Reads an input scan by scan in its own thread, so that waiting for it can be stopped. Scans are read on request or a
+/// few in advance. If no thread can be created, scans are read in the calling thread.
 pub struct ScanReader {
-    place: Place,
+    worker: Worker,
     stop: Stop,
-    /// Where scans come from once they are read before anybody asks.
+    /// Queue of scans that are read in advance.
     ahead: Option<Arc<ScanQueue>>,
-    /// Here and not in the thread, which nobody waits for: what was fetched is to go before the process does.
+    /// Owned here and not by the thread, which is never joined, so that fetched files are removed before the process
+    /// ends.
     _scans: LocalScans,
 }
 
-/// What is known of an input once it is open.
+/// Properties of an open input.
 pub struct Opened {
     pub name: String,
     pub scans: Option<usize>,
     pub poses: PoseSource,
 }
 
-/// How scans are told from each other.
-pub type Marking = fn(&StoredScan) -> voxtile::Result<ScanMark>;
+/// Function that computes the fingerprint of a scan.
+pub type FingerprintFn = fn(&StoredScan) -> voxtile::Result<ScanFingerprint>;
 
-/// A scan, and what tells it from others.
+/// A scan with its fingerprint.
 pub struct ReadScan {
     pub scan: StoredScan,
-    pub mark: ScanMark,
+    pub fingerprint: ScanFingerprint,
 }
 
-/// What came of asking for a scan.
+/// Result of requesting a scan.
 pub enum Read {
     Scan(ReadScan),
-    /// One that cannot be read; the next call gives the one behind it.
+    /// A scan that cannot be read. The next call returns the following scan.
     Unread(Error),
-    /// One that came while too many waited.
-    LeftOut(ScanMark),
+    /// A scan that was dropped because too many were queued.
+    LeftOut(ScanFingerprint),
     End,
-    /// It was asked to stop before there was a scan.
+    /// Reading was stopped.
     Stopped,
 }
 
-enum Place {
+enum Worker {
     Thread { requests: Sender<Request>, answers: Receiver<Answer> },
-    Here(Box<dyn ScanSource + Send>, PointRoom, Marking),
+    Here(Box<dyn ScanSource + Send>, PointBudget, FingerprintFn),
 }
 
 enum Request {
@@ -67,7 +68,7 @@ enum Request {
     Fingerprint,
     Remarks,
     Crs,
-    /// Read on into a queue until the input has come to its end.
+    /// Read into a queue until the end of the input.
     Ahead(Arc<ScanQueue>),
 }
 
@@ -80,12 +81,12 @@ enum Answer {
 }
 
 impl ScanReader {
-    /// Opens an input; `None` if it was asked to stop before that had come to an end.
+    /// Opens an input. Returns `None` if it was stopped before.
     pub fn open(
         scans: PathBuf,
         options: ReadOptions,
-        room: PointRoom,
-        mark: Marking,
+        budget: PointBudget,
+        fingerprint: FingerprintFn,
         watch: Watch,
     ) -> anyhow::Result<Option<(Self, Opened)>> {
         let (requests, requests_in) = channel();
@@ -94,7 +95,7 @@ impl ScanReader {
             Err(Error::Stopped) => return Ok(None),
             local => local?,
         };
-        let (path, own_options, here) = (local.path().to_owned(), options.clone(), room.clone());
+        let (path, own_options, here) = (local.path().to_owned(), options.clone(), budget.clone());
         let (named, own_watch, stop) = (scans.clone(), watch.clone(), watch.stop().clone());
         let read = move || {
             let mut source = match scan_input::open(&path, &own_options, &own_watch) {
@@ -105,9 +106,10 @@ impl ScanReader {
             let mut is_wanted = answers_out.send(Answer::Opened(Ok(opened))).is_ok();
             while is_wanted && let Ok(request) = requests_in.recv() {
                 match request {
-                    Request::Ahead(queue) => read_ahead(&mut *source, &room, mark, &queue),
+                    Request::Ahead(queue) => read_ahead(&mut *source, &budget, fingerprint, &queue),
                     request => {
-                        is_wanted = answers_out.send(answer(&mut *source, &request, &room, mark)).is_ok();
+                        is_wanted =
+                            answers_out.send(answer(&mut *source, &request, &budget, fingerprint)).is_ok();
                     }
                 }
             }
@@ -115,7 +117,7 @@ impl ScanReader {
         match thread::Builder::new().name("voxtile-read".to_owned()).spawn(read) {
             Ok(_) => {
                 let mut reader =
-                    Self { place: Place::Thread { requests, answers }, stop, ahead: None, _scans: local };
+                    Self { worker: Worker::Thread { requests, answers }, stop, ahead: None, _scans: local };
                 match reader.wait(&mut || Ok(()))? {
                     Some(Answer::Opened(Err(Error::Stopped))) => Ok(None),
                     Some(Answer::Opened(opened)) => Ok(Some((reader, opened?))),
@@ -123,54 +125,61 @@ impl ScanReader {
                 }
             }
             Err(error) => {
-                log::warn!("no thread for reading, so that requests to stop wait for the input: {error}");
+                log::warn!(
+                    "cannot start a thread for reading, so stop requests take effect only when the input \
+                            responds: {error}"
+                );
                 let source = scan_input::open(local.path(), &options, &watch)?;
                 let opened = Opened::of(&scans, &*source);
                 Ok(Some((
-                    Self { place: Place::Here(source, here, mark), stop, ahead: None, _scans: local },
+                    Self {
+                        worker: Worker::Here(source, here, fingerprint),
+                        stop,
+                        ahead: None,
+                        _scans: local,
+                    },
                     opened,
                 )))
             }
         }
     }
 
-    /// From here on scans are read as they come, before anybody asks for them. Where there is no thread to read, they are
-    /// not.
+    /// Starts to read scans in advance into a queue. Has no effect without a thread.
     pub fn read_ahead(&mut self, queue: ScanQueue) {
-        if let Place::Thread { requests, .. } = &self.place {
+        if let Worker::Thread { requests, .. } = &self.worker {
             let queue = Arc::new(queue);
-            // A thread that is gone is noticed by waiting for it.
+            // If the thread has ended, the next wait reports it.
             drop(requests.send(Request::Ahead(queue.clone())));
             self.ahead = Some(queue);
         }
     }
 
-    /// The next scan. While it does not come, `idle` is called ten times a second.
+    /// Returns the next scan. While waiting, `idle` is called ten times a second.
     pub fn next(&mut self, idle: &mut dyn FnMut() -> voxtile::Result<()>) -> anyhow::Result<Read> {
         if let Some(queue) = &self.ahead {
             return take(queue, &self.stop, idle);
         }
-        match self.ask(Request::Scan, idle)? {
+        match self.request_answer(Request::Scan, idle)? {
             Some(Answer::Read(read)) => Ok(read?),
             _ => Ok(Read::Stopped),
         }
     }
 
-    /// The next scan if it has been read already.
-    pub fn next_at_hand(&mut self) -> Option<voxtile::Result<Read>> {
+    /// Returns the next scan if it is already read.
+    pub fn next_ready(&mut self) -> Option<voxtile::Result<Read>> {
         self.ahead.as_ref().and_then(|queue| queue.take(Duration::ZERO))
     }
 
-    /// How maps of earlier versions know this input; `None` if it was asked to stop before that was known.
+    /// Returns the fingerprint used in maps of older versions, or `None` if it was stopped before it was known.
     pub fn fingerprint(&mut self) -> anyhow::Result<Option<voxtile::Result<String>>> {
-        match self.ask(Request::Fingerprint, &mut || Ok(()))? {
+        match self.request_answer(Request::Fingerprint, &mut || Ok(()))? {
             Some(Answer::Fingerprint(fingerprint)) => Ok(Some(fingerprint)),
             _ => Ok(None),
         }
     }
 
-    /// What a person should know of the input, of which no more is wanted. An input that is being waited for tells
-    /// nothing.
+    /// Stops reading and returns remarks for the user about the input. While the thread is waiting for the input, there
+    /// are none.
     pub fn remarks(&mut self) -> anyhow::Result<Vec<String>> {
         let is_ahead = self.ahead.as_ref().map(|queue| queue.close()).is_some();
         let mut patience = 10;
@@ -178,38 +187,38 @@ impl ScanReader {
             patience -= 1;
             if is_ahead && patience == 0 { Err(Error::Stopped) } else { Ok(()) }
         };
-        match self.ask(Request::Remarks, &mut impatient)? {
+        match self.request_answer(Request::Remarks, &mut impatient)? {
             Some(Answer::Remarks(remarks)) => Ok(remarks),
             _ => Ok(Vec::new()),
         }
     }
 
-    /// The coordinate reference system that the input names so far.
+    /// Returns the coordinate reference system that the input has named so far.
     pub fn crs(&mut self) -> anyhow::Result<Option<String>> {
-        match self.ask(Request::Crs, &mut || Ok(()))? {
+        match self.request_answer(Request::Crs, &mut || Ok(()))? {
             Some(Answer::Crs(crs)) => Ok(crs),
             _ => Ok(None),
         }
     }
 
-    fn ask(
+    fn request_answer(
         &mut self,
         request: Request,
         idle: &mut dyn FnMut() -> voxtile::Result<()>,
     ) -> anyhow::Result<Option<Answer>> {
-        match &mut self.place {
-            Place::Here(..) if self.stop.is_set() => return Ok(None),
-            Place::Here(source, room, mark) => {
-                return Ok(Some(answer(&mut **source, &request, room, *mark)));
+        match &mut self.worker {
+            Worker::Here(..) if self.stop.is_set() => return Ok(None),
+            Worker::Here(source, budget, fingerprint) => {
+                return Ok(Some(answer(&mut **source, &request, budget, *fingerprint)));
             }
-            // A thread that is gone is noticed by waiting for it.
-            Place::Thread { requests, .. } => drop(requests.send(request)),
+            // If the thread has ended, the next wait reports it.
+            Worker::Thread { requests, .. } => drop(requests.send(request)),
         }
         self.wait(idle)
     }
 
     fn wait(&mut self, idle: &mut dyn FnMut() -> voxtile::Result<()>) -> anyhow::Result<Option<Answer>> {
-        let Place::Thread { answers, .. } = &self.place else { return Ok(None) };
+        let Worker::Thread { answers, .. } = &self.worker else { return Ok(None) };
         loop {
             if self.stop.is_set() {
                 return Ok(None);
@@ -242,7 +251,7 @@ fn take(
     idle: &mut dyn FnMut() -> voxtile::Result<()>,
 ) -> anyhow::Result<Read> {
     while !stop.is_set() {
-        // The reading thread holds the queue until it has pushed the last scan, or has panicked.
+        // The reading thread owns a reference to the queue until it has pushed the last scan or panicked.
         let is_ours_alone = Arc::strong_count(queue) == 1;
         match queue.take(PATIENCE) {
             Some(read) => return Ok(read?),
@@ -253,10 +262,15 @@ fn take(
     Ok(Read::Stopped)
 }
 
-/// Reads an input to its end, or until nobody wants more of it.
-fn read_ahead(source: &mut dyn ScanSource, room: &PointRoom, mark: Marking, queue: &ScanQueue) {
+/// Reads an input until its end or until the queue is closed.
+fn read_ahead(
+    source: &mut dyn ScanSource,
+    budget: &PointBudget,
+    fingerprint: FingerprintFn,
+    queue: &ScanQueue,
+) {
     loop {
-        let read = read(source, room, mark);
+        let read = read(source, budget, fingerprint);
         let is_last = is_last(&read);
         if !queue.push(read) || is_last {
             return;
@@ -264,20 +278,29 @@ fn read_ahead(source: &mut dyn ScanSource, room: &PointRoom, mark: Marking, queu
     }
 }
 
-fn answer(source: &mut dyn ScanSource, request: &Request, room: &PointRoom, mark: Marking) -> Answer {
+fn answer(
+    source: &mut dyn ScanSource,
+    request: &Request,
+    budget: &PointBudget,
+    fingerprint: FingerprintFn,
+) -> Answer {
     match request {
-        Request::Scan => Answer::Read(read(source, room, mark)),
+        Request::Scan => Answer::Read(read(source, budget, fingerprint)),
         Request::Fingerprint => Answer::Fingerprint(source.fingerprint()),
         Request::Remarks => Answer::Remarks(source.remarks()),
         Request::Crs | Request::Ahead(_) => Answer::Crs(source.crs()),
     }
 }
 
-fn read(source: &mut dyn ScanSource, room: &PointRoom, mark: Marking) -> voxtile::Result<Read> {
-    match source.next_stored(room) {
+fn read(
+    source: &mut dyn ScanSource,
+    budget: &PointBudget,
+    fingerprint: FingerprintFn,
+) -> voxtile::Result<Read> {
+    match source.next_stored(budget) {
         Ok(Some(scan)) => {
-            let mark = mark(&scan)?;
-            Ok(Read::Scan(ReadScan { scan, mark }))
+            let fingerprint = fingerprint(&scan)?;
+            Ok(Read::Scan(ReadScan { scan, fingerprint }))
         }
         Ok(None) => Ok(Read::End),
         Err(Error::Stopped) => Ok(Read::Stopped),
@@ -291,7 +314,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_thread_that_panicked_is_an_error_and_no_endless_wait() {
+    fn panicked_threads_are_errors() {
         let queue = Arc::new(ScanQueue::new(crate::scan_queue::WhenBehind::Wait, 1));
         let thread_queue = queue.clone();
         let thread = thread::spawn(move || {
@@ -301,7 +324,7 @@ mod tests {
         assert!(thread.join().is_err());
         let mut idle = || Ok(());
         assert!(matches!(take(&queue, &Stop::default(), &mut idle), Ok(Read::End)));
-        let error = take(&queue, &Stop::default(), &mut idle).err().expect("nobody pushes any more");
+        let error = take(&queue, &Stop::default(), &mut idle).err().expect("the queue has no sender");
         assert_eq!(error.to_string(), READER_IS_GONE);
     }
 }

@@ -1,27 +1,28 @@
 use super::RigidPose;
 use super::quaternion_order::up;
 
-/// Which way a sensor goes, seen from itself: what its poses look like where they are those of another frame.
+/// Statistics of the direction of travel in the sensor frame. They show poses that belong to another frame, such as a
+/// camera's.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Direction {
     first: Option<RigidPose>,
     last: Option<RigidPose>,
-    /// Squares of the steps along x, y and z of the sensor.
+    /// Sums of the squared steps along the sensor's x, y and z, in m^2.
     squares: [f64; 3],
-    /// The steps along them.
+    /// Sums of the steps along the sensor's axes, in metres.
     steps_m: [f64; 3],
     path_m: f64,
 }
 
-/// Shorter steps are as much noise as motion.
+/// Shorter steps are dominated by noise.
 const MIN_STEP_M: f64 = 0.2;
-/// A path that tells a direction.
+/// Shortest path that gives a reliable direction.
 const MIN_PATH_M: f64 = 1.5;
 const Y: usize = 1;
 const Z: usize = 2;
 
 impl Direction {
-    /// Poses that are looked at.
+    /// Number of poses to evaluate.
     pub(super) const MAX_POSES: usize = 10_000;
 
     pub(super) fn insert(&mut self, pose: &RigidPose) {
@@ -43,43 +44,45 @@ impl Direction {
         self.last = Some(*pose);
     }
 
-    /// The share of the way that goes along an axis, where the way is long enough.
+    /// Returns the fraction of the motion that is along an axis, if the path is long enough.
     fn share(&self, axis: usize) -> Option<f64> {
         let all: f64 = self.squares.iter().sum();
         (self.path_m >= MIN_PATH_M).then(|| self.squares.get(axis).map_or(0.0, |square| square / all))
     }
 
-    /// Whether this may be the way of a camera, which looks along its z: not one that goes along x or y.
+    /// Returns whether the trajectory may be a camera's, which looks along its z: false if it mostly moves along x or
+    /// y.
     pub(super) fn may_be_of_camera(&self) -> bool {
         self.share(Z).is_none_or(|share| share > 0.5)
     }
 
-    /// Whether it goes along z.
+    /// Returns whether the sensor moves along its z.
     pub(super) fn is_along_z(&self) -> bool {
         self.share(Z).is_some_and(|share| share > 0.9)
     }
 
-    /// What a person should know of the way of a lidar. `names_calib`: another remark names the `calib.txt` of a camera.
+    /// Returns warnings about a lidar trajectory. `names_calib`: another warning already names the `calib.txt` of a
+    /// camera.
     pub(super) fn remarks(&self, has_calib: bool, names_calib: bool) -> Vec<String> {
         let mut remarks = Vec::new();
         let Some(first) = &self.first else { return remarks };
         let starts_level = up(first.quaternion) > 0.94;
         if up(first.quaternion) < -0.7 {
             remarks.push(
-                "the first pose is upside down: does the sensor hang so? If w comes first in the quaternions, a first \
-                 line of names says so (# t tx ty tz qw qx qy qz)"
+                "the first pose is upside down: is the sensor mounted upside down? If the quaternions start with w, \
+                 add a header line (# t tx ty tz qw qx qy qz)"
                     .to_owned(),
             );
         } else if !has_calib && !names_calib && starts_level && self.is_along_z() {
             remarks.push(
-                "the poses go along their own z, as those of a camera do, not of a lidar on the ground: `calib` FILE \
-                 or `extrinsic` turns them into those of the sensor"
+                "the sensor moves along its z axis, like a camera and unlike a lidar on the ground: convert the poses \
+                 with `calib` FILE or `extrinsic`"
                     .to_owned(),
             );
         } else if has_calib && self.share(Y).is_some_and(|share| share > 0.9) && self.steps_m[Y] < 0.0 {
             remarks.push(
-                "with `calib` the poses go along their own -y: are they those of the lidar already? Leave `calib` out \
-                 then"
+                "with `calib` the sensor moves along its -y axis: if the poses are already those of the lidar, omit \
+                 `calib`"
                     .to_owned(),
             );
         }
@@ -92,7 +95,7 @@ mod tests {
     use super::*;
     use nalgebra::{UnitQuaternion, Vector3};
 
-    fn way(step_m: [f64; 3], roll: f64) -> Direction {
+    fn moving(step_m: [f64; 3], roll: f64) -> Direction {
         let mut direction = Direction::default();
         for k in 0..30 {
             let rotation = UnitQuaternion::from_euler_angles(roll, 0.0, 0.0);
@@ -104,25 +107,25 @@ mod tests {
     }
 
     #[test]
-    fn a_camera_goes_along_z() {
-        let camera = way([0.01, 0.0, 0.9], 0.0);
+    fn cameras_move_along_z() {
+        let camera = moving([0.01, 0.0, 0.9], 0.0);
         assert!(camera.is_along_z() && camera.may_be_of_camera());
-        assert!(camera.remarks(false, false).iter().any(|remark| remark.contains("along their own z")));
+        assert!(camera.remarks(false, false).iter().any(|remark| remark.contains("along its z axis")));
         assert!(camera.remarks(true, false).is_empty() && camera.remarks(false, true).is_empty());
-        let lidar = way([0.9, 0.1, 0.05], 0.0);
+        let lidar = moving([0.9, 0.1, 0.05], 0.0);
         assert!(!lidar.is_along_z() && !lidar.may_be_of_camera());
         assert!(lidar.remarks(false, false).is_empty() && lidar.remarks(true, false).is_empty());
-        let twice = way([0.0, -0.9, 0.0], 0.0);
+        let twice = moving([0.0, -0.9, 0.0], 0.0);
         assert!(twice.remarks(false, false).is_empty() && twice.remarks(true, false).len() == 1);
-        assert!(way([0.0, 0.9, 0.0], 0.0).remarks(true, false).is_empty());
-        let still = way([0.0, 0.0, 0.001], 0.0);
+        assert!(moving([0.0, 0.9, 0.0], 0.0).remarks(true, false).is_empty());
+        let still = moving([0.0, 0.0, 0.001], 0.0);
         assert!(!still.is_along_z() && still.may_be_of_camera() && still.remarks(false, false).is_empty());
     }
 
     #[test]
-    fn a_first_pose_upside_down_is_worth_a_remark() {
-        let remarks = way([0.9, 0.0, 0.0], std::f64::consts::PI).remarks(false, true);
+    fn first_pose_upside_down_is_remarked() {
+        let remarks = moving([0.9, 0.0, 0.0], std::f64::consts::PI).remarks(false, true);
         assert!(remarks.len() == 1 && remarks[0].contains("upside down"), "{remarks:?}");
-        assert!(way([0.9, 0.0, 0.0], 1.0).remarks(false, false).is_empty());
+        assert!(moving([0.9, 0.0, 0.0], 1.0).remarks(false, false).is_empty());
     }
 }

@@ -2,51 +2,52 @@ use super::time_unit::SECONDS;
 use crate::read::text_line::Separator;
 use crate::read::units::{LengthUnit, TimeUnit, name_and_unit};
 
-/// Which columns of a table are a pose.
+/// Columns of a table that form a pose.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Roles {
     pub(super) time: Option<TimeColumns>,
     pub(super) position: [usize; 3],
-    /// The units of x, y and z.
+    /// Units of x, y and z.
     pub(super) units: [LengthUnit; 3],
     pub(super) quaternion: [usize; 4],
 }
 
-/// Where the time stamp of a pose is.
+/// Columns that hold the time stamp.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum TimeColumns {
-    /// In one column; with the decimal digits between its unit and a nanosecond, if its name tells the unit.
+    /// One column. The second value is the number of decimal digits between its unit and a nanosecond, if the column
+    /// name states the unit.
     One(usize, Option<i32>),
-    /// Whole seconds in one column, the nanoseconds after them in another.
+    /// Whole seconds in one column and the remaining nanoseconds in another.
     Two { seconds: usize, nanoseconds: usize },
 }
 
-/// What a line of words is.
+/// Meaning of a line of words.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Names {
-    /// Names of the columns of poses.
+    /// Column names of poses.
     Poses(Roles),
-    /// Names of columns whose numbers cannot be used; so many columns, and why.
+    /// Column names of an unsupported table, with their count and the reason.
     Wrong { columns: usize, reason: String },
-    /// Anything else.
+    /// Any other text.
     Prose,
 }
 
-/// Names of times, the best first.
+/// Names of time columns, most specific first.
 const TIMES: [&str; 6] = ["timestamp", "stamp", "header.stamp", "field.header.stamp", "time", "t"];
 const SECOND_NAMES: [&str; 2] = ["sec", "secs"];
 const NANOSECOND_NAMES: [&str; 3] = ["nsec", "nsecs", "nanosec"];
-/// Names of angles that no convention is known of.
+/// Names of angles. They have no common convention, so they are refused.
 const ANGLES: [&str; 12] =
     ["roll", "pitch", "yaw", "heading", "rx", "ry", "rz", "omega", "phi", "kappa", "euler", "theta"];
-/// What is in brackets behind a name and is no unit of length, but no prose either.
+/// Bracketed texts after a column name that are units but not units of length.
 const OTHER_UNITS: [&str; 14] = [
     "px", "pixel", "pixels", "deg", "degree", "degrees", "rad", "radian", "radians", "s", "ms", "ns", "m/s",
     "voxel",
 ];
 
 impl Names {
-    /// What a line is.
+    /// Classifies a line.
     pub(super) fn of(line: &str) -> Self {
         let words = words_of(line);
         let names: Vec<(String, Option<String>)> = words.iter().map(|word| plain(word)).collect();
@@ -60,8 +61,8 @@ impl Names {
             let is_angle = |name: &str| name.split(['_', '.', ' ']).any(|part| ANGLES.contains(&part));
             return match names.iter().find(|(name, _)| is_angle(name)) {
                 Some((name, _)) => wrong(format!(
-                    "the column `{name:.40}` is an angle: roll, pitch and yaw have many conventions and are not read; \
-                     save quaternions (qx qy qz qw) or matrices"
+                    "the column `{name:.40}` is an angle: roll, pitch and yaw are not supported, because they have \
+                     many conventions; save quaternions (qx qy qz qw) or matrices"
                 )),
                 None => Self::Prose,
             };
@@ -72,7 +73,7 @@ impl Names {
                 Some((Some(unit), _)) => *place = unit,
                 Some((None, text)) if is_a_unit(text, words.get(at).map_or("", |word| word)) => {
                     let known = LengthUnit::KNOWN;
-                    return wrong(format!("`{text:.20}` is no unit of length that is known ({known})"));
+                    return wrong(format!("`{text:.20}` is an unknown unit of length; known units: {known}"));
                 }
                 _ => {}
             }
@@ -86,25 +87,25 @@ impl Names {
 }
 
 impl Roles {
-    /// Whether these are `t x y z qx qy qz qw`, in seconds and metres as far as the names tell.
+    /// Returns whether the columns are `t x y z qx qy qz qw`, in seconds and metres as far as the names state units.
     pub(super) fn are_those_of_tum(&self) -> bool {
         matches!(self.time, Some(TimeColumns::One(0, None | Some(SECONDS))))
             && (self.position, self.quaternion) == ([1, 2, 3], [4, 5, 6, 7])
             && !self.has_units()
     }
 
-    /// Whether w comes before the rest of the quaternion.
+    /// Returns whether w precedes x, y and z of the quaternion.
     pub(super) fn is_w_first(&self) -> bool {
         let [x, y, z, w] = self.quaternion;
         w < x.min(y).min(z)
     }
 
-    /// Whether positions are in another unit than metres.
+    /// Returns whether positions have a unit other than metres.
     pub(super) fn has_units(&self) -> bool {
         self.units.iter().any(|unit| *unit != LengthUnit::METRE)
     }
 
-    /// The last column that is needed.
+    /// Returns the index of the last column in use.
     pub(super) fn last(&self) -> usize {
         let time = match self.time {
             Some(TimeColumns::One(at, _)) => at,
@@ -115,7 +116,7 @@ impl Roles {
     }
 }
 
-/// The words of a line of names. Between blanks, a unit in brackets belongs to the name before it.
+/// Splits a line of column names. In a blank-separated line, a bracketed unit belongs to the name before it.
 fn words_of(line: &str) -> Vec<String> {
     let separator = Separator::of(line);
     let mut words: Vec<String> = Vec::new();
@@ -131,19 +132,19 @@ fn words_of(line: &str) -> Vec<String> {
     words
 }
 
-/// A name in lower case without its unit, and the unit.
+/// Splits a column name into its name, in lower case, and its unit.
 fn plain(word: &str) -> (String, Option<String>) {
     name_and_unit(word.trim().trim_start_matches(['#', '%']))
 }
 
-/// Whether what is behind a name is meant as a unit: frames and remarks stand there, too.
+/// Returns whether the bracketed text after a name is meant as a unit. It may also be a frame or a remark.
 fn is_a_unit(text: &str, word: &str) -> bool {
     OTHER_UNITS.contains(&text) || (word.contains('[') && !matches!(text, "-" | "1") && !text.contains(' '))
 }
 
 fn time_columns(names: &[(String, Option<String>)]) -> Result<Option<TimeColumns>, String> {
     let find = |is_it: &dyn Fn(&str) -> bool| names.iter().position(|(name, _)| is_it(name));
-    // `sec`, `header.stamp.sec`; or `stamp_sec`, whose last part is a unit.
+    // `sec`, `header.stamp.sec`, or `stamp_sec`, whose last part is a unit.
     let part = |known: &[&str]| {
         find(&|name| {
             let mut parts = name.rsplit('.');
@@ -167,13 +168,13 @@ fn time_columns(names: &[(String, Option<String>)]) -> Result<Option<TimeColumns
     let Some(at) = named.or_else(|| part(&SECOND_NAMES)) else { return Ok(None) };
     match names.get(at).and_then(|(_, unit)| unit.as_deref()) {
         Some(unit @ ("min" | "mins" | "minutes" | "h" | "hours" | "d" | "days" | "m")) => {
-            Err(format!("`{unit}` is no unit of time that is known (ns, us, ms, s)"))
+            Err(format!("`{unit}` is an unknown unit of time; known units: ns, us, ms, s"))
         }
         unit => Ok(Some(TimeColumns::One(at, unit.and_then(TimeUnit::named).map(|unit| unit.digits)))),
     }
 }
 
-/// `x`, `tx`, `px`, `pos_x`, `p_RS_R_x`, `pose.position.x`; no velocity.
+/// Matches `x`, `tx`, `px`, `pos_x`, `p_RS_R_x` and `pose.position.x`, but not velocities.
 fn is_position(name: &str, axis: char) -> bool {
     let Some(before) = name.strip_suffix(axis) else { return false };
     let starts = |start: &str| before.starts_with(start) && before.ends_with(['_', '.']);
@@ -186,7 +187,7 @@ fn is_position(name: &str, axis: char) -> bool {
         || before.contains("trans")
 }
 
-/// `qx`, `q_x`, `q_RS_x`, `pose.orientation.x`, `quat_x`.
+/// Matches `qx`, `q_x`, `q_RS_x`, `pose.orientation.x` and `quat_x`.
 fn is_quaternion(name: &str, axis: char) -> bool {
     let Some(before) = name.strip_suffix(axis) else { return false };
     before == "q"
@@ -212,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn headers_of_many_programs() {
+    fn headers_of_many_programs_are_read() {
         let tum = Roles { time: one(0, None), position: [1, 2, 3], units: METRES, quaternion: [4, 5, 6, 7] };
         assert_eq!(roles(" timestamp tx ty tz qx qy qz qw   (sensor -> world)"), Some(tum.clone()));
         assert_eq!(roles("tx ty tz qx qy qz qw (sensor to world)").map(|roles| roles.units), Some(METRES));
@@ -266,9 +267,9 @@ mod tests {
         }
         assert_eq!(roles("timestamp[us] x y z qx qy qz qw").and_then(|roles| roles.time), one(0, Some(3)));
         for (line, wanted) in [
-            ("t x[px] y[px] z[px] qx qy qz qw", "`px` is no unit of length"),
-            ("t x y z [furlong] qx qy qz qw", "`furlong` is no unit of length"),
-            ("t [min] x y z qx qy qz qw", "`min` is no unit of time"),
+            ("t x[px] y[px] z[px] qx qy qz qw", "`px` is an unknown unit of length"),
+            ("t x y z [furlong] qx qy qz qw", "`furlong` is an unknown unit of length"),
+            ("t [min] x y z qx qy qz qw", "`min` is an unknown unit of time"),
             ("t x y z roll pitch yaw", "`roll` is an angle"),
             ("time,x,y,z,rx [deg],ry [deg],rz [deg]", "`rx` is an angle"),
         ] {

@@ -14,22 +14,22 @@ use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use voxtile::{Error, FormatError, Result};
 
-/// The scans of an E57 file.
+/// Source of the scans of an E57 file.
 struct E57 {
     path: PathBuf,
     reader: E57Reader<BufReader<File>>,
     scans: Vec<PointCloud>,
     next: usize,
     is_read: bool,
-    /// Whether the caller knows where the sensor of scans without a pose was.
+    /// Whether the caller provides the sensor position of scans without a pose.
     has_origin: bool,
     crs: Option<String>,
     remarks: Vec<String>,
     budget: Budget,
 }
 
-/// Opens an E57 file: each scan is a cloud in the frame of its scanner, with its pose. A scan without a pose is in the
-/// frame of the file, and its sensor at the origin of that, if no other one is given.
+/// Opens an E57 file. Each scan is a cloud in the frame of its scanner, with its pose. A scan without a pose is in the
+/// file's frame, with the sensor at its origin unless another position is given.
 pub(crate) fn open(path: &Path, options: &ReadOptions) -> Result<Box<dyn CloudSource>> {
     let (has_origin, budget) = (options.sensor_origin_m.is_some(), &options.budget());
     let mut file = File::open(path).map_err(|error| Error::io(path, "read", error))?;
@@ -39,20 +39,18 @@ pub(crate) fn open(path: &Path, options: &ReadOptions) -> Result<Box<dyn CloudSo
     let scans = reader.pointclouds();
     let mut remarks = Vec::new();
     let mut crs = reader.coordinate_metadata().map(str::to_owned).filter(|crs| !crs.trim().is_empty());
-    // Coordinates of E57 are metres, whatever is said of them.
+    // E57 coordinates are always in metres, even if the coordinate system names another unit.
     let units = crs.as_deref().map(WktUnits::of);
     if units.is_some_and(|units| [units.flat, units.high].iter().flatten().any(|unit| unit.metres != 1.0)) {
         crs = None;
-        remarks.push(
-            "the coordinate system is not in metres as the points are, and the output does not name it"
-                .into(),
-        );
+        remarks
+            .push("the coordinate system is not in metres, unlike the points, and is not passed on".into());
     }
     let bare = scans.iter().filter(|scan| scan.transform.is_none()).count();
     if bare > 0 && !has_origin {
         remarks.push(format!(
-            "{bare} of {} scans have no pose: their points are in the frame of the file, and without `poses` or \
-             `sensor_origin` the sensor is taken to be at its origin",
+            "{bare} of {} scans have no pose: their points are in the frame of the file, and the sensor is assumed at \
+             its origin unless `poses` or `sensor_origin` is given",
             scans.len()
         ));
     }
@@ -61,8 +59,8 @@ pub(crate) fn open(path: &Path, options: &ReadOptions) -> Result<Box<dyn CloudSo
     Ok(Box::new(E57 { path, reader, scans, next, is_read, has_origin, crs, remarks, budget }))
 }
 
-/// Checks that the description of the scans fits in memory, and takes no long time. The library holds all of it, as text
-/// and as a tree.
+/// Checks that the XML section fits in memory and can be parsed quickly. The library holds all of it, as text and as a
+/// tree.
 fn check_xml(path: &Path, file: &mut File, budget: &Budget) -> Result<()> {
     let fail = |error| Error::io(path, "read", error);
     let mut header = Vec::new();
@@ -74,10 +72,10 @@ fn check_xml(path: &Path, file: &mut File, budget: &Budget) -> Result<()> {
     let [start, bytes, page_bytes] = [24, 32, 40].map(number);
     let wrong = |at: u64, reason: String| Err(FormatError::at_offset(at, reason).in_input(path));
     if header.len() < HEADER_BYTES || !header.starts_with(SIGNATURE) {
-        return wrong(0, "it is no E57 file, or is cut off; copy it again".to_owned());
+        return wrong(0, "it is not an E57 file, or is truncated: copy it again".to_owned());
     }
     if page_bytes != PAGE_BYTES {
-        return wrong(40, format!("pages of {page_bytes} bytes; those of E57 have {PAGE_BYTES}"));
+        return wrong(40, format!("the page size is {page_bytes} bytes; E57 files have {PAGE_BYTES}"));
     }
     let mut text = Pages::new(&mut *file, start).map_err(fail)?.take(bytes);
     let (mut check, mut buffer) = (XmlCheck::default(), vec![0; PAGE_BYTES as usize]);
@@ -90,7 +88,7 @@ fn check_xml(path: &Path, file: &mut File, budget: &Budget) -> Result<()> {
         let needed = check.nodes.saturating_mul(NODE_BYTES).saturating_add(bytes.saturating_mul(3));
         if needed > budget.whole_bytes() {
             let reason = format!(
-                "its description of {bytes} bytes would take more than {} bytes of memory: raise `memory`, or split \
+                "its XML section of {bytes} bytes would need more than {} bytes of memory: raise `memory`, or split \
                  the file",
                 budget.whole_bytes()
             );
@@ -103,15 +101,15 @@ fn check_xml(path: &Path, file: &mut File, budget: &Budget) -> Result<()> {
     file.seek(SeekFrom::Start(0)).map(drop).map_err(fail)
 }
 
-/// The first bytes of a file, and how many its header has.
+/// Signature and length of the file header.
 const SIGNATURE: &[u8] = b"ASTM-E57";
 const HEADER_BYTES: usize = 48;
-/// Each point takes the time of its fields, also of those that take no bytes of the file.
+/// Limit for fields per point. Every field costs time for each point, even if it takes no bytes in the file.
 const MAX_FIELDS: usize = 256;
-/// What a tag or an attribute takes in the library's tree.
+/// Approximate memory for a tag or an attribute in the library's tree.
 const NODE_BYTES: u64 = 100;
 
-/// The name of a field, as the library spells it.
+/// Returns the name of a field as spelled by the library.
 fn name_of(name: &RecordName) -> String {
     match name {
         RecordName::Unknown { name, .. } => name.clone(),
@@ -119,8 +117,8 @@ fn name_of(name: &RecordName) -> String {
     }
 }
 
-/// Whether any field of a point takes bits of the file. The library counts points by those bits: where there are none,
-/// a single packet would fill all memory with points.
+/// Returns whether any field of a point takes bits in the file. The library counts points by these bits: without any, a
+/// single packet would fill the memory with points.
 fn has_bits(scan: &PointCloud) -> bool {
     scan.prototype.iter().any(|record| match record.data_type {
         RecordDataType::ScaledInteger { min, max, .. } | RecordDataType::Integer { min, max } => min < max,
@@ -178,7 +176,7 @@ impl CloudSource for E57 {
         }
         if scan.prototype.len() > MAX_FIELDS {
             let reason = format!(
-                "a point has {} fields, at most {MAX_FIELDS} are read: export the scan with fewer fields",
+                "a point has {} fields, but at most {MAX_FIELDS} are supported: export the scan with fewer fields",
                 scan.prototype.len()
             );
             return Err(FormatError::at_record(0, reason).in_input(&self.path));
@@ -189,8 +187,8 @@ impl CloudSource for E57 {
             FormatError::at_record(done, reason).in_input(path)
         };
         if scan.records > 0 && !has_bits(scan) {
-            let reason = "every field of its points has a minimum that is its maximum, so that points take no bytes \
-                          and cannot be counted; write the scan again with a wider range of x, y or z";
+            let reason = "every field has equal minimum and maximum, so its points take no bytes and cannot be \
+                          counted: write the scan again with a wider range of x, y or z";
             return Err(wrong(0, reason.into()));
         }
         check_packets(path, scan, &self.budget)?;
@@ -217,7 +215,7 @@ impl CloudSource for E57 {
     }
 }
 
-/// Where a point is, or where nothing came back.
+/// Returns the position of a point and whether it is a return.
 fn place(cartesian: &CartesianCoordinate, spherical: &SphericalCoordinate) -> ([f64; 3], bool) {
     match (cartesian, spherical) {
         (CartesianCoordinate::Valid { x, y, z }, _) => {

@@ -6,10 +6,10 @@ use voxtile::{Error, Result};
 /// Opens a file of a folder.
 pub(crate) type OpenFile = Box<dyn Fn(&Path) -> Result<Box<dyn CloudSource>> + Send>;
 
-/// Remarks that are kept; a folder may have a million files.
+/// Maximum number of remarks to keep; a folder may have a million files.
 const MAX_REMARKS: usize = 20;
 
-/// The clouds of all files of a folder, one file open at a time.
+/// Source of the clouds of all files of a folder. Only one file is open at a time.
 pub(crate) struct Files {
     format: String,
     paths: std::vec::IntoIter<PathBuf>,
@@ -19,21 +19,21 @@ pub(crate) struct Files {
     open: OpenFile,
     current: Option<(PathBuf, Box<dyn CloudSource>)>,
     crs: Option<String>,
-    /// Whether a file was opened, so that the coordinate system is known or known to be missing.
+    /// Whether a file was opened; `crs` is then final.
     is_begun: bool,
     remarks: Remarks,
 }
 
-/// What is to be said of files. What is true of several is said once.
+/// Remarks on files. A remark that applies to several files appears once.
 #[derive(Clone, Default)]
 struct Remarks {
-    said: Vec<Said>,
+    remarks: Vec<FileRemark>,
     are_more: bool,
 }
 
-/// A remark on a file, or on the folder if it has no name, and how many other files it is true of.
+/// Remark on a file, or on the folder if `file` is empty, with the number of other files it applies to.
 #[derive(Clone)]
-struct Said {
+struct FileRemark {
     file: String,
     others: u64,
     remark: String,
@@ -41,29 +41,31 @@ struct Said {
 
 impl Remarks {
     fn add(&mut self, file: String, remark: String) {
-        if let Some(said) = self.said.iter_mut().find(|said| said.remark == remark && !said.file.is_empty()) {
-            said.others += 1;
-        } else if self.said.len() < MAX_REMARKS {
-            self.said.push(Said { file, others: 0, remark });
+        if let Some(remarks) =
+            self.remarks.iter_mut().find(|remarks| remarks.remark == remark && !remarks.file.is_empty())
+        {
+            remarks.others += 1;
+        } else if self.remarks.len() < MAX_REMARKS {
+            self.remarks.push(FileRemark { file, others: 0, remark });
         } else {
             self.are_more = true;
         }
     }
 
     fn lines(&self) -> Vec<String> {
-        let line = |Said { file, others, remark }: &Said| match (file.as_str(), others) {
+        let line = |FileRemark { file, others, remark }: &FileRemark| match (file.as_str(), others) {
             ("", _) => remark.clone(),
             (_, 0) => format!("{file}: {remark}"),
             (_, 1) => format!("{file} and another file: {remark}"),
             _ => format!("{file} and {others} other files: {remark}"),
         };
-        let more = self.are_more.then(|| "there is more to say of other files".to_owned());
-        self.said.iter().map(line).chain(more).collect()
+        let more = self.are_more.then(|| "there are more remarks on other files".to_owned());
+        self.remarks.iter().map(line).chain(more).collect()
     }
 }
 
 impl Files {
-    /// The clouds of files in this order. `is_one_each`: every file is one cloud.
+    /// Creates the source. Files are read in the given order. `is_one_each`: every file is one cloud.
     pub(crate) fn new(format: String, paths: Vec<PathBuf>, is_one_each: bool, open: OpenFile) -> Self {
         let ends =
             paths.first().zip(paths.last()).map(|(first, last)| [first, last].map(|path| name_of(path)));
@@ -81,13 +83,13 @@ impl Files {
         }
     }
 
-    /// With remarks on the folder itself.
+    /// Adds remarks on the folder itself.
     pub(crate) fn with_remarks(mut self, remarks: Vec<String>) -> Self {
         remarks.into_iter().for_each(|remark| self.remarks.add(String::new(), remark));
         self
     }
 
-    /// Keeps what is to be said of the file that ends.
+    /// Closes the current file and keeps its remarks.
     fn close(&mut self) {
         let Some((path, source)) = self.current.take() else { return };
         let name = name_of(&path);
@@ -96,15 +98,15 @@ impl Files {
         }
     }
 
-    /// Takes a file only if its points are in the coordinate system of those before: no point of another is mapped.
+    /// Checks that a file uses the coordinate system of the files before it, so that no map mixes systems.
     fn check_crs(&mut self, path: &Path, crs: Option<&str>) -> Result<()> {
         let is_first = !std::mem::replace(&mut self.is_begun, true);
         let Some(crs) = crs else { return Ok(()) };
         match &self.crs {
             Some(first) if first != crs => {
                 let reason = format!(
-                    "its coordinates are in {crs:.80}, those of the files before it in {first:.80}; convert it \
-                     first, for instance with pdal, or map it on its own"
+                    "its coordinates are in {crs:.80}, but those of the previous files are in {first:.80}: convert it \
+                     first, for instance with pdal, or build a separate map"
                 );
                 return Err(Error::argument(path.display().to_string(), reason));
             }
@@ -113,8 +115,8 @@ impl Files {
         }
         if !is_first {
             let remark = format!(
-                "names the coordinate system {crs:.80}, the files before it name none; are their points in it, and does \
-                 the map name it (`voxtile info`)? Read this file first otherwise"
+                "names the coordinate system {crs:.80}, but the previous files name none: check that their points are \
+                 in it, and that the map names it (`voxtile info`); otherwise read this file first"
             );
             self.remarks.add(name_of(path), remark);
         }

@@ -1,31 +1,31 @@
 use std::path::Path;
 use voxtile::Error;
 
-/// A format that is known, but not read.
+/// A known format that is not supported.
 pub(crate) struct Foreign {
     name: &'static str,
-    /// Starts of its files; empty if the name alone tells.
+    /// File signatures; empty if only the extension identifies the format.
     magic: &'static [&'static [u8]],
     extensions: &'static [&'static str],
-    /// What a person can do.
-    way: &'static str,
+    /// Advice to the user.
+    advice: &'static str,
 }
 
 impl Foreign {
-    /// Says what a file is, and the way to one that can be read.
+    /// Creates an error that names the format and how to convert it.
     pub(crate) fn error(&self, path: &Path) -> Error {
         Error::argument(
             path.display().to_string(),
-            format!("is {}, which is not read: {}", self.name, self.way),
+            format!("is {}, which is not supported: {}", self.name, self.advice),
         )
     }
 }
 
 const TO_CLOUD: &str =
     "sample points of its surface (CloudCompare, MeshLab) and save them as PLY, LAS or PCD";
-const UNPACK: &str = "unpack it and give the files inside";
+const UNPACK: &str = "unpack it and use the files inside";
 const PACKETS: &str =
-    "let the sensor's own tool (or its ROS driver) make clouds of it: PCD, PLY, .bag or .mcap";
+    "convert it to clouds (PCD, PLY, .bag or .mcap) with the sensor's software or its ROS driver";
 
 const FOREIGN: [Foreign; 27] = [
     Foreign {
@@ -38,104 +38,109 @@ const FOREIGN: [Foreign; 27] = [
             b"\x0a\x0d\x0d\x0a",
         ],
         extensions: &["pcap", "pcapng"],
-        way: PACKETS,
+        advice: PACKETS,
     },
     Foreign {
         name: "HDF5",
         magic: &[b"\x89HDF\r\n\x1a\n"],
         extensions: &["h5", "hdf5"],
-        way: "write its clouds as PLY, .bin or CSV (Python: h5py)",
+        advice: "write its clouds as PLY, .bin or CSV (Python: h5py)",
     },
     Foreign {
         name: "a NumPy array",
         magic: &[b"\x93NUMPY"],
         extensions: &["npy"],
-        way: "write it as .bin, `array.astype('<f4').tofile(...)`, and name its columns as fields; poses are read from \
-              .npy",
+        advice: "write it as .bin, `array.astype('<f4').tofile(...)`, and give its columns with `fields`; only poses \
+              are read from .npy",
     },
     Foreign {
         name: "one image",
         magic: &[b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff", b"II*\0", b"MM\0*"],
         extensions: &["png", "jpg", "jpeg", "tif", "tiff", "pgm"],
-        way: "give the folder of 16-bit depth PNGs that it is in",
+        advice: "use the folder of 16-bit depth PNGs as the input",
     },
     Foreign {
         name: "a ZIP archive",
         magic: &[b"PK\x03\x04", b"PK\x05\x06"],
         extensions: &["zip", "npz"],
-        way: UNPACK,
+        advice: UNPACK,
     },
-    Foreign { name: "packed with gzip", magic: &[b"\x1f\x8b\x08"], extensions: &["gz", "tgz"], way: UNPACK },
+    Foreign {
+        name: "packed with gzip",
+        magic: &[b"\x1f\x8b\x08"],
+        extensions: &["gz", "tgz"],
+        advice: UNPACK,
+    },
     Foreign {
         name: "packed with Zstandard",
         magic: &[b"\x28\xb5\x2f\xfd"],
         extensions: &["zst"],
-        way: UNPACK,
+        advice: UNPACK,
     },
-    Foreign { name: "packed with bzip2", magic: &[b"BZh"], extensions: &["bz2"], way: UNPACK },
-    Foreign { name: "packed with xz", magic: &[b"\xfd7zXZ\0"], extensions: &["xz"], way: UNPACK },
-    Foreign { name: "packed with LZ4", magic: &[b"\x04\x22\x4d\x18"], extensions: &["lz4"], way: UNPACK },
-    Foreign { name: "a 7z archive", magic: &[b"7z\xbc\xaf\x27\x1c"], extensions: &["7z"], way: UNPACK },
-    Foreign { name: "a RAR archive", magic: &[b"Rar!"], extensions: &["rar"], way: UNPACK },
-    Foreign { name: "a tar archive", magic: &[], extensions: &["tar"], way: UNPACK },
-    Foreign { name: "a mesh (OBJ)", magic: &[], extensions: &["obj"], way: TO_CLOUD },
-    Foreign { name: "a mesh (STL)", magic: &[b"solid "], extensions: &["stl"], way: TO_CLOUD },
-    Foreign { name: "a mesh (OFF)", magic: &[b"OFF\n", b"COFF"], extensions: &["off"], way: TO_CLOUD },
-    Foreign { name: "a scene (glTF)", magic: &[b"glTF"], extensions: &["glb", "gltf"], way: TO_CLOUD },
-    Foreign { name: "a mesh (FBX)", magic: &[b"Kaydara FBX"], extensions: &["fbx"], way: TO_CLOUD },
+    Foreign { name: "packed with bzip2", magic: &[b"BZh"], extensions: &["bz2"], advice: UNPACK },
+    Foreign { name: "packed with xz", magic: &[b"\xfd7zXZ\0"], extensions: &["xz"], advice: UNPACK },
+    Foreign { name: "packed with LZ4", magic: &[b"\x04\x22\x4d\x18"], extensions: &["lz4"], advice: UNPACK },
+    Foreign { name: "a 7z archive", magic: &[b"7z\xbc\xaf\x27\x1c"], extensions: &["7z"], advice: UNPACK },
+    Foreign { name: "a RAR archive", magic: &[b"Rar!"], extensions: &["rar"], advice: UNPACK },
+    Foreign { name: "a tar archive", magic: &[], extensions: &["tar"], advice: UNPACK },
+    Foreign { name: "a mesh (OBJ)", magic: &[], extensions: &["obj"], advice: TO_CLOUD },
+    Foreign { name: "a mesh (STL)", magic: &[b"solid "], extensions: &["stl"], advice: TO_CLOUD },
+    Foreign { name: "a mesh (OFF)", magic: &[b"OFF\n", b"COFF"], extensions: &["off"], advice: TO_CLOUD },
+    Foreign { name: "a scene (glTF)", magic: &[b"glTF"], extensions: &["glb", "gltf"], advice: TO_CLOUD },
+    Foreign { name: "a mesh (FBX)", magic: &[b"Kaydara FBX"], extensions: &["fbx"], advice: TO_CLOUD },
     Foreign {
         name: "Parquet",
         magic: &[b"PAR1"],
         extensions: &["parquet"],
-        way: "write x, y, z and intensity as CSV (Python: pandas)",
+        advice: "write x, y, z and intensity as CSV (Python: pandas)",
     },
     Foreign {
         name: "a map (OctoMap)",
         magic: &[b"# Octomap OcTree"],
         extensions: &["bt", "ot"],
-        way: "it holds no clouds; `voxtile import FILE -o MAP` makes a map of it, and info, query, raycast and export take \
-              the file itself",
+        advice: "it contains no clouds; convert it to a map with `voxtile import FILE -o MAP`, or use it directly with \
+              info, query, raycast and export",
     },
     Foreign {
         name: "OpenVDB",
         magic: &[b" BDV"],
         extensions: &["vdb"],
-        way: "it holds volumes, no clouds; write its points as PLY",
+        advice: "it contains volumes, not clouds; write its points as PLY",
     },
     Foreign {
-        name: "a project of a scanner's maker",
+        name: "a scanner manufacturer's project",
         magic: &[],
         extensions: &["rcp", "rcs", "fls", "zfs", "rdbx", "rxp", "lgs", "ptg", "ptx", "3dd"],
-        way: "export it there as E57 or LAS",
+        advice: "export it as E57 or LAS with the manufacturer's software",
     },
     Foreign {
-        name: "a recording of Livox",
+        name: "a Livox recording",
         magic: &[b"livox_tech"],
         extensions: &["lvx", "lvx2"],
-        way: "Livox Viewer exports LAS and CSV; its driver records .bag",
+        advice: "export LAS or CSV with Livox Viewer, or record a .bag with the driver",
     },
-    Foreign { name: "packets of Ouster", magic: &[], extensions: &["osf"], way: PACKETS },
+    Foreign { name: "Ouster packets", magic: &[], extensions: &["osf"], advice: PACKETS },
     Foreign {
         name: "CloudCompare's own format",
         magic: &[b"CCB"],
         extensions: &["sbf", "bin2"],
-        way: "CloudCompare saves it as PLY, LAS or E57",
+        advice: "save it as PLY, LAS or E57 with CloudCompare",
     },
     Foreign {
         name: "a point cloud for the web",
         magic: &[],
         extensions: &["pnts", "ept", "slpk"],
-        way: "give the LAZ or COPC that it was made of",
+        advice: "use the LAZ or COPC file that it was created from",
     },
     Foreign {
-        name: "a table of Excel or MATLAB",
+        name: "an Excel or MATLAB table",
         magic: &[b"MATLAB 5.0"],
         extensions: &["mat", "xlsx", "xls"],
-        way: "save x, y, z and intensity as CSV",
+        advice: "save x, y, z and intensity as CSV",
     },
 ];
 
-/// The foreign format that starts with these bytes.
+/// Returns the unsupported format with this file signature.
 pub(crate) fn of_bytes(start: &[u8]) -> Option<&'static Foreign> {
     if start.get(257..262) == Some(b"ustar") {
         return of_extension("tar");
@@ -143,61 +148,61 @@ pub(crate) fn of_bytes(start: &[u8]) -> Option<&'static Foreign> {
     FOREIGN.iter().find(|foreign| foreign.magic.iter().any(|magic| start.starts_with(magic)))
 }
 
-/// The archive that starts with these bytes, whatever its name.
+/// Returns the archive format with this signature, whatever the file's name.
 pub(crate) fn archive_of(start: &[u8]) -> Option<&'static Foreign> {
-    of_bytes(start).filter(|foreign| foreign.way == UNPACK)
+    of_bytes(start).filter(|foreign| foreign.advice == UNPACK)
 }
 
-/// The foreign format with this ending, in lower case.
+/// Returns the unsupported format with this extension (lower case).
 pub(crate) fn of_extension(extension: &str) -> Option<&'static Foreign> {
     FOREIGN.iter().find(|foreign| foreign.extensions.contains(&extension))
 }
 
-/// What lies in the place of a file that did not arrive, and what to do.
+/// Describes a placeholder or error page stored instead of the file, with advice.
 pub(crate) fn stand_in(start: &[u8]) -> Option<&'static str> {
-    let text = without_mark(start).trim_ascii_start();
+    let text = without_bom(start).trim_ascii_start();
     let starts =
         |word: &str| text.get(..word.len()).is_some_and(|start| start.eq_ignore_ascii_case(word.as_bytes()));
     if starts("version https://git-lfs.") || starts("version https://hawser.") {
-        return Some("is a Git LFS pointer, not the file itself: fetch it with `git lfs pull`");
+        return Some("is a Git LFS pointer, not the file itself: get it with `git lfs pull`");
     }
     if starts("/annex/objects/") {
-        return Some("is a pointer of git-annex, not the file itself: fetch it with `git annex get`");
+        return Some("is a git-annex pointer, not the file itself: get it with `git annex get`");
     }
     if ["<!doctype html", "<html", "<head", "<body", "<!-- saved from url"].iter().any(|tag| starts(tag)) {
         return Some(
-            "is a page of HTML, not data: the download gave a web page, perhaps a login or an error; open it in a \
+            "is an HTML page, not data: the download returned a web page, possibly a login or an error; open it in a \
              browser and download the file itself",
         );
     }
     if starts("<?xml") || starts("<Error>") {
         return Some(
-            "is XML, not data: the download gave an error or a list; open it in an editor to see which",
+            "is XML, not data: the download returned an error or a list; open it in an editor to see the reason",
         );
     }
     None
 }
 
-/// The encoding of a text that is not UTF-8, and what to do.
+/// Describes the encoding of a text that is not UTF-8, with advice.
 pub(crate) fn text_encoding(start: &[u8]) -> Option<&'static str> {
     let is_utf16 = match *start {
         [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => true,
-        // Digits and blanks with a zero byte each.
+        // Digits and blanks, each with a zero byte.
         [0, low, 0, ..] | [low, 0, _, 0, ..] => low.is_ascii_graphic() || low == b' ',
         _ => false,
     };
     is_utf16.then_some("is text in UTF-16: save it as UTF-8")
 }
 
-/// What editors on Windows put before a text.
+/// UTF-8 byte order mark, written by some Windows editors.
 pub(crate) const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
-/// The bytes behind a byte order mark, if there is one.
-pub(crate) fn without_mark(start: &[u8]) -> &[u8] {
+/// Strips a byte order mark.
+pub(crate) fn without_bom(start: &[u8]) -> &[u8] {
     start.strip_prefix(BYTE_ORDER_MARK).unwrap_or(start)
 }
 
-/// How a file starts that is not what its name says.
+/// Describes the first bytes of a file for an error message.
 pub(crate) fn beginning_of(start: &[u8]) -> String {
     let line = start.split(|byte| matches!(byte, b'\n' | b'\r')).next().unwrap_or_default().trim_ascii();
     let is_text = !line.is_empty() && line.iter().all(|byte| byte.is_ascii_graphic() || *byte == b' ');
@@ -206,7 +211,7 @@ pub(crate) fn beginning_of(start: &[u8]) -> String {
     }
     let are_zeros = !start.is_empty() && start.iter().all(|byte| *byte == 0);
     if are_zeros {
-        "; it starts with zeros: was a copy or a download cut off?".to_owned()
+        "; it starts with zeros: was a copy or a download interrupted?".to_owned()
     } else {
         String::new()
     }
@@ -217,13 +222,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_stands_for_a_file_is_named() {
+    fn placeholders_are_reported() {
         for (start, what) in [
             (&b"version https://git-lfs.github.com/spec/v1\noid sha256:0\n"[..], "git lfs pull"),
             (b"version https://hawser.github.com/spec/v1\n", "git lfs pull"),
             (b"/annex/objects/SHA256E-s1--0\n", "git annex get"),
-            (b"\xef\xbb\xbf\r\n<!DOCTYPE HTML><html>", "is a page of HTML"),
-            (b"<html lang=\"en\">", "is a page of HTML"),
+            (b"\xef\xbb\xbf\r\n<!DOCTYPE HTML><html>", "is an HTML page"),
+            (b"<html lang=\"en\">", "is an HTML page"),
             (b"<?xml version=\"1.0\"?><Error>", "is XML"),
         ] {
             assert!(stand_in(start).is_some_and(|found| found.contains(what)), "{what}");
@@ -234,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn archives_are_named_one_by_one() {
+    fn each_archive_format_is_reported() {
         let tar = [&[b'a'; 257][..], b"ustar\x0000"].concat();
         for (start, name) in [
             (&b"PK\x03\x04"[..], "ZIP"),

@@ -1,4 +1,4 @@
-use super::foreign::without_mark;
+use super::foreign::without_bom;
 use crate::RigidPose;
 use voxtile::FormatError;
 use voxtile::scan::Pose;
@@ -15,33 +15,33 @@ pub(super) enum Encoding {
 
 pub(super) struct Field {
     pub(super) name: String,
-    /// Bytes of one value: 1, 2, 4 or 8.
+    /// Bytes per value: 1, 2, 4 or 8.
     pub(super) size: usize,
     /// `I`, `U` or `F`.
     pub(super) kind: u8,
     pub(super) count: usize,
-    /// Bytes before this field in a point.
+    /// Byte offset of the field in a point.
     pub(super) offset: usize,
-    /// Values before this field in a point.
+    /// Index of the field's first value in a point.
     pub(super) first_value: usize,
 }
 
-/// The header of a PCD file.
+/// Header of a PCD file.
 pub(super) struct Header {
     pub(super) fields: Vec<Field>,
     pub(super) points: usize,
     pub(super) point_bytes: usize,
     pub(super) encoding: Encoding,
-    /// The `VIEWPOINT`, as it is written; zeros alone are none.
+    /// The `VIEWPOINT` as written, or `None` if it is all zeros.
     pub(super) world_from_sensor: Result<Option<RigidPose>>,
     pub(super) data_at: usize,
     pub(super) data_line: u64,
 }
 
-/// A longer header is an error.
+/// Limit for the size of the header.
 pub(super) const MAX_HEADER_BYTES: usize = 1 << 16;
 
-/// A larger point is an error: as many bytes are read at a time.
+/// Limit for the size of a point, which is read at once.
 const MAX_POINT_BYTES: usize = 1 << 20;
 
 const KEYS: [&str; 11] = [
@@ -58,7 +58,7 @@ const KEYS: [&str; 11] = [
     "DATA",
 ];
 
-/// Whether a file starts as PCD does: with comments, then a first key, in letters of either case.
+/// Returns whether a file starts like PCD: comments, then a known key, in any case.
 pub(crate) fn is_start(start: &[u8]) -> bool {
     let text = String::from_utf8_lossy(start);
     let is_comment = |line: &&str| line.is_empty() || (line.starts_with('#') && !is_magic(line));
@@ -79,15 +79,15 @@ impl Header {
     ///
     /// # Errors
     ///
-    /// An invalid header, with the line.
+    /// The header is invalid; the error gives the line.
     pub(super) fn parse(file: &[u8]) -> Result<Self> {
         let mut entries: Vec<(String, Vec<String>, u64)> = Vec::new();
-        let (mut at, mut line_number) = (file.len() - without_mark(file).len(), 0);
+        let (mut at, mut line_number) = (file.len() - without_bom(file).len(), 0);
         let end = line_end(file);
         loop {
             line_number += 1;
             let Some(length) = file[at..].iter().position(|&byte| byte == end) else {
-                let reason = "the header ends without a line DATA; this is no PCD file";
+                let reason = "the header has no DATA line: this is not a PCD file";
                 return Err(FormatError::at_line(line_number, reason));
             };
             let line = String::from_utf8_lossy(&file[at..at + length]).into_owned();
@@ -98,7 +98,7 @@ impl Header {
             if !KEYS.contains(&key.as_str()) {
                 return Err(FormatError::at_line(
                     line_number,
-                    format!("`{word:.40}` is no key of a PCD header"),
+                    format!("`{word:.40}` is not a key of a PCD header"),
                 ));
             }
             let is_data = key == "DATA";
@@ -114,11 +114,11 @@ impl Header {
         let find =
             |key: &str| entries.iter().find(|(name, ..)| name == key).map(|(_, words, line)| (words, *line));
         let need = |key: &str| {
-            find(key).ok_or_else(|| FormatError::at_line(data_line, format!("the header has no line {key}")))
+            find(key).ok_or_else(|| FormatError::at_line(data_line, format!("the header has no {key} line")))
         };
         let (names, _) = find("FIELDS")
             .or_else(|| find("COLUMNS"))
-            .ok_or_else(|| FormatError::at_line(data_line, "the header has no line FIELDS"))?;
+            .ok_or_else(|| FormatError::at_line(data_line, "the header has no FIELDS line"))?;
         let (sizes, sizes_line) = need("SIZE")?;
         let (kinds, kinds_line) = need("TYPE")?;
         let ones = vec!["1".to_owned(); names.len()];
@@ -139,8 +139,10 @@ impl Header {
             let kind = kinds[number].as_bytes().first().copied().unwrap_or_default().to_ascii_uppercase();
             let is_known = matches!((kind, size), (b'I' | b'U', 1 | 2 | 4 | 8) | (b'F', 4 | 8));
             if !is_known || count > 1 << 16 {
-                let reason =
-                    format!("field {name} of type {} size {size} count {count} is not known", kinds[number]);
+                let reason = format!(
+                    "field {name} has an unsupported combination of type {}, size {size} and count {count}",
+                    kinds[number]
+                );
                 return Err(FormatError::at_line(sizes_line, reason));
             }
             fields.push(Field { name: name.clone(), size, kind, count, offset, first_value });
@@ -159,8 +161,10 @@ impl Header {
             Some("binary") => Encoding::Binary,
             Some("binary_compressed") => Encoding::Compressed,
             other => {
-                let reason =
-                    format!("DATA {} is not ascii, binary or binary_compressed", other.unwrap_or_default());
+                let reason = format!(
+                    "DATA must be ascii, binary or binary_compressed, not {}",
+                    other.unwrap_or_default()
+                );
                 return Err(FormatError::at_line(line, reason));
             }
         };
@@ -168,7 +172,7 @@ impl Header {
     }
 }
 
-/// The last byte of the lines of a header: CR, if the first of them ends with that alone.
+/// Returns the last byte of line ends: CR if the first line ends with CR alone, else LF.
 fn line_end(file: &[u8]) -> u8 {
     let first = file.iter().position(|byte| matches!(byte, b'\n' | b'\r'));
     match first.map(|at| (file[at], file.get(at + 1))) {
@@ -220,5 +224,5 @@ fn viewpoint(words: &[String], line: u64) -> Result<Option<RigidPose>> {
 }
 
 fn parse<N: std::str::FromStr>(word: &str, line: u64) -> Result<N> {
-    word.parse().map_err(|_| FormatError::at_line(line, format!("`{word}` is not a number that fits here")))
+    word.parse().map_err(|_| FormatError::at_line(line, format!("`{word}` is not a valid number")))
 }

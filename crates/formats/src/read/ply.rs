@@ -1,19 +1,19 @@
 use super::cloud::CloudHead;
 use super::columns::{Clock, Meaning};
 use super::input_file::open_input;
-use super::left_out::LeftOut;
 use super::lines::Lines;
 use super::one::{Points, Visit};
 use super::ply_header::{Element, Encoding, Header};
 use super::ply_rows::{PlyRows, Row};
 use super::scalar::Scalar;
+use super::skipped_rows::SkippedRows;
 use crate::read_options::ReadOptions;
 use std::fs::File;
 use std::io::{self, BufReader, Read};
 use std::path::{Path, PathBuf};
 use voxtile::{Error, FormatError, Result};
 
-/// The points of a PLY file.
+/// Points of a PLY file.
 struct PlyPoints {
     path: PathBuf,
     header: Header,
@@ -21,7 +21,7 @@ struct PlyPoints {
     vertices: usize,
     meaning: Meaning,
     clock: Clock,
-    left_out: LeftOut,
+    skipped_rows: SkippedRows,
 }
 
 /// Opens a PLY file and reads its header.
@@ -40,14 +40,14 @@ pub(crate) fn open(
     let names: Vec<String> = element.properties.iter().map(|property| property.name.clone()).collect();
     let is_integer = |at: usize| element.properties.get(at).is_some_and(|found| found.kind.is_integer());
     let meaning = Meaning::of(&names, is_integer).map_err(|reason| wrong(&reason))?;
-    let meaning = meaning.ok_or_else(|| wrong("vertices have no x, y and z"))?;
+    let meaning = meaning.ok_or_else(|| wrong("vertices lack x, y or z"))?;
     head.points = Some(element.count);
     head.fields = names;
     head.has_intensities = meaning.intensity.is_some();
     head.has_times = meaning.time.is_some();
-    let (clock, left_out) = (Clock::new(head.stamp_ns), LeftOut::default());
+    let (clock, skipped_rows) = (Clock::new(head.stamp_ns), SkippedRows::default());
     let (path, input) = (path.to_owned(), Some(input));
-    Ok((head, Box::new(PlyPoints { path, header, input, vertices, meaning, clock, left_out })))
+    Ok((head, Box::new(PlyPoints { path, header, input, vertices, meaning, clock, skipped_rows })))
 }
 
 impl Points for PlyPoints {
@@ -62,9 +62,9 @@ impl Points for PlyPoints {
     fn remarks(&self) -> Vec<String> {
         let units = self.meaning.remark();
         let comment = self.header.unit.as_ref().filter(|_| units.is_none()).map(|(line, comment)| {
-            format!("line {line} says `{comment:.60}`, but coordinates are read as metres")
+            format!("line {line} contains `{comment:.60}`, but coordinates are read as metres")
         });
-        units.into_iter().chain(comment).chain(self.left_out.remark()).collect()
+        units.into_iter().chain(comment).chain(self.skipped_rows.remark()).collect()
     }
 }
 
@@ -77,7 +77,8 @@ impl PlyPoints {
                 continue;
             }
             if number != self.vertices {
-                // What follows the vertices matters only where lines are wrapped: it tells whether numbers are missing.
+                // In a file with wrapped lines, the elements after the vertices must be read too: they show whether
+                // numbers are missing.
                 if number < self.vertices || rows.are_wrapped() {
                     rows.pass(element)?;
                 }
@@ -90,14 +91,14 @@ impl PlyPoints {
                         let value = |at: usize| values.get(at).copied().unwrap_or(f64::NAN);
                         visit(self.clock.point(&meaning, value))?;
                     }
-                    Row::Unread(line, reason) => self.left_out.add(line, reason),
+                    Row::Unread(line, reason) => self.skipped_rows.add(line, reason),
                 }
             }
         }
         if rows.are_wrapped() {
             rows.check_end()?;
         }
-        match self.left_out.error() {
+        match self.skipped_rows.error() {
             Some(error) if visited == 0 => Err(error.in_input(&self.path)),
             _ => Ok(()),
         }
@@ -113,7 +114,7 @@ impl PlyPoints {
             };
             let is_wanted = number == self.vertices;
             if let (false, Some(bytes)) = (is_wanted, element.bytes()) {
-                // All are alike: skipped at once. What is beyond the end shows at the next element.
+                // Elements of fixed size are skipped at once. A truncated file is detected at the next element.
                 let skipped = element.count.checked_mul(bytes).map(|bytes| records.skip(bytes));
                 match skipped {
                     Some(Ok(())) => continue,
@@ -140,7 +141,7 @@ impl PlyPoints {
     }
 }
 
-/// Elements of a binary file.
+/// Reader of the elements of a binary file.
 struct Records {
     input: BufReader<File>,
     at: u64,
@@ -149,7 +150,7 @@ struct Records {
 }
 
 impl Records {
-    /// Reads an element: a value a property, NaN for a list.
+    /// Reads an element: one value per property, NaN for a list.
     fn next(&mut self, element: &Element, values: &mut Vec<f64>) -> io::Result<()> {
         values.clear();
         for property in &element.properties {
@@ -159,7 +160,7 @@ impl Records {
                     values.push(value);
                 }
                 Some(count) => {
-                    // A negative length, which is damage, is none.
+                    // A negative length is damage; the list is then empty.
                     let count = self.value(count)? as u64;
                     self.skip(count.saturating_mul(property.kind.bytes() as u64))?;
                     values.push(f64::NAN);

@@ -1,5 +1,5 @@
 use super::columns::Meaning;
-use super::foreign::{text_encoding, without_mark};
+use super::foreign::{text_encoding, without_bom};
 use super::lines::{Extent, MAX_LINE_BYTES, RawLines};
 use super::text_header::names_of;
 use super::text_line::{Separator, comment_of, digits_behind_comma};
@@ -7,13 +7,13 @@ use std::io::{self, BufRead};
 use voxtile::FormatError;
 use voxtile::space::Point;
 
-/// Reads points, one per line: x y z in metres, separated by blanks, commas, semicolons or tabs, with decimal commas
-/// where commas separate nothing. More columns are ignored. Names of columns before the points say which are x, y and z,
-/// and their units. Empty lines, comments (`#`, `//`, `%`) and a first line of other words are skipped.
+/// Reads points, one per line: x y z in metres, separated by blanks, commas, semicolons or tabs, with decimal commas if
+/// commas are not separators. Further columns are ignored. Column names before the points determine x, y and z and
+/// their units. Empty lines, comments (`#`, `//`, `%`) and a first line of other words are skipped.
 ///
 /// # Errors
 ///
-/// A line without three numbers; a unit that is not known; the outer error is the stream's.
+/// A line has no three numbers, or a unit is unknown. The outer error is an I/O error of the input.
 pub fn read_points(input: impl BufRead) -> io::Result<Result<Vec<Point>, FormatError>> {
     let mut lines = RawLines::new(input, MAX_LINE_BYTES);
     let (mut points, mut meaning, mut number) = (Vec::new(), Meaning::of_metres([0, 1, 2]), 0);
@@ -28,7 +28,7 @@ pub fn read_points(input: impl BufRead) -> io::Result<Result<Vec<Point>, FormatE
             if let Some(encoding) = text_encoding(bytes) {
                 return wrong(encoding.to_owned());
             }
-            bytes = without_mark(bytes);
+            bytes = without_bom(bytes);
         }
         let text =
             str::from_utf8(bytes).map_err(|error| io::Error::new(io::ErrorKind::InvalidData, error))?;
@@ -56,15 +56,15 @@ pub fn read_points(input: impl BufRead) -> io::Result<Result<Vec<Point>, FormatE
     Ok(Ok(points))
 }
 
-/// The point of a line.
+/// Parses the point of a line.
 fn point_of(line: &str, meaning: &Meaning) -> Option<Point> {
     let separator = Separator::of(line);
     let mut cells = separator.split(line);
     if digits_behind_comma(separator, &cells).is_some() {
         return None;
     }
-    if separator == Separator::Mark(',') {
-        // Blanks part cells, too: `1, 2 3`.
+    if separator == Separator::Char(',') {
+        // Blanks separate cells too: `1, 2 3`.
         cells = cells.into_iter().flat_map(str::split_ascii_whitespace).collect();
     }
     let [x, y, z] = meaning.xyz.map(|at| separator.number(cells.get(at)?));
@@ -72,7 +72,7 @@ fn point_of(line: &str, meaning: &Meaning) -> Option<Point> {
     Some([in_x.metres(x?), in_y.metres(y?), in_z.metres(z?)])
 }
 
-/// Whether a number is among the first three words.
+/// Returns whether one of the first three words is a number.
 fn has_numbers(line: &str) -> bool {
     let separator = Separator::of(line);
     separator.split(line).iter().take(3).any(|cell| separator.number(cell).is_some())
@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn points_of_many_programs() {
+    fn points_of_many_programs_are_read() {
         let wanted = vec![[1.5, 2.25, -3.0], [4.0, 5.0, 6.0]];
         for text in [
             "1.5 2.25 -3\n4 5 6\n",
@@ -115,7 +115,7 @@ mod tests {
             ("1,2\n", "line 1: `1,2` is not a point"),
             ("6,001,3,178,-1,000\n", "is not a point"),
             ("1 2 3\nx y z\n", "line 2: `x y z` is not a point"),
-            ("x (px) y (px) z (px)\n1 2 3\n", "`px` is no known unit"),
+            ("x (px) y (px) z (px)\n1 2 3\n", "`px` is an unknown unit"),
             ("\u{0}1\u{0} \u{0}2", "is text in UTF-16"),
         ] {
             let error = read(text).unwrap_err();

@@ -4,19 +4,19 @@ use crate::registry::Registry;
 use std::path::Path;
 use voxtile::{Error, Result};
 
-/// Checks that a path is no FIFO, socket or device: opening one waits for a program that writes, perhaps for ever, and
-/// gives its bytes once. What is not there is reported when it is opened.
+/// Checks that a path is not a FIFO, socket or device: opening one may block, and it can be read only once. A missing
+/// file is reported when it is opened.
 pub(crate) fn check_regular(path: &Path) -> Result<()> {
     let is_special = std::fs::metadata(path).is_ok_and(|meta| !meta.is_file() && !meta.is_dir());
     if !is_special {
         return Ok(());
     }
-    // Of these, a single cloud is read in one pass.
+    // Formats that read a single cloud in one pass.
     let extension = extension_of(path);
     let is_streamed = extension.is_empty()
         || (Registry::default().formats().iter())
             .any(|format| matches!(format.open, Open::Stream(_)) && format.has_extension(&extension));
-    let hint = "; or name it alone, with `format` ply or `format` xyz, which are read in one pass";
+    let hint = "; or use it as the only input with `format` ply or `format` xyz, which are read in one pass";
     let reason = format!(
         "is a FIFO, a socket or a device, not a file: save its contents to a file{}",
         if is_streamed { hint } else { "" }

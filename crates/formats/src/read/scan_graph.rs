@@ -9,7 +9,6 @@ use std::path::{Path, PathBuf};
 use voxtile::scan::Pose;
 use voxtile::{Error, FormatError, Result};
 
-/// Opens a scan graph.
 pub(crate) fn open(path: &Path, _: &ReadOptions) -> Result<Box<dyn ScanSource + Send>> {
     check_regular(path)?;
     let file = open_input(path)?;
@@ -18,17 +17,17 @@ pub(crate) fn open(path: &Path, _: &ReadOptions) -> Result<Box<dyn ScanSource + 
 }
 
 /// Reads OctoMap's binary scan graph of `file_bytes` bytes, as written by `ScanGraph::writeBinary`, scan by scan. Its
-/// edges are not read.
+/// edges are ignored.
 ///
-/// `path` is for errors and for the fingerprint. Reads are small: `input` should be buffered.
+/// `path` is used for errors and for the fingerprint. Reads are small, so `input` should be buffered.
 ///
 /// # Errors
 ///
-/// A stream that fails or ends before its first four bytes; errors in a scan are returned with that scan.
+/// The input fails or ends within its first four bytes. Errors in a scan are returned with that scan.
 pub fn read_scan_graph<R: Read>(input: R, file_bytes: u64, path: &Path) -> Result<impl ScanSource + use<R>> {
     let path = path.to_owned();
     let mut graph = ScanGraph { path, input, offset: 0, file_bytes, nodes: 0, done: 0, is_past_error: false };
-    // An empty graph is an empty file.
+    // An empty file is an empty graph.
     if file_bytes > 0 {
         graph.nodes = u32::from_le_bytes(graph.bytes()?);
     }
@@ -48,7 +47,7 @@ struct ScanGraph<R> {
     file_bytes: u64,
     nodes: u32,
     done: u32,
-    /// Whether the input is behind the scan that caused an error.
+    /// Whether reading can continue after the scan that caused an error.
     is_past_error: bool,
 }
 
@@ -66,13 +65,12 @@ impl<R: Read> ScanGraph<R> {
         Ok(bytes)
     }
 
-    /// Numbers after their count, which must be `N`.
+    /// Reads a vector, which starts with its length `N`.
     fn vector<const N: usize>(&mut self) -> Result<[f64; N]> {
         let at = self.offset;
         let count = i32::from_le_bytes(self.bytes()?);
         if count != N as i32 {
-            let reason =
-                format!("a vector of {count} numbers where one of {N} belongs; this is no scan graph");
+            let reason = format!("a vector has {count} numbers instead of {N}: this is not a scan graph");
             return Err(FormatError::at_offset(at, reason).in_input(&self.path));
         }
         let mut numbers = [0.0; N];
@@ -99,7 +97,7 @@ impl<R: Read> ScanSource for ScanGraph<R> {
         let at = self.offset;
         let points = u64::from(u32::from_le_bytes(self.bytes()?));
         if points * POINT_BYTES > self.file_bytes - self.offset {
-            let reason = format!("{points} points announced, more than the rest of the file can hold");
+            let reason = format!("{points} points are announced, more than fit in the rest of the file");
             return Err(FormatError::at_offset(at, reason).in_input(&self.path));
         }
         store.begin(false);
@@ -112,10 +110,12 @@ impl<R: Read> ScanSource for ScanGraph<R> {
         let [qw, qx, qy, qz] = self.vector()?;
         let id = u32::from_le_bytes(self.bytes()?);
         self.done += 1;
-        // An invalid pose does not affect where the next scan starts.
+        // An invalid pose does not affect the start of the next scan.
         self.is_past_error = true;
         if ![x, y, z, qw, qx, qy, qz].iter().all(|number| number.is_finite()) {
-            return Err(FormatError::at_offset(at, "a pose that is not finite").in_input(&self.path));
+            return Err(
+                FormatError::at_offset(at, "the pose has a number that is not finite").in_input(&self.path)
+            );
         }
         let world_from_sensor = Pose::of_quaternion([x, y, z], [qx, qy, qz, qw])
             .map_err(|reason| FormatError::at_offset(at, reason).in_input(&self.path))?;

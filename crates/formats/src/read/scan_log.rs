@@ -10,16 +10,15 @@ use voxtile::maths::sin_cos;
 use voxtile::scan::Pose;
 use voxtile::{Error, FormatError, Result};
 
-/// Opens a scan log.
 pub(crate) fn open(path: &Path, _: &ReadOptions) -> Result<Box<dyn ScanSource + Send>> {
     Ok(Box::new(read_scan_log(BufReader::with_capacity(1 << 16, open_input(path)?), path)))
 }
 
-/// Reads OctoMap's scan log, a text: `NODE x y z roll pitch yaw` starts a scan, its points follow as `x y z`, in the
-/// frame of the node. Empty lines and those that start with `#` or a blank are skipped, as in OctoMap.
+/// Reads OctoMap's scan log, a text format: `NODE x y z roll pitch yaw` starts a scan, and its points follow as `x y z`
+/// in the node's frame. Empty lines and lines that start with `#` or a blank are skipped, as in OctoMap.
 ///
-/// Numbers are read as `f32`, as in OctoMap, so that log and graph give the same map. `path` is for errors and for the
-/// fingerprint.
+/// Numbers are read as `f32`, as in OctoMap, so that a log and its graph give the same map. `path` is used for errors
+/// and for the fingerprint.
 pub fn read_scan_log<R: BufRead>(input: R, path: &Path) -> impl ScanSource + use<R> {
     ScanLog { path: path.to_owned(), input, line: 0, pose: None, done: 0 }
 }
@@ -28,16 +27,16 @@ struct ScanLog<R> {
     path: PathBuf,
     input: R,
     line: u64,
-    /// Pose of the scan whose points follow.
+    /// Pose of the current scan.
     pose: Option<Pose>,
     done: usize,
 }
 
-/// A longer line is an error.
+/// Limit for the length of a line.
 const MAX_LINE_BYTES: u64 = 1 << 16;
 
 impl<R: BufRead> ScanLog<R> {
-    /// The next line with content; `None` at the end.
+    /// Returns the next line with content, or `None` at the end.
     fn next_line(&mut self) -> Result<Option<String>> {
         loop {
             let mut bytes = Vec::new();
@@ -73,7 +72,7 @@ impl<R: BufRead> ScanLog<R> {
     fn pose(&self, words: &str) -> Result<Pose> {
         let [x, y, z, roll, pitch, yaw] = self.numbers(words)?;
         if ![x, y, z, roll, pitch, yaw].iter().all(|number| number.is_finite()) {
-            return Err(self.wrong("a pose that is not finite"));
+            return Err(self.wrong("the pose has a number that is not finite"));
         }
         Ok(Isometry3::from_parts(Translation3::new(x, y, z), rotation(roll, pitch, yaw)).into())
     }
@@ -105,7 +104,9 @@ impl<R: BufRead> ScanSource for ScanLog<R> {
                 }
                 (None, Some(_)) => points.push(self.numbers(&line)?, 0.0)?,
                 (None, None) => {
-                    return Err(self.wrong("points before the first line NODE; this is no scan log"));
+                    return Err(
+                        self.wrong("there are points before the first NODE line: this is not a scan log")
+                    );
                 }
             }
         }
@@ -120,7 +121,7 @@ impl<R: BufRead> ScanSource for ScanLog<R> {
     }
 }
 
-/// First roll about x, then pitch about y, then yaw about z, in radians.
+/// Rotation about x (roll), then y (pitch), then z (yaw), in radians.
 fn rotation(roll: f64, pitch: f64, yaw: f64) -> UnitQuaternion<f64> {
     let ((sr, cr), (sp, cp), (sy, cy)) = (sin_cos(roll), sin_cos(pitch), sin_cos(yaw));
     let matrix = Matrix3::new(

@@ -1,48 +1,48 @@
-//! A text of points, line by line.
+//! Line-by-line parser of a text of points.
 
 use super::cloud::CloudPoint;
 use super::columns::{Clock, Meaning};
-use super::text_header::{are_poses, asked_separator, names_of, unit_of_comment, units_row};
+use super::text_header::{are_poses, names_of, requested_separator, unit_of_comment, units_row};
 use super::text_line::{Separator, comment_of, digits_behind_comma, without_end};
 
-/// What a line of a text of points is.
+/// Meaning of a line.
 #[derive(Debug, PartialEq)]
 pub(super) enum Line {
     Point(CloudPoint),
-    /// A comment, names, an empty line, a number of points.
+    /// A comment, column names, an empty line, or a number of points.
     Nothing,
-    /// A row that is no point, and why.
+    /// An invalid row and the reason.
     Unread(String),
 }
 
-/// Why a text is none of points, and the number of the line that says so.
+/// Line number and reason of an error that makes the whole text unusable.
 pub(super) type Wrong = (u64, String);
 
-/// How the lines of a text are split, and what their columns mean. Both are known with the first point.
+/// Separator and meaning of the columns. Both are fixed with the first point.
 #[derive(Debug, Default)]
 pub(super) struct Columns {
     pub(super) clock: Clock,
     pub(super) names: Vec<String>,
     separator: Separator,
-    asked: Option<Separator>,
+    requested: Option<Separator>,
     are_named: bool,
     meaning: Option<Meaning>,
     has_points: bool,
-    /// Whether each cell of the first point is a number.
+    /// Whether every cell of the first point is a number.
     are_numbers: bool,
-    /// Columns before those with names: R writes the names of rows there.
+    /// Number of columns before the named ones: R writes row names there.
     unnamed: usize,
     counts: Counts,
-    /// The first line before the points that says nothing. Only names behind it make it harmless.
+    /// First unrecognised line before the points. It is an error unless column names follow.
     prose: Option<Wrong>,
-    /// Lines before the points.
+    /// Number of lines before the points.
     lines_before: u32,
-    /// A comment that speaks of another unit than metres.
+    /// A comment that mentions a unit other than metres.
     comment_unit: Option<Wrong>,
     notes: Vec<String>,
 }
 
-/// Numbers of points that stand before them: PTS has one before each scan.
+/// Point counts that precede the points. PTS has one before each scan.
 #[derive(Debug, Default)]
 struct Counts {
     scans: u64,
@@ -50,11 +50,11 @@ struct Counts {
     rows: u64,
 }
 
-/// More lines of prose before the names of columns are an error.
+/// Limit for the lines of prose before the column names.
 const MAX_LINES_BEFORE: u32 = 100;
 
 impl Counts {
-    /// Takes a line of one number, if a scan may begin here.
+    /// Accepts a line with one number as a point count, if a scan may begin here.
     fn begin(&mut self, count: f64) -> bool {
         let is_number = count.fract() == 0.0 && count >= 0.0;
         let may_begin = is_number && (self.scans == 0 || self.rows >= self.announced);
@@ -68,19 +68,19 @@ impl Counts {
     fn remark(&self) -> Option<String> {
         let Self { scans, announced, rows } = self;
         if *scans > 0 && announced != rows {
-            return Some(format!("announces {announced} points and has {rows}: is it cut off?"));
+            return Some(format!("announces {announced} points but has {rows}: is it truncated?"));
         }
-        (*scans > 1).then(|| format!("{scans} scans with a number of points each, read as one cloud"))
+        (*scans > 1).then(|| format!("{scans} scans, each with a point count, are read as one cloud"))
     }
 }
 
 impl Columns {
-    /// Whether names were found.
+    /// Returns whether column names were found.
     pub(super) fn are_named(&self) -> bool {
         self.are_named
     }
 
-    /// Whether each cell of the first point is a number.
+    /// Returns whether every cell of the first point is a number.
     pub(super) fn are_numbers(&self) -> bool {
         self.are_numbers
     }
@@ -89,28 +89,28 @@ impl Columns {
         self.meaning.as_ref()
     }
 
-    /// What a person should know of the columns.
+    /// Returns remarks for the user about the columns.
     pub(super) fn remarks(&self) -> Vec<String> {
         let units = self.meaning.as_ref().and_then(Meaning::remark);
         self.notes.iter().cloned().chain(units).collect()
     }
 
-    /// What a person should know at the end of the text.
+    /// Returns a remark for the user at the end of the text.
     pub(super) fn last_remark(&self) -> Option<String> {
         self.counts.remark()
     }
 
-    /// Why a text that ended without a point is none of points.
+    /// Returns the error of a text that ended without a point, if any.
     pub(super) fn why_none(&self) -> Option<Wrong> {
         self.prose.clone().filter(|_| !self.are_named)
     }
 
-    /// Reads the next line.
+    /// Parses the next line.
     pub(super) fn take(&mut self, number: u64, line: &str) -> Result<Line, Wrong> {
         let text = line.trim();
         if text.is_empty() {
-            // A row of empty cells may be nothing but tabs.
-            let is_row = self.has_points && self.separator == Separator::Mark('\t') && line.contains('\t');
+            // A row of empty cells may consist of tabs only.
+            let is_row = self.has_points && self.separator == Separator::Char('\t') && line.contains('\t');
             return Ok(if is_row { self.row(line) } else { Line::Nothing });
         }
         if let Some(comment) = comment_of(text) {
@@ -122,8 +122,8 @@ impl Columns {
         if self.has_points {
             return Ok(self.row(line));
         }
-        if let Some(separator) = asked_separator(text).filter(|_| self.lines_before == 0) {
-            self.asked = Some(separator);
+        if let Some(separator) = requested_separator(text).filter(|_| self.lines_before == 0) {
+            self.requested = Some(separator);
             return Ok(Line::Nothing);
         }
         let found = self.begin(number, line).map_err(|reason| {
@@ -140,7 +140,7 @@ impl Columns {
         }
     }
 
-    /// Takes names of columns, which some programs write as a comment, and the unit that it speaks of.
+    /// Reads column names, which some programs write as a comment, and a unit mentioned in a comment.
     fn take_comment(&mut self, number: u64, comment: &str) -> Result<(), String> {
         if !self.are_named {
             self.take_names(comment)?;
@@ -151,11 +151,11 @@ impl Columns {
         Ok(())
     }
 
-    /// Takes a line before the first point.
+    /// Parses a line before the first point.
     fn begin(&mut self, number: u64, line: &str) -> Result<Line, String> {
-        let separator = self.asked.unwrap_or_else(|| Separator::of_row(line, self.names.len()));
+        let separator = self.requested.unwrap_or_else(|| Separator::of_row(line, self.names.len()));
         let cells = separator.split(line);
-        // PTS starts with the number of its points.
+        // PTS starts with a point count.
         if let [only] = without_end(&cells)
             && let Some(count) = separator.number(only)
         {
@@ -172,9 +172,9 @@ impl Columns {
             _ => {
                 let text = line.trim();
                 let reason = if text.get(..5).is_some_and(|start| start.eq_ignore_ascii_case("ncols")) {
-                    "this is a grid of heights (ESRI ASCII), not points: gdal_translate -of XYZ makes points of it".into()
+                    "this is a grid of heights (ESRI ASCII), not points: convert it with gdal_translate -of XYZ".into()
                 } else {
-                    format!("`{text:.60}` is neither numbers nor names of columns with x, y and z")
+                    format!("`{text:.60}` is neither numbers nor column names with x, y and z")
                 };
                 if self.lines_before >= MAX_LINES_BEFORE {
                     return Err(reason);
@@ -188,21 +188,21 @@ impl Columns {
     fn begin_unnamed(&mut self, separator: Separator, cells: &[&str]) -> Result<Line, String> {
         let columns = without_end(cells).len();
         if columns == 0 {
-            // A row of no return says nothing of the columns.
+            // A row without a return does not reveal the columns.
             let position_m = [f64::NAN; 3];
             return Ok(Line::Point(CloudPoint { is_return: false, ..CloudPoint::hit(position_m) }));
         }
         if let Some(cell) = digits_behind_comma(separator, cells) {
-            return Err(ambiguous_commas(columns, &format!("`{cell:.20}` is the end of a number")));
+            return Err(ambiguous_commas(columns, &format!("`{cell:.20}` is the fraction of a number")));
         }
         let is_number = |cell: Option<&&str>| cell.is_some_and(|cell| separator.number(cell).is_some());
         let mut meaning = Meaning::of_metres([0, 1, 2]);
-        // x y z, then the intensity, unless the three after them are a colour or a normal.
+        // x y z, then the intensity, unless the next three columns are a colour or a normal.
         meaning.intensity = (columns > 3 && columns != 6 && is_number(cells.get(3))).then_some(3);
         self.names = ["x", "y", "z"].map(str::to_owned).into();
         self.names.extend(meaning.intensity.map(|_| "intensity".to_owned()));
         if columns > 3 {
-            let rest = if columns > self.names.len() { ", the rest is not read" } else { "" };
+            let rest = if columns > self.names.len() { ", the others are ignored" } else { "" };
             self.notes.push(format!("{columns} columns without names: {}{rest}", self.names.join(" ")));
         }
         (self.separator, self.meaning) = (separator, Some(meaning));
@@ -211,7 +211,7 @@ impl Columns {
     }
 
     fn begin_named(&mut self, separator: Separator, cells: &[&str], line: &str) -> Result<Line, String> {
-        let Some(mut meaning) = self.meaning else { return Err("x, y and z are not known".into()) };
+        let Some(mut meaning) = self.meaning else { return Err("the columns x, y and z are unknown".into()) };
         if let Some(units) = units_row(cells, &meaning) {
             meaning.units = units;
             self.meaning = Some(meaning);
@@ -219,12 +219,12 @@ impl Columns {
         }
         self.separator = separator;
         let columns = without_end(cells).len();
-        if separator == Separator::Mark(',') && columns == 2 * self.names.len() {
-            return Err(ambiguous_commas(columns, &format!("{} names of columns", self.names.len())));
+        if separator == Separator::Char(',') && columns == 2 * self.names.len() {
+            return Err(ambiguous_commas(columns, &format!("there are {} column names", self.names.len())));
         }
         let is_one_more = columns == self.names.len() + 1 && line.trim_start().starts_with('"');
         self.unnamed = usize::from(is_one_more);
-        // What a point can do without may be words.
+        // Optional columns may contain words and are then ignored.
         for at in meaning.intensity.into_iter().chain(meaning.time.map(|time| time.at)) {
             let cell = cells.get(at + self.unnamed).copied().unwrap_or_default();
             if cell.is_empty() || separator.number(cell).is_some() {
@@ -233,7 +233,7 @@ impl Columns {
             meaning.intensity = meaning.intensity.filter(|intensity| *intensity != at);
             meaning.time = meaning.time.filter(|time| time.at != at);
             let name = self.names.get(at).map(String::as_str).unwrap_or_default();
-            self.notes.push(format!("column `{name:.40}` has no numbers (`{cell:.20}`): not read"));
+            self.notes.push(format!("column `{name:.40}` has no numbers (`{cell:.20}`) and is ignored"));
         }
         let before = self.meaning.replace(meaning);
         match self.first_point(cells) {
@@ -252,7 +252,8 @@ impl Columns {
         self.counts.rows += 1;
         if let (Some((line, comment)), Some(None)) = (&self.comment_unit, self.meaning().map(Meaning::remark))
         {
-            self.notes.push(format!("line {line} says `{comment:.60}`, but coordinates are read as metres"));
+            self.notes
+                .push(format!("line {line} contains `{comment:.60}`, but coordinates are read as metres"));
         }
         Ok(Line::Point(point))
     }
@@ -277,27 +278,28 @@ impl Columns {
         Line::Unread(reason)
     }
 
-    /// Takes a line as names, if it has x, y and z.
+    /// Parses a line as column names, if they include x, y and z.
     fn take_names(&mut self, line: &str) -> Result<bool, String> {
         let names = names_of(line.trim());
-        // Livox counts nanoseconds; that a column holds integers is not known before all of it is read.
+        // Livox counts nanoseconds. Whether other columns hold integers is unknown until all rows are read.
         let is_integer =
             |at: usize| names.get(at).is_some_and(|name| name.eq_ignore_ascii_case("offset_time"));
         let Some(meaning) = Meaning::of(&names, is_integer)? else { return Ok(false) };
         if are_poses(&names) {
-            self.notes
-                .push("has columns qx qy qz qw: if these are poses, give them with `poses` FILE".into());
+            self.notes.push("has columns qx qy qz qw: if these are poses, use `poses` FILE".into());
         }
         (self.names, self.meaning, self.are_named) = (names, Some(meaning), true);
         Ok(true)
     }
 
     fn point(&mut self, cells: &[&str]) -> Result<CloudPoint, String> {
-        let Some(meaning) = self.meaning else { return Err("x, y and z are not known".into()) };
+        let Some(meaning) = self.meaning else { return Err("the columns x, y and z are unknown".into()) };
         let (separator, unnamed) = (self.separator, self.unnamed);
         let value = |at: usize| -> Result<f64, String> {
             match cells.get(at + unnamed) {
-                None => Err(format!("{} columns, {} are needed", cells.len(), meaning.last() + unnamed + 1)),
+                None => {
+                    Err(format!("{} columns, but {} are needed", cells.len(), meaning.last() + unnamed + 1))
+                }
                 Some(&"") => Ok(f64::NAN),
                 Some(cell) => separator.number(cell).ok_or_else(|| format!("`{cell:.40}` is not a number")),
             }
@@ -311,12 +313,12 @@ impl Columns {
 }
 
 fn too_few(columns: usize) -> String {
-    format!("{columns} columns; a point has x, y and z")
+    format!("{columns} columns; a point needs x, y and z")
 }
 
 fn ambiguous_commas(cells: usize, why: &str) -> String {
     format!(
-        "{cells} cells between commas, but {why}: decimal commas cannot be told from commas between cells; save it with \
+        "{cells} comma-separated cells, but {why}: decimal commas and separators are ambiguous; save it with \
          semicolons or tabs, or with decimal points"
     )
 }
@@ -347,7 +349,7 @@ mod tests {
     }
 
     #[test]
-    fn names_and_marks_of_many_programs() {
+    fn names_and_separators_of_many_programs() {
         let wanted = CloudPoint { intensity: 7.0, ..CloudPoint::hit([1.0, 2.0, 3.0]) };
         for text in [
             "1 2 3 7",
@@ -381,7 +383,7 @@ mod tests {
     }
 
     #[test]
-    fn a_colour_is_no_intensity_and_an_empty_cell_is_no_return() {
+    fn colours_are_not_intensities_and_empty_cells_are_not_returns() {
         assert_eq!(read("1 2 3 255 0 0"), Ok(vec![CloudPoint::hit([1.0, 2.0, 3.0])]));
         let points = read("x,y,z,time\n,,,5\nnan,nan,nan,5\n,,,").unwrap_or_default();
         assert_eq!(points.iter().map(|point| point.is_return).collect::<Vec<_>>(), [false; 3]);
@@ -399,12 +401,12 @@ mod tests {
     }
 
     #[test]
-    fn rows_that_are_no_points_are_left_out() {
+    fn invalid_rows_are_skipped() {
         for (text, reason) in [
-            ("x y z intensity\n1 2 3\n1 2 3 4", "line 2: 3 columns, 4 are needed"),
+            ("x y z intensity\n1 2 3\n1 2 3 4", "line 2: 3 columns, but 4 are needed"),
             ("1 2 3\n1 2 c\n4 5 6", "line 2: `c` is not a number"),
             ("x,y,z\n1,2,3\nx,y,z\n4,5,6", "line 3: `x` is not a number"),
-            ("1 2 3\n7\n4 5 6", "line 2: 1 columns, 3 are needed"),
+            ("1 2 3\n7\n4 5 6", "line 2: 1 columns, but 3 are needed"),
         ] {
             let (points, _, unread) = read_all(text).unwrap_or_else(|error| panic!("{error}"));
             assert_eq!(unread, [reason], "{text}");
@@ -413,15 +415,15 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_text_of_points_is_an_error_with_line_and_word() {
+    fn invalid_texts_are_errors_with_line_and_word() {
         for (text, reason) in [
-            ("# a\nhello world", "line 2: `hello world` is neither numbers nor names"),
+            ("# a\nhello world", "line 2: `hello world` is neither numbers nor column names"),
             ("Exported\n1 2 3", "line 1: `Exported` is neither"),
-            ("1 2", "line 1: 2 columns; a point has x, y and z"),
+            ("1 2", "line 1: 2 columns; a point needs x, y and z"),
             ("1\n2\n3", "line 2: 1 columns"),
-            ("x (px),y (px),z (px)\n1,2,3", "line 1: column `x (px)`: `px` is no known unit"),
-            ("6,001,3,178,-1,000", "line 1: 6 cells between commas, but `001` is the end of a number"),
-            ("x,y,z\n6,5,3,5,1,5", "line 2: 6 cells between commas, but 3 names of columns"),
+            ("x (px),y (px),z (px)\n1,2,3", "line 1: column `x (px)`: `px` is an unknown unit"),
+            ("6,001,3,178,-1,000", "line 1: 6 comma-separated cells, but `001` is the fraction of a number"),
+            ("x,y,z\n6,5,3,5,1,5", "line 2: 6 comma-separated cells, but there are 3 column names"),
             ("ncols 3\nnrows 2\n1 2 3", "line 1: this is a grid of heights"),
         ] {
             let error = read(text).unwrap_err();
@@ -430,13 +432,13 @@ mod tests {
     }
 
     #[test]
-    fn guesses_are_said() {
+    fn guesses_are_remarked() {
         for (text, remark) in [
             ("1 2 3 7", "4 columns without names: x y z intensity"),
-            ("1 2 3 7 255 0 0", "7 columns without names: x y z intensity, the rest is not read"),
-            ("1 2 3 255 0 0", "6 columns without names: x y z, the rest is not read"),
-            ("# units: mm\n1 2 3", "line 1 says `units: mm`, but coordinates are read as metres"),
-            ("x,y,z,time\n1,2,3,12:05", "column `time` has no numbers (`12:05`): not read"),
+            ("1 2 3 7 255 0 0", "7 columns without names: x y z intensity, the others are ignored"),
+            ("1 2 3 255 0 0", "6 columns without names: x y z, the others are ignored"),
+            ("# units: mm\n1 2 3", "line 1 contains `units: mm`, but coordinates are read as metres"),
+            ("x,y,z,time\n1,2,3,12:05", "column `time` has no numbers (`12:05`) and is ignored"),
             ("t,x,y,z,qx,qy,qz,qw\n0,1,2,3,0,0,0,1", "if these are poses"),
             ("x[mm] y[mm] z[mm]\n1 2 3", "x, y and z are in mm"),
         ] {
@@ -451,18 +453,18 @@ mod tests {
     }
 
     #[test]
-    fn numbers_of_points_stand_before_each_scan() {
+    fn point_counts_precede_each_scan() {
         for (text, points, remark) in [
             ("2\n1 2 3\n4 5 6\n", 2, None),
-            ("2\n1 2 3\n4 5 6\n1\n7 8 9\n", 3, Some("2 scans with a number of points each")),
+            ("2\n1 2 3\n4 5 6\n1\n7 8 9\n", 3, Some("2 scans, each with a point count")),
             ("0\n1\n1 2 3\n", 1, Some("2 scans")),
-            ("3\n1 2 3\n4 5 6\n", 2, Some("announces 3 points and has 2")),
+            ("3\n1 2 3\n4 5 6\n", 2, Some("announces 3 points but has 2")),
         ] {
             let (found, columns, unread) = read_all(text).unwrap_or_else(|error| panic!("{error}"));
             assert_eq!((found.len(), unread.len()), (points, 0), "{text}");
-            let said = columns.last_remark();
-            assert_eq!(said.is_some(), remark.is_some(), "{text}: {said:?}");
-            assert!(said.is_none_or(|said| said.contains(remark.unwrap_or_default())), "{text}");
+            let found = columns.last_remark();
+            assert_eq!(found.is_some(), remark.is_some(), "{text}: {found:?}");
+            assert!(found.is_none_or(|found| found.contains(remark.unwrap_or_default())), "{text}");
         }
     }
 }

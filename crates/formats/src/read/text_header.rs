@@ -1,18 +1,18 @@
-//! What a text of points says before its points: names of columns, units, a separator.
+//! Parts of a text of points before its points: column names, units and the separator.
 
 use super::columns::Meaning;
 use super::text_line::{Separator, without_end};
 use super::units::LengthUnit;
 
-/// The names that a line has, if they were names.
+/// Splits a line into column names.
 pub(super) fn names_of(line: &str) -> Vec<String> {
-    let tab = Separator::Mark('\t');
+    let tab = Separator::Char('\t');
     let has_tabs = line.trim().contains('\t') && !tab.split(line.trim()).contains(&"");
     let separator = if has_tabs { tab } else { Separator::of(line) };
     let cells = separator.split(line);
     let mut names: Vec<String> = Vec::new();
     for cell in without_end(&cells) {
-        // Between blanks, `x (cm)` is two words.
+        // In a blank-separated line, `x (cm)` is two words.
         match names.last_mut().filter(|_| separator == Separator::Blank) {
             Some(name) if cell.starts_with(['[', '(']) || is_open(name) => {
                 name.push(' ');
@@ -24,21 +24,21 @@ pub(super) fn names_of(line: &str) -> Vec<String> {
     names
 }
 
-/// Whether a bracket of a name is not closed yet.
+/// Returns whether a name has an unclosed bracket.
 fn is_open(name: &str) -> bool {
     let last = name.rfind(['[', '(', ']', ')']).and_then(|at| name.get(at..));
     last.is_some_and(|rest| rest.starts_with(['[', '(']))
 }
 
-/// The separator that a first line `sep=;` of Excel asks for.
-pub(super) fn asked_separator(line: &str) -> Option<Separator> {
+/// Returns the separator requested by a first line `sep=;`, as in Excel.
+pub(super) fn requested_separator(line: &str) -> Option<Separator> {
     let lower = line.trim().trim_matches('"').to_ascii_lowercase();
     let mut mark = lower.strip_prefix("sep=")?.chars();
-    let separator = mark.next().map_or(Separator::Mark('\t'), Separator::Mark);
+    let separator = mark.next().map_or(Separator::Char('\t'), Separator::Char);
     mark.next().is_none().then_some(separator)
 }
 
-/// The units of x, y and z in a row of units below the names.
+/// Returns the units of x, y and z from a row of units below the names.
 pub(super) fn units_row(cells: &[&str], meaning: &Meaning) -> Option<[LengthUnit; 3]> {
     let unit = |at: usize| {
         let cell = cells.get(at)?.trim_matches(['[', ']', '(', ')', '{', '}', '<', '>', ' ']);
@@ -48,7 +48,7 @@ pub(super) fn units_row(cells: &[&str], meaning: &Meaning) -> Option<[LengthUnit
     Some([unit(x)?, unit(y)?, unit(z)?])
 }
 
-/// The unit of length that a comment speaks of, if it is another than metres: `units: mm`, `all values in cm`.
+/// Returns the unit of length mentioned in a comment, unless it is metres: `units: mm`, `all values in cm`.
 pub(super) fn unit_of_comment(comment: &str) -> Option<LengthUnit> {
     let lower = comment.to_lowercase();
     let words: Vec<&str> =
@@ -63,7 +63,7 @@ pub(super) fn unit_of_comment(comment: &str) -> Option<LengthUnit> {
     found.filter(|unit| *unit != LengthUnit::METRE)
 }
 
-/// Whether these are names of columns of poses.
+/// Returns whether these are column names of poses.
 pub(super) fn are_poses(names: &[String]) -> bool {
     ["qx", "qy", "qz", "qw"].iter().all(|wanted| names.iter().any(|name| name.eq_ignore_ascii_case(wanted)))
 }
@@ -73,7 +73,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_are_those_of_columns() {
+    fn column_names_are_split() {
         for (line, wanted) in [
             ("x y z", vec!["x", "y", "z"]),
             ("x (cm) y [cm] z (cm) t", vec!["x (cm)", "y [cm]", "z (cm)", "t"]),
@@ -88,10 +88,10 @@ mod tests {
     }
 
     #[test]
-    fn units_and_separators_before_points() {
-        assert_eq!(asked_separator("sep=;"), Some(Separator::Mark(';')));
-        assert_eq!(asked_separator("\"SEP=,\""), Some(Separator::Mark(',')));
-        assert_eq!(asked_separator("separate"), None);
+    fn units_and_separators_are_detected() {
+        assert_eq!(requested_separator("sep=;"), Some(Separator::Char(';')));
+        assert_eq!(requested_separator("\"SEP=,\""), Some(Separator::Char(',')));
+        assert_eq!(requested_separator("separate"), None);
         let meaning = Meaning::of_metres([1, 2, 3]);
         assert_eq!(units_row(&["s", "[mm]", "(mm)", "mm"], &meaning).map(|units| units[0].name), Some("mm"));
         assert_eq!(units_row(&["s", "px", "px", "px"], &meaning), None);

@@ -1,36 +1,36 @@
-//! A line of a text of numbers: what parts its cells, and the numbers in them.
+//! Splits lines of text into cells and parses their numbers.
 
-/// What parts the cells of a line.
+/// Separator of the cells of a line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Separator {
-    /// Blanks and tabs, one or more.
+    /// One or more blanks and tabs.
     #[default]
     Blank,
-    /// A mark; there may be nothing between two of them.
-    Mark(char),
+    /// A character. Cells between two separators may be empty.
+    Char(char),
 }
 
 impl Separator {
-    /// What parts the cells of a line. A comma is a mark, unless the words between blanks are numbers with decimal
+    /// Detects the separator of a line. Commas separate cells unless the blank-separated words are numbers with decimal
     /// commas.
     pub(crate) fn of(line: &str) -> Self {
         let has = |mark: char| is_outside_quotes(line, mark);
         if let Some(mark) = [';', '|'].into_iter().find(|mark| has(*mark)) {
-            return Self::Mark(mark);
+            return Self::Char(mark);
         }
         let is_decimal = |word: &str| Self::Blank.number(word).is_some() && !word.starts_with(',');
         let mut words = line.split_ascii_whitespace();
         let are_decimals = words.clone().count() > 1 && words.all(is_decimal);
-        if has(',') && !are_decimals { Self::Mark(',') } else { Self::Blank }
+        if has(',') && !are_decimals { Self::Char(',') } else { Self::Blank }
     }
 
-    /// What parts the cells of a line of a table with so many columns: a tab, if it gives as many cells.
+    /// Detects the separator of a table row: tabs, if they give the expected number of columns.
     pub(crate) fn of_row(line: &str, columns: usize) -> Self {
-        let tab = Self::Mark('\t');
+        let tab = Self::Char('\t');
         if line.contains('\t') && tab.split(line).len() == columns { tab } else { Self::of(line) }
     }
 
-    /// The cells of a line, without quotes around them. Empty ones between marks count, also behind the last mark.
+    /// Splits a line into cells without their quotes. Empty cells count, also after the last separator.
     pub(crate) fn split(self, line: &str) -> Vec<&str> {
         let has_quotes = line.contains('"');
         match self {
@@ -40,7 +40,7 @@ impl Separator {
                 .filter(|cell| !cell.is_empty())
                 .map(cell_of)
                 .collect(),
-            Self::Mark(mark) => {
+            Self::Char(mark) => {
                 let mut line = line.trim_matches(|letter: char| letter.is_whitespace() && letter != mark);
                 // Rows of Markdown and of some databases begin and end with a bar.
                 if mark == '|' && line.starts_with(mark) {
@@ -56,14 +56,14 @@ impl Separator {
         }
     }
 
-    /// The number in a cell, which may have a decimal comma where no comma parts cells.
+    /// Parses the number in a cell. Decimal commas are accepted if commas are not separators.
     pub(crate) fn number(self, cell: &str) -> Option<f64> {
         if let Some(number) = number(cell) {
             return Some(number);
         }
         let (whole, fraction) = cell.split_once(',')?;
-        // Between commas, a cell with a comma was quoted; three digits behind it may be thousands.
-        let may_be_thousands = self == Self::Mark(',') && fraction.len() == 3;
+        // In a comma-separated line, a cell with a comma was quoted. Three digits after the comma may be thousands.
+        let may_be_thousands = self == Self::Char(',') && fraction.len() == 3;
         let is_fraction = fraction.starts_with(|first: char| first.is_ascii_digit());
         if may_be_thousands || !is_fraction || whole.contains('.') || fraction.contains([',', '.']) {
             return None;
@@ -72,18 +72,18 @@ impl Separator {
     }
 }
 
-/// Cells without empty ones at the end: a mark behind the last cell begins none.
+/// Removes empty cells at the end of a line.
 pub(crate) fn without_end<'c, 'l>(cells: &'c [&'l str]) -> &'c [&'l str] {
     let end = cells.iter().rposition(|cell| !cell.is_empty()).map_or(0, |last| last + 1);
     cells.get(..end).unwrap_or(cells)
 }
 
-/// A cell between commas that is the fraction of a number with a decimal comma: `001` of `6,001,3,178`.
+/// Returns a cell that is the fraction of a number with a decimal comma, as `001` in `6,001,3,178`.
 pub(super) fn digits_behind_comma<'c>(separator: Separator, cells: &[&'c str]) -> Option<&'c str> {
     let is_integer =
         |cell: &str| !cell.is_empty() && cell.trim_start_matches('-').bytes().all(|b| b.is_ascii_digit());
     let cells = without_end(cells);
-    if separator != Separator::Mark(',')
+    if separator != Separator::Char(',')
         || !cells.len().is_multiple_of(2)
         || !cells.iter().all(|cell| is_integer(cell))
     {
@@ -93,18 +93,18 @@ pub(super) fn digits_behind_comma<'c>(separator: Separator, cells: &[&'c str]) -
     cells.iter().skip(1).step_by(2).find(is_fraction).copied()
 }
 
-/// What a comment says; `None` of a line that is none.
+/// Returns the text of a comment line, or `None` for other lines.
 pub(crate) fn comment_of(line: &str) -> Option<&str> {
     let line = line.trim_start();
     ["#", "%", "//"].iter().find_map(|mark| line.strip_prefix(mark))
 }
 
-/// The number that a word is. What programs write for no number is NaN.
+/// Parses a word as a number. Common words for a missing number give NaN.
 pub(crate) fn number(word: &str) -> Option<f64> {
     word.parse().ok().or_else(|| unusual_number(word))
 }
 
-/// `-nan(ind)` and `1.#QNAN` of Windows, `1.#INF`, `NA` of tables, `1.5D+02` of Fortran.
+/// Parses `-nan(ind)`, `1.#QNAN` and `1.#INF` of Windows programs, `NA` of tables, and `1.5D+02` of Fortran.
 #[cold]
 fn unusual_number(word: &str) -> Option<f64> {
     let lower = word.trim().trim_matches(['"', '\'']).to_ascii_lowercase();
@@ -133,7 +133,7 @@ fn unusual_number(word: &str) -> Option<f64> {
     format!("{mantissa}e{exponent}").parse::<f64>().ok().map(|number| sign * number)
 }
 
-/// A cell without blanks and quotes around it.
+/// Trims blanks and quotes from a cell.
 fn cell_of(cell: &str) -> &str {
     let cell = cell.trim();
     let quoted = ['"', '\''].into_iter().find_map(|quote| cell.strip_prefix(quote)?.strip_suffix(quote));
@@ -147,12 +147,12 @@ fn is_outside_quotes(line: &str, mark: char) -> bool {
     split_unquoted(line, |letter| letter == mark).len() > 1
 }
 
-/// Parts of a line between marks that are not within double quotes.
-fn split_unquoted(line: &str, is_mark: impl Fn(char) -> bool) -> Vec<&str> {
+/// Splits a line at separators that are not within double quotes.
+fn split_unquoted(line: &str, is_separator: impl Fn(char) -> bool) -> Vec<&str> {
     let mut is_quoted = false;
     line.split(|letter: char| {
         is_quoted ^= letter == '"';
-        !is_quoted && is_mark(letter)
+        !is_quoted && is_separator(letter)
     })
     .collect()
 }
@@ -162,8 +162,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lines_of_many_programs_are_parted() {
-        let mark = Separator::Mark;
+    fn lines_of_many_programs_are_split() {
+        let mark = Separator::Char;
         for (line, separator, cells) in [
             ("1 2\t 3", Separator::Blank, vec!["1", "2", "3"]),
             ("1, 2 ,3,", mark(','), vec!["1", "2", "3", ""]),
@@ -188,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_of_many_programs() {
+    fn numbers_of_many_programs_are_parsed() {
         for (word, wanted) in [
             ("1.5", Some(1.5)),
             ("-.5e1", Some(-5.0)),
@@ -226,8 +226,8 @@ mod tests {
     }
 
     #[test]
-    fn decimal_commas_count_where_commas_part_no_cells() {
-        let semicolon = Separator::Mark(';');
+    fn decimal_commas_are_accepted_if_commas_are_not_separators() {
+        let semicolon = Separator::Char(';');
         for (separator, cell, wanted) in [
             (semicolon, "1,5", Some(1.5)),
             (semicolon, "-1,250", Some(-1.25)),
@@ -235,9 +235,9 @@ mod tests {
             (Separator::Blank, "0,25", Some(0.25)),
             (semicolon, "1.234,5", None),
             (semicolon, "1,234,567", None),
-            (Separator::Mark(','), "1,25", Some(1.25)),
-            // Thousands, perhaps.
-            (Separator::Mark(','), "1,250", None),
+            (Separator::Char(','), "1,25", Some(1.25)),
+            // Possibly thousands.
+            (Separator::Char(','), "1,250", None),
         ] {
             assert_eq!(separator.number(cell), wanted, "{cell}");
         }

@@ -1,104 +1,103 @@
-/// Follows a text of XML byte by byte, and counts what takes the memory and the time of its reader: it compares each
-/// attribute of a tag with those before it, and keeps the name spaces of a tag for all tags within.
+/// Incremental check of an XML text. It counts constructs that take much memory or time in the XML parser, which
+/// compares each attribute of a tag with the previous ones and keeps the namespaces of a tag for all tags within it.
 #[derive(Debug, Default)]
 pub(super) struct XmlCheck {
-    place: Place,
-    /// The bytes since the last `<`, up to those that tell what it starts.
+    state: State,
+    /// Bytes since the last `<`, up to those that identify the construct.
     start: Vec<u8>,
-    /// The last two bytes of this place: those that begin it count for none.
+    /// Last two bytes within the current construct, without its opening bytes.
     last: [u8; 2],
-    /// Attributes of the tag so far.
+    /// Number of attributes of the current tag.
     attributes: usize,
     name_spaces: usize,
-    /// Tags and attributes.
+    /// Number of tags and attributes.
     pub(super) nodes: u64,
 }
 
-/// Where the next byte is.
+/// Lexical state.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-enum Place {
+enum State {
     #[default]
     Text,
     Tag,
-    /// The value of an attribute, up to this quote.
+    /// An attribute value, up to this quote.
     Value(u8),
-    /// Up to these bytes.
     Comment,
     Data,
     Instruction,
 }
 
-/// E57 has few attributes.
+/// Limit well above the attributes used by E57.
 const MAX_ATTRIBUTES: usize = 256;
-/// A file declares those of its extensions.
+/// Limit for namespaces. A file declares one for each of its extensions.
 const MAX_NAME_SPACES: usize = 1000;
 const COMMENT: &[u8] = b"!--";
 const DATA: &[u8] = b"![CDATA[";
 
 impl XmlCheck {
-    /// Takes the next bytes.
+    /// Checks the next bytes.
     ///
     /// # Errors
     ///
-    /// More of something than is read.
+    /// A limit is exceeded.
     pub(super) fn take(&mut self, bytes: &[u8]) -> Result<(), String> {
         bytes.iter().try_for_each(|&byte| {
-            let before = self.place;
+            let before = self.state;
             let taken = self.step(byte);
-            self.last = if self.place == before { [self.last[1], byte] } else { [0; 2] };
+            self.last = if self.state == before { [self.last[1], byte] } else { [0; 2] };
             taken
         })
     }
 
     fn step(&mut self, byte: u8) -> Result<(), String> {
         let [before, last] = self.last;
-        match (self.place, byte) {
-            (Place::Text, b'<') => {
-                self.place = Place::Tag;
+        match (self.state, byte) {
+            (State::Text, b'<') => {
+                self.state = State::Tag;
                 self.start.clear();
                 self.attributes = 0;
                 self.nodes += 1;
             }
-            (Place::Tag, b'>') => self.place = Place::Text,
-            (Place::Tag, b'"' | b'\'') => self.place = Place::Value(byte),
-            (Place::Tag, b'=') => {
+            (State::Tag, b'>') => self.state = State::Text,
+            (State::Tag, b'"' | b'\'') => self.state = State::Value(byte),
+            (State::Tag, b'=') => {
                 self.nodes += 1;
                 self.attributes += 1;
-                return at_most(self.attributes, MAX_ATTRIBUTES, "attributes of one tag");
+                return at_most(self.attributes, MAX_ATTRIBUTES, "attributes in one tag");
             }
-            (Place::Tag, _) => return self.name(byte),
-            (Place::Value(quote), _) if byte == quote => self.place = Place::Tag,
-            (Place::Comment, b'>') if (before, last) == (b'-', b'-') => self.place = Place::Text,
-            (Place::Data, b'>') if (before, last) == (b']', b']') => self.place = Place::Text,
-            (Place::Instruction, b'>') if last == b'?' => self.place = Place::Text,
+            (State::Tag, _) => return self.name(byte),
+            (State::Value(quote), _) if byte == quote => self.state = State::Tag,
+            (State::Comment, b'>') if (before, last) == (b'-', b'-') => self.state = State::Text,
+            (State::Data, b'>') if (before, last) == (b']', b']') => self.state = State::Text,
+            (State::Instruction, b'>') if last == b'?' => self.state = State::Text,
             _ => {}
         }
         Ok(())
     }
 
-    /// A byte of a tag outside of values.
+    /// Processes a byte of a tag outside of attribute values.
     fn name(&mut self, byte: u8) -> Result<(), String> {
         if self.start.len() < DATA.len() {
             self.start.push(byte);
-            self.place = match self.start.as_slice() {
-                COMMENT => Place::Comment,
-                DATA => Place::Data,
-                b"?" => Place::Instruction,
-                _ => Place::Tag,
+            self.state = match self.start.as_slice() {
+                COMMENT => State::Comment,
+                DATA => State::Data,
+                b"?" => State::Instruction,
+                _ => State::Tag,
             };
         }
-        // `xmlns`, and `xmlns:` before a name.
+        // `xmlns`, or `xmlns:` before a name.
         if byte == b'n' && self.last == *b"ml" {
             self.name_spaces += 1;
         }
-        at_most(self.name_spaces, MAX_NAME_SPACES, "declarations of name spaces")
+        at_most(self.name_spaces, MAX_NAME_SPACES, "namespace declarations")
     }
 }
 
 fn at_most(count: usize, most: usize, what: &str) -> Result<(), String> {
     match count <= most {
         true => Ok(()),
-        false => Err(format!("its description has more than {most} {what}")),
+        false => Err(format!("its XML section has more than {most} {what}")),
     }
 }
 
@@ -113,17 +112,17 @@ mod tests {
     }
 
     #[test]
-    fn tags_and_attributes_are_counted_and_texts_are_not() {
+    fn only_tags_and_attributes_are_counted() {
         assert_eq!(check("<?xml version=\"1.0\"?><a b='<c d=\"1\">' e=\"2\"><f/></a>"), Ok(6));
         assert_eq!(check("<a>x = y, \"<!-- <b c='1'> -- --><![CDATA[<d e=\"1\">]] >]]></a>"), Ok(4));
     }
 
     #[test]
-    fn more_than_is_read_is_refused() {
+    fn exceeded_limits_are_errors() {
         let many = |count: usize| (0..count).map(|k| format!(" a{k}='='")).collect::<String>();
         assert!(check(&format!("<a{}/>", many(256)).repeat(3)).is_ok());
-        assert!(check(&format!("<a{}/>", many(257))).unwrap_err().contains("256 attributes of one tag"));
-        // A comment ends after the bytes that begin it, and so do others.
+        assert!(check(&format!("<a{}/>", many(257))).unwrap_err().contains("256 attributes in one tag"));
+        // The opening bytes of a comment do not also close it.
         for start in ["<!-->", "<!--->", "<![CDATA[]>", "<?>"] {
             let end =
                 ["-->", "]]>", "?>"][usize::from(start.contains('[')) + 2 * usize::from(start.contains('?'))];

@@ -11,12 +11,12 @@ use std::path::Path;
 use std::sync::Arc;
 use voxtile::{FormatError, Result};
 
-/// A `.bag` of ROS 1, version 2.0. Its index is read if there is one; otherwise the file is read once before.
+/// ROS 1 bag file (`.bag`, version 2.0). If it has no index, the file is read twice.
 #[derive(Debug)]
 pub struct Bag1 {
     file: FileBytes,
     topics: TopicList,
-    /// The topic of a connection; `None` if it is left out, because there are too many.
+    /// Topics by connection ID. `None` for connections skipped because there are too many topics.
     connections: HashMap<u32, Option<usize>>,
     chunks: Vec<ChunkPlace>,
     order: ChunkOrder,
@@ -25,24 +25,24 @@ pub struct Bag1 {
 }
 
 const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
-/// A longer header of a record is damage.
+/// Limit for a record header.
 const MAX_HEADER_BYTES: u64 = 1 << 16;
-/// A longer connection, which has the definition of a message, or place of a chunk is damage.
+/// Limit for connection records, which contain message definitions, and for chunk info records.
 const MAX_RECORD_BYTES: u64 = 4 << 20;
-/// Most connections of a recording: publishers of topics. Others are left out.
+/// Limit for connections (publishers of topics). Further ones are skipped.
 const MAX_CONNECTIONS: usize = 1 << 16;
 
 impl Bag1 {
-    /// Opens a file.
+    /// Opens a bag.
     ///
     /// # Errors
     ///
-    /// A file that cannot be read or is no such bag.
+    /// The file cannot be read or is not such a bag.
     pub fn open(path: &Path) -> Result<Self> {
         Self::open_within(path, &Budget::default())
     }
 
-    /// As [`Bag1::open`], in so much memory.
+    /// As [`Bag1::open`], within a memory budget.
     ///
     /// # Errors
     ///
@@ -52,9 +52,10 @@ impl Bag1 {
         let magic = file.read_at(0, MAGIC.len() as u64)?;
         if magic != MAGIC {
             let reason = if magic.starts_with(b"#ROSBAG V1") {
-                "a bag of version 1 is older than is read; `rosbag fix` or `rosbag reindex` makes version 2.0 of it"
+                "bag format version 1 is not supported: convert it to version 2.0 with `rosbag fix` or `rosbag \
+                 reindex`"
             } else {
-                "it does not start with `#ROSBAG V2.0`: it is no bag of ROS 1"
+                "it does not start with `#ROSBAG V2.0`: it is not a ROS 1 bag"
             };
             return Err(FormatError::at_offset(0, reason).in_input(path));
         }
@@ -76,8 +77,8 @@ impl Bag1 {
         Ok(bag)
     }
 
-    /// The record at a place, with the place behind it. The data of chunks and indices are left out. `None` where no
-    /// whole header is.
+    /// Reads the record at an offset and returns it with the offset of the next one. The data of chunks and index
+    /// records is not read. `None` if there is no complete header.
     fn record(&mut self, offset: u64) -> Result<Option<(Record, u64)>> {
         let start = self.file.read_at(offset, 4)?;
         let Some(header_bytes) = start.first_chunk().map(|bytes| u64::from(u32::from_le_bytes(*bytes)))
@@ -105,7 +106,7 @@ impl Bag1 {
         Ok(Some((record, data_at + data_bytes)))
     }
 
-    /// Reads connections and places of chunks from the end of the file; `false` if they are not all there.
+    /// Reads connections and chunk locations from the end of the file. Returns `false` if they are incomplete.
     fn read_index(&mut self, index_at: u64) -> Result<bool> {
         let shares = Shares::of(self.spill.budget());
         let mut lists: HashSet<Arc<[usize]>> = HashSet::new();
@@ -151,7 +152,7 @@ impl Bag1 {
         Ok(!self.chunks.is_empty() || !self.connections.is_empty() || self.forget())
     }
 
-    /// Forgets a broken index.
+    /// Discards a broken index.
     fn forget(&mut self) -> bool {
         self.topics = TopicList::default();
         self.connections.clear();
@@ -159,7 +160,7 @@ impl Bag1 {
         false
     }
 
-    /// Finds chunks one after the other and looks into each, where there is no index.
+    /// Finds chunks one by one and inspects each, if there is no index.
     fn scan(&mut self) -> Result<()> {
         let mut at = MAGIC.len() as u64;
         let (mut walk, mut cut) = (Walk::default(), String::new());
@@ -181,11 +182,11 @@ impl Bag1 {
         }
         let cut = match at == len {
             true => String::new(),
-            false => format!(", which ends in the midst of a record (it was cut off{cut})"),
+            false => format!(", and ends within a record (it was truncated{cut})"),
         };
         self.remarks.push(format!(
-            "{path} has no index (the recorder did not close it){cut}: {messages} messages were found by reading it \
-             whole"
+            "{path} has no index (the recorder did not close it){cut}: {messages} messages were found by reading the \
+             whole file"
         ));
         Ok(())
     }
@@ -201,13 +202,13 @@ impl Bag1 {
         self.connections.insert(id, topic);
     }
 
-    /// The topic of a connection, or that it is left out; `None` if it is not known.
+    /// Returns the topic of a connection. The outer `None` means unknown, the inner one skipped.
     fn topic_of(&self, connection: u32) -> Option<Option<usize>> {
         let is_full = self.connections.len() >= MAX_CONNECTIONS;
         self.connections.get(&connection).copied().or(is_full.then_some(None))
     }
 
-    /// Walks over the records of a chunk.
+    /// Visits the records of a chunk.
     fn find_messages(&mut self, chunk: &mut OpenChunk, take: &mut TakeMessage<'_>) -> Result<()> {
         let is_broken = chunk.is_broken();
         let OpenChunk { bytes, complaint } = chunk;
@@ -229,14 +230,14 @@ impl Bag1 {
                 Some((record, data_at, end))
             });
             let Some((record, data_at, end)) = whole else {
-                OpenChunk::note(complaint, format!("byte {at} of its contents starts no record"));
+                OpenChunk::note(complaint, format!("there is no record at byte {at} of its contents"));
                 return Ok(());
             };
             let len = end - data_at;
             if record.op == Some(RecordKind::Connection) {
                 let data_bytes = if len > MAX_RECORD_BYTES { 0 } else { len as usize };
                 let data = bytes.piece(data_at, data_bytes, &mut window)?.unwrap_or_default();
-                // What a broken chunk says of a connection may be wrong.
+                // Connection data from a broken chunk may be wrong, so known connections are kept.
                 let is_known = record.u32("conn").is_some_and(|id| self.connections.contains_key(&id));
                 if !(is_broken && is_known) {
                     self.connect(&record, data);
@@ -244,7 +245,7 @@ impl Bag1 {
             } else if record.op == Some(RecordKind::Message) {
                 let topic = record.u32("conn").and_then(|id| self.topic_of(id));
                 let Some((topic, log_ns)) = topic.zip(record.time_ns("time")) else {
-                    OpenChunk::note(complaint, format!("byte {at}: a message without connection or time"));
+                    OpenChunk::note(complaint, format!("byte {at}: the message has no connection or time"));
                     return Ok(());
                 };
                 if let Some(topic) = topic {
@@ -257,7 +258,7 @@ impl Bag1 {
     }
 }
 
-/// The number that four bytes are.
+/// Decodes four little-endian bytes.
 fn u32_of(bytes: Option<&[u8]>) -> Option<u64> {
     bytes?.first_chunk().map(|bytes| u64::from(u32::from_le_bytes(*bytes)))
 }
@@ -285,7 +286,7 @@ impl ChunkFile for Bag1 {
         let head = self.record(place.offset)?;
         let Some((record, end)) = head.filter(|(record, _)| record.op == Some(RecordKind::Chunk)) else {
             return Err(wrong(
-                "there is no chunk where the index says so; `rosbag reindex` makes a new index".into(),
+                "there is no chunk at the place in the index: rebuild the index with `rosbag reindex`".into(),
             ));
         };
         let claimed = u64::from(record.u32("size").unwrap_or_default());
@@ -293,8 +294,7 @@ impl ChunkFile for Bag1 {
         let data_at = place.offset + 8 + record.header_bytes;
         let data_bytes = end.saturating_sub(data_at);
         if claimed.max(data_bytes) > MAX_CHUNK_BYTES {
-            let reason =
-                "a chunk of more than 1 GiB is not read; record smaller ones (rosbag record --chunksize)";
+            let reason = "chunks of more than 1 GiB are not supported: record smaller ones (rosbag record --chunksize)";
             return Err(wrong(reason.into()));
         }
         let there = data_bytes.min(self.file.len.saturating_sub(data_at));
@@ -309,7 +309,7 @@ impl ChunkFile for Bag1 {
             false => plain(part, memory_bytes, input, &mut |_| {}),
         })?;
         let is_cut = there < data_bytes;
-        let cut = || Complaint { reason: "the file ends in the midst of it".to_owned(), is_broken: false };
+        let cut = || Complaint { reason: "the file ends within it".to_owned(), is_broken: false };
         let complaint = if is_cut { Some(cut()) } else { complaint };
         let mut chunk = OpenChunk { bytes, complaint };
         self.find_messages(&mut chunk, take)?;

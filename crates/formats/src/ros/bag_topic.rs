@@ -4,21 +4,21 @@ use super::messages::MessageKind;
 use super::recording::{Recording, Topic};
 use voxtile::{Error, Result};
 
-/// Most topics that an error lists.
+/// Maximum number of topics listed in an error.
 const MAX_LISTED: usize = 100;
 
-/// A topic that was chosen.
+/// A selected topic.
 #[derive(Clone, Debug)]
 pub(super) struct Chosen {
     pub(super) index: usize,
     pub(super) kind: MessageKind,
-    /// The topic of the camera, for depth images.
+    /// Camera topic, for depth images.
     pub(super) camera: Option<usize>,
-    /// What a person should know of the choice.
+    /// Remarks for the user about the selection.
     pub(super) remarks: Vec<String>,
 }
 
-/// The kind of the messages of a topic that can be decoded.
+/// Returns the message type of a topic if it can be decoded.
 pub(super) fn kind_of(topic: &Topic) -> Option<MessageKind> {
     topic.wire.and(MessageKind::of(&topic.type_name))
 }
@@ -39,7 +39,7 @@ pub(super) fn choose_clouds(
             let type_name = topic.map_or("", |topic| topic.type_name.as_str());
             let packets = topic.and_then(packets_of).map(|packets| packets + "; ").unwrap_or_default();
             let list = list(topics.iter());
-            let reason = format!("messages of type {type_name} are no clouds; {packets}topics: {list}");
+            let reason = format!("messages of type {type_name} are not clouds; {packets}topics: {list}");
             return Err(Error::argument(format!("topic {name}"), reason));
         };
         let mut chosen = chosen(&topics, index, kind)?;
@@ -48,26 +48,29 @@ pub(super) fn choose_clouds(
             && images.holds_depths() == Some(false)
         {
             let encoding = &images.encoding;
-            chosen.remarks.push(format!("{} ({encoding}) is read as depths, as it was named", topic.name));
+            chosen.remarks.push(format!(
+                "{} ({encoding}) is read as depth images, because it was selected",
+                topic.name
+            ));
         }
         return Ok(chosen);
     }
     CloudTopics::find(recording, &topics, whole_bytes)?.choose(recording, &topics)
 }
 
-/// Finds the topic of poses.
+/// Finds the topic of the poses.
 pub(super) fn choose_poses(topics: &[Topic], name: Option<&str>) -> Result<usize> {
     if let Some(name) = name {
         let index = named(topics, name, "odometry")?;
         let topic = topics.get(index).filter(|topic| kind_of(topic).is_some_and(MessageKind::is_pose));
         return topic.map(|_| index).ok_or_else(|| {
-            let reason = format!("its messages are no poses; topics: {}", list(topics.iter()));
+            let reason = format!("its messages are not poses; topics: {}", list(topics.iter()));
             Error::argument(format!("odometry {name}"), reason)
         });
     }
     let is_pose = |topic: &&Topic| topic.messages > 0 && kind_of(topic).is_some_and(MessageKind::is_pose);
     let found: Vec<&Topic> = topics.iter().filter(is_pose).collect();
-    // Odometry says which frame moves, poses and paths do not.
+    // Odometry messages name the moving frame; poses and paths do not.
     let odometry: Vec<_> =
         found.iter().filter(|topic| kind_of(topic) == Some(MessageKind::Odometry)).collect();
     match (odometry.as_slice(), found.as_slice()) {
@@ -75,14 +78,14 @@ pub(super) fn choose_poses(topics: &[Topic], name: Option<&str>) -> Result<usize
         ([], [topic]) => index_of(topics, topic),
         ([], []) => {
             let reason = format!(
-                "no topic holds poses (Odometry, PoseStamped, Path); topics: {}",
+                "no topic contains poses (Odometry, PoseStamped, Path); topics: {}",
                 list(topics.iter())
             );
             Err(Error::argument("recording", reason))
         }
         _ => {
             let found = list(found.into_iter());
-            let reason = format!("several topics hold poses; choose one with `odometry` NAME: {found}");
+            let reason = format!("several topics contain poses; choose one with `odometry` NAME: {found}");
             Err(Error::argument("recording", reason))
         }
     }
@@ -90,11 +93,11 @@ pub(super) fn choose_poses(topics: &[Topic], name: Option<&str>) -> Result<usize
 
 fn index_of(topics: &[Topic], wanted: &Topic) -> Result<usize> {
     let index = topics.iter().position(|topic| topic == wanted);
-    index.ok_or_else(|| Error::argument("recording", "the topic is gone"))
+    index.ok_or_else(|| Error::argument("recording", "the topic is missing now"))
 }
 
 fn named(topics: &[Topic], name: &str, option: &str) -> Result<usize> {
-    // The part of a split recording with the most messages of a name speaks for it, if types differ.
+    // If the parts of a split recording have different types for a topic, the part with most messages is used.
     let same =
         topics.iter().enumerate().filter(|(_, topic)| topic.name.trim_matches('/') == name.trim_matches('/'));
     let best = same.max_by_key(|(_, topic)| (kind_of(topic).is_some(), topic.messages));
@@ -106,7 +109,7 @@ fn named(topics: &[Topic], name: &str, option: &str) -> Result<usize> {
     })
 }
 
-/// The choice of a topic, with its camera if it holds images.
+/// Returns the selection of a topic, with its camera if it contains images.
 pub(super) fn chosen(topics: &[Topic], index: usize, kind: MessageKind) -> Result<Chosen> {
     let (camera, remarks) = (None, Vec::new());
     let Some(image) = topics.get(index).filter(|_| kind.is_image()) else {
@@ -124,7 +127,7 @@ pub(super) fn chosen(topics: &[Topic], index: usize, kind: MessageKind) -> Resul
     }
 }
 
-/// `/points (sensor_msgs/msg/PointCloud2, 20 messages), ...`.
+/// Formats topics as `/points (sensor_msgs/msg/PointCloud2, 20 messages), ...`.
 pub(super) fn list<'t>(topics: impl Iterator<Item = &'t Topic>) -> String {
     let mut topics = topics.fuse();
     let mut text: Vec<String> = topics

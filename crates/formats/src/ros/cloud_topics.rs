@@ -6,15 +6,15 @@ use super::recording::{Recording, Topic};
 use std::collections::HashSet;
 use voxtile::{Error, Result};
 
-/// The topics of a recording that may be read as clouds.
+/// Topics of a recording that may contain clouds.
 #[derive(Debug, Default)]
 pub(super) struct CloudTopics {
     found: Vec<Found>,
-    /// The same clouds in other forms, or forms that are rarely meant: they are taken if there is nothing else.
+    /// Topics used only if there is nothing else: copies of the same clouds, and less likely kinds.
     others: Vec<Found>,
-    /// Images that may be depths or not.
+    /// Image topics that may contain depths or not.
     unsure: Vec<String>,
-    /// Images that are called depths and have no camera.
+    /// Image topics named as depth but without a camera.
     without_camera: Vec<String>,
 }
 
@@ -22,13 +22,13 @@ pub(super) struct CloudTopics {
 struct Found {
     index: usize,
     kind: MessageKind,
-    /// Its encoding, if that alone says that images are depths.
+    /// Image encoding, if it is the only evidence for depths.
     guessed: Option<String>,
 }
 
-/// Most topics of images that are looked into. Of more, the user chooses.
+/// Limit for the image topics to inspect. With more, the user must select a topic.
 const MAX_LOOKED_INTO: usize = 100;
-/// Most topics that are named for a reason.
+/// Maximum number of topics named for a reason.
 const MAX_NAMED: usize = 10;
 
 impl CloudTopics {
@@ -51,7 +51,7 @@ impl CloudTopics {
                 continue;
             }
             let is_compressed = kind == MessageKind::CompressedImage;
-            // Each look may read the recording up to the first image.
+            // Inspecting a topic may read the recording up to its first image.
             looked_into += 1;
             if looked_into <= MAX_LOOKED_INTO {
                 let images = DepthImages::of_topic(recording, index, topic, kind, whole_bytes)?;
@@ -80,7 +80,7 @@ impl CloudTopics {
         }
     }
 
-    /// Leaves out compressed images that another topic has, too.
+    /// Drops compressed images that another topic also contains.
     fn drop_copies(&mut self, topics: &[Topic]) {
         let name_of = |found: &Found| topics.get(found.index).map_or("", |topic| topic.name.as_str());
         let plain: HashSet<&str> = self.found.iter().map(name_of).collect();
@@ -94,7 +94,7 @@ impl CloudTopics {
         });
     }
 
-    /// Chooses the only one.
+    /// Selects the only topic.
     pub(super) fn choose(self, recording: &dyn Recording, topics: &[Topic]) -> Result<Chosen> {
         let (first, rest) = match self.found.is_empty() {
             true => (&self.others, &[][..]),
@@ -108,19 +108,23 @@ impl CloudTopics {
                 let name = of(only).map_or("", |topic| topic.name.as_str());
                 if let Some(encoding) = &only.guessed {
                     chosen.remarks.push(format!(
-                        "{name} is read as depths because of its encoding {encoding}: its name does not say so"
+                        "{name} is read as depth images because of its encoding {encoding}, although its name does not \
+                         contain \"depth\""
                     ));
                 }
                 if !rest.is_empty() {
                     let rest = list(rest.iter().filter_map(of));
-                    chosen.remarks.push(format!("{name} is read; `topic` NAME takes another one: {rest}"));
+                    chosen.remarks.push(format!(
+                        "{name} is read; other topics can be chosen with `topic` NAME: {rest}"
+                    ));
                 }
-                chosen.remarks.extend(self.why_unsure().map(|why| format!("left out: {why}")));
+                chosen.remarks.extend(self.why_unsure().map(|why| format!("ignored: {why}")));
                 Ok(chosen)
             }
             several => {
                 let several = list(several.iter().filter_map(of));
-                let reason = format!("several topics hold clouds; choose one with `topic` NAME: {several}");
+                let reason =
+                    format!("several topics contain clouds; choose one with `topic` NAME: {several}");
                 Err(Error::argument("recording", reason))
             }
         }
@@ -129,22 +133,22 @@ impl CloudTopics {
     fn why_unsure(&self) -> Option<String> {
         (!self.unsure.is_empty()).then(|| {
             format!(
-                "images whose names do not say that they are depths: {}; if they are, name the topic with `topic`",
+                "images that are not named as depth: {}; if they are depth images, select the topic with `topic`",
                 named(&self.unsure)
             )
         })
     }
 
     fn why_none(&self, recording: &dyn Recording, topics: &[Topic]) -> String {
-        // A file that was cut off may lack what was looked for.
+        // A truncated file may lack the topics.
         let found_out =
             recording.remarks().into_iter().fold(String::new(), |all, remark| all + "; " + &remark);
         if topics.is_empty() {
-            return format!("it holds no topics{found_out}");
+            return format!("it contains no topics{found_out}");
         }
         let list = list(topics.iter());
         if topics.iter().all(|topic| topic.messages == 0) {
-            return format!("it holds no messages{found_out}; topics: {list}");
+            return format!("it contains no messages{found_out}; topics: {list}");
         }
         let camera = (!self.without_camera.is_empty()).then(|| {
             let names: Vec<String> = self
@@ -159,21 +163,24 @@ impl CloudTopics {
         let is_unread = |topic: &&Topic| topic.messages > 0 && topic.wire.is_none();
         let unread: Vec<String> = topics.iter().filter(is_unread).map(|topic| topic.name.clone()).collect();
         let unread = (!unread.is_empty()).then(|| {
-            format!("messages that are serialised otherwise than by ROS are not read: {}", named(&unread))
+            format!(
+                "messages with another serialization than that of ROS are not supported: {}",
+                named(&unread)
+            )
         });
         let whys = self.why_unsure().into_iter().chain(camera).chain(packets).chain(unread);
         let whys = whys.fold(String::new(), |all, why| all + "; " + &why);
         format!(
-            "no topic holds clouds (PointCloud2, PointCloud, CustomMsg of Livox, LaserScan, depth images){whys}\
-             {found_out}; topics: {list}"
+            "no topic contains clouds (PointCloud2, PointCloud, CustomMsg of Livox, LaserScan, depth \
+             images){whys}{found_out}; topics: {list}"
         )
     }
 }
 
-/// What to do with a topic of packets.
+/// Returns advice for a topic of packets.
 pub(super) fn packets_of(topic: &Topic) -> Option<String> {
     let driver = driver_of(&topic.type_name)?;
-    Some(format!("{} holds no points: {driver} makes clouds of it, whose topic can be read", topic.name))
+    Some(format!("{} contains no points: convert it to clouds with {driver} and use that topic", topic.name))
 }
 
 fn named(names: &[String]) -> String {

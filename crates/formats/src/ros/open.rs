@@ -12,16 +12,16 @@ use crate::spill::Budget;
 use std::path::{Path, PathBuf};
 use voxtile::{Error, Result};
 
-/// Opens a recording: a file, the folder of a bag of ROS 2, or several that follow one another in time.
+/// Opens a recording: a file, a ROS 2 bag folder, or several recordings that follow each other in time.
 ///
 /// # Errors
 ///
-/// No path; a file that cannot be read or is no recording.
+/// `paths` is empty, or a file cannot be read or is not a recording.
 pub fn open_recording(paths: &[PathBuf]) -> Result<Box<dyn Recording>> {
     open_recording_within(paths, &Budget::default())
 }
 
-/// As [`open_recording`], in so much memory.
+/// As [`open_recording`], within a memory budget.
 ///
 /// # Errors
 ///
@@ -34,7 +34,7 @@ pub fn open_recording_within(paths: &[PathBuf], budget: &Budget) -> Result<Box<d
         }
     };
     match paths {
-        [] => Err(Error::argument("recording", "no file is given")),
+        [] => Err(Error::argument("recording", "no file was given")),
         [path] => open(path),
         paths => {
             let mut parts = Sequence::default();
@@ -52,7 +52,8 @@ pub(super) fn open_file(path: &Path, budget: &Budget) -> Result<Box<dyn Recordin
     }
 }
 
-/// Opens a file by how it starts; where that is damaged, by the end of its name.
+/// Opens an uncompressed file. Its format is detected from the first bytes or, if these are damaged, from the
+/// extension.
 pub(super) fn open_plain_file(path: &Path, budget: &Budget) -> Result<Box<dyn Recording>> {
     let formats = Registry::default();
     let (start, extension) = (first_bytes(path)?, extension_of(path));
@@ -65,7 +66,7 @@ pub(super) fn open_plain_file(path: &Path, budget: &Budget) -> Result<Box<dyn Re
         Some("mcap") => Ok(Box::new(PackedMessages::new(McapFile::open_within(path, budget)?, path, budget))),
         Some("db3") => open_db3(path, budget),
         _ => {
-            let reason = "it is no recording by its content or its name; known: .bag, .mcap, .db3, a folder with \
+            let reason = "it is not a supported recording; supported: .bag, .mcap, .db3, or a folder with \
                           metadata.yaml";
             Err(Error::argument(path.display().to_string(), reason))
         }
@@ -80,6 +81,6 @@ fn open_db3(path: &Path, budget: &Budget) -> Result<Box<dyn Recording>> {
 #[cfg(not(feature = "sqlite"))]
 fn open_db3(path: &Path, _: &Budget) -> Result<Box<dyn Recording>> {
     let reason =
-        "this program was built without SQLite (feature `sqlite`); `ros2 bag convert` makes an .mcap of it";
+        "this build does not support SQLite (feature `sqlite`): convert it to .mcap with `ros2 bag convert`";
     Err(Error::argument(path.display().to_string(), reason))
 }

@@ -1,4 +1,4 @@
-use super::point_store::{PointRoom, PointStore};
+use super::point_store::{PointBudget, PointStore};
 use super::sensor_scan::SensorScan;
 use super::source::{ScanHead, ScanSource};
 use super::stored_scan::StoredScan;
@@ -7,7 +7,7 @@ use crate::read::guard::catch;
 use std::path::{Path, PathBuf};
 use voxtile::{Error, Result};
 
-/// Scans whose reader may panic on a file that nobody thought of: that is an error with the name of the input, and ends
+/// Wraps a reader that may panic on an unexpected file. A panic becomes an error with the name of the input, and ends
 /// it.
 pub(crate) struct GuardedScans {
     source: Box<dyn ScanSource + Send>,
@@ -16,7 +16,6 @@ pub(crate) struct GuardedScans {
 }
 
 impl GuardedScans {
-    /// Opens scans.
     pub(crate) fn open(
         path: &Path,
         open: impl FnOnce() -> Result<Box<dyn ScanSource + Send>>,
@@ -25,8 +24,8 @@ impl GuardedScans {
         Ok(Box::new(Self { source, path: path.to_owned(), has_panicked: false }))
     }
 
-    /// After a panic the reader is not asked again: there is no other scan.
-    fn ask<T>(&mut self, none: T, call: impl FnOnce(&mut dyn ScanSource) -> Result<T>) -> Result<T> {
+    /// After a panic the reader is not used again, and there are no further scans.
+    fn guard<T>(&mut self, none: T, call: impl FnOnce(&mut dyn ScanSource) -> Result<T>) -> Result<T> {
         if self.has_panicked {
             return Ok(none);
         }
@@ -40,7 +39,8 @@ impl GuardedScans {
 
 fn fault(path: &Path, place: &str) -> Error {
     let reason = format!(
-        "reading it met a fault in the program or one of its libraries ({place}): please report this message with the file"
+        "reading it caused an internal error in voxtile or one of its libraries ({place}): please report this message \
+         together with the file"
     );
     Error::argument(path.display().to_string(), reason)
 }
@@ -51,19 +51,19 @@ impl ScanSource for GuardedScans {
     }
 
     fn read_scan(&mut self, points: &mut PointStore) -> Result<Option<ScanHead>> {
-        self.ask(None, |source| source.read_scan(points))
+        self.guard(None, |source| source.read_scan(points))
     }
 
     fn next_scan(&mut self) -> Result<Option<SensorScan>> {
-        self.ask(None, |source| source.next_scan())
+        self.guard(None, |source| source.next_scan())
     }
 
-    fn next_stored(&mut self, room: &PointRoom) -> Result<Option<StoredScan>> {
-        self.ask(None, |source| source.next_stored(room))
+    fn next_stored(&mut self, budget: &PointBudget) -> Result<Option<StoredScan>> {
+        self.guard(None, |source| source.next_stored(budget))
     }
 
     fn skip(&mut self, scans: usize) -> Result<usize> {
-        self.ask(0, |source| source.skip(scans))
+        self.guard(0, |source| source.skip(scans))
     }
 
     fn pass_unread(&mut self) -> bool {
@@ -120,13 +120,13 @@ mod tests {
     }
 
     #[test]
-    fn a_panic_is_an_error_that_names_the_input() {
+    fn panics_become_errors_with_the_input() {
         let path = Path::new("odd.las");
         let mut scans = GuardedScans::open(path, || Ok(Box::new(Faulty))).unwrap();
         let error = scans.next_scan().err().unwrap().to_string();
         assert!(error.starts_with("odd.las: ") && error.contains("guarded_scans.rs:"), "{error}");
         assert!(!scans.pass_unread() && scans.next_scan().unwrap().is_none());
         let error = GuardedScans::open(path, || panic!("while it is opened")).err().unwrap();
-        assert!(error.to_string().starts_with("odd.las: reading it met a fault"), "{error}");
+        assert!(error.to_string().starts_with("odd.las: reading it caused an internal error"), "{error}");
     }
 }

@@ -6,52 +6,52 @@ use voxtile::space::Point;
 use voxtile::{Error, Result};
 use voxtile_scratch::{ScratchFile, Window};
 
-/// The points of one scan in the sensor's frame, in metres: in memory up to a limit, the rest in a temporary file.
+/// Points of one scan in the sensor frame, in metres: in memory up to a limit, the others in a temporary file.
 ///
-/// The file is unnamed and is freed when the store is dropped.
+/// The file has no name and is freed when the store is dropped.
 #[derive(Debug, Default)]
 pub struct PointStore {
-    /// The last points; all of them if there is no file.
+    /// The last points, or all of them if there is no file.
     points: Vec<Point>,
     intensities: Option<Vec<f32>>,
-    /// Number of points before these, in the file.
+    /// Number of points in the file, which precede those in memory.
     filed: usize,
     file: Option<ScratchFile>,
-    room: PointRoom,
+    budget: PointBudget,
 }
 
-/// How many points of a scan may be in memory, and where the rest goes.
+/// Memory limit for the points of a scan, and the folder for the others.
 #[derive(Clone, Debug)]
-pub struct PointRoom {
-    most_points: usize,
+pub struct PointBudget {
+    max_points: usize,
     folder: PathBuf,
 }
 
-/// Bytes of a point in the file: the point, and the intensity, 0 if there is none. The bytes are native, as no other
-/// process reads them.
+/// Size of a point in the file: the point and its intensity (0 if there is none), in native byte order, because no
+/// other process reads the file.
 const RECORD_BYTES: usize = size_of::<Point>() + size_of::<f32>();
-/// Points that are read at a time.
+/// Number of points to read at once.
 const POINTS_AT_A_TIME: usize = 1 << 14;
-/// Points in memory that are passed at a time. The receiver copies them into the world frame, 6 MiB; and beam coherence
-/// works within one chunk, which should be a whole scan of most sensors.
-const POINTS_HANDED_OVER: usize = 1 << 18;
+/// Number of points in memory to pass at once. The receiver copies them into the world frame (6 MiB), and beam
+/// coherence works within one chunk, which should be a whole scan for most sensors.
+const POINTS_PER_CHUNK: usize = 1 << 18;
 
-impl Default for PointRoom {
+impl Default for PointBudget {
     fn default() -> Self {
-        Self { most_points: usize::MAX, folder: PathBuf::new() }
+        Self { max_points: usize::MAX, folder: PathBuf::new() }
     }
 }
 
-impl PointRoom {
-    /// Room for the points of so many bytes; more go to a file in a folder.
-    pub fn new(most_bytes: usize, folder: &Path) -> Self {
-        Self { most_points: (most_bytes / RECORD_BYTES).max(POINTS_AT_A_TIME), folder: folder.to_owned() }
+impl PointBudget {
+    /// Creates a limit in bytes. Further points go to a file in `folder`.
+    pub fn new(max_bytes: usize, folder: &Path) -> Self {
+        Self { max_points: (max_bytes / RECORD_BYTES).max(POINTS_AT_A_TIME), folder: folder.to_owned() }
     }
 
-    /// An unnamed file in this folder.
+    /// Creates an unnamed temporary file.
     fn file(&self) -> Result<ScratchFile> {
         ScratchFile::in_folder(&self.folder).map_err(|error| {
-            Error::io(&self.folder, "keep the points of a scan in a temporary file in", error)
+            Error::io(&self.folder, "store the points of a scan in a temporary file in", error)
         })
     }
 
@@ -61,39 +61,39 @@ impl PointRoom {
 }
 
 impl PointStore {
-    /// A store without points.
-    pub fn new(room: PointRoom) -> Self {
-        Self { room, ..Self::default() }
+    /// Creates an empty store.
+    pub fn new(budget: PointBudget) -> Self {
+        Self { budget, ..Self::default() }
     }
 
-    /// Removes all points; the next ones come with intensities or without.
+    /// Removes all points and sets whether the next ones have intensities.
     pub fn begin(&mut self, has_intensities: bool) {
         self.points.clear();
         self.intensities = has_intensities.then(Vec::new);
         (self.filed, self.file) = (0, None);
     }
 
-    pub(crate) fn room(&self) -> &PointRoom {
-        &self.room
+    pub(crate) fn budget(&self) -> &PointBudget {
+        &self.budget
     }
 
-    /// Reserves memory for so many points.
+    /// Reserves memory for points, up to the limit.
     pub(crate) fn reserve(&mut self, points: usize) {
-        let points = points.min(self.room.most_points);
+        let points = points.min(self.budget.max_points);
         self.points.reserve_exact(points);
         if let Some(intensities) = &mut self.intensities {
             intensities.reserve_exact(points);
         }
     }
 
-    /// Adds a point; the intensity is ignored if the scan has none.
+    /// Adds a point. The intensity is ignored if the scan has none.
     ///
     /// # Errors
     ///
-    /// A file that cannot be written.
+    /// A file cannot be written.
     #[inline]
     pub fn push(&mut self, point: Point, intensity: f32) -> Result<()> {
-        if self.points.len() == self.room.most_points {
+        if self.points.len() == self.budget.max_points {
             self.put_in_file()?;
         }
         self.points.push(point);
@@ -107,12 +107,12 @@ impl PointStore {
     ///
     /// # Errors
     ///
-    /// A file that cannot be written.
+    /// A file cannot be written.
     pub(crate) fn extend(
         &mut self,
         mut points: impl ExactSizeIterator<Item = (Point, f32)> + Clone,
     ) -> Result<()> {
-        if points.len() > self.room.most_points.saturating_sub(self.points.len()) {
+        if points.len() > self.budget.max_points.saturating_sub(self.points.len()) {
             return points.try_for_each(|(point, intensity)| self.push(point, intensity));
         }
         self.points.extend(points.clone().map(|(point, _)| point));
@@ -126,10 +126,11 @@ impl PointStore {
     fn put_in_file(&mut self) -> Result<()> {
         let mut file = match self.file.take() {
             Some(file) => file,
-            None => self.room.file()?,
+            None => self.budget.file()?,
         };
-        let cannot =
-            |error| Error::io(self.room.folder(), "keep the points of a scan in a temporary file in", error);
+        let cannot = |error| {
+            Error::io(self.budget.folder(), "store the points of a scan in a temporary file in", error)
+        };
         let mut bytes = Vec::with_capacity(POINTS_AT_A_TIME * RECORD_BYTES);
         for (chunk, points) in self.points.chunks(POINTS_AT_A_TIME).enumerate() {
             bytes.clear();
@@ -149,27 +150,27 @@ impl PointStore {
         Ok(())
     }
 
-    /// Number of points.
+    /// Returns the number of points.
     pub fn len(&self) -> usize {
         self.filed + self.points.len()
     }
 
-    /// Whether there are none.
+    /// Returns whether there are no points.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Whether each point has an intensity.
+    /// Returns whether every point has an intensity.
     pub fn has_intensities(&self) -> bool {
         self.intensities.is_some()
     }
 
-    /// Passes the points of a range to `take` in order, chunk by chunk, with their intensities if they have any. `take`
+    /// Passes the points of a range to `take` in order, chunk by chunk, with their intensities if there are any. `take`
     /// returns whether to continue.
     ///
     /// # Errors
     ///
-    /// A file that cannot be read.
+    /// A file cannot be read.
     pub fn for_each_chunk(&self, range: Range<usize>, take: &mut TakePoints<'_>) -> Result<()> {
         let in_file = range.start.min(self.filed)..range.end.min(self.filed);
         let in_memory = range.start.max(self.filed) - self.filed..range.end.max(self.filed) - self.filed;
@@ -190,8 +191,8 @@ impl PointStore {
             }
             next += count;
         }
-        for first in in_memory.clone().step_by(POINTS_HANDED_OVER) {
-            let some = first..in_memory.end.min(first + POINTS_HANDED_OVER);
+        for first in in_memory.clone().step_by(POINTS_PER_CHUNK) {
+            let some = first..in_memory.end.min(first + POINTS_PER_CHUNK);
             let intensities = self.intensities.as_ref().map(|intensities| &intensities[some.clone()]);
             if !take(&self.points[some], intensities) {
                 return Ok(());
@@ -200,18 +201,18 @@ impl PointStore {
         Ok(())
     }
 
-    /// The records of points in the file.
+    /// Maps a range of point records of the file.
     fn window(&self, first: usize, count: usize) -> Result<Window> {
         let window = match &self.file {
             Some(file) => file.window((first * RECORD_BYTES) as u64, count * RECORD_BYTES),
             None => Err(io::ErrorKind::UnexpectedEof.into()),
         };
         window.map_err(|error| {
-            Error::io(self.room.folder(), "read the points of a scan back from a temporary file in", error)
+            Error::io(self.budget.folder(), "read the points of a scan from a temporary file in", error)
         })
     }
 
-    /// Points and intensities, if all are in memory.
+    /// Returns points and intensities, if all are in memory.
     pub(crate) fn into_parts(self) -> (Vec<Point>, Option<Vec<f32>>) {
         (self.points, self.intensities)
     }
@@ -222,12 +223,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn points_come_back_from_file_and_memory_in_order() {
+    fn points_from_file_and_memory_are_in_order() {
         let folder = tempfile::TempDir::new().unwrap();
-        // More than is handed over at a time, from memory and from the file.
-        let count = POINTS_HANDED_OVER + 3 * POINTS_AT_A_TIME + 77;
-        for (most_bytes, has_intensities) in [(0, true), (1 << 20, false), (usize::MAX, true)] {
-            let mut store = PointStore::new(PointRoom::new(most_bytes, folder.path()));
+        // More points than are passed at once, in memory and in the file.
+        let count = POINTS_PER_CHUNK + 3 * POINTS_AT_A_TIME + 77;
+        for (max_bytes, has_intensities) in [(0, true), (1 << 20, false), (usize::MAX, true)] {
+            let mut store = PointStore::new(PointBudget::new(max_bytes, folder.path()));
             store.begin(has_intensities);
             let point = |k: usize| ([k as f64, -0.5 * k as f64, f64::NAN], k as f32);
             for first in (0..count).step_by(1000) {
@@ -237,15 +238,15 @@ mod tests {
                         .map(point)
                         .for_each(|(point, intensity)| store.push(point, intensity).unwrap()),
                 }
-                assert!(store.points.len() <= store.room.most_points);
+                assert!(store.points.len() <= store.budget.max_points);
             }
-            assert_eq!((store.len(), store.file.is_some()), (count, most_bytes < usize::MAX));
+            assert_eq!((store.len(), store.file.is_some()), (count, max_bytes < usize::MAX));
             for range in
                 [0..count, 5..6, 100..count - 3, POINTS_AT_A_TIME - 1..2 * POINTS_AT_A_TIME + 1, 7..7]
             {
                 let mut next = range.start;
                 let mut take = |points: &[Point], intensities: Option<&[f32]>| {
-                    assert!(points.len() <= POINTS_HANDED_OVER);
+                    assert!(points.len() <= POINTS_PER_CHUNK);
                     assert_eq!(intensities.is_some(), has_intensities);
                     for (at, point) in points.iter().enumerate() {
                         assert!(

@@ -7,23 +7,22 @@ use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 use voxtile::Result;
 
-/// A temporary file for what exceeds the memory of a reader. Its space is used again once no part of it is; where parts
-/// overlap in time for long, another file takes its place, and each is freed with its last part.
+/// Temporary file for data that exceeds the memory of a reader. Its space is reused as soon as no part of it is in use.
+/// If parts overlap in time for long, another file replaces it, and each file is freed with its last part.
 #[derive(Debug)]
 pub(crate) struct SpillFile {
     budget: Budget,
     file: Option<Arc<Mutex<File>>>,
     end: u64,
-    /// A file of so many bytes takes no more.
-    most_bytes: u64,
+    /// File size at which a new file is started.
+    max_bytes: u64,
 }
 
-/// How many bytes a stream has.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum StreamSize {
-    /// As many as the file says; more are an error.
+    /// Size stated by the file. A longer stream is an error.
     Claimed(u64),
-    /// Unknown; more than these are an error.
+    /// Unknown size with an upper limit. A longer stream is an error.
     AtMost(u64),
 }
 
@@ -42,29 +41,29 @@ impl StreamSize {
     }
 }
 
-/// Why a stream is not whole.
+/// Reason why a stream is incomplete.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Complaint {
     pub(crate) reason: String,
-    /// The decoder failed: the bytes before that may be wrong, too, since many checksums come behind their data.
+    /// Whether the decoder failed. The bytes before may then be wrong too, because many checksums follow their data.
     pub(crate) is_broken: bool,
 }
 
 const MAX_FILE_BYTES: u64 = 256 << 20;
-/// Bytes that are copied at a time.
+/// Size of copy operations.
 const COPY_BYTES: usize = 1 << 16;
 
 impl SpillFile {
     pub(crate) fn new(budget: &Budget) -> Self {
-        Self { budget: budget.clone(), file: None, end: 0, most_bytes: MAX_FILE_BYTES }
+        Self { budget: budget.clone(), file: None, end: 0, max_bytes: MAX_FILE_BYTES }
     }
 
     pub(crate) fn budget(&self) -> &Budget {
         &self.budget
     }
 
-    /// Reads a stream to its end, or up to `most_bytes`: into memory as long as `memory_bytes` suffice, else into the
-    /// file. `see` gets the bytes in order. Returns also why the stream is not whole.
+    /// Reads a stream to its end or to the limit of `size`: into memory up to `memory_bytes`, else into the file. `see`
+    /// receives the bytes in order. Also returns the reason if the stream is incomplete.
     pub(crate) fn take(
         &mut self,
         mut input: impl Read,
@@ -74,10 +73,10 @@ impl SpillFile {
     ) -> Result<(Bytes, Option<Complaint>)> {
         let (mut start, mut complaint) = (Vec::new(), None);
         let broken = |error: std::io::Error| Complaint { reason: error.to_string(), is_broken: true };
-        let (most_bytes, limit) = (size.most(), size.most().saturating_add(1));
-        let reason = format!("it holds more than the {most_bytes} bytes that it {}", size.word());
+        let (max_bytes, limit) = (size.most(), size.most().saturating_add(1));
+        let reason = format!("it contains more than the {max_bytes} bytes that it {}", size.word());
         let too_many = Complaint { reason, is_broken: false };
-        // What is announced to be larger does not pass through memory.
+        // Streams with a larger stated size go directly to the file.
         let first_bytes = match size {
             StreamSize::Claimed(claimed) if claimed >= memory_bytes as u64 => 0,
             _ => limit.min(memory_bytes as u64),
@@ -90,7 +89,7 @@ impl SpillFile {
             let read = (&mut input).take(first_bytes).read_to_end(&mut start);
             complaint = read.err().map(broken);
             let is_too_long = start.len() as u64 == limit;
-            start.truncate(usize::try_from(most_bytes).unwrap_or(usize::MAX));
+            start.truncate(usize::try_from(max_bytes).unwrap_or(usize::MAX));
             see(&start);
             if complaint.is_some() || is_too_long || (start.len() as u64) < first_bytes {
                 return Ok((Bytes::Memory(start), complaint.or(is_too_long.then_some(too_many))));
@@ -98,7 +97,7 @@ impl SpillFile {
         }
         let cannot = |error| self.budget.cannot("write", error);
         let file = match self.file.take() {
-            Some(file) if self.end < self.most_bytes || Arc::strong_count(&file) == 1 => file,
+            Some(file) if self.end < self.max_bytes || Arc::strong_count(&file) == 1 => file,
             _ => Arc::new(Mutex::new(self.budget.file()?)),
         };
         if Arc::strong_count(&file) == 1 {
@@ -119,7 +118,7 @@ impl SpillFile {
                 match input.read(&mut buffer) {
                     Ok(0) => break,
                     Ok(count) => {
-                        let left = usize::try_from(most_bytes - written).unwrap_or(usize::MAX);
+                        let left = usize::try_from(max_bytes - written).unwrap_or(usize::MAX);
                         if count > left {
                             complaint = Some(too_many.clone());
                         }
@@ -147,7 +146,7 @@ mod tests {
 
     #[test]
     fn parts_that_always_overlap_take_several_files() {
-        let mut spill = SpillFile { most_bytes: 1000, ..SpillFile::new(&Budget::default()) };
+        let mut spill = SpillFile { max_bytes: 1000, ..SpillFile::new(&Budget::default()) };
         let mut held = Vec::new();
         for k in 0..100_u8 {
             let size = StreamSize::Claimed(100);

@@ -11,15 +11,15 @@ use std::path::{Path, PathBuf};
 const RECORD_BYTES: usize = 24;
 const METADATA: &str = "pointcloud_map_metadata.yaml";
 
-/// A folder as Autoware loads it: squares of the ground as PCD files of their own, and a list of them. One file is open
-/// at a time.
+/// Writer of an Autoware point cloud map folder: PCD files for squares of the ground, and a metadata file that lists
+/// them. Only one file is open at a time.
 pub(super) struct AutowareSink {
     folder: PathBuf,
     cell_m: f64,
     origin_m: [f64; 3],
     resolution_m: f64,
     points: ExternalSort<RECORD_BYTES>,
-    /// Points of each square: heads of files tell how many follow.
+    /// Number of points of each square, for the headers of the files.
     counts: BTreeMap<[i32; 2], u64>,
 }
 
@@ -27,16 +27,19 @@ impl AutowareSink {
     pub(super) fn create(head: &VoxelsHead, folder: &Path, options: &WriteOptions) -> Result<Self> {
         let cell_m = options.cell_m;
         if !(cell_m >= 1.0 && cell_m.fract() == 0.0 && cell_m <= 1e6) {
-            let reason = format!("{cell_m} m; squares have an edge of whole metres, from 1 m on");
+            let reason = format!(
+                "{cell_m} m is invalid: the edge of squares must be a whole number of metres, at \
+                                  least 1"
+            );
             return Err(Error::argument("cell", reason));
         }
         if options.origin_m.iter().any(|origin| !origin.is_finite()) {
-            return Err(Error::argument("origin", format!("{:?} is no point", options.origin_m)));
+            return Err(Error::argument("origin", format!("{:?} is not a point", options.origin_m)));
         }
         fs::create_dir_all(folder).map_err(|error| Error::io(folder, "create", error))?;
         let mut files = fs::read_dir(folder).map_err(|error| Error::io(folder, "read", error))?;
         if files.next().is_some() {
-            let reason = "the folder has files in it, which would be loaded too; name an empty one";
+            let reason = "the folder is not empty, and its files would be loaded too: use an empty folder";
             return Err(Error::argument(folder.display().to_string(), reason));
         }
         Ok(Self {
@@ -49,7 +52,7 @@ impl AutowareSink {
         })
     }
 
-    /// The lower corner of a square, as a part of its file's name.
+    /// Returns the coordinate of a square's lower corner, used in its file name.
     fn corner(&self, cell: i32) -> i64 {
         i64::from(cell) * self.cell_m as i64
     }
@@ -81,12 +84,12 @@ impl VoxelSink for AutowareSink {
         };
         if (0..3).any(is_far) {
             let reason = format!(
-                "single precision cannot hold voxels of {} m at {:?} m; give an origin near the map that is subtracted",
+                "single precision is too coarse for voxels of {} m at {:?} m: set `origin` to a point near the map",
                 self.resolution_m, voxel.center_m
             );
             return Err(Error::argument("origin", reason));
         }
-        // Of what is written, so that no point lies outside its file's square.
+        // Uses the rounded coordinates, so that no point is outside of its file's square.
         let cell = [0, 1].map(|k: usize| (f64::from(place[k]) / self.cell_m).floor() as i32);
         *self.counts.entry(cell).or_default() += 1;
         let mut record = [0; RECORD_BYTES];
@@ -138,7 +141,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn squares_have_files_of_their_own() {
+    fn squares_have_separate_files() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("cloud");
         let rows = [row([0, 0, 0], 0.9), row([-1, 39, 0], 0.8), row([40, 0, 0], 0.9), row([1, 1, 1], 0.7)];
@@ -160,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn what_single_precision_cannot_hold_is_refused() {
+    fn too_coarse_single_precision_is_refused() {
         let folder = tempfile::tempdir().unwrap();
         let mut voxel = row([0; 3], 0.9);
         voxel.center_m = [500_123.4, 40_182_321.7, 57.3];

@@ -3,22 +3,22 @@ use super::*;
 use std::path::Path;
 use voxtile::octree::OctreeFormat;
 
-/// Calls what makes a sink of one stream.
+/// Wraps the constructor of a stream sink.
 macro_rules! stream {
     ($new:expr) => {
         Writer::Stream(|head, out, options| Ok(Box::new($new(head, out, options)?)))
     };
 }
 
-/// Calls what makes a sink of files.
+/// Wraps the constructor of a file sink.
 macro_rules! files {
     ($create:expr) => {
         Writer::Files(|head, path, options| Ok(Box::new($create(head, path, options)?)))
     };
 }
 
-/// A row that needs a feature.
-macro_rules! behind {
+/// A row that depends on a Cargo feature.
+macro_rules! with_feature {
     ($feature:literal, $name:literal, $extension:literal, $help:literal, $writer:expr) => {
         OutputFormat {
             feature: Some($feature),
@@ -36,7 +36,7 @@ macro_rules! behind {
     };
 }
 
-/// A row with what most formats have in common.
+/// A row with common defaults.
 const fn row(
     name: &'static str,
     extension: Option<&'static str>,
@@ -50,16 +50,17 @@ const fn row(
         feature: None,
         takes: &[Region, Which],
         origin: Origin::Map,
-        refusal: "leave the option out",
+        refusal: "omit the option",
         is_text: false,
         needs_free_voxels: false,
         writer,
     }
 }
 
-const TREE_REFUSAL: &str = "an octree file holds free and occupied voxels alike; leave the option out";
+const TREE_REFUSAL: &str = "an octree file always contains free and occupied voxels; omit the option";
 
-/// The table: help texts, hints and checks of options are made from it, pages are checked against it.
+/// All output formats. Help texts, hints and option checks are generated from this table, and documents are checked
+/// against it.
 #[rustfmt::skip]
 const TABLE: [OutputFormat; 18] = [
     OutputFormat { origin: Origin::Corner,
@@ -76,33 +77,33 @@ const TABLE: [OutputFormat; 18] = [
     OutputFormat { is_text: true,
         ..row("xyz", Some("xyz"), "Text: x y z probability", files!(xyz::XyzSink::create)) },
     row("npz", Some("npz"), "NumPy arrays: xyz, log_odds, probability, count", files!(npz::NpzSink::create)),
-    behind!("las", "las", "las", "LAS 1.4 with log-odds and count as extra bytes", files!(las::LasSink::plain)),
-    behind!("las", "laz", "laz", "The same, compressed", files!(las::LasSink::compressed)),
-    behind!("las", "copc", "copc.laz", "The same with levels of detail", files!(copc::CopcSink::create)),
-    behind!("e57", "e57", "e57", "ASTM E57", files!(e57::E57Sink::create)),
-    behind!("parquet", "parquet", "parquet", "Apache Parquet, where it was built in",
+    with_feature!("las", "las", "las", "LAS 1.4 with log-odds and count as extra bytes", files!(las::LasSink::plain)),
+    with_feature!("las", "laz", "laz", "The same, compressed", files!(las::LasSink::compressed)),
+    with_feature!("las", "copc", "copc.laz", "The same with levels of detail", files!(copc::CopcSink::create)),
+    with_feature!("e57", "e57", "e57", "ASTM E57", files!(e57::E57Sink::create)),
+    with_feature!("parquet", "parquet", "parquet", "Apache Parquet, if enabled in this build",
             files!(parquet::ParquetSink::create)),
-    behind!("ros", "mcap", "mcap", "A recording with PointCloud2, as Foxglove opens it",
+    with_feature!("ros", "mcap", "mcap", "A recording with PointCloud2 messages, for Foxglove and others",
             files!(mcap::McapSink::create)),
     OutputFormat::GLB,
     OutputFormat { takes: &[Region, Which, Heights], needs_free_voxels: true,
-        ..row("nav2", Some("pgm"), "A flat map of nav2: .pgm and .yaml", files!(nav2::Nav2Sink::create)) },
+        ..row("nav2", Some("pgm"), "A 2D occupancy grid for nav2: .pgm and .yaml", files!(nav2::Nav2Sink::create)) },
     OutputFormat { takes: &[Region, Which, Heights],
         ..row("heightmap", Some("png"), "Heights as a 16-bit PNG with a world file",
               files!(heightmap::HeightmapSink::create)) },
     OutputFormat { takes: &[Region, Which, Cell], origin: Origin::Point,
-        ..row("autoware", None, "A folder of PCD squares with the metadata of Autoware",
+        ..row("autoware", None, "A folder of PCD files for squares, with Autoware's metadata",
               files!(autoware::AutowareSink::create)) },
     OutputFormat { takes: &[],
-        refusal: "it holds what is occupied of the whole map, in true coordinates; make a map of a part with \
-                  `voxtile crop`",
+        refusal: "it always contains the occupied voxels of the whole map in map coordinates; for a part, create a \
+                  smaller map with `voxtile crop`",
         ..row("3dtiles", None,
-              "A folder of 3D Tiles: the surface at every level of detail, as Cesium and others open it",
+              "A folder of 3D Tiles: the surface at every level of detail, for Cesium and others",
               Writer::Tileset) },
 ];
 
 impl OutputFormat {
-    /// The surface of occupied voxels as binary glTF, which 3D Tiles are made of, too.
+    /// Surface of occupied voxels as binary glTF, which 3D Tiles also consist of.
     pub const GLB: Self = Self {
         takes: &[Region, Which, Quantized],
         ..row(
@@ -114,14 +115,14 @@ impl OutputFormat {
     };
 }
 
-/// The formats that maps are written in.
+/// Output formats of maps.
 #[derive(Clone, Debug)]
 pub struct OutputFormats {
     rows: Vec<OutputFormat>,
 }
 
 impl Default for OutputFormats {
-    /// Those of this crate, whether or not it was built to write them.
+    /// All formats of this crate, including those not available in this build.
     fn default() -> Self {
         Self { rows: TABLE.to_vec() }
     }
@@ -134,22 +135,22 @@ impl OutputFormats {
         self
     }
 
-    /// All of them, in the order of help texts.
+    /// Returns all formats, in the order of help texts.
     pub fn all(&self) -> &[OutputFormat] {
         &self.rows
     }
 
-    /// The format of a name, as a person types it: `nav2`, `copc`.
+    /// Returns the format with this name, such as `nav2` or `copc`, in any case.
     pub fn of_name(&self, name: &str) -> Option<&OutputFormat> {
         self.rows.iter().find(|format| format.name.eq_ignore_ascii_case(name))
     }
 
-    /// The format that the end of a file's name asks for. Folders say nothing.
+    /// Returns the format with the extension of a file name. Folder formats have none.
     pub fn of_path(&self, path: &Path) -> Option<&OutputFormat> {
         let name = path.file_name()?.to_string_lossy().to_ascii_lowercase();
         let is_end = |end: &str| name.strip_suffix(end).is_some_and(|before| before.ends_with('.'));
         let found = self.rows.iter().filter(|format| format.extension.is_some_and(is_end));
-        // `.copc.laz` ends with `.laz`, too.
+        // `.copc.laz` also ends with `.laz`.
         found.max_by_key(|format| format.extension.map_or(0, str::len))
     }
 }
@@ -159,7 +160,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_of_files_ask_for_formats() {
+    fn file_extensions_select_formats() {
         let formats = OutputFormats::default();
         let of_path = |name: &str| formats.of_path(Path::new(name)).map(|format| format.name);
         for format in formats.all() {

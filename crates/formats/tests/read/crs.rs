@@ -10,24 +10,24 @@ const UTM: &str = "PROJCS[\"WGS 84 / UTM zone 32N\",GEOGCS[\"WGS 84\",DATUM[\"WG
                    298.257223563]],PRIMEM[\"Greenwich\",0],UNIT[\"degree\",0.0174532925199433]],\
                    PROJECTION[\"Transverse_Mercator\"],UNIT[\"metre\",1],AUTHORITY[\"EPSG\",\"32632\"]]";
 
-/// The coordinate system that comes back of a file, and what is remarked.
+/// Writes and reads a coordinate system. Returns the one read and the remarks.
 fn round_trip(format: &str, crs: Option<&str>) -> (Option<String>, Vec<String>) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(format!("a.{}", format_of(format).extension.unwrap()));
     write_voxels(format, &path, crs);
     if format != "e57" {
         let bytes = fs::read(&path).unwrap();
-        // Point format 6 wants the bit, whether or not a system is known.
+        // Point format 6 requires the WKT bit, even without a coordinate system.
         assert_eq!(bytes[6] & 1 << 4, 1 << 4, "{format}");
     }
-    // A scan of E57 without a pose is remarked otherwise.
+    // The given origin avoids a remark on the missing pose of an E57 scan.
     let options = ReadOptions { sensor_origin_m: Some([0.0; 3]), ..ReadOptions::default() };
     let source = open_clouds(&path, &options).unwrap();
     (source.crs().map(str::to_owned), source.remarks())
 }
 
 #[test]
-fn text_and_numbers_come_back() {
+fn text_and_codes_round_trip() {
     for format in FORMATS {
         for crs in [None, Some(UTM), Some("EPSG:25832")] {
             assert_eq!(round_trip(format, crs), (crs.map(str::to_owned), vec![]), "{format}");
@@ -36,20 +36,20 @@ fn text_and_numbers_come_back() {
 }
 
 #[test]
-fn a_system_in_feet_is_not_that_of_metres() {
+fn coordinate_systems_in_feet_are_not_passed_on() {
     let feet = UTM.replace("UNIT[\"metre\",1]", "UNIT[\"US survey foot\",0.304800609601219]");
     for format in FORMATS {
         let (crs, remarks) = round_trip(format, Some(&feet));
-        let said = "the coordinate system is not in metres";
+        let expected = "the coordinate system is not in metres";
         assert!(
-            crs.is_none() && remarks.iter().any(|remark| remark.starts_with(said)),
+            crs.is_none() && remarks.iter().any(|remark| remark.starts_with(expected)),
             "{format}: {remarks:?}"
         );
     }
 }
 
 #[test]
-fn what_is_no_number_of_a_system_is_refused() {
+fn invalid_epsg_codes_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.las");
     let head = VoxelsHead::of_stream(0, 0.5);
@@ -60,7 +60,7 @@ fn what_is_no_number_of_a_system_is_refused() {
     }
 }
 
-/// A folder of files, each with its coordinate system.
+/// Opens a folder of files, each with its own coordinate system.
 fn folder_of(folder: &Path, format: &str, systems: &[Option<&str>]) -> Box<dyn CloudSource> {
     for (number, crs) in systems.iter().enumerate() {
         let path = folder.join(format!("{number}.{}", format_of(format).extension.unwrap()));
@@ -74,7 +74,7 @@ fn of_systems(source: &dyn CloudSource) -> Vec<String> {
 }
 
 #[test]
-fn files_of_another_system_are_refused_before_their_points() {
+fn files_with_another_coordinate_system_are_refused() {
     for format in ["las", "e57"] {
         let folder = tempfile::tempdir().unwrap();
         let systems = [Some("EPSG:25832"), Some("EPSG:25833"), None, Some("EPSG:25832")];
@@ -88,14 +88,14 @@ fn files_of_another_system_are_refused_before_their_points() {
             }
         }
         assert_eq!((clouds, errors.len()), (3, 1), "{format}: {errors:?}");
-        let parts = ["/1.", "in EPSG:25833, those of the files before it in EPSG:25832"];
+        let parts = ["/1.", "in EPSG:25833, but those of the previous files are in EPSG:25832"];
         assert!(parts.iter().all(|part| errors[0].contains(part)), "{errors:?}");
         assert_eq!((source.crs(), of_systems(&*source)), (Some("EPSG:25832"), vec![]));
     }
 }
 
 #[test]
-fn a_system_that_later_files_name_is_told() {
+fn coordinate_system_of_later_files_is_remarked() {
     let folder = tempfile::tempdir().unwrap();
     let mut source = folder_of(folder.path(), "las", &[None, Some("EPSG:25832")]);
     assert!(source.next_cloud().unwrap().is_some());
@@ -103,6 +103,6 @@ fn a_system_that_later_files_name_is_told() {
     assert!(source.next_cloud().unwrap().is_some());
     assert_eq!(source.crs(), Some("EPSG:25832"));
     let remarks = of_systems(&*source);
-    let told = "1.las: names the coordinate system EPSG:25832, the files before it name none";
-    assert!(remarks.len() == 1 && remarks[0].starts_with(told), "{remarks:?}");
+    let expected = "1.las: names the coordinate system EPSG:25832, but the previous files name none";
+    assert!(remarks.len() == 1 && remarks[0].starts_with(expected), "{remarks:?}");
 }

@@ -13,7 +13,7 @@ fn image(path: &Path, width: u32, depths: &[u16]) {
 }
 
 #[test]
-fn seven_scenes_have_millimetres_invalid_pixels_and_poses() {
+fn seven_scenes_data_is_read() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     image(&at("frame-000000.depth.png"), 2, &[2000, 0, 65535, 500]);
@@ -45,8 +45,8 @@ fn seven_scenes_have_millimetres_invalid_pixels_and_poses() {
 }
 
 #[test]
-fn tum_has_a_list_with_stamps_and_a_scale_of_5000() {
-    // A camera is also searched for next to the folder.
+fn tum_data_has_a_list_and_a_scale_of_5000() {
+    // A camera file is also searched for next to the folder.
     let outer = tempfile::tempdir().unwrap();
     let folder = outer.path().join("folder");
     fs::create_dir_all(folder.join("depth")).unwrap();
@@ -58,12 +58,12 @@ fn tum_has_a_list_with_stamps_and_a_scale_of_5000() {
     let clouds = clouds_with(&folder, &ReadOptions { intrinsics, ..Default::default() });
     assert_eq!(clouds[0].0.stamp_ns, Some(1_305_031_453_374_112_000));
     let depths: Vec<_> = clouds[0].1.iter().map(|point| (point.position_m[2], point.is_return)).collect();
-    // The largest value is no distance.
+    // The largest value means no return.
     assert_eq!(depths, [(1.0, true), (1.0, false)]);
 }
 
 #[test]
-fn lines_of_the_list_that_cannot_be_read_are_left_out() {
+fn invalid_lines_of_the_list_are_skipped() {
     let folder = tempfile::tempdir().unwrap();
     let options = ReadOptions {
         intrinsics: Some(Intrinsics::new([525.0, 525.0, 319.5, 239.5]).unwrap()),
@@ -77,16 +77,19 @@ fn lines_of_the_list_that_cannot_be_read_are_left_out() {
     let clouds = crate::support::all(&mut *source).unwrap();
     assert_eq!(clouds.iter().map(|(head, _)| head.stamp_ns).collect::<Vec<_>>(), [Some(12_500_000_000)]);
     let remarks = source.remarks();
-    assert!(remarks.len() == 1 && remarks[0].starts_with("2 lines are left out, the first: "), "{remarks:?}");
-    assert!(remarks[0].contains("line 2: `nan` is no time stamp"), "{remarks:?}");
+    assert!(
+        remarks.len() == 1 && remarks[0].starts_with("2 lines are invalid and skipped, the first: "),
+        "{remarks:?}"
+    );
+    assert!(remarks[0].contains("line 2: `nan` is not a time stamp"), "{remarks:?}");
     fs::write(&list, "nan 1.png\n").unwrap();
     let (error, points) = failure(folder.path(), &options);
-    assert!(error.contains("line 1: `nan` is no time stamp") && points == 0, "{error}");
+    assert!(error.contains("line 1: `nan` is not a time stamp") && points == 0, "{error}");
 }
 
-/// A list from elsewhere is not to open any file of the machine.
+/// An untrusted list must not open arbitrary files.
 #[test]
-fn images_out_of_the_folder_are_refused() {
+fn images_outside_of_the_folder_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let inner = folder.path().join("set");
     fs::create_dir(&inner).unwrap();
@@ -100,7 +103,7 @@ fn images_out_of_the_folder_are_refused() {
         fs::write(inner.join("depth.txt"), format!("# depth maps\n1305031453.374112 {name}\n")).unwrap();
         let (error, points) = failure(&inner, &options);
         assert!(
-            error.contains("depth.txt: malformed: line 2") && error.contains("leads out of the folder"),
+            error.contains("depth.txt: malformed: line 2") && error.contains("is outside of the folder"),
             "{error}"
         );
         assert_eq!(points, 0);
@@ -108,7 +111,7 @@ fn images_out_of_the_folder_are_refused() {
 }
 
 #[test]
-fn images_that_are_no_depths_are_errors() {
+fn other_images_are_errors() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("1.png");
     let intrinsics = Some(Intrinsics::new([1.0, 1.0, 0.0, 0.0]).unwrap());
@@ -116,7 +119,7 @@ fn images_that_are_no_depths_are_errors() {
     let encoder = png::Encoder::new(File::create(&path).unwrap(), 1, 1);
     encoder.write_header().unwrap().write_image_data(&[9]).unwrap();
     let (error, _) = failure(folder.path(), &options);
-    assert!(error.contains("is no depth image"), "{error}");
+    assert!(error.contains("is not a depth image"), "{error}");
     let depths: Vec<u16> = (0..40_000_u32).map(|k| (k.wrapping_mul(2_654_435_761) >> 16) as u16).collect();
     image(&path, 100, &depths);
     let whole = fs::read(&path).unwrap();
@@ -160,7 +163,7 @@ fn fifos_among_depth_images_are_refused() {
     fifo("frame-000000.pose.txt");
     let (error, _) = failure(folder.path(), &ReadOptions::default());
     assert!(error.contains("frame-000000.pose.txt: is a FIFO"), "{error}");
-    // Only what is read in one pass may be named alone.
+    // Only formats that are read in one pass may be a FIFO.
     for (name, is_hinted) in [("a.ply", true), ("b.e57", false)] {
         fifo(name);
         let (error, _) = failure(&at(name), &ReadOptions::default());

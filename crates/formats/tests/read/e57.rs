@@ -5,9 +5,9 @@ use std::path::Path;
 use voxtile_formats::RigidPose;
 use voxtile_formats::{ReadOptions, open_clouds};
 
-/// Written by pye57 (libE57Format).
+/// The fixture was written by pye57 (libE57Format).
 #[test]
-fn scans_have_poses_and_invalid_points_are_no_returns() {
+fn scans_have_poses_and_invalid_points_are_not_returns() {
     let clouds = clouds(&fixture("scans.e57"));
     let names: Vec<&str> = clouds.iter().map(|(head, _)| head.name.as_str()).collect();
     assert_eq!(names, ["scan at 0", "scan at 100"]);
@@ -31,9 +31,9 @@ fn scans_have_poses_and_invalid_points_are_no_returns() {
     }
 }
 
-/// As programs write what is in one frame already: exports of voxels have no pose.
+/// Data already in one frame, such as exported voxels, has no pose.
 #[test]
-fn a_scan_without_a_pose_is_in_the_frame_of_the_file() {
+fn scans_without_pose_are_in_the_file_frame() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("bare.e57");
     write_voxels("e57", &path, None);
@@ -52,7 +52,7 @@ fn a_scan_without_a_pose_is_in_the_frame_of_the_file() {
 }
 
 #[test]
-fn no_damage_makes_a_panic() {
+fn damage_never_panics() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("damaged.e57");
     let bytes = fs::read(fixture("scans.e57")).unwrap();
@@ -66,20 +66,20 @@ fn no_damage_makes_a_panic() {
     }
 }
 
-/// The library would make points of it until there is no memory.
+/// The library would create points until the memory is exhausted.
 #[test]
-fn points_that_take_no_bits_are_refused() {
+fn points_without_bits_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("constant.e57");
     let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/corpus/cloud_e57/without-bits");
-    // The first byte is for the target of the fuzzer.
+    // The first byte is only for the fuzz target.
     fs::write(&path, &fs::read(corpus).unwrap()[1..]).unwrap();
     let (error, points) = failure(&path, &ReadOptions::default());
-    assert!(error.contains("constant.e57: malformed: record 0: every field of its points has"), "{error}");
+    assert!(error.contains("constant.e57: malformed: record 0: every field has equal"), "{error}");
     assert_eq!(points, 0);
 }
 
-/// A file whose description is this one.
+/// Writes a file with this XML section.
 fn described(path: &Path, xml: &[u8]) {
     let mut content = b"ASTM-E57".to_vec();
     content.extend([1_u32, 0].iter().flat_map(|number| number.to_le_bytes()));
@@ -89,20 +89,20 @@ fn described(path: &Path, xml: &[u8]) {
     }
     content.extend(xml);
     content.resize(1020 * pages, 0);
-    // Checksums are compared later than what is tested here.
+    // Checksums are only verified after the tested checks.
     let file: Vec<u8> = content.chunks(1020).flat_map(|page| [page, &[0; 4]].concat()).collect();
     fs::write(path, file).unwrap();
 }
 
 #[test]
-fn a_file_that_is_no_e57_or_is_cut_off_says_so() {
+fn foreign_and_truncated_files_are_errors() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.e57");
     let whole = fs::read(fixture("scans.e57")).unwrap();
     let page = b"<!DOCTYPE html><html><body>The file has moved to another server.</body></html>";
-    let cut = "offset 0: it is no E57 file, or is cut off; copy it again";
+    let cut = "offset 0: it is not an E57 file, or is truncated: copy it again";
     for (bytes, reason) in
-        [(&b""[..], cut), (&whole[..8], cut), (&whole[..47], cut), (page, "is a page of HTML, not data")]
+        [(&b""[..], cut), (&whole[..8], cut), (&whole[..47], cut), (page, "is an HTML page, not data")]
     {
         fs::write(&path, bytes).unwrap();
         let (error, _) =
@@ -111,15 +111,15 @@ fn a_file_that_is_no_e57_or_is_cut_off_says_so() {
     }
 }
 
-/// The library compares each attribute of a tag with those before it.
+/// The library compares each attribute of a tag with the previous ones.
 #[test]
-fn a_tag_with_many_attributes_is_refused() {
+fn tags_with_many_attributes_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("many.e57");
     let attributes: String = (0..200_000).map(|k| format!(" a{k}=''")).collect();
     described(&path, format!("<e57Root{attributes}/>").as_bytes());
     let (error, _) = failure(&path, &ReadOptions::default());
-    assert!(error.contains("more than 256 attributes of one tag"), "{error}");
+    assert!(error.contains("more than 256 attributes in one tag"), "{error}");
 }
 
 /// A packet is decoded as a whole.
@@ -145,7 +145,7 @@ fn packets_that_exceed_the_memory_are_refused() {
     let with = |memory_bytes| ReadOptions { memory_bytes, ..ReadOptions::default() };
     let (error, points) = failure(&path, &with(0));
     assert!(
-        error.contains("record 0: a packet of points would take") && error.contains("`memory`"),
+        error.contains("record 0: a packet of points would need") && error.contains("`memory`"),
         "{error}"
     );
     assert_eq!(points, 0);

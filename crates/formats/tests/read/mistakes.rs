@@ -3,7 +3,7 @@ use std::fs;
 use std::path::Path;
 use voxtile_formats::{ReadOptions, Registry, open_clouds, open_scans};
 
-/// Points and remarks of a file of clouds.
+/// Returns the points and the remarks of a file.
 fn read(path: &Path, options: &ReadOptions) -> (Vec<[f64; 3]>, Vec<String>) {
     let mut source = open_clouds(path, options).unwrap_or_else(|error| panic!("{error:#}"));
     let clouds = crate::support::all(source.as_mut()).unwrap_or_else(|error| panic!("{error:#}"));
@@ -28,7 +28,7 @@ fn error_of(name: &str, bytes: &[u8]) -> String {
 const WANTED: [[f64; 3]; 2] = [[1.5, -2.25, 3.0], [4.0, 5.0, 6.0]];
 
 #[test]
-fn texts_as_programs_write_them() {
+fn texts_of_many_programs_are_read() {
     for (name, text) in [
         ("mac.xyz", "1.5 -2.25 3\r4 5 6\r"),
         ("mark.csv", "\u{feff}x,y,z\r\n1.5,-2.25,3\r\n4,5,6\r\n"),
@@ -53,10 +53,10 @@ fn texts_as_programs_write_them() {
 }
 
 #[test]
-fn rows_that_are_no_points_are_counted_and_named() {
+fn invalid_rows_are_counted_and_reported() {
     let (points, remarks) = read_text("a.csv", "x,y,z\n1.5,-2.25,3\nbroken,1,2\n4,5,6\n7,8\n");
     assert_eq!(points, WANTED);
-    assert_eq!(remarks, ["2 rows are no points, left out (line 3: `broken` is not a number)"]);
+    assert_eq!(remarks, ["2 rows are not points, skipped (line 3: `broken` is not a number)"]);
     let error = error_of("a.csv", b"x,y,z\nbroken,1,2\n");
     assert!(error.contains("line 2: `broken` is not a number"), "{error}");
     let (points, _) = read_text("nan.csv", "x,y,z\n1.5,-2.25,3\n,,\n1.#QNAN,-nan(ind),NA\n4,5,6\n");
@@ -64,15 +64,15 @@ fn rows_that_are_no_points_are_counted_and_named() {
 }
 
 #[test]
-fn what_is_no_text_of_points_is_said_with_line_and_word() {
+fn invalid_texts_are_errors_with_line_and_word() {
     for (name, bytes, reason) in [
-        ("a.csv", &b"x (px),y (px),z (px)\n1,2,3\n"[..], "line 1: column `x (px)`: `px` is no known unit"),
-        ("a.xyz", b"# a\nC 1 2 3\n", "line 2: `C 1 2 3` is neither numbers nor names"),
-        ("a.txt", b"1 2\n3 4\n", "line 1: 2 columns; a point has x, y and z"),
+        ("a.csv", &b"x (px),y (px),z (px)\n1,2,3\n"[..], "line 1: column `x (px)`: `px` is an unknown unit"),
+        ("a.xyz", b"# a\nC 1 2 3\n", "line 2: `C 1 2 3` is neither numbers nor column names"),
+        ("a.txt", b"1 2\n3 4\n", "line 1: 2 columns; a point needs x, y and z"),
         ("a.csv", b"\xff\xfex\0,\0y\0", "is text in UTF-16: save it as UTF-8"),
         ("a.txt", b"", "the file is empty"),
         ("a.asc", b"ncols 2\nnrows 1\n1 2\n", "line 1: this is a grid of heights"),
-        ("a.xyz", b"1 2 3\0\0", "bytes of zero"),
+        ("a.xyz", b"1 2 3\0\0", "zero bytes"),
     ] {
         let error = error_of(name, bytes);
         assert!(error.contains(reason) && error.contains(name), "{error}");
@@ -80,7 +80,7 @@ fn what_is_no_text_of_points_is_said_with_line_and_word() {
 }
 
 #[test]
-fn what_arrived_in_place_of_a_file_is_named_whatever_its_name() {
+fn placeholders_are_reported_for_any_name() {
     let pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:00\nsize 5\n".to_owned();
     let page = "\n<!DOCTYPE html>\n<html>Sign in</html>\n".to_owned();
     let formats = Registry::default();
@@ -88,7 +88,7 @@ fn what_arrived_in_place_of_a_file_is_named_whatever_its_name() {
     let foreign = ["npy", "bt", "zip", "pcap", "dat"];
     for extension in extensions.chain(&foreign) {
         for (text, reason) in
-            [(&pointer, "is a Git LFS pointer, not the file itself"), (&page, "is a page of HTML")]
+            [(&pointer, "is a Git LFS pointer, not the file itself"), (&page, "is an HTML page")]
         {
             let folder = tempfile::tempdir().unwrap();
             let path = folder.path().join(format!("a.{extension}"));
@@ -107,7 +107,7 @@ fn what_arrived_in_place_of_a_file_is_named_whatever_its_name() {
 }
 
 #[test]
-fn archives_are_named() {
+fn archives_are_reported() {
     for (name, bytes, reason) in [
         ("a.csv", &b"PK\x03\x04..."[..], "is a ZIP archive"),
         ("a.las", b"\x1f\x8b\x08\0...", "is packed with gzip"),
@@ -125,16 +125,16 @@ fn archives_are_named() {
 
 #[cfg(unix)]
 #[test]
-fn links_to_nothing_are_said() {
+fn broken_links_are_reported() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.las");
     std::os::unix::fs::symlink("../lost.las", &path).unwrap();
     let error = failure(&path, &ReadOptions::default()).0;
-    assert!(error.contains("is a link to ../lost.las, and there is no such file"), "{error}");
+    assert!(error.contains("is a link to ../lost.las, which does not exist"), "{error}");
 }
 
 #[test]
-fn headers_of_ply_in_any_letters_and_line_ends() {
+fn ply_headers_in_any_case_and_line_ends() {
     let head = "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\n\
                 end_header\n";
     let body = "1.5 -2.25 3\n4 5 6\n";
@@ -150,14 +150,14 @@ fn headers_of_ply_in_any_letters_and_line_ends() {
     ] {
         assert_eq!(read_text("a.ply", &text).0, WANTED, "{text}");
     }
-    // Words of properties that are not read need not be numbers.
+    // Properties that are not read may contain words.
     let labelled = head.replace("end_header", "property int label\nend_header");
     let (points, remarks) = read_text("a.ply", &format!("{labelled}1.5 -2.25 3 wall\n4 5 6 floor\n"));
     assert_eq!((points.as_slice(), remarks.len()), (&WANTED[..], 0));
     let (points, remarks) = read_text("a.ply", &format!("{head}1.5 -2.25 3\n4 five 6\n"));
     assert_eq!(points, WANTED[..1]);
-    assert_eq!(remarks, ["1 row is no point, left out (line 9: `five` is not a number)"]);
-    // A number that is missing where lines are wrapped, with faces behind.
+    assert_eq!(remarks, ["1 row is not a point, skipped (line 9: `five` is not a number)"]);
+    // A missing number in wrapped lines, followed by faces.
     let faces = head.replace("end_header", "element face 1\nproperty list uchar int i\nend_header");
     let whole = format!("{faces}1.5 -2.25\n3 4 5 6\n3 0 1 0\n");
     assert_eq!(read_text("a.ply", &whole).0, WANTED);
@@ -174,12 +174,13 @@ fn headers_of_ply_in_any_letters_and_line_ends() {
     assert!(remarks[0].contains("x, y and z are in mm"), "{remarks:?}");
     let comment = head.replace("element", "comment units: mm\nelement");
     let (_, remarks) = read_text("a.ply", &format!("{comment}{body}"));
-    assert!(remarks[0].contains("line 3 says `comment units: mm`"), "{remarks:?}");
+    assert!(remarks[0].contains("line 3 contains `comment units: mm`"), "{remarks:?}");
 }
 
-/// A binary file whose lines end with CR has its first number right behind the last CR, whatever its first byte.
+/// In a binary file with CR line ends, the first number directly follows the last CR, even if it starts with an LF
+/// byte.
 #[test]
-fn binary_ply_after_cr_alone() {
+fn binary_ply_after_cr_line_ends() {
     let head = "ply\rformat binary_little_endian 1.0\relement vertex 2\rproperty uchar label\rproperty float x\r\
                 property float y\rproperty float z\rend_header\r";
     let row = |[x, y, z]: [f64; 3]| {
@@ -199,7 +200,7 @@ fn scan_of(path: &Path, options: &ReadOptions) -> Result<(Vec<[f64; 3]>, Vec<Str
 }
 
 #[test]
-fn headers_of_pcd_in_any_letters_and_line_ends() {
+fn pcd_headers_in_any_case_and_line_ends() {
     let head = "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 2\nHEIGHT 1\n\
                 VIEWPOINT 0 0 0 1 0 0 0\nPOINTS 2\nDATA ascii\n";
     let body = "1.5 -2.25 3\n4 5 6\n";
@@ -232,7 +233,7 @@ fn headers_of_pcd_in_any_letters_and_line_ends() {
     let (points, remarks) = scan_of(&path, &options).unwrap();
     assert_eq!(points, WANTED[..1]);
     assert!(
-        remarks[0].ends_with("1 row is no point, left out (line 13: `five` is not a number)"),
+        remarks[0].ends_with("1 row is not a point, skipped (line 13: `five` is not a number)"),
         "{remarks:?}"
     );
     write(&format!("{head}1.5 -2.25 3\n4 5\n"));
@@ -240,15 +241,15 @@ fn headers_of_pcd_in_any_letters_and_line_ends() {
     assert!(error.contains("line 13: 2 values; field z is missing"), "{error}");
     write(&format!("{}{body}", head.replace("x y z", "a b z")));
     let error = scan_of(&path, &options).unwrap_err();
-    assert!(error.contains("the points have no field x, y; their fields are `a b z`"), "{error}");
-    // A viewpoint that is none matters only where it is needed.
+    assert!(error.contains("the points have no field x, y; fields: `a b z`"), "{error}");
+    // An invalid viewpoint is an error only if it is needed.
     write(&format!("{}{body}", head.replace("VIEWPOINT 0 0 0 1", "VIEWPOINT 1 0 0 0")));
     assert!(scan_of(&path, &options).unwrap_err().contains("VIEWPOINT"));
     let posed = ReadOptions { poses: Some("identity".into()), ..ReadOptions::default() };
     assert_eq!(scan_of(&path, &posed).map(|(points, _)| points), Ok(WANTED.to_vec()));
 }
 
-/// Numbers of a file without a header: a room whose points are in no order.
+/// Numbers for a headerless file: points of a room in random order.
 fn raw(points: usize, row: impl Fn(usize, [f64; 3]) -> Vec<f64>) -> Vec<f64> {
     let mut state = 1_u64;
     let mut part = || {
@@ -260,13 +261,13 @@ fn raw(points: usize, row: impl Fn(usize, [f64; 3]) -> Vec<f64>) -> Vec<f64> {
 }
 
 #[test]
-fn columns_of_raw_numbers_are_checked_and_said() {
+fn columns_of_raw_numbers_are_checked_and_reported() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.bin");
     let floats =
         |values: &[f64]| values.iter().flat_map(|value| (*value as f32).to_le_bytes()).collect::<Vec<u8>>();
     let doubles = |values: &[f64]| values.iter().flat_map(|value| value.to_le_bytes()).collect::<Vec<u8>>();
-    for (bytes, said) in [
+    for (bytes, expected) in [
         (
             floats(&raw(420, |k, [x, y, z]| vec![x, y, z, (k % 7) as f64])),
             "4 columns of float32: x y z intensity",
@@ -274,7 +275,7 @@ fn columns_of_raw_numbers_are_checked_and_said() {
         (floats(&raw(420, |_, place| place.to_vec())), "3 columns of float32: x y z"),
         (
             floats(&raw(420, |_, [x, y, z]| vec![x, y, z, 0.5, 0.5, 0.5])),
-            "6 columns of float32: x y z, the rest is not read (`fields` names them)",
+            "6 columns of float32: x y z, the others are ignored (set with `fields`)",
         ),
         (doubles(&raw(420, |_, place| place.to_vec())), "3 columns of float64: x y z"),
         (
@@ -284,10 +285,13 @@ fn columns_of_raw_numbers_are_checked_and_said() {
     ] {
         fs::write(&path, bytes).unwrap();
         let (points, remarks) = read(&path, &ReadOptions::default());
-        assert_eq!(remarks, [said]);
-        assert_eq!(points.len(), 420, "{said}");
+        assert_eq!(remarks, [expected]);
+        assert_eq!(points.len(), 420, "{expected}");
         let first = raw(1, |_, place| place.to_vec());
-        assert!(points[0].iter().zip(&first).all(|(found, wanted)| (found - wanted).abs() < 1e-6), "{said}");
+        assert!(
+            points[0].iter().zip(&first).all(|(found, wanted)| (found - wanted).abs() < 1e-6),
+            "{expected}"
+        );
     }
     fs::write(
         &path,
@@ -324,7 +328,7 @@ fn fields_of_raw_numbers_have_types_and_units() {
 }
 
 #[test]
-fn texts_beside_clouds_are_no_clouds() {
+fn companion_texts_are_not_clouds() {
     let folder = tempfile::tempdir().unwrap();
     for (name, text) in [
         ("1.csv", "1.5,-2.25,3\n"),
@@ -339,7 +343,7 @@ fn texts_beside_clouds_are_no_clouds() {
     assert_eq!(points, WANTED);
     for name in ["imu.csv", "cam.txt", "gt_poses.txt"] {
         let is_named =
-            |remark: &&String| remark.starts_with(name) && remark.ends_with("is no cloud, left out");
+            |remark: &&String| remark.starts_with(name) && remark.ends_with("is not a cloud and was skipped");
         assert_eq!(remarks.iter().filter(is_named).count(), 1, "{remarks:?}");
     }
     let names: Vec<String> = clouds(folder.path()).into_iter().map(|(head, _)| head.name).collect();
@@ -347,12 +351,15 @@ fn texts_beside_clouds_are_no_clouds() {
 }
 
 #[test]
-fn a_folder_of_texts_without_clouds_names_what_may_be_meant() {
+fn text_folders_without_clouds_suggest_alternatives() {
     let folder = tempfile::tempdir().unwrap();
     fs::create_dir(folder.path().join("depth")).unwrap();
     fs::write(folder.path().join("cam.txt"), "525 525 31.5 23.5\n").unwrap();
     let error = failure(folder.path(), &ReadOptions::default()).0;
-    assert!(error.contains("cam.txt") && error.contains("is one of its folders meant (depth)"), "{error}");
+    assert!(
+        error.contains("cam.txt") && error.contains("did you mean one of its subfolders (depth)"),
+        "{error}"
+    );
     fs::write(folder.path().join("associations.txt"), "1.5 depth/1.png 1.5 rgb/1.png\n").unwrap();
     let error = failure(folder.path(), &ReadOptions::default()).0;
     assert!(error.contains("{print $1, $2}' associations.txt > depth.txt"), "{error}");

@@ -20,7 +20,7 @@ const TUM: &str = "# timestamp tx ty tz qx qy qz qw\n\
 const FIRST_NS: i64 = 1_403_636_579_763_555_584;
 
 #[test]
-fn stamps_are_exact_and_poses_lie_between() {
+fn stamps_are_exact_and_poses_are_interpolated() {
     let trajectory = read(TUM).unwrap();
     let first = RigidPose { position_m: [1.0, 2.0, 3.0], ..RigidPose::IDENTITY };
     assert_eq!(trajectory.at(FIRST_NS, 0).unwrap(), Found::Exact(first));
@@ -28,20 +28,20 @@ fn stamps_are_exact_and_poses_lie_between() {
     assert_eq!(trajectory.at(before_ns, i64::MAX).unwrap(), Found::Before { first_ns: FIRST_NS });
     let last_ns = FIRST_NS + 11_000_000_000;
     assert_eq!(trajectory.at(last_ns + 1_000_001, i64::MAX).unwrap(), Found::After { last_ns });
-    // Written numbers stay, though their length is not 1 to the last bit.
+    // Poses keep their values even if the quaternion's length is not exactly 1.
     let Found::Exact(last) = trajectory.at(last_ns, 0).unwrap() else { panic!() };
     assert_eq!(last.quaternion, [0.0, 0.0, 0.707, 0.7072]);
     let Found::Between(half) = trajectory.at(FIRST_NS + 500_000_000, 500_000_000).unwrap() else { panic!() };
     assert_eq!(half.position_m, [2.0, 2.0, 3.0]);
     let (sin, cos) = (std::f64::consts::PI / 8.0).sin_cos();
     assert!((half.quaternion[2] - sin).abs() < 1e-12 && (half.quaternion[3] - cos).abs() < 1e-12, "{half:?}");
-    // A hole of ten seconds, near to its begin as in its middle.
+    // A gap of ten seconds, near its start and in its middle.
     for into_ns in [400_000_000, 5_000_000_000] {
         let at_ns = FIRST_NS + 1_000_000_000 + into_ns;
         assert_eq!(trajectory.at(at_ns, 4_999_999_999).unwrap(), Found::Gap { gap_ns: 10_000_000_000 });
         assert!(matches!(trajectory.at(at_ns, 5_000_000_000).unwrap(), Found::Between(_)));
     }
-    // Once a second, every moment is within half a second of a pose.
+    // With one pose per second, every moment is within half a second of a pose.
     assert_eq!(
         trajectory.at(FIRST_NS + 1_000_001, 499_999_999).unwrap(),
         Found::Gap { gap_ns: 1_000_000_000 }
@@ -53,7 +53,7 @@ fn stamps_are_exact_and_poses_lie_between() {
 }
 
 #[test]
-fn a_pose_within_a_millisecond_is_taken_whatever_the_gap() {
+fn poses_within_a_millisecond_are_used_in_any_gap() {
     let key_frames =
         "1700000010.000000000 1 0 0 0 0 0 1\n1700000025.5 2 0 0 0 0 0 1\n1700000040.25 3 0 0 0 0 0 1\n";
     let trajectory = read(key_frames).unwrap();
@@ -71,13 +71,13 @@ fn a_pose_within_a_millisecond_is_taken_whatever_the_gap() {
             assert_eq!(x_m(stamp_ns + apart_ns), None, "{apart_ns}");
         }
     }
-    // Where the gap may be filled, the pose is between two, however near to one.
+    // If the gap may be interpolated, the pose is interpolated even close to a sample.
     let Found::Between(pose) = trajectory.at(first_ns + 74, i64::MAX).unwrap() else { panic!() };
     assert!(pose.position_m[0] > 1.0);
 }
 
 #[test]
-fn stamps_out_of_order_and_twice_are_remarked() {
+fn unordered_and_duplicate_stamps_are_remarked() {
     let trajectory = read("2 1 0 0 0 0 0 1\n1 2 0 0 0 0 0 1\n2 3 0 0 0 0 0 1\n").unwrap();
     assert_eq!(
         trajectory.stamps_ns().map(|stamp| stamp.unwrap()).collect::<Vec<_>>(),
@@ -90,34 +90,34 @@ fn stamps_out_of_order_and_twice_are_remarked() {
 }
 
 #[test]
-fn what_is_no_pose_is_an_error_with_its_line() {
+fn invalid_poses_are_errors_with_their_line() {
     for (text, reason) in [
         ("1 nan 0 0 0 0 0 1\n", "line 1: `nan` is not finite"),
         ("0 0 0 0 0 0 0 0\n", "line 1: the quaternion 0 0 0 0 has length 0"),
-        // Most lines are something else.
+        // Most lines have another layout.
         (
             "0 0 0 0 0 0 0 1\n\n1 2 3 4 5 6 7 8 9\n1 2 3 4 5 6 7 8 9\n",
-            "line 3: 9 numbers; the lines before have 8",
+            "line 3: 9 numbers, but the lines before have 8",
         ),
         (
             "1 2 3 0.1 0.2 0.3 0.4\n1 2 3 0 0 0 1\n2 2 3 0.1 0.2 0.3 0.4\n",
-            "are these angles, roll, pitch and yaw?",
+            "are these roll, pitch and yaw angles?",
         ),
         ("1 2 3 4 5 6\n", "line 1: 6 numbers; a pose is 8 numbers (TUM: t x y z qx qy qz qw), 7 without t"),
-        ("1 2 3 4 5 6\n", "roll, pitch and yaw are not read"),
+        ("1 2 3 4 5 6\n", "roll, pitch and yaw are not supported"),
         ("t x y z roll pitch yaw\n1 2 3 4 0 0 1\n", "line 1: the column `roll` is an angle"),
         ("# t x y z roll pitch yaw\n1 2 3 4 0 0 1\n", "line 2: the column `roll` is an angle"),
-        ("# t x[px] y[px] z[px] qx qy qz qw\n1 2 3 4 0 0 0 1\n", "line 2: `px` is no unit of length"),
+        ("# t x[px] y[px] z[px] qx qy qz qw\n1 2 3 4 0 0 0 1\n", "line 2: `px` is an unknown unit of length"),
         (
             "# id t x y z qw qx qy qz\n1 2 3 4 1 0 0 0\n",
-            "line 2: 8 columns; the names before it are of 9 or more",
+            "line 2: 8 columns, but the header line has 9 or more",
         ),
-        ("t[min] x y z qx qy qz qw\n1 2 3 4 0 0 0 1\n", "line 1: `min` is no unit of time"),
+        ("t[min] x y z qx qy qz qw\n1 2 3 4 0 0 0 1\n", "line 1: `min` is an unknown unit of time"),
         ("nan 2 3 4 0 0 0 1\nNA 2 3 4 0 0 0 1\n", "line 1: no time stamp"),
-        ("1 0 0 0 0 2 0 0 0 0 1 0\n", "line 1: the matrix is no rotation"),
+        ("1 0 0 0 0 2 0 0 0 0 1 0\n", "line 1: the matrix is not a rotation"),
         ("one two\n", "line 1: `one two` is neither"),
         ("1 2 3\n", "line 1: 3 numbers"),
-        ("# nothing\n", "holds no pose"),
+        ("# nothing\n", "contains no pose"),
         ("x 0 0 0 0 0 0 1\n", "is neither a pose"),
     ] {
         let error = format!("{:#}", read(text).unwrap_err());
@@ -125,7 +125,7 @@ fn what_is_no_pose_is_an_error_with_its_line() {
     }
 }
 
-/// So many clouds, if that is known, which are never read.
+/// Source with an optional number of clouds, which are never read.
 struct Clouds(Option<u64>);
 
 impl CloudSource for Clouds {
@@ -151,12 +151,12 @@ impl CloudSource for Clouds {
 }
 
 #[test]
-fn poses_by_number_are_as_many_as_clouds() {
+fn poses_by_number_must_match_the_number_of_clouds() {
     let trajectory = read(TUM).unwrap();
     assert_eq!(trajectory.of_cloud(2, &Clouds(Some(3))).unwrap(), trajectory.by_number(2).unwrap());
     assert_eq!(trajectory.of_cloud(2, &Clouds(None)).unwrap(), trajectory.by_number(2).unwrap());
     for (number, clouds, counts) in [
-        (0, Some(4), "3 poses for 4 clouds (1.txt to trajectory.txt), which have no time stamps in common"),
+        (0, Some(4), "3 poses for 4 clouds (1.txt to trajectory.txt), and not both have time stamps"),
         (0, Some(2), "3 poses for 2 clouds (1.txt to trajectory.txt), "),
         (3, None, "3 poses for at least 4 clouds, "),
     ] {
@@ -166,7 +166,7 @@ fn poses_by_number_are_as_many_as_clouds() {
 }
 
 #[test]
-fn tables_name_their_columns() {
+fn tables_have_named_columns() {
     let euroc = "#timestamp [ns], p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], q_RS_z []\n\
                  1403636579763555584,1,2,3,0,1,0,0\n";
     let csv = "qw,qz,qy,qx,z,y,x,timestamp,note\n0,0,0,1,3,2,1,1403636579.763555584,9\n";
@@ -196,18 +196,18 @@ fn units_of_columns_are_used() {
         let trajectory = read(text).unwrap();
         assert_eq!(trajectory.at(1_700_000_000_000_000_000, 0).unwrap(), Found::Exact(wanted), "{text}");
         let remarks = trajectory.remarks().join("\n");
-        let said = format!("positions are in {unit} by the names of their columns");
-        assert!(if unit.is_empty() { remarks.is_empty() } else { remarks.contains(&said) }, "{remarks}");
+        let expected = format!("positions are in {unit}, as stated in their column names");
+        assert!(if unit.is_empty() { remarks.is_empty() } else { remarks.contains(&expected) }, "{remarks}");
     }
 }
 
 #[test]
-fn rows_that_are_no_poses_keep_their_numbers_and_are_remarked() {
+fn invalid_rows_keep_their_numbers_and_are_remarked() {
     for (row, reason) in [
         ("2 nan nan nan nan nan nan nan", "line 3: `nan` is not finite"),
         ("2 -nan(ind) 0 0 0 0 0 1", "line 3: `-nan(ind)` is not finite"),
         ("2 20 0 0 0 0 0 0", "line 3: the quaternion 0 0 0 0 has length 0"),
-        ("2 lost", "line 3: 2 numbers; the lines before have 8"),
+        ("2 lost", "line 3: 2 numbers, but the lines before have 8"),
         ("2 20 x 0 0 0 0 1", "line 3: `x` is not a number"),
         ("2", "line 3: 1 numbers"),
         ("2,,,,,,,", "line 3: 1 numbers"),
@@ -225,12 +225,13 @@ fn rows_that_are_no_poses_keep_their_numbers_and_are_remarked() {
         assert!(matches!(trajectory.at(3_000_000_000, 0).unwrap(), Found::Exact(_)));
         let remarks = trajectory.remarks();
         assert!(
-            remarks.len() == 1 && remarks[0].starts_with("1 row of poses is left out, the first: "),
+            remarks.len() == 1
+                && remarks[0].starts_with("1 row of poses is invalid and skipped, the first: "),
             "{remarks:?}"
         );
         assert!(remarks[0].contains(reason), "{remarks:?}");
     }
-    // Words between poses are no pose of a scan, and a stamp that cannot be read leaves the pose its number.
+    // Words between poses do not count as a row; a pose with an unreadable stamp keeps its number.
     let text =
         "t x y z qx qy qz qw\n1 10 0 0 0 0 0 1\nt x y z qx qy qz qw\nnan 20 0 0 0 0 0 1\n3 30 0 0 0 0 0 1\n";
     let trajectory = read(text).unwrap();
@@ -242,14 +243,14 @@ fn rows_that_are_no_poses_keep_their_numbers_and_are_remarked() {
     );
     let remarks = trajectory.remarks().join("\n");
     assert!(remarks.contains("line 3: `t x y z") && remarks.contains("line 4: no time stamp"), "{remarks}");
-    // A matrix over four lines is lost as a whole.
+    // A matrix on four lines is lost as a whole.
     let matrix = |x: &str| format!("1 0 0 {x}\n0 1 0 0\n0 0 1 0\n0 0 0 1\n");
     let trajectory = read(&["1", "nan", "3"].map(matrix).concat()).unwrap();
     let x_m = |number: usize| trajectory.by_number(number).unwrap().map(|pose| pose.position_m[0]);
     assert_eq!((trajectory.len(), [0, 1, 2].map(x_m)), (3, [Some(1.0), None, Some(3.0)]));
 }
 
-/// The poses of a cart that turns to the left, each `x y z` and the quaternion as `w x y z`.
+/// Poses of a cart that turns left: `x y z` and the quaternion as `w x y z`.
 fn turning_cart() -> Vec<([f64; 3], [f64; 4])> {
     let at = |k: i32| (f64::from(k), 0.04 * f64::from(k));
     (0..12)
@@ -259,7 +260,7 @@ fn turning_cart() -> Vec<([f64; 3], [f64; 4])> {
 }
 
 #[test]
-fn quaternions_with_w_first_are_told_by_the_way_the_sensor_stands() {
+fn quaternion_order_is_detected_by_upright_sensors() {
     let text = |is_first: bool, head: &str| {
         let line = |(k, (p, [w, x, y, z])): (usize, ([f64; 3], [f64; 4]))| {
             let q = if is_first { [w, x, y, z] } else { [x, y, z, w] };
@@ -286,15 +287,15 @@ fn quaternions_with_w_first_are_told_by_the_way_the_sensor_stands() {
             assert_eq!(found, wanted);
         }
         let remarks = trajectory.remarks().join("\n");
-        assert_eq!(remarks.contains("are read w first (qw qx qy qz)"), is_guess, "{remarks}");
+        assert_eq!(remarks.contains("are read as qw qx qy qz"), is_guess, "{remarks}");
     }
 }
 
 #[test]
-fn kitti_poses_of_the_camera_become_those_of_the_lidar() {
+fn kitti_camera_poses_are_converted_to_lidar_poses() {
     let folder = tempfile::tempdir().unwrap();
     let (poses, calib) = (folder.path().join("00.txt"), folder.path().join("calib.txt"));
-    // The camera looks along the lidar's x and went 5 m forward.
+    // The camera looks along the lidar's x and moved 5 m forward.
     fs::write(&poses, "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0 0 1 0 0 0 0 1 5\n").unwrap();
     fs::write(&calib, "P0: 1 0 0 0 0 1 0 0 0 0 1 0\nTr: 0 -1 0 0 0 0 -1 -0.08 1 0 0 -0.27\n").unwrap();
     let trajectory = Trajectory::read(&poses, Some(&calib)).unwrap();
@@ -307,9 +308,9 @@ fn kitti_poses_of_the_camera_become_those_of_the_lidar() {
     assert_eq!(plain.by_number(1).unwrap().unwrap().position_m, [0.0, 0.0, 5.0]);
 }
 
-/// Maps that were built of the one are resumed with the other.
+/// A map built from one of the two forms can be resumed with the other.
 #[test]
-fn a_matrix_in_a_file_is_the_pose_that_the_engine_makes_of_it_to_the_bit() {
+fn matrices_give_bit_identical_poses_to_the_engine() {
     let (mut text, mut wanted) = (String::new(), Vec::new());
     let mut next = 1_u64;
     let mut random = || {
@@ -319,7 +320,7 @@ fn a_matrix_in_a_file_is_the_pose_that_the_engine_makes_of_it_to_the_bit() {
     for k in 0..3000 {
         let [roll, pitch, yaw] = [0; 3].map(|_| 6.4 * random() - 3.2);
         let rotation = Rotation3::from_euler_angles(roll, pitch, yaw);
-        // As few digits as make a rotation, and as many as a double has.
+        // From the fewest digits that form a rotation up to the digits of a double.
         let digits = 4 + k % 14;
         let rows: [[f64; 4]; 3] = std::array::from_fn(|row| {
             std::array::from_fn(|column| {
@@ -341,7 +342,7 @@ fn a_matrix_in_a_file_is_the_pose_that_the_engine_makes_of_it_to_the_bit() {
 }
 
 #[test]
-fn arrays_of_numpy() {
+fn numpy_arrays_are_read() {
     let at = |name: &str| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name);
     let tum = Trajectory::read(&at("poses_tum.npy"), None).unwrap();
     assert_eq!(tum.span_ns().unwrap(), Some([1_700_000_000_250_000_000, 1_700_000_001_250_000_000]));
@@ -391,7 +392,7 @@ fn real_poses_of_two_forms_agree() {
     }
 }
 
-/// A file of NumPy with this header, of a version, and so many bytes.
+/// Returns a NumPy file of a version, with this header and this many data bytes.
 fn npy(version: u8, header: &str, bytes: usize) -> Vec<u8> {
     let length = header.len() as u32;
     let length =
@@ -400,7 +401,7 @@ fn npy(version: u8, header: &str, bytes: usize) -> Vec<u8> {
 }
 
 #[test]
-fn an_array_that_holds_no_poses_says_what_is_expected() {
+fn invalid_arrays_report_the_expected_layout() {
     let folder = tempfile::tempdir().unwrap();
     let fail = |name: &str, bytes: &[u8]| {
         let path = folder.path().join(name);
@@ -421,19 +422,19 @@ fn an_array_that_holds_no_poses_says_what_is_expected() {
         (npy(3, &header("[('t', '<f8'), ('x', '<f8')]", "False", "2,"), 32), "is a structured array"),
         (npy(1, &header("'<f8'", "True", "2, 8"), 128), "is in Fortran order"),
         (npy(1, &header("'<f8'", "False", "2, 9"), 144), "has the shape (2, 9); poses are N x 8"),
-        (npy(1, &header("'<f8'", "False", "2, 6"), 96), "roll, pitch and yaw are not read"),
+        (npy(1, &header("'<f8'", "False", "2, 6"), 96), "roll, pitch and yaw are not supported"),
         (npy(1, &header("'<f8'", "False", ""), 8), "has the shape ()"),
         (npy(1, &header("'<f8'", "False", "18446744073709551615, 8"), 0), "the file ends after 0 of"),
         (npy(1, &plain, 40), "the file ends after 0 of 2 poses"),
         (npy(1, &plain, 128), "record 0: the quaternion 0 0 0 0 has length 0.000, not 1"),
-        (npy(4, &plain, 128), "its version is none of 1, 2 and 3"),
-        (npy(1, "{}", 0), "its header names no type"),
+        (npy(4, &plain, 128), "its format version is not 1, 2 or 3"),
+        (npy(1, "{}", 0), "its header has no type"),
         (npy(1, &plain, 0)[..40].to_vec(), "the file ends within its header"),
         (npy(2, &plain, 0)[..9].to_vec(), "the file ends within its header"),
-        (npy(1, &plain, 0)[..7].to_vec(), "is no array of NumPy, which its name says"),
-        (Vec::new(), "is no array of NumPy"),
-        (TUM.as_bytes().to_vec(), "is no array of NumPy"),
-        (b"\x80\x04\x95numpy".to_vec(), "is no array of NumPy"),
+        (npy(1, &plain, 0)[..7].to_vec(), "is not a NumPy array in spite of its name"),
+        (Vec::new(), "is not a NumPy array"),
+        (TUM.as_bytes().to_vec(), "is not a NumPy array"),
+        (b"\x80\x04\x95numpy".to_vec(), "is not a NumPy array"),
     ] {
         let error = fail("poses.NPY", &bytes);
         assert!(error.contains("poses.NPY") && error.contains(wanted), "{error}\n{wanted}");
@@ -442,18 +443,18 @@ fn an_array_that_holds_no_poses_says_what_is_expected() {
         (
             "poses.npz",
             &b"PK\x03\x04rest"[..],
-            "is an archive (.zip, .npz), not a text of poses: save one array",
+            "is an archive (.zip, .npz), not a text file of poses: save one array",
         ),
-        ("poses.csv.gz", b"\x1f\x8b\x08\x00", "is packed (gzip), not a text of poses: unpack it first"),
+        ("poses.csv.gz", b"\x1f\x8b\x08\x00", "is packed (gzip), not a text file of poses: unpack it first"),
         (
             "drive.bag",
             b"#ROSBAG V2.0\n",
-            "is a recording (.bag), not a text of poses: give the recording itself",
+            "is a recording (.bag), not a text file of poses: use the recording itself",
         ),
         ("drive.mcap", b"\x89MCAP0\r\n", "is a recording (.mcap)"),
         ("drive.db3", b"SQLite format 3\0", "is a database"),
         ("poses.csv", b"\xff\xfe1\0 \0", "is text in UTF-16"),
-        ("poses.bin", &1.5_f64.to_le_bytes(), "is binary, not a text of poses: save the poses as text"),
+        ("poses.bin", &1.5_f64.to_le_bytes(), "is binary, not a text file of poses: save the poses as text"),
     ] {
         let error = fail(name, bytes);
         assert!(error.contains(wanted), "{error}");

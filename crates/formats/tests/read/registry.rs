@@ -1,4 +1,4 @@
-//! One row and one file add a format; all that lists formats lists those of the registry.
+//! Tests that a format needs only one registry row and one file, and that all lists of formats agree with the registry.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -7,9 +7,9 @@ use std::path::Path;
 use voxtile::{Error, FormatError, Result};
 use voxtile_formats::read::{Points, Visit};
 use voxtile_formats::{CloudHead, CloudPoint};
-use voxtile_formats::{InputFormat, Mark, Open, ReadOptions, Registry};
+use voxtile_formats::{Detection, InputFormat, Open, ReadOptions, Registry};
 
-/// Points on the x axis, one a line.
+/// Points on the x axis, one per line.
 struct Axis(BufReader<fs::File>);
 
 impl Points for Axis {
@@ -33,13 +33,13 @@ const AXIS: InputFormat = InputFormat {
     aliases: &["line"],
     title: "points on an axis",
     extensions: &["axis"],
-    mark: Mark::Start(|start| start.starts_with(b"AXIS\n")),
+    detection: Detection::Start(|start| start.starts_with(b"AXIS\n")),
     open: Open::Cloud(open_axis),
     ..InputFormat::UNNAMED
 };
 
 #[test]
-fn a_format_is_a_row_and_a_file() {
+fn formats_need_one_row_and_one_file() {
     let folder = tempfile::tempdir().unwrap();
     let scans = folder.path().join("drive/scans");
     fs::create_dir_all(&scans).unwrap();
@@ -59,7 +59,7 @@ fn a_format_is_a_row_and_a_file() {
         assert_eq!(second.points_in_sensor, [[3.0, 0.0, 0.0]]);
         assert!(source.next_scan().unwrap().is_none());
     }
-    // Its content tells it whatever the name; without its row it is nothing that is known.
+    // The format is detected from the content, whatever the name. Without its row it is unknown.
     let renamed = folder.path().join("cloud.dat");
     fs::write(&renamed, "AXIS\nx\n").unwrap();
     let error = match formats.open_scans(&renamed, &ReadOptions::default()).unwrap().next_scan() {
@@ -68,14 +68,14 @@ fn a_format_is_a_row_and_a_file() {
     };
     assert!(error.contains("line 2: no number"), "{error}");
     let error = Registry::default().guess(&renamed, &[]).unwrap_err().to_string();
-    assert!(error.contains("known are pcd, ply") && !error.contains("axis"), "{error}");
+    assert!(error.contains("known formats: pcd, ply") && !error.contains("axis"), "{error}");
     fs::write(folder.path().join("bad.axis"), "nothing").unwrap();
     let error = formats.guess(&folder.path().join("bad.axis"), &[]).unwrap_err().to_string();
-    assert!(error.contains("is called .axis, but does not start like such a file"), "{error}");
+    assert!(error.contains("has the extension .axis, but its content is not of that format"), "{error}");
 }
 
 #[test]
-fn names_are_of_one_format_and_rows_are_whole() {
+fn names_are_unique_and_rows_are_complete() {
     let formats = Registry::default();
     let mut names = BTreeSet::new();
     for format in formats.formats() {
@@ -96,9 +96,9 @@ fn repository(path: &str) -> String {
     fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-/// The table of `docs/formats.md`, and the names that Python's help lists.
+/// Checks the table of `docs/formats.md` and the names in Python's help.
 #[test]
-fn pages_list_the_formats_that_there_are() {
+fn documents_list_all_formats() {
     let formats = Registry::default();
     let names: BTreeSet<&str> = formats.formats().iter().map(|format| format.name).collect();
     let page = repository("docs/formats.md");

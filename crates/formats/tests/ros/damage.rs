@@ -4,39 +4,39 @@ use voxtile_formats::CloudSource;
 use voxtile_formats::ros::{BagOptions, PoseSource, open_bag, open_recording};
 
 #[test]
-fn files_that_are_cut_off_give_what_is_whole() {
+fn truncated_files_give_complete_messages() {
     let folder = tempfile::tempdir().unwrap();
     for name in FILES {
         let bytes = std::fs::read(data(name)).unwrap();
         let path = folder.path().join(name);
-        // Without the last byte the index is gone, but no message is.
+        // Without the last byte the index is lost, but no message.
         std::fs::write(&path, &bytes[..bytes.len() - 1]).unwrap();
         let (clouds, errors, remarks) = read(from_ref(&path), &topic("/points"));
         assert_eq!(errors, Vec::<String>::new(), "{name}");
         assert_eq!(remarks.len(), 1, "{name}: {remarks:?}");
         assert!(remarks[0].contains("41 messages were found"), "{remarks:?}");
         assert_clouds(&clouds, "map", name);
-        // In the midst of messages: some are gone, the first is not.
+        // Cut within the messages: some are lost, but not the first.
         std::fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
         let (clouds, _, remarks) = read(&[path], &topic("/points"));
         assert!((1..4).contains(&clouds.len()), "{name}: {}", clouds.len());
-        assert!(remarks.iter().any(|remark| remark.contains("cut off")), "{name}: {remarks:?}");
+        assert!(remarks.iter().any(|remark| remark.contains("truncated")), "{name}: {remarks:?}");
     }
 }
 
 #[cfg(feature = "sqlite")]
 #[test]
-fn folders_whose_file_is_cut_off_or_gone_say_so() {
+fn folders_with_truncated_or_missing_files_are_errors() {
     let folder = tempfile::tempdir().unwrap();
     let copy = |name: &str, bytes: &[u8]| std::fs::write(folder.path().join(name), bytes).unwrap();
     copy("metadata.yaml", &std::fs::read(data("by_file/metadata.yaml")).unwrap());
     let error = format!("{:#}", open_recording(&[folder.path().to_owned()]).err().unwrap());
-    assert!(error.contains("names by_file.db3.zstd, which is not there"), "{error}");
+    assert!(error.contains("lists by_file.db3.zstd, which does not exist"), "{error}");
     let bytes = std::fs::read(data("by_file/by_file.db3.zstd")).unwrap();
     copy("by_file.db3.zstd", &bytes[..bytes.len() - 1]);
-    // The archive is one block: without its end there is nothing.
+    // The archive is a single block: without its end, nothing can be decompressed.
     let error = format!("{:#}", open_recording(&[folder.path().to_owned()]).err().unwrap());
-    assert!(error.contains("by_file.db3.zstd: malformed: offset 0: it is cut off or damaged"), "{error}");
+    assert!(error.contains("by_file.db3.zstd: malformed: offset 0: it is truncated or damaged"), "{error}");
     // Without metadata, files are found by their names.
     std::fs::remove_file(folder.path().join("metadata.yaml")).unwrap();
     copy("by_file.db3.zstd", &bytes);
@@ -46,7 +46,7 @@ fn folders_whose_file_is_cut_off_or_gone_say_so() {
 }
 
 #[test]
-fn files_that_are_no_recordings_say_so() {
+fn foreign_files_are_errors() {
     let folder = tempfile::tempdir().unwrap();
     for name in ["x.bag", "x.mcap", "x.db3", "x.txt"] {
         let path = folder.path().join(name);
@@ -62,7 +62,7 @@ fn files_that_are_no_recordings_say_so() {
     assert!(open_recording(&[]).is_err());
 }
 
-/// A generator of numbers that need not be good.
+/// Simple pseudo-random number generator.
 struct Numbers(u64);
 
 impl Numbers {
@@ -73,7 +73,7 @@ impl Numbers {
 }
 
 #[test]
-fn damaged_files_never_panic_and_end() {
+fn damaged_files_do_not_panic_or_hang() {
     let folder = tempfile::tempdir().unwrap();
     let mut numbers = Numbers(3);
     let databases = cfg!(feature = "sqlite").then_some("folder/folder.db3");
@@ -107,12 +107,12 @@ fn damaged_files_never_panic_and_end() {
                 }
             }
         }
-        // Most of it must have got as far as points, or this tests nothing.
+        // Ensures that many points were decoded despite the damage.
         assert!(read > 2_000, "{name}: {read} points");
     }
 }
 
-/// Where the checksums of the chunks of an MCAP file are.
+/// Returns the offsets of the checksums of an MCAP file's chunks.
 fn checksums(file: &[u8]) -> Vec<usize> {
     let (mut at, mut found) = (8, Vec::new());
     while let Some(length) = file.get(at + 1..at + 9) {
@@ -125,7 +125,7 @@ fn checksums(file: &[u8]) -> Vec<usize> {
 }
 
 #[test]
-fn chunks_of_mcap_whose_checksum_is_wrong_are_damaged() {
+fn mcap_chunks_with_wrong_checksum_are_damaged() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.mcap");
     let (mut checked, mut left_out) = (0, 0);
@@ -139,16 +139,16 @@ fn chunks_of_mcap_whose_checksum_is_wrong_are_damaged() {
                 file[at..at + 4].copy_from_slice(&bytes);
                 std::fs::write(&path, file).unwrap();
                 let (clouds, mut errors, remarks) = read(from_ref(&path), &topic("/points"));
-                // No cloud comes of damaged bytes, and each that is left out has its error.
+                // No cloud is read from damaged bytes, and each missing cloud has an error.
                 assert_eq!(clouds.len() + errors.len(), 4, "{name}: {errors:?}");
                 assert_same(&clouds, &wanted, true);
                 left_out += errors.len();
                 errors.extend(remarks);
                 assert_eq!(!errors.is_empty(), is_damaged, "{name}: {errors:?}");
-                // Clouds may lose their poses with it, too.
+                // Clouds may also lose their poses.
                 let damages: Vec<_> = errors.iter().filter(|error| error.contains("damaged")).collect();
                 assert_eq!(!damages.is_empty(), is_damaged, "{name}: {errors:?}");
-                let is_named = damages.iter().all(|error| error.contains("that in its header 04030201"));
+                let is_named = damages.iter().all(|error| error.contains("but its header states 04030201"));
                 assert!(is_named, "{name}: {errors:?}");
             }
             checked += usize::from(has_checksum);
@@ -157,9 +157,9 @@ fn chunks_of_mcap_whose_checksum_is_wrong_are_damaged() {
     assert!(checked > 0 && left_out >= 4, "the fixtures have checksums: {checked} {left_out}");
 }
 
-/// A file without an index is walked over, and its damaged chunks are left out, too.
+/// Damaged chunks are also skipped in a file without an index.
 #[test]
-fn damaged_chunks_of_a_file_without_an_index_are_left_out() {
+fn damaged_chunks_without_index_are_skipped() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.mcap");
     let whole = std::fs::read(data("zstd.mcap")).unwrap();
@@ -169,14 +169,14 @@ fn damaged_chunks_of_a_file_without_an_index_are_left_out() {
         file[at] ^= 1;
         std::fs::write(&path, file).unwrap();
         let (clouds, errors, _) = read(from_ref(&path), &topic("/points"));
-        // A chunk without clouds is an error, too: where there is no index, its clouds may be what is damaged.
+        // Without an index, a damaged chunk without clouds is also an error, because it could contain clouds.
         let all = clouds.len() + errors.len();
         assert!(!errors.is_empty() && (4..=5).contains(&all), "{}: {errors:?}", clouds.len());
         assert_same(&clouds, &wanted, all == 4);
     }
 }
 
-/// Checks that clouds are those of the same stamps of the whole file, with their names.
+/// Checks that clouds equal those of the whole file with the same stamps and, optionally, names.
 fn assert_same(clouds: &[Cloud], whole: &[Cloud], have_names: bool) {
     for (head, points) in clouds {
         let (same, wanted) = whole.iter().find(|(same, _)| same.stamp_ns == head.stamp_ns).unwrap();
@@ -185,9 +185,9 @@ fn assert_same(clouds: &[Cloud], whole: &[Cloud], have_names: bool) {
     }
 }
 
-/// The topic of a damaged chunk is known, and the number of its messages.
+/// The topics of a damaged chunk and the number of its messages are known.
 #[test]
-fn a_file_without_an_index_whose_only_clouds_are_damaged_names_the_damage() {
+fn damage_without_index_and_clouds_is_reported() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.mcap");
     let mut file = std::fs::read(data("only_points.mcap")).unwrap();
@@ -206,9 +206,9 @@ fn a_file_without_an_index_whose_only_clouds_are_damaged_names_the_damage() {
     assert!(errors.iter().all(|error| error.contains("a chunk is damaged")), "{errors:?}");
 }
 
-/// Whatever a decoder gives out before it fails.
+/// Whatever the decoder outputs before it fails.
 #[test]
-fn no_cloud_of_a_bag_comes_of_damaged_bytes() {
+fn no_cloud_is_read_from_damaged_bytes() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.bag");
     let text = |name: &std::path::Path| {

@@ -65,7 +65,7 @@ impl Bag {
     }
 }
 
-/// A PNG of one row.
+/// Encodes a PNG with one row.
 fn png(bits: png::BitDepth, pixels: &[u8]) -> Vec<u8> {
     let mut bytes = Vec::new();
     let pixel_bytes = if bits == png::BitDepth::Sixteen { 2 } else { 1 };
@@ -80,7 +80,7 @@ fn png16(pixels: &[u16]) -> Vec<u8> {
     png(png::BitDepth::Sixteen, &pixels.iter().flat_map(|pixel| pixel.to_be_bytes()).collect::<Vec<u8>>())
 }
 
-/// What the transport `compressedDepth` writes before a PNG.
+/// Returns the header that the transport `compressedDepth` writes before a PNG.
 fn config(a: f32, b: f32) -> Vec<u8> {
     [1_u32.to_le_bytes(), a.to_le_bytes(), b.to_le_bytes()].concat()
 }
@@ -90,7 +90,7 @@ fn depths(clouds: &[Cloud]) -> Vec<Option<f64>> {
 }
 
 #[test]
-fn images_of_16_bits_are_depths_where_a_name_says_so() {
+fn images_named_as_depth_are_depths() {
     for (name, frame, encoding) in [
         ("/camera/depth/image_raw", "camera", "mono16"),
         ("/camera/depth/image_raw", "infra", "16UC1"),
@@ -104,18 +104,19 @@ fn images_of_16_bits_are_depths_where_a_name_says_so() {
         assert_eq!((errors, remarks), (vec![], vec![]), "{name} {encoding}");
         assert_eq!(depths(&clouds), [Some(1.0), None], "{name} {encoding}");
     }
-    // Cameras for depths write these two; that is a guess.
+    // Depth cameras use both encodings; other evidence is missing, so this is a guess.
     for encoding in ["16UC1", "32FC1"] {
         let bag = Bag::new().image("/camera/image_raw", "camera", encoding).camera("/camera/camera_info");
         let (clouds, _, remarks) = bag.read(BagOptions::default());
         assert_eq!(depths(&clouds), [Some(1.0), None]);
-        let told = format!("/camera/image_raw is read as depths because of its encoding {encoding}");
-        assert!(remarks[0].starts_with(&told), "{remarks:?}");
+        let expected =
+            format!("/camera/image_raw is read as depth images because of its encoding {encoding}");
+        assert!(remarks[0].starts_with(&expected), "{remarks:?}");
     }
 }
 
 #[test]
-fn images_of_temperatures_are_no_walls() {
+fn temperature_images_are_not_depths() {
     for (name, frame, encoding) in [
         ("/thermal/image_raw", "camera", "mono16"),
         ("/thermal/image_raw", "camera", "16UC1"),
@@ -130,22 +131,24 @@ fn images_of_temperatures_are_no_walls() {
                 .camera(&format!("{}/camera_info", &name[..name.len() - 10]))
         };
         let error = bag().refusal();
-        let told = format!("names do not say that they are depths: {name} ({encoding}); if they are, name");
-        assert!(error.contains("no topic holds clouds") && error.contains(&told), "{error}");
-        // Beside clouds they are left out, and that is said.
+        let expected = format!(
+            "images that are not named as depth: {name} ({encoding}); if they are depth images, select"
+        );
+        assert!(error.contains("no topic contains clouds") && error.contains(&expected), "{error}");
+        // If there are clouds too, the images are skipped with a remark.
         let (clouds, _, remarks) = bag().points().read(BagOptions::default());
         assert_eq!(clouds[0].1[0].position_m, [7.0, 1.0, 2.0]);
-        assert!(remarks.len() == 1 && remarks[0].contains(&told), "{remarks:?}");
-        // Who names them wants them.
+        assert!(remarks.len() == 1 && remarks[0].contains(&expected), "{remarks:?}");
+        // The images are used if their topic is selected.
         let (clouds, errors, remarks) = bag().points().read(topic(name));
         assert_eq!((depths(&clouds), errors), (vec![Some(1.0), None], vec![]), "{name}");
-        let told = format!("{name} ({encoding}) is read as depths, as it was named");
-        assert_eq!(remarks, [told]);
+        let expected = format!("{name} ({encoding}) is read as depth images, because it was selected");
+        assert_eq!(remarks, [expected]);
     }
 }
 
 #[test]
-fn the_largest_number_is_no_depth() {
+fn largest_value_is_not_a_depth() {
     let pixels = [65535_u16, 65534].map(u16::to_le_bytes).concat();
     let image = MessageWriter::ros1().image(5, "camera", "16UC1", 2, &pixels);
     let bag = Bag::new().with("/depth/image", IMAGE, image).camera("/depth/camera_info");
@@ -153,14 +156,14 @@ fn the_largest_number_is_no_depth() {
 }
 
 #[test]
-fn depths_are_read_that_are_compressed() {
-    // The encoder: number = a / depth + b.
+fn compressed_depths_are_read() {
+    // Encoder: value = a / depth + b.
     let (a, b) = (100.0 * 101.0_f32, 1.0 - 100.0 * 101.0 / 10.0);
     let inverse = |depth_m: f32| (a / depth_m + b) as u16;
     let millimetres = png16(&[1500, 0, 65535, 12]);
     let wanted = [Some(1.5), None, None, Some(0.012)];
-    // Width and height, and the same numbers in groups of four bits, eight in a word: no zero, one number: twice
-    // 1500; one zero, two numbers: twice 64035, and twice 65523, less 1, for what goes down.
+    // Width and height, then the values in groups of four bits, eight per word: no zero, one value (2 * 1500); one
+    // zero, two values (2 * 64035, and 2 * 65523 - 1, which is negative).
     let groups: [u32; 20] =
         [0, 1, 0x8, 0xf, 0xe, 0x5, 1, 2, 0xe, 0x8, 0x9, 0xa, 0xf, 0x3, 0xd, 0xc, 0xf, 0xf, 0xf, 0x3];
     let word = |groups: &[u32]| groups.iter().zip(0..).fold(0, |word, (bits, k)| word | bits << (28 - 4 * k));
@@ -198,11 +201,11 @@ fn depths_are_read_that_are_compressed() {
 }
 
 #[test]
-fn compressed_images_that_are_no_depths_say_why() {
+fn compressed_images_without_depths_report_the_reason() {
     let png8 = png(png::BitDepth::Eight, &[1, 2]);
     let whole = png16(&[1; 4]);
     let cut = [config(0.0, 0.0), whole[..whole.len() - 26].to_vec()].concat();
-    for (format, data, told) in [
+    for (format, data, expected) in [
         (
             "rgb8; jpeg compressed bgr8",
             b"\xff\xd8\xff\xe0....".to_vec(),
@@ -213,24 +216,24 @@ fn compressed_images_that_are_no_depths_say_why() {
         (
             "16UC1; compressedDepth rvl",
             [config(0.0, 0.0), vec![1, 0, 0, 0, 2, 0, 0, 0]].concat(),
-            "row 0 of 2 is cut",
+            "row 0 of 2 is truncated",
         ),
+        ("32FC1; compressedDepth png", [config(f32::NAN, 0.0), png16(&[1])].concat(), "the depth parameters"),
         (
-            "32FC1; compressedDepth png",
-            [config(f32::NAN, 0.0), png16(&[1])].concat(),
-            "the parameters of the depths",
+            "bgr8; compressedDepth png",
+            [config(0.0, 0.0), png16(&[1])].concat(),
+            "the pixel encoding is `bgr8`",
         ),
-        ("bgr8; compressedDepth png", [config(0.0, 0.0), png16(&[1])].concat(), "pixels were `bgr8`"),
-        ("mono8; png compressed", png8, "grey with 16 bits"),
+        ("mono8; png compressed", png8, "16-bit grey"),
         ("16UC1; compressedDepth", cut, "row 0 of 1 of its PNG"),
         ("16UC1; compressedDepth", vec![], "is neither PNG nor RVL"),
     ] {
         let name = "/depth/image/compressedDepth";
         let bag = Bag::new().compressed(name, format, &data).camera("/depth/camera_info");
         let (_, errors, _) = bag.read(topic(name));
-        assert!(errors.len() == 1 && errors[0].contains(told), "{errors:?} {told}");
+        assert!(errors.len() == 1 && errors[0].contains(expected), "{errors:?} {expected}");
     }
-    // Photographs beside depths are no second topic of clouds, nor are the depths in another form.
+    // Colour images are not a second topic of clouds, and neither is the same depth image in another encoding.
     let depth = [config(0.0, 0.0), png16(&[2000])].concat();
     let bag = Bag::new()
         .compressed("/color/image/compressed", "rgb8; jpeg compressed bgr8", b"\xff\xd8\xff\xe0")
@@ -243,39 +246,43 @@ fn compressed_images_that_are_no_depths_say_why() {
     let bag = bag.image("/depth/image", "camera", "16UC1");
     let (clouds, _, remarks) = bag.read(BagOptions::default());
     assert_eq!((depths(&clouds), remarks), (vec![Some(1.0), None], vec![]));
-    // Points are taken before depths that are compressed, as ever.
+    // Points are preferred to compressed depth images.
     let bag =
         Bag::new().points().compressed("/depth/image/compressedDepth", "16UC1; compressedDepth", &depth);
     let (clouds, _, remarks) = bag.camera("/depth/camera_info").read(BagOptions::default());
     assert_eq!(clouds[0].1[0].position_m, [7.0, 1.0, 2.0]);
     assert!(
-        remarks[0].starts_with("/points is read; `topic` NAME takes another one: /depth/image/c"),
+        remarks[0]
+            .starts_with("/points is read; other topics can be chosen with `topic` NAME: /depth/image/c"),
         "{remarks:?}"
     );
 }
 
 #[test]
-fn what_is_missing_to_make_clouds_is_said() {
+fn missing_requirements_are_reported() {
     let error = Bag::new().image("/depth/image", "camera", "16UC1").refusal();
     assert!(error.contains("of type CameraInfo: /depth/image without /depth/camera_info"), "{error}");
-    for (type_name, told) in [
-        ("velodyne_msgs/VelodyneScan", "/packets holds no points: velodyne_pointcloud makes clouds"),
-        ("ouster_ros/PacketMsg", "ouster_ros makes clouds"),
+    for (type_name, expected) in [
+        (
+            "velodyne_msgs/VelodyneScan",
+            "/packets contains no points: convert it to clouds with velodyne_pointcloud",
+        ),
+        ("ouster_ros/PacketMsg", "convert it to clouds with ouster_ros"),
     ] {
         let error = Bag::new().with("/packets", type_name, vec![0; 20]).refusal();
-        assert!(error.contains(told), "{error}");
+        assert!(error.contains(expected), "{error}");
         let bag = Bag::new().with("/packets", type_name, vec![0; 20]).points();
         let error = open_bag(&[bag.path()], &topic("/packets")).err().map(|error| format!("{error:#}"));
-        assert!(error.as_ref().is_some_and(|error| error.contains(told)), "{error:?}");
+        assert!(error.as_ref().is_some_and(|error| error.contains(expected)), "{error:?}");
     }
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.bag");
-    let no_message = "it holds no messages; topics: /points";
-    for (topics, told) in [(vec![], "it holds no topics"), (vec![("/points", "x/Y")], no_message)] {
+    let no_message = "it contains no messages; topics: /points";
+    for (topics, expected) in [(vec![], "it contains no topics"), (vec![("/points", "x/Y")], no_message)] {
         std::fs::write(&path, bag1(&topics, &[])).unwrap();
         let error = open_bag(std::slice::from_ref(&path), &BagOptions::default())
             .err()
             .map(|error| format!("{error:#}"));
-        assert!(error.as_ref().is_some_and(|error| error.contains(told)), "{error:?}");
+        assert!(error.as_ref().is_some_and(|error| error.contains(expected)), "{error:?}");
     }
 }

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use voxtile_formats::ros::BagOptions;
 
 #[test]
-fn a_transform_that_makes_a_loop_costs_a_recording_no_pose() {
+fn transforms_closing_a_loop_lose_no_pose_of_a_recording() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("loop.bag");
     let (start_ns, still) = (1_700_000_000_000_000_000, [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]);
@@ -40,16 +40,16 @@ fn a_transform_that_makes_a_loop_costs_a_recording_no_pose() {
     for wrong in [[("lidar", "map"), ("base", "map")], [("lidar", "base"), ("elsewhere", "lidar")]] {
         let (posed, errors, remarks) = write(&wrong);
         assert_eq!((posed, errors), (49, Vec::new()), "{remarks:?}");
-        assert!(remarks.iter().any(|remark| remark.contains("which makes a loop")), "{remarks:?}");
+        assert!(remarks.iter().any(|remark| remark.contains("which closes a loop")), "{remarks:?}");
     }
     let (posed, _, remarks) = write(&[("", "base"), ("base", "/base")]);
     assert_eq!(posed, 49);
-    assert_eq!(remarks, ["2 transforms are not valid and left out; the first: a frame has no name"]);
+    assert_eq!(remarks, ["2 transforms are invalid and were skipped; the first: a frame has no name"]);
 }
 
-/// It has no pose at other times, rather than that of its mount.
+/// At other times there is no pose, instead of the pose of the mount.
 #[test]
-fn a_single_transform_gives_a_pose_at_its_own_time_alone() {
+fn single_transforms_give_a_pose_only_at_their_time() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("single.bag");
     let tf = |at_ns, parent: &str, child: &str| {
@@ -76,7 +76,7 @@ fn a_single_transform_gives_a_pose_at_its_own_time_alone() {
 }
 
 #[test]
-fn a_frame_with_ever_other_parents_leaves_room_for_others() {
+fn frames_with_many_parents_do_not_displace_others() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("parents.bag");
     let tf = |at_ns, parent: &str, child: &str| {
@@ -93,19 +93,19 @@ fn a_frame_with_ever_other_parents_leaves_room_for_others() {
         let (clouds, _, remarks) =
             read(from_ref(&path), &BagOptions { memory_bytes, ..BagOptions::default() });
         assert!(clouds[0].0.world_from_sensor.is_some(), "{remarks:?}");
-        assert!(!remarks.iter().any(|remark| remark.contains("are left out")), "{remarks:?}");
+        assert!(!remarks.iter().any(|remark| remark.contains("were skipped")), "{remarks:?}");
     }
 }
 
 #[test]
-fn frames_that_lead_nowhere_cost_each_cloud_nothing() {
+fn unrelated_frames_do_not_slow_down_clouds() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("frames.bag");
     let tf = |at_ns, parent: &str, child: &str| {
         MessageWriter::ros1().tf(at_ns, parent, child, &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
     };
     let mut messages = vec![(1, 1, tf(1, "map", "f0")), (1, 1, tf(10_000, "map", "f0"))];
-    // Each of these is searched before the parent that leads to the map.
+    // These frames are searched before the parent that leads to the map.
     for k in 0..9000 {
         messages.extend([2, 20_000].map(|at_ns| (1, 2, tf(at_ns, &format!("f{}", k + 1), &format!("f{k}")))));
     }

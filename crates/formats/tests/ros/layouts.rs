@@ -6,7 +6,7 @@ use voxtile_formats::ros::{BagOptions, PoseSource};
 
 const XYZ: [Field; 3] = [("x", 0, F32), ("y", 4, F32), ("z", 8, F32)];
 
-/// What is read of a recording of one topic.
+/// Reads a recording with one topic.
 fn read_messages(type_name: &str, messages: &[Vec<u8>]) -> (Vec<Cloud>, Vec<String>, Vec<String>) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.bag");
@@ -15,7 +15,7 @@ fn read_messages(type_name: &str, messages: &[Vec<u8>]) -> (Vec<Cloud>, Vec<Stri
     read(&[path], &BagOptions { poses: PoseSource::None, ..BagOptions::default() })
 }
 
-/// The points of a cloud with this layout, what is wrong with it, and the remarks.
+/// Reads a cloud with this layout. Returns its points, the errors and the remarks.
 fn read_cloud(
     layout: &CloudLayout,
     fields: &[Field],
@@ -34,7 +34,7 @@ fn le(numbers: &[f32]) -> Vec<u8> {
     numbers.iter().flat_map(|number| number.to_le_bytes()).collect()
 }
 
-/// Six points: x is 1 to 6.
+/// Encodes six points with x from 1 to 6.
 fn six() -> Vec<u8> {
     (1..=6).flat_map(|k| le(&[k as f32, 0.5, -0.25])).collect()
 }
@@ -44,14 +44,14 @@ fn layout(size: [u32; 2], row_step: u32) -> CloudLayout {
 }
 
 #[test]
-fn points_are_found_whatever_row_step_says() {
+fn points_are_found_for_any_row_step() {
     let wanted: Vec<[f64; 3]> = (1..=6).map(|k| [f64::from(k), 0.5, -0.25]).collect();
-    // That of a row, none, that of the cloud, points of a row, more than there is.
+    // The size of a row, 0, the size of the cloud, the points per row, and two sizes that are too large.
     for row_step in [36, 0, 72, 3, 40, u32::MAX] {
         let (points, errors, remarks) = read_cloud(&layout([2, 3], row_step), &XYZ, &six());
         assert_eq!((positions(&points), errors, remarks), (wanted.clone(), vec![], vec![]), "{row_step}");
     }
-    // Rows with a gap behind them, the last one without it.
+    // Rows followed by a gap, with the last gap missing in one case.
     for last in [0, 4] {
         let mut data = six();
         data.splice(36..36, [9; 4]);
@@ -59,16 +59,16 @@ fn points_are_found_whatever_row_step_says() {
         let (points, errors, _) = read_cloud(&layout([2, 3], 40), &XYZ, &data);
         assert_eq!((positions(&points), errors), (wanted.clone(), vec![]), "{last}");
     }
-    // Fewer bytes than points are an error, and those that are there are given.
+    // Missing bytes are an error; the available points are returned.
     for row_step in [36, 72] {
         let (points, errors, _) = read_cloud(&layout([2, 3], row_step), &XYZ, &six()[..60]);
         assert_eq!(positions(&points), wanted[..5], "{row_step}");
-        assert!(errors[0].contains("6 points are announced; 60 bytes of data hold 5"), "{errors:?}");
+        assert!(errors[0].contains("6 points are announced, but 60 bytes of data contain 5"), "{errors:?}");
     }
 }
 
 #[test]
-fn large_clouds_are_found_whatever_row_step_says() {
+fn large_clouds_are_found_for_any_row_step() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.bag");
     let count = 200_000;
@@ -90,43 +90,43 @@ fn large_clouds_are_found_whatever_row_step_says() {
 }
 
 #[test]
-fn points_that_are_not_announced_are_read_and_said() {
+fn unannounced_points_are_read_and_remarked() {
     for size in [[0, 6], [6, 0], [0, 0]] {
         let (points, errors, remarks) = read_cloud(&layout(size, 72), &XYZ, &six());
         assert_eq!((points.len(), errors), (6, vec![]), "{size:?}");
-        assert_eq!(remarks, ["1 clouds announce no points, but hold some, which are read"]);
+        assert_eq!(remarks, ["1 clouds announce no points, but contain points, which are read"]);
     }
-    // Neither of these has six points.
+    // These messages do not contain six points.
     for (size, data) in [([0, 5], six()), ([0, 0], vec![]), ([0, 0], vec![7; 13])] {
         let (points, errors, remarks) = read_cloud(&layout(size, 72), &XYZ, &data);
         assert_eq!((points.len(), errors, remarks), (0, vec![], vec![]), "{size:?}");
     }
-    // Without points, fields are not needed.
+    // A cloud without points needs no fields.
     let empty = CloudLayout { size: [0, 0], is_big_endian: false, point_step: 0, row_step: 0 };
     let (points, errors, _) = read_cloud(&empty, &[], &[]);
     assert_eq!((points.len(), errors), (0, vec![]));
 }
 
 #[test]
-fn the_byte_order_is_that_of_the_points() {
+fn byte_order_is_detected_from_the_points() {
     let numbers: Vec<f32> = (1..=6).flat_map(|k| [1.7 * k as f32, -0.3 * k as f32, 0.0]).collect();
     let wanted: Vec<[f64; 3]> =
         numbers.chunks(3).map(|point| [0, 1, 2].map(|k| f64::from(point[k]))).collect();
     let big: Vec<u8> = numbers.iter().flat_map(|number| number.to_be_bytes()).collect();
-    let said = CloudLayout { is_big_endian: true, ..layout([1, 6], 72) };
-    let (points, _, remarks) = read_cloud(&said, &XYZ, &big);
+    let expected = CloudLayout { is_big_endian: true, ..layout([1, 6], 72) };
+    let (points, _, remarks) = read_cloud(&expected, &XYZ, &big);
     assert_eq!((positions(&points), remarks), (wanted.clone(), vec![]));
-    let (points, _, remarks) = read_cloud(&said, &XYZ, &le(&numbers));
+    let (points, _, remarks) = read_cloud(&expected, &XYZ, &le(&numbers));
     assert_eq!(positions(&points), wanted);
-    assert_eq!(remarks, ["1 clouds say that they are big-endian, but are little-endian"]);
-    // Too few points to know.
-    let one = CloudLayout { size: [1, 1], ..said };
+    assert_eq!(remarks, ["1 clouds are marked as big-endian, but are little-endian"]);
+    // Too few points to detect the byte order.
+    let one = CloudLayout { size: [1, 1], ..expected };
     let (points, _, remarks) = read_cloud(&one, &XYZ, &big[..12]);
     assert_eq!((positions(&points), remarks), (wanted[..1].to_vec(), vec![]));
 }
 
 #[test]
-fn fields_are_found_in_letters_of_either_case_and_in_one() {
+fn fields_are_found_in_any_case_and_as_vectors() {
     let data = le(&[1.0, 2.0, 3.0, 40.0]);
     let layout = CloudLayout { size: [1, 1], is_big_endian: false, point_step: 16, row_step: 16 };
     for fields in [
@@ -138,34 +138,37 @@ fn fields_are_found_in_letters_of_either_case_and_in_one() {
         assert_eq!((positions(&points), errors), (vec![[1.0, 2.0, 3.0]], vec![]), "{fields:?}");
         assert_eq!((points[0].intensity, remarks), (40.0, vec![]), "{fields:?}");
     }
-    // A temperature is no time.
+    // `T` is a temperature, not a time.
     let fields = [("x", 0, F32), ("y", 4, F32), ("z", 8, F32), ("T", 12, F32)];
     assert_eq!(read_cloud(&layout, &fields, &data).0[0].time_s, 0.0);
 }
 
 #[test]
-fn plane_clouds_have_z_0_and_fields_outside_of_points_are_errors() {
+fn planar_clouds_have_z_0_and_fields_outside_of_points_are_errors() {
     let data = le(&[1.0, 2.0, 3.0, 4.0]);
     let layout = CloudLayout { size: [1, 2], is_big_endian: false, point_step: 8, row_step: 16 };
     let (points, errors, remarks) = read_cloud(&layout, &[("x", 0, F32), ("y", 4, F32)], &data);
     assert_eq!((positions(&points), errors), (vec![[1.0, 2.0, 0.0], [3.0, 4.0, 0.0]], vec![]));
-    assert_eq!(remarks, ["1 clouds have no field z: it is taken as 0"]);
-    for (fields, told) in [
+    assert_eq!(remarks, ["1 clouds have no field z: 0 is used"]);
+    for (fields, expected) in [
         (
             vec![("x", 0, F32), ("y", 4, F32), ("z", 8, F32)],
-            "the field z begins at byte 8 of points of 8 bytes",
+            "the field z at byte 8 is outside of the point, which has 8 bytes",
         ),
-        (vec![("x", 0, F32), ("y", 1, F64)], "the field y begins at byte 1 of points of 8 bytes"),
-        (vec![("x", 0, F32), ("y", 4, 99)], "the field y is of no known type"),
+        (
+            vec![("x", 0, F32), ("y", 1, F64)],
+            "the field y at byte 1 is outside of the point, which has 8 bytes",
+        ),
+        (vec![("x", 0, F32), ("y", 4, 99)], "the field y has an unknown type"),
         (vec![("range", 0, F32), ("azimuth", 4, F32)], "have no field x; fields: range, azimuth"),
         (vec![("xyz", 0, F32)], "have no field x; fields: xyz"),
     ] {
         let (_, errors, _) = read_cloud(&layout, &fields, &data);
-        assert!(errors[0].contains(told), "{errors:?}");
+        assert!(errors[0].contains(expected), "{errors:?}");
     }
 }
 
-/// `sensor_msgs/PointCloud`, which ROS 2 still has.
+/// `sensor_msgs/PointCloud`, which also exists in ROS 2.
 #[test]
 fn old_clouds_are_read_with_their_channels() {
     let cloud = |writer: MessageWriter| {
@@ -200,7 +203,7 @@ fn old_clouds_are_read_with_their_channels() {
         assert_eq!((points[1].is_return, points[1].time_s), (false, 0.25));
         assert_eq!((points[2].is_return, points[2].intensity, points[2].time_s), (false, 30.0, 0.0));
     }
-    // A channel with fewer values than points is that of something else.
+    // A channel with fewer values than points is ignored.
     let short = MessageWriter::ros1().header(7, "lidar").u32(1).f32s(&[1.0, 2.0, 3.0]).u32(1);
     let short = short.text("intensity").u32(0).done();
     let (clouds, errors, _) = read_messages("sensor_msgs/PointCloud", std::slice::from_ref(&short));
@@ -211,7 +214,7 @@ fn old_clouds_are_read_with_their_channels() {
 
 /// A driver without a clock.
 #[test]
-fn livox_of_other_packages_is_read() {
+fn livox_messages_of_both_drivers_are_read() {
     let point = MessageWriter::ros1()
         .u32(5_000_000)
         .f32s(&[1.0, 2.0, 3.0])

@@ -4,7 +4,7 @@ use crate::support::read;
 use std::path::{Path, PathBuf};
 use voxtile_formats::ros::{BagOptions, PoseSource, open_bag};
 
-/// A bag of one cloud, `/tf`, and a topic of poses.
+/// Writes a bag with one cloud, `/tf` and a topic of poses.
 fn with_odometry(folder: &Path, poses: &[Vec<u8>], type_name: &str) -> PathBuf {
     let stamp_ns = 1_700_000_000_000_000_000;
     let tf = MessageWriter::ros1().tf(stamp_ns, "map", "lidar", &[1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]);
@@ -20,9 +20,9 @@ fn with_odometry(folder: &Path, poses: &[Vec<u8>], type_name: &str) -> PathBuf {
     path
 }
 
-/// The map would be of other poses than those that were asked for.
+/// Otherwise the map would be built with other poses than requested.
 #[test]
-fn a_topic_of_poses_without_any_that_can_be_used_is_an_error() {
+fn pose_topics_without_valid_poses_are_errors() {
     let folder = tempfile::tempdir().unwrap();
     let pose = |frame: &str, x_m: f64| {
         let header = MessageWriter::ros1().header(1_700_000_000_000_000_000, frame);
@@ -34,26 +34,26 @@ fn a_topic_of_poses_without_any_that_can_be_used_is_an_error() {
         ..BagOptions::default()
     };
     let cut = pose("odom", 1.0)[..20].to_vec();
-    for (poses, told) in [
-        (vec![], "odometry /odom: none of its 0 messages gives a pose"),
-        (vec![pose("odom", f64::NAN), pose("", 1.0)], "; 2 are not valid, or their frames have no name"),
+    for (poses, expected) in [
+        (vec![], "odometry /odom: none of its 0 messages contains a valid pose"),
+        (vec![pose("odom", f64::NAN), pose("", 1.0)], "; 2 are invalid or have unnamed frames"),
         (vec![cut], "; 1 messages or chunks with poses cannot be read; the first: /odom: "),
     ] {
         let path = with_odometry(folder.path(), &poses, "geometry_msgs/PoseStamped");
         let error = open_bag(&[path], &options).err().map(|error| format!("{error:#}")).unwrap_or_default();
-        assert!(error.contains(told), "{error}");
+        assert!(error.contains(expected), "{error}");
     }
-    // One is enough.
+    // One valid pose is enough.
     let poses = [pose("odom", f64::NAN), pose("odom", 7.0)];
     let path = with_odometry(folder.path(), &poses, "geometry_msgs/PoseStamped");
     let (clouds, _, remarks) = read(&[path], &options);
     assert_eq!(clouds[0].0.world_from_sensor.unwrap().position_m, [7.0, 0.0, 0.0]);
-    assert!(remarks.iter().any(|remark| remark.starts_with("1 poses are not valid")), "{remarks:?}");
+    assert!(remarks.iter().any(|remark| remark.starts_with("1 poses are invalid")), "{remarks:?}");
 }
 
-/// Every message of a path tells the way so far.
+/// Every message of a path repeats the poses so far.
 #[test]
-fn a_path_that_grows_is_one_way() {
+fn growing_paths_are_one_trajectory() {
     let folder = tempfile::tempdir().unwrap();
     let path_of = |count: i64| {
         let start_ns = 1_700_000_000_000_000_000;

@@ -17,11 +17,11 @@ pub(super) fn export(export: &Export<'_>, format: OctreeFormat) -> anyhow::Resul
     }
     read_map(&options.map, |reader| {
         let grid = reader.config().grid;
-        let origin = options.origin_m.map(|asked_m| ExportOrigin::near(asked_m, &grid));
+        let origin = options.origin_m.map(|requested_m| ExportOrigin::near(requested_m, &grid));
         let origin = origin.transpose()?.unwrap_or_default();
         let (region, memory_bytes) = (options.region.as_ref(), options.memory_bytes);
         let octree = OctreeExport { format, region, origin: origin.voxel, memory_bytes };
-        // Parts lie in a file without a name until all of them are known.
+        // Parts are kept in an unnamed file until all are known.
         let mut spool = scratch_for(&options.output)?;
         let map = Stoppable::new(reader, export.watch.stop());
         let voxels = file.write(&origin, &grid, |mut out| map.write_octree(&octree, &mut spool, &mut out))?;
@@ -29,14 +29,15 @@ pub(super) fn export(export: &Export<'_>, format: OctreeFormat) -> anyhow::Resul
     })
 }
 
-/// From one of OctoMap's files to another; OctoMap's threshold is log-odds 0.
+/// Converts between OctoMap's file formats. OctoMap's threshold is log-odds 0.
 fn of_octree(
     export: &Export<'_>,
     file: &MovedFile<'_>,
     format: OctreeFormat,
 ) -> anyhow::Result<ExportSummary> {
     if export.options.region.is_some() || export.options.origin_m.is_some() {
-        let reason = "from an octree file to another is the whole tree, where it is";
+        let reason = "conversion between octree files always includes the whole tree with its coordinates: omit this \
+                      option";
         return Err(Error::argument("region, origin", reason).into());
     }
     let octree = octree_file::read(&export.options.map)?;

@@ -2,52 +2,52 @@ use voxtile::space::{Grid, Point, VoxelBox, VoxelIndex};
 use voxtile::{Error, Result};
 use voxtile_formats::write::PCD_REACH_VOXELS;
 
-/// Where in the map a file has its coordinates 0 0 0: the lower corner of a voxel, so that the file's voxels are the
-/// map's, moved by whole voxels.
+/// Origin of a file's coordinates in the map: the lower corner of a voxel, so that the file's voxels are those of the
+/// map, shifted by whole voxels.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ExportOrigin {
     pub voxel: VoxelIndex,
-    /// The voxel's lower corner in metres.
+    /// Lower corner of the voxel, in metres.
     pub corner_m: Point,
-    /// What was asked for, if that is no such corner.
-    pub asked_m: Option<Point>,
+    /// Requested origin, if it is not a voxel corner.
+    pub requested_m: Option<Point>,
 }
 
-/// Nearer to the map's origin than so many voxels, `f32` is exact enough as it is: to a 128th of a voxel.
+/// Up to this distance from the map's origin, in voxels, `f32` is sufficiently precise: to a 128th of a voxel.
 const NEAR_VOXELS: i64 = 1 << 17;
-/// The origin of a file that chooses it itself: round in metres, too, where the resolution is.
+/// Step of automatically chosen origins, in voxels. They are also round in metres if the resolution is.
 const STEP_VOXELS: i64 = 10_000;
 
 impl ExportOrigin {
-    /// The voxel corner next to a point in metres.
+    /// Returns the voxel corner nearest to a point in metres.
     ///
     /// # Errors
     ///
-    /// A point that is not finite, or too far away for a voxel to be there.
-    pub fn near(asked_m: Point, grid: &Grid) -> Result<Self> {
-        let units = grid.to_voxel_units(asked_m);
+    /// The point is not finite or is outside of the range of voxel indices.
+    pub fn near(requested_m: Point, grid: &Grid) -> Result<Self> {
+        let units = grid.to_voxel_units(requested_m);
         let voxel = units.map(f64::round);
-        // False for NaN, too.
+        // False for NaN too.
         let is_index = |x: &f64| *x >= f64::from(i32::MIN) && *x <= f64::from(i32::MAX);
         if !voxel.iter().all(is_index) {
             let reason = format!(
-                "{asked_m:?} m is not finite, or too far away for voxels of {} m",
+                "{requested_m:?} m is not finite, or too far away for the indices of voxels of {} m",
                 grid.resolution_m()
             );
             return Err(Error::argument("origin", reason));
         }
-        // A thousandth: what is typed in metres is seldom the corner to the last bit.
+        // Tolerance of a thousandth of a voxel: metres as typed are rarely exact.
         let is_corner = (0..3).all(|k| (units[k] - voxel[k]).abs() < 1e-3);
         let origin = Self::at(voxel.map(|x| x as i32), grid);
-        Ok(Self { asked_m: (!is_corner).then_some(asked_m), ..origin })
+        Ok(Self { requested_m: (!is_corner).then_some(requested_m), ..origin })
     }
 
-    /// The origin of a file in single precision of voxels in a box: the map's own where `f32` has room for the
-    /// coordinates, else a round place in their middle.
+    /// Chooses the origin of a single precision file for voxels in a box: the map's own if `f32` is sufficient for the
+    /// coordinates, else a round point near their middle.
     ///
     /// # Errors
     ///
-    /// Voxels too far apart for any origin.
+    /// The voxels are too far apart for any origin.
     pub fn nearby(voxels: &VoxelBox, grid: &Grid) -> Result<Self> {
         let reach = i64::from(PCD_REACH_VOXELS);
         let mut voxel = [0; 3];
@@ -60,8 +60,8 @@ impl ExportOrigin {
             if min - middle < -reach || end - middle > reach {
                 let width_m = 2.0 * reach as f64 * grid.resolution_m();
                 let reason = format!(
-                    "coordinates of a .pcd are float32, which tell voxels of {} m apart over {width_m} m, and the map is wider; \
-                     export .ply, or region by region (`region`)",
+                    "the float32 coordinates of .pcd resolve voxels of {} m only within {width_m} m, and the map is \
+                     wider: export .ply, or single regions (`region`)",
                     grid.resolution_m()
                 );
                 return Err(Error::argument("output", reason));
@@ -72,14 +72,14 @@ impl ExportOrigin {
     }
 
     fn at(voxel: VoxelIndex, grid: &Grid) -> Self {
-        Self { voxel, corner_m: voxel.map(|index| grid.corner_m(index)), asked_m: None }
+        Self { voxel, corner_m: voxel.map(|index| grid.corner_m(index)), requested_m: None }
     }
 
     pub fn is_moved(&self) -> bool {
         self.voxel != [0; 3]
     }
 
-    /// Center of a voxel of the map in the file's coordinates; `(index - origin + 0.5) * resolution`.
+    /// Returns the center of a voxel in the file's coordinates: `(index - origin + 0.5) * resolution`.
     pub fn center_m(&self, voxel: VoxelIndex, grid: &Grid) -> Point {
         std::array::from_fn(|k| {
             // Differences of indices are exact in f64.

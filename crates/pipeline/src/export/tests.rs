@@ -8,7 +8,7 @@ use voxtile_formats::write::{
     Origin, OutputFormat, OutputFormats, OutputOption, VoxelRow, VoxelSink, Writer,
 };
 
-/// The format of a program that voxtile knows nothing of: a line for each voxel.
+/// A format that voxtile does not know: one line per voxel.
 struct IndexSink<W> {
     out: W,
 }
@@ -31,7 +31,7 @@ const INDEX: OutputFormat = OutputFormat {
     feature: None,
     takes: &[OutputOption::Which],
     origin: Origin::Map,
-    refusal: "it has no room for it",
+    refusal: "it cannot store it",
     is_text: true,
     needs_free_voxels: true,
     writer: Writer::Files(|_, path, _| {
@@ -57,13 +57,13 @@ fn options(output: &Path) -> ExportOptions {
 }
 
 #[test]
-fn a_row_more_is_a_format_more() {
+fn a_new_row_adds_a_format() {
     let folder = tempfile::tempdir().unwrap();
     let lines = |name: &str, which| {
         let path = folder.path().join(name);
         let mut options = options(&path);
         options.which = which;
-        let summary = export(&options, &Watch::nobody()).unwrap();
+        let summary = export(&options, &Watch::silent()).unwrap();
         let text = fs::read_to_string(&path).unwrap();
         assert_eq!(text.lines().count() as u64, summary.voxels);
         let is_stream = matches!(summary.written, Written::Stream { .. });
@@ -74,40 +74,42 @@ fn a_row_more_is_a_format_more() {
     assert_eq!(all, lines("a.index", Some(WhichVoxels::All)));
     let occupied = lines("a.INDEX", Some(WhichVoxels::Occupied));
     assert!(!occupied.is_empty() && occupied.len() < all.len());
-    // Not a stream by its extension: the longest counts.
+    // The longest matching extension is used, so this is not the stream format.
     assert_eq!(lines("a.index.stream", None), occupied);
     assert_eq!(lines("a.index.stream", Some(WhichVoxels::AtLeast(0.0))), all);
     let mut named = options(&folder.path().join("a.ply"));
     named.format = Some("Index".to_owned());
-    export(&named, &Watch::nobody()).unwrap();
+    export(&named, &Watch::silent()).unwrap();
     assert_eq!(fs::read_to_string(folder.path().join("a.ply")).unwrap(), all);
 }
 
 #[test]
-fn what_a_row_does_not_take_is_refused_with_those_that_do() {
+fn unsupported_options_are_refused_with_alternatives() {
     let folder = tempfile::tempdir().unwrap();
     let refusal = |name: &str, change: fn(&mut ExportOptions)| {
         let output = if name == "-" { name.into() } else { folder.path().join(name) };
         let mut options = options(&output);
         change(&mut options);
-        export(&options, &Watch::nobody()).unwrap_err().to_string()
+        export(&options, &Watch::silent()).unwrap_err().to_string()
     };
     let heights = refusal("a.index", |options| options.z_min_m = Some(1.0));
     assert!(
-        heights.contains("index does not take it; formats that do: nav2 heightmap; it has no room"),
+        heights.contains(
+            "index does not support it; formats that support it: nav2 heightmap; it cannot store it"
+        ),
         "{heights}"
     );
     let origin = refusal("a.index", |options| options.origin_m = Some([1.0; 3]));
-    assert!(origin.contains("index keeps true coordinates"), "{origin}");
+    assert!(origin.contains("index always has map coordinates"), "{origin}");
     let stream = refusal("-", |options| options.format = Some("index".to_owned()));
-    assert!(stream.contains("index is not written as a stream"), "{stream}");
+    assert!(stream.contains("index cannot be written to standard output"), "{stream}");
     let unknown = refusal("a.what", |_| ());
     assert!(unknown.contains(".copc.laz") && unknown.contains(".index .index.stream;"), "{unknown}");
     let unnamed = refusal("-", |_| ());
     assert!(unnamed.contains("ply pcd csv bt ot index-stream"), "{unnamed}");
     let misnamed = refusal("a.ply", |options| options.format = Some("play".to_owned()));
     assert!(
-        misnamed.contains("`play` is no known format") && misnamed.contains("3dtiles index"),
+        misnamed.contains("`play` is an unknown format") && misnamed.contains("3dtiles index"),
         "{misnamed}"
     );
     let wrong = refusal("a.ply", |options| options.which = Some(WhichVoxels::AtLeast(1.5)));

@@ -3,45 +3,45 @@ use voxtile::Result;
 use voxtile::scan::Pose;
 use voxtile_formats::{PoseSource, RigidPose};
 
-/// A scan of the check: points of it, and the poses of the body when it and its neighbours were taken.
+/// Scan of the check: some of its points, and the body poses of the scan and its neighbours.
 pub(super) struct Pick {
     pub(super) points: Vec<[f32; 3]>,
     pub(super) stamp_ns: Option<i64>,
     pub(super) before: RigidPose,
     pub(super) own: RigidPose,
-    /// `None` where no scan came after it.
+    /// `None` if there is no next scan.
     pub(super) after: Option<RigidPose>,
 }
 
-/// What poses may mean.
+/// Reading (interpretation) of poses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Reading {
-    /// What was read.
+    /// The poses as given.
     Given,
     WFirst,
     WLast,
-    /// World to sensor.
+    /// Poses are world to sensor.
     Inverse,
-    /// Of a camera, whose world is that of its first image.
+    /// Poses of a camera, with the first image as the world.
     Camera,
-    /// Of the lidar, which were taken for those of a camera.
+    /// Poses of the lidar that were treated as poses of a camera.
     NotCamera,
     Millimetres,
     Centimetres,
-    /// All at one place: to compare with, as flat ground looks alike from everywhere.
+    /// All scans at the same place, for comparison, because flat ground looks alike everywhere.
     Still,
     /// The points are in the world frame.
     WorldFrame,
-    /// Each scan has the pose of the one after it.
+    /// Each scan has the pose of the next one.
     Next,
     Previous,
 }
 
-/// A camera's axes in those of a lidar: x to the right, y down, z ahead.
+/// Rotation between the axes of a lidar and of a camera (x right, y down, z forward).
 const CAMERA_FROM_LIDAR: RigidPose = RigidPose { position_m: [0.0; 3], quaternion: [0.5, -0.5, 0.5, 0.5] };
 
 impl Reading {
-    /// The other readings that poses from there may have.
+    /// Returns the alternative readings for poses from this source.
     pub(super) fn others(source: &PoseSource, has_calib: bool) -> Vec<Self> {
         let any = [Self::Inverse, Self::Next, Self::Previous];
         let own: &[Self] = match source {
@@ -62,7 +62,7 @@ impl Reading {
         any.into_iter().chain(own.iter().copied()).collect()
     }
 
-    /// The points of a scan by this reading.
+    /// Returns the points of a scan at their pose by this reading.
     pub(super) fn place<'p>(self, pick: &'p Pick, mount: &RigidPose) -> Result<Placed<'p>> {
         let body = self.body(pick);
         let (frame, sensor) = match self {
@@ -92,33 +92,31 @@ impl Reading {
         }
     }
 
-    /// If what they would fit, and what to do.
+    /// Describes the problem and its solution for a message.
     pub(super) fn advice(self) -> &'static str {
         match self {
             Self::Given | Self::Still => "they are right",
-            Self::WFirst => {
-                "w comes first in the quaternions: say so in a first line of names, # t tx ty tz qw qx qy qz"
-            }
-            Self::WLast => "w comes last in the quaternions, as in x y z w",
+            Self::WFirst => "the quaternions start with w: add a header line, # t tx ty tz qw qx qy qz",
+            Self::WLast => "the quaternions end with w, as in x y z w",
             Self::Inverse => {
                 "they are the inverse, world to sensor: save the inverse of each, sensor to world"
             }
             Self::Camera => {
-                "they are poses of a camera (z ahead): `calib` FILE or `extrinsic` makes those of the sensor of them"
+                "they are poses of a camera (z forward): convert them with `calib` FILE or `extrinsic`"
             }
-            Self::NotCamera => "they are poses of the lidar already: leave `calib` out",
+            Self::NotCamera => "they are already poses of the lidar: omit `calib`",
             Self::Millimetres => {
-                "their positions are millimetres: say so in a first line of names, # t tx[mm] ty[mm] tz[mm] qx qy qz qw"
+                "their positions are in millimetres: add a header line, # t tx[mm] ty[mm] tz[mm] qx qy qz qw"
             }
             Self::Centimetres => {
-                "their positions are centimetres: say so in a first line of names, # t tx[cm] ty[cm] tz[cm] qx qy qz qw"
+                "their positions are in centimetres: add a header line, # t tx[cm] ty[cm] tz[cm] qx qy qz qw"
             }
-            Self::WorldFrame => "the points are in the world frame already: `world_frame`",
+            Self::WorldFrame => "the points are already in the world frame: add `world_frame`",
             Self::Next => {
-                "each scan has the pose of the next one: is a scan or a pose too much at the beginning?"
+                "each scan has the pose of the next one: is there an extra scan or pose at the beginning?"
             }
             Self::Previous => {
-                "each scan has the pose of the one before it: does a scan or a pose lack at the beginning?"
+                "each scan has the pose of the previous one: is a scan or pose missing at the beginning?"
             }
         }
     }
