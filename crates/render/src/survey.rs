@@ -30,7 +30,7 @@ pub struct Survey {
     pub unread: Vec<[i32; 3]>,
 }
 
-/// Number of occupied voxels between two heights.
+/// Bin of the histogram of heights.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct HeightBin {
     /// Lower border in metres.

@@ -478,7 +478,7 @@ fn coordinate_reference_systems_are_kept_and_written_back() {
     let third = path("third");
     output(&["build", text(&again), "-o", text(&third), "--no-rays", "--resolution", "0.5"]);
     assert!(output(&["info", text(&third), "--json"]).contains("25832"));
-    // Coordinates in another system would be at another place.
+    // Points in another system would be misplaced, so they are refused.
     let mixed = path("mixed.las");
     output(&["export", text(&plain), "-o", text(&mixed), "-q"]);
     name_crs(&mixed, "EPSG:25833");

@@ -379,7 +379,7 @@ fn an_input_resumes_with_its_own_settings() {
     let (code, stderr) = failure(&["build", text(&a), "-o", map, "--resume", "--max-range", "1"]);
     assert!(code == 2 && stderr.contains("ranges of 0 m to 50 m, not 0 m to 1 m"), "{stderr}");
     assert_eq!(build(&a, &["--resume", "--max-range", "50"])["scans"], 1);
-    // The other input also resumes with its own.
+    // The other input also resumes with its own ranges.
     numbered(&b, 2, 2..3);
     let resumed = build(&b, &["--resume"]);
     assert_eq!((&resumed["resumed_after"], &resumed["hits"]), (&2.into(), &0.into()));

@@ -33,7 +33,7 @@ fn one_thread_writes_all_octrees_sleeps_when_idle_and_ends_with_its_mapper() {
         queue.batches_in == queue.batches_out
     };
     wait_until("all octrees are written", || is_done(&mapper));
-    // A busy machine may delay it, but it must become idle; the time of a spinning thread would always grow.
+    // On a busy machine this may take long. The running time of a spinning thread would grow without end.
     wait_until("the thread is idle", || {
         let before = workers();
         assert_eq!(before.len(), 1);
