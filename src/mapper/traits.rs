@@ -124,7 +124,6 @@ pub trait Mapper: MapView + Send {
     ///
     /// Fails if the origin is outside of the map's space, intensities are missing or differ in number from the points,
     /// or points or tiles cannot be read or written.
-    /// that cannot be read or written.
     fn insert_points(&mut self, scan: &dyn ScanPoints) -> Result<ScanReport>;
 
     /// Inserts the part of a scan that is within some tiles. These tiles are afterwards bit-identical to those after

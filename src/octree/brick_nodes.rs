@@ -23,7 +23,6 @@ impl BrickNodes {
     /// occupied; without a threshold none is.
     ///
     /// `values_of` returns the values of a word's 64 voxels, negative infinity for unknown ones.
-    /// `values_of` gives the values of a word's 64 voxels, and negative infinity for those that are unknown.
     #[inline]
     pub(crate) fn of_values(
         brick: BrickCode,

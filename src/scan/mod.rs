@@ -4,9 +4,9 @@
 //! Scan, ScanRef -> rays -> marks or counts in pages -> updates, grouped by tile
 //!                  ray     pages, coherence            per_scan or per_ray, updates; spill if memory is short
 //! ```
+//!
 //! `trace` coordinates all of it. Updates do not depend on the content of tiles, so they can be stored and applied
 //! later. `codec` compresses the points of kept scans.
-//! `codec` has the points of a kept scan in few bytes.
 
 mod codec;
 mod coherence;
