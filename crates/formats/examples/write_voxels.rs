@@ -1,10 +1,10 @@
-//! Writes voxels of a table in a format of another program.
+//! Writes the voxels of a CSV table in one of the output formats.
 //!
 //! ```text
 //! write_voxels FORMAT VOXELS.csv OUTPUT [--resolution M] [--origin X Y Z] [--subtract X Y Z] [--quantize]
 //! ```
 //!
-//! A line of the table is `ix,iy,iz,log_odds,count`; tiles have 32 voxels along an edge.
+//! Each line of the table is `ix,iy,iz,log_odds,count`. Tiles have 32 voxels per edge.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -118,7 +118,7 @@ fn row(line: &str, arguments: &Arguments) -> Option<VoxelRow> {
     })
 }
 
-/// The place of a voxel in its tile, in Morton order.
+/// Returns the Morton index of a voxel within its tile.
 fn morton(index: [i32; 3]) -> u64 {
     let mut code = 0;
     for bit in 0..5 {

@@ -11,11 +11,12 @@ use std::path::{Path, PathBuf};
 use voxtile::{Error, Result};
 
 impl Registry {
-    /// What a file or a folder is: by its content first, by its name second. Of a folder, `not_clouds` are left out.
+    /// Detects the format of a file or folder from its content, then from its name. In a folder, files listed in
+    /// `not_clouds` are ignored.
     ///
     /// # Errors
     ///
-    /// It cannot be read; it is of no known format, or of one that must be converted first.
+    /// The path cannot be read, its format is unknown, or the format must be converted first.
     pub fn guess(&self, path: &Path, not_clouds: &[PathBuf]) -> Result<&InputFormat> {
         let meta = std::fs::metadata(path).map_err(|error| match error.kind() {
             ErrorKind::NotFound => argument(path, why_missing(path)),
@@ -24,14 +25,15 @@ impl Registry {
         if meta.is_dir() { self.guess_folder(path, not_clouds) } else { self.guess_file(path) }
     }
 
-    /// The input itself, which may be a folder `scans` in the one that was named, and its format.
+    /// Returns the path to read and its format. If `path` has a subfolder `scans` with the clouds, that subfolder is
+    /// the path.
     pub(crate) fn find(&self, path: &Path, options: &ReadOptions) -> Result<(PathBuf, &InputFormat)> {
         let named = options.format.as_deref().map(|name| self.named(name)).transpose()?;
         let not_clouds = options.not_clouds();
         let inner = path.join("scans");
         let packed = self.packed_recording(path).map(|format| format.name);
         if named.is_some_and(|named| packed != Some(named.name)) && path.is_file() {
-            // What is packed is named, whatever it was called.
+            // Archives are rejected by their content, whatever format was requested.
             if let Some(archive) = foreign::archive_of(&first_bytes(path)?) {
                 return Err(archive.error(path));
             }
@@ -42,7 +44,7 @@ impl Registry {
         let pcd = self.named("pcd")?;
         let is_pcd =
             |folder| named.is_none_or(|named| named.name == pcd.name) && pcd_scans::is_folder(folder);
-        // Texts of any kind lie beside a folder of PCD.
+        // A folder of PCD files often contains unrelated text files.
         if !is_pcd(path) && is_pcd(&inner) {
             return Ok((inner, pcd));
         }
@@ -53,7 +55,7 @@ impl Registry {
         }
     }
 
-    /// What starts with these bytes, if that tells it.
+    /// Returns the format that has this signature at the start of the file, if any.
     pub(crate) fn of_start(&self, start: &[u8]) -> Option<&InputFormat> {
         let start = foreign::without_mark(start);
         self.formats().iter().find(|format| match format.mark {
@@ -122,7 +124,8 @@ impl Registry {
                 counts.entry(format.name).or_insert((format, file, 0_u64)).2 += 1;
             }
         }
-        // Lists, times and poses lie beside clouds, and so do pictures. Between the two, a camera decides.
+        // Lists, time stamps, poses and pictures often accompany clouds. If there are only pictures and text clouds,
+        // the pictures are the input if camera intrinsics are known.
         let mut aside: Vec<&str> =
             self.formats().iter().filter(|format| format.is_aside).map(|format| format.name).collect();
         if !listing.has_depths() {
@@ -143,7 +146,7 @@ impl Registry {
                     None => Err(argument(path, listing.why_nothing(&self.names(", "), &texts.others))),
                 }
             }
-            // The first file tells LAS from LAZ, and is checked early.
+            // The first file distinguishes LAS from LAZ; this also reports a damaged file early.
             (Some((_, file, _)), None) => self.guess_file(file),
             (Some((one, _, count)), Some((other, _, others))) => {
                 let (one, other) = (one.name, other.name);
@@ -156,7 +159,7 @@ impl Registry {
         }
     }
 
-    /// The format of a recording whose file is compressed as a whole: `a.mcap.zstd`.
+    /// Returns the format of a recording that is compressed as a whole, such as `a.mcap.zstd`.
     fn packed_recording(&self, path: &Path) -> Option<&InputFormat> {
         let is_packed = matches!(extension_of(path).as_str(), "zst" | "zstd");
         let inner = extension_of(Path::new(path.file_stem().filter(|_| is_packed)?));
@@ -166,7 +169,7 @@ impl Registry {
         self.formats().iter().find(is_it)
     }
 
-    /// The format of files with an extension, in lower case, in a folder of clouds.
+    /// Returns the format of files with this extension (lower case) in a folder of clouds.
     fn in_folder(&self, extension: &str) -> Option<&InputFormat> {
         let may_be =
             |format: &&InputFormat| !matches!(format.mark, Mark::Name) && format.has_extension(extension);
@@ -178,7 +181,7 @@ fn argument(path: &Path, reason: impl Into<String>) -> Error {
     Error::argument(path.display().to_string(), reason)
 }
 
-/// Why there is no file.
+/// Returns the error text for a path that does not exist.
 fn why_missing(path: &Path) -> String {
     match std::fs::read_link(path) {
         Err(_) => "there is no such file or folder".to_owned(),

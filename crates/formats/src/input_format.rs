@@ -4,31 +4,32 @@ use crate::scans::ScanSource;
 use crate::{CloudHead, CloudSource};
 use std::path::Path;
 
-/// A format of input: a row of the [`Registry`](crate::Registry).
+/// Input format: a row of the [`Registry`](crate::Registry).
 #[derive(Clone, Copy, Debug)]
 pub struct InputFormat {
-    /// Its name in options and messages: `e57`.
+    /// Name in options and messages, such as `e57`.
     pub name: &'static str,
-    /// Other names for it in options.
+    /// Alternative names in options.
     pub aliases: &'static [&'static str],
-    /// What people call it: `ROS 2 bag (SQLite)`.
+    /// Name for display, such as `ROS 2 bag (SQLite)`.
     pub title: &'static str,
-    /// Endings of the names of its files, in lower case without the dot. Those in a folder of clouds go by them.
+    /// File name extensions, in lower case without the dot. They select the files of this format in a folder of clouds.
     pub extensions: &'static [&'static str],
     /// How a file is recognised.
     pub mark: Mark,
-    /// Recognises a folder, whatever other files are in it.
+    /// Returns whether a folder is an input of this format, whatever other files it contains.
     pub is_folder: fn(&Path) -> bool,
-    /// Whether such files lie beside clouds of other formats, as lists and pictures do.
+    /// Whether files of this format also accompany clouds of other formats, as text lists and pictures do.
     pub is_aside: bool,
-    /// Whether the input has poses of its own. A file of poses is looked for otherwise.
+    /// Returns whether the input contains its own poses. Otherwise a pose file is searched for.
     pub has_poses: fn(&Path) -> bool,
     /// Opens an input.
     pub open: Open,
 }
 
 impl InputFormat {
-    /// A row to start from: a name, a title and `open` make a format that has to be asked for.
+    /// Defaults for a row. With only a name, a title and `open` set, the format is never detected and must be requested
+    /// by name.
     pub const UNNAMED: Self = Self {
         name: "",
         aliases: &[],
@@ -41,31 +42,30 @@ impl InputFormat {
         open: Open::LeftOut(""),
     };
 
-    /// Whether the file has an extension of this format.
     pub(crate) fn has_extension(&self, extension: &str) -> bool {
         self.extensions.contains(&extension)
     }
 }
 
-/// How a file is recognised. All formats are asked for the first of these, then all for the next.
+/// How a file is recognised. Detection tries the variants in this order, each for all formats.
 #[derive(Clone, Copy, Debug)]
 pub enum Mark {
-    /// By its extension, whatever is in it.
+    /// By the extension alone.
     Name,
-    /// By its first bytes.
+    /// By the first bytes.
     Start(fn(&[u8]) -> bool),
-    /// By its first bytes or, where they tell nothing, by its extension.
+    /// By the first bytes, or by the extension if the bytes match no format.
     StartOrName(fn(&[u8]) -> bool),
-    /// By what its first bytes look like, where nothing else tells; the flag is whether its extension is one of the
-    /// format's. An error is why it is none.
+    /// By inspecting the first bytes, if nothing else matches. The flag is true if the file has one of the format's
+    /// extensions. The error is the reason why the file is not of this format.
     Look(fn(&[u8], bool) -> Result<(), String>),
-    /// Not by the file: folders are recognised, or the format is named.
+    /// Never recognised as a file: the format is a folder or is requested by name.
     None,
 }
 
-/// Opens one cloud: what is known of it, begun by its file's name, and its points.
+/// Opens one cloud. The head passed in is pre-filled from the file name; the returned head is complete.
 pub type OpenCloud = fn(&Path, CloudHead, &ReadOptions) -> voxtile::Result<(CloudHead, Box<dyn Points>)>;
-/// Opens clouds.
+/// Opens several clouds.
 pub type OpenClouds = fn(&Path, &ReadOptions) -> voxtile::Result<Box<dyn CloudSource>>;
 /// Opens scans.
 pub type OpenScans = fn(&Path, &ReadOptions) -> voxtile::Result<Box<dyn ScanSource + Send>>;
@@ -73,18 +73,18 @@ pub type OpenScans = fn(&Path, &ReadOptions) -> voxtile::Result<Box<dyn ScanSour
 /// How an input is opened.
 #[derive(Clone, Copy, Debug)]
 pub enum Open {
-    /// A file is a cloud. Folders are read file by file.
+    /// A file is one cloud. Folders are read file by file.
     Cloud(OpenCloud),
-    /// The same, and a file is read in one pass: a FIFO will do.
+    /// As `Cloud`, and a file is read in one sequential pass, so a FIFO also works.
     Stream(OpenCloud),
-    /// A file has several clouds. Folders are read file by file.
+    /// A file contains several clouds. Folders are read file by file.
     Clouds(OpenClouds),
-    /// A folder has clouds.
+    /// A folder contains the clouds.
     Folder(OpenClouds),
-    /// A file or a folder is a recording, which knows where its sensors were.
+    /// A file or folder is a recording that also contains the sensor poses.
     Recording(OpenClouds),
-    /// A file or a folder has scans, and finds their poses.
+    /// A file or folder contains scans and provides their poses.
     Scans(OpenScans),
-    /// This build leaves the format out, for want of this feature.
+    /// The format is disabled in this build; the value is the Cargo feature that enables it.
     LeftOut(&'static str),
 }

@@ -1,15 +1,16 @@
-//! Files of other programs, one format per file, and voxtile's scan stream. Knows no mapper.
+//! Readers and writers of the file formats of other programs, one format per file, and of voxtile's scan stream. This
+//! crate does not depend on the mapper.
 //!
 //! ```text
-//! path -> registry.rs, guess.rs: which format
-//!      -> read/, ros/: CloudSource -> CloudHead, then CloudPoint after CloudPoint
-//!      -> poses/: a pose for each cloud
+//! path -> registry.rs, guess.rs: format detection
+//!      -> read/, ros/: CloudSource -> CloudHead, then a sequence of CloudPoint
+//!      -> poses/: one pose per cloud
 //!      -> scans/: ScanSource -> SensorScan, StoredScan
-//! VoxelRow after VoxelRow -> write/: VoxelSink -> .ply .las .npz ..
+//! sequence of VoxelRow -> write/: VoxelSink -> .ply .las .npz ..
 //! ```
 //!
-//! `spill/` has what exceeds the memory of a reader. Formats that need many crates stand behind features: `las`, `e57`,
-//! `ros`, `sqlite`.
+//! `spill/` holds temporary files for data that exceeds the memory budget. The features `las`, `e57`, `ros` and
+//! `sqlite` enable formats with many dependencies.
 
 mod guess;
 mod input_format;

@@ -17,32 +17,32 @@ use crate::scans::{GuardedScans, ScanSource};
 use std::path::Path;
 use voxtile::{Error, Result};
 
-/// Opens scans of any known format: a file, a folder of files, or the folder that holds such a folder as `scans`. Its
-/// content tells the format first, its name second.
+/// Opens scans of any known format: a file, a folder of files, or a folder that contains such a folder named `scans`.
+/// The format is detected from the content first, then from the name.
 ///
-/// Files of a folder are in natural order of their names (`scan2` before `scan10`). Scans without poses of their own
-/// take them from [`ReadOptions::poses`], or from `poses_tum.txt` or `poses_kitti.txt` in or beside the folder; see
-/// [`ScanSource::pose_source`].
+/// Files of a folder are read in natural order of their names (`scan2` before `scan10`). Scans without poses of their
+/// own take them from [`ReadOptions::poses`], or from `poses_tum.txt` or `poses_kitti.txt` in the folder or in its
+/// parent; see [`ScanSource::pose_source`].
 ///
 /// # Errors
 ///
-/// Nothing that is known, options that do not fit, a file that cannot be read; scans without any poses, poses that do
+/// The format is unknown, the options do not fit it, a file cannot be read, the scans have no poses, or the poses do
 /// not match the scans.
 pub fn open_scans(path: &Path, options: &ReadOptions) -> Result<Box<dyn ScanSource + Send>> {
     Registry::default().open_scans(path, options)
 }
 
-/// Opens clouds of any known format, without the poses that are beside them.
+/// Opens clouds of any known format, ignoring pose files.
 ///
 /// # Errors
 ///
-/// As for [`open_scans`]; a format that has no clouds without poses.
+/// As for [`open_scans`]. Also fails for a format that contains only scans with poses.
 pub fn open_clouds(path: &Path, options: &ReadOptions) -> Result<Box<dyn CloudSource>> {
     Registry::default().open_clouds(path, options)
 }
 
 impl Registry {
-    /// [`open_scans`] of these formats.
+    /// As the free function [`open_scans`], for the formats of this registry.
     ///
     /// # Errors
     ///
@@ -71,7 +71,7 @@ impl Registry {
         Ok(options.selection.clone().of(scans))
     }
 
-    /// [`open_clouds`] of these formats.
+    /// As the free function [`open_clouds`], for the formats of this registry.
     ///
     /// # Errors
     ///
@@ -142,7 +142,7 @@ fn open_folder(path: &Path, format: InputFormat, options: &ReadOptions) -> Resul
     let open = Box::new(move |path: &Path| {
         check_regular(path)?;
         if matches!(format.open, Open::Clouds(_)) {
-            // Readers of libraries open the file themselves.
+            // Some libraries open the file themselves: check here that it can be opened.
             open_input(path)?;
         }
         open_file(path, &format, stamps, &options)

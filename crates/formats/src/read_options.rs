@@ -4,51 +4,51 @@ use crate::read::Intrinsics;
 use crate::scans::Selection;
 use std::path::PathBuf;
 
-/// How an input is read where its files do not say it; see [`open_scans`](super::open_scans).
+/// Settings for reading an input; see [`open_scans`](super::open_scans).
 #[derive(Clone, Debug)]
 pub struct ReadOptions {
-    /// The name of the format; guessed if `None`.
+    /// Name of the format. `None`: detected.
     pub format: Option<String>,
-    /// Columns of a `.bin` file: `x`, `y`, `z`, `intensity`, and any others, with units if not in metres (`x_mm`); each a
-    /// float of four bytes, or of the type behind a colon (`x:f64`, `ring:u16`). `None`: KITTI's four, or nuScenes' five
-    /// for a `.pcd.bin`, unless the numbers of the file are clearly those of other columns.
+    /// Columns of a `.bin` file: `x`, `y`, `z`, `intensity` and any others, with units if not in metres (`x_mm`). Each
+    /// is a four-byte float, or has the type after a colon (`x:f64`, `ring:u16`). `None`: KITTI's four columns, or
+    /// nuScenes' five for a `.pcd.bin`, unless the numbers clearly belong to other columns.
     pub fields: Option<Vec<String>>,
-    /// A LAS file with GPS times is cut into scans of this many seconds. 0: the file is one cloud.
+    /// Duration of the scans that a LAS file with GPS times is split into, in seconds. 0: the file is one cloud.
     pub scan_period_s: f64,
-    /// Where the sensor was, in metres in the frame of the points: for clouds that are registered already and come
-    /// without poses. Their points are then given relative to it, and the cloud says where it was.
+    /// Sensor position in the frame of the points, in metres, for registered clouds without poses. Points are then
+    /// returned relative to it, and the cloud has it as its pose.
     pub sensor_origin_m: Option<[f64; 3]>,
-    /// Units of a depth image in a metre. `None`: 5000 for TUM RGB-D, 1000 (millimetres) otherwise.
+    /// Depth image units per metre. `None`: 5000 for TUM RGB-D, 1000 (millimetres) otherwise.
     pub depth_scale: Option<f64>,
-    /// The camera of depth images.
+    /// Camera of depth images.
     pub intrinsics: Option<Intrinsics>,
-    /// A file with the camera of depth images. `None`: `camera-intrinsics.txt` in the folder or beside it.
+    /// File with the camera of depth images. `None`: `camera-intrinsics.txt` in the folder or its parent.
     pub intrinsics_path: Option<PathBuf>,
-    /// Files that are no clouds, though they may lie among them. Those that are named above and below are none anyway.
+    /// Files of the folder that are not clouds. Files named in other options are excluded anyway.
     pub not_clouds: Vec<PathBuf>,
-    /// What to take of a recording.
+    /// Settings for recordings.
     pub recording: RecordingOptions,
-    /// A file of poses, or `identity`: all scans are in the world frame.
+    /// Pose file, or `identity` if all scans are in the world frame.
     pub poses: Option<PathBuf>,
-    /// The `calib.txt` of KITTI: poses are of the camera.
+    /// KITTI `calib.txt`, for poses of the camera.
     pub calib: Option<PathBuf>,
     /// How clouds get their poses.
     pub clouds: CloudOptions,
-    /// Which scans and points are taken.
+    /// Selection of scans and points.
     pub selection: Selection,
-    /// Bytes of memory for what grows with the input; beyond them it goes to temporary files.
+    /// Memory budget in bytes for data that grows with the input. Data beyond it goes to temporary files.
     pub memory_bytes: usize,
-    /// Folder of temporary files; the system's own if `None`.
+    /// Folder for temporary files. `None`: the system's.
     pub scratch: Option<PathBuf>,
 }
 
 impl ReadOptions {
-    /// How much memory reading may take, and where the rest goes.
+    /// Returns the memory budget and the folder for temporary files.
     pub fn budget(&self) -> Budget {
         Budget { bytes: self.memory_bytes, scratch: self.scratch.clone() }
     }
 
-    /// The files that are no clouds.
+    /// Returns all files that are not clouds, including those named in other options.
     pub(crate) fn not_clouds(&self) -> Vec<PathBuf> {
         let named = [&self.poses, &self.calib, &self.intrinsics_path].into_iter().flatten();
         self.not_clouds.iter().chain(named).cloned().collect()
@@ -77,13 +77,13 @@ impl Default for ReadOptions {
     }
 }
 
-/// What to take of a recording.
+/// Settings for recordings.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct RecordingOptions {
-    /// The topic with the clouds, where there are several.
+    /// Topic of the clouds. Required if there are several.
     pub topic: Option<String>,
-    /// A topic with poses, in place of `/tf`.
+    /// Topic of poses to use instead of `/tf`.
     pub odometry_topic: Option<String>,
-    /// The frame that is the world.
+    /// Name of the world frame.
     pub fixed_frame: Option<String>,
 }

@@ -15,7 +15,7 @@ const ROS: Open = Open::Recording(crate::ros::recording_clouds::open);
 #[cfg(not(feature = "ros"))]
 const ROS: Open = Open::LeftOut("ros");
 
-/// Every format that is read: a row here and the file that opens it are all that a format needs.
+/// All supported input formats. A new format needs a row here and a file that opens it.
 const FORMATS: [InputFormat; 17] = [
     InputFormat {
         name: "pcd",
@@ -53,7 +53,7 @@ const FORMATS: [InputFormat; 17] = [
         open: Open::Cloud(read::bin::open),
         ..InputFormat::UNNAMED
     },
-    // One may be called the other; the header says which it is.
+    // LAS and LAZ files share extensions; the header distinguishes them.
     InputFormat {
         name: "las",
         title: "LAS",
@@ -107,7 +107,7 @@ const FORMATS: [InputFormat; 17] = [
     InputFormat {
         name: "bag",
         title: "ROS 1 bag",
-        // A recorder that is killed leaves `.bag.active`.
+        // A killed recorder leaves `.bag.active`.
         extensions: &["bag", "active"],
         mark: Mark::Start(|start| start.starts_with(b"#ROSBAG V2.0")),
         has_poses: |_| true,
@@ -173,46 +173,46 @@ fn is_las(start: &[u8]) -> bool {
     start.starts_with(b"LASF")
 }
 
-/// Whether the points of a LAS file are compressed: a format number above 127.
+/// Returns whether the points of a LAS file are compressed: bit 7 of the point format is set.
 fn is_laz(start: &[u8]) -> bool {
     is_copc(start) || start.get(104).is_some_and(|format| format & 0x80 != 0)
 }
 
-/// Whether the first record of a LAS file is COPC's own.
+/// Returns whether the first record of a LAS file is the COPC record.
 fn is_copc(start: &[u8]) -> bool {
     start.get(377..382) == Some(b"copc\0")
 }
 
-/// The formats that are read.
+/// Registry of input formats.
 #[derive(Clone, Debug)]
 pub struct Registry {
     formats: Vec<InputFormat>,
 }
 
 impl Default for Registry {
-    /// Every format of this crate.
+    /// All formats of this crate.
     fn default() -> Self {
         Self { formats: FORMATS.to_vec() }
     }
 }
 
 impl Registry {
-    /// These formats and one more, which others of the same name hide.
+    /// Adds a format. It is hidden by an existing format with the same name.
     pub fn with(mut self, format: InputFormat) -> Self {
         self.formats.push(format);
         self
     }
 
-    /// The formats, also those that this build leaves out.
+    /// Returns all formats, including those disabled in this build.
     pub fn formats(&self) -> &[InputFormat] {
         &self.formats
     }
 
-    /// The format of a name or another name of it, in letters of either case.
+    /// Returns the format with this name or alias, in any case.
     ///
     /// # Errors
     ///
-    /// There is none.
+    /// There is no such format.
     pub fn named(&self, name: &str) -> Result<&InputFormat> {
         let lower = name.to_lowercase();
         let is_it = |format: &&InputFormat| format.name == lower || format.aliases.contains(&&*lower);
@@ -223,7 +223,7 @@ impl Registry {
         self.formats.iter().find(is_it).ok_or_else(unknown)
     }
 
-    /// The names of all formats.
+    /// Returns the names of all formats.
     pub fn names(&self, separator: &str) -> String {
         self.formats.iter().map(|format| format.name).collect::<Vec<_>>().join(separator)
     }

@@ -3,28 +3,28 @@ use voxtile::mapper::MapView;
 use voxtile::space::Point;
 use voxtile::{MapQueries, Occupancy};
 
-/// What is known of a point.
+/// State of a map at a point.
 #[derive(Debug, Serialize)]
 pub struct Answer {
-    /// The point, as it was asked for.
+    /// The queried point.
     pub point_m: Point,
     /// `unknown`, `free` or `occupied`.
     pub state: &'static str,
-    /// Of being occupied; `None` where it is unknown.
+    /// Probability of being occupied; `None` if unknown.
     pub probability: Option<f64>,
-    /// The same as log-odds.
+    /// Log-odds of being occupied; `None` if unknown.
     pub log_odds: Option<f64>,
-    /// How often the voxel was updated.
+    /// Number of updates of the voxel.
     pub observation_count: Option<i32>,
-    /// Center of its voxel.
+    /// Center of the voxel.
     pub voxel_center_m: Option<Point>,
 }
 
-/// What a map knows of a point.
+/// Returns the state of a map at a point.
 ///
 /// # Errors
 ///
-/// Those of [`MapQueries::voxel_at`].
+/// As for [`MapQueries::voxel_at`].
 pub fn answer_at(map: &impl MapView, point: Point) -> voxtile::Result<Answer> {
     let grid = map.config().grid;
     let voxel = map.voxel_at(point)?;

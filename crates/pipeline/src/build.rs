@@ -20,24 +20,24 @@ use voxtile::store::{FsDisk, InputContent, InputRecord, UnsyncedDisk};
 use voxtile::{Error, MapConfig, MapPath, MemoryLimit};
 use voxtile_formats::{PointRoom, ReadOptions, ScanMark};
 
-/// The share of the limit of memory that reading may take, beside the points of scans: chunks and messages of
-/// recordings, poses, the sorting of LAS.
+/// Divisor of the memory limit that gives the share for reading, without the points of scans: chunks and messages of
+/// recordings, poses, sorting of LAS files.
 const PARTS_FOR_READING: usize = 32;
-/// Reading has so much at least. What it has beyond that is taken from the map.
+/// Minimum memory for reading. What exceeds the share is taken from the map's memory.
 const MIN_FOR_READING: usize = 4 << 20;
 
-/// The share of the limit of memory that the points of scans may take, as they are read and as they are mapped.
+/// Divisor of the memory limit that gives the share for the points of scans that are being read or inserted.
 const PARTS_OF_MEMORY: usize = 32;
 
-/// Scans are taken together where there is so much room for the points of each, a lidar's of 128 beams.
+/// Minimum memory per scan for inserting several scans at once: the points of a lidar with 128 beams.
 const ROOM_TO_GO_TOGETHER: usize = 3 << 20;
 
-/// Makes the map, or goes on with it; `None` if it was asked to stop before the first scan. What was accepted is in the
-/// map then, whatever ended the build.
+/// Builds or continues a map. Returns `None` if it was stopped before the first scan. All accepted scans are flushed,
+/// however the build ends.
 ///
 /// # Errors
 ///
-/// Options that do not fit the map or the input, an input or a map that cannot be read or written.
+/// The options do not fit the map or the input, or an input or a map cannot be read or written.
 pub fn build(options: &BuildOptions, watch: &Watch) -> anyhow::Result<Option<Summary>> {
     let started = Instant::now();
     let stop = watch.stop();
@@ -46,7 +46,7 @@ pub fn build(options: &BuildOptions, watch: &Watch) -> anyhow::Result<Option<Sum
     let config = if exists { config_to_go_on(options)? } else { config_to_create(options)? };
     check_no_rays(options, &config)?;
     check_when_behind(options)?;
-    // Nobody goes on with a piece, or asks whether it has a scan.
+    // A shard is never resumed or compared, so its scans are not hashed.
     let mark: Marking =
         if options.piece_of.is_none() { ScanMark::of } else { |scan| Ok(ScanMark::without_content(scan)) };
     let room = room(options, &config);
@@ -74,7 +74,7 @@ pub fn build(options: &BuildOptions, watch: &Watch) -> anyhow::Result<Option<Sum
             mapper
         }
         none => {
-            // A first scan that cannot be mapped should not leave an empty map behind.
+            // If the first scan cannot be mapped, no empty map must be created.
             intake.check_first()?;
             let mut config = config;
             config.crs = crs;
@@ -113,7 +113,7 @@ pub fn build(options: &BuildOptions, watch: &Watch) -> anyhow::Result<Option<Sum
     };
     let outcome = build.insert_all();
     build.gauge.say("flushing");
-    // What was accepted is kept, whatever ended the build.
+    // Accepted scans are flushed, however the build ended.
     let flushed = build.mapper.flush();
     let Build { report, scans, mut intake, gauge, doubt, .. } = build;
     drop(gauge);
@@ -151,10 +151,10 @@ struct Build<'a> {
     report: ScanReport,
     scans: u64,
     has_rays: bool,
-    /// Most scans that are mapped together.
+    /// Maximum number of scans to insert at once.
     most_together: usize,
     notes_content: bool,
-    /// Whether the poses fit, while that is not known.
+    /// Check of the poses, until its result is known.
     pose_check: Option<PoseCheck>,
     doubt: Option<Doubt>,
     is_strict: bool,
@@ -165,7 +165,7 @@ impl Build<'_> {
         loop {
             let (mapper, schedule) = (&mut *self.mapper, &mut self.schedule);
             let most = self.most_together.min(schedule.scans_until_due());
-            // An input that is quiet does not keep what came from being made durable.
+            // While the input is idle, pending scans are still flushed on schedule.
             let next =
                 self.intake.next(most, &mut || flush_if(schedule.is_due_waiting(), mapper, schedule))?;
             let taken = match next {
@@ -212,7 +212,7 @@ impl Build<'_> {
         Ok(())
     }
 
-    /// Compares a scan with those before. What cannot be compared is no reason to end.
+    /// Compares a scan with the previous ones. A failed comparison does not end the build.
     fn check_poses(
         &mut self,
         look: impl FnOnce(&mut PoseCheck) -> voxtile::Result<Option<Doubt>>,
@@ -236,7 +236,7 @@ impl Build<'_> {
     }
 }
 
-/// How the input is read; without rays no poses are needed.
+/// Returns the settings for reading. Poses are not needed without rays.
 fn read_options(options: &BuildOptions, config: &MapConfig) -> ReadOptions {
     let mut read = options.read.clone();
     read.scratch = Some(folder_beside(options).to_owned());
@@ -251,7 +251,7 @@ fn read_options(options: &BuildOptions, config: &MapConfig) -> ReadOptions {
     read
 }
 
-/// Batches have no rays to map again.
+/// Batches of points have no rays to replay.
 fn check_no_rays(options: &BuildOptions, config: &MapConfig) -> voxtile::Result<()> {
     if !(options.no_rays && config.keeps_scans) {
         return Ok(());
@@ -261,7 +261,7 @@ fn check_no_rays(options: &BuildOptions, config: &MapConfig) -> voxtile::Result<
     Err(Error::argument("no_rays, keep_scans", reason))
 }
 
-/// What makes sense only beside something else.
+/// Checks options that require other options.
 fn check_combinations(options: &BuildOptions) -> voxtile::Result<()> {
     if options.again && (options.resume || !options.append) {
         return Err(Error::argument("again", "goes with `append`, and without `resume`"));
@@ -272,7 +272,7 @@ fn check_combinations(options: &BuildOptions) -> voxtile::Result<()> {
     Ok(())
 }
 
-/// Only scans that come by themselves can come too fast.
+/// Checks that the input is a stream, because only streams can be faster than the mapper.
 fn check_when_behind(options: &BuildOptions) -> voxtile::Result<()> {
     let is_file = options.scans.is_file() || options.scans.is_dir();
     if options.when_behind == WhenBehind::Wait || !is_file {
@@ -294,17 +294,17 @@ fn flush_if(
     if !schedule.is_by_time() {
         mapper.flush()?;
     } else if mapper.is_flushing() {
-        // The disk is slower than the clock: the next flush begins once this one has ended.
+        // The disk is slower than the schedule: the next flush begins after the current one.
         return Ok(());
     } else {
-        // Scans go on meanwhile.
+        // Scans are inserted during the flush.
         mapper.begin_flush()?;
     }
     schedule.flushed();
     Ok(())
 }
 
-/// Where the map is made. A piece of a map is made again after a crash, and made durable when it is handed over.
+/// Returns the path of the map. A shard is not durable until it is imported; after a crash it is built again.
 fn place_of_map(options: &BuildOptions) -> MapPath {
     match options.piece_of {
         None => MapPath::from(&options.output),
@@ -312,7 +312,7 @@ fn place_of_map(options: &BuildOptions) -> MapPath {
     }
 }
 
-/// Whether there is a map to go on with.
+/// Returns whether there is a map to continue.
 fn exists(options: &BuildOptions) -> anyhow::Result<bool> {
     if options.output.is_file() {
         let reason = "is a file; a map is a folder, name another `output`";
@@ -320,7 +320,7 @@ fn exists(options: &BuildOptions) -> anyhow::Result<bool> {
     }
     let exists = match MapReader::open(&options.output, 0) {
         Err(Error::NoMap { .. }) => false,
-        // Damage is told by the mapper, which opens the map next.
+        // Damage is reported by the mapper, which opens the map next.
         _ => true,
     };
     if exists && !options.append && !options.resume {
@@ -333,8 +333,8 @@ fn exists(options: &BuildOptions) -> anyhow::Result<bool> {
     Ok(exists)
 }
 
-/// Goes on with an input of which the map has scans, or begins with one that it does not know; returns how many of its
-/// scans the map has, `None` if it was asked to stop.
+/// Resumes an input of which the map has scans, or begins a new one. Returns the number of its scans that the map has,
+/// or `None` if the build was stopped.
 fn begin(
     options: &BuildOptions,
     mapper: &mut OutOfCoreTileMapper,
@@ -342,8 +342,8 @@ fn begin(
     name: &str,
 ) -> anyhow::Result<Option<u64>> {
     let inputs = mapper.inputs();
-    // Of inputs that begin with many scans without points nothing tells one from another but what comes later, and their
-    // names, where the map has nothing else.
+    // Inputs that begin with many empty scans cannot be distinguished by content, only by later scans or by their
+    // names.
     let is_this = |input: &InputRecord| {
         let is_known = |content: &InputContent| content.begins_with.is_some() || input.is_named(name);
         let is_same = |content: &InputContent| {
@@ -360,7 +360,7 @@ fn begin(
             }
             check_begun(options, &inputs[at], mapper)?;
             if at + 1 < inputs.len() {
-                // Other inputs came between.
+                // The map has other inputs after this one.
                 mapper.begin_input(inputs[at].clone())?;
             }
             return Ok(Some(content.scans - content.skipped.len() as u64));
@@ -370,7 +370,7 @@ fn begin(
         }
     }
     if let Some(last) = inputs.last().filter(|last| last.content.is_none() && !options.again) {
-        // Of an earlier version: one name for all of it.
+        // A map of an older version identifies the whole input by a fingerprint.
         let Some(fingerprint) = intake.fingerprint()? else { return Ok(None) };
         if fingerprint.is_ok_and(|fingerprint| fingerprint == last.name) {
             let done = mapper.scan_number().saturating_sub(last.first_scan);
@@ -381,14 +381,14 @@ fn begin(
             return Ok(intake.pass(done)?.then_some(done));
         }
     }
-    // A map that was merged of others has tiles, and knows of no scans.
+    // A merged map has tiles but no scan count.
     let is_empty = mapper.scan_number() == 0 && mapper.tile_bounds().is_none();
     if options.resume && !options.append && !is_empty {
         let same = inputs.iter().rfind(|input| input.is_named(name) && input.content.is_some());
         let (found, wanted) = match same.or(inputs.last()) {
             None => ("that it does not know".to_owned(), name.to_owned()),
             Some(known) => match known.content {
-                // Its name is a fingerprint.
+                // The recorded name is a fingerprint.
                 None => {
                     let Some(fingerprint) = intake.fingerprint()? else { return Ok(None) };
                     (known.name.clone(), fingerprint.map_or(name.to_owned(), |of| format!("{of} ({name})")))
@@ -415,7 +415,7 @@ fn begin(
     Ok(Some(0))
 }
 
-/// An input by what tells it from others of its name.
+/// Describes an input by its name and its content.
 fn beginning(name: &str, begins_with: Option<&str>) -> String {
     match begins_with {
         Some(fingerprint) => {
@@ -425,7 +425,7 @@ fn beginning(name: &str, begins_with: Option<&str>) -> String {
     }
 }
 
-/// An input goes on as it was begun.
+/// Checks that an input continues with its original settings.
 fn check_begun(
     options: &BuildOptions,
     input: &InputRecord,
@@ -442,7 +442,7 @@ fn check_begun(
     }
 }
 
-/// Points of another coordinate reference system are elsewhere.
+/// Checks that the coordinate reference systems of input and map agree.
 fn check_crs(options: &BuildOptions, found: Option<&String>, own: Option<&String>) -> voxtile::Result<()> {
     match (found, own) {
         (Some(found), Some(own)) if found != own => {
@@ -465,18 +465,18 @@ fn taken_before(options: &BuildOptions, name: &str, scans: u64) -> anyhow::Error
     Error::argument(options.scans.display().to_string(), reason).into()
 }
 
-/// For temporary files: the map's folder or, where that is still to be made, the nearest folder around it. The system
-/// may keep its own in memory.
+/// Returns the folder for temporary files: the map's folder, or its nearest existing ancestor. The system's temporary
+/// folder may be in memory.
 fn folder_beside(options: &BuildOptions) -> &Path {
     options.output.ancestors().find(|folder| folder.is_dir()).unwrap_or(Path::new("."))
 }
 
-/// The memory for reading, of a limit of so many bytes.
+/// Returns the memory for reading, given the memory limit.
 fn for_reading(bytes: usize) -> usize {
     (bytes / PARTS_FOR_READING).max(MIN_FOR_READING)
 }
 
-/// The configuration of the map, which leaves the memory for reading alone.
+/// Returns the configuration of the map with its memory reduced by the share for reading.
 fn config_of_map(options: &BuildOptions, config: &MapConfig) -> MapConfig {
     let mut config = config.clone();
     if let Some(bytes) = config.memory_bytes()
@@ -488,7 +488,7 @@ fn config_of_map(options: &BuildOptions, config: &MapConfig) -> MapConfig {
     config
 }
 
-/// Points of a scan that the limit of memory has no room for go to a file.
+/// Returns the memory limit for the points of a scan. Further points go to a file.
 fn room(options: &BuildOptions, config: &MapConfig) -> PointRoom {
     let folder = folder_beside(options);
     match config.memory_bytes() {
@@ -497,7 +497,7 @@ fn room(options: &BuildOptions, config: &MapConfig) -> PointRoom {
     }
 }
 
-/// How many scans there may be at a time: those that are mapped, those that wait, and the one that is read.
+/// Returns the number of scans that can exist at once: being inserted, queued, and being read.
 fn scans_in_memory(options: &BuildOptions, config: &MapConfig) -> usize {
     let together = most_together(options, config);
     match options.when_behind {
@@ -507,14 +507,14 @@ fn scans_in_memory(options: &BuildOptions, config: &MapConfig) -> usize {
     }
 }
 
-/// How many scans are taken together if they are at hand: one for each core, as far as there is room for their points.
+/// Returns the maximum number of scans to insert at once: one per core, limited by the memory for their points.
 fn most_together(options: &BuildOptions, config: &MapConfig) -> usize {
     let room =
         config.memory_bytes().map_or(usize::MAX, |bytes| bytes / PARTS_OF_MEMORY / ROOM_TO_GO_TOGETHER);
     if options.no_rays { 1 } else { rayon::current_num_threads().min(room.saturating_sub(1) / 2).max(1) }
 }
 
-/// Free space alone is rarely what was wanted.
+/// Returns a warning if all rays were cut, which leaves only free space.
 fn all_is_cut(report: &ScanReport, config: &MapConfig) -> Option<String> {
     let ScanReport { points, skipped, cut_at_max_range, .. } = *report;
     let skipped: u64 = skipped.by_cause().into_iter().map(|(_, count)| count).sum();

@@ -6,10 +6,10 @@ use voxtile::sensor::{Iwlo, LogOdds, SensorModel};
 use voxtile::space::{Grid, GridError};
 use voxtile::{Error, InsertMode, MapConfig, RayConfig, Storage};
 
-/// Where rays are cut unless something else is asked for.
+/// Default maximum range of rays.
 const MAX_RANGE_M: f64 = 100.0;
 
-/// The parameters of a new map.
+/// Returns the parameters of a new map.
 pub fn config_to_create(options: &BuildOptions) -> anyhow::Result<MapConfig> {
     let (resolution_m, tile_size_m) =
         (options.resolution_m.unwrap_or(0.1), options.tile_size_m.unwrap_or(10.0));
@@ -20,7 +20,7 @@ pub fn config_to_create(options: &BuildOptions) -> anyhow::Result<MapConfig> {
     Ok(for_this_run(options, config, None)?.validated()?)
 }
 
-/// The map's own parameters, and those that were typed, which must be the same.
+/// Returns the parameters of an existing map. Given options must agree with them.
 pub fn config_to_go_on(options: &BuildOptions) -> anyhow::Result<MapConfig> {
     let map = MapReader::open(&options.output, 0)?;
     let mut config = map.config().clone();
@@ -35,8 +35,8 @@ pub fn config_to_go_on(options: &BuildOptions) -> anyhow::Result<MapConfig> {
     Ok(for_this_run(options, config, begun)?.validated()?)
 }
 
-/// What counts of the rays of the input that is to go on: another one may have come behind it. Which input it is shows
-/// when it is read; by then this is compared with what it was begun with.
+/// Returns the ray settings of the input to resume. A later input may have changed the map's current ones. Whether it
+/// is the same input is only known once it is read; its settings are compared then.
 fn rays_begun(options: &BuildOptions, map: &MapReader) -> RayConfig {
     let name = name_of_path(&options.scans);
     let inputs = map.metadata().ext.as_ref().map_or(&[][..], |ext| &ext.inputs);
@@ -44,7 +44,7 @@ fn rays_begun(options: &BuildOptions, map: &MapReader) -> RayConfig {
     input.and_then(|input| input.rays).unwrap_or(map.config().rays)
 }
 
-/// Names the option that makes a tile fit its voxels.
+/// Names the option that makes the tile size a multiple of the voxel size.
 fn name_the_option(error: Error) -> anyhow::Error {
     match error {
         Error::Grid(GridError::NotWhole { smaller_m, larger_m, .. }) => {
@@ -77,7 +77,7 @@ fn check_threshold(options: &BuildOptions, own: f64) -> voxtile::Result<()> {
     }
 }
 
-/// What was begun goes on as it was, unless something else is asked for, which is then refused.
+/// Applies the options of this run. Settings of an existing input cannot be changed; contradictions are refused later.
 fn for_this_run(
     options: &BuildOptions,
     config: MapConfig,

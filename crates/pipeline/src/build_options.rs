@@ -6,80 +6,80 @@ use voxtile::space::Aabb;
 use voxtile::{InsertMode, MemoryLimit, OctreeConfig, Storage};
 use voxtile_formats::ReadOptions;
 
-/// How observations become evidence, without the numbers.
+/// Sensor model, without its parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SensorModelKind {
-    /// OctoMap's: constant log-odds for hit and miss.
+    /// OctoMap's model: constant log-odds for hits and misses.
     LogOdds,
-    /// Intensity-weighted log-odds, for sonar, radar and lidar intensity.
+    /// Intensity-weighted log-odds, for sonar, radar and lidar intensities.
     Iwlo,
 }
 
-/// What a build is asked for. `None` is the map's own value; of a new map, or of rays that a build begins with, the
-/// default that is named here.
+/// Settings of a build. `None` means the map's own value; for a new map, or for the rays of a new input, it means the
+/// default named here.
 #[derive(Clone, Debug)]
 pub struct BuildOptions {
-    /// The scans: a file, a folder, a URL, a map, or `-` for a scan stream from standard input.
+    /// Scans: a file, a folder, a URL, a map, or `-` for a scan stream from standard input.
     pub scans: PathBuf,
-    /// How they are read.
+    /// Settings for reading the scans.
     pub read: ReadOptions,
     /// Folder of the map.
     pub output: PathBuf,
-    /// Edge of a voxel in metres: 0.1.
+    /// Edge of a voxel in metres. Default: 0.1.
     pub resolution_m: Option<f64>,
-    /// Edge of a tile in metres: 10.
+    /// Edge of a tile in metres. Default: 10.
     pub tile_size_m: Option<f64>,
-    /// How tiles are stored: as OctoMap's files.
+    /// Storage format of tiles. Default: OctoMap's.
     pub storage: Option<Storage>,
-    /// Limit of memory.
+    /// Memory limit.
     pub memory: MemoryLimit,
-    /// Points nearer to the sensor than this are skipped, in metres: 0.
+    /// Minimum range in metres; nearer points are skipped. Default: 0.
     pub min_range_m: Option<f64>,
-    /// Rays are cut at this range in metres: 100.
+    /// Maximum range in metres; rays are cut there. Default: 100.
     pub max_range_m: Option<f64>,
-    /// How observations become evidence: by constant log-odds.
+    /// Sensor model. Default: constant log-odds.
     pub sensor_model: Option<SensorModelKind>,
-    /// Probabilities of a hit and a miss, and the least and most that a voxel gets.
+    /// Probabilities of a hit and a miss, and the minimum and maximum probability of a voxel.
     pub probabilities: Option<[f64; 4]>,
-    /// Probability from which a voxel counts as occupied: 0.5.
+    /// Minimum probability of an occupied voxel. Default: 0.5.
     pub occupancy_threshold: Option<f64>,
-    /// Intensities up to this one are no evidence, in the sensor's unit: 35.
+    /// Intensities up to this value are no evidence, in the sensor's unit. Default: 35.
     pub intensity_threshold: Option<f64>,
-    /// Intensity of full weight, in the sensor's unit: 255.
+    /// Intensity with full weight, in the sensor's unit. Default: 255.
     pub intensity_max: Option<f64>,
-    /// How often one scan updates a voxel: once.
+    /// How often one scan can update a voxel. Default: once.
     pub insert_mode: Option<InsertMode>,
-    /// Whether the map keeps the scans. One that does goes on doing so.
+    /// Whether the map keeps the scans. A map that keeps scans continues to do so.
     pub keep_scans: bool,
-    /// Only tiles whose center is in this box are mapped.
+    /// Only tiles with their center in this box are updated.
     pub region: Option<Aabb>,
-    /// Rays without a return clear up to so many metres: they clear nothing.
+    /// Range up to which rays without a return clear space, in metres. Default: they clear nothing.
     pub clear_no_return_m: Option<f64>,
-    /// Whether points are hits alone, without rays.
+    /// Whether points are hits without rays.
     pub no_rays: bool,
-    /// Whether scans may be added to a map.
+    /// Whether scans may be added to an existing map.
     pub append: bool,
-    /// Whether to go on with an input that the map has scans of.
+    /// Whether to resume an input of which the map has scans.
     pub resume: bool,
-    /// Whether to add scans that the map has once more.
+    /// Whether to add scans again that the map already has.
     pub again: bool,
-    /// Whether scans that cannot be read are skipped.
+    /// Whether to skip scans that cannot be read.
     pub skip_bad: bool,
-    /// Whether poses that do not fit the scans are refused, before anything is mapped, in place of a remark.
+    /// Whether poses that do not fit the scans are an error before anything is mapped, instead of a warning.
     pub strict: bool,
-    /// When the map is flushed: every 60 s, beside scans.
+    /// When to flush the map. Default: every 60 s, in the background.
     pub flush_every: FlushEvery,
-    /// What becomes of scans that come faster than they can be mapped.
+    /// What to do with scans that arrive faster than they can be inserted.
     pub when_behind: WhenBehind,
-    /// What tiles keep for coarse queries; no answer and no file depends on it.
+    /// Data that tiles keep for coarse queries. It does not affect results and files.
     pub octree: OctreeConfig,
-    /// The map is made as a piece with this id, and is not durable. Whoever crashes makes it again, and
+    /// ID of the shard to build. A shard is not durable: after a crash it must be built again, and
     /// [`operations::move_shard`](voxtile::operations::move_shard()) makes it durable.
     pub piece_of: Option<[u8; 16]>,
 }
 
 impl BuildOptions {
-    /// A build of these scans into a new map, with all defaults.
+    /// Creates the options for a new map with all defaults.
     pub fn new(scans: impl Into<PathBuf>, output: impl Into<PathBuf>) -> Self {
         Self {
             scans: scans.into(),

@@ -4,25 +4,25 @@ use std::path::Path;
 use voxtile::mapper::OutOfCoreTileMapper;
 use voxtile::{Error, MapConfig, Storage};
 
-/// The map of a flush that failed.
+/// Cleanup of a map after a failed flush.
 pub(crate) struct FailedFlush<'a> {
     pub folder: &'a Path,
     pub config: MapConfig,
-    /// The scans of its last flush that did not fail.
+    /// Number of scans at the last successful flush.
     pub scan_number: u64,
-    /// Whether this build made the map.
+    /// Whether this build created the map.
     pub is_new: bool,
-    /// A piece of a map is made again as a whole.
+    /// Whether the map is a shard, which is always rebuilt as a whole.
     pub is_piece: bool,
 }
 
 const GONE: &str = "no scan was flushed, and the new map was removed";
-/// The files of a map without scans.
+/// Files of a map without scans.
 const EMPTY_MAP: [&str; 3] = ["metadata.json", "commits.log", "writer.lock"];
 
 impl FailedFlush<'_> {
-    /// Removes what the flush left, of a new map all, once the map is closed. Returns the error with what a user can
-    /// rely on.
+    /// Removes the uncommitted files of the flush, or the whole map if it is new and empty. The map must be closed.
+    /// Returns the error with the state of the map and advice.
     pub fn clean(self, error: Error) -> anyhow::Error {
         let hint = match self.config.storage {
             Storage::OctoMap if is_full(&error) => {
@@ -47,19 +47,19 @@ impl FailedFlush<'_> {
         anyhow::Error::new(error).context(context)
     }
 
-    /// Returns whether the map is gone.
+    /// Returns whether the map was removed.
     fn remove_leftovers(&self) -> bool {
         if self.is_piece {
             return false;
         }
-        // Opening the map removes what was not committed.
+        // Opening the map removes uncommitted files.
         let reopened = OutOfCoreTileMapper::open(self.folder, self.config.clone());
         let is_open = reopened.inspect_err(|error| log::debug!("{error:#}")).is_ok();
         is_open && self.is_new && self.scan_number == 0 && remove_empty_map(self.folder)
     }
 }
 
-/// Removes a map that has no more than its own files. Returns whether it is gone.
+/// Removes a map that has no files except those of an empty map. Returns whether it was removed.
 fn remove_empty_map(folder: &Path) -> bool {
     let is_own = |name: &std::ffi::OsStr| EMPTY_MAP.iter().any(|own| name == *own);
     let Ok(entries) = fs::read_dir(folder) else { return false };
@@ -71,12 +71,12 @@ fn remove_empty_map(folder: &Path) -> bool {
         Err(error) => error.kind() == ErrorKind::NotFound,
         Ok(()) => true,
     });
-    // A folder that is a mount point stays.
+    // Fails for a mount point, which remains.
     let _ = fs::remove_dir(folder);
     is_removed
 }
 
-/// Whether a disk, or what a user may take of it, is full.
+/// Returns whether a disk or quota is full.
 fn is_full(error: &Error) -> bool {
     let kind = match error {
         Error::Io { cause, .. } => cause.kind(),

@@ -4,22 +4,22 @@ use voxtile::Result;
 use voxtile_bucket::FetchedFiles;
 use voxtile_formats::{PointStore, PoseSource, ReadOptions, ScanHead, ScanSource, open_scans};
 
-/// Scans of a bucket, from files that were fetched.
+/// Scans of a bucket, read from fetched files.
 pub struct FetchedSource {
     source: Box<dyn ScanSource + Send>,
-    /// Behind the source, which has some of them open.
+    /// Dropped after the source, which may have files open.
     _files: FetchedFiles,
 }
 
 impl FetchedSource {
-    /// Fetches all files at a URL, then reads them as those of a folder.
+    /// Fetches all files at a URL, then reads them like a folder.
     pub fn open(url: &str, options: &ReadOptions, watch: &Watch) -> Result<Self> {
         let files = fetch(url, watch)?;
         Ok(Self { source: open_scans(files.path(), options)?, _files: files })
     }
 }
 
-/// Fetches all files at a URL, until it is asked to stop.
+/// Fetches all files at a URL, unless it is stopped.
 pub fn fetch(url: &str, watch: &Watch) -> Result<FetchedFiles> {
     let bucket = bucket_at(url)?;
     let gauge = watch.over_bytes();

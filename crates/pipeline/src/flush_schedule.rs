@@ -1,14 +1,14 @@
 use std::str::FromStr;
 use std::time::{Duration, Instant};
 
-/// How often a build makes durable what it mapped.
+/// When a build flushes the map, which makes the inserted scans durable.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FlushEvery {
     /// After this number of scans.
     Scans(u64),
-    /// After this time, while scans are still inserted.
+    /// After this time, while scans are still being inserted.
     Time(Duration),
-    /// Only at the end.
+    /// Only at the end of the build.
     End,
 }
 
@@ -31,7 +31,7 @@ impl FromStr for FlushEvery {
     }
 }
 
-/// When the next flush is due.
+/// Schedule of flushes.
 pub struct FlushSchedule {
     every: FlushEvery,
     scans: u64,
@@ -39,12 +39,12 @@ pub struct FlushSchedule {
 }
 
 impl FlushSchedule {
-    /// A schedule that begins now.
+    /// Creates a schedule that starts now.
     pub fn new(every: FlushEvery) -> Self {
         Self { every, scans: 0, since: Instant::now() }
     }
 
-    /// Asked after scans: whether to flush now.
+    /// Counts inserted scans and returns whether to flush now.
     pub fn is_due(&mut self, scans: usize) -> bool {
         self.scans += scans as u64;
         match self.every {
@@ -54,7 +54,7 @@ impl FlushSchedule {
         }
     }
 
-    /// How many scans may come before it is asked again.
+    /// Returns how many scans may be inserted before the next call of [`FlushSchedule::is_due`].
     pub fn scans_until_due(&self) -> usize {
         match self.every {
             FlushEvery::Scans(scans) => {
@@ -64,7 +64,7 @@ impl FlushSchedule {
         }
     }
 
-    /// Asked while no scan comes: whether to flush now what came since the last flush.
+    /// Returns whether to flush now while the input is idle.
     pub fn is_due_waiting(&self) -> bool {
         match self.every {
             FlushEvery::Time(time) => self.scans > 0 && self.since.elapsed() >= time,
@@ -72,12 +72,13 @@ impl FlushSchedule {
         }
     }
 
-    /// Whether time decides, so that a flush may go on beside scans. After so many scans is after these and no others.
+    /// Returns whether the schedule is by time, which permits a background flush. A flush after a number of scans must
+    /// contain exactly these scans.
     pub fn is_by_time(&self) -> bool {
         matches!(self.every, FlushEvery::Time(_))
     }
 
-    /// The map was flushed.
+    /// Records that the map was flushed.
     pub fn flushed(&mut self) {
         (self.scans, self.since) = (0, Instant::now());
     }

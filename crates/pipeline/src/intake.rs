@@ -9,50 +9,50 @@ use voxtile::store::InputContent;
 use voxtile::{Error, FormatError, Place};
 use voxtile_formats::{ScanChain, ScanMark, StoredScan};
 
-/// Scans among which the first with points is looked for: it tells which input this is.
+/// Number of scans to search for the first one with points, which identifies the input.
 const LEAD: usize = 16;
-/// Most bad places of an input that may be skipped. All scans of a damaged chunk of a recording are at one place.
+/// Limit for the places of an input that cannot be read. All scans of a damaged chunk of a recording are at one place.
 const MAX_BAD_PLACES: usize = 1000;
-/// Most scans of an input that may be skipped: a map stores the number of each.
+/// Limit for the skipped scans of an input, because the map stores the number of each.
 const MAX_SKIPPED: usize = 10_000;
 
-/// The scans of an input in order, and what the map is to remember of those that it has taken.
+/// Sequence of the scans of an input, and the record of the accepted ones for the map.
 pub struct Intake {
     reader: ScanReader,
     scans: PathBuf,
-    /// What was read to tell which input this is, and not taken yet.
+    /// Scans that were read to identify the input and are not yet inserted.
     lead: VecDeque<Read>,
-    /// What came behind scans that were taken together, and is no scan.
+    /// A read after the scans of a batch that is not a scan.
     behind: Option<voxtile::Result<Read>>,
     chain: ScanChain,
     begins_with: Option<String>,
     skipped: Vec<u64>,
-    /// The bytes of files at which scans were skipped, and how many were skipped at no such place.
+    /// File offsets at which scans were skipped, and the number of skipped scans without such a place.
     bad_places: HashSet<(PathBuf, u64)>,
     skipped_alone: usize,
     skips_bad: bool,
-    /// What a scan with rays needs. `None` for points alone.
+    /// Requirements for scans with rays. `None` for points without rays.
     rays: Option<RayNeeds>,
-    /// Why scans were skipped by this process.
+    /// Scans skipped by this process, with the reasons.
     pub unread: Vec<String>,
-    /// How many scans were left out because they came faster than they could be mapped.
+    /// Number of scans that were dropped because they arrived faster than they could be inserted.
     pub left_out: u64,
 }
 
-/// What a map needs of scans whose rays it takes.
+/// Requirements of a map for scans with rays.
 pub struct RayNeeds {
     pub grid: Grid,
     pub sensor_model: SensorModel,
 }
 
-/// What came of asking for scans to map.
+/// Result of requesting scans.
 pub enum Next {
     Scans(Vec<Taken>),
     End,
     Stopped,
 }
 
-/// A scan, and what has been taken of the input with it.
+/// A scan, and the state of the input up to it.
 pub struct Taken {
     pub scan: StoredScan,
     pub content: InputContent,
@@ -86,7 +86,7 @@ impl Intake {
         self.reader.read_ahead(queue);
     }
 
-    /// Reads what tells which input this is; `false` if it was asked to stop before that had come.
+    /// Reads the scans that identify the input. Returns `false` if it was stopped before.
     pub fn read_lead(&mut self) -> anyhow::Result<bool> {
         while self.lead.len() < LEAD && self.begins_with.is_none() {
             match self.reader.next(&mut || Ok(()))? {
@@ -105,7 +105,7 @@ impl Intake {
         Ok(true)
     }
 
-    /// The first scan of what has been read, if there is any.
+    /// Returns the first scan that was read ahead, if any.
     fn first(&self) -> Option<&StoredScan> {
         self.lead.iter().find_map(|read| match read {
             Read::Scan(ReadScan { scan, .. }) => Some(scan),
@@ -113,13 +113,13 @@ impl Intake {
         })
     }
 
-    /// The error of a first scan that cannot be mapped, where it is not to be skipped.
+    /// Checks the first scan, unless scans that cannot be mapped are skipped.
     pub fn check_first(&mut self) -> anyhow::Result<()> {
         if let (Some(needs), Some(scan)) = (&self.rays, self.first())
             && needs.sensor_model.needs_intensity()
             && !scan.has_intensities()
         {
-            // If the first has none, none has.
+            // All scans of an input have the same fields.
             needs.check_fields(scan)?;
         }
         match self.lead.pop_front().map(|first| self.judged(first)) {
@@ -131,7 +131,7 @@ impl Intake {
         }
     }
 
-    /// A scan that cannot be mapped is as one that cannot be read.
+    /// Converts a scan that cannot be mapped to one that cannot be read.
     fn judged(&self, read: Read) -> Read {
         let Some(needs) = &self.rays else { return read };
         match read {
@@ -143,24 +143,24 @@ impl Intake {
         }
     }
 
-    /// What the first scan with points is.
+    /// Returns the fingerprint of the first scan with points.
     pub fn begins_with(&self) -> Option<&str> {
         self.begins_with.as_deref()
     }
 
-    /// Whether an input of which a map has this is as this one begins.
+    /// Returns whether this input starts like the input with this content in the map.
     pub fn begins_as(&self, content: &InputContent) -> bool {
         let (Some(_), None) = (&self.begins_with, &content.begins_with) else {
             return content.begins_with == self.begins_with;
         };
-        // The map has only the scans without points that come first; without any, nothing identifies the input.
+        // The map only has empty scans of its input. If it has none at all, nothing identifies the input.
         if content.scans == 0 {
             return false;
         }
         let (mut chain, mut reads) = (ScanChain::default(), self.lead.iter());
         while chain.scans() < content.scans {
             match reads.next() {
-                // Skipped, whether it can be read or not.
+                // Skipped by the earlier build, whether it can be read now or not.
                 Some(Read::Unread(_) | Read::Scan(_)) if content.skipped.contains(&chain.scans()) => {
                     chain.add_unread();
                 }
@@ -171,22 +171,22 @@ impl Intake {
         chain.scan_text() == content.scan_chain
     }
 
-    /// How maps of earlier versions know this input; `None` if it was asked to stop before that was known.
+    /// Returns the fingerprint used in maps of older versions, or `None` if it was stopped before it was known.
     pub fn fingerprint(&mut self) -> anyhow::Result<Option<voxtile::Result<String>>> {
         self.reader.fingerprint()
     }
 
-    /// What a person should know of the input so far.
+    /// Returns remarks for the user about the input so far.
     pub fn remarks(&mut self) -> Vec<String> {
         self.reader.remarks().unwrap_or_default()
     }
 
-    /// The coordinate reference system that the input names.
+    /// Returns the coordinate reference system named by the input.
     pub fn crs(&mut self) -> Option<String> {
         self.reader.crs().unwrap_or_default()
     }
 
-    /// What has been taken so far.
+    /// Returns the record of the input up to the last accepted scan.
     pub fn content(&self) -> InputContent {
         InputContent {
             scans: self.chain.scans(),
@@ -197,11 +197,11 @@ impl Intake {
         }
     }
 
-    /// Passes over scans that a map has taken, which must be the same; `false` if it was asked to stop before the end.
+    /// Skips the scans that the map has, and checks that they are the same. Returns `false` if it was stopped before.
     ///
     /// # Errors
     ///
-    /// Fewer scans, other scans, other poses, a scan that cannot be read any more.
+    /// There are fewer scans than in the map, scans or poses differ, or a scan cannot be read any more.
     pub fn pass_over(&mut self, content: &InputContent) -> anyhow::Result<bool> {
         self.skipped.clone_from(&content.skipped);
         if !self.pass(content.scans)? {
@@ -209,7 +209,7 @@ impl Intake {
         }
         let differs = match (
             self.chain.scan_text() == content.scan_chain,
-            // Once the map was remapped, nothing tells by which poses.
+            // A remapped map does not record the poses.
             content.pose_chain.is_empty() || self.chain.pose_text() == content.pose_chain,
         ) {
             (true, true) => return Ok(true),
@@ -223,7 +223,7 @@ impl Intake {
         )))
     }
 
-    /// The same where the map does not know more than their number.
+    /// Skips a number of scans without comparing them.
     pub fn pass(&mut self, scans: u64) -> anyhow::Result<bool> {
         while self.chain.scans() < scans {
             let number = self.chain.scans();
@@ -254,8 +254,8 @@ impl Intake {
         Ok(true)
     }
 
-    /// The next scans, which count as taken from now on: one, and up to `most` if they are at hand. While none comes,
-    /// `idle` is called ten times a second.
+    /// Accepts the next scan and, if they are already read, further ones up to `most`. While none arrives, `idle` is
+    /// called ten times a second.
     pub fn next(
         &mut self,
         most: usize,
@@ -322,7 +322,7 @@ impl Intake {
         Ok(())
     }
 
-    /// Counts a scan that is skipped, unless another one was skipped at the same place.
+    /// Counts the places of skipped scans. Several scans at the same place count once.
     fn count_bad(&mut self, error: &Error) {
         match error {
             Error::Malformed { path, cause } if cause.place == Place::Offset => {
@@ -345,7 +345,7 @@ impl Intake {
         Some(read.map(|read| self.judged(read)))
     }
 
-    /// What was read before and not taken.
+    /// Returns a read that was made earlier and not yet used.
     fn read_before(&mut self) -> Option<voxtile::Result<Read>> {
         self.behind.take().or_else(|| self.lead.pop_front().map(Ok))
     }
@@ -356,7 +356,7 @@ impl Intake {
 }
 
 impl RayNeeds {
-    /// Whether a scan, the one of this number of an input, can be mapped.
+    /// Checks that a scan can be mapped. `number` is its number in the input.
     fn check(&self, scan: &StoredScan, number: u64, input: &Path) -> voxtile::Result<()> {
         let origin = scan.origin();
         if self.grid.voxel_of(origin).is_none() {

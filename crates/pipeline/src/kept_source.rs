@@ -8,23 +8,22 @@ use voxtile::scan::{Pose, ScanPoints, Stop};
 use voxtile::{Error, Result};
 use voxtile_formats::{PointStore, ScanHead, ScanSource};
 
-/// The scans that a map or a snapshot of one keeps, as an input like any other.
+/// The kept scans of a map or a snapshot as an input.
 pub struct KeptSource {
     path: PathBuf,
     scans: KeptScans,
-    /// Those that take the place of the scans' own, by their numbers.
+    /// Poses that replace the scans' own, by scan number.
     new_poses: FxHashMap<u64, Pose>,
     count: usize,
     crs: Option<String>,
     fingerprint: String,
 }
 
-/// Whether a path names a map that may keep scans, or a snapshot of one. Of a URL nobody knows before the store
-/// answers.
+/// Returns whether a path names a map or snapshot that may keep scans. For a URL, the store must be queried.
 ///
 /// # Errors
 ///
-/// A bucket that cannot be asked.
+/// The bucket cannot be queried.
 pub fn is_map(path: &Path, stop: &Stop) -> Result<bool> {
     let has_files =
         |path: &Path| ["metadata.json", "commits.log"].iter().all(|name| path.join(name).is_file());
@@ -36,14 +35,14 @@ pub fn is_map(path: &Path, stop: &Stop) -> Result<bool> {
         return Ok(true);
     }
     match text {
-        // Not the name of a user before that of a host.
+        // The `@` is not the one between user and host of the URL.
         Some((map, snapshot)) if !snapshot.contains('/') && map.contains("://") => is_map_at(map, stop),
         _ => Ok(false),
     }
 }
 
 impl KeptSource {
-    /// Opens them with their own poses, or with those of a file.
+    /// Opens the scans with their own poses, or with those of a file.
     pub fn open(path: &Path, poses: Option<&PoseFile<'_>>) -> Result<Self> {
         let reader = MapAt::of(path)?.open()?;
         let (scans, summary) = (reader.kept_scans()?, reader.kept_summary()?);

@@ -1,14 +1,14 @@
-//! How scans become a map, how maps are found, and how they become files: what the command, the page, the Python
-//! package and the ROS 2 node share. Nothing here prints, parses a command line or knows a screen.
+//! Building, finding and exporting maps: the part shared by the command line program, the viewer, the Python package
+//! and the ROS 2 node. Nothing here prints, parses a command line or depends on a user interface.
 //!
 //! ```text
 //! BuildOptions -> build                                             build, build_config, flush_schedule
 //!   scans of a file, folder, map, bucket or pipe                    scan_input, kept_source, fetched_source
-//!   -> ScanReader, in a thread of its own -> ScanQueue -> Intake    scan_reader, scan_queue, intake
+//!   -> ScanReader, in its own thread -> ScanQueue -> Intake         scan_reader, scan_queue, intake
 //!   -> a mapper -> Summary                                          summary
 //! ExportOptions -> export -> ExportSummary                          export/, output/
-//! numbers: lists of numbers that all front ends have                numbers
-//! Watch: ends work, and hears how far it is                         watch
+//! numbers: lists of numbers used by all front ends                  numbers
+//! Watch: stops work and receives its progress                       watch
 //! ```
 
 mod answer;

@@ -7,26 +7,26 @@ use voxtile::store::{SnapshotName, TileVersion};
 use voxtile::tile::Voxel;
 use voxtile::{Error, MapConfig, Result};
 
-/// Bytes of the tiles that a reading command keeps in memory.
+/// Cache size for tiles in commands that only read.
 const TILES_BYTES: usize = 64 << 20;
-/// How often a map is opened again because a writer flushed it.
+/// Maximum number of attempts to read a map that a writer keeps flushing.
 const ATTEMPTS: usize = 8;
 
-/// A map as it is, or as a snapshot of it.
+/// A map or a snapshot of it.
 #[derive(Clone, Debug)]
 pub struct MapAt {
-    /// Its folder, or the URL of a bucket.
+    /// Folder or bucket URL of the map.
     pub map: PathBuf,
-    /// The snapshot of it, if it is one.
+    /// Name of the snapshot, if any.
     pub snapshot: Option<SnapshotName>,
 }
 
 impl MapAt {
-    /// `MAP`, or `MAP@SNAPSHOT` where nothing has that as its own name.
+    /// Parses `MAP` or `MAP@SNAPSHOT`. An existing file or folder with the whole name takes precedence.
     ///
     /// # Errors
     ///
-    /// A name that no snapshot can have.
+    /// The name is not a valid snapshot name.
     pub fn of(path: &Path) -> Result<Self> {
         match named_snapshot(path) {
             Some((map, name)) => Ok(Self { map: map.to_owned(), snapshot: Some(SnapshotName::new(name)?) }),
@@ -34,11 +34,11 @@ impl MapAt {
         }
     }
 
-    /// Opens it for reading.
+    /// Opens the map for reading.
     ///
     /// # Errors
     ///
-    /// As for [`MapReader::open`]; a file.
+    /// As for [`MapReader::open`]. Also fails for a file.
     pub fn open(&self) -> Result<MapReader> {
         check_is_no_file(&self.map)?;
         match &self.snapshot {
@@ -48,7 +48,7 @@ impl MapAt {
     }
 }
 
-/// A map is a folder; a file of OctoMap is another form of one.
+/// Checks that a map is not a file. Maps are folders; OctoMap files are only supported by some commands.
 ///
 /// # Errors
 ///
@@ -65,22 +65,22 @@ pub fn check_is_no_file(map: &Path) -> Result<()> {
     Err(Error::argument(map.display().to_string(), reason))
 }
 
-/// The two parts of `MAP@SNAPSHOT`, where nothing has that as its own name.
+/// Splits `MAP@SNAPSHOT`, unless a file or folder with the whole name exists.
 fn named_snapshot(path: &Path) -> Option<(&Path, &str)> {
     let text = path.to_str().filter(|_| std::fs::symlink_metadata(path).is_err())?;
     let (map, name) = text.rsplit_once('@')?;
     (!name.contains(std::path::is_separator)).then_some((Path::new(map), name))
 }
 
-/// What can be read.
+/// A map in one of the supported forms.
 pub enum AnyMap {
-    /// A map, or a snapshot of one.
+    /// A map or a snapshot.
     Map(Box<MapReader>),
-    /// A file of OctoMap.
+    /// An OctoMap file.
     Octree(Box<OctreeMap>),
 }
 
-/// Calls a method of whichever it is.
+/// Forwards a method call to the variant.
 macro_rules! whichever {
     ($map:expr, $method:ident($($argument:expr),*)) => {
         match $map {
@@ -144,11 +144,11 @@ impl MapView for AnyMap {
     }
 }
 
-/// A map that is to be changed, made or looked at as a whole: not a snapshot of one.
+/// Checks that a path names a map that can be written, not a snapshot.
 ///
 /// # Errors
 ///
-/// [`Error::InvalidArgument`] for `MAP@SNAPSHOT` where there is a map at `MAP`, for a URL, and for a file.
+/// [`Error::InvalidArgument`] for `MAP@SNAPSHOT` if there is a map at `MAP`, for a URL, and for a file.
 pub fn whole_map(path: &Path) -> Result<&Path> {
     check_is_folder(path)?;
     check_is_no_file(path)?;
@@ -165,22 +165,22 @@ pub fn whole_map(path: &Path) -> Result<&Path> {
     Ok(path)
 }
 
-/// Answers from one state of a map, or from a snapshot of it (`MAP@SNAPSHOT`); if a writer flushes the map meanwhile,
-/// begins again with the new state.
+/// Reads one state of a map or a snapshot (`MAP@SNAPSHOT`). If a writer flushes the map during the read, `read` is
+/// called again with the new state.
 ///
 /// # Errors
 ///
-/// As for [`MapAt::open`]; those of `read`.
+/// As for [`MapAt::open`], and errors of `read`.
 pub fn read_map<T>(map: &Path, mut read: impl FnMut(&MapReader) -> anyhow::Result<T>) -> anyhow::Result<T> {
     let map = MapAt::of(map)?;
     again_if_changed(|| read(&map.open()?))
 }
 
-/// Opens a map, a snapshot, or a file of OctoMap.
+/// Opens a map, a snapshot, or an OctoMap file.
 ///
 /// # Errors
 ///
-/// As for [`MapAt::open`]; a file that is none of OctoMap.
+/// As for [`MapAt::open`]. Also fails for a file that is not an OctoMap file.
 pub fn open_any_map(map: &Path) -> anyhow::Result<AnyMap> {
     if OctreeMap::is_named_by(map) {
         return Ok(AnyMap::Octree(Box::new(OctreeMap::of(octree_file::read(map)?)?)));
@@ -188,20 +188,20 @@ pub fn open_any_map(map: &Path) -> anyhow::Result<AnyMap> {
     Ok(AnyMap::Map(Box::new(MapAt::of(map)?.open()?)))
 }
 
-/// Answers from one state of a map, a snapshot, or a file of OctoMap.
+/// As [`read_map`], also for OctoMap files.
 ///
 /// # Errors
 ///
-/// As for [`open_any_map`]; those of `read`.
+/// As for [`open_any_map`], and errors of `read`.
 pub fn read_any_map<T>(map: &Path, mut read: impl FnMut(&AnyMap) -> anyhow::Result<T>) -> anyhow::Result<T> {
     again_if_changed(|| read(&open_any_map(map)?))
 }
 
-/// The same from two maps.
+/// As [`read_map`], for two maps.
 ///
 /// # Errors
 ///
-/// As for [`MapAt::open`]; those of `read`.
+/// As for [`MapAt::open`], and errors of `read`.
 pub fn read_maps<T>(
     first: &MapAt,
     second: &MapAt,
@@ -210,11 +210,11 @@ pub fn read_maps<T>(
     again_if_changed(|| read(&first.open()?, &second.open()?))
 }
 
-/// The same from any number of maps.
+/// As [`read_map`], for any number of maps.
 ///
 /// # Errors
 ///
-/// As for [`MapAt::open`]; those of `read`.
+/// As for [`MapAt::open`], and errors of `read`.
 pub fn read_all_maps<T>(
     maps: &[PathBuf],
     mut read: impl FnMut(&[MapReader]) -> anyhow::Result<T>,

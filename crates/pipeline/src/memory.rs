@@ -1,13 +1,13 @@
-//! What this process takes of memory.
+//! Memory use of this process.
 
 use std::fs;
 
-/// Largest resident memory of this process so far, in bytes; `None` where the system does not tell.
+/// Returns the peak resident memory of this process in bytes, or `None` if the system does not report it.
 pub fn peak_bytes() -> Option<u64> {
     status_bytes("VmHWM:")
 }
 
-/// Resident memory of this process, in bytes; `None` where the system does not tell.
+/// Returns the resident memory of this process in bytes, or `None` if the system does not report it.
 pub fn resident_bytes() -> Option<u64> {
     status_bytes("VmRSS:")
 }

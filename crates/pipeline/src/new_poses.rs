@@ -7,26 +7,26 @@ use voxtile_formats::ReadOptions;
 use voxtile_formats::poses::{Found, Trajectory};
 use voxtile_formats::{Budget, RigidPose};
 
-/// Most scans that an error names.
+/// Maximum number of scans named in an error.
 const MAX_NAMED: usize = 5;
 
-/// How a file of poses is read.
+/// A pose file and the settings for reading it.
 #[derive(Debug)]
 pub struct PoseFile<'a> {
-    /// The file.
+    /// The pose file.
     pub path: &'a Path,
-    /// The `calib.txt` of KITTI.
+    /// KITTI `calib.txt`, for poses of the camera.
     pub calib: Option<&'a Path>,
-    /// Where the sensor is in the body that the poses are of.
+    /// Pose of the sensor in the body frame, which the poses describe.
     pub body_from_sensor: Option<RigidPose>,
-    /// Most nanoseconds from a scan to the nearer of the poses around it.
+    /// Maximum time from a scan to the nearer of the two poses around it, in nanoseconds.
     pub tolerance_ns: i64,
-    /// What reading may take of memory.
+    /// Memory budget for reading.
     pub budget: Budget,
 }
 
 impl<'a> PoseFile<'a> {
-    /// `None` if scans are to keep their own poses.
+    /// Returns the pose file of the read options, or `None` if scans keep their own poses.
     pub fn of_reading(options: &'a ReadOptions) -> Option<Self> {
         let body = options.clouds.body_from_sensor;
         Some(Self {
@@ -39,11 +39,11 @@ impl<'a> PoseFile<'a> {
     }
 }
 
-/// The poses of a file for the scans that a map keeps, as a build with that file would give them.
+/// Returns the poses of a file for the scans that a map keeps, as a build with this file would assign them.
 ///
 /// # Errors
 ///
-/// A map that does not keep all its scans; a file that cannot be read, and poses that do not fit the scans.
+/// The map does not keep all its scans, the file cannot be read, or its poses do not fit the scans.
 pub fn poses_for(from: &PoseFile<'_>, scans: &KeptSummary) -> Result<NewPoses> {
     scans.check_keeps_all()?;
     let scans = scans.scans();
@@ -54,12 +54,12 @@ pub fn poses_for(from: &PoseFile<'_>, scans: &KeptSummary) -> Result<NewPoses> {
         return Err(Error::argument(file.display().to_string(), reason));
     }
     let trajectory = Trajectory::read_within(file, calib, budget)?;
-    // Stamps that mean nothing are all the same.
+    // Equal stamps, for instance all 0, are ignored.
     if trajectory.span_ns()?.is_none_or(|[first, last]| first < last) {
         trajectory.remarks().iter().for_each(|remark| log::warn!("{}: {remark}", file.display()));
     }
     let have_stamps = scans.iter().all(|scan| scan.stamp_ns.is_some());
-    // Lines in another order than time belong to scans by their stamps alone.
+    // Poses that are not sorted by time can only be matched by stamp.
     let is_by_line = !(have_stamps && trajectory.goes_back());
     if is_by_line && trajectory.len() == scans.len() && is_in_step(&trajectory, scans, tolerance_ns)? {
         trajectory.check_order()?;
@@ -84,7 +84,7 @@ pub fn poses_for(from: &PoseFile<'_>, scans: &KeptSummary) -> Result<NewPoses> {
     by_time(&trajectory, file, scans, tolerance_ns, body_from_sensor.as_ref())
 }
 
-/// Whether the poses are those of the scans in order, as far as time stamps tell.
+/// Returns whether poses match the scans one by one, as far as stamps show.
 fn is_in_step(trajectory: &Trajectory, scans: &[KeptScanHead], tolerance_ns: i64) -> Result<bool> {
     let most = u64::try_from(tolerance_ns).unwrap_or(0);
     for (of_pose, scan) in trajectory.stamps_ns().zip(scans) {

@@ -1,4 +1,4 @@
-//! Lists of numbers as front ends have them, and what they mean.
+//! Conversion of lists of numbers from the front ends.
 
 use voxtile::scan::Pose;
 use voxtile::space::{Aabb, Point};
@@ -6,14 +6,14 @@ use voxtile::{Error, Result};
 use voxtile_formats::ReadOptions;
 use voxtile_formats::RigidPose;
 
-/// Most seconds that a tolerance or a period may have.
+/// Limit for tolerances and periods, in seconds.
 const MAX_S: f64 = 1e9;
 
-/// A box of six numbers in metres: X0 Y0 Z0 X1 Y1 Z1.
+/// Converts six numbers in metres to a box: X0 Y0 Z0 X1 Y1 Z1.
 ///
 /// # Errors
 ///
-/// Another count; corners that are not in this order. It names the `argument`.
+/// The count is wrong, or the corners are not in this order. The error names `argument`.
 pub fn region_of(argument: &str, corners: &[f64]) -> Result<Aabb> {
     if let [x0, y0, z0, x1, y1, z1] = *corners
         && x0 < x1
@@ -25,21 +25,21 @@ pub fn region_of(argument: &str, corners: &[f64]) -> Result<Aabb> {
     Err(Error::argument(argument, "needs X0 < X1, Y0 < Y1 and Z0 < Z1"))
 }
 
-/// A point of three numbers in metres.
+/// Converts three numbers in metres to a point.
 ///
 /// # Errors
 ///
-/// Another count. It names the `argument`.
+/// The count is wrong. The error names `argument`.
 pub fn point_of(argument: &str, numbers: &[f64]) -> Result<Point> {
     let count = numbers.len();
     numbers.try_into().map_err(|_| Error::argument(argument, format!("{count} numbers; give 3 (x y z)")))
 }
 
-/// The nanoseconds of a `pose_tolerance`.
+/// Converts a `pose_tolerance` to nanoseconds.
 ///
 /// # Errors
 ///
-/// What is no time.
+/// The value is not a valid time.
 pub fn tolerance_ns(seconds: f64) -> Result<i64> {
     match (0.0..=MAX_S).contains(&seconds) {
         true => Ok((seconds * 1e9).round() as i64),
@@ -50,22 +50,22 @@ pub fn tolerance_ns(seconds: f64) -> Result<i64> {
     }
 }
 
-/// Where the sensor is in a body.
+/// Pose of the sensor in the body.
 #[derive(Clone, Copy, Debug)]
 pub struct Mount {
-    /// As it is put behind poses of the body. A quaternion that was given is this one, to the bit.
+    /// For composition with poses of the body. A quaternion is kept as given, to the last bit.
     pub rigid: RigidPose,
-    /// The same as a matrix.
+    /// The same pose as a matrix.
     pub body_from_sensor: Pose,
 }
 
 impl Mount {
-    /// A pose of 7 numbers (position in metres, quaternion x y z w) or of a 3x4 matrix, row by row; 9 numbers are a
-    /// rotation.
+    /// Parses a pose of 7 numbers (position in metres, quaternion x y z w), a 3x4 matrix in row-major order, or 9
+    /// numbers of a rotation matrix.
     ///
     /// # Errors
     ///
-    /// Another count; what turns nothing.
+    /// The count is wrong, or the rotation is invalid.
     pub fn of(numbers: &[f64]) -> Result<Self> {
         let body_from_sensor = match *numbers {
             [x, y, z, qx, qy, qz, qw] => {
@@ -93,11 +93,11 @@ impl Mount {
     }
 }
 
-/// Says where the sensor is, and in whose frame the box of ignored points is: the body's or the sensor's own.
+/// Sets the pose of the sensor, and the frame of the box of ignored points: the body's or the sensor's.
 ///
 /// # Errors
 ///
-/// A box in the frame of a body that is not known.
+/// The box is in the body frame, but the sensor's pose in the body is not given.
 pub fn set_mount(options: &mut ReadOptions, mount: Option<Mount>, is_box_of_body: bool) -> Result<()> {
     options.clouds.body_from_sensor = mount.map_or(RigidPose::IDENTITY, |mount| mount.rigid);
     if is_box_of_body {

@@ -1,4 +1,4 @@
-//! OctoMap's files in place of a map: what they hold, and their voxels.
+//! OctoMap files as maps: contents and voxels.
 
 use std::fs::File;
 use std::io::BufReader;
@@ -8,34 +8,34 @@ use voxtile::space::{Grid, MortonCode};
 use voxtile::{Error, Result};
 use voxtile_formats::write::VoxelRow;
 
-/// Most voxels that the pruned leaves of a file may stand for when they are written out one by one: a file of twenty
-/// bytes can stand for 2^48.
+/// Limit for the voxels of a file when its pruned leaves are expanded: a file of twenty bytes can represent 2^48
+/// voxels.
 pub const MAX_VOXELS: u64 = 1 << 28;
 
 /// Reads an octree file.
 ///
 /// # Errors
 ///
-/// A file that cannot be read or is none of OctoMap.
+/// The file cannot be read or is not an OctoMap file.
 pub fn read(path: &Path) -> Result<OctreeFile> {
     let file = File::open(path).map_err(|error| Error::io(path, "open", error))?;
     octree::read(BufReader::with_capacity(1 << 16, file)).map_err(|error| error.in_input(path))
 }
 
-/// The voxels of a file. The size of tiles has no meaning; two voxels always make a grid.
+/// Returns the grid of a file's voxels. The tile size is arbitrary (two voxels), because the file has no tiles.
 ///
 /// # Errors
 ///
-/// A resolution that is none.
+/// The resolution is invalid.
 pub fn grid_of(file: &OctreeFile) -> Result<Grid> {
     Ok(Grid::new(file.resolution_m, 2.0 * file.resolution_m)?)
 }
 
-/// Number of finest voxels with at least `min_log_odds`, which a file's leaves may stand for.
+/// Counts the finest voxels with at least `min_log_odds`, with pruned leaves expanded.
 ///
 /// # Errors
 ///
-/// More than [`MAX_VOXELS`].
+/// There are more than [`MAX_VOXELS`].
 pub fn count_voxels(file: &OctreeFile, min_log_odds: f32, keep: impl Fn(&VoxelRow) -> bool) -> Result<u64> {
     let size = file.tree.count_voxels(min_log_odds).occupied;
     if size > MAX_VOXELS {
@@ -50,11 +50,12 @@ pub fn count_voxels(file: &OctreeFile, min_log_odds: f32, keep: impl Fn(&VoxelRo
     Ok(count)
 }
 
-/// Visits the finest voxels with at least `min_log_odds`, in Morton order. OctoMap's files keep no counts: 0.
+/// Visits the finest voxels with at least `min_log_odds` in Morton order. Their observation counts are 0, because
+/// OctoMap files contain none.
 ///
 /// # Errors
 ///
-/// Those of `visit`; a resolution that is none.
+/// `visit` fails, or the resolution is invalid.
 pub fn for_each_voxel(
     file: &OctreeFile,
     min_log_odds: f32,

@@ -1,18 +1,18 @@
-//! Where a map is: a folder, or the URL of a bucket.
+//! Locations of maps: a folder, or the URL of a bucket.
 
 use std::path::Path;
 use voxtile::scan::Stop;
 use voxtile::store::MapPath;
 use voxtile::{Error, Result};
 
-/// How the URLs of maps in buckets begin.
+/// URL schemes of maps in buckets.
 const SCHEMES: [&str; 7] = ["s3", "gs", "az", "abfs", "abfss", "http", "https"];
 
-/// Where a map is that is to be read: a folder, or the URL of a bucket.
+/// Returns the location of a map to read: a folder or a bucket URL.
 ///
 /// # Errors
 ///
-/// As for `Bucket::open`; a URL, where the command was built without buckets.
+/// As for `Bucket::open`. Also fails for a URL if this build does not support buckets.
 pub fn place_of(map: &Path) -> Result<MapPath> {
     match url_of(map) {
         Some(url) => in_bucket(url),
@@ -20,14 +20,14 @@ pub fn place_of(map: &Path) -> Result<MapPath> {
     }
 }
 
-/// The URL that is given in place of a folder.
+/// Returns the URL if the path is one.
 pub fn url_of(map: &Path) -> Option<&str> {
     let text = map.to_str()?;
     let (scheme, _) = text.split_once("://")?;
     SCHEMES.contains(&scheme).then_some(text)
 }
 
-/// A map that is to be changed cannot be in a bucket.
+/// Checks that a map to modify is not in a bucket.
 ///
 /// # Errors
 ///
@@ -39,15 +39,15 @@ pub fn check_is_folder(map: &Path) -> Result<()> {
     Err(Error::argument(url, reason))
 }
 
-/// How long a request to a bucket may remain without progress, if the command line says so.
+/// Maximum time without progress for bucket requests, if set by the user.
 #[cfg(feature = "bucket")]
 static BUCKET_TIMEOUT: std::sync::OnceLock<std::time::Duration> = std::sync::OnceLock::new();
 
-/// What ends the waits for all buckets of this process.
+/// Stop flag for all bucket requests of this process.
 #[cfg(feature = "bucket")]
 static BUCKET_STOP: std::sync::OnceLock<Stop> = std::sync::OnceLock::new();
 
-/// Sets what ends the waits for all buckets of this process; the first one counts.
+/// Sets the stop flag for all bucket requests of this process. Only the first call has an effect.
 pub fn stop_buckets_with(stop: &Stop) {
     #[cfg(feature = "bucket")]
     let _ = BUCKET_STOP.set(stop.clone());
@@ -55,13 +55,13 @@ pub fn stop_buckets_with(stop: &Stop) {
     let _ = stop;
 }
 
-/// Sets the bound for all buckets of this process; the first one counts.
+/// Sets the maximum time without progress for all bucket requests of this process. Only the first call has an effect.
 #[cfg(feature = "bucket")]
 pub fn set_bucket_timeout(timeout: std::time::Duration) {
     let _ = BUCKET_TIMEOUT.set(timeout);
 }
 
-/// The bucket of a URL, whose waits end as [`stop_buckets_with`] says.
+/// Opens the bucket of a URL. Its requests can be stopped; see [`stop_buckets_with`].
 ///
 /// # Errors
 ///
@@ -76,7 +76,7 @@ pub fn bucket_at(url: &str) -> Result<voxtile_bucket::Bucket> {
     })
 }
 
-/// Whether there is a map at a URL; false where the command was built without buckets.
+/// Returns whether there is a map at a URL.
 ///
 /// # Errors
 ///
@@ -86,7 +86,7 @@ pub fn is_map_at(url: &str, stop: &Stop) -> Result<bool> {
     bucket_at(url)?.has_map(&|| stop.is_set())
 }
 
-/// False: there are no buckets.
+/// Returns `false`, because this build does not support buckets.
 ///
 /// # Errors
 ///
@@ -106,7 +106,7 @@ fn in_bucket(url: &str) -> Result<MapPath> {
     Err(without_buckets(url))
 }
 
-/// Why a URL cannot be used, where there are no buckets.
+/// Returns the error for a URL in a build without buckets.
 #[cfg(not(feature = "bucket"))]
 pub fn without_buckets(url: &str) -> Error {
     let reason = "this voxtile was built without buckets; `cargo install --locked --path crates/cli --features bucket` makes one with them";

@@ -1,7 +1,7 @@
 use voxtile::space::{Aabb, Grid, TileBox};
 use voxtile::{Error, Result};
 
-/// The tiles whose centers are in a region.
+/// Returns the tiles with their center in a region.
 ///
 /// # Errors
 ///

@@ -8,20 +8,19 @@ use std::path::Path;
 use voxtile::{Error, Result};
 use voxtile_formats::{ReadOptions, ScanSource, open_scans, read_scan_stream};
 
-/// Most letters of an input's name that a map keeps.
+/// Maximum length of an input name stored in a map, in characters.
 const MAX_LETTERS: usize = 200;
 
-/// Whether scans are to come from standard input.
+/// Returns whether the scans are read from standard input.
 pub fn is_standard_input(scans: &Path) -> bool {
     scans == Path::new("-")
 }
 
-/// Opens scans, which are a scan stream if they come from standard input. Once it is to stop, nothing waits for a
-/// bucket.
+/// Opens scans. Standard input must be a scan stream. Waiting for a bucket can be stopped.
 ///
 /// # Errors
 ///
-/// An input that cannot be read, options that do not fit it; [`Error::Stopped`].
+/// The input cannot be read, the options do not fit it, or [`Error::Stopped`].
 pub fn open(scans: &Path, options: &ReadOptions, watch: &Watch) -> Result<Box<dyn ScanSource + Send>> {
     if options.format.is_none() && is_map(scans, watch.stop())? {
         let source = KeptSource::open(scans, PoseFile::of_reading(options).as_ref())?;
@@ -41,8 +40,8 @@ pub fn open(scans: &Path, options: &ReadOptions, watch: &Watch) -> Result<Box<dy
     Ok(options.selection.clone().of(Box::new(stream)))
 }
 
-/// What a map calls an input, for people: the last part of its path (the last two, where that is `scans`), or the label
-/// of a stream.
+/// Returns the display name of an input stored in the map: the last component of its path (the last two if it is
+/// `scans`), or the label of a stream.
 pub fn name_of(scans: &Path, source: &dyn ScanSource) -> String {
     if is_standard_input(scans) {
         return source.fingerprint().unwrap_or_else(|_| "standard input".to_owned());
@@ -50,7 +49,7 @@ pub fn name_of(scans: &Path, source: &dyn ScanSource) -> String {
     name_of_path(scans)
 }
 
-/// The same of a path.
+/// As [`name_of`], for a path.
 pub fn name_of_path(scans: &Path) -> String {
     let path = scans.canonicalize().unwrap_or_else(|_| scans.to_owned());
     let part = |path: &Path| path.file_name().map(|name| name.to_string_lossy().into_owned());

@@ -6,12 +6,11 @@ use std::path::{Path, PathBuf};
 use voxtile::Result;
 use voxtile_formats::{ReadOptions, ScanSource};
 
-/// Opens the scans at a URL that is none of a map.
+/// Opens the scans at a URL that is not a map.
 ///
 /// # Errors
 ///
-/// As for `Bucket::open` and
-/// `FetchedFiles::fetch`; a URL, where the command was built without buckets.
+/// As for `Bucket::open` and `FetchedFiles::fetch`. Also fails if this build does not support buckets.
 #[cfg(feature = "bucket")]
 pub fn scans_at(url: &str, options: &ReadOptions, watch: &Watch) -> Result<Box<dyn ScanSource + Send>> {
     Ok(Box::new(crate::fetched_source::FetchedSource::open(url, options, watch)?))
@@ -22,7 +21,7 @@ pub fn scans_at(url: &str, _: &ReadOptions, _: &Watch) -> Result<Box<dyn ScanSou
     Err(without_buckets(url))
 }
 
-/// Scans as files, for as long as this lives.
+/// Scans as local files. Fetched files are removed with this value.
 pub struct LocalScans {
     path: PathBuf,
     #[cfg(feature = "bucket")]
@@ -30,11 +29,11 @@ pub struct LocalScans {
 }
 
 impl LocalScans {
-    /// Fetches what lies at a URL that is none of a map, until it is asked to stop; takes all else as it is.
+    /// Fetches the files at a URL that is not a map, unless it is stopped. Other paths are used unchanged.
     ///
     /// # Errors
     ///
-    /// A place that cannot be read; [`Error::Stopped`](voxtile::Error::Stopped).
+    /// The location cannot be read, or [`Error::Stopped`](voxtile::Error::Stopped).
     #[cfg(feature = "bucket")]
     pub fn of(scans: &Path, watch: &Watch) -> Result<Self> {
         let url = match url_of(scans) {
@@ -46,17 +45,17 @@ impl LocalScans {
         Ok(Self { path, _fetched: fetched })
     }
 
-    /// Takes what is no URL as it is.
+    /// Uses a path unchanged.
     ///
     /// # Errors
     ///
-    /// A URL: there are no buckets.
+    /// The path is a URL, and this build does not support buckets.
     #[cfg(not(feature = "bucket"))]
     pub fn of(scans: &Path, _: &Watch) -> Result<Self> {
         url_of(scans).map_or(Ok(Self { path: scans.to_owned() }), |url| Err(without_buckets(url)))
     }
 
-    /// Where they are.
+    /// Returns the path of the scans.
     pub fn path(&self) -> &Path {
         &self.path
     }

@@ -4,25 +4,26 @@ use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use voxtile::Error;
 
-/// What becomes of scans that come faster than they can be mapped.
+/// Policy for scans that arrive faster than they can be inserted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum WhenBehind {
     /// The input waits.
     #[default]
     Wait,
-    /// The oldest scan that waits makes room.
+    /// The oldest queued scan is dropped.
     DropOldest,
-    /// While more than half of the room is taken, every second scan is left out; then as [`DropOldest`](Self::DropOldest).
+    /// While the queue is more than half full, every second scan is dropped; when it is full, as
+    /// [`DropOldest`](Self::DropOldest).
     Thin,
 }
 
-/// Scans that were read and wait to be mapped, oldest first: at most a few, so that what is mapped is what came last.
+/// Bounded queue of scans to insert, oldest first.
 ///
-/// Of a scan that is left out its mark stays: what the map remembers of the input counts all scans.
+/// The fingerprint of a dropped scan remains in the queue, because the map's record of the input counts all scans.
 pub struct ScanQueue {
     waiting: Mutex<Waiting>,
     came: Condvar,
-    /// There is room again, or nobody takes any more.
+    /// Signals free space or the closing of the queue.
     has_room: Condvar,
     most_scans: usize,
     when_behind: WhenBehind,
@@ -33,21 +34,21 @@ struct Waiting {
     reads: VecDeque<voxtile::Result<Read>>,
     scans: usize,
     was_thinned: bool,
-    /// Nobody takes any more.
+    /// Whether the receiver is gone.
     is_closed: bool,
 }
 
 impl ScanQueue {
-    /// Most scans that wait where the input does not.
+    /// Default capacity if the input does not wait.
     pub const MAX_SCANS: usize = 8;
 
-    /// A queue in which at most so many scans wait.
+    /// Creates a queue with this capacity.
     pub fn new(when_behind: WhenBehind, most_scans: usize) -> Self {
         let (came, has_room) = (Condvar::new(), Condvar::new());
         Self { waiting: Mutex::default(), came, has_room, most_scans, when_behind }
     }
 
-    /// Puts in what was read, once there is room if the input is to wait; tells whether anybody will take it.
+    /// Adds a read. If the input is to wait, blocks until there is space. Returns `false` if the queue is closed.
     pub fn push(&self, read: voxtile::Result<Read>) -> bool {
         let mut waiting = self.lock();
         match read {
@@ -64,7 +65,7 @@ impl ScanQueue {
         !waiting.is_closed
     }
 
-    /// The oldest, waited for so long; `None` if nothing has come.
+    /// Returns the oldest read, waiting for at most `patience`, or `None` if none arrived.
     pub fn take(&self, patience: Duration) -> Option<voxtile::Result<Read>> {
         let waiting = self.lock();
         let waited = self.came.wait_timeout_while(waiting, patience, |waiting| waiting.reads.is_empty());
@@ -75,7 +76,7 @@ impl ScanQueue {
         Some(read)
     }
 
-    /// Says that nobody takes any more.
+    /// Closes the queue: the receiver takes no more.
     pub fn close(&self) {
         self.lock().is_closed = true;
         self.has_room.notify_all();
@@ -106,7 +107,7 @@ impl Waiting {
     }
 }
 
-/// Whether nothing comes after this.
+/// Returns whether this read is the last one.
 pub fn is_last(read: &Result<Read, Error>) -> bool {
     matches!(read, Ok(Read::End | Read::Stopped) | Err(_))
 }
@@ -129,7 +130,7 @@ mod tests {
         ReadScan { scan, mark }
     }
 
-    /// What comes out after so many scans: the numbers of those that are to be mapped, and how many were left out.
+    /// Returns the numbers of the scans to insert after this many arrived, and the number of dropped scans.
     fn after(scans: usize, when_behind: WhenBehind) -> (Vec<usize>, usize) {
         let queue = ScanQueue::new(when_behind, ScanQueue::MAX_SCANS);
         let marks: Vec<String> = (0..scans).map(|number| scan(number).mark.scan_text()).collect();
@@ -185,7 +186,7 @@ mod tests {
         let pushed = AtomicUsize::new(0);
         std::thread::scope(|scope| {
             let input = scope.spawn(|| {
-                // A queue that makes nobody wait should not be filled for ever.
+                // Without blocking, the queue would be filled forever.
                 while pushed.load(Ordering::SeqCst) < 100 && queue.push(Ok(Read::Scan(scan(0)))) {
                     pushed.fetch_add(1, Ordering::SeqCst);
                 }

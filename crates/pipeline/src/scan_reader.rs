@@ -12,48 +12,49 @@ use voxtile::Error;
 use voxtile::scan::Stop;
 use voxtile_formats::{PointRoom, PoseSource, ReadOptions, ScanMark, ScanSource, StoredScan};
 
-/// How long an input may keep us waiting before we look up.
+/// Maximum time to wait for the input before checking for a stop request.
 const PATIENCE: Duration = Duration::from_millis(100);
 
-/// A panic in a reader of a format must end the build, not leave it waiting.
+/// Error for a reading thread that ended unexpectedly, for instance by a panic.
 const READER_IS_GONE: &str = "the thread that reads the scans ended before the input did";
 
-/// Reads an input on a thread of its own, scan by scan: whoever asks can stop waiting, whatever the input does. Scans are
-/// read when they are asked for, or a few of them ahead. Where the system gives no thread, it reads here.
+/// Reads an input scan by scan in its own thread, so that waiting for it can be stopped. Scans are read on request or a
+/// few in advance. If no thread can be created, scans are read in the calling thread.
 pub struct ScanReader {
     place: Place,
     stop: Stop,
-    /// Where scans come from once they are read before anybody asks.
+    /// Queue of scans that are read in advance.
     ahead: Option<Arc<ScanQueue>>,
-    /// Here and not in the thread, which nobody waits for: what was fetched is to go before the process does.
+    /// Owned here and not by the thread, which is never joined, so that fetched files are removed before the process
+    /// ends.
     _scans: LocalScans,
 }
 
-/// What is known of an input once it is open.
+/// Properties of an open input.
 pub struct Opened {
     pub name: String,
     pub scans: Option<usize>,
     pub poses: PoseSource,
 }
 
-/// How scans are told from each other.
+/// Function that computes the fingerprint of a scan.
 pub type Marking = fn(&StoredScan) -> voxtile::Result<ScanMark>;
 
-/// A scan, and what tells it from others.
+/// A scan with its fingerprint.
 pub struct ReadScan {
     pub scan: StoredScan,
     pub mark: ScanMark,
 }
 
-/// What came of asking for a scan.
+/// Result of requesting a scan.
 pub enum Read {
     Scan(ReadScan),
-    /// One that cannot be read; the next call gives the one behind it.
+    /// A scan that cannot be read. The next call returns the following scan.
     Unread(Error),
-    /// One that came while too many waited.
+    /// A scan that was dropped because too many were queued.
     LeftOut(ScanMark),
     End,
-    /// It was asked to stop before there was a scan.
+    /// Reading was stopped.
     Stopped,
 }
 
@@ -67,7 +68,7 @@ enum Request {
     Fingerprint,
     Remarks,
     Crs,
-    /// Read on into a queue until the input has come to its end.
+    /// Read into a queue until the end of the input.
     Ahead(Arc<ScanQueue>),
 }
 
@@ -80,7 +81,7 @@ enum Answer {
 }
 
 impl ScanReader {
-    /// Opens an input; `None` if it was asked to stop before that had come to an end.
+    /// Opens an input. Returns `None` if it was stopped before.
     pub fn open(
         scans: PathBuf,
         options: ReadOptions,
@@ -134,18 +135,17 @@ impl ScanReader {
         }
     }
 
-    /// From here on scans are read as they come, before anybody asks for them. Where there is no thread to read, they are
-    /// not.
+    /// Starts to read scans in advance into a queue. Has no effect without a thread.
     pub fn read_ahead(&mut self, queue: ScanQueue) {
         if let Place::Thread { requests, .. } = &self.place {
             let queue = Arc::new(queue);
-            // A thread that is gone is noticed by waiting for it.
+            // If the thread has ended, the next wait reports it.
             drop(requests.send(Request::Ahead(queue.clone())));
             self.ahead = Some(queue);
         }
     }
 
-    /// The next scan. While it does not come, `idle` is called ten times a second.
+    /// Returns the next scan. While waiting, `idle` is called ten times a second.
     pub fn next(&mut self, idle: &mut dyn FnMut() -> voxtile::Result<()>) -> anyhow::Result<Read> {
         if let Some(queue) = &self.ahead {
             return take(queue, &self.stop, idle);
@@ -156,12 +156,12 @@ impl ScanReader {
         }
     }
 
-    /// The next scan if it has been read already.
+    /// Returns the next scan if it is already read.
     pub fn next_at_hand(&mut self) -> Option<voxtile::Result<Read>> {
         self.ahead.as_ref().and_then(|queue| queue.take(Duration::ZERO))
     }
 
-    /// How maps of earlier versions know this input; `None` if it was asked to stop before that was known.
+    /// Returns the fingerprint used in maps of older versions, or `None` if it was stopped before it was known.
     pub fn fingerprint(&mut self) -> anyhow::Result<Option<voxtile::Result<String>>> {
         match self.ask(Request::Fingerprint, &mut || Ok(()))? {
             Some(Answer::Fingerprint(fingerprint)) => Ok(Some(fingerprint)),
@@ -169,8 +169,8 @@ impl ScanReader {
         }
     }
 
-    /// What a person should know of the input, of which no more is wanted. An input that is being waited for tells
-    /// nothing.
+    /// Stops reading and returns remarks for the user about the input. While the thread is waiting for the input, there
+    /// are none.
     pub fn remarks(&mut self) -> anyhow::Result<Vec<String>> {
         let is_ahead = self.ahead.as_ref().map(|queue| queue.close()).is_some();
         let mut patience = 10;
@@ -184,7 +184,7 @@ impl ScanReader {
         }
     }
 
-    /// The coordinate reference system that the input names so far.
+    /// Returns the coordinate reference system that the input has named so far.
     pub fn crs(&mut self) -> anyhow::Result<Option<String>> {
         match self.ask(Request::Crs, &mut || Ok(()))? {
             Some(Answer::Crs(crs)) => Ok(crs),
@@ -202,7 +202,7 @@ impl ScanReader {
             Place::Here(source, room, mark) => {
                 return Ok(Some(answer(&mut **source, &request, room, *mark)));
             }
-            // A thread that is gone is noticed by waiting for it.
+            // If the thread has ended, the next wait reports it.
             Place::Thread { requests, .. } => drop(requests.send(request)),
         }
         self.wait(idle)
@@ -242,7 +242,7 @@ fn take(
     idle: &mut dyn FnMut() -> voxtile::Result<()>,
 ) -> anyhow::Result<Read> {
     while !stop.is_set() {
-        // The reading thread holds the queue until it has pushed the last scan, or has panicked.
+        // The reading thread owns a reference to the queue until it has pushed the last scan or panicked.
         let is_ours_alone = Arc::strong_count(queue) == 1;
         match queue.take(PATIENCE) {
             Some(read) => return Ok(read?),
@@ -253,7 +253,7 @@ fn take(
     Ok(Read::Stopped)
 }
 
-/// Reads an input to its end, or until nobody wants more of it.
+/// Reads an input until its end or until the queue is closed.
 fn read_ahead(source: &mut dyn ScanSource, room: &PointRoom, mark: Marking, queue: &ScanQueue) {
     loop {
         let read = read(source, room, mark);

@@ -8,88 +8,87 @@ use voxtile::scan::ScanReport;
 use voxtile::space::{Grid, TileBox};
 use voxtile::tile::{OctreeStatistics, TileCounts};
 
-/// What a build did, and what the map now is.
+/// Result of a build, and the state of the map.
 #[derive(Debug, Serialize)]
 pub struct Summary {
     /// Folder of the map.
     #[serde(serialize_with = "voxtile::path_text::serialize")]
     pub map: PathBuf,
-    /// Scans that were inserted.
+    /// Number of scans inserted.
     pub scans: u64,
-    /// Scans of the same input that were in the map before.
+    /// Number of scans of this input that the map already had.
     pub resumed_after: u64,
-    /// Whether it was asked to stop before the end of the input.
+    /// Whether the build was stopped before the end of the input.
     pub interrupted: bool,
-    /// Where the poses come from.
+    /// Origin of the poses.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub poses: Option<String>,
-    /// The tiles that are mapped; missing where that is all of space.
+    /// Mapped tiles; missing if there is no region.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub region_tiles: Option<TileBox>,
-    /// The scans that were skipped, with the reason of each.
+    /// Skipped scans with the reasons.
     #[serde(rename = "unread_scans")]
     pub unread: Vec<String>,
-    /// How many scans were left out because they came faster than they could be mapped.
+    /// Number of scans dropped because they arrived faster than they could be inserted.
     #[serde(rename = "left_out_scans")]
     pub left_out: u64,
-    /// What a person should know beside.
+    /// Further remarks for the user.
     pub remarks: Vec<String>,
-    /// Voxels and tiles.
+    /// Grid of voxels and tiles.
     #[serde(skip)]
     pub grid: Grid,
-    /// What was done with points and rays.
+    /// Statistics of points and rays.
     #[serde(flatten)]
     pub report: ScanReport,
     /// Number of the last scan in the map.
     pub scan_number: u64,
-    /// Observed voxels of the map.
+    /// Number of observed voxels in the map.
     pub voxels: u64,
-    /// Those that are occupied.
+    /// Number of occupied voxels.
     pub occupied: u64,
-    /// Tiles of the map.
+    /// Number of tiles in the map.
     pub tiles: u64,
-    /// Those in memory at the end.
+    /// Number of tiles in memory at the end.
     pub cached_tiles: u64,
     /// Sizes of the tiles in memory at the end.
     pub cached: TileCounts,
-    /// The work for pointer octrees; missing where there are none.
+    /// Statistics of pointer octrees; missing if there are none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub octrees: Option<OctreeWork>,
-    /// Bytes of the map on disk.
+    /// Size of the map on disk, in bytes.
     pub disk_bytes: u64,
-    /// Tiles that were read.
+    /// Number of tiles read.
     pub loads: u64,
-    /// Tiles that were written.
+    /// Number of tiles written.
     pub saves: u64,
-    /// What went to disk and came back.
+    /// Disk reads and writes.
     pub io: IoCounts,
     /// Waits for the disk.
     pub stalls: StallCounts,
-    /// Bytes of memory at the end, by what they hold.
+    /// Memory use at the end in bytes, by purpose.
     pub memory: MemoryCounts,
     /// Wall time.
     pub seconds: f64,
-    /// Largest resident memory of the process.
+    /// Peak resident memory of the process.
     pub peak_rss_bytes: Option<u64>,
 }
 
-/// What was done for pointer octrees, from the start to the last flush.
+/// Statistics of pointer octrees, from the start to the last flush.
 #[derive(Debug, Serialize)]
 pub struct OctreeWork {
-    /// Hits of the voxel caches among all updates; missing where there are no caches.
+    /// Fraction of updates that hit the voxel caches; missing if there are no caches.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hit_rate: Option<f64>,
-    /// The counts.
     #[serde(flatten)]
     pub statistics: OctreeStatistics,
 }
 
 impl Summary {
-    /// The summary of `scans` inserted into a map that has been flushed.
+    /// Creates the summary after `scans` were inserted and the map was flushed.
     ///
     /// # Errors
     ///
-    /// A map that cannot be opened.
+    /// The map cannot be opened.
     pub fn of(
         map: &Path,
         scans: u64,

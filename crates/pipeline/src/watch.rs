@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use voxtile::mapper::MapStatistics;
 use voxtile::scan::Stop;
 
-/// What long work is counted in.
+/// Unit of progress.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unit {
     /// Scans.
@@ -15,31 +15,31 @@ pub enum Unit {
     Bytes,
 }
 
-/// Receives the progress of one piece of work. Dropped when the work ends.
+/// Receives the progress of one task. Dropped when the task ends.
 pub trait Gauge: Send + Sync {
-    /// Sets how many were done by an earlier run.
+    /// Sets the number of items done by an earlier run.
     fn pass(&self, done: u64);
 
-    /// One more is done.
+    /// Counts one more item.
     fn step(&self);
 
-    /// So many of all are done.
+    /// Sets the number of items done, and of all.
     fn set(&self, done: u64, all: u64);
 
     /// Shows a message between steps, such as "flushing".
     fn say(&self, message: &'static str);
 
-    /// Shows what a mapper holds. Calls `statistics` only if it is displayed.
+    /// Shows the statistics of a mapper. Calls `statistics` only if they are displayed.
     fn show(&self, statistics: &dyn Fn() -> MapStatistics);
 }
 
-/// Makes a gauge for some work: its unit, and how many there are, where that is known.
+/// Function that creates a gauge for a task, given its unit and the number of items, if known.
 pub type MakeGauge = Arc<dyn Fn(Unit, Option<u64>) -> Box<dyn Gauge> + Send + Sync>;
 
-/// Hears how many scans or tiles are done, and of how many; 0 where that is not known.
+/// Callback with the number of scans or tiles done, and of all (0 if unknown).
 pub type Listener = Arc<dyn Fn(u64, u64) + Send + Sync>;
 
-/// The caller's side of long work: stops it and receives its progress.
+/// Control of a long task by its caller: stops it and receives its progress.
 #[derive(Clone)]
 pub struct Watch {
     stop: Stop,
@@ -47,17 +47,17 @@ pub struct Watch {
 }
 
 impl Watch {
-    /// Runs to the end and reports no progress.
+    /// Creates a watch that never stops the task and ignores its progress.
     pub fn nobody() -> Self {
         Self::of_program(Stop::default(), None)
     }
 
-    /// Reports progress to gauges that `make_gauge` makes.
+    /// Creates a watch that reports progress to gauges created by `make_gauge`.
     pub fn new(stop: Stop, make_gauge: MakeGauge) -> Self {
         Self { stop, make_gauge }
     }
 
-    /// Calls a listener after each step.
+    /// Creates a watch that calls a listener after each step.
     pub fn of_program(stop: Stop, listener: Option<Listener>) -> Self {
         let make_gauge = move |_, all: Option<u64>| -> Box<dyn Gauge> {
             let (listener, done) = (listener.clone(), AtomicU64::new(0));
@@ -66,22 +66,22 @@ impl Watch {
         Self { stop, make_gauge: Arc::new(make_gauge) }
     }
 
-    /// Whether to stop.
+    /// Returns the stop flag.
     pub fn stop(&self) -> &Stop {
         &self.stop
     }
 
-    /// A gauge over scans.
+    /// Creates a gauge for scans.
     pub fn over_scans(&self, scans: Option<usize>) -> Box<dyn Gauge> {
         (self.make_gauge)(Unit::Scans, scans.map(|scans| scans as u64))
     }
 
-    /// A gauge over tiles.
+    /// Creates a gauge for tiles.
     pub fn over_tiles(&self, tiles: usize) -> Box<dyn Gauge> {
         (self.make_gauge)(Unit::Tiles, Some(tiles as u64))
     }
 
-    /// A gauge over bytes.
+    /// Creates a gauge for bytes.
     pub fn over_bytes(&self) -> Box<dyn Gauge> {
         (self.make_gauge)(Unit::Bytes, None)
     }
@@ -93,7 +93,7 @@ impl fmt::Debug for Watch {
     }
 }
 
-/// Steps that a program hears of.
+/// Gauge that calls a listener.
 struct Heard {
     listener: Option<Listener>,
     done: AtomicU64,

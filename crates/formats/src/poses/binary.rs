@@ -1,7 +1,7 @@
 use std::path::Path;
 use voxtile::{Error, Result};
 
-/// Starts of files that are no text, what they are, and the way to poses that are read.
+/// File signatures of non-text files, with their names and how to get readable poses from them.
 const KINDS: [(&[u8], &str, &str); 14] = [
     (b"PK\x03\x04", "an archive (.zip, .npz)", "save one array: numpy.save('poses.npy', archive['poses'])"),
     (b"\x1f\x8b", "packed (gzip)", UNPACK),
@@ -23,11 +23,11 @@ const SAVE: &str = "save the poses as text (TUM, KITTI, CSV) or as .npy";
 const RECORDING: &str =
     "give the recording itself as scans, with `odometry` for a topic of poses, or save its poses as text";
 
-/// Checks that a file of poses that starts like this may be text, which has no zero bytes.
+/// Checks that a pose file with this start can be text, which contains no zero bytes.
 ///
 /// # Errors
 ///
-/// What it is instead, and what to do.
+/// Names the detected kind of file and how to convert it.
 pub(super) fn check_text(path: &Path, head: &[u8]) -> Result<()> {
     let known = KINDS.iter().find(|(start, ..)| head.starts_with(start));
     let (kind, way) = match known {

@@ -4,7 +4,7 @@ use crate::read::lines::Lines;
 use std::path::Path;
 use voxtile::{FormatError, Result};
 
-/// The pose of the lidar in the camera of a KITTI sequence: the line `Tr:` of its `calib.txt`.
+/// Reads the pose of the lidar in the camera frame from the `Tr:` line of a KITTI `calib.txt`.
 pub(super) fn read(path: &Path) -> Result<RigidPose> {
     let mut lines = Lines::open(path)?;
     while let Some((_, line)) = lines.next()? {

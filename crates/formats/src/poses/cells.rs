@@ -2,14 +2,14 @@ use super::pose_rows::{BadKind, Stamp};
 use super::time_unit::stamp_of;
 use crate::read::text_line::{Separator, without_end};
 
-/// Cells of a line.
+/// Cells of a line of text.
 pub(super) struct Cells<'l> {
     pub(super) words: Vec<&'l str>,
     pub(super) separator: Separator,
 }
 
 impl Cells<'_> {
-    /// The numbers of these columns, all finite.
+    /// Parses the numbers of these columns. All must be finite.
     pub(super) fn all(&self, columns: &[usize]) -> Result<Vec<f64>, (BadKind, String)> {
         let number = |&at: &usize| {
             let lost = |reason| (BadKind::Lost, reason);
@@ -31,7 +31,7 @@ impl Cells<'_> {
     }
 }
 
-/// Whether a line starts as poses do: with a number, or with what programs write for none, empty cells included.
+/// Returns whether a line starts as a pose does: with a number, an empty cell or a common word for a missing number.
 pub(super) fn starts_with_number(line: &str) -> bool {
     let separator = Separator::of(line);
     let words = separator.split(line);
@@ -40,7 +40,7 @@ pub(super) fn starts_with_number(line: &str) -> bool {
     first.is_none_or(|word| separator.number(word).is_some())
 }
 
-/// The stamp of whole seconds and the nanoseconds after them.
+/// Combines a column of whole seconds and a column of nanoseconds.
 pub(super) fn stamp_of_two(cells: &Cells<'_>, seconds: usize, nanoseconds: usize) -> Stamp {
     let whole = |at: usize| cells.words.get(at).and_then(|word| stamp_of(word, 0));
     let (Some(seconds), Some(nanoseconds @ 0..1_000_000_000)) = (whole(seconds), whole(nanoseconds)) else {
@@ -50,13 +50,13 @@ pub(super) fn stamp_of_two(cells: &Cells<'_>, seconds: usize, nanoseconds: usize
     stamp_ns.map_or(Stamp::Unreadable, Stamp::At)
 }
 
-/// The cells of a table.
+/// Splits a line of a table into cells.
 pub(super) fn cells(line: &str) -> Vec<&str> {
     let cells = Separator::of(line).split(line);
     without_end(&cells).to_vec()
 }
 
-/// The words of a line of numbers alone: commas or blanks part them, or both.
+/// Splits a line of numbers separated by commas, blanks or both.
 pub(super) fn numbers(line: &str) -> Vec<&str> {
     let cells = cells(line);
     if !cells.iter().any(|cell| cell.contains(char::is_whitespace)) {

@@ -1,27 +1,28 @@
 use super::RigidPose;
 use super::quaternion_order::up;
 
-/// Which way a sensor goes, seen from itself: what its poses look like where they are those of another frame.
+/// Statistics of the direction of travel in the sensor frame. They show poses that belong to another frame, such as a
+/// camera's.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Direction {
     first: Option<RigidPose>,
     last: Option<RigidPose>,
-    /// Squares of the steps along x, y and z of the sensor.
+    /// Sums of the squared steps along the sensor's x, y and z, in m^2.
     squares: [f64; 3],
-    /// The steps along them.
+    /// Sums of the steps along the sensor's axes, in metres.
     steps_m: [f64; 3],
     path_m: f64,
 }
 
-/// Shorter steps are as much noise as motion.
+/// Shorter steps are dominated by noise.
 const MIN_STEP_M: f64 = 0.2;
-/// A path that tells a direction.
+/// Shortest path that gives a reliable direction.
 const MIN_PATH_M: f64 = 1.5;
 const Y: usize = 1;
 const Z: usize = 2;
 
 impl Direction {
-    /// Poses that are looked at.
+    /// Number of poses to evaluate.
     pub(super) const MAX_POSES: usize = 10_000;
 
     pub(super) fn insert(&mut self, pose: &RigidPose) {
@@ -43,23 +44,25 @@ impl Direction {
         self.last = Some(*pose);
     }
 
-    /// The share of the way that goes along an axis, where the way is long enough.
+    /// Returns the fraction of the motion that is along an axis, if the path is long enough.
     fn share(&self, axis: usize) -> Option<f64> {
         let all: f64 = self.squares.iter().sum();
         (self.path_m >= MIN_PATH_M).then(|| self.squares.get(axis).map_or(0.0, |square| square / all))
     }
 
-    /// Whether this may be the way of a camera, which looks along its z: not one that goes along x or y.
+    /// Returns whether the trajectory may be a camera's, which looks along its z: false if it mostly moves along x or
+    /// y.
     pub(super) fn may_be_of_camera(&self) -> bool {
         self.share(Z).is_none_or(|share| share > 0.5)
     }
 
-    /// Whether it goes along z.
+    /// Returns whether the sensor moves along its z.
     pub(super) fn is_along_z(&self) -> bool {
         self.share(Z).is_some_and(|share| share > 0.9)
     }
 
-    /// What a person should know of the way of a lidar. `names_calib`: another remark names the `calib.txt` of a camera.
+    /// Returns warnings about a lidar trajectory. `names_calib`: another warning already names the `calib.txt` of a
+    /// camera.
     pub(super) fn remarks(&self, has_calib: bool, names_calib: bool) -> Vec<String> {
         let mut remarks = Vec::new();
         let Some(first) = &self.first else { return remarks };

@@ -7,23 +7,23 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 use voxtile::{Error, Result};
 
-/// Names of pose files that are searched for.
+/// Pose file names to search for.
 const POSE_FILES: [&str; 2] = ["poses_tum.txt", "poses_kitti.txt"];
-/// Given instead of a pose file: every scan is in the world frame.
+/// Value of the option `poses` if all scans are in the world frame.
 const IDENTITY: &str = "identity";
-/// Most files that an error names.
+/// Maximum number of files named in an error.
 const MAX_NAMED: usize = 4;
-/// Files that may be poses, by their extensions.
+/// Extensions of possible pose files.
 const POSE_EXTENSIONS: [&str; 4] = ["txt", "tum", "kitti", "csv"];
-/// How much of a file is read to see whether it may be poses.
+/// Number of bytes read to detect whether a file contains poses.
 const GLANCE_BYTES: u64 = 1 << 14;
 
-/// Where the poses of an input come from: the file that is named, the input's own, a file in it or beside it. One cloud
-/// alone needs none. `are_images`: the sensor is a camera, which looks along z.
+/// Finds the poses of an input: the given file, the input's own poses, or a file in the input's folder or its parent. A
+/// single cloud needs none. `are_images`: the sensor is a camera, which looks along its z.
 ///
 /// # Errors
 ///
-/// A file that cannot be read; no poses, where they are needed.
+/// A file cannot be read, or there are no poses where they are needed.
 pub(crate) fn find_poses(
     path: &Path,
     own: Option<PoseSource>,
@@ -56,10 +56,10 @@ pub(crate) fn find_poses(
     }
 }
 
-/// Names of the file with the pose of a lidar in its camera.
+/// Names of files with the pose of the lidar in the camera frame.
 const CALIB_FILES: [&str; 2] = ["calib.txt", "calib_velo_to_cam.txt"];
 
-/// Remarks what tells that the poses are those of another frame than the sensor's.
+/// Adds a remark if the poses seem to belong to a frame other than the sensor's.
 fn remark_frame(
     trajectory: &mut Trajectory,
     file: &Path,
@@ -82,7 +82,7 @@ fn remark_frame(
     Ok(())
 }
 
-/// The `calib.txt` of KITTI beside poses or clouds.
+/// Finds the KITTI `calib.txt` next to the poses or the clouds.
 fn calib_for(file: &Path, folder: &Path) -> Option<PathBuf> {
     let of_file = file.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let places = [of_file.to_owned(), folder.to_owned(), above(folder)];
@@ -90,7 +90,7 @@ fn calib_for(file: &Path, folder: &Path) -> Option<PathBuf> {
     paths.find(|path| path.is_file() && super::calib::read(path).is_ok())
 }
 
-/// The pose file in a folder, or beside it.
+/// Finds the pose file in a folder or in its parent.
 pub(crate) fn pose_file_for(folder: &Path) -> Option<PathBuf> {
     let beside = above(folder);
     let places = [folder, &*beside];
@@ -111,16 +111,16 @@ fn no_poses(path: &Path, folder: &Path) -> Error {
     Error::argument(path.display().to_string(), reason)
 }
 
-/// The folder that a folder is in, by the name that a person would use for it.
+/// Returns the parent of a folder, as a user would name it.
 fn above(folder: &Path) -> PathBuf {
     let is_named = folder.file_name().is_some();
     let parent = folder.parent().filter(|parent| is_named && !parent.as_os_str().is_empty());
-    // What a link leads to is somewhere else than its name.
+    // The parent of a symbolic link's target differs from the parent of its name.
     let is_link = fs::symlink_metadata(folder).is_ok_and(|metadata| metadata.is_symlink());
     parent.filter(|_| !is_link).map_or_else(|| folder.join(".."), Path::to_owned)
 }
 
-/// A few files in a folder or beside it that look like pose files.
+/// Returns a few files in a folder or its parent that look like pose files.
 fn files_like_poses(folder: &Path) -> Vec<String> {
     let mut found = Vec::new();
     for place in [folder.to_owned(), above(folder)] {
@@ -133,7 +133,7 @@ fn files_like_poses(folder: &Path) -> Vec<String> {
     found
 }
 
-/// Whether a file is a text that starts like a pose file.
+/// Returns whether a file is a text that starts with poses.
 fn may_be_poses(path: &Path) -> bool {
     let is_text = path
         .extension()

@@ -1,9 +1,9 @@
-/// The longest time between two poses of a sensor that is filled: twice the tolerance, so that each moment in it is
-/// within the tolerance of one of the two. Files of poses and transforms of recordings go by this.
+/// Returns the longest time between two poses that is interpolated: twice the tolerance, so that each moment between
+/// them is within the tolerance of one of them. Used for pose files and for transforms of recordings.
 pub fn most_gap_ns(tolerance_ns: i64) -> i64 {
     tolerance_ns.max(0).saturating_mul(2)
 }
 
-/// A pose so near in time is that of the scan, however far the next one is: programs round stamps, and key frames have
-/// no others beside them.
+/// A pose this close to a scan in time is used whatever the distance to the next pose is: programs round stamps, and
+/// key frames have large gaps.
 pub(crate) const SAME_TIME_NS: u64 = 1_000_000;

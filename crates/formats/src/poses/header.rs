@@ -2,51 +2,52 @@ use super::time_unit::SECONDS;
 use crate::read::text_line::Separator;
 use crate::read::units::{LengthUnit, TimeUnit, name_and_unit};
 
-/// Which columns of a table are a pose.
+/// Columns of a table that form a pose.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Roles {
     pub(super) time: Option<TimeColumns>,
     pub(super) position: [usize; 3],
-    /// The units of x, y and z.
+    /// Units of x, y and z.
     pub(super) units: [LengthUnit; 3],
     pub(super) quaternion: [usize; 4],
 }
 
-/// Where the time stamp of a pose is.
+/// Columns that hold the time stamp.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum TimeColumns {
-    /// In one column; with the decimal digits between its unit and a nanosecond, if its name tells the unit.
+    /// One column. The second value is the number of decimal digits between its unit and a nanosecond, if the column
+    /// name states the unit.
     One(usize, Option<i32>),
-    /// Whole seconds in one column, the nanoseconds after them in another.
+    /// Whole seconds in one column and the remaining nanoseconds in another.
     Two { seconds: usize, nanoseconds: usize },
 }
 
-/// What a line of words is.
+/// Meaning of a line of words.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Names {
-    /// Names of the columns of poses.
+    /// Column names of poses.
     Poses(Roles),
-    /// Names of columns whose numbers cannot be used; so many columns, and why.
+    /// Column names of an unsupported table, with their count and the reason.
     Wrong { columns: usize, reason: String },
-    /// Anything else.
+    /// Any other text.
     Prose,
 }
 
-/// Names of times, the best first.
+/// Names of time columns, most specific first.
 const TIMES: [&str; 6] = ["timestamp", "stamp", "header.stamp", "field.header.stamp", "time", "t"];
 const SECOND_NAMES: [&str; 2] = ["sec", "secs"];
 const NANOSECOND_NAMES: [&str; 3] = ["nsec", "nsecs", "nanosec"];
-/// Names of angles that no convention is known of.
+/// Names of angles. They have no common convention, so they are refused.
 const ANGLES: [&str; 12] =
     ["roll", "pitch", "yaw", "heading", "rx", "ry", "rz", "omega", "phi", "kappa", "euler", "theta"];
-/// What is in brackets behind a name and is no unit of length, but no prose either.
+/// Bracketed texts after a column name that are units but not units of length.
 const OTHER_UNITS: [&str; 14] = [
     "px", "pixel", "pixels", "deg", "degree", "degrees", "rad", "radian", "radians", "s", "ms", "ns", "m/s",
     "voxel",
 ];
 
 impl Names {
-    /// What a line is.
+    /// Classifies a line.
     pub(super) fn of(line: &str) -> Self {
         let words = words_of(line);
         let names: Vec<(String, Option<String>)> = words.iter().map(|word| plain(word)).collect();
@@ -86,25 +87,25 @@ impl Names {
 }
 
 impl Roles {
-    /// Whether these are `t x y z qx qy qz qw`, in seconds and metres as far as the names tell.
+    /// Returns whether the columns are `t x y z qx qy qz qw`, in seconds and metres as far as the names state units.
     pub(super) fn are_those_of_tum(&self) -> bool {
         matches!(self.time, Some(TimeColumns::One(0, None | Some(SECONDS))))
             && (self.position, self.quaternion) == ([1, 2, 3], [4, 5, 6, 7])
             && !self.has_units()
     }
 
-    /// Whether w comes before the rest of the quaternion.
+    /// Returns whether w precedes x, y and z of the quaternion.
     pub(super) fn is_w_first(&self) -> bool {
         let [x, y, z, w] = self.quaternion;
         w < x.min(y).min(z)
     }
 
-    /// Whether positions are in another unit than metres.
+    /// Returns whether positions have a unit other than metres.
     pub(super) fn has_units(&self) -> bool {
         self.units.iter().any(|unit| *unit != LengthUnit::METRE)
     }
 
-    /// The last column that is needed.
+    /// Returns the index of the last column in use.
     pub(super) fn last(&self) -> usize {
         let time = match self.time {
             Some(TimeColumns::One(at, _)) => at,
@@ -115,7 +116,7 @@ impl Roles {
     }
 }
 
-/// The words of a line of names. Between blanks, a unit in brackets belongs to the name before it.
+/// Splits a line of column names. In a blank-separated line, a bracketed unit belongs to the name before it.
 fn words_of(line: &str) -> Vec<String> {
     let separator = Separator::of(line);
     let mut words: Vec<String> = Vec::new();
@@ -131,19 +132,19 @@ fn words_of(line: &str) -> Vec<String> {
     words
 }
 
-/// A name in lower case without its unit, and the unit.
+/// Splits a column name into its name, in lower case, and its unit.
 fn plain(word: &str) -> (String, Option<String>) {
     name_and_unit(word.trim().trim_start_matches(['#', '%']))
 }
 
-/// Whether what is behind a name is meant as a unit: frames and remarks stand there, too.
+/// Returns whether the bracketed text after a name is meant as a unit. It may also be a frame or a remark.
 fn is_a_unit(text: &str, word: &str) -> bool {
     OTHER_UNITS.contains(&text) || (word.contains('[') && !matches!(text, "-" | "1") && !text.contains(' '))
 }
 
 fn time_columns(names: &[(String, Option<String>)]) -> Result<Option<TimeColumns>, String> {
     let find = |is_it: &dyn Fn(&str) -> bool| names.iter().position(|(name, _)| is_it(name));
-    // `sec`, `header.stamp.sec`; or `stamp_sec`, whose last part is a unit.
+    // `sec`, `header.stamp.sec`, or `stamp_sec`, whose last part is a unit.
     let part = |known: &[&str]| {
         find(&|name| {
             let mut parts = name.rsplit('.');
@@ -173,7 +174,7 @@ fn time_columns(names: &[(String, Option<String>)]) -> Result<Option<TimeColumns
     }
 }
 
-/// `x`, `tx`, `px`, `pos_x`, `p_RS_R_x`, `pose.position.x`; no velocity.
+/// Matches `x`, `tx`, `px`, `pos_x`, `p_RS_R_x` and `pose.position.x`, but not velocities.
 fn is_position(name: &str, axis: char) -> bool {
     let Some(before) = name.strip_suffix(axis) else { return false };
     let starts = |start: &str| before.starts_with(start) && before.ends_with(['_', '.']);
@@ -186,7 +187,7 @@ fn is_position(name: &str, axis: char) -> bool {
         || before.contains("trans")
 }
 
-/// `qx`, `q_x`, `q_RS_x`, `pose.orientation.x`, `quat_x`.
+/// Matches `qx`, `q_x`, `q_RS_x`, `pose.orientation.x` and `quat_x`.
 fn is_quaternion(name: &str, axis: char) -> bool {
     let Some(before) = name.strip_suffix(axis) else { return false };
     before == "q"

@@ -1,10 +1,10 @@
 use super::RigidPose;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 
-/// How far a matrix may be from a rotation: files round to a few digits.
+/// Maximum deviation of a matrix from a rotation. Files often round to a few digits.
 const MAX_ERROR: f64 = 1e-2;
 
-/// The pose of a row-major matrix of 3x4 or 4x4.
+/// Converts a row-major 3x4 or 4x4 matrix to a pose.
 pub(crate) fn matrix_of(numbers: &[f64]) -> Result<RigidPose, String> {
     let (rows, last) = match numbers.len() {
         12 | 16 => numbers.split_at(12),
@@ -28,7 +28,7 @@ pub(crate) fn matrix_of(numbers: &[f64]) -> Result<RigidPose, String> {
         ));
     }
     let rotation = Rotation3::from_matrix_unchecked(matrix);
-    // What rounding left beside a rotation is shared out evenly by the quaternion's length.
+    // Normalising the quaternion spreads the rounding error of the matrix evenly.
     let quaternion = UnitQuaternion::from_rotation_matrix(&rotation);
     let [qx, qy, qz, qw]: [f64; 4] = quaternion.coords.into();
     Ok(RigidPose { position_m: [x, y, z], quaternion: [qx, qy, qz, qw] })

@@ -1,5 +1,5 @@
-//! Poses of clouds, which make scans of them. [`Trajectory`] reads files of poses and tells the pose at a time,
-//! `find_poses.rs` finds the poses of an input, `posed_clouds.rs` gives them to its clouds.
+//! Poses of clouds. [`Trajectory`] reads pose files and returns the pose at a time, `find_poses.rs` finds the poses of
+//! an input, and `posed_clouds.rs` combines clouds and poses to scans.
 
 mod binary;
 mod calib;

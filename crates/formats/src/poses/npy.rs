@@ -11,15 +11,15 @@ const MAGIC: &[u8] = b"\x93NUMPY";
 const NO_ARRAY: &str = "is no array of NumPy, which its name says: save it with numpy.save, or give a text of poses a \
                         name that ends with .txt or .csv";
 const CUT_HEADER: &str = "the file ends within its header; copy or save it again";
-/// A longer header is an error.
+/// Limit for the header; longer headers are rejected.
 const MAX_HEADER_BYTES: usize = 1 << 16;
 
-/// Whether a file that starts like this is an array of NumPy, or is named as one.
+/// Returns whether a file is a NumPy array, by its first bytes or its extension.
 pub(super) fn is_npy(path: &Path, head: &[u8]) -> bool {
     head.starts_with(MAGIC) || path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("npy"))
 }
 
-/// Takes the poses of an array: N x 8 of TUM, N x 7 without times, N x 12, N x 16, N x 3 x 4 or N x 4 x 4. Returns
+/// Reads the poses of an array: N x 8 (TUM), N x 7 (without times), N x 12, N x 16, N x 3 x 4 or N x 4 x 4. Returns
 /// whether they are matrices.
 pub(super) fn read(path: &Path, mut input: PoseInput, poses: &mut PoseRows) -> Result<bool> {
     let fail = |error| Error::io(path, "read", error);
@@ -65,7 +65,7 @@ pub(super) fn read(path: &Path, mut input: PoseInput, poses: &mut PoseRows) -> R
     Ok(columns >= 12)
 }
 
-/// The pose of a row. All stamps have the unit of the first.
+/// Converts a row to a pose. The first stamp determines the unit of all stamps.
 fn row_of(numbers: &[f64], digits: &mut Option<i32>) -> std::result::Result<Row, BadRow> {
     let (stamp, values) = match numbers {
         [time, values @ ..] if values.len() == 7 => (stamp_of(*time, digits), values),
@@ -95,7 +95,7 @@ fn stamp_of(time: f64, digits: &mut Option<i32>) -> Stamp {
     stamp_of_value(time, digits).map_or(Stamp::Unreadable, Stamp::At)
 }
 
-/// Bytes of a number, rows, numbers in a row.
+/// Returns the bytes per number, the number of rows and the numbers per row.
 fn layout(header: &str) -> std::result::Result<(usize, u64, usize), String> {
     let value = |key: &str| header.split_once(key).map(|(_, rest)| rest.trim_start_matches([':', ' ']));
     let Some(descr) = value("'descr'") else {

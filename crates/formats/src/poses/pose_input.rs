@@ -3,15 +3,15 @@ use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 use voxtile::{Error, Result};
 
-/// A file of poses, opened once: a pipe gives its bytes only once.
+/// Reader of a pose file that is opened only once, because a pipe cannot be read again.
 pub(super) struct PoseInput {
     head: Vec<u8>,
-    /// Bytes of the head that are taken.
+    /// Number of bytes of `head` already consumed.
     taken: usize,
     rest: BufReader<File>,
 }
 
-/// The start of a file tells what it is.
+/// Number of bytes used to detect the kind of file.
 const HEAD_BYTES: u64 = 4096;
 
 impl PoseInput {
@@ -23,7 +23,6 @@ impl PoseInput {
         Ok(Self { head, taken: 0, rest })
     }
 
-    /// The first bytes.
     pub(super) fn head(&self) -> &[u8] {
         &self.head
     }

@@ -6,25 +6,25 @@ use std::cmp::Ordering;
 use std::path::Path;
 use voxtile::{Error, Result};
 
-/// A line or a row of a file of poses.
+/// A line of text or a row of an array in a pose file.
 pub(super) struct Row {
     pub(super) stamp: Stamp,
     pub(super) pose: RigidPose,
-    /// Whether no name says where the quaternion has its w.
+    /// Whether the order of the quaternion is unknown because the columns have no names.
     pub(super) has_unnamed_quaternion: bool,
 }
 
-/// The time stamp of a row.
+/// Time stamp of a row.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Stamp {
-    /// Rows have none.
+    /// The format has no stamps.
     None,
     At(i64),
-    /// What stands there is no time.
+    /// The field is not a valid time.
     Unreadable,
 }
 
-/// Why a row is no pose.
+/// Reason why a row is not a pose.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct BadRow {
     pub(super) reason: String,
@@ -32,36 +32,36 @@ pub(super) struct BadRow {
     pub(super) stamp: Stamp,
 }
 
-/// What is in the place of a pose.
+/// Kind of an invalid row.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum BadKind {
-    /// Numbers that are no numbers, or missing: the program lost track.
+    /// Numbers are missing, NaN or infinite: the program that wrote the file lost track.
     Lost,
-    /// A row of another kind, or a pose of another kind. If most are, the file is something else.
+    /// A row or pose of another layout. If most rows are like this, the file is not a pose file.
     Odd,
-    /// Words: no row at all, which takes no number.
+    /// Text: not counted as a row.
     Words,
 }
 
-/// Takes the poses of a file one after the other.
+/// Collects the poses of a file.
 pub(super) struct PoseRows {
     budget: Budget,
     poses: PoseWriter,
     rows: usize,
     stamped: usize,
-    /// Poses whose rows have no time stamp.
+    /// Number of poses without a readable time stamp.
     without_stamp: usize,
     last_ns: Option<i64>,
-    /// How often the time goes back, and how often it stands still.
+    /// Number of stamps earlier than the one before.
     back: u64,
-    /// Number of the first pose that is earlier than the one before, from 1.
+    /// Number of the first pose, from 1, that is earlier than the one before.
     first_back: Option<u64>,
     still: u64,
     bad: BadRows,
     order: OrderEvidence,
 }
 
-/// The rows that are left out.
+/// Rows that were skipped.
 #[derive(Default)]
 struct BadRows {
     lost: u64,
@@ -73,28 +73,28 @@ struct BadRows {
     first_unstamped: Option<Error>,
 }
 
-/// What the stamps of a file are like.
+/// Properties of the time stamps of a file.
 pub(super) struct Stamps {
     pub(super) has_stamps: bool,
-    /// Number of the first pose whose stamp is earlier than the one before, from 1.
+    /// Number of the first pose, from 1, whose stamp is earlier than the one before.
     pub(super) goes_back: Option<u64>,
     pub(super) remarks: Vec<String>,
 }
 
-/// The poses of a file, in the orders in which they are looked for.
+/// Poses of a file, by row number and by time.
 pub(super) struct PoseLists {
-    /// In the order of the file; lost ones have their place.
+    /// In file order. Lost poses keep their positions.
     pub(super) poses: PoseList,
-    /// In strict order of time, without lost ones, where that is another list.
+    /// Sorted by strictly increasing time, without lost poses; `None` if `poses` is already so.
     pub(super) by_time: Option<PoseList>,
-    /// The stamps of lost poses, in order.
+    /// Stamps of lost poses, sorted.
     pub(super) lost: PoseList,
 }
 
-/// In the place of a stamp that cannot be read.
+/// Placeholder for an unreadable stamp.
 const NO_STAMP: i64 = i64::MIN;
 
-/// A pose by its time and its number in the file.
+/// A pose with its row number in the file.
 #[derive(Clone, Copy)]
 struct Numbered {
     timed: TimedPose,
@@ -142,7 +142,7 @@ impl PoseRows {
         }
     }
 
-    /// Takes a row; `error` makes an error that names its place.
+    /// Adds a row. `error` creates an error that names the row's location.
     pub(super) fn push(
         &mut self,
         row: std::result::Result<Row, BadRow>,
@@ -198,12 +198,12 @@ impl PoseRows {
         self.last_ns = Some(stamp_ns);
     }
 
-    /// The trajectory of these poses; `None` if the file has no rows.
+    /// Returns the trajectory, or `None` if the file has no rows.
     ///
     /// # Errors
     ///
-    /// No row is a pose, or most are something else: the first of them; no time stamp that can be read, where there
-    /// must be one.
+    /// No row is a pose or most rows are invalid (the error names the first), or `must_have_stamps` is set and no time
+    /// stamp is readable.
     pub(super) fn finish(mut self, path: &Path, must_have_stamps: bool) -> Result<Option<Trajectory>> {
         let good = (self.rows as u64).saturating_sub(self.bad.lost + self.bad.odd);
         let BadRows { odd, words, first, first_odd, first_unstamped, .. } = &mut self.bad;
@@ -266,20 +266,19 @@ impl PoseRows {
     }
 }
 
-/// In the place of a pose that was lost.
+/// Placeholder for a lost pose.
 const LOST: RigidPose = RigidPose { position_m: [f64::NAN; 3], quaternion: [0.0, 0.0, 0.0, 1.0] };
 
-/// Whether a pose was lost.
 pub(super) fn is_lost(pose: &RigidPose) -> bool {
     pose.position_m.iter().any(|number| number.is_nan())
 }
 
-/// The stamp of a pose, if it has one.
+/// Returns the stamp of a pose, if it has one.
 pub(super) fn stamp_of(timed: &TimedPose) -> Option<i64> {
     (timed.stamp_ns != NO_STAMP).then_some(timed.stamp_ns)
 }
 
-/// The poses that are wanted in strict order of time: of equal stamps the last stays.
+/// Sorts the selected poses by strictly increasing time. Of equal stamps, the last pose remains.
 fn sort(poses: &PoseList, budget: &Budget, is_wanted: impl Fn(&RigidPose) -> bool) -> Result<PoseList> {
     let mut sorter = Sorter::new(budget, budget.bytes / 4);
     for number in 0..poses.len() {

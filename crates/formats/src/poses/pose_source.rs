@@ -1,18 +1,18 @@
 use std::fmt;
 use std::path::PathBuf;
 
-/// The source of the poses of scans.
+/// Origin of the poses of scans.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum PoseSource {
-    /// The input has a pose with each scan.
+    /// The input stores a pose with each scan.
     Scans,
     /// A pose file with one pose per scan.
     File(PathBuf),
     /// The `VIEWPOINT` of each PCD file.
     Viewpoint,
-    /// None: every scan is in the world frame.
+    /// No poses: every scan is in the world frame.
     Identity,
-    /// None are known.
+    /// No poses are known.
     Missing,
 }
 

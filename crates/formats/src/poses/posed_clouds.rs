@@ -10,29 +10,30 @@ use voxtile::scan::{Pose, no_return};
 use voxtile::space::Point;
 use voxtile::{Error, Result};
 
-/// How clouds get their poses, and what becomes of their points.
+/// How clouds get their poses, and how their points are transformed.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct CloudOptions {
-    /// Most nanoseconds from a cloud to the nearer of the poses around it, which may be twice as much apart; a cloud
-    /// in a longer gap has no pose.
+    /// Maximum time from a cloud to the nearer of the two poses around it, in nanoseconds. The two poses may be twice
+    /// as far apart; a cloud in a longer gap has no pose.
     pub pose_tolerance_ns: i64,
-    /// Where the sensor is in the body that the poses are of.
+    /// Pose of the sensor in the body frame, which the trajectory describes.
     pub body_from_sensor: RigidPose,
-    /// Points are in the world frame already; poses say from where they were seen.
+    /// Points are already in the world frame; poses only give the ray origins.
     pub is_world_frame: bool,
-    /// Takes each point to where it was at the time of its cloud, by its own time and the poses between.
+    /// Applies motion compensation: moves each point to its position at the time of its cloud, using the point's own
+    /// time.
     pub is_deskewed: bool,
-    /// A cloud without a pose is in the world frame: for points without rays.
+    /// A cloud without a pose is in the world frame. Only valid for points without rays.
     pub may_lack_poses: bool,
-    /// Whether a cloud without a pose is worth a remark: not where points count alone.
+    /// Whether clouds without a pose cause a remark.
     pub are_poses_needed: bool,
     /// Points without a return are kept as rays: [`RayConfig::no_return_range_m`](voxtile::RayConfig).
     pub has_no_returns: bool,
 }
 
 impl CloudOptions {
-    /// Whether nothing but the poses' own places is asked for.
+    /// Returns whether poses are used unchanged, without extrinsics, world frame or deskewing.
     pub(crate) fn is_plain(&self) -> bool {
         self.body_from_sensor == RigidPose::IDENTITY && !self.is_world_frame && !self.is_deskewed
     }
@@ -52,46 +53,46 @@ impl Default for CloudOptions {
     }
 }
 
-/// From where poses come.
+/// Origin of the poses of clouds.
 pub(crate) enum CloudPoses {
-    /// A file, by time stamp or else by number.
+    /// A pose file, matched by time stamp or else by number.
     File(Box<Trajectory>),
-    /// The source has them; what people call them.
+    /// The cloud source provides them; the value is for display.
     Source(PoseSource),
     /// Every cloud is in the world frame.
     Identity,
-    /// There are none.
+    /// No poses are known.
     Missing,
 }
 
-/// Clouds of other programs as scans. Clouds without a pose are passed over and counted.
+/// Turns clouds into scans by adding poses. Clouds without a pose are skipped and counted.
 pub(crate) struct PosedClouds {
     source: Box<dyn CloudSource>,
     path: PathBuf,
-    /// By which maps of earlier versions know the input.
+    /// Files from which the input fingerprint of older map versions is computed.
     files: Vec<PathBuf>,
     poses: CloudPoses,
     options: CloudOptions,
-    /// Clouds so far.
+    /// Number of clouds read so far.
     number: u64,
     without_pose: u64,
     is_at_end: bool,
-    /// Whether the poses cannot be used: no other cloud would have one.
+    /// Whether the poses are unusable, so that every further cloud would fail too.
     has_bad_poses: bool,
-    /// Whether any had one.
+    /// Whether any cloud had a pose.
     has_pose: bool,
-    /// Why they have none, and the names of the first of each reason.
+    /// Reasons for missing poses, each with the names of the first clouds affected.
     reasons: Vec<(String, Vec<String>)>,
     fields: Vec<String>,
-    /// Points that `is_deskewed` left where they were, as there is no pose at their time.
+    /// Number of points that deskewing left unchanged because there is no pose at their time.
     stayed: u64,
-    /// Clouds without times of points, of which it moved none.
+    /// Number of clouds that were not deskewed because they have no point times.
     without_times: u64,
 }
 
-/// Why points are not moved.
+/// Why deskewing does not apply.
 const IN_WORLD: &str = "points that are in the world frame already have no motion left in them";
-/// Most reasons that are told, and most clouds that are named for each.
+/// Maximum number of reasons in a remark, and of cloud names for each reason.
 const MAX_NAMED: usize = 3;
 
 impl PosedClouds {
@@ -132,12 +133,12 @@ impl PosedClouds {
         })
     }
 
-    /// Sets the files by which maps of earlier versions know the input.
+    /// Sets the files from which the input fingerprint of older map versions is computed.
     pub(crate) fn set_files(&mut self, files: Vec<PathBuf>) {
         self.files = files;
     }
 
-    /// The pose of the body at a time, or of a cloud; or why there is none.
+    /// Returns the body pose for a cloud, or the reason why there is none.
     fn pose_of(&self, head: &CloudHead, number: u64) -> Result<std::result::Result<RigidPose, String>> {
         let tolerance_ns = self.options.pose_tolerance_ns;
         Ok(match (&self.poses, head.stamp_ns) {
@@ -170,7 +171,8 @@ impl PosedClouds {
         })
     }
 
-    /// The next cloud and its number. One that cannot be read has a number too: those behind it keep theirs.
+    /// Returns the next cloud and its number. An unreadable cloud also uses up a number, so that later clouds keep
+    /// theirs.
     fn next_cloud(&mut self) -> Result<Option<(u64, CloudHead)>> {
         let found = self.source.next_cloud();
         let number = self.number;
@@ -178,7 +180,7 @@ impl PosedClouds {
         Ok(found?.map(|head| (number, head)))
     }
 
-    /// How many poses are by number, and left where the clouds end.
+    /// Returns the number of poses left over at the end of the clouds, if poses are matched by number.
     fn poses_left(&self) -> Option<u64> {
         let CloudPoses::File(trajectory) = &self.poses else { return None };
         let left = (trajectory.len() as u64).saturating_sub(self.number);
@@ -197,7 +199,7 @@ impl PosedClouds {
         }
     }
 
-    /// Why clouds have no pose: each reason once.
+    /// Describes the reasons for missing poses, each once.
     fn why_without_pose(&self) -> String {
         let list = |names: &[String]| {
             let more = if names.len() > MAX_NAMED { ", ..." } else { "" };
@@ -209,7 +211,7 @@ impl PosedClouds {
         told.join("; ") + more
     }
 
-    /// Reads the points of the cloud at hand.
+    /// Reads the points of the current cloud.
     fn read_points(&mut self, head: &CloudHead, body: &RigidPose, points: &mut PointStore) -> Result<Pose> {
         let sensor = body.then(&self.options.body_from_sensor);
         let mut world_from_sensor = Pose::from_quaternion(sensor.position_m, sensor.quaternion)?;
@@ -218,7 +220,7 @@ impl PosedClouds {
             return Err(Error::argument("deskew", IN_WORLD));
         }
         if is_in_world {
-            // The points stay where they are to the last bits; a rotation and its inverse would move them.
+            // A rotation and its inverse would change the last bits of the points; the identity does not.
             world_from_sensor = Pose::from_quaternion(sensor.position_m, RigidPose::IDENTITY.quaternion)?;
         }
         let Self { source, options, poses, .. } = self;
@@ -243,7 +245,7 @@ impl PosedClouds {
             let place = match is_return {
                 true => deskew.as_mut().map_or(position_m, |deskew| deskew.apply(&point)),
                 false if options.has_no_returns => {
-                    // As long as a direction is known.
+                    // A point without a return is kept if its direction is known.
                     let direction = std::array::from_fn(|k| position_m[k] - origin[k]);
                     let far = position_m
                         .iter()
@@ -252,7 +254,7 @@ impl PosedClouds {
                         .flatten();
                     return points.push(far.unwrap_or([f64::NAN; 3]), intensity);
                 }
-                // Counted as a point without a return.
+                // Dropped later as a point without a return.
                 false => origin,
             };
             let in_sensor: Point = std::array::from_fn(|k| place[k] - origin[k]);
@@ -268,7 +270,7 @@ impl PosedClouds {
     }
 }
 
-/// Where the body was at another time than that of the cloud at hand.
+/// Returns the body pose at a time other than that of the current cloud.
 fn body_at(
     poses: &CloudPoses,
     own: Option<&PoseAt>,
@@ -285,12 +287,12 @@ fn body_at(
     }
 }
 
-/// Why a stamp has no pose, from the later and the earlier of two times.
+/// Explains why a stamp has no pose: `later_ns - earlier_ns` is the distance to the trajectory.
 fn outside(later_ns: i64, earlier_ns: i64, place: &str) -> String {
-    /// Seconds that clocks are apart: GPS and Unix time, adjusted standard GPS time of LAS.
+    /// Offsets between common clocks, in seconds: GPS and Unix time, and the adjusted standard GPS time of LAS.
     const CLOCKS_S: [f64; 3] = [315_964_800.0, 1e9, 1e9 + 315_964_800.0];
     let apart_s = (i128::from(later_ns) - i128::from(earlier_ns)) as f64 * 1e-9;
-    // Leap seconds, and a drive of a day.
+    // Tolerance for leap seconds and the duration of a drive.
     let is_clock = |clock_s: &f64| (apart_s - clock_s).abs() < 100_000.0;
     let hint =
         if CLOCKS_S.iter().any(is_clock) { "; do their clocks differ, as GPS and Unix time do?" } else { "" };
@@ -326,10 +328,10 @@ impl ScanSource for PosedClouds {
         }
         self.is_at_end = true;
         if self.without_pose > 0 && !self.has_pose && !self.options.may_lack_poses {
-            // A map of nothing would be no answer.
+            // An empty map would hide the problem, so this is an error.
             let mut why = self.why_without_pose();
             if matches!(self.poses, CloudPoses::Source(_)) {
-                // The source knows what its own poses lack.
+                // The source reports which of its own poses are missing.
                 why = self.source.remarks().into_iter().fold(why, |why, remark| why + "; " + &remark);
             }
             let reason = format!(
@@ -361,7 +363,7 @@ impl ScanSource for PosedClouds {
     }
 
     fn pass_unread(&mut self) -> bool {
-        // After the end there is no scan that could be passed.
+        // There is no scan to skip at the end.
         !self.is_at_end && !self.has_bad_poses
     }
 

@@ -1,28 +1,28 @@
-//! Whether quaternions that no name tells of have their w first or last.
+//! Detection of the order of quaternion components, w first or w last, where no column name states it.
 
-/// What tells the one from the other. Each quaternion is of length 1 either way, and turns from pose to pose are as
-/// large; but the sensor starts upright and turns about the vertical in one of the two readings only.
+/// Evidence for either order. Both have unit length and equal turns between poses; but only in the correct order does
+/// the sensor start upright and turn about the vertical.
 #[derive(Clone, Debug, Default)]
 pub(super) struct OrderEvidence {
-    /// The first quaternion, as it is written.
+    /// First quaternion, as stored in the file.
     first: Option<[f64; 4]>,
     count: u64,
-    /// Of the turns since the first pose, the squares of their axes' parts; with w last, and with w first.
+    /// Sums of the squared axis components of the rotations since the first pose, for w last and for w first.
     turns: [[f64; 3]; 2],
-    /// The largest turn, as the sine of half of it.
+    /// Largest rotation, as the sine of half its angle.
     most_turned: f64,
-    /// How often z points up.
+    /// Number of poses with z pointing up, for each order.
     upright: [u64; 2],
 }
 
-/// A tenth of a degree of turn tells nothing, nor a first pose that is not exactly one that programs begin with.
+/// Tolerance for a first pose that is exactly upright; smaller differences are rounding.
 const EXACT: f64 = 1e-6;
-/// Sines of half of 1 and of 15 degrees.
+/// Sines of half of 1 degree and of 15 degrees.
 const SOME_TURN: f64 = 0.0087;
 const MUCH_TURN: f64 = 0.13;
 
 impl OrderEvidence {
-    /// Takes a quaternion, as it is written.
+    /// Adds a quaternion, as stored in the file.
     pub(super) fn insert(&mut self, written: [f64; 4]) {
         let length = written.iter().map(|q| q * q).sum::<f64>().sqrt();
         let written = written.map(|q| q / length);
@@ -40,7 +40,7 @@ impl OrderEvidence {
         }
     }
 
-    /// Whether w is first, by all that is known. In doubt it is last, as in TUM's files.
+    /// Returns whether w is first according to the evidence. The default is w last, as in TUM files.
     pub(super) fn is_w_first(&self) -> bool {
         let Some(first) = self.first else { return false };
         let (up_if_last, up_if_first) = (up(w_last(first)), up(w_first(first)));
@@ -63,17 +63,17 @@ fn w_last(written: [f64; 4]) -> [f64; 4] {
     written
 }
 
-/// `w x y z` as `x y z w`.
+/// Converts `w x y z` to `x y z w`.
 pub(super) fn w_first([w, x, y, z]: [f64; 4]) -> [f64; 4] {
     [x, y, z, w]
 }
 
-/// How far the z axis of a rotation points up: 1 for all the way, -1 for down.
+/// Returns the vertical component of the rotated z axis: 1 is up, -1 is down.
 pub(super) fn up([x, y, z, w]: [f64; 4]) -> f64 {
     (w * w + z * z - x * x - y * y) / (w * w + z * z + x * x + y * y)
 }
 
-/// The axis of the turn from one rotation to another in the world, as long as the sine of half of the turn.
+/// Returns the rotation axis between two rotations in the world frame, scaled by the sine of half the angle.
 fn turn([ax, ay, az, aw]: [f64; 4], [bx, by, bz, bw]: [f64; 4]) -> [f64; 3] {
     [
         bx * aw - bw * ax - by * az + bz * ay,
@@ -89,7 +89,7 @@ mod tests {
 
     type Rotation = UnitQuaternion<f64>;
 
-    /// Whether w is taken to be first where it is, and where it is last.
+    /// Returns the detected result (w first) for poses written with w first, and for poses written with w last.
     fn found(rotations: &[Rotation]) -> [bool; 2] {
         [true, false].map(|is_first| {
             let mut evidence = OrderEvidence::default();
@@ -123,12 +123,12 @@ mod tests {
     fn in_doubt_w_is_last() {
         let still = of((0..9).map(|_| [0.0; 3]));
         assert_eq!(found(&still), [false, false]);
-        // Upside down, as a lidar below a drone is.
+        // Upside down, as a lidar below a drone.
         let below = of((0..50).map(|k| [std::f64::consts::PI, 0.0, 0.02 * f64::from(k)]));
         assert!(!found(&below)[1]);
         let below = of((0..50).map(|_| [std::f64::consts::PI, 0.0, 0.0]));
         assert!(!found(&below)[1]);
-        // A camera, whose z looks ahead, faces any way.
+        // A camera, whose z axis points forward, with any heading.
         for start in 0..24 {
             let optical = Rotation::from_euler_angles(-std::f64::consts::FRAC_PI_2, 0.0, 0.0);
             for swing in [0.0, 0.02, 0.3, 1.5, 6.0] {
@@ -137,7 +137,7 @@ mod tests {
                 assert!(!found(&turns.collect::<Vec<_>>())[1], "{start} {swing}");
             }
         }
-        // The world is the first camera: y is down.
+        // The first camera is the world frame: y points down.
         let nodding = of((0..60).map(|k| [0.02 * f64::from(k), 0.0, 0.0]));
         assert!(!found(&nodding)[1]);
     }

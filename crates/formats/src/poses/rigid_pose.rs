@@ -1,28 +1,29 @@
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
-/// Where one frame is in another: `parent = R(quaternion) * child + position`.
+/// Pose of a child frame in a parent frame: `parent = R(quaternion) * child + position`.
 ///
-/// The numbers are kept as they were written, so that a pose that is not changed keeps its bits.
+/// Numbers are stored as read, so that a pose that is not transformed keeps its bits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RigidPose {
-    /// Origin of the child in the parent, in metres.
+    /// Origin of the child in the parent frame, in metres.
     pub position_m: [f64; 3],
-    /// Rotation as x y z w, of length about 1.
+    /// Rotation as x y z w, with length about 1.
     pub quaternion: [f64; 4],
 }
 
 impl RigidPose {
-    /// Both frames are the same.
+    /// Identity: both frames coincide.
     pub const IDENTITY: Self = Self { position_m: [0.0; 3], quaternion: [0.0, 0.0, 0.0, 1.0] };
 
-    /// Whether all numbers are finite and the quaternion has a length.
+    /// Returns whether all numbers are finite and the quaternion has a nonzero length.
     pub fn is_valid(&self) -> bool {
         let numbers = self.position_m.iter().chain(&self.quaternion);
         let square: f64 = self.quaternion.iter().map(|q| q * q).sum();
         numbers.copied().all(f64::is_finite) && square.is_finite() && square > 1e-12
     }
 
-    /// The pose of the other's child in this pose's parent. An identity changes no bit of the other.
+    /// Composes two poses: the pose of `other`'s child in this pose's parent. The identity preserves all bits of
+    /// `other`.
     pub fn then(&self, other: &Self) -> Self {
         if *self == Self::IDENTITY {
             return *other;
@@ -35,7 +36,7 @@ impl RigidPose {
         Self { position_m: moved.into(), quaternion: coordinates(&(rotation * other.rotation())) }
     }
 
-    /// The pose of the parent in the child.
+    /// Returns the pose of the parent in the child.
     pub fn inverse(&self) -> Self {
         if *self == Self::IDENTITY {
             return *self;
@@ -45,7 +46,7 @@ impl RigidPose {
         Self { position_m: position.into(), quaternion: coordinates(&back) }
     }
 
-    /// A point of the child in the parent.
+    /// Transforms a point from the child frame to the parent frame.
     pub fn apply(&self, point: [f64; 3]) -> [f64; 3] {
         if *self == Self::IDENTITY {
             return point;
@@ -53,7 +54,7 @@ impl RigidPose {
         (self.rotation() * Vector3::from(point) + Vector3::from(self.position_m)).into()
     }
 
-    /// Between this pose (share 0) and another (share 1): positions along a line, rotations at constant speed (slerp).
+    /// Interpolates between this pose (share 0) and another (share 1): positions linearly, rotations by slerp.
     pub fn towards(&self, other: &Self, share: f64) -> Self {
         if share <= 0.0 {
             return *self;
@@ -63,7 +64,7 @@ impl RigidPose {
         }
         let position = |k: usize| self.position_m[k] + share * (other.position_m[k] - self.position_m[k]);
         let (from, to) = (self.rotation(), other.rotation());
-        // The shorter way round: q and -q are the same rotation.
+        // Take the shorter arc: q and -q are the same rotation.
         let to = if from.coords.dot(&to.coords) < 0.0 {
             UnitQuaternion::new_unchecked(-to.into_inner())
         } else {

@@ -12,47 +12,47 @@ use std::borrow::Cow;
 use std::path::Path;
 use voxtile::scan::Pose;
 
-/// What the numbers of a line are, decided by the first line of numbers.
+/// Meaning of the numbers of a line, set by the first line of numbers.
 #[derive(Clone, Debug)]
 enum Layout {
-    /// Columns with names.
+    /// Named columns.
     Named(Roles),
     /// `t x y z qx qy qz qw`.
     Tum,
-    /// The same without a time.
+    /// `x y z qx qy qz qw`.
     Bare,
-    /// A matrix, perhaps with a time before it.
+    /// A 3x4 or 4x4 matrix, optionally preceded by a time.
     Matrix { has_time: bool },
-    /// A matrix of 4x4 over four lines; some keep the time in the corner that is always 1.
+    /// A 4x4 matrix on four lines. Some programs store the time in the corner that is otherwise 1.
     Rows,
 }
 
-/// What is taken for a pose in lines of numbers alone.
+/// How strictly lines of numbers are interpreted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Rules {
-    /// Stamps are times, quaternions have a length near 1.
+    /// Stamps must be times, and quaternions must have a length near 1.
     #[default]
     Strict,
-    /// As earlier versions took the poses of PCD files: any number is a stamp, one that is no time is none, and
-    /// quaternions have any length but 0.
+    /// Compatible with older versions, for the poses of PCD files: any number is accepted as a stamp, an invalid stamp
+    /// is ignored, and quaternions may have any nonzero length.
     Lenient,
 }
 
-/// How a text of poses is written.
+/// Form of a text with poses.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Form {
-    /// Whether earlier versions took it for the poses of PCD files: lines of 7 or 8 numbers in the order of TUM or of
-    /// KITTI's 12, with blanks and commas between them, and comments after `#`.
+    /// Whether older versions accepted this text for the poses of PCD files: lines of 8 or 7 numbers in TUM order or 12
+    /// in KITTI order, separated by blanks and commas, with comments after `#`.
     pub(crate) is_plain: bool,
-    /// Whether its stamps, if it has any, are seconds.
+    /// Whether stamps, if there are any, are in seconds.
     pub(crate) is_in_seconds: bool,
-    /// Whether its poses are matrices.
+    /// Whether the poses are matrices.
     pub(crate) is_matrix: bool,
-    /// The units of x, y and z where they are not metres.
+    /// Units of x, y and z if not metres.
     pub(crate) unit: Option<[&'static str; 3]>,
 }
 
-/// Reads the poses of a text. A line of names tells the columns wherever it stands before the poses.
+/// Reads the poses of a text. A header line may follow comments and other lines, but must precede the poses.
 pub(super) fn read(
     path: &Path,
     input: PoseInput,
@@ -80,7 +80,7 @@ pub(super) fn read(
     Ok(text.form())
 }
 
-/// Whether a text that starts like this starts with poses.
+/// Returns whether a text with this start contains poses.
 pub(crate) fn looks_like_poses(start: &[u8]) -> bool {
     let start = String::from_utf8_lossy(start);
     let start = start.trim_start_matches('\u{feff}');
@@ -89,7 +89,7 @@ pub(crate) fn looks_like_poses(start: &[u8]) -> bool {
     for line in lines.filter(|line| comment_of(line).is_none()) {
         match text.take(line) {
             Ok(Taken::Row(_)) => return true,
-            // A line of names comes before poses, and a matrix may have four lines.
+            // A header line may precede the poses, and a matrix may take four lines.
             Ok(Taken::Nothing) => {}
             Err(_) => return false,
         }
@@ -97,24 +97,24 @@ pub(crate) fn looks_like_poses(start: &[u8]) -> bool {
     false
 }
 
-/// What editors on Windows put before a text.
+/// UTF-8 byte order mark, written by some Windows editors.
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
-/// What poses may be, for messages.
+/// Supported forms of a pose, for messages.
 const FORMS: &str = "8 numbers (TUM: t x y z qx qy qz qw), 7 without t, 12 or 16 (KITTI: a matrix of 3x4 or 4x4), \
                      one more with a time before a matrix, or a table whose first line names its columns";
 
-/// What a line has.
+/// Content of a line.
 enum Taken {
     Row(Row),
-    /// A comment, names, a part of a matrix.
+    /// A comment, column names, or part of a matrix.
     Nothing,
 }
 
-/// What is wrong with a line.
+/// Problem with a line.
 enum Bad {
-    /// It is no pose; others may be.
+    /// Only this row is invalid.
     Row(BadRow),
-    /// What the poses mean is not known.
+    /// The poses of the whole file cannot be interpreted.
     File(String),
 }
 
@@ -122,15 +122,15 @@ struct TextPoses {
     rules: Rules,
     layout: Option<Layout>,
     names: Names,
-    /// Whether a line without numbers names the columns, not a comment.
+    /// Whether the column names are on a line of their own, not in a comment.
     has_header: bool,
-    /// Whether each line so far is plain.
+    /// Whether all lines so far have the plain form.
     are_plain: bool,
-    /// Decimal digits of a unit of time below which there are nanoseconds.
+    /// Decimal digits between the unit of time and a nanosecond.
     digits: Option<i32>,
-    /// Numbers of a matrix that is not whole yet; NaN where there is none.
+    /// Numbers of an incomplete matrix; NaN for unreadable ones.
     matrix: Vec<f64>,
-    /// What is wrong with a line of it.
+    /// The first problem within this matrix.
     matrix_fault: Option<BadRow>,
 }
 
@@ -148,7 +148,6 @@ impl TextPoses {
         }
     }
 
-    /// How the text is written.
     fn form(&self) -> Form {
         Form {
             is_plain: self.are_plain,
@@ -190,7 +189,7 @@ impl TextPoses {
         self.take_numbers(line)
     }
 
-    /// Keeps the names that a line tells; prose does not take them away.
+    /// Stores the column names of a line. Prose does not replace them.
     fn note_names(&mut self, names: Names) {
         if names != Names::Prose {
             self.names = names;
@@ -200,7 +199,7 @@ impl TextPoses {
     fn take_numbers(&mut self, line: &str) -> Result<Taken, Bad> {
         let mut words = cells(line);
         if self.layout.is_none() {
-            // Names that need more columns than there are belong to prose.
+            // A line naming more columns than the rows have was prose.
             match &self.names {
                 Names::Poses(roles) if roles.last() < words.len() => {
                     self.layout = Some(Layout::Named(roles.clone()));
@@ -264,7 +263,7 @@ impl TextPoses {
             && !(matches!(layout, Layout::Matrix { .. }) && found == columns + 4)
         {
             let reason = format!("{found} numbers; the lines before have {columns}");
-            // A row that ends early was lost.
+            // A truncated row was lost.
             let kind = if found < columns { BadKind::Lost } else { BadKind::Odd };
             let has_time = matches!(layout, Layout::Tum | Layout::Matrix { has_time: true });
             let stamp = if has_time { self.stamp(cells, 0, None) } else { Stamp::None };
@@ -312,7 +311,8 @@ impl TextPoses {
         }
     }
 
-    /// Takes a line of a matrix of 4x4. Of a line that cannot be read the matrix is lost, and it ends where it would.
+    /// Adds a line of a 4x4 matrix. An unreadable line makes the whole matrix invalid, but still counts as one of its
+    /// lines.
     fn take_matrix_line(&mut self, cells: &Cells<'_>) -> Result<Taken, Bad> {
         let line = match (cells.words.len(), cells.all(&[0, 1, 2, 3])) {
             (4, Ok(numbers)) => numbers,
@@ -362,7 +362,7 @@ impl TextPoses {
     }
 }
 
-/// A line before all poses, perhaps their number.
+/// A line before the first pose that is not a row, for instance the number of poses.
 fn no_row(reason: String) -> Bad {
     Bad::Row(BadRow { reason, kind: BadKind::Words, stamp: Stamp::None })
 }
@@ -389,13 +389,13 @@ fn pose_of(numbers: &[f64], rules: Rules) -> Result<RigidPose, (BadKind, String)
     })
 }
 
-/// A number with an exponent if it would have many digits without.
+/// Formats a number, with an exponent if it would otherwise have many digits.
 fn short(number: f64) -> String {
     let is_short = number == 0.0 || !number.is_finite() || (1e-4..1e9).contains(&number.abs());
     if is_short { number.to_string() } else { format!("{number:e}") }
 }
 
-/// The pose of x y z and a quaternion.
+/// Builds a pose from x y z and a quaternion.
 pub(super) fn pose(numbers: [f64; 7], rules: Rules) -> Result<RigidPose, String> {
     let [x, y, z, qx, qy, qz, qw] = numbers;
     let pose = RigidPose { position_m: [x, y, z], quaternion: [qx, qy, qz, qw] };

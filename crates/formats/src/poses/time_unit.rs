@@ -1,15 +1,15 @@
 use crate::read::stamp;
 
-/// Digits between a second and a nanosecond.
+/// Decimal digits between a second and a nanosecond.
 pub(super) const SECONDS: i32 = 9;
 
-/// Units of time by how large a number of them is today: decimal digits between the unit and a nanosecond.
+/// Guesses the unit of a time from its magnitude. Returns the decimal digits between the unit and a nanosecond.
 pub(super) fn digits_of(word: &str) -> Option<i32> {
     let value: f64 = word.parse().ok()?;
     value.is_finite().then(|| digits_of_value(value))
 }
 
-/// The same of a number.
+/// As [`digits_of`], for a number.
 pub(super) fn digits_of_value(value: f64) -> i32 {
     // A hundred billion seconds are 3000 years.
     match value.abs() {
@@ -20,12 +20,12 @@ pub(super) fn digits_of_value(value: f64) -> i32 {
     }
 }
 
-/// The stamp of a decimal text, exactly.
+/// Parses a stamp in decimal text exactly.
 pub(super) fn stamp_of(word: &str, digits: i32) -> Option<i64> {
     stamp::nanoseconds(word, digits)
 }
 
-/// The stamp of a double; whole units do not share its rounding.
+/// Converts a stamp in floating point. The whole part is converted exactly.
 pub(super) fn stamp_of_value(value: f64, digits: i32) -> Option<i64> {
     let unit_ns = 10_i64.checked_pow(u32::try_from(digits).ok()?)?;
     let whole = value.trunc();

@@ -11,62 +11,62 @@ use crate::spill::{Budget, PoseList, TimedPose};
 use std::path::{Path, PathBuf};
 use voxtile::{Error, Result};
 
-/// Poses of a sensor, sensor to world, in the order of their file and by time. Many are in a temporary file.
+/// Poses of a sensor in the world frame, in file order and sorted by time. Long lists are kept in a temporary file.
 #[derive(Clone, Debug, Default)]
 pub struct Trajectory {
     path: PathBuf,
-    /// In the order of the file. A pose that was lost has its place.
+    /// In file order. Lost poses keep their positions.
     poses: PoseList,
-    /// In strict order of time and without lost ones, where that is another list.
+    /// Sorted by strictly increasing time, without lost poses; `None` if `poses` is already so.
     by_time: Option<PoseList>,
     /// Time stamps of lost poses.
     lost: PoseList,
     has_stamps: bool,
-    /// Whether the file has them, taken or not.
+    /// Whether the file has stamps, even if they are not used.
     is_stamped: bool,
-    /// Number of the first pose whose stamp is earlier than the one before, from 1.
+    /// Number of the first pose, from 1, whose stamp is earlier than the one before.
     goes_back: Option<u64>,
-    /// Poses are of a camera; those of the lidar are `[0] * pose * [1]`.
+    /// Transforms for poses of a camera: the pose of the lidar is `[0] * pose * [1]`.
     lidar: Option<[RigidPose; 2]>,
-    /// Quaternions are written w first, which no name of a column says.
+    /// Whether unnamed quaternion columns are read w first.
     is_w_first: bool,
-    /// How the text is written, if it is one.
+    /// Form of the text, if the file is text.
     form: Form,
     remarks: Vec<String>,
 }
 
-/// What a trajectory knows of a time.
+/// Result of looking up a time in a trajectory.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Found {
-    /// A pose with this very stamp, as it was written.
+    /// A pose with exactly this stamp, unchanged.
     Exact(RigidPose),
-    /// Between two poses: positions along a line, rotations at constant speed.
+    /// Interpolated between two poses: positions linearly, rotations by slerp.
     Between(RigidPose),
     /// The poses before and after are too far apart for the tolerance.
     Gap {
-        /// Nanoseconds from one to the other.
+        /// Time between the two poses, in nanoseconds.
         gap_ns: u64,
     },
-    /// Before the first pose.
+    /// The time is before the first pose.
     Before {
-        /// Its stamp.
+        /// Stamp of the first pose.
         first_ns: i64,
     },
-    /// The pose of this time was lost: its row is no pose.
+    /// The row of this time is not a valid pose.
     Lost,
-    /// After the last pose.
+    /// The time is after the last pose.
     After {
-        /// Its stamp.
+        /// Stamp of the last pose.
         last_ns: i64,
     },
-    /// The file has no stamps: its poses are known by number only.
+    /// The file has no stamps; poses are identified by number only.
     WithoutStamps,
 }
 
-/// What remarks on time stamps have in common.
+/// Common part of the remarks on time stamps.
 const OF_STAMPS: &str = "time stamps of poses";
 
-/// The last pose before a time and the first at it or after it.
+/// Returns the last pose before a time and the first pose at or after it.
 fn around(poses: &PoseList, stamp_ns: i64) -> Result<[Option<TimedPose>; 2]> {
     let after = poses.before(stamp_ns)?;
     let earlier = after.checked_sub(1).map(|before| poses.get(before)).transpose()?.flatten();
@@ -74,32 +74,32 @@ fn around(poses: &PoseList, stamp_ns: i64) -> Result<[Option<TimedPose>; 2]> {
 }
 
 impl Trajectory {
-    /// Reads a file of poses: TUM (`t x y z qx qy qz qw`), KITTI (12 numbers of a 3x4 matrix), matrices of 4x4, tables
-    /// with names of columns (EuRoC, exports of ROS), arrays of NumPy (`.npy`) of N x 8, N x 3 x 4 or N x 4 x 4.
+    /// Reads a pose file: TUM (`t x y z qx qy qz qw`), KITTI (12 numbers of a 3x4 matrix), 4x4 matrices, tables with
+    /// column names (EuRoC, ROS exports), or NumPy arrays (`.npy`) of N x 8, N x 3 x 4 or N x 4 x 4.
     ///
-    /// Stamps are seconds; of nanoseconds, if their column says so or they would lie thousands of years ahead.
-    /// Positions are metres, if the names of their columns name no other unit. Rows that are no poses are left out and
-    /// keep their numbers; a remark counts them and names the first.
-    /// `calib` is the `calib.txt` of a KITTI sequence, whose poses are of the camera: they become those of the lidar.
+    /// Stamps are in seconds, or in smaller units if the column name or the magnitude shows it. Positions are in metres
+    /// unless the column names state another unit. Invalid rows are skipped but still counted in row numbers; a remark
+    /// gives their number and names the first. `calib` is the `calib.txt` of a KITTI sequence, whose poses are the
+    /// camera's: they are converted to poses of the lidar.
     ///
     /// # Errors
     ///
-    /// It cannot be read; no pose at all, or most lines are something else: the first with its number; a unit that is
-    /// not known.
+    /// The file cannot be read, it contains no pose, most lines are invalid (the error names the first), or a unit is
+    /// unknown.
     pub fn read(path: &Path, calib: Option<&Path>) -> Result<Self> {
         Self::read_within(path, calib, &Budget::default())
     }
 
-    /// As [`Trajectory::read`], in so much memory. Each pose takes 64 bytes, of memory or of a temporary file.
+    /// As [`Trajectory::read`], within a memory budget. Each pose takes 64 bytes, in memory or in a temporary file.
     ///
     /// # Errors
     ///
-    /// As for [`Trajectory::read`]; a temporary file that cannot be written.
+    /// As for [`Trajectory::read`]. Also fails if a temporary file cannot be written.
     pub fn read_within(path: &Path, calib: Option<&Path>, budget: &Budget) -> Result<Self> {
         Self::read_by(Rules::Strict, path, calib, budget)
     }
 
-    /// As [`Trajectory::read_within`], by these rules.
+    /// As [`Trajectory::read_within`], with the given rules.
     pub(crate) fn read_by(rules: Rules, path: &Path, calib: Option<&Path>, budget: &Budget) -> Result<Self> {
         let mut rows = PoseRows::new(budget);
         let input = PoseInput::open(path)?;
@@ -109,7 +109,7 @@ impl Trajectory {
         } else {
             form = text::read(path, input, rules, &mut rows)?;
         }
-        // Earlier versions took the poses of PCD files by number, whatever stood where their time should.
+        // Older versions matched the poses of PCD files by number, whatever the time column contained.
         let must_have_stamps = rules == Rules::Strict || !form.is_plain;
         let Some(mut trajectory) = rows.finish(path, must_have_stamps)? else {
             return Err(Error::argument(path.display().to_string(), "holds no pose"));
@@ -144,13 +144,13 @@ impl Trajectory {
         }
     }
 
-    /// The pose at a time. Between two poses there is one if they are at most twice the tolerance apart, see
-    /// [`most_gap_ns`]; none is ever extrapolated. Poses that are further apart, the first and the last are taken up to
-    /// a millisecond away, by which programs round.
+    /// Returns the pose at a time. Between two poses it is interpolated if they are at most twice the tolerance apart
+    /// (see [`most_gap_ns`]). Poses are never extrapolated: otherwise a pose is used only within one millisecond, which
+    /// covers rounding of stamps.
     ///
     /// # Errors
     ///
-    /// A temporary file that cannot be read.
+    /// A temporary file cannot be read.
     pub fn at(&self, stamp_ns: i64, tolerance_ns: i64) -> Result<Found> {
         let Some(poses) = self.stamped() else { return Ok(Found::WithoutStamps) };
         let [earlier, later] = around(poses, stamp_ns)?;
@@ -180,7 +180,7 @@ impl Trajectory {
         })
     }
 
-    /// Whether a lost pose is at a time, and nearer to it than the pose that is so far away.
+    /// Returns whether a lost pose is close to a time, and closer than the nearest valid pose.
     fn is_lost_at(&self, stamp_ns: i64, pose_apart_ns: Option<u64>) -> Result<bool> {
         let lost = around(&self.lost, stamp_ns)?.into_iter().flatten();
         let apart_ns = lost.map(|timed| timed.stamp_ns.abs_diff(stamp_ns)).min();
@@ -188,12 +188,12 @@ impl Trajectory {
             .is_some_and(|apart| apart <= SAME_TIME_NS && pose_apart_ns.is_none_or(|pose| apart < pose)))
     }
 
-    /// The poses in strict order of time, if they have stamps.
+    /// Returns the poses sorted by time, if they have stamps.
     fn stamped(&self) -> Option<&PoseList> {
         self.has_stamps.then(|| self.by_time.as_ref().unwrap_or(&self.poses))
     }
 
-    /// The pose of the lidar, of one as it was written.
+    /// Converts a pose as stored to the pose of the lidar.
     fn of_lidar(&self, mut pose: RigidPose) -> RigidPose {
         if self.is_w_first {
             pose.quaternion = w_first(pose.quaternion);
@@ -201,22 +201,22 @@ impl Trajectory {
         self.lidar.map_or(pose, |[before, after]| before.then(&pose).then(&after))
     }
 
-    /// The pose of a number, from 0, in the order of the file. `None` also of one that was lost.
+    /// Returns the pose of a row in file order, from 0. `None` if there is no such row or its pose was lost.
     ///
     /// # Errors
     ///
-    /// A temporary file that cannot be read.
+    /// A temporary file cannot be read.
     pub fn by_number(&self, number: usize) -> Result<Option<RigidPose>> {
         let timed = self.poses.get(number)?.filter(|timed| !is_lost(&timed.pose));
         Ok(timed.map(|timed| self.of_lidar(timed.pose)))
     }
 
-    /// Whether the pose of a number was lost: its row is no pose.
+    /// Returns whether the pose of a row was lost.
     fn is_lost(&self, number: usize) -> Result<bool> {
         Ok(self.poses.get(number)?.is_some_and(|timed| is_lost(&timed.pose)))
     }
 
-    /// Which way a sensor on the body goes, as far as the first thousands of poses tell.
+    /// Returns the direction of travel of a sensor on the body, from the first poses.
     pub(super) fn direction(&self, body_from_sensor: &RigidPose) -> Result<Direction> {
         let mut direction = Direction::default();
         for number in 0..self.len().min(Direction::MAX_POSES) {
@@ -227,44 +227,41 @@ impl Trajectory {
         Ok(direction)
     }
 
-    /// Whether its poses are matrices, as those of KITTI are.
+    /// Returns whether the poses are matrices, as in KITTI files.
     pub(super) fn are_matrices(&self) -> bool {
         self.form.is_matrix
     }
 
-    /// Adds a remark.
     pub(super) fn remark(&mut self, remark: String) {
         self.remarks.push(remark);
     }
 
-    /// The time stamp of a pose by its number, from 0, in the order of the file.
+    /// Returns the time stamp of a row in file order, from 0.
     pub(crate) fn stamp_of(&self, number: usize) -> Result<Option<i64>> {
         let timed = if self.has_stamps { self.poses.get(number)? } else { None };
         Ok(timed.as_ref().and_then(stamp_of))
     }
 
-    /// Leaves the poses their numbers alone.
+    /// Drops the stamps, so that poses are matched by number.
     pub(crate) fn forget_stamps(&mut self) {
         (self.has_stamps, self.by_time, self.lost, self.goes_back) = Default::default();
         self.remarks.retain(|remark| !remark.contains(OF_STAMPS));
     }
 
-    /// The file.
     pub(crate) fn path(&self) -> &Path {
         &self.path
     }
 
-    /// How the file is written, if it is a text.
+    /// Returns the form of the text, if the file is text.
     pub(crate) fn form(&self) -> Form {
         self.form
     }
 
-    /// The pose of a cloud by its number, from 0, where stamps do not tell it.
+    /// Returns the pose of a cloud by its number, from 0, for clouds without stamps. `None` if its pose was lost.
     ///
     /// # Errors
     ///
-    /// Not as many poses as clouds: which belong together is not known then; a temporary file that cannot be read.
-    /// `None` if its pose was lost.
+    /// The numbers of poses and clouds differ, so they cannot be matched; a temporary file cannot be read.
     pub fn of_cloud(&self, number: u64, source: &dyn CloudSource) -> Result<Option<RigidPose>> {
         self.check_clouds(source)?;
         self.check_order()?;
@@ -276,22 +273,22 @@ impl Trajectory {
         Ok(pose)
     }
 
-    /// Checks that there are as many poses as clouds, if that number is known before they are read.
+    /// Checks that there are as many poses as clouds, if the number of clouds is known in advance.
     ///
     /// # Errors
     ///
-    /// There are not.
+    /// The numbers differ.
     pub fn check_clouds(&self, source: &dyn CloudSource) -> Result<()> {
         let Some(clouds) = source.len_hint().filter(|clouds| *clouds != self.len() as u64) else {
             return Ok(());
         };
-        // A file that is no cloud is often at an end of the list.
+        // A file that is not a cloud is often the first or last of the list.
         let named = source.ends().map(|[first, last]| format!(" ({first} to {last})")).unwrap_or_default();
         Err(self.other_number(&format!("{clouds} clouds{named}")))
     }
 
-    /// Checks that the poses may be taken line by line, for clouds that have no time stamps: stamps that go back tell
-    /// that the lines are in another order than the clouds.
+    /// Checks that the poses can be matched by number, for clouds without time stamps. Stamps that go back show that
+    /// the lines are in another order than the clouds.
     ///
     /// # Errors
     ///
@@ -306,13 +303,13 @@ impl Trajectory {
         Err(Error::argument(self.path.display().to_string(), reason))
     }
 
-    /// Whether a time stamp is earlier than the one before.
+    /// Returns whether a time stamp is earlier than the one before.
     pub fn goes_back(&self) -> bool {
         self.goes_back.is_some()
     }
 
     fn other_number(&self, clouds: &str) -> Error {
-        // The poses have times, and what the clouds are called tells none.
+        // The poses have stamps, but the names of the clouds contain none.
         let names = if self.is_stamped {
             "; the names of the clouds tell no times (1700000000.123456789, 1700000000_123456789 and \
              1700000000123456789 would)"
@@ -327,33 +324,33 @@ impl Trajectory {
         Error::argument(self.path.display().to_string(), reason)
     }
 
-    /// Number of poses in the file.
+    /// Returns the number of poses in the file.
     pub fn len(&self) -> usize {
         self.poses.len()
     }
 
-    /// Whether there is no pose.
+    /// Returns whether there are no poses.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// First and last time stamp, if poses have stamps.
+    /// Returns the first and last time stamp, if poses have stamps.
     ///
     /// # Errors
     ///
-    /// A temporary file that cannot be read.
+    /// A temporary file cannot be read.
     pub fn span_ns(&self) -> Result<Option<[i64; 2]>> {
         let Some(poses) = self.stamped() else { return Ok(None) };
         let (first, last) = (poses.get(0)?, poses.get(poses.len().saturating_sub(1))?);
         Ok(first.zip(last).map(|(first, last)| [first.stamp_ns, last.stamp_ns]))
     }
 
-    /// Whether poses have stamps; they are known by number only otherwise.
+    /// Returns whether poses have stamps. Otherwise they are identified by number only.
     pub fn has_stamps(&self) -> bool {
         self.has_stamps
     }
 
-    /// The different stamps, in order.
+    /// Returns the distinct stamps in increasing order.
     pub fn stamps_ns(&self) -> impl Iterator<Item = Result<i64>> + '_ {
         let poses = self.stamped();
         let count = poses.map_or(0, PoseList::len);
@@ -361,7 +358,7 @@ impl Trajectory {
         stamps.into_iter().flatten().filter_map(|timed| timed.map(|timed| Some(timed?.stamp_ns)).transpose())
     }
 
-    /// What a person should know of the file.
+    /// Returns remarks for the user about the file.
     pub fn remarks(&self) -> &[String] {
         &self.remarks
     }

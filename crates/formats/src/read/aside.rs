@@ -1,4 +1,4 @@
-//! Texts that lie beside clouds and are none: poses, times, cameras, logs of other sensors.
+//! Text files that accompany clouds but are not clouds: poses, times, cameras, logs of other sensors.
 
 use super::file_order::name_of;
 use super::glance::{GLANCE_BYTES, first_bytes};
@@ -10,14 +10,14 @@ use crate::poses::matrix_of;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// The texts of a folder.
+/// Text files of a folder.
 pub(crate) struct Texts {
     pub(crate) clouds: Vec<PathBuf>,
-    /// What the others are, with their names.
+    /// Files that are not clouds: their names and kinds.
     pub(crate) others: Vec<String>,
 }
 
-/// Names, without their ends, of texts that lie beside clouds and are none.
+/// Names, without extensions, of text files that are not clouds.
 const NAMES: [&str; 12] = [
     "calib",
     "camera-intrinsics",
@@ -32,7 +32,7 @@ const NAMES: [&str; 12] = [
     "rgb",
     "times",
 ];
-/// Words in names of such texts.
+/// Words that occur in names of such files.
 const WORDS: [&str; 44] = [
     "accelerometer",
     "assoc",
@@ -79,7 +79,7 @@ const WORDS: [&str; 44] = [
     "vicon",
     "wheel",
 ];
-/// Words beside these.
+/// Further words that may occur in addition to these.
 const OTHER_WORDS: [&str; 30] = [
     "base",
     "body",
@@ -112,22 +112,22 @@ const OTHER_WORDS: [&str; 30] = [
     "tum",
     "velodyne",
 ];
-/// Texts of a folder that are looked into.
+/// Maximum number of files of a folder to inspect.
 const MAX_LOOKS: usize = 64;
-/// Rows of a text that are looked at.
+/// Maximum number of rows of a file to inspect.
 const MAX_ROWS: usize = 64;
-/// No more rows than a matrix.
+/// A file with at most this many rows may be a matrix.
 const FEW_ROWS: usize = 4;
-/// Coordinates in metres are smaller than times since 1970 in seconds.
+/// Smallest plausible Unix time in seconds; coordinates in metres are smaller.
 const MIN_STAMP: f64 = 1e8;
 
-/// Whether a file is a text beside clouds, by its name alone.
+/// Returns whether the name alone shows that a file is not a cloud.
 pub(super) fn is_surely_named(path: &Path) -> bool {
     NAMES.contains(&stem_of(path).as_str())
 }
 
-/// Parts clouds from other texts. Those that are named as no other file of the folder is are looked into: clouds are
-/// numbered.
+/// Separates clouds from other text files. Clouds are numbered, so only files whose name differs from all others in
+/// more than a number are inspected.
 pub(super) fn sort_out(paths: Vec<PathBuf>) -> Texts {
     let mut forms = BTreeMap::new();
     for path in &paths {
@@ -145,7 +145,7 @@ pub(super) fn sort_out(paths: Vec<PathBuf>) -> Texts {
     texts
 }
 
-/// What a depth data set has in place of `depth.txt`, and the way to that.
+/// Returns a hint for a depth data set that has an association file instead of `depth.txt`.
 pub(super) fn depth_list_of(path: &Path) -> Option<String> {
     if !stem_of(path).starts_with("assoc") {
         return None;
@@ -166,7 +166,7 @@ fn stem_of(path: &Path) -> String {
     path.file_stem().map(|stem| stem.to_string_lossy().to_lowercase()).unwrap_or_default()
 }
 
-/// A name with `#` for each number.
+/// Returns the name with each number replaced by `#`.
 fn form_of(path: &Path) -> String {
     let mut form = String::new();
     for letter in name_of(path).chars() {
@@ -178,7 +178,7 @@ fn form_of(path: &Path) -> String {
     form
 }
 
-/// Whether the words of a file's name are those of texts beside clouds: `imu0`, `gt_poses`, `left_camera`.
+/// Returns whether all words of the name are those of companion files, such as `imu0`, `gt_poses` or `left_camera`.
 fn is_named(path: &Path) -> bool {
     let stem = stem_of(path);
     let words = stem.split(|letter: char| !letter.is_alphanumeric()).filter(|word| !word.is_empty());
@@ -191,7 +191,7 @@ fn is_named(path: &Path) -> bool {
     is_named && are_known
 }
 
-/// What a text is that is no cloud.
+/// Returns the kind of a text file that is not a cloud.
 fn other_than_cloud(path: &Path) -> Option<String> {
     let start = first_bytes(path).ok()?;
     if let Err(reason) = check_start(&start, true) {
@@ -231,7 +231,7 @@ fn other_than_cloud(path: &Path) -> Option<String> {
     (is_named(path) && is_whole && rows.len() <= FEW_ROWS).then(|| "a few numbers, as of a camera".to_owned())
 }
 
-/// The names of columns at the start of a text, and its first rows of numbers.
+/// Parses the column names at the start of a text and its first rows of numbers.
 fn rows_of(start: &[u8]) -> (Vec<String>, Vec<Vec<f64>>) {
     let (mut names, mut rows) = (Vec::new(), Vec::new());
     let mut lines = RawLines::new(start, MAX_LINE_BYTES);
@@ -254,7 +254,7 @@ fn rows_of(start: &[u8]) -> (Vec<String>, Vec<Vec<f64>>) {
             None => {}
         }
     }
-    // The last one may be cut.
+    // The last row may be truncated.
     if start.len() as u64 == GLANCE_BYTES && rows.len() < MAX_ROWS {
         rows.pop();
     }
@@ -310,7 +310,7 @@ mod tests {
             ("scan_1.csv", "nothing that is read"),
             ("scan_2.csv", "1,2,3\n"),
         ]);
-        // A damaged one of many is an error of its own.
+        // A damaged cloud among many is reported as an error when it is read.
         assert_eq!((found.len(), others.len()), (6, 0), "{others:?}");
     }
 

@@ -12,14 +12,14 @@ use voxtile::{Error, FormatError, Result};
 
 const KITTI: [&str; 4] = ["x", "y", "z", "intensity"];
 const NUSCENES: [&str; 5] = ["x", "y", "z", "intensity", "ring"];
-/// Bytes of the start of a file that tell its columns: whole points of three to eight floats or doubles.
+/// Number of bytes used to guess the columns: a whole number of points of three to eight floats or doubles.
 const GLANCE_BYTES: u64 = 3 * 840 * 8;
-/// Points that say nothing of their columns are no more than this.
+/// Up to this many points do not give enough evidence for the columns.
 const FEW_POINTS: usize = 16;
-/// More columns than any sensor has.
+/// Limit well above the number of columns of any sensor.
 const MAX_FIELDS: usize = 256;
 
-/// The points of a file of numbers without a header.
+/// Points of a headerless file of numbers.
 struct BinPoints {
     path: PathBuf,
     input: BufReader<File>,
@@ -31,7 +31,7 @@ struct BinPoints {
     remarks: Vec<String>,
 }
 
-/// The columns of a file: names, types, and where they are in a point.
+/// Columns of a file: names, types and byte offsets in a point.
 struct Columns {
     names: Vec<String>,
     places: Vec<(usize, Scalar)>,
@@ -39,7 +39,7 @@ struct Columns {
 }
 
 impl Columns {
-    /// Names, each perhaps with a type behind a colon: `x:f64`.
+    /// Parses names with optional types after a colon, such as `x:f64`.
     fn of(fields: &[String]) -> Self {
         let mut columns = Self { names: Vec::new(), places: Vec::new(), point_bytes: 0 };
         for field in fields {
@@ -52,7 +52,7 @@ impl Columns {
         columns
     }
 
-    /// The columns of a reading that are known: x y z, and in the fourth of four the intensity.
+    /// Builds the known columns of a reading: x y z, and intensity if there are four.
     fn of_reading(reading: Reading) -> Self {
         let mut names: Vec<String> =
             KITTI.iter().take(reading.columns).map(|name| (*name).to_owned()).collect();
@@ -67,8 +67,8 @@ impl Columns {
     }
 }
 
-/// Opens a file of numbers without a header. Nothing in it names its columns: its size must fit them, and what is not
-/// named is checked against the numbers.
+/// Opens a headerless file of numbers. Its size must fit the named columns; if no columns are named, they are guessed
+/// from the numbers.
 pub(crate) fn open(
     path: &Path,
     mut head: CloudHead,
@@ -127,7 +127,7 @@ pub(crate) fn open(
     Ok((head, Box::new(points)))
 }
 
-/// The columns of a file whose columns were not named: those of KITTI or nuScenes, unless its numbers say otherwise.
+/// Guesses the columns of a file: those of KITTI or nuScenes, unless the numbers contradict them.
 fn guess(path: &Path, is_nuscenes: bool, start: &[u8], bytes: u64) -> Result<Columns> {
     let names = if is_nuscenes { &NUSCENES[..] } else { &KITTI[..] };
     let usual = Reading { kind: Scalar::F32, columns: names.len() };
@@ -152,7 +152,7 @@ fn guess(path: &Path, is_nuscenes: bool, start: &[u8], bytes: u64) -> Result<Col
     }
     match BinStart::new(start, bytes).judge(usual) {
         Verdict::Wrong(reason) => Err(wrong(reason.to_owned())),
-        // Where the colour or the time is in 6 columns does not matter for x, y and z.
+        // The order of colour and time in 6 columns does not affect x, y and z.
         Verdict::Other(other) if matches!(other.columns, 3 | 4 | 6) => Ok(Columns::of_reading(other)),
         Verdict::Other(other) => Err(wrong(format!(
             "its numbers repeat every {} of {}, not every {} of float32: name the columns of the file as fields, for \
@@ -186,14 +186,14 @@ fn guess(path: &Path, is_nuscenes: bool, start: &[u8], bytes: u64) -> Result<Col
     }
 }
 
-/// Names for the columns of a reading, to begin with.
+/// Suggests column names for a reading, for messages.
 fn example(reading: Reading) -> String {
     let kind = if reading.kind == Scalar::F64 { ":f64" } else { "" };
     let names = NUSCENES.map(str::to_owned).into_iter().chain((6..).map(|number| format!("column{number}")));
     names.take(reading.columns).map(|name| name + kind).collect::<Vec<_>>().join(",")
 }
 
-/// What a person should know of columns that were guessed.
+/// Describes guessed columns to the user.
 fn said_of(columns: &Columns) -> String {
     let count = columns.names.len();
     let is_wide = columns.places.iter().any(|(_, kind)| *kind == Scalar::F64);
@@ -203,8 +203,8 @@ fn said_of(columns: &Columns) -> String {
     format!("{count} columns of {}: {}{rest}", if is_wide { "float64" } else { "float32" }, known.join(" "))
 }
 
-/// Whether a file, read as five columns, has a ring in the last one, and as four no intensity there. In the wrong five
-/// columns, the last holds coordinates by turns, which are not all whole numbers; in the wrong four likewise.
+/// Returns whether the fifth of five columns is a ring and the data is not four columns with intensity. With a wrong
+/// column count, the last column contains coordinates, which are not all whole numbers.
 fn looks_like_nuscenes(start: &[u8]) -> bool {
     let floats: Vec<f32> = start.as_chunks().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
     let last_of = |columns: usize| floats.iter().skip(columns - 1).step_by(columns).copied();

@@ -1,45 +1,45 @@
-//! Which columns a file of numbers without a header has.
+//! Guesses the columns of a headerless file of numbers.
 
 use super::scalar::Scalar;
 
-/// The start of a file of numbers.
+/// First bytes of a file of numbers.
 pub(super) struct BinStart<'b> {
     bytes: &'b [u8],
     file_bytes: u64,
 }
 
-/// A reading of a file: numbers of one type, so many a point.
+/// Interpretation of a file: the type of its numbers and the numbers per point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Reading {
     pub(super) kind: Scalar,
     pub(super) columns: usize,
 }
 
-/// What the numbers say of a reading.
+/// Result of judging a reading.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Verdict {
-    /// Nothing speaks for another one.
+    /// No other reading fits better.
     Right,
-    /// Another one fits clearly better.
+    /// Another reading fits clearly better.
     Other(Reading),
-    /// Two others fit, of which one has a multiple of the columns of the other.
+    /// Two other readings fit; the columns of one are a multiple of the other's.
     Either(Reading, Reading),
-    /// Another one fits as well, and the fourth column is negative: no intensity is.
+    /// Another reading fits as well, and the fourth column has negative values, which intensities do not have.
     Doubtful(Reading),
-    /// The bytes are of another kind: text, big-endian.
+    /// The bytes are not little-endian floats, for instance text or big-endian numbers.
     Wrong(&'static str),
 }
 
-/// Numbers of a point that are tried.
+/// Numbers per point to try.
 const COLUMNS: std::ops::RangeInclusive<usize> = 3..=8;
-/// Fewer points say nothing of their columns.
+/// Fewer points do not give enough evidence.
 const FEW_POINTS: usize = 16;
-/// A right reading has a spread of less than this share of that of any wrong one. Measured on lidars and depth cameras,
-/// also in random order: 0.01 to 0.3.
+/// The spread of the correct reading is below this fraction of the spread of any wrong one. Measured fractions for
+/// lidars and depth cameras, also in random point order: 0.01 to 0.3.
 const CLEARLY: f64 = 0.5;
-/// A spread above this is that of numbers which have nothing in common.
+/// Numbers with a larger spread are unrelated.
 const UNRELATED: f64 = 0.7;
-/// Shares of numbers that may be coordinates: of nearly all, of hardly any.
+/// Fractions of plausible values: nearly all values, or few of them.
 const NEARLY_ALL: f64 = 0.98;
 const HARDLY_ANY: f64 = 0.5;
 
@@ -58,7 +58,8 @@ impl<'b> BinStart<'b> {
         Self { bytes, file_bytes }
     }
 
-    /// Whether a reading fits: of the same columns, points follow each other closely, and those of others do not.
+    /// Judges a reading: in the correct one, successive values of a column are close, and values of different columns
+    /// are not.
     pub(super) fn judge(&self, reading: Reading) -> Verdict {
         let is_text = |byte: &u8| byte.is_ascii_graphic() || byte.is_ascii_whitespace();
         if self.bytes.len() >= FEW_POINTS && self.bytes.iter().all(is_text) {
@@ -107,8 +108,8 @@ impl<'b> BinStart<'b> {
         Verdict::Right
     }
 
-    /// A reading with a multiple of the columns that fits clearly better: perhaps that is right, perhaps points take
-    /// turns, as those of two lasers do.
+    /// Returns a reading with a multiple of the columns that fits clearly better. Either it is correct, or the points
+    /// alternate, as those of two lasers do.
     fn multiple_of(&self, reading: Reading, spreads: &Spreads) -> Option<Reading> {
         let spread = |columns: usize| spreads.at(columns).unwrap_or(f64::INFINITY);
         let mut multiples = (2..=COLUMNS.end() / reading.columns).map(|times| times * reading.columns);
@@ -117,8 +118,8 @@ impl<'b> BinStart<'b> {
         self.file_bytes.is_multiple_of(multiple.point_bytes()).then_some(multiple)
     }
 
-    /// The reading, other than this one, that the file has whole points of and that has the least spread; of multiples
-    /// the first that has one.
+    /// Returns the best other reading with a whole number of points: the one with the least spread, with fewest columns
+    /// among multiples.
     fn best(&self, kind: Scalar, spreads: &Spreads, than: Reading) -> Option<Reading> {
         let readings = COLUMNS.map(|columns| Reading { kind, columns });
         let fitting = readings.filter(|reading| self.file_bytes.is_multiple_of(reading.point_bytes()));
@@ -142,7 +143,7 @@ impl<'b> BinStart<'b> {
     }
 }
 
-/// The share of numbers that may be coordinates, intensities or times.
+/// Returns the fraction of numbers that are plausible coordinates, intensities or times.
 fn plausible(values: &[f64]) -> f64 {
     let numbers = values.iter().filter(|value| !value.is_nan());
     let (mut all, mut good) = (0_u32, 0_u32);
@@ -153,8 +154,8 @@ fn plausible(values: &[f64]) -> f64 {
     if all == 0 { 1.0 } else { f64::from(good) / f64::from(all) }
 }
 
-/// How far numbers are apart that are so many places apart, in units of their variance: about 1 where they have nothing
-/// in common.
+/// Mean squared difference of numbers a given number of places apart, in units of their variance: about 1 for unrelated
+/// numbers.
 struct Spreads(Vec<Option<f64>>);
 
 impl Spreads {
@@ -176,7 +177,7 @@ impl Spreads {
         self.0.get(columns.checked_sub(*COLUMNS.start())?).copied().flatten()
     }
 
-    /// The least spread of numbers of columns that are no multiple of these.
+    /// Returns the least spread over column counts that are not multiples of `columns`.
     fn least_of_others(&self, columns: usize) -> f64 {
         let others = COLUMNS.filter(|other| !other.is_multiple_of(columns));
         others.filter_map(|other| self.at(other)).fold(f64::INFINITY, f64::min)
@@ -191,10 +192,9 @@ fn scaled(value: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// The numbers of a point.
     type Row<'r> = &'r dyn Fn(usize) -> Vec<f64>;
 
-    /// Numbers in a fixed order that looks random.
+    /// Deterministic pseudo-random numbers.
     fn noise(seed: usize) -> f64 {
         let mixed = (seed as u64)
             .wrapping_mul(0x9e37_79b9_7f4a_7c15)
@@ -215,7 +215,7 @@ mod tests {
         BinStart::new(bytes, bytes.len() as u64).judge(Reading { kind: Scalar::F32, columns })
     }
 
-    /// A room, in order and in none.
+    /// Random points of a room.
     fn room(k: usize) -> [f64; 3] {
         [6.0 * noise(3 * k) + 1.0, 8.0 * noise(3 * k + 1) - 4.0, noise(3 * k + 2) - 1.0]
     }
@@ -236,7 +236,7 @@ mod tests {
             }),
         ];
         for (what, row) in rows {
-            // Sizes that fit any number of columns.
+            // A number of points for which the file size fits every column count.
             assert_eq!(judge(&bytes(Scalar::F32, 840, row), 4), Verdict::Right, "{what}");
         }
         assert_eq!(judge(&bytes(Scalar::F32, 840, &|_| vec![0.0; 4]), 4), Verdict::Right);
@@ -267,7 +267,7 @@ mod tests {
 
     #[test]
     fn what_says_nothing_is_doubtful_only_with_a_negative_intensity() {
-        // Each column is as any other.
+        // All columns have the same distribution.
         let cube = |k: usize| [0, 1, 2].map(|axis| noise(3 * k + axis) - 0.5).to_vec();
         let three = bytes(Scalar::F32, 840, &cube);
         assert!(matches!(judge(&three, 4), Verdict::Doubtful(_)));

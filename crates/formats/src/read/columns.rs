@@ -1,21 +1,21 @@
-//! What the columns of a table of points mean, by their names.
+//! Meaning of the columns of a table of points, derived from their names.
 
 use super::cloud::CloudPoint;
 use super::units::{LengthUnit, TimeUnit, name_and_unit};
 
-/// A column with times.
+/// A column of times.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct TimeColumn {
     pub(super) at: usize,
-    /// Seconds in a unit.
+    /// Unit of the column, in seconds.
     pub(super) unit_s: f64,
 }
 
-/// Which columns are read.
+/// Columns to read.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Meaning {
     pub(super) xyz: [usize; 3],
-    /// The units of x, y and z.
+    /// Units of x, y and z.
     pub(super) units: [LengthUnit; 3],
     pub(super) intensity: Option<usize>,
     pub(super) time: Option<TimeColumn>,
@@ -24,7 +24,7 @@ pub(super) struct Meaning {
 const INTENSITIES: [&str; 6] = ["intensity", "reflectivity", "reflectance", "remission", "intensities", "i"];
 const TIMES: [&str; 8] =
     ["time", "timestamp", "t", "offset_time", "gps_time", "gpstime", "stamps", "time_offset"];
-/// What stands in brackets behind a coordinate and is no unit.
+/// Bracketed texts after a coordinate name that are not units.
 const NO_UNITS: [&str; 21] = [
     "world",
     "local",
@@ -49,7 +49,7 @@ const NO_UNITS: [&str; 21] = [
     "float64",
 ];
 
-/// A column by its name.
+/// A column name and its parts.
 struct Column<'n> {
     written: &'n str,
     name: String,
@@ -57,7 +57,7 @@ struct Column<'n> {
 }
 
 impl<'n> Column<'n> {
-    /// A name in lower case without what programs put around it, and the unit that was behind it.
+    /// Parses a name: lower case, without the prefixes that programs add, and with the unit separated.
     fn of(written: &'n str) -> Self {
         let (name, unit) = name_and_unit(written);
         if let Some((name, unit)) = array_name(&name) {
@@ -67,7 +67,7 @@ impl<'n> Column<'n> {
         Self { written, name, unit }
     }
 
-    /// The unit of a coordinate; `None` if the name has none.
+    /// Returns the unit of a coordinate; `None` if the name has none.
     fn length(&self) -> Result<Option<LengthUnit>, String> {
         let Some(unit) = self.unit.as_deref().filter(|unit| !NO_UNITS.contains(unit)) else {
             return Ok(None);
@@ -82,7 +82,7 @@ impl<'n> Column<'n> {
     }
 }
 
-/// A column of an array of VTK: `Points_m_XYZ:0` of VeloView is `points:0` in metres.
+/// Parses the name of a VTK array column: `Points_m_XYZ:0` of VeloView is `points:0` in metres.
 fn array_name(name: &str) -> Option<(String, Option<String>)> {
     let (array, number) = name.rsplit_once(':')?;
     let unit = array.strip_prefix("points_")?.strip_suffix("xyz")?.trim_end_matches('_');
@@ -90,23 +90,24 @@ fn array_name(name: &str) -> Option<(String, Option<String>)> {
 }
 
 impl Meaning {
-    /// Three coordinates in metres, without more.
+    /// Three coordinates in metres, without intensity and time.
     pub(super) fn of_metres(xyz: [usize; 3]) -> Self {
         Self { xyz, units: [LengthUnit::METRE; 3], intensity: None, time: None }
     }
 
-    /// Finds the columns by name; `None` without x, y and z. `is_integer` tells which columns hold integers: without a
-    /// unit, their times are nanoseconds (Ouster's `t`, Livox' `offset_time`), and those of floats are seconds.
+    /// Finds the columns by name. Returns `None` without x, y and z. `is_integer` returns whether a column holds
+    /// integers: times without a unit are nanoseconds in integer columns (Ouster's `t`, Livox' `offset_time`) and
+    /// seconds in others.
     ///
     /// # Errors
     ///
-    /// Coordinates whose unit is not known.
+    /// The unit of a coordinate is unknown.
     pub(super) fn of(names: &[String], is_integer: impl Fn(usize) -> bool) -> Result<Option<Self>, String> {
         let columns: Vec<Column> = names.iter().map(|name| Column::of(name)).collect();
         let named = |wanted: &str| {
             let mut found = columns.iter().enumerate().filter(|(_, column)| column.name == wanted);
             let first = found.clone().next();
-            // Beside pixels there may be metres.
+            // A table may have pixel coordinates in addition to metres.
             found.find(|(_, column)| column.length().is_ok()).or(first).map(|(at, _)| at)
         };
         let axis = |short: &str, number: usize| {
@@ -118,7 +119,7 @@ impl Meaning {
         let mut meaning = Self::of_metres([x, y, z]);
         meaning.units = units_of([x, y, z].map(|at| columns.get(at)))?;
         let find = |is_it: &dyn Fn(&Column) -> bool| columns.iter().position(is_it);
-        // `t_m` is a translation.
+        // `t_m` is a translation, not a time.
         let is_length =
             |unit: &Option<String>| unit.as_deref().is_some_and(|unit| LengthUnit::named(unit).is_some());
         let time = |name: &str| find(&|column| column.name == name && !is_length(&column.unit));
@@ -131,7 +132,7 @@ impl Meaning {
         Ok(Some(meaning))
     }
 
-    /// What a person should know of the units.
+    /// Returns a remark for the user about the units.
     pub(super) fn remark(&self) -> Option<String> {
         let [x, y, z] = self.units.map(|unit| unit.name);
         if self.units == [LengthUnit::METRE; 3] {
@@ -145,24 +146,22 @@ impl Meaning {
         Some(format!("coordinates become metres: {units}, by the names of their columns"))
     }
 
-    /// The columns that are read.
     fn all(&self) -> impl Iterator<Item = usize> {
         let more = self.intensity.into_iter().chain(self.time.map(|time| time.at));
         self.xyz.into_iter().chain(more)
     }
 
-    /// Whether a column is read.
     pub(super) fn reads(&self, at: usize) -> bool {
         self.all().any(|column| column == at)
     }
 
-    /// The last column that is needed.
+    /// Returns the index of the last column in use.
     pub(super) fn last(&self) -> usize {
         self.all().max().unwrap_or(0)
     }
 }
 
-/// The units of three columns: of each, or of none.
+/// Returns the units of three columns. Either all columns have a unit or none has.
 fn units_of(columns: [Option<&Column>; 3]) -> Result<[LengthUnit; 3], String> {
     let mut units = [None; 3];
     for (unit, column) in units.iter_mut().zip(columns) {
@@ -180,10 +179,10 @@ fn units_of(columns: [Option<&Column>; 3]) -> Result<[LengthUnit; 3], String> {
     Ok(units.map(|unit| unit.unwrap_or(LengthUnit::METRE)))
 }
 
-/// Times beyond this many seconds count from an epoch, not from the stamp of a cloud.
+/// Larger times, in seconds, count from an epoch instead of the cloud's stamp.
 const ABSOLUTE_S: f64 = 1e8;
 
-/// Makes times relative to the stamp of their cloud.
+/// Converts times to be relative to the stamp of their cloud.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Clock {
     stamp_ns: Option<i64>,
@@ -195,7 +194,7 @@ impl Clock {
         Self { stamp_ns, first_s: None }
     }
 
-    /// Seconds after the stamp; after the first point where the cloud has no stamp.
+    /// Returns the time after the stamp in seconds, or after the first point if the cloud has no stamp.
     fn relative_s(&mut self, time_s: f64) -> f64 {
         if !time_s.is_finite() {
             return 0.0;
@@ -210,14 +209,14 @@ impl Clock {
         time_s - base
     }
 
-    /// The point of a row; NaN where nothing came back.
+    /// Creates the point of a row. Its position is NaN where there was no return.
     pub(super) fn point(&mut self, meaning: &Meaning, value: impl Fn(usize) -> f64) -> CloudPoint {
         let intensity = meaning.intensity.map(&value);
         let time = meaning.time.map(|time| value(time.at));
         self.point_of(meaning, meaning.xyz.map(&value), intensity, time)
     }
 
-    /// The point of the values of a row, in the units of their columns.
+    /// Creates the point of a row from values in the units of their columns.
     pub(super) fn point_of(
         &mut self,
         meaning: &Meaning,

@@ -5,25 +5,25 @@ use super::units::LengthUnit;
 /// Unit of the axes of a coordinate reference system.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct CrsUnit {
-    /// Metres in the unit.
+    /// Length of the unit in metres.
     pub(super) metres: f64,
-    /// Name and factor as written, if the factor is that of another unit. The name is used.
+    /// Name and factor as written, if the factor belongs to another unit. The name takes precedence.
     pub(super) conflict: Option<(String, f64)>,
 }
 
 pub(super) const FOOT_M: f64 = LengthUnit::FOOT.metres(1.0);
 pub(super) const US_FOOT_M: f64 = LengthUnit::US_SURVEY_FOOT.metres(1.0);
-/// Factors are written with so many digits. Feet of all kinds are as near to each other.
+/// Relative tolerance for factors, which are rounded in files. The kinds of feet differ by less.
 const SAME: f64 = 1e-4;
 
 impl CrsUnit {
-    /// Unit of a name and a factor. `None` if neither is known.
+    /// Determines the unit from a name and a factor. `None` if neither is known.
     pub(super) fn of(name: &str, factor: Option<f64>) -> Option<Self> {
         let (metres, conflict) = match (metres_by_name(name), factor) {
             (Some(known), Some(factor)) if (factor / known - 1.0).abs() > SAME => {
                 (known, Some((name.to_owned(), factor)))
             }
-            // Feet differ in the digits of their factors.
+            // Kinds of feet differ only in the last digits of their factors.
             (_, Some(factor)) => (factor, None),
             (known, None) => (known?, None),
         };
@@ -31,7 +31,7 @@ impl CrsUnit {
     }
 }
 
-/// Metres in a unit, by its name without blanks and punctuation: `Foot_US`, `US survey foot`.
+/// Returns the length of a unit in metres, by its name without blanks and punctuation: `Foot_US`, `US survey foot`.
 fn metres_by_name(name: &str) -> Option<f64> {
     let letters = name.chars().filter(|letter| letter.is_alphanumeric());
     let plain: String = letters.flat_map(char::to_lowercase).collect();

@@ -10,13 +10,13 @@ use std::io::BufReader;
 use std::path::{Path, PathBuf};
 use voxtile::{FormatError, Result};
 
-/// A depth image before it is read.
+/// A depth image to read.
 pub(super) struct Frame {
     pub(super) path: PathBuf,
     pub(super) head: CloudHead,
 }
 
-/// Tells the frames one after the other, with their poses and what there is to say of them.
+/// Sequence of depth images with their poses, and remarks on them.
 pub(super) trait Frames: Send {
     fn next(&mut self) -> Result<Option<Frame>>;
 
@@ -29,15 +29,15 @@ pub(super) trait Frames: Send {
     }
 }
 
-/// How depths are written.
+/// Interpretation of depth images.
 #[derive(Clone, Copy)]
 pub(super) struct DepthCode {
     pub(super) camera: Intrinsics,
-    /// Units in a metre.
+    /// Image units per metre.
     pub(super) scale: f64,
 }
 
-/// Clouds of depth images.
+/// Source of clouds from depth images.
 pub(super) struct DepthFrames {
     format: String,
     frames: Box<dyn Frames>,
@@ -92,7 +92,7 @@ fn open(path: &Path) -> Result<Reader> {
     reader.map_err(|(at, reason)| FormatError::at_offset(at, reason).in_input(path))
 }
 
-/// Reads an image row by row: each pixel is a point, or the direction in which nothing came back.
+/// Reads an image row by row. Each pixel is a point, or a direction without a return.
 fn read(path: &Path, code: &DepthCode, visit: Visit<'_>) -> Result<()> {
     let mut reader = open(path)?;
     let (_, height) = size(&reader);

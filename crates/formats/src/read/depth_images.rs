@@ -11,33 +11,32 @@ use std::fs::{self, DirEntry};
 use std::path::{Path, PathBuf};
 use voxtile::{Error, FormatError, Result};
 
-/// Depth images in the order of their names, each perhaps with a pose beside it: `frame-000000.pose.txt`.
+/// Depth images in order of their names, each with an optional pose file such as `frame-000000.pose.txt`.
 struct ImageFrames {
     files: u64,
     paths: std::vec::IntoIter<PathBuf>,
     stamps: NameStamps,
     lost: u64,
-    /// What is wrong with the first pose that cannot be read.
+    /// Description of the first unreadable pose.
     first_bad: Option<String>,
 }
 
-/// Units of a depth image in a metre: millimetres.
+/// Image units per metre: millimetres.
 const SCALE: f64 = 1000.0;
-/// A file of a pose is small.
+/// Limit for a pose file.
 const MAX_POSE_BYTES: u64 = 1 << 14;
 
-/// Whether depth images have files with their poses, as those of 7-Scenes have.
+/// Returns whether depth images have pose files, as in the 7-Scenes data set.
 pub(crate) fn has_poses(folder: &Path) -> bool {
     let is_pose = |entry: DirEntry| entry.file_name().to_string_lossy().ends_with(".pose.txt");
     fs::read_dir(folder).is_ok_and(|entries| entries.flatten().any(is_pose))
 }
 
-/// Opens a folder of depth images.
 pub(crate) fn open(folder: &Path, options: &ReadOptions) -> Result<Box<dyn CloudSource>> {
     let listing = Listing::read(folder, &options.not_clouds())?;
     let mut paths: Vec<PathBuf> =
         listing.clouds().filter(|path| extension_of(path) == "png").cloned().collect();
-    // Beside colours, depths say that they are depths.
+    // If colour images are present too, only the images named as depth are used.
     if paths.iter().any(|path| is_named_depth(path)) {
         paths.retain(|path| is_named_depth(path));
     }
@@ -91,7 +90,7 @@ impl Frames for ImageFrames {
     }
 }
 
-/// The pose of the camera in the world: a matrix of 4x4. `None` where tracking was lost.
+/// Reads the pose of the camera in the world: a 4x4 matrix. `None` where tracking was lost.
 fn pose(path: &Path) -> Result<Option<RigidPose>> {
     use std::io::Read;
     let mut text = String::new();
@@ -101,7 +100,7 @@ fn pose(path: &Path) -> Result<Option<RigidPose>> {
     let wrong = |reason: String| FormatError::at_line(1, reason).in_input(path);
     let mut numbers = Vec::new();
     for word in text.split_ascii_whitespace() {
-        // Windows writes `-1.#IND` for what is not a number.
+        // Windows programs write `-1.#IND` for NaN.
         let number = if word.contains('#') { Ok(f64::NAN) } else { word.parse::<f64>() };
         numbers.push(number.map_err(|_| wrong(format!("`{word:.40}` is not a number")))?);
     }

@@ -12,26 +12,26 @@ use crate::read_options::ReadOptions;
 use std::path::{Path, PathBuf};
 use voxtile::{Error, Result};
 
-/// The lines of `depth.txt`: a stamp in seconds and a file.
+/// Lines of `depth.txt`: a stamp in seconds and a file name.
 struct TumFrames {
     folder: PathBuf,
     lines: Lines,
-    /// Lines that name no image, and what is wrong with the first.
+    /// Number of invalid lines.
     bad: u64,
     first_bad: Option<Error>,
     has_frame: bool,
 }
 
-/// Units of a depth image in a metre.
+/// Image units per metre.
 const SCALE: f64 = 5000.0;
 
-/// Whether a folder has the list of TUM RGB-D. A recording may have one beside it.
+/// Returns whether a folder has the list of a TUM RGB-D data set. Recordings may contain such a file too.
 pub(crate) fn is_folder(folder: &Path) -> bool {
     let list = folder.join("depth.txt");
     list.exists() && !list.is_dir() && !is_rosbag2(folder)
 }
 
-/// Opens a folder of TUM RGB-D. Its poses, `groundtruth.txt`, are a file of poses.
+/// Opens a TUM RGB-D folder. Its `groundtruth.txt` is read as a pose file.
 pub(crate) fn open(folder: &Path, options: &ReadOptions) -> Result<Box<dyn CloudSource>> {
     let camera = match options.intrinsics {
         Some(camera) => camera,
@@ -88,7 +88,7 @@ impl Frames for TumFrames {
     }
 }
 
-/// The stamp and the file of a line.
+/// Parses the stamp and the file name of a line.
 fn frame(line: &str) -> std::result::Result<(i64, &str), String> {
     let Some((stamp, file)) = line.split_once([' ', '\t', ',']) else {
         return Err("a line has a time stamp in seconds and the file of a depth image".into());

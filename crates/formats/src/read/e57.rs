@@ -14,22 +14,22 @@ use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use voxtile::{Error, FormatError, Result};
 
-/// The scans of an E57 file.
+/// Source of the scans of an E57 file.
 struct E57 {
     path: PathBuf,
     reader: E57Reader<BufReader<File>>,
     scans: Vec<PointCloud>,
     next: usize,
     is_read: bool,
-    /// Whether the caller knows where the sensor of scans without a pose was.
+    /// Whether the caller provides the sensor position of scans without a pose.
     has_origin: bool,
     crs: Option<String>,
     remarks: Vec<String>,
     budget: Budget,
 }
 
-/// Opens an E57 file: each scan is a cloud in the frame of its scanner, with its pose. A scan without a pose is in the
-/// frame of the file, and its sensor at the origin of that, if no other one is given.
+/// Opens an E57 file. Each scan is a cloud in the frame of its scanner, with its pose. A scan without a pose is in the
+/// file's frame, with the sensor at its origin unless another position is given.
 pub(crate) fn open(path: &Path, options: &ReadOptions) -> Result<Box<dyn CloudSource>> {
     let (has_origin, budget) = (options.sensor_origin_m.is_some(), &options.budget());
     let mut file = File::open(path).map_err(|error| Error::io(path, "read", error))?;
@@ -39,7 +39,7 @@ pub(crate) fn open(path: &Path, options: &ReadOptions) -> Result<Box<dyn CloudSo
     let scans = reader.pointclouds();
     let mut remarks = Vec::new();
     let mut crs = reader.coordinate_metadata().map(str::to_owned).filter(|crs| !crs.trim().is_empty());
-    // Coordinates of E57 are metres, whatever is said of them.
+    // E57 coordinates are always in metres, even if the coordinate system names another unit.
     let units = crs.as_deref().map(WktUnits::of);
     if units.is_some_and(|units| [units.flat, units.high].iter().flatten().any(|unit| unit.metres != 1.0)) {
         crs = None;
@@ -61,8 +61,8 @@ pub(crate) fn open(path: &Path, options: &ReadOptions) -> Result<Box<dyn CloudSo
     Ok(Box::new(E57 { path, reader, scans, next, is_read, has_origin, crs, remarks, budget }))
 }
 
-/// Checks that the description of the scans fits in memory, and takes no long time. The library holds all of it, as text
-/// and as a tree.
+/// Checks that the XML section fits in memory and can be parsed quickly. The library holds all of it, as text and as a
+/// tree.
 fn check_xml(path: &Path, file: &mut File, budget: &Budget) -> Result<()> {
     let fail = |error| Error::io(path, "read", error);
     let mut header = Vec::new();
@@ -103,15 +103,15 @@ fn check_xml(path: &Path, file: &mut File, budget: &Budget) -> Result<()> {
     file.seek(SeekFrom::Start(0)).map(drop).map_err(fail)
 }
 
-/// The first bytes of a file, and how many its header has.
+/// Signature and length of the file header.
 const SIGNATURE: &[u8] = b"ASTM-E57";
 const HEADER_BYTES: usize = 48;
-/// Each point takes the time of its fields, also of those that take no bytes of the file.
+/// Limit for fields per point. Every field costs time for each point, even if it takes no bytes in the file.
 const MAX_FIELDS: usize = 256;
-/// What a tag or an attribute takes in the library's tree.
+/// Approximate memory for a tag or an attribute in the library's tree.
 const NODE_BYTES: u64 = 100;
 
-/// The name of a field, as the library spells it.
+/// Returns the name of a field as spelled by the library.
 fn name_of(name: &RecordName) -> String {
     match name {
         RecordName::Unknown { name, .. } => name.clone(),
@@ -119,8 +119,8 @@ fn name_of(name: &RecordName) -> String {
     }
 }
 
-/// Whether any field of a point takes bits of the file. The library counts points by those bits: where there are none,
-/// a single packet would fill all memory with points.
+/// Returns whether any field of a point takes bits in the file. The library counts points by these bits: without any, a
+/// single packet would fill the memory with points.
 fn has_bits(scan: &PointCloud) -> bool {
     scan.prototype.iter().any(|record| match record.data_type {
         RecordDataType::ScaledInteger { min, max, .. } | RecordDataType::Integer { min, max } => min < max,
@@ -217,7 +217,7 @@ impl CloudSource for E57 {
     }
 }
 
-/// Where a point is, or where nothing came back.
+/// Returns the position of a point and whether it is a return.
 fn place(cartesian: &CartesianCoordinate, spherical: &SphericalCoordinate) -> ([f64; 3], bool) {
     match (cartesian, spherical) {
         (CartesianCoordinate::Valid { x, y, z }, _) => {

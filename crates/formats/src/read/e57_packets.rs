@@ -6,19 +6,19 @@ use std::io::{self, Read};
 use std::path::Path;
 use voxtile::{Error, FormatError, Result};
 
-/// Bytes of memory for a value that waits for the others of its point, and for a point that waits to be taken.
+/// Memory for an unpacked value whose point is incomplete, and for a complete point not yet consumed.
 const VALUE_BYTES: u64 = 32;
 const POINT_BYTES: u64 = 320;
 const INDEX: u8 = 0;
 const DATA: u8 = 1;
 const IGNORED: u8 = 2;
 
-/// Checks that each packet of a scan fits in memory once it is decoded. The library takes a packet as a whole, and keeps
-/// values of a field until those of all others have come: a bit of the file may take hundreds of bytes.
+/// Checks that each packet of a scan fits in memory after decoding. The library decodes whole packets and keeps the
+/// values of a field until those of all other fields are available, so one bit in the file may take hundreds of bytes.
 ///
 /// # Errors
 ///
-/// A packet that takes too much; a file that cannot be read. What else is wrong with packets, the library reports.
+/// A packet takes too much memory, or the file cannot be read. Other problems of packets are reported by the library.
 pub(super) fn check_packets(path: &Path, scan: &PointCloud, budget: &Budget) -> Result<()> {
     let fail = |error| Error::io(path, "read", error);
     let mut file = File::open(path).map_err(fail)?;
@@ -42,18 +42,18 @@ pub(super) fn check_packets(path: &Path, scan: &PointCloud, budget: &Budget) -> 
     }
 }
 
-/// What the packets of a scan have unpacked so far.
+/// State of the packets decoded so far.
 struct Packets {
-    /// Bits of a value of each field.
+    /// Bits per value of each field.
     bits: Vec<u64>,
-    /// Bits of each field.
+    /// Unpacked bits of each field.
     unpacked: Vec<u64>,
-    /// Points whose values have all come.
+    /// Number of complete points.
     points: u64,
 }
 
 impl Packets {
-    /// The bytes that a packet takes, if they are more than `most_bytes`.
+    /// Returns the memory that a packet takes, if it exceeds `most_bytes`.
     fn check(&mut self, file: &mut File, scan: &PointCloud, most_bytes: u64) -> io::Result<Option<u64>> {
         let mut pages = Pages::new(file, scan.file_offset)?;
         let mut section = [0; 32];
@@ -66,7 +66,7 @@ impl Packets {
             let [kind, _, length @ ..] = head;
             let length = u64::from(u16::from_le_bytes(length)) + 1;
             match kind {
-                // As the library passes over them.
+                // The library skips these packets too.
                 INDEX => pages.skip(12 + length)?,
                 IGNORED => pages.skip(length)?,
                 DATA => {
@@ -98,7 +98,7 @@ impl Packets {
         Ok(None)
     }
 
-    /// The bytes of memory for what is unpacked and not taken yet; takes the points that are whole.
+    /// Returns the memory for unpacked values, and consumes the complete points.
     fn decode(&mut self) -> u64 {
         let values = || {
             let fields = self.unpacked.iter().zip(&self.bits);
@@ -114,7 +114,7 @@ impl Packets {
     }
 }
 
-/// Bits of a value in a packet.
+/// Returns the bits per value of a field in a packet.
 fn bits(of: &RecordDataType) -> u64 {
     match *of {
         RecordDataType::Single { .. } => 32,

@@ -1,30 +1,29 @@
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 
-/// E57 is in pages of so many bytes, the last four of which are a checksum.
+/// Size of an E57 page. Its last four bytes are a checksum.
 pub(super) const PAGE_BYTES: u64 = 1024;
 const CONTENT_BYTES: u64 = PAGE_BYTES - 4;
 
-/// The bytes of a file without the checksums of its pages.
+/// Reader of a file without the checksums of its pages.
 pub(super) struct Pages<'f> {
     file: BufReader<&'f mut File>,
-    /// Bytes of the file before the next one.
+    /// Physical position in the file.
     at: u64,
 }
 
 impl<'f> Pages<'f> {
-    /// The bytes from a place of the file on.
+    /// Starts at a physical position of the file.
     pub(super) fn new(file: &'f mut File, at: u64) -> io::Result<Self> {
         file.seek(SeekFrom::Start(at))?;
         Ok(Self { file: BufReader::with_capacity(1 << 14, file), at })
     }
 
-    /// Bytes before the next one, without checksums.
+    /// Returns the logical position, without checksums.
     pub(super) fn position(&self) -> u64 {
         self.at / PAGE_BYTES * CONTENT_BYTES + (self.at % PAGE_BYTES).min(CONTENT_BYTES)
     }
 
-    /// Passes over bytes.
     pub(super) fn skip(&mut self, bytes: u64) -> io::Result<()> {
         let to = self.position().saturating_add(bytes);
         let to = (to / CONTENT_BYTES).saturating_mul(PAGE_BYTES).saturating_add(to % CONTENT_BYTES);

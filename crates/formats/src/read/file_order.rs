@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 /// Sorts files in natural order: `full2` before `full10`, and `9.5` before `10.25`.
 ///
-/// Names of equal length are compared letter by letter: their numbers are padded, perhaps hexadecimal.
+/// Names of equal length are compared character by character, because their numbers are padded or hexadecimal.
 pub(crate) fn sort_naturally(files: &mut [PathBuf]) {
     let length = |path: &PathBuf| path.file_name().unwrap_or_default().len();
     let is_padded = files.windows(2).all(|pair| length(&pair[0]) == length(&pair[1]));
@@ -22,12 +22,12 @@ pub(crate) fn sort_naturally(files: &mut [PathBuf]) {
     });
 }
 
-/// The last part of a path, for messages.
+/// Returns the last component of a path, for messages.
 pub(crate) fn name_of(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// The digits before and after the point, if a file name without its extension is a decimal number.
+/// Splits a file name that is a decimal number, without its extension, into the digits before and after the point.
 fn decimal(path: &Path) -> Option<(&str, &str)> {
     let stem = path.file_stem().and_then(OsStr::to_str)?;
     let (whole, part) = stem.split_once('.').unwrap_or((stem, ""));
@@ -66,7 +66,7 @@ mod tests {
         // Nanoseconds without leading zeros.
         let names = ["1500000000.5000000.pcd", "1500000000.70000000.pcd", "1500000000.120000000.pcd"];
         assert_eq!(sorted(&[names[2], names[0], names[1]]), names);
-        // Hexadecimal numbers of one length.
+        // Hexadecimal numbers of equal length.
         assert_eq!(sorted(&["0a1f.pcd", "0a10.pcd"]), ["0a10.pcd", "0a1f.pcd"]);
         assert_eq!(sorted(&["1.pcd", "01.pcd"]).len(), 2);
     }

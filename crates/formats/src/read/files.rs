@@ -6,10 +6,10 @@ use voxtile::{Error, Result};
 /// Opens a file of a folder.
 pub(crate) type OpenFile = Box<dyn Fn(&Path) -> Result<Box<dyn CloudSource>> + Send>;
 
-/// Remarks that are kept; a folder may have a million files.
+/// Maximum number of remarks to keep; a folder may have a million files.
 const MAX_REMARKS: usize = 20;
 
-/// The clouds of all files of a folder, one file open at a time.
+/// Source of the clouds of all files of a folder. Only one file is open at a time.
 pub(crate) struct Files {
     format: String,
     paths: std::vec::IntoIter<PathBuf>,
@@ -19,19 +19,19 @@ pub(crate) struct Files {
     open: OpenFile,
     current: Option<(PathBuf, Box<dyn CloudSource>)>,
     crs: Option<String>,
-    /// Whether a file was opened, so that the coordinate system is known or known to be missing.
+    /// Whether a file was opened; `crs` is then final.
     is_begun: bool,
     remarks: Remarks,
 }
 
-/// What is to be said of files. What is true of several is said once.
+/// Remarks on files. A remark that applies to several files appears once.
 #[derive(Clone, Default)]
 struct Remarks {
     said: Vec<Said>,
     are_more: bool,
 }
 
-/// A remark on a file, or on the folder if it has no name, and how many other files it is true of.
+/// Remark on a file, or on the folder if `file` is empty, with the number of other files it applies to.
 #[derive(Clone)]
 struct Said {
     file: String,
@@ -63,7 +63,7 @@ impl Remarks {
 }
 
 impl Files {
-    /// The clouds of files in this order. `is_one_each`: every file is one cloud.
+    /// Creates the source. Files are read in the given order. `is_one_each`: every file is one cloud.
     pub(crate) fn new(format: String, paths: Vec<PathBuf>, is_one_each: bool, open: OpenFile) -> Self {
         let ends =
             paths.first().zip(paths.last()).map(|(first, last)| [first, last].map(|path| name_of(path)));
@@ -81,13 +81,13 @@ impl Files {
         }
     }
 
-    /// With remarks on the folder itself.
+    /// Adds remarks on the folder itself.
     pub(crate) fn with_remarks(mut self, remarks: Vec<String>) -> Self {
         remarks.into_iter().for_each(|remark| self.remarks.add(String::new(), remark));
         self
     }
 
-    /// Keeps what is to be said of the file that ends.
+    /// Closes the current file and keeps its remarks.
     fn close(&mut self) {
         let Some((path, source)) = self.current.take() else { return };
         let name = name_of(&path);
@@ -96,7 +96,7 @@ impl Files {
         }
     }
 
-    /// Takes a file only if its points are in the coordinate system of those before: no point of another is mapped.
+    /// Checks that a file uses the coordinate system of the files before it, so that no map mixes systems.
     fn check_crs(&mut self, path: &Path, crs: Option<&str>) -> Result<()> {
         let is_first = !std::mem::replace(&mut self.is_begun, true);
         let Some(crs) = crs else { return Ok(()) };

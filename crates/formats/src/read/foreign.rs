@@ -1,18 +1,18 @@
 use std::path::Path;
 use voxtile::Error;
 
-/// A format that is known, but not read.
+/// A known format that is not supported.
 pub(crate) struct Foreign {
     name: &'static str,
-    /// Starts of its files; empty if the name alone tells.
+    /// File signatures; empty if only the extension identifies the format.
     magic: &'static [&'static [u8]],
     extensions: &'static [&'static str],
-    /// What a person can do.
+    /// Advice to the user.
     way: &'static str,
 }
 
 impl Foreign {
-    /// Says what a file is, and the way to one that can be read.
+    /// Creates an error that names the format and how to convert it.
     pub(crate) fn error(&self, path: &Path) -> Error {
         Error::argument(
             path.display().to_string(),
@@ -135,7 +135,7 @@ const FOREIGN: [Foreign; 27] = [
     },
 ];
 
-/// The foreign format that starts with these bytes.
+/// Returns the unsupported format with this file signature.
 pub(crate) fn of_bytes(start: &[u8]) -> Option<&'static Foreign> {
     if start.get(257..262) == Some(b"ustar") {
         return of_extension("tar");
@@ -143,17 +143,17 @@ pub(crate) fn of_bytes(start: &[u8]) -> Option<&'static Foreign> {
     FOREIGN.iter().find(|foreign| foreign.magic.iter().any(|magic| start.starts_with(magic)))
 }
 
-/// The archive that starts with these bytes, whatever its name.
+/// Returns the archive format with this signature, whatever the file's name.
 pub(crate) fn archive_of(start: &[u8]) -> Option<&'static Foreign> {
     of_bytes(start).filter(|foreign| foreign.way == UNPACK)
 }
 
-/// The foreign format with this ending, in lower case.
+/// Returns the unsupported format with this extension (lower case).
 pub(crate) fn of_extension(extension: &str) -> Option<&'static Foreign> {
     FOREIGN.iter().find(|foreign| foreign.extensions.contains(&extension))
 }
 
-/// What lies in the place of a file that did not arrive, and what to do.
+/// Describes a placeholder or error page stored instead of the file, with advice.
 pub(crate) fn stand_in(start: &[u8]) -> Option<&'static str> {
     let text = without_mark(start).trim_ascii_start();
     let starts =
@@ -178,26 +178,26 @@ pub(crate) fn stand_in(start: &[u8]) -> Option<&'static str> {
     None
 }
 
-/// The encoding of a text that is not UTF-8, and what to do.
+/// Describes the encoding of a text that is not UTF-8, with advice.
 pub(crate) fn text_encoding(start: &[u8]) -> Option<&'static str> {
     let is_utf16 = match *start {
         [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => true,
-        // Digits and blanks with a zero byte each.
+        // Digits and blanks, each with a zero byte.
         [0, low, 0, ..] | [low, 0, _, 0, ..] => low.is_ascii_graphic() || low == b' ',
         _ => false,
     };
     is_utf16.then_some("is text in UTF-16: save it as UTF-8")
 }
 
-/// What editors on Windows put before a text.
+/// UTF-8 byte order mark, written by some Windows editors.
 pub(crate) const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
-/// The bytes behind a byte order mark, if there is one.
+/// Strips a byte order mark.
 pub(crate) fn without_mark(start: &[u8]) -> &[u8] {
     start.strip_prefix(BYTE_ORDER_MARK).unwrap_or(start)
 }
 
-/// How a file starts that is not what its name says.
+/// Describes the first bytes of a file for an error message.
 pub(crate) fn beginning_of(start: &[u8]) -> String {
     let line = start.split(|byte| matches!(byte, b'\n' | b'\r')).next().unwrap_or_default().trim_ascii();
     let is_text = !line.is_empty() && line.iter().all(|byte| byte.is_ascii_graphic() || *byte == b' ');

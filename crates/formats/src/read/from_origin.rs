@@ -3,20 +3,20 @@ use super::one::Visit;
 use crate::poses::RigidPose;
 use voxtile::{Error, Result};
 
-/// Clouds that are registered already, seen from where the sensor was.
+/// Wraps a source of registered clouds to give their points relative to a known sensor position.
 pub struct FromOrigin {
     source: Box<dyn CloudSource>,
     origin_m: [f64; 3],
-    /// A cloud that knows its own pose keeps it.
+    /// Whether the current cloud has its own pose, which is kept.
     is_posed: bool,
 }
 
 impl FromOrigin {
-    /// Points in the frame of the file, in metres, and where the sensor stood in it.
+    /// Wraps a source. `origin_m` is the sensor position in the frame of the points, in metres.
     ///
     /// # Errors
     ///
-    /// An origin that is not finite.
+    /// The origin is not finite.
     pub fn new(source: Box<dyn CloudSource>, origin_m: [f64; 3]) -> Result<Self> {
         if !origin_m.iter().all(|axis| axis.is_finite()) {
             return Err(Error::argument("sensor origin", "must be three finite numbers in metres"));

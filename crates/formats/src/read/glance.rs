@@ -4,10 +4,10 @@ use std::io::Read;
 use std::path::Path;
 use voxtile::{Error, Result};
 
-/// How much of a file is read to identify it.
+/// Number of bytes used to identify a file.
 pub(super) const GLANCE_BYTES: u64 = 1 << 13;
 
-/// The first bytes of a file.
+/// Reads the first bytes of a regular file.
 pub(crate) fn first_bytes(path: &Path) -> Result<Vec<u8>> {
     check_regular(path)?;
     let mut start = Vec::new();

@@ -1,16 +1,15 @@
-//! PNG of depths: grey with 16 bits.
+//! PNG depth images: 16-bit grey.
 
 use std::io::{BufRead, Seek};
 
-/// Memory of the decoder, which holds a few rows: images may be a million pixels wide.
+/// Memory limit of the decoder, which holds a few rows. Images may be a million pixels wide.
 const MAX_DECODER_BYTES: usize = 8 << 20;
 
-/// The byte of an image that is wrong, and why.
+/// Byte offset of an error and its reason.
 type Wrong = (u64, String);
-/// Where a PNG says what its pixels are.
+/// Offset of the pixel format in the header.
 const KIND_AT: u64 = 16;
 
-/// Begins to read an image.
 pub(crate) fn open<R: BufRead + Seek>(input: R) -> Result<png::Reader<R>, Wrong> {
     let limits = png::Limits { bytes: MAX_DECODER_BYTES };
     let mut decoder = png::Decoder::new_with_limits(input, limits);
@@ -31,7 +30,7 @@ pub(crate) fn open<R: BufRead + Seek>(input: R) -> Result<png::Reader<R>, Wrong>
     Ok(reader)
 }
 
-/// Columns and rows.
+/// Returns the numbers of columns and rows.
 pub(crate) fn size<R: BufRead + Seek>(reader: &png::Reader<R>) -> (u32, u32) {
     (reader.info().width, reader.info().height)
 }

@@ -3,12 +3,12 @@ use std::panic::{self, AssertUnwindSafe, PanicHookInfo, catch_unwind};
 use std::sync::Once;
 
 thread_local! {
-    /// The first panic of each call that is guarded in this thread, from the outer to the inner ones.
+    /// First panic of each guarded call of this thread, from the outermost to the innermost call.
     static PANICS: RefCell<Vec<Option<String>>> = const { RefCell::new(Vec::new()) };
 }
 
-/// Calls into a library that may panic on a damaged file, and makes an error of it; nothing is printed. What the call
-/// was using may hold nonsense after that: it is at most asked once more, guarded again.
+/// Calls a library that may panic on a damaged file, and converts a panic to an error without printing it. Afterwards,
+/// the state used by the call may be inconsistent: use it at most once more, also guarded.
 #[cfg(any(feature = "las", feature = "e57"))]
 pub(crate) fn guarded<T, E: std::fmt::Display>(call: impl FnOnce() -> Result<T, E>) -> Result<T, String> {
     catch(call).map_or_else(
@@ -19,7 +19,7 @@ pub(crate) fn guarded<T, E: std::fmt::Display>(call: impl FnOnce() -> Result<T, 
     )
 }
 
-/// Returns what a call returns, or where it panicked.
+/// Returns the result of a call, or the source location of its panic.
 pub(crate) fn catch<T>(call: impl FnOnce() -> T) -> Result<T, String> {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {
@@ -36,14 +36,14 @@ pub(crate) fn catch<T>(call: impl FnOnce() -> T) -> Result<T, String> {
     result.map_err(|_| place.unwrap_or_default())
 }
 
-/// Notes a panic of this thread; `false` if no call of it is guarded.
+/// Records a panic of this thread. Returns `false` if no guarded call is active.
 fn note(info: &PanicHookInfo<'_>) -> bool {
     PANICS
         .try_with(|panics| {
             let Ok(mut panics) = panics.try_borrow_mut() else { return false };
             let Some(panic) = panics.last_mut() else { return false };
             let place = info.location().map(|place| {
-                // The name of the file is enough: the folder is that of a build.
+                // The file name is enough: the folder is a path of the build machine.
                 let file = place.file().rsplit(['/', '\\']).next().unwrap_or_default();
                 format!("{file}:{}", place.line())
             });

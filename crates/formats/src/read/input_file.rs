@@ -4,19 +4,19 @@ use std::io::{self, Read, Seek};
 use std::path::Path;
 use voxtile::{Error, Result};
 
-/// How much of a file is read to see whether it is what its name says.
+/// Number of bytes used to detect placeholders.
 const GLANCE_BYTES: u64 = 512;
 
-/// Opens a file of an input, of any format. All readers open their files here, so that a pointer of Git LFS or a page
-/// of HTML in place of the file is named as what it is.
+/// Opens an input file of any format. All readers open their files with this function, so that Git LFS pointers and
+/// HTML pages stored instead of a file are reported as such.
 ///
 /// # Errors
 ///
-/// A file that cannot be opened; something else in its place.
+/// The file cannot be opened, or a placeholder is stored instead.
 pub(crate) fn open_input(path: &Path) -> Result<File> {
     let fail = |error: io::Error| Error::io(path, "read", error);
     let mut file = File::open(path).map_err(fail)?;
-    // A pipe gives its bytes only once.
+    // A pipe cannot be read twice.
     if !file.metadata().map_err(fail)?.is_file() {
         return Ok(file);
     }

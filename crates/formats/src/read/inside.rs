@@ -1,6 +1,6 @@
 use std::path::{Component, Path};
 
-/// Whether a name that a file gives leads to what is in its folder: data from elsewhere are not to open other files.
+/// Returns whether a file name found in data stays within its folder. Untrusted data must not open other files.
 pub(crate) fn is_inside(name: &Path) -> bool {
     name.components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir))
 }

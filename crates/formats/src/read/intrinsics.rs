@@ -3,26 +3,26 @@ use super::regular::check_regular;
 use std::path::{Path, PathBuf};
 use voxtile::{Error, FormatError, Result};
 
-/// A camera without distortion: where a pixel looks.
+/// Pinhole camera without distortion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Intrinsics {
-    /// Focal lengths along columns and rows, in pixels.
+    /// Focal lengths in x and y, in pixels.
     pub focal_px: [f64; 2],
-    /// The pixel on the axis: column and row.
+    /// Principal point: column and row, in pixels.
     pub center_px: [f64; 2],
 }
 
-/// Where a data set keeps its camera.
+/// Common names of files with camera intrinsics.
 const NAMES: [&str; 3] = ["camera-intrinsics.txt", "intrinsics.txt", "camera.txt"];
-/// More numbers than any form has.
+/// Limit for the numbers in a file; no supported form has more.
 const MAX_NUMBERS: usize = 64;
 
 impl Intrinsics {
-    /// A camera of `fx fy cx cy`.
+    /// Creates a camera from `fx fy cx cy`, in pixels.
     ///
     /// # Errors
     ///
-    /// A focal length that is not above 0; what is not finite.
+    /// A focal length is not above 0, or a number is not finite.
     pub fn new(numbers: [f64; 4]) -> Result<Self> {
         let [fx, fy, cx, cy] = numbers;
         if !numbers.iter().all(|number| number.is_finite()) || fx <= 0.0 || fy <= 0.0 {
@@ -33,11 +33,11 @@ impl Intrinsics {
         Ok(Self { focal_px: [fx, fy], center_px: [cx, cy] })
     }
 
-    /// Reads a file with a 3x3 matrix, or with `fx fy cx cy`; `#` starts a comment.
+    /// Reads a file with a 3x3 matrix or with `fx fy cx cy`. `#` starts a comment.
     ///
     /// # Errors
     ///
-    /// Other numbers; a camera with distortion, whose images must be rectified first.
+    /// The file has other numbers, or the camera has distortion: its images must be rectified first.
     pub fn read(path: &Path) -> Result<Self> {
         let mut lines = Lines::open(path)?;
         let mut numbers: Vec<f64> = Vec::new();
@@ -72,7 +72,7 @@ impl Intrinsics {
         }
     }
 
-    /// The camera of a folder: of its file, if it has one, or of one beside it.
+    /// Finds the camera of a folder: the given file, a file in the folder, or one in its parent.
     pub(super) fn find(folder: &Path, asked: Option<&Path>) -> Result<Self> {
         if let Some(path) = asked {
             return Self::read(path);
@@ -93,12 +93,12 @@ impl Intrinsics {
         Self::read(&path)
     }
 
-    /// Whether one of these files is a camera by its name.
+    /// Returns whether one of these files has the name of a camera file.
     pub(super) fn is_in(files: &[PathBuf]) -> bool {
         files.iter().any(|path| path.file_name().is_some_and(|name| NAMES.iter().any(|known| name == *known)))
     }
 
-    /// Where a pixel looks, of depth 1.
+    /// Returns the direction of a pixel, with depth 1.
     pub(super) fn direction(&self, column: f64, row: f64) -> [f64; 3] {
         let ([fx, fy], [cx, cy]) = (self.focal_px, self.center_px);
         [(column - cx) / fx, (row - cy) / fy, 1.0]

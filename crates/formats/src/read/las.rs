@@ -12,13 +12,13 @@ use std::fs::File;
 use std::path::Path;
 use voxtile::{Error, Result};
 
-/// Opens a LAS, LAZ or COPC file. Coordinates become metres. With GPS times it is cut into scans of
-/// [`ReadOptions::scan_period_s`], numbered from 0, each with the middle of its window as stamp; without them, or where
-/// the origin of the rays is given, it is one cloud in the order of the file.
+/// Opens a LAS, LAZ or COPC file. Coordinates are converted to metres. A file with GPS times is split into scans of
+/// [`ReadOptions::scan_period_s`], numbered from 0 and stamped with the middle of their window. A file without GPS
+/// times, or with a given ray origin, is one cloud in file order.
 ///
-/// Stamps are GPS time in nanoseconds, without leap seconds taken off: since 6 January 1980 where the header says that
-/// times are "adjusted standard GPS time" (the 10^9 seconds that such files leave out, or the offset of LAS 1.5, are
-/// added), since the begin of the week otherwise.
+/// Stamps are GPS time in nanoseconds, without leap seconds removed. If the header declares "adjusted standard GPS
+/// time", they count from 6 January 1980: the offset of 10^9 s, or that of LAS 1.5, is added. Otherwise they count from
+/// the start of the GPS week.
 pub(crate) fn open(path: &Path, options: &ReadOptions) -> Result<Box<dyn CloudSource>> {
     let mut file = File::open(path).map_err(|error| Error::io(path, "read", error))?;
     let mut layout = Layout::read(path, &mut file)?;
@@ -44,13 +44,13 @@ pub(crate) fn open(path: &Path, options: &ReadOptions) -> Result<Box<dyn CloudSo
     Ok(Box::new(WholeLas { format, units, head: Some(head), points, is_read: false }))
 }
 
-/// Names of the fields that are read.
+/// Returns the names of the fields to read.
 pub(super) fn fields(has_times: bool) -> Vec<String> {
     let names = ["X", "Y", "Z", "Intensity"].into_iter().chain(has_times.then_some("GPS Time"));
     names.map(str::to_owned).collect()
 }
 
-/// A LAS file as one cloud.
+/// Source of a LAS file as one cloud.
 struct WholeLas {
     format: String,
     units: Units,

@@ -4,25 +4,25 @@ use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 use voxtile::{Error, FormatError, Result};
 
-/// The numbers of points in a header.
+/// Point counts in a header.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Counts {
-    /// Of 32 bits.
+    /// The 32-bit count.
     pub(super) legacy: u64,
-    /// Of 64 bits, since LAS 1.4.
+    /// The 64-bit count, since LAS 1.4.
     pub(super) large: Option<u64>,
 }
 
 impl Counts {
-    /// The number that counts, of two the one from `low` to `high`: writers of LAS 1.4 may leave the old number empty,
-    /// or put the points of an earlier version there. Other readers take the large one, too.
+    /// Selects the valid count: the 64-bit one if it is nonzero and within `low..=high`, else the 32-bit one. Writers
+    /// of LAS 1.4 may leave the old count empty or outdated; other readers also prefer the 64-bit count.
     pub(super) fn choose(&self, low: u64, high: u64) -> u64 {
         let numbers = [self.large.unwrap_or(0), self.legacy].into_iter().filter(|number| *number > 0);
         let mut fitting = numbers.clone().filter(|number| (low..=high).contains(number));
         fitting.next().or_else(|| numbers.clone().next()).unwrap_or(0)
     }
 
-    /// A remark on two numbers that differ.
+    /// Returns a remark if the two counts differ.
     pub(super) fn remark(&self, taken: u64) -> Option<String> {
         let large = self.large.filter(|large| *large > 0 && self.legacy > 0 && *large != self.legacy)?;
         Some(format!(
@@ -31,21 +31,21 @@ impl Counts {
         ))
     }
 
-    /// The byte of the number in the header.
+    /// Returns the byte offset of the count in the header.
     pub(super) fn place(&self) -> u64 {
         if self.legacy == 0 && self.large.is_some() { 247 } else { 107 }
     }
 }
 
-/// Records that are looked at where more are there than announced.
+/// Number of records to sample if the file has more than announced.
 const SAMPLES: u64 = 64;
 
-/// Finds how many points of a file that is not compressed are to be read: all that are there.
+/// Determines the number of points of an uncompressed file: all points present in the file.
 pub(super) fn settle(path: &Path, file: &mut File, layout: &mut Layout) -> Result<()> {
     let record_bytes = layout.record_bytes.max(1);
     let room_to = |end: u64| end.saturating_sub(layout.points_at) / record_bytes;
     let (room, all) = (room_to(layout.points_end()), room_to(layout.file_bytes));
-    // Two numbers: the one of the points that are there, else one that there is room for.
+    // If the two counts differ, take the one that equals the points present, else one that does not exceed them.
     let exact = layout.counts.choose(room, room);
     let announced = if exact == room { room } else { layout.counts.choose(0, all) };
     layout.points = announced;
@@ -77,19 +77,20 @@ pub(super) fn settle(path: &Path, file: &mut File, layout: &mut Layout) -> Resul
     Ok(())
 }
 
-/// A remark on a file whose writer was stopped before it wrote the number of points.
+/// Returns a remark on a file whose writer stopped before writing the point count.
 pub(super) fn stopped(there: u64) -> String {
     format!(
         "the header announces no points, as a writer leaves it that was stopped: the {there} that are there are read"
     )
 }
 
-/// A remark on a file that was cut off.
+/// Returns a remark on a truncated file.
 pub(super) fn cut_off(read: u64, announced: u64) -> String {
     format!("the file is cut off: {read} of {announced} points are there and are read")
 }
 
-/// Whether records behind the announced points are points, too: not all zero, and near the bounds in the header.
+/// Returns whether the records after the announced points are points too: not all zero, and close to the header's
+/// bounds.
 fn are_points(file: &mut File, layout: &Layout, from: u64, to: u64) -> std::io::Result<bool> {
     let step = ((to - from) / SAMPLES).max(1);
     let mut is_zero = true;

@@ -1,15 +1,15 @@
 use super::las_layout::Layout;
 use super::las_units::Units;
 
-/// Degrees have smaller steps than this: a tenth of a metre on the ground.
+/// Largest scale for coordinates in degrees; it corresponds to a tenth of a metre on the ground.
 const MAX_DEGREE_SCALE: f64 = 1e-6;
-/// A file of degrees spans few of them; its heights are metres.
+/// A file in degrees spans only a few degrees; its heights are in metres.
 const MAX_DEGREES: f64 = 2.0;
-/// A cloud without a coordinate system is of a sensor or a site: neither so high nor so wide, in metres.
+/// Limits for a cloud without a coordinate system: one from a sensor or a site is neither higher nor wider, in metres.
 const MAX_HEIGHT_M: f64 = 2000.0;
 const MAX_WIDTH_M: f64 = 100_000.0;
 
-/// Remarks on coordinates of a file without a coordinate system that look like degrees or millimetres.
+/// Returns a remark if the coordinates of a file without a coordinate system look like degrees or millimetres.
 pub(super) fn hints(layout: &Layout, units: &Units) -> Option<String> {
     if units.is_known || layout.points == 0 {
         return None;
@@ -19,7 +19,7 @@ pub(super) fn hints(layout: &Layout, units: &Units) -> Option<String> {
     let [x_span, y_span, z_span] = [x, y, z].map(|(least, most)| most - least);
     let [x_scale, y_scale, z_scale] = [0, 1, 2].map(|axis| layout.transform(axis).0.abs());
     let are_angles = x.0 >= -180.0 && x.1 <= 360.0 && y.0 >= -90.0 && y.1 <= 90.0;
-    // Metres have one scale for all axes, and are not flatter than they are high.
+    // Coordinates in metres have the same scale on all axes, and the cloud is wider than high.
     let is_narrow = x_span.max(y_span) <= MAX_DEGREES && z_span > 2.0 * x_span.max(y_span);
     let is_finer = z_scale >= 100.0 * x_scale.max(y_scale);
     if are_angles && x_scale.max(y_scale) <= MAX_DEGREE_SCALE && (is_finer || is_narrow) {

@@ -5,52 +5,52 @@ use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 use voxtile::{Error, FormatError, Result};
 
-/// The header of a LAS file, checked against the size of the file.
+/// Header of a LAS file, checked against the file size.
 pub(super) struct Layout {
-    /// The header, and what follows a short one.
+    /// The header. If it is a short one, the bytes after it are included.
     header: Vec<u8>,
     pub(super) file_bytes: u64,
     pub(super) points_at: u64,
-    /// The numbers of points in the header.
+    /// Point counts in the header.
     pub(super) counts: Counts,
-    /// Points to read.
+    /// Number of points to read.
     pub(super) points: u64,
     pub(super) format: PointFormat,
-    /// Bytes of a point that is not compressed.
+    /// Size of an uncompressed point.
     pub(super) record_bytes: u64,
     pub(super) is_compressed: bool,
     pub(super) has_wkt: bool,
     records: Vec<Record>,
-    /// What a person should know of the header.
+    /// Remarks for the user about the header.
     pub(super) remarks: Vec<String>,
 }
 
-/// Where a point has the fields that are read.
+/// Layout of the fields to read.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct PointFormat {
-    /// Formats from 6 on have wider flags.
+    /// Formats 6 and above have wider flags.
     pub(super) is_extended: bool,
     pub(super) time_at: Option<usize>,
 }
 
-/// Bytes of the header of LAS 1.4 and LAS 1.5.
+/// Sizes of the LAS 1.4 and LAS 1.5 headers.
 const LONG_HEADER_BYTES: usize = 375;
 const HEADER_BYTES: usize = 393;
-/// Bytes of the header before LAS 1.3.
+/// Size of the header before LAS 1.3.
 const SHORT_HEADER_BYTES: u64 = 227;
-/// Three scales and three offsets; the largest and the least coordinate of each axis.
+/// Offsets of the three scales and three offsets, and of the maximum and minimum of each axis.
 const SCALES_AT: usize = 131;
 const BOUNDS_AT: usize = 179;
-/// Scales and offsets are smaller: a hundred times the distance to the sun.
+/// Limit for scales and offsets: a hundred times the distance to the sun, in metres.
 const MAX_COORDINATE: f64 = 1e13;
-/// Bytes of a point by its format.
+/// Size of a point by point format.
 const POINT_BYTES: [u64; 11] = [20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67];
 const COMPRESSED: u64 = 0x80;
 /// Bits of the global encoding.
 const IS_STANDARD_TIME: u64 = 1;
 const HAS_WKT: u64 = 1 << 4;
 const HAS_TIME_OFFSET: u64 = 1 << 6;
-/// Standard GPS time leaves out so many seconds; LAS 1.5 names them in millions.
+/// Adjusted standard GPS time subtracts this many seconds. LAS 1.5 stores the offset in millions of seconds.
 const STANDARD_OFFSET_S: i64 = 1_000_000_000;
 const TIME_OFFSET_AT: usize = 391;
 
@@ -105,7 +105,8 @@ impl Layout {
         Ok(layout)
     }
 
-    /// Reads the records of coordinates and of the compression, before the points and, since LAS 1.4, behind them.
+    /// Reads the records with the coordinate system and the compression, before the points and, since LAS 1.4, after
+    /// them.
     fn read_records(&mut self, file: &mut File, header_bytes: u64, is_long: bool) -> std::io::Result<()> {
         let count = number(&self.header, 100, 4);
         let before = las_records::Span { start: header_bytes, end: self.points_at, count, wide: 2 };
@@ -128,30 +129,29 @@ impl Layout {
         Ok(())
     }
 
-    /// Where points that are not compressed end at the latest: at what the header says to be behind them, or with the
-    /// file.
+    /// Returns an upper bound for the end of uncompressed points: the start of the data after them, or the file size.
     pub(super) fn points_end(&self) -> u64 {
         let minor = number(&self.header, 25, 1);
-        // Wave packets since LAS 1.3, long records since LAS 1.4.
+        // Waveform packets exist since LAS 1.3, extended records since LAS 1.4.
         let waves_at = if minor >= 3 { number(&self.header, 227, 8) } else { 0 };
         let records_at = if self.counts.large.is_some() { number(&self.header, 235, 8) } else { 0 };
         let ends = [waves_at, records_at].into_iter().filter(|end| *end >= self.points_at);
         ends.fold(self.file_bytes, u64::min)
     }
 
-    /// Factor and offset that make a coordinate of a whole number.
+    /// Returns the scale and the offset of an axis.
     pub(super) fn transform(&self, axis: usize) -> (f64, f64) {
         (double(&self.header, SCALES_AT + 8 * axis), double(&self.header, SCALES_AT + 24 + 8 * axis))
     }
 
-    /// The least and the largest coordinate of an axis, if the header has finite ones.
+    /// Returns the minimum and maximum of an axis, if the header's values are finite.
     pub(super) fn bounds(&self, axis: usize) -> Option<(f64, f64)> {
         let (most, least) =
             (double(&self.header, BOUNDS_AT + 16 * axis), double(&self.header, BOUNDS_AT + 8 + 16 * axis));
         (least.is_finite() && most.is_finite() && least <= most).then_some((least, most))
     }
 
-    /// The zero of GPS times, in nanoseconds of GPS time: 0 where they count from the begin of a week.
+    /// Returns the epoch of GPS times, in nanoseconds of GPS time; 0 if they count from the start of a week.
     pub(super) fn zero_ns(&self) -> i64 {
         let (minor, encoding) = (number(&self.header, 25, 1), number(&self.header, 6, 2));
         let offset_s = match (encoding & IS_STANDARD_TIME != 0, minor >= 5 && encoding & HAS_TIME_OFFSET != 0)
@@ -164,12 +164,12 @@ impl Layout {
         offset_s.saturating_mul(1_000_000_000)
     }
 
-    /// The record of coordinates with this number.
+    /// Returns the coordinate system record with this ID.
     pub(super) fn record(&self, id: u16) -> Option<&[u8]> {
         las_records::find(&self.records, las_records::PROJECTION, id)
     }
 
-    /// The record that says how points are compressed.
+    /// Returns the LASzip record, which describes the compression.
     pub(super) fn laszip(&self) -> Option<&[u8]> {
         las_records::find(&self.records, las_records::LASZIP, las_records::LASZIP_ID)
     }
@@ -186,7 +186,7 @@ impl PointFormat {
     }
 }
 
-/// Scales and offsets make coordinates of whole numbers: from others than these, no finite ones come.
+/// Checks that scales and offsets give finite coordinates.
 fn check_scales(header: &[u8]) -> std::result::Result<(), (u64, String)> {
     for (k, axis) in ["x", "y", "z", "x", "y", "z"].into_iter().enumerate() {
         let (at, what) = (SCALES_AT + 8 * k, if k < 3 { "scale" } else { "offset" });
@@ -198,13 +198,13 @@ fn check_scales(header: &[u8]) -> std::result::Result<(), (u64, String)> {
     Ok(())
 }
 
-/// A little-endian number of up to eight bytes; what is missing is zero.
+/// Reads a little-endian number of up to eight bytes. Missing bytes are zero.
 pub(super) fn number(bytes: &[u8], at: usize, width: usize) -> u64 {
     let bytes = bytes.iter().skip(at).take(width);
     bytes.enumerate().fold(0, |sum, (k, byte)| sum | u64::from(*byte) << (8 * k.min(7)))
 }
 
-/// A little-endian double.
+/// Reads a little-endian double.
 pub(super) fn double(bytes: &[u8], at: usize) -> f64 {
     f64::from_bits(number(bytes, at, 8))
 }

@@ -8,49 +8,49 @@ use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use voxtile::{Error, FormatError, Result};
 
-/// Points that are decoded at a time, and most bytes of them.
+/// Number of points to decode in one batch, and the limit for its bytes.
 const AT_A_TIME: u64 = 4096;
 const MAX_BATCH_BYTES: u64 = 1 << 20;
 
-/// A point of a LAS file, in metres.
+/// Point of a LAS file, in metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct LasPoint {
     pub(super) position_m: [f64; 3],
     pub(super) intensity: u16,
-    /// Seconds of the file's GPS time; 0 without.
+    /// GPS time of the file in seconds; 0 if there is none.
     pub(super) time_s: f64,
 }
 
-/// The points of a LAS or LAZ file, in order.
+/// Reader of the points of a LAS or LAZ file, in order.
 pub(super) struct LasPoints {
     path: PathBuf,
     records: Records,
     fields: Fields,
     record_bytes: usize,
     at_a_time: u64,
-    /// Points to read, and those that were read.
+    /// Number of points to read, and number read so far.
     points: u64,
     done: u64,
     withheld: u64,
     is_cut: bool,
 }
 
-/// Where the bytes of points come from.
+/// Source of point records.
 enum Records {
     Plain(BufReader<File>),
     Compressed(Box<LazPoints>),
 }
 
-/// The fields of a point that are read.
+/// Extraction of the fields to read.
 struct Fields {
     format: PointFormat,
-    /// Factor and offset of each axis.
+    /// Scale and offset of each axis.
     transforms: [(f64, f64); 3],
     metres: [f64; 2],
 }
 
 impl LasPoints {
-    /// `chunks` are those of a file that is compressed.
+    /// Opens the points. `chunks` is set for a compressed file.
     pub(super) fn open(path: &Path, layout: &Layout, chunks: Option<Chunks>, units: &Units) -> Result<Self> {
         let fail = |error| Error::io(path, "read", error);
         let file = File::open(path).map_err(fail)?;
@@ -80,7 +80,7 @@ impl LasPoints {
         self.fields.format.time_at.is_some()
     }
 
-    /// Visits the points, without those that are marked as deleted ("withheld").
+    /// Visits the points, except those marked as deleted ("withheld").
     pub(super) fn visit(&mut self, visit: &mut dyn FnMut(LasPoint) -> Result<()>) -> Result<()> {
         let mut batch = Vec::new();
         while self.done < self.points {
@@ -107,7 +107,7 @@ impl LasPoints {
         Ok(())
     }
 
-    /// A file without a chunk table that ends early was cut off: its points are good as far as they go.
+    /// Handles an early end. A file without a chunk table was truncated; the points read so far are valid.
     fn ended(&mut self, end: End) -> Result<()> {
         let has_table = matches!(&self.records, Records::Compressed(points) if points.has_table);
         let reason = match end {
@@ -123,7 +123,7 @@ impl LasPoints {
         Err(FormatError::at_record(self.done, reason).in_input(&self.path))
     }
 
-    /// What a person should know of the points that were read.
+    /// Returns remarks for the user about the points read.
     pub(super) fn remarks(&self) -> Vec<String> {
         let withheld = (self.withheld > 0).then(|| {
             format!("{} points are marked as withheld, that is deleted, and are left out", self.withheld)
@@ -134,9 +134,9 @@ impl LasPoints {
 }
 
 impl Fields {
-    /// A point, if it is not withheld.
+    /// Decodes a point, unless it is withheld.
     fn of(&self, bytes: &[u8]) -> Option<LasPoint> {
-        // The flag is bit 7 of the classification in old formats, and bit 2 of the flags in new ones.
+        // The withheld flag is bit 7 of the classification in formats 0 to 5, and bit 2 of the flags in later formats.
         let withheld = if self.format.is_extended { 0b100 } else { 0b1000_0000 };
         if bytes.get(15).copied().unwrap_or(0) & withheld != 0 {
             return None;

@@ -2,38 +2,38 @@ use super::las_layout::number;
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 
-/// A variable length record of a LAS file.
+/// Variable length record of a LAS file.
 pub(super) struct Record {
     user: String,
     id: u16,
     data: Vec<u8>,
 }
 
-/// Whose the records of coordinates are, and the one of the compression.
+/// User IDs of the coordinate system records and of the compression record.
 pub(super) const PROJECTION: &str = "LASF_Projection";
 pub(super) const LASZIP: &str = "laszip encoded";
 pub(super) const LASZIP_ID: u16 = 22204;
-/// The coordinate system, as text and as keys of GeoTIFF with their doubles.
+/// Record IDs of the coordinate system: as well-known text, and as GeoTIFF keys with their doubles.
 pub(super) const WKT_ID: u16 = 2112;
 pub(super) const KEYS_ID: u16 = 34735;
 pub(super) const DOUBLES_ID: u16 = 34736;
-/// Records of more bytes, and more of them, have nothing to do with coordinates.
+/// Limits. Larger or further records are not coordinate systems.
 const MAX_RECORD_BYTES: u64 = 1 << 20;
 const MAX_RECORDS: u64 = 10_000;
 
-/// Where records are.
+/// Location of records in a file.
 pub(super) struct Span {
     pub(super) start: u64,
     pub(super) end: u64,
-    /// How many are announced.
+    /// Number of records announced.
     pub(super) count: u64,
-    /// Bytes of the length of a record.
+    /// Size of the length field of a record.
     pub(super) wide: usize,
 }
 
 impl Span {
-    /// Reads the records that are used. Returns how many records there are: fewer than are announced if the rest does
-    /// not fit, more if a known one follows.
+    /// Reads the records in use. Returns the number of records: fewer than announced if the rest does not fit in the
+    /// file, more if a known record follows.
     pub(super) fn read(&self, file: &mut File, records: &mut Vec<Record>) -> io::Result<u64> {
         let head_bytes = 52 + self.wide as u64;
         let (mut at, mut found) = (self.start, 0);
@@ -61,7 +61,7 @@ impl Span {
             if found >= self.count && !is_wanted {
                 return Ok(found);
             }
-            // Of equal records the first counts.
+            // The first of several equal records takes precedence.
             if is_wanted && bytes <= MAX_RECORD_BYTES && find(records, &user, id).is_none() {
                 let mut data = Vec::new();
                 (&mut *file).take(bytes).read_to_end(&mut data)?;
@@ -69,12 +69,12 @@ impl Span {
             }
             (at, found) = (next, found + 1);
         }
-        // Of more records, no more is known.
+        // Records beyond the limit are not inspected.
         Ok(self.count.max(found))
     }
 }
 
-/// The data of a record.
+/// Returns the data of a record.
 pub(super) fn find<'r>(records: &'r [Record], user: &str, id: u16) -> Option<&'r [u8]> {
     let record = records.iter().find(|record| record.user == user && record.id == id);
     record.map(|record| record.data.as_slice())

@@ -8,24 +8,24 @@ use crate::spill::{Sorted, Sorter};
 use std::path::{Path, PathBuf};
 use voxtile::{Error, FormatError, Result};
 
-/// A LAS file cut into scans of equal length by GPS time.
+/// Source that splits a LAS file into scans of equal duration by GPS time.
 pub(super) struct LasScans {
     format: String,
     path: PathBuf,
     units: Units,
-    /// Until the first scan is asked for.
+    /// Unsorted points, until the first scan is requested.
     unsorted: Option<(LasPoints, Sorter<LasPoint>)>,
     sorted: Option<Sorted<LasPoint>>,
     period_s: f64,
     zero_ns: i64,
     first_s: f64,
     has_one_time: bool,
-    /// The window that is read, and the first point that was not given.
+    /// Current window, and the first point not yet returned.
     window: Option<u64>,
     peeked: Option<LasPoint>,
     scans: u64,
     remarks: Vec<String>,
-    /// Why not all points could be read; told after those that could.
+    /// Error that ended reading. It is returned after the complete points.
     failure: Option<Error>,
 }
 
@@ -102,17 +102,18 @@ impl LasScans {
         Ok(())
     }
 
-    /// The window of a time, from 0.
+    /// Returns the index of the window of a time, from 0.
     fn window_of(&self, time_s: f64) -> u64 {
         if self.has_one_time { 0 } else { window_after(time_s - self.first_s, self.period_s) }
     }
 
-    /// The middle of a window, in seconds of the file.
+    /// Returns the middle of a window, in seconds of the file.
     fn middle_s(&self, window: u64) -> f64 {
         self.first_s + (window as f64 + 0.5) * self.period_s
     }
 
-    /// Nanoseconds of GPS time: since 6 January 1980 or, of old files, since the begin of the week.
+    /// Returns the stamp in nanoseconds of GPS time: since 6 January 1980, or since the start of the week for old
+    /// files.
     fn stamp_ns(&self, window: u64) -> Option<i64> {
         let middle_ns = (self.middle_s(window) * 1e9).round();
         let is_possible = middle_ns.abs() < 9e18 && !self.has_one_time;
@@ -132,10 +133,10 @@ impl LasScans {
     }
 }
 
-/// The window of a time after the first, from 0. One that begins a window may be written a little earlier, as rounding
-/// has it: it is taken as its begin.
+/// Returns the window index for a time after the first point. A time slightly before a window, due to rounding, counts
+/// as the window's start.
 fn window_after(since_s: f64, period_s: f64) -> u64 {
-    /// Of a window. Seconds of the GPS epoch have steps of 0.1 us.
+    /// Tolerance, as a fraction of a window. Seconds since the GPS epoch have steps of 0.1 us.
     const ROUNDING: f64 = 1e-5;
     (since_s / period_s + ROUNDING) as u64
 }
@@ -151,7 +152,7 @@ impl CloudSource for LasScans {
             while self.next_of(window)?.is_some() {}
         }
         let Some(first) = self.peeked else {
-            // What was whole has been given.
+            // All complete points were returned.
             return self.failure.take().map_or(Ok(None), Err);
         };
         let window = self.window_of(first.time_s);
@@ -197,7 +198,7 @@ mod tests {
 
     #[test]
     fn a_time_that_begins_a_window_is_in_it() {
-        // In the numbers of a file a window is not quite a tenth of a second.
+        // In floating point, a window is not exactly a tenth of a second.
         for window in 0..10_000 {
             let first_s = 1_000_000_000.05_f64;
             let time_s = first_s + 0.1 * f64::from(window);

@@ -3,22 +3,22 @@ use super::las_layout::{Layout, double, number};
 use super::las_records::{DOUBLES_ID, KEYS_ID, WKT_ID};
 use super::wkt::WktUnits;
 
-/// What a LAS file says of its coordinates.
+/// Units and coordinate system of a LAS file.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Units {
-    /// Metres in a unit of x and y, and of z.
+    /// Unit of x and y, and unit of z, in metres.
     pub(super) metres: [f64; 2],
-    /// The coordinate system, if the coordinates stay as they are in it.
+    /// Coordinate system, if the coordinates are not converted.
     pub(super) crs: Option<String>,
     /// Whether the file names a coordinate system or a unit.
     pub(super) is_known: bool,
     pub(super) remarks: Vec<String>,
 }
 
-/// The system is that of the file, not of the metres that are read of it.
+/// The coordinate system describes the original coordinates, not those converted to metres.
 const NOT_PASSED_ON: &str = "the coordinate system is not in metres, and the output does not name it";
 
-/// Metres in a unit of length by its number in the EPSG register.
+/// Returns a unit of length in metres, by its EPSG code.
 fn of_epsg(code: u64) -> Option<f64> {
     Some(match code {
         9001 => 1.0,
@@ -43,7 +43,7 @@ fn of_epsg(code: u64) -> Option<f64> {
     })
 }
 
-/// Metres in the unit of a vertical system of the EPSG register: NAVD88 and NGVD29 in feet, and common ones in metres.
+/// Returns the unit of a vertical EPSG system in metres: NAVD88 and NGVD29 in feet, and common systems in metres.
 fn of_vertical(code: u64) -> Option<f64> {
     match code {
         5702 | 6360 => Some(US_FOOT_M),
@@ -55,7 +55,7 @@ fn of_vertical(code: u64) -> Option<f64> {
     }
 }
 
-/// Keys of GeoTIFF.
+/// GeoTIFF keys.
 const MODEL_TYPE: u64 = 1024;
 const GEOGRAPHIC: u64 = 2;
 const PROJECTED_SYSTEM: u64 = 3072;
@@ -63,7 +63,7 @@ const LINEAR_UNITS: u64 = 3076;
 const LINEAR_UNIT_SIZE: u64 = 3077;
 const VERTICAL_SYSTEM: u64 = 4096;
 const VERTICAL_UNITS: u64 = 4099;
-/// A system or a unit of the file's own.
+/// Code of a system or unit that the file defines itself.
 const USER_DEFINED: u64 = 32767;
 
 impl Units {
@@ -73,7 +73,7 @@ impl Units {
             .record(WKT_ID)
             .map(|data| String::from_utf8_lossy(data).trim_end_matches('\0').trim().to_owned());
         let text = text.filter(|text| !text.is_empty());
-        // Both may be there: the header says which one counts.
+        // Both may be present; the header states which one is valid.
         let keys = layout.record(KEYS_ID).filter(|_| text.is_none() || !layout.has_wkt);
         if let Some(keys) = keys {
             units.take_keys(keys, layout.record(DOUBLES_ID).unwrap_or_default());
@@ -92,7 +92,7 @@ impl Units {
         units
     }
 
-    /// GeoTIFF: unit of the projection, unit of heights, and known systems in feet.
+    /// Reads GeoTIFF keys: the unit of the projection, the unit of heights, and known systems in feet.
     fn take_keys(&mut self, keys: &[u8], doubles: &[u8]) {
         let entries = keys.as_chunks::<8>().0.iter().skip(1);
         let found = |wanted: u64, place: u64| {
@@ -101,7 +101,7 @@ impl Units {
                 .filter(|entry| number(*entry, 0, 2) == wanted && number(*entry, 2, 2) == place);
             found.next().map(|entry| number(entry, 6, 2))
         };
-        // 0 is a value that is not known.
+        // 0 means unknown.
         let value = |wanted| found(wanted, 0).filter(|value| *value > 0);
         self.is_known |= [MODEL_TYPE, PROJECTED_SYSTEM, LINEAR_UNITS, VERTICAL_SYSTEM, VERTICAL_UNITS]
             .into_iter()
@@ -127,7 +127,7 @@ impl Units {
         if let Some(code) = value(LINEAR_UNITS).filter(|code| unit(*code).is_none()) {
             self.remarks.push(format!("the unit of x and y, EPSG:{code}, is not known; metres are assumed"));
         }
-        // Heights without a unit of their own are in that of their system, else of the projection.
+        // The unit of heights defaults to that of the vertical system, then to that of the projection.
         let high = value(VERTICAL_UNITS).and_then(unit).or(value(VERTICAL_SYSTEM).and_then(of_vertical));
         if let Some(metres) = high {
             self.metres[1] = metres;
@@ -140,7 +140,7 @@ impl Units {
         }
     }
 
-    /// Heights have the unit of the projection, if not one of their own.
+    /// Reads the units of well-known text. The unit of heights defaults to that of the projection.
     fn take_wkt(&mut self, wkt: &str) {
         let found = WktUnits::of(wkt);
         if found.is_degrees {
@@ -170,7 +170,7 @@ impl Units {
     }
 }
 
-/// Metres in a unit of the state planes of NAD83 in feet, which files often name without their unit.
+/// Returns the unit in metres of the NAD83 state planes in feet, which files often name without a unit.
 fn of_state_plane(code: u64) -> Option<f64> {
     match code {
         2222..=2224 | 2251..=2253 | 2256 | 2265 | 2266 | 2269 | 2270 | 2273 | 2280..=2282 => Some(FOOT_M),
@@ -179,7 +179,7 @@ fn of_state_plane(code: u64) -> Option<f64> {
     }
 }
 
-/// Whether a projected system of the EPSG register is metric for sure: UTM on WGS 84, ETRS89 and NAD83.
+/// Returns whether a projected EPSG system is known to be metric, such as UTM on WGS 84, ETRS89 and NAD83.
 fn is_metric(code: u64) -> bool {
     matches!(code, 32601..=32660 | 32701..=32760 | 25828..=25838 | 26901..=26923 | 3857 | 2154 | 2056 | 28992 | 27700)
 }

@@ -1,5 +1,5 @@
-//! What a LAZ file says of its chunks, checked before the crate `laz` decodes it: that reserves memory by what the file
-//! claims, and a claim of gigabytes ends the program.
+//! Checks the chunks of a LAZ file before the crate `laz` decodes it. That crate allocates memory as the file claims,
+//! so a claim of gigabytes would abort the program.
 
 use super::guard::guarded;
 use super::las_count::{cut_off, stopped};
@@ -13,43 +13,43 @@ use std::io::{BufReader, Seek, SeekFrom};
 use std::path::Path;
 use voxtile::{Error, FormatError, Result};
 
-/// Most bytes of a point before it is compressed: formats need 67, the rest are extra bytes, each with models of its
-/// own in memory.
+/// Limit for the size of an uncompressed point. Point formats need up to 67 bytes; the rest are extra bytes, each with
+/// its own models in memory.
 const MAX_POINT_BYTES: u64 = 1024;
-/// Most parts of a point: position, time, colour, wave packet, extra bytes.
+/// Maximum number of parts of a point: position, time, colour, wave packet, extra bytes.
 const MAX_ITEMS: usize = 5;
-/// Points in one stream, without chunks and without a table of them. LASzip wrote these until version 1.2.
+/// Compressor type: one stream of points without chunks and chunk table. Written by LASzip up to version 1.2.
 const POINT_WISE: u64 = 1;
-/// Points in chunks, whose fields are apart: each chunk says how many bytes every field takes.
+/// Compressor type: chunks with separate layers of fields. Each chunk states the size of every layer.
 const LAYERED: u64 = 3;
-/// The table while it is read, and the numbers of points that are kept of it.
+/// Copies of the table in memory: the table while it is read, and the point counts kept from it.
 const TABLE_COPIES: u64 = 2;
-/// Bytes of the place of the chunk table, in front of the points.
+/// Size of the offset of the chunk table, which precedes the points.
 const TABLE_PLACE_BYTES: u64 = 8;
 
-/// The compressed points of a file.
+/// Compressed points of a file.
 pub(super) struct Chunks {
     pub(super) items: Vec<LazItem>,
-    /// Layers of fields in place of points one after the other.
+    /// Whether fields are in separate layers instead of point by point.
     pub(super) is_layered: bool,
     pub(super) data_at: u64,
     pub(super) points: ChunkPoints,
-    /// Without a table of chunks nothing says where the points end but their number.
+    /// Whether there is a chunk table. Without one, only the number of points determines their end.
     pub(super) has_table: bool,
 }
 
-/// How many points chunks have.
+/// Number of points per chunk.
 pub(super) enum ChunkPoints {
-    /// One chunk has all.
+    /// A single chunk has all points.
     All,
-    /// Each chunk but the last has as many.
+    /// All chunks but the last have this many points.
     Each(u64),
-    /// Numbers of their own.
+    /// Each chunk has its own number of points.
     Own(Vec<u64>),
 }
 
 impl Chunks {
-    /// Refuses a file whose chunks cannot be where it says, or do not fit in memory, and sets how many points are read.
+    /// Checks that the chunks are within the file and fit in memory, and sets the number of points to read.
     pub(super) fn read(path: &Path, file: &File, layout: &mut Layout, budget: &Budget) -> Result<Self> {
         let wrong = |at: u64, reason: String| FormatError::at_offset(at, reason).in_input(path);
         let Some(description) = layout.laszip() else {
@@ -73,7 +73,7 @@ impl Chunks {
             );
             return Err(wrong(105, reason));
         }
-        // The decoder goes by the version of the parts: those from 3 on are layers, whatever the compressor is called.
+        // The decoder uses the version of the parts: versions 3 and above are layered, whatever the compressor type.
         if !(POINT_WISE..=LAYERED).contains(&compressor)
             || laz.items().iter().any(|item| (item.version() >= 3) != (compressor == LAYERED))
         {
@@ -94,7 +94,7 @@ impl Chunks {
     }
 }
 
-/// What is known of the chunks of a file while they are looked at.
+/// State of the check of a file's chunks.
 struct ChunkReader<'f> {
     path: &'f Path,
     input: BufReader<&'f File>,
@@ -121,7 +121,7 @@ impl ChunkReader<'_> {
         Chunks { items, is_layered, data_at, points, has_table }
     }
 
-    /// A writer that was killed leaves 0 in the header. How many points there are does not follow from their bytes.
+    /// Rejects a header with 0 points, left by a killed writer: compressed bytes do not reveal the number of points.
     fn check_number(&self, layout: &Layout, bytes: u64) -> Result<()> {
         if layout.points > 0 || bytes < self.point_bytes() {
             return Ok(());
@@ -133,12 +133,12 @@ impl ChunkReader<'_> {
         Err(self.wrong(layout.counts.place(), reason))
     }
 
-    /// The chunk table and its place; `None` if the file ends before it or in it.
+    /// Reads the chunk table and its offset. `None` if the file ends before or within it.
     fn table(&mut self, layout: &Layout) -> Result<Option<(u64, ChunkTable)>> {
         let Some(table_at) = self.table_place(layout)? else { return Ok(None) };
         let data_at = layout.points_at + TABLE_PLACE_BYTES;
         let chunks = number(&bytes_at(self.path, &mut self.input, table_at, 8)?, 4, 4);
-        // Each chunk begins with a point that is not compressed.
+        // Each chunk begins with an uncompressed point.
         let most_chunks = (table_at - data_at.min(table_at)) / self.point_bytes().max(1) + 1;
         if chunks > most_chunks {
             let reason =
@@ -154,7 +154,7 @@ impl ChunkReader<'_> {
             );
             return Err(self.wrong(table_at + 4, reason));
         }
-        // The library reads the place again, and the table there.
+        // The library reads the table's offset and the table again.
         self.input
             .seek(SeekFrom::Start(layout.points_at))
             .map_err(|error| Error::io(self.path, "read", error))?;
@@ -162,8 +162,8 @@ impl ChunkReader<'_> {
         Ok(guarded(|| ChunkTable::read_from(input, laz)).ok().map(|table| (table_at, table)))
     }
 
-    /// Where the chunk table is: said in front of the points, or in the last bytes of the file if the writer could not
-    /// go back.
+    /// Returns the offset of the chunk table. It precedes the points, or is in the last bytes of the file if the writer
+    /// could not seek back.
     fn table_place(&mut self, layout: &Layout) -> Result<Option<u64>> {
         let last_at = layout.file_bytes.saturating_sub(TABLE_PLACE_BYTES);
         let is_place = |place: u64| place as i64 > layout.points_at as i64 && place <= last_at;
@@ -175,7 +175,7 @@ impl ChunkReader<'_> {
             if is_place(place) {
                 return Ok(Some(place));
             }
-            // The library looks at the end only where the writer left the place open.
+            // The library looks at the end only if the writer left the offset unset.
             if place as i64 > layout.points_at as i64 {
                 break;
             }
@@ -189,7 +189,7 @@ impl ChunkReader<'_> {
         let most = layout.counts.legacy.max(layout.counts.large.unwrap_or(0));
         let is_variable = self.laz.uses_variable_size_chunks();
         let (mut at, mut room) = (data_at, 0_u64);
-        // Points as the chunks themselves count them.
+        // Number of points by the chunks' own counts.
         let (mut own, mut own_points) = (self.is_layered().then_some(0_u64), Vec::new());
         for (chunk, entry) in table.as_ref().iter().enumerate() {
             let end = at.checked_add(entry.byte_count).filter(|end| *end <= table_at);
@@ -202,7 +202,7 @@ impl ChunkReader<'_> {
                 return Err(self.wrong(table_at, reason));
             };
             self.check_chunk_bytes(chunk, at, entry.byte_count)?;
-            // A chunk behind all points may be empty.
+            // A chunk after all points may be empty.
             if entry.point_count == 0 && entry.byte_count > 0 && (room < most || most == 0) {
                 let reason = format!("chunk {chunk} has {} bytes and no points", entry.byte_count);
                 return Err(self.wrong(at, reason));
@@ -219,7 +219,7 @@ impl ChunkReader<'_> {
                             own.filter(|_| points <= entry.point_count).map(|own| own.saturating_add(points));
                     }
                     Err(error) if room < most => return Err(error),
-                    // Writers close a file without points with a chunk of none.
+                    // Writers end a file without points with an empty chunk.
                     Err(_) => own = None,
                 }
             } else {
@@ -228,7 +228,7 @@ impl ChunkReader<'_> {
             room = room.saturating_add(entry.point_count);
             at = end;
         }
-        // Of a table and chunks that differ, those count that have the announced number.
+        // If table and chunks differ, use the one that matches the announced number.
         let is_number = |points: u64| layout.counts.choose(points, points) == points;
         let differs = is_variable && own.is_some_and(|own| own != room);
         let is_own = differs && own.is_some_and(is_number);
@@ -239,7 +239,7 @@ impl ChunkReader<'_> {
         }
         let there = if is_variable && !is_own { Some(room) } else { own };
         match there {
-            // Fewer than announced are believed of chunks that reach up to their table alone.
+            // A smaller number than announced is accepted only if the chunks extend up to their table.
             Some(there) if at == table_at || layout.counts.choose(there, there) <= there => {
                 take_all(layout, there);
             }
@@ -280,7 +280,7 @@ impl ChunkReader<'_> {
         Ok(self.chunks(data_at, points, true))
     }
 
-    /// Follows the chunks from one to the next, as far as they go.
+    /// Follows the chunks one by one until one is incomplete.
     fn without_table(&mut self, layout: &mut Layout) -> Result<Chunks> {
         let data_at = layout.points_at + TABLE_PLACE_BYTES;
         let is_variable = self.laz.uses_variable_size_chunks();
@@ -339,7 +339,7 @@ impl ChunkReader<'_> {
         Ok(self.chunks(data_at, points, false))
     }
 
-    /// Chunks of layers are held in memory.
+    /// Checks the size of a layered chunk, which is held in memory.
     fn check_chunk_bytes(&self, chunk: usize, at: u64, bytes: u64) -> Result<()> {
         let most = self.budget.whole_bytes();
         if !self.is_layered() || bytes <= most {
@@ -353,7 +353,7 @@ impl ChunkReader<'_> {
     }
 }
 
-/// Takes all points of a file whose chunks count them.
+/// Sets the number of points of a file from the counts in its chunks.
 fn take_all(layout: &mut Layout, there: u64) {
     let announced = layout.counts.choose(there, there);
     layout.points = there;

@@ -5,13 +5,12 @@ use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
 use voxtile::{Error, FormatError, Result};
 
-/// The head of a chunk whose fields are in layers: behind its first point, its number of points and the bytes of each
-/// layer.
+/// Head of a layered chunk. It follows the first point and contains the number of points and the size of each layer.
 pub(super) struct LayeredHead {
     pub(super) points: u64,
     lengths_at: u64,
     layers_at: u64,
-    /// Bytes of all layers.
+    /// Total size of the layers.
     claimed: u64,
 }
 
@@ -33,12 +32,12 @@ impl LayeredHead {
         Ok(Self { points: number(&head, 0, 4), lengths_at, layers_at: lengths_at + lengths_bytes, claimed })
     }
 
-    /// Where the chunk ends.
+    /// Returns the offset of the chunk's end.
     pub(super) fn end(&self) -> Option<u64> {
         self.layers_at.checked_add(self.claimed)
     }
 
-    /// Checks the layers against the end of the chunk: the library takes what stands behind them as the next chunk.
+    /// Checks that the layers end with the chunk. The library takes the bytes after them as the next chunk.
     pub(super) fn check(&self, path: &Path, end: u64) -> Result<()> {
         if self.end() == Some(end) {
             return Ok(());
@@ -49,7 +48,7 @@ impl LayeredHead {
     }
 }
 
-/// A few bytes of a file; they are missing if it was cut off.
+/// Reads bytes at an offset. Fails if the file is truncated.
 pub(super) fn bytes_at(path: &Path, input: &mut BufReader<&File>, at: u64, count: u64) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let read = input.seek(SeekFrom::Start(at)).and_then(|_| input.take(count).read_to_end(&mut bytes));

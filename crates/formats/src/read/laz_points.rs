@@ -6,25 +6,25 @@ use std::fs::File;
 use std::io::{BufReader, ErrorKind, Seek, SeekFrom};
 use voxtile::{Error, Result};
 
-/// Compressed points in their order, chunk by chunk. The whole decompressor of the crate `laz` needs a chunk table, and
-/// panics where LASzip wrote none; its decompressors of records do not.
+/// Decompressor of points in order, chunk by chunk. The complete decompressor of the crate `laz` requires a chunk table
+/// and panics without one; its record decompressors do not.
 pub(super) struct LazPoints {
     decompressor: Box<dyn RecordDecompressor<BufReader<File>> + Send>,
     items: Vec<LazItem>,
     points: ChunkPoints,
-    /// Chunks that were begun.
+    /// Number of chunks started.
     chunks: usize,
-    /// Points of the chunk that were not read yet.
+    /// Number of unread points of the current chunk.
     left: u64,
     /// Without a chunk table, points may end with the file.
     pub(super) has_table: bool,
 }
 
-/// Why no more points are read.
+/// Reason for an early end.
 pub(super) enum End {
-    /// The file ends.
+    /// End of the file.
     File,
-    /// It is damaged.
+    /// The file is damaged.
     Damage(String),
 }
 
@@ -40,7 +40,8 @@ impl LazPoints {
         Ok(Self { decompressor, items, points, chunks: 0, left: 0, has_table })
     }
 
-    /// Fills `bytes` with points of `point_bytes` each, in order. Returns how many are whole, and why it ended early.
+    /// Fills `bytes` with points of `point_bytes` each. Returns the number of complete points, and the reason for an
+    /// early end.
     pub(super) fn fill(&mut self, bytes: &mut [u8], point_bytes: usize) -> (usize, Option<End>) {
         let mut done = 0;
         let mut is_file_end = false;

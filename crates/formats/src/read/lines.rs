@@ -1,4 +1,4 @@
-//! Lines of a text of any size, each of bounded length.
+//! Reads the lines of a text of any size. The length of each line is bounded.
 
 use super::foreign::text_encoding;
 use super::input_file::open_input;
@@ -7,24 +7,24 @@ use std::io::{self, BufRead, BufReader, ErrorKind};
 use std::path::{Path, PathBuf};
 use voxtile::{Error, FormatError, Result};
 
-/// A longer line is an error: its words would take many times its bytes.
+/// Limit for a line. The words of a longer line would take a multiple of its size in memory.
 pub(crate) const MAX_LINE_BYTES: usize = 1 << 16;
 
-/// How much of a line was read.
+/// Extent of a line that was read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Extent {
     Whole,
-    /// The line goes on.
+    /// The line is longer than the limit.
     Start,
 }
 
-/// Lines of an input as bytes. They end with LF, CR LF or CR alone.
+/// Reader of lines as bytes. Lines end with LF, CR LF or CR.
 pub(crate) struct RawLines<R> {
     input: R,
     line: Vec<u8>,
-    /// At most so many bytes of a line are read.
+    /// Limit for the bytes read at once from a line.
     max_bytes: usize,
-    /// Whether the last line ended with CR: an LF after it belongs to it.
+    /// Whether the last line ended with CR. A following LF then belongs to the same line end.
     is_after_return: bool,
 }
 
@@ -33,12 +33,12 @@ impl<R: BufRead> RawLines<R> {
         Self { input, line: Vec::new(), max_bytes, is_after_return: false }
     }
 
-    /// The line that was read last, without its end.
+    /// Returns the current line without its end.
     pub(crate) fn line(&self) -> &[u8] {
         &self.line
     }
 
-    /// Reads the next line, or its start. `None` at the end of the input.
+    /// Reads the next line, or the start of a long one. Returns `None` at the end of the input.
     pub(crate) fn next(&mut self) -> io::Result<Option<Extent>> {
         let Self { input, line, max_bytes, is_after_return } = self;
         line.clear();
@@ -71,14 +71,14 @@ impl<R: BufRead> RawLines<R> {
         }
     }
 
-    /// Passes over what is left of a line whose start was read.
+    /// Skips the rest of a line of which the start was read.
     pub(crate) fn pass_rest(&mut self) -> io::Result<()> {
         while self.next()? == Some(Extent::Start) {}
         Ok(())
     }
 }
 
-/// Lines of a file, one at a time.
+/// Reader of the lines of a file.
 pub(crate) struct Lines {
     path: PathBuf,
     lines: RawLines<Box<dyn BufRead + Send>>,
@@ -90,13 +90,13 @@ impl Lines {
         Ok(Self::new(path, BufReader::with_capacity(1 << 16, open_input(path)?), 0))
     }
 
-    /// The lines of what is left of an input, after so many lines.
+    /// Reads the rest of an input. `lines_before` is the number of lines already read.
     pub(crate) fn new(path: &Path, input: impl BufRead + Send + 'static, lines_before: u64) -> Self {
         let lines = RawLines::new(Box::new(input) as Box<dyn BufRead + Send>, MAX_LINE_BYTES);
         Self { path: path.to_owned(), lines, number: lines_before }
     }
 
-    /// The next line without its end, and its number. Of a long comment only the start is read.
+    /// Returns the next line, without its end, and its number. Long comments are truncated.
     pub(crate) fn next(&mut self) -> Result<Option<(u64, String)>> {
         let Some(extent) = self.read()? else { return Ok(None) };
         if self.number == 1
@@ -115,7 +115,7 @@ impl Lines {
         Ok(Some((self.number, text)))
     }
 
-    /// Passes over the next line that is not blank, of any length; `false` at the end.
+    /// Skips the next line that is not blank, whatever its length. Returns `false` at the end.
     pub(crate) fn pass(&mut self) -> Result<bool> {
         while let Some(extent) = self.read()? {
             if extent == Extent::Start {
@@ -139,17 +139,17 @@ impl Lines {
         self.lines.pass_rest().map_err(|error| Error::io(&self.path, "read", error))
     }
 
-    /// The number of the line that was read last.
+    /// Returns the number of the current line.
     pub(crate) fn number(&self) -> u64 {
         self.number
     }
 
-    /// An error of the line that was read last.
+    /// Creates an error for the current line.
     pub(crate) fn error(&self, reason: impl Into<String>) -> Error {
         self.error_at(self.number, reason)
     }
 
-    /// An error of a line by its number.
+    /// Creates an error for a line.
     pub(crate) fn error_at(&self, line: u64, reason: impl Into<String>) -> Error {
         FormatError::at_line(line, reason).in_input(&self.path)
     }
@@ -178,7 +178,7 @@ mod tests {
     #[test]
     fn lines_end_as_on_any_system() {
         let read = |text: &'static [u8]| {
-            // Two bytes at a time: an end may be cut in two.
+            // A buffer of two bytes may split a line end.
             let mut lines = Lines::new(Path::new("a"), BufReader::with_capacity(2, text), 0);
             std::iter::from_fn(|| lines.next().unwrap()).collect::<Vec<_>>()
         };

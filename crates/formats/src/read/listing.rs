@@ -7,19 +7,19 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 use voxtile::{Error, Result};
 
-/// What a folder holds, in the natural order of names: `scan2` before `scan10`.
+/// Contents of a folder, in natural order of names: `scan2` before `scan10`.
 pub(crate) struct Listing {
     files: Vec<PathBuf>,
     folders: Vec<PathBuf>,
 }
 
-/// How much of a `metadata.yaml` is read to see whether it is rosbag2's.
+/// Number of bytes of a `metadata.yaml` that are searched for the key of rosbag2.
 const MARK_WITHIN_BYTES: u64 = 1 << 20;
-/// The key of all others in it.
+/// Top-level key of a rosbag2 description.
 const BAG2_MARK: &[u8] = b"rosbag2_bagfile_information";
 
 impl Listing {
-    /// Lists a folder, without files that are known to be no clouds, by whatever path they were named.
+    /// Lists a folder, except files known not to be clouds (compared by resolved path).
     pub(crate) fn read(folder: &Path, not_clouds: &[PathBuf]) -> Result<Self> {
         let fail = |error| Error::io(folder, "read", error);
         let (mut files, mut folders) = (Vec::new(), Vec::new());
@@ -43,27 +43,27 @@ impl Listing {
         Ok(Self { files, folders })
     }
 
-    /// The files that may be clouds by their names.
+    /// Returns the files that may be clouds by their names.
     pub(crate) fn clouds(&self) -> impl Iterator<Item = &PathBuf> {
         self.files.iter().filter(|path| !aside::is_surely_named(path))
     }
 
-    /// The files of a format.
+    /// Returns the files of a format.
     pub(crate) fn with_extension(&self, format: &InputFormat) -> Vec<PathBuf> {
         self.clouds().filter(|path| format.has_extension(&extension_of(path))).cloned().collect()
     }
 
-    /// The files of a format of text, without those that are no clouds: lists, logs and cameras lie among texts.
+    /// Returns the files of a text format, separated into clouds and others such as lists, logs and cameras.
     pub(crate) fn texts(&self, format: &InputFormat) -> Texts {
         aside::sort_out(self.with_extension(format))
     }
 
-    /// Whether there are pictures that say that they are depths, or a camera.
+    /// Returns whether there are images named as depth, or a camera file.
     pub(crate) fn has_depths(&self) -> bool {
         self.files.iter().any(|path| is_named_depth(path)) || Intrinsics::is_in(&self.files)
     }
 
-    /// Why a folder has no clouds, and where they may be; `others` says what its texts are.
+    /// Explains why a folder has no clouds and suggests where they may be. `others` describes its other text files.
     pub(crate) fn why_nothing(&self, known: &str, others: &[String]) -> String {
         if let Some(list) = self.files.iter().find_map(|path| aside::depth_list_of(path)) {
             return list;
@@ -90,7 +90,7 @@ impl Listing {
     }
 }
 
-/// Whether a folder has the description of a bag of ROS 2.
+/// Returns whether a folder contains the description of a rosbag2 recording.
 pub(crate) fn is_rosbag2(folder: &Path) -> bool {
     let path = folder.join("metadata.yaml");
     let mut start = Vec::new();
@@ -98,12 +98,13 @@ pub(crate) fn is_rosbag2(folder: &Path) -> bool {
     path.is_file() && read().is_ok() && start.windows(BAG2_MARK.len()).any(|window| window == BAG2_MARK)
 }
 
-/// The ending of a file's name, in lower case.
+/// Returns the extension of a file in lower case.
 pub(crate) fn extension_of(path: &Path) -> String {
     path.extension().map(|extension| extension.to_string_lossy().to_lowercase()).unwrap_or_default()
 }
 
-/// What an entry of a folder is called elsewhere, too. Only links are looked up: a folder may have a million files.
+/// Returns the resolved path of a folder entry. Only symbolic links are resolved, because a folder may have a million
+/// files.
 fn place_of(entry: &DirEntry, folder: &Path) -> PathBuf {
     let is_link = entry.file_type().is_ok_and(|kind| kind.is_symlink());
     let target = is_link.then(|| entry.path().canonicalize().ok()).flatten();

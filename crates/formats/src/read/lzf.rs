@@ -1,11 +1,11 @@
 use std::io::{self, Read, Write};
 
-/// Copies start at most so many bytes back.
+/// Maximum distance of a copy, in bytes.
 const WINDOW_BYTES: usize = 1 << 13;
-/// Bytes that are written at a time.
+/// Size of output writes.
 const OUT_BYTES: usize = 1 << 16;
 
-/// Decompresses LZF, the compression of PCD's `binary_compressed`, to exactly `len` bytes; returns `false` if the input
+/// Decompresses LZF, the compression of PCD's `binary_compressed`, to exactly `len` bytes. Returns `false` if the input
 /// is damaged.
 ///
 /// The format: a control byte below 32 is followed by that many literal bytes plus one. Any other control byte has a
@@ -14,7 +14,7 @@ const OUT_BYTES: usize = 1 << 16;
 ///
 /// # Errors
 ///
-/// An input that cannot be read, an output that cannot be written.
+/// The input cannot be read, or the output cannot be written.
 pub(super) fn decompress(input: &mut impl Read, len: u64, out: impl Write) -> io::Result<bool> {
     let mut output = Output { tail: Vec::with_capacity(WINDOW_BYTES + OUT_BYTES + 512), done: 0, out };
     let mut literal = [0; 32];
@@ -32,7 +32,7 @@ pub(super) fn decompress(input: &mut impl Read, len: u64, out: impl Write) -> io
             let length = 2 + usize::from(control >> 5) + usize::from(more);
             let back = 1 + (usize::from(control & 31) << 8 | usize::from(low));
             let Some(start) = output.tail.len().checked_sub(back) else { return Ok(false) };
-            // Byte by byte: the copy may overlap its output.
+            // Byte by byte, because the copy may overlap its output.
             (start..start + length).for_each(|at| output.tail.push(output.tail[at]));
         }
         if output.len() > len {
@@ -47,8 +47,8 @@ pub(super) fn decompress(input: &mut impl Read, len: u64, out: impl Write) -> io
     Ok(is_whole)
 }
 
-/// Whether so many compressed bytes can become so many: LZF compresses at most 264 bytes into 3. Refuses claims that
-/// would only size an allocation.
+/// Returns whether the compressed size is sufficient for the uncompressed size: LZF compresses at most 264 bytes into
+/// 3. Rejects false sizes before they cause an allocation.
 pub(super) fn is_possible(packed: u64, unpacked: u64) -> bool {
     unpacked / 128 <= packed
 }
@@ -62,7 +62,7 @@ fn next(input: &mut impl Read) -> io::Result<Option<u8>> {
     }
 }
 
-/// The output; its tail is kept, to copy from.
+/// Output with a tail that serves as the window for copies.
 struct Output<W> {
     tail: Vec<u8>,
     done: u64,
@@ -93,7 +93,7 @@ mod tests {
 
     #[test]
     fn literals_and_copies() {
-        // "abc", then 9 bytes from 3 back, then 10 bytes from 1 back.
+        // "abc", then a copy of 9 bytes from 3 back, then of 10 bytes from 1 back.
         let packed = [2, b'a', b'b', b'c', 7 << 5, 0, 2, 7 << 5, 1, 0];
         assert_eq!(unpacked(&packed, 22).unwrap(), b"abcabcabcabccccccccccc");
         for wrong in [&packed[..9], &[2, b'a'], &[0x20, 0]] {
@@ -106,7 +106,7 @@ mod tests {
 
     #[test]
     fn more_than_the_window() {
-        // 0 to 31, and then again and again from as far back as may be.
+        // The bytes 0 to 31, then repeated copies at the maximum distance.
         let mut packed: Vec<u8> = Vec::new();
         let mut expected: Vec<u8> = Vec::new();
         for k in 0..256 {

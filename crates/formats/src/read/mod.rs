@@ -1,7 +1,7 @@
-//! Point clouds in files, one format a file.
+//! Readers of point cloud files, one format per file.
 //!
-//! Each format is a [`CloudSource`]: files with one cloud (PLY, text, `.bin`), with several (LAS cut by
-//! GPS time, E57), and folders of either.
+//! Each format is a [`CloudSource`]: files with one cloud (PLY, text, `.bin`), files with several (LAS split by GPS
+//! time, E57), and folders of either.
 
 mod aside;
 pub(crate) mod bin;

@@ -1,43 +1,43 @@
-//! Time stamps in the names of files.
+//! Time stamps in file names.
 
 use super::cloud::CloudHead;
 use super::one::head_of;
 use super::stamp::nanoseconds;
 use std::path::{Path, PathBuf};
 
-/// Endings that a name has beside the last one: `0001.pcd.bin`, `frame-000001.depth.png`.
+/// Additional extensions before the last one: `0001.pcd.bin`, `frame-000001.depth.png`.
 const INNER_ENDINGS: [&str; 4] = [".pcd", ".depth", ".cloud", ".points"];
-/// From 1990 to 2100 in seconds: what a number in a name must mean to be a stamp. Counters do not come that far.
+/// Plausible stamps, in seconds: the years 1990 to 2100. Counters do not reach them.
 const PLAUSIBLE_S: std::ops::Range<i128> = 631_152_000..4_102_444_800;
-/// Digits of a second's nanoseconds.
+/// Decimal digits of a second in nanoseconds.
 const NANOSECOND_DIGITS: usize = 9;
 
-/// The time stamp in a file's name: `1700000000123456789.bin`, `1403636579.763555.ply`, `lidar__1532402927647951.bin`,
-/// `cloud_1583836591_182590976.pcd`.
+/// Returns the time stamp in a file name: `1700000000123456789.bin`, `1403636579.763555.ply`,
+/// `lidar__1532402927647951.bin`, `cloud_1583836591_182590976.pcd`.
 pub fn in_name(path: &Path) -> Option<i64> {
     NameStamps::default().stamp(path)
 }
 
-/// How the names of the files of a folder tell times: one name alone may be read in two ways.
+/// How the file names of a folder encode times. A single name may be ambiguous.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct NameStamps {
-    /// Seconds and, behind a point, a part of one.
+    /// Meaning of the digits after a point.
     behind_point: Part,
-    /// The same behind `_` or `-`.
+    /// Meaning of the digits after `_` or `-`.
     behind_dash: Option<Part>,
 }
 
-/// What is behind whole seconds.
+/// Meaning of the digits after whole seconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Part {
     /// Decimals of a second.
     #[default]
     Decimals,
-    /// A whole number of units of `10^digits` nanoseconds, perhaps without leading zeros.
+    /// An integer in units of `10^digits` nanoseconds, possibly without leading zeros.
     Whole { digits: i32 },
 }
 
-/// Seconds in a name and the digits behind them.
+/// Seconds in a name and the digits after them.
 #[derive(Clone, Copy)]
 struct Parted<'n> {
     seconds: &'n str,
@@ -46,7 +46,7 @@ struct Parted<'n> {
 }
 
 impl NameStamps {
-    /// Looks at all names of a folder.
+    /// Derives the encoding from all names of a folder.
     pub(crate) fn of(files: &[PathBuf]) -> Self {
         let names = || files.iter().filter_map(|path| parted(stem_of(path)?));
         Self {
@@ -55,17 +55,17 @@ impl NameStamps {
         }
     }
 
-    /// Whether what is behind a point is a whole number, not decimals.
+    /// Returns whether the digits after a point are an integer instead of decimals.
     pub(crate) fn are_whole(self) -> bool {
         self.behind_point != Part::Decimals
     }
 
-    /// What is known of the cloud of a file by its name.
+    /// Returns the properties of a cloud that are known from its file name.
     pub(crate) fn head_of(self, path: &Path) -> CloudHead {
         CloudHead { stamp_ns: self.stamp(path), ..head_of(path) }
     }
 
-    /// What a person should know of this reading.
+    /// Returns a remark for the user about an unusual encoding.
     pub(crate) fn remark(self) -> Option<String> {
         let unit = match self.behind_point {
             Part::Decimals => return None,
@@ -77,7 +77,7 @@ impl NameStamps {
         ))
     }
 
-    /// The time stamp in a file's name.
+    /// Returns the time stamp in a file name.
     pub(crate) fn stamp(self, path: &Path) -> Option<i64> {
         let stem = stem_of(path)?;
         if let Some(Parted { seconds, part, is_behind_point }) = parted(stem) {
@@ -100,7 +100,7 @@ impl NameStamps {
     }
 }
 
-/// A file's name without its endings.
+/// Returns a file name without its extensions.
 fn stem_of(path: &Path) -> Option<&str> {
     let name = path.file_name()?.to_str()?;
     let mut stem = name;
@@ -115,7 +115,7 @@ fn stem_of(path: &Path) -> Option<&str> {
     Some(stem)
 }
 
-/// Seconds and a part of one, if a name ends with them.
+/// Splits off seconds and the digits after them at the end of a name.
 fn parted(stem: &str) -> Option<Parted<'_>> {
     let (before, part) = stem.rsplit_once(['.', '_', '-'])?;
     let start = before.trim_end_matches(|letter: char| letter.is_ascii_digit()).len();
@@ -128,12 +128,12 @@ fn parted(stem: &str) -> Option<Parted<'_>> {
     (is_time && is_part).then_some(Parted { seconds, part, is_behind_point })
 }
 
-/// A number in one piece, with decimals where it counts seconds.
+/// Parses a stamp written as one number. Decimals are allowed after seconds.
 fn one_number(stem: &str) -> Option<i64> {
     let number_at = stem.trim_end_matches(|letter: char| letter.is_ascii_digit() || letter == '.').len();
     let (prefix, number) = stem.split_at(number_at);
     let (whole, fraction) = number.split_once('.').unwrap_or((number, ""));
-    // A date of ten or twelve digits behind a word is no stamp.
+    // A number of ten or twelve digits after a word may be a date.
     let is_sure = prefix.is_empty() || (prefix.ends_with(['_', '-']) && whole.len() + fraction.len() >= 13);
     if !is_sure
         || !is_digits(whole)
@@ -146,20 +146,20 @@ fn one_number(stem: &str) -> Option<i64> {
     let in_unit = |(_, per_second): &(i32, i128)| PLAUSIBLE_S.contains(&(value / per_second));
     let (digits, per_second) =
         [(9, 1), (6, 1_000), (3, 1_000_000), (0, 1_000_000_000)].into_iter().find(in_unit)?;
-    // Seconds alone may have a fraction.
+    // Only seconds may have a fraction.
     (fraction.is_empty() || per_second == 1).then(|| nanoseconds(number, digits))?
 }
 
-/// How wide the parts of seconds in names are.
+/// Statistics of the digits after seconds in the names of a folder.
 #[derive(Default)]
 struct Widths {
     least: usize,
     most: usize,
-    /// Whether one of several digits starts with 0: they are padded, or decimals.
+    /// Whether a number of several digits starts with 0, which shows padding or decimals.
     has_zero_start: bool,
-    /// Whether one of several digits ends with 0, which programs that shorten decimals leave out.
+    /// Whether a number of several digits ends with 0. Programs that shorten decimals omit such zeros.
     has_zero_end: bool,
-    /// Whether a later second has a smaller part: a counter beside seconds never does.
+    /// Whether a later second has a smaller number, which a running counter never has.
     starts_again: bool,
 }
 
@@ -188,8 +188,9 @@ impl Widths {
         self.least < self.most
     }
 
-    /// Decimals are of one width, or shorter where they end with zeros. `sec.nsec` and `sec.usec` without leading zeros
-    /// are of different widths and never start with 0; and a double has no nine decimals of today's seconds.
+    /// Decimals have equal widths, or are shorter where trailing zeros are omitted. `sec.nsec` and `sec.usec` without
+    /// leading zeros have different widths and never start with 0. A double cannot hold nine decimals of current Unix
+    /// time.
     fn behind_point(&self) -> Part {
         match self.most {
             _ if !self.differ() || self.has_zero_start => Part::Decimals,
@@ -199,7 +200,7 @@ impl Widths {
         }
     }
 
-    /// Behind `_` and `-` there may be counters.
+    /// The number after `_` or `-` may be a counter.
     fn behind_dash(&self) -> Option<Part> {
         match self.most {
             NANOSECOND_DIGITS => Some(Part::Whole { digits: 0 }),
@@ -219,7 +220,7 @@ fn is_digits(text: &str) -> bool {
 mod tests {
     use super::*;
 
-    /// The times of names that are together, after 1.5e9 s.
+    /// Reads the stamps of several names together, relative to 1.5e9 s.
     fn together(names: &[&str]) -> Vec<Option<i64>> {
         let files: Vec<PathBuf> = names.iter().map(PathBuf::from).collect();
         let stamps = NameStamps::of(&files);

@@ -3,36 +3,36 @@ use super::name_stamps;
 use std::path::Path;
 use voxtile::Result;
 
-/// Takes the points of a cloud.
+/// Callback for the points of a cloud.
 pub type Visit<'v> = &'v mut dyn FnMut(CloudPoint) -> Result<()>;
 
-/// The points of a cloud that was opened.
+/// Points of an open cloud.
 pub trait Points: Send {
-    /// Visits them once, in order.
+    /// Visits the points in order. Call it at most once.
     ///
     /// # Errors
     ///
-    /// A file that cannot be read or is invalid; the first error of `visit`.
+    /// A file cannot be read or is invalid, or `visit` returns an error.
     fn read(&mut self, visit: Visit<'_>) -> Result<()>;
 
-    /// What a person should know of them, so far: what was guessed, rows that were left out.
+    /// Returns remarks for the user about the points read so far, such as guesses and skipped rows.
     fn remarks(&self) -> Vec<String> {
         Vec::new()
     }
 }
 
-/// What a file's name tells of its cloud.
+/// Returns the properties of a cloud that are known from its file name.
 pub(crate) fn head_of(path: &Path) -> CloudHead {
     let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     CloudHead { name, stamp_ns: name_stamps::in_name(path), ..CloudHead::default() }
 }
 
-/// A file with one cloud.
+/// Source for a file with one cloud.
 pub(crate) struct OneCloud {
     format: String,
     head: Option<CloudHead>,
     points: Option<Box<dyn Points>>,
-    /// Of points that were read.
+    /// Remarks on points already read.
     remarks: Vec<String>,
 }
 
@@ -41,7 +41,7 @@ impl OneCloud {
         Self { format: format.into(), head: Some(head), points: Some(points), remarks: Vec::new() }
     }
 
-    /// Lets go of the file.
+    /// Closes the file and keeps its remarks.
     fn close(&mut self) {
         if let Some(points) = self.points.take() {
             self.remarks = points.remarks();
@@ -67,7 +67,7 @@ impl CloudSource for OneCloud {
     }
 
     fn read_points(&mut self, visit: Visit<'_>) -> Result<()> {
-        // Before the first cloud there is nothing to read.
+        // There is no current cloud before the first call of `next_cloud`.
         match (&self.head, self.points.take()) {
             (None, Some(mut points)) => {
                 let read = points.read(visit);

@@ -15,19 +15,19 @@ use voxtile::scan::Pose;
 use voxtile::{Error, FormatError, Result};
 use voxtile_scratch::ScratchFile;
 
-/// A longer line is an error.
+/// Limit for the length of a line.
 const MAX_LINE_BYTES: usize = 1 << 20;
-/// Bytes that are read at a time.
+/// Size of reads.
 const BYTES_AT_A_TIME: usize = 1 << 16;
-/// Bytes of one field that are read at a time.
+/// Limit for the bytes of one field to read at once.
 const MAX_FIELD_BYTES: usize = 1 << 20;
 
 /// Reads a PCD file (versions 0.5 to 0.7; `ascii`, `binary` or `binary_compressed`) from memory. Bytes after the last
-/// point are ignored: PCL pads its files. The pose is the `VIEWPOINT`; points are NaN where the sensor saw nothing.
+/// point are ignored, because PCL pads its files. The pose is the `VIEWPOINT`. Points without a return are NaN.
 ///
 /// # Errors
 ///
-/// An invalid header (with the line), points that are missing or not numbers.
+/// The header is invalid (the error gives the line), or points are missing or not numbers.
 pub fn read_pcd(file: &[u8]) -> Result<SensorScan> {
     let (path, head) = (Path::new("PCD"), CloudHead::default());
     let (head, mut pcd) = begin(path, head, Cursor::new(file), file.len() as u64, &Budget::default(), true)?;
@@ -42,8 +42,7 @@ pub fn read_pcd(file: &[u8]) -> Result<SensorScan> {
     Ok(SensorScan { name: head.name, points_in_sensor, intensities, world_from_sensor })
 }
 
-/// Opens a PCD file and reads its header, which may have a `VIEWPOINT`. One that is none is an error only if it is
-/// needed.
+/// Opens a PCD file and reads its header. An invalid `VIEWPOINT` is an error only if it is needed.
 pub(super) fn open(
     path: &Path,
     head: CloudHead,
@@ -61,19 +60,19 @@ pub(super) fn open(
     Ok((head, Box::new(points)))
 }
 
-/// The points of a PCD file.
+/// Points of a PCD file.
 struct PcdPoints<R> {
     path: PathBuf,
     header: Header,
     columns: Columns,
     input: R,
     file_bytes: u64,
-    /// For what is unpacked.
+    /// Memory budget for decompressed data.
     budget: Budget,
     left_out: LeftOut,
 }
 
-/// Reads the header, and moves to the points.
+/// Reads the header and seeks to the points.
 fn begin<R: BufRead + Seek>(
     path: &Path,
     mut head: CloudHead,
@@ -140,7 +139,7 @@ impl<R: BufRead> PcdPoints<R> {
             }
             let text = String::from_utf8_lossy(lines.line());
             let words: Vec<&str> = text.split_ascii_whitespace().collect();
-            // A row that is too short is damage; a word is a value that is not known.
+            // A short row is damage; a word is an unknown value.
             if let Some(field) = last.filter(|field| words.len() <= field.first_value) {
                 return Err(wrong(
                     number,
@@ -150,7 +149,7 @@ impl<R: BufRead> PcdPoints<R> {
             let value = |column: usize| {
                 let field = &header.fields[column];
                 let word = words.get(field.first_value).copied().unwrap_or_default();
-                // A number of a four-byte field is rounded to it, as in the binary encodings.
+                // Numbers of four-byte fields are rounded to `f32`, as in the binary encodings.
                 let parsed = match (field.kind, field.size) {
                     (b'F', 4) => word.parse::<f32>().map(f64::from),
                     _ => word.parse(),
@@ -173,7 +172,7 @@ impl<R: BufRead> PcdPoints<R> {
         }
     }
 
-    /// Points one after the other.
+    /// Reads points stored point by point.
     fn visit_binary(&mut self, visit: Visit<'_>) -> Result<()> {
         let Self { path, header, columns, input, file_bytes, .. } = self;
         let there = file_bytes.saturating_sub(header.data_at as u64);
@@ -201,7 +200,7 @@ impl<R: BufRead> PcdPoints<R> {
         Ok(())
     }
 
-    /// Compressed size, uncompressed size, then the compressed fields one after the other.
+    /// Reads compressed points: the compressed size, the uncompressed size, then the fields one after another.
     fn visit_compressed(&mut self, visit: Visit<'_>) -> Result<()> {
         let Self { path, header, columns, input, file_bytes, budget, .. } = self;
         let cannot = |error| Error::io(path, "read", error);
@@ -257,7 +256,7 @@ impl<R: BufRead> PcdPoints<R> {
     }
 }
 
-/// Which fields are read.
+/// Fields to read.
 struct Columns {
     meaning: Meaning,
 }
@@ -272,7 +271,7 @@ impl Columns {
             meaning.intensity = INTENSITY_NAMES.iter().find_map(|name| find(name));
             return Ok(Self { meaning });
         }
-        // As tables have them: in letters of either case, with units.
+        // As in text tables: in any case, with units.
         let names: Vec<String> = header.fields.iter().map(|field| field.name.clone()).collect();
         let meaning = Meaning::of(&names, |_| false);
         let meaning = meaning.map_err(|reason| FormatError::at_line(header.data_line, reason))?;
@@ -288,7 +287,7 @@ impl Columns {
         Ok(Self { meaning })
     }
 
-    /// The fields that are read: x, y, z, and the intensity if there is one.
+    /// Returns the fields to read: x, y, z, and the intensity if there is one.
     fn all(&self) -> impl Iterator<Item = usize> {
         self.meaning.xyz.into_iter().chain(self.meaning.intensity)
     }
@@ -302,7 +301,7 @@ impl Columns {
         Ok(self.point_of([value(x)?, value(y)?, value(z)?], intensity))
     }
 
-    /// The point of these values. It counts as hit also where they are no numbers.
+    /// Creates a point from its values. It counts as a return even if they are NaN.
     fn point_of(&self, [x, y, z]: [f64; 3], intensity: Option<f64>) -> CloudPoint {
         let [in_x, in_y, in_z] = self.meaning.units;
         let position_m = [in_x.metres(x), in_y.metres(y), in_z.metres(z)];
@@ -310,7 +309,7 @@ impl Columns {
     }
 }
 
-/// The decompressed values, field after field.
+/// Decompressed values, stored field by field.
 enum Fields {
     InMemory(Vec<u8>),
     InFile(ScratchFile),
@@ -320,12 +319,12 @@ impl Fields {
     fn new(budget: &Budget, bytes: u64) -> Result<Self> {
         match bytes > budget.bytes as u64 {
             true => budget.scratch_file().map(Self::InFile),
-            // It grows as data arrives.
+            // The buffer grows as data arrives.
             false => Ok(Self::InMemory(Vec::new())),
         }
     }
 
-    /// The values of a field of some points.
+    /// Reads the values of one field for a range of points.
     fn read(
         &mut self,
         header: &Header,
@@ -348,7 +347,7 @@ impl Fields {
     }
 }
 
-/// A little-endian number.
+/// Decodes a little-endian number.
 fn number(kind: u8, bytes: &[u8]) -> f64 {
     // Zero-extended to eight bytes.
     let mut wide = [0; 8];

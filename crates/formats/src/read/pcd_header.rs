@@ -15,33 +15,33 @@ pub(super) enum Encoding {
 
 pub(super) struct Field {
     pub(super) name: String,
-    /// Bytes of one value: 1, 2, 4 or 8.
+    /// Bytes per value: 1, 2, 4 or 8.
     pub(super) size: usize,
     /// `I`, `U` or `F`.
     pub(super) kind: u8,
     pub(super) count: usize,
-    /// Bytes before this field in a point.
+    /// Byte offset of the field in a point.
     pub(super) offset: usize,
-    /// Values before this field in a point.
+    /// Index of the field's first value in a point.
     pub(super) first_value: usize,
 }
 
-/// The header of a PCD file.
+/// Header of a PCD file.
 pub(super) struct Header {
     pub(super) fields: Vec<Field>,
     pub(super) points: usize,
     pub(super) point_bytes: usize,
     pub(super) encoding: Encoding,
-    /// The `VIEWPOINT`, as it is written; zeros alone are none.
+    /// The `VIEWPOINT` as written, or `None` if it is all zeros.
     pub(super) world_from_sensor: Result<Option<RigidPose>>,
     pub(super) data_at: usize,
     pub(super) data_line: u64,
 }
 
-/// A longer header is an error.
+/// Limit for the size of the header.
 pub(super) const MAX_HEADER_BYTES: usize = 1 << 16;
 
-/// A larger point is an error: as many bytes are read at a time.
+/// Limit for the size of a point, which is read at once.
 const MAX_POINT_BYTES: usize = 1 << 20;
 
 const KEYS: [&str; 11] = [
@@ -58,7 +58,7 @@ const KEYS: [&str; 11] = [
     "DATA",
 ];
 
-/// Whether a file starts as PCD does: with comments, then a first key, in letters of either case.
+/// Returns whether a file starts like PCD: comments, then a known key, in any case.
 pub(crate) fn is_start(start: &[u8]) -> bool {
     let text = String::from_utf8_lossy(start);
     let is_comment = |line: &&str| line.is_empty() || (line.starts_with('#') && !is_magic(line));
@@ -79,7 +79,7 @@ impl Header {
     ///
     /// # Errors
     ///
-    /// An invalid header, with the line.
+    /// The header is invalid; the error gives the line.
     pub(super) fn parse(file: &[u8]) -> Result<Self> {
         let mut entries: Vec<(String, Vec<String>, u64)> = Vec::new();
         let (mut at, mut line_number) = (file.len() - without_mark(file).len(), 0);
@@ -168,7 +168,7 @@ impl Header {
     }
 }
 
-/// The last byte of the lines of a header: CR, if the first of them ends with that alone.
+/// Returns the last byte of line ends: CR if the first line ends with CR alone, else LF.
 fn line_end(file: &[u8]) -> u8 {
     let first = file.iter().position(|byte| matches!(byte, b'\n' | b'\r'));
     match first.map(|at| (file[at], file.get(at + 1))) {

@@ -1,4 +1,4 @@
-//! Scans of PCD files. They were the first that were read: what maps of earlier versions rely on is here.
+//! Scans of PCD files, including the behaviour that maps created by older versions rely on.
 
 use super::file_order::sort_naturally;
 use super::files::Files;
@@ -18,18 +18,18 @@ use std::path::{Path, PathBuf};
 use voxtile::scan::Pose;
 use voxtile::{Error, FormatError, Result};
 
-/// Numbers in file names are compared with time stamps if both exceed this many seconds: counters do not.
+/// Numbers in file names are compared with time stamps only if both exceed this many seconds. Counters are smaller.
 const MIN_STAMP_S: f64 = 1e6;
 
-/// Whether there are PCD files in a folder.
+/// Returns whether a folder contains PCD files.
 pub(crate) fn is_folder(folder: &Path) -> bool {
     files_of(folder).is_ok_and(|files| !files.is_empty())
 }
 
-/// Opens a PCD file, or those of a folder. A pose file goes before the `VIEWPOINT` of the files.
+/// Opens a PCD file or a folder of them. A pose file takes precedence over the `VIEWPOINT` of the files.
 ///
-/// Where nothing more is asked for than scans with their poses, scans have no time stamps, and plain poses are taken
-/// line by line, unless the stamps of the files are those of other poses.
+/// With default options, scans have no time stamps, and plain pose files are matched line by line, unless the stamps in
+/// the file names contradict those of the poses.
 pub(crate) fn open(path: &Path, options: &ReadOptions) -> Result<Box<dyn ScanSource + Send>> {
     let files = if path.is_dir() { files_of(path)? } else { vec![path.to_owned()] };
     if files.is_empty() {
@@ -58,7 +58,7 @@ pub(crate) fn open(path: &Path, options: &ReadOptions) -> Result<Box<dyn ScanSou
             None if is_alone && !has_origin => Some(RigidPose::IDENTITY),
             // Writers without a pose write the identity.
             Some(pose) if has_origin && is_identity(&pose) => None,
-            // What is calculated with begins with a quaternion of length 1, what is taken as it is becomes one later.
+            // Poses used in calculations are normalised now; poses passed through unchanged are normalised later.
             Some(pose) if !is_plain => Some(normalized(&pose)?),
             pose => pose,
         };
@@ -84,7 +84,7 @@ pub(crate) fn open(path: &Path, options: &ReadOptions) -> Result<Box<dyn ScanSou
 }
 
 fn poses_of(path: &Path, files: &[PathBuf], is_plain: bool, options: &ReadOptions) -> Result<CloudPoses> {
-    // A pose file beside a single PCD file belongs to its whole folder.
+    // A pose file next to a single PCD file belongs to the whole folder.
     let has_file = options.poses.is_some() || (path.is_dir() && pose_file_for(path).is_some());
     let own = match options.sensor_origin_m {
         Some(_) => Some(PoseSource::Scans),
@@ -97,8 +97,8 @@ fn poses_of(path: &Path, files: &[PathBuf], is_plain: bool, options: &ReadOption
     find_poses(path, own, None, false, rules, options)
 }
 
-/// Whether files take these poses line by line: a plain text, unless the names of the files are time stamps that its
-/// stamps contradict.
+/// Returns whether poses are matched line by line: the file is plain text, and time stamps in the file names, if any,
+/// do not contradict its stamps.
 fn is_by_line(trajectory: &Trajectory, files: &[PathBuf], stamps: NameStamps) -> Result<bool> {
     if !trajectory.form().is_plain {
         return Ok(false);
@@ -108,7 +108,7 @@ fn is_by_line(trajectory: &Trajectory, files: &[PathBuf], stamps: NameStamps) ->
     if trajectory.len() != files.len() {
         return Ok(false);
     }
-    // Clocks of which neither knows the other tell nothing.
+    // Without a common time range, the clocks are unrelated.
     if !stamps.iter().any(|stamp| (first_ns..=last_ns).contains(stamp)) {
         return Ok(true);
     }
@@ -116,7 +116,7 @@ fn is_by_line(trajectory: &Trajectory, files: &[PathBuf], stamps: NameStamps) ->
         return Ok(false);
     }
     for (number, of_file) in stamps.into_iter().enumerate() {
-        // A row that was lost may have lost its time, too.
+        // A lost row may also lack a valid time.
         if trajectory.stamp_of(number)?.is_some_and(|of_pose| of_pose.abs_diff(of_file) > SAME_TIME_NS) {
             return Ok(false);
         }
@@ -124,7 +124,7 @@ fn is_by_line(trajectory: &Trajectory, files: &[PathBuf], stamps: NameStamps) ->
     Ok(true)
 }
 
-/// Warns where the numbers in the names of files are time stamps, and one does not match its pose as the others do.
+/// Warns if the numbers in the file names are time stamps and one of them does not match its pose.
 fn warn_of_shift(trajectory: &Trajectory, files: &[PathBuf], names: NameStamps) -> Result<()> {
     let mut stamps = Vec::with_capacity(files.len());
     for number in 0..files.len() {
@@ -141,7 +141,7 @@ fn warn_of_shift(trajectory: &Trajectory, files: &[PathBuf], names: NameStamps) 
     Ok(())
 }
 
-/// The first file whose name does not match its pose, and by how many seconds.
+/// Returns the first file whose name does not match its pose, with the difference in seconds.
 fn first_shifted<'f>(
     stamps_s: &[f64],
     files: &'f [PathBuf],
@@ -168,14 +168,14 @@ fn first_shifted<'f>(
     (0..apart.len()).find(is_shifted).map(|k| (&files[k], (apart[k] - most).abs()))
 }
 
-/// The number at the end of a file's name.
+/// Returns the number at the end of a file name.
 fn number_in(path: &Path) -> Option<f64> {
     let stem = path.file_stem()?.to_str()?;
     let digits = stem.trim_end_matches(|letter: char| letter.is_ascii_digit() || letter == '.').len();
     stem[digits..].trim_start_matches('.').parse().ok()
 }
 
-/// Whether the `VIEWPOINT` of a PCD file tells where it was taken.
+/// Returns whether the `VIEWPOINT` of a PCD file gives a sensor pose.
 fn is_placed(path: &Path) -> bool {
     let head = pcd::open(path, CloudHead::default(), &Default::default(), true).ok();
     head.and_then(|(head, _)| head.world_from_sensor).is_some_and(|pose| !is_identity(&pose))

@@ -13,7 +13,7 @@ use std::io::{self, BufReader, Read};
 use std::path::{Path, PathBuf};
 use voxtile::{Error, FormatError, Result};
 
-/// The points of a PLY file.
+/// Points of a PLY file.
 struct PlyPoints {
     path: PathBuf,
     header: Header,
@@ -77,7 +77,8 @@ impl PlyPoints {
                 continue;
             }
             if number != self.vertices {
-                // What follows the vertices matters only where lines are wrapped: it tells whether numbers are missing.
+                // In a file with wrapped lines, the elements after the vertices must be read too: they show whether
+                // numbers are missing.
                 if number < self.vertices || rows.are_wrapped() {
                     rows.pass(element)?;
                 }
@@ -113,7 +114,7 @@ impl PlyPoints {
             };
             let is_wanted = number == self.vertices;
             if let (false, Some(bytes)) = (is_wanted, element.bytes()) {
-                // All are alike: skipped at once. What is beyond the end shows at the next element.
+                // Elements of fixed size are skipped at once. A truncated file is detected at the next element.
                 let skipped = element.count.checked_mul(bytes).map(|bytes| records.skip(bytes));
                 match skipped {
                     Some(Ok(())) => continue,
@@ -140,7 +141,7 @@ impl PlyPoints {
     }
 }
 
-/// Elements of a binary file.
+/// Reader of the elements of a binary file.
 struct Records {
     input: BufReader<File>,
     at: u64,
@@ -149,7 +150,7 @@ struct Records {
 }
 
 impl Records {
-    /// Reads an element: a value a property, NaN for a list.
+    /// Reads an element: one value per property, NaN for a list.
     fn next(&mut self, element: &Element, values: &mut Vec<f64>) -> io::Result<()> {
         values.clear();
         for property in &element.properties {
@@ -159,7 +160,7 @@ impl Records {
                     values.push(value);
                 }
                 Some(count) => {
-                    // A negative length, which is damage, is none.
+                    // A negative length is damage; the list is then empty.
                     let count = self.value(count)? as u64;
                     self.skip(count.saturating_mul(property.kind.bytes() as u64))?;
                     values.push(f64::NAN);

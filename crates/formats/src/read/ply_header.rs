@@ -5,7 +5,7 @@ use std::io::{BufRead, Read};
 use std::path::Path;
 use voxtile::{Error, FormatError, Result};
 
-/// How the numbers of a PLY file are written.
+/// Encoding of the numbers in a PLY file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Encoding {
     Ascii,
@@ -13,16 +13,16 @@ pub(super) enum Encoding {
     BigEndian,
 }
 
-/// A property of an element.
+/// Property of an element.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Property {
     pub(super) name: String,
     pub(super) kind: Scalar,
-    /// Type of the length, if this is a list.
+    /// Type of the list length, if the property is a list.
     pub(super) list: Option<Scalar>,
 }
 
-/// Elements of one kind: vertices, faces.
+/// Element type, such as vertices or faces.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Element {
     pub(super) name: String,
@@ -31,28 +31,28 @@ pub(super) struct Element {
 }
 
 impl Element {
-    /// Bytes of one, if all are alike.
+    /// Returns the size of one element, if it is fixed.
     pub(super) fn bytes(&self) -> Option<u64> {
         let one = |property: &Property| property.list.is_none().then(|| property.kind.bytes() as u64);
         self.properties.iter().map(one).sum()
     }
 }
 
-/// What a PLY file says before its numbers.
+/// Header of a PLY file.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Header {
     pub(super) encoding: Encoding,
     pub(super) elements: Vec<Element>,
     pub(super) lines: u64,
     pub(super) bytes: u64,
-    /// A comment that speaks of another unit than metres, with its line.
+    /// A comment that mentions a unit other than metres, with its line number.
     pub(super) unit: Option<(u64, String)>,
 }
 
-/// A longer header is an error.
+/// Limit for the size of the header.
 const MAX_HEADER_BYTES: u64 = 1 << 20;
 
-/// Whether a file starts as PLY does: with a line `ply`, perhaps with blanks behind it.
+/// Returns whether a file starts with a line `ply`, possibly followed by blanks.
 pub(crate) fn is_start(start: &[u8]) -> bool {
     let end = start.iter().position(|byte| matches!(byte, b'\n' | b'\r'));
     let line = end.and_then(|end| start.get(..end)).unwrap_or_default();
@@ -125,7 +125,7 @@ impl Header {
     }
 }
 
-/// Reads the first line with its end, and gives the last byte of an end: CR, if that is all of it.
+/// Reads the first line and returns the last byte of line ends: CR if the line ends with CR alone, else LF.
 fn first_line(input: &mut impl BufRead, line: &mut Vec<u8>) -> std::io::Result<u8> {
     loop {
         let Some(&byte) = input.fill_buf()?.first() else { return Ok(b'\n') };

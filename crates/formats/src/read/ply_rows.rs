@@ -7,25 +7,25 @@ use super::text_line::number;
 use std::collections::VecDeque;
 use voxtile::{Error, Result};
 
-/// Reads elements, one a line. If the first of the vertices does not fit its line, lines are wrapped: elements follow
+/// Reads elements, one per line. If the first vertex does not match its line, lines are wrapped: elements then follow
 /// each other word by word.
 pub(super) struct PlyRows {
     lines: Lines,
-    /// A value a property.
+    /// One value per property.
     values: Vec<f64>,
-    /// Words that were not taken yet, if lines are wrapped.
+    /// Unread words of the current line, if lines are wrapped.
     words: Option<VecDeque<String>>,
 }
 
-/// An element.
+/// A parsed element.
 pub(super) enum Row<'r> {
-    /// A value a property, NaN for a list and for a property that is not read.
+    /// One value per property. NaN for lists and for properties that are not read.
     Values(&'r [f64]),
-    /// The line with a word that is no number, and what is wrong.
+    /// An element with a word that is not a number: line number and reason.
     Unread(u64, String),
 }
 
-/// Why a line is no element.
+/// Reason why a line is not an element.
 enum Wrong {
     Missing(String),
     Word(String),
@@ -40,7 +40,7 @@ impl PlyRows {
         self.words.is_some()
     }
 
-    /// Passes over the elements of a kind.
+    /// Skips all elements of a type.
     pub(super) fn pass(&mut self, element: &Element) -> Result<()> {
         for done in 0..element.count {
             let is_there = match self.are_wrapped() {
@@ -54,7 +54,7 @@ impl PlyRows {
         Ok(())
     }
 
-    /// Reads the next of an element, of which so many are done.
+    /// Reads the next element. `done` is the number of elements already read.
     pub(super) fn next(
         &mut self,
         element: &Element,
@@ -79,7 +79,7 @@ impl PlyRows {
         }
     }
 
-    /// Checks that nothing is left of wrapped lines.
+    /// Checks that no words of wrapped lines are left.
     pub(super) fn check_end(&mut self) -> Result<()> {
         match self.word()? {
             None => Ok(()),
@@ -90,7 +90,8 @@ impl PlyRows {
         }
     }
 
-    /// Takes the words of an element. The outer `None` is the end of the file, the inner text a word that is no number.
+    /// Reads the words of an element. The outer `None` means the end of the file; an inner text is the reason for an
+    /// invalid word.
     fn take(&mut self, element: &Element, is_read: &dyn Fn(usize) -> bool) -> Result<Option<Option<String>>> {
         self.values.clear();
         let mut wrong = None;
@@ -124,7 +125,7 @@ impl PlyRows {
         }
     }
 
-    /// The next line that is not blank.
+    /// Returns the next line that is not blank.
     fn next_line(&mut self) -> Result<Option<String>> {
         while let Some((_, line)) = self.lines.next()? {
             if !line.trim().is_empty() {
@@ -139,7 +140,7 @@ impl PlyRows {
     }
 }
 
-/// The values of a line: one a property, NaN for a list.
+/// Parses the values of a line: one per property, NaN for a list.
 fn values_of(
     element: &Element,
     line: &str,
@@ -168,13 +169,13 @@ fn values_of(
     wrong.map_or(Ok(()), |reason| Err(Wrong::Word(reason)))
 }
 
-/// The value of a property that is no list.
+/// Parses the value of a property that is not a list.
 fn value_of(property: &Property, word: &str, is_read: bool) -> std::result::Result<f64, String> {
     if !is_read {
         return Ok(f64::NAN);
     }
     let value = number(word).ok_or_else(|| format!("`{word:.40}` is not a number"))?;
-    // More digits than a float holds say nothing: the binary forms have none of them.
+    // Digits beyond the precision of a float are dropped, for equal results from text and binary files.
     Ok(if property.kind == Scalar::F32 { f64::from(value as f32) } else { value })
 }
 

@@ -7,13 +7,13 @@ use std::io::{self, BufRead};
 use voxtile::FormatError;
 use voxtile::space::Point;
 
-/// Reads points, one per line: x y z in metres, separated by blanks, commas, semicolons or tabs, with decimal commas
-/// where commas separate nothing. More columns are ignored. Names of columns before the points say which are x, y and z,
-/// and their units. Empty lines, comments (`#`, `//`, `%`) and a first line of other words are skipped.
+/// Reads points, one per line: x y z in metres, separated by blanks, commas, semicolons or tabs, with decimal commas if
+/// commas are not separators. Further columns are ignored. Column names before the points determine x, y and z and
+/// their units. Empty lines, comments (`#`, `//`, `%`) and a first line of other words are skipped.
 ///
 /// # Errors
 ///
-/// A line without three numbers; a unit that is not known; the outer error is the stream's.
+/// A line has no three numbers, or a unit is unknown. The outer error is an I/O error of the input.
 pub fn read_points(input: impl BufRead) -> io::Result<Result<Vec<Point>, FormatError>> {
     let mut lines = RawLines::new(input, MAX_LINE_BYTES);
     let (mut points, mut meaning, mut number) = (Vec::new(), Meaning::of_metres([0, 1, 2]), 0);
@@ -56,7 +56,7 @@ pub fn read_points(input: impl BufRead) -> io::Result<Result<Vec<Point>, FormatE
     Ok(Ok(points))
 }
 
-/// The point of a line.
+/// Parses the point of a line.
 fn point_of(line: &str, meaning: &Meaning) -> Option<Point> {
     let separator = Separator::of(line);
     let mut cells = separator.split(line);
@@ -64,7 +64,7 @@ fn point_of(line: &str, meaning: &Meaning) -> Option<Point> {
         return None;
     }
     if separator == Separator::Mark(',') {
-        // Blanks part cells, too: `1, 2 3`.
+        // Blanks separate cells too: `1, 2 3`.
         cells = cells.into_iter().flat_map(str::split_ascii_whitespace).collect();
     }
     let [x, y, z] = meaning.xyz.map(|at| separator.number(cells.get(at)?));
@@ -72,7 +72,7 @@ fn point_of(line: &str, meaning: &Meaning) -> Option<Point> {
     Some([in_x.metres(x?), in_y.metres(y?), in_z.metres(z?)])
 }
 
-/// Whether a number is among the first three words.
+/// Returns whether one of the first three words is a number.
 fn has_numbers(line: &str) -> bool {
     let separator = Separator::of(line);
     separator.split(line).iter().take(3).any(|cell| separator.number(cell).is_some())

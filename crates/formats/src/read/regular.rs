@@ -4,14 +4,14 @@ use crate::registry::Registry;
 use std::path::Path;
 use voxtile::{Error, Result};
 
-/// Checks that a path is no FIFO, socket or device: opening one waits for a program that writes, perhaps for ever, and
-/// gives its bytes once. What is not there is reported when it is opened.
+/// Checks that a path is not a FIFO, socket or device: opening one may block, and it can be read only once. A missing
+/// file is reported when it is opened.
 pub(crate) fn check_regular(path: &Path) -> Result<()> {
     let is_special = std::fs::metadata(path).is_ok_and(|meta| !meta.is_file() && !meta.is_dir());
     if !is_special {
         return Ok(());
     }
-    // Of these, a single cloud is read in one pass.
+    // Formats that read a single cloud in one pass.
     let extension = extension_of(path);
     let is_streamed = extension.is_empty()
         || (Registry::default().formats().iter())

@@ -1,4 +1,4 @@
-/// A number in a binary file.
+/// Type of a number in a binary file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Scalar {
     I8,
@@ -13,7 +13,7 @@ pub(super) enum Scalar {
     F64,
 }
 
-/// The value of the first bytes, in either order.
+/// Decodes the first bytes in either byte order.
 macro_rules! number {
     ($kind:ty, $bytes:expr, $big:expr) => {{
         let mut array = [0; size_of::<$kind>()];
@@ -25,7 +25,8 @@ macro_rules! number {
 }
 
 impl Scalar {
-    /// The type of a name: of PLY (`uchar`, `float`), of NumPy (`uint8`, `float32`) or short (`u8`, `f32`).
+    /// Returns the type with this name: as in PLY (`uchar`, `float`), as in NumPy (`uint8`, `float32`), or short (`u8`,
+    /// `f32`).
     pub(super) fn named(name: &str) -> Option<Self> {
         Some(match name.to_ascii_lowercase().as_str() {
             "char" | "int8" | "i8" => Self::I8,
@@ -55,7 +56,7 @@ impl Scalar {
         !matches!(self, Self::F32 | Self::F64)
     }
 
-    /// The value at the start of `bytes`; missing bytes are zero, so callers check that there are enough.
+    /// Decodes the value at the start of `bytes`. Missing bytes count as zero, so callers must check the length.
     pub(super) fn value(self, bytes: &[u8], is_big_endian: bool) -> f64 {
         match self {
             Self::I8 => f64::from(number!(i8, bytes, is_big_endian)),

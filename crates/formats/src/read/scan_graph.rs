@@ -9,7 +9,6 @@ use std::path::{Path, PathBuf};
 use voxtile::scan::Pose;
 use voxtile::{Error, FormatError, Result};
 
-/// Opens a scan graph.
 pub(crate) fn open(path: &Path, _: &ReadOptions) -> Result<Box<dyn ScanSource + Send>> {
     check_regular(path)?;
     let file = open_input(path)?;
@@ -18,17 +17,17 @@ pub(crate) fn open(path: &Path, _: &ReadOptions) -> Result<Box<dyn ScanSource + 
 }
 
 /// Reads OctoMap's binary scan graph of `file_bytes` bytes, as written by `ScanGraph::writeBinary`, scan by scan. Its
-/// edges are not read.
+/// edges are ignored.
 ///
-/// `path` is for errors and for the fingerprint. Reads are small: `input` should be buffered.
+/// `path` is used for errors and for the fingerprint. Reads are small, so `input` should be buffered.
 ///
 /// # Errors
 ///
-/// A stream that fails or ends before its first four bytes; errors in a scan are returned with that scan.
+/// The input fails or ends within its first four bytes. Errors in a scan are returned with that scan.
 pub fn read_scan_graph<R: Read>(input: R, file_bytes: u64, path: &Path) -> Result<impl ScanSource + use<R>> {
     let path = path.to_owned();
     let mut graph = ScanGraph { path, input, offset: 0, file_bytes, nodes: 0, done: 0, is_past_error: false };
-    // An empty graph is an empty file.
+    // An empty file is an empty graph.
     if file_bytes > 0 {
         graph.nodes = u32::from_le_bytes(graph.bytes()?);
     }
@@ -48,7 +47,7 @@ struct ScanGraph<R> {
     file_bytes: u64,
     nodes: u32,
     done: u32,
-    /// Whether the input is behind the scan that caused an error.
+    /// Whether reading can continue after the scan that caused an error.
     is_past_error: bool,
 }
 
@@ -66,7 +65,7 @@ impl<R: Read> ScanGraph<R> {
         Ok(bytes)
     }
 
-    /// Numbers after their count, which must be `N`.
+    /// Reads a vector, which starts with its length `N`.
     fn vector<const N: usize>(&mut self) -> Result<[f64; N]> {
         let at = self.offset;
         let count = i32::from_le_bytes(self.bytes()?);
@@ -112,7 +111,7 @@ impl<R: Read> ScanSource for ScanGraph<R> {
         let [qw, qx, qy, qz] = self.vector()?;
         let id = u32::from_le_bytes(self.bytes()?);
         self.done += 1;
-        // An invalid pose does not affect where the next scan starts.
+        // An invalid pose does not affect the start of the next scan.
         self.is_past_error = true;
         if ![x, y, z, qw, qx, qy, qz].iter().all(|number| number.is_finite()) {
             return Err(FormatError::at_offset(at, "a pose that is not finite").in_input(&self.path));

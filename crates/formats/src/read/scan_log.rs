@@ -10,16 +10,15 @@ use voxtile::maths::sin_cos;
 use voxtile::scan::Pose;
 use voxtile::{Error, FormatError, Result};
 
-/// Opens a scan log.
 pub(crate) fn open(path: &Path, _: &ReadOptions) -> Result<Box<dyn ScanSource + Send>> {
     Ok(Box::new(read_scan_log(BufReader::with_capacity(1 << 16, open_input(path)?), path)))
 }
 
-/// Reads OctoMap's scan log, a text: `NODE x y z roll pitch yaw` starts a scan, its points follow as `x y z`, in the
-/// frame of the node. Empty lines and those that start with `#` or a blank are skipped, as in OctoMap.
+/// Reads OctoMap's scan log, a text format: `NODE x y z roll pitch yaw` starts a scan, and its points follow as `x y z`
+/// in the node's frame. Empty lines and lines that start with `#` or a blank are skipped, as in OctoMap.
 ///
-/// Numbers are read as `f32`, as in OctoMap, so that log and graph give the same map. `path` is for errors and for the
-/// fingerprint.
+/// Numbers are read as `f32`, as in OctoMap, so that a log and its graph give the same map. `path` is used for errors
+/// and for the fingerprint.
 pub fn read_scan_log<R: BufRead>(input: R, path: &Path) -> impl ScanSource + use<R> {
     ScanLog { path: path.to_owned(), input, line: 0, pose: None, done: 0 }
 }
@@ -28,16 +27,16 @@ struct ScanLog<R> {
     path: PathBuf,
     input: R,
     line: u64,
-    /// Pose of the scan whose points follow.
+    /// Pose of the current scan.
     pose: Option<Pose>,
     done: usize,
 }
 
-/// A longer line is an error.
+/// Limit for the length of a line.
 const MAX_LINE_BYTES: u64 = 1 << 16;
 
 impl<R: BufRead> ScanLog<R> {
-    /// The next line with content; `None` at the end.
+    /// Returns the next line with content, or `None` at the end.
     fn next_line(&mut self) -> Result<Option<String>> {
         loop {
             let mut bytes = Vec::new();
@@ -120,7 +119,7 @@ impl<R: BufRead> ScanSource for ScanLog<R> {
     }
 }
 
-/// First roll about x, then pitch about y, then yaw about z, in radians.
+/// Rotation about x (roll), then y (pitch), then z (yaw), in radians.
 fn rotation(roll: f64, pitch: f64, yaw: f64) -> UnitQuaternion<f64> {
     let ((sr, cr), (sp, cp), (sy, cy)) = (sin_cos(roll), sin_cos(pitch), sin_cos(yaw));
     let matrix = Matrix3::new(

@@ -12,17 +12,17 @@ use voxtile::{Error, FormatError, Result};
 /// Reads voxtile's scan stream, as written by a [`ScanStreamWriter`](crate::ScanStreamWriter), scan by scan, from a
 /// file or a pipe.
 ///
-/// `path` is for errors. With `is_file` the file is opened for the fingerprint; otherwise the fingerprint is the
-/// stream's label, and an error if it has none. Reads are small: `input` should be buffered.
+/// `path` is used for errors. With `is_file`, the file is opened for the fingerprint. Otherwise the fingerprint is the
+/// label of the stream, and an error if it has none. Reads are small, so `input` should be buffered.
 ///
 /// # Errors
 ///
-/// A stream that fails or has another header; errors in a scan are returned with that scan.
+/// The input fails or has an invalid header. Errors in a scan are returned with that scan.
 pub fn read_scan_stream<R: Read>(input: R, path: &Path, is_file: bool) -> Result<impl ScanSource + use<R>> {
     begin(AnyInput(input), path, is_file)
 }
 
-/// The same of a file: scans that are skipped are not read.
+/// As [`read_scan_stream`], for a file. The points of skipped scans are not read.
 ///
 /// # Errors
 ///
@@ -55,13 +55,13 @@ struct ScanStream<R> {
     label: String,
     has_intensities: bool,
     done: u64,
-    /// Whether the input is behind the scan that caused an error.
+    /// Whether reading can continue after the scan that caused an error.
     is_past_error: bool,
-    /// Points as they are in the stream.
+    /// Encoded points.
     chunk: Vec<u8>,
 }
 
-/// What stands before the points of a scan.
+/// Data before the points of a scan.
 struct Head {
     count: u32,
     pose_at: u64,
@@ -71,10 +71,10 @@ struct Head {
 const COUNT_BYTES: usize = 4;
 const POSE_BYTES: usize = 56;
 
-/// Points that are read at a time.
+/// Number of points to read at once.
 const CHUNK_POINTS: usize = 4096;
 
-/// Most points reserved at once: the count in a damaged stream may be any number.
+/// Limit for the points to reserve: the count in a damaged stream may have any value.
 const MAX_RESERVED: usize = 1 << 16;
 
 impl<R: StreamInput> ScanStream<R> {
@@ -118,8 +118,8 @@ impl<R: StreamInput> ScanStream<R> {
         Ok(())
     }
 
-    /// What stands before the points of a scan; `None` at the end of the stream. It is read at once: passing over a
-    /// scan takes as long as its reads.
+    /// Reads the data before the points of a scan, or returns `None` at the end of the stream. It is a single read,
+    /// because reads dominate the time to skip a scan.
     fn next_head(&mut self) -> Result<Option<Head>> {
         let mut bytes = [0; COUNT_BYTES + POSE_BYTES];
         let mut filled = 0;
@@ -150,7 +150,7 @@ impl<R: StreamInput> ScanStream<R> {
         if self.has_intensities { 16 } else { 12 }
     }
 
-    /// Reads so many points as they are in the stream.
+    /// Reads encoded points.
     fn read_chunk(&mut self, points: usize) -> Result<()> {
         let mut chunk = std::mem::take(&mut self.chunk);
         chunk.resize(points * self.point_bytes(), 0);
@@ -168,14 +168,14 @@ impl<R: StreamInput> ScanStream<R> {
         Ok(())
     }
 
-    /// The stream ends so many bytes into points that begin here.
+    /// Creates the error for a stream that ends after this many bytes of the points that start here.
     fn ends_in_points(&self, bytes: u64) -> Error {
         let number = bytes - bytes % 4;
         let what = if number % self.point_bytes() as u64 == 12 { "an intensity" } else { "a point" };
         self.wrong(self.offset + number, format!("the stream ends in {what}"))
     }
 
-    /// Passes over a scan; `false` at the end of the stream.
+    /// Skips a scan. Returns `false` at the end of the stream.
     fn pass_scan(&mut self) -> Result<bool> {
         let Some(Head { count, pose_at, pose }) = self.next_head()? else { return Ok(false) };
         let bytes = u64::from(count) * self.point_bytes() as u64;
@@ -190,7 +190,7 @@ impl<R: StreamInput> ScanStream<R> {
         pose.map(|_| true)
     }
 
-    /// The pose from the numbers that start at an offset.
+    /// Creates the pose from the numbers at an offset.
     fn pose(&self, numbers: [f64; 7], at: u64) -> Result<Pose> {
         if !numbers.iter().all(|number| number.is_finite()) {
             return Err(self.wrong(at, "a pose that is not finite"));

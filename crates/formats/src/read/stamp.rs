@@ -1,10 +1,10 @@
-//! Time stamps from decimal text, exactly: a double holds no nanoseconds of today.
+//! Exact conversion of time stamps from decimal text. A double cannot hold the nanoseconds of current Unix time.
 
-/// Digits that a number may have; more are an error, so that nothing overflows.
+/// Limit for the digits of a number, so that nothing overflows.
 const MAX_DIGITS: usize = 36;
 
-/// The nanoseconds of a decimal text of units of `10^digits_per_unit` nanoseconds: 9 for seconds, 0 for nanoseconds.
-/// Digits beyond a nanosecond are rounded. `None` if it is not a number or beyond 292 years.
+/// Parses a decimal number in units of `10^digits_per_unit` nanoseconds: 9 for seconds, 0 for nanoseconds. Digits below
+/// a nanosecond are rounded. Returns `None` if it is not a number or exceeds 292 years.
 pub(crate) fn nanoseconds(text: &str, digits_per_unit: i32) -> Option<i64> {
     let text = text.trim();
     let (is_negative, digits) = match text.strip_prefix('-') {
@@ -31,13 +31,13 @@ pub(crate) fn nanoseconds(text: &str, digits_per_unit: i32) -> Option<i64> {
     } else if shift >= 0 {
         value.checked_mul(power(shift.unsigned_abs())?)?
     } else {
-        // A power beyond all digits leaves nothing.
+        // A divisor beyond all digits gives 0.
         power(shift.unsigned_abs()).map_or(0, |divisor| (value + divisor / 2) / divisor)
     };
     i64::try_from(if is_negative { -value } else { value }).ok()
 }
 
-/// The nanoseconds of a decimal text of seconds.
+/// Parses a decimal number of seconds.
 pub(crate) fn of_seconds(text: &str) -> Option<i64> {
     nanoseconds(text, 9)
 }

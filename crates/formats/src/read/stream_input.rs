@@ -4,13 +4,13 @@ use std::io::{self, Read, Seek, SeekFrom};
 use std::path::Path;
 use voxtile::Result;
 
-/// Where a scan stream comes from.
+/// Input of a scan stream.
 pub(crate) trait StreamInput: Read {
-    /// Passes over so many bytes; returns how many of them there were.
+    /// Skips bytes. Returns the number of bytes skipped, which is smaller at the end of the input.
     fn pass(&mut self, bytes: u64) -> io::Result<u64>;
 }
 
-/// Anything that can be read. To pass over bytes is to read them.
+/// Any reader. Bytes are skipped by reading them.
 pub(crate) struct AnyInput<R>(pub(crate) R);
 
 impl<R: Read> Read for AnyInput<R> {
@@ -25,13 +25,13 @@ impl<R: Read> StreamInput for AnyInput<R> {
     }
 }
 
-/// A file, without a buffer: points are read in large pieces, and what is passed over is not to be read.
+/// Unbuffered file. Points are read in large chunks, and skipped bytes are not read.
 pub(crate) struct FileInput {
     file: File,
     at: u64,
-    /// How long it was when that was last asked: a file may grow. 0 for a pipe by a name.
+    /// File size at the last query; the file may grow. 0 for a named pipe.
     known_bytes: u64,
-    /// Whether the file has not been told yet where to read on.
+    /// Whether the position changed and a seek is needed before the next read.
     has_passed: bool,
 }
 
@@ -58,7 +58,7 @@ impl StreamInput for FileInput {
         if bytes > self.known_bytes.saturating_sub(self.at) {
             let metadata = self.file.metadata()?;
             if !metadata.is_file() {
-                // A pipe by a name.
+                // A named pipe.
                 let passed = io::copy(&mut (&mut self.file).take(bytes), &mut io::sink())?;
                 self.at += passed;
                 return Ok(passed);

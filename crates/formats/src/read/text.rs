@@ -9,21 +9,21 @@ use crate::read_options::ReadOptions;
 use std::path::Path;
 use voxtile::{FormatError, Result};
 
-/// The points of a text.
+/// Points of a text.
 struct TextPoints {
     lines: Lines,
     columns: Columns,
     left_out: LeftOut,
-    /// The point that told what the columns are.
+    /// The point that determined the columns.
     first: Option<CloudPoint>,
     is_at_end: bool,
 }
 
-/// Checks that a file that starts like this is a text of points. One whose name does not say so has numbers alone.
+/// Checks that a file with this start is a text of points. A file without a known extension must contain only numbers.
 ///
 /// # Errors
 ///
-/// Why it is none, with the line.
+/// The reason why it is not, with the line.
 pub(crate) fn check_start(start: &[u8], is_named: bool) -> std::result::Result<(), String> {
     if let Some(encoding) = text_encoding(start) {
         return Err(encoding.to_owned());
@@ -40,7 +40,7 @@ pub(crate) fn check_start(start: &[u8], is_named: bool) -> std::result::Result<(
         (RawLines::new(text, MAX_LINE_BYTES), Columns::default(), LeftOut::default());
     let at_line = |(line, reason): (u64, String)| format!("line {line}: {reason}");
     for number in 1.. {
-        // What is in memory is read without errors.
+        // Reading from memory does not fail.
         if !matches!(lines.next(), Ok(Some(_))) {
             break;
         }
@@ -54,7 +54,7 @@ pub(crate) fn check_start(start: &[u8], is_named: bool) -> std::result::Result<(
     if let Some(wrong) = columns.why_none() {
         return Err(at_line(wrong));
     }
-    // Names alone: a text without points yet. What follows long comments is not known.
+    // A text with column names but no points yet, or one that starts with long comments.
     match left_out.error() {
         None if columns.are_named() || (is_named && is_cut) => Ok(()),
         Some(error) => Err(error.to_string()),

@@ -1,24 +1,24 @@
-//! A text of points, line by line.
+//! Line-by-line parser of a text of points.
 
 use super::cloud::CloudPoint;
 use super::columns::{Clock, Meaning};
 use super::text_header::{are_poses, asked_separator, names_of, unit_of_comment, units_row};
 use super::text_line::{Separator, comment_of, digits_behind_comma, without_end};
 
-/// What a line of a text of points is.
+/// Meaning of a line.
 #[derive(Debug, PartialEq)]
 pub(super) enum Line {
     Point(CloudPoint),
-    /// A comment, names, an empty line, a number of points.
+    /// A comment, column names, an empty line, or a number of points.
     Nothing,
-    /// A row that is no point, and why.
+    /// An invalid row and the reason.
     Unread(String),
 }
 
-/// Why a text is none of points, and the number of the line that says so.
+/// Line number and reason of an error that makes the whole text unusable.
 pub(super) type Wrong = (u64, String);
 
-/// How the lines of a text are split, and what their columns mean. Both are known with the first point.
+/// Separator and meaning of the columns. Both are fixed with the first point.
 #[derive(Debug, Default)]
 pub(super) struct Columns {
     pub(super) clock: Clock,
@@ -28,21 +28,21 @@ pub(super) struct Columns {
     are_named: bool,
     meaning: Option<Meaning>,
     has_points: bool,
-    /// Whether each cell of the first point is a number.
+    /// Whether every cell of the first point is a number.
     are_numbers: bool,
-    /// Columns before those with names: R writes the names of rows there.
+    /// Number of columns before the named ones: R writes row names there.
     unnamed: usize,
     counts: Counts,
-    /// The first line before the points that says nothing. Only names behind it make it harmless.
+    /// First unrecognised line before the points. It is an error unless column names follow.
     prose: Option<Wrong>,
-    /// Lines before the points.
+    /// Number of lines before the points.
     lines_before: u32,
-    /// A comment that speaks of another unit than metres.
+    /// A comment that mentions a unit other than metres.
     comment_unit: Option<Wrong>,
     notes: Vec<String>,
 }
 
-/// Numbers of points that stand before them: PTS has one before each scan.
+/// Point counts that precede the points. PTS has one before each scan.
 #[derive(Debug, Default)]
 struct Counts {
     scans: u64,
@@ -50,11 +50,11 @@ struct Counts {
     rows: u64,
 }
 
-/// More lines of prose before the names of columns are an error.
+/// Limit for the lines of prose before the column names.
 const MAX_LINES_BEFORE: u32 = 100;
 
 impl Counts {
-    /// Takes a line of one number, if a scan may begin here.
+    /// Accepts a line with one number as a point count, if a scan may begin here.
     fn begin(&mut self, count: f64) -> bool {
         let is_number = count.fract() == 0.0 && count >= 0.0;
         let may_begin = is_number && (self.scans == 0 || self.rows >= self.announced);
@@ -75,12 +75,12 @@ impl Counts {
 }
 
 impl Columns {
-    /// Whether names were found.
+    /// Returns whether column names were found.
     pub(super) fn are_named(&self) -> bool {
         self.are_named
     }
 
-    /// Whether each cell of the first point is a number.
+    /// Returns whether every cell of the first point is a number.
     pub(super) fn are_numbers(&self) -> bool {
         self.are_numbers
     }
@@ -89,27 +89,27 @@ impl Columns {
         self.meaning.as_ref()
     }
 
-    /// What a person should know of the columns.
+    /// Returns remarks for the user about the columns.
     pub(super) fn remarks(&self) -> Vec<String> {
         let units = self.meaning.as_ref().and_then(Meaning::remark);
         self.notes.iter().cloned().chain(units).collect()
     }
 
-    /// What a person should know at the end of the text.
+    /// Returns a remark for the user at the end of the text.
     pub(super) fn last_remark(&self) -> Option<String> {
         self.counts.remark()
     }
 
-    /// Why a text that ended without a point is none of points.
+    /// Returns the error of a text that ended without a point, if any.
     pub(super) fn why_none(&self) -> Option<Wrong> {
         self.prose.clone().filter(|_| !self.are_named)
     }
 
-    /// Reads the next line.
+    /// Parses the next line.
     pub(super) fn take(&mut self, number: u64, line: &str) -> Result<Line, Wrong> {
         let text = line.trim();
         if text.is_empty() {
-            // A row of empty cells may be nothing but tabs.
+            // A row of empty cells may consist of tabs only.
             let is_row = self.has_points && self.separator == Separator::Mark('\t') && line.contains('\t');
             return Ok(if is_row { self.row(line) } else { Line::Nothing });
         }
@@ -140,7 +140,7 @@ impl Columns {
         }
     }
 
-    /// Takes names of columns, which some programs write as a comment, and the unit that it speaks of.
+    /// Reads column names, which some programs write as a comment, and a unit mentioned in a comment.
     fn take_comment(&mut self, number: u64, comment: &str) -> Result<(), String> {
         if !self.are_named {
             self.take_names(comment)?;
@@ -151,11 +151,11 @@ impl Columns {
         Ok(())
     }
 
-    /// Takes a line before the first point.
+    /// Parses a line before the first point.
     fn begin(&mut self, number: u64, line: &str) -> Result<Line, String> {
         let separator = self.asked.unwrap_or_else(|| Separator::of_row(line, self.names.len()));
         let cells = separator.split(line);
-        // PTS starts with the number of its points.
+        // PTS starts with a point count.
         if let [only] = without_end(&cells)
             && let Some(count) = separator.number(only)
         {
@@ -188,7 +188,7 @@ impl Columns {
     fn begin_unnamed(&mut self, separator: Separator, cells: &[&str]) -> Result<Line, String> {
         let columns = without_end(cells).len();
         if columns == 0 {
-            // A row of no return says nothing of the columns.
+            // A row without a return does not reveal the columns.
             let position_m = [f64::NAN; 3];
             return Ok(Line::Point(CloudPoint { is_return: false, ..CloudPoint::hit(position_m) }));
         }
@@ -197,7 +197,7 @@ impl Columns {
         }
         let is_number = |cell: Option<&&str>| cell.is_some_and(|cell| separator.number(cell).is_some());
         let mut meaning = Meaning::of_metres([0, 1, 2]);
-        // x y z, then the intensity, unless the three after them are a colour or a normal.
+        // x y z, then the intensity, unless the next three columns are a colour or a normal.
         meaning.intensity = (columns > 3 && columns != 6 && is_number(cells.get(3))).then_some(3);
         self.names = ["x", "y", "z"].map(str::to_owned).into();
         self.names.extend(meaning.intensity.map(|_| "intensity".to_owned()));
@@ -224,7 +224,7 @@ impl Columns {
         }
         let is_one_more = columns == self.names.len() + 1 && line.trim_start().starts_with('"');
         self.unnamed = usize::from(is_one_more);
-        // What a point can do without may be words.
+        // Optional columns may contain words and are then ignored.
         for at in meaning.intensity.into_iter().chain(meaning.time.map(|time| time.at)) {
             let cell = cells.get(at + self.unnamed).copied().unwrap_or_default();
             if cell.is_empty() || separator.number(cell).is_some() {
@@ -277,10 +277,10 @@ impl Columns {
         Line::Unread(reason)
     }
 
-    /// Takes a line as names, if it has x, y and z.
+    /// Parses a line as column names, if they include x, y and z.
     fn take_names(&mut self, line: &str) -> Result<bool, String> {
         let names = names_of(line.trim());
-        // Livox counts nanoseconds; that a column holds integers is not known before all of it is read.
+        // Livox counts nanoseconds. Whether other columns hold integers is unknown until all rows are read.
         let is_integer =
             |at: usize| names.get(at).is_some_and(|name| name.eq_ignore_ascii_case("offset_time"));
         let Some(meaning) = Meaning::of(&names, is_integer)? else { return Ok(false) };

@@ -1,10 +1,10 @@
-//! What a text of points says before its points: names of columns, units, a separator.
+//! Parts of a text of points before its points: column names, units and the separator.
 
 use super::columns::Meaning;
 use super::text_line::{Separator, without_end};
 use super::units::LengthUnit;
 
-/// The names that a line has, if they were names.
+/// Splits a line into column names.
 pub(super) fn names_of(line: &str) -> Vec<String> {
     let tab = Separator::Mark('\t');
     let has_tabs = line.trim().contains('\t') && !tab.split(line.trim()).contains(&"");
@@ -12,7 +12,7 @@ pub(super) fn names_of(line: &str) -> Vec<String> {
     let cells = separator.split(line);
     let mut names: Vec<String> = Vec::new();
     for cell in without_end(&cells) {
-        // Between blanks, `x (cm)` is two words.
+        // In a blank-separated line, `x (cm)` is two words.
         match names.last_mut().filter(|_| separator == Separator::Blank) {
             Some(name) if cell.starts_with(['[', '(']) || is_open(name) => {
                 name.push(' ');
@@ -24,13 +24,13 @@ pub(super) fn names_of(line: &str) -> Vec<String> {
     names
 }
 
-/// Whether a bracket of a name is not closed yet.
+/// Returns whether a name has an unclosed bracket.
 fn is_open(name: &str) -> bool {
     let last = name.rfind(['[', '(', ']', ')']).and_then(|at| name.get(at..));
     last.is_some_and(|rest| rest.starts_with(['[', '(']))
 }
 
-/// The separator that a first line `sep=;` of Excel asks for.
+/// Returns the separator requested by a first line `sep=;`, as in Excel.
 pub(super) fn asked_separator(line: &str) -> Option<Separator> {
     let lower = line.trim().trim_matches('"').to_ascii_lowercase();
     let mut mark = lower.strip_prefix("sep=")?.chars();
@@ -38,7 +38,7 @@ pub(super) fn asked_separator(line: &str) -> Option<Separator> {
     mark.next().is_none().then_some(separator)
 }
 
-/// The units of x, y and z in a row of units below the names.
+/// Returns the units of x, y and z from a row of units below the names.
 pub(super) fn units_row(cells: &[&str], meaning: &Meaning) -> Option<[LengthUnit; 3]> {
     let unit = |at: usize| {
         let cell = cells.get(at)?.trim_matches(['[', ']', '(', ')', '{', '}', '<', '>', ' ']);
@@ -48,7 +48,7 @@ pub(super) fn units_row(cells: &[&str], meaning: &Meaning) -> Option<[LengthUnit
     Some([unit(x)?, unit(y)?, unit(z)?])
 }
 
-/// The unit of length that a comment speaks of, if it is another than metres: `units: mm`, `all values in cm`.
+/// Returns the unit of length mentioned in a comment, unless it is metres: `units: mm`, `all values in cm`.
 pub(super) fn unit_of_comment(comment: &str) -> Option<LengthUnit> {
     let lower = comment.to_lowercase();
     let words: Vec<&str> =
@@ -63,7 +63,7 @@ pub(super) fn unit_of_comment(comment: &str) -> Option<LengthUnit> {
     found.filter(|unit| *unit != LengthUnit::METRE)
 }
 
-/// Whether these are names of columns of poses.
+/// Returns whether these are column names of poses.
 pub(super) fn are_poses(names: &[String]) -> bool {
     ["qx", "qy", "qz", "qw"].iter().all(|wanted| names.iter().any(|name| name.eq_ignore_ascii_case(wanted)))
 }

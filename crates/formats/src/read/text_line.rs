@@ -1,17 +1,17 @@
-//! A line of a text of numbers: what parts its cells, and the numbers in them.
+//! Splits lines of text into cells and parses their numbers.
 
-/// What parts the cells of a line.
+/// Separator of the cells of a line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Separator {
-    /// Blanks and tabs, one or more.
+    /// One or more blanks and tabs.
     #[default]
     Blank,
-    /// A mark; there may be nothing between two of them.
+    /// A character. Cells between two separators may be empty.
     Mark(char),
 }
 
 impl Separator {
-    /// What parts the cells of a line. A comma is a mark, unless the words between blanks are numbers with decimal
+    /// Detects the separator of a line. Commas separate cells unless the blank-separated words are numbers with decimal
     /// commas.
     pub(crate) fn of(line: &str) -> Self {
         let has = |mark: char| is_outside_quotes(line, mark);
@@ -24,13 +24,13 @@ impl Separator {
         if has(',') && !are_decimals { Self::Mark(',') } else { Self::Blank }
     }
 
-    /// What parts the cells of a line of a table with so many columns: a tab, if it gives as many cells.
+    /// Detects the separator of a table row: tabs, if they give the expected number of columns.
     pub(crate) fn of_row(line: &str, columns: usize) -> Self {
         let tab = Self::Mark('\t');
         if line.contains('\t') && tab.split(line).len() == columns { tab } else { Self::of(line) }
     }
 
-    /// The cells of a line, without quotes around them. Empty ones between marks count, also behind the last mark.
+    /// Splits a line into cells without their quotes. Empty cells count, also after the last separator.
     pub(crate) fn split(self, line: &str) -> Vec<&str> {
         let has_quotes = line.contains('"');
         match self {
@@ -56,13 +56,13 @@ impl Separator {
         }
     }
 
-    /// The number in a cell, which may have a decimal comma where no comma parts cells.
+    /// Parses the number in a cell. Decimal commas are accepted if commas are not separators.
     pub(crate) fn number(self, cell: &str) -> Option<f64> {
         if let Some(number) = number(cell) {
             return Some(number);
         }
         let (whole, fraction) = cell.split_once(',')?;
-        // Between commas, a cell with a comma was quoted; three digits behind it may be thousands.
+        // In a comma-separated line, a cell with a comma was quoted. Three digits after the comma may be thousands.
         let may_be_thousands = self == Self::Mark(',') && fraction.len() == 3;
         let is_fraction = fraction.starts_with(|first: char| first.is_ascii_digit());
         if may_be_thousands || !is_fraction || whole.contains('.') || fraction.contains([',', '.']) {
@@ -72,13 +72,13 @@ impl Separator {
     }
 }
 
-/// Cells without empty ones at the end: a mark behind the last cell begins none.
+/// Removes empty cells at the end of a line.
 pub(crate) fn without_end<'c, 'l>(cells: &'c [&'l str]) -> &'c [&'l str] {
     let end = cells.iter().rposition(|cell| !cell.is_empty()).map_or(0, |last| last + 1);
     cells.get(..end).unwrap_or(cells)
 }
 
-/// A cell between commas that is the fraction of a number with a decimal comma: `001` of `6,001,3,178`.
+/// Returns a cell that is the fraction of a number with a decimal comma, as `001` in `6,001,3,178`.
 pub(super) fn digits_behind_comma<'c>(separator: Separator, cells: &[&'c str]) -> Option<&'c str> {
     let is_integer =
         |cell: &str| !cell.is_empty() && cell.trim_start_matches('-').bytes().all(|b| b.is_ascii_digit());
@@ -93,18 +93,18 @@ pub(super) fn digits_behind_comma<'c>(separator: Separator, cells: &[&'c str]) -
     cells.iter().skip(1).step_by(2).find(is_fraction).copied()
 }
 
-/// What a comment says; `None` of a line that is none.
+/// Returns the text of a comment line, or `None` for other lines.
 pub(crate) fn comment_of(line: &str) -> Option<&str> {
     let line = line.trim_start();
     ["#", "%", "//"].iter().find_map(|mark| line.strip_prefix(mark))
 }
 
-/// The number that a word is. What programs write for no number is NaN.
+/// Parses a word as a number. Common words for a missing number give NaN.
 pub(crate) fn number(word: &str) -> Option<f64> {
     word.parse().ok().or_else(|| unusual_number(word))
 }
 
-/// `-nan(ind)` and `1.#QNAN` of Windows, `1.#INF`, `NA` of tables, `1.5D+02` of Fortran.
+/// Parses `-nan(ind)`, `1.#QNAN` and `1.#INF` of Windows programs, `NA` of tables, and `1.5D+02` of Fortran.
 #[cold]
 fn unusual_number(word: &str) -> Option<f64> {
     let lower = word.trim().trim_matches(['"', '\'']).to_ascii_lowercase();
@@ -133,7 +133,7 @@ fn unusual_number(word: &str) -> Option<f64> {
     format!("{mantissa}e{exponent}").parse::<f64>().ok().map(|number| sign * number)
 }
 
-/// A cell without blanks and quotes around it.
+/// Trims blanks and quotes from a cell.
 fn cell_of(cell: &str) -> &str {
     let cell = cell.trim();
     let quoted = ['"', '\''].into_iter().find_map(|quote| cell.strip_prefix(quote)?.strip_suffix(quote));
@@ -147,7 +147,7 @@ fn is_outside_quotes(line: &str, mark: char) -> bool {
     split_unquoted(line, |letter| letter == mark).len() > 1
 }
 
-/// Parts of a line between marks that are not within double quotes.
+/// Splits a line at separators that are not within double quotes.
 fn split_unquoted(line: &str, is_mark: impl Fn(char) -> bool) -> Vec<&str> {
     let mut is_quoted = false;
     line.split(|letter: char| {
@@ -236,7 +236,7 @@ mod tests {
             (semicolon, "1.234,5", None),
             (semicolon, "1,234,567", None),
             (Separator::Mark(','), "1,25", Some(1.25)),
-            // Thousands, perhaps.
+            // Possibly thousands.
             (Separator::Mark(','), "1,250", None),
         ] {
             assert_eq!(separator.number(cell), wanted, "{cell}");

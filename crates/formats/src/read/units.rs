@@ -1,15 +1,15 @@
-//! Units that names of columns carry: `x (cm)`, `X[mm]`, `y_mm`, `z/ft`, `time [us]`.
+//! Units in column names: `x (cm)`, `X[mm]`, `y_mm`, `z/ft`, `time [us]`.
 
-/// A unit of length.
+/// Unit of length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct LengthUnit {
-    /// Its short name.
+    /// Short name.
     pub(crate) name: &'static str,
     times: f64,
     per: f64,
 }
 
-/// A unit of time.
+/// Unit of time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct TimeUnit {
     pub(crate) seconds: f64,
@@ -21,7 +21,7 @@ const fn length(name: &'static str, times: f64, per: f64) -> LengthUnit {
     LengthUnit { name, times, per }
 }
 
-/// Units with their names in lower case. Division keeps decimals: 7 / 100 is 0.07, 7 * 0.01 is not.
+/// Units with their names in lower case. Division preserves decimals: 7 / 100 is 0.07, but 7 * 0.01 is not.
 const LENGTHS: [(LengthUnit, &[&str]); 10] = [
     (LengthUnit::METRE, &["m", "meter", "meters", "metre", "metres", "mtr", "mtrs"]),
     (length("cm", 1.0, 100.0), &["cm", "centimeter", "centimeters", "centimetre", "centimetres"]),
@@ -90,15 +90,15 @@ impl LengthUnit {
     pub(crate) const METRE: Self = length("m", 1.0, 1.0);
     pub(crate) const FOOT: Self = length("ft", 0.3048, 1.0);
     pub(crate) const US_SURVEY_FOOT: Self = length("US survey foot", 1200.0, 3937.0);
-    /// For messages.
+    /// Known units, for messages.
     pub(crate) const KNOWN: &str = "m, dm, cm, mm, um, km, ft, us-ft, yd, in";
 
-    /// The unit of a name in lower case.
+    /// Returns the unit with this name (lower case).
     pub(crate) fn named(name: &str) -> Option<Self> {
         LENGTHS.iter().find(|(_, names)| names.contains(&name)).map(|(unit, _)| *unit)
     }
 
-    /// Metres of a number of these. Those of a metre stay as they are, to the bit.
+    /// Converts a value to metres. Values in metres are unchanged to the last bit.
     #[inline]
     pub(crate) const fn metres(self, number: f64) -> f64 {
         number * self.times / self.per
@@ -106,14 +106,14 @@ impl LengthUnit {
 }
 
 impl TimeUnit {
-    /// The unit of a name in lower case.
+    /// Returns the unit with this name (lower case).
     pub(crate) fn named(name: &str) -> Option<Self> {
         TIMES.iter().find(|(_, names)| names.contains(&name)).map(|(unit, _)| *unit)
     }
 }
 
-/// The name of a column in lower case, and the unit behind it as it is written, in lower case: in brackets whatever it
-/// is, else behind `_`, `/`, `-` or a blank if it is one that is known.
+/// Splits a column name into the name and its unit, both in lower case. A bracketed text is always the unit; after `_`,
+/// `/`, `-` or a blank, only known units are.
 pub(crate) fn name_and_unit(name: &str) -> (String, Option<String>) {
     let lower = name.trim().trim_matches(['"', '\'']).trim().to_lowercase();
     if let Some((before, unit)) = lower.split_once(['[', '(', '{', '<'])
@@ -124,7 +124,7 @@ pub(crate) fn name_and_unit(name: &str) -> (String, Option<String>) {
         return (name, Some(unit.to_owned()).filter(|unit| !unit.is_empty()));
     }
     if let Some((before, unit)) = lower.rsplit_once(['_', '/', '-', ' '])
-        // `x_in` is an input more often than inches.
+        // `x_in` is more often an input than inches.
         && unit != "in"
         && (LengthUnit::named(unit).is_some() || TimeUnit::named(unit).is_some())
     {

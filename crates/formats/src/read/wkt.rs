@@ -1,19 +1,19 @@
-//! Units of coordinate systems as well-known text.
+//! Units of coordinate systems in well-known text.
 
 use super::crs_unit::CrsUnit;
 
-/// What well-known text says of its coordinates.
+/// Units found in well-known text.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct WktUnits {
-    /// The unit of x and y: the one that closes PROJCS (PROJCRS).
+    /// Unit of x and y: the last one in PROJCS (PROJCRS).
     pub(super) flat: Option<CrsUnit>,
-    /// The unit of z: the one of VERT_CS (VERTCRS).
+    /// Unit of z: the one in VERT_CS (VERTCRS).
     pub(super) high: Option<CrsUnit>,
-    /// Coordinates are angles.
+    /// Whether coordinates are angles.
     pub(super) is_degrees: bool,
 }
 
-/// Systems whose coordinates are lengths, systems of heights, and those whose coordinates are angles.
+/// Systems with lengths, systems of heights, and systems with angles.
 const FLAT: [&str; 7] =
     ["PROJCS", "PROJCRS", "PROJECTEDCRS", "LOCAL_CS", "ENGCRS", "ENGINEERINGCRS", "GEOCCS"];
 const HIGH: [&str; 4] = ["VERT_CS", "VERTCRS", "VERTCS", "VERTICALCRS"];
@@ -21,7 +21,7 @@ const ANGLES: [&str; 4] = ["GEOGCS", "GEOGCRS", "GEOGRAPHICCRS", "GEODCRS"];
 
 impl WktUnits {
     pub(super) fn of(wkt: &str) -> Self {
-        // Of the same length, unlike Unicode's.
+        // ASCII upper case preserves the length.
         let upper = wkt.to_ascii_uppercase();
         let at = |names: &[&str]| names.iter().find_map(|name| node(&upper, name));
         let unit = |names: &[&str]| at(names).and_then(|at| wkt.get(at..)).and_then(last_unit);
@@ -33,7 +33,7 @@ impl WktUnits {
     }
 }
 
-/// Where a node of this name begins.
+/// Returns the offset of the node with this name.
 fn node(upper: &str, name: &str) -> Option<usize> {
     upper.match_indices(name).map(|(at, _)| at).find(|at| {
         let (before, behind) = upper.split_at(*at);
@@ -42,9 +42,9 @@ fn node(upper: &str, name: &str) -> Option<usize> {
     })
 }
 
-/// The last unit of length directly within the node that a text starts with: `UNIT["foot",0.3048]`,
-/// `LENGTHUNIT["metre",1]`. Units of what is nested deeper (degrees, parameters) are passed by; axes of newer texts
-/// hold the unit themselves and count if there is none beside them.
+/// Returns the last unit of length directly within the node at the start of `text`: `UNIT["foot",0.3048]` or
+/// `LENGTHUNIT["metre",1]`. Units of deeper nodes (degrees, parameters) are ignored. In newer texts the axes contain
+/// the unit; it is used if the node itself has none.
 fn last_unit(text: &str) -> Option<CrsUnit> {
     let (mut depth, mut is_quoted) = (0_u32, false);
     let (mut own, mut of_axis) = (None, None);
@@ -92,7 +92,7 @@ fn last_unit(text: &str) -> Option<CrsUnit> {
     own.or(of_axis)
 }
 
-/// A unit: its name between quotes, and its factor.
+/// Parses a unit: its quoted name and its factor.
 fn unit(inside: &str) -> Option<CrsUnit> {
     let (name, rest) = inside.trim_start().strip_prefix('"')?.split_once('"')?;
     let rest = rest.split([']', ')']).next().unwrap_or_default();
@@ -118,7 +118,7 @@ mod tests {
                     AXIS[\"x\",east,ORDER[1],LENGTHUNIT[\"foot\",0.3048]],AXIS[\"y\",north,LENGTHUNIT[\"foot\",0.3048]]]";
         assert_eq!(metres(axes), Some(0.3048));
         assert_eq!(metres("PROJCS[\"a\"]"), None);
-        // A unit that is known needs no factor; another one does.
+        // A known unit needs no factor; others do.
         assert_eq!(metres("PROJCS[\"a\",UNIT[\"feet\",abc]]"), Some(0.3048));
         assert_eq!(metres("PROJCS[\"a\",UNIT[\"ell\",abc]]"), None);
     }

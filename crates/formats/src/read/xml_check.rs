@@ -1,46 +1,45 @@
-/// Follows a text of XML byte by byte, and counts what takes the memory and the time of its reader: it compares each
-/// attribute of a tag with those before it, and keeps the name spaces of a tag for all tags within.
+/// Incremental check of an XML text. It counts constructs that take much memory or time in the XML parser, which
+/// compares each attribute of a tag with the previous ones and keeps the namespaces of a tag for all tags within it.
 #[derive(Debug, Default)]
 pub(super) struct XmlCheck {
     place: Place,
-    /// The bytes since the last `<`, up to those that tell what it starts.
+    /// Bytes since the last `<`, up to those that identify the construct.
     start: Vec<u8>,
-    /// The last two bytes of this place: those that begin it count for none.
+    /// Last two bytes within the current construct, without its opening bytes.
     last: [u8; 2],
-    /// Attributes of the tag so far.
+    /// Number of attributes of the current tag.
     attributes: usize,
     name_spaces: usize,
-    /// Tags and attributes.
+    /// Number of tags and attributes.
     pub(super) nodes: u64,
 }
 
-/// Where the next byte is.
+/// Lexical state.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Place {
     #[default]
     Text,
     Tag,
-    /// The value of an attribute, up to this quote.
+    /// An attribute value, up to this quote.
     Value(u8),
-    /// Up to these bytes.
     Comment,
     Data,
     Instruction,
 }
 
-/// E57 has few attributes.
+/// Limit well above the attributes used by E57.
 const MAX_ATTRIBUTES: usize = 256;
-/// A file declares those of its extensions.
+/// Limit for namespaces. A file declares one for each of its extensions.
 const MAX_NAME_SPACES: usize = 1000;
 const COMMENT: &[u8] = b"!--";
 const DATA: &[u8] = b"![CDATA[";
 
 impl XmlCheck {
-    /// Takes the next bytes.
+    /// Checks the next bytes.
     ///
     /// # Errors
     ///
-    /// More of something than is read.
+    /// A limit is exceeded.
     pub(super) fn take(&mut self, bytes: &[u8]) -> Result<(), String> {
         bytes.iter().try_for_each(|&byte| {
             let before = self.place;
@@ -76,7 +75,7 @@ impl XmlCheck {
         Ok(())
     }
 
-    /// A byte of a tag outside of values.
+    /// Processes a byte of a tag outside of attribute values.
     fn name(&mut self, byte: u8) -> Result<(), String> {
         if self.start.len() < DATA.len() {
             self.start.push(byte);
@@ -87,7 +86,7 @@ impl XmlCheck {
                 _ => Place::Tag,
             };
         }
-        // `xmlns`, and `xmlns:` before a name.
+        // `xmlns`, or `xmlns:` before a name.
         if byte == b'n' && self.last == *b"ml" {
             self.name_spaces += 1;
         }
@@ -123,7 +122,7 @@ mod tests {
         let many = |count: usize| (0..count).map(|k| format!(" a{k}='='")).collect::<String>();
         assert!(check(&format!("<a{}/>", many(256)).repeat(3)).is_ok());
         assert!(check(&format!("<a{}/>", many(257))).unwrap_err().contains("256 attributes of one tag"));
-        // A comment ends after the bytes that begin it, and so do others.
+        // The opening bytes of a comment do not also close it.
         for start in ["<!-->", "<!--->", "<![CDATA[]>", "<?>"] {
             let end =
                 ["-->", "]]>", "?>"][usize::from(start.contains('[')) + 2 * usize::from(start.contains('?'))];

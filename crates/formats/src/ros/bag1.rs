@@ -11,12 +11,12 @@ use std::path::Path;
 use std::sync::Arc;
 use voxtile::{FormatError, Result};
 
-/// A `.bag` of ROS 1, version 2.0. Its index is read if there is one; otherwise the file is read once before.
+/// ROS 1 bag file (`.bag`, version 2.0). If it has no index, the file is read twice.
 #[derive(Debug)]
 pub struct Bag1 {
     file: FileBytes,
     topics: TopicList,
-    /// The topic of a connection; `None` if it is left out, because there are too many.
+    /// Topics by connection ID. `None` for connections skipped because there are too many topics.
     connections: HashMap<u32, Option<usize>>,
     chunks: Vec<ChunkPlace>,
     order: ChunkOrder,
@@ -25,24 +25,24 @@ pub struct Bag1 {
 }
 
 const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
-/// A longer header of a record is damage.
+/// Limit for a record header.
 const MAX_HEADER_BYTES: u64 = 1 << 16;
-/// A longer connection, which has the definition of a message, or place of a chunk is damage.
+/// Limit for connection records, which contain message definitions, and for chunk info records.
 const MAX_RECORD_BYTES: u64 = 4 << 20;
-/// Most connections of a recording: publishers of topics. Others are left out.
+/// Limit for connections (publishers of topics). Further ones are skipped.
 const MAX_CONNECTIONS: usize = 1 << 16;
 
 impl Bag1 {
-    /// Opens a file.
+    /// Opens a bag.
     ///
     /// # Errors
     ///
-    /// A file that cannot be read or is no such bag.
+    /// The file cannot be read or is not such a bag.
     pub fn open(path: &Path) -> Result<Self> {
         Self::open_within(path, &Budget::default())
     }
 
-    /// As [`Bag1::open`], in so much memory.
+    /// As [`Bag1::open`], within a memory budget.
     ///
     /// # Errors
     ///
@@ -76,8 +76,8 @@ impl Bag1 {
         Ok(bag)
     }
 
-    /// The record at a place, with the place behind it. The data of chunks and indices are left out. `None` where no
-    /// whole header is.
+    /// Reads the record at an offset and returns it with the offset of the next one. The data of chunks and index
+    /// records is not read. `None` if there is no complete header.
     fn record(&mut self, offset: u64) -> Result<Option<(Record, u64)>> {
         let start = self.file.read_at(offset, 4)?;
         let Some(header_bytes) = start.first_chunk().map(|bytes| u64::from(u32::from_le_bytes(*bytes)))
@@ -105,7 +105,7 @@ impl Bag1 {
         Ok(Some((record, data_at + data_bytes)))
     }
 
-    /// Reads connections and places of chunks from the end of the file; `false` if they are not all there.
+    /// Reads connections and chunk locations from the end of the file. Returns `false` if they are incomplete.
     fn read_index(&mut self, index_at: u64) -> Result<bool> {
         let shares = Shares::of(self.spill.budget());
         let mut lists: HashSet<Arc<[usize]>> = HashSet::new();
@@ -151,7 +151,7 @@ impl Bag1 {
         Ok(!self.chunks.is_empty() || !self.connections.is_empty() || self.forget())
     }
 
-    /// Forgets a broken index.
+    /// Discards a broken index.
     fn forget(&mut self) -> bool {
         self.topics = TopicList::default();
         self.connections.clear();
@@ -159,7 +159,7 @@ impl Bag1 {
         false
     }
 
-    /// Finds chunks one after the other and looks into each, where there is no index.
+    /// Finds chunks one by one and inspects each, if there is no index.
     fn scan(&mut self) -> Result<()> {
         let mut at = MAGIC.len() as u64;
         let (mut walk, mut cut) = (Walk::default(), String::new());
@@ -201,13 +201,13 @@ impl Bag1 {
         self.connections.insert(id, topic);
     }
 
-    /// The topic of a connection, or that it is left out; `None` if it is not known.
+    /// Returns the topic of a connection. The outer `None` means unknown, the inner one skipped.
     fn topic_of(&self, connection: u32) -> Option<Option<usize>> {
         let is_full = self.connections.len() >= MAX_CONNECTIONS;
         self.connections.get(&connection).copied().or(is_full.then_some(None))
     }
 
-    /// Walks over the records of a chunk.
+    /// Visits the records of a chunk.
     fn find_messages(&mut self, chunk: &mut OpenChunk, take: &mut TakeMessage<'_>) -> Result<()> {
         let is_broken = chunk.is_broken();
         let OpenChunk { bytes, complaint } = chunk;
@@ -236,7 +236,7 @@ impl Bag1 {
             if record.op == Some(RecordKind::Connection) {
                 let data_bytes = if len > MAX_RECORD_BYTES { 0 } else { len as usize };
                 let data = bytes.piece(data_at, data_bytes, &mut window)?.unwrap_or_default();
-                // What a broken chunk says of a connection may be wrong.
+                // Connection data from a broken chunk may be wrong, so known connections are kept.
                 let is_known = record.u32("conn").is_some_and(|id| self.connections.contains_key(&id));
                 if !(is_broken && is_known) {
                     self.connect(&record, data);
@@ -257,7 +257,7 @@ impl Bag1 {
     }
 }
 
-/// The number that four bytes are.
+/// Decodes four little-endian bytes.
 fn u32_of(bytes: Option<&[u8]>) -> Option<u64> {
     bytes?.first_chunk().map(|bytes| u64::from(u32::from_le_bytes(*bytes)))
 }

@@ -1,6 +1,6 @@
 use super::file_bytes::Pieces;
 
-/// What a record of a bag is.
+/// Type of a bag record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum RecordKind {
     Message,
@@ -11,18 +11,18 @@ pub(super) enum RecordKind {
     Connection,
 }
 
-/// The header of a record: names and values.
+/// Header of a bag record: fields with names and values.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Record {
     pub(super) op: Option<RecordKind>,
     fields: Vec<(String, Vec<u8>)>,
     pub(super) header_bytes: u64,
-    /// Its data, where they were read.
+    /// Record data, if it was read.
     pub(super) data: Vec<u8>,
 }
 
 impl Record {
-    /// Parses `name=value` after `name=value`, each behind its length.
+    /// Parses a sequence of length-prefixed `name=value` fields.
     pub(super) fn of(header: &[u8]) -> Option<Self> {
         let mut pieces = Pieces::new(header);
         let mut record = Self { header_bytes: header.len() as u64, ..Self::default() };
@@ -45,7 +45,7 @@ impl Record {
         Some(record)
     }
 
-    /// The text of a field among fields without an `op`: the data of a connection. `None` if any of them is damaged.
+    /// Returns a text field from the data of a connection, which has no `op` field. `None` if any field is damaged.
     pub(super) fn text_of(data: &[u8], name: &str) -> Option<String> {
         let (mut pieces, mut found) = (Pieces::new(data), None);
         while !pieces.is_empty() {
@@ -75,11 +75,11 @@ impl Record {
         Some(u64::from_le_bytes(*self.value(name)?.first_chunk()?))
     }
 
-    /// Seconds and nanoseconds, as nanoseconds.
+    /// Returns a time field in nanoseconds.
     pub(super) fn time_ns(&self, name: &str) -> Option<i64> {
         let mut pieces = Pieces::new(self.value(name)?);
         let (seconds, ns) = (pieces.u32()?, pieces.u32()?);
-        // At most 2^32 * 10^9 + 2^32: far below 2^63.
+        // At most 2^32 * 10^9 + 2^32, far below 2^63.
         Some(i64::from(seconds) * 1_000_000_000 + i64::from(ns))
     }
 }

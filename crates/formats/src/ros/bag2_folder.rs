@@ -10,14 +10,14 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 use voxtile::{Error, FormatError, Result};
 
-/// A folder of `ros2 bag`: `metadata.yaml` and the files that it names, in order. Without one, all recordings in the
-/// folder in the natural order of their names: the parts of a bag that `rosbag record --split` wrote.
+/// rosbag2 folder: `metadata.yaml` and the files listed in it, in order. Without that file, all recordings of the
+/// folder in natural order of their names, as written by `rosbag record --split`.
 pub struct Bag2Folder {
     files: Sequence,
     remarks: Vec<String>,
 }
 
-/// A longer `metadata.yaml` is an error.
+/// Limit for the size of `metadata.yaml`.
 const MAX_METADATA_BYTES: u64 = 8 << 20;
 
 impl Bag2Folder {
@@ -25,12 +25,13 @@ impl Bag2Folder {
     ///
     /// # Errors
     ///
-    /// A folder without files of a recording; a file that cannot be read or is invalid.
+    /// The folder contains no recording, or a file cannot be read or is invalid.
     pub fn open(path: &Path) -> Result<Self> {
         Self::open_within(path, &Budget::default())
     }
 
-    /// As [`Bag2Folder::open`], in so much memory. Compressed files are unpacked into its folder for temporary files.
+    /// As [`Bag2Folder::open`], within a memory budget. Compressed files are decompressed into the folder for temporary
+    /// files.
     ///
     /// # Errors
     ///
@@ -55,7 +56,7 @@ impl Bag2Folder {
             (Bag2Metadata::default(), Vec::new())
         };
         let mut files = if files.is_empty() { files_of(path)? } else { files };
-        // Each of a million names of one file would be a file of its own.
+        // Drop repeated names: a damaged list could name one file a million times.
         let (named, mut seen) = (files.len(), HashSet::new());
         files.retain(|file| seen.insert(file.clone()));
         if files.len() < named {
@@ -65,7 +66,7 @@ impl Bag2Folder {
                 metadata_path.display()
             ));
         }
-        // Bags of ROS 1 have none.
+        // ROS 1 bags have no metadata file.
         if !metadata_path.is_file() && !files.iter().all(|file| is_bag1(file)) {
             let path = path.display();
             remarks
@@ -86,14 +87,14 @@ impl Bag2Folder {
     }
 }
 
-/// By its name; one that the recorder did not close ends with `.bag.active`.
+/// Detected by name. A bag that the recorder did not close ends with `.bag.active`.
 fn is_bag1(file: &Path) -> bool {
     let name = file.to_string_lossy().to_lowercase();
     name.ends_with(".bag") || name.ends_with(".bag.active")
 }
 
-/// A file that the metadata name: beside them, perhaps behind the name of the folder, perhaps compressed since. Of one
-/// that leads out of the folder only the last part counts.
+/// Finds a file listed in the metadata: in the folder, possibly with the folder's name prepended, possibly compressed
+/// later. For a path outside of the folder only its last component is used.
 fn find(folder: &Path, name: &str) -> Result<PathBuf> {
     let is_inside = is_inside(Path::new(name));
     let whole = is_inside.then(|| folder.join(name));
@@ -116,7 +117,7 @@ fn find(folder: &Path, name: &str) -> Result<PathBuf> {
     })
 }
 
-/// The files of recordings in a folder, in the natural order of their names.
+/// Returns the recordings in a folder, in natural order of their names.
 fn files_of(folder: &Path) -> Result<Vec<PathBuf>> {
     let wrong = |error| Error::io(folder, "read", error);
     let mut files = Vec::new();

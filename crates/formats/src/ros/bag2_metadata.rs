@@ -1,14 +1,14 @@
-/// What is needed of the `metadata.yaml` of a bag of ROS 2.
+/// Required parts of the `metadata.yaml` of a ROS 2 bag.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Bag2Metadata {
-    /// In the order of their messages.
+    /// Files in the order of their messages.
     pub(super) files: Vec<String>,
-    /// Empty if nothing is compressed.
+    /// Empty if the files are not compressed.
     pub(super) compression_format: String,
 }
 
 impl Bag2Metadata {
-    /// Reads the lines of the two keys. `ros2 bag` and rosbags write each of them once, outside of other lists.
+    /// Parses the lines of the two keys. `ros2 bag` and rosbags write each key once, outside of other lists.
     pub(super) fn of(text: &str) -> Self {
         let mut metadata = Self::default();
         let mut is_in_files = false;
@@ -40,7 +40,7 @@ impl Bag2Metadata {
     }
 }
 
-/// A value without its quotes.
+/// Removes the quotes of a value.
 fn scalar(value: &str) -> String {
     let value = value.trim();
     let inner = ['"', '\''].iter().find_map(|&quote| value.strip_prefix(quote)?.strip_suffix(quote));

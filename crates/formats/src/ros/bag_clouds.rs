@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use voxtile::{Error, FormatError, Result};
 
-/// The clouds of one topic of a recording, with the poses that the recording knows.
+/// Source of the clouds of one topic of a recording, with the poses from the recording.
 pub struct BagClouds {
     path: PathBuf,
     recording: Box<dyn Recording>,
@@ -26,32 +26,33 @@ pub struct BagClouds {
     /// Number of the next cloud.
     next: u64,
     current: Option<Current>,
-    /// The largest message that is held in memory.
+    /// Maximum size of a message held in memory.
     whole_bytes: u64,
-    /// The frame of the cloud at hand.
+    /// Frame of the current cloud.
     frame: Option<String>,
-    /// Number of clouds whose stamp is 0.
+    /// Number of clouds with stamp 0.
     without_stamp: u64,
-    /// Number of clouds that are read otherwise than they say.
+    /// Number of clouds for each repair of inconsistent messages.
     repaired: BTreeMap<&'static str, u64>,
 }
 
-/// The message of the cloud at hand.
+/// Message of the current cloud.
 struct Current {
     log_ns: i64,
-    /// The message or, of a large one, its first bytes.
+    /// The message, or only its first bytes if it is large.
     bytes: Vec<u8>,
-    /// All of a large message.
+    /// The complete message, if it is large.
     part: Option<FilePart>,
 }
 
-/// Opens the clouds of a recording: a file, the folder of a bag of ROS 2, or several that follow one another in time.
+/// Opens the clouds of a recording: a file, a ROS 2 bag folder, or several recordings that follow each other in time.
 ///
-/// The recording is read once for its poses here, and once more for its clouds.
+/// The recording is read once here for its poses, and again for its clouds.
 ///
 /// # Errors
 ///
-/// A file that cannot be read or is no recording; no topic with clouds, or several and none is chosen.
+/// A file cannot be read or is not a recording; there is no topic with clouds, or there are several and none is
+/// selected.
 pub fn open_bag(paths: &[PathBuf], options: &BagOptions) -> Result<BagClouds> {
     let path = paths.first().cloned().unwrap_or_default();
     let name_it = |error| match error {
@@ -92,7 +93,7 @@ pub fn open_bag(paths: &[PathBuf], options: &BagOptions) -> Result<BagClouds> {
     })
 }
 
-/// The first camera of a topic that is whole: cameras do not change while they record.
+/// Reads the first valid camera message of a topic. Cameras do not change during a recording.
 fn read_camera(recording: &mut dyn Recording, index: usize, whole_bytes: u64) -> Result<CameraInfo> {
     let topic = recording.topics().get(index).cloned();
     let (name, wire) = topic.map_or_else(Default::default, |topic| (topic.name, topic.wire));
@@ -111,28 +112,28 @@ fn read_camera(recording: &mut dyn Recording, index: usize, whole_bytes: u64) ->
             }
             Ok(None) => return Err(Error::argument("recording", last)),
             Err(error @ Error::Io { .. }) => return Err(error),
-            // Bad parts are told of when clouds are read.
+            // Damaged parts are reported when the clouds are read.
             Err(_) => {}
         }
     }
 }
 
 impl BagClouds {
-    /// The topic that is read.
+    /// Returns the topic of the clouds.
     pub fn topic(&self) -> &Topic {
         &self.topic
     }
 
-    /// All topics of the recording.
+    /// Returns all topics of the recording.
     pub fn topics(&self) -> &[Topic] {
         self.recording.topics()
     }
 
-    /// The bytes of a message that are needed at a time.
+    /// Returns the part of a message that is held in memory.
     fn current(&self, message: Message, number: u64) -> Result<Current> {
         let Message { log_ns, mut data, .. } = message;
         if self.chosen.kind != MessageKind::PointCloud2 {
-            // Points of other kinds cannot be read piece by piece.
+            // Only PointCloud2 can be read in parts.
             data.load(self.whole_bytes).map_err(|error| match error {
                 Error::InvalidArgument { reason, .. } => self.wrong(number, &reason),
                 error => error,
@@ -160,7 +161,7 @@ impl BagClouds {
     }
 }
 
-/// When a cloud was taken: drivers without a clock leave its stamp at 0.
+/// Returns the time stamp of a cloud, or its recording time if the stamp is 0, as from drivers without a clock.
 fn stamp_of(header: &Header, message: &Current) -> i64 {
     if header.stamp_ns == 0 { message.log_ns } else { header.stamp_ns }
 }
@@ -180,7 +181,7 @@ impl CloudSource for BagClouds {
             Ok(Some(message)) => message,
             Ok(None) => return Ok(None),
             Err(error) => {
-                // One that is damaged has a number, too.
+                // A damaged cloud also uses up a number.
                 self.next += u64::from(!matches!(error, Error::Io { .. }));
                 return Err(error);
             }

@@ -1,33 +1,32 @@
 use crate::spill::Budget;
 use std::path::PathBuf;
 
-/// Which clouds of a recording are read, and where their poses come from.
+/// Settings for reading a recording: the clouds and the origin of their poses.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BagOptions {
-    /// The topic of the clouds; needed if there are several.
+    /// Topic of the clouds. Required if there are several.
     pub topic: Option<String>,
-    /// The topic of poses, for [`PoseSource::Odometry`]; needed if there are several.
+    /// Topic of poses for [`PoseSource::Odometry`]. Required if there are several.
     pub odometry_topic: Option<String>,
-    /// The frame of the map. By default `map`, else `odom`, else the root of the tree that the clouds' frame is in;
-    /// with poses of a topic, the frame of these.
+    /// Name of the map frame. By default `map`, else `odom`, else the root of the tree that contains the clouds' frame.
+    /// With a topic of poses, the frame of those poses.
     pub fixed_frame: Option<String>,
-    /// Where poses come from.
+    /// Origin of the poses.
     pub poses: PoseSource,
-    /// Between two poses further apart in time there is none; see [`most_gap_ns`](crate::poses::most_gap_ns).
+    /// Maximum time between two poses to interpolate, in nanoseconds; see [`most_gap_ns`](crate::poses::most_gap_ns).
     pub most_gap_ns: Option<i64>,
-    /// Points are in the frame of the map already; poses only say from where they were seen.
+    /// Whether points are already in the map frame; poses then only give the ray origins.
     pub is_world_frame: bool,
-    /// Whether poses are looked for in other topics than those that are named, for clouds that are in the frame of the
-    /// map already.
+    /// Whether poses are also searched for in topics not named here, for clouds that are already in the map frame.
     pub are_poses_needed: bool,
-    /// Bytes of memory for chunks, messages and poses; beyond them they go to temporary files.
+    /// Memory budget in bytes for chunks, messages and poses. Data beyond it goes to temporary files.
     pub memory_bytes: usize,
-    /// Folder that compressed files are unpacked into, and of other temporary files; the system's own if `None`.
+    /// Folder for decompressed and other temporary files. `None`: the system's.
     pub scratch: Option<PathBuf>,
 }
 
 impl BagOptions {
-    /// How much memory reading may take, and where the rest goes.
+    /// Returns the memory budget and the folder for temporary files.
     pub fn budget(&self) -> Budget {
         Budget { bytes: self.memory_bytes, scratch: self.scratch.clone() }
     }
@@ -49,14 +48,14 @@ impl Default for BagOptions {
     }
 }
 
-/// Where the poses of the sensor come from.
+/// Origin of sensor poses.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum PoseSource {
-    /// The transforms of `/tf` and `/tf_static`.
+    /// Transforms of `/tf` and `/tf_static`.
     #[default]
     Tf,
-    /// A topic of odometry, poses or a path, with the transforms from there to the sensor on top.
+    /// A topic of odometry, poses or a path, combined with the transforms from its child frame to the sensor.
     Odometry,
-    /// Nowhere: the caller knows them.
+    /// None; the caller provides poses.
     None,
 }

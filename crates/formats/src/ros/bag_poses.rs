@@ -15,61 +15,61 @@ use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 use voxtile::{Error, Result};
 
-/// Where the sensor was at the stamp of each cloud.
+/// Sensor poses at the stamps of clouds.
 #[derive(Debug)]
 pub(super) struct BagPoses {
     source: PoseSource,
-    /// Shared with those who look poses up while clouds are read.
+    /// Shared with the pose lookups used while clouds are read.
     transforms: Arc<Transforms>,
     fixed_frame: Option<String>,
-    /// Poses of a topic, until they are among the transforms.
+    /// Poses of a topic, until they are added to `transforms`.
     track: PoseTrack,
-    /// The frame that the poses of a topic are of, once they are among the transforms.
+    /// Child frame of the poses of a topic, once they are in `transforms`.
     body: Option<String>,
-    /// The frame of clouds that are in that of the map already, and the frame from where they were seen.
+    /// For registered clouds: their frame, which is the map frame, and the sensor's frame.
     registered: Option<(String, String)>,
     is_world_frame: bool,
     are_poses_needed: bool,
-    /// What is read, as options say it.
+    /// Topic of poses from the options.
     odometry_topic: Option<String>,
     /// Whether any cloud had a pose.
     has_placed: bool,
-    /// What to do if no cloud has a pose.
+    /// Advice to report if no cloud has a pose.
     hints: Vec<String>,
-    /// How the pose of a sensor is looked up, by its frame.
+    /// Pose lookups by sensor frame.
     lookups: HashMap<String, std::result::Result<PoseLookup, WhyNot>>,
     /// Number of clouds without a pose, by reason.
     without: BTreeMap<String, u64>,
     remarks: Vec<String>,
 }
 
-/// Where a sensor was.
+/// Pose of a cloud.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Placed {
     pub(super) world_from_sensor: RigidPose,
-    /// The points are in the frame of the map already.
+    /// Whether the points are already in the map frame.
     pub(super) is_in_world: bool,
 }
 
-/// What names of frames contain that do not move.
+/// Words in names of fixed frames.
 const MAP_NAMES: [&str; 6] = ["map", "odom", "world", "camera_init", "global", "earth"];
-/// What names of sensors, and of what carries them, contain.
+/// Words in names of sensor and robot frames.
 const BODY_NAMES: [&str; 14] = [
     "base", "body", "camera", "imu", "laser", "lidar", "livox", "mapped", "os_", "ouster", "robot", "sensor",
     "vehicle", "velodyne",
 ];
-/// The frame of poses that do not name theirs, where it is not that of the clouds.
+/// Child frame of poses that do not name it, if it differs from the clouds' frame.
 const UNNAMED_BODY: &str = "(unnamed)";
-/// Memory that a sample takes.
+/// Memory per sample, in bytes.
 const SAMPLE_BYTES: usize = 96;
-/// Most frames of sensors whose lookups are kept. A topic has few; those of more are made again.
+/// Limit for cached lookups. A topic usually has few sensor frames; further lookups are created each time.
 const MAX_LOOKUPS: usize = 32;
-/// Most reasons that are counted for clouds without a pose.
+/// Limit for the reasons to count for clouds without a pose.
 const MAX_REASONS: usize = 100;
-/// The frames that a robot moves by, if a pose does not name its own.
+/// Robot base frames, used if a pose does not name its child frame.
 const BASE_FRAMES: [&str; 2] = ["base_link", "base_footprint"];
 impl BagPoses {
-    /// Reads all transforms, and the poses of a topic if these are asked for.
+    /// Reads all transforms, and the poses of a topic if requested.
     pub(super) fn read(recording: &mut dyn Recording, options: &BagOptions) -> Result<Self> {
         let mut poses = Self {
             source: options.poses,
@@ -110,7 +110,7 @@ impl BagPoses {
         }
     }
 
-    /// Who asks for the poses of a topic does not want those of `/tf` in their place.
+    /// An unusable pose topic is an error: falling back to `/tf` would not be what the user asked for.
     fn without_track(&self, topic: &Topic) -> Error {
         let (messages, odd) = (topic.messages, self.track.odd);
         let unusable = match odd {
@@ -152,7 +152,7 @@ impl BagPoses {
             let mut message = match recording.next_message() {
                 Ok(Some(message)) => message,
                 Ok(None) => break,
-                // Damage costs a few poses; a disk that is full, or fails, might cost all.
+                // Damage loses a few poses; an I/O error, such as a full disk, could lose all.
                 Err(error @ Error::Io { .. }) => return Err(error),
                 Err(error) => {
                     note(format!("{error:#}"));
@@ -206,28 +206,28 @@ impl BagPoses {
         Ok(())
     }
 
-    /// Whether the place of a frame in the map is known by what moves it.
+    /// Returns whether the pose of a frame in the map is known from moving transforms.
     pub(super) fn places(&self, frame: &str) -> bool {
         let fixed = self.fixed_frame.clone().map_or_else(|| self.fixed_frame_of(frame), Ok);
         fixed.is_ok_and(|fixed| fixed != frame)
     }
 
-    /// Whether a frame moves.
+    /// Returns whether a frame moves.
     pub(super) fn moves(&self, frame: &str) -> bool {
         self.transforms.ancestors(frame).iter().any(|frame| self.transforms.is_moving(frame))
     }
 
-    /// Whether anything moves in a frame.
+    /// Returns whether any frame moves relative to this one.
     pub(super) fn moves_below(&self, frame: &str) -> bool {
         !self.transforms.moving_below(frame).is_empty()
     }
 
-    /// Takes clouds in this frame as those of the map, seen from what moves in it. `false` if it is not called as a map
-    /// is, if nothing moves in it, or several frames do, none of which is that of a robot.
+    /// Treats clouds in this frame as registered in the map, with the rays starting at a frame that moves in it.
+    /// Returns `false` if the frame is not named like a map, or if no unique robot frame moves in it.
     pub(super) fn see_from_below(&mut self, frame: &str) -> bool {
         let is_like =
             |frame: &str, names: &[&str]| names.iter().any(|name| frame.to_lowercase().contains(name));
-        // Wheels and arms move in the frame of a robot.
+        // Wheels and arms also move relative to a robot's frame.
         if !is_like(frame, &MAP_NAMES) {
             return false;
         }
@@ -237,19 +237,19 @@ impl BagPoses {
         let base =
             BASE_FRAMES.iter().find_map(|base| moving.iter().map(|(name, _)| name).find(|name| name == base));
         let body = if let [only] = last[..] { Some(only) } else { base };
-        // An arm may move before a camera that stands.
+        // An arm may move in front of a fixed camera.
         let Some(body) = body.filter(|body| is_like(body, &BODY_NAMES)) else { return false };
         self.registered = Some((frame.to_owned(), body.clone()));
         self.fixed_frame = Some(frame.to_owned());
         true
     }
 
-    /// Says what to do if no cloud has a pose.
+    /// Sets the advice to report if no cloud has a pose.
     pub(super) fn hint(&mut self, hint: String) {
         self.hints = vec![hint];
     }
 
-    /// Where the sensor was; counts why not.
+    /// Returns the pose of a cloud. Counts the reason if there is none.
     pub(super) fn place(&mut self, cloud_frame: &str, stamp_ns: i64) -> Result<Option<Placed>> {
         if self.source == PoseSource::None {
             return Ok(None);
@@ -279,7 +279,7 @@ impl BagPoses {
         }
     }
 
-    /// The frame from where clouds were seen that are in the frame of the map already.
+    /// Returns the sensor frame of clouds that are already in the map frame.
     fn seen_from(&self, cloud_frame: &str) -> Option<String> {
         if !self.are_poses_needed {
             return None;
@@ -289,7 +289,7 @@ impl BagPoses {
         }
         let body = self.body.as_deref().filter(|body| *body != cloud_frame)?;
         let is_fixed = self.fixed_frame.as_deref() == Some(cloud_frame);
-        // Of points in the world, only the place of the sensor is asked for.
+        // For points in the world frame, only the sensor position is needed.
         let is_unknown = self.is_world_frame && !self.transforms.knows(cloud_frame);
         (is_fixed || is_unknown).then(|| body.to_owned())
     }
@@ -305,7 +305,7 @@ impl BagPoses {
         self.lookup(sensor_frame)?.find(stamp_ns)
     }
 
-    /// Looks up where a sensor was at any time, once its first pose was asked for.
+    /// Returns a lookup of sensor poses at any time. The poses of a topic must be settled before, by the first pose.
     pub(super) fn lookup(&self, sensor_frame: &str) -> std::result::Result<PoseLookup, WhyNot> {
         let unknown = || Err(WhyNot::UnknownFrame(sensor_frame.to_owned()));
         self.lookups.get(sensor_frame).cloned().unwrap_or_else(unknown)
@@ -322,7 +322,7 @@ impl BagPoses {
         PoseLookup::new(Arc::clone(&self.transforms), fixed, sensor_frame.to_owned())
     }
 
-    /// The default frame of the map, above the frame of a sensor.
+    /// Returns the default map frame above a sensor frame.
     fn fixed_frame_of(&self, sensor_frame: &str) -> std::result::Result<String, WhyNot> {
         if !self.transforms.knows(sensor_frame) {
             return Err(WhyNot::UnknownFrame(sensor_frame.to_owned()));
@@ -333,14 +333,14 @@ impl BagPoses {
         {
             return Ok(known.to_owned());
         }
-        // A mount alone says nothing of where the robot went.
+        // A static mount alone does not give the robot's motion.
         if !chain.iter().any(|frame| self.transforms.is_moving(frame)) {
             return Err(WhyNot::NothingMoves(sensor_frame.to_owned()));
         }
         Ok(self.transforms.root_of(sensor_frame))
     }
 
-    /// Puts the poses of a topic among the transforms, in the place of those of the same frame.
+    /// Adds the poses of a topic to the transforms, replacing those of the same frame.
     fn settle_track(&mut self, sensor_frame: &str) {
         let PoseTrack { parent, child: named, poses, mut odd } = std::mem::take(&mut self.track);
         let mut child = if named.is_empty() { self.base_of(sensor_frame) } else { named.clone() };
@@ -351,7 +351,7 @@ impl BagPoses {
         let transforms = Arc::make_mut(&mut self.transforms);
         transforms.detach(&child);
         if self.fixed_frame.is_none() {
-            // What is above the frame of the poses does not matter, and might lead back to its child.
+            // Ancestors of the parent frame are irrelevant and might form a loop with its child.
             transforms.detach(&parent);
             self.fixed_frame = Some(parent.clone());
         }
@@ -373,14 +373,15 @@ impl BagPoses {
         }
     }
 
-    /// The frame that poses without a name are of: the base of the robot that carries the sensor, or the sensor.
+    /// Returns the child frame of poses that do not name it: the base of the robot that carries the sensor, or the
+    /// sensor.
     fn base_of(&self, sensor_frame: &str) -> String {
         let chain = self.transforms.ancestors(sensor_frame);
         let base = BASE_FRAMES.into_iter().find(|base| chain.iter().any(|frame| frame == base));
         base.unwrap_or(sensor_frame).to_owned()
     }
 
-    /// What a person should know.
+    /// Returns remarks for the user.
     pub(super) fn remarks(&self) -> impl Iterator<Item = String> + '_ {
         let without = self.without.iter().map(|(why, count)| format!("{count} clouds have no pose: {why}"));
         let is_without = !self.has_placed && !self.without.is_empty();

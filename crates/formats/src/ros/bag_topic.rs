@@ -4,21 +4,21 @@ use super::messages::MessageKind;
 use super::recording::{Recording, Topic};
 use voxtile::{Error, Result};
 
-/// Most topics that an error lists.
+/// Maximum number of topics listed in an error.
 const MAX_LISTED: usize = 100;
 
-/// A topic that was chosen.
+/// A selected topic.
 #[derive(Clone, Debug)]
 pub(super) struct Chosen {
     pub(super) index: usize,
     pub(super) kind: MessageKind,
-    /// The topic of the camera, for depth images.
+    /// Camera topic, for depth images.
     pub(super) camera: Option<usize>,
-    /// What a person should know of the choice.
+    /// Remarks for the user about the selection.
     pub(super) remarks: Vec<String>,
 }
 
-/// The kind of the messages of a topic that can be decoded.
+/// Returns the message type of a topic if it can be decoded.
 pub(super) fn kind_of(topic: &Topic) -> Option<MessageKind> {
     topic.wire.and(MessageKind::of(&topic.type_name))
 }
@@ -55,7 +55,7 @@ pub(super) fn choose_clouds(
     CloudTopics::find(recording, &topics, whole_bytes)?.choose(recording, &topics)
 }
 
-/// Finds the topic of poses.
+/// Finds the topic of the poses.
 pub(super) fn choose_poses(topics: &[Topic], name: Option<&str>) -> Result<usize> {
     if let Some(name) = name {
         let index = named(topics, name, "odometry")?;
@@ -67,7 +67,7 @@ pub(super) fn choose_poses(topics: &[Topic], name: Option<&str>) -> Result<usize
     }
     let is_pose = |topic: &&Topic| topic.messages > 0 && kind_of(topic).is_some_and(MessageKind::is_pose);
     let found: Vec<&Topic> = topics.iter().filter(is_pose).collect();
-    // Odometry says which frame moves, poses and paths do not.
+    // Odometry messages name the moving frame; poses and paths do not.
     let odometry: Vec<_> =
         found.iter().filter(|topic| kind_of(topic) == Some(MessageKind::Odometry)).collect();
     match (odometry.as_slice(), found.as_slice()) {
@@ -94,7 +94,7 @@ fn index_of(topics: &[Topic], wanted: &Topic) -> Result<usize> {
 }
 
 fn named(topics: &[Topic], name: &str, option: &str) -> Result<usize> {
-    // The part of a split recording with the most messages of a name speaks for it, if types differ.
+    // If the parts of a split recording have different types for a topic, the part with most messages is used.
     let same =
         topics.iter().enumerate().filter(|(_, topic)| topic.name.trim_matches('/') == name.trim_matches('/'));
     let best = same.max_by_key(|(_, topic)| (kind_of(topic).is_some(), topic.messages));
@@ -106,7 +106,7 @@ fn named(topics: &[Topic], name: &str, option: &str) -> Result<usize> {
     })
 }
 
-/// The choice of a topic, with its camera if it holds images.
+/// Returns the selection of a topic, with its camera if it contains images.
 pub(super) fn chosen(topics: &[Topic], index: usize, kind: MessageKind) -> Result<Chosen> {
     let (camera, remarks) = (None, Vec::new());
     let Some(image) = topics.get(index).filter(|_| kind.is_image()) else {
@@ -124,7 +124,7 @@ pub(super) fn chosen(topics: &[Topic], index: usize, kind: MessageKind) -> Resul
     }
 }
 
-/// `/points (sensor_msgs/msg/PointCloud2, 20 messages), ...`.
+/// Formats topics as `/points (sensor_msgs/msg/PointCloud2, 20 messages), ...`.
 pub(super) fn list<'t>(topics: impl Iterator<Item = &'t Topic>) -> String {
     let mut topics = topics.fuse();
     let mut text: Vec<String> = topics

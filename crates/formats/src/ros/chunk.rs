@@ -4,42 +4,42 @@ use std::io::Read;
 use std::sync::Arc;
 use voxtile::{Error, Result};
 
-/// A part of a file whose messages are read together.
+/// Location of a chunk: a part of a file whose messages are read together.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct ChunkPlace {
-    /// Bytes of the file before it.
+    /// Offset in the file.
     pub(super) offset: u64,
-    /// Its bytes in the file; fewer are there if it is cut off.
+    /// Size in the file. A truncated file has fewer bytes.
     pub(super) bytes: u64,
-    /// No message of it is earlier.
+    /// Lower bound for the times of its messages.
     pub(super) start_ns: i64,
-    /// The topics that it has messages of; `None` if that is not known. Chunks share their lists.
+    /// Topics with messages in the chunk; `None` if unknown. Chunks share these lists.
     pub(super) topics: Option<Arc<[usize]>>,
-    /// Its bytes are records of the file itself, not compressed and without a frame.
+    /// Whether the bytes are plain records of the file, without a chunk header and compression.
     pub(super) is_bare: bool,
 }
 
-/// A chunk of which messages are found.
+/// A chunk with its messages located.
 #[derive(Debug, Default)]
 pub(super) struct OpenChunk {
     pub(super) bytes: Bytes,
-    /// What is wrong with it: its messages are those before the bad place. Where it is broken, no message is taken.
+    /// Damage found. Messages before the damage are valid, unless the chunk is broken: then none is used.
     pub(super) complaint: Option<Complaint>,
 }
 
 impl OpenChunk {
-    /// Whether any byte of it may be wrong.
+    /// Returns whether any byte may be wrong.
     pub(super) fn is_broken(&self) -> bool {
         self.complaint.as_ref().is_some_and(|complaint| complaint.is_broken)
     }
 
-    /// Notes that no record starts where one should, unless something else is wrong already.
+    /// Records that no record starts at the expected place, unless damage was recorded before.
     pub(super) fn note(complaint: &mut Option<Complaint>, reason: String) {
         complaint.get_or_insert(Complaint { reason, is_broken: false });
     }
 }
 
-/// A message in a chunk.
+/// Location of a message in a chunk.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct MessagePlace {
     pub(super) log_ns: i64,
@@ -70,14 +70,15 @@ impl Record for MessagePlace {
     }
 }
 
-/// A chunk that takes more bytes is not read, not even into a temporary file.
+/// Limit for a chunk, even in a temporary file.
 pub(super) const MAX_CHUNK_BYTES: u64 = 1 << 30;
 
-/// What to do about a window of zstd that is too large.
+/// Advice for a zstd window that is too large.
 const WINDOW_HINT: &str =
     "raise `memory`, or compress it with a smaller window (zstd without --long and --ultra)";
 
-/// Unpacks a compressed stream, as far as it goes, and says why not all of it. `see` gets the bytes in order.
+/// Decompresses a stream as far as possible, and returns the reason if it is incomplete. `see` receives the bytes in
+/// order.
 pub(super) fn decompress(
     compression: &str,
     input: impl Read,
@@ -93,7 +94,7 @@ pub(super) fn decompress(
         "zstd" => match unpacker(input, spill) {
             Ok(decoder) => {
                 let (plain, complaint) = spill.take(decoder, size, memory_bytes, see)?;
-                // The library says so of a window.
+                // The library reports a too large window with this text.
                 let hinted = complaint.map(|complaint| match complaint.reason.contains("too much memory") {
                     true => Complaint { reason: format!("{}: {WINDOW_HINT}", complaint.reason), ..complaint },
                     false => complaint,
@@ -117,7 +118,7 @@ pub(super) fn decompress(
     Ok((plain, complaint))
 }
 
-/// The bytes of a chunk that is not compressed: in memory or, of a large one, where they are.
+/// Returns the bytes of an uncompressed chunk: in memory, or as a part of the file if large.
 pub(super) fn plain(
     part: FilePart,
     memory_bytes: usize,
@@ -141,7 +142,7 @@ pub(super) fn plain(
     }
 }
 
-/// Unpacks zstd. A frame says how much memory it needs, which is believed up to a bound.
+/// Creates a zstd decoder. Its memory, as stated by the frame, is limited.
 pub(super) fn unpacker<'i, R: Read + 'i>(input: R, spill: &SpillFile) -> std::io::Result<Box<dyn Read + 'i>> {
     let mut decoder = zstd::stream::read::Decoder::new(input)?;
     decoder.window_log_max(spill.budget().window_log())?;

@@ -6,22 +6,22 @@ use std::collections::HashMap;
 use std::path::Path;
 use voxtile::{Error, FormatError, Result};
 
-/// A recording whose messages lie in chunks.
+/// Recording whose messages are in chunks.
 pub(super) trait ChunkFile {
     fn path(&self) -> &Path;
 
     fn order(&mut self) -> &mut ChunkOrder;
 
-    /// The next step of the order.
+    /// Returns the next step of the order.
     fn step(&mut self) -> Result<Step>;
 
-    /// Reads a chunk, and finds its messages.
+    /// Reads a chunk and locates its messages.
     fn load(&mut self, place: &ChunkPlace, take: &mut TakeMessage<'_>) -> Result<OpenChunk>;
 
-    /// The topics and the places of chunks.
+    /// Returns the topics and the chunk locations.
     fn found(&mut self) -> (&mut TopicList, &mut Vec<ChunkPlace>);
 
-    /// Looks into the next chunk of a file without an index: takes its place, and counts its messages.
+    /// Inspects the next chunk of a file without an index: adds its location and counts its messages.
     fn look_into(&mut self, offset: u64, bytes: u64, walk: &mut Walk) -> Result<()> {
         let start_ns = walk.start_ns.unwrap_or(i64::MIN);
         let place = ChunkPlace { offset, bytes, start_ns, topics: None, is_bare: false };
@@ -34,7 +34,7 @@ pub(super) trait ChunkFile {
         match loaded {
             Err(error @ Error::Io { .. }) => return Err(error),
             Ok(chunk) if !chunk.is_broken() => walk.messages += counts.values().sum::<u64>(),
-            // Each of its messages is an error when it is its turn.
+            // The messages of a broken chunk are reported as errors one by one.
             Ok(_) => earliest = None,
             Err(_) => (earliest, counts) = Default::default(),
         }
@@ -46,8 +46,8 @@ pub(super) trait ChunkFile {
         Ok(())
     }
 
-    /// The next message of all chunks, in order of time. A damaged chunk is reported once, and what is whole of it
-    /// follows. Of a broken one, each message is an error.
+    /// Returns the next message of all chunks in time order. A damaged chunk is reported once, and its valid messages
+    /// follow. In a broken chunk, each message is an error.
     fn next_in_order(&mut self) -> Result<Option<Message>> {
         loop {
             let place = match self.step()? {
@@ -83,17 +83,17 @@ pub(super) trait ChunkFile {
     }
 }
 
-/// Takes the messages of a chunk.
+/// Callback for the messages of a chunk.
 pub(super) type TakeMessage<'t> = dyn FnMut(MessagePlace) -> Result<()> + 't;
 
-/// How the memory of a recording is divided.
+/// Division of a recording's memory budget, in bytes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Shares {
-    /// For the bytes of chunks that are played together.
+    /// For the contents of chunks that are read concurrently.
     pub(super) chunks: usize,
-    /// For the places of their messages.
+    /// For the locations of their messages.
     pub(super) messages: usize,
-    /// For the places of all chunks.
+    /// For the locations of all chunks.
     pub(super) places: usize,
 }
 
@@ -102,23 +102,23 @@ impl Shares {
         Self {
             chunks: budget.bytes / 2,
             messages: budget.bytes / 4,
-            // In the first bytes of memory are those of a few hundred gigabytes.
+            // The smallest budget suffices for a few hundred gigabytes of chunks.
             places: usize::try_from(budget.whole_bytes()).unwrap_or(usize::MAX),
         }
     }
 }
 
-/// What a walk over the chunks of a file without an index has found.
+/// Statistics from reading a file without an index.
 #[derive(Debug, Default)]
 pub(super) struct Walk {
     pub(super) messages: u64,
-    /// The earliest message of the last chunk that had one.
+    /// Earliest message of the last chunk that had messages.
     start_ns: Option<i64>,
 }
 
-/// Checks that the place of one more chunk fits in memory.
+/// Checks that one more chunk location fits in memory.
 pub(super) fn check_chunks(chunks: usize, shares: Shares, path: &Path) -> Result<()> {
-    // The order in which they are played takes a number for each.
+    // The order of chunks takes one index per chunk.
     if chunks < shares.places / (size_of::<ChunkPlace>() + size_of::<u32>()) {
         return Ok(());
     }

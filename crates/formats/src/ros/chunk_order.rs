@@ -6,17 +6,17 @@ use crate::spill::{Budget, Bytes, Record, Sorted, Sorter};
 use std::path::{Path, PathBuf};
 use voxtile::{Error, FormatError, Result};
 
-/// Puts the messages of chunks in order of time. Chunks overlap a little; those that do are played together.
+/// Merges the messages of chunks in time order. Chunks that overlap in time are open together.
 #[derive(Debug)]
 pub(super) struct ChunkOrder {
-    /// What messages are wanted of.
+    /// Topics to return.
     pub(super) topics: TopicSet,
     budget: Budget,
-    /// Numbers of chunks in order of their starts.
+    /// Chunk numbers sorted by start time.
     order: Vec<u32>,
     next: usize,
     open: Vec<Playing>,
-    /// Messages may be out of order, because too many chunks overlap.
+    /// Whether messages may be out of order because too many chunks overlap.
     has_given_up: bool,
 }
 
@@ -25,14 +25,14 @@ struct Playing {
     bytes: std::result::Result<Bytes, BrokenChunk>,
     /// The next message.
     head: MessagePlace,
-    /// The messages after it, in order of time, and how many all are.
+    /// Later messages in time order, and the number of all messages.
     rest: Sorted<MessagePlace>,
     messages: u64,
     /// Number of the chunk in its file.
     number: usize,
 }
 
-/// A chunk of which any byte may be wrong. Each of its messages is an error, so that those behind keep their numbers.
+/// A chunk in which any byte may be wrong. Each of its messages is an error, so that later messages keep their numbers.
 #[derive(Debug)]
 pub(super) struct BrokenChunk {
     pub(super) path: PathBuf,
@@ -54,20 +54,20 @@ impl Playing {
     }
 }
 
-/// What to do next.
+/// Next action of the caller.
 #[derive(Debug)]
 pub(super) enum Step {
-    /// Read this chunk and give it to [`ChunkOrder::open`].
+    /// Read this chunk and pass it to [`ChunkOrder::open`].
     Load(ChunkPlace),
-    /// The next message.
+    /// Use this message.
     Message(Message),
-    /// There is nothing left.
+    /// All messages were returned.
     End,
 }
 
-/// Most chunks that are played together.
+/// Limit for open chunks.
 const MAX_OPEN: usize = 1024;
-/// A message of so many bytes is taken into memory, from wherever it is.
+/// Messages up to this size are copied to memory.
 const SMALL_BYTES: u64 = 1 << 16;
 
 impl ChunkOrder {
@@ -76,7 +76,7 @@ impl ChunkOrder {
         Self { topics, budget: budget.clone(), order, next: 0, open, has_given_up: false }
     }
 
-    /// Begins with these chunks.
+    /// Starts a pass over these chunks.
     pub(super) fn begin(&mut self, places: &[ChunkPlace], topics: &[usize]) {
         let topics = TopicSet::of(topics);
         let is_wanted = |place: &ChunkPlace| {
@@ -88,32 +88,32 @@ impl ChunkOrder {
         *self = Self { topics, order, ..Self::new(&self.budget) };
     }
 
-    /// How the memory of the recording is divided.
+    /// Returns the division of the memory budget.
     pub(super) fn shares(&self) -> Shares {
         Shares::of(&self.budget)
     }
 
-    /// Sorts the messages of a chunk that is to be loaded.
+    /// Returns a sorter for the messages of a chunk to load.
     pub(super) fn sorter(&self) -> Sorter<MessagePlace> {
         let share = Shares::of(&self.budget).messages as u64;
         let held: u64 = self.open.iter().map(|playing| playing.messages * MessagePlace::BYTES as u64).sum();
         Sorter::new(&self.budget, usize::try_from(share.saturating_sub(held)).unwrap_or(0))
     }
 
-    /// Bytes of memory for a chunk that is to be loaded.
+    /// Returns the memory available for a chunk to load.
     pub(super) fn chunk_bytes(&self) -> usize {
         let held: usize = self.open.iter().filter_map(Playing::bytes).map(Bytes::in_memory).sum();
         Shares::of(&self.budget).chunks.saturating_sub(held)
     }
 
-    /// The next step.
+    /// Returns the next step.
     pub(super) fn step(&mut self, places: &[ChunkPlace]) -> Result<Step> {
         let earliest = self.earliest();
         let next = self.order.get(self.next).and_then(|number| places.get(*number as usize));
         if let Some(place) = next {
             let is_due = earliest.is_none_or(|(_, log_ns)| place.start_ns <= log_ns);
             let held: u64 = self.open.iter().filter_map(Playing::bytes).map(Bytes::len).sum();
-            // A file whose chunks all overlap would be open as a whole.
+            // Without this limit, a file whose chunks all overlap would be open completely.
             let is_room = earliest.is_none() || (held < MAX_CHUNK_BYTES && self.open.len() < MAX_OPEN);
             self.has_given_up |= is_due && !is_room;
             if is_due && is_room {
@@ -127,14 +127,14 @@ impl ChunkOrder {
         }
     }
 
-    /// What a person should know of the order of a file's messages.
+    /// Returns a remark for the user about the order of a file's messages.
     pub(super) fn remark(&self, path: &Path) -> Option<String> {
         let text =
             || format!("{}: its chunks overlap so much that messages come out of order", path.display());
         self.has_given_up.then(text)
     }
 
-    /// Takes a chunk that was asked for, and its messages.
+    /// Adds a loaded chunk and its messages.
     pub(super) fn open(
         &mut self,
         bytes: std::result::Result<Bytes, BrokenChunk>,
@@ -147,7 +147,7 @@ impl ChunkOrder {
         Ok(())
     }
 
-    /// The open chunk with the earliest message, and its time.
+    /// Returns the open chunk with the earliest message, and its time.
     fn earliest(&self) -> Option<(usize, i64)> {
         let heads = self.open.iter().enumerate();
         let heads = heads.map(|(index, playing)| (playing.head.log_ns, playing.number, index));
@@ -169,7 +169,7 @@ impl ChunkOrder {
             }
             Ok(Bytes::File(part)) => Ok(Bytes::File(part.part(start, len))),
         };
-        // A message that cannot be read is passed over, or it would come again for ever.
+        // Skip a message that cannot be read; otherwise it would be returned again forever.
         match playing.rest.next()? {
             Some(next) => playing.head = next,
             None => drop(self.open.swap_remove(index)),

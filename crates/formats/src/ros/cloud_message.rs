@@ -6,7 +6,7 @@ use crate::read::cloud::CloudPoint;
 use crate::spill::FilePart;
 use voxtile::Result;
 
-/// A message that is a cloud.
+/// A decoded message that is a cloud.
 pub(super) enum CloudMessage<'a> {
     PointCloud2(PointCloud2<'a>),
     PointCloud(PointCloud<'a>),
@@ -36,7 +36,7 @@ impl<'a> CloudMessage<'a> {
         })
     }
 
-    /// Decodes a `PointCloud2` of `len` bytes of which only the first are at hand.
+    /// Decodes a `PointCloud2` of `len` bytes from its first bytes.
     pub(super) fn decode_start(
         wire: Wire,
         start: &'a [u8],
@@ -56,12 +56,12 @@ impl<'a> CloudMessage<'a> {
         }
     }
 
-    /// Takes this as the stamp of the message: times of points are told from there on.
+    /// Sets the stamp that point times are relative to.
     pub(super) fn count_times_from(&mut self, stamp_ns: i64) {
         match self {
             Self::PointCloud2(cloud) => cloud.header.stamp_ns = stamp_ns,
             Self::Livox(cloud) => cloud.header.stamp_ns = stamp_ns,
-            // Their times are after the stamp, whichever it is.
+            // Their point times are already relative to the stamp.
             Self::PointCloud(_) | Self::LaserScan(_) | Self::Depth(..) | Self::CompressedDepth(..) => {}
         }
     }
@@ -71,7 +71,7 @@ impl<'a> CloudMessage<'a> {
             Self::PointCloud2(cloud) => cloud.points_claimed(),
             Self::PointCloud(cloud) => cloud.count as u64,
             Self::Livox(cloud) => cloud.count as u64,
-            // Beams that mean nothing are left out.
+            // Invalid beams are skipped.
             Self::LaserScan(scan) => scan.points().count() as u64,
             Self::Depth(image, _) => image.pixels_claimed(),
             Self::CompressedDepth(image, _) => image.pixels_claimed(),
@@ -113,8 +113,8 @@ impl<'a> CloudMessage<'a> {
         }
     }
 
-    /// Visits all points that are there; returns why there are not more. `part` is a message of which the first bytes
-    /// were decoded.
+    /// Visits all available points, and returns the reason if some are missing. `part` is the complete message if only
+    /// its first bytes were decoded.
     pub(super) fn visit(
         &self,
         part: Option<&FilePart>,
@@ -139,7 +139,7 @@ impl<'a> CloudMessage<'a> {
         }
     }
 
-    /// What is read otherwise than the message says, as the end of a sentence on clouds.
+    /// Returns the corrections of inconsistent messages, each as the end of a sentence about clouds.
     pub(super) fn repairs(&self) -> &[&'static str] {
         match self {
             Self::PointCloud2(cloud) => cloud.repairs(),

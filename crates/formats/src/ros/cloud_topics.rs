@@ -6,15 +6,15 @@ use super::recording::{Recording, Topic};
 use std::collections::HashSet;
 use voxtile::{Error, Result};
 
-/// The topics of a recording that may be read as clouds.
+/// Topics of a recording that may contain clouds.
 #[derive(Debug, Default)]
 pub(super) struct CloudTopics {
     found: Vec<Found>,
-    /// The same clouds in other forms, or forms that are rarely meant: they are taken if there is nothing else.
+    /// Topics used only if there is nothing else: copies of the same clouds, and less likely kinds.
     others: Vec<Found>,
-    /// Images that may be depths or not.
+    /// Image topics that may contain depths or not.
     unsure: Vec<String>,
-    /// Images that are called depths and have no camera.
+    /// Image topics named as depth but without a camera.
     without_camera: Vec<String>,
 }
 
@@ -22,13 +22,13 @@ pub(super) struct CloudTopics {
 struct Found {
     index: usize,
     kind: MessageKind,
-    /// Its encoding, if that alone says that images are depths.
+    /// Image encoding, if it is the only evidence for depths.
     guessed: Option<String>,
 }
 
-/// Most topics of images that are looked into. Of more, the user chooses.
+/// Limit for the image topics to inspect. With more, the user must select a topic.
 const MAX_LOOKED_INTO: usize = 100;
-/// Most topics that are named for a reason.
+/// Maximum number of topics named for a reason.
 const MAX_NAMED: usize = 10;
 
 impl CloudTopics {
@@ -51,7 +51,7 @@ impl CloudTopics {
                 continue;
             }
             let is_compressed = kind == MessageKind::CompressedImage;
-            // Each look may read the recording up to the first image.
+            // Inspecting a topic may read the recording up to its first image.
             looked_into += 1;
             if looked_into <= MAX_LOOKED_INTO {
                 let images = DepthImages::of_topic(recording, index, topic, kind, whole_bytes)?;
@@ -80,7 +80,7 @@ impl CloudTopics {
         }
     }
 
-    /// Leaves out compressed images that another topic has, too.
+    /// Drops compressed images that another topic also contains.
     fn drop_copies(&mut self, topics: &[Topic]) {
         let name_of = |found: &Found| topics.get(found.index).map_or("", |topic| topic.name.as_str());
         let plain: HashSet<&str> = self.found.iter().map(name_of).collect();
@@ -94,7 +94,7 @@ impl CloudTopics {
         });
     }
 
-    /// Chooses the only one.
+    /// Selects the only topic.
     pub(super) fn choose(self, recording: &dyn Recording, topics: &[Topic]) -> Result<Chosen> {
         let (first, rest) = match self.found.is_empty() {
             true => (&self.others, &[][..]),
@@ -136,7 +136,7 @@ impl CloudTopics {
     }
 
     fn why_none(&self, recording: &dyn Recording, topics: &[Topic]) -> String {
-        // A file that was cut off may lack what was looked for.
+        // A truncated file may lack the topics.
         let found_out =
             recording.remarks().into_iter().fold(String::new(), |all, remark| all + "; " + &remark);
         if topics.is_empty() {
@@ -170,7 +170,7 @@ impl CloudTopics {
     }
 }
 
-/// What to do with a topic of packets.
+/// Returns advice for a topic of packets.
 pub(super) fn packets_of(topic: &Topic) -> Option<String> {
     let driver = driver_of(&topic.type_name)?;
     Some(format!("{} holds no points: {driver} makes clouds of it, whose topic can be read", topic.name))

@@ -9,16 +9,16 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use voxtile::{Error, FormatError, Result};
 
-/// A `.db3` of ROS 2: a database of SQLite, which is opened for reading only.
+/// ROS 2 bag in a SQLite database (`.db3`), opened read-only.
 ///
-/// Messages come in order of the time at which they were recorded. The places of many are in a temporary file.
+/// Messages are returned in order of their recording time. If there are many, their locations are in a temporary file.
 #[derive(Debug)]
 pub struct Db3 {
     database: Database,
     topics: TopicList,
-    /// The topic of a number in the file.
+    /// Topics by their ID in the file.
     numbers: HashMap<i64, usize>,
-    /// Messages that are still to come.
+    /// Locations of the remaining messages.
     places: Option<Sorted<RowPlace>>,
     spill: SpillFile,
     remarks: Vec<String>,
@@ -27,9 +27,9 @@ pub struct Db3 {
 #[derive(Debug)]
 struct Database {
     path: PathBuf,
-    /// `None` while it is closed.
+    /// `None` while the database is closed.
     connection: Option<Connection>,
-    /// A longer value of a column is an error.
+    /// Limit for a column value, in bytes.
     most_bytes: u64,
 }
 
@@ -63,22 +63,22 @@ impl Record for RowPlace {
 }
 
 impl Db3 {
-    /// Opens a file.
+    /// Opens a bag.
     ///
     /// # Errors
     ///
-    /// A file that cannot be read or is no such database.
+    /// The file cannot be read or is not such a database.
     pub fn open(path: &Path) -> Result<Self> {
         Self::open_within(path, &Budget::default())
     }
 
-    /// As [`Db3::open`], in so much memory.
+    /// As [`Db3::open`], within a memory budget.
     ///
     /// # Errors
     ///
     /// As for [`Db3::open`].
     pub fn open_within(path: &Path, budget: &Budget) -> Result<Self> {
-        // SQLite would say the same of a file that is missing and of one that is no database.
+        // SQLite reports a missing file like a file that is not a database.
         std::fs::File::open(path).map_err(|error| Error::io(path, "read", error))?;
         let mut db3 = Self {
             database: Database { path: path.to_owned(), connection: None, most_bytes: budget.whole_bytes() },
@@ -129,7 +129,7 @@ impl Db3 {
         Ok(())
     }
 
-    /// Finds the rows of topics; those before an error stay. The inner error is that of a temporary file.
+    /// Finds the rows of topics. Rows found before an error are kept. The inner error is that of a temporary file.
     fn find_rows(
         &mut self,
         topics: &TopicSet,
@@ -153,7 +153,7 @@ impl Db3 {
         Ok(Ok(()))
     }
 
-    /// The bytes of a message; a large one goes to a file.
+    /// Reads the bytes of a message; a large one is copied to a file.
     fn data(&mut self, id: i64) -> Result<MessageData> {
         let path = self.database.path.clone();
         let fail = |error| wrong(&path, u64::try_from(id).unwrap_or(0), &error);

@@ -3,34 +3,34 @@ use super::messages::{CompressedDepth, Image, MessageKind, is_depth_encoding};
 use super::recording::{Recording, Topic};
 use voxtile::{Error, Result};
 
-/// What is known of the images of a topic, whose pixels may be depths.
+/// Properties of a topic's images, for deciding whether its pixels are depths.
 #[derive(Clone, Debug)]
 pub(super) struct DepthImages {
-    /// What a pixel is: `16UC1`.
+    /// Pixel encoding, such as `16UC1`.
     pub(super) encoding: String,
-    /// What the names of topic and frame say.
+    /// Evidence from the names of the topic and the frame.
     name: Option<DepthName>,
-    /// Whether they are compressed in a way that is for depths alone.
+    /// Whether the images use a compression only for depths.
     is_depth_transport: bool,
     is_compressed: bool,
 }
 
-/// Ends of the names of topics with images that are compressed.
+/// Name suffixes of topics with compressed images.
 const TRANSPORTS: [&str; 2] = ["/compressedDepth", "/compressed"];
 
-/// The topic that the images of a topic are published on when they are not compressed.
+/// Returns the name of the topic with the uncompressed images.
 pub(super) fn base_name(image: &str) -> &str {
     TRANSPORTS.iter().find_map(|transport| image.strip_suffix(transport)).unwrap_or(image)
 }
 
-/// The camera of images is described beside them.
+/// Returns the name of the topic with the camera of the images.
 pub(super) fn camera_name(image: &str) -> String {
     let (folder, _) = base_name(image).rsplit_once('/').unwrap_or_default();
     format!("{folder}/camera_info")
 }
 
 impl DepthImages {
-    /// Looks at the first image of a topic. `None` if there is none, or if its pixels cannot be depths.
+    /// Inspects the first image of a topic. Returns `None` if there is none, or if its pixels cannot be depths.
     pub(super) fn of_topic(
         recording: &mut dyn Recording,
         index: usize,
@@ -41,7 +41,7 @@ impl DepthImages {
         recording.begin(&[index])?;
         let first = match recording.next_message() {
             Err(error @ Error::Io { .. }) => return Err(error),
-            // Bad chunks are told of when clouds are read.
+            // Damaged chunks are reported when the clouds are read.
             first => first.unwrap_or_default(),
         };
         let Some((mut message, wire)) = first.zip(topic.wire) else { return Ok(None) };
@@ -62,12 +62,13 @@ impl DepthImages {
         }))
     }
 
-    /// Whether pixels are depths. `None`: probably, as cameras write depths so, but nothing else says it.
+    /// Returns whether pixels are depths. `None`: probably, because the encoding is common for depths, but without
+    /// further evidence.
     pub(super) fn holds_depths(&self) -> Option<bool> {
         match self.name {
             Some(name) => Some(name == DepthName::Depth),
             None if self.is_depth_transport => Some(true),
-            // As cameras write brightness and temperatures, too.
+            // Cameras use these encodings for brightness and temperature too.
             None if self.is_compressed || self.encoding == "mono16" => Some(false),
             None => None,
         }

@@ -1,12 +1,12 @@
-/// What the name of a topic or a frame says of the pixels of its images.
+/// Meaning of image pixels according to the name of a topic or frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum DepthName {
     Depth,
-    /// Temperatures, brightness, trust.
+    /// Temperature, brightness, confidence or similar.
     Other,
 }
 
-/// Beginnings of words for images of numbers that are no depths, and whole words.
+/// Prefixes and whole words in names of images that are not depths.
 const OTHER_BEGINNINGS: [&str; 15] = [
     "amplitude",
     "boson",
@@ -28,8 +28,8 @@ const OTHER_WORDS: [&str; 11] =
     ["ambient", "disp", "grey", "gray", "ir", "lwir", "mono", "mwir", "nir", "noise", "swir"];
 
 impl DepthName {
-    /// By the last word that says it, of the last part of a path that does: `/depth_camera/ir/image_raw` is infrared,
-    /// `aligned_depth_to_infra1` is a depth.
+    /// Classifies by the last meaningful word of the last meaningful path component: `/depth_camera/ir/image_raw` is
+    /// infrared, `aligned_depth_to_infra1` is depth.
     pub(super) fn of(name: &str) -> Option<Self> {
         name.rsplit('/').find_map(|part| {
             let lower = part.to_lowercase();

@@ -4,18 +4,18 @@ use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use voxtile::{Error, Result};
 
-/// A file that is read here and there.
+/// File with random access.
 #[derive(Debug)]
 pub(super) struct FileBytes {
     path: PathBuf,
-    /// `None` while it is closed.
+    /// `None` while the file is closed.
     input: Option<Input>,
-    /// All of it, for the parts that are read in their own order; `None` until one is.
+    /// The whole file, for parts read independently; `None` until one is used.
     whole: Option<FilePart>,
     pub(super) len: u64,
 }
 
-/// An open file, and where in it reading goes on.
+/// An open file with its current position.
 #[derive(Debug)]
 struct Input {
     bytes: BufReader<File>,
@@ -33,12 +33,12 @@ impl FileBytes {
         Ok(Self { path: path.to_owned(), input: Some(input), whole: None, len })
     }
 
-    /// Closes the file until something is read again.
+    /// Closes the file until the next read.
     pub(super) fn close(&mut self) {
         (self.input, self.whole) = (None, None);
     }
 
-    /// All of it. However many parts of it there are, they share one handle.
+    /// Returns the whole file as a part. All parts share one handle.
     pub(super) fn whole(&mut self) -> Result<FilePart> {
         let whole = match self.whole.take() {
             Some(whole) => whole,
@@ -51,7 +51,7 @@ impl FileBytes {
         &self.path
     }
 
-    /// Reads so many bytes from a place on as a stream: fewer at the end of the file.
+    /// Reads a range of the file as a stream, which is shorter at the end of the file.
     pub(super) fn stream<T>(
         &mut self,
         offset: u64,
@@ -71,14 +71,15 @@ impl FileBytes {
         Ok(outcome)
     }
 
-    /// Bytes from a place on: fewer than asked for at the end of the file. Memory grows with what is there only.
+    /// Reads a range of the file, which is shorter at the end of the file. Memory is only allocated for bytes that
+    /// exist.
     pub(super) fn read_at(&mut self, offset: u64, bytes: u64) -> Result<Vec<u8>> {
         let there = bytes.min(self.len.saturating_sub(offset));
         if there == 0 {
             return Ok(Vec::new());
         }
         let input = self.input.take().map_or_else(|| Input::open(&self.path), Ok);
-        // After an error, where the file is now is not known: it is opened again.
+        // After an error, the position is unknown and the file is opened again.
         let read = input.and_then(|mut input| Ok((input.read_at(offset, there)?, input)));
         let (taken, input) = read.map_err(|error| Error::io(&self.path, "read", error))?;
         self.input = Some(input);
@@ -93,7 +94,7 @@ impl Input {
 
     fn go_to(&mut self, offset: u64) -> io::Result<()> {
         match i64::try_from(i128::from(offset) - i128::from(self.at)) {
-            // Keeps what is buffered already.
+            // A relative seek preserves the buffer.
             Ok(ahead) => self.bytes.seek_relative(ahead)?,
             Err(_) => drop(self.bytes.seek(SeekFrom::Start(offset))?),
         }
@@ -110,7 +111,7 @@ impl Input {
     }
 }
 
-/// Where a record is cut off, as the end of a remark.
+/// Describes where a record is truncated, as the end of a remark.
 pub(super) fn cut_at(at: u64, file_bytes: u64, end: Option<u64>) -> String {
     match end {
         Some(end) => format!(" at byte {file_bytes}: the record from byte {at} on should end at byte {end}"),
@@ -118,10 +119,10 @@ pub(super) fn cut_at(at: u64, file_bytes: u64, end: Option<u64>) -> String {
     }
 }
 
-/// A longer name of a topic, a type or an encoding is damage.
+/// Limit for the names of topics, types and encodings.
 const MAX_NAME_BYTES: usize = 1 << 12;
 
-/// Reads little-endian numbers and pieces of a record.
+/// Reader of little-endian numbers and slices of a record.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pieces<'a> {
     pub(super) bytes: &'a [u8],
@@ -160,20 +161,20 @@ impl<'a> Pieces<'a> {
         Some(u64::from_le_bytes(*self.take(8)?.first_chunk()?))
     }
 
-    /// Bytes behind their length.
+    /// Reads length-prefixed bytes.
     pub(super) fn sized(&mut self) -> Option<&'a [u8]> {
         let count = self.u32()? as usize;
         self.take(count)
     }
 
-    /// A name behind its length.
+    /// Reads a length-prefixed name.
     pub(super) fn name(&mut self) -> Option<String> {
         let name = self.sized().filter(|name| name.len() <= MAX_NAME_BYTES)?;
         Some(String::from_utf8_lossy(name).into_owned())
     }
 }
 
-/// Nanoseconds as files count them, which may be more than a signed number holds.
+/// Converts nanoseconds to a signed number, saturating.
 pub(super) fn signed_ns(ns: u64) -> i64 {
     i64::try_from(ns).unwrap_or(i64::MAX)
 }

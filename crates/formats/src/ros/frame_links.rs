@@ -5,26 +5,26 @@ use crate::spill::TimedPose;
 use std::cmp::Reverse;
 use std::convert::Infallible;
 
-/// The parents of a frame, each with where the frame was in it. A frame has one parent at a time; transforms that name
-/// others are kept next to it, so that a wrong one hides nothing.
+/// Parents of a frame, each with the poses of the frame in it. A frame has one parent at a time. Transforms with other
+/// parents are kept too, so that a wrong transform hides nothing.
 #[derive(Clone, Debug, Default)]
 pub(super) struct FrameLinks {
-    /// In the order in which the parents were first named.
+    /// In the order in which the parents first appeared.
     links: Vec<Link>,
 }
 
-/// Where a frame was in one of its parents.
+/// Poses of a frame in one parent.
 #[derive(Clone, Debug, Default)]
 struct Link {
     parent: String,
-    /// At any time.
+    /// Static transform.
     fixed: Option<RigidPose>,
     samples: Samples,
-    /// Number of the last transform of this link among all.
+    /// Sequence number of this link's last transform among all transforms.
     last: u64,
 }
 
-/// A step from a frame to one of its parents.
+/// Step from a frame to one of its parents.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Step<'a> {
     pub(super) child: &'a str,
@@ -36,32 +36,33 @@ pub(super) struct Step<'a> {
 #[derive(Clone, Copy, Debug)]
 enum Place<'a> {
     Fixed(&'a RigidPose),
-    /// What is around the time of the search.
+    /// Samples around the time of the search.
     Moving(Around),
 }
 
-/// Which parent a frame has at a time: the first of these that leads to where the search goes.
+/// Confidence in a parent at a time, best first. A search takes the first parent that leads to its target.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Trust {
-    /// Samples before and after the stamp, or at it. First those with the latest sample up to the stamp.
+    /// Samples before and after the stamp, or at it. Ordered by the latest sample up to the stamp.
     Between(Reverse<i64>),
-    /// Samples at several times, where no time is asked for; first the newest.
+    /// Samples at several times, for a search without a time. Newest first.
     Moving(Reverse<u64>),
-    /// Samples around or shortly before the stamp that give no pose, or not yet.
+    /// Samples around or shortly before the stamp that do not give a pose (yet).
     Held(Reverse<i64>),
-    /// A static transform; first the newest.
+    /// A static transform. Newest first.
     Fixed(Reverse<u64>),
-    /// One sample alone, or samples at other times; first the newest.
+    /// A single sample, or samples at other times only. Newest first.
     Doubtful(Reverse<u64>),
 }
 
-/// Parents of a frame that are kept: the first ones, and the last one. Real frames have one or two.
+/// Limit for the parents of a frame: the first ones and the last one are kept. Real frames have one or two.
 const MAX_PARENTS: usize = 16;
-/// For so long after its last sample a moving parent hides static ones: as long as the buffers of tf2 are.
+/// Time after its last sample during which a moving parent takes precedence over static ones. Equal to the default
+/// buffer length of tf2.
 const HOLD_NS: i64 = 10_000_000_000;
 
 impl FrameLinks {
-    /// Adds a transform, the one of this number, and returns whether it names a new parent.
+    /// Adds a transform with this sequence number. Returns whether its parent is new.
     pub(super) fn insert(
         &mut self,
         parent: &str,
@@ -80,7 +81,7 @@ impl FrameLinks {
         is_new
     }
 
-    /// Takes samples in the place of those of a parent, and returns whether it is a new one.
+    /// Replaces the samples of a parent. Returns whether the parent is new.
     pub(super) fn attach(&mut self, parent: &str, samples: Samples, number: u64) -> bool {
         let is_new = !self.has_parent(parent);
         if let Some(link) = self.link_to(parent, number) {
@@ -89,7 +90,7 @@ impl FrameLinks {
         is_new
     }
 
-    /// The link to a parent, which gets a transform of this number.
+    /// Returns the link to a parent, and sets the sequence number of its last transform.
     fn link_to(&mut self, parent: &str, number: u64) -> Option<&mut Link> {
         let at = self.links.iter().position(|link| link.parent == parent).unwrap_or_else(|| {
             self.links.truncate(MAX_PARENTS - 1);
@@ -101,27 +102,27 @@ impl FrameLinks {
         Some(link)
     }
 
-    /// Number of parents.
+    /// Returns the number of parents.
     pub(super) fn parents(&self) -> usize {
         self.links.len()
     }
 
-    /// The samples of all parents.
+    /// Iterates over the samples of all parents.
     pub(super) fn samples_mut(&mut self) -> impl Iterator<Item = &mut Samples> {
         self.links.iter_mut().map(|link| &mut link.samples)
     }
 
-    /// Whether a transform names this parent.
+    /// Returns whether a transform names this parent.
     pub(super) fn has_parent(&self, parent: &str) -> bool {
         self.links.iter().any(|link| link.parent == parent)
     }
 
-    /// Whether any link has a time, and be it a single one.
+    /// Returns whether any link has a sample with a time.
     pub(super) fn is_moving(&self) -> bool {
         self.links.iter().any(|link| !link.samples.is_empty())
     }
 
-    /// Whether any link has transforms at several times.
+    /// Returns whether any link has samples at several times.
     pub(super) fn moves(&self) -> bool {
         self.links.iter().any(|link| link.samples.has_several())
     }
@@ -130,18 +131,18 @@ impl FrameLinks {
         self.links.is_empty()
     }
 
-    /// Forgets all samples; static transforms stay.
+    /// Drops all samples and keeps static transforms.
     pub(super) fn forget_samples(&mut self) {
         self.samples_mut().for_each(|samples| *samples = Samples::default());
         self.drop_empty();
     }
 
-    /// Forgets samples that are older than this before the last one of the same link.
+    /// Drops samples older than `span_ns` before the last sample of the same link.
     pub(super) fn forget_older_than(&mut self, span_ns: i64) {
         self.samples_mut().for_each(|samples| samples.forget_older_than(span_ns));
     }
 
-    /// Number of poses.
+    /// Returns the number of poses.
     pub(super) fn len(&self) -> usize {
         self.links.iter().map(|link| link.samples.len() + usize::from(link.fixed.is_some())).sum()
     }
@@ -150,7 +151,7 @@ impl FrameLinks {
         self.links.iter().map(|link| link.samples.len()).sum()
     }
 
-    /// Forgets the older half of the link with most samples.
+    /// Drops the older half of the samples of the link with most samples.
     pub(super) fn shrink(&mut self) {
         if let Some(samples) = self.samples_mut().max_by_key(|samples| samples.len()) {
             samples.forget_older_half();
@@ -162,7 +163,7 @@ impl FrameLinks {
         self.links.retain(|link| link.fixed.is_some() || !link.samples.is_empty());
     }
 
-    /// The steps to the parents at a time, the most trusted first.
+    /// Returns the steps to the parents at a time, by decreasing confidence.
     ///
     /// # Errors
     ///
@@ -180,7 +181,7 @@ impl FrameLinks {
         })
     }
 
-    /// The steps to the parents at whatever time, the most trusted first. They have no pose.
+    /// Returns the steps to the parents at any time, by decreasing confidence. These steps have no pose.
     pub(super) fn steps<'a>(&'a self, child: &'a str) -> Vec<Step<'a>> {
         let Ok(steps) = self.steps_by::<Infallible>(child, |link| {
             let last = Reverse(link.last);
@@ -213,7 +214,7 @@ impl FrameLinks {
 }
 
 fn trust_at(link: &Link, around: &Around, stamp_ns: i64, most_gap_ns: Option<i64>) -> Trust {
-    // Anything may send one sample.
+    // A single sample may be spurious.
     if !link.samples.has_several() {
         return Trust::Doubtful(Reverse(link.last));
     }
@@ -233,12 +234,12 @@ fn trust_at(link: &Link, around: &Around, stamp_ns: i64, most_gap_ns: Option<i64
 }
 
 impl Step<'_> {
-    /// Whether more than one sample alone, or samples at other times, say so.
+    /// Returns whether the evidence is better than a single sample or samples at other times.
     pub(super) fn is_trusted(&self) -> bool {
         !matches!(self.trust, Trust::Doubtful(_))
     }
 
-    /// Where the child was in the parent at the time of the search. Nothing is extrapolated.
+    /// Returns the pose of the child in the parent at the time of the search. Poses are not extrapolated.
     pub(super) fn pose(&self, stamp_ns: i64, most_gap_ns: Option<i64>) -> Result<RigidPose, WhyNot> {
         let (before, after) = match self.place {
             Place::Fixed(pose) => return Ok(*pose),

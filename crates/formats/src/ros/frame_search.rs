@@ -1,26 +1,27 @@
 use super::frame_links::Step;
 use std::collections::HashSet;
 
-/// A search from a frame upwards, through its parents in their order. Each frame is visited once, so that loops end.
+/// Depth-first search from a frame upwards, with the most trusted parents first. Each frame is visited once, so that
+/// loops terminate.
 #[derive(Debug, Default)]
 pub(super) struct Search<'a> {
-    /// The steps to the frame that was wanted, if it is above.
+    /// Steps to the wanted frame, if it is an ancestor.
     pub(super) route: Option<Vec<Step<'a>>>,
-    /// What was visited, in order, beginning with the frame itself.
+    /// Visited frames in order, starting with the frame itself.
     pub(super) frames: Vec<&'a str>,
-    /// The first frame from which no step led to a new one: the root, in a tree.
+    /// First frame without a step to a new frame: the root, in a tree.
     pub(super) end: Option<&'a str>,
     /// A frame that is its own ancestor.
     pub(super) looped: Option<&'a str>,
-    /// Whether there were too many frames to visit all.
+    /// Whether the search stopped at the limit of frames.
     pub(super) is_cut: bool,
 }
 
-/// Frames that a search visits.
+/// Maximum number of frames to visit.
 const MAX_FRAMES: usize = 10_000;
 
 impl<'a> Search<'a> {
-    /// Searches until a frame is wanted, or all above is visited.
+    /// Searches until a frame is wanted or all ancestors are visited.
     ///
     /// # Errors
     ///

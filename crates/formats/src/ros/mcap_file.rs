@@ -13,10 +13,10 @@ use std::path::Path;
 use std::sync::Arc;
 use voxtile::{FormatError, Result};
 
-/// An MCAP file, of ROS 1 or ROS 2. Its summary is read if there is one; otherwise the file is read once before.
+/// MCAP file of ROS 1 or ROS 2. If it has no summary, the file is read twice.
 ///
-/// Messages come in order of the time at which they were recorded. Chunks that overlap in time are in memory or, beyond
-/// its share, in a temporary file.
+/// Messages are returned in order of their recording time. Chunks that overlap in time are in memory or, beyond its
+/// share, in a temporary file.
 #[derive(Debug)]
 pub struct McapFile {
     file: FileBytes,
@@ -28,15 +28,15 @@ pub struct McapFile {
     remarks: Vec<String>,
 }
 
-/// A footer and the magic at the end.
+/// Size of the footer and the magic bytes at the end.
 const END_BYTES: u64 = RECORD_HEAD_BYTES + 20 + 8;
-/// The magic at the end.
+/// Size of the magic bytes at the end.
 const END_MAGIC_BYTES: u64 = 8;
-/// A longer record of the summary is damage.
+/// Limit for a record of the summary.
 const MAX_RECORD_BYTES: u64 = 1 << 20;
-/// Messages outside of chunks are read together up to this size.
+/// Limit for consecutive messages outside of chunks that are read together.
 const BARE_CHUNK_BYTES: u64 = 4 << 20;
-/// Such a part that has messages of more topics is read whatever topics are wanted.
+/// A group of such messages with more topics is always read, whatever topics are selected.
 const MAX_BARE_TOPICS: usize = 64;
 
 impl McapFile {
@@ -44,12 +44,12 @@ impl McapFile {
     ///
     /// # Errors
     ///
-    /// A file that cannot be read or is no MCAP file.
+    /// The file cannot be read or is not MCAP.
     pub fn open(path: &Path) -> Result<Self> {
         Self::open_within(path, &Budget::default())
     }
 
-    /// As [`McapFile::open`], in so much memory.
+    /// As [`McapFile::open`], within a memory budget.
     ///
     /// # Errors
     ///
@@ -78,14 +78,14 @@ impl McapFile {
         Ok(mcap)
     }
 
-    /// The kind and the length of the record at a place; `None` at the end of the file.
+    /// Returns the type and the length of the record at an offset, or `None` at the end of the file.
     fn head(&mut self, offset: u64) -> Result<Option<(u8, u64)>> {
         let head = self.file.read_at(offset, RECORD_HEAD_BYTES)?;
         let mut pieces = Pieces::new(&head);
         Ok(pieces.u8().zip(pieces.u64()))
     }
 
-    /// Reads channels and places of chunks from the end of the file; `false` if they are not all there.
+    /// Reads channels and chunk locations from the end of the file. Returns `false` if they are incomplete.
     fn read_summary(&mut self) -> Result<bool> {
         let Some(end_at) = self.file.len.checked_sub(END_BYTES) else { return Ok(false) };
         let end = self.file.read_at(end_at, END_BYTES)?;
@@ -94,7 +94,7 @@ impl McapFile {
         let Some(mut at) = footer.filter(|&start| start != 0) else { return Ok(false) };
         let shares = Shares::of(self.spill.budget());
         let mut statistics = None;
-        // Channels may come behind the places of chunks: lists are those of channels until all are known.
+        // Channel records may follow the chunk indexes, so the lists contain channel IDs until all records are read.
         let mut lists = HashSet::new();
         let mut indices = Vec::new();
         while at < end_at {
@@ -124,7 +124,7 @@ impl McapFile {
             at = next;
         }
         let Some(statistics) = statistics else { return Ok(false) };
-        // Without chunks, or without their places, messages are found by stepping over all records.
+        // Without chunks or their indexes, messages are found by reading all records.
         if statistics.messages > 0
             && (self.channels.is_empty() || indices.len() as u64 != u64::from(statistics.chunks))
         {
@@ -153,7 +153,7 @@ impl McapFile {
         Ok(true)
     }
 
-    /// Steps over all records, and looks into each chunk.
+    /// Reads all records, and inspects each chunk.
     fn scan(&mut self) -> Result<()> {
         let mut at = MAGIC.len() as u64;
         let shares = Shares::of(self.spill.budget());
@@ -211,7 +211,7 @@ impl McapFile {
         Ok(())
     }
 
-    /// Takes a message outside of chunks together with those before it.
+    /// Adds a message outside of chunks to the previous group of such messages.
     fn append_bare(&mut self, at: u64, next: u64, topic: usize, log_ns: i64) {
         match self.chunks.last_mut().filter(|place| place.is_bare && next - place.offset <= BARE_CHUNK_BYTES)
         {
@@ -231,7 +231,7 @@ impl McapFile {
         }
     }
 
-    /// Walks over the records of a chunk.
+    /// Visits the records of a chunk.
     fn find_messages(&mut self, chunk: &mut OpenChunk, take: &mut TakeMessage<'_>) -> Result<()> {
         let is_broken = chunk.is_broken();
         let OpenChunk { bytes, complaint } = chunk;
@@ -259,7 +259,7 @@ impl McapFile {
             let contents =
                 bytes.piece(start, count.min(most_bytes) as usize, &mut window)?.unwrap_or_default();
             match kind {
-                // What a broken chunk says of them may be wrong.
+                // Records from a broken chunk may be wrong, so known channels are kept.
                 op::SCHEMA | op::CHANNEL if is_broken && self.channels.knows(kind, contents) => {}
                 op::SCHEMA => drop(self.channels.add_schema(contents)),
                 op::CHANNEL => drop(self.channels.add_channel(contents, &mut self.topics)),
@@ -283,7 +283,7 @@ impl McapFile {
         Ok(())
     }
 
-    /// The bytes of a chunk that is not bare, unpacked.
+    /// Returns the decompressed contents of a chunk.
     fn unpacked(&mut self, place: &ChunkPlace) -> Result<OpenChunk> {
         let path = self.file.path().to_owned();
         let wrong = |reason: &str| FormatError::at_offset(place.offset, reason).in_input(&path);
@@ -323,7 +323,7 @@ impl McapFile {
             false => plain(part, memory_bytes, input, &mut see),
         })?;
         if is_cut {
-            // What is missing explains a checksum that is wrong.
+            // Truncation also explains a wrong checksum.
             let reason = "the file ends in the midst of it".to_owned();
             return Ok(OpenChunk { bytes, complaint: Some(Complaint { reason, is_broken: false }) });
         }

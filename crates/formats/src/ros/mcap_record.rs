@@ -6,14 +6,14 @@ use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 use std::sync::Arc;
 
-/// The first and the last bytes of an MCAP file.
+/// First and last bytes of an MCAP file.
 pub(super) const MAGIC: &[u8] = b"\x89MCAP0\r\n";
-/// Bytes of a record before its contents: its kind and its length.
+/// Size of a record's type and length.
 pub(super) const RECORD_HEAD_BYTES: u64 = 9;
-/// Bytes of a message before its data: channel, sequence, two times.
+/// Size of a message before its data: channel, sequence number, two times.
 pub(super) const MESSAGE_HEAD_BYTES: u64 = 2 + 4 + 8 + 8;
 
-/// Kinds of records.
+/// Record types.
 pub(super) mod op {
     pub(in crate::ros) const FOOTER: u8 = 2;
     pub(in crate::ros) const SCHEMA: u8 = 3;
@@ -25,18 +25,18 @@ pub(super) mod op {
     pub(in crate::ros) const DATA_END: u8 = 15;
 }
 
-/// The channels of a file: what its messages are.
+/// Channels of a file, with their message types and topics.
 #[derive(Debug, Default)]
 pub(super) struct Channels {
     types: HashMap<u16, String>,
-    /// `None` for a topic that is left out, because there are too many.
+    /// Topics by channel. `None` for topics skipped because there are too many.
     topics: HashMap<u16, Option<usize>>,
 }
 
-/// The bytes of a schema or a channel that are read: its names come first.
+/// Number of bytes to read of a schema or channel record, which starts with its names.
 pub(super) const MAX_NAMES_BYTES: u64 = 1 << 14;
 
-/// The record at a place of some bytes: its kind, its contents and the place behind it.
+/// Returns the record at an offset: its type, the range of its contents and the next offset.
 pub(super) fn record_at(bytes: &[u8], at: usize) -> Option<(u8, Range<usize>, usize)> {
     let mut pieces = Pieces { bytes, at };
     let (kind, count) = (pieces.u8()?, usize::try_from(pieces.u64()?).ok()?);
@@ -50,12 +50,12 @@ impl Channels {
         self.topics.is_empty()
     }
 
-    /// The topic of a channel, or that it is left out; `None` if the channel is not known.
+    /// Returns the topic of a channel. The outer `None` means unknown, the inner one skipped.
     pub(super) fn topic(&self, channel: u16) -> Option<Option<usize>> {
         self.topics.get(&channel).copied()
     }
 
-    /// Whether the contents of a schema or channel record have a number that is known already.
+    /// Returns whether the ID of a schema or channel record is already known.
     pub(super) fn knows(&self, kind: u8, contents: &[u8]) -> bool {
         let id = Pieces::new(contents).u16();
         id.is_some_and(|id| match kind {
@@ -64,7 +64,7 @@ impl Channels {
         })
     }
 
-    /// Takes the contents of a schema record.
+    /// Adds a schema record.
     pub(super) fn add_schema(&mut self, contents: &[u8]) -> Option<()> {
         let mut pieces = Pieces::new(contents);
         let id = pieces.u16()?;
@@ -72,7 +72,7 @@ impl Channels {
         Some(())
     }
 
-    /// Takes the contents of a channel record.
+    /// Adds a channel record.
     pub(super) fn add_channel(&mut self, contents: &[u8], topics: &mut TopicList) -> Option<()> {
         let mut pieces = Pieces::new(contents);
         let (id, schema) = (pieces.u16()?, pieces.u16()?);
@@ -88,7 +88,7 @@ impl Channels {
     }
 }
 
-/// The start of a message: its channel, and when it was recorded.
+/// Parses the start of a message: its channel and recording time.
 pub(super) fn message_head(contents: &[u8]) -> Option<(u16, i64)> {
     let mut pieces = Pieces::new(contents);
     let channel = pieces.u16()?;
@@ -98,19 +98,19 @@ pub(super) fn message_head(contents: &[u8]) -> Option<(u16, i64)> {
     Some((channel, log_ns))
 }
 
-/// The start of a chunk.
+/// Header of a chunk.
 pub(super) struct ChunkHead {
     pub(super) plain_bytes: u64,
-    /// Of its records once they are unpacked; 0 if the recorder made none.
+    /// Checksum of the uncompressed records, or 0 if the recorder wrote none.
     pub(super) crc: u32,
     pub(super) compression: String,
-    /// Bytes of the chunk before its compressed records, and how many these are.
+    /// Offset of the compressed records in the chunk, and their size.
     pub(super) records_at: u64,
     pub(super) records_bytes: u64,
 }
 
 impl ChunkHead {
-    /// The most bytes that it takes.
+    /// Upper bound for the size of the header.
     pub(super) const MAX_BYTES: u64 = 1 << 13;
 
     pub(super) fn of(contents: &[u8]) -> Option<Self> {
@@ -123,7 +123,7 @@ impl ChunkHead {
         Some(Self { plain_bytes, crc, compression, records_at: pieces.at as u64, records_bytes })
     }
 
-    /// What is wrong with its unpacked records by their checksum.
+    /// Returns a complaint if the checksum of the uncompressed records is wrong.
     pub(super) fn complaint(&self, plain: crc32fast::Hasher) -> Option<Complaint> {
         let (found, wanted) = (plain.finalize(), self.crc);
         let reason = || {
@@ -135,17 +135,17 @@ impl ChunkHead {
     }
 }
 
-/// Where a chunk is.
+/// Location of a chunk.
 pub(super) struct ChunkIndex {
     pub(super) start_ns: i64,
     pub(super) offset: u64,
     pub(super) bytes: u64,
-    /// Empty if the file does not say.
+    /// Channels with messages in the chunk. Empty if unknown.
     pub(super) channels: Arc<[u16]>,
 }
 
 impl ChunkIndex {
-    /// The same, with the list that an equal one has already.
+    /// Replaces the channel list by an equal one from `lists`, to share memory.
     pub(super) fn shared(self, lists: &mut HashSet<Arc<[u16]>>) -> Self {
         match lists.get(&self.channels) {
             Some(list) => Self { channels: Arc::clone(list), ..self },
@@ -167,7 +167,7 @@ impl ChunkIndex {
     }
 }
 
-/// How many messages each channel has.
+/// Message counts by channel.
 pub(super) struct Statistics {
     pub(super) messages: u64,
     pub(super) chunks: u32,
@@ -178,7 +178,7 @@ impl Statistics {
     pub(super) fn of(contents: &[u8]) -> Option<Self> {
         let mut pieces = Pieces::new(contents);
         let messages = pieces.u64()?;
-        // Numbers of schemas, channels, attachments and metadata.
+        // Numbers of schemas, channels, attachments and metadata records.
         pieces.take(2 + 4 + 4 + 4)?;
         let chunks = pieces.u32()?;
         pieces.take(16)?;

@@ -1,22 +1,22 @@
 use crate::spill::{Bytes, FilePart};
 use voxtile::{Error, Result};
 
-/// The bytes of a message: in memory or, of a large one, in a file.
+/// Bytes of a message, in memory or, if large, in a file.
 #[derive(Clone, Debug, Default)]
 pub struct MessageData(pub(super) Bytes);
 
 impl MessageData {
-    /// Number of bytes.
+    /// Returns the number of bytes.
     pub fn len(&self) -> u64 {
         self.0.len()
     }
 
-    /// Whether there are none.
+    /// Returns whether there are no bytes.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// The bytes, if they are in memory.
+    /// Returns the bytes if they are in memory.
     pub fn in_memory(&self) -> Option<&[u8]> {
         match &self.0 {
             Bytes::Memory(bytes) => Some(bytes),
@@ -24,11 +24,11 @@ impl MessageData {
         }
     }
 
-    /// Reads the bytes into memory, if they are not there.
+    /// Loads the bytes into memory.
     ///
     /// # Errors
     ///
-    /// More than `most_bytes`; a file that cannot be read.
+    /// There are more than `most_bytes`, or a file cannot be read.
     pub fn load(&mut self, most_bytes: u64) -> Result<&[u8]> {
         if let Bytes::File(part) = &self.0 {
             if part.len() > most_bytes {
@@ -45,9 +45,9 @@ impl MessageData {
     }
 }
 
-/// The first bytes of a part.
+/// Reads the first bytes of a file part.
 pub(super) fn read(part: &FilePart, bytes: u64) -> Result<Vec<u8>> {
-    // The file has so many bytes, and the caller room for them.
+    // The caller limits `bytes`.
     let mut taken = vec![0; usize::try_from(bytes.min(part.len())).unwrap_or(0)];
     part.read_at(0, &mut taken)?;
     Ok(taken)

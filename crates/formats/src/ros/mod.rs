@@ -1,10 +1,10 @@
 //! Recordings of ROS 1 and ROS 2.
 //!
 //! ```text
-//! .bag, .mcap, .db3, folder of a bag -> Recording -> Message
+//! .bag, .mcap, .db3, bag folder -> Recording -> Message
 //! Message -> messages -> points, poses
 //! poses -> Transforms -> RigidPose at a stamp
-//! all of it -> BagClouds, which is a CloudSource
+//! all of these -> BagClouds, a CloudSource
 //! ```
 
 mod bag1;

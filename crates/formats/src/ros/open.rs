@@ -12,16 +12,16 @@ use crate::spill::Budget;
 use std::path::{Path, PathBuf};
 use voxtile::{Error, Result};
 
-/// Opens a recording: a file, the folder of a bag of ROS 2, or several that follow one another in time.
+/// Opens a recording: a file, a ROS 2 bag folder, or several recordings that follow each other in time.
 ///
 /// # Errors
 ///
-/// No path; a file that cannot be read or is no recording.
+/// `paths` is empty, or a file cannot be read or is not a recording.
 pub fn open_recording(paths: &[PathBuf]) -> Result<Box<dyn Recording>> {
     open_recording_within(paths, &Budget::default())
 }
 
-/// As [`open_recording`], in so much memory.
+/// As [`open_recording`], within a memory budget.
 ///
 /// # Errors
 ///
@@ -52,7 +52,8 @@ pub(super) fn open_file(path: &Path, budget: &Budget) -> Result<Box<dyn Recordin
     }
 }
 
-/// Opens a file by how it starts; where that is damaged, by the end of its name.
+/// Opens an uncompressed file. Its format is detected from the first bytes or, if these are damaged, from the
+/// extension.
 pub(super) fn open_plain_file(path: &Path, budget: &Budget) -> Result<Box<dyn Recording>> {
     let formats = Registry::default();
     let (start, extension) = (first_bytes(path)?, extension_of(path));

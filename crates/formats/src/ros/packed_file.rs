@@ -10,20 +10,20 @@ use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 use voxtile::{Error, FormatError, Result};
 
-/// A file of a recording that is compressed as a whole (`a.mcap.zstd`). It is unpacked into a temporary folder, which
-/// goes with this.
+/// Recording file that is compressed as a whole (`a.mcap.zstd`). It is decompressed into a temporary folder, which is
+/// removed with this value.
 pub(super) struct PackedFile {
     recording: Box<dyn Recording>,
     remark: Option<String>,
     _unpacked: TempDir,
 }
 
-/// Endings of names of such files.
+/// Extensions of such files.
 const EXTENSIONS: [&str; 2] = ["zstd", "zst"];
-/// How they begin.
+/// Zstandard signature.
 pub(super) const MAGIC: &[u8] = b"\x28\xb5\x2f\xfd";
 
-/// Whether a file is compressed as a whole, by its name.
+/// Returns whether the extension marks a file as compressed.
 pub(super) fn is_packed(path: &Path) -> bool {
     EXTENSIONS.contains(&extension_of(path).as_str())
 }
@@ -35,7 +35,7 @@ impl PackedFile {
             .map_err(|error| Error::io(&scratch, "unpack a recording into", error))?;
         let (plain, damage) = unpack(path, folder.path(), budget)?;
         let damaged = damage.map(|damage| format!("it is cut off or damaged ({damage})"));
-        // The name of the temporary file would tell nobody anything.
+        // The name of the temporary file would not help the user.
         let recording = open_plain_file(&plain, budget).map_err(|error| {
             let damaged = damaged.as_deref().unwrap_or("it was unpacked");
             let reason = format!("{damaged}, and what is in it cannot be read: {error:#}");
@@ -46,7 +46,7 @@ impl PackedFile {
     }
 }
 
-/// Unpacks a compressed file; as much of it as is whole, and why not more, if it is cut off.
+/// Decompresses a file. If it is damaged, the readable part is kept and the reason is returned.
 fn unpack(file: &Path, folder: &Path, budget: &Budget) -> Result<(PathBuf, Option<String>)> {
     let target = folder.join(file.file_stem().unwrap_or_default());
     let input = open_input(file)?;

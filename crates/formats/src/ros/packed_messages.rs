@@ -6,15 +6,15 @@ use crate::spill::{Budget, Bytes, SpillFile, StreamSize};
 use std::path::{Path, PathBuf};
 use voxtile::{Error, Result};
 
-/// A recording whose messages may be compressed each by itself (`compression_mode: MESSAGE`). They begin as no message
-/// of CDR does.
+/// Recording with individually compressed messages (`compression_mode: MESSAGE`), detected by signatures that no CDR
+/// message starts with.
 pub(super) struct PackedMessages<R> {
     recording: R,
     path: PathBuf,
     spill: SpillFile,
 }
 
-/// How compressed messages begin.
+/// Signatures of compressed messages.
 const MAGICS: [(&[u8], &str); 2] = [(b"\x28\xb5\x2f\xfd", "zstd"), (b"\x04\x22\x4d\x18", "lz4")];
 const MAGIC_BYTES: u64 = 4;
 

@@ -2,10 +2,10 @@ use super::bag_topic::kind_of;
 use super::messages::MessageKind;
 use super::recording::Topic;
 
-/// Most topics that a hint names.
+/// Maximum number of topics in a hint.
 const MAX_NAMED: usize = 10;
 
-/// The topics with poses, as what to do without `/tf`.
+/// Returns a hint that names the topics with poses, for recordings without `/tf`.
 pub(super) fn topics_with_poses(topics: &[Topic]) -> Option<String> {
     let is_pose = |topic: &&Topic| topic.messages > 0 && kind_of(topic).is_some_and(MessageKind::is_pose);
     let mut found = topics.iter().filter(is_pose).peekable();

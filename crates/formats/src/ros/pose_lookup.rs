@@ -3,20 +3,22 @@ use crate::poses::RigidPose;
 use std::sync::Arc;
 use voxtile::{Error, Result};
 
-/// Looks up where a sensor was in the world, for as long as anybody asks.
+/// Lookup of the poses of one sensor in the world, at any time. Clones share the transforms.
 #[derive(Clone, Debug)]
 pub(super) struct PoseLookup {
     transforms: Arc<Transforms>,
     fixed_frame: String,
     sensor_frame: String,
-    /// The frames that lead from the sensor to the world.
+    /// Frames to search between the sensor and the world.
     among: Arc<SearchFrames>,
 }
 
 impl PoseLookup {
+    /// Creates a lookup.
+    ///
     /// # Errors
     ///
-    /// There are too many frames between.
+    /// There are too many frames between the sensor and the world.
     pub(super) fn new(
         transforms: Arc<Transforms>,
         fixed_frame: String,
@@ -26,7 +28,7 @@ impl PoseLookup {
         Ok(Self { transforms, fixed_frame, sensor_frame, among })
     }
 
-    /// Where the sensor was, if that is known.
+    /// Returns the pose of the sensor, if it is known.
     pub(super) fn pose(&self, stamp_ns: i64) -> Result<Option<RigidPose>> {
         match self.find(stamp_ns) {
             Err(WhyNot::Unreadable(why)) => Err(Error::argument("poses of the recording", why)),

@@ -2,22 +2,22 @@ use super::messages::StampedPose;
 use super::samples::Samples;
 use super::transforms::is_pose;
 
-/// The poses of a topic, all of one frame in another. Every message of a path tells all the way so far: a pose is kept
-/// once for each stamp, whatever the number of messages that tell it.
+/// Poses of a topic, all of one child frame in one parent frame. Each message of a path repeats all previous poses, so
+/// a pose is stored once per stamp.
 #[derive(Debug, Default)]
 pub(super) struct PoseTrack {
-    /// As the first pose that can be used names it.
+    /// Parent frame of the first valid pose.
     pub(super) parent: String,
-    /// Empty if the poses do not say.
+    /// Child frame; empty if the poses do not name it.
     pub(super) child: String,
-    /// By stamp; of two poses of the same stamp the later one counts.
+    /// Poses by stamp. Of poses with equal stamps, the last one is kept.
     pub(super) poses: Samples,
-    /// Number of poses that are not valid or of other frames.
+    /// Number of poses that are invalid or belong to other frames.
     pub(super) odd: u64,
 }
 
 impl PoseTrack {
-    /// Takes a pose, if it can be used.
+    /// Adds a pose if it is valid.
     pub(super) fn insert(&mut self, pose: StampedPose) {
         let StampedPose { header, child_frame, parent_from_child } = pose;
         let parent = header.frame_id;
@@ -65,7 +65,7 @@ mod tests {
             track.insert(pose(track.odd as i64, parent, x_m));
         }
         assert_eq!((track.parent.as_str(), track.poses.len(), track.odd), ("odom", 2, 3));
-        // As if memory were full.
+        // Simulates full memory.
         assert_eq!(track.poses.drain().len(), 2);
         track.insert(pose(9, "map", 5.0));
         assert_eq!((track.parent.as_str(), track.odd), ("odom", 4));

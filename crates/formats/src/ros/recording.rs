@@ -5,80 +5,81 @@ use std::collections::hash_map::DefaultHasher;
 use std::hash::{Hash, Hasher};
 use voxtile::Result;
 
-/// A topic of a recording.
+/// Topic of a recording.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Topic {
-    /// Its name: `/points`.
+    /// Name, such as `/points`.
     pub name: String,
-    /// The type of its messages, as the recording writes it.
+    /// Message type, as spelled in the recording.
     pub type_name: String,
-    /// How they are serialised; `None` if it is a way that is not read.
+    /// Serialization of the messages; `None` if it is not supported.
     pub wire: Option<Wire>,
-    /// Number of messages, as the recording counts them.
+    /// Number of messages according to the recording.
     pub messages: u64,
 }
 
-/// A message of a recording.
+/// Message of a recording.
 #[derive(Clone, Debug)]
 pub struct Message {
-    /// Its topic: an index into [`Recording::topics`].
+    /// Index of its topic in [`Recording::topics`].
     pub topic: usize,
-    /// When it was recorded, in nanoseconds.
+    /// Recording time, in nanoseconds.
     pub log_ns: i64,
-    /// Its bytes.
+    /// Serialized message.
     pub data: MessageData,
 }
 
-/// Messages one at a time, in the order in which they are played.
+/// Source of messages in playback order.
 pub trait Recording: Send {
-    /// Name of the format, for people.
+    /// Returns the display name of the format.
     fn format(&self) -> &str;
 
-    /// All topics.
+    /// Returns all topics.
     fn topics(&self) -> &[Topic];
 
-    /// Begins from the start, with the messages of these topics (indices) only.
+    /// Starts from the beginning with the messages of these topics (indices).
     ///
     /// # Errors
     ///
-    /// A file that cannot be read.
+    /// A file cannot be read.
     fn begin(&mut self, topics: &[usize]) -> Result<()>;
 
-    /// The next message. `None` after the last one, and before [`Recording::begin`].
+    /// Returns the next message, or `None` after the last one and before [`Recording::begin`].
     ///
     /// # Errors
     ///
-    /// A file that cannot be read or is invalid. The call after that goes on behind the bad part.
+    /// A file cannot be read or is invalid. The next call continues after the damaged part.
     fn next_message(&mut self) -> Result<Option<Message>>;
 
-    /// Closes files until they are read again: a process may have fewer files open than a bag has parts.
+    /// Closes files until they are read again. A split bag may have more parts than a process may have open files.
     fn close_files(&mut self);
 
-    /// What a person should know: parts that were cut off, an index that is missing.
+    /// Returns remarks for the user, for instance on truncated parts or a missing index.
     fn remarks(&self) -> Vec<String> {
         Vec::new()
     }
 }
 
-/// Topics as they are found. A topic that several publishers write is one; one of two types is two.
+/// List of distinct topics. Several publishers of a topic share an entry; a name with two message types has two
+/// entries.
 #[derive(Debug, Default)]
 pub(super) struct TopicList {
     pub(super) topics: Vec<Topic>,
-    /// What they take.
+    /// Memory used by the topics.
     bytes: usize,
-    /// Indices of topics by the hash of what tells one from another. A file may name a topic in each of its connections.
+    /// Topic indices by the hash of name, type and serialization. A file may repeat a topic in each of its connections.
     by_hash: HashMap<u64, Vec<usize>>,
 }
 
-/// Some of the topics of a recording. A file may have as many topics as messages.
+/// Set of topics of a recording. A file may have as many topics as messages.
 #[derive(Clone, Debug, Default)]
 pub(super) struct TopicSet {
-    /// By topic; topics beyond the end are left out.
+    /// Membership by topic index. Indices beyond the end are not in the set.
     is_in: Vec<bool>,
 }
 
 impl TopicSet {
-    /// The set of these topics (indices); those that no list can hold are left out.
+    /// Creates a set from topic indices. Indices beyond the limit of a list are ignored.
     pub(super) fn of(topics: &[usize]) -> Self {
         let last = topics.iter().filter(|topic| **topic < MAX_TOPIC_BYTES).max();
         let mut is_in = vec![false; last.map_or(0, |last| last + 1)];
@@ -100,11 +101,11 @@ impl TopicSet {
     }
 }
 
-/// Memory for topics: some ten thousand. Others are not read.
+/// Memory limit for topics, enough for about ten thousand. Further topics are skipped.
 const MAX_TOPIC_BYTES: usize = 1 << 20;
 
 impl TopicList {
-    /// The index of a topic, which is appended if it is new; `None` if there are too many.
+    /// Returns the index of a topic, adding it if it is new. Returns `None` if there are too many topics.
     pub(super) fn index(&mut self, name: &str, type_name: &str, wire: Option<Wire>) -> Option<usize> {
         let mut hasher = DefaultHasher::new();
         (name, type_name, wire).hash(&mut hasher);
@@ -126,7 +127,7 @@ impl TopicList {
         Some(index)
     }
 
-    /// Counts messages of a topic.
+    /// Adds to the number of messages of a topic.
     pub(super) fn count(&mut self, index: usize, messages: u64) {
         if let Some(topic) = self.topics.get_mut(index) {
             topic.messages = topic.messages.saturating_add(messages);
@@ -139,7 +140,7 @@ mod tests {
     use super::*;
     use std::time::{Duration, Instant};
 
-    /// Each name was once compared with all that were kept.
+    /// Guards against comparing each name with all others.
     #[test]
     fn many_topics_take_time_as_their_number() {
         let (mut topics, start) = (TopicList::default(), Instant::now());

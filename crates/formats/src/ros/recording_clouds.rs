@@ -5,7 +5,7 @@ use crate::ros::{BagOptions, PoseSource, open_bag};
 use std::path::Path;
 use voxtile::{Error, Result};
 
-/// Opens the clouds of a recording. A file of poses goes before its own.
+/// Opens the clouds of a recording. A pose file takes precedence over the recording's own poses.
 pub(crate) fn open(path: &Path, options: &ReadOptions) -> Result<Box<dyn CloudSource>> {
     check(options)?;
     let recording = &options.recording;
@@ -28,7 +28,7 @@ pub(crate) fn open(path: &Path, options: &ReadOptions) -> Result<Box<dyn CloudSo
     Ok(Box::new(open_bag(&[path.to_owned()], &bag)?))
 }
 
-/// Refuses what a recording says itself, and what would be passed over.
+/// Rejects options for values that the recording contains itself, which would be ignored.
 fn check(options: &ReadOptions) -> Result<()> {
     if options.depth_scale.is_some() {
         let reason = "depth images of a recording say themselves what they are in, 16UC1 millimetres and 32FC1 metres: \

@@ -8,7 +8,7 @@ use super::wire::WireReader;
 use crate::spill::Bytes;
 use voxtile::{Error, Result};
 
-/// A topic of odometry, and the frames that its first pose names.
+/// An odometry topic and the frames of its first pose.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Odometry {
     pub(super) topic: String,
@@ -16,14 +16,14 @@ pub(super) struct Odometry {
     pub(super) child: String,
 }
 
-/// Most topics of odometry that are looked into.
+/// Maximum number of odometry topics to inspect.
 const MAX_LOOKED_INTO: usize = 20;
-/// Most messages that are read to find the first pose of each.
+/// Maximum number of messages to read for the first pose of each topic.
 const MAX_MESSAGES: usize = 10_000;
 
-/// Finds the poses of clouds that are in the frame of the map already, as programs for odometry publish them: `/tf`
-/// does not say where the sensor was. One topic of odometry in the frame of the clouds does, or a frame that moves in
-/// it.
+/// Finds the poses of clouds that are already in the map frame, as published by odometry programs. `/tf` does not
+/// contain the sensor position for them. It is taken from a single odometry topic in the clouds' frame, or from a frame
+/// that moves in it.
 pub(super) fn find_registered(
     recording: &mut dyn Recording,
     clouds: usize,
@@ -34,7 +34,7 @@ pub(super) fn find_registered(
         return Ok(poses);
     }
     let Some(frame) = first_frame(recording, clouds)? else { return Ok(poses) };
-    // Another frame of the map was asked for.
+    // Another map frame was requested.
     if options.fixed_frame.as_ref().is_some_and(|fixed| fixed.trim_start_matches('/') != frame) {
         return Ok(poses);
     }
@@ -44,7 +44,7 @@ pub(super) fn find_registered(
     };
     let from_here: Vec<&Odometry> = all.iter().filter(of_clouds).collect();
     let mut poses = poses;
-    // A frame that moves in a map may be that of a sensor, or be moved when the map is corrected.
+    // A frame that moves in a map may be a sensor's, or may move because the map is corrected.
     let is_sensor = poses.moves(&frame) && (from_here.is_empty() || !poses.moves_below(&frame));
     if poses.places(&frame) && is_sensor {
         return Ok(poses);
@@ -68,7 +68,7 @@ pub(super) fn find_registered(
     Ok(poses)
 }
 
-/// The frame of the first cloud, if that can be read.
+/// Returns the frame of the first cloud, if it can be read.
 fn first_frame(recording: &mut dyn Recording, clouds: usize) -> Result<Option<String>> {
     let wire = recording.topics().get(clouds).and_then(|topic| topic.wire);
     recording.begin(&[clouds])?;
@@ -88,7 +88,7 @@ fn first_frame(recording: &mut dyn Recording, clouds: usize) -> Result<Option<St
     Ok(header.ok().map(|header| header.frame_id))
 }
 
-/// The topics of odometry.
+/// Finds the odometry topics.
 fn odometries(recording: &mut dyn Recording, options: &BagOptions) -> Result<Vec<Odometry>> {
     let topics = recording.topics().to_vec();
     let is_odometry =

@@ -3,18 +3,18 @@ use crate::spill::{Budget, PoseList, PoseWriter, Record, Sorter, TimedPose};
 use std::cmp::Ordering;
 use voxtile::Result;
 
-/// Sorts the samples of a recording whose transforms do not fit in memory.
+/// External sort for the samples of a recording whose transforms exceed the memory budget.
 #[derive(Debug)]
 pub(super) struct SampleSpool {
     budget: Budget,
     sorter: Sorter<Spooled>,
-    /// How many samples have a number.
+    /// Number of sample lists with a number.
     numbers: u32,
-    /// How many times memory was full.
+    /// Number of times the memory was full.
     rounds: u32,
 }
 
-/// A sample of some samples.
+/// A sample with the number of its list.
 #[derive(Clone, Copy, Debug)]
 struct Spooled {
     number: u32,
@@ -52,7 +52,7 @@ impl SampleSpool {
         Self { budget: budget.clone(), sorter, numbers: 0, rounds: 0 }
     }
 
-    /// Takes samples out of memory.
+    /// Moves samples from memory to the sorter.
     pub(super) fn take<'s>(&mut self, all: impl Iterator<Item = &'s mut Samples>) -> Result<()> {
         for samples in all {
             let mut drained = samples.drain();
@@ -68,11 +68,11 @@ impl SampleSpool {
         Ok(())
     }
 
-    /// Gives all samples back, in a file.
+    /// Returns all samples to their lists, stored in a file.
     pub(super) fn finish<'s>(mut self, all: impl Iterator<Item = &'s mut Samples>) -> Result<()> {
         let mut all: Vec<&mut Samples> = all.collect();
         self.take(all.iter_mut().map(|samples| &mut **samples))?;
-        // Without a number, and so without samples, come last.
+        // Lists without a number have no samples and are sorted last.
         all.sort_unstable_by_key(|samples| samples.number.unwrap_or(u32::MAX));
         let mut sorted = self.sorter.finish()?;
         let mut writer = PoseWriter::new(&self.budget, 0);
@@ -82,7 +82,7 @@ impl SampleSpool {
         while let Some(Spooled { number, sample, .. }) = next {
             next = sorted.next()?;
             let is_same = |other: &Spooled| other.number == number;
-            // Of two samples of the same stamp the later one counts.
+            // Of samples with equal stamps, the last one is kept.
             if !next.as_ref().is_some_and(|next| is_same(next) && next.sample.stamp_ns == sample.stamp_ns) {
                 writer.push(sample)?;
                 end += 1;
@@ -113,7 +113,7 @@ mod tests {
         let (mut memory, mut filed) = (vec![Samples::default(); 3], vec![Samples::default(); 3]);
         let mut spool = SampleSpool::new(&Budget::default(), 0);
         for k in 0..1000_i64 {
-            // Stamps repeat, in other rounds and in the same one.
+            // Stamps repeat, within a round and across rounds.
             let (which, stamp_ns) = ((k % 2) as usize, (k * 7919 % 601) / 2 * 2);
             memory[which].insert(stamp_ns, pose(k));
             filed[which].insert(stamp_ns, pose(k));

@@ -3,28 +3,28 @@ use crate::spill::{PoseList, TimedPose};
 use std::collections::BTreeMap;
 use voxtile::Result;
 
-/// Where a frame was in its parent, by stamp: in memory or, of a long recording, in a temporary file.
+/// Poses of a frame in its parent, by stamp: in memory or, for a long recording, in a temporary file.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Samples {
     memory: BTreeMap<i64, RigidPose>,
-    /// In strict order of time. Samples are here or in memory.
+    /// Sorted by strictly increasing time. Samples are either here or in memory.
     filed: PoseList,
-    /// The first and the last stamp of samples that wait to be sorted.
+    /// First and last stamp of the samples that are being sorted.
     waiting: Option<(i64, i64)>,
-    /// Its number among the samples that wait to be sorted.
+    /// Number of this list among the samples that are being sorted.
     pub(super) number: Option<u32>,
 }
 
-/// The samples at or before a time, and at or after it.
+/// Samples at or before a time, and at or after it.
 pub(super) type Around = (Option<TimedPose>, Option<TimedPose>);
 
 impl Samples {
-    /// Adds a sample; of two of the same stamp the later one counts.
+    /// Adds a sample. It replaces one with the same stamp.
     pub(super) fn insert(&mut self, stamp_ns: i64, pose: RigidPose) {
         self.memory.insert(stamp_ns, pose);
     }
 
-    /// Number of samples; those that wait to be sorted are not counted.
+    /// Returns the number of samples, without those being sorted.
     pub(super) fn len(&self) -> usize {
         self.memory.len() + self.filed.len()
     }
@@ -33,7 +33,7 @@ impl Samples {
         self.len() == 0 && self.waiting.is_none()
     }
 
-    /// Whether there are samples of more than one stamp.
+    /// Returns whether there are samples with more than one stamp.
     pub(super) fn has_several(&self) -> bool {
         let all = joined(ends(&self.memory), self.waiting);
         self.filed.len() > 1 || all.is_some_and(|(first_ns, last_ns)| first_ns < last_ns)
@@ -54,14 +54,14 @@ impl Samples {
         Ok((before, after))
     }
 
-    /// Forgets samples in memory that are older than this before the last one.
+    /// Drops samples in memory that are more than `span_ns` older than the last one.
     pub(super) fn forget_older_than(&mut self, span_ns: i64) {
         if let Some((&last_ns, _)) = self.memory.last_key_value() {
             self.memory = self.memory.split_off(&last_ns.saturating_sub(span_ns));
         }
     }
 
-    /// Forgets the older half of the samples in memory, and one alone.
+    /// Drops the older half of the samples in memory, rounded up.
     pub(super) fn forget_older_half(&mut self) {
         let middle = self.memory.len().div_ceil(2);
         self.memory = match self.memory.keys().nth(middle) {
@@ -70,25 +70,25 @@ impl Samples {
         };
     }
 
-    /// Takes the samples out of memory, to be sorted.
+    /// Removes the samples from memory, for sorting.
     pub(super) fn drain(&mut self) -> impl ExactSizeIterator<Item = TimedPose> + use<> {
         let samples = std::mem::take(&mut self.memory);
         self.waiting = joined(self.waiting, ends(&samples));
         samples.into_iter().map(|(stamp_ns, pose)| TimedPose { stamp_ns, pose })
     }
 
-    /// Takes the samples that were sorted in a file.
+    /// Sets the samples that were sorted into a file.
     pub(super) fn file(&mut self, sorted: PoseList) {
         (self.filed, self.waiting) = (sorted, None);
     }
 }
 
-/// The first and the last stamp.
+/// Returns the first and the last stamp.
 fn ends(samples: &BTreeMap<i64, RigidPose>) -> Option<(i64, i64)> {
     Some((*samples.first_key_value()?.0, *samples.last_key_value()?.0))
 }
 
-/// The first and the last stamp of both.
+/// Returns the range that covers both ranges.
 fn joined(one: Option<(i64, i64)>, other: Option<(i64, i64)>) -> Option<(i64, i64)> {
     let Some(((first_ns, last_ns), other)) = one.zip(other) else { return one.or(other) };
     Some((first_ns.min(other.0), last_ns.max(other.1)))

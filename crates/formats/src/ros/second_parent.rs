@@ -1,19 +1,19 @@
 use std::fmt;
 
-/// A parent that a transform gives to a frame that has another one, or that is below the frame.
+/// A transform that gives a frame an additional parent, or a parent below the frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SecondParent {
     /// The frame.
     pub child: String,
-    /// The parent that came last.
+    /// The latest parent.
     pub parent: String,
-    /// The parent that counts without it.
+    /// The parent in use otherwise.
     pub before: Option<String>,
-    /// The frames of the loop that it makes: from the parent up to the child; empty if it makes none.
+    /// Frames of the loop that the transform closes: from the parent up to the child. Empty if there is no loop.
     pub loop_frames: Vec<String>,
 }
 
-/// Longer names are cut, and longer loops.
+/// Limits for the length of a name and of a loop in messages.
 const MAX_CHARS: usize = 60;
 const MAX_FRAMES: usize = 8;
 
@@ -34,7 +34,7 @@ impl fmt::Display for SecondParent {
     }
 }
 
-/// What others sent is printed without what a terminal obeys.
+/// Escapes control characters, which a terminal would obey, in names from untrusted sources.
 fn name(frame: &str) -> String {
     let cut: String = frame.chars().take(MAX_CHARS).collect();
     cut.escape_debug().to_string()

@@ -1,9 +1,9 @@
 use super::recording::{Message, Recording, Topic, TopicList, TopicSet};
 use voxtile::Result;
 
-/// Recordings one after the other, as one: the parts of a split bag.
+/// Recordings concatenated in time, such as the parts of a split bag.
 ///
-/// One part at a time has its files open.
+/// Only one part has open files at a time.
 #[derive(Default)]
 pub struct Sequence {
     parts: Vec<Part>,
@@ -15,16 +15,16 @@ pub struct Sequence {
 
 struct Part {
     recording: Box<dyn Recording>,
-    /// The topic of all parts, for each of this one.
+    /// Index in the common topic list of each topic of this part.
     topics: Vec<usize>,
 }
 
 impl Sequence {
-    /// Appends what was recorded next.
+    /// Appends the next recording in time.
     pub fn push(&mut self, mut recording: Box<dyn Recording>) {
         recording.close_files();
         let topics = recording.topics().iter().map(|topic| {
-            // Topics beyond the most are never asked for.
+            // Topics beyond the limit are never selected.
             let index = self.topics.index(&topic.name, &topic.type_name, topic.wire).unwrap_or(usize::MAX);
             self.topics.count(index, topic.messages);
             index
@@ -60,14 +60,14 @@ impl Recording for Sequence {
                 part.recording.begin(&own)?;
             }
             let Some(message) = part.recording.next_message()? else {
-                // Chunks that are in memory are not needed any more.
+                // Frees the chunks in memory.
                 part.recording.begin(&[])?;
                 part.recording.close_files();
                 self.at += 1;
                 self.has_begun = false;
                 continue;
             };
-            // A topic that only shows up in the midst of a file was not asked for.
+            // A topic that first appears within a file could not be selected.
             if let Some(&topic) = part.topics.get(message.topic) {
                 return Ok(Some(Message { topic, ..message }));
             }

@@ -2,24 +2,24 @@ use super::messages::StampedPose;
 use super::second_parent::SecondParent;
 use super::transforms::{BadTransform, Transforms};
 
-/// Takes the transforms of a recording, and counts those that are left out.
+/// Adds the transforms of a recording and counts the rejected ones.
 #[derive(Debug, Default)]
 pub(super) struct TransformIntake {
-    /// Pairs of a frame and its parent.
+    /// Number of distinct pairs of a frame and its parent.
     links: usize,
     beyond: u64,
     invalid: u64,
     first_invalid: Option<BadTransform>,
-    /// Links among which second parents were looked for.
+    /// Number of links checked for second parents.
     checked: usize,
     seconds: Vec<SecondParent>,
 }
 
-/// Most pairs of a frame and its parent; a robot has a hundred.
+/// Limit for pairs of a frame and its parent. Robots have about a hundred.
 const MAX_LINKS: usize = 10_000;
-/// A longer name of a frame is damage.
+/// Limit for the length of a frame name.
 const MAX_NAME_BYTES: usize = 256;
-/// Second parents of frames that are reported, and links among which they are looked for.
+/// Limits for the second parents to report and the links to check for them.
 const MAX_SECONDS: usize = 8;
 const MAX_CHECKED: usize = 2000;
 
@@ -27,7 +27,7 @@ impl TransformIntake {
     pub(super) fn take(&mut self, transforms: &mut Transforms, pose: StampedPose, is_static: bool) {
         let StampedPose { header, child_frame, parent_from_child } = pose;
         let (parent, stamp_ns) = (header.frame_id.as_str(), header.stamp_ns);
-        // A frame that has many parents loses one for the next.
+        // A frame at its limit of parents drops one for the new parent.
         let parents = transforms.parents_of(&child_frame);
         let is_new = !transforms.has_link(parent, &child_frame);
         if is_new && (self.links >= MAX_LINKS || parent.len().max(child_frame.len()) > MAX_NAME_BYTES) {
@@ -50,7 +50,7 @@ impl TransformIntake {
         }
     }
 
-    /// What a person should know.
+    /// Returns remarks for the user.
     pub(super) fn remarks(self) -> Vec<String> {
         let Self { beyond, invalid, first_invalid, seconds, .. } = self;
         let beyond = (beyond > 0).then(|| {
@@ -65,7 +65,7 @@ impl TransformIntake {
     }
 }
 
-/// What a second parent means.
+/// Explains the consequence of a second parent.
 pub(super) fn remark_on(second: SecondParent) -> String {
     format!(
         "{second}; a parent named by one transform, or one that closes a loop, is used only if no other leads to the \

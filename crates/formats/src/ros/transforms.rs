@@ -6,50 +6,50 @@ use crate::poses::RigidPose;
 use std::collections::{HashMap, HashSet};
 use std::convert::Infallible;
 
-/// The tree of frames of a recording or a robot: where each frame was in its parents, over time.
+/// Tree of coordinate frames of a recording or a robot: the poses of each frame in its parents, over time.
 ///
-/// At a time a frame has one parent: the first of these that leads to the frame that is asked for, and to no frame
+/// At each time, a frame has one parent: the first of these that leads to the wanted frame without visiting a frame
 /// twice.
 ///
-/// 1. One with transforms before and after the stamp, or at it: of several the one with the latest before.
-/// 2. One with transforms up to 10 s before the stamp, which give no pose, or not yet.
-/// 3. A static one: of several the newest.
-/// 4. One with a single transform, or with transforms at other times: of several the newest.
+/// 1. A parent with transforms before and after the stamp, or at it. Of several, the one with the latest sample before.
+/// 2. A parent with transforms up to 10 s before the stamp that do not give a pose (yet).
+/// 3. A static parent. Of several, the newest.
+/// 4. A parent with a single transform, or with transforms at other times. Of several, the newest.
 ///
-/// So a transform that makes a loop, or that names another parent once, changes no pose.
+/// A transform that closes a loop, or a single transform to another parent, therefore does not change any pose.
 #[derive(Clone, Debug, Default)]
 pub struct Transforms {
     frames: HashMap<String, FrameLinks>,
-    /// Number of transforms taken.
+    /// Number of transforms added.
     taken: u64,
-    /// Two samples further apart have nothing between them.
+    /// Maximum time between two samples to interpolate, in nanoseconds.
     most_gap_ns: Option<i64>,
 }
 
-/// The frames among which poses of a frame in another are searched, so that others cost nothing.
+/// Frames to search for poses of a frame in another, so that unrelated frames cost nothing.
 #[derive(Debug)]
 pub(super) struct SearchFrames {
     /// See [`Transforms::frames_between`].
     between: HashSet<String>,
-    /// All frames above the source, where the target is one of them at some time: at other times, both may be connected
-    /// by a common ancestor. `None` if there are too many.
+    /// All ancestors of the source, if they include the target at some time: at other times, a common ancestor may
+    /// connect the two frames. `None` if there are too many.
     above: Option<HashSet<String>>,
 }
 
-/// Why the pose of a frame in another is not known at a time.
+/// Reason why the pose of a frame in another is unknown at a time.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, thiserror::Error)]
 #[non_exhaustive]
 pub enum WhyNot {
-    /// No transform names it.
+    /// No transform names the frame.
     #[error("no transform names the frame {0}")]
     UnknownFrame(String),
-    /// Both frames are known, but nothing connects them.
+    /// Both frames are known, but not connected.
     #[error("nothing connects the frames {0} and {1}")]
     NotConnected(String, String),
     /// A frame is its own ancestor.
     #[error("the frame {0} is its own ancestor")]
     Loop(String),
-    /// More frames are above it than a robot has.
+    /// The frame has more ancestors than the limit.
     #[error(
         "too many frames are above the frame {0}: name a nearer frame with `fixed_frame` (ROS 2 node: `frame_id`)"
     )]
@@ -57,7 +57,7 @@ pub enum WhyNot {
     /// The stamp is before the first transform of a frame.
     #[error("the stamp is before the first transform of {0}")]
     Before(String),
-    /// The stamp is behind the last transform of a frame.
+    /// The stamp is after the last transform of a frame.
     #[error("the stamp is after the last transform of {0}")]
     After(String),
     /// The transforms before and after the stamp are too far apart.
@@ -65,10 +65,10 @@ pub enum WhyNot {
         "the transforms of {0} before and after the stamp are too far apart; `pose_tolerance` allows for more"
     )]
     Gap(String),
-    /// The frame moves in no other, so that nothing says where it was.
+    /// The frame does not move in any other frame, so its pose is unknown.
     #[error("no transform says how {0} moves")]
     NothingMoves(String),
-    /// The points are in the fixed frame already, and where the sensor was is not known.
+    /// The points are already in the fixed frame, and the sensor position is unknown.
     #[error("the points are in the frame {0} already; nothing says where the sensor was")]
     AlreadyFixed(String),
     /// A temporary file cannot be read.
@@ -76,42 +76,40 @@ pub enum WhyNot {
     Unreadable(String),
 }
 
-/// Why a transform is not taken.
+/// Reason why a transform is rejected.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum BadTransform {
     /// The parent or the child has no name.
     #[error("a frame has no name")]
     NoName,
-    /// The parent is the child.
+    /// Parent and child are the same frame.
     #[error("the frame {0} is in itself")]
     InItself(String),
-    /// Numbers that are not finite, or a quaternion whose length is off by more than a tenth.
+    /// Numbers are not finite, or the length of the quaternion differs from 1 by more than 0.1.
     #[error("the pose of {0} has numbers that are not finite, or a quaternion whose length is not 1")]
     Pose(String),
 }
 
-/// How far the length of a quaternion may be from 1, as in files of poses.
+/// Maximum deviation of a quaternion's length from 1, as for pose files.
 const MAX_LENGTH_ERROR: f64 = 0.1;
-/// Most frames among which ways are searched for each cloud of a recording.
+/// Limit for the frames to search for each cloud of a recording.
 const MAX_FRAMES_BETWEEN: usize = 1000;
-/// Most moving frames among which that of the robot is looked for.
+/// Limit for the moving frames to consider as the robot's frame.
 const MAX_MOVING: usize = 100;
 
 impl Transforms {
-    /// Sets how far apart in time two samples may be that a pose is found between; see
-    /// [`most_gap_ns`](crate::poses::most_gap_ns).
+    /// Sets the maximum time between two samples to interpolate; see [`most_gap_ns`](crate::poses::most_gap_ns).
     pub fn set_most_gap_ns(&mut self, most_gap_ns: Option<i64>) {
         self.most_gap_ns = most_gap_ns;
     }
 
-    /// Adds where a child was in a parent, and returns whether the child gets a parent that it did not have. Of two
-    /// samples of the same stamp the later one counts. Of more than 16 parents of a frame the first ones and the last
-    /// are kept.
+    /// Adds the pose of a child in a parent. Returns whether the parent is new for the child. A sample replaces one
+    /// with the same stamp. If a frame has more than 16 parents, the first ones and the last one are kept.
     ///
     /// # Errors
     ///
-    /// The transform is not taken: a frame without a name or in itself, a pose that is not valid.
+    /// The transform is rejected: a frame has no name, parent and child are the same, or the pose is invalid.
     pub fn insert(
         &mut self,
         parent: &str,
@@ -128,12 +126,12 @@ impl Transforms {
         Ok(links.is_some_and(|links| links.insert(parent, stamp_ns, parent_from_child, is_static, number)))
     }
 
-    /// Puts samples, all of them [poses](is_pose), in the place of those of a child in a parent, and returns whether
-    /// the child gets a parent that it did not have.
+    /// Replaces the samples of a child in a parent. Returns whether the parent is new for the child. All samples must
+    /// be [poses](is_pose).
     ///
     /// # Errors
     ///
-    /// The samples are not taken: a frame without a name or in itself.
+    /// The samples are rejected: a frame has no name, or parent and child are the same.
     pub(super) fn attach(
         &mut self,
         parent: &str,
@@ -148,7 +146,7 @@ impl Transforms {
         Ok(links.is_some_and(|links| links.attach(parent, samples, number)))
     }
 
-    /// The links of a child, and the number of its next transform.
+    /// Returns the links of a child, and the sequence number of its next transform.
     fn links_of(&mut self, child: &str) -> (Option<&mut FrameLinks>, u64) {
         if !self.frames.contains_key(child) {
             self.frames.insert(child.to_owned(), FrameLinks::default());
@@ -157,22 +155,22 @@ impl Transforms {
         (self.frames.get_mut(child), self.taken)
     }
 
-    /// Whether a transform names this parent of a child.
+    /// Returns whether a transform names this parent of a child.
     pub(super) fn has_link(&self, parent: &str, child: &str) -> bool {
         self.frames.get(bare(child)).is_some_and(|links| links.has_parent(bare(parent)))
     }
 
-    /// Number of parents of a child.
+    /// Returns the number of parents of a child.
     pub(super) fn parents_of(&self, child: &str) -> usize {
         self.frames.get(bare(child)).map_or(0, FrameLinks::parents)
     }
 
-    /// All samples.
+    /// Iterates over all samples.
     pub(super) fn samples_mut(&mut self) -> impl Iterator<Item = &mut Samples> {
         self.frames.values_mut().flat_map(FrameLinks::samples_mut)
     }
 
-    /// What is wrong with a parent of a child, if the child has another one, or if they are in a loop.
+    /// Returns the conflict if a child has another parent than this one, or if they form a loop.
     pub fn second_parent(&self, parent: &str, child: &str) -> Option<SecondParent> {
         let (parent, child) = (bare(parent), bare(child));
         let others = self.steps(child);
@@ -189,12 +187,12 @@ impl Transforms {
         Some(SecondParent { child: child.to_owned(), parent: parent.to_owned(), before, loop_frames })
     }
 
-    /// Forgets where a frame was in its parents.
+    /// Removes all poses of a frame in its parents.
     pub fn detach(&mut self, child: &str) {
         self.frames.remove(bare(child));
     }
 
-    /// Forgets how a frame moved in its parents; static transforms stay.
+    /// Removes the moving poses of a frame in its parents; static transforms are kept.
     pub fn forget_samples(&mut self, child: &str) {
         if let Some(links) = self.frames.get_mut(bare(child)) {
             links.forget_samples();
@@ -204,15 +202,15 @@ impl Transforms {
         }
     }
 
-    /// Forgets samples that are older than this before the last one of the same frames, and returns how many samples
-    /// are left, with one for what is static: a buffer of tf keeps its last seconds.
+    /// Drops samples more than `span_ns` older than the last one of the same link, like the buffer of tf2. Returns the
+    /// number of samples left, counting a static transform as one.
     pub fn forget_older_than(&mut self, span_ns: i64) -> usize {
         self.frames.values_mut().for_each(|links| links.forget_older_than(span_ns));
         self.frames.values().map(FrameLinks::len).sum()
     }
 
-    /// Forgets older samples of the frame that has most, and returns how many those were: who sends too many takes no
-    /// room of others. Static transforms stay.
+    /// Drops older samples of the frame with most samples, so that one busy publisher does not displace other frames.
+    /// Returns the number of dropped samples. Static transforms are kept.
     pub fn shrink_largest(&mut self) -> usize {
         let largest = self.frames.iter_mut().max_by_key(|(_, links)| links.samples());
         let Some((child, links)) = largest else { return 0 };
@@ -226,29 +224,29 @@ impl Transforms {
         lost
     }
 
-    /// Number of frames that have a parent.
+    /// Returns the number of frames with a parent.
     pub fn frames(&self) -> usize {
         self.frames.len()
     }
 
-    /// Whether a transform names a frame.
+    /// Returns whether a transform names a frame.
     pub fn knows(&self, frame: &str) -> bool {
         let frame = bare(frame);
         self.frames.contains_key(frame) || self.frames.values().any(|links| links.has_parent(frame))
     }
 
-    /// Whether there are no transforms.
+    /// Returns whether there are no transforms.
     pub fn is_empty(&self) -> bool {
         self.frames.is_empty()
     }
 
-    /// The frame and what is above it, at whatever time. Parents that a single transform names are left out if
-    /// something moves without them.
+    /// Returns a frame and its ancestors, at any time. Parents from a single transform are ignored if the other
+    /// ancestors include a moving frame.
     pub fn ancestors(&self, frame: &str) -> Vec<String> {
         self.above(bare(frame)).frames.into_iter().map(str::to_owned).collect()
     }
 
-    /// The last of the parents above a frame, of the same ones.
+    /// Returns the root above a frame: the last of its [ancestors](Self::ancestors).
     pub fn root_of(&self, frame: &str) -> String {
         let frame = bare(frame);
         self.above(frame).end.unwrap_or(frame).to_owned()
@@ -256,7 +254,7 @@ impl Transforms {
 
     fn above<'a>(&'a self, frame: &'a str) -> Search<'a> {
         let trusted = self.search(frame, Step::is_trusted, |_| false);
-        // A single transform that is left out must not count as what moves.
+        // A moving ancestor must be found without the single transforms, which are ignored then.
         let moves = |frame: &&str| self.frames.get(*frame).is_some_and(FrameLinks::moves);
         if trusted.frames.iter().any(moves) {
             return trusted;
@@ -264,7 +262,7 @@ impl Transforms {
         self.search(frame, |_| true, |_| false)
     }
 
-    /// A search at whatever time.
+    /// Searches without a time.
     fn search<'a>(
         &'a self,
         frame: &'a str,
@@ -276,13 +274,13 @@ impl Transforms {
         search
     }
 
-    /// Whether a link of a frame to a parent has transforms of `/tf`, be it a single one.
+    /// Returns whether a frame has samples in any parent, even a single one.
     pub fn is_moving(&self, child: &str) -> bool {
         self.frames.get(bare(child)).is_some_and(FrameLinks::is_moving)
     }
 
-    /// The frames below a frame that move in their parents, in the order of their names, and whether nothing moves
-    /// below each: a robot or a sensor in the frame of its map is such a frame.
+    /// Returns the moving frames below a frame, sorted by name, each with whether no frame moves below it. The robot or
+    /// sensor is such a frame below its map.
     pub(super) fn moving_below(&self, frame: &str) -> Vec<(String, bool)> {
         let frame = bare(frame);
         let mut children: HashMap<&str, Vec<&str>> = HashMap::new();
@@ -294,7 +292,7 @@ impl Transforms {
         let moves = |child: &str| self.frames.get(child).is_some_and(FrameLinks::moves);
         let moving: Vec<&str> =
             below(&children, frame).into_iter().filter(|child| *child != frame && moves(child)).collect();
-        // More are no robot.
+        // A robot has fewer moving frames.
         if moving.len() > MAX_MOVING {
             return Vec::new();
         }
@@ -306,17 +304,17 @@ impl Transforms {
         all
     }
 
-    /// The pose of the source frame in the target frame at a time: along the whole chain, each link between the samples
-    /// around the stamp. Nothing is extrapolated.
+    /// Returns the pose of the source frame in the target frame at a time. Each link of the chain is interpolated
+    /// between the samples around the stamp; poses are not extrapolated.
     ///
     /// # Errors
     ///
-    /// Why it is not known.
+    /// The reason why the pose is unknown.
     pub fn lookup(&self, target_frame: &str, source_frame: &str, stamp_ns: i64) -> Result<RigidPose, WhyNot> {
         self.lookup_among(target_frame, source_frame, stamp_ns, None)
     }
 
-    /// As [`Transforms::lookup`], with no other frames than these.
+    /// As [`Transforms::lookup`], restricted to the given frames.
     pub(super) fn lookup_among(
         &self,
         target_frame: &str,
@@ -334,7 +332,7 @@ impl Transforms {
         Ok(common_from_target.inverse().then(&common_from_source))
     }
 
-    /// The frames among which poses of a source in a target are searched.
+    /// Returns the frames to search for poses of a source in a target.
     ///
     /// # Errors
     ///
@@ -347,8 +345,8 @@ impl Transforms {
         Ok(SearchFrames { between, above })
     }
 
-    /// The frames on all upward paths from a source to a target, at whatever time; where there is no such path, the
-    /// frames above both.
+    /// Returns the frames on all upward paths from a source to a target, at any time. If there is no such path, returns
+    /// the ancestors of both.
     ///
     /// # Errors
     ///
@@ -374,7 +372,7 @@ impl Transforms {
         }
     }
 
-    /// The children of each frame above a frame, up to an end: what is above that does not matter.
+    /// Returns the children of each frame above a frame. The search stops at `end`, whose ancestors are irrelevant.
     fn children_above<'a>(&'a self, from: &'a str, end: Option<&str>) -> HashMap<&'a str, Vec<&'a str>> {
         let mut children: HashMap<&str, Vec<&str>> = HashMap::from([(from, Vec::new())]);
         let mut open = vec![from];
@@ -390,12 +388,12 @@ impl Transforms {
         children
     }
 
-    /// The frames whose place in their parents leads from one frame to another at a time: up to what is above both,
-    /// from each.
+    /// Returns the frames whose poses in their parents connect two frames at a time: from each frame up to their common
+    /// ancestor.
     ///
     /// # Errors
     ///
-    /// Why there is no such way.
+    /// The reason why the frames are not connected.
     pub fn links_between(
         &self,
         target_frame: &str,
@@ -406,8 +404,8 @@ impl Transforms {
         Ok(route.map(|steps| steps.iter().map(|step| step.child.to_owned()).collect()))
     }
 
-    /// The steps up to what is above both, from each. Doubtful ones are taken only where no others lead there: they do
-    /// not say where a frame was, but why that is not known.
+    /// Returns the steps from both frames up to their common ancestor. Doubtful steps are used only if no others lead
+    /// there: they give no pose, only the reason why it is unknown.
     fn route<'a>(
         &'a self,
         target: &'a str,
@@ -421,7 +419,7 @@ impl Transforms {
         let Some(above) = above else {
             return self.route_among(target, source, stamp_ns, Some(between));
         };
-        // A trusted upward path is the result of the full search, too.
+        // The full search would also return a trusted upward path.
         let trusted = |at: &'a str| {
             let steps = self.steps_at(at, stamp_ns)?;
             Ok(kept(steps, |step| step.is_trusted() && between.contains(step.parent)))
@@ -461,7 +459,7 @@ impl Transforms {
         self.frames.get(child).map_or(Vec::new(), |links| links.steps(child))
     }
 
-    /// The pose of the first frame in the parent of the last.
+    /// Returns the pose of the first frame in the parent of the last.
     fn along(&self, steps: &[Step<'_>], stamp_ns: i64) -> Result<RigidPose, WhyNot> {
         let mut pose = RigidPose::IDENTITY;
         for step in steps {
@@ -471,7 +469,7 @@ impl Transforms {
     }
 }
 
-/// All that is below a frame, by the children of each.
+/// Returns all frames below a frame, given the children of each.
 fn below<'a>(children: &HashMap<&'a str, Vec<&'a str>>, from: &str) -> HashSet<&'a str> {
     let mut found = HashSet::new();
     let mut open: Vec<&str> = vec![from];
@@ -485,8 +483,9 @@ fn below<'a>(children: &HashMap<&'a str, Vec<&'a str>>, from: &str) -> HashSet<&
     found
 }
 
-/// A target above the source is found first, then a source above the target, then what is above both. In a tree there
-/// is one way; in a loop the first one is that of the robot: what is above the frame of the map does not matter.
+/// Searches for the target above the source, then for the source above the target, then for a common ancestor. In a
+/// tree the path is unique. In a loop, the first path is the robot's, because frames above the map frame are
+/// irrelevant.
 fn route_by<'a>(
     target: &'a str,
     source: &'a str,
@@ -519,7 +518,7 @@ fn kept<'a>(mut steps: Vec<Step<'a>>, is_kept: impl Fn(&Step<'a>) -> bool) -> Ve
     steps
 }
 
-/// The names of a parent and a child.
+/// Checks and normalises the names of a parent and a child.
 fn names<'a>(parent: &'a str, child: &'a str) -> Result<(&'a str, &'a str), BadTransform> {
     let (parent, child) = (bare(parent), bare(child));
     if parent.is_empty() || child.is_empty() {
@@ -531,13 +530,13 @@ fn names<'a>(parent: &'a str, child: &'a str) -> Result<(&'a str, &'a str), BadT
     Ok((parent, child))
 }
 
-/// Whether a pose may be one: finite numbers, and a quaternion whose length is about 1.
+/// Returns whether a pose is valid: finite numbers, and a quaternion with a length of about 1.
 pub(super) fn is_pose(pose: &RigidPose) -> bool {
     let length = pose.quaternion.iter().map(|q| q * q).sum::<f64>().sqrt();
     pose.is_valid() && (length - 1.0).abs() <= MAX_LENGTH_ERROR
 }
 
-/// tf 1 wrote slashes before names, tf 2 does not know them.
+/// Strips the leading slashes of tf 1 names, which tf 2 does not use.
 fn bare(frame: &str) -> &str {
     frame.trim_start_matches('/')
 }

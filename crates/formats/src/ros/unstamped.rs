@@ -1,22 +1,22 @@
 use super::messages::StampedPose;
 
-/// Poses whose stamp is 0, as drivers without a clock leave it. Where no pose of a kind has a stamp, each is taken as
-/// of when it was recorded; where one has, 0 is a time as any other.
+/// Handles poses with stamp 0, as from drivers without a clock. If no pose of a kind has a stamp, recording times are
+/// used instead. If any pose has one, 0 is a valid time.
 #[derive(Debug, Default)]
 pub(super) struct Unstamped {
     held: Vec<StampedPose>,
-    /// When those that are held were recorded.
+    /// Recording times of the held poses.
     recorded_ns: Vec<i64>,
     has_stamps: bool,
-    /// Number of poses that are taken as of when they were recorded.
+    /// Number of poses that got their recording time as the stamp.
     pub(super) count: u64,
 }
 
-/// After so many poses without a stamp none is waited for.
+/// After this many poses without a stamp, the decision is made without waiting for more.
 const MAX_HELD: usize = 1000;
 
 impl Unstamped {
-    /// Takes a pose that was recorded then, and gives those whose stamps are decided to `take`.
+    /// Adds a pose with its recording time. Poses whose stamps are decided are passed to `take`.
     pub(super) fn sort(&mut self, pose: StampedPose, log_ns: i64, take: &mut dyn FnMut(StampedPose)) {
         if self.has_stamps || pose.header.stamp_ns != 0 {
             if !self.has_stamps {
@@ -33,7 +33,7 @@ impl Unstamped {
         }
     }
 
-    /// Gives those that are still held.
+    /// Passes the remaining poses to `take`.
     pub(super) fn finish(&mut self, take: &mut dyn FnMut(StampedPose)) {
         self.count += self.held.len() as u64;
         for (mut pose, log_ns) in self.held.drain(..).zip(self.recorded_ns.drain(..)) {
@@ -49,7 +49,7 @@ mod tests {
     use crate::poses::RigidPose;
     use crate::ros::messages::Header;
 
-    /// The stamps that come of poses with these stamps, recorded at 100, 101, ..
+    /// Returns the resulting stamps of poses recorded at 100, 101, ...
     fn stamps(poses: &[i64]) -> (Vec<i64>, u64) {
         let (mut unstamped, mut taken) = (Unstamped::default(), Vec::new());
         let mut take = |pose: StampedPose| taken.push(pose.header.stamp_ns);

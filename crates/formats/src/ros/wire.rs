@@ -1,20 +1,20 @@
 use std::fmt;
 
-/// How the messages of a topic are serialised.
+/// Serialization of the messages of a topic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Wire {
     /// ROS 1: little-endian, without padding.
     Ros1,
-    /// CDR of ROS 2: a header of four bytes says the endianness; numbers are aligned to their size.
+    /// CDR of ROS 2: a header of four bytes states the byte order; numbers are aligned to their size.
     Cdr,
 }
 
-/// What is wrong with the bytes of a message.
+/// Decoding error of a message.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct WireError {
-    /// Bytes of the message before the place.
+    /// Byte offset in the message.
     pub byte: usize,
-    /// What is wrong.
+    /// Reason.
     pub reason: String,
 }
 
@@ -29,27 +29,28 @@ impl std::error::Error for WireError {}
 /// Result of decoding.
 pub type Decoded<T> = std::result::Result<T, WireError>;
 
-/// Reads the bytes of one message, number after number.
+/// Sequential reader of a serialized message.
 #[derive(Clone, Debug)]
 pub struct WireReader<'a> {
     bytes: &'a [u8],
-    /// Bytes of the message, of which `bytes` may be the first only.
+    /// Length of the message. `bytes` may contain only its start.
     len: u64,
     at: usize,
     wire: Wire,
-    /// Alignment counts from here.
+    /// Origin for alignment.
     origin: usize,
-    /// Numbers are never aligned to more than this.
+    /// Upper bound for the alignment of numbers.
     most_alignment: usize,
     is_big_endian: bool,
 }
 
-/// Bytes of CDR's header.
+/// Size of the CDR header.
 const CDR_HEADER: usize = 4;
 
 macro_rules! numbers {
     ($($name:ident: $type:ty),*) => {$(
         #[doc = concat!("A number of type `", stringify!($type), "`.")]
+        /// Reads the next number.
         ///
         /// # Errors
         ///
@@ -64,23 +65,23 @@ macro_rules! numbers {
 impl<'a> WireReader<'a> {
     numbers!(u8: u8, u16: u16, i32: i32, u32: u32, u64: u64, f32: f32, f64: f64);
 
-    /// Begins with a message.
+    /// Starts reading a message.
     ///
     /// # Errors
     ///
-    /// A header of CDR that is missing or of a kind that ROS 2 does not write.
+    /// The CDR header is missing or of a kind that ROS 2 does not write.
     pub fn new(wire: Wire, bytes: &'a [u8]) -> Decoded<Self> {
         Self::of_start(wire, bytes, bytes.len() as u64)
     }
 
-    /// Begins with the first bytes of a message of `len` bytes.
+    /// Starts reading a message of `len` bytes from its first bytes.
     pub(super) fn of_start(wire: Wire, bytes: &'a [u8], len: u64) -> Decoded<Self> {
         let mut reader = Self { bytes, len, at: 0, wire, origin: 0, most_alignment: 1, is_big_endian: false };
         if wire == Wire::Ros1 {
             return Ok(reader);
         }
         let header: [u8; CDR_HEADER] = reader.array()?;
-        // The representations of the DDS-XTypes standard whose structures are plain: CDR, and CDR version 2.
+        // The encodings of the DDS-XTypes standard with plain structures: CDR and CDR version 2.
         let (is_big_endian, most_alignment) = match [header[0], header[1]] {
             [0, 0] => (true, 8),
             [0, 1] => (false, 8),
@@ -95,22 +96,22 @@ impl<'a> WireReader<'a> {
         Ok(Self { origin: CDR_HEADER, is_big_endian, most_alignment, ..reader })
     }
 
-    /// An error at the place that was reached.
+    /// Creates an error at the current position.
     pub fn error(&self, reason: impl Into<String>) -> WireError {
         WireError { byte: self.at, reason: reason.into() }
     }
 
-    /// How the message is serialised.
+    /// Returns the serialization of the message.
     pub fn wire(&self) -> Wire {
         self.wire
     }
 
-    /// Bytes that are left.
+    /// Returns the number of bytes left.
     pub fn remaining(&self) -> usize {
         usize::try_from(self.len).unwrap_or(usize::MAX).saturating_sub(self.at)
     }
 
-    /// The next bytes, as they are.
+    /// Reads raw bytes.
     ///
     /// # Errors
     ///
@@ -127,11 +128,11 @@ impl<'a> WireReader<'a> {
         Ok(bytes)
     }
 
-    /// The length of a sequence whose items take at least so many bytes each.
+    /// Reads the length of a sequence whose items take at least `least_item_bytes` bytes each.
     ///
     /// # Errors
     ///
-    /// More items than the message has room for.
+    /// The message is too short for the items.
     pub fn sequence(&mut self, least_item_bytes: usize) -> Decoded<usize> {
         let count = self.u32()? as usize;
         if count.checked_mul(least_item_bytes.max(1)).is_none_or(|bytes| bytes > self.remaining()) {
@@ -141,17 +142,17 @@ impl<'a> WireReader<'a> {
         Ok(count)
     }
 
-    /// A sequence of bytes.
+    /// Reads a sequence of bytes.
     ///
     /// # Errors
     ///
-    /// More bytes than the message has.
+    /// The message ends before them.
     pub fn byte_sequence(&mut self) -> Decoded<&'a [u8]> {
         let count = self.sequence(1)?;
         self.bytes(count)
     }
 
-    /// A sequence of bytes, as many of them as are at hand: where it begins in the message, and its length.
+    /// Reads a sequence of bytes, as far as they are available, and returns its offset in the message and its length.
     pub(super) fn start_of_bytes(&mut self) -> Decoded<(&'a [u8], u64, usize)> {
         let count = self.sequence(1)?;
         let (at, there) = (self.at, count.min(self.bytes.len().saturating_sub(self.at)));
@@ -160,29 +161,29 @@ impl<'a> WireReader<'a> {
         Ok((bytes, at as u64, count))
     }
 
-    /// A sequence of `f32`.
+    /// Reads a sequence of `f32`.
     ///
     /// # Errors
     ///
-    /// More numbers than the message has.
+    /// The message ends before them.
     pub fn f32_sequence(&mut self) -> Decoded<Vec<f32>> {
         let count = self.sequence(4)?;
         (0..count).map(|_| self.f32()).collect()
     }
 
-    /// A string. Bytes that are not UTF-8 are replaced.
+    /// Reads a string. Invalid UTF-8 is replaced.
     ///
     /// # Errors
     ///
-    /// More bytes than the message has.
+    /// The message ends before it.
     pub fn string(&mut self) -> Decoded<String> {
         let bytes = self.byte_sequence()?;
-        // CDR counts a NUL at the end. ROS 1 has none, but some writers put one there.
+        // CDR strings include a terminating NUL. ROS 1 strings do not, but some writers add one.
         let text = bytes.strip_suffix(&[0]).unwrap_or(bytes);
         Ok(String::from_utf8_lossy(text).into_owned())
     }
 
-    /// A time, in nanoseconds.
+    /// Reads a time in nanoseconds.
     ///
     /// # Errors
     ///
@@ -192,11 +193,11 @@ impl<'a> WireReader<'a> {
             Wire::Ros1 => i64::from(self.u32()?),
             Wire::Cdr => i64::from(self.i32()?),
         };
-        // At most 2^32 * 10^9 + 2^32: far below 2^63.
+        // At most 2^32 * 10^9 + 2^32, far below 2^63.
         Ok(seconds * 1_000_000_000 + i64::from(self.u32()?))
     }
 
-    /// The next bytes of a number, behind the padding before it.
+    /// Reads the bytes of a number after its alignment padding.
     fn array<const N: usize>(&mut self) -> Decoded<[u8; N]> {
         let beyond = (self.at.saturating_sub(self.origin)) % N.min(self.most_alignment).max(1);
         if beyond != 0 {

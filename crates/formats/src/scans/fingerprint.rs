@@ -3,7 +3,7 @@ use std::path::Path;
 use voxtile::scan::Pose;
 use voxtile::{Error, Result};
 
-/// Identifies an input: see [`ScanSource::fingerprint`](super::ScanSource::fingerprint).
+/// Fingerprint of an input; see [`ScanSource::fingerprint`](super::ScanSource::fingerprint).
 #[derive(Default)]
 pub(crate) struct Fingerprint {
     hasher: blake3::Hasher,

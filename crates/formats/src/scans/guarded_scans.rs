@@ -7,7 +7,7 @@ use crate::read::guard::catch;
 use std::path::{Path, PathBuf};
 use voxtile::{Error, Result};
 
-/// Scans whose reader may panic on a file that nobody thought of: that is an error with the name of the input, and ends
+/// Wraps a reader that may panic on an unexpected file. A panic becomes an error with the name of the input, and ends
 /// it.
 pub(crate) struct GuardedScans {
     source: Box<dyn ScanSource + Send>,
@@ -16,7 +16,6 @@ pub(crate) struct GuardedScans {
 }
 
 impl GuardedScans {
-    /// Opens scans.
     pub(crate) fn open(
         path: &Path,
         open: impl FnOnce() -> Result<Box<dyn ScanSource + Send>>,
@@ -25,7 +24,7 @@ impl GuardedScans {
         Ok(Box::new(Self { source, path: path.to_owned(), has_panicked: false }))
     }
 
-    /// After a panic the reader is not asked again: there is no other scan.
+    /// After a panic the reader is not used again, and there are no further scans.
     fn ask<T>(&mut self, none: T, call: impl FnOnce(&mut dyn ScanSource) -> Result<T>) -> Result<T> {
         if self.has_panicked {
             return Ok(none);

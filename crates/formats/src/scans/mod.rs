@@ -1,4 +1,4 @@
-//! Scans as a build takes them: points in memory or in a file, a pose, and what identifies them.
+//! Scans for a build: points in memory or in a file, a pose, and hashes that identify scans.
 
 mod fingerprint;
 mod guarded_scans;

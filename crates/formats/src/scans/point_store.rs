@@ -6,34 +6,34 @@ use voxtile::space::Point;
 use voxtile::{Error, Result};
 use voxtile_scratch::{ScratchFile, Window};
 
-/// The points of one scan in the sensor's frame, in metres: in memory up to a limit, the rest in a temporary file.
+/// Points of one scan in the sensor frame, in metres: in memory up to a limit, the others in a temporary file.
 ///
-/// The file is unnamed and is freed when the store is dropped.
+/// The file has no name and is freed when the store is dropped.
 #[derive(Debug, Default)]
 pub struct PointStore {
-    /// The last points; all of them if there is no file.
+    /// The last points, or all of them if there is no file.
     points: Vec<Point>,
     intensities: Option<Vec<f32>>,
-    /// Number of points before these, in the file.
+    /// Number of points in the file, which precede those in memory.
     filed: usize,
     file: Option<ScratchFile>,
     room: PointRoom,
 }
 
-/// How many points of a scan may be in memory, and where the rest goes.
+/// Memory limit for the points of a scan, and the folder for the others.
 #[derive(Clone, Debug)]
 pub struct PointRoom {
     most_points: usize,
     folder: PathBuf,
 }
 
-/// Bytes of a point in the file: the point, and the intensity, 0 if there is none. The bytes are native, as no other
-/// process reads them.
+/// Size of a point in the file: the point and its intensity (0 if there is none), in native byte order, because no
+/// other process reads the file.
 const RECORD_BYTES: usize = size_of::<Point>() + size_of::<f32>();
-/// Points that are read at a time.
+/// Number of points to read at once.
 const POINTS_AT_A_TIME: usize = 1 << 14;
-/// Points in memory that are passed at a time. The receiver copies them into the world frame, 6 MiB; and beam coherence
-/// works within one chunk, which should be a whole scan of most sensors.
+/// Number of points in memory to pass at once. The receiver copies them into the world frame (6 MiB), and beam
+/// coherence works within one chunk, which should be a whole scan for most sensors.
 const POINTS_HANDED_OVER: usize = 1 << 18;
 
 impl Default for PointRoom {
@@ -43,12 +43,12 @@ impl Default for PointRoom {
 }
 
 impl PointRoom {
-    /// Room for the points of so many bytes; more go to a file in a folder.
+    /// Creates a limit in bytes. Further points go to a file in `folder`.
     pub fn new(most_bytes: usize, folder: &Path) -> Self {
         Self { most_points: (most_bytes / RECORD_BYTES).max(POINTS_AT_A_TIME), folder: folder.to_owned() }
     }
 
-    /// An unnamed file in this folder.
+    /// Creates an unnamed temporary file.
     fn file(&self) -> Result<ScratchFile> {
         ScratchFile::in_folder(&self.folder).map_err(|error| {
             Error::io(&self.folder, "keep the points of a scan in a temporary file in", error)
@@ -61,12 +61,12 @@ impl PointRoom {
 }
 
 impl PointStore {
-    /// A store without points.
+    /// Creates an empty store.
     pub fn new(room: PointRoom) -> Self {
         Self { room, ..Self::default() }
     }
 
-    /// Removes all points; the next ones come with intensities or without.
+    /// Removes all points and sets whether the next ones have intensities.
     pub fn begin(&mut self, has_intensities: bool) {
         self.points.clear();
         self.intensities = has_intensities.then(Vec::new);
@@ -77,7 +77,7 @@ impl PointStore {
         &self.room
     }
 
-    /// Reserves memory for so many points.
+    /// Reserves memory for points, up to the limit.
     pub(crate) fn reserve(&mut self, points: usize) {
         let points = points.min(self.room.most_points);
         self.points.reserve_exact(points);
@@ -86,11 +86,11 @@ impl PointStore {
         }
     }
 
-    /// Adds a point; the intensity is ignored if the scan has none.
+    /// Adds a point. The intensity is ignored if the scan has none.
     ///
     /// # Errors
     ///
-    /// A file that cannot be written.
+    /// A file cannot be written.
     #[inline]
     pub fn push(&mut self, point: Point, intensity: f32) -> Result<()> {
         if self.points.len() == self.room.most_points {
@@ -107,7 +107,7 @@ impl PointStore {
     ///
     /// # Errors
     ///
-    /// A file that cannot be written.
+    /// A file cannot be written.
     pub(crate) fn extend(
         &mut self,
         mut points: impl ExactSizeIterator<Item = (Point, f32)> + Clone,
@@ -149,27 +149,27 @@ impl PointStore {
         Ok(())
     }
 
-    /// Number of points.
+    /// Returns the number of points.
     pub fn len(&self) -> usize {
         self.filed + self.points.len()
     }
 
-    /// Whether there are none.
+    /// Returns whether there are no points.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Whether each point has an intensity.
+    /// Returns whether every point has an intensity.
     pub fn has_intensities(&self) -> bool {
         self.intensities.is_some()
     }
 
-    /// Passes the points of a range to `take` in order, chunk by chunk, with their intensities if they have any. `take`
+    /// Passes the points of a range to `take` in order, chunk by chunk, with their intensities if there are any. `take`
     /// returns whether to continue.
     ///
     /// # Errors
     ///
-    /// A file that cannot be read.
+    /// A file cannot be read.
     pub fn for_each_chunk(&self, range: Range<usize>, take: &mut TakePoints<'_>) -> Result<()> {
         let in_file = range.start.min(self.filed)..range.end.min(self.filed);
         let in_memory = range.start.max(self.filed) - self.filed..range.end.max(self.filed) - self.filed;
@@ -200,7 +200,7 @@ impl PointStore {
         Ok(())
     }
 
-    /// The records of points in the file.
+    /// Maps a range of point records of the file.
     fn window(&self, first: usize, count: usize) -> Result<Window> {
         let window = match &self.file {
             Some(file) => file.window((first * RECORD_BYTES) as u64, count * RECORD_BYTES),
@@ -211,7 +211,7 @@ impl PointStore {
         })
     }
 
-    /// Points and intensities, if all are in memory.
+    /// Returns points and intensities, if all are in memory.
     pub(crate) fn into_parts(self) -> (Vec<Point>, Option<Vec<f32>>) {
         (self.points, self.intensities)
     }
@@ -224,7 +224,7 @@ mod tests {
     #[test]
     fn points_come_back_from_file_and_memory_in_order() {
         let folder = tempfile::TempDir::new().unwrap();
-        // More than is handed over at a time, from memory and from the file.
+        // More points than are passed at once, in memory and in the file.
         let count = POINTS_HANDED_OVER + 3 * POINTS_AT_A_TIME + 77;
         for (most_bytes, has_intensities) in [(0, true), (1 << 20, false), (usize::MAX, true)] {
             let mut store = PointStore::new(PointRoom::new(most_bytes, folder.path()));

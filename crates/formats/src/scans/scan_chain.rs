@@ -2,8 +2,8 @@ use super::stored_scan::StoredScan;
 use voxtile::Result;
 use voxtile::scan::Pose;
 
-/// Identifies a scan: a hash of its points and intensities, and another of its pose. Storage format and name do not
-/// matter.
+/// Fingerprint of a scan: a hash of its points and intensities, and another of its pose. It does not depend on storage
+/// format and file name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ScanMark {
     scan: [u8; MARK_BYTES],
@@ -11,9 +11,9 @@ pub struct ScanMark {
     has_points: bool,
 }
 
-/// Identifies the start of an input: hash chains over its scans and over their poses.
+/// Fingerprint of the start of an input: hash chains over its scans and over their poses.
 ///
-/// Its size does not grow with the scans, and it can be continued.
+/// It has a constant size and can be extended by further scans.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ScanChain {
     scans: u64,
@@ -22,15 +22,15 @@ pub struct ScanChain {
 }
 
 const MARK_BYTES: usize = 16;
-/// Points that are hashed at a time.
+/// Number of points to hash at once.
 const POINTS_AT_A_TIME: usize = 1024;
 
 impl ScanMark {
-    /// The mark of a scan.
+    /// Computes the fingerprint of a scan.
     ///
     /// # Errors
     ///
-    /// Points that cannot be read.
+    /// Points cannot be read.
     pub fn of(scan: &StoredScan) -> Result<Self> {
         let StoredScan { points_in_sensor: store, world_from_sensor, .. } = scan;
         let mut hasher = hasher("voxtile 1 scan");
@@ -59,40 +59,40 @@ impl ScanMark {
         Ok(Self { scan: mark(&hasher), pose: pose_mark(world_from_sensor), has_points: !store.is_empty() })
     }
 
-    /// A mark that tells nothing but whether the scan has points, for who asks nothing else: marking takes a tenth of
-    /// the time of reading.
+    /// Creates a fingerprint without hashes, for callers that only need to know whether the scan has points. Hashing
+    /// takes a tenth of the time of reading.
     pub fn without_content(scan: &StoredScan) -> Self {
         Self { scan: [0; MARK_BYTES], pose: [0; MARK_BYTES], has_points: !scan.points_in_sensor.is_empty() }
     }
 
-    /// Whether the scan has points: one without is like many others.
+    /// Returns whether the scan has points. Scans without points are not distinguishable.
     pub fn has_points(&self) -> bool {
         self.has_points
     }
 
-    /// The hash of the scan without its pose, as 32 hexadecimal digits.
+    /// Returns the hash of the scan without its pose, as 32 hexadecimal digits.
     pub fn scan_text(&self) -> String {
         to_text(&self.scan)
     }
 }
 
 impl ScanChain {
-    /// Parses a chain; `None` if the texts are not 32 hexadecimal digits each.
+    /// Parses a chain. Returns `None` if a text is not 32 hexadecimal digits.
     pub fn from_texts(scans: u64, scan_chain: &str, pose_chain: &str) -> Option<Self> {
         Some(Self { scans, scan_chain: from_text(scan_chain)?, pose_chain: from_text(pose_chain)? })
     }
 
-    /// Number of scans so far.
+    /// Returns the number of scans so far.
     pub fn scans(&self) -> u64 {
         self.scans
     }
 
-    /// The chain of the scans, as 32 hexadecimal digits.
+    /// Returns the chain over the scans, as 32 hexadecimal digits.
     pub fn scan_text(&self) -> String {
         to_text(&self.scan_chain)
     }
 
-    /// The chain of their poses, likewise.
+    /// Returns the chain over the poses, as 32 hexadecimal digits.
     pub fn pose_text(&self) -> String {
         to_text(&self.pose_chain)
     }
@@ -136,7 +136,7 @@ fn pose_mark(pose: &Pose) -> [u8; MARK_BYTES] {
     mark(&hasher)
 }
 
-/// The bits of a number; all NaN are equal.
+/// Returns the bits of a number. All NaN have equal bits.
 fn bits(number: f64) -> u64 {
     if number.is_nan() { f64::NAN.to_bits() } else { number.to_bits() }
 }

@@ -1,19 +1,19 @@
 use super::sensor_scan::SensorScan;
 use voxtile::scan::Pose;
 
-/// What a scan is, and where it may leave something: what a build in parts has to know of every scan before it begins.
+/// Content hash and horizontal extent of a scan. A build in shards needs them for every scan in advance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ScanReach {
-    /// Tells scans apart: a hash of points, intensities and pose, to the bit.
+    /// Hash of points, intensities and pose, to the last bit.
     pub content: [u8; 16],
-    /// The lowest and the highest x and y of the sensor and of all ends of rays, in metres, world frame, but for
-    /// rounding; `None` if no ray leaves anything.
+    /// Minimum and maximum x and y of the sensor and of all ray ends, in metres in the world frame, up to rounding.
+    /// `None` if no ray affects the map.
     pub bounds: Option<[[f64; 2]; 2]>,
 }
 
 impl ScanReach {
-    /// The reach of a scan whose rays are cut at `max_range_m`, and those without a return at `no_return_range_m` if
-    /// they clear anything.
+    /// Computes the reach of a scan. Rays are cut at `max_range_m`; rays without a return are cut at
+    /// `no_return_range_m`, or ignored if it is `None`.
     pub fn of(scan: &SensorScan, max_range_m: Option<f64>, no_return_range_m: Option<f64>) -> Self {
         let pose = &scan.world_from_sensor;
         Self { content: content_of(scan), bounds: bounds_of(scan, pose, max_range_m, no_return_range_m) }
@@ -56,7 +56,7 @@ fn bounds_of(
     let around = |origin: f64, low: f64, high: f64| {
         let (mut ends, mut bounds) = ([low, high], [origin, origin]);
         if let Some(range) = max_range_m {
-            // Not by `clamp`, which panics where the range is none.
+            // `clamp` would panic for a NaN range.
             ends = ends.map(|end| end.max(origin - range).min(origin + range));
         }
         if has_ends {
@@ -83,7 +83,7 @@ mod tests {
         }
     }
 
-    /// Every end of a ray by itself, as the mapper takes them.
+    /// Computes every ray end separately, as the mapper does.
     fn ends(scan: &SensorScan, max_range_m: Option<f64>, no_return_range_m: Option<f64>) -> Vec<[f64; 2]> {
         let [x, y, z] = scan.world_from_sensor.position_m();
         let mut ends = Vec::new();
@@ -126,7 +126,7 @@ mod tests {
                     let (lowest, highest) =
                         sides.fold((f64::MAX, f64::MIN), |(low, high), x| (low.min(x), high.max(x)));
                     prop_assert!(low[k] <= lowest + 1e-9 && high[k] >= highest - 1e-9);
-                    // Nothing else: where no range cuts rays, the bounds are those of the ends.
+                    // Where no range cuts rays, the bounds are exactly those of the ray ends.
                     if max_range.is_none() {
                         prop_assert!(low[k] >= lowest - 1e-9 && high[k] <= highest + 1e-9);
                     }
@@ -148,7 +148,7 @@ mod tests {
         others.push(SensorScan { intensities: Some(vec![1.0]), ..scan(vec![[1.0, 2.0, 3.0]], pose(0.0)) });
         assert_eq!(content(&one), content(&scan(vec![[1.0, 2.0, 3.0]], pose(0.0))));
         assert!(others.iter().all(|other| content(other) != content(&one)));
-        // Ranges that no map takes are told when it is made.
+        // Invalid ranges are reported elsewhere, when the map is created; here they must not panic.
         for range in [f64::NAN, -1.0, f64::INFINITY] {
             ScanReach::of(&one, Some(range), Some(range));
         }

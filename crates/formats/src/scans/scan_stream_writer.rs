@@ -7,29 +7,31 @@ use voxtile::space::Point;
 pub(crate) const MAGIC: &[u8; 8] = b"VXSCANS\n";
 pub(crate) const VERSION: u32 = 1;
 pub(crate) const FLAG_INTENSITIES: u32 = 1;
-/// The longest label, in bytes.
+/// Maximum length of a label, in bytes.
 pub(crate) const MAX_LABEL_BYTES: u32 = 4096;
 
-/// Writes scans as voxtile's scan stream, to a file (`.scans`) or to `voxtile build -`. `docs/format.md` has the bytes.
+/// Writer of voxtile's scan stream, for a file (`.scans`) or for `voxtile build -`. The format is described in
+/// `docs/format.md`.
 ///
-/// Points are in the sensor's frame as `f32`, so they are equally exact far from the world's origin.
+/// Points are stored in the sensor frame as `f32`, so their precision does not depend on the distance from the world
+/// origin.
 #[derive(Debug)]
 pub struct ScanStreamWriter<W> {
     out: W,
     has_intensities: bool,
-    /// The bytes of one scan.
+    /// Encoded scan.
     scan: Vec<u8>,
 }
 
 impl<W: Write> ScanStreamWriter<W> {
     /// Starts a stream, with or without an intensity per point.
     ///
-    /// The label identifies the scans: two streams with one label must be equal from the first scan on, so that a build
-    /// of one can be resumed with the other. An empty label promises nothing.
+    /// The label identifies the scans: two streams with the same label must contain the same scans from the start, so
+    /// that the build of one can be resumed with the other. A stream with an empty label cannot be resumed.
     ///
     /// # Errors
     ///
-    /// A label of more than 4096 bytes; errors of the stream.
+    /// The label has more than 4096 bytes, or the output fails.
     pub fn new(mut out: W, label: &str, has_intensities: bool) -> io::Result<Self> {
         let length = u32::try_from(label.len()).ok().filter(|&length| length <= MAX_LABEL_BYTES);
         let length = length.ok_or_else(|| invalid("the label has more than 4096 bytes"))?;
@@ -41,18 +43,18 @@ impl<W: Write> ScanStreamWriter<W> {
         Ok(Self { out, has_intensities, scan: Vec::new() })
     }
 
-    /// Adds a scan.
+    /// Writes a scan.
     ///
     /// # Errors
     ///
-    /// More than 2^32 - 1 points, a wrong number of intensities; errors of the stream.
+    /// The scan has more than 2^32 - 1 points or a wrong number of intensities, or the output fails.
     pub fn write(&mut self, scan: &SensorScan) -> io::Result<()> {
         let SensorScan { points_in_sensor, intensities, world_from_sensor, .. } = scan;
         let intensities = intensities.as_deref();
         self.write_points(world_from_sensor, points_in_sensor.iter().copied(), intensities)
     }
 
-    /// Adds a scan in the world frame: its pose is its origin.
+    /// Writes a scan whose points are in the world frame. Its pose is a translation to the ray origin.
     ///
     /// # Errors
     ///
@@ -87,11 +89,11 @@ impl<W: Write> ScanStreamWriter<W> {
         self.out.write_all(&self.scan)
     }
 
-    /// Flushes the stream.
+    /// Flushes the output.
     ///
     /// # Errors
     ///
-    /// Errors of the stream.
+    /// The output fails.
     pub fn flush(&mut self) -> io::Result<()> {
         self.out.flush()
     }

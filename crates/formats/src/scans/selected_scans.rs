@@ -5,19 +5,19 @@ use voxtile::Result;
 use voxtile::scan::Pose;
 use voxtile::space::Aabb;
 
-/// Which scans of an input are taken, and which of their points are left out.
+/// Selection of scans and points of an input.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Selection {
-    /// Scans that are passed over at the beginning.
+    /// Number of scans to skip at the beginning.
     pub first: u64,
-    /// Most scans that are taken; `None` for all.
+    /// Maximum number of scans to use. `None`: all.
     pub count: Option<u64>,
-    /// Of the others, one of so many is taken; 1 takes each.
+    /// Use every n-th of the remaining scans; 1 uses each.
     pub every: u64,
-    /// Points in this box are left out: the car sees itself. Both corners are inside.
+    /// Points in this box, including its boundary, are removed; for instance points on the vehicle itself.
     pub ignored: Option<Aabb>,
-    /// The frame of that box: the sensor's, or the body's if this says where the sensor is in it.
+    /// Pose of the sensor in the body, if the box is in the body frame. `None`: the box is in the sensor frame.
     pub body_from_sensor: Option<Pose>,
 }
 
@@ -28,12 +28,12 @@ impl Default for Selection {
 }
 
 impl Selection {
-    /// Whether everything is taken.
+    /// Returns whether all scans and points are selected.
     pub fn is_everything(&self) -> bool {
         self.first == 0 && self.count.is_none() && self.every <= 1 && self.ignored.is_none()
     }
 
-    /// These scans and points of a source.
+    /// Applies the selection to a source.
     pub fn of(self, source: Box<dyn ScanSource + Send>) -> Box<dyn ScanSource + Send> {
         if self.is_everything() {
             return source;
@@ -49,14 +49,14 @@ impl Selection {
     }
 }
 
-/// Some scans of a source, without some of their points.
+/// Source of the selected scans, without the ignored points.
 struct SelectedScans {
     source: Box<dyn ScanSource + Send>,
     selection: Selection,
-    /// Scans of the source that were passed over or taken.
+    /// Number of source scans that were skipped or used.
     passed: u64,
     taken: u64,
-    /// Scans that were passed over and cannot be read.
+    /// Number of skipped scans that could not be read.
     bad: u64,
     unfiltered: PointStore,
 }
@@ -66,16 +66,16 @@ impl SelectedScans {
         self.selection.count.is_some_and(|count| self.taken >= count)
     }
 
-    /// Moves to the next scan that is wanted; `false` if there is none.
+    /// Advances to the next selected scan. Returns `false` if there is none.
     fn seek(&mut self) -> Result<bool> {
         if self.is_at_end() {
             return Ok(false);
         }
-        // Behind the last number there is no scan.
+        // Saturates: there are no scans beyond the largest number.
         let passed_between = self.taken.saturating_mul(self.selection.every.max(1));
         let wanted = self.selection.first.saturating_add(passed_between);
         while self.passed < wanted {
-            // One at a time: a scan that cannot be read has a number as the others do, and was not wanted.
+            // Skip one at a time: an unreadable scan also has a number, and is no error if it is not selected.
             match self.source.skip(1) {
                 Ok(0) => return Ok(false),
                 Ok(_) => {}

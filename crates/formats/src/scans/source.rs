@@ -8,27 +8,27 @@ use voxtile::scan::Pose;
 /// Name and pose of a scan.
 #[derive(Clone, Debug)]
 pub struct ScanHead {
-    /// Name of the scan in its source: a file name or a number.
+    /// Name in its source: a file name or a number.
     pub name: String,
-    /// When it was taken, in nanoseconds since the epoch of its source, if that is known.
+    /// Time stamp, in nanoseconds since the epoch of the source, if known.
     pub stamp_ns: Option<i64>,
     /// Pose of the sensor: `world = R * p + t`.
     pub world_from_sensor: Pose,
 }
 
-/// Scans one at a time, in order.
+/// Source of scans, read one at a time in order.
 pub trait ScanSource {
-    /// Number of scans, if known before they are read.
+    /// Returns the number of scans, if known in advance.
     fn len_hint(&self) -> Option<usize>;
 
-    /// Reads the next scan; its points replace those in `points`. `None` after the last scan.
+    /// Reads the next scan; its points replace those in `points`. Returns `None` after the last scan.
     ///
     /// # Errors
     ///
-    /// A file that cannot be read or is invalid, with its path and offset or line.
+    /// A file cannot be read or is invalid. The error gives its path and the offset or line.
     fn read_scan(&mut self, points: &mut PointStore) -> Result<Option<ScanHead>>;
 
-    /// The next scan in memory, however large it is.
+    /// Returns the next scan in memory, whatever its size.
     ///
     /// # Errors
     ///
@@ -42,7 +42,7 @@ pub trait ScanSource {
         }))
     }
 
-    /// The next scan, with as many of its points in memory as `room` allows.
+    /// Returns the next scan, with as many of its points in memory as `room` allows.
     ///
     /// # Errors
     ///
@@ -58,7 +58,7 @@ pub trait ScanSource {
         }))
     }
 
-    /// Skips scans; returns how many there were.
+    /// Skips scans. Returns the number skipped, which is smaller at the end.
     ///
     /// # Errors
     ///
@@ -72,44 +72,46 @@ pub trait ScanSource {
         Ok(scans)
     }
 
-    /// After an error of [`ScanSource::next_scan`], moves past the bad scan, so that the next call returns the one
-    /// behind it; `false` if that is not possible.
+    /// After an error of [`ScanSource::next_scan`], skips the bad scan so that the next call returns the following one.
+    /// Returns `false` if that is impossible.
     fn pass_unread(&mut self) -> bool {
         false
     }
 
-    /// What the input is, for people.
+    /// Returns the display name of the input's format.
     fn format(&self) -> String {
         "scans".to_owned()
     }
 
-    /// Names of the fields of its points, as of the last scan, if they are known.
+    /// Returns the names of the point fields in the last scan, if known.
     fn fields(&self) -> Vec<String> {
         Vec::new()
     }
 
-    /// What a person should know of this input beside its scans, so far: parts that were cut off, scans without poses.
+    /// Returns remarks for the user about the input so far, for instance on truncated parts or scans without poses.
     fn remarks(&self) -> Vec<String> {
         Vec::new()
     }
 
-    /// The coordinate reference system of the world frame, as far as the input names one by now.
+    /// Returns the coordinate reference system of the world frame, if the input has named one so far.
     fn crs(&self) -> Option<String> {
         None
     }
 
-    /// The source of the poses.
+    /// Returns the origin of the poses.
     fn pose_source(&self) -> PoseSource {
         PoseSource::Scans
     }
 
-    /// Identifies this input, wherever it is stored: number and size of its files, and a BLAKE3 over their names, sizes
-    /// and bytes and the poses. Reads every file once. For a pipe: its label.
+    /// Returns a fingerprint of this input that does not depend on its location: number and size of its files, and a
+    /// BLAKE3 hash of their names, sizes and contents and of the poses. Reads every file once. For a pipe, it is the
+    /// label.
     ///
-    /// Maps of earlier versions identify their input by this; a [`ScanChain`](super::ScanChain) works scan by scan.
+    /// Maps created by older versions identify their input by this. A [`ScanChain`](super::ScanChain) identifies it
+    /// scan by scan.
     ///
     /// # Errors
     ///
-    /// A file that cannot be read, a stream without a label.
+    /// A file cannot be read, or a stream has no label.
     fn fingerprint(&self) -> Result<String>;
 }

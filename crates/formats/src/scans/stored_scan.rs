@@ -4,16 +4,16 @@ use voxtile::Result;
 use voxtile::scan::{Pose, ScanPoints, TakePoints};
 use voxtile::space::Point;
 
-/// A scan of any size in the sensor's frame, and the sensor's pose.
+/// Scan of any size in the sensor frame, with the sensor's pose.
 ///
-/// As [`ScanPoints`] its points are in the world frame.
+/// The [`ScanPoints`] implementation returns its points in the world frame.
 #[derive(Debug)]
 pub struct StoredScan {
-    /// Name of the scan in its source: a file name or a number.
+    /// Name in its source: a file name or a number.
     pub name: String,
-    /// When it was taken, in nanoseconds since the epoch of its source, if that is known.
+    /// Time stamp, in nanoseconds since the epoch of the source, if known.
     pub stamp_ns: Option<i64>,
-    /// End points in metres, sensor frame.
+    /// End points in the sensor frame, in metres.
     pub points_in_sensor: PointStore,
     /// Pose of the sensor: `world = R * p + t`.
     pub world_from_sensor: Pose,

@@ -3,12 +3,12 @@ use std::path::{Path, PathBuf};
 use voxtile::{Error, Result};
 use voxtile_scratch::ScratchFile;
 
-/// How much memory a reader may take. What exceeds it goes to temporary files.
+/// Memory budget of a reader. Data beyond it goes to temporary files.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Budget {
-    /// Bytes of memory for what grows with the input.
+    /// Memory for data that grows with the input, in bytes.
     pub bytes: usize,
-    /// Folder of temporary files; the system's own if `None`.
+    /// Folder for temporary files. `None`: the system's.
     pub scratch: Option<PathBuf>,
 }
 
@@ -19,45 +19,45 @@ impl Default for Budget {
 }
 
 impl Budget {
-    /// The memory of a reader that is given none.
+    /// Default budget of a reader.
     pub const DEFAULT_BYTES: usize = 64 << 20;
 
-    /// Bytes that a message, or another part of a file that cannot be read piece by piece, may take on top.
+    /// Additional memory for messages and other parts of a file that can only be read as a whole.
     #[cfg(any(feature = "las", feature = "e57", feature = "ros"))]
     const WHOLE_BYTES: u64 = 12 << 20;
 
-    /// The largest part of a file that is held in memory whole.
+    /// Returns the maximum size of a part of a file to hold in memory as a whole.
     #[cfg(any(feature = "las", feature = "e57", feature = "ros"))]
     pub(crate) fn whole_bytes(&self) -> u64 {
         Self::WHOLE_BYTES.saturating_add(self.bytes as u64)
     }
 
-    /// The base-2 logarithm of the largest window of zstd. Every decoder takes 8 MiB.
+    /// Returns the base-2 logarithm of the largest accepted zstd window. Every decoder supports 8 MiB.
     #[cfg(feature = "ros")]
     pub(crate) fn window_log(&self) -> u32 {
         self.bytes.saturating_mul(2).checked_ilog2().unwrap_or(0).clamp(23, 27)
     }
 
-    /// An unnamed file, which is freed with its last handle.
+    /// Creates an unnamed temporary file, which is freed with its last handle.
     pub(crate) fn file(&self) -> Result<File> {
         let folder = self.scratch.clone().unwrap_or_else(std::env::temp_dir);
         tempfile::tempfile_in(&folder).map_err(|error| self.cannot("make", error))
     }
 
-    /// A file that is read as memory.
+    /// Creates a temporary file that is read as memory.
     pub(crate) fn scratch_file(&self) -> Result<ScratchFile> {
         let folder = self.scratch.clone().unwrap_or_else(std::env::temp_dir);
         ScratchFile::in_folder(&folder).map_err(|error| self.cannot("make", error))
     }
 
-    /// An error of a temporary file.
+    /// Creates the error for a temporary file.
     pub(crate) fn cannot(&self, what: &'static str, error: std::io::Error) -> Error {
         let folder = self.scratch.clone().unwrap_or_else(std::env::temp_dir);
         cannot(&folder, what, error)
     }
 }
 
-/// An error of a temporary file in a folder.
+/// Creates the error for a temporary file in a folder.
 pub(super) fn cannot(folder: &Path, what: &'static str, error: std::io::Error) -> Error {
     let action = match what {
         "make" => "make a temporary file in",

@@ -1,17 +1,17 @@
 use super::file_part::FilePart;
 use voxtile::Result;
 
-/// Bytes in memory, or in a file.
+/// Bytes in memory or in a file.
 #[derive(Clone, Debug)]
 pub(crate) enum Bytes {
     Memory(Vec<u8>),
     File(FilePart),
 }
 
-/// Bytes that are read of a file at a time.
+/// Number of bytes to read from a file at once.
 const WINDOW_BYTES: u64 = 1 << 16;
 
-/// The bytes of a file that were read last.
+/// Cached range of a file.
 #[derive(Debug, Default)]
 pub(crate) struct Window {
     start: u64,
@@ -32,7 +32,7 @@ impl Bytes {
         }
     }
 
-    /// Bytes of memory that it takes.
+    /// Returns the memory in use, in bytes.
     pub(crate) fn in_memory(&self) -> usize {
         match self {
             Self::Memory(bytes) => bytes.capacity(),
@@ -40,7 +40,7 @@ impl Bytes {
         }
     }
 
-    /// A few bytes from a place on; `None` if there are not so many.
+    /// Returns the bytes at an offset, or `None` if there are too few.
     pub(crate) fn piece<'a>(
         &'a self,
         at: u64,
@@ -61,7 +61,7 @@ impl Bytes {
         let is_there = ahead.is_some_and(|ahead| ahead + count <= window.bytes.len());
         if !is_there {
             let bytes = (count as u64).max(WINDOW_BYTES).min(part.len() - at);
-            // At most a window, or what the caller asked for.
+            // At most a window or the requested size.
             window.bytes.resize(bytes as usize, 0);
             window.start = at;
             part.read_at(at, &mut window.bytes)?;

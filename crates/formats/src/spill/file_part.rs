@@ -4,11 +4,11 @@ use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 use voxtile::{Error, Result};
 
-/// A part of a file that several readers share.
+/// Part of a file that several readers share.
 #[derive(Clone, Debug)]
 pub(crate) struct FilePart {
     file: Arc<Mutex<File>>,
-    /// The file, or the folder of a temporary one.
+    /// Path of the file, or of the folder for an unnamed temporary file.
     path: Arc<Path>,
     start: u64,
     len: u64,
@@ -19,7 +19,7 @@ impl FilePart {
         Self { file, path, start, len }
     }
 
-    /// A part of a file of its own handle; the file has these bytes.
+    /// Opens a part of a file with a handle of its own. The caller ensures that the file has these bytes.
     #[cfg(feature = "ros")]
     pub(crate) fn open(path: &Path, start: u64, len: u64) -> Result<Self> {
         let file = File::open(path).map_err(|error| Error::io(path, "read", error))?;
@@ -40,20 +40,20 @@ impl FilePart {
         self.len
     }
 
-    /// A part of this part, as far as it goes.
+    /// Returns a part of this part, limited to its end.
     #[cfg(feature = "ros")]
     pub(crate) fn part(&self, start: u64, len: u64) -> Self {
         let start = start.min(self.len);
         Self { start: self.start + start, len: len.min(self.len - start), ..self.clone() }
     }
 
-    /// Reads it from its start.
+    /// Returns a reader that starts at the beginning of the part.
     #[cfg(feature = "ros")]
     pub(crate) fn reader(&self) -> impl Read + use<> {
         std::io::BufReader::with_capacity(1 << 16, PartReader { part: self.clone(), at: 0 })
     }
 
-    /// Fills the buffer from a place on.
+    /// Fills the buffer from an offset in the part.
     pub(crate) fn read_at(&self, at: u64, buffer: &mut [u8]) -> Result<()> {
         let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
         let read =
@@ -62,7 +62,7 @@ impl FilePart {
     }
 }
 
-/// Reads a part from its start to its end.
+/// Sequential reader of a part.
 #[cfg(feature = "ros")]
 struct PartReader {
     part: FilePart,

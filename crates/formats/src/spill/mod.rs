@@ -1,4 +1,4 @@
-//! What exceeds the memory of a reader: temporary files, and the bytes and records in them.
+//! Temporary files for data that exceeds the memory budget of a reader, and access to the bytes and records in them.
 
 mod budget;
 #[cfg(feature = "ros")]

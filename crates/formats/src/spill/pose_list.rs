@@ -7,21 +7,21 @@ use std::path::Path;
 use std::sync::{Arc, Mutex};
 use voxtile::Result;
 
-/// A pose and its time; 0 where it has none.
+/// Pose with its time stamp, which is 0 if there is none.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct TimedPose {
     pub(crate) stamp_ns: i64,
     pub(crate) pose: RigidPose,
 }
 
-/// Poses in memory or, if they are many, in a temporary file.
+/// List of poses, in memory or, if long, in a temporary file.
 #[derive(Clone, Debug)]
 pub(crate) enum PoseList {
     Memory(Vec<TimedPose>),
     File(FilePart),
 }
 
-/// Bytes of a pose in a file.
+/// Size of a pose in a file, in bytes.
 const POSE_BYTES: usize = 8 + 7 * 8;
 
 impl Default for PoseList {
@@ -50,7 +50,7 @@ impl PoseList {
         }
     }
 
-    /// A part of the poses.
+    /// Returns a range of the poses.
     #[cfg(feature = "ros")]
     pub(crate) fn part(&self, range: std::ops::Range<usize>) -> Self {
         let bytes = |poses: usize| poses as u64 * POSE_BYTES as u64;
@@ -60,7 +60,7 @@ impl PoseList {
         }
     }
 
-    /// Number of poses before a time, of a list in order of time.
+    /// Returns the number of poses before a time, for a list sorted by time.
     pub(crate) fn before(&self, stamp_ns: i64) -> Result<usize> {
         if let Self::Memory(poses) = self {
             return Ok(poses.partition_point(|pose| pose.stamp_ns < stamp_ns));
@@ -79,7 +79,7 @@ impl PoseList {
 }
 
 impl TimedPose {
-    /// Bytes in a file.
+    /// Size in a file, in bytes.
     pub(crate) const BYTES: usize = POSE_BYTES;
 
     pub(crate) fn encode(&self) -> [u8; POSE_BYTES] {
@@ -111,7 +111,7 @@ impl Default for TimedPose {
     }
 }
 
-/// Makes a list of poses.
+/// Writer of a list of poses.
 #[derive(Debug)]
 pub(crate) struct PoseWriter {
     budget: Budget,
@@ -122,7 +122,7 @@ pub(crate) struct PoseWriter {
 }
 
 impl PoseWriter {
-    /// Poses beyond so many bytes go to a file.
+    /// Creates a writer. Poses beyond `memory_bytes` go to a file.
     pub(crate) fn new(budget: &Budget, memory_bytes: usize) -> Self {
         let most_in_memory = memory_bytes / size_of::<TimedPose>();
         Self { budget: budget.clone(), most_in_memory, poses: Vec::new(), file: None, filed: 0 }

@@ -5,27 +5,27 @@ use std::fs::File;
 use std::io::{BufWriter, Read, Seek, SeekFrom, Write};
 use voxtile::Result;
 
-/// What is sorted in bounded memory.
+/// Fixed-size record that [`Sorter`] can sort.
 pub(crate) trait Record: Copy {
-    /// Bytes in a temporary file, at most [`MAX_RECORD_BYTES`].
+    /// Size in a temporary file, at most [`MAX_RECORD_BYTES`].
     const BYTES: usize;
 
-    /// Writes it to exactly as many bytes.
+    /// Encodes the record into exactly [`Self::BYTES`] bytes.
     fn encode(&self, bytes: &mut [u8]);
 
-    /// Reads it from them.
+    /// Decodes a record.
     fn decode(bytes: &[u8]) -> Self;
 
-    /// Records that are equal keep their order.
+    /// Compares two records. The sort is stable for equal ones.
     fn order(&self, other: &Self) -> Ordering;
 }
 
-/// The largest record.
+/// Limit for the size of a record.
 const MAX_RECORD_BYTES: usize = 128;
-/// Bytes that are read of a run at a time, at most; at least 16 records.
+/// Limit for the bytes of a run to read at once; at least 16 records are read.
 const MAX_BUFFER_BYTES: usize = 1 << 16;
 
-/// Sorts records in bounded memory: parts of them are sorted and written to a temporary file, then merged.
+/// External merge sort in bounded memory: sorted runs are written to a temporary file and then merged.
 #[derive(Debug)]
 pub(crate) struct Sorter<T> {
     memory_bytes: usize,
@@ -33,13 +33,13 @@ pub(crate) struct Sorter<T> {
     part: Vec<T>,
     most_records: usize,
     file: Option<BufWriter<File>>,
-    /// Records of each run that was written.
+    /// Number of records of each run in the file.
     runs: Vec<u64>,
 }
 
 impl<T: Record> Sorter<T> {
     pub(crate) fn new(budget: &Budget, memory_bytes: usize) -> Self {
-        // A stable sort takes half as much again.
+        // The stable sort needs half as much memory again.
         let most_records = (memory_bytes / 3 * 2 / size_of::<T>()).max(16);
         let budget = budget.clone();
         Self { memory_bytes, budget, part: Vec::new(), most_records, file: None, runs: Vec::new() }
@@ -80,7 +80,7 @@ impl<T: Record> Sorter<T> {
         Ok(())
     }
 
-    /// The records in order.
+    /// Returns the records in order.
     pub(crate) fn finish(mut self) -> Result<Sorted<T>> {
         if self.file.is_none() {
             self.part.sort_by(T::order);
@@ -102,7 +102,7 @@ impl<T: Record> Sorter<T> {
             runs.push(Run { at, end, buffer_bytes, buffer: Vec::new(), used: 0 });
             at = end;
         }
-        // Where there is a file, no record is left here.
+        // If there is a file, no records are left in memory.
         let here = std::mem::take(&mut self.part).into_iter();
         let mut sorted = Sorted { budget: self.budget, here, file, runs, next: BinaryHeap::new() };
         for run in 0..sorted.runs.len() {
@@ -112,7 +112,7 @@ impl<T: Record> Sorter<T> {
     }
 }
 
-/// A sorted part of the temporary file.
+/// Sorted run in the temporary file.
 #[derive(Debug)]
 struct Run {
     at: u64,
@@ -122,18 +122,18 @@ struct Run {
     used: usize,
 }
 
-/// The first record of a run that was not given yet.
+/// Head of a run during the merge.
 #[derive(Debug)]
 struct Next<T> {
     record: T,
     run: usize,
 }
 
-/// Records in order.
+/// Sorted records.
 #[derive(Debug)]
 pub(crate) struct Sorted<T> {
     budget: Budget,
-    /// All records, if they fitted in memory.
+    /// All records, if they fit in memory.
     here: std::vec::IntoIter<T>,
     file: Option<File>,
     runs: Vec<Run>,
@@ -141,7 +141,7 @@ pub(crate) struct Sorted<T> {
 }
 
 impl<T: Record> Sorted<T> {
-    /// The next record.
+    /// Returns the next record.
     pub(crate) fn next(&mut self) -> Result<Option<T>> {
         if let Some(record) = self.here.next() {
             return Ok(Some(record));
@@ -151,7 +151,7 @@ impl<T: Record> Sorted<T> {
         Ok(Some(record))
     }
 
-    /// Takes the next record of a run.
+    /// Reads the next record of a run.
     fn refill(&mut self, number: usize) -> Result<()> {
         let (Some(run), Some(file)) = (self.runs.get_mut(number), &mut self.file) else { return Ok(()) };
         if run.used >= run.buffer.len() {
@@ -172,7 +172,7 @@ impl<T: Record> Sorted<T> {
 }
 
 impl<T: Record> Ord for Next<T> {
-    /// The greatest of the heap is the first; of equal records, that of the earlier run.
+    /// The maximum of the heap is the first record in order; of equal records, the one from the earlier run.
     fn cmp(&self, other: &Self) -> Ordering {
         other.record.order(&self.record).then(other.run.cmp(&self.run))
     }

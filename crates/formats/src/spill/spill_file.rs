@@ -7,23 +7,23 @@ use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 use voxtile::Result;
 
-/// A temporary file for what exceeds the memory of a reader. Its space is used again once no part of it is; where parts
-/// overlap in time for long, another file takes its place, and each is freed with its last part.
+/// Temporary file for data that exceeds the memory of a reader. Its space is reused as soon as no part of it is in use.
+/// If parts overlap in time for long, another file replaces it, and each file is freed with its last part.
 #[derive(Debug)]
 pub(crate) struct SpillFile {
     budget: Budget,
     file: Option<Arc<Mutex<File>>>,
     end: u64,
-    /// A file of so many bytes takes no more.
+    /// File size at which a new file is started.
     most_bytes: u64,
 }
 
-/// How many bytes a stream has.
+/// Size of a stream.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum StreamSize {
-    /// As many as the file says; more are an error.
+    /// Size stated by the file. A longer stream is an error.
     Claimed(u64),
-    /// Unknown; more than these are an error.
+    /// Unknown size with an upper limit. A longer stream is an error.
     AtMost(u64),
 }
 
@@ -42,16 +42,16 @@ impl StreamSize {
     }
 }
 
-/// Why a stream is not whole.
+/// Reason why a stream is incomplete.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Complaint {
     pub(crate) reason: String,
-    /// The decoder failed: the bytes before that may be wrong, too, since many checksums come behind their data.
+    /// Whether the decoder failed. The bytes before may then be wrong too, because many checksums follow their data.
     pub(crate) is_broken: bool,
 }
 
 const MAX_FILE_BYTES: u64 = 256 << 20;
-/// Bytes that are copied at a time.
+/// Size of copy operations.
 const COPY_BYTES: usize = 1 << 16;
 
 impl SpillFile {
@@ -63,8 +63,8 @@ impl SpillFile {
         &self.budget
     }
 
-    /// Reads a stream to its end, or up to `most_bytes`: into memory as long as `memory_bytes` suffice, else into the
-    /// file. `see` gets the bytes in order. Returns also why the stream is not whole.
+    /// Reads a stream to its end or to the limit of `size`: into memory up to `memory_bytes`, else into the file. `see`
+    /// receives the bytes in order. Also returns the reason if the stream is incomplete.
     pub(crate) fn take(
         &mut self,
         mut input: impl Read,
@@ -77,7 +77,7 @@ impl SpillFile {
         let (most_bytes, limit) = (size.most(), size.most().saturating_add(1));
         let reason = format!("it holds more than the {most_bytes} bytes that it {}", size.word());
         let too_many = Complaint { reason, is_broken: false };
-        // What is announced to be larger does not pass through memory.
+        // Streams with a larger stated size go directly to the file.
         let first_bytes = match size {
             StreamSize::Claimed(claimed) if claimed >= memory_bytes as u64 => 0,
             _ => limit.min(memory_bytes as u64),

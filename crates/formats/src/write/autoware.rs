@@ -11,15 +11,15 @@ use std::path::{Path, PathBuf};
 const RECORD_BYTES: usize = 24;
 const METADATA: &str = "pointcloud_map_metadata.yaml";
 
-/// A folder as Autoware loads it: squares of the ground as PCD files of their own, and a list of them. One file is open
-/// at a time.
+/// Writer of an Autoware point cloud map folder: PCD files for squares of the ground, and a metadata file that lists
+/// them. Only one file is open at a time.
 pub(super) struct AutowareSink {
     folder: PathBuf,
     cell_m: f64,
     origin_m: [f64; 3],
     resolution_m: f64,
     points: ExternalSort<RECORD_BYTES>,
-    /// Points of each square: heads of files tell how many follow.
+    /// Number of points of each square, for the headers of the files.
     counts: BTreeMap<[i32; 2], u64>,
 }
 
@@ -49,7 +49,7 @@ impl AutowareSink {
         })
     }
 
-    /// The lower corner of a square, as a part of its file's name.
+    /// Returns the coordinate of a square's lower corner, used in its file name.
     fn corner(&self, cell: i32) -> i64 {
         i64::from(cell) * self.cell_m as i64
     }
@@ -86,7 +86,7 @@ impl VoxelSink for AutowareSink {
             );
             return Err(Error::argument("origin", reason));
         }
-        // Of what is written, so that no point lies outside its file's square.
+        // Uses the rounded coordinates, so that no point is outside of its file's square.
         let cell = [0, 1].map(|k: usize| (f64::from(place[k]) / self.cell_m).floor() as i32);
         *self.counts.entry(cell).or_default() += 1;
         let mut record = [0; RECORD_BYTES];

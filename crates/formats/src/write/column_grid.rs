@@ -2,14 +2,14 @@ use super::lattice::Lattice;
 use super::row::{VoxelRow, VoxelsHead};
 use super::{Error, Result};
 
-/// Most cells of a flat map.
+/// Limit for the cells of a 2D grid.
 const MAX_CELLS: u64 = 1 << 31;
 
-/// Columns of voxels, seen from above as a picture: its first row has the largest y.
+/// Grid of voxel columns as a top view. The first row has the largest y.
 #[derive(Clone, Debug)]
 pub(super) struct ColumnGrid<T> {
     lattice: Lattice,
-    /// The lowest voxel of the box around all.
+    /// Lowest voxel of the bounding box.
     lowest: [i64; 3],
     layers: i64,
     width: usize,
@@ -18,11 +18,11 @@ pub(super) struct ColumnGrid<T> {
 }
 
 impl<T: Copy> ColumnGrid<T> {
-    /// The columns of the box that voxels were announced in, once the first of them says where their indices begin.
+    /// Creates a grid for the bounding box in `head`. The first voxel relates indices to coordinates.
     ///
     /// # Errors
     ///
-    /// More cells than a flat map may have.
+    /// There are more cells than the limit.
     pub(super) fn new(head: &VoxelsHead, first: &VoxelRow, empty: T) -> Result<Self> {
         let lattice = Lattice::of(first, head.resolution_m);
         let [lowest, highest] = head.bounds_m.map(|corner| lattice.index_at(corner));
@@ -42,16 +42,16 @@ impl<T: Copy> ColumnGrid<T> {
         let mut cells = Vec::new();
         cells.try_reserve_exact(count).map_err(|_| too_large())?;
         cells.resize(count, empty);
-        // Neither is greater than their product, which was checked.
+        // Neither exceeds their product, which was checked.
         let (width, height) = (width as usize, height as usize);
         Ok(Self { lattice, lowest, layers: i64::try_from(layers).unwrap_or(i64::MAX), width, height, cells })
     }
 
-    /// The column of a voxel, and its layer above the lowest.
+    /// Returns the column of a voxel, and its layer above the lowest one.
     ///
     /// # Errors
     ///
-    /// A voxel outside the box that was announced.
+    /// The voxel is outside of the bounding box.
     pub(super) fn column(&mut self, voxel: &VoxelRow) -> Result<(&mut T, i64)> {
         let [x, y, z] = std::array::from_fn(|k| i64::from(voxel.index[k]) - self.lowest[k]);
         let inside = |at: i64, size: usize| usize::try_from(at).ok().filter(|&at| at < size);
@@ -65,28 +65,28 @@ impl<T: Copy> ColumnGrid<T> {
         cell.map(|cell| (cell, z)).ok_or_else(outside)
     }
 
-    /// Columns and rows.
+    /// Returns the numbers of columns and rows.
     pub(super) fn size(&self) -> [usize; 2] {
         [self.width, self.height]
     }
 
-    /// Number of layers of the box.
+    /// Returns the number of layers of the bounding box.
     pub(super) fn layers(&self) -> i64 {
         self.layers
     }
 
-    /// The lower corner of the box.
+    /// Returns the lower corner of the bounding box.
     pub(super) fn corner_m(&self) -> [f64; 3] {
         self.lattice.corner_m(self.lowest)
     }
 
-    /// Row by row from the largest y down, each from the smallest x.
+    /// Returns the cells row by row, from the largest y down, each row from the smallest x.
     pub(super) fn cells(&self) -> &[T] {
         &self.cells
     }
 }
 
-/// What there is to say of a flat map without voxels.
+/// Returns the error for a 2D grid without voxels.
 pub(super) fn nothing_to_draw() -> Error {
     Error::argument("flat map", "there are no voxels to draw; a picture needs at least one")
 }

@@ -15,32 +15,32 @@ use std::collections::BTreeMap;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::PathBuf;
 
-/// A Morton code of 96 bit and a point.
+/// Size of a record in the first sort: a 96-bit Morton code and a point.
 const CODED_BYTES: usize = 12 + POINT_BYTES;
-/// A level before that.
+/// Size of a record in the second sort: a level, then the above.
 const LEVELLED_BYTES: usize = 1 + CODED_BYTES;
 const NODE_BYTES: usize = 32;
 
-/// LAZ with levels of detail (COPC 1.0): points are sorted into the nodes of an octree, a chunk each.
+/// Writer of LAZ with levels of detail (COPC 1.0). Points are sorted into the nodes of an octree, one chunk per node.
 pub(super) struct CopcSink {
     out: OutFile,
     head: VoxelsHead,
     layout: LasLayout,
-    /// Fields and coordinates.
+    /// Records that describe fields and coordinates.
     common: Vec<Vlr>,
     scratch_folder: PathBuf,
     points: ExternalSort<CODED_BYTES>,
     cube: Option<Cube>,
 }
 
-/// The octree in the world.
+/// Cube of the octree in world coordinates.
 struct Cube {
     lattice: Lattice,
     lowest: [i64; 3],
     levels: Levels,
 }
 
-/// Where a node's points are in the file.
+/// Location of a node's points in the file.
 #[derive(Default)]
 struct Chunk {
     offset: u64,
@@ -84,7 +84,7 @@ impl Cube {
         Ok(morton(index))
     }
 
-    /// The record that a COPC file begins with.
+    /// Returns the COPC info record, which is first in the file.
     fn info(&self, resolution_m: f64, hierarchy: u64, hierarchy_bytes: u64) -> Vec<u8> {
         let half = 0.5 * self.levels.edge_voxels() * resolution_m;
         let [x, y, z] = self.lattice.corner_m(self.lowest).map(|corner| corner + half);
@@ -92,7 +92,7 @@ impl Cube {
         let mut info: Vec<u8> = [x, y, z, half, spacing].into_iter().flat_map(f64::to_le_bytes).collect();
         info.extend(hierarchy.to_le_bytes());
         info.extend(hierarchy_bytes.to_le_bytes());
-        // No times; reserved.
+        // No GPS times; reserved bytes.
         info.resize(160, 0);
         info
     }
@@ -149,7 +149,7 @@ impl VoxelSink for CopcSink {
         }
         compressor.done().map_err(refused)?;
         let mut out = compressor.into_inner();
-        // The table of chunks stands behind the last one, and its place before the first.
+        // The chunk table follows the last chunk, and its offset precedes the first one.
         let mut table = [0; 8];
         out.seek(SeekFrom::Start(table_at)).map_err(refused)?;
         out.read_exact(&mut table).map_err(refused)?;
@@ -179,7 +179,7 @@ fn code_of(bytes: [u8; 12]) -> u128 {
     bytes.iter().fold(0, |code, &byte| code << 8 | u128::from(byte))
 }
 
-/// Points by level, and in Morton order within: a node's points follow each other.
+/// Sorts points by level, then in Morton order, so that the points of a node are consecutive.
 fn by_level(
     points: ExternalSort<CODED_BYTES>,
     levels: &Levels,
@@ -199,7 +199,8 @@ fn by_level(
     Ok(levelled)
 }
 
-/// One page with all nodes. A node whose voxels all stand for coarser cells is there, too: readers come past it.
+/// Returns a single hierarchy page with all nodes. Nodes without own points are included, because readers traverse
+/// them.
 fn hierarchy(mut nodes: BTreeMap<NodeKey, Chunk>) -> Result<Vec<u8>> {
     let keys: Vec<NodeKey> = nodes.keys().copied().collect();
     for (mut level, mut place) in keys {
@@ -240,7 +241,7 @@ mod tests {
         let bytes = std::fs::read(&path).unwrap();
         let u64_at = |at: usize| u64::from_le_bytes(bytes[at..at + 8].try_into().unwrap()) as usize;
         assert_eq!(&bytes[377..381], b"copc");
-        // The info record stands behind the head of the file and its own.
+        // The info record follows the file header and its own header.
         let (page, page_bytes) = (u64_at(375 + 54 + 40), u64_at(375 + 54 + 48));
         let i32_at = |at: usize| i32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
         let mut by_level = [0; 3];
@@ -249,7 +250,7 @@ mod tests {
         }
         assert_eq!(by_level.iter().sum::<i32>(), 40_000);
         assert_eq!(by_level[0], 50 * 50);
-        // Chunks of a node each, in the order of the file, read by the library.
+        // One chunk per node in file order, read by the library.
         let mut reader = ::las::Reader::from_path(&path).unwrap();
         let data = reader.read_points(50_000).unwrap();
         let mut found: Vec<[i64; 3]> = data

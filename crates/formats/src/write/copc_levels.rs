@@ -1,56 +1,57 @@
-/// Voxels along the edge of a node at its own level of detail, as a power of two: 64.
+/// Voxels along the edge of a node at its level of detail, as a power of two: 64.
 const NODE_BITS: u32 = 6;
 
-/// An octree around voxels, and which of its levels each voxel is shown from.
+/// Octree around voxels that assigns each voxel to a level of detail.
 ///
-/// In Morton order, the first voxel of each cell stands for its cell: a voxel belongs to the coarsest level at which it
-/// is the first of a cell. So every voxel is in one node, and what is above a level looks like the whole, but coarser.
+/// In Morton order, the first voxel of each cell represents its cell. A voxel belongs to the coarsest level at which it
+/// is the first of a cell. Each voxel is thus in exactly one node, and the levels above form a coarser version of the
+/// whole.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Levels {
-    /// The edge of the whole, as a power of two of voxels.
+    /// Edge of the octree, as a power of two of voxels.
     bits: u32,
 }
 
-/// A node: its level, and its place along x, y and z.
+/// Key of a node: its level and its index along x, y and z.
 pub(super) type NodeKey = (u8, [u32; 3]);
 
 impl Levels {
-    /// An octree around so many voxels along its longest side, at most 2^32.
+    /// Creates an octree for this many voxels along the longest side, at most 2^32.
     pub(super) fn around(voxels: u64) -> Self {
         let bits = (NODE_BITS..32).find(|&bits| 1 << bits >= voxels).unwrap_or(32);
         Self { bits }
     }
 
-    /// The edge of the whole in voxels.
+    /// Returns the edge of the octree in voxels.
     pub(super) fn edge_voxels(&self) -> f64 {
         f64::from(self.bits).exp2()
     }
 
-    /// Distance of voxels at the coarsest level, in voxels.
+    /// Returns the distance between voxels at the coarsest level, in voxels.
     pub(super) fn spacing_voxels(&self) -> f64 {
         f64::from(self.bits - NODE_BITS).exp2()
     }
 
-    /// The level that a voxel is shown from, if this is the one before it in Morton order.
+    /// Returns the level of a voxel, given the previous voxel in Morton order.
     pub(super) fn level(&self, before: Option<u128>, code: u128) -> u8 {
         let Some(before) = before else {
             return 0;
         };
         let differ = before ^ code;
-        // Levels of the octree at which both are in the same cell.
+        // Depth down to which both voxels are in the same cell.
         let shared = self.bits - (128 - differ.leading_zeros()).div_ceil(3).min(self.bits);
-        // One level deeper they are apart; cells of a node are that much finer than the node.
+        // They are apart one level deeper. The cells of a node are finer than the node by `NODE_BITS`.
         (shared + 1).saturating_sub(NODE_BITS).min(self.bits - NODE_BITS) as u8
     }
 
-    /// The node that holds a voxel at a level.
+    /// Returns the node of a voxel at a level.
     pub(super) fn node(&self, level: u8, code: u128) -> NodeKey {
         let shift = self.bits.saturating_sub(u32::from(level));
         (level, indices(code).map(|index| index.checked_shr(shift).unwrap_or(0)))
     }
 }
 
-/// Bits of three numbers in turn, x lowest.
+/// Interleaves the bits of three numbers, x lowest.
 pub(super) fn morton(index: [u32; 3]) -> u128 {
     let mut code = 0;
     for bit in 0..32 {
@@ -61,7 +62,7 @@ pub(super) fn morton(index: [u32; 3]) -> u128 {
     code
 }
 
-/// The numbers of a Morton code.
+/// Splits a Morton code into its three numbers.
 fn indices(code: u128) -> [u32; 3] {
     let number =
         |k: usize| (0..32).fold(0, |number, bit| number | ((code >> (3 * bit + k) & 1) as u32) << bit);
@@ -96,7 +97,7 @@ mod tests {
             let level = levels.level(before, code);
             before = Some(code);
             counts[usize::from(level)] += 1;
-            // Down to its level, the voxel is the first of its cell; at its own, nobody else is there.
+            // The voxel is the first of its cell at its own level and at all finer levels.
             for depth in level..3 {
                 let cell = indices(code).map(|k| k >> (2 - depth));
                 if depth == level {
@@ -105,7 +106,7 @@ mod tests {
             }
         }
         assert_eq!(counts.iter().sum::<usize>(), codes.len());
-        // The coarsest level shows every cell of 4 voxels that anything is in.
+        // The coarsest level has a voxel for every nonempty cell of 4 voxels.
         let cells: std::collections::HashSet<_> =
             codes.iter().map(|&code| indices(code).map(|k| k >> 2)).collect();
         assert_eq!(counts[0], cells.len());

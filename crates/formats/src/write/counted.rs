@@ -2,7 +2,7 @@ use super::row::{VoxelRow, VoxelSink};
 use super::{Error, Result};
 use std::path::PathBuf;
 
-/// Lets through as many voxels as were announced, all of them finite: formats name their number up front.
+/// Sink that checks that all voxels are finite and as many as announced, because some formats store their number first.
 pub(super) struct Counted<'a> {
     inner: Box<dyn VoxelSink + 'a>,
     final_path: PathBuf,

@@ -4,7 +4,7 @@ use super::row::{VoxelRow, VoxelSink, VoxelsHead};
 use super::stream_out::StreamOut;
 use std::io::Write;
 
-/// Text with a header line; every number reads back to the same bits.
+/// Writer of CSV with a header line. Every number can be parsed back to the same bits.
 pub(super) struct CsvSink<'a> {
     out: StreamOut<'a>,
 }

@@ -7,14 +7,14 @@ use super::{Error, Result};
 use ::e57::{E57Writer, Record, RecordValue};
 use std::path::{Path, PathBuf};
 
-/// Three coordinates of 64 bit and a probability of 32.
+/// Three 64-bit coordinates and a 32-bit probability.
 const RECORD_BYTES: u64 = 28;
-/// Points that are read back at once.
+/// Number of points to read back at once.
 const BATCH: u64 = 4096;
 
-/// A cloud of E57: coordinates in double precision, probabilities as intensities.
+/// Writer of an E57 point cloud with coordinates in double precision and probabilities as intensities.
 ///
-/// The library's writer of a cloud borrows its file for as long as it lives, so points wait in a file of their own.
+/// The library's point writer borrows its file for its whole lifetime, so points are first stored in a temporary file.
 pub(super) struct E57Sink {
     out: OutFile,
     points: Spool,
@@ -69,8 +69,8 @@ impl VoxelSink for E57Sink {
     }
 }
 
-/// A coordinate system as the library may put it between `<![CDATA[` and `]]>`: an end within the text is divided among
-/// two such sections, which readers join.
+/// Prepares a coordinate system for a CDATA section by the library. `]]>` within the text is split between two
+/// sections, which readers join.
 fn as_cdata(crs: &str) -> Result<String> {
     let is_xml = |c: char| matches!(c, '\t' | '\n' | '\r' | ' '..='\u{fffd}' | '\u{10000}'..);
     if let Some(c) = crs.chars().find(|c| !is_xml(*c)) {
@@ -81,7 +81,7 @@ fn as_cdata(crs: &str) -> Result<String> {
     Ok(crs.replace("]]>", "]]]]><![CDATA[>"))
 }
 
-/// A name for a file or a cloud, as the format wants one: unlike in one file, and the same for the same voxels.
+/// Returns a GUID for a file or cloud. It is unique within a file and the same for the same voxels.
 fn guid(bytes: u64, number: u16) -> String {
     format!("{{766f7874-696c-{number:04x}-8000-{:012x}}}", bytes & 0xffff_ffff_ffff)
 }

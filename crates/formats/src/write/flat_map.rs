@@ -3,18 +3,18 @@ use super::column_grid::{ColumnGrid, nothing_to_draw};
 use super::height_range::HeightRange;
 use super::row::{VoxelRow, VoxelsHead};
 
-/// What is known of a column of voxels.
+/// State of a column of voxels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Column {
-    /// No voxel of it was seen.
+    /// No voxel of the column was observed.
     Unknown,
-    /// Voxels were seen, and none of them is occupied.
+    /// Voxels were observed, but none is occupied.
     Free,
     /// At least one voxel is occupied.
     Occupied,
 }
 
-/// A map seen from above, for robots that drive: a state for each column of voxels between two heights.
+/// 2D occupancy grid: a state for each column of voxels between two heights.
 #[derive(Clone, Debug)]
 pub(super) struct FlatMap {
     head: VoxelsHead,
@@ -23,7 +23,7 @@ pub(super) struct FlatMap {
 }
 
 impl FlatMap {
-    /// A map of what will be announced, of the voxels that have a part at these heights.
+    /// Creates a grid for the announced voxels within a range of heights.
     pub(super) fn new(head: &VoxelsHead, heights: HeightRange) -> Self {
         Self { head: head.clone(), heights, grid: None }
     }
@@ -32,7 +32,7 @@ impl FlatMap {
     ///
     /// # Errors
     ///
-    /// A box that has more columns than a flat map may have; a voxel outside of it.
+    /// The bounding box has more columns than the limit, or the voxel is outside of it.
     pub(super) fn put(&mut self, voxel: &VoxelRow) -> Result<()> {
         let grid = match &mut self.grid {
             Some(grid) => grid,
@@ -50,29 +50,29 @@ impl FlatMap {
         Ok(())
     }
 
-    /// Columns and rows.
+    /// Returns the numbers of columns and rows.
     ///
     /// # Errors
     ///
-    /// No voxel came.
+    /// There are no voxels.
     pub(super) fn size(&self) -> Result<[usize; 2]> {
         self.grid().map(ColumnGrid::size)
     }
 
-    /// The lower corner of the box around all voxels, in metres.
+    /// Returns the lower corner of the bounding box, in metres.
     ///
     /// # Errors
     ///
-    /// No voxel came.
+    /// There are no voxels.
     pub(super) fn corner_m(&self) -> Result<[f64; 3]> {
         self.grid().map(ColumnGrid::corner_m)
     }
 
-    /// Row by row from the largest y down, each from the smallest x.
+    /// Returns the columns row by row, from the largest y down, each row from the smallest x.
     ///
     /// # Errors
     ///
-    /// No voxel came.
+    /// There are no voxels.
     pub(super) fn columns(&self) -> Result<&[Column]> {
         self.grid().map(ColumnGrid::cells)
     }

@@ -9,18 +9,18 @@ use super::spool::Spool;
 use super::{Error, Result};
 use std::path::PathBuf;
 
-/// A brick and a place in it.
+/// Size of a sort record: a brick index and a voxel position in the brick.
 const RECORD_BYTES: usize = 15;
 
-/// The six indices of a face.
+/// Size of the six indices of a face.
 const INDEX_BYTES: u64 = 24;
 
-/// Heights from low to high: red, green, blue.
+/// Colours of heights from low to high: red, green, blue.
 const COLOURS: [[f64; 3]; 5] =
     [[68.0, 1.0, 84.0], [59.0, 82.0, 139.0], [33.0, 145.0, 140.0], [94.0, 201.0, 98.0], [253.0, 231.0, 37.0]];
 
-/// The surface of occupied voxels as binary glTF. Voxels are sorted into bricks, with those around each brick, so that
-/// faces at its border are seen exactly.
+/// Writer of the surface of occupied voxels as binary glTF. Voxels are sorted into bricks that include their
+/// neighbouring voxels, so that faces at brick borders are exact.
 pub(super) struct GlbSink {
     out: OutFile,
     head: VoxelsHead,
@@ -34,25 +34,25 @@ pub(super) struct GlbSink {
     most: [i32; 3],
 }
 
-/// How a vertex is written.
+/// Encoding of vertex positions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum VertexKind {
-    /// Whole numbers of 16 bits, which need the extension `KHR_mesh_quantization`.
+    /// 16-bit integers, which require the extension `KHR_mesh_quantization`.
     Short,
-    /// Whole numbers in single precision: exact up to 2^24.
+    /// Integers in single precision, exact up to 2^24.
     Single,
 }
 
-/// What a file says of its mesh.
+/// Properties of the mesh, for the file header.
 pub(super) struct Surface {
     pub(super) quads: u64,
     pub(super) kind: VertexKind,
     pub(super) resolution_m: f64,
-    /// The lower corner of all occupied voxels, as the map has it: z up.
+    /// Lower corner of all occupied voxels in the map frame (z up).
     pub(super) corner_m: [f64; 3],
-    /// Voxels along x, y and z.
+    /// Number of voxels along x, y and z.
     pub(super) size: [i64; 3],
-    /// Bounds of the vertices, as glTF has it: y up.
+    /// Bounds of the vertices in the glTF frame (y up).
     pub(super) least: [i64; 3],
     pub(super) most: [i64; 3],
     pub(super) crs: Option<String>,
@@ -221,13 +221,13 @@ impl Mesh {
         Ok(())
     }
 
-    /// Whether one more face fits: said before the scratch files hold more than any file can.
+    /// Checks that the file can hold one more face, before the scratch files grow beyond the limit.
     fn check_room(&self) -> Result<()> {
         let bytes = 4 * self.surface.kind.bytes() as u64 + INDEX_BYTES;
         if (self.surface.quads + 1) * bytes > u64::from(u32::MAX) { Err(too_large()) } else { Ok(()) }
     }
 
-    /// Where a height is among those that are coloured: 0 is the first colour, 1 the last.
+    /// Returns the position of a height in the coloured range: 0 is the first colour, 1 the last.
     fn share_of_height(&self, place: i64) -> f64 {
         match self.colour_heights_m {
             Some([low, high]) if high > low => {
@@ -263,7 +263,7 @@ fn too_large() -> Error {
     Error::argument("GLB", "the mesh has more than the 4 GiB of a file of this format; choose a region")
 }
 
-/// The colour of a height from 0 to 1, without transparency.
+/// Returns the opaque colour of a height from 0 to 1.
 fn colour(share: f64) -> [u8; 4] {
     let along = share.clamp(0.0, 1.0) * (COLOURS.len() - 1) as f64;
     let below = (along as usize).min(COLOURS.len() - 2);
@@ -278,7 +278,7 @@ mod tests {
     use super::*;
     use std::collections::HashSet;
 
-    /// Unit faces of a file: the middle of each, doubled, with its direction.
+    /// Returns the unit faces of a file: the centre of each, doubled, and its normal.
     fn faces(rows: &[VoxelRow], is_quantized: bool) -> Vec<([i64; 3], [i64; 3])> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.glb");
@@ -362,7 +362,7 @@ mod tests {
 
     #[test]
     fn faces_are_those_between_occupied_and_not() {
-        // Clumps around the borders of bricks, below zero as well, with a free voxel among them.
+        // Clusters around brick borders, also below zero, with a free voxel among them.
         let mut rows = Vec::new();
         for x in -35..35 {
             for y in [-33, -32, -1, 0, 1, 31, 32] {

@@ -1,10 +1,10 @@
 use super::glb::{Surface, VertexKind};
 use serde_json::{Value, json};
 
-/// The head of a glTF file: one mesh, its buffer, and where it is in the world.
+/// Returns the JSON header of a glTF file: one mesh, its buffer and its position in the world.
 ///
-/// Vertices are whole numbers of voxels, exact in single precision too; the node's scale and translation, in double
-/// precision, make them metres.
+/// Vertices are integer voxel coordinates, exact in single precision. The scale and translation of the node, in double
+/// precision, convert them to metres.
 pub(super) fn of(surface: &Surface) -> Value {
     let asset =
         json!({ "version": "2.0", "generator": concat!("voxtile-clouds ", env!("CARGO_PKG_VERSION")) });
@@ -24,7 +24,7 @@ pub(super) fn of(surface: &Surface) -> Value {
             "name": "voxels",
             "mesh": 0,
             "scale": [resolution_m, resolution_m, resolution_m],
-            // glTF's y is up, and its z is the map's -y.
+            // In glTF, y is up and z is the map's -y.
             "translation": [x, z, -(y + surface.size[1] as f64 * resolution_m)],
             "extras": {
                 "origin_m": [x, y, z],

@@ -1,17 +1,17 @@
 /// Voxels along the edge of a brick.
 pub(super) const BRICK: usize = 32;
-/// And of the layer around it.
+/// Edge including the layer of neighbours on both sides.
 const EDGE: usize = BRICK + 2;
 
-/// Occupied voxels of a cube and of the layer around it, so that what lies between two bricks is seen from both.
+/// Occupied voxels of a brick and of the layer around it, so that faces between two bricks are correct in both.
 pub(super) struct Brick {
     occupied: Vec<bool>,
 }
 
-/// A rectangle between occupied and not occupied voxels.
+/// Rectangle between occupied and other voxels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Quad {
-    /// Corners in voxels from the brick's lower corner, anticlockwise as seen from outside.
+    /// Corners in voxels from the brick's lower corner, counter-clockwise as seen from outside.
     pub(super) corners: [[u8; 3]; 4],
 }
 
@@ -24,7 +24,7 @@ impl Brick {
         self.occupied.fill(false);
     }
 
-    /// Adds a voxel; 0 is the layer below the brick, 1 its first own.
+    /// Adds a voxel. Index 0 is the layer below the brick, index 1 the first voxel of the brick.
     pub(super) fn insert(&mut self, place: [u8; 3]) {
         if let Some(voxel) = self.occupied.get_mut(at(place.map(usize::from))) {
             *voxel = true;
@@ -35,7 +35,7 @@ impl Brick {
         self.occupied.get(at(place)).copied().unwrap_or(false)
     }
 
-    /// The surface of the brick's own voxels, in few rectangles.
+    /// Emits the surface of the brick's own voxels as few rectangles.
     pub(super) fn quads(&self, emit: &mut dyn FnMut(Quad)) {
         let mut mask = [[false; BRICK]; BRICK];
         for axis in 0..3 {
@@ -78,7 +78,7 @@ fn at([x, y, z]: [usize; 3]) -> usize {
     (z * EDGE + y) * EDGE + x
 }
 
-/// Covers what is set with rectangles, row by row: as wide as they go, then as high.
+/// Covers the set cells with rectangles, row by row: first extended in width, then in height.
 fn rectangles(mask: &mut [[bool; BRICK]; BRICK], emit: &mut dyn FnMut([usize; 2], [usize; 2])) {
     for row in 0..BRICK {
         let mut column = 0;

@@ -2,7 +2,7 @@ use super::options::WriteOptions;
 use super::row::VoxelRow;
 use super::{Error, Result};
 
-/// The heights of voxels that a flat map takes.
+/// Range of heights of the voxels in a 2D grid.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct HeightRange {
     least_m: f64,
@@ -10,11 +10,11 @@ pub(super) struct HeightRange {
 }
 
 impl HeightRange {
-    /// The heights that are asked for; all, if none are.
+    /// Creates the range from the options; unlimited by default.
     ///
     /// # Errors
     ///
-    /// A range without any height.
+    /// The range is empty.
     pub(super) fn of(options: &WriteOptions) -> Result<Self> {
         let least_m = options.z_min_m.unwrap_or(f64::NEG_INFINITY);
         let most_m = options.z_max_m.unwrap_or(f64::INFINITY);
@@ -25,7 +25,7 @@ impl HeightRange {
         Err(Error::argument("z_min, z_max", reason))
     }
 
-    /// Whether a voxel of this size has a part between the two heights.
+    /// Returns whether a voxel overlaps the range.
     pub(super) fn meets(&self, voxel: &VoxelRow, resolution_m: f64) -> bool {
         let (center_m, half_m) = (voxel.center_m[2], 0.5 * resolution_m);
         center_m + half_m > self.least_m && center_m - half_m < self.most_m

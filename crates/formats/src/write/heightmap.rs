@@ -7,10 +7,11 @@ use super::{Error, Result};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// Values of a cell, but for the 0 of a column without an occupied voxel.
+/// Number of values for heights; 0 means a column without an occupied voxel.
 const VALUES: i64 = u16::MAX as i64;
 
-/// Heights of the topmost occupied voxels, as a picture of 16 bit with a world file and the scale beside it.
+/// Writer of the heights of the topmost occupied voxels as a 16-bit PNG, with a world file and a JSON file for the
+/// scale.
 pub(super) struct HeightmapSink {
     out: OutFile,
     head: VoxelsHead,
@@ -37,7 +38,7 @@ impl HeightmapSink {
     }
 }
 
-/// Layers of voxels that share a value: one, unless there are more layers than values.
+/// Number of voxel layers per value: one, unless there are more layers than values.
 fn layers_per_value(grid: &ColumnGrid<u16>) -> i64 {
     (grid.layers().max(1) - 1) / VALUES + 1
 }
@@ -91,7 +92,7 @@ impl VoxelSink for HeightmapSink {
         stream.finish().map_err(refused)?;
         writer.finish().map_err(refused)?;
 
-        // The middle of the upper left cell.
+        // World files refer to the centre of the upper left cell.
         let top = y + (height as f64 - 0.5) * resolution_m;
         let world = format!("{resolution_m}\n0\n0\n-{resolution_m}\n{}\n{top}\n", x + 0.5 * resolution_m);
         write_text(&self.world_file, &world)?;
@@ -120,7 +121,7 @@ mod tests {
     use super::super::testing::{head_of, row};
     use super::*;
 
-    /// The values of a heightmap of five voxels, row by row.
+    /// Returns the values of a heightmap of five voxels, row by row.
     fn values(options: &WriteOptions) -> Vec<u16> {
         let path = &options.final_path;
         let rows = [row([0, 0, -3], 0.9), row([0, 0, 5], 0.9), row([0, 0, 6], 0.1), row([1, 2, 0], 0.8)];
@@ -140,7 +141,7 @@ mod tests {
     fn only_heights_that_are_asked_for_count() {
         let folder = tempfile::tempdir().unwrap();
         let all = WriteOptions::beside(&folder.path().join("heights.png"));
-        // The voxel at 2.75 m is left out, and the one below it is the topmost.
+        // The voxel at 2.75 m is excluded, so the one below it is the topmost.
         assert_eq!(values(&WriteOptions { z_max_m: Some(2.5), ..all.clone() }), [0, 4, 0, 0, 1, 0]);
         assert_eq!(values(&WriteOptions { z_min_m: Some(0.5), ..all }), [0, 0, 0, 0, 9, 0]);
     }

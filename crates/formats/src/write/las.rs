@@ -6,7 +6,7 @@ use super::{Error, Result};
 use laz::{LasZipCompressor, LazItemRecordBuilder, LazVlr, LazVlrBuilder};
 use std::path::{Path, PathBuf};
 
-/// LAS 1.4, compressed or not: points in the order of the voxels.
+/// Writer of LAS 1.4 or LAZ. Points are in the order of the voxels.
 pub(super) struct LasSink {
     path: PathBuf,
     layout: LasLayout,
@@ -45,7 +45,7 @@ impl LasSink {
     }
 }
 
-/// How points of voxels are compressed.
+/// Returns the LASzip description of the compressed points.
 pub(super) fn laz_vlr(
     path: &Path,
     with_chunks: fn(LazVlrBuilder, u32) -> LazVlrBuilder,
@@ -56,7 +56,7 @@ pub(super) fn laz_vlr(
     Ok(with_chunks(LazVlrBuilder::new(items), chunk_size).build())
 }
 
-/// The record that tells readers how points are compressed.
+/// Returns the LASzip record.
 pub(super) fn laz_record(path: &Path, laz: &LazVlr) -> Result<::las::raw::Vlr> {
     let mut data = Vec::new();
     laz.write_to(&mut data).map_err(|error| Error::io(path, "write", error))?;

@@ -7,33 +7,34 @@ use ::las::raw::vlr::RecordLength;
 use ::las::raw::{Header, Vlr};
 use std::io::{Seek, SeekFrom};
 
-/// Bytes of a point: point format 6, log-odds as f64, the number of updates as i32.
+/// Size of a point: point format 6, log-odds as f64, number of updates as i32.
 pub(super) const POINT_BYTES: usize = 30 + EXTRA_BYTES as usize;
 pub(super) const EXTRA_BYTES: u16 = 12;
 pub(super) const POINT_FORMAT: u8 = 6;
-/// Set in the format of a point that is compressed.
+/// Bit of the point format that marks compressed points.
 pub(super) const COMPRESSED: u8 = 0x80;
-/// Bytes of the head of a file of LAS 1.4.
+/// Size of the LAS 1.4 header.
 const HEADER_BYTES: u16 = 375;
 
-/// How voxels become points of LAS 1.4: whole numbers of a scale, from an offset near them.
+/// Conversion of voxels to LAS 1.4 points: scaled integers relative to an offset near the voxels.
 #[derive(Clone, Debug)]
 pub(super) struct LasLayout {
-    /// A power of two, as all offsets are whole: coordinates come back without a rounding of their own.
+    /// A power of two. Since all offsets are integers, decoded coordinates have no additional rounding error.
     scale_m: f64,
     offset_m: [f64; 3],
-    /// What points were made so far.
+    /// Statistics of the points converted so far.
     points: u64,
     least: [i32; 3],
     most: [i32; 3],
 }
 
 impl LasLayout {
-    /// Fine enough that a center is a thousandth of a voxel off at most, as far as whole numbers of 32 bit allow it.
+    /// Chooses a scale so that the error of a centre is at most a thousandth of a voxel, or a coarser one if 32-bit
+    /// integers require it.
     ///
     /// # Errors
     ///
-    /// Voxels too far apart.
+    /// The voxels are too far apart.
     pub(super) fn of(head: &VoxelsHead) -> Result<Self> {
         let [low, high] = head.bounds_m;
         let offset_m: [f64; 3] = std::array::from_fn(|k| (0.5 * (low[k] + high[k])).round());
@@ -52,11 +53,11 @@ impl LasLayout {
         Ok(Self { scale_m, offset_m, points: 0, least: [i32::MAX; 3], most: [i32::MIN; 3] })
     }
 
-    /// A point.
+    /// Converts a voxel to a point.
     ///
     /// # Errors
     ///
-    /// A voxel far outside the box that was announced.
+    /// The voxel is far outside of the bounding box.
     pub(super) fn point(&mut self, voxel: &VoxelRow) -> Result<[u8; POINT_BYTES]> {
         let mut position = [0; 3];
         for (k, whole) in position.iter_mut().enumerate() {
@@ -75,7 +76,7 @@ impl LasLayout {
         point[..12].copy_from_slice([x, y, z].as_flattened());
         let intensity = (voxel.probability.clamp(0.0, 1.0) * 65535.0).round() as u16;
         point[12..14].copy_from_slice(&intensity.to_le_bytes());
-        // The first of one return; created, not classified.
+        // First of one return; classification "created, never classified".
         point[14] = 0x11;
         point[16] = 1;
         point[30..38].copy_from_slice(&voxel.log_odds.to_le_bytes());
@@ -83,7 +84,7 @@ impl LasLayout {
         Ok(point)
     }
 
-    /// Writes the head of the file: over what stood there, if points were written already.
+    /// Writes the header at the start of the file, overwriting an earlier one.
     pub(super) fn write_head(
         &self,
         out: &mut OutFile,
@@ -99,7 +100,7 @@ impl LasLayout {
         let mut by_return = [0; 15];
         by_return[0] = self.points;
         let header = Header {
-            // Well-known text is the only way to name a coordinate system with this point format.
+            // With this point format, well-known text is the only standard way to name a coordinate system.
             global_encoding: 1 << 4,
             version: ::las::Version::new(1, 4),
             system_identifier: padded("voxtile"),
@@ -139,7 +140,7 @@ impl LasLayout {
     }
 }
 
-/// What every file says of its points beside its head: the fields behind format 6, and where the world is.
+/// Returns the records of every file: the extra fields of points, and the coordinate system.
 pub(super) fn common_vlrs(options: &WriteOptions) -> Result<Vec<Vlr>> {
     let mut fields = extra_field("log_odds", 10, "log-odds of being occupied");
     fields.extend(extra_field("count", 6, "number of updates"));
@@ -150,8 +151,8 @@ pub(super) fn common_vlrs(options: &WriteOptions) -> Result<Vec<Vlr>> {
     Ok(vlrs)
 }
 
-/// The coordinate system. LAS 1.4 wants well-known text with this point format; a number of the EPSG register alone
-/// cannot become one here and goes where older versions keep it, among the keys of GeoTIFF.
+/// Returns the coordinate system record. LAS 1.4 requires well-known text with this point format. An EPSG code cannot
+/// be converted to it here, so it is stored as GeoTIFF keys, as in older versions.
 fn crs_vlr(crs: &str) -> Result<Vlr> {
     let Some(number) = crs.strip_prefix("EPSG:") else {
         let text = [crs.as_bytes(), &[0]].concat();
@@ -160,13 +161,13 @@ fn crs_vlr(crs: &str) -> Result<Vlr> {
     let number: u16 = number.parse().map_err(|_| {
         Error::argument("crs", format!("`{crs}` is no number of a projected system; give well-known text"))
     })?;
-    // Version 1.1.0 and three keys: projected, by this number, in metres.
+    // Key directory version 1.1.0 with three keys: projected model, EPSG code, unit metre.
     let keys = [[1, 1, 0, 3], [1024, 0, 1, 1], [3072, 0, 1, number], [3076, 0, 1, 9001]];
     let data = keys.as_flattened().iter().flat_map(|value| value.to_le_bytes()).collect();
     vlr("LASF_Projection", 34735, "coordinate system", data)
 }
 
-/// A record of variable length.
+/// Creates a variable length record.
 pub(super) fn vlr(user: &str, record_id: u16, description: &str, data: Vec<u8>) -> Result<Vlr> {
     let too_long = |_| Error::argument("LAS", format!("{} bytes of {description} are too many", data.len()));
     let length = u16::try_from(data.len()).map_err(too_long)?;
@@ -180,18 +181,18 @@ pub(super) fn vlr(user: &str, record_id: u16, description: &str, data: Vec<u8>) 
     })
 }
 
-/// A text, cut or filled up with zeros.
+/// Truncates a text or pads it with zeros.
 pub(super) fn padded<const N: usize>(text: &str) -> [u8; N] {
     let mut bytes = [0; N];
     bytes.iter_mut().zip(text.bytes()).for_each(|(to, from)| *to = from);
     bytes
 }
 
-/// The description of an extra field of points.
+/// Describes an extra field of points.
 fn extra_field(name: &str, data_type: u8, description: &str) -> Vec<u8> {
     let mut field = vec![0, 0, data_type, 0];
     field.extend(padded::<32>(name));
-    // Neither a value for nothing, nor bounds, nor a scale.
+    // No "no data" value, bounds and scale.
     field.extend([0; 4 + 5 * 24]);
     field.extend(padded::<32>(description));
     field

@@ -5,19 +5,19 @@ use super::point_cloud2::{FieldType, SCHEMA, encode};
 use super::row::{VoxelRow, VoxelSink, VoxelsHead};
 use std::path::Path;
 
-/// Most points of a cloud.
+/// Maximum number of points of a cloud.
 const MAX_POINTS: usize = 1 << 20;
 const TOPIC: &str = "/voxels";
 
-/// A recording of ROS 2 (MCAP) with clouds of whole tiles, as far as they fit.
+/// Writer of a ROS 2 recording (MCAP). Each cloud contains whole tiles, unless a tile exceeds the limit.
 ///
-/// Coordinates are in single precision, which all viewers know, unless that is too coarse where the map is.
+/// Coordinates are in single precision, which all viewers support, unless that is too coarse at the map's location.
 pub(super) struct McapSink {
     file: McapFile,
     frame: String,
     stamp_ns: u64,
     fields: Vec<(&'static str, FieldType)>,
-    /// Points of the cloud that is next, and where its last tile begins.
+    /// Points of the next cloud. `tile_start` is the offset of its last tile.
     points: Vec<u8>,
     most_points: usize,
     tile: Option<[i32; 3]>,
@@ -30,7 +30,7 @@ impl McapSink {
         let topic = Topic { name: TOPIC, type_name: "sensor_msgs/msg/PointCloud2", definition: SCHEMA };
         let file = McapFile::create(path, &topic)?;
         let fits = head.bounds_m.as_flattened().iter().all(|bound| {
-            // Half the distance of neighbouring numbers of single precision at that place.
+            // Half the distance of neighbouring single precision numbers at this location.
             bound.abs() * f64::from(f32::EPSILON) <= head.resolution_m / 16.0
         });
         let of = if fits { FieldType::Float32 } else { FieldType::Float64 };
@@ -59,7 +59,7 @@ impl McapSink {
         self.fields.iter().map(|(_, of)| of.bytes() as usize).sum()
     }
 
-    /// Writes the points up to a place as a cloud.
+    /// Writes the points up to an offset as a cloud.
     fn write_cloud(&mut self, end: usize) -> Result<()> {
         let end = end.min(self.points.len());
         if end == 0 {
@@ -67,7 +67,7 @@ impl McapSink {
         }
         let rest = self.points.split_off(end);
         let data = encode(self.stamp_ns, &self.frame, &self.fields, &self.points);
-        // A nanosecond apart, so that players keep their order.
+        // The recording times differ by a nanosecond, so that players keep the order.
         let log_ns = self.stamp_ns.saturating_add(u64::from(self.clouds));
         self.file.write(log_ns, self.stamp_ns, &data)?;
         self.clouds = self.clouds.saturating_add(1);
@@ -83,7 +83,7 @@ impl VoxelSink for McapSink {
             self.tile_start = self.points.len();
         }
         if self.points.len() >= self.most_points.saturating_mul(self.step()) {
-            // Before the last tile, unless it fills the cloud alone.
+            // End the cloud before its last tile, unless that is the only one.
             let end = if self.tile_start == 0 { self.points.len() } else { self.tile_start };
             self.write_cloud(end)?;
         }
@@ -115,7 +115,7 @@ mod tests {
     fn clouds_hold_whole_tiles_as_far_as_they_fit() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.mcap");
-        // Tiles of 16 voxels along x: 16 points each, and one of 64 that is cut.
+        // Tiles of 16 voxels along x: 16 points each, and one with 64 points, which is split.
         let mut rows: Vec<_> = (0..48).map(|x| row([x, 0, 0], 0.9)).collect();
         rows.extend((0..4).flat_map(|y| (48..64).map(move |x| row([x, y, 0], 0.9))));
         let mut sink = McapSink::create(&head_of(&rows), &path, &WriteOptions::beside(&path)).unwrap();
@@ -125,13 +125,13 @@ mod tests {
         let bytes = std::fs::read(&path).unwrap();
         let messages: Vec<_> =
             ::mcap::MessageStream::new(&bytes).unwrap().map(|message| message.unwrap()).collect();
-        // Behind the head of the CDR, stamp, frame and height stands the number of points.
+        // The number of points follows the CDR header, stamp, frame and height.
         let width = |data: &[u8]| u32::from_le_bytes(data[24..28].try_into().unwrap());
         let widths: Vec<u32> = messages.iter().map(|message| width(&message.data)).collect();
         assert_eq!(widths, [32, 16, 40, 24]);
         assert!(messages.is_sorted_by_key(|message| message.log_time));
 
-        // By the index alone, each chunk is found and its sum is right.
+        // The index finds every chunk, and its checksum is correct.
         let summary = ::mcap::Summary::read(&bytes).unwrap().unwrap();
         let stats = summary.stats.as_ref().unwrap();
         assert_eq!((stats.message_count, stats.chunk_count, stats.channel_count), (4, 4, 1));

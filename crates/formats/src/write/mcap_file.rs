@@ -2,17 +2,17 @@ use super::Result;
 use super::out_file::OutFile;
 use std::path::Path;
 
-/// The first and the last bytes of a file.
+/// First and last bytes of an MCAP file.
 const MAGIC: &[u8] = b"\x89MCAP0\r\n";
-/// Bytes of a record before its contents: its kind and its length.
+/// Size of a record's type and length.
 const RECORD_HEAD_BYTES: u64 = 9;
-/// Bytes of a message before its data: channel, sequence, two times.
+/// Size of a message before its data: channel, sequence number, two times.
 const MESSAGE_HEAD_BYTES: u64 = 2 + 4 + 8 + 8;
-/// The one schema and the one channel. A schema of number 0 would be none.
+/// IDs of the only schema and channel. A schema ID of 0 would mean no schema.
 const SCHEMA: u16 = 1;
 const CHANNEL: u16 = 1;
 
-/// Kinds of records, by <https://mcap.dev/spec>.
+/// Record types, see <https://mcap.dev/spec>.
 mod op {
     pub(super) const HEADER: u8 = 1;
     pub(super) const FOOTER: u8 = 2;
@@ -27,25 +27,25 @@ mod op {
     pub(super) const DATA_END: u8 = 15;
 }
 
-/// What the messages of a file are.
+/// Topic of the messages of a file.
 pub(super) struct Topic<'t> {
     pub(super) name: &'t str,
-    /// Type of ROS: `sensor_msgs/msg/PointCloud2`.
+    /// ROS message type, such as `sensor_msgs/msg/PointCloud2`.
     pub(super) type_name: &'t str,
-    /// Its definition, as `ros2msg`.
+    /// Message definition in `ros2msg` format.
     pub(super) definition: &'t str,
 }
 
-/// An MCAP file of ROS 2 with one topic: every message is a chunk of its own, uncompressed, with an index.
+/// Writer of a ROS 2 MCAP file with one topic. Every message is an uncompressed chunk of its own, with an index.
 pub(super) struct McapFile {
     out: OutFile,
-    /// The records of schema and channel, which the summary repeats.
+    /// Schema and channel records, which the summary repeats.
     schema: Vec<u8>,
     channel: Vec<u8>,
     chunks: Vec<Chunk>,
 }
 
-/// Where a chunk is.
+/// Location of a chunk.
 struct Chunk {
     log_ns: u64,
     offset: u64,
@@ -54,7 +54,7 @@ struct Chunk {
     index_bytes: u64,
 }
 
-/// The contents of records.
+/// Builder of record contents.
 #[derive(Default)]
 struct Contents(Vec<u8>);
 
@@ -74,7 +74,7 @@ impl Contents {
         self
     }
 
-    /// Behind their number of bytes; texts and maps are so.
+    /// Appends length-prefixed bytes, as used for texts and maps.
     fn sized(mut self, bytes: &[u8]) -> Self {
         self.0.extend((bytes.len() as u32).to_le_bytes());
         self.0.extend(bytes);
@@ -85,7 +85,7 @@ impl Contents {
         self.sized(text.as_bytes())
     }
 
-    /// The whole record.
+    /// Returns the complete record.
     fn record(self, kind: u8) -> Vec<u8> {
         [&[kind][..], &(self.0.len() as u64).to_le_bytes(), &self.0].concat()
     }
@@ -106,7 +106,7 @@ impl McapFile {
         Ok(Self { out, schema, channel, chunks: Vec::new() })
     }
 
-    /// Writes a message of the topic; the times of recording must not go back.
+    /// Writes a message of the topic. Recording times must not decrease.
     pub(super) fn write(&mut self, log_ns: u64, publish_ns: u64, data: &[u8]) -> Result<()> {
         let mut message = vec![op::MESSAGE];
         message.extend((MESSAGE_HEAD_BYTES + data.len() as u64).to_le_bytes());
@@ -125,7 +125,7 @@ impl McapFile {
         for part in [&chunk[..], &head, data] {
             self.out.write(part)?;
         }
-        // The one message begins with the chunk.
+        // The only message is at the start of the chunk.
         let entry = Contents::default().u64(log_ns).u64(0).0;
         let index = Contents::default().u16(CHANNEL).sized(&entry).record(op::MESSAGE_INDEX);
         self.out.write(&index)?;
@@ -139,9 +139,9 @@ impl McapFile {
         Ok(())
     }
 
-    /// Writes what finds the messages again.
+    /// Writes the summary with the indexes.
     pub(super) fn finish(mut self) -> Result<()> {
-        // No sum of all before it: chunks have their own.
+        // No checksum of the data section: chunks have their own.
         self.out.write(&Contents::default().u32(0).record(op::DATA_END))?;
         let start = self.out.len();
         let chunks: Vec<u8> = self.chunks.iter().flat_map(Chunk::index).collect();
@@ -159,7 +159,7 @@ impl McapFile {
         }
         let offsets_start = start + summary.len() as u64;
         summary.extend(offsets);
-        // The sum is of all from the summary's begin to the sum itself.
+        // The checksum covers the summary and the footer up to the checksum itself.
         let footer = Contents::default().u64(start).u64(offsets_start).u32(0).record(op::FOOTER);
         summary.extend(&footer[..footer.len() - size_of::<u32>()]);
         let sum = crc32fast::hash(&summary);
@@ -173,7 +173,7 @@ impl McapFile {
         let count = self.chunks.len() as u64;
         let times = || self.chunks.iter().map(|chunk| chunk.log_ns);
         let by_channel = Contents::default().u16(CHANNEL).u64(count).0;
-        // Messages; schemas, channels, attachments, metadata, chunks.
+        // Counts of messages, schemas, channels, attachments, metadata records and chunks.
         let counts = Contents::default().u64(count).u16(1).u32(1).u32(0).u32(0).u32(count as u32);
         let times = counts.u64(times().min().unwrap_or(0)).u64(times().max().unwrap_or(0));
         times.sized(&by_channel).record(op::STATISTICS)

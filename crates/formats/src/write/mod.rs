@@ -1,12 +1,12 @@
-//! Voxels as files for other programs: one format a file, and a row in the table of `registry.rs`.
+//! Writers of voxels for other programs, one format per file. `registry.rs` has the table of formats.
 //!
 //! ```text
-//! OutputFormats -> OutputFormat::open(VoxelsHead, WriteOptions) -> VoxelSink <- VoxelRow after VoxelRow, then finish
+//! OutputFormats -> OutputFormat::open(VoxelsHead, WriteOptions) -> VoxelSink <- sequence of VoxelRow, then finish
 //! ```
 //!
-//! A sink writes to the path that it is given; who calls renames it when it is whole. What cannot be written in the
-//! order of the voxels is sorted in files without names beside the output: memory does not grow with the voxels, but
-//! for the flat grids of `nav2` and `heightmap`.
+//! A sink writes to the given path; the caller renames the complete file. Data that cannot be written in voxel order is
+//! sorted in unnamed files in the output's folder. Memory does not grow with the voxels, except for the 2D grids of
+//! `nav2` and `heightmap`.
 
 mod autoware;
 mod column_grid;

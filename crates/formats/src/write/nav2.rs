@@ -6,7 +6,7 @@ use super::out_file::OutFile;
 use super::row::{VoxelRow, VoxelSink, VoxelsHead};
 use std::path::{Path, PathBuf};
 
-/// A flat map as nav2's map server loads it: a picture, and a `.yaml` beside it that names it.
+/// Writer of a 2D occupancy grid for nav2's map server: an image and a `.yaml` file that refers to it.
 pub(super) struct Nav2Sink {
     out: OutFile,
     resolution_m: f64,
@@ -38,8 +38,8 @@ impl VoxelSink for Nav2Sink {
             self.out.write(&greys)?;
         }
         let [x, y, _] = self.map.corner_m()?;
-        // nav2 compares with `<` and `>`: 0.196 is below the 0.19608 of an unknown cell, which its own saver's 0.25
-        // makes free.
+        // nav2 compares with `<` and `>`. 0.196 is below the 0.19608 of an unknown cell; with the 0.25 of nav2's own
+        // saver, unknown cells would be loaded as free.
         let yaml = format!(
             "image: {}\nmode: trinary\nresolution: {}\norigin: [{x:?}, {y:?}, 0.0]\nnegate: 0\noccupied_thresh: 0.65\n\
              free_thresh: 0.196\n",
@@ -62,7 +62,7 @@ fn grey_of(column: Column) -> u8 {
     }
 }
 
-/// A text of YAML that is nothing but a text; JSON's quotes are YAML's.
+/// Quotes a text for YAML. JSON string literals are valid YAML.
 pub(super) fn quoted(text: &str) -> String {
     serde_json::Value::from(text).to_string()
 }
@@ -73,7 +73,7 @@ mod tests {
     use super::super::testing::{head_of, row};
     use super::*;
 
-    /// States by the rule of nav2's loader, row by row from the top: `#` occupied, `.` free, `?` unknown.
+    /// Returns the states as loaded by nav2's rule, row by row from the top: `#` occupied, `.` free, `?` unknown.
     fn map(rows: &[VoxelRow], z_m: [Option<f64>; 2]) -> Vec<String> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("map.pgm");
@@ -102,7 +102,7 @@ mod tests {
     }
 
     fn rows() -> Vec<VoxelRow> {
-        // Voxels of 0.5 m. A column with free below occupied, one that is free, one that is occupied above 2 m alone.
+        // Voxels of 0.5 m: a column with free below occupied, a free one, and one that is only occupied above 2 m.
         vec![
             row([-1, 2, 0], 0.2),
             row([-1, 2, 1], 0.9),
@@ -120,7 +120,7 @@ mod tests {
 
     #[test]
     fn heights_choose_what_counts() {
-        // From 2 m on lies the voxel that begins there, and below is what ends there.
+        // A voxel that begins at 2 m is above the limit, and one that ends there is below.
         assert_eq!(map(&rows(), [None, Some(2.0)]), ["??.", "#?."]);
         assert_eq!(map(&rows(), [Some(0.5), None]), ["??#", "#??"]);
         assert_eq!(map(&rows(), [Some(1.0), Some(1.25)]), ["???", ".??"]);

@@ -6,7 +6,8 @@ use super::zip_store::ZipStore;
 use std::io::Read;
 use std::path::Path;
 
-/// Columns as arrays of NumPy in an archive. Each waits in a file of its own until the next can follow it.
+/// Writer of columns as NumPy arrays in an archive. Each column is stored in a temporary file until the archive is
+/// written.
 pub(super) struct NpzSink {
     zip: ZipStore,
     columns: Vec<Column>,
@@ -14,7 +15,7 @@ pub(super) struct NpzSink {
 
 struct Column {
     name: &'static str,
-    /// The head of a `.npy` file: type and shape.
+    /// Header of the `.npy` file: type and shape.
     head: Vec<u8>,
     crc: crc32fast::Hasher,
     spool: Spool,
@@ -75,7 +76,7 @@ impl Column {
     }
 }
 
-/// The head of a `.npy` file, version 1.0: a dictionary in the words of Python, filled up to a multiple of 64 bytes.
+/// Returns the header of a `.npy` file, version 1.0: a Python dictionary literal, padded to a multiple of 64 bytes.
 fn npy_head(of: &str, shape: &str) -> Vec<u8> {
     let mut words = format!("{{'descr': '{of}', 'fortran_order': False, 'shape': {shape}, }}");
     while (10 + words.len() + 1) % 64 != 0 {
@@ -145,7 +146,7 @@ mod tests {
     #[test]
     fn large_archives_say_64_bit() {
         let bytes = archive(100);
-        // The record of 64 bit and its locator stand before the old end.
+        // The 64-bit end record and its locator precede the classic end record.
         let end = bytes.len() - 22;
         assert_eq!(bytes[end..end + 4], 0x0605_4b50_u32.to_le_bytes());
         assert_eq!(bytes[end - 20..end - 16], 0x0706_4b50_u32.to_le_bytes());

@@ -1,40 +1,39 @@
 use super::{Error, Result};
 use std::path::{Path, PathBuf};
 
-/// How voxels are written.
+/// Settings for writing voxels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WriteOptions {
-    /// The name that the output has in the end: files beside it, and names within it, follow this one.
+    /// Final path of the output. The names of companion files, and names within files, are derived from it.
     pub final_path: PathBuf,
-    /// Where files beside the output are written, under names that follow the final one: `map.yaml`, `map.pgw`.
+    /// Folder for companion files, named after the output: `map.yaml`, `map.pgm`.
     pub companion_folder: PathBuf,
-    /// Where files without a name are kept until the output is whole. They need about as much room as the output.
+    /// Folder for unnamed temporary files. They need about as much space as the output.
     pub scratch_folder: PathBuf,
-    /// The coordinate reference system that the coordinates are in, in metres: well-known text or, where only its
-    /// number is known, `EPSG:25832`. Formats that name none leave it out.
+    /// Coordinate reference system of the coordinates, in metres: well-known text, or `EPSG:25832` if only the code is
+    /// known. Ignored by formats that cannot store it.
     pub crs: Option<String>,
-    /// Flat maps and heightmaps: voxels that reach above this height alone, in metres.
+    /// 2D grids and heightmaps: only voxels that reach above this height, in metres.
     pub z_min_m: Option<f64>,
-    /// Flat maps and heightmaps: voxels that reach below this height alone, in metres.
+    /// 2D grids and heightmaps: only voxels that reach below this height, in metres.
     pub z_max_m: Option<f64>,
     /// Autoware: edge of the square of a file, in whole metres.
     pub cell_m: f64,
-    /// Where in the map the file's coordinates begin, in metres: what is to be added to the centers of voxels. Formats
-    /// without room for it leave it out.
+    /// Origin of the file's coordinates in the map, in metres: the offset to add to them. Ignored by formats that
+    /// cannot store it.
     pub origin_m: [f64; 3],
-    /// Meshes: the heights of the first and the last colour, in metres; of the lowest and highest voxel if not given.
+    /// Meshes: heights of the first and the last colour, in metres. `None`: those of the lowest and the highest voxel.
     pub colour_heights_m: Option<[f64; 2]>,
-    /// Meshes: positions are numbers of 16 bits where these suffice (`KHR_mesh_quantization`), which not every program
-    /// reads.
+    /// Meshes: 16-bit positions where these suffice (`KHR_mesh_quantization`). Not all programs support them.
     pub is_quantized: bool,
-    /// Recordings: the frame of the clouds.
+    /// Recordings: frame of the clouds.
     pub frame: String,
-    /// Recordings: the time of the clouds, in nanoseconds since 1970.
+    /// Recordings: time stamp of the clouds, in nanoseconds since 1970.
     pub stamp_ns: u64,
 }
 
 impl WriteOptions {
-    /// All that follows from where the output ends up: files beside it and scratch files lie in its folder.
+    /// Creates options for an output path. Companion and temporary files are in its folder.
     pub fn beside(final_path: &Path) -> Self {
         let folder = match final_path.parent() {
             Some(folder) if !folder.as_os_str().is_empty() => folder.to_owned(),
@@ -56,7 +55,7 @@ impl WriteOptions {
         }
     }
 
-    /// The final name without its folder.
+    /// Returns the final file name.
     pub(super) fn final_name(&self) -> Result<&str> {
         let name = self.final_path.file_name().and_then(|name| name.to_str());
         name.ok_or_else(|| {
@@ -65,12 +64,12 @@ impl WriteOptions {
         })
     }
 
-    /// Where a file beside the output is written: its name is the final one with another end. `own` is the end that the
-    /// output itself should have.
+    /// Returns the path of a companion file: the final name with another extension. `own` is the recommended extension
+    /// of the output itself.
     pub(super) fn companion(&self, extension: &str, own: &str) -> Result<PathBuf> {
         let name = self.final_name()?;
         let beside = Path::new(name).with_extension(extension);
-        // Some disks take names that differ in case for one.
+        // Some file systems are case-insensitive.
         if beside.to_str().is_some_and(|beside| beside.eq_ignore_ascii_case(name)) {
             let hint = self.final_path.with_extension(own);
             let reason =

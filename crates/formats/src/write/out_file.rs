@@ -3,17 +3,17 @@ use std::fs::File;
 use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-/// A file that is written; its errors name it.
+/// Output file. Its errors contain the path.
 pub(super) struct OutFile {
     path: PathBuf,
     out: BufWriter<File>,
-    /// Bytes that were written.
+    /// Number of bytes written.
     len: u64,
 }
 
 impl OutFile {
     pub(super) fn create(path: &Path) -> Result<Self> {
-        // Readable as well: writers of some formats go back and read what they wrote.
+        // Also readable: some format writers read back what they wrote.
         let mut options = File::options();
         let file = options.read(true).write(true).create(true).truncate(true).open(path);
         let file = file.map_err(|error| Error::io(path, "create", error))?;
@@ -24,7 +24,7 @@ impl OutFile {
         &self.path
     }
 
-    /// Bytes that were written.
+    /// Returns the number of bytes written.
     pub(super) fn len(&self) -> u64 {
         self.len
     }
@@ -35,7 +35,7 @@ impl OutFile {
         Ok(())
     }
 
-    /// Appends all of another file.
+    /// Appends the contents of another file.
     pub(super) fn append(&mut self, from: &mut dyn Read) -> Result<u64> {
         let copied = io::copy(from, &mut self.out).map_err(|error| self.refused(error))?;
         self.len += copied;
@@ -51,7 +51,7 @@ impl OutFile {
     }
 }
 
-/// For libraries that write by themselves. The length that [`OutFile::len`] gives is that of the farthest byte.
+/// For libraries that seek while writing. [`OutFile::len`] then returns the end of the furthest write.
 impl Write for OutFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let written = self.out.write(bytes)?;

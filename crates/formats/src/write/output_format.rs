@@ -7,71 +7,73 @@ use std::io::{BufWriter, Write};
 use std::path::Path;
 use voxtile::octree::OctreeFormat;
 
-/// A format that maps are written in: a row of [`OutputFormats`](super::OutputFormats).
+/// Output format of maps: a row of [`OutputFormats`](super::OutputFormats).
 #[derive(Clone, Copy, Debug)]
 pub struct OutputFormat {
-    /// Its name, as a person types it: `copc`.
+    /// Name in options, such as `copc`.
     pub name: &'static str,
-    /// The end of its files' names without the dot: `copc.laz`. `None` for a folder, which its name alone asks for.
+    /// File extension without the dot, such as `copc.laz`. `None` for a folder format, which is only selected by its
+    /// name.
     pub extension: Option<&'static str>,
-    /// What it is, for help texts.
+    /// Description for help texts.
     pub help: &'static str,
-    /// The feature of this crate that it needs, if any.
+    /// Cargo feature that the format requires, if any.
     pub feature: Option<&'static str>,
-    /// The options that it takes, beside an origin.
+    /// Supported options, apart from an origin.
     pub takes: &'static [OutputOption],
-    /// Where its coordinates may begin.
+    /// Supported origins of coordinates.
     pub origin: Origin,
-    /// Why it takes no other option, and what to do.
+    /// Reason why other options are refused, with advice.
     pub refusal: &'static str,
-    /// Whether a terminal can show it.
+    /// Whether a terminal can display it.
     pub is_text: bool,
-    /// Whether it tells free voxels from such that nobody saw, and so has all observed voxels unless asked otherwise.
+    /// Whether the format distinguishes free from unobserved voxels and therefore contains all observed voxels by
+    /// default.
     pub needs_free_voxels: bool,
-    /// How it is written.
+    /// Writer of the format.
     pub writer: Writer,
 }
 
-/// An option that some formats take.
+/// Option that only some formats support.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OutputOption {
     /// Only voxels in a box.
     Region,
-    /// Occupied voxels, free ones, all, or those from a probability on.
+    /// Occupied voxels, free ones, all, or those above a probability.
     Which,
     /// Only voxels between two heights.
     Heights,
-    /// The edge of the square of a file.
+    /// Edge of the square of a file.
     Cell,
-    /// Positions as numbers of 16 bits.
+    /// 16-bit positions.
     Quantized,
 }
 
-/// Where the coordinates of a file may begin.
+/// Supported origins of a file's coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Origin {
-    /// Where the map's do.
+    /// Only the origin of the map.
     Map,
-    /// At a corner of a voxel, which `FILE.origin.json` names.
+    /// A corner of a voxel, which is stored in `FILE.origin.json`.
     Corner,
-    /// The same. Where single precision is too coarse for the map's coordinates, an origin is chosen.
+    /// As `Corner`. If single precision is too coarse for the map's coordinates, an origin is chosen automatically.
     CornerNearby,
-    /// At any point, which the file itself names.
+    /// Any point, which the file itself stores.
     Point,
 }
 
-/// How a format is written.
+/// Writer of a format.
 #[derive(Clone, Copy, Debug)]
 pub enum Writer {
-    /// One stream of bytes, voxel after voxel, so that it can go to a pipe.
+    /// One stream of bytes, voxel by voxel, which can be a pipe.
     Stream(OpenStream),
-    /// A file or a folder, and files beside it, voxel after voxel.
+    /// A file or a folder with companion files, voxel by voxel.
     Files(OpenFiles),
-    /// OctoMap's tree, one stream of bytes, which the engine writes.
+    /// OctoMap tree as one stream of bytes, written by the engine.
     Octree(OctreeFormat),
-    /// A folder with the levels of detail of a whole map.
+    /// A folder with levels of detail of a whole map.
     Tileset,
-    /// Not at all: this program was built without it.
+    /// Not available in this build.
     NotBuilt,
 }
 
@@ -83,31 +85,31 @@ pub type OpenStream =
 pub type OpenFiles = fn(&VoxelsHead, &Path, &WriteOptions) -> Result<Box<dyn VoxelSink>>;
 
 impl OutputFormat {
-    /// Whether it can be written to a pipe.
+    /// Returns whether the format can be written to a pipe.
     pub fn is_stream(&self) -> bool {
         matches!(self.writer, Writer::Stream(_) | Writer::Octree(_))
     }
 
-    /// Whether this program was built to write it.
+    /// Checks that this build supports the format.
     ///
     /// # Errors
     ///
-    /// It was not.
+    /// It does not.
     pub fn check_built(&self) -> Result<()> {
         let Writer::NotBuilt = self.writer else { return Ok(()) };
         let feature = self.feature.unwrap_or_default();
         Err(self.refused(&format!("this program was built without it; build with the feature `{feature}`")))
     }
 
-    /// Starts a file of voxels, or a folder where the format is one, at a path of its own. It is whole when the sink is
+    /// Starts writing voxels to a file, or to a folder for a folder format. The output is complete when the sink is
     /// finished.
     ///
-    /// Nothing is renamed, synchronised or removed: who calls does that. A folder must be empty or not there yet.
+    /// The caller renames, syncs and removes files. A folder must be empty or absent.
     ///
     /// # Errors
     ///
-    /// A resolution, a box or options that make no sense; a format that this program was built without, or that is not
-    /// made of voxels; the system refuses.
+    /// The resolution, bounding box or options are invalid; the format is not supported by this build or is not made of
+    /// voxels; or an I/O error occurs.
     pub fn open(&self, head: &VoxelsHead, path: &Path, options: &WriteOptions) -> Result<Box<dyn VoxelSink>> {
         self.check_built()?;
         check(head)?;
@@ -122,11 +124,11 @@ impl OutputFormat {
         Ok(Box::new(Counted::new(sink, options.final_path.clone(), head.voxels)))
     }
 
-    /// Starts a stream of voxels; errors name `options.final_path`. Bytes come in small parts: buffer them.
+    /// Starts a stream of voxels. Errors name `options.final_path`. Writes are small, so `out` should be buffered.
     ///
     /// # Errors
     ///
-    /// As for [`OutputFormat::open`]; a format that is not one stream.
+    /// As for [`OutputFormat::open`]. Also fails for a format that is not a stream.
     pub fn open_stream<'a>(
         &self,
         head: &VoxelsHead,

@@ -12,7 +12,7 @@ use ::parquet::schema::parser::parse_message_type;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Rows that are kept until they are written, column by column.
+/// Number of rows to collect before they are written column by column.
 const GROUP_ROWS: usize = 1 << 20;
 
 const SCHEMA: &str = "message voxels {
@@ -21,7 +21,7 @@ const SCHEMA: &str = "message voxels {
     required int32 tile_x; required int32 tile_y; required int32 tile_z;
 }";
 
-/// A table of Parquet.
+/// Writer of an Apache Parquet table.
 pub(super) struct ParquetSink {
     path: PathBuf,
     writer: SerializedFileWriter<OutFile>,

@@ -4,12 +4,12 @@ use super::stream_out::StreamOut;
 use super::{Error, Result};
 use std::io::Write;
 
-/// Up to so many voxels from a PCD file's origin along an axis, `f32` resolves centers to an eighth of a voxel; more
-/// distant ones are refused.
+/// Maximum distance of voxels from the origin of a PCD file along an axis, in voxels. Within it, `f32` represents
+/// centers to an eighth of a voxel. More distant voxels are refused.
 pub const PCD_REACH_VOXELS: i32 = 1 << 21;
 
-/// PCD 0.7, binary, as PCL reads it: x y z as F4, intensity F4 holds the probability, observation_count I4. A file's
-/// origin is its `VIEWPOINT`.
+/// Writer of binary PCD 0.7 as read by PCL: x y z as F4, intensity F4 with the probability, observation_count I4. The
+/// origin is stored as `VIEWPOINT`.
 pub(super) struct PcdSink<'a> {
     out: StreamOut<'a>,
     resolution_m: f64,

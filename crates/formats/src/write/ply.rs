@@ -4,7 +4,7 @@ use super::row::{VoxelRow, VoxelSink, VoxelsHead};
 use super::stream_out::StreamOut;
 use std::io::Write;
 
-/// PLY, binary little-endian: x y z as double, probability float, log_odds double, observation_count int.
+/// Writer of binary little-endian PLY: x y z as double, probability float, log_odds double, observation_count int.
 pub(super) struct PlySink<'a> {
     out: StreamOut<'a>,
 }

@@ -1,4 +1,4 @@
-/// The definition of the message, as recordings carry it: messages that it is made of follow.
+/// Message definition for recordings, followed by the definitions of the nested messages.
 pub(super) const SCHEMA: &str = "\
 std_msgs/Header header
 uint32 height
@@ -33,7 +33,7 @@ uint8 datatype
 uint32 count
 ";
 
-/// How a field of a point is written.
+/// Type of a point field.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum FieldType {
     Int32,
@@ -58,7 +58,7 @@ impl FieldType {
     }
 }
 
-/// A message in the form that ROS 2 sends it in: CDR, little-endian. Alignment counts from behind its first four bytes.
+/// Encoder of a ROS 2 message: little-endian CDR. Alignment counts from after the first four bytes.
 struct Cdr(Vec<u8>);
 
 impl Cdr {
@@ -80,12 +80,12 @@ impl Cdr {
     }
 }
 
-/// A cloud without rows. Fields follow each other without gaps; the points are as long as whole such points.
+/// Encodes an unorganised cloud. Fields are packed without gaps, and `points` contains whole points.
 pub(super) fn encode(stamp_ns: u64, frame: &str, fields: &[(&str, FieldType)], points: &[u8]) -> Vec<u8> {
     let step: u32 = fields.iter().map(|(_, of)| of.bytes()).sum();
     let mut cdr = Cdr(Vec::with_capacity(points.len() + 512));
     cdr.0.extend([0, 1, 0, 0]);
-    // Seconds are signed; those of a stamp of 64 bit of nanoseconds fit for another century or wrap as ROS does.
+    // Seconds are a signed 32-bit number, valid until 2038; later stamps wrap as in ROS.
     cdr.u32((stamp_ns / 1_000_000_000) as u32);
     cdr.u32((stamp_ns % 1_000_000_000) as u32);
     cdr.text(frame);

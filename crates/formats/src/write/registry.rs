@@ -3,21 +3,21 @@ use super::*;
 use std::path::Path;
 use voxtile::octree::OctreeFormat;
 
-/// Calls what makes a sink of one stream.
+/// Wraps the constructor of a stream sink.
 macro_rules! stream {
     ($new:expr) => {
         Writer::Stream(|head, out, options| Ok(Box::new($new(head, out, options)?)))
     };
 }
 
-/// Calls what makes a sink of files.
+/// Wraps the constructor of a file sink.
 macro_rules! files {
     ($create:expr) => {
         Writer::Files(|head, path, options| Ok(Box::new($create(head, path, options)?)))
     };
 }
 
-/// A row that needs a feature.
+/// A row that depends on a Cargo feature.
 macro_rules! behind {
     ($feature:literal, $name:literal, $extension:literal, $help:literal, $writer:expr) => {
         OutputFormat {
@@ -36,7 +36,7 @@ macro_rules! behind {
     };
 }
 
-/// A row with what most formats have in common.
+/// A row with common defaults.
 const fn row(
     name: &'static str,
     extension: Option<&'static str>,
@@ -59,7 +59,8 @@ const fn row(
 
 const TREE_REFUSAL: &str = "an octree file holds free and occupied voxels alike; leave the option out";
 
-/// The table: help texts, hints and checks of options are made from it, pages are checked against it.
+/// All output formats. Help texts, hints and option checks are generated from this table, and documents are checked
+/// against it.
 #[rustfmt::skip]
 const TABLE: [OutputFormat; 18] = [
     OutputFormat { origin: Origin::Corner,
@@ -102,7 +103,7 @@ const TABLE: [OutputFormat; 18] = [
 ];
 
 impl OutputFormat {
-    /// The surface of occupied voxels as binary glTF, which 3D Tiles are made of, too.
+    /// Surface of occupied voxels as binary glTF, which 3D Tiles also consist of.
     pub const GLB: Self = Self {
         takes: &[Region, Which, Quantized],
         ..row(
@@ -114,14 +115,14 @@ impl OutputFormat {
     };
 }
 
-/// The formats that maps are written in.
+/// Output formats of maps.
 #[derive(Clone, Debug)]
 pub struct OutputFormats {
     rows: Vec<OutputFormat>,
 }
 
 impl Default for OutputFormats {
-    /// Those of this crate, whether or not it was built to write them.
+    /// All formats of this crate, including those not available in this build.
     fn default() -> Self {
         Self { rows: TABLE.to_vec() }
     }
@@ -134,22 +135,22 @@ impl OutputFormats {
         self
     }
 
-    /// All of them, in the order of help texts.
+    /// Returns all formats, in the order of help texts.
     pub fn all(&self) -> &[OutputFormat] {
         &self.rows
     }
 
-    /// The format of a name, as a person types it: `nav2`, `copc`.
+    /// Returns the format with this name, such as `nav2` or `copc`, in any case.
     pub fn of_name(&self, name: &str) -> Option<&OutputFormat> {
         self.rows.iter().find(|format| format.name.eq_ignore_ascii_case(name))
     }
 
-    /// The format that the end of a file's name asks for. Folders say nothing.
+    /// Returns the format with the extension of a file name. Folder formats have none.
     pub fn of_path(&self, path: &Path) -> Option<&OutputFormat> {
         let name = path.file_name()?.to_string_lossy().to_ascii_lowercase();
         let is_end = |end: &str| name.strip_suffix(end).is_some_and(|before| before.ends_with('.'));
         let found = self.rows.iter().filter(|format| format.extension.is_some_and(is_end));
-        // `.copc.laz` ends with `.laz`, too.
+        // `.copc.laz` also ends with `.laz`.
         found.max_by_key(|format| format.extension.map_or(0, str::len))
     }
 }

@@ -4,32 +4,32 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::path::{Path, PathBuf};
 
-/// Bytes of records that are sorted at once, and of those that wait while sorted runs are merged.
+/// Memory for the records of one run, and for the read buffers of a merge.
 const MEMORY_BYTES: usize = 32 << 20;
 
-/// Records of a fixed size, sorted by their bytes in constant memory. Keys are written with [`key`], so that bytes
-/// compare as numbers do.
+/// External sort of fixed-size records by their bytes in constant memory. [`key`] encodes numbers so that their bytes
+/// sort in numeric order.
 pub(super) struct ExternalSort<const N: usize> {
     folder: PathBuf,
     memory_bytes: usize,
     records: Vec<[u8; N]>,
-    /// Sorted runs, one after the other.
+    /// Sorted runs, concatenated.
     spool: Option<Spool>,
-    /// Where each run ends.
+    /// End offset of each run.
     run_ends: Vec<u64>,
 }
 
-/// A number as bytes that compare as numbers do.
+/// Encodes a number as bytes that sort in numeric order.
 pub(super) fn key(number: i32) -> [u8; 4] {
     ((number as u32) ^ (1 << 31)).to_be_bytes()
 }
 
-/// The number of a [`key`].
+/// Decodes a [`key`].
 pub(super) fn of_key(bytes: [u8; 4]) -> i32 {
     (u32::from_be_bytes(bytes) ^ (1 << 31)) as i32
 }
 
-/// A part of a record. Records are as long as their writers say: what is not there is zero.
+/// Returns a part of a record. Missing bytes are zero.
 pub(super) fn part<const M: usize>(record: &[u8], at: usize) -> [u8; M] {
     let mut bytes = [0; M];
     if let Some(found) = record.get(at..at + M) {
@@ -70,7 +70,7 @@ impl<const N: usize> ExternalSort<N> {
         Ok(())
     }
 
-    /// All records in order.
+    /// Returns all records in order.
     pub(super) fn into_sorted(mut self) -> Result<Sorted<N>> {
         let Some(_) = &self.spool else {
             self.records.sort_unstable();
@@ -99,7 +99,7 @@ impl<const N: usize> ExternalSort<N> {
     }
 }
 
-/// Records in order.
+/// Sorted records.
 pub(super) enum Sorted<const N: usize> {
     Memory(std::vec::IntoIter<[u8; N]>),
     Merge(Merge<N>),
@@ -114,7 +114,7 @@ impl<const N: usize> Sorted<N> {
     }
 }
 
-/// Sorted runs that become one.
+/// Merge of sorted runs.
 pub(super) struct Merge<const N: usize> {
     reader: SpoolReader,
     runs: Vec<Run>,
@@ -123,11 +123,11 @@ pub(super) struct Merge<const N: usize> {
 }
 
 struct Run {
-    /// Where the bytes behind the buffer begin.
+    /// Offset of the bytes after the buffer.
     next: u64,
     end: u64,
     buffer: Vec<u8>,
-    /// How much of the buffer is used up.
+    /// Number of consumed bytes of the buffer.
     at: usize,
 }
 
@@ -140,7 +140,7 @@ impl<const N: usize> Merge<N> {
         Ok(Some(record))
     }
 
-    /// The next record of a run waits for its turn.
+    /// Adds the next record of a run to the merge.
     fn refill(&mut self, number: usize) -> Result<()> {
         let Some(run) = self.runs.get_mut(number) else {
             return Ok(());

@@ -3,7 +3,7 @@ use std::fs::File;
 use std::io::{BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-/// Bytes that wait in a file without a name until it is known where they belong.
+/// Unnamed temporary file for bytes whose final position is not known yet.
 pub(super) struct Spool {
     folder: PathBuf,
     out: BufWriter<File>,
@@ -17,7 +17,7 @@ impl Spool {
         Ok(Self { folder: folder.to_owned(), out: BufWriter::with_capacity(1 << 16, file), len: 0 })
     }
 
-    /// Bytes that were written.
+    /// Returns the number of bytes written.
     pub(super) fn len(&self) -> u64 {
         self.len
     }
@@ -28,7 +28,7 @@ impl Spool {
         Ok(())
     }
 
-    /// What was written, from the start.
+    /// Returns a reader that starts at the beginning.
     pub(super) fn into_reader(mut self) -> Result<SpoolReader> {
         let folder = self.folder.clone();
         self.out.flush().map_err(|error| refused(&folder, error))?;
@@ -38,7 +38,7 @@ impl Spool {
     }
 }
 
-/// A spool that is read.
+/// Reader of a spool.
 pub(super) struct SpoolReader {
     folder: PathBuf,
     file: File,
@@ -46,12 +46,12 @@ pub(super) struct SpoolReader {
 }
 
 impl SpoolReader {
-    /// Its file, at its start.
+    /// Returns the file, positioned at its start.
     pub(super) fn file(&mut self) -> &mut File {
         &mut self.file
     }
 
-    /// Reads bytes at an offset: as many as there are, and at most as many as the buffer holds.
+    /// Reads up to `most` bytes at an offset, fewer at the end.
     pub(super) fn read_at(&mut self, offset: u64, buffer: &mut Vec<u8>, most: u64) -> Result<()> {
         buffer.clear();
         let failed = |error| Error::io(&self.folder, "read a temporary file in", error);

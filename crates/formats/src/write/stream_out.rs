@@ -3,7 +3,7 @@ use std::fmt;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// A stream that is written; its errors name it.
+/// Output stream. Its errors contain the name of the output.
 pub(super) struct StreamOut<'a> {
     name: PathBuf,
     out: Box<dyn Write + 'a>,
@@ -18,7 +18,7 @@ impl<'a> StreamOut<'a> {
         self.out.write_all(bytes).map_err(|error| Error::io(&self.name, "write", error))
     }
 
-    /// What `write!` calls.
+    /// Called by `write!`.
     pub(super) fn write_fmt(&mut self, text: fmt::Arguments<'_>) -> Result<()> {
         self.out.write_fmt(text).map_err(|error| Error::io(&self.name, "write", error))
     }

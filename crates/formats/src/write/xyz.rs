@@ -4,7 +4,7 @@ use super::out_file::OutFile;
 use super::row::{VoxelRow, VoxelSink, VoxelsHead};
 use std::path::Path;
 
-/// Text, a line a voxel: `x y z probability`, in as few digits as give back the same numbers.
+/// Writer of text with one line per voxel: `x y z probability`, with the fewest digits that restore the same numbers.
 pub(super) struct XyzSink {
     out: OutFile,
 }

@@ -3,10 +3,10 @@ use super::{Error, Result};
 use std::io::Read;
 use std::path::Path;
 
-/// Sizes and offsets from here on do not fit into the 32 bit of an old archive.
+/// Sizes and offsets from this value on require the 64-bit format (ZIP64).
 const ZIP64_FROM: u64 = u32::MAX as u64;
 
-/// An archive without compression. Sizes and checksums are known before each entry.
+/// Writer of a ZIP archive without compression. The size and checksum of each entry are known in advance.
 pub(super) struct ZipStore {
     out: OutFile,
     entries: Vec<Entry>,
@@ -25,14 +25,14 @@ impl ZipStore {
         Ok(Self { out: OutFile::create(path)?, entries: Vec::new(), zip64_from: ZIP64_FROM })
     }
 
-    /// Archives of 64 bit from a smaller size on.
+    /// Sets a smaller limit for the 64-bit format, for tests.
     #[cfg(test)]
     pub(super) fn with_zip64_from(mut self, bytes: u64) -> Self {
         self.zip64_from = bytes;
         self
     }
 
-    /// Appends an entry of a known size and checksum.
+    /// Appends an entry of known size and checksum.
     pub(super) fn entry(
         &mut self,
         name: &'static str,
@@ -64,7 +64,7 @@ impl ZipStore {
         Ok(())
     }
 
-    /// Writes the list of the entries.
+    /// Writes the central directory.
     pub(super) fn finish(mut self) -> Result<()> {
         let start = self.out.len();
         let mut list = Vec::new();
@@ -74,7 +74,7 @@ impl ZipStore {
         let (count, bytes) = (self.entries.len() as u64, list.len() as u64);
         let end = start + bytes;
         if start >= self.zip64_from || bytes >= self.zip64_from {
-            // Record and locator of an archive of 64 bit; version 4.5 reads it.
+            // End record and locator of the 64-bit format; version 4.5 is required to read it.
             list.extend(0x0606_4b50_u32.to_le_bytes());
             list.extend(44_u64.to_le_bytes());
             list.extend([45, 0, 45, 0, 0, 0, 0, 0, 0, 0, 0, 0]);
@@ -100,12 +100,13 @@ impl ZipStore {
 }
 
 impl Entry {
-    /// What heads and the list have in common: from the version that reads it to the length of the extra field.
+    /// Writes the fields common to local headers and the central directory: from the required version to the length of
+    /// the extra field.
     fn push_common(&self, head: &mut Vec<u8>, is_new: bool, is_large: bool, extra_bytes: u16) {
         let version: u16 = if is_new { 45 } else { 20 };
         let size = if is_large { u32::MAX } else { self.bytes as u32 };
         head.extend(version.to_le_bytes());
-        // No flags, no compression, and the first moment of such clocks: equal voxels give equal files.
+        // No flags, no compression, and the earliest DOS time stamp, so that equal voxels give equal files.
         head.extend([0, 0, 0, 0, 0, 0, 0x21, 0]);
         head.extend(self.crc32.to_le_bytes());
         head.extend(size.to_le_bytes());

@@ -1,4 +1,4 @@
-//! The corpus of `fuzz/` of this crate's readers, fed to the bodies of its targets. `fuzz/run.sh` looks for more.
+//! Runs the fuzz targets on the corpus of `fuzz/`. `fuzz/run.sh` searches for new inputs.
 #![cfg(all(feature = "las", feature = "e57", feature = "ros"))]
 
 #[path = "../made/mod.rs"]
@@ -23,14 +23,15 @@ fn no_file_of_the_corpus_breaks_a_reader() {
         let files: Vec<PathBuf> = entries.map(|entry| entry.unwrap().path()).collect();
         assert!(!files.is_empty(), "{} is empty", folder.display());
         for path in files {
-            // Says which file it was, should the next line panic.
+            // Names the file if the next line panics.
             println!("{}", path.display());
             target(&fs::read(&path).unwrap());
         }
     }
 }
 
-/// Formats and the corpus of each. The crate png reads depth images, and what is around them is a list of stamps.
+/// Formats and their corpora. Depth images are excluded: the crate png decodes them, and their lists contain only
+/// stamps and file names.
 const CORPORA: [(&str, &str); 15] = [
     ("pcd", "pcd"),
     ("ply", "cloud_ply"),

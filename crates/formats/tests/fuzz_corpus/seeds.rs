@@ -1,4 +1,4 @@
-//! Small valid files of every format, from which fuzzing begins.
+//! Small valid files of every format as initial inputs for fuzzing.
 
 use super::made::bag1::bag1;
 use super::made::message::{F32, MessageWriter, U32};
@@ -12,12 +12,12 @@ use voxtile_formats::ros::messages::MessageKind;
 /// Target, name and content of seeds.
 pub type Seeds = Vec<(&'static str, &'static str, Vec<u8>)>;
 
-/// Every seed.
+/// Returns all seeds.
 pub fn all() -> Seeds {
     [plain(), surveys(), poses(), recordings(), messages()].concat()
 }
 
-/// A file that the generator `tests/fixtures/clouds.py` made.
+/// Reads a file created by `tests/fixtures/clouds.py`.
 fn fixture(name: &str) -> Vec<u8> {
     fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name)).unwrap()
 }
@@ -53,7 +53,7 @@ fn surveys() -> Seeds {
     ]
 }
 
-/// A file of E57 without the checksums of its pages.
+/// Clears the page checksums of an E57 file.
 fn unsealed(mut file: Vec<u8>) -> Vec<u8> {
     file.chunks_mut(1024).for_each(|page| page[1020..].fill(0));
     file
@@ -81,7 +81,7 @@ fn poses() -> Seeds {
 const STAMP_NS: i64 = 1_700_000_000_100_000_000;
 const POSE: [f64; 7] = [1.0, 2.0, 3.0, 0.0, 0.0, 0.6, 0.8];
 
-/// A cloud of two points with times.
+/// Encodes a cloud of two points with times.
 fn cloud(message: MessageWriter) -> Vec<u8> {
     let fields = [("x", 0, F32), ("y", 4, F32), ("z", 8, F32), ("intensity", 12, F32), ("t", 16, U32)];
     let point = |k: f32| [[k, 2.0, 3.0, 4.0].map(f32::to_le_bytes).as_flattened(), &[9, 0, 0, 0]].concat();
@@ -119,7 +119,7 @@ fn odometry(message: MessageWriter) -> Vec<u8> {
     message.header(STAMP_NS, "odom").text("base_link").f64s(&POSE).f64s(&[0.0; 36 + 6 + 36]).done()
 }
 
-/// Every kind of message, of ROS 1 and as CDR.
+/// Encodes messages of every kind, for ROS 1 and as CDR.
 fn messages() -> Seeds {
     let of = |new: fn() -> MessageWriter, wire: Wire| {
         let header = || new().header(STAMP_NS, "lidar");

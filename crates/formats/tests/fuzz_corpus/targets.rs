@@ -1,8 +1,8 @@
-//! Bytes of any kind into every reader of other programs' files: none may panic, hang or take much memory, and what is
-//! read must hold together. The result says whether the bytes were read as a whole.
+//! Fuzz targets: arbitrary bytes for every reader of foreign files. No input may cause a panic, a hang or high memory
+//! use, and decoded data must be consistent. A target returns whether the input was read completely.
 //!
-//! The crates `las` and `e57` panic on damage, and their readers here make errors of it. libFuzzer ends the program at
-//! a panic before anything can catch it: the programs of those two targets replace its hook, see `fuzz/src/lib.rs`.
+//! The crates `las` and `e57` panic on damaged input, which the readers convert to errors. libFuzzer aborts at a panic
+//! before it can be caught, so these two targets replace its panic hook; see `fuzz/src/lib.rs`.
 
 use std::fs;
 use std::path::Path;
@@ -19,7 +19,7 @@ use voxtile_formats::{ReadOptions, open_clouds};
 
 pub type Target = fn(&[u8]) -> bool;
 
-/// Every target by the name of its corpus.
+/// All targets by corpus name.
 pub const TARGETS: [(&str, Target); 10] = [
     ("cloud_ply", ply),
     ("cloud_text", text),
@@ -33,10 +33,10 @@ pub const TARGETS: [(&str, Target); 10] = [
     ("ros_messages", messages),
 ];
 
-/// LAZ says a lot in few bytes: so many points of a cloud are enough.
+/// Limit for the points of a cloud: a few bytes of LAZ can decode to a huge number of points.
 const MAX_POINTS: u64 = 2_000;
 
-/// PLY in any of its encodings.
+/// PLY in any encoding.
 pub fn ply(data: &[u8]) -> bool {
     clouds(data, "a.ply", "ply", 0.0)
 }
@@ -46,13 +46,13 @@ pub fn text(data: &[u8]) -> bool {
     clouds(data, "a.xyz", "xyz", 0.0)
 }
 
-/// Floats without a header, as KITTI and nuScenes write them.
+/// Floats without a header, as in KITTI and nuScenes.
 pub fn bin(data: &[u8]) -> bool {
     let is_kitti = clouds(data, "a.bin", "bin", 0.0);
     is_kitti || clouds(data, "a.pcd.bin", "bin", 0.0)
 }
 
-/// LAS and LAZ: as one cloud and, if it has few points, cut into scans by time.
+/// LAS and LAZ: as one cloud and, if it has few points, split into scans by time.
 pub fn las(data: &[u8]) -> bool {
     let is_read = clouds(data, "a.laz", "las", 0.0);
     if is_read {
@@ -61,8 +61,8 @@ pub fn las(data: &[u8]) -> bool {
     is_read
 }
 
-/// E57. Where the lowest bit of the first byte is set, the checksums of its pages are made right before the rest is
-/// read, so that what lies behind them is reached.
+/// E57. If the lowest bit of the first byte is set, the page checksums are corrected first, so that damage is not only
+/// found by them.
 pub fn e57(data: &[u8]) -> bool {
     let Some((&choice, file)) = data.split_first() else { return false };
     let mut file = file.to_vec();
@@ -72,7 +72,7 @@ pub fn e57(data: &[u8]) -> bool {
     clouds(&file, "a.e57", "e57", 0.0)
 }
 
-/// Makes the last four bytes the CRC-32C of those before, the most significant first.
+/// Sets the last four bytes to the CRC-32C of the others, in big-endian order.
 fn seal_page(page: &mut [u8; 1024]) {
     let Some((content, crc)) = page.split_last_chunk_mut::<4>() else { return };
     let shifted = |sum: u32, _| if sum & 1 == 1 { sum >> 1 ^ 0x82f6_3b78 } else { sum >> 1 };
@@ -92,11 +92,11 @@ fn clouds(data: &[u8], name: &str, format: &str, scan_period_s: f64) -> bool {
     })
 }
 
-/// Reads all clouds of a source; whether nothing was wrong.
+/// Reads all clouds of a source. Returns whether there were no errors.
 fn drain(source: &mut dyn CloudSource, bytes: usize) -> bool {
     let (mut is_whole, mut steps) = (true, 0);
     loop {
-        // An error that comes again and again would be a hang.
+        // Detects a hang: an error that repeats forever.
         steps += 1;
         assert!(steps <= 2 * bytes + 16, "{} steps", steps);
         match source.next_cloud() {
@@ -121,12 +121,12 @@ fn drain(source: &mut dyn CloudSource, bytes: usize) -> bool {
     is_whole
 }
 
-/// Poses of any layout, text or array of NumPy.
+/// Poses in any layout, as text or as a NumPy array.
 pub fn trajectory(data: &[u8]) -> bool {
     let read = with_file("poses", data, |path| Trajectory::read(path, None));
     let Ok(poses) = read else { return false };
     assert!(!poses.is_empty() && poses.len() <= data.len());
-    // Lost poses are none.
+    // Lost poses are `None`.
     let known: Vec<_> = (0..poses.len()).filter_map(|number| poses.by_number(number).unwrap()).collect();
     assert!(!known.is_empty() && known.iter().all(|pose| pose.is_valid()));
     let stamps: Vec<i64> = poses.stamps_ns().map(|stamp| stamp.unwrap()).collect();
@@ -141,12 +141,12 @@ pub fn trajectory(data: &[u8]) -> bool {
     true
 }
 
-/// A recording of ROS 1.
+/// ROS 1 recording.
 pub fn bag1(data: &[u8]) -> bool {
     recording(data, "a.bag")
 }
 
-/// A recording of MCAP.
+/// MCAP recording.
 pub fn mcap(data: &[u8]) -> bool {
     recording(data, "a.mcap")
 }
@@ -174,7 +174,7 @@ fn recording(data: &[u8], name: &str) -> bool {
     })
 }
 
-/// Plays all messages; whether nothing was wrong.
+/// Reads all messages. Returns whether there were no errors.
 fn play(recording: &mut dyn Recording, bytes: usize) -> bool {
     let (mut is_whole, mut errors) = (true, 0);
     loop {
@@ -191,7 +191,7 @@ fn play(recording: &mut dyn Recording, bytes: usize) -> bool {
     is_whole
 }
 
-/// The `metadata.yaml` of a bag of ROS 2, beside a file without messages.
+/// `metadata.yaml` of a ROS 2 bag, next to a file without messages.
 pub fn bag2_metadata(data: &[u8]) -> bool {
     let folder = TempDir::new().expect("a temporary folder");
     fs::write(folder.path().join("metadata.yaml"), data).expect("a temporary file");
@@ -216,7 +216,7 @@ const KINDS: [MessageKind; 13] = [
     MessageKind::CompressedImage,
 ];
 
-/// A message: the first byte chooses its kind, and ROS 1 or CDR.
+/// A message. The first byte selects its kind, and ROS 1 or CDR.
 pub fn messages(data: &[u8]) -> bool {
     let Some((&choice, data)) = data.split_first() else { return false };
     let wire = if choice & 1 == 1 { Wire::Cdr } else { Wire::Ros1 };
@@ -227,13 +227,13 @@ pub fn messages(data: &[u8]) -> bool {
     })
 }
 
-/// The byte before a message of a kind in [`messages`].
+/// Returns the first byte of the input of [`messages`] for a kind of message.
 pub fn choice(kind: MessageKind, wire: Wire) -> u8 {
     let number = KINDS.iter().position(|known| *known == kind).expect("all kinds are listed");
     (number as u8) << 1 | u8::from(wire == Wire::Cdr)
 }
 
-/// Number of points, or of poses.
+/// Returns the number of points or poses.
 fn decode(kind: MessageKind, wire: Wire, data: &[u8]) -> Decoded<usize> {
     Ok(match kind {
         MessageKind::PointCloud2 => {
@@ -256,7 +256,7 @@ fn decode(kind: MessageKind, wire: Wire, data: &[u8]) -> Decoded<usize> {
     })
 }
 
-/// Readers take paths: each thread has a folder, whose file is written anew.
+/// Writes the input to a file, because readers take paths. Each thread has its own folder.
 fn with_file<T>(name: &str, data: &[u8], read: impl FnOnce(&Path) -> T) -> T {
     thread_local!(static FOLDER: TempDir = TempDir::new().expect("a temporary folder"));
     FOLDER.with(|folder| {

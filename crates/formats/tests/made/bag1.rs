@@ -1,7 +1,7 @@
-/// A message of a bag: the number of its topic, when it was recorded, its bytes.
+/// Message of a bag: its topic index, recording time and data.
 pub type BagMessage = (usize, i64, Vec<u8>);
 
-/// A bag of ROS 1 with an index: topics with their types, and messages in one chunk, not compressed.
+/// Encodes a ROS 1 bag with an index: topics with their types, and messages in one uncompressed chunk.
 pub fn bag1(topics: &[(&str, &str)], messages: &[BagMessage]) -> Vec<u8> {
     let connections: Vec<Vec<u8>> = topics.iter().zip(0..).map(|(topic, id)| connection(id, topic)).collect();
     let mut contents = connections.concat();

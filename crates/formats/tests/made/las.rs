@@ -1,38 +1,38 @@
-//! LAS and LAZ files, byte by byte.
+//! Writes LAS and LAZ files byte by byte.
 
 use laz::record::{RecordCompressor, SequentialPointRecordCompressor};
 use laz::{LasZipCompressor, LazItemRecordBuilder, LazVlr, LazVlrBuilder};
 use std::io::{Cursor, Seek, SeekFrom, Write};
 
-/// A LAS file of points on a slope, a point every 0.01 s.
+/// LAS file with points on a slope, one every 0.01 s.
 #[derive(Clone)]
 pub struct Las {
     pub minor: u8,
     pub format: u8,
     pub points: usize,
-    /// The numbers of points in the header.
+    /// Point counts in the header.
     pub legacy: u32,
     pub large: u64,
     pub encoding: u16,
     pub scales: [f64; 3],
     pub offsets: [f64; 3],
-    /// Records before the points: user, number, data.
+    /// Records before the points: user ID, record ID, data.
     pub records: Vec<(&'static str, u16, Vec<u8>)>,
     /// GPS time of the first point.
     pub start_s: f64,
 }
 
-/// How points are compressed.
+/// Compression of points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Packing {
-    /// As LASzip did before it had chunks: one stream, without a table.
+    /// One stream without chunks and chunk table, as in old LASzip versions.
     PointWise,
-    /// Chunks of so many points.
+    /// Chunks with this many points.
     Chunked(u32),
 }
 
 impl Las {
-    /// A file whose header is right.
+    /// Creates a file with a correct header.
     pub fn new(minor: u8, format: u8, points: usize) -> Self {
         let is_old = minor < 4;
         Self {
@@ -53,7 +53,7 @@ impl Las {
         [20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67][self.format as usize]
     }
 
-    /// Whole numbers of a point.
+    /// Returns the integer coordinates of a point.
     pub fn whole(k: usize) -> [i32; 3] {
         [100 + 7 * k as i32, 200 - 3 * k as i32, 50 + (k % 40) as i32 * 25]
     }
@@ -77,7 +77,7 @@ impl Las {
         point
     }
 
-    /// Bytes before the points.
+    /// Returns the bytes before the points.
     pub fn head(&self, is_compressed: bool) -> Vec<u8> {
         let header_bytes = [227, 227, 227, 235, 375, 393][self.minor as usize];
         let mut head = vec![0; header_bytes];
@@ -120,7 +120,7 @@ impl Las {
         bytes
     }
 
-    /// The same points, compressed.
+    /// Returns the file with compressed points.
     pub fn packed(&self, packing: Packing) -> Vec<u8> {
         let items = LazItemRecordBuilder::default_for_point_format_id(self.format, 0).unwrap();
         let chunk_size = match packing {
@@ -131,7 +131,7 @@ impl Las {
         let mut description = Vec::new();
         laz.write_to(&mut description).unwrap();
         if packing == Packing::PointWise {
-            // LASzip 1.2: the first kind of compressor, chunks of 0 points.
+            // LASzip 1.2: compressor type 1, chunks of 0 points.
             description[0] = 1;
             description[4..8].copy_from_slice(&[1, 2, 0, 0]);
             description[12..16].fill(0);

@@ -1,4 +1,4 @@
-//! Small files that tests make.
+//! Generators of small test files.
 #![allow(dead_code)]
 
 pub mod bag1;

@@ -2,10 +2,10 @@ use std::fs;
 use std::path::Path;
 use voxtile_formats::write::{OutputFormat, OutputFormats, VoxelRow, VoxelsHead, WriteOptions};
 
-/// Number of voxels in a file of [`write_voxels`].
+/// Number of voxels written by [`write_voxels`].
 pub const VOXELS: i32 = 30;
 
-/// A voxel of half a metre.
+/// Returns a voxel of half a metre.
 pub fn voxel(k: i32) -> VoxelRow {
     let index = [k, 7 * k, -k];
     VoxelRow {
@@ -18,12 +18,12 @@ pub fn voxel(k: i32) -> VoxelRow {
     }
 }
 
-/// The format of a name.
+/// Returns the format with this name.
 pub fn format_of(name: &str) -> OutputFormat {
     *OutputFormats::default().of_name(name).unwrap()
 }
 
-/// Writes the voxels of 0 to [`VOXELS`].
+/// Writes voxels 0 to [`VOXELS`] - 1.
 pub fn write_voxels(format: &str, path: &Path, crs: Option<&str>) {
     let [first, last] = [voxel(0), voxel(VOXELS - 1)].map(|row| row.center_m);
     let bound = |pick: fn(f64, f64) -> f64| std::array::from_fn(|k| pick(first[k], last[k]));
@@ -39,7 +39,7 @@ pub fn write_voxels(format: &str, path: &Path, crs: Option<&str>) {
     sink.finish().unwrap();
 }
 
-/// The bytes of such a file.
+/// Returns the bytes of a file from [`write_voxels`].
 pub fn voxel_file(format: &str) -> Vec<u8> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a").with_extension(format_of(format).extension.unwrap());

@@ -10,17 +10,17 @@ const UTM: &str = "PROJCS[\"WGS 84 / UTM zone 32N\",GEOGCS[\"WGS 84\",DATUM[\"WG
                    298.257223563]],PRIMEM[\"Greenwich\",0],UNIT[\"degree\",0.0174532925199433]],\
                    PROJECTION[\"Transverse_Mercator\"],UNIT[\"metre\",1],AUTHORITY[\"EPSG\",\"32632\"]]";
 
-/// The coordinate system that comes back of a file, and what is remarked.
+/// Writes and reads a coordinate system. Returns the one read and the remarks.
 fn round_trip(format: &str, crs: Option<&str>) -> (Option<String>, Vec<String>) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(format!("a.{}", format_of(format).extension.unwrap()));
     write_voxels(format, &path, crs);
     if format != "e57" {
         let bytes = fs::read(&path).unwrap();
-        // Point format 6 wants the bit, whether or not a system is known.
+        // Point format 6 requires the WKT bit, even without a coordinate system.
         assert_eq!(bytes[6] & 1 << 4, 1 << 4, "{format}");
     }
-    // A scan of E57 without a pose is remarked otherwise.
+    // The given origin avoids a remark on the missing pose of an E57 scan.
     let options = ReadOptions { sensor_origin_m: Some([0.0; 3]), ..ReadOptions::default() };
     let source = open_clouds(&path, &options).unwrap();
     (source.crs().map(str::to_owned), source.remarks())
@@ -60,7 +60,7 @@ fn what_is_no_number_of_a_system_is_refused() {
     }
 }
 
-/// A folder of files, each with its coordinate system.
+/// Opens a folder of files, each with its own coordinate system.
 fn folder_of(folder: &Path, format: &str, systems: &[Option<&str>]) -> Box<dyn CloudSource> {
     for (number, crs) in systems.iter().enumerate() {
         let path = folder.join(format!("{number}.{}", format_of(format).extension.unwrap()));

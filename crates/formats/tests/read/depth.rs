@@ -46,7 +46,7 @@ fn seven_scenes_have_millimetres_invalid_pixels_and_poses() {
 
 #[test]
 fn tum_has_a_list_with_stamps_and_a_scale_of_5000() {
-    // A camera is also searched for next to the folder.
+    // A camera file is also searched for next to the folder.
     let outer = tempfile::tempdir().unwrap();
     let folder = outer.path().join("folder");
     fs::create_dir_all(folder.join("depth")).unwrap();
@@ -58,7 +58,7 @@ fn tum_has_a_list_with_stamps_and_a_scale_of_5000() {
     let clouds = clouds_with(&folder, &ReadOptions { intrinsics, ..Default::default() });
     assert_eq!(clouds[0].0.stamp_ns, Some(1_305_031_453_374_112_000));
     let depths: Vec<_> = clouds[0].1.iter().map(|point| (point.position_m[2], point.is_return)).collect();
-    // The largest value is no distance.
+    // The largest value means no return.
     assert_eq!(depths, [(1.0, true), (1.0, false)]);
 }
 
@@ -84,7 +84,7 @@ fn lines_of_the_list_that_cannot_be_read_are_left_out() {
     assert!(error.contains("line 1: `nan` is no time stamp") && points == 0, "{error}");
 }
 
-/// A list from elsewhere is not to open any file of the machine.
+/// An untrusted list must not open arbitrary files.
 #[test]
 fn images_out_of_the_folder_are_refused() {
     let folder = tempfile::tempdir().unwrap();
@@ -160,7 +160,7 @@ fn fifos_among_depth_images_are_refused() {
     fifo("frame-000000.pose.txt");
     let (error, _) = failure(folder.path(), &ReadOptions::default());
     assert!(error.contains("frame-000000.pose.txt: is a FIFO"), "{error}");
-    // Only what is read in one pass may be named alone.
+    // Only formats that are read in one pass may be a FIFO.
     for (name, is_hinted) in [("a.ply", true), ("b.e57", false)] {
         fifo(name);
         let (error, _) = failure(&at(name), &ReadOptions::default());

@@ -5,19 +5,19 @@ use std::path::Path;
 use voxtile_formats::poses::{Found, Trajectory};
 use voxtile_formats::{CloudPoint, Deskew, RigidPose};
 
-/// When the sweep begins: the stamp of the cloud.
+/// Start of the sweep: the stamp of the cloud.
 const STAMP_NS: i64 = 1_700_000_000_250_000_000;
-/// A turn of the scanner.
+/// Duration of a turn of the scanner.
 const TURN_S: f64 = 0.1;
 const POINTS: usize = 2_000;
 /// Walls, floor and ceiling.
 const ROOM_M: [[f64; 2]; 3] = [[-6.0, 7.0], [-5.0, 4.0], [-1.5, 2.5]];
-/// The body goes ahead, and turns about its z: a constant twist.
+/// The body moves forward, up, and turns about its z: a constant twist.
 const SPEED_M_S: f64 = 8.0;
 const CLIMB_M_S: f64 = 0.5;
 const TURN_RAD_S: f64 = 1.2;
 
-/// Where the sensor is, so many seconds after the stamp.
+/// Returns the pose of the sensor at a time after the stamp, in seconds.
 fn world_from_sensor(time_s: f64) -> RigidPose {
     let angle = TURN_RAD_S * time_s;
     let radius_m = SPEED_M_S / TURN_RAD_S;
@@ -28,7 +28,7 @@ fn world_from_sensor(time_s: f64) -> RigidPose {
     }
 }
 
-/// What the scanner measures: whole nanoseconds after the stamp, and where in its own frame at that time.
+/// Simulates the measurements: nanoseconds after the stamp, and the point in the sensor frame at that time.
 fn sweep() -> Vec<(u32, [f64; 3])> {
     let point = |k: usize| {
         let after_ns = (TURN_S * 1e9 * k as f64 / POINTS as f64).round() as u32;
@@ -37,7 +37,7 @@ fn sweep() -> Vec<(u32, [f64; 3])> {
         let elevation = (k % 16) as f64 * 0.05 - 0.4;
         let ray = [elevation.cos() * azimuth.cos(), elevation.cos() * azimuth.sin(), elevation.sin()];
         let tip = pose.apply(ray);
-        // The way along the ray to the nearest plane ahead.
+        // Distance along the ray to the nearest plane ahead.
         let length_m = (0..3).map(|axis| {
             let ahead = tip[axis] - pose.position_m[axis];
             (ROOM_M[axis][usize::from(ahead > 0.0)] - pose.position_m[axis]) / ahead
@@ -48,13 +48,13 @@ fn sweep() -> Vec<(u32, [f64; 3])> {
     (0..POINTS).map(point).collect()
 }
 
-/// How far a point of the world is from the room's nearest plane.
+/// Returns the distance of a point to the room's nearest plane.
 fn beside_planes_m(point: [f64; 3]) -> f64 {
     let planes = point.iter().zip(ROOM_M).flat_map(|(at, planes)| planes.map(|plane| (at - plane).abs()));
     planes.fold(f64::INFINITY, f64::min)
 }
 
-/// How far the points are from the planes, at most.
+/// Returns the largest distance of the points to the planes.
 fn worst_m(points: &[CloudPoint], mut place: impl FnMut(&CloudPoint) -> [f64; 3]) -> f64 {
     let sensor = world_from_sensor(0.0);
     points.iter().map(|point| beside_planes_m(sensor.apply(place(point)))).fold(0.0, f64::max)
@@ -70,7 +70,7 @@ fn assert_deskews(points: &[CloudPoint], pose_at: impl FnMut(i64) -> Option<Rigi
     assert!(deskewed_m < 2e-5, "{of}: {deskewed_m} m off");
 }
 
-/// Poses every two milliseconds, as a file.
+/// Creates a pose file with a pose every two milliseconds.
 fn trajectory(folder: &Path) -> Trajectory {
     let mut text = String::new();
     for k in -10..80 {
@@ -93,7 +93,7 @@ fn in_file(trajectory: &Trajectory, at_ns: i64) -> Option<RigidPose> {
     }
 }
 
-/// The name of a time, its type in PLY, and its bytes for so many nanoseconds after the stamp.
+/// Name of a time field, its PLY type, and its encoding of nanoseconds after the stamp.
 type PlyTime = (&'static str, &'static str, fn(u32) -> Vec<u8>);
 
 #[test]
@@ -126,7 +126,7 @@ fn times_of_every_field_of_ply_take_points_to_the_planes() {
     }
 }
 
-/// The names of columns, and the time of a row.
+/// Name of a time column, and its text for nanoseconds after the stamp.
 type TextTime = (&'static str, fn(u32) -> String);
 
 #[test]
@@ -153,7 +153,7 @@ fn times_of_every_column_of_text_take_points_to_the_planes() {
     }
 }
 
-/// A cloud may take a second, and poses may end before it does.
+/// A cloud may last a second, and the poses may end before it does.
 #[test]
 fn points_far_from_the_stamp_move_and_those_without_a_pose_are_counted() {
     let last_ns = STAMP_NS + 2_000_500_000;
@@ -180,7 +180,7 @@ mod recordings {
     use voxtile_formats::CloudSource;
     use voxtile_formats::ros::{BagOptions, open_bag};
 
-    /// A sweep with the transforms around it, as a bag.
+    /// Writes a sweep and its transforms to a bag and deskews it.
     fn assert_bag_deskews(type_name: &str, cloud: Vec<u8>, of: &str) {
         let mut messages: Vec<BagMessage> = Vec::new();
         for k in -10..80 {
@@ -208,7 +208,7 @@ mod recordings {
         assert_deskews(&points, |stamp_ns| pose_at(stamp_ns).unwrap(), of);
     }
 
-    /// A field, and its bytes for so many nanoseconds after the stamp.
+    /// Time field, and its encoding of nanoseconds after the stamp.
     type MessageTime = (Field, fn(u32) -> Vec<u8>);
 
     #[test]
@@ -232,7 +232,7 @@ mod recordings {
         }
     }
 
-    /// Drivers without a clock leave the stamp of a cloud at 0; the times of its points may be those of another clock.
+    /// Drivers without a clock leave the cloud's stamp at 0, while its points have times of another clock.
     #[test]
     fn times_since_1970_need_no_stamp_of_the_message() {
         let fields = [("x", 0, F32), ("y", 4, F32), ("z", 8, F32), ("timestamp", 12, F64)];
@@ -252,7 +252,7 @@ mod recordings {
         assert_bag_deskews("livox_ros_driver/CustomMsg", message.done(), "livox");
     }
 
-    /// Its time base is the stamp, or lies before it where the driver stamps a cloud as it sends it.
+    /// The time base equals the stamp, or precedes it if the driver sets the stamp when it sends the cloud.
     #[test]
     fn times_of_livox_count_from_their_time_base() {
         for before_ns in [0, 20_000_000] {

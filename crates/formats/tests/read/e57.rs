@@ -5,7 +5,7 @@ use std::path::Path;
 use voxtile_formats::RigidPose;
 use voxtile_formats::{ReadOptions, open_clouds};
 
-/// Written by pye57 (libE57Format).
+/// The fixture was written by pye57 (libE57Format).
 #[test]
 fn scans_have_poses_and_invalid_points_are_no_returns() {
     let clouds = clouds(&fixture("scans.e57"));
@@ -31,7 +31,7 @@ fn scans_have_poses_and_invalid_points_are_no_returns() {
     }
 }
 
-/// As programs write what is in one frame already: exports of voxels have no pose.
+/// Data already in one frame, such as exported voxels, has no pose.
 #[test]
 fn a_scan_without_a_pose_is_in_the_frame_of_the_file() {
     let folder = tempfile::tempdir().unwrap();
@@ -66,20 +66,20 @@ fn no_damage_makes_a_panic() {
     }
 }
 
-/// The library would make points of it until there is no memory.
+/// The library would create points until the memory is exhausted.
 #[test]
 fn points_that_take_no_bits_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("constant.e57");
     let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/corpus/cloud_e57/without-bits");
-    // The first byte is for the target of the fuzzer.
+    // The first byte is only for the fuzz target.
     fs::write(&path, &fs::read(corpus).unwrap()[1..]).unwrap();
     let (error, points) = failure(&path, &ReadOptions::default());
     assert!(error.contains("constant.e57: malformed: record 0: every field of its points has"), "{error}");
     assert_eq!(points, 0);
 }
 
-/// A file whose description is this one.
+/// Writes a file with this XML section.
 fn described(path: &Path, xml: &[u8]) {
     let mut content = b"ASTM-E57".to_vec();
     content.extend([1_u32, 0].iter().flat_map(|number| number.to_le_bytes()));
@@ -89,7 +89,7 @@ fn described(path: &Path, xml: &[u8]) {
     }
     content.extend(xml);
     content.resize(1020 * pages, 0);
-    // Checksums are compared later than what is tested here.
+    // Checksums are only verified after the tested checks.
     let file: Vec<u8> = content.chunks(1020).flat_map(|page| [page, &[0; 4]].concat()).collect();
     fs::write(path, file).unwrap();
 }
@@ -111,7 +111,7 @@ fn a_file_that_is_no_e57_or_is_cut_off_says_so() {
     }
 }
 
-/// The library compares each attribute of a tag with those before it.
+/// The library compares each attribute of a tag with the previous ones.
 #[test]
 fn a_tag_with_many_attributes_is_refused() {
     let folder = tempfile::tempdir().unwrap();

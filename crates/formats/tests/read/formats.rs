@@ -3,7 +3,7 @@ use std::fs;
 use std::path::Path;
 use voxtile_formats::{ReadOptions, Registry, open_clouds};
 
-/// The name of a file's or a folder's format.
+/// Returns the name of the detected format.
 fn guess(path: &Path) -> voxtile::Result<&'static str> {
     Registry::default().guess(path, &[]).map(|format| format.name)
 }

@@ -17,8 +17,8 @@ fn assert_near(found: &[CloudPoint], wanted: &[CloudPoint], what: &str) {
     }
 }
 
-/// By hand: points k and k + 1 of even k were measured at 3e8 + k / 32 s, in any order in the file. Windows of 0.1 s
-/// hold the pairs 0 1, 2 3, 4, 5 6, 7, 8 9.
+/// Expected by construction: for even k, points k and k + 1 were measured at 3e8 + k / 32 s, in any order in the file.
+/// Windows of 0.1 s contain the points 0 1, 2 3, 4, 5 6, 7, 8 9.
 #[test]
 fn a_file_is_cut_into_scans_by_its_times() {
     for name in ["timed.las", "timed.laz"] {
@@ -26,7 +26,7 @@ fn a_file_is_cut_into_scans_by_its_times() {
             let clouds = clouds_with(&fixture(name), &ReadOptions { memory_bytes, ..Default::default() });
             let names: Vec<&str> = clouds.iter().map(|(head, _)| head.name.as_str()).collect();
             assert_eq!(names, ["0", "1", "2", "3", "4", "5"], "{name}");
-            // The first window ends at 0.1 s: times 0 and 0.0625. The whole number of the GPS time of today is 1.3e9.
+            // The first window ends at 0.1 s and contains times 0 and 0.0625. Adjusted GPS time adds 1e9 s.
             assert_eq!(clouds[0].0.stamp_ns, Some(1_300_000_000_050_000_000));
             let counts: Vec<usize> = clouds.iter().map(|(_, points)| points.len()).collect();
             assert_eq!(counts, [4, 4, 2, 4, 2, 4], "{name}");
@@ -35,7 +35,7 @@ fn a_file_is_cut_into_scans_by_its_times() {
                 assert!((found - wanted).abs() < 1e-6, "{times:?}");
             }
             let mut points: Vec<CloudPoint> = clouds.into_iter().flat_map(|(_, points)| points).collect();
-            // Two points of a time keep the order of the file, which is any.
+            // Two points with equal times are in any order.
             for pair in points.chunks_mut(2) {
                 pair.sort_by(|a, b| a.intensity.total_cmp(&b.intensity));
             }
@@ -68,7 +68,7 @@ fn feet_become_metres_on_each_axis() {
         assert_near(&clouds[0].1, &points, name);
         let remarks = source.remarks();
         assert!(remarks[0].contains("coordinates become metres"), "{remarks:?}");
-        // What is read is not in the system of the file any more.
+        // The coordinates read are no longer in the file's system.
         assert_eq!(source.crs(), None, "{name}");
         assert!(remarks[1].starts_with("the coordinate system is not in metres"), "{remarks:?}");
     }
@@ -109,7 +109,7 @@ fn a_file_that_is_cut_off_gives_what_is_whole() {
     }
 }
 
-/// Writes a number of points into a header, which LAS 1.4 has twice.
+/// Writes a point count into a header, which has two of them in LAS 1.4.
 fn announce(bytes: &mut [u8], points: u64) {
     bytes[107..111].copy_from_slice(&(points as u32).to_le_bytes());
     if bytes[25] >= 4 {
@@ -117,7 +117,7 @@ fn announce(bytes: &mut [u8], points: u64) {
     }
 }
 
-/// A recorder writes the number of points last.
+/// A recorder writes the point count last.
 #[test]
 fn a_file_whose_writer_was_killed_is_read_as_far_as_it_goes() {
     let folder = tempfile::tempdir().unwrap();
@@ -143,7 +143,7 @@ fn a_file_whose_writer_was_killed_is_read_as_far_as_it_goes() {
     }
 }
 
-/// What stands behind the points is none: wave packets of LAS 1.3, long records of LAS 1.4.
+/// Data after the points is not a point: wave packets of LAS 1.3, extended records of LAS 1.4.
 #[test]
 fn records_behind_points_are_not_taken_for_points() {
     let folder = tempfile::tempdir().unwrap();
@@ -158,7 +158,7 @@ fn records_behind_points_are_not_taken_for_points() {
     }
 }
 
-/// A LAZ file of no points, as writers close one, has no cloud with points and is none that was killed.
+/// A complete LAZ file without points must not be taken for an interrupted one.
 #[test]
 fn compressed_files_may_be_empty() {
     let folder = tempfile::tempdir().unwrap();
@@ -169,7 +169,7 @@ fn compressed_files_may_be_empty() {
     assert_eq!(clouds(&path).iter().map(|(_, points)| points.len()).sum::<usize>(), 0);
 }
 
-/// Found by fuzzing: coordinates that were no numbers, and hits all the same.
+/// Found by fuzzing: coordinates were NaN but counted as returns.
 #[test]
 fn scales_and_offsets_must_give_coordinates() {
     let folder = tempfile::tempdir().unwrap();
@@ -200,7 +200,7 @@ fn no_damage_makes_a_panic() {
                 let path = folder.path().join(name);
                 fs::write(&path, &damaged).unwrap();
                 if let Ok(mut source) = open_clouds(&path, &ReadOptions::default()) {
-                    // Hours of empty windows are one step each.
+                    // A gap of hours without points is skipped in one step.
                     for _ in 0..50 {
                         match source.next_cloud() {
                             Ok(Some(_)) => drop(source.read_points(&mut |_| Ok(()))),
@@ -251,7 +251,8 @@ const LASPY: [Sums; 8] = [
     ("pdal_4_6_crop.las", 23875, [39147701499.18, 34728463766.2, 169401233.96], 439166.0, [FT; 2]),
 ];
 
-/// Number of points, sums of x, y and z in the unit of the file and of the intensity, by laspy 2.7 with lazrs.
+/// Expected values: number of points, and sums of x, y, z (in the unit of the file) and intensity, from laspy 2.7 with
+/// lazrs.
 #[test]
 fn real_files_are_what_laspy_reads() {
     let Some(folder) = shared_data("las_large_coords") else { return };

@@ -3,7 +3,7 @@ use crate::support::{all, failure};
 use std::fs;
 use voxtile_formats::{ReadOptions, open_clouds};
 
-/// How a file is read: cut by time, as one cloud, as one cloud with an origin.
+/// Ways to read a file: split by time, as one cloud, and as one cloud with an origin.
 fn ways() -> [ReadOptions; 3] {
     [
         ReadOptions::default(),
@@ -12,7 +12,7 @@ fn ways() -> [ReadOptions; 3] {
     ]
 }
 
-/// The number of points of a file, which are those of `las` from the first on, and the remarks.
+/// Reads a file and checks that its points are the first ones of `las`. Returns their number and the remarks.
 fn read(las: &Las, bytes: &[u8]) -> (usize, String) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.las");
@@ -40,7 +40,7 @@ fn refusal(bytes: &[u8]) -> String {
     ways().map(|options| failure(&path, &options).0).into_iter().next().unwrap()
 }
 
-/// LASzip and laspy take the large number; a writer may have put any other in the old field.
+/// LASzip and laspy use the 64-bit count; the old field may contain any value.
 #[test]
 fn of_two_numbers_of_points_that_of_the_points_counts() {
     for (legacy, large, remark) in [
@@ -66,14 +66,14 @@ fn points_behind_the_announced_ones_are_read() {
     let announced = "the header announces 100 points";
     let (points, remarks) = read(&las, &las.bytes());
     assert!(points == 400 && remarks == format!("{announced}; 400 are there and are read"), "{remarks}");
-    // Zeros and other bytes behind the points are none.
+    // Zeros and other bytes after the points are not points.
     for noise in [vec![0; 28 * 50], (0..28 * 50).map(|k| (k * 37 % 251) as u8).collect()] {
         let whole = Las::new(2, 1, 100);
         let (points, remarks) = read(&whole, &[whole.bytes(), noise].concat());
         let wanted = format!("{announced}, which are read; the file has room for 50 more behind them");
         assert!(points == 100 && remarks == wanted, "{points} {remarks}");
     }
-    // Compressed points are counted by their chunks, where these have layers.
+    // Compressed points are counted by their chunks if these are layered.
     let las = Las { large: 100, ..Las::new(4, 6, 400) };
     let (points, remarks) = read(&las, &las.packed(Packing::Chunked(50_000)));
     assert!(points == 400 && remarks == format!("{announced}; 400 are there and are read"), "{remarks}");
@@ -96,10 +96,10 @@ fn what_is_there_of_a_file_that_was_cut_off_is_read() {
     }
 }
 
-/// Without its end a file has no chunk table.
+/// A truncated file has no chunk table.
 #[test]
 fn compressed_points_are_read_without_the_chunk_table() {
-    // Points one after the other: all before the cut.
+    // Point-wise compression: all points before the cut.
     let las = Las::new(2, 1, 400);
     for packing in [Packing::Chunked(100), Packing::Chunked(50_000), Packing::PointWise] {
         let whole = las.packed(packing);
@@ -109,7 +109,7 @@ fn compressed_points_are_read_without_the_chunk_table() {
         assert!((200..400).contains(&points), "{packing:?}: {points}");
         assert_eq!(remarks, format!("the file is cut off: {points} of 400 points are there and are read"));
     }
-    // Layers: whole chunks.
+    // Layered compression: whole chunks.
     let las = Las::new(4, 6, 400);
     let whole = las.packed(Packing::Chunked(100));
     let (points, remarks) = read(&las, &whole[..whole.len() - whole.len() / 4]);
@@ -120,7 +120,7 @@ fn compressed_points_are_read_without_the_chunk_table() {
     assert!(error.contains("the file ends within the first chunk of its 400 points"), "{error}");
 }
 
-/// A writer that was stopped leaves no number of points, and perhaps no table.
+/// An interrupted writer leaves no point count, and possibly no chunk table.
 #[test]
 fn layers_count_their_points() {
     let las = Las { large: 0, ..Las::new(4, 6, 400) };
@@ -132,7 +132,7 @@ fn layers_count_their_points() {
             "{points} {remarks}"
         );
     }
-    // Of points one after the other nothing says where they end.
+    // The end of point-wise compressed points is unknown without a count.
     let las = Las { legacy: 0, ..Las::new(2, 1, 400) };
     for packing in [Packing::Chunked(100), Packing::PointWise] {
         let error = refusal(&las.packed(packing));
@@ -140,7 +140,7 @@ fn layers_count_their_points() {
     }
 }
 
-/// LASzip 1.2 and before: neither chunks nor a table of them.
+/// LASzip 1.2 and older: no chunks and no chunk table.
 #[test]
 fn one_stream_of_points_is_read() {
     for format in [0, 1, 2, 3] {
@@ -228,7 +228,7 @@ fn points_without_a_time_are_left_out_of_scans_alone() {
     assert!(remark.starts_with("2 of 400 points have a GPS time that is not a number"), "{remark}");
     assert!(remark.contains("first record 7; `scan_period` 0"), "{remark}");
     assert!(counts[1..].iter().all(|(points, remarks)| *points == 400 && remarks.is_empty()), "{counts:?}");
-    // Nothing would be left.
+    // No point would remain.
     (0..400).for_each(|k| bytes[time_at(k)..time_at(k) + 8].copy_from_slice(&f64::NAN.to_le_bytes()));
     fs::write(&path, &bytes).unwrap();
     let (error, points) = failure(&path, &ReadOptions::default());

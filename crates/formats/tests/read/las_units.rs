@@ -5,7 +5,7 @@ use voxtile_formats::{ReadOptions, open_clouds};
 
 const US_FOOT_M: f64 = 1200.0 / 3937.0;
 
-/// Metres in a unit of x, y and of z, as a file is read, and the remarks.
+/// Returns the units of x, y and of z in metres, derived from the read points, and the remarks.
 fn units(las: &Las) -> ([f64; 2], String) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.las");
@@ -38,7 +38,7 @@ fn projected(unit: &str, vertical: &str) -> String {
     )
 }
 
-/// Files of New Mexico name the survey foot of heights with the factor of a metre.
+/// Files of New Mexico name the survey foot for heights but have the factor of a metre.
 #[test]
 fn the_name_of_a_unit_counts_where_its_factor_is_of_another() {
     let survey = "\"US survey foot\",0.304800609601219";
@@ -54,7 +54,7 @@ fn the_name_of_a_unit_counts_where_its_factor_is_of_another() {
         [0.3048, 1.0],
         "the unit of x and y is named foot, with the factor 1: the name counts, 0.3048 m",
     );
-    // Digits of a factor count where it is the unit's own, and a name that is not known has no more than its factor.
+    // A factor close to the named unit is used with all its digits. An unknown name has only its factor.
     let las = with_wkt(&projected("\"Foot_US\",0.3048006", "\"rod\",5.0292"));
     assert_units(&las, [0.304_800_6, 5.0292], "coordinates become metres");
     let las = with_wkt("LOCAL_CS[\"hall\",UNIT[\"millimetre\",0.001]]");
@@ -62,7 +62,7 @@ fn the_name_of_a_unit_counts_where_its_factor_is_of_another() {
     assert_units(&with_wkt(&projected("\"metre\",1", "\"Meter\",1")), [1.0; 2], "");
 }
 
-/// A file with GeoTIFF keys: key, place of the value, value.
+/// Returns a file with GeoTIFF keys: key, location of the value, value.
 fn with_keys(keys: &[[u16; 3]], doubles: &[f64]) -> Las {
     let mut values = vec![[1, 1, 0, keys.len() as u16]];
     values.extend(keys.iter().map(|[key, place, value]| [*key, *place, 1, *value]));
@@ -76,10 +76,10 @@ fn with_keys(keys: &[[u16; 3]], doubles: &[f64]) -> Las {
 fn keys_name_units_by_number_by_size_and_by_the_vertical_system() {
     let metres = "coordinates become metres";
     assert_units(&with_keys(&[[3076, 0, 9003]], &[]), [US_FOOT_M; 2], metres);
-    // A size of the file's own, the second of its doubles.
+    // A user-defined unit size, the second of the doubles.
     let own = [[3076, 0, 32767], [3077, 34736, 1]];
     assert_units(&with_keys(&own, &[7.0, 0.01]), [0.01; 2], metres);
-    // Heights of NAVD88 in metres, and in feet, over a projection in the other.
+    // NAVD88 heights in metres and in feet, with the projection in the other unit.
     assert_units(&with_keys(&[[3076, 0, 9002], [4096, 0, 5703]], &[]), [0.3048, 1.0], metres);
     assert_units(&with_keys(&[[3076, 0, 9001], [4096, 0, 6360]], &[]), [1.0, US_FOOT_M], metres);
     assert_units(&with_keys(&[[3076, 0, 9001], [4096, 0, 6360], [4099, 0, 9001]], &[]), [1.0; 2], "");
@@ -104,13 +104,13 @@ fn coordinates_that_look_like_degrees_or_millimetres_are_remarked() {
         remark.starts_with("x and y look like degrees (7.1") && remark.contains("in steps of 0.0000001"),
         "{remark}"
     );
-    // All axes in the same steps: heights are metres all the same.
+    // Equal steps on all axes: heights in metres too.
     let narrow = Las { scales: [1e-7, 1e-7, 1e-7], offsets: [-77.03, 38.9, 12.0], ..Las::new(2, 1, 400) };
     assert_eq!(hint(&narrow), "", "a cloud of a millimetre in fine steps");
     let millimetres = Las { scales: [1.0; 3], offsets: [0.0; 3], points: 40_000, ..Las::new(2, 0, 40_000) };
     let remark = hint(&millimetres);
     assert!(remark.contains("if they are millimetres or feet"), "{remark}");
-    // A named system says what the numbers are, and metres near zero are metres.
+    // A file with a named system, and small coordinates in metres, give no hint.
     let named = Las {
         scales: degrees.scales,
         offsets: degrees.offsets,

@@ -4,14 +4,14 @@ use crate::support::{Cloud, all, clouds, clouds_with, failure, fixture};
 use std::fs;
 use voxtile_formats::{CloudPoint, ReadOptions, open_clouds};
 
-/// Where the points begin, and where the chunk table is.
+/// Returns the offsets of the points and of the chunk table.
 fn places(file: &[u8]) -> (usize, usize) {
     let points_at = u32::from_le_bytes(file[96..100].try_into().unwrap()) as usize;
     let table_at = u64::from_le_bytes(file[points_at..points_at + 8].try_into().unwrap()) as usize;
     (points_at, table_at)
 }
 
-/// What is said of a file with some bytes of it overwritten.
+/// Returns the error for a file with some bytes overwritten.
 fn of_damaged(file: &[u8], at: usize, bytes: &[u8]) -> String {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("damaged.laz");
@@ -23,7 +23,7 @@ fn of_damaged(file: &[u8], at: usize, bytes: &[u8]) -> String {
     error
 }
 
-/// The number of points of a file with some bytes of it overwritten, and the remarks.
+/// Returns the number of points and the remarks for a file with some bytes overwritten.
 fn of_changed(file: &[u8], at: usize, bytes: &[u8]) -> (usize, String) {
     let folder = tempfile::tempdir().unwrap();
     let [whole, changed] = ["whole.laz", "changed.laz"].map(|name| folder.path().join(name));
@@ -48,7 +48,7 @@ fn assert_says(error: &str, at: usize, what: &str) {
     );
 }
 
-/// Each claim would have the library reserve gigabytes, or read for years.
+/// Each of these claims would make the library reserve gigabytes or read for years.
 #[test]
 fn a_chunk_table_that_lies_is_refused() {
     let (by_point, by_layer) = (fs::read(fixture("timed.laz")).unwrap(), voxel_file("laz"));
@@ -56,13 +56,13 @@ fn a_chunk_table_that_lies_is_refused() {
         let (points_at, table_at) = places(file);
         let error = of_damaged(file, table_at + 4, &[0xff; 4]);
         assert_says(&error, table_at + 4, "the chunk table promises 4294967295 chunks");
-        // Without its table, each chunk says how many points it has.
+        // Without the table, each chunk states its number of points.
         let (points, remarks) = of_changed(file, points_at, &u64::to_le_bytes(1 << 40));
         assert!(
             remarks.contains(&format!("cut off or damaged: {points} points are read without it")),
             "{remarks}"
         );
-        // The table itself is compressed: other bytes are other lengths of chunks, or none at all.
+        // The table is compressed: changed bytes give other chunk lengths or an invalid table.
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("damaged.laz");
         let mut refused = 0;
@@ -82,24 +82,25 @@ fn a_chunk_table_that_lies_is_refused() {
         assert!(refused > 50, "{refused}");
     }
     let (points_at, _) = places(&by_layer);
-    // Behind the place of the table, the first point and the number of points.
+    // After the table's offset, the first point and the number of points.
     let lengths_at = points_at + 8 + 42 + 4;
     let error = of_damaged(&by_layer, lengths_at, &[0xff; 4]);
     assert_says(&error, lengths_at, "the fields of a chunk claim 42949");
-    // Found by fuzzing: where the fields end before their chunk does, the next one is looked for in their bytes.
+    // Found by fuzzing: if the fields end before their chunk, the library looks for the next chunk in the remaining
+    // bytes.
     let shorter =
         (u32::from_le_bytes(by_layer[lengths_at..lengths_at + 4].try_into().unwrap()) - 1).to_le_bytes();
     let error = of_damaged(&by_layer, lengths_at, &shorter);
     assert_says(&error, lengths_at, "the fields of a chunk claim ");
 }
 
-/// Found by fuzzing: layers that are said to be none are not checked as such.
+/// Found by fuzzing: the layers were not checked if the compressor type claimed that there are none.
 #[test]
 fn a_compressor_must_fit_the_versions_of_its_parts() {
     for (file, compressor) in
         [(fs::read(fixture("timed.laz")).unwrap(), 2_u16), (voxel_file("laz"), 2), (voxel_file("laz"), 1)]
     {
-        // The description follows the head of its record, which begins with two bytes and the name.
+        // The description follows the record header, which begins with two bytes and the user ID.
         let name_at = file.windows(14).position(|bytes| bytes == b"laszip encoded").unwrap();
         let error = of_damaged(&file, name_at - 2 + 54, &compressor.to_le_bytes());
         assert_says(&error, 100, &format!("compressor {compressor} does not fit"));
@@ -108,7 +109,7 @@ fn a_compressor_must_fit_the_versions_of_its_parts() {
 
 #[test]
 fn more_points_than_the_chunks_have_room_for_are_refused() {
-    // Of layers, the chunks know better.
+    // For layered chunks, the chunks' own counts are used.
     let by_layer = voxel_file("laz");
     let (points, remarks) = of_changed(&by_layer, 247, &u64::to_le_bytes(1 << 50));
     assert_eq!(points, VOXELS as usize);
@@ -120,7 +121,7 @@ fn more_points_than_the_chunks_have_room_for_are_refused() {
     assert_says(&error, 105, "points of 60000 bytes are compressed as 2 parts of 42 bytes");
 }
 
-/// Every point of a COPC file is in it once, in the order of its chunks.
+/// Each point of a COPC file is read once, in the order of the chunks.
 #[test]
 fn copc_is_read_as_laz_is() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,35 +1,35 @@
-//! Files of other programs, read.
+//! Tests of reading files of other programs.
 
-/// Coordinate systems on their way through.
+/// Coordinate reference systems.
 #[cfg(all(feature = "las", feature = "e57"))]
 mod crs;
-/// Depth images that the test makes.
+/// Generated depth images.
 mod depth;
-/// Points of a scanner in motion.
+/// Motion compensation.
 mod deskew;
 #[cfg(feature = "e57")]
 mod e57;
-/// What a file or a folder is.
+/// Detection of formats.
 mod formats;
 #[cfg(feature = "las")]
 mod las;
-/// How many points a LAS file has.
+/// Point counts of LAS files.
 #[cfg(feature = "las")]
 mod las_counts;
-/// In what a LAS file measures.
+/// Units of LAS files.
 #[cfg(feature = "las")]
 mod las_units;
-/// What is promised of compressed points.
+/// Checks of compressed points.
 #[cfg(feature = "las")]
 mod laz_chunks;
 #[path = "../made/mod.rs"]
 mod made;
-/// What people have that is not quite what its name says.
+/// Files that deviate from their format or name.
 mod mistakes;
 /// PLY, text and raw floats.
 mod plain;
-/// Files of poses.
+/// Pose files.
 mod poses;
-/// The formats that there are.
+/// The registry of formats.
 mod registry;
 mod support;

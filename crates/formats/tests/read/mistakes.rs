@@ -3,7 +3,7 @@ use std::fs;
 use std::path::Path;
 use voxtile_formats::{ReadOptions, Registry, open_clouds, open_scans};
 
-/// Points and remarks of a file of clouds.
+/// Returns the points and the remarks of a file.
 fn read(path: &Path, options: &ReadOptions) -> (Vec<[f64; 3]>, Vec<String>) {
     let mut source = open_clouds(path, options).unwrap_or_else(|error| panic!("{error:#}"));
     let clouds = crate::support::all(source.as_mut()).unwrap_or_else(|error| panic!("{error:#}"));
@@ -150,14 +150,14 @@ fn headers_of_ply_in_any_letters_and_line_ends() {
     ] {
         assert_eq!(read_text("a.ply", &text).0, WANTED, "{text}");
     }
-    // Words of properties that are not read need not be numbers.
+    // Properties that are not read may contain words.
     let labelled = head.replace("end_header", "property int label\nend_header");
     let (points, remarks) = read_text("a.ply", &format!("{labelled}1.5 -2.25 3 wall\n4 5 6 floor\n"));
     assert_eq!((points.as_slice(), remarks.len()), (&WANTED[..], 0));
     let (points, remarks) = read_text("a.ply", &format!("{head}1.5 -2.25 3\n4 five 6\n"));
     assert_eq!(points, WANTED[..1]);
     assert_eq!(remarks, ["1 row is no point, left out (line 9: `five` is not a number)"]);
-    // A number that is missing where lines are wrapped, with faces behind.
+    // A missing number in wrapped lines, followed by faces.
     let faces = head.replace("end_header", "element face 1\nproperty list uchar int i\nend_header");
     let whole = format!("{faces}1.5 -2.25\n3 4 5 6\n3 0 1 0\n");
     assert_eq!(read_text("a.ply", &whole).0, WANTED);
@@ -177,7 +177,8 @@ fn headers_of_ply_in_any_letters_and_line_ends() {
     assert!(remarks[0].contains("line 3 says `comment units: mm`"), "{remarks:?}");
 }
 
-/// A binary file whose lines end with CR has its first number right behind the last CR, whatever its first byte.
+/// In a binary file with CR line ends, the first number directly follows the last CR, even if it starts with an LF
+/// byte.
 #[test]
 fn binary_ply_after_cr_alone() {
     let head = "ply\rformat binary_little_endian 1.0\relement vertex 2\rproperty uchar label\rproperty float x\r\
@@ -241,14 +242,14 @@ fn headers_of_pcd_in_any_letters_and_line_ends() {
     write(&format!("{}{body}", head.replace("x y z", "a b z")));
     let error = scan_of(&path, &options).unwrap_err();
     assert!(error.contains("the points have no field x, y; their fields are `a b z`"), "{error}");
-    // A viewpoint that is none matters only where it is needed.
+    // An invalid viewpoint is an error only if it is needed.
     write(&format!("{}{body}", head.replace("VIEWPOINT 0 0 0 1", "VIEWPOINT 1 0 0 0")));
     assert!(scan_of(&path, &options).unwrap_err().contains("VIEWPOINT"));
     let posed = ReadOptions { poses: Some("identity".into()), ..ReadOptions::default() };
     assert_eq!(scan_of(&path, &posed).map(|(points, _)| points), Ok(WANTED.to_vec()));
 }
 
-/// Numbers of a file without a header: a room whose points are in no order.
+/// Numbers for a headerless file: points of a room in random order.
 fn raw(points: usize, row: impl Fn(usize, [f64; 3]) -> Vec<f64>) -> Vec<f64> {
     let mut state = 1_u64;
     let mut part = || {

@@ -16,7 +16,7 @@ fn ply_of_every_encoding() {
     }
 }
 
-/// Text has more digits than a float holds; a double keeps them.
+/// Text has more digits than a float, which are dropped; a double keeps them.
 #[test]
 fn ply_as_text_is_the_same_points_as_in_both_binaries() {
     let folder = tempfile::tempdir().unwrap();
@@ -45,7 +45,7 @@ fn ply_as_text_is_the_same_points_as_in_both_binaries() {
 #[test]
 fn ply_that_is_cut_off_gives_what_is_whole() {
     let folder = tempfile::tempdir().unwrap();
-    // A face of 13 bytes and some of the last vertex go; of the text, a line and a half.
+    // Removes a face of 13 bytes and a part of the last vertex; from the text, one and a half lines.
     for (name, cut) in [("little.ply", 15), ("big.ply", 15), ("ascii.ply", 12)] {
         let bytes = fs::read(fixture(name)).unwrap();
         let path = folder.path().join(name);
@@ -79,7 +79,7 @@ fn raw_floats_that_do_not_fit_their_columns_are_an_error() {
     assert_eq!(points, 0);
 }
 
-/// The points of a wall, a row each: with a ring, or as KITTI has them.
+/// Encodes the points of a wall, one row each: with a ring, or as in KITTI.
 fn raw_floats(points: usize, row: impl Fn(f32) -> Vec<f32>) -> Vec<u8> {
     (0..points).flat_map(|k| row(k as f32)).flat_map(f32::to_le_bytes).collect()
 }
@@ -119,7 +119,7 @@ fn no_file_of_four_columns_is_refused() {
         ("no points", Vec::new()),
     ] {
         fs::write(&path, &bytes).unwrap();
-        // What is empty has no format of its own.
+        // An empty file has no detectable format.
         let options = ReadOptions { format: Some("bin".into()), ..ReadOptions::default() };
         assert_eq!(clouds_with(&path, &options)[0].1.len(), bytes.len() / 16, "{what}");
     }
@@ -138,7 +138,7 @@ fn a_folder_is_read_in_natural_order_with_stamps_of_names() {
     assert_eq!(found, [("9.bin", None), ("10.bin", None), ("1700000000123456789.bin", stamp_ns)]);
 }
 
-/// A table of poses among texts, by whatever path it is named.
+/// A table of poses among text clouds, given by different paths.
 #[test]
 fn files_that_are_named_for_something_else_are_no_clouds() {
     let folder = tempfile::tempdir().unwrap();
@@ -149,7 +149,7 @@ fn files_that_are_named_for_something_else_are_no_clouds() {
     }
     fs::write(scans.join("0_gps.csv"), "timestamp,tx,ty,tz\n0,1,2,3\n").unwrap();
     fs::write(scans.join("lens.txt"), "500 500 320 240\n").unwrap();
-    // What no other file is named like is looked into.
+    // A file whose name differs from all others is inspected.
     let source = voxtile_formats::open_clouds(&scans, &ReadOptions::default()).unwrap();
     assert_eq!((source.len_hint(), source.remarks().len()), (Some(2), 2));
     let other_path = scans.join("../scans/0_gps.csv");

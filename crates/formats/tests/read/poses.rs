@@ -28,20 +28,20 @@ fn stamps_are_exact_and_poses_lie_between() {
     assert_eq!(trajectory.at(before_ns, i64::MAX).unwrap(), Found::Before { first_ns: FIRST_NS });
     let last_ns = FIRST_NS + 11_000_000_000;
     assert_eq!(trajectory.at(last_ns + 1_000_001, i64::MAX).unwrap(), Found::After { last_ns });
-    // Written numbers stay, though their length is not 1 to the last bit.
+    // Poses keep their values even if the quaternion's length is not exactly 1.
     let Found::Exact(last) = trajectory.at(last_ns, 0).unwrap() else { panic!() };
     assert_eq!(last.quaternion, [0.0, 0.0, 0.707, 0.7072]);
     let Found::Between(half) = trajectory.at(FIRST_NS + 500_000_000, 500_000_000).unwrap() else { panic!() };
     assert_eq!(half.position_m, [2.0, 2.0, 3.0]);
     let (sin, cos) = (std::f64::consts::PI / 8.0).sin_cos();
     assert!((half.quaternion[2] - sin).abs() < 1e-12 && (half.quaternion[3] - cos).abs() < 1e-12, "{half:?}");
-    // A hole of ten seconds, near to its begin as in its middle.
+    // A gap of ten seconds, near its start and in its middle.
     for into_ns in [400_000_000, 5_000_000_000] {
         let at_ns = FIRST_NS + 1_000_000_000 + into_ns;
         assert_eq!(trajectory.at(at_ns, 4_999_999_999).unwrap(), Found::Gap { gap_ns: 10_000_000_000 });
         assert!(matches!(trajectory.at(at_ns, 5_000_000_000).unwrap(), Found::Between(_)));
     }
-    // Once a second, every moment is within half a second of a pose.
+    // With one pose per second, every moment is within half a second of a pose.
     assert_eq!(
         trajectory.at(FIRST_NS + 1_000_001, 499_999_999).unwrap(),
         Found::Gap { gap_ns: 1_000_000_000 }
@@ -71,7 +71,7 @@ fn a_pose_within_a_millisecond_is_taken_whatever_the_gap() {
             assert_eq!(x_m(stamp_ns + apart_ns), None, "{apart_ns}");
         }
     }
-    // Where the gap may be filled, the pose is between two, however near to one.
+    // If the gap may be interpolated, the pose is interpolated even close to a sample.
     let Found::Between(pose) = trajectory.at(first_ns + 74, i64::MAX).unwrap() else { panic!() };
     assert!(pose.position_m[0] > 1.0);
 }
@@ -94,7 +94,7 @@ fn what_is_no_pose_is_an_error_with_its_line() {
     for (text, reason) in [
         ("1 nan 0 0 0 0 0 1\n", "line 1: `nan` is not finite"),
         ("0 0 0 0 0 0 0 0\n", "line 1: the quaternion 0 0 0 0 has length 0"),
-        // Most lines are something else.
+        // Most lines have another layout.
         (
             "0 0 0 0 0 0 0 1\n\n1 2 3 4 5 6 7 8 9\n1 2 3 4 5 6 7 8 9\n",
             "line 3: 9 numbers; the lines before have 8",
@@ -125,7 +125,7 @@ fn what_is_no_pose_is_an_error_with_its_line() {
     }
 }
 
-/// So many clouds, if that is known, which are never read.
+/// Source with an optional number of clouds, which are never read.
 struct Clouds(Option<u64>);
 
 impl CloudSource for Clouds {
@@ -230,7 +230,7 @@ fn rows_that_are_no_poses_keep_their_numbers_and_are_remarked() {
         );
         assert!(remarks[0].contains(reason), "{remarks:?}");
     }
-    // Words between poses are no pose of a scan, and a stamp that cannot be read leaves the pose its number.
+    // Words between poses do not count as a row; a pose with an unreadable stamp keeps its number.
     let text =
         "t x y z qx qy qz qw\n1 10 0 0 0 0 0 1\nt x y z qx qy qz qw\nnan 20 0 0 0 0 0 1\n3 30 0 0 0 0 0 1\n";
     let trajectory = read(text).unwrap();
@@ -242,14 +242,14 @@ fn rows_that_are_no_poses_keep_their_numbers_and_are_remarked() {
     );
     let remarks = trajectory.remarks().join("\n");
     assert!(remarks.contains("line 3: `t x y z") && remarks.contains("line 4: no time stamp"), "{remarks}");
-    // A matrix over four lines is lost as a whole.
+    // A matrix on four lines is lost as a whole.
     let matrix = |x: &str| format!("1 0 0 {x}\n0 1 0 0\n0 0 1 0\n0 0 0 1\n");
     let trajectory = read(&["1", "nan", "3"].map(matrix).concat()).unwrap();
     let x_m = |number: usize| trajectory.by_number(number).unwrap().map(|pose| pose.position_m[0]);
     assert_eq!((trajectory.len(), [0, 1, 2].map(x_m)), (3, [Some(1.0), None, Some(3.0)]));
 }
 
-/// The poses of a cart that turns to the left, each `x y z` and the quaternion as `w x y z`.
+/// Poses of a cart that turns left: `x y z` and the quaternion as `w x y z`.
 fn turning_cart() -> Vec<([f64; 3], [f64; 4])> {
     let at = |k: i32| (f64::from(k), 0.04 * f64::from(k));
     (0..12)
@@ -294,7 +294,7 @@ fn quaternions_with_w_first_are_told_by_the_way_the_sensor_stands() {
 fn kitti_poses_of_the_camera_become_those_of_the_lidar() {
     let folder = tempfile::tempdir().unwrap();
     let (poses, calib) = (folder.path().join("00.txt"), folder.path().join("calib.txt"));
-    // The camera looks along the lidar's x and went 5 m forward.
+    // The camera looks along the lidar's x and moved 5 m forward.
     fs::write(&poses, "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0 0 1 0 0 0 0 1 5\n").unwrap();
     fs::write(&calib, "P0: 1 0 0 0 0 1 0 0 0 0 1 0\nTr: 0 -1 0 0 0 0 -1 -0.08 1 0 0 -0.27\n").unwrap();
     let trajectory = Trajectory::read(&poses, Some(&calib)).unwrap();
@@ -307,7 +307,7 @@ fn kitti_poses_of_the_camera_become_those_of_the_lidar() {
     assert_eq!(plain.by_number(1).unwrap().unwrap().position_m, [0.0, 0.0, 5.0]);
 }
 
-/// Maps that were built of the one are resumed with the other.
+/// A map built from one of the two forms can be resumed with the other.
 #[test]
 fn a_matrix_in_a_file_is_the_pose_that_the_engine_makes_of_it_to_the_bit() {
     let (mut text, mut wanted) = (String::new(), Vec::new());
@@ -319,7 +319,7 @@ fn a_matrix_in_a_file_is_the_pose_that_the_engine_makes_of_it_to_the_bit() {
     for k in 0..3000 {
         let [roll, pitch, yaw] = [0; 3].map(|_| 6.4 * random() - 3.2);
         let rotation = Rotation3::from_euler_angles(roll, pitch, yaw);
-        // As few digits as make a rotation, and as many as a double has.
+        // From the fewest digits that form a rotation up to the digits of a double.
         let digits = 4 + k % 14;
         let rows: [[f64; 4]; 3] = std::array::from_fn(|row| {
             std::array::from_fn(|column| {
@@ -391,7 +391,7 @@ fn real_poses_of_two_forms_agree() {
     }
 }
 
-/// A file of NumPy with this header, of a version, and so many bytes.
+/// Returns a NumPy file of a version, with this header and this many data bytes.
 fn npy(version: u8, header: &str, bytes: usize) -> Vec<u8> {
     let length = header.len() as u32;
     let length =

@@ -1,4 +1,4 @@
-//! One row and one file add a format; all that lists formats lists those of the registry.
+//! Tests that a format needs only one registry row and one file, and that all lists of formats agree with the registry.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -9,7 +9,7 @@ use voxtile_formats::read::{Points, Visit};
 use voxtile_formats::{CloudHead, CloudPoint};
 use voxtile_formats::{InputFormat, Mark, Open, ReadOptions, Registry};
 
-/// Points on the x axis, one a line.
+/// Points on the x axis, one per line.
 struct Axis(BufReader<fs::File>);
 
 impl Points for Axis {
@@ -59,7 +59,7 @@ fn a_format_is_a_row_and_a_file() {
         assert_eq!(second.points_in_sensor, [[3.0, 0.0, 0.0]]);
         assert!(source.next_scan().unwrap().is_none());
     }
-    // Its content tells it whatever the name; without its row it is nothing that is known.
+    // The format is detected from the content, whatever the name. Without its row it is unknown.
     let renamed = folder.path().join("cloud.dat");
     fs::write(&renamed, "AXIS\nx\n").unwrap();
     let error = match formats.open_scans(&renamed, &ReadOptions::default()).unwrap().next_scan() {
@@ -96,7 +96,7 @@ fn repository(path: &str) -> String {
     fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-/// The table of `docs/formats.md`, and the names that Python's help lists.
+/// Checks the table of `docs/formats.md` and the names in Python's help.
 #[test]
 fn pages_list_the_formats_that_there_are() {
     let formats = Registry::default();

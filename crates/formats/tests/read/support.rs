@@ -3,13 +3,13 @@ use voxtile::Result;
 use voxtile_formats::{CloudHead, CloudPoint, CloudSource};
 use voxtile_formats::{ReadOptions, open_clouds};
 
-/// A file that somebody else's writer made, see `tests/fixtures/clouds.py`.
+/// Returns the path of a file written by another program; see `tests/fixtures/clouds.py`.
 pub fn fixture(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name)
 }
 
-/// A folder of real data: under `$VOXTILE_DATA`, by default beside the repository. `None`, after saying so, where it is
-/// absent.
+/// Returns a folder of real data in `$VOXTILE_DATA`, by default next to the repository. If it is absent, prints a
+/// message and returns `None`.
 pub fn shared_data(folder: &str) -> Option<PathBuf> {
     let root = std::env::var_os("VOXTILE_DATA")
         .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"), PathBuf::from);
@@ -24,7 +24,7 @@ pub fn shared_data(folder: &str) -> Option<PathBuf> {
 /// A cloud with its points.
 pub type Cloud = (CloudHead, Vec<CloudPoint>);
 
-/// All clouds of a source, or the first error.
+/// Returns all clouds of a source, or the first error.
 pub fn all(source: &mut dyn CloudSource) -> Result<Vec<Cloud>> {
     let mut clouds = Vec::new();
     while let Some(head) = source.next_cloud()? {
@@ -47,7 +47,7 @@ pub fn clouds(path: &Path) -> Vec<Cloud> {
     clouds_with(path, &ReadOptions::default())
 }
 
-/// What goes wrong, and how many points came before.
+/// Returns the error, and the number of points read before it.
 pub fn failure(path: &Path, options: &ReadOptions) -> (String, usize) {
     let mut points = 0;
     let mut read = || -> Result<()> {
@@ -64,7 +64,7 @@ pub fn failure(path: &Path, options: &ReadOptions) -> (String, usize) {
     (format!("{error:#}"), points)
 }
 
-/// The points of the fixtures, shifted.
+/// Returns the points of the fixtures, shifted.
 pub fn wanted(shift: [f64; 3]) -> Vec<CloudPoint> {
     (0..20)
         .map(f64::from)

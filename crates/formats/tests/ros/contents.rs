@@ -122,7 +122,7 @@ fn gaps_between_transforms_may_be_limited() {
     assert!(clouds.iter().all(|(head, _)| head.world_from_sensor.is_none()));
     let why = "too far apart; `pose_tolerance` allows for more";
     assert!(remarks.iter().any(|remark| remark.contains(why)), "{remarks:?}");
-    // The map moves in odom five times a second.
+    // `map` moves in `odom` five times a second.
     for (tolerance_ns, posed) in [(99_999_999, 0), (100_000_000, 4)] {
         let options = BagOptions { most_gap_ns: Some(most_gap_ns(tolerance_ns)), ..topic("/points") };
         let (clouds, ..) = read(&[data("lz4.bag")], &options);

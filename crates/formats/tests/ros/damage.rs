@@ -9,14 +9,14 @@ fn files_that_are_cut_off_give_what_is_whole() {
     for name in FILES {
         let bytes = std::fs::read(data(name)).unwrap();
         let path = folder.path().join(name);
-        // Without the last byte the index is gone, but no message is.
+        // Without the last byte the index is lost, but no message.
         std::fs::write(&path, &bytes[..bytes.len() - 1]).unwrap();
         let (clouds, errors, remarks) = read(from_ref(&path), &topic("/points"));
         assert_eq!(errors, Vec::<String>::new(), "{name}");
         assert_eq!(remarks.len(), 1, "{name}: {remarks:?}");
         assert!(remarks[0].contains("41 messages were found"), "{remarks:?}");
         assert_clouds(&clouds, "map", name);
-        // In the midst of messages: some are gone, the first is not.
+        // Cut within the messages: some are lost, but not the first.
         std::fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
         let (clouds, _, remarks) = read(&[path], &topic("/points"));
         assert!((1..4).contains(&clouds.len()), "{name}: {}", clouds.len());
@@ -34,7 +34,7 @@ fn folders_whose_file_is_cut_off_or_gone_say_so() {
     assert!(error.contains("names by_file.db3.zstd, which is not there"), "{error}");
     let bytes = std::fs::read(data("by_file/by_file.db3.zstd")).unwrap();
     copy("by_file.db3.zstd", &bytes[..bytes.len() - 1]);
-    // The archive is one block: without its end there is nothing.
+    // The archive is a single block: without its end, nothing can be decompressed.
     let error = format!("{:#}", open_recording(&[folder.path().to_owned()]).err().unwrap());
     assert!(error.contains("by_file.db3.zstd: malformed: offset 0: it is cut off or damaged"), "{error}");
     // Without metadata, files are found by their names.
@@ -62,7 +62,7 @@ fn files_that_are_no_recordings_say_so() {
     assert!(open_recording(&[]).is_err());
 }
 
-/// A generator of numbers that need not be good.
+/// Simple pseudo-random number generator.
 struct Numbers(u64);
 
 impl Numbers {
@@ -107,12 +107,12 @@ fn damaged_files_never_panic_and_end() {
                 }
             }
         }
-        // Most of it must have got as far as points, or this tests nothing.
+        // Ensures that many points were decoded despite the damage.
         assert!(read > 2_000, "{name}: {read} points");
     }
 }
 
-/// Where the checksums of the chunks of an MCAP file are.
+/// Returns the offsets of the checksums of an MCAP file's chunks.
 fn checksums(file: &[u8]) -> Vec<usize> {
     let (mut at, mut found) = (8, Vec::new());
     while let Some(length) = file.get(at + 1..at + 9) {
@@ -139,13 +139,13 @@ fn chunks_of_mcap_whose_checksum_is_wrong_are_damaged() {
                 file[at..at + 4].copy_from_slice(&bytes);
                 std::fs::write(&path, file).unwrap();
                 let (clouds, mut errors, remarks) = read(from_ref(&path), &topic("/points"));
-                // No cloud comes of damaged bytes, and each that is left out has its error.
+                // No cloud is read from damaged bytes, and each missing cloud has an error.
                 assert_eq!(clouds.len() + errors.len(), 4, "{name}: {errors:?}");
                 assert_same(&clouds, &wanted, true);
                 left_out += errors.len();
                 errors.extend(remarks);
                 assert_eq!(!errors.is_empty(), is_damaged, "{name}: {errors:?}");
-                // Clouds may lose their poses with it, too.
+                // Clouds may also lose their poses.
                 let damages: Vec<_> = errors.iter().filter(|error| error.contains("damaged")).collect();
                 assert_eq!(!damages.is_empty(), is_damaged, "{name}: {errors:?}");
                 let is_named = damages.iter().all(|error| error.contains("that in its header 04030201"));
@@ -157,7 +157,7 @@ fn chunks_of_mcap_whose_checksum_is_wrong_are_damaged() {
     assert!(checked > 0 && left_out >= 4, "the fixtures have checksums: {checked} {left_out}");
 }
 
-/// A file without an index is walked over, and its damaged chunks are left out, too.
+/// Damaged chunks are also skipped in a file without an index.
 #[test]
 fn damaged_chunks_of_a_file_without_an_index_are_left_out() {
     let folder = tempfile::tempdir().unwrap();
@@ -169,14 +169,14 @@ fn damaged_chunks_of_a_file_without_an_index_are_left_out() {
         file[at] ^= 1;
         std::fs::write(&path, file).unwrap();
         let (clouds, errors, _) = read(from_ref(&path), &topic("/points"));
-        // A chunk without clouds is an error, too: where there is no index, its clouds may be what is damaged.
+        // Without an index, a damaged chunk without clouds is also an error, because it could contain clouds.
         let all = clouds.len() + errors.len();
         assert!(!errors.is_empty() && (4..=5).contains(&all), "{}: {errors:?}", clouds.len());
         assert_same(&clouds, &wanted, all == 4);
     }
 }
 
-/// Checks that clouds are those of the same stamps of the whole file, with their names.
+/// Checks that clouds equal those of the whole file with the same stamps and, optionally, names.
 fn assert_same(clouds: &[Cloud], whole: &[Cloud], have_names: bool) {
     for (head, points) in clouds {
         let (same, wanted) = whole.iter().find(|(same, _)| same.stamp_ns == head.stamp_ns).unwrap();
@@ -185,7 +185,7 @@ fn assert_same(clouds: &[Cloud], whole: &[Cloud], have_names: bool) {
     }
 }
 
-/// The topic of a damaged chunk is known, and the number of its messages.
+/// The topics of a damaged chunk and the number of its messages are known.
 #[test]
 fn a_file_without_an_index_whose_only_clouds_are_damaged_names_the_damage() {
     let folder = tempfile::tempdir().unwrap();
@@ -206,7 +206,7 @@ fn a_file_without_an_index_whose_only_clouds_are_damaged_names_the_damage() {
     assert!(errors.iter().all(|error| error.contains("a chunk is damaged")), "{errors:?}");
 }
 
-/// Whatever a decoder gives out before it fails.
+/// Whatever the decoder outputs before it fails.
 #[test]
 fn no_cloud_of_a_bag_comes_of_damaged_bytes() {
     let folder = tempfile::tempdir().unwrap();

@@ -65,7 +65,7 @@ impl Bag {
     }
 }
 
-/// A PNG of one row.
+/// Encodes a PNG with one row.
 fn png(bits: png::BitDepth, pixels: &[u8]) -> Vec<u8> {
     let mut bytes = Vec::new();
     let pixel_bytes = if bits == png::BitDepth::Sixteen { 2 } else { 1 };
@@ -80,7 +80,7 @@ fn png16(pixels: &[u16]) -> Vec<u8> {
     png(png::BitDepth::Sixteen, &pixels.iter().flat_map(|pixel| pixel.to_be_bytes()).collect::<Vec<u8>>())
 }
 
-/// What the transport `compressedDepth` writes before a PNG.
+/// Returns the header that the transport `compressedDepth` writes before a PNG.
 fn config(a: f32, b: f32) -> Vec<u8> {
     [1_u32.to_le_bytes(), a.to_le_bytes(), b.to_le_bytes()].concat()
 }
@@ -104,7 +104,7 @@ fn images_of_16_bits_are_depths_where_a_name_says_so() {
         assert_eq!((errors, remarks), (vec![], vec![]), "{name} {encoding}");
         assert_eq!(depths(&clouds), [Some(1.0), None], "{name} {encoding}");
     }
-    // Cameras for depths write these two; that is a guess.
+    // Depth cameras use both encodings; other evidence is missing, so this is a guess.
     for encoding in ["16UC1", "32FC1"] {
         let bag = Bag::new().image("/camera/image_raw", "camera", encoding).camera("/camera/camera_info");
         let (clouds, _, remarks) = bag.read(BagOptions::default());
@@ -132,11 +132,11 @@ fn images_of_temperatures_are_no_walls() {
         let error = bag().refusal();
         let told = format!("names do not say that they are depths: {name} ({encoding}); if they are, name");
         assert!(error.contains("no topic holds clouds") && error.contains(&told), "{error}");
-        // Beside clouds they are left out, and that is said.
+        // If there are clouds too, the images are skipped with a remark.
         let (clouds, _, remarks) = bag().points().read(BagOptions::default());
         assert_eq!(clouds[0].1[0].position_m, [7.0, 1.0, 2.0]);
         assert!(remarks.len() == 1 && remarks[0].contains(&told), "{remarks:?}");
-        // Who names them wants them.
+        // The images are used if their topic is selected.
         let (clouds, errors, remarks) = bag().points().read(topic(name));
         assert_eq!((depths(&clouds), errors), (vec![Some(1.0), None], vec![]), "{name}");
         let told = format!("{name} ({encoding}) is read as depths, as it was named");
@@ -154,13 +154,13 @@ fn the_largest_number_is_no_depth() {
 
 #[test]
 fn depths_are_read_that_are_compressed() {
-    // The encoder: number = a / depth + b.
+    // Encoder: value = a / depth + b.
     let (a, b) = (100.0 * 101.0_f32, 1.0 - 100.0 * 101.0 / 10.0);
     let inverse = |depth_m: f32| (a / depth_m + b) as u16;
     let millimetres = png16(&[1500, 0, 65535, 12]);
     let wanted = [Some(1.5), None, None, Some(0.012)];
-    // Width and height, and the same numbers in groups of four bits, eight in a word: no zero, one number: twice
-    // 1500; one zero, two numbers: twice 64035, and twice 65523, less 1, for what goes down.
+    // Width and height, then the values in groups of four bits, eight per word: no zero, one value (2 * 1500); one
+    // zero, two values (2 * 64035, and 2 * 65523 - 1, which is negative).
     let groups: [u32; 20] =
         [0, 1, 0x8, 0xf, 0xe, 0x5, 1, 2, 0xe, 0x8, 0x9, 0xa, 0xf, 0x3, 0xd, 0xc, 0xf, 0xf, 0xf, 0x3];
     let word = |groups: &[u32]| groups.iter().zip(0..).fold(0, |word, (bits, k)| word | bits << (28 - 4 * k));
@@ -230,7 +230,7 @@ fn compressed_images_that_are_no_depths_say_why() {
         let (_, errors, _) = bag.read(topic(name));
         assert!(errors.len() == 1 && errors[0].contains(told), "{errors:?} {told}");
     }
-    // Photographs beside depths are no second topic of clouds, nor are the depths in another form.
+    // Colour images are not a second topic of clouds, and neither is the same depth image in another encoding.
     let depth = [config(0.0, 0.0), png16(&[2000])].concat();
     let bag = Bag::new()
         .compressed("/color/image/compressed", "rgb8; jpeg compressed bgr8", b"\xff\xd8\xff\xe0")
@@ -243,7 +243,7 @@ fn compressed_images_that_are_no_depths_say_why() {
     let bag = bag.image("/depth/image", "camera", "16UC1");
     let (clouds, _, remarks) = bag.read(BagOptions::default());
     assert_eq!((depths(&clouds), remarks), (vec![Some(1.0), None], vec![]));
-    // Points are taken before depths that are compressed, as ever.
+    // Points are preferred to compressed depth images.
     let bag =
         Bag::new().points().compressed("/depth/image/compressedDepth", "16UC1; compressedDepth", &depth);
     let (clouds, _, remarks) = bag.camera("/depth/camera_info").read(BagOptions::default());

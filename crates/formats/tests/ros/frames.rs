@@ -47,7 +47,7 @@ fn a_transform_that_makes_a_loop_costs_a_recording_no_pose() {
     assert_eq!(remarks, ["2 transforms are not valid and left out; the first: a frame has no name"]);
 }
 
-/// It has no pose at other times, rather than that of its mount.
+/// At other times there is no pose, instead of the pose of the mount.
 #[test]
 fn a_single_transform_gives_a_pose_at_its_own_time_alone() {
     let folder = tempfile::tempdir().unwrap();
@@ -105,7 +105,7 @@ fn frames_that_lead_nowhere_cost_each_cloud_nothing() {
         MessageWriter::ros1().tf(at_ns, parent, child, &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
     };
     let mut messages = vec![(1, 1, tf(1, "map", "f0")), (1, 1, tf(10_000, "map", "f0"))];
-    // Each of these is searched before the parent that leads to the map.
+    // These frames are searched before the parent that leads to the map.
     for k in 0..9000 {
         messages.extend([2, 20_000].map(|at_ns| (1, 2, tf(at_ns, &format!("f{}", k + 1), &format!("f{k}")))));
     }

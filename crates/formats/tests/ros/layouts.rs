@@ -6,7 +6,7 @@ use voxtile_formats::ros::{BagOptions, PoseSource};
 
 const XYZ: [Field; 3] = [("x", 0, F32), ("y", 4, F32), ("z", 8, F32)];
 
-/// What is read of a recording of one topic.
+/// Reads a recording with one topic.
 fn read_messages(type_name: &str, messages: &[Vec<u8>]) -> (Vec<Cloud>, Vec<String>, Vec<String>) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.bag");
@@ -15,7 +15,7 @@ fn read_messages(type_name: &str, messages: &[Vec<u8>]) -> (Vec<Cloud>, Vec<Stri
     read(&[path], &BagOptions { poses: PoseSource::None, ..BagOptions::default() })
 }
 
-/// The points of a cloud with this layout, what is wrong with it, and the remarks.
+/// Reads a cloud with this layout. Returns its points, the errors and the remarks.
 fn read_cloud(
     layout: &CloudLayout,
     fields: &[Field],
@@ -34,7 +34,7 @@ fn le(numbers: &[f32]) -> Vec<u8> {
     numbers.iter().flat_map(|number| number.to_le_bytes()).collect()
 }
 
-/// Six points: x is 1 to 6.
+/// Encodes six points with x from 1 to 6.
 fn six() -> Vec<u8> {
     (1..=6).flat_map(|k| le(&[k as f32, 0.5, -0.25])).collect()
 }
@@ -46,12 +46,12 @@ fn layout(size: [u32; 2], row_step: u32) -> CloudLayout {
 #[test]
 fn points_are_found_whatever_row_step_says() {
     let wanted: Vec<[f64; 3]> = (1..=6).map(|k| [f64::from(k), 0.5, -0.25]).collect();
-    // That of a row, none, that of the cloud, points of a row, more than there is.
+    // The size of a row, 0, the size of the cloud, the points per row, and two sizes that are too large.
     for row_step in [36, 0, 72, 3, 40, u32::MAX] {
         let (points, errors, remarks) = read_cloud(&layout([2, 3], row_step), &XYZ, &six());
         assert_eq!((positions(&points), errors, remarks), (wanted.clone(), vec![], vec![]), "{row_step}");
     }
-    // Rows with a gap behind them, the last one without it.
+    // Rows followed by a gap, with the last gap missing in one case.
     for last in [0, 4] {
         let mut data = six();
         data.splice(36..36, [9; 4]);
@@ -59,7 +59,7 @@ fn points_are_found_whatever_row_step_says() {
         let (points, errors, _) = read_cloud(&layout([2, 3], 40), &XYZ, &data);
         assert_eq!((positions(&points), errors), (wanted.clone(), vec![]), "{last}");
     }
-    // Fewer bytes than points are an error, and those that are there are given.
+    // Missing bytes are an error; the available points are returned.
     for row_step in [36, 72] {
         let (points, errors, _) = read_cloud(&layout([2, 3], row_step), &XYZ, &six()[..60]);
         assert_eq!(positions(&points), wanted[..5], "{row_step}");
@@ -96,12 +96,12 @@ fn points_that_are_not_announced_are_read_and_said() {
         assert_eq!((points.len(), errors), (6, vec![]), "{size:?}");
         assert_eq!(remarks, ["1 clouds announce no points, but hold some, which are read"]);
     }
-    // Neither of these has six points.
+    // These messages do not contain six points.
     for (size, data) in [([0, 5], six()), ([0, 0], vec![]), ([0, 0], vec![7; 13])] {
         let (points, errors, remarks) = read_cloud(&layout(size, 72), &XYZ, &data);
         assert_eq!((points.len(), errors, remarks), (0, vec![], vec![]), "{size:?}");
     }
-    // Without points, fields are not needed.
+    // A cloud without points needs no fields.
     let empty = CloudLayout { size: [0, 0], is_big_endian: false, point_step: 0, row_step: 0 };
     let (points, errors, _) = read_cloud(&empty, &[], &[]);
     assert_eq!((points.len(), errors), (0, vec![]));
@@ -119,7 +119,7 @@ fn the_byte_order_is_that_of_the_points() {
     let (points, _, remarks) = read_cloud(&said, &XYZ, &le(&numbers));
     assert_eq!(positions(&points), wanted);
     assert_eq!(remarks, ["1 clouds say that they are big-endian, but are little-endian"]);
-    // Too few points to know.
+    // Too few points to detect the byte order.
     let one = CloudLayout { size: [1, 1], ..said };
     let (points, _, remarks) = read_cloud(&one, &XYZ, &big[..12]);
     assert_eq!((positions(&points), remarks), (wanted[..1].to_vec(), vec![]));
@@ -138,7 +138,7 @@ fn fields_are_found_in_letters_of_either_case_and_in_one() {
         assert_eq!((positions(&points), errors), (vec![[1.0, 2.0, 3.0]], vec![]), "{fields:?}");
         assert_eq!((points[0].intensity, remarks), (40.0, vec![]), "{fields:?}");
     }
-    // A temperature is no time.
+    // `T` is a temperature, not a time.
     let fields = [("x", 0, F32), ("y", 4, F32), ("z", 8, F32), ("T", 12, F32)];
     assert_eq!(read_cloud(&layout, &fields, &data).0[0].time_s, 0.0);
 }
@@ -165,7 +165,7 @@ fn plane_clouds_have_z_0_and_fields_outside_of_points_are_errors() {
     }
 }
 
-/// `sensor_msgs/PointCloud`, which ROS 2 still has.
+/// `sensor_msgs/PointCloud`, which also exists in ROS 2.
 #[test]
 fn old_clouds_are_read_with_their_channels() {
     let cloud = |writer: MessageWriter| {
@@ -200,7 +200,7 @@ fn old_clouds_are_read_with_their_channels() {
         assert_eq!((points[1].is_return, points[1].time_s), (false, 0.25));
         assert_eq!((points[2].is_return, points[2].intensity, points[2].time_s), (false, 30.0, 0.0));
     }
-    // A channel with fewer values than points is that of something else.
+    // A channel with fewer values than points is ignored.
     let short = MessageWriter::ros1().header(7, "lidar").u32(1).f32s(&[1.0, 2.0, 3.0]).u32(1);
     let short = short.text("intensity").u32(0).done();
     let (clouds, errors, _) = read_messages("sensor_msgs/PointCloud", std::slice::from_ref(&short));

@@ -1,27 +1,27 @@
-//! Recordings that rosbags and the writer of mcap.dev made (tests/fixtures/make_ros.py) give what was put into them.
+//! Reads recordings written by rosbags and by the MCAP library (tests/fixtures/make_ros.py).
 #![cfg(feature = "ros")]
 
-/// Clouds and poses of whole recordings.
+/// Clouds and poses of intact recordings.
 mod contents;
-/// Files that are cut off, damaged or no recordings.
+/// Truncated, damaged and foreign files.
 mod damage;
-/// Images of 16 bits, and compressed ones.
+/// Depth images, also compressed ones.
 mod depths;
-/// Transforms that contradict one another.
+/// Contradictory transforms.
 mod frames;
-/// Clouds whose messages are laid out as drivers do it.
+/// Message layouts used by drivers.
 mod layouts;
 #[path = "../made/mod.rs"]
 mod made;
-/// What exceeds the memory goes to temporary files.
+/// Temporary files for data beyond the memory budget.
 mod memory;
-/// Poses of a topic.
+/// Topics of poses.
 mod odometry;
-/// Messages and files that are compressed.
+/// Compressed messages and files.
 mod packed;
 /// Recordings of several files.
 mod parts;
-/// Clouds that are in the frame of the map already.
+/// Clouds that are already in the map frame.
 mod registered;
 mod support;
 /// Recordings with many topics.

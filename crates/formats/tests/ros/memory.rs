@@ -4,7 +4,7 @@ use crate::support::{data, read, recordings, topic};
 use std::slice::from_ref;
 use voxtile_formats::ros::{BagOptions, PoseSource, open_bag};
 
-/// What does not fit in memory is read from temporary files, and is the same.
+/// Data beyond the memory budget is read from temporary files with equal results.
 #[test]
 fn little_memory_gives_the_same_clouds() {
     let folder = tempfile::tempdir().unwrap();
@@ -16,20 +16,20 @@ fn little_memory_gives_the_same_clouds() {
             let much = read(std::slice::from_ref(&path), &options(poses));
             let little = BagOptions { memory_bytes: 0, ..options(poses) };
             let found = read(std::slice::from_ref(&path), &little);
-            // As text, in which NaN is NaN.
+            // Compared as text, because NaN is not equal to itself.
             assert!(format!("{found:?}") == format!("{much:?}"), "{}", path.display());
             assert!(much.0.len() > 1, "{}", path.display());
         }
     }
 }
 
-/// A map without its poses would be built of a full disk.
+/// Otherwise a full disk would lead to a map without poses.
 #[test]
 fn temporary_files_that_cannot_be_made_are_an_error() {
     let options = BagOptions { memory_bytes: 0, scratch: Some(data("gone")), ..topic("/points") };
     let active = tempfile::NamedTempFile::new().unwrap();
     let whole = std::fs::read(data("bz2.bag")).unwrap();
-    // Without the end of its index.
+    // The end of the index is missing.
     std::fs::write(active.path(), &whole[..whole.len() - 10]).unwrap();
     for path in [data("bz2.bag"), data("zstd.mcap"), active.path().to_owned()] {
         let error = open_bag(from_ref(&path), &options).err().map(|error| format!("{error:#}"));
@@ -42,7 +42,7 @@ fn temporary_files_that_cannot_be_made_are_an_error() {
     }
 }
 
-/// Clouds of many points, in rows with bytes between them and without, and one that is cut off; transforms.
+/// Encodes large clouds with and without gaps between rows, a truncated one, and transforms.
 fn large_bag() -> Vec<u8> {
     const POINT_BYTES: usize = 23;
     let cloud = |height: u32, row_bytes: usize, data_bytes: usize| {

@@ -4,7 +4,7 @@ use crate::support::read;
 use std::path::{Path, PathBuf};
 use voxtile_formats::ros::{BagOptions, PoseSource, open_bag};
 
-/// A bag of one cloud, `/tf`, and a topic of poses.
+/// Writes a bag with one cloud, `/tf` and a topic of poses.
 fn with_odometry(folder: &Path, poses: &[Vec<u8>], type_name: &str) -> PathBuf {
     let stamp_ns = 1_700_000_000_000_000_000;
     let tf = MessageWriter::ros1().tf(stamp_ns, "map", "lidar", &[1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]);
@@ -20,7 +20,7 @@ fn with_odometry(folder: &Path, poses: &[Vec<u8>], type_name: &str) -> PathBuf {
     path
 }
 
-/// The map would be of other poses than those that were asked for.
+/// Otherwise the map would be built with other poses than requested.
 #[test]
 fn a_topic_of_poses_without_any_that_can_be_used_is_an_error() {
     let folder = tempfile::tempdir().unwrap();
@@ -43,7 +43,7 @@ fn a_topic_of_poses_without_any_that_can_be_used_is_an_error() {
         let error = open_bag(&[path], &options).err().map(|error| format!("{error:#}")).unwrap_or_default();
         assert!(error.contains(told), "{error}");
     }
-    // One is enough.
+    // One valid pose is enough.
     let poses = [pose("odom", f64::NAN), pose("odom", 7.0)];
     let path = with_odometry(folder.path(), &poses, "geometry_msgs/PoseStamped");
     let (clouds, _, remarks) = read(&[path], &options);
@@ -51,7 +51,7 @@ fn a_topic_of_poses_without_any_that_can_be_used_is_an_error() {
     assert!(remarks.iter().any(|remark| remark.starts_with("1 poses are not valid")), "{remarks:?}");
 }
 
-/// Every message of a path tells the way so far.
+/// Every message of a path repeats the poses so far.
 #[test]
 fn a_path_that_grows_is_one_way() {
     let folder = tempfile::tempdir().unwrap();

@@ -13,7 +13,7 @@ fn cloud(writer: MessageWriter, x_m: f32) -> Vec<u8> {
     writer.point_cloud2(5, "lidar", &fields, &[[x_m, 1.0, 2.0].map(f32::to_le_bytes).concat()])
 }
 
-/// An MCAP of messages as they are, uncompressed.
+/// Encodes an MCAP file without compression.
 fn mcap_of(messages: &[Vec<u8>]) -> Vec<u8> {
     let mut bytes = std::io::Cursor::new(Vec::new());
     let mut writer = mcap::Writer::new(&mut bytes).unwrap();
@@ -41,7 +41,7 @@ fn messages_that_are_compressed_are_read_without_metadata() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.mcap");
     let plain: Vec<Vec<u8>> = (1..4).map(|k| cloud(MessageWriter::cdr(), k as f32)).collect();
-    // The last one is not compressed.
+    // The last message is not compressed.
     let mut packed: Vec<Vec<u8>> = plain.iter().map(|message| zstd_of(message)).collect();
     packed[2].clone_from(&plain[2]);
     std::fs::write(&path, mcap_of(&packed)).unwrap();
@@ -65,7 +65,7 @@ fn databases_of_compressed_messages_are_read_without_metadata() {
     assert_clouds(&clouds, "map", "by message");
 }
 
-/// A bag of ROS 1 may have any bytes.
+/// Messages in a ROS 1 bag may contain arbitrary bytes.
 #[test]
 fn messages_of_ros_1_are_taken_as_they_are() {
     let folder = tempfile::tempdir().unwrap();
@@ -89,45 +89,45 @@ fn files_that_are_compressed_are_read_alone() {
             let (clouds, errors, remarks) =
                 read(from_ref(&path), &BagOptions { poses: PoseSource::None, ..topic("/points") });
             assert_eq!((clouds.len(), errors, remarks), (4, vec![], vec![]), "{name}");
-            // Also where its format is named.
+            // Also if the format is given.
             let named = ReadOptions { format: Some(format.to_owned()), ..ReadOptions::default() };
             let named = ReadOptions {
                 recording: RecordingOptions { topic: Some("/points".into()), ..Default::default() },
                 ..named
             };
             assert_eq!(open_clouds(&path, &named).unwrap().len_hint(), Some(4));
-            // Alone in a folder.
+            // As the only file of a folder.
             let inner = tempfile::tempdir().unwrap();
             std::fs::copy(&path, inner.path().join(format!("{name}.{end}"))).unwrap();
             assert_eq!(guess(inner.path()).unwrap(), format);
             assert_eq!(read(&[inner.path().to_owned()], &topic("/points")).0.len(), 4);
         }
     }
-    // An archive of something else is none.
+    // A compressed file of another kind is refused.
     let path = folder.path().join("a.las.zst");
     std::fs::write(&path, zstd_of(b"LASF")).unwrap();
     let error = guess(&path).err().map(|error| format!("{error:#}")).unwrap();
     assert!(error.contains("unpack it"), "{error}");
-    // One in one is not unpacked twice.
+    // Double compression is not supported.
     let path = folder.path().join("b.mcap.zst");
     std::fs::write(&path, zstd_of(&zstd_of(&std::fs::read(data("only_points.mcap")).unwrap()))).unwrap();
     let error = open_bag(from_ref(&path), &unposed()).err().map(|error| format!("{error:#}")).unwrap();
     assert!(error.contains("b.mcap.zst: malformed: offset 0: it was unpacked, and what is in it"), "{error}");
 }
 
-/// A recorder that lost its disk.
+/// A recorder whose disk was disconnected.
 #[test]
 fn files_that_are_cut_off_before_anything_say_where() {
     let folder = tempfile::tempdir().unwrap();
     for (name, at) in [("zstd.mcap", 30), ("lz4.mcap", 30), ("bz2.bag", 30), ("zstd.mcap", 3)] {
         let whole = std::fs::read(data(name)).unwrap();
         let path = folder.path().join(name);
-        // The header of the first chunk is whole, its contents are not.
+        // The header of the first chunk is complete, its contents are not.
         let start = match name {
             "bz2.bag" => whole.windows(3).position(|bytes| bytes == b"BZh").unwrap(),
             _ => 8 + 9 + u64::from_le_bytes(whole[9..17].try_into().unwrap()) as usize + 9 + 60,
         };
-        // Also in the header of a record.
+        // Also within the header of a record.
         let len = if at == 3 { start - 60 - 9 + at } else { start + at };
         std::fs::write(&path, &whole[..len]).unwrap();
         let error =

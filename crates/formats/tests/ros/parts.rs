@@ -13,7 +13,7 @@ fn parts_of_a_split_recording_are_one() {
     assert_clouds(&clouds[..4], "map", "first part");
 }
 
-/// A bag of ROS 1 of one cloud, with the transforms before and after it.
+/// Encodes a ROS 1 bag with one cloud and transforms before and after it.
 fn part(number: i64, has_mount: bool) -> Vec<u8> {
     let stamp_ns = 1_700_000_000_000_000_000 + number * 100_000_000;
     let moved = |stamp_ns: i64| {
@@ -25,13 +25,13 @@ fn part(number: i64, has_mount: bool) -> Vec<u8> {
     let points = [[number as f32, 1.0, 2.0].map(f32::to_le_bytes).concat()];
     let cloud = MessageWriter::ros1().point_cloud2(stamp_ns, "lidar", &fields, &points);
     let mut topics = vec![("/points", "sensor_msgs/PointCloud2"), ("/tf", "tf2_msgs/TFMessage")];
-    // The transform that frames the cloud's stamp is in the next part.
+    // The transform after the cloud's stamp is in the next part.
     let mut messages = vec![(1, stamp_ns - 60_000_000, moved(stamp_ns - 60_000_000)), (0, stamp_ns, cloud)];
     if has_mount {
         topics.push(("/tf_static", "tf2_msgs/TFMessage"));
         messages.push((2, stamp_ns - 60_000_000, mount));
     } else {
-        // Connections are numbered anew in each part.
+        // Connection IDs differ between the parts.
         topics.swap(0, 1);
         messages.iter_mut().for_each(|message| message.0 = 1 - message.0);
     }
@@ -53,7 +53,7 @@ fn a_split_bag_is_one_recording() {
         for (number, (head, points)) in clouds.iter().enumerate() {
             assert_eq!(head.name, number.to_string());
             assert_eq!(points[0].position_m[0], number as f64, "parts are in the natural order of names");
-            // Nothing is known behind the last transform.
+            // Poses after the last transform are unknown.
             let position_m = head.world_from_sensor.map(|pose| pose.position_m);
             match number {
                 10 => assert_eq!(position_m, None),
@@ -78,7 +78,7 @@ fn the_last_part_of_a_split_bag_may_be_cut_off() {
     assert!(remarks.iter().any(|remark| remark.contains("drive_1.bag.active has no index")), "{remarks:?}");
 }
 
-/// Metadata from elsewhere are not to open any file of the machine.
+/// Untrusted metadata must not open arbitrary files.
 #[test]
 fn files_out_of_the_folder_of_a_bag_are_not_read() {
     let folder = tempfile::tempdir().unwrap();
@@ -93,16 +93,16 @@ fn files_out_of_the_folder_of_a_bag_are_not_read() {
             open_recording(from_ref(&bag)).err().map(|error| format!("{error:#}")).unwrap_or_default();
         assert!(error.contains(&format!("names {name}, which leads out of the folder")), "{error}");
     }
-    // The name of a recorder's own folder, and the file moved since.
+    // The recorder's folder name is ignored if the file was moved.
     std::fs::rename(&outside, bag.join("a.mcap")).unwrap();
     assert!(open_recording(&[bag]).is_ok());
 }
 
-/// `a/drive.bag.zstd` and `b/drive.bag.zstd` are both `drive.bag` once they are unpacked.
+/// `a/drive.bag.zstd` and `b/drive.bag.zstd` both decompress to `drive.bag`.
 #[test]
 fn packed_parts_of_the_same_name_are_all_read() {
     let folder = tempfile::tempdir().unwrap();
-    // More than is buffered of a file that is open.
+    // Larger than the read buffer of the open file.
     for (part, count) in [("a", 100), ("b", 1)] {
         std::fs::create_dir(folder.path().join(part)).unwrap();
         let messages: Vec<_> = (0..count).map(|stamp_ns| (0, stamp_ns, vec![7; 4000])).collect();

@@ -11,14 +11,14 @@ const CLOUD: &str = "sensor_msgs/PointCloud2";
 const ODOMETRY: &str = "nav_msgs/Odometry";
 const TF: &str = "tf2_msgs/TFMessage";
 
-/// What is recorded ten times a second, for half a second: the sensor is at x = 0, 1, ...
+/// Messages recorded ten times a second for half a second. The sensor is at x = 0, 1, ...
 enum Recorded {
-    /// Clouds in this frame, of one point at x = 100, y = the number of the cloud.
+    /// Clouds in this frame, each with one point at x = 100 and y = number of the cloud.
     Clouds(&'static str),
-    /// Of a frame in another.
+    /// Odometry of the second frame in the first.
     Odometry(&'static str, &'static str),
     Tf(&'static str, &'static str),
-    /// A transform that does not change.
+    /// A constant transform.
     Still(&'static str, &'static str),
     Pose(&'static str),
 }
@@ -72,7 +72,7 @@ fn odometry_of(name: Option<&str>) -> BagOptions {
     }
 }
 
-/// Checks that points stay and that the sensor moves.
+/// Checks that the points are unchanged and the sensor moves.
 fn assert_registered(clouds: &[Cloud], of: &str) {
     assert_eq!(clouds.len(), 5, "{of}");
     for (k, (head, points)) in clouds.iter().enumerate() {
@@ -93,25 +93,25 @@ fn registered_clouds_are_seen_from_the_odometry() {
         let (clouds, errors, remarks) = read(std::slice::from_ref(&path), &options);
         assert_eq!(errors, Vec::<String>::new());
         assert_registered(&clouds, &format!("{options:?}"));
-        // Who says so is not told.
+        // With an explicit topic there is no remark on the choice.
         let told = "the clouds are in the frame camera_init already: they are taken as they are, seen from body \
                     (`odometry` /Odometry `world_frame`)";
         let wanted: &[&str] = if options.is_world_frame { &[] } else { &[told] };
         assert_eq!(remarks, wanted);
     }
-    // A cloud in another frame that nothing knows is in the world if that is said.
+    // With `is_world_frame`, a cloud in an unknown frame is in the world.
     let (_folder, path) =
         record(&[("/cloud_registered", Clouds("map")), ("/Odometry", Odometry("camera_init", "body"))]);
     assert_registered(&read(std::slice::from_ref(&path), &explicit).0, "in the world");
     let (clouds, _, remarks) = read(&[path], &odometry_of(None));
     assert!(clouds.iter().all(|(head, _)| head.world_from_sensor.is_none()));
     assert!(remarks[0].contains("no transform names the frame map"), "{remarks:?}");
-    // Poses do not name the frame that they are of.
+    // The poses do not name their child frame.
     let (_folder, path) = record(&[("/cloud_registered", Clouds("map")), ("/pose", Pose("map"))]);
     let (clouds, _, remarks) = read(std::slice::from_ref(&path), &odometry_of(Some("/pose")));
     assert_registered(&clouds, "poses");
     assert_eq!(remarks.len(), 1, "{remarks:?}");
-    // Without being asked for, they are no odometry.
+    // Poses without a child frame are not used as odometry by default.
     let (clouds, _, remarks) = read(&[path], &BagOptions::default());
     assert!(clouds[0].0.world_from_sensor.is_none());
     assert!(remarks.iter().any(|remark| remark.contains("as with `odometry` /pose")), "{remarks:?}");
@@ -123,7 +123,7 @@ fn registered_clouds_are_seen_from_what_moves_in_their_frame() {
     let body = "they are taken as they are, seen from body";
     for (topics, told) in [
         (vec![cloud("camera_init"), ("/tf", Tf("camera_init", "body"))], body),
-        // Two topics of odometry; one frame moves.
+        // Two odometry topics, but one moving frame.
         (
             vec![
                 cloud("camera_init"),
@@ -133,7 +133,7 @@ fn registered_clouds_are_seen_from_what_moves_in_their_frame() {
             ],
             body,
         ),
-        // The map is at rest.
+        // The map is static.
         (
             vec![
                 cloud("camera_init"),
@@ -150,7 +150,7 @@ fn registered_clouds_are_seen_from_what_moves_in_their_frame() {
             ],
             "seen from body (`odometry` /Odometry `world_frame`)",
         ),
-        // The map is corrected, which moves no point of a cloud in odom.
+        // Corrections of the map do not move the points of a cloud in `odom`.
         (
             vec![
                 cloud("odom"),
@@ -160,7 +160,7 @@ fn registered_clouds_are_seen_from_what_moves_in_their_frame() {
             ],
             "seen from odom_mapping (`odometry` /odometry `world_frame`)",
         ),
-        // Wheels move, too.
+        // Wheels move too.
         (
             vec![
                 cloud("odom"),
@@ -192,14 +192,14 @@ fn what_is_not_clear_is_said_and_not_guessed() {
             ],
             "(/a, /b): name one, as with `odometry` /a `world_frame`",
         ),
-        // Wheels in the frame of a robot say nothing of a map.
+        // Wheels moving in a robot's frame give no pose in a map.
         (
             vec![cloud("base_link"), ("/tf", Tf("base_link", "wheel"))],
             "no transform says how base_link moves",
         ),
-        // An arm before a camera that stands.
+        // An arm in front of a fixed camera.
         (vec![cloud("world"), ("/tf", Tf("world", "gripper"))], "no transform says how world moves"),
-        // Odometry of the sensor itself: which is not asked for.
+        // Odometry of the sensor itself is only used if requested.
         (
             vec![cloud("body"), ("/Odometry", Odometry("camera_init", "body"))],
             "poses are in /Odometry (nav_msgs/Odometry, 5 messages): name their topic, as with `odometry` /Odometry",
@@ -211,14 +211,14 @@ fn what_is_not_clear_is_said_and_not_guessed() {
         assert!(clouds.iter().all(|(head, _)| head.world_from_sensor.is_none() && !head.is_in_world));
         assert!(remarks.iter().any(|remark| remark.contains(told)), "{told}: {remarks:?}");
     }
-    // The hint leads to poses.
+    // Following the hint gives poses.
     let (_folder, path) = record(&[cloud("body"), ("/Odometry", Odometry("camera_init", "body"))]);
     let (clouds, _, remarks) = read(&[path], &odometry_of(Some("/Odometry")));
     assert_eq!(clouds[3].0.world_from_sensor.unwrap().position_m, [3.0, 0.0, 0.5]);
     assert!(!clouds[3].0.is_in_world && remarks.is_empty(), "{remarks:?}");
 }
 
-/// A sensor whose place `/tf` knows is not in the frame of odometry, whatever is recorded.
+/// A sensor with a pose in `/tf` is not in the odometry frame, whatever else is recorded.
 #[test]
 fn clouds_of_a_sensor_are_not_registered() {
     let (_folder, path) = record(&[
@@ -231,7 +231,7 @@ fn clouds_of_a_sensor_are_not_registered() {
     assert_eq!(remarks, Vec::<String>::new());
     assert_eq!(clouds[2].0.world_from_sensor.unwrap().position_m, [2.0, 0.0, 0.5]);
     assert!(!clouds[2].0.is_in_world);
-    // One that stands in the map.
+    // A sensor that is fixed in the map.
     let (_folder, path) =
         record(&[("/cloud_registered", Clouds("lidar")), ("/tf_static", Still("map", "lidar"))]);
     let (clouds, _, remarks) = read(&[path], &BagOptions::default());
@@ -260,7 +260,7 @@ fn scans_of_registered_clouds_keep_their_points() {
     let error = open_scans(&path, &options).and_then(|mut scans| scans.next_scan());
     let error = format!("{:#}", error.err().unwrap());
     assert!(error.contains("deskew") && error.contains("have no motion left in them"), "{error}");
-    // Points alone need no poses.
+    // Points without rays need no poses.
     let mut options = ReadOptions::default();
     (options.clouds.may_lack_poses, options.clouds.are_poses_needed) = (true, false);
     let scan = open_scans(&path, &options).unwrap().next_scan().unwrap().unwrap();

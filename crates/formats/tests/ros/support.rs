@@ -28,7 +28,7 @@ pub fn topic(name: &str) -> BagOptions {
     BagOptions { topic: Some(name.to_owned()), ..BagOptions::default() }
 }
 
-/// All clouds, and all that went wrong.
+/// Returns all clouds, errors and remarks.
 pub fn read(paths: &[PathBuf], options: &BagOptions) -> (Vec<Cloud>, Vec<String>, Vec<String>) {
     let mut source = open_bag(paths, options).unwrap();
     let (mut clouds, mut errors) = (Vec::new(), Vec::new());
@@ -61,7 +61,7 @@ pub fn assert_points(points: &[CloudPoint], rows: &Value, of: &str) {
         };
         let is_right = (0..3).all(|axis| near(point.position_m[axis], &row[axis], 1e-6))
             && near(f64::from(point.intensity), &row[3], 0.0)
-            // Stamps of type f64 in seconds since the epoch are this coarse.
+            // Resolution of `f64` stamps in seconds since the epoch.
             && near(point.time_s, &row[4], 3e-7)
             && Some(point.is_return) == row[5].as_bool();
         assert!(is_right, "{of}, point {k}: {point:?} is not {row}");

@@ -4,7 +4,7 @@ use crate::support::read;
 use std::time::{Duration, Instant};
 use voxtile_formats::ros::{BagOptions, open_bag};
 
-/// Names of topics beyond the most that are kept, and messages of these topics before those that are wanted.
+/// More topic names than the limit, and messages of these topics before the wanted ones.
 #[test]
 fn topics_that_are_left_out_cost_no_others() {
     let folder = tempfile::tempdir().unwrap();
@@ -50,7 +50,7 @@ fn topics_that_are_left_out_cost_no_others() {
     }
 }
 
-/// Each look may read the recording up to the first image.
+/// Inspecting a topic may read the recording up to its first image.
 #[test]
 fn of_many_topics_of_images_some_are_looked_into() {
     let folder = tempfile::tempdir().unwrap();
@@ -69,7 +69,7 @@ fn of_many_topics_of_images_some_are_looked_into() {
     assert!(start.elapsed() < Duration::from_secs(30), "{:?}", start.elapsed());
 }
 
-/// Recordings of other programs in the same container.
+/// Other programs also use the MCAP container.
 #[test]
 fn messages_that_are_not_of_ros_are_named() {
     let folder = tempfile::tempdir().unwrap();

@@ -10,19 +10,19 @@ use voxtile::tile::Voxel;
 use voxtile::{MapQueries, Result};
 use voxtile_formats::write::VoxelRow;
 
-/// Which voxels are written.
+/// Selection of voxels.
 pub(super) struct Chosen {
     pub region: Option<Aabb>,
-    /// From this probability on; `None` is the map's threshold.
+    /// Minimum probability. `None`: the map's threshold.
     min_probability: Option<f64>,
-    /// The same as log-odds.
+    /// Minimum as log-odds.
     pub min_log_odds: f64,
-    /// Below these log-odds.
+    /// Upper limit of log-odds, exclusive unless infinite.
     end_log_odds: f64,
 }
 
 impl Chosen {
-    /// The voxels that are asked for, of a map with this threshold in log-odds.
+    /// Creates the selection for a map with this threshold in log-odds.
     pub fn of(export: &Export<'_>, threshold: f64) -> Self {
         let default = if export.format.needs_free_voxels { WhichVoxels::All } else { WhichVoxels::Occupied };
         let (min_probability, min_log_odds, end_log_odds) = match export.options.which.unwrap_or(default) {
@@ -36,12 +36,12 @@ impl Chosen {
         Self { region: export.options.region, min_probability, min_log_odds, end_log_odds }
     }
 
-    /// Whether log-odds are below the end.
+    /// Returns whether log-odds are below the upper limit.
     pub fn is_below_end(&self, log_odds: f64) -> bool {
         log_odds < self.end_log_odds || self.end_log_odds == f64::INFINITY
     }
 
-    /// How many voxels there are, without reading a tile where the log of the map knows.
+    /// Returns the number of voxels, without reading tiles if the map's log is sufficient.
     pub fn count(&self, map: &MapReader, stop: &Stop) -> Result<u64> {
         if self.region.is_none()
             && let Some((voxels, occupied)) = map.voxel_counts()
@@ -64,7 +64,7 @@ impl Chosen {
         map.for_each_occupied(self.min_probability, self.region.as_ref(), visit)
     }
 
-    /// Visits the voxels tile by tile, until an error, with their centers where the file has them.
+    /// Visits the voxels tile by tile until an error, with their centers in the file's coordinates.
     pub fn for_each(
         &self,
         map: &impl MapView,
@@ -101,7 +101,7 @@ impl Chosen {
     }
 }
 
-/// How far a walk over tiles is.
+/// Progress of a walk over tiles.
 struct Tiles<'a> {
     all: Vec<TileIndex>,
     done: usize,

@@ -9,7 +9,7 @@ use voxtile::mapper::{MapView, Stoppable};
 use voxtile::space::Aabb;
 use voxtile_formats::write::{VoxelsHead, WriteOptions};
 
-/// Writes the file, or the folder, and what belongs beside it: all of it or nothing.
+/// Writes a file or folder and its companion files atomically.
 pub(super) fn export(export: &Export<'_>) -> anyhow::Result<ExportSummary> {
     let (options, watch) = (export.options, export.watch);
     let (head, files_beside) = read_any_map(&options.map, |map| {
@@ -42,7 +42,7 @@ pub(super) fn export(export: &Export<'_>) -> anyhow::Result<ExportSummary> {
     Ok(export.summary(head.voxels, Written::Files { format: export.format.name, bounds_m, files_beside }))
 }
 
-/// Counts the voxels, and finds a box around their centers.
+/// Counts the voxels and computes their bounding box.
 fn head_of(chosen: &Chosen, map: &impl MapView) -> Result<VoxelsHead> {
     let grid = map.config().grid;
     let mut head = VoxelsHead {

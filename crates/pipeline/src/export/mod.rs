@@ -1,16 +1,16 @@
-//! Maps to files for other programs.
+//! Export of maps to the formats of other programs.
 //!
 //! ```text
 //! ExportOptions -> export: format, checked options        options, run
 //!   voxels, one stream of bytes                           stream   (moved_file, origin, origin_file)
 //!   an octree                                             octree   (the same)
-//!   voxels, and files beside                              files
+//!   voxels with companion files                           files
 //!   3D Tiles                                              tileset
 //! -> ExportSummary                                        summary
 //! export_scans: the scans that a map keeps                scans
 //! ```
 //!
-//! The formats are those of `voxtile_formats::write`; `chosen` walks over the voxels for all of them.
+//! The formats are those of `voxtile_formats::write`. `chosen` selects the voxels for all of them.
 
 mod chosen;
 mod files;

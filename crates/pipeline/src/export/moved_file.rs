@@ -7,24 +7,24 @@ use std::io::{self, Write};
 use voxtile::Error;
 use voxtile::space::Grid;
 
-/// One file whose coordinates may begin elsewhere than the map's; then a file beside it says so.
+/// Output file whose coordinates may have another origin than the map's, which is then stored in a companion file.
 pub(super) struct MovedFile<'a> {
     export: &'a Export<'a>,
-    /// `None` for a stream, which has nothing beside it.
+    /// Companion file; `None` for a stream.
     beside: Option<OriginFile>,
 }
 
 impl<'a> MovedFile<'a> {
-    /// The output of an export.
+    /// Prepares the output of an export.
     ///
     /// # Errors
     ///
-    /// Something else has the name of the file beside.
+    /// Another file has the name of the companion file.
     pub fn of(export: &'a Export<'a>) -> voxtile::Result<Self> {
         Ok(Self { export, beside: OriginFile::of(&export.options.output)? })
     }
 
-    /// Writes all of it, and beside it where it is.
+    /// Writes the file and, if the origin differs, its companion file.
     pub fn write<T>(
         &self,
         origin: &ExportOrigin,
@@ -34,14 +34,15 @@ impl<'a> MovedFile<'a> {
         let (output, stop) = (&self.export.options.output, self.export.watch.stop());
         let mut file = OutputFile::create(output)?.stop_with(stop.clone());
         let written = write(file.out()).map_err(|error| match error.downcast::<io::Error>() {
-            // It does not say by itself which file it is about.
+            // The I/O error does not name the file.
             Ok(error) => Error::io(output, "write", error).into(),
             Err(error) => error,
         });
         stop.check()?;
         let value = written?;
         match &self.beside {
-            // First: who has only one of the two has one too many, and no shifted file that does not say so.
+            // The companion file is written first. After a crash there may be a companion file without its output, but
+            // never a shifted output without its companion file.
             Some(beside) if origin.is_moved() => {
                 let hash = file.hash()?;
                 beside.write(output, hash, origin, grid)?;
@@ -56,7 +57,7 @@ impl<'a> MovedFile<'a> {
         Ok(value)
     }
 
-    /// What was written.
+    /// Returns the summary of the export.
     pub fn summary(&self, voxels: u64, origin: &ExportOrigin) -> ExportSummary {
         let beside = self.beside.as_ref().filter(|_| origin.is_moved());
         let written = Written::Stream {

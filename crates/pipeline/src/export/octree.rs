@@ -21,7 +21,7 @@ pub(super) fn export(export: &Export<'_>, format: OctreeFormat) -> anyhow::Resul
         let origin = origin.transpose()?.unwrap_or_default();
         let (region, memory_bytes) = (options.region.as_ref(), options.memory_bytes);
         let octree = OctreeExport { format, region, origin: origin.voxel, memory_bytes };
-        // Parts lie in a file without a name until all of them are known.
+        // Parts are kept in an unnamed file until all are known.
         let mut spool = scratch_for(&options.output)?;
         let map = Stoppable::new(reader, export.watch.stop());
         let voxels = file.write(&origin, &grid, |mut out| map.write_octree(&octree, &mut spool, &mut out))?;
@@ -29,7 +29,7 @@ pub(super) fn export(export: &Export<'_>, format: OctreeFormat) -> anyhow::Resul
     })
 }
 
-/// From one of OctoMap's files to another; OctoMap's threshold is log-odds 0.
+/// Converts between OctoMap's file formats. OctoMap's threshold is log-odds 0.
 fn of_octree(
     export: &Export<'_>,
     file: &MovedFile<'_>,

@@ -4,51 +4,51 @@ use voxtile::space::{Aabb, Point};
 use voxtile::{Error, Result};
 use voxtile_formats::write::{Origin, OutputFormat, OutputFormats, OutputOption};
 
-/// What an export is asked for. `None` is the default that is named here.
+/// Settings of an export. `None` means the default named here.
 #[derive(Clone, Debug)]
 pub struct ExportOptions {
-    /// The map: a folder, `FOLDER@SNAPSHOT`, a URL, or a file of OctoMap.
+    /// Map: a folder, `FOLDER@SNAPSHOT`, a URL, or an OctoMap file.
     pub map: PathBuf,
-    /// The file or folder to write; `-` is standard output.
+    /// File or folder to write; `-` is standard output.
     pub output: PathBuf,
-    /// The name of a format: that of the output's extension.
+    /// Name of the format. Default: the one of the output's extension.
     pub format: Option<String>,
-    /// The formats that are known.
+    /// Available formats.
     pub formats: OutputFormats,
-    /// Which voxels are written: the occupied ones; all where a format tells free voxels from unseen ones.
+    /// Voxels to write. Default: occupied voxels, or all for formats that distinguish free from unobserved voxels.
     pub which: Option<WhichVoxels>,
-    /// Flat maps: the lowest height that counts, in metres.
+    /// 2D grids: minimum height in metres.
     pub z_min_m: Option<f64>,
-    /// Flat maps: the greatest height that counts, in metres.
+    /// 2D grids: maximum height in metres.
     pub z_max_m: Option<f64>,
-    /// Autoware: edge of the square of a file, in whole metres: 20.
+    /// Autoware: edge of the square of a file, in whole metres. Default: 20.
     pub cell_m: Option<f64>,
-    /// Meshes: positions as numbers of 16 bits (`KHR_mesh_quantization`) in place of 32. Not every program reads them.
+    /// Meshes: 16-bit positions (`KHR_mesh_quantization`) instead of 32-bit ones. Not all programs support them.
     pub is_quantized: bool,
-    /// Only voxels whose center is in this box are written.
+    /// Only voxels with their center in this box are written.
     pub region: Option<Aabb>,
-    /// The file's coordinates are those of the map less this, in metres: 0 0 0. The nearest corner of a voxel counts,
-    /// but for Autoware.
+    /// Origin of the file's coordinates in the map, in metres, rounded to the nearest voxel corner except for Autoware.
+    /// Default: the map's origin.
     pub origin_m: Option<Point>,
-    /// Memory in bytes for the part of an octree file that is put together at a time, beside that of one tile.
+    /// Memory in bytes for the part of an octree file being built, in addition to one tile.
     pub memory_bytes: usize,
 }
 
-/// Which voxels are written.
+/// Selection of voxels by state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum WhichVoxels {
-    /// Those from the map's occupancy threshold on.
+    /// Voxels at or above the map's occupancy threshold.
     Occupied,
-    /// Those that were observed and are below it.
+    /// Observed voxels below the threshold.
     Free,
-    /// All that were observed.
+    /// All observed voxels.
     All,
-    /// Those of at least this probability, from 0 to 1.
+    /// Voxels with at least this probability, from 0 to 1.
     AtLeast(f64),
 }
 
 impl ExportOptions {
-    /// A whole map as the output's extension says, with all defaults.
+    /// Creates the options to export a whole map with all defaults. The output's extension determines the format.
     pub fn new(map: impl Into<PathBuf>, output: impl Into<PathBuf>) -> Self {
         Self {
             map: map.into(),
@@ -66,11 +66,12 @@ impl ExportOptions {
         }
     }
 
-    /// The format to write.
+    /// Returns the format to write.
     ///
     /// # Errors
     ///
-    /// A name or an extension of no known format; one that the options do not fit; one that was not built in.
+    /// The name or extension is unknown, the options do not fit the format, or the format is not available in this
+    /// build.
     pub fn checked_format(&self) -> Result<OutputFormat> {
         let format = self.known_format()?;
         if let Some(WhichVoxels::AtLeast(probability)) = self.which
@@ -112,7 +113,7 @@ impl ExportOptions {
         Err(Error::argument("output", reason))
     }
 
-    /// Whether the format takes all options that are given.
+    /// Checks that the format supports all given options.
     fn check_taken(&self, format: &OutputFormat) -> Result<()> {
         let has_heights = self.z_min_m.is_some() || self.z_max_m.is_some();
         let which = match self.which {

@@ -2,32 +2,32 @@ use voxtile::space::{Grid, Point, VoxelBox, VoxelIndex};
 use voxtile::{Error, Result};
 use voxtile_formats::write::PCD_REACH_VOXELS;
 
-/// Where in the map a file has its coordinates 0 0 0: the lower corner of a voxel, so that the file's voxels are the
-/// map's, moved by whole voxels.
+/// Origin of a file's coordinates in the map: the lower corner of a voxel, so that the file's voxels are those of the
+/// map, shifted by whole voxels.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ExportOrigin {
     pub voxel: VoxelIndex,
-    /// The voxel's lower corner in metres.
+    /// Lower corner of the voxel, in metres.
     pub corner_m: Point,
-    /// What was asked for, if that is no such corner.
+    /// Requested origin, if it is not a voxel corner.
     pub asked_m: Option<Point>,
 }
 
-/// Nearer to the map's origin than so many voxels, `f32` is exact enough as it is: to a 128th of a voxel.
+/// Up to this distance from the map's origin, in voxels, `f32` is sufficiently precise: to a 128th of a voxel.
 const NEAR_VOXELS: i64 = 1 << 17;
-/// The origin of a file that chooses it itself: round in metres, too, where the resolution is.
+/// Step of automatically chosen origins, in voxels. They are also round in metres if the resolution is.
 const STEP_VOXELS: i64 = 10_000;
 
 impl ExportOrigin {
-    /// The voxel corner next to a point in metres.
+    /// Returns the voxel corner nearest to a point in metres.
     ///
     /// # Errors
     ///
-    /// A point that is not finite, or too far away for a voxel to be there.
+    /// The point is not finite or is outside of the range of voxel indices.
     pub fn near(asked_m: Point, grid: &Grid) -> Result<Self> {
         let units = grid.to_voxel_units(asked_m);
         let voxel = units.map(f64::round);
-        // False for NaN, too.
+        // False for NaN too.
         let is_index = |x: &f64| *x >= f64::from(i32::MIN) && *x <= f64::from(i32::MAX);
         if !voxel.iter().all(is_index) {
             let reason = format!(
@@ -36,18 +36,18 @@ impl ExportOrigin {
             );
             return Err(Error::argument("origin", reason));
         }
-        // A thousandth: what is typed in metres is seldom the corner to the last bit.
+        // Tolerance of a thousandth of a voxel: metres as typed are rarely exact.
         let is_corner = (0..3).all(|k| (units[k] - voxel[k]).abs() < 1e-3);
         let origin = Self::at(voxel.map(|x| x as i32), grid);
         Ok(Self { asked_m: (!is_corner).then_some(asked_m), ..origin })
     }
 
-    /// The origin of a file in single precision of voxels in a box: the map's own where `f32` has room for the
-    /// coordinates, else a round place in their middle.
+    /// Chooses the origin of a single precision file for voxels in a box: the map's own if `f32` is sufficient for the
+    /// coordinates, else a round point near their middle.
     ///
     /// # Errors
     ///
-    /// Voxels too far apart for any origin.
+    /// The voxels are too far apart for any origin.
     pub fn nearby(voxels: &VoxelBox, grid: &Grid) -> Result<Self> {
         let reach = i64::from(PCD_REACH_VOXELS);
         let mut voxel = [0; 3];
@@ -79,7 +79,7 @@ impl ExportOrigin {
         self.voxel != [0; 3]
     }
 
-    /// Center of a voxel of the map in the file's coordinates; `(index - origin + 0.5) * resolution`.
+    /// Returns the center of a voxel in the file's coordinates: `(index - origin + 0.5) * resolution`.
     pub fn center_m(&self, voxel: VoxelIndex, grid: &Grid) -> Point {
         std::array::from_fn(|k| {
             // Differences of indices are exact in f64.

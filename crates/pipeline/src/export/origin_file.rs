@@ -7,36 +7,36 @@ use std::path::{Path, PathBuf};
 use voxtile::space::{Grid, Point, VoxelIndex};
 use voxtile::{Error, Result};
 
-/// The file beside an exported one that says where in the map it is: `FILE.origin.json`.
+/// Companion file of an exported file that stores its origin in the map: `FILE.origin.json`.
 #[derive(Debug)]
 pub struct OriginFile {
     path: PathBuf,
-    /// Whether one is there, from an earlier export.
+    /// Whether the file exists, from an earlier export.
     is_there: bool,
 }
 
 #[derive(Debug, Deserialize, Serialize)]
 struct OriginRecord {
     format: String,
-    /// Of the exported file: which one this is about.
+    /// Name and hash of the exported file that this record describes.
     file: String,
     blake3: String,
-    /// To be added to its coordinates.
+    /// Offset to add to the file's coordinates, in metres.
     origin_m: Point,
     origin_voxel: VoxelIndex,
     resolution_m: f64,
 }
 
 const FORMAT: &str = "voxtile-origin-1";
-/// Ours are a few hundred bytes.
+/// Size limit; these files have a few hundred bytes.
 const MAX_BYTES: u64 = 1 << 16;
 
 impl OriginFile {
-    /// The one of an exported file, which need not be there; `None` for a stream, which has nothing beside it.
+    /// Returns the companion file of an exported file, which need not exist; `None` for a stream.
     ///
     /// # Errors
     ///
-    /// Something else that has the name.
+    /// Another file has its name.
     pub fn of(output: &Path) -> Result<Option<Self>> {
         if is_standard_output(output) || output.file_name().is_none() {
             return Ok(None);
@@ -61,7 +61,8 @@ impl OriginFile {
         &self.path
     }
 
-    /// Says where a file is that is about to get its name. Who reads the two in between is told by the file's hash.
+    /// Writes the origin of a file that is about to be renamed into place. A reader that sees both in an intermediate
+    /// state can detect it by the hash.
     pub fn write(
         &self,
         output: &Path,
@@ -84,7 +85,7 @@ impl OriginFile {
         file.finish()
     }
 
-    /// Removes what an earlier export said, for a file that is where the map is.
+    /// Removes the companion file of an earlier export, because the new file has the map's origin.
     pub fn remove(&self) -> Result<()> {
         match self.is_there.then(|| fs::remove_file(&self.path)) {
             Some(Err(error)) if error.kind() != io::ErrorKind::NotFound => {

@@ -5,18 +5,18 @@ use crate::memory;
 use crate::watch::Watch;
 use voxtile_formats::write::{OutputFormat, Writer};
 
-/// An export whose options fit each other.
+/// An export with checked options.
 pub(super) struct Export<'a> {
     pub options: &'a ExportOptions,
     pub format: OutputFormat,
     pub watch: &'a Watch,
 }
 
-/// Writes a map for other programs. Stopped, the output is as it was.
+/// Exports a map. If it is stopped, the output is unchanged.
 ///
 /// # Errors
 ///
-/// Options that do not fit each other, a map that cannot be read, an output that cannot be written.
+/// The options are invalid, the map cannot be read, or the output cannot be written.
 pub fn export(options: &ExportOptions, watch: &Watch) -> anyhow::Result<ExportSummary> {
     let export = Export { options, format: options.checked_format()?, watch };
     match export.format.writer {

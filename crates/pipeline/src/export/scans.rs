@@ -1,4 +1,5 @@
-//! The scans that a map keeps, as a folder that `build` and others read: a PCD file each, and their poses.
+//! Export of the scans that a map keeps, as a folder of PCD files with their poses that `build` and other programs
+//! read.
 
 use crate::map_at::MapAt;
 use crate::output::StagedOutput;
@@ -11,25 +12,26 @@ use voxtile::mapper::KeptScan;
 use voxtile::scan::ScanPoints;
 use voxtile::{Error, Result};
 
-/// What was written.
+/// Summary of exported scans.
 #[derive(Debug, Default, Serialize)]
 pub struct ExportedScans {
-    /// Scans.
+    /// Number of scans.
     pub scans: u64,
-    /// Points of all of them.
+    /// Number of points of all scans.
     pub points: u64,
-    /// Whether the points are in the world frame, which whoever reads them must say.
+    /// Whether the points are in the world frame. Readers must be configured accordingly.
     pub world_frame: bool,
 }
 
-/// Name of the file of poses, in the format of TUM: seconds, position, quaternion.
+/// Name of the pose file in TUM format: seconds, position, quaternion.
 pub const POSES_NAME: &str = "poses_tum.txt";
 
-/// Writes the scans that a map keeps into a new folder; it is there whole or not at all.
+/// Writes the scans that a map keeps into a new folder, atomically.
 ///
 /// # Errors
 ///
-/// A map that cannot be read; scans in the world frame beside others; a folder that is not empty or cannot be written.
+/// The map cannot be read, it has scans in the world frame and others in the sensor frame, or the folder is not empty
+/// or cannot be written.
 pub fn export_scans(map: &Path, folder: &Path, watch: &Watch) -> anyhow::Result<ExportedScans> {
     let reader = MapAt::of(map)?.open()?;
     let (mut records, mut all, mut are_stamped) = (reader.kept_scans()?, 0, true);
@@ -45,7 +47,7 @@ pub fn export_scans(map: &Path, folder: &Path, watch: &Watch) -> anyhow::Result<
     let open = File::create_new(&poses).map_err(|error| Error::io(&poses, "create", error))?;
     let mut lines = BufWriter::new(open);
     let mut exported = ExportedScans::default();
-    // Names in the order of the scans.
+    // File names sort in the order of the scans.
     let digits = all.to_string().len().max(6);
     for scan in reader.kept_scans()? {
         watch.stop().check()?;
@@ -75,17 +77,17 @@ fn write_pose(scan: &KeptScan, is_stamped: bool, out: &mut impl Write) -> io::Re
     let [x, y, z] = scan.origin();
     let [qx, qy, qz, qw] = scan.world_from_sensor().map_or([0.0, 0.0, 0.0, 1.0], |pose| pose.quaternion());
     let stamp = decimal_seconds(stamp_ns);
-    // The shortest decimals that read back to the same bits.
+    // The shortest decimals that parse to the same bits.
     writeln!(out, "{stamp} {x} {y} {z} {qx} {qy} {qz} {qw}")
 }
 
-/// Nanoseconds as seconds. The sign is of the whole number: -0.5 s have no whole second that could bear it.
+/// Formats nanoseconds as seconds. The sign is separate: the whole part of -0.5 s is 0, which has no sign.
 fn decimal_seconds(stamp_ns: i64) -> String {
     let (sign, all) = (if stamp_ns < 0 { "-" } else { "" }, stamp_ns.unsigned_abs());
     format!("{sign}{}.{:09}", all / 1_000_000_000, all % 1_000_000_000)
 }
 
-/// Writes the points as they were inserted: `float32` where that is all there is, else `float64`.
+/// Writes the points as they were inserted: as `float32` if that is exact, else as `float64`.
 fn write_pcd(scan: &KeptScan, path: &Path) -> Result<()> {
     let mut is_narrow = true;
     scan.for_each_own_chunk(0..scan.len(), &mut |points, _| {

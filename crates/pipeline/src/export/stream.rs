@@ -40,7 +40,7 @@ fn of_map(export: &Export<'_>, file: &MovedFile<'_>, reader: &MapReader) -> anyh
     Ok(file.summary(voxels, &origin))
 }
 
-/// The voxels of one of OctoMap's files, in the order of its tree; its threshold is log-odds 0.
+/// Exports the voxels of an OctoMap file in tree order. Its threshold is log-odds 0.
 fn of_octree(
     export: &Export<'_>,
     file: &MovedFile<'_>,
@@ -82,8 +82,8 @@ fn open<'a>(
     export.format.open_stream(&head, out, &options)
 }
 
-/// Where the file's coordinates begin: where they are asked to, or, in a file in single precision of a far map, where
-/// they must.
+/// Returns the origin of the file's coordinates: the requested one, or an automatic one where single precision requires
+/// it.
 fn origin_of(
     export: &Export<'_>,
     grid: &Grid,
@@ -98,7 +98,7 @@ fn origin_of(
     }
 }
 
-/// A box around the voxels of all tiles that may have one to export.
+/// Returns a bounding box of the voxels of all tiles that may have voxels to export.
 fn hull(grid: &Grid, tiles: &[TileIndex], region: Option<&Aabb>) -> Option<VoxelBox> {
     let wanted = region.map(|region| grid.voxels_in(region));
     let boxes = tiles.iter().map(|&tile| {

@@ -2,45 +2,45 @@ use serde::{Serialize, Serializer};
 use std::path::{Path, PathBuf};
 use voxtile::space::{Aabb, Point, VoxelIndex};
 
-/// What an export has written.
+/// Result of an export.
 #[derive(Debug, Serialize)]
 pub struct ExportSummary {
-    /// The file or folder; `-` is standard output.
+    /// File or folder written; `-` is standard output.
     #[serde(serialize_with = "voxtile::path_text::serialize")]
     pub file: PathBuf,
-    /// Voxels in it.
+    /// Number of voxels written.
     pub voxels: u64,
-    /// Largest resident memory of the process.
+    /// Peak resident memory of the process.
     pub peak_rss_bytes: Option<u64>,
-    /// What else there is to say, by what was written.
+    /// Further results, by kind of output.
     #[serde(flatten)]
     pub written: Written,
 }
 
-/// What was written.
+/// Results by kind of output.
 #[derive(Debug, Serialize)]
 #[serde(untagged)]
 pub enum Written {
     /// One stream of bytes: voxels or an octree.
     Stream {
-        /// Where in the map its coordinates begin, in metres.
+        /// Origin of its coordinates in the map, in metres.
         origin_m: Point,
-        /// The voxel whose lower corner that is.
+        /// Voxel with its lower corner at the origin.
         origin_voxel: VoxelIndex,
-        /// The file that says so, if coordinates are not the map's.
+        /// File that stores the origin, if it is not the map's.
         #[serde(serialize_with = "path_if_any")]
         origin_file: Option<PathBuf>,
-        /// The origin that was asked for, if that is no corner of a voxel, in metres.
+        /// Requested origin, if it is not a voxel corner, in metres.
         #[serde(skip)]
         asked_m: Option<Point>,
     },
-    /// A file or a folder, and files beside it.
+    /// A file or a folder, with companion files.
     Files {
         /// Name of the format.
         format: &'static str,
-        /// A box around the centers of all voxels, in metres.
+        /// Bounding box of all voxel centers, in metres.
         bounds_m: Option<Aabb>,
-        /// Files beside the output.
+        /// Companion files.
         #[serde(serialize_with = "paths")]
         files_beside: Vec<PathBuf>,
     },
@@ -48,7 +48,7 @@ pub enum Written {
     Tileset {
         /// Name of the format.
         format: &'static str,
-        /// Nodes of all levels.
+        /// Number of nodes of all levels.
         nodes: u64,
     },
 }

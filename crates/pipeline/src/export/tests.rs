@@ -8,7 +8,7 @@ use voxtile_formats::write::{
     Origin, OutputFormat, OutputFormats, OutputOption, VoxelRow, VoxelSink, Writer,
 };
 
-/// The format of a program that voxtile knows nothing of: a line for each voxel.
+/// A format that voxtile does not know: one line per voxel.
 struct IndexSink<W> {
     out: W,
 }
@@ -74,7 +74,7 @@ fn a_row_more_is_a_format_more() {
     assert_eq!(all, lines("a.index", Some(WhichVoxels::All)));
     let occupied = lines("a.INDEX", Some(WhichVoxels::Occupied));
     assert!(!occupied.is_empty() && occupied.len() < all.len());
-    // Not a stream by its extension: the longest counts.
+    // The longest matching extension is used, so this is not the stream format.
     assert_eq!(lines("a.index.stream", None), occupied);
     assert_eq!(lines("a.index.stream", Some(WhichVoxels::AtLeast(0.0))), all);
     let mut named = options(&folder.path().join("a.ply"));

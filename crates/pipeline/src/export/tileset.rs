@@ -1,4 +1,4 @@
-//! A folder of 3D Tiles: `tileset.json`, and the surface of every node as binary glTF.
+//! Export to a 3D Tiles folder: `tileset.json`, and the surface of every node as binary glTF.
 
 use super::run::Export;
 use super::summary::{ExportSummary, Written};
@@ -14,15 +14,15 @@ use voxtile::{Error, Result};
 use voxtile_formats::write::{OutputFormat, VoxelRow, VoxelsHead, WriteOptions};
 use voxtile_render::levels::{Levels, LevelsOf, NodeKey, NodeStore, TilesetContent, subtree, tileset};
 
-/// How much was written.
+/// Numbers of nodes and voxels written.
 #[derive(Default)]
 struct Counts {
     nodes: AtomicU64,
-    /// Of the finest nodes.
+    /// Voxels of the finest nodes.
     voxels: AtomicU64,
 }
 
-/// Writes the folder: all of it or nothing.
+/// Writes the folder atomically.
 pub(super) fn export(export: &Export<'_>) -> anyhow::Result<ExportSummary> {
     let (output, watch) = (&export.options.output, export.watch);
     let counts = read_any_map(&export.options.map, |map| {
@@ -34,7 +34,7 @@ pub(super) fn export(export: &Export<'_>) -> anyhow::Result<ExportSummary> {
         let levels =
             Levels::build(map, &tiles, 0, &store, &|_| !watch.stop().is_set())?.ok_or(Error::Stopped)?;
         if let Some(reason) = levels.unreadable().first() {
-            // Whoever opens the folder would not know what is missing.
+            // An incomplete tileset would not be recognisable as such.
             return Err(anyhow::anyhow!("{reason}"));
         }
         let tileset = Tileset {
@@ -86,7 +86,7 @@ impl Tileset<'_> {
         self.write_subtrees(&nodes, &root)
     }
 
-    /// The files that a file names, and those that these name.
+    /// Writes the files referenced by a file, recursively.
     fn write_subtrees(&self, nodes: &LevelsOf<'_, AnyMap>, file: &serde_json::Value) -> Result<()> {
         let mut open = vec![file["root"].clone()];
         while let Some(node) = open.pop() {
@@ -117,9 +117,9 @@ impl Tileset<'_> {
             occupied_log_odds: 0.0,
         };
         let mut options = WriteOptions::beside(&path);
-        // Coordinates begin at the node's corner.
+        // Coordinates are relative to the node's corner.
         options.colour_heights_m = Some(heights_m.map(|height| height - corner_m[2]));
-        // Programs that show 3D Tiles read such positions, and a folder of them takes a fifth less.
+        // Viewers of 3D Tiles support quantized positions, which make the folder a fifth smaller.
         options.is_quantized = true;
         let mut sink = OutputFormat::GLB.open(&head, &path, &options)?;
         for voxel in &voxels {
@@ -140,7 +140,7 @@ impl Tileset<'_> {
         Ok(())
     }
 
-    /// Of what is occupied, in metres.
+    /// Returns the range of heights of occupied voxels, in metres.
     fn heights_m(&self) -> [f64; 2] {
         let boxes = self.levels.tops().iter().map(|&key| self.levels.bounds_m(self.store, key));
         boxes.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], around| {

@@ -1,4 +1,4 @@
-//! Files and folders that are made whole or not at all.
+//! Files and folders that are written atomically.
 
 mod output_file;
 mod staged_output;

@@ -6,20 +6,21 @@ use tempfile::NamedTempFile;
 use voxtile::scan::Stop;
 use voxtile::{Error, Result};
 
-/// A file that appears whole or not at all.
+/// A file that is written atomically.
 ///
-/// Its bytes go to a file of their own beside the target, with a name that nothing else has, which takes the target's
-/// name at the end. So two commands that write to one name leave the whole file of one of them, a link is never
-/// followed, and what a killed program leaves is in no other's way.
+/// The bytes go to a uniquely named temporary file next to the target, which is renamed to the target at the end.
+/// Therefore two commands with the same target leave the complete file of one of them, symbolic links are never
+/// followed, and the remains of a killed program do not block others.
 ///
-/// Standard output (`-`), a pipe or a device has no name to take: it gets all bytes at the end, from a temporary file.
+/// Standard output (`-`), a pipe or a device cannot be renamed: it receives all bytes at the end, from a temporary
+/// file.
 #[derive(Debug)]
 pub struct OutputFile {
     target: PathBuf,
     out: Out,
 }
 
-/// Takes bytes until it is asked to stop.
+/// Writer that fails once it is stopped.
 #[derive(Debug)]
 struct Out {
     bytes: BufWriter<Unfinished>,
@@ -28,18 +29,18 @@ struct Out {
 
 #[derive(Debug)]
 enum Unfinished {
-    /// Beside its place.
+    /// Next to the target.
     Named(NamedTempFile),
-    /// Without a name, until it is copied to where it goes.
+    /// Unnamed; copied to the target at the end.
     Copied(File),
 }
 
 impl OutputFile {
-    /// Begins a file.
+    /// Creates the temporary file.
     ///
     /// # Errors
     ///
-    /// A link, a folder, a place inside of a map; a folder that refuses.
+    /// The target is a symbolic link, a folder or within a map, or the folder is not writable.
     pub fn create(target: &Path) -> Result<Self> {
         let unfinished = match place_of(target)? {
             Place::File => named_beside(target).map(Unfinished::Named),
@@ -50,11 +51,12 @@ impl OutputFile {
         Ok(Self { target: target.to_owned(), out })
     }
 
-    /// Whether a file can be made at a path. Standard output, which has the summary, is none.
+    /// Checks that an image file can be created at a path. Standard output is not possible, because it is used for the
+    /// summary.
     ///
     /// # Errors
     ///
-    /// As for [`OutputFile::create`]; standard output.
+    /// As for [`OutputFile::create`]. Also fails for standard output.
     pub fn check_picture(target: &Path) -> Result<()> {
         if is_standard_output(target) {
             return Err(Error::argument(
@@ -65,64 +67,63 @@ impl OutputFile {
         check_target(target).map(drop)
     }
 
-    /// Once the stop is set, writing fails.
+    /// Makes writes fail once the stop is set.
     pub fn stop_with(mut self, stop: Stop) -> Self {
         self.out.stop = stop;
         self
     }
 
-    /// What the bytes go to; its errors do not name the file, [`OutputFile::written`] does.
+    /// Returns the writer. Its errors do not name the file; see [`OutputFile::written`].
     pub fn out(&mut self) -> &mut impl Write {
         &mut self.out
     }
 
-    /// The result of writing, with the name of the file.
+    /// Adds the name of the file to an error.
     ///
     /// # Errors
     ///
-    /// That of the result.
+    /// The error of `result`.
     pub fn written<T>(&self, result: io::Result<T>) -> Result<T> {
         result.map_err(|error| Error::io(&self.target, "write", error))
     }
 
-    /// The hash of all that was written so far.
+    /// Returns the hash of all bytes written so far.
     ///
     /// # Errors
     ///
-    /// A disk that refuses.
+    /// An I/O error occurs.
     pub fn hash(&mut self) -> Result<blake3::Hash> {
         let mut hasher = blake3::Hasher::new();
         let bytes = &mut self.out.bytes;
         let hashed = bytes.flush().and_then(|()| {
             let file = bytes.get_mut().file();
             file.rewind()?;
-            // To the end, where writing goes on.
+            // Reading to the end restores the write position.
             io::copy(file, &mut hasher)
         });
         self.written(hashed)?;
         Ok(hasher.finalize())
     }
 
-    /// Gives the file its name, durably; or sends all of it to where it goes.
+    /// Renames the file to the target and syncs it, or copies it to standard output or a pipe.
     ///
     /// # Errors
     ///
-    /// A disk that refuses: what had the name has it still. Only the very last step, to make the name durable, can fail
-    /// when the file has it.
+    /// An I/O error occurs. The target is then unchanged, unless only the sync of its folder failed.
     pub fn finish(self) -> anyhow::Result<()> {
         let Self { target, out } = self;
         let refused = |error| Error::io(&target, "write", error);
         match out.bytes.into_inner().map_err(|error| refused(error.into_error()))? {
             Unfinished::Named(file) => {
                 file.as_file().sync_all().map_err(refused)?;
-                // Again, for what has come to be there meanwhile.
+                // Check again: the target may have been created in the meantime.
                 check_target(&target)?;
                 file.persist(&target).map_err(|error| Error::io(&target, "replace", error.error))?;
                 let synced = sync_folder(folder_of(&target));
                 Ok(synced.map_err(|error| Error::io(&target, "make durable", error))?)
             }
             Unfinished::Copied(file) if is_standard_output(&target) => {
-                // As it is: `main` knows a reader that has seen enough.
+                // Without the file name: the caller handles a closed pipe.
                 Ok(copy(file, &mut io::stdout().lock())?)
             }
             Unfinished::Copied(file) => {
@@ -163,12 +164,11 @@ impl Write for Unfinished {
     }
 }
 
-/// A file without a name for what is put together on the way to `target`, on the same disk where that is a file. It is
-/// gone with the process.
+/// Creates an unnamed temporary file for intermediate data, in the target's folder if the target is a file.
 ///
 /// # Errors
 ///
-/// A target that is none, as for [`OutputFile::create`]; a folder that refuses.
+/// The target is invalid as for [`OutputFile::create`], or the folder is not writable.
 pub fn scratch_for(target: &Path) -> Result<File> {
     let file = match place_of(target)? {
         Place::File => tempfile::tempfile_in(folder_of(target)),
@@ -182,7 +182,7 @@ fn named_beside(target: &Path) -> io::Result<NamedTempFile> {
     prefix.push(".");
     let mut builder = tempfile::Builder::new();
     builder.prefix(&prefix).suffix(".part");
-    // As for any file that a program makes: the user's umask decides who may read it.
+    // The umask determines the permissions, as for any new file.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     builder.tempfile_in(folder_of(target))

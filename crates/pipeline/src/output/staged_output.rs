@@ -4,19 +4,19 @@ use std::io;
 use std::path::{Path, PathBuf};
 use voxtile::{Error, Result};
 
-/// A file or a folder that another library writes under its own name, and files beside it: in a folder of its own until
-/// all of it is whole.
+/// A file or folder that a library writes by path, and its companion files. All are written to a temporary folder and
+/// renamed when complete.
 pub struct StagedOutput {
     target: PathBuf,
     staging: tempfile::TempDir,
 }
 
 impl StagedOutput {
-    /// Begins an output.
+    /// Creates the temporary folder.
     ///
     /// # Errors
     ///
-    /// A link, a place inside of a map; a folder that is not empty; a folder that refuses.
+    /// The target is a symbolic link, within a map or a folder that is not empty, or its folder is not writable.
     pub fn beside(target: &Path) -> Result<Self> {
         check_staged_target(target)?;
         let staging = tempfile::Builder::new().prefix(".voxtile-").tempdir_in(folder_of(target));
@@ -24,33 +24,33 @@ impl StagedOutput {
         Ok(Self { target: target.to_owned(), staging })
     }
 
-    /// Where all of it is written.
+    /// Returns the temporary folder.
     pub fn folder(&self) -> &Path {
         self.staging.path()
     }
 
-    /// Where the output itself is written.
+    /// Returns the temporary path of the output itself.
     ///
     /// # Errors
     ///
-    /// A path without a name.
+    /// The target has no file name.
     pub fn path(&self) -> Result<PathBuf> {
         let name = self.target.file_name().ok_or_else(|| Error::argument("output", "has no name"))?;
         Ok(self.folder().join(name))
     }
 
-    /// Gives everything its name, durably, the output itself last. Returns the files beside it.
+    /// Syncs and renames everything, the output itself last. Returns the companion files.
     ///
     /// # Errors
     ///
-    /// A name that something else has: then all of it is as it was. A disk that refuses.
+    /// A name is taken by another file (nothing is changed then), or an I/O error occurs.
     pub fn finish(self) -> Result<Vec<PathBuf>> {
         let own = self.path()?;
         let folder = folder_of(&self.target);
         let beside = self.beside_output(&own)?;
         let name_of = |from: &Path| from.file_name().map_or(self.target.clone(), |name| folder.join(name));
         let mut names: Vec<PathBuf> = beside.iter().map(|from| name_of(from)).collect();
-        // All before the first gets its name.
+        // Check everything before the first rename.
         for (from, to) in beside.iter().zip(&names) {
             check_staged(from, to)?;
             self.check_beside(from, to)?;
@@ -65,7 +65,7 @@ impl StagedOutput {
         Ok(names)
     }
 
-    /// What was written beside the output itself, in order.
+    /// Returns the companion files, sorted.
     fn beside_output(&self, own: &Path) -> Result<Vec<PathBuf>> {
         let list = fs::read_dir(self.folder()).and_then(Iterator::collect::<io::Result<Vec<_>>>);
         let list = list.map_err(|error| Error::io(self.folder(), "list", error))?;
@@ -75,8 +75,8 @@ impl StagedOutput {
         Ok(beside)
     }
 
-    /// Nobody has named the files beside an output. One that is there belongs to an earlier output of this name, or
-    /// is what an export left that was killed, or is of somebody else.
+    /// Checks that a companion file may be written. Companion files are not named by the user, so an existing one is
+    /// replaced only if the output exists too (it then belongs to an earlier export) or if its content is the same.
     fn check_beside(&self, from: &Path, to: &Path) -> Result<()> {
         if self.target.exists() || !to.exists() || is_same(from, to)? {
             return Ok(());
@@ -87,7 +87,7 @@ impl StagedOutput {
     }
 }
 
-/// Whether two files have the same content.
+/// Returns whether two files have the same content.
 fn is_same(a: &Path, b: &Path) -> Result<bool> {
     let len = |path: &Path| {
         fs::metadata(path).map(|metadata| metadata.len()).map_err(|error| Error::io(path, "look at", error))
@@ -96,7 +96,7 @@ fn is_same(a: &Path, b: &Path) -> Result<bool> {
     Ok(len(a)? == len(b)? && content(a)? == content(b)?)
 }
 
-/// Makes a file or folder durable that is about to get a name.
+/// Syncs a file or folder before it is renamed, and checks the destination.
 fn check_staged(from: &Path, to: &Path) -> Result<()> {
     sync_all(from).map_err(|error| Error::io(from, "make durable", error))?;
     if to.is_dir() && !from.is_dir() {
@@ -113,7 +113,7 @@ fn take_name(from: &Path, to: &Path) -> io::Result<()> {
     fs::rename(from, to)
 }
 
-/// A new file, a file that is replaced, or an empty folder.
+/// Checks that the target is absent, a regular file or an empty folder.
 fn check_staged_target(target: &Path) -> Result<()> {
     if !target.is_dir() {
         return match check_target(target)? {
@@ -132,7 +132,7 @@ fn check_staged_target(target: &Path) -> Result<()> {
     Err(Error::argument(target.display().to_string(), reason))
 }
 
-/// Makes a file durable, or a folder with its files.
+/// Syncs a file, or a folder with its files.
 fn sync_all(path: &Path) -> io::Result<()> {
     if path.is_dir() {
         for entry in std::fs::read_dir(path)? {

@@ -4,12 +4,12 @@ use std::path::Path;
 use voxtile::store::check_outside_of_maps;
 use voxtile::{Error, Result};
 
-/// Whether a path stands for standard output.
+/// Returns whether a path denotes standard output.
 pub fn is_standard_output(path: &Path) -> bool {
     path == Path::new("-")
 }
 
-/// What a path names that is to be written to.
+/// Kind of output target.
 pub(super) enum Place {
     File,
     Stream,
@@ -48,7 +48,7 @@ pub(super) fn folder_of(target: &Path) -> &Path {
 }
 
 pub(super) fn sync_folder(folder: &Path) -> io::Result<()> {
-    // Only Unix lets a folder be opened and synced, and who may write to it need not be allowed to read it.
+    // Only Unix can open and sync a folder. A writable folder may be unreadable.
     match File::open(folder) {
         Ok(folder) if cfg!(unix) => folder.sync_all(),
         _ => Ok(()),

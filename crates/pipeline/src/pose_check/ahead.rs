@@ -5,14 +5,15 @@ use std::path::Path;
 use voxtile::Result;
 use voxtile_formats::{PointRoom, ReadOptions};
 
-/// Checks the poses of an input before anything is mapped; `false` if it or its poses can be read only once.
+/// Checks the poses of an input before anything is mapped. Returns `false` if the input or its poses cannot be read
+/// twice.
 ///
 /// # Errors
 ///
-/// Poses that do not fit the scans; an input that cannot be opened.
+/// The poses do not fit the scans, or the input cannot be opened.
 pub fn check_ahead(scans: &Path, options: &ReadOptions, room: &PointRoom, watch: &Watch) -> Result<bool> {
     let may_be_read_twice = |path: &Path| path.is_file() || path.is_dir();
-    // `identity` is no file.
+    // `identity` is not a file.
     let poses = options.poses.as_deref().filter(|path| path.exists());
     if !may_be_read_twice(scans) || !poses.is_none_or(may_be_read_twice) {
         return Ok(false);
@@ -24,7 +25,7 @@ pub fn check_ahead(scans: &Path, options: &ReadOptions, room: &PointRoom, watch:
             Ok(Some(scan)) => check.take(&scan)?,
             Ok(None) => check.finish()?,
             Err(_) if source.pass_unread() => None,
-            // The build meets it, too.
+            // The build reports this error later.
             Err(_) => check.finish()?,
         };
         if let Some(doubt) = doubt {

@@ -5,40 +5,40 @@ use voxtile::scan::ScanPoints as _;
 use voxtile::{Error, Result};
 use voxtile_formats::{PoseSource, ReadOptions, RigidPose, StoredScan};
 
-/// Scans that are compared.
+/// Number of scans to compare.
 const MAX_PICKS: usize = 10;
-/// A scan so far from the one before, in voxels or degrees, is another view of the same.
+/// Minimum motion between compared scans, in voxels or degrees. Scans closer together have nearly the same view.
 const STEP_VOXELS: f64 = 7.5;
 const STEP_DEGREES: f64 = 20.0;
-/// Edge of a voxel, as a share of the distance of half of the points, and in metres. In a room they are smaller.
+/// Edge of a voxel: a fraction of the median range, limited to a range in metres. Rooms give smaller voxels.
 const VOXEL_SHARE: f64 = 0.05;
 const VOXEL_M: [f64; 2] = [0.1, 0.4];
-/// Points of a scan that are looked at.
+/// Maximum number of points to use per scan.
 const MAX_POINTS: usize = 1 << 14;
-/// Of more in all scans together, a quarter of the voxels is counted.
+/// With more points in all scans together, only a quarter of the voxels is counted.
 const MANY_POINTS: usize = 50_000;
-/// Larger scans are those of stations, and to read them twice would take long.
+/// Larger scans are from stationary scanners and are excluded, because reading them twice takes long.
 const MAX_SCAN_POINTS: usize = 1 << 21;
 
-/// What overlaps as much was placed right.
+/// Overlap above which poses are accepted.
 const ENOUGH: f64 = 0.75;
-/// What right poses of scans near each other reach.
+/// Overlap that correct poses reach for nearby scans.
 const EXPECTED: f64 = 0.5;
-/// How much better the odds of being seen before must be by another reading. Right poses of real sets never had worse
-/// odds than another reading, and wrong ones by 2.2 times or more.
+/// Factor by which the odds of the overlap must improve for another reading. In real data sets, correct poses always
+/// had better odds than other readings, and other readings of wrong poses improved the odds by a factor of at least
+/// 2.2.
 const BETTER_ODDS: f64 = 2.0;
-/// Of readings that fit alike, the likelier comes first.
+/// Readings within this difference are equivalent; the more likely one is preferred.
 const TIE: f64 = 0.05;
-/// Positions that are too large by far leave no more than this.
+/// Maximum overlap if positions are much too large.
 const NO_OVERLAP: f64 = 0.2;
-/// How much better positions must fit than none at all.
+/// Minimum improvement over the overlap without any motion.
 const THAN_STILL: f64 = 0.1;
-/// In metres a second, and in metres between scans: nothing that carries a sensor goes so fast, nor do stations lie so
-/// far from each other.
+/// Limits for the speed of a sensor (m/s) and for the distance between stations (m).
 const TOO_FAST: f64 = 300.0;
 const TOO_FAR_M: f64 = 500.0;
 
-/// Why poses seem wrong.
+/// Reason to doubt the poses.
 #[derive(Clone, Debug)]
 pub struct Doubt {
     input: PathBuf,
@@ -46,21 +46,21 @@ pub struct Doubt {
 }
 
 impl Doubt {
-    /// For a person.
+    /// Returns the doubt as a remark for the user.
     pub fn remark(&self) -> String {
         format!("{}: {}", self.input.display(), self.reason)
     }
 
-    /// As an error.
+    /// Returns the doubt as an error.
     pub fn refusal(&self) -> Error {
         let reason = format!("{}; without `strict` they are mapped all the same", self.reason);
         Error::argument(self.input.display().to_string(), reason)
     }
 }
 
-/// Compares some of the first scans with those before, at their poses.
+/// Check of poses by the overlap of some of the first scans.
 pub struct PoseCheck {
-    /// What is named in messages.
+    /// Name of the input in messages.
     input: PathBuf,
     mount: RigidPose,
     others: Vec<Reading>,
@@ -71,7 +71,7 @@ pub struct PoseCheck {
 }
 
 impl PoseCheck {
-    /// A check of poses from there; `None` where poses do not place the points.
+    /// Creates a check for poses from this source. Returns `None` if the poses do not move the points.
     pub fn of(options: &ReadOptions, source: &PoseSource, scans: &Path) -> Option<Self> {
         let input = match source {
             PoseSource::File(path) => path.clone(),
@@ -89,16 +89,16 @@ impl PoseCheck {
         })
     }
 
-    /// Whether it needs no more scans.
+    /// Returns whether no more scans are needed.
     pub fn is_done(&self) -> bool {
         self.is_done
     }
 
-    /// Takes the next scan. Once it has seen enough, why the poses seem wrong, if they do.
+    /// Adds the next scan. When there are enough scans, returns the doubt about the poses, if any.
     ///
     /// # Errors
     ///
-    /// Points that cannot be read.
+    /// Points cannot be read.
     pub fn take(&mut self, scan: &StoredScan) -> Result<Option<Doubt>> {
         if self.is_done {
             return Ok(None);
@@ -128,11 +128,11 @@ impl PoseCheck {
         Ok(None)
     }
 
-    /// Compares what there is.
+    /// Compares the scans added so far.
     ///
     /// # Errors
     ///
-    /// A pose that is none.
+    /// A pose is invalid.
     pub fn finish(&mut self) -> Result<Option<Doubt>> {
         let doubt = if self.is_done { Ok(None) } else { self.doubt() };
         self.end();
@@ -179,7 +179,7 @@ impl PoseCheck {
         }))
     }
 
-    /// What streets and plains look alike from everywhere must not tell alone.
+    /// Excludes readings that cannot be concluded from overlap alone, because streets and plains look alike everywhere.
     fn is_plausible(&self, reading: Reading, given: f64, share: f64) -> Result<bool> {
         match reading {
             Reading::Millimetres | Reading::Centimetres => {
@@ -191,7 +191,7 @@ impl PoseCheck {
         }
     }
 
-    /// Whether half of the steps are faster than anything, or longer.
+    /// Returns whether half of the steps exceed the speed or distance limit.
     fn is_too_fast(&self) -> bool {
         let pairs = || self.picks.windows(2);
         let is_too_fast = |pair: &[Pick]| {
@@ -204,7 +204,7 @@ impl PoseCheck {
         2 * pairs().filter(|pair| is_too_fast(pair)).count() > pairs().count()
     }
 
-    /// Whether the middle of the points goes where the sensor goes, as it does in the world frame.
+    /// Returns whether the points' centre moves with the sensor, as it does for points in the world frame.
     fn points_go_along(&self) -> bool {
         let Some(first) = self.picks.first() else { return false };
         let (middle, [mut along, mut all]) = (middle_of(&first.points), [0.0; 2]);
@@ -234,7 +234,7 @@ fn is_step(from: &RigidPose, to: &RigidPose, step_m: f64) -> bool {
     distance_m(from, to) >= step_m || turned.to_degrees() >= STEP_DEGREES
 }
 
-/// The edge of a voxel that suits a scan.
+/// Returns a suitable voxel edge for a scan.
 fn voxel_of(points: &[[f32; 3]]) -> f64 {
     let range = |point: &[f32; 3]| point.iter().map(|c| f64::from(*c) * f64::from(*c)).sum::<f64>().sqrt();
     let mut ranges: Vec<f64> = points.iter().map(range).filter(|range| RANGE_M.contains(range)).collect();
@@ -243,7 +243,7 @@ fn voxel_of(points: &[[f32; 3]]) -> f64 {
     ranges.get(ranges.len() / 2).map_or(most_m, |median| (VOXEL_SHARE * median).clamp(least_m, most_m))
 }
 
-/// The median of each coordinate.
+/// Returns the median of each coordinate.
 fn middle_of(points: &[[f32; 3]]) -> [f64; 3] {
     std::array::from_fn(|k| {
         let mut values: Vec<f32> = points.iter().map(|point| point[k]).collect();
@@ -252,7 +252,7 @@ fn middle_of(points: &[[f32; 3]]) -> [f64; 3] {
     })
 }
 
-/// Points of a scan, evenly among all of them.
+/// Returns evenly distributed points of a scan.
 fn sample(scan: &StoredScan) -> Result<Vec<[f32; 3]>> {
     let every = scan.len().div_ceil(MAX_POINTS).max(1);
     let (mut points, mut skip) = (Vec::with_capacity(scan.len().div_ceil(every)), 0);
@@ -272,7 +272,7 @@ mod tests {
     use voxtile::scan::Pose;
     use voxtile_formats::PointStore;
 
-    /// A yard with walls and posts of irregular places.
+    /// Returns the points of a yard with walls and posts at irregular places.
     fn world() -> Vec<[f64; 3]> {
         let mut next = 7_u64;
         let mut random = move || {
@@ -296,7 +296,7 @@ mod tests {
         points
     }
 
-    /// A way with bends, of so many metres a step.
+    /// Returns a trajectory with bends and this step length.
     fn way(step_m: f64) -> Vec<RigidPose> {
         (0..12)
             .map(|k| {
@@ -308,7 +308,7 @@ mod tests {
             .collect()
     }
 
-    /// What is said of scans that come with these poses.
+    /// Returns the doubt reported for scans with these poses.
     fn said(
         scan: impl Fn(usize) -> Vec<[f64; 3]>,
         come: &[RigidPose],
@@ -330,7 +330,7 @@ mod tests {
         doubt.or(check.finish().unwrap()).map(|doubt| doubt.remark())
     }
 
-    /// What is seen of the yard, in the sensor's frame.
+    /// Returns the points seen from a pose, in the sensor frame.
     fn seen(world: &[[f64; 3]], pose: &RigidPose) -> Vec<[f64; 3]> {
         let own = world.iter().map(|point| pose.inverse().apply(*point));
         own.filter(|own| own.iter().map(|c| c * c).sum::<f64>() < 400.0).collect()
@@ -366,7 +366,7 @@ mod tests {
         let in_world = |number: usize| scan(number).into_iter().map(|own| right[number].apply(own)).collect();
         let said_in_world = said(in_world, &right, &plain, 1).unwrap_or_default();
         assert!(said_in_world.contains("`world_frame`"), "{said_in_world}");
-        // The mount is part of no reading.
+        // The sensor's pose in the body is the same in all readings.
         let extrinsic = RigidPose { position_m: [0.1, 0.0, 0.2], quaternion: [0.0, 0.0, 1.0, 0.0] };
         let mut mounted = ReadOptions::default();
         mounted.clouds.body_from_sensor = extrinsic;
@@ -377,7 +377,7 @@ mod tests {
         assert!(said(scan, &inverse, &mounted, 1).is_some_and(|said| said.contains("the inverse")));
     }
 
-    /// From each station flat ground looks the same, which would overlap best with all of them at one place.
+    /// Flat ground looks the same from every station, so the overlap would be best with all stations at one place.
     #[test]
     fn stations_far_from_each_other_are_no_doubt() {
         let ground: Vec<[f64; 3]> = (0..120)
@@ -390,10 +390,10 @@ mod tests {
             let options = ReadOptions::default();
             assert_eq!(said(|_| ground.clone(), &way(step_m), &options, 60), None, "{step_m}");
         }
-        // The same of poses that are not right, as nothing tells.
+        // Wrong poses that cannot be detected.
         let far: Vec<RigidPose> = way(60.0).iter().map(RigidPose::inverse).collect();
         assert_eq!(said(|_| ground.clone(), &far, &ReadOptions::default(), 60), None);
-        // But nothing goes 2 km a second.
+        // A speed of 2 km/s is implausible.
         let fast = said(|_| ground.clone(), &way(2000.0), &ReadOptions::default(), 1);
         assert!(fast.is_some_and(|said| said.contains("are millimetres")));
     }

@@ -1,10 +1,9 @@
-//! Whether poses fit scans: a scan sees again what the scans before it saw, if its pose is right.
+//! Checks whether poses fit their scans: with correct poses, a scan overlaps the previous scans.
 //!
-//! [`PoseCheck`] picks some of the first scans that are a few metres apart, `overlap.rs` counts how much of each was
-//! seen before, and `reading.rs` has other readings of the same poses: w first, the inverse, of a camera, in
-//! millimetres.
-//! Key frames and stations far from each other overlap little by right poses, too: only another reading by which they
-//! overlap is a reason to doubt.
+//! [`PoseCheck`] selects some of the first scans that are a few metres apart, `overlap.rs` computes the overlap, and
+//! `reading.rs` lists alternative readings of the poses: quaternions with w first, inverse poses, camera poses,
+//! millimetres. Distant key frames and stations overlap little even with correct poses, so poses are only doubted if
+//! another reading gives more overlap.
 
 mod ahead;
 mod check;

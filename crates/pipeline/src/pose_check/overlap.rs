@@ -4,29 +4,29 @@ use std::ops::RangeInclusive;
 use voxtile::scan::Pose;
 use voxtile::space::Point;
 
-/// How far from the sensor points are looked at, in metres: nearer is what carries it, farther they are sparse.
+/// Ranges of the points to use, in metres. Closer points are on the vehicle, farther ones are sparse.
 pub(super) const RANGE_M: RangeInclusive<f64> = 1.0..=25.0;
-/// A scan of fewer voxels tells nothing.
+/// Scans with fewer voxels are ignored.
 const MIN_VOXELS: u32 = 50;
-/// Shares of which there is a median.
+/// Minimum number of values for a median.
 const MIN_SHARES: usize = 2;
 
-/// Which voxels are counted. A quarter of very many tells as much.
+/// Voxels to count. For very many points, a quarter of the voxels is sufficient.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Counted {
     All,
     Quarter,
 }
 
-/// The points of a scan, where they are in the world.
+/// Points of a scan with their pose in the world.
 pub(super) struct Placed<'p> {
     pub(super) points: &'p [[f32; 3]],
     pub(super) world_from_points: Pose,
-    /// Where the sensor is in the frame of the points.
+    /// Position of the sensor in the frame of the points.
     pub(super) sensor: Point,
 }
 
-/// The median of what scans see again: the share of a scan's voxels that scans before it have. `None` where the scans
+/// Returns the median overlap: the fraction of a scan's voxels that occur in the previous scans. `None` if the scans
 /// are too few or too small.
 pub(super) fn overlap<'p>(
     scans: impl Iterator<Item = Placed<'p>>,
@@ -70,7 +70,7 @@ pub(super) fn overlap<'p>(
     (shares.len() >= MIN_SHARES).then(|| shares[shares.len() / 2])
 }
 
-/// A voxel near the anchor; far from it voxels share keys.
+/// Returns the key of a voxel. Keys are unique near the anchor only.
 fn key(point: Point, anchor: Point, voxel_m: f64) -> u64 {
     let mut key = 0;
     for (coordinate, origin) in point.into_iter().zip(anchor) {
@@ -80,7 +80,7 @@ fn key(point: Point, anchor: Point, voxel_m: f64) -> u64 {
     key
 }
 
-/// Whether a voxel is one of a quarter of all, spread evenly.
+/// Returns whether a voxel belongs to an evenly distributed quarter of all voxels.
 fn is_of_quarter(key: u64) -> bool {
     key.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 62 == 0
 }
@@ -91,7 +91,7 @@ mod tests {
 
     #[test]
     fn what_was_seen_before_is_counted_once_for_each_scan() {
-        // A wall of 200 voxels, each hit twice; the second scan has moved by half of the wall.
+        // A wall of 200 voxels, each hit twice. The second scan is shifted by half the wall.
         let wall: Vec<[f32; 3]> =
             (0..400).map(|k| [5.0, 0.4 * (k / 2 % 20) as f32 - 3.9, 0.4 * (k / 40) as f32 - 1.9]).collect();
         let at = |y_m: f64| Placed {

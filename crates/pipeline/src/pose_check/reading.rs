@@ -3,45 +3,45 @@ use voxtile::Result;
 use voxtile::scan::Pose;
 use voxtile_formats::{PoseSource, RigidPose};
 
-/// A scan of the check: points of it, and the poses of the body when it and its neighbours were taken.
+/// Scan of the check: some of its points, and the body poses of the scan and its neighbours.
 pub(super) struct Pick {
     pub(super) points: Vec<[f32; 3]>,
     pub(super) stamp_ns: Option<i64>,
     pub(super) before: RigidPose,
     pub(super) own: RigidPose,
-    /// `None` where no scan came after it.
+    /// `None` if there is no next scan.
     pub(super) after: Option<RigidPose>,
 }
 
-/// What poses may mean.
+/// Reading (interpretation) of poses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Reading {
-    /// What was read.
+    /// The poses as given.
     Given,
     WFirst,
     WLast,
-    /// World to sensor.
+    /// Poses are world to sensor.
     Inverse,
-    /// Of a camera, whose world is that of its first image.
+    /// Poses of a camera, with the first image as the world.
     Camera,
-    /// Of the lidar, which were taken for those of a camera.
+    /// Poses of the lidar that were treated as poses of a camera.
     NotCamera,
     Millimetres,
     Centimetres,
-    /// All at one place: to compare with, as flat ground looks alike from everywhere.
+    /// All scans at the same place, for comparison, because flat ground looks alike everywhere.
     Still,
     /// The points are in the world frame.
     WorldFrame,
-    /// Each scan has the pose of the one after it.
+    /// Each scan has the pose of the next one.
     Next,
     Previous,
 }
 
-/// A camera's axes in those of a lidar: x to the right, y down, z ahead.
+/// Rotation between the axes of a lidar and of a camera (x right, y down, z forward).
 const CAMERA_FROM_LIDAR: RigidPose = RigidPose { position_m: [0.0; 3], quaternion: [0.5, -0.5, 0.5, 0.5] };
 
 impl Reading {
-    /// The other readings that poses from there may have.
+    /// Returns the alternative readings for poses from this source.
     pub(super) fn others(source: &PoseSource, has_calib: bool) -> Vec<Self> {
         let any = [Self::Inverse, Self::Next, Self::Previous];
         let own: &[Self] = match source {
@@ -62,7 +62,7 @@ impl Reading {
         any.into_iter().chain(own.iter().copied()).collect()
     }
 
-    /// The points of a scan by this reading.
+    /// Returns the points of a scan at their pose by this reading.
     pub(super) fn place<'p>(self, pick: &'p Pick, mount: &RigidPose) -> Result<Placed<'p>> {
         let body = self.body(pick);
         let (frame, sensor) = match self {
@@ -92,7 +92,7 @@ impl Reading {
         }
     }
 
-    /// If what they would fit, and what to do.
+    /// Describes the problem and its solution for a message.
     pub(super) fn advice(self) -> &'static str {
         match self {
             Self::Given | Self::Still => "they are right",

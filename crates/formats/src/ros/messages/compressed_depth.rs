@@ -8,36 +8,36 @@ use crate::ros::wire::{Decoded, Wire, WireError, WireReader};
 use std::io::Cursor;
 use voxtile::Result;
 
-/// `sensor_msgs/CompressedImage` whose pixels may be depths: of the transport `compressedDepth` (PNG or RVL), or a
-/// PNG of 16 bits.
+/// `sensor_msgs/CompressedImage` whose pixels may be depths: from the transport `compressedDepth` (PNG or RVL), or a
+/// 16-bit PNG.
 #[derive(Clone, Debug)]
 pub struct CompressedDepth<'a> {
-    /// Stamp and frame, as of an image that is not compressed.
+    /// Stamp and frame, as of an uncompressed image.
     pub header: Header,
-    /// Rows.
+    /// Number of rows.
     pub height: u32,
-    /// Columns.
+    /// Number of columns.
     pub width: u32,
-    /// What a pixel was before: `16UC1`.
+    /// Encoding of the uncompressed pixels, such as `16UC1`.
     pub encoding: String,
-    /// Whether it is of the transport `compressedDepth`, which is for depths alone.
+    /// Whether the transport is `compressedDepth`, which is only used for depths.
     pub is_depth_transport: bool,
     code: Code,
     pixels: Pixels<'a>,
 }
 
-/// How the numbers of pixels are compressed.
+/// Compressed pixel values.
 #[derive(Clone, Copy, Debug)]
 enum Pixels<'a> {
     Png(&'a [u8]),
     Rvl(&'a [u8]),
 }
 
-/// What the numbers of pixels are.
+/// Meaning of pixel values.
 #[derive(Clone, Copy, Debug)]
 enum Code {
     Millimetres,
-    /// `a / (number - b)` metres.
+    /// The depth is `a / (value - b)` metres.
     Inverse {
         a: f64,
         b: f64,
@@ -45,17 +45,17 @@ enum Code {
 }
 
 const PNG_MAGIC: &[u8] = b"\x89PNG\r\n\x1a\n";
-/// Bytes before the pixels: a number for the kind of code, and its two parameters.
+/// Size of the header before the pixels: the code type and its two parameters.
 const CONFIG_BYTES: usize = 12;
-/// An image of RVL that claims more pixels is damage; a few bytes may be millions of zeros.
+/// Limit for the pixels of an RVL image: a few bytes can decode to millions of zeros.
 const MAX_RVL_PIXELS: u64 = 1 << 26;
 
 impl<'a> CompressedDepth<'a> {
-    /// Decodes a message, and the size of its image.
+    /// Decodes a message and the size of its image.
     ///
     /// # Errors
     ///
-    /// The message is cut off; its data are neither PNG of 16 bits nor RVL.
+    /// The message is truncated, or its data is neither a 16-bit PNG nor RVL.
     pub fn decode(wire: Wire, bytes: &'a [u8]) -> Decoded<Self> {
         let mut reader = WireReader::new(wire, bytes)?;
         let (header, format) = (Header::read(&mut reader)?, reader.string()?);
@@ -107,12 +107,12 @@ impl<'a> CompressedDepth<'a> {
         Ok(Self { header, height, width, encoding, is_depth_transport, code, pixels })
     }
 
-    /// Number of pixels that it claims.
+    /// Returns the number of pixels according to the image size.
     pub fn pixels_claimed(&self) -> u64 {
         u64::from(self.height) * u64::from(self.width)
     }
 
-    /// Visits a point a pixel, row by row; returns why there are not more.
+    /// Visits one point per pixel, row by row. Returns the reason if some are missing.
     pub(crate) fn visit(
         &self,
         camera: &CameraInfo,
@@ -153,12 +153,12 @@ impl<'a> CompressedDepth<'a> {
 }
 
 impl Code {
-    /// The depth of a number; NaN if it means that nothing came back.
+    /// Returns the depth of a pixel value; NaN if there is no return.
     fn depth_m(self, number: u16) -> f64 {
         match self {
             Self::Millimetres => depth_of(number).map_or(f64::NAN, |depth| depth * 1e-3),
             Self::Inverse { .. } if number == 0 => f64::NAN,
-            // The encoder worked in single precision, which decides nothing here.
+            // The encoder used single precision; the difference is negligible.
             Self::Inverse { a, b } => a / (f64::from(number) - b),
         }
     }

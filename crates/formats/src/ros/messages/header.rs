@@ -3,18 +3,18 @@ use crate::ros::wire::{Decoded, Wire, WireReader};
 /// `std_msgs/Header`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Header {
-    /// When the data were taken, in nanoseconds.
+    /// Time stamp of the data, in nanoseconds.
     pub stamp_ns: i64,
-    /// The frame of the data, without slashes at its start: tf 1 wrote them, tf 2 does not know them.
+    /// Frame of the data, without the leading slashes of tf 1, which tf 2 does not use.
     pub frame_id: String,
 }
 
 impl Header {
-    /// Reads it.
+    /// Reads a header.
     ///
     /// # Errors
     ///
-    /// The message is cut off.
+    /// The message is truncated.
     pub fn read(reader: &mut WireReader<'_>) -> Decoded<Self> {
         if reader.wire() == Wire::Ros1 {
             // `seq`, which ROS 2 dropped.
@@ -24,7 +24,7 @@ impl Header {
     }
 }
 
-/// The name of a frame.
+/// Reads the name of a frame.
 pub(super) fn read_frame(reader: &mut WireReader<'_>) -> Decoded<String> {
     let name = reader.string()?;
     Ok(name.trim_start_matches('/').to_owned())

@@ -4,34 +4,34 @@ use crate::read::cloud::CloudPoint;
 use crate::read::depth::depth_of;
 use crate::ros::wire::{Decoded, Wire, WireError, WireReader};
 
-/// `sensor_msgs/Image`, with its pixels as the bytes that they are.
+/// `sensor_msgs/Image` with its undecoded pixels.
 #[derive(Clone, Debug)]
 pub struct Image<'a> {
-    /// Stamp and frame; the frame is the camera's optical one: z ahead, x to the right, y down.
+    /// Stamp and frame. The frame is the camera's optical frame: z forward, x right, y down.
     pub header: Header,
-    /// Rows.
+    /// Number of rows.
     pub height: u32,
-    /// Columns.
+    /// Number of columns.
     pub width: u32,
-    /// What a pixel is: `16UC1`.
+    /// Pixel encoding, such as `16UC1`.
     pub encoding: String,
     is_big_endian: bool,
     row_bytes: usize,
     data: &'a [u8],
 }
 
-/// `sensor_msgs/CameraInfo`: as much of it as places pixels in space.
+/// `sensor_msgs/CameraInfo`, reduced to the pinhole parameters.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CameraInfo {
     /// Stamp and frame.
     pub header: Header,
     /// Focal lengths, in pixels.
     pub focal_px: [f64; 2],
-    /// The principal point, in pixels.
+    /// Principal point, in pixels.
     pub center_px: [f64; 2],
 }
 
-/// Whether pixels of an encoding may be depths. `16UC1` and `mono16` may be anything else of 16 bits, too.
+/// Returns whether pixels of an encoding may be depths. `16UC1` and `mono16` may also be other 16-bit values.
 pub fn is_depth_encoding(encoding: &str) -> bool {
     matches!(encoding, "16UC1" | "mono16" | "32FC1")
 }
@@ -41,13 +41,13 @@ impl CameraInfo {
     ///
     /// # Errors
     ///
-    /// The message is cut off; a camera that is not calibrated.
+    /// The message is truncated, or the camera is not calibrated.
     pub fn decode(wire: Wire, bytes: &[u8]) -> Decoded<Self> {
         let mut reader = WireReader::new(wire, bytes)?;
         let header = Header::read(&mut reader)?;
         reader.u32()?;
         reader.u32()?;
-        // The distortion: depth images are rectified before they are depths, but for a few sensors with little of it.
+        // The distortion is ignored: most depth images are rectified, and the others have little distortion.
         reader.string()?;
         for _ in 0..reader.sequence(8)? {
             reader.f64()?;
@@ -65,7 +65,7 @@ impl CameraInfo {
 }
 
 impl CameraInfo {
-    /// The point of a pixel (column and row). Where its depth is none, nothing came back along the ray through it.
+    /// Returns the point of a pixel (column and row). Without a valid depth, it is a ray without a return.
     pub(super) fn point(&self, pixel: [usize; 2], depth_m: f64) -> CloudPoint {
         let is_return = depth_m.is_finite() && depth_m > 0.0;
         let z = if is_return { depth_m } else { 1.0 };
@@ -81,7 +81,7 @@ impl<'a> Image<'a> {
     ///
     /// # Errors
     ///
-    /// The message is cut off.
+    /// The message is truncated.
     pub fn decode(wire: Wire, bytes: &'a [u8]) -> Decoded<Self> {
         let mut reader = WireReader::new(wire, bytes)?;
         Ok(Self {
@@ -95,12 +95,12 @@ impl<'a> Image<'a> {
         })
     }
 
-    /// Number of pixels that it claims.
+    /// Returns the number of pixels according to the image size.
     pub fn pixels_claimed(&self) -> u64 {
         u64::from(self.height) * u64::from(self.width)
     }
 
-    /// A point a pixel, row by row; nothing if its pixels are not depths.
+    /// Iterates over one point per pixel, row by row. Empty if the pixels are not depths.
     pub fn points<'s>(&'s self, camera: &'s CameraInfo) -> impl Iterator<Item = CloudPoint> + 's {
         let depth = self.depth();
         let rows = if self.width == 0 || depth.is_none() { 0 } else { self.height };
@@ -124,7 +124,7 @@ impl<'a> Image<'a> {
         })
     }
 
-    /// Why there are fewer points than pixels, if there are.
+    /// Returns the reason if there are fewer points than pixels.
     pub fn shortage(&self) -> Option<WireError> {
         let Some((kind, _)) = self.depth() else {
             let reason = format!("pixels are `{}`; depths are 16UC1 (mm) or 32FC1 (m)", self.encoding);
@@ -143,7 +143,7 @@ impl<'a> Image<'a> {
         })
     }
 
-    /// The type of a pixel, and how many metres its unit has.
+    /// Returns the pixel type and its unit in metres.
     fn depth(&self) -> Option<(FieldType, f64)> {
         match self.encoding.as_str() {
             "16UC1" | "mono16" => Some((FieldType::U16, 1e-3)),

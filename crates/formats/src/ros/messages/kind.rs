@@ -1,4 +1,4 @@
-/// The messages that are read.
+/// Supported message types.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MessageKind {
     /// `sensor_msgs/PointCloud2`.
@@ -9,9 +9,9 @@ pub enum MessageKind {
     LivoxCustom,
     /// `sensor_msgs/LaserScan`.
     LaserScan,
-    /// `sensor_msgs/Image`; a cloud if it holds depths.
+    /// `sensor_msgs/Image`; a cloud if its pixels are depths.
     Image,
-    /// `sensor_msgs/CompressedImage`; a cloud if it holds depths.
+    /// `sensor_msgs/CompressedImage`; a cloud if its pixels are depths.
     CompressedImage,
     /// `sensor_msgs/CameraInfo`.
     CameraInfo,
@@ -30,8 +30,8 @@ pub enum MessageKind {
 }
 
 impl MessageKind {
-    /// By the name of a type, as ROS 1 (`sensor_msgs/PointCloud2`), ROS 2 (`sensor_msgs/msg/PointCloud2`) or DDS
-    /// (`sensor_msgs::msg::dds_::PointCloud2_`) writes it.
+    /// Returns the type with this name, in the form of ROS 1 (`sensor_msgs/PointCloud2`), ROS 2
+    /// (`sensor_msgs/msg/PointCloud2`) or DDS (`sensor_msgs::msg::dds_::PointCloud2_`).
     pub fn of(type_name: &str) -> Option<Self> {
         let words: Vec<&str> = type_name.split(['/', ':']).filter(|word| !word.is_empty()).collect();
         let (package, name) = (*words.first()?, words.last()?.trim_end_matches('_'));
@@ -53,18 +53,18 @@ impl MessageKind {
         })
     }
 
-    /// Whether its messages are clouds, or may be.
+    /// Returns whether messages are clouds.
     pub fn is_cloud(self) -> bool {
         matches!(self, Self::PointCloud2 | Self::PointCloud | Self::LivoxCustom | Self::LaserScan)
             || self.is_image()
     }
 
-    /// Whether its messages are images, which may hold depths.
+    /// Returns whether messages are images, which may contain depths.
     pub fn is_image(self) -> bool {
         matches!(self, Self::Image | Self::CompressedImage)
     }
 
-    /// Whether its messages say where something was, in time.
+    /// Returns whether messages contain poses over time.
     pub fn is_pose(self) -> bool {
         matches!(
             self,

@@ -7,19 +7,19 @@ use crate::ros::wire::{Decoded, Wire, WireReader};
 pub struct LaserScan {
     /// Stamp and frame.
     pub header: Header,
-    /// Angle of the first beam about z, from x.
+    /// Angle of the first beam about z, measured from x.
     pub angle_min_rad: f32,
-    /// Between two beams.
+    /// Angle between two beams.
     pub angle_increment_rad: f32,
-    /// Between two beams.
+    /// Time between two beams.
     pub time_increment_s: f32,
-    /// Shorter ranges mean nothing.
+    /// Smallest valid range.
     pub range_min_m: f32,
-    /// Longer ranges are beams that hit nothing.
+    /// Largest valid range. Longer ranges are beams without a return.
     pub range_max_m: f32,
-    /// One a beam.
+    /// One range per beam.
     pub ranges_m: Vec<f32>,
-    /// One a beam, or none.
+    /// One intensity per beam, or empty.
     pub intensities: Vec<f32>,
 }
 
@@ -28,7 +28,7 @@ impl LaserScan {
     ///
     /// # Errors
     ///
-    /// The message is cut off.
+    /// The message is truncated.
     pub fn decode(wire: Wire, bytes: &[u8]) -> Decoded<Self> {
         let mut reader = WireReader::new(wire, bytes)?;
         let header = Header::read(&mut reader)?;
@@ -36,7 +36,7 @@ impl LaserScan {
         // `angle_max` follows from the number of ranges.
         reader.f32()?;
         let (angle_increment_rad, time_increment_s) = (reader.f32()?, reader.f32()?);
-        // `scan_time`, from one scan to the next.
+        // `scan_time`, the time between two scans.
         reader.f32()?;
         Ok(Self {
             header,
@@ -50,14 +50,14 @@ impl LaserScan {
         })
     }
 
-    /// Its beams. Ranges that mean nothing (NaN, below the least one) are left out; those beyond the longest one hit
-    /// nothing.
+    /// Iterates over the beams. Invalid ranges (NaN or below the minimum) are skipped; ranges beyond the maximum are
+    /// rays without a return.
     pub fn points(&self) -> impl Iterator<Item = CloudPoint> + '_ {
         self.ranges_m.iter().enumerate().filter_map(|(beam, &range_m)| self.point(beam, range_m))
     }
 
     fn point(&self, beam: usize, range_m: f32) -> Option<CloudPoint> {
-        // REP 117: -inf is an object that is too near, +inf is nothing, NaN is an error.
+        // REP 117: -inf is an object that is too close, +inf is no return, NaN is an error.
         if range_m.is_nan() || range_m < self.range_min_m || range_m < 0.0 {
             return None;
         }

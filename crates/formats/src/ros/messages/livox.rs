@@ -9,12 +9,12 @@ pub struct LivoxCustom<'a> {
     pub header: Header,
     /// Number of points.
     pub count: usize,
-    /// Where `offset_time` counts from, in nanoseconds.
+    /// Reference time of `offset_time`, in nanoseconds.
     timebase_ns: u64,
     points: WireReader<'a>,
 }
 
-/// A time base further from the stamp is that of another clock.
+/// A time base further from the stamp belongs to another clock.
 const MAX_BASE_NS: u128 = 1_000_000_000;
 
 /// `offset_time`, x, y, z, `reflectivity`, `tag`, `line`.
@@ -25,7 +25,7 @@ impl<'a> LivoxCustom<'a> {
     ///
     /// # Errors
     ///
-    /// The message is cut off.
+    /// The message is truncated.
     pub fn decode(wire: Wire, bytes: &'a [u8]) -> Decoded<Self> {
         let mut reader = WireReader::new(wire, bytes)?;
         let header = Header::read(&mut reader)?;
@@ -38,13 +38,14 @@ impl<'a> LivoxCustom<'a> {
         Ok(Self { header, count, timebase_ns, points: reader })
     }
 
-    /// From the stamp to the time base. Mostly it repeats the stamp; some drivers stamp a cloud when they send it.
+    /// Returns the time from the stamp to the time base. Usually they are equal; some drivers set the stamp when they
+    /// send the cloud.
     fn base_after_stamp_s(&self) -> f64 {
         let base_ns = i128::from(self.timebase_ns) - i128::from(self.header.stamp_ns);
         if base_ns.unsigned_abs() <= MAX_BASE_NS { base_ns as f64 * 1e-9 } else { 0.0 }
     }
 
-    /// Its points, in order. A message that is cut off ends with an error.
+    /// Iterates over the points, in order. A truncated message ends with an error.
     pub fn points(&self) -> impl Iterator<Item = Decoded<CloudPoint>> + '_ {
         let (mut reader, base_s) = (self.points.clone(), self.base_after_stamp_s());
         (0..self.count).map(move |_| point(&mut reader, base_s))
@@ -56,7 +57,7 @@ fn point(reader: &mut WireReader<'_>, base_s: f64) -> Decoded<CloudPoint> {
     let position_m = [reader.f32()?, reader.f32()?, reader.f32()?].map(f64::from);
     let intensity = f32::from(reader.u8()?);
     reader.bytes(2)?;
-    // All zeros where nothing came back.
+    // Points without a return are all zeros.
     let is_return = position_m.iter().all(|m| m.is_finite()) && position_m != [0.0; 3];
     let position_m = if is_return { position_m } else { [f64::NAN; 3] };
     Ok(CloudPoint { position_m, intensity, time_s, is_return })

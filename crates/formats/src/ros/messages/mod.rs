@@ -1,4 +1,4 @@
-//! Messages, each decoded by one function for ROS 1 and ROS 2.
+//! Message types. Each is decoded by one function for ROS 1 and ROS 2.
 
 mod compressed_depth;
 mod header;

@@ -1,4 +1,5 @@
-/// The packages of messages that hold what a sensor sent, or compressed clouds, and what makes clouds of them.
+/// Message types with raw sensor packets or compressed clouds: package, type and the program that converts them to
+/// clouds.
 const DRIVERS: [(&str, &str, &str); 12] = [
     ("velodyne_msgs", "VelodyneScan", "velodyne_pointcloud"),
     ("ouster_ros", "PacketMsg", "ouster_ros"),
@@ -14,7 +15,7 @@ const DRIVERS: [(&str, &str, &str); 12] = [
     ("stereo_msgs", "DisparityImage", "stereo_image_proc"),
 ];
 
-/// The program that makes clouds of messages of a type which are none, if it is known.
+/// Returns the program that converts messages of this type to clouds, if known.
 pub(in crate::ros) fn driver_of(type_name: &str) -> Option<&'static str> {
     let words: Vec<&str> = type_name.split(['/', ':']).filter(|word| !word.is_empty()).collect();
     let (package, name) = (*words.first()?, words.last()?.trim_end_matches('_'));

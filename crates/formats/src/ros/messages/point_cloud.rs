@@ -2,25 +2,25 @@ use super::header::Header;
 use crate::read::cloud::CloudPoint;
 use crate::ros::wire::{Decoded, Wire, WireReader};
 
-/// `sensor_msgs/PointCloud`: the message before `PointCloud2`, with values of points in channels.
+/// `sensor_msgs/PointCloud`, the predecessor of `PointCloud2`, with point attributes in channels.
 #[derive(Clone, Debug)]
 pub struct PointCloud<'a> {
     /// Stamp and frame.
     pub header: Header,
     /// Number of points.
     pub count: usize,
-    /// Names of its channels.
+    /// Channel names.
     pub channels: Vec<String>,
     points: WireReader<'a>,
     intensity: Option<WireReader<'a>>,
-    /// Seconds after the stamp.
+    /// Times in seconds after the stamp.
     time: Option<WireReader<'a>>,
 }
 
 const POINT_BYTES: usize = 3 * 4;
-/// The fewest bytes of a channel: the lengths of its name and of its values.
+/// Minimum size of a channel: the lengths of its name and of its values.
 const MIN_CHANNEL_BYTES: usize = 4 + 4;
-/// More channels are damage.
+/// Limit for the channels of a message.
 const MAX_CHANNELS: usize = 1024;
 const INTENSITY_NAMES: [&str; 4] = ["intensity", "intensities", "reflectivity", "i"];
 const TIME_NAMES: [&str; 4] = ["stamps", "time", "times", "t"];
@@ -30,7 +30,7 @@ impl<'a> PointCloud<'a> {
     ///
     /// # Errors
     ///
-    /// The message is cut off.
+    /// The message is truncated.
     pub fn decode(wire: Wire, bytes: &'a [u8]) -> Decoded<Self> {
         let mut reader = WireReader::new(wire, bytes)?;
         let header = Header::read(&mut reader)?;
@@ -61,17 +61,17 @@ impl<'a> PointCloud<'a> {
         Ok(cloud)
     }
 
-    /// Whether points have intensities.
+    /// Returns whether points have intensities.
     pub fn has_intensities(&self) -> bool {
         self.intensity.is_some()
     }
 
-    /// Whether points have times.
+    /// Returns whether points have times.
     pub fn has_times(&self) -> bool {
         self.time.is_some()
     }
 
-    /// Its points, in order.
+    /// Iterates over the points, in order.
     pub fn points(&self) -> impl Iterator<Item = Decoded<CloudPoint>> + '_ {
         let (mut points, mut intensity, mut time) =
             (self.points.clone(), self.intensity.clone(), self.time.clone());
@@ -80,7 +80,7 @@ impl<'a> PointCloud<'a> {
             let value =
                 |values: &mut Option<WireReader<'_>>| values.as_mut().map_or(Ok(0.0), WireReader::f32);
             let (intensity, time_s) = (value(&mut intensity)?, f64::from(value(&mut time)?));
-            // As in `PointCloud2`: NaN, or all zeros, where nothing came back.
+            // As in `PointCloud2`, points without a return are NaN or all zeros.
             let is_return = position_m.iter().all(|m| m.is_finite()) && position_m != [0.0; 3];
             Ok(CloudPoint {
                 position_m: if is_return { position_m } else { [f64::NAN; 3] },

@@ -9,26 +9,26 @@ use crate::ros::wire::{Decoded, Wire, WireError, WireReader};
 use crate::spill::FilePart;
 use voxtile::Result;
 
-/// `sensor_msgs/PointCloud2`, with its points as the bytes that they are.
+/// `sensor_msgs/PointCloud2` with its undecoded points.
 #[derive(Clone, Debug)]
 pub struct PointCloud2<'a> {
     /// Stamp and frame.
     pub header: Header,
-    /// Rows; 1 if the cloud is not organised.
+    /// Number of rows; 1 if the cloud is not organised.
     pub height: u32,
-    /// Points of a row.
+    /// Points per row.
     pub width: u32,
-    /// All fields, in the order of the message.
+    /// All fields, in message order.
     pub fields: Vec<PointField>,
     is_big_endian: bool,
     point_bytes: usize,
     row_bytes: usize,
-    /// The points, or as many of them as are at hand.
+    /// Bytes of the points, or the available part of them.
     data: &'a [u8],
-    /// Where they begin in the message, and how many bytes they take.
+    /// Offset of the points in the message.
     data_at: u64,
     data_bytes: usize,
-    /// Where x, y and z are; a plane cloud has no z.
+    /// Columns of x and y.
     xyz: [Column; 2],
     z: Option<Column>,
     intensity: Option<Column>,
@@ -39,15 +39,15 @@ pub struct PointCloud2<'a> {
 const INTENSITY_NAMES: [&str; 5] = ["intensity", "Intensity", "i", "reflectivity", "reflectance"];
 const TIME_NAMES: [&str; 8] =
     ["t", "time", "time_stamp", "timestamp", "offset_time", "timeOffset", "time_offset", "stamps"];
-/// More fields of a point are damage.
+/// Limit for the fields of a point.
 const MAX_FIELDS: usize = 1024;
-/// The bytes of a large message that must have all that is before its points.
+/// Number of bytes read from the start of a large message. They must include everything before the points.
 pub(crate) const MAX_HEAD_BYTES: u64 = 1 << 20;
-/// Bytes of a large message that are read at a time.
+/// Size of the parts in which a large message is read.
 const PIECE_BYTES: usize = 1 << 16;
-/// Points of a large message may have at most so many bytes.
+/// Limit for the size of a point in a large message.
 const MAX_POINT_BYTES: usize = 1 << 20;
-/// Times of type `f64` above this are nanoseconds: in seconds this is three million years.
+/// Times of type `f64` above this are nanoseconds: as seconds they would be three million years.
 const MIN_NANOSECONDS: f64 = 1e14;
 
 impl<'a> PointCloud2<'a> {
@@ -55,13 +55,12 @@ impl<'a> PointCloud2<'a> {
     ///
     /// # Errors
     ///
-    /// A message that is cut off; fields without x, y or z, or outside of a point.
+    /// The message is truncated, x or y is missing, or a field is outside of a point.
     pub fn decode(wire: Wire, bytes: &'a [u8]) -> Decoded<Self> {
         Self::decode_start(wire, bytes, bytes.len() as u64)
     }
 
-    /// Decodes a message of `len` bytes of which only the first are at hand; [`PointCloud2::visit_part`] visits its
-    /// points.
+    /// Decodes a message of `len` bytes from its first bytes. [`PointCloud2::visit_part`] visits its points.
     pub(crate) fn decode_start(wire: Wire, bytes: &'a [u8], len: u64) -> Decoded<Self> {
         let mut reader = WireReader::of_start(wire, bytes, len)?;
         let header = Header::read(&mut reader)?;
@@ -124,37 +123,37 @@ impl<'a> PointCloud2<'a> {
         })
     }
 
-    /// Whether points have intensities.
+    /// Returns whether points have intensities.
     pub fn has_intensities(&self) -> bool {
         self.intensity.is_some()
     }
 
-    /// Whether points have times.
+    /// Returns whether points have times.
     pub fn has_times(&self) -> bool {
         self.time.is_some()
     }
 
-    /// What is read otherwise than the message says, as the end of a sentence on clouds.
+    /// Returns the corrections of inconsistent messages, each as the end of a sentence about clouds.
     pub fn repairs(&self) -> &[&'static str] {
         &self.repairs
     }
 
-    /// Number of points that it claims.
+    /// Returns the number of points according to the message's width and height.
     pub fn points_claimed(&self) -> u64 {
         u64::from(self.height) * u64::from(self.width)
     }
 
-    /// The points whose bytes are there, in order.
+    /// Iterates over the points whose bytes are available, in order.
     pub fn points(&self) -> impl Iterator<Item = CloudPoint> + '_ {
         let rows =
             (0..self.height as usize).map_while(|row| self.data.get(row.checked_mul(self.row_bytes)?..));
-        // An empty row has no points, and however many of them there are, nothing follows.
+        // Rows of width 0 have no points, whatever their number.
         let rows = rows.take(if self.width == 0 { 0 } else { usize::MAX });
         rows.flat_map(|row| row.chunks_exact(self.point_bytes.max(1)).take(self.width as usize))
             .map(|point| self.point(point))
     }
 
-    /// Visits the points of a large message, of which [`PointCloud2::decode_start`] got the first bytes.
+    /// Visits the points of a large message decoded by [`PointCloud2::decode_start`].
     pub(crate) fn visit_part(
         &self,
         message: &FilePart,
@@ -166,7 +165,7 @@ impl<'a> PointCloud2<'a> {
             return Ok(Some(WireError { byte: 0, reason }));
         }
         let (mut height, mut width) = (self.height as usize, self.width as usize);
-        // Rows without anything between them are one.
+        // Rows without gaps are read as a single row.
         if point_bytes.checked_mul(width) == Some(self.row_bytes)
             && let Some(points) = height.checked_mul(width)
         {
@@ -189,7 +188,7 @@ impl<'a> PointCloud2<'a> {
         Ok(self.is_short().then(|| self.shortage_of(there)))
     }
 
-    /// Why there are fewer points than the message claims, if there are.
+    /// Returns the reason if there are fewer points than the message announces.
     pub fn shortage(&self) -> Option<WireError> {
         self.is_short().then(|| self.shortage_of(self.points().count() as u64))
     }
@@ -211,7 +210,7 @@ impl<'a> PointCloud2<'a> {
     fn point(&self, point: &[u8]) -> CloudPoint {
         let [x_m, y_m] = self.xyz.map(|column| self.value(point, column));
         let position_m = [x_m, y_m, self.z.map_or(0.0, |column| self.value(point, column))];
-        // Sensors write NaN, or all zeros, where nothing came back.
+        // Sensors write NaN or all zeros for points without a return.
         let is_return = position_m.iter().all(|m| m.is_finite()) && position_m != [0.0; 3];
         CloudPoint {
             position_m: if is_return { position_m } else { [f64::NAN; 3] },
@@ -221,7 +220,7 @@ impl<'a> PointCloud2<'a> {
         }
     }
 
-    /// Columns lie within a point, so that there always is a value.
+    /// Decodes a value of a point. Columns are always within a point.
     fn value(&self, point: &[u8], column: Column) -> f64 {
         let bytes = point.get(column.offset..).unwrap_or_default();
         column.kind.value(bytes, self.is_big_endian).unwrap_or(f64::NAN)
@@ -252,7 +251,8 @@ impl<'a> PointCloud2<'a> {
         if seconds.is_finite() { seconds } else { 0.0 }
     }
 
-    /// A time that is since the epoch or since the stamp, whichever makes it the shorter one.
+    /// Converts a time that counts either from the epoch or from the stamp: the interpretation closer to the stamp is
+    /// used.
     fn after_stamp_s(&self, seconds: f64) -> f64 {
         let (whole_s, rest_ns) =
             (self.header.stamp_ns.div_euclid(1_000_000_000), self.header.stamp_ns.rem_euclid(1_000_000_000));

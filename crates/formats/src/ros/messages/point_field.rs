@@ -1,6 +1,6 @@
 use crate::ros::wire::{Decoded, WireReader};
 
-/// The type of a field of `sensor_msgs/PointCloud2`.
+/// Type of a field of `sensor_msgs/PointCloud2`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FieldType {
     /// `INT8`.
@@ -24,25 +24,25 @@ pub enum FieldType {
 /// `sensor_msgs/PointField`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PointField {
-    /// Its name.
+    /// Name.
     pub name: String,
-    /// Bytes of a point before it.
+    /// Byte offset in a point.
     pub offset: usize,
-    /// Its type; `None` if the number is not one of the eight.
+    /// Type; `None` for an unknown type code.
     pub kind: Option<FieldType>,
-    /// Number of values; 0 means 1, as many drivers write it.
+    /// Number of values; 0 means 1, as written by many drivers.
     pub count: u32,
 }
 
 impl PointField {
-    /// The fewest bytes that one takes in a message.
+    /// Minimum size of a field description in a message.
     pub const MIN_BYTES: usize = 13;
 
-    /// Reads it.
+    /// Reads a field description.
     ///
     /// # Errors
     ///
-    /// The message is cut off.
+    /// The message is truncated.
     pub fn read(reader: &mut WireReader<'_>) -> Decoded<Self> {
         Ok(Self {
             name: reader.string()?,
@@ -54,7 +54,7 @@ impl PointField {
 }
 
 impl FieldType {
-    /// By its number in messages.
+    /// Returns the type with this code.
     pub fn of(number: u8) -> Option<Self> {
         Some(match number {
             1 => Self::I8,
@@ -69,7 +69,7 @@ impl FieldType {
         })
     }
 
-    /// Bytes of a value.
+    /// Returns the size of a value in bytes.
     pub fn bytes(self) -> usize {
         match self {
             Self::I8 | Self::U8 => 1,
@@ -79,7 +79,7 @@ impl FieldType {
         }
     }
 
-    /// The value at the start of some bytes; `None` if they are too few.
+    /// Decodes the value at the start of `bytes`. Returns `None` if there are too few bytes.
     pub fn value(self, bytes: &[u8], is_big_endian: bool) -> Option<f64> {
         macro_rules! number {
             ($type:ty) => {{

@@ -1,33 +1,33 @@
-//! Where the values of a point are in the bytes of `sensor_msgs/PointCloud2`.
+//! Locations of the values of a point in the bytes of `sensor_msgs/PointCloud2`.
 
 use super::point_field::{FieldType, PointField};
 
-/// Where a value is in a point.
+/// Location of a value in a point.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Column {
     pub(super) offset: usize,
     pub(super) kind: FieldType,
 }
 
-/// Where the time of a point is, and what it means.
+/// Location and meaning of the time of a point.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum TimeColumn {
     /// Nanoseconds (integers) or seconds (`f32`) after the stamp.
     AfterStamp(Column),
-    /// `f64`, mostly since the epoch.
+    /// `f64`, usually since the epoch.
     Double(usize),
-    /// 64 bits as two values of 32: nanoseconds since the epoch.
+    /// Two 32-bit values that form a 64-bit time: nanoseconds since the epoch.
     Wide(usize),
 }
 
-/// Names of a field that holds x, y and z.
+/// Names of fields that hold x, y and z together.
 const VECTOR_NAMES: [&str; 2] = ["xyz", "position"];
-/// Points that are looked at for the byte order.
+/// Number of points to inspect for the byte order.
 const LOOKED_AT: usize = 64;
-/// Coordinates of points, in metres, are between these, or 0.
+/// Plausible coordinates in metres, except 0.
 const SENSIBLE_M: std::ops::Range<f64> = 1e-6..1e7;
 
-/// The columns of x and y, and that of z if there is one; or why not.
+/// Returns the columns of x and y, and of z if there is one, or the reason why there are none.
 pub(super) fn position_columns(
     fields: &[PointField],
     point_bytes: usize,
@@ -68,7 +68,7 @@ pub(super) fn position_columns(
     }
 }
 
-/// The number of points of a message that has the bytes of some and says that there are none.
+/// Returns the number of points of a message whose size is announced as zero although it contains points.
 pub(super) fn points_unannounced(
     height: u32,
     width: u32,
@@ -83,8 +83,8 @@ pub(super) fn points_unannounced(
     (announced == 0 || announced == count).then_some(count)
 }
 
-/// Bytes from a row to the next. Some drivers leave `row_step` at 0, or write the size of the whole cloud or a number
-/// of points there: then rows are without a gap, as they are to viewers that go by `point_step` alone.
+/// Returns the bytes from one row to the next. Some drivers set `row_step` to 0, to the size of the whole cloud or to
+/// the number of points. Rows are then contiguous, as viewers that only use `point_step` assume.
 pub(super) fn row_bytes_of(
     row_step: usize,
     height: u32,
@@ -103,7 +103,7 @@ pub(super) fn row_bytes_of(
     Some(if !is_there && is_without_gaps { row } else { row_step })
 }
 
-/// Whether the first points are sensible in little-endian, and in big-endian they are not.
+/// Returns whether the first points are plausible in little-endian order and implausible in big-endian order.
 pub(super) fn is_little_endian(data: &[u8], point_bytes: usize, columns: &[Column]) -> bool {
     let (mut little, mut big, mut all) = (0, 0, 0);
     for point in data.chunks_exact(point_bytes.max(1)).take(LOOKED_AT) {
@@ -122,12 +122,12 @@ pub(super) fn is_little_endian(data: &[u8], point_bytes: usize, columns: &[Colum
     all >= 6 && 10 * little >= 9 * all && 2 * big < all
 }
 
-/// What the first of these names finds, as it is written; if none does, in letters of either case.
+/// Returns the first match for these names: case-sensitive first, then in any case.
 pub(super) fn any_of<T>(names: &[&str], find: impl Fn(bool, &str) -> Option<T>) -> Option<T> {
     [true, false].into_iter().find_map(|is_exact| names.iter().find_map(|name| find(is_exact, name)))
 }
 
-/// A field of this name. `T` is a temperature, no time.
+/// Finds a field by name. `T` does not match `t`, because it is a temperature.
 fn named<'f>(fields: &'f [PointField], name: &str, is_exact: bool) -> Option<&'f PointField> {
     let is_it = |field: &&PointField| match is_exact || name == "t" {
         true => field.name == name,
@@ -136,7 +136,7 @@ fn named<'f>(fields: &'f [PointField], name: &str, is_exact: bool) -> Option<&'f
     fields.iter().find(is_it)
 }
 
-/// A field of this name that lies within a point.
+/// Finds a field that is within a point by name.
 pub(super) fn find(fields: &[PointField], name: &str, is_exact: bool, point_bytes: usize) -> Option<Column> {
     let field = named(fields, name, is_exact)?;
     let kind = field.kind?;

@@ -3,39 +3,39 @@ use super::kind::MessageKind;
 use crate::poses::RigidPose;
 use crate::ros::wire::{Decoded, Wire, WireReader};
 
-/// Where a frame was in another, and when.
+/// Pose of a frame in another frame at a time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StampedPose {
-    /// Stamp and the parent frame.
+    /// Stamp and parent frame.
     pub header: Header,
-    /// The frame whose pose this is; empty if the message does not say.
+    /// Child frame; empty if the message does not name it.
     pub child_frame: String,
-    /// The child in the parent.
+    /// Pose of the child in the parent.
     pub parent_from_child: RigidPose,
 }
 
-/// The poses of a message of so many bytes are decoded together.
+/// The poses of messages up to this size are decoded together.
 const SMALL_BYTES: usize = 1 << 16;
-/// The fewest bytes of a transform, and of a pose, in a message.
+/// Minimum size of a transform or a pose in a message.
 const MIN_BYTES: usize = 7 * 8;
 
-/// Decodes the poses of a message: tf, odometry, poses and paths. Messages of other kinds have none.
+/// Decodes the poses of a message: tf, odometry, poses and paths. Other message types contain none.
 ///
 /// # Errors
 ///
-/// The message is cut off.
+/// The message is truncated.
 pub fn decode_poses(kind: MessageKind, wire: Wire, bytes: &[u8]) -> Decoded<Vec<StampedPose>> {
     let mut poses = Vec::new();
     visit(kind, wire, bytes, &mut |pose| poses.push(pose))?;
     Ok(poses)
 }
 
-/// Visits the poses of a message, none of them if it is cut off. A large message is decoded twice for that, so that its
-/// poses are not in memory together.
+/// Visits the poses of a message, or none of them if it is truncated. A large message is decoded twice for this, so
+/// that its poses are not in memory together.
 ///
 /// # Errors
 ///
-/// The message is cut off.
+/// The message is truncated.
 pub(crate) fn visit_poses(
     kind: MessageKind,
     wire: Wire,
@@ -82,7 +82,7 @@ fn visit(kind: MessageKind, wire: Wire, bytes: &[u8], take: &mut dyn FnMut(Stamp
 /// `geometry_msgs/TransformStamped`.
 fn transform(reader: &mut WireReader<'_>) -> Decoded<StampedPose> {
     let (header, child_frame) = (Header::read(reader)?, read_frame(reader)?);
-    // A transform is laid out like a pose.
+    // A transform has the same layout as a pose.
     Ok(StampedPose { header, child_frame, parent_from_child: pose(reader)? })
 }
 

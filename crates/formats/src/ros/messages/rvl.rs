@@ -1,17 +1,18 @@
-/// RVL of depth images (Wilson 2017): runs of zeros and of numbers, which are differences from the number before. Each
-/// is written in groups of four bits, one of which says whether another group follows, in words of 32 bits.
+/// RVL decoder for depth images (Wilson 2017). The data alternates runs of zeros and runs of differences to the
+/// previous value. Each number is stored in groups of four bits, one of which marks a continuation, packed in 32-bit
+/// words.
 #[derive(Clone, Debug)]
 pub(super) struct Rvl<'a> {
     words: &'a [[u8; 4]],
     word: u32,
-    /// Groups that are left of the word.
+    /// Groups left in the current word.
     groups: u32,
     zeros: u32,
     numbers: u32,
     previous: u16,
 }
 
-/// Groups of a number of 32 bits.
+/// Maximum number of groups of a 32-bit number.
 const MAX_GROUPS: u32 = 11;
 
 impl<'a> Rvl<'a> {
@@ -20,7 +21,7 @@ impl<'a> Rvl<'a> {
         Self { words, word: 0, groups: 0, zeros: 0, numbers: 0, previous: 0 }
     }
 
-    /// The next pixel; `None` behind the last one.
+    /// Returns the next pixel, or `None` after the last one.
     pub(super) fn pixel(&mut self) -> Option<u16> {
         while self.zeros == 0 && self.numbers == 0 {
             (self.zeros, self.numbers) = (self.number()?, self.number()?);
@@ -31,7 +32,7 @@ impl<'a> Rvl<'a> {
         }
         self.numbers -= 1;
         let coded = self.number()?;
-        // Even numbers go up, odd ones down.
+        // Zigzag coding: even numbers are positive differences, odd ones are negative.
         let difference = (coded >> 1) as u16 ^ if coded & 1 == 1 { u16::MAX } else { 0 };
         self.previous = self.previous.wrapping_add(difference);
         Some(self.previous)
@@ -59,7 +60,7 @@ impl<'a> Rvl<'a> {
 mod tests {
     use super::*;
 
-    /// Writes groups of four bits in words.
+    /// Packs groups of four bits into words.
     fn words(groups: &[u32]) -> Vec<u8> {
         let word =
             |groups: &[u32]| groups.iter().zip(0..).fold(0, |word, (bits, k)| word | bits << (28 - 4 * k));
@@ -68,7 +69,8 @@ mod tests {
 
     #[test]
     fn runs_and_differences_are_pixels() {
-        // Two zeros; three numbers: +10 (20 = 0b010_100), -1 (1), +0 (0); one zero, one number: -9 (17 = 0b010_001).
+        // Two zeros; three differences: +10 (20 = 0b010_100), -1 (1), +0 (0); one zero, one difference: -9 (17 =
+        // 0b010_001).
         let bytes = words(&[2, 3, 0b1100, 0b0010, 1, 0, 1, 1, 0b1001, 0b0010]);
         let mut rvl = Rvl::new(&bytes);
         let pixels: Vec<u16> = std::iter::from_fn(|| rvl.pixel()).take(7).collect();

@@ -113,7 +113,7 @@ fn a_transform_that_makes_a_loop_changes_no_pose_wherever_it_comes() {
     ];
     for (parent, child) in links {
         for is_static in [false, true] {
-            // A static one that leads to the map says where the sensor is, and so does a stamp between two.
+            // These transforms may change the pose: a static link to the map, or a stamp between two samples.
             if is_static && (parent, child) == ("map", "lidar") {
                 continue;
             }
@@ -310,7 +310,7 @@ fn a_single_transform_counts_where_nothing_else_moves() {
 fn frames_that_do_not_lead_to_the_map_cost_a_cloud_nothing() {
     let mut tf = robot();
     let wanted = tf.lookup("map", "lidar", MIDDLE).unwrap();
-    // Chains above the sensor and above the map, one of which comes back.
+    // Chains above the sensor and above the map; one of them leads back.
     for frame in 0..3000 {
         fixed(&mut tf, &format!("a{}", frame + 1), &format!("a{frame}"), RigidPose::IDENTITY);
         fixed(&mut tf, &format!("b{}", frame + 1), &format!("b{frame}"), RigidPose::IDENTITY);
@@ -338,7 +338,7 @@ fn frames_that_do_not_lead_to_the_map_cost_a_cloud_nothing() {
     }
 }
 
-/// An upward path at some time hides no common ancestor at other times.
+/// An upward path at one time must not hide a common ancestor at other times.
 #[test]
 fn a_common_ancestor_gives_poses_before_the_map_frame_is_a_parent() {
     let mut tf = Transforms::default();
@@ -366,7 +366,7 @@ fn a_common_ancestor_gives_poses_before_the_map_frame_is_a_parent() {
     }
 }
 
-/// The climb ends at the frame that is asked for.
+/// The search must stop at the target frame.
 #[test]
 fn a_loop_above_the_frame_of_the_map_is_no_error() {
     let wanted = robot().lookup("map", "lidar", MIDDLE).unwrap();
