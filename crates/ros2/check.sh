@@ -231,9 +231,9 @@ for kind in ${*:-friendly hostile types variants odometry launch path real senso
     *) built_of -o "$map.built" ;;
     esac
     if [ $kind = hostile ]; then
-        grep -q 'has the parent lidar, which makes a loop (map in lidar.*; publisher: ' "$work/$kind.log" ||
+        grep -q 'has the parent lidar, which closes a loop (map in lidar.*; publisher: ' "$work/$kind.log" ||
             fail "a loop of frames is not reported"
-        [ "$(grep -c 'which makes a loop\|has two parents' "$work/$kind.log")" -le 6 ] || fail "too many warnings"
+        [ "$(grep -c 'which closes a loop\|has two parents' "$work/$kind.log")" -le 6 ] || fail "too many warnings"
     fi
     of_node=$("$voxtile" digest "$map") of_bag=$("$voxtile" digest "$map.built")
     [ "$of_node" = "$of_bag" ] || fail "the map of the node is another one: $of_node, not $of_bag"

@@ -96,12 +96,12 @@ fn wrong_pcd_files_are_told_what_is_wrong() {
         ("FIELDS x y z", "FIELDS x y w", "the points have no field z"),
         ("SIZE 4 4 4 4", "SIZE 4 4 4", "SIZE has 3 entries for 4 fields"),
         ("TYPE F F F F", "TYPE F F F Q", "field intensity of type Q"),
-        ("DATA ascii", "DATA zip", "DATA zip is not ascii, binary or binary_compressed"),
+        ("DATA ascii", "DATA zip", "DATA must be ascii, binary or binary_compressed, not zip"),
         ("POINTS 3", "POINTS 4", "POINTS 4 is not WIDTH times HEIGHT, 3"),
         ("VIEWPOINT 1 2 3 0 0 0 1", "VIEWPOINT 1 2", "VIEWPOINT needs seven finite numbers"),
         ("VIEWPOINT 1 2 3 0 0 0 1", "VIEWPOINT 1 2 3 0 0 0 0", "a quaternion of length 0"),
         ("VIEWPOINT 1 2 3 0 0 0 1", "VIEWPOINT 1 2 3 0 1e300 0 0", "a quaternion too long to be a rotation"),
-        ("VERSION", "VERSOIN", "line 2: `VERSOIN` is no key"),
+        ("VERSION", "VERSOIN", "line 2: `VERSOIN` is not a key"),
     ] {
         let error = changed(from, to);
         assert!(error.contains(message), "{error}");
@@ -109,7 +109,7 @@ fn wrong_pcd_files_are_told_what_is_wrong() {
     assert!(message_of(read_pcd(b"ply\nformat")).contains("line 1"));
     assert!(
         changed("WIDTH 3\nHEIGHT 1", "WIDTH 99999999999999999999\nHEIGHT 1")
-            .contains("not a number that fits")
+            .contains("is not a valid number")
     );
     for encoding in ["ascii", "binary", "binary_compressed"] {
         let file = pcd(encoding, &points(40));
@@ -161,7 +161,7 @@ fn poses_match_the_files_or_both_counts_are_told() {
         ("0 1 0 0 0 0 1e300 0\n", "the quaternion 0 0 1e300 0 has length inf, not 1"),
         ("0 1 0 NaN 0 0 0 1\n", "line 1: `NaN` is not finite"),
         ("0 1 0\n", "line 1: 3 numbers; a pose is 8 numbers (TUM"),
-        ("1 0 0 0 0 2 0 0 0 0 1 0\n", "line 1: the matrix is no rotation"),
+        ("1 0 0 0 0 2 0 0 0 0 1 0\n", "line 1: the matrix is not a rotation"),
         ("0 1 0 zero 0 0 0 1\n", "`zero` is not a number"),
     ] {
         write(text);
@@ -187,7 +187,7 @@ fn points_in_the_world_frame_are_not_deskewed() {
     let mut options = ReadOptions { poses: Some("identity".into()), ..ReadOptions::default() };
     (options.clouds.is_deskewed, options.clouds.is_world_frame) = (true, true);
     let error = message_of(open_scans(&folder, &options).map(drop));
-    assert!(error.contains("deskew, world_frame: points that are in the world frame already"), "{error}");
+    assert!(error.contains("deskew, world_frame: points in the world frame are already"), "{error}");
 }
 
 #[test]
@@ -230,7 +230,7 @@ fn a_file_without_the_viewpoint_that_others_have_is_an_error_of_its_own() {
     let mut source = open_scans(&folder, &ReadOptions::default()).unwrap();
     assert_eq!(source.pose_source(), voxtile_formats::PoseSource::Viewpoint);
     assert!(source.next_scan().unwrap().is_some() && source.next_scan().unwrap().is_some());
-    assert!(message_of(source.next_scan()).contains("no VIEWPOINT in this file"));
+    assert!(message_of(source.next_scan()).contains("this file has no VIEWPOINT"));
     assert!(source.pass_unread() && source.next_scan().unwrap().is_none());
 }
 
@@ -410,12 +410,12 @@ fn graphs_and_logs_are_read_and_hostile_ones_are_errors() {
     let mut bomb = graph();
     bomb[4..8].copy_from_slice(&u32::MAX.to_le_bytes());
     fs::write(&path, bomb).unwrap();
-    assert!(message_of(read(&path)).contains("4294967295 points announced"));
+    assert!(message_of(read(&path)).contains("4294967295 points are announced"));
     for (text, message) in [
-        ("1 2 3\n", "line 1: points before the first line NODE"),
+        ("1 2 3\n", "line 1: there are points before the first NODE line"),
         ("NODE 1 2 3\n", "line 1: fewer than 6 numbers"),
         ("NODE 0 0 0 0 0 0\n1 two 3\n", "line 2: `two` is not a number"),
-        ("NODE 0 0 0 0 0 nan\n", "a pose that is not finite"),
+        ("NODE 0 0 0 0 0 nan\n", "the pose has a number that is not finite"),
     ] {
         fs::write(&log, text).unwrap();
         let error = message_of(read(&log));

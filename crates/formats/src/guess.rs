@@ -101,14 +101,17 @@ impl Registry {
         }
         let beginning = foreign::beginning_of(&start);
         Err(match (why_not, of(|_| true)) {
-            (Some((title, reason)), _) => argument(path, format!("is no {title}: {reason}")),
+            (Some((title, reason)), _) => argument(path, format!("is not a valid {title}: {reason}")),
             (None, Some(_)) => argument(
                 path,
                 format!(
-                    "is called .{extension}, but does not start like such a file: is it damaged?{beginning}"
+                    "has the extension .{extension}, but its content is not of that format: is it damaged?{beginning}"
                 ),
             ),
-            _ => argument(path, format!("is of no known format{beginning}; known are {}", self.names(", "))),
+            _ => argument(
+                path,
+                format!("has an unknown format{beginning}; known formats: {}", self.names(", ")),
+            ),
         })
     }
 
@@ -151,7 +154,7 @@ impl Registry {
             (Some((one, _, count)), Some((other, _, others))) => {
                 let (one, other) = (one.name, other.name);
                 let reason = format!(
-                    "holds {count} files of {one} and {others} of {other}; name the format that is meant"
+                    "contains {count} files of format {one} and {others} of format {other}; select one with `format`"
                 );
                 Err(argument(path, reason))
             }
@@ -186,8 +189,8 @@ fn why_missing(path: &Path) -> String {
     match std::fs::read_link(path) {
         Err(_) => "there is no such file or folder".to_owned(),
         Ok(target) if target.to_string_lossy().contains(".git/annex/") => {
-            "is a link of git-annex to a file that is not here: fetch it with `git annex get`".to_owned()
+            "is a git-annex link to a file that was not downloaded: get it with `git annex get`".to_owned()
         }
-        Ok(target) => format!("is a link to {}, and there is no such file or folder", target.display()),
+        Ok(target) => format!("is a link to {}, which does not exist", target.display()),
     }
 }

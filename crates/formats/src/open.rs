@@ -56,7 +56,7 @@ impl Registry {
         let has_poses = (format.has_poses)(&path);
         let scans = match format.open {
             Open::Scans(_) if has_poses && options.poses.is_some() => {
-                let reason = format!("a {} has its own poses; leave the option out", format.title);
+                let reason = format!("a {} has its own poses; omit the option", format.title);
                 return Err(Error::argument("poses", reason));
             }
             Open::Scans(open) => open(&path, options)?,
@@ -88,11 +88,13 @@ fn open_as(path: &Path, format: &InputFormat, options: &ReadOptions) -> Result<B
     let is_folder = path.is_dir();
     let source = match format.open {
         Open::Recording(open) => return open(path, options),
-        Open::Scans(_) => return wrong(format!("is {}: it has scans, not clouds alone", format.title)),
+        Open::Scans(_) => {
+            return wrong(format!("is {}, which contains scans with poses: open it as scans", format.title));
+        }
         Open::LeftOut(feature) => {
             let title = format.title;
             return wrong(format!(
-                "is {title}, which this build leaves out: build with the feature `{feature}`"
+                "is {title}, which this build does not support: build with the feature `{feature}`"
             ));
         }
         Open::Folder(open) if is_folder => open(path, options)?,
@@ -110,11 +112,14 @@ fn check(options: &ReadOptions) -> Result<()> {
     if !(options.scan_period_s >= 0.0 && options.scan_period_s.is_finite()) {
         return Err(Error::argument(
             "scan period",
-            "must be seconds from 0 on; 0 leaves a file in one cloud",
+            "must be at least 0 seconds; 0 reads a file as one cloud",
         ));
     }
     if options.depth_scale.is_some_and(|scale| !(scale > 0.0 && scale.is_finite())) {
-        return Err(Error::argument("depth scale", "must be above 0: the units of a depth image in a metre"));
+        return Err(Error::argument(
+            "depth scale",
+            "must be above 0: it is the number of depth units per metre",
+        ));
     }
     Ok(())
 }
@@ -147,7 +152,7 @@ fn open_folder(path: &Path, format: InputFormat, options: &ReadOptions) -> Resul
         }
         open_file(path, &format, stamps, &options)
     });
-    let others = others.into_iter().map(|other| format!("{other} is no cloud, left out"));
+    let others = others.into_iter().map(|other| format!("{other} is not a cloud and was skipped"));
     let remarks = stamps.remark().into_iter().chain(others).collect();
     Ok(Box::new(Files::new(name, paths, is_one_each, open).with_remarks(remarks)))
 }
@@ -166,6 +171,9 @@ fn open_file(
             Ok(Box::new(OneCloud::new(format.title, open(path, stamps.head_of(path), options)?)))
         }
         Open::Clouds(open) => open(path, options),
-        _ => Err(Error::argument(path.display().to_string(), format!("{} has no such files", format.title))),
+        _ => Err(Error::argument(
+            path.display().to_string(),
+            format!("{} cannot be read from a single file", format.title),
+        )),
     }
 }

@@ -217,7 +217,7 @@ impl Registry {
         let lower = name.to_lowercase();
         let is_it = |format: &&InputFormat| format.name == lower || format.aliases.contains(&&*lower);
         let unknown = || {
-            let reason = format!("is not known; known are {}", self.names(", "));
+            let reason = format!("is unknown; known formats: {}", self.names(", "));
             Error::argument(format!("format `{name}`"), reason)
         };
         self.formats.iter().find(is_it).ok_or_else(unknown)

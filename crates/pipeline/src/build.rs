@@ -130,7 +130,7 @@ pub fn build(options: &BuildOptions, watch: &Watch) -> anyhow::Result<Option<Sum
         let flush_error = failed.clean(flush_error);
         return Err(match outcome {
             Ok(()) => flush_error,
-            Err(error) => error.context(format!("{flush_error:#}; before that")),
+            Err(error) => error.context(format!("{flush_error:#}; the previous error")),
         });
     }
     if let Err(error) = outcome {
@@ -256,18 +256,18 @@ fn check_no_rays(options: &BuildOptions, config: &MapConfig) -> voxtile::Result<
     if !(options.no_rays && config.keeps_scans) {
         return Ok(());
     }
-    let reason = "points without rays are no scans, which a map could keep; leave one of the two out, or build \
-                  another map";
+    let reason =
+        "points without rays cannot be kept as scans: omit one of the two options, or build another map";
     Err(Error::argument("no_rays, keep_scans", reason))
 }
 
 /// Checks options that require other options.
 fn check_combinations(options: &BuildOptions) -> voxtile::Result<()> {
     if options.again && (options.resume || !options.append) {
-        return Err(Error::argument("again", "goes with `append`, and without `resume`"));
+        return Err(Error::argument("again", "requires `append`, and excludes `resume`"));
     }
     if options.read.calib.is_some() && options.read.poses.is_none() {
-        return Err(Error::argument("calib", "belongs to a file of poses; name it with `poses`"));
+        return Err(Error::argument("calib", "requires a pose file: add `poses`"));
     }
     Ok(())
 }
@@ -278,8 +278,7 @@ fn check_when_behind(options: &BuildOptions) -> voxtile::Result<()> {
     if options.when_behind == WhenBehind::Wait || !is_file {
         return Ok(());
     }
-    let reason =
-        "files wait until they are read: leave it out, or give the scans as they come, as - or a pipe";
+    let reason = "has no effect on files: omit it, or read a live stream from - or a pipe";
     Err(Error::argument("when_behind", reason))
 }
 
@@ -315,7 +314,7 @@ fn place_of_map(options: &BuildOptions) -> MapPath {
 /// Returns whether there is a map to continue.
 fn exists(options: &BuildOptions) -> anyhow::Result<bool> {
     if options.output.is_file() {
-        let reason = "is a file; a map is a folder, name another `output`";
+        let reason = "is a file, but a map is a folder: choose another `output`";
         return Err(Error::argument(options.output.display().to_string(), reason).into());
     }
     let exists = match MapReader::open(&options.output, 0) {
@@ -324,7 +323,7 @@ fn exists(options: &BuildOptions) -> anyhow::Result<bool> {
         _ => true,
     };
     if exists && !options.append && !options.resume {
-        let hint = "use `resume` to go on with these scans, `append` to add them to it, or another `output`";
+        let hint = "use `resume` to continue with these scans, `append` to add them, or another `output`";
         return Err(Error::AlreadyExists { path: options.output.clone(), hint }.into());
     }
     if !exists && options.append && !options.resume {
@@ -386,7 +385,7 @@ fn begin(
     if options.resume && !options.append && !is_empty {
         let same = inputs.iter().rfind(|input| input.is_named(name) && input.content.is_some());
         let (found, wanted) = match same.or(inputs.last()) {
-            None => ("that it does not know".to_owned(), name.to_owned()),
+            None => ("nothing".to_owned(), name.to_owned()),
             Some(known) => match known.content {
                 // The recorded name is a fingerprint.
                 None => {
@@ -405,9 +404,8 @@ fn begin(
         };
         let (path, what) = (options.output.clone(), "been built from input");
         let error = anyhow::Error::from(Error::Mismatch { path, what, found, wanted });
-        return Err(error.context(
-            "`resume` takes what came since of an input that the map has; `append` adds another one",
-        ));
+        return Err(error
+            .context("`resume` continues an input that the map already has; `append` adds another input"));
     }
     let content = options.piece_of.is_none().then(|| intake.content());
     let (rays, is_hits_alone) = (Some(mapper.config().rays), Some(options.no_rays));
@@ -433,9 +431,9 @@ fn check_begun(
 ) -> voxtile::Result<()> {
     match input.is_hits_alone {
         Some(begun) if begun != options.no_rays => {
-            let how = |is_hits_alone| if is_hits_alone { "points alone (`no_rays`)" } else { "rays" };
+            let how = |is_hits_alone| if is_hits_alone { "points without rays (`no_rays`)" } else { "rays" };
             let (found, wanted) = (how(begun).to_owned(), how(options.no_rays).to_owned());
-            let what = "been built of this input with";
+            let what = "been built from this input with";
             Err(Error::Mismatch { path: options.output.clone(), what, found, wanted })
         }
         _ => mapper.check_rays(input),
@@ -447,7 +445,7 @@ fn check_crs(options: &BuildOptions, found: Option<&String>, own: Option<&String
     match (found, own) {
         (Some(found), Some(own)) if found != own => {
             let reason = format!(
-                "its coordinates are in {}, those of the map in {}; convert them first, for instance with pdal",
+                "its coordinates are in {}, but the map is in {}: convert them first, for instance with pdal",
                 beginning_or_difference(found, own),
                 beginning_or_difference(own, found)
             );
@@ -459,8 +457,8 @@ fn check_crs(options: &BuildOptions, found: Option<&String>, own: Option<&String
 
 fn taken_before(options: &BuildOptions, name: &str, scans: u64) -> anyhow::Error {
     let reason = format!(
-        "the map has {scans} scans of an input that begins as this one does ({name}); `resume` takes what came since, \
-         and `append` `again` adds all of them once more"
+        "the map already has {scans} scans of an input with the same beginning ({name}); use `resume` to add the later \
+         scans, or `append` `again` to add all scans again"
     );
     Error::argument(options.scans.display().to_string(), reason).into()
 }
@@ -521,9 +519,9 @@ fn all_is_cut(report: &ScanReport, config: &MapConfig) -> Option<String> {
     let range_m = config.rays.max_range_m?;
     (cut_at_max_range > 0 && cut_at_max_range + skipped == points).then(|| {
         format!(
-            "all {cut_at_max_range} rays were cut at {range_m} m, so that nothing is occupied: raise `max_range`; are \
-             the points in metres? Points that are in the world frame already, far from 0 0 0, need `world_frame` \
-             with poses, `sensor_origin` or `no_rays`"
+            "all {cut_at_max_range} rays were cut at {range_m} m, so nothing is occupied: raise `max_range`, or check \
+             that the points are in metres. Points already in the world frame, far from 0 0 0, need `world_frame` with \
+             poses, `sensor_origin` or `no_rays`"
         )
     })
 }

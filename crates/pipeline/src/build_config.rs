@@ -61,7 +61,7 @@ fn name_the_option(error: Error) -> anyhow::Error {
 fn check_storage(options: &BuildOptions, own: Storage) -> voxtile::Result<()> {
     match options.storage {
         Some(wanted) if wanted != own => {
-            let reason = format!("the map's tiles are stored as {own}; leave it out, or convert the map");
+            let reason = format!("the map's tiles are stored as {own}: omit this option, or convert the map");
             Err(Error::argument("storage", reason))
         }
         _ => Ok(()),
@@ -71,7 +71,7 @@ fn check_storage(options: &BuildOptions, own: Storage) -> voxtile::Result<()> {
 fn check_threshold(options: &BuildOptions, own: f64) -> voxtile::Result<()> {
     match options.occupancy_threshold {
         Some(wanted) if wanted != own => {
-            Err(Error::argument("occupancy_threshold", format!("the map's is {own}; leave it out")))
+            Err(Error::argument("occupancy_threshold", format!("the map has {own}: omit this option")))
         }
         _ => Ok(()),
     }
@@ -112,14 +112,16 @@ fn sensor_model(options: &BuildOptions, own: SensorModel) -> anyhow::Result<Sens
         (Some(SensorModelKind::Iwlo), _) => SensorModel::Iwlo(Iwlo::default()),
     };
     if options.probabilities.is_some() && !matches!(model, SensorModel::LogOdds(_)) {
-        return Err(Error::argument("probabilities", "only the sensor model log-odds has these").into());
+        return Err(
+            Error::argument("probabilities", "only the sensor model log-odds has these parameters").into()
+        );
     }
     if let Some([hit, miss, least, most]) = options.probabilities {
         return Ok(SensorModel::LogOdds(LogOdds::from_probabilities(hit, miss, least, most)?));
     }
     let SensorModel::Iwlo(mut iwlo) = model else {
         if options.intensity_threshold.is_some() || options.intensity_max.is_some() {
-            let reason = "only the sensor model iwlo has these; add `sensor_model` iwlo";
+            let reason = "only the sensor model iwlo has these parameters: add `sensor_model` iwlo";
             return Err(Error::argument("intensity_threshold, intensity_max", reason).into());
         }
         return Ok(model);

@@ -26,7 +26,7 @@ impl FailedFlush<'_> {
     pub fn clean(self, error: Error) -> anyhow::Error {
         let hint = match self.config.storage {
             Storage::OctoMap if is_full(&error) => {
-                "a map with `storage` compact takes about a thirtieth of the room"
+                "a map with `storage` compact takes about a thirtieth of the space"
             }
             _ => "",
         };
@@ -34,13 +34,13 @@ impl FailedFlush<'_> {
         let Self { folder, scan_number, .. } = self;
         let folder = folder.display();
         let context = match (is_gone, hint) {
-            (true, "") => format!("{folder}: {GONE}; repeat the command once the cause is gone"),
+            (true, "") => format!("{folder}: {GONE}; fix the cause and repeat the command"),
             (true, hint) => format!("{folder}: {GONE}; free disk space, or: {hint}"),
             (false, _) => {
                 let hint = if hint.is_empty() { String::new() } else { format!("; {hint}") };
                 format!(
-                    "{folder}: the map is as of scan {scan_number}; once the cause is gone, the same command with \
-                     `resume` goes on from there{hint}"
+                    "{folder}: the map contains the scans up to {scan_number}; fix the cause and continue with the \
+                     same command and `resume`{hint}"
                 )
             }
         };

@@ -16,7 +16,7 @@ impl FromStr for FlushEvery {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let wrong = || "neither a number of scans (25), nor seconds (60s), nor end".to_owned();
+        let wrong = || "must be a number of scans (25), seconds (60s) or end".to_owned();
         if text == "end" {
             return Ok(Self::End);
         }

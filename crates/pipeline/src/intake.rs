@@ -213,12 +213,12 @@ impl Intake {
             content.pose_chain.is_empty() || self.chain.pose_text() == content.pose_chain,
         ) {
             (true, true) => return Ok(true),
-            (true, false) => "the same scans have other poses than",
-            (false, _) => "they are not",
+            (true, false) => "their poses have changed",
+            (false, _) => "they have changed",
         };
         Err(self.wrong(format!(
-            "of its first {} scans, the map has taken all, but {differs} those that it took: what changed cannot be taken \
-             back; build another map, or add all of them once more with `append` `again`",
+            "the map already has its first {} scans, but {differs}: changed scans cannot be removed from the map; \
+             build another map, or add all scans again with `append` `again`",
             content.scans
         )))
     }
@@ -231,11 +231,14 @@ impl Intake {
             match self.read(&mut || Ok(()))? {
                 Read::Stopped => return Ok(false),
                 Read::End => {
-                    let reason = format!("has {number} scans, and the map has taken {scans} from it");
+                    let reason = format!("has {number} scans, but the map already has {scans} scans of it");
                     return Err(self.wrong(reason));
                 }
                 Read::Scan(_) if was_skipped => {
-                    log::warn!("{}: scan {number} was skipped, and stays so", self.scans.display());
+                    log::warn!(
+                        "{}: scan {number} was skipped before and remains skipped",
+                        self.scans.display()
+                    );
                     self.skipped_alone += 1;
                     self.chain.add_unread();
                 }
@@ -246,7 +249,8 @@ impl Intake {
                 Read::LeftOut(mark) => self.chain.add(&mark),
                 Read::Scan(ReadScan { mark, .. }) => self.chain.add(&mark),
                 Read::Unread(error) => {
-                    let context = format!("scan {number}, which the map has taken, cannot be read any more");
+                    let context =
+                        format!("scan {number}, which the map already has, cannot be read any more");
                     return Err(anyhow::Error::new(error).context(context));
                 }
             }
@@ -309,8 +313,8 @@ impl Intake {
         };
         if let Some(excess) = excess {
             let context = format!(
-                "more than {excess} of one input cannot be read: copy or repair the input and go on with `resume`, or \
-                 build from later scans with `first`"
+                "more than {excess} of one input cannot be read: copy or repair the input and continue with `resume`, \
+                 or start with later scans with `first`"
             );
             return Err(anyhow::Error::new(error).context(context));
         }
@@ -363,7 +367,7 @@ impl RayNeeds {
             let StoredScan { name, .. } = scan;
             let reason = format!(
                 "the sensor of scan {name} is at {origin:?} m, which is not finite or too far away for a voxel index: \
-                 mend its pose, or leave the scan out with `skip_bad`"
+                 correct its pose, or skip the scan with `skip_bad`"
             );
             return Err(FormatError::at_record(number, reason).in_input(input));
         }

@@ -55,10 +55,10 @@ impl MapAt {
 /// [`Error::InvalidArgument`] for a file.
 pub fn check_is_no_file(map: &Path) -> Result<()> {
     let reason = if OctreeMap::is_named_by(map) {
-        "is a file of OctoMap, which this command does not take: `voxtile import` makes a map of it; info, query, raycast, \
-         digest, export, picture and view take the file itself"
+        "is an OctoMap file, which this command does not support: convert it to a map with `voxtile import`; info, \
+         query, raycast, digest, export, picture and view read it directly"
     } else if map.is_file() {
-        "is a file, and none of OctoMap; a map is a folder, which `voxtile build` or `import` makes"
+        "is a file, but not an OctoMap file; a map is a folder, created with `voxtile build` or `import`"
     } else {
         return Ok(());
     };
@@ -156,7 +156,7 @@ pub fn whole_map(path: &Path) -> Result<&Path> {
         && map.join("metadata.json").exists()
     {
         let reason = format!(
-            "names a snapshot, which can be read and not changed; name the map {}, or make a map of the snapshot with `voxtile \
+            "is a snapshot, which is read-only; use the map {}, or create a map from the snapshot with `voxtile \
              convert`",
             map.display()
         );

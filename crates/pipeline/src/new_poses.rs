@@ -49,8 +49,7 @@ pub fn poses_for(from: &PoseFile<'_>, scans: &KeptSummary) -> Result<NewPoses> {
     let scans = scans.scans();
     let &PoseFile { path: file, calib, body_from_sensor, tolerance_ns, ref budget } = from;
     if std::fs::metadata(file).is_ok_and(|meta| !meta.is_file() && !meta.is_dir()) {
-        let reason =
-            "is a FIFO, a socket or a device, and new poses may be read twice: save what it gives to a file";
+        let reason = "is a FIFO, a socket or a device, but new poses may be read twice: save them to a file";
         return Err(Error::argument(file.display().to_string(), reason));
     }
     let trajectory = Trajectory::read_within(file, calib, budget)?;
@@ -67,8 +66,8 @@ pub fn poses_for(from: &PoseFile<'_>, scans: &KeptSummary) -> Result<NewPoses> {
         for (number, scan) in scans.iter().enumerate() {
             let pose = trajectory.by_number(number)?.ok_or_else(|| {
                 let reason = format!(
-                    "the pose of scan {} was lost: its row is no pose, and a map needs one of each scan; \
-                     `remove-scans` removes the scan",
+                    "scan {} has an invalid pose, but a map needs a pose for every scan; remove the scan with \
+                     `remove-scans`",
                     scan.number
                 );
                 Error::argument(file.display().to_string(), reason)
@@ -100,13 +99,13 @@ fn other_number(poses: usize, scans: &[KeptScanHead]) -> String {
     let all = scans.len();
     match scans.get(poses) {
         Some(scan) => format!(
-            "{poses} poses for {all} scans that the map keeps: none from scan {} on, and there are no time stamps to tell \
-             which belong together",
+            "{poses} poses for {all} kept scans of the map: they are missing from scan {} on, and there are no time \
+             stamps to match them",
             scan.number
         ),
         None => format!(
-            "{poses} poses for {all} scans that the map keeps: {} too many, and there are no time stamps to tell which \
-             belong together",
+            "{poses} poses for {all} kept scans of the map: there are {} too many, and there are no time stamps to \
+             match them",
             poses - all
         ),
     }
@@ -137,7 +136,8 @@ fn by_time(
         0 => String::new(),
         more => format!(" and {more} more"),
     };
-    let reason = format!("has no pose near in time for scan {named}{more}; `pose_tolerance` allows for more");
+    let reason =
+        format!("has no pose close in time to scan {named}{more}; raise `pose_tolerance` to allow for more");
     Err(Error::argument(file.display().to_string(), reason))
 }
 

@@ -44,7 +44,7 @@ pub fn tolerance_ns(seconds: f64) -> Result<i64> {
     match (0.0..=MAX_S).contains(&seconds) {
         true => Ok((seconds * 1e9).round() as i64),
         false => {
-            let reason = format!("{seconds} is no time in seconds, from 0 to {MAX_S}");
+            let reason = format!("{seconds} is not a time in seconds from 0 to {MAX_S}");
             Err(Error::argument("pose_tolerance", reason))
         }
     }
@@ -102,7 +102,7 @@ pub fn set_mount(options: &mut ReadOptions, mount: Option<Mount>, is_box_of_body
     options.clouds.body_from_sensor = mount.map_or(RigidPose::IDENTITY, |mount| mount.rigid);
     if is_box_of_body {
         let Some(mount) = mount else {
-            let reason = "the body's frame is known by `extrinsic` only; add it, or name the box in the sensor's frame";
+            let reason = "the body frame requires `extrinsic`: add it, or give the box in the sensor frame";
             return Err(Error::argument("ignore_frame", reason));
         };
         options.selection.body_from_sensor = Some(mount.body_from_sensor);

@@ -39,7 +39,7 @@ pub fn grid_of(file: &OctreeFile) -> Result<Grid> {
 pub fn count_voxels(file: &OctreeFile, min_log_odds: f32, keep: impl Fn(&VoxelRow) -> bool) -> Result<u64> {
     let size = file.tree.count_voxels(min_log_odds).occupied;
     if size > MAX_VOXELS {
-        let hint = "such a file is made by pruning large cubes; export it as .ot or .bt, which stays pruned";
+        let hint = "such files contain large pruned cubes; export it as .ot or .bt, which remain pruned";
         return Err(Error::TooLarge { what: "number of voxels in the file", size, limit: MAX_VOXELS, hint });
     }
     let mut count = 0;

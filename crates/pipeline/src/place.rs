@@ -34,8 +34,7 @@ pub fn url_of(map: &Path) -> Option<&str> {
 /// [`Error::InvalidArgument`] for a URL.
 pub fn check_is_folder(map: &Path) -> Result<()> {
     let Some(url) = url_of(map) else { return Ok(()) };
-    let reason =
-        "a map in a bucket can be read and not changed; `voxtile pull` it, change it, `voxtile push` it";
+    let reason = "a map in a bucket is read-only: `voxtile pull` it, change the copy, and `voxtile push` it";
     Err(Error::argument(url, reason))
 }
 
@@ -109,6 +108,7 @@ fn in_bucket(url: &str) -> Result<MapPath> {
 /// Returns the error for a URL in a build without buckets.
 #[cfg(not(feature = "bucket"))]
 pub fn without_buckets(url: &str) -> Error {
-    let reason = "this voxtile was built without buckets; `cargo install --locked --path crates/cli --features bucket` makes one with them";
+    let reason = "this build does not support buckets: install one with `cargo install --locked --path crates/cli \
+                  --features bucket`";
     Error::argument(url, reason)
 }

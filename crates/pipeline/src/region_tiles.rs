@@ -9,7 +9,7 @@ use voxtile::{Error, Result};
 pub fn tiles_of(region: &Aabb, grid: &Grid) -> Result<TileBox> {
     TileBox::with_centers_in(region, grid).ok_or_else(|| {
         let reason = format!(
-            "no tile has its center in {region}; tiles are {} m long, and a region is made of whole ones",
+            "no tile has its center in {region}; tiles have an edge of {} m, and a region consists of whole tiles",
             grid.tile_size_m()
         );
         Error::argument("region", reason)

@@ -33,7 +33,7 @@ pub fn open(scans: &Path, options: &ReadOptions, watch: &Watch) -> Result<Box<dy
         return open_scans(scans, options);
     }
     if options.poses.is_some() {
-        return Err(Error::argument("poses", "a scan stream has its own poses; leave the option out"));
+        return Err(Error::argument("poses", "a scan stream has its own poses; omit the option"));
     }
     let input = BufReader::with_capacity(1 << 18, stdin());
     let stream = read_scan_stream(input, Path::new("standard input"), false)?;

@@ -16,7 +16,7 @@ use voxtile_formats::{PointRoom, PoseSource, ReadOptions, ScanMark, ScanSource, 
 const PATIENCE: Duration = Duration::from_millis(100);
 
 /// Error for a reading thread that ended unexpectedly, for instance by a panic.
-const READER_IS_GONE: &str = "the thread that reads the scans ended before the input did";
+const READER_IS_GONE: &str = "the thread that reads the scans ended before the end of the input";
 
 /// Reads an input scan by scan in its own thread, so that waiting for it can be stopped. Scans are read on request or a
 /// few in advance. If no thread can be created, scans are read in the calling thread.
@@ -124,7 +124,10 @@ impl ScanReader {
                 }
             }
             Err(error) => {
-                log::warn!("no thread for reading, so that requests to stop wait for the input: {error}");
+                log::warn!(
+                    "cannot start a thread for reading, so stop requests take effect only when the input \
+                            responds: {error}"
+                );
                 let source = scan_input::open(local.path(), &options, &watch)?;
                 let opened = Opened::of(&scans, &*source);
                 Ok(Some((

@@ -230,7 +230,7 @@ fn bad_inputs_print_one_line_with_a_remedy() {
     let points = file("points.txt", b"1 2 3\n4 five 6\n");
     let other = file("scans.pcap", b"\xd4\xc3\xb2\xa1 and more of a capture");
     let cases: Vec<(Vec<&str>, i32, &str)> = vec![
-        (vec!["build", scans, "-o", map], 2, "use --resume to go on with these scans"),
+        (vec!["build", scans, "-o", map], 2, "use --resume to continue with these scans"),
         (vec!["build", "nowhere", "-o", new], 2, "nowhere: there is no such file or folder"),
         (vec!["build", text(&empty_folder), "-o", new], 2, "no file of a known format"),
         (vec!["build", &other, "-o", new], 2, "pcap"),
@@ -261,7 +261,7 @@ fn bad_inputs_print_one_line_with_a_remedy() {
         (
             vec!["build", scans, "-o", map, "--append", "--occupancy-threshold", "0.6"],
             2,
-            "the map's is 0.5; leave it out",
+            "the map has 0.5: omit this option",
         ),
         (
             vec!["build", scans, "-o", new, "--sensor-model", "iwlo", "--intensity-max", "35"],
@@ -274,11 +274,11 @@ fn bad_inputs_print_one_line_with_a_remedy() {
             "add --tile-size 9.9 or --tile-size 10.2",
         ),
         (vec!["build", scans, "-o", new, "--resolution", "7"], 2, "add --tile-size 14, or choose another"),
-        (vec!["build", scans, "-o", &plain], 2, "is a file; a map is a folder"),
+        (vec!["build", scans, "-o", &plain], 2, "is a file, but a map is a folder"),
         (
             vec!["build", scans, "-o", map, "--append"],
             2,
-            "the map has 3 scans of an input that begins as this one",
+            "the map already has 3 scans of an input with the same beginning",
         ),
         (vec!["build", scans, "-o", map, "--again"], 2, "--append"),
         (vec!["build", scans, "-o", new, "--resolution", "-1"], 2, "resolution"),
@@ -344,7 +344,7 @@ fn bad_inputs_print_one_line_with_a_remedy() {
             2,
             "has no usable length",
         ),
-        (vec!["export", map, "-o", "a.abc"], 2, "its extension is of no known format"),
+        (vec!["export", map, "-o", "a.abc"], 2, "its extension is unknown"),
         (vec!["export", map, "-o", "a.ply", "--region", "1", "1", "1", "0", "2", "2"], 2, "needs X0 < X1"),
         (vec!["export", map, "-o", "no/such/a.ply"], 1, "no/such/a.ply: cannot create"),
     ];
@@ -608,7 +608,7 @@ fn files_are_recognised_by_content() {
     assert_eq!(output(&["info", text(&renamed)]), output(&["info", text(&ot)]));
     for command in ["info", "digest"] {
         let (code, stderr) = failure(&[command, text(&ply)]);
-        assert!(code == 2 && stderr.contains("is a file, and none of OctoMap"), "{stderr}");
+        assert!(code == 2 && stderr.contains("is a file, but not an OctoMap file"), "{stderr}");
     }
 }
 

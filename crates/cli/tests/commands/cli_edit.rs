@@ -38,9 +38,10 @@ fn octomap_files_are_refused_with_a_hint_where_a_folder_is_needed() {
         &["remove-points", "--region", "0", "0", "0", "1", "1", "1"],
         &["convert", "--storage", "compact", "-o", text(&folder.path().join("new"))],
     ] {
-        for (file, named) in
-            [(&tree, "`voxtile import` makes a map of it"), (&other, "is a file, and none of OctoMap")]
-        {
+        for (file, named) in [
+            (&tree, "convert it to a map with `voxtile import`"),
+            (&other, "is a file, but not an OctoMap file"),
+        ] {
             let [command, rest @ ..] = arguments else { unreachable!() };
             let (code, stderr) = failure(&[&[*command, text(file)], rest].concat());
             assert!(code == 2 && stderr.contains(named), "{arguments:?}: {stderr}");

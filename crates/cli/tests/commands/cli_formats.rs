@@ -156,7 +156,7 @@ fn gaps_between_poses_are_filled_up_to_twice_the_tolerance() {
                 "{own:?} {tolerance}: {reported}"
             );
             assert_eq!(
-                reported.contains("apart; --pose-tolerance allows for more"),
+                reported.contains("apart; --pose-tolerance permits larger gaps"),
                 !is_filled,
                 "{reported}"
             );
@@ -165,7 +165,7 @@ fn gaps_between_poses_are_filled_up_to_twice_the_tolerance() {
         let input = ["build", &bag, "--topic", "/points", "--pose-tolerance", "0.01", "-o", text(&map)];
         let refused = refusal(&[&input, own].concat());
         assert!(refused.contains("none of its 4 clouds has a pose"), "{refused}");
-        assert!(refused.contains("apart; --pose-tolerance allows for more"), "{refused}");
+        assert!(refused.contains("apart; --pose-tolerance permits larger gaps"), "{refused}");
     }
 }
 
@@ -409,7 +409,7 @@ fn clouds_without_any_pose_make_no_map() {
     let map = folder.path().join("other");
     output(&["build", text(&scans), "--poses", text(&poses), "-o", text(&map)]);
     let reported = output(&["scans", text(&scans), "--poses", text(&poses)]);
-    let named = "1 cloud has no pose, left out (1600000001.000000000.xyz: it is 0.500 s after the last pose)";
+    let named = "1 cloud has no pose: skipped (1600000001.000000000.xyz: it is 0.500 s after the last pose)";
     assert!(reported.contains(named), "{reported}");
     assert!(output(&["scans", text(&map)]).contains("1600000000"), "{}", output(&["scans", text(&map)]));
 }
@@ -570,7 +570,7 @@ fn damaged_clouds_shift_no_others_of_a_selection() {
     assert_eq!(build(&map("b"), &["--every", "12"]), [0.0, 12.0, 24.0, 36.0]);
     assert_eq!(build(&map("c"), &["--first", "7", "--count", "2"]), [7.0, 8.0]);
     let reported = output(&["scans", text(&scans), "--poses", text(&poses), "--first", "7", "--count", "2"]);
-    assert!(reported.contains("1 of the scans that were passed over cannot be read"), "{reported}");
+    assert!(reported.contains("1 of the skipped scans cannot be read"), "{reported}");
 }
 
 /// These bytes make the LAZ decoder panic.
@@ -586,7 +586,7 @@ fn a_panic_of_a_decoder_prints_one_line_with_the_file() {
         fs::write(&file, bytes).unwrap();
         let printed = refusal(&["scans", text(&file)]);
         assert!(
-            printed.contains("damaged.laz") && printed.contains("its decoder gave up (decoders.rs:"),
+            printed.contains("damaged.laz") && printed.contains("its decoder failed (decoders.rs:"),
             "{printed}"
         );
         assert!(printed.lines().count() == 1 && !printed.contains("panicked"), "{printed}");
@@ -615,7 +615,7 @@ fn truncated_clouds_are_kept_or_reported_with_an_offset() {
     let las = cut("voxels.las");
     let reported = json(&["scans", text(&las), "--json"]);
     let points = reported["points"].as_u64().unwrap();
-    let remark = format!("the file is cut off: {points} of {} points are there and are read", points + 3);
+    let remark = format!("the file is truncated: {points} of {} points exist and are read", points + 3);
     assert!(reported["remarks"].to_string().contains(&remark), "{reported}");
     assert_eq!(build(&las, "las.map")["points"], points);
     let ply = cut("voxels.ply");
@@ -641,8 +641,8 @@ fn points_not_moved_by_deskewing_are_reported() {
     let input = ["scans", text(&scans), "--poses", text(&poses), "--pose-tolerance", "2"];
     let reported = output(&[&input[..], &["--deskew"]].concat());
     for part in [
-        "1 cloud has no times of points, or no stamp: --deskew moved nothing there",
-        "2 points stayed: no pose is known at their own times (--deskew)",
+        "1 cloud has no point times or no stamp: --deskew had no effect there",
+        "2 points not deskewed: there is no pose at their own times",
     ] {
         assert!(reported.contains(part), "{reported}");
     }

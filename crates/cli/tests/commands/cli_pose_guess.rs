@@ -123,7 +123,7 @@ fn w_first_quaternions_are_detected_and_reported() {
     };
     let w_last = digest(&|_, [x, y], half| format!("{x} {y} 0 0 0 {} {}\n", half.sin(), half.cos()), "");
     let w_first = |_, [x, y]: [f64; 2], half: f64| format!("{x} {y} 0 {} 0 0 {}\n", half.cos(), half.sin());
-    assert_eq!(digest(&w_first, "w first (qw qx qy qz)"), w_last);
+    assert_eq!(digest(&w_first, "qw qx qy qz, because"), w_last);
     let named = |k, p: [f64; 2], half| {
         let head = if k == 0 { "# tx ty tz qw qx qy qz\n" } else { "" };
         head.to_owned() + &w_first(k, p, half)
@@ -152,26 +152,26 @@ fn a_calib_beside_poses_of_a_camera_is_named() {
     };
     fs::write(&poses, along(2, 1.0)).unwrap();
     let reported = overview(&[]);
-    assert!(reported.contains("go along their own z") && reported.contains("--calib FILE"), "{reported}");
+    assert!(reported.contains("moves along its z axis") && reported.contains("--calib FILE"), "{reported}");
     let calib = folder.path().join("calib.txt");
     fs::write(&calib, "P0: 1 0 0 0 0 1 0 0 0 0 1 0\n").unwrap();
     assert!(!overview(&[]).contains("calib.txt"), "it has no Tr");
     fs::write(&calib, "Tr: 0 -1 0 0 0 0 -1 -0.1 1 0 0 -0.3\n").unwrap();
     let reported = overview(&[]);
-    assert!(reported.contains(&format!("need --calib {}", calib.display())), "{reported}");
-    assert!(reported.contains("these go along z") && !reported.contains("own z"), "{reported}");
+    assert!(reported.contains(&format!("add --calib {}", calib.display())), "{reported}");
+    assert!(reported.contains("these move along z") && !reported.contains("its z axis"), "{reported}");
     let reported = overview(&["--calib", text(&calib)]);
     assert!(!reported.contains("note"), "{reported}");
     // Without motion the axis is unknown.
     fs::write(&poses, along(2, 0.0)).unwrap();
     let reported = overview(&[]);
-    assert!(reported.contains("need --calib") && !reported.contains("these go"), "{reported}");
+    assert!(reported.contains("add --calib") && !reported.contains("these move"), "{reported}");
     // Lidar poses move along x.
     fs::write(&poses, along(0, 1.0)).unwrap();
     assert!(!overview(&[]).contains("note"));
     // With a wrong calib they move along -y.
     let reported = overview(&["--calib", text(&calib)]);
-    assert!(reported.contains("with --calib the poses go along their own -y"), "{reported}");
+    assert!(reported.contains("with --calib the sensor moves along its -y axis"), "{reported}");
     fs::write(&poses, "1 0 0 0 0 -1 0 0 0 0 -1 0\n".repeat(3)).unwrap();
     assert!(overview(&[]).contains("upside down"));
 }
@@ -214,7 +214,8 @@ fn times_in_names_may_lack_zeros_or_points() {
     let reported = voxtile(&["scans", text(&scans), "--poses", text(&file)]).output().unwrap();
     let reported = String::from_utf8(reported.stderr).unwrap();
     assert!(
-        reported.contains("200 poses for 3 clouds") && reported.contains("names of the clouds tell no times"),
+        reported.contains("200 poses for 3 clouds")
+            && reported.contains("names of the clouds contain no times"),
         "{reported}"
     );
 }
@@ -241,11 +242,11 @@ fn a_scan_without_a_pose_is_skipped_and_named() {
             let summary: Value = serde_json::from_slice(&built.stdout).unwrap();
             assert_eq!(summary["scans"], 3, "{row}");
             assert!(
-                reported.contains("1 row of poses is left out") && reported.contains("line 3"),
+                reported.contains("1 row of poses is invalid and skipped") && reported.contains("line 3"),
                 "{row}: {reported}"
             );
             assert!(
-                reported.contains("1 cloud has no pose, left out (") && reported.contains(" was lost)"),
+                reported.contains("1 cloud has no pose: skipped (") && reported.contains(" was lost)"),
                 "{row}: {reported}"
             );
         }

@@ -103,7 +103,10 @@ fn another_map_is_built_from_kept_scans_with_other_poses() {
     let lines: Vec<_> = fs::read_to_string(&moved).unwrap().lines().take(2).map(str::to_owned).collect();
     fs::write(&moved, lines.join("\n")).unwrap();
     let message = fails(&["build", &kept.map, "-o", &kept.path("none"), "--poses", &moved], 2);
-    assert!(message.contains("2 poses for 3 scans that the map keeps: none from scan 3 on"), "{message}");
+    assert!(
+        message.contains("2 poses for 3 kept scans of the map: they are missing from scan 3 on"),
+        "{message}"
+    );
 }
 
 #[test]
@@ -122,7 +125,7 @@ fn kept_scans_are_listed_exported_and_rebuilt() {
     output(&[&["build", &out, "-o", &again][..], &TILES].concat());
     assert_eq!(digest(&again), digest(&kept.map));
     let message = fails(&["export", &kept.map, "--scans", &out], 2);
-    assert!(message.contains("is a folder with content; name another"), "{message}");
+    assert!(message.contains("is a folder that is not empty: choose another"), "{message}");
     let third = kept.path("third");
     output(&[&["build", &kept.map, "-o", &third][..], &TILES].concat());
     assert_eq!(digest(&third), digest(&kept.map));
@@ -168,7 +171,10 @@ fn impossible_replays_are_refused_with_a_remedy() {
     let two = fs::read_to_string(&three).unwrap().lines().take(2).collect::<Vec<_>>().join("\n");
     fs::write(&three, two).unwrap();
     let message = refused(&["remap", &kept.map, "--poses", &three]);
-    assert!(message.contains("2 poses for 3 scans that the map keeps: none from scan 3 on"), "{message}");
+    assert!(
+        message.contains("2 poses for 3 kept scans of the map: they are missing from scan 3 on"),
+        "{message}"
+    );
     let message = refused(&["remap", &kept.map, "--poses", &three, "--tolerance", "1"]);
     assert!(message.contains("0.02m,0.1deg"), "{message}");
     let message = refused(&["remove-scans", &kept.map, "--scans", "3..1"]);
@@ -278,7 +284,7 @@ fn unordered_poses_are_not_matched_by_line() {
     let line = |stamp: i32| format!("{stamp} {stamp} 0 0 0 0 0 1\n");
     fs::write(&poses, [3, 2, 1].map(line).concat()).unwrap();
     let message = fails(&["remap", &kept.map, "--poses", &poses], 2);
-    assert!(message.contains("its time stamps go back"), "{message}");
+    assert!(message.contains("its time stamps are not in order"), "{message}");
     assert_eq!(digest(&kept.map), kept.digest_with(&kept.poses("own.txt", 0.0), "same"));
 
     // Clouds with stamps as names.
@@ -313,7 +319,7 @@ fn unordered_poses_are_not_matched_by_line() {
     let build = ["build", text(&clouds), "-o", &kept.path("x"), "--poses", &kept.path("back.txt")];
     for more in [&[][..], &["--skip-bad"]] {
         let message = fails(&[&build[..], more].concat(), 2);
-        assert!(message.contains("its time stamps go back (pose 2 is earlier"), "{message}");
+        assert!(message.contains("its time stamps are not in order (pose 2 is earlier"), "{message}");
         assert!(!message.contains("is skipped"), "{message}");
     }
 }

@@ -54,8 +54,8 @@ fn guesses_are_printed() {
         (
             "a.csv",
             &[
-                "coordinates become metres: x, y and z are in cm",
-                "1 row is no point, left out (line 3: `px` is not a number)",
+                "coordinates are converted to metres: x, y and z are in cm",
+                "1 row is not a point, skipped (line 3: `px` is not a number)",
             ],
         ),
     ] {

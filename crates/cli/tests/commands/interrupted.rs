@@ -41,8 +41,8 @@ fn a_resumed_build_adds_every_scan_once_and_refuses_other_input() {
     let text_of_file = fs::read_to_string(&file).unwrap().replacen("0.55", "0.56", 1);
     fs::write(&file, text_of_file).unwrap();
     let cases: [(&[&str], &str); 8] = [
-        (&[text(&other_input)], "has 2 scans, and the map has taken 3 from it"),
-        (&[text(&changed_input)], "of its first 3 scans, the map has taken all, but they are not those"),
+        (&[text(&other_input)], "has 2 scans, but the map already has 3 scans of it"),
+        (&[text(&changed_input)], "the map already has its first 3 scans, but they have changed"),
         (&[scans, "--resolution", "0.1"], "resolution 0.2 m, not 0.1 m"),
         (&[scans, "--tile-size", "20"], "tile size 10 m, not 20 m"),
         (&[scans, "--max-range", "10"], "ranges of 0 m to 9 m, not 0 m to 10 m"),
@@ -116,10 +116,10 @@ fn known_inputs_resume_when_grown_and_are_refused_when_changed() {
     let good = fs::read_to_string(&third).unwrap();
     fs::write(&third, good.replacen("4 0.03", "4 0.04", 1)).unwrap();
     let (code, stderr) = failure(&["build", text(&a), "-o", map, "--resume"]);
-    assert!(code == 2 && stderr.contains("but they are not those that it took"), "{stderr}");
+    assert!(code == 2 && stderr.contains("but they have changed"), "{stderr}");
     fs::write(&third, good.replacen("VIEWPOINT 3 ", "VIEWPOINT 3.5 ", 1)).unwrap();
     let (code, stderr) = failure(&["build", text(&a), "-o", map, "--append", "--resume"]);
-    assert!(code == 2 && stderr.contains("the same scans have other poses than those"), "{stderr}");
+    assert!(code == 2 && stderr.contains("but their poses have changed"), "{stderr}");
     fs::write(&third, good).unwrap();
     assert_eq!(build(&a, &["--append", "--again"])["scans"], 12);
 }
@@ -397,7 +397,7 @@ fn points_alone_and_rays_of_one_input_do_not_mix() {
         numbered(&a, 1, 2..3);
         let before = digest(text(&map));
         let (code, stderr) = failure(&[&build[..], &["--resume"], alone(!begun_alone)].concat());
-        assert!(code == 2 && stderr.contains("points alone (--no-rays)"), "{stderr}");
+        assert!(code == 2 && stderr.contains("points without rays (--no-rays)"), "{stderr}");
         assert_eq!(digest(text(&map)), before);
         output(&[&build[..], &["--resume"], alone(begun_alone)].concat());
         assert_ne!(digest(text(&map)), before);

@@ -67,11 +67,11 @@ fn errors_name_the_options_for_poses() {
     let folder = TempDir::new().unwrap();
     let (bag, map) = (folder.path().join("a.bag"), folder.path().join("map"));
     for (frame, odometries, reported) in [
-        ("camera_init", &["/a", "/b"][..], "name one, as with --odometry /a --world-frame"),
+        ("camera_init", &["/a", "/b"][..], "select one, for instance --odometry /a --world-frame"),
         (
             "body",
             &["/Odometry"],
-            "poses are in /Odometry (nav_msgs/Odometry, 4 messages): name their topic, as with \
+            "there are poses in /Odometry (nav_msgs/Odometry, 4 messages): select their topic, for instance \
                                   --odometry /Odometry",
         ),
     ] {

@@ -252,5 +252,5 @@ fn a_gigabyte_of_zeros_is_no_poses() {
     let command = build(&scans, &map, MEMORY, &["--poses", poses.to_str().unwrap()]);
     let output = limited(&command, 'v', 1 << 20).output().unwrap();
     let printed = String::from_utf8_lossy(&output.stderr);
-    assert!(printed.contains("is binary, not a text of poses"), "{printed}");
+    assert!(printed.contains("is binary, not a text file of poses"), "{printed}");
 }

@@ -44,7 +44,7 @@ fn a_full_disk_keeps_the_last_flush_and_the_build_resumes_later() {
         let message = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(1), "{message}");
         assert!(message.contains("No space left on device"), "{message}");
-        assert!(message.contains("the same command with --resume goes on from there"), "{message}");
+        assert!(message.contains("continue with the same command and --resume"), "{message}");
         assert_eq!(message.lines().count(), 1, "{message}");
         let (number, seen) = digest(&map).unwrap();
         assert!((1..30).contains(&number), "{number}");

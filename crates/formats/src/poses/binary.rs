@@ -11,17 +11,17 @@ const KINDS: [(&[u8], &str, &str); 14] = [
     (b"7z\xbc\xaf", "an archive (7z)", UNPACK),
     (b"#ROSBAG", "a recording (.bag)", RECORDING),
     (b"\x89MCAP", "a recording (.mcap)", RECORDING),
-    (b"SQLite format 3\0", "a database, perhaps a recording (.db3)", RECORDING),
+    (b"SQLite format 3\0", "a database, possibly a recording (.db3)", RECORDING),
     (b"\x89HDF", "HDF5", SAVE),
     (b"PAR1", "Parquet", SAVE),
-    (b"MATLAB 5", "a MAT-file of MATLAB", SAVE),
+    (b"MATLAB 5", "a MATLAB file (.mat)", SAVE),
     (b"\xff\xfe", "text in UTF-16", "save it as UTF-8"),
     (b"\xfe\xff", "text in UTF-16", "save it as UTF-8"),
 ];
 const UNPACK: &str = "unpack it first";
 const SAVE: &str = "save the poses as text (TUM, KITTI, CSV) or as .npy";
 const RECORDING: &str =
-    "give the recording itself as scans, with `odometry` for a topic of poses, or save its poses as text";
+    "use the recording itself as the input, with `odometry` for a topic of poses, or save its poses as text";
 
 /// Checks that a pose file with this start can be text, which contains no zero bytes.
 ///
@@ -35,5 +35,5 @@ pub(super) fn check_text(path: &Path, head: &[u8]) -> Result<()> {
         None if head.contains(&0) => ("binary", SAVE),
         None => return Ok(()),
     };
-    Err(Error::argument(path.display().to_string(), format!("is {kind}, not a text of poses: {way}")))
+    Err(Error::argument(path.display().to_string(), format!("is {kind}, not a text file of poses: {way}")))
 }

@@ -14,9 +14,9 @@ pub(super) fn read(path: &Path) -> Result<RigidPose> {
         }
         let words = numbers.split_ascii_whitespace();
         let numbers: std::result::Result<Vec<f64>, _> = words.map(str::parse).collect();
-        let numbers = numbers.map_err(|_| lines.error("what follows `Tr:` are not 12 numbers"))?;
+        let numbers = numbers.map_err(|_| lines.error("`Tr:` is not followed by 12 numbers"))?;
         return matrix_of(&numbers).map_err(|reason| lines.error(reason));
     }
-    Err(FormatError::at_line(1, "no line starts with `Tr:`, the pose of the lidar in the camera")
+    Err(FormatError::at_line(1, "there is no line `Tr:` with the pose of the lidar in the camera frame")
         .in_input(path))
 }

@@ -69,20 +69,20 @@ impl Direction {
         let starts_level = up(first.quaternion) > 0.94;
         if up(first.quaternion) < -0.7 {
             remarks.push(
-                "the first pose is upside down: does the sensor hang so? If w comes first in the quaternions, a first \
-                 line of names says so (# t tx ty tz qw qx qy qz)"
+                "the first pose is upside down: is the sensor mounted upside down? If the quaternions start with w, \
+                 add a header line (# t tx ty tz qw qx qy qz)"
                     .to_owned(),
             );
         } else if !has_calib && !names_calib && starts_level && self.is_along_z() {
             remarks.push(
-                "the poses go along their own z, as those of a camera do, not of a lidar on the ground: `calib` FILE \
-                 or `extrinsic` turns them into those of the sensor"
+                "the sensor moves along its z axis, like a camera and unlike a lidar on the ground: convert the poses \
+                 with `calib` FILE or `extrinsic`"
                     .to_owned(),
             );
         } else if has_calib && self.share(Y).is_some_and(|share| share > 0.9) && self.steps_m[Y] < 0.0 {
             remarks.push(
-                "with `calib` the poses go along their own -y: are they those of the lidar already? Leave `calib` out \
-                 then"
+                "with `calib` the sensor moves along its -y axis: if the poses are already those of the lidar, omit \
+                 `calib`"
                     .to_owned(),
             );
         }
@@ -110,7 +110,7 @@ mod tests {
     fn a_camera_goes_along_z() {
         let camera = way([0.01, 0.0, 0.9], 0.0);
         assert!(camera.is_along_z() && camera.may_be_of_camera());
-        assert!(camera.remarks(false, false).iter().any(|remark| remark.contains("along their own z")));
+        assert!(camera.remarks(false, false).iter().any(|remark| remark.contains("along its z axis")));
         assert!(camera.remarks(true, false).is_empty() && camera.remarks(false, true).is_empty());
         let lidar = way([0.9, 0.1, 0.05], 0.0);
         assert!(!lidar.is_along_z() && !lidar.may_be_of_camera());

@@ -71,11 +71,11 @@ fn remark_frame(
     let calib = may_need_calib.then(|| calib_for(file, folder)).flatten();
     let mut remarks = direction.remarks(options.calib.is_some(), calib.is_some());
     if let Some(calib) = calib {
-        let way = if direction.is_along_z() { ", and these go along z, as a camera does" } else { "" };
+        let way = if direction.is_along_z() { ", and these move along z like a camera" } else { "" };
         let calib = calib.display();
         remarks.push(format!(
-            "{calib} has Tr, where the lidar is in the camera: poses of the camera, as KITTI's own are{way}, need \
-             `calib` {calib}"
+            "{calib} contains Tr, the pose of the lidar in the camera frame: if these are poses of the camera, as in \
+             KITTI{way}, add `calib` {calib}"
         ));
     }
     remarks.into_iter().for_each(|remark| trajectory.remark(remark));
@@ -104,9 +104,9 @@ fn no_poses(path: &Path, folder: &Path) -> Error {
         more => format!(" ({} look like some)", more.join(", ")),
     };
     let reason = format!(
-        "has no poses: there is no poses_tum.txt or poses_kitti.txt in or beside it (nor a VIEWPOINT but the identity, if \
-         these are PCD files); name a file with `poses` FILE{found}, or say `poses` identity if all scans are in the \
-         world frame; `sensor_origin` X Y Z is for one station, `no_rays` for points alone"
+        "has no poses: there is no poses_tum.txt or poses_kitti.txt in it or its parent (PCD files have no VIEWPOINT \
+         except the identity); give a file with `poses` FILE{found}, or use `poses` identity if all scans are in the \
+         world frame, `sensor_origin` X Y Z for a single station, or `no_rays` for points without rays"
     );
     Error::argument(path.display().to_string(), reason)
 }

@@ -61,8 +61,8 @@ impl Names {
             let is_angle = |name: &str| name.split(['_', '.', ' ']).any(|part| ANGLES.contains(&part));
             return match names.iter().find(|(name, _)| is_angle(name)) {
                 Some((name, _)) => wrong(format!(
-                    "the column `{name:.40}` is an angle: roll, pitch and yaw have many conventions and are not read; \
-                     save quaternions (qx qy qz qw) or matrices"
+                    "the column `{name:.40}` is an angle: roll, pitch and yaw are not supported, because they have \
+                     many conventions; save quaternions (qx qy qz qw) or matrices"
                 )),
                 None => Self::Prose,
             };
@@ -73,7 +73,7 @@ impl Names {
                 Some((Some(unit), _)) => *place = unit,
                 Some((None, text)) if is_a_unit(text, words.get(at).map_or("", |word| word)) => {
                     let known = LengthUnit::KNOWN;
-                    return wrong(format!("`{text:.20}` is no unit of length that is known ({known})"));
+                    return wrong(format!("`{text:.20}` is an unknown unit of length; known units: {known}"));
                 }
                 _ => {}
             }
@@ -168,7 +168,7 @@ fn time_columns(names: &[(String, Option<String>)]) -> Result<Option<TimeColumns
     let Some(at) = named.or_else(|| part(&SECOND_NAMES)) else { return Ok(None) };
     match names.get(at).and_then(|(_, unit)| unit.as_deref()) {
         Some(unit @ ("min" | "mins" | "minutes" | "h" | "hours" | "d" | "days" | "m")) => {
-            Err(format!("`{unit}` is no unit of time that is known (ns, us, ms, s)"))
+            Err(format!("`{unit}` is an unknown unit of time; known units: ns, us, ms, s"))
         }
         unit => Ok(Some(TimeColumns::One(at, unit.and_then(TimeUnit::named).map(|unit| unit.digits)))),
     }
@@ -267,9 +267,9 @@ mod tests {
         }
         assert_eq!(roles("timestamp[us] x y z qx qy qz qw").and_then(|roles| roles.time), one(0, Some(3)));
         for (line, wanted) in [
-            ("t x[px] y[px] z[px] qx qy qz qw", "`px` is no unit of length"),
-            ("t x y z [furlong] qx qy qz qw", "`furlong` is no unit of length"),
-            ("t [min] x y z qx qy qz qw", "`min` is no unit of time"),
+            ("t x[px] y[px] z[px] qx qy qz qw", "`px` is an unknown unit of length"),
+            ("t x y z [furlong] qx qy qz qw", "`furlong` is an unknown unit of length"),
+            ("t [min] x y z qx qy qz qw", "`min` is an unknown unit of time"),
             ("t x y z roll pitch yaw", "`roll` is an angle"),
             ("time,x,y,z,rx [deg],ry [deg],rz [deg]", "`rx` is an angle"),
         ] {

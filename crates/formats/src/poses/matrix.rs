@@ -11,7 +11,7 @@ pub(crate) fn matrix_of(numbers: &[f64]) -> Result<RigidPose, String> {
         other => return Err(format!("{other} numbers; a matrix has 12 (3x4) or 16 (4x4)")),
     };
     if !numbers.iter().all(|number| number.is_finite()) {
-        return Err("the matrix holds what is not a finite number".into());
+        return Err("the matrix contains a number that is not finite".into());
     }
     if !last.is_empty()
         && last.iter().zip([0.0, 0.0, 0.0, 1.0]).any(|(found, wanted)| (found - wanted).abs() > 1e-6)
@@ -23,7 +23,7 @@ pub(crate) fn matrix_of(numbers: &[f64]) -> Result<RigidPose, String> {
     let error = (matrix * matrix.transpose() - Matrix3::identity()).abs().max();
     if !(error < MAX_ERROR && matrix.determinant() > 0.0) {
         return Err(format!(
-            "the matrix is no rotation (it is {error:.3} off, determinant {:.3})",
+            "the matrix is not a rotation (error {error:.3}, determinant {:.3})",
             matrix.determinant()
         ));
     }

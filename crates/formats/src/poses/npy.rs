@@ -8,9 +8,9 @@ use std::path::Path;
 use voxtile::{Error, FormatError, Result};
 
 const MAGIC: &[u8] = b"\x93NUMPY";
-const NO_ARRAY: &str = "is no array of NumPy, which its name says: save it with numpy.save, or give a text of poses a \
-                        name that ends with .txt or .csv";
-const CUT_HEADER: &str = "the file ends within its header; copy or save it again";
+const NO_ARRAY: &str = "is not a NumPy array in spite of its name: save it with numpy.save, or rename a text file of \
+                        poses to .txt or .csv";
+const CUT_HEADER: &str = "the file ends within its header: copy or save it again";
 /// Limit for the header; longer headers are rejected.
 const MAX_HEADER_BYTES: usize = 1 << 16;
 
@@ -31,7 +31,7 @@ pub(super) fn read(path: &Path, mut input: PoseInput, poses: &mut PoseRows) -> R
         _ => return Err(wrong(0, NO_ARRAY.into())),
     };
     if !(1..=3).contains(&version) {
-        let reason = "its version is none of 1, 2 and 3; save it again with numpy.save";
+        let reason = "its format version is not 1, 2 or 3: save it again with numpy.save";
         return Err(wrong(6, reason.into()));
     }
     let is_long = version >= 2;
@@ -40,7 +40,7 @@ pub(super) fn read(path: &Path, mut input: PoseInput, poses: &mut PoseRows) -> R
     input.read_exact(length_bytes).map_err(|_| wrong(8, CUT_HEADER.into()))?;
     let header_bytes = u32::from_le_bytes(length) as usize;
     if header_bytes > MAX_HEADER_BYTES {
-        return Err(wrong(8, format!("a header of {header_bytes} bytes is no header")));
+        return Err(wrong(8, format!("the header size of {header_bytes} bytes is invalid")));
     }
     let mut header = vec![0; header_bytes];
     input.read_exact(&mut header).map_err(|_| wrong(8, CUT_HEADER.into()))?;
@@ -99,10 +99,10 @@ fn stamp_of(time: f64, digits: &mut Option<i32>) -> Stamp {
 fn layout(header: &str) -> std::result::Result<(usize, u64, usize), String> {
     let value = |key: &str| header.split_once(key).map(|(_, rest)| rest.trim_start_matches([':', ' ']));
     let Some(descr) = value("'descr'") else {
-        return Err("its header names no type ('descr'); save it again with numpy.save".into());
+        return Err("its header has no type ('descr'): save it again with numpy.save".into());
     };
     if descr.starts_with('[') {
-        let reason = "is a structured array; save a plain one: \
+        let reason = "is a structured array: save a plain one with \
                       numpy.lib.recfunctions.structured_to_unstructured(poses)";
         return Err(reason.into());
     }
@@ -117,7 +117,7 @@ fn layout(header: &str) -> std::result::Result<(usize, u64, usize), String> {
         }
     };
     if value("'fortran_order'").is_some_and(|rest| rest.starts_with("True")) {
-        return Err("is in Fortran order; save numpy.ascontiguousarray(poses)".into());
+        return Err("is in Fortran order: save numpy.ascontiguousarray(poses)".into());
     }
     let shape =
         value("'shape'").and_then(|rest| rest.strip_prefix('(')?.split(')').next()).unwrap_or_default();
@@ -127,8 +127,8 @@ fn layout(header: &str) -> std::result::Result<(usize, u64, usize), String> {
         [rows, 12] | [rows, 3, 4] => Ok((width, rows, 12)),
         [rows, 16] | [rows, 4, 4] => Ok((width, rows, 16)),
         _ => Err(format!(
-            "has the shape ({shape}); poses are N x 8 (t x y z qx qy qz qw), N x 7 (without t), N x 3 x 4 or \
-             N x 4 x 4; roll, pitch and yaw are not read"
+            "has the shape ({shape}); poses are N x 8 (t x y z qx qy qz qw), N x 7 (without t), N x 3 x 4 or N x 4 x \
+             4; roll, pitch and yaw are not supported"
         )),
     }
 }

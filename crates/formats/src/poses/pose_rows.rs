@@ -222,8 +222,9 @@ impl PoseRows {
         let is_w_first = self.order.is_w_first();
         if is_w_first {
             stamps.remarks.push(
-                "no line names its columns, and its quaternions are read w first (qw qx qy qz), by which the sensor is \
-                 upright and turns about z; a first line `# t tx ty tz qx qy qz qw` has them read as TUM's"
+                "there is no header line, and the quaternions are read as qw qx qy qz, because the sensor is then \
+                 upright and turns about z; to read them as in TUM files, add the line `# t tx ty tz qx qy qz qw` at \
+                 the start"
                     .to_owned(),
             );
         }
@@ -237,7 +238,7 @@ impl PoseRows {
                 let twice = self.stamped.saturating_sub(sorted.len()).saturating_sub(lists.lost.len());
                 if twice > 0 && (self.back > 0 || self.still > 0) {
                     stamps.remarks.push(format!(
-                        "{twice} time stamps of poses occur again; the last pose of each is taken"
+                        "{twice} time stamps of poses are duplicates; the last pose of each is used"
                     ));
                 }
                 lists.by_time = Some(sorted);
@@ -253,14 +254,17 @@ impl PoseRows {
             let rows = lost + odd + words;
             let rows =
                 if rows == 1 { "1 row of poses is".to_owned() } else { format!("{rows} rows of poses are") };
-            remarks.push(format!("{rows} left out, the first: {first:#}"));
+            remarks.push(format!("{rows} invalid and skipped, the first: {first:#}"));
         }
         if let Some(first) = first_unstamped.as_ref().filter(|_| self.stamped > 0) {
-            remarks.push(format!("{unstamped} time stamps of poses cannot be read, the first: {first:#}"));
+            remarks.push(format!("{unstamped} time stamps of poses are invalid, the first: {first:#}"));
         }
         if self.back > 0 {
             let back = self.back;
-            remarks.push(format!("{back} time stamps of poses go back; the poses were sorted by time"));
+            remarks.push(format!(
+                "{back} time stamps of poses are earlier than the one before; the poses were sorted \
+                                  by time"
+            ));
         }
         remarks
     }

@@ -19,7 +19,7 @@ pub enum PoseSource {
 impl fmt::Display for PoseSource {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Scans => f.write_str("with each scan, in the input"),
+            Self::Scans => f.write_str("in the input, one per scan"),
             Self::File(path) => write!(f, "{}", path.display()),
             Self::Viewpoint => f.write_str("VIEWPOINT of each file"),
             Self::Missing => f.write_str("none"),

@@ -91,7 +91,7 @@ pub(crate) struct PosedClouds {
 }
 
 /// Why deskewing does not apply.
-const IN_WORLD: &str = "points that are in the world frame already have no motion left in them";
+const IN_WORLD: &str = "points in the world frame are already motion-compensated";
 /// Maximum number of reasons in a remark, and of cloud names for each reason.
 const MAX_NAMED: usize = 3;
 
@@ -105,7 +105,7 @@ impl PosedClouds {
         if options.is_deskewed && options.is_world_frame {
             return Err(Error::argument(
                 "deskew, world_frame",
-                format!("{IN_WORLD}; leave one of the two out"),
+                format!("{IN_WORLD}; omit one of the two options"),
             ));
         }
         if let CloudPoses::File(trajectory) = &poses
@@ -143,11 +143,9 @@ impl PosedClouds {
         let tolerance_ns = self.options.pose_tolerance_ns;
         Ok(match (&self.poses, head.stamp_ns) {
             (CloudPoses::Identity, _) => Ok(RigidPose::IDENTITY),
-            (CloudPoses::Missing, _) => {
-                Err("neither the input has poses nor a file of them was named".to_owned())
-            }
+            (CloudPoses::Missing, _) => Err("the input has no poses, and no pose file was given".to_owned()),
             (CloudPoses::Source(_), _) => {
-                head.world_from_sensor.ok_or_else(|| "the input has none for it".to_owned())
+                head.world_from_sensor.ok_or_else(|| "the input has no pose for it".to_owned())
             }
             (CloudPoses::File(trajectory), Some(stamp_ns)) if trajectory.has_stamps() => {
                 match trajectory.at(stamp_ns, tolerance_ns)? {
@@ -155,7 +153,7 @@ impl PosedClouds {
                     Found::Gap { gap_ns } => {
                         let gap_s = gap_ns as f64 * 1e-9;
                         Err(format!(
-                            "the poses around it are {gap_s:.3} s apart; `pose_tolerance` allows for more"
+                            "the poses around it are {gap_s:.3} s apart; `pose_tolerance` permits larger gaps"
                         ))
                     }
                     Found::Lost => Err("the pose at its time was lost".to_owned()),
@@ -294,8 +292,11 @@ fn outside(later_ns: i64, earlier_ns: i64, place: &str) -> String {
     let apart_s = (i128::from(later_ns) - i128::from(earlier_ns)) as f64 * 1e-9;
     // Tolerance for leap seconds and the duration of a drive.
     let is_clock = |clock_s: &f64| (apart_s - clock_s).abs() < 100_000.0;
-    let hint =
-        if CLOCKS_S.iter().any(is_clock) { "; do their clocks differ, as GPS and Unix time do?" } else { "" };
+    let hint = if CLOCKS_S.iter().any(is_clock) {
+        "; do the clocks differ, for instance GPS and Unix time?"
+    } else {
+        ""
+    };
     format!("it is {apart_s:.3} s {place}{hint}")
 }
 
@@ -335,8 +336,8 @@ impl ScanSource for PosedClouds {
                 why = self.source.remarks().into_iter().fold(why, |why, remark| why + "; " + &remark);
             }
             let reason = format!(
-                "none of its {} clouds has a pose ({why}); name a file of poses with `poses` FILE, or map points alone \
-                     with `no_rays`",
+                "none of its {} clouds has a pose ({why}); give a pose file with `poses` FILE, or map points without \
+                     rays with `no_rays`",
                 self.without_pose
             );
             return Err(Error::argument(self.path.display().to_string(), reason));
@@ -396,34 +397,33 @@ impl ScanSource for PosedClouds {
         if let Some(left) = self.poses_left() {
             let clouds = self.number;
             remarks.push(format!(
-                "{left} more poses than clouds ({clouds}): do the poses, which have no time stamps, begin with the first cloud?"
+                "there are {left} more poses than clouds ({clouds}), and the poses have no time stamps: does the first \
+                 pose belong to the first cloud?"
             ));
         }
         if self.without_pose > 0 {
             let clouds = if self.without_pose == 1 { "cloud has" } else { "clouds have" };
             let why = self.why_without_pose();
-            remarks.push(format!("{} {clouds} no pose, left out ({why})", self.without_pose));
+            remarks.push(format!("{} {clouds} no pose: skipped ({why})", self.without_pose));
         }
         if self.without_times > 0 {
             let clouds = if self.without_times == 1 { "cloud has" } else { "clouds have" };
             remarks.push(format!(
-                "{} {clouds} no times of points, or no stamp: `deskew` moved nothing there",
+                "{} {clouds} no point times or no stamp: `deskew` had no effect there",
                 self.without_times
             ));
         }
         if self.stayed > 0 {
             let points = if self.stayed == 1 { "point" } else { "points" };
-            remarks.push(format!(
-                "{} {points} stayed: no pose is known at their own times (`deskew`)",
-                self.stayed
-            ));
+            remarks
+                .push(format!("{} {points} not deskewed: there is no pose at their own times", self.stayed));
         }
         remarks
     }
 
     fn fingerprint(&self) -> Result<String> {
         if self.files.is_empty() {
-            let reason = "maps of earlier versions have no inputs of this kind";
+            let reason = "maps of older versions do not support this kind of input";
             return Err(Error::argument(self.path.display().to_string(), reason));
         }
         let mut fingerprint = Fingerprint::default();

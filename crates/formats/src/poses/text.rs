@@ -73,7 +73,7 @@ pub(super) fn read(
     }
     if !text.matrix.is_empty() {
         let reason =
-            format!("the file ends within a matrix of 4x4, after {} lines of it", text.matrix.len() / 4);
+            format!("the file ends within a 4x4 matrix, after {} of its lines", text.matrix.len() / 4);
         let bad = BadRow { reason, kind: BadKind::Words, stamp: Stamp::None };
         poses.push(Err(bad), |reason| lines.error(reason))?;
     }
@@ -100,8 +100,8 @@ pub(crate) fn looks_like_poses(start: &[u8]) -> bool {
 /// UTF-8 byte order mark, written by some Windows editors.
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 /// Supported forms of a pose, for messages.
-const FORMS: &str = "8 numbers (TUM: t x y z qx qy qz qw), 7 without t, 12 or 16 (KITTI: a matrix of 3x4 or 4x4), \
-                     one more with a time before a matrix, or a table whose first line names its columns";
+const FORMS: &str = "8 numbers (TUM: t x y z qx qy qz qw), 7 without t, 12 or 16 (a 3x4 or 4x4 matrix, as in KITTI), \
+                     one more if a time precedes the matrix, or a table with a header line";
 
 /// Content of a line.
 enum Taken {
@@ -182,7 +182,7 @@ impl TextPoses {
                 }
                 Names::Wrong { reason, .. } => Err(Bad::File(reason)),
                 Names::Prose => Err(no_row(format!(
-                    "`{line:.60}` is neither a pose nor names of columns: a pose is {FORMS}"
+                    "`{line:.60}` is neither a pose nor a header line: a pose is {FORMS}"
                 ))),
             };
         }
@@ -206,7 +206,7 @@ impl TextPoses {
                 }
                 Names::Poses(roles) if roles.is_w_first() => {
                     return Err(Bad::File(format!(
-                        "{} columns; the names before it are of {} or more, with w first",
+                        "{} columns, but the header line has {} or more and w first",
                         words.len(),
                         roles.last() + 1
                     )));
@@ -262,7 +262,7 @@ impl TextPoses {
             && found != columns
             && !(matches!(layout, Layout::Matrix { .. }) && found == columns + 4)
         {
-            let reason = format!("{found} numbers; the lines before have {columns}");
+            let reason = format!("{found} numbers, but the lines before have {columns}");
             // A truncated row was lost.
             let kind = if found < columns { BadKind::Lost } else { BadKind::Odd };
             let has_time = matches!(layout, Layout::Tum | Layout::Matrix { has_time: true });
@@ -318,7 +318,7 @@ impl TextPoses {
             (4, Ok(numbers)) => numbers,
             (4, Err((kind, reason))) => self.matrix_line_fault(kind, reason),
             (other, _) => {
-                self.matrix_line_fault(BadKind::Odd, format!("{other} numbers; the lines before have 4"))
+                self.matrix_line_fault(BadKind::Odd, format!("{other} numbers, but the lines before have 4"))
             }
         };
         self.matrix.extend(line);
@@ -370,11 +370,9 @@ fn no_row(reason: String) -> Bad {
 fn other_count(numbers: usize) -> String {
     let hint = match numbers {
         6 => {
-            "; roll, pitch and yaw are not read, as they have many conventions: save quaternions or matrices"
+            "; roll, pitch and yaw are not supported, because they have many conventions: save quaternions or matrices"
         }
-        9 => {
-            "; seconds and nanoseconds in two columns need a first line with names: sec nsec x y z qx qy qz qw"
-        }
+        9 => "; seconds and nanoseconds in two columns need the header line sec nsec x y z qx qy qz qw",
         _ => "",
     };
     format!("{numbers} numbers; a pose is {FORMS}{hint}")
@@ -402,7 +400,7 @@ pub(super) fn pose(numbers: [f64; 7], rules: Rules) -> Result<RigidPose, String>
     let length = (qx * qx + qy * qy + qz * qz + qw * qw).sqrt();
     if !pose.is_valid() || (rules == Rules::Strict && (length - 1.0).abs() > 0.1) {
         let hint =
-            if length.is_finite() && length > 1e-6 { "; are these angles, roll, pitch and yaw?" } else { "" };
+            if length.is_finite() && length > 1e-6 { "; are these roll, pitch and yaw angles?" } else { "" };
         let [qx, qy, qz, qw] = pose.quaternion.map(short);
         let length = if length < 1e6 { format!("{length:.3}") } else { short(length) };
         return Err(format!("the quaternion {qx} {qy} {qz} {qw} has length {length}, not 1{hint}"));

@@ -112,12 +112,12 @@ impl Trajectory {
         // Older versions matched the poses of PCD files by number, whatever the time column contained.
         let must_have_stamps = rules == Rules::Strict || !form.is_plain;
         let Some(mut trajectory) = rows.finish(path, must_have_stamps)? else {
-            return Err(Error::argument(path.display().to_string(), "holds no pose"));
+            return Err(Error::argument(path.display().to_string(), "contains no pose"));
         };
         trajectory.form = form;
         if let Some([x, y, z]) = form.unit {
             let units = if x == y && y == z { x.to_owned() } else { format!("{x}, {y} and {z}") };
-            trajectory.remarks.push(format!("positions are in {units} by the names of their columns"));
+            trajectory.remarks.push(format!("positions are in {units}, as stated in their column names"));
         }
         if let Some(calib) = calib {
             let camera_from_lidar = super::calib::read(calib)?;
@@ -296,9 +296,9 @@ impl Trajectory {
     pub fn check_order(&self) -> Result<()> {
         let Some(number) = self.goes_back else { return Ok(()) };
         let reason = format!(
-            "its time stamps go back (pose {number} is earlier than the one before), but there are no time stamps of \
-             clouds to compare with, and line by line these are the poses of the clouds in their order: put the lines \
-             in that order (stamps that mean nothing may all be 0)"
+            "its time stamps are not in order (pose {number} is earlier than the one before). The clouds have no time \
+             stamps, so poses are assigned line by line: sort the lines in the order of the clouds, or set all stamps \
+             to 0"
         );
         Err(Error::argument(self.path.display().to_string(), reason))
     }
@@ -311,14 +311,14 @@ impl Trajectory {
     fn other_number(&self, clouds: &str) -> Error {
         // The poses have stamps, but the names of the clouds contain none.
         let names = if self.is_stamped {
-            "; the names of the clouds tell no times (1700000000.123456789, 1700000000_123456789 and \
-             1700000000123456789 would)"
+            "; the file names of the clouds contain no times such as 1700000000.123456789, 1700000000_123456789 or \
+             1700000000123456789"
         } else {
             ""
         };
         let reason = format!(
-            "{} poses for {clouds}, which have no time stamps in common: there must be one pose a cloud, in \
-             their order (files in the natural order of their names, scan2 before scan10){names}",
+            "{} poses for {clouds}, and not both have time stamps: there must be one pose per cloud, in the same order \
+             (files in natural order, scan2 before scan10){names}",
             self.len()
         );
         Error::argument(self.path.display().to_string(), reason)

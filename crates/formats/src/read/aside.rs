@@ -156,8 +156,8 @@ pub(super) fn depth_list_of(path: &Path) -> Option<String> {
     let depth_at = line.split_ascii_whitespace().position(|word| word.contains("depth"))?;
     let name = name_of(path);
     Some(format!(
-        "{name} pairs images of colours and of depths; list the depths alone: \
-         `awk '!/^#/ {{print ${depth_at}, ${}}}' {name} > depth.txt`, or give the folder of the depth images",
+        "{name} pairs colour and depth images; list only the depth images: `awk '!/^#/ {{print ${depth_at}, ${}}}' \
+         {name} > depth.txt`, or use the folder of the depth images as the input",
         depth_at + 1
     ))
 }
@@ -199,7 +199,7 @@ fn other_than_cloud(path: &Path) -> Option<String> {
     }
     let (names, rows) = rows_of(&start);
     if are_poses(&names) {
-        return Some("poses, by the names of its columns".to_owned());
+        return Some("poses, by its column names".to_owned());
     }
     let all = |is_it: &dyn Fn(&[f64]) -> bool| rows.len() > 1 && rows.iter().all(|row| is_it(row));
     if names.is_empty() {
@@ -215,7 +215,7 @@ fn other_than_cloud(path: &Path) -> Option<String> {
         let is_later = |pair: &[Vec<f64>]| matches!(pair, [a, b] if first(a) < first(b));
         let are_times = all(&|row| row.first().is_some_and(|first| *first > MIN_STAMP));
         if are_times && rows.windows(2).all(is_later) {
-            return Some("a log: its first column is time".to_owned());
+            return Some("a log: its first column is a time".to_owned());
         }
         let quaternion = |row: &[f64]| match row {
             [_, _, _, _, rest @ ..] if rest.len() == 4 => {
@@ -228,7 +228,8 @@ fn other_than_cloud(path: &Path) -> Option<String> {
         }
     }
     let is_whole = (start.len() as u64) < GLANCE_BYTES;
-    (is_named(path) && is_whole && rows.len() <= FEW_ROWS).then(|| "a few numbers, as of a camera".to_owned())
+    (is_named(path) && is_whole && rows.len() <= FEW_ROWS)
+        .then(|| "a few numbers, possibly of a camera".to_owned())
 }
 
 /// Parses the column names at the start of a text and its first rows of numbers.
@@ -281,15 +282,15 @@ mod tests {
     fn texts_that_are_no_clouds_are_parted_from_clouds() {
         let clouds = [("scan_1.csv", "1,2,3\n"), ("scan_2.csv", "4,5,6\n4,5,7\n")];
         for (name, text, what) in [
-            ("imu.csv", "t,ax,ay,az\n0,1,2,3\n", "neither numbers nor names"),
+            ("imu.csv", "t,ax,ay,az\n0,1,2,3\n", "neither numbers nor column names"),
             ("cam.txt", "525 525 31.5 23.5\n", "a few numbers"),
             ("left_camera.txt", "525 0 31.5\n0 525 23.5\n0 0 1\n", "a few numbers"),
-            ("trajectory.csv", "t,x,y,z,qx,qy,qz,qw\n0,1,2,3,0,0,0,1\n", "poses, by the names"),
+            ("trajectory.csv", "t,x,y,z,qx,qy,qz,qw\n0,1,2,3,0,0,0,1\n", "poses, by its column names"),
             ("path.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 1 0 1 0 0 0 0 1 0\n", "its rows are matrices"),
-            ("log.txt", "1700000000.1 0 0 9.8\n1700000000.2 0 0 9.8\n", "its first column is time"),
+            ("log.txt", "1700000000.1 0 0 9.8\n1700000000.2 0 0 9.8\n", "its first column is a time"),
             ("gt_poses.txt", "0 1 2 3 0 0 0 1\n0.1 1 2 3 0 0 0 1\n", "end with quaternions"),
             ("stamps.txt", "0.1\n0.2\n0.3\n", "1 columns"),
-            ("remarks.txt", "made on Monday\n", "neither numbers nor names"),
+            ("remarks.txt", "made on Monday\n", "neither numbers nor column names"),
         ] {
             let (found, others) = sorted_out(&[clouds[0], clouds[1], (name, text)]);
             assert_eq!(found, ["scan_1.csv", "scan_2.csv"], "{name}");

@@ -92,7 +92,7 @@ pub(crate) fn open(
     if columns.names.len() > MAX_FIELDS {
         return Err(Error::argument(
             "fields",
-            format!("{} names; at most {MAX_FIELDS} are possible", columns.names.len()),
+            format!("{} names, but at most {MAX_FIELDS} are supported", columns.names.len()),
         ));
     }
     let meaning =
@@ -104,8 +104,8 @@ pub(crate) fn open(
         let kind =
             if columns.places.iter().all(|(_, kind)| *kind == Scalar::F32) { "floats" } else { "numbers" };
         let reason = format!(
-            "{bytes} bytes are no whole number of points of {} {kind} ({list}): name the columns of the file as fields, \
-             or it is cut off",
+            "{bytes} bytes are not a whole number of points of {} {kind} ({list}): give the correct columns with \
+             `fields`, or check whether the file is truncated",
             columns.names.len()
         );
         return Err(FormatError::at_offset(bytes - bytes % point_bytes, reason).in_input(path));
@@ -139,8 +139,8 @@ fn guess(path: &Path, is_nuscenes: bool, start: &[u8], bytes: u64) -> Result<Col
         && looks_like_nuscenes(start)
     {
         let reason = format!(
-            "its size fits {} floats a point ({}) and {}, and the last of {} are whole numbers, as of the ring of \
-             a sensor: name the columns of the file as fields, `fields` {} or {}",
+            "its size fits {} floats per point ({}) and {}, and the last of {} are integers like the ring of a sensor: \
+             give the columns with `fields` {} or {}",
             KITTI.len(),
             KITTI.join(", "),
             NUSCENES.len(),
@@ -155,16 +155,15 @@ fn guess(path: &Path, is_nuscenes: bool, start: &[u8], bytes: u64) -> Result<Col
         // The order of colour and time in 6 columns does not affect x, y and z.
         Verdict::Other(other) if matches!(other.columns, 3 | 4 | 6) => Ok(Columns::of_reading(other)),
         Verdict::Other(other) => Err(wrong(format!(
-            "its numbers repeat every {} of {}, not every {} of float32: name the columns of the file as fields, for \
-             instance `fields` {}",
+            "its numbers repeat every {} of {}, not every {} of float32: give its columns with `fields`, for instance \
+             `fields` {}",
             other.columns,
             other.type_name(),
             usual.columns,
             example(other)
         ))),
         Verdict::Either(one, other) => Err(wrong(format!(
-            "its numbers repeat every {} and every {} of {}: name the columns of the file as fields, `fields` {} or \
-             {}",
+            "its numbers repeat every {} and every {} of {}: give its columns with `fields` {} or {}",
             one.columns,
             other.columns,
             one.type_name(),
@@ -172,8 +171,8 @@ fn guess(path: &Path, is_nuscenes: bool, start: &[u8], bytes: u64) -> Result<Col
             example(other)
         ))),
         Verdict::Doubtful(other) if is_whole => Err(wrong(format!(
-            "read as {} columns of float32 ({}), its intensities are below 0, and {} columns fit as well: name the \
-             columns of the file as fields, `fields` {} or {}",
+            "read as {} columns of float32 ({}), its intensities are negative, and {} columns fit as well: give its \
+             columns with `fields` {} or {}",
             usual.columns,
             names.join(", "),
             other.columns,
@@ -199,7 +198,7 @@ fn said_of(columns: &Columns) -> String {
     let is_wide = columns.places.iter().any(|(_, kind)| *kind == Scalar::F64);
     let known: Vec<&str> =
         columns.names.iter().map(String::as_str).filter(|name| NUSCENES.contains(name)).collect();
-    let rest = if known.len() < count { ", the rest is not read (`fields` names them)" } else { "" };
+    let rest = if known.len() < count { ", the others are ignored (set with `fields`)" } else { "" };
     format!("{count} columns of {}: {}{rest}", if is_wide { "float64" } else { "float32" }, known.join(" "))
 }
 

@@ -63,7 +63,7 @@ impl<'b> BinStart<'b> {
     pub(super) fn judge(&self, reading: Reading) -> Verdict {
         let is_text = |byte: &u8| byte.is_ascii_graphic() || byte.is_ascii_whitespace();
         if self.bytes.len() >= FEW_POINTS && self.bytes.iter().all(is_text) {
-            return Verdict::Wrong("its bytes are text: read it with `format` xyz");
+            return Verdict::Wrong("it is a text file: read it with `format` xyz");
         }
         let floats = self.values(Scalar::F32, false);
         let doubles = self.values(Scalar::F64, false);
@@ -79,12 +79,12 @@ impl<'b> BinStart<'b> {
                 Verdict::Other(best)
             } else {
                 Verdict::Wrong(
-                    "its numbers are float64: name its columns as fields, for instance `fields` x:f64,y:f64,z:f64",
+                    "its numbers are float64: give its columns, for instance `fields` x:f64,y:f64,z:f64",
                 )
             };
         }
         if plausible(&floats) < HARDLY_ANY && plausible(&self.values(Scalar::F32, true)) >= NEARLY_ALL {
-            return Verdict::Wrong("its numbers are big-endian: write it little-endian, `astype('<f4')`");
+            return Verdict::Wrong("its numbers are big-endian: write it as little-endian, `astype('<f4')`");
         }
         if floats.len() < FEW_POINTS * reading.columns {
             return Verdict::Right;

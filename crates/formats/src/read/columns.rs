@@ -74,7 +74,8 @@ impl<'n> Column<'n> {
         };
         LengthUnit::named(unit).map(Some).ok_or_else(|| {
             format!(
-                "column `{:.40}`: `{unit:.20}` is no known unit of length; known are {}: convert the column and name it so",
+                "column `{:.40}`: `{unit:.20}` is an unknown unit of length: convert the column to a known one ({}) \
+                 and rename it",
                 self.written,
                 LengthUnit::KNOWN
             )
@@ -143,7 +144,7 @@ impl Meaning {
         } else {
             format!("x is in {x}, y in {y}, z in {z}")
         };
-        Some(format!("coordinates become metres: {units}, by the names of their columns"))
+        Some(format!("coordinates are converted to metres: {units} according to the column names"))
     }
 
     fn all(&self) -> impl Iterator<Item = usize> {
@@ -172,7 +173,7 @@ fn units_of(columns: [Option<&Column>; 3]) -> Result<[LengthUnit; 3], String> {
     let without = units.iter().zip(columns).find(|(unit, _)| unit.is_none());
     if let (Some((_, Some(other))), Some((_, Some(without)))) = (other, without) {
         return Err(format!(
-            "column `{:.40}` has a unit and `{:.40}` has none: name the unit of each coordinate",
+            "column `{:.40}` has a unit and `{:.40}` has none: add the unit to every coordinate",
             other.written, without.written
         ));
     }
@@ -292,10 +293,10 @@ mod tests {
             assert!(found.contains(remark) && found.is_empty() == remark.is_empty(), "{list:?}: {found}");
         }
         for (list, reason) in [
-            (["x (px)", "y (px)", "z (px)"], "column `x (px)`: `px` is no known unit of length"),
-            (["x [deg]", "y [deg]", "z [m]"], "`deg` is no known unit"),
+            (["x (px)", "y (px)", "z (px)"], "column `x (px)`: `px` is an unknown unit of length"),
+            (["x [deg]", "y [deg]", "z [m]"], "`deg` is an unknown unit"),
             (["x (cm)", "y", "z"], "column `x (cm)` has a unit and `y` has none"),
-            (["x_ms", "y_ms", "z_ms"], "`ms` is no known unit of length"),
+            (["x_ms", "y_ms", "z_ms"], "`ms` is an unknown unit of length"),
         ] {
             let error = Meaning::of(&names(&list), |_| false).unwrap_err();
             assert!(error.contains(reason), "{error}");

@@ -82,9 +82,9 @@ impl Frames for ImageFrames {
         if lost == 0 {
             return self.stamps.remark().into_iter().collect();
         }
-        let mut remark = format!("{lost} images have a pose that is not a number: tracking was lost there");
+        let mut remark = format!("{lost} images have a pose of NaN, because tracking was lost");
         if let Some(first) = &self.first_bad {
-            remark = format!("{lost} images have a pose that is lost or cannot be read: {first}");
+            remark = format!("{lost} images have an invalid pose or none: {first}");
         }
         self.stamps.remark().into_iter().chain([remark]).collect()
     }
@@ -105,7 +105,7 @@ fn pose(path: &Path) -> Result<Option<RigidPose>> {
         numbers.push(number.map_err(|_| wrong(format!("`{word:.40}` is not a number")))?);
     }
     if numbers.len() != 16 {
-        return Err(wrong(format!("{} numbers; a pose is a matrix of 4x4", numbers.len())));
+        return Err(wrong(format!("{} numbers; a pose is a 4x4 matrix", numbers.len())));
     }
     if !numbers.iter().all(|number| number.is_finite()) {
         return Ok(None);

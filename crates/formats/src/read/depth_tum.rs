@@ -59,8 +59,9 @@ impl Frames for TumFrames {
             }
             match frame(line) {
                 Ok((_, file)) if !is_inside(Path::new(file)) => {
-                    let reason =
-                        format!("`{file:.80}` leads out of the folder; name images in it, as depth/1.png");
+                    let reason = format!(
+                        "`{file:.80}` is outside of the folder; images must be in it, for instance depth/1.png"
+                    );
                     return Err(self.lines.error(reason));
                 }
                 Ok((stamp_ns, file)) => {
@@ -84,16 +85,16 @@ impl Frames for TumFrames {
     fn remarks(&self) -> Vec<String> {
         let Some(first) = &self.first_bad else { return Vec::new() };
         let lines = if self.bad == 1 { "1 line is".to_owned() } else { format!("{} lines are", self.bad) };
-        vec![format!("{lines} left out, the first: {first:#}")]
+        vec![format!("{lines} invalid and skipped, the first: {first:#}")]
     }
 }
 
 /// Parses the stamp and the file name of a line.
 fn frame(line: &str) -> std::result::Result<(i64, &str), String> {
     let Some((stamp, file)) = line.split_once([' ', '\t', ',']) else {
-        return Err("a line has a time stamp in seconds and the file of a depth image".into());
+        return Err("a line must have a time stamp in seconds and the file name of a depth image".into());
     };
     let stamp_ns =
-        stamp::of_seconds(stamp).ok_or_else(|| format!("`{stamp:.40}` is no time stamp in seconds"))?;
+        stamp::of_seconds(stamp).ok_or_else(|| format!("`{stamp:.40}` is not a time stamp in seconds"))?;
     Ok((stamp_ns, file.trim()))
 }

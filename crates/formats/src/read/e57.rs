@@ -43,16 +43,14 @@ pub(crate) fn open(path: &Path, options: &ReadOptions) -> Result<Box<dyn CloudSo
     let units = crs.as_deref().map(WktUnits::of);
     if units.is_some_and(|units| [units.flat, units.high].iter().flatten().any(|unit| unit.metres != 1.0)) {
         crs = None;
-        remarks.push(
-            "the coordinate system is not in metres as the points are, and the output does not name it"
-                .into(),
-        );
+        remarks
+            .push("the coordinate system is not in metres, unlike the points, and is not passed on".into());
     }
     let bare = scans.iter().filter(|scan| scan.transform.is_none()).count();
     if bare > 0 && !has_origin {
         remarks.push(format!(
-            "{bare} of {} scans have no pose: their points are in the frame of the file, and without `poses` or \
-             `sensor_origin` the sensor is taken to be at its origin",
+            "{bare} of {} scans have no pose: their points are in the frame of the file, and the sensor is assumed at \
+             its origin unless `poses` or `sensor_origin` is given",
             scans.len()
         ));
     }
@@ -74,10 +72,10 @@ fn check_xml(path: &Path, file: &mut File, budget: &Budget) -> Result<()> {
     let [start, bytes, page_bytes] = [24, 32, 40].map(number);
     let wrong = |at: u64, reason: String| Err(FormatError::at_offset(at, reason).in_input(path));
     if header.len() < HEADER_BYTES || !header.starts_with(SIGNATURE) {
-        return wrong(0, "it is no E57 file, or is cut off; copy it again".to_owned());
+        return wrong(0, "it is not an E57 file, or is truncated: copy it again".to_owned());
     }
     if page_bytes != PAGE_BYTES {
-        return wrong(40, format!("pages of {page_bytes} bytes; those of E57 have {PAGE_BYTES}"));
+        return wrong(40, format!("the page size is {page_bytes} bytes; E57 files have {PAGE_BYTES}"));
     }
     let mut text = Pages::new(&mut *file, start).map_err(fail)?.take(bytes);
     let (mut check, mut buffer) = (XmlCheck::default(), vec![0; PAGE_BYTES as usize]);
@@ -90,7 +88,7 @@ fn check_xml(path: &Path, file: &mut File, budget: &Budget) -> Result<()> {
         let needed = check.nodes.saturating_mul(NODE_BYTES).saturating_add(bytes.saturating_mul(3));
         if needed > budget.whole_bytes() {
             let reason = format!(
-                "its description of {bytes} bytes would take more than {} bytes of memory: raise `memory`, or split \
+                "its XML section of {bytes} bytes would need more than {} bytes of memory: raise `memory`, or split \
                  the file",
                 budget.whole_bytes()
             );
@@ -178,7 +176,7 @@ impl CloudSource for E57 {
         }
         if scan.prototype.len() > MAX_FIELDS {
             let reason = format!(
-                "a point has {} fields, at most {MAX_FIELDS} are read: export the scan with fewer fields",
+                "a point has {} fields, but at most {MAX_FIELDS} are supported: export the scan with fewer fields",
                 scan.prototype.len()
             );
             return Err(FormatError::at_record(0, reason).in_input(&self.path));
@@ -189,8 +187,8 @@ impl CloudSource for E57 {
             FormatError::at_record(done, reason).in_input(path)
         };
         if scan.records > 0 && !has_bits(scan) {
-            let reason = "every field of its points has a minimum that is its maximum, so that points take no bytes \
-                          and cannot be counted; write the scan again with a wider range of x, y or z";
+            let reason = "every field has equal minimum and maximum, so its points take no bytes and cannot be \
+                          counted: write the scan again with a wider range of x, y or z";
             return Err(wrong(0, reason.into()));
         }
         check_packets(path, scan, &self.budget)?;

@@ -32,7 +32,7 @@ pub(super) fn check_packets(path: &Path, scan: &PointCloud, budget: &Budget) -> 
         Ok(None) => Ok(()),
         Ok(Some(needed)) => {
             let reason = format!(
-                "a packet of points would take {needed} bytes of memory: raise `memory`, or write the file again with \
+                "a packet of points would need {needed} bytes of memory: raise `memory`, or write the file again with \
                  smaller packets"
             );
             Err(FormatError::at_record(packets.points, reason).in_input(path))

@@ -57,7 +57,7 @@ impl Remarks {
             (_, 1) => format!("{file} and another file: {remark}"),
             _ => format!("{file} and {others} other files: {remark}"),
         };
-        let more = self.are_more.then(|| "there is more to say of other files".to_owned());
+        let more = self.are_more.then(|| "there are more remarks on other files".to_owned());
         self.said.iter().map(line).chain(more).collect()
     }
 }
@@ -103,8 +103,8 @@ impl Files {
         match &self.crs {
             Some(first) if first != crs => {
                 let reason = format!(
-                    "its coordinates are in {crs:.80}, those of the files before it in {first:.80}; convert it \
-                     first, for instance with pdal, or map it on its own"
+                    "its coordinates are in {crs:.80}, but those of the previous files are in {first:.80}: convert it \
+                     first, for instance with pdal, or build a separate map"
                 );
                 return Err(Error::argument(path.display().to_string(), reason));
             }
@@ -113,8 +113,8 @@ impl Files {
         }
         if !is_first {
             let remark = format!(
-                "names the coordinate system {crs:.80}, the files before it name none; are their points in it, and does \
-                 the map name it (`voxtile info`)? Read this file first otherwise"
+                "names the coordinate system {crs:.80}, but the previous files name none: check that their points are \
+                 in it, and that the map names it (`voxtile info`); otherwise read this file first"
             );
             self.remarks.add(name_of(path), remark);
         }

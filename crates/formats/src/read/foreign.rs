@@ -16,16 +16,16 @@ impl Foreign {
     pub(crate) fn error(&self, path: &Path) -> Error {
         Error::argument(
             path.display().to_string(),
-            format!("is {}, which is not read: {}", self.name, self.way),
+            format!("is {}, which is not supported: {}", self.name, self.way),
         )
     }
 }
 
 const TO_CLOUD: &str =
     "sample points of its surface (CloudCompare, MeshLab) and save them as PLY, LAS or PCD";
-const UNPACK: &str = "unpack it and give the files inside";
+const UNPACK: &str = "unpack it and use the files inside";
 const PACKETS: &str =
-    "let the sensor's own tool (or its ROS driver) make clouds of it: PCD, PLY, .bag or .mcap";
+    "convert it to clouds (PCD, PLY, .bag or .mcap) with the sensor's software or its ROS driver";
 
 const FOREIGN: [Foreign; 27] = [
     Foreign {
@@ -50,14 +50,14 @@ const FOREIGN: [Foreign; 27] = [
         name: "a NumPy array",
         magic: &[b"\x93NUMPY"],
         extensions: &["npy"],
-        way: "write it as .bin, `array.astype('<f4').tofile(...)`, and name its columns as fields; poses are read from \
-              .npy",
+        way: "write it as .bin, `array.astype('<f4').tofile(...)`, and give its columns with `fields`; only poses are \
+              read from .npy",
     },
     Foreign {
         name: "one image",
         magic: &[b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff", b"II*\0", b"MM\0*"],
         extensions: &["png", "jpg", "jpeg", "tif", "tiff", "pgm"],
-        way: "give the folder of 16-bit depth PNGs that it is in",
+        way: "use the folder of 16-bit depth PNGs as the input",
     },
     Foreign {
         name: "a ZIP archive",
@@ -93,42 +93,42 @@ const FOREIGN: [Foreign; 27] = [
         name: "a map (OctoMap)",
         magic: &[b"# Octomap OcTree"],
         extensions: &["bt", "ot"],
-        way: "it holds no clouds; `voxtile import FILE -o MAP` makes a map of it, and info, query, raycast and export take \
-              the file itself",
+        way: "it contains no clouds; convert it to a map with `voxtile import FILE -o MAP`, or use it directly with \
+              info, query, raycast and export",
     },
     Foreign {
         name: "OpenVDB",
         magic: &[b" BDV"],
         extensions: &["vdb"],
-        way: "it holds volumes, no clouds; write its points as PLY",
+        way: "it contains volumes, not clouds; write its points as PLY",
     },
     Foreign {
-        name: "a project of a scanner's maker",
+        name: "a scanner manufacturer's project",
         magic: &[],
         extensions: &["rcp", "rcs", "fls", "zfs", "rdbx", "rxp", "lgs", "ptg", "ptx", "3dd"],
-        way: "export it there as E57 or LAS",
+        way: "export it as E57 or LAS with the manufacturer's software",
     },
     Foreign {
-        name: "a recording of Livox",
+        name: "a Livox recording",
         magic: &[b"livox_tech"],
         extensions: &["lvx", "lvx2"],
-        way: "Livox Viewer exports LAS and CSV; its driver records .bag",
+        way: "export LAS or CSV with Livox Viewer, or record a .bag with the driver",
     },
-    Foreign { name: "packets of Ouster", magic: &[], extensions: &["osf"], way: PACKETS },
+    Foreign { name: "Ouster packets", magic: &[], extensions: &["osf"], way: PACKETS },
     Foreign {
         name: "CloudCompare's own format",
         magic: &[b"CCB"],
         extensions: &["sbf", "bin2"],
-        way: "CloudCompare saves it as PLY, LAS or E57",
+        way: "save it as PLY, LAS or E57 with CloudCompare",
     },
     Foreign {
         name: "a point cloud for the web",
         magic: &[],
         extensions: &["pnts", "ept", "slpk"],
-        way: "give the LAZ or COPC that it was made of",
+        way: "use the LAZ or COPC file that it was created from",
     },
     Foreign {
-        name: "a table of Excel or MATLAB",
+        name: "an Excel or MATLAB table",
         magic: &[b"MATLAB 5.0"],
         extensions: &["mat", "xlsx", "xls"],
         way: "save x, y, z and intensity as CSV",
@@ -159,20 +159,20 @@ pub(crate) fn stand_in(start: &[u8]) -> Option<&'static str> {
     let starts =
         |word: &str| text.get(..word.len()).is_some_and(|start| start.eq_ignore_ascii_case(word.as_bytes()));
     if starts("version https://git-lfs.") || starts("version https://hawser.") {
-        return Some("is a Git LFS pointer, not the file itself: fetch it with `git lfs pull`");
+        return Some("is a Git LFS pointer, not the file itself: get it with `git lfs pull`");
     }
     if starts("/annex/objects/") {
-        return Some("is a pointer of git-annex, not the file itself: fetch it with `git annex get`");
+        return Some("is a git-annex pointer, not the file itself: get it with `git annex get`");
     }
     if ["<!doctype html", "<html", "<head", "<body", "<!-- saved from url"].iter().any(|tag| starts(tag)) {
         return Some(
-            "is a page of HTML, not data: the download gave a web page, perhaps a login or an error; open it in a \
+            "is an HTML page, not data: the download returned a web page, possibly a login or an error; open it in a \
              browser and download the file itself",
         );
     }
     if starts("<?xml") || starts("<Error>") {
         return Some(
-            "is XML, not data: the download gave an error or a list; open it in an editor to see which",
+            "is XML, not data: the download returned an error or a list; open it in an editor to see the reason",
         );
     }
     None
@@ -206,7 +206,7 @@ pub(crate) fn beginning_of(start: &[u8]) -> String {
     }
     let are_zeros = !start.is_empty() && start.iter().all(|byte| *byte == 0);
     if are_zeros {
-        "; it starts with zeros: was a copy or a download cut off?".to_owned()
+        "; it starts with zeros: was a copy or a download interrupted?".to_owned()
     } else {
         String::new()
     }
@@ -222,8 +222,8 @@ mod tests {
             (&b"version https://git-lfs.github.com/spec/v1\noid sha256:0\n"[..], "git lfs pull"),
             (b"version https://hawser.github.com/spec/v1\n", "git lfs pull"),
             (b"/annex/objects/SHA256E-s1--0\n", "git annex get"),
-            (b"\xef\xbb\xbf\r\n<!DOCTYPE HTML><html>", "is a page of HTML"),
-            (b"<html lang=\"en\">", "is a page of HTML"),
+            (b"\xef\xbb\xbf\r\n<!DOCTYPE HTML><html>", "is an HTML page"),
+            (b"<html lang=\"en\">", "is an HTML page"),
             (b"<?xml version=\"1.0\"?><Error>", "is XML"),
         ] {
             assert!(stand_in(start).is_some_and(|found| found.contains(what)), "{what}");

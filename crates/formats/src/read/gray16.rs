@@ -20,12 +20,13 @@ pub(crate) fn open<R: BufRead + Seek>(input: R) -> Result<png::Reader<R>, Wrong>
     let info = reader.info();
     if (info.bit_depth, info.color_type) != (png::BitDepth::Sixteen, png::ColorType::Grayscale) {
         let (color, bits) = (info.color_type, info.bit_depth);
-        let reason =
-            format!("is no depth image: those are grey with 16 bits, this one is {color:?} with {bits:?}");
+        let reason = format!(
+            "is not a depth image: depth images are 16-bit grey, this one is {color:?} with {bits:?}"
+        );
         return Err((KIND_AT, reason));
     }
     if info.interlaced {
-        return Err((KIND_AT, "is interlaced; save it without".into()));
+        return Err((KIND_AT, "is interlaced: save it without interlacing".into()));
     }
     Ok(reader)
 }

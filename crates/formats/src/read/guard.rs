@@ -12,9 +12,7 @@ thread_local! {
 #[cfg(any(feature = "las", feature = "e57"))]
 pub(crate) fn guarded<T, E: std::fmt::Display>(call: impl FnOnce() -> Result<T, E>) -> Result<T, String> {
     catch(call).map_or_else(
-        |place| {
-            Err(format!("its decoder gave up ({place}): the file is damaged, or of a kind it does not know"))
-        },
+        |place| Err(format!("its decoder failed ({place}): the file is damaged or of an unsupported kind")),
         |result| result.map_err(|error| error.to_string()),
     )
 }
@@ -67,7 +65,7 @@ mod tests {
             );
             panic!("outer")
         });
-        assert!(inner.unwrap_err().contains("its decoder gave up (guard.rs:"));
+        assert!(inner.unwrap_err().contains("its decoder failed (guard.rs:"));
         assert_eq!(guarded(|| Ok::<_, String>(5)), Ok(5));
         assert_eq!(guarded(|| Err::<(), _>("no")), Err("no".to_owned()));
         PANICS.with_borrow(|panics| assert!(panics.is_empty()));

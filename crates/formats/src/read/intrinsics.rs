@@ -54,21 +54,22 @@ impl Intrinsics {
         match numbers.as_slice() {
             &[fx, skew, cx, zero, fy, cy, a, b, one] => {
                 if (skew, zero, a, b, one) != (0.0, 0.0, 0.0, 0.0, 1.0) {
-                    return wrong("the matrix is not fx 0 cx, 0 fy cy, 0 0 1: skewed cameras are not known");
+                    return wrong(
+                        "the matrix is not fx 0 cx, 0 fy cy, 0 0 1: cameras with skew are not supported",
+                    );
                 }
                 Self::new([fx, fy, cx, cy])
             }
             &[fx, fy, cx, cy] => Self::new([fx, fy, cx, cy]),
             &[fx, fy, cx, cy, ref distortion @ ..] if distortion.len() <= 5 => {
                 if distortion.iter().any(|number| *number != 0.0) {
-                    return wrong("the camera has a distortion: rectify the images first");
+                    return wrong("the camera has distortion: rectify the images first");
                 }
                 Self::new([fx, fy, cx, cy])
             }
-            other => wrong(&format!(
-                "{} numbers; a camera is a matrix of 3x3, or fx fy cx cy, in pixels",
-                other.len()
-            )),
+            other => {
+                wrong(&format!("{} numbers; a camera is a 3x3 matrix or fx fy cx cy, in pixels", other.len()))
+            }
         }
     }
 
@@ -83,8 +84,8 @@ impl Intrinsics {
         let found = paths.find(|path| path.exists() && !path.is_dir());
         let Some(path) = found else {
             let reason = format!(
-                "depth images need the camera: name a file with fx fy cx cy in pixels, or with a matrix of 3x3, by \
-                 `intrinsics` FILE, or put it in the folder or beside it as {}",
+                "depth images need camera intrinsics: give a file with fx fy cx cy in pixels or a 3x3 matrix with \
+                 `intrinsics` FILE, or put it in the folder or its parent as {}",
                 NAMES.join(" or ")
             );
             return Err(Error::argument(folder.display().to_string(), reason));

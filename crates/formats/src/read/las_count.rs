@@ -26,7 +26,7 @@ impl Counts {
     pub(super) fn remark(&self, taken: u64) -> Option<String> {
         let large = self.large.filter(|large| *large > 0 && self.legacy > 0 && *large != self.legacy)?;
         Some(format!(
-            "the header has two numbers of points, {} and {large}: {taken} are there and are read",
+            "the header has two point counts, {} and {large}: {taken} points exist and are read",
             self.legacy
         ))
     }
@@ -64,11 +64,11 @@ pub(super) fn settle(path: &Path, file: &mut File, layout: &mut Layout) -> Resul
         let are_points = are_points(file, layout, announced, room);
         if are_points.map_err(|error| Error::io(path, "read", error))? {
             layout.points = room;
-            remark = Some(format!("the header announces {announced} points; {room} are there and are read"));
+            remark = Some(format!("the header announces {announced} points; {room} exist and are read"));
         } else {
             let behind = room - announced;
             remark = Some(format!(
-                "the header announces {announced} points, which are read; the file has room for {behind} more behind \
+                "the header announces {announced} points, which are read; the file has space for {behind} more after \
                  them"
             ));
         }
@@ -80,13 +80,13 @@ pub(super) fn settle(path: &Path, file: &mut File, layout: &mut Layout) -> Resul
 /// Returns a remark on a file whose writer stopped before writing the point count.
 pub(super) fn stopped(there: u64) -> String {
     format!(
-        "the header announces no points, as a writer leaves it that was stopped: the {there} that are there are read"
+        "the header announces no points, because its writer was interrupted: the {there} points that exist are read"
     )
 }
 
 /// Returns a remark on a truncated file.
 pub(super) fn cut_off(read: u64, announced: u64) -> String {
-    format!("the file is cut off: {read} of {announced} points are there and are read")
+    format!("the file is truncated: {read} of {announced} points exist and are read")
 }
 
 /// Returns whether the records after the announced points are points too: not all zero, and close to the header's

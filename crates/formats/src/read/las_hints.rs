@@ -24,15 +24,15 @@ pub(super) fn hints(layout: &Layout, units: &Units) -> Option<String> {
     let is_finer = z_scale >= 100.0 * x_scale.max(y_scale);
     if are_angles && x_scale.max(y_scale) <= MAX_DEGREE_SCALE && (is_finer || is_narrow) {
         return Some(format!(
-            "x and y look like degrees ({} to {}, {} to {}, in steps of {x_scale}) and are taken as metres, as no \
-             coordinate system is named; if they are, project the file first (PDAL: filters.reprojection)",
+            "x and y look like degrees ({} to {}, {} to {}, in steps of {x_scale}) and are read as metres, because the \
+             file names no coordinate system; if they are degrees, project the file first (PDAL: filters.reprojection)",
             x.0, x.1, y.0, y.1
         ));
     }
     (z_span > MAX_HEIGHT_M || x_span.max(y_span) > MAX_WIDTH_M).then(|| {
         format!(
-            "the points span {x_span} by {y_span} by {z_span} m, as no unit is named: if they are millimetres or feet, \
-             scale them first"
+            "the points span {x_span} by {y_span} by {z_span} m, assuming metres because the file names no unit: if \
+             they are millimetres or feet, scale them first"
         )
     })
 }

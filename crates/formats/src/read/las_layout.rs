@@ -63,7 +63,7 @@ impl Layout {
         file.take(HEADER_BYTES as u64).read_to_end(&mut header).map_err(fail)?;
         let wrong = |at: u64, reason: String| FormatError::at_offset(at, reason).in_input(path);
         if !header.starts_with(b"LASF") || (header.len() as u64) < SHORT_HEADER_BYTES {
-            return Err(wrong(0, "the file ends within its header, or is no LAS".into()));
+            return Err(wrong(0, "the file ends within its header, or is not a LAS file".into()));
         }
         let (minor, header_bytes) = (number(&header, 25, 1), number(&header, 94, 2));
         let points_at = number(&header, 96, 4);
@@ -75,16 +75,18 @@ impl Layout {
         let counts =
             Counts { legacy: number(&header, 107, 4), large: is_long.then(|| number(&header, 247, 8)) };
         if points_at < header_bytes || points_at > file_bytes {
-            let reason = format!("points begin at byte {points_at} of a file of {file_bytes} bytes");
+            let reason = format!("points begin at byte {points_at}, but the file has {file_bytes} bytes");
             return Err(wrong(96, reason));
         }
         let is_compressed = format & COMPRESSED != 0;
         let id = format & !COMPRESSED;
         let Some(least_bytes) = POINT_BYTES.get(id as usize) else {
-            return Err(wrong(104, format!("points have format {id}; formats 0 to 10 are known")));
+            return Err(wrong(104, format!("point format {id} is unknown; formats 0 to 10 are supported")));
         };
         if record_bytes < *least_bytes {
-            let reason = format!("points of format {id} take {least_bytes} bytes, not {record_bytes}");
+            let reason = format!(
+                "points of format {id} have {least_bytes} bytes, but the header states {record_bytes}"
+            );
             return Err(wrong(105, reason));
         }
         check_scales(&header).map_err(|(at, reason)| wrong(at, reason))?;
@@ -113,7 +115,7 @@ impl Layout {
         let found = before.read(file, &mut self.records)?;
         if found != count {
             self.remarks.push(format!(
-                "the header announces {count} records before the points; {found} are there and are used"
+                "the header announces {count} records before the points; {found} exist and are used"
             ));
         }
         let (start, count) = (number(&self.header, 235, 8), number(&self.header, 243, 4));
@@ -122,7 +124,7 @@ impl Layout {
             let found = if start >= self.points_at { behind.read(file, &mut self.records)? } else { 0 };
             if found != count {
                 self.remarks.push(format!(
-                    "the header announces {count} records behind the points; {found} are there and are used"
+                    "the header announces {count} records after the points; {found} exist and are used"
                 ));
             }
         }
@@ -192,7 +194,10 @@ fn check_scales(header: &[u8]) -> std::result::Result<(), (u64, String)> {
         let (at, what) = (SCALES_AT + 8 * k, if k < 3 { "scale" } else { "offset" });
         let value = double(header, at);
         if !(value.abs() < MAX_COORDINATE && (value != 0.0 || what == "offset")) {
-            return Err((at as u64, format!("the {what} of {axis} is {value}: no coordinates come of it")));
+            return Err((
+                at as u64,
+                format!("the {what} of {axis} is {value}, which does not give valid coordinates"),
+            ));
         }
     }
     Ok(())

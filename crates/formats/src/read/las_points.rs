@@ -125,9 +125,8 @@ impl LasPoints {
 
     /// Returns remarks for the user about the points read.
     pub(super) fn remarks(&self) -> Vec<String> {
-        let withheld = (self.withheld > 0).then(|| {
-            format!("{} points are marked as withheld, that is deleted, and are left out", self.withheld)
-        });
+        let withheld = (self.withheld > 0)
+            .then(|| format!("{} points are marked as withheld (deleted) and were skipped", self.withheld));
         let cut = self.is_cut.then(|| cut_off(self.done, self.points));
         withheld.into_iter().chain(cut).collect()
     }

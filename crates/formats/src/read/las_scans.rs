@@ -82,13 +82,13 @@ impl LasScans {
         }
         self.remarks.extend(points.remarks());
         if timeless > 0 && timeless == number {
-            let reason = "no GPS time of its points is a number: read it as one cloud with `scan_period` 0";
+            let reason = "no point has a valid GPS time: read it as one cloud with `scan_period` 0";
             return Err(FormatError::at_record(first_timeless, reason).in_input(&self.path));
         }
         if timeless > 0 {
             self.remarks.push(format!(
-                "{timeless} of {number} points have a GPS time that is not a number and are left out, first record \
-                 {first_timeless}; `scan_period` 0 reads the file as one cloud with them"
+                "{timeless} of {number} points have a GPS time of NaN and were skipped, first record {first_timeless}; \
+                 `scan_period` 0 reads the file as one cloud with them"
             ));
         }
         (self.first_s, self.has_one_time) = (least, least >= most);

@@ -16,7 +16,7 @@ pub(super) struct Units {
 }
 
 /// The coordinate system describes the original coordinates, not those converted to metres.
-const NOT_PASSED_ON: &str = "the coordinate system is not in metres, and the output does not name it";
+const NOT_PASSED_ON: &str = "the coordinate system is not in metres and is not passed on";
 
 /// Returns a unit of length in metres, by its EPSG code.
 fn of_epsg(code: u64) -> Option<f64> {
@@ -84,7 +84,9 @@ impl Units {
         units.crs = text.or(units.crs);
         if units.metres != [1.0; 2] {
             let [flat, high] = units.metres;
-            units.remarks.push(format!("coordinates become metres: x and y times {flat}, z times {high}"));
+            units
+                .remarks
+                .push(format!("coordinates are converted to metres: x and y times {flat}, z times {high}"));
             if units.crs.take().is_some() {
                 units.remarks.push(NOT_PASSED_ON.into());
             }
@@ -120,12 +122,12 @@ impl Units {
         match (flat.or(system.and_then(of_state_plane)), system) {
             (Some(metres), _) => self.metres = [metres; 2],
             (None, Some(code)) if code != USER_DEFINED && !is_metric(code) => self.remarks.push(format!(
-                "the unit of coordinate system EPSG:{code} is not in the file; metres are assumed"
+                "the file does not state the unit of coordinate system EPSG:{code}; metres are assumed"
             )),
             _ => {}
         }
         if let Some(code) = value(LINEAR_UNITS).filter(|code| unit(*code).is_none()) {
-            self.remarks.push(format!("the unit of x and y, EPSG:{code}, is not known; metres are assumed"));
+            self.remarks.push(format!("the unit of x and y, EPSG:{code}, is unknown; metres are assumed"));
         }
         // The unit of heights defaults to that of the vertical system, then to that of the projection.
         let high = value(VERTICAL_UNITS).and_then(unit).or(value(VERTICAL_SYSTEM).and_then(of_vertical));
@@ -133,10 +135,8 @@ impl Units {
             self.metres[1] = metres;
         }
         if let Some(code) = value(VERTICAL_UNITS).filter(|code| unit(*code).is_none()) {
-            self.remarks.push(format!(
-                "the unit of z, EPSG:{code}, is not known; one of {} m is assumed",
-                self.metres[1]
-            ));
+            self.remarks
+                .push(format!("the unit of z, EPSG:{code}, is unknown; {} m is assumed", self.metres[1]));
         }
     }
 
@@ -149,7 +149,7 @@ impl Units {
         let mut take = |unit: Option<CrsUnit>, axes: &str| {
             if let Some(CrsUnit { metres, conflict: Some((name, factor)) }) = &unit {
                 self.remarks.push(format!(
-                    "the unit of {axes} is named {name}, with the factor {factor}: the name counts, {metres} m"
+                    "the unit of {axes} is named {name}, but has the factor {factor}: the name is used, {metres} m"
                 ));
             }
             unit.map(|unit| unit.metres)

@@ -55,7 +55,7 @@ impl Chunks {
         let Some(description) = layout.laszip() else {
             return Err(wrong(
                 100,
-                "the points are compressed, but no record says how (`laszip encoded`)".into(),
+                "the points are compressed, but the record `laszip encoded` is missing".into(),
             ));
         };
         let compressor = number(description, 0, 2);
@@ -66,7 +66,7 @@ impl Chunks {
             || point_bytes > MAX_POINT_BYTES
         {
             let reason = format!(
-                "points of {} bytes are compressed as {} parts of {point_bytes} bytes: these must be as many, and at \
+                "points of {} bytes are compressed as {} parts of {point_bytes} bytes: the sizes must be equal and at \
                  most {MAX_POINT_BYTES}",
                 layout.record_bytes,
                 laz.items().len()
@@ -77,7 +77,10 @@ impl Chunks {
         if !(POINT_WISE..=LAYERED).contains(&compressor)
             || laz.items().iter().any(|item| (item.version() >= 3) != (compressor == LAYERED))
         {
-            return Err(wrong(100, format!("compressor {compressor} does not fit the parts of its points")));
+            return Err(wrong(
+                100,
+                format!("compressor type {compressor} contradicts the versions of the point parts"),
+            ));
         }
         let mut reader = ChunkReader { path, input: BufReader::new(file), laz, compressor, budget };
         if compressor == POINT_WISE {
@@ -127,8 +130,8 @@ impl ChunkReader<'_> {
             return Ok(());
         }
         let reason = format!(
-            "the header announces no points, but {bytes} bytes of compressed ones follow: the file was not finished; \
-             repair its header with the program that wrote it, or write the points again"
+            "the header announces no points, but {bytes} bytes of compressed points follow: the writer was \
+             interrupted; repair the header with the program that wrote it, or write the file again"
         );
         Err(self.wrong(layout.counts.place(), reason))
     }
@@ -142,15 +145,15 @@ impl ChunkReader<'_> {
         let most_chunks = (table_at - data_at.min(table_at)) / self.point_bytes().max(1) + 1;
         if chunks > most_chunks {
             let reason =
-                format!("the chunk table promises {chunks} chunks; before it is room for {most_chunks}");
+                format!("the chunk table lists {chunks} chunks, but there is only space for {most_chunks}");
             return Err(self.wrong(table_at + 4, reason));
         }
         if chunks.saturating_mul(size_of::<ChunkTableEntry>() as u64)
             > self.budget.whole_bytes() / TABLE_COPIES
         {
             let reason = format!(
-                "a table of {chunks} chunks exceeds its share of the memory for reading: raise `memory`, or write the \
-                 file with larger chunks"
+                "a table of {chunks} chunks exceeds the memory for reading: raise `memory`, or write the file with \
+                 larger chunks"
             );
             return Err(self.wrong(table_at + 4, reason));
         }
@@ -195,7 +198,7 @@ impl ChunkReader<'_> {
             let end = at.checked_add(entry.byte_count).filter(|end| *end <= table_at);
             let Some(end) = end else {
                 let reason = format!(
-                    "the chunk table promises {} bytes for chunk {chunk} at byte {at}; the chunks end at byte \
+                    "the chunk table lists {} bytes for chunk {chunk} at byte {at}, but the chunks end at byte \
                      {table_at}",
                     entry.byte_count
                 );
@@ -234,7 +237,7 @@ impl ChunkReader<'_> {
         let is_own = differs && own.is_some_and(is_number);
         if differs && !is_own && !is_number(room) {
             let own = own.unwrap_or(0);
-            let reason = format!("the chunk table has {room} points, and the chunks themselves have {own}");
+            let reason = format!("the chunk table lists {room} points, but the chunks contain {own}");
             return Err(self.wrong(table_at, reason));
         }
         let there = if is_variable && !is_own { Some(room) } else { own };
@@ -245,8 +248,7 @@ impl ChunkReader<'_> {
             }
             Some(there) => {
                 let announced = layout.counts.choose(there, there);
-                let reason =
-                    format!("{announced} points are announced; the chunk table has room for {there}");
+                let reason = format!("{announced} points are announced, but the chunk table lists {there}");
                 return Err(self.wrong(table_at, reason));
             }
             None => {
@@ -257,13 +259,13 @@ impl ChunkReader<'_> {
                 self.check_number(layout, table_at.saturating_sub(data_at))?;
                 if room < announced {
                     let reason =
-                        format!("{announced} points are announced; the chunk table has room for {room}");
+                        format!("{announced} points are announced, but the chunk table lists {room}");
                     return Err(self.wrong(layout.counts.place(), reason));
                 }
                 layout.remarks.extend(layout.counts.remark(announced));
                 if announced < least {
                     layout.remarks.push(format!(
-                        "the header announces {announced} points, which are read; the chunks hold {least} or more"
+                        "the header announces {announced} points, which are read; the chunks contain {least} or more"
                     ));
                 }
             }
@@ -288,8 +290,7 @@ impl ChunkReader<'_> {
         let there = layout.file_bytes.saturating_sub(data_at);
         if !self.is_layered() {
             if is_variable {
-                let reason =
-                    "the chunk table, which says how many points each chunk has, is cut off or damaged";
+                let reason = "the chunk table with the number of points per chunk is truncated or damaged";
                 return Err(self.wrong(layout.points_at, reason.into()));
             }
             layout.points = announced;
@@ -310,7 +311,7 @@ impl ChunkReader<'_> {
             self.check_chunk_bytes(own.len(), at, end - at)?;
             whole = whole.saturating_add(head.points);
             if is_variable && own.len() as u64 >= most_own {
-                let reason = "its chunks exceed their share of the memory for reading: raise `memory`";
+                let reason = "its chunks exceed the memory for reading: raise `memory`";
                 return Err(self.wrong(at, reason.into()));
             }
             if is_variable {
@@ -328,9 +329,9 @@ impl ChunkReader<'_> {
             0 if whole == 0 => None,
             0 => Some(stopped(whole)),
             _ if whole < announced => Some(cut_off(whole, announced)),
-            _ => {
-                Some(format!("the chunk table is cut off or damaged: {announced} points are read without it"))
-            }
+            _ => Some(format!(
+                "the chunk table is truncated or damaged: {announced} points are read without it"
+            )),
         });
         let points = match is_variable {
             true => ChunkPoints::Own(own),
@@ -346,8 +347,8 @@ impl ChunkReader<'_> {
             return Ok(());
         }
         let reason = format!(
-            "chunk {chunk} has {bytes} bytes, and at most {most} of a chunk are held in memory: raise `memory`, or \
-             write the file with smaller chunks"
+            "chunk {chunk} has {bytes} bytes, but at most {most} fit in memory: raise `memory`, or write the file with \
+             smaller chunks"
         );
         Err(self.wrong(at, reason))
     }
@@ -360,6 +361,6 @@ fn take_all(layout: &mut Layout, there: u64) {
     layout.remarks.extend(match announced {
         _ if announced == there => layout.counts.remark(there),
         0 => Some(stopped(there)),
-        _ => Some(format!("the header announces {announced} points; {there} are there and are read")),
+        _ => Some(format!("the header announces {announced} points; {there} exist and are read")),
     });
 }

@@ -43,7 +43,7 @@ impl LayeredHead {
             return Ok(());
         }
         let there = end.saturating_sub(self.layers_at);
-        let reason = format!("the fields of a chunk claim {} bytes; it has {there}", self.claimed);
+        let reason = format!("the fields of a chunk need {} bytes, but it has {there}", self.claimed);
         Err(FormatError::at_offset(self.lengths_at, reason).in_input(path))
     }
 }

@@ -16,8 +16,8 @@ impl LeftOut {
     /// Returns a remark on the skipped rows.
     pub(super) fn remark(&self) -> Option<String> {
         let (line, reason) = self.first.as_ref()?;
-        let rows = if self.rows == 1 { "row is no point" } else { "rows are no points" };
-        Some(format!("{} {rows}, left out (line {line}: {reason})", self.rows))
+        let rows = if self.rows == 1 { "row is not a point" } else { "rows are not points" };
+        Some(format!("{} {rows}, skipped (line {line}: {reason})", self.rows))
     }
 
     /// Returns the error for a text without any valid row; `None` if no row was skipped.

@@ -108,7 +108,7 @@ impl Lines {
         let text = if self.number == 1 { text.trim_start_matches('\u{feff}') } else { &text }.to_owned();
         if extent == Extent::Start {
             if comment_of(&text).is_none() {
-                return Err(self.error("the line is longer than 64 KiB: this is no text of numbers"));
+                return Err(self.error("the line is longer than 64 KiB: this is not a text file of numbers"));
             }
             self.pass_rest()?;
         }

@@ -73,7 +73,7 @@ impl Listing {
             Some(known.error(path))
         });
         if let Some(foreign) = foreign {
-            return format!("no file that is read: {foreign:#}");
+            return format!("contains no supported file: {foreign:#}");
         }
         let names: Vec<String> = (self.folders.iter().take(5))
             .filter_map(|path| Some(path.file_name()?.to_string_lossy().into_owned()))
@@ -81,12 +81,12 @@ impl Listing {
         let hint = if names.is_empty() {
             String::new()
         } else {
-            format!("; is one of its folders meant ({})?", names.join(", "))
+            format!("; did you mean one of its subfolders ({})?", names.join(", "))
         };
         if others.is_empty() {
-            return format!("no file of a known format ({known}){hint}");
+            return format!("contains no file of a known format ({known}){hint}");
         }
-        format!("no file in it is a cloud: {}{hint}", others.join(", "))
+        format!("contains no clouds: {}{hint}", others.join(", "))
     }
 }
 

@@ -73,7 +73,7 @@ impl NameStamps {
             Part::Whole { .. } => "microseconds",
         };
         Some(format!(
-            "what is behind the point in the names of files is of different lengths: it is read as {unit}"
+            "the numbers after the point in the file names have different lengths: they are read as {unit}"
         ))
     }
 

@@ -208,7 +208,7 @@ impl<R: BufRead> PcdPoints<R> {
         let there = file_bytes.saturating_sub(header.data_at as u64);
         let mut sizes = [0; 8];
         if there < sizes.len() as u64 {
-            return Err(wrong("the file ends before the sizes of the packed data".into()));
+            return Err(wrong("the file ends before the sizes of the compressed data".into()));
         }
         input.read_exact(&mut sizes).map_err(cannot)?;
         let there = there - sizes.len() as u64;
@@ -217,18 +217,20 @@ impl<R: BufRead> PcdPoints<R> {
         let (packed, unpacked) = (size(0), size(4));
         if unpacked != wanted {
             return Err(wrong(format!(
-                "{unpacked} bytes unpacked for {} points of {}",
+                "the uncompressed size is {unpacked} bytes for {} points of {}",
                 header.points, header.point_bytes
             )));
         }
         if packed > there {
-            return Err(wrong(format!("{packed} bytes of packed data announced, {there} there")));
+            return Err(wrong(format!(
+                "{packed} bytes of compressed data are announced, but there are {there}"
+            )));
         }
         if wanted == 0 {
             return Ok(());
         }
         if !lzf::is_possible(packed, wanted) {
-            return Err(wrong("the packed data is damaged".into()));
+            return Err(wrong("the compressed data is damaged".into()));
         }
         let mut fields = Fields::new(budget, wanted)?;
         let is_whole = match &mut fields {
@@ -236,7 +238,7 @@ impl<R: BufRead> PcdPoints<R> {
             Fields::InFile(file) => lzf::decompress(&mut (&mut *input).take(packed), wanted, file),
         };
         if !is_whole.map_err(cannot)? {
-            return Err(wrong("the packed data is damaged".into()));
+            return Err(wrong("the compressed data is damaged".into()));
         }
         let wanted: Vec<usize> = columns.all().collect();
         let strides = wanted.iter().map(|&column| header.fields[column].size * header.fields[column].count);
@@ -280,7 +282,7 @@ impl Columns {
             let axes = ["x", "y", "z"].into_iter().filter(|axis| find(axis).is_none());
             let missing = axes.collect::<Vec<_>>().join(", ");
             let names = names.join(" ");
-            let reason = format!("the points have no field {missing}; their fields are `{names:.200}`");
+            let reason = format!("the points have no field {missing}; fields: `{names:.200}`");
             return Err(FormatError::at_line(header.data_line, reason));
         };
         meaning.intensity = meaning.intensity.filter(|at| header.fields[*at].count > 0);

@@ -87,7 +87,7 @@ impl Header {
         loop {
             line_number += 1;
             let Some(length) = file[at..].iter().position(|&byte| byte == end) else {
-                let reason = "the header ends without a line DATA; this is no PCD file";
+                let reason = "the header has no DATA line: this is not a PCD file";
                 return Err(FormatError::at_line(line_number, reason));
             };
             let line = String::from_utf8_lossy(&file[at..at + length]).into_owned();
@@ -98,7 +98,7 @@ impl Header {
             if !KEYS.contains(&key.as_str()) {
                 return Err(FormatError::at_line(
                     line_number,
-                    format!("`{word:.40}` is no key of a PCD header"),
+                    format!("`{word:.40}` is not a key of a PCD header"),
                 ));
             }
             let is_data = key == "DATA";
@@ -114,11 +114,11 @@ impl Header {
         let find =
             |key: &str| entries.iter().find(|(name, ..)| name == key).map(|(_, words, line)| (words, *line));
         let need = |key: &str| {
-            find(key).ok_or_else(|| FormatError::at_line(data_line, format!("the header has no line {key}")))
+            find(key).ok_or_else(|| FormatError::at_line(data_line, format!("the header has no {key} line")))
         };
         let (names, _) = find("FIELDS")
             .or_else(|| find("COLUMNS"))
-            .ok_or_else(|| FormatError::at_line(data_line, "the header has no line FIELDS"))?;
+            .ok_or_else(|| FormatError::at_line(data_line, "the header has no FIELDS line"))?;
         let (sizes, sizes_line) = need("SIZE")?;
         let (kinds, kinds_line) = need("TYPE")?;
         let ones = vec!["1".to_owned(); names.len()];
@@ -139,8 +139,10 @@ impl Header {
             let kind = kinds[number].as_bytes().first().copied().unwrap_or_default().to_ascii_uppercase();
             let is_known = matches!((kind, size), (b'I' | b'U', 1 | 2 | 4 | 8) | (b'F', 4 | 8));
             if !is_known || count > 1 << 16 {
-                let reason =
-                    format!("field {name} of type {} size {size} count {count} is not known", kinds[number]);
+                let reason = format!(
+                    "field {name} has an unsupported combination of type {}, size {size} and count {count}",
+                    kinds[number]
+                );
                 return Err(FormatError::at_line(sizes_line, reason));
             }
             fields.push(Field { name: name.clone(), size, kind, count, offset, first_value });
@@ -159,8 +161,10 @@ impl Header {
             Some("binary") => Encoding::Binary,
             Some("binary_compressed") => Encoding::Compressed,
             other => {
-                let reason =
-                    format!("DATA {} is not ascii, binary or binary_compressed", other.unwrap_or_default());
+                let reason = format!(
+                    "DATA must be ascii, binary or binary_compressed, not {}",
+                    other.unwrap_or_default()
+                );
                 return Err(FormatError::at_line(line, reason));
             }
         };
@@ -220,5 +224,5 @@ fn viewpoint(words: &[String], line: u64) -> Result<Option<RigidPose>> {
 }
 
 fn parse<N: std::str::FromStr>(word: &str, line: u64) -> Result<N> {
-    word.parse().map_err(|_| FormatError::at_line(line, format!("`{word}` is not a number that fits here")))
+    word.parse().map_err(|_| FormatError::at_line(line, format!("`{word}` is not a valid number")))
 }

@@ -50,7 +50,7 @@ pub(crate) fn open(path: &Path, options: &ReadOptions) -> Result<Box<dyn ScanSou
     let open = move |path: &Path| -> Result<Box<dyn CloudSource>> {
         let (mut head, points) = pcd::open(path, stamps.head_of(path), &budget, is_viewpoint_needed)?;
         if head.world_from_sensor.is_none() && must_have_viewpoint {
-            let reason = "no VIEWPOINT in this file, which other files of the folder have: where it was taken is not known";
+            let reason = "this file has no VIEWPOINT, but other files of the folder do: its pose is unknown";
             return Err(FormatError::at_line(1, reason).in_input(path));
         }
         head.stamp_ns = head.stamp_ns.filter(|_| has_stamps);
@@ -132,8 +132,8 @@ fn warn_of_shift(trajectory: &Trajectory, files: &[PathBuf], names: NameStamps) 
     }
     if let Some((file, seconds)) = first_shifted(&stamps, files, names) {
         log::warn!(
-            "{}: the number in {} is {seconds:.3} s further from its pose's time stamp than those of most files: is a \
-             line or a file missing?",
+            "{}: the number in the name {} differs by {seconds:.3} s more from its pose's time stamp than in most \
+             files: is a pose or a file missing?",
             trajectory.path().display(),
             file.display()
         );

@@ -40,7 +40,7 @@ pub(crate) fn open(
     let names: Vec<String> = element.properties.iter().map(|property| property.name.clone()).collect();
     let is_integer = |at: usize| element.properties.get(at).is_some_and(|found| found.kind.is_integer());
     let meaning = Meaning::of(&names, is_integer).map_err(|reason| wrong(&reason))?;
-    let meaning = meaning.ok_or_else(|| wrong("vertices have no x, y and z"))?;
+    let meaning = meaning.ok_or_else(|| wrong("vertices lack x, y or z"))?;
     head.points = Some(element.count);
     head.fields = names;
     head.has_intensities = meaning.intensity.is_some();
@@ -62,7 +62,7 @@ impl Points for PlyPoints {
     fn remarks(&self) -> Vec<String> {
         let units = self.meaning.remark();
         let comment = self.header.unit.as_ref().filter(|_| units.is_none()).map(|(line, comment)| {
-            format!("line {line} says `{comment:.60}`, but coordinates are read as metres")
+            format!("line {line} contains `{comment:.60}`, but coordinates are read as metres")
         });
         units.into_iter().chain(comment).chain(self.left_out.remark()).collect()
     }

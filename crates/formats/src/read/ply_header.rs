@@ -98,25 +98,25 @@ impl Header {
                         "ascii" => Encoding::Ascii,
                         "binary_little_endian" => Encoding::LittleEndian,
                         "binary_big_endian" => Encoding::BigEndian,
-                        other => return Err(wrong(format!("format `{other:.40}` is not known"))),
+                        other => return Err(wrong(format!("format `{other:.40}` is unknown"))),
                     });
                 }
                 ("element", [name, count]) => {
                     let count = count
                         .parse()
-                        .map_err(|_| wrong(format!("`{count:.40}` is no number of elements")))?;
+                        .map_err(|_| wrong(format!("`{count:.40}` is not a number of elements")))?;
                     header.elements.push(Element { name: (*name).to_owned(), count, properties: Vec::new() });
                 }
                 ("property", rest) => {
                     let property = property(rest).map_err(&wrong)?;
                     let element = header.elements.last_mut();
                     element
-                        .ok_or_else(|| wrong("a property without an element".into()))?
+                        .ok_or_else(|| wrong("the property has no element".into()))?
                         .properties
                         .push(property);
                 }
                 ("end_header", []) => break,
-                _ => return Err(wrong(format!("`{text:.60}` is no line of a header of PLY"))),
+                _ => return Err(wrong(format!("`{text:.60}` is not a line of a PLY header"))),
             }
         }
         header.encoding = encoding
@@ -160,5 +160,5 @@ fn property(words: &[&str]) -> std::result::Result<Property, String> {
 }
 
 fn scalar(name: &str) -> std::result::Result<Scalar, String> {
-    Scalar::named(name).ok_or_else(|| format!("type `{name:.40}` is not known"))
+    Scalar::named(name).ok_or_else(|| format!("type `{name:.40}` is unknown"))
 }

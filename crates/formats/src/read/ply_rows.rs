@@ -84,8 +84,8 @@ impl PlyRows {
         match self.word()? {
             None => Ok(()),
             Some(word) => Err(self.lines.error(format!(
-                "`{word:.40}` is left when all elements are read, though lines are wrapped: a number is missing or too \
-                 many somewhere"
+                "`{word:.40}` remains after all elements were read from wrapped lines: somewhere there is a number too \
+                 few or too many"
             ))),
         }
     }
@@ -180,5 +180,5 @@ fn value_of(property: &Property, word: &str, is_read: bool) -> std::result::Resu
 }
 
 fn length_of(word: &str) -> std::result::Result<u64, String> {
-    word.parse().map_err(|_| format!("`{word:.40}` is no length of a list"))
+    word.parse().map_err(|_| format!("`{word:.40}` is not a list length"))
 }

@@ -115,7 +115,7 @@ mod tests {
             ("1,2\n", "line 1: `1,2` is not a point"),
             ("6,001,3,178,-1,000\n", "is not a point"),
             ("1 2 3\nx y z\n", "line 2: `x y z` is not a point"),
-            ("x (px) y (px) z (px)\n1 2 3\n", "`px` is no known unit"),
+            ("x (px) y (px) z (px)\n1 2 3\n", "`px` is an unknown unit"),
             ("\u{0}1\u{0} \u{0}2", "is text in UTF-16"),
         ] {
             let error = read(text).unwrap_err();

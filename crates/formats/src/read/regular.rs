@@ -16,7 +16,7 @@ pub(crate) fn check_regular(path: &Path) -> Result<()> {
     let is_streamed = extension.is_empty()
         || (Registry::default().formats().iter())
             .any(|format| matches!(format.open, Open::Stream(_)) && format.has_extension(&extension));
-    let hint = "; or name it alone, with `format` ply or `format` xyz, which are read in one pass";
+    let hint = "; or use it as the only input with `format` ply or `format` xyz, which are read in one pass";
     let reason = format!(
         "is a FIFO, a socket or a device, not a file: save its contents to a file{}",
         if is_streamed { hint } else { "" }

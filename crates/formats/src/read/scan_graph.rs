@@ -70,8 +70,7 @@ impl<R: Read> ScanGraph<R> {
         let at = self.offset;
         let count = i32::from_le_bytes(self.bytes()?);
         if count != N as i32 {
-            let reason =
-                format!("a vector of {count} numbers where one of {N} belongs; this is no scan graph");
+            let reason = format!("a vector has {count} numbers instead of {N}: this is not a scan graph");
             return Err(FormatError::at_offset(at, reason).in_input(&self.path));
         }
         let mut numbers = [0.0; N];
@@ -98,7 +97,7 @@ impl<R: Read> ScanSource for ScanGraph<R> {
         let at = self.offset;
         let points = u64::from(u32::from_le_bytes(self.bytes()?));
         if points * POINT_BYTES > self.file_bytes - self.offset {
-            let reason = format!("{points} points announced, more than the rest of the file can hold");
+            let reason = format!("{points} points are announced, more than fit in the rest of the file");
             return Err(FormatError::at_offset(at, reason).in_input(&self.path));
         }
         store.begin(false);
@@ -114,7 +113,9 @@ impl<R: Read> ScanSource for ScanGraph<R> {
         // An invalid pose does not affect the start of the next scan.
         self.is_past_error = true;
         if ![x, y, z, qw, qx, qy, qz].iter().all(|number| number.is_finite()) {
-            return Err(FormatError::at_offset(at, "a pose that is not finite").in_input(&self.path));
+            return Err(
+                FormatError::at_offset(at, "the pose has a number that is not finite").in_input(&self.path)
+            );
         }
         let world_from_sensor = Pose::of_quaternion([x, y, z], [qx, qy, qz, qw])
             .map_err(|reason| FormatError::at_offset(at, reason).in_input(&self.path))?;

@@ -72,7 +72,7 @@ impl<R: BufRead> ScanLog<R> {
     fn pose(&self, words: &str) -> Result<Pose> {
         let [x, y, z, roll, pitch, yaw] = self.numbers(words)?;
         if ![x, y, z, roll, pitch, yaw].iter().all(|number| number.is_finite()) {
-            return Err(self.wrong("a pose that is not finite"));
+            return Err(self.wrong("the pose has a number that is not finite"));
         }
         Ok(Isometry3::from_parts(Translation3::new(x, y, z), rotation(roll, pitch, yaw)).into())
     }
@@ -104,7 +104,9 @@ impl<R: BufRead> ScanSource for ScanLog<R> {
                 }
                 (None, Some(_)) => points.push(self.numbers(&line)?, 0.0)?,
                 (None, None) => {
-                    return Err(self.wrong("points before the first line NODE; this is no scan log"));
+                    return Err(
+                        self.wrong("there are points before the first NODE line: this is not a scan log")
+                    );
                 }
             }
         }

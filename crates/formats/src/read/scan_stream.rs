@@ -80,26 +80,27 @@ const MAX_RESERVED: usize = 1 << 16;
 impl<R: StreamInput> ScanStream<R> {
     fn read_header(&mut self) -> Result<()> {
         if self.bytes("the magic number")? != *MAGIC {
-            return Err(self.wrong(0, "this is no scan stream of voxtile's"));
+            return Err(self.wrong(0, "this is not a voxtile scan stream"));
         }
         let version = u32::from_le_bytes(self.bytes("the version")?);
         if version != VERSION {
-            return Err(self.wrong(8, format!("version {version} is not known, only version {VERSION}")));
+            return Err(
+                self.wrong(8, format!("version {version} is unknown; only version {VERSION} is supported"))
+            );
         }
         let flags = u32::from_le_bytes(self.bytes("the flags")?);
         if flags & !FLAG_INTENSITIES != 0 {
-            return Err(self.wrong(12, format!("flags {flags:#x} are not known")));
+            return Err(self.wrong(12, format!("flags {flags:#x} are unknown")));
         }
         self.has_intensities = flags & FLAG_INTENSITIES != 0;
         let length = u32::from_le_bytes(self.bytes("the length of the label")?);
         if length > MAX_LABEL_BYTES {
-            return Err(
-                self.wrong(16, format!("a label of {length} bytes; it has {MAX_LABEL_BYTES} at most"))
-            );
+            return Err(self
+                .wrong(16, format!("the label has {length} bytes; at most {MAX_LABEL_BYTES} are allowed")));
         }
         let mut label = vec![0; length as usize];
         self.fill(&mut label, "the label")?;
-        self.label = String::from_utf8(label).map_err(|_| self.wrong(20, "the label is no UTF-8"))?;
+        self.label = String::from_utf8(label).map_err(|_| self.wrong(20, "the label is not UTF-8"))?;
         Ok(())
     }
 
@@ -193,7 +194,7 @@ impl<R: StreamInput> ScanStream<R> {
     /// Creates the pose from the numbers at an offset.
     fn pose(&self, numbers: [f64; 7], at: u64) -> Result<Pose> {
         if !numbers.iter().all(|number| number.is_finite()) {
-            return Err(self.wrong(at, "a pose that is not finite"));
+            return Err(self.wrong(at, "the pose has a number that is not finite"));
         }
         let [x, y, z, qx, qy, qz, qw] = numbers;
         Pose::of_quaternion([x, y, z], [qx, qy, qz, qw]).map_err(|reason| self.wrong(at + 24, reason))
@@ -260,8 +261,8 @@ impl<R: StreamInput> ScanSource for ScanStream<R> {
             return Fingerprint::of_file(&self.path);
         }
         if self.label.is_empty() {
-            let reason = "a stream without a label cannot be told from others, so that a build of it cannot be \
-                          resumed; store it in a file, or give it a label where it is made";
+            let reason = "a stream without a label cannot be identified, so its build cannot be resumed: store it in a \
+                          file, or give it a label when writing it";
             return Err(Error::argument(self.path.display().to_string(), reason));
         }
         Ok(format!("stream {:?}", self.label))

@@ -29,7 +29,7 @@ pub(crate) fn check_start(start: &[u8], is_named: bool) -> std::result::Result<(
         return Err(encoding.to_owned());
     }
     if start.contains(&0) {
-        return Err("it has bytes of zero, as no text has".to_owned());
+        return Err("it contains zero bytes, so it is not a text file".to_owned());
     }
     let is_cut = start.len() as u64 == GLANCE_BYTES;
     let mut text = without_mark(start);
@@ -46,7 +46,7 @@ pub(crate) fn check_start(start: &[u8], is_named: bool) -> std::result::Result<(
         }
         match columns.take(number, &String::from_utf8_lossy(lines.line())).map_err(at_line)? {
             Line::Point(_) if is_named || columns.are_named() || columns.are_numbers() => return Ok(()),
-            Line::Point(_) => return Err(format!("line {number}: there are words among the numbers")),
+            Line::Point(_) => return Err(format!("line {number}: there are words between the numbers")),
             Line::Nothing => {}
             Line::Unread(reason) => left_out.add(number, reason),
         }
@@ -58,7 +58,7 @@ pub(crate) fn check_start(start: &[u8], is_named: bool) -> std::result::Result<(
     match left_out.error() {
         None if columns.are_named() || (is_named && is_cut) => Ok(()),
         Some(error) => Err(error.to_string()),
-        None => Err("no line of it has three numbers or more, or names with x, y and z".to_owned()),
+        None => Err("no line has three or more numbers or column names with x, y and z".to_owned()),
     }
 }
 
@@ -81,7 +81,7 @@ pub(crate) fn open(
             return Err(error.in_input(path));
         }
         if !points.columns.are_named() {
-            let reason = "no point, and no names of columns with x, y and z";
+            let reason = "there are no points and no column names with x, y and z";
             return Err(FormatError::at_offset(0, reason).in_input(path));
         }
     }

@@ -68,9 +68,9 @@ impl Counts {
     fn remark(&self) -> Option<String> {
         let Self { scans, announced, rows } = self;
         if *scans > 0 && announced != rows {
-            return Some(format!("announces {announced} points and has {rows}: is it cut off?"));
+            return Some(format!("announces {announced} points but has {rows}: is it truncated?"));
         }
-        (*scans > 1).then(|| format!("{scans} scans with a number of points each, read as one cloud"))
+        (*scans > 1).then(|| format!("{scans} scans, each with a point count, are read as one cloud"))
     }
 }
 
@@ -172,9 +172,9 @@ impl Columns {
             _ => {
                 let text = line.trim();
                 let reason = if text.get(..5).is_some_and(|start| start.eq_ignore_ascii_case("ncols")) {
-                    "this is a grid of heights (ESRI ASCII), not points: gdal_translate -of XYZ makes points of it".into()
+                    "this is a grid of heights (ESRI ASCII), not points: convert it with gdal_translate -of XYZ".into()
                 } else {
-                    format!("`{text:.60}` is neither numbers nor names of columns with x, y and z")
+                    format!("`{text:.60}` is neither numbers nor column names with x, y and z")
                 };
                 if self.lines_before >= MAX_LINES_BEFORE {
                     return Err(reason);
@@ -193,7 +193,7 @@ impl Columns {
             return Ok(Line::Point(CloudPoint { is_return: false, ..CloudPoint::hit(position_m) }));
         }
         if let Some(cell) = digits_behind_comma(separator, cells) {
-            return Err(ambiguous_commas(columns, &format!("`{cell:.20}` is the end of a number")));
+            return Err(ambiguous_commas(columns, &format!("`{cell:.20}` is the fraction of a number")));
         }
         let is_number = |cell: Option<&&str>| cell.is_some_and(|cell| separator.number(cell).is_some());
         let mut meaning = Meaning::of_metres([0, 1, 2]);
@@ -202,7 +202,7 @@ impl Columns {
         self.names = ["x", "y", "z"].map(str::to_owned).into();
         self.names.extend(meaning.intensity.map(|_| "intensity".to_owned()));
         if columns > 3 {
-            let rest = if columns > self.names.len() { ", the rest is not read" } else { "" };
+            let rest = if columns > self.names.len() { ", the others are ignored" } else { "" };
             self.notes.push(format!("{columns} columns without names: {}{rest}", self.names.join(" ")));
         }
         (self.separator, self.meaning) = (separator, Some(meaning));
@@ -211,7 +211,7 @@ impl Columns {
     }
 
     fn begin_named(&mut self, separator: Separator, cells: &[&str], line: &str) -> Result<Line, String> {
-        let Some(mut meaning) = self.meaning else { return Err("x, y and z are not known".into()) };
+        let Some(mut meaning) = self.meaning else { return Err("the columns x, y and z are unknown".into()) };
         if let Some(units) = units_row(cells, &meaning) {
             meaning.units = units;
             self.meaning = Some(meaning);
@@ -220,7 +220,7 @@ impl Columns {
         self.separator = separator;
         let columns = without_end(cells).len();
         if separator == Separator::Mark(',') && columns == 2 * self.names.len() {
-            return Err(ambiguous_commas(columns, &format!("{} names of columns", self.names.len())));
+            return Err(ambiguous_commas(columns, &format!("there are {} column names", self.names.len())));
         }
         let is_one_more = columns == self.names.len() + 1 && line.trim_start().starts_with('"');
         self.unnamed = usize::from(is_one_more);
@@ -233,7 +233,7 @@ impl Columns {
             meaning.intensity = meaning.intensity.filter(|intensity| *intensity != at);
             meaning.time = meaning.time.filter(|time| time.at != at);
             let name = self.names.get(at).map(String::as_str).unwrap_or_default();
-            self.notes.push(format!("column `{name:.40}` has no numbers (`{cell:.20}`): not read"));
+            self.notes.push(format!("column `{name:.40}` has no numbers (`{cell:.20}`) and is ignored"));
         }
         let before = self.meaning.replace(meaning);
         match self.first_point(cells) {
@@ -252,7 +252,8 @@ impl Columns {
         self.counts.rows += 1;
         if let (Some((line, comment)), Some(None)) = (&self.comment_unit, self.meaning().map(Meaning::remark))
         {
-            self.notes.push(format!("line {line} says `{comment:.60}`, but coordinates are read as metres"));
+            self.notes
+                .push(format!("line {line} contains `{comment:.60}`, but coordinates are read as metres"));
         }
         Ok(Line::Point(point))
     }
@@ -285,19 +286,20 @@ impl Columns {
             |at: usize| names.get(at).is_some_and(|name| name.eq_ignore_ascii_case("offset_time"));
         let Some(meaning) = Meaning::of(&names, is_integer)? else { return Ok(false) };
         if are_poses(&names) {
-            self.notes
-                .push("has columns qx qy qz qw: if these are poses, give them with `poses` FILE".into());
+            self.notes.push("has columns qx qy qz qw: if these are poses, use `poses` FILE".into());
         }
         (self.names, self.meaning, self.are_named) = (names, Some(meaning), true);
         Ok(true)
     }
 
     fn point(&mut self, cells: &[&str]) -> Result<CloudPoint, String> {
-        let Some(meaning) = self.meaning else { return Err("x, y and z are not known".into()) };
+        let Some(meaning) = self.meaning else { return Err("the columns x, y and z are unknown".into()) };
         let (separator, unnamed) = (self.separator, self.unnamed);
         let value = |at: usize| -> Result<f64, String> {
             match cells.get(at + unnamed) {
-                None => Err(format!("{} columns, {} are needed", cells.len(), meaning.last() + unnamed + 1)),
+                None => {
+                    Err(format!("{} columns, but {} are needed", cells.len(), meaning.last() + unnamed + 1))
+                }
                 Some(&"") => Ok(f64::NAN),
                 Some(cell) => separator.number(cell).ok_or_else(|| format!("`{cell:.40}` is not a number")),
             }
@@ -311,12 +313,12 @@ impl Columns {
 }
 
 fn too_few(columns: usize) -> String {
-    format!("{columns} columns; a point has x, y and z")
+    format!("{columns} columns; a point needs x, y and z")
 }
 
 fn ambiguous_commas(cells: usize, why: &str) -> String {
     format!(
-        "{cells} cells between commas, but {why}: decimal commas cannot be told from commas between cells; save it with \
+        "{cells} comma-separated cells, but {why}: decimal commas and separators are ambiguous; save it with \
          semicolons or tabs, or with decimal points"
     )
 }
@@ -401,10 +403,10 @@ mod tests {
     #[test]
     fn rows_that_are_no_points_are_left_out() {
         for (text, reason) in [
-            ("x y z intensity\n1 2 3\n1 2 3 4", "line 2: 3 columns, 4 are needed"),
+            ("x y z intensity\n1 2 3\n1 2 3 4", "line 2: 3 columns, but 4 are needed"),
             ("1 2 3\n1 2 c\n4 5 6", "line 2: `c` is not a number"),
             ("x,y,z\n1,2,3\nx,y,z\n4,5,6", "line 3: `x` is not a number"),
-            ("1 2 3\n7\n4 5 6", "line 2: 1 columns, 3 are needed"),
+            ("1 2 3\n7\n4 5 6", "line 2: 1 columns, but 3 are needed"),
         ] {
             let (points, _, unread) = read_all(text).unwrap_or_else(|error| panic!("{error}"));
             assert_eq!(unread, [reason], "{text}");
@@ -415,13 +417,13 @@ mod tests {
     #[test]
     fn what_is_no_text_of_points_is_an_error_with_line_and_word() {
         for (text, reason) in [
-            ("# a\nhello world", "line 2: `hello world` is neither numbers nor names"),
+            ("# a\nhello world", "line 2: `hello world` is neither numbers nor column names"),
             ("Exported\n1 2 3", "line 1: `Exported` is neither"),
-            ("1 2", "line 1: 2 columns; a point has x, y and z"),
+            ("1 2", "line 1: 2 columns; a point needs x, y and z"),
             ("1\n2\n3", "line 2: 1 columns"),
-            ("x (px),y (px),z (px)\n1,2,3", "line 1: column `x (px)`: `px` is no known unit"),
-            ("6,001,3,178,-1,000", "line 1: 6 cells between commas, but `001` is the end of a number"),
-            ("x,y,z\n6,5,3,5,1,5", "line 2: 6 cells between commas, but 3 names of columns"),
+            ("x (px),y (px),z (px)\n1,2,3", "line 1: column `x (px)`: `px` is an unknown unit"),
+            ("6,001,3,178,-1,000", "line 1: 6 comma-separated cells, but `001` is the fraction of a number"),
+            ("x,y,z\n6,5,3,5,1,5", "line 2: 6 comma-separated cells, but there are 3 column names"),
             ("ncols 3\nnrows 2\n1 2 3", "line 1: this is a grid of heights"),
         ] {
             let error = read(text).unwrap_err();
@@ -433,10 +435,10 @@ mod tests {
     fn guesses_are_said() {
         for (text, remark) in [
             ("1 2 3 7", "4 columns without names: x y z intensity"),
-            ("1 2 3 7 255 0 0", "7 columns without names: x y z intensity, the rest is not read"),
-            ("1 2 3 255 0 0", "6 columns without names: x y z, the rest is not read"),
-            ("# units: mm\n1 2 3", "line 1 says `units: mm`, but coordinates are read as metres"),
-            ("x,y,z,time\n1,2,3,12:05", "column `time` has no numbers (`12:05`): not read"),
+            ("1 2 3 7 255 0 0", "7 columns without names: x y z intensity, the others are ignored"),
+            ("1 2 3 255 0 0", "6 columns without names: x y z, the others are ignored"),
+            ("# units: mm\n1 2 3", "line 1 contains `units: mm`, but coordinates are read as metres"),
+            ("x,y,z,time\n1,2,3,12:05", "column `time` has no numbers (`12:05`) and is ignored"),
             ("t,x,y,z,qx,qy,qz,qw\n0,1,2,3,0,0,0,1", "if these are poses"),
             ("x[mm] y[mm] z[mm]\n1 2 3", "x, y and z are in mm"),
         ] {
@@ -454,9 +456,9 @@ mod tests {
     fn numbers_of_points_stand_before_each_scan() {
         for (text, points, remark) in [
             ("2\n1 2 3\n4 5 6\n", 2, None),
-            ("2\n1 2 3\n4 5 6\n1\n7 8 9\n", 3, Some("2 scans with a number of points each")),
+            ("2\n1 2 3\n4 5 6\n1\n7 8 9\n", 3, Some("2 scans, each with a point count")),
             ("0\n1\n1 2 3\n", 1, Some("2 scans")),
-            ("3\n1 2 3\n4 5 6\n", 2, Some("announces 3 points and has 2")),
+            ("3\n1 2 3\n4 5 6\n", 2, Some("announces 3 points but has 2")),
         ] {
             let (found, columns, unread) = read_all(text).unwrap_or_else(|error| panic!("{error}"));
             assert_eq!((found.len(), unread.len()), (points, 0), "{text}");

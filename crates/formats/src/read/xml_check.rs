@@ -63,7 +63,7 @@ impl XmlCheck {
             (Place::Tag, b'=') => {
                 self.nodes += 1;
                 self.attributes += 1;
-                return at_most(self.attributes, MAX_ATTRIBUTES, "attributes of one tag");
+                return at_most(self.attributes, MAX_ATTRIBUTES, "attributes in one tag");
             }
             (Place::Tag, _) => return self.name(byte),
             (Place::Value(quote), _) if byte == quote => self.place = Place::Tag,
@@ -90,14 +90,14 @@ impl XmlCheck {
         if byte == b'n' && self.last == *b"ml" {
             self.name_spaces += 1;
         }
-        at_most(self.name_spaces, MAX_NAME_SPACES, "declarations of name spaces")
+        at_most(self.name_spaces, MAX_NAME_SPACES, "namespace declarations")
     }
 }
 
 fn at_most(count: usize, most: usize, what: &str) -> Result<(), String> {
     match count <= most {
         true => Ok(()),
-        false => Err(format!("its description has more than {most} {what}")),
+        false => Err(format!("its XML section has more than {most} {what}")),
     }
 }
 
@@ -121,7 +121,7 @@ mod tests {
     fn more_than_is_read_is_refused() {
         let many = |count: usize| (0..count).map(|k| format!(" a{k}='='")).collect::<String>();
         assert!(check(&format!("<a{}/>", many(256)).repeat(3)).is_ok());
-        assert!(check(&format!("<a{}/>", many(257))).unwrap_err().contains("256 attributes of one tag"));
+        assert!(check(&format!("<a{}/>", many(257))).unwrap_err().contains("256 attributes in one tag"));
         // The opening bytes of a comment do not also close it.
         for start in ["<!-->", "<!--->", "<![CDATA[]>", "<?>"] {
             let end =

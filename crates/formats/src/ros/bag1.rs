@@ -52,9 +52,10 @@ impl Bag1 {
         let magic = file.read_at(0, MAGIC.len() as u64)?;
         if magic != MAGIC {
             let reason = if magic.starts_with(b"#ROSBAG V1") {
-                "a bag of version 1 is older than is read; `rosbag fix` or `rosbag reindex` makes version 2.0 of it"
+                "bag format version 1 is not supported: convert it to version 2.0 with `rosbag fix` or `rosbag \
+                 reindex`"
             } else {
-                "it does not start with `#ROSBAG V2.0`: it is no bag of ROS 1"
+                "it does not start with `#ROSBAG V2.0`: it is not a ROS 1 bag"
             };
             return Err(FormatError::at_offset(0, reason).in_input(path));
         }
@@ -181,11 +182,11 @@ impl Bag1 {
         }
         let cut = match at == len {
             true => String::new(),
-            false => format!(", which ends in the midst of a record (it was cut off{cut})"),
+            false => format!(", and ends within a record (it was truncated{cut})"),
         };
         self.remarks.push(format!(
-            "{path} has no index (the recorder did not close it){cut}: {messages} messages were found by reading it \
-             whole"
+            "{path} has no index (the recorder did not close it){cut}: {messages} messages were found by reading the \
+             whole file"
         ));
         Ok(())
     }
@@ -229,7 +230,7 @@ impl Bag1 {
                 Some((record, data_at, end))
             });
             let Some((record, data_at, end)) = whole else {
-                OpenChunk::note(complaint, format!("byte {at} of its contents starts no record"));
+                OpenChunk::note(complaint, format!("there is no record at byte {at} of its contents"));
                 return Ok(());
             };
             let len = end - data_at;
@@ -244,7 +245,7 @@ impl Bag1 {
             } else if record.op == Some(RecordKind::Message) {
                 let topic = record.u32("conn").and_then(|id| self.topic_of(id));
                 let Some((topic, log_ns)) = topic.zip(record.time_ns("time")) else {
-                    OpenChunk::note(complaint, format!("byte {at}: a message without connection or time"));
+                    OpenChunk::note(complaint, format!("byte {at}: the message has no connection or time"));
                     return Ok(());
                 };
                 if let Some(topic) = topic {
@@ -285,7 +286,7 @@ impl ChunkFile for Bag1 {
         let head = self.record(place.offset)?;
         let Some((record, end)) = head.filter(|(record, _)| record.op == Some(RecordKind::Chunk)) else {
             return Err(wrong(
-                "there is no chunk where the index says so; `rosbag reindex` makes a new index".into(),
+                "there is no chunk at the place in the index: rebuild the index with `rosbag reindex`".into(),
             ));
         };
         let claimed = u64::from(record.u32("size").unwrap_or_default());
@@ -293,8 +294,7 @@ impl ChunkFile for Bag1 {
         let data_at = place.offset + 8 + record.header_bytes;
         let data_bytes = end.saturating_sub(data_at);
         if claimed.max(data_bytes) > MAX_CHUNK_BYTES {
-            let reason =
-                "a chunk of more than 1 GiB is not read; record smaller ones (rosbag record --chunksize)";
+            let reason = "chunks of more than 1 GiB are not supported: record smaller ones (rosbag record --chunksize)";
             return Err(wrong(reason.into()));
         }
         let there = data_bytes.min(self.file.len.saturating_sub(data_at));
@@ -309,7 +309,7 @@ impl ChunkFile for Bag1 {
             false => plain(part, memory_bytes, input, &mut |_| {}),
         })?;
         let is_cut = there < data_bytes;
-        let cut = || Complaint { reason: "the file ends in the midst of it".to_owned(), is_broken: false };
+        let cut = || Complaint { reason: "the file ends within it".to_owned(), is_broken: false };
         let complaint = if is_cut { Some(cut()) } else { complaint };
         let mut chunk = OpenChunk { bytes, complaint };
         self.find_messages(&mut chunk, take)?;

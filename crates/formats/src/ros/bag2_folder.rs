@@ -46,7 +46,10 @@ impl Bag2Folder {
             let read = file.take(MAX_METADATA_BYTES + 1).read_to_end(&mut text);
             read.map_err(|error| Error::io(&metadata_path, "read", error))?;
             if text.len() as u64 > MAX_METADATA_BYTES {
-                let reason = format!("it is longer than {MAX_METADATA_BYTES} bytes; name the files instead");
+                let reason = format!(
+                    "it is longer than {MAX_METADATA_BYTES} bytes; use the recordings in the folder \
+                                      as inputs instead"
+                );
                 return Err(FormatError::at_offset(MAX_METADATA_BYTES, reason).in_input(&metadata_path));
             }
             let metadata = Bag2Metadata::of(&String::from_utf8_lossy(&text));
@@ -62,23 +65,23 @@ impl Bag2Folder {
         if files.len() < named {
             let again = named - files.len();
             remarks.push(format!(
-                "{}: names of files occur again ({again}); each file is read once",
+                "{}: file names are repeated ({again} times); each file is read once",
                 metadata_path.display()
             ));
         }
         // ROS 1 bags have no metadata file.
         if !metadata_path.is_file() && !files.iter().all(|file| is_bag1(file)) {
             let path = path.display();
-            remarks
-                .push(format!("{path} has no metadata.yaml: its files are read in the order of their names"));
+            remarks.push(format!("{path} has no metadata.yaml: its files are read in order of their names"));
         }
         if files.is_empty() {
-            let reason = "the folder holds no .mcap, .db3 or .bag file, and no metadata.yaml names one";
+            let reason =
+                "the folder contains no .mcap, .db3 or .bag file, and no metadata.yaml that lists one";
             return Err(Error::argument(path.display().to_string(), reason));
         }
         let format = metadata.compression_format.as_str();
         if !matches!(format, "" | "zstd") {
-            let reason = format!("compression_format `{format}` is not read; known: zstd");
+            let reason = format!("compression_format `{format}` is not supported; supported: zstd");
             return Err(FormatError::at_offset(0, reason).in_input(&metadata_path));
         }
         let mut recordings = Sequence::default();
@@ -107,10 +110,11 @@ fn find(folder: &Path, name: &str) -> Result<PathBuf> {
     candidates.into_iter().find(|path| path.is_file()).ok_or_else(|| {
         let reason = match is_inside {
             true => format!(
-                "metadata.yaml names {name}, which is not there; give the files that are there instead"
+                "metadata.yaml lists {name}, which does not exist; use the existing files as inputs instead"
             ),
             false => format!(
-                "metadata.yaml names {name}, which leads out of the folder and is not read; move the file into it"
+                "metadata.yaml lists {name}, which is outside of the folder and is not read; move the file into the \
+                 folder"
             ),
         };
         Error::argument(folder.display().to_string(), reason)

@@ -68,7 +68,7 @@ pub fn open_bag(paths: &[PathBuf], options: &BagOptions) -> Result<BagClouds> {
         .and_then(|poses| find_registered(recording.as_mut(), chosen.index, poses, options))
         .map_err(name_it)?;
     let topic = recording.topics().get(chosen.index).cloned();
-    let gone = || Error::argument(path.display().to_string(), "the topic of the clouds is gone");
+    let gone = || Error::argument(path.display().to_string(), "the topic of the clouds is missing now");
     let topic = topic.ok_or_else(gone)?;
     let wire = topic.wire.ok_or_else(gone)?;
     let camera = match chosen.camera {
@@ -98,7 +98,7 @@ fn read_camera(recording: &mut dyn Recording, index: usize, whole_bytes: u64) ->
     let topic = recording.topics().get(index).cloned();
     let (name, wire) = topic.map_or_else(Default::default, |topic| (topic.name, topic.wire));
     recording.begin(&[index])?;
-    let mut last = format!("depth images need their camera, but {name} holds no message");
+    let mut last = format!("depth images need their camera, but {name} has no message");
     loop {
         match recording.next_message() {
             Ok(Some(mut message)) => {
@@ -107,7 +107,7 @@ fn read_camera(recording: &mut dyn Recording, index: usize, whole_bytes: u64) ->
                 let decode = |data: &[u8]| CameraInfo::decode(wire.unwrap_or(Wire::Cdr), data);
                 match data.and_then(|data| decode(data).map_err(|error| error.to_string())) {
                     Ok(camera) => return Ok(camera),
-                    Err(error) => last = format!("no message of {name} can be used; the last: {error}"),
+                    Err(error) => last = format!("no message of {name} is valid; the last: {error}"),
                 }
             }
             Ok(None) => return Err(Error::argument("recording", last)),
@@ -237,8 +237,7 @@ impl CloudSource for BagClouds {
         remarks.extend(self.repaired.iter().map(|(repair, count)| format!("{count} clouds {repair}")));
         if self.without_stamp > 0 {
             let count = self.without_stamp;
-            remarks
-                .push(format!("{count} clouds have no stamp; they are taken as of when they were recorded"));
+            remarks.push(format!("{count} clouds have no stamp; their recording times are used"));
         }
         remarks
     }

@@ -115,12 +115,12 @@ impl BagPoses {
         let (messages, odd) = (topic.messages, self.track.odd);
         let unusable = match odd {
             0 => String::new(),
-            odd => format!("; {odd} are not valid, or their frames have no name"),
+            odd => format!("; {odd} are invalid or have unnamed frames"),
         };
         let bad = self.remarks.first().map(|bad| format!("; {bad}")).unwrap_or_default();
         let reason = format!(
-            "none of its {messages} messages gives a pose that can be used{unusable}{bad}; choose another topic, \
-             leave the option out for /tf, or name a file with `poses`"
+            "none of its {messages} messages contains a valid pose{unusable}{bad}; choose another topic, omit the \
+             option to use /tf, or give a file with `poses`"
         );
         Error::argument(format!("odometry {}", topic.name), reason)
     }
@@ -200,8 +200,7 @@ impl BagPoses {
         self.remarks.extend(intake.remarks());
         let count = unstamped.count + unstamped_track.count;
         if count > 0 {
-            self.remarks
-                .push(format!("{count} poses have no stamp; they are taken as of when they were recorded"));
+            self.remarks.push(format!("{count} poses have no stamp; their recording times are used"));
         }
         Ok(())
     }
@@ -362,14 +361,12 @@ impl BagPoses {
         }
         if odd > 0 {
             let remark = format!(
-                "{odd} poses are not valid, or of other frames than {parent} and {child}, and left out"
+                "{odd} poses are invalid or not of the frames {parent} and {child}, and were skipped"
             );
             self.remarks.push(remark);
         }
         if named.is_empty() && child != UNNAMED_BODY {
-            self.remarks.push(format!(
-                "the poses do not say of which frame they are; they are taken as those of {child}"
-            ));
+            self.remarks.push(format!("the poses do not name their child frame; {child} is assumed"));
         }
     }
 
@@ -390,7 +387,8 @@ impl BagPoses {
         let registered = registered.map(|(frame, body)| {
             let option = self.odometry_topic.as_ref();
             let option = option.map(|topic| format!(" (`odometry` {topic} `world_frame`)")).unwrap_or_default();
-            format!("the clouds are in the frame {frame} already: they are taken as they are, seen from {body}{option}")
+            format!("the clouds are already in the frame {frame}: their points are not transformed, and rays start at \
+                     {body}{option}")
         });
         self.remarks.iter().cloned().chain(registered).chain(without).chain(hints)
     }

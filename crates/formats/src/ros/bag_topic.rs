@@ -39,7 +39,7 @@ pub(super) fn choose_clouds(
             let type_name = topic.map_or("", |topic| topic.type_name.as_str());
             let packets = topic.and_then(packets_of).map(|packets| packets + "; ").unwrap_or_default();
             let list = list(topics.iter());
-            let reason = format!("messages of type {type_name} are no clouds; {packets}topics: {list}");
+            let reason = format!("messages of type {type_name} are not clouds; {packets}topics: {list}");
             return Err(Error::argument(format!("topic {name}"), reason));
         };
         let mut chosen = chosen(&topics, index, kind)?;
@@ -48,7 +48,10 @@ pub(super) fn choose_clouds(
             && images.holds_depths() == Some(false)
         {
             let encoding = &images.encoding;
-            chosen.remarks.push(format!("{} ({encoding}) is read as depths, as it was named", topic.name));
+            chosen.remarks.push(format!(
+                "{} ({encoding}) is read as depth images, because it was selected",
+                topic.name
+            ));
         }
         return Ok(chosen);
     }
@@ -61,7 +64,7 @@ pub(super) fn choose_poses(topics: &[Topic], name: Option<&str>) -> Result<usize
         let index = named(topics, name, "odometry")?;
         let topic = topics.get(index).filter(|topic| kind_of(topic).is_some_and(MessageKind::is_pose));
         return topic.map(|_| index).ok_or_else(|| {
-            let reason = format!("its messages are no poses; topics: {}", list(topics.iter()));
+            let reason = format!("its messages are not poses; topics: {}", list(topics.iter()));
             Error::argument(format!("odometry {name}"), reason)
         });
     }
@@ -75,14 +78,14 @@ pub(super) fn choose_poses(topics: &[Topic], name: Option<&str>) -> Result<usize
         ([], [topic]) => index_of(topics, topic),
         ([], []) => {
             let reason = format!(
-                "no topic holds poses (Odometry, PoseStamped, Path); topics: {}",
+                "no topic contains poses (Odometry, PoseStamped, Path); topics: {}",
                 list(topics.iter())
             );
             Err(Error::argument("recording", reason))
         }
         _ => {
             let found = list(found.into_iter());
-            let reason = format!("several topics hold poses; choose one with `odometry` NAME: {found}");
+            let reason = format!("several topics contain poses; choose one with `odometry` NAME: {found}");
             Err(Error::argument("recording", reason))
         }
     }
@@ -90,7 +93,7 @@ pub(super) fn choose_poses(topics: &[Topic], name: Option<&str>) -> Result<usize
 
 fn index_of(topics: &[Topic], wanted: &Topic) -> Result<usize> {
     let index = topics.iter().position(|topic| topic == wanted);
-    index.ok_or_else(|| Error::argument("recording", "the topic is gone"))
+    index.ok_or_else(|| Error::argument("recording", "the topic is missing now"))
 }
 
 fn named(topics: &[Topic], name: &str, option: &str) -> Result<usize> {

@@ -104,7 +104,7 @@ pub(super) fn decompress(
             Err(error) => (Bytes::default(), Some(bare(error.to_string()))),
         },
         other => {
-            let reason = format!("compression `{other}` is not known; known: none, bz2, lz4, zstd");
+            let reason = format!("compression `{other}` is not supported; supported: none, bz2, lz4, zstd");
             (Bytes::default(), Some(bare(reason)))
         }
     };

@@ -77,7 +77,7 @@ pub(super) trait ChunkFile {
                 continue;
             }
             self.order().open(Ok(chunk.bytes), sorted, whole)?;
-            let reason = format!("a chunk is damaged: {reason}; {whole} messages of it can be read");
+            let reason = format!("a chunk is damaged: {reason}; {whole} of its messages can be read");
             return Err(FormatError::at_offset(place.offset, reason).in_input(self.path()));
         }
     }
@@ -123,7 +123,7 @@ pub(super) fn check_chunks(chunks: usize, shares: Shares, path: &Path) -> Result
         return Ok(());
     }
     let reason = format!(
-        "has more than {} chunks, whose places would exceed {} bytes of memory: raise `memory`, or record with larger \
+        "has more than {} chunks, whose index would exceed {} bytes of memory: raise `memory`, or record with larger \
          chunks",
         chunks, shares.places
     );

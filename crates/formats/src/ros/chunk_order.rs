@@ -43,7 +43,7 @@ pub(super) struct BrokenChunk {
 impl BrokenChunk {
     fn error(&self, log_ns: i64) -> Error {
         let reason =
-            format!("a chunk is damaged: {}; its message recorded at {log_ns} ns is left out", self.reason);
+            format!("a chunk is damaged: {}; its message recorded at {log_ns} ns is skipped", self.reason);
         FormatError::at_offset(self.offset, reason).in_input(&self.path)
     }
 }
@@ -130,7 +130,7 @@ impl ChunkOrder {
     /// Returns a remark for the user about the order of a file's messages.
     pub(super) fn remark(&self, path: &Path) -> Option<String> {
         let text =
-            || format!("{}: its chunks overlap so much that messages come out of order", path.display());
+            || format!("{}: its chunks overlap so much that messages are out of order", path.display());
         self.has_given_up.then(text)
     }
 

@@ -32,7 +32,7 @@ impl<'a> CloudMessage<'a> {
             (MessageKind::CompressedImage, Some(camera)) => {
                 Self::CompressedDepth(CompressedDepth::decode(wire, data)?, camera)
             }
-            _ => return Err(WireError { byte: 0, reason: "it is no cloud".to_owned() }),
+            _ => return Err(WireError { byte: 0, reason: "it is not a cloud".to_owned() }),
         })
     }
 

@@ -108,19 +108,23 @@ impl CloudTopics {
                 let name = of(only).map_or("", |topic| topic.name.as_str());
                 if let Some(encoding) = &only.guessed {
                     chosen.remarks.push(format!(
-                        "{name} is read as depths because of its encoding {encoding}: its name does not say so"
+                        "{name} is read as depth images because of its encoding {encoding}, although its name does not \
+                         contain \"depth\""
                     ));
                 }
                 if !rest.is_empty() {
                     let rest = list(rest.iter().filter_map(of));
-                    chosen.remarks.push(format!("{name} is read; `topic` NAME takes another one: {rest}"));
+                    chosen.remarks.push(format!(
+                        "{name} is read; other topics can be chosen with `topic` NAME: {rest}"
+                    ));
                 }
-                chosen.remarks.extend(self.why_unsure().map(|why| format!("left out: {why}")));
+                chosen.remarks.extend(self.why_unsure().map(|why| format!("ignored: {why}")));
                 Ok(chosen)
             }
             several => {
                 let several = list(several.iter().filter_map(of));
-                let reason = format!("several topics hold clouds; choose one with `topic` NAME: {several}");
+                let reason =
+                    format!("several topics contain clouds; choose one with `topic` NAME: {several}");
                 Err(Error::argument("recording", reason))
             }
         }
@@ -129,7 +133,7 @@ impl CloudTopics {
     fn why_unsure(&self) -> Option<String> {
         (!self.unsure.is_empty()).then(|| {
             format!(
-                "images whose names do not say that they are depths: {}; if they are, name the topic with `topic`",
+                "images that are not named as depth: {}; if they are depth images, select the topic with `topic`",
                 named(&self.unsure)
             )
         })
@@ -140,11 +144,11 @@ impl CloudTopics {
         let found_out =
             recording.remarks().into_iter().fold(String::new(), |all, remark| all + "; " + &remark);
         if topics.is_empty() {
-            return format!("it holds no topics{found_out}");
+            return format!("it contains no topics{found_out}");
         }
         let list = list(topics.iter());
         if topics.iter().all(|topic| topic.messages == 0) {
-            return format!("it holds no messages{found_out}; topics: {list}");
+            return format!("it contains no messages{found_out}; topics: {list}");
         }
         let camera = (!self.without_camera.is_empty()).then(|| {
             let names: Vec<String> = self
@@ -159,13 +163,16 @@ impl CloudTopics {
         let is_unread = |topic: &&Topic| topic.messages > 0 && topic.wire.is_none();
         let unread: Vec<String> = topics.iter().filter(is_unread).map(|topic| topic.name.clone()).collect();
         let unread = (!unread.is_empty()).then(|| {
-            format!("messages that are serialised otherwise than by ROS are not read: {}", named(&unread))
+            format!(
+                "messages with another serialization than that of ROS are not supported: {}",
+                named(&unread)
+            )
         });
         let whys = self.why_unsure().into_iter().chain(camera).chain(packets).chain(unread);
         let whys = whys.fold(String::new(), |all, why| all + "; " + &why);
         format!(
-            "no topic holds clouds (PointCloud2, PointCloud, CustomMsg of Livox, LaserScan, depth images){whys}\
-             {found_out}; topics: {list}"
+            "no topic contains clouds (PointCloud2, PointCloud, CustomMsg of Livox, LaserScan, depth \
+             images){whys}{found_out}; topics: {list}"
         )
     }
 }
@@ -173,7 +180,7 @@ impl CloudTopics {
 /// Returns advice for a topic of packets.
 pub(super) fn packets_of(topic: &Topic) -> Option<String> {
     let driver = driver_of(&topic.type_name)?;
-    Some(format!("{} holds no points: {driver} makes clouds of it, whose topic can be read", topic.name))
+    Some(format!("{} contains no points: convert it to clouds with {driver} and use that topic", topic.name))
 }
 
 fn named(names: &[String]) -> String {

@@ -219,7 +219,8 @@ impl Recording for Db3 {
             Ok(kept) => kept?,
             Err(error) => {
                 let path = self.database.path.display();
-                let remark = format!("{path} is damaged ({error}): {found} messages were found before that");
+                let remark =
+                    format!("{path} is damaged ({error}): {found} messages were found before the damage");
                 if !self.remarks.contains(&remark) {
                     self.remarks.push(remark);
                 }
@@ -246,5 +247,5 @@ impl Recording for Db3 {
 }
 
 fn wrong(path: &Path, row: u64, error: &rusqlite::Error) -> Error {
-    FormatError::at_record(row, format!("it cannot be read as a bag of ROS 2: {error}")).in_input(path)
+    FormatError::at_record(row, format!("it cannot be read as a ROS 2 bag: {error}")).in_input(path)
 }

@@ -114,8 +114,8 @@ impl Input {
 /// Describes where a record is truncated, as the end of a remark.
 pub(super) fn cut_at(at: u64, file_bytes: u64, end: Option<u64>) -> String {
     match end {
-        Some(end) => format!(" at byte {file_bytes}: the record from byte {at} on should end at byte {end}"),
-        None => format!(" at byte {file_bytes}, in the record from byte {at} on"),
+        Some(end) => format!(" at byte {file_bytes}: the record at byte {at} should end at byte {end}"),
+        None => format!(" at byte {file_bytes}, in the record at byte {at}"),
     }
 }
 

@@ -57,8 +57,11 @@ impl McapFile {
     pub fn open_within(path: &Path, budget: &Budget) -> Result<Self> {
         let mut file = FileBytes::open(path)?;
         if file.read_at(0, MAGIC.len() as u64)? != MAGIC {
-            return Err(FormatError::at_offset(0, "it does not start as an MCAP file (version 0) does")
-                .in_input(path));
+            return Err(FormatError::at_offset(
+                0,
+                "it does not start with the signature of an MCAP file (version 0)",
+            )
+            .in_input(path));
         }
         let mut mcap = Self {
             file,
@@ -203,8 +206,8 @@ impl McapFile {
         if !is_closed {
             let messages = walk.messages;
             self.remarks.push(format!(
-                "{} has no end (the recorder did not close it, or it was cut off{cut}): {messages} messages were found \
-                 by reading it whole",
+                "{} has no footer (the recorder did not close it, or it was truncated{cut}): {messages} messages were \
+                 found by reading the whole file",
                 self.file.path().display()
             ));
         }
@@ -248,7 +251,7 @@ impl McapFile {
                 Some((kind, count, end))
             });
             let Some((kind, count, end)) = whole else {
-                OpenChunk::note(complaint, format!("byte {at} of its contents starts no record"));
+                OpenChunk::note(complaint, format!("there is no record at byte {at} of its contents"));
                 return Ok(());
             };
             let most_bytes = match kind {
@@ -268,7 +271,7 @@ impl McapFile {
                     let known =
                         head.and_then(|(channel, log_ns)| Some((self.channels.topic(channel)?, log_ns)));
                     let Some((topic, log_ns)) = known else {
-                        OpenChunk::note(complaint, format!("byte {at}: a message without a channel"));
+                        OpenChunk::note(complaint, format!("byte {at}: the message has no channel"));
                         return Ok(());
                     };
                     let start = start + MESSAGE_HEAD_BYTES;
@@ -288,10 +291,12 @@ impl McapFile {
         let path = self.file.path().to_owned();
         let wrong = |reason: &str| FormatError::at_offset(place.offset, reason).in_input(&path);
         let too_large =
-            || wrong("a chunk of more than 1 GiB is not read; record with smaller chunks (`mcap recover`)");
+            || wrong("chunks of more than 1 GiB are not supported: write smaller chunks (`mcap recover`)");
         let head = self.head(place.offset)?;
         let Some((_, bytes)) = head.filter(|(kind, _)| *kind == op::CHUNK) else {
-            return Err(wrong("there is no chunk where the index says so; `mcap recover` makes a new index"));
+            return Err(wrong(
+                "there is no chunk at the place in the index: rebuild the index with `mcap recover`",
+            ));
         };
         if bytes > MAX_CHUNK_BYTES {
             return Err(too_large());
@@ -299,7 +304,7 @@ impl McapFile {
         let contents_at = place.offset.saturating_add(RECORD_HEAD_BYTES);
         let there = bytes.min(self.file.len.saturating_sub(contents_at));
         let start = self.file.read_at(contents_at, there.min(ChunkHead::MAX_BYTES))?;
-        let head = ChunkHead::of(&start).ok_or_else(|| wrong("a chunk is cut off in its header"))?;
+        let head = ChunkHead::of(&start).ok_or_else(|| wrong("the header of a chunk is truncated"))?;
         if head.plain_bytes > MAX_CHUNK_BYTES {
             return Err(too_large());
         }
@@ -324,7 +329,7 @@ impl McapFile {
         })?;
         if is_cut {
             // Truncation also explains a wrong checksum.
-            let reason = "the file ends in the midst of it".to_owned();
+            let reason = "the file ends within it".to_owned();
             return Ok(OpenChunk { bytes, complaint: Some(Complaint { reason, is_broken: false }) });
         }
         let has_checksum = head.crc != 0;

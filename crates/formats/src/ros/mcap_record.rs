@@ -128,7 +128,7 @@ impl ChunkHead {
         let (found, wanted) = (plain.finalize(), self.crc);
         let reason = || {
             format!(
-                "its contents are damaged: their checksum is {found:08x}, that in its header {wanted:08x}"
+                "its contents are damaged: their checksum is {found:08x}, but its header states {wanted:08x}"
             )
         };
         (wanted != 0 && found != wanted).then(|| Complaint { reason: reason(), is_broken: true })

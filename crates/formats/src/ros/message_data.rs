@@ -33,8 +33,8 @@ impl MessageData {
         if let Bytes::File(part) = &self.0 {
             if part.len() > most_bytes {
                 let reason = format!(
-                    "{} bytes; at most {most_bytes} bytes of a message of its kind are held in memory: raise `memory`, \
-                     or leave the topic out",
+                    "{} bytes; messages of its kind must fit in {most_bytes} bytes of memory: raise `memory`, or do \
+                     not select the topic",
                     part.len()
                 );
                 return Err(Error::argument("message", reason));

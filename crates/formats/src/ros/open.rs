@@ -34,7 +34,7 @@ pub fn open_recording_within(paths: &[PathBuf], budget: &Budget) -> Result<Box<d
         }
     };
     match paths {
-        [] => Err(Error::argument("recording", "no file is given")),
+        [] => Err(Error::argument("recording", "no file was given")),
         [path] => open(path),
         paths => {
             let mut parts = Sequence::default();
@@ -66,7 +66,7 @@ pub(super) fn open_plain_file(path: &Path, budget: &Budget) -> Result<Box<dyn Re
         Some("mcap") => Ok(Box::new(PackedMessages::new(McapFile::open_within(path, budget)?, path, budget))),
         Some("db3") => open_db3(path, budget),
         _ => {
-            let reason = "it is no recording by its content or its name; known: .bag, .mcap, .db3, a folder with \
+            let reason = "it is not a supported recording; supported: .bag, .mcap, .db3, or a folder with \
                           metadata.yaml";
             Err(Error::argument(path.display().to_string(), reason))
         }
@@ -81,6 +81,6 @@ fn open_db3(path: &Path, budget: &Budget) -> Result<Box<dyn Recording>> {
 #[cfg(not(feature = "sqlite"))]
 fn open_db3(path: &Path, _: &Budget) -> Result<Box<dyn Recording>> {
     let reason =
-        "this program was built without SQLite (feature `sqlite`); `ros2 bag convert` makes an .mcap of it";
+        "this build does not support SQLite (feature `sqlite`): convert it to .mcap with `ros2 bag convert`";
     Err(Error::argument(path.display().to_string(), reason))
 }

@@ -34,14 +34,15 @@ impl PackedFile {
         let folder = tempfile::tempdir_in(&scratch)
             .map_err(|error| Error::io(&scratch, "unpack a recording into", error))?;
         let (plain, damage) = unpack(path, folder.path(), budget)?;
-        let damaged = damage.map(|damage| format!("it is cut off or damaged ({damage})"));
+        let damaged = damage.map(|damage| format!("it is truncated or damaged ({damage})"));
         // The name of the temporary file would not help the user.
         let recording = open_plain_file(&plain, budget).map_err(|error| {
             let damaged = damaged.as_deref().unwrap_or("it was unpacked");
-            let reason = format!("{damaged}, and what is in it cannot be read: {error:#}");
+            let reason = format!("{damaged}, but its contents cannot be read: {error:#}");
             FormatError::at_offset(0, reason).in_input(path)
         })?;
-        let remark = damaged.map(|damaged| format!("{}: {damaged}; read as far as it goes", path.display()));
+        let remark =
+            damaged.map(|damaged| format!("{}: {damaged}; the readable part is used", path.display()));
         Ok(Self { recording, remark, _unpacked: folder })
     }
 }

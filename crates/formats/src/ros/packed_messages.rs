@@ -42,7 +42,7 @@ impl<R: Recording> PackedMessages<R> {
         };
         if let Some(complaint) = complaint {
             let (log_ns, why) = (message.log_ns, complaint.reason);
-            let reason = format!("a message recorded at {log_ns} ns cannot be unpacked: {why}");
+            let reason = format!("a message recorded at {log_ns} ns cannot be decompressed: {why}");
             return Err(Error::argument(self.path.display().to_string(), reason));
         }
         Ok(Message { data: MessageData(data), ..message })

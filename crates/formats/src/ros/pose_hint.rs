@@ -15,8 +15,8 @@ pub(super) fn topics_with_poses(topics: &[Topic]) -> Option<String> {
         .map(|topic| format!("{} ({}, {} messages)", topic.name, topic.type_name, topic.messages))
         .collect();
     Some(format!(
-        "poses are in {}: name their topic, as with `odometry` {first}, and `world_frame` if the points are in the \
-         frame of the map already",
+        "there are poses in {}: select their topic, for instance `odometry` {first}, and add `world_frame` if the \
+         points are already in the map frame",
         all.join(", ")
     ))
 }

@@ -31,13 +31,12 @@ pub(crate) fn open(path: &Path, options: &ReadOptions) -> Result<Box<dyn CloudSo
 /// Rejects options for values that the recording contains itself, which would be ignored.
 fn check(options: &ReadOptions) -> Result<()> {
     if options.depth_scale.is_some() {
-        let reason = "depth images of a recording say themselves what they are in, 16UC1 millimetres and 32FC1 metres: \
-                      leave it out";
+        let reason = "depth images of a recording have a fixed unit, millimetres for 16UC1 and metres for 32FC1: omit \
+                      this option";
         return Err(Error::argument("depth_scale", reason));
     }
     if options.intrinsics_path.is_some() || options.intrinsics.is_some() {
-        let reason =
-            "the camera of a recording is in the topic `camera_info` beside its depth images: leave it out";
+        let reason = "a recording contains its camera in a topic `camera_info`: omit this option";
         return Err(Error::argument("intrinsics", reason));
     }
     Ok(())

@@ -61,8 +61,8 @@ pub(super) fn find_registered(
         let names: Vec<&str> = from_here.iter().map(|odometry| odometry.topic.as_str()).collect();
         let (first, names) = (names.first().copied().unwrap_or_default(), names.join(", "));
         poses.hint(format!(
-            "the clouds are in the frame {frame} already, in which several topics say where the sensor was ({names}): \
-             name one, as with `odometry` {first} `world_frame`"
+            "the clouds are already in the frame {frame}, and several topics contain sensor poses in it ({names}): \
+             select one, for instance `odometry` {first} `world_frame`"
         ));
     }
     Ok(poses)

@@ -28,7 +28,7 @@ impl fmt::Display for SecondParent {
             let cut = if self.loop_frames.len() > MAX_FRAMES { " .." } else { "" };
             let frames: Vec<String> =
                 self.loop_frames.iter().take(MAX_FRAMES).map(|frame| name(frame)).collect();
-            write!(f, ", which makes a loop ({child} in {}{cut})", frames.join(" in "))?;
+            write!(f, ", which closes a loop ({child} in {}{cut})", frames.join(" in "))?;
         }
         Ok(())
     }

@@ -55,12 +55,12 @@ impl TransformIntake {
         let Self { beyond, invalid, first_invalid, seconds, .. } = self;
         let beyond = (beyond > 0).then(|| {
             format!(
-                "{beyond} transforms are left out: their frames are more than {MAX_LINKS}, or have names of more than \
+                "{beyond} transforms were skipped: there are more than {MAX_LINKS} frames, or frame names exceed \
                  {MAX_NAME_BYTES} bytes"
             )
         });
         let invalid = first_invalid
-            .map(|first| format!("{invalid} transforms are not valid and left out; the first: {first}"));
+            .map(|first| format!("{invalid} transforms are invalid and were skipped; the first: {first}"));
         beyond.into_iter().chain(invalid).chain(seconds.into_iter().map(remark_on)).collect()
     }
 }
@@ -68,7 +68,7 @@ impl TransformIntake {
 /// Explains the consequence of a second parent.
 pub(super) fn remark_on(second: SecondParent) -> String {
     format!(
-        "{second}; a parent named by one transform, or one that closes a loop, is used only if no other leads to the \
-         map frame"
+        "{second}; a parent that appears in a single transform or closes a loop is only used if no other parent leads \
+         to the map frame"
     )
 }

@@ -44,14 +44,14 @@ pub enum WhyNot {
     #[error("no transform names the frame {0}")]
     UnknownFrame(String),
     /// Both frames are known, but not connected.
-    #[error("nothing connects the frames {0} and {1}")]
+    #[error("the frames {0} and {1} are not connected")]
     NotConnected(String, String),
     /// A frame is its own ancestor.
     #[error("the frame {0} is its own ancestor")]
     Loop(String),
     /// The frame has more ancestors than the limit.
     #[error(
-        "too many frames are above the frame {0}: name a nearer frame with `fixed_frame` (ROS 2 node: `frame_id`)"
+        "the frame {0} has too many ancestors: select a closer frame with `fixed_frame` (ROS 2 node: `frame_id`)"
     )]
     TooManyFrames(String),
     /// The stamp is before the first transform of a frame.
@@ -62,14 +62,14 @@ pub enum WhyNot {
     After(String),
     /// The transforms before and after the stamp are too far apart.
     #[error(
-        "the transforms of {0} before and after the stamp are too far apart; `pose_tolerance` allows for more"
+        "the transforms of {0} before and after the stamp are too far apart; `pose_tolerance` permits larger gaps"
     )]
     Gap(String),
     /// The frame does not move in any other frame, so its pose is unknown.
-    #[error("no transform says how {0} moves")]
+    #[error("no transform describes how {0} moves")]
     NothingMoves(String),
     /// The points are already in the fixed frame, and the sensor position is unknown.
-    #[error("the points are in the frame {0} already; nothing says where the sensor was")]
+    #[error("the points are already in the frame {0}, but the sensor position is unknown")]
     AlreadyFixed(String),
     /// A temporary file cannot be read.
     #[error("{0}")]
@@ -84,10 +84,10 @@ pub enum BadTransform {
     #[error("a frame has no name")]
     NoName,
     /// Parent and child are the same frame.
-    #[error("the frame {0} is in itself")]
+    #[error("the frame {0} is its own parent")]
     InItself(String),
     /// Numbers are not finite, or the length of the quaternion differs from 1 by more than 0.1.
-    #[error("the pose of {0} has numbers that are not finite, or a quaternion whose length is not 1")]
+    #[error("the pose of {0} has a number that is not finite, or a quaternion with a length other than 1")]
     Pose(String),
 }
 

@@ -89,7 +89,7 @@ impl<'a> WireReader<'a> {
             [0, 7] => (false, 4),
             [high, low] => {
                 let reason =
-                    format!("the header says representation {high:02x} {low:02x}; plain CDR is 00 01");
+                    format!("the header states representation {high:02x} {low:02x}, but plain CDR is 00 01");
                 return Err(WireError { byte: 0, reason });
             }
         };
@@ -120,9 +120,13 @@ impl<'a> WireReader<'a> {
         let taken = self.at.checked_add(count).and_then(|end| self.bytes.get(self.at..end));
         let bytes = taken.ok_or_else(|| {
             if count <= self.remaining() {
-                return self.error(format!("more than {} bytes before the points", self.bytes.len()));
+                return self
+                    .error(format!("there are more than {} bytes before the points", self.bytes.len()));
             }
-            self.error(format!("{count} bytes are wanted, {} are left: it is cut off", self.remaining()))
+            self.error(format!(
+                "{count} bytes are needed, but {} are left: the message is truncated",
+                self.remaining()
+            ))
         })?;
         self.at += count;
         Ok(bytes)
@@ -137,7 +141,7 @@ impl<'a> WireReader<'a> {
         let count = self.u32()? as usize;
         if count.checked_mul(least_item_bytes.max(1)).is_none_or(|bytes| bytes > self.remaining()) {
             let left = self.remaining();
-            return Err(self.error(format!("a sequence claims {count} items; {left} bytes are left")));
+            return Err(self.error(format!("a sequence has {count} items, but {left} bytes are left")));
         }
         Ok(count)
     }
@@ -205,7 +209,7 @@ impl<'a> WireReader<'a> {
         }
         let at = self.at;
         let bytes = self.bytes(N)?;
-        bytes.try_into().map_err(|_| WireError { byte: at, reason: "it is cut off".to_owned() })
+        bytes.try_into().map_err(|_| WireError { byte: at, reason: "the message is truncated".to_owned() })
     }
 }
 

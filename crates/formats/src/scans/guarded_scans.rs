@@ -39,7 +39,8 @@ impl GuardedScans {
 
 fn fault(path: &Path, place: &str) -> Error {
     let reason = format!(
-        "reading it met a fault in the program or one of its libraries ({place}): please report this message with the file"
+        "reading it caused an internal error in voxtile or one of its libraries ({place}): please report this message \
+         together with the file"
     );
     Error::argument(path.display().to_string(), reason)
 }
@@ -126,6 +127,6 @@ mod tests {
         assert!(error.starts_with("odd.las: ") && error.contains("guarded_scans.rs:"), "{error}");
         assert!(!scans.pass_unread() && scans.next_scan().unwrap().is_none());
         let error = GuardedScans::open(path, || panic!("while it is opened")).err().unwrap();
-        assert!(error.to_string().starts_with("odd.las: reading it met a fault"), "{error}");
+        assert!(error.to_string().starts_with("odd.las: reading it caused an internal error"), "{error}");
     }
 }

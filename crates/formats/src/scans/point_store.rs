@@ -51,7 +51,7 @@ impl PointRoom {
     /// Creates an unnamed temporary file.
     fn file(&self) -> Result<ScratchFile> {
         ScratchFile::in_folder(&self.folder).map_err(|error| {
-            Error::io(&self.folder, "keep the points of a scan in a temporary file in", error)
+            Error::io(&self.folder, "store the points of a scan in a temporary file in", error)
         })
     }
 
@@ -129,7 +129,7 @@ impl PointStore {
             None => self.room.file()?,
         };
         let cannot =
-            |error| Error::io(self.room.folder(), "keep the points of a scan in a temporary file in", error);
+            |error| Error::io(self.room.folder(), "store the points of a scan in a temporary file in", error);
         let mut bytes = Vec::with_capacity(POINTS_AT_A_TIME * RECORD_BYTES);
         for (chunk, points) in self.points.chunks(POINTS_AT_A_TIME).enumerate() {
             bytes.clear();
@@ -207,7 +207,7 @@ impl PointStore {
             None => Err(io::ErrorKind::UnexpectedEof.into()),
         };
         window.map_err(|error| {
-            Error::io(self.room.folder(), "read the points of a scan back from a temporary file in", error)
+            Error::io(self.room.folder(), "read the points of a scan from a temporary file in", error)
         })
     }
 

@@ -74,7 +74,7 @@ impl<W: Write> ScanStreamWriter<W> {
     ) -> io::Result<()> {
         let count = u32::try_from(points.len()).map_err(|_| invalid("more than 2^32 - 1 points"))?;
         if self.has_intensities && intensities.is_none_or(|all| all.len() != points.len()) {
-            return Err(invalid("the scan has not one intensity a point"));
+            return Err(invalid("the scan does not have one intensity per point"));
         }
         self.scan.clear();
         self.scan.extend(count.to_le_bytes());

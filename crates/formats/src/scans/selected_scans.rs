@@ -81,7 +81,7 @@ impl SelectedScans {
                 Ok(_) => {}
                 Err(error) if !self.source.pass_unread() => return Err(error),
                 Err(error) => {
-                    log::debug!("scan {} is passed over and cannot be read: {error}", self.passed);
+                    log::debug!("skipped scan {} cannot be read: {error}", self.passed);
                     self.bad += 1;
                 }
             }
@@ -173,7 +173,7 @@ impl ScanSource for SelectedScans {
     fn remarks(&self) -> Vec<String> {
         let mut remarks = self.source.remarks();
         if self.bad > 0 {
-            remarks.push(format!("{} of the scans that were passed over cannot be read", self.bad));
+            remarks.push(format!("{} of the skipped scans cannot be read", self.bad));
         }
         remarks
     }

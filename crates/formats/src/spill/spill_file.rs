@@ -75,7 +75,7 @@ impl SpillFile {
         let (mut start, mut complaint) = (Vec::new(), None);
         let broken = |error: std::io::Error| Complaint { reason: error.to_string(), is_broken: true };
         let (most_bytes, limit) = (size.most(), size.most().saturating_add(1));
-        let reason = format!("it holds more than the {most_bytes} bytes that it {}", size.word());
+        let reason = format!("it contains more than the {most_bytes} bytes that it {}", size.word());
         let too_many = Complaint { reason, is_broken: false };
         // Streams with a larger stated size go directly to the file.
         let first_bytes = match size {

@@ -27,16 +27,19 @@ impl AutowareSink {
     pub(super) fn create(head: &VoxelsHead, folder: &Path, options: &WriteOptions) -> Result<Self> {
         let cell_m = options.cell_m;
         if !(cell_m >= 1.0 && cell_m.fract() == 0.0 && cell_m <= 1e6) {
-            let reason = format!("{cell_m} m; squares have an edge of whole metres, from 1 m on");
+            let reason = format!(
+                "{cell_m} m is invalid: the edge of squares must be a whole number of metres, at \
+                                  least 1"
+            );
             return Err(Error::argument("cell", reason));
         }
         if options.origin_m.iter().any(|origin| !origin.is_finite()) {
-            return Err(Error::argument("origin", format!("{:?} is no point", options.origin_m)));
+            return Err(Error::argument("origin", format!("{:?} is not a point", options.origin_m)));
         }
         fs::create_dir_all(folder).map_err(|error| Error::io(folder, "create", error))?;
         let mut files = fs::read_dir(folder).map_err(|error| Error::io(folder, "read", error))?;
         if files.next().is_some() {
-            let reason = "the folder has files in it, which would be loaded too; name an empty one";
+            let reason = "the folder is not empty, and its files would be loaded too: use an empty folder";
             return Err(Error::argument(folder.display().to_string(), reason));
         }
         Ok(Self {
@@ -81,7 +84,7 @@ impl VoxelSink for AutowareSink {
         };
         if (0..3).any(is_far) {
             let reason = format!(
-                "single precision cannot hold voxels of {} m at {:?} m; give an origin near the map that is subtracted",
+                "single precision is too coarse for voxels of {} m at {:?} m: set `origin` to a point near the map",
                 self.resolution_m, voxel.center_m
             );
             return Err(Error::argument("origin", reason));

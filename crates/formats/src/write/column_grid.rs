@@ -32,7 +32,7 @@ impl<T: Copy> ColumnGrid<T> {
         let count = width.checked_mul(height).filter(|&count| count <= MAX_CELLS);
         let too_large = || {
             let reason = format!(
-                "{width} x {height} cells of {} m; at most {MAX_CELLS} can be written: choose a region, or write coarser \
+                "{width} x {height} cells of {} m; at most {MAX_CELLS} are supported: choose a region, or use coarser \
                  voxels",
                 head.resolution_m
             );
@@ -59,7 +59,7 @@ impl<T: Copy> ColumnGrid<T> {
         let cell = inside(x, self.width).zip(row).filter(|_| (0..self.layers).contains(&z));
         let cell = cell.and_then(|(x, row)| self.cells.get_mut(row * self.width + x));
         let outside = || {
-            let reason = format!("voxel {:?} lies outside the box that was announced", voxel.index);
+            let reason = format!("voxel {:?} is outside of the announced bounds", voxel.index);
             Error::argument("flat map", reason)
         };
         cell.map(|cell| (cell, z)).ok_or_else(outside)
@@ -88,5 +88,5 @@ impl<T: Copy> ColumnGrid<T> {
 
 /// Returns the error for a 2D grid without voxels.
 pub(super) fn nothing_to_draw() -> Error {
-    Error::argument("flat map", "there are no voxels to draw; a picture needs at least one")
+    Error::argument("flat map", "there are no voxels; an image needs at least one")
 }

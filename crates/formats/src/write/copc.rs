@@ -77,7 +77,7 @@ impl Cube {
             let at = i64::from(voxel.index[k]) - self.lowest[k];
             let inside = u32::try_from(at).ok().filter(|&at| f64::from(at) < self.levels.edge_voxels());
             *inside_index = inside.ok_or_else(|| {
-                let reason = format!("voxel {:?} lies outside the box that was announced", voxel.index);
+                let reason = format!("voxel {:?} is outside of the announced bounds", voxel.index);
                 Error::argument("COPC", reason)
             })?;
         }

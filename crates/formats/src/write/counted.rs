@@ -23,12 +23,12 @@ impl<'a> Counted<'a> {
 impl VoxelSink for Counted<'_> {
     fn put(&mut self, voxel: &VoxelRow) -> Result<()> {
         if self.seen == self.announced {
-            let reason = format!("more than the {} voxels that were announced", self.announced);
+            let reason = format!("there are more than the {} announced voxels", self.announced);
             return Err(self.wrong(reason));
         }
         let numbers = voxel.center_m.iter().chain([&voxel.probability, &voxel.log_odds]);
         if let Some(number) = numbers.copied().find(|number| !number.is_finite()) {
-            return Err(self.wrong(format!("voxel {:?} has the number {number}", voxel.index)));
+            return Err(self.wrong(format!("voxel {:?} has the invalid value {number}", voxel.index)));
         }
         self.inner.put(voxel)?;
         self.seen += 1;
@@ -37,7 +37,8 @@ impl VoxelSink for Counted<'_> {
 
     fn finish(self: Box<Self>) -> Result<()> {
         if self.seen < self.announced {
-            let reason = format!("{} voxels of the {} that were announced", self.seen, self.announced);
+            let reason =
+                format!("only {} of the {} announced voxels were written", self.seen, self.announced);
             return Err(self.wrong(reason));
         }
         self.inner.finish()

@@ -75,7 +75,7 @@ fn as_cdata(crs: &str) -> Result<String> {
     let is_xml = |c: char| matches!(c, '\t' | '\n' | '\r' | ' '..='\u{fffd}' | '\u{10000}'..);
     if let Some(c) = crs.chars().find(|c| !is_xml(*c)) {
         let reason =
-            format!("has the character {c:?}, which no E57 file can hold; export .las, .laz or .ply");
+            format!("contains the character {c:?}, which E57 does not support: export .las, .laz or .ply");
         return Err(Error::argument("coordinate reference system", reason));
     }
     Ok(crs.replace("]]>", "]]]]><![CDATA[>"))

@@ -137,7 +137,7 @@ impl VoxelSink for GlbSink {
         let size: [i64; 3] = std::array::from_fn(|k| (i64::from(most[k]) - i64::from(least[k]) + 1).max(0));
         let longest = size.iter().copied().max().unwrap_or(0);
         if longest > 1 << 24 {
-            let reason = format!("{longest} voxels along a side are more than single precision tells apart");
+            let reason = format!("{longest} voxels along a side exceed single precision");
             return Err(Error::argument("GLB", format!("{reason}; choose a region")));
         }
         let is_short = is_quantized && longest <= i64::from(u16::MAX);
@@ -260,7 +260,7 @@ impl Mesh {
 }
 
 fn too_large() -> Error {
-    Error::argument("GLB", "the mesh has more than the 4 GiB of a file of this format; choose a region")
+    Error::argument("GLB", "the mesh exceeds 4 GiB, the limit of this format: choose a region")
 }
 
 /// Returns the opaque colour of a height from 0 to 1.

@@ -21,7 +21,8 @@ impl HeightRange {
         if least_m < most_m {
             return Ok(Self { least_m, most_m });
         }
-        let reason = format!("heights from {least_m} to {most_m} m hold nothing; z_min must be below z_max");
+        let reason =
+            format!("the range of heights from {least_m} to {most_m} m is empty: z_min must be below z_max");
         Err(Error::argument("z_min, z_max", reason))
     }
 

@@ -45,7 +45,7 @@ impl LasLayout {
         }
         if scale_m > head.resolution_m / 8.0 || scale_m <= 0.0 {
             let reason = format!(
-                "voxels of {} m over {reach} m do not fit into the whole numbers of the format; choose a region",
+                "voxels of {} m over {reach} m exceed the 32-bit coordinates of the format: choose a region",
                 head.resolution_m
             );
             return Err(Error::argument("LAS", reason));
@@ -63,7 +63,7 @@ impl LasLayout {
         for (k, whole) in position.iter_mut().enumerate() {
             let scaled = ((voxel.center_m[k] - self.offset_m[k]) / self.scale_m).round();
             if scaled.abs() > f64::from(i32::MAX) {
-                let reason = format!("voxel {:?} lies outside the box that was announced", voxel.index);
+                let reason = format!("voxel {:?} is outside of the announced bounds", voxel.index);
                 return Err(Error::argument("LAS", reason));
             }
             *whole = scaled as i32;
@@ -159,7 +159,10 @@ fn crs_vlr(crs: &str) -> Result<Vlr> {
         return vlr("LASF_Projection", 2112, "coordinate system", text);
     };
     let number: u16 = number.parse().map_err(|_| {
-        Error::argument("crs", format!("`{crs}` is no number of a projected system; give well-known text"))
+        Error::argument(
+            "crs",
+            format!("`{crs}` is not the EPSG code of a projected system: use well-known text"),
+        )
     })?;
     // Key directory version 1.1.0 with three keys: projected model, EPSG code, unit metre.
     let keys = [[1, 1, 0, 3], [1024, 0, 1, 1], [3072, 0, 1, number], [3076, 0, 1, 9001]];
@@ -169,7 +172,7 @@ fn crs_vlr(crs: &str) -> Result<Vlr> {
 
 /// Creates a variable length record.
 pub(super) fn vlr(user: &str, record_id: u16, description: &str, data: Vec<u8>) -> Result<Vlr> {
-    let too_long = |_| Error::argument("LAS", format!("{} bytes of {description} are too many", data.len()));
+    let too_long = |_| Error::argument("LAS", format!("{description}: {} bytes are too many", data.len()));
     let length = u16::try_from(data.len()).map_err(too_long)?;
     Ok(Vlr {
         reserved: 0,

@@ -59,7 +59,7 @@ impl WriteOptions {
     pub(super) fn final_name(&self) -> Result<&str> {
         let name = self.final_path.file_name().and_then(|name| name.to_str());
         name.ok_or_else(|| {
-            let reason = "the output needs a name in Unicode, for files beside it name it";
+            let reason = "the output needs a Unicode file name, because its companion files contain it";
             Error::argument(self.final_path.display().to_string(), reason)
         })
     }
@@ -72,8 +72,7 @@ impl WriteOptions {
         // Some file systems are case-insensitive.
         if beside.to_str().is_some_and(|beside| beside.eq_ignore_ascii_case(name)) {
             let hint = self.final_path.with_extension(own);
-            let reason =
-                format!("a file beside the output has this name; name the output {}", hint.display());
+            let reason = format!("a companion file needs this name: name the output {}", hint.display());
             return Err(Error::argument(self.final_path.display().to_string(), reason));
         }
         Ok(self.companion_folder.join(beside))

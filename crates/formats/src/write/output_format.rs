@@ -98,7 +98,7 @@ impl OutputFormat {
     pub fn check_built(&self) -> Result<()> {
         let Writer::NotBuilt = self.writer else { return Ok(()) };
         let feature = self.feature.unwrap_or_default();
-        Err(self.refused(&format!("this program was built without it; build with the feature `{feature}`")))
+        Err(self.refused(&format!("this build does not support it: build with the feature `{feature}`")))
     }
 
     /// Starts writing voxels to a file, or to a folder for a folder format. The output is complete when the sink is
@@ -119,7 +119,7 @@ impl OutputFormat {
                 let file = File::create(path).map_err(|error| Error::io(path, "create", error))?;
                 open(head, Box::new(BufWriter::with_capacity(1 << 17, file)), options)?
             }
-            _ => return Err(self.refused("is made of a whole map, not of voxels")),
+            _ => return Err(self.refused("is created from a whole map, not from single voxels")),
         };
         Ok(Box::new(Counted::new(sink, options.final_path.clone(), head.voxels)))
     }
@@ -137,7 +137,7 @@ impl OutputFormat {
     ) -> Result<Box<dyn VoxelSink + 'a>> {
         check(head)?;
         let Writer::Stream(open) = self.writer else {
-            return Err(self.refused("is not a stream of voxels; name a file"));
+            return Err(self.refused("is not a stream format: use an output file"));
         };
         let sink = open(head, Box::new(out), options)?;
         Ok(Box::new(Counted::new(sink, options.final_path.clone(), head.voxels)))
@@ -150,12 +150,12 @@ impl OutputFormat {
 
 fn check(head: &VoxelsHead) -> Result<()> {
     if !(head.resolution_m.is_finite() && head.resolution_m > 0.0) {
-        let reason = format!("{} m is no edge of a voxel", head.resolution_m);
+        let reason = format!("{} m is not a valid voxel size", head.resolution_m);
         return Err(Error::argument("resolution", reason));
     }
     let bounds = head.bounds_m.as_flattened();
     if head.voxels > 0 && !bounds.iter().all(|bound| bound.is_finite()) {
-        let reason = format!("{:?} is no box around the voxels", head.bounds_m);
+        let reason = format!("{:?} is not a valid box", head.bounds_m);
         return Err(Error::argument("bounds", reason));
     }
     Ok(())

@@ -39,7 +39,8 @@ impl VoxelSink for PcdSink<'_> {
         let reach_m = f64::from(PCD_REACH_VOXELS) * self.resolution_m;
         if let Some(far) = voxel.center_m.iter().find(|coordinate| coordinate.abs() > reach_m) {
             let reason = format!(
-                "{far} m from the file's origin a float32 of PCD does not tell voxels of {} m apart",
+                "{far} m from the file's origin, float32 coordinates are too coarse for voxels of {} m: set a closer \
+                 `origin`",
                 self.resolution_m
             );
             return Err(Error::argument("origin", reason));

@@ -50,14 +50,14 @@ const fn row(
         feature: None,
         takes: &[Region, Which],
         origin: Origin::Map,
-        refusal: "leave the option out",
+        refusal: "omit the option",
         is_text: false,
         needs_free_voxels: false,
         writer,
     }
 }
 
-const TREE_REFUSAL: &str = "an octree file holds free and occupied voxels alike; leave the option out";
+const TREE_REFUSAL: &str = "an octree file always contains free and occupied voxels; omit the option";
 
 /// All output formats. Help texts, hints and option checks are generated from this table, and documents are checked
 /// against it.
@@ -81,24 +81,24 @@ const TABLE: [OutputFormat; 18] = [
     behind!("las", "laz", "laz", "The same, compressed", files!(las::LasSink::compressed)),
     behind!("las", "copc", "copc.laz", "The same with levels of detail", files!(copc::CopcSink::create)),
     behind!("e57", "e57", "e57", "ASTM E57", files!(e57::E57Sink::create)),
-    behind!("parquet", "parquet", "parquet", "Apache Parquet, where it was built in",
+    behind!("parquet", "parquet", "parquet", "Apache Parquet, if enabled in this build",
             files!(parquet::ParquetSink::create)),
-    behind!("ros", "mcap", "mcap", "A recording with PointCloud2, as Foxglove opens it",
+    behind!("ros", "mcap", "mcap", "A recording with PointCloud2 messages, for Foxglove and others",
             files!(mcap::McapSink::create)),
     OutputFormat::GLB,
     OutputFormat { takes: &[Region, Which, Heights], needs_free_voxels: true,
-        ..row("nav2", Some("pgm"), "A flat map of nav2: .pgm and .yaml", files!(nav2::Nav2Sink::create)) },
+        ..row("nav2", Some("pgm"), "A 2D occupancy grid for nav2: .pgm and .yaml", files!(nav2::Nav2Sink::create)) },
     OutputFormat { takes: &[Region, Which, Heights],
         ..row("heightmap", Some("png"), "Heights as a 16-bit PNG with a world file",
               files!(heightmap::HeightmapSink::create)) },
     OutputFormat { takes: &[Region, Which, Cell], origin: Origin::Point,
-        ..row("autoware", None, "A folder of PCD squares with the metadata of Autoware",
+        ..row("autoware", None, "A folder of PCD files for squares, with Autoware's metadata",
               files!(autoware::AutowareSink::create)) },
     OutputFormat { takes: &[],
-        refusal: "it holds what is occupied of the whole map, in true coordinates; make a map of a part with \
-                  `voxtile crop`",
+        refusal: "it always contains the occupied voxels of the whole map in map coordinates; for a part, create a \
+                  smaller map with `voxtile crop`",
         ..row("3dtiles", None,
-              "A folder of 3D Tiles: the surface at every level of detail, as Cesium and others open it",
+              "A folder of 3D Tiles: the surface at every level of detail, for Cesium and others",
               Writer::Tileset) },
 ];
 

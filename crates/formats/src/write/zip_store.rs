@@ -57,7 +57,7 @@ impl ZipStore {
             copied += self.out.append(*part)?;
         }
         if copied != bytes {
-            let reason = format!("{copied} bytes of {name} where {bytes} were announced");
+            let reason = format!("{name} has {copied} bytes, but {bytes} were announced");
             return Err(Error::argument(self.out.path().display().to_string(), reason));
         }
         self.entries.push(entry);

@@ -88,7 +88,7 @@ fn files_of_another_system_are_refused_before_their_points() {
             }
         }
         assert_eq!((clouds, errors.len()), (3, 1), "{format}: {errors:?}");
-        let parts = ["/1.", "in EPSG:25833, those of the files before it in EPSG:25832"];
+        let parts = ["/1.", "in EPSG:25833, but those of the previous files are in EPSG:25832"];
         assert!(parts.iter().all(|part| errors[0].contains(part)), "{errors:?}");
         assert_eq!((source.crs(), of_systems(&*source)), (Some("EPSG:25832"), vec![]));
     }
@@ -103,6 +103,6 @@ fn a_system_that_later_files_name_is_told() {
     assert!(source.next_cloud().unwrap().is_some());
     assert_eq!(source.crs(), Some("EPSG:25832"));
     let remarks = of_systems(&*source);
-    let told = "1.las: names the coordinate system EPSG:25832, the files before it name none";
+    let told = "1.las: names the coordinate system EPSG:25832, but the previous files name none";
     assert!(remarks.len() == 1 && remarks[0].starts_with(told), "{remarks:?}");
 }

@@ -77,11 +77,14 @@ fn lines_of_the_list_that_cannot_be_read_are_left_out() {
     let clouds = crate::support::all(&mut *source).unwrap();
     assert_eq!(clouds.iter().map(|(head, _)| head.stamp_ns).collect::<Vec<_>>(), [Some(12_500_000_000)]);
     let remarks = source.remarks();
-    assert!(remarks.len() == 1 && remarks[0].starts_with("2 lines are left out, the first: "), "{remarks:?}");
-    assert!(remarks[0].contains("line 2: `nan` is no time stamp"), "{remarks:?}");
+    assert!(
+        remarks.len() == 1 && remarks[0].starts_with("2 lines are invalid and skipped, the first: "),
+        "{remarks:?}"
+    );
+    assert!(remarks[0].contains("line 2: `nan` is not a time stamp"), "{remarks:?}");
     fs::write(&list, "nan 1.png\n").unwrap();
     let (error, points) = failure(folder.path(), &options);
-    assert!(error.contains("line 1: `nan` is no time stamp") && points == 0, "{error}");
+    assert!(error.contains("line 1: `nan` is not a time stamp") && points == 0, "{error}");
 }
 
 /// An untrusted list must not open arbitrary files.
@@ -100,7 +103,7 @@ fn images_out_of_the_folder_are_refused() {
         fs::write(inner.join("depth.txt"), format!("# depth maps\n1305031453.374112 {name}\n")).unwrap();
         let (error, points) = failure(&inner, &options);
         assert!(
-            error.contains("depth.txt: malformed: line 2") && error.contains("leads out of the folder"),
+            error.contains("depth.txt: malformed: line 2") && error.contains("is outside of the folder"),
             "{error}"
         );
         assert_eq!(points, 0);
@@ -116,7 +119,7 @@ fn images_that_are_no_depths_are_errors() {
     let encoder = png::Encoder::new(File::create(&path).unwrap(), 1, 1);
     encoder.write_header().unwrap().write_image_data(&[9]).unwrap();
     let (error, _) = failure(folder.path(), &options);
-    assert!(error.contains("is no depth image"), "{error}");
+    assert!(error.contains("is not a depth image"), "{error}");
     let depths: Vec<u16> = (0..40_000_u32).map(|k| (k.wrapping_mul(2_654_435_761) >> 16) as u16).collect();
     image(&path, 100, &depths);
     let whole = fs::read(&path).unwrap();

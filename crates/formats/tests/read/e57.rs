@@ -75,7 +75,7 @@ fn points_that_take_no_bits_are_refused() {
     // The first byte is only for the fuzz target.
     fs::write(&path, &fs::read(corpus).unwrap()[1..]).unwrap();
     let (error, points) = failure(&path, &ReadOptions::default());
-    assert!(error.contains("constant.e57: malformed: record 0: every field of its points has"), "{error}");
+    assert!(error.contains("constant.e57: malformed: record 0: every field has equal"), "{error}");
     assert_eq!(points, 0);
 }
 
@@ -100,9 +100,9 @@ fn a_file_that_is_no_e57_or_is_cut_off_says_so() {
     let path = folder.path().join("a.e57");
     let whole = fs::read(fixture("scans.e57")).unwrap();
     let page = b"<!DOCTYPE html><html><body>The file has moved to another server.</body></html>";
-    let cut = "offset 0: it is no E57 file, or is cut off; copy it again";
+    let cut = "offset 0: it is not an E57 file, or is truncated: copy it again";
     for (bytes, reason) in
-        [(&b""[..], cut), (&whole[..8], cut), (&whole[..47], cut), (page, "is a page of HTML, not data")]
+        [(&b""[..], cut), (&whole[..8], cut), (&whole[..47], cut), (page, "is an HTML page, not data")]
     {
         fs::write(&path, bytes).unwrap();
         let (error, _) =
@@ -119,7 +119,7 @@ fn a_tag_with_many_attributes_is_refused() {
     let attributes: String = (0..200_000).map(|k| format!(" a{k}=''")).collect();
     described(&path, format!("<e57Root{attributes}/>").as_bytes());
     let (error, _) = failure(&path, &ReadOptions::default());
-    assert!(error.contains("more than 256 attributes of one tag"), "{error}");
+    assert!(error.contains("more than 256 attributes in one tag"), "{error}");
 }
 
 /// A packet is decoded as a whole.
@@ -145,7 +145,7 @@ fn packets_that_exceed_the_memory_are_refused() {
     let with = |memory_bytes| ReadOptions { memory_bytes, ..ReadOptions::default() };
     let (error, points) = failure(&path, &with(0));
     assert!(
-        error.contains("record 0: a packet of points would take") && error.contains("`memory`"),
+        error.contains("record 0: a packet of points would need") && error.contains("`memory`"),
         "{error}"
     );
     assert_eq!(points, 0);

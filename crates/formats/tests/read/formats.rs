@@ -43,7 +43,7 @@ fn folders_tell_what_they_hold() {
     let at = |name: &str| folder.path().join(name);
     fs::create_dir(at("data")).unwrap();
     let error = format!("{:#}", guess(folder.path()).unwrap_err());
-    assert!(error.contains("is one of its folders meant (data)"), "{error}");
+    assert!(error.contains("did you mean one of its subfolders (data)"), "{error}");
     fs::copy(fixture("kitti.bin"), at("1.bin")).unwrap();
     assert_eq!(guess(folder.path()).unwrap(), "bin");
     fs::copy(fixture("ascii.ply"), at("1.ply")).unwrap();
@@ -64,9 +64,9 @@ fn what_is_not_read_is_named_with_the_way() {
         ("a.obj", b"v 1 2 3\n", "is a mesh (OBJ)"),
         ("a.stl", b"\0\0\0\0", "is a mesh (STL)"),
         ("a.zip", b"PK\x03\x04", "unpack it"),
-        ("a.txt", b"some prose\n", "is no text of points"),
-        ("a.e57", b"ASTM", "is called .e57"),
-        ("a.weird", b"\0\x01", "known are pcd, ply, xyz"),
+        ("a.txt", b"some prose\n", "is not a valid text of points"),
+        ("a.e57", b"ASTM", "has the extension .e57"),
+        ("a.weird", b"\0\x01", "known formats: pcd, ply, xyz"),
         ("a.ply", b"", "the file is empty"),
     ] {
         let path = folder.path().join(name);
@@ -80,11 +80,11 @@ fn what_is_not_read_is_named_with_the_way() {
         .err()
         .map(|error| format!("{error:#}"))
         .unwrap_or_default();
-    assert!(error.contains("is PCD: it has scans, not clouds alone"), "{error}");
+    assert!(error.contains("is PCD, which contains scans with poses"), "{error}");
     let error = guess(&folder.path().join("nothing")).unwrap_err().to_string();
     assert!(error.ends_with("nothing: there is no such file or folder"), "{error}");
     let formats = Registry::default();
     assert_eq!(formats.named("LAZ").unwrap().name, "laz");
     assert_eq!(formats.named("kitti").unwrap().name, "bin");
-    assert!(formats.named("foo").unwrap_err().to_string().contains("known are pcd, ply, xyz"));
+    assert!(formats.named("foo").unwrap_err().to_string().contains("known formats: pcd, ply, xyz"));
 }

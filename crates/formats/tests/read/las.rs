@@ -67,7 +67,7 @@ fn feet_become_metres_on_each_axis() {
         }
         assert_near(&clouds[0].1, &points, name);
         let remarks = source.remarks();
-        assert!(remarks[0].contains("coordinates become metres"), "{remarks:?}");
+        assert!(remarks[0].contains("coordinates are converted to metres"), "{remarks:?}");
         // The coordinates read are no longer in the file's system.
         assert_eq!(source.crs(), None, "{name}");
         assert!(remarks[1].starts_with("the coordinate system is not in metres"), "{remarks:?}");
@@ -105,7 +105,7 @@ fn a_file_that_is_cut_off_gives_what_is_whole() {
         let mut source = open_clouds(&path, &options).unwrap();
         let points: usize = all(source.as_mut()).unwrap().iter().map(|(_, points)| points.len()).sum();
         assert_eq!(points, 18);
-        assert_eq!(source.remarks(), ["the file is cut off: 18 of 20 points are there and are read"]);
+        assert_eq!(source.remarks(), ["the file is truncated: 18 of 20 points exist and are read"]);
     }
 }
 
@@ -124,9 +124,9 @@ fn a_file_whose_writer_was_killed_is_read_as_far_as_it_goes() {
     let path = folder.path().join("killed.las");
     let whole = fs::read(fixture("timed.las")).unwrap();
     for (announced, cut, points, remark) in [
-        (0, 5, 19, "announces no points, as a writer leaves it that was stopped: the 19 "),
+        (0, 5, 19, "announces no points, because its writer was interrupted: the 19 "),
         (0, 20 * 28, 0, ""),
-        (15, 0, 20, "announces 15 points; 20 are there and are read"),
+        (15, 0, 20, "announces 15 points; 20 exist and are read"),
         (20, 0, 20, ""),
     ] {
         let mut bytes = whole[..whole.len() - cut].to_vec();

@@ -44,9 +44,9 @@ fn refusal(bytes: &[u8]) -> String {
 #[test]
 fn of_two_numbers_of_points_that_of_the_points_counts() {
     for (legacy, large, remark) in [
-        (100, 400, "two numbers of points, 100 and 400: 400 are there"),
-        (400, 100, "two numbers of points, 400 and 100: 400 are there"),
-        (400, 1 << 60, "two numbers of points, 400 and 1152921504606846976: 400 are there"),
+        (100, 400, "two point counts, 100 and 400: 400 points exist"),
+        (400, 100, "two point counts, 400 and 100: 400 points exist"),
+        (400, 1 << 60, "two point counts, 400 and 1152921504606846976: 400 points exist"),
         (400, 0, ""),
         (0, 400, ""),
         (400, 400, ""),
@@ -65,21 +65,21 @@ fn points_behind_the_announced_ones_are_read() {
     let las = Las { legacy: 100, ..Las::new(2, 1, 400) };
     let announced = "the header announces 100 points";
     let (points, remarks) = read(&las, &las.bytes());
-    assert!(points == 400 && remarks == format!("{announced}; 400 are there and are read"), "{remarks}");
+    assert!(points == 400 && remarks == format!("{announced}; 400 exist and are read"), "{remarks}");
     // Zeros and other bytes after the points are not points.
     for noise in [vec![0; 28 * 50], (0..28 * 50).map(|k| (k * 37 % 251) as u8).collect()] {
         let whole = Las::new(2, 1, 100);
         let (points, remarks) = read(&whole, &[whole.bytes(), noise].concat());
-        let wanted = format!("{announced}, which are read; the file has room for 50 more behind them");
+        let wanted = format!("{announced}, which are read; the file has space for 50 more after them");
         assert!(points == 100 && remarks == wanted, "{points} {remarks}");
     }
     // Compressed points are counted by their chunks if these are layered.
     let las = Las { large: 100, ..Las::new(4, 6, 400) };
     let (points, remarks) = read(&las, &las.packed(Packing::Chunked(50_000)));
-    assert!(points == 400 && remarks == format!("{announced}; 400 are there and are read"), "{remarks}");
+    assert!(points == 400 && remarks == format!("{announced}; 400 exist and are read"), "{remarks}");
     let las = Las { legacy: 100, ..Las::new(2, 1, 400) };
     let (points, remarks) = read(&las, &las.packed(Packing::Chunked(150)));
-    assert!(points == 100 && remarks.contains("the chunks hold 301 or more"), "{remarks}");
+    assert!(points == 100 && remarks.contains("the chunks contain 301 or more"), "{remarks}");
 }
 
 #[test]
@@ -89,7 +89,7 @@ fn what_is_there_of_a_file_that_was_cut_off_is_read() {
         let whole = las.bytes();
         let cut = &whole[..whole.len() - 60 * las.point_bytes() - 5];
         let (points, remarks) = read(&las, cut);
-        let wanted = "the file is cut off: 339 of 400 points are there and are read";
+        let wanted = "the file is truncated: 339 of 400 points exist and are read";
         assert!(points == 339 && remarks == wanted, "{points} {remarks}");
         let error = refusal(&whole[..las.head(false).len() + 10]);
         assert!(error.contains("the file ends before the first of 400 points"), "{error}");
@@ -107,15 +107,18 @@ fn compressed_points_are_read_without_the_chunk_table() {
         assert_eq!((points, remarks.as_str()), (400, ""), "{packing:?}");
         let (points, remarks) = read(&las, &whole[..whole.len() - whole.len() / 4]);
         assert!((200..400).contains(&points), "{packing:?}: {points}");
-        assert_eq!(remarks, format!("the file is cut off: {points} of 400 points are there and are read"));
+        assert_eq!(remarks, format!("the file is truncated: {points} of 400 points exist and are read"));
     }
     // Layered compression: whole chunks.
     let las = Las::new(4, 6, 400);
     let whole = las.packed(Packing::Chunked(100));
     let (points, remarks) = read(&las, &whole[..whole.len() - whole.len() / 4]);
-    assert!(points == 200 && remarks.contains("cut off: 200 of 400 points"), "{points} {remarks}");
+    assert!(points == 200 && remarks.contains("truncated: 200 of 400 points"), "{points} {remarks}");
     let (points, remarks) = read(&las, &whole[..whole.len() - 3]);
-    assert!(points == 400 && remarks.contains("the chunk table is cut off or damaged"), "{points} {remarks}");
+    assert!(
+        points == 400 && remarks.contains("the chunk table is truncated or damaged"),
+        "{points} {remarks}"
+    );
     let error = refusal(&whole[..las.head(true).len() + 200]);
     assert!(error.contains("the file ends within the first chunk of its 400 points"), "{error}");
 }
@@ -128,7 +131,7 @@ fn layers_count_their_points() {
     for (bytes, wanted) in [(&whole[..], 400), (&whole[..whole.len() - whole.len() / 4], 200)] {
         let (points, remarks) = read(&las, bytes);
         assert!(
-            points == wanted && remarks.contains(&format!("the {wanted} that are there")),
+            points == wanted && remarks.contains(&format!("the {wanted} points that exist")),
             "{points} {remarks}"
         );
     }
@@ -164,7 +167,7 @@ fn announced_records_that_are_not_there_do_no_harm() {
     bytes[100..104].copy_from_slice(&30_u32.to_le_bytes());
     let (points, remarks) = read(&las, &bytes);
     assert!(
-        points == 400 && remarks.contains("announces 30 records before the points; 0 are there"),
+        points == 400 && remarks.contains("announces 30 records before the points; 0 exist"),
         "{remarks}"
     );
     let las = Las::new(4, 6, 400);
@@ -174,7 +177,7 @@ fn announced_records_that_are_not_there_do_no_harm() {
         bytes[243..247].copy_from_slice(&7_u32.to_le_bytes());
         let (points, remarks) = read(&las, &bytes);
         assert!(
-            points == 400 && remarks.contains("announces 7 records behind the points; 0 are"),
+            points == 400 && remarks.contains("announces 7 records after the points; 0 exist"),
             "{remarks}"
         );
     }
@@ -202,9 +205,13 @@ fn las_1_5_is_read_with_its_own_zero_of_time() {
 fn point_formats_that_are_not_known_and_short_points_are_refused() {
     let mut bytes = Las::new(4, 6, 4).bytes();
     bytes[104] = 11;
-    assert!(refusal(&bytes).contains("offset 104: points have format 11; formats 0 to 10 are known"));
+    assert!(
+        refusal(&bytes).contains("offset 104: point format 11 is unknown; formats 0 to 10 are supported")
+    );
     bytes[104] = 7;
-    assert!(refusal(&bytes).contains("offset 105: points of format 7 take 36 bytes, not 30"));
+    assert!(
+        refusal(&bytes).contains("offset 105: points of format 7 have 36 bytes, but the header states 30")
+    );
 }
 
 #[test]
@@ -225,12 +232,12 @@ fn points_without_a_time_are_left_out_of_scans_alone() {
     });
     assert_eq!(counts[0].0, 398);
     let remark = &counts[0].1[0];
-    assert!(remark.starts_with("2 of 400 points have a GPS time that is not a number"), "{remark}");
+    assert!(remark.starts_with("2 of 400 points have a GPS time of NaN"), "{remark}");
     assert!(remark.contains("first record 7; `scan_period` 0"), "{remark}");
     assert!(counts[1..].iter().all(|(points, remarks)| *points == 400 && remarks.is_empty()), "{counts:?}");
     // No point would remain.
     (0..400).for_each(|k| bytes[time_at(k)..time_at(k) + 8].copy_from_slice(&f64::NAN.to_le_bytes()));
     fs::write(&path, &bytes).unwrap();
     let (error, points) = failure(&path, &ReadOptions::default());
-    assert!(points == 0 && error.contains("no GPS time of its points is a number"), "{error}");
+    assert!(points == 0 && error.contains("no point has a valid GPS time"), "{error}");
 }

@@ -46,19 +46,19 @@ fn the_name_of_a_unit_counts_where_its_factor_is_of_another() {
     assert_units(
         &las,
         [0.304_800_609_601_219, US_FOOT_M],
-        "the unit of z is named US survey foot, with the factor 1:",
+        "the unit of z is named US survey foot, but has the factor 1:",
     );
     let las = with_wkt(&projected("\"foot\",1", "\"metre\",1"));
     assert_units(
         &las,
         [0.3048, 1.0],
-        "the unit of x and y is named foot, with the factor 1: the name counts, 0.3048 m",
+        "the unit of x and y is named foot, but has the factor 1: the name is used, 0.3048 m",
     );
     // A factor close to the named unit is used with all its digits. An unknown name has only its factor.
     let las = with_wkt(&projected("\"Foot_US\",0.3048006", "\"rod\",5.0292"));
-    assert_units(&las, [0.304_800_6, 5.0292], "coordinates become metres");
+    assert_units(&las, [0.304_800_6, 5.0292], "coordinates are converted to metres");
     let las = with_wkt("LOCAL_CS[\"hall\",UNIT[\"millimetre\",0.001]]");
-    assert_units(&las, [0.001; 2], "coordinates become metres: x and y times 0.001, z times 0.001");
+    assert_units(&las, [0.001; 2], "coordinates are converted to metres: x and y times 0.001, z times 0.001");
     assert_units(&with_wkt(&projected("\"metre\",1", "\"Meter\",1")), [1.0; 2], "");
 }
 
@@ -74,7 +74,7 @@ fn with_keys(keys: &[[u16; 3]], doubles: &[f64]) -> Las {
 
 #[test]
 fn keys_name_units_by_number_by_size_and_by_the_vertical_system() {
-    let metres = "coordinates become metres";
+    let metres = "coordinates are converted to metres";
     assert_units(&with_keys(&[[3076, 0, 9003]], &[]), [US_FOOT_M; 2], metres);
     // A user-defined unit size, the second of the doubles.
     let own = [[3076, 0, 32767], [3077, 34736, 1]];
@@ -83,15 +83,11 @@ fn keys_name_units_by_number_by_size_and_by_the_vertical_system() {
     assert_units(&with_keys(&[[3076, 0, 9002], [4096, 0, 5703]], &[]), [0.3048, 1.0], metres);
     assert_units(&with_keys(&[[3076, 0, 9001], [4096, 0, 6360]], &[]), [1.0, US_FOOT_M], metres);
     assert_units(&with_keys(&[[3076, 0, 9001], [4096, 0, 6360], [4099, 0, 9001]], &[]), [1.0; 2], "");
-    assert_units(
-        &with_keys(&[[3076, 0, 9999]], &[]),
-        [1.0; 2],
-        "the unit of x and y, EPSG:9999, is not known",
-    );
+    assert_units(&with_keys(&[[3076, 0, 9999]], &[]), [1.0; 2], "the unit of x and y, EPSG:9999, is unknown");
     assert_units(
         &with_keys(&[[3076, 0, 9001], [4099, 0, 9999]], &[]),
         [1.0; 2],
-        "the unit of z, EPSG:9999, is not known; one of 1 m is assumed",
+        "the unit of z, EPSG:9999, is unknown; 1 m is assumed",
     );
 }
 

@@ -55,11 +55,11 @@ fn a_chunk_table_that_lies_is_refused() {
     for file in [&by_point, &by_layer, &voxel_file("copc")] {
         let (points_at, table_at) = places(file);
         let error = of_damaged(file, table_at + 4, &[0xff; 4]);
-        assert_says(&error, table_at + 4, "the chunk table promises 4294967295 chunks");
+        assert_says(&error, table_at + 4, "the chunk table lists 4294967295 chunks");
         // Without the table, each chunk states its number of points.
         let (points, remarks) = of_changed(file, points_at, &u64::to_le_bytes(1 << 40));
         assert!(
-            remarks.contains(&format!("cut off or damaged: {points} points are read without it")),
+            remarks.contains(&format!("truncated or damaged: {points} points are read without it")),
             "{remarks}"
         );
         // The table is compressed: changed bytes give other chunk lengths or an invalid table.
@@ -85,13 +85,13 @@ fn a_chunk_table_that_lies_is_refused() {
     // After the table's offset, the first point and the number of points.
     let lengths_at = points_at + 8 + 42 + 4;
     let error = of_damaged(&by_layer, lengths_at, &[0xff; 4]);
-    assert_says(&error, lengths_at, "the fields of a chunk claim 42949");
+    assert_says(&error, lengths_at, "the fields of a chunk need 42949");
     // Found by fuzzing: if the fields end before their chunk, the library looks for the next chunk in the remaining
     // bytes.
     let shorter =
         (u32::from_le_bytes(by_layer[lengths_at..lengths_at + 4].try_into().unwrap()) - 1).to_le_bytes();
     let error = of_damaged(&by_layer, lengths_at, &shorter);
-    assert_says(&error, lengths_at, "the fields of a chunk claim ");
+    assert_says(&error, lengths_at, "the fields of a chunk need ");
 }
 
 /// Found by fuzzing: the layers were not checked if the compressor type claimed that there are none.
@@ -103,7 +103,7 @@ fn a_compressor_must_fit_the_versions_of_its_parts() {
         // The description follows the record header, which begins with two bytes and the user ID.
         let name_at = file.windows(14).position(|bytes| bytes == b"laszip encoded").unwrap();
         let error = of_damaged(&file, name_at - 2 + 54, &compressor.to_le_bytes());
-        assert_says(&error, 100, &format!("compressor {compressor} does not fit"));
+        assert_says(&error, 100, &format!("compressor {compressor} contradicts"));
     }
 }
 
@@ -113,10 +113,10 @@ fn more_points_than_the_chunks_have_room_for_are_refused() {
     let by_layer = voxel_file("laz");
     let (points, remarks) = of_changed(&by_layer, 247, &u64::to_le_bytes(1 << 50));
     assert_eq!(points, VOXELS as usize);
-    assert!(remarks.contains("announces 1125899906842624 points; 30 are there"), "{remarks}");
+    assert!(remarks.contains("announces 1125899906842624 points; 30 exist"), "{remarks}");
     let by_point = Las { legacy: 1 << 30, ..Las::new(2, 1, 400) }.packed(Packing::Chunked(100));
     let error = of_damaged(&by_point, 107, &u32::to_le_bytes(1 << 30));
-    assert_says(&error, 107, "1073741824 points are announced; the chunk table has room for 400");
+    assert_says(&error, 107, "1073741824 points are announced, but the chunk table lists 400");
     let error = of_damaged(&by_layer, 105, &60_000_u16.to_le_bytes());
     assert_says(&error, 105, "points of 60000 bytes are compressed as 2 parts of 42 bytes");
 }

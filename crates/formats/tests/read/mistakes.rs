@@ -56,7 +56,7 @@ fn texts_as_programs_write_them() {
 fn rows_that_are_no_points_are_counted_and_named() {
     let (points, remarks) = read_text("a.csv", "x,y,z\n1.5,-2.25,3\nbroken,1,2\n4,5,6\n7,8\n");
     assert_eq!(points, WANTED);
-    assert_eq!(remarks, ["2 rows are no points, left out (line 3: `broken` is not a number)"]);
+    assert_eq!(remarks, ["2 rows are not points, skipped (line 3: `broken` is not a number)"]);
     let error = error_of("a.csv", b"x,y,z\nbroken,1,2\n");
     assert!(error.contains("line 2: `broken` is not a number"), "{error}");
     let (points, _) = read_text("nan.csv", "x,y,z\n1.5,-2.25,3\n,,\n1.#QNAN,-nan(ind),NA\n4,5,6\n");
@@ -66,13 +66,13 @@ fn rows_that_are_no_points_are_counted_and_named() {
 #[test]
 fn what_is_no_text_of_points_is_said_with_line_and_word() {
     for (name, bytes, reason) in [
-        ("a.csv", &b"x (px),y (px),z (px)\n1,2,3\n"[..], "line 1: column `x (px)`: `px` is no known unit"),
-        ("a.xyz", b"# a\nC 1 2 3\n", "line 2: `C 1 2 3` is neither numbers nor names"),
-        ("a.txt", b"1 2\n3 4\n", "line 1: 2 columns; a point has x, y and z"),
+        ("a.csv", &b"x (px),y (px),z (px)\n1,2,3\n"[..], "line 1: column `x (px)`: `px` is an unknown unit"),
+        ("a.xyz", b"# a\nC 1 2 3\n", "line 2: `C 1 2 3` is neither numbers nor column names"),
+        ("a.txt", b"1 2\n3 4\n", "line 1: 2 columns; a point needs x, y and z"),
         ("a.csv", b"\xff\xfex\0,\0y\0", "is text in UTF-16: save it as UTF-8"),
         ("a.txt", b"", "the file is empty"),
         ("a.asc", b"ncols 2\nnrows 1\n1 2\n", "line 1: this is a grid of heights"),
-        ("a.xyz", b"1 2 3\0\0", "bytes of zero"),
+        ("a.xyz", b"1 2 3\0\0", "zero bytes"),
     ] {
         let error = error_of(name, bytes);
         assert!(error.contains(reason) && error.contains(name), "{error}");
@@ -88,7 +88,7 @@ fn what_arrived_in_place_of_a_file_is_named_whatever_its_name() {
     let foreign = ["npy", "bt", "zip", "pcap", "dat"];
     for extension in extensions.chain(&foreign) {
         for (text, reason) in
-            [(&pointer, "is a Git LFS pointer, not the file itself"), (&page, "is a page of HTML")]
+            [(&pointer, "is a Git LFS pointer, not the file itself"), (&page, "is an HTML page")]
         {
             let folder = tempfile::tempdir().unwrap();
             let path = folder.path().join(format!("a.{extension}"));
@@ -130,7 +130,7 @@ fn links_to_nothing_are_said() {
     let path = folder.path().join("a.las");
     std::os::unix::fs::symlink("../lost.las", &path).unwrap();
     let error = failure(&path, &ReadOptions::default()).0;
-    assert!(error.contains("is a link to ../lost.las, and there is no such file"), "{error}");
+    assert!(error.contains("is a link to ../lost.las, which does not exist"), "{error}");
 }
 
 #[test]
@@ -156,7 +156,7 @@ fn headers_of_ply_in_any_letters_and_line_ends() {
     assert_eq!((points.as_slice(), remarks.len()), (&WANTED[..], 0));
     let (points, remarks) = read_text("a.ply", &format!("{head}1.5 -2.25 3\n4 five 6\n"));
     assert_eq!(points, WANTED[..1]);
-    assert_eq!(remarks, ["1 row is no point, left out (line 9: `five` is not a number)"]);
+    assert_eq!(remarks, ["1 row is not a point, skipped (line 9: `five` is not a number)"]);
     // A missing number in wrapped lines, followed by faces.
     let faces = head.replace("end_header", "element face 1\nproperty list uchar int i\nend_header");
     let whole = format!("{faces}1.5 -2.25\n3 4 5 6\n3 0 1 0\n");
@@ -174,7 +174,7 @@ fn headers_of_ply_in_any_letters_and_line_ends() {
     assert!(remarks[0].contains("x, y and z are in mm"), "{remarks:?}");
     let comment = head.replace("element", "comment units: mm\nelement");
     let (_, remarks) = read_text("a.ply", &format!("{comment}{body}"));
-    assert!(remarks[0].contains("line 3 says `comment units: mm`"), "{remarks:?}");
+    assert!(remarks[0].contains("line 3 contains `comment units: mm`"), "{remarks:?}");
 }
 
 /// In a binary file with CR line ends, the first number directly follows the last CR, even if it starts with an LF
@@ -233,7 +233,7 @@ fn headers_of_pcd_in_any_letters_and_line_ends() {
     let (points, remarks) = scan_of(&path, &options).unwrap();
     assert_eq!(points, WANTED[..1]);
     assert!(
-        remarks[0].ends_with("1 row is no point, left out (line 13: `five` is not a number)"),
+        remarks[0].ends_with("1 row is not a point, skipped (line 13: `five` is not a number)"),
         "{remarks:?}"
     );
     write(&format!("{head}1.5 -2.25 3\n4 5\n"));
@@ -241,7 +241,7 @@ fn headers_of_pcd_in_any_letters_and_line_ends() {
     assert!(error.contains("line 13: 2 values; field z is missing"), "{error}");
     write(&format!("{}{body}", head.replace("x y z", "a b z")));
     let error = scan_of(&path, &options).unwrap_err();
-    assert!(error.contains("the points have no field x, y; their fields are `a b z`"), "{error}");
+    assert!(error.contains("the points have no field x, y; fields: `a b z`"), "{error}");
     // An invalid viewpoint is an error only if it is needed.
     write(&format!("{}{body}", head.replace("VIEWPOINT 0 0 0 1", "VIEWPOINT 1 0 0 0")));
     assert!(scan_of(&path, &options).unwrap_err().contains("VIEWPOINT"));
@@ -275,7 +275,7 @@ fn columns_of_raw_numbers_are_checked_and_said() {
         (floats(&raw(420, |_, place| place.to_vec())), "3 columns of float32: x y z"),
         (
             floats(&raw(420, |_, [x, y, z]| vec![x, y, z, 0.5, 0.5, 0.5])),
-            "6 columns of float32: x y z, the rest is not read (`fields` names them)",
+            "6 columns of float32: x y z, the others are ignored (set with `fields`)",
         ),
         (doubles(&raw(420, |_, place| place.to_vec())), "3 columns of float64: x y z"),
         (
@@ -340,7 +340,7 @@ fn texts_beside_clouds_are_no_clouds() {
     assert_eq!(points, WANTED);
     for name in ["imu.csv", "cam.txt", "gt_poses.txt"] {
         let is_named =
-            |remark: &&String| remark.starts_with(name) && remark.ends_with("is no cloud, left out");
+            |remark: &&String| remark.starts_with(name) && remark.ends_with("is not a cloud and was skipped");
         assert_eq!(remarks.iter().filter(is_named).count(), 1, "{remarks:?}");
     }
     let names: Vec<String> = clouds(folder.path()).into_iter().map(|(head, _)| head.name).collect();
@@ -353,7 +353,10 @@ fn a_folder_of_texts_without_clouds_names_what_may_be_meant() {
     fs::create_dir(folder.path().join("depth")).unwrap();
     fs::write(folder.path().join("cam.txt"), "525 525 31.5 23.5\n").unwrap();
     let error = failure(folder.path(), &ReadOptions::default()).0;
-    assert!(error.contains("cam.txt") && error.contains("is one of its folders meant (depth)"), "{error}");
+    assert!(
+        error.contains("cam.txt") && error.contains("did you mean one of its subfolders (depth)"),
+        "{error}"
+    );
     fs::write(folder.path().join("associations.txt"), "1.5 depth/1.png 1.5 rgb/1.png\n").unwrap();
     let error = failure(folder.path(), &ReadOptions::default()).0;
     assert!(error.contains("{print $1, $2}' associations.txt > depth.txt"), "{error}");

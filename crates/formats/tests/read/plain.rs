@@ -75,7 +75,7 @@ fn raw_floats_that_do_not_fit_their_columns_are_an_error() {
     let fields = ["x", "y", "z"].map(str::to_owned).to_vec();
     let (error, points) =
         failure(&fixture("kitti.bin"), &ReadOptions { fields: Some(fields), ..Default::default() });
-    assert!(error.contains("320 bytes are no whole number of points of 3 floats"), "{error}");
+    assert!(error.contains("320 bytes are not a whole number of points of 3 floats"), "{error}");
     assert_eq!(points, 0);
 }
 

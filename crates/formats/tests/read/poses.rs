@@ -97,27 +97,27 @@ fn what_is_no_pose_is_an_error_with_its_line() {
         // Most lines have another layout.
         (
             "0 0 0 0 0 0 0 1\n\n1 2 3 4 5 6 7 8 9\n1 2 3 4 5 6 7 8 9\n",
-            "line 3: 9 numbers; the lines before have 8",
+            "line 3: 9 numbers, but the lines before have 8",
         ),
         (
             "1 2 3 0.1 0.2 0.3 0.4\n1 2 3 0 0 0 1\n2 2 3 0.1 0.2 0.3 0.4\n",
-            "are these angles, roll, pitch and yaw?",
+            "are these roll, pitch and yaw angles?",
         ),
         ("1 2 3 4 5 6\n", "line 1: 6 numbers; a pose is 8 numbers (TUM: t x y z qx qy qz qw), 7 without t"),
-        ("1 2 3 4 5 6\n", "roll, pitch and yaw are not read"),
+        ("1 2 3 4 5 6\n", "roll, pitch and yaw are not supported"),
         ("t x y z roll pitch yaw\n1 2 3 4 0 0 1\n", "line 1: the column `roll` is an angle"),
         ("# t x y z roll pitch yaw\n1 2 3 4 0 0 1\n", "line 2: the column `roll` is an angle"),
-        ("# t x[px] y[px] z[px] qx qy qz qw\n1 2 3 4 0 0 0 1\n", "line 2: `px` is no unit of length"),
+        ("# t x[px] y[px] z[px] qx qy qz qw\n1 2 3 4 0 0 0 1\n", "line 2: `px` is an unknown unit of length"),
         (
             "# id t x y z qw qx qy qz\n1 2 3 4 1 0 0 0\n",
-            "line 2: 8 columns; the names before it are of 9 or more",
+            "line 2: 8 columns, but the header line has 9 or more",
         ),
-        ("t[min] x y z qx qy qz qw\n1 2 3 4 0 0 0 1\n", "line 1: `min` is no unit of time"),
+        ("t[min] x y z qx qy qz qw\n1 2 3 4 0 0 0 1\n", "line 1: `min` is an unknown unit of time"),
         ("nan 2 3 4 0 0 0 1\nNA 2 3 4 0 0 0 1\n", "line 1: no time stamp"),
-        ("1 0 0 0 0 2 0 0 0 0 1 0\n", "line 1: the matrix is no rotation"),
+        ("1 0 0 0 0 2 0 0 0 0 1 0\n", "line 1: the matrix is not a rotation"),
         ("one two\n", "line 1: `one two` is neither"),
         ("1 2 3\n", "line 1: 3 numbers"),
-        ("# nothing\n", "holds no pose"),
+        ("# nothing\n", "contains no pose"),
         ("x 0 0 0 0 0 0 1\n", "is neither a pose"),
     ] {
         let error = format!("{:#}", read(text).unwrap_err());
@@ -156,7 +156,7 @@ fn poses_by_number_are_as_many_as_clouds() {
     assert_eq!(trajectory.of_cloud(2, &Clouds(Some(3))).unwrap(), trajectory.by_number(2).unwrap());
     assert_eq!(trajectory.of_cloud(2, &Clouds(None)).unwrap(), trajectory.by_number(2).unwrap());
     for (number, clouds, counts) in [
-        (0, Some(4), "3 poses for 4 clouds (1.txt to trajectory.txt), which have no time stamps in common"),
+        (0, Some(4), "3 poses for 4 clouds (1.txt to trajectory.txt), and not both have time stamps"),
         (0, Some(2), "3 poses for 2 clouds (1.txt to trajectory.txt), "),
         (3, None, "3 poses for at least 4 clouds, "),
     ] {
@@ -196,7 +196,7 @@ fn units_of_columns_are_used() {
         let trajectory = read(text).unwrap();
         assert_eq!(trajectory.at(1_700_000_000_000_000_000, 0).unwrap(), Found::Exact(wanted), "{text}");
         let remarks = trajectory.remarks().join("\n");
-        let said = format!("positions are in {unit} by the names of their columns");
+        let said = format!("positions are in {unit}, as stated in their column names");
         assert!(if unit.is_empty() { remarks.is_empty() } else { remarks.contains(&said) }, "{remarks}");
     }
 }
@@ -207,7 +207,7 @@ fn rows_that_are_no_poses_keep_their_numbers_and_are_remarked() {
         ("2 nan nan nan nan nan nan nan", "line 3: `nan` is not finite"),
         ("2 -nan(ind) 0 0 0 0 0 1", "line 3: `-nan(ind)` is not finite"),
         ("2 20 0 0 0 0 0 0", "line 3: the quaternion 0 0 0 0 has length 0"),
-        ("2 lost", "line 3: 2 numbers; the lines before have 8"),
+        ("2 lost", "line 3: 2 numbers, but the lines before have 8"),
         ("2 20 x 0 0 0 0 1", "line 3: `x` is not a number"),
         ("2", "line 3: 1 numbers"),
         ("2,,,,,,,", "line 3: 1 numbers"),
@@ -225,7 +225,8 @@ fn rows_that_are_no_poses_keep_their_numbers_and_are_remarked() {
         assert!(matches!(trajectory.at(3_000_000_000, 0).unwrap(), Found::Exact(_)));
         let remarks = trajectory.remarks();
         assert!(
-            remarks.len() == 1 && remarks[0].starts_with("1 row of poses is left out, the first: "),
+            remarks.len() == 1
+                && remarks[0].starts_with("1 row of poses is invalid and skipped, the first: "),
             "{remarks:?}"
         );
         assert!(remarks[0].contains(reason), "{remarks:?}");
@@ -286,7 +287,7 @@ fn quaternions_with_w_first_are_told_by_the_way_the_sensor_stands() {
             assert_eq!(found, wanted);
         }
         let remarks = trajectory.remarks().join("\n");
-        assert_eq!(remarks.contains("are read w first (qw qx qy qz)"), is_guess, "{remarks}");
+        assert_eq!(remarks.contains("are read as qw qx qy qz"), is_guess, "{remarks}");
     }
 }
 
@@ -421,19 +422,19 @@ fn an_array_that_holds_no_poses_says_what_is_expected() {
         (npy(3, &header("[('t', '<f8'), ('x', '<f8')]", "False", "2,"), 32), "is a structured array"),
         (npy(1, &header("'<f8'", "True", "2, 8"), 128), "is in Fortran order"),
         (npy(1, &header("'<f8'", "False", "2, 9"), 144), "has the shape (2, 9); poses are N x 8"),
-        (npy(1, &header("'<f8'", "False", "2, 6"), 96), "roll, pitch and yaw are not read"),
+        (npy(1, &header("'<f8'", "False", "2, 6"), 96), "roll, pitch and yaw are not supported"),
         (npy(1, &header("'<f8'", "False", ""), 8), "has the shape ()"),
         (npy(1, &header("'<f8'", "False", "18446744073709551615, 8"), 0), "the file ends after 0 of"),
         (npy(1, &plain, 40), "the file ends after 0 of 2 poses"),
         (npy(1, &plain, 128), "record 0: the quaternion 0 0 0 0 has length 0.000, not 1"),
-        (npy(4, &plain, 128), "its version is none of 1, 2 and 3"),
-        (npy(1, "{}", 0), "its header names no type"),
+        (npy(4, &plain, 128), "its format version is not 1, 2 or 3"),
+        (npy(1, "{}", 0), "its header has no type"),
         (npy(1, &plain, 0)[..40].to_vec(), "the file ends within its header"),
         (npy(2, &plain, 0)[..9].to_vec(), "the file ends within its header"),
-        (npy(1, &plain, 0)[..7].to_vec(), "is no array of NumPy, which its name says"),
-        (Vec::new(), "is no array of NumPy"),
-        (TUM.as_bytes().to_vec(), "is no array of NumPy"),
-        (b"\x80\x04\x95numpy".to_vec(), "is no array of NumPy"),
+        (npy(1, &plain, 0)[..7].to_vec(), "is not a NumPy array in spite of its name"),
+        (Vec::new(), "is not a NumPy array"),
+        (TUM.as_bytes().to_vec(), "is not a NumPy array"),
+        (b"\x80\x04\x95numpy".to_vec(), "is not a NumPy array"),
     ] {
         let error = fail("poses.NPY", &bytes);
         assert!(error.contains("poses.NPY") && error.contains(wanted), "{error}\n{wanted}");
@@ -442,18 +443,18 @@ fn an_array_that_holds_no_poses_says_what_is_expected() {
         (
             "poses.npz",
             &b"PK\x03\x04rest"[..],
-            "is an archive (.zip, .npz), not a text of poses: save one array",
+            "is an archive (.zip, .npz), not a text file of poses: save one array",
         ),
-        ("poses.csv.gz", b"\x1f\x8b\x08\x00", "is packed (gzip), not a text of poses: unpack it first"),
+        ("poses.csv.gz", b"\x1f\x8b\x08\x00", "is packed (gzip), not a text file of poses: unpack it first"),
         (
             "drive.bag",
             b"#ROSBAG V2.0\n",
-            "is a recording (.bag), not a text of poses: give the recording itself",
+            "is a recording (.bag), not a text file of poses: use the recording itself",
         ),
         ("drive.mcap", b"\x89MCAP0\r\n", "is a recording (.mcap)"),
         ("drive.db3", b"SQLite format 3\0", "is a database"),
         ("poses.csv", b"\xff\xfe1\0 \0", "is text in UTF-16"),
-        ("poses.bin", &1.5_f64.to_le_bytes(), "is binary, not a text of poses: save the poses as text"),
+        ("poses.bin", &1.5_f64.to_le_bytes(), "is binary, not a text file of poses: save the poses as text"),
     ] {
         let error = fail(name, bytes);
         assert!(error.contains(wanted), "{error}");

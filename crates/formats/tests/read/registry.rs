@@ -68,10 +68,10 @@ fn a_format_is_a_row_and_a_file() {
     };
     assert!(error.contains("line 2: no number"), "{error}");
     let error = Registry::default().guess(&renamed, &[]).unwrap_err().to_string();
-    assert!(error.contains("known are pcd, ply") && !error.contains("axis"), "{error}");
+    assert!(error.contains("known formats: pcd, ply") && !error.contains("axis"), "{error}");
     fs::write(folder.path().join("bad.axis"), "nothing").unwrap();
     let error = formats.guess(&folder.path().join("bad.axis"), &[]).unwrap_err().to_string();
-    assert!(error.contains("is called .axis, but does not start like such a file"), "{error}");
+    assert!(error.contains("has the extension .axis, but its content is not of that format"), "{error}");
 }
 
 #[test]

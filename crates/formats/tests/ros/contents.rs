@@ -82,7 +82,7 @@ fn several_topics_are_listed_and_none_too() {
         assert!(!text.contains("/color"), "{text}");
         assert!(text.contains(name), "{text}");
         assert!(error(name, &topic("/pionts")).contains("/points"));
-        assert!(error(name, &topic("/tf")).contains("are no clouds"));
+        assert!(error(name, &topic("/tf")).contains("are not clouds"));
         assert!(error(name, &topic("/color/image_raw")).contains("/color/camera_info"));
     }
 }
@@ -112,7 +112,7 @@ fn content_tells_a_recording_whatever_its_name() {
     let path = folder.path().join("points.xyz");
     std::fs::write(&path, "1 2 3\n").unwrap();
     let Err(error) = open_recording(&[path]) else { panic!("points are no recording") };
-    assert!(format!("{error:#}").contains("no recording by its content or its name"), "{error}");
+    assert!(format!("{error:#}").contains("not a supported recording"), "{error}");
 }
 
 #[test]
@@ -120,7 +120,7 @@ fn gaps_between_transforms_may_be_limited() {
     let options = BagOptions { most_gap_ns: Some(10_000_000), ..topic("/points") };
     let (clouds, _, remarks) = read(&[data("lz4.bag")], &options);
     assert!(clouds.iter().all(|(head, _)| head.world_from_sensor.is_none()));
-    let why = "too far apart; `pose_tolerance` allows for more";
+    let why = "too far apart; `pose_tolerance` permits larger gaps";
     assert!(remarks.iter().any(|remark| remark.contains(why)), "{remarks:?}");
     // `map` moves in `odom` five times a second.
     for (tolerance_ns, posed) in [(99_999_999, 0), (100_000_000, 4)] {

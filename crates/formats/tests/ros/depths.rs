@@ -109,7 +109,7 @@ fn images_of_16_bits_are_depths_where_a_name_says_so() {
         let bag = Bag::new().image("/camera/image_raw", "camera", encoding).camera("/camera/camera_info");
         let (clouds, _, remarks) = bag.read(BagOptions::default());
         assert_eq!(depths(&clouds), [Some(1.0), None]);
-        let told = format!("/camera/image_raw is read as depths because of its encoding {encoding}");
+        let told = format!("/camera/image_raw is read as depth images because of its encoding {encoding}");
         assert!(remarks[0].starts_with(&told), "{remarks:?}");
     }
 }
@@ -130,8 +130,10 @@ fn images_of_temperatures_are_no_walls() {
                 .camera(&format!("{}/camera_info", &name[..name.len() - 10]))
         };
         let error = bag().refusal();
-        let told = format!("names do not say that they are depths: {name} ({encoding}); if they are, name");
-        assert!(error.contains("no topic holds clouds") && error.contains(&told), "{error}");
+        let told = format!(
+            "images that are not named as depth: {name} ({encoding}); if they are depth images, select"
+        );
+        assert!(error.contains("no topic contains clouds") && error.contains(&told), "{error}");
         // If there are clouds too, the images are skipped with a remark.
         let (clouds, _, remarks) = bag().points().read(BagOptions::default());
         assert_eq!(clouds[0].1[0].position_m, [7.0, 1.0, 2.0]);
@@ -139,7 +141,7 @@ fn images_of_temperatures_are_no_walls() {
         // The images are used if their topic is selected.
         let (clouds, errors, remarks) = bag().points().read(topic(name));
         assert_eq!((depths(&clouds), errors), (vec![Some(1.0), None], vec![]), "{name}");
-        let told = format!("{name} ({encoding}) is read as depths, as it was named");
+        let told = format!("{name} ({encoding}) is read as depth images, because it was selected");
         assert_eq!(remarks, [told]);
     }
 }
@@ -213,15 +215,15 @@ fn compressed_images_that_are_no_depths_say_why() {
         (
             "16UC1; compressedDepth rvl",
             [config(0.0, 0.0), vec![1, 0, 0, 0, 2, 0, 0, 0]].concat(),
-            "row 0 of 2 is cut",
+            "row 0 of 2 is truncated",
         ),
+        ("32FC1; compressedDepth png", [config(f32::NAN, 0.0), png16(&[1])].concat(), "the depth parameters"),
         (
-            "32FC1; compressedDepth png",
-            [config(f32::NAN, 0.0), png16(&[1])].concat(),
-            "the parameters of the depths",
+            "bgr8; compressedDepth png",
+            [config(0.0, 0.0), png16(&[1])].concat(),
+            "the pixel encoding is `bgr8`",
         ),
-        ("bgr8; compressedDepth png", [config(0.0, 0.0), png16(&[1])].concat(), "pixels were `bgr8`"),
-        ("mono8; png compressed", png8, "grey with 16 bits"),
+        ("mono8; png compressed", png8, "16-bit grey"),
         ("16UC1; compressedDepth", cut, "row 0 of 1 of its PNG"),
         ("16UC1; compressedDepth", vec![], "is neither PNG nor RVL"),
     ] {
@@ -249,7 +251,8 @@ fn compressed_images_that_are_no_depths_say_why() {
     let (clouds, _, remarks) = bag.camera("/depth/camera_info").read(BagOptions::default());
     assert_eq!(clouds[0].1[0].position_m, [7.0, 1.0, 2.0]);
     assert!(
-        remarks[0].starts_with("/points is read; `topic` NAME takes another one: /depth/image/c"),
+        remarks[0]
+            .starts_with("/points is read; other topics can be chosen with `topic` NAME: /depth/image/c"),
         "{remarks:?}"
     );
 }
@@ -259,8 +262,11 @@ fn what_is_missing_to_make_clouds_is_said() {
     let error = Bag::new().image("/depth/image", "camera", "16UC1").refusal();
     assert!(error.contains("of type CameraInfo: /depth/image without /depth/camera_info"), "{error}");
     for (type_name, told) in [
-        ("velodyne_msgs/VelodyneScan", "/packets holds no points: velodyne_pointcloud makes clouds"),
-        ("ouster_ros/PacketMsg", "ouster_ros makes clouds"),
+        (
+            "velodyne_msgs/VelodyneScan",
+            "/packets contains no points: convert it to clouds with velodyne_pointcloud",
+        ),
+        ("ouster_ros/PacketMsg", "convert it to clouds with ouster_ros"),
     ] {
         let error = Bag::new().with("/packets", type_name, vec![0; 20]).refusal();
         assert!(error.contains(told), "{error}");
@@ -270,8 +276,8 @@ fn what_is_missing_to_make_clouds_is_said() {
     }
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.bag");
-    let no_message = "it holds no messages; topics: /points";
-    for (topics, told) in [(vec![], "it holds no topics"), (vec![("/points", "x/Y")], no_message)] {
+    let no_message = "it contains no messages; topics: /points";
+    for (topics, told) in [(vec![], "it contains no topics"), (vec![("/points", "x/Y")], no_message)] {
         std::fs::write(&path, bag1(&topics, &[])).unwrap();
         let error = open_bag(std::slice::from_ref(&path), &BagOptions::default())
             .err()

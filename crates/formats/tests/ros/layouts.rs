@@ -63,7 +63,7 @@ fn points_are_found_whatever_row_step_says() {
     for row_step in [36, 72] {
         let (points, errors, _) = read_cloud(&layout([2, 3], row_step), &XYZ, &six()[..60]);
         assert_eq!(positions(&points), wanted[..5], "{row_step}");
-        assert!(errors[0].contains("6 points are announced; 60 bytes of data hold 5"), "{errors:?}");
+        assert!(errors[0].contains("6 points are announced, but 60 bytes of data contain 5"), "{errors:?}");
     }
 }
 
@@ -94,7 +94,7 @@ fn points_that_are_not_announced_are_read_and_said() {
     for size in [[0, 6], [6, 0], [0, 0]] {
         let (points, errors, remarks) = read_cloud(&layout(size, 72), &XYZ, &six());
         assert_eq!((points.len(), errors), (6, vec![]), "{size:?}");
-        assert_eq!(remarks, ["1 clouds announce no points, but hold some, which are read"]);
+        assert_eq!(remarks, ["1 clouds announce no points, but contain points, which are read"]);
     }
     // These messages do not contain six points.
     for (size, data) in [([0, 5], six()), ([0, 0], vec![]), ([0, 0], vec![7; 13])] {
@@ -118,7 +118,7 @@ fn the_byte_order_is_that_of_the_points() {
     assert_eq!((positions(&points), remarks), (wanted.clone(), vec![]));
     let (points, _, remarks) = read_cloud(&said, &XYZ, &le(&numbers));
     assert_eq!(positions(&points), wanted);
-    assert_eq!(remarks, ["1 clouds say that they are big-endian, but are little-endian"]);
+    assert_eq!(remarks, ["1 clouds are marked as big-endian, but are little-endian"]);
     // Too few points to detect the byte order.
     let one = CloudLayout { size: [1, 1], ..said };
     let (points, _, remarks) = read_cloud(&one, &XYZ, &big[..12]);
@@ -149,14 +149,17 @@ fn plane_clouds_have_z_0_and_fields_outside_of_points_are_errors() {
     let layout = CloudLayout { size: [1, 2], is_big_endian: false, point_step: 8, row_step: 16 };
     let (points, errors, remarks) = read_cloud(&layout, &[("x", 0, F32), ("y", 4, F32)], &data);
     assert_eq!((positions(&points), errors), (vec![[1.0, 2.0, 0.0], [3.0, 4.0, 0.0]], vec![]));
-    assert_eq!(remarks, ["1 clouds have no field z: it is taken as 0"]);
+    assert_eq!(remarks, ["1 clouds have no field z: 0 is used"]);
     for (fields, told) in [
         (
             vec![("x", 0, F32), ("y", 4, F32), ("z", 8, F32)],
-            "the field z begins at byte 8 of points of 8 bytes",
+            "the field z at byte 8 is outside of the point, which has 8 bytes",
         ),
-        (vec![("x", 0, F32), ("y", 1, F64)], "the field y begins at byte 1 of points of 8 bytes"),
-        (vec![("x", 0, F32), ("y", 4, 99)], "the field y is of no known type"),
+        (
+            vec![("x", 0, F32), ("y", 1, F64)],
+            "the field y at byte 1 is outside of the point, which has 8 bytes",
+        ),
+        (vec![("x", 0, F32), ("y", 4, 99)], "the field y has an unknown type"),
         (vec![("range", 0, F32), ("azimuth", 4, F32)], "have no field x; fields: range, azimuth"),
         (vec![("xyz", 0, F32)], "have no field x; fields: xyz"),
     ] {

@@ -35,8 +35,8 @@ fn a_topic_of_poses_without_any_that_can_be_used_is_an_error() {
     };
     let cut = pose("odom", 1.0)[..20].to_vec();
     for (poses, told) in [
-        (vec![], "odometry /odom: none of its 0 messages gives a pose"),
-        (vec![pose("odom", f64::NAN), pose("", 1.0)], "; 2 are not valid, or their frames have no name"),
+        (vec![], "odometry /odom: none of its 0 messages contains a valid pose"),
+        (vec![pose("odom", f64::NAN), pose("", 1.0)], "; 2 are invalid or have unnamed frames"),
         (vec![cut], "; 1 messages or chunks with poses cannot be read; the first: /odom: "),
     ] {
         let path = with_odometry(folder.path(), &poses, "geometry_msgs/PoseStamped");
@@ -48,7 +48,7 @@ fn a_topic_of_poses_without_any_that_can_be_used_is_an_error() {
     let path = with_odometry(folder.path(), &poses, "geometry_msgs/PoseStamped");
     let (clouds, _, remarks) = read(&[path], &options);
     assert_eq!(clouds[0].0.world_from_sensor.unwrap().position_m, [7.0, 0.0, 0.0]);
-    assert!(remarks.iter().any(|remark| remark.starts_with("1 poses are not valid")), "{remarks:?}");
+    assert!(remarks.iter().any(|remark| remark.starts_with("1 poses are invalid")), "{remarks:?}");
 }
 
 /// Every message of a path repeats the poses so far.

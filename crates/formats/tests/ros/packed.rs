@@ -54,7 +54,7 @@ fn messages_that_are_compressed_are_read_without_metadata() {
     std::fs::write(&path, mcap_of(&packed)).unwrap();
     let (clouds, errors, _) = read(from_ref(&path), &unposed());
     assert_eq!(clouds.len(), 2);
-    assert!(errors[0].contains("a message recorded at 1 ns cannot be unpacked"), "{errors:?}");
+    assert!(errors[0].contains("a message recorded at 1 ns cannot be decompressed"), "{errors:?}");
 }
 
 #[cfg(feature = "sqlite")]
@@ -112,7 +112,7 @@ fn files_that_are_compressed_are_read_alone() {
     let path = folder.path().join("b.mcap.zst");
     std::fs::write(&path, zstd_of(&zstd_of(&std::fs::read(data("only_points.mcap")).unwrap()))).unwrap();
     let error = open_bag(from_ref(&path), &unposed()).err().map(|error| format!("{error:#}")).unwrap();
-    assert!(error.contains("b.mcap.zst: malformed: offset 0: it was unpacked, and what is in it"), "{error}");
+    assert!(error.contains("b.mcap.zst: malformed: offset 0: it was unpacked, but its contents"), "{error}");
 }
 
 /// A recorder whose disk was disconnected.
@@ -133,10 +133,10 @@ fn files_that_are_cut_off_before_anything_say_where() {
         let error =
             open_bag(&[path], &BagOptions::default()).err().map(|error| format!("{error:#}")).unwrap();
         let told = match at {
-            3 => format!("cut off at byte {len}, in the record from byte {}", len - at),
-            _ => format!("cut off at byte {len}: the record from byte "),
+            3 => format!("truncated at byte {len}, in the record at byte {}", len - at),
+            _ => format!("truncated at byte {len}: the record at byte "),
         };
-        assert!(error.contains("it holds no topics; ") && error.contains(&told), "{error}");
+        assert!(error.contains("it contains no topics; ") && error.contains(&told), "{error}");
         assert!(error.contains("0 messages were found"), "{error}");
     }
 }

@@ -91,7 +91,7 @@ fn files_out_of_the_folder_of_a_bag_are_not_read() {
         std::fs::write(bag.join("metadata.yaml"), format!("relative_file_paths:\n- {name}\n")).unwrap();
         let error =
             open_recording(from_ref(&bag)).err().map(|error| format!("{error:#}")).unwrap_or_default();
-        assert!(error.contains(&format!("names {name}, which leads out of the folder")), "{error}");
+        assert!(error.contains(&format!("lists {name}, which is outside of the folder")), "{error}");
     }
     // The recorder's folder name is ignored if the file was moved.
     std::fs::rename(&outside, bag.join("a.mcap")).unwrap();
@@ -142,5 +142,5 @@ fn a_file_that_is_named_again_is_read_once() {
     std::fs::write(folder.path().join("metadata.yaml"), metadata).unwrap();
     let (clouds, errors, remarks) = read(&[folder.path().to_owned()], &BagOptions::default());
     assert_eq!((clouds.len(), errors), (4, vec![]));
-    assert!(remarks[0].contains("names of files occur again (99999)"), "{remarks:?}");
+    assert!(remarks[0].contains("file names are repeated (99999 times)"), "{remarks:?}");
 }

@@ -94,7 +94,7 @@ fn registered_clouds_are_seen_from_the_odometry() {
         assert_eq!(errors, Vec::<String>::new());
         assert_registered(&clouds, &format!("{options:?}"));
         // With an explicit topic there is no remark on the choice.
-        let told = "the clouds are in the frame camera_init already: they are taken as they are, seen from body \
+        let told = "the clouds are already in the frame camera_init: their points are not transformed, and rays start at body \
                     (`odometry` /Odometry `world_frame`)";
         let wanted: &[&str] = if options.is_world_frame { &[] } else { &[told] };
         assert_eq!(remarks, wanted);
@@ -114,13 +114,13 @@ fn registered_clouds_are_seen_from_the_odometry() {
     // Poses without a child frame are not used as odometry by default.
     let (clouds, _, remarks) = read(&[path], &BagOptions::default());
     assert!(clouds[0].0.world_from_sensor.is_none());
-    assert!(remarks.iter().any(|remark| remark.contains("as with `odometry` /pose")), "{remarks:?}");
+    assert!(remarks.iter().any(|remark| remark.contains("for instance `odometry` /pose")), "{remarks:?}");
 }
 
 #[test]
 fn registered_clouds_are_seen_from_what_moves_in_their_frame() {
     let cloud = |frame| ("/cloud_registered", Clouds(frame));
-    let body = "they are taken as they are, seen from body";
+    let body = "their points are not transformed, and rays start at body";
     for (topics, told) in [
         (vec![cloud("camera_init"), ("/tf", Tf("camera_init", "body"))], body),
         // Two odometry topics, but one moving frame.
@@ -148,7 +148,7 @@ fn registered_clouds_are_seen_from_what_moves_in_their_frame() {
                 ("/tf_static", Still("map", "camera_init")),
                 ("/Odometry", Odometry("camera_init", "body")),
             ],
-            "seen from body (`odometry` /Odometry `world_frame`)",
+            "rays start at body (`odometry` /Odometry `world_frame`)",
         ),
         // Corrections of the map do not move the points of a cloud in `odom`.
         (
@@ -158,7 +158,7 @@ fn registered_clouds_are_seen_from_what_moves_in_their_frame() {
                 ("/tf", Tf("odom", "base_link")),
                 ("/odometry", Odometry("odom", "odom_mapping")),
             ],
-            "seen from odom_mapping (`odometry` /odometry `world_frame`)",
+            "rays start at odom_mapping (`odometry` /odometry `world_frame`)",
         ),
         // Wheels move too.
         (
@@ -168,7 +168,7 @@ fn registered_clouds_are_seen_from_what_moves_in_their_frame() {
                 ("/left", Tf("base_link", "left_wheel")),
                 ("/right", Tf("base_link", "right_wheel")),
             ],
-            "seen from base_link",
+            "rays start at base_link",
         ),
     ] {
         let (_folder, path) = record(&topics);
@@ -190,19 +190,19 @@ fn what_is_not_clear_is_said_and_not_guessed() {
                 ("/a", Odometry("camera_init", "aft_mapped")),
                 ("/b", Odometry("camera_init", "imu")),
             ],
-            "(/a, /b): name one, as with `odometry` /a `world_frame`",
+            "(/a, /b): select one, for instance `odometry` /a `world_frame`",
         ),
         // Wheels moving in a robot's frame give no pose in a map.
         (
             vec![cloud("base_link"), ("/tf", Tf("base_link", "wheel"))],
-            "no transform says how base_link moves",
+            "no transform describes how base_link moves",
         ),
         // An arm in front of a fixed camera.
-        (vec![cloud("world"), ("/tf", Tf("world", "gripper"))], "no transform says how world moves"),
+        (vec![cloud("world"), ("/tf", Tf("world", "gripper"))], "no transform describes how world moves"),
         // Odometry of the sensor itself is only used if requested.
         (
             vec![cloud("body"), ("/Odometry", Odometry("camera_init", "body"))],
-            "poses are in /Odometry (nav_msgs/Odometry, 5 messages): name their topic, as with `odometry` /Odometry",
+            "there are poses in /Odometry (nav_msgs/Odometry, 5 messages): select their topic, for instance `odometry` /Odometry",
         ),
         (vec![cloud("lidar")], "no transform names the frame lidar"),
     ] {
@@ -259,7 +259,7 @@ fn scans_of_registered_clouds_keep_their_points() {
     options.clouds.is_deskewed = true;
     let error = open_scans(&path, &options).and_then(|mut scans| scans.next_scan());
     let error = format!("{:#}", error.err().unwrap());
-    assert!(error.contains("deskew") && error.contains("have no motion left in them"), "{error}");
+    assert!(error.contains("deskew") && error.contains("already motion-compensated"), "{error}");
     // Points without rays need no poses.
     let mut options = ReadOptions::default();
     (options.clouds.may_lack_poses, options.clouds.are_poses_needed) = (true, false);
@@ -292,7 +292,9 @@ fn poses_without_stamps_are_of_when_they_were_recorded() {
     let xs: Vec<_> =
         clouds.iter().map(|(head, _)| head.world_from_sensor.map(|pose| pose.position_m[0])).collect();
     assert_eq!(xs, [Some(0.5), Some(1.5), Some(2.5), None]);
-    for told in ["4 poses have no stamp; they are taken", "4 clouds have no stamp; they are taken"] {
+    for told in
+        ["4 poses have no stamp; their recording times", "4 clouds have no stamp; their recording times"]
+    {
         assert!(remarks.iter().any(|remark| remark.starts_with(told)), "{remarks:?}");
     }
 }

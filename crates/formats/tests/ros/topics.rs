@@ -45,7 +45,7 @@ fn topics_that_are_left_out_cost_no_others() {
         let (clouds, errors, remarks) = read(&[folder.path().join(name)], &BagOptions::default());
         let positions: Vec<_> = clouds.iter().map(|(_, points)| points[0].position_m).collect();
         assert_eq!((positions, errors), (vec![[1.0, 1.0, 2.0]], Vec::new()), "{name}");
-        let is_scanned = remarks.iter().any(|remark| remark.contains("reading it whole"));
+        let is_scanned = remarks.iter().any(|remark| remark.contains("reading the whole file"));
         assert_eq!(is_scanned, name.starts_with("cut"), "{name}: {remarks:?}");
     }
 }
@@ -84,7 +84,6 @@ fn messages_that_are_not_of_ros_are_named() {
     drop(writer);
     std::fs::write(&path, bytes.into_inner()).unwrap();
     let error = open_bag(&[path], &BagOptions::default()).err().map(|error| format!("{error:#}"));
-    let told =
-        "serialised otherwise than by ROS are not read: /lidar; topics: /lidar (foxglove.PointCloud, 1 ";
+    let told = "with another serialization than that of ROS are not supported: /lidar; topics: /lidar (foxglove.PointCloud, 1 ";
     assert!(error.as_ref().is_some_and(|error| error.contains(told)), "{error:?}");
 }

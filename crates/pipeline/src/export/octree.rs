@@ -36,7 +36,8 @@ fn of_octree(
     format: OctreeFormat,
 ) -> anyhow::Result<ExportSummary> {
     if export.options.region.is_some() || export.options.origin_m.is_some() {
-        let reason = "from an octree file to another is the whole tree, where it is";
+        let reason = "conversion between octree files always includes the whole tree with its coordinates: omit this \
+                      option";
         return Err(Error::argument("region, origin", reason).into());
     }
     let octree = octree_file::read(&export.options.map)?;

@@ -81,7 +81,7 @@ impl ExportOptions {
         }
         if is_standard_output(&self.output) && !format.is_stream() {
             let what = if format.extension.is_some() { "file" } else { "folder" };
-            let reason = format!("{} is not written as a stream; name a {what}", format.name);
+            let reason = format!("{} cannot be written to standard output: use a {what}", format.name);
             return Err(Error::argument("output", reason));
         }
         self.check_taken(&format)?;
@@ -96,7 +96,7 @@ impl ExportOptions {
         if let Some(name) = &self.format {
             return self.formats.of_name(name).copied().ok_or_else(|| {
                 let known = list(&|format| Some(format.name.to_owned()));
-                Error::argument("format", format!("`{name}` is no known format; known are {known}"))
+                Error::argument("format", format!("`{name}` is an unknown format; known formats: {known}"))
             });
         }
         if let Some(format) = self.formats.of_path(&self.output) {
@@ -108,7 +108,7 @@ impl ExportOptions {
         } else {
             let known = list(&|format| Some(format!(".{}", format.extension?)));
             let output = self.output.display();
-            format!("{output}: its extension is of no known format; known are {known}; or add `format`")
+            format!("{output}: its extension is unknown; known extensions: {known}; or add `format`")
         };
         Err(Error::argument("output", reason))
     }
@@ -133,15 +133,15 @@ impl ExportOptions {
                 let takers = self.formats.all().iter().filter(|other| other.takes.contains(&option));
                 let takers: Vec<&str> = takers.map(|other| other.name).collect();
                 let which = match takers.len() {
-                    1..=4 => format!("formats that do: {}; ", takers.join(" ")),
+                    1..=4 => format!("formats that support it: {}; ", takers.join(" ")),
                     _ => String::new(),
                 };
-                let reason = format!("{name} does not take it; {which}{refusal}");
+                let reason = format!("{name} does not support it; {which}{refusal}");
                 return Err(Error::argument(argument, reason));
             }
         }
         if self.origin_m.is_some() && format.origin == Origin::Map {
-            let reason = format!("{name} keeps true coordinates; {refusal}");
+            let reason = format!("{name} always has map coordinates; {refusal}");
             return Err(Error::argument("origin", reason));
         }
         Ok(())

@@ -31,7 +31,7 @@ impl ExportOrigin {
         let is_index = |x: &f64| *x >= f64::from(i32::MIN) && *x <= f64::from(i32::MAX);
         if !voxel.iter().all(is_index) {
             let reason = format!(
-                "{asked_m:?} m is not finite, or too far away for voxels of {} m",
+                "{asked_m:?} m is not finite, or too far away for the indices of voxels of {} m",
                 grid.resolution_m()
             );
             return Err(Error::argument("origin", reason));
@@ -60,8 +60,8 @@ impl ExportOrigin {
             if min - middle < -reach || end - middle > reach {
                 let width_m = 2.0 * reach as f64 * grid.resolution_m();
                 let reason = format!(
-                    "coordinates of a .pcd are float32, which tell voxels of {} m apart over {width_m} m, and the map is wider; \
-                     export .ply, or region by region (`region`)",
+                    "the float32 coordinates of .pcd resolve voxels of {} m only within {width_m} m, and the map is \
+                     wider: export .ply, or single regions (`region`)",
                     grid.resolution_m()
                 );
                 return Err(Error::argument("output", reason));

@@ -97,6 +97,6 @@ impl OriginFile {
 }
 
 fn in_the_way(path: PathBuf) -> Error {
-    let hint = "it is in the way of what says where the exported file is; move or remove it";
+    let hint = "this name is needed for the origin of the exported file: move or remove the existing file";
     Error::AlreadyExists { path, hint }
 }

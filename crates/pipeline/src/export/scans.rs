@@ -54,7 +54,8 @@ pub fn export_scans(map: &Path, folder: &Path, watch: &Watch) -> anyhow::Result<
         let scan = scan?;
         let is_in_world = scan.world_from_sensor().is_none();
         if exported.scans > 0 && is_in_world != exported.world_frame {
-            let reason = "has scans in the world frame and others in the frame of their sensor; one folder cannot hold both";
+            let reason = "has scans in the world frame and others in the sensor frame, which cannot be exported to one \
+                          folder";
             return Err(Error::argument(map.display().to_string(), reason).into());
         }
         let path = unfinished.join(format!("{:0digits$}.pcd", scan.number()));
@@ -66,7 +67,7 @@ pub fn export_scans(map: &Path, folder: &Path, watch: &Watch) -> anyhow::Result<
         progress.step();
     }
     lines.flush().map_err(|error| Error::io(&poses, "write", error))?;
-    progress.say("making it durable");
+    progress.say("syncing");
     staged.finish()?;
     drop(progress);
     Ok(exported)

@@ -31,7 +31,7 @@ const INDEX: OutputFormat = OutputFormat {
     feature: None,
     takes: &[OutputOption::Which],
     origin: Origin::Map,
-    refusal: "it has no room for it",
+    refusal: "it cannot store it",
     is_text: true,
     needs_free_voxels: true,
     writer: Writer::Files(|_, path, _| {
@@ -94,20 +94,22 @@ fn what_a_row_does_not_take_is_refused_with_those_that_do() {
     };
     let heights = refusal("a.index", |options| options.z_min_m = Some(1.0));
     assert!(
-        heights.contains("index does not take it; formats that do: nav2 heightmap; it has no room"),
+        heights.contains(
+            "index does not support it; formats that support it: nav2 heightmap; it cannot store it"
+        ),
         "{heights}"
     );
     let origin = refusal("a.index", |options| options.origin_m = Some([1.0; 3]));
-    assert!(origin.contains("index keeps true coordinates"), "{origin}");
+    assert!(origin.contains("index always has map coordinates"), "{origin}");
     let stream = refusal("-", |options| options.format = Some("index".to_owned()));
-    assert!(stream.contains("index is not written as a stream"), "{stream}");
+    assert!(stream.contains("index cannot be written to standard output"), "{stream}");
     let unknown = refusal("a.what", |_| ());
     assert!(unknown.contains(".copc.laz") && unknown.contains(".index .index.stream;"), "{unknown}");
     let unnamed = refusal("-", |_| ());
     assert!(unnamed.contains("ply pcd csv bt ot index-stream"), "{unnamed}");
     let misnamed = refusal("a.ply", |options| options.format = Some("play".to_owned()));
     assert!(
-        misnamed.contains("`play` is no known format") && misnamed.contains("3dtiles index"),
+        misnamed.contains("`play` is an unknown format") && misnamed.contains("3dtiles index"),
         "{misnamed}"
     );
     let wrong = refusal("a.ply", |options| options.which = Some(WhichVoxels::AtLeast(1.5)));

@@ -61,7 +61,7 @@ impl OutputFile {
         if is_standard_output(target) {
             return Err(Error::argument(
                 "output",
-                "a picture needs a file: standard output is for the summary",
+                "an image needs an output file, because standard output is used for the summary",
             ));
         }
         check_target(target).map(drop)
@@ -174,7 +174,7 @@ pub fn scratch_for(target: &Path) -> Result<File> {
         Place::File => tempfile::tempfile_in(folder_of(target)),
         Place::Stream => tempfile::tempfile(),
     };
-    file.map_err(|error| Error::io(target, "create a temporary file beside", error))
+    file.map_err(|error| Error::io(target, "create a temporary file next to", error))
 }
 
 fn named_beside(target: &Path) -> io::Result<NamedTempFile> {

@@ -81,8 +81,8 @@ impl StagedOutput {
         if self.target.exists() || !to.exists() || is_same(from, to)? {
             return Ok(());
         }
-        let hint =
-            "a file beside the output needs this name; move or remove what has it, or name another output";
+        let hint = "a companion file of the output needs this name: move or remove the existing file, or choose another \
+             output";
         Err(Error::AlreadyExists { path: to.to_owned(), hint })
     }
 }
@@ -100,7 +100,7 @@ fn is_same(a: &Path, b: &Path) -> Result<bool> {
 fn check_staged(from: &Path, to: &Path) -> Result<()> {
     sync_all(from).map_err(|error| Error::io(from, "make durable", error))?;
     if to.is_dir() && !from.is_dir() {
-        let reason = "is a folder, and a file needs its name; name another output, or remove it first";
+        let reason = "is a folder, but a file needs its name: choose another output, or remove the folder";
         return Err(Error::argument(to.display().to_string(), reason));
     }
     check_staged_target(to)
@@ -119,7 +119,7 @@ fn check_staged_target(target: &Path) -> Result<()> {
         return match check_target(target)? {
             Place::File => Ok(()),
             Place::Stream => {
-                let reason = format!("{} is no regular file", target.display());
+                let reason = format!("{} is not a regular file", target.display());
                 Err(Error::argument("output", reason))
             }
         };
@@ -128,7 +128,7 @@ fn check_staged_target(target: &Path) -> Result<()> {
     if is_empty {
         return Ok(());
     }
-    let reason = "is a folder with content; name another, or remove it first";
+    let reason = "is a folder that is not empty: choose another output, or remove it first";
     Err(Error::argument(target.display().to_string(), reason))
 }
 

@@ -27,15 +27,15 @@ pub(super) fn check_target(target: &Path) -> Result<Place> {
         Err(error) if error.kind() == io::ErrorKind::NotFound => None,
         Err(error) => return Err(Error::io(target, "look at", error)),
         Ok(metadata) if metadata.is_file() => None,
-        Ok(metadata) if metadata.is_dir() => Some("is a folder; name a file in it"),
-        Ok(metadata) if metadata.is_symlink() => Some(
-            "is a symbolic link, and links are not followed; name the file itself, or - for standard output",
-        ),
+        Ok(metadata) if metadata.is_dir() => Some("is a folder: use a file in it"),
+        Ok(metadata) if metadata.is_symlink() => {
+            Some("is a symbolic link, which is not followed: use its target, or - for standard output")
+        }
         // A pipe or a device.
         Ok(_) => return Ok(Place::Stream),
     };
     if target.file_name().is_none() {
-        return Err(Error::argument("output", format!("{} is no name of a file", target.display())));
+        return Err(Error::argument("output", format!("{} is not a file name", target.display())));
     }
     match reason {
         Some(reason) => Err(Error::argument("output", format!("{} {reason}", target.display()))),

@@ -53,7 +53,7 @@ impl Doubt {
 
     /// Returns the doubt as an error.
     pub fn refusal(&self) -> Error {
-        let reason = format!("{}; without `strict` they are mapped all the same", self.reason);
+        let reason = format!("{}; without `strict` the scans are mapped nevertheless", self.reason);
         Error::argument(self.input.display().to_string(), reason)
     }
 }
@@ -152,14 +152,14 @@ impl PoseCheck {
 
     fn doubt(&self) -> Result<Option<Doubt>> {
         let Some(given) = self.overlap(Reading::Given)? else { return Ok(None) };
-        log::debug!("{}: scans see {given:.2} of their voxels again", self.input.display());
+        log::debug!("{}: overlap of scans {given:.2}", self.input.display());
         if given >= ENOUGH {
             return Ok(None);
         }
         let mut best: Option<(Reading, f64)> = None;
         for &reading in &self.others {
             let Some(share) = self.overlap(reading)? else { continue };
-            log::debug!("{}: by {reading:?} {share:.2}", self.input.display());
+            log::debug!("{}: overlap as {reading:?} {share:.2}", self.input.display());
             if share >= EXPECTED
                 && odds(share) >= BETTER_ODDS * odds(given)
                 && best.is_none_or(|(_, best)| share > best + TIE)
@@ -172,8 +172,8 @@ impl PoseCheck {
             let [given, share] = [given, share].map(|share| (100.0 * share).round());
             let advice = reading.advice();
             let reason = format!(
-                "the poses do not seem to fit the scans: a scan sees {given} % of its voxels again, and would see \
-                 {share} % if {advice}"
+                "the poses do not seem to fit the scans: scans overlap the previous ones by {given} %, and would \
+                 overlap by {share} % if {advice}"
             );
             Doubt { input: self.input.clone(), reason }
         }))
@@ -352,11 +352,11 @@ mod tests {
         let cases = [
             (right.clone(), &plain, ""),
             (right.clone(), &calib, ""),
-            (w_first, &plain, "w comes first"),
+            (w_first, &plain, "start with w"),
             (each(&RigidPose::inverse), &plain, "they are the inverse"),
             (each(&|pose| camera.then(pose).then(&camera.inverse())), &plain, "poses of a camera"),
-            (each(&|pose| camera.inverse().then(pose).then(&camera)), &calib, "leave `calib` out"),
-            (millimetres, &plain, "are millimetres"),
+            (each(&|pose| camera.inverse().then(pose).then(&camera)), &calib, "omit `calib`"),
+            (millimetres, &plain, "are in millimetres"),
         ];
         for (come, options, wanted) in cases {
             let said = said(scan, &come, options, 1).unwrap_or_default();
@@ -395,7 +395,7 @@ mod tests {
         assert_eq!(said(|_| ground.clone(), &far, &ReadOptions::default(), 60), None);
         // A speed of 2 km/s is implausible.
         let fast = said(|_| ground.clone(), &way(2000.0), &ReadOptions::default(), 1);
-        assert!(fast.is_some_and(|said| said.contains("are millimetres")));
+        assert!(fast.is_some_and(|said| said.contains("are in millimetres")));
     }
 
     #[test]

@@ -96,29 +96,27 @@ impl Reading {
     pub(super) fn advice(self) -> &'static str {
         match self {
             Self::Given | Self::Still => "they are right",
-            Self::WFirst => {
-                "w comes first in the quaternions: say so in a first line of names, # t tx ty tz qw qx qy qz"
-            }
-            Self::WLast => "w comes last in the quaternions, as in x y z w",
+            Self::WFirst => "the quaternions start with w: add a header line, # t tx ty tz qw qx qy qz",
+            Self::WLast => "the quaternions end with w, as in x y z w",
             Self::Inverse => {
                 "they are the inverse, world to sensor: save the inverse of each, sensor to world"
             }
             Self::Camera => {
-                "they are poses of a camera (z ahead): `calib` FILE or `extrinsic` makes those of the sensor of them"
+                "they are poses of a camera (z forward): convert them with `calib` FILE or `extrinsic`"
             }
-            Self::NotCamera => "they are poses of the lidar already: leave `calib` out",
+            Self::NotCamera => "they are already poses of the lidar: omit `calib`",
             Self::Millimetres => {
-                "their positions are millimetres: say so in a first line of names, # t tx[mm] ty[mm] tz[mm] qx qy qz qw"
+                "their positions are in millimetres: add a header line, # t tx[mm] ty[mm] tz[mm] qx qy qz qw"
             }
             Self::Centimetres => {
-                "their positions are centimetres: say so in a first line of names, # t tx[cm] ty[cm] tz[cm] qx qy qz qw"
+                "their positions are in centimetres: add a header line, # t tx[cm] ty[cm] tz[cm] qx qy qz qw"
             }
-            Self::WorldFrame => "the points are in the world frame already: `world_frame`",
+            Self::WorldFrame => "the points are already in the world frame: add `world_frame`",
             Self::Next => {
-                "each scan has the pose of the next one: is a scan or a pose too much at the beginning?"
+                "each scan has the pose of the next one: is there an extra scan or pose at the beginning?"
             }
             Self::Previous => {
-                "each scan has the pose of the one before it: does a scan or a pose lack at the beginning?"
+                "each scan has the pose of the previous one: is a scan or pose missing at the beginning?"
             }
         }
     }

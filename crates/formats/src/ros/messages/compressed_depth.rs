@@ -70,7 +70,9 @@ impl<'a> CompressedDepth<'a> {
         };
         let encoding = format.split(';').next().unwrap_or_default().trim().to_owned();
         let code = match (config, encoding.as_str()) {
-            (None, "32FC1") => return Err(reader.error("a PNG of 32FC1 without its parameters")),
+            (None, "32FC1") => {
+                return Err(reader.error("the 32FC1 depth parameters before the PNG are missing"));
+            }
             (Some(config), "32FC1") => {
                 let number = |at: usize| {
                     let bytes = config.get(at..).and_then(|bytes| bytes.first_chunk()).copied();
@@ -78,13 +80,14 @@ impl<'a> CompressedDepth<'a> {
                 };
                 let (a, b) = (number(4), number(8));
                 if !(a.is_finite() && b.is_finite() && a > 0.0) {
-                    return Err(reader.error(format!("the parameters of the depths are {a} and {b}")));
+                    return Err(reader.error(format!("the depth parameters {a} and {b} are invalid")));
                 }
                 Code::Inverse { a, b }
             }
             (_, "16UC1" | "mono16") | (None, _) => Code::Millimetres,
             (Some(_), other) => {
-                let reason = format!("pixels were `{other}`; depths are 16UC1 (mm) or 32FC1 (m)");
+                let reason =
+                    format!("the pixel encoding is `{other}`; depth images have 16UC1 (mm) or 32FC1 (m)");
                 return Err(reader.error(reason));
             }
         };
@@ -97,7 +100,7 @@ impl<'a> CompressedDepth<'a> {
                 let number = |at: usize| packed.get(at..).and_then(|bytes| bytes.first_chunk()).copied();
                 let [width, height] = [0, 4].map(|at| u32::from_le_bytes(number(at).unwrap_or_default()));
                 if u64::from(width) * u64::from(height) > MAX_RVL_PIXELS {
-                    let reason = format!("{width} x {height} pixels; at most {MAX_RVL_PIXELS} are possible");
+                    let reason = format!("{width} x {height} pixels; at most {MAX_RVL_PIXELS} are supported");
                     return Err(reader.error(reason));
                 }
                 (width, height)
@@ -127,7 +130,7 @@ impl<'a> CompressedDepth<'a> {
                     (0..self.height).flat_map(|row| (0..self.width).map(move |column| (row, column)))
                 {
                     let Some(number) = pixels.pixel() else {
-                        return wrong(format!("row {row} of {} is cut off", self.height));
+                        return wrong(format!("row {row} of {} is truncated", self.height));
                     };
                     visit(camera.point([column as usize, row as usize], self.code.depth_m(number)))?;
                 }

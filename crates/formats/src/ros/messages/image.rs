@@ -58,7 +58,7 @@ impl CameraInfo {
         }
         let [fx, _, cx, _, fy, cy, ..] = k;
         if ![fx, fy, cx, cy].iter().all(|value| value.is_finite()) || fx == 0.0 || fy == 0.0 {
-            return Err(reader.error("the camera is not calibrated: K has no focal lengths"));
+            return Err(reader.error("the camera is not calibrated: K contains no focal lengths"));
         }
         Ok(Self { header, focal_px: [fx, fy], center_px: [cx, cy] })
     }
@@ -127,7 +127,10 @@ impl<'a> Image<'a> {
     /// Returns the reason if there are fewer points than pixels.
     pub fn shortage(&self) -> Option<WireError> {
         let Some((kind, _)) = self.depth() else {
-            let reason = format!("pixels are `{}`; depths are 16UC1 (mm) or 32FC1 (m)", self.encoding);
+            let reason = format!(
+                "the pixel encoding is `{}`; depth images have 16UC1 (mm) or 32FC1 (m)",
+                self.encoding
+            );
             return Some(WireError { byte: 0, reason });
         };
         let row = (self.width as usize).checked_mul(kind.bytes())?;
@@ -139,7 +142,7 @@ impl<'a> Image<'a> {
         let (claimed, bytes) = (self.pixels_claimed(), self.data.len());
         Some(WireError {
             byte: 0,
-            reason: format!("{claimed} pixels are announced; {bytes} bytes are there"),
+            reason: format!("{claimed} pixels are announced, but there are {bytes} bytes"),
         })
     }
 

@@ -40,7 +40,7 @@ impl<'a> PointCloud<'a> {
         let channels_count = reader.sequence(MIN_CHANNEL_BYTES)?;
         if channels_count > MAX_CHANNELS {
             return Err(
-                reader.error(format!("{channels_count} channels; at most {MAX_CHANNELS} are possible"))
+                reader.error(format!("{channels_count} channels; at most {MAX_CHANNELS} are supported"))
             );
         }
         let mut cloud = Self { header, count, channels: Vec::new(), points, intensity: None, time: None };

@@ -67,7 +67,9 @@ impl<'a> PointCloud2<'a> {
         let (mut height, mut width) = (reader.u32()?, reader.u32()?);
         let count = reader.sequence(PointField::MIN_BYTES)?;
         if count > MAX_FIELDS {
-            return Err(reader.error(format!("points of {count} fields; at most {MAX_FIELDS} are possible")));
+            return Err(
+                reader.error(format!("points have {count} fields; at most {MAX_FIELDS} are supported"))
+            );
         }
         let fields = (0..count).map(|_| PointField::read(&mut reader)).collect::<Decoded<Vec<_>>>()?;
         let is_big_endian = reader.u8()? != 0;
@@ -87,13 +89,13 @@ impl<'a> PointCloud2<'a> {
             Err(reason) => return Err(reader.error(reason)),
         };
         if z.is_none() {
-            repairs.push("have no field z: it is taken as 0");
+            repairs.push("have no field z: 0 is used");
         }
         let intensity = any_of(&INTENSITY_NAMES, |is_exact, name| find(&fields, name, is_exact, point_bytes));
         let time = any_of(&TIME_NAMES, |is_exact, name| time_column(&fields, name, is_exact, point_bytes));
         if let Some(count) = points_unannounced(height, width, point_bytes, data_bytes) {
             (height, width) = (1, count);
-            repairs.push("announce no points, but hold some, which are read");
+            repairs.push("announce no points, but contain points, which are read");
         }
         let Some(row_bytes) = row_bytes_of(row_bytes, height, width, point_bytes, data_bytes) else {
             return Err(reader.error("width * point_step is too large"));
@@ -101,7 +103,7 @@ impl<'a> PointCloud2<'a> {
         let is_big_endian = is_big_endian && {
             let columns: Vec<Column> = xyz.into_iter().chain(z).collect();
             let is_wrong = is_little_endian(data, point_bytes, &columns);
-            repairs.extend(is_wrong.then_some("say that they are big-endian, but are little-endian"));
+            repairs.extend(is_wrong.then_some("are marked as big-endian, but are little-endian"));
             !is_wrong
         };
         Ok(Self {
@@ -161,7 +163,7 @@ impl<'a> PointCloud2<'a> {
     ) -> Result<Option<WireError>> {
         let point_bytes = self.point_bytes.max(1);
         if point_bytes > MAX_POINT_BYTES {
-            let reason = format!("points of {point_bytes} bytes; at most {MAX_POINT_BYTES} are possible");
+            let reason = format!("points have {point_bytes} bytes; at most {MAX_POINT_BYTES} are supported");
             return Ok(Some(WireError { byte: 0, reason }));
         }
         let (mut height, mut width) = (self.height as usize, self.width as usize);
@@ -203,7 +205,7 @@ impl<'a> PointCloud2<'a> {
 
     fn shortage_of(&self, there: u64) -> WireError {
         let (claimed, bytes) = (self.points_claimed(), self.data_bytes);
-        let reason = format!("{claimed} points are announced; {bytes} bytes of data hold {there}");
+        let reason = format!("{claimed} points are announced, but {bytes} bytes of data contain {there}");
         WireError { byte: 0, reason }
     }
 

@@ -56,10 +56,10 @@ pub(super) fn position_columns(
     match (axes, there) {
         ([Some(x), Some(y), None], None) => Ok(([x, y], None)),
         (_, Some(field)) if field.kind.is_some() => Err(format!(
-            "the field {} begins at byte {} of points of {point_bytes} bytes (point_step): it is not within them",
+            "the field {} at byte {} is outside of the point, which has {point_bytes} bytes (point_step)",
             field.name, field.offset
         )),
-        (_, Some(field)) => Err(format!("the field {} is of no known type", field.name)),
+        (_, Some(field)) => Err(format!("the field {} has an unknown type", field.name)),
         (_, None) => {
             let names: Vec<&str> = fields.iter().map(|field| field.name.as_str()).collect();
             let names = names.join(", ");

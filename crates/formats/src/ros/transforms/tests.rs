@@ -236,7 +236,7 @@ fn a_second_parent_and_a_loop_are_named() {
     let found = tf.second_parent("lidar", "map").unwrap().to_string();
     assert_eq!(
         found,
-        "frame map has the parent lidar, which makes a loop (map in lidar in base in odom in map)"
+        "frame map has the parent lidar, which closes a loop (map in lidar in base in odom in map)"
     );
     moving(&mut tf, "a\u{1b}[2J", "base", &[5], 0.1);
     let found = tf.second_parent("a\u{1b}[2J", "base").unwrap().to_string();
