@@ -141,7 +141,7 @@ impl Input {
     }
 
     fn source(&self) -> anyhow::Result<Box<dyn ScanSource + Send>> {
-        Ok(voxtile_pipeline::open_scans(&self.path, &self.options, &Watch::nobody())?)
+        Ok(voxtile_pipeline::open_scans(&self.path, &self.options, &Watch::silent())?)
     }
 }
 

@@ -10,7 +10,7 @@ use voxtile::{
     Error, InMemoryMapper, InsertMode, MapConfig, MapPath, MapQueries, Mapper, OutOfCoreTileMapper, Pose,
     Scan, ScanPoints, ScanRef,
 };
-use voxtile_formats::{PointRoom, ScanSource, ScanStreamWriter, SensorScan, StoredScan, read_scan_stream};
+use voxtile_formats::{PointBudget, ScanSource, ScanStreamWriter, SensorScan, StoredScan, read_scan_stream};
 use voxtile_local::{LocalMap, LocalParameters, WithLocalMap};
 
 /// What a driver hands out: `f32` in the sensor's frame, intensities, and a pose from elsewhere.
@@ -79,7 +79,7 @@ impl Measured {
         let mut writer = ScanStreamWriter::new(&mut bytes, "", self.intensities.is_some()).unwrap();
         writer.write(&scan).unwrap();
         let mut source = read_scan_stream(&*bytes, Path::new("scans"), false).unwrap();
-        let stored = source.next_stored(&PointRoom::default()).unwrap().unwrap();
+        let stored = source.next_stored(&PointBudget::default()).unwrap().unwrap();
         // The stream's quaternion was normalized once more.
         StoredScan { world_from_sensor, ..stored }
     }

@@ -5,7 +5,7 @@ use testkit::memory_folder::lone_folder;
 use testkit::random_scans::Random;
 use testkit::support::{fixtures, message_of, shared_data};
 use voxtile::scan::Pose;
-use voxtile_formats::{PointRoom, ReadOptions, SensorScan, open_scans, read_pcd};
+use voxtile_formats::{PointBudget, ReadOptions, SensorScan, open_scans, read_pcd};
 
 const HEADER: &str =
     "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z intensity\nSIZE 4 4 4 4\nTYPE F F F F\nCOUNT 1 1 1 1\n";
@@ -262,7 +262,7 @@ fn plain_poses_of_pcd_files_have_any_stamps_and_lengths() {
         fs::write(&poses, text).unwrap();
         let mut source = open_scans(folder.path(), &with_poses(&poses)).unwrap();
         for x in [1.0, 2.0] {
-            let scan = source.next_stored(&PointRoom::default()).unwrap().unwrap();
+            let scan = source.next_stored(&PointBudget::default()).unwrap().unwrap();
             let pose = scan.world_from_sensor;
             assert_eq!((pose.position_m()[0], pose.quaternion()), (x, [0.0, 0.0, 0.0, 1.0]), "{text}");
             assert_eq!(scan.stamp_ns, None);

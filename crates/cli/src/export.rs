@@ -77,10 +77,10 @@ fn text_of(summary: &ExportSummary) -> String {
     let voxels = HumanCount(summary.voxels);
     let mut text = format!("{voxels} voxels in {file}\n");
     match &summary.written {
-        Written::Stream { origin_m: [x, y, z], origin_voxel, origin_file, asked_m } => {
-            if *origin_voxel != [0; 3] || asked_m.is_some() {
+        Written::Stream { origin_m: [x, y, z], origin_voxel, origin_file, requested_m } => {
+            if *origin_voxel != [0; 3] || requested_m.is_some() {
                 text += &format!("origin {x} {y} {z} m: add it to the file's coordinates");
-                if let Some([x, y, z]) = asked_m {
+                if let Some([x, y, z]) = requested_m {
                     text += &format!("; the voxel corner nearest to {x} {y} {z}");
                 }
                 if let Some(path) = origin_file {

@@ -15,7 +15,7 @@ use voxtile::mapper::MapReader;
 use voxtile::scan::Stop;
 use voxtile::space::Point;
 use voxtile::store::ScanRecord;
-use voxtile_formats::{PointRoom, ScanSource};
+use voxtile_formats::{PointBudget, ScanSource};
 use voxtile_pipeline::place::url_of;
 use voxtile_pipeline::read_map;
 use voxtile_pipeline::{LocalScans, open_scans};
@@ -120,7 +120,7 @@ fn of_input(args: &ScansArgs, out: &mut impl Write) -> anyhow::Result<Overview> 
     let local = LocalScans::of(&args.data, &watch)?;
     let mut source: Box<dyn ScanSource + Send> = open_scans(local.path(), &options, &watch)?;
     let progress = Progress::over_scans(source.len_hint());
-    let room = PointRoom::new(POINTS_BYTES, &std::env::temp_dir());
+    let room = PointBudget::new(POINTS_BYTES, &std::env::temp_dir());
     let mut overview = Overview { format: source.format(), points: Some(0), ..Overview::default() };
     overview.poses = Some(source.pose_source().to_string());
     while let Some(scan) =

@@ -1,4 +1,4 @@
-use crate::input_format::{InputFormat, Mark, Open};
+use crate::input_format::{Detection, InputFormat, Open};
 use crate::read::foreign;
 use crate::read::glance::first_bytes;
 use crate::read::listing::{Listing, extension_of};
@@ -57,20 +57,20 @@ impl Registry {
 
     /// Returns the format that has this signature at the start of the file, if any.
     pub(crate) fn of_start(&self, start: &[u8]) -> Option<&InputFormat> {
-        let start = foreign::without_mark(start);
-        self.formats().iter().find(|format| match format.mark {
-            Mark::Start(is_it) | Mark::StartOrName(is_it) => is_it(start),
+        let start = foreign::without_bom(start);
+        self.formats().iter().find(|format| match format.detection {
+            Detection::Start(is_it) | Detection::StartOrName(is_it) => is_it(start),
             _ => false,
         })
     }
 
     fn guess_file(&self, path: &Path) -> Result<&InputFormat> {
         let extension = extension_of(path);
-        let of = |is_it: fn(&Mark) -> bool| {
+        let of = |is_it: fn(&Detection) -> bool| {
             let mut formats = self.formats().iter();
-            formats.find(|format| is_it(&format.mark) && format.has_extension(&extension))
+            formats.find(|format| is_it(&format.detection) && format.has_extension(&extension))
         };
-        if let Some(named) = of(|mark| matches!(mark, Mark::Name)) {
+        if let Some(named) = of(|detection| matches!(detection, Detection::Name)) {
             return Ok(named);
         }
         let start = first_bytes(path)?;
@@ -83,7 +83,7 @@ impl Registry {
         if let Some(foreign) = foreign::of_bytes(&start) {
             return Err(foreign.error(path));
         }
-        if let Some(named) = of(|mark| matches!(mark, Mark::StartOrName(_))) {
+        if let Some(named) = of(|detection| matches!(detection, Detection::StartOrName(_))) {
             return Ok(named);
         }
         if let Some(foreign) = foreign::of_extension(&extension) {
@@ -91,7 +91,7 @@ impl Registry {
         }
         let mut why_not = None;
         for format in self.formats() {
-            let Mark::Look(check) = format.mark else { continue };
+            let Detection::Look(check) = format.detection else { continue };
             let is_named = format.has_extension(&extension);
             match check(&start, is_named) {
                 Ok(()) => return Ok(format),
@@ -142,7 +142,7 @@ impl Registry {
         let mut found = counts.values();
         match (found.next(), found.next()) {
             (Some((format, ..)), None) if matches!(format.open, Open::Folder(_)) => Ok(format),
-            (Some((format, ..)), None) if matches!(format.mark, Mark::Look(_)) => {
+            (Some((format, ..)), None) if matches!(format.detection, Detection::Look(_)) => {
                 let texts = listing.texts(format);
                 match texts.clouds.first() {
                     Some(file) => self.guess_file(file),
@@ -174,8 +174,9 @@ impl Registry {
 
     /// Returns the format of files with this extension (lower case) in a folder of clouds.
     fn in_folder(&self, extension: &str) -> Option<&InputFormat> {
-        let may_be =
-            |format: &&InputFormat| !matches!(format.mark, Mark::Name) && format.has_extension(extension);
+        let may_be = |format: &&InputFormat| {
+            !matches!(format.detection, Detection::Name) && format.has_extension(extension)
+        };
         self.formats().iter().find(may_be)
     }
 }

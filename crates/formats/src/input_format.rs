@@ -16,7 +16,7 @@ pub struct InputFormat {
     /// File name extensions, in lower case without the dot. They select the files of this format in a folder of clouds.
     pub extensions: &'static [&'static str],
     /// How a file is recognised.
-    pub mark: Mark,
+    pub detection: Detection,
     /// Returns whether a folder is an input of this format, whatever other files it contains.
     pub is_folder: fn(&Path) -> bool,
     /// Whether files of this format also accompany clouds of other formats, as text lists and pictures do.
@@ -35,11 +35,11 @@ impl InputFormat {
         aliases: &[],
         title: "",
         extensions: &[],
-        mark: Mark::None,
+        detection: Detection::None,
         is_folder: |_| false,
         is_aside: false,
         has_poses: |_| false,
-        open: Open::LeftOut(""),
+        open: Open::Disabled(""),
     };
 
     pub(crate) fn has_extension(&self, extension: &str) -> bool {
@@ -49,7 +49,7 @@ impl InputFormat {
 
 /// How a file is recognised. Detection tries the variants in this order, each for all formats.
 #[derive(Clone, Copy, Debug)]
-pub enum Mark {
+pub enum Detection {
     /// By the extension alone.
     Name,
     /// By the first bytes.
@@ -86,5 +86,5 @@ pub enum Open {
     /// A file or folder contains scans and provides their poses.
     Scans(OpenScans),
     /// The format is disabled in this build; the value is the Cargo feature that enables it.
-    LeftOut(&'static str),
+    Disabled(&'static str),
 }

@@ -25,7 +25,7 @@ mod scans;
 mod spill;
 pub mod write;
 
-pub use input_format::{InputFormat, Mark, Open, OpenCloud, OpenClouds, OpenScans};
+pub use input_format::{Detection, InputFormat, Open, OpenCloud, OpenClouds, OpenScans};
 pub use open::{open_clouds, open_scans};
 pub use poses::{CloudOptions, Deskew, PoseSource, RigidPose};
 pub use read::{
@@ -35,7 +35,7 @@ pub use read::{
 pub use read_options::{ReadOptions, RecordingOptions};
 pub use registry::Registry;
 pub use scans::{
-    PointRoom, PointStore, ScanChain, ScanHead, ScanMark, ScanReach, ScanSource, ScanStreamWriter, Selection,
-    SensorScan, StoredScan,
+    PointBudget, PointStore, ScanChain, ScanFingerprint, ScanHead, ScanReach, ScanSource, ScanStreamWriter,
+    Selection, SensorScan, StoredScan,
 };
 pub use spill::Budget;

@@ -1,5 +1,5 @@
 use crate::CloudSource;
-use crate::input_format::{InputFormat, Mark, Open};
+use crate::input_format::{Detection, InputFormat, Open};
 use crate::poses::PoseSource;
 use crate::poses::PosedClouds;
 use crate::poses::Rules;
@@ -91,7 +91,7 @@ fn open_as(path: &Path, format: &InputFormat, options: &ReadOptions) -> Result<B
         Open::Scans(_) => {
             return wrong(format!("is {}, which contains scans with poses: open it as scans", format.title));
         }
-        Open::LeftOut(feature) => {
+        Open::Disabled(feature) => {
             let title = format.title;
             return wrong(format!(
                 "is {title}, which this build does not support: build with the feature `{feature}`"
@@ -126,8 +126,8 @@ fn check(options: &ReadOptions) -> Result<()> {
 
 fn open_folder(path: &Path, format: InputFormat, options: &ReadOptions) -> Result<Box<dyn CloudSource>> {
     let listing = Listing::read(path, &options.not_clouds())?;
-    let (paths, others) = match format.mark {
-        Mark::Look(_) => {
+    let (paths, others) = match format.detection {
+        Detection::Look(_) => {
             let texts = listing.texts(&format);
             (texts.clouds, texts.others)
         }

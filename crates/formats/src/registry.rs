@@ -1,19 +1,19 @@
-use crate::input_format::{InputFormat, Mark, Open};
+use crate::input_format::{Detection, InputFormat, Open};
 use crate::read::{self, pcd_scans};
 use voxtile::{Error, Result};
 
 #[cfg(feature = "las")]
 const LAS: Open = Open::Clouds(read::las::open);
 #[cfg(not(feature = "las"))]
-const LAS: Open = Open::LeftOut("las");
+const LAS: Open = Open::Disabled("las");
 #[cfg(feature = "e57")]
 const E57: Open = Open::Clouds(read::e57::open);
 #[cfg(not(feature = "e57"))]
-const E57: Open = Open::LeftOut("e57");
+const E57: Open = Open::Disabled("e57");
 #[cfg(feature = "ros")]
 const ROS: Open = Open::Recording(crate::ros::recording_clouds::open);
 #[cfg(not(feature = "ros"))]
-const ROS: Open = Open::LeftOut("ros");
+const ROS: Open = Open::Disabled("ros");
 
 /// All supported input formats. A new format needs a row here and a file that opens it.
 const FORMATS: [InputFormat; 17] = [
@@ -21,7 +21,7 @@ const FORMATS: [InputFormat; 17] = [
         name: "pcd",
         title: "PCD",
         extensions: &["pcd"],
-        mark: Mark::StartOrName(read::pcd_header::is_start),
+        detection: Detection::StartOrName(read::pcd_header::is_start),
         is_folder: pcd_scans::is_folder,
         open: Open::Scans(pcd_scans::open),
         ..InputFormat::UNNAMED
@@ -30,7 +30,7 @@ const FORMATS: [InputFormat; 17] = [
         name: "ply",
         title: "PLY",
         extensions: &["ply"],
-        mark: Mark::Start(read::ply_header::is_start),
+        detection: Detection::Start(read::ply_header::is_start),
         open: Open::Stream(read::ply::open),
         ..InputFormat::UNNAMED
     },
@@ -39,7 +39,7 @@ const FORMATS: [InputFormat; 17] = [
         aliases: &["txt", "csv", "pts", "asc"],
         title: "text of points",
         extensions: &["xyz", "txt", "csv", "pts", "asc", "xyzi", "tsv"],
-        mark: Mark::Look(read::text::check_start),
+        detection: Detection::Look(read::text::check_start),
         is_aside: true,
         open: Open::Stream(read::text::open),
         ..InputFormat::UNNAMED
@@ -49,7 +49,7 @@ const FORMATS: [InputFormat; 17] = [
         aliases: &["kitti", "nuscenes"],
         title: "raw floats (KITTI .bin)",
         extensions: &["bin", "velodyne"],
-        mark: Mark::StartOrName(|_| false),
+        detection: Detection::StartOrName(|_| false),
         open: Open::Cloud(read::bin::open),
         ..InputFormat::UNNAMED
     },
@@ -58,7 +58,7 @@ const FORMATS: [InputFormat; 17] = [
         name: "las",
         title: "LAS",
         extensions: &["las", "laz"],
-        mark: Mark::Start(|start| is_las(start) && !is_laz(start)),
+        detection: Detection::Start(|start| is_las(start) && !is_laz(start)),
         open: LAS,
         ..InputFormat::UNNAMED
     },
@@ -66,7 +66,7 @@ const FORMATS: [InputFormat; 17] = [
         name: "laz",
         title: "LAZ",
         extensions: &["las", "laz"],
-        mark: Mark::Start(|start| is_las(start) && is_laz(start) && !is_copc(start)),
+        detection: Detection::Start(|start| is_las(start) && is_laz(start) && !is_copc(start)),
         open: LAS,
         ..InputFormat::UNNAMED
     },
@@ -74,7 +74,7 @@ const FORMATS: [InputFormat; 17] = [
         name: "copc",
         title: "COPC",
         extensions: &["las", "laz"],
-        mark: Mark::Start(|start| is_las(start) && is_copc(start)),
+        detection: Detection::Start(|start| is_las(start) && is_copc(start)),
         open: LAS,
         ..InputFormat::UNNAMED
     },
@@ -82,7 +82,7 @@ const FORMATS: [InputFormat; 17] = [
         name: "e57",
         title: "E57",
         extensions: &["e57"],
-        mark: Mark::Start(|start| start.starts_with(b"ASTM-E57")),
+        detection: Detection::Start(|start| start.starts_with(b"ASTM-E57")),
         has_poses: |_| true,
         open: E57,
         ..InputFormat::UNNAMED
@@ -109,7 +109,7 @@ const FORMATS: [InputFormat; 17] = [
         title: "ROS 1 bag",
         // A killed recorder leaves `.bag.active`.
         extensions: &["bag", "active"],
-        mark: Mark::Start(|start| start.starts_with(b"#ROSBAG V2.0")),
+        detection: Detection::Start(|start| start.starts_with(b"#ROSBAG V2.0")),
         has_poses: |_| true,
         open: ROS,
         ..InputFormat::UNNAMED
@@ -118,7 +118,7 @@ const FORMATS: [InputFormat; 17] = [
         name: "mcap",
         title: "MCAP",
         extensions: &["mcap"],
-        mark: Mark::Start(|start| start.starts_with(b"\x89MCAP0\r\n")),
+        detection: Detection::Start(|start| start.starts_with(b"\x89MCAP0\r\n")),
         has_poses: |_| true,
         open: ROS,
         ..InputFormat::UNNAMED
@@ -127,7 +127,7 @@ const FORMATS: [InputFormat; 17] = [
         name: "db3",
         title: "ROS 2 bag (SQLite)",
         extensions: &["db3"],
-        mark: Mark::Start(|start| start.starts_with(b"SQLite format 3\0")),
+        detection: Detection::Start(|start| start.starts_with(b"SQLite format 3\0")),
         has_poses: |_| true,
         open: ROS,
         ..InputFormat::UNNAMED
@@ -144,7 +144,7 @@ const FORMATS: [InputFormat; 17] = [
         name: "graph",
         title: "OctoMap scan graph",
         extensions: &["graph"],
-        mark: Mark::Name,
+        detection: Detection::Name,
         has_poses: |_| true,
         open: Open::Scans(read::scan_graph::open),
         ..InputFormat::UNNAMED
@@ -153,7 +153,7 @@ const FORMATS: [InputFormat; 17] = [
         name: "log",
         title: "OctoMap scan log",
         extensions: &["log"],
-        mark: Mark::Name,
+        detection: Detection::Name,
         has_poses: |_| true,
         open: Open::Scans(read::scan_log::open),
         ..InputFormat::UNNAMED
@@ -162,7 +162,7 @@ const FORMATS: [InputFormat; 17] = [
         name: "scans",
         title: "scan stream",
         extensions: &["scans"],
-        mark: Mark::Name,
+        detection: Detection::Name,
         has_poses: |_| true,
         open: Open::Scans(read::scan_stream::open),
         ..InputFormat::UNNAMED

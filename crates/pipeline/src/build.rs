@@ -2,11 +2,11 @@ use crate::build_config::{config_to_create, config_to_go_on};
 use crate::build_options::BuildOptions;
 use crate::failed_flush::FailedFlush;
 use crate::flush_schedule::FlushSchedule;
-use crate::intake::{Intake, Next, RayNeeds, Taken};
+use crate::ingest::{Ingest, Next, RayNeeds, Taken};
 use crate::pose_check::{Doubt, PoseCheck, check_ahead};
 use crate::scan_input::is_standard_input;
 use crate::scan_queue::{ScanQueue, WhenBehind};
-use crate::scan_reader::{Marking, ScanReader};
+use crate::scan_reader::{FingerprintFn, ScanReader};
 use crate::summary::Summary;
 use crate::watch::{Gauge, Watch};
 use crate::whole_map;
@@ -18,7 +18,7 @@ use voxtile::mapper::{MapReader, MapView, Mapper, OutOfCoreTileMapper};
 use voxtile::scan::{ScanPoints, ScanReport};
 use voxtile::store::{FsDisk, InputContent, InputRecord, UnsyncedDisk};
 use voxtile::{Error, MapConfig, MapPath, MemoryLimit};
-use voxtile_formats::{PointRoom, ReadOptions, ScanMark};
+use voxtile_formats::{PointBudget, ReadOptions, ScanFingerprint};
 
 /// Divisor of the memory limit that gives the share for reading, without the points of scans: chunks and messages of
 /// recordings, poses, sorting of LAS files.
@@ -30,7 +30,7 @@ const MIN_FOR_READING: usize = 4 << 20;
 const PARTS_OF_MEMORY: usize = 32;
 
 /// Minimum memory per scan for inserting several scans at once: the points of a lidar with 128 beams.
-const ROOM_TO_GO_TOGETHER: usize = 3 << 20;
+const MIN_BATCH_BYTES: usize = 3 << 20;
 
 /// Builds or continues a map. Returns `None` if it was stopped before the first scan. All accepted scans are flushed,
 /// however the build ends.
@@ -47,27 +47,31 @@ pub fn build(options: &BuildOptions, watch: &Watch) -> anyhow::Result<Option<Sum
     check_no_rays(options, &config)?;
     check_when_behind(options)?;
     // A shard is never resumed or compared, so its scans are not hashed.
-    let mark: Marking =
-        if options.piece_of.is_none() { ScanMark::of } else { |scan| Ok(ScanMark::without_content(scan)) };
-    let room = room(options, &config);
-    let most_together = most_together(options, &config);
+    let fingerprint: FingerprintFn = if options.piece_of.is_none() {
+        ScanFingerprint::of
+    } else {
+        |scan| Ok(ScanFingerprint::without_content(scan))
+    };
+    let point_budget = point_budget(options, &config);
+    let max_batch = max_batch(options, &config);
     let read = read_options(options, &config);
-    let is_checked = options.strict && check_ahead(&options.scans, &read, &room, watch)?;
-    let opened = ScanReader::open(options.scans.clone(), read.clone(), room, mark, watch.clone())?;
+    let is_checked = options.strict && check_ahead(&options.scans, &read, &point_budget, watch)?;
+    let opened =
+        ScanReader::open(options.scans.clone(), read.clone(), point_budget, fingerprint, watch.clone())?;
     let Some((reader, input)) = opened else { return Ok(None) };
     let pose_check = if is_checked { None } else { PoseCheck::of(&read, &input.poses, &options.scans) };
     let config = config_of_map(options, &config);
     let needs = RayNeeds { grid: config.grid, sensor_model: config.sensor_model };
-    let mut intake =
-        Intake::new(reader, options.scans.clone(), options.skip_bad, (!options.no_rays).then_some(needs));
+    let mut ingest =
+        Ingest::new(reader, options.scans.clone(), options.skip_bad, (!options.no_rays).then_some(needs));
     let mut opened_map = match exists {
-        true => Some(OutOfCoreTileMapper::open(place_of_map(options), config.clone())?),
+        true => Some(OutOfCoreTileMapper::open(map_path(options), config.clone())?),
         false => None,
     };
-    if !intake.read_lead()? {
+    if !ingest.read_lookahead()? {
         return Ok(None);
     }
-    let crs = intake.crs();
+    let crs = ingest.crs();
     let mapper = match &mut opened_map {
         Some(mapper) => {
             check_crs(options, crs.as_ref(), config.crs.as_ref())?;
@@ -75,37 +79,37 @@ pub fn build(options: &BuildOptions, watch: &Watch) -> anyhow::Result<Option<Sum
         }
         none => {
             // If the first scan cannot be mapped, no empty map must be created.
-            intake.check_first()?;
+            ingest.check_first()?;
             let mut config = config;
             config.crs = crs;
             whole_map(&options.output)?;
             none.insert(match options.piece_of {
                 None => OutOfCoreTileMapper::create(&options.output, config)?,
-                Some(map_id) => OutOfCoreTileMapper::create_as(place_of_map(options), config, map_id)?,
+                Some(map_id) => OutOfCoreTileMapper::create_as(map_path(options), config, map_id)?,
             })
         }
     };
     mapper.stop_with(stop.clone());
-    let Some(resumed_after) = begin(options, mapper, &mut intake, &input.name)? else {
+    let Some(resumed_after) = begin(options, mapper, &mut ingest, &input.name)? else {
         return Ok(None);
     };
 
     if options.when_behind != WhenBehind::Wait {
-        intake.read_ahead(ScanQueue::new(options.when_behind, ScanQueue::MAX_SCANS));
-    } else if most_together > 1 {
-        intake.read_ahead(ScanQueue::new(options.when_behind, most_together));
+        ingest.read_ahead(ScanQueue::new(options.when_behind, ScanQueue::MAX_SCANS));
+    } else if max_batch > 1 {
+        ingest.read_ahead(ScanQueue::new(options.when_behind, max_batch));
     }
     let gauge = watch.over_scans(input.scans);
-    gauge.pass(intake.content().scans);
+    gauge.pass(ingest.content().scans);
     let mut build = Build {
         mapper,
-        intake,
+        ingest,
         schedule: FlushSchedule::new(options.flush_every),
         gauge,
         report: ScanReport::default(),
         scans: 0,
         has_rays: !options.no_rays,
-        most_together,
+        max_batch,
         notes_content: options.piece_of.is_none(),
         pose_check,
         doubt: None,
@@ -115,17 +119,17 @@ pub fn build(options: &BuildOptions, watch: &Watch) -> anyhow::Result<Option<Sum
     build.gauge.say("flushing");
     // Accepted scans are flushed, however the build ended.
     let flushed = build.mapper.flush();
-    let Build { report, scans, mut intake, gauge, doubt, .. } = build;
+    let Build { report, scans, mut ingest, gauge, doubt, .. } = build;
     drop(gauge);
-    let mut remarks = intake.remarks();
+    let mut remarks = ingest.remarks();
     remarks.iter_mut().for_each(|remark| *remark = format!("{}: {remark}", options.scans.display()));
     remarks.extend(doubt.map(|doubt| doubt.remark()));
-    remarks.extend(all_is_cut(&report, mapper.config()));
+    remarks.extend(all_rays_cut(&report, mapper.config()));
     remarks.iter().for_each(|remark| log::warn!("{remark}"));
     if let Err(flush_error) = flushed {
         let (config, scan_number) = (mapper.config().clone(), mapper.flushed_scan_number());
-        let (is_new, is_piece) = (!exists, options.piece_of.is_some());
-        let failed = FailedFlush { folder: &options.output, config, scan_number, is_new, is_piece };
+        let (is_new, is_shard) = (!exists, options.piece_of.is_some());
+        let failed = FailedFlush { folder: &options.output, config, scan_number, is_new, is_shard };
         drop(opened_map);
         let flush_error = failed.clean(flush_error);
         return Err(match outcome {
@@ -139,20 +143,20 @@ pub fn build(options: &BuildOptions, watch: &Watch) -> anyhow::Result<Option<Sum
     }
     let interrupted = stop.is_set();
     let summary = Summary::of(&options.output, scans, report, mapper, started.elapsed())?;
-    let (poses, unread, left_out) = (Some(input.poses.to_string()), intake.unread, intake.left_out);
+    let (poses, unread, left_out) = (Some(input.poses.to_string()), ingest.unread, ingest.left_out);
     Ok(Some(Summary { interrupted, resumed_after, poses, unread, left_out, remarks, ..summary }))
 }
 
 struct Build<'a> {
     mapper: &'a mut OutOfCoreTileMapper,
-    intake: Intake,
+    ingest: Ingest,
     schedule: FlushSchedule,
     gauge: Box<dyn Gauge>,
     report: ScanReport,
     scans: u64,
     has_rays: bool,
     /// Maximum number of scans to insert at once.
-    most_together: usize,
+    max_batch: usize,
     notes_content: bool,
     /// Check of the poses, until its result is known.
     pose_check: Option<PoseCheck>,
@@ -164,16 +168,16 @@ impl Build<'_> {
     fn insert_all(&mut self) -> anyhow::Result<()> {
         loop {
             let (mapper, schedule) = (&mut *self.mapper, &mut self.schedule);
-            let most = self.most_together.min(schedule.scans_until_due());
+            let most = self.max_batch.min(schedule.scans_until_due());
             // While the input is idle, pending scans are still flushed on schedule.
             let next =
-                self.intake.next(most, &mut || flush_if(schedule.is_due_waiting(), mapper, schedule))?;
+                self.ingest.next(most, &mut || flush_if(schedule.is_due_waiting(), mapper, schedule))?;
             let taken = match next {
                 Next::Scans(taken) => taken,
                 Next::Stopped => return Ok(()),
                 Next::End => {
                     // The last scans may have been skipped.
-                    self.note_content(self.intake.content());
+                    self.note_content(self.ingest.content());
                     self.check_poses(PoseCheck::finish)?;
                     return Ok(());
                 }
@@ -239,7 +243,7 @@ impl Build<'_> {
 /// Returns the settings for reading. Poses are not needed without rays.
 fn read_options(options: &BuildOptions, config: &MapConfig) -> ReadOptions {
     let mut read = options.read.clone();
-    read.scratch = Some(folder_beside(options).to_owned());
+    read.scratch = Some(scratch_folder(options).to_owned());
     if let Some(bytes) = config.memory_bytes() {
         read.memory_bytes = for_reading(bytes);
     }
@@ -304,7 +308,7 @@ fn flush_if(
 }
 
 /// Returns the path of the map. A shard is not durable until it is imported; after a crash it is built again.
-fn place_of_map(options: &BuildOptions) -> MapPath {
+fn map_path(options: &BuildOptions) -> MapPath {
     match options.piece_of {
         None => MapPath::from(&options.output),
         Some(_) => MapPath::on(Arc::new(UnsyncedDisk::of(Arc::new(FsDisk))), &options.output),
@@ -337,7 +341,7 @@ fn exists(options: &BuildOptions) -> anyhow::Result<bool> {
 fn begin(
     options: &BuildOptions,
     mapper: &mut OutOfCoreTileMapper,
-    intake: &mut Intake,
+    ingest: &mut Ingest,
     name: &str,
 ) -> anyhow::Result<Option<u64>> {
     let inputs = mapper.inputs();
@@ -346,15 +350,15 @@ fn begin(
     let is_this = |input: &InputRecord| {
         let is_known = |content: &InputContent| content.begins_with.is_some() || input.is_named(name);
         let is_same = |content: &InputContent| {
-            content.begins_with.as_deref() == intake.begins_with()
-                || (is_known(content) && intake.begins_as(content))
+            content.begins_with.as_deref() == ingest.begins_with()
+                || (is_known(content) && ingest.begins_as(content))
         };
         input.content.as_ref().is_some_and(is_same)
     };
     if let Some(at) = inputs.iter().rposition(is_this).filter(|_| !options.again) {
         let content = inputs[at].content.clone().unwrap_or_default();
         if options.resume {
-            if !intake.pass_over(&content)? {
+            if !ingest.pass_over(&content)? {
                 return Ok(None);
             }
             check_begun(options, &inputs[at], mapper)?;
@@ -370,14 +374,14 @@ fn begin(
     }
     if let Some(last) = inputs.last().filter(|last| last.content.is_none() && !options.again) {
         // A map of an older version identifies the whole input by a fingerprint.
-        let Some(fingerprint) = intake.fingerprint()? else { return Ok(None) };
+        let Some(fingerprint) = ingest.fingerprint()? else { return Ok(None) };
         if fingerprint.is_ok_and(|fingerprint| fingerprint == last.name) {
             let done = mapper.scan_number().saturating_sub(last.first_scan);
             if !options.resume {
                 return Err(taken_before(options, name, done));
             }
             check_begun(options, last, mapper)?;
-            return Ok(intake.pass(done)?.then_some(done));
+            return Ok(ingest.pass(done)?.then_some(done));
         }
     }
     // A merged map has tiles but no scan count.
@@ -385,18 +389,18 @@ fn begin(
     if options.resume && !options.append && !is_empty {
         let same = inputs.iter().rfind(|input| input.is_named(name) && input.content.is_some());
         let (found, wanted) = match same.or(inputs.last()) {
-            None => ("nothing".to_owned(), name.to_owned()),
+            None => ("of unknown origin".to_owned(), name.to_owned()),
             Some(known) => match known.content {
                 // The recorded name is a fingerprint.
                 None => {
-                    let Some(fingerprint) = intake.fingerprint()? else { return Ok(None) };
+                    let Some(fingerprint) = ingest.fingerprint()? else { return Ok(None) };
                     (known.name.clone(), fingerprint.map_or(name.to_owned(), |of| format!("{of} ({name})")))
                 }
                 Some(_) if known.is_named(name) => (
                     beginning(&known.name, known.begins_with()),
                     format!(
                         "{}: the input was replaced or its beginning has changed",
-                        beginning(name, intake.begins_with())
+                        beginning(name, ingest.begins_with())
                     ),
                 ),
                 Some(_) => (known.name.clone(), name.to_owned()),
@@ -407,7 +411,7 @@ fn begin(
         return Err(error
             .context("`resume` continues an input that the map already has; `append` adds another input"));
     }
-    let content = options.piece_of.is_none().then(|| intake.content());
+    let content = options.piece_of.is_none().then(|| ingest.content());
     let (rays, is_hits_alone) = (Some(mapper.config().rays), Some(options.no_rays));
     mapper.begin_input(InputRecord { content, rays, is_hits_alone, ..InputRecord::from(name) })?;
     Ok(Some(0))
@@ -465,7 +469,7 @@ fn taken_before(options: &BuildOptions, name: &str, scans: u64) -> anyhow::Error
 
 /// Returns the folder for temporary files: the map's folder, or its nearest existing ancestor. The system's temporary
 /// folder may be in memory.
-fn folder_beside(options: &BuildOptions) -> &Path {
+fn scratch_folder(options: &BuildOptions) -> &Path {
     options.output.ancestors().find(|folder| folder.is_dir()).unwrap_or(Path::new("."))
 }
 
@@ -487,17 +491,17 @@ fn config_of_map(options: &BuildOptions, config: &MapConfig) -> MapConfig {
 }
 
 /// Returns the memory limit for the points of a scan. Further points go to a file.
-fn room(options: &BuildOptions, config: &MapConfig) -> PointRoom {
-    let folder = folder_beside(options);
+fn point_budget(options: &BuildOptions, config: &MapConfig) -> PointBudget {
+    let folder = scratch_folder(options);
     match config.memory_bytes() {
-        Some(bytes) => PointRoom::new(bytes / PARTS_OF_MEMORY / scans_in_memory(options, config), folder),
-        None => PointRoom::default(),
+        Some(bytes) => PointBudget::new(bytes / PARTS_OF_MEMORY / scans_in_memory(options, config), folder),
+        None => PointBudget::default(),
     }
 }
 
 /// Returns the number of scans that can exist at once: being inserted, queued, and being read.
 fn scans_in_memory(options: &BuildOptions, config: &MapConfig) -> usize {
-    let together = most_together(options, config);
+    let together = max_batch(options, config);
     match options.when_behind {
         WhenBehind::Wait if together == 1 => 1,
         WhenBehind::Wait => 2 * together + 1,
@@ -506,14 +510,18 @@ fn scans_in_memory(options: &BuildOptions, config: &MapConfig) -> usize {
 }
 
 /// Returns the maximum number of scans to insert at once: one per core, limited by the memory for their points.
-fn most_together(options: &BuildOptions, config: &MapConfig) -> usize {
-    let room =
-        config.memory_bytes().map_or(usize::MAX, |bytes| bytes / PARTS_OF_MEMORY / ROOM_TO_GO_TOGETHER);
-    if options.no_rays { 1 } else { rayon::current_num_threads().min(room.saturating_sub(1) / 2).max(1) }
+fn max_batch(options: &BuildOptions, config: &MapConfig) -> usize {
+    let point_budget =
+        config.memory_bytes().map_or(usize::MAX, |bytes| bytes / PARTS_OF_MEMORY / MIN_BATCH_BYTES);
+    if options.no_rays {
+        1
+    } else {
+        rayon::current_num_threads().min(point_budget.saturating_sub(1) / 2).max(1)
+    }
 }
 
 /// Returns a warning if all rays were cut, which leaves only free space.
-fn all_is_cut(report: &ScanReport, config: &MapConfig) -> Option<String> {
+fn all_rays_cut(report: &ScanReport, config: &MapConfig) -> Option<String> {
     let ScanReport { points, skipped, cut_at_max_range, .. } = *report;
     let skipped: u64 = skipped.by_cause().into_iter().map(|(_, count)| count).sum();
     let range_m = config.rays.max_range_m?;

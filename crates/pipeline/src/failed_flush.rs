@@ -13,7 +13,7 @@ pub(crate) struct FailedFlush<'a> {
     /// Whether this build created the map.
     pub is_new: bool,
     /// Whether the map is a shard, which is always rebuilt as a whole.
-    pub is_piece: bool,
+    pub is_shard: bool,
 }
 
 const GONE: &str = "no scan was flushed, and the new map was removed";
@@ -49,7 +49,7 @@ impl FailedFlush<'_> {
 
     /// Returns whether the map was removed.
     fn remove_leftovers(&self) -> bool {
-        if self.is_piece {
+        if self.is_shard {
             return false;
         }
         // Opening the map removes uncommitted files.

@@ -22,10 +22,10 @@ pub enum WhenBehind {
 /// The fingerprint of a dropped scan remains in the queue, because the map's record of the input counts all scans.
 pub struct ScanQueue {
     waiting: Mutex<Waiting>,
-    came: Condvar,
+    arrived: Condvar,
     /// Signals free space or the closing of the queue.
     has_room: Condvar,
-    most_scans: usize,
+    capacity: usize,
     when_behind: WhenBehind,
 }
 
@@ -43,9 +43,9 @@ impl ScanQueue {
     pub const MAX_SCANS: usize = 8;
 
     /// Creates a queue with this capacity.
-    pub fn new(when_behind: WhenBehind, most_scans: usize) -> Self {
-        let (came, has_room) = (Condvar::new(), Condvar::new());
-        Self { waiting: Mutex::default(), came, has_room, most_scans, when_behind }
+    pub fn new(when_behind: WhenBehind, capacity: usize) -> Self {
+        let (arrived, has_room) = (Condvar::new(), Condvar::new());
+        Self { waiting: Mutex::default(), arrived, has_room, capacity, when_behind }
     }
 
     /// Adds a read. If the input is to wait, blocks until there is space. Returns `false` if the queue is closed.
@@ -53,22 +53,22 @@ impl ScanQueue {
         let mut waiting = self.lock();
         match read {
             Ok(Read::Scan(scan)) if self.when_behind == WhenBehind::Wait => {
-                let is_full = |waiting: &mut Waiting| waiting.scans >= self.most_scans && !waiting.is_closed;
+                let is_full = |waiting: &mut Waiting| waiting.scans >= self.capacity && !waiting.is_closed;
                 waiting = self.has_room.wait_while(waiting, is_full).unwrap_or_else(PoisonError::into_inner);
                 waiting.scans += 1;
                 waiting.reads.push_back(Ok(Read::Scan(scan)));
             }
-            Ok(Read::Scan(scan)) => waiting.push_scan(scan, self.when_behind, self.most_scans),
+            Ok(Read::Scan(scan)) => waiting.push_scan(scan, self.when_behind, self.capacity),
             other => waiting.reads.push_back(other),
         }
-        self.came.notify_all();
+        self.arrived.notify_all();
         !waiting.is_closed
     }
 
     /// Returns the oldest read, waiting for at most `patience`, or `None` if none arrived.
     pub fn take(&self, patience: Duration) -> Option<voxtile::Result<Read>> {
         let waiting = self.lock();
-        let waited = self.came.wait_timeout_while(waiting, patience, |waiting| waiting.reads.is_empty());
+        let waited = self.arrived.wait_timeout_while(waiting, patience, |waiting| waiting.reads.is_empty());
         let (mut waiting, _) = waited.unwrap_or_else(PoisonError::into_inner);
         let read = waiting.reads.pop_front()?;
         waiting.scans -= usize::from(matches!(read, Ok(Read::Scan(_))));
@@ -88,18 +88,18 @@ impl ScanQueue {
 }
 
 impl Waiting {
-    fn push_scan(&mut self, scan: ReadScan, when_behind: WhenBehind, most_scans: usize) {
+    fn push_scan(&mut self, scan: ReadScan, when_behind: WhenBehind, capacity: usize) {
         if when_behind == WhenBehind::Thin {
-            self.was_thinned = !self.was_thinned && 2 * self.scans > most_scans;
+            self.was_thinned = !self.was_thinned && 2 * self.scans > capacity;
             if self.was_thinned {
-                return self.reads.push_back(Ok(Read::LeftOut(scan.mark)));
+                return self.reads.push_back(Ok(Read::LeftOut(scan.fingerprint)));
             }
         }
-        if self.scans >= most_scans
+        if self.scans >= capacity
             && let Some(oldest) = self.reads.iter_mut().find(|read| matches!(read, Ok(Read::Scan(_))))
-            && let Ok(Read::Scan(ReadScan { mark, .. })) = oldest
+            && let Ok(Read::Scan(ReadScan { fingerprint, .. })) = oldest
         {
-            *oldest = Ok(Read::LeftOut(*mark));
+            *oldest = Ok(Read::LeftOut(*fingerprint));
             self.scans -= 1;
         }
         self.scans += 1;
@@ -117,7 +117,7 @@ mod tests {
     use super::*;
     use nalgebra::Isometry3;
     use std::sync::atomic::{AtomicUsize, Ordering};
-    use voxtile_formats::{PointStore, ScanMark, StoredScan};
+    use voxtile_formats::{PointStore, ScanFingerprint, StoredScan};
 
     fn scan(number: usize) -> ReadScan {
         let mut points_in_sensor = PointStore::default();
@@ -126,14 +126,15 @@ mod tests {
         let world_from_sensor = Isometry3::identity().into();
         let scan =
             StoredScan { name: number.to_string(), stamp_ns: None, points_in_sensor, world_from_sensor };
-        let mark = ScanMark::of(&scan).unwrap();
-        ReadScan { scan, mark }
+        let fingerprint = ScanFingerprint::of(&scan).unwrap();
+        ReadScan { scan, fingerprint }
     }
 
     /// Returns the numbers of the scans to insert after this many arrived, and the number of dropped scans.
     fn after(scans: usize, when_behind: WhenBehind) -> (Vec<usize>, usize) {
         let queue = ScanQueue::new(when_behind, ScanQueue::MAX_SCANS);
-        let marks: Vec<String> = (0..scans).map(|number| scan(number).mark.scan_text()).collect();
+        let fingerprints: Vec<String> =
+            (0..scans).map(|number| scan(number).fingerprint.scan_text()).collect();
         assert!((0..scans).all(|number| queue.push(Ok(Read::Scan(scan(number))))));
         assert!(queue.push(Ok(Read::End)));
         let (mut mapped, mut left_out, mut seen) = (Vec::new(), 0, Vec::new());
@@ -141,29 +142,29 @@ mod tests {
             match queue.take(Duration::ZERO) {
                 Some(Ok(Read::Scan(scan))) => {
                     mapped.push(seen.len());
-                    seen.push(scan.mark.scan_text());
+                    seen.push(scan.fingerprint.scan_text());
                 }
-                Some(Ok(Read::LeftOut(mark))) => {
+                Some(Ok(Read::LeftOut(fingerprint))) => {
                     left_out += 1;
-                    seen.push(mark.scan_text());
+                    seen.push(fingerprint.scan_text());
                 }
                 Some(Ok(Read::End)) => break,
                 _ => panic!("nothing else was put in"),
             }
         }
-        assert_eq!(seen, marks, "every scan is known of, in order");
+        assert_eq!(seen, fingerprints, "every scan is known of, in order");
         assert!(queue.take(Duration::ZERO).is_none());
         (mapped, left_out)
     }
 
     #[test]
-    fn the_oldest_scans_make_room_and_leave_their_marks() {
+    fn oldest_scans_are_dropped_but_keep_their_fingerprints() {
         assert_eq!(after(8, WhenBehind::DropOldest), ((0..8).collect(), 0));
         assert_eq!(after(20, WhenBehind::DropOldest), ((12..20).collect(), 12));
     }
 
     #[test]
-    fn every_second_scan_is_left_out_while_more_than_half_of_the_room_is_taken() {
+    fn every_second_scan_is_dropped_while_the_queue_is_half_full() {
         assert_eq!(after(5, WhenBehind::Thin), ((0..5).collect(), 0));
         assert_eq!(after(11, WhenBehind::Thin), (vec![0, 1, 2, 3, 4, 6, 8, 10], 3));
         let (mapped, left_out) = after(100, WhenBehind::Thin);
@@ -171,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn a_queue_that_nobody_takes_from_says_so() {
+    fn closed_queues_reject_scans() {
         for when_behind in [WhenBehind::Wait, WhenBehind::DropOldest, WhenBehind::Thin] {
             let queue = ScanQueue::new(when_behind, 1);
             assert!(queue.push(Ok(Read::Scan(scan(0)))));
@@ -181,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn an_input_that_is_to_wait_waits_for_room_and_no_longer_than_somebody_takes() {
+    fn waiting_inputs_block_until_space_or_close() {
         let queue = ScanQueue::new(WhenBehind::Wait, 2);
         let pushed = AtomicUsize::new(0);
         std::thread::scope(|scope| {

@@ -10,7 +10,7 @@ use std::thread;
 use std::time::Duration;
 use voxtile::Error;
 use voxtile::scan::Stop;
-use voxtile_formats::{PointRoom, PoseSource, ReadOptions, ScanMark, ScanSource, StoredScan};
+use voxtile_formats::{PointBudget, PoseSource, ReadOptions, ScanFingerprint, ScanSource, StoredScan};
 
 /// Maximum time to wait for the input before checking for a stop request.
 const PATIENCE: Duration = Duration::from_millis(100);
@@ -21,7 +21,7 @@ const READER_IS_GONE: &str = "the thread that reads the scans ended before the e
 /// Reads an input scan by scan in its own thread, so that waiting for it can be stopped. Scans are read on request or a
 /// few in advance. If no thread can be created, scans are read in the calling thread.
 pub struct ScanReader {
-    place: Place,
+    worker: Worker,
     stop: Stop,
     /// Queue of scans that are read in advance.
     ahead: Option<Arc<ScanQueue>>,
@@ -38,12 +38,12 @@ pub struct Opened {
 }
 
 /// Function that computes the fingerprint of a scan.
-pub type Marking = fn(&StoredScan) -> voxtile::Result<ScanMark>;
+pub type FingerprintFn = fn(&StoredScan) -> voxtile::Result<ScanFingerprint>;
 
 /// A scan with its fingerprint.
 pub struct ReadScan {
     pub scan: StoredScan,
-    pub mark: ScanMark,
+    pub fingerprint: ScanFingerprint,
 }
 
 /// Result of requesting a scan.
@@ -52,15 +52,15 @@ pub enum Read {
     /// A scan that cannot be read. The next call returns the following scan.
     Unread(Error),
     /// A scan that was dropped because too many were queued.
-    LeftOut(ScanMark),
+    LeftOut(ScanFingerprint),
     End,
     /// Reading was stopped.
     Stopped,
 }
 
-enum Place {
+enum Worker {
     Thread { requests: Sender<Request>, answers: Receiver<Answer> },
-    Here(Box<dyn ScanSource + Send>, PointRoom, Marking),
+    Here(Box<dyn ScanSource + Send>, PointBudget, FingerprintFn),
 }
 
 enum Request {
@@ -85,8 +85,8 @@ impl ScanReader {
     pub fn open(
         scans: PathBuf,
         options: ReadOptions,
-        room: PointRoom,
-        mark: Marking,
+        budget: PointBudget,
+        fingerprint: FingerprintFn,
         watch: Watch,
     ) -> anyhow::Result<Option<(Self, Opened)>> {
         let (requests, requests_in) = channel();
@@ -95,7 +95,7 @@ impl ScanReader {
             Err(Error::Stopped) => return Ok(None),
             local => local?,
         };
-        let (path, own_options, here) = (local.path().to_owned(), options.clone(), room.clone());
+        let (path, own_options, here) = (local.path().to_owned(), options.clone(), budget.clone());
         let (named, own_watch, stop) = (scans.clone(), watch.clone(), watch.stop().clone());
         let read = move || {
             let mut source = match scan_input::open(&path, &own_options, &own_watch) {
@@ -106,9 +106,10 @@ impl ScanReader {
             let mut is_wanted = answers_out.send(Answer::Opened(Ok(opened))).is_ok();
             while is_wanted && let Ok(request) = requests_in.recv() {
                 match request {
-                    Request::Ahead(queue) => read_ahead(&mut *source, &room, mark, &queue),
+                    Request::Ahead(queue) => read_ahead(&mut *source, &budget, fingerprint, &queue),
                     request => {
-                        is_wanted = answers_out.send(answer(&mut *source, &request, &room, mark)).is_ok();
+                        is_wanted =
+                            answers_out.send(answer(&mut *source, &request, &budget, fingerprint)).is_ok();
                     }
                 }
             }
@@ -116,7 +117,7 @@ impl ScanReader {
         match thread::Builder::new().name("voxtile-read".to_owned()).spawn(read) {
             Ok(_) => {
                 let mut reader =
-                    Self { place: Place::Thread { requests, answers }, stop, ahead: None, _scans: local };
+                    Self { worker: Worker::Thread { requests, answers }, stop, ahead: None, _scans: local };
                 match reader.wait(&mut || Ok(()))? {
                     Some(Answer::Opened(Err(Error::Stopped))) => Ok(None),
                     Some(Answer::Opened(opened)) => Ok(Some((reader, opened?))),
@@ -131,7 +132,12 @@ impl ScanReader {
                 let source = scan_input::open(local.path(), &options, &watch)?;
                 let opened = Opened::of(&scans, &*source);
                 Ok(Some((
-                    Self { place: Place::Here(source, here, mark), stop, ahead: None, _scans: local },
+                    Self {
+                        worker: Worker::Here(source, here, fingerprint),
+                        stop,
+                        ahead: None,
+                        _scans: local,
+                    },
                     opened,
                 )))
             }
@@ -140,7 +146,7 @@ impl ScanReader {
 
     /// Starts to read scans in advance into a queue. Has no effect without a thread.
     pub fn read_ahead(&mut self, queue: ScanQueue) {
-        if let Place::Thread { requests, .. } = &self.place {
+        if let Worker::Thread { requests, .. } = &self.worker {
             let queue = Arc::new(queue);
             // If the thread has ended, the next wait reports it.
             drop(requests.send(Request::Ahead(queue.clone())));
@@ -153,20 +159,20 @@ impl ScanReader {
         if let Some(queue) = &self.ahead {
             return take(queue, &self.stop, idle);
         }
-        match self.ask(Request::Scan, idle)? {
+        match self.request_answer(Request::Scan, idle)? {
             Some(Answer::Read(read)) => Ok(read?),
             _ => Ok(Read::Stopped),
         }
     }
 
     /// Returns the next scan if it is already read.
-    pub fn next_at_hand(&mut self) -> Option<voxtile::Result<Read>> {
+    pub fn next_ready(&mut self) -> Option<voxtile::Result<Read>> {
         self.ahead.as_ref().and_then(|queue| queue.take(Duration::ZERO))
     }
 
     /// Returns the fingerprint used in maps of older versions, or `None` if it was stopped before it was known.
     pub fn fingerprint(&mut self) -> anyhow::Result<Option<voxtile::Result<String>>> {
-        match self.ask(Request::Fingerprint, &mut || Ok(()))? {
+        match self.request_answer(Request::Fingerprint, &mut || Ok(()))? {
             Some(Answer::Fingerprint(fingerprint)) => Ok(Some(fingerprint)),
             _ => Ok(None),
         }
@@ -181,7 +187,7 @@ impl ScanReader {
             patience -= 1;
             if is_ahead && patience == 0 { Err(Error::Stopped) } else { Ok(()) }
         };
-        match self.ask(Request::Remarks, &mut impatient)? {
+        match self.request_answer(Request::Remarks, &mut impatient)? {
             Some(Answer::Remarks(remarks)) => Ok(remarks),
             _ => Ok(Vec::new()),
         }
@@ -189,30 +195,30 @@ impl ScanReader {
 
     /// Returns the coordinate reference system that the input has named so far.
     pub fn crs(&mut self) -> anyhow::Result<Option<String>> {
-        match self.ask(Request::Crs, &mut || Ok(()))? {
+        match self.request_answer(Request::Crs, &mut || Ok(()))? {
             Some(Answer::Crs(crs)) => Ok(crs),
             _ => Ok(None),
         }
     }
 
-    fn ask(
+    fn request_answer(
         &mut self,
         request: Request,
         idle: &mut dyn FnMut() -> voxtile::Result<()>,
     ) -> anyhow::Result<Option<Answer>> {
-        match &mut self.place {
-            Place::Here(..) if self.stop.is_set() => return Ok(None),
-            Place::Here(source, room, mark) => {
-                return Ok(Some(answer(&mut **source, &request, room, *mark)));
+        match &mut self.worker {
+            Worker::Here(..) if self.stop.is_set() => return Ok(None),
+            Worker::Here(source, budget, fingerprint) => {
+                return Ok(Some(answer(&mut **source, &request, budget, *fingerprint)));
             }
             // If the thread has ended, the next wait reports it.
-            Place::Thread { requests, .. } => drop(requests.send(request)),
+            Worker::Thread { requests, .. } => drop(requests.send(request)),
         }
         self.wait(idle)
     }
 
     fn wait(&mut self, idle: &mut dyn FnMut() -> voxtile::Result<()>) -> anyhow::Result<Option<Answer>> {
-        let Place::Thread { answers, .. } = &self.place else { return Ok(None) };
+        let Worker::Thread { answers, .. } = &self.worker else { return Ok(None) };
         loop {
             if self.stop.is_set() {
                 return Ok(None);
@@ -257,9 +263,14 @@ fn take(
 }
 
 /// Reads an input until its end or until the queue is closed.
-fn read_ahead(source: &mut dyn ScanSource, room: &PointRoom, mark: Marking, queue: &ScanQueue) {
+fn read_ahead(
+    source: &mut dyn ScanSource,
+    budget: &PointBudget,
+    fingerprint: FingerprintFn,
+    queue: &ScanQueue,
+) {
     loop {
-        let read = read(source, room, mark);
+        let read = read(source, budget, fingerprint);
         let is_last = is_last(&read);
         if !queue.push(read) || is_last {
             return;
@@ -267,20 +278,29 @@ fn read_ahead(source: &mut dyn ScanSource, room: &PointRoom, mark: Marking, queu
     }
 }
 
-fn answer(source: &mut dyn ScanSource, request: &Request, room: &PointRoom, mark: Marking) -> Answer {
+fn answer(
+    source: &mut dyn ScanSource,
+    request: &Request,
+    budget: &PointBudget,
+    fingerprint: FingerprintFn,
+) -> Answer {
     match request {
-        Request::Scan => Answer::Read(read(source, room, mark)),
+        Request::Scan => Answer::Read(read(source, budget, fingerprint)),
         Request::Fingerprint => Answer::Fingerprint(source.fingerprint()),
         Request::Remarks => Answer::Remarks(source.remarks()),
         Request::Crs | Request::Ahead(_) => Answer::Crs(source.crs()),
     }
 }
 
-fn read(source: &mut dyn ScanSource, room: &PointRoom, mark: Marking) -> voxtile::Result<Read> {
-    match source.next_stored(room) {
+fn read(
+    source: &mut dyn ScanSource,
+    budget: &PointBudget,
+    fingerprint: FingerprintFn,
+) -> voxtile::Result<Read> {
+    match source.next_stored(budget) {
         Ok(Some(scan)) => {
-            let mark = mark(&scan)?;
-            Ok(Read::Scan(ReadScan { scan, mark }))
+            let fingerprint = fingerprint(&scan)?;
+            Ok(Read::Scan(ReadScan { scan, fingerprint }))
         }
         Ok(None) => Ok(Read::End),
         Err(Error::Stopped) => Ok(Read::Stopped),
@@ -294,7 +314,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_thread_that_panicked_is_an_error_and_no_endless_wait() {
+    fn panicked_threads_are_errors() {
         let queue = Arc::new(ScanQueue::new(crate::scan_queue::WhenBehind::Wait, 1));
         let thread_queue = queue.clone();
         let thread = thread::spawn(move || {

@@ -79,6 +79,7 @@ pub struct OctreeWork {
     /// Fraction of updates that hit the voxel caches; missing if there are no caches.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hit_rate: Option<f64>,
+    /// Counters of the octrees.
     #[serde(flatten)]
     pub statistics: OctreeStatistics,
 }

@@ -48,7 +48,7 @@ pub struct Watch {
 
 impl Watch {
     /// Creates a watch that never stops the task and ignores its progress.
-    pub fn nobody() -> Self {
+    pub fn silent() -> Self {
         Self::of_program(Stop::default(), None)
     }
 
@@ -61,7 +61,7 @@ impl Watch {
     pub fn of_program(stop: Stop, listener: Option<Listener>) -> Self {
         let make_gauge = move |_, all: Option<u64>| -> Box<dyn Gauge> {
             let (listener, done) = (listener.clone(), AtomicU64::new(0));
-            Box::new(Heard { listener, done, all: all.unwrap_or(0) })
+            Box::new(ListenerGauge { listener, done, all: all.unwrap_or(0) })
         };
         Self { stop, make_gauge: Arc::new(make_gauge) }
     }
@@ -94,13 +94,13 @@ impl fmt::Debug for Watch {
 }
 
 /// Gauge that calls a listener.
-struct Heard {
+struct ListenerGauge {
     listener: Option<Listener>,
     done: AtomicU64,
     all: u64,
 }
 
-impl Gauge for Heard {
+impl Gauge for ListenerGauge {
     fn pass(&self, done: u64) {
         self.done.store(done, Relaxed);
     }

@@ -30,10 +30,10 @@ const RECORDING: &str =
 /// Names the detected kind of file and how to convert it.
 pub(super) fn check_text(path: &Path, head: &[u8]) -> Result<()> {
     let known = KINDS.iter().find(|(start, ..)| head.starts_with(start));
-    let (kind, way) = match known {
-        Some((_, kind, way)) => (*kind, *way),
+    let (kind, advice) = match known {
+        Some((_, kind, advice)) => (*kind, *advice),
         None if head.contains(&0) => ("binary", SAVE),
         None => return Ok(()),
     };
-    Err(Error::argument(path.display().to_string(), format!("is {kind}, not a text file of poses: {way}")))
+    Err(Error::argument(path.display().to_string(), format!("is {kind}, not a text file of poses: {advice}")))
 }

@@ -95,7 +95,7 @@ mod tests {
     use super::*;
     use nalgebra::{UnitQuaternion, Vector3};
 
-    fn way(step_m: [f64; 3], roll: f64) -> Direction {
+    fn moving(step_m: [f64; 3], roll: f64) -> Direction {
         let mut direction = Direction::default();
         for k in 0..30 {
             let rotation = UnitQuaternion::from_euler_angles(roll, 0.0, 0.0);
@@ -107,25 +107,25 @@ mod tests {
     }
 
     #[test]
-    fn a_camera_goes_along_z() {
-        let camera = way([0.01, 0.0, 0.9], 0.0);
+    fn cameras_move_along_z() {
+        let camera = moving([0.01, 0.0, 0.9], 0.0);
         assert!(camera.is_along_z() && camera.may_be_of_camera());
         assert!(camera.remarks(false, false).iter().any(|remark| remark.contains("along its z axis")));
         assert!(camera.remarks(true, false).is_empty() && camera.remarks(false, true).is_empty());
-        let lidar = way([0.9, 0.1, 0.05], 0.0);
+        let lidar = moving([0.9, 0.1, 0.05], 0.0);
         assert!(!lidar.is_along_z() && !lidar.may_be_of_camera());
         assert!(lidar.remarks(false, false).is_empty() && lidar.remarks(true, false).is_empty());
-        let twice = way([0.0, -0.9, 0.0], 0.0);
+        let twice = moving([0.0, -0.9, 0.0], 0.0);
         assert!(twice.remarks(false, false).is_empty() && twice.remarks(true, false).len() == 1);
-        assert!(way([0.0, 0.9, 0.0], 0.0).remarks(true, false).is_empty());
-        let still = way([0.0, 0.0, 0.001], 0.0);
+        assert!(moving([0.0, 0.9, 0.0], 0.0).remarks(true, false).is_empty());
+        let still = moving([0.0, 0.0, 0.001], 0.0);
         assert!(!still.is_along_z() && still.may_be_of_camera() && still.remarks(false, false).is_empty());
     }
 
     #[test]
-    fn a_first_pose_upside_down_is_worth_a_remark() {
-        let remarks = way([0.9, 0.0, 0.0], std::f64::consts::PI).remarks(false, true);
+    fn first_pose_upside_down_is_remarked() {
+        let remarks = moving([0.9, 0.0, 0.0], std::f64::consts::PI).remarks(false, true);
         assert!(remarks.len() == 1 && remarks[0].contains("upside down"), "{remarks:?}");
-        assert!(way([0.9, 0.0, 0.0], 1.0).remarks(false, false).is_empty());
+        assert!(moving([0.9, 0.0, 0.0], 1.0).remarks(false, false).is_empty());
     }
 }

@@ -71,11 +71,11 @@ fn remark_frame(
     let calib = may_need_calib.then(|| calib_for(file, folder)).flatten();
     let mut remarks = direction.remarks(options.calib.is_some(), calib.is_some());
     if let Some(calib) = calib {
-        let way = if direction.is_along_z() { ", and these move along z like a camera" } else { "" };
+        let hint = if direction.is_along_z() { ", and these move along z like a camera" } else { "" };
         let calib = calib.display();
         remarks.push(format!(
             "{calib} contains Tr, the pose of the lidar in the camera frame: if these are poses of the camera, as in \
-             KITTI{way}, add `calib` {calib}"
+             KITTI{hint}, add `calib` {calib}"
         ));
     }
     remarks.into_iter().for_each(|remark| trajectory.remark(remark));
@@ -92,8 +92,8 @@ fn calib_for(file: &Path, folder: &Path) -> Option<PathBuf> {
 
 /// Finds the pose file in a folder or in its parent.
 pub(crate) fn pose_file_for(folder: &Path) -> Option<PathBuf> {
-    let beside = above(folder);
-    let places = [folder, &*beside];
+    let parent = above(folder);
+    let places = [folder, &*parent];
     places.iter().flat_map(|place| POSE_FILES.map(|name| place.join(name))).find(|path| path.is_file())
 }
 

@@ -213,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn headers_of_many_programs() {
+    fn headers_of_many_programs_are_read() {
         let tum = Roles { time: one(0, None), position: [1, 2, 3], units: METRES, quaternion: [4, 5, 6, 7] };
         assert_eq!(roles(" timestamp tx ty tz qx qy qz qw   (sensor -> world)"), Some(tum.clone()));
         assert_eq!(roles("tx ty tz qx qy qz qw (sensor to world)").map(|roles| roles.units), Some(METRES));

@@ -203,10 +203,10 @@ impl PosedClouds {
             let more = if names.len() > MAX_NAMED { ", ..." } else { "" };
             names.iter().take(MAX_NAMED).map(String::as_str).collect::<Vec<_>>().join(", ") + more
         };
-        let told = self.reasons.iter().take(MAX_NAMED);
-        let told: Vec<String> = told.map(|(why, names)| format!("{}: {why}", list(names))).collect();
+        let reasons = self.reasons.iter().take(MAX_NAMED);
+        let reasons: Vec<String> = reasons.map(|(why, names)| format!("{}: {why}", list(names))).collect();
         let more = if self.reasons.len() > MAX_NAMED { "; ..." } else { "" };
-        told.join("; ") + more
+        reasons.join("; ") + more
     }
 
     /// Reads the points of the current cloud.

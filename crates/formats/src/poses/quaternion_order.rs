@@ -10,7 +10,7 @@ pub(super) struct OrderEvidence {
     /// Sums of the squared axis components of the rotations since the first pose, for w last and for w first.
     turns: [[f64; 3]; 2],
     /// Largest rotation, as the sine of half its angle.
-    most_turned: f64,
+    max_turn: f64,
     /// Number of poses with z pointing up, for each order.
     upright: [u64; 2],
 }
@@ -35,7 +35,7 @@ impl OrderEvidence {
         for ((read, turns), upright) in readings.iter().zip(&mut self.turns).zip(&mut self.upright) {
             let axis = turn(read(first), read(written));
             turns.iter_mut().zip(axis).for_each(|(sum, part)| *sum += part * part);
-            self.most_turned = self.most_turned.max(axis.iter().map(|part| part * part).sum::<f64>().sqrt());
+            self.max_turn = self.max_turn.max(axis.iter().map(|part| part * part).sum::<f64>().sqrt());
             *upright += u64::from(up(read(written)) > 0.5);
         }
     }
@@ -51,8 +51,8 @@ impl OrderEvidence {
         let [upright_if_last, upright_if_first] = self.upright.map(|count| count as f64 / self.count as f64);
         let is_identity = first[0].abs() > 1.0 - EXACT;
         let turns_about_z = |least: f64| first_w > least && last < 0.4;
-        (is_identity && self.most_turned > SOME_TURN && turns_about_z(0.6))
-            || (self.most_turned > MUCH_TURN
+        (is_identity && self.max_turn > SOME_TURN && turns_about_z(0.6))
+            || (self.max_turn > MUCH_TURN
                 && turns_about_z(0.8)
                 && upright_if_first > 0.95
                 && upright_if_last < 0.5)
@@ -106,7 +106,7 @@ mod tests {
     }
 
     #[test]
-    fn turns_of_an_upright_sensor_tell() {
+    fn turns_of_an_upright_sensor_reveal_the_order() {
         let car = of((0..50).map(|k| [0.01, 0.02, 0.02 * f64::from(k)]));
         assert_eq!(found(&car), [true, false]);
         let from_rest = of((0..50).map(|k| [0.0, 0.0, 0.001 * f64::from(k)]));
@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn in_doubt_w_is_last() {
+    fn w_is_last_by_default() {
         let still = of((0..9).map(|_| [0.0; 3]));
         assert_eq!(found(&still), [false, false]);
         // Upside down, as a lidar below a drone.

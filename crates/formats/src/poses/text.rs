@@ -135,13 +135,13 @@ struct TextPoses {
 }
 
 impl TextPoses {
-    fn new(rules: Rules, has_mark: bool) -> Self {
+    fn new(rules: Rules, has_bom: bool) -> Self {
         Self {
             rules,
             layout: None,
             names: Names::Prose,
             has_header: false,
-            are_plain: !has_mark,
+            are_plain: !has_bom,
             digits: None,
             matrix: Vec::new(),
             matrix_fault: None,
@@ -350,7 +350,7 @@ impl TextPoses {
     fn stamp(&mut self, cells: &Cells<'_>, at: usize, named: Option<i32>) -> Stamp {
         let word = cells.words.get(at).copied().unwrap_or_default();
         let word = match cells.separator {
-            Separator::Mark(',') => Cow::Borrowed(word),
+            Separator::Char(',') => Cow::Borrowed(word),
             _ => Cow::Owned(word.replace(',', ".")),
         };
         let digits = named.or(self.digits).or_else(|| digits_of(&word));

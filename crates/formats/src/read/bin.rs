@@ -84,8 +84,8 @@ pub(crate) fn open(
             (&mut file).take(GLANCE_BYTES).read_to_end(&mut start).map_err(fail)?;
             std::io::Seek::rewind(&mut file).map_err(fail)?;
             let columns = guess(path, head.name.ends_with(".pcd.bin"), &start, bytes)?;
-            let said = said_of(&columns);
-            (columns, Some(said))
+            let remark = describe(&columns);
+            (columns, Some(remark))
         }
     };
     let list = columns.names.join(", ");
@@ -193,7 +193,7 @@ fn example(reading: Reading) -> String {
 }
 
 /// Describes guessed columns to the user.
-fn said_of(columns: &Columns) -> String {
+fn describe(columns: &Columns) -> String {
     let count = columns.names.len();
     let is_wide = columns.places.iter().any(|(_, kind)| *kind == Scalar::F64);
     let known: Vec<&str> =

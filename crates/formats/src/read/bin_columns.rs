@@ -75,7 +75,7 @@ impl<'b> BinStart<'b> {
             if let Some(multiple) = self.multiple_of(best, &spreads) {
                 return Verdict::Either(best, multiple);
             }
-            return if spread < UNRELATED * spreads.least_of_others(best.columns) {
+            return if spread < UNRELATED * spreads.min_of_others(best.columns) {
                 Verdict::Other(best)
             } else {
                 Verdict::Wrong(
@@ -101,7 +101,7 @@ impl<'b> BinStart<'b> {
             };
         }
         let mut fourth = floats.iter().skip(3).step_by(reading.columns);
-        let is_sure = own < UNRELATED * spreads.least_of_others(reading.columns);
+        let is_sure = own < UNRELATED * spreads.min_of_others(reading.columns);
         if !is_sure && reading.columns > 3 && fourth.any(|value| *value < 0.0) {
             return Verdict::Doubtful(best);
         }
@@ -178,7 +178,7 @@ impl Spreads {
     }
 
     /// Returns the least spread over column counts that are not multiples of `columns`.
-    fn least_of_others(&self, columns: usize) -> f64 {
+    fn min_of_others(&self, columns: usize) -> f64 {
         let others = COLUMNS.filter(|other| !other.is_multiple_of(columns));
         others.filter_map(|other| self.at(other)).fold(f64::INFINITY, f64::min)
     }
@@ -226,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn four_columns_are_found_right() {
+    fn four_columns_are_judged_right() {
         let rows: [(&str, Row); 4] = [
             ("a room", &|k| [&room(k)[..], &[noise(k + 7)]].concat()),
             ("a circle", &|k| [&circle(k)[..], &[noise(k)]].concat()),
@@ -243,7 +243,7 @@ mod tests {
     }
 
     #[test]
-    fn other_columns_are_found_right() {
+    fn other_columns_are_judged_right() {
         let (narrow, wide) = (Scalar::F32, Scalar::F64);
         let rows: [(&str, Scalar, usize, Row); 8] = [
             ("x y z", narrow, 3, &|k| room(k).to_vec()),
@@ -266,7 +266,7 @@ mod tests {
     }
 
     #[test]
-    fn what_says_nothing_is_doubtful_only_with_a_negative_intensity() {
+    fn ambiguous_columns_are_doubtful_only_with_negative_intensity() {
         // All columns have the same distribution.
         let cube = |k: usize| [0, 1, 2].map(|axis| noise(3 * k + axis) - 0.5).to_vec();
         let three = bytes(Scalar::F32, 840, &cube);
@@ -276,7 +276,7 @@ mod tests {
     }
 
     #[test]
-    fn points_that_take_turns_are_not_halved() {
+    fn alternating_points_are_not_halved() {
         let turns =
             |k: usize| [circle(k)[0], circle(k)[1], if k.is_multiple_of(2) { 2.0 } else { -2.0 }].to_vec();
         let [three, six] = [3, 6].map(|columns| Reading { kind: Scalar::F32, columns });
@@ -284,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn bytes_of_another_kind_are_named() {
+    fn other_kinds_of_bytes_are_reported() {
         assert!(
             matches!(judge(&b"1.5 2.5 3.5 0.5\n".repeat(40), 4), Verdict::Wrong(why) if why.contains("text"))
         );

@@ -250,7 +250,7 @@ mod tests {
     }
 
     #[test]
-    fn columns_are_found_by_the_names_that_programs_use() {
+    fn columns_are_found_by_common_names() {
         let time = Some(TimeColumn { at: 4, unit_s: 1e-6 });
         assert_eq!(
             found(&["Z", "X [m]", "scalar_Intensity", "y_m", "time [us]"], false),

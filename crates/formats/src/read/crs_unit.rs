@@ -43,7 +43,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_well_known_name_counts_more_than_a_factor_of_another_unit() {
+    fn known_unit_names_override_wrong_factors() {
         let of = |name, factor| CrsUnit::of(name, factor).map(|unit| (unit.metres, unit.conflict.is_some()));
         assert_eq!(of("US survey foot", Some(1.0)), Some((US_FOOT_M, true)));
         assert_eq!(of("Foot_US", Some(0.304_800_609_601_219)), Some((0.304_800_609_601_219, false)));

@@ -53,8 +53,8 @@ struct Packets {
 }
 
 impl Packets {
-    /// Returns the memory that a packet takes, if it exceeds `most_bytes`.
-    fn check(&mut self, file: &mut File, scan: &PointCloud, most_bytes: u64) -> io::Result<Option<u64>> {
+    /// Returns the memory that a packet takes, if it exceeds `max_bytes`.
+    fn check(&mut self, file: &mut File, scan: &PointCloud, max_bytes: u64) -> io::Result<Option<u64>> {
         let mut pages = Pages::new(file, scan.file_offset)?;
         let mut section = [0; 32];
         pages.read_exact(&mut section)?;
@@ -85,7 +85,7 @@ impl Packets {
                     }
                     let before = self.points;
                     let needed = self.decode();
-                    if needed > most_bytes {
+                    if needed > max_bytes {
                         self.points = before;
                         return Ok(Some(needed));
                     }

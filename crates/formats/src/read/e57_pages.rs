@@ -51,7 +51,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn checksums_are_passed_over() {
+    fn page_checksums_are_skipped() {
         let mut file = tempfile::tempfile().unwrap();
         let content: Vec<u8> = (0..5 * CONTENT_BYTES).map(|k| (k * 7 / 3) as u8).collect();
         for page in content.chunks(CONTENT_BYTES as usize) {

@@ -53,7 +53,7 @@ mod tests {
     }
 
     #[test]
-    fn files_come_as_people_count() {
+    fn files_are_in_natural_order() {
         assert_eq!(
             sorted(&["full10.pcd", "full2.pcd", "full1.pcd"]),
             ["full1.pcd", "full2.pcd", "full10.pcd"]

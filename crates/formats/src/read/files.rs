@@ -27,13 +27,13 @@ pub(crate) struct Files {
 /// Remarks on files. A remark that applies to several files appears once.
 #[derive(Clone, Default)]
 struct Remarks {
-    said: Vec<Said>,
+    remarks: Vec<FileRemark>,
     are_more: bool,
 }
 
 /// Remark on a file, or on the folder if `file` is empty, with the number of other files it applies to.
 #[derive(Clone)]
-struct Said {
+struct FileRemark {
     file: String,
     others: u64,
     remark: String,
@@ -41,24 +41,26 @@ struct Said {
 
 impl Remarks {
     fn add(&mut self, file: String, remark: String) {
-        if let Some(said) = self.said.iter_mut().find(|said| said.remark == remark && !said.file.is_empty()) {
-            said.others += 1;
-        } else if self.said.len() < MAX_REMARKS {
-            self.said.push(Said { file, others: 0, remark });
+        if let Some(remarks) =
+            self.remarks.iter_mut().find(|remarks| remarks.remark == remark && !remarks.file.is_empty())
+        {
+            remarks.others += 1;
+        } else if self.remarks.len() < MAX_REMARKS {
+            self.remarks.push(FileRemark { file, others: 0, remark });
         } else {
             self.are_more = true;
         }
     }
 
     fn lines(&self) -> Vec<String> {
-        let line = |Said { file, others, remark }: &Said| match (file.as_str(), others) {
+        let line = |FileRemark { file, others, remark }: &FileRemark| match (file.as_str(), others) {
             ("", _) => remark.clone(),
             (_, 0) => format!("{file}: {remark}"),
             (_, 1) => format!("{file} and another file: {remark}"),
             _ => format!("{file} and {others} other files: {remark}"),
         };
         let more = self.are_more.then(|| "there are more remarks on other files".to_owned());
-        self.said.iter().map(line).chain(more).collect()
+        self.remarks.iter().map(line).chain(more).collect()
     }
 }
 

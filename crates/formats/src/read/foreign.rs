@@ -8,7 +8,7 @@ pub(crate) struct Foreign {
     magic: &'static [&'static [u8]],
     extensions: &'static [&'static str],
     /// Advice to the user.
-    way: &'static str,
+    advice: &'static str,
 }
 
 impl Foreign {
@@ -16,7 +16,7 @@ impl Foreign {
     pub(crate) fn error(&self, path: &Path) -> Error {
         Error::argument(
             path.display().to_string(),
-            format!("is {}, which is not supported: {}", self.name, self.way),
+            format!("is {}, which is not supported: {}", self.name, self.advice),
         )
     }
 }
@@ -38,100 +38,105 @@ const FOREIGN: [Foreign; 27] = [
             b"\x0a\x0d\x0d\x0a",
         ],
         extensions: &["pcap", "pcapng"],
-        way: PACKETS,
+        advice: PACKETS,
     },
     Foreign {
         name: "HDF5",
         magic: &[b"\x89HDF\r\n\x1a\n"],
         extensions: &["h5", "hdf5"],
-        way: "write its clouds as PLY, .bin or CSV (Python: h5py)",
+        advice: "write its clouds as PLY, .bin or CSV (Python: h5py)",
     },
     Foreign {
         name: "a NumPy array",
         magic: &[b"\x93NUMPY"],
         extensions: &["npy"],
-        way: "write it as .bin, `array.astype('<f4').tofile(...)`, and give its columns with `fields`; only poses are \
+        advice: "write it as .bin, `array.astype('<f4').tofile(...)`, and give its columns with `fields`; only poses are \
               read from .npy",
     },
     Foreign {
         name: "one image",
         magic: &[b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff", b"II*\0", b"MM\0*"],
         extensions: &["png", "jpg", "jpeg", "tif", "tiff", "pgm"],
-        way: "use the folder of 16-bit depth PNGs as the input",
+        advice: "use the folder of 16-bit depth PNGs as the input",
     },
     Foreign {
         name: "a ZIP archive",
         magic: &[b"PK\x03\x04", b"PK\x05\x06"],
         extensions: &["zip", "npz"],
-        way: UNPACK,
+        advice: UNPACK,
     },
-    Foreign { name: "packed with gzip", magic: &[b"\x1f\x8b\x08"], extensions: &["gz", "tgz"], way: UNPACK },
+    Foreign {
+        name: "packed with gzip",
+        magic: &[b"\x1f\x8b\x08"],
+        extensions: &["gz", "tgz"],
+        advice: UNPACK,
+    },
     Foreign {
         name: "packed with Zstandard",
         magic: &[b"\x28\xb5\x2f\xfd"],
         extensions: &["zst"],
-        way: UNPACK,
+        advice: UNPACK,
     },
-    Foreign { name: "packed with bzip2", magic: &[b"BZh"], extensions: &["bz2"], way: UNPACK },
-    Foreign { name: "packed with xz", magic: &[b"\xfd7zXZ\0"], extensions: &["xz"], way: UNPACK },
-    Foreign { name: "packed with LZ4", magic: &[b"\x04\x22\x4d\x18"], extensions: &["lz4"], way: UNPACK },
-    Foreign { name: "a 7z archive", magic: &[b"7z\xbc\xaf\x27\x1c"], extensions: &["7z"], way: UNPACK },
-    Foreign { name: "a RAR archive", magic: &[b"Rar!"], extensions: &["rar"], way: UNPACK },
-    Foreign { name: "a tar archive", magic: &[], extensions: &["tar"], way: UNPACK },
-    Foreign { name: "a mesh (OBJ)", magic: &[], extensions: &["obj"], way: TO_CLOUD },
-    Foreign { name: "a mesh (STL)", magic: &[b"solid "], extensions: &["stl"], way: TO_CLOUD },
-    Foreign { name: "a mesh (OFF)", magic: &[b"OFF\n", b"COFF"], extensions: &["off"], way: TO_CLOUD },
-    Foreign { name: "a scene (glTF)", magic: &[b"glTF"], extensions: &["glb", "gltf"], way: TO_CLOUD },
-    Foreign { name: "a mesh (FBX)", magic: &[b"Kaydara FBX"], extensions: &["fbx"], way: TO_CLOUD },
+    Foreign { name: "packed with bzip2", magic: &[b"BZh"], extensions: &["bz2"], advice: UNPACK },
+    Foreign { name: "packed with xz", magic: &[b"\xfd7zXZ\0"], extensions: &["xz"], advice: UNPACK },
+    Foreign { name: "packed with LZ4", magic: &[b"\x04\x22\x4d\x18"], extensions: &["lz4"], advice: UNPACK },
+    Foreign { name: "a 7z archive", magic: &[b"7z\xbc\xaf\x27\x1c"], extensions: &["7z"], advice: UNPACK },
+    Foreign { name: "a RAR archive", magic: &[b"Rar!"], extensions: &["rar"], advice: UNPACK },
+    Foreign { name: "a tar archive", magic: &[], extensions: &["tar"], advice: UNPACK },
+    Foreign { name: "a mesh (OBJ)", magic: &[], extensions: &["obj"], advice: TO_CLOUD },
+    Foreign { name: "a mesh (STL)", magic: &[b"solid "], extensions: &["stl"], advice: TO_CLOUD },
+    Foreign { name: "a mesh (OFF)", magic: &[b"OFF\n", b"COFF"], extensions: &["off"], advice: TO_CLOUD },
+    Foreign { name: "a scene (glTF)", magic: &[b"glTF"], extensions: &["glb", "gltf"], advice: TO_CLOUD },
+    Foreign { name: "a mesh (FBX)", magic: &[b"Kaydara FBX"], extensions: &["fbx"], advice: TO_CLOUD },
     Foreign {
         name: "Parquet",
         magic: &[b"PAR1"],
         extensions: &["parquet"],
-        way: "write x, y, z and intensity as CSV (Python: pandas)",
+        advice: "write x, y, z and intensity as CSV (Python: pandas)",
     },
     Foreign {
         name: "a map (OctoMap)",
         magic: &[b"# Octomap OcTree"],
         extensions: &["bt", "ot"],
-        way: "it contains no clouds; convert it to a map with `voxtile import FILE -o MAP`, or use it directly with \
+        advice: "it contains no clouds; convert it to a map with `voxtile import FILE -o MAP`, or use it directly with \
               info, query, raycast and export",
     },
     Foreign {
         name: "OpenVDB",
         magic: &[b" BDV"],
         extensions: &["vdb"],
-        way: "it contains volumes, not clouds; write its points as PLY",
+        advice: "it contains volumes, not clouds; write its points as PLY",
     },
     Foreign {
         name: "a scanner manufacturer's project",
         magic: &[],
         extensions: &["rcp", "rcs", "fls", "zfs", "rdbx", "rxp", "lgs", "ptg", "ptx", "3dd"],
-        way: "export it as E57 or LAS with the manufacturer's software",
+        advice: "export it as E57 or LAS with the manufacturer's software",
     },
     Foreign {
         name: "a Livox recording",
         magic: &[b"livox_tech"],
         extensions: &["lvx", "lvx2"],
-        way: "export LAS or CSV with Livox Viewer, or record a .bag with the driver",
+        advice: "export LAS or CSV with Livox Viewer, or record a .bag with the driver",
     },
-    Foreign { name: "Ouster packets", magic: &[], extensions: &["osf"], way: PACKETS },
+    Foreign { name: "Ouster packets", magic: &[], extensions: &["osf"], advice: PACKETS },
     Foreign {
         name: "CloudCompare's own format",
         magic: &[b"CCB"],
         extensions: &["sbf", "bin2"],
-        way: "save it as PLY, LAS or E57 with CloudCompare",
+        advice: "save it as PLY, LAS or E57 with CloudCompare",
     },
     Foreign {
         name: "a point cloud for the web",
         magic: &[],
         extensions: &["pnts", "ept", "slpk"],
-        way: "use the LAZ or COPC file that it was created from",
+        advice: "use the LAZ or COPC file that it was created from",
     },
     Foreign {
         name: "an Excel or MATLAB table",
         magic: &[b"MATLAB 5.0"],
         extensions: &["mat", "xlsx", "xls"],
-        way: "save x, y, z and intensity as CSV",
+        advice: "save x, y, z and intensity as CSV",
     },
 ];
 
@@ -145,7 +150,7 @@ pub(crate) fn of_bytes(start: &[u8]) -> Option<&'static Foreign> {
 
 /// Returns the archive format with this signature, whatever the file's name.
 pub(crate) fn archive_of(start: &[u8]) -> Option<&'static Foreign> {
-    of_bytes(start).filter(|foreign| foreign.way == UNPACK)
+    of_bytes(start).filter(|foreign| foreign.advice == UNPACK)
 }
 
 /// Returns the unsupported format with this extension (lower case).
@@ -155,7 +160,7 @@ pub(crate) fn of_extension(extension: &str) -> Option<&'static Foreign> {
 
 /// Describes a placeholder or error page stored instead of the file, with advice.
 pub(crate) fn stand_in(start: &[u8]) -> Option<&'static str> {
-    let text = without_mark(start).trim_ascii_start();
+    let text = without_bom(start).trim_ascii_start();
     let starts =
         |word: &str| text.get(..word.len()).is_some_and(|start| start.eq_ignore_ascii_case(word.as_bytes()));
     if starts("version https://git-lfs.") || starts("version https://hawser.") {
@@ -193,7 +198,7 @@ pub(crate) fn text_encoding(start: &[u8]) -> Option<&'static str> {
 pub(crate) const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
 /// Strips a byte order mark.
-pub(crate) fn without_mark(start: &[u8]) -> &[u8] {
+pub(crate) fn without_bom(start: &[u8]) -> &[u8] {
     start.strip_prefix(BYTE_ORDER_MARK).unwrap_or(start)
 }
 
@@ -217,7 +222,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_stands_for_a_file_is_named() {
+    fn placeholders_are_reported() {
         for (start, what) in [
             (&b"version https://git-lfs.github.com/spec/v1\noid sha256:0\n"[..], "git lfs pull"),
             (b"version https://hawser.github.com/spec/v1\n", "git lfs pull"),
@@ -234,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn archives_are_named_one_by_one() {
+    fn each_archive_format_is_reported() {
         let tar = [&[b'a'; 257][..], b"ustar\x0000"].concat();
         for (start, name) in [
             (&b"PK\x03\x04"[..], "ZIP"),

@@ -58,7 +58,7 @@ mod tests {
 
     #[cfg(any(feature = "las", feature = "e57"))]
     #[test]
-    fn a_panic_is_an_error_with_its_place() {
+    fn panics_become_errors_with_their_location() {
         let inner = guarded(|| -> Result<(), String> {
             assert!(
                 guarded(|| -> Result<(), String> { panic!("inner") }).unwrap_err().contains("(guard.rs:")

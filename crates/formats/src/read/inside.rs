@@ -10,7 +10,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_names_below_are_inside() {
+    fn only_descendants_are_inside() {
         for (name, wanted) in
             [("a.png", true), ("./depth/a..png", true), ("/a", false), ("../a", false), ("a/../../b", false)]
         {

@@ -74,8 +74,8 @@ impl Intrinsics {
     }
 
     /// Finds the camera of a folder: the given file, a file in the folder, or one in its parent.
-    pub(super) fn find(folder: &Path, asked: Option<&Path>) -> Result<Self> {
-        if let Some(path) = asked {
+    pub(super) fn find(folder: &Path, given: Option<&Path>) -> Result<Self> {
+        if let Some(path) = given {
             return Self::read(path);
         }
         let folders: Vec<PathBuf> =

@@ -66,9 +66,9 @@ pub(super) fn settle(path: &Path, file: &mut File, layout: &mut Layout) -> Resul
             layout.points = room;
             remark = Some(format!("the header announces {announced} points; {room} exist and are read"));
         } else {
-            let behind = room - announced;
+            let extra = room - announced;
             remark = Some(format!(
-                "the header announces {announced} points, which are read; the file has space for {behind} more after \
+                "the header announces {announced} points, which are read; the file has space for {extra} more after \
                  them"
             ));
         }
@@ -117,7 +117,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn of_two_numbers_the_one_that_fits_counts() {
+    fn fitting_count_is_chosen() {
         let counts = |legacy, large| Counts { legacy, large };
         for (numbers, [low, high], chosen) in [
             (counts(100, None), [0, 50], 100),

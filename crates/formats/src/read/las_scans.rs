@@ -197,7 +197,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_time_that_begins_a_window_is_in_it() {
+    fn window_start_times_are_in_their_window() {
         // In floating point, a window is not exactly a tenth of a second.
         for window in 0..10_000 {
             let first_s = 1_000_000_000.05_f64;

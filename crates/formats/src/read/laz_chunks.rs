@@ -142,10 +142,10 @@ impl ChunkReader<'_> {
         let data_at = layout.points_at + TABLE_PLACE_BYTES;
         let chunks = number(&bytes_at(self.path, &mut self.input, table_at, 8)?, 4, 4);
         // Each chunk begins with an uncompressed point.
-        let most_chunks = (table_at - data_at.min(table_at)) / self.point_bytes().max(1) + 1;
-        if chunks > most_chunks {
+        let max_chunks = (table_at - data_at.min(table_at)) / self.point_bytes().max(1) + 1;
+        if chunks > max_chunks {
             let reason =
-                format!("the chunk table lists {chunks} chunks, but there is only space for {most_chunks}");
+                format!("the chunk table lists {chunks} chunks, but there is only space for {max_chunks}");
             return Err(self.wrong(table_at + 4, reason));
         }
         if chunks.saturating_mul(size_of::<ChunkTableEntry>() as u64)

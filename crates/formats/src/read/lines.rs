@@ -176,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_end_as_on_any_system() {
+    fn line_ends_of_all_systems_are_accepted() {
         let read = |text: &'static [u8]| {
             // A buffer of two bytes may split a line end.
             let mut lines = Lines::new(Path::new("a"), BufReader::with_capacity(2, text), 0);
@@ -190,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn text_in_another_encoding_is_named() {
+    fn text_in_another_encoding_is_reported() {
         for text in [&b"\xff\xfe1\0 \0"[..], b"\xfe\xff\x001", b"1\0 \x002\0\r\0\n\0"] {
             let mut lines = Lines::new(Path::new("a"), text, 0);
             let error = format!("{:#}", lines.next().unwrap_err());

@@ -1,4 +1,4 @@
-use super::aside::{self, Texts};
+use super::companions::{self, Texts};
 use super::foreign;
 use super::intrinsics::Intrinsics;
 use crate::input_format::InputFormat;
@@ -45,7 +45,7 @@ impl Listing {
 
     /// Returns the files that may be clouds by their names.
     pub(crate) fn clouds(&self) -> impl Iterator<Item = &PathBuf> {
-        self.files.iter().filter(|path| !aside::is_surely_named(path))
+        self.files.iter().filter(|path| !companions::is_surely_named(path))
     }
 
     /// Returns the files of a format.
@@ -55,7 +55,7 @@ impl Listing {
 
     /// Returns the files of a text format, separated into clouds and others such as lists, logs and cameras.
     pub(crate) fn texts(&self, format: &InputFormat) -> Texts {
-        aside::sort_out(self.with_extension(format))
+        companions::sort_out(self.with_extension(format))
     }
 
     /// Returns whether there are images named as depth, or a camera file.
@@ -65,7 +65,7 @@ impl Listing {
 
     /// Explains why a folder has no clouds and suggests where they may be. `others` describes its other text files.
     pub(crate) fn why_nothing(&self, known: &str, others: &[String]) -> String {
-        if let Some(list) = self.files.iter().find_map(|path| aside::depth_list_of(path)) {
+        if let Some(list) = self.files.iter().find_map(|path| companions::depth_list_of(path)) {
             return list;
         }
         let foreign = self.files.iter().find_map(|path| {

@@ -105,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn more_than_the_window() {
+    fn copies_reach_across_the_window() {
         // The bytes 0 to 31, then repeated copies at the maximum distance.
         let mut packed: Vec<u8> = Vec::new();
         let mut expected: Vec<u8> = Vec::new();

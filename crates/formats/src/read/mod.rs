@@ -3,11 +3,11 @@
 //! Each format is a [`CloudSource`]: files with one cloud (PLY, text, `.bin`), files with several (LAS split by GPS
 //! time, E57), and folders of either.
 
-mod aside;
 pub(crate) mod bin;
 mod bin_columns;
 pub(crate) mod cloud;
 mod columns;
+mod companions;
 #[cfg(any(feature = "las", feature = "e57"))]
 mod crs_unit;
 pub(crate) mod depth;
@@ -54,7 +54,6 @@ mod laz_chunks;
 mod laz_head;
 #[cfg(feature = "las")]
 mod laz_points;
-mod left_out;
 pub(crate) mod lines;
 pub(crate) mod listing;
 mod lzf;
@@ -72,6 +71,7 @@ mod scalar;
 pub(crate) mod scan_graph;
 pub(crate) mod scan_log;
 pub(crate) mod scan_stream;
+mod skipped_rows;
 pub(crate) mod stamp;
 mod stream_input;
 pub(crate) mod text;

@@ -22,9 +22,9 @@ pub fn in_name(path: &Path) -> Option<i64> {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct NameStamps {
     /// Meaning of the digits after a point.
-    behind_point: Part,
+    after_point: Part,
     /// Meaning of the digits after `_` or `-`.
-    behind_dash: Option<Part>,
+    after_dash: Option<Part>,
 }
 
 /// Meaning of the digits after whole seconds.
@@ -50,14 +50,14 @@ impl NameStamps {
     pub(crate) fn of(files: &[PathBuf]) -> Self {
         let names = || files.iter().filter_map(|path| parted(stem_of(path)?));
         Self {
-            behind_point: Widths::of(names().filter(|name| name.is_behind_point)).behind_point(),
-            behind_dash: Widths::of(names().filter(|name| !name.is_behind_point)).behind_dash(),
+            after_point: Widths::of(names().filter(|name| name.is_behind_point)).after_point(),
+            after_dash: Widths::of(names().filter(|name| !name.is_behind_point)).after_dash(),
         }
     }
 
     /// Returns whether the digits after a point are an integer instead of decimals.
     pub(crate) fn are_whole(self) -> bool {
-        self.behind_point != Part::Decimals
+        self.after_point != Part::Decimals
     }
 
     /// Returns the properties of a cloud that are known from its file name.
@@ -67,7 +67,7 @@ impl NameStamps {
 
     /// Returns a remark for the user about an unusual encoding.
     pub(crate) fn remark(self) -> Option<String> {
-        let unit = match self.behind_point {
+        let unit = match self.after_point {
             Part::Decimals => return None,
             Part::Whole { digits: 0 } => "nanoseconds",
             Part::Whole { .. } => "microseconds",
@@ -82,8 +82,8 @@ impl NameStamps {
         let stem = stem_of(path)?;
         if let Some(Parted { seconds, part, is_behind_point }) = parted(stem) {
             let sure = Part::Whole { digits: 0 };
-            let kind = match self.behind_dash {
-                _ if is_behind_point => Some(self.behind_point),
+            let kind = match self.after_dash {
+                _ if is_behind_point => Some(self.after_point),
                 None => (part.len() == NANOSECOND_DIGITS).then_some(sure),
                 known => known,
             };
@@ -191,7 +191,7 @@ impl Widths {
     /// Decimals have equal widths, or are shorter where trailing zeros are omitted. `sec.nsec` and `sec.usec` without
     /// leading zeros have different widths and never start with 0. A double cannot hold nine decimals of current Unix
     /// time.
-    fn behind_point(&self) -> Part {
+    fn after_point(&self) -> Part {
         match self.most {
             _ if !self.differ() || self.has_zero_start => Part::Decimals,
             NANOSECOND_DIGITS => Part::Whole { digits: 0 },
@@ -201,7 +201,7 @@ impl Widths {
     }
 
     /// The number after `_` or `-` may be a counter.
-    fn behind_dash(&self) -> Option<Part> {
+    fn after_dash(&self) -> Option<Part> {
         match self.most {
             NANOSECOND_DIGITS => Some(Part::Whole { digits: 0 }),
             _ if !self.starts_again => None,
@@ -228,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn names_that_are_numbers_are_stamps_and_counters_are_not() {
+    fn numeric_names_are_stamps_except_counters() {
         let stamps = [
             ("1700000000123456789.bin", 1_700_000_000_123_456_789),
             ("1403636579.763555.ply", 1_403_636_579_763_555_000),
@@ -257,7 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn nanoseconds_without_leading_zeros_are_known_by_the_other_names() {
+    fn nanoseconds_without_leading_zeros_are_detected_by_other_names() {
         let names = ["1500000000.5000000.pcd", "1500000000.120000000.pcd", "1500000001.70000000.pcd"];
         assert_eq!(together(&names), [Some(5_000_000), Some(120_000_000), Some(1_070_000_000)]);
         let dashed = names.map(|name| name.replacen('.', "-", 1));

@@ -1,11 +1,11 @@
 use super::columns::Meaning;
 use super::input_file::open_input;
-use super::left_out::LeftOut;
 use super::lines::{Extent, RawLines};
 use super::lzf;
 use super::one::{Points, Visit};
 use super::pcd_header::{Encoding, Header, MAX_HEADER_BYTES};
 use super::regular::check_regular;
+use super::skipped_rows::SkippedRows;
 use super::text_line;
 use crate::scans::SensorScan;
 use crate::{Budget, CloudHead, CloudPoint, RigidPose};
@@ -69,7 +69,7 @@ struct PcdPoints<R> {
     file_bytes: u64,
     /// Memory budget for decompressed data.
     budget: Budget,
-    left_out: LeftOut,
+    skipped_rows: SkippedRows,
 }
 
 /// Reads the header and seeks to the points.
@@ -93,8 +93,8 @@ fn begin<R: BufRead + Seek>(
         Err(error) if is_pose_needed => return Err(error.in_input(path)),
         pose => pose.unwrap_or_default(),
     };
-    let (path, budget, left_out) = (path.to_owned(), budget.clone(), LeftOut::default());
-    Ok((head, PcdPoints { path, header, columns, input, file_bytes, budget, left_out }))
+    let (path, budget, skipped_rows) = (path.to_owned(), budget.clone(), SkippedRows::default());
+    Ok((head, PcdPoints { path, header, columns, input, file_bytes, budget, skipped_rows }))
 }
 
 impl<R: BufRead + Seek + Send> Points for PcdPoints<R> {
@@ -103,7 +103,7 @@ impl<R: BufRead + Seek + Send> Points for PcdPoints<R> {
     }
 
     fn remarks(&self) -> Vec<String> {
-        self.columns.meaning.remark().into_iter().chain(self.left_out.remark()).collect()
+        self.columns.meaning.remark().into_iter().chain(self.skipped_rows.remark()).collect()
     }
 }
 
@@ -117,7 +117,7 @@ impl<R: BufRead> PcdPoints<R> {
     }
 
     fn visit_ascii(&mut self, visit: Visit<'_>) -> Result<()> {
-        let Self { path, header, columns, input, left_out, .. } = self;
+        let Self { path, header, columns, input, skipped_rows, .. } = self;
         let wrong = |line: u64, reason: String| FormatError::at_line(line, reason).in_input(path);
         let mut lines = RawLines::new(input, MAX_LINE_BYTES);
         let (mut number, mut visited) = (header.data_line, 0_u64);
@@ -163,10 +163,10 @@ impl<R: BufRead> PcdPoints<R> {
                     visited += 1;
                     visit(point)?;
                 }
-                Err(reason) => left_out.add(number, reason),
+                Err(reason) => skipped_rows.add(number, reason),
             }
         }
-        match left_out.error() {
+        match skipped_rows.error() {
             Some(error) if visited == 0 => Err(error.in_input(path)),
             _ => Ok(()),
         }

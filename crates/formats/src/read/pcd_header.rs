@@ -1,4 +1,4 @@
-use super::foreign::without_mark;
+use super::foreign::without_bom;
 use crate::RigidPose;
 use voxtile::FormatError;
 use voxtile::scan::Pose;
@@ -82,7 +82,7 @@ impl Header {
     /// The header is invalid; the error gives the line.
     pub(super) fn parse(file: &[u8]) -> Result<Self> {
         let mut entries: Vec<(String, Vec<String>, u64)> = Vec::new();
-        let (mut at, mut line_number) = (file.len() - without_mark(file).len(), 0);
+        let (mut at, mut line_number) = (file.len() - without_bom(file).len(), 0);
         let end = line_end(file);
         loop {
             line_number += 1;

@@ -1,12 +1,12 @@
 use super::cloud::CloudHead;
 use super::columns::{Clock, Meaning};
 use super::input_file::open_input;
-use super::left_out::LeftOut;
 use super::lines::Lines;
 use super::one::{Points, Visit};
 use super::ply_header::{Element, Encoding, Header};
 use super::ply_rows::{PlyRows, Row};
 use super::scalar::Scalar;
+use super::skipped_rows::SkippedRows;
 use crate::read_options::ReadOptions;
 use std::fs::File;
 use std::io::{self, BufReader, Read};
@@ -21,7 +21,7 @@ struct PlyPoints {
     vertices: usize,
     meaning: Meaning,
     clock: Clock,
-    left_out: LeftOut,
+    skipped_rows: SkippedRows,
 }
 
 /// Opens a PLY file and reads its header.
@@ -45,9 +45,9 @@ pub(crate) fn open(
     head.fields = names;
     head.has_intensities = meaning.intensity.is_some();
     head.has_times = meaning.time.is_some();
-    let (clock, left_out) = (Clock::new(head.stamp_ns), LeftOut::default());
+    let (clock, skipped_rows) = (Clock::new(head.stamp_ns), SkippedRows::default());
     let (path, input) = (path.to_owned(), Some(input));
-    Ok((head, Box::new(PlyPoints { path, header, input, vertices, meaning, clock, left_out })))
+    Ok((head, Box::new(PlyPoints { path, header, input, vertices, meaning, clock, skipped_rows })))
 }
 
 impl Points for PlyPoints {
@@ -64,7 +64,7 @@ impl Points for PlyPoints {
         let comment = self.header.unit.as_ref().filter(|_| units.is_none()).map(|(line, comment)| {
             format!("line {line} contains `{comment:.60}`, but coordinates are read as metres")
         });
-        units.into_iter().chain(comment).chain(self.left_out.remark()).collect()
+        units.into_iter().chain(comment).chain(self.skipped_rows.remark()).collect()
     }
 }
 
@@ -91,14 +91,14 @@ impl PlyPoints {
                         let value = |at: usize| values.get(at).copied().unwrap_or(f64::NAN);
                         visit(self.clock.point(&meaning, value))?;
                     }
-                    Row::Unread(line, reason) => self.left_out.add(line, reason),
+                    Row::Unread(line, reason) => self.skipped_rows.add(line, reason),
                 }
             }
         }
         if rows.are_wrapped() {
             rows.check_end()?;
         }
-        match self.left_out.error() {
+        match self.skipped_rows.error() {
             Some(error) if visited == 0 => Err(error.in_input(&self.path)),
             _ => Ok(()),
         }

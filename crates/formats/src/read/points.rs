@@ -1,5 +1,5 @@
 use super::columns::Meaning;
-use super::foreign::{text_encoding, without_mark};
+use super::foreign::{text_encoding, without_bom};
 use super::lines::{Extent, MAX_LINE_BYTES, RawLines};
 use super::text_header::names_of;
 use super::text_line::{Separator, comment_of, digits_behind_comma};
@@ -28,7 +28,7 @@ pub fn read_points(input: impl BufRead) -> io::Result<Result<Vec<Point>, FormatE
             if let Some(encoding) = text_encoding(bytes) {
                 return wrong(encoding.to_owned());
             }
-            bytes = without_mark(bytes);
+            bytes = without_bom(bytes);
         }
         let text =
             str::from_utf8(bytes).map_err(|error| io::Error::new(io::ErrorKind::InvalidData, error))?;
@@ -63,7 +63,7 @@ fn point_of(line: &str, meaning: &Meaning) -> Option<Point> {
     if digits_behind_comma(separator, &cells).is_some() {
         return None;
     }
-    if separator == Separator::Mark(',') {
+    if separator == Separator::Char(',') {
         // Blanks separate cells too: `1, 2 3`.
         cells = cells.into_iter().flat_map(str::split_ascii_whitespace).collect();
     }
@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn points_of_many_programs() {
+    fn points_of_many_programs_are_read() {
         let wanted = vec![[1.5, 2.25, -3.0], [4.0, 5.0, 6.0]];
         for text in [
             "1.5 2.25 -3\n4 5 6\n",

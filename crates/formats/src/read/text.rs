@@ -1,9 +1,9 @@
 use super::cloud::{CloudHead, CloudPoint};
-use super::foreign::{text_encoding, without_mark};
+use super::foreign::{text_encoding, without_bom};
 use super::glance::GLANCE_BYTES;
-use super::left_out::LeftOut;
 use super::lines::{Lines, MAX_LINE_BYTES, RawLines};
 use super::one::{Points, Visit};
+use super::skipped_rows::SkippedRows;
 use super::text_columns::{Columns, Line};
 use crate::read_options::ReadOptions;
 use std::path::Path;
@@ -13,7 +13,7 @@ use voxtile::{FormatError, Result};
 struct TextPoints {
     lines: Lines,
     columns: Columns,
-    left_out: LeftOut,
+    skipped_rows: SkippedRows,
     /// The point that determined the columns.
     first: Option<CloudPoint>,
     is_at_end: bool,
@@ -32,12 +32,12 @@ pub(crate) fn check_start(start: &[u8], is_named: bool) -> std::result::Result<(
         return Err("it contains zero bytes, so it is not a text file".to_owned());
     }
     let is_cut = start.len() as u64 == GLANCE_BYTES;
-    let mut text = without_mark(start);
+    let mut text = without_bom(start);
     if is_cut && let Some(end) = text.iter().rposition(|byte| matches!(byte, b'\n' | b'\r')) {
         text = text.get(..end).unwrap_or(text);
     }
-    let (mut lines, mut columns, mut left_out) =
-        (RawLines::new(text, MAX_LINE_BYTES), Columns::default(), LeftOut::default());
+    let (mut lines, mut columns, mut skipped_rows) =
+        (RawLines::new(text, MAX_LINE_BYTES), Columns::default(), SkippedRows::default());
     let at_line = |(line, reason): (u64, String)| format!("line {line}: {reason}");
     for number in 1.. {
         // Reading from memory does not fail.
@@ -48,14 +48,14 @@ pub(crate) fn check_start(start: &[u8], is_named: bool) -> std::result::Result<(
             Line::Point(_) if is_named || columns.are_named() || columns.are_numbers() => return Ok(()),
             Line::Point(_) => return Err(format!("line {number}: there are words between the numbers")),
             Line::Nothing => {}
-            Line::Unread(reason) => left_out.add(number, reason),
+            Line::Unread(reason) => skipped_rows.add(number, reason),
         }
     }
     if let Some(wrong) = columns.why_none() {
         return Err(at_line(wrong));
     }
     // A text with column names but no points yet, or one that starts with long comments.
-    match left_out.error() {
+    match skipped_rows.error() {
         None if columns.are_named() || (is_named && is_cut) => Ok(()),
         Some(error) => Err(error.to_string()),
         None => Err("no line has three or more numbers or column names with x, y and z".to_owned()),
@@ -68,16 +68,16 @@ pub(crate) fn open(
     mut head: CloudHead,
     _: &ReadOptions,
 ) -> Result<(CloudHead, Box<dyn Points>)> {
-    let (columns, left_out) = (Columns::default(), LeftOut::default());
+    let (columns, skipped_rows) = (Columns::default(), SkippedRows::default());
     let mut points =
-        TextPoints { lines: Lines::open(path)?, columns, left_out, first: None, is_at_end: false };
+        TextPoints { lines: Lines::open(path)?, columns, skipped_rows, first: None, is_at_end: false };
     points.columns.clock = super::columns::Clock::new(head.stamp_ns);
     points.first = points.next()?;
     if points.first.is_none() {
         if let Some((line, reason)) = points.columns.why_none() {
             return Err(FormatError::at_line(line, reason).in_input(path));
         }
-        if let Some(error) = points.left_out.error() {
+        if let Some(error) = points.skipped_rows.error() {
             return Err(error.in_input(path));
         }
         if !points.columns.are_named() {
@@ -99,7 +99,7 @@ impl TextPoints {
             match self.columns.take(number, &line) {
                 Ok(Line::Point(point)) => return Ok(Some(point)),
                 Ok(Line::Nothing) => {}
-                Ok(Line::Unread(reason)) => self.left_out.add(number, reason),
+                Ok(Line::Unread(reason)) => self.skipped_rows.add(number, reason),
                 Err((line, reason)) => return Err(self.lines.error_at(line, reason)),
             }
         }
@@ -121,6 +121,6 @@ impl Points for TextPoints {
 
     fn remarks(&self) -> Vec<String> {
         let last = self.columns.last_remark().filter(|_| self.is_at_end);
-        self.columns.remarks().into_iter().chain(self.left_out.remark()).chain(last).collect()
+        self.columns.remarks().into_iter().chain(self.skipped_rows.remark()).chain(last).collect()
     }
 }

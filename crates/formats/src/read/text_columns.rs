@@ -2,7 +2,7 @@
 
 use super::cloud::CloudPoint;
 use super::columns::{Clock, Meaning};
-use super::text_header::{are_poses, asked_separator, names_of, unit_of_comment, units_row};
+use super::text_header::{are_poses, names_of, requested_separator, unit_of_comment, units_row};
 use super::text_line::{Separator, comment_of, digits_behind_comma, without_end};
 
 /// Meaning of a line.
@@ -24,7 +24,7 @@ pub(super) struct Columns {
     pub(super) clock: Clock,
     pub(super) names: Vec<String>,
     separator: Separator,
-    asked: Option<Separator>,
+    requested: Option<Separator>,
     are_named: bool,
     meaning: Option<Meaning>,
     has_points: bool,
@@ -110,7 +110,7 @@ impl Columns {
         let text = line.trim();
         if text.is_empty() {
             // A row of empty cells may consist of tabs only.
-            let is_row = self.has_points && self.separator == Separator::Mark('\t') && line.contains('\t');
+            let is_row = self.has_points && self.separator == Separator::Char('\t') && line.contains('\t');
             return Ok(if is_row { self.row(line) } else { Line::Nothing });
         }
         if let Some(comment) = comment_of(text) {
@@ -122,8 +122,8 @@ impl Columns {
         if self.has_points {
             return Ok(self.row(line));
         }
-        if let Some(separator) = asked_separator(text).filter(|_| self.lines_before == 0) {
-            self.asked = Some(separator);
+        if let Some(separator) = requested_separator(text).filter(|_| self.lines_before == 0) {
+            self.requested = Some(separator);
             return Ok(Line::Nothing);
         }
         let found = self.begin(number, line).map_err(|reason| {
@@ -153,7 +153,7 @@ impl Columns {
 
     /// Parses a line before the first point.
     fn begin(&mut self, number: u64, line: &str) -> Result<Line, String> {
-        let separator = self.asked.unwrap_or_else(|| Separator::of_row(line, self.names.len()));
+        let separator = self.requested.unwrap_or_else(|| Separator::of_row(line, self.names.len()));
         let cells = separator.split(line);
         // PTS starts with a point count.
         if let [only] = without_end(&cells)
@@ -219,7 +219,7 @@ impl Columns {
         }
         self.separator = separator;
         let columns = without_end(cells).len();
-        if separator == Separator::Mark(',') && columns == 2 * self.names.len() {
+        if separator == Separator::Char(',') && columns == 2 * self.names.len() {
             return Err(ambiguous_commas(columns, &format!("there are {} column names", self.names.len())));
         }
         let is_one_more = columns == self.names.len() + 1 && line.trim_start().starts_with('"');
@@ -349,7 +349,7 @@ mod tests {
     }
 
     #[test]
-    fn names_and_marks_of_many_programs() {
+    fn names_and_separators_of_many_programs() {
         let wanted = CloudPoint { intensity: 7.0, ..CloudPoint::hit([1.0, 2.0, 3.0]) };
         for text in [
             "1 2 3 7",
@@ -383,7 +383,7 @@ mod tests {
     }
 
     #[test]
-    fn a_colour_is_no_intensity_and_an_empty_cell_is_no_return() {
+    fn colours_are_not_intensities_and_empty_cells_are_not_returns() {
         assert_eq!(read("1 2 3 255 0 0"), Ok(vec![CloudPoint::hit([1.0, 2.0, 3.0])]));
         let points = read("x,y,z,time\n,,,5\nnan,nan,nan,5\n,,,").unwrap_or_default();
         assert_eq!(points.iter().map(|point| point.is_return).collect::<Vec<_>>(), [false; 3]);
@@ -401,7 +401,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_that_are_no_points_are_left_out() {
+    fn invalid_rows_are_skipped() {
         for (text, reason) in [
             ("x y z intensity\n1 2 3\n1 2 3 4", "line 2: 3 columns, but 4 are needed"),
             ("1 2 3\n1 2 c\n4 5 6", "line 2: `c` is not a number"),
@@ -415,7 +415,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_text_of_points_is_an_error_with_line_and_word() {
+    fn invalid_texts_are_errors_with_line_and_word() {
         for (text, reason) in [
             ("# a\nhello world", "line 2: `hello world` is neither numbers nor column names"),
             ("Exported\n1 2 3", "line 1: `Exported` is neither"),
@@ -432,7 +432,7 @@ mod tests {
     }
 
     #[test]
-    fn guesses_are_said() {
+    fn guesses_are_remarked() {
         for (text, remark) in [
             ("1 2 3 7", "4 columns without names: x y z intensity"),
             ("1 2 3 7 255 0 0", "7 columns without names: x y z intensity, the others are ignored"),
@@ -453,7 +453,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_of_points_stand_before_each_scan() {
+    fn point_counts_precede_each_scan() {
         for (text, points, remark) in [
             ("2\n1 2 3\n4 5 6\n", 2, None),
             ("2\n1 2 3\n4 5 6\n1\n7 8 9\n", 3, Some("2 scans, each with a point count")),
@@ -462,9 +462,9 @@ mod tests {
         ] {
             let (found, columns, unread) = read_all(text).unwrap_or_else(|error| panic!("{error}"));
             assert_eq!((found.len(), unread.len()), (points, 0), "{text}");
-            let said = columns.last_remark();
-            assert_eq!(said.is_some(), remark.is_some(), "{text}: {said:?}");
-            assert!(said.is_none_or(|said| said.contains(remark.unwrap_or_default())), "{text}");
+            let found = columns.last_remark();
+            assert_eq!(found.is_some(), remark.is_some(), "{text}: {found:?}");
+            assert!(found.is_none_or(|found| found.contains(remark.unwrap_or_default())), "{text}");
         }
     }
 }

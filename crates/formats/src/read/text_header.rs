@@ -6,7 +6,7 @@ use super::units::LengthUnit;
 
 /// Splits a line into column names.
 pub(super) fn names_of(line: &str) -> Vec<String> {
-    let tab = Separator::Mark('\t');
+    let tab = Separator::Char('\t');
     let has_tabs = line.trim().contains('\t') && !tab.split(line.trim()).contains(&"");
     let separator = if has_tabs { tab } else { Separator::of(line) };
     let cells = separator.split(line);
@@ -31,10 +31,10 @@ fn is_open(name: &str) -> bool {
 }
 
 /// Returns the separator requested by a first line `sep=;`, as in Excel.
-pub(super) fn asked_separator(line: &str) -> Option<Separator> {
+pub(super) fn requested_separator(line: &str) -> Option<Separator> {
     let lower = line.trim().trim_matches('"').to_ascii_lowercase();
     let mut mark = lower.strip_prefix("sep=")?.chars();
-    let separator = mark.next().map_or(Separator::Mark('\t'), Separator::Mark);
+    let separator = mark.next().map_or(Separator::Char('\t'), Separator::Char);
     mark.next().is_none().then_some(separator)
 }
 
@@ -73,7 +73,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_are_those_of_columns() {
+    fn column_names_are_split() {
         for (line, wanted) in [
             ("x y z", vec!["x", "y", "z"]),
             ("x (cm) y [cm] z (cm) t", vec!["x (cm)", "y [cm]", "z (cm)", "t"]),
@@ -88,10 +88,10 @@ mod tests {
     }
 
     #[test]
-    fn units_and_separators_before_points() {
-        assert_eq!(asked_separator("sep=;"), Some(Separator::Mark(';')));
-        assert_eq!(asked_separator("\"SEP=,\""), Some(Separator::Mark(',')));
-        assert_eq!(asked_separator("separate"), None);
+    fn units_and_separators_are_detected() {
+        assert_eq!(requested_separator("sep=;"), Some(Separator::Char(';')));
+        assert_eq!(requested_separator("\"SEP=,\""), Some(Separator::Char(',')));
+        assert_eq!(requested_separator("separate"), None);
         let meaning = Meaning::of_metres([1, 2, 3]);
         assert_eq!(units_row(&["s", "[mm]", "(mm)", "mm"], &meaning).map(|units| units[0].name), Some("mm"));
         assert_eq!(units_row(&["s", "px", "px", "px"], &meaning), None);

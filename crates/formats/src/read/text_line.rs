@@ -7,7 +7,7 @@ pub(crate) enum Separator {
     #[default]
     Blank,
     /// A character. Cells between two separators may be empty.
-    Mark(char),
+    Char(char),
 }
 
 impl Separator {
@@ -16,17 +16,17 @@ impl Separator {
     pub(crate) fn of(line: &str) -> Self {
         let has = |mark: char| is_outside_quotes(line, mark);
         if let Some(mark) = [';', '|'].into_iter().find(|mark| has(*mark)) {
-            return Self::Mark(mark);
+            return Self::Char(mark);
         }
         let is_decimal = |word: &str| Self::Blank.number(word).is_some() && !word.starts_with(',');
         let mut words = line.split_ascii_whitespace();
         let are_decimals = words.clone().count() > 1 && words.all(is_decimal);
-        if has(',') && !are_decimals { Self::Mark(',') } else { Self::Blank }
+        if has(',') && !are_decimals { Self::Char(',') } else { Self::Blank }
     }
 
     /// Detects the separator of a table row: tabs, if they give the expected number of columns.
     pub(crate) fn of_row(line: &str, columns: usize) -> Self {
-        let tab = Self::Mark('\t');
+        let tab = Self::Char('\t');
         if line.contains('\t') && tab.split(line).len() == columns { tab } else { Self::of(line) }
     }
 
@@ -40,7 +40,7 @@ impl Separator {
                 .filter(|cell| !cell.is_empty())
                 .map(cell_of)
                 .collect(),
-            Self::Mark(mark) => {
+            Self::Char(mark) => {
                 let mut line = line.trim_matches(|letter: char| letter.is_whitespace() && letter != mark);
                 // Rows of Markdown and of some databases begin and end with a bar.
                 if mark == '|' && line.starts_with(mark) {
@@ -63,7 +63,7 @@ impl Separator {
         }
         let (whole, fraction) = cell.split_once(',')?;
         // In a comma-separated line, a cell with a comma was quoted. Three digits after the comma may be thousands.
-        let may_be_thousands = self == Self::Mark(',') && fraction.len() == 3;
+        let may_be_thousands = self == Self::Char(',') && fraction.len() == 3;
         let is_fraction = fraction.starts_with(|first: char| first.is_ascii_digit());
         if may_be_thousands || !is_fraction || whole.contains('.') || fraction.contains([',', '.']) {
             return None;
@@ -83,7 +83,7 @@ pub(super) fn digits_behind_comma<'c>(separator: Separator, cells: &[&'c str]) -
     let is_integer =
         |cell: &str| !cell.is_empty() && cell.trim_start_matches('-').bytes().all(|b| b.is_ascii_digit());
     let cells = without_end(cells);
-    if separator != Separator::Mark(',')
+    if separator != Separator::Char(',')
         || !cells.len().is_multiple_of(2)
         || !cells.iter().all(|cell| is_integer(cell))
     {
@@ -148,11 +148,11 @@ fn is_outside_quotes(line: &str, mark: char) -> bool {
 }
 
 /// Splits a line at separators that are not within double quotes.
-fn split_unquoted(line: &str, is_mark: impl Fn(char) -> bool) -> Vec<&str> {
+fn split_unquoted(line: &str, is_separator: impl Fn(char) -> bool) -> Vec<&str> {
     let mut is_quoted = false;
     line.split(|letter: char| {
         is_quoted ^= letter == '"';
-        !is_quoted && is_mark(letter)
+        !is_quoted && is_separator(letter)
     })
     .collect()
 }
@@ -162,8 +162,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lines_of_many_programs_are_parted() {
-        let mark = Separator::Mark;
+    fn lines_of_many_programs_are_split() {
+        let mark = Separator::Char;
         for (line, separator, cells) in [
             ("1 2\t 3", Separator::Blank, vec!["1", "2", "3"]),
             ("1, 2 ,3,", mark(','), vec!["1", "2", "3", ""]),
@@ -188,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_of_many_programs() {
+    fn numbers_of_many_programs_are_parsed() {
         for (word, wanted) in [
             ("1.5", Some(1.5)),
             ("-.5e1", Some(-5.0)),
@@ -226,8 +226,8 @@ mod tests {
     }
 
     #[test]
-    fn decimal_commas_count_where_commas_part_no_cells() {
-        let semicolon = Separator::Mark(';');
+    fn decimal_commas_are_accepted_if_commas_are_not_separators() {
+        let semicolon = Separator::Char(';');
         for (separator, cell, wanted) in [
             (semicolon, "1,5", Some(1.5)),
             (semicolon, "-1,250", Some(-1.25)),
@@ -235,9 +235,9 @@ mod tests {
             (Separator::Blank, "0,25", Some(0.25)),
             (semicolon, "1.234,5", None),
             (semicolon, "1,234,567", None),
-            (Separator::Mark(','), "1,25", Some(1.25)),
+            (Separator::Char(','), "1,25", Some(1.25)),
             // Possibly thousands.
-            (Separator::Mark(','), "1,250", None),
+            (Separator::Char(','), "1,250", None),
         ] {
             assert_eq!(separator.number(cell), wanted, "{cell}");
         }

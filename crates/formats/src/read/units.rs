@@ -142,7 +142,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_are_parted_from_units() {
+    fn names_are_split_from_units() {
         for (name, wanted, unit) in [
             ("x (cm)", "x", Some("cm")),
             ("X[mm]", "x", Some("mm")),
@@ -165,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn lengths_become_metres() {
+    fn lengths_are_converted_to_metres() {
         for (name, number, metres) in [
             ("cm", 7.0, 0.07),
             ("millimetres", 1234.0, 1.234),

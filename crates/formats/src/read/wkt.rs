@@ -109,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn the_unit_of_the_projection_is_not_that_of_its_ellipsoid() {
+    fn projection_unit_is_not_the_ellipsoid_unit() {
         let projection = "PROJCS[\"a, [b]\",GEOGCS[\"c\",DATUM[\"d\",SPHEROID[\"e\",6378137,298.25]],\
                           UNIT[\"degree\",0.0174]],PARAMETER[\"f\",9],UNIT[\"US survey foot\",0.3048006096]],VERT_CS[\"g\",\
                           UNIT[\"metre\",1]]";

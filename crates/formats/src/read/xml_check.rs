@@ -2,7 +2,7 @@
 /// compares each attribute of a tag with the previous ones and keeps the namespaces of a tag for all tags within it.
 #[derive(Debug, Default)]
 pub(super) struct XmlCheck {
-    place: Place,
+    state: State,
     /// Bytes since the last `<`, up to those that identify the construct.
     start: Vec<u8>,
     /// Last two bytes within the current construct, without its opening bytes.
@@ -16,7 +16,7 @@ pub(super) struct XmlCheck {
 
 /// Lexical state.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-enum Place {
+enum State {
     #[default]
     Text,
     Tag,
@@ -42,34 +42,34 @@ impl XmlCheck {
     /// A limit is exceeded.
     pub(super) fn take(&mut self, bytes: &[u8]) -> Result<(), String> {
         bytes.iter().try_for_each(|&byte| {
-            let before = self.place;
+            let before = self.state;
             let taken = self.step(byte);
-            self.last = if self.place == before { [self.last[1], byte] } else { [0; 2] };
+            self.last = if self.state == before { [self.last[1], byte] } else { [0; 2] };
             taken
         })
     }
 
     fn step(&mut self, byte: u8) -> Result<(), String> {
         let [before, last] = self.last;
-        match (self.place, byte) {
-            (Place::Text, b'<') => {
-                self.place = Place::Tag;
+        match (self.state, byte) {
+            (State::Text, b'<') => {
+                self.state = State::Tag;
                 self.start.clear();
                 self.attributes = 0;
                 self.nodes += 1;
             }
-            (Place::Tag, b'>') => self.place = Place::Text,
-            (Place::Tag, b'"' | b'\'') => self.place = Place::Value(byte),
-            (Place::Tag, b'=') => {
+            (State::Tag, b'>') => self.state = State::Text,
+            (State::Tag, b'"' | b'\'') => self.state = State::Value(byte),
+            (State::Tag, b'=') => {
                 self.nodes += 1;
                 self.attributes += 1;
                 return at_most(self.attributes, MAX_ATTRIBUTES, "attributes in one tag");
             }
-            (Place::Tag, _) => return self.name(byte),
-            (Place::Value(quote), _) if byte == quote => self.place = Place::Tag,
-            (Place::Comment, b'>') if (before, last) == (b'-', b'-') => self.place = Place::Text,
-            (Place::Data, b'>') if (before, last) == (b']', b']') => self.place = Place::Text,
-            (Place::Instruction, b'>') if last == b'?' => self.place = Place::Text,
+            (State::Tag, _) => return self.name(byte),
+            (State::Value(quote), _) if byte == quote => self.state = State::Tag,
+            (State::Comment, b'>') if (before, last) == (b'-', b'-') => self.state = State::Text,
+            (State::Data, b'>') if (before, last) == (b']', b']') => self.state = State::Text,
+            (State::Instruction, b'>') if last == b'?' => self.state = State::Text,
             _ => {}
         }
         Ok(())
@@ -79,11 +79,11 @@ impl XmlCheck {
     fn name(&mut self, byte: u8) -> Result<(), String> {
         if self.start.len() < DATA.len() {
             self.start.push(byte);
-            self.place = match self.start.as_slice() {
-                COMMENT => Place::Comment,
-                DATA => Place::Data,
-                b"?" => Place::Instruction,
-                _ => Place::Tag,
+            self.state = match self.start.as_slice() {
+                COMMENT => State::Comment,
+                DATA => State::Data,
+                b"?" => State::Instruction,
+                _ => State::Tag,
             };
         }
         // `xmlns`, or `xmlns:` before a name.
@@ -112,13 +112,13 @@ mod tests {
     }
 
     #[test]
-    fn tags_and_attributes_are_counted_and_texts_are_not() {
+    fn only_tags_and_attributes_are_counted() {
         assert_eq!(check("<?xml version=\"1.0\"?><a b='<c d=\"1\">' e=\"2\"><f/></a>"), Ok(6));
         assert_eq!(check("<a>x = y, \"<!-- <b c='1'> -- --><![CDATA[<d e=\"1\">]] >]]></a>"), Ok(4));
     }
 
     #[test]
-    fn more_than_is_read_is_refused() {
+    fn exceeded_limits_are_errors() {
         let many = |count: usize| (0..count).map(|k| format!(" a{k}='='")).collect::<String>();
         assert!(check(&format!("<a{}/>", many(256)).repeat(3)).is_ok());
         assert!(check(&format!("<a{}/>", many(257))).unwrap_err().contains("256 attributes in one tag"));

@@ -52,7 +52,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lists_stand_below_their_key_or_behind_it() {
+    fn lists_follow_their_key_as_block_or_inline() {
         let text = "a:\n  relative_file_paths:\n    - x_0.db3\n    - \"x_1.db3\"\n  \
                     compression_format: ''\n  files:\n  - path: y\n";
         let metadata = Bag2Metadata::of(text);

@@ -6,7 +6,7 @@ use super::pose_lookup::PoseLookup;
 use super::pose_track::PoseTrack;
 use super::recording::{Recording, Topic};
 use super::sample_spool::SampleSpool;
-use super::transform_intake::{TransformIntake, remark_on};
+use super::transform_collector::{TransformCollector, remark_on};
 use super::transforms::{Transforms, WhyNot};
 use super::unstamped::Unstamped;
 use crate::poses::RigidPose;
@@ -138,7 +138,7 @@ impl BagPoses {
             bad += 1;
             first_bad.get_or_insert(what);
         };
-        let (mut intake, share) = (TransformIntake::default(), budget.bytes / 2);
+        let (mut intake, share) = (TransformCollector::default(), budget.bytes / 2);
         let (mut unstamped, mut unstamped_track) = (Unstamped::default(), Unstamped::default());
         let (mut in_memory, mut spool) = (0, None);
         let (transforms, track) = (Arc::make_mut(&mut self.transforms), &mut self.track);

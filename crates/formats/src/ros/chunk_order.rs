@@ -184,7 +184,7 @@ mod tests {
     use crate::spill::FilePart;
 
     #[test]
-    fn messages_that_cannot_be_read_are_told_of_once() {
+    fn unreadable_messages_are_reported_once() {
         let cut = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(cut.path(), [7; 10]).unwrap();
         let mut order = ChunkOrder::new(&Budget::default());

@@ -30,7 +30,7 @@ struct Database {
     /// `None` while the database is closed.
     connection: Option<Connection>,
     /// Limit for a column value, in bytes.
-    most_bytes: u64,
+    max_bytes: u64,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -81,7 +81,7 @@ impl Db3 {
         // SQLite reports a missing file like a file that is not a database.
         std::fs::File::open(path).map_err(|error| Error::io(path, "read", error))?;
         let mut db3 = Self {
-            database: Database { path: path.to_owned(), connection: None, most_bytes: budget.whole_bytes() },
+            database: Database { path: path.to_owned(), connection: None, max_bytes: budget.whole_bytes() },
             topics: TopicList::default(),
             numbers: HashMap::new(),
             places: None,
@@ -192,8 +192,8 @@ impl Database {
             None => {
                 let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
                 let connection = Connection::open_with_flags(&self.path, flags)?;
-                let most_bytes = i32::try_from(self.most_bytes).unwrap_or(i32::MAX);
-                connection.set_limit(Limit::SQLITE_LIMIT_LENGTH, most_bytes)?;
+                let max_bytes = i32::try_from(self.max_bytes).unwrap_or(i32::MAX);
+                connection.set_limit(Limit::SQLITE_LIMIT_LENGTH, max_bytes)?;
                 connection
             }
         };

@@ -54,7 +54,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_last_word_says_what_pixels_are() {
+    fn last_word_determines_the_pixels() {
         for name in [
             "/camera/depth/image_raw",
             "/camera/aligned_depth_to_infra1/image_raw",

@@ -29,12 +29,12 @@ struct Link {
 pub(super) struct Step<'a> {
     pub(super) child: &'a str,
     pub(super) parent: &'a str,
-    place: Place<'a>,
+    place: LinkPose<'a>,
     trust: Trust,
 }
 
 #[derive(Clone, Copy, Debug)]
-enum Place<'a> {
+enum LinkPose<'a> {
     Fixed(&'a RigidPose),
     /// Samples around the time of the search.
     Moving(Around),
@@ -201,11 +201,11 @@ impl FrameLinks {
             let parent = link.parent.as_str();
             if let Some(pose) = &link.fixed {
                 let trust = Trust::Fixed(Reverse(link.last));
-                steps.push(Step { child, parent, place: Place::Fixed(pose), trust });
+                steps.push(Step { child, parent, place: LinkPose::Fixed(pose), trust });
             }
             if !link.samples.is_empty() {
                 let (around, trust) = moving(link)?;
-                steps.push(Step { child, parent, place: Place::Moving(around), trust });
+                steps.push(Step { child, parent, place: LinkPose::Moving(around), trust });
             }
         }
         steps.sort_by_key(|step| step.trust);
@@ -242,8 +242,8 @@ impl Step<'_> {
     /// Returns the pose of the child in the parent at the time of the search. Poses are not extrapolated.
     pub(super) fn pose(&self, stamp_ns: i64, most_gap_ns: Option<i64>) -> Result<RigidPose, WhyNot> {
         let (before, after) = match self.place {
-            Place::Fixed(pose) => return Ok(*pose),
-            Place::Moving(around) => around,
+            LinkPose::Fixed(pose) => return Ok(*pose),
+            LinkPose::Moving(around) => around,
         };
         let child = || self.child.to_owned();
         let Some(before) = before else { return Err(WhyNot::Before(child())) };

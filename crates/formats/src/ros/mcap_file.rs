@@ -105,12 +105,12 @@ impl McapFile {
             let next = at.checked_add(RECORD_HEAD_BYTES).and_then(|at| at.checked_add(bytes));
             let Some(next) = next.filter(|&next| next <= end_at) else { return Ok(false) };
             if matches!(kind, op::SCHEMA | op::CHANNEL | op::CHUNK_INDEX | op::STATISTICS) {
-                let most_bytes = match kind {
+                let max_bytes = match kind {
                     op::SCHEMA | op::CHANNEL => bytes.min(MAX_NAMES_BYTES),
                     _ if bytes > MAX_RECORD_BYTES => return Ok(false),
                     _ => bytes,
                 };
-                let contents = self.file.read_at(at + RECORD_HEAD_BYTES, most_bytes)?;
+                let contents = self.file.read_at(at + RECORD_HEAD_BYTES, max_bytes)?;
                 let taken = match kind {
                     op::SCHEMA => self.channels.add_schema(&contents),
                     op::CHANNEL => self.channels.add_channel(&contents, &mut self.topics),
@@ -254,13 +254,13 @@ impl McapFile {
                 OpenChunk::note(complaint, format!("there is no record at byte {at} of its contents"));
                 return Ok(());
             };
-            let most_bytes = match kind {
+            let max_bytes = match kind {
                 op::SCHEMA | op::CHANNEL => MAX_NAMES_BYTES,
                 op::MESSAGE => MESSAGE_HEAD_BYTES,
                 _ => 0,
             };
             let contents =
-                bytes.piece(start, count.min(most_bytes) as usize, &mut window)?.unwrap_or_default();
+                bytes.piece(start, count.min(max_bytes) as usize, &mut window)?.unwrap_or_default();
             match kind {
                 // Records from a broken chunk may be wrong, so known channels are kept.
                 op::SCHEMA | op::CHANNEL if is_broken && self.channels.knows(kind, contents) => {}

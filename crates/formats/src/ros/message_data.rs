@@ -28,12 +28,12 @@ impl MessageData {
     ///
     /// # Errors
     ///
-    /// There are more than `most_bytes`, or a file cannot be read.
-    pub fn load(&mut self, most_bytes: u64) -> Result<&[u8]> {
+    /// There are more than `max_bytes`, or a file cannot be read.
+    pub fn load(&mut self, max_bytes: u64) -> Result<&[u8]> {
         if let Bytes::File(part) = &self.0 {
-            if part.len() > most_bytes {
+            if part.len() > max_bytes {
                 let reason = format!(
-                    "{} bytes; messages of its kind must fit in {most_bytes} bytes of memory: raise `memory`, or do \
+                    "{} bytes; messages of its kind must fit in {max_bytes} bytes of memory: raise `memory`, or do \
                      not select the topic",
                     part.len()
                 );

@@ -44,7 +44,7 @@ mod sample_spool;
 mod samples;
 mod second_parent;
 mod sequence;
-mod transform_intake;
+mod transform_collector;
 mod transforms;
 mod unstamped;
 mod wire;

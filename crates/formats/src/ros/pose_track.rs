@@ -48,7 +48,7 @@ mod tests {
     }
 
     #[test]
-    fn a_path_that_is_told_again_and_again_is_kept_once() {
+    fn repeated_path_poses_are_stored_once() {
         let mut track = PoseTrack::default();
         for message in 1..=100 {
             (0..message).for_each(|stamp_ns| track.insert(pose(stamp_ns, "odom", f64::from(message as i32))));
@@ -59,7 +59,7 @@ mod tests {
     }
 
     #[test]
-    fn the_first_pose_that_can_be_used_names_the_frames() {
+    fn first_valid_pose_determines_the_frames() {
         let mut track = PoseTrack::default();
         for (parent, x_m) in [("", 1.0), ("map", f64::NAN), ("odom", 2.0), ("map", 3.0), ("odom", 4.0)] {
             track.insert(pose(track.odd as i64, parent, x_m));
@@ -72,7 +72,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pose_is_one_as_those_of_transforms_are() {
+    fn poses_are_validated_like_transforms() {
         let mut track = PoseTrack::default();
         for length in [1.0, 0.95, 0.5, 0.0, f64::INFINITY] {
             let mut pose = pose(0, "odom", 1.0);

@@ -108,7 +108,7 @@ mod tests {
     use crate::poses::RigidPose;
 
     #[test]
-    fn samples_in_a_file_are_found_as_those_in_memory() {
+    fn samples_in_file_and_memory_are_equal() {
         let pose = |k: i64| RigidPose { position_m: [k as f64, 0.5, -1.0], ..RigidPose::IDENTITY };
         let (mut memory, mut filed) = (vec![Samples::default(); 3], vec![Samples::default(); 3]);
         let mut spool = SampleSpool::new(&Budget::default(), 0);

@@ -63,7 +63,7 @@ mod tests {
     }
 
     #[test]
-    fn poses_without_stamps_are_of_when_they_were_recorded() {
+    fn poses_without_stamps_use_recording_times() {
         assert_eq!(stamps(&[0, 0, 0]), (vec![100, 101, 102], 3));
         assert_eq!(stamps(&[0, 0, 5, 0]), (vec![0, 0, 5, 0], 0), "simulations begin at 0");
         assert_eq!(stamps(&[]), (vec![], 0));

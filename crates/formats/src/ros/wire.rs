@@ -40,7 +40,7 @@ pub struct WireReader<'a> {
     /// Origin for alignment.
     origin: usize,
     /// Upper bound for the alignment of numbers.
-    most_alignment: usize,
+    max_alignment: usize,
     is_big_endian: bool,
 }
 
@@ -76,13 +76,13 @@ impl<'a> WireReader<'a> {
 
     /// Starts reading a message of `len` bytes from its first bytes.
     pub(super) fn of_start(wire: Wire, bytes: &'a [u8], len: u64) -> Decoded<Self> {
-        let mut reader = Self { bytes, len, at: 0, wire, origin: 0, most_alignment: 1, is_big_endian: false };
+        let mut reader = Self { bytes, len, at: 0, wire, origin: 0, max_alignment: 1, is_big_endian: false };
         if wire == Wire::Ros1 {
             return Ok(reader);
         }
         let header: [u8; CDR_HEADER] = reader.array()?;
         // The encodings of the DDS-XTypes standard with plain structures: CDR and CDR version 2.
-        let (is_big_endian, most_alignment) = match [header[0], header[1]] {
+        let (is_big_endian, max_alignment) = match [header[0], header[1]] {
             [0, 0] => (true, 8),
             [0, 1] => (false, 8),
             [0, 6] => (true, 4),
@@ -93,7 +93,7 @@ impl<'a> WireReader<'a> {
                 return Err(WireError { byte: 0, reason });
             }
         };
-        Ok(Self { origin: CDR_HEADER, is_big_endian, most_alignment, ..reader })
+        Ok(Self { origin: CDR_HEADER, is_big_endian, max_alignment, ..reader })
     }
 
     /// Creates an error at the current position.
@@ -132,14 +132,14 @@ impl<'a> WireReader<'a> {
         Ok(bytes)
     }
 
-    /// Reads the length of a sequence whose items take at least `least_item_bytes` bytes each.
+    /// Reads the length of a sequence whose items take at least `min_item_bytes` bytes each.
     ///
     /// # Errors
     ///
     /// The message is too short for the items.
-    pub fn sequence(&mut self, least_item_bytes: usize) -> Decoded<usize> {
+    pub fn sequence(&mut self, min_item_bytes: usize) -> Decoded<usize> {
         let count = self.u32()? as usize;
-        if count.checked_mul(least_item_bytes.max(1)).is_none_or(|bytes| bytes > self.remaining()) {
+        if count.checked_mul(min_item_bytes.max(1)).is_none_or(|bytes| bytes > self.remaining()) {
             let left = self.remaining();
             return Err(self.error(format!("a sequence has {count} items, but {left} bytes are left")));
         }
@@ -203,9 +203,9 @@ impl<'a> WireReader<'a> {
 
     /// Reads the bytes of a number after its alignment padding.
     fn array<const N: usize>(&mut self) -> Decoded<[u8; N]> {
-        let beyond = (self.at.saturating_sub(self.origin)) % N.min(self.most_alignment).max(1);
+        let beyond = (self.at.saturating_sub(self.origin)) % N.min(self.max_alignment).max(1);
         if beyond != 0 {
-            self.bytes(N.min(self.most_alignment) - beyond)?;
+            self.bytes(N.min(self.max_alignment) - beyond)?;
         }
         let at = self.at;
         let bytes = self.bytes(N)?;

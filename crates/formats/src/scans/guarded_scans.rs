@@ -1,4 +1,4 @@
-use super::point_store::{PointRoom, PointStore};
+use super::point_store::{PointBudget, PointStore};
 use super::sensor_scan::SensorScan;
 use super::source::{ScanHead, ScanSource};
 use super::stored_scan::StoredScan;
@@ -25,7 +25,7 @@ impl GuardedScans {
     }
 
     /// After a panic the reader is not used again, and there are no further scans.
-    fn ask<T>(&mut self, none: T, call: impl FnOnce(&mut dyn ScanSource) -> Result<T>) -> Result<T> {
+    fn guard<T>(&mut self, none: T, call: impl FnOnce(&mut dyn ScanSource) -> Result<T>) -> Result<T> {
         if self.has_panicked {
             return Ok(none);
         }
@@ -51,19 +51,19 @@ impl ScanSource for GuardedScans {
     }
 
     fn read_scan(&mut self, points: &mut PointStore) -> Result<Option<ScanHead>> {
-        self.ask(None, |source| source.read_scan(points))
+        self.guard(None, |source| source.read_scan(points))
     }
 
     fn next_scan(&mut self) -> Result<Option<SensorScan>> {
-        self.ask(None, |source| source.next_scan())
+        self.guard(None, |source| source.next_scan())
     }
 
-    fn next_stored(&mut self, room: &PointRoom) -> Result<Option<StoredScan>> {
-        self.ask(None, |source| source.next_stored(room))
+    fn next_stored(&mut self, budget: &PointBudget) -> Result<Option<StoredScan>> {
+        self.guard(None, |source| source.next_stored(budget))
     }
 
     fn skip(&mut self, scans: usize) -> Result<usize> {
-        self.ask(0, |source| source.skip(scans))
+        self.guard(0, |source| source.skip(scans))
     }
 
     fn pass_unread(&mut self) -> bool {
@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn a_panic_is_an_error_that_names_the_input() {
+    fn panics_become_errors_with_the_input() {
         let path = Path::new("odd.las");
         let mut scans = GuardedScans::open(path, || Ok(Box::new(Faulty))).unwrap();
         let error = scans.next_scan().err().unwrap().to_string();

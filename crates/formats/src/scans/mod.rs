@@ -13,8 +13,8 @@ mod stored_scan;
 
 pub(crate) use fingerprint::Fingerprint;
 pub(crate) use guarded_scans::GuardedScans;
-pub use point_store::{PointRoom, PointStore};
-pub use scan_chain::{ScanChain, ScanMark};
+pub use point_store::{PointBudget, PointStore};
+pub use scan_chain::{ScanChain, ScanFingerprint};
 pub use scan_reach::ScanReach;
 pub use scan_stream_writer::ScanStreamWriter;
 pub(crate) use scan_stream_writer::{FLAG_INTENSITIES, MAGIC, MAX_LABEL_BYTES, VERSION};

@@ -17,13 +17,13 @@ pub struct PointStore {
     /// Number of points in the file, which precede those in memory.
     filed: usize,
     file: Option<ScratchFile>,
-    room: PointRoom,
+    budget: PointBudget,
 }
 
 /// Memory limit for the points of a scan, and the folder for the others.
 #[derive(Clone, Debug)]
-pub struct PointRoom {
-    most_points: usize,
+pub struct PointBudget {
+    max_points: usize,
     folder: PathBuf,
 }
 
@@ -34,18 +34,18 @@ const RECORD_BYTES: usize = size_of::<Point>() + size_of::<f32>();
 const POINTS_AT_A_TIME: usize = 1 << 14;
 /// Number of points in memory to pass at once. The receiver copies them into the world frame (6 MiB), and beam
 /// coherence works within one chunk, which should be a whole scan for most sensors.
-const POINTS_HANDED_OVER: usize = 1 << 18;
+const POINTS_PER_CHUNK: usize = 1 << 18;
 
-impl Default for PointRoom {
+impl Default for PointBudget {
     fn default() -> Self {
-        Self { most_points: usize::MAX, folder: PathBuf::new() }
+        Self { max_points: usize::MAX, folder: PathBuf::new() }
     }
 }
 
-impl PointRoom {
+impl PointBudget {
     /// Creates a limit in bytes. Further points go to a file in `folder`.
-    pub fn new(most_bytes: usize, folder: &Path) -> Self {
-        Self { most_points: (most_bytes / RECORD_BYTES).max(POINTS_AT_A_TIME), folder: folder.to_owned() }
+    pub fn new(max_bytes: usize, folder: &Path) -> Self {
+        Self { max_points: (max_bytes / RECORD_BYTES).max(POINTS_AT_A_TIME), folder: folder.to_owned() }
     }
 
     /// Creates an unnamed temporary file.
@@ -62,8 +62,8 @@ impl PointRoom {
 
 impl PointStore {
     /// Creates an empty store.
-    pub fn new(room: PointRoom) -> Self {
-        Self { room, ..Self::default() }
+    pub fn new(budget: PointBudget) -> Self {
+        Self { budget, ..Self::default() }
     }
 
     /// Removes all points and sets whether the next ones have intensities.
@@ -73,13 +73,13 @@ impl PointStore {
         (self.filed, self.file) = (0, None);
     }
 
-    pub(crate) fn room(&self) -> &PointRoom {
-        &self.room
+    pub(crate) fn budget(&self) -> &PointBudget {
+        &self.budget
     }
 
     /// Reserves memory for points, up to the limit.
     pub(crate) fn reserve(&mut self, points: usize) {
-        let points = points.min(self.room.most_points);
+        let points = points.min(self.budget.max_points);
         self.points.reserve_exact(points);
         if let Some(intensities) = &mut self.intensities {
             intensities.reserve_exact(points);
@@ -93,7 +93,7 @@ impl PointStore {
     /// A file cannot be written.
     #[inline]
     pub fn push(&mut self, point: Point, intensity: f32) -> Result<()> {
-        if self.points.len() == self.room.most_points {
+        if self.points.len() == self.budget.max_points {
             self.put_in_file()?;
         }
         self.points.push(point);
@@ -112,7 +112,7 @@ impl PointStore {
         &mut self,
         mut points: impl ExactSizeIterator<Item = (Point, f32)> + Clone,
     ) -> Result<()> {
-        if points.len() > self.room.most_points.saturating_sub(self.points.len()) {
+        if points.len() > self.budget.max_points.saturating_sub(self.points.len()) {
             return points.try_for_each(|(point, intensity)| self.push(point, intensity));
         }
         self.points.extend(points.clone().map(|(point, _)| point));
@@ -126,10 +126,11 @@ impl PointStore {
     fn put_in_file(&mut self) -> Result<()> {
         let mut file = match self.file.take() {
             Some(file) => file,
-            None => self.room.file()?,
+            None => self.budget.file()?,
         };
-        let cannot =
-            |error| Error::io(self.room.folder(), "store the points of a scan in a temporary file in", error);
+        let cannot = |error| {
+            Error::io(self.budget.folder(), "store the points of a scan in a temporary file in", error)
+        };
         let mut bytes = Vec::with_capacity(POINTS_AT_A_TIME * RECORD_BYTES);
         for (chunk, points) in self.points.chunks(POINTS_AT_A_TIME).enumerate() {
             bytes.clear();
@@ -190,8 +191,8 @@ impl PointStore {
             }
             next += count;
         }
-        for first in in_memory.clone().step_by(POINTS_HANDED_OVER) {
-            let some = first..in_memory.end.min(first + POINTS_HANDED_OVER);
+        for first in in_memory.clone().step_by(POINTS_PER_CHUNK) {
+            let some = first..in_memory.end.min(first + POINTS_PER_CHUNK);
             let intensities = self.intensities.as_ref().map(|intensities| &intensities[some.clone()]);
             if !take(&self.points[some], intensities) {
                 return Ok(());
@@ -207,7 +208,7 @@ impl PointStore {
             None => Err(io::ErrorKind::UnexpectedEof.into()),
         };
         window.map_err(|error| {
-            Error::io(self.room.folder(), "read the points of a scan from a temporary file in", error)
+            Error::io(self.budget.folder(), "read the points of a scan from a temporary file in", error)
         })
     }
 
@@ -222,12 +223,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn points_come_back_from_file_and_memory_in_order() {
+    fn points_from_file_and_memory_are_in_order() {
         let folder = tempfile::TempDir::new().unwrap();
         // More points than are passed at once, in memory and in the file.
-        let count = POINTS_HANDED_OVER + 3 * POINTS_AT_A_TIME + 77;
-        for (most_bytes, has_intensities) in [(0, true), (1 << 20, false), (usize::MAX, true)] {
-            let mut store = PointStore::new(PointRoom::new(most_bytes, folder.path()));
+        let count = POINTS_PER_CHUNK + 3 * POINTS_AT_A_TIME + 77;
+        for (max_bytes, has_intensities) in [(0, true), (1 << 20, false), (usize::MAX, true)] {
+            let mut store = PointStore::new(PointBudget::new(max_bytes, folder.path()));
             store.begin(has_intensities);
             let point = |k: usize| ([k as f64, -0.5 * k as f64, f64::NAN], k as f32);
             for first in (0..count).step_by(1000) {
@@ -237,15 +238,15 @@ mod tests {
                         .map(point)
                         .for_each(|(point, intensity)| store.push(point, intensity).unwrap()),
                 }
-                assert!(store.points.len() <= store.room.most_points);
+                assert!(store.points.len() <= store.budget.max_points);
             }
-            assert_eq!((store.len(), store.file.is_some()), (count, most_bytes < usize::MAX));
+            assert_eq!((store.len(), store.file.is_some()), (count, max_bytes < usize::MAX));
             for range in
                 [0..count, 5..6, 100..count - 3, POINTS_AT_A_TIME - 1..2 * POINTS_AT_A_TIME + 1, 7..7]
             {
                 let mut next = range.start;
                 let mut take = |points: &[Point], intensities: Option<&[f32]>| {
-                    assert!(points.len() <= POINTS_HANDED_OVER);
+                    assert!(points.len() <= POINTS_PER_CHUNK);
                     assert_eq!(intensities.is_some(), has_intensities);
                     for (at, point) in points.iter().enumerate() {
                         assert!(

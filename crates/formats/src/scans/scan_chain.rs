@@ -5,9 +5,9 @@ use voxtile::scan::Pose;
 /// Fingerprint of a scan: a hash of its points and intensities, and another of its pose. It does not depend on storage
 /// format and file name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ScanMark {
-    scan: [u8; MARK_BYTES],
-    pose: [u8; MARK_BYTES],
+pub struct ScanFingerprint {
+    scan: [u8; FINGERPRINT_BYTES],
+    pose: [u8; FINGERPRINT_BYTES],
     has_points: bool,
 }
 
@@ -17,15 +17,15 @@ pub struct ScanMark {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ScanChain {
     scans: u64,
-    scan_chain: [u8; MARK_BYTES],
-    pose_chain: [u8; MARK_BYTES],
+    scan_chain: [u8; FINGERPRINT_BYTES],
+    pose_chain: [u8; FINGERPRINT_BYTES],
 }
 
-const MARK_BYTES: usize = 16;
+const FINGERPRINT_BYTES: usize = 16;
 /// Number of points to hash at once.
 const POINTS_AT_A_TIME: usize = 1024;
 
-impl ScanMark {
+impl ScanFingerprint {
     /// Computes the fingerprint of a scan.
     ///
     /// # Errors
@@ -56,13 +56,21 @@ impl ScanMark {
                 true
             })?;
         }
-        Ok(Self { scan: mark(&hasher), pose: pose_mark(world_from_sensor), has_points: !store.is_empty() })
+        Ok(Self {
+            scan: fingerprint(&hasher),
+            pose: pose_fingerprint(world_from_sensor),
+            has_points: !store.is_empty(),
+        })
     }
 
     /// Creates a fingerprint without hashes, for callers that only need to know whether the scan has points. Hashing
     /// takes a tenth of the time of reading.
     pub fn without_content(scan: &StoredScan) -> Self {
-        Self { scan: [0; MARK_BYTES], pose: [0; MARK_BYTES], has_points: !scan.points_in_sensor.is_empty() }
+        Self {
+            scan: [0; FINGERPRINT_BYTES],
+            pose: [0; FINGERPRINT_BYTES],
+            has_points: !scan.points_in_sensor.is_empty(),
+        }
     }
 
     /// Returns whether the scan has points. Scans without points are not distinguishable.
@@ -98,8 +106,8 @@ impl ScanChain {
     }
 
     /// Adds a scan.
-    pub fn add(&mut self, mark: &ScanMark) {
-        self.chain(&mark.scan, &mark.pose);
+    pub fn add(&mut self, fingerprint: &ScanFingerprint) {
+        self.chain(&fingerprint.scan, &fingerprint.pose);
     }
 
     /// Adds a scan that could not be read.
@@ -113,7 +121,7 @@ impl ScanChain {
             let mut hasher = hasher("voxtile 1 chain");
             hasher.update(chain);
             hasher.update(new);
-            *chain = mark(&hasher);
+            *chain = fingerprint(&hasher);
         }
     }
 }
@@ -122,18 +130,18 @@ fn hasher(context: &str) -> blake3::Hasher {
     blake3::Hasher::new_derive_key(context)
 }
 
-fn mark(hasher: &blake3::Hasher) -> [u8; MARK_BYTES] {
-    let mut mark = [0; MARK_BYTES];
-    hasher.finalize_xof().fill(&mut mark);
-    mark
+fn fingerprint(hasher: &blake3::Hasher) -> [u8; FINGERPRINT_BYTES] {
+    let mut fingerprint = [0; FINGERPRINT_BYTES];
+    hasher.finalize_xof().fill(&mut fingerprint);
+    fingerprint
 }
 
-fn pose_mark(pose: &Pose) -> [u8; MARK_BYTES] {
+fn pose_fingerprint(pose: &Pose) -> [u8; FINGERPRINT_BYTES] {
     let mut hasher = hasher("voxtile 1 pose");
     for number in pose.position_m().into_iter().chain(pose.quaternion()) {
         hasher.update(&bits(number).to_le_bytes());
     }
-    mark(&hasher)
+    fingerprint(&hasher)
 }
 
 /// Returns the bits of a number. All NaN have equal bits.
@@ -141,19 +149,19 @@ fn bits(number: f64) -> u64 {
     if number.is_nan() { f64::NAN.to_bits() } else { number.to_bits() }
 }
 
-fn to_text(mark: &[u8; MARK_BYTES]) -> String {
-    mark.iter().map(|byte| format!("{byte:02x}")).collect()
+fn to_text(fingerprint: &[u8; FINGERPRINT_BYTES]) -> String {
+    fingerprint.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-fn from_text(text: &str) -> Option<[u8; MARK_BYTES]> {
-    if text.len() != 2 * MARK_BYTES || !text.is_ascii() {
+fn from_text(text: &str) -> Option<[u8; FINGERPRINT_BYTES]> {
+    if text.len() != 2 * FINGERPRINT_BYTES || !text.is_ascii() {
         return None;
     }
-    let mut mark = [0; MARK_BYTES];
-    for (k, byte) in mark.iter_mut().enumerate() {
+    let mut fingerprint = [0; FINGERPRINT_BYTES];
+    for (k, byte) in fingerprint.iter_mut().enumerate() {
         *byte = u8::from_str_radix(&text[2 * k..2 * k + 2], 16).ok()?;
     }
-    Some(mark)
+    Some(fingerprint)
 }
 
 #[cfg(test)]
@@ -174,25 +182,25 @@ mod tests {
         }
     }
 
-    fn mark_of(scan: &StoredScan) -> ScanMark {
-        ScanMark::of(scan).unwrap()
+    fn fingerprint_of(scan: &StoredScan) -> ScanFingerprint {
+        ScanFingerprint::of(scan).unwrap()
     }
 
     #[test]
-    fn a_chain_tells_scans_and_poses_apart_and_goes_on_from_its_texts() {
+    fn chains_distinguish_scans_and_poses_and_resume_from_text() {
         let first_points = [[1.0, 2.0, 3.0]];
         let scans = || {
             [scan(&first_points, None, 0.0), scan(&[], None, 1.0), scan(&[[f64::NAN; 3]; 3000], None, 2.0)]
         };
         let chain_of = |scans: &[StoredScan]| {
             let mut chain = ScanChain::default();
-            scans.iter().for_each(|scan| chain.add(&mark_of(scan)));
+            scans.iter().for_each(|scan| chain.add(&fingerprint_of(scan)));
             chain
         };
         let whole = chain_of(&scans());
         let first = chain_of(&scans()[..2]);
         let mut on = ScanChain::from_texts(2, &first.scan_text(), &first.pose_text()).unwrap();
-        on.add(&mark_of(&scans()[2]));
+        on.add(&fingerprint_of(&scans()[2]));
         assert_eq!(on, whole);
 
         let mut moved = scans();
@@ -209,9 +217,9 @@ mod tests {
         assert_ne!(changed.scan_text(), whole.scan_text());
         assert_eq!(changed.pose_text(), whole.pose_text());
 
-        let of = |intensity| mark_of(&scan(&first_points, intensity, 0.0)).scan_text();
-        let marks = [None, Some(1.0), Some(2.0)].map(of);
-        assert!(marks[0] != marks[1] && marks[1] != marks[2], "{marks:?}");
+        let of = |intensity| fingerprint_of(&scan(&first_points, intensity, 0.0)).scan_text();
+        let fingerprints = [None, Some(1.0), Some(2.0)].map(of);
+        assert!(fingerprints[0] != fingerprints[1] && fingerprints[1] != fingerprints[2], "{fingerprints:?}");
 
         let mut unread = chain_of(&scans()[..1]);
         unread.add_unread();

@@ -89,11 +89,11 @@ mod tests {
         let mut ends = Vec::new();
         for &point in &scan.points_in_sensor {
             let end = scan.world_from_sensor.to_world()(point);
-            let way = [end[0] - x, end[1] - y, end[2] - z];
-            let length = way.iter().map(|d| d * d).sum::<f64>().sqrt();
+            let ray = [end[0] - x, end[1] - y, end[2] - z];
+            let length = ray.iter().map(|d| d * d).sum::<f64>().sqrt();
             if length.is_finite() && length > 0.0 {
                 let share = max_range_m.map_or(1.0, |range| (range / length).min(1.0));
-                ends.push([x + way[0] * share, y + way[1] * share]);
+                ends.push([x + ray[0] * share, y + ray[1] * share]);
             }
         }
         if let Some(range) = no_return_range_m {
@@ -104,7 +104,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn all_ends_of_rays_are_within_reach(
+        fn all_ray_ends_are_within_reach(
             points in prop::collection::vec(prop::array::uniform3(-90.0_f64..90.0), 0..40),
             position in prop::array::uniform3(-500.0_f64..500.0),
             quaternion in prop::array::uniform4(0.1_f64..1.0),
@@ -136,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn scans_that_differ_in_a_bit_have_other_contents() {
+    fn scans_differing_in_one_bit_have_different_hashes() {
         let pose = |x| Pose::from_quaternion([x, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]).unwrap();
         let content = |scan: &SensorScan| ScanReach::of(scan, None, None).content;
         let one = scan(vec![[1.0, 2.0, 3.0]], pose(0.0));

@@ -1,4 +1,4 @@
-use super::point_store::{PointRoom, PointStore};
+use super::point_store::{PointBudget, PointStore};
 use super::source::{ScanHead, ScanSource};
 use crate::poses::PoseSource;
 use voxtile::Result;
@@ -91,8 +91,8 @@ impl SelectedScans {
     }
 
     fn read_without_ignored(&mut self, points: &mut PointStore, ignored: &Aabb) -> Result<Option<ScanHead>> {
-        let room: PointRoom = points.room().clone();
-        self.unfiltered = PointStore::new(room);
+        let budget: PointBudget = points.budget().clone();
+        self.unfiltered = PointStore::new(budget);
         let head = self.source.read_scan(&mut self.unfiltered)?;
         points.begin(self.unfiltered.has_intensities());
         let to_body = self.selection.body_from_sensor.as_ref().map(Pose::to_world);

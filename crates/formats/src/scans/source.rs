@@ -1,4 +1,4 @@
-use super::point_store::{PointRoom, PointStore};
+use super::point_store::{PointBudget, PointStore};
 use super::sensor_scan::SensorScan;
 use super::stored_scan::StoredScan;
 use crate::poses::PoseSource;
@@ -42,13 +42,13 @@ pub trait ScanSource {
         }))
     }
 
-    /// Returns the next scan, with as many of its points in memory as `room` allows.
+    /// Returns the next scan, with as many of its points in memory as `budget` allows.
     ///
     /// # Errors
     ///
     /// As for [`ScanSource::read_scan`].
-    fn next_stored(&mut self, room: &PointRoom) -> Result<Option<StoredScan>> {
-        let mut points_in_sensor = PointStore::new(room.clone());
+    fn next_stored(&mut self, budget: &PointBudget) -> Result<Option<StoredScan>> {
+        let mut points_in_sensor = PointStore::new(budget.clone());
         let head = self.read_scan(&mut points_in_sensor)?;
         Ok(head.map(|ScanHead { name, stamp_ns, world_from_sensor }| StoredScan {
             name,

@@ -115,7 +115,7 @@ impl Default for TimedPose {
 #[derive(Debug)]
 pub(crate) struct PoseWriter {
     budget: Budget,
-    most_in_memory: usize,
+    max_in_memory: usize,
     poses: Vec<TimedPose>,
     file: Option<BufWriter<File>>,
     filed: u64,
@@ -124,12 +124,12 @@ pub(crate) struct PoseWriter {
 impl PoseWriter {
     /// Creates a writer. Poses beyond `memory_bytes` go to a file.
     pub(crate) fn new(budget: &Budget, memory_bytes: usize) -> Self {
-        let most_in_memory = memory_bytes / size_of::<TimedPose>();
-        Self { budget: budget.clone(), most_in_memory, poses: Vec::new(), file: None, filed: 0 }
+        let max_in_memory = memory_bytes / size_of::<TimedPose>();
+        Self { budget: budget.clone(), max_in_memory, poses: Vec::new(), file: None, filed: 0 }
     }
 
     pub(crate) fn push(&mut self, pose: TimedPose) -> Result<()> {
-        if self.file.is_none() && self.poses.len() < self.most_in_memory {
+        if self.file.is_none() && self.poses.len() < self.max_in_memory {
             self.poses.push(pose);
             return Ok(());
         }
@@ -161,7 +161,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn poses_in_a_file_are_those_in_memory() {
+    fn poses_in_file_and_memory_are_equal() {
         let pose = |k: i64| {
             let x = k as f64 * 0.1;
             TimedPose {

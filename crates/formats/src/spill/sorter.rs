@@ -31,7 +31,7 @@ pub(crate) struct Sorter<T> {
     memory_bytes: usize,
     budget: Budget,
     part: Vec<T>,
-    most_records: usize,
+    max_records: usize,
     file: Option<BufWriter<File>>,
     /// Number of records of each run in the file.
     runs: Vec<u64>,
@@ -40,17 +40,17 @@ pub(crate) struct Sorter<T> {
 impl<T: Record> Sorter<T> {
     pub(crate) fn new(budget: &Budget, memory_bytes: usize) -> Self {
         // The stable sort needs half as much memory again.
-        let most_records = (memory_bytes / 3 * 2 / size_of::<T>()).max(16);
+        let max_records = (memory_bytes / 3 * 2 / size_of::<T>()).max(16);
         let budget = budget.clone();
-        Self { memory_bytes, budget, part: Vec::new(), most_records, file: None, runs: Vec::new() }
+        Self { memory_bytes, budget, part: Vec::new(), max_records, file: None, runs: Vec::new() }
     }
 
     pub(crate) fn push(&mut self, record: T) -> Result<()> {
-        if self.part.len() >= self.most_records {
+        if self.part.len() >= self.max_records {
             self.write_part()?;
         }
         if self.part.len() == self.part.capacity() {
-            let more = self.part.len().max(16).min(self.most_records - self.part.len());
+            let more = self.part.len().max(16).min(self.max_records - self.part.len());
             self.part.reserve_exact(more);
         }
         self.part.push(record);

@@ -15,7 +15,7 @@ pub(crate) struct SpillFile {
     file: Option<Arc<Mutex<File>>>,
     end: u64,
     /// File size at which a new file is started.
-    most_bytes: u64,
+    max_bytes: u64,
 }
 
 /// Size of a stream.
@@ -56,7 +56,7 @@ const COPY_BYTES: usize = 1 << 16;
 
 impl SpillFile {
     pub(crate) fn new(budget: &Budget) -> Self {
-        Self { budget: budget.clone(), file: None, end: 0, most_bytes: MAX_FILE_BYTES }
+        Self { budget: budget.clone(), file: None, end: 0, max_bytes: MAX_FILE_BYTES }
     }
 
     pub(crate) fn budget(&self) -> &Budget {
@@ -74,8 +74,8 @@ impl SpillFile {
     ) -> Result<(Bytes, Option<Complaint>)> {
         let (mut start, mut complaint) = (Vec::new(), None);
         let broken = |error: std::io::Error| Complaint { reason: error.to_string(), is_broken: true };
-        let (most_bytes, limit) = (size.most(), size.most().saturating_add(1));
-        let reason = format!("it contains more than the {most_bytes} bytes that it {}", size.word());
+        let (max_bytes, limit) = (size.most(), size.most().saturating_add(1));
+        let reason = format!("it contains more than the {max_bytes} bytes that it {}", size.word());
         let too_many = Complaint { reason, is_broken: false };
         // Streams with a larger stated size go directly to the file.
         let first_bytes = match size {
@@ -90,7 +90,7 @@ impl SpillFile {
             let read = (&mut input).take(first_bytes).read_to_end(&mut start);
             complaint = read.err().map(broken);
             let is_too_long = start.len() as u64 == limit;
-            start.truncate(usize::try_from(most_bytes).unwrap_or(usize::MAX));
+            start.truncate(usize::try_from(max_bytes).unwrap_or(usize::MAX));
             see(&start);
             if complaint.is_some() || is_too_long || (start.len() as u64) < first_bytes {
                 return Ok((Bytes::Memory(start), complaint.or(is_too_long.then_some(too_many))));
@@ -98,7 +98,7 @@ impl SpillFile {
         }
         let cannot = |error| self.budget.cannot("write", error);
         let file = match self.file.take() {
-            Some(file) if self.end < self.most_bytes || Arc::strong_count(&file) == 1 => file,
+            Some(file) if self.end < self.max_bytes || Arc::strong_count(&file) == 1 => file,
             _ => Arc::new(Mutex::new(self.budget.file()?)),
         };
         if Arc::strong_count(&file) == 1 {
@@ -119,7 +119,7 @@ impl SpillFile {
                 match input.read(&mut buffer) {
                     Ok(0) => break,
                     Ok(count) => {
-                        let left = usize::try_from(most_bytes - written).unwrap_or(usize::MAX);
+                        let left = usize::try_from(max_bytes - written).unwrap_or(usize::MAX);
                         if count > left {
                             complaint = Some(too_many.clone());
                         }
@@ -147,7 +147,7 @@ mod tests {
 
     #[test]
     fn parts_that_always_overlap_take_several_files() {
-        let mut spill = SpillFile { most_bytes: 1000, ..SpillFile::new(&Budget::default()) };
+        let mut spill = SpillFile { max_bytes: 1000, ..SpillFile::new(&Budget::default()) };
         let mut held = Vec::new();
         for k in 0..100_u8 {
             let size = StreamSize::Claimed(100);

@@ -141,7 +141,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn squares_have_files_of_their_own() {
+    fn squares_have_separate_files() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("cloud");
         let rows = [row([0, 0, 0], 0.9), row([-1, 39, 0], 0.8), row([40, 0, 0], 0.9), row([1, 1, 1], 0.7)];
@@ -163,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn what_single_precision_cannot_hold_is_refused() {
+    fn too_coarse_single_precision_is_refused() {
         let folder = tempfile::tempdir().unwrap();
         let mut voxel = row([0; 3], 0.9);
         voxel.center_m = [500_123.4, 40_182_321.7, 57.3];

@@ -76,14 +76,14 @@ mod tests {
     use std::collections::HashMap;
 
     #[test]
-    fn codes_come_back() {
+    fn codes_round_trip() {
         for index in [[0, 0, 0], [1, 2, 3], [u32::MAX, 0, u32::MAX], [1 << 31, 77, 12345678]] {
             assert_eq!(indices(morton(index)), index);
         }
     }
 
     #[test]
-    fn every_level_holds_one_voxel_a_cell() {
+    fn every_level_has_one_voxel_per_cell() {
         // A floor and a wall of 256 voxels, in Morton order: levels 0, 1 and 2.
         let levels = Levels::around(256);
         let mut codes: Vec<u128> = (0..256 * 256)

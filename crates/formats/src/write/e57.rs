@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn points_come_back() {
+    fn points_round_trip() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.e57");
         let rows: Vec<_> = (0..5000).map(|k| row([k, -k, 3], 0.75)).collect();

@@ -334,7 +334,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mesh_that_no_file_can_hold_is_refused_while_it_grows() {
+    fn too_large_meshes_are_refused_early() {
         let folder = tempfile::tempdir().unwrap();
         let mut brick = Brick::new();
         brick.insert([5, 6, 7]);
@@ -361,7 +361,7 @@ mod tests {
     }
 
     #[test]
-    fn faces_are_those_between_occupied_and_not() {
+    fn faces_separate_occupied_from_other_voxels() {
         // Clusters around brick borders, also below zero, with a free voxel among them.
         let mut rows = Vec::new();
         for x in -35..35 {

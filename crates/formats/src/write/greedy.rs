@@ -122,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn neighbours_in_the_layer_around_hide_faces() {
+    fn neighbours_of_the_brick_hide_faces() {
         let mut brick = Brick::new();
         brick.insert([1, 5, 5]);
         brick.insert([0, 5, 5]);

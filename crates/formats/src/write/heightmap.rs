@@ -72,7 +72,7 @@ impl VoxelSink for HeightmapSink {
             png::EncodingError::IoError(error) => Error::io(&path, "write", error),
             other => Error::argument(path.display().to_string(), other.to_string()),
         };
-        let too_wide = |_| Error::argument("flat map", "a side is too long for an image: choose a region");
+        let too_wide = |_| Error::argument("heightmap", "a side is too long for an image: choose a region");
         let (columns, rows) =
             (u32::try_from(width).map_err(too_wide)?, u32::try_from(height).map_err(too_wide)?);
         let mut encoder = png::Encoder::new(&mut self.out, columns, rows);
@@ -138,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn only_heights_that_are_asked_for_count() {
+    fn only_requested_heights_are_used() {
         let folder = tempfile::tempdir().unwrap();
         let all = WriteOptions::beside(&folder.path().join("heights.png"));
         // The voxel at 2.75 m is excluded, so the one below it is the topmost.
@@ -147,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn the_topmost_occupied_voxel_counts() {
+    fn topmost_occupied_voxel_is_used() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("heights.png");
         assert_eq!(values(&WriteOptions::beside(&path)), [0, 4, 0, 0, 9, 0]);

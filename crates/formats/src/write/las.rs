@@ -93,7 +93,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn points_come_back_from_both() {
+    fn points_round_trip_with_and_without_compression() {
         let folder = tempfile::tempdir().unwrap();
         let rows: Vec<_> = (0..300).map(|k| row([k - 150, 7 * k, -k], 0.9)).collect();
         for is_compressed in [false, true] {

@@ -221,7 +221,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn far_voxels_take_a_coarser_scale_or_none() {
+    fn distant_voxels_use_a_coarser_scale_or_are_refused() {
         let mut head = head_of(&[row([0; 3], 0.5)]);
         let near = LasLayout::of(&head).unwrap();
         assert_eq!(near.scale_m, 1.0 / 2048.0);

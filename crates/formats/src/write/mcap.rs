@@ -19,7 +19,7 @@ pub(super) struct McapSink {
     fields: Vec<(&'static str, FieldType)>,
     /// Points of the next cloud. `tile_start` is the offset of its last tile.
     points: Vec<u8>,
-    most_points: usize,
+    max_points: usize,
     tile: Option<[i32; 3]>,
     tile_start: usize,
     clouds: u32,
@@ -48,7 +48,7 @@ impl McapSink {
             stamp_ns: options.stamp_ns,
             fields,
             points: Vec::new(),
-            most_points: MAX_POINTS,
+            max_points: MAX_POINTS,
             tile: None,
             tile_start: 0,
             clouds: 0,
@@ -82,7 +82,7 @@ impl VoxelSink for McapSink {
         if self.tile.replace(voxel.tile) != Some(voxel.tile) {
             self.tile_start = self.points.len();
         }
-        if self.points.len() >= self.most_points.saturating_mul(self.step()) {
+        if self.points.len() >= self.max_points.saturating_mul(self.step()) {
             // End the cloud before its last tile, unless that is the only one.
             let end = if self.tile_start == 0 { self.points.len() } else { self.tile_start };
             self.write_cloud(end)?;
@@ -112,14 +112,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn clouds_hold_whole_tiles_as_far_as_they_fit() {
+    fn clouds_contain_whole_tiles_if_they_fit() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.mcap");
         // Tiles of 16 voxels along x: 16 points each, and one with 64 points, which is split.
         let mut rows: Vec<_> = (0..48).map(|x| row([x, 0, 0], 0.9)).collect();
         rows.extend((0..4).flat_map(|y| (48..64).map(move |x| row([x, y, 0], 0.9))));
         let mut sink = McapSink::create(&head_of(&rows), &path, &WriteOptions::beside(&path)).unwrap();
-        sink.most_points = 40;
+        sink.max_points = 40;
         rows.iter().for_each(|row| sink.put(row).unwrap());
         Box::new(sink).finish().unwrap();
         let bytes = std::fs::read(&path).unwrap();

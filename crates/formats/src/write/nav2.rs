@@ -114,12 +114,12 @@ mod tests {
     }
 
     #[test]
-    fn all_three_states_pass_the_rule() {
+    fn all_three_states_are_loaded_correctly() {
         assert_eq!(map(&rows(), [None, None]), ["??#", "#?."]);
     }
 
     #[test]
-    fn heights_choose_what_counts() {
+    fn heights_limit_the_voxels() {
         // A voxel that begins at 2 m is above the limit, and one that ends there is below.
         assert_eq!(map(&rows(), [None, Some(2.0)]), ["??.", "#?."]);
         assert_eq!(map(&rows(), [Some(0.5), None]), ["??#", "#??"]);

@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn heads_fill_lines_of_64_bytes() {
+    fn headers_are_multiples_of_64_bytes() {
         for rows in [0_u64, 7, 1 << 40] {
             let head = npy_head("<f8", &format!("({rows}, 3)"));
             assert_eq!(head.len() % 64, 0);
@@ -131,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn the_checksum_is_that_of_the_entry() {
+    fn entry_checksums_are_correct() {
         let bytes = archive(u64::from(u32::MAX));
         let at = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
         assert_eq!(at(0), 0x0403_4b50);
@@ -144,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn large_archives_say_64_bit() {
+    fn large_archives_use_zip64() {
         let bytes = archive(100);
         // The 64-bit end record and its locator precede the classic end record.
         let end = bytes.len() - 22;

@@ -86,7 +86,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn no_output_takes_the_name_of_what_belongs_beside_it() {
+    fn outputs_do_not_use_names_of_companion_files() {
         let rows = [row([0, 0, 0], 0.9)];
         for (format, name, hint) in [
             ("nav2", "map.yaml", "map.pgm"),

@@ -18,7 +18,7 @@ macro_rules! files {
 }
 
 /// A row that depends on a Cargo feature.
-macro_rules! behind {
+macro_rules! with_feature {
     ($feature:literal, $name:literal, $extension:literal, $help:literal, $writer:expr) => {
         OutputFormat {
             feature: Some($feature),
@@ -77,13 +77,13 @@ const TABLE: [OutputFormat; 18] = [
     OutputFormat { is_text: true,
         ..row("xyz", Some("xyz"), "Text: x y z probability", files!(xyz::XyzSink::create)) },
     row("npz", Some("npz"), "NumPy arrays: xyz, log_odds, probability, count", files!(npz::NpzSink::create)),
-    behind!("las", "las", "las", "LAS 1.4 with log-odds and count as extra bytes", files!(las::LasSink::plain)),
-    behind!("las", "laz", "laz", "The same, compressed", files!(las::LasSink::compressed)),
-    behind!("las", "copc", "copc.laz", "The same with levels of detail", files!(copc::CopcSink::create)),
-    behind!("e57", "e57", "e57", "ASTM E57", files!(e57::E57Sink::create)),
-    behind!("parquet", "parquet", "parquet", "Apache Parquet, if enabled in this build",
+    with_feature!("las", "las", "las", "LAS 1.4 with log-odds and count as extra bytes", files!(las::LasSink::plain)),
+    with_feature!("las", "laz", "laz", "The same, compressed", files!(las::LasSink::compressed)),
+    with_feature!("las", "copc", "copc.laz", "The same with levels of detail", files!(copc::CopcSink::create)),
+    with_feature!("e57", "e57", "e57", "ASTM E57", files!(e57::E57Sink::create)),
+    with_feature!("parquet", "parquet", "parquet", "Apache Parquet, if enabled in this build",
             files!(parquet::ParquetSink::create)),
-    behind!("ros", "mcap", "mcap", "A recording with PointCloud2 messages, for Foxglove and others",
+    with_feature!("ros", "mcap", "mcap", "A recording with PointCloud2 messages, for Foxglove and others",
             files!(mcap::McapSink::create)),
     OutputFormat::GLB,
     OutputFormat { takes: &[Region, Which, Heights], needs_free_voxels: true,
@@ -160,7 +160,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_of_files_ask_for_formats() {
+    fn file_extensions_select_formats() {
         let formats = OutputFormats::default();
         let of_path = |name: &str| formats.of_path(Path::new(name)).map(|format| format.name);
         for format in formats.all() {

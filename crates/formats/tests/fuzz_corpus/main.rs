@@ -16,7 +16,7 @@ fn corpus(target: &str) -> PathBuf {
 }
 
 #[test]
-fn no_file_of_the_corpus_breaks_a_reader() {
+fn corpus_files_break_no_reader() {
     for (name, target) in TARGETS {
         let folder = corpus(name);
         let entries = fs::read_dir(&folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display()));

@@ -27,7 +27,7 @@ fn round_trip(format: &str, crs: Option<&str>) -> (Option<String>, Vec<String>) 
 }
 
 #[test]
-fn text_and_numbers_come_back() {
+fn text_and_codes_round_trip() {
     for format in FORMATS {
         for crs in [None, Some(UTM), Some("EPSG:25832")] {
             assert_eq!(round_trip(format, crs), (crs.map(str::to_owned), vec![]), "{format}");
@@ -36,20 +36,20 @@ fn text_and_numbers_come_back() {
 }
 
 #[test]
-fn a_system_in_feet_is_not_that_of_metres() {
+fn coordinate_systems_in_feet_are_not_passed_on() {
     let feet = UTM.replace("UNIT[\"metre\",1]", "UNIT[\"US survey foot\",0.304800609601219]");
     for format in FORMATS {
         let (crs, remarks) = round_trip(format, Some(&feet));
-        let said = "the coordinate system is not in metres";
+        let expected = "the coordinate system is not in metres";
         assert!(
-            crs.is_none() && remarks.iter().any(|remark| remark.starts_with(said)),
+            crs.is_none() && remarks.iter().any(|remark| remark.starts_with(expected)),
             "{format}: {remarks:?}"
         );
     }
 }
 
 #[test]
-fn what_is_no_number_of_a_system_is_refused() {
+fn invalid_epsg_codes_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.las");
     let head = VoxelsHead::of_stream(0, 0.5);
@@ -74,7 +74,7 @@ fn of_systems(source: &dyn CloudSource) -> Vec<String> {
 }
 
 #[test]
-fn files_of_another_system_are_refused_before_their_points() {
+fn files_with_another_coordinate_system_are_refused() {
     for format in ["las", "e57"] {
         let folder = tempfile::tempdir().unwrap();
         let systems = [Some("EPSG:25832"), Some("EPSG:25833"), None, Some("EPSG:25832")];
@@ -95,7 +95,7 @@ fn files_of_another_system_are_refused_before_their_points() {
 }
 
 #[test]
-fn a_system_that_later_files_name_is_told() {
+fn coordinate_system_of_later_files_is_remarked() {
     let folder = tempfile::tempdir().unwrap();
     let mut source = folder_of(folder.path(), "las", &[None, Some("EPSG:25832")]);
     assert!(source.next_cloud().unwrap().is_some());
@@ -103,6 +103,6 @@ fn a_system_that_later_files_name_is_told() {
     assert!(source.next_cloud().unwrap().is_some());
     assert_eq!(source.crs(), Some("EPSG:25832"));
     let remarks = of_systems(&*source);
-    let told = "1.las: names the coordinate system EPSG:25832, but the previous files name none";
-    assert!(remarks.len() == 1 && remarks[0].starts_with(told), "{remarks:?}");
+    let expected = "1.las: names the coordinate system EPSG:25832, but the previous files name none";
+    assert!(remarks.len() == 1 && remarks[0].starts_with(expected), "{remarks:?}");
 }

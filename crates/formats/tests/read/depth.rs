@@ -13,7 +13,7 @@ fn image(path: &Path, width: u32, depths: &[u16]) {
 }
 
 #[test]
-fn seven_scenes_have_millimetres_invalid_pixels_and_poses() {
+fn seven_scenes_data_is_read() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     image(&at("frame-000000.depth.png"), 2, &[2000, 0, 65535, 500]);
@@ -45,7 +45,7 @@ fn seven_scenes_have_millimetres_invalid_pixels_and_poses() {
 }
 
 #[test]
-fn tum_has_a_list_with_stamps_and_a_scale_of_5000() {
+fn tum_data_has_a_list_and_a_scale_of_5000() {
     // A camera file is also searched for next to the folder.
     let outer = tempfile::tempdir().unwrap();
     let folder = outer.path().join("folder");
@@ -63,7 +63,7 @@ fn tum_has_a_list_with_stamps_and_a_scale_of_5000() {
 }
 
 #[test]
-fn lines_of_the_list_that_cannot_be_read_are_left_out() {
+fn invalid_lines_of_the_list_are_skipped() {
     let folder = tempfile::tempdir().unwrap();
     let options = ReadOptions {
         intrinsics: Some(Intrinsics::new([525.0, 525.0, 319.5, 239.5]).unwrap()),
@@ -89,7 +89,7 @@ fn lines_of_the_list_that_cannot_be_read_are_left_out() {
 
 /// An untrusted list must not open arbitrary files.
 #[test]
-fn images_out_of_the_folder_are_refused() {
+fn images_outside_of_the_folder_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let inner = folder.path().join("set");
     fs::create_dir(&inner).unwrap();
@@ -111,7 +111,7 @@ fn images_out_of_the_folder_are_refused() {
 }
 
 #[test]
-fn images_that_are_no_depths_are_errors() {
+fn other_images_are_errors() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("1.png");
     let intrinsics = Some(Intrinsics::new([1.0, 1.0, 0.0, 0.0]).unwrap());

@@ -49,7 +49,7 @@ fn sweep() -> Vec<(u32, [f64; 3])> {
 }
 
 /// Returns the distance of a point to the room's nearest plane.
-fn beside_planes_m(point: [f64; 3]) -> f64 {
+fn plane_distance_m(point: [f64; 3]) -> f64 {
     let planes = point.iter().zip(ROOM_M).flat_map(|(at, planes)| planes.map(|plane| (at - plane).abs()));
     planes.fold(f64::INFINITY, f64::min)
 }
@@ -57,7 +57,7 @@ fn beside_planes_m(point: [f64; 3]) -> f64 {
 /// Returns the largest distance of the points to the planes.
 fn worst_m(points: &[CloudPoint], mut place: impl FnMut(&CloudPoint) -> [f64; 3]) -> f64 {
     let sensor = world_from_sensor(0.0);
-    points.iter().map(|point| beside_planes_m(sensor.apply(place(point)))).fold(0.0, f64::max)
+    points.iter().map(|point| plane_distance_m(sensor.apply(place(point)))).fold(0.0, f64::max)
 }
 
 fn assert_deskews(points: &[CloudPoint], pose_at: impl FnMut(i64) -> Option<RigidPose>, of: &str) {
@@ -97,7 +97,7 @@ fn in_file(trajectory: &Trajectory, at_ns: i64) -> Option<RigidPose> {
 type PlyTime = (&'static str, &'static str, fn(u32) -> Vec<u8>);
 
 #[test]
-fn times_of_every_field_of_ply_take_points_to_the_planes() {
+fn every_ply_time_field_deskews() {
     let times: [PlyTime; 6] = [
         ("t", "uint", |ns| ns.to_le_bytes().to_vec()),
         ("offset_time", "uint32", |ns| ns.to_le_bytes().to_vec()),
@@ -130,7 +130,7 @@ fn times_of_every_field_of_ply_take_points_to_the_planes() {
 type TextTime = (&'static str, fn(u32) -> String);
 
 #[test]
-fn times_of_every_column_of_text_take_points_to_the_planes() {
+fn every_text_time_column_deskews() {
     let times: [TextTime; 6] = [
         ("t[ns]", |ns| ns.to_string()),
         ("offset_time", |ns| ns.to_string()),
@@ -212,7 +212,7 @@ mod recordings {
     type MessageTime = (Field, fn(u32) -> Vec<u8>);
 
     #[test]
-    fn times_of_every_field_of_messages_take_points_to_the_planes() {
+    fn every_message_time_field_deskews() {
         let times: [MessageTime; 5] = [
             (("t", 12, U32), |ns| ns.to_le_bytes().to_vec()),
             (("offset_time", 12, U32), |ns| ns.to_le_bytes().to_vec()),
@@ -234,7 +234,7 @@ mod recordings {
 
     /// Drivers without a clock leave the cloud's stamp at 0, while its points have times of another clock.
     #[test]
-    fn times_since_1970_need_no_stamp_of_the_message() {
+    fn absolute_times_need_no_message_stamp() {
         let fields = [("x", 0, F32), ("y", 4, F32), ("z", 8, F32), ("timestamp", 12, F64)];
         let point = |(ns, place): (u32, [f64; 3])| {
             let place = place.map(|axis| (axis as f32).to_le_bytes());

@@ -7,7 +7,7 @@ use voxtile_formats::{ReadOptions, open_clouds};
 
 /// The fixture was written by pye57 (libE57Format).
 #[test]
-fn scans_have_poses_and_invalid_points_are_no_returns() {
+fn scans_have_poses_and_invalid_points_are_not_returns() {
     let clouds = clouds(&fixture("scans.e57"));
     let names: Vec<&str> = clouds.iter().map(|(head, _)| head.name.as_str()).collect();
     assert_eq!(names, ["scan at 0", "scan at 100"]);
@@ -33,7 +33,7 @@ fn scans_have_poses_and_invalid_points_are_no_returns() {
 
 /// Data already in one frame, such as exported voxels, has no pose.
 #[test]
-fn a_scan_without_a_pose_is_in_the_frame_of_the_file() {
+fn scans_without_pose_are_in_the_file_frame() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("bare.e57");
     write_voxels("e57", &path, None);
@@ -52,7 +52,7 @@ fn a_scan_without_a_pose_is_in_the_frame_of_the_file() {
 }
 
 #[test]
-fn no_damage_makes_a_panic() {
+fn damage_never_panics() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("damaged.e57");
     let bytes = fs::read(fixture("scans.e57")).unwrap();
@@ -68,7 +68,7 @@ fn no_damage_makes_a_panic() {
 
 /// The library would create points until the memory is exhausted.
 #[test]
-fn points_that_take_no_bits_are_refused() {
+fn points_without_bits_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("constant.e57");
     let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/corpus/cloud_e57/without-bits");
@@ -95,7 +95,7 @@ fn described(path: &Path, xml: &[u8]) {
 }
 
 #[test]
-fn a_file_that_is_no_e57_or_is_cut_off_says_so() {
+fn foreign_and_truncated_files_are_errors() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.e57");
     let whole = fs::read(fixture("scans.e57")).unwrap();
@@ -113,7 +113,7 @@ fn a_file_that_is_no_e57_or_is_cut_off_says_so() {
 
 /// The library compares each attribute of a tag with the previous ones.
 #[test]
-fn a_tag_with_many_attributes_is_refused() {
+fn tags_with_many_attributes_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("many.e57");
     let attributes: String = (0..200_000).map(|k| format!(" a{k}=''")).collect();

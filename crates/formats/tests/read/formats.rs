@@ -9,7 +9,7 @@ fn guess(path: &Path) -> voxtile::Result<&'static str> {
 }
 
 #[test]
-fn content_tells_the_format_whatever_the_name() {
+fn formats_are_detected_by_content() {
     let folder = tempfile::tempdir().unwrap();
     for (name, format) in [
         ("ascii.ply", "ply"),
@@ -38,7 +38,7 @@ fn content_tells_the_format_whatever_the_name() {
 }
 
 #[test]
-fn folders_tell_what_they_hold() {
+fn folder_formats_are_detected() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     fs::create_dir(at("data")).unwrap();
@@ -56,7 +56,7 @@ fn folders_tell_what_they_hold() {
 }
 
 #[test]
-fn what_is_not_read_is_named_with_the_way() {
+fn unsupported_formats_are_reported_with_advice() {
     let folder = tempfile::tempdir().unwrap();
     for (name, bytes, reason) in [
         ("a.dat", &b"\xd4\xc3\xb2\xa1\x02\x00"[..], "is a network capture"),

@@ -20,7 +20,7 @@ fn assert_near(found: &[CloudPoint], wanted: &[CloudPoint], what: &str) {
 /// Expected by construction: for even k, points k and k + 1 were measured at 3e8 + k / 32 s, in any order in the file.
 /// Windows of 0.1 s contain the points 0 1, 2 3, 4, 5 6, 7, 8 9.
 #[test]
-fn a_file_is_cut_into_scans_by_its_times() {
+fn files_are_split_into_scans_by_time() {
     for name in ["timed.las", "timed.laz"] {
         for memory_bytes in [0, 1 << 20] {
             let clouds = clouds_with(&fixture(name), &ReadOptions { memory_bytes, ..Default::default() });
@@ -45,7 +45,7 @@ fn a_file_is_cut_into_scans_by_its_times() {
 }
 
 #[test]
-fn scans_that_are_not_read_are_passed_by() {
+fn unread_scans_are_skipped() {
     let mut source = open_clouds(&fixture("timed.laz"), &ReadOptions::default()).unwrap();
     let mut heads = 0;
     while source.next_cloud().unwrap().is_some() {
@@ -55,7 +55,7 @@ fn scans_that_are_not_read_are_passed_by() {
 }
 
 #[test]
-fn feet_become_metres_on_each_axis() {
+fn feet_are_converted_on_each_axis() {
     let us_foot = 1200.0 / 3937.0;
     for (name, flat) in [("feet.las", 0.3048), ("survey_feet.las", us_foot)] {
         let mut source = open_clouds(&fixture(name), &ReadOptions::default()).unwrap();
@@ -75,7 +75,7 @@ fn feet_become_metres_on_each_axis() {
 }
 
 #[test]
-fn withheld_points_are_left_out() {
+fn withheld_points_are_skipped() {
     let mut source = open_clouds(&fixture("withheld.laz"), &one_cloud()).unwrap();
     let clouds = all(source.as_mut()).unwrap();
     let mut points = wanted([600_000.0, 5_000_000.0, 100.0]);
@@ -85,7 +85,7 @@ fn withheld_points_are_left_out() {
 }
 
 #[test]
-fn the_origin_of_the_rays_makes_one_cloud() {
+fn given_ray_origin_gives_one_cloud() {
     let options =
         ReadOptions { sensor_origin_m: Some([600_000.0, 5_000_000.0, 100.0]), ..Default::default() };
     let clouds = clouds_with(&fixture("feet.las"), &options);
@@ -96,7 +96,7 @@ fn the_origin_of_the_rays_makes_one_cloud() {
 }
 
 #[test]
-fn a_file_that_is_cut_off_gives_what_is_whole() {
+fn truncated_files_give_complete_points() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("cut.las");
     let bytes = fs::read(fixture("timed.las")).unwrap();
@@ -119,7 +119,7 @@ fn announce(bytes: &mut [u8], points: u64) {
 
 /// A recorder writes the point count last.
 #[test]
-fn a_file_whose_writer_was_killed_is_read_as_far_as_it_goes() {
+fn files_of_killed_writers_are_read_to_their_end() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("killed.las");
     let whole = fs::read(fixture("timed.las")).unwrap();
@@ -145,7 +145,7 @@ fn a_file_whose_writer_was_killed_is_read_as_far_as_it_goes() {
 
 /// Data after the points is not a point: wave packets of LAS 1.3, extended records of LAS 1.4.
 #[test]
-fn records_behind_points_are_not_taken_for_points() {
+fn records_after_points_are_not_points() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("records.las");
     for place in [227, 235] {
@@ -189,7 +189,7 @@ fn scales_and_offsets_must_give_coordinates() {
 }
 
 #[test]
-fn no_damage_makes_a_panic() {
+fn damage_never_panics() {
     let folder = tempfile::tempdir().unwrap();
     for name in ["timed.las", "timed.laz", "feet.las", "survey_feet.las"] {
         let bytes = fs::read(fixture(name)).unwrap();

@@ -42,7 +42,7 @@ fn refusal(bytes: &[u8]) -> String {
 
 /// LASzip and laspy use the 64-bit count; the old field may contain any value.
 #[test]
-fn of_two_numbers_of_points_that_of_the_points_counts() {
+fn matching_point_count_is_used() {
     for (legacy, large, remark) in [
         (100, 400, "two point counts, 100 and 400: 400 points exist"),
         (400, 100, "two point counts, 400 and 100: 400 points exist"),
@@ -61,7 +61,7 @@ fn of_two_numbers_of_points_that_of_the_points_counts() {
 }
 
 #[test]
-fn points_behind_the_announced_ones_are_read() {
+fn points_after_the_announced_ones_are_read() {
     let las = Las { legacy: 100, ..Las::new(2, 1, 400) };
     let announced = "the header announces 100 points";
     let (points, remarks) = read(&las, &las.bytes());
@@ -83,7 +83,7 @@ fn points_behind_the_announced_ones_are_read() {
 }
 
 #[test]
-fn what_is_there_of_a_file_that_was_cut_off_is_read() {
+fn truncated_files_are_read_to_their_end() {
     for (minor, format) in [(2, 1), (4, 6)] {
         let las = Las::new(minor, format, 400);
         let whole = las.bytes();
@@ -161,7 +161,7 @@ fn one_stream_of_points_is_read() {
 }
 
 #[test]
-fn announced_records_that_are_not_there_do_no_harm() {
+fn missing_announced_records_are_harmless() {
     let las = Las::new(2, 1, 400);
     let mut bytes = las.bytes();
     bytes[100..104].copy_from_slice(&30_u32.to_le_bytes());
@@ -184,7 +184,7 @@ fn announced_records_that_are_not_there_do_no_harm() {
 }
 
 #[test]
-fn las_1_5_is_read_with_its_own_zero_of_time() {
+fn las_1_5_time_offset_is_used() {
     let las = Las { encoding: 1 << 6 | 1, ..Las::new(5, 6, 400) };
     let mut bytes = las.bytes();
     bytes[391..393].copy_from_slice(&1250_u16.to_le_bytes());
@@ -202,7 +202,7 @@ fn las_1_5_is_read_with_its_own_zero_of_time() {
 }
 
 #[test]
-fn point_formats_that_are_not_known_and_short_points_are_refused() {
+fn unknown_point_formats_and_short_points_are_refused() {
     let mut bytes = Las::new(4, 6, 4).bytes();
     bytes[104] = 11;
     assert!(
@@ -215,7 +215,7 @@ fn point_formats_that_are_not_known_and_short_points_are_refused() {
 }
 
 #[test]
-fn points_without_a_time_are_left_out_of_scans_alone() {
+fn points_without_time_are_only_skipped_in_scans() {
     let las = Las::new(2, 1, 400);
     let mut bytes = las.bytes();
     let time_at = |k: usize| 227 + 28 * k + 20;

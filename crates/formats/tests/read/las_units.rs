@@ -40,7 +40,7 @@ fn projected(unit: &str, vertical: &str) -> String {
 
 /// Files of New Mexico name the survey foot for heights but have the factor of a metre.
 #[test]
-fn the_name_of_a_unit_counts_where_its_factor_is_of_another() {
+fn unit_names_override_wrong_factors() {
     let survey = "\"US survey foot\",0.304800609601219";
     let las = with_wkt(&projected(survey, "\"US survey foot\",1.0"));
     assert_units(
@@ -73,7 +73,7 @@ fn with_keys(keys: &[[u16; 3]], doubles: &[f64]) -> Las {
 }
 
 #[test]
-fn keys_name_units_by_number_by_size_and_by_the_vertical_system() {
+fn keys_give_units_by_code_size_and_vertical_system() {
     let metres = "coordinates are converted to metres";
     assert_units(&with_keys(&[[3076, 0, 9003]], &[]), [US_FOOT_M; 2], metres);
     // A user-defined unit size, the second of the doubles.

@@ -50,7 +50,7 @@ fn assert_says(error: &str, at: usize, what: &str) {
 
 /// Each of these claims would make the library reserve gigabytes or read for years.
 #[test]
-fn a_chunk_table_that_lies_is_refused() {
+fn false_chunk_tables_are_refused() {
     let (by_point, by_layer) = (fs::read(fixture("timed.laz")).unwrap(), voxel_file("laz"));
     for file in [&by_point, &by_layer, &voxel_file("copc")] {
         let (points_at, table_at) = places(file);
@@ -73,8 +73,8 @@ fn a_chunk_table_that_lies_is_refused() {
             match open_clouds(&path, &ReadOptions::default()) {
                 Ok(mut source) => assert_eq!(points_of(all(source.as_mut()).unwrap()).len(), points),
                 Err(error) => {
-                    let said = format!("{error:#}");
-                    assert!(said.contains("damaged.laz: malformed: offset "), "{said}");
+                    let expected = format!("{error:#}");
+                    assert!(expected.contains("damaged.laz: malformed: offset "), "{expected}");
                     refused += 1;
                 }
             }
@@ -96,7 +96,7 @@ fn a_chunk_table_that_lies_is_refused() {
 
 /// Found by fuzzing: the layers were not checked if the compressor type claimed that there are none.
 #[test]
-fn a_compressor_must_fit_the_versions_of_its_parts() {
+fn compressor_type_must_match_item_versions() {
     for (file, compressor) in
         [(fs::read(fixture("timed.laz")).unwrap(), 2_u16), (voxel_file("laz"), 2), (voxel_file("laz"), 1)]
     {
@@ -108,7 +108,7 @@ fn a_compressor_must_fit_the_versions_of_its_parts() {
 }
 
 #[test]
-fn more_points_than_the_chunks_have_room_for_are_refused() {
+fn more_points_than_in_chunks_are_refused() {
     // For layered chunks, the chunks' own counts are used.
     let by_layer = voxel_file("laz");
     let (points, remarks) = of_changed(&by_layer, 247, &u64::to_le_bytes(1 << 50));
@@ -123,7 +123,7 @@ fn more_points_than_the_chunks_have_room_for_are_refused() {
 
 /// Each point of a COPC file is read once, in the order of the chunks.
 #[test]
-fn copc_is_read_as_laz_is() {
+fn copc_is_read_like_laz() {
     let folder = tempfile::tempdir().unwrap();
     let centers = |format: &str| {
         let path = folder.path().join(format!("a.{}", format_of(format).extension.unwrap()));

@@ -28,7 +28,7 @@ fn error_of(name: &str, bytes: &[u8]) -> String {
 const WANTED: [[f64; 3]; 2] = [[1.5, -2.25, 3.0], [4.0, 5.0, 6.0]];
 
 #[test]
-fn texts_as_programs_write_them() {
+fn texts_of_many_programs_are_read() {
     for (name, text) in [
         ("mac.xyz", "1.5 -2.25 3\r4 5 6\r"),
         ("mark.csv", "\u{feff}x,y,z\r\n1.5,-2.25,3\r\n4,5,6\r\n"),
@@ -53,7 +53,7 @@ fn texts_as_programs_write_them() {
 }
 
 #[test]
-fn rows_that_are_no_points_are_counted_and_named() {
+fn invalid_rows_are_counted_and_reported() {
     let (points, remarks) = read_text("a.csv", "x,y,z\n1.5,-2.25,3\nbroken,1,2\n4,5,6\n7,8\n");
     assert_eq!(points, WANTED);
     assert_eq!(remarks, ["2 rows are not points, skipped (line 3: `broken` is not a number)"]);
@@ -64,7 +64,7 @@ fn rows_that_are_no_points_are_counted_and_named() {
 }
 
 #[test]
-fn what_is_no_text_of_points_is_said_with_line_and_word() {
+fn invalid_texts_are_errors_with_line_and_word() {
     for (name, bytes, reason) in [
         ("a.csv", &b"x (px),y (px),z (px)\n1,2,3\n"[..], "line 1: column `x (px)`: `px` is an unknown unit"),
         ("a.xyz", b"# a\nC 1 2 3\n", "line 2: `C 1 2 3` is neither numbers nor column names"),
@@ -80,7 +80,7 @@ fn what_is_no_text_of_points_is_said_with_line_and_word() {
 }
 
 #[test]
-fn what_arrived_in_place_of_a_file_is_named_whatever_its_name() {
+fn placeholders_are_reported_for_any_name() {
     let pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:00\nsize 5\n".to_owned();
     let page = "\n<!DOCTYPE html>\n<html>Sign in</html>\n".to_owned();
     let formats = Registry::default();
@@ -107,7 +107,7 @@ fn what_arrived_in_place_of_a_file_is_named_whatever_its_name() {
 }
 
 #[test]
-fn archives_are_named() {
+fn archives_are_reported() {
     for (name, bytes, reason) in [
         ("a.csv", &b"PK\x03\x04..."[..], "is a ZIP archive"),
         ("a.las", b"\x1f\x8b\x08\0...", "is packed with gzip"),
@@ -125,7 +125,7 @@ fn archives_are_named() {
 
 #[cfg(unix)]
 #[test]
-fn links_to_nothing_are_said() {
+fn broken_links_are_reported() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.las");
     std::os::unix::fs::symlink("../lost.las", &path).unwrap();
@@ -134,7 +134,7 @@ fn links_to_nothing_are_said() {
 }
 
 #[test]
-fn headers_of_ply_in_any_letters_and_line_ends() {
+fn ply_headers_in_any_case_and_line_ends() {
     let head = "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\n\
                 end_header\n";
     let body = "1.5 -2.25 3\n4 5 6\n";
@@ -180,7 +180,7 @@ fn headers_of_ply_in_any_letters_and_line_ends() {
 /// In a binary file with CR line ends, the first number directly follows the last CR, even if it starts with an LF
 /// byte.
 #[test]
-fn binary_ply_after_cr_alone() {
+fn binary_ply_after_cr_line_ends() {
     let head = "ply\rformat binary_little_endian 1.0\relement vertex 2\rproperty uchar label\rproperty float x\r\
                 property float y\rproperty float z\rend_header\r";
     let row = |[x, y, z]: [f64; 3]| {
@@ -200,7 +200,7 @@ fn scan_of(path: &Path, options: &ReadOptions) -> Result<(Vec<[f64; 3]>, Vec<Str
 }
 
 #[test]
-fn headers_of_pcd_in_any_letters_and_line_ends() {
+fn pcd_headers_in_any_case_and_line_ends() {
     let head = "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 2\nHEIGHT 1\n\
                 VIEWPOINT 0 0 0 1 0 0 0\nPOINTS 2\nDATA ascii\n";
     let body = "1.5 -2.25 3\n4 5 6\n";
@@ -261,13 +261,13 @@ fn raw(points: usize, row: impl Fn(usize, [f64; 3]) -> Vec<f64>) -> Vec<f64> {
 }
 
 #[test]
-fn columns_of_raw_numbers_are_checked_and_said() {
+fn columns_of_raw_numbers_are_checked_and_reported() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.bin");
     let floats =
         |values: &[f64]| values.iter().flat_map(|value| (*value as f32).to_le_bytes()).collect::<Vec<u8>>();
     let doubles = |values: &[f64]| values.iter().flat_map(|value| value.to_le_bytes()).collect::<Vec<u8>>();
-    for (bytes, said) in [
+    for (bytes, expected) in [
         (
             floats(&raw(420, |k, [x, y, z]| vec![x, y, z, (k % 7) as f64])),
             "4 columns of float32: x y z intensity",
@@ -285,10 +285,13 @@ fn columns_of_raw_numbers_are_checked_and_said() {
     ] {
         fs::write(&path, bytes).unwrap();
         let (points, remarks) = read(&path, &ReadOptions::default());
-        assert_eq!(remarks, [said]);
-        assert_eq!(points.len(), 420, "{said}");
+        assert_eq!(remarks, [expected]);
+        assert_eq!(points.len(), 420, "{expected}");
         let first = raw(1, |_, place| place.to_vec());
-        assert!(points[0].iter().zip(&first).all(|(found, wanted)| (found - wanted).abs() < 1e-6), "{said}");
+        assert!(
+            points[0].iter().zip(&first).all(|(found, wanted)| (found - wanted).abs() < 1e-6),
+            "{expected}"
+        );
     }
     fs::write(
         &path,
@@ -325,7 +328,7 @@ fn fields_of_raw_numbers_have_types_and_units() {
 }
 
 #[test]
-fn texts_beside_clouds_are_no_clouds() {
+fn companion_texts_are_not_clouds() {
     let folder = tempfile::tempdir().unwrap();
     for (name, text) in [
         ("1.csv", "1.5,-2.25,3\n"),
@@ -348,7 +351,7 @@ fn texts_beside_clouds_are_no_clouds() {
 }
 
 #[test]
-fn a_folder_of_texts_without_clouds_names_what_may_be_meant() {
+fn text_folders_without_clouds_suggest_alternatives() {
     let folder = tempfile::tempdir().unwrap();
     fs::create_dir(folder.path().join("depth")).unwrap();
     fs::write(folder.path().join("cam.txt"), "525 525 31.5 23.5\n").unwrap();

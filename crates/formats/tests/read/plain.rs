@@ -4,7 +4,7 @@ use voxtile_formats::{CloudPoint, RigidPose};
 use voxtile_formats::{ReadOptions, Registry};
 
 #[test]
-fn ply_of_every_encoding() {
+fn every_ply_encoding_is_read() {
     for name in ["ascii.ply", "little.ply", "big.ply"] {
         let clouds = clouds(&fixture(name));
         let [(head, points)] = clouds.as_slice() else { panic!("{} clouds", clouds.len()) };
@@ -18,7 +18,7 @@ fn ply_of_every_encoding() {
 
 /// Text has more digits than a float, which are dropped; a double keeps them.
 #[test]
-fn ply_as_text_is_the_same_points_as_in_both_binaries() {
+fn text_and_binary_ply_give_equal_points() {
     let folder = tempfile::tempdir().unwrap();
     let rows: [[f64; 3]; 2] = [[0.1, -1e-3, 16_777_217.0], [1.0 / 3.0, 2e30, -0.7]];
     let file = |format: &str, body: &[Vec<u8>]| {
@@ -43,7 +43,7 @@ fn ply_as_text_is_the_same_points_as_in_both_binaries() {
 }
 
 #[test]
-fn ply_that_is_cut_off_gives_what_is_whole() {
+fn truncated_ply_gives_complete_points() {
     let folder = tempfile::tempdir().unwrap();
     // Removes a face of 13 bytes and a part of the last vertex; from the text, one and a half lines.
     for (name, cut) in [("little.ply", 15), ("big.ply", 15), ("ascii.ply", 12)] {
@@ -57,7 +57,7 @@ fn ply_that_is_cut_off_gives_what_is_whole() {
 }
 
 #[test]
-fn text_and_raw_floats_are_the_same_points() {
+fn text_and_raw_floats_give_equal_points() {
     for name in ["points.csv", "points.xyz", "kitti.bin", "nuscenes.pcd.bin"] {
         let clouds = clouds(&fixture(name));
         assert_eq!(clouds.len(), 1, "{name}");
@@ -102,7 +102,7 @@ fn five_columns_are_not_read_as_four() {
 }
 
 #[test]
-fn no_file_of_four_columns_is_refused() {
+fn four_column_files_are_accepted() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("0.bin");
     let grid = |k: f32| [(k / 20.0).floor(), k % 20.0, 2.0];
@@ -140,7 +140,7 @@ fn a_folder_is_read_in_natural_order_with_stamps_of_names() {
 
 /// A table of poses among text clouds, given by different paths.
 #[test]
-fn files_that_are_named_for_something_else_are_no_clouds() {
+fn files_used_by_other_options_are_not_clouds() {
     let folder = tempfile::tempdir().unwrap();
     let scans = folder.path().join("scans");
     fs::create_dir(&scans).unwrap();
@@ -169,7 +169,7 @@ fn files_that_are_named_for_something_else_are_no_clouds() {
 }
 
 #[test]
-fn a_bad_file_of_a_folder_is_passed_by() {
+fn invalid_files_of_a_folder_are_skipped() {
     let folder = tempfile::tempdir().unwrap();
     for name in ["1.ply", "2.ply", "3.ply"] {
         fs::copy(fixture("little.ply"), folder.path().join(name)).unwrap();
@@ -185,7 +185,7 @@ fn a_bad_file_of_a_folder_is_passed_by() {
 }
 
 #[test]
-fn registered_points_are_seen_from_the_sensor_origin() {
+fn registered_points_are_relative_to_the_sensor_origin() {
     let options = ReadOptions { sensor_origin_m: Some([1.0, 2.0, 4.0]), ..Default::default() };
     let clouds = clouds_with(&fixture("points.csv"), &options);
     let (head, points) = &clouds[0];
@@ -197,7 +197,7 @@ fn registered_points_are_seen_from_the_sensor_origin() {
 }
 
 #[test]
-fn no_damage_of_a_small_file_makes_a_panic() {
+fn damage_of_small_files_never_panics() {
     let folder = tempfile::tempdir().unwrap();
     for name in ["ascii.ply", "little.ply", "points.csv"] {
         let bytes = fs::read(fixture(name)).unwrap();

@@ -20,7 +20,7 @@ const TUM: &str = "# timestamp tx ty tz qx qy qz qw\n\
 const FIRST_NS: i64 = 1_403_636_579_763_555_584;
 
 #[test]
-fn stamps_are_exact_and_poses_lie_between() {
+fn stamps_are_exact_and_poses_are_interpolated() {
     let trajectory = read(TUM).unwrap();
     let first = RigidPose { position_m: [1.0, 2.0, 3.0], ..RigidPose::IDENTITY };
     assert_eq!(trajectory.at(FIRST_NS, 0).unwrap(), Found::Exact(first));
@@ -53,7 +53,7 @@ fn stamps_are_exact_and_poses_lie_between() {
 }
 
 #[test]
-fn a_pose_within_a_millisecond_is_taken_whatever_the_gap() {
+fn poses_within_a_millisecond_are_used_in_any_gap() {
     let key_frames =
         "1700000010.000000000 1 0 0 0 0 0 1\n1700000025.5 2 0 0 0 0 0 1\n1700000040.25 3 0 0 0 0 0 1\n";
     let trajectory = read(key_frames).unwrap();
@@ -77,7 +77,7 @@ fn a_pose_within_a_millisecond_is_taken_whatever_the_gap() {
 }
 
 #[test]
-fn stamps_out_of_order_and_twice_are_remarked() {
+fn unordered_and_duplicate_stamps_are_remarked() {
     let trajectory = read("2 1 0 0 0 0 0 1\n1 2 0 0 0 0 0 1\n2 3 0 0 0 0 0 1\n").unwrap();
     assert_eq!(
         trajectory.stamps_ns().map(|stamp| stamp.unwrap()).collect::<Vec<_>>(),
@@ -90,7 +90,7 @@ fn stamps_out_of_order_and_twice_are_remarked() {
 }
 
 #[test]
-fn what_is_no_pose_is_an_error_with_its_line() {
+fn invalid_poses_are_errors_with_their_line() {
     for (text, reason) in [
         ("1 nan 0 0 0 0 0 1\n", "line 1: `nan` is not finite"),
         ("0 0 0 0 0 0 0 0\n", "line 1: the quaternion 0 0 0 0 has length 0"),
@@ -151,7 +151,7 @@ impl CloudSource for Clouds {
 }
 
 #[test]
-fn poses_by_number_are_as_many_as_clouds() {
+fn poses_by_number_must_match_the_number_of_clouds() {
     let trajectory = read(TUM).unwrap();
     assert_eq!(trajectory.of_cloud(2, &Clouds(Some(3))).unwrap(), trajectory.by_number(2).unwrap());
     assert_eq!(trajectory.of_cloud(2, &Clouds(None)).unwrap(), trajectory.by_number(2).unwrap());
@@ -166,7 +166,7 @@ fn poses_by_number_are_as_many_as_clouds() {
 }
 
 #[test]
-fn tables_name_their_columns() {
+fn tables_have_named_columns() {
     let euroc = "#timestamp [ns], p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], q_RS_z []\n\
                  1403636579763555584,1,2,3,0,1,0,0\n";
     let csv = "qw,qz,qy,qx,z,y,x,timestamp,note\n0,0,0,1,3,2,1,1403636579.763555584,9\n";
@@ -196,13 +196,13 @@ fn units_of_columns_are_used() {
         let trajectory = read(text).unwrap();
         assert_eq!(trajectory.at(1_700_000_000_000_000_000, 0).unwrap(), Found::Exact(wanted), "{text}");
         let remarks = trajectory.remarks().join("\n");
-        let said = format!("positions are in {unit}, as stated in their column names");
-        assert!(if unit.is_empty() { remarks.is_empty() } else { remarks.contains(&said) }, "{remarks}");
+        let expected = format!("positions are in {unit}, as stated in their column names");
+        assert!(if unit.is_empty() { remarks.is_empty() } else { remarks.contains(&expected) }, "{remarks}");
     }
 }
 
 #[test]
-fn rows_that_are_no_poses_keep_their_numbers_and_are_remarked() {
+fn invalid_rows_keep_their_numbers_and_are_remarked() {
     for (row, reason) in [
         ("2 nan nan nan nan nan nan nan", "line 3: `nan` is not finite"),
         ("2 -nan(ind) 0 0 0 0 0 1", "line 3: `-nan(ind)` is not finite"),
@@ -260,7 +260,7 @@ fn turning_cart() -> Vec<([f64; 3], [f64; 4])> {
 }
 
 #[test]
-fn quaternions_with_w_first_are_told_by_the_way_the_sensor_stands() {
+fn quaternion_order_is_detected_by_upright_sensors() {
     let text = |is_first: bool, head: &str| {
         let line = |(k, (p, [w, x, y, z])): (usize, ([f64; 3], [f64; 4]))| {
             let q = if is_first { [w, x, y, z] } else { [x, y, z, w] };
@@ -292,7 +292,7 @@ fn quaternions_with_w_first_are_told_by_the_way_the_sensor_stands() {
 }
 
 #[test]
-fn kitti_poses_of_the_camera_become_those_of_the_lidar() {
+fn kitti_camera_poses_are_converted_to_lidar_poses() {
     let folder = tempfile::tempdir().unwrap();
     let (poses, calib) = (folder.path().join("00.txt"), folder.path().join("calib.txt"));
     // The camera looks along the lidar's x and moved 5 m forward.
@@ -310,7 +310,7 @@ fn kitti_poses_of_the_camera_become_those_of_the_lidar() {
 
 /// A map built from one of the two forms can be resumed with the other.
 #[test]
-fn a_matrix_in_a_file_is_the_pose_that_the_engine_makes_of_it_to_the_bit() {
+fn matrices_give_bit_identical_poses_to_the_engine() {
     let (mut text, mut wanted) = (String::new(), Vec::new());
     let mut next = 1_u64;
     let mut random = || {
@@ -342,7 +342,7 @@ fn a_matrix_in_a_file_is_the_pose_that_the_engine_makes_of_it_to_the_bit() {
 }
 
 #[test]
-fn arrays_of_numpy() {
+fn numpy_arrays_are_read() {
     let at = |name: &str| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name);
     let tum = Trajectory::read(&at("poses_tum.npy"), None).unwrap();
     assert_eq!(tum.span_ns().unwrap(), Some([1_700_000_000_250_000_000, 1_700_000_001_250_000_000]));
@@ -401,7 +401,7 @@ fn npy(version: u8, header: &str, bytes: usize) -> Vec<u8> {
 }
 
 #[test]
-fn an_array_that_holds_no_poses_says_what_is_expected() {
+fn invalid_arrays_report_the_expected_layout() {
     let folder = tempfile::tempdir().unwrap();
     let fail = |name: &str, bytes: &[u8]| {
         let path = folder.path().join(name);

@@ -7,7 +7,7 @@ use std::path::Path;
 use voxtile::{Error, FormatError, Result};
 use voxtile_formats::read::{Points, Visit};
 use voxtile_formats::{CloudHead, CloudPoint};
-use voxtile_formats::{InputFormat, Mark, Open, ReadOptions, Registry};
+use voxtile_formats::{Detection, InputFormat, Open, ReadOptions, Registry};
 
 /// Points on the x axis, one per line.
 struct Axis(BufReader<fs::File>);
@@ -33,13 +33,13 @@ const AXIS: InputFormat = InputFormat {
     aliases: &["line"],
     title: "points on an axis",
     extensions: &["axis"],
-    mark: Mark::Start(|start| start.starts_with(b"AXIS\n")),
+    detection: Detection::Start(|start| start.starts_with(b"AXIS\n")),
     open: Open::Cloud(open_axis),
     ..InputFormat::UNNAMED
 };
 
 #[test]
-fn a_format_is_a_row_and_a_file() {
+fn formats_need_one_row_and_one_file() {
     let folder = tempfile::tempdir().unwrap();
     let scans = folder.path().join("drive/scans");
     fs::create_dir_all(&scans).unwrap();
@@ -75,7 +75,7 @@ fn a_format_is_a_row_and_a_file() {
 }
 
 #[test]
-fn names_are_of_one_format_and_rows_are_whole() {
+fn names_are_unique_and_rows_are_complete() {
     let formats = Registry::default();
     let mut names = BTreeSet::new();
     for format in formats.formats() {
@@ -98,7 +98,7 @@ fn repository(path: &str) -> String {
 
 /// Checks the table of `docs/formats.md` and the names in Python's help.
 #[test]
-fn pages_list_the_formats_that_there_are() {
+fn documents_list_all_formats() {
     let formats = Registry::default();
     let names: BTreeSet<&str> = formats.formats().iter().map(|format| format.name).collect();
     let page = repository("docs/formats.md");

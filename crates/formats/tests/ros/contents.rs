@@ -3,7 +3,7 @@ use voxtile_formats::poses::most_gap_ns;
 use voxtile_formats::ros::{BagOptions, PoseSource, open_bag, open_recording};
 
 #[test]
-fn the_same_clouds_and_poses_come_out_of_each() {
+fn all_formats_give_equal_clouds_and_poses() {
     for name in recordings() {
         let (clouds, errors, remarks) = read(&[data(name)], &topic("/points"));
         assert_eq!((errors, remarks), (vec![], vec![]), "{name}");
@@ -12,7 +12,7 @@ fn the_same_clouds_and_poses_come_out_of_each() {
 }
 
 #[test]
-fn a_fixed_frame_may_be_chosen() {
+fn fixed_frame_can_be_chosen() {
     let options = BagOptions { fixed_frame: Some("/odom".to_owned()), ..topic("points") };
     let (clouds, errors, _) = read(&[data("zstd.mcap")], &options);
     assert_eq!(errors, Vec::<String>::new());
@@ -20,7 +20,7 @@ fn a_fixed_frame_may_be_chosen() {
 }
 
 #[test]
-fn odometry_and_poses_carry_the_mount() {
+fn odometry_and_poses_include_the_mount() {
     for name in recordings() {
         for odometry in ["/odometry", "/pose"] {
             let options = BagOptions {
@@ -37,7 +37,7 @@ fn odometry_and_poses_carry_the_mount() {
 }
 
 #[test]
-fn odometry_is_preferred_to_topics_that_do_not_say_what_moves() {
+fn odometry_is_preferred_to_unnamed_poses() {
     let options = BagOptions { poses: PoseSource::Odometry, ..topic("/points") };
     let (clouds, _, remarks) = read(&[data("none.bag")], &options);
     assert!(remarks.is_empty(), "{remarks:?}");
@@ -62,7 +62,7 @@ fn scans_depth_images_and_livox_are_clouds() {
 }
 
 #[test]
-fn several_topics_are_listed_and_none_too() {
+fn several_topics_or_none_are_listed() {
     let error = |name: &str, options: &BagOptions| match open_bag(&[data(name)], options) {
         Ok(_) => panic!("{name} opens"),
         Err(error) => format!("{error:#}"),
@@ -88,7 +88,7 @@ fn several_topics_are_listed_and_none_too() {
 }
 
 #[test]
-fn one_topic_needs_no_name_and_no_transforms_leave_clouds_without_poses() {
+fn single_topics_need_no_name_and_may_lack_poses() {
     let (clouds, errors, remarks) = read(&[data("only_points.mcap")], &BagOptions::default());
     assert_eq!((clouds.len(), errors), (4, vec![]));
     assert!(clouds.iter().all(|(head, _)| head.world_from_sensor.is_none()));
@@ -99,7 +99,7 @@ fn one_topic_needs_no_name_and_no_transforms_leave_clouds_without_poses() {
 }
 
 #[test]
-fn content_tells_a_recording_whatever_its_name() {
+fn recordings_are_detected_by_content() {
     let folder = tempfile::tempdir().unwrap();
     for name in ["none.bag", "none.mcap"] {
         for renamed in ["drive", "drive.bag", "drive.mcap.backup"] {
@@ -116,7 +116,7 @@ fn content_tells_a_recording_whatever_its_name() {
 }
 
 #[test]
-fn gaps_between_transforms_may_be_limited() {
+fn transform_gaps_can_be_limited() {
     let options = BagOptions { most_gap_ns: Some(10_000_000), ..topic("/points") };
     let (clouds, _, remarks) = read(&[data("lz4.bag")], &options);
     assert!(clouds.iter().all(|(head, _)| head.world_from_sensor.is_none()));
@@ -131,7 +131,7 @@ fn gaps_between_transforms_may_be_limited() {
 }
 
 #[test]
-fn messages_come_in_the_order_in_which_they_were_recorded() {
+fn messages_are_in_recording_order() {
     for name in recordings() {
         let mut recording = open_recording(&[data(name)]).unwrap();
         let all: Vec<usize> = (0..recording.topics().len()).collect();

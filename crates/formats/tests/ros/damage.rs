@@ -4,7 +4,7 @@ use voxtile_formats::CloudSource;
 use voxtile_formats::ros::{BagOptions, PoseSource, open_bag, open_recording};
 
 #[test]
-fn files_that_are_cut_off_give_what_is_whole() {
+fn truncated_files_give_complete_messages() {
     let folder = tempfile::tempdir().unwrap();
     for name in FILES {
         let bytes = std::fs::read(data(name)).unwrap();
@@ -26,7 +26,7 @@ fn files_that_are_cut_off_give_what_is_whole() {
 
 #[cfg(feature = "sqlite")]
 #[test]
-fn folders_whose_file_is_cut_off_or_gone_say_so() {
+fn folders_with_truncated_or_missing_files_are_errors() {
     let folder = tempfile::tempdir().unwrap();
     let copy = |name: &str, bytes: &[u8]| std::fs::write(folder.path().join(name), bytes).unwrap();
     copy("metadata.yaml", &std::fs::read(data("by_file/metadata.yaml")).unwrap());
@@ -46,7 +46,7 @@ fn folders_whose_file_is_cut_off_or_gone_say_so() {
 }
 
 #[test]
-fn files_that_are_no_recordings_say_so() {
+fn foreign_files_are_errors() {
     let folder = tempfile::tempdir().unwrap();
     for name in ["x.bag", "x.mcap", "x.db3", "x.txt"] {
         let path = folder.path().join(name);
@@ -73,7 +73,7 @@ impl Numbers {
 }
 
 #[test]
-fn damaged_files_never_panic_and_end() {
+fn damaged_files_do_not_panic_or_hang() {
     let folder = tempfile::tempdir().unwrap();
     let mut numbers = Numbers(3);
     let databases = cfg!(feature = "sqlite").then_some("folder/folder.db3");
@@ -125,7 +125,7 @@ fn checksums(file: &[u8]) -> Vec<usize> {
 }
 
 #[test]
-fn chunks_of_mcap_whose_checksum_is_wrong_are_damaged() {
+fn mcap_chunks_with_wrong_checksum_are_damaged() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.mcap");
     let (mut checked, mut left_out) = (0, 0);
@@ -159,7 +159,7 @@ fn chunks_of_mcap_whose_checksum_is_wrong_are_damaged() {
 
 /// Damaged chunks are also skipped in a file without an index.
 #[test]
-fn damaged_chunks_of_a_file_without_an_index_are_left_out() {
+fn damaged_chunks_without_index_are_skipped() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.mcap");
     let whole = std::fs::read(data("zstd.mcap")).unwrap();
@@ -187,7 +187,7 @@ fn assert_same(clouds: &[Cloud], whole: &[Cloud], have_names: bool) {
 
 /// The topics of a damaged chunk and the number of its messages are known.
 #[test]
-fn a_file_without_an_index_whose_only_clouds_are_damaged_names_the_damage() {
+fn damage_without_index_and_clouds_is_reported() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.mcap");
     let mut file = std::fs::read(data("only_points.mcap")).unwrap();
@@ -208,7 +208,7 @@ fn a_file_without_an_index_whose_only_clouds_are_damaged_names_the_damage() {
 
 /// Whatever the decoder outputs before it fails.
 #[test]
-fn no_cloud_of_a_bag_comes_of_damaged_bytes() {
+fn no_cloud_is_read_from_damaged_bytes() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.bag");
     let text = |name: &std::path::Path| {

@@ -90,7 +90,7 @@ fn depths(clouds: &[Cloud]) -> Vec<Option<f64>> {
 }
 
 #[test]
-fn images_of_16_bits_are_depths_where_a_name_says_so() {
+fn images_named_as_depth_are_depths() {
     for (name, frame, encoding) in [
         ("/camera/depth/image_raw", "camera", "mono16"),
         ("/camera/depth/image_raw", "infra", "16UC1"),
@@ -109,13 +109,14 @@ fn images_of_16_bits_are_depths_where_a_name_says_so() {
         let bag = Bag::new().image("/camera/image_raw", "camera", encoding).camera("/camera/camera_info");
         let (clouds, _, remarks) = bag.read(BagOptions::default());
         assert_eq!(depths(&clouds), [Some(1.0), None]);
-        let told = format!("/camera/image_raw is read as depth images because of its encoding {encoding}");
-        assert!(remarks[0].starts_with(&told), "{remarks:?}");
+        let expected =
+            format!("/camera/image_raw is read as depth images because of its encoding {encoding}");
+        assert!(remarks[0].starts_with(&expected), "{remarks:?}");
     }
 }
 
 #[test]
-fn images_of_temperatures_are_no_walls() {
+fn temperature_images_are_not_depths() {
     for (name, frame, encoding) in [
         ("/thermal/image_raw", "camera", "mono16"),
         ("/thermal/image_raw", "camera", "16UC1"),
@@ -130,24 +131,24 @@ fn images_of_temperatures_are_no_walls() {
                 .camera(&format!("{}/camera_info", &name[..name.len() - 10]))
         };
         let error = bag().refusal();
-        let told = format!(
+        let expected = format!(
             "images that are not named as depth: {name} ({encoding}); if they are depth images, select"
         );
-        assert!(error.contains("no topic contains clouds") && error.contains(&told), "{error}");
+        assert!(error.contains("no topic contains clouds") && error.contains(&expected), "{error}");
         // If there are clouds too, the images are skipped with a remark.
         let (clouds, _, remarks) = bag().points().read(BagOptions::default());
         assert_eq!(clouds[0].1[0].position_m, [7.0, 1.0, 2.0]);
-        assert!(remarks.len() == 1 && remarks[0].contains(&told), "{remarks:?}");
+        assert!(remarks.len() == 1 && remarks[0].contains(&expected), "{remarks:?}");
         // The images are used if their topic is selected.
         let (clouds, errors, remarks) = bag().points().read(topic(name));
         assert_eq!((depths(&clouds), errors), (vec![Some(1.0), None], vec![]), "{name}");
-        let told = format!("{name} ({encoding}) is read as depth images, because it was selected");
-        assert_eq!(remarks, [told]);
+        let expected = format!("{name} ({encoding}) is read as depth images, because it was selected");
+        assert_eq!(remarks, [expected]);
     }
 }
 
 #[test]
-fn the_largest_number_is_no_depth() {
+fn largest_value_is_not_a_depth() {
     let pixels = [65535_u16, 65534].map(u16::to_le_bytes).concat();
     let image = MessageWriter::ros1().image(5, "camera", "16UC1", 2, &pixels);
     let bag = Bag::new().with("/depth/image", IMAGE, image).camera("/depth/camera_info");
@@ -155,7 +156,7 @@ fn the_largest_number_is_no_depth() {
 }
 
 #[test]
-fn depths_are_read_that_are_compressed() {
+fn compressed_depths_are_read() {
     // Encoder: value = a / depth + b.
     let (a, b) = (100.0 * 101.0_f32, 1.0 - 100.0 * 101.0 / 10.0);
     let inverse = |depth_m: f32| (a / depth_m + b) as u16;
@@ -200,11 +201,11 @@ fn depths_are_read_that_are_compressed() {
 }
 
 #[test]
-fn compressed_images_that_are_no_depths_say_why() {
+fn compressed_images_without_depths_report_the_reason() {
     let png8 = png(png::BitDepth::Eight, &[1, 2]);
     let whole = png16(&[1; 4]);
     let cut = [config(0.0, 0.0), whole[..whole.len() - 26].to_vec()].concat();
-    for (format, data, told) in [
+    for (format, data, expected) in [
         (
             "rgb8; jpeg compressed bgr8",
             b"\xff\xd8\xff\xe0....".to_vec(),
@@ -230,7 +231,7 @@ fn compressed_images_that_are_no_depths_say_why() {
         let name = "/depth/image/compressedDepth";
         let bag = Bag::new().compressed(name, format, &data).camera("/depth/camera_info");
         let (_, errors, _) = bag.read(topic(name));
-        assert!(errors.len() == 1 && errors[0].contains(told), "{errors:?} {told}");
+        assert!(errors.len() == 1 && errors[0].contains(expected), "{errors:?} {expected}");
     }
     // Colour images are not a second topic of clouds, and neither is the same depth image in another encoding.
     let depth = [config(0.0, 0.0), png16(&[2000])].concat();
@@ -258,10 +259,10 @@ fn compressed_images_that_are_no_depths_say_why() {
 }
 
 #[test]
-fn what_is_missing_to_make_clouds_is_said() {
+fn missing_requirements_are_reported() {
     let error = Bag::new().image("/depth/image", "camera", "16UC1").refusal();
     assert!(error.contains("of type CameraInfo: /depth/image without /depth/camera_info"), "{error}");
-    for (type_name, told) in [
+    for (type_name, expected) in [
         (
             "velodyne_msgs/VelodyneScan",
             "/packets contains no points: convert it to clouds with velodyne_pointcloud",
@@ -269,19 +270,19 @@ fn what_is_missing_to_make_clouds_is_said() {
         ("ouster_ros/PacketMsg", "convert it to clouds with ouster_ros"),
     ] {
         let error = Bag::new().with("/packets", type_name, vec![0; 20]).refusal();
-        assert!(error.contains(told), "{error}");
+        assert!(error.contains(expected), "{error}");
         let bag = Bag::new().with("/packets", type_name, vec![0; 20]).points();
         let error = open_bag(&[bag.path()], &topic("/packets")).err().map(|error| format!("{error:#}"));
-        assert!(error.as_ref().is_some_and(|error| error.contains(told)), "{error:?}");
+        assert!(error.as_ref().is_some_and(|error| error.contains(expected)), "{error:?}");
     }
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.bag");
     let no_message = "it contains no messages; topics: /points";
-    for (topics, told) in [(vec![], "it contains no topics"), (vec![("/points", "x/Y")], no_message)] {
+    for (topics, expected) in [(vec![], "it contains no topics"), (vec![("/points", "x/Y")], no_message)] {
         std::fs::write(&path, bag1(&topics, &[])).unwrap();
         let error = open_bag(std::slice::from_ref(&path), &BagOptions::default())
             .err()
             .map(|error| format!("{error:#}"));
-        assert!(error.as_ref().is_some_and(|error| error.contains(told)), "{error:?}");
+        assert!(error.as_ref().is_some_and(|error| error.contains(expected)), "{error:?}");
     }
 }

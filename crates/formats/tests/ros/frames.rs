@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use voxtile_formats::ros::BagOptions;
 
 #[test]
-fn a_transform_that_makes_a_loop_costs_a_recording_no_pose() {
+fn transforms_closing_a_loop_lose_no_pose_of_a_recording() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("loop.bag");
     let (start_ns, still) = (1_700_000_000_000_000_000, [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]);
@@ -49,7 +49,7 @@ fn a_transform_that_makes_a_loop_costs_a_recording_no_pose() {
 
 /// At other times there is no pose, instead of the pose of the mount.
 #[test]
-fn a_single_transform_gives_a_pose_at_its_own_time_alone() {
+fn single_transforms_give_a_pose_only_at_their_time() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("single.bag");
     let tf = |at_ns, parent: &str, child: &str| {
@@ -76,7 +76,7 @@ fn a_single_transform_gives_a_pose_at_its_own_time_alone() {
 }
 
 #[test]
-fn a_frame_with_ever_other_parents_leaves_room_for_others() {
+fn frames_with_many_parents_do_not_displace_others() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("parents.bag");
     let tf = |at_ns, parent: &str, child: &str| {
@@ -98,7 +98,7 @@ fn a_frame_with_ever_other_parents_leaves_room_for_others() {
 }
 
 #[test]
-fn frames_that_lead_nowhere_cost_each_cloud_nothing() {
+fn unrelated_frames_do_not_slow_down_clouds() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("frames.bag");
     let tf = |at_ns, parent: &str, child: &str| {

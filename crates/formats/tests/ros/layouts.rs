@@ -44,7 +44,7 @@ fn layout(size: [u32; 2], row_step: u32) -> CloudLayout {
 }
 
 #[test]
-fn points_are_found_whatever_row_step_says() {
+fn points_are_found_for_any_row_step() {
     let wanted: Vec<[f64; 3]> = (1..=6).map(|k| [f64::from(k), 0.5, -0.25]).collect();
     // The size of a row, 0, the size of the cloud, the points per row, and two sizes that are too large.
     for row_step in [36, 0, 72, 3, 40, u32::MAX] {
@@ -68,7 +68,7 @@ fn points_are_found_whatever_row_step_says() {
 }
 
 #[test]
-fn large_clouds_are_found_whatever_row_step_says() {
+fn large_clouds_are_found_for_any_row_step() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.bag");
     let count = 200_000;
@@ -90,7 +90,7 @@ fn large_clouds_are_found_whatever_row_step_says() {
 }
 
 #[test]
-fn points_that_are_not_announced_are_read_and_said() {
+fn unannounced_points_are_read_and_remarked() {
     for size in [[0, 6], [6, 0], [0, 0]] {
         let (points, errors, remarks) = read_cloud(&layout(size, 72), &XYZ, &six());
         assert_eq!((points.len(), errors), (6, vec![]), "{size:?}");
@@ -108,25 +108,25 @@ fn points_that_are_not_announced_are_read_and_said() {
 }
 
 #[test]
-fn the_byte_order_is_that_of_the_points() {
+fn byte_order_is_detected_from_the_points() {
     let numbers: Vec<f32> = (1..=6).flat_map(|k| [1.7 * k as f32, -0.3 * k as f32, 0.0]).collect();
     let wanted: Vec<[f64; 3]> =
         numbers.chunks(3).map(|point| [0, 1, 2].map(|k| f64::from(point[k]))).collect();
     let big: Vec<u8> = numbers.iter().flat_map(|number| number.to_be_bytes()).collect();
-    let said = CloudLayout { is_big_endian: true, ..layout([1, 6], 72) };
-    let (points, _, remarks) = read_cloud(&said, &XYZ, &big);
+    let expected = CloudLayout { is_big_endian: true, ..layout([1, 6], 72) };
+    let (points, _, remarks) = read_cloud(&expected, &XYZ, &big);
     assert_eq!((positions(&points), remarks), (wanted.clone(), vec![]));
-    let (points, _, remarks) = read_cloud(&said, &XYZ, &le(&numbers));
+    let (points, _, remarks) = read_cloud(&expected, &XYZ, &le(&numbers));
     assert_eq!(positions(&points), wanted);
     assert_eq!(remarks, ["1 clouds are marked as big-endian, but are little-endian"]);
     // Too few points to detect the byte order.
-    let one = CloudLayout { size: [1, 1], ..said };
+    let one = CloudLayout { size: [1, 1], ..expected };
     let (points, _, remarks) = read_cloud(&one, &XYZ, &big[..12]);
     assert_eq!((positions(&points), remarks), (wanted[..1].to_vec(), vec![]));
 }
 
 #[test]
-fn fields_are_found_in_letters_of_either_case_and_in_one() {
+fn fields_are_found_in_any_case_and_as_vectors() {
     let data = le(&[1.0, 2.0, 3.0, 40.0]);
     let layout = CloudLayout { size: [1, 1], is_big_endian: false, point_step: 16, row_step: 16 };
     for fields in [
@@ -144,13 +144,13 @@ fn fields_are_found_in_letters_of_either_case_and_in_one() {
 }
 
 #[test]
-fn plane_clouds_have_z_0_and_fields_outside_of_points_are_errors() {
+fn planar_clouds_have_z_0_and_fields_outside_of_points_are_errors() {
     let data = le(&[1.0, 2.0, 3.0, 4.0]);
     let layout = CloudLayout { size: [1, 2], is_big_endian: false, point_step: 8, row_step: 16 };
     let (points, errors, remarks) = read_cloud(&layout, &[("x", 0, F32), ("y", 4, F32)], &data);
     assert_eq!((positions(&points), errors), (vec![[1.0, 2.0, 0.0], [3.0, 4.0, 0.0]], vec![]));
     assert_eq!(remarks, ["1 clouds have no field z: 0 is used"]);
-    for (fields, told) in [
+    for (fields, expected) in [
         (
             vec![("x", 0, F32), ("y", 4, F32), ("z", 8, F32)],
             "the field z at byte 8 is outside of the point, which has 8 bytes",
@@ -164,7 +164,7 @@ fn plane_clouds_have_z_0_and_fields_outside_of_points_are_errors() {
         (vec![("xyz", 0, F32)], "have no field x; fields: xyz"),
     ] {
         let (_, errors, _) = read_cloud(&layout, &fields, &data);
-        assert!(errors[0].contains(told), "{errors:?}");
+        assert!(errors[0].contains(expected), "{errors:?}");
     }
 }
 
@@ -214,7 +214,7 @@ fn old_clouds_are_read_with_their_channels() {
 
 /// A driver without a clock.
 #[test]
-fn livox_of_other_packages_is_read() {
+fn livox_messages_of_both_drivers_are_read() {
     let point = MessageWriter::ros1()
         .u32(5_000_000)
         .f32s(&[1.0, 2.0, 3.0])

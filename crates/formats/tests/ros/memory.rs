@@ -25,7 +25,7 @@ fn little_memory_gives_the_same_clouds() {
 
 /// Otherwise a full disk would lead to a map without poses.
 #[test]
-fn temporary_files_that_cannot_be_made_are_an_error() {
+fn missing_temporary_folders_are_errors() {
     let options = BagOptions { memory_bytes: 0, scratch: Some(data("gone")), ..topic("/points") };
     let active = tempfile::NamedTempFile::new().unwrap();
     let whole = std::fs::read(data("bz2.bag")).unwrap();

@@ -22,7 +22,7 @@ fn with_odometry(folder: &Path, poses: &[Vec<u8>], type_name: &str) -> PathBuf {
 
 /// Otherwise the map would be built with other poses than requested.
 #[test]
-fn a_topic_of_poses_without_any_that_can_be_used_is_an_error() {
+fn pose_topics_without_valid_poses_are_errors() {
     let folder = tempfile::tempdir().unwrap();
     let pose = |frame: &str, x_m: f64| {
         let header = MessageWriter::ros1().header(1_700_000_000_000_000_000, frame);
@@ -34,14 +34,14 @@ fn a_topic_of_poses_without_any_that_can_be_used_is_an_error() {
         ..BagOptions::default()
     };
     let cut = pose("odom", 1.0)[..20].to_vec();
-    for (poses, told) in [
+    for (poses, expected) in [
         (vec![], "odometry /odom: none of its 0 messages contains a valid pose"),
         (vec![pose("odom", f64::NAN), pose("", 1.0)], "; 2 are invalid or have unnamed frames"),
         (vec![cut], "; 1 messages or chunks with poses cannot be read; the first: /odom: "),
     ] {
         let path = with_odometry(folder.path(), &poses, "geometry_msgs/PoseStamped");
         let error = open_bag(&[path], &options).err().map(|error| format!("{error:#}")).unwrap_or_default();
-        assert!(error.contains(told), "{error}");
+        assert!(error.contains(expected), "{error}");
     }
     // One valid pose is enough.
     let poses = [pose("odom", f64::NAN), pose("odom", 7.0)];
@@ -53,7 +53,7 @@ fn a_topic_of_poses_without_any_that_can_be_used_is_an_error() {
 
 /// Every message of a path repeats the poses so far.
 #[test]
-fn a_path_that_grows_is_one_way() {
+fn growing_paths_are_one_trajectory() {
     let folder = tempfile::tempdir().unwrap();
     let path_of = |count: i64| {
         let start_ns = 1_700_000_000_000_000_000;

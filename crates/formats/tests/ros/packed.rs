@@ -37,7 +37,7 @@ fn unposed() -> BagOptions {
 }
 
 #[test]
-fn messages_that_are_compressed_are_read_without_metadata() {
+fn compressed_messages_are_read_without_metadata() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.mcap");
     let plain: Vec<Vec<u8>> = (1..4).map(|k| cloud(MessageWriter::cdr(), k as f32)).collect();
@@ -67,7 +67,7 @@ fn databases_of_compressed_messages_are_read_without_metadata() {
 
 /// Messages in a ROS 1 bag may contain arbitrary bytes.
 #[test]
-fn messages_of_ros_1_are_taken_as_they_are() {
+fn ros_1_messages_are_not_decompressed() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.bag");
     let mut message = cloud(MessageWriter::ros1(), 3.0);
@@ -78,7 +78,7 @@ fn messages_of_ros_1_are_taken_as_they_are() {
 }
 
 #[test]
-fn files_that_are_compressed_are_read_alone() {
+fn compressed_files_are_read_without_metadata() {
     let folder = tempfile::tempdir().unwrap();
     let guess = |path: &Path| Registry::default().guess(path, &[]).map(|format| format.name);
     for (name, format) in [("only_points.mcap", "mcap"), ("none.bag", "bag")] {
@@ -117,7 +117,7 @@ fn files_that_are_compressed_are_read_alone() {
 
 /// A recorder whose disk was disconnected.
 #[test]
-fn files_that_are_cut_off_before_anything_say_where() {
+fn files_truncated_before_any_message_report_the_offset() {
     let folder = tempfile::tempdir().unwrap();
     for (name, at) in [("zstd.mcap", 30), ("lz4.mcap", 30), ("bz2.bag", 30), ("zstd.mcap", 3)] {
         let whole = std::fs::read(data(name)).unwrap();
@@ -132,11 +132,11 @@ fn files_that_are_cut_off_before_anything_say_where() {
         std::fs::write(&path, &whole[..len]).unwrap();
         let error =
             open_bag(&[path], &BagOptions::default()).err().map(|error| format!("{error:#}")).unwrap();
-        let told = match at {
+        let expected = match at {
             3 => format!("truncated at byte {len}, in the record at byte {}", len - at),
             _ => format!("truncated at byte {len}: the record at byte "),
         };
-        assert!(error.contains("it contains no topics; ") && error.contains(&told), "{error}");
+        assert!(error.contains("it contains no topics; ") && error.contains(&expected), "{error}");
         assert!(error.contains("0 messages were found"), "{error}");
     }
 }

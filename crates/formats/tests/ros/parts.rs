@@ -68,7 +68,7 @@ fn a_split_bag_is_one_recording() {
 }
 
 #[test]
-fn the_last_part_of_a_split_bag_may_be_cut_off() {
+fn last_part_of_a_split_bag_may_be_truncated() {
     let folder = tempfile::tempdir().unwrap();
     let (first, second) = (part(0, true), part(1, false));
     std::fs::write(folder.path().join("drive_0.bag"), first).unwrap();
@@ -80,7 +80,7 @@ fn the_last_part_of_a_split_bag_may_be_cut_off() {
 
 /// Untrusted metadata must not open arbitrary files.
 #[test]
-fn files_out_of_the_folder_of_a_bag_are_not_read() {
+fn files_outside_of_the_bag_folder_are_not_read() {
     let folder = tempfile::tempdir().unwrap();
     let bag = folder.path().join("bag");
     std::fs::create_dir(&bag).unwrap();
@@ -100,7 +100,7 @@ fn files_out_of_the_folder_of_a_bag_are_not_read() {
 
 /// `a/drive.bag.zstd` and `b/drive.bag.zstd` both decompress to `drive.bag`.
 #[test]
-fn packed_parts_of_the_same_name_are_all_read() {
+fn compressed_parts_with_equal_names_are_all_read() {
     let folder = tempfile::tempdir().unwrap();
     // Larger than the read buffer of the open file.
     for (part, count) in [("a", 100), ("b", 1)] {
@@ -122,7 +122,7 @@ fn packed_parts_of_the_same_name_are_all_read() {
 }
 
 #[test]
-fn packed_files_are_unpacked_where_it_is_said() {
+fn compressed_files_use_the_scratch_folder() {
     let folder = tempfile::tempdir().unwrap();
     let packed = zstd::encode_all(std::fs::read(data("only_points.mcap")).unwrap().as_slice(), 3).unwrap();
     std::fs::write(folder.path().join("a.mcap.zstd"), packed).unwrap();
@@ -135,7 +135,7 @@ fn packed_files_are_unpacked_where_it_is_said() {
 }
 
 #[test]
-fn a_file_that_is_named_again_is_read_once() {
+fn repeated_file_names_are_read_once() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::copy(data("only_points.mcap"), folder.path().join("a.mcap")).unwrap();
     let metadata = format!("relative_file_paths:\n{}", "- a.mcap\n".repeat(100_000));

@@ -84,7 +84,7 @@ fn assert_registered(clouds: &[Cloud], of: &str) {
 }
 
 #[test]
-fn registered_clouds_are_seen_from_the_odometry() {
+fn registered_clouds_use_odometry() {
     let plain =
         [("/cloud_registered", Clouds("camera_init")), ("/Odometry", Odometry("camera_init", "body"))];
     let (_folder, path) = record(&plain);
@@ -94,9 +94,9 @@ fn registered_clouds_are_seen_from_the_odometry() {
         assert_eq!(errors, Vec::<String>::new());
         assert_registered(&clouds, &format!("{options:?}"));
         // With an explicit topic there is no remark on the choice.
-        let told = "the clouds are already in the frame camera_init: their points are not transformed, and rays start at body \
+        let expected = "the clouds are already in the frame camera_init: their points are not transformed, and rays start at body \
                     (`odometry` /Odometry `world_frame`)";
-        let wanted: &[&str] = if options.is_world_frame { &[] } else { &[told] };
+        let wanted: &[&str] = if options.is_world_frame { &[] } else { &[expected] };
         assert_eq!(remarks, wanted);
     }
     // With `is_world_frame`, a cloud in an unknown frame is in the world.
@@ -118,10 +118,10 @@ fn registered_clouds_are_seen_from_the_odometry() {
 }
 
 #[test]
-fn registered_clouds_are_seen_from_what_moves_in_their_frame() {
+fn registered_clouds_use_moving_frames() {
     let cloud = |frame| ("/cloud_registered", Clouds(frame));
     let body = "their points are not transformed, and rays start at body";
-    for (topics, told) in [
+    for (topics, expected) in [
         (vec![cloud("camera_init"), ("/tf", Tf("camera_init", "body"))], body),
         // Two odometry topics, but one moving frame.
         (
@@ -175,15 +175,15 @@ fn registered_clouds_are_seen_from_what_moves_in_their_frame() {
         let options = BagOptions { topic: Some("/cloud_registered".to_owned()), ..BagOptions::default() };
         let (clouds, errors, remarks) = read(&[path], &options);
         assert_eq!(errors, Vec::<String>::new());
-        assert_registered(&clouds, told);
-        assert!(remarks.iter().any(|remark| remark.contains(told)), "{told}: {remarks:?}");
+        assert_registered(&clouds, expected);
+        assert!(remarks.iter().any(|remark| remark.contains(expected)), "{expected}: {remarks:?}");
     }
 }
 
 #[test]
-fn what_is_not_clear_is_said_and_not_guessed() {
+fn ambiguous_poses_are_not_guessed() {
     let cloud = |frame| ("/cloud_registered", Clouds(frame));
-    for (topics, told) in [
+    for (topics, expected) in [
         (
             vec![
                 cloud("camera_init"),
@@ -209,7 +209,7 @@ fn what_is_not_clear_is_said_and_not_guessed() {
         let (_folder, path) = record(&topics);
         let (clouds, _, remarks) = read(&[path], &BagOptions::default());
         assert!(clouds.iter().all(|(head, _)| head.world_from_sensor.is_none() && !head.is_in_world));
-        assert!(remarks.iter().any(|remark| remark.contains(told)), "{told}: {remarks:?}");
+        assert!(remarks.iter().any(|remark| remark.contains(expected)), "{expected}: {remarks:?}");
     }
     // Following the hint gives poses.
     let (_folder, path) = record(&[cloud("body"), ("/Odometry", Odometry("camera_init", "body"))]);
@@ -272,7 +272,7 @@ fn scans_of_registered_clouds_keep_their_points() {
 
 /// Drivers without a clock.
 #[test]
-fn poses_without_stamps_are_of_when_they_were_recorded() {
+fn poses_without_stamps_use_recording_times() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.bag");
     let fields = [("x", 0, F32), ("y", 4, F32), ("z", 8, F32)];
@@ -292,9 +292,9 @@ fn poses_without_stamps_are_of_when_they_were_recorded() {
     let xs: Vec<_> =
         clouds.iter().map(|(head, _)| head.world_from_sensor.map(|pose| pose.position_m[0])).collect();
     assert_eq!(xs, [Some(0.5), Some(1.5), Some(2.5), None]);
-    for told in
+    for expected in
         ["4 poses have no stamp; their recording times", "4 clouds have no stamp; their recording times"]
     {
-        assert!(remarks.iter().any(|remark| remark.starts_with(told)), "{remarks:?}");
+        assert!(remarks.iter().any(|remark| remark.starts_with(expected)), "{remarks:?}");
     }
 }

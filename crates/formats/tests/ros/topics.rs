@@ -6,7 +6,7 @@ use voxtile_formats::ros::{BagOptions, open_bag};
 
 /// More topic names than the limit, and messages of these topics before the wanted ones.
 #[test]
-fn topics_that_are_left_out_cost_no_others() {
+fn skipped_topics_do_not_affect_others() {
     let folder = tempfile::tempdir().unwrap();
     let fields = [("x", 0, F32), ("y", 4, F32), ("z", 8, F32)];
     let points = [[1.0_f32, 1.0, 2.0].map(f32::to_le_bytes).concat()];
@@ -52,7 +52,7 @@ fn topics_that_are_left_out_cost_no_others() {
 
 /// Inspecting a topic may read the recording up to its first image.
 #[test]
-fn of_many_topics_of_images_some_are_looked_into() {
+fn many_image_topics_are_inspected_in_part() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.bag");
     let names: Vec<String> =
@@ -71,7 +71,7 @@ fn of_many_topics_of_images_some_are_looked_into() {
 
 /// Other programs also use the MCAP container.
 #[test]
-fn messages_that_are_not_of_ros_are_named() {
+fn foreign_messages_are_reported() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.mcap");
     let mut bytes = std::io::Cursor::new(Vec::new());
@@ -84,6 +84,6 @@ fn messages_that_are_not_of_ros_are_named() {
     drop(writer);
     std::fs::write(&path, bytes.into_inner()).unwrap();
     let error = open_bag(&[path], &BagOptions::default()).err().map(|error| format!("{error:#}"));
-    let told = "with another serialization than that of ROS are not supported: /lidar; topics: /lidar (foxglove.PointCloud, 1 ";
-    assert!(error.as_ref().is_some_and(|error| error.contains(told)), "{error:?}");
+    let expected = "with another serialization than that of ROS are not supported: /lidar; topics: /lidar (foxglove.PointCloud, 1 ";
+    assert!(error.as_ref().is_some_and(|error| error.contains(expected)), "{error:?}");
 }

@@ -51,7 +51,7 @@ fn head_of(chosen: &Chosen, map: &impl MapView) -> Result<VoxelsHead> {
         bounds_m: [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]],
         occupied_log_odds: map.config().occupied_log_odds(),
     };
-    let gauge = Watch::nobody().over_tiles(0);
+    let gauge = Watch::silent().over_tiles(0);
     chosen.for_each(
         map,
         &*gauge,

@@ -64,7 +64,7 @@ impl<'a> MovedFile<'a> {
             origin_m: origin.corner_m,
             origin_voxel: origin.voxel,
             origin_file: beside.map(|beside| beside.path().to_owned()),
-            asked_m: origin.asked_m,
+            requested_m: origin.requested_m,
         };
         self.export.summary(voxels, written)
     }

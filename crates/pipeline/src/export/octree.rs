@@ -17,7 +17,7 @@ pub(super) fn export(export: &Export<'_>, format: OctreeFormat) -> anyhow::Resul
     }
     read_map(&options.map, |reader| {
         let grid = reader.config().grid;
-        let origin = options.origin_m.map(|asked_m| ExportOrigin::near(asked_m, &grid));
+        let origin = options.origin_m.map(|requested_m| ExportOrigin::near(requested_m, &grid));
         let origin = origin.transpose()?.unwrap_or_default();
         let (region, memory_bytes) = (options.region.as_ref(), options.memory_bytes);
         let octree = OctreeExport { format, region, origin: origin.voxel, memory_bytes };

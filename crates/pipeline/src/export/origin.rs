@@ -10,7 +10,7 @@ pub struct ExportOrigin {
     /// Lower corner of the voxel, in metres.
     pub corner_m: Point,
     /// Requested origin, if it is not a voxel corner.
-    pub asked_m: Option<Point>,
+    pub requested_m: Option<Point>,
 }
 
 /// Up to this distance from the map's origin, in voxels, `f32` is sufficiently precise: to a 128th of a voxel.
@@ -24,14 +24,14 @@ impl ExportOrigin {
     /// # Errors
     ///
     /// The point is not finite or is outside of the range of voxel indices.
-    pub fn near(asked_m: Point, grid: &Grid) -> Result<Self> {
-        let units = grid.to_voxel_units(asked_m);
+    pub fn near(requested_m: Point, grid: &Grid) -> Result<Self> {
+        let units = grid.to_voxel_units(requested_m);
         let voxel = units.map(f64::round);
         // False for NaN too.
         let is_index = |x: &f64| *x >= f64::from(i32::MIN) && *x <= f64::from(i32::MAX);
         if !voxel.iter().all(is_index) {
             let reason = format!(
-                "{asked_m:?} m is not finite, or too far away for the indices of voxels of {} m",
+                "{requested_m:?} m is not finite, or exceeds the range of indices of voxels of {} m",
                 grid.resolution_m()
             );
             return Err(Error::argument("origin", reason));
@@ -39,7 +39,7 @@ impl ExportOrigin {
         // Tolerance of a thousandth of a voxel: metres as typed are rarely exact.
         let is_corner = (0..3).all(|k| (units[k] - voxel[k]).abs() < 1e-3);
         let origin = Self::at(voxel.map(|x| x as i32), grid);
-        Ok(Self { asked_m: (!is_corner).then_some(asked_m), ..origin })
+        Ok(Self { requested_m: (!is_corner).then_some(requested_m), ..origin })
     }
 
     /// Chooses the origin of a single precision file for voxels in a box: the map's own if `f32` is sufficient for the
@@ -72,7 +72,7 @@ impl ExportOrigin {
     }
 
     fn at(voxel: VoxelIndex, grid: &Grid) -> Self {
-        Self { voxel, corner_m: voxel.map(|index| grid.corner_m(index)), asked_m: None }
+        Self { voxel, corner_m: voxel.map(|index| grid.corner_m(index)), requested_m: None }
     }
 
     pub fn is_moved(&self) -> bool {

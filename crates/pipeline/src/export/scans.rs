@@ -130,7 +130,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn stamps_before_zero_keep_their_distance() {
+    fn negative_stamps_are_formatted_correctly() {
         for (stamp_ns, text) in [
             (-500_000_000, "-0.500000000"),
             (-1, "-0.000000001"),

@@ -90,7 +90,7 @@ fn origin_of(
     voxels: impl FnOnce() -> Option<VoxelBox>,
 ) -> Result<ExportOrigin> {
     match export.options.origin_m {
-        Some(asked_m) => ExportOrigin::near(asked_m, grid),
+        Some(requested_m) => ExportOrigin::near(requested_m, grid),
         None if export.format.origin == Origin::CornerNearby => {
             voxels().map_or(Ok(ExportOrigin::default()), |voxels| ExportOrigin::nearby(&voxels, grid))
         }

@@ -32,7 +32,7 @@ pub enum Written {
         origin_file: Option<PathBuf>,
         /// Requested origin, if it is not a voxel corner, in metres.
         #[serde(skip)]
-        asked_m: Option<Point>,
+        requested_m: Option<Point>,
     },
     /// A file or a folder, with companion files.
     Files {

@@ -57,13 +57,13 @@ fn options(output: &Path) -> ExportOptions {
 }
 
 #[test]
-fn a_row_more_is_a_format_more() {
+fn a_new_row_adds_a_format() {
     let folder = tempfile::tempdir().unwrap();
     let lines = |name: &str, which| {
         let path = folder.path().join(name);
         let mut options = options(&path);
         options.which = which;
-        let summary = export(&options, &Watch::nobody()).unwrap();
+        let summary = export(&options, &Watch::silent()).unwrap();
         let text = fs::read_to_string(&path).unwrap();
         assert_eq!(text.lines().count() as u64, summary.voxels);
         let is_stream = matches!(summary.written, Written::Stream { .. });
@@ -79,18 +79,18 @@ fn a_row_more_is_a_format_more() {
     assert_eq!(lines("a.index.stream", Some(WhichVoxels::AtLeast(0.0))), all);
     let mut named = options(&folder.path().join("a.ply"));
     named.format = Some("Index".to_owned());
-    export(&named, &Watch::nobody()).unwrap();
+    export(&named, &Watch::silent()).unwrap();
     assert_eq!(fs::read_to_string(folder.path().join("a.ply")).unwrap(), all);
 }
 
 #[test]
-fn what_a_row_does_not_take_is_refused_with_those_that_do() {
+fn unsupported_options_are_refused_with_alternatives() {
     let folder = tempfile::tempdir().unwrap();
     let refusal = |name: &str, change: fn(&mut ExportOptions)| {
         let output = if name == "-" { name.into() } else { folder.path().join(name) };
         let mut options = options(&output);
         change(&mut options);
-        export(&options, &Watch::nobody()).unwrap_err().to_string()
+        export(&options, &Watch::silent()).unwrap_err().to_string()
     };
     let heights = refusal("a.index", |options| options.z_min_m = Some(1.0));
     assert!(

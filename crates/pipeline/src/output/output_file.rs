@@ -1,4 +1,4 @@
-use super::target::{Place, check_target, folder_of, is_standard_output, place_of, sync_folder};
+use super::target::{TargetKind, check_target, folder_of, is_standard_output, sync_folder, target_kind};
 use std::fs::File;
 use std::io::{self, BufWriter, Seek, Write};
 use std::path::{Path, PathBuf};
@@ -42,9 +42,9 @@ impl OutputFile {
     ///
     /// The target is a symbolic link, a folder or within a map, or the folder is not writable.
     pub fn create(target: &Path) -> Result<Self> {
-        let unfinished = match place_of(target)? {
-            Place::File => named_beside(target).map(Unfinished::Named),
-            Place::Stream => tempfile::tempfile().map(Unfinished::Copied),
+        let unfinished = match target_kind(target)? {
+            TargetKind::File => named_temporary(target).map(Unfinished::Named),
+            TargetKind::Stream => tempfile::tempfile().map(Unfinished::Copied),
         };
         let unfinished = unfinished.map_err(|error| Error::io(target, "create", error))?;
         let out = Out { bytes: BufWriter::with_capacity(1 << 18, unfinished), stop: Stop::default() };
@@ -170,14 +170,14 @@ impl Write for Unfinished {
 ///
 /// The target is invalid as for [`OutputFile::create`], or the folder is not writable.
 pub fn scratch_for(target: &Path) -> Result<File> {
-    let file = match place_of(target)? {
-        Place::File => tempfile::tempfile_in(folder_of(target)),
-        Place::Stream => tempfile::tempfile(),
+    let file = match target_kind(target)? {
+        TargetKind::File => tempfile::tempfile_in(folder_of(target)),
+        TargetKind::Stream => tempfile::tempfile(),
     };
     file.map_err(|error| Error::io(target, "create a temporary file next to", error))
 }
 
-fn named_beside(target: &Path) -> io::Result<NamedTempFile> {
+fn named_temporary(target: &Path) -> io::Result<NamedTempFile> {
     let mut prefix = target.file_name().unwrap_or_default().to_owned();
     prefix.push(".");
     let mut builder = tempfile::Builder::new();

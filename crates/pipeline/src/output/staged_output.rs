@@ -1,4 +1,4 @@
-use super::target::{Place, check_target, folder_of, sync_folder};
+use super::target::{TargetKind, check_target, folder_of, sync_folder};
 use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -47,7 +47,7 @@ impl StagedOutput {
     pub fn finish(self) -> Result<Vec<PathBuf>> {
         let own = self.path()?;
         let folder = folder_of(&self.target);
-        let beside = self.beside_output(&own)?;
+        let beside = self.companions(&own)?;
         let name_of = |from: &Path| from.file_name().map_or(self.target.clone(), |name| folder.join(name));
         let mut names: Vec<PathBuf> = beside.iter().map(|from| name_of(from)).collect();
         // Check everything before the first rename.
@@ -58,7 +58,7 @@ impl StagedOutput {
         names.push(name_of(&own));
         check_staged(&own, &self.target)?;
         for (from, to) in beside.iter().chain([&own]).zip(&names) {
-            take_name(from, to).map_err(|error| Error::io(to, "replace", error))?;
+            rename_over(from, to).map_err(|error| Error::io(to, "replace", error))?;
         }
         names.pop();
         sync_folder(folder).map_err(|error| Error::io(&self.target, "make durable", error))?;
@@ -66,7 +66,7 @@ impl StagedOutput {
     }
 
     /// Returns the companion files, sorted.
-    fn beside_output(&self, own: &Path) -> Result<Vec<PathBuf>> {
+    fn companions(&self, own: &Path) -> Result<Vec<PathBuf>> {
         let list = fs::read_dir(self.folder()).and_then(Iterator::collect::<io::Result<Vec<_>>>);
         let list = list.map_err(|error| Error::io(self.folder(), "list", error))?;
         let mut beside: Vec<PathBuf> =
@@ -106,7 +106,7 @@ fn check_staged(from: &Path, to: &Path) -> Result<()> {
     check_staged_target(to)
 }
 
-fn take_name(from: &Path, to: &Path) -> io::Result<()> {
+fn rename_over(from: &Path, to: &Path) -> io::Result<()> {
     if from.is_dir() && to.is_dir() {
         fs::remove_dir(to)?;
     }
@@ -117,8 +117,8 @@ fn take_name(from: &Path, to: &Path) -> io::Result<()> {
 fn check_staged_target(target: &Path) -> Result<()> {
     if !target.is_dir() {
         return match check_target(target)? {
-            Place::File => Ok(()),
-            Place::Stream => {
+            TargetKind::File => Ok(()),
+            TargetKind::Stream => {
                 let reason = format!("{} is not a regular file", target.display());
                 Err(Error::argument("output", reason))
             }

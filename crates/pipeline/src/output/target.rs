@@ -10,19 +10,19 @@ pub fn is_standard_output(path: &Path) -> bool {
 }
 
 /// Kind of output target.
-pub(super) enum Place {
+pub(super) enum TargetKind {
     File,
     Stream,
 }
 
-pub(super) fn place_of(target: &Path) -> Result<Place> {
+pub(super) fn target_kind(target: &Path) -> Result<TargetKind> {
     if is_standard_output(target) {
-        return Ok(Place::Stream);
+        return Ok(TargetKind::Stream);
     }
     check_target(target)
 }
 
-pub(super) fn check_target(target: &Path) -> Result<Place> {
+pub(super) fn check_target(target: &Path) -> Result<TargetKind> {
     let reason = match fs::symlink_metadata(target) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => None,
         Err(error) => return Err(Error::io(target, "look at", error)),
@@ -32,14 +32,14 @@ pub(super) fn check_target(target: &Path) -> Result<Place> {
             Some("is a symbolic link, which is not followed: use its target, or - for standard output")
         }
         // A pipe or a device.
-        Ok(_) => return Ok(Place::Stream),
+        Ok(_) => return Ok(TargetKind::Stream),
     };
     if target.file_name().is_none() {
         return Err(Error::argument("output", format!("{} is not a file name", target.display())));
     }
     match reason {
         Some(reason) => Err(Error::argument("output", format!("{} {reason}", target.display()))),
-        None => check_outside_of_maps(target).map(|()| Place::File),
+        None => check_outside_of_maps(target).map(|()| TargetKind::File),
     }
 }
 

@@ -3,7 +3,7 @@ use crate::scan_input;
 use crate::watch::Watch;
 use std::path::Path;
 use voxtile::Result;
-use voxtile_formats::{PointRoom, ReadOptions};
+use voxtile_formats::{PointBudget, ReadOptions};
 
 /// Checks the poses of an input before anything is mapped. Returns `false` if the input or its poses cannot be read
 /// twice.
@@ -11,7 +11,7 @@ use voxtile_formats::{PointRoom, ReadOptions};
 /// # Errors
 ///
 /// The poses do not fit the scans, or the input cannot be opened.
-pub fn check_ahead(scans: &Path, options: &ReadOptions, room: &PointRoom, watch: &Watch) -> Result<bool> {
+pub fn check_ahead(scans: &Path, options: &ReadOptions, room: &PointBudget, watch: &Watch) -> Result<bool> {
     let may_be_read_twice = |path: &Path| path.is_file() || path.is_dir();
     // `identity` is not a file.
     let poses = options.poses.as_deref().filter(|path| path.exists());

@@ -186,7 +186,7 @@ impl PoseCheck {
                 let still = self.overlap(Reading::Still)?.unwrap_or(0.0);
                 Ok(given < NO_OVERLAP && (share >= still + THAN_STILL || self.is_too_fast()))
             }
-            Reading::WorldFrame => Ok(self.points_go_along()),
+            Reading::WorldFrame => Ok(self.points_move_along()),
             _ => Ok(true),
         }
     }
@@ -205,7 +205,7 @@ impl PoseCheck {
     }
 
     /// Returns whether the points' centre moves with the sensor, as it does for points in the world frame.
-    fn points_go_along(&self) -> bool {
+    fn points_move_along(&self) -> bool {
         let Some(first) = self.picks.first() else { return false };
         let (middle, [mut along, mut all]) = (middle_of(&first.points), [0.0; 2]);
         for pick in &self.picks {
@@ -239,8 +239,8 @@ fn voxel_of(points: &[[f32; 3]]) -> f64 {
     let range = |point: &[f32; 3]| point.iter().map(|c| f64::from(*c) * f64::from(*c)).sum::<f64>().sqrt();
     let mut ranges: Vec<f64> = points.iter().map(range).filter(|range| RANGE_M.contains(range)).collect();
     ranges.sort_unstable_by(f64::total_cmp);
-    let [least_m, most_m] = VOXEL_M;
-    ranges.get(ranges.len() / 2).map_or(most_m, |median| (VOXEL_SHARE * median).clamp(least_m, most_m))
+    let [min_m, max_m] = VOXEL_M;
+    ranges.get(ranges.len() / 2).map_or(max_m, |median| (VOXEL_SHARE * median).clamp(min_m, max_m))
 }
 
 /// Returns the median of each coordinate.
@@ -297,7 +297,7 @@ mod tests {
     }
 
     /// Returns a trajectory with bends and this step length.
-    fn way(step_m: f64) -> Vec<RigidPose> {
+    fn trajectory(step_m: f64) -> Vec<RigidPose> {
         (0..12)
             .map(|k| {
                 let s = step_m * f64::from(k);
@@ -309,7 +309,7 @@ mod tests {
     }
 
     /// Returns the doubt reported for scans with these poses.
-    fn said(
+    fn doubt_for(
         scan: impl Fn(usize) -> Vec<[f64; 3]>,
         come: &[RigidPose],
         options: &ReadOptions,
@@ -337,8 +337,8 @@ mod tests {
     }
 
     #[test]
-    fn another_reading_that_fits_better_is_told() {
-        let (world, right) = (world(), way(2.0));
+    fn better_readings_are_reported() {
+        let (world, right) = (world(), trajectory(2.0));
         let scan = |number: usize| seen(&world, &right[number]);
         let each = |change: &dyn Fn(&RigidPose) -> RigidPose| right.iter().map(change).collect::<Vec<_>>();
         let camera = RigidPose { position_m: [0.0; 3], quaternion: [0.5, -0.5, 0.5, 0.5] };
@@ -359,27 +359,35 @@ mod tests {
             (millimetres, &plain, "are in millimetres"),
         ];
         for (come, options, wanted) in cases {
-            let said = said(scan, &come, options, 1).unwrap_or_default();
-            assert!(said.contains(wanted) && said.is_empty() == wanted.is_empty(), "{wanted}: {said}");
-            assert!(said.is_empty() || said.starts_with("poses.txt: the poses do not seem to fit"), "{said}");
+            let doubt_for = doubt_for(scan, &come, options, 1).unwrap_or_default();
+            assert!(
+                doubt_for.contains(wanted) && doubt_for.is_empty() == wanted.is_empty(),
+                "{wanted}: {doubt_for}"
+            );
+            assert!(
+                doubt_for.is_empty() || doubt_for.starts_with("poses.txt: the poses do not seem to fit"),
+                "{doubt_for}"
+            );
         }
         let in_world = |number: usize| scan(number).into_iter().map(|own| right[number].apply(own)).collect();
-        let said_in_world = said(in_world, &right, &plain, 1).unwrap_or_default();
-        assert!(said_in_world.contains("`world_frame`"), "{said_in_world}");
+        let doubt_in_world = doubt_for(in_world, &right, &plain, 1).unwrap_or_default();
+        assert!(doubt_in_world.contains("`world_frame`"), "{doubt_in_world}");
         // The sensor's pose in the body is the same in all readings.
         let extrinsic = RigidPose { position_m: [0.1, 0.0, 0.2], quaternion: [0.0, 0.0, 1.0, 0.0] };
         let mut mounted = ReadOptions::default();
         mounted.clouds.body_from_sensor = extrinsic;
         let sensor = each(&|pose| pose.then(&extrinsic));
         let scan = |number: usize| seen(&world, &sensor[number]);
-        assert_eq!(said(scan, &sensor, &mounted, 1), None);
+        assert_eq!(doubt_for(scan, &sensor, &mounted, 1), None);
         let inverse = each(&|pose| pose.inverse().then(&extrinsic));
-        assert!(said(scan, &inverse, &mounted, 1).is_some_and(|said| said.contains("the inverse")));
+        assert!(
+            doubt_for(scan, &inverse, &mounted, 1).is_some_and(|doubt_for| doubt_for.contains("the inverse"))
+        );
     }
 
     /// Flat ground looks the same from every station, so the overlap would be best with all stations at one place.
     #[test]
-    fn stations_far_from_each_other_are_no_doubt() {
+    fn distant_stations_cause_no_doubt() {
         let ground: Vec<[f64; 3]> = (0..120)
             .flat_map(|ring| {
                 (0..120).map(move |beam| (1.5 + 0.15 * f64::from(ring), 0.0524 * f64::from(beam)))
@@ -388,18 +396,18 @@ mod tests {
             .collect();
         for step_m in [15.0, 30.0, 60.0] {
             let options = ReadOptions::default();
-            assert_eq!(said(|_| ground.clone(), &way(step_m), &options, 60), None, "{step_m}");
+            assert_eq!(doubt_for(|_| ground.clone(), &trajectory(step_m), &options, 60), None, "{step_m}");
         }
         // Wrong poses that cannot be detected.
-        let far: Vec<RigidPose> = way(60.0).iter().map(RigidPose::inverse).collect();
-        assert_eq!(said(|_| ground.clone(), &far, &ReadOptions::default(), 60), None);
+        let far: Vec<RigidPose> = trajectory(60.0).iter().map(RigidPose::inverse).collect();
+        assert_eq!(doubt_for(|_| ground.clone(), &far, &ReadOptions::default(), 60), None);
         // A speed of 2 km/s is implausible.
-        let fast = said(|_| ground.clone(), &way(2000.0), &ReadOptions::default(), 1);
-        assert!(fast.is_some_and(|said| said.contains("are in millimetres")));
+        let fast = doubt_for(|_| ground.clone(), &trajectory(2000.0), &ReadOptions::default(), 1);
+        assert!(fast.is_some_and(|doubt_for| doubt_for.contains("are in millimetres")));
     }
 
     #[test]
-    fn points_are_taken_evenly() {
+    fn points_are_sampled_evenly() {
         let mut points_in_sensor = PointStore::default();
         points_in_sensor.begin(false);
         (0..3 * MAX_POINTS + 5).for_each(|k| points_in_sensor.push([k as f64, 0.0, 0.0], 0.0).unwrap());

@@ -90,7 +90,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_was_seen_before_is_counted_once_for_each_scan() {
+    fn repeated_voxels_are_counted_once_per_scan() {
         // A wall of 200 voxels, each hit twice. The second scan is shifted by half the wall.
         let wall: Vec<[f32; 3]> =
             (0..400).map(|k| [5.0, 0.4 * (k / 2 % 20) as f32 - 3.9, 0.4 * (k / 40) as f32 - 1.9]).collect();

@@ -82,7 +82,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_names_of_ros_1_ros_2_and_dds_are_one() {
+    fn ros_1_ros_2_and_dds_names_are_equivalent() {
         for name in
             ["sensor_msgs/PointCloud2", "sensor_msgs/msg/PointCloud2", "sensor_msgs::msg::dds_::PointCloud2_"]
         {

@@ -31,7 +31,7 @@ fn robot() -> Transforms {
 const MIDDLE: i64 = S / 2 + 7_000_000;
 
 #[test]
-fn a_stamp_that_is_there_keeps_every_bit() {
+fn exact_stamps_keep_every_bit() {
     let mut tf = Transforms::default();
     moving(&mut tf, "/odom", "base", &[5], 0.3);
     moving(&mut tf, "odom", "base", &[9], 0.7);
@@ -44,7 +44,7 @@ fn a_stamp_that_is_there_keeps_every_bit() {
 }
 
 #[test]
-fn nothing_is_extrapolated_or_bridged() {
+fn poses_are_not_extrapolated() {
     let mut tf = Transforms::default();
     moving(&mut tf, "odom", "base", &[5, 9], 0.3);
     assert_eq!(tf.lookup("odom", "base", 4), Err(WhyNot::Before("base".into())));
@@ -70,7 +70,7 @@ fn each_link_keeps_its_own_last_seconds() {
 }
 
 #[test]
-fn the_frame_with_most_samples_loses_the_older_half() {
+fn frame_with_most_samples_drops_the_older_half() {
     let mut tf = Transforms::default();
     moving(&mut tf, "odom", "base", &[0, 1, 2, 3, 4, 5, 6, 7, 8, 9], 0.3);
     moving(&mut tf, "map", "odom", &[2], 0.7);
@@ -83,7 +83,7 @@ fn the_frame_with_most_samples_loses_the_older_half() {
 }
 
 #[test]
-fn transforms_that_are_none_are_refused() {
+fn invalid_transforms_are_refused() {
     let mut tf = Transforms::default();
     let put = |tf: &mut Transforms, parent: &str, child: &str, pose| tf.insert(parent, child, 5, pose, true);
     assert_eq!(put(&mut tf, "/base", "base", at(0.3)), Err(BadTransform::InItself("base".into())));
@@ -98,7 +98,7 @@ fn transforms_that_are_none_are_refused() {
 }
 
 #[test]
-fn a_transform_that_makes_a_loop_changes_no_pose_wherever_it_comes() {
+fn transforms_closing_a_loop_change_no_pose() {
     let wanted = robot().lookup("map", "lidar", MIDDLE).unwrap();
     let links = [
         ("lidar", "map"),
@@ -135,7 +135,7 @@ fn a_transform_that_makes_a_loop_changes_no_pose_wherever_it_comes() {
 }
 
 #[test]
-fn two_frames_in_each_other_have_the_pose_of_the_one_that_is_asked_for() {
+fn mutual_parents_give_the_requested_pose() {
     let mut tf = Transforms::default();
     moving(&mut tf, "odom", "base", &[5, 6], 0.3);
     fixed(&mut tf, "base", "odom", at(0.9));
@@ -146,7 +146,7 @@ fn two_frames_in_each_other_have_the_pose_of_the_one_that_is_asked_for() {
 }
 
 #[test]
-fn an_inverted_tree_bears_a_loop_too() {
+fn inverted_trees_tolerate_loops() {
     let mut tf = Transforms::default();
     moving(&mut tf, "base", "odom", &[5, 9], 0.3);
     fixed(&mut tf, "base", "lidar", at(0.2));
@@ -156,7 +156,7 @@ fn an_inverted_tree_bears_a_loop_too() {
 }
 
 #[test]
-fn a_frame_may_get_another_parent_and_stamps_before_have_the_first_one() {
+fn reparenting_keeps_earlier_poses() {
     let mut tf = Transforms::default();
     moving(&mut tf, "odom", "base", &[10, 20, 30], 0.3);
     moving(&mut tf, "map", "odom", &[10, 20, 30, 40, 50], 1.0);
@@ -166,7 +166,7 @@ fn a_frame_may_get_another_parent_and_stamps_before_have_the_first_one() {
 }
 
 #[test]
-fn a_static_transform_counts_until_the_frame_moves_and_after_it_rests_for_long() {
+fn static_transforms_are_used_before_and_long_after_motion() {
     let mut tf = Transforms::default();
     fixed(&mut tf, "map", "odom", at(0.1));
     moving(&mut tf, "map", "odom", &[S], 0.5);
@@ -182,7 +182,7 @@ fn a_static_transform_counts_until_the_frame_moves_and_after_it_rests_for_long()
 }
 
 #[test]
-fn a_frame_that_is_given_parents_back_and_forth_keeps_the_way_to_the_map() {
+fn alternating_parents_keep_the_path_to_the_map() {
     let mut tf = robot();
     let wanted = tf.lookup("map", "lidar", MIDDLE).unwrap();
     for tick in 0..1000 {
@@ -199,7 +199,7 @@ fn a_frame_that_is_given_parents_back_and_forth_keeps_the_way_to_the_map() {
 }
 
 #[test]
-fn a_search_in_a_deep_chain_ends() {
+fn searches_in_deep_chains_terminate() {
     let mut tf = robot();
     for frame in 0..30_000 {
         fixed(&mut tf, &(frame + 1).to_string(), &frame.to_string(), RigidPose::IDENTITY);
@@ -214,7 +214,7 @@ fn a_search_in_a_deep_chain_ends() {
 }
 
 #[test]
-fn the_root_is_the_end_of_what_many_transforms_say() {
+fn root_follows_repeated_transforms() {
     let mut tf = Transforms::default();
     moving(&mut tf, "world", "base", &[1, 2, 3], 0.3);
     fixed(&mut tf, "base", "lidar", at(0.2));
@@ -227,7 +227,7 @@ fn the_root_is_the_end_of_what_many_transforms_say() {
 }
 
 #[test]
-fn a_second_parent_and_a_loop_are_named() {
+fn second_parents_and_loops_are_reported() {
     let mut tf = robot();
     assert_eq!(tf.second_parent("base", "lidar"), None);
     let is_new = tf.insert("lidar", "map", 5, at(0.1), false);
@@ -252,7 +252,7 @@ fn two_branches_meet_at_their_common_ancestor() {
 }
 
 #[test]
-fn samples_of_a_topic_are_a_parent_as_others_are() {
+fn topic_samples_act_as_a_parent() {
     let mut tf = robot();
     let wanted = tf.lookup("map", "lidar", MIDDLE).unwrap();
     let samples = || {
@@ -280,7 +280,7 @@ fn samples_of_a_topic_are_a_parent_as_others_are() {
 }
 
 #[test]
-fn samples_that_cannot_be_read_are_an_error_whatever_else_is_known() {
+fn unreadable_samples_are_always_an_error() {
     let cut = tempfile::NamedTempFile::new().unwrap();
     let mut samples = Samples::default();
     samples.file(PoseList::File(FilePart::open(cut.path(), 0, 6400).unwrap()));
@@ -295,7 +295,7 @@ fn samples_that_cannot_be_read_are_an_error_whatever_else_is_known() {
 }
 
 #[test]
-fn a_single_transform_counts_where_nothing_else_moves() {
+fn single_transforms_are_used_if_nothing_else_moves() {
     let mut tf = Transforms::default();
     fixed(&mut tf, "base", "lidar", at(0.2));
     moving(&mut tf, "odom", "base", &[5 * S], 0.3);
@@ -307,7 +307,7 @@ fn a_single_transform_counts_where_nothing_else_moves() {
 }
 
 #[test]
-fn frames_that_do_not_lead_to_the_map_cost_a_cloud_nothing() {
+fn frames_unrelated_to_the_map_are_not_searched() {
     let mut tf = robot();
     let wanted = tf.lookup("map", "lidar", MIDDLE).unwrap();
     // Chains above the sensor and above the map; one of them leads back.
@@ -368,7 +368,7 @@ fn a_common_ancestor_gives_poses_before_the_map_frame_is_a_parent() {
 
 /// The search must stop at the target frame.
 #[test]
-fn a_loop_above_the_frame_of_the_map_is_no_error() {
+fn loops_above_the_map_frame_are_no_error() {
     let wanted = robot().lookup("map", "lidar", MIDDLE).unwrap();
     let links: [&[(&str, &str)]; 4] = [
         &[("world", "map"), ("map", "world")],

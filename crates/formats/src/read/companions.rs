@@ -279,7 +279,7 @@ mod tests {
     }
 
     #[test]
-    fn texts_that_are_no_clouds_are_parted_from_clouds() {
+    fn companion_texts_are_separated_from_clouds() {
         let clouds = [("scan_1.csv", "1,2,3\n"), ("scan_2.csv", "4,5,6\n4,5,7\n")];
         for (name, text, what) in [
             ("imu.csv", "t,ax,ay,az\n0,1,2,3\n", "neither numbers nor column names"),
@@ -302,7 +302,7 @@ mod tests {
     }
 
     #[test]
-    fn clouds_with_names_of_their_own_stay() {
+    fn clouds_with_unusual_names_are_kept() {
         let (found, others) = sorted_out(&[
             ("hall.csv", "1,2,3\n"),
             ("kitchen.xyz", "500000.5 5000000.5 3\n500001.5 5000001.5 3\n"),
@@ -316,7 +316,7 @@ mod tests {
     }
 
     #[test]
-    fn a_list_of_pairs_leads_to_the_depths() {
+    fn association_files_suggest_the_depth_list() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("associations.txt");
         fs::write(&path, "# rgb depth\n1.5 rgb/1.png 1.5 depth/1.png\n").unwrap();

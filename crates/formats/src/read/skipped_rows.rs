@@ -2,12 +2,12 @@ use voxtile::FormatError;
 
 /// Counts the invalid rows of a text and keeps the first.
 #[derive(Debug, Default)]
-pub(super) struct LeftOut {
+pub(super) struct SkippedRows {
     rows: u64,
     first: Option<(u64, String)>,
 }
 
-impl LeftOut {
+impl SkippedRows {
     pub(super) fn add(&mut self, line: u64, reason: String) {
         self.rows += 1;
         self.first.get_or_insert((line, reason));

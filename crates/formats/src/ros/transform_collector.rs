@@ -4,7 +4,7 @@ use super::transforms::{BadTransform, Transforms};
 
 /// Adds the transforms of a recording and counts the rejected ones.
 #[derive(Debug, Default)]
-pub(super) struct TransformIntake {
+pub(super) struct TransformCollector {
     /// Number of distinct pairs of a frame and its parent.
     links: usize,
     beyond: u64,
@@ -23,7 +23,7 @@ const MAX_NAME_BYTES: usize = 256;
 const MAX_SECONDS: usize = 8;
 const MAX_CHECKED: usize = 2000;
 
-impl TransformIntake {
+impl TransformCollector {
     pub(super) fn take(&mut self, transforms: &mut Transforms, pose: StampedPose, is_static: bool) {
         let StampedPose { header, child_frame, parent_from_child } = pose;
         let (parent, stamp_ns) = (header.frame_id.as_str(), header.stamp_ns);

@@ -7,23 +7,23 @@ use voxtile::sensor::SensorModel;
 use voxtile::space::Grid;
 use voxtile::store::InputContent;
 use voxtile::{Error, FormatError, Place};
-use voxtile_formats::{ScanChain, ScanMark, StoredScan};
+use voxtile_formats::{ScanChain, ScanFingerprint, StoredScan};
 
 /// Number of scans to search for the first one with points, which identifies the input.
-const LEAD: usize = 16;
+const LOOKAHEAD: usize = 16;
 /// Limit for the places of an input that cannot be read. All scans of a damaged chunk of a recording are at one place.
 const MAX_BAD_PLACES: usize = 1000;
 /// Limit for the skipped scans of an input, because the map stores the number of each.
 const MAX_SKIPPED: usize = 10_000;
 
 /// Sequence of the scans of an input, and the record of the accepted ones for the map.
-pub struct Intake {
+pub struct Ingest {
     reader: ScanReader,
     scans: PathBuf,
     /// Scans that were read to identify the input and are not yet inserted.
-    lead: VecDeque<Read>,
+    lookahead: VecDeque<Read>,
     /// A read after the scans of a batch that is not a scan.
-    behind: Option<voxtile::Result<Read>>,
+    pending: Option<voxtile::Result<Read>>,
     chain: ScanChain,
     begins_with: Option<String>,
     skipped: Vec<u64>,
@@ -58,17 +58,17 @@ pub struct Taken {
     pub content: InputContent,
 }
 
-impl Intake {
+impl Ingest {
     pub fn new(reader: ScanReader, scans: PathBuf, skips_bad: bool, rays: Option<RayNeeds>) -> Self {
-        let (lead, chain) = (VecDeque::new(), ScanChain::default());
+        let (lookahead, chain) = (VecDeque::new(), ScanChain::default());
         let (skipped, unread, left_out) = Default::default();
-        let (behind, begins_with) = (None, None);
+        let (pending, begins_with) = (None, None);
         let (bad_places, skipped_alone) = Default::default();
         Self {
             reader,
             scans,
-            lead,
-            behind,
+            lookahead,
+            pending,
             chain,
             begins_with,
             skipped,
@@ -87,18 +87,18 @@ impl Intake {
     }
 
     /// Reads the scans that identify the input. Returns `false` if it was stopped before.
-    pub fn read_lead(&mut self) -> anyhow::Result<bool> {
-        while self.lead.len() < LEAD && self.begins_with.is_none() {
+    pub fn read_lookahead(&mut self) -> anyhow::Result<bool> {
+        while self.lookahead.len() < LOOKAHEAD && self.begins_with.is_none() {
             match self.reader.next(&mut || Ok(()))? {
                 Read::Stopped => return Ok(false),
                 Read::End => break,
                 read => {
-                    if let Read::Scan(ReadScan { mark, .. }) = &read
-                        && mark.has_points()
+                    if let Read::Scan(ReadScan { fingerprint, .. }) = &read
+                        && fingerprint.has_points()
                     {
-                        self.begins_with = Some(mark.scan_text());
+                        self.begins_with = Some(fingerprint.scan_text());
                     }
-                    self.lead.push_back(read);
+                    self.lookahead.push_back(read);
                 }
             }
         }
@@ -107,7 +107,7 @@ impl Intake {
 
     /// Returns the first scan that was read ahead, if any.
     fn first(&self) -> Option<&StoredScan> {
-        self.lead.iter().find_map(|read| match read {
+        self.lookahead.iter().find_map(|read| match read {
             Read::Scan(ReadScan { scan, .. }) => Some(scan),
             _ => None,
         })
@@ -122,10 +122,10 @@ impl Intake {
             // All scans of an input have the same fields.
             needs.check_fields(scan)?;
         }
-        match self.lead.pop_front().map(|first| self.judged(first)) {
+        match self.lookahead.pop_front().map(|first| self.judged(first)) {
             Some(Read::Unread(error)) if !self.skips_bad => Err(error.into()),
             first => {
-                first.into_iter().for_each(|first| self.lead.push_front(first));
+                first.into_iter().for_each(|first| self.lookahead.push_front(first));
                 Ok(())
             }
         }
@@ -157,14 +157,16 @@ impl Intake {
         if content.scans == 0 {
             return false;
         }
-        let (mut chain, mut reads) = (ScanChain::default(), self.lead.iter());
+        let (mut chain, mut reads) = (ScanChain::default(), self.lookahead.iter());
         while chain.scans() < content.scans {
             match reads.next() {
                 // Skipped by the earlier build, whether it can be read now or not.
                 Some(Read::Unread(_) | Read::Scan(_)) if content.skipped.contains(&chain.scans()) => {
                     chain.add_unread();
                 }
-                Some(Read::LeftOut(mark) | Read::Scan(ReadScan { mark, .. })) => chain.add(mark),
+                Some(Read::LeftOut(fingerprint) | Read::Scan(ReadScan { fingerprint, .. })) => {
+                    chain.add(fingerprint)
+                }
                 _ => return false,
             }
         }
@@ -246,8 +248,8 @@ impl Intake {
                     self.count_bad(&error);
                     self.chain.add_unread();
                 }
-                Read::LeftOut(mark) => self.chain.add(&mark),
-                Read::Scan(ReadScan { mark, .. }) => self.chain.add(&mark),
+                Read::LeftOut(fingerprint) => self.chain.add(&fingerprint),
+                Read::Scan(ReadScan { fingerprint, .. }) => self.chain.add(&fingerprint),
                 Read::Unread(error) => {
                     let context =
                         format!("scan {number}, which the map already has, cannot be read any more");
@@ -270,18 +272,18 @@ impl Intake {
                 Read::Stopped => return Ok(Next::Stopped),
                 Read::End => return Ok(Next::End),
                 Read::Scan(scan) => break vec![self.took(scan)],
-                Read::LeftOut(mark) => self.leave_out(&mark),
+                Read::LeftOut(fingerprint) => self.leave_out(&fingerprint),
                 Read::Unread(error) => self.skip(error)?,
             }
         };
         while taken.len() < most
-            && let Some(read) = self.read_at_hand()
+            && let Some(read) = self.read_ready()
         {
             match read {
                 Ok(Read::Scan(scan)) => taken.push(self.took(scan)),
-                Ok(Read::LeftOut(mark)) => self.leave_out(&mark),
+                Ok(Read::LeftOut(fingerprint)) => self.leave_out(&fingerprint),
                 other => {
-                    self.behind = Some(other);
+                    self.pending = Some(other);
                     break;
                 }
             }
@@ -289,13 +291,13 @@ impl Intake {
         Ok(Next::Scans(taken))
     }
 
-    fn took(&mut self, ReadScan { scan, mark }: ReadScan) -> Taken {
-        self.chain.add(&mark);
+    fn took(&mut self, ReadScan { scan, fingerprint }: ReadScan) -> Taken {
+        self.chain.add(&fingerprint);
         Taken { scan, content: self.content() }
     }
 
-    fn leave_out(&mut self, mark: &ScanMark) {
-        self.chain.add(mark);
+    fn leave_out(&mut self, fingerprint: &ScanFingerprint) {
+        self.chain.add(fingerprint);
         self.left_out += 1;
     }
 
@@ -344,14 +346,14 @@ impl Intake {
         Ok(self.judged(read))
     }
 
-    fn read_at_hand(&mut self) -> Option<voxtile::Result<Read>> {
-        let read = self.read_before().or_else(|| self.reader.next_at_hand())?;
+    fn read_ready(&mut self) -> Option<voxtile::Result<Read>> {
+        let read = self.read_before().or_else(|| self.reader.next_ready())?;
         Some(read.map(|read| self.judged(read)))
     }
 
     /// Returns a read that was made earlier and not yet used.
     fn read_before(&mut self) -> Option<voxtile::Result<Read>> {
-        self.behind.take().or_else(|| self.lead.pop_front().map(Ok))
+        self.pending.take().or_else(|| self.lookahead.pop_front().map(Ok))
     }
 
     fn wrong(&self, reason: String) -> anyhow::Error {
