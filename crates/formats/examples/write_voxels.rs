@@ -37,7 +37,7 @@ fn run() -> Result<(), Box<dyn std::error::Error>> {
     let text = std::fs::read_to_string(&arguments.table)?;
     let mut rows: Vec<VoxelRow> = Vec::new();
     for line in text.lines().filter(|line| !line.is_empty()) {
-        rows.push(row(line, &arguments).ok_or_else(|| format!("no voxel: {line}"))?);
+        rows.push(row(line, &arguments).ok_or_else(|| format!("not a voxel: {line}"))?);
     }
     rows.sort_by_key(|row| (row.tile, morton(row.index)));
     let mut bounds_m = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
@@ -71,7 +71,7 @@ fn arguments() -> Result<Arguments, String> {
     let mut words = std::env::args().skip(1);
     let mut word = |what: &str| words.next().ok_or_else(|| format!("{what} is missing"));
     let name = word("FORMAT")?;
-    let format = *OutputFormats::default().of_name(&name).ok_or_else(|| format!("{name} is no format"))?;
+    let format = *OutputFormats::default().of_name(&name).ok_or_else(|| format!("{name} is not a format"))?;
     let (table, output) = (word("VOXELS.csv")?.into(), Path::new(&word("OUTPUT")?).to_owned());
     let (origin_m, subtract_m) = ([0.0; 3], [0.0; 3]);
     let mut arguments =
@@ -81,14 +81,14 @@ fn arguments() -> Result<Arguments, String> {
     while let Some(option) = rest.pop() {
         let mut number = || -> Result<f64, String> {
             let text = rest.pop().ok_or_else(|| format!("{option} needs a number"))?;
-            text.parse().map_err(|_| format!("{option}: {text} is no number"))
+            text.parse().map_err(|_| format!("{option}: {text} is not a number"))
         };
         match option.as_str() {
             "--resolution" => arguments.resolution_m = number()?,
             "--origin" => arguments.origin_m = [number()?, number()?, number()?],
             "--quantize" => arguments.is_quantized = true,
             "--subtract" => arguments.subtract_m = [number()?, number()?, number()?],
-            _ => return Err(format!("{option} is no option")),
+            _ => return Err(format!("unknown option {option}")),
         }
     }
     if format.origin == Origin::Map {

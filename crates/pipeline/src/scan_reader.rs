@@ -324,7 +324,7 @@ mod tests {
         assert!(thread.join().is_err());
         let mut idle = || Ok(());
         assert!(matches!(take(&queue, &Stop::default(), &mut idle), Ok(Read::End)));
-        let error = take(&queue, &Stop::default(), &mut idle).err().expect("nobody pushes any more");
+        let error = take(&queue, &Stop::default(), &mut idle).err().expect("the queue has no sender");
         assert_eq!(error.to_string(), READER_IS_GONE);
     }
 }

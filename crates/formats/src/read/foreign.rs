@@ -50,8 +50,8 @@ const FOREIGN: [Foreign; 27] = [
         name: "a NumPy array",
         magic: &[b"\x93NUMPY"],
         extensions: &["npy"],
-        advice: "write it as .bin, `array.astype('<f4').tofile(...)`, and give its columns with `fields`; only poses are \
-              read from .npy",
+        advice: "write it as .bin, `array.astype('<f4').tofile(...)`, and give its columns with `fields`; only poses \
+              are read from .npy",
     },
     Foreign {
         name: "one image",

@@ -149,7 +149,6 @@ impl Lines {
         self.error_at(self.number, reason)
     }
 
-    /// Creates an error for a line.
     pub(crate) fn error_at(&self, line: u64, reason: impl Into<String>) -> Error {
         FormatError::at_line(line, reason).in_input(&self.path)
     }

@@ -9,7 +9,6 @@ use crate::read_options::ReadOptions;
 use std::path::Path;
 use voxtile::{FormatError, Result};
 
-/// Points of a text.
 struct TextPoints {
     lines: Lines,
     columns: Columns,

@@ -1,6 +1,5 @@
 //! Units in column names: `x (cm)`, `X[mm]`, `y_mm`, `z/ft`, `time [us]`.
 
-/// Unit of length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct LengthUnit {
     /// Short name.
@@ -9,7 +8,6 @@ pub(crate) struct LengthUnit {
     per: f64,
 }
 
-/// Unit of time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct TimeUnit {
     pub(crate) seconds: f64,

@@ -211,7 +211,6 @@ impl BagPoses {
         fixed.is_ok_and(|fixed| fixed != frame)
     }
 
-    /// Returns whether a frame moves.
     pub(super) fn moves(&self, frame: &str) -> bool {
         self.transforms.ancestors(frame).iter().any(|frame| self.transforms.is_moving(frame))
     }

@@ -9,7 +9,6 @@ use voxtile::{Error, FormatError, Result};
 /// Merges the messages of chunks in time order. Chunks that overlap in time are open together.
 #[derive(Debug)]
 pub(super) struct ChunkOrder {
-    /// Topics to return.
     pub(super) topics: TopicSet,
     budget: Budget,
     /// Chunk numbers sorted by start time.

@@ -55,7 +55,7 @@ mod tests {
         }
         assert_eq!((track.poses.len(), track.odd), (100, 0));
         let (_, first) = track.poses.around(0).unwrap();
-        assert_eq!(first.map(|first| first.pose.position_m[0]), Some(100.0), "what is told last counts");
+        assert_eq!(first.map(|first| first.pose.position_m[0]), Some(100.0), "the last pose is kept");
     }
 
     #[test]

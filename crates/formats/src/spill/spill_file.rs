@@ -18,7 +18,6 @@ pub(crate) struct SpillFile {
     max_bytes: u64,
 }
 
-/// Size of a stream.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum StreamSize {
     /// Size stated by the file. A longer stream is an error.

@@ -38,7 +38,6 @@ impl Spool {
     }
 }
 
-/// Reader of a spool.
 pub(super) struct SpoolReader {
     folder: PathBuf,
     file: File,

@@ -103,7 +103,7 @@ fn compressor_type_must_match_item_versions() {
         // The description follows the record header, which begins with two bytes and the user ID.
         let name_at = file.windows(14).position(|bytes| bytes == b"laszip encoded").unwrap();
         let error = of_damaged(&file, name_at - 2 + 54, &compressor.to_le_bytes());
-        assert_says(&error, 100, &format!("compressor {compressor} contradicts"));
+        assert_says(&error, 100, &format!("compressor type {compressor} contradicts"));
     }
 }
 

@@ -94,7 +94,8 @@ fn registered_clouds_use_odometry() {
         assert_eq!(errors, Vec::<String>::new());
         assert_registered(&clouds, &format!("{options:?}"));
         // With an explicit topic there is no remark on the choice.
-        let expected = "the clouds are already in the frame camera_init: their points are not transformed, and rays start at body \
+        let expected = "the clouds are already in the frame camera_init: their points are not transformed, and \
+                    rays start at body \
                     (`odometry` /Odometry `world_frame`)";
         let wanted: &[&str] = if options.is_world_frame { &[] } else { &[expected] };
         assert_eq!(remarks, wanted);
@@ -202,7 +203,8 @@ fn ambiguous_poses_are_not_guessed() {
         // Odometry of the sensor itself is only used if requested.
         (
             vec![cloud("body"), ("/Odometry", Odometry("camera_init", "body"))],
-            "there are poses in /Odometry (nav_msgs/Odometry, 5 messages): select their topic, for instance `odometry` /Odometry",
+            "there are poses in /Odometry (nav_msgs/Odometry, 5 messages): select their topic, for instance \
+             `odometry` /Odometry",
         ),
         (vec![cloud("lidar")], "no transform names the frame lidar"),
     ] {

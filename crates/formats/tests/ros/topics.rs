@@ -84,6 +84,7 @@ fn foreign_messages_are_reported() {
     drop(writer);
     std::fs::write(&path, bytes.into_inner()).unwrap();
     let error = open_bag(&[path], &BagOptions::default()).err().map(|error| format!("{error:#}"));
-    let expected = "with another serialization than that of ROS are not supported: /lidar; topics: /lidar (foxglove.PointCloud, 1 ";
+    let expected = "with another serialization than that of ROS are not supported: /lidar; topics: \
+                    /lidar (foxglove.PointCloud, 1 ";
     assert!(error.as_ref().is_some_and(|error| error.contains(expected)), "{error:?}");
 }

@@ -81,8 +81,8 @@ impl StagedOutput {
         if self.target.exists() || !to.exists() || is_same(from, to)? {
             return Ok(());
         }
-        let hint = "a companion file of the output needs this name: move or remove the existing file, or choose another \
-             output";
+        let hint = "a companion file of the output needs this name: move or remove the existing file, or choose \
+             another output";
         Err(Error::AlreadyExists { path: to.to_owned(), hint })
     }
 }

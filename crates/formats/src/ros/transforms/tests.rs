@@ -79,7 +79,7 @@ fn frame_with_most_samples_drops_the_older_half() {
     assert_eq!(tf.lookup("odom", "base", 4), Err(WhyNot::Before("base".into())));
     assert_eq!(tf.lookup("odom", "lidar", 5), Ok(at(0.3)));
     while tf.shrink_largest() > 0 {}
-    assert_eq!((tf.frames(), tf.forget_older_than(S)), (1, 1), "static transforms stay");
+    assert_eq!((tf.frames(), tf.forget_older_than(S)), (1, 1), "static transforms are kept");
 }
 
 #[test]
@@ -178,7 +178,7 @@ fn static_transforms_are_used_before_and_long_after_motion() {
     assert_eq!(tf.lookup("map", "odom", 13 * S), Ok(at(0.1)));
     fixed(&mut tf, "world", "odom", at(0.7));
     assert_eq!(tf.lookup("world", "odom", 13 * S), Ok(at(0.7)));
-    assert_eq!(tf.lookup("map", "odom", 13 * S), Ok(at(0.1)), "what does not lead there does not count");
+    assert_eq!(tf.lookup("map", "odom", 13 * S), Ok(at(0.1)), "parents that do not lead there are ignored");
 }
 
 #[test]
