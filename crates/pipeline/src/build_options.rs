@@ -69,7 +69,7 @@ pub struct BuildOptions {
     pub strict: bool,
     /// When to flush the map. Default: every 60 s, in the background.
     pub flush_every: FlushEvery,
-    /// What to do with scans that arrive faster than they can be inserted.
+    /// Policy for scans that arrive faster than they can be inserted.
     pub when_behind: WhenBehind,
     /// Data that tiles keep for coarse queries. It does not affect results and files.
     pub octree: OctreeConfig,

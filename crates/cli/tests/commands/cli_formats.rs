@@ -584,9 +584,12 @@ fn a_panic_of_a_decoder_prints_one_line_with_the_file() {
         let mut bytes = whole.clone();
         bytes[points_at + at..points_at + at + 16].fill(0xff);
         fs::write(&file, bytes).unwrap();
-        let said = refusal(&["scans", text(&file)]);
-        assert!(said.contains("damaged.laz") && said.contains("its decoder failed (decoders.rs:"), "{said}");
-        assert!(said.lines().count() == 1 && !said.contains("panicked"), "{said}");
+        let printed = refusal(&["scans", text(&file)]);
+        assert!(
+            printed.contains("damaged.laz") && printed.contains("its decoder failed (decoders.rs:"),
+            "{printed}"
+        );
+        assert!(printed.lines().count() == 1 && !printed.contains("panicked"), "{printed}");
     }
 }
 

@@ -166,7 +166,7 @@ fn a_calib_beside_poses_of_a_camera_is_named() {
     fs::write(&poses, along(2, 0.0)).unwrap();
     let reported = overview(&[]);
     assert!(reported.contains("add --calib") && !reported.contains("these move"), "{reported}");
-    // Poses of the lidar go along x.
+    // Lidar poses move along x.
     fs::write(&poses, along(0, 1.0)).unwrap();
     assert!(!overview(&[]).contains("note"));
     // With a calib that is not theirs, along -y.

@@ -251,6 +251,6 @@ fn a_gigabyte_of_zeros_is_no_poses() {
     File::create(&poses).unwrap().set_len(1 << 30).unwrap();
     let command = build(&scans, &map, MEMORY, &["--poses", poses.to_str().unwrap()]);
     let output = limited(&command, 'v', 1 << 20).output().unwrap();
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert!(said.contains("is binary, not a text file of poses"), "{said}");
+    let printed = String::from_utf8_lossy(&output.stderr);
+    assert!(printed.contains("is binary, not a text file of poses"), "{printed}");
 }

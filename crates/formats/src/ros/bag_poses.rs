@@ -303,7 +303,8 @@ impl BagPoses {
         self.lookup(sensor_frame)?.find(stamp_ns)
     }
 
-    /// Returns a lookup of sensor poses at any time. The poses of a topic must be settled before, by the first pose.
+    /// Returns a lookup of sensor poses at any time. Call it after the first [`BagPoses::place`], which adds the poses of
+    /// a topic to the transforms.
     pub(super) fn lookup(&self, sensor_frame: &str) -> std::result::Result<PoseLookup, WhyNot> {
         let unknown = || Err(WhyNot::UnknownFrame(sensor_frame.to_owned()));
         self.lookups.get(sensor_frame).cloned().unwrap_or_else(unknown)

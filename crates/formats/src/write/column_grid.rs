@@ -36,7 +36,7 @@ impl<T: Copy> ColumnGrid<T> {
                  voxels",
                 head.resolution_m
             );
-            Error::argument("flat map", reason)
+            Error::argument("2D grid", reason)
         };
         let count = count.and_then(|count| usize::try_from(count).ok()).ok_or_else(too_large)?;
         let mut cells = Vec::new();
@@ -60,7 +60,7 @@ impl<T: Copy> ColumnGrid<T> {
         let cell = cell.and_then(|(x, row)| self.cells.get_mut(row * self.width + x));
         let outside = || {
             let reason = format!("voxel {:?} is outside of the announced bounds", voxel.index);
-            Error::argument("flat map", reason)
+            Error::argument("2D grid", reason)
         };
         cell.map(|cell| (cell, z)).ok_or_else(outside)
     }
@@ -88,5 +88,5 @@ impl<T: Copy> ColumnGrid<T> {
 
 /// Returns the error for a 2D grid without voxels.
 pub(super) fn nothing_to_draw() -> Error {
-    Error::argument("flat map", "there are no voxels; an image needs at least one")
+    Error::argument("2D grid", "there are no voxels; an image needs at least one")
 }

@@ -40,7 +40,8 @@ impl Levels {
         let differ = before ^ code;
         // Depth down to which both voxels are in the same cell.
         let shared = self.bits - (128 - differ.leading_zeros()).div_ceil(3).min(self.bits);
-        // They are apart one level deeper. The cells of a node are finer than the node by `NODE_BITS`.
+        // One level deeper, they are in different cells. The cells of a node are smaller than the node by a factor of
+        // 2^`NODE_BITS`.
         (shared + 1).saturating_sub(NODE_BITS).min(self.bits - NODE_BITS) as u8
     }
 

@@ -72,7 +72,7 @@ impl VoxelSink for HeightmapSink {
             png::EncodingError::IoError(error) => Error::io(&path, "write", error),
             other => Error::argument(path.display().to_string(), other.to_string()),
         };
-        let too_wide = |_| Error::argument("flat map", "a side is too long for an image: choose a region");
+        let too_wide = |_| Error::argument("heightmap", "a side is too long for an image: choose a region");
         let (columns, rows) =
             (u32::try_from(width).map_err(too_wide)?, u32::try_from(height).map_err(too_wide)?);
         let mut encoder = png::Encoder::new(&mut self.out, columns, rows);

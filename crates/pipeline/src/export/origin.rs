@@ -31,7 +31,7 @@ impl ExportOrigin {
         let is_index = |x: &f64| *x >= f64::from(i32::MIN) && *x <= f64::from(i32::MAX);
         if !voxel.iter().all(is_index) {
             let reason = format!(
-                "{requested_m:?} m is not finite, or too far away for the indices of voxels of {} m",
+                "{requested_m:?} m is not finite, or exceeds the range of indices of voxels of {} m",
                 grid.resolution_m()
             );
             return Err(Error::argument("origin", reason));
