@@ -18,7 +18,7 @@ pub type Body = UnsyncBoxBody<Bytes, Infallible>;
 pub enum Keep {
     /// Not cached: it may change.
     No,
-    /// Cached for ever: its URL contains its version.
+    /// Cached forever: its URL contains its version.
     ForEver,
 }
 

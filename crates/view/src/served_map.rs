@@ -291,7 +291,7 @@ impl ServedMap {
     }
 }
 
-/// Returns an origin for tiles without versions, such as those of OctoMap files. Browsers cache nodes for ever, so it
+/// Returns an origin for tiles without versions, such as those of OctoMap files. Browsers cache nodes forever, so it
 /// must differ from that of any file that a server showed earlier or will show later.
 fn new_origin() -> u64 {
     RandomState::new().build_hasher().finish()

@@ -256,7 +256,7 @@ fn octomap_files_and_several_maps_are_shown() {
     assert_eq!(viewer.get("maps/2/tileset.json").status, 404);
 }
 
-/// Browsers cache nodes for ever, so another file at the same address must have other URLs.
+/// Browsers cache nodes forever, so another file at the same address must have other URLs.
 #[test]
 fn another_octomap_file_has_other_nodes() {
     let (folder, map) = a_map();
@@ -412,7 +412,7 @@ fn a_flush_is_announced_and_changes_only_its_nodes() {
     };
     let (before, after) = (finest(&before), finest(&after));
     assert!(after.difference(&before).count() > 0);
-    assert!(after.intersection(&before).count() > 0, "tiles that nobody changed have other versions");
+    assert!(after.intersection(&before).count() > 0, "unchanged tiles have new versions");
 }
 
 #[test]

@@ -30,7 +30,7 @@ fn answer(command: &str, map: &Path, how: &[&str]) -> Value {
 }
 
 fn peak(answer: &Value) -> u64 {
-    answer["peak_rss_bytes"].as_u64().expect("this system tells the peak")
+    answer["peak_rss_bytes"].as_u64().expect("this system reports the peak")
 }
 
 /// A build stays within its budget plus 48 MiB, whatever it maps, and the map does not depend on the budget.

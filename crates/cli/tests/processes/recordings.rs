@@ -27,7 +27,7 @@ fn keeps_to_its_memory(input: &Path, how: &[&str]) -> String {
     let name = input.display();
     assert!(output.status.success(), "{name}: {}", String::from_utf8_lossy(&output.stderr));
     let built: Value = serde_json::from_slice(&output.stdout).unwrap();
-    let peak = built["peak_rss_bytes"].as_u64().expect("this system tells the peak");
+    let peak = built["peak_rss_bytes"].as_u64().expect("this system reports the peak");
     assert!(peak < MEMORY + BESIDE, "{name}: {} MiB", peak >> 20);
     assert_eq!(built["scans"], 1, "{name}: {built}");
     digest(&map).unwrap().1
