@@ -260,7 +260,7 @@ fn wrong_files_are_refused_with_their_offset() {
     let refusals = [
         (bt_file(header, &[0x01]), begin, "ends"),
         (bt_file(header, &[0x05, 0x00]), begin, "3 nodes follow, but the header says 2"),
-        (bt_file(header, &[0x03, 0x00, 0x00, 0x00]), begin + 2, "has none"),
+        (bt_file(header, &[0x03, 0x00, 0x00, 0x00]), begin + 2, "has no children"),
         (bt_file(header, &[0x03, 0x00].repeat(16)), begin + 30, "finest level"),
         (ot_file("id OcTree\nres 1", &[0, 0, 0, 0, 1].repeat(17)), ot_begin + 84, "finest level"),
         (ot_file("id OcTree\nres 1", &f32::NAN.to_le_bytes()), ot_begin, "not finite"),

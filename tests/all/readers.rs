@@ -95,7 +95,7 @@ fn wrong_pcd_files_are_told_what_is_wrong() {
     for (from, to, message) in [
         ("FIELDS x y z", "FIELDS x y w", "the points have no field z"),
         ("SIZE 4 4 4 4", "SIZE 4 4 4", "SIZE has 3 entries for 4 fields"),
-        ("TYPE F F F F", "TYPE F F F Q", "field intensity of type Q"),
+        ("TYPE F F F F", "TYPE F F F Q", "field intensity has an unsupported combination of type Q"),
         ("DATA ascii", "DATA zip", "DATA must be ascii, binary or binary_compressed, not zip"),
         ("POINTS 3", "POINTS 4", "POINTS 4 is not WIDTH times HEIGHT, 3"),
         ("VIEWPOINT 1 2 3 0 0 0 1", "VIEWPOINT 1 2", "VIEWPOINT needs seven finite numbers"),

@@ -226,7 +226,7 @@ fn scans_are_removed_by_time_and_by_input_and_snapshots_are_told() {
     };
     assert!(message_of(remove(ScanSelection::Time(0, 9), false)).contains("the map keeps none"));
     let message = message_of(remove(ScanSelection::Input("third".to_owned()), false));
-    assert!(message.contains("it has first, second"), "{message}");
+    assert!(message.contains("its inputs are first, second"), "{message}");
     let removed = remove(ScanSelection::Input("second".to_owned()), false).unwrap();
     assert_eq!((removed.scans_removed, removed.snapshots_with_them.len()), (2, 1));
     let reader = MapReader::open(at(&disk), 0).unwrap();

@@ -14,20 +14,20 @@ use voxtile::{Error, Result};
 pub enum LocalAnswer {
     /// Occupied in the local map, or in the archive if the local map has removed the voxel.
     Occupied,
-    /// Near to an occupied voxel of the local map.
+    /// Within the inflation radius of an occupied voxel of the local map.
     Inflated,
-    /// Free by the archive, with the probability of being occupied.
+    /// Free in the archive; the value is the probability of being occupied.
     Free(f64),
     /// Never observed.
     Unknown,
 }
 
 impl LocalView {
-    /// The state of a point, with free and unknown distinguished by an archive.
+    /// Returns the state of a point. The archive distinguishes free from unknown.
     ///
     /// # Errors
     ///
-    /// A tile of the archive that cannot be read.
+    /// If a tile of the archive cannot be read.
     pub fn answer_at(&self, point: Point, archive: &(impl MapView + Sized)) -> Result<LocalAnswer> {
         Ok(match self.state_at(point) {
             LocalState::Occupied => LocalAnswer::Occupied,
@@ -42,16 +42,16 @@ impl LocalView {
 }
 
 impl LocalMap {
-    /// Copies voxels that are occupied in an archive and at most `radius_m` metres from `position`, when a robot
-    /// returns to a known place. Returns how many were new.
+    /// Copies the occupied voxels of an archive within `radius_m` metres of `position`, for a robot that returns to a
+    /// known place. Returns the number of new voxels.
     ///
-    /// Evidence from scans is kept. The archive's voxels count as older than all of it, the nearest as the youngest of
-    /// them, up to the limit on voxels.
+    /// Evidence from scans is kept. Copied voxels count as older than all of it, the nearest ones as the youngest of
+    /// them. The limit on voxels applies.
     ///
     /// # Errors
     ///
-    /// A tile that cannot be read, an archive of another resolution, a position without a voxel, an invalid radius: the
-    /// map is unchanged.
+    /// If a tile cannot be read, the resolutions differ, the position has no voxel or the radius is invalid. The map is
+    /// then unchanged.
     pub fn prime(
         &mut self,
         archive: &(impl MapView + Sized),
@@ -61,7 +61,7 @@ impl LocalMap {
         self.check_position(position)?;
         check_resolution(self.resolution_m(), archive)?;
         if !(radius_m >= 0.0 && radius_m.is_finite()) {
-            return Err(Error::argument("radius", format!("{radius_m} m is not a length of at least 0")));
+            return Err(Error::argument("radius", format!("{radius_m} m must be a length of at least 0")));
         }
         let found = self.occupied_around(archive, position, radius_m)?;
         self.position = Some(position);
@@ -78,7 +78,7 @@ impl LocalMap {
         Ok(new)
     }
 
-    /// Squared distance, voxel and log-odds of the archive's occupied voxels in a ball, the nearest first.
+    /// Returns the squared distance, index and log-odds of the archive's occupied voxels in a ball, nearest first.
     fn occupied_around(
         &self,
         archive: &(impl MapView + Sized),
@@ -98,7 +98,8 @@ impl LocalMap {
         Ok(found)
     }
 
-    /// Adds a voxel at the start of the history, unless it is in the map already or free by the map's own thresholds.
+    /// Adds a voxel at the start of the history unless the map has it already or its own thresholds classify it as
+    /// free.
     fn add_oldest(&mut self, voxel: VoxelIndex, log_odds: f64) -> bool {
         let limits = self.applied.log_odds;
         let log_odds = log_odds.clamp(limits.min, limits.max);
@@ -120,7 +121,7 @@ impl LocalMap {
     }
 }
 
-/// An archive and a local map that take the same scans.
+/// An archive and a local map that are updated with the same scans.
 #[derive(Debug)]
 pub struct WithLocalMap<M> {
     archive: M,
@@ -132,7 +133,7 @@ impl<M: Mapper> WithLocalMap<M> {
     ///
     /// # Errors
     ///
-    /// Different resolutions.
+    /// If the resolutions differ.
     pub fn new(archive: M, local: LocalMap) -> Result<Self> {
         check_resolution(local.resolution_m(), &archive)?;
         Ok(Self { archive, local })
@@ -142,10 +143,10 @@ impl<M: Mapper> WithLocalMap<M> {
     ///
     /// # Errors
     ///
-    /// As for [`Mapper::insert_points`] and [`LocalMap::insert_points`]; then both are as before the call.
+    /// As for [`Mapper::insert_points`] and [`LocalMap::insert_points`]. Both maps are then unchanged.
     pub fn insert_points(&mut self, scan: &dyn ScanPoints) -> Result<(ScanReport, LocalReport)> {
         let Self { archive, local } = self;
-        // First everything that can fail in the local map; after that only the archive can fail.
+        // The local map runs all its checks first, so only the archive can fail from here on.
         let (local_report, report) = local.insert_after(scan, || archive.insert_points(scan))?;
         Ok((report, local_report))
     }
@@ -171,36 +172,36 @@ impl<M: Mapper> WithLocalMap<M> {
         self.local.prime(&self.archive, position, radius_m)
     }
 
-    /// The combined answer for a point.
+    /// Returns the combined answer for a point.
     ///
     /// # Errors
     ///
-    /// A tile of the archive that cannot be read.
+    /// If a tile of the archive cannot be read.
     pub fn answer_at(&self, point: Point) -> Result<LocalAnswer> {
         self.local.view().answer_at(point, &self.archive)
     }
 
-    /// The archive.
+    /// Returns the archive.
     pub fn archive(&self) -> &M {
         &self.archive
     }
 
-    /// The archive, mutably: to flush it or to update it alone.
+    /// Returns the archive, mutably: to flush it or to update it alone.
     pub fn archive_mut(&mut self) -> &mut M {
         &mut self.archive
     }
 
-    /// The local map.
+    /// Returns the local map.
     pub fn local(&self) -> &LocalMap {
         &self.local
     }
 
-    /// The local map, mutably: to change its parameters or to update it alone.
+    /// Returns the local map, mutably: to change its parameters or to update it alone.
     pub fn local_mut(&mut self) -> &mut LocalMap {
         &mut self.local
     }
 
-    /// The archive and the local map.
+    /// Returns the archive and the local map.
     pub fn into_parts(self) -> (M, LocalMap) {
         (self.archive, self.local)
     }
@@ -211,6 +212,7 @@ fn check_resolution(resolution_m: f64, archive: &impl MapView) -> Result<()> {
     if of_archive == resolution_m {
         return Ok(());
     }
-    let reason = format!("{resolution_m} m, but the archive has {of_archive} m; take the same for both");
+    let reason =
+        format!("{resolution_m} m, but the archive has {of_archive} m; use the same resolution for both");
     Err(Error::argument("resolution of the local map", reason))
 }

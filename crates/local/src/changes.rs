@@ -6,17 +6,17 @@ use voxtile::space::VoxelIndex;
 /// A voxel that changed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct VoxelChange {
-    /// Which voxel.
+    /// Index of the voxel.
     pub voxel: VoxelIndex,
-    /// Its state before.
+    /// State before the change.
     pub before: LocalState,
-    /// Its state now.
+    /// State after the change.
     pub after: LocalState,
 }
 
 impl LocalView {
-    /// The voxels that differ from an earlier view of the same map, in no particular order. Parts that both views share
-    /// are skipped.
+    /// Returns the voxels that differ from an earlier view of the same map, in no particular order. Skips parts that
+    /// both views share.
     pub fn changes_since(&self, earlier: &Self) -> Vec<VoxelChange> {
         let mut changes = Vec::new();
         for (index, page) in &self.pages {

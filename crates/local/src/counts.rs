@@ -1,17 +1,17 @@
 use super::runs::Runs;
 
-/// For each voxel of a block, the number of voxels that inflate it, and which voxels of the block inflate others.
+/// For each voxel of a block: how many voxels inflate it, and whether it inflates others.
 ///
-/// Counts are stored as bit planes: plane `k` holds bit `k` of the counts of all 64 voxels. So adding one to all voxels
-/// of a mask is a carry over planes, and a block has as many planes as its largest count needs: mostly two or three.
+/// Counts are stored as bit planes: plane `k` holds bit `k` of the counts of all 64 voxels. Adding one to all voxels of
+/// a mask is a carry across the planes. A block has as many planes as its largest count needs, usually two or three.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Counts {
-    /// By number of planes: the inflating voxels, then the planes.
+    /// Indexed by the number of planes: the mask of inflating voxels, then the planes.
     runs: [Runs<u64>; MAX_PLANES + 1],
 }
 
-/// Where the counts of a block are; no planes if nothing is inflated.
-// Next to each other in a block of 32 bytes.
+/// Position of the counts of a block; no planes if nothing is inflated.
+// Packed, so that a block fits into 32 bytes.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(Rust, packed)]
 pub(super) struct Tally {
@@ -19,11 +19,11 @@ pub(super) struct Tally {
     planes: u8,
 }
 
-/// At most 2^16 voxels inflate a voxel: see `MAX_RADIUS_VOXELS`.
+/// At most 2^16 voxels inflate one voxel: see `MAX_RADIUS_VOXELS`.
 const MAX_PLANES: usize = 16;
 
 impl Tally {
-    /// Whether no voxel is inflated.
+    /// Returns whether no voxel is inflated.
     #[inline]
     pub(super) fn is_empty(self) -> bool {
         self.planes == 0
@@ -43,19 +43,19 @@ impl Counts {
         self.runs[planes].get_mut(tally.run, planes + 1)
     }
 
-    /// The voxels that at least one voxel inflates.
+    /// Returns the mask of voxels that at least one voxel inflates.
     #[inline]
     pub(super) fn inflated(&self, tally: Tally) -> u64 {
         if tally.is_empty() { 0 } else { self.words(tally)[1..].iter().fold(0, |any, plane| any | plane) }
     }
 
-    /// The voxels that inflate others.
+    /// Returns the mask of voxels that inflate others.
     #[inline]
     pub(super) fn inflating(&self, tally: Tally) -> u64 {
         if tally.is_empty() { 0 } else { self.words(tally)[0] }
     }
 
-    /// Sets the voxels that inflate others; these are inflated themselves.
+    /// Sets the mask of voxels that inflate others; each of them is inflated itself.
     pub(super) fn set_inflating(&mut self, tally: Tally, mask: u64) {
         match tally.is_empty() {
             true => debug_assert_eq!(mask, 0),
@@ -109,7 +109,7 @@ impl Counts {
         mask & !after
     }
 
-    /// Bytes of memory on the heap.
+    /// Returns bytes of memory on the heap.
     pub(super) fn bytes(&self) -> usize {
         self.runs.iter().map(Runs::bytes).sum()
     }
@@ -130,7 +130,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn planes_count_as_numbers_do(
+        fn bit_planes_count_like_integers(
             steps in prop::collection::vec((0..2_usize, any::<bool>(), any::<u64>(), 1..40_u32), 0..60),
         ) {
             let mut counts = Counts::default();
@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn counts_reach_what_the_largest_ball_has() {
+    fn counts_reach_the_size_of_the_largest_ball() {
         let (mut counts, mut tally) = (Counts::default(), Tally::default());
         (0..57_777).for_each(|_| _ = counts.add(&mut tally, 1 << 63 | 1));
         counts.set_inflating(tally, 5);

@@ -9,25 +9,25 @@ use voxtile::maths::logit;
 use voxtile::scan::MAX_RAY_STEPS;
 use voxtile::space::{Grid, Point, VoxelIndex};
 
-/// The evidence of the present scan (the paper's task buffers).
+/// Evidence of the current scan (the paper's task buffers).
 #[derive(Debug, Default)]
 pub(super) struct Frame {
     /// Voxels with evidence, in order of arrival.
     touches: Vec<Touch>,
-    /// The points in the world frame, where the scan has them otherwise.
+    /// Points in the world frame, if the scan does not provide them in this form.
     pub(super) points: Vec<Point>,
-    /// The indices of the points that are used.
+    /// Indices of the points that are not skipped.
     counting: Vec<u32>,
     pages: PageTable,
 }
 
-/// The evidence of the present scan for one voxel.
+/// Evidence of the current scan for one voxel.
 #[derive(Clone, Copy, Debug)]
 struct Touch {
     voxel: u32,
     hits: u32,
     misses: u32,
-    /// Whether the voxel was not in the map before (`B_new`), or was (`B_keep`).
+    /// Whether the voxel is new in the map (`B_new`) or existed before (`B_keep`).
     is_new: bool,
     is_free: bool,
 }
@@ -40,7 +40,7 @@ impl Frame {
             + self.pages.bytes()
     }
 
-    /// The scan's evidence for a voxel so far.
+    /// Returns the evidence of this scan for a voxel, creating it if necessary.
     #[inline]
     fn touch(&mut self, id: u32, voxel: &mut Voxel) -> &mut Touch {
         let number = voxel.touch().unwrap_or_else(|| {
@@ -53,9 +53,9 @@ impl Frame {
     }
 }
 
-/// The stages of an update up to the inflation.
+/// Stages of an update before the inflation.
 impl LocalMap {
-    /// Input update (Algorithm 1, lines 2 to 19): a hit for the voxel of each point that is used.
+    /// Input update (Algorithm 1, lines 2 to 19): adds a hit to the voxel of each point that is not skipped.
     pub(super) fn take_hits(
         &mut self,
         origin: Point,
@@ -67,7 +67,7 @@ impl LocalMap {
         // Neighbouring points are often in the same block.
         let mut last_block = None;
         for (number, &point) in points.iter().enumerate() {
-            let Some(voxel) = self.voxel_that_counts(origin, start, point, report) else { continue };
+            let Some(voxel) = self.voxel_of_used_point(origin, start, point, report) else { continue };
             self.frame.counting.push(number as u32);
             let index = voxel.map(|k| k >> 2);
             let block = match last_block {
@@ -92,8 +92,8 @@ impl LocalMap {
         touch.is_new |= known.is_none();
     }
 
-    /// The voxel of a point; `None`, and counted, if the point is skipped.
-    fn voxel_that_counts(
+    /// Returns the voxel of a point; counts the point and returns `None` if it is skipped.
+    fn voxel_of_used_point(
         &self,
         origin: Point,
         start: VoxelIndex,
@@ -119,9 +119,9 @@ impl LocalMap {
         None
     }
 
-    /// Ray casting (Algorithm 1, line 20): a miss for each voxel of the map that a ray passes.
+    /// Ray casting (Algorithm 1, line 20): adds a miss to each stored voxel on a ray.
     ///
-    /// Runs after all hits, so that the counts do not depend on the order of the points.
+    /// Runs after all hits, so that the result does not depend on the order of the points.
     pub(super) fn take_misses(&mut self, origin: Point, start: VoxelIndex, points: &[Point]) {
         let Self { grid, tree, voxels, frame, .. } = self;
         let origin = grid.to_voxel_units(origin);
@@ -137,7 +137,7 @@ impl LocalMap {
         (frame.counting, frame.pages) = (counting, pages);
     }
 
-    /// Occupancy check (equations 2 and 3): one sum per voxel, then the clamp, then its state.
+    /// Occupancy check (equations 2 and 3): sums the evidence of each voxel, clamps it and sets the state.
     pub(super) fn check_occupancy(&mut self) {
         let LocalParameters { log_odds, occupied_log_odds, .. } = self.applied;
         for touch in &mut self.frame.touches {
@@ -154,8 +154,8 @@ impl LocalMap {
         }
     }
 
-    /// Sequential removal (Algorithm 3): updated voxels move to the end of the history; voxels known to be free, and
-    /// those over the limit at the start of the history, are removed.
+    /// Sequential removal (Algorithm 3): moves updated voxels to the end of the history. Removes voxels known to be
+    /// free, and the oldest ones above the limit.
     pub(super) fn manage_history(&mut self, report: &mut LocalReport) {
         let touches = std::mem::take(&mut self.frame.touches);
         report.updated = touches.len() as u64;
@@ -174,7 +174,7 @@ impl LocalMap {
         }
         self.frame.touches = touches;
         self.frame.touches.clear();
-        // New voxels may remove as many others; a lowered limit is applied in parts.
+        // Each new voxel may displace an old one; a lowered limit is applied over several updates.
         let most = self.applied.work_per_update.saturating_add(report.new as usize);
         for _ in 0..most {
             let Some(oldest) = self.voxels.oldest().filter(|_| self.is_over_limit()) else { break };
@@ -184,7 +184,7 @@ impl LocalMap {
         }
     }
 
-    /// Removes a voxel that is no longer in the history from the occupancy map, and with it its inflation.
+    /// Removes a voxel that has left the history from the occupancy map, and its inflation with it.
     pub(super) fn remove(&mut self, id: u32) {
         let (block, place) = self.voxels.slab.get(id).home();
         self.tree.unstore(block, place);

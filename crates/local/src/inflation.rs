@@ -7,24 +7,24 @@ use super::tree::{NONE, Node, Tree};
 use std::sync::Arc;
 use voxtile::space::{Grid, Point, VoxelIndex};
 
-/// Keeps the inflated set: the dilation of the occupied voxels in range.
+/// The inflated set: the dilation of the occupied voxels in range.
 ///
-/// It is updated incrementally: a voxel that starts to inflate adds one to the counts of its stencil; one that stops
-/// subtracts it.
+/// It is updated incrementally: a voxel that starts to inflate adds one to the counts of its stencil, and subtracts it
+/// again when it stops.
 #[derive(Clone, Debug)]
 pub(super) struct Inflation {
     pub(super) rules: Rules,
     /// Blocks whose occupied voxels have changed.
     waiting: Vec<u32>,
-    /// Blocks that may be empty now.
+    /// Blocks to check for removal.
     emptied: Vec<u32>,
-    /// Numbers of the blocks around the present one, as its stencil numbers them.
-    beside: Vec<u32>,
+    /// Numbers of the blocks around the current one, indexed like its stencil.
+    affected: Vec<u32>,
     nodes: NodesAround,
     pages: Vec<u32>,
-    /// Inflated voxels.
+    /// Number of inflated voxels.
     pub(super) inflated: usize,
-    /// Voxels that started or stopped to inflate others since this was set to 0.
+    /// Number of voxels that started or stopped inflating others since the last reset.
     pub(super) changes: usize,
 }
 
@@ -34,7 +34,7 @@ impl Inflation {
             rules: Rules::new(range_m, radius_m, resolution_m),
             waiting: Vec::new(),
             emptied: Vec::new(),
-            beside: Vec::new(),
+            affected: Vec::new(),
             nodes: NodesAround::default(),
             pages: Vec::new(),
             inflated: 0,
@@ -42,7 +42,7 @@ impl Inflation {
         }
     }
 
-    /// Gives a node the current rule; it takes effect at the next [`Inflation::update`].
+    /// Assigns the current rule to a node; it takes effect at the next [`Inflation::update`].
     pub(super) fn adopt(&mut self, tree: &mut Tree, node: u32) {
         let (old, new) = (tree.nodes.get(node).rule, self.rules.current());
         if old == new {
@@ -59,7 +59,7 @@ impl Inflation {
         tree.nodes.get_mut(node).rule = new;
     }
 
-    /// Marks a block whose occupied voxels have changed.
+    /// Queues a block whose occupied voxels have changed.
     #[inline]
     pub(super) fn wait(&mut self, tree: &mut Tree, block: u32) {
         if !std::mem::replace(&mut tree.blocks.get_mut(block).is_waiting, true) {
@@ -67,13 +67,13 @@ impl Inflation {
         }
     }
 
-    /// Marks a block that may be empty.
+    /// Queues a block to be removed if it is empty.
     pub(super) fn may_be_empty(&mut self, block: u32) {
         self.emptied.push(block);
     }
 
-    /// Updates the inflated set for blocks that changed, and for voxels that entered or left the range of the sensor,
-    /// now at `position`. With `has_old_rules` some nodes may have another rule than the current one.
+    /// Updates the inflated set for blocks that changed and for voxels that entered or left the range of the sensor at
+    /// `position`. `has_old_rules`: some nodes may still have an older rule.
     pub(super) fn update(&mut self, tree: &mut Tree, grid: Grid, position: Point, has_old_rules: bool) {
         let mut waiting = std::mem::take(&mut self.waiting);
         for block in waiting.drain(..) {
@@ -130,7 +130,7 @@ impl Inflation {
             Relation::Outside if inflating == 0 => return,
             _ => {}
         }
-        // Blocks added meanwhile contain nothing that inflates.
+        // Blocks added in this loop contain no inflating voxels.
         for place in ones(tree.nodes.get(node).blocks.mask) {
             if let Some(block) = tree.nodes.get(node).blocks.get(&tree.lists, place) {
                 self.reconcile(tree, block, &ball, relation);
@@ -138,7 +138,7 @@ impl Inflation {
         }
     }
 
-    /// Makes exactly the right voxels of a block inflate others. `relation` is that of a cube that holds the block.
+    /// Recomputes which voxels of a block inflate others. `relation` is that of a cube that contains the block.
     fn reconcile(&mut self, tree: &mut Tree, block: u32, ball: &Ball, relation: Relation) {
         let (occupied, inflating) = {
             let block = tree.blocks.get(block);
@@ -163,43 +163,43 @@ impl Inflation {
         }
     }
 
-    /// Starts and stops the inflation by voxels of a block.
+    /// Starts and stops the inflation by the voxels of a block.
     fn change(&mut self, tree: &mut Tree, block: u32, begin: u64, end: u64, stencil: &Stencil) {
-        self.beside.clear();
-        self.beside.resize(stencil.blocks(), NONE);
+        self.affected.clear();
+        self.affected.resize(stencil.blocks(), NONE);
         let index = tree.block_index(block);
         self.nodes.move_to(index.map(|k| k >> 2));
-        self.find_beside(tree, index, begin | end, stencil);
+        self.find_affected(tree, index, begin | end, stencil);
         for place in ones(begin) {
             for &(number, mask) in stencil.of_place(place) {
-                self.count_up(tree, self.beside[number as usize], mask);
+                self.count_up(tree, self.affected[number as usize], mask);
             }
         }
         for place in ones(end) {
             for &(number, mask) in stencil.of_place(place) {
-                self.count_down(tree, self.beside[number as usize], mask);
+                self.count_down(tree, self.affected[number as usize], mask);
             }
         }
         tree.set_inflating(block, begin, end);
         self.changes += (begin.count_ones() + end.count_ones()) as usize;
     }
 
-    /// Finds the blocks that voxels of the block at `index` inflate; makes those that do not exist.
+    /// Finds or creates the blocks that voxels of the block at `index` inflate.
     #[inline]
-    fn find_beside(&mut self, tree: &mut Tree, index: VoxelIndex, voxels: u64, stencil: &Stencil) {
+    fn find_affected(&mut self, tree: &mut Tree, index: VoxelIndex, voxels: u64, stencil: &Stencil) {
         for place in ones(voxels) {
             for &(number, _) in stencil.of_place(place) {
-                if self.beside[number as usize] != NONE {
+                if self.affected[number as usize] != NONE {
                     continue;
                 }
                 let offset = stencil.offset_of(number);
                 let at: VoxelIndex = std::array::from_fn(|k| index[k] + offset[k]);
                 let node = self.nodes.make(tree, at.map(|k| k >> 2), self.rules.current());
-                self.beside[number as usize] = tree.make_block_in(node, place_of(at));
+                self.affected[number as usize] = tree.make_block_in(node, place_of(at));
             }
         }
-        // Most are not in a cache. Reading all before any changes lets the processor wait for them at once.
-        let found = self.beside.iter().filter(|block| **block != NONE);
+        // Most blocks are not in the cache. Reading all of them before the first write overlaps the cache misses.
+        let found = self.affected.iter().filter(|block| **block != NONE);
         let inflated = found.fold(0, |any, &block| any | tree.counts.inflated(tree.blocks.get(block).tally));
         std::hint::black_box(inflated);
     }
@@ -227,14 +227,14 @@ impl Inflation {
         }
     }
 
-    /// Bytes of memory on the heap.
+    /// Returns bytes of memory on the heap.
     pub(super) fn bytes(&self) -> usize {
-        let lists = [&self.waiting, &self.emptied, &self.beside, &self.pages];
+        let lists = [&self.waiting, &self.emptied, &self.affected, &self.pages];
         lists.iter().map(|list| list.capacity() * size_of::<u32>()).sum::<usize>()
     }
 }
 
-/// The voxels of a block that are in a ball.
+/// Returns the voxels of a block that are in a ball.
 fn in_ball(mask: u64, block: VoxelIndex, ball: &Ball) -> u64 {
     ones(mask).filter(|&place| ball.holds(cell_at(block, place))).fold(0, |mask, place| mask | 1 << place)
 }

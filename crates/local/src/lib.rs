@@ -1,9 +1,9 @@
-//! The local map: what a planner reads many times a second.
+//! Local map: a bounded 3D map near the robot, in memory, for planners that query it many times a second.
 //!
-//! It takes the same scans as an archive ([`Mapper`](voxtile::mapper::Mapper)), or works alone. Occupied voxels and those
-//! around them (inflation) are kept near the robot in space and time, in memory bounded by a limit on voxels. After La,
-//! Kang and Lee, "A robust, task-agnostic and fully-scalable voxel mapping system for large scale environments",
-//! sections IV and V; `docs/local_map.md` says what is the paper's, what is corrected, and how fast it is.
+//! It is fed with the same scans as an archive ([`Mapper`](voxtile::mapper::Mapper)) or used alone. It keeps occupied
+//! voxels and the voxels around them (inflation) that are recent and near the robot; a limit on voxels bounds the
+//! memory. After La, Kang and Lee, "A robust, task-agnostic and fully-scalable voxel mapping system for large scale
+//! environments", sections IV and V. `docs/local_map.md` lists the differences from the paper and the speed.
 //!
 //! ```text
 //! Scan -> hits, misses -> occupancy -> history, removal -> inflation -> LocalView

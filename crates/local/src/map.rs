@@ -13,21 +13,21 @@ use voxtile::scan::{Scan, ScanPoints};
 use voxtile::space::{Grid, Point, VoxelIndex};
 use voxtile::{Error, Result};
 
-/// The voxels that a planner needs now: occupied, or inflated by an occupied one.
+/// Map of the voxels that a planner needs: occupied voxels and those inflated by them.
 ///
-/// One writer inserts scans; any number of readers see whole updates and never wait.
+/// One writer inserts scans. Readers see complete updates and never block.
 #[derive(Debug)]
 pub struct LocalMap {
     pub(super) grid: Grid,
-    /// The requested parameters.
+    /// Parameters requested by the user.
     parameters: LocalParameters,
-    /// The parameters of the last update.
+    /// Parameters of the last update.
     pub(super) applied: LocalParameters,
     pub(super) tree: Tree,
     pub(super) voxels: Voxels,
     pub(super) inflation: Inflation,
     pub(super) sweep: Sweep,
-    /// Kept from update to update for its memory.
+    /// Reused by all updates to avoid allocations.
     pub(super) frame: Frame,
     pub(super) position: Option<Point>,
     update_number: u64,
@@ -35,15 +35,15 @@ pub struct LocalMap {
     view: Arc<LocalView>,
 }
 
-/// Voxel indices near the ends of `i32` have no neighbours to inflate.
+/// Voxel indices close to the limits of `i32` have no neighbours to inflate.
 const MAX_INDEX: i32 = i32::MAX - (1 << 12);
 
 impl LocalMap {
-    /// An empty map of voxels of `resolution_m` metres.
+    /// Creates an empty map with voxels of `resolution_m` metres.
     ///
     /// # Errors
     ///
-    /// An invalid resolution or parameter.
+    /// If the resolution or a parameter is invalid.
     pub fn new(resolution_m: f64, parameters: LocalParameters) -> Result<Self> {
         let grid = Grid::new(resolution_m, resolution_m * 64.0)?;
         let parameters = parameters.validated(resolution_m)?;
@@ -65,23 +65,22 @@ impl LocalMap {
         })
     }
 
-    /// Edge of a voxel in metres.
+    /// Returns the edge length of a voxel in metres.
     pub fn resolution_m(&self) -> f64 {
         self.grid.resolution_m()
     }
 
-    /// The parameters of the next update.
+    /// Returns the parameters of the next update.
     pub fn parameters(&self) -> &LocalParameters {
         &self.parameters
     }
 
-    /// Sets parameters from the next update on. Their effect on voxels that a scan does not touch is spread over
-    /// several updates, nearest to the sensor first; see [`LocalParameters::work_per_update`] and
-    /// [`LocalReport::is_settled`].
+    /// Sets the parameters of later updates. Their effect on voxels that a scan does not touch is spread over several
+    /// updates, nearest to the sensor first; see [`LocalParameters::work_per_update`] and [`LocalReport::is_settled`].
     ///
     /// # Errors
     ///
-    /// An invalid parameter: the map keeps its parameters.
+    /// If a parameter is invalid; the map then keeps its parameters.
     pub fn set_parameters(&mut self, parameters: LocalParameters) -> Result<()> {
         self.parameters = parameters.validated(self.resolution_m())?;
         Ok(())
@@ -89,11 +88,11 @@ impl LocalMap {
 
     /// Inserts a scan: hits at its points, misses on the rays to them. Intensities are not used.
     ///
-    /// Points that do not lie in memory in the world frame are copied there first.
+    /// Points that are not stored as world coordinates are converted into a buffer first.
     ///
     /// # Errors
     ///
-    /// An origin without a voxel, more than 67 million voxels and points, points that cannot be read: the map is
+    /// If the origin has no voxel, a point cannot be read, or voxels and points exceed 67 million. The map is then
     /// unchanged.
     pub fn insert_points(&mut self, scan: &dyn ScanPoints) -> Result<LocalReport> {
         self.insert_after(scan, || Ok(())).map(|(report, ())| report)
@@ -108,7 +107,7 @@ impl LocalMap {
         self.insert_points(scan)
     }
 
-    /// Inserts a scan after everything that can fail and `first` have succeeded.
+    /// Inserts a scan after all checks have passed and `first` has succeeded.
     pub(super) fn insert_after<T>(
         &mut self,
         scan: &dyn ScanPoints,
@@ -128,7 +127,7 @@ impl LocalMap {
     ///
     /// # Errors
     ///
-    /// A position without a voxel, more than 67 million voxels and points: the map is unchanged.
+    /// If the position has no voxel, or voxels and points exceed 67 million. The map is then unchanged.
     pub fn insert_relayed(&mut self, position: Point, points: &[Point]) -> Result<LocalReport> {
         self.update(position, points, false)
     }
@@ -137,7 +136,7 @@ impl LocalMap {
         let start = self.check_scan(origin, points.len())?;
         let mut report = LocalReport { points: points.len() as u64, ..LocalReport::default() };
         let mut clock = Clock::start();
-        self.take_over_parameters(&mut report);
+        self.apply_parameters(&mut report);
         self.position = Some(origin);
         report.times.parameters = clock.lap();
         self.take_hits(origin, start, points, &mut report);
@@ -163,38 +162,39 @@ impl LocalMap {
         report.is_settled = self.parameters == self.applied && self.sweep.is_done() && !self.is_over_limit();
     }
 
-    /// Whether there are more voxels than the limit: it was lowered, and the excess is removed over several updates.
+    /// Returns whether there are more voxels than the limit. This happens after the limit was lowered; the excess is
+    /// removed over several updates.
     pub(super) fn is_over_limit(&self) -> bool {
         self.applied.max_voxels.is_some_and(|limit| self.voxels.len() > limit)
     }
 
-    /// The voxel of a position where a sensor can be.
+    /// Returns the voxel of a sensor position.
     pub(super) fn check_position(&self, position: Point) -> Result<VoxelIndex> {
         self.voxel_of(position).ok_or_else(|| {
-            let reason = format!("{position:?} m is not finite or too far away for a voxel index");
+            let reason = format!("{position:?} m must be finite and in the range of voxel indices");
             Error::argument("scan origin", reason)
         })
     }
 
-    /// The voxel of a scan's origin, if the map can take the scan; after this check nothing can fail.
+    /// Returns the voxel of a scan's origin if the map accepts the scan; nothing can fail after this check.
     fn check_scan(&self, origin: Point, points: usize) -> Result<VoxelIndex> {
         check_room(self.voxels.len(), points)?;
         self.check_position(origin)
     }
 
-    /// The voxel of a point, if it can be in the map.
+    /// Returns the voxel of a point if it is in the range of the map.
     pub fn voxel_of(&self, point: Point) -> Option<VoxelIndex> {
         let voxel = self.grid.voxel_of(point)?;
         voxel.iter().all(|k| (-MAX_INDEX..=MAX_INDEX).contains(k)).then_some(voxel)
     }
 
-    /// Applies parameters that were set since the last update, and does a part of the work that follows.
-    pub(super) fn take_over_parameters(&mut self, report: &mut LocalReport) {
+    /// Applies parameters set since the last update, and does a part of the resulting work.
+    pub(super) fn apply_parameters(&mut self, report: &mut LocalReport) {
         if self.parameters != self.applied {
             let before = std::mem::replace(&mut self.applied, self.parameters);
-            if !self.inflation.rules.has_room() {
-                // All rule numbers are in use by ranges and radii that are not applied everywhere yet; this one waits
-                // until they are.
+            if !self.inflation.rules.has_free_number() {
+                // All rule numbers are in use by earlier ranges and radii that are not applied everywhere yet. This one
+                // waits until a number is free.
                 self.applied.inflation_range_m = before.inflation_range_m;
                 self.applied.inflation_radius_m = before.inflation_radius_m;
             }
@@ -223,32 +223,32 @@ impl LocalMap {
         self.tree.page_ids().map(|page| self.tree.pages.get(page).occupied as usize).sum()
     }
 
-    /// The map after the last update; this view never changes.
+    /// Returns the map after the last update; the view never changes.
     pub fn view(&self) -> &Arc<LocalView> {
         &self.view
     }
 
-    /// A reader, for another thread.
+    /// Returns a reader for another thread.
     pub fn reader(&self) -> LocalReader {
         LocalReader::new(self.shared.clone())
     }
 
-    /// Voxels with occupancy (`n_occ`): occupied, or not yet known to be free.
+    /// Returns the number of voxels with occupancy (`n_occ`): occupied, or not yet known to be free.
     pub fn stored_voxels(&self) -> usize {
         self.voxels.len()
     }
 
-    /// Inflated voxels (`n_inf`).
+    /// Returns the number of inflated voxels (`n_inf`).
     pub fn inflated_voxels(&self) -> usize {
         self.inflation.inflated
     }
 
-    /// Voxels in the occupancy or the inflation map; visits all of them.
+    /// Returns the number of voxels in the occupancy or the inflation map; visits all of them.
     pub fn voxels(&self) -> usize {
         self.inflation.inflated + self.tree.stored_but_not_inflated()
     }
 
-    /// Each voxel with occupancy and its log-odds, in the order of removal: the longest without an update first.
+    /// Returns each voxel with occupancy and its log-odds in the order of removal: the least recently updated first.
     pub fn history(&self) -> impl Iterator<Item = (VoxelIndex, f64)> + '_ {
         self.voxels.in_order().map(|voxel| {
             let (block, place) = voxel.home();
@@ -256,7 +256,7 @@ impl LocalMap {
         })
     }
 
-    /// Bytes of memory, including what readers see and some buffers.
+    /// Returns the memory used in bytes, including the views of readers and some buffers.
     pub fn bytes(&self) -> usize {
         self.tree.bytes()
             + self.voxels.slab.bytes()
@@ -267,7 +267,7 @@ impl LocalMap {
     }
 }
 
-/// Measures consecutive stages.
+/// Stopwatch for consecutive stages.
 struct Clock(Instant);
 
 impl Clock {
@@ -281,7 +281,7 @@ impl Clock {
     }
 }
 
-/// The points of a scan where they lie, or else copied to a buffer.
+/// Returns the points of a scan in place if possible, else copied to a buffer.
 fn points_in_world<'p>(scan: &'p dyn ScanPoints, buffer: &'p mut Vec<Point>) -> Result<&'p [Point]> {
     if let Some(points) = scan.in_memory() {
         return Ok(points);
@@ -294,7 +294,7 @@ fn points_in_world<'p>(scan: &'p dyn ScanPoints, buffer: &'p mut Vec<Point>) -> 
     Ok(buffer)
 }
 
-/// Checks that so many points fit as new voxels beside those stored.
+/// Checks that this many points fit as new voxels in addition to those stored.
 fn check_room(stored: usize, points: usize) -> Result<()> {
     if stored.saturating_add(points) <= MAX_NUMBERED {
         return Ok(());
@@ -306,7 +306,7 @@ fn check_room(stored: usize, points: usize) -> Result<()> {
     Err(Error::argument("points of the scan", reason))
 }
 
-/// Whether a voxel of these log-odds is removed. Where the thresholds meet, occupied wins.
+/// Returns whether a voxel with these log-odds is removed. If the thresholds are equal, occupied wins.
 pub(super) fn is_known_free(parameters: &LocalParameters, log_odds: f64) -> bool {
     log_odds <= parameters.free_log_odds && log_odds < parameters.occupied_log_odds
 }
@@ -316,7 +316,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn scans_that_may_be_too_much_are_refused() {
+    fn scans_that_may_exceed_the_capacity_are_refused() {
         assert!(check_room(0, MAX_NUMBERED).is_ok() && check_room(MAX_NUMBERED - 4000, 4000).is_ok());
         let error = check_room(MAX_NUMBERED - 4000, 4001).unwrap_err().to_string();
         assert!(error.contains("max_voxels") && error.contains("4001 points"), "{error}");

@@ -1,13 +1,13 @@
 use super::tree::{NONE, Tree};
 use voxtile::space::VoxelIndex;
 
-/// The numbers of a node and of the nodes around it, found or made once for all voxels that inflate there.
+/// Numbers of a node and of its neighbours, looked up or created once for all voxels that inflate there.
 ///
-/// No node may be removed meanwhile.
+/// No node may be removed while this is in use.
 #[derive(Clone, Debug)]
 pub(super) struct NodesAround {
     center: VoxelIndex,
-    /// 3 x 3 x 3 numbers; [`NONE`] where it is not known yet.
+    /// 3 x 3 x 3 numbers; [`NONE`] where not looked up yet.
     numbers: [u32; 27],
 }
 
@@ -18,7 +18,7 @@ impl Default for NodesAround {
 }
 
 impl NodesAround {
-    /// Makes the node with an index the center.
+    /// Centers the cache at the node with this index.
     #[inline]
     pub(super) fn move_to(&mut self, center: VoxelIndex) {
         if self.center != center {
@@ -26,12 +26,12 @@ impl NodesAround {
         }
     }
 
-    /// The node with an index, made with the rule if it does not exist.
+    /// Returns the node with an index; creates it with the rule if it does not exist.
     #[inline]
     pub(super) fn make(&mut self, tree: &mut Tree, index: VoxelIndex, rule: u8) -> u32 {
         let [x, y, z]: [u32; 3] = std::array::from_fn(|k| (index[k] - self.center[k] + 1) as u32);
         if x > 2 || y > 2 || z > 2 {
-            // A stencil may reach farther.
+            // A stencil can reach beyond the direct neighbours.
             return tree.make_node(index, rule);
         }
         let number = &mut self.numbers[(x * 9 + y * 3 + z) as usize];
@@ -52,7 +52,7 @@ mod tests {
         let mut around = NodesAround::default();
         for center in [[0; 3], [-1, 4, -4], [-1, 3, -4], [0; 3]] {
             around.move_to(center);
-            // Twice: the first time some are made, the second all are known.
+            // Twice: the first round creates nodes, the second finds them.
             for number in (0..125).chain(0..125) {
                 let offset = [number % 5 - 2, number / 5 % 5 - 2, number / 25 - 2];
                 let index: VoxelIndex = std::array::from_fn(|k| center[k] + offset[k]);

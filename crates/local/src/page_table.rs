@@ -1,17 +1,17 @@
 use super::tree::{NONE, Tree};
 use voxtile::space::VoxelIndex;
 
-/// Finds pages with occupied voxels without a hash map, for the rays of one scan.
+/// Dense table of the pages with occupied voxels: avoids hash lookups while the rays of a scan are traced.
 #[derive(Debug, Default)]
 pub(super) struct PageTable {
     min: VoxelIndex,
     size: [u32; 3],
-    /// The number of each page of the box; [`NONE`] if there is none.
+    /// Number of each page of the box; [`NONE`] if it does not exist.
     pages: Vec<u32>,
 }
 
-/// A larger box of pages is not tabulated; pages are then looked up in the tree.
-const MOST: u64 = 1 << 18;
+/// Largest box, in pages, that is tabulated; beyond it pages are looked up in the tree.
+const MAX_PAGES_IN_BOX: u64 = 1 << 18;
 
 impl PageTable {
     /// Rebuilds the table from a tree.
@@ -26,7 +26,7 @@ impl PageTable {
         self.min = low;
         self.size = std::array::from_fn(|k| if high[k] < low[k] { 0 } else { high[k].abs_diff(low[k]) + 1 });
         let size = self.size.map(u64::from).into_iter().fold(1, u64::saturating_mul);
-        if size > MOST {
+        if size > MAX_PAGES_IN_BOX {
             return;
         }
         self.pages.resize(size as usize, NONE);
@@ -41,12 +41,12 @@ impl PageTable {
     fn place(&self, index: VoxelIndex) -> Option<usize> {
         let [x, y, z]: [u32; 3] = std::array::from_fn(|k| index[k].wrapping_sub(self.min[k]) as u32);
         let [width, height, depth] = self.size;
-        // Wraps only for boxes too large to tabulate; those use the tree.
+        // Overflows only for boxes too large to tabulate; those use the tree.
         let place = x.wrapping_mul(height).wrapping_add(y).wrapping_mul(depth).wrapping_add(z);
         (x < width && y < height && z < depth).then_some(place as usize)
     }
 
-    /// The page with an index, if it holds voxels with occupancy.
+    /// Returns the page with an index if it holds voxels with occupancy.
     #[inline]
     pub(super) fn get(&self, tree: &Tree, index: VoxelIndex) -> Option<u32> {
         let place = self.place(index)?;
@@ -57,7 +57,7 @@ impl PageTable {
         }
     }
 
-    /// Bytes of memory on the heap.
+    /// Returns bytes of memory on the heap.
     pub(super) fn bytes(&self) -> usize {
         self.pages.capacity() * size_of::<u32>()
     }

@@ -3,37 +3,39 @@ use voxtile::maths::logit;
 use voxtile::sensor::LogOdds;
 use voxtile::{Error, Result};
 
-/// Parameters of a local map. All of them may change while the map runs, from the next update on.
+/// Parameters of a local map. All of them can change at runtime, from the next update on.
 ///
-/// The names in brackets are the voxel mapping paper's.
+/// Names in parentheses are those of the paper.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct LocalParameters {
-    /// Probability in (0, 1) of a voxel before its first hit counts (`p_init`). Default: 0.5.
+    /// Occupancy probability in (0, 1) of a new voxel before its first hit is added (`p_init`). Default: 0.5.
     pub initial_probability: f64,
-    /// Hit, miss and clamps in log-odds. Default: OctoMap's.
+    /// Log-odds of a hit and of a miss, and the clamping limits. Default: OctoMap's.
     pub log_odds: LogOdds,
-    /// Log-odds from which a voxel is occupied (`l_occ`). Default: 0.
+    /// Lowest log-odds of an occupied voxel (`l_occ`). Default: 0.
     pub occupied_log_odds: f64,
-    /// Log-odds up to which a voxel is known to be free, and removed (`l_free`). Default: logit(0.4).
+    /// Highest log-odds of a voxel known to be free, which is removed (`l_free`). Default: logit(0.4).
     pub free_log_odds: f64,
-    /// Most voxels with occupancy (`n_lim`): beyond it, those with the oldest updates are removed. `None` keeps all.
+    /// Maximum number of voxels with occupancy (`n_lim`); beyond it, the least recently updated are removed. `None`: no
+    /// limit.
     pub max_voxels: Option<usize>,
     /// Points nearer to the sensor than this, in metres, are skipped. Default: 0.
     pub min_input_range_m: f64,
-    /// Points farther from the sensor than this, in metres, are skipped (`d_in`); infinity takes all.
+    /// Points farther from the sensor than this, in metres, are skipped (`d_in`); infinity accepts all.
     pub input_range_m: f64,
-    /// Voxels whose center is at most this far from the sensor, in metres, are inflated (`d_inf`); infinity takes all.
+    /// Voxels whose center is within this distance of the sensor, in metres, are inflated (`d_inf`); infinity inflates
+    /// all.
     pub inflation_range_m: f64,
-    /// Voxels whose center is at most this far from an occupied voxel's center, in metres, are inflated; 0 is the
-    /// occupied voxel alone, the most is 24 voxels. Default: 0.2.
+    /// Inflation radius in metres between voxel centers: 0 inflates the occupied voxel alone, the maximum is 24 voxels.
+    /// Default: 0.2.
     pub inflation_radius_m: f64,
-    /// Most voxels that one update classifies, inflates or removes because parameters changed; the rest follows in
-    /// later updates. At least 1. Changes by scans are not limited. Default: 20 000.
+    /// Maximum number of voxels that one update reclassifies, inflates or removes because parameters changed; later
+    /// updates continue. At least 1. Changes by scans are not limited. Default: 20 000.
     pub work_per_update: usize,
 }
 
-/// Largest inflation radius in voxels: its ball has 57 777 voxels, which 16 bits can count.
+/// Largest inflation radius in voxels. Its ball has 57 777 voxels, so 16 bits suffice for the counts.
 pub(super) const MAX_RADIUS_VOXELS: f64 = 24.0;
 
 impl Default for LocalParameters {
@@ -43,7 +45,7 @@ impl Default for LocalParameters {
 }
 
 impl LocalParameters {
-    /// For a reactive planner: what was seen last, near the robot.
+    /// Returns parameters for a reactive planner: recent voxels near the robot.
     pub fn local_mapping() -> Self {
         Self {
             initial_probability: 0.5,
@@ -59,39 +61,39 @@ impl LocalParameters {
         }
     }
 
-    /// For navigation while mapping: everything that was seen, inflated near the robot.
+    /// Returns parameters for navigation while mapping: all observed voxels, inflated near the robot.
     pub fn autonomous_mapping() -> Self {
         Self { max_voxels: None, input_range_m: f64::INFINITY, ..Self::local_mapping() }
     }
 
-    /// For a robot that receives maps of others: long input range, all of it inflated.
+    /// Returns parameters for a robot that receives maps from others: long input range, everything inflated.
     pub fn passive_perception() -> Self {
         Self { input_range_m: f64::INFINITY, inflation_range_m: f64::INFINITY, ..Self::local_mapping() }
     }
 
-    /// The same with at most so many voxels with occupancy.
+    /// Returns these parameters with another maximum number of voxels.
     pub fn with_max_voxels(self, max_voxels: impl Into<Option<usize>>) -> Self {
         Self { max_voxels: max_voxels.into(), ..self }
     }
 
-    /// The same with other ranges of input and inflation, in metres.
+    /// Returns these parameters with other ranges of input and inflation, in metres.
     pub fn with_ranges(self, input_range_m: f64, inflation_range_m: f64) -> Self {
         Self { input_range_m, inflation_range_m, ..self }
     }
 
-    /// The same with another inflation radius in metres.
+    /// Returns these parameters with another inflation radius, in metres.
     pub fn with_inflation_radius(self, inflation_radius_m: f64) -> Self {
         Self { inflation_radius_m, ..self }
     }
 
-    /// The parameters, if all are valid for this resolution.
+    /// Returns the parameters if all are valid for this resolution.
     ///
     /// # Errors
     ///
-    /// NaN, a negative range, thresholds outside the clamps or in the wrong order.
+    /// If a value is NaN, a range is negative, or thresholds are outside the clamps or in the wrong order.
     pub fn validated(self, resolution_m: f64) -> Result<Self> {
         let wrong = |argument: &str, value: f64, right: &str| {
-            Err(Error::argument(argument, format!("{value} is not {right}")))
+            Err(Error::argument(argument, format!("{value} must be {right}")))
         };
         self.log_odds.validated()?;
         let LogOdds { min, max, .. } = self.log_odds;
@@ -110,7 +112,7 @@ impl LocalParameters {
             ("input range", self.input_range_m),
             ("inflation range", self.inflation_range_m),
         ];
-        // Nothing is farther away than this.
+        // Would skip every point.
         if self.min_input_range_m == f64::INFINITY {
             return wrong("minimum input range", f64::INFINITY, "a finite length");
         }
@@ -124,7 +126,7 @@ impl LocalParameters {
             return wrong("inflation radius", radius_m, &right);
         }
         if self.max_voxels == Some(0) || self.work_per_update == 0 {
-            return wrong("most voxels, and work per update", 0.0, "at least 1");
+            return wrong("max voxels or work per update", 0.0, "at least 1");
         }
         Ok(self)
     }

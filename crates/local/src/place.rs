@@ -1,21 +1,22 @@
 use voxtile::space::VoxelIndex;
 pub(super) use voxtile::space::ones;
 
-/// The place of a cell among the 4 x 4 x 4 cells of its parent, from the lowest two bits of each index.
+/// Returns the position (0 to 63) of a cell among the 4 x 4 x 4 cells of its parent, from the lowest two bits of each
+/// index.
 #[inline]
 pub(super) fn place_of([x, y, z]: VoxelIndex) -> usize {
     (x & 3 | (y & 3) << 2 | (z & 3) << 4) as usize
 }
 
-/// The cell at a place of its parent.
+/// Returns the cell at a position of its parent.
 #[inline]
 pub(super) fn cell_at(parent: VoxelIndex, place: usize) -> VoxelIndex {
     let place = place as i32;
     [parent[0] << 2 | place & 3, parent[1] << 2 | place >> 2 & 3, parent[2] << 2 | place >> 4]
 }
 
-/// Moves each place `p` of a mask to `p ^ flip`, where `flip` combines 3 (x), 12 (y) and 48 (z): mirrors the mask along
-/// these axes.
+/// Moves each position `p` of a mask to `p ^ flip`, where `flip` combines 3 (x), 12 (y) and 48 (z): mirrors the mask
+/// along these axes.
 #[inline]
 pub(super) fn mirrored(mut mask: u64, flip: usize) -> u64 {
     let swap = |mask: u64, low: u64, by: u32| (mask >> by & low) | (mask & low) << by;
@@ -31,13 +32,14 @@ pub(super) fn mirrored(mut mask: u64, flip: usize) -> u64 {
     mask
 }
 
-/// The places in a box, given by the first and the last of 0 to 3 along each axis; empty if a first exceeds its last.
+/// Returns the mask of a box, given by the first and the last of 0 to 3 along each axis; empty if a first exceeds its
+/// last.
 #[inline]
 pub(super) fn in_box(x: (usize, usize), y: (usize, usize), z: (usize, usize)) -> u64 {
     RANGES[0][x.0][x.1] & RANGES[1][y.0][y.1] & RANGES[2][z.0][z.1]
 }
 
-/// For each axis, first and last: the places between them.
+/// Masks by axis, first and last layer (inclusive).
 static RANGES: [[[u64; 4]; 4]; 3] = ranges();
 
 const fn ranges() -> [[[u64; 4]; 4]; 3] {
@@ -57,7 +59,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn masks_are_mirrored_and_boxed_place_by_place() {
+    fn mirrored_masks_and_box_masks_equal_naive_ones() {
         let mask = 0x0123_4567_89ab_cdef_u64 ^ 1 << 40;
         for flip in (0..8).map(|octant| (0..3).map(|k| ((octant >> k & 1) * 3) << (2 * k)).sum::<usize>()) {
             let naive = ones(mask).fold(0_u64, |moved, place| moved | 1 << (place ^ flip));

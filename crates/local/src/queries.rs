@@ -5,8 +5,8 @@ use voxtile::query::occupied_set::OccupiedSet;
 use voxtile::query::voxels_around;
 use voxtile::space::{Aabb, Grid, Point, VoxelBox, VoxelIndex};
 
-/// Voxels of a local map as obstacles. Others are unknown: a local map does not tell free from unknown. Unite it with
-/// an archive ([`United`](voxtile::query::United)) to know.
+/// The voxels of a local map as obstacles. All others are unknown: a local map does not distinguish free from unknown.
+/// Combine it with an archive ([`United`](voxtile::query::United)) to distinguish them.
 #[derive(Clone, Copy, Debug)]
 pub struct LocalObstacles<'a> {
     view: &'a LocalView,
@@ -37,7 +37,7 @@ impl OccupiedSet for LocalObstacles<'_> {
     }
 }
 
-/// Its occupied voxels answer; [`LocalView::obstacles`] takes the inflated ones too.
+/// Queries see the occupied voxels; [`LocalView::obstacles`] can include inflated ones.
 impl OccupiedSet for LocalView {
     fn grid_of_set(&self) -> Grid {
         self.grid
@@ -63,12 +63,12 @@ impl OccupiedSet for LocalView {
 answer_as_occupied_set!(LocalView);
 
 impl LocalView {
-    /// Occupied voxels, or inflated ones too, as obstacles to be asked about: for a planner.
+    /// Returns the occupied voxels, and the inflated ones if requested, as obstacles for queries.
     pub fn obstacles(&self, obstacle: Obstacle) -> LocalObstacles<'_> {
         LocalObstacles { view: self, obstacle }
     }
 
-    /// The largest empty cell around a voxel.
+    /// Returns the largest empty cell around a voxel.
     fn empty_around(&self, voxel: VoxelIndex) -> Option<VoxelBox> {
         let cell = |shift: u32| {
             let min = voxel.map(|k| k >> shift << shift);
@@ -80,7 +80,7 @@ impl LocalView {
         if node.block(place(2)).is_none() { cell(2) } else { None }
     }
 
-    /// The voxels of each page.
+    /// Returns the box of voxels of each page.
     fn cells_of_pages(&self) -> impl Iterator<Item = VoxelBox> {
         self.pages.keys().map(|page| {
             let min = page.map(|k| k << 6);
@@ -88,7 +88,7 @@ impl LocalView {
         })
     }
 
-    /// The centers, in metres, of the obstacles whose center is in the half-open box, in no particular order.
+    /// Returns the centers, in metres, of the obstacles whose center is in the half-open box, in no particular order.
     pub fn points_in(&self, window: &Aabb, obstacle: Obstacle) -> Vec<Point> {
         let mut points = Vec::new();
         self.for_each_obstacle_in(&voxels_around(&self.grid, window), obstacle, |voxel| {

@@ -1,12 +1,12 @@
 use voxtile::space::{Grid, Point, VoxelIndex};
 
-/// A ball around the sensor; contains the voxels whose centers are in it.
+/// Ball around the sensor; contains the voxels whose centers are inside.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ball {
     pub(super) grid: Grid,
-    /// In metres.
+    /// Center in metres.
     pub(super) center: Point,
-    /// In metres; may be infinite.
+    /// Radius in metres; may be infinite.
     pub(super) radius_m: f64,
 }
 
@@ -20,7 +20,7 @@ pub(super) enum Relation {
 }
 
 impl Ball {
-    /// Whether a voxel's center is at most the radius away.
+    /// Returns whether a voxel's center is within the radius.
     #[inline]
     pub(super) fn holds(&self, voxel: VoxelIndex) -> bool {
         let center_m = self.grid.center_m(voxel);
@@ -28,10 +28,10 @@ impl Ball {
         x * x + y * y + z * z <= self.radius_m * self.radius_m
     }
 
-    /// Position of the cube of `edge` voxels from `min` on.
+    /// Classifies the cube of `edge` voxels per side whose lowest voxel is `min`.
     #[inline]
     pub(super) fn relation(&self, min: VoxelIndex, edge: i32) -> Relation {
-        // Far above the rounding error of squares and sums.
+        // Much larger than the rounding error of squares and sums.
         const MARGIN: f64 = 1e-9;
         let squared = self.radius_m * self.radius_m;
         let (mut nearest, mut farthest) = (0.0, 0.0);

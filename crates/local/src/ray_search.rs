@@ -7,10 +7,10 @@ use voxtile::space::{Point, VoxelIndex};
 
 /// Finds the voxels with occupancy on a ray: exactly those that [`RayWalk`] visits before its last voxel.
 ///
-/// A ray crosses borders in the order of their times, at equal times the lowest axis first. So it visits a voxel if and
-/// only if it crosses all borders into it before any border out of it. The same holds for larger cells, whose borders
-/// are voxel borders with bit-identical times. So no walk is needed: each non-empty cell near the ray is tested by
-/// itself.
+/// A ray crosses voxel borders in the order of their times, at equal times the lowest axis first. So it visits a voxel
+/// if and only if it crosses all borders into it before any border out of it. The same holds for larger cells, whose
+/// borders are voxel borders with bit-identical times. Each non-empty cell near the ray can therefore be tested by
+/// itself, without a walk.
 #[derive(Clone, Debug)]
 pub(super) struct RaySearch {
     origin: Point,
@@ -19,22 +19,21 @@ pub(super) struct RaySearch {
     step: [i32; 3],
     start: VoxelIndex,
     last: VoxelIndex,
-    /// A box that contains the ray: the voxels of its two ends, less a quarter of a voxel at their outer borders.
+    /// Bounds of the ray: the voxels of its two ends, shrunk by a quarter of a voxel at their outer borders.
     low: Point,
     high: Point,
-    /// The highest place along the axes on which the ray descends, else 0: places XORed with it are in the order of the
-    /// ray.
+    /// XOR mask that sorts positions in the order of the ray: all bits of the axes along which the ray descends.
     flip: usize,
 }
 
-/// The times at which a ray enters and leaves a cell.
+/// Times at which a ray enters and leaves a cell.
 #[derive(Clone, Copy, Debug)]
 struct Stay {
     enter: f64,
     leave: f64,
 }
 
-/// The position of the walk from page to page.
+/// Position of the walk from page to page.
 struct Cursor {
     page: VoxelIndex,
     next: Point,
@@ -42,7 +41,7 @@ struct Cursor {
 }
 
 impl RaySearch {
-    /// The ray from `origin` to `end`, both in units of voxels and inside `start` and `last`, their voxels.
+    /// Creates the ray from `origin` to `end`, in units of voxels; `start` and `last` are the voxels that contain them.
     pub(super) fn new(origin: Point, start: VoxelIndex, end: Point, last: VoxelIndex) -> Self {
         let direction: Point = std::array::from_fn(|k| end[k] - origin[k]);
         Self {
@@ -58,7 +57,7 @@ impl RaySearch {
         }
     }
 
-    /// Visits the number of each voxel with occupancy on the ray, from the first up to, not including, the last.
+    /// Visits the number of each voxel with occupancy on the ray in order, excluding the last voxel.
     #[inline]
     pub(super) fn for_each_stored(
         &self,
@@ -67,7 +66,7 @@ impl RaySearch {
         end: Point,
         mut visit: impl FnMut(u32),
     ) {
-        // Times are undefined along an axis on which the ray hardly moves.
+        // Times are not usable along an axis on which the ray hardly moves.
         let is_sound = |k: usize| self.step[k] == 0 || self.inv_direction[k].abs() < 1e30;
         if !(is_sound(0) && is_sound(1) && is_sound(2)) {
             return self.for_each_stored_by_steps(tree, end, visit);
@@ -117,7 +116,8 @@ impl RaySearch {
         });
     }
 
-    /// The block of the ray's end, if it is in the node and holds only the end: this saves most rays the descent to it.
+    /// Returns the mask of the block of the ray's end if it is in the node and holds only the end; skipping it saves
+    /// most rays the descent.
     #[inline]
     fn block_of_end_alone(&self, tree: &Tree, node: &Node) -> u64 {
         let place = place_of(self.last.map(|k| k >> 2));
@@ -144,8 +144,8 @@ impl RaySearch {
         });
     }
 
-    /// Visits the cells of `2^SHIFT` voxels that are in the mask and on the ray, in the ray's order. `stay` is the
-    /// ray's stay in their parent.
+    /// Visits the cells of `2^SHIFT` voxels that are in the mask and on the ray, in the order of the ray. `stay` is the
+    /// time span of the ray in their parent.
     #[inline]
     fn search<const SHIFT: u32>(
         &self,
@@ -157,7 +157,7 @@ impl RaySearch {
         if mask == 0 {
             return;
         }
-        // Without a branch per cell: it would be unpredictable.
+        // No branch per cell: it would be unpredictable.
         let (mut near, mut visited) = (mask & self.near::<SHIFT>(parent, stay), 0_u64);
         while near != 0 {
             let place = near.trailing_zeros() as usize;
@@ -176,8 +176,8 @@ impl RaySearch {
         }
     }
 
-    /// The cells of `2^SHIFT` voxels of a parent that lie in a box around the ray's part in it, and in the box of the
-    /// ray's ends.
+    /// Returns the cells of `2^SHIFT` voxels of a parent that are in the box around the ray's part in it and in the box
+    /// of the ray's ends.
     #[inline]
     fn near<const SHIFT: u32>(&self, parent: VoxelIndex, stay: Stay) -> u64 {
         // In voxels; the rounding error of times and positions is at most a thousandth of this.
@@ -195,16 +195,16 @@ impl RaySearch {
         in_box(range(0), range(1), range(2))
     }
 
-    /// Whether the ray visits a cell of `2^SHIFT` voxels that is in the box of the ray's ends.
+    /// Returns whether the ray visits a cell of `2^SHIFT` voxels that is in the box of the ray's ends.
     #[inline]
     fn visits<const SHIFT: u32>(&self, cell: VoxelIndex) -> bool {
         let [ex, ey, ez]: Point = std::array::from_fn(|k| self.enter_time::<SHIFT>(k, cell[k]));
         let [lx, ly, lz]: Point = std::array::from_fn(|k| self.leave_time::<SHIFT>(k, cell[k]));
-        // At equal times the lowest axis goes first.
+        // At equal times the lowest axis is first.
         (ex <= ly) & (ex <= lz) & (ey < lx) & (ey <= lz) & (ez < lx) & (ez < ly)
     }
 
-    /// The times at which the ray enters and leaves a cell of `2^SHIFT` voxels that it visits.
+    /// Returns the times at which the ray enters and leaves a cell of `2^SHIFT` voxels that it visits.
     #[inline]
     fn stay_in<const SHIFT: u32>(&self, cell: VoxelIndex) -> Stay {
         let [ex, ey, ez]: Point = std::array::from_fn(|k| self.enter_time::<SHIFT>(k, cell[k]));
@@ -212,7 +212,7 @@ impl RaySearch {
         Stay { enter: larger(larger(ex, ey), larger(ez, 0.0)), leave: smaller(smaller(lx, ly), lz) }
     }
 
-    /// Time at which the ray enters a cell of `2^SHIFT` voxels along `axis`; minus infinity for the first.
+    /// Returns the time at which the ray enters a cell of `2^SHIFT` voxels along `axis`; minus infinity for the first.
     #[inline]
     fn enter_time<const SHIFT: u32>(&self, axis: usize, cell: i32) -> f64 {
         match cell == self.start[axis] >> SHIFT {
@@ -221,7 +221,7 @@ impl RaySearch {
         }
     }
 
-    /// Time at which the ray leaves a cell of `2^SHIFT` voxels along `axis`; infinite for the last.
+    /// Returns the time at which the ray leaves a cell of `2^SHIFT` voxels along `axis`; infinity for the last.
     #[inline]
     fn leave_time<const SHIFT: u32>(&self, axis: usize, cell: i32) -> f64 {
         match cell == self.last[axis] >> SHIFT {
@@ -230,14 +230,14 @@ impl RaySearch {
         }
     }
 
-    /// Time at which the ray crosses a voxel border, as in [`RayWalk`].
+    /// Returns the time at which the ray crosses a voxel border, as in [`RayWalk`].
     #[inline]
     fn time(&self, axis: usize, border: i32) -> f64 {
         (f64::from(border) - self.origin[axis]) * self.inv_direction[axis]
     }
 }
 
-/// The axis with the least time, the lowest at equal times, and that time.
+/// Returns the axis with the smallest time, the lowest axis at equal times, and that time.
 #[inline]
 fn earliest([x, y, z]: Point) -> (usize, f64) {
     if x <= y && x <= z {
@@ -249,7 +249,7 @@ fn earliest([x, y, z]: Point) -> (usize, f64) {
     }
 }
 
-// One instruction each; the library's versions handle NaN.
+// One instruction each; the standard library's versions handle NaN.
 #[inline]
 fn smaller(a: f64, b: f64) -> f64 {
     if a < b { a } else { b }
@@ -260,10 +260,10 @@ fn larger(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
 
-/// Which of the cells 0 to 3 holds a coordinate, or is nearest to it; on a border either of the two.
+/// Returns which of the cells 0 to 3 holds a coordinate or is nearest to it; on a border either of the two.
 #[inline]
 fn cell_of(x: f64) -> usize {
-    // Added to a number, this leaves the nearest integer in the lowest bits.
+    // Adding this to a number leaves the nearest integer in the lowest bits.
     const INTEGERS: f64 = 6_755_399_441_055_744.0;
     let x = smaller(larger(x, 0.25), 3.75);
     (x - 0.5 + INTEGERS).to_bits() as usize & 3

@@ -2,7 +2,7 @@ use super::changes::VoxelChange;
 use super::view::LocalView;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// The published view. Writer and readers hold the lock only to copy a pointer.
+/// The published view. The lock is held only to copy a pointer.
 #[derive(Debug)]
 pub(super) struct Shared(Mutex<Arc<LocalView>>);
 
@@ -13,7 +13,7 @@ impl Shared {
 
     pub(super) fn set(&self, view: Arc<LocalView>) {
         let before = std::mem::replace(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner), view);
-        // Dropped after the lock is released: freeing the old view takes time.
+        // Dropped after the lock is released because freeing the old view takes time.
         drop(before);
     }
 
@@ -22,11 +22,11 @@ impl Shared {
     }
 }
 
-/// Reads a local map from any thread: it sees whole updates and does not wait for the writer.
+/// Handle to read a local map from any thread. It returns complete updates and does not wait for the writer.
 #[derive(Clone, Debug)]
 pub struct LocalReader {
     shared: Arc<Shared>,
-    /// The view of the last call of [`LocalReader::changes`].
+    /// View returned by the last call of [`LocalReader::changes`].
     seen: Arc<LocalView>,
 }
 
@@ -36,13 +36,13 @@ impl LocalReader {
         Self { shared, seen: empty }
     }
 
-    /// The map after the last whole update.
+    /// Returns the map after the last complete update.
     pub fn view(&self) -> Arc<LocalView> {
         self.shared.get()
     }
 
-    /// The voxels that changed since the last call, in no particular order, and the present view; at the first call,
-    /// all voxels.
+    /// Returns the current view and the voxels that changed since the last call, in no particular order; all voxels at
+    /// the first call.
     pub fn changes(&mut self) -> (Arc<LocalView>, Vec<VoxelChange>) {
         let view = self.view();
         let changes = view.changes_since(&self.seen);

@@ -6,29 +6,29 @@ use voxtile::scan::SkippedPoints;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct LocalReport {
-    /// Points received.
+    /// Number of points received.
     pub points: u64,
-    /// Points that were skipped, by cause.
+    /// Skipped points by cause.
     pub skipped: SkippedPoints,
-    /// Points that were skipped because they are beyond the input range.
+    /// Points skipped because they are beyond the input range.
     pub beyond_input_range: u64,
     /// Voxels that received evidence.
     pub updated: u64,
-    /// Of these, voxels that were not in the map before.
+    /// New voxels among the updated ones.
     pub new: u64,
     /// Voxels removed because they are known to be free.
     pub freed: u64,
-    /// Voxels removed because of the limit.
+    /// Voxels removed because of the limit on voxels.
     pub forgotten: u64,
-    /// Voxels that started or stopped to inflate others.
+    /// Voxels that started or stopped inflating others.
     pub inflation_changes: u64,
-    /// Whether the present parameters are applied to all voxels.
+    /// Whether the current parameters are applied to all voxels.
     pub is_settled: bool,
-    /// Time of each stage.
+    /// Duration of each stage.
     pub times: StageTimes,
 }
 
-/// How long each stage of an update took.
+/// Durations of the stages of an update.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct StageTimes {
     /// Applying changed parameters.
@@ -48,7 +48,7 @@ pub struct StageTimes {
 }
 
 impl StageTimes {
-    /// All stages (`t_tot`).
+    /// Returns the sum of all stages (`t_tot`).
     pub fn total(&self) -> Duration {
         self.parameters
             + self.input

@@ -3,15 +3,15 @@ use super::stencil::Stencil;
 use std::sync::Arc;
 use voxtile::space::{Grid, Point};
 
-/// Inflation rules: one, or several in parts of the map while parameters change.
+/// The inflation rules in use: one, or several in different parts of the map while parameters change.
 #[derive(Clone, Debug)]
 pub(super) struct Rules {
-    /// By number.
+    /// Indexed by the number of the rule.
     rules: Vec<Option<Rule>>,
     current: u8,
 }
 
-/// Which occupied voxels inflate which voxels.
+/// Defines which occupied voxels inflate which voxels.
 #[derive(Clone, Debug)]
 struct Rule {
     range_m: f64,
@@ -24,20 +24,20 @@ impl Rules {
         Self { rules: vec![Some(Rule { range_m, stencil })], current: 0 }
     }
 
-    /// Number of the current rule.
+    /// Returns the number of the current rule.
     #[inline]
     pub(super) fn current(&self) -> u8 {
         self.current
     }
 
-    /// Whether another rule can be added.
-    pub(super) fn has_room(&self) -> bool {
+    /// Returns whether another rule can be added.
+    pub(super) fn has_free_number(&self) -> bool {
         self.rules.len() < 256 || self.rules.iter().any(Option::is_none)
     }
 
-    /// Adds a rule and makes it current; there must be room.
+    /// Adds a rule and makes it current. Requires [`Rules::has_free_number`].
     pub(super) fn set(&mut self, range_m: f64, radius_m: f64, resolution_m: f64) {
-        debug_assert!(self.has_room());
+        debug_assert!(self.has_free_number());
         let known = self.rules.iter().flatten().find(|rule| rule.stencil.radius_m() == radius_m);
         let stencil = known.map(|rule| rule.stencil.clone());
         let stencil = stencil.unwrap_or_else(|| Arc::new(Stencil::new(radius_m, resolution_m)));
@@ -49,7 +49,7 @@ impl Rules {
         self.current = number as u8;
     }
 
-    /// Removes all rules but the current one, which every node has by now.
+    /// Removes all rules except the current one, once every node has it.
     pub(super) fn forget_old(&mut self) {
         for (number, rule) in self.rules.iter_mut().enumerate() {
             if number != usize::from(self.current) {
@@ -62,7 +62,7 @@ impl Rules {
         self.get(number).stencil.clone()
     }
 
-    /// The ball in which voxels inflate others by a rule, with the sensor at `center`.
+    /// Returns the ball in which voxels inflate others by a rule, with the sensor at `center`.
     pub(super) fn ball(&self, number: u8, grid: Grid, center: Point) -> Ball {
         Ball { grid, center, radius_m: self.get(number).range_m }
     }
@@ -70,6 +70,6 @@ impl Rules {
     fn get(&self, number: u8) -> &Rule {
         let current = usize::from(self.current);
         let rule = self.rules[usize::from(number)].as_ref().or(self.rules[current].as_ref());
-        rule.expect("the current rule is never forgotten")
+        rule.expect("the current rule is never removed")
     }
 }

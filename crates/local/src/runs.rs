@@ -1,4 +1,4 @@
-/// An allocator of runs of equal length, by number; growing wastes at most an eighth.
+/// Allocator of runs of equal length, addressed by number. It over-allocates by an eighth at most.
 #[derive(Clone, Debug)]
 pub(super) struct Runs<T> {
     values: Vec<T>,
@@ -12,11 +12,11 @@ impl<T> Default for Runs<T> {
 }
 
 impl<T: Copy + Default> Runs<T> {
-    /// Allocates a run of `len` values, uninitialised; returns its number.
+    /// Allocates an uninitialised run of `len` values and returns its number.
     pub(super) fn take(&mut self, len: usize) -> u32 {
         self.free.pop().unwrap_or_else(|| {
             let used = self.values.len();
-            // Doubling would leave a third unused on average.
+            // Doubling would leave a third of the capacity unused on average.
             if self.values.capacity() < used + len {
                 self.values.reserve_exact(used / 8 + 1024);
             }
@@ -40,7 +40,7 @@ impl<T: Copy + Default> Runs<T> {
         &mut self.values[run as usize * len..][..len]
     }
 
-    /// Bytes of memory on the heap.
+    /// Returns bytes of memory on the heap.
     pub(super) fn bytes(&self) -> usize {
         self.values.capacity() * size_of::<T>() + self.free.capacity() * size_of::<u32>()
     }

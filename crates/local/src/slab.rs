@@ -1,4 +1,4 @@
-/// Values by number, in chunks: growing moves none of them and wastes less than a chunk.
+/// Values addressed by number, stored in chunks. Growing moves no value and wastes less than a chunk.
 #[derive(Clone, Debug)]
 pub(super) struct Slab<T> {
     chunks: Vec<Box<[T]>>,
@@ -28,7 +28,7 @@ impl<T: Clone + Default> Slab<T> {
         id
     }
 
-    /// Frees a number; its value stays until the number is used again.
+    /// Frees a number; its value is dropped when the number is reused.
     pub(super) fn remove(&mut self, id: u32) {
         self.free.push(id);
     }
@@ -43,7 +43,7 @@ impl<T: Clone + Default> Slab<T> {
         &mut self.chunks[(id / CHUNK) as usize][(id % CHUNK) as usize]
     }
 
-    /// Bytes of memory on the heap.
+    /// Returns bytes of memory on the heap.
     pub(super) fn bytes(&self) -> usize {
         self.chunks.len() * (CHUNK as usize * size_of::<T>() + size_of::<Box<[T]>>())
             + self.free.capacity() * size_of::<u32>()

@@ -1,7 +1,7 @@
 use super::runs::Runs;
 
-/// A map from 64 places to numbers: 4 bytes per number, in a list as long as needed.
-// Next to each other in a block of 32 bytes.
+/// Map from 64 positions to numbers: 4 bytes per number, in a list as long as needed.
+// Packed, so that a block fits into 32 bytes.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(Rust, packed(4))]
 pub(super) struct Sparse64 {
@@ -9,20 +9,20 @@ pub(super) struct Sparse64 {
     list: u32,
 }
 
-/// The lists of many [`Sparse64`], by capacity: 1, 2, 4 ... 64, the smallest that suffices.
+/// Storage of the lists of many [`Sparse64`] by capacity class: 1, 2, 4 ... 64, the smallest that suffices.
 #[derive(Clone, Debug, Default)]
 pub(super) struct IdLists {
     classes: [Runs<u32>; 7],
 }
 
-/// The class of lists of so many numbers.
+/// Returns the capacity class for this many numbers.
 #[inline]
 fn class_of(len: usize) -> usize {
     len.next_power_of_two().trailing_zeros() as usize
 }
 
 impl IdLists {
-    /// Bytes of memory on the heap.
+    /// Returns bytes of memory on the heap.
     pub(super) fn bytes(&self) -> usize {
         self.classes.iter().map(Runs::bytes).sum()
     }
@@ -37,7 +37,7 @@ impl IdLists {
         self.classes[class].get_mut(list, 1 << class)
     }
 
-    /// Moves a list to another class, as much as fits; returns its number there.
+    /// Moves as much of a list as fits to another class; returns its number there.
     fn moved(&mut self, list: u32, from: usize, to: usize) -> u32 {
         let new = self.classes[to].take(1 << to);
         let len = 1 << from.min(to);
@@ -60,20 +60,20 @@ impl Sparse64 {
         (self.mask & ((1 << place) - 1)).count_ones() as usize
     }
 
-    /// The number at a place (0 to 63).
+    /// Returns the number at a position (0 to 63).
     #[inline]
     pub(super) fn get(&self, lists: &IdLists, place: usize) -> Option<u32> {
         let is_taken = self.mask >> place & 1 != 0;
         is_taken.then(|| lists.list(class_of(self.len()), self.list)[self.rank(place)])
     }
 
-    /// The numbers, by place.
+    /// Returns the numbers in the order of their positions.
     pub(super) fn ids<'a>(&self, lists: &'a IdLists) -> &'a [u32] {
         let len = self.len();
         if len == 0 { &[] } else { &lists.list(class_of(len), self.list)[..len] }
     }
 
-    /// Inserts a number at a free place.
+    /// Inserts a number at a free position.
     pub(super) fn insert(&mut self, lists: &mut IdLists, place: usize, id: u32) {
         debug_assert!(self.mask >> place & 1 == 0);
         let len = self.len();
@@ -90,7 +90,7 @@ impl Sparse64 {
         self.mask |= 1 << place;
     }
 
-    /// Removes the number at a place.
+    /// Removes and returns the number at a position.
     pub(super) fn remove(&mut self, lists: &mut IdLists, place: usize) -> u32 {
         debug_assert!(self.mask >> place & 1 != 0);
         let (len, rank) = (self.len(), self.rank(place));
@@ -116,7 +116,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn lists_are_what_a_tree_map_is(steps in prop::collection::vec((0..3_usize, 0..64_usize), 0..400)) {
+        fn sparse_maps_equal_tree_maps(steps in prop::collection::vec((0..3_usize, 0..64_usize), 0..400)) {
             let mut lists = IdLists::default();
             let mut sparse = [Sparse64::default(); 3];
             let mut naive: [BTreeMap<usize, u32>; 3] = Default::default();

@@ -1,23 +1,24 @@
 use super::place::{cell_at, place_of};
 use voxtile::space::VoxelIndex;
 
-/// The voxels that an occupied voxel inflates: a ball on voxel centers, as masks of blocks of 4 x 4 x 4.
+/// The voxels that an occupied voxel inflates: a ball of voxel centers, as masks of blocks of 4 x 4 x 4.
 ///
-/// One for all voxels; it replaces the paper's look-up table in every voxel.
+/// All voxels share one stencil; it replaces the paper's look-up table per voxel.
 #[derive(Clone, Debug)]
 pub(super) struct Stencil {
     radius_m: f64,
-    /// How many blocks it extends beyond the voxel's own, along each axis and to both sides.
+    /// Number of blocks by which the stencil extends beyond the voxel's own block, to each side of each axis.
     pub(super) reach: i32,
-    /// For each place of the voxel in its block: the blocks, numbered by [`Stencil::number_of`], and their voxels.
+    /// For each position of the voxel in its block: the affected blocks, numbered by [`Stencil::number_of`], and the
+    /// masks of their voxels.
     parts: Vec<Vec<(u32, u64)>>,
-    /// The blocks by number, relative to the voxel's own.
+    /// Offsets of the blocks, by number, from the voxel's own block.
     offsets: Vec<VoxelIndex>,
 }
 
 impl Stencil {
-    /// The ball of a radius in metres, for voxels of `resolution_m`: all offsets `d` in voxels with
-    /// `|d| <= radius / resolution`, where a relative error of 1e-9 does not matter.
+    /// Creates the ball of a radius in metres for voxels of `resolution_m`: all offsets `d` in voxels with `|d| <=
+    /// radius / resolution`, with a relative tolerance of 1e-9.
     pub(super) fn new(radius_m: f64, resolution_m: f64) -> Self {
         let radius = radius_m / resolution_m * (1.0 + 1e-9);
         let r = radius.floor() as i32;
@@ -41,37 +42,37 @@ impl Stencil {
         self.radius_m
     }
 
-    /// Blocks in the cube around the stencil.
+    /// Returns the number of blocks in the cube around the stencil.
     pub(super) fn blocks(&self) -> usize {
         self.offsets.len()
     }
 
-    /// The blocks, and their voxels, that the voxel at a place of its block inflates.
+    /// Returns the blocks and the masks that the voxel at a position of its block inflates.
     #[inline]
     pub(super) fn of_place(&self, place: usize) -> &[(u32, u64)] {
         &self.parts[place]
     }
 
-    /// The number of a block, given relative to the voxel's own.
+    /// Returns the number of a block, given by its offset from the voxel's own block.
     fn number_of(&self, offset: VoxelIndex) -> usize {
         let [x, y, z] = offset.map(|k| k + self.reach);
         ((x * (2 * self.reach + 1) + y) * (2 * self.reach + 1) + z) as usize
     }
 
-    /// The block with a number, relative to the voxel's own.
+    /// Returns the offset of a block from the voxel's own block.
     #[inline]
     pub(super) fn offset_of(&self, number: u32) -> VoxelIndex {
         self.offsets[number as usize]
     }
 }
 
-/// The blocks up to `reach` away along each axis, in the order of [`Stencil::number_of`].
+/// Returns the offsets up to `reach` along each axis, in the order of [`Stencil::number_of`].
 fn offsets(reach: i32) -> Vec<VoxelIndex> {
     let along = move || -reach..=reach;
     along().flat_map(|x| along().flat_map(move |y| along().map(move |z| [x, y, z]))).collect()
 }
 
-/// All offsets of at most a length in voxels.
+/// Returns all offsets of at most this length in voxels.
 fn ball(radius: f64) -> impl Iterator<Item = VoxelIndex> {
     let r = radius.floor() as i32;
     let along = move || -r..=r;
@@ -84,7 +85,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn balls_have_as_many_voxels_as_they_should() {
+    fn balls_have_the_expected_number_of_voxels() {
         // 0.3 m is slightly less than three voxels of 0.1 m in f64.
         let sizes = [(0.0, 1), (0.1, 7), (0.2, 33), (0.3, 123), (0.25, 81), (0.4, 257), (2.4, 57_777)];
         for (radius_m, size) in sizes {

@@ -4,10 +4,10 @@ use super::report::LocalReport;
 use super::tree::Tree;
 use voxtile::space::{Point, VoxelIndex};
 
-/// Applies changed parameters node by node: the nodes left, the nearest to the sensor last.
+/// Nodes to which changed parameters must still be applied, the nearest to the sensor last.
 #[derive(Debug, Default)]
 pub(super) struct Sweep {
-    /// By index.
+    /// Indices of the nodes.
     nodes: Vec<VoxelIndex>,
 }
 
@@ -20,7 +20,7 @@ impl Sweep {
         self.nodes.capacity() * size_of::<VoxelIndex>()
     }
 
-    /// All nodes, sorted by their distance to a voxel.
+    /// Returns all nodes sorted by their distance to a voxel.
     fn of(tree: &Tree, from: VoxelIndex) -> Self {
         let from = from.map(|k| i64::from(k >> 4));
         let distance = |index: &VoxelIndex| {
@@ -34,7 +34,7 @@ impl Sweep {
 }
 
 impl LocalMap {
-    /// Starts a sweep over all voxels, if the changed parameters need one.
+    /// Starts a sweep over all voxels if the changed parameters require it.
     pub(super) fn begin_sweep(&mut self, before: &LocalParameters) {
         let LocalParameters { inflation_range_m, inflation_radius_m, .. } = self.applied;
         let states = |p: &LocalParameters| {
@@ -76,7 +76,7 @@ impl LocalMap {
         }
     }
 
-    /// Classifies the voxels of a node anew and gives it the current inflation rule; returns the work in voxels.
+    /// Reclassifies the voxels of a node and assigns the current inflation rule; returns the work in voxels.
     fn sweep_node(&mut self, node: u32, report: &mut LocalReport) -> usize {
         let LocalParameters { log_odds, occupied_log_odds, .. } = self.applied;
         let mut work = 0;
@@ -99,7 +99,7 @@ impl LocalMap {
         }
         let before = self.inflation.changes;
         self.inflation.adopt(&mut self.tree, node);
-        // Voxels that stopped to inflate start again with the new stencil.
+        // Voxels that stopped inflating start again with the new stencil.
         work + 2 * (self.inflation.changes - before)
     }
 }

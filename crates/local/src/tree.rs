@@ -5,11 +5,11 @@ use super::sparse::{IdLists, Sparse64};
 use rustc_hash::FxHashMap;
 use voxtile::space::{VoxelIndex, hash_table_bytes};
 
-/// No number.
+/// Marks a missing page, node or block.
 pub(super) const NONE: u32 = u32::MAX;
 
-/// The voxels of a local map: a hash map of pages of 64 voxels along an edge, in these nodes of 16, in these blocks of
-/// 4. Empty ones do not exist and are skipped at the largest size.
+/// The voxels of a local map: a hash map of pages of 64 voxels per edge, divided into nodes of 16, divided into blocks
+/// of 4. Empty cells do not exist, so that searches skip them at the largest size.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Tree {
     by_index: FxHashMap<VoxelIndex, u32>,
@@ -18,57 +18,57 @@ pub(super) struct Tree {
     pub(super) blocks: Slab<Block>,
     pub(super) lists: IdLists,
     pub(super) counts: Counts,
-    /// Index and number of the page of the last block.
+    /// Index and number of the page of the last block used.
     last_page: Option<(VoxelIndex, u32)>,
-    /// Pages, by index, with nodes that changed since the last publication.
+    /// Indices of pages with nodes that changed since the last publication.
     dirty: Vec<VoxelIndex>,
 }
 
-/// 64 x 64 x 64 voxels.
+/// A cube of 64 x 64 x 64 voxels.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Page {
-    /// Index of a voxel, divided by 64.
+    /// Index of any of its voxels, divided by 64.
     pub(super) index: VoxelIndex,
     pub(super) nodes: Sparse64,
-    /// Nodes that hold voxels with occupancy.
+    /// Mask of nodes that hold voxels with occupancy.
     pub(super) stored: u64,
-    /// Nodes in which voxels changed since the last publication.
+    /// Mask of nodes in which voxels changed since the last publication.
     pub(super) dirty: u64,
-    /// Occupied voxels.
+    /// Number of occupied voxels.
     pub(super) occupied: u32,
-    /// Voxels that inflate others.
+    /// Number of voxels that inflate others.
     pub(super) inflating: u32,
 }
 
-/// 16 x 16 x 16 voxels.
+/// A cube of 16 x 16 x 16 voxels.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Node {
     pub(super) page: u32,
     pub(super) place: u8,
     /// Number of the inflation rule of the node.
     pub(super) rule: u8,
-    /// Occupied voxels.
+    /// Number of occupied voxels.
     pub(super) occupied: u16,
-    /// Voxels that inflate others.
+    /// Number of voxels that inflate others.
     pub(super) inflating: u16,
     pub(super) blocks: Sparse64,
-    /// Blocks that hold voxels with occupancy.
+    /// Mask of blocks that hold voxels with occupancy.
     pub(super) stored: u64,
-    /// Blocks in which voxels changed since the last publication.
+    /// Mask of blocks in which voxels changed since the last publication.
     pub(super) dirty: u64,
 }
 
-/// 4 x 4 x 4 voxels, each with its occupancy and its inflation: half a cache line.
+/// A cube of 4 x 4 x 4 voxels, each with its occupancy and inflation. Fills half a cache line.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Block {
     pub(super) node: u32,
     pub(super) place: u8,
-    /// Whether it is queued to be inflated anew.
+    /// Whether the block is queued for an update of the inflation.
     pub(super) is_waiting: bool,
     /// The voxels with occupancy, and their numbers.
     pub(super) voxels: Sparse64,
     pub(super) occupied: u64,
-    /// The occupied voxels that inflate others now, and the counts of inflation.
+    /// Mask of the occupied voxels that inflate others, and the counts of inflation.
     pub(super) tally: Tally,
 }
 
@@ -77,43 +77,43 @@ impl Tree {
         self.by_index.get(&index).copied()
     }
 
-    /// The numbers of all pages.
+    /// Returns the numbers of all pages.
     pub(super) fn page_ids(&self) -> impl Iterator<Item = u32> + '_ {
         self.by_index.values().copied()
     }
 
-    /// Index of a voxel of the node, divided by 16.
+    /// Returns the index of the node: that of any of its voxels, divided by 16.
     pub(super) fn node_index(&self, node: u32) -> VoxelIndex {
         let Node { page, place, .. } = *self.nodes.get(node);
         cell_at(self.pages.get(page).index, place.into())
     }
 
-    /// Index of a voxel of the block, divided by 4.
+    /// Returns the index of the block: that of any of its voxels, divided by 4.
     pub(super) fn block_index(&self, block: u32) -> VoxelIndex {
         let Block { node, place, .. } = *self.blocks.get(block);
         cell_at(self.node_index(node), place.into())
     }
 
-    /// The node with an index.
+    /// Returns the node with an index.
     pub(super) fn node_at(&self, index: VoxelIndex) -> Option<u32> {
         let page = self.page_at(index.map(|k| k >> 2))?;
         self.pages.get(page).nodes.get(&self.lists, place_of(index))
     }
 
-    /// The block with an index.
+    /// Returns the block with an index.
     #[inline]
     pub(super) fn block_at(&self, index: VoxelIndex) -> Option<u32> {
         let node = self.node_at(index.map(|k| k >> 2))?;
         self.nodes.get(node).blocks.get(&self.lists, place_of(index))
     }
 
-    /// The block with an index, made if it does not exist; a new node gets the rule.
+    /// Returns the block with an index, created if it does not exist; a new node gets the rule.
     pub(super) fn make_block(&mut self, index: VoxelIndex, rule: u8) -> u32 {
         let node = self.make_node(index.map(|k| k >> 2), rule);
         self.make_block_in(node, place_of(index))
     }
 
-    /// The node with an index, made with the rule if it does not exist.
+    /// Returns the node with an index, created with the rule if it does not exist.
     pub(super) fn make_node(&mut self, index: VoxelIndex, rule: u8) -> u32 {
         let page = self.make_page(index.map(|k| k >> 2));
         let in_page = place_of(index);
@@ -127,7 +127,7 @@ impl Tree {
         }
     }
 
-    /// The block at a place of a node, made if it does not exist.
+    /// Returns the block at a position of a node, created if it does not exist.
     #[inline]
     pub(super) fn make_block_in(&mut self, node: u32, in_node: usize) -> u32 {
         match self.nodes.get(node).blocks.get(&self.lists, in_node) {
@@ -143,7 +143,7 @@ impl Tree {
 
     #[inline]
     fn make_page(&mut self, index: VoxelIndex) -> u32 {
-        // Mostly it is the page of the last block.
+        // Usually the page of the last block.
         if let Some((last, page)) = self.last_page
             && last == index
         {
@@ -180,7 +180,7 @@ impl Tree {
         }
     }
 
-    /// Sets whether a voxel is occupied; returns whether that changed it.
+    /// Sets whether a voxel is occupied; returns whether the state changed.
     pub(super) fn set_occupied(&mut self, block: u32, place: usize, is_occupied: bool) -> bool {
         let Block { node, place: in_node, occupied, .. } = self.blocks.get_mut(block);
         let was_occupied = *occupied >> place & 1 != 0;
@@ -200,20 +200,20 @@ impl Tree {
         true
     }
 
-    /// Changes which voxels of a block inflate others: `begin` start, `end` stop.
+    /// Changes which voxels of a block inflate others: those in `begin` start, those in `end` stop.
     pub(super) fn set_inflating(&mut self, block: u32, begin: u64, end: u64) {
         let Block { node, tally, .. } = *self.blocks.get(block);
         let inflating = (self.counts.inflating(tally) | begin) & !end;
         self.counts.set_inflating(tally, inflating);
         let (begin, end) = (begin.count_ones(), end.count_ones());
         let node = self.nodes.get_mut(node);
-        // A node has 4096 voxels.
+        // Fits: a node has 4096 voxels.
         node.inflating = (u32::from(node.inflating) + begin - end) as u16;
         let page = self.pages.get_mut(node.page);
         page.inflating = page.inflating + begin - end;
     }
 
-    /// Marks the block at a place of a node as changed for readers.
+    /// Marks the block at a position of a node as changed for readers.
     #[inline]
     pub(super) fn mark_dirty(&mut self, node: u32, in_node: u8) {
         let Node { page, place, dirty, .. } = self.nodes.get_mut(node);
@@ -229,13 +229,13 @@ impl Tree {
         *dirty |= 1 << place;
     }
 
-    /// The pages, by index, that may have changed for readers since the last call; some may not exist any more, some
+    /// Returns the indices of pages that may have changed for readers since the last call. Some pages may be gone, some
     /// may be listed twice.
     pub(super) fn take_dirty(&mut self) -> Vec<VoxelIndex> {
         std::mem::take(&mut self.dirty)
     }
 
-    /// Marks these pages as published; keeps the memory for the next call of [`Tree::take_dirty`].
+    /// Marks these pages as published; reuses the memory in the next call of [`Tree::take_dirty`].
     pub(super) fn shown(&mut self, mut dirty: Vec<VoxelIndex>) {
         for index in dirty.drain(..) {
             let Some(page) = self.page_at(index) else { continue };
@@ -249,10 +249,10 @@ impl Tree {
         self.dirty = dirty;
     }
 
-    /// Removes a block if it is empty, and its node and page if they are.
+    /// Removes a block if it is empty, and its node and page if they are empty as well.
     ///
-    /// Publish the tree before anything new is made: new nodes and blocks do not know what readers saw in their
-    /// places.
+    /// The tree must be published before new nodes or blocks are created: they do not know what readers saw at their
+    /// positions.
     pub(super) fn drop_if_empty(&mut self, block: u32) {
         let Block { node, place, voxels, tally, .. } = self.blocks.get(block).clone();
         if voxels.mask != 0 || !tally.is_empty() {
@@ -275,17 +275,17 @@ impl Tree {
         }
     }
 
-    /// The numbers of all nodes of a page.
+    /// Returns the numbers of all nodes of a page.
     pub(super) fn nodes_of(&self, page: u32) -> &[u32] {
         self.pages.get(page).nodes.ids(&self.lists)
     }
 
-    /// The numbers of all blocks of a node.
+    /// Returns the numbers of all blocks of a node.
     pub(super) fn blocks_of(&self, node: u32) -> &[u32] {
         self.nodes.get(node).blocks.ids(&self.lists)
     }
 
-    /// Voxels with occupancy that nothing inflates.
+    /// Returns the number of voxels with occupancy that are not inflated.
     pub(super) fn stored_but_not_inflated(&self) -> usize {
         let nodes = self.page_ids().flat_map(|page| self.nodes_of(page));
         let blocks = nodes.flat_map(|&node| self.blocks_of(node)).map(|&block| self.blocks.get(block));
@@ -294,7 +294,7 @@ impl Tree {
             .sum()
     }
 
-    /// Bytes of memory on the heap.
+    /// Returns bytes of memory on the heap.
     pub(super) fn bytes(&self) -> usize {
         hash_table_bytes::<(VoxelIndex, u32)>(self.by_index.capacity())
             + self.pages.bytes()

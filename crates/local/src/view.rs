@@ -4,9 +4,9 @@ use rustc_hash::FxHashMap;
 use std::sync::Arc;
 use voxtile::space::{Grid, Point, VoxelIndex, hash_table_bytes};
 
-/// A local map after one update. It never changes: a planner can query it as long as it likes.
+/// Immutable state of a local map after one update, for queries.
 ///
-/// Views share what did not change between their updates.
+/// Views share the pages that did not change between them.
 #[derive(Clone, Debug)]
 pub struct LocalView {
     pub(super) grid: Grid,
@@ -15,58 +15,58 @@ pub struct LocalView {
     pub(super) stored: usize,
     pub(super) occupied: usize,
     pub(super) inflated: usize,
-    /// By index of a voxel, divided by 64.
+    /// Pages by the index of any of their voxels, divided by 64.
     pub(super) pages: FxHashMap<VoxelIndex, Arc<PageView>>,
 }
 
-/// 4 x 4 x 4 nodes.
+/// A page: 4 x 4 x 4 nodes.
 #[derive(Clone, Debug, Default)]
 pub(super) struct PageView {
     pub(super) mask: u64,
-    /// For each node of the mask: its blocks, and the number of blocks before.
+    /// For each node of the mask: the mask of its blocks, and the number of blocks before them.
     nodes: Box<[(u64, u32)]>,
-    /// The blocks of all nodes.
+    /// Blocks of all nodes.
     blocks: Box<[BlockView]>,
 }
 
-/// 4 x 4 x 4 blocks.
+/// A node: 4 x 4 x 4 blocks.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct NodeView<'a> {
     pub(super) mask: u64,
-    /// The blocks of the mask.
+    /// Blocks in the order of the mask.
     blocks: &'a [BlockView],
 }
 
-/// 4 x 4 x 4 voxels.
+/// A block: 4 x 4 x 4 voxels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct BlockView {
     pub(super) occupied: u64,
     pub(super) inflated: u64,
 }
 
-/// The state of a voxel in a local map.
+/// State of a voxel in a local map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum LocalState {
     /// Neither occupied nor inflated: free or unknown; the local map does not distinguish these.
     None,
-    /// Not occupied, but near to an occupied voxel.
+    /// Not occupied, but within the inflation radius of an occupied voxel.
     Inflated,
     /// Occupied.
     Occupied,
 }
 
-/// Which voxels are obstacles for a query.
+/// Selects the voxels that are obstacles for a query.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Obstacle {
-    /// Occupied voxels alone.
+    /// Occupied voxels only.
     Occupied,
-    /// Occupied and inflated voxels: what a planner for a point robot avoids.
+    /// Occupied and inflated voxels: a point robot must avoid them.
     #[default]
     Inflated,
 }
 
 impl Obstacle {
-    /// Whether a state is an obstacle.
+    /// Returns whether a state is an obstacle.
     pub fn is(self, state: LocalState) -> bool {
         match self {
             Self::Occupied => state == LocalState::Occupied,
@@ -86,7 +86,7 @@ impl BlockView {
         }
     }
 
-    /// The voxels that are obstacles.
+    /// Returns the mask of voxels that are obstacles.
     pub(super) fn obstacles(&self, obstacle: Obstacle) -> u64 {
         match obstacle {
             Obstacle::Occupied => self.occupied,
@@ -95,7 +95,7 @@ impl BlockView {
     }
 }
 
-/// The value at a place among those of a mask.
+/// Returns the value at a position among those of a mask.
 fn at<T>(values: &[T], mask: u64, place: usize) -> Option<&T> {
     let rank = (mask & ((1 << place) - 1)).count_ones() as usize;
     (mask >> place & 1 != 0).then(|| &values[rank])
@@ -112,12 +112,12 @@ impl PageView {
         NodeView { mask, blocks: &self.blocks[before as usize..][..mask.count_ones() as usize] }
     }
 
-    /// The nodes of the mask.
+    /// Returns the nodes of the mask.
     fn nodes(&self) -> impl Iterator<Item = NodeView<'_>> {
         self.nodes.iter().map(|node| self.view_of(node))
     }
 
-    /// Bytes of memory on the heap, with those of the counts beside it.
+    /// Returns the bytes of memory on the heap, including the reference counts.
     fn bytes(&self) -> usize {
         2 * size_of::<usize>()
             + size_of::<Self>()
@@ -133,7 +133,7 @@ impl<'a> NodeView<'a> {
     }
 }
 
-/// Builds views of pages; kept from page to page for its memory.
+/// Builds views of pages; reused to avoid allocations.
 #[derive(Default)]
 struct PageBuilder {
     nodes: Vec<(u64, u32)>,
@@ -141,7 +141,7 @@ struct PageBuilder {
 }
 
 impl PageBuilder {
-    /// The view of a page; `before` is its last view. `None` if nothing in it is occupied or inflated.
+    /// Returns the view of a page; `before` is its last view. `None` if nothing in it is occupied or inflated.
     fn build(&mut self, tree: &Tree, page: &Page, before: Option<&PageView>) -> Option<PageView> {
         self.nodes.clear();
         self.blocks.clear();
@@ -167,10 +167,10 @@ impl PageBuilder {
     /// Adds the visible blocks of a node; `before` is its last view. Returns their mask.
     fn add_blocks_of(&mut self, tree: &Tree, node: u32, before: NodeView) -> u64 {
         let Node { blocks, dirty, .. } = tree.nodes.get(node);
-        // Most are not in a cache. Reading all before any decision lets the processor wait for them at once.
+        // Most blocks are not in the cache. Reading all of them before the first decision overlaps the cache misses.
         let changed = ones(blocks.mask & dirty).filter_map(|place| blocks.get(&tree.lists, place));
         std::hint::black_box(changed.fold(0, |any, id| any | tree.blocks.get(id).occupied));
-        // Blocks that did not change are copied from the view, where they lie together.
+        // Unchanged blocks are copied from the last view, where they are contiguous.
         let mut unchanged = ones(before.mask).zip(before.blocks).filter(|(place, _)| dirty >> place & 1 == 0);
         let mut mask = before.mask & !dirty;
         let mut next = unchanged.next();
@@ -211,37 +211,37 @@ impl LocalView {
         }
     }
 
-    /// Number of the update; 0 before the first.
+    /// Returns the number of the update; 0 before the first.
     pub fn update_number(&self) -> u64 {
         self.update_number
     }
 
-    /// Position of the sensor at that update, in metres; `None` before the first.
+    /// Returns the position of the sensor at that update, in metres; `None` before the first.
     pub fn position(&self) -> Option<Point> {
         self.position
     }
 
-    /// Edge of a voxel in metres.
+    /// Returns the edge length of a voxel in metres.
     pub fn resolution_m(&self) -> f64 {
         self.grid.resolution_m()
     }
 
-    /// Voxels with occupancy: occupied, or not yet known to be free.
+    /// Returns the number of voxels with occupancy: occupied, or not yet known to be free.
     pub fn stored_voxels(&self) -> usize {
         self.stored
     }
 
-    /// Occupied voxels.
+    /// Returns the number of occupied voxels.
     pub fn occupied_voxels(&self) -> usize {
         self.occupied
     }
 
-    /// Inflated voxels, including occupied ones.
+    /// Returns the number of inflated voxels, including occupied ones.
     pub fn inflated_voxels(&self) -> usize {
         self.inflated
     }
 
-    /// The state of a voxel.
+    /// Returns the state of a voxel.
     pub fn state(&self, voxel: VoxelIndex) -> LocalState {
         let place = |shift: u32| place_of(voxel.map(|k| k >> shift));
         let page = self.pages.get(&voxel.map(|k| k >> 6));
@@ -249,7 +249,7 @@ impl LocalView {
         block.map_or(LocalState::None, |block| block.state(place(0)))
     }
 
-    /// The state of the voxel that holds a point; `None` if the point is not finite.
+    /// Returns the state of the voxel that contains a point; [`LocalState::None`] if the point is not finite.
     pub fn state_at(&self, point: Point) -> LocalState {
         self.grid.voxel_of(point).map_or(LocalState::None, |voxel| self.state(voxel))
     }
@@ -268,7 +268,7 @@ impl LocalView {
         }
     }
 
-    /// Bytes of memory on the heap, without regard to sharing.
+    /// Returns the bytes of memory on the heap, including the reference counts.
     pub(super) fn bytes(&self) -> usize {
         hash_table_bytes::<(VoxelIndex, Arc<PageView>)>(self.pages.capacity())
             + self.pages.values().map(|page| page.bytes()).sum::<usize>()

@@ -1,24 +1,24 @@
 use super::slab::Slab;
 use super::tree::NONE;
 
-/// A voxel with occupancy, and its place in the history.
+/// A voxel with occupancy, linked into the history.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Voxel {
-    /// Sum of the evidence so far, clamped.
+    /// Clamped sum of the evidence so far.
     pub(super) log_odds: f64,
     block: u32,
-    /// The voxel updated before it.
+    /// Number of the voxel updated before it.
     older: u32,
-    /// The voxel updated after it.
+    /// Number of the voxel updated after it.
     newer: u32,
-    /// Its place in the block, and 64 times the number of its evidence in the present scan.
+    /// Position in the block (6 bits), and the number of the voxel's evidence in the current scan (26 bits).
     place_and_touch: u32,
 }
 
-/// Most voxels with occupancy, including all points of a scan; each may have evidence in a scan.
+/// Maximum number of voxels with occupancy, including all points of a scan; each may have evidence in a scan.
 pub(super) const MAX_NUMBERED: usize = NO_TOUCH as usize;
 
-/// No number, in 26 bits.
+/// Marks missing evidence, in 26 bits.
 const NO_TOUCH: u32 = u32::MAX >> 6;
 
 impl Default for Voxel {
@@ -33,28 +33,28 @@ impl Voxel {
         Self { log_odds, block, older: NONE, newer: NONE, place_and_touch }
     }
 
-    /// Number of its block, and its place in the block.
+    /// Returns the number of the voxel's block and its position there.
     #[inline]
     pub(super) fn home(&self) -> (u32, usize) {
         (self.block, (self.place_and_touch & 63) as usize)
     }
 
-    /// Number of its evidence in the present scan.
+    /// Returns the number of the voxel's evidence in the current scan.
     #[inline]
     pub(super) fn touch(&self) -> Option<u32> {
         let touch = self.place_and_touch >> 6;
         (touch != NO_TOUCH).then_some(touch)
     }
 
-    /// Sets the value of [`Voxel::touch`]; there are fewer than [`MAX_NUMBERED`].
+    /// Sets the value of [`Voxel::touch`]; it must be below [`MAX_NUMBERED`].
     #[inline]
     pub(super) fn set_touch(&mut self, touch: Option<u32>) {
         self.place_and_touch = self.place_and_touch & 63 | touch.unwrap_or(NO_TOUCH) << 6;
     }
 }
 
-/// All voxels with occupancy, in the order of their last updates (the paper's history buffer): a doubly linked list, so
-/// that a voxel moves to the end in constant time.
+/// All voxels with occupancy in the order of their last updates (the paper's history buffer): a doubly linked list, so
+/// that moving a voxel to the end takes constant time.
 #[derive(Clone, Debug)]
 pub(super) struct Voxels {
     pub(super) slab: Slab<Voxel>,
@@ -70,12 +70,12 @@ impl Default for Voxels {
 }
 
 impl Voxels {
-    /// Voxels in the history.
+    /// Returns the number of voxels in the history.
     pub(super) fn len(&self) -> usize {
         self.len
     }
 
-    /// The voxel with the oldest update.
+    /// Returns the least recently updated voxel.
     pub(super) fn oldest(&self) -> Option<u32> {
         (self.oldest != NONE).then_some(self.oldest)
     }
@@ -118,7 +118,7 @@ impl Voxels {
         self.len -= 1;
     }
 
-    /// The history, oldest first.
+    /// Returns the history, oldest first.
     pub(super) fn in_order(&self) -> impl Iterator<Item = &Voxel> {
         let mut next = self.oldest;
         std::iter::from_fn(move || {

@@ -204,5 +204,5 @@ fn pieces_that_do_not_go_together_are_no_map() {
         assert!(refused.to_string().contains(name), "{refused}");
         assert!(disk.files().into_keys().all(|file| !file.starts_with(path("joined"))));
     }
-    assert!(join(&disk, &[]).unwrap_err().to_string().starts_with("pieces: "));
+    assert!(join(&disk, &[]).unwrap_err().to_string().starts_with("shards: "));
 }

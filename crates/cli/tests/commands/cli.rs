@@ -519,7 +519,7 @@ fn share_runs_the_program_next_to_this_one_or_explains_its_installation() {
         let printed = String::from_utf8_lossy(&helped.stdout).into_owned();
         assert!(helped.status.success() && helped.stderr.is_empty(), "{help:?}");
         for word in
-            ["--publish", "--subscribe", "cargo install --locked --path crates/share-node", "not here"]
+            ["--publish", "--subscribe", "cargo install --locked --path crates/share-node", "was not found"]
         {
             assert!(printed.contains(word), "{help:?}: {printed}");
         }

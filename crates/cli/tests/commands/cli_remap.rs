@@ -272,7 +272,10 @@ fn an_invalid_tolerance_is_refused() {
     for tolerance in ["nan", "-1", "inf", "-inf", "1e300"] {
         let option = format!("--pose-tolerance={tolerance}");
         let message = fails(&["remap", &kept.map, "--poses", &poses, &option], 2);
-        assert!(message.contains("--pose-tolerance") && message.contains("no time in seconds"), "{message}");
+        assert!(
+            message.contains("--pose-tolerance") && message.contains("is not a time in seconds"),
+            "{message}"
+        );
     }
 }
 

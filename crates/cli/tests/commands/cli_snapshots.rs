@@ -80,11 +80,11 @@ fn wrong_snapshot_names_are_reported() {
         (&["revert", map, "b"], "lists them"),
         (&["digest", &past], "has no snapshot none"),
         (&["diff", map, "a", "b"], "has no snapshot b"),
-        (&["clear", &present, "--region", "0", "0", "0", "1", "1", "1"], "can be read and not changed"),
-        (&["decay", &present, "--halflife", "10"], "can be read and not changed"),
-        (&["verify", &present], "can be read and not changed"),
-        (&["convert", map, "-o", &present, "--storage", "compact"], "can be read and not changed"),
-        (&["build", text(&scans), "-o", &present], "can be read and not changed"),
+        (&["clear", &present, "--region", "0", "0", "0", "1", "1", "1"], "is a snapshot, which is read-only"),
+        (&["decay", &present, "--halflife", "10"], "is a snapshot, which is read-only"),
+        (&["verify", &present], "is a snapshot, which is read-only"),
+        (&["convert", map, "-o", &present, "--storage", "compact"], "is a snapshot, which is read-only"),
+        (&["build", text(&scans), "-o", &present], "is a snapshot, which is read-only"),
     ] {
         let (code, printed) = failure(arguments);
         assert_eq!(code, 2, "{arguments:?}: {printed}");

@@ -174,7 +174,7 @@ fn an_input_of_an_earlier_version_resumes() {
     drop(mapper);
     let (map, whole) = (text(&map), text(&whole));
     let (code, stderr) = failure(&["build", text(&a), "-o", map, "--append"]);
-    assert!(code == 2 && stderr.contains("the map has 4 scans"), "{stderr}");
+    assert!(code == 2 && stderr.contains("the map already has 4 scans"), "{stderr}");
     let resumed = json(&["build", text(&a), "-o", map, "--resume", "--json"]);
     assert_eq!((&resumed["scans"], &resumed["resumed_after"]), (&2.into(), &4.into()));
     output(&["build", text(&a), "-o", whole]);

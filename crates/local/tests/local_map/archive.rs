@@ -11,7 +11,7 @@ fn config() -> MapConfig {
 }
 
 #[test]
-fn one_call_feeds_both_and_each_is_as_if_alone() {
+fn one_call_updates_both_maps_as_separate_calls_would() {
     let random = &mut Random(21);
     let parameters = at_once(LocalParameters::local_mapping().with_max_voxels(700));
     let archive = InMemoryMapper::new(config()).unwrap();
@@ -26,8 +26,8 @@ fn one_call_feeds_both_and_each_is_as_if_alone() {
         local.insert_scan(&scan);
     }
     assert_eq!(both.archive().digest().unwrap(), archive.digest().unwrap());
-    assert_equal(both.local(), &local, "beside an archive");
-    // What one refuses, none takes.
+    assert_equal(both.local(), &local, "with an archive");
+    // A scan refused by one map changes neither.
     assert!(both.insert_scan(&scan([f64::NAN; 3], &[])).is_err());
     assert_eq!(both.archive().digest().unwrap(), archive.digest().unwrap());
     assert_equal(both.local(), &local, "after an error");
@@ -35,7 +35,7 @@ fn one_call_feeds_both_and_each_is_as_if_alone() {
 }
 
 #[test]
-fn the_archive_tells_free_from_unknown() {
+fn the_archive_distinguishes_free_from_unknown() {
     let parameters = at_once(LocalParameters::local_mapping().with_max_voxels(1));
     let archive = InMemoryMapper::new(config()).unwrap();
     let mut both = WithLocalMap::new(archive, LocalMap::new(0.1, parameters).unwrap()).unwrap();
@@ -48,13 +48,13 @@ fn the_archive_tells_free_from_unknown() {
     assert!(matches!(at([1.05, 0.05, 0.05]), LocalAnswer::Free(p) if p < 0.5));
     assert_eq!(at([1.05, 1.05, 0.05]), LocalAnswer::Unknown);
     assert_eq!(at([f64::NAN; 3]), LocalAnswer::Unknown);
-    // Forgotten by the local map, known to the archive.
+    // Removed from the local map, but still in the archive.
     assert_eq!(both.local().view().state_at([3.05, 0.05, 0.05]), LocalState::None);
     assert_eq!(at([3.05, 0.05, 0.05]), LocalAnswer::Occupied);
 }
 
 #[test]
-fn priming_takes_the_nearest_of_the_archive_as_older_than_what_was_seen() {
+fn priming_adds_the_nearest_archive_voxels_as_older_than_observed_ones() {
     let random = &mut Random(22);
     let mut archive = InMemoryMapper::new(config()).unwrap();
     for _ in 0..4 {
@@ -85,11 +85,11 @@ fn priming_takes_the_nearest_of_the_archive_as_older_than_what_was_seen() {
         assert_eq!(new, wanted.len());
         wanted.extend(&seen);
         assert!(map.history().map(|(voxel, _)| voxel).eq(wanted.iter().copied()));
-        // Inflation as if all had been seen.
+        // Inflation as if all voxels had been observed.
         let mut naive = ReferenceLocal::new(0.1, parameters);
         (naive.position, naive.history) = (position, map.history().collect());
         assert_equal(&map, &naive, "when primed");
-        // Again, nothing comes; and a scan goes on from there.
+        // Priming again adds nothing, and a later scan continues from the same state.
         assert_eq!(map.prime(&archive, position, 3.0).unwrap(), 0);
         let scan = crowded_scan(random, [0.0; 3], 40);
         map.insert_scan(&scan).unwrap();

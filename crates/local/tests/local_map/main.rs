@@ -1,4 +1,4 @@
-//! The local map against a naive one, after every update; what planners ask; archives beside it.
+//! Tests of the local map: against a naive reference after every update, its queries, and its use with archives.
 
 mod archive;
 mod mended;
@@ -12,7 +12,7 @@ use voxtile::Scan;
 use voxtile::space::Point;
 use voxtile_local::{LocalMap, LocalParameters};
 
-/// A scan as [`random_scan`] makes it, in a world of few voxels: rays often pass what others hit.
+/// A scan like that of [`random_scan`] in a world of few voxels, where rays often pass voxels that others hit.
 fn crowded_scan(random: &mut Random, center: Point, points: usize) -> Scan {
     let mut scan = random_scan(random, center, points);
     let wall: Vec<Point> = scan.points.iter().map(|p| [center[0] + 2.0, p[1], p[2]]).collect();
@@ -21,7 +21,7 @@ fn crowded_scan(random: &mut Random, center: Point, points: usize) -> Scan {
     scan
 }
 
-/// Parameters that do all their work at once, so that the map is settled after every update.
+/// Parameters without a work limit: the map is settled after every update.
 fn at_once(parameters: LocalParameters) -> LocalParameters {
     let mut parameters = parameters;
     parameters.work_per_update = usize::MAX;
@@ -32,7 +32,7 @@ fn scan(origin: Point, points: &[Point]) -> Scan {
     Scan { origin, points: points.to_vec(), intensities: None }
 }
 
-/// The map is the naive one: log-odds to the bit, history in order, occupied and inflated sets.
+/// Asserts that the map equals the naive one: log-odds bit for bit, history order, occupied and inflated sets.
 fn assert_equal(map: &LocalMap, naive: &ReferenceLocal, when: &str) {
     assert!(map.history().eq(naive.history.iter().copied()), "the histories differ {when}");
     let (states, expected) = (states_of(map.view()), naive.states());

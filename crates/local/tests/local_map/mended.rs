@@ -1,4 +1,4 @@
-//! What the paper's pseudo-code gets wrong, a test each.
+//! One test for each error in the paper's pseudo-code.
 
 use super::{at_once, scan};
 use voxtile::space::Point;
@@ -14,7 +14,7 @@ fn map(parameters: LocalParameters) -> LocalMap {
     LocalMap::new(0.1, parameters).unwrap()
 }
 
-/// Algorithm 1, line 4 ends the cloud at the first point that is too far.
+/// Algorithm 1, line 4 stops at the first point that is too far.
 #[test]
 fn a_point_that_is_too_far_is_skipped_alone() {
     let mut map = map(parameters().with_ranges(5.0, f64::INFINITY));
@@ -23,7 +23,7 @@ fn a_point_that_is_too_far_is_skipped_alone() {
     assert_eq!((report.beyond_input_range, report.new, map.stored_voxels()), (1, 2, 2));
 }
 
-/// Algorithm 1, lines 10 and 19 put every voxel with occupancy into the inflation map, though nothing inflates it.
+/// Algorithm 1, lines 10 and 19 put every voxel with occupancy into the inflation map, even if no voxel inflates it.
 #[test]
 fn a_voxel_is_inflated_only_if_an_occupied_one_inflates_it() {
     let mut unsure = parameters();
@@ -34,9 +34,9 @@ fn a_voxel_is_inflated_only_if_an_occupied_one_inflates_it() {
     assert_eq!(map.view().state_at([1.05, 0.05, 0.05]), LocalState::None);
 }
 
-/// Algorithm 1, lines 12 to 14 forget the initial probability where the voxel was inflated before.
+/// Algorithm 1, lines 12 to 14 ignore the initial probability if the voxel was inflated before.
 #[test]
-fn a_voxel_begins_with_the_initial_probability_inflated_or_not() {
+fn an_inflated_voxel_starts_with_the_initial_probability() {
     let mut likely = parameters();
     likely.initial_probability = 0.6;
     let mut map = map(likely);
@@ -64,8 +64,8 @@ fn misses_do_not_depend_on_the_order_of_the_points() {
     assert!(forward[0].1 < forward[1].1 && forward[1].1 < forward[2].1);
 }
 
-/// Algorithm 2, line 2 looks at voxels that changed in this step alone: what became occupied far away is not inflated
-/// when the robot comes near, and what was inflated stays so when it has gone.
+/// Algorithm 2, line 2 considers only voxels that changed in this step: voxels that became occupied out of range are
+/// not inflated when the robot approaches, and inflated voxels remain so after it has left.
 #[test]
 fn inflation_follows_the_robot() {
     let mut map = map(parameters().with_ranges(f64::INFINITY, 3.0));
@@ -77,25 +77,25 @@ fn inflation_follows_the_robot() {
     }
 }
 
-/// Algorithm 2, lines 8 to 10 count down what was never counted up.
+/// Algorithm 2, lines 8 to 10 decrement counts that were never incremented.
 #[test]
 fn counts_never_go_below_zero() {
     let mut map = map(parameters());
     let wall = [2.05, 0.05, 0.05];
-    // A voxel that is seen, then seen free before it ever inflated anything: it was out of range.
+    // The voxel is observed as occupied, then as free, but never inflated anything: it was out of range.
     map.set_parameters(parameters().with_ranges(f64::INFINITY, 0.5)).unwrap();
     map.insert_scan(&scan(ORIGIN, &[wall])).unwrap();
     map.insert_scan(&scan(ORIGIN, &[[4.05, 0.05, 0.05]; 8])).unwrap();
     assert_eq!(map.view().state_at(wall), LocalState::None);
-    // Its neighbor inflates its place, and is not taken for it.
+    // The neighbour's inflation of this voxel must remain.
     map.set_parameters(parameters()).unwrap();
     map.insert_scan(&scan(ORIGIN, &[[2.05, 0.15, 0.05]])).unwrap();
     assert_eq!(map.view().state_at(wall), LocalState::Inflated);
 }
 
-/// Algorithm 3, line 15 removes voxels from both maps, also those that others still inflate.
+/// Algorithm 3, line 15 removes voxels from both maps, even if other voxels still inflate them.
 #[test]
-fn what_becomes_free_stays_inflated_by_others() {
+fn freed_voxels_remain_inflated_by_others() {
     let mut map = map(parameters());
     map.insert_scan(&scan(ORIGIN, &[[2.05, 0.05, 0.05], [2.05, 0.15, 0.05]])).unwrap();
     let report = map.insert_scan(&scan(ORIGIN, &[[4.05, 0.05, 0.05]; 8])).unwrap();
@@ -104,9 +104,9 @@ fn what_becomes_free_stays_inflated_by_others() {
     assert_eq!(map.view().state_at([2.05, 0.15, 0.05]), LocalState::Occupied);
 }
 
-/// Algorithm 3, line 19 comes after the inflation: what the limit removes leaves its inflation behind for ever.
+/// Algorithm 3, line 19 runs after the inflation: the inflation of voxels removed by the limit is never removed.
 #[test]
-fn what_is_forgotten_takes_its_inflation_with_it() {
+fn removed_voxels_no_longer_inflate_others() {
     let mut map = map(parameters().with_max_voxels(1));
     map.insert_scan(&scan(ORIGIN, &[[1.05, 0.05, 0.05]])).unwrap();
     let report = map.insert_scan(&scan(ORIGIN, &[[0.05, 3.05, 0.05]])).unwrap();
@@ -115,10 +115,10 @@ fn what_is_forgotten_takes_its_inflation_with_it() {
     assert_eq!(map.view().state_at([0.05, 3.05, 0.05]), LocalState::Occupied);
 }
 
-/// Algorithm 3, lines 3 and 10 put occupied voxels alone into the history: those between occupied and free would never
-/// be removed, and line 9 would take them out of a history in which they are not.
+/// Algorithm 3, lines 3 and 10 add only occupied voxels to the history: those between occupied and free would never be
+/// removed, and line 9 would remove them from a history that does not contain them.
 #[test]
-fn voxels_that_are_neither_occupied_nor_free_count_and_are_forgotten() {
+fn undecided_voxels_count_towards_the_limit_and_are_removed() {
     let mut unsure = parameters().with_max_voxels(10);
     unsure.occupied_log_odds = 2.0;
     let mut map = map(unsure);

@@ -23,7 +23,7 @@ fn obstacles(states: &BTreeMap<VoxelIndex, LocalState>, obstacle: Obstacle) -> B
 }
 
 #[test]
-fn points_segments_bodies_and_windows_are_those_of_a_look_at_every_voxel() {
+fn queries_equal_a_search_over_all_voxels() {
     let random = &mut Random(3);
     let (map, grid) = (map(random), Grid::new(0.1, 6.4).unwrap());
     let (view, states) = (map.view(), states_of(map.view()));
@@ -96,7 +96,7 @@ fn points_segments_bodies_and_windows_are_those_of_a_look_at_every_voxel() {
 }
 
 #[test]
-fn questions_that_make_no_sense_are_refused_and_none_panics() {
+fn invalid_queries_return_errors_and_never_panic() {
     let view = map(&mut Random(4)).view().clone();
     let odd = [f64::NAN, f64::INFINITY, -1e300, 1e12, 2.1e8, 0.0];
     for &x in &odd {
@@ -121,7 +121,7 @@ fn questions_that_make_no_sense_are_refused_and_none_panics() {
 }
 
 #[test]
-fn scans_and_parameters_that_make_no_sense_leave_the_map_as_it_was() {
+fn invalid_scans_and_parameters_leave_the_map_unchanged() {
     let mut map = map(&mut Random(5));
     let (before, number) = (map.history().collect::<Vec<_>>(), map.view().update_number());
     for origin in [[f64::NAN; 3], [f64::INFINITY; 3], [2.147_483e8, 0.0, 0.0]] {

@@ -13,7 +13,7 @@ fn pick<T: Copy>(random: &mut Random, choices: &[T]) -> T {
     choices[random.below(choices.len() as u64) as usize]
 }
 
-/// One parameter, or several, become something else.
+/// Changes one or several parameters.
 fn change(random: &mut Random, p: &mut LocalParameters) {
     for _ in 0..1 + random.below(3) {
         match random.below(9) {
@@ -34,13 +34,13 @@ fn change(random: &mut Random, p: &mut LocalParameters) {
 }
 
 #[test]
-fn after_every_update_the_map_is_the_naive_one_with_parameters_that_change() {
+fn the_map_equals_the_naive_one_while_parameters_change() {
     for seed in 0..8 {
         let random = &mut Random(seed);
         let mut parameters = at_once(LocalParameters::local_mapping());
         let mut map = LocalMap::new(0.1, parameters).unwrap();
         let mut naive = ReferenceLocal::new(0.1, parameters);
-        // Across pages, and across zero.
+        // Moves across page borders and across zero.
         let mut center = random.point([0.0, -6.4, 6.4], 1.0);
         for update in 0..40 {
             if random.below(3) == 0 {
@@ -82,7 +82,7 @@ fn a_wide_ball_counts_beyond_255() {
 }
 
 #[test]
-fn with_a_work_limit_a_change_takes_several_updates_and_ends_as_it_would_at_once() {
+fn a_change_with_a_work_limit_takes_several_updates_and_gives_the_same_map() {
     for seed in 0..6 {
         let random = &mut Random(100 + seed);
         let mut parameters = LocalParameters::passive_perception().with_max_voxels(None);
@@ -100,7 +100,7 @@ fn with_a_work_limit_a_change_takes_several_updates_and_ends_as_it_would_at_once
         for update in 0.. {
             assert!(update < 2000, "the change never ends");
             if update == 3 || (update == 6 && seed % 2 == 0) {
-                // A change while another is under way, too.
+                // Also changes parameters while another change is being applied.
                 change(random, &mut parameters);
                 (parameters.inflation_radius_m, parameters.inflation_range_m) =
                     if update == 3 { (0.1, 3.0) } else { (0.3, f64::INFINITY) };
@@ -108,12 +108,15 @@ fn with_a_work_limit_a_change_takes_several_updates_and_ends_as_it_would_at_once
                 naive.parameters = parameters;
                 changed_at = update;
             }
-            // No new evidence: what is left to do is the change alone.
+            // No new evidence: only the parameter change is left to apply.
             let report = map.insert_scan(&super::scan([0.0; 3], &[])).unwrap();
             naive.insert_scan(&super::scan([0.0; 3], &[]));
-            // Twice a node's voxels come on top at most: a node is done as a whole.
+            // A node is processed as a whole, so the limit can be exceeded by twice the voxels of a node.
             assert!(report.inflation_changes < 2000, "{} changes", report.inflation_changes);
-            assert!(changed_at < 3 || update > changed_at + 1 || !report.is_settled, "no limit is seen");
+            assert!(
+                changed_at < 3 || update > changed_at + 1 || !report.is_settled,
+                "the work limit has no effect"
+            );
             let _ = before;
             if changed_at >= 3 && report.is_settled && update > 6 {
                 break;
@@ -124,7 +127,7 @@ fn with_a_work_limit_a_change_takes_several_updates_and_ends_as_it_would_at_once
 }
 
 #[test]
-fn while_the_radius_changes_every_voxel_has_the_old_one_or_the_new_one() {
+fn every_voxel_has_the_old_or_the_new_radius_during_a_change() {
     let random = &mut Random(77);
     let mut parameters = LocalParameters::passive_perception().with_max_voxels(None);
     parameters.work_per_update = 60;
@@ -153,11 +156,11 @@ fn while_the_radius_changes_every_voxel_has_the_old_one_or_the_new_one() {
 }
 
 #[test]
-fn what_comes_back_inflates_as_it_did_at_first() {
+fn removed_voxels_inflate_again_when_they_return() {
     let parameters = at_once(LocalParameters::passive_perception().with_max_voxels(Some(1)));
     let mut map = LocalMap::new(0.1, parameters).unwrap();
     let mut naive = ReferenceLocal::new(0.1, parameters);
-    // The first inflates across a border of nodes; what the second leaves of it is removed.
+    // The first point inflates across a border of nodes; the second removes what is left of it.
     for (update, point) in [[1.65, 0.85, 0.85], [30.05, 0.85, 0.85]].into_iter().cycle().take(6).enumerate() {
         map.insert_relayed([0.0; 3], &[point]).unwrap();
         naive.update([0.0; 3], &[point], false);
@@ -185,7 +188,7 @@ fn real_scans_give_the_naive_map() {
 }
 
 #[test]
-fn rays_along_borders_edges_and_corners_pass_the_voxels_of_the_walk() {
+fn rays_along_borders_edges_and_corners_equal_the_walk() {
     for seed in 0..60 {
         let random = &mut Random(1000 + seed);
         let parameters = at_once(LocalParameters::passive_perception().with_inflation_radius(0.0));

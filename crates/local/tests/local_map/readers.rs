@@ -6,7 +6,7 @@ use testkit::reference_local::states_of;
 use voxtile_local::{LocalMap, LocalParameters, LocalState};
 
 #[test]
-fn changes_lead_from_one_look_to_the_next() {
+fn changes_lead_from_one_view_to_the_next() {
     let random = &mut Random(8);
     let mut map = LocalMap::new(
         0.1,
@@ -38,9 +38,9 @@ fn changes_lead_from_one_look_to_the_next() {
 }
 
 #[test]
-fn readers_see_whole_updates_while_the_writer_goes_on() {
+fn readers_see_complete_updates_during_writes() {
     let random = &mut Random(9);
-    // All is in the range of inflation, so that every occupied voxel is inflated.
+    // Everything is in the inflation range, so that every occupied voxel is inflated.
     let mut map =
         LocalMap::new(0.1, at_once(LocalParameters::passive_perception().with_max_voxels(2000))).unwrap();
     let is_done = AtomicBool::new(false);
@@ -55,7 +55,8 @@ fn readers_see_whole_updates_while_the_writer_goes_on() {
                     assert!(view.update_number() >= last);
                     last = view.update_number();
                     views += 1;
-                    // Half an update would show in the counts, which are those of the whole.
+                    // A partial update would show as a difference from the counts, which are those of the complete
+                    // update.
                     let states = states_of(&view);
                     let occupied = states.values().filter(|state| **state == LocalState::Occupied).count();
                     assert_eq!(occupied, view.occupied_voxels());
@@ -71,7 +72,7 @@ fn readers_see_whole_updates_while_the_writer_goes_on() {
 }
 
 #[test]
-fn a_view_stays_as_it_is() {
+fn a_view_never_changes() {
     let random = &mut Random(10);
     let mut map = LocalMap::new(0.1, at_once(LocalParameters::local_mapping())).unwrap();
     map.insert_scan(&crowded_scan(random, [0.0; 3], 80)).unwrap();
