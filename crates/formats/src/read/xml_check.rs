@@ -131,6 +131,6 @@ mod tests {
         }
         let spaces = |count: usize| (0..count).map(|k| format!("<a xmlns:b{k}='c'/>")).collect::<String>();
         assert!(check(&spaces(1000)).is_ok());
-        assert!(check(&spaces(1001)).unwrap_err().contains("1000 declarations"));
+        assert!(check(&spaces(1001)).unwrap_err().contains("1000 namespace declarations"));
     }
 }

@@ -300,7 +300,7 @@ fn columns_of_raw_numbers_are_checked_and_reported() {
     .unwrap();
     let (error, points) = failure(&path, &ReadOptions::default());
     assert!(
-        error.contains("repeat every 7 of float32, not every 4") && error.contains("--fields x,y,z"),
+        error.contains("repeat every 7 of float32, not every 4") && error.contains("`fields` x,y,z"),
         "{error}"
     );
     assert_eq!(points, 0);

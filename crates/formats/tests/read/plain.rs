@@ -91,7 +91,7 @@ fn five_columns_are_not_read_as_four() {
     let wall = |k: f32| [8.25, 0.1 * k - 3.0, 0.03 * k];
     fs::write(&path, raw_floats(400, |k| [&wall(k)[..], &[k % 97.0, k % 32.0]].concat())).unwrap();
     let (error, points) = failure(&path, &ReadOptions::default());
-    assert!(error.contains("`--fields x,y,z,intensity,ring` or") && error.contains("0.bin"), "{error}");
+    assert!(error.contains("`fields` x,y,z,intensity,ring or") && error.contains("0.bin"), "{error}");
     assert_eq!(points, 0);
     let five = ["x", "y", "z", "intensity", "ring"].map(str::to_owned).to_vec();
     let (_, points) = clouds_with(&path, &ReadOptions { fields: Some(five), ..Default::default() }).remove(0);
