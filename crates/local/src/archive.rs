@@ -65,7 +65,7 @@ impl LocalMap {
         }
         let found = self.occupied_around(archive, position, radius_m)?;
         self.position = Some(position);
-        self.take_over_parameters(&mut LocalReport::default());
+        self.apply_parameters(&mut LocalReport::default());
         let mut new = 0;
         for (_, voxel, log_odds) in found {
             if self.voxels.len() >= self.applied.max_voxels.unwrap_or(MAX_NUMBERED).min(MAX_NUMBERED) {
