@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
-# Fuzzes the readers of every file format, one after the other, with stable Rust.
+# Fuzzes the readers of all file formats, one after the other, with stable Rust.
 #
-#   fuzz/run.sh [SECONDS_PER_TARGET] [TARGET...]    60 seconds and all targets, if nothing else is said
-#   fuzz/run.sh minimize [TARGET...]                adds to fuzz/corpus what reaches code that nothing there reaches
+#   fuzz/run.sh [SECONDS_PER_TARGET] [TARGET...]    default: 60 seconds, all targets
+#   fuzz/run.sh minimize [TARGET...]                adds inputs to fuzz/corpus that reach code not reached before
 #
-# One line a target. A finding leaves its input under fuzz/artifacts, and the exit status is 1. What a run learns is
-# kept in fuzz/target/corpus for the next.
+# Prints one line per target. A finding writes its input to fuzz/artifacts and makes the exit status 1. The inputs that
+# a run discovers are kept in fuzz/target/corpus for the next run.
 set -euo pipefail
 cd "$(dirname "$0")"
 
@@ -19,7 +19,7 @@ if [[ $# == 0 ]]; then
     for file in src/bin/*.rs; do targets+=("$(basename "$file" .rs)"); done
 fi
 
-# With a target named, cargo instruments no build script and no procedural macro.
+# With an explicit target triple, cargo does not instrument build scripts and procedural macros.
 triple=$(rustc -vV | sed -n 's/^host: //p')
 bins=()
 for target in "${targets[@]}"; do bins+=(--bin "$target"); done
@@ -28,7 +28,7 @@ RUSTFLAGS="-Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 \
 -Cllvm-args=-sanitizer-coverage-trace-compares --cfg fuzzing" \
     cargo build --release --locked --target "$triple" "${bins[@]}"
 
-# Keeps all that has a name in the corpus (seeds and findings), and few and small files besides.
+# Keeps all named inputs of the corpus (seeds and findings), and adds few and small files.
 minimize() {
     local target=$1 program=$2 kept
     kept=target/minimized
@@ -37,7 +37,7 @@ minimize() {
     find "corpus/$target" -name '*-*' -exec cp {} "$kept" \;
     "$program" -set_cover_merge=1 -use_counters=0 -max_len=1024 -rss_limit_mb=1024 -timeout=10 \
         "$kept" "corpus/$target" "target/corpus/$target" >"target/$target.log" 2>&1
-    # The files that reach most come first, each named by 40 digits.
+    # The files with the most coverage are listed first, each named by 40 digits.
     ls -tr "$kept" | { grep -v -e - || true; } | tail -n +49 | while read -r file; do rm "$kept/$file"; done
     rm -r "corpus/$target"
     mv "$kept" "corpus/$target"
@@ -50,7 +50,7 @@ fuzz() {
     "$program" -max_total_time="$seconds" -max_len=65536 -timeout=10 -rss_limit_mb=1024 \
         -artifact_prefix="artifacts/$target/" "${dictionary[@]}" \
         "target/corpus/$target" "corpus/$target" >"target/$target.log" 2>&1 || outcome="FINDING (exit status $?), see target/$target.log"
-    # The program leaves its numbers in the last line that has them, and its runs as `#N`.
+    # The last line with numbers has the totals; runs are printed as `#N`.
     awk -v target="$target" -v outcome="$outcome" '
         /^#[0-9]+/ { runs = substr($1, 2) }
         /cov: / { for (i = 1; i < NF; i++) if ($i == "cov:") edges = $(i + 1) }
@@ -60,7 +60,7 @@ fuzz() {
     [[ -z $outcome ]]
 }
 
-# Readers that take paths get their files here: in memory, where that is possible.
+# Readers that take paths read their files in memory, where possible.
 TMPDIR=$(mktemp -d -p /dev/shm 2>/dev/null || mktemp -d)
 export TMPDIR
 trap 'rm -rf "$TMPDIR"' EXIT

@@ -4,12 +4,12 @@
 #
 #   python/check.sh [--short] [PYTEST ARGUMENTS]
 #
-# --short leaves out clusters of Dask, the notebooks and pyright, whose three minutes guard what seldom changes, and takes
-# the module that `cargo build --workspace --features voxtile-python/extension-module` has made, from VOXTILE_BIN: a
-# wheel has other features, with which half of the dependencies would compile once more.
+# --short skips Dask clusters, the notebooks and pyright, which take three minutes and rarely fail. It uses the module
+# in VOXTILE_BIN that `cargo build --workspace --features voxtile-python/extension-module` has built, because a wheel
+# with other features would recompile half of the dependencies.
 #
-# Needs python3 with venv, and the network for maturin, pytest, mypy and the like. The build is that of the tests, which
-# is made in a few minutes; `maturin build --release` makes the wheel to hand out.
+# Needs python3 with venv, and the network for maturin, pytest, mypy and others. The module is a development build,
+# which takes a few minutes; `maturin build --release` builds a wheel for distribution.
 set -euo pipefail
 cd "$(dirname "$0")"
 short=
@@ -22,11 +22,11 @@ install() { "$python" -m pip install --quiet --disable-pip-version-check "$@"; }
 install dask distributed matplotlib mypy pytest
 left_out=()
 if [[ $short ]]; then
-    for file in dask dask_jobs dask_pieces notebooks; do left_out+=("--ignore=tests/test_$file.py"); done
+    for file in dask dask_jobs dask_shards notebooks; do left_out+=("--ignore=tests/test_$file.py"); done
 else
     install ipykernel nbclient pyright
 fi
-install --only-binary :all: pyoctomap || echo "skipped: pyoctomap, which has no wheel for this Python"
+install --only-binary :all: pyoctomap || echo "skipped: pyoctomap has no wheel for this version of Python"
 if [[ $short ]]; then
     module=$(realpath "${VOXTILE_BIN:-../target/debug}")/lib_voxtile.so
     package=$("$python" -c 'import sysconfig; print(sysconfig.get_path("platlib"))')/voxtile
@@ -38,12 +38,12 @@ if [[ $short ]]; then
 else
     CARGO_PROFILE_DEV_OPT_LEVEL=1 MATURIN_PEP517_ARGS="--profile dev --locked" install .
 fi
-# Beside the sources, Python would find the package without its module.
+# Next to the sources, Python would import the package without its module.
 cp -r tests "$work/tests"
 cp -r examples "$work/examples"
 mkdir "$work/docs"
 cp ../docs/python.md ../docs/python_recorded.md "$work/docs"
-# Tests run elsewhere, where a relative path leads nowhere.
+# Tests run in another folder, so the path must be absolute.
 VOXTILE_DATA=$(realpath -m "${VOXTILE_DATA:-../../shared/data}")
 export VOXTILE_DATA
 mkdir "$work/python"
@@ -52,13 +52,13 @@ cd "$work/python"
 "$python" -m pytest --quiet tests "${left_out[@]}" "$@"
 "$python" -m mypy --strict --package voxtile
 "$python" -m mypy.stubtest voxtile
-# It gets its program from npm.
+# Pyright downloads its program from npm.
 if [[ $short ]]; then
-    echo "left out: pyright"
+    echo "skipped: pyright"
 elif "$python" -m pyright --version >/dev/null 2>&1; then
     "$python" -m pyright --pythonpath "$python" "$("$python" -c 'import os, voxtile; print(os.path.dirname(voxtile.__file__))')"
 else
-    echo "skipped: pyright, whose program is not to be had"
+    echo "skipped: pyright, whose program cannot be downloaded"
 fi
 "$python" -c '
 import pathlib, subprocess, sys, voxtile

@@ -1,8 +1,8 @@
-"""voxtile and `pyoctomap` on the same made-up clouds: seconds of processor time, medians of alternating runs.
+"""Benchmark of voxtile and `pyoctomap` on the same synthetic clouds: CPU seconds, medians of alternating runs.
 
     python benchmarks/beside_pyoctomap.py [RUNS]
 
-Needs `pip install pyoctomap`. Each run is a process of its own, so that its memory is its own.
+Needs `pip install pyoctomap`. Each run is a separate process, to measure its memory.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ SCANS, POINTS, QUESTIONS, RAYS = 20, 20_000, 200_000, 5_000
 
 
 def scan(number: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Points on the walls of a hall of 30 x 20 x 6 m, and the sensor, in the world's frame."""
+    """Returns points on the walls of a hall of 30 x 20 x 6 m, and the sensor position, in the world's frame."""
     random = np.random.default_rng(number)
     sensor = np.array([3.0 + number, 10.0, 1.5])
     directions = random.normal(size=(POINTS, 3))

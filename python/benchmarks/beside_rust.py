@@ -1,10 +1,11 @@
-"""The same scans and questions from Python and from Rust: seconds of processor time, medians of alternating runs.
+"""Benchmark of the same inserts and queries from Python and from Rust: CPU seconds, medians of alternating runs.
 
     cargo build --release -p peers --bin asked_from_rust
+
     python benchmarks/beside_rust.py ../target/release/asked_from_rust [RUNS]
 
-Each run is a process of its own, with a map of its own. On a noisy machine the ratio of the least times tells more than
-that of the medians. Needs the package as `maturin build --release` makes it.
+Each run is a separate process with a new map. On a noisy machine compare the minimum times rather than the medians.
+Needs the package as `maturin build --release` builds it.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ SCANS = 60
 
 
 def write(path: Path) -> None:
-    """The work for the program in Rust."""
+    """Writes the inputs for the Rust program."""
     with path.open("wb") as file:
         file.write(struct.pack("<Q", SCANS))
         for number in range(SCANS):

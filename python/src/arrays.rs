@@ -1,4 +1,4 @@
-//! numpy arrays in and out.
+//! Conversion between numpy arrays and Rust slices.
 
 use crate::errors::wrong;
 use numpy::{Element, IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
@@ -7,7 +7,7 @@ use pyo3::sync::PyOnceLock;
 use pyo3::types::PyDict;
 use voxtile::Point;
 
-/// Points in the precision that they came in.
+/// Points in the precision of the input array.
 pub enum Points<'py> {
     /// Single precision.
     F32(PyReadonlyArray2<'py, f32>),
@@ -15,7 +15,7 @@ pub enum Points<'py> {
     F64(PyReadonlyArray2<'py, f64>),
 }
 
-/// Points that are borrowed from an array.
+/// Points borrowed from an array.
 #[derive(Clone, Copy)]
 pub enum PointSlice<'a> {
     /// Single precision.
@@ -25,7 +25,7 @@ pub enum PointSlice<'a> {
 }
 
 impl<'py> Points<'py> {
-    /// An array of N x 3. One of `float32` or `float64` in C order is used where it lies; any other is copied.
+    /// Takes an array of N x 3. Borrows `float32` and `float64` in C order; copies any other array.
     pub fn of(argument: &str, points: &Bound<'py, PyAny>) -> PyResult<Self> {
         let (array, is_single) = numbers(argument, points, true)?;
         let shape: Vec<usize> = array.getattr("shape")?.extract()?;
@@ -41,7 +41,7 @@ impl<'py> Points<'py> {
         Ok(if is_single { Self::F32(array.extract()?) } else { Self::F64(array.extract()?) })
     }
 
-    /// The points where they lie.
+    /// The points, without a copy.
     pub fn slice(&self) -> PyResult<PointSlice<'_>> {
         Ok(match self {
             Self::F32(array) => PointSlice::F32(array.as_slice()?.as_chunks().0),
@@ -59,7 +59,7 @@ impl PointSlice<'_> {
         }
     }
 
-    /// Calls `take` with the points in double precision, so many at a time.
+    /// Calls `take` with at most `most` points at a time, in double precision.
     pub fn in_chunks<E>(
         &self,
         most: usize,
@@ -78,7 +78,7 @@ impl PointSlice<'_> {
         }
     }
 
-    /// A copy in double precision.
+    /// Returns a copy in double precision.
     pub fn to_vec(self) -> Vec<Point> {
         match self {
             Self::F32(points) => points.iter().map(|point| point.map(f64::from)).collect(),
@@ -87,7 +87,7 @@ impl PointSlice<'_> {
     }
 }
 
-/// A list of single-precision numbers, one a point.
+/// Takes an array of single-precision numbers, one per point.
 pub fn singles<'py>(argument: &str, values: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArray1<'py, f32>> {
     let py = values.py();
     let (array, _) = numbers(argument, values, true)?;
@@ -99,7 +99,7 @@ pub fn singles<'py>(argument: &str, values: &Bound<'py, PyAny>) -> PyResult<PyRe
     }
 }
 
-/// Numbers of any shape in double precision: the shape, and the numbers in C order.
+/// Returns the shape of an array and its numbers in C order, in double precision.
 pub fn doubles(argument: &str, values: &Bound<'_, PyAny>) -> PyResult<(Vec<usize>, Vec<f64>)> {
     let (array, _) = numbers(argument, values, false)?;
     let shape = array.getattr("shape")?.extract()?;
@@ -107,15 +107,15 @@ pub fn doubles(argument: &str, values: &Bound<'_, PyAny>) -> PyResult<(Vec<usize
     Ok((shape, flat.as_slice()?.to_vec()))
 }
 
-/// An array in C order, aligned, in native bytes, and whether it is of single precision, which stays if it may. What is
-/// masked becomes NaN.
+/// Returns an aligned array in C order and native byte order, and whether it has single precision. Single precision is
+/// kept if `may_be_single` is set. Masked elements become NaN.
 fn numbers<'py>(
     argument: &str,
     values: &Bound<'py, PyAny>,
     may_be_single: bool,
 ) -> PyResult<(Bound<'py, PyAny>, bool)> {
     let py = values.py();
-    let no_array = |error: PyErr| wrong(py, argument, format!("is no array of numbers: {error}"));
+    let no_array = |error: PyErr| wrong(py, argument, format!("is not an array of numbers: {error}"));
     let numpy = numpy(py)?;
     let masked = numpy.getattr("ma")?.getattr("MaskedArray")?;
     let array = numpy.call_method1("asanyarray", (values,)).map_err(no_array)?;
@@ -140,13 +140,13 @@ fn required<'py>(array: &Bound<'py, PyAny>, dtype: &str) -> PyResult<Bound<'py, 
     numpy(array.py())?.call_method1("require", (array, dtype, ["C_CONTIGUOUS", "ALIGNED", "ENSUREARRAY"]))
 }
 
-/// The module numpy.
+/// Returns the module numpy.
 pub fn numpy(py: Python<'_>) -> PyResult<&Bound<'_, PyAny>> {
     static NUMPY: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
     Ok(NUMPY.get_or_try_init(py, || PyResult::Ok(py.import("numpy")?.into_any().unbind()))?.bind(py))
 }
 
-/// A list as an array of one row each.
+/// Converts a list of rows to an array.
 pub fn rows<T: Element, const N: usize>(
     py: Python<'_>,
     rows: Vec<[T; N]>,
@@ -155,12 +155,12 @@ pub fn rows<T: Element, const N: usize>(
     rows.into_flattened().into_pyarray(py).reshape([count, N])
 }
 
-/// A list as an array.
+/// Converts a list to an array.
 pub fn column<T: Element>(py: Python<'_>, values: Vec<T>) -> Bound<'_, PyArray1<T>> {
     values.into_pyarray(py)
 }
 
-/// What serde makes of a value, as objects of Python.
+/// Converts a serializable value to Python objects.
 pub fn object<'py>(py: Python<'py>, value: &impl serde::Serialize) -> PyResult<Bound<'py, PyAny>> {
     let text = serde_json::to_string(value)
         .map_err(|error| pyo3::exceptions::PyRuntimeError::new_err(error.to_string()))?;

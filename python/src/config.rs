@@ -1,4 +1,4 @@
-//! How a map is made, from keyword arguments.
+//! Configurations of maps from keyword arguments.
 
 use crate::errors::{exception, wrong};
 use bytesize::ByteSize;
@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 use voxtile::sensor::{Iwlo, LogOdds};
 use voxtile::{InsertMode, MapConfig, MemoryLimit, SensorModel, Storage};
 
-/// What [`config_of`] makes a configuration of.
+/// Arguments of [`config_of`].
 pub struct ConfigArguments<'a, 'py> {
     pub resolution: f64,
     pub tile_size: f64,
@@ -21,7 +21,7 @@ pub struct ConfigArguments<'a, 'py> {
     pub keep_scans: bool,
 }
 
-/// The configuration of a new map.
+/// Returns the configuration of a new map.
 pub fn config_of(py: Python<'_>, arguments: &ConfigArguments<'_, '_>) -> PyResult<MapConfig> {
     let raised = |error: voxtile::Error| exception(py, &error);
     let insert_mode = match arguments.insert_mode {
@@ -38,7 +38,7 @@ pub fn config_of(py: Python<'_>, arguments: &ConfigArguments<'_, '_>) -> PyResul
         }
         ("iwlo", None) => SensorModel::Iwlo(Iwlo::default()),
         ("iwlo", Some(_)) => {
-            return Err(wrong(py, "probabilities", "are of the sensor model 'log-odds' alone"));
+            return Err(wrong(py, "probabilities", "only the sensor model 'log-odds' has them"));
         }
         (other, _) => {
             return Err(wrong(py, "sensor_model", format!("{other:?} is neither 'log-odds' nor 'iwlo'")));
@@ -56,12 +56,12 @@ pub fn config_of(py: Python<'_>, arguments: &ConfigArguments<'_, '_>) -> PyResul
     config.validated().map_err(raised)
 }
 
-/// A limit of memory, or the default.
+/// Returns the memory limit, or the default.
 pub fn memory_of(memory: Option<&Bound<'_, PyAny>>) -> PyResult<MemoryLimit> {
     Ok(memory.map(bytes_of).transpose()?.map_or(MemoryLimit::Default, MemoryLimit::Bytes))
 }
 
-/// The storage of a new map, by its name.
+/// Returns the storage with this name.
 pub fn storage_of(py: Python<'_>, storage: &str) -> PyResult<Storage> {
     match storage {
         "octomap" => Ok(Storage::OctoMap),
@@ -70,14 +70,19 @@ pub fn storage_of(py: Python<'_>, storage: &str) -> PyResult<Storage> {
     }
 }
 
-/// Bytes of memory: a number, or a text such as `"512MiB"`.
+/// Parses bytes of memory: a number, or a text such as `"512MiB"`.
 pub fn bytes_of(memory: &Bound<'_, PyAny>) -> PyResult<usize> {
     let py = memory.py();
     if let Ok(bytes) = memory.extract::<usize>() {
         return Ok(bytes);
     }
-    let no_bytes =
-        || wrong(py, "memory", format!("{memory:?} is no number of bytes; give one, or a text as '512MiB'"));
+    let no_bytes = || {
+        wrong(
+            py,
+            "memory",
+            format!("{memory:?} is not a number of bytes; pass a number, or text as '512MiB'"),
+        )
+    };
     let text: String = memory.extract().map_err(|_| no_bytes())?;
     let size: ByteSize = text.parse().map_err(|_| no_bytes())?;
     usize::try_from(size.as_u64()).map_err(|_| no_bytes())

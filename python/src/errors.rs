@@ -1,16 +1,16 @@
-//! voxtile's errors as exceptions: one class for each remedy, in `voxtile.errors`.
+//! Conversion of voxtile's errors to the exceptions of `voxtile.errors`.
 
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::PyDict;
 use voxtile::Error;
 
-/// The exception of an error, with path, tile and offset as attributes.
+/// Returns the exception of an error, with path, tile and offset as attributes.
 pub fn exception(py: Python<'_>, error: &Error) -> PyErr {
     with_details(py, Some(error), format!("{error:#}"))
 }
 
-/// The exception of a build or an export that failed, with what it was about.
+/// Returns the exception of a failed build or export, with the same attributes.
 pub fn exception_of_any(py: Python<'_>, error: &anyhow::Error) -> PyErr {
     with_details(py, error.downcast_ref(), format!("{error:#}"))
 }
@@ -36,12 +36,12 @@ fn with_details(py: Python<'_>, error: Option<&Error>, message: String) -> PyErr
         .unwrap_or_else(|error| error)
 }
 
-/// The exception of a kind that only Python knows: `closed`, `read_only`.
+/// Returns the exception of a kind that exists only in Python: `closed`, `read_only`.
 pub fn exception_of_kind(py: Python<'_>, kind: &str, message: &str) -> PyErr {
     raised(py, kind, message.to_owned(), &PyDict::new(py)).unwrap_or_else(|error| error)
 }
 
-/// A wrong argument.
+/// Returns the exception of a wrong argument.
 pub fn wrong(py: Python<'_>, argument: &str, reason: impl Into<String>) -> PyErr {
     exception(py, &Error::argument(argument, reason))
 }

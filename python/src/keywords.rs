@@ -1,4 +1,4 @@
-//! Keyword arguments, taken one by one as what they are.
+//! Typed access to keyword arguments.
 
 use crate::arrays::doubles;
 use crate::config::bytes_of;
@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::PathBuf;
 
-/// What was passed, and what could have been. `None` is as if it had not been passed.
+/// Keyword arguments that are left to take, and the names taken so far. A value of `None` counts as not passed.
 pub struct Keywords<'py> {
     left: Bound<'py, PyDict>,
     known: Vec<&'static str>,
@@ -26,29 +26,29 @@ impl<'py> Keywords<'py> {
         if value.is_none() {
             return Ok(None);
         }
-        // One number or truth value of NumPy is one of Python.
+        // Converts a scalar of NumPy to a number of Python.
         let is_of_numpy = value.hasattr("dtype")? && value.getattr("ndim")?.extract::<usize>()? == 0;
         Ok(Some(if is_of_numpy { value.call_method0("item")? } else { value }))
     }
 
-    /// A value of a type that `what` describes.
+    /// Takes a value of the type that `what` describes.
     fn of_type<T: FromPyObjectOwned<'py>>(&mut self, name: &'static str, what: &str) -> PyResult<Option<T>> {
         let Some(value) = self.value(name)? else { return Ok(None) };
         let not_one = |_| wrong(value.py(), name, format!("{value:?} is not {what}"));
         value.extract::<T>().map(Some).map_err(|error| not_one(error.into()))
     }
 
-    /// A number in the unit that the option says.
+    /// Takes a number.
     pub fn number(&mut self, name: &'static str) -> PyResult<Option<f64>> {
         self.of_type(name, "a number")
     }
 
-    /// A count.
+    /// Takes a count.
     pub fn count(&mut self, name: &'static str) -> PyResult<Option<u64>> {
         self.of_type(name, "a whole number from 0")
     }
 
-    /// A truth value; false if it is left out.
+    /// Takes a truth value; false if it was not passed.
     pub fn flag(&mut self, name: &'static str) -> PyResult<bool> {
         Ok(self.of_type(name, "True or False")?.unwrap_or(false))
     }
@@ -61,28 +61,28 @@ impl<'py> Keywords<'py> {
         self.of_type(name, "a path")
     }
 
-    /// Texts: a list, or one with commas between.
+    /// Takes a list of texts, or one text separated by commas.
     pub fn texts(&mut self, name: &'static str) -> PyResult<Option<Vec<String>>> {
         let Some(value) = self.value(name)? else { return Ok(None) };
         if let Ok(text) = value.extract::<String>() {
             return Ok(Some(text.split(',').map(str::to_owned).collect()));
         }
         let texts = value.extract::<Vec<String>>();
-        texts.map(Some).map_err(|_| wrong(value.py(), name, format!("{value:?} is no list of texts")))
+        texts.map(Some).map_err(|_| wrong(value.py(), name, format!("{value:?} is not a list of texts")))
     }
 
-    /// Numbers of any shape, row by row.
+    /// Takes numbers of any shape, row by row.
     pub fn numbers(&mut self, name: &'static str) -> PyResult<Option<Vec<f64>>> {
         let Some(value) = self.value(name)? else { return Ok(None) };
         Ok(Some(doubles(name, &value)?.1))
     }
 
-    /// Bytes: a number, or a text as "512MiB".
+    /// Takes bytes: a number, or a text such as "512MiB".
     pub fn bytes(&mut self, name: &'static str) -> PyResult<Option<usize>> {
         self.value(name)?.map(|value| bytes_of(&value)).transpose()
     }
 
-    /// What a name means.
+    /// Takes one of the names in `meanings` and returns its meaning.
     pub fn one_of<T: Copy>(&mut self, name: &'static str, meanings: &[(&str, T)]) -> PyResult<Option<T>> {
         let Some(value) = self.value(name)? else { return Ok(None) };
         let text = value.extract::<String>().unwrap_or_default();
@@ -90,12 +90,12 @@ impl<'py> Keywords<'py> {
             Some(&(_, meant)) => Ok(Some(meant)),
             None => {
                 let names: Vec<&str> = meanings.iter().map(|&(name, _)| name).collect();
-                Err(wrong(value.py(), name, format!("{value:?} is none of {}", names.join(", "))))
+                Err(wrong(value.py(), name, format!("{value:?} is not one of {}", names.join(", "))))
             }
         }
     }
 
-    /// What `parse` makes of a text, or of what prints as one; it says what is wrong.
+    /// Takes a text, or the text form of another value, and parses it. The error of `parse` becomes the message.
     pub fn parsed<T, E: std::fmt::Display>(
         &mut self,
         name: &'static str,
@@ -106,7 +106,7 @@ impl<'py> Keywords<'py> {
         parse(&text).map(Some).map_err(|error| wrong(value.py(), name, format!("{value:?}: {error}")))
     }
 
-    /// Refuses what nobody has taken.
+    /// Reports the first keyword that was not taken as unexpected.
     pub fn end(self) -> PyResult<()> {
         let Some(name) = self.left.keys().into_iter().next() else { return Ok(()) };
         let name = name.to_string();

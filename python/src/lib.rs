@@ -1,17 +1,17 @@
 //! The module `voxtile._voxtile`: voxtile's library for Python, with numpy arrays.
 //!
 //! ```text
-//! map            Map: lifetime, scans in, questions
-//! questions      what arrays of points, rays and boxes are answered
-//! local_map      LocalMap: what is near the robot
+//! map            Map: lifetime, inserts, queries
+//! questions      queries of arrays of points, rays and boxes
+//! local_map      LocalMap: obstacles around the robot
 //! operations     whole maps on disk
-//! remapping      maps that follow the scans that they keep
+//! remapping      replays of kept scans: new poses, other parameters, removals
 //! scan_iterator  files of scans
-//! calls          builds and exports, in this process
-//! options        keywords as options
-//! keywords       keyword arguments, taken one by one
+//! calls          builds and exports in this process
+//! options        options of builds and exports from keywords
+//! keywords       typed access to keyword arguments
 //! command        the command `voxtile`
-//! watched        work beside the interpreter, which Ctrl-C ends
+//! watched        work without the interpreter's lock, which Ctrl-C ends
 //! ```
 //!
 //! The package around it is `python/voxtile/`; its documentation for users is `docs/python.md`.
@@ -36,7 +36,7 @@ mod source;
 mod tile_iterator;
 mod watched;
 
-/// The module.
+/// The Python module.
 #[pyo3::pymodule]
 mod _voxtile {
     #[pymodule_export]
@@ -49,8 +49,8 @@ mod _voxtile {
     use super::map::Map;
     #[pymodule_export]
     use super::operations::{
-        adopt, clear, convert, crop, decay, delete_snapshot, describe, diff, import_octree, join, merge,
-        move_piece, repair, revert, snapshots, verify,
+        clear, convert, crop, decay, delete_snapshot, describe, diff, import_octree, join, merge, move_shard,
+        repair, replace_tiles, revert, snapshots, verify,
     };
     #[pymodule_export]
     use super::remapping::{remap, remap_as, remove_points, remove_scans};

@@ -1,4 +1,4 @@
-//! `voxtile.LocalMap`: what is near the robot, inflated for a planner.
+//! `voxtile.LocalMap`: obstacles around the robot, inflated for a planner.
 
 use crate::arrays::{Points, column, object, rows};
 use crate::errors::{exception, wrong};
@@ -11,14 +11,14 @@ use pyo3::prelude::*;
 use voxtile::{Point, Queries, Result, Stop, UnknownAs};
 use voxtile_local::{LocalParameters, LocalReader, LocalState, Obstacle};
 
-/// Points that take less time than anybody waits for Ctrl-C.
+/// Up to this many points are inserted without a thread of their own: Ctrl-C need not interrupt them.
 const FEW: usize = 1 << 14;
 
-/// The local map: occupied voxels around the robot, and those too near to them. It is in memory alone.
+/// Local map in memory: occupied voxels around the robot, and voxels too close to them.
 ///
-/// `preset` is "local-mapping" (the latest 50,000 voxels within 40 m, inflated within 8 m), "autonomous-mapping"
-/// (everything, inflated within 8 m) or "passive-perception" (points at any distance, all inflated). Lengths are in
-/// metres. Any thread may ask while another inserts: it sees whole updates.
+/// `preset` is "local-mapping" (the latest 50,000 voxels within 40 m, inflated within 8 m), "autonomous-mapping" (all
+/// voxels, inflated within 8 m) or "passive-perception" (points at any distance, all inflated). Lengths are in metres.
+/// Several threads may query the map while another inserts; each query sees complete updates.
 #[pyclass(frozen, module = "voxtile")]
 pub struct LocalMap {
     map: Mutex<voxtile_local::LocalMap>,
@@ -63,7 +63,7 @@ impl LocalMap {
         Ok(Self { reader: map.reader(), map: Mutex::new(map) })
     }
 
-    /// Adds a scan, as `Map.insert` does; returns what the update did, as a dict.
+    /// Inserts a scan, as `Map.insert` does. Returns counts of the update as a dict.
     #[pyo3(signature = (points, pose=None, *, origin=None))]
     fn insert<'py>(
         &self,
@@ -78,7 +78,7 @@ impl LocalMap {
         object(py, &report)
     }
 
-    /// 2 for points in occupied voxels, 1 for those in inflated ones, 0 for all others, free or unknown: `int8`.
+    /// States at points (`int8`): 2 for occupied voxels, 1 for inflated ones, 0 for all others, free or unknown.
     fn state<'py>(&self, py: Python<'py>, points: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray1<i8>>> {
         let points = Points::of("points", points)?;
         let slice = points.slice()?;
@@ -111,8 +111,8 @@ impl LocalMap {
         self.centers(py, LocalState::Inflated)
     }
 
-    /// Whether boxes (N x 6 or N x 2 x 3: lower and upper corner) touch something occupied or, with `inflated`,
-    /// something inflated: an array of `bool`.
+    /// Whether boxes (N x 6 or N x 2 x 3: lower and upper corner) touch an occupied voxel or, with `inflated`, an
+    /// inflated one: an array of `bool`.
     #[pyo3(signature = (boxes, *, inflated=true))]
     fn collides<'py>(
         &self,
@@ -133,19 +133,19 @@ impl LocalMap {
         Ok(column(py, answers))
     }
 
-    /// Where the sensor was at the last update; `None` before the first.
+    /// Position of the sensor at the last update; `None` before the first.
     #[getter]
     fn position(&self) -> Option<Point> {
         self.reader.view().position()
     }
 
-    /// Edge of a voxel, in metres.
+    /// Edge of a voxel in metres.
     #[getter]
     fn resolution(&self) -> f64 {
         self.reader.view().resolution_m()
     }
 
-    /// Updates so far.
+    /// Number of updates so far.
     #[getter]
     fn updates(&self) -> u64 {
         self.reader.view().update_number()

@@ -25,29 +25,30 @@ use voxtile::{
     ScanReport, SnapshotName, Stop, TileIndex, UnknownAs,
 };
 
-/// So few questions, or points to insert, take a thread of their own only if they take long.
+/// Up to this many queries, or points to insert, start on the calling thread and move to another one only if they take
+/// long.
 const FEW: usize = 128;
 
-/// Most scans that are handed to the mapper together.
+/// Upper bound on the number of scans that are passed to the mapper together.
 const TOGETHER: usize = 32;
 
-/// With so many points no more scans join them: those of a file take memory only while they are here.
+/// A batch with this many points takes no more scans: points of scans from a file use memory until they are inserted.
 const POINTS_TOGETHER: usize = 1 << 20;
 
-/// A map: what is occupied, free and unknown.
+/// Occupancy map: each voxel is occupied, free or unknown.
 ///
-/// Made by `Map.create`, `Map.open` or `voxtile.open`, and closed by `close` or at the end of a `with` block. Points
-/// are arrays of N x 3 in metres, `float32` or `float64`; answers are arrays in the order of the questions. Any
-/// thread may ask while another inserts: it sees whole scans.
+/// Returned by `Map.create`, `Map.open` and `voxtile.open`; closed by `close` or at the end of a `with` block. Points
+/// are arrays of N x 3 in metres, `float32` or `float64`; results are arrays in the order of the input. Several threads
+/// may query the map while another inserts; each query sees complete scans.
 #[pyclass(frozen, module = "voxtile")]
 pub struct Map {
-    /// `None` once it is closed. Shared with the work that closes it, which may outlive the call.
+    /// `None` once the map is closed. Shared with the work that closes it, which may outlive the call.
     source: Arc<RwLock<Option<Arc<Source>>>>,
     config: MapConfig,
     path: PathBuf,
-    /// Its name, if it is one.
+    /// Name of the snapshot, if the map is one.
     snapshot: Option<String>,
-    /// Whether the last few questions took long: the next ones take a thread of their own, so that none is asked twice.
+    /// Whether recent queries took long. The next ones then start in a thread of their own, so that none runs twice.
     is_slow: AtomicBool,
 }
 
@@ -77,18 +78,19 @@ impl Map {
         self.source.read().clone().ok_or_else(|| closed(py, &self.path))
     }
 
-    /// The map, if it takes scans.
+    /// Returns the map, if it is open for writing.
     fn writer(&self, py: Python<'_>) -> PyResult<Arc<Source>> {
         let source = self.source(py)?;
         if matches!(*source, Source::Writer { .. }) {
             return Ok(source);
         }
-        let message = format!("{}: open for reading alone; open it with mode=\"r+\"", self.path.display());
+        let message =
+            format!("{}: open for reading; open it with mode=\"r+\" to change it", self.path.display());
         Err(exception_of_kind(py, "read_only", &message))
     }
 
-    /// Changes the map in a thread of its own, or at once if it is `short` and no other thread's change is waited for:
-    /// Ctrl-C ends the waiting.
+    /// Changes the map in a thread of its own so that Ctrl-C can interrupt it, or on this thread if the change is
+    /// `short` and no other thread holds the map.
     fn change<T: Send>(
         &self,
         py: Python<'_>,
@@ -104,7 +106,7 @@ impl Map {
         changed.flatten().ok_or_else(|| closed(py, &self.path))
     }
 
-    /// Adds scans, one report of all.
+    /// Inserts scans and returns one report of all.
     fn insert_together(&self, py: Python<'_>, given: &[GivenScan<'_>]) -> PyResult<InsertReport> {
         let scans = given.iter().map(|given| given.scan(py)).collect::<PyResult<Vec<ScanRef<'_>>>>()?;
         let scans: Vec<&dyn ScanPoints> = scans.iter().map(|scan| scan as _).collect();
@@ -118,7 +120,7 @@ impl Map {
         Ok(all)
     }
 
-    /// Changes the map in a way that cannot be given up once it has begun.
+    /// Changes the map in a way that cannot be interrupted once it has begun.
     fn finish<T: Send + 'static>(
         &self,
         py: Python<'_>,
@@ -128,7 +130,7 @@ impl Map {
         finished(py, move |stop| source.change(stop, change))?.ok_or_else(|| closed(py, &self.path))
     }
 
-    /// Asks one thing of each point.
+    /// Queries one value per point.
     fn at_points<'py, T: Element + Send>(
         &self,
         points: &Bound<'py, PyAny>,
@@ -141,7 +143,7 @@ impl Map {
         Ok(column(py, answers))
     }
 
-    /// Asks the map in a thread of its own, or at once if there are few questions and nothing is waited for.
+    /// Queries the map in a thread of its own, or on this thread if there are few queries and nothing to wait for.
     fn ask<T: Send>(
         &self,
         py: Python<'_>,
@@ -168,11 +170,12 @@ impl Map {
 
 #[pymethods]
 impl Map {
-    /// Makes a new map in a folder that is empty or not there.
+    /// Creates a map in a folder that is empty or does not exist.
     ///
-    /// Lengths are in metres. `memory` bounds all that grows with the map: bytes, or a text such as "512MiB" (the
-    /// default). `insert_mode` is "per-scan" or "per-ray", `sensor_model` "log-odds" or "iwlo", `storage` "octomap" or
-    /// "compact". `probabilities` are hit, miss, least and most of the log-odds model.
+    /// Lengths are in metres. `memory` bounds all memory that grows with the map: bytes, or a text such as "512MiB"
+    /// (the default). `insert_mode` is "per-scan" or "per-ray", `sensor_model` "log-odds" or "iwlo", `storage`
+    /// "octomap" or "compact". `probabilities` of the log-odds model are those of a hit and a miss, then the minimum
+    /// and the maximum.
     #[staticmethod]
     #[pyo3(signature = (path, resolution=0.1, *, tile_size=10.0, min_range=0.0, max_range=None, insert_mode="per-scan",
         sensor_model="log-odds", probabilities=None, occupancy_threshold=0.5, storage="octomap", memory=None, keep_scans=false))]
@@ -212,9 +215,10 @@ impl Map {
         Self::opened(py, path, move |path| Source::writer(options.open(path)?))
     }
 
-    /// Opens a map: to insert scans (mode "r+"), or to be asked (mode "r"), beside a writer too.
+    /// Opens a map to insert scans (mode "r+") or to query it (mode "r"). Readers may open a map that a writer has
+    /// open.
     ///
-    /// Of `snapshot` there is only reading. A file of OctoMap (`.bt`, `.ot`) is read whole.
+    /// A `snapshot` and a file of OctoMap (`.bt`, `.ot`) are read-only. A file of OctoMap is loaded into memory.
     #[staticmethod]
     #[pyo3(signature = (path, mode="r+", *, snapshot=None, memory=None))]
     fn open(
@@ -241,12 +245,14 @@ impl Map {
             ("r+", None) if !is_octree => {
                 Self::opened(py, path, move |path| Source::writer(options.open(path)?))
             }
-            ("r+", _) => Err(wrong(py, "mode", "snapshots and files of OctoMap are read alone: mode=\"r\"")),
+            ("r+", _) => {
+                Err(wrong(py, "mode", "snapshots and files of OctoMap are read-only; use mode=\"r\""))
+            }
             (other, _) => Err(wrong(py, "mode", format!("{other:?} is neither 'r+' nor 'r'"))),
         }
     }
 
-    /// The folder, or the file.
+    /// The map's folder, or the file of OctoMap.
     #[getter]
     fn path(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
         Ok(py.import("pathlib")?.call_method1("Path", (&self.path,))?.unbind())
@@ -276,7 +282,7 @@ impl Map {
         self.source.read().is_none()
     }
 
-    /// Whether the map takes scans.
+    /// Whether the map is open for writing.
     #[getter]
     fn writable(&self) -> bool {
         self.source.read().as_ref().is_some_and(|source| matches!(**source, Source::Writer { .. }))
@@ -288,8 +294,8 @@ impl Map {
         self.ask(py, 1, |source, stop| source.ask(stop, |map| Ok(map.scan_number())))
     }
 
-    /// A box around all that was observed, in whole tiles: an array of 2 x 3, lower and upper corner in metres. `None`
-    /// for an empty map.
+    /// Box around all observed space, in whole tiles: an array of 2 x 3, lower and upper corner in metres. `None` for
+    /// an empty map.
     #[getter]
     fn bounds<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
         let tiles = self.tile_indices(py)?;
@@ -301,11 +307,11 @@ impl Map {
         hull.map(|hull| rows(py, vec![hull.min, hull.max])).transpose()
     }
 
-    /// Adds a scan: rays from the sensor to its points.
+    /// Inserts a scan: rays from the sensor to its points.
     ///
     /// With `pose` (world_from_sensor: a matrix of 4 x 4, seven numbers x y z qx qy qz qw, or a tuple of position and
-    /// quaternion) points are in the sensor's frame, with `origin` in the world's. Points that are NaN or masked are
-    /// skipped and counted. After an error the map is as it was.
+    /// quaternion) points are in the sensor's frame; with `origin` they are in the world's. Points that are NaN or
+    /// masked are skipped and counted. After an error the map is unchanged.
     #[pyo3(signature = (points, pose=None, *, origin=None, intensities=None))]
     fn insert<'py>(
         &self,
@@ -321,12 +327,12 @@ impl Map {
         Ok(report.into())
     }
 
-    /// Adds scans from an iterable of `(points, pose)` or `(points, pose, intensities)`; returns one report of all.
+    /// Inserts scans from an iterable of `(points, pose)` or `(points, pose, intensities)`. Returns one report of all.
     ///
-    /// Scans of a list, of a tuple or of `voxtile.scans` go to the cores one each, which is faster than one after the
-    /// other, and the map is the same. After an error the scans before it are in the map.
+    /// Scans of a list, of a tuple and of `voxtile.scans` are processed in parallel; the map is the same as with one
+    /// `insert` per scan. After an error the scans before the failed one are in the map.
     fn insert_many<'py>(&self, py: Python<'py>, scans: &Bound<'py, PyAny>) -> PyResult<InsertReport> {
-        // What else is iterated may use the memory of a scan for the next one.
+        // Other iterables may reuse the memory of a scan for the next one.
         let has_memory_of_its_own = scans.is_instance_of::<PyList>()
             || scans.is_instance_of::<PyTuple>()
             || scans.is_instance_of::<ScanIterator>();
@@ -345,7 +351,7 @@ impl Map {
                     Ok(true)
                 });
             }
-            // Those before one that is wrong are taken.
+            // Inserts the scans before a wrong one.
             if !given.is_empty() {
                 all.add(&self.insert_together(py, &given)?);
                 py.check_signals()?;
@@ -354,11 +360,11 @@ impl Map {
         outcome.map(|_| all)
     }
 
-    /// Makes everything so far durable, as a whole. Nothing to do for a map that is read.
+    /// Writes all inserted scans to disk as one atomic flush. Does nothing for a map that is open for reading.
     ///
-    /// With `wait=False` it returns at once, and what it makes durable is the map as of now, while scans go on;
-    /// `flushed_scan_number` tells when that is done. If it fails, the next flush says why. Where very many small tiles
-    /// wait and memory is short, it flushes before it returns.
+    /// With `wait=False` it returns at once and flushes the current state in the background while scans are inserted;
+    /// `flushed_scan_number` reports the progress. An error of a background flush is raised by the next flush. If
+    /// memory is short and very many small tiles wait to be written, the call waits anyway.
     #[pyo3(signature = (*, wait=true))]
     fn flush(&self, py: Python<'_>, wait: bool) -> PyResult<()> {
         if !matches!(*self.source(py)?, Source::Writer { .. }) {
@@ -367,7 +373,7 @@ impl Map {
         self.finish(py, if wait { Mapper::flush } else { OutOfCoreTileMapper::begin_flush })
     }
 
-    /// Number of the last scan that a crash cannot take away.
+    /// Number of the last scan that survives a crash.
     #[getter]
     fn flushed_scan_number(&self, py: Python<'_>) -> PyResult<u64> {
         match *self.source(py)? {
@@ -376,16 +382,16 @@ impl Map {
         }
     }
 
-    /// Flushes and closes. A closed map may be closed again.
+    /// Flushes and closes the map. Closing a closed map does nothing.
     ///
-    /// If the flush fails the map stays open, so that the disk can be seen to and the map closed again; `flush=False`
-    /// gives up what no flush has made durable.
+    /// If the flush fails, the map stays open: free the disk and close the map again. `flush=False` discards all scans
+    /// since the last flush.
     #[pyo3(signature = (*, flush=true))]
     fn close(&self, py: Python<'_>, flush: bool) -> PyResult<()> {
         let Some(source) = self.source.read().clone() else { return Ok(()) };
         let open = self.source.clone();
         finished(py, move |stop| {
-            // Another thread may still ask; the lock on the map's files goes now.
+            // Releases the lock on the map's files now. Queries of other threads may still run.
             source.close(stop, flush)?;
             drop((source, open.write().take()));
             Ok(())
@@ -409,7 +415,7 @@ impl Map {
         Ok(false)
     }
 
-    /// Sees what a writer has flushed since the map was opened for reading. Returns whether there was something.
+    /// Loads the writer's latest flush into a map that is open for reading. Returns whether there was a new one.
     fn refresh(&self, py: Python<'_>) -> PyResult<bool> {
         self.ask(py, usize::MAX, |source, _| match source {
             Source::Reader(reader) => reader.write().refresh(),
@@ -417,26 +423,26 @@ impl Map {
         })
     }
 
-    /// Flushes, and keeps the map as it is now under a name.
+    /// Flushes, and keeps the current state of the map as a snapshot.
     fn snapshot(&self, py: Python<'_>, name: &str) -> PyResult<()> {
         let name = SnapshotName::new(name).map_err(|error| exception(py, &error))?;
         self.finish(py, move |mapper| mapper.snapshot(&name))
     }
 
-    /// Sizes of the map and of what is in memory, as a dict.
+    /// Sizes of the map on disk and in memory, as a dict.
     fn statistics<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let statistics = self.ask(py, 1, |source, stop| source.ask(stop, |map| Ok(map.statistics())))?;
         object(py, &statistics)
     }
 
-    /// The occupancy at points: an array of `int8`, 1 occupied, 0 free, -1 unknown.
+    /// Occupancy at points: an array of `int8`, 1 occupied, 0 free, -1 unknown.
     fn occupancy<'py>(&self, points: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray1<i8>>> {
         let least = self.config.occupied_log_odds();
         let code = |of: Option<Evidence>| of.map_or(-1, |of| i8::from(of.log_odds >= least));
         self.at_points(points, |source, stop, points| questions::evidences(source, stop, points, code))
     }
 
-    /// Probabilities of being occupied at points: `float64`, NaN for unknown.
+    /// Probabilities of occupancy at points: `float64`, NaN for unknown.
     fn probability<'py>(&self, points: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let probability = |of: Option<Evidence>| of.map_or(f64::NAN, |of| of.probability());
         self.at_points(points, |source, stop, points| questions::evidences(source, stop, points, probability))
@@ -454,10 +460,10 @@ impl Map {
         self.at_points(points, |source, stop, points| questions::evidences(source, stop, points, count))
     }
 
-    /// The first occupied voxel on each ray: distances in metres from the origin (infinite where nothing is hit), and
-    /// indices of voxels, `int32` of N x 3 (the least integers where nothing is hit).
+    /// First occupied voxel on each ray: distances in metres from the origin (infinite without a hit), and voxel
+    /// indices, `int32` of N x 3 (the minimum of `int32` without a hit).
     ///
-    /// `origins` is one point or as many as directions. `unknown` is "free" or "obstacle".
+    /// `origins` is one point, or one per direction. `unknown` is "free" or "obstacle".
     #[pyo3(signature = (origins, directions, *, max_range=None, unknown="free"))]
     fn cast_rays<'py>(
         &self,
@@ -485,9 +491,9 @@ impl Map {
         Ok((column(py, distances), rows(py, voxels)?))
     }
 
-    /// The occupied voxel with the nearest center to each point, at most `max_distance` metres away: indices (`int32`,
-    /// N x 3), distances (infinite where there is none), and directions to it (unit vectors, NaN where there is none or
-    /// the point is the center).
+    /// Occupied voxel with the nearest center to each point, within `max_distance` metres: indices (`int32`, N x 3),
+    /// distances (infinite if there is none), and directions to it (unit vectors; NaN if there is none or the point is
+    /// the center).
     #[pyo3(signature = (points, max_distance=10.0))]
     fn nearest<'py>(
         &self,
@@ -510,8 +516,8 @@ impl Map {
         Ok((rows(py, voxels)?, column(py, distances), rows(py, directions)?))
     }
 
-    /// Whether boxes touch something occupied: an array of `bool`. A box is six numbers, lower corner and upper
-    /// corner in metres: N x 6 or N x 2 x 3.
+    /// Whether boxes touch an occupied voxel: an array of `bool`. `boxes` are lower and upper corners in metres, N x 6
+    /// or N x 2 x 3. `unknown` is "free" or "obstacle".
     #[pyo3(signature = (boxes, *, unknown="free"))]
     fn collides<'py>(
         &self,
@@ -521,16 +527,16 @@ impl Map {
     ) -> PyResult<Bound<'py, PyArray1<bool>>> {
         let unknown = unknown_of(py, unknown)?;
         let bodies = bodies_of(boxes)?;
-        // A box may be large.
+        // One box may be large, so even few boxes may take long.
         let answers =
             self.ask(py, usize::MAX, |source, stop| questions::collisions(source, stop, &bodies, unknown))?;
         Ok(column(py, answers))
     }
 
-    /// The occupied voxels: centers in metres (`float64`, N x 3) and probabilities (`float32`), tile by tile.
+    /// Occupied voxels: centers in metres (`float64`, N x 3) and probabilities (`float32`), tile by tile.
     ///
-    /// `region` is a box, lower and upper corner in metres; `min_probability` the map's threshold if it is not named.
-    /// For maps larger than memory use `occupied_by_tile`.
+    /// `region` is a box, lower and upper corner in metres. `min_probability` defaults to the map's threshold. Use
+    /// `occupied_by_tile` for maps larger than memory.
     #[pyo3(signature = (region=None, min_probability=None))]
     fn occupied<'py>(
         &self,
@@ -545,7 +551,7 @@ impl Map {
         Ok((rows(py, centers)?, column(py, probabilities)))
     }
 
-    /// Iterates over the occupied voxels, a tile at a time, in constant memory: index of the tile, centers,
+    /// Iterates over the occupied voxels tile by tile, in constant memory. Yields the index of the tile, centers, and
     /// probabilities.
     #[pyo3(signature = (min_probability=None))]
     fn occupied_by_tile(&self, py: Python<'_>, min_probability: Option<f64>) -> PyResult<TileIterator> {
@@ -554,16 +560,16 @@ impl Map {
         Ok(TileIterator::new(self.source(py)?, self.path.clone(), boxes, min_probability))
     }
 
-    /// Indices of the tiles in which something was observed: `int32`, N x 3.
+    /// Indices of the tiles with observed voxels: `int32`, N x 3.
     #[getter]
     fn tiles<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<i32>>> {
         rows(py, self.tile_indices(py)?.into_iter().map(|tile| [tile.x, tile.y, tile.z]).collect())
     }
 
-    /// A region as an array of three axes, x, y, z, and the lower corner of its first voxel in metres.
+    /// All voxels of a region as an array with axes x, y, z, and the lower corner of the first voxel in metres.
     ///
-    /// `values` says what is in it: "occupancy" (`int8`: 1, 0, -1 unknown), "probability" or "log_odds" (`float64`, NaN
-    /// unknown).
+    /// `values` is "occupancy" (`int8`: 1 occupied, 0 free, -1 unknown), "probability" or "log_odds" (`float64`, NaN
+    /// for unknown).
     #[pyo3(signature = (region, values="occupancy"))]
     fn to_dense<'py>(
         &self,
@@ -594,7 +600,7 @@ impl Map {
                 (voxels, column(py, values).into_any())
             }
             other => {
-                let reason = format!("{other:?} is none of 'occupancy', 'probability', 'log_odds'");
+                let reason = format!("{other:?} is not one of 'occupancy', 'probability', 'log_odds'");
                 return Err(wrong(py, "values", reason));
             }
         };
@@ -604,20 +610,20 @@ impl Map {
         Ok((array.call_method1("reshape", (edges,))?, column(py, corner.to_vec())))
     }
 
-    /// The digest of the map's content, equal for equal maps, as the command prints it.
+    /// Digest of the map's content, as the command prints it. Equal maps have equal digests.
     fn digest(&self, py: Python<'_>) -> PyResult<String> {
         let digest = self.ask(py, usize::MAX, |source, stop| source.ask(stop, |map| map.digest()))?;
         Ok(digest.to_string())
     }
 
-    /// A matplotlib figure of the map from above; see `voxtile.pictures.plot`.
+    /// Draws the map from above with matplotlib; see `voxtile.pictures.plot`.
     #[pyo3(signature = (**options))]
     fn plot(slf: &Bound<'_, Self>, options: Option<&Bound<'_, PyDict>>) -> PyResult<Py<PyAny>> {
         let pictures = slf.py().import("voxtile.pictures")?;
         Ok(pictures.getattr("plot")?.call((slf,), options)?.unbind())
     }
 
-    /// Opens the viewer in a browser, in a process of its own, which is returned. What is not flushed is not seen.
+    /// Opens the viewer in a browser and returns its process. The viewer shows the last flush.
     fn view(slf: &Bound<'_, Self>) -> PyResult<Py<PyAny>> {
         let (py, map) = (slf.py(), slf.get());
         map.source(py)?;
@@ -639,10 +645,10 @@ impl Map {
         format!("<voxtile.Map {} {} m, {state}>", self.path.display(), self.resolution())
     }
 
-    /// A map is not copied to another process: it is opened there.
+    /// Raises: a map cannot be pickled.
     fn __reduce__(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
         let message =
-            "a map cannot be pickled: give the other process its path, and open it there with mode=\"r\"";
+            "a map cannot be pickled; pass its path to the other process and open it there with mode=\"r\"";
         Err(exception_of_kind(py, "no_pickle", message))
     }
 }
@@ -652,7 +658,7 @@ impl Map {
         self.ask(py, 1, |source, stop| source.ask(stop, |map| Ok(map.tile_indices())))
     }
 
-    /// The box of a tile in metres.
+    /// Returns the box of a tile in metres.
     fn box_of(&self, tile: TileIndex) -> Aabb {
         let grid = &self.config.grid;
         let voxels = grid.voxels_of_tile(tile);
@@ -660,7 +666,7 @@ impl Map {
     }
 }
 
-/// A box: lower and upper corner, six numbers or 2 x 3.
+/// Parses a box: lower and upper corner, six numbers or 2 x 3.
 pub fn region_of(region: &Bound<'_, PyAny>) -> PyResult<Aabb> {
     let (shape, corners) = doubles("region", region)?;
     match (&shape[..], &corners[..]) {
@@ -683,7 +689,7 @@ fn unknown_of(py: Python<'_>, unknown: &str) -> PyResult<UnknownAs> {
     }
 }
 
-/// What a question to a closed map is answered.
+/// Returns the exception of a call on a closed map.
 pub fn closed(py: Python<'_>, path: &Path) -> PyErr {
     exception_of_kind(py, "closed", &format!("{}: the map is closed; open it again", path.display()))
 }

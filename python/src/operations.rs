@@ -1,4 +1,4 @@
-//! What is done with whole maps on disk. Answers are dicts with the fields that the command prints.
+//! Operations on whole maps on disk. Each returns a dict with the fields that the command prints.
 
 use crate::arrays::object;
 use crate::config::storage_of;
@@ -16,12 +16,12 @@ use voxtile::operations::{self, Decay, Part, Prefer};
 use voxtile::{Error, MapPath, MemoryLimit, Result, SnapshotName, Stop, TileIndex, integrity, octree};
 use voxtile_pipeline::check_is_no_file;
 
-/// A map, or a snapshot of it as a tuple with its name.
+/// A map, or a tuple of a map and the name of a snapshot.
 #[derive(FromPyObject)]
 pub enum MapOrSnapshot {
-    /// A folder.
+    /// Folder of a map.
     Map(PathBuf),
-    /// A folder and a name.
+    /// Folder of a map and name of a snapshot.
     Snapshot(PathBuf, String),
 }
 
@@ -38,15 +38,15 @@ impl MapOrSnapshot {
     }
 }
 
-/// The folder of a map, and no file.
+/// Returns the folder of a map, or an error for a file.
 pub fn folder_of(map: &Path) -> Result<&Path> {
     check_is_no_file(map).map(|()| map)
 }
 
 pub type Callback = Option<Py<PyAny>>;
 
-/// Does work and returns what it tells.
-pub fn told<'py, T: Serialize + Send>(
+/// Runs `work` and returns its report as a dict.
+pub fn reported<'py, T: Serialize + Send>(
     py: Python<'py>,
     progress: Callback,
     work: impl FnOnce(&Stop, &Progress<'_>) -> Result<T> + Send,
@@ -63,20 +63,20 @@ fn part_of(region: &Bound<'_, PyAny>, outside: bool) -> PyResult<Part> {
     Ok(if outside { Part::Outside(region) } else { Part::Inside(region) })
 }
 
-/// The snapshots of a map, by flush and then by name: a list of dicts.
+/// Lists the snapshots of a map, ordered by flush and then by name: a list of dicts.
 #[pyfunction]
 pub fn snapshots<'py>(py: Python<'py>, map: PathBuf) -> PyResult<Bound<'py, PyAny>> {
-    told(py, None, |_, _| operations::snapshots(folder_of(&map)?))
+    reported(py, None, |_, _| operations::snapshots(folder_of(&map)?))
 }
 
-/// Deletes a snapshot; what it alone kept is freed.
+/// Deletes a snapshot and frees the tiles that only this snapshot uses.
 #[pyfunction]
 pub fn delete_snapshot(py: Python<'_>, map: PathBuf, name: &str) -> PyResult<()> {
     let name = name_of(py, name)?;
     watched_with_progress(py, None, |_, _| operations::delete_snapshot(folder_of(&map)?, &name))
 }
 
-/// Compares two maps, or snapshots `(map, name)`: a dict of sums, with a list of the tiles that differ in
+/// Compares two maps, or snapshots `(map, name)`. Returns a dict of sums, with a list of the tiles that differ in
 /// `"differing"`.
 #[pyfunction]
 #[pyo3(signature = (first, second, *, progress=None))]
@@ -87,19 +87,19 @@ pub fn diff<'py>(
     progress: Callback,
 ) -> PyResult<Bound<'py, PyAny>> {
     let mut tiles = Vec::new();
-    let sums = told(py, progress, |_, progress| {
+    let sums = reported(py, progress, |_, progress| {
         operations::diff(
             &first.open()?,
             &second.open()?,
             |tile| tiles.push(tile),
-            |done, all| progress.tell(done, all),
+            |done, all| progress.report(done, all),
         )
     })?;
     sums.set_item("differing", object(py, &tiles)?)?;
     Ok(sums)
 }
 
-/// Makes a map what a snapshot of it is; `keep_as` keeps what it was as another snapshot.
+/// Reverts a map to a snapshot. `keep_as` first keeps the current state as another snapshot.
 #[pyfunction]
 #[pyo3(signature = (map, name, *, keep_as=None, progress=None))]
 pub fn revert<'py>(
@@ -110,12 +110,12 @@ pub fn revert<'py>(
     progress: Callback,
 ) -> PyResult<Bound<'py, PyAny>> {
     let (name, keep_as) = (name_of(py, name)?, keep_as.map(|name| name_of(py, name)).transpose()?);
-    told(py, progress, |_, progress| {
-        operations::revert(folder_of(&map)?, &name, keep_as.as_ref(), |done, all| progress.tell(done, all))
+    reported(py, progress, |_, progress| {
+        operations::revert(folder_of(&map)?, &name, keep_as.as_ref(), |done, all| progress.report(done, all))
     })
 }
 
-/// Makes one map of several of the same resolution and tile size. `prefer` is "first", "last" or "more-observed";
+/// Merges maps of the same resolution and tile size into a new one. `prefer` is "first", "last" or "more-observed";
 /// without it the log-odds of a voxel are added.
 #[pyfunction]
 #[pyo3(signature = (maps, output, *, prefer=None, progress=None))]
@@ -132,22 +132,22 @@ pub fn merge<'py>(
         Some("last") => Some(Prefer::Last),
         Some("more-observed") => Some(Prefer::MoreObserved),
         Some(other) => {
-            let reason = format!("{other:?} is none of 'first', 'last', 'more-observed'");
+            let reason = format!("{other:?} is not one of 'first', 'last', 'more-observed'");
             return Err(wrong(py, "prefer", reason));
         }
     };
-    told(py, progress, |_, progress| {
+    reported(py, progress, |_, progress| {
         let maps = maps.iter().map(MapOrSnapshot::open).collect::<Result<Vec<_>>>()?;
-        operations::merge(&maps, &output, prefer, |done, all| progress.tell(done, all))
+        operations::merge(&maps, &output, prefer, |done, all| progress.report(done, all))
     })
 }
 
-/// Moves a map that nobody needs any more to its place as a piece of a map that `join` makes, whose id is 32 hexadecimal
-/// digits, and makes it durable. A map of another id, or of another file system, is copied, and every byte of its tiles
-/// is compared with the log.
+/// Moves a map to its place as a shard of a map that `join` will make, and makes it durable. `map_id` is the id of that
+/// map, 32 hexadecimal digits. A map with another id, or on another file system, is copied, and every byte of its tiles
+/// is checked against the log.
 #[pyfunction]
 #[pyo3(signature = (map, output, map_id, *, progress=None))]
-pub fn move_piece<'py>(
+pub fn move_shard<'py>(
     py: Python<'py>,
     map: PathBuf,
     output: PathBuf,
@@ -155,38 +155,38 @@ pub fn move_piece<'py>(
     progress: Callback,
 ) -> PyResult<Bound<'py, PyAny>> {
     let id = map_id_of(py, "map_id", map_id)?;
-    told(py, progress, |_, progress| {
-        operations::move_shard(&map, &output, id, |done, all| progress.tell(done, all))
+    reported(py, progress, |_, progress| {
+        operations::move_shard(&map, &output, id, |done, all| progress.report(done, all))
     })
 }
 
-/// The id of a map from 32 hexadecimal digits.
+/// Parses the id of a map: 32 hexadecimal digits.
 pub fn map_id_of(py: Python<'_>, argument: &str, digits: &str) -> PyResult<[u8; 16]> {
     let id = u128::from_str_radix(digits, 16).ok().filter(|_| digits.len() == 32);
     let reason = || format!("{digits:?} is not 32 hexadecimal digits");
     id.map(u128::to_be_bytes).ok_or_else(|| wrong(py, argument, reason()))
 }
 
-/// Makes one map of pieces with the same id that have no tile in common, without reading their tiles.
+/// Joins shards with the same id and disjoint tiles into one map, without reading their tiles.
 #[pyfunction]
-#[pyo3(signature = (pieces, output, *, progress=None))]
+#[pyo3(signature = (shards, output, *, progress=None))]
 pub fn join<'py>(
     py: Python<'py>,
-    pieces: Vec<PathBuf>,
+    shards: Vec<PathBuf>,
     output: PathBuf,
     progress: Callback,
 ) -> PyResult<Bound<'py, PyAny>> {
-    told(py, progress, |_, progress| {
-        let pieces: Vec<MapPath> = pieces.into_iter().map(MapPath::from).collect();
-        operations::join(&pieces, &output, |done, all| progress.tell(done, all))
+    reported(py, progress, |_, progress| {
+        let shards: Vec<MapPath> = shards.into_iter().map(MapPath::from).collect();
+        operations::join(&shards, &output, |done, all| progress.report(done, all))
     })
 }
 
-/// Puts the tiles of parts in the place of a map's own, in one commit. Parts are made of the map as of the flush
-/// `of_flush`, each with other tiles; `scans` is how many scans they have more.
+/// Replaces tiles of a map by those of shards, in one commit. The shards were made from the map at the flush
+/// `of_flush`, and each holds other tiles; `scans` is the number of scans they add.
 #[pyfunction]
 #[pyo3(signature = (map, parts, *, of_flush, scans, progress=None))]
-pub fn adopt<'py>(
+pub fn replace_tiles<'py>(
     py: Python<'py>,
     map: PathBuf,
     parts: Vec<PathBuf>,
@@ -194,20 +194,20 @@ pub fn adopt<'py>(
     scans: u64,
     progress: Callback,
 ) -> PyResult<Bound<'py, PyAny>> {
-    told(py, progress, |_, progress| {
+    reported(py, progress, |_, progress| {
         let parts = parts
             .iter()
             .map(|part| MapReader::open(part, MemoryLimit::DEFAULT_BYTES))
             .collect::<Result<Vec<_>>>()?;
-        operations::replace_tiles(&map, &parts, of_flush, scans, |done, all| progress.tell(done, all))
+        operations::replace_tiles(&map, &parts, of_flush, scans, |done, all| progress.report(done, all))
     })
 }
 
-/// What a map says of itself: id, flush and scan numbers, how many records its list of scans has if that is known, grid
-/// and range in metres, whether it keeps its scans.
+/// Describes a map: id, flush and scan numbers, number of records in its list of scans (`None` if unknown), grid and
+/// range in metres, whether it keeps its scans.
 #[pyfunction]
 pub fn describe<'py>(py: Python<'py>, map: MapOrSnapshot) -> PyResult<Bound<'py, PyAny>> {
-    told(py, None, |_, _| {
+    reported(py, None, |_, _| {
         let map = map.open()?;
         let described = Described {
             map_id: map.metadata().ext.as_ref().map(|ext| ext.map_id.clone()),
@@ -223,7 +223,7 @@ pub fn describe<'py>(py: Python<'py>, map: MapOrSnapshot) -> PyResult<Bound<'py,
     })
 }
 
-/// What [`describe`] tells.
+/// Report of [`describe`].
 #[derive(Serialize)]
 struct Described {
     map_id: Option<String>,
@@ -236,26 +236,26 @@ struct Described {
     max_range: Option<f64>,
 }
 
-/// Makes a map of the part of another that is in a box, or outside it. With `piece_of` it is a piece of the map with
-/// this id, and not durable until `move_piece` has moved it.
+/// Makes a map of the part of another that is inside a box, or outside it. With `shard_of` it makes a shard of the map
+/// with this id; the shard is not durable until `move_shard` has moved it.
 #[pyfunction]
-#[pyo3(signature = (map, output, region, *, outside=false, piece_of=None, progress=None))]
+#[pyo3(signature = (map, output, region, *, outside=false, shard_of=None, progress=None))]
 pub fn crop<'py>(
     py: Python<'py>,
     map: MapOrSnapshot,
     output: PathBuf,
     region: &Bound<'py, PyAny>,
     outside: bool,
-    piece_of: Option<&str>,
+    shard_of: Option<&str>,
     progress: Callback,
 ) -> PyResult<Bound<'py, PyAny>> {
     let part = part_of(region, outside)?;
-    let piece_of = piece_of.map(|digits| map_id_of(py, "piece_of", digits)).transpose()?;
-    told(py, progress, |_, progress| {
-        let tell = |done, all| progress.tell(done, all);
-        match piece_of {
-            None => operations::crop(&map.open()?, &part, &output, tell),
-            Some(map_id) => operations::crop_shard(&map.open()?, &part, &output, map_id, tell),
+    let shard_of = shard_of.map(|digits| map_id_of(py, "shard_of", digits)).transpose()?;
+    reported(py, progress, |_, progress| {
+        let report = |done, all| progress.report(done, all);
+        match shard_of {
+            None => operations::crop(&map.open()?, &part, &output, report),
+            Some(map_id) => operations::crop_shard(&map.open()?, &part, &output, map_id, report),
         }
     })
 }
@@ -271,8 +271,8 @@ pub fn convert<'py>(
     progress: Callback,
 ) -> PyResult<Bound<'py, PyAny>> {
     let storage = storage_of(py, storage)?;
-    told(py, progress, |_, progress| {
-        operations::convert(&map.open()?, &output, storage, |done, all| progress.tell(done, all))
+    reported(py, progress, |_, progress| {
+        operations::convert(&map.open()?, &output, storage, |done, all| progress.report(done, all))
     })
 }
 
@@ -287,15 +287,15 @@ pub fn import_octree<'py>(
     progress: Callback,
 ) -> PyResult<Bound<'py, PyAny>> {
     let storage = storage_of(py, storage)?;
-    told(py, progress, |_, progress| {
+    reported(py, progress, |_, progress| {
         let opened = File::open(&file).map_err(|error| Error::io(&file, "open", error))?;
         let map =
             OctreeMap::of(octree::read(BufReader::new(opened)).map_err(|error| error.in_input(&file))?)?;
-        operations::import(&map, &output, storage, |done, all| progress.tell(done, all))
+        operations::import(&map, &output, storage, |done, all| progress.report(done, all))
     })
 }
 
-/// Forgets what is in a box, or outside it.
+/// Removes all voxels inside a box, or outside it.
 #[pyfunction]
 #[pyo3(signature = (map, region, *, outside=false, progress=None))]
 pub fn clear<'py>(
@@ -306,13 +306,13 @@ pub fn clear<'py>(
     progress: Callback,
 ) -> PyResult<Bound<'py, PyAny>> {
     let part = part_of(region, outside)?;
-    told(py, progress, |_, progress| {
-        operations::clear(folder_of(&map)?, &part, |done, all| progress.tell(done, all))
+    reported(py, progress, |_, progress| {
+        operations::clear(folder_of(&map)?, &part, |done, all| progress.report(done, all))
     })
 }
 
-/// Lets evidence fade: log-odds halve in so many scans. `scans` is how many have passed, those since the last decay
-/// if it is not named; log-odds nearer to 0 than `forget_below` are forgotten.
+/// Decays evidence: log-odds halve every `halflife_scans` scans. `scans` is the number of scans that have passed, by
+/// default those since the last decay. Log-odds closer to 0 than `forget_below` are removed.
 #[pyfunction]
 #[pyo3(signature = (map, halflife_scans, *, scans=None, forget_below=0.0, progress=None))]
 pub fn decay<'py>(
@@ -325,13 +325,13 @@ pub fn decay<'py>(
 ) -> PyResult<Bound<'py, PyAny>> {
     let mut how = Decay::new(halflife_scans).with_forget_below(forget_below);
     how.scans = scans;
-    told(py, progress, |_, progress| {
-        operations::decay(folder_of(&map)?, &how, |done, all| progress.tell(done, all))
+    reported(py, progress, |_, progress| {
+        operations::decay(folder_of(&map)?, &how, |done, all| progress.report(done, all))
     })
 }
 
-/// Checks every file of a map: a dict of sums, with a list of what was found in `"findings"`. The map is whole if
-/// `"damage"` is 0. `tiles` are the only ones to be checked, and nothing else is; `but_tiles` checks all but tiles.
+/// Checks every file of a map. Returns a dict of sums, with a list of problems in `"findings"`. The map is intact if
+/// `"damage"` is 0. With `tiles`, only these are checked; with `but_tiles`, all except tiles.
 #[pyfunction]
 #[pyo3(signature = (map, *, tiles=None, but_tiles=false, progress=None))]
 pub fn verify<'py>(
@@ -348,32 +348,32 @@ pub fn verify<'py>(
             VerifyScope::Tiles(tiles.into_iter().map(|[x, y, z]| TileIndex { x, y, z }).collect())
         }
         (Some(_), true) => {
-            return Err(wrong(py, "but_tiles", "tiles are named too; leave out one of the two"));
+            return Err(wrong(py, "but_tiles", "cannot be combined with tiles; leave out one of the two"));
         }
     };
     let mut findings = Vec::new();
-    let sums = told(py, progress, |_, progress| {
+    let sums = reported(py, progress, |_, progress| {
         integrity::verify_scope(
             folder_of(&map)?,
             &scope,
             |finding| findings.push(finding.clone()),
-            |done, all| progress.tell(done, all),
+            |done, all| progress.report(done, all),
         )
     })?;
     sums.set_item("findings", object(py, &findings)?)?;
     Ok(sums)
 }
 
-/// Repairs what can be repaired, and puts the rest aside: a dict of sums, with a list of what was done in `"done"`.
+/// Repairs a map and moves unrecoverable files aside. Returns a dict of sums, with a list of the repairs in `"done"`.
 #[pyfunction]
 #[pyo3(signature = (map, *, progress=None))]
 pub fn repair<'py>(py: Python<'py>, map: PathBuf, progress: Callback) -> PyResult<Bound<'py, PyAny>> {
     let mut done = Vec::new();
-    let sums = told(py, progress, |_, progress| {
+    let sums = reported(py, progress, |_, progress| {
         integrity::repair(
             folder_of(&map)?,
             |action| done.push(action.clone()),
-            |done, all| progress.tell(done, all),
+            |done, all| progress.report(done, all),
         )
     })?;
     sums.set_item("done", object(py, &done)?)?;

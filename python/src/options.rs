@@ -1,4 +1,5 @@
-//! Keywords as options: the one place that knows both. What is left out is the default of the options.
+//! Conversion of Python keywords to the options of builds and exports. Keywords that are not passed take the options'
+//! defaults.
 
 use crate::errors::{exception, wrong};
 use crate::keywords::Keywords;
@@ -22,7 +23,7 @@ const WHICH_VOXELS: [(&str, WhichVoxels); 3] =
 /// Whether the box of ignored points is in the body's frame.
 const FRAMES: [(&str, bool); 2] = [("sensor", false), ("body", true)];
 
-/// How scans are read: `voxtile.files.ReadOptions`.
+/// Returns how scans are read: `voxtile.files.ReadOptions`.
 pub fn read_options(py: Python<'_>, keywords: &mut Keywords<'_>) -> PyResult<ReadOptions> {
     let raised = |error: voxtile::Error| exception(py, &error);
     let mut options = ReadOptions::default();
@@ -52,7 +53,7 @@ pub fn read_options(py: Python<'_>, keywords: &mut Keywords<'_>) -> PyResult<Rea
     options.poses = keywords.path("poses")?;
     options.calib = keywords.path("calib")?;
     let mount = keywords.numbers("extrinsic")?.map(|mut numbers| {
-        // Of a 4 x 4 matrix the last row says nothing.
+        // The last row of a 4 x 4 matrix is constant.
         if numbers.len() == 16 {
             numbers.truncate(12);
         }
@@ -64,7 +65,7 @@ pub fn read_options(py: Python<'_>, keywords: &mut Keywords<'_>) -> PyResult<Rea
     Ok(options)
 }
 
-/// How a map is built: `voxtile.files.BuildOptions`.
+/// Returns how a map is built: `voxtile.files.BuildOptions`.
 pub fn build_options(
     py: Python<'_>,
     scans: &Path,
@@ -80,12 +81,13 @@ pub fn build_options(
     options.min_range_m = keywords.number("min_range")?;
     options.max_range_m = keywords.number("max_range")?;
     options.sensor_model = keywords.one_of("sensor_model", &SENSOR_MODELS)?;
-    options.probabilities = match keywords.numbers("probabilities")? {
-        Some(numbers) => Some(numbers.try_into().map_err(|_| {
-            wrong(py, "probabilities", "must be four numbers: of a hit, of a miss, least, most")
-        })?),
-        None => None,
-    };
+    options.probabilities =
+        match keywords.numbers("probabilities")? {
+            Some(numbers) => Some(numbers.try_into().map_err(|_| {
+                wrong(py, "probabilities", "must be four numbers: hit, miss, minimum, maximum")
+            })?),
+            None => None,
+        };
     options.occupancy_threshold = keywords.number("occupancy_threshold")?;
     options.intensity_threshold = keywords.number("intensity_threshold")?;
     options.intensity_max = keywords.number("intensity_max")?;
@@ -105,7 +107,7 @@ pub fn build_options(
     Ok(options)
 }
 
-/// What is written: `voxtile.files.ExportOptions`.
+/// Returns how a map is exported: `voxtile.files.ExportOptions`.
 pub fn export_options(
     py: Python<'_>,
     map: PathBuf,
@@ -118,7 +120,7 @@ pub fn export_options(
     let what = keywords.one_of("what", &WHICH_VOXELS)?;
     let min_probability = keywords.number("min_probability")?.map(WhichVoxels::AtLeast);
     if what.is_some() && min_probability.is_some() {
-        return Err(wrong(py, "min_probability", "says itself which voxels; leave `what` out"));
+        return Err(wrong(py, "min_probability", "cannot be combined with `what`; leave one of the two out"));
     }
     options.which = min_probability.or(what);
     options.z_min_m = keywords.number("z_min")?;
@@ -133,7 +135,7 @@ pub fn export_options(
     Ok(options)
 }
 
-/// The file or folder, whatever its name: `-` is no standard input here.
+/// Returns the path of a file or folder. Here `-` is a file name, not standard input.
 pub fn no_stream(path: &Path) -> PathBuf {
     if path.as_os_str() == "-" { Path::new(".").join(path) } else { path.to_owned() }
 }

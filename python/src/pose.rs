@@ -1,4 +1,4 @@
-//! Poses as programs of Python have them.
+//! Poses in the forms that Python programs use.
 
 use crate::arrays::doubles;
 use crate::errors::{exception, wrong};
@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use voxtile::{Point, Pose};
 
-/// `world_from_sensor`: a matrix of 4 x 4 or 3 x 4, seven numbers x y z qx qy qz qw, or a tuple of position and
+/// Parses `world_from_sensor`: a matrix of 4 x 4 or 3 x 4, seven numbers x y z qx qy qz qw, or a tuple of position and
 /// quaternion (x, y, z, w).
 pub fn pose_of(pose: &Bound<'_, PyAny>) -> PyResult<Pose> {
     let py = pose.py();
@@ -34,7 +34,7 @@ pub fn pose_of(pose: &Bound<'_, PyAny>) -> PyResult<Pose> {
     made.map_err(|error| exception(py, &error))
 }
 
-/// A point: three numbers.
+/// Parses a point: three numbers.
 pub fn point_of(argument: &str, point: &Bound<'_, PyAny>) -> PyResult<Point> {
     let (shape, numbers) = doubles(argument, point)?;
     <Point>::try_from(numbers).map_err(|_| {
@@ -42,7 +42,7 @@ pub fn point_of(argument: &str, point: &Bound<'_, PyAny>) -> PyResult<Point> {
     })
 }
 
-/// A pose as a matrix of 4 x 4, row by row.
+/// Returns a pose as a matrix of 4 x 4, row by row.
 pub fn matrix_of(pose: &Pose) -> Vec<[f64; 4]> {
     let matrix = pose.isometry().to_homogeneous();
     (0..4).map(|row| std::array::from_fn(|column| matrix[(row, column)])).collect()

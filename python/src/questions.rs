@@ -1,4 +1,4 @@
-//! Questions about many points, rays and boxes. Answers are lists in the order of the questions.
+//! Queries of many points, rays and boxes. Results are lists in the order of the input.
 
 use crate::arrays::{PointSlice, doubles};
 use crate::errors::wrong;
@@ -10,14 +10,14 @@ use voxtile::{
     Aabb, Error, Evidence, Hit, MapQueries, Point, Queries, RayQuery, Result, Shape, Stop, UnknownAs,
 };
 
-/// Points that are asked before looking whether to stop.
+/// Points per query before the next check for a stop.
 const POINTS_AT_A_TIME: usize = 1 << 20;
-/// Rays likewise: each may cross a million voxels.
+/// Rays per query: fewer, because each may cross a million voxels.
 const RAYS_AT_A_TIME: usize = 1 << 14;
-/// Most bytes of a dense array.
+/// Upper bound on the size of a dense array in bytes.
 const MAX_DENSE_BYTES: u64 = 1 << 32;
 
-/// Boxes of an array of N x 6 or N x 2 x 3: lower and upper corner, in metres.
+/// Parses boxes of an array of N x 6 or N x 2 x 3: lower and upper corner, in metres.
 pub fn bodies_of(boxes: &Bound<'_, PyAny>) -> PyResult<Vec<Shape>> {
     let (shape, corners) = doubles("boxes", boxes)?;
     if !matches!(shape[..], [_, 6] | [_, 2, 3] | [0]) {
@@ -29,7 +29,7 @@ pub fn bodies_of(boxes: &Bound<'_, PyAny>) -> PyResult<Vec<Shape>> {
     Ok(corners.as_chunks().0.iter().map(body).collect())
 }
 
-/// The exact evidence at each point, as `of` writes it.
+/// Writes the exact evidence at each point, converted by `of`.
 pub fn evidences<T>(
     source: &Source,
     stop: &Stop,
@@ -47,7 +47,7 @@ pub fn evidences<T>(
     })
 }
 
-/// What each ray hits first.
+/// Returns the first hit of each ray.
 pub fn rays(source: &Source, stop: &Stop, rays: &[RayQuery]) -> Result<Vec<Option<Hit>>> {
     source.ask(stop, |map| {
         let mut hits = Vec::with_capacity(rays.len());
@@ -59,7 +59,7 @@ pub fn rays(source: &Source, stop: &Stop, rays: &[RayQuery]) -> Result<Vec<Optio
     })
 }
 
-/// The occupied voxel nearest to each point.
+/// Returns the occupied voxel nearest to each point.
 pub fn nearest(
     source: &Source,
     stop: &Stop,
@@ -76,7 +76,7 @@ pub fn nearest(
     })
 }
 
-/// Whether each body touches something.
+/// Returns whether each body touches an occupied voxel.
 pub fn collisions(source: &Source, stop: &Stop, bodies: &[Shape], unknown: UnknownAs) -> Result<Vec<bool>> {
     source.ask(stop, |map| {
         let mut collide = Vec::with_capacity(bodies.len());
@@ -88,7 +88,7 @@ pub fn collisions(source: &Source, stop: &Stop, bodies: &[Shape], unknown: Unkno
     })
 }
 
-/// Centers in metres and probabilities of occupied voxels, tile by tile.
+/// Returns centers in metres and probabilities of occupied voxels, tile by tile.
 pub fn occupied(map: &View<'_>, region: Option<&Aabb>, least: Option<f64>) -> Result<(Vec<Point>, Vec<f32>)> {
     let grid = map.config().grid;
     let (mut centers, mut probabilities) = (Vec::new(), Vec::new());
@@ -99,7 +99,7 @@ pub fn occupied(map: &View<'_>, region: Option<&Aabb>, least: Option<f64>) -> Re
     Ok((centers, probabilities))
 }
 
-/// The box of a region in voxels, and a value for each of them, the last axis first.
+/// Returns the box of a region in voxels, and a value for each of them, the last axis first.
 pub fn dense<T: Clone>(
     map: &View<'_>,
     region: &Aabb,
@@ -118,19 +118,19 @@ pub fn dense<T: Clone>(
     Ok((voxels, values))
 }
 
-/// An array with the same value everywhere, if there is memory for it: an allocation that fails would end the process.
+/// Allocates an array filled with one value. Returns an error if memory is short: a failed allocation would end the
+/// process.
 fn array_of<T: Clone>(edges: [u64; 3], value: T) -> Result<Vec<T>> {
     let count = edges.iter().try_fold(1_u64, |count, &edge| count.checked_mul(edge)).unwrap_or(u64::MAX);
     let bytes = count.saturating_mul(size_of::<T>() as u64);
     let too_large =
         |limit, hint| Error::TooLarge { what: "number of bytes of the array", size: bytes, limit, hint };
     if bytes > MAX_DENSE_BYTES {
-        return Err(too_large(MAX_DENSE_BYTES, "ask for a smaller region, or for the occupied voxels alone"));
+        return Err(too_large(MAX_DENSE_BYTES, "choose a smaller region, or only the occupied voxels"));
     }
     let mut values = Vec::new();
-    // How much memory there is, nobody knows: less than this.
-    let no_memory =
-        |_| too_large(bytes.saturating_sub(1), "there is no memory for it: ask for a smaller region");
+    // The available memory is unknown, but smaller than the request.
+    let no_memory = |_| too_large(bytes.saturating_sub(1), "memory is short: choose a smaller region");
     values.try_reserve_exact(count as usize).map_err(no_memory)?;
     values.resize(count as usize, value);
     Ok(values)

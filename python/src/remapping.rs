@@ -1,9 +1,9 @@
-//! Maps that follow the scans that they keep: new poses, other parameters, removals.
+//! Replays of the scans that a map keeps: new poses, other parameters, removals.
 
 use crate::config::{memory_of, storage_of};
 use crate::errors::{exception_of_kind, wrong};
 use crate::map::region_of;
-use crate::operations::{Callback, MapOrSnapshot, folder_of, name_of, told};
+use crate::operations::{Callback, MapOrSnapshot, folder_of, name_of, reported};
 use crate::pose::pose_of;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -13,8 +13,8 @@ use voxtile::operations::{self, NewPoses, Remap, Replay, ScanSelection};
 use voxtile::space::Grid;
 use voxtile::{InsertMode, MapView};
 
-/// What every change of the scans can do.
-fn rework_of(
+/// Returns the options common to all replays.
+fn replay_of(
     py: Python<'_>,
     keep_as: Option<&str>,
     dry_run: bool,
@@ -24,11 +24,11 @@ fn rework_of(
     Ok(Replay::default().with_memory(memory_of(memory)?).with_keep_as(keep_as).with_dry_run(dry_run))
 }
 
-/// Gives the scans that a map keeps new poses, and maps again what they touch: one commit, after which the map is as if
+/// Assigns new poses to the scans that a map keeps, and replays the affected tiles. In one commit the map becomes as if
 /// it had been built with these poses.
 ///
-/// `poses` is one a scan in order (N x 4 x 4, N x 7, or a list of poses as `Map.insert` takes them), or a dict of scan
-/// numbers and poses. Scans that move and turn by no more than `tolerance`, metres and degrees, stay.
+/// `poses` is one pose per scan in order (N x 4 x 4, N x 7, or a list of poses as `Map.insert` takes them), or a dict
+/// of scan numbers and poses. Scans that move and turn by at most `tolerance` (metres, degrees) keep their poses.
 #[pyfunction]
 #[pyo3(signature = (map, poses, *, tolerance=None, keep_as=None, dry_run=false, memory=None, progress=None))]
 #[expect(clippy::too_many_arguments, reason = "keywords, in Python")]
@@ -49,17 +49,18 @@ pub fn remap<'py>(
         }
         Err(_) => NewPoses::InOrder(poses.try_iter()?.map(|pose| pose_of(&pose?)).collect::<PyResult<_>>()?),
     };
-    let how = rework_of(py, keep_as, dry_run, memory.as_ref())?;
+    let how = replay_of(py, keep_as, dry_run, memory.as_ref())?;
     let tolerance = tolerance.map(|(moved_m, turned_deg)| (moved_m, turned_deg.to_radians()));
-    told(py, progress, |stop, progress| {
+    reported(py, progress, |stop, progress| {
         let how = Remap::new(how.with_stop(stop.clone())).with_tolerance(tolerance);
         operations::remap(&KeptSummary::read(folder_of(&map)?)?, &poses, &how, |done, all| {
-            progress.tell(done, all)
+            progress.report(done, all)
         })
     })
 }
 
-/// Makes another map of the scans that a map keeps, with other parameters; what is not named stays.
+/// Makes a new map of the scans that a map keeps, with other parameters. Parameters that are not passed are those of
+/// the map.
 #[pyfunction]
 #[pyo3(signature = (map, output, *, resolution=None, tile_size=None, min_range=None, max_range=None, insert_mode=None,
     storage=None, keep_scans=false, memory=None, progress=None))]
@@ -88,7 +89,7 @@ pub fn remap_as<'py>(
     };
     let storage = storage.map(|storage| storage_of(py, storage)).transpose()?;
     let memory = memory_of(memory.as_ref())?;
-    told(py, progress, |stop, progress| {
+    reported(py, progress, |stop, progress| {
         let reader = map.open()?;
         let own = reader.config().clone();
         let edges =
@@ -104,16 +105,17 @@ pub fn remap_as<'py>(
             rays.insert_mode = insert_mode.unwrap_or(rays.insert_mode);
             rays
         };
-        operations::rebuild(&reader, &output, config, rays, stop, |done, all| progress.tell(done, all))
+        operations::rebuild(&reader, &output, config, rays, stop, |done, all| progress.report(done, all))
     })
 }
 
-/// Takes scans out of a map that keeps them, as if they had never been: `scans`, a first and a last number; `time`, a
-/// first and a last time stamp in nanoseconds; or `input`, the name of what they came from.
+/// Removes scans from a map that keeps them, as if they had never been inserted. Selects them by `scans`, a first and a
+/// last number; `time`, a first and a last time stamp in nanoseconds; or `input`, the name of the input that they were
+/// read from.
 ///
-/// Snapshots that hold any of them are named in the answer (`snapshots_with_them`), and deleted if `from_snapshots`
-/// (`snapshots_deleted`). Raises `SnapshotsFailedError` if scans were removed, but a snapshot could not be read or
-/// deleted and may still contain some; its `report` is the answer.
+/// Snapshots that contain any of them are listed in `snapshots_with_them`, or deleted with `from_snapshots` and listed
+/// in `snapshots_deleted`. Raises `SnapshotsFailedError` if scans were removed, but a snapshot could not be read or
+/// deleted and may still contain some; its `report` is the report.
 #[pyfunction]
 #[pyo3(signature = (map, *, scans=None, time=None, input=None, from_snapshots=false, keep_as=None, dry_run=false,
     memory=None, progress=None))]
@@ -134,13 +136,13 @@ pub fn remove_scans<'py>(
         (Some((first, last)), None, None) => ScanSelection::Numbers(first, last),
         (None, Some((first, last)), None) => ScanSelection::Time(first, last),
         (None, None, Some(name)) => ScanSelection::Input(name),
-        _ => return Err(wrong(py, "scans", "name one of scans, time and input")),
+        _ => return Err(wrong(py, "scans", "pass exactly one of scans, time and input")),
     };
-    let how = rework_of(py, keep_as, dry_run, memory.as_ref())?;
-    let report = told(py, progress, |stop, progress| {
+    let how = replay_of(py, keep_as, dry_run, memory.as_ref())?;
+    let report = reported(py, progress, |stop, progress| {
         let how = how.with_stop(stop.clone());
         operations::remove_scans(folder_of(&map)?, &selection, from_snapshots, &how, |done, all| {
-            progress.tell(done, all)
+            progress.report(done, all)
         })
     })?;
     let failed: Vec<Bound<'py, PyAny>> = report.get_item("snapshots_failed")?.extract()?;
@@ -155,7 +157,7 @@ pub fn remove_scans<'py>(
     Err(raised)
 }
 
-/// Takes all points in a box out of the scans that a map keeps, and maps again what their rays touched.
+/// Removes all points in a box from the scans that a map keeps, and replays the voxels that their rays crossed.
 #[pyfunction]
 #[pyo3(signature = (map, region, *, keep_as=None, dry_run=false, memory=None, progress=None))]
 pub fn remove_points<'py>(
@@ -168,9 +170,9 @@ pub fn remove_points<'py>(
     progress: Callback,
 ) -> PyResult<Bound<'py, PyAny>> {
     let region = region_of(region)?;
-    let how = rework_of(py, keep_as, dry_run, memory.as_ref())?;
-    told(py, progress, |stop, progress| {
+    let how = replay_of(py, keep_as, dry_run, memory.as_ref())?;
+    reported(py, progress, |stop, progress| {
         let how = how.with_stop(stop.clone());
-        operations::remove_points(folder_of(&map)?, &region, &how, |done, all| progress.tell(done, all))
+        operations::remove_points(folder_of(&map)?, &region, &how, |done, all| progress.report(done, all))
     })
 }

@@ -1,35 +1,35 @@
-//! What became of a scan.
+//! `voxtile.InsertReport`: counts of an insert.
 
 use pyo3::prelude::*;
 use voxtile::ScanReport;
 
-/// What became of the points of a scan, or of many.
+/// Counts of the points of a scan, or of several, and of the updates that they made.
 #[pyclass(frozen, get_all, eq, module = "voxtile")]
 #[derive(PartialEq)]
 pub struct InsertReport {
     /// Points received.
     points: u64,
-    /// Points that were skipped, for whatever cause.
+    /// Points skipped for any reason.
     skipped: u64,
     /// Points with a coordinate that is NaN or infinite.
     not_finite: u64,
-    /// Points too far away for a voxel index.
+    /// Points beyond the range of voxel indices.
     out_of_range: u64,
     /// Points at the sensor's own origin: no return.
     no_return: u64,
-    /// Points nearer than the min range.
+    /// Points closer than the minimum range.
     too_near: u64,
     /// Points whose ray would cross more than a million voxels.
     ray_too_long: u64,
     /// Points without the intensity that the sensor model needs.
     no_intensity: u64,
-    /// Points beyond the max range, whose rays were cut there.
+    /// Points beyond the maximum range, whose rays were cut there.
     cut_at_max_range: u64,
-    /// Updates of voxels by hits.
+    /// Voxel updates by hits.
     hits: u64,
-    /// Updates of voxels by misses.
+    /// Voxel updates by misses.
     misses: u64,
-    /// Tiles that received updates, each counted once a scan.
+    /// Tiles with updates, counted once per scan.
     tiles_touched: u64,
 }
 
@@ -54,7 +54,7 @@ impl From<ScanReport> for InsertReport {
 }
 
 impl InsertReport {
-    /// Adds what became of another scan.
+    /// Adds the counts of another report.
     pub fn add(&mut self, other: &Self) {
         self.points += other.points;
         self.skipped += other.skipped;

@@ -1,4 +1,4 @@
-//! A scan of arrays, as the library takes it.
+//! Scans of numpy arrays, as the library takes them.
 
 use crate::arrays::{PointSlice, Points, singles};
 use crate::errors::{exception, wrong};
@@ -7,16 +7,16 @@ use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
 use voxtile::{Point, Pose, ScanRef};
 
-/// The frame of a scan's points.
+/// Frame of a scan's points.
 pub enum Frame {
-    /// The sensor's, at a pose.
+    /// The sensor's frame, at a pose.
     Sensor(Pose),
-    /// The world's; rays begin here.
+    /// The world's frame, with the origin of the rays.
     World(Point),
 }
 
 impl Frame {
-    /// What a caller names: either a pose or an origin.
+    /// Takes either a pose or an origin.
     pub fn of(
         py: Python<'_>,
         pose: Option<&Bound<'_, PyAny>>,
@@ -26,13 +26,14 @@ impl Frame {
             (Some(pose), None) => Ok(Self::Sensor(pose_of(pose)?)),
             (None, Some(origin)) => Ok(Self::World(point_of("origin", origin)?)),
             _ => {
-                let reason = "name either the pose of the sensor, or its origin for points of the world";
+                let reason =
+                    "pass either the pose of the sensor, or its origin if points are in the world's frame";
                 Err(wrong(py, "pose", reason))
             }
         }
     }
 
-    /// The scan of these points.
+    /// Returns the scan of these points.
     pub fn scan<'a>(&self, points: PointSlice<'a>) -> ScanRef<'a> {
         match (self, points) {
             (Self::Sensor(pose), PointSlice::F32(points)) => ScanRef::in_sensor(*pose, points),
@@ -43,7 +44,7 @@ impl Frame {
     }
 }
 
-/// A scan as a caller gives it.
+/// A scan as passed by the caller.
 pub struct GivenScan<'py> {
     points: Points<'py>,
     frame: Frame,
@@ -51,7 +52,7 @@ pub struct GivenScan<'py> {
 }
 
 impl<'py> GivenScan<'py> {
-    /// From arguments: points, one of pose and origin, and perhaps intensities.
+    /// Takes arguments: points, one of pose and origin, and optional intensities.
     pub fn of(
         points: &Bound<'py, PyAny>,
         pose: Option<&Bound<'py, PyAny>>,
@@ -63,7 +64,7 @@ impl<'py> GivenScan<'py> {
         Ok(Self { points: Points::of("points", points)?, frame, intensities })
     }
 
-    /// From a pair of points and pose, or a triple with intensities.
+    /// Takes a pair of points and pose, or a triple with intensities.
     pub fn of_tuple(scan: &Bound<'py, PyAny>) -> PyResult<Self> {
         type Pair<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>);
         type Triple<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>);
@@ -80,7 +81,7 @@ impl<'py> GivenScan<'py> {
         Self::of(&points, Some(&pose), None, intensities.as_ref())
     }
 
-    /// The scan, borrowed.
+    /// Returns the scan, borrowed.
     pub fn scan(&self, py: Python<'_>) -> PyResult<ScanRef<'_>> {
         let scan = self.frame.scan(self.points.slice()?);
         match &self.intensities {

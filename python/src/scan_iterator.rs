@@ -1,11 +1,11 @@
-//! `voxtile.ScanIterator`: the scans of a file or folder, by the command's own readers, and those that a map keeps.
+//! `voxtile.ScanIterator`: the scans of a file or folder, or those that a map keeps.
 
 use crate::arrays::{column, rows};
 use crate::errors::{exception, exception_of_any};
 use crate::keywords::Keywords;
 use crate::options::{no_stream, read_options};
 use crate::pose::matrix_of;
-use crate::watched::left_to_itself;
+use crate::watched::run_detached;
 use numpy::{PyArray1, PyArray2};
 use parking_lot::Mutex;
 use pyo3::prelude::*;
@@ -19,28 +19,28 @@ use voxtile::{Pose, Result as Fallible, Stop};
 use voxtile_formats::{ReadOptions, ScanReach, ScanSource, SensorScan};
 use voxtile_pipeline::Watch;
 
-/// A scan that was read: points in the sensor's frame, and its pose.
+/// A scan: points in the sensor's frame, the pose, and intensities.
 type ReadScan<'py> =
     (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>, Option<Bound<'py, PyArray1<f32>>>);
 
-/// Iterates over scans: `(points, pose, intensities)`, what `Map.insert_many` takes.
+/// Iterates over scans: `(points, pose, intensities)`, as `Map.insert_many` takes them.
 #[pyclass(frozen, module = "voxtile")]
 pub struct ScanIterator {
     reading: Arc<Mutex<Reading>>,
-    /// As far as it is known.
+    /// Number of scans left, if known.
     left: AtomicUsize,
 }
 
 struct Reading {
     scans: Scans,
-    /// What was read for somebody who was interrupted meanwhile.
+    /// Scan that was read for a call that Ctrl-C interrupted.
     read: Option<Fallible<Option<SensorScan>>>,
 }
 
-/// Where scans come from.
+/// Source of the scans.
 enum Scans {
     Input(Box<dyn ScanSource + Send>),
-    /// A map that keeps them, and how many.
+    /// A map that keeps its scans, and their number.
     Kept(Box<KeptScans>, usize),
 }
 
@@ -53,7 +53,7 @@ impl Scans {
     }
 }
 
-/// A kept scan with all its points. Points in the world frame get a pose at the sensor's place.
+/// Reads a kept scan with all its points. Points in the world frame get a pose at the sensor's position.
 fn in_memory(scan: &KeptScan) -> Fallible<SensorScan> {
     let origin = scan.origin();
     let pose = scan.world_from_sensor();
@@ -92,7 +92,7 @@ impl ScanIterator {
                     reading.read = Some(reading.scans.next());
                 }
             };
-            left_to_itself(py, &Stop::default(), read)?;
+            run_detached(py, &Stop::default(), read)?;
             // Another thread may have taken it.
             if let Some(read) = self.reading.try_lock().and_then(|mut reading| reading.read.take()) {
                 break read;
@@ -102,24 +102,24 @@ impl ScanIterator {
             self.left.store(0, Ordering::Relaxed);
             return Ok(None);
         };
-        // Nobody waits for it, so that a step too few is no harm.
+        // A race between threads makes the hint wrong by one, which is harmless.
         self.left.store(self.left.load(Ordering::Relaxed).saturating_sub(1), Ordering::Relaxed);
         let SensorScan { points_in_sensor, intensities, world_from_sensor, .. } = scan;
         let pose = rows(py, matrix_of(&world_from_sensor))?;
         Ok(Some((rows(py, points_in_sensor)?, pose, intensities.map(|intensities| column(py, intensities)))))
     }
 
-    /// Number of scans to come, if it is known before they are read; else 0.
+    /// Number of scans left, if it is known without reading them; else 0.
     fn __length_hint__(&self) -> usize {
         self.left.load(Ordering::Relaxed)
     }
 }
 
-/// A path, and how it is read.
+/// A path and the options to read it.
 struct Input {
     path: PathBuf,
     options: ReadOptions,
-    /// Whether something was asked for.
+    /// Whether any option was passed.
     has_options: bool,
 }
 
@@ -145,11 +145,11 @@ impl Input {
     }
 }
 
-/// The scans of a path.
+/// Opens the scans of a path.
 #[pyfunction]
 pub fn open_scans(py: Python<'_>, path: PathBuf, options: &Bound<'_, PyDict>) -> PyResult<ScanIterator> {
     let input = Input::of(py, &path, options)?;
-    let opened = left_to_itself(py, &Stop::default(), move || input.open())?;
+    let opened = run_detached(py, &Stop::default(), move || input.open())?;
     let scans = opened.map_err(|error| exception_of_any(py, &error))?;
     let count = match &scans {
         Scans::Input(scans) => scans.len_hint(),
@@ -161,11 +161,11 @@ pub fn open_scans(py: Python<'_>, path: PathBuf, options: &Bound<'_, PyDict>) ->
     })
 }
 
-/// Content and bounds of a scan: west, south, east, north.
+/// Fingerprint and bounds of a scan: west, south, east, north.
 type Reach = (String, Option<(f64, f64, f64, f64)>);
 
-/// Reads the scans of a path, and tells of each what tells it from others, 32 hexadecimal digits, and a box around it
-/// and its rays along x and y in metres, `None` if it leaves nothing.
+/// Reads the scans of a path. Returns for each a fingerprint of 32 hexadecimal digits, and a box around it and its rays
+/// along x and y in metres, `None` if it changes no voxel.
 #[pyfunction]
 #[pyo3(signature = (path, options, *, max_range=None, no_return_range=None))]
 pub fn scan_reaches(
@@ -178,7 +178,7 @@ pub fn scan_reaches(
     let input = Input::of(py, &path, options)?;
     let stop = Stop::default();
     let asked = stop.clone();
-    let reaches = left_to_itself(py, &stop, move || -> anyhow::Result<Vec<Reach>> {
+    let reaches = run_detached(py, &stop, move || -> anyhow::Result<Vec<Reach>> {
         let (mut scans, mut reaches) = (input.open()?, Vec::new());
         while let Some(scan) = scans.next()? {
             asked.check()?;
@@ -191,11 +191,11 @@ pub fn scan_reaches(
     reaches.map_err(|error| exception_of_any(py, &error))
 }
 
-/// The number of scans of a path; where only reading tells it, they are read.
+/// Returns the number of scans of a path. Reads them if the format does not store their number.
 #[pyfunction]
 pub fn count_scans(py: Python<'_>, path: PathBuf, options: &Bound<'_, PyDict>) -> PyResult<usize> {
     let input = Input::of(py, &path, options)?;
-    let counted = left_to_itself(py, &Stop::default(), move || -> anyhow::Result<usize> {
+    let counted = run_detached(py, &Stop::default(), move || -> anyhow::Result<usize> {
         let mut scans = input.source()?;
         match scans.len_hint() {
             Some(count) => Ok(count),

@@ -1,4 +1,4 @@
-//! What can be asked: a map that takes scans, one that is read, a file of OctoMap.
+//! Open maps that can be queried: one open for writing, one open for reading, a file of OctoMap.
 
 use parking_lot::{Mutex, MutexGuard, RwLock};
 use std::fs::File;
@@ -8,14 +8,14 @@ use std::time::Duration;
 use voxtile::mapper::{LiveReader, MapReader, MapView, Mapper, OctreeMap, Stoppable};
 use voxtile::{Error, MapConfig, OutOfCoreTileMapper, Result, Stop, octree};
 
-/// What is asked: ends at the next tile once its stop is set.
+/// A view of a map that stops at the next tile once its stop is set.
 pub type View<'a> = Stoppable<'a, dyn MapView + 'a>;
 
 /// An open map.
 pub enum Source {
-    /// A map that takes scans. Questions go to the reader, which waits for no scan and no flush.
+    /// A map open for writing. Queries use the reader, which waits for no scan and no flush.
     Writer {
-        /// Gone once the map is closed, or once a defect has left it half changed.
+        /// `None` once the map is closed, or after a panic left it half changed.
         mapper: Mutex<Option<Box<OutOfCoreTileMapper>>>,
         /// Sees the map after each scan.
         reader: LiveReader,
@@ -26,26 +26,26 @@ pub enum Source {
     Octree(Box<OctreeMap>),
 }
 
-/// How often a view is taken anew because so much changed while it was held.
+/// Attempts at a query whose view expires because the map changed too much meanwhile.
 const ATTEMPTS: usize = 8;
-/// How long to wait for another thread's scan before looking whether to stop.
+/// Interval of checks for a stop while another thread holds the mapper.
 const BETWEEN_LOOKS: Duration = Duration::from_millis(50);
 
 impl Source {
-    /// A map that takes scans.
+    /// Wraps a mapper.
     pub fn writer(mapper: OutOfCoreTileMapper) -> Result<Self> {
         let reader = mapper.reader()?;
         Ok(Self::Writer { mapper: Mutex::new(Some(Box::new(mapper))), reader })
     }
 
-    /// A file of OctoMap.
+    /// Loads a file of OctoMap.
     pub fn octree(path: &Path) -> Result<Self> {
         let file = File::open(path).map_err(|error| Error::io(path, "open", error))?;
         let file = octree::read(BufReader::new(file)).map_err(|error| error.in_input(path))?;
         OctreeMap::of(file).map(|map| Self::Octree(Box::new(map)))
     }
 
-    /// How the map is made.
+    /// Returns the configuration of the map.
     pub fn config(&self) -> MapConfig {
         match self {
             Self::Writer { reader, .. } => reader.config().clone(),
@@ -54,7 +54,7 @@ impl Source {
         }
     }
 
-    /// Asks the map as it is after its latest scan.
+    /// Queries the map as it is after its latest scan.
     pub fn ask<T>(&self, stop: &Stop, mut question: impl FnMut(&View<'_>) -> Result<T>) -> Result<T> {
         let mut ask = |view: &dyn MapView| question(&Stoppable::new(view, stop));
         match self {
@@ -73,7 +73,7 @@ impl Source {
         }
     }
 
-    /// The mapper, once no other thread uses it; `None` if there is none (any more).
+    /// Returns the mapper once no other thread uses it; `None` if the map is read-only or closed.
     pub fn mapper(&self, stop: &Stop) -> Result<Option<MutexGuard<'_, Option<Box<OutOfCoreTileMapper>>>>> {
         let Self::Writer { mapper, .. } = self else { return Ok(None) };
         loop {
@@ -84,7 +84,7 @@ impl Source {
         }
     }
 
-    /// Changes the map. A defect on the way closes it: what it was left as is on no disk.
+    /// Changes the map. A panic closes it without a flush.
     pub fn change<T>(
         &self,
         stop: &Stop,
@@ -94,7 +94,7 @@ impl Source {
         changed(&mut guard, stop, change)
     }
 
-    /// Changes the map if no other thread uses it now. If one does, or the map is closed, the change is still there.
+    /// Changes the map if no other thread uses it now. Otherwise, or if the map is closed, `change` is left untouched.
     pub fn change_if_free<T, C>(&self, stop: &Stop, change: &mut Option<C>) -> Result<Option<T>>
     where
         C: FnOnce(&mut OutOfCoreTileMapper) -> Result<T>,
@@ -107,7 +107,7 @@ impl Source {
         }
     }
 
-    /// Whether a question waits for no other thread: a view that is being refreshed is read by nobody.
+    /// Returns whether a query would wait for no other thread. A refresh blocks the queries of a reader.
     pub fn is_free(&self) -> bool {
         match self {
             Self::Reader(reader) => reader.try_read().is_some(),
@@ -115,8 +115,8 @@ impl Source {
         }
     }
 
-    /// Closes a map that takes scans, and makes it durable before if it is to `flush`. No other thread's scan comes
-    /// between. After an error, and after a stop, the map is open.
+    /// Closes a map that is open for writing, after a flush if `flush` is set. No other thread can insert between flush
+    /// and close. After an error or a stop the map is still open.
     pub fn close(&self, stop: &Stop, flush: bool) -> Result<()> {
         let Some(mut guard) = self.mapper(stop)? else { return Ok(()) };
         if flush {

@@ -1,4 +1,4 @@
-//! `voxtile.TileIterator`: a map larger than memory, a tile at a time.
+//! `voxtile.TileIterator`: the occupied voxels of a map that may be larger than memory.
 
 use crate::arrays::{column, rows};
 use crate::map::closed;
@@ -12,7 +12,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use voxtile::{Aabb, TileIndex};
 
-/// The occupied voxels of a map, a tile at a time: `(tile, centers, probabilities)`.
+/// Iterates over the occupied voxels of a map, tile by tile: `(tile, centers, probabilities)`.
 #[pyclass(frozen, module = "voxtile")]
 pub struct TileIterator {
     source: Arc<Source>,
@@ -22,7 +22,7 @@ pub struct TileIterator {
 }
 
 impl TileIterator {
-    /// Tiles with their boxes in metres, in this order.
+    /// Iterates over tiles with their boxes in metres, in this order.
     pub fn new(
         source: Arc<Source>,
         path: PathBuf,

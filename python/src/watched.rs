@@ -1,4 +1,4 @@
-//! Work beside the interpreter: its lock is released, and Ctrl-C ends the work.
+//! Work without the interpreter's lock, which Ctrl-C ends.
 
 use crate::errors::exception;
 use parking_lot::{Condvar, Mutex};
@@ -11,17 +11,17 @@ use std::thread;
 use std::time::{Duration, Instant};
 use voxtile::{Error, Result, Stop};
 
-/// How often signals are looked for.
+/// Interval of checks for signals.
 pub const BETWEEN_LOOKS: Duration = Duration::from_millis(50);
 
-/// How long after Ctrl-C work may go on before it is left to itself.
+/// Time that work may continue after Ctrl-C before its thread is detached.
 const PATIENCE: Duration = Duration::from_millis(500);
 
-/// What unwinds work that cannot return early: nothing is wrong.
-struct GivenUp;
+/// Panic payload that unwinds cancelled work.
+struct Cancelled;
 
-/// Does work in a thread of its own, so that this one can see to signals. The work is asked to stop by a signal handler
-/// that raises, and is waited for: nothing goes on behind the caller's back.
+/// Runs `work` in another thread while this one checks for signals. If a signal handler raises, the stop is set and the
+/// call waits for the work to end.
 pub fn watched<T: Send>(py: Python<'_>, work: impl FnOnce(&Stop) -> Result<T> + Send) -> PyResult<T> {
     watched_by(py, &Stop::default(), work)
 }
@@ -49,9 +49,9 @@ fn watched_by<T: Send>(
     }
 }
 
-/// Does work that owns all it needs, in a thread of its own. After Ctrl-C it is asked to stop; if that takes longer
-/// than anybody would wait, its thread finishes it and drops its answer. The interpreter waits for it before it exits.
-pub fn left_to_itself<T: Send + 'static>(
+/// Runs work that owns its data in another thread. After Ctrl-C the stop is set; if the work does not end soon, its
+/// thread finishes it and drops the result. The interpreter waits for that thread before it exits.
+pub fn run_detached<T: Send + 'static>(
     py: Python<'_>,
     stop: &Stop,
     work: impl FnOnce() -> T + Send + 'static,
@@ -60,7 +60,7 @@ pub fn left_to_itself<T: Send + 'static>(
     let counted = UnderWay::begin();
     let run = move || {
         let done = catch_unwind(AssertUnwindSafe(work));
-        // Whoever asked may have gone; what nobody takes is dropped before the work counts as done.
+        // The caller may have returned. An unreceived result is dropped before the work counts as done.
         drop(answer.send(done));
         drop(answer);
         drop(counted);
@@ -70,22 +70,22 @@ pub fn left_to_itself<T: Send + 'static>(
         (_, Some(raised)) => Err(raised),
         (Some(Ok(answer)), None) => Ok(answer),
         (Some(Err(panic)), None) => Err(defect(&*panic)),
-        (None, None) => Err(defect(&"a thread without an answer")),
+        (None, None) => Err(defect(&"a thread ended without a result")),
     }
 }
 
-/// [`left_to_itself`] for work of the library.
+/// [`run_detached`] for work of the library.
 pub fn finished<T: Send + 'static>(
     py: Python<'_>,
     work: impl FnOnce(&Stop) -> Result<T> + Send + 'static,
 ) -> PyResult<T> {
     let stop = Stop::default();
     let of_work = stop.clone();
-    left_to_itself(py, &stop, move || work(&of_work))?.map_err(|error| exception(py, &error))
+    run_detached(py, &stop, move || work(&of_work))?.map_err(|error| exception(py, &error))
 }
 
-/// Waits for an answer, or for the end of whoever was to send one. After a signal handler has raised, which sets the
-/// stop, at most for `patience`.
+/// Waits for a result, or for the sender to be dropped. After a signal handler has raised, which sets the stop, it
+/// waits at most `patience`.
 fn answer_or_interrupt<T>(
     answers: &Receiver<T>,
     stop: &Stop,
@@ -110,7 +110,7 @@ fn answer_or_interrupt<T>(
     }
 }
 
-/// Work that may outlive the call that began it.
+/// Counter of work that may outlive the call that began it.
 struct UnderWay;
 
 static UNDER_WAY: Mutex<usize> = Mutex::new(0);
@@ -130,7 +130,7 @@ impl Drop for UnderWay {
     }
 }
 
-/// Waits until nothing goes on that was interrupted; Ctrl-C ends the waiting.
+/// Waits until all interrupted work has ended; Ctrl-C ends the wait.
 #[pyfunction]
 pub fn wait_for_all(py: Python<'_>) -> PyResult<()> {
     loop {
@@ -148,13 +148,13 @@ pub fn wait_for_all(py: Python<'_>) -> PyResult<()> {
     }
 }
 
-/// Short work on this thread: it takes less time than anybody would wait for Ctrl-C.
+/// Runs short work on this thread, without checks for Ctrl-C.
 pub fn at_once<T: Send>(py: Python<'_>, work: impl FnOnce(&Stop) -> Result<T> + Send) -> PyResult<T> {
     py.detach(|| work(&Stop::default())).map_err(|error| exception(py, &error))
 }
 
-/// Asks on this thread, which is cheaper than one of its own; `None` if that takes longer than [`BETWEEN_LOOKS`], for
-/// then somebody may wait for Ctrl-C.
+/// Runs a query on this thread, which is cheaper than a thread of its own. Returns `None` if it takes longer than
+/// [`BETWEEN_LOOKS`]: Ctrl-C would wait for it.
 pub fn briefly<T: Send>(py: Python<'_>, ask: impl FnOnce(&Stop) -> Result<T> + Send) -> PyResult<Option<T>> {
     match py.detach(|| ask(&Stop::after(BETWEEN_LOOKS))) {
         Err(Error::Stopped) => Ok(None),
@@ -162,69 +162,68 @@ pub fn briefly<T: Send>(py: Python<'_>, ask: impl FnOnce(&Stop) -> Result<T> + S
     }
 }
 
-/// [`watched`] for work that says how far it is. A callback that raises ends the work, and so does Ctrl-C.
+/// [`watched`] for work that reports its progress. A callback that raises ends the work, as Ctrl-C does.
 pub fn watched_with_progress<T: Send>(
     py: Python<'_>,
     callback: Option<Py<PyAny>>,
     work: impl FnOnce(&Stop, &Progress<'_>) -> Result<T> + Send,
 ) -> PyResult<T> {
     let stop = Stop::default();
-    let teller = callback.map(|callback| Teller::new(stop.clone(), callback));
-    let done = watched_by(py, &stop, |stop| work(stop, &Progress { stop, teller: teller.as_ref() }));
-    match teller.and_then(|teller| teller.raised()) {
+    let reporter = callback.map(|callback| Reporter::new(stop.clone(), callback));
+    let done = watched_by(py, &stop, |stop| work(stop, &Progress { stop, reporter: reporter.as_ref() }));
+    match reporter.and_then(|reporter| reporter.raised()) {
         Some(raised) => Err(raised),
         None => done,
     }
 }
 
-/// How far work is that cannot return early.
+/// Progress of work that cannot return early.
 pub struct Progress<'a> {
     stop: &'a Stop,
-    teller: Option<&'a Teller>,
+    reporter: Option<&'a Reporter>,
 }
 
 impl Progress<'_> {
-    /// Tells of `done` out of `all`. Leaves the work by unwinding if it is to be given up: maps bear that anywhere, as
-    /// they bear a crash.
-    pub fn tell(&self, done: u64, all: u64) {
-        if let Some(teller) = self.teller {
-            teller.tell(done, all);
+    /// Reports `done` of `all`. Unwinds if the work was cancelled: maps tolerate that anywhere, like a crash.
+    pub fn report(&self, done: u64, all: u64) {
+        if let Some(reporter) = self.reporter {
+            reporter.report(done, all);
         }
         if self.stop.is_set() {
-            resume_unwind(Box::new(GivenUp));
+            resume_unwind(Box::new(Cancelled));
         }
     }
 }
 
-/// Tells a callback of Python how far work is. A callback that raises stops the work.
-pub struct Teller {
+/// Reports progress to a Python callback. A callback that raises stops the work.
+pub struct Reporter {
     stop: Stop,
     callback: Py<PyAny>,
     raised: Mutex<Option<PyErr>>,
-    told: Mutex<Option<Instant>>,
+    reported: Mutex<Option<Instant>>,
 }
 
-impl Teller {
-    /// Tells this callback.
+impl Reporter {
+    /// Reports to this callback.
     pub fn new(stop: Stop, callback: Py<PyAny>) -> Self {
-        Self { stop, callback, raised: Mutex::new(None), told: Mutex::new(None) }
+        Self { stop, callback, raised: Mutex::new(None), reported: Mutex::new(None) }
     }
 
-    /// Tells of `done` out of `all`, not more often than a person can see, and nothing after a stop.
-    pub fn tell(&self, done: u64, all: u64) {
-        let mut told = self.told.lock();
-        let is_soon = done != all && told.is_some_and(|told| told.elapsed() < BETWEEN_LOOKS);
+    /// Reports `done` of `all`, at most once per [`BETWEEN_LOOKS`], and nothing after a stop.
+    pub fn report(&self, done: u64, all: u64) {
+        let mut reported = self.reported.lock();
+        let is_soon = done != all && reported.is_some_and(|reported| reported.elapsed() < BETWEEN_LOOKS);
         if self.stop.is_set() || is_soon {
             return;
         }
-        *told = Some(Instant::now());
+        *reported = Some(Instant::now());
         if let Err(raised) = Python::attach(|py| self.callback.call1(py, (done, all)).map(drop)) {
             *self.raised.lock() = Some(raised);
             self.stop.set();
         }
     }
 
-    /// What the callback raised.
+    /// Takes the exception that the callback raised.
     pub fn raised(&self) -> Option<PyErr> {
         self.raised.lock().take()
     }
@@ -232,5 +231,5 @@ impl Teller {
 
 fn defect(panic: &(dyn Any + Send)) -> PyErr {
     let text = panic.downcast_ref::<String>().map(String::as_str).or(panic.downcast_ref::<&str>().copied());
-    PyRuntimeError::new_err(format!("a defect of voxtile: {}", text.unwrap_or("a panic without a text")))
+    PyRuntimeError::new_err(format!("a defect of voxtile: {}", text.unwrap_or("a panic without a message")))
 }

@@ -1,4 +1,4 @@
-"""What the tests share: random scans, and a naive map to compare with."""
+"""Random scans, and a naive map to compare with."""
 
 from __future__ import annotations
 
@@ -10,7 +10,9 @@ Scan = tuple[NDArray[np.float32], NDArray[np.float64]]
 
 
 class NaiveMap:
-    """OctoMap's log-odds, once a scan, with rays walked voxel by voxel at exact crossings. A dict is the map."""
+    """OctoMap's log-odds, updated once per scan. Rays are walked voxel by voxel at exact crossings; a dict stores
+    the voxels.
+    """
 
     HIT, MISS, MIN, MAX = (float(np.log(p / (1 - p))) for p in (0.7, 0.4, 0.1192, 0.971))
 
@@ -42,7 +44,7 @@ class NaiveMap:
 
 
 def scans_of(seed: int, count: int = 4, points: int = 300) -> list[Scan]:
-    """Scans of a room, in the sensor's frame, and poses as x y z qx qy qz qw."""
+    """Generates scans of a room in the sensor's frame, and poses as x y z qx qy qz qw."""
     random = np.random.default_rng(seed)
     scans = []
     for number in range(count):
@@ -57,7 +59,7 @@ def scans_of(seed: int, count: int = 4, points: int = 300) -> list[Scan]:
 
 
 def matrix_of(pose: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The matrix of a pose that turns about z alone."""
+    """Returns the matrix of a pose that rotates only about z."""
     x, y, z, _, _, sine, cosine = pose
     yaw = 2 * np.arctan2(sine, cosine)
     c, s = np.cos(yaw), np.sin(yaw)
@@ -66,5 +68,5 @@ def matrix_of(pose: NDArray[np.float64]) -> NDArray[np.float64]:
 
 @pytest.fixture
 def room() -> list[Scan]:
-    """A few scans."""
+    """A few scans of a room."""
     return scans_of(7)

@@ -1,4 +1,4 @@
-"""Maps that several processes make, part by part."""
+"""Distributed builds and updates with dask."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ OPTIONS = {"resolution": 0.25, "tile_size": 2.0, "max_range": 4.0}
 
 @pytest.fixture
 def drive(tmp_path: Path) -> Path:
-    """Scans along a street, each of them seven metres on."""
+    """Scans along a street, seven metres apart."""
     folder = tmp_path / "drive"
     folder.mkdir()
     header = "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\n"
@@ -71,13 +71,13 @@ def test_any_regions_make_the_map_of_one_build(
     assert len(files) > 20 and all(file.stat().st_nlink == 1 for file in files)
 
 
-def test_workers_that_are_killed_change_nothing(drive: Path, whole: str, tmp_path: Path) -> None:
+def test_killed_workers_do_not_change_the_map(drive: Path, whole: str, tmp_path: Path) -> None:
     cluster = distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None)
     killed = []
     parts = tmp_path / "map.parts"
 
     def kill(client: object) -> None:
-        # When the first part is there, others are being made.
+        # Once the first part exists, others are being built.
         while not any(parts.glob("*-*-*")):
             time.sleep(0.001)
         for worker in list(cluster.workers.values())[:1]:
@@ -111,7 +111,7 @@ def test_a_function_of_the_tiles_sees_every_voxel_once(client: object, drive: Pa
     assert len(found) == len(tiles) > 20
     assert sum(count for count, _ in found) == occupied > 0
     assert np.isclose(sum(total for _, total in found), np.nansum(dense))
-    # In the order that was asked for, and of a snapshot.
+    # In the given order, and of a snapshot.
     some = [tuple(int(number) for number in tile) for tile in tiles[:3]]
     back = voxtile_dask.map_tiles(tmp_path / "map", _occupied, tiles=some[::-1]).compute()
     assert back == found[:3][::-1]
@@ -122,10 +122,10 @@ def test_a_function_of_the_tiles_sees_every_voxel_once(client: object, drive: Pa
     assert voxtile_dask.map_tiles(tmp_path / "map", _occupied, snapshot="before").compute() == found
 
 
-def test_the_worker_that_fails_is_named(
+def test_an_error_names_the_failed_worker(
     drive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # No file of a worker may grow beyond a kilobyte: its disk is full.
+    # Files of a worker are limited to a kilobyte, as on a full disk.
     def fill(dask_worker: object) -> None:
         import resource
         import signal
@@ -142,7 +142,7 @@ def test_the_worker_that_fails_is_named(
             voxtile_dask.build(drive, tmp_path / "map", client=client, **OPTIONS)
 
 
-def test_workers_killed_again_and_again_leave_a_map_or_an_error_and_the_next_run_goes_on(
+def test_a_build_resumes_after_repeated_kills_of_workers(
     drive: Path, whole: str, tmp_path: Path
 ) -> None:
     # VOXTILE_DASK_KILLS=20 takes a minute.
@@ -169,11 +169,11 @@ def test_workers_killed_again_and_again_leave_a_map_or_an_error_and_the_next_run
                 voxtile_dask.build(drive, tmp_path / "map", region_size=4.0, client=client, **OPTIONS)
             except errors.VoxtileError as error:
                 failures += 1
-                assert "call again to go on" in str(error) and failures <= kills
+                assert "call again to resume" in str(error) and failures <= kills
                 continue
             if killed >= kills:
                 break
-            # It was too fast for them.
+            # The build finished before the kills.
             assert voxtile.digest(tmp_path / "map") == whole
             shutil.rmtree(tmp_path / "map")
         is_over.set()
@@ -181,26 +181,26 @@ def test_workers_killed_again_and_again_leave_a_map_or_an_error_and_the_next_run
     assert killed == kills and voxtile.digest(tmp_path / "map") == whole
 
 
-def test_a_scheduler_that_is_killed_is_an_error_and_the_next_run_goes_on(
+def test_a_build_resumes_after_a_kill_of_the_scheduler(
     drive: Path, whole: str, tmp_path: Path
 ) -> None:
     start = "import sys; from dask.__main__ import main; sys.exit(main())"
-    told = tmp_path / "scheduler.json"
+    address = tmp_path / "scheduler.json"
     dask = [sys.executable, "-c", start]
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    common = [f"--scheduler-file={told}", "--no-dashboard"]
+    common = [f"--scheduler-file={address}", "--no-dashboard"]
     scheduler = subprocess.Popen([*dask, "scheduler", "--port=0", *common], **quiet)
     worker = subprocess.Popen(
         [*dask, "worker", "--nthreads=1", f"--local-directory={tmp_path}", *common], **quiet
     )
     try:
-        client = distributed.Client(scheduler_file=str(told), timeout="60s")
+        client = distributed.Client(scheduler_file=str(address), timeout="60s")
 
         def kill(done: int, regions: int) -> None:
             if done == 2:
                 scheduler.kill()
 
-        with pytest.raises(errors.VoxtileError, match="call again to go on"):
+        with pytest.raises(errors.VoxtileError, match="call again to resume"):
             voxtile_dask.build(
                 drive, tmp_path / "map", region_size=4.0, client=client, progress=kill, **OPTIONS
             )
@@ -216,7 +216,7 @@ def test_a_scheduler_that_is_killed_is_an_error_and_the_next_run_goes_on(
 
 
 @pytest.mark.parametrize("error", [CancelledError("lost"), distributed.comm.CommClosedError("closed")])
-def test_a_scheduler_that_ends_in_the_midst_of_an_answer_is_an_error_that_says_what_to_do(
+def test_a_scheduler_lost_during_a_call_is_an_error_with_a_remedy(
     error: BaseException, drive: Path, whole: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     city, other = tmp_path / "whole", tmp_path / "other"
@@ -238,21 +238,21 @@ def test_a_scheduler_that_ends_in_the_midst_of_an_answer_is_an_error_that_says_w
         for method, call in calls:
             with monkeypatch.context() as broken:
                 broken.setattr(*method, fail)
-                with pytest.raises(errors.VoxtileError, match="call again.*a scheduler that runs"):
+                with pytest.raises(errors.VoxtileError, match="call again.*a running scheduler"):
                     call()
-        # None of them leaves anything that is in the way of the next call.
+        # No failed call blocks the next one.
         for _, call in calls[1:]:
             call()
     assert voxtile.digest(other) == voxtile.digest(tmp_path / "merged") == whole
 
 
-def test_a_folder_in_the_way_stays_and_what_a_killed_call_left_does_not(
+def test_merge_keeps_foreign_folders_and_removes_remains_of_killed_calls(
     client: object, drive: Path, whole: str, tmp_path: Path
 ) -> None:
     beside = tmp_path / "merged.columns"
     beside.mkdir()
     (beside / "thesis.txt").write_text("mine")
-    with pytest.raises(errors.ArgumentError, match="thesis.txt in it is of no earlier call"):
+    with pytest.raises(errors.ArgumentError, match="contains thesis.txt"):
         voxtile_dask.merge([tmp_path / "whole"], tmp_path / "merged", client=client)
     assert (beside / "thesis.txt").read_text() == "mine"
     (beside / "thesis.txt").unlink()
@@ -261,16 +261,16 @@ def test_a_folder_in_the_way_stays_and_what_a_killed_call_left_does_not(
     assert voxtile.digest(tmp_path / "merged") == whole and not list(tmp_path.glob("merged.*"))
 
 
-def test_a_folder_of_that_name_stays_when_a_map_is_built(client: object, drive: Path, tmp_path: Path) -> None:
+def test_a_build_keeps_a_foreign_folder_of_parts(client: object, drive: Path, tmp_path: Path) -> None:
     parts = tmp_path / "map.parts"
     parts.mkdir()
     (parts / "thesis.txt").write_text("mine")
-    with pytest.raises(errors.ArgumentError, match="thesis.txt in it is of no earlier call"):
+    with pytest.raises(errors.ArgumentError, match="contains thesis.txt"):
         voxtile_dask.build(drive, tmp_path / "map", region_size=4.0, client=client, **OPTIONS)
     assert [path.name for path in parts.iterdir()] == ["thesis.txt"] and not (tmp_path / "map").exists()
 
 
-def test_parts_of_a_call_that_was_given_up_are_in_no_other_map(
+def test_parts_of_an_abandoned_call_are_not_used(
     client: object, drive: Path, whole: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fail(*_: object) -> None:
@@ -280,7 +280,7 @@ def test_parts_of_a_call_that_was_given_up_are_in_no_other_map(
         broken.setattr("voxtile.dask.building.join", fail)
         with pytest.raises(errors.DiskError, match="full"):
             voxtile_dask.build(drive, tmp_path / "map", region_size=4.0, client=client, **OPTIONS)
-    # The folder was removed, and these come from tasks that were still at work.
+    # The folder was removed; these parts come from tasks that were still running.
     (tmp_path / "map.parts" / "map_id.json").unlink()
     for part in list((tmp_path / "map.parts").glob("*-*-*"))[1:]:
         shutil.rmtree(part)
@@ -288,7 +288,7 @@ def test_parts_of_a_call_that_was_given_up_are_in_no_other_map(
     assert report["regions_done_before"] == 0 and voxtile.digest(tmp_path / "map") == whole
 
 
-def test_a_stray_point_makes_no_regions_where_rays_are_cut(client: object, drive: Path, tmp_path: Path) -> None:
+def test_a_point_beyond_max_range_adds_no_regions(client: object, drive: Path, tmp_path: Path) -> None:
     scan = drive / "003.pcd"
     content = bytearray(scan.read_bytes())
     struct.pack_into("<2f", content, content.index(b"DATA binary\n") + len(b"DATA binary\n"), 1e7, 1e7)
@@ -302,7 +302,7 @@ def test_a_stray_point_makes_no_regions_where_rays_are_cut(client: object, drive
     assert {path.name for path in tmp_path.iterdir()} == {"drive", "map", "whole"}
 
 
-def test_maps_without_tiles_fade_and_merge_like_others(client: object, tmp_path: Path) -> None:
+def test_maps_without_tiles_decay_and_merge(client: object, tmp_path: Path) -> None:
     empty = tmp_path / "empty"
     voxtile.Map.create(empty, resolution=0.2).close()
     voxtile_dask.decay(empty, tmp_path / "faded", 10.0, client=client)
@@ -312,12 +312,12 @@ def test_maps_without_tiles_fade_and_merge_like_others(client: object, tmp_path:
         assert voxtile.open(tmp_path / made).resolution == 0.2
 
 
-def test_a_worker_whose_disk_is_another_file_system_copies_its_parts(
+def test_a_worker_on_another_file_system_copies_its_parts(
     drive: Path, whole: str, tmp_path: Path
 ) -> None:
     memory = Path("/dev/shm")
     if not memory.is_dir() or memory.stat().st_dev == tmp_path.stat().st_dev:
-        pytest.skip("there is no other file system")
+        pytest.skip("there is no second file system")
     with tempfile.TemporaryDirectory(dir=memory) as local:
         cluster = distributed.LocalCluster(
             n_workers=1, threads_per_worker=1, processes=True, dashboard_address=None, local_directory=local
@@ -328,28 +328,28 @@ def test_a_worker_whose_disk_is_another_file_system_copies_its_parts(
     assert voxtile.verify(tmp_path / "map")["findings"] == []
 
 
-def test_what_a_build_in_parts_does_not_take_is_named(client: object, drive: Path, tmp_path: Path) -> None:
+def test_unsupported_options_are_errors(client: object, drive: Path, tmp_path: Path) -> None:
     for name, value in {"region_size": 1.0, "every": 2, "keep_scans": True}.items():
         with pytest.raises(errors.ArgumentError, match=f"^{name}: "):
             voxtile_dask.build(drive, tmp_path / "map", client=client, **{**OPTIONS, name: value})
     (tmp_path / "map").mkdir()
-    with pytest.raises(errors.ArgumentError, match="it exists"):
+    with pytest.raises(errors.ArgumentError, match="already exists"):
         voxtile_dask.build(drive, tmp_path / "map", client=client, **OPTIONS)
 
 
-def test_the_command_makes_the_map_and_tells_of_it(drive: Path, whole: str, tmp_path: Path) -> None:
+def test_the_command_builds_a_map_and_reports(drive: Path, whole: str, tmp_path: Path) -> None:
     options = [f"--{name.replace('_', '-')}={value}" for name, value in OPTIONS.items()]
     command = [sys.executable, "-m", "voxtile.dask", str(drive), "-o", str(tmp_path / "map"), "--local=2", *options]
     done = subprocess.run([*command, "--region-size=5", "--json"], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    told = json.loads(done.stdout)
+    report = json.loads(done.stdout)
     assert voxtile.digest(tmp_path / "map") == whole
-    assert told["regions"] > 1 and told["overlap"] >= 1 and told["slowest"][0]["seconds"] > 0
+    assert report["regions"] > 1 and report["overlap"] >= 1 and report["slowest"][0]["seconds"] > 0
     again = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert again.returncode == 2 and "it exists" in again.stderr
+    assert again.returncode == 2 and "already exists" in again.stderr
 
 
-def test_a_second_run_goes_on(
+def test_a_second_run_resumes(
     client: object, drive: Path, whole: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fail(*_: object) -> None:
@@ -364,7 +364,7 @@ def test_a_second_run_goes_on(
     assert voxtile.digest(tmp_path / "map") == whole
 
 
-def test_a_part_that_was_damaged_since_is_named_and_no_map_is_made(
+def test_a_damaged_part_is_an_error(
     client: object, drive: Path, whole: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fail(*_: object) -> None:
@@ -403,7 +403,7 @@ def test_a_stream_of_scans_in_a_file_makes_the_same_map(client: object, tmp_path
     assert voxtile.digest(tmp_path / "map") == voxtile.digest(tmp_path / "whole")
 
 
-def test_a_second_run_takes_no_parts_of_other_points(
+def test_a_second_run_ignores_parts_of_other_scans(
     drive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fail(*_: object) -> None:
@@ -415,7 +415,7 @@ def test_a_second_run_takes_no_parts_of_other_points(
             broken.setattr("voxtile.dask.building.join", fail)
             with pytest.raises(errors.DiskError, match="full"):
                 voxtile_dask.build(drive, tmp_path / "map", region_size=4.0, client=client, **OPTIONS)
-        # The first point changes sides along z: the box around the scan is the same.
+        # The first point is mirrored along z: the box around the scan is the same.
         scan = drive / "003.pcd"
         content = bytearray(scan.read_bytes())
         content[content.index(b"DATA binary\n") + len(b"DATA binary\n") + 11] ^= 0x80
@@ -427,7 +427,7 @@ def test_a_second_run_takes_no_parts_of_other_points(
 
 
 def _again(drive: Path, tmp_path: Path) -> Path:
-    """The same street, driven back along a line beside it and a little beyond its end."""
+    """The same street, driven back on a parallel line and slightly beyond its end."""
     folder = tmp_path / "again"
     folder.mkdir()
     poses = np.loadtxt(drive / "poses_kitti.txt")[::-1]
@@ -452,7 +452,7 @@ def test_new_drives_into_a_map_make_the_map_of_one_build(
         report = voxtile_dask.build(
             again, city, update=True, region_size=region_size, client=client, **OPTIONS
         )
-        # Who opened the map before sees it as it was.
+        # A reader opened before the update still sees the old map.
         assert reader.digest() == before
         assert reader.refresh() and reader.digest() != before
         scans = reader.scan_number
@@ -460,13 +460,13 @@ def test_new_drives_into_a_map_make_the_map_of_one_build(
     assert scans == 24 and report["adopted"]["scan_number"] == 24
     assert report["adopted"]["tiles_added"] > 0 and report["adopted"]["tiles_changed"] > 0
     assert voxtile.verify(city)["damage"] == 0
-    # The map goes on with the command, too.
+    # The command can append to the updated map, too.
     for map in (city, tmp_path / "whole"):
         voxtile.build(drive, map, append=True, again=True, **OPTIONS)
     assert voxtile.digest(city) == voxtile.digest(tmp_path / "whole")
 
 
-def test_workers_killed_during_an_update_leave_a_map_as_before_or_as_after(drive: Path, tmp_path: Path) -> None:
+def test_an_update_with_killed_workers_is_atomic(drive: Path, tmp_path: Path) -> None:
     again, city = _again(drive, tmp_path), tmp_path / "city"
     voxtile.build(drive, city, **OPTIONS)
     before = voxtile.digest(city)
@@ -496,9 +496,9 @@ def test_workers_killed_during_an_update_leave_a_map_as_before_or_as_after(drive
     assert killed and set(seen) <= {before, after} and voxtile.digest(city) == after != before
 
 
-@pytest.mark.parametrize("killed_in", ["adopt", "remove"])
+@pytest.mark.parametrize("killed_in", ["replace_tiles", "remove"])
 @pytest.mark.parametrize("is_changed", [False, True])
-def test_an_update_that_was_killed_at_its_end_is_done_once(
+def test_an_update_killed_at_its_end_is_applied_once(
     client: object, killed_in: str, is_changed: bool, drive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     again, city, whole = _again(drive, tmp_path), tmp_path / "city", tmp_path / "whole"
@@ -512,7 +512,7 @@ def test_an_update_that_was_killed_at_its_end_is_done_once(
         broken.setattr(f"voxtile.dask.building.{killed_in}", fail)
         with pytest.raises(KeyboardInterrupt):
             voxtile_dask.build(again, city, update=True, region_size=5.0, client=client, **OPTIONS)
-    # Somebody adds as many scans as the update has.
+    # Another writer adds as many scans as the update.
     others = [drive] if is_changed else []
     for scans in others:
         voxtile.build(scans, city, append=True, again=True, **OPTIONS)
@@ -525,7 +525,7 @@ def test_an_update_that_was_killed_at_its_end_is_done_once(
     assert not (tmp_path / "city.parts").exists()
 
 
-def test_an_update_of_which_nobody_knows_whether_it_was_done_is_an_error(
+def test_an_update_with_unknown_outcome_is_an_error(
     client: object, drive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     again, city, parts = _again(drive, tmp_path), tmp_path / "city", tmp_path / "city.parts"
@@ -538,15 +538,15 @@ def test_an_update_of_which_nobody_knows_whether_it_was_done_is_an_error(
         broken.setattr("voxtile.dask.building.remove", fail)
         with pytest.raises(KeyboardInterrupt):
             voxtile_dask.build(again, city, update=True, region_size=5.0, client=client, **OPTIONS)
-    # As of a map of which it was not known then how long its list of scans was.
+    # As with a map whose list of scans had an unknown length.
     note = json.loads((parts / "adopting.json").read_text())
     note["map"]["unlisted_scans"] = None
     (parts / "adopting.json").write_text(json.dumps(note))
-    with pytest.raises(errors.ArgumentError, match=f"12 scans in place after scan 12.*remove {parts}"):
+    with pytest.raises(errors.ArgumentError, match=f"committed 12 scans after scan 12.*remove {parts}"):
         voxtile_dask.build(again, city, update=True, region_size=5.0, client=client, **OPTIONS)
 
 
-def test_an_update_of_a_map_that_somebody_changes_is_an_error(client: object, drive: Path, tmp_path: Path) -> None:
+def test_an_update_of_a_concurrently_changed_map_is_an_error(client: object, drive: Path, tmp_path: Path) -> None:
     again, city = _again(drive, tmp_path), tmp_path / "city"
     voxtile.build(drive, city, **OPTIONS)
     changed = []
@@ -561,7 +561,7 @@ def test_an_update_of_a_map_that_somebody_changes_is_an_error(client: object, dr
             again, city, update=True, region_size=5.0, client=client, progress=change, **OPTIONS
         )
     assert voxtile.digest(city) == changed[0]
-    # The next call adds the scans to what the other one left.
+    # The next call adds the scans to the changed map.
     shutil.copytree(city, tmp_path / "whole")
     voxtile.build(again, tmp_path / "whole", append=True, again=True, **OPTIONS)
     voxtile_dask.build(again, city, update=True, region_size=5.0, client=client, **OPTIONS)
@@ -572,8 +572,8 @@ def test_an_update_of_a_map_that_somebody_changes_is_an_error(client: object, dr
         voxtile_dask.build(again, city, update=True, client=client, resolution=0.5)
 
 
-def test_a_drive_that_comes_back_is_read_where_it_was(client: object, drive: Path, tmp_path: Path) -> None:
-    """Thirty scans elsewhere lie between two visits of the street."""
+def test_each_visit_of_a_region_is_read(client: object, drive: Path, tmp_path: Path) -> None:
+    """Thirty scans elsewhere between two visits of the street."""
     folder, scans = tmp_path / "round", sorted(drive.glob("*.pcd"))
     folder.mkdir()
     poses = np.loadtxt(drive / "poses_kitti.txt")
@@ -592,9 +592,9 @@ def test_a_drive_that_comes_back_is_read_where_it_was(client: object, drive: Pat
 @pytest.mark.parametrize("suffix", [".ply", ".xyz", ".las"])
 def test_files_of_regions_are_those_of_the_command(client: object, suffix: str, drive: Path, tmp_path: Path) -> None:
     voxtile.build(drive, tmp_path / "map", **OPTIONS)
-    told = voxtile_dask.export(tmp_path / "map", tmp_path / "files", suffix, region_size=5.0, client=client)
-    assert sorted(path.name for path in (tmp_path / "files").iterdir()) == told["files"] and len(told["files"]) > 4
-    for name in told["files"]:
+    report = voxtile_dask.export(tmp_path / "map", tmp_path / "files", suffix, region_size=5.0, client=client)
+    assert sorted(path.name for path in (tmp_path / "files").iterdir()) == report["files"] and len(report["files"]) > 4
+    for name in report["files"]:
         x, y = map(int, name.removesuffix(suffix).split("_"))
         region = [5.0 * x, 5.0 * y, -100.0, 5.0 * (x + 1), 5.0 * (y + 1), 100.0]
         voxtile.export(tmp_path / "map", tmp_path / f"one{suffix}", region=region)
@@ -602,24 +602,24 @@ def test_files_of_regions_are_those_of_the_command(client: object, suffix: str, 
     if suffix == ".xyz":
         voxtile.export(tmp_path / "map", tmp_path / "whole.xyz")
         whole = (tmp_path / "whole.xyz").read_text().splitlines()
-        parts = [line for name in told["files"] for line in (tmp_path / "files" / name).read_text().splitlines()]
+        parts = [line for name in report["files"] for line in (tmp_path / "files" / name).read_text().splitlines()]
         assert sorted(set(whole)) == sorted(set(parts)) and len(whole) > 100
-    with pytest.raises(errors.ArgumentError, match="it exists"):
+    with pytest.raises(errors.ArgumentError, match="already exists"):
         voxtile_dask.export(tmp_path / "map", tmp_path / "files", suffix, client=client)
 
 
 def test_statistics_are_those_of_the_whole_map(client: object, drive: Path, tmp_path: Path) -> None:
     voxtile.build(drive, tmp_path / "map", **OPTIONS)
-    told = voxtile_dask.statistics(tmp_path / "map", client=client)
+    report = voxtile_dask.statistics(tmp_path / "map", client=client)
     info = json.loads(
         subprocess.check_output([sys.executable, "-m", "voxtile", "info", "--json", str(tmp_path / "map")])
     )
-    assert told["tiles"] == info["tiles"] and told["occupied"] > 0
-    assert [told["observed"], told["occupied"]] == [info["voxels"], info["occupied"]]
+    assert report["tiles"] == info["tiles"] and report["occupied"] > 0
+    assert [report["observed"], report["occupied"]] == [info["voxels"], info["occupied"]]
     with voxtile.open(tmp_path / "map") as opened:
         centers = opened.occupied()[0]
-    assert told["occupied_low"] == centers.min(axis=0).tolist()
-    assert told["occupied_high"] == centers.max(axis=0).tolist()
+    assert report["occupied_low"] == centers.min(axis=0).tolist()
+    assert report["occupied_high"] == centers.max(axis=0).tolist()
 
 
 @pytest.mark.parametrize("region_size", [40.0, 70.0])
@@ -627,7 +627,7 @@ def test_statistics_are_those_of_the_whole_map(client: object, drive: Path, tmp_
 def test_recorded_scans(client: object, name: str, region_size: float, tmp_path: Path) -> None:
     data = Path(os.environ.get("VOXTILE_DATA", "")) / name
     if "VOXTILE_DATA" not in os.environ or not data.is_dir():
-        pytest.skip(f"{name} is not there; VOXTILE_DATA names the folder of recorded sets")
+        pytest.skip(f"{name} is missing; set VOXTILE_DATA to the folder of recorded sets")
     options = {"resolution": 0.5, "max_range": 40.0, "storage": "compact"}
     voxtile.build(data, tmp_path / "whole", **options)
     voxtile_dask.build(data, tmp_path / "map", region_size=region_size, client=client, **options)

@@ -1,4 +1,4 @@
-"""Work on whole maps by several processes, column by column: what one process answers."""
+"""Distributed operations on whole maps give the results of one process."""
 
 from __future__ import annotations
 
@@ -39,14 +39,14 @@ def _map(folder: Path, seed: int, shift: float = 0.0, **options: object) -> Path
 
 
 @pytest.mark.parametrize("region_size", [4.0, 5.3, 1000.0, None])
-def test_maps_are_merged_and_fade_as_by_one_process(client: object, region_size: float | None, tmp_path: Path) -> None:
+def test_merge_and_decay_as_by_one_process(client: object, region_size: float | None, tmp_path: Path) -> None:
     maps = [_map(tmp_path / name, seed) for seed, name in enumerate(["a", "b", "c"], 1)]
     for prefer in (None, "last"):
         whole, parts = tmp_path / f"whole {prefer}", tmp_path / f"parts {prefer}"
         voxtile.merge(maps, whole, prefer=prefer)
-        told = voxtile_dask.merge(maps, parts, prefer=prefer, region_size=region_size, client=client)
+        report = voxtile_dask.merge(maps, parts, prefer=prefer, region_size=region_size, client=client)
         assert voxtile.digest(parts) == voxtile.digest(whole)
-        assert told["regions"] > 1
+        assert report["regions"] > 1
     before = voxtile.digest(maps[0])
     voxtile_dask.decay(maps[0], tmp_path / "faded", 5, forget_below=0.1, region_size=region_size, client=client)
     assert voxtile.digest(maps[0]) == before
@@ -65,7 +65,7 @@ def test_maps_are_merged_and_fade_as_by_one_process(client: object, region_size:
         ({"sensor_model": "iwlo"}, {}, "last"),
     ],
 )
-def test_where_the_first_map_has_no_tile_the_others_become_like_it(
+def test_merge_uses_the_storage_of_the_first_map(
     client: object, first: dict[str, object], second: dict[str, object], prefer: str | None, tmp_path: Path
 ) -> None:
     maps = [_map(tmp_path / "a", 1, **first), _map(tmp_path / "b", 2, shift=9.0, **second)]
@@ -77,7 +77,7 @@ def test_where_the_first_map_has_no_tile_the_others_become_like_it(
     ]
 
 
-def test_maps_that_do_not_go_together_are_refused_and_nothing_is_left(client: object, tmp_path: Path) -> None:
+def test_incompatible_maps_are_errors_without_output(client: object, tmp_path: Path) -> None:
     maps = [_map(tmp_path / "a", 1), _map(tmp_path / "b", 2, probabilities=[0.8, 0.4, 0.1, 0.9])]
     with pytest.raises(errors.VoxtileError, match="prefer"):
         voxtile_dask.merge(maps, tmp_path / "both", client=client)
@@ -88,7 +88,7 @@ def test_maps_that_do_not_go_together_are_refused_and_nothing_is_left(client: ob
     assert {path.name for path in tmp_path.iterdir()} == {"a", "b"}
 
 
-def test_damage_is_found_whoever_looks(client: object, tmp_path: Path) -> None:
+def test_verify_finds_the_damage_that_one_process_finds(client: object, tmp_path: Path) -> None:
     source = _map(tmp_path / "map", 5)
     whole = voxtile.verify(source)
     assert voxtile_dask.verify(source, region_size=4.0, client=client) == whole and whole["damage"] == 0
@@ -100,8 +100,8 @@ def test_damage_is_found_whoever_looks(client: object, tmp_path: Path) -> None:
     (source / "tile_77_0_0").mkdir()
     whole, found = voxtile.verify(source), voxtile_dask.verify(source, region_size=4.0, client=client)
 
-    def sorted_findings(told: dict[str, object]) -> list[str]:
-        return sorted(json.dumps(finding, sort_keys=True) for finding in told.pop("findings"))
+    def sorted_findings(report: dict[str, object]) -> list[str]:
+        return sorted(json.dumps(finding, sort_keys=True) for finding in report.pop("findings"))
 
     assert whole["damage"] >= 2 and sorted_findings(found) == sorted_findings(whole) and found == whole
     tables[0].unlink()
@@ -113,7 +113,7 @@ def test_damage_is_found_whoever_looks(client: object, tmp_path: Path) -> None:
         voxtile.verify(source, tiles=[(0, 0, 0)], but_tiles=True)
 
 
-def test_a_map_is_built_again_from_its_scans_with_other_poses(client: object, tmp_path: Path) -> None:
+def test_a_map_is_rebuilt_from_its_scans_with_other_poses(client: object, tmp_path: Path) -> None:
     source = _map(tmp_path / "map", 7, keep_scans=True)
     poses = []
     for _, pose, _ in voxtile.scans(source):
@@ -128,7 +128,7 @@ def test_a_map_is_built_again_from_its_scans_with_other_poses(client: object, tm
 
 
 @pytest.mark.parametrize("error", [CancelledError("enough"), KeyError("mine")])
-def test_what_the_callers_progress_raises_is_the_callers(client: object, error: Exception, tmp_path: Path) -> None:
+def test_exceptions_of_the_callback_are_raised_unchanged(client: object, error: Exception, tmp_path: Path) -> None:
     source = _map(tmp_path / "map", 5)
 
     def fail(done: int, columns: int) -> None:
@@ -136,38 +136,38 @@ def test_what_the_callers_progress_raises_is_the_callers(client: object, error: 
 
     with pytest.raises(type(error), match=str(error.args[0])):
         voxtile_dask.decay(source, tmp_path / "faded", 5, client=client, progress=fail)
-    # A task that was just putting its piece there may still remove it.
+    # A task that is just writing its shard may still remove it.
     until = time.monotonic() + 10
     while len(list(tmp_path.iterdir())) > 1 and time.monotonic() < until:
         time.sleep(0.01)
     assert [path.name for path in tmp_path.iterdir()] == ["map"]
 
 
-def test_a_tile_over_a_corner_of_four_regions_is_in_all_of_them(client: object, tmp_path: Path) -> None:
+def test_a_tile_on_a_corner_of_four_regions_is_exported_to_all(client: object, tmp_path: Path) -> None:
     with voxtile.Map.create(tmp_path / "map", **OPTIONS) as made:
         # One tile, from 4 m to 6 m.
         made.insert(np.array([[x, y, 0.6] for x in (4.6, 5.4) for y in (4.6, 5.4)]), origin=[5.1, 5.1, 0.6])
-    told = voxtile_dask.export(tmp_path / "map", tmp_path / "files", ".xyz", region_size=5.0, client=client)
-    assert told["files"] == ["0_0.xyz", "0_1.xyz", "1_0.xyz", "1_1.xyz"]
-    lines = [line for name in told["files"] for line in (tmp_path / "files" / name).read_text().splitlines()]
+    report = voxtile_dask.export(tmp_path / "map", tmp_path / "files", ".xyz", region_size=5.0, client=client)
+    assert report["files"] == ["0_0.xyz", "0_1.xyz", "1_0.xyz", "1_1.xyz"]
+    lines = [line for name in report["files"] for line in (tmp_path / "files" / name).read_text().splitlines()]
     voxtile.export(tmp_path / "map", tmp_path / "whole.xyz")
     assert sorted(lines) == sorted((tmp_path / "whole.xyz").read_text().splitlines()) and len(lines) == 4
 
 
-def test_files_of_another_call_are_not_taken_for_ones_own(client: object, tmp_path: Path) -> None:
+def test_files_of_other_calls_are_not_used(client: object, tmp_path: Path) -> None:
     source, beside = _map(tmp_path / "map", 5), tmp_path / "files.unfinished"
     beside.mkdir()
     (beside / "7_7.csv").write_text("mine")
-    with pytest.raises(errors.ArgumentError, match="7_7.csv in it is of no earlier call"):
+    with pytest.raises(errors.ArgumentError, match="contains 7_7.csv"):
         voxtile_dask.export(source, tmp_path / "files", ".csv", client=client)
     assert (beside / "7_7.csv").read_text() == "mine"
-    # What a call with other options left that was killed.
+    # Remains of a killed call with other options.
     attempt = beside / ("0" * 32)
     attempt.mkdir()
     (beside / "7_7.csv").rename(attempt / "7_7.csv")
-    told = voxtile_dask.export(source, tmp_path / "files", ".csv", client=client)
-    assert "7_7.csv" not in told["files"]
-    assert sorted(path.name for path in (tmp_path / "files").iterdir()) == told["files"]
+    report = voxtile_dask.export(source, tmp_path / "files", ".csv", client=client)
+    assert "7_7.csv" not in report["files"]
+    assert sorted(path.name for path in (tmp_path / "files").iterdir()) == report["files"]
     assert {path.name for path in tmp_path.iterdir()} == {"map", "files"}
 
 
@@ -185,7 +185,7 @@ def test_a_snapshot_is_named_as_in_the_command(client: object, tmp_path: Path) -
     assert (tmp_path / "now.csv").read_bytes() != (tmp_path / "before.csv").read_bytes()
 
 
-def test_threads_of_a_worker_have_maps_of_their_own(tmp_path: Path) -> None:
+def test_threads_of_a_worker_open_separate_maps(tmp_path: Path) -> None:
     source = _map(tmp_path / "map", 5)
     with voxtile.Map.open(source, "r") as opened:
         tiles = [tuple(int(number) for number in tile) for tile in opened.tiles]
@@ -199,10 +199,10 @@ def test_threads_of_a_worker_have_maps_of_their_own(tmp_path: Path) -> None:
             opened = tile._reader()
             is_opened.set()
             assert has_another_begun.wait(60)
-            # It is of one flush from the task's begin to its end.
+            # The map stays at one flush for the whole task.
             return tile._reader() is opened
         assert is_opened.wait(60)
-        # The second task may have begun before the first had opened the map, the third has not.
+        # The second task may have begun before the first opened the map; the third did not.
         if tile.index == order[-1] != order[1]:
             has_another_begun.set()
         return True

@@ -1,4 +1,4 @@
-"""What the simulated plan of a build in parts must be, whatever its costs are."""
+"""Properties of simulated plans, for any costs."""
 
 from __future__ import annotations
 
@@ -16,68 +16,69 @@ regions = pytest.importorskip("voxtile.dask.regions")
 CITY = plan.City(streets_km=60.0)
 
 
-def _told(**changed: object) -> dict[str, object]:
+def _plan(**changed: object) -> dict[str, object]:
     how = {"region_size": 300.0, "reach": 60.0, "workers": [1, 4, 50, 1000], **changed}
     city = how.pop("city", CITY)
     return plan.simulate(city, **how)
 
 
 def test_more_workers_take_no_longer_and_no_less_than_their_share() -> None:
-    told = _told()
-    rows = told["workers"]
+    found = _plan()
+    rows = found["workers"]
     for fewer, more in zip(rows, rows[1:], strict=False):
         assert more["seconds"] < fewer["seconds"]
-    alone = told["cpu_seconds"]["map"]
+    alone = found["cpu_seconds"]["map"]
     assert rows[0]["map_seconds"] == pytest.approx(alone)
     for row in rows:
-        least = max(alone / row["workers"], told["longest_task_seconds"])
-        assert least <= row["map_seconds"] * (1 + 1e-9) <= least + alone / row["workers"] + told["longest_task_seconds"]
+        least = max(alone / row["workers"], found["longest_task_seconds"])
+        most = least + alone / row["workers"] + found["longest_task_seconds"]
+        assert least <= row["map_seconds"] * (1 + 1e-9) <= most
 
 
 def test_smaller_regions_read_more_and_map_the_same() -> None:
-    free = plan.Costs(task_s=0.0, read_scan_s=0.0, piece_tile_s=0.0)
-    told = [_told(region_size=size, costs=free) for size in (200.0, 400.0, 800.0)]
-    assert [row["overlap"] for row in told] == sorted((row["overlap"] for row in told), reverse=True)
-    assert all(row["overlap"] >= 1 for row in told)
-    # Each scan is mapped once, wherever the borders are.
-    for row in told:
+    free = plan.Costs(task_s=0.0, read_scan_s=0.0, shard_tile_s=0.0)
+    found = [_plan(region_size=size, costs=free) for size in (200.0, 400.0, 800.0)]
+    assert [row["overlap"] for row in found] == sorted((row["overlap"] for row in found), reverse=True)
+    assert all(row["overlap"] >= 1 for row in found)
+    # Each scan is mapped once, independent of the borders.
+    for row in found:
         assert row["cpu_seconds"]["map"] == pytest.approx(row["scans"] * free.map_scan_s)
         assert row["bytes_read"] == (row["scans_read"] + row["scans"]) * free.scan_bytes
 
 
 def test_a_dense_downtown_makes_tasks_uneven() -> None:
-    even, dense = _told(), _told(city=plan.City(streets_km=60.0, downtown_times=10))
+    even, dense = _plan(), _plan(city=plan.City(streets_km=60.0, downtown_times=10))
     assert dense["scans"] > 1.5 * even["scans"] and dense["skew"] > 2 * even["skew"]
     assert even["skew"] < 3
 
 
-def test_streets_have_the_length_that_was_asked_for() -> None:
+def test_streets_have_the_requested_length() -> None:
     for kilometres in (10.0, 60.0, 250.0):
-        assert _told(city=plan.City(streets_km=kilometres))["scans"] == pytest.approx(kilometres * 1000, rel=0.2)
+        assert _plan(city=plan.City(streets_km=kilometres))["scans"] == pytest.approx(kilometres * 1000, rel=0.2)
 
 
-def test_the_advised_size_is_the_smallest_that_keeps_to_the_goal() -> None:
+def test_the_advised_size_is_the_smallest_within_the_goal() -> None:
     costs = plan.Costs(plan_scan_s=0.001, read_scan_s=0.001, map_scan_s=0.01)
     for reach in (20.0, 60.0, 150.0):
         size = plan.advised_region_size(reach, 10.0, costs)
         assert plan.cpu_factor(size, reach, costs) <= 1.3
         assert size == 200.0 or plan.cpu_factor(size - 100.0, reach, costs) > 1.3
-    # Scans that cost nothing but reading: no size helps, and the answer is one all the same.
+    # Reading dominates: no size reaches the goal, but one is returned.
     hopeless = plan.Costs(plan_scan_s=1.0, read_scan_s=1.0, map_scan_s=0.0)
     assert 200.0 <= plan.advised_region_size(60.0, 10.0, hopeless) <= 10_000.0
 
 
-def test_a_drive_that_comes_back_leaves_out_what_it_drove_elsewhere() -> None:
+def test_scans_between_two_visits_are_skipped() -> None:
     here, there = (1.0, 1.0, 2.0, 2.0), (901.0, 1.0, 902.0, 2.0)
     boxes = [here] * 5 + [there] * 100 + [None] + [here] * 7
     columns = regions.columns_of(boxes, 100.0, 0.5)
     assert columns == {(0, 0): [(0, 5), (106, 113)], (9, 0): [(5, 105)]}
-    # A short gap is read: opening the map again takes longer.
+    # A short gap is read, because reopening the map takes longer.
     columns = regions.columns_of([here, *[there] * regions.JOINED_GAP_SCANS, here], 100.0, 0.5)
     assert columns[0, 0] == [(0, regions.JOINED_GAP_SCANS + 2)]
 
 
-def test_whole_tiles_of_columns_are_apart_and_leave_none_out() -> None:
+def test_columns_partition_the_tiles() -> None:
     for size, tile_size in ((53.0, 10.0), (40.0, 10.0), (7.0, 2.0)):
         boxes = [regions.tiles_of((x, -1), size, tile_size) for x in range(-3, 3)]
         for west, east in zip(boxes, boxes[1:], strict=False):
@@ -106,12 +107,12 @@ def test_a_plan_of_too_many_columns_names_the_scan() -> None:
     assert len(regions.columns_of(boxes[:2], 100.0, 0.5, most=4)) == 4
 
 
-def test_the_command_tells_the_plan() -> None:
+def test_the_command_prints_the_plan() -> None:
     command = [sys.executable, "-m", "voxtile.dask.plan", "--streets-km=20", "--workers", "2", "3"]
-    told = json.loads(subprocess.check_output([*command, "--json"], text=True))
-    assert [row["workers"] for row in told["workers"]] == [2, 3]
-    assert told["region_size"] == plan.advised_region_size(60.0, 10.0)
-    assert f"{told['tasks']} tasks" in subprocess.check_output(command, text=True)
+    found = json.loads(subprocess.check_output([*command, "--json"], text=True))
+    assert [row["workers"] for row in found["workers"]] == [2, 3]
+    assert found["region_size"] == plan.advised_region_size(60.0, 10.0)
+    assert f"{found['tasks']} tasks" in subprocess.check_output(command, text=True)
     for wrong in ("--streets-km=0", "--max-range=nan", "--workers=0", "--region-size=-1"):
         done = subprocess.run([*command, wrong], capture_output=True, text=True, check=False)
         assert done.returncode == 2 and done.stderr.startswith("error: "), wrong

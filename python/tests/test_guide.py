@@ -1,4 +1,4 @@
-"""The guide runs from top to bottom."""
+"""Runs the examples of the guide."""
 
 import os
 import re
@@ -14,7 +14,7 @@ DATA = Path(os.environ.get("VOXTILE_DATA", DOCS.parent.parent / "shared" / "data
 
 
 def blocks(text: str) -> list[str]:
-    """The blocks of Python that are not said to be left out."""
+    """Returns the Python blocks that are not marked as excluded."""
     found = re.findall(r"(<!-- not run by the test: [^\n]+ -->\n)?```python\n(.*?)```", text, re.DOTALL)
     return [block for left_out, block in found if not left_out]
 
@@ -34,13 +34,13 @@ def run(page: Path, folder: Path) -> str:
 
 def test_the_guide(tmp_path: Path) -> None:
     if not GUIDE.exists():
-        pytest.skip("the guide is in the repository")
+        pytest.skip("the guide is only in the repository")
     printed = run(GUIDE, tmp_path)
     assert "10 of 10" in printed and "nothing no_map" in printed
 
 
 def test_the_guide_with_recorded_scans(tmp_path: Path) -> None:
     if not RECORDED.exists() or not (DATA / "mulran_riverside02_a").is_dir():
-        pytest.skip(f"recorded sets are not at {DATA}; VOXTILE_DATA names their folder")
+        pytest.skip(f"recorded sets are not at {DATA}; set VOXTILE_DATA to their folder")
     printed = run(RECORDED, tmp_path)
     assert "collides: False - sunk into the road: True" in printed

@@ -1,4 +1,4 @@
-"""An open map: scans in, answers out."""
+"""Inserts and queries of an open map."""
 
 import subprocess
 import sys
@@ -20,7 +20,7 @@ def made(folder: Path, scans: list[Scan], **options: object) -> voxtile.Map:
     return made
 
 
-def test_a_flush_beside_scans_is_of_its_call(tmp_path: Path) -> None:
+def test_a_background_flush_has_the_state_of_its_call(tmp_path: Path) -> None:
     scans = scans_of(6, count=12, points=2000)
     with voxtile.Map.create(tmp_path / "map", 0.1) as found:
         found.insert_many(scans[:6])
@@ -53,7 +53,7 @@ def test_equals_the_naive_map(tmp_path: Path, seed: int) -> None:
         expected = [naive.voxels.get(tuple(key), [np.nan, 0]) for key in around.tolist()]
         log_odds = np.array([value for value, _ in expected])
         assert np.array_equal(found.counts(centers), [count for _, count in expected])
-        # OctoMap's steps are single-precision numbers.
+        # OctoMap's log-odds are single-precision numbers.
         np.testing.assert_allclose(found.log_odds(centers), log_odds, atol=1e-5)
         np.testing.assert_allclose(found.probability(centers), 1 / (1 + np.exp(-log_odds)), atol=1e-5)
         unknown = np.isnan(log_odds)
@@ -70,7 +70,7 @@ def test_equals_the_naive_map(tmp_path: Path, seed: int) -> None:
         assert np.array_equal(dense.reshape(-1), found.occupancy((at + 0.5) * 0.25 + corner))
 
 
-def test_one_map_of_any_array(tmp_path: Path, room: list[Scan]) -> None:
+def test_all_array_types_make_the_same_map(tmp_path: Path, room: list[Scan]) -> None:
     digests = set()
     forms = {
         "single": lambda points: points,
@@ -95,7 +95,7 @@ def test_poses(tmp_path: Path, room: list[Scan]) -> None:
         with made(tmp_path / name, scans) as found:
             return found.digest()
 
-    # Halves of right angles are numbers that every form has.
+    # Half of a right angle is exact in all forms of a pose.
     poses = [np.array([1.0, 2.0, 0.5, 0.0, 0.0, 0.0, 1.0])] * len(room)
     seven = [(points, pose) for (points, _), pose in zip(room, poses)]
     pairs = [(points, (pose[:3], pose[3:])) for points, pose in seven]
@@ -103,7 +103,7 @@ def test_poses(tmp_path: Path, room: list[Scan]) -> None:
     assert digest("seven", seven) == digest("pairs", pairs) == digest("matrices", matrices)  # type: ignore[arg-type]
 
 
-def test_points_that_are_none_are_counted(tmp_path: Path) -> None:
+def test_skipped_points_are_counted(tmp_path: Path) -> None:
     points = np.array([[1, 2, 3], [np.nan, 0, 0], [4, 4, 4], [0, 0, 0]], np.float32)
     masked = np.ma.masked_array(points, [[False] * 3, [False] * 3, [True] * 3, [False] * 3])
     with voxtile.Map.create(tmp_path / "map", 0.25) as found:
@@ -139,7 +139,7 @@ def test_rays_nearest_boxes(tmp_path: Path) -> None:
         assert found.collides(boxes.reshape(2, 2, 3), unknown="obstacle").tolist() == [True, True]
 
 
-def test_closed_and_read_alone(tmp_path: Path, room: list[Scan]) -> None:
+def test_closed_and_read_only_maps(tmp_path: Path, room: list[Scan]) -> None:
     with made(tmp_path / "map", room) as found:
         digest = found.digest()
         with pytest.raises(errors.LockedError) as locked:
@@ -172,7 +172,7 @@ def test_closed_and_read_alone(tmp_path: Path, room: list[Scan]) -> None:
         voxtile.Map.create(tmp_path / "map")
 
 
-def test_an_error_leaves_the_map_as_it_is(tmp_path: Path, room: list[Scan]) -> None:
+def test_an_error_does_not_change_the_map(tmp_path: Path, room: list[Scan]) -> None:
     with made(tmp_path / "map", room) as found:
         digest = found.digest()
         for points, pose in (([[1, 2]], np.eye(4)), ([[1, 2, 3]], np.zeros((4, 4))), ("no", np.eye(4))):
@@ -185,10 +185,10 @@ def test_an_error_leaves_the_map_as_it_is(tmp_path: Path, room: list[Scan]) -> N
         assert found.digest() == digest
 
 
-def test_an_array_for_which_there_is_no_memory_is_an_error(tmp_path: Path, room: list[Scan]) -> None:
+def test_an_array_larger_than_memory_is_an_error(tmp_path: Path, room: list[Scan]) -> None:
     resource = pytest.importorskip("resource")
     made(tmp_path / "map", room).close()
-    # A process of its own: it would end.
+    # In a process of its own, because a failed allocation would end it.
     script = """
         import resource, sys, numpy as np, voxtile
         found = voxtile.Map.open(sys.argv[1], "r")
@@ -205,8 +205,8 @@ def test_an_array_for_which_there_is_no_memory_is_an_error(tmp_path: Path, room:
         pytest.skip("no /proc")
     assert resource is not None
     command = [sys.executable, "-c", textwrap.dedent(script), str(tmp_path / "map")]
-    told = subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines()
-    assert len(told) == 2 and "1000000000" in told[0] and "8000000000" in told[1], told
+    printed = subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines()
+    assert len(printed) == 2 and "1000000000" in printed[0] and "8000000000" in printed[1], printed
 
 
 def test_the_viewer_of_a_snapshot_shows_the_snapshot(

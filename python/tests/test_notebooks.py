@@ -1,4 +1,4 @@
-"""The notebooks of `examples/`, run from top to bottom without a screen."""
+"""Runs the notebooks of `examples/` without a display."""
 
 from pathlib import Path
 
@@ -20,5 +20,5 @@ def test_there_are_notebooks() -> None:
 def test_a_notebook_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
     monkeypatch.setenv("MPLBACKEND", "agg")
     notebook = nbformat.read(EXAMPLES / f"{name}.ipynb", as_version=4)
-    assert not any(cell.get("outputs") for cell in notebook.cells), "notebooks are kept without outputs"
+    assert not any(cell.get("outputs") for cell in notebook.cells), "clear the outputs of notebooks before a commit"
     nbclient.NotebookClient(notebook, timeout=300, resources={"metadata": {"path": str(tmp_path)}}).execute()

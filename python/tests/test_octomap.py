@@ -1,4 +1,4 @@
-"""The same clouds in OctoMap, by the package `pyoctomap`."""
+"""Comparison with OctoMap, through the package `pyoctomap`."""
 
 from pathlib import Path
 
@@ -15,7 +15,7 @@ def test_equals_octomap(tmp_path: Path) -> None:
     with voxtile.Map.create(tmp_path / "map", 0.25) as found:
         for points, pose in scans_of(11, count=6, points=2000):
             world = points.astype(np.float64) @ matrix_of(pose)[:3, :3].T + pose[:3]
-            # OctoMap's clouds have single precision.
+            # OctoMap's points have single precision.
             world = world.astype(np.float32).astype(np.float64)
             found.insert(world, origin=pose[:3].astype(np.float32))
             tree.insertPointCloud(world, pose[:3].astype(np.float32).astype(np.float64))
@@ -27,7 +27,7 @@ def test_equals_octomap(tmp_path: Path) -> None:
         same = np.isclose(ours, theirs, atol=1e-5, equal_nan=True)
         known = int(np.count_nonzero(~np.isnan(theirs)))
         assert known > 10_000
-        # OctoMap sums up the borders that a ray crosses, and so takes some voxels beside the ray.
+        # OctoMap accumulates rounding errors along a ray, so it updates a few other voxels.
         assert np.count_nonzero(~same) <= known // 1000
 
 

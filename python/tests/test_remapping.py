@@ -1,4 +1,4 @@
-"""Maps that follow the scans that they keep."""
+"""Replays of the scans that a map keeps."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def mapped(path: Path, made: list[tuple[np.ndarray, np.ndarray, np.ndarray]], **
     return voxtile.digest(path)
 
 
-def test_a_map_follows_its_poses(tmp_path: Path) -> None:
+def test_new_poses_make_the_map_of_a_build_with_them(tmp_path: Path) -> None:
     made = scans(6)
     before = mapped(tmp_path / "kept", made, keep_scans=True)
     for kept, taken in zip(voxtile.scans(tmp_path / "kept"), made, strict=True):
@@ -42,15 +42,15 @@ def test_a_map_follows_its_poses(tmp_path: Path) -> None:
     voxtile.remap(tmp_path / "kept", poses, keep_as="before", progress=lambda done, all: seen.append((done, all)))
     assert voxtile.digest(tmp_path / "kept") == wanted and seen[-1] == (6, 6)
     assert voxtile.digest(tmp_path / "kept", snapshot="before") == before
-    told = voxtile.remap(tmp_path / "kept", {1: made[0][1], 6: made[5][1]}, tolerance=(1.0, 1.0))
-    assert (told["scans_changed"], told["scans_within_tolerance"]) == (0, 1)
+    report = voxtile.remap(tmp_path / "kept", {1: made[0][1], 6: made[5][1]}, tolerance=(1.0, 1.0))
+    assert (report["scans_changed"], report["scans_within_tolerance"]) == (0, 1)
 
 
-def test_scans_and_points_go(tmp_path: Path) -> None:
+def test_scans_and_points_are_removed(tmp_path: Path) -> None:
     made = scans(5)
     mapped(tmp_path / "kept", made, keep_scans=True)
-    told = voxtile.remove_scans(tmp_path / "kept", scans=(2, 3))
-    assert told["scans_removed"] == 2
+    report = voxtile.remove_scans(tmp_path / "kept", scans=(2, 3))
+    assert report["scans_removed"] == 2
     assert voxtile.digest(tmp_path / "kept") == mapped(tmp_path / "left", [made[0], *made[3:]])
     region = [[-9, -9, -9], [2, 9, 9]]
     gone = voxtile.remove_points(tmp_path / "kept", region)
@@ -60,7 +60,7 @@ def test_scans_and_points_go(tmp_path: Path) -> None:
         assert coarse.resolution == 0.4 and len(coarse.occupied()[0]) > 0
 
 
-def test_a_removal_names_snapshots_that_may_still_have_the_scans(tmp_path: Path) -> None:
+def test_a_removal_reports_snapshots_that_may_contain_the_scans(tmp_path: Path) -> None:
     made = scans(4)
     mapped(tmp_path / "kept", made, keep_scans=True)
     for name in ["good", "bad"]:
@@ -74,7 +74,7 @@ def test_a_removal_names_snapshots_that_may_still_have_the_scans(tmp_path: Path)
     assert voxtile.digest(tmp_path / "kept") == mapped(tmp_path / "left", [made[0], made[3]])
 
 
-def test_what_cannot_be_mapped_again_is_an_exception(tmp_path: Path) -> None:
+def test_invalid_replays_are_errors(tmp_path: Path) -> None:
     made = scans(2)
     mapped(tmp_path / "without", made)
     with pytest.raises(voxtile.VoxtileError, match="keeps no scans"):
@@ -82,7 +82,7 @@ def test_what_cannot_be_mapped_again_is_an_exception(tmp_path: Path) -> None:
     mapped(tmp_path / "kept", made, keep_scans=True)
     with pytest.raises(voxtile.VoxtileError, match="1 poses for 2 scans"):
         voxtile.remap(tmp_path / "kept", [made[0][1]])
-    with pytest.raises(voxtile.VoxtileError, match="name one of"):
+    with pytest.raises(voxtile.VoxtileError, match="exactly one of"):
         voxtile.remove_scans(tmp_path / "kept")
     with pytest.raises((voxtile.VoxtileError, ValueError, TypeError)):
         voxtile.remap(tmp_path / "kept", [np.full((4, 4), np.nan)] * 2)

@@ -16,7 +16,7 @@ import voxtile
 from conftest import scans_of
 
 
-def test_a_reader_asks_while_another_thread_inserts(tmp_path: Path) -> None:
+def test_queries_during_inserts(tmp_path: Path) -> None:
     scans = scans_of(1, count=40, points=2000)
     with voxtile.Map.create(tmp_path / "map", 0.1) as found:
         at, numbers, failures = scans[0][0][:500], [], []
@@ -91,16 +91,16 @@ ARRAYS = """
         for thread in threads:
             thread.join(timeout=60)
         assert not failures, failures
-        assert not any(thread.is_alive() for thread in threads), "a question waits for ever"
+        assert not any(thread.is_alive() for thread in threads), "a query does not end"
         print(f"{answers} arrays of answers, {found.scan_number} scans")
     """
 
 
 @pytest.mark.parametrize("threads", [1, 4, 8])
-def test_arrays_of_questions_while_another_thread_inserts(tmp_path: Path, threads: int) -> None:
-    """The long form: VOXTILE_READER_SECONDS=300."""
+def test_array_queries_during_inserts(tmp_path: Path, threads: int) -> None:
+    """VOXTILE_READER_SECONDS=300 for a long run."""
     seconds = float(os.environ.get("VOXTILE_READER_SECONDS", "1"))
-    # Questions that begin on the stack of a waiting one would soon need more than a small stack.
+    # If waiting queries started others on their stack, a small stack would overflow.
     stacks = {"RUST_MIN_STACK": str(256 << 10)}
     done = subprocess.run(
         ["sh", "-c", 'ulimit -s 256; exec "$@"', "sh", sys.executable, "-c", textwrap.dedent(ARRAYS)]
@@ -129,7 +129,7 @@ def test_two_threads_two_maps_and_one(tmp_path: Path) -> None:
         assert (a.scan_number, b.scan_number) == (12, 24)
 
 
-def test_a_scan_that_was_taken_while_another_thread_closes_is_in_the_map(tmp_path: Path) -> None:
+def test_scans_accepted_during_close_are_in_the_map(tmp_path: Path) -> None:
     scan = np.random.default_rng(1).uniform(-20, 20, (5_000, 3))
     for attempt in range(3):
         found = voxtile.Map.create(tmp_path / str(attempt), 0.2, tile_size=2.0, memory="1GiB")
@@ -157,9 +157,10 @@ def test_a_scan_that_was_taken_while_another_thread_closes_is_in_the_map(tmp_pat
 
 
 def interrupted(script: str, *arguments: object) -> tuple[str, float]:
-    """Runs a script until it has printed a line and a moment longer, sends Ctrl-C, and returns what it prints then and
-    after how many seconds."""
-    # Shells start what runs in the background without it.
+    """Runs a script until shortly after its first line, sends Ctrl-C, and returns its next line and the seconds
+    until then.
+    """
+    # Shells start background processes with SIGINT ignored.
     handled = "import signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"
     process = subprocess.Popen(
         [sys.executable, "-c", handled + textwrap.dedent(script), *map(str, arguments)],
@@ -177,7 +178,7 @@ def interrupted(script: str, *arguments: object) -> tuple[str, float]:
     return line.strip(), took
 
 
-def test_ctrl_c_ends_a_long_scan_and_the_map_is_whole(tmp_path: Path) -> None:
+def test_ctrl_c_ends_a_long_insert_and_the_map_is_intact(tmp_path: Path) -> None:
     script = """
         import sys
         import numpy as np
@@ -221,7 +222,7 @@ def test_ctrl_c_ends_a_short_call_that_waits_for_another_thread(tmp_path: Path) 
     assert line == "interrupted" and took < 2
 
 
-def test_ctrl_c_in_a_flush_leaves_it_to_itself(tmp_path: Path) -> None:
+def test_a_flush_finishes_after_ctrl_c(tmp_path: Path) -> None:
     script = """
         import sys
         import numpy as np
@@ -237,9 +238,9 @@ def test_ctrl_c_in_a_flush_leaves_it_to_itself(tmp_path: Path) -> None:
         """
     line, took = interrupted(script, tmp_path / "map")
     if line == "flushed before":
-        pytest.skip("the disk is too fast")
+        pytest.skip("the flush ended before Ctrl-C")
     assert line == "interrupted" and took < 2
-    # The interpreter waited for it.
+    # The interpreter waited for the flush.
     with voxtile.open(tmp_path / "map") as found:
         assert found.scan_number == 1
 
@@ -247,11 +248,11 @@ def test_ctrl_c_in_a_flush_leaves_it_to_itself(tmp_path: Path) -> None:
 BUILD = """
     import sys
     import voxtile
-    told = []
+    calls = []
     def progress(done, all):
-        if not told:
+        if not calls:
             print("begun", flush=True)
-        told.append(done)
+        calls.append(done)
     try:
         voxtile.build(sys.argv[1], sys.argv[2], resolution=0.1, max_range=50.0, progress=progress)
         print("built before", flush=True)
@@ -260,7 +261,7 @@ BUILD = """
     """
 
 
-def test_ctrl_c_in_a_build_keeps_what_was_accepted(tmp_path: Path) -> None:
+def test_ctrl_c_in_a_build_keeps_accepted_scans(tmp_path: Path) -> None:
     random = np.random.default_rng(3)
     (tmp_path / "scans").mkdir()
     for number in range(200):
@@ -330,13 +331,13 @@ def test_memory_of_many_maps_is_flat(tmp_path: Path) -> None:
     assert max(sizes) - sizes[0] < 16 << 20, sizes
 
 
-def test_ctrl_c_ends_a_few_questions_that_take_long(tmp_path: Path) -> None:
+def test_ctrl_c_ends_a_few_long_queries(tmp_path: Path) -> None:
     script = """
         import sys
         import numpy as np
         import voxtile
         with voxtile.Map.create(sys.argv[1], 0.1, tile_size=1.0, max_range=40.0) as found:
-            # Free space alone: the nearest voxel is looked for in every tile.
+            # Only free space: the search for the nearest voxel visits every tile.
             angles = np.linspace(0, 2 * np.pi, 2000)
             ends = 50 * np.stack([np.cos(angles), np.sin(angles), np.zeros(2000)], axis=1)
             found.insert(ends, np.eye(4))
@@ -351,7 +352,7 @@ def test_ctrl_c_ends_a_few_questions_that_take_long(tmp_path: Path) -> None:
     assert line == "interrupted" and took < 1
 
 
-def test_rays_through_empty_space_are_short_work(tmp_path: Path) -> None:
+def test_rays_through_empty_space_are_fast(tmp_path: Path) -> None:
     with voxtile.Map.create(tmp_path / "map", 0.5, tile_size=10.0) as found:
         far = np.eye(4)
         far[:3, 3] = [4e8, 1e8, -3e7]

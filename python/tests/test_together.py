@@ -1,4 +1,4 @@
-"""Scans that are handed in together."""
+"""Inserts of several scans at once."""
 
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Whole maps on disk, files of scans, and the command."""
+"""Operations on whole maps, files of scans, and the command."""
 
 import json
 import operator
@@ -41,11 +41,11 @@ def voxtile_command(*arguments: object) -> str:
 
 
 def test_build_makes_the_map_of_the_command(tmp_path: Path, scans: Path, room: list[Scan]) -> None:
-    told: list[tuple[int, int]] = []
+    calls: list[tuple[int, int]] = []
     report = voxtile.build(
-        scans, tmp_path / "built", resolution=0.25, max_range=4.0, progress=lambda *done: told.append(done)
+        scans, tmp_path / "built", resolution=0.25, max_range=4.0, progress=lambda *done: calls.append(done)
     )
-    assert report["points"] == sum(len(points) for points, _ in room) and told[-1] == (len(room), len(room))
+    assert report["points"] == sum(len(points) for points, _ in room) and calls[-1] == (len(room), len(room))
     voxtile_command("build", scans, "-o", tmp_path / "commanded", "--resolution", 0.25, "--max-range", 4.0)
     with voxtile.Map.create(tmp_path / "inserted", 0.25, max_range=4.0) as inserted:
         inserted.insert_many(voxtile.scans(scans))
@@ -54,7 +54,7 @@ def test_build_makes_the_map_of_the_command(tmp_path: Path, scans: Path, room: l
     assert voxtile_command("digest", tmp_path / "built").split()[0] == digest
 
 
-def test_scans_are_what_the_files_hold(scans: Path, room: list[Scan]) -> None:
+def test_scans_are_those_of_the_files(scans: Path, room: list[Scan]) -> None:
     for (points, pose, intensities), (expected, expected_pose) in zip(voxtile.scans(scans), room, strict=True):
         assert intensities is None and np.array_equal(points, expected)
         np.testing.assert_allclose(pose, matrix_of(expected_pose), atol=1e-12)
@@ -72,13 +72,13 @@ def test_scans_are_what_the_files_hold(scans: Path, room: list[Scan]) -> None:
         voxtile.scans(scans, pose_tolerance=-1.0)
 
 
-def test_options_may_be_one_text_or_of_numpy(tmp_path: Path, scans: Path, room: list[Scan]) -> None:
+def test_options_as_text_and_as_numpy_scalars(tmp_path: Path, scans: Path, room: list[Scan]) -> None:
     rows = np.arange(15, dtype="<f4").reshape(3, 5)
     rows.tofile(tmp_path / "five.bin")
     for fields in ("x,y,z,intensity,ring", ["x", "y", "z", "intensity", "ring"]):
         ((points, _, intensities),) = voxtile.scans(tmp_path / "five.bin", fields=fields)
         assert np.array_equal(points, rows[:, :3]) and np.array_equal(intensities, rows[:, 3])
-    told = voxtile.build(
+    report = voxtile.build(
         scans,
         tmp_path / "map",
         resolution=np.float32(0.25),
@@ -87,11 +87,11 @@ def test_options_may_be_one_text_or_of_numpy(tmp_path: Path, scans: Path, room: 
         keep_scans=np.bool_(False),
         max_range=np.array(4.0),
     )
-    assert (told["scans"], told["points"]) == (2, sum(len(points) for points, _ in room[:2]))
+    assert (report["scans"], report["points"]) == (2, sum(len(points) for points, _ in room[:2]))
 
 
-def test_a_build_goes_on_where_the_command_left_it(tmp_path: Path, scans: Path, room: list[Scan]) -> None:
-    """Build and command know each other's maps and inputs."""
+def test_build_and_command_resume_each_other(tmp_path: Path, scans: Path, room: list[Scan]) -> None:
+    """Build and command resume each other's maps and inputs."""
     whole, ours, theirs = tmp_path / "whole", tmp_path / "ours", tmp_path / "theirs"
     options = {"resolution": 0.25, "max_range": 4.0}
     voxtile.build(scans, whole, resolution=0.25, max_range=4.0)
@@ -111,8 +111,8 @@ def test_a_build_goes_on_where_the_command_left_it(tmp_path: Path, scans: Path, 
     assert voxtile.digest(ours) == voxtile.digest(theirs) != voxtile.digest(whole)
 
 
-def test_a_build_reads_as_the_command_does(tmp_path: Path, scans: Path) -> None:
-    """Lists, names with dashes, numbers of numpy, remarks as warnings."""
+def test_a_build_reads_inputs_as_the_command_does(tmp_path: Path, scans: Path) -> None:
+    """Lists, names with dashes, NumPy scalars, remarks as warnings."""
     ours, theirs = tmp_path / "ours", tmp_path / "theirs"
     box = np.array([[-1, -1, -1], [0.5, 1, 1]])
     with pytest.warns(UserWarning, match="all 1200 rays were cut at 1.5 m.*raise .max_range."):
@@ -190,10 +190,10 @@ def test_decay_verify_repair(city: Path) -> None:
 
 def test_export_and_files_of_octomap(city: Path, tmp_path: Path) -> None:
     voxtile.export(city, tmp_path / "city.ot")
-    told: list[tuple[int, int]] = []
-    answer = voxtile.export(city, tmp_path / "city.ply", what="all", progress=lambda *done: told.append(done))
+    calls: list[tuple[int, int]] = []
+    answer = voxtile.export(city, tmp_path / "city.ply", what="all", progress=lambda *done: calls.append(done))
     with voxtile.open(city) as ours:
-        assert answer["voxels"] == len(ours.occupied(min_probability=0.0)[0]) and told
+        assert answer["voxels"] == len(ours.occupied(min_probability=0.0)[0]) and calls
     assert (tmp_path / "city.ply").read_bytes().startswith(b"ply\n")
     with voxtile.open(city) as ours, voxtile.open(tmp_path / "city.ot") as theirs:
         at = np.random.default_rng(5).uniform(-6, 6, (4000, 3))

@@ -13,7 +13,7 @@ use voxtile::{
 use voxtile_formats::{PointBudget, ScanSource, ScanStreamWriter, SensorScan, StoredScan, read_scan_stream};
 use voxtile_local::{LocalMap, LocalParameters, WithLocalMap};
 
-/// What a driver hands out: `f32` in the sensor's frame, intensities, and a pose from elsewhere.
+/// Data of a sensor driver: `f32` points in the sensor's frame, intensities, and a separate pose.
 struct Measured {
     points: Vec<[f32; 3]>,
     intensities: Option<Vec<f32>>,
@@ -56,7 +56,7 @@ impl Measured {
         self.points.iter().map(|point| point.map(f64::from)).collect()
     }
 
-    /// The world frame, number by number.
+    /// Transforms each number to the world frame.
     fn in_world(&self) -> Scan {
         let rotation = self.world_from_sensor.rotation.to_rotation_matrix();
         let at = self.world_from_sensor.translation;
@@ -70,7 +70,7 @@ impl Measured {
         Scan { origin: [at.x, at.y, at.z], points, intensities: self.intensities.clone() }
     }
 
-    /// The same, as it comes from a file.
+    /// The same scan, read from a file.
     fn stored(&self) -> StoredScan {
         let (name, world_from_sensor) = (String::new(), self.world_from_sensor.into());
         let (points_in_sensor, intensities) = (self.widened(), self.intensities.clone());
@@ -80,15 +80,15 @@ impl Measured {
         writer.write(&scan).unwrap();
         let mut source = read_scan_stream(&*bytes, Path::new("scans"), false).unwrap();
         let stored = source.next_stored(&PointBudget::default()).unwrap().unwrap();
-        // The stream's quaternion was normalized once more.
+        // The stream has normalized the quaternion once more.
         StoredScan { world_from_sensor, ..stored }
     }
 }
 
-/// Each form of a scan, one number for each.
+/// Number of forms in which a scan can be passed.
 const FORMS: usize = 6;
 
-/// Passes a form of what was measured on.
+/// Passes a measurement to `take` in one of the forms.
 fn with_form<T>(measured: &Measured, form: usize, take: impl FnOnce(&dyn ScanPoints) -> T) -> T {
     let (pose, widened, in_world) = (measured.world_from_sensor, measured.widened(), measured.in_world());
     let scan = match form {
@@ -105,7 +105,7 @@ fn with_form<T>(measured: &Measured, form: usize, take: impl FnOnce(&dyn ScanPoi
     }
 }
 
-/// A mapper of any kind whose map can be compared.
+/// A mapper of any kind, with a comparable digest.
 trait AnyMapper: Mapper {
     fn digest_text(&self) -> String;
 }
@@ -116,7 +116,7 @@ impl<M: Mapper> AnyMapper for M {
     }
 }
 
-/// The maps that a form is tried on: in memory, and out of core with little room of each kind.
+/// Mappers to test: one in memory, and two out of core with little memory of each kind.
 fn mappers(config: &MapConfig, folder: &TempDir) -> Vec<Box<dyn AnyMapper>> {
     let mut mappers: Vec<Box<dyn AnyMapper>> = vec![Box::new(InMemoryMapper::new(config.clone()).unwrap())];
     let little = [
@@ -145,7 +145,7 @@ fn configs() -> impl Iterator<Item = (MapConfig, bool)> {
     })
 }
 
-/// The digest and the reports of scans in a form, equal for all mappers.
+/// Returns the digest and the reports of scans in a form, which are equal for all mappers.
 fn mapped(config: &MapConfig, scans: &[Measured], form: usize) -> (String, Vec<ScanReport>) {
     let folder = TempDir::new().unwrap();
     let mut outcomes = mappers(config, &folder).into_iter().map(|mut mapper| {
@@ -160,10 +160,10 @@ fn mapped(config: &MapConfig, scans: &[Measured], form: usize) -> (String, Vec<S
 }
 
 #[test]
-fn every_form_of_a_scan_makes_the_same_map_to_the_bit() {
+fn every_form_of_a_scan_makes_an_identical_map() {
     for (seed, (config, has_intensities)) in configs().enumerate() {
         let random = &mut Random(100 + seed as u64);
-        // Few rays, none, and enough for several threads.
+        // Scans with few points, with none, and with enough for several threads.
         let scans = [80, 0, 1, 300, 9_000].map(|count| measured(random, count, has_intensities));
         let naive = mapped(&config, &scans, 0);
         let ScanReport { skipped, cut_at_max_range, .. } = *naive.1.last().unwrap();
@@ -196,13 +196,13 @@ fn points_of_the_world_frame_are_widened_exactly() {
     }
 }
 
-/// All of a local map that a scan changes.
+/// Content of a local map.
 fn content(map: &LocalMap) -> (Vec<(VoxelIndex, f64)>, usize, u64) {
     (map.history().collect(), map.voxels(), map.view().update_number())
 }
 
 #[test]
-fn a_local_map_takes_every_form_beside_an_archive_or_alone() {
+fn a_local_map_takes_every_form_with_and_without_an_archive() {
     let scans: Vec<Measured> = (0..4).map(|seed| measured(&mut Random(seed), 150, false)).collect();
     let config = MapConfig::new(0.2, 3.2).unwrap();
     let mut outcomes = (0..FORMS).map(|form| {
@@ -223,7 +223,7 @@ fn a_local_map_takes_every_form_beside_an_archive_or_alone() {
     outcomes.for_each(|other| assert!(other == first));
 }
 
-/// A file that is damaged in its middle.
+/// Points of a file that is damaged in the middle.
 struct HalfRead;
 
 impl ScanPoints for HalfRead {
@@ -246,7 +246,7 @@ impl ScanPoints for HalfRead {
 }
 
 #[test]
-fn what_cannot_be_inserted_changes_nothing() {
+fn a_failed_insert_changes_nothing() {
     let points = [[1.0, 0.0, 0.5], [2.0, 0.0, 0.5]];
     let scan = ScanRef::in_world([0.1; 3], &points);
     for wrong in [&[][..], &[1.0], &[1.0; 3]] {
@@ -290,12 +290,12 @@ fn what_cannot_be_inserted_changes_nothing() {
         both.insert_points(scan).unwrap_err();
     }
     assert!((content(both.local()), both.archive().digest().unwrap()) == before);
-    // Its points are nowhere, so none counts.
+    // Its points cannot be transformed, so none counts.
     assert_eq!(both.insert_points(&turned_nowhere).unwrap().0.skipped.not_finite, 2);
 }
 
 #[test]
-fn a_pose_is_a_rotation_and_a_position_or_an_error_that_says_why() {
+fn invalid_poses_are_errors_with_a_reason() {
     let quaternion = |position_m, xyzw| Pose::from_quaternion(position_m, xyzw);
     let level = |last: [f64; 4]| {
         Pose::from_matrix(&[[1.0, 0.0, 0.0, 4.0], [0.0, 1.0, 0.0, 5.0], [0.0, 0.0, 1.0, 6.0], last])

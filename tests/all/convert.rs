@@ -22,7 +22,7 @@ fn scan(number: u64) -> Scan {
     random_scan(&mut Random(number), [3.0 * number as f64, 0.0, 0.0], 4)
 }
 
-/// A map of two scans, flushed after each, so that tiles are of different scans.
+/// A map of two scans with a flush after each, so that tiles differ in their scan numbers.
 fn map(disk: &FaultyDisk, config: MapConfig) -> voxtile::Digest {
     let mut mapper = OutOfCoreTileMapper::create(MapPath::on(disk.shared(), place("map")), config).unwrap();
     mapper.begin_input(INPUT).unwrap();
@@ -45,7 +45,7 @@ fn converted(disk: &FaultyDisk, from: &str, to: &str, storage: Storage) -> Resul
     Ok(())
 }
 
-/// The files of a map's tiles, by their path in the map.
+/// Files of a map's tiles, by their path in the map.
 fn tile_files(disk: &FaultyDisk, name: &str) -> BTreeMap<PathBuf, Vec<u8>> {
     let files = disk.files().into_iter();
     let inside =
@@ -54,7 +54,7 @@ fn tile_files(disk: &FaultyDisk, name: &str) -> BTreeMap<PathBuf, Vec<u8>> {
 }
 
 #[test]
-fn there_and_back_the_content_stays_and_the_files_are_the_same() {
+fn a_round_trip_keeps_content_and_files() {
     let iwlo = SensorModel::Iwlo(Iwlo::default());
     for config in [config(), config().with_sensor_model(iwlo).with_storage(Storage::Compact)] {
         let (own, other) = match config.storage {
@@ -94,7 +94,7 @@ fn there_and_back_the_content_stays_and_the_files_are_the_same() {
 }
 
 #[test]
-fn a_build_goes_on_with_the_other_form_as_with_the_first() {
+fn a_build_resumes_a_converted_map() {
     let disk = FaultyDisk::new(Fault::None);
     map(&disk, config());
     converted(&disk, "map", "small", Storage::Compact).unwrap();
@@ -111,9 +111,9 @@ fn a_build_goes_on_with_the_other_form_as_with_the_first() {
     assert_eq!(digests[0], digests[1]);
 }
 
-/// The power went after the commit and before `metadata.json` was replaced: the log is the truth.
+/// The power failed between the commit and the replacement of `metadata.json`: the log decides.
 #[test]
-fn a_map_made_of_one_whose_metadata_is_behind_has_its_scans_all_the_same() {
+fn copies_of_a_map_with_outdated_metadata_have_all_scans() {
     let disk = FaultyDisk::new(Fault::None);
     let mut mapper = OutOfCoreTileMapper::create(MapPath::on(disk.shared(), place("map")), config()).unwrap();
     mapper.begin_input(INPUT).unwrap();
@@ -134,7 +134,7 @@ fn a_map_made_of_one_whose_metadata_is_behind_has_its_scans_all_the_same() {
 }
 
 #[test]
-fn whatever_fails_and_wherever_the_power_goes_there_is_no_new_map_or_the_whole_one() {
+fn a_conversion_is_atomic_after_faults_and_power_cuts() {
     let before = FaultyDisk::new(Fault::None);
     let digest = map(&before, config());
     let first = tile_files(&before, "map");
@@ -184,7 +184,7 @@ fn whatever_fails_and_wherever_the_power_goes_there_is_no_new_map_or_the_whole_o
 }
 
 #[test]
-fn a_damaged_tile_is_named_and_leaves_nothing_behind() {
+fn a_damaged_tile_is_an_error_without_output() {
     for storage in [Storage::OctoMap, Storage::Compact] {
         let disk = FaultyDisk::new(Fault::None);
         map(&disk, config().with_storage(storage));
@@ -202,9 +202,9 @@ fn a_damaged_tile_is_named_and_leaves_nothing_behind() {
     }
 }
 
-/// A map of the original format has no checksums; what is made of it has.
+/// A map of the original format has no checksums; the converted one has.
 #[test]
-fn a_map_of_the_seeds_own_format_gets_what_it_lacks() {
+fn a_map_of_the_original_format_gets_checksums() {
     let disk = FaultyDisk::new(Fault::None);
     let digest = map(&disk, config());
     disk.take(&place("map").join("commits.log"));

@@ -24,7 +24,7 @@ fn scan(seed: u64) -> Scan {
 
 const STORAGES: [Storage; 2] = [Storage::OctoMap, Storage::Compact];
 
-/// The name of the table of a tile.
+/// Name of a tile's table.
 fn table_name(storage: Storage) -> &'static str {
     TileFile::Table.name(storage)
 }
@@ -42,7 +42,7 @@ fn small_map(storage: Storage) -> FaultyDisk {
     disk.copy()
 }
 
-/// What can be read of each tile.
+/// Digests of all tiles.
 fn contents(disk: &FaultyDisk) -> voxtile::Result<Digests> {
     let reader = MapReader::open(MapPath::on(disk.shared(), map()), 1 << 20)?;
     let mut contents = Digests::new();
@@ -72,7 +72,7 @@ fn tile_of(path: &Path) -> Option<TileIndex> {
     tile_of_folder(path.parent()?.file_name()?.to_str()?)
 }
 
-/// Every byte of every file with one bit the other way, and every shorter length of it, also none.
+/// Every file with a bit of one byte flipped, for each byte, and truncated to each length.
 fn damages(disk: &FaultyDisk) -> Vec<(PathBuf, Vec<u8>)> {
     let mut damages = Vec::new();
     for (path, bytes) in disk.files() {
@@ -90,7 +90,7 @@ fn damages(disk: &FaultyDisk) -> Vec<(PathBuf, Vec<u8>)> {
 }
 
 #[test]
-fn every_flipped_byte_and_every_truncation_is_found_named_repaired_and_never_overwritten() {
+fn every_flipped_byte_and_every_truncation_is_found_and_repaired() {
     STORAGES.into_iter().for_each(check_every_damage);
 }
 
@@ -109,7 +109,7 @@ fn check_every_damage(storage: Storage) {
         let (verification, found) = findings(&disk);
         assert!(!verification.is_whole(), "{what}");
         let named = found.iter().any(|finding| {
-            // What is wrong between metadata and log is told of the log, whichever was damaged.
+            // Differences between metadata and log are reported for the log, whichever is damaged.
             let log = path.ends_with("metadata.json") && finding.path.ends_with("commits.log");
             let same_file = finding.path == path || log;
             finding.severity == Severity::Damage
@@ -119,11 +119,11 @@ fn check_every_damage(storage: Storage) {
         assert!(named, "{what}: {found:?}");
 
         let is_derived = path.ends_with("octree.bt");
-        // Queries do not need it.
+        // Queries do not need the list of scans.
         let is_list = path.ends_with("scans.bin");
         let tile = tile_of(&path).filter(|_| !is_derived);
         check_reading(&disk, &before, tile, is_derived || is_list, &what);
-        // A writer at work does not overwrite what it cannot read.
+        // A writer does not overwrite a file that it cannot read.
         if let Ok(mut mapper) = OutOfCoreTileMapper::open(MapPath::on(disk.shared(), map()), config()) {
             let refused = [1, 4].map(|seed| mapper.insert_scan(&scan(seed)).is_err());
             assert_eq!(refused.contains(&true), tile.is_some(), "{what}");
@@ -146,7 +146,7 @@ fn check_every_damage(storage: Storage) {
     }
 }
 
-/// Reading says what is damaged, and the rest goes on.
+/// Reads report the damage, and all other tiles can be read.
 fn check_reading(disk: &FaultyDisk, before: &Digests, tile: Option<TileIndex>, is_derived: bool, what: &str) {
     let reader = MapReader::open(MapPath::on(disk.shared(), map()), 1 << 20);
     let Ok(reader) = reader else {
@@ -166,11 +166,11 @@ fn check_reading(disk: &FaultyDisk, before: &Digests, tile: Option<TileIndex>, i
 }
 
 #[test]
-fn missing_swapped_older_and_foreign_files_are_found_and_repaired() {
-    STORAGES.into_iter().for_each(check_files_that_do_not_belong);
+fn missing_swapped_outdated_and_foreign_files_are_found_and_repaired() {
+    STORAGES.into_iter().for_each(check_foreign_files);
 }
 
-fn check_files_that_do_not_belong(storage: Storage) {
+fn check_foreign_files(storage: Storage) {
     let whole = small_map(storage);
     let before = contents(&whole).unwrap();
     let files = whole.files();
@@ -210,7 +210,7 @@ fn check_files_that_do_not_belong(storage: Storage) {
             true,
         ),
         (
-            "a table of a map as it was before",
+            "a table of an earlier map with this path",
             Box::new(|disk| disk.put(table, &older.files()[table])),
             "the file belongs to map",
             true,
@@ -306,7 +306,7 @@ fn check_files_that_do_not_belong(storage: Storage) {
 }
 
 #[test]
-fn the_power_goes_at_every_change_of_a_repair_and_another_repair_finishes_it() {
+fn an_interrupted_repair_is_completed_by_the_next() {
     STORAGES.into_iter().for_each(check_crashes_of_repairs);
 }
 
@@ -365,12 +365,12 @@ fn check_crashes_of_repairs(storage: Storage) {
 }
 
 #[test]
-fn numbers_that_cannot_be_true_are_damage_and_not_counted_on() {
+fn impossible_numbers_in_the_log_are_damage() {
     let whole = small_map(Storage::OctoMap);
     let log = Path::new("/map/commits.log");
     let bytes = whole.files()[log].clone();
-    // The last record, its fields from the beginning of its payload: flush, scan, and of the first tile: scan,
-    // lengths, voxels, occupied.
+    // Fields of the last record from the beginning of its payload: flush, scan, and for the first tile: scan, lengths,
+    // voxels, occupied.
     let mut last = 32;
     while last + 12 + length(&bytes, last) < bytes.len() {
         last += 12 + length(&bytes, last);
@@ -394,7 +394,7 @@ fn numbers_that_cannot_be_true_are_damage_and_not_counted_on() {
 }
 
 #[test]
-fn a_damaged_index_does_not_keep_the_tiles_from_being_checked() {
+fn tiles_are_checked_although_the_index_is_damaged() {
     for (index, storage, name) in [
         ("metadata.json", Storage::OctoMap, "iwlo_meta.bin"),
         ("metadata.json", Storage::OctoMap, "octree.bt"),
@@ -422,18 +422,18 @@ fn a_damaged_index_does_not_keep_the_tiles_from_being_checked() {
 }
 
 #[test]
-fn verify_beside_writers_finds_no_damage() {
-    STORAGES.into_iter().for_each(verify_beside_writers);
+fn verify_during_writes_finds_no_damage() {
+    STORAGES.into_iter().for_each(verify_during_writes);
 }
 
-fn verify_beside_writers(storage: Storage) {
+fn verify_during_writes(storage: Storage) {
     let disk = small_map(storage);
     let config = || MapReader::config_of(MapPath::on(disk.shared(), map())).unwrap();
     let open = || OutOfCoreTileMapper::open(MapPath::on(disk.shared(), map()), config()).unwrap();
     let (mut writer, mut seed) = (Some(open()), 10);
     let found = &mut Vec::new();
     let work = |_, _| {
-        // Another writer each time, which has not seen who reads.
+        // A new writer each time, which does not know the readers.
         let mut mapper = writer.take().unwrap();
         for _ in 0..4 {
             seed += 1;
@@ -449,15 +449,15 @@ fn verify_beside_writers(storage: Storage) {
 }
 
 #[test]
-fn a_repair_without_a_log_loses_no_version_of_a_table() {
+fn a_repair_without_a_log_keeps_all_versions_of_tables() {
     STORAGES.into_iter().for_each(repair_without_a_log);
 }
 
-/// What is left of a map if the process dies at a change of a flush; `None` if the flush has fewer.
+/// Returns the disk after a crash of the process at a change of a flush; `None` if the flush has fewer changes.
 fn after_a_crash_in_a_flush(storage: Storage, at: u64) -> Option<FaultyDisk> {
     let disk = small_map(storage);
     let mut mapper = OutOfCoreTileMapper::open(MapPath::on(disk.shared(), map()), config()).unwrap();
-    // Tiles that are there, and new ones.
+    // Existing tiles and new ones.
     for seed in [1, 5, 6] {
         mapper.insert_scan(&scan(seed)).unwrap();
     }
@@ -488,7 +488,7 @@ fn repair_without_a_log(storage: Storage) {
     assert!(crashes > 15);
 }
 
-/// Whether a map can be gone on with from the input that it was built from.
+/// Whether a build can resume the map with its original input.
 fn can_be_resumed(disk: &FaultyDisk) -> bool {
     let config = MapReader::config_of(MapPath::on(disk.shared(), map())).unwrap();
     let mut mapper = OutOfCoreTileMapper::open(MapPath::on(disk.shared(), map()), config).unwrap();
@@ -498,9 +498,10 @@ fn can_be_resumed(disk: &FaultyDisk) -> bool {
     }
 }
 
-/// The flush is committed and named by `metadata.json`, some of its tables have their names, and the log is damaged.
+/// The flush is committed and `metadata.json` replaced, some of its tables have their final names, and the log is
+/// damaged.
 #[test]
-fn a_repair_without_a_log_completes_the_last_commit_and_forgets_the_input() {
+fn a_repair_with_a_damaged_log_completes_the_last_commit_and_drops_the_input() {
     for storage in STORAGES {
         let log = Path::new("/map/commits.log");
         let mut crashes = 0;
@@ -530,9 +531,9 @@ fn a_repair_without_a_log_completes_the_last_commit_and_forgets_the_input() {
     }
 }
 
-/// As a copy may be that was taken while the map was written: log and one tile are of an earlier flush.
+/// As after a copy during a flush: the log and one tile are of an earlier flush.
 #[test]
-fn a_map_put_together_from_tiles_of_two_flushes_is_not_gone_on_with() {
+fn a_map_of_tiles_from_two_flushes_cannot_be_resumed() {
     for storage in STORAGES {
         let earlier = small_map(storage);
         let disk = earlier.copy();
@@ -559,7 +560,7 @@ fn a_map_put_together_from_tiles_of_two_flushes_is_not_gone_on_with() {
 }
 
 #[test]
-fn metadata_of_another_map_takes_nothing_from_this_one() {
+fn metadata_of_another_map_is_repaired_without_losses() {
     for storage in STORAGES {
         let whole = small_map(storage);
         let other = small_map(storage);
@@ -585,7 +586,7 @@ fn metadata_of_another_map_takes_nothing_from_this_one() {
         assert!(repair(&disk).unwrap().is_complete());
         assert_eq!((index(&disk), contents(&disk).unwrap()), (index(&whole), before.clone()), "{storage}");
         assert!(can_be_resumed(&disk), "{storage}");
-        // Without a log that can be read, the tiles tell which map it is and how many scans it has.
+        // Without a readable log, the tiles contain the map id and the number of scans.
         let mut cut = files[log].clone();
         cut.pop();
         for damaged in [None, Some(cut), Some(vec![0; 100])] {
@@ -604,9 +605,9 @@ fn metadata_of_another_map_takes_nothing_from_this_one() {
     }
 }
 
-/// As it is where the writer was killed between the record of a commit and `metadata.json`.
+/// As after a kill of the writer between the record of a commit and `metadata.json`.
 #[test]
-fn metadata_behind_the_log_is_brought_up_to_it_and_nothing_is_lost() {
+fn outdated_metadata_is_updated_from_the_log() {
     for storage in STORAGES {
         let disk = small_map(storage);
         let metadata = Path::new("/map/metadata.json");
@@ -616,25 +617,25 @@ fn metadata_behind_the_log_is_brought_up_to_it_and_nothing_is_lost() {
         mapper.flush().unwrap();
         drop(mapper);
         // The number of scans in the list is not part of a commit.
-        let told = |disk: &FaultyDisk| {
+        let content = |disk: &FaultyDisk| {
             let text = String::from_utf8(disk.files()[metadata].clone()).unwrap();
             let is_kept = |line: &&str| !["scan_records", "crc32"].iter().any(|key| line.contains(key));
             text.lines().filter(is_kept).map(str::to_owned).collect::<Vec<_>>()
         };
-        let (before, now) = (contents(&disk).unwrap(), told(&disk));
+        let (before, now) = (contents(&disk).unwrap(), content(&disk));
         disk.put(metadata, &earlier);
         let mut actions = Vec::new();
         let done = |action: &Action| actions.push((action.kind, action.path.clone()));
         let repaired = integrity::repair(MapPath::on(disk.shared(), map()), done, |_, _| ()).unwrap();
         assert!(repaired.is_complete(), "{storage}: {repaired:?}");
         assert_eq!(actions, [(ActionKind::Derived, metadata.to_owned())], "{storage}");
-        assert_eq!((told(&disk), contents(&disk).unwrap()), (now, before), "{storage}");
+        assert_eq!((content(&disk), contents(&disk).unwrap()), (now, before), "{storage}");
         assert_eq!(repair(&disk).unwrap().actions, 0, "{storage}");
     }
 }
 
 #[test]
-fn verify_reads_a_log_that_stays_the_same_three_times_at_most_however_many_tiles_are_damaged() {
+fn verify_reads_an_unchanged_log_at_most_three_times() {
     let disk = FaultyDisk::new(Fault::None);
     let mut mapper = OutOfCoreTileMapper::create(MapPath::on(disk.shared(), map()), config()).unwrap();
     for seed in 0..10 {
@@ -657,37 +658,37 @@ fn verify_reads_a_log_that_stays_the_same_three_times_at_most_however_many_tiles
     assert!(tiles > 10);
     assert_eq!((verification.tiles, verification.damage), (tiles, 2 * tiles), "{found:?}");
     let opened = disk.times_opened(Path::new("/map/commits.log"));
-    // For the first look, the second one, and the one at what lies around.
+    // Once for the first check, once for the second, once for the search for stray files.
     assert!(opened <= 3, "{opened} times for {tiles} tiles");
 }
 
 #[test]
-fn what_is_not_voxtiles_stays_and_keeps_nobody_from_opening_the_map() {
+fn foreign_files_are_kept_and_ignored() {
     let whole = small_map(Storage::OctoMap);
     let tile = whole.files().into_keys().find(|path| path.ends_with("octree.bt")).unwrap();
     let notes = Path::new("/map/notes.next");
     let disk = whole.copy();
-    disk.put(notes, b"somebody's notes");
+    disk.put(notes, b"notes of a user");
     disk.shared().create_folder(Path::new("/map/old.next")).unwrap();
     disk.shared().create_folder(&tile.with_file_name("octree.bt.next")).unwrap();
     assert!(!findings(&disk).1.is_empty());
     drop(OutOfCoreTileMapper::open(MapPath::on(disk.shared(), map()), config()).unwrap());
     repair(&disk).unwrap();
-    assert_eq!(disk.files()[notes], b"somebody's notes");
+    assert_eq!(disk.files()[notes], b"notes of a user");
     assert_eq!(contents(&disk).unwrap(), contents(&whole).unwrap());
-    // Behind the log.
+    // Bytes after the end of the log.
     let disk = whole.copy();
     let log = Path::new("/map/commits.log");
     disk.put(log, &[&whole.files()[log][..], &[7; 1000]].concat());
     let (verification, found) = findings(&disk);
     assert_eq!((verification.damage, verification.notes), (0, 1), "{found:?}");
-    // Gone while it is written to.
+    // The log is deleted during a write.
     let disk = whole.copy();
     let mut mapper = OutOfCoreTileMapper::open(MapPath::on(disk.shared(), map()), config()).unwrap();
     mapper.insert_scan(&scan(1)).unwrap();
     disk.take(log);
     assert!(mapper.flush().is_err());
-    assert!(disk.files().keys().all(|path| path != log), "a log without its beginning is none");
+    assert!(disk.files().keys().all(|path| path != log), "a log without its beginning must not exist");
 }
 
 fn length(log: &[u8], record: usize) -> usize {

@@ -1,4 +1,4 @@
-//! Deletions of snapshots that are killed: the same command completes them, and its exit code says so.
+//! Interrupted deletions of snapshots: the same command completes them and succeeds.
 
 use crate::harness::{at, keeping_scans as config, map, name};
 use std::path::Path;
@@ -21,7 +21,7 @@ fn looked_at(disk: &FaultyDisk) -> Verification {
 }
 
 #[test]
-fn a_deletion_that_is_killed_is_completed_by_the_same_call_which_succeeds() {
+fn a_killed_deletion_is_completed_by_the_same_call() {
     let of = name("s");
     let start = FaultyDisk::new(Fault::None);
     insert(&mut OutOfCoreTileMapper::create(at(&start), config()).unwrap(), 1);
@@ -44,7 +44,7 @@ fn a_deletion_that_is_killed_is_completed_by_the_same_call_which_succeeds() {
             let before = looked_at(&disk);
             match delete_snapshot(at(&disk), &of) {
                 Ok(()) => completed += usize::from(!is_listed),
-                // Nothing was left to do.
+                // The deletion was already complete.
                 Err(Error::InvalidArgument { .. }) => {
                     assert_eq!((is_listed, before.leftovers), (false, 0), "change {change}");
                     gone += 1;
@@ -61,7 +61,7 @@ fn a_deletion_that_is_killed_is_completed_by_the_same_call_which_succeeds() {
 }
 
 #[test]
-fn a_name_that_no_snapshot_had_is_refused() {
+fn an_unknown_snapshot_name_is_an_error() {
     let disk = FaultyDisk::new(Fault::None);
     insert(&mut OutOfCoreTileMapper::create(at(&disk), config()).unwrap(), 1);
     let refused = delete_snapshot(at(&disk), &name("s"));

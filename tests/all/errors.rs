@@ -5,7 +5,7 @@ use voxtile::space::TileIndex;
 use voxtile::{Error, FormatError, MapReader, Place};
 
 #[test]
-fn a_cause_is_told_once_by_whoever_prints() {
+fn a_cause_is_printed_once() {
     let place = Path::new("map/tile_0_0_0");
     let tile = Some(TileIndex::new(0, -1, 2));
     let damaged = FormatError::at_offset(12, "a wrong checksum").in_map(place, tile);
@@ -25,25 +25,25 @@ fn a_cause_is_told_once_by_whoever_prints() {
         assert!(error.source().unwrap().source().is_none());
         let whole = format!("{alone}: {cause}");
         assert_eq!(format!("{error:#}"), whole);
-        // What the command prints, with a context or without one.
+        // The command prints the error with or without a context.
         let error = anyhow::Error::from(error);
         assert_eq!(format!("{error:#}"), whole);
         assert_eq!(format!("{:#}", error.context("after 3 scans")), format!("after 3 scans: {whole}"));
     }
     let error = MapReader::open("/no/map/here", 0).err().unwrap();
-    assert!(error.source().is_none(), "nothing is behind it");
+    assert!(error.source().is_none(), "the error has no source");
     assert_eq!(format!("{error}"), format!("{error:#}"));
 }
 
 #[test]
-fn the_operating_systems_refusal_is_found_without_a_look_at_the_text() {
+fn the_os_error_is_a_source_of_the_error() {
     let error = Error::io(Path::new("map"), "open", io::Error::from(io::ErrorKind::PermissionDenied));
     let cause = error.source().and_then(|cause| cause.downcast_ref::<io::Error>()).unwrap();
     assert_eq!(cause.kind(), io::ErrorKind::PermissionDenied);
 }
 
 #[test]
-fn errors_say_what_they_are_about() {
+fn errors_name_their_subject() {
     let tile = TileIndex::new(4, 5, 6);
     let error = FormatError::at_offset(8, "short").in_map(Path::new("t"), Some(tile));
     assert_eq!(error.kind(), "damaged");

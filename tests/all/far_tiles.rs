@@ -1,4 +1,4 @@
-//! Maps whose tiles are far from each other: rays pass the space between them in few steps and meet the same voxels.
+//! Maps with large distances between tiles: rays cross the empty space in few steps and hit the same voxels.
 
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
@@ -15,7 +15,7 @@ use voxtile::{
 use voxtile_local::{LocalMap, LocalParameters};
 use voxtile_share::VoxelSet;
 
-/// Asks for one tile after another, as a map does that knows nothing about the space between them.
+/// A map without an index of empty space: queries look up every tile.
 struct TileByTile<'a>(&'a InMemoryMapper);
 
 impl MapView for TileByTile<'_> {
@@ -51,20 +51,20 @@ impl MapView for TileByTile<'_> {
     }
 }
 
-/// Adds points, all of them occupied.
+/// Inserts occupied points.
 fn occupy(map: &mut impl Mapper, points: &[Point]) {
     let (intensities, is_occupied) = (None, vec![true; points.len()]);
     map.batch_update(&PointBatch { points, intensities, is_occupied: &is_occupied }).unwrap();
 }
 
 #[test]
-fn rays_through_empty_space_meet_what_single_tiles_would() {
+fn rays_through_empty_space_hit_the_voxels_of_a_tile_by_tile_search() {
     let mut random = Random(7);
     for round in 0..12 {
         let config = MapConfig::new(1.0, 2.0).unwrap();
         let grid = config.grid;
         let (mut map, mut set) = (InMemoryMapper::new(config).unwrap(), VoxelSet::new(grid));
-        // Clusters of voxels, some of them near each other.
+        // Clusters of voxels, some of them close to each other.
         let far_m = [40.0, 600.0, 9000.0][round % 3];
         let mut points = Vec::new();
         for _ in 0..=random.below(5) {
@@ -85,7 +85,7 @@ fn rays_through_empty_space_meet_what_single_tiles_would() {
             let target = points[random.below(points.len() as u64) as usize];
             let direction = match number % 3 {
                 0 => random.point([0.0; 3], 1.0),
-                // Along an axis and past the corners of tiles: many crossings are ties.
+                // Along an axis and through the corners of tiles, where many crossings are ties.
                 1 => [target[0].round() - origin[0].round(), 0.0, target[2].round() - origin[2].round()],
                 _ => std::array::from_fn(|k| grid.center_m(grid.voxel_of(target).unwrap())[k] - origin[k]),
             };
@@ -106,7 +106,7 @@ fn rays_through_empty_space_meet_what_single_tiles_would() {
     }
 }
 
-/// Rays to a wall 400,000 km away, past it, and along all axes.
+/// Casts rays to a wall 400,000 km away, past it, and along all axes.
 fn check_far(map: &dyn Queries, wall: &[Point]) {
     let begun = Instant::now();
     let ray = |origin: Point, direction: Point| {
@@ -129,7 +129,7 @@ fn check_far(map: &dyn Queries, wall: &[Point]) {
 }
 
 #[test]
-fn a_tile_at_the_end_of_the_world_costs_rays_little() {
+fn rays_are_fast_with_a_very_distant_tile() {
     let wall: Vec<Point> = (0..20).map(|k| [4e8, 1.2e8 + 3.0 * f64::from(k), -3e7]).collect();
     let near: Vec<Point> = (0..20).map(|k| [5.0, f64::from(k) * 0.5, 9.0]).collect();
     let config = MapConfig::new(0.5, 10.0).unwrap();
@@ -162,9 +162,9 @@ fn a_tile_at_the_end_of_the_world_costs_rays_little() {
     check_far(&*local.reader().view(), &wall);
 }
 
-/// So many tiles, so far apart, that fine levels of cubes are given up.
+/// So many tiles, so far apart, that the index drops its fine levels of cubes.
 #[test]
-fn thousands_of_tiles_anywhere_cost_rays_little() {
+fn rays_are_fast_with_thousands_of_scattered_tiles() {
     let mut random = Random(11);
     let mut points: Vec<Point> = (0..5000).map(|_| random.point([0.0; 3], 4e8)).collect();
     let wall: Vec<Point> = (0..10).map(|k| [4.2e8, 1.2e8 + 3.0 * f64::from(k), -3e7]).collect();
@@ -185,7 +185,7 @@ fn rays_end_at_the_last_voxels() {
         for direction in [[1.0, slow, 0.0], [slow, -1.0, slow], [0.0, slow, 1.0], [-1.0, -slow, -1.0]] {
             for origin in [[3.5; 3], last.map(|k| k - 2.0), [last[0], 0.5, last[2] - 2.0]] {
                 let query = RayQuery { origin, direction, max_range_m: None, unknown: UnknownAs::Free };
-                // At the end of all voxels along one axis a ray goes on along the others.
+                // At the last voxel index of an axis, a ray can still advance along the others.
                 let hit = map.cast_ray(&query).unwrap();
                 assert!(
                     hit.is_none_or(|hit| slow.abs() > 1e-309 && hit.voxel != [0; 3]),
@@ -198,7 +198,7 @@ fn rays_end_at_the_last_voxels() {
 }
 
 #[test]
-fn what_is_crossed_at_infinite_time_is_no_hit() {
+fn voxels_crossed_at_infinite_distance_are_no_hits() {
     let config = MapConfig::new(1.0, 4.0).unwrap();
     let (mut map, mut set) = (InMemoryMapper::new(config.clone()).unwrap(), VoxelSet::new(config.grid));
     let voxel = [LAST_VOXEL_INDEX - 1, 100, 0];

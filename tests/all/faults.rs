@@ -11,7 +11,7 @@ use voxtile::{
 };
 
 const INPUT: &str = "random scans";
-/// After these scans the map is flushed; after `REOPENED` it is closed and opened again as well.
+/// The map is flushed after these numbers of scans, and also closed and reopened after `REOPENED`.
 const FLUSHED: [usize; 4] = [3, 5, 8, 11];
 const REOPENED: usize = 8;
 
@@ -20,23 +20,23 @@ fn compact() -> MapConfig {
     config().with_storage(Storage::Compact)
 }
 
-/// Scans on a way there and back again, so that tiles come again that were pushed out.
+/// Scans of a drive forth and back, so that evicted tiles are loaded again.
 fn scans() -> Vec<Scan> {
     let mut random = Random(7);
     let ways = [0.0, 3.0, 6.0, 3.0, 0.0, 3.0, 6.0, 9.0, 6.0, 3.0, 0.0];
     ways.iter().map(|&x| random_scan(&mut random, [x, 0.0, 0.0], 4)).collect()
 }
 
-/// A build of the map to the end, from wherever it is, with readers beside it. Its state `n` is the map of `n` scans.
-/// What the disk refuses is tried again by the same process.
+/// A complete build of the map from any state, with concurrent readers. State `n` is the map of `n` scans. The process
+/// retries failed operations.
 struct Build {
     config: MapConfig,
     scans: Vec<Scan>,
-    /// After each number of scans: the digest, and the answer to a query.
+    /// Digest after each number of scans, and the result of a query.
     digests: Vec<Digest>,
     answers: Vec<Occupancy>,
-    /// Whether flushes go on beside the next scans. Which operation comes as the n-th is left to chance then.
-    is_beside: bool,
+    /// Whether flushes run in the background. The order of operations is then not deterministic.
+    in_background: bool,
 }
 
 impl Build {
@@ -51,18 +51,18 @@ impl Build {
                 mapper.insert_scan(scan).unwrap();
             }
         }
-        Self { config, scans, digests, answers, is_beside: false }
+        Self { config, scans, digests, answers, in_background: false }
     }
 
-    fn beside(self) -> Self {
-        Self { is_beside: true, ..self }
+    fn with_background_flushes(self) -> Self {
+        Self { in_background: true, ..self }
     }
 
-    /// Both ways to flush, with both storages.
+    /// Foreground and background flushes, with both storages.
     fn all(config: &MapConfig) -> impl Iterator<Item = Self> {
         [Storage::OctoMap, Storage::Compact].into_iter().flat_map(move |storage| {
             let config = config.clone().with_storage(storage);
-            [Self::of(config.clone()), Self::of(config).beside()]
+            [Self::of(config.clone()), Self::of(config).with_background_flushes()]
         })
     }
 
@@ -80,10 +80,10 @@ impl Build {
         assert_eq!(digest, self.digests[number], "{what}: after {number} scans");
     }
 
-    /// Looks at a mapper after an error: nothing has changed.
+    /// Checks that an error has not changed the mapper.
     fn look(&self, disk: &FaultyDisk, mapper: &OutOfCoreTileMapper) {
         if disk.broken().is_some() {
-            // What is not to be had is an error; what is had is right.
+            // A read either fails or returns the right content.
             match mapper.digest() {
                 Ok(digest) => assert_eq!(digest, self.digests[mapper.scan_number() as usize]),
                 Err(error) => assert!(error.is_of_medium(), "{error:#}"),
@@ -91,8 +91,8 @@ impl Build {
             return;
         }
         self.check_digest(mapper, "after an error");
-        // A query that wants a tile in memory.
-        let answer = mapper.occupancy_at([3.0, 0.1, 0.1]).expect("queries go on");
+        // A query that loads a tile.
+        let answer = mapper.occupancy_at([3.0, 0.1, 0.1]).expect("queries still succeed");
         assert_eq!(answer, self.answers[mapper.scan_number() as usize]);
     }
 
@@ -100,12 +100,12 @@ impl Build {
         let nothing = |_: &()| ();
         let look = |mapper: &OutOfCoreTileMapper| self.look(disk, mapper);
         let mut mapper = insist(disk, &mut (), nothing, |_| match open_or_create(disk, &self.config) {
-            // An attempt that failed at its very end has made the map.
+            // A failed attempt may have created the map.
             Err(Error::AlreadyExists { .. }) => self.open(disk),
             opened => opened,
         })?;
         let done = insist(disk, &mut mapper, look, |mapper| mapper.resume_input(INPUT))? as usize;
-        assert_eq!(done, from, "a reader sees what a mapper goes on from");
+        assert_eq!(done, from, "readers and mappers see the same number of scans");
         *progress = Progress { is_early: false, safe: done, tried: done, failed: None };
         assert_eq!(mapper.scan_number(), done as u64);
         let digest = insist(disk, &mut mapper, look, |mapper| mapper.digest())?;
@@ -116,14 +116,14 @@ impl Build {
             if !FLUSHED.contains(&number) {
                 continue;
             }
-            if self.is_beside {
-                // Before a reader opens the map: one that comes between a commit and its `metadata.json` waits for the
-                // writer a tenth of a second, and this disk has no clock.
+            if self.in_background {
+                // Before a reader opens the map: between a commit and its `metadata.json`, a reader would wait a tenth
+                // of a second for the writer, and this disk has no clock.
                 self.end_flush(disk, &mut mapper, progress, number)?;
             }
             readers.push(insist(disk, &mut (), nothing, |_| MapReader::open(at(disk), 0))?);
             progress.tried = number;
-            if self.is_beside {
+            if self.in_background {
                 insist(disk, &mut mapper, look, |mapper| mapper.begin_flush())?;
             } else {
                 insist(disk, &mut mapper, look, |mapper| mapper.flush())?;
@@ -131,7 +131,7 @@ impl Build {
             }
             for reader in &mut readers {
                 let digest = insist(disk, reader, |_| (), |reader| reader.digest())?;
-                assert_eq!(digest, self.digests[reader.scan_number() as usize], "a reader beside the writer");
+                assert_eq!(digest, self.digests[reader.scan_number() as usize], "a concurrent reader");
             }
             if number == REOPENED {
                 readers.clear();
@@ -145,7 +145,7 @@ impl Build {
         self.end_flush(disk, &mut mapper, progress, self.scans.len())
     }
 
-    /// Waits for a flush that went on beside scans; what it could not do is done now, after `number` scans.
+    /// Waits for a background flush. If it failed, flushes now, after `number` scans.
     fn end_flush(
         &self,
         disk: &FaultyDisk,
@@ -169,8 +169,8 @@ impl Build {
     }
 }
 
-/// Does one thing. If the disk refuses, the subject must be as before; again, in vain if there is no room; and with
-/// room it must go. An error only if the power went, or of damage where a fault stays.
+/// Repeats a call until it succeeds: at most twice on a full disk, then with free space. After each failure the subject
+/// must be unchanged. Returns an error only after a crash, or for damage caused by a persistent fault.
 fn insist<S, T>(
     disk: &FaultyDisk,
     subject: &mut S,
@@ -182,7 +182,7 @@ fn insist<S, T>(
         match attempt(subject) {
             Ok(done) => return Ok(done),
             Err(error) if disk.has_crashed() => return Err(error),
-            // What could not be read when the map was opened is unknown until it is opened again.
+            // A file that was unreadable when the map was opened is reported as damaged until the map is reopened.
             Err(error @ Error::Damaged { .. }) if disk.had_a_fault_that_stays() => return Err(error),
             Err(error) => {
                 assert!(number < 3 && matches!(error, Error::Io { .. }), "attempt {number}: {error:#}");
@@ -196,8 +196,8 @@ fn insist<S, T>(
     }
 }
 
-/// The last flush that returned, the one that was tried last, and one beside scans that failed before: a crash may
-/// bring back its record.
+/// Scans after the last successful flush, after the last attempted one, and after a failed background flush, whose
+/// record may reappear after a crash.
 struct Progress {
     is_early: bool,
     safe: usize,
@@ -232,9 +232,9 @@ impl Subject for Build {
             opened => opened.unwrap_or_else(|error| panic!("{what}: {among:?}: {error:#}")),
         };
         let found = reader.scan_number() as usize;
-        assert!(among.contains(&found), "{what}: {found} is none of {among:?}");
+        assert!(among.contains(&found), "{what}: {found} is not one of {among:?}");
         self.check_digest(&reader, what);
-        // The list of scans, and the scans that are kept, are those of the flush that the reader sees.
+        // The list of scans and the kept scans match the flush that the reader sees.
         let numbers: Vec<u64> = (1..=found as u64).collect();
         let listed = reader.scans().unwrap_or_else(|error| panic!("{what}: {error:#}"));
         assert!(listed.iter().map(|scan| scan.number).eq(numbers.iter().copied()), "{what}");
@@ -253,19 +253,19 @@ impl Subject for Build {
     }
 }
 
-/// Kinds of faults after which the same process succeeds in the end.
+/// Faults after which the same process eventually succeeds.
 const REFUSALS: [fn(u64) -> Fault; 4] = [Fault::Fails, Fault::LosesSync, Fault::IsFull, Fault::IsReadOnly];
 
 #[test]
-fn every_operation_fails_once_and_the_call_is_undone_and_goes_the_next_time() {
-    let keeping = Build::of(config().with_kept_scans(true)).beside();
+fn a_call_that_fails_once_changes_nothing_and_succeeds_on_retry() {
+    let keeping = Build::of(config().with_kept_scans(true)).with_background_flushes();
     for build in Build::all(&config()).chain([keeping]) {
         sweep(&build, faults(&build, &REFUSALS, 32), &[Left::Dropped]);
     }
 }
 
 #[test]
-fn a_fault_that_stays_gives_no_wrong_answer_and_once_it_is_mended_the_map_goes_on() {
+fn a_persistent_fault_gives_no_wrong_results_and_the_map_recovers_after_it() {
     for config in [config(), compact()] {
         let build = Build::of(config);
         sweep(&build, faults(&build, &[Fault::Breaks], 16), &[Left::Mended]);
@@ -273,17 +273,17 @@ fn a_fault_that_stays_gives_no_wrong_answer_and_once_it_is_mended_the_map_goes_o
 }
 
 #[test]
-fn the_power_goes_at_every_operation_and_the_last_flush_is_there() {
-    let keeping = Build::of(config().with_kept_scans(true)).beside();
+fn a_power_cut_at_any_operation_keeps_the_last_flush() {
+    let keeping = Build::of(config().with_kept_scans(true)).with_background_flushes();
     for build in Build::all(&config()).chain([keeping]) {
         sweep(&build, faults(&build, &[Fault::Crashes], 24), &EVERY_CRASH);
     }
 }
 
-/// Next to no memory: resident tiles become compact, those are saved by a thread of their own, and updates wait in
-/// files. Which operation comes as the n-th is left to chance then.
+/// With little memory, resident tiles become compact, a separate thread writes them, and updates wait in files. The
+/// order of operations is then not deterministic.
 #[test]
-fn short_of_memory_every_operation_fails_once_and_the_power_goes_at_every_operation() {
+fn faults_and_power_cuts_with_little_memory() {
     let kinds: [fn(u64) -> Fault; 3] = [Fault::Fails, Fault::IsFull, Fault::Crashes];
     for build in Build::all(&config().with_tight_memory_bytes(6_000)) {
         sweep(&build, faults(&build, &kinds, 40), &[Left::Shuffled(0)]);
@@ -291,12 +291,12 @@ fn short_of_memory_every_operation_fails_once_and_the_power_goes_at_every_operat
 }
 
 #[test]
-fn the_power_goes_some_time_after_the_process_was_killed_at_every_operation() {
+fn a_power_cut_after_a_kill_keeps_the_last_flush() {
     sweep_after_kills(&Build::of(config()), 4, |at| vec![at % 17, 7 + at % 89]);
 }
 
 #[test]
-fn the_power_goes_again_at_every_operation_of_opening_after_a_crash() {
+fn a_second_power_cut_while_opening_keeps_the_last_flush() {
     for config in [config(), compact()] {
         crash_again_while_opening(&Build::of(config));
     }
@@ -318,7 +318,8 @@ fn crash_again_while_opening(build: &Build) {
                     break;
                 }
                 points += 1;
-                // An error, except in the last steps: a later commit replaces `metadata.json` and the log as well.
+                // An error, unless the last steps were reached: a later commit also replaces `metadata.json` and the
+                // log.
                 drop(opened);
                 let what = format!("{fault:?}, {unsynced:?}, again at {again} of opening");
                 let left = recovering.after_crash(Unsynced::Shuffled(again));
@@ -334,15 +335,17 @@ fn crash_again_while_opening(build: &Build) {
     println!("{points} second crashes");
 }
 
-/// A flush that the disk refused is not tried again at once: the map goes on, and the power goes.
+/// The process does not retry the failed flush: it continues to insert scans until the power fails.
 #[test]
-fn a_flush_that_failed_leaves_nothing_behind_that_a_crash_could_bring_back() {
+fn a_failed_flush_does_not_reappear_after_a_crash() {
     let build = Build::of(config());
     let mut points = 0;
     for (at, fault) in (0..).zip(faults(&build, &[Fault::LosesSync], 16)) {
         for later in [0, 1, 2, 3, 5, 8, 13, 21, 34] {
             let disk = FaultyDisk::new(fault);
-            let Some(reached) = live_carelessly(&disk, &build, Fault::Crashes(later)) else { break };
+            let Some(reached) = run_ignoring_failed_flushes(&disk, &build, Fault::Crashes(later)) else {
+                break;
+            };
             points += 1;
             let unsynced =
                 [Unsynced::Dropped, Unsynced::Kept, Unsynced::Shuffled(at), Unsynced::Shuffled(later)];
@@ -355,9 +358,9 @@ fn a_flush_that_failed_leaves_nothing_behind_that_a_crash_could_bring_back() {
     println!("{points} crashes after a failed flush");
 }
 
-/// Inserts all scans and flushes as always, whatever a flush answers; after the first that fails comes another fault.
-/// `None` if none failed, or something else did.
-fn live_carelessly(disk: &FaultyDisk, build: &Build, then: Fault) -> Option<Reached> {
+/// Inserts all scans and ignores failed flushes. The second fault begins after the first failed flush. Returns `None`
+/// if no flush failed, or if another operation failed.
+fn run_ignoring_failed_flushes(disk: &FaultyDisk, build: &Build, then: Fault) -> Option<Reached> {
     let mut mapper = build.create(disk).ok()?;
     mapper.begin_input(INPUT).ok()?;
     let mut progress = Progress { is_early: false, safe: 0, tried: 0, failed: None };
@@ -385,13 +388,13 @@ fn live_carelessly(disk: &FaultyDisk, build: &Build, then: Fault) -> Option<Reac
 }
 
 #[test]
-fn a_flush_that_failed_is_not_believed_by_the_next_process() {
+fn the_next_process_ignores_a_failed_flush() {
     let build = Build::of(config());
     let mut points = 0;
     for fault in faults(&build, &[Fault::LosesSync, Fault::LosesSyncAndDies], 4) {
         let disk = FaultyDisk::new(fault);
-        // The process ends where the flush fails.
-        let Some(reached) = live_carelessly(&disk, &build, Fault::Crashes(0)) else { continue };
+        // The process ends at the failed flush.
+        let Some(reached) = run_ignoring_failed_flushes(&disk, &build, Fault::Crashes(0)) else { continue };
         points += 1;
         let next = disk.after_kill();
         drop(build.open(&next).unwrap());
@@ -400,7 +403,7 @@ fn a_flush_that_failed_is_not_believed_by_the_next_process() {
     println!("{points} failed flushes and new processes");
 }
 
-/// What a map was built from is known from the commit on, not from when `metadata.json` says it too.
+/// The input of a map is recorded by the commit, before `metadata.json` contains it.
 #[test]
 fn the_input_is_that_of_the_last_commit() {
     let build = Build::of(config());
@@ -413,9 +416,10 @@ fn the_input_is_that_of_the_last_commit() {
         let begun = mapper.begin_input(INPUT).is_ok();
         (disk, begun)
     };
-    // The commit is the whole record in the log; that is longest before it is compacted, after `metadata.json`.
+    // The commit is the complete record in the log. The log is longest just before it is compacted, after
+    // `metadata.json`.
     let log_bytes = |disk: &FaultyDisk| disk.files()[&map().join("commits.log")].len();
-    let says_so = |disk: &FaultyDisk| {
+    let metadata_has_input = |disk: &FaultyDisk| {
         String::from_utf8_lossy(&disk.files()[&map().join("metadata.json")]).contains(INPUT)
     };
     let crash = |at| {
@@ -426,7 +430,7 @@ fn the_input_is_that_of_the_last_commit() {
     let longest = crashes.iter().map(|(left, _)| log_bytes(left)).max().unwrap();
     let (mut committed, mut not_committed) = (0, 0);
     for (at, (left, begun)) in crashes.iter().enumerate() {
-        let is_committed = log_bytes(left) == longest || says_so(left);
+        let is_committed = log_bytes(left) == longest || metadata_has_input(left);
         assert!(is_committed || !begun);
         *(if is_committed { &mut committed } else { &mut not_committed }) += 1;
         let resumed =
@@ -452,7 +456,7 @@ fn a_failed_sync_and_then_a_full_disk_lose_nothing() {
         disk.set_fault(Fault::IsFull(full));
         let _ = mapper.flush();
         disk.make_room();
-        // Queries push tiles out of memory.
+        // Queries evict tiles from memory.
         for tile in mapper.tile_indices() {
             mapper.tile(tile).unwrap();
         }
@@ -464,7 +468,7 @@ fn a_failed_sync_and_then_a_full_disk_lose_nothing() {
 }
 
 #[test]
-fn a_reload_that_fails_changes_nothing() {
+fn a_failed_reload_changes_nothing() {
     let build = Build::of(config());
     let disk = FaultyDisk::new(Fault::None);
     let roomy = config().with_write_buffer_bytes(1 << 20);
@@ -483,12 +487,12 @@ fn a_reload_that_fails_changes_nothing() {
             if reloaded == Some(true) {
                 return;
             }
-            build.check_digest(&mapper, "after a reload that failed");
+            build.check_digest(&mapper, "after a failed reload");
         }
     }
 }
 
-/// A map of the original format, with the content of the first three scans.
+/// A map of the original format with the content of the first three scans.
 fn foreign(build: &Build) -> FaultyDisk {
     let disk = FaultyDisk::new(Fault::None);
     let mut mapper = build.create(&disk).unwrap();
@@ -503,11 +507,11 @@ fn foreign(build: &Build) -> FaultyDisk {
 }
 
 #[test]
-fn a_map_of_the_seeds_format_is_adopted_whole_or_not_at_all() {
+fn conversion_of_the_original_format_is_atomic() {
     let build = Build::of(config());
     let (foreign, fourth) = (foreign(&build), build.scans[3].clone());
     let before = digest_of(&foreign, None).unwrap();
-    let adopt = move |disk: &FaultyDisk| -> Result<()> {
+    let convert = move |disk: &FaultyDisk| -> Result<()> {
         let mut mapper = OutOfCoreTileMapper::open(at(disk), config())?;
         if mapper.digest()? == before {
             mapper.insert_scan(&fourth)?;
@@ -515,11 +519,11 @@ fn a_map_of_the_seeds_format_is_adopted_whole_or_not_at_all() {
         mapper.flush()
     };
     let done = foreign.copy();
-    adopt(&done).unwrap();
+    convert(&done).unwrap();
     let after = digest_of(&done, None).unwrap();
-    let job = Job::new(foreign.copy(), map(), adopt.clone(), |disk| digest_of(disk, None).unwrap());
+    let job = Job::new(foreign.copy(), map(), convert.clone(), |disk| digest_of(disk, None).unwrap());
     sweep(&job, faults(&job, &[Fault::Crashes], 2), &EVERY_CRASH);
-    // Twice no room, at any two changes.
+    // The disk is full twice, at any two changes.
     for (first, second) in some_of((0..90).flat_map(|first| (0..90).map(move |second| (first, second))), 6) {
         let disk = foreign.copy();
         let mut mapper = build.open(&disk).unwrap();
@@ -532,9 +536,9 @@ fn a_map_of_the_seeds_format_is_adopted_whole_or_not_at_all() {
         mapper.flush().unwrap_or_else(|error| panic!("full at {first}, at {second}: {error:#}"));
         assert_eq!(mapper.digest().unwrap(), after);
     }
-    // A reader that opened it before sees what it was.
+    // A reader that was opened before sees the old content.
     let disk = foreign.copy();
     let reader = MapReader::open(at(&disk), 0).unwrap();
-    adopt(&disk).unwrap();
+    convert(&disk).unwrap();
     assert_eq!(reader.digest().unwrap(), before);
 }

@@ -1,4 +1,4 @@
-//! The first voxel asked of a tile on disk is read from a part of its file.
+//! The first query of a voxel in a tile on disk reads only a part of its file.
 
 use std::path::{Path, PathBuf};
 use testkit::faulty_disk::{Fault, FaultyDisk};
@@ -16,7 +16,7 @@ fn config(storage: Storage) -> MapConfig {
     MapConfig::new(0.1, 3.2).unwrap().with_range(0.0, 3.0).with_storage(storage)
 }
 
-/// A map of some tiles, the first flush kept under a name.
+/// A map of some tiles, with a snapshot of the first flush.
 fn small(storage: Storage, seed: u64) -> FaultyDisk {
     let disk = FaultyDisk::new(Fault::None);
     let mut mapper = OutOfCoreTileMapper::create(MapPath::on(disk.shared(), map()), config(storage)).unwrap();
@@ -32,7 +32,7 @@ fn small(storage: Storage, seed: u64) -> FaultyDisk {
     disk.copy()
 }
 
-/// A map of a tile whose file is too long to be read at once, in several groups.
+/// A map with a tile whose file has several groups, too long to be read at once.
 fn long() -> FaultyDisk {
     let disk = FaultyDisk::new(Fault::None);
     let model = SensorModel::Iwlo(Iwlo { sharpness: 1.0, ..Iwlo::default() });
@@ -63,7 +63,7 @@ fn any_voxel(random: &mut Random) -> VoxelIndex {
 }
 
 #[test]
-fn the_first_voxel_is_the_one_of_the_whole_tile_in_both_storages() {
+fn the_first_query_equals_that_of_the_whole_tile_in_both_storages() {
     let mut random = Random(5);
     for (seed, storage) in [(1, Storage::Compact), (2, Storage::Compact), (3, Storage::OctoMap)] {
         let disk = small(storage, seed);
@@ -90,7 +90,7 @@ fn the_first_voxel_is_the_one_of_the_whole_tile_in_both_storages() {
                 let io = reader.statistics().io;
                 let is_loaded = tile.is_some() && storage == Storage::OctoMap;
                 assert_eq!((io.loads, io.bytes_read > 0), (u64::from(is_loaded), tile.is_some()), "{io:?}");
-                // The second one loads the tile, and the answers stay.
+                // The second query loads the tile; the results are the same.
                 assert_eq!(bits(reader.evidence(voxel).unwrap()), bits(wanted), "{voxel:?}");
                 assert_eq!(reader.statistics().io.loads, u64::from(tile.is_some()));
                 observed += u64::from(wanted.is_some());
@@ -100,7 +100,7 @@ fn the_first_voxel_is_the_one_of_the_whole_tile_in_both_storages() {
     }
 }
 
-/// The path of the table of a tile.
+/// Path and content of a tile's table.
 fn table(disk: &FaultyDisk, reader: &MapReader, voxel: VoxelIndex) -> (PathBuf, Vec<u8>) {
     let tile = reader.config().grid.tile_of_voxel(voxel);
     let path = map().join(format!("tile_{}_{}_{}/tile.vxt", tile.x, tile.y, tile.z));
@@ -109,7 +109,7 @@ fn table(disk: &FaultyDisk, reader: &MapReader, voxel: VoxelIndex) -> (PathBuf, 
 }
 
 #[test]
-fn damage_is_an_error_or_beside_what_is_read() {
+fn damage_is_an_error_unless_it_is_in_an_unread_part() {
     let disk = small(Storage::Compact, 4);
     let whole = open(&disk);
     let tile = whole.tiles().map(Result::unwrap).max_by_key(|tile| tile.table().len()).unwrap();
@@ -133,15 +133,15 @@ fn damage_is_an_error_or_beside_what_is_read() {
     assert!(refused > 100, "{refused}");
 }
 
-/// A file as long as the one that the log names, and intact, but for the text of its parameters.
+/// A file as long as the one recorded in the log, and valid except for the text of its parameters.
 #[test]
-fn only_the_file_that_the_log_names_is_an_answer() {
+fn a_file_that_differs_from_the_log_is_an_error() {
     let disk = small(Storage::Compact, 4);
     let reader = open(&disk);
     let voxel = [3, 2, 1];
     let (path, mut bytes) = table(&disk, &reader, voxel);
     let length = u32::from_le_bytes(bytes[60..64].try_into().unwrap()) as usize;
-    // In the name of a key.
+    // Within the name of a key.
     bytes[72 + 3] ^= 1;
     let parameters = crc32fast::hash(&bytes[72..72 + length]);
     bytes[64..68].copy_from_slice(&parameters.to_le_bytes());
@@ -153,7 +153,7 @@ fn only_the_file_that_the_log_names_is_an_answer() {
 }
 
 #[test]
-fn of_a_long_file_a_part_is_read() {
+fn only_a_part_of_a_long_file_is_read() {
     let disk = long();
     let whole = open(&disk);
     let tile = whole.tiles().map(Result::unwrap).max_by_key(|tile| tile.table().len()).unwrap();
@@ -172,7 +172,7 @@ fn of_a_long_file_a_part_is_read() {
         read.push(reader.statistics().io.bytes_read);
     }
     assert!(read.iter().all(|&read| read > 0 && read < bytes.len() as u64), "{read:?}");
-    // Damage is an error, or in a group that is not read.
+    // Damage is an error, unless it is in a group that is not read.
     let [mut refused, mut answered] = [0; 2];
     for _ in 0..300 {
         let mut wrong = bytes.clone();
@@ -195,7 +195,7 @@ fn of_a_long_file_a_part_is_read() {
         }
     }
     assert!(refused > 40 && answered > 100, "{refused} {answered}");
-    // A cut is an error, or behind the group that is read.
+    // Truncation is an error, unless it is after the group that is read.
     for _ in 0..100 {
         disk.put(&path, &bytes[..random.below(bytes.len() as u64) as usize]);
         let (voxel, wanted) = known[random.below(known.len() as u64) as usize];

@@ -1,6 +1,6 @@
-//! Files of every kind as the version wrote them that first had them: every later version reads them.
+//! Files of every kind, written by the first version that supported them. Every later version must read them.
 //!
-//! Folders of `tests/data` are never written again. What a later version writes otherwise gets a folder of its own:
+//! Folders of `tests/data` are never rewritten. If a later version writes a different format, it gets a new folder:
 //! `VOXTILE_NEW_FIXTURES=tests/data/files_3 cargo test --test all -- --ignored fixtures_of_this_version`.
 
 use serde_json::{Value, json};
@@ -59,7 +59,7 @@ fn name(name: &str) -> SnapshotName {
     SnapshotName::new(name).unwrap()
 }
 
-/// What is known of a map without changing it.
+/// Describes a map without changing it.
 fn described(map: &Path) -> Value {
     let reader = MapReader::open(map, 1 << 20).unwrap();
     let mut described = json!({ "digest": digest(&reader), "scans": reader.scan_number() });
@@ -76,7 +76,7 @@ fn check_whole(map: &Path, what: &str) {
 }
 
 #[test]
-fn maps_of_all_versions_are_read_verified_and_gone_on_with() {
+fn maps_of_all_versions_are_read_verified_and_continued() {
     for folder in fixtures() {
         let expected: Value =
             serde_json::from_slice(&fs::read(folder.join("expected.json")).unwrap()).unwrap();
@@ -87,7 +87,7 @@ fn maps_of_all_versions_are_read_verified_and_gone_on_with() {
             copy(&folder.join(of), &map);
             assert_eq!(described(&map), expected[of], "{what}");
             check_whole(&map, &what);
-            // A writer goes on with it, and what was kept under a name stays.
+            // A writer continues the map, and its snapshot is unchanged.
             let config = MapReader::config_of(&map).unwrap().with_cache_tiles(2);
             let mut mapper = OutOfCoreTileMapper::open(&map, config).unwrap();
             assert_eq!(digest(&mapper), expected[of]["digest"], "{what}");
@@ -133,7 +133,7 @@ fn streams_packets_and_layers_of_all_versions_are_read() {
     }
 }
 
-/// Tiles of the maps above have one group. This one has three, with symbols of one and two bytes and rare states.
+/// The tiles of the maps above have one group. This tile has three, with symbols of one and two bytes and rare states.
 #[test]
 fn a_tile_of_version_1_with_several_groups_is_read() {
     let file = fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/compact_1/tile.vxt")).unwrap();
@@ -157,14 +157,16 @@ fn a_tile_of_version_1_with_several_groups_is_read() {
     let sifted = read_compact_voxels_from(&mut &file[..], bytes, &voxels, 0.5).unwrap().table;
     expected.retain(|_, evidence| evidence.log_odds >= 0.5);
     assert!(sifted.into_iter().eq(expected));
-    // It has no index.
+    // Version 1 has no index.
     assert!(CompactFileIndex::read(&mut &file[..], bytes, &voxels).unwrap().is_none());
 }
 
 #[test]
 #[ignore = "writes the fixtures of a new version"]
 fn fixtures_of_this_version() {
-    let folder = PathBuf::from(std::env::var_os("VOXTILE_NEW_FIXTURES").expect("a folder that is not there"));
+    let folder = PathBuf::from(
+        std::env::var_os("VOXTILE_NEW_FIXTURES").expect("VOXTILE_NEW_FIXTURES must name a new folder"),
+    );
     fs::create_dir(&folder).unwrap();
     let scans = scans();
     write_plain(&folder.join("plain"), &scans);
@@ -173,7 +175,7 @@ fn fixtures_of_this_version() {
     write_seed(&folder.join("plain"), &folder.join("seed"));
     let mut expected = json!({});
     for of in MAPS {
-        // Aside: looking at a map of a killed writer must leave it as it is.
+        // Reads a copy, because opening the map of a killed writer would change it.
         expected[of] = described(&folder.join(of));
     }
     let file = BufWriter::new(File::create(folder.join("six.scans")).unwrap());
@@ -191,7 +193,7 @@ fn insert(mapper: &mut OutOfCoreTileMapper, scans: &[Scan]) {
     }
 }
 
-/// Two flushes, a snapshot between them, tiles that were removed, and evidence that faded.
+/// Two flushes with a snapshot between them, removed tiles, and decayed evidence.
 fn write_plain(map: &Path, scans: &[Scan]) {
     let mut mapper = OutOfCoreTileMapper::create(map, config()).unwrap();
     mapper.begin_input("six scans").unwrap();
@@ -205,7 +207,7 @@ fn write_plain(map: &Path, scans: &[Scan]) {
     decay(map, &Decay::new(20.0), |_, _| ()).unwrap();
 }
 
-/// What a writer leaves that is killed between two flushes: next versions of tiles, and waiting updates.
+/// Files of a writer that was killed between two flushes: next versions of tiles, and waiting updates.
 fn write_killed(folder: &Path, scans: &[Scan]) {
     let place = TempDir::new().unwrap();
     let map = place.path().join("map");
@@ -227,7 +229,7 @@ fn write_compact(map: &Path, scans: &[Scan]) {
     mapper.flush().unwrap();
 }
 
-/// A map of the original format: no log, no trailers, nothing of ours in the metadata.
+/// A map of the original format: no log, no trailers, no extensions in the metadata.
 fn write_seed(plain: &Path, map: &Path) {
     copy(plain, map);
     fs::remove_file(map.join("commits.log")).unwrap();
@@ -243,7 +245,7 @@ fn write_seed(plain: &Path, map: &Path) {
             }
         }
         let table = entry.join("iwlo_meta.bin");
-        // Of a tile that only a snapshot has, nothing is left.
+        // A tile that only a snapshot uses has no files left.
         let Ok(bytes) = fs::read(&table) else {
             fs::remove_dir(&entry).unwrap();
             continue;
@@ -253,7 +255,7 @@ fn write_seed(plain: &Path, map: &Path) {
     }
 }
 
-/// Packets and a layer of the same voxels; returns their digest.
+/// Writes packets and a layer of the same voxels. Returns their digest.
 fn write_shared(folder: &Path) -> String {
     let mut sender = Sender::new(config().grid, 7, SenderConfig::default()).unwrap();
     let mut random = Random(8);

@@ -1,5 +1,4 @@
-//! One trait for everything that can be asked: the same answers from whatever holds the map, and those of a search of
-//! every voxel.
+//! The trait `Queries` for all kinds of maps: every implementation gives the results of a search over all voxels.
 
 use crate::queries::config;
 use std::collections::BTreeMap;
@@ -28,7 +27,7 @@ fn voxels_of(map: &dyn Queries) -> Voxels {
     voxels.map(|voxel| (voxel.voxel, voxel.occupancy)).collect()
 }
 
-/// A box around a turned one or a capsule cannot tell; points of the body can: how far it is from each voxel, about.
+/// Generates a body. Exact tests of rotated boxes and capsules are approximated by points, see [`touches`].
 fn body(random: &mut Random, number: usize) -> Shape {
     let center = random.point([0.0; 3], 3.0);
     match number % 4 {
@@ -52,7 +51,7 @@ fn body(random: &mut Random, number: usize) -> Shape {
     }
 }
 
-/// Whether a point is in a body that is larger by a margin, or smaller if it is below 0.
+/// Whether a point is in the body enlarged by a margin, or shrunk if the margin is negative.
 fn holds(body: &Shape, point: Point, margin_m: f64) -> bool {
     let distance = |a: Point, b: Point| (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt();
     match body {
@@ -75,7 +74,7 @@ fn holds(body: &Shape, point: Point, margin_m: f64) -> bool {
     }
 }
 
-/// Whether some point of a voxel is in a body: sure, or not within the distance between the points that are tried.
+/// Whether a point of a voxel is in a body: certainly, and possibly, within the spacing of the sample points.
 fn touches(body: &Shape, grid: &Grid, voxel: VoxelIndex) -> [bool; 2] {
     const TRIED: i32 = 7;
     let edge_m = grid.resolution_m() / f64::from(TRIED - 1);
@@ -101,7 +100,7 @@ fn is_obstacle(voxels: &Voxels, voxel: VoxelIndex, unknown: UnknownAs) -> bool {
     }
 }
 
-/// Asks all that can be asked and compares with a search of every voxel.
+/// Runs all queries and compares them with a search over all voxels.
 fn check(name: &str, map: &dyn Queries, voxels: &Voxels, random: &mut Random) {
     let grid = map.grid();
     assert_eq!(voxels_of(map), *voxels, "{name}");
@@ -198,7 +197,7 @@ fn check(name: &str, map: &dyn Queries, voxels: &Voxels, random: &mut Random) {
 }
 
 #[test]
-fn whatever_holds_a_map_gives_its_answers() {
+fn all_kinds_of_maps_give_the_same_results() {
     let folder = TempDir::new().unwrap();
     let path = folder.path().join("map");
     let mut in_memory = InMemoryMapper::new(config()).unwrap();
@@ -238,7 +237,7 @@ fn whatever_holds_a_map_gives_its_answers() {
 }
 
 #[test]
-fn sets_of_occupied_voxels_answer_and_unite_with_maps() {
+fn voxel_sets_can_be_queried_and_united_with_maps() {
     let mut random = Random(21);
     let mut archive = InMemoryMapper::new(config()).unwrap();
     let mut local = LocalMap::new(0.1, LocalParameters::local_mapping()).unwrap();

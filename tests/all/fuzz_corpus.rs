@@ -1,4 +1,4 @@
-//! The corpus of `fuzz/`, fed to the bodies of its targets. `fuzz/run.sh` looks for more.
+//! Runs the corpus of `fuzz/` through the bodies of its targets. `fuzz/run.sh` searches for new inputs.
 
 mod seeds;
 mod targets;
@@ -12,7 +12,7 @@ fn corpus(target: &str) -> PathBuf {
 }
 
 #[test]
-fn no_file_of_the_corpus_breaks_a_reader() {
+fn readers_survive_every_file_of_the_corpus() {
     for (name, target) in TARGETS {
         let folder = corpus(name);
         let entries = fs::read_dir(&folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display()));
@@ -20,7 +20,7 @@ fn no_file_of_the_corpus_breaks_a_reader() {
         assert!(!files.is_empty(), "{} is empty", folder.display());
         let mut is_one_read = false;
         for path in files {
-            // Says which file it was, should the next line panic.
+            // Names the file if the next line panics.
             println!("{}", path.display());
             is_one_read |= target(&fs::read(&path).unwrap());
         }

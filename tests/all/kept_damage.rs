@@ -1,8 +1,8 @@
-//! Damage to each kind of file of kept scans, whether the map or only a snapshot needs it: found, repaired, and never a
-//! way back for scans that were removed.
+//! Damage to files of kept scans that the map or only a snapshot needs: it is found and repaired, and removed scans
+//! never reappear.
 
 use crate::harness::{
-    at, damage_in, digest_of, keeping_scans as config, map, name, open_or_create, rework, scans,
+    at, damage_in, digest_of, keeping_scans as config, map, name, open_or_create, replay, scans,
 };
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -19,7 +19,7 @@ fn pose(number: u64, by_m: f64) -> Pose {
     Pose::from_quaternion([3.0 * (number % 4) as f64 + by_m, 0.0, 0.5], [0.0, 0.0, 0.0, 1.0]).unwrap()
 }
 
-/// Maps a scan, by a process of its own: it gets a segment of its own.
+/// Inserts a scan in a new process, so that it gets its own segment.
 fn insert(disk: &FaultyDisk, number: u64) -> Result<()> {
     let mut mapper = open_or_create(disk, &config())?;
     let scan = random_scan(&mut Random(number), [0.0; 3], 5);
@@ -27,11 +27,11 @@ fn insert(disk: &FaultyDisk, number: u64) -> Result<()> {
     mapper.flush()
 }
 
-/// The scan that is private.
+/// Number of the removed scan.
 const REMOVED: u64 = 3;
 
-/// Four scans, the snapshot `s`; the third is removed; the snapshot `t`; a fifth scan. `s` alone needs a catalog and a
-/// segment, `t` the beginning of the map's catalog.
+/// Four scans, snapshot `s`, removal of the third scan, snapshot `t`, a fifth scan. Only `s` needs the old catalog and
+/// a segment; `t` needs the beginning of the map's catalog.
 fn a_map() -> FaultyDisk {
     let disk = FaultyDisk::new(Fault::None);
     (1..=4).for_each(|number| insert(&disk, number).unwrap());
@@ -43,19 +43,19 @@ fn a_map() -> FaultyDisk {
 }
 
 fn remove(disk: &FaultyDisk, number: u64) -> Result<()> {
-    remove_scans(at(disk), &ScanSelection::Numbers(number, number), false, &rework(), |_, _| ()).map(drop)
+    remove_scans(at(disk), &ScanSelection::Numbers(number, number), false, &replay(), |_, _| ()).map(drop)
 }
 
 fn moved(disk: &FaultyDisk) -> Result<()> {
     let poses = NewPoses::Numbered(vec![(1, pose(1, 0.7)), (4, pose(4, 0.7))]);
-    remap(&scans(disk)?, &poses, &Remap::new(rework()), |_, _| ()).map(drop)
+    remap(&scans(disk)?, &poses, &Remap::new(replay()), |_, _| ()).map(drop)
 }
 
 fn reverted(disk: &FaultyDisk, to: &str) -> Result<()> {
     revert(at(disk), &name(to), Some(&name("before")), |_, _| ()).map(drop)
 }
 
-/// What is done to a map, and whether it may bring the removed scan back.
+/// An operation, and whether it may restore the removed scan.
 type Work = (&'static str, fn(&FaultyDisk) -> Result<()>, bool);
 
 const WORKS: [Work; 5] = [
@@ -75,7 +75,7 @@ fn flush_number(disk: &FaultyDisk) -> u64 {
     MapReader::open(at(disk), 0).unwrap().flush_number()
 }
 
-/// The numbers of the scans that can be read with their points.
+/// Returns the numbers of the scans whose points can be read.
 fn kept(disk: &FaultyDisk) -> Result<Vec<u64>> {
     MapReader::open(at(disk), 0)?.kept_scans()?.map(|scan| scan.map(|scan| scan.number())).collect()
 }
@@ -86,7 +86,7 @@ fn repaired(disk: &FaultyDisk, what: &str) -> Repair {
     repair
 }
 
-/// Ways in which a file is not as it was.
+/// Returns damaged versions of a file.
 fn damages(files: &BTreeMap<PathBuf, Vec<u8>>, path: &Path) -> Vec<(String, Option<Vec<u8>>)> {
     let bytes = &files[path];
     let mut damages = vec![("lost".to_owned(), None)];
@@ -100,7 +100,7 @@ fn damages(files: &BTreeMap<PathBuf, Vec<u8>>, path: &Path) -> Vec<(String, Opti
         flipped[offset] ^= 1 << (offset % 8);
         damages.push((format!("a bit at {offset}"), Some(flipped)));
     }
-    // The other catalog under its name, as from a copy of long ago.
+    // The other catalog under this name, as from an old copy.
     let is_other = |other: &Path| other != path && other.to_string_lossy().contains("catalog");
     for (other, content) in files.iter().filter(|(other, _)| is_catalog && is_other(other)) {
         damages.push((format!("{} in its place", other.display()), Some(content.clone())));
@@ -108,7 +108,7 @@ fn damages(files: &BTreeMap<PathBuf, Vec<u8>>, path: &Path) -> Vec<(String, Opti
     damages
 }
 
-/// Does one thing with a map: it is what it would be without the damage, or an error and nothing was done.
+/// Runs an operation on a damaged map: it either has the result of the undamaged map, or fails and changes nothing.
 fn works(disk: &FaultyDisk, work: &Work, expected: Digest, what: &str, is_repaired: bool) -> bool {
     let (name, work, may_bring_back) = work;
     let (before, flush) = (digest_of(disk, None).unwrap(), flush_number(disk));
@@ -130,7 +130,7 @@ fn works(disk: &FaultyDisk, work: &Work, expected: Digest, what: &str, is_repair
 }
 
 #[test]
-fn damage_to_any_file_of_kept_scans_is_found_and_repaired_and_brings_no_removed_scan_back() {
+fn damage_to_kept_scans_is_repaired_and_restores_no_removed_scan() {
     let whole = a_map();
     assert_eq!(damage_in(&whole), BTreeSet::new());
     let files = files_of_scans(&whole);
@@ -159,7 +159,7 @@ fn damage_to_any_file_of_kept_scans_is_found_and_repaired_and_brings_no_removed_
             }
             let before = files_of_scans(&damaged);
             let repair = repaired(&damaged, &what);
-            // The header of a catalog says nothing that its name does not say.
+            // The header of a catalog only repeats its name.
             let is_header = ["catalog", "a bit at 0", "a bit at 14"].map(|part| what.contains(part));
             let is_complete = is_header[0] && (is_header[1] && how.ends_with(" 0") || is_header[2]);
             assert_eq!((repair.is_complete(), repair.tiles_lost), (is_complete, 0), "{what}: {repair:?}");
@@ -176,7 +176,7 @@ fn damage_to_any_file_of_kept_scans_is_found_and_repaired_and_brings_no_removed_
                 done_after += usize::from(works(&disk, work, expected, &what, true));
                 assert_eq!(damage_in(&disk), BTreeSet::new(), "{what}");
             }
-            // A repaired map takes scans, and goes back to its snapshots.
+            // A repaired map accepts scans and can be reverted to its snapshots.
             assert!(done_after >= 3, "{what}: {done_after}");
             (done, refused) = (done + done_before + done_after, refused + 10 - done_before - done_after);
         }
@@ -185,7 +185,7 @@ fn damage_to_any_file_of_kept_scans_is_found_and_repaired_and_brings_no_removed_
     assert!(done > 200 && refused > 50, "{done} done, {refused} refused");
 }
 
-/// Of maps that share catalogs and points, each is read as often as of one.
+/// Catalogs and points shared by several snapshots are read only once.
 #[test]
 fn verify_reads_catalogs_and_points_once_for_all_snapshots() {
     let opened = |snapshots: u64| {
@@ -203,9 +203,9 @@ fn verify_reads_catalogs_and_points_once_for_all_snapshots() {
     assert_eq!(opened(1), opened(4));
 }
 
-/// The power goes at every step of a repair of what a snapshot needs.
+/// A power cut at every step of a repair of a snapshot's scans.
 #[test]
-fn a_repair_of_a_snapshots_scans_that_the_power_ends_is_completed_by_another() {
+fn an_interrupted_repair_of_a_snapshots_scans_is_completed_by_the_next() {
     let damaged = a_map();
     let mut files = files_of_scans(&damaged);
     let only_snapshots = map().join("kept_scans/segment.3");
@@ -239,9 +239,9 @@ fn a_repair_of_a_snapshots_scans_that_the_power_ends_is_completed_by_another() {
     assert!(crashes > 10, "{crashes}");
 }
 
-/// Only snapshots keep scans, and a file has the name of their folder.
+/// Only snapshots keep scans, and the folder of kept scans is replaced by a file.
 #[test]
-fn a_file_in_place_of_the_scans_that_only_snapshots_keep_is_moved_away() {
+fn a_file_in_place_of_the_folder_of_kept_scans_is_moved_away() {
     let disk = FaultyDisk::new(Fault::None);
     let plain = config().with_kept_scans(false);
     let mut mapper = OutOfCoreTileMapper::create(at(&disk), plain).unwrap();
@@ -266,7 +266,7 @@ fn a_file_in_place_of_the_scans_that_only_snapshots_keep_is_moved_away() {
     revert(at(&disk), &name("kept"), None, |_, _| ()).unwrap();
 }
 
-/// Takes the names of catalogs out of a log of one record.
+/// Removes the names of catalogs from a log of one record.
 fn forget_catalog(disk: &FaultyDisk, path: &Path) {
     let bytes = disk.files()[path].clone();
     let (log, mut commits) = CommitLog::read(&mut &*bytes, bytes.len() as u64).unwrap();
@@ -277,12 +277,12 @@ fn forget_catalog(disk: &FaultyDisk, path: &Path) {
     CommitLog::write_whole(&*disk.shared(), path, log.map_id(), &commits, &text).unwrap();
 }
 
-/// A map as versions wrote it that did not name catalogs.
+/// A map of earlier versions, whose log does not name catalogs.
 #[test]
-fn a_map_whose_log_names_no_catalog_opens_and_names_it_from_the_next_flush_on() {
+fn the_next_flush_names_the_catalog_of_a_log_without_one() {
     let whole = a_map();
     let disk = whole.copy();
-    // One record, with the metadata as of now.
+    // A log of one record, with the current metadata.
     repair_index(&disk);
     ["commits.log", "snapshots/s", "snapshots/t"]
         .iter()
@@ -304,7 +304,7 @@ fn a_map_whose_log_names_no_catalog_opens_and_names_it_from_the_next_flush_on() 
         assert!(named(&disk).is_some(), "{name}");
         assert_eq!(damage_in(&disk), BTreeSet::new(), "{name}");
     }
-    // A repair of what a snapshot needs leaves the map its own catalog.
+    // A repair of a snapshot's scans does not change the map's own catalog.
     let segment = map().join("kept_scans/segment.3");
     disk.take(&segment);
     assert_eq!(damage_in(&disk), BTreeSet::from([segment]));
@@ -312,21 +312,21 @@ fn a_map_whose_log_names_no_catalog_opens_and_names_it_from_the_next_flush_on() 
     assert_eq!(kept(&disk).unwrap(), [1, 2, 4, 5]);
 }
 
-/// Writes the log anew, as one record of the whole map.
+/// Rewrites the log as one record of the whole map.
 fn repair_index(disk: &FaultyDisk) {
     disk.take(&map().join("metadata.json"));
     repair(at(disk), |_| (), |_, _| ()).unwrap();
     assert_eq!(damage_in(disk), BTreeSet::new());
 }
 
-/// While a snapshot's catalog is damaged nothing tells which files may go: the map stays as it is.
+/// While the catalog of a snapshot is damaged, it is unknown which files the snapshot needs: a removal changes nothing.
 #[test]
-fn a_removal_is_refused_before_it_changes_anything_while_the_catalog_of_a_snapshot_is_damaged() {
+fn a_removal_changes_nothing_while_the_catalog_of_a_snapshot_is_damaged() {
     let disk = a_map();
     let catalog = files_of_scans(&disk).into_keys().find(|path| path.ends_with("catalog.1")).unwrap();
     disk.take(&catalog);
     let (before, flush) = (digest_of(&disk, None).unwrap(), flush_number(&disk));
-    let how = rework().with_keep_as(name("before"));
+    let how = replay().with_keep_as(name("before"));
     let refused = remove_scans(at(&disk), &ScanSelection::Numbers(2, 2), true, &how, |_, _| ());
     let message = testkit::support::message_of(refused);
     let parts = ["catalog.1: ", "the snapshot s needs it", "nothing was changed"];
@@ -337,24 +337,24 @@ fn a_removal_is_refused_before_it_changes_anything_while_the_catalog_of_a_snapsh
     assert_eq!(kept(&disk).unwrap(), [1, 4, 5]);
 }
 
-/// What was done is told, and what could not be done.
+/// The report contains the removals that were done and those that failed.
 #[test]
-fn a_snapshot_that_cannot_be_read_is_part_of_the_answer_of_a_removal() {
+fn the_report_of_a_removal_contains_unreadable_snapshots() {
     let disk = a_map();
     disk.put(&map().join("snapshots/t"), b"nothing");
     let remove =
-        |number| remove_scans(at(&disk), &ScanSelection::Numbers(number, number), true, &rework(), |_, _| ());
+        |number| remove_scans(at(&disk), &ScanSelection::Numbers(number, number), true, &replay(), |_, _| ());
     let removed = remove(2).unwrap();
     assert_eq!((removed.scans_removed, removed.snapshots_deleted), (1, vec![name("s")]));
     let [failed] = &*removed.snapshots_failed else { panic!("{:?}", removed.snapshots_failed) };
     assert!(failed.name == name("t") && failed.reason.contains("may contain scans"), "{failed:?}");
     assert_eq!(kept(&disk).unwrap(), [1, 4, 5]);
-    // Nothing else is left to do.
+    // No scan is left to remove.
     let message = testkit::support::message_of(remove(2));
     assert!(message.contains("snapshots/t") && message.contains("may contain scans"), "{message}");
 }
 
-/// Ways in which a log is damaged: lost, cut, or a bit of it changed.
+/// Returns damaged logs: missing, truncated, or with a flipped bit.
 fn damaged_logs(bytes: &[u8]) -> Vec<Option<Vec<u8>>> {
     let mut damages = vec![None];
     for part in 1..8 {
@@ -367,10 +367,10 @@ fn damaged_logs(bytes: &[u8]) -> Vec<Option<Vec<u8>>> {
     damages
 }
 
-/// The log is damaged, and `metadata.json` is lost or one of long ago: the newest catalog may be the only one without
-/// the removed scan.
+/// The log is damaged, and `metadata.json` is missing or outdated: perhaps only the newest catalog lacks the removed
+/// scan.
 #[test]
-fn no_removed_scan_returns_where_log_and_metadata_are_damaged() {
+fn no_removed_scan_reappears_after_damage_to_log_and_metadata() {
     let (log, metadata) = (map().join("commits.log"), map().join("metadata.json"));
     let (mut from_tiles, mut repairs) = (0, 0);
     for has_later_snapshot in [false, true] {
@@ -402,8 +402,8 @@ fn no_removed_scan_returns_where_log_and_metadata_are_damaged() {
             let what = format!("{has_later_snapshot}, {}, {length:?}", old_metadata.is_some());
             let Ok(repair) = repair(at(&damaged), |_| (), |_, _| ()) else { continue };
             (repairs, from_tiles) = (repairs + 1, from_tiles + u64::from(repair.scans_lost > 0));
-            // Where the log is torn at the end of a record, it is that of an earlier flush.
-            // A map whose two files are lost keeps no scans.
+            // A log truncated at the end of a record is the valid log of an earlier flush. A map without log and
+            // metadata keeps no scans.
             let is_back = kept(&damaged).unwrap_or_default().contains(&REMOVED);
             let is_earlier = flush_number(&damaged) < flush_number(&whole);
             assert!(!is_back || is_earlier, "{what}: {repair:?}");
@@ -412,7 +412,7 @@ fn no_removed_scan_returns_where_log_and_metadata_are_damaged() {
             let is_gone = |bytes: &Vec<u8>| !left.values().any(|other| other.starts_with(bytes));
             let gone: Vec<_> =
                 kept_scans.iter().filter(|(_, bytes)| is_gone(bytes)).map(|(path, _)| path).collect();
-            // What a flush wrote that the log does not tell of any more is cut off, as after a crash.
+            // Data of a flush that the log no longer contains is truncated, as after a crash.
             assert!(is_earlier || gone.is_empty(), "{what}: {gone:?} are gone: {repair:?}");
             let past = MapReader::open_snapshot(at(&damaged), &name("s"), 0).unwrap();
             assert_eq!(past.kept_scans().unwrap().count(), 4, "{what}");
@@ -423,13 +423,13 @@ fn no_removed_scan_returns_where_log_and_metadata_are_damaged() {
     assert!(repairs > 60 && from_tiles > 20, "{repairs} repairs, {from_tiles} of them lost scans");
 }
 
-/// Points that a deleted snapshot alone kept are not left behind without an error.
+/// A failed removal of points that only a deleted snapshot needed is an error.
 #[test]
-fn a_deletion_whose_points_the_disk_does_not_remove_fails_and_is_completed_by_another() {
+fn a_deletion_that_cannot_remove_points_fails_and_is_completed_by_the_next() {
     let disk = a_map();
     let catalog = map().join("kept_scans/catalog.1");
     let segment = map().join("kept_scans/segment.3");
-    // Nothing tells whether the map needs the points.
+    // It is unknown whether the map needs the points.
     let own = files_of_scans(&disk)
         .into_keys()
         .find(|path| path != &catalog && path.to_string_lossy().contains("catalog"));

@@ -1,5 +1,4 @@
-//! The files of kept scans under the hands of a writer: what is damaged stays, and what could not be synced is no
-//! scan's undoing.
+//! Writes and repairs of kept scans: writers do not touch damaged files, and a failed sync loses no scan.
 
 use crate::harness::{at, is_whole, keeping_scans as config, map, name};
 use std::collections::BTreeMap;
@@ -13,7 +12,7 @@ use voxtile::scan::ScanPoints;
 use voxtile::store::{CatalogEntry, KeptFrame, KeptRecord, SegmentPlace, TileStore};
 use voxtile::{Error, MapReader, Mapper, OutOfCoreTileMapper, RayConfig, Result, ScanRef};
 
-/// The points of a scan, told by its name.
+/// Returns the points of a scan, which contain its name.
 fn points(name: u64) -> Vec<[f64; 3]> {
     (0..40).map(|number| [name as f64, 0.1 * f64::from(number), 0.5]).collect()
 }
@@ -22,7 +21,7 @@ fn insert(mapper: &mut OutOfCoreTileMapper, name: u64) -> Result<()> {
     mapper.insert_points(&ScanRef::in_world([0.0; 3], &points(name))).map(drop)
 }
 
-/// A map whose catalog has a scan in each of four flushes, each in a segment of its own.
+/// A map whose catalog has four scans, each of another flush and in its own segment.
 fn a_map() -> FaultyDisk {
     a_map_of(4)
 }
@@ -58,7 +57,7 @@ fn kept_points(disk: &FaultyDisk) -> Result<Vec<Vec<[f64; 3]>>> {
 }
 
 #[test]
-fn a_writer_neither_removes_nor_cuts_off_what_is_behind_damage() {
+fn a_writer_does_not_remove_or_truncate_data_after_damage() {
     let whole = a_map();
     let files = kept_files(&whole);
     let [(catalog, bytes)] = files
@@ -94,7 +93,7 @@ fn a_writer_neither_removes_nor_cuts_off_what_is_behind_damage() {
     assert!(refused > bytes.len() * 9 / 10, "{refused} of {}", bytes.len());
 }
 
-/// A store that keeps scans, whose last begun scan was not noted.
+/// A store that keeps scans.
 struct Writer {
     disk: FaultyDisk,
     store: TileStore,
@@ -137,7 +136,7 @@ impl Writer {
         self.store.commit(self.store.metadata().clone(), self.scan_number)
     }
 
-    /// Commits until it goes, after this fault; returns how often it did not.
+    /// Commits until it succeeds, after this fault. Returns the number of failures.
     fn commit_after(&mut self, fault: Fault) -> usize {
         self.disk.set_fault(fault);
         let failed = (0..5).take_while(|_| self.commit().is_err()).count();
@@ -145,7 +144,7 @@ impl Writer {
         failed
     }
 
-    /// The scans that are there when the power has gone now.
+    /// Checks the scans that are left after a power cut.
     fn check(&mut self, names: &[u64], what: &str) {
         self.commit().unwrap();
         let left = self.disk.after_crash(Unsynced::Dropped);
@@ -157,7 +156,7 @@ impl Writer {
 }
 
 #[test]
-fn a_scan_that_is_given_up_after_a_failed_sync_takes_no_other_along() {
+fn an_abandoned_scan_after_a_failed_sync_loses_no_other_scan() {
     let mut failed = 0;
     for change in 0..20 {
         let mut writer = Writer::new();
@@ -174,7 +173,7 @@ fn a_scan_that_is_given_up_after_a_failed_sync_takes_no_other_along() {
 }
 
 #[test]
-fn a_scan_that_is_noted_after_a_failed_sync_is_durable() {
+fn a_scan_committed_after_a_failed_sync_is_durable() {
     let mut failed = 0;
     for change in 0..20 {
         let mut writer = Writer::new();
@@ -189,7 +188,7 @@ fn a_scan_that_is_noted_after_a_failed_sync_is_durable() {
 }
 
 #[test]
-fn a_copy_that_fails_halfway_moves_no_later_scan() {
+fn a_partly_failed_copy_does_not_shift_later_scans() {
     let mut failed = 0;
     for change in 0..8 {
         for operation in 0..24 {
@@ -207,7 +206,7 @@ fn a_copy_that_fails_halfway_moves_no_later_scan() {
     assert!(failed > 0);
 }
 
-/// A map with scans of one flush in one segment, and where that is.
+/// A map with all scans of one flush in one segment, and the path of the segment.
 fn one_segment(scans: u64) -> (FaultyDisk, PathBuf) {
     let disk = FaultyDisk::new(Fault::None);
     let mut mapper = OutOfCoreTileMapper::create(at(&disk), config()).unwrap();
@@ -216,7 +215,7 @@ fn one_segment(scans: u64) -> (FaultyDisk, PathBuf) {
     (disk.copy(), map().join("kept_scans/segment.1"))
 }
 
-/// Where the catalog is, and how long it is.
+/// Returns path and length of the catalog.
 fn catalog_of(disk: &FaultyDisk) -> (PathBuf, usize) {
     let files = kept_files(disk).into_iter();
     let mut catalogs = files.filter(|(path, _)| path.to_string_lossy().contains("kept_scans/catalog"));
@@ -237,20 +236,20 @@ fn repaired(disk: &FaultyDisk, what: &str) -> Repair {
     repaired
 }
 
-/// The names of the scans whose points the map keeps.
+/// Returns the names of the scans whose points the map keeps.
 fn kept_names(disk: &FaultyDisk) -> Vec<u64> {
     kept_points(disk).unwrap().iter().map(|points| points[0][0] as u64).collect()
 }
 
-/// Two writers, each of which removes what nothing needs.
-fn go_on(disk: &FaultyDisk) {
+/// Runs two writers, each of which removes unneeded files.
+fn continue_map(disk: &FaultyDisk) {
     for name in [8, 9] {
         let mut mapper = OutOfCoreTileMapper::open(at(disk), config()).unwrap();
         insert(&mut mapper, name).and_then(|()| mapper.flush()).unwrap();
     }
 }
 
-/// Whether each of these files is there yet, under whatever name.
+/// Whether each of these files still exists, under any name.
 fn has_all(disk: &FaultyDisk, files: &BTreeMap<PathBuf, Vec<u8>>) -> bool {
     let left = disk.files();
     files.values().all(|bytes| left.values().any(|kept| kept == bytes))
@@ -263,7 +262,7 @@ fn in_quarantine(disk: &FaultyDisk, name: &str) -> usize {
 }
 
 #[test]
-fn a_flipped_bit_in_a_catalog_costs_one_scan_at_most_and_no_file() {
+fn a_flipped_bit_in_a_catalog_loses_at_most_one_scan_and_no_file() {
     let whole = a_map();
     let (catalog, bytes) = catalog_of(&whole);
     let mut lost = 0;
@@ -276,7 +275,7 @@ fn a_flipped_bit_in_a_catalog_costs_one_scan_at_most_and_no_file() {
         assert_eq!(names.len() as u64 + repaired.scans_lost, 4, "{what}: {names:?}");
         assert!(repaired.scans_lost <= 1 && repaired.actions > 0, "{what}: {repaired:?}");
         lost += repaired.scans_lost;
-        go_on(&disk);
+        continue_map(&disk);
         assert!(has_all(&disk, &files), "{what}");
         assert_eq!(kept_names(&disk), [&names[..], &[8, 9]].concat(), "{what}");
     }
@@ -284,7 +283,7 @@ fn a_flipped_bit_in_a_catalog_costs_one_scan_at_most_and_no_file() {
 }
 
 #[test]
-fn what_only_a_lost_record_named_stays_when_a_snapshot_of_it_goes() {
+fn points_of_a_lost_record_are_kept_when_its_snapshot_is_deleted() {
     let disk = a_map_of(3);
     let name = name("s");
     snapshot(at(&disk), &name).unwrap();
@@ -294,28 +293,28 @@ fn what_only_a_lost_record_named_stays_when_a_snapshot_of_it_goes() {
     flip(&disk, &catalog_of(&disk).0, 60);
     let files = kept_files(&disk);
     assert_eq!(repaired(&disk, "").scans_lost, 1);
-    go_on(&disk);
+    continue_map(&disk);
     delete_snapshot(at(&disk), &name).unwrap();
-    go_on(&disk);
+    continue_map(&disk);
     assert!(has_all(&disk, &files));
     assert_eq!(kept_names(&disk), [2, 3, 4, 8, 9, 8, 9]);
 }
 
 #[test]
-fn a_bad_sector_of_a_segment_costs_the_scan_in_it() {
+fn a_bad_sector_of_a_segment_loses_only_its_scan() {
     let (disk, segment) = one_segment(4);
     let second = one_segment(1).0.files()[&segment].len();
     disk.make_bytes_unreadable(&segment, second + 8..second + 9);
     let files = kept_files(&disk);
     assert_eq!(repaired(&disk, "").scans_lost, 1);
     assert_eq!(kept_names(&disk), [1, 3, 4]);
-    go_on(&disk);
+    continue_map(&disk);
     assert!(has_all(&disk, &files) && disk.files().contains_key(&segment));
     assert_eq!(in_quarantine(&disk, "segment"), 0);
 }
 
 #[test]
-fn a_segment_goes_to_quarantine_once_and_only_if_no_scan_needs_it() {
+fn a_segment_is_quarantined_only_if_no_scan_needs_it() {
     let ends: Vec<_> = (0..=4).map(|scans| if scans == 0 { 0 } else { segment_bytes(scans) }).collect();
     for damaged in [vec![0, 1, 3], vec![0, 1, 2, 3]] {
         let (disk, segment) = one_segment(4);
@@ -323,7 +322,7 @@ fn a_segment_goes_to_quarantine_once_and_only_if_no_scan_needs_it() {
         let files = kept_files(&disk);
         assert_eq!(repaired(&disk, "").scans_lost, damaged.len() as u64);
         assert_eq!(kept_names(&disk).len(), 4 - damaged.len());
-        go_on(&disk);
+        continue_map(&disk);
         assert!(has_all(&disk, &files));
         assert_eq!(in_quarantine(&disk, "segment"), usize::from(damaged.len() == 4));
     }
@@ -335,7 +334,7 @@ fn segment_bytes(scans: u64) -> usize {
 }
 
 #[test]
-fn a_bad_sector_of_a_catalog_leaves_the_scans_before_it() {
+fn a_bad_sector_of_a_catalog_keeps_the_scans_before_it() {
     for disk in [a_map(), a_map().without_links()] {
         let (catalog, _) = catalog_of(&disk);
         let (_, two) = catalog_of(&a_map_of(2));
@@ -343,14 +342,14 @@ fn a_bad_sector_of_a_catalog_leaves_the_scans_before_it() {
         let files = kept_files(&disk);
         assert_eq!(repaired(&disk, "").scans_lost, 2);
         assert_eq!(kept_names(&disk), [1, 2]);
-        go_on(&disk);
+        continue_map(&disk);
         assert!(has_all(&disk, &files));
         assert_eq!(kept_names(&disk), [1, 2, 8, 9]);
     }
 }
 
 #[test]
-fn a_repair_of_kept_scans_that_the_power_ends_loses_no_file() {
+fn an_interrupted_repair_of_kept_scans_loses_no_file() {
     let damaged = a_map();
     let (catalog, _) = catalog_of(&damaged);
     let (_, one) = catalog_of(&a_map_of(1));
@@ -368,19 +367,19 @@ fn a_repair_of_kept_scans_that_the_power_ends_loses_no_file() {
         crashes += 1;
         for unsynced in [Unsynced::Dropped, Unsynced::Kept, Unsynced::Shuffled(change)] {
             let (disk, what) = (disk.after_crash(unsynced), format!("change {change}, {unsynced:?}"));
-            // A writer that comes in between removes none, either.
+            // A writer between the two repairs does not remove files either.
             drop(TileStore::open(disk.shared(), map()).unwrap());
             assert!(has_all(&disk, &files), "{what}");
             repaired(&disk, &what);
             assert_eq!(kept_names(&disk), [1, 4], "{what}");
-            go_on(&disk);
+            continue_map(&disk);
             assert!(has_all(&disk, &files), "{what}");
         }
     }
     assert!(crashes > 10, "{crashes}");
 }
 
-/// A damaged file of the map's own, or a missing one.
+/// Damages or removes metadata and log.
 fn lose(disk: &FaultyDisk, is_missing: bool) {
     for name in ["metadata.json", "commits.log"] {
         match is_missing {
@@ -399,13 +398,13 @@ fn a_repair_without_metadata_and_log_keeps_all_kept_scans() {
         assert_eq!(repaired(&disk, "").scans_lost, 4);
         assert_eq!(in_quarantine(&disk, "kept_scans"), files.len());
         assert!(kept_files(&disk).keys().all(|path| path.starts_with(map().join("quarantine"))));
-        go_on(&disk);
+        continue_map(&disk);
         assert!(has_all(&disk, &files));
         assert_eq!(kept_names(&disk), [8, 9]);
     }
 }
 
-/// What a snapshot needs stays where it is.
+/// Kept scans of snapshots are not moved.
 #[test]
 fn a_repair_without_metadata_and_log_keeps_the_kept_scans_of_snapshots() {
     let disk = a_map_of(3);
@@ -416,7 +415,7 @@ fn a_repair_without_metadata_and_log_keeps_the_kept_scans_of_snapshots() {
     drop(mapper);
     let files = kept_files(&disk);
     lose(&disk, true);
-    // Whether the snapshot can be read or not.
+    // With readable and with unreadable snapshots.
     for is_whole in [true, false] {
         let disk = disk.copy();
         if !is_whole {
@@ -425,7 +424,7 @@ fn a_repair_without_metadata_and_log_keeps_the_kept_scans_of_snapshots() {
         assert_eq!(repaired(&disk, "").scans_lost, 4);
         let moved = in_quarantine(&disk, "kept_scans");
         assert_eq!(moved, if is_whole { 1 } else { files.len() });
-        go_on(&disk);
+        continue_map(&disk);
         assert!(has_all(&disk, &files));
         if is_whole {
             let past = MapReader::open_snapshot(at(&disk), &name, 0).unwrap();
@@ -435,7 +434,7 @@ fn a_repair_without_metadata_and_log_keeps_the_kept_scans_of_snapshots() {
 }
 
 #[test]
-fn a_repair_without_metadata_and_log_that_the_power_ends_loses_no_kept_scan() {
+fn an_interrupted_repair_without_metadata_and_log_loses_no_kept_scan() {
     let damaged = a_map();
     let files = kept_files(&damaged);
     lose(&damaged, false);
@@ -452,7 +451,7 @@ fn a_repair_without_metadata_and_log_that_the_power_ends_loses_no_kept_scan() {
             let (disk, what) = (disk.after_crash(unsynced), format!("change {change}, {unsynced:?}"));
             drop(TileStore::open(disk.shared(), map()));
             repaired(&disk, &what);
-            go_on(&disk);
+            continue_map(&disk);
             assert!(has_all(&disk, &files), "{what}");
         }
     }

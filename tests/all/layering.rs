@@ -10,7 +10,7 @@ fn sources(folder: &Path) -> Vec<PathBuf> {
     files.filter(|path| path.extension().is_some_and(|extension| extension == "rs")).collect()
 }
 
-/// The modules of ours that the code of a folder or file names, tests left out.
+/// Returns the engine's modules that a folder or file uses, tests excluded.
 fn uses(folder: &str) -> Vec<(PathBuf, String)> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src").join(folder);
     let mut edges = Vec::new();
@@ -18,7 +18,7 @@ fn uses(folder: &str) -> Vec<(PathBuf, String)> {
         let text = fs::read_to_string(&path).unwrap();
         let code = text.split("#[cfg(test)]\nmod tests {").next().unwrap();
         for line in code.lines().filter(|line| !line.trim_start().starts_with("//")) {
-            // A macro is expanded elsewhere.
+            // Macros are expanded elsewhere.
             for part in line.replace("$crate::", "").split("crate::").skip(1) {
                 let name: String = part.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
                 edges.push((path.clone(), name));
@@ -28,7 +28,8 @@ fn uses(folder: &str) -> Vec<(PathBuf, String)> {
     edges
 }
 
-/// Every folder and file of the engine, and what of ours it may name. What other crates may use, their manifests say.
+/// Folders and files of the engine, each with the modules that it may use. Dependencies between crates are in their
+/// manifests.
 const LAYERS: [(&str, &[&str]); 19] = [
     ("maths.rs", &[]),
     ("one_heap.rs", &[]),
@@ -44,11 +45,11 @@ const LAYERS: [(&str, &[&str]); 19] = [
     ("octree", &["error", "space"]),
     ("tile", &["config", "error", "octree", "scan", "sensor", "space"]),
     ("store", &["config", "error", "scratch", "sensor", "space"]),
-    // The one layer that knows both tiles and files.
+    // The only layer that uses both tiles and files.
     ("persistence", &["config", "error", "scan", "sensor", "space", "store", "tile"]),
     ("mapper", &["config", "error", "octree", "persistence", "scan", "sensor", "space", "store", "tile"]),
     ("query", &["config", "error", "mapper", "maths", "octree", "scan", "sensor", "space", "store", "tile"]),
-    // Whole maps on disk, tile by tile.
+    // Operations on whole maps on disk, tile by tile.
     (
         "operations",
         &["config", "error", "mapper", "maths", "persistence", "scan", "sensor", "space", "store", "tile"],
@@ -57,7 +58,7 @@ const LAYERS: [(&str, &[&str]); 19] = [
 ];
 
 #[test]
-fn every_folder_knows_only_what_lies_before_it_in_the_flow() {
+fn modules_only_use_lower_layers() {
     for (layer, allowed) in LAYERS {
         let own = layer.trim_end_matches(".rs");
         for (path, name) in uses(layer) {
@@ -67,7 +68,7 @@ fn every_folder_knows_only_what_lies_before_it_in_the_flow() {
 }
 
 #[test]
-fn every_folder_has_its_place_in_the_flow() {
+fn every_module_has_a_layer() {
     let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
     for entry in fs::read_dir(src).unwrap() {
         let name = entry.unwrap().file_name().into_string().unwrap();
@@ -79,7 +80,7 @@ fn every_folder_has_its_place_in_the_flow() {
 }
 
 #[test]
-fn only_the_disk_touches_a_maps_files_and_the_engine_neither_prints_nor_exits() {
+fn only_the_disk_uses_the_file_system_and_the_engine_does_not_print_or_exit() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
     for path in sources(&root) {
         let text = fs::read_to_string(&path).unwrap();

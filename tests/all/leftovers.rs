@@ -1,7 +1,7 @@
 //! What a command that is killed, or that the disk refuses a rename, leaves in a map: reported by `verify`, completed by
 //! the next writer and by the same command.
 
-use crate::harness::{at, digest_of, keeping_scans, make_foreign, map, name, open_or_create, rework, scans};
+use crate::harness::{at, digest_of, keeping_scans, make_foreign, map, name, open_or_create, replay, scans};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
@@ -102,32 +102,32 @@ fn new_poses() -> NewPoses {
 }
 
 fn moved(disk: &FaultyDisk) -> Result<()> {
-    remap(&scans(disk)?, &new_poses(), &Remap::new(rework().with_keep_as(name("before"))), |_, _| ())
+    remap(&scans(disk)?, &new_poses(), &Remap::new(replay().with_keep_as(name("before"))), |_, _| ())
         .map(drop)
 }
 
 fn moved_beside(disk: &FaultyDisk) -> Result<()> {
-    let how = Remap::new(rework().with_keep_as(name("before")));
+    let how = Remap::new(replay().with_keep_as(name("before")));
     let mut beside = OnlineRemap::begin(&scans(disk)?, &new_poses(), &how)?;
     beside.follow(|_| ())?;
     beside.finish().map(drop)
 }
 
 fn removed(disk: &FaultyDisk) -> Result<()> {
-    remove_scans(at(disk), &ScanSelection::Numbers(2, 2), false, &rework(), |_, _| ()).map(drop)
+    remove_scans(at(disk), &ScanSelection::Numbers(2, 2), false, &replay(), |_, _| ()).map(drop)
 }
 
 fn removed_kept(disk: &FaultyDisk) -> Result<()> {
-    let (scans, how) = (ScanSelection::Numbers(2, 2), rework().with_keep_as(name("before")));
+    let (scans, how) = (ScanSelection::Numbers(2, 2), replay().with_keep_as(name("before")));
     remove_scans(at(disk), &scans, false, &how, |_, _| ()).map(drop)
 }
 
 fn points_removed(disk: &FaultyDisk) -> Result<()> {
-    remove_points(at(disk), &region(), &rework(), |_, _| ()).map(drop)
+    remove_points(at(disk), &region(), &replay(), |_, _| ()).map(drop)
 }
 
 fn points_removed_kept(disk: &FaultyDisk) -> Result<()> {
-    remove_points(at(disk), &region(), &rework().with_keep_as(name("before")), |_, _| ()).map(drop)
+    remove_points(at(disk), &region(), &replay().with_keep_as(name("before")), |_, _| ()).map(drop)
 }
 
 /// Repairs a map whose list of scans and one octree are damaged.
@@ -306,11 +306,11 @@ fn points_of_removed_scans_are_reported_and_gone_after_the_same_call() {
                 // Numbers that the map never had are refused, after the earlier removal is completed.
                 let other = disk.copy();
                 let scans = ScanSelection::Numbers(7, 9);
-                let refused = remove_scans(self::at(&other), &scans, false, &rework(), |_, _| ());
+                let refused = remove_scans(self::at(&other), &scans, false, &replay(), |_, _| ());
                 assert!(message_of(refused).contains("the map keeps none"), "{what}");
                 assert!(!segments(&other).0.contains("segment.1"), "{what}");
                 let again =
-                    remove_scans(self::at(&disk), &ScanSelection::Numbers(2, 2), false, &rework(), |_, _| ());
+                    remove_scans(self::at(&disk), &ScanSelection::Numbers(2, 2), false, &replay(), |_, _| ());
                 assert!(again.unwrap().files_removed > 0, "{what}");
             } else {
                 removed(&disk).unwrap();
@@ -412,14 +412,14 @@ fn kept_scans_go_with_the_last_snapshot_that_has_them() {
 #[test]
 fn a_removal_of_removed_scans_succeeds_and_one_of_unknown_scans_is_refused() {
     let disk = one_segment();
-    for (scans, how) in [(1, rework()), (0, rework()), (0, rework().with_keep_as(name("before")))] {
+    for (scans, how) in [(1, replay()), (0, replay()), (0, replay().with_keep_as(name("before")))] {
         let removed = remove_scans(at(&disk), &ScanSelection::Numbers(2, 2), false, &how, |_, _| ()).unwrap();
         assert_eq!((removed.scans_removed, removed.files_removed), (scans, 0));
     }
     assert_eq!(names(&disk), Vec::<String>::new());
     for from_snapshots in [false, true] {
         let scans = ScanSelection::Numbers(4, 9);
-        let refused = remove_scans(at(&disk), &scans, from_snapshots, &rework(), |_, _| ());
+        let refused = remove_scans(at(&disk), &scans, from_snapshots, &replay(), |_, _| ());
         assert!(message_of(refused).contains("the map keeps none"));
     }
     // Beside another writer, where nothing is left to do.
@@ -445,7 +445,7 @@ fn a_revert_leaves_no_kept_scans_that_nothing_needs() {
 #[test]
 fn a_removal_completes_the_removal_of_a_second_map() {
     let start = four_scans(Storage::Compact, true);
-    let beside = OnlineRemap::begin(&scans(&start).unwrap(), &new_poses(), &Remap::new(rework())).unwrap();
+    let beside = OnlineRemap::begin(&scans(&start).unwrap(), &new_poses(), &Remap::new(replay())).unwrap();
     let start = start.after_kill();
     drop(beside);
     let second = Path::new("/city/map.remapping");
@@ -465,7 +465,7 @@ fn a_removal_completes_the_removal_of_a_second_map() {
 fn a_removal_removes_the_second_map_of_a_remapping_that_was_killed() {
     let start = four_scans(Storage::Compact, true);
     delete_snapshot(at(&start), &name("third")).unwrap();
-    let beside = OnlineRemap::begin(&scans(&start).unwrap(), &new_poses(), &Remap::new(rework())).unwrap();
+    let beside = OnlineRemap::begin(&scans(&start).unwrap(), &new_poses(), &Remap::new(replay())).unwrap();
     let disk = start.after_kill();
     drop(beside);
     let second = Path::new("/city/map.remapping");
@@ -522,7 +522,7 @@ fn a_snapshot_of_another_state_is_not_taken_for_that_of_an_earlier_attempt() {
     let disk = four_scans(Storage::Compact, true);
     let third = Some(name("third"));
     let before = (digest_of(&disk, None).unwrap(), names(&disk));
-    let how = rework().with_keep_as(third.clone());
+    let how = replay().with_keep_as(third.clone());
     let refusals = [
         message_of(snapshot(at(&disk), &name("third"))),
         message_of(
@@ -547,7 +547,7 @@ fn a_snapshot_of_another_state_is_not_taken_for_that_of_an_earlier_attempt() {
     // Nothing but the pose of that scan, which is in no tile.
     snapshot(at(&disk), &name("fifth")).unwrap();
     let poses = NewPoses::Numbered(vec![(5, pose(0, 9.0))]);
-    remap(&scans(&disk).unwrap(), &poses, &Remap::new(rework()), |_, _| ()).unwrap();
+    remap(&scans(&disk).unwrap(), &poses, &Remap::new(replay()), |_, _| ()).unwrap();
     assert!(message_of(snapshot(at(&disk), &name("fifth"))).contains("snapshots/fifth"));
 }
 

@@ -2,7 +2,7 @@
 
 use crate::harness::{
     Act, Content, Job, State, Taken, at, check_files, damage_in, digest_of, faults, keeping_scans as config,
-    map, name, new_poses, perform, rework, scans, snapshot_names,
+    map, name, new_poses, perform, replay, scans, snapshot_names,
 };
 use std::collections::{BTreeMap, BTreeSet};
 use testkit::faulty_disk::{Fault, FaultyDisk};
@@ -45,7 +45,7 @@ fn damage_among_kept_scans_is_named_and_nothing_is_changed() {
             let poses = NewPoses::Numbered(new_poses(&state.now.scans, 3, None));
             let before = disk.files();
             let remapped =
-                scans(&disk).and_then(|scans| remap(&scans, &poses, &Remap::new(rework()), |_, _| ()));
+                scans(&disk).and_then(|scans| remap(&scans, &poses, &Remap::new(replay()), |_, _| ()));
             match remapped {
                 Ok(_) => {
                     let moved = state.after(&Act::Move { seed: 3, rest: None }, &config());
@@ -82,7 +82,7 @@ fn segments_and_catalogs_that_are_missing_are_damage() {
         disk.take(path);
         let poses = NewPoses::Numbered(new_poses(&state.now.scans, 3, None));
         let message = message_of(
-            scans(&disk).and_then(|scans| remap(&scans, &poses, &Remap::new(rework()), |_, _| ())),
+            scans(&disk).and_then(|scans| remap(&scans, &poses, &Remap::new(replay()), |_, _| ())),
         );
         assert!(message.contains("missing"), "{message}");
         let mut damage = 0;
@@ -99,7 +99,7 @@ fn segments_and_catalogs_that_are_missing_are_damage() {
 fn what_is_no_scan_is_named_and_refused() {
     let refused = |disk: &FaultyDisk| {
         let poses = NewPoses::Numbered(vec![(1, Pose::identity())]);
-        message_of(scans(disk).and_then(|scans| remap(&scans, &poses, &Remap::new(rework()), |_, _| ())))
+        message_of(scans(disk).and_then(|scans| remap(&scans, &poses, &Remap::new(replay()), |_, _| ())))
     };
     let (disk, _) = a_map_with_kept_scans();
     clear(at(&disk), &Part::Inside(region(0.0, 1.0)), |_, _| ()).unwrap();
@@ -133,7 +133,7 @@ fn what_is_no_scan_is_named_and_refused() {
     drop(mapper);
     assert!(refused(&disk).contains("the points of scan 1 are in the world frame"), "{}", refused(&disk));
     let region = region(-9.0, 9.0);
-    let removed = remove_points(at(&disk), &region, &rework(), |_, _| ()).unwrap();
+    let removed = remove_points(at(&disk), &region, &replay(), |_, _| ()).unwrap();
     assert!(removed.points_removed > 0);
 }
 
@@ -141,7 +141,7 @@ fn what_is_no_scan_is_named_and_refused() {
 fn new_poses_that_do_not_fit_are_named() {
     let (disk, _) = a_map_with_kept_scans();
     let wrong = |poses: NewPoses| {
-        message_of(scans(&disk).and_then(|scans| remap(&scans, &poses, &Remap::new(rework()), |_, _| ())))
+        message_of(scans(&disk).and_then(|scans| remap(&scans, &poses, &Remap::new(replay()), |_, _| ())))
     };
     let identity = Pose::identity();
     let message = wrong(NewPoses::InOrder(vec![identity; 3]));
@@ -170,13 +170,13 @@ fn scans_that_hardly_move_are_left_alone_and_told() {
         });
         NewPoses::Numbered(poses.collect())
     };
-    let how = Remap::new(rework()).with_tolerance((0.045, 0.01));
+    let how = Remap::new(replay()).with_tolerance((0.045, 0.01));
     let remapped = remap(&scans(&disk).unwrap(), &moved(0.01), &how, |_, _| ()).unwrap();
     assert_eq!((remapped.scans_within_tolerance, remapped.mapped.scans_changed), (4, 1), "{remapped:?}");
     let left_m = remapped.largest_move_left_m;
     assert!((left_m - 0.04).abs() < 1e-9 && (remapped.largest_move_m - 0.05).abs() < 1e-9);
     assert!(digest_of(&disk, None).unwrap() != digest);
-    let wide = Remap::new(rework().with_dry_run(true)).with_tolerance((9.0, 9.0));
+    let wide = Remap::new(replay().with_dry_run(true)).with_tolerance((9.0, 9.0));
     assert_eq!(
         remap(&scans(&disk).unwrap(), &moved(0.02), &wide, |_, _| ()).unwrap().mapped.scans_changed,
         0
@@ -189,7 +189,7 @@ fn a_dry_run_and_a_stop_change_nothing() {
     let (disk, state) = a_map_with_kept_scans();
     let poses = NewPoses::Numbered(new_poses(&state.now.scans, 5, Some(1)));
     let before = disk.files();
-    let dry = Remap::new(rework().with_dry_run(true));
+    let dry = Remap::new(replay().with_dry_run(true));
     let told = remap(&scans(&disk).unwrap(), &poses, &dry, |_, _| ()).unwrap().mapped;
     assert!(told.estimated_s.is_some() && told.scans_changed == 2 && told.tiles_mapped > 0, "{told:?}");
     let is_lock = |path: &std::path::PathBuf| path.ends_with("writer.lock");
@@ -198,7 +198,7 @@ fn a_dry_run_and_a_stop_change_nothing() {
     };
     assert!(without_lock(before) == without_lock(disk.files()));
     let stop = Stop::default();
-    let how = Remap::new(rework().with_stop(stop.clone()));
+    let how = Remap::new(replay().with_stop(stop.clone()));
     let stopped = remap(&scans(&disk).unwrap(), &poses, &how, |done, _| {
         if done == 1 {
             stop.set()
@@ -207,7 +207,7 @@ fn a_dry_run_and_a_stop_change_nothing() {
     assert!(matches!(stopped, Err(Error::Stopped)));
     assert!(state.is_on(&disk));
     assert_eq!(damage_in(&disk), BTreeSet::new(), "stopped");
-    let done = remap(&scans(&disk).unwrap(), &poses, &Remap::new(rework()), |_, _| ()).unwrap().mapped;
+    let done = remap(&scans(&disk).unwrap(), &poses, &Remap::new(replay()), |_, _| ()).unwrap().mapped;
     assert_eq!((done.tiles_mapped > 0, done.scans_changed), (true, 2));
 }
 
@@ -222,7 +222,7 @@ fn scans_are_removed_by_time_and_by_input_and_snapshots_are_told() {
     mapper.snapshot(&name("old")).unwrap();
     drop(mapper);
     let remove = |scans: ScanSelection, from_snapshots| {
-        remove_scans(at(&disk), &scans, from_snapshots, &rework(), |_, _| ())
+        remove_scans(at(&disk), &scans, from_snapshots, &replay(), |_, _| ())
     };
     assert!(message_of(remove(ScanSelection::Time(0, 9), false)).contains("the map keeps none"));
     let message = message_of(remove(ScanSelection::Input("third".to_owned()), false));
@@ -271,23 +271,23 @@ fn scans_that_the_map_has_no_more_are_removed_from_its_snapshots() {
         let disk = a_map_with_snapshots();
         let remove =
             |from_snapshots, how: &Replay| remove_scans(at(&disk), &scans, from_snapshots, how, |_, _| ());
-        let removed = remove(false, &rework()).unwrap();
+        let removed = remove(false, &replay()).unwrap();
         assert_eq!((removed.scans_removed, removed.snapshots_with_them.len()), (2, 2), "{scans:?}");
         // The map does not keep the times of removed scans.
         let is_told = !matches!(scans, ScanSelection::Time(..));
-        match remove(false, &rework()) {
+        match remove(false, &replay()) {
             Ok(removed) => assert!(is_told && removed.scans_removed == 0, "{scans:?}"),
             refused => assert!(!is_told && message_of(refused).contains("the map keeps none"), "{scans:?}"),
         }
-        let told = remove(true, &rework().with_dry_run(true)).unwrap();
+        let told = remove(true, &replay().with_dry_run(true)).unwrap();
         assert_eq!((told.scans_removed, told.snapshots_with_them.len()), (0, 2), "{scans:?}");
         // The one that is to keep them does.
-        let kept = remove(true, &rework().with_keep_as(name("third"))).unwrap();
+        let kept = remove(true, &replay().with_keep_as(name("third"))).unwrap();
         assert_eq!(kept.snapshots_deleted, [name("second")], "{scans:?}");
         assert_eq!(kept.snapshots_with_them, [name("third")], "{scans:?}");
-        assert_eq!(remove(true, &rework()).unwrap().snapshots_deleted, [name("third")], "{scans:?}");
+        assert_eq!(remove(true, &replay()).unwrap().snapshots_deleted, [name("third")], "{scans:?}");
         assert_eq!(snapshot_names(&disk), ["first"], "{scans:?}");
-        match remove(true, &rework()) {
+        match remove(true, &replay()) {
             Ok(removed) => assert!(is_told && removed.snapshots_deleted.is_empty(), "{scans:?}"),
             refused => assert!(!is_told && message_of(refused).contains("the map keeps none"), "{scans:?}"),
         }
@@ -300,9 +300,9 @@ fn scans_that_the_map_has_no_more_are_removed_from_its_snapshots() {
 fn snapshots_go_whatever_has_become_of_the_map() {
     let disk = a_map_with_snapshots();
     let scans = ScanSelection::Numbers(4, 5);
-    remove_scans(at(&disk), &scans, false, &rework(), |_, _| ()).unwrap();
+    remove_scans(at(&disk), &scans, false, &replay(), |_, _| ()).unwrap();
     clear(at(&disk), &Part::Inside(region(0.0, 1.0)), |_, _| ()).unwrap();
-    let removed = remove_scans(at(&disk), &scans, true, &rework(), |_, _| ()).unwrap();
+    let removed = remove_scans(at(&disk), &scans, true, &replay(), |_, _| ()).unwrap();
     assert_eq!(removed.snapshots_deleted, [name("second"), name("third")]);
 }
 
@@ -311,7 +311,7 @@ fn a_snapshot_that_cannot_be_read_is_told_after_the_others_are_gone() {
     let disk = a_map_with_snapshots();
     disk.put(&map().join("snapshots/second"), b"nothing");
     let scans = ScanSelection::Numbers(4, 5);
-    let remove = || remove_scans(at(&disk), &scans, true, &rework(), |_, _| ());
+    let remove = || remove_scans(at(&disk), &scans, true, &replay(), |_, _| ());
     let is_told =
         |message: &str| message.contains("snapshots/second") && message.contains("may contain scans");
     let removed = remove().unwrap();
@@ -333,7 +333,7 @@ fn a_snapshot_that_cannot_be_read_is_told_after_the_others_are_gone() {
 fn a_removal_that_ended_between_map_and_snapshots_is_completed() {
     let remove = |disk: &FaultyDisk| {
         let scans = ScanSelection::Numbers(4, 5);
-        remove_scans(at(disk), &scans, true, &rework(), |_, _| ()).map(drop)
+        remove_scans(at(disk), &scans, true, &replay(), |_, _| ()).map(drop)
     };
     let start = a_map_with_snapshots();
     let job = Job::new(start.copy(), map(), remove, |disk| {

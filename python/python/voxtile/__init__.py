@@ -1,11 +1,11 @@
-"""Probabilistic 3D occupancy mapping whose map is bounded by the disk, never by memory.
+"""Probabilistic 3D occupancy mapping for maps larger than memory.
 
-A ``Map`` takes scans (``insert``) and answers questions about many points, rays and boxes at once; lengths are in
-metres, points are arrays of N x 3. Functions of this module work on whole maps on disk, and raise the exceptions of
-``voxtile.errors``. Progress callbacks get what is done and how much there is.
+A ``Map`` takes scans (``insert``) and answers queries of many points, rays and boxes at once. Lengths are in
+metres, points are arrays of N x 3. Functions of this module work on whole maps on disk. Errors are the
+exceptions of ``voxtile.errors``. Progress callbacks receive the work done and the total.
 
-Where processes are forked with maps open, threads are missing in the child: start processes with ``spawn``, and open
-maps there.
+A forked process lacks the threads of its parent, so it cannot use maps opened there: start processes with
+``spawn`` and open maps in them.
 """
 
 import atexit
@@ -39,7 +39,7 @@ from .errors import VoxtileError
 from .files import build, export, export_scans, scans
 from .whole_maps import digest, open, snapshot
 
-# What was interrupted while it could not be given up is finished before the interpreter exits.
+# Interrupted work that cannot be cancelled is finished before the interpreter exits.
 atexit.register(wait_for_all)
 del wait_for_all
 

@@ -7,8 +7,8 @@ from ._voxtile import run_command
 
 
 def main() -> None:
-    """Runs the command with the arguments of this process, and ends it with the command's exit code."""
-    # Python's handler only notes the signal, for an interpreter that does not run meanwhile.
+    """Runs the command with the arguments of this process and exits with its exit code."""
+    # Python's handler would only set a flag for the interpreter, which does not run during the command.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     run_command(["voxtile", *sys.argv[1:]])
 

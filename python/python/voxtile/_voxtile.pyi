@@ -14,7 +14,7 @@ __all__ = [
     "Map",
     "ScanIterator",
     "TileIterator",
-    "adopt",
+    "replace_tiles",
     "call_build",
     "call_export",
     "call_export_scans",
@@ -29,7 +29,7 @@ __all__ = [
     "import_octree",
     "join",
     "merge",
-    "move_piece",
+    "move_shard",
     "open_scans",
     "remap",
     "remap_as",
@@ -229,7 +229,7 @@ def call_build(
     options: Mapping[str, Any],
     progress: _Progress | None = None,
     *,
-    piece_of: str | None = None,
+    shard_of: str | None = None,
 ) -> dict[str, Any]: ...
 def call_export(
     map: _Path, output: _Path, options: Mapping[str, Any], progress: _Progress | None = None
@@ -293,11 +293,11 @@ def merge(
     prefer: Literal["first", "last", "more-observed"] | None = None,
     progress: _Progress | None = None,
 ) -> dict[str, Any]: ...
-def move_piece(
+def move_shard(
     map: _Path, output: _Path, map_id: str, *, progress: _Progress | None = None
 ) -> dict[str, Any]: ...
-def join(pieces: Sequence[_Path], output: _Path, *, progress: _Progress | None = None) -> dict[str, Any]: ...
-def adopt(
+def join(shards: Sequence[_Path], output: _Path, *, progress: _Progress | None = None) -> dict[str, Any]: ...
+def replace_tiles(
     map: _Path, parts: Sequence[_Path], *, of_flush: int, scans: int, progress: _Progress | None = None
 ) -> dict[str, Any]: ...
 def describe(map: _MapOrSnapshot) -> dict[str, Any]: ...
@@ -307,7 +307,7 @@ def crop(
     region: ArrayLike,
     *,
     outside: bool = False,
-    piece_of: str | None = None,
+    shard_of: str | None = None,
     progress: _Progress | None = None,
 ) -> dict[str, Any]: ...
 def convert(

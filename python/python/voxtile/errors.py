@@ -1,4 +1,4 @@
-"""Exceptions of voxtile: one class for each thing that can be done about it."""
+"""Exceptions of voxtile: one class per remedy."""
 
 from __future__ import annotations
 
@@ -7,9 +7,11 @@ from typing import Any
 
 
 class VoxtileError(Exception):
-    """What every other is. The message names path, tile, offset or argument, and says what to do.
+    """Base class of all exceptions of voxtile. The message names the path, tile, offset or argument, and the
+    remedy.
 
-    ``path``, ``tile``, ``offset`` (in bytes), ``line`` and ``record`` are ``None`` where the error is not about one.
+    ``path``, ``tile``, ``offset`` (in bytes), ``line`` and ``record`` are ``None`` if the error concerns
+    none.
     """
 
     kind = "other"
@@ -33,7 +35,7 @@ class VoxtileError(Exception):
 
 
 class ArgumentError(VoxtileError, ValueError):
-    """An argument is wrong: pass another."""
+    """An argument is wrong: pass another value."""
 
     kind = "invalid_argument"
 
@@ -45,85 +47,85 @@ class GridError(ArgumentError):
 
 
 class DiskError(VoxtileError):
-    """The operating system refused: look at the path, the disk, the rights; then try again."""
+    """The operating system reported an error: check the path, the disk and the permissions, then try again."""
 
     kind = "io"
 
 
 class DamagedError(VoxtileError):
-    """A file of a map is damaged: restore or repair it."""
+    """A file of a map is damaged: restore or repair the map."""
 
     kind = "damaged"
 
 
 class MalformedError(VoxtileError):
-    """A file that was given to be read is not what it should be: give another."""
+    """An input file is malformed: use another file."""
 
     kind = "malformed"
 
 
 class NoMapError(VoxtileError):
-    """There is no map at the path: create one, or name another path."""
+    """There is no map at the path: create one, or pass another path."""
 
     kind = "no_map"
 
 
 class ExistsError(VoxtileError):
-    """There is a map or other content at the path: open it, or choose another path."""
+    """A map or another file exists at the path: open it, or choose another path."""
 
     kind = "already_exists"
 
 
 class MismatchError(VoxtileError):
-    """The map was made with other parameters: go on with its own."""
+    """The parameters differ from the map's: use those of the map."""
 
     kind = "mismatch"
 
 
 class LockedError(VoxtileError):
-    """Another writer has the map: wait for it or close it; readers may open it beside."""
+    """Another writer has locked the map: wait for it or close it. Readers may open the map."""
 
     kind = "locked"
 
 
 class LockLostError(VoxtileError):
-    """The lock of the map was removed: close it and open it again, it is as of the last flush."""
+    """The lock of the map was removed: close and reopen the map, which continues from the last flush."""
 
     kind = "lock_lost"
 
 
 class ChangedError(VoxtileError):
-    """A writer flushed the map while it was read: refresh it or open it again."""
+    """A writer flushed the map during a read: refresh or reopen it."""
 
     kind = "changed"
 
 
 class ExpiredError(VoxtileError):
-    """The map changed too much while a question was answered: ask again, or for less."""
+    """The map changed too much during a query: query again, or query less."""
 
     kind = "expired"
 
 
 class StoppedError(VoxtileError):
-    """What was under way was given up: nothing of it is in the map."""
+    """The operation was cancelled: it changed nothing in the map."""
 
     kind = "stopped"
 
 
 class NoAnswerError(VoxtileError):
-    """A server stopped answering: look at the network and the server, then try again."""
+    """A server stopped responding: check the network and the server, then try again."""
 
     kind = "no_answer"
 
 
 class UnsavedChangesError(VoxtileError):
-    """A tile has updates that are not on disk: flush first."""
+    """A tile has changes that are not on disk: flush first."""
 
     kind = "unsaved_changes"
 
 
 class TooLargeError(VoxtileError):
-    """The answer would be too large: ask for less."""
+    """The result would be too large: query less."""
 
     kind = "too_large"
 
@@ -135,7 +137,7 @@ class ClosedError(VoxtileError, ValueError):
 
 
 class ReadOnlyError(VoxtileError):
-    """The map is open for reading alone: open it with mode "r+"."""
+    """The map is open for reading: open it with mode "r+" to change it."""
 
     kind = "read_only"
 
@@ -147,9 +149,11 @@ class PickleError(VoxtileError, TypeError):
 
 
 class SnapshotsFailedError(VoxtileError):
-    """Scans were removed, but these snapshots may still contain some: repair or delete them, then remove again.
+    """Scans were removed, but these snapshots may still contain some: repair or delete them, then remove
+    again.
 
-    ``report`` is what ``remove_scans`` returns otherwise; its ``snapshots_failed`` has a name and a reason each.
+    ``report`` is the report that ``remove_scans`` would return; its ``snapshots_failed`` lists names and
+    reasons.
     """
 
     kind = "snapshots_failed"
@@ -176,6 +180,6 @@ def of_kind(
     line: int | None = None,
     record: int | None = None,
 ) -> VoxtileError:
-    """The exception of a kind: the words of ``docs/json.md``, and those of this module's classes."""
+    """Returns the exception of a kind: one of ``docs/json.md``, or of a class of this module."""
     kind_of_error = _BY_KIND.get(kind, VoxtileError)
     return kind_of_error(message, path=path, tile=tile, offset=offset, line=line, record=record)

@@ -1,4 +1,4 @@
-"""Files of scans in, files for other programs out: what the commands ``build`` and ``export`` do, in this process."""
+"""Scans from files and exports to other programs: the commands ``build`` and ``export`` in this process."""
 
 from __future__ import annotations
 
@@ -18,12 +18,13 @@ _Corners = Sequence[float] | Sequence[Sequence[float]]
 
 
 class ReadOptions(TypedDict, total=False):
-    """How scans are read. Lengths are in metres, times in seconds; what is left out is as for ``voxtile build``.
+    """Options for reading scans. Lengths are in metres, times in seconds; defaults are those of ``voxtile build``.
 
-    ``format`` names what the content does not tell: pcd ply xyz bin las laz copc e57 tum-rgbd depth bag mcap db3
-    rosbag2 graph log scans. ``topic``, ``odometry`` and ``fixed_frame`` choose from a recording, ``first``, ``count``
-    and ``every`` choose scans. ``poses`` is a file of poses (TUM, KITTI, CSV, .npy), sensor to world, or "identity";
-    ``extrinsic`` says where the sensor is in the body that poses are of: seven numbers, or twelve of a 3 x 4 matrix.
+    ``format`` is needed if the content does not identify it: pcd ply xyz bin las laz copc e57 tum-rgbd depth bag
+    mcap db3 rosbag2 graph log scans. ``topic``, ``odometry`` and ``fixed_frame`` select data of a recording;
+    ``first``, ``count`` and ``every`` select scans. ``poses`` is a file of poses (TUM, KITTI, CSV, .npy), sensor to
+    world, or "identity". ``extrinsic`` is the pose of the sensor in the body frame of the poses: seven numbers, or
+    twelve of a 3 x 4 matrix.
     """
 
     format: str | None
@@ -49,9 +50,9 @@ class ReadOptions(TypedDict, total=False):
 
 
 class BuildOptions(ReadOptions, total=False):
-    """How a map is built: all that ``ReadOptions`` says of reading, and the options of ``voxtile build``.
+    """Options of a build: those of ``ReadOptions``, and the options of ``voxtile build``.
 
-    Lengths are in metres; what is left out is the command's default, or as the map is that goes on.
+    Lengths are in metres. Defaults are those of the command, or the parameters of the map that is resumed.
     """
 
     resolution: float
@@ -80,10 +81,10 @@ class BuildOptions(ReadOptions, total=False):
 
 
 class ExportOptions(TypedDict, total=False):
-    """What is written, and how: the options of ``voxtile export``. Lengths are in metres.
+    """Options of ``voxtile export``. Lengths are in metres.
 
-    ``format`` names what the ending of the output does not: ply pcd csv bt ot xyz npz las laz copc e57 parquet mcap
-    glb nav2 heightmap autoware 3dtiles.
+    ``format`` is needed if the extension of the output does not name it: ply pcd csv bt ot xyz npz las laz copc e57
+    parquet mcap glb nav2 heightmap autoware 3dtiles.
     """
 
     format: str | None
@@ -99,7 +100,7 @@ class ExportOptions(TypedDict, total=False):
 
 
 def scans(path: _Path, **options: Unpack[ReadOptions]) -> ScanIterator:
-    """Iterates over the scans of a file or folder of any format that the command reads, or over those that a map keeps.
+    """Iterates over the scans of a file or folder, in any format of the command, or over those that a map keeps.
 
     A scan is a tuple of points in the sensor's frame (``float64``, N x 3), the pose (4 x 4) and intensities
     (``float32``, or ``None``). ``ReadOptions`` lists the keywords.
@@ -108,7 +109,7 @@ def scans(path: _Path, **options: Unpack[ReadOptions]) -> ScanIterator:
 
 
 def count_scans(path: _Path, **options: Unpack[ReadOptions]) -> int:
-    """The number of scans of a file or folder. Where the format does not tell it, they are read, but in ``.scans``."""
+    """Counts the scans of a file or folder. Reads them if their number is not stored, except in ``.scans``."""
     return _count_scans(path, options)
 
 
@@ -119,16 +120,16 @@ def reaches(
     clear_no_return: float | None = None,
     **options: Unpack[ReadOptions],
 ) -> list[tuple[str, tuple[float, float, float, float] | None]]:
-    """Of each scan what tells it from others, and a box (west, south, east, north) around it and its rays in metres.
+    """Returns for each scan a fingerprint, and a box (west, south, east, north) around it and its rays in metres.
 
-    The box is ``None`` where a scan leaves nothing in a map.
+    The box is ``None`` if the scan changes no voxel.
     """
     return scan_reaches(path, options, max_range=max_range, no_return_range=clear_no_return)
 
 
-def build_piece(path: _Path, output: _Path, map_id: str, **options: Unpack[BuildOptions]) -> dict[str, Any]:
-    """Makes a map as ``build`` does, but as a piece of the map with this id: ``move_piece`` makes it durable."""
-    return call_build(path, output, options, piece_of=map_id)
+def build_shard(path: _Path, output: _Path, map_id: str, **options: Unpack[BuildOptions]) -> dict[str, Any]:
+    """Builds a shard of the map with this id, as ``build`` does. It is durable after ``move_shard``."""
+    return call_build(path, output, options, shard_of=map_id)
 
 
 def build(
@@ -157,10 +158,11 @@ def export(
     progress: Callable[[int, int], object] | None = None,
     **options: Unpack[ExportOptions],
 ) -> dict[str, Any]:
-    """Writes a map for other programs; the name's ending says in which format, as for ``voxtile export``.
+    """Exports a map to a file of another program. The extension selects the format, as in ``voxtile export``.
 
-    ``path`` is a map, a file of OctoMap, or ``"map@snapshot"``; what is not flushed is not exported. ``ExportOptions``
-    lists the keywords. Returns what the command prints with ``--json``. If it is interrupted, nothing is written.
+    ``path`` is a map, a file of OctoMap, or ``"map@snapshot"``. Only flushed scans are exported. ``ExportOptions``
+    lists the keywords. Returns the report that the command prints with ``--json``. If it is interrupted, no output
+    is written.
     """
     return call_export(path, output, options, progress)
 
@@ -168,5 +170,5 @@ def export(
 def export_scans(
     path: _Path, output: _Path, *, progress: Callable[[int, int], object] | None = None
 ) -> dict[str, Any]:
-    """Writes the scans that a map keeps into a new folder: a ``.pcd`` each, and ``poses_tum.txt``."""
+    """Exports the scans that a map keeps into a new folder: a ``.pcd`` file each, and ``poses_tum.txt``."""
     return call_export_scans(path, output, progress)

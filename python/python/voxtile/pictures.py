@@ -1,4 +1,4 @@
-"""Maps to look at: figures of matplotlib, a summary for notebooks, the viewer."""
+"""Pictures of maps: matplotlib figures, a summary for notebooks, the viewer."""
 
 from __future__ import annotations
 
@@ -26,19 +26,18 @@ def heights(
     map: Map,
     region: Any = None,
     min_probability: float | None = None,
-    most_pixels: int = _MOST_PIXELS,
+    max_pixels: int = _MOST_PIXELS,
 ) -> tuple[NDArray[np.float64], tuple[float, float, float, float]]:
-    """The height of the highest occupied voxel of each column, from above, in metres; NaN where there is none.
+    """Heights of the highest occupied voxel of each column, in metres; NaN for columns without one.
 
-    Returns an array of rows (y) and columns (x), and what it covers: left, right, bottom, top. Columns are whole
-    voxels, several of them where there would be more than ``most_pixels`` along an edge. Takes the memory of one tile
-    and of the picture.
+    Returns an array of rows (y) and columns (x), and its extent: left, right, bottom, top. A column of the array is
+    a whole voxel, or several if an edge would exceed ``max_pixels``. Uses the memory of one tile and of the picture.
     """
     bounds = map.bounds if region is None else np.asarray(region, np.float64).reshape(2, 3)
     if bounds is None:
         return np.full((1, 1), np.nan), (0.0, 1.0, 0.0, 1.0)
     low, high = bounds
-    edge = map.resolution * max(1, int(np.ceil((high - low)[:2].max() / map.resolution / most_pixels)))
+    edge = map.resolution * max(1, int(np.ceil((high - low)[:2].max() / map.resolution / max_pixels)))
     columns, rows = np.maximum(1, np.ceil((high - low)[:2] / edge - 1e-9)).astype(int)
     highest = np.full((rows, columns), -np.inf)
     for _, centers, _ in map.occupied_by_tile(min_probability):
@@ -51,9 +50,9 @@ def heights(
 
 
 def plot(map: Map, *, region: Any = None, min_probability: float | None = None, ax: Axes | None = None) -> Figure:
-    """A figure of the map from above: the height of the highest occupied voxel of each column, in metres.
+    """Draws the map from above: the height of the highest occupied voxel of each column, in metres.
 
-    ``region`` is a box, lower and upper corner; ``ax`` axes to draw into. Needs matplotlib.
+    ``region`` is a box, lower and upper corner; ``ax`` are axes to draw into. Needs matplotlib.
     """
     from matplotlib.figure import Figure as NewFigure
 
@@ -69,7 +68,7 @@ def plot(map: Map, *, region: Any = None, min_probability: float | None = None, 
 
 
 def summary_html(map: Map) -> str:
-    """What a notebook shows of a map: a summary, and a small picture if matplotlib is there."""
+    """Returns the summary of a map that notebooks show, with a small picture if matplotlib is installed."""
     if map.closed:
         return f"<p><b>voxtile map</b> {html.escape(str(map.path))}, closed</p>"
     cells = {
@@ -87,7 +86,7 @@ def _picture_html(map: Map) -> str:
         from matplotlib.image import imsave
     except ImportError:
         return ""
-    values, _ = heights(map, most_pixels=256)
+    values, _ = heights(map, max_pixels=256)
     if np.isnan(values).all():
         return ""
     png = io.BytesIO()
@@ -96,7 +95,6 @@ def _picture_html(map: Map) -> str:
 
 
 def view(path: str | os.PathLike[str], snapshot: str | None = None) -> subprocess.Popen[bytes]:
-    """Opens the viewer in a browser, on a map or a snapshot of it. The process that serves it ends with
-    ``terminate``."""
+    """Opens the viewer on a map or a snapshot in a browser. ``terminate`` ends the returned process."""
     shown = os.path.abspath(path) if snapshot is None else f"{os.path.abspath(path)}@{snapshot}"
     return subprocess.Popen([sys.executable, "-m", "voxtile", "view", shown])

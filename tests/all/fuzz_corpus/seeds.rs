@@ -1,4 +1,4 @@
-//! Small valid files of every format, from which fuzzing begins.
+//! Small valid files of every format, as seeds for fuzzing.
 
 use super::targets::{TILES, compact_bytes, entries_end, grid};
 use crate::readers::{graph, pcd, points};
@@ -18,7 +18,7 @@ use voxtile_share::{SetRange, VoxelSet, write_layer};
 /// Target, name and content of seeds.
 pub type Seeds = Vec<(&'static str, &'static str, Vec<u8>)>;
 
-/// Every seed.
+/// Returns the seeds of all targets.
 pub fn all() -> Seeds {
     [octrees(), map_files(), compact_tables(), clouds(), scans(), texts(), shared()].concat()
 }
@@ -60,8 +60,8 @@ fn octrees() -> Seeds {
     ]
 }
 
-/// The files of a map of two scans, each in a tile of its own and flushed alone. The first byte is the choice that
-/// the targets of checksummed formats take.
+/// Files of a map of two scans, each in its own tile and flush. The first byte is the option byte of targets with
+/// checksums.
 fn map_files() -> Seeds {
     let folder = TempDir::new().unwrap();
     let folder = folder.path().join("map");
@@ -102,16 +102,16 @@ fn map_files() -> Seeds {
     ]
 }
 
-/// Of version 2; the corpus keeps those of version 1. No voxel, some with symbols and rare states of every kind, and a
-/// brick of one state.
+/// Tables of version 2; the corpus keeps those of version 1. One without voxels, one with symbols and rare states of
+/// every kind, and one with a brick of a single state.
 fn compact_tables() -> Seeds {
     let first = grid().voxels_of_tile(TILES[0]).min;
     let brick = |x: i32| BrickCode::of_voxel([first[0] + 8 * x, first[1], first[2]]);
     let state = |log_odds, observation_count| Evidence { log_odds, observation_count };
     let (mut some, mut full) = (Table::default(), Table::default());
     for x in 0..3 {
-        // The first two bricks have their states in common, so that these take one and two bytes; the third has its
-        // own.
+        // The first two bricks share their states, so symbols take one or two bytes; the third brick has its own
+        // states.
         let voxels = (0..400).map(|place| (place, state(f64::from(x / 2 * 350 + place as i32), x / 2)));
         some.insert(brick(x), &voxels.collect::<Vec<_>>());
     }
@@ -140,7 +140,7 @@ fn compact_tables() -> Seeds {
 fn clouds() -> Seeds {
     let types = b"FIELDS i _ z y x\nSIZE 2 1 8 4 4\nTYPE U U F I F\nCOUNT 1 3 1 1 1\nWIDTH 1\nHEIGHT 1\nDATA binary\n";
     let columns = b"COLUMNS x y z\nSIZE 4 4 4\nTYPE F F F\nPOINTS 8\nDATA binary_compressed\n";
-    // Sizes, then 96 zeros: a literal and two copies of what was just written.
+    // Sizes, then 96 zeros: a literal and two copies of preceding bytes.
     let packed = [7, 0, 0, 0, 96, 0, 0, 0, 0, 0, 7 << 5, 81, 0, 3 << 5, 0];
     vec![
         ("pcd", "ascii", pcd("ascii", &points(2))),
@@ -194,7 +194,7 @@ fn shared() -> Seeds {
     }
     let mut file = vec![0];
     write_layer(&mut layer, &mut file).unwrap();
-    // Put, wait, send; then loss, a new sender, an invented packet.
+    // Put, wait, send; then a loss, a new sender, a forged packet.
     let life =
         [0, 1, 2, 3, 3, 20, 4, 5, 7, 0, 6, 0, 1, 9, 9, 9, 3, 50, 4, 8, 136, 0, 4, 4, 4, 3, 50, 4, 9, 2, 1, 1];
     vec![

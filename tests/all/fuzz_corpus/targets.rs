@@ -1,8 +1,8 @@
-//! Bytes of any kind into every reader of a format: none may panic, hang or take much memory, and what is read must
-//! hold together. The result says whether the bytes were read.
+//! Bodies of the fuzz targets: any bytes as input to every reader of a format. A reader must not panic, hang or use
+//! much memory, and its output must be consistent. The result is whether the input was valid.
 //!
-//! In formats with checksums the first byte of the input chooses: where its lowest bit is set, the checksums are
-//! made right before the rest is read, so that what lies behind them is reached.
+//! In formats with checksums the first byte of the input contains options: if its lowest bit is set, the checksums are
+//! corrected first, to reach the code after them.
 
 use std::path::Path;
 use std::time::Duration;
@@ -25,7 +25,7 @@ use voxtile_share::{Receiver, ReceiverConfig, Sender, SenderConfig, read_layer};
 
 pub type Target = fn(&[u8]) -> bool;
 
-/// Every target by the name of its corpus.
+/// All targets, by the names of their corpora.
 pub const TARGETS: [(&str, Target); 14] = [
     ("bt", octree),
     ("ot", octree),
@@ -45,18 +45,18 @@ pub const TARGETS: [(&str, Target); 14] = [
 
 const MAX_TREE_BYTES: usize = 64 << 20;
 
-/// OctoMap's `.bt` and `.ot`: what was read comes back from what is written of it.
+/// OctoMap's `.bt` and `.ot`: a round trip through the writer gives the same tree.
 pub fn octree(data: &[u8]) -> bool {
     let Ok(file) = read_with_limit(data, MAX_TREE_BYTES) else { return false };
     let written = octree_bytes(&file);
-    let again = read(written.as_slice()).expect("what was written is read");
+    let again = read(written.as_slice()).expect("the written file is valid");
     assert!(again.tree.leaves().eq(file.tree.leaves()));
     assert_eq!(again.tree.node_count(), file.tree.node_count());
     assert_eq!(octree_bytes(&again), written);
 
     let mut pruned = Vec::new();
-    write_bt(&file.tree, file.resolution_m, 0.0, &mut pruned).expect("memory takes all");
-    let pruned = read(pruned.as_slice()).expect("what was written is read").tree;
+    write_bt(&file.tree, file.resolution_m, 0.0, &mut pruned).expect("writes to memory succeed");
+    let pruned = read(pruned.as_slice()).expect("the written file is valid").tree;
     assert_eq!(pruned.expanded_leaf_count(), file.tree.expanded_leaf_count());
     let mut normal = file.tree.clone();
     normal.normalize();
@@ -64,7 +64,7 @@ pub fn octree(data: &[u8]) -> bool {
     let states = file.tree.count_voxels(0.0);
     assert_eq!(normal.count_voxels(0.0), states);
     assert_eq!(states.occupied + states.free, file.tree.expanded_leaf_count());
-    // A lone root has no bits in `.bt` that could say that it is free.
+    // `.bt` has no bits for the state of a lone root.
     if file.tree.node_count() > 1 {
         assert_eq!(pruned.count_voxels(0.0), states);
     }
@@ -77,11 +77,11 @@ fn octree_bytes(file: &OctreeFile) -> Vec<u8> {
         OctreeFormat::Bt => write_bt_unpruned(&file.tree, file.resolution_m, 0.0, &mut bytes),
         OctreeFormat::Ot => write_ot(&file.tree, file.resolution_m, &mut bytes),
     }
-    .expect("memory takes all");
+    .expect("writes to memory succeed");
     bytes
 }
 
-/// Tiles of the table; two bits of the first byte choose one.
+/// Tiles of the table, selected by two bits of the first byte.
 pub const TILES: [TileIndex; 4] = [
     TileIndex::new(0, 0, 0),
     TileIndex::new(-1, 7, -3),
@@ -89,12 +89,12 @@ pub const TILES: [TileIndex; 4] = [
     TileIndex::new(i32::MAX, i32::MIN, 67_108_863),
 ];
 
-/// The grid of [`TILES`].
+/// Grid of [`TILES`].
 pub fn grid() -> Grid {
     Grid::new(0.1, 3.2).expect("32 voxels along a tile")
 }
 
-/// `iwlo_meta.bin`: the same bytes come from what was read.
+/// `iwlo_meta.bin`: the writer reproduces the input.
 pub fn table(data: &[u8]) -> bool {
     let Some((&choice, file)) = data.split_first() else { return false };
     let mut file = file.to_vec();
@@ -109,20 +109,20 @@ pub fn table(data: &[u8]) -> bool {
     assert_eq!(decoded.table.iter().count(), decoded.table.len());
     if let Some(trailer) = decoded.trailer {
         let mut written = Vec::new();
-        write_table(&decoded.table, trailer.clone(), &mut written).expect("memory takes all");
+        write_table(&decoded.table, trailer.clone(), &mut written).expect("writes to memory succeed");
         assert_eq!(written, file);
-        assert_eq!(read(&written).expect("what was written is read").trailer, Some(trailer));
+        assert_eq!(read(&written).expect("the written file is valid").trailer, Some(trailer));
     }
     true
 }
 
-/// Where the entries of a table end.
+/// Returns the end of the entries of a table.
 pub fn entries_end(file: &[u8]) -> Option<usize> {
     let count = u64::from_le_bytes(file.get(8..16)?.try_into().ok()?);
     usize::try_from(count.checked_mul(18)?.checked_add(16)?).ok()
 }
 
-/// Makes the checksums of a table right, and the length of the parameters behind its trailer.
+/// Corrects the checksums of a table, and the length of the parameters after its trailer.
 fn seal_table(file: &mut [u8]) {
     let Some((entries, behind)) = entries_end(file).and_then(|end| file.split_at_mut_checked(end)) else {
         return;
@@ -134,14 +134,14 @@ fn seal_table(file: &mut [u8]) {
     seal(trailer);
 }
 
-/// Makes the last four bytes the CRC-32 of those before.
+/// Sets the last four bytes to the CRC-32 of those before.
 fn seal(bytes: &mut [u8]) {
     if let Some((content, crc)) = bytes.split_last_chunk_mut::<4>() {
         *crc = crc32fast::hash(content).to_le_bytes();
     }
 }
 
-/// `tile.vxt`: what stands in front is written the same again, and so is the table.
+/// `tile.vxt`: the writer reproduces its front part and its table.
 pub fn compact_file(data: &[u8]) -> bool {
     let Some((&choice, file)) = data.split_first() else { return false };
     let mut file = file.to_vec();
@@ -152,27 +152,30 @@ pub fn compact_file(data: &[u8]) -> bool {
     let read = |bytes: &[u8]| read_compact_file(&mut &bytes[..], bytes.len() as u64, &voxels);
     let index = CompactFileIndex::read(&mut &file[..], file.len() as u64, &voxels);
     if let Ok(Some(index)) = &index {
-        ask_voxels(index, &file, &voxels, None);
+        query_voxels(index, &file, &voxels, None);
     }
     let Ok(decoded) = read(&file) else { return false };
-    if let Some(index) = index.expect("the whole was read") {
+    if let Some(index) = index.expect("the whole file is valid") {
         assert_eq!(index.crc, crc32fast::hash(&file));
-        ask_voxels(&index, &file, &voxels, Some(&decoded.table));
+        query_voxels(&index, &file, &voxels, Some(&decoded.table));
     }
-    let front = decoded.trailer.expect("what stands in front was read");
-    assert_eq!(read_compact_front(&mut &file[..], file.len() as u64).expect("it was read before"), front);
+    let front = decoded.trailer.expect("the front part is valid");
+    assert_eq!(
+        read_compact_front(&mut &file[..], file.len() as u64).expect("the whole file is valid"),
+        front
+    );
     let mut written = Vec::new();
     let compact = compact_bytes(&decoded.table);
-    write_compact_file(&compact, front.clone(), &mut written).expect("memory takes all");
-    let again = read(&written).expect("what was written is read");
+    write_compact_file(&compact, front.clone(), &mut written).expect("writes to memory succeed");
+    let again = read(&written).expect("the written file is valid");
     assert!(again.table.iter().eq(decoded.table.iter()));
     let of_content = |front: Trailer| Trailer { table_crc: 0, ..front };
     assert_eq!(again.trailer.map(of_content), Some(of_content(front)));
     true
 }
 
-/// Asks for some voxels of a `tile.vxt`, one group each; the table has the same if it is given.
-fn ask_voxels(index: &CompactFileIndex, file: &[u8], voxels: &VoxelBox, table: Option<&Table>) {
+/// Queries some voxels of a `tile.vxt`, each from one group. Compares them with the table, if given.
+fn query_voxels(index: &CompactFileIndex, file: &[u8], voxels: &VoxelBox, table: Option<&Table>) {
     for step in 0..9 {
         let voxel =
             std::array::from_fn(|k| voxels.min[k] + (step * [1, 3, 2][k]) % (voxels.end[k] - voxels.min[k]));
@@ -181,13 +184,13 @@ fn ask_voxels(index: &CompactFileIndex, file: &[u8], voxels: &VoxelBox, table: O
         let group = place.map(|place| &file[place.start as usize..place.end as usize]);
         let found = group.map(|group| index.evidence(code, group));
         if let Some(table) = table {
-            let found = found.and_then(|found| found.expect("the whole was read"));
+            let found = found.and_then(|found| found.expect("the whole file is valid"));
             assert_eq!(found, table.get(code));
         }
     }
 }
 
-/// Makes the checksums of a `tile.vxt` right.
+/// Corrects the checksums of a `tile.vxt`.
 fn seal_compact_file(file: &mut [u8]) {
     let Some((front, behind)) = file.split_at_mut_checked(TRAILER_BYTES) else { return };
     let length = u32::from_le_bytes(std::array::from_fn(|k| front[60 + k]));
@@ -198,7 +201,7 @@ fn seal_compact_file(file: &mut [u8]) {
     seal(front);
 }
 
-/// Makes the checksums of codebook and groups right in a table in the compact form, if it is of version 2.
+/// Corrects the checksums of codebook and groups of a compact table of version 2.
 fn seal_parts(table: &mut [u8]) {
     let number = |table: &[u8], at: usize| {
         let bytes = table.get(at..).and_then(|table| table.first_chunk());
@@ -220,8 +223,8 @@ fn seal_parts(table: &mut [u8]) {
     }
 }
 
-/// A table in its compact form: it comes back from the bytes that are made of it, and these are the same again. Others
-/// may stand for the same table.
+/// Compact form of a table: writing it and reading it back gives the same table and the same bytes. The input may be
+/// another encoding of the table.
 pub fn compact(data: &[u8]) -> bool {
     let Some((&choice, bytes)) = data.split_first() else { return false };
     let mut bytes = bytes.to_vec();
@@ -237,20 +240,20 @@ pub fn compact(data: &[u8]) -> bool {
     assert_eq!(table.iter().count(), table.len());
     assert!(table.iter().all(|(code, _)| voxels.contains(code.to_key().to_index_from(voxels.min))));
     let written = compact_bytes(&table);
-    let again = read(&written).expect("what was written is read");
+    let again = read(&written).expect("the written file is valid");
     assert!(again.iter().eq(table.iter()));
     assert!(compact_bytes(&again) == written);
     true
 }
 
-/// The compact form of a table.
+/// Returns the compact form of a table.
 pub fn compact_bytes(table: &Table) -> Vec<u8> {
     let mut bytes = Vec::new();
-    write_compact(table, CompactEffort::Fast, &mut bytes).expect("memory takes all");
+    write_compact(table, CompactEffort::Fast, &mut bytes).expect("writes to memory succeed");
     bytes
 }
 
-/// `metadata.json`: what was read comes back from its own text.
+/// `metadata.json`: a round trip through its text gives the same metadata.
 pub fn metadata(data: &[u8]) -> bool {
     let Some((&choice, text)) = data.split_first() else { return false };
     let Ok(text) = str::from_utf8(text) else { return false };
@@ -258,7 +261,7 @@ pub fn metadata(data: &[u8]) -> bool {
         if choice & 1 == 1 { Metadata::from_text(&sealed_metadata(text)) } else { Metadata::from_text(text) };
     let Ok(metadata) = read else { return false };
     let text = metadata.to_text();
-    let again = Metadata::from_text(&text).expect("what was written is read");
+    let again = Metadata::from_text(&text).expect("the written file is valid");
     assert_eq!(again, metadata);
     assert_eq!(again.to_text(), text);
     true
@@ -271,7 +274,7 @@ fn sealed_metadata(text: &str) -> String {
     format!("{guarded}{:08x}\"\n  }}\n}}\n", crc32fast::hash(guarded.as_bytes()))
 }
 
-/// `commits.log`: its valid part alone says the same.
+/// `commits.log`: its valid part alone gives the same result.
 pub fn commit_log(data: &[u8]) -> bool {
     let Some((&choice, file)) = data.split_first() else { return false };
     let mut file = file.to_vec();
@@ -281,7 +284,7 @@ pub fn commit_log(data: &[u8]) -> bool {
     let read = |bytes: &[u8]| CommitLog::read(&mut &bytes[..], bytes.len() as u64);
     let Ok((log, commits)) = read(&file) else { return false };
     assert!(log.bytes() <= file.len() as u64);
-    let (again, same) = read(&file[..log.bytes() as usize]).expect("the valid part is read");
+    let (again, same) = read(&file[..log.bytes() as usize]).expect("the valid part can be read");
     assert_eq!(again, log);
     assert_eq!((same.flush_number, same.scan_number), (commits.flush_number, commits.scan_number));
     assert_eq!((same.tiles, same.last_changed), (commits.tiles, commits.last_changed));
@@ -304,7 +307,7 @@ fn seal_commit_log(file: &mut [u8]) {
     }
 }
 
-/// A PCD file in any of its encodings.
+/// PCD in any of its encodings.
 pub fn pcd(data: &[u8]) -> bool {
     let Ok(SensorScan { points_in_sensor, intensities, world_from_sensor, .. }) = read_pcd(data) else {
         return false;
@@ -314,7 +317,7 @@ pub fn pcd(data: &[u8]) -> bool {
     true
 }
 
-/// OctoMap's scan graph, scan by scan.
+/// OctoMap's scan graph, read scan by scan.
 pub fn graph(data: &[u8]) -> bool {
     const POINT_BYTES: usize = 28;
     let source = read_scan_graph(data, data.len() as u64, Path::new("fuzz.graph"));
@@ -325,18 +328,18 @@ pub fn graph(data: &[u8]) -> bool {
     })
 }
 
-/// OctoMap's scan log, scan by scan.
+/// OctoMap's scan log, read scan by scan.
 pub fn log(data: &[u8]) -> bool {
     let points = all_points(read_scan_log(data, Path::new("fuzz.log")));
     assert!(points.is_none_or(|points| points <= data.len()));
     points.is_some()
 }
 
-/// voxtile's scan stream, scan by scan.
+/// voxtile's scan stream, read scan by scan.
 pub fn scan_stream(data: &[u8]) -> bool {
     const POINT_BYTES: usize = 12;
     read_scan_stream(data, Path::new("fuzz.scans"), false).is_ok_and(|source| {
-        // Tells the stream by its label, or says that it has none.
+        // Reads the label that identifies the stream, or finds that it has none.
         source.fingerprint().unwrap_or_default();
         let points = all_points(source);
         assert!(points.is_none_or(|points| points * POINT_BYTES <= data.len()));
@@ -344,7 +347,7 @@ pub fn scan_stream(data: &[u8]) -> bool {
     })
 }
 
-/// Number of points in all scans; `None` if one could not be read.
+/// Returns the number of points in all scans; `None` if a scan could not be read.
 fn all_points(mut source: impl ScanSource) -> Option<usize> {
     let len_hint = source.len_hint();
     let (mut scans, mut points) = (0, 0);
@@ -357,14 +360,14 @@ fn all_points(mut source: impl ScanSource) -> Option<usize> {
     Some(points)
 }
 
-/// Points, a text.
+/// Points as text.
 pub fn points(data: &[u8]) -> bool {
     let Ok(Ok(points)) = read_points(data) else { return false };
     assert!(points.len() <= data.len());
     true
 }
 
-/// Packets, requests and layers of map sharing: what was read comes back from what is written of it.
+/// Packets, requests and layers of map sharing: a round trip through the encoder gives the same value.
 pub fn share_packet(data: &[u8]) -> bool {
     let Some((&choice, packet)) = data.split_first() else { return false };
     let mut packet = packet.to_vec();
@@ -372,20 +375,20 @@ pub fn share_packet(data: &[u8]) -> bool {
         packet.extend(crc32fast::hash(&packet).to_le_bytes());
     }
     let is_packet = Packet::decode(&packet).is_ok_and(|read| {
-        let written = read.encode().expect("what was read can be written");
-        let again = Packet::decode(&written).expect("what was written is read");
-        // Lengths of a status may be NaN, which is not equal to itself.
+        let written = read.encode().expect("a decoded packet can be encoded");
+        let again = Packet::decode(&written).expect("the written file is valid");
+        // Lengths of a status may be NaN, which does not compare equal.
         assert_eq!(format!("{:?}", in_order(again)), format!("{:?}", in_order(read)));
         true
     });
     let is_request = Request::decode(&packet).is_ok_and(|read| {
-        assert_eq!(Request::decode(&read.encode()).expect("what was written is read"), read);
+        assert_eq!(Request::decode(&read.encode()).expect("the written file is valid"), read);
         true
     });
     is_packet || is_request || read_layer(&mut &packet[..], 1 << 20).is_ok()
 }
 
-/// Voxels lie in a packet in the order of its cube, which need not be the smallest one.
+/// The voxels of a packet are ordered by its cube, which need not be the smallest one.
 fn in_order(mut packet: Packet) -> Packet {
     match &mut packet {
         Packet::Changes { updates, .. } => updates.sort_unstable(),
@@ -395,8 +398,8 @@ fn in_order(mut packet: Packet) -> Packet {
     packet
 }
 
-/// A life of a sender and a receiver, whose voxels, losses, delays, repetitions, restarts and invented packets the
-/// bytes tell. Whatever it was, once the link is good the sets become equal.
+/// A sender and a receiver whose voxels, losses, delays, duplicates, restarts and forged packets are taken from the
+/// input. Once the link is reliable, their sets must become equal.
 pub fn share_life(data: &[u8]) -> bool {
     let grid = Grid::new(0.1, 0.8).expect("8 voxels along a tile");
     let mut config = SenderConfig::default();
@@ -422,11 +425,11 @@ pub fn share_life(data: &[u8]) -> bool {
                 if verb & 128 == 0 {
                     down.push(packet.clone());
                 }
-                receiver.take(&packet, now).expect("a packet of the sender's");
+                receiver.take(&packet, now).expect("the packet of a sender is valid");
             }
             7 if !up.is_empty() => {
                 let ask = up.swap_remove(usize::from(byte()) % up.len());
-                let answers = sender.answer(1, &ask, now).expect("an ask of the receiver's");
+                let answers = sender.answer(1, &ask, now).expect("the request of a receiver is valid");
                 down.extend(answers.into_iter().map(|packet| packet.bytes));
             }
             8 if verb & 128 == 0 => drop((down.pop(), up.pop())),
@@ -448,11 +451,11 @@ pub fn share_life(data: &[u8]) -> bool {
     for _ in 0..1200 {
         now += Duration::from_millis(100);
         for packet in sender.poll(now) {
-            receiver.take(&packet.bytes, now).expect("a packet of the sender's");
+            receiver.take(&packet.bytes, now).expect("the packet of a sender is valid");
         }
         for ask in receiver.poll(now) {
-            for packet in sender.answer(1, &ask, now).expect("an ask of the receiver's") {
-                receiver.take(&packet.bytes, now).expect("a packet of the sender's");
+            for packet in sender.answer(1, &ask, now).expect("the request of a receiver is valid") {
+                receiver.take(&packet.bytes, now).expect("the packet of a sender is valid");
             }
         }
         let is_equal = receiver.is_converged() && receiver.equal_as_of() == Some(sender.last_packet());
@@ -460,7 +463,7 @@ pub fn share_life(data: &[u8]) -> bool {
             break;
         }
     }
-    let layer = receiver.layer().expect("a sender was heard");
+    let layer = receiver.layer().expect("packets of a sender were received");
     assert!(receiver.is_over_limit() || layer == &*sender.sent(), "{:?}", receiver.counts());
     !sender.sent().is_empty()
 }

@@ -2,25 +2,24 @@ use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
 use testkit::support::some_of;
 use voxtile::Result;
 
-/// Something that is done to a disk, and leads a map through states with numbers.
+/// A procedure on a disk that leads a map through numbered states.
 pub trait Subject {
-    /// The disk that it begins with, in state 0.
+    /// Returns the initial disk, in state 0.
     fn disk(&self) -> FaultyDisk;
 
-    /// Does it to its end, from a state.
+    /// Runs the procedure from a state to its end.
     fn run(&self, disk: &FaultyDisk, from: usize) -> Reached;
 
-    /// The state that the map is in. Panics if it is none of these, or if the map is not whole.
+    /// Returns the state of the map. Panics if it is not in `among`, or if the map is damaged.
     fn find(&self, disk: &FaultyDisk, among: &[usize], what: &str) -> usize;
 
-    /// Panics unless the disk is as it must be at the end.
+    /// Panics unless the disk is in its final state.
     fn check_end(&self, disk: &FaultyDisk, what: &str);
 
-    /// Looks at a disk that refused something, whose power is on. By default there is nothing to see.
+    /// Checks a disk on which an operation failed without a crash. Does nothing by default.
     fn check_refused(&self, _: &FaultyDisk, _: Fault) {}
 
-    /// Panics unless an interruption left one of the states that it may have left, whole, and leads from there to the
-    /// same end.
+    /// Panics unless the map is intact and in one of the reached states, and another run completes the procedure.
     fn check(&self, left: &FaultyDisk, reached: &Reached, what: &str) {
         let from = self.find(left, &reached.states, what);
         let again = self.run(left, from);
@@ -29,33 +28,33 @@ pub trait Subject {
     }
 }
 
-/// How far a [`Subject`] came.
+/// Result of a run of a [`Subject`].
 #[derive(Debug)]
 pub struct Reached {
-    /// The states that it may have left.
+    /// States that the map may be in.
     pub states: Vec<usize>,
-    /// Whether it made nothing durable, so that a crash may bring back what the run before left.
+    /// Whether the run made nothing durable, so that a crash may restore the state before the previous run.
     pub is_early: bool,
-    /// The error that ended it.
+    /// Error that ended the run.
     pub end: Result<()>,
 }
 
-/// What is found of a disk after a fault.
+/// State of a disk after a fault.
 #[derive(Clone, Copy, Debug)]
 pub enum Left {
     /// The same disk without the fault.
     Mended,
-    /// The process was killed: nothing is lost yet, and nothing more is on the medium.
+    /// The process was killed: written data is complete, but not yet on the medium.
     Killed,
-    /// The power went: nothing is there but what was synced.
+    /// Power cut: only synced data is left.
     Dropped,
-    /// The power went when everything was on the medium.
+    /// Power cut after all data reached the medium.
     Kept,
-    /// The power went: some names and blocks are there, as a seed says.
+    /// Power cut: a random part of unsynced names and blocks is left. The number is a seed.
     Shuffled(u64),
 }
 
-/// What a power cut may leave.
+/// Possible states after a power cut.
 pub const EVERY_CRASH: [Left; 5] =
     [Left::Dropped, Left::Kept, Left::Shuffled(0), Left::Shuffled(1), Left::Shuffled(2)];
 
@@ -75,7 +74,7 @@ impl Left {
     }
 }
 
-/// Faults of these kinds at one in so many of the moments of an undisturbed run, whose end is checked.
+/// Returns faults of these kinds at one in `one_in` moments of an undisturbed run, whose end is checked.
 pub fn faults(subject: &impl Subject, kinds: &[fn(u64) -> Fault], one_in: u64) -> Vec<Fault> {
     let undisturbed = subject.disk();
     undisturbed.set_fault(Fault::None);
@@ -91,7 +90,7 @@ pub fn faults(subject: &impl Subject, kinds: &[fn(u64) -> Fault], one_in: u64) -
     some_of(kinds.iter().flat_map(of_kind), one_in).collect()
 }
 
-/// Runs the subject with each fault, and checks what is left in each of these ways.
+/// Runs the subject with each fault, and checks the disk in each of these states.
 pub fn sweep(subject: &impl Subject, faults: impl IntoIterator<Item = Fault>, lefts: &[Left]) {
     for (number, fault) in (0..).zip(faults) {
         let disk = subject.disk();
@@ -106,11 +105,11 @@ pub fn sweep(subject: &impl Subject, faults: impl IntoIterator<Item = Fault>, le
     }
 }
 
-/// Kills the process at one in so many changes. The next one goes on, and the power goes at its changes of the numbers
-/// that `later` makes of the first.
+/// Kills the process at one in `one_in` changes. The next run is interrupted by a power cut at each change that `later`
+/// computes from the first one.
 pub fn sweep_after_kills(subject: &impl Subject, one_in: u64, later: impl Fn(u64) -> Vec<u64>) {
     for fault in faults(subject, &[Fault::Crashes], one_in) {
-        let Fault::Crashes(at) = fault else { unreachable!("asked for crashes") };
+        let Fault::Crashes(at) = fault else { unreachable!("only crashes were requested") };
         let disk = subject.disk();
         disk.set_fault(fault);
         let killed = subject.run(&disk, 0);

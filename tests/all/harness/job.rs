@@ -7,8 +7,7 @@ use voxtile::{Error, Result};
 
 type Work = dyn Fn(&FaultyDisk) -> Result<()>;
 
-/// One call that makes or changes a map. It leads what `look` sees of a disk from one state (0) to another (1), and may
-/// be repeated.
+/// One repeatable call that changes a map from state 0 to state 1, as observed by `look`.
 pub struct Job<T> {
     start: FaultyDisk,
     map: PathBuf,
@@ -32,7 +31,7 @@ impl<T: PartialEq + Debug> Job<T> {
         Self { start, map: map.into(), work: Box::new(work), look: Box::new(look), states, is_tidy: false }
     }
 
-    /// The same for a call that gives the room back of the tiles that it wrote in vain.
+    /// Also requires that a failed call removes the tiles that it has written.
     pub fn tidy(self) -> Self {
         Self { is_tidy: true, ..self }
     }
@@ -45,7 +44,7 @@ impl<T: PartialEq + Debug> Subject for Job<T> {
 
     fn run(&self, disk: &FaultyDisk, from: usize) -> Reached {
         let end = match (self.work)(disk) {
-            // What a commit left to do is done by the next writer.
+            // The next writer completes a commit.
             Err(Error::AlreadyExists { .. }) if from == 1 => {
                 TileStore::open(disk.shared(), &self.map).map(drop)
             }
@@ -57,19 +56,19 @@ impl<T: PartialEq + Debug> Subject for Job<T> {
     fn find(&self, disk: &FaultyDisk, among: &[usize], what: &str) -> usize {
         let seen = (self.look)(disk);
         let found = among.iter().copied().find(|&number| self.states[number] == seen);
-        found.unwrap_or_else(|| panic!("{what}: {seen:?} is none of the states {among:?}"))
+        found.unwrap_or_else(|| panic!("{what}: {seen:?} is not one of the states {among:?}"))
     }
 
     fn check_refused(&self, disk: &FaultyDisk, fault: Fault) {
         let is_full = matches!(fault, Fault::IsFull(_));
         let was_there = self.start.files();
-        let is_in_vain = |path: &PathBuf| {
+        let is_unused = |path: &PathBuf| {
             let text = path.to_string_lossy();
             let is_new_tile = text.contains("tile_") && !was_there.contains_key(path);
             text.contains(".unfinished") || (is_full && self.is_tidy && is_new_tile)
         };
         if is_full || matches!(fault, Fault::Fails(_)) {
-            let left: Vec<_> = disk.files().into_keys().filter(is_in_vain).collect();
+            let left: Vec<_> = disk.files().into_keys().filter(is_unused).collect();
             assert!(left.is_empty(), "{fault:?}: {left:?}");
         }
     }

@@ -1,6 +1,6 @@
 use super::acts::{Act, perform};
 use super::interruption::{Reached, Subject};
-use super::map::{at, damage_in, map, open_or_create, rework, scans, snapshot_names};
+use super::map::{at, damage_in, map, open_or_create, replay, scans, snapshot_names};
 use super::model::State;
 use super::scans::{Taken, new_poses};
 use std::collections::BTreeSet;
@@ -11,7 +11,7 @@ use voxtile::operations::{NewPoses, OnlineRemap, Remap};
 use voxtile::store::{TileStore, tile_of_folder};
 use voxtile::{MapConfig, MapReader, MapView, Mapper};
 
-/// Acts with a map, each in a process of its own, and the naive map after each number of them.
+/// A sequence of acts, each in a process of its own, and the naive map after each of them.
 pub struct Life {
     pub acts: Vec<Act>,
     pub states: Vec<State>,
@@ -28,15 +28,14 @@ impl Life {
         Self { acts, states, config, has_links: true }
     }
 
-    /// The same where a file has one name only.
+    /// The same on a file system without hard links.
     pub fn without_links(self) -> Self {
         Self { has_links: false, ..self }
     }
 
-    /// Scans that were flushed before the commit of a remapping beside them are in the map; what is left of that act is
-    /// done.
-    fn complete_what_was_beside(&self, disk: &FaultyDisk, number: usize, what: &str) {
-        let (before, Some(Act::MoveBeside { seed, rest, meanwhile })) =
+    /// An interrupted online remap leaves the scans that were flushed before it. Completes that act.
+    fn complete_online_remap(&self, disk: &FaultyDisk, number: usize, what: &str) {
+        let (before, Some(Act::MoveOnline { seed, rest, meanwhile })) =
             (&self.states[number], self.acts.get(number))
         else {
             return;
@@ -46,20 +45,20 @@ impl Life {
                 assert_eq!(damage_in(disk), BTreeSet::new(), "{what}");
                 let poses = NewPoses::Numbered(new_poses(&before.now.scans, *seed, *rest));
                 let mut mapper = open_or_create(disk, &self.config).unwrap();
-                let mut beside =
-                    OnlineRemap::begin(&scans(disk).unwrap(), &poses, &Remap::new(rework())).unwrap();
+                let mut online =
+                    OnlineRemap::begin(&scans(disk).unwrap(), &poses, &Remap::new(replay())).unwrap();
                 (next..meanwhile.end).for_each(|seed| Taken::new(seed).insert_into(&mut mapper).unwrap());
                 mapper.flush().unwrap();
                 drop(mapper);
-                beside.follow(|_| ()).unwrap();
-                beside.finish().unwrap();
+                online.follow(|_| ()).unwrap();
+                online.finish().unwrap();
                 return;
             }
         }
     }
 }
 
-/// State `n` is that after `n` acts.
+/// State `n` is the state after `n` acts.
 impl Subject for Life {
     fn disk(&self) -> FaultyDisk {
         let disk = FaultyDisk::new(Fault::None);
@@ -78,7 +77,7 @@ impl Subject for Life {
     }
 
     fn find(&self, disk: &FaultyDisk, among: &[usize], what: &str) -> usize {
-        among.iter().for_each(|&number| self.complete_what_was_beside(disk, number, what));
+        among.iter().for_each(|&number| self.complete_online_remap(disk, number, what));
         let found = among.iter().copied().find(|&number| self.states[number].is_on(disk));
         let found =
             found.unwrap_or_else(|| panic!("{what}: none of the states {among:?} of {:?}", self.acts));
@@ -90,14 +89,14 @@ impl Subject for Life {
 
     fn check_end(&self, disk: &FaultyDisk, what: &str) {
         OnlineRemap::remove_leftovers(at(disk)).unwrap();
-        // What a crash in the last act left goes when the map is opened.
+        // Opening the map removes the leftovers of a crash.
         drop(TileStore::open(disk.shared(), map()).unwrap());
-        assert!(self.states.last().unwrap().is_on(disk), "{what}: another end");
+        assert!(self.states.last().unwrap().is_on(disk), "{what}: wrong final state");
         check_files(disk, what);
     }
 }
 
-/// Nothing is damaged, and no file is there that the map does not need.
+/// Panics if the map is damaged, or if it has unneeded files.
 pub fn check_files(disk: &FaultyDisk, what: &str) {
     let mut found = Vec::new();
     verify(at(disk), |finding| found.push(finding.clone()), |_, _| ()).unwrap();

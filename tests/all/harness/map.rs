@@ -9,7 +9,7 @@ use voxtile::{
     Digest, Error, MapConfig, MapPath, MapQueries, MapReader, MemoryLimit, OutOfCoreTileMapper, Result,
 };
 
-/// The folder of the map.
+/// Folder of the map.
 pub fn map() -> &'static Path {
     Path::new("/city/map")
 }
@@ -23,22 +23,22 @@ pub fn name(name: &str) -> SnapshotName {
     SnapshotName::new(name).unwrap()
 }
 
-/// A map of few voxels, with memory for two tiles and next to no waiting updates: every scan evicts.
+/// A map of few voxels, with memory for two tiles and almost no waiting updates: every scan evicts tiles.
 pub fn config() -> MapConfig {
     MapConfig::new(0.4, 3.2).unwrap().with_range(0.0, 3.0).with_cache_tiles(2).with_write_buffer_bytes(600)
 }
 
-/// The same map, which keeps its scans.
+/// The same map with kept scans.
 pub fn keeping_scans() -> MapConfig {
     config().with_range(0.3, 3.0).with_kept_scans(true)
 }
 
-/// Replays kept scans in the least memory.
-pub fn rework() -> Replay {
+/// Replays kept scans with the minimum of memory.
+pub fn replay() -> Replay {
     Replay::default().with_memory(MemoryLimit::Bytes(MemoryLimit::min_bytes(&config().grid)))
 }
 
-/// A mapper of the map, which is created if there is none.
+/// Opens the map, or creates it.
 pub fn open_or_create(disk: &FaultyDisk, config: &MapConfig) -> Result<OutOfCoreTileMapper> {
     match OutOfCoreTileMapper::open(at(disk), config.clone()) {
         Err(Error::NoMap { .. }) => OutOfCoreTileMapper::create(at(disk), config.clone()),
@@ -46,12 +46,12 @@ pub fn open_or_create(disk: &FaultyDisk, config: &MapConfig) -> Result<OutOfCore
     }
 }
 
-/// What a replay reads of the kept scans first.
+/// Reads the summary of kept scans that replays need.
 pub fn scans(disk: &FaultyDisk) -> Result<KeptSummary> {
     KeptSummary::read(at(disk))
 }
 
-/// The digest of the map, or of a snapshot.
+/// Returns the digest of the map, or of a snapshot.
 pub fn digest_of(disk: &FaultyDisk, snapshot: Option<&str>) -> Result<Digest> {
     match snapshot {
         Some(of) => MapReader::open_snapshot(at(disk), &name(of), 1 << 20)?.digest(),
@@ -59,14 +59,14 @@ pub fn digest_of(disk: &FaultyDisk, snapshot: Option<&str>) -> Result<Digest> {
     }
 }
 
-/// The names of the snapshots, in order.
+/// Returns the sorted names of the snapshots.
 pub fn snapshot_names(disk: &FaultyDisk) -> Vec<String> {
     let mut names: Vec<_> = snapshots(at(disk)).unwrap().into_iter().map(|info| info.name).collect();
     names.sort_unstable();
     names
 }
 
-/// The files of the map that are damaged.
+/// Returns the damaged files of the map.
 pub fn damage_in(disk: &FaultyDisk) -> BTreeSet<PathBuf> {
     let mut damaged = BTreeSet::new();
     let found = |finding: &Finding| {
@@ -78,13 +78,13 @@ pub fn damage_in(disk: &FaultyDisk) -> BTreeSet<PathBuf> {
     damaged
 }
 
-/// Whether nothing of the map is damaged or missing.
+/// Whether verification finds no damage.
 pub fn is_whole(disk: &FaultyDisk) -> bool {
     verify(at(disk), |_| (), |_, _| ()).unwrap().is_whole()
 }
 
-/// Turns a map in the folder, of `octomap` storage and 0.4 m voxels, into one of the original format: without the files
-/// that voxtile adds.
+/// Converts a map of `octomap` storage with voxels of 0.4 m to the original format, by removing the files that voxtile
+/// adds.
 pub fn make_foreign(disk: &FaultyDisk, folder: &Path) {
     for name in ["commits.log", "snapshots", "scans.bin"] {
         disk.take(&folder.join(name));

@@ -8,18 +8,18 @@ use voxtile::operations::snapshots;
 use voxtile::scan::ScanPoints;
 use voxtile::{Error, MapConfig, MapReader, MapView};
 
-/// A naive map.
+/// Content of a naive map.
 #[derive(Clone, Debug, Default)]
 pub struct Content {
-    /// The kept scans, by their numbers.
+    /// Kept scans by number.
     pub scans: BTreeMap<u64, Taken>,
-    /// The number of the last scan.
+    /// Number of the last scan.
     pub scan_number: u64,
     pub voxels: Voxels,
 }
 
 impl Content {
-    /// Whether a map has this content, to the bit.
+    /// Whether a map has exactly this content.
     pub fn is_of(&self, reader: &MapReader) -> bool {
         let is_kept = || !reader.keeps_scans() || kept_scans(reader) == self.scans;
         reader.scan_number() == self.scan_number && is_kept() && voxels_of(reader) == self.voxels
@@ -41,7 +41,7 @@ fn kept_scans(reader: &MapReader) -> BTreeMap<u64, Taken> {
     kept.collect()
 }
 
-/// A naive map and its snapshots: copies.
+/// A naive map and copies of it as snapshots.
 #[derive(Clone, Debug, Default)]
 pub struct State {
     pub now: Content,
@@ -49,7 +49,7 @@ pub struct State {
 }
 
 impl State {
-    /// The state after an act.
+    /// Returns the state after an act.
     pub fn after(&self, act: &Act, config: &MapConfig) -> Self {
         let Self { mut now, mut snapshots } = self.clone();
         match act {
@@ -69,7 +69,7 @@ impl State {
                 }
                 now.voxels = with_scans(config, Voxels::new(), now.scans.values());
             }
-            Act::MoveBeside { seed, rest, meanwhile } => {
+            Act::MoveOnline { seed, rest, meanwhile } => {
                 let moved = self.after(&Act::Move { seed: *seed, rest: *rest }, config);
                 return moved.after(&Act::Scans(meanwhile.clone()), config);
             }
@@ -100,7 +100,7 @@ impl State {
         Self { now, snapshots }
     }
 
-    /// Whether the map on a disk is in this state, with all its snapshots. No map is one without scans.
+    /// Whether the map on a disk is in this state, including all snapshots. A missing map equals one without scans.
     pub fn is_on(&self, disk: &FaultyDisk) -> bool {
         let reader = match MapReader::open(at(disk), 0) {
             Err(Error::NoMap { .. }) => return self.now.scan_number == 0,
@@ -115,7 +115,7 @@ impl State {
     }
 }
 
-/// The voxels after these scans.
+/// Returns the voxels after these scans.
 fn with_scans<'a>(config: &MapConfig, before: Voxels, scans: impl IntoIterator<Item = &'a Taken>) -> Voxels {
     let mut map = ReferenceMap::new(config);
     map.voxels = before;

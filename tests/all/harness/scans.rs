@@ -2,7 +2,7 @@ use std::collections::BTreeMap;
 use testkit::random_scans::{Random, random_scan};
 use voxtile::{Mapper, OutOfCoreTileMapper, Pose, Result, Scan, ScanRef};
 
-/// A scan as it was measured, and where from.
+/// A scan in the sensor's frame, with its pose.
 #[derive(Clone, Debug)]
 pub struct Taken {
     pub points: Vec<[f64; 3]>,
@@ -11,7 +11,7 @@ pub struct Taken {
 }
 
 impl Taken {
-    /// A scan of five points, some of which are none, and a point at the sensor.
+    /// A scan of five points, some of which are not finite, and a point at the sensor.
     pub fn new(seed: u64) -> Self {
         let mut random = Random(seed);
         let scan = random_scan(&mut random, [0.0; 3], 5);
@@ -32,7 +32,7 @@ impl Taken {
     }
 }
 
-/// To the bit: some points are not numbers.
+/// Compares bits, because some points are NaN.
 impl PartialEq for Taken {
     fn eq(&self, other: &Self) -> bool {
         let bits = |scan: &Self| {
@@ -45,7 +45,7 @@ impl PartialEq for Taken {
     }
 }
 
-/// Somewhere on a short drive; neighbours see the same places.
+/// A random pose along a short drive; consecutive scans overlap.
 fn random_pose(random: &mut Random, number: u64) -> Pose {
     let along = [0.0, 3.0, 6.0, 9.0, 6.0, 3.0][number as usize % 6];
     let turn = random.between(-3.0, 3.0);
@@ -53,7 +53,7 @@ fn random_pose(random: &mut Random, number: u64) -> Pose {
     Pose::from_quaternion(position, [0.1, 0.0, (turn / 2.0_f64).sin(), (turn / 2.0_f64).cos()]).unwrap()
 }
 
-/// Other poses for scans whose number leaves a rest when it is divided by four, or for all.
+/// Returns new poses for the scans whose number modulo 4 is `rest`, or for all.
 pub fn new_poses(scans: &BTreeMap<u64, Taken>, seed: u64, rest: Option<u64>) -> Vec<(u64, Pose)> {
     let numbers = scans.keys().copied().filter(|number| rest.is_none_or(|rest| number % 4 == rest));
     numbers.map(|number| (number, random_pose(&mut Random(seed ^ number), number))).collect()

@@ -1,6 +1,6 @@
-"""One map by many workers of a dask cluster, and work on maps tile by tile: ``pip install voxtile[dask]``.
+"""Builds and other operations on one map, distributed over a dask cluster: ``pip install voxtile[dask]``.
 
-``python -m voxtile.dask`` is the command, and ``python -m voxtile.dask.plan`` tells what a city would take.
+``python -m voxtile.dask`` is the command; ``python -m voxtile.dask.plan`` estimates the cost of mapping a city.
 """
 
 from .building import BuildOptions, build

@@ -1,8 +1,7 @@
-"""A build in parts.
+"""A build divided into columns of tiles.
 
-Space is divided into columns. A task maps the scans that reach a column into that column's tiles only, so tasks have
-no order and share nothing, and a lost one is run again. Disjoint columns are pieces of the map of the whole, which gets
-their files.
+Each task maps the scans that reach its column, and only into that column's tiles. Tasks therefore have no order and
+share no state, and a lost task can run again. Columns are disjoint shards of one map, which takes over their files.
 """
 
 from __future__ import annotations
@@ -24,11 +23,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from .. import files
-from .._voxtile import adopt, crop, describe, join, verify
+from .._voxtile import replace_tiles, crop, describe, join, verify
 from ..errors import ArgumentError, VoxtileError
 from ..files import ReadOptions
 from . import losses
-from .pieces import MAP_ID, hand_over, locked, remove
+from .shards import MAP_ID, move_to_place, locked, remove
 from .regions import Box, Column, Range, columns_of, region_of, scans_in, tiles_of
 from .simulation import advised_region_size
 
@@ -41,23 +40,23 @@ if TYPE_CHECKING:
     from typing_extensions import Unpack
 
 _Path = str | os.PathLike[str]
-# What tells a scan from others, and where it may leave something.
-_Seen = tuple[str, Box | None]
+# A scan's fingerprint, and the box that it may change.
+_ScanBox = tuple[str, Box | None]
 
-# Its types are not complete.
+# Its type hints are incomplete.
 _dask: Any = distributed
 
-# What does not commute with dividing space, or makes numbers of scans mean something else.
-_READING_ONLY = {"every": 1, "first": 0, "count": None}
+# Options that would select other scans in each task.
+_UNSUPPORTED = {"every": 1, "first": 0, "count": None}
 
-# Where ``voxtile build`` cuts rays if no range is named, into a new map and into one that it adds to.
+# Default range of ``voxtile build``.
 _DEFAULT_RANGE_M = 100.0
-# A plan of more is a mistake: dask would take minutes to hear of the tasks.
-_MOST_REGIONS = 100_000
+# Limit on the number of regions: dask needs minutes to submit more tasks, so more is assumed to be a mistake.
+_MAX_REGIONS = 100_000
 
 
 class BuildOptions(ReadOptions, total=False):
-    """How a map is built: the keywords of ``voxtile.build`` that a build in parts can take. ``memory`` is a task's."""
+    """Options of a distributed build: the keywords of ``voxtile.build`` that it supports. ``memory`` is per task."""
 
     tile_size: float
     storage: Literal["octomap", "compact"]
@@ -84,18 +83,19 @@ def build(
     progress: Callable[[int, int], object] | None = None,
     **options: Unpack[BuildOptions],
 ) -> dict[str, Any]:
-    """Makes a map of a file or folder of scans with the workers of ``client``, or of the current one.
+    """Builds a map from a file or folder of scans with the workers of ``client``, or of the current client.
 
-    The map has the digest of ``voxtile.build``, for any ``region_size`` (metres, along x and y) and any workers. All
-    workers and this process need to see ``scans`` and the folder of ``out``. What is done lies in ``out + ".parts"``
-    until the end; the same call after a failure goes on with it.
+    The map has the digest of ``voxtile.build``, for any ``region_size`` (metres, along x and y) and any number of
+    workers. All workers and this process must see ``scans`` and the folder of ``out``. Finished regions are kept in
+    ``out + ".parts"`` until the end; after a failure, the same call resumes from them.
 
-    With ``update`` the scans are added to the map ``out``, as ``voxtile.build`` does with ``append`` and ``again`` and
-    the same keywords: name ``max_range`` and the like again, for a new run does not take them from the map.
-    Only the regions that they reach are read; one flush puts all of them in place, so readers see the map before or
-    after. A map that somebody else changes meanwhile is left as it is, with an error.
+    With ``update`` the scans are added to the map ``out``, as ``voxtile.build`` does with ``append`` and ``again``
+    and the same keywords. Pass ``max_range`` and similar options again: they are not taken from the map. Only the
+    regions that the scans reach are read. One flush replaces all changed tiles, so readers see the map before or
+    after the update. If another process changes the map meanwhile, the update raises an error and the map keeps that
+    process's changes.
 
-    ``progress`` is called with the regions done and their number. Returns numbers about the build.
+    ``progress`` is called with the number of finished regions and their total. Returns a report of the build.
     """
     began = time.perf_counter()
     output = Path(os.path.abspath(out))
@@ -117,19 +117,19 @@ def build(
         seen, plan_cpu = _plan(found, source, settings)
         planned = time.perf_counter()
         boxes = [box for _, box in seen]
-        columns = columns_of(boxes, size, tile_size, most=_MOST_REGIONS)
+        columns = columns_of(boxes, size, tile_size, most=_MAX_REGIONS)
         if not columns:
-            raise ArgumentError(f"{source}: no scan has a point, so there is nothing to map")
-        drive = _mark(source, size, settings, seen, str(output) if base else None)
-        if base is not None and (adopted := _adopted_before(parts, drive, base)) is not None:
+            raise ArgumentError(f"{source}: no scan has a point; check the input")
+        drive = _fingerprint(source, size, settings, seen, str(output) if base else None)
+        if base is not None and (adopted := _committed_before(parts, drive, base)) is not None:
             remove(parts)
             return {**adopted, "output": str(output), "regions_done_before": adopted["regions"]}
         map_id = _id_of(parts) if base is None else base.map_id
-        # A task of a call that was given up may still put its part here, for a map of another id.
-        mark = _mark(drive, map_id, None if base is None else base.flush_number)
+        # A task of an abandoned call may still write its part here, for a map of another id.
+        mark = _fingerprint(drive, map_id, None if base is None else base.flush_number)
         wanted = {parts / f"{mark}-{x}-{y}": ((x, y), ranges) for (x, y), ranges in columns.items()}
         open_parts = {part: what for part, what in wanted.items() if not part.exists()}
-        # Long tasks first: a short one at the end keeps few workers waiting.
+        # Start with the longest tasks: a short one at the end keeps few workers idle.
         longest = sorted(open_parts.items(), key=lambda what: -scans_in(what[1][1]))
         of_map = None if base is None else str(output)
         how = ((size, tile_size), settings, of_map)
@@ -152,7 +152,7 @@ def build(
             found.cancel([*checks, *futures])
         mapped, merge_cpu = time.perf_counter(), time.process_time()
         read = sum(scans_in(ranges) for ranges in columns.values())
-        told = {
+        report = {
             "output": str(output),
             "region_size": size,
             "regions": len(columns),
@@ -163,14 +163,14 @@ def build(
         }
         names = [str(part) for part in sorted(wanted)]
         if base is None:
-            told["tiles"] = join(names, str(output))["tiles"]
+            report["tiles"] = join(names, str(output))["tiles"]
         else:
-            told["adopted"] = _adopt(output, names, drive, base, told)
+            report["adopted"] = _commit(output, names, drive, base, report)
         remove(parts)
     ended, ended_cpu = time.perf_counter(), time.process_time()
     seconds = sorted((task["seconds"] for task in tasks), reverse=True)
     return {
-        **told,
+        **report,
         "workers": len(found.nthreads()),
         "dashboard": found.dashboard_link,
         "seconds": {"plan": planned - began, "map": mapped - planned, "merge": ended - mapped},
@@ -186,43 +186,43 @@ def build(
 
 @dataclass(frozen=True)
 class _Base:
-    """The map that an update goes on with, as of its last flush."""
+    """The map that an update extends, as of its last flush."""
 
     map_id: str
     flush_number: int
     scan_number: int
-    # Scans that its list of scans does not have: those of updates. ``None`` if that is not known.
+    # Number of scans missing from its list of scans: those of updates. ``None`` if unknown.
     unlisted_scans: int | None
     tile_size: float
 
 
-# Says which update is being put in place, so that it is not done twice.
-_ADOPTING = "adopting.json"
+# Record of the update that is being committed, so that it is not applied twice.
+_COMMITTING = "adopting.json"
 
-# What calls leave in the folder of parts.
+# Names of the files that calls leave in the folder of parts.
 _OWN_NAMES = re.compile(
     r"(map_id|adopting)\.(json|new)|attempt-[0-9a-f]{32}(\.unfinished)?|[0-9a-f]{16}-(-?[0-9]+)-(-?[0-9]+)"
 )
 
 
 def _base(output: Path, settings: dict[str, Any]) -> _Base:
-    told = describe(str(output))
-    if told["keeps_scans"]:
-        raise ArgumentError(f"{output}: it keeps its scans, which a build in parts does not; use voxtile.build")
+    report = describe(str(output))
+    if report["keeps_scans"]:
+        raise ArgumentError(f"{output}: the map keeps its scans; use voxtile.build, which supports this")
     for name in ("resolution", "tile_size"):
-        if settings.get(name, told[name]) != told[name]:
-            raise ArgumentError(f"{name}: the map has {told[name]} m; leave it out")
-    scans, listed = told["scan_number"], told["scan_records"]
+        if settings.get(name, report[name]) != report[name]:
+            raise ArgumentError(f"{name}: the map has {report[name]} m; leave this option out")
+    scans, listed = report["scan_number"], report["scan_records"]
     unlisted = None if listed is None else scans - listed
-    return _Base(str(told["map_id"]), told["flush_number"], scans, unlisted, told["tile_size"])
+    return _Base(str(report["map_id"]), report["flush_number"], scans, unlisted, report["tile_size"])
 
 
-def _mark(*what: object) -> str:
+def _fingerprint(*what: object) -> str:
     identity = json.dumps([version("voxtile"), *what], sort_keys=True, default=str)
     return hashlib.sha256(identity.encode()).hexdigest()[:16]
 
 
-def _note(path: Path, what: object) -> None:
+def _write_json(path: Path, what: object) -> None:
     beside = path.with_suffix(".new")
     with open(beside, "w", encoding="utf-8") as file:
         json.dump(what, file)
@@ -231,37 +231,37 @@ def _note(path: Path, what: object) -> None:
     os.replace(beside, path)
 
 
-def _adopt(output: Path, names: Sequence[str], drive: str, base: _Base, told: dict[str, Any]) -> dict[str, Any]:
-    note = Path(names[0]).parent / _ADOPTING
-    _note(note, {"drive": drive, "map": asdict(base), "told": told})
+def _commit(output: Path, names: Sequence[str], drive: str, base: _Base, report: dict[str, Any]) -> dict[str, Any]:
+    note = Path(names[0]).parent / _COMMITTING
+    _write_json(note, {"drive": drive, "map": asdict(base), "report": report})
     try:
-        adopted: dict[str, Any] = adopt(str(output), names, of_flush=base.flush_number, scans=told["scans"])
+        adopted: dict[str, Any] = replace_tiles(str(output), names, of_flush=base.flush_number, scans=report["scans"])
     except ArgumentError:
-        # The map is as somebody else left it. After other errors nobody knows.
+        # The map was changed by another process, and the update was not committed. After other errors this is unknown.
         note.unlink()
         raise
     return adopted
 
 
-def _adopted_before(parts: Path, drive: str, base: _Base) -> dict[str, Any] | None:
-    """What a call told that put these scans in place and was killed before it removed the parts."""
+def _committed_before(parts: Path, drive: str, base: _Base) -> dict[str, Any] | None:
+    """Returns the report of a call that committed these scans and was killed before it removed the parts."""
     try:
-        noted: dict[str, Any] = json.loads((parts / _ADOPTING).read_text(encoding="utf-8"))
+        noted: dict[str, Any] = json.loads((parts / _COMMITTING).read_text(encoding="utf-8"))
     except (FileNotFoundError, ValueError):
         return None
     before = _Base(**noted["map"])
     if noted["drive"] != drive or before.map_id != base.map_id or before.flush_number == base.flush_number:
         return None
-    told: dict[str, Any] = noted["told"]
-    # The number of a flush tells nothing: it may be another writer's, whose scans are in the list.
+    report: dict[str, Any] = noted["report"]
+    # The flush number alone does not identify the update: another writer may have flushed scans, which are in the list.
     added = _difference(base.unlisted_scans, before.unlisted_scans)
-    if added == told["scans"]:
-        return told
+    if added == report["scans"]:
+        return report
     if added is not None and added <= 0:
         return None
     raise ArgumentError(
-        f"{parts}: an earlier call ended while it put {told['scans']} scans in place after scan {before.scan_number},"
-        f" and {told['output']} has changed since; look whether it has them, remove {parts}, and call again if not"
+        f"{parts}: an earlier call ended while it committed {report['scans']} scans after scan {before.scan_number},"
+        f" and {report['output']} has changed since; if the map lacks them, remove {parts} and call again"
     )
 
 
@@ -270,67 +270,69 @@ def _difference(number: int | None, other: int | None) -> int | None:
 
 
 def _id_of(parts: Path) -> str:
-    """The id of the map to come: all its parts have it, those of an earlier call, too."""
+    """Returns the id of the new map. All parts have it, including those of an earlier call."""
     note = parts / MAP_ID
     try:
         noted: str = json.loads(note.read_text(encoding="utf-8"))
     except (FileNotFoundError, ValueError):
         noted = uuid.uuid4().hex
-        _note(note, noted)
+        _write_json(note, noted)
     return noted
 
 
 def _check_part(part: str) -> dict[str, Any]:
-    """Reads a part of an earlier call: what happened to it since, nobody knows."""
+    """Verifies a part of an earlier call, which may have been damaged since."""
     done = verify(part)
     for finding in done["findings"]:
         if finding["severity"] == "damage":
-            raise VoxtileError(f"{finding['path']}: {finding['reason']}; remove {part}, and call again to go on")
+            raise VoxtileError(f"{finding['path']}: {finding['reason']}; remove {part}, and call again to resume")
     return done
 
 
 def _result(future: Any) -> dict[str, Any]:
-    """What a task answers; an error says which worker to look at."""
-    with losses.told(use_less="take a smaller region_size or memory", then=_GO_ON):
+    """Returns the result of a task. If its worker was lost, the error names it."""
+    with losses.explained(use_less="use a smaller region_size or memory", then=_RESUME):
         done: dict[str, Any] = future.result()
     return done
 
 
-# What to do after a loss.
-_GO_ON = "call again to go on: the regions that are done are kept"
+# Advice after a loss.
+_RESUME = "call again to resume: finished regions are kept"
 
 
 def _check(output: Path, region_size: float, tile_size: float, options: Any, update: bool) -> None:
-    # A column narrower than two tiles may have the center of none.
+    # A column narrower than two tiles may contain no tile center.
     if not (math.isfinite(region_size) and region_size >= 2 * tile_size):
-        raise ArgumentError(f"region_size: {region_size} m is less than two tiles of {tile_size} m; take more")
+        raise ArgumentError(f"region_size: {region_size} m is less than two tiles of {tile_size} m; use a larger size")
     if not update and "resolution" not in options:
-        raise ArgumentError("resolution: a new map needs the edge of its voxels in metres")
+        raise ArgumentError("resolution: a new map needs it; pass the edge of a voxel in metres")
     if not update and output.exists():
-        raise ArgumentError(f"{output}: it exists; name a new map, or remove it")
+        raise ArgumentError(f"{output}: already exists; choose another path, or remove it")
     allowed = {"resolution", *BuildOptions.__annotations__, *ReadOptions.__annotations__}
     for name in options:
         if name not in allowed:
-            raise ArgumentError(f"{name}: a build in parts does not take it; use voxtile.build")
-    for name, value in _READING_ONLY.items():
+            raise ArgumentError(f"{name}: not supported by a distributed build; use voxtile.build")
+    for name, value in _UNSUPPORTED.items():
         if options.get(name, value) != value:
-            raise ArgumentError(f"{name}: a build in parts takes all scans; leave it out, or use voxtile.build")
+            raise ArgumentError(f"{name}: a distributed build uses all scans; leave it out, or use voxtile.build")
 
 
-def _plan(client: Any, source: str, settings: dict[str, Any]) -> tuple[list[_Seen], float]:
-    """What each scan is, and where it may leave something, ``None`` for nowhere; and the seconds of CPU for that."""
+def _plan(client: Any, source: str, settings: dict[str, Any]) -> tuple[list[_ScanBox], float]:
+    """Returns the fingerprint of each scan and the box that it may change (``None`` for no box), and the CPU seconds
+    used.
+    """
     reading = {name: value for name, value in settings.items() if name in ReadOptions.__annotations__}
     reach = (settings["max_range"], settings.get("clear_no_return"))
-    # Other formats that do not tell how many there are would be read as a whole for it: a single task does that, too.
+    # Counting the scans of other formats without a stored number would read them all; a single task does that too.
     is_stream = source.lower().endswith(".scans")
     scans = files.count_scans(source, **reading) if is_stream else operator.length_hint(files.scans(source, **reading))
     workers = max(sum(client.nthreads().values()), 1)
     step = max(math.ceil(scans / (4 * workers)), 1)
     firsts = list(range(0, scans, step)) or [0]
-    # The last one takes what an estimate left out.
+    # The last task also takes scans beyond the estimate.
     spans = [(first, None if first == firsts[-1] else step) for first in firsts]
     tasks = [client.submit(_boxes, source, *span, reading, reach, pure=False, retries=2) for span in spans]
-    with losses.told(use_less="take workers with fewer threads", then=_GO_ON):
+    with losses.explained(use_less="use workers with fewer threads", then=_RESUME):
         found = client.gather(tasks)
     return [scan for part, _ in found for scan in part], sum(cpu for _, cpu in found)
 
@@ -341,7 +343,7 @@ def _boxes(
     count: int | None,
     reading: dict[str, Any],
     reach: tuple[float | None, float | None],
-) -> tuple[list[_Seen], float]:
+) -> tuple[list[_ScanBox], float]:
     began = time.process_time()
     max_range, clear_no_return = reach
     options: dict[str, Any] = {**reading, "first": first, "count": count}
@@ -359,24 +361,24 @@ def _map_column(
     settings: dict[str, Any],
     of_map: str | None,
 ) -> dict[str, Any]:
-    """Maps a column on the worker's disk, and puts a piece of the map beside the others.
+    """Maps a column on the worker's disk, and moves it to its place as a shard of the map.
 
-    ``sizes`` are a column's and a tile's.
+    ``sizes`` are the edges of a column and of a tile.
     """
     began, cpu_began = time.perf_counter(), time.process_time()
     with tempfile.TemporaryDirectory(prefix="voxtile-", dir=_dask.get_worker().local_directory) as local:
         made = os.path.join(local, "map")
         try:
             if of_map is not None:
-                crop(of_map, made, tiles_of(column, *sizes), piece_of=map_id)
+                crop(of_map, made, tiles_of(column, *sizes), shard_of=map_id)
             for first, last in ranges:
                 options: dict[str, Any] = {**settings, "first": first, "count": last - first}
-                # A later range begins as another input may have: these are other scans.
-                goes_on: dict[str, Any] = {"append": True, "again": True} if os.path.exists(made) else {}
-                files.build_piece(source, made, map_id, region=region_of(column, sizes[0]), **options, **goes_on)
-            hand_over(made, part, map_id)
+                # Later ranges contain other scans of the same input.
+                resume: dict[str, Any] = {"append": True, "again": True} if os.path.exists(made) else {}
+                files.build_shard(source, made, map_id, region=region_of(column, sizes[0]), **options, **resume)
+            move_to_place(made, part, map_id)
         except VoxtileError as error:
-            # Of the classes of errors, callers look at the class and the message.
+            # Keep the class of the error and extend its message.
             worker = _dask.get_worker()
             error.args = (f"{error} (worker {worker.address}, whose disk is {worker.local_directory})",)
             raise

@@ -1,7 +1,7 @@
-"""Work on a finished map, region by region.
+"""Exports and statistics of a finished map, region by region.
 
-A task reads its own tiles only. It writes beside the output under a name of its own attempt, and then renames that: a
-lost task is run again, and no file is there in part.
+A task reads only its own tiles. It writes to a file of its own attempt, and then renames that to the output: a lost
+task can run again, and no partial file appears.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from .._voxtile import Map, describe
 from ..errors import ArgumentError
 from ..files import ExportOptions
 from . import losses
-from .pieces import attempt_in
+from .shards import attempt_in
 from .regions import Column
 from .simulation import advised_region_size
 from .tiles import Tile, map_tiles
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 _Path = str | os.PathLike[str]
 
-# Its types are not complete.
+# Its type hints are incomplete.
 _dask: Any = distributed
 
 
@@ -44,29 +44,29 @@ def export(
     client: distributed.Client | None = None,
     **options: Unpack[ExportOptions],
 ) -> dict[str, Any]:
-    """Writes a file for each region of a map into the new folder ``out``, in the format of the ending ``suffix``.
+    """Writes a file for each region of a map into the new folder ``out``, in the format of the extension ``suffix``.
 
-    ``x_y`` and the suffix name a file; it has what ``voxtile.export`` writes of that region, byte for byte. Regions
-    without a tile get no file. ``suffix`` is one of a single file (``.ply``, ``.las``, ``.csv`` and so on);
-    ``options`` are those of ``voxtile.export`` but for ``region``. The map is not to be changed meanwhile: name a
-    snapshot, ``"map@snapshot"``, while somebody writes to it.
+    Files are named ``x_y`` plus the suffix. Each is equal to the output of ``voxtile.export`` for that region.
+    Regions without a tile get no file. ``suffix`` must be that of a format with a single file (``.ply``, ``.las``,
+    ``.csv`` and so on); ``options`` are those of ``voxtile.export`` except ``region``. The map must not change
+    meanwhile: export a snapshot, ``"map@snapshot"``, of a map that is being written.
     """
     if "region" in options:
-        raise ArgumentError("region: regions are those of the tasks; leave it out, or use voxtile.export")
+        raise ArgumentError("region: each task has its own region; leave this option out, or use voxtile.export")
     if not suffix.startswith(".") or os.sep in suffix:
-        raise ArgumentError(f"suffix: {suffix!r} is no ending of a file, such as .ply")
+        raise ArgumentError(f"suffix: {suffix!r} is not a file extension, such as .ply")
     output = Path(os.path.abspath(out))
     if output.exists():
-        raise ArgumentError(f"{output}: it exists; name a new folder, or remove it")
+        raise ArgumentError(f"{output}: already exists; choose another folder, or remove it")
     path, snapshot = _map_at(os.fspath(map))
-    told = describe(path if snapshot is None else (path, snapshot))
-    size = advised_region_size(told["max_range"], told["tile_size"]) if region_size is None else region_size
-    if not size >= 2 * told["tile_size"]:
-        raise ArgumentError(f"region_size: {size} m is less than two tiles of {told['tile_size']} m; take more")
+    described = describe(path if snapshot is None else (path, snapshot))
+    size = advised_region_size(described["max_range"], described["tile_size"]) if region_size is None else region_size
+    if not size >= 2 * described["tile_size"]:
+        raise ArgumentError(f"region_size: {size} m is less than two tiles of {described['tile_size']} m; use more")
     with Map.open(path, "r", snapshot=snapshot) as opened:
         heights = (float(opened.tiles[:, 2].min(initial=0)), float(opened.tiles[:, 2].max(initial=0)) + 1.0)
-        columns = _columns(opened.tiles[:, :2], told["tile_size"], size)
-    low, high = (height * told["tile_size"] for height in heights)
+        columns = _columns(opened.tiles[:, :2], described["tile_size"], size)
+    low, high = (height * described["tile_size"] for height in heights)
     found: Any = _dask.Client.current() if client is None else client
     with attempt_in(output.with_name(f"{output.name}.unfinished")) as folder:
         futures = [
@@ -83,7 +83,7 @@ def export(
             for x, y in columns
         ]
         try:
-            with losses.told(use_less="take a smaller region_size", then="call again"):
+            with losses.explained(use_less="use a smaller region_size", then="call again"):
                 tasks: list[dict[str, Any]] = found.gather(futures)
         finally:
             found.cancel(futures)
@@ -94,7 +94,7 @@ def export(
 
 
 def _map_at(text: str) -> tuple[str, str | None]:
-    """A map and the name of a snapshot, as the command reads ``MAP@SNAPSHOT``: not where that is a file's name."""
+    """Splits ``MAP@SNAPSHOT`` as the command does: not if a file of that name exists."""
     map, at, name = text.rpartition("@")
     if not at or os.sep in name or os.path.lexists(text):
         return text, None
@@ -102,8 +102,8 @@ def _map_at(text: str) -> tuple[str, str | None]:
 
 
 def _columns(tiles: NDArray[np.int32], tile_size: float, size: float) -> list[Column]:
-    """The regions that have a part of a tile: of one that a border cuts two, of one with a corner inside four."""
-    # Regions are no smaller than tiles. A tile that ends where a region begins has nothing in it.
+    """Returns the regions that overlap a tile. A tile on a border is in two regions, one over a corner in four."""
+    # Regions are no smaller than tiles. A tile that ends exactly where a region begins does not overlap it.
     low, high = (np.floor((tiles + end) * tile_size / size - shift) for end, shift in ((0, -1e-9), (1, 1e-9)))
     corners = (np.stack([x[:, 0], y[:, 1]], axis=1) for x in (low, high) for y in (low, high))
     return sorted({(int(x), int(y)) for corner in corners for x, y in corner})
@@ -122,9 +122,11 @@ def _export_region(
 def statistics(
     map: _Path, *, snapshot: str | None = None, client: distributed.Client | None = None
 ) -> dict[str, Any]:
-    """Counts a map's tiles, its observed, occupied and free voxels, and the bounds of what is occupied in metres."""
+    """Counts a map's tiles and its observed, occupied and free voxels. Also returns the bounds of occupied space in
+    metres.
+    """
     found: Any = _dask.Client.current() if client is None else client
-    with losses.told(use_less="take workers with fewer threads", then="call again"):
+    with losses.explained(use_less="use workers with fewer threads", then="call again"):
         counted = found.compute(map_tiles(map, _count, snapshot=snapshot)).result()
     occupied = [tile for tile in counted if tile["occupied"]]
     return {
@@ -139,7 +141,7 @@ def _count(tile: Tile) -> dict[str, Any]:
     log_odds, _ = tile.dense("log_odds")
     centers, _ = tile.occupied()
     observed = int(np.isfinite(log_odds).sum())
-    told = {"observed": observed, "occupied": len(centers), "free": observed - len(centers)}
+    described = {"observed": observed, "occupied": len(centers), "free": observed - len(centers)}
     if len(centers) > 0:
-        told.update(low=centers.min(axis=0), high=centers.max(axis=0))
-    return told
+        described.update(low=centers.min(axis=0), high=centers.max(axis=0))
+    return described

@@ -1,4 +1,4 @@
-"""Workers and schedulers that end while somebody waits for their answers."""
+"""Errors for workers and schedulers that are lost during a call."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ import distributed
 
 from ..errors import VoxtileError
 
-# Its types are not complete.
+# Its type hints are incomplete.
 _dask: Any = distributed
 
 
 @contextmanager
-def told(*, use_less: str, then: str) -> Iterator[None]:
-    """Makes such a loss an error that says what to do: how a task would take less memory, and what to do then."""
+def explained(*, use_less: str, then: str) -> Iterator[None]:
+    """Turns such a loss into an error with a remedy: how a task uses less memory, and what to do next."""
     try:
         yield
     except _dask.KilledWorker as error:
         raise VoxtileError(
-            f"{error.last_worker.address}: this worker and others have ended over one task; perhaps memory was short:"
-            f" {use_less}, or workers with more, and {then}"
+            f"{error.last_worker.address}: this and other workers were lost on the same task, perhaps out of memory:"
+            f" {use_less}, or workers with more memory, and {then}"
         ) from error
     except (CancelledError, _dask.comm.CommClosedError) as error:
-        # The second while an answer is on its way.
-        raise VoxtileError(f"{error}; {then}, with a client of a scheduler that runs") from error
+        # A lost connection while a result is being received.
+        raise VoxtileError(f"{error}; {then}, with a client of a running scheduler") from error

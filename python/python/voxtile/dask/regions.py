@@ -1,4 +1,4 @@
-"""Regions of a build in parts: columns of tiles, and which scans reach each.
+"""Regions of a distributed build: columns of tiles, and the scans that reach each of them.
 
 Lengths are in metres, boxes are west, south, east, north.
 """
@@ -12,10 +12,10 @@ from ..errors import ArgumentError
 
 Box = tuple[float, float, float, float]
 Column = tuple[int, int]
-# The first scan and the one after the last.
+# The first scan, and the one after the last.
 Range = tuple[int, int]
 
-# Scans in a gap are read and mapped to nothing. Going on with a map after a gap takes as long as so many of them.
+# Scans in a gap are read but change nothing. Reopening the map after a gap takes as long as reading this many.
 JOINED_GAP_SCANS = 20
 
 
@@ -26,10 +26,10 @@ def columns_of(
     joined_gap: int = JOINED_GAP_SCANS,
     most: float = math.inf,
 ) -> dict[Column, list[Range]]:
-    """The columns that scans may reach, and of each the ranges of scans that do, in their order.
+    """Returns the columns that scans may reach, each with its ranges of scans in order.
 
-    A drive that comes back leaves out what it drove elsewhere, unless that is at most ``joined_gap`` scans.
-    More columns than ``most`` are an error.
+    If a drive returns to a column, the scans in between are skipped, unless they are at most ``joined_gap``. Raises
+    an error for more than ``most`` columns.
     """
     columns: dict[Column, list[Range]] = {}
     for number, box in enumerate(boxes):
@@ -39,8 +39,8 @@ def columns_of(
             ranges = columns.setdefault(column, [])
             if len(columns) > most:
                 raise ArgumentError(
-                    f"scan {number}: with it, scans reach more than {most} regions of {size} m; look at its pose and"
-                    " points, or take a smaller max_range or clear_no_return, or a larger region_size"
+                    f"scan {number}: with it, scans reach more than {most} regions of {size} m; check its pose and"
+                    " points, or use a smaller max_range or clear_no_return, or a larger region_size"
                 )
             if ranges and number - ranges[-1][1] <= joined_gap:
                 ranges[-1] = (ranges[-1][0], number + 1)
@@ -50,9 +50,9 @@ def columns_of(
 
 
 def reached(box: Box, size: float, tile_size: float) -> Iterator[Column]:
-    """The columns in which a box may have the center of a tile that it touches."""
+    """Yields the columns that may contain the center of a tile that the box touches."""
     west, south, east, north = box
-    # A tile whose center is in a column reaches half of its edge beyond; the other half is slack for rounding.
+    # A tile extends half of its edge beyond its center; the other half is slack for rounding.
     margin = tile_size
     return (
         (x, y)
@@ -62,13 +62,13 @@ def reached(box: Box, size: float, tile_size: float) -> Iterator[Column]:
 
 
 def region_of(column: Column, size: float) -> list[float]:
-    """The half-open box of a column, as ``voxtile.build`` takes it: low x, y, z and high x, y, z."""
+    """Returns the half-open box of a column, as ``voxtile.build`` takes it: low x, y, z and high x, y, z."""
     x, y = column
     return [x * size, y * size, -math.inf, (x + 1) * size, (y + 1) * size, math.inf]
 
 
 def tiles_of(column: Column, size: float, tile_size: float) -> list[float]:
-    """The box of the whole tiles whose center is in a column, as ``voxtile.crop`` takes it."""
+    """Returns the box of the whole tiles whose centers are in a column, as ``voxtile.crop`` takes it."""
     x, y = column
     low, high = (
         [_first_tile(number, size, tile_size) * tile_size for number in corner] for corner in ((x, y), (x + 1, y + 1))
@@ -77,18 +77,18 @@ def tiles_of(column: Column, size: float, tile_size: float) -> list[float]:
 
 
 def column_of(tile: tuple[int, int], size: float, tile_size: float) -> Column:
-    """The column that has the center of a tile."""
+    """Returns the column that contains the center of a tile."""
     x, y = (_column_along_axis(number, size, tile_size) for number in tile)
     return x, y
 
 
 def _first_tile(column: int, size: float, tile_size: float) -> int:
-    """The first tile of a column along an axis, rounded as ``voxtile.build`` does it."""
+    """Returns the first tile of a column along an axis, rounded as in ``voxtile.build``."""
     return math.ceil(column * size / tile_size - 0.5)
 
 
 def _column_along_axis(tile: int, size: float, tile_size: float) -> int:
-    # Rounded otherwise: a center on a border may be in the one beside.
+    # This division rounds differently: a center on a border may be assigned to the next column.
     column = math.floor((tile + 0.5) * tile_size / size)
     while tile < _first_tile(column, size, tile_size):
         column -= 1

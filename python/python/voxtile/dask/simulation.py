@@ -1,7 +1,7 @@
-"""What a build in parts would cost: tasks, bytes and time for a city, without a scan of it.
+"""Estimates of tasks, bytes and time of a distributed build of a city, without its scans.
 
-Streets are lines at equal distances, along x and along y; a car
-drives each once. The planner is that of a build; times are counts multiplied by ``Costs``.
+Streets are lines at equal distances, along x and along y; a car drives each once. Regions are planned as in a build;
+times are counts multiplied by ``Costs``.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ from .regions import Box, columns_of, scans_in
 class Costs:
     """CPU seconds and bytes. Measured on 120 scans: docs/cluster.md, "The size of regions"."""
 
-    # The first pass: decoding a scan, its box, and its checksum.
+    # First pass: decoding a scan, its box, and its fingerprint.
     plan_scan_s: float = 0.00016
-    # A scan that a region's task reads, whether or not it leaves something there.
+    # A scan read by the task of a region, whether or not it changes a voxel there.
     read_scan_s: float = 0.0008
-    # A scan that is mapped, over all regions that it reaches.
+    # Mapping a scan, over all regions that it reaches.
     map_scan_s: float = 0.0111
-    # Opening and flushing a task's map; what dask itself takes is not in it.
+    # Opening and flushing the map of a task, without the overhead of dask.
     task_s: float = 0.01
-    # A tile that a task moves to its place.
-    piece_tile_s: float = 0.00007
-    # A tile in the last step, which one process does.
+    # Moving a tile to its place.
+    shard_tile_s: float = 0.00007
+    # A tile in the final join, which runs in one process.
     merge_tile_s: float = 0.00014
     # A scan of 8000 points in a file of float32.
     scan_bytes: int = 90_000
@@ -36,7 +36,7 @@ class Costs:
 
 @dataclass(frozen=True)
 class City:
-    """A square of streets. In the middle, on a ninth of the area, each street is driven ``downtown_times``."""
+    """A square of streets. In the center, a ninth of the area, each street is driven ``downtown_times``."""
 
     streets_km: float = 10_000.0
     street_distance_m: float = 200.0
@@ -44,18 +44,18 @@ class City:
     downtown_times: int = 1
 
 
-# What a build in parts may take of the CPU of one build.
+# Allowed CPU time of a distributed build, as a multiple of that of one build.
 _CPU_GOAL = 1.3
-# Where no range is named: what lidars of cars reach.
+# Default range: that of automotive lidars.
 _USUAL_RANGE_M = 100.0
 _TILES_STEP = 10
-# A region that is wider than this leaves nothing to share.
-_MOST_TILES = 1000
+# With wider regions there would be too few tasks to distribute.
+_MAX_TILES = 1000
 
 
 def cpu_factor(region_size: float, reach: float, costs: Costs = Costs()) -> float:
-    """CPU of a build in parts on a straight drive over that of one build, before the last step."""
-    # A region reads what is beside it as far as scans reach, and along both ends of a street.
+    """CPU time of a distributed build on a straight drive over that of one build, without the final join."""
+    # A region also reads the scans within their range of its border, at both ends of a street.
     read_times = (region_size + 2 * reach) / region_size
     scans_of_region = max(region_size, 1.0)
     one = costs.read_scan_s + costs.map_scan_s
@@ -64,23 +64,24 @@ def cpu_factor(region_size: float, reach: float, costs: Costs = Costs()) -> floa
 
 
 def advised_region_size(max_range: float | None, tile_size: float, costs: Costs = Costs()) -> float:
-    """The edge of the smallest regions, in metres, that keep the CPU within 1.3 of one build; small ones share evenly.
+    """Returns the edge of the smallest region, in metres, that keeps CPU time within 1.3 of one build.
 
-    Where no size does, the first one of which the double would gain less than a hundredth.
+    Small regions balance the load. If no size reaches the goal, returns the first whose double would gain less than
+    0.01.
     """
     reach = _USUAL_RANGE_M if max_range is None else max_range
-    for tiles in range(2 * _TILES_STEP, _MOST_TILES + 1, _TILES_STEP):
+    for tiles in range(2 * _TILES_STEP, _MAX_TILES + 1, _TILES_STEP):
         size = tiles * tile_size
         factor = cpu_factor(size, reach, costs)
         if factor <= _CPU_GOAL or factor - cpu_factor(2 * size, reach, costs) < 0.01:
             return size
-    return _MOST_TILES * tile_size
+    return _MAX_TILES * tile_size
 
 
 def simulate(
     city: City, *, region_size: float, reach: float, workers: list[int], tile_size: float = 10.0, costs: Costs = Costs()
 ) -> dict[str, Any]:
-    """Plans a build of a city and runs the plan: each free worker takes the next task, the longest first."""
+    """Plans a build of a city and simulates it: each free worker takes the longest remaining task."""
     edge = _edge(city)
     boxes, weights = _drive(city, edge, reach)
     columns = columns_of(boxes, region_size, tile_size, joined_gap=1)
@@ -98,9 +99,9 @@ def simulate(
         read += scans
         tasks.append(costs.task_s + scans * costs.read_scan_s + share * costs.map_scan_s)
     scans = before[-1]
-    # Tiles of the ground and of what stands on it, where a scan reaches.
+    # Tiles of the ground and of objects on it, within the range of a scan.
     tiles = _TILES_HIGH * _ground_tiles(city, edge, reach, tile_size)
-    tasks = sorted((task + tiles / len(tasks) * costs.piece_tile_s for task in tasks), reverse=True)
+    tasks = sorted((task + tiles / len(tasks) * costs.shard_tile_s for task in tasks), reverse=True)
     plan_s, merge_s = scans * costs.plan_scan_s, tiles * costs.merge_tile_s
     cpu_s = plan_s + sum(tasks) + merge_s
     one_build_s = scans * (costs.read_scan_s + costs.map_scan_s)
@@ -129,31 +130,31 @@ def simulate(
     }
 
 
-# Tiles above each other that scans of streets leave something in.
+# Layers of tiles that scans of a street change.
 _TILES_HIGH = 2
 
 
 def _ground_tiles(city: City, edge: float, reach: float, tile_size: float) -> float:
-    """Tiles on the ground that scans reach: a band along each street, counted once where two cross."""
+    """Number of ground tiles that scans reach: a band along each street, with crossings counted once."""
     covered = min(2 * reach / city.street_distance_m, 1.0)
     return (1 - (1 - covered) ** 2) * (edge / tile_size) ** 2
 
 
 def _edge(city: City) -> float:
-    """The edge of the square in which streets have the wanted length."""
+    """Edge of the square in which the streets have the given total length."""
     for name, value in asdict(city).items():
         if not (math.isfinite(value) and value > 0):
-            raise ValueError(f"{name}: {value} is not above 0")
+            raise ValueError(f"{name}: must be greater than 0, not {value}")
     streets = max(round(math.sqrt(city.streets_km * 1000.0 / (2 * city.street_distance_m))), 1)
     return streets * city.street_distance_m
 
 
-# Scans are planned in groups, so that a city takes seconds.
+# Scans are planned in groups, so that a simulation of a city takes seconds.
 _GROUP_M = 20.0
 
 
 def _drive(city: City, edge: float, reach: float) -> tuple[list[Box | None], list[int]]:
-    """The box around each group of scans, and how many there are in it, in the order of the drive."""
+    """Returns the box around each group of scans, and the number of scans in it, in the order of the drive."""
     boxes: list[Box | None] = []
     weights: list[int] = []
     scans = max(round(_GROUP_M / city.scan_distance_m), 1)
@@ -172,7 +173,7 @@ def _drive(city: City, edge: float, reach: float) -> tuple[list[Box | None], lis
 
 
 def _share(box: Box | None, x: int, y: int, size: float) -> float:
-    """What part of a box is in a column."""
+    """Returns the fraction of a box that is in a column."""
     if box is None:
         return 0.0
     west, south, east, north = box

@@ -1,4 +1,4 @@
-"""A function of one's own over the tiles of a map."""
+"""User functions over the tiles of a map."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ _Path = str | os.PathLike[str]
 _Index = tuple[int, int, int]
 _T = TypeVar("_T")
 
-# Its types are not complete.
+# Its type hints are incomplete.
 _bag: Any = dask.bag
 
-# Tiles of a task: opening a map takes as long as reading a few.
+# Tiles per task: opening a map takes as long as reading a few.
 _TILES_AT_ONCE = 16
 
 
 class _Opened(threading.local):
-    """The map of the task at hand, by process, path and snapshot; threads of a worker have tasks of their own."""
+    """The map of the current task, by process, path and snapshot. Threads of a worker run different tasks."""
 
     def __init__(self) -> None:
         self.maps: dict[tuple[int, str, str | None], Map] = {}
@@ -43,7 +43,7 @@ _opened = _Opened()
 
 @dataclass(frozen=True)
 class Tile:
-    """A tile of a map, whose arrays are read when they are asked for."""
+    """A tile of a map. Its arrays are read on access."""
 
     map: str
     snapshot: str | None
@@ -51,7 +51,7 @@ class Tile:
 
     @property
     def region(self) -> list[float]:
-        """The tile's box: low x, y, z and high x, y, z in metres."""
+        """Box of the tile: low x, y, z and high x, y, z in metres."""
         size = self._reader().tile_size
         return [size * number for number in self.index] + [size * (number + 1) for number in self.index]
 
@@ -62,11 +62,11 @@ class Tile:
     def dense(
         self, values: Literal["occupancy", "probability", "log_odds"] = "occupancy"
     ) -> tuple[NDArray[Any], NDArray[np.float64]]:
-        """All voxels of the tile as an array by x, y, z, and the lower corner of the first; as ``Map.to_dense``."""
+        """All voxels of the tile as an array by x, y, z, and the lower corner of the first, as in ``Map.to_dense``."""
         return self._reader().to_dense(self.region, values)
 
     def _reader(self) -> Map:
-        # A process that was forked opens its own.
+        # A forked process must open its own map.
         key = (os.getpid(), self.map, self.snapshot)
         reader = _opened.maps.get(key)
         if reader is None:
@@ -82,11 +82,12 @@ def map_tiles(
     tiles: Sequence[_Index] | None = None,
     snapshot: str | None = None,
 ) -> Any:
-    """The results of ``function`` for each tile of a map, or for ``tiles``, as a lazy ``dask.bag.Bag`` in their order.
+    """Applies ``function`` to each tile of a map, or to ``tiles``: a lazy ``dask.bag.Bag`` of results in their
+    order.
 
-    ``compute()`` runs it on the current client; ``sum()``, ``fold()`` and the like combine results where they are made.
-    All workers need to see ``map`` under the same path. Each task reads the last flush before it began: name a
-    ``snapshot`` while somebody writes to the map.
+    ``compute()`` runs it on the current client; ``sum()``, ``fold()`` and the like combine results on the workers.
+    All workers must see ``map`` under the same path. Each task reads the last flush before it began: pass a
+    ``snapshot`` if the map is being written.
     """
     path = os.path.abspath(map)
     if tiles is None:
@@ -99,6 +100,6 @@ def map_tiles(
 
 
 def _apply(tiles: Sequence[Tile], function: Callable[[Tile], _T]) -> list[_T]:
-    # What an earlier task has opened may be an earlier flush.
+    # A map opened by an earlier task may be at an earlier flush.
     _opened.maps.clear()
     return [function(tile) for tile in tiles]

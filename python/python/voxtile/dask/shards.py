@@ -1,4 +1,4 @@
-"""What tasks make, put where others find it: pieces of one map, under the id that it is to have."""
+"""Hand-over of the shards that tasks make, under the id of the final map."""
 
 from __future__ import annotations
 
@@ -13,28 +13,28 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from .._voxtile import move_piece
+from .._voxtile import move_shard
 from ..errors import ArgumentError
 
-# The id that all parts have.
+# Id of the map, which all its parts have.
 MAP_ID = "map_id.json"
 
 _LOCK = "lock"
-# The name of an attempt's folder.
+# Name of the folder of an attempt.
 _ATTEMPT = re.compile("[0-9a-f]{32}")
 
 
-def hand_over(made: str, place: str, map_id: str) -> None:
-    """Moves what a worker made to its place, whole and durable; ``made`` is gone then.
+def move_to_place(made: str, place: str, map_id: str) -> None:
+    """Moves a map from the worker's disk to its final place, atomically and durably, and removes ``made``.
 
-    From another file system, or where ``made`` has another id, it is copied, and every byte is compared with its log.
-    Another attempt may have been first, and made the same.
+    A map from another file system, or with another id, is copied, and every byte is checked against its log. If
+    another attempt was first, its equal result is kept.
     """
     folder = os.path.dirname(place)
     attempt = os.path.join(folder, f"attempt-{uuid.uuid4().hex}")
     with _opened(folder) as opened:
         try:
-            move_piece(made, attempt, map_id)
+            move_shard(made, attempt, map_id)
             _check_is_there(opened, folder)
             if not os.path.exists(place):
                 os.rename(attempt, place)
@@ -44,16 +44,17 @@ def hand_over(made: str, place: str, map_id: str) -> None:
                 raise
         finally:
             shutil.rmtree(attempt, ignore_errors=True)
-            # Of a failure, a moment ago, on a disk that refused to have it removed.
+            # Remains of a failed move whose removal failed too.
             shutil.rmtree(f"{attempt}.unfinished", ignore_errors=True)
             _unmake_if_gone(opened, folder)
 
 
 @contextmanager
 def locked(parts: Path, own: re.Pattern[str]) -> Iterator[None]:
-    """One process at a time makes a map; the lock ends with the process.
+    """Lets one process at a time build a map; the lock ends with the process.
 
-    What lies in the folder has names like ``own``. A folder with anything else is somebody's, and stays as it is.
+    The folder may only contain names that match ``own``. A folder with other content is left unchanged and is an
+    error.
     """
     _check_is_own(parts, own)
     parts.mkdir(parents=True, exist_ok=True)
@@ -62,7 +63,7 @@ def locked(parts: Path, own: re.Pattern[str]) -> Iterator[None]:
             try:
                 yield
             finally:
-                # What was made stays for the next run; a folder without anything does not.
+                # Keep results for the next run, but no empty folder.
                 with suppress(OSError):
                     if set(os.listdir(parts)) <= {_LOCK, MAP_ID}:
                         remove(parts)
@@ -71,64 +72,64 @@ def locked(parts: Path, own: re.Pattern[str]) -> Iterator[None]:
 
 
 @contextmanager
-def attempt_in(beside: Path) -> Iterator[Path]:
-    """A new folder in ``beside``, which is removed in the end, and so is what a killed call left there.
+def attempt_in(folder: Path) -> Iterator[Path]:
+    """Makes a new folder in ``folder`` and removes it at the end, with the remains of killed calls.
 
-    Its name is 32 hexadecimal digits. A task of an earlier attempt that was given up may still be at work in another.
+    Its name is 32 hexadecimal digits. Tasks of an abandoned call may still write to another one.
     """
-    with locked(beside, _ATTEMPT):
-        attempt = beside / uuid.uuid4().hex
+    with locked(folder, _ATTEMPT):
+        attempt = folder / uuid.uuid4().hex
         try:
             attempt.mkdir()
             yield attempt
         finally:
             with suppress(OSError):
-                remove(beside)
+                remove(folder)
 
 
 def remove(folder: Path) -> None:
-    """Takes a folder of pieces away that nobody waits for any more; it is removed once the lock is given back.
+    """Renames a folder of shards that is no longer needed; it is deleted after the lock is released.
 
-    Tasks that were given up may still be at work. They find no folder of that name, so that they put nothing there.
+    Tasks of an abandoned call may still run. They no longer find the folder, so they write nothing there.
     """
     os.rename(folder, folder.with_name(f"{folder.name}.gone-{uuid.uuid4().hex}"))
 
 
 def _check_is_own(parts: Path, own: re.Pattern[str]) -> None:
     if parts.is_symlink() or (parts.exists() and not parts.is_dir()):
-        raise ArgumentError(f"{parts}: pieces need a folder of this name, and it is a link or a file; move it away")
+        raise ArgumentError(f"{parts}: is a link or a file, but a folder is needed here; move it away")
     for name in sorted(os.listdir(parts)) if parts.exists() else []:
         if (name != _LOCK and not own.fullmatch(name)) or (parts / name).is_symlink():
-            raise ArgumentError(f"{parts}: {name} in it is of no earlier call; move the folder away")
+            raise ArgumentError(f"{parts}: contains {name}, which no earlier call has written; move the folder away")
 
 
 @contextmanager
 def _lock(parts: Path) -> Iterator[None]:
     path = parts / _LOCK
-    # NFS gives a lock only to who may write.
+    # NFS grants a lock only with write access.
     lock = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o666)
     try:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            # Whoever had it may have taken the folder away a moment ago.
+            # The previous holder may have renamed the folder a moment ago.
             is_there = os.path.samestat(os.fstat(lock), os.stat(path))
         except OSError:
             is_there = False
         if not is_there:
-            raise ArgumentError(f"{parts}: another process makes this map; wait for it")
+            raise ArgumentError(f"{parts}: another process is building this map; wait for it")
         yield
     finally:
         os.close(lock)
 
 
 def _sweep(parts: Path) -> None:
-    """Removes what was taken away. Nobody has the lock open any more: NFS would keep that file, and the folder."""
+    """Deletes renamed folders. The lock file must be closed: NFS would keep an open file, and so the folder."""
     for gone in parts.parent.glob(f"{glob.escape(parts.name)}.gone-{'[0-9a-f]' * 32}"):
         for _ in range(_ATTEMPTS):
             shutil.rmtree(gone, ignore_errors=True)
             if not gone.exists():
                 break
-            # A task was just removing what it had made.
+            # A task may just be removing its own shard.
             time.sleep(0.1)
 
 
@@ -148,7 +149,7 @@ def _opened(folder: str) -> Iterator[int]:
 
 
 def _gone(folder: str) -> FileNotFoundError:
-    return FileNotFoundError(f"{folder}: it is gone, so nobody waits for this piece any more")
+    return FileNotFoundError(f"{folder}: was removed, so this shard is no longer needed")
 
 
 def _check_is_there(opened: int, folder: str) -> None:
@@ -157,7 +158,7 @@ def _check_is_there(opened: int, folder: str) -> None:
 
 
 def _unmake_if_gone(opened: int, folder: str) -> None:
-    """A folder that was taken away while a piece was on its way was made again for that piece."""
+    """Removes the folder if it was renamed during a move: the move created it anew."""
     with suppress(OSError):
         if not os.path.samestat(os.fstat(opened), os.stat(folder)):
             os.rmdir(folder)
