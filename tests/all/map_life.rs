@@ -62,7 +62,7 @@ fn replays() -> Life {
         Act::RemovePoints(region(2.0, 4.0)),
         Act::Move { seed: 9, rest: None },
         Act::Revert("a"),
-        Act::MoveBeside { seed: 3, rest: Some(2), meanwhile: 7..10 },
+        Act::MoveOnline { seed: 3, rest: Some(2), meanwhile: 7..10 },
         Act::Delete("a"),
         Act::RemoveScans(6, 6),
         Act::Scans(10..11),
@@ -126,7 +126,7 @@ fn random_acts(random: &mut Random) -> Vec<Act> {
     for step in 1..12 {
         let act = match random.below(8) {
             0 => Act::Scans(10 * step..10 * step + 1 + random.below(3)),
-            1 | 2 => Act::MoveBeside {
+            1 | 2 => Act::MoveOnline {
                 seed: random.next(),
                 rest: Some(random.below(5)).filter(|&rest| rest < 4),
                 meanwhile: 10 * step..10 * step + random.below(5),

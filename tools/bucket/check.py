@@ -146,8 +146,8 @@ def check(port):
 
     # What is not there, and what would write.
     assert "no map here" in voxtile("info", "s3://robots/maps/none", port=port, fails=True)
-    assert "read and not changed" in voxtile("clear", url, "--region", 0, 0, 0, 1, 1, 1, port=port, fails=True)
-    assert "read and not changed" in voxtile("crop", MAP, "-o", url, "--region", 0, 0, 0, 9, 9, 9, port=port, fails=True)
+    assert "is read-only" in voxtile("clear", url, "--region", 0, 0, 0, 1, 1, 1, port=port, fails=True)
+    assert "is read-only" in voxtile("crop", MAP, "-o", url, "--region", 0, 0, 0, 9, 9, 9, port=port, fails=True)
 
     voxtile("pull", url, WORK / "pulled", port=port)
     assert voxtile("digest", WORK / "pulled", port=port) == digest
