@@ -46,7 +46,7 @@ impl LocalMap {
             "passive-perception" => LocalParameters::passive_perception(),
             _ => {
                 let known = "local-mapping, autonomous-mapping or passive-perception";
-                return Err(wrong(py, "preset", format!("is {known}, not `{preset}`")));
+                return Err(wrong(py, "preset", format!("must be {known}, not `{preset}`")));
             }
         };
         parameters.max_voxels = max_voxels.or(parameters.max_voxels);

@@ -29,8 +29,8 @@ impl World for City {
     fn scene(&self, center: Point, radius_m: f64) -> Scene {
         let radius_m = bounded(radius_m);
         let mut solids = Vec::new();
-        // A block's boxes never leave it, so the blocks that meet the square are sufficient. The casts saturate; at
-        // such distances f64 cannot resolve metres and the ranges are single blocks.
+        // All boxes of a block are inside the block, so only blocks that overlap the requested square matter. Casts to
+        // i64 saturate at distances at which f64 no longer resolves metres.
         let range = |k: usize| {
             let block_of = |x: f64| (x / Self::BLOCK_M).floor() as i64;
             block_of(center[k] - radius_m)..=block_of(center[k] + radius_m)

@@ -39,7 +39,8 @@ const STEPS: [f64; 30] = [
 const SAMPLE_SIZE: usize = 48;
 /// Bound of the multiples: 2^51. Products of larger ones are not exact.
 const MAX_STEPS: f64 = 2_251_799_813_685_248.0;
-/// Maximum deviation of a value from the product, in units in the last place; readers add offsets.
+/// Maximum difference between a value and its multiple of the step, in units in the last place. Values differ from exact
+/// multiples if the program that wrote the file added an offset.
 const MAX_ULPS: u64 = 100;
 
 /// Grid of multiples of a step, or of fractions of a unit. Readers multiply or divide, which differs in the last place.

@@ -194,11 +194,12 @@ impl Stretch {
         self.slabs
     }
 
-    /// Marks the voxels in the words of a page, in Morton order. Returns the number of slabs that could be decided; the
-    /// first voxel of the next one may also be marked.
+    /// Marks the voxels in the words of a page, in Morton order. Returns the number of slabs that are complete; the
+    /// first voxel of the next slab may also be marked.
     ///
-    /// At a crossing the ray passes two voxels along `A`, mostly in one word: they are marked together.
-    // Not inlined: as a function of its own, most of the loop's data is in registers.
+    /// Where the ray crosses a border between slabs it passes two voxels, which are usually bits of one word and marked
+    /// together.
+    // Inlined, the loop would not fit in registers.
     #[inline(never)]
     pub(crate) fn mark<const A: usize, const B: usize, const C: usize>(
         &self,

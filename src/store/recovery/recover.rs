@@ -133,8 +133,8 @@ fn settle_snapshots(
     tolerate(disk.sync_folder(&folder), &folder, "sync")
 }
 
-/// Returns whether a file in the folder of snapshots remains of an interrupted deletion: it contains its own name, and
-/// the log does not list it. Foreign files are kept.
+/// Returns whether a file in the folder of snapshots is left over from an interrupted deletion: it contains its own name,
+/// and the log does not list it. Foreign files are kept.
 fn is_deleted_snapshot(
     disk: &dyn Disk,
     layout: &Layout,

@@ -59,7 +59,7 @@ impl SnapshotWriter<'_> {
         self.store.files.sync_folder(&folder)?;
         listed.insert(name.clone(), Some(flush_number));
         if let Err(error) = self.store.commit_snapshots(listed) {
-            // If the file remains, no record names it.
+            // A failed removal is harmless: snapshots that the log does not list are ignored and removed later.
             let _ = self.store.disk().remove_file(&next);
             return Err(error);
         }

@@ -95,12 +95,12 @@ impl ScanChain {
         self.scans
     }
 
-    /// Returns the chain over the scans, as 32 hexadecimal digits.
+    /// Returns the hash chain of the scans as 32 hexadecimal digits.
     pub fn scan_text(&self) -> String {
         to_text(&self.scan_chain)
     }
 
-    /// Returns the chain over the poses, as 32 hexadecimal digits.
+    /// Returns the hash chain of the poses as 32 hexadecimal digits.
     pub fn pose_text(&self) -> String {
         to_text(&self.pose_chain)
     }

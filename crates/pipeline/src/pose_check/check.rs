@@ -30,7 +30,7 @@ const EXPECTED: f64 = 0.5;
 const BETTER_ODDS: f64 = 2.0;
 /// Readings within this difference are equivalent; the more likely one is preferred.
 const TIE: f64 = 0.05;
-/// Maximum overlap if positions are much too large.
+/// Overlap below which scans do not overlap, as if positions were in millimetres and read as metres.
 const NO_OVERLAP: f64 = 0.2;
 /// Minimum improvement over the overlap without any motion.
 const THAN_STILL: f64 = 0.1;

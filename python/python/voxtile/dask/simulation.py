@@ -130,7 +130,7 @@ def simulate(
     }
 
 
-# Layers of tiles that scans of a street change.
+# Number of tiles, one above the other, that a scan of a street changes.
 _TILES_HIGH = 2
 
 
