@@ -94,11 +94,14 @@ fn scans_are_inserted_during_an_online_remap() {
         insert(&mut mapper, 91);
         mapper.flush().unwrap();
         drop(mapper);
-        let told = online.finish().unwrap();
+        let report = online.finish().unwrap();
         assert!((40..=91).contains(&followed), "{followed}");
-        assert_eq!((told.mapped.scans, told.mapped.scans_changed), (91, moving), "{told:?}");
-        assert!((told.largest_move_m - 1.7).abs() < 1e-9, "{told:?}");
-        assert!(told.mapped.tiles_mapped > 0 && told.mapped.tiles_mapped <= told.mapped.tiles, "{told:?}");
+        assert_eq!((report.mapped.scans, report.mapped.scans_changed), (91, moving), "{report:?}");
+        assert!((report.largest_move_m - 1.7).abs() < 1e-9, "{report:?}");
+        assert!(
+            report.mapped.tiles_mapped > 0 && report.mapped.tiles_mapped <= report.mapped.tiles,
+            "{report:?}"
+        );
 
         // The result of an offline remap with the same scans and poses.
         let other = place.path().join("other");
