@@ -1,5 +1,5 @@
-//! What a command that is killed, or that the disk refuses a rename, leaves in a map: reported by `verify`, completed by
-//! the next writer and by the same command.
+//! Files that a killed command, or one whose rename failed, leaves in a map: `verify` reports them, and the next writer
+//! and the same command complete them.
 
 use crate::harness::{at, digest_of, keeping_scans, make_foreign, map, name, open_or_create, replay, scans};
 use std::collections::{BTreeMap, BTreeSet};
@@ -25,7 +25,7 @@ fn pose(number: u64, by_m: f64) -> Pose {
     Pose::from_quaternion([3.0 * (number % 4) as f64 + by_m, 0.0, 0.5], [0.0, 0.0, 0.0, 1.0]).unwrap()
 }
 
-/// Maps scans with these numbers, with a flush after each.
+/// Inserts scans with these numbers, with a flush after each.
 fn build(disk: &FaultyDisk, config: MapConfig, numbers: std::ops::Range<u64>) -> Result<()> {
     let mut mapper = open_or_create(disk, &config)?;
     for number in numbers.filter(|&number| number >= mapper.scan_number()).collect::<Vec<_>>() {
@@ -51,7 +51,7 @@ fn findings(disk: &FaultyDisk) -> (Verification, BTreeSet<PathBuf>) {
     (verification, found)
 }
 
-/// Files that wait for their names.
+/// Files that wait to be renamed.
 fn waiting(disk: &FaultyDisk) -> Vec<PathBuf> {
     disk.files()
         .into_keys()
@@ -65,7 +65,7 @@ fn region() -> Aabb {
     Aabb { min: [-1.0, -1.0, -1.0], max: [4.1, 4.0, 4.0] }
 }
 
-/// A process that changes a map.
+/// A change of a map in a process of its own.
 type Work = fn(&FaultyDisk) -> Result<()>;
 
 fn appended(disk: &FaultyDisk) -> Result<()> {
@@ -77,7 +77,7 @@ fn cleared(disk: &FaultyDisk) -> Result<()> {
     clear(at(disk), &Part::Inside(region()), |_, _| ()).map(drop)
 }
 
-fn faded(disk: &FaultyDisk) -> Result<()> {
+fn decayed(disk: &FaultyDisk) -> Result<()> {
     decay(at(disk), &Decay::new(2.0).with_forget_below(0.25), |_, _| ()).map(drop)
 }
 
@@ -87,7 +87,7 @@ fn kept(disk: &FaultyDisk) -> Result<()> {
 
 fn deleted(disk: &FaultyDisk) -> Result<()> {
     match delete_snapshot(at(disk), &name("third")) {
-        // Done by an attempt before.
+        // Done by an earlier attempt.
         Err(Error::InvalidArgument { .. }) => Ok(()),
         deleted => deleted,
     }
@@ -106,7 +106,7 @@ fn moved(disk: &FaultyDisk) -> Result<()> {
         .map(drop)
 }
 
-fn moved_beside(disk: &FaultyDisk) -> Result<()> {
+fn moved_online(disk: &FaultyDisk) -> Result<()> {
     let how = Remap::new(replay().with_keep_as(name("before")));
     let mut beside = OnlineRemap::begin(&scans(disk)?, &new_poses(), &how)?;
     beside.follow(|_| ())?;
@@ -147,7 +147,7 @@ fn damaged(storage: Storage) -> FaultyDisk {
     disk
 }
 
-/// The same without the files that voxtile adds.
+/// The same map without the files that voxtile adds.
 fn foreign() -> FaultyDisk {
     let disk = four_scans(Storage::OctoMap, false);
     make_foreign(&disk, map());
@@ -161,13 +161,13 @@ fn all_works() -> Vec<(&'static str, FaultyDisk, Work)> {
         works.push(("append", plain.copy(), appended));
         works.push(("append kept scans", keeping.copy(), appended));
         works.push(("clear", plain.copy(), cleared));
-        works.push(("decay", plain.copy(), faded));
+        works.push(("decay", plain.copy(), decayed));
         works.push(("snapshot", plain.copy(), kept));
         works.push(("delete", plain.copy(), deleted));
         works.push(("revert", plain.copy(), reverted));
         works.push(("revert kept scans", keeping.copy(), reverted));
         works.push(("remap", keeping.copy(), moved));
-        works.push(("remap beside", keeping.copy(), moved_beside));
+        works.push(("online remap", keeping.copy(), moved_online));
         works.push(("remove scans", keeping.copy(), removed));
         works.push(("remove points", keeping.copy(), points_removed));
         works.push(("repair", damaged(storage), repaired));
@@ -176,20 +176,20 @@ fn all_works() -> Vec<(&'static str, FaultyDisk, Work)> {
     works
 }
 
-/// What `info` says of the bytes on disk: of the map, and of readers.
+/// Returns the bytes on disk as `info` counts them: of the map, and of readers.
 fn bytes_of(disk: &FaultyDisk) -> (Option<(u64, u64)>, u64) {
     let reader = MapReader::open(at(disk), 0).unwrap();
     (reader.disk_bytes(), kept_bytes(at(disk)).unwrap().reader_bytes)
 }
 
-/// What `info` counts is what is left once everything is in order.
+/// `info` counts the bytes that are left after the cleanup.
 #[test]
-fn files_that_could_not_be_renamed_are_reported_and_the_next_writer_settles_them() {
+fn failed_renames_are_reported_and_completed_by_the_next_writer() {
     let (mut faults, mut kinds) = (0, BTreeMap::<String, u64>::new());
     for (what, start, work) in all_works() {
         let undisturbed = start.copy();
         undisturbed.set_fault(Fault::None);
-        // What cannot be read stays so.
+        // Unreadable files remain unreadable.
         let begin = || {
             let disk = start.copy();
             if what == "repair" {
@@ -234,9 +234,9 @@ fn files_that_could_not_be_renamed_are_reported_and_the_next_writer_settles_them
     assert!(faults > 20);
 }
 
-/// Files that no act of today leaves, too.
+/// Also files that no current operation leaves.
 #[test]
-fn files_that_replace_others_are_reported_and_removed_whatever_the_map() {
+fn unfinished_replacements_are_reported_and_removed() {
     for start in [four_scans(Storage::Compact, false), foreign()] {
         let names = ["metadata.json.next", "commits.log.next", "scans.bin.next"];
         names.iter().for_each(|name| start.put(&map().join(name), b"half"));
@@ -251,7 +251,7 @@ fn files_that_replace_others_are_reported_and_removed_whatever_the_map() {
     }
 }
 
-/// The segments of the kept scans, and how many scans the map keeps.
+/// Returns the segments of the kept scans, and the number of kept scans.
 fn segments(disk: &FaultyDisk) -> (BTreeSet<String>, u64) {
     let is_segment = |path: &PathBuf| {
         let name = path.file_name()?.to_string_lossy().into_owned();
@@ -274,10 +274,10 @@ fn one_segment() -> FaultyDisk {
     disk.copy()
 }
 
-/// The first segment has the removed scan: whatever is killed and wherever, as long as it is there `verify` reports it,
-/// and the same call removes it, as does the next writer.
+/// The first segment contains the removed scan. After a kill at any change, `verify` reports the segment while it
+/// exists, and the same call or the next writer removes it.
 #[test]
-fn points_of_removed_scans_are_reported_and_gone_after_the_same_call() {
+fn leftover_points_of_removed_scans_are_reported_and_removed() {
     let start = one_segment();
     let done = start.copy();
     removed(&done).unwrap();
@@ -298,12 +298,12 @@ fn points_of_removed_scans_are_reported_and_gone_after_the_same_call() {
                 let (verification, found) = findings(&disk);
                 assert!(found.contains(&map().join("kept_scans/segment.1")), "{what}: {found:?}");
                 assert!(verification.is_whole() && verification.leftovers > 0, "{what}");
-                // By another writer.
+                // Completed by another writer.
                 let other = disk.copy();
                 drop(TileStore::open(other.shared(), map()).unwrap());
                 assert!(!segments(&other).0.contains("segment.1"), "{what}");
                 removed(&other).unwrap_or_else(|error| panic!("{what}: after another writer: {error:#}"));
-                // Numbers that the map never had are refused, after the earlier removal is completed.
+                // Unknown scan numbers are an error, after the earlier removal is completed.
                 let other = disk.copy();
                 let scans = ScanSelection::Numbers(7, 9);
                 let refused = remove_scans(self::at(&other), &scans, false, &replay(), |_, _| ());
@@ -318,7 +318,7 @@ fn points_of_removed_scans_are_reported_and_gone_after_the_same_call() {
             assert_eq!(segments(&disk), segments(&done), "{what}");
             let (verification, found) = findings(&disk);
             assert_eq!(verification.leftovers, 0, "{what}, {scans} scans: {found:?}");
-            // Durably.
+            // The removal is durable.
             let dropped = disk.after_crash(Unsynced::Dropped);
             assert_eq!(segments(&dropped), segments(&done), "{what}");
         }
@@ -326,9 +326,9 @@ fn points_of_removed_scans_are_reported_and_gone_after_the_same_call() {
     assert!(left > 0);
 }
 
-/// A copy of the map, as in a bucket, has no file that is to be gone.
+/// A copy of the map, as in a bucket, contains no file that is to be removed.
 #[test]
-fn a_copy_of_a_map_leaves_out_what_a_killed_removal_left() {
+fn a_copy_of_a_map_skips_leftovers_of_a_killed_removal() {
     let start = one_segment();
     let done = start.copy();
     removed(&done).unwrap();
@@ -351,17 +351,17 @@ fn a_copy_of_a_map_leaves_out_what_a_killed_removal_left() {
     assert!(left > 0);
 }
 
-/// Readers need not wait for `metadata.json` once a writer has been there, whether that commits anything or not.
+/// After any writer has opened the map, readers need not wait for `metadata.json`, even if the writer commits nothing.
 #[test]
-fn a_writer_replaces_metadata_that_are_behind_the_log() {
+fn a_writer_replaces_outdated_metadata() {
     let start = four_scans(Storage::Compact, false);
     let done = start.copy();
-    faded(&done).unwrap();
+    decayed(&done).unwrap();
     let mut behind = 0;
     for change in 0..done.changes() {
         let disk = start.copy();
         disk.set_fault(Fault::Crashes(change));
-        let _ = faded(&disk);
+        let _ = decayed(&disk);
         let disk = disk.after_kill();
         let is_behind = || TileStore::open_read_only(disk.shared(), map()).unwrap().is_metadata_behind();
         behind += u64::from(is_behind());
@@ -371,7 +371,7 @@ fn a_writer_replaces_metadata_that_are_behind_the_log() {
     assert!(behind > 0);
 }
 
-/// A disk that refuses to remove them is an error, and not a warning.
+/// If the disk cannot remove the files, the call fails.
 #[test]
 fn a_removal_whose_files_remain_is_an_error() {
     let start = one_segment();
@@ -393,9 +393,9 @@ fn a_removal_whose_files_remain_is_an_error() {
     assert!(refused > 0);
 }
 
-/// A map that keeps no scans any more keeps none of an earlier state either, once no snapshot has that.
+/// Kept scans are deleted with the last snapshot that needs them, if the map no longer keeps scans.
 #[test]
-fn kept_scans_go_with_the_last_snapshot_that_has_them() {
+fn kept_scans_are_deleted_with_the_last_snapshot_that_needs_them() {
     let disk = FaultyDisk::new(Fault::None);
     build(&disk, config(Storage::Compact, false), 0..1).unwrap();
     snapshot(at(&disk), &name("without")).unwrap();
@@ -410,7 +410,7 @@ fn kept_scans_go_with_the_last_snapshot_that_has_them() {
 }
 
 #[test]
-fn a_removal_of_removed_scans_succeeds_and_one_of_unknown_scans_is_refused() {
+fn a_repeated_removal_succeeds_and_one_of_unknown_scans_fails() {
     let disk = one_segment();
     for (scans, how) in [(1, replay()), (0, replay()), (0, replay().with_keep_as(name("before")))] {
         let removed = remove_scans(at(&disk), &ScanSelection::Numbers(2, 2), false, &how, |_, _| ()).unwrap();
@@ -422,17 +422,17 @@ fn a_removal_of_removed_scans_succeeds_and_one_of_unknown_scans_is_refused() {
         let refused = remove_scans(at(&disk), &scans, from_snapshots, &replay(), |_, _| ());
         assert!(message_of(refused).contains("the map keeps none"));
     }
-    // Beside another writer, where nothing is left to do.
+    // Another writer may hold the map if nothing is left to do.
     let writer = TileStore::open(disk.shared(), map()).unwrap();
     removed(&disk).unwrap();
     drop(writer);
-    // Whatever has become of the map since.
+    // Later changes of the map do not matter.
     cleared(&disk).unwrap();
     removed(&disk).unwrap();
 }
 
 #[test]
-fn a_revert_leaves_no_kept_scans_that_nothing_needs() {
+fn a_revert_removes_unneeded_kept_scans() {
     let disk = four_scans(Storage::Compact, true);
     let before = segments(&disk).0;
     revert(at(&disk), &name("third"), None, |_, _| ()).unwrap();
@@ -441,7 +441,7 @@ fn a_revert_leaves_no_kept_scans_that_nothing_needs() {
     assert!(segments(&disk).0.len() < before.len());
 }
 
-/// A removal of the second map removes the files with its id first.
+/// A removal of the second map first removes the files with its id.
 #[test]
 fn a_removal_completes_the_removal_of_a_second_map() {
     let start = four_scans(Storage::Compact, true);
@@ -460,9 +460,9 @@ fn a_removal_completes_the_removal_of_a_second_map() {
     }
 }
 
-/// A second map that a remapping beside a mapper left has evidence of all scans.
+/// The second map, left by an online remap, has evidence of all scans.
 #[test]
-fn a_removal_removes_the_second_map_of_a_remapping_that_was_killed() {
+fn a_removal_removes_the_second_map_of_a_killed_remap() {
     let start = four_scans(Storage::Compact, true);
     delete_snapshot(at(&start), &name("third")).unwrap();
     let beside = OnlineRemap::begin(&scans(&start).unwrap(), &new_poses(), &Remap::new(replay())).unwrap();
@@ -483,14 +483,14 @@ fn names(disk: &FaultyDisk) -> Vec<String> {
     names
 }
 
-/// Whatever is killed and wherever: the same call ends as if nothing had happened, although it makes a name first.
+/// After a kill at any change, the same call succeeds with the same result, although it first creates a snapshot.
 #[test]
 fn a_call_that_makes_a_snapshot_first_can_be_repeated_after_a_kill() {
     let works: [(&str, Work); 6] = [
         ("snapshot", kept),
         ("revert", reverted),
         ("remap", moved),
-        ("remap beside", moved_beside),
+        ("online remap", moved_online),
         ("remove scans", removed_kept),
         ("remove points", points_removed_kept),
     ];
@@ -516,9 +516,9 @@ fn a_call_that_makes_a_snapshot_first_can_be_repeated_after_a_kill() {
     }
 }
 
-/// A name that is taken by another state stays refused.
+/// The name of a snapshot of another state is an error.
 #[test]
-fn a_snapshot_of_another_state_is_not_taken_for_that_of_an_earlier_attempt() {
+fn an_existing_snapshot_of_another_state_is_an_error() {
     let disk = four_scans(Storage::Compact, true);
     let third = Some(name("third"));
     let before = (digest_of(&disk, None).unwrap(), names(&disk));
@@ -544,16 +544,16 @@ fn a_snapshot_of_another_state_is_not_taken_for_that_of_an_earlier_attempt() {
     mapper.flush().unwrap();
     drop(mapper);
     assert!(message_of(snapshot(at(&disk), &name("fourth"))).contains("snapshots/fourth"));
-    // Nothing but the pose of that scan, which is in no tile.
+    // Only the pose of that scan changes, which is in no tile.
     snapshot(at(&disk), &name("fifth")).unwrap();
     let poses = NewPoses::Numbered(vec![(5, pose(0, 9.0))]);
     remap(&scans(&disk).unwrap(), &poses, &Remap::new(replay()), |_, _| ()).unwrap();
     assert!(message_of(snapshot(at(&disk), &name("fifth"))).contains("snapshots/fifth"));
 }
 
-/// Beside a writer with scans that are not flushed nothing is damage, and what it flushes is no leftover.
+/// Unflushed scans of a writer are no damage, and flushed ones are no leftovers.
 #[test]
-fn a_writer_at_work_is_no_damage_and_its_flushed_scans_are_no_leftovers() {
+fn verify_during_writes_finds_no_damage_and_no_leftovers() {
     let disk = four_scans(Storage::Compact, true);
     let mut mapper = OutOfCoreTileMapper::open(at(&disk), config(Storage::Compact, true)).unwrap();
     for number in 4..8 {

@@ -1,7 +1,7 @@
-//! Many queries at once beside the mapper: arrays of queries, and a caller's own parallel loops over single queries, by
-//! up to eight threads with small stacks, while the mapper inserts, evicts and flushes.
+//! Concurrent queries: arrays of queries, and parallel loops of the caller over single queries, in up to eight threads
+//! with small stacks, while the mapper inserts, evicts and flushes.
 //!
-//! The long form: `VOXTILE_READER_SECONDS=300 cargo test --release --test all -- live_arrays`.
+//! Long run: `VOXTILE_READER_SECONDS=300 cargo test --release --test all -- live_arrays`.
 
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -19,10 +19,10 @@ use voxtile::{
 
 const SCANS: usize = 12;
 
-/// A query takes some kilobytes. Queries that begin on the stack of a waiting one would soon need more than this.
+/// A query needs a few kilobytes of stack. If waiting queries started others on their stack, this would overflow.
 const STACK_BYTES: usize = 256 << 10;
 
-/// Far longer than a life takes, on a busy machine too.
+/// Far longer than a run takes, even on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(120);
 
 struct Setting {
@@ -31,7 +31,7 @@ struct Setting {
     points: Vec<Point>,
     rays: Vec<RayQuery>,
     region: Aabb,
-    /// The answers after each number of scans.
+    /// Expected results after each number of scans.
     expected: Vec<Answers>,
 }
 
@@ -74,7 +74,7 @@ impl Setting {
         setting
     }
 
-    /// Asks everything of one state of the map.
+    /// Runs all queries on one state of the map.
     fn ask(&self, map: &(impl MapQueries + Queries)) -> Result<Answers> {
         let some = &self.points[..40];
         let nearest = |point: &Point| map.nearest_occupied(*point, 2.0);
@@ -91,7 +91,7 @@ impl Setting {
         })
     }
 
-    /// Asks a view for everything; `false` if it has expired.
+    /// Runs all queries on a view; `false` if it has expired.
     fn ask_view(&self, reader: &LiveReader) -> bool {
         let view = reader.view();
         let number = voxtile::MapView::scan_number(&view);
@@ -103,9 +103,9 @@ impl Setting {
         true
     }
 
-    /// Asks the reader itself for arrays: each answer is that of one scan.
+    /// Queries the reader for arrays: each result is that of one scan.
     fn ask_reader(&self, reader: &LiveReader, inserted: &AtomicU64) {
-        // Scans are counted before and after they are visible.
+        // The count is read before and after the queries, because a scan becomes visible before it is counted.
         let before = inserted.load(Ordering::SeqCst) as usize;
         let (hits, occupancies) = (reader.cast_rays(&self.rays), reader.occupancy_at_points(&self.points));
         let after = (inserted.load(Ordering::SeqCst) as usize + 1).min(SCANS);
@@ -118,7 +118,7 @@ impl Setting {
         );
     }
 
-    /// A caller's own parallel loop over single queries, each of the latest scan.
+    /// Runs single queries in a parallel loop, each on the latest scan.
     fn ask_one_by_one(&self, reader: &LiveReader, inserted: &AtomicU64) {
         let before = inserted.load(Ordering::SeqCst) as usize;
         let found: Vec<_> = self.rays.par_iter().take(60).map(|ray| reader.cast_ray(ray).unwrap()).collect();
@@ -130,13 +130,13 @@ impl Setting {
     }
 }
 
-/// In which threads queries and the mapper run.
+/// Threads of the queries and of the mapper.
 #[derive(Clone, Copy, Debug)]
 struct Threads {
     askers: usize,
-    /// Queries run in a pool of so many threads with small stacks, or in the global one.
+    /// Number of threads of a pool with small stacks for queries; `None` for the global pool.
     pool: Option<usize>,
-    /// The mapper is called from inside of that pool.
+    /// Whether the mapper is called inside that pool.
     is_mapper_inside: bool,
 }
 
@@ -150,7 +150,7 @@ fn life(setting: &Setting, threads: Threads) -> u64 {
     };
     let folder = memory_folder();
     let path = MapPath::on(UnsyncedDisk::shared(), folder.path().join("map"));
-    // Room for a part of the tiles: some are evicted, and queries read them.
+    // Memory for a part of the tiles, so that some are evicted and read by queries.
     let config = setting.config.clone();
     let config = match threads.askers % 2 {
         0 => config.with_cache_tiles(60),
@@ -200,7 +200,7 @@ fn life(setting: &Setting, threads: Threads) -> u64 {
 }
 
 #[test]
-fn arrays_of_queries_in_many_threads_with_small_stacks_beside_the_mapper() {
+fn array_queries_in_many_threads_with_small_stacks_during_inserts() {
     let seconds = std::env::var("VOXTILE_READER_SECONDS").ok().and_then(|text| text.parse().ok());
     let until = Instant::now() + Duration::from_secs(seconds.unwrap_or(1));
     let (done, is_done) = channel::<()>();
@@ -227,7 +227,7 @@ fn arrays_of_queries_in_many_threads_with_small_stacks_beside_the_mapper() {
         drop(done);
     };
     let lives = thread::spawn(lives);
-    // Nothing is sent: the channel closes when the lives end, with or without a failure.
+    // Nothing is sent: the channel closes when the runs end, with or without a failure.
     let longest = PATIENCE + Duration::from_secs(seconds.unwrap_or(1));
     let ended = is_done.recv_timeout(longest);
     assert!(ended != Err(RecvTimeoutError::Timeout), "queries and the mapper wait for each other");

@@ -1,4 +1,5 @@
-//! Readers in other threads while the mapper inserts and flushes: every answer is that of the naive map as of one scan.
+//! Readers in other threads while the mapper inserts and flushes: every result is that of the naive map after some
+//! scan.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread;
@@ -48,7 +49,7 @@ fn voxels(view: &LiveView) -> Result<Voxels> {
     Ok(voxels)
 }
 
-/// Compares some points of a view, or all of it; whether it has not expired.
+/// Compares some points of a view, or all of it. Returns false if the view has expired.
 fn agrees(view: &LiveView, naive: &[Voxels], random: &mut Random) -> bool {
     let (expected, grid) = (&naive[view.scan_number() as usize], view.config().grid);
     for _ in 0..30 {
@@ -72,15 +73,15 @@ fn agrees(view: &LiveView, naive: &[Voxels], random: &mut Random) -> bool {
     true
 }
 
-/// Asks until all is done, by views that last for an instant or for many scans. Returns how many did and did not
-/// expire.
+/// Queries until the mapper is done, with short-lived and long-lived views. Returns how many expired and how many did
+/// not.
 fn ask(reader: &LiveReader, naive: &[Voxels], is_over: &AtomicBool, seed: u64) -> (u64, u64) {
     let mut random = Random(seed);
     let (mut expired, mut answered) = (0, 0);
     let mut before = 0;
     while !is_over.load(Ordering::Relaxed) || answered == 0 {
         let view = reader.view();
-        assert!(view.scan_number() >= before, "a later view saw less");
+        assert!(view.scan_number() >= before, "a later view has fewer scans");
         before = view.scan_number();
         for _ in 0..[1, 1, 8][random.below(3) as usize] {
             match agrees(&view, naive, &mut random) {
@@ -93,7 +94,7 @@ fn ask(reader: &LiveReader, naive: &[Voxels], is_over: &AtomicBool, seed: u64) -
     (expired, answered)
 }
 
-fn beside_each_other(seed: u64, config: &MapConfig) -> (u64, u64) {
+fn run_concurrently(seed: u64, config: &MapConfig) -> (u64, u64) {
     let folder = memory_folder();
     let path = folder.path().join("map");
     let scans = scans(seed);
@@ -113,7 +114,7 @@ fn beside_each_other(seed: u64, config: &MapConfig) -> (u64, u64) {
             if number % 7 == 6 {
                 mapper.flush().unwrap();
             }
-            // Time for readers to come in between, on a busy machine too.
+            // Lets readers run in between, even on a busy machine.
             thread::sleep(Duration::from_micros(300));
         }
         mapper.flush().unwrap();
@@ -121,7 +122,7 @@ fn beside_each_other(seed: u64, config: &MapConfig) -> (u64, u64) {
         readers.map(|reader| reader.join().unwrap())
     });
     drop(mapper);
-    // The last scan stays there to be asked about.
+    // The last scan remains visible.
     let view = reader.view();
     assert_eq!(view.scan_number(), SCANS as u64);
     assert_eq!(voxels_of(&view), naive[SCANS]);
@@ -129,7 +130,7 @@ fn beside_each_other(seed: u64, config: &MapConfig) -> (u64, u64) {
 }
 
 #[test]
-fn readers_beside_the_mapper_see_whole_scans() {
+fn concurrent_readers_see_complete_scans() {
     let config = MapConfig::new(0.2, 1.6).unwrap();
     for seed in 0..cases(3, 8) {
         let mode = if seed % 3 == 0 { InsertMode::PerRay } else { InsertMode::PerScan };
@@ -140,14 +141,14 @@ fn readers_beside_the_mapper_see_whole_scans() {
         if seed % 4 >= 2 {
             config = config.with_storage(Storage::Compact);
         }
-        let (expired, _) = beside_each_other(seed, &config.clone().with_memory_bytes(1 << 30));
-        assert_eq!(expired, 0, "nothing expires where there is memory");
+        let (expired, _) = run_concurrently(seed, &config.clone().with_memory_bytes(1 << 30));
+        assert_eq!(expired, 0, "views do not expire with enough memory");
         let bytes = [30_000, 100_000, 300_000][seed as usize % 3];
         for config in [
             config.clone().with_cache_tiles(1 + (seed as usize * 5) % 17),
             config.with_tight_memory_bytes(bytes),
         ] {
-            let (expired, answered) = beside_each_other(seed, &config);
+            let (expired, answered) = run_concurrently(seed, &config);
             assert!(answered > expired, "{expired} questions expired, {answered} were answered");
         }
     }
@@ -173,7 +174,7 @@ fn a_view_that_holds_too_much_expires_and_the_next_does_not() {
         held = held.max(with_views.saturating_sub(mapper.statistics().memory.readers));
     }
     assert!(matches!(view.voxel_at([0.0; 3]), Err(Error::Expired)));
-    // An eighth of the limit, and the table of what is held.
+    // An eighth of the limit, and the table of held tiles.
     assert!(held < 2 * 40_000 / 8, "{held} bytes were held");
     drop(view);
     assert_eq!(voxels_of(&reader.view()), naive_maps(&config, &scans)[SCANS]);
@@ -183,7 +184,7 @@ fn insert(mapper: &mut OutOfCoreTileMapper, scan: &Scan) {
     mapper.insert_scan(scan).unwrap();
 }
 
-/// How often a reader answers while the mapper does something.
+/// Counts the queries that a reader completes while the mapper works.
 fn answers_during(reader: &LiveReader, work: impl FnOnce() + Send) -> u64 {
     let (is_over, answers) = (AtomicBool::new(false), AtomicU64::new(0));
     thread::scope(|scope| {
@@ -205,7 +206,7 @@ fn answers_during(reader: &LiveReader, work: impl FnOnce() + Send) -> u64 {
 }
 
 #[test]
-fn a_reader_waits_for_no_flush() {
+fn readers_do_not_wait_for_flushes() {
     let folder = memory_folder();
     let config = MapConfig::new(0.2, 1.6).unwrap();
     let disk = UnsyncedDisk::taking(Duration::from_millis(150));
@@ -213,13 +214,13 @@ fn a_reader_waits_for_no_flush() {
         OutOfCoreTileMapper::create(MapPath::on(disk, folder.path().join("map")), config).unwrap();
     scans(2)[..5].iter().for_each(|scan| insert(&mut mapper, scan));
     let reader = mapper.reader().unwrap();
-    // One that waited would answer once or twice.
+    // A reader that waited would complete only one or two.
     let answers = answers_during(&reader, || mapper.flush().unwrap());
     assert!(answers > 100, "{answers} answers during a flush");
 }
 
 #[test]
-fn a_reader_waits_for_no_disk_read_of_the_mapper() {
+fn readers_do_not_wait_for_disk_reads_of_the_mapper() {
     let folder = memory_folder();
     let config = MapConfig::new(0.2, 1.6).unwrap();
     let path = folder.path().join("map");

@@ -1,4 +1,4 @@
-//! A limit in bytes: the layers between the tiles in use and the disk.
+//! Memory limits: the layers between resident tiles and the disk.
 
 use std::sync::{Arc, Mutex, mpsc};
 use std::thread;
@@ -39,7 +39,7 @@ fn tiles_ahead_are_fetched_before_they_are_needed() {
         }
         mapper.flush().unwrap();
         let io = mapper.statistics().io;
-        // There is nothing to be fetched for a new map, and on the way back over the same ground there is.
+        // A new map has nothing to fetch; the second pass over the same ground has.
         assert_eq!(io.prefetches > 0, io.loads > 0, "{io:?}");
         assert_eq!(io.prefetches > 10, mapper.scan_number() > scans.len() as u64, "{io:?}");
     }
@@ -47,9 +47,9 @@ fn tiles_ahead_are_fetched_before_they_are_needed() {
     assert_eq!(mapper.digest().unwrap(), expected.digest().unwrap());
 }
 
-/// What an operator sees: everything is counted, and adds up.
+/// All statistics are counted and consistent.
 #[test]
-fn with_little_memory_tiles_wait_packed_and_everything_is_counted() {
+fn statistics_count_everything_with_little_memory() {
     let folder = memory_folder();
     let scans = scans(60);
     let mut expected = InMemoryMapper::new(config()).unwrap();
@@ -72,7 +72,7 @@ fn with_little_memory_tiles_wait_packed_and_everything_is_counted() {
     let statistics = mapper.statistics();
     let in_memory = expected.statistics().cached.bytes();
     assert!(in_memory > 4 * BYTES as u64, "{in_memory} bytes do not need more than the limit");
-    // A scan's updates are counted before they are known to the byte.
+    // The updates of a scan are estimated before they are counted exactly.
     assert!(most < 2 * BYTES as u64, "{most} bytes");
     assert!(statistics.io.encoded > 20 && statistics.io.decoded > 0, "{:?}", statistics.io);
     assert!(statistics.compact_tiles > 0 && statistics.memory.compact_tiles > 0);
@@ -86,10 +86,10 @@ fn with_little_memory_tiles_wait_packed_and_everything_is_counted() {
     assert!(flushed.stalls.p50_us <= flushed.stalls.p99_us);
 }
 
-/// What a way has passed is written once, with all that was observed: otherwise a few updates of every tile would stay
-/// in memory, and tiles would be read and written again for them, the more of them the longer the way.
+/// Tiles out of range are written once, with all their updates. Otherwise updates would accumulate in memory, and tiles
+/// would be read and rewritten for them.
 #[test]
-fn tiles_that_are_left_behind_take_their_updates_with_them() {
+fn tiles_out_of_range_are_written_once_with_their_updates() {
     let folder = memory_folder();
     let config = MapConfig::new(0.2, 1.6).unwrap().with_range(0.0, 20.0);
     let scans: Vec<Scan> = Survey::tour(3, 1_000).take(cases(120, 240) as usize).collect();
@@ -112,9 +112,9 @@ fn tiles_that_are_left_behind_take_their_updates_with_them() {
     assert_eq!(mapper.digest().unwrap(), expected.digest().unwrap());
 }
 
-/// A tile may be wanted, changed and flushed while an older version of it is still on its way to disk.
+/// A tile may be needed, changed and flushed while an older version is still being written.
 #[test]
-fn a_tile_that_is_flushed_overtakes_no_older_version_of_itself() {
+fn a_flush_does_not_overtake_an_older_version_of_a_tile() {
     let scans = scans(12);
     for bytes in [100_000, 300_000] {
         let folder = memory_folder();
@@ -135,10 +135,10 @@ fn a_tile_that_is_flushed_overtakes_no_older_version_of_itself() {
     }
 }
 
-/// Far more tiles are at work on than fit: what waits for them goes to files rather than that they are read for it, and
-/// counts all the same, for queries as for the map.
+/// More tiles are active than fit in memory: their updates wait in files instead of loading the tiles, and still count
+/// in queries and in the map.
 #[test]
-fn updates_of_tiles_on_disk_wait_in_files_until_they_are_worth_reading_them() {
+fn updates_of_tiles_on_disk_wait_in_files() {
     let folder = memory_folder();
     let config = MapConfig::new(0.1, 6.4).unwrap().with_range(0.0, 20.0);
     let scans: Vec<Scan> = (0..3).flat_map(|_| scans(20)).collect();
@@ -147,7 +147,8 @@ fn updates_of_tiles_on_disk_wait_in_files_until_they_are_worth_reading_them() {
         expected.insert_scan(scan).unwrap();
     }
     let digest = expected.digest().unwrap();
-    // In the first a single scan is too much. In the second a tile would be read every time, were it not for the files.
+    // With the first limit a single scan is too large. With the second a tile would be loaded for each update without
+    // the files.
     for (bytes, most_loads_of_tile) in [(100_000, 2.0), (2_000_000, 0.25)] {
         let path = folder.path().join(format!("map_{bytes}"));
         let tight = config.clone().with_tight_memory_bytes(bytes);
@@ -172,9 +173,9 @@ fn updates_of_tiles_on_disk_wait_in_files_until_they_are_worth_reading_them() {
     }
 }
 
-/// The flush holds all tiles until its disk goes on. They leave memory all the same.
+/// The flush holds all tiles while its disk is blocked. They are evicted from memory nevertheless.
 #[test]
-fn a_flush_that_stands_still_stops_no_scan() {
+fn a_blocked_flush_does_not_block_scans() {
     const BYTES: usize = 6_000_000;
     let folder = memory_folder();
     let path = folder.path().join("map");
@@ -184,7 +185,7 @@ fn a_flush_that_stands_still_stops_no_scan() {
     let disk = UnsyncedDisk::gated(&gate);
     let tight = config().with_tight_memory_bytes(BYTES);
     let mut mapper = OutOfCoreTileMapper::create(MapPath::on(disk, &path), tight).unwrap();
-    let (before, beside) = scans.split_at(30);
+    let (before, during) = scans.split_at(30);
     for scan in before {
         mapper.insert_scan(scan).unwrap();
         expected.insert_scan(scan).unwrap();
@@ -195,7 +196,7 @@ fn a_flush_that_stands_still_stops_no_scan() {
     let holder = thread::spawn(move || {
         let guard = gate.lock().unwrap();
         closed.send(()).unwrap();
-        // A scan that waited for the flush would wait for ever.
+        // A scan that waited for the flush would never end.
         let stood_still = ended.recv_timeout(Duration::from_secs(20)).is_ok();
         drop(guard);
         stood_still
@@ -203,12 +204,12 @@ fn a_flush_that_stands_still_stops_no_scan() {
     done.recv().unwrap();
     mapper.begin_flush().unwrap();
     let encoded = mapper.statistics().io.encoded;
-    for scan in beside {
+    for scan in during {
         mapper.insert_scan(scan).unwrap();
         expected.insert_scan(scan).unwrap();
     }
     assert!(mapper.is_flushing());
-    assert!(mapper.statistics().io.encoded > encoded + 20, "no tile had to go");
+    assert!(mapper.statistics().io.encoded > encoded + 20, "no tile was evicted");
     let _ = end.send(());
     assert!(holder.join().unwrap(), "a scan waited");
     mapper.end_flush().unwrap();
@@ -218,9 +219,9 @@ fn a_flush_that_stands_still_stops_no_scan() {
     assert_eq!(MapReader::open(&path, 0).unwrap().digest().unwrap(), expected.digest().unwrap());
 }
 
-/// A flush beside the mapper has lists of its tiles, which nothing could make room for if these are small and many.
+/// A background flush needs lists of its tiles, which would not fit in memory for very many small tiles.
 #[test]
-fn a_flush_of_very_many_small_tiles_is_done_at_once() {
+fn a_flush_of_very_many_small_tiles_runs_in_the_foreground() {
     let folder = memory_folder();
     let path = folder.path().join("map");
     let config = MapConfig::new(0.2, 0.8).unwrap().with_range(0.0, 100.0);
@@ -240,7 +241,7 @@ fn a_flush_of_very_many_small_tiles_is_done_at_once() {
     assert!(!mapper.is_flushing());
     assert_eq!(mapper.flushed_scan_number(), 1);
     assert_eq!(MapReader::open(&path, 0).unwrap().digest().unwrap(), expected.digest().unwrap());
-    // A few tiles go beside the mapper, however many there are.
+    // A few tiles are flushed in the background, independent of the size of the map.
     mapper.insert_points(&ScanRef::in_world([0.0; 3], &[[3.0, 0.0, 0.0]])).unwrap();
     mapper.begin_flush().unwrap();
     mapper.end_flush().unwrap();
@@ -248,7 +249,7 @@ fn a_flush_of_very_many_small_tiles_is_done_at_once() {
 }
 
 #[test]
-fn tables_that_are_kept_for_a_reader_count_as_memory() {
+fn tables_kept_for_readers_count_as_memory() {
     let folder = memory_folder();
     let index_bytes = |name: &str, is_read: bool| {
         let map = folder.path().join(name);

@@ -1,87 +1,88 @@
-//! All integration tests of the engine in one binary, a module a subject.
+//! All integration tests of the engine in one binary, with one module per subject.
 
-/// Scans as people have them: borrowed, narrow, in either frame; poses of every form.
+/// Scans as borrowed slices, in single precision, in either frame, with poses of every form.
 mod borrowed_scans;
-/// Maps with another storage: the same content, and there and back the same files.
+/// Conversion between storages.
 mod convert;
-/// Every byte of every file of a map, damaged: found, named, repaired.
+/// Damage to every byte of every file of a map: found and repaired.
 mod corruption;
-/// Deletions of snapshots that are killed.
+/// Interrupted deletions of snapshots.
 mod deletions;
-/// Errors: what they say, their causes, what they are about.
+/// Errors: messages, causes, subjects.
 mod errors;
-/// Maps whose tiles are far from each other.
+/// Maps with large distances between tiles.
 mod far_tiles;
-/// Every operation of a life of a map fails once, and the power goes at every one of them.
+/// A fault and a power cut at every operation of a build.
 mod faults;
-/// The first voxel asked of a tile on disk.
+/// The first query of a tile on disk.
 mod first_questions;
-/// Files of every kind, of every version.
+/// Files written by all versions.
 mod format_fixtures;
-/// One trait for everything that can be asked.
+/// The trait `Queries` for all kinds of maps.
 mod front_door;
-/// Inputs that fuzzing found worth keeping, once more.
+/// The corpus of the fuzzers.
 mod fuzz_corpus;
-/// One map on a disk that fails: acts, faults, and the naive map to compare with.
+/// A map on a faulty disk: operations, faults, and the naive map to compare with.
 mod harness;
-/// Damage to the files of kept scans, of the map and of its snapshots.
+/// Damage to kept scans of the map and of its snapshots.
 mod kept_damage;
-/// Files of kept scans under the hands of a writer.
+/// Writes and repairs of kept scans.
 mod kept_scans;
-/// What each folder may know.
+/// Dependencies between the engine's modules.
 mod layering;
-/// Files that a killed command, or one that the disk refused, leaves in a map.
+/// Leftovers of killed or failed commands.
 mod leftovers;
-/// Many queries at once beside the mapper, in threads with small stacks.
+/// Concurrent queries in threads with small stacks.
 mod live_arrays;
-/// Readers in other threads beside the mapper.
+/// Readers in other threads during inserts.
 mod live_readers;
 mod low_memory;
-/// Lives of maps in processes of their own, against the naive map: at random, and with every operation as a fault.
+/// Sequences of operations in separate processes, compared with the naive map: random ones, and with a fault at every
+/// operation.
 mod map_life;
-/// The same sentences about every mapper: equal to the naive one, to the bit.
+/// The contract of all mappers: equal to the naive one, to the bit.
 mod mapper_contract;
-/// Random insert, query, eviction, flush, snapshot, revert, crash, reopen: always the naive map as of then.
+/// Random inserts, queries, evictions, flushes, snapshots, reverts, crashes and reopens, compared with the naive map.
 mod model;
-/// What the OctoCache paper says, where it can be tried.
+/// Claims of the OctoCache paper.
 mod octocache;
-/// OctoMap's own files, to the last node and byte.
+/// OctoMap's own files, compared node by node and byte by byte.
 mod octomap_files;
-/// Octree files of maps beyond memory: those of the whole tree, to the byte.
+/// Octree files of maps larger than memory, compared with those of the whole tree.
 mod octree_export;
-/// What is done with whole maps: made, merged, cropped, cleared, faded.
+/// Operations on whole maps.
 mod operations;
 /// Maps opened and created by options.
 mod options;
-/// Queries against brute force.
+/// Queries compared with brute force.
 mod queries;
-/// Scans from files, good and bad.
+/// Scans from valid and invalid files.
 mod readers;
-/// How often a remap reads the list of kept scans.
+/// Number of reads of the list of kept scans in a remap.
 mod remap_reads;
-/// Maps that follow their scans: what is refused, reported and left alone.
+/// Errors and reports of remaps and removals.
 mod remapping;
 mod remapping_beside;
 mod remapping_changed;
-/// The list of scans that a map keeps.
+/// The list of scans of a map.
 mod scan_list;
-/// The stream of scans, in files and from standard input.
+/// Scan streams in files and from standard input.
 mod scan_stream;
 mod scans_together;
-/// The names of snapshots: in their files, and in the log.
+/// Names of snapshots in their files and in the log.
 mod snapshot_names;
-/// Snapshots, reverts and diffs against naive ones; their damage and repair.
+/// Snapshots, reverts and diffs compared with naive ones; damage and repair.
 mod snapshots;
-/// Numbers that are large, negative or on a border.
+/// Large and negative coordinates, and coordinates on borders.
 mod space;
-/// Files of a map: what a flush leaves, what damage is told, what is never overwritten.
+/// Files of a map: flushes, damage, locks.
 mod store;
-/// Scans that count in some tiles only, and maps of a region.
+/// Scans restricted to some tiles, and maps of a region.
 mod tile_selection;
-/// Drives that a cache of tiles likes and some that it does not.
+/// Trajectories that are easy or hard for a cache of tiles.
 mod trajectories;
-/// Files that the medium does not give back.
+/// Unreadable files.
 mod unreadable;
-/// Voxel caches in every mode: the same map and coarse answers, and counts as a naive cache has them.
+/// Voxel caches in every mode, compared with naive ones.
 mod voxel_cache;
 mod wide_scans;

@@ -1,5 +1,5 @@
-//! Lives of maps in processes of their own, against the naive map: undisturbed ones at random, and some of which every
-//! operation fails or is the last.
+//! Sequences of operations in separate processes, compared with the naive map: undisturbed random ones, and some with a
+//! fault or a crash at every operation.
 
 use crate::harness::{
     Act, EVERY_CRASH, Left, Life, Subject, at, check_files, config, faults, keeping_scans, map, perform,
@@ -13,7 +13,7 @@ use voxtile::sensor::{Iwlo, SensorModel};
 use voxtile::store::TileStore;
 use voxtile::{Aabb, InsertMode, MapQueries, MapReader};
 
-/// Tiles are removed and come again, and at the end all of them are removed.
+/// Tiles are removed and created again, and at the end all are removed.
 fn removals() -> Life {
     let acts = vec![
         Act::Scans(0..3),
@@ -26,7 +26,7 @@ fn removals() -> Life {
     Life::new(config(), acts)
 }
 
-/// Snapshots that share tiles, of tiles that are removed, and again; reverts to each; and none at the end.
+/// Snapshots that share tiles, of removed and new tiles; reverts to each; none at the end.
 fn snapshots() -> Life {
     let acts = vec![
         Act::Scans(0..2),
@@ -43,7 +43,7 @@ fn snapshots() -> Life {
         Act::Delete("b"),
         Act::Scans(5..6),
         Act::Delete("c"),
-        // Nothing that it sees has changed until it is gone.
+        // The map does not change during the life of this snapshot.
         Act::Snapshot("d"),
         Act::Delete("d"),
         Act::Scans(6..8),
@@ -51,7 +51,7 @@ fn snapshots() -> Life {
     Life::new(config(), acts)
 }
 
-/// Scans are moved and removed, before a snapshot and after.
+/// Scans are moved and removed, before and after a snapshot.
 fn replays() -> Life {
     let acts = vec![
         Act::Scans(0..5),
@@ -78,16 +78,16 @@ fn every_operation_fails(life: &Life, one_in: u64) {
     sweep(life, faults(life, &[Fault::Fails], one_in), &[Left::Killed]);
 }
 
-fn the_power_goes(life: &Life, one_in: u64) {
+fn check_power_cuts(life: &Life, one_in: u64) {
     sweep(life, faults(life, &[Fault::Crashes], one_in), &EVERY_CRASH);
 }
 
-fn the_power_goes_after_a_kill(life: &Life, one_in: u64) {
+fn check_power_cuts_after_kills(life: &Life, one_in: u64) {
     sweep_after_kills(life, one_in, |at| vec![0, 1, 2, 3, 5, at % 17, 7 + at % 29]);
 }
 
 #[test]
-fn an_operation_fails_and_the_next_process_goes_on() {
+fn the_next_process_continues_after_a_failed_operation() {
     every_operation_fails(&removals(), 8);
     every_operation_fails(&snapshots(), 32);
     every_operation_fails(&snapshots().without_links(), 48);
@@ -95,30 +95,30 @@ fn an_operation_fails_and_the_next_process_goes_on() {
 }
 
 #[test]
-fn the_power_goes_at_every_change_of_removals() {
-    the_power_goes(&removals(), 8);
+fn power_cuts_at_every_change_of_removals() {
+    check_power_cuts(&removals(), 8);
 }
 
 #[test]
-fn the_power_goes_at_every_change_of_snapshots() {
-    the_power_goes(&snapshots(), 16);
+fn power_cuts_at_every_change_of_snapshots() {
+    check_power_cuts(&snapshots(), 16);
 }
 
 #[test]
-fn the_power_goes_at_every_change_of_snapshots_where_files_have_one_name() {
-    the_power_goes(&snapshots().without_links(), 24);
+fn power_cuts_at_every_change_of_snapshots_without_hard_links() {
+    check_power_cuts(&snapshots().without_links(), 24);
 }
 
 #[test]
-fn the_power_goes_at_every_change_of_replays() {
-    the_power_goes(&replays(), 48);
+fn power_cuts_at_every_change_of_replays() {
+    check_power_cuts(&replays(), 48);
 }
 
 #[test]
-fn the_power_goes_some_time_after_a_kill() {
-    the_power_goes_after_a_kill(&removals(), 16);
-    the_power_goes_after_a_kill(&snapshots(), 64);
-    the_power_goes_after_a_kill(&replays(), 192);
+fn power_cuts_some_time_after_a_kill() {
+    check_power_cuts_after_kills(&removals(), 16);
+    check_power_cuts_after_kills(&snapshots(), 64);
+    check_power_cuts_after_kills(&replays(), 192);
 }
 
 fn random_acts(random: &mut Random) -> Vec<Act> {
@@ -156,7 +156,7 @@ fn random_acts(random: &mut Random) -> Vec<Act> {
 }
 
 #[test]
-fn random_lives_are_the_naive_map_of_the_scans_that_are_left() {
+fn random_lives_equal_the_naive_map_of_the_remaining_scans() {
     let mut configs = Vec::new();
     for sensor_model in [SensorModel::default(), SensorModel::Iwlo(Iwlo::default())] {
         for insert_mode in [InsertMode::PerScan, InsertMode::PerRay] {
@@ -175,9 +175,9 @@ fn random_lives_are_the_naive_map_of_the_scans_that_are_left() {
     }
 }
 
-/// A reader from before goes on seeing what was removed.
+/// An open reader continues to see removed tiles.
 #[test]
-fn a_reader_goes_on_seeing_removed_tiles() {
+fn an_open_reader_sees_removed_tiles() {
     let (life, disk) = (removals(), FaultyDisk::new(Fault::None));
     for (number, act) in life.acts.iter().enumerate() {
         let reader = MapReader::open(at(&disk), 0);
@@ -190,9 +190,9 @@ fn a_reader_goes_on_seeing_removed_tiles() {
     }
 }
 
-/// What is staged and not committed leaves the map as it was.
+/// A staged removal without a commit does not change the map.
 #[test]
-fn a_removal_counts_from_the_commit_on() {
+fn a_removal_takes_effect_with_the_commit() {
     let (life, disk) = (removals(), FaultyDisk::new(Fault::None));
     perform(&disk, &life.config, &life.states[0], &life.acts[0]).unwrap();
     let mut store = TileStore::open(disk.shared(), map()).unwrap();

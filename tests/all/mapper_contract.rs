@@ -11,7 +11,7 @@ use voxtile::space::{TileIndex, VoxelKey};
 use voxtile::{InsertMode, MapConfig, MapPath, Storage, VoxelCacheConfig, VoxelCacheMode};
 use voxtile_simulation::Survey;
 
-/// Small tiles, so that a scan of a few metres touches many.
+/// Small tiles, so that a scan of a few metres touches several.
 fn config() -> MapConfig {
     MapConfig::new(0.1, 1.6).unwrap()
 }
@@ -27,7 +27,7 @@ fn configs() -> Vec<MapConfig> {
     configs
 }
 
-/// A seeded drive: scans and batches, revisits included.
+/// Inserts the scans and batches of a seeded drive with revisits.
 fn drive(mapper: &mut impl Mapper, reference: &mut ReferenceMap, seed: u64, steps: usize) {
     let mut random = Random(seed);
     for step in 0..steps {
@@ -87,7 +87,7 @@ fn out_of_core_equals_the_naive_map_for_any_cache_and_after_flush_and_reopen() {
             assert_eq!(voxels_of(&mapper), reference.voxels, "before flush");
             assert!(mapper.cached_tile_indices().len() <= cache_tiles);
             if cache_tiles == 3 {
-                // Updates are waiting for tiles on disk here.
+                // Updates wait for tiles on disk.
                 assert_coarse_answers_are_maxima(&mapper);
             }
             let unsaved = mapper.digest().unwrap();
@@ -120,9 +120,9 @@ fn out_of_core_equals_the_naive_map_for_any_cache_and_after_flush_and_reopen() {
     }
 }
 
-/// Rays that leave the window around the sensor, in which nearly all are marked.
+/// Rays that leave the window around the sensor.
 #[test]
-fn stray_points_far_away_are_mapped_like_others() {
+fn very_distant_points_are_mapped_like_others() {
     for mode in [InsertMode::PerScan, InsertMode::PerRay] {
         let config = MapConfig::new(0.1, 10.0).unwrap().with_insert_mode(mode);
         let mut scan = random_scan(&mut Random(5), [0.05, 0.0, 1.0], 50);
@@ -138,9 +138,9 @@ fn stray_points_far_away_are_mapped_like_others() {
     }
 }
 
-/// Enough rays that every thread gets some, and in all forms in which rays count.
+/// Enough rays for several threads, in all modes.
 #[test]
-fn the_answer_does_not_depend_on_the_number_of_threads() {
+fn maps_do_not_depend_on_the_number_of_threads() {
     let scans: Vec<_> = Survey::street(3).take(2).collect();
     for mode in [InsertMode::PerScan, InsertMode::PerRay] {
         for model in [SensorModel::default(), SensorModel::Iwlo(Iwlo::default())] {
@@ -205,11 +205,11 @@ fn assert_coarse_answers_are_maxima(view: &impl MapView) {
         }
         for (node, max) in maxima.into_iter().step_by(7) {
             let first = node.map(|index| index << (16 - depth));
-            // Any voxel of the node will do, known or not.
+            // Any voxel of the node, known or unknown.
             let point = view.config().grid.center_m(first.map(|index| index + (1 << (16 - depth)) / 2));
             let answer = view.occupancy_at_depth(point, depth as u8).unwrap().probability();
             if depth == 16 {
-                // The voxel itself, as exact as it is.
+                // At the finest depth, the exact voxel.
                 assert_eq!(answer, view.occupancy_at(point).unwrap().probability(), "node {node:?}");
                 continue;
             }
@@ -219,7 +219,7 @@ fn assert_coarse_answers_are_maxima(view: &impl MapView) {
 }
 
 #[test]
-fn a_refused_call_changes_nothing_and_uses_no_number() {
+fn a_failed_call_changes_nothing_and_uses_no_scan_number() {
     let config = config().with_sensor_model(SensorModel::Iwlo(Iwlo::default()));
     let mut mapper = InMemoryMapper::new(config).unwrap();
     let mut random = Random(1);
@@ -261,7 +261,7 @@ fn every_cause_of_a_skipped_point_is_counted() {
 }
 
 #[test]
-fn an_echo_without_weight_is_no_evidence_for_its_voxel() {
+fn an_echo_without_weight_does_not_update_its_voxel() {
     let config = config().with_sensor_model(SensorModel::Iwlo(Iwlo::default()));
     let mut mapper = InMemoryMapper::new(config).unwrap();
     let scan =
@@ -272,7 +272,7 @@ fn an_echo_without_weight_is_no_evidence_for_its_voxel() {
 }
 
 #[test]
-fn dirty_tiles_and_saved_tiles_are_told() {
+fn dirty_and_saved_tiles_are_reported() {
     let folder = memory_folder();
     let config = config().with_cache_tiles(2);
     let mut mapper = OutOfCoreTileMapper::create(folder.path().join("map"), config).unwrap();
@@ -296,7 +296,7 @@ fn dirty_tiles_and_saved_tiles_are_told() {
 }
 
 #[test]
-fn tiles_in_use_stay_and_others_leave() {
+fn tiles_in_use_are_not_evicted() {
     let folder = memory_folder();
     let config = config().with_cache_tiles(2);
     let mut mapper =
@@ -311,7 +311,7 @@ fn tiles_in_use_stay_and_others_leave() {
         assert_eq!(mapper.tile(tile(x)).unwrap().unwrap().table().len(), 1);
     }
     assert_eq!(mapper.cached_tile_indices(), [tile(0), tile(4)]);
-    // With every tile in use, one more comes on top.
+    // All tiles are in use, so the cache exceeds its limit by one.
     let others = [mapper.tile(tile(4)).unwrap(), mapper.tile(tile(3)).unwrap()];
     assert_eq!(mapper.cached_tile_indices().len(), 3);
     assert_eq!((held.table().len(), others.len()), (1, 2));

@@ -1,4 +1,4 @@
-//! Random lives of a mapper beside the naive map, which is set back to the last flush where the process ends.
+//! Random lives of a mapper compared with the naive map, which is reset to the last flush after a crash.
 
 use crate::harness::name;
 use std::collections::BTreeMap;
@@ -20,7 +20,7 @@ use voxtile::{
 /// Voxels, and the number of scans.
 type Content = (Voxels, u64);
 
-/// One random life of a map.
+/// Runs one random life of a map.
 fn live(seed: u64, config: &MapConfig) {
     let folder = memory_folder();
     let path = folder.path().join("map");
@@ -35,7 +35,7 @@ fn live(seed: u64, config: &MapConfig) {
     };
     let (mut scans, mut flushed) = (0, Content::default());
     let mut kept: BTreeMap<&str, Content> = BTreeMap::new();
-    // As of the flush that goes on beside what comes next.
+    // Content at the start of the background flush.
     let mut begun: Option<Content> = None;
     for step in 0..80 {
         let what = format!("seed {seed}, step {step}");
@@ -75,9 +75,9 @@ fn live(seed: u64, config: &MapConfig) {
                 kept.insert(snapshot, flushed.clone());
             }
             choice => {
-                // Whatever was evicted since the last flush is on disk, and must not count.
+                // Tiles evicted since the last flush are on disk, but must not count.
                 drop(mapper);
-                // What was begun is finished.
+                // A background flush is completed.
                 flushed = begun.take().unwrap_or(flushed);
                 match choice {
                     12 => {
@@ -131,7 +131,7 @@ fn check_snapshots(path: &Path, kept: &BTreeMap<&str, Content>, what: &str) {
 }
 
 #[test]
-fn any_life_of_a_map_equals_the_naive_map_as_of_then() {
+fn random_lives_of_a_map_equal_the_naive_map() {
     let config = MapConfig::new(0.2, 1.6).unwrap();
     for seed in 0..cases(8, 60) {
         let mode = if seed % 3 == 0 { InsertMode::PerRay } else { InsertMode::PerScan };
@@ -147,7 +147,7 @@ fn any_life_of_a_map_equals_the_naive_map_as_of_then() {
             config = config.with_storage(Storage::Compact);
         }
         live(seed, &config);
-        // From nothing but what a scan needs to a few of the map's tiles.
+        // From the minimum for a scan to a few tiles of the map.
         let bytes = [0, 3_000, 30_000, 100_000, 300_000][seed as usize % 5];
         live(seed, &config.with_tight_memory_bytes(bytes));
     }

@@ -1,4 +1,4 @@
-//! What the OctoCache paper says of update order.
+//! Claims of the OctoCache paper about the order of updates.
 
 use std::collections::BTreeSet;
 use testkit::random_scans::Random;
@@ -7,21 +7,21 @@ use voxtile::space::MortonCode;
 /// A leaf of a small octree: its child numbers from the root down.
 type Leaf = Vec<u8>;
 
-/// Steps from a leaf up to the lowest common ancestor, and from there down to another.
+/// Steps from a leaf up to the lowest common ancestor with another leaf, and down to that.
 fn distance(a: &Leaf, b: &Leaf) -> usize {
     let common = a.iter().zip(b).take_while(|(a, b)| a == b).count();
     (a.len() - common) + (b.len() - common)
 }
 
-/// The paper's F, the sum over neighbors in the sequence, and the ways from the root to the first and back from the
-/// last: these are the same for every order where all leaves are at one depth. Without them a pruned tree would reward
-/// an order for ending deep down.
+/// The paper's F, the sum over neighbors in the sequence, plus the paths from the root to the first leaf and from the
+/// last one back. With all leaves at one depth this is a constant; in a pruned tree, an order could otherwise save cost
+/// by ending at a deep leaf.
 fn cost(sequence: &[&Leaf]) -> usize {
     let ends = [sequence.first(), sequence.last()].map(|leaf| leaf.map_or(0, |leaf| leaf.len()));
     sequence.windows(2).map(|pair| distance(pair[0], pair[1])).sum::<usize>() + ends[0] + ends[1]
 }
 
-/// The least cost of all orders of the leaves.
+/// Minimum cost over all orders of the leaves.
 fn least_cost(leaves: &mut Vec<&Leaf>, fixed: usize) -> usize {
     if fixed == leaves.len() {
         return cost(leaves);
@@ -35,17 +35,17 @@ fn least_cost(leaves: &mut Vec<&Leaf>, fixed: usize) -> usize {
     least
 }
 
-/// Theorem A.1, by trying every order: Morton order is a cheapest one. In trees whose leaves are all at one depth, and
-/// in pruned ones, where the order is that of a dictionary.
+/// Theorem A.1, checked by trying every order: Morton order has minimum cost. Covers trees with all leaves at one
+/// depth, and pruned trees, where the order is lexicographic.
 #[test]
-fn morton_order_is_a_cheapest_order_of_updates() {
+fn morton_order_has_the_minimum_cost_of_updates() {
     let mut random = Random(11);
     for round in 0..200 {
         let is_pruned = round % 2 == 1;
         let mut leaves: BTreeSet<Leaf> = BTreeSet::new();
         while leaves.len() < 7 {
             let depth = if is_pruned { 1 + random.below(4) } else { 4 };
-            // Few children, so that leaves have ancestors in common.
+            // Few distinct children, so that leaves share ancestors.
             let leaf: Leaf = (0..depth).map(|_| random.below(3) as u8 * 3).collect();
             let is_apart = leaves.iter().all(|other| !other.starts_with(&leaf) && !leaf.starts_with(other));
             if is_apart {
@@ -56,7 +56,7 @@ fn morton_order_is_a_cheapest_order_of_updates() {
         }
         let mut in_morton_order: Vec<&Leaf> = leaves.iter().collect();
         if !is_pruned {
-            // The codes that voxels have, by way of their keys.
+            // Morton codes as voxels have them, computed from keys.
             let code = |leaf: &Leaf| leaf.iter().fold(0, |code, child| code << 3 | u64::from(*child));
             in_morton_order.sort_by_key(|leaf| MortonCode(code(leaf)).to_key().morton());
         }

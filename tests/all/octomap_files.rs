@@ -1,4 +1,4 @@
-//! OctoMap's `.bt` and `.ot` files: real maps, bytes written by hand, and bytes that are no map.
+//! OctoMap's `.bt` and `.ot` files: real maps, bytes written by hand, and invalid bytes.
 
 use proptest::prelude::*;
 use std::path::PathBuf;
@@ -41,8 +41,8 @@ fn refusal(bytes: &[u8]) -> (u64, String) {
     }
 }
 
-/// Maps that OctoMap wrote: small ones of our own (`tools/octomap_oracle/fixtures.cpp`), and large ones of others where
-/// they are.
+/// Maps that OctoMap wrote: small ones of our own (`tools/octomap_oracle/fixtures.cpp`), and large public ones if they
+/// are available.
 fn maps_of_octomap() -> Vec<PathBuf> {
     let is_map =
         |path: &PathBuf| path.extension().is_some_and(|extension| extension == "bt" || extension == "ot");
@@ -116,7 +116,7 @@ fn maps_of_octomap_are_normal_trees_that_grow_again_from_their_leaves() {
 }
 
 #[test]
-fn geb079_has_the_numbers_that_octomap_counts() {
+fn geb079_has_the_counts_of_octomap() {
     let Some(path) = shared_data("octomap_maps").map(|folder| folder.join("geb079.bt")) else { return };
     let file = read_bt(std::fs::read(path).unwrap().as_slice()).unwrap();
     assert_eq!((file.tree.node_count(), file.tree.leaf_count()), (532_566, 428_144));
@@ -145,7 +145,7 @@ fn a_tiny_tree_has_these_bytes() {
 }
 
 #[test]
-fn writing_bt_prunes_by_state_and_leaves_the_tree_alone() {
+fn writing_bt_prunes_by_state_and_does_not_change_the_tree() {
     let tree = Octree::from_sorted((0..64).map(|i| (MortonCode(i), 1.0 + i as f32)));
     assert_eq!((tree.node_count(), tree.leaf_count()), (15 + 8 + 64, 64));
     let bytes = written_bt(&tree, 0.1);
@@ -166,11 +166,11 @@ fn writing_bt_prunes_by_state_and_leaves_the_tree_alone() {
 
 #[test]
 fn writing_bt_stops_pruning_where_octomap_does() {
-    // Eight cubes of eight voxels. OctoMap finds nothing to prune among the voxels and looks no further up.
+    // Eight cubes of eight voxels. OctoMap finds nothing to prune among the voxels and stops there.
     let cubes = Octree::from_sorted((0..64).map(|i| (MortonCode(i), 1.0 + (i / 8) as f32)));
     assert_eq!(read(written_bt(&cubes, 0.1).as_slice()).unwrap().tree.node_count(), 15 + 8);
 
-    // One more cube that is pruned, and the eight are too.
+    // With one more cube that can be pruned, the eight are pruned too.
     let mut tree = cubes.clone();
     tree.write_sorted(&std::array::from_fn::<_, 8, _>(|i| (MortonCode(512 + i as u64), -1.0 - i as f32)));
     let pruned = read(written_bt(&tree, 0.1).as_slice()).unwrap().tree;
@@ -179,7 +179,7 @@ fn writing_bt_stops_pruning_where_octomap_does() {
 }
 
 #[test]
-fn a_root_alone_is_a_whole_occupied_world() {
+fn a_lone_occupied_root_covers_all_space() {
     let bytes = bt_file("id OcTree\nsize 1\nres 0.1", &[0, 0]);
     let mut tree = read(bytes.as_slice()).unwrap().tree;
     assert_eq!(tree.expanded_leaf_count(), 1 << 48);
@@ -191,7 +191,7 @@ fn a_root_alone_is_a_whole_occupied_world() {
 }
 
 #[test]
-fn the_header_may_be_in_any_order_and_say_more() {
+fn the_header_may_have_any_order_and_unknown_fields() {
     let nodes = [[0x80, 0x00].as_slice(), &[0x00, 0x00]].concat();
     for header in [
         "id 1\nsize 2\nres 0.1\ndata\n",
@@ -230,7 +230,7 @@ fn a_colored_tree_is_read_without_its_colors() {
 }
 
 #[test]
-fn what_a_file_says_is_kept_even_where_it_is_no_normal_tree() {
+fn trees_of_files_are_kept_even_if_they_are_not_normal() {
     let node = |value: f32, mask| [value.to_le_bytes().as_slice(), &[mask]].concat();
     let payload = [node(-7.0, 0xff), node(0.5, 0).repeat(8)].concat();
     let bytes = ot_file("id OcTree\nsize 9\nres 0.1", &payload);
@@ -242,7 +242,7 @@ fn what_a_file_says_is_kept_even_where_it_is_no_normal_tree() {
 }
 
 #[test]
-fn what_follows_the_last_node_stays_in_the_stream() {
+fn bytes_after_the_last_node_are_not_consumed() {
     let tree = Octree::from_sorted([voxel(3, 4, 5, 1.0)]);
     for mut bytes in [written_bt(&tree, 0.1), written_ot(&tree, 0.1)] {
         bytes.extend(b"more");
@@ -253,7 +253,7 @@ fn what_follows_the_last_node_stays_in_the_stream() {
 }
 
 #[test]
-fn wrong_files_are_refused_with_their_offset() {
+fn invalid_files_are_errors_with_an_offset() {
     let header = "id OcTree\nsize 2\nres 0.1";
     let begin = bt_file(header, &[]).len() as u64;
     let ot_begin = ot_file("id OcTree\nres 1", &[]).len() as u64;
@@ -286,7 +286,7 @@ fn wrong_files_are_refused_with_their_offset() {
 }
 
 #[test]
-fn a_resolution_that_is_no_length_is_not_written() {
+fn an_invalid_resolution_is_not_written() {
     for resolution_m in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         assert!(write_bt(&Octree::new(), resolution_m, 0.0, &mut Vec::new()).is_err());
         assert!(write_ot(&Octree::new(), resolution_m, &mut Vec::new()).is_err());
@@ -304,7 +304,7 @@ fn memory_has_a_limit() {
     }
 }
 
-/// Bytes of a valid file, with some of them changed, cut off or put in.
+/// Bytes of a valid file, with some of them changed, removed or inserted.
 fn damaged_file() -> impl Strategy<Value = Vec<u8>> {
     let voxels = prop::collection::btree_map(0..600_u64, prop_oneof![Just(1.0_f32), Just(-1.0)], 0..200);
     let damage = prop::collection::vec((any::<prop::sample::Index>(), any::<u8>(), 0..3), 0..4);
@@ -338,7 +338,7 @@ proptest! {
     }
 
     #[test]
-    fn bytes_of_no_kind_give_a_tree_or_an_error(
+    fn random_bytes_give_a_tree_or_an_error(
         is_bt in any::<bool>(), nodes in any::<u64>(), payload in prop::collection::vec(any::<u8>(), 0..200),
     ) {
         let _ = read(payload.as_slice());
@@ -348,7 +348,7 @@ proptest! {
     }
 
     #[test]
-    fn every_tree_comes_back_from_ot_with_every_bit(
+    fn a_round_trip_through_ot_keeps_every_bit(
         voxels in prop::collection::btree_map(0..MortonCode::END, -4.0..4.0_f32, 0..100),
     ) {
         let tree = Octree::from_sorted(voxels.into_iter().map(|(code, value)| (MortonCode(code), value)));

@@ -13,7 +13,7 @@ use voxtile::{Error, InMemoryMapper, MapConfig, MapQueries, MapReader, Mapper, R
 
 const FORMATS: [OctreeFormat; 2] = [OctreeFormat::Bt, OctreeFormat::Ot];
 
-/// What is written from the tree in memory.
+/// Returns the file of the tree in memory.
 fn whole(map: &impl MapQueries, format: OctreeFormat, region: Option<&Aabb>) -> Vec<u8> {
     let tree = map.merged_octree(region, u64::MAX).unwrap();
     let (config, mut bytes) = (map.config(), Vec::new());
@@ -33,14 +33,14 @@ fn streamed(
     memory_bytes: usize,
 ) -> std::result::Result<(u64, Vec<u8>), Box<dyn std::error::Error>> {
     let mut bytes = Vec::new();
-    // What an earlier attempt left in a spool does no harm.
+    // The spool contains remains of an earlier attempt.
     let mut spool = Cursor::new(vec![7; 100]);
     let export = OctreeExport { format, region, origin: [0; 3], memory_bytes };
     let voxels = map.write_octree::<Box<dyn std::error::Error>>(&export, &mut spool, &mut bytes)?;
     Ok((voxels, bytes))
 }
 
-/// The streamed files of a map are those of its whole tree, with any memory.
+/// Compares the streamed files of a map with those of its whole tree, with any memory.
 fn check(map: &impl MapQueries, region: Option<&Aabb>) {
     let mut count = 0;
     match region {
@@ -58,7 +58,7 @@ fn check(map: &impl MapQueries, region: Option<&Aabb>) {
 }
 
 fn config() -> MapConfig {
-    // Tiles of 11 voxels: none begins where a brick does.
+    // Tiles of 11 voxels: no tile is aligned with a brick.
     MapConfig::new(0.1, 1.1).unwrap().with_range(0.0, 5.0)
 }
 
@@ -77,7 +77,7 @@ fn the_file_of_a_map_is_that_of_its_whole_tree() {
 }
 
 #[test]
-fn dirty_tiles_and_waiting_updates_are_in_the_file_and_the_tiles_in_memory_stay() {
+fn an_export_includes_unsaved_updates_and_evicts_no_tile() {
     let folder = TempDir::new().unwrap();
     let mut random = Random(32);
     let small = config().with_cache_tiles(60);
@@ -129,7 +129,7 @@ fn single_voxels_and_cubes_that_are_pruned_whole() {
         update(&mut map, [(voxel, 1)]);
         check(&map, None);
     }
-    // Of one value, over several tiles and several blocks; and one voxel that is not.
+    // Cubes of one value over several tiles and blocks, and a single other voxel.
     let mut map = InMemoryMapper::new(config()).unwrap();
     update(&mut map, cube([-32, 0, -32], 32).map(|voxel| (voxel, 1)));
     check(&map, None);
@@ -138,8 +138,8 @@ fn single_voxels_and_cubes_that_are_pruned_whole() {
 }
 
 #[test]
-fn a_file_is_pruned_no_further_than_octomap_gets() {
-    // Cubes of 2 voxels with a value each: nothing to prune among voxels, where OctoMap begins, but something above.
+fn a_file_is_pruned_as_far_as_by_octomap() {
+    // Cubes of 2 voxels with one value each: nothing to prune among voxels, where OctoMap begins, but something above.
     let mut map = InMemoryMapper::new(config()).unwrap();
     let value = |voxel: [i32; 3]| {
         1 + voxel.iter().zip([1, 2, 4]).map(|(k, bit)| (k >> 1 & 1) as u32 * bit).sum::<u32>()
@@ -148,13 +148,13 @@ fn a_file_is_pruned_no_further_than_octomap_gets() {
         update(&mut map, cube(min, 4).map(|voxel| (voxel, value(voxel).min(6))));
     }
     check(&map, None);
-    // And once OctoMap finds something among voxels, all of it goes.
+    // Once OctoMap finds something to prune among voxels, it prunes everything.
     update(&mut map, cube([64; 3], 2).map(|voxel| (voxel, 1 + (voxel[0] & 1) as u32)));
     check(&map, None);
 }
 
 #[test]
-fn voxels_that_octomap_has_no_key_for_are_an_error_before_anything_is_written() {
+fn voxels_beyond_octomaps_keys_are_an_error_without_output() {
     let mut map = InMemoryMapper::new(config()).unwrap();
     update(&mut map, [([32768, 0, 0], 1), ([32767, 0, 0], 1), ([3, 4, 5], 1)]);
     for format in FORMATS {
@@ -174,7 +174,7 @@ fn a_file_with_an_origin_is_that_of_the_map_moved_by_whole_voxels() {
     let far = [63_781_370, -41_820_013, 1_003];
     for shift in [[8, -16, 4_096], [1, 0, -3], far, [2_000_000_000, -2_000_000_000, 17], [0, 0, 40_000]] {
         let mut voxels: BTreeMap<[i32; 3], u32> = BTreeMap::new();
-        // Random voxels, a cube that is pruned whole where it lies now, and one that is where it lies then.
+        // Random voxels, a cube that can be pruned at its old position, and one that can be pruned at its new position.
         for _ in 0..400 {
             voxels.insert(std::array::from_fn(|_| random.below(60) as i32 - 30), 1 + random.below(3) as u32);
         }
@@ -201,7 +201,7 @@ fn a_file_with_an_origin_is_that_of_the_map_moved_by_whole_voxels() {
     }
 }
 
-/// Any division of a tree into blocks gives the bytes of the tree.
+/// Any division of a tree into blocks gives the same bytes.
 #[test]
 fn blocks_of_any_size_are_the_whole_tree() {
     let mut random = Random(33);
@@ -245,7 +245,7 @@ fn in_blocks(voxels: &BTreeMap<MortonCode, f32>, format: OctreeFormat, seed: u64
             StreamOutcome::Again(further) => pruning = further,
         }
     }
-    panic!("a stream that was told how far to prune is written");
+    panic!("a stream with a known depth of pruning is written");
 }
 
 fn add_blocks(
@@ -279,7 +279,7 @@ fn add_blocks(
     stream.add_block(first, depth, &mut values).unwrap();
 }
 
-/// A tile that cannot be read is told, and nothing is written.
+/// An unreadable tile is an error, and no output is written.
 #[test]
 fn a_damaged_tile_ends_the_export() -> Result<()> {
     let folder = TempDir::new().unwrap();

@@ -1,4 +1,4 @@
-//! Maps opened and created by options, and readers within bytes.
+//! Maps opened and created by options, and readers with a memory limit.
 
 use tempfile::TempDir;
 use testkit::faulty_disk::{Fault, FaultyDisk};
@@ -13,7 +13,7 @@ fn config() -> MapConfig {
 }
 
 #[test]
-fn options_create_only_what_they_are_told_to() {
+fn options_create_maps_only_on_request() {
     let folder = TempDir::new().unwrap();
     let place = folder.path().join("map");
     assert!(matches!(MapOptions::new().open(&place), Err(Error::NoMap { .. })));
@@ -29,7 +29,7 @@ fn options_create_only_what_they_are_told_to() {
     assert!(matches!(options.clone().create_new(true).open(&place), Err(Error::AlreadyExists { .. })));
     let other = MapOptions::new().config(MapConfig::new(0.1, 1.6).unwrap());
     assert!(matches!(other.create_if_missing(true).open(&place), Err(Error::Mismatch { .. })));
-    // Without a config the map knows how it was made.
+    // Without a configuration, the map's own is used.
     let mapper = MapOptions::new().memory_bytes(64 << 20).open(&place).unwrap();
     assert_eq!(mapper.config().grid, config().grid);
     assert_eq!(mapper.digest().unwrap(), digest);
@@ -54,7 +54,7 @@ fn a_map_is_opened_on_any_disk() {
 }
 
 #[test]
-fn a_reader_keeps_to_its_bytes_and_gives_the_same_answers() {
+fn a_reader_respects_its_memory_limit_and_gives_the_same_results() {
     const BYTES: usize = 200_000;
     let folder = TempDir::new().unwrap();
     let place = folder.path().join("map");
@@ -75,9 +75,9 @@ fn a_reader_keeps_to_its_bytes_and_gives_the_same_answers() {
     }
     assert!(all.statistics().cached.bytes() > 2 * BYTES as u64, "the map is larger than the limit");
     assert!((BYTES as u64 / 2..=BYTES as u64).contains(&most), "{most} bytes");
-    // It is the reader's alone: a map that is made with this configuration has another.
+    // The limit belongs to the reader: its configuration does not contain it.
     assert_eq!(small.config().memory, MemoryLimit::Default);
-    // One tile has room in any limit.
+    // Any limit has room for one tile.
     let least = MapOptions::new().memory_bytes(1).open_read_only(&place).unwrap();
     assert_eq!(least.digest().unwrap(), all.digest().unwrap());
     least.occupancy_at([0.0; 3]).unwrap();

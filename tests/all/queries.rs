@@ -15,12 +15,12 @@ use voxtile::{
     OutOfCoreTileMapper, Queries, Scan, Storage,
 };
 
-/// A map of ten voxels a tile, four tiles in memory and updates that wait.
+/// A map of ten voxels per tile edge, with four tiles in memory and a write buffer.
 pub fn config() -> MapConfig {
     MapConfig::new(0.1, 1.0).unwrap().with_cache_tiles(4).with_write_buffer_bytes(5_000)
 }
 
-/// The same map in memory and out of core with updates still waiting.
+/// The same map in memory, and out of core with waiting updates.
 fn maps(folder: &TempDir) -> (InMemoryMapper, OutOfCoreTileMapper) {
     let mut in_memory = InMemoryMapper::new(config()).unwrap();
     let path = folder.path().join("map");
@@ -50,7 +50,7 @@ fn rays_end_where_single_steps_end() {
         let direction = match number % 5 {
             0 => [0.0, -1.0, 0.0],
             1 => random.point([0.0; 3], 1.0),
-            // Few rays meet something by chance: aim at it.
+            // Few random rays hit anything, so aim at an occupied voxel.
             _ => {
                 let target = grid.center_m(occupied[random.below(occupied.len() as u64) as usize].index);
                 std::array::from_fn(|k| target[k] - origin[k])
@@ -85,7 +85,7 @@ fn rays_end_where_single_steps_end() {
 }
 
 #[test]
-fn rays_from_afar_end_where_single_steps_end() {
+fn rays_from_a_distance_end_where_single_steps_end() {
     let folder = TempDir::new().unwrap();
     let (map, out_of_core) = maps(&folder);
     let grid = map.config().grid;
@@ -105,7 +105,7 @@ fn rays_from_afar_end_where_single_steps_end() {
         let target = targets[random.below(targets.len() as u64) as usize];
         let mut direction = random.point([0.0; 3], 1.0);
         if number % 4 == 0 {
-            // Along an axis: the other two never cross.
+            // Along an axis: the ray never crosses borders of the other two.
             direction = std::array::from_fn(|k| f64::from(u8::from(k == number as usize % 3)));
         }
         let origin = std::array::from_fn(|k| grid.center_m(target)[k] - distance_m * direction[k]);
@@ -133,7 +133,7 @@ fn rays_from_afar_end_where_single_steps_end() {
         };
         assert_eq!(answer.map(|hit| (hit.voxel, hit.distance_m, hit.probability)), stopped);
         hits += u32::from(stopped.is_some());
-        // The same way, away from the map: nothing, and at once.
+        // The opposite direction, away from the map: no hit, and quickly.
         let away = RayQuery { direction: direction.map(|d| -d), ..query };
         if distance_m > 100.0 {
             assert_eq!(map.cast_ray(&away).unwrap(), None);
@@ -166,7 +166,7 @@ fn rays_along_the_ends_of_all_voxels() {
 }
 
 #[test]
-fn at_the_finest_depth_an_octree_answers_as_the_table_does() {
+fn an_octree_equals_the_table_at_the_finest_depth() {
     let folder = TempDir::new().unwrap();
     let (in_memory, mut out_of_core) = maps(&folder);
     out_of_core.flush().unwrap();
@@ -244,7 +244,7 @@ fn regions_collisions_and_nearest_are_those_of_a_search_of_every_voxel() {
     }
 }
 
-/// Sensor models under which one miss leads far down, hardly down, and up.
+/// Sensor models in which one miss lowers the log-odds much, hardly, or raises them.
 fn models() -> [SensorModel; 4] {
     let plain = LogOdds::default();
     [
@@ -274,7 +274,7 @@ fn occupied_voxels_of_a_map_on_disk_are_those_of_its_tables_in_their_order() {
         let grid = mapper.config().grid;
         let mut count = 0;
         for threads in [1, 5] {
-            // Some of the tiles in memory, others not.
+            // With some of the tiles in memory.
             let reader = MapReader::open(&path, 100_000).unwrap();
             reader.occupancy_at([0.0; 3]).unwrap();
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
@@ -306,7 +306,7 @@ fn occupied_voxels_of_a_map_on_disk_are_those_of_its_tables_in_their_order() {
     }
 }
 
-/// Asks a map about rays, nearest and occupied voxels, and looks at every voxel for the answers.
+/// Compares rays, nearest and occupied voxels with a search over all voxels.
 fn check_by_every_voxel(map: &impl MapView, random: &mut Random) {
     let (grid, occupied_from) = (map.config().grid, map.config().occupied_log_odds());
     let log_odds = |(bits, _): (u64, i32)| f64::from_bits(bits);
@@ -367,12 +367,12 @@ fn check_by_every_voxel(map: &impl MapView, random: &mut Random) {
 }
 
 #[test]
-fn free_space_is_passed_over_only_where_it_is_free() {
+fn rays_skip_only_free_space() {
     let mut random = Random(70);
     for (number, model) in models().into_iter().enumerate() {
         for threshold in [0.2, 0.4, 0.485, 0.4878, 0.5, 0.7, 0.95] {
             let folder = TempDir::new().unwrap();
-            // Tiles of three blocks of bricks along each side, and a part of one.
+            // Tiles of three blocks of bricks and a fraction along each edge.
             let mut config = MapConfig::new(0.1, 10.0).unwrap();
             (config.sensor_model, config.occupancy_threshold) = (model, threshold);
             config.rays.insert_mode = if number % 2 == 0 { InsertMode::PerScan } else { InsertMode::PerRay };
@@ -384,7 +384,7 @@ fn free_space_is_passed_over_only_where_it_is_free() {
                 let from = random.point([0.0; 3], 2.0);
                 mapper.insert_scan(&random_scan(&mut Random(seed), from, 60)).unwrap();
             }
-            // As it was made; with summaries of every brick; as it comes from disk.
+            // As built, with summaries of every brick, and as loaded from disk.
             check_by_every_voxel(&mapper, &mut random);
             mapper.flush().unwrap();
             check_by_every_voxel(&mapper, &mut random);
@@ -395,12 +395,12 @@ fn free_space_is_passed_over_only_where_it_is_free() {
 }
 
 #[test]
-fn many_points_are_answered_in_their_order() {
+fn results_of_many_points_are_in_their_order() {
     let folder = TempDir::new().unwrap();
     let (map, mut out_of_core) = maps(&folder);
     out_of_core.flush().unwrap();
     let mut random = Random(70);
-    // More of a tile than are answered at a time, and more than are grouped at a time.
+    // More points of a tile than are queried at a time, and more than are grouped at a time.
     let mut points: Vec<_> = (0..70_000).map(|_| random.point([0.0; 3], 4.0)).collect();
     points[7] = [f64::NAN; 3];
     points[8] = [1e300, 0.0, 0.0];
@@ -451,7 +451,7 @@ fn the_merged_octree_holds_every_voxel_and_refuses_what_octomap_cannot_address()
 }
 
 #[test]
-fn wrong_questions_are_told_what_is_wrong() {
+fn invalid_queries_are_errors_with_a_reason() {
     let map = InMemoryMapper::new(config()).unwrap();
     let query =
         RayQuery { origin: [0.0; 3], direction: [0.0; 3], max_range_m: None, unknown: UnknownAs::Free };
@@ -479,7 +479,7 @@ fn wrong_questions_are_told_what_is_wrong() {
 #[test]
 fn a_ray_that_hardly_moves_along_an_axis_ends_and_meets_what_is_ahead() {
     let mut map = InMemoryMapper::new(config()).unwrap();
-    // A wall in front of a sensor that is on voxel borders: what leaves them downwards is below.
+    // A wall in front of a sensor on a border of voxels: rays that leave it downwards pass below.
     let wall = (-5..5).map(|y| [2.05, 0.1 * f64::from(y) + 0.05, 0.05]).collect();
     map.insert_scan(&Scan { origin: [0.05, 0.05, 0.05], points: wall, intensities: None }).unwrap();
     for slow in [-1e-310, -f64::from_bits(1), 1e-310, -1e-300] {
@@ -503,11 +503,11 @@ fn a_ray_that_hardly_moves_along_an_axis_ends_and_meets_what_is_ahead() {
 }
 
 #[test]
-fn the_nearest_voxel_of_a_map_without_any_is_looked_for_once() {
+fn nearest_loads_each_tile_of_free_space_once() {
     let folder = TempDir::new().unwrap();
     let config = config().with_range(0.0, 30.0).with_cache_tiles(1);
     let mut map = OutOfCoreTileMapper::create(folder.path().join("map"), config).unwrap();
-    // Free space alone.
+    // Only free space.
     let scan = Scan { origin: [0.05; 3], points: vec![[100.0, 0.05, 0.05]], intensities: None };
     map.insert_scan(&scan).unwrap();
     map.flush().unwrap();
@@ -518,7 +518,7 @@ fn the_nearest_voxel_of_a_map_without_any_is_looked_for_once() {
 }
 
 #[test]
-fn a_tile_that_a_pruned_cube_fills_fits_into_memory() {
+fn a_tile_filled_by_a_pruned_cube_fits_into_memory() {
     // One leaf of 2^45 voxels, below the root.
     let header = "# Octomap OcTree binary file\nid OcTree\nsize 2\nres 0.01\ndata\n";
     let file = [header.as_bytes(), &[1, 0]].concat();
@@ -528,7 +528,7 @@ fn a_tile_that_a_pruned_cube_fills_fits_into_memory() {
     assert!(matches!(map.occupancy_at([1.0; 3]).unwrap(), Occupancy::Unknown));
 }
 
-/// What is known of columns, by every voxel of the map.
+/// Computes columns from every voxel of the map.
 fn naive_columns(map: &impl MapView, region: &Aabb, heights_m: [f64; 2]) -> BTreeMap<[i32; 2], Column> {
     let (grid, occupied_from) = (map.config().grid, map.config().occupied_log_odds());
     let half_m = 0.5 * grid.resolution_m();
@@ -558,7 +558,7 @@ fn columns_from_above_are_those_of_every_voxel() {
         let corner = random.point([0.0; 3], 4.0);
         let region = match number {
             0 => Aabb { min: [f64::NEG_INFINITY; 3], max: [f64::INFINITY; 3] },
-            // Borders through centers.
+            // Borders through voxel centers.
             1..10 => Aabb { min: [-1.05, -0.95, -2.05], max: [1.05, 1.15, 0.05] },
             _ => Aabb { min: corner, max: corner.map(|at| at + reach_m) },
         };

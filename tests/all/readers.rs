@@ -136,7 +136,7 @@ fn damaged_pcd_files_never_panic() {
 }
 
 #[test]
-fn poses_match_the_files_or_both_counts_are_told() {
+fn mismatched_numbers_of_poses_and_files_are_errors_with_both_counts() {
     let folder = TempDir::new().unwrap();
     let scans = folder.path().join("scans");
     fs::create_dir(&scans).unwrap();
@@ -170,7 +170,7 @@ fn poses_match_the_files_or_both_counts_are_told() {
     }
 }
 
-/// Scans that are told by their first point, as `name` says, without a `VIEWPOINT` that says anything.
+/// Scans without poses, identified by the x coordinate of their first point, in files with the given names.
 fn unplaced(folder: &Path, names: &[&str]) {
     for (number, name) in names.iter().enumerate() {
         let text =
@@ -179,7 +179,7 @@ fn unplaced(folder: &Path, names: &[&str]) {
     }
 }
 
-/// A caller of the library says what the command's arguments cannot.
+/// Library callers can combine options that the command's arguments cannot.
 #[test]
 fn points_in_the_world_frame_are_not_deskewed() {
     let (_outer, folder) = lone_folder();

@@ -27,7 +27,7 @@ fn map_of(scans: u64) -> FaultyDisk {
     disk.copy()
 }
 
-/// Each reading opens the catalog twice: for its checksum, and for what is in it.
+/// Each read opens the catalog twice: for its checksum, and for its content.
 #[test]
 fn a_remap_reads_the_catalog_three_times_and_once_more_where_few_scans_move() {
     for (moved, readings) in [(6, 3), (1, 4)] {

@@ -1,4 +1,4 @@
-//! Maps that keep their scans: what is refused, named, reported and left alone. Their lives are in `map_life`.
+//! Maps that keep their scans: errors, reports, and unchanged maps. Random sequences are tested in `map_life`.
 
 use crate::harness::{
     Act, Content, Job, State, Taken, at, check_files, damage_in, digest_of, faults, keeping_scans as config,
@@ -26,9 +26,9 @@ fn a_map_with_kept_scans() -> (FaultyDisk, State) {
     (disk, State::default().after(&scans, &config()))
 }
 
-/// Whatever byte of the kept scans is damaged: it is found, or it is none that counts; and then nothing is changed.
+/// Any damaged byte of the kept scans is found, or does not matter; a replay that finds it changes nothing.
 #[test]
-fn damage_among_kept_scans_is_named_and_nothing_is_changed() {
+fn damage_to_kept_scans_is_an_error_and_changes_nothing() {
     let (whole, state) = a_map_with_kept_scans();
     let files = whole.files();
     let kept = files.iter().filter(|(path, _)| path.to_string_lossy().contains("kept_scans"));
@@ -64,7 +64,7 @@ fn damage_among_kept_scans_is_named_and_nothing_is_changed() {
                     assert_eq!(tables(&before), tables(&disk.files()), "{what}");
                 }
             }
-            // What is left is a map like any other, whose scans are not all kept.
+            // The repaired map works, but no longer keeps all scans.
             repair(at(&disk), |_| (), |_, _| ()).unwrap();
             assert_eq!(damage_in(&disk), BTreeSet::new(), "{what}");
         }
@@ -96,7 +96,7 @@ fn segments_and_catalogs_that_are_missing_are_damage() {
 }
 
 #[test]
-fn what_is_no_scan_is_named_and_refused() {
+fn maps_with_other_changes_than_scans_are_not_replayed() {
     let refused = |disk: &FaultyDisk| {
         let poses = NewPoses::Numbered(vec![(1, Pose::identity())]);
         message_of(scans(disk).and_then(|scans| remap(&scans, &poses, &Remap::new(replay()), |_, _| ())))
@@ -113,7 +113,7 @@ fn what_is_no_scan_is_named_and_refused() {
     drop(mapper);
     assert!(refused(&disk).contains("number 6, which is not a scan"), "{}", refused(&disk));
 
-    // Scans from before, and a map without any.
+    // Scans inserted before scans were kept, and a map without any.
     let disk = FaultyDisk::new(Fault::None);
     let without = config().with_kept_scans(false);
     perform(&disk, &without, &State::default(), &Act::Scans(0..2)).unwrap();
@@ -125,7 +125,7 @@ fn what_is_no_scan_is_named_and_refused() {
     assert!(refused(&disk).contains("scan 1, whose points are not kept"), "{}", refused(&disk));
     assert_eq!(MapReader::open(at(&disk), 0).unwrap().scans().unwrap().len(), 3);
 
-    // In the world frame there is no pose that could change.
+    // Scans in the world frame have no pose to change.
     let disk = FaultyDisk::new(Fault::None);
     let mut mapper = OutOfCoreTileMapper::create(at(&disk), config()).unwrap();
     mapper.insert_scan(&Taken::new(3).in_world()).unwrap();
@@ -138,7 +138,7 @@ fn what_is_no_scan_is_named_and_refused() {
 }
 
 #[test]
-fn new_poses_that_do_not_fit_are_named() {
+fn invalid_new_poses_are_errors() {
     let (disk, _) = a_map_with_kept_scans();
     let wrong = |poses: NewPoses| {
         message_of(scans(&disk).and_then(|scans| remap(&scans, &poses, &Remap::new(replay()), |_, _| ())))
@@ -159,7 +159,7 @@ fn new_poses_that_do_not_fit_are_named() {
 }
 
 #[test]
-fn scans_that_hardly_move_are_left_alone_and_told() {
+fn scans_within_the_tolerance_are_unchanged_and_reported() {
     let (disk, state) = a_map_with_kept_scans();
     let digest = digest_of(&disk, None).unwrap();
     let moved = |by_m: f64| {
@@ -183,15 +183,15 @@ fn scans_that_hardly_move_are_left_alone_and_told() {
     );
 }
 
-/// The same scans in little memory, and a request to stop in the middle.
+/// The same scans in little memory, and a stop during the replay.
 #[test]
 fn a_dry_run_and_a_stop_change_nothing() {
     let (disk, state) = a_map_with_kept_scans();
     let poses = NewPoses::Numbered(new_poses(&state.now.scans, 5, Some(1)));
     let before = disk.files();
     let dry = Remap::new(replay().with_dry_run(true));
-    let told = remap(&scans(&disk).unwrap(), &poses, &dry, |_, _| ()).unwrap().mapped;
-    assert!(told.estimated_s.is_some() && told.scans_changed == 2 && told.tiles_mapped > 0, "{told:?}");
+    let dry = remap(&scans(&disk).unwrap(), &poses, &dry, |_, _| ()).unwrap().mapped;
+    assert!(dry.estimated_s.is_some() && dry.scans_changed == 2 && dry.tiles_mapped > 0, "{dry:?}");
     let is_lock = |path: &std::path::PathBuf| path.ends_with("writer.lock");
     let without_lock = |files: BTreeMap<std::path::PathBuf, Vec<u8>>| {
         files.into_iter().filter(|(path, _)| !is_lock(path)).collect::<Vec<_>>()
@@ -212,7 +212,7 @@ fn a_dry_run_and_a_stop_change_nothing() {
 }
 
 #[test]
-fn scans_are_removed_by_time_and_by_input_and_snapshots_are_told() {
+fn scans_are_removed_by_time_and_by_input_and_snapshots_are_reported() {
     let disk = FaultyDisk::new(Fault::None);
     let mut mapper = OutOfCoreTileMapper::create(at(&disk), config()).unwrap();
     for (input, seeds) in [("first", 0..3), ("second", 3..5)] {
@@ -232,7 +232,7 @@ fn scans_are_removed_by_time_and_by_input_and_snapshots_are_told() {
     let reader = MapReader::open(at(&disk), 0).unwrap();
     let three = State::default().after(&Act::Scans(0..3), &config());
     assert!(Content { scan_number: 5, ..three.now }.is_of(&reader));
-    // Their numbers stay theirs: the next scan is the sixth.
+    // Scan numbers are not reused: the next scan is the sixth.
     drop(reader);
     let mut mapper = OutOfCoreTileMapper::open(at(&disk), config()).unwrap();
     Taken::new(7).insert_into(&mut mapper).unwrap();
@@ -241,10 +241,10 @@ fn scans_are_removed_by_time_and_by_input_and_snapshots_are_told() {
     drop(mapper);
     let removed = remove(ScanSelection::Numbers(1, 1), true).unwrap();
     assert_eq!(removed.snapshots_deleted, [name("old")]);
-    check_files(&disk, "nothing is left of them");
+    check_files(&disk, "no leftovers of removed scans");
 }
 
-/// A map of five scans of two inputs, which two snapshots hold, too.
+/// A map of five scans of two inputs, which are also in two snapshots.
 fn a_map_with_snapshots() -> FaultyDisk {
     let disk = FaultyDisk::new(Fault::None);
     let mut mapper = OutOfCoreTileMapper::create(at(&disk), config()).unwrap();
@@ -262,9 +262,9 @@ fn a_map_with_snapshots() -> FaultyDisk {
     disk.copy()
 }
 
-/// What is gone from the map is still found in snapshots, however it is selected.
+/// Scans that were removed from the map are still found in snapshots, for any selection.
 #[test]
-fn scans_that_the_map_has_no_more_are_removed_from_its_snapshots() {
+fn scans_removed_from_the_map_are_removed_from_its_snapshots() {
     let selections =
         [ScanSelection::Numbers(4, 5), ScanSelection::Time(3, 4), ScanSelection::Input("second".to_owned())];
     for scans in selections {
@@ -274,30 +274,34 @@ fn scans_that_the_map_has_no_more_are_removed_from_its_snapshots() {
         let removed = remove(false, &replay()).unwrap();
         assert_eq!((removed.scans_removed, removed.snapshots_with_them.len()), (2, 2), "{scans:?}");
         // The map does not keep the times of removed scans.
-        let is_told = !matches!(scans, ScanSelection::Time(..));
+        let is_reported = !matches!(scans, ScanSelection::Time(..));
         match remove(false, &replay()) {
-            Ok(removed) => assert!(is_told && removed.scans_removed == 0, "{scans:?}"),
-            refused => assert!(!is_told && message_of(refused).contains("the map keeps none"), "{scans:?}"),
+            Ok(removed) => assert!(is_reported && removed.scans_removed == 0, "{scans:?}"),
+            refused => {
+                assert!(!is_reported && message_of(refused).contains("the map keeps none"), "{scans:?}")
+            }
         }
-        let told = remove(true, &replay().with_dry_run(true)).unwrap();
-        assert_eq!((told.scans_removed, told.snapshots_with_them.len()), (0, 2), "{scans:?}");
-        // The one that is to keep them does.
+        let dry = remove(true, &replay().with_dry_run(true)).unwrap();
+        assert_eq!((dry.scans_removed, dry.snapshots_with_them.len()), (0, 2), "{scans:?}");
+        // The snapshot that the call creates contains the scans as well.
         let kept = remove(true, &replay().with_keep_as(name("third"))).unwrap();
         assert_eq!(kept.snapshots_deleted, [name("second")], "{scans:?}");
         assert_eq!(kept.snapshots_with_them, [name("third")], "{scans:?}");
         assert_eq!(remove(true, &replay()).unwrap().snapshots_deleted, [name("third")], "{scans:?}");
         assert_eq!(snapshot_names(&disk), ["first"], "{scans:?}");
         match remove(true, &replay()) {
-            Ok(removed) => assert!(is_told && removed.snapshots_deleted.is_empty(), "{scans:?}"),
-            refused => assert!(!is_told && message_of(refused).contains("the map keeps none"), "{scans:?}"),
+            Ok(removed) => assert!(is_reported && removed.snapshots_deleted.is_empty(), "{scans:?}"),
+            refused => {
+                assert!(!is_reported && message_of(refused).contains("the map keeps none"), "{scans:?}")
+            }
         }
         check_files(&disk, "removed");
     }
 }
 
-/// A map that has changed by something else since is not mapped again, and its snapshots go.
+/// A map that was changed by another operation is not replayed, but snapshots are deleted.
 #[test]
-fn snapshots_go_whatever_has_become_of_the_map() {
+fn snapshots_are_deleted_although_the_map_was_changed() {
     let disk = a_map_with_snapshots();
     let scans = ScanSelection::Numbers(4, 5);
     remove_scans(at(&disk), &scans, false, &replay(), |_, _| ()).unwrap();
@@ -307,20 +311,20 @@ fn snapshots_go_whatever_has_become_of_the_map() {
 }
 
 #[test]
-fn a_snapshot_that_cannot_be_read_is_told_after_the_others_are_gone() {
+fn an_unreadable_snapshot_is_reported_after_the_others_are_deleted() {
     let disk = a_map_with_snapshots();
     disk.put(&map().join("snapshots/second"), b"nothing");
     let scans = ScanSelection::Numbers(4, 5);
     let remove = || remove_scans(at(&disk), &scans, true, &replay(), |_, _| ());
-    let is_told =
+    let is_reported =
         |message: &str| message.contains("snapshots/second") && message.contains("may contain scans");
     let removed = remove().unwrap();
     let [failed] = &*removed.snapshots_failed else { panic!("{removed:?}") };
-    assert!(is_told(&failed.reason) && failed.name == name("second"), "{failed:?}");
+    assert!(is_reported(&failed.reason) && failed.name == name("second"), "{failed:?}");
     assert_eq!(removed.snapshots_deleted, [name("third")]);
-    // Nothing else is left to do.
+    // No scan is left to remove.
     let message = message_of(remove());
-    assert!(is_told(&message), "{message}");
+    assert!(is_reported(&message), "{message}");
     assert_eq!(snapshot_names(&disk), ["first", "second"]);
     assert_eq!(MapReader::open(at(&disk), 0).unwrap().scans().unwrap().len(), 3);
     delete_snapshot(at(&disk), &name("second")).unwrap();
@@ -328,9 +332,9 @@ fn a_snapshot_that_cannot_be_read_is_told_after_the_others_are_gone() {
     assert_eq!((removed.scans_removed, removed.snapshots_deleted.len()), (0, 0));
 }
 
-/// Whatever fails and wherever the process is killed: the same call does the rest.
+/// After a fault or kill at any operation, the same call completes the removal.
 #[test]
-fn a_removal_that_ended_between_map_and_snapshots_is_completed() {
+fn an_interrupted_removal_is_completed_by_the_same_call() {
     let remove = |disk: &FaultyDisk| {
         let scans = ScanSelection::Numbers(4, 5);
         remove_scans(at(disk), &scans, true, &replay(), |_, _| ()).map(drop)

@@ -1,4 +1,4 @@
-//! Remapping beside a mapper that goes on; what it makes of random lives is tested where the others are (`remapping`).
+//! Online remaps during inserts. Random sequences are tested in `remapping` and `map_life`.
 
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -34,7 +34,7 @@ fn insert(mapper: &mut OutOfCoreTileMapper, number: u64) {
     mapper.insert_points(&ScanRef::in_sensor(pose(number, 0.0), &points)).unwrap();
 }
 
-/// A drive along x; the corrected one is some metres beside it.
+/// A drive along x; the corrected one is shifted by some metres.
 fn pose(number: u64, y: f64) -> Pose {
     Pose::from_quaternion([0.3 * number as f64, y, 0.0], [0.0, 0.0, 0.1, 1.0]).unwrap()
 }
@@ -57,29 +57,29 @@ fn digest_of(folder: &Path) -> String {
     MapReader::open(folder, 0).unwrap().digest().unwrap().to_string()
 }
 
-fn nothing_is_left_beside(folder: &Path) {
+fn assert_no_leftovers(folder: &Path) {
     let names: Vec<_> = std::fs::read_dir(folder.parent().unwrap()).unwrap().flatten().collect();
     assert!(names.iter().all(|entry| entry.file_name() != "map.remapping"), "{names:?}");
 }
 
-/// A mapper that takes scans, flushes beside them and is read, while another thread follows it; for both storages, and
-/// for poses that move some of the scans or all.
+/// A mapper inserts scans, flushes in the background and is queried, while another thread runs an online remap; for
+/// both storages, and for poses that move some of the scans or all.
 #[test]
-fn scans_go_on_while_the_map_is_mapped_again() {
+fn scans_are_inserted_during_an_online_remap() {
     for (storage, moving) in [(Storage::OctoMap, 40), (Storage::Compact, 8)] {
         let place = tempfile::tempdir().unwrap();
         let folder = place.path().join("map");
         let mut mapper = with_scans(&folder, config().with_storage(storage), 40);
-        let beside = OnlineRemap::begin(&scans(&folder).unwrap(), &moved(moving), &how()).unwrap();
-        assert!(beside.moves_scans());
+        let online = OnlineRemap::begin(&scans(&folder).unwrap(), &moved(moving), &how()).unwrap();
+        assert!(online.moves_scans());
         let (is_over, mut followed) = (AtomicBool::new(false), 0);
-        let beside = std::thread::scope(|scope| {
+        let online = std::thread::scope(|scope| {
             let follower = scope.spawn(|| {
-                let mut beside = beside;
+                let mut online = online;
                 while !is_over.load(Ordering::Relaxed) {
-                    followed += beside.follow(|_| ()).unwrap();
+                    followed += online.follow(|_| ()).unwrap();
                 }
-                beside
+                online
             });
             for number in 41..=90 {
                 insert(&mut mapper, number);
@@ -94,20 +94,23 @@ fn scans_go_on_while_the_map_is_mapped_again() {
         insert(&mut mapper, 91);
         mapper.flush().unwrap();
         drop(mapper);
-        let told = beside.finish().unwrap();
+        let report = online.finish().unwrap();
         assert!((40..=91).contains(&followed), "{followed}");
-        assert_eq!((told.mapped.scans, told.mapped.scans_changed), (91, moving), "{told:?}");
-        assert!((told.largest_move_m - 1.7).abs() < 1e-9, "{told:?}");
-        assert!(told.mapped.tiles_mapped > 0 && told.mapped.tiles_mapped <= told.mapped.tiles, "{told:?}");
+        assert_eq!((report.mapped.scans, report.mapped.scans_changed), (91, moving), "{report:?}");
+        assert!((report.largest_move_m - 1.7).abs() < 1e-9, "{report:?}");
+        assert!(
+            report.mapped.tiles_mapped > 0 && report.mapped.tiles_mapped <= report.mapped.tiles,
+            "{report:?}"
+        );
 
-        // What the command makes of the same scans and poses.
+        // The result of an offline remap with the same scans and poses.
         let other = place.path().join("other");
         drop(with_scans(&other, config().with_storage(storage), 91));
         remap(&scans(&other).unwrap(), &moved(moving), &how(), |_, _| ()).unwrap();
         assert_eq!(digest_of(&folder), digest_of(&other), "{storage:?}");
-        nothing_is_left_beside(&folder);
+        assert_no_leftovers(&folder);
 
-        // It goes on, and can be mapped again: its scans know their poses and tiles.
+        // The map can be continued and replayed: its scans have the new poses and tiles.
         for map in [&folder, &other] {
             let mut mapper = OutOfCoreTileMapper::open(&**map, config()).unwrap();
             insert(&mut mapper, 92);
@@ -121,49 +124,49 @@ fn scans_go_on_while_the_map_is_mapped_again() {
 }
 
 #[test]
-fn poses_that_move_nothing_leave_the_map_alone() {
+fn unchanged_poses_do_not_change_the_map() {
     let place = tempfile::tempdir().unwrap();
     let folder = place.path().join("map");
     drop(with_scans(&folder, config(), 5));
     let commits = std::fs::read(folder.join("commits.log")).unwrap();
     let same = NewPoses::Numbered((1..=5).map(|number| (number, pose(number, 0.0))).collect());
-    let mut beside = OnlineRemap::begin(&scans(&folder).unwrap(), &same, &how()).unwrap();
-    assert!(!beside.moves_scans());
-    assert_eq!(beside.follow(|_| ()).unwrap(), 0);
-    assert_eq!(beside.finish().unwrap().mapped.scans_changed, 0);
+    let mut online = OnlineRemap::begin(&scans(&folder).unwrap(), &same, &how()).unwrap();
+    assert!(!online.moves_scans());
+    assert_eq!(online.follow(|_| ()).unwrap(), 0);
+    assert_eq!(online.finish().unwrap().mapped.scans_changed, 0);
     assert_eq!(std::fs::read(folder.join("commits.log")).unwrap(), commits);
 }
 
-/// Another process changed earlier scans between the mapper and the end: nothing is taken over.
+/// Another process changed earlier scans before the end: the remap is not swapped in.
 #[test]
-fn scans_that_were_changed_meanwhile_are_not_overwritten() {
+fn concurrent_changes_of_scans_are_not_overwritten() {
     let place = tempfile::tempdir().unwrap();
     let folder = place.path().join("map");
     drop(with_scans(&folder, config(), 6));
     let begun = || {
-        let mut beside = OnlineRemap::begin(&scans(&folder).unwrap(), &moved(6), &how()).unwrap();
-        beside.follow(|_| ()).unwrap();
-        beside
+        let mut online = OnlineRemap::begin(&scans(&folder).unwrap(), &moved(6), &how()).unwrap();
+        online.follow(|_| ()).unwrap();
+        online
     };
-    let beside = begun();
+    let online = begun();
     remove_scans(&*folder, &ScanSelection::Numbers(2, 2), false, &Replay::default(), |_, _| ()).unwrap();
     let digest = digest_of(&folder);
-    assert!(matches!(beside.finish(), Err(Error::Changed { .. })));
+    assert!(matches!(online.finish(), Err(Error::Changed { .. })));
     assert_eq!(digest_of(&folder), digest);
-    nothing_is_left_beside(&folder);
+    assert_no_leftovers(&folder);
 
     let moved = moved(1);
-    let beside = OnlineRemap::begin(&scans(&folder).unwrap(), &moved, &how()).unwrap();
+    let online = OnlineRemap::begin(&scans(&folder).unwrap(), &moved, &how()).unwrap();
     let region = voxtile::Aabb { min: [0.0; 3], max: [1.0; 3] };
     clear(&*folder, &Part::Inside(region), |_, _| ()).unwrap();
     let digest = digest_of(&folder);
-    let message = message_of(beside.finish());
+    let message = message_of(online.finish());
     assert!(message.contains("a change by another operation: clear"), "{message}");
     assert_eq!(digest_of(&folder), digest);
 }
 
 #[test]
-fn one_at_a_time_and_a_stop_or_a_drop_leaves_nothing() {
+fn only_one_remap_runs_and_a_stop_or_drop_leaves_nothing() {
     let place = tempfile::tempdir().unwrap();
     let folder = place.path().join("map");
     let mut mapper = with_scans(&folder, config(), 6);
@@ -171,24 +174,24 @@ fn one_at_a_time_and_a_stop_or_a_drop_leaves_nothing() {
     let stop = Stop::default();
     let mut stoppable = how();
     stoppable.replay = stoppable.replay.with_stop(stop.clone());
-    let mut beside = OnlineRemap::begin(&scans(&folder).unwrap(), &moved(6), &stoppable).unwrap();
+    let mut online = OnlineRemap::begin(&scans(&folder).unwrap(), &moved(6), &stoppable).unwrap();
     let second = OnlineRemap::begin(&scans(&folder).unwrap(), &moved(6), &how());
     assert!(matches!(second, Err(Error::Locked { .. })), "{second:?}");
     assert!(place.path().join("map.remapping").exists());
     assert!(matches!(
-        beside.follow(|scan| if scan == 2 {
+        online.follow(|scan| if scan == 2 {
             stop.set()
         }),
         Err(Error::Stopped)
     ));
-    drop(beside);
-    nothing_is_left_beside(&folder);
+    drop(online);
+    assert_no_leftovers(&folder);
     insert(&mut mapper, 7);
     mapper.flush().unwrap();
-    // Not while the mapper has the map.
-    let beside = OnlineRemap::begin(&scans(&folder).unwrap(), &moved(6), &how()).unwrap();
-    assert!(matches!(beside.finish(), Err(Error::Locked { .. })));
-    nothing_is_left_beside(&folder);
+    // The end needs the lock that the mapper holds.
+    let online = OnlineRemap::begin(&scans(&folder).unwrap(), &moved(6), &how()).unwrap();
+    assert!(matches!(online.finish(), Err(Error::Locked { .. })));
+    assert_no_leftovers(&folder);
     drop(mapper);
     assert_ne!(digest_of(&folder), digest);
 
@@ -200,7 +203,7 @@ fn one_at_a_time_and_a_stop_or_a_drop_leaves_nothing() {
         message_of(scans(&folder).and_then(|scans| OnlineRemap::begin(&scans, &moved(6), &dry)))
             .contains("dry_run")
     );
-    // What is not of a map stays, and is in the way.
+    // Foreign files are kept and block the remap.
     std::fs::create_dir_all(place.path().join("map.remapping/kept_scans")).unwrap();
     std::fs::write(place.path().join("map.remapping/kept_scans/letter.txt"), "dear").unwrap();
     let message = message_of(scans(&folder).and_then(|scans| OnlineRemap::begin(&scans, &moved(6), &how())));
@@ -209,19 +212,19 @@ fn one_at_a_time_and_a_stop_or_a_drop_leaves_nothing() {
 }
 
 #[test]
-fn a_snapshot_keeps_the_map_as_it_was_before_the_end() {
+fn a_snapshot_keeps_the_map_before_the_swap() {
     let place = tempfile::tempdir().unwrap();
     let folder = place.path().join("map");
     let mut mapper = with_scans(&folder, config(), 6);
     let name = SnapshotName::new("before").unwrap();
     let mut keeping = how();
     keeping.replay = keeping.replay.with_keep_as(name.clone());
-    let beside = OnlineRemap::begin(&scans(&folder).unwrap(), &moved(6), &keeping).unwrap();
+    let online = OnlineRemap::begin(&scans(&folder).unwrap(), &moved(6), &keeping).unwrap();
     insert(&mut mapper, 7);
     mapper.flush().unwrap();
     drop(mapper);
     let digest = digest_of(&folder);
-    beside.finish().unwrap();
+    online.finish().unwrap();
     let kept = MapReader::open_snapshot(&*folder, &name, 0).unwrap();
     assert_eq!(kept.digest().unwrap().to_string(), digest);
     assert_eq!(kept.scan_number(), 7);

@@ -1,4 +1,4 @@
-//! A build that flushes between a look at a map and its lock: what is to be removed was decided without its scans.
+//! Flushes between the first read of a map and its lock: a removal or remap would miss the new scans.
 
 use crate::harness::{at, digest_of, keeping_scans as config};
 use std::fmt;
@@ -13,7 +13,7 @@ fn insert(mapper: &mut OutOfCoreTileMapper, x: f64) {
     mapper.flush().unwrap();
 }
 
-/// The map is flushed between the look and the lock, and is then as that build left it.
+/// Flushes the map between the first read and the lock. The call must fail and leave the map of that flush.
 fn is_refused<T: fmt::Debug>(work: impl FnOnce(MapPath) -> Result<T>) {
     let disk = FaultyDisk::new(Fault::None);
     let mut mapper = OutOfCoreTileMapper::create(at(&disk), config()).unwrap();
@@ -31,19 +31,19 @@ fn is_refused<T: fmt::Debug>(work: impl FnOnce(MapPath) -> Result<T>) {
 }
 
 #[test]
-fn points_that_came_meanwhile_are_not_passed_over() {
+fn a_removal_of_points_fails_if_scans_were_added_meanwhile() {
     let region = Aabb { min: [0.0; 3], max: [5.0; 3] };
     is_refused(|map| remove_points(map, &region, &Replay::default(), |_, _| ()));
 }
 
 #[test]
-fn scans_that_came_meanwhile_are_not_removed_uncounted() {
+fn a_removal_of_scans_fails_if_scans_were_added_meanwhile() {
     let scans = ScanSelection::Numbers(1, 9);
     is_refused(|map| remove_scans(map, &scans, false, &Replay::default(), |_, _| ()));
 }
 
 #[test]
-fn scans_that_came_meanwhile_do_not_keep_poses_unasked() {
+fn a_remap_fails_if_scans_were_added_meanwhile() {
     let pose = Pose::from_quaternion([1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]).unwrap();
     let poses = NewPoses::InOrder(vec![pose]);
     is_refused(|map| remap(&KeptSummary::read(map)?, &poses, &Remap::new(Replay::default()), |_, _| ()));

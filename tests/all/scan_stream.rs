@@ -37,7 +37,7 @@ fn assert_same(a: &SensorScan, b: &SensorScan) {
 }
 
 #[test]
-fn what_is_written_is_read() {
+fn written_scans_are_read_back() {
     let scans: Vec<_> = [3, 0, 5].map(sensor_scan).to_vec();
     let found = read(&written("three", true, &scans)).unwrap();
     assert_eq!(found.len(), 3);
@@ -50,7 +50,7 @@ fn what_is_written_is_read() {
 }
 
 #[test]
-fn scans_in_the_world_frame_are_as_exact_far_away_as_near() {
+fn scans_in_the_world_frame_are_exact_at_any_distance() {
     let scan = Survey::tour(1, 500).next().unwrap();
     for shift_m in [0.0, 6.4e6] {
         let scan: Scan = scan.clone().translated([shift_m; 3]);
@@ -65,7 +65,7 @@ fn scans_in_the_world_frame_are_as_exact_far_away_as_near() {
 }
 
 #[test]
-fn a_stream_that_ends_or_is_wrong_anywhere_is_an_error_with_its_place() {
+fn truncated_and_invalid_streams_are_errors_with_an_offset() {
     let bytes = written("label", true, &[sensor_scan(2)]);
     let header = written("label", true, &[]).len();
     for end in (0..bytes.len()).filter(|&end| end != header) {
@@ -81,19 +81,19 @@ fn a_stream_that_ends_or_is_wrong_anywhere_is_an_error_with_its_place() {
         let error = read(&wrong).unwrap_err();
         assert!(matches!(error, Error::Malformed { .. }), "{at}: {error:#}");
     }
-    // A quaternion of no length.
+    // A quaternion of length 0.
     let mut wrong = bytes.clone();
     wrong[header + 28..header + 60].fill(0);
     assert!(read(&wrong).is_err());
-    // A count that nothing stands behind takes no memory.
+    // An impossible count must not allocate memory.
     let mut wrong = bytes;
     wrong[header..header + 4].fill(255);
     assert!(read(&wrong).is_err());
 }
 
-/// Whatever is skipped and wherever a file ends or is wrong: the answers are those of reading every scan.
+/// For any number of skipped scans, and any truncated or damaged file: the result equals that of reading every scan.
 #[test]
-fn skipped_scans_are_looked_at_as_if_they_were_read() {
+fn skipped_scans_are_checked_like_scans_that_are_read() {
     let folder = TempDir::new().unwrap();
     let path = folder.path().join("drive.scans");
     for has_intensities in [true, false] {
@@ -120,7 +120,7 @@ fn skipped_scans_are_looked_at_as_if_they_were_read() {
     }
 }
 
-/// What is read behind so many skipped scans, and the error that ends it. Scans that cannot be read are passed over.
+/// Returns the scans read after so many skipped ones, and the errors. Unreadable scans are passed over.
 fn skip_and_read(
     source: &mut dyn ScanSource,
     scans: usize,
@@ -147,14 +147,14 @@ fn skip_and_read(
 }
 
 #[test]
-fn a_scan_without_intensities_or_a_label_too_long_is_refused() {
+fn missing_intensities_and_long_labels_are_errors() {
     let mut writer = ScanStreamWriter::new(Vec::new(), "", true).unwrap();
     assert!(writer.write(&SensorScan { intensities: None, ..sensor_scan(1) }).is_err());
     assert!(ScanStreamWriter::new(Vec::new(), &"x".repeat(5000), true).is_err());
 }
 
 #[test]
-fn a_stream_is_known_by_its_label_and_a_file_by_its_bytes() {
+fn streams_are_identified_by_label_and_files_by_content() {
     let source = |label: &str| {
         let bytes = written(label, true, &[sensor_scan(2)]);
         read_scan_stream(std::io::Cursor::new(bytes), Path::new("-"), false).unwrap().fingerprint()

@@ -1,4 +1,4 @@
-//! Scans handed in together make the map that they make one after the other.
+//! Scans inserted as a batch make the same map as one by one.
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use testkit::random_scans::{Random, random_scan};
@@ -11,7 +11,7 @@ use voxtile::{
 };
 use voxtile_simulation::Survey;
 
-/// Of many rays and of few, and one of none.
+/// Scans with many rays, with few, and with none.
 fn scans() -> Vec<Scan> {
     let mut random = Random(7);
     let mut scans: Vec<Scan> = Survey::tour(3, 900).step_by(3).take(4).collect();
@@ -39,7 +39,7 @@ fn configs() -> Vec<MapConfig> {
     vec![config, iwlo, region, every_ray]
 }
 
-/// The reports and the digest of scans that are handed in one by one.
+/// Returns the reports and the digest of scans that are inserted one by one.
 fn one_by_one(config: &MapConfig, scans: &[Scan]) -> (Vec<ScanReport>, String) {
     let mut mapper = InMemoryMapper::new(config.clone()).unwrap();
     let reports = scans.iter().map(|scan| mapper.insert_scan(scan).unwrap()).collect();
@@ -47,7 +47,7 @@ fn one_by_one(config: &MapConfig, scans: &[Scan]) -> (Vec<ScanReport>, String) {
 }
 
 #[test]
-fn the_map_and_the_reports_are_those_of_one_scan_after_the_other_for_any_threads_and_any_memory() {
+fn batches_equal_single_inserts_for_any_threads_and_memory() {
     let scans = scans();
     for config in configs() {
         let wanted = one_by_one(&config, &scans);
@@ -77,11 +77,11 @@ fn the_map_and_the_reports_are_those_of_one_scan_after_the_other_for_any_threads
                 mapper.insert_all(&all(others), &mut reports).unwrap();
             });
             let digest = mapper.digest().unwrap().to_string();
-            // A scan in parts tells the same of its points, and of tiles what it knows.
-            let told = |reports: &[ScanReport]| {
+            // The reports of a scan inserted in parts have the same counts of points, but may differ in tiles.
+            let counts = |reports: &[ScanReport]| {
                 reports.iter().map(|r| (r.points, r.hits, r.misses)).collect::<Vec<_>>()
             };
-            assert_eq!(told(&reports), told(&wanted.0), "{threads} threads, {bytes:?} bytes");
+            assert_eq!(counts(&reports), counts(&wanted.0), "{threads} threads, {bytes:?} bytes");
             assert_eq!(digest, wanted.1, "{threads} threads, {bytes:?} bytes");
             mapper.flush().unwrap();
             drop(mapper);
@@ -97,7 +97,7 @@ fn the_map_and_the_reports_are_those_of_one_scan_after_the_other_for_any_threads
 }
 
 #[test]
-fn the_first_scan_that_is_refused_ends_it_and_those_before_are_in_the_map() {
+fn scans_before_an_invalid_one_are_in_the_map() {
     let config = MapConfig::new(0.2, 6.4).unwrap().with_sensor_model(SensorModel::Iwlo(Iwlo::default()));
     for bad in [0, 1, 3, 4] {
         let mut scans: Vec<Scan> =

@@ -10,7 +10,7 @@ use voxtile::store::{CommitLog, Layout, TileStore, read_log};
 use voxtile::{Digest, Mapper, OutOfCoreTileMapper, Result};
 
 /// Inserts scans into the same tiles each time, and flushes.
-fn go_on(disk: &FaultyDisk, seeds: std::ops::Range<u64>) -> Result<()> {
+fn continue_map(disk: &FaultyDisk, seeds: std::ops::Range<u64>) -> Result<()> {
     let mut mapper = OutOfCoreTileMapper::open(at(disk), config())?;
     for seed in seeds {
         mapper.insert_scan(&random_scan(&mut Random(seed), [0.0; 3], 5))?;
@@ -19,16 +19,16 @@ fn go_on(disk: &FaultyDisk, seeds: std::ops::Range<u64>) -> Result<()> {
     Ok(())
 }
 
-/// A map with two snapshots of different flushes, which has changed since; and their digests.
+/// Returns a map with two snapshots of different flushes, changed since then, and the digests of the snapshots.
 fn with_two() -> (FaultyDisk, [Digest; 2]) {
     let disk = FaultyDisk::new(Fault::None);
     drop(OutOfCoreTileMapper::create(at(&disk), config()).unwrap());
     let digests = ["s1", "s2"].map(|of| {
-        go_on(&disk, if of == "s1" { 0..2 } else { 2..4 }).unwrap();
+        continue_map(&disk, if of == "s1" { 0..2 } else { 2..4 }).unwrap();
         OutOfCoreTileMapper::open(at(&disk), config()).unwrap().snapshot(&name(of)).unwrap();
         digest_of(&disk, Some(of)).unwrap()
     });
-    go_on(&disk, 4..6).unwrap();
+    continue_map(&disk, 4..6).unwrap();
     (disk, digests)
 }
 
@@ -56,8 +56,8 @@ fn swapped_snapshots_are_found_refused_and_put_back() {
     assert!(error.contains("belongs to the snapshot s2"), "{error}");
     assert!(digest_of(&disk, Some("s2")).is_err());
     assert_eq!(digest_of(&disk, None).unwrap(), now);
-    // Mapping goes on, and what both see stays.
-    go_on(&disk, 6..9).unwrap();
+    // Inserts continue, and both snapshots are unchanged.
+    continue_map(&disk, 6..9).unwrap();
     let repaired = disk.copy();
     swap(&disk);
     for disk in [&disk, &repaired] {
@@ -71,7 +71,7 @@ fn swapped_snapshots_are_found_refused_and_put_back() {
 }
 
 #[test]
-fn a_repair_of_swapped_snapshots_can_be_cut_short_anywhere() {
+fn a_repair_of_swapped_snapshots_can_be_interrupted_anywhere() {
     let (disk, digests) = with_two();
     swap(&disk);
     for moment in 0.. {
@@ -97,26 +97,26 @@ fn a_repair_of_swapped_snapshots_can_be_cut_short_anywhere() {
 }
 
 #[test]
-fn a_snapshot_that_is_missing_is_a_finding_and_its_tables_stay_until_a_person_decides() {
+fn a_missing_snapshot_is_reported_and_its_tables_are_kept_until_it_is_deleted() {
     let (disk, digests) = with_two();
     let file = disk.files()[&path("s1")].clone();
     disk.take(&path("s1"));
     assert_eq!(damage_in(&disk), BTreeSet::from([path("s1")]));
     assert!(snapshots(at(&disk)).unwrap().iter().any(|info| info.damage.is_some()));
-    go_on(&disk, 6..9).unwrap();
+    continue_map(&disk, 6..9).unwrap();
     assert_eq!(digest_of(&disk, Some("s2")).unwrap(), digests[1]);
-    // Put back.
+    // The file is put back.
     let again = disk.copy();
     again.put(&path("s1"), &file);
     assert_eq!(damage_in(&again), BTreeSet::new());
     assert_eq!(digest_of(&again, Some("s1")).unwrap(), digests[0]);
-    // Given up by name.
+    // The snapshot is deleted by name.
     let given_up = disk.copy();
     delete_snapshot(at(&given_up), &name("s1")).unwrap();
     assert_eq!(damage_in(&given_up), BTreeSet::new());
     assert!(kept(&given_up) < kept(&disk));
     assert_eq!(digest_of(&given_up, Some("s2")).unwrap(), digests[1]);
-    // Or by a repair, which deletes nothing.
+    // A repair removes the snapshot, but no tables.
     let repair = repair(at(&disk), |_| (), |_, _| ()).unwrap();
     assert_eq!((repair.snapshots_lost, repair.tiles_lost, repair.is_complete()), (1, 0, false));
     assert_eq!(damage_in(&disk), BTreeSet::new());
@@ -124,7 +124,7 @@ fn a_snapshot_that_is_missing_is_a_finding_and_its_tables_stay_until_a_person_de
     assert_eq!(digest_of(&disk, Some("s2")).unwrap(), digests[1]);
 }
 
-/// A map as versions wrote it that did not list snapshots.
+/// Turns the map into one of earlier versions, which did not list snapshots.
 fn without_list(disk: &FaultyDisk) {
     let (log, commits) = read_log(&*disk.shared(), &Layout::new(map())).unwrap().unwrap();
     let mut metadata = TileStore::open_read_only(disk.shared(), map()).unwrap().metadata().clone();
@@ -153,7 +153,7 @@ fn snapshots_of_maps_that_do_not_list_them_are_read_and_listed_at_the_next_commi
     for (of, digest) in ["s1", "s2"].iter().zip(&digests) {
         assert_eq!(digest_of(&disk, Some(of)).unwrap(), *digest);
     }
-    go_on(&disk, 6..7).unwrap();
+    continue_map(&disk, 6..7).unwrap();
     for (of, digest) in ["s1", "s2"].iter().zip(&digests) {
         assert_eq!(digest_of(&disk, Some(of)).unwrap(), *digest);
     }
@@ -166,9 +166,9 @@ fn snapshots_of_maps_that_do_not_list_them_are_read_and_listed_at_the_next_commi
     assert_eq!((kept(&disk), damage_in(&disk).len()), (0, 0));
 }
 
-/// Copies by hand, files of other maps, notes: the log names none of them, and a deleted snapshot is told from them.
+/// Copied files, files of other maps and notes are not in the log. They are kept, unlike a deleted snapshot.
 #[test]
-fn what_somebody_else_put_beside_the_snapshots_stays() {
+fn foreign_files_in_the_folder_of_snapshots_are_kept() {
     let (disk, digests) = with_two();
     let (other, _) = with_two();
     let files = disk.files();
@@ -180,9 +180,9 @@ fn what_somebody_else_put_beside_the_snapshots_stays() {
     put.iter().for_each(|(path, bytes)| disk.put(path, bytes));
     let deleted = files[&path("s2")].clone();
     delete_snapshot(at(&disk), &name("s2")).unwrap();
-    // As the disk has it if the power goes before the removal is durable.
+    // As after a power cut before the removal is durable.
     disk.put(&path("s2"), &deleted);
-    go_on(&disk, 6..8).unwrap();
+    continue_map(&disk, 6..8).unwrap();
     let left = disk.files();
     assert!(!left.contains_key(&path("s2")));
     for (path, bytes) in &put {

@@ -39,7 +39,7 @@ fn small(storage: Storage) -> (FaultyDisk, Vec<Digest>) {
 }
 
 #[test]
-fn a_revert_brings_back_all_of_it_and_readers_go_on_seeing_what_they_saw() {
+fn a_revert_restores_everything_and_does_not_affect_open_readers() {
     for storage in [Storage::OctoMap, Storage::Compact] {
         for disk in [small(storage).0, small(storage).0.without_links()] {
             let (_, digests) = small(storage);
@@ -52,7 +52,7 @@ fn a_revert_brings_back_all_of_it_and_readers_go_on_seeing_what_they_saw() {
                 assert_eq!(digest_of(&disk, of).unwrap(), digests[digest], "{of:?}");
             }
             drop(reader);
-            // The input is that of the snapshot, and the same scans lead to the same maps again.
+            // The input is that of the snapshot, and inserting the same scans again gives the same maps.
             let mut mapper = OutOfCoreTileMapper::open(at(&disk), config().with_storage(storage)).unwrap();
             assert_eq!(mapper.resume_input("scans").unwrap(), 2);
             for seed in 2..4 {
@@ -66,12 +66,12 @@ fn a_revert_brings_back_all_of_it_and_readers_go_on_seeing_what_they_saw() {
                 delete_snapshot(at(&disk), &name(of)).unwrap();
             }
             let kept = disk.files().into_keys().filter(|path| path.to_string_lossy().contains(".flush"));
-            assert_eq!(kept.count(), 0, "nobody sees any kept table");
+            assert_eq!(kept.count(), 0, "no kept table is needed");
         }
     }
 }
 
-/// A revert leaves the same bytes in place and kept, under two names of one file or as two files.
+/// After a revert, the current and the kept table have the same bytes, as hard links or as two files.
 #[test]
 fn a_kept_table_takes_the_place_of_a_damaged_one_with_the_same_bytes() {
     for storage in [Storage::OctoMap, Storage::Compact] {
@@ -140,9 +140,9 @@ fn check_restored(
 }
 
 #[test]
-fn own_bytes_are_what_deleting_frees() {
+fn own_bytes_are_freed_by_a_deletion() {
     let (disk, _) = small(Storage::OctoMap);
-    // The log and `metadata.json` say what happened.
+    // The log and `metadata.json` grow with each operation.
     let is_counted = |path: &Path| path.parent() != Some(map());
     let files = || disk.files().into_iter().filter(|(path, _)| is_counted(path));
     let bytes = || files().map(|(_, bytes)| bytes.len() as u64).sum::<u64>();
@@ -178,9 +178,9 @@ fn wrong_names_and_other_refusals_say_what_to_do() {
     drop(writer);
 }
 
-/// A map of the original format gets its checksums first.
+/// A map of the original format first gets its checksums.
 #[test]
-fn a_map_of_the_seeds_format_is_adopted_by_its_first_snapshot() {
+fn a_map_of_the_original_format_is_converted_by_its_first_snapshot() {
     let (disk, digests) = small(Storage::OctoMap);
     make_foreign(&disk, map());
     snapshot(at(&disk), &name("adopted")).unwrap();
@@ -188,10 +188,10 @@ fn a_map_of_the_seeds_format_is_adopted_by_its_first_snapshot() {
     assert_eq!(digest_of(&disk, Some("adopted")).unwrap(), digests[2]);
 }
 
-/// Every few bytes of a snapshot and of a table that only snapshots see, and these files gone: found, named, repaired;
-/// the map and what is whole of the snapshots stay as they were.
+/// Damage at every few bytes of a snapshot and of tables that only snapshots need, and removal of these files: it is
+/// found and repaired, and the map and intact parts of snapshots are unchanged.
 #[test]
-fn damage_to_what_only_snapshots_see_is_found_and_repaired() {
+fn damage_to_files_of_snapshots_is_found_and_repaired() {
     for storage in [Storage::OctoMap, Storage::Compact] {
         let (whole, digests) = small(storage);
         let is_of_snapshots = |path: &Path| {
@@ -229,7 +229,7 @@ fn check_repair(disk: &FaultyDisk, digests: &[Digest], path: &Path, what: &str) 
     let is_missing = !disk.files().contains_key(path);
     assert!(named || is_missing, "{what}: the file is not named");
     assert_eq!(digest_of(disk, None).unwrap(), digests[2], "{what}");
-    // Opening for writing removes nothing that a snapshot may see.
+    // A writer removes no file that a snapshot may need.
     let files = disk.files();
     drop(TileStore::open(disk.shared(), map()).unwrap());
     assert_eq!(disk.files(), files, "{what}");
@@ -249,8 +249,8 @@ fn check_repair(disk: &FaultyDisk, digests: &[Digest], path: &Path, what: &str) 
     }
 }
 
-/// Several snapshots see one damaged table, and others later ones of the same tile: those lose nothing.
-/// The names of its tables lead a snapshot that has lost one to the next, whichever name comes first.
+/// One of two snapshots has lost a table of a tile. The lookup by flush number must not use the table of the other one,
+/// whichever name is first.
 #[test]
 fn a_snapshot_that_is_led_to_a_table_of_another_is_found() {
     for names in [["a", "b"], ["b", "a"]] {
@@ -276,7 +276,7 @@ fn a_snapshot_that_is_led_to_a_table_of_another_is_found() {
 }
 
 #[test]
-fn a_repair_takes_nothing_from_snapshots_that_are_whole() {
+fn a_repair_does_not_change_intact_snapshots() {
     let disk = FaultyDisk::new(Fault::None);
     let mut mapper = OutOfCoreTileMapper::create(at(&disk), config()).unwrap();
     let mut digests = BTreeMap::new();
@@ -313,9 +313,9 @@ fn a_repair_takes_nothing_from_snapshots_that_are_whole() {
     }
 }
 
-/// Whatever is put together again from the tiles: snapshots see what they saw, also after what comes then.
+/// After a repair from the tiles alone, snapshots are unchanged, also after further scans.
 #[test]
-fn snapshots_outlive_the_loss_of_the_log_and_of_tables_in_place() {
+fn snapshots_survive_the_loss_of_the_log_and_of_current_tables() {
     let (whole, digests) = small(Storage::OctoMap);
     for lost in [&["commits.log"][..], &["commits.log", "metadata.json"]] {
         let disk = whole.copy();
@@ -323,7 +323,7 @@ fn snapshots_outlive_the_loss_of_the_log_and_of_tables_in_place() {
         repair(at(&disk), |_| (), |_, _| ()).unwrap();
         let mut mapper = OutOfCoreTileMapper::open(at(&disk), config());
         for seed in 30..34 {
-            // Without metadata.json the ranges of the rays are not known any more, which matters to no snapshot.
+            // Without metadata.json the ray ranges are lost, which does not affect snapshots.
             let mapper = mapper.as_mut().unwrap();
             mapper.insert_scan(&scan(seed)).unwrap();
             mapper.flush().unwrap();
@@ -332,7 +332,7 @@ fn snapshots_outlive_the_loss_of_the_log_and_of_tables_in_place() {
         assert_eq!(digest_of(&disk, Some("first")).unwrap(), digests[0], "{lost:?}");
         assert_eq!(digest_of(&disk, Some("second")).unwrap(), digests[1], "{lost:?}");
     }
-    // A table in place is damaged: the tile goes, but not what snapshots see of it.
+    // A current table is damaged: the tile is lost from the map, but not from snapshots.
     let disk = whole.copy();
     let files = disk.files();
     let kept = files.keys().find(|path| path.to_string_lossy().contains(".flush")).unwrap();
@@ -347,7 +347,7 @@ fn snapshots_outlive_the_loss_of_the_log_and_of_tables_in_place() {
 
 /// A flush is committed and named by `metadata.json`, its tables wait for their names, and the log is lost.
 #[test]
-fn a_repair_that_completes_a_commit_without_a_log_takes_nothing_from_snapshots() {
+fn a_repair_that_completes_a_commit_does_not_change_snapshots() {
     for storage in [Storage::OctoMap, Storage::Compact] {
         let (whole, digests) = small(storage);
         snapshot(at(&whole), &name("third")).unwrap();
@@ -491,7 +491,7 @@ fn a_diff_counts_what_a_naive_one_counts() {
     assert!(matches!(error, Error::Mismatch { what: "resolution", .. }), "{error:#}");
 }
 
-/// A file of two names is not written to through one of them.
+/// Writing a hard-linked file through one name does not change the other.
 #[test]
 #[cfg(unix)]
 fn a_linked_file_that_is_created_anew_leaves_the_other_name_its_content() {

@@ -45,17 +45,17 @@ fn copy(from: &Path, to: &Path) {
 }
 
 #[test]
-fn what_came_after_the_last_flush_is_lost_whole_and_nothing_else() {
+fn a_crash_loses_only_scans_after_the_last_flush() {
     let folder = TempDir::new().unwrap();
     let path = map(&folder);
     let flushed = voxels_of(&MapReader::open(&path, 1 << 20).unwrap());
     let mut mapper = open(&path).unwrap();
     for seed in 10..14 {
-        // Evictions write tiles all the while.
+        // Evictions write tiles during this loop.
         mapper.insert_scan(&random_scan(&mut Random(seed), [0.5; 3], 30)).unwrap();
     }
     assert!(!mapper.take_saved_tiles().is_empty());
-    assert_eq!(voxels_of(&MapReader::open(&path, 1 << 20).unwrap()), flushed, "a reader beside the writer");
+    assert_eq!(voxels_of(&MapReader::open(&path, 1 << 20).unwrap()), flushed, "a concurrent reader");
     let crashed = folder.path().join("crashed");
     copy(&path, &crashed);
     let reopened = open(&crashed).unwrap();
@@ -65,7 +65,7 @@ fn what_came_after_the_last_flush_is_lost_whole_and_nothing_else() {
     assert_eq!(leftovers, 0);
 }
 
-/// Where the trailer of a table begins.
+/// Returns the start of the trailer of a table.
 fn entries_end(table: &[u8]) -> usize {
     16 + 18 * u64::from_le_bytes(table[8..16].try_into().unwrap()) as usize
 }
@@ -76,7 +76,7 @@ fn walk(folder: &Path) -> Vec<PathBuf> {
 }
 
 #[test]
-fn a_commit_whose_renames_were_cut_short_is_finished_on_opening() {
+fn opening_completes_the_renames_of_a_commit() {
     let folder = TempDir::new().unwrap();
     let path = map(&folder);
     let before = folder.path().join("before");
@@ -86,7 +86,7 @@ fn a_commit_whose_renames_were_cut_short_is_finished_on_opening() {
     mapper.flush().unwrap();
     let committed = voxels_of(&mapper);
     drop(mapper);
-    // As if the power had gone after the record: old files, new ones beside them, the new log.
+    // As after a power cut following the commit record: old files, new ones next to them, the new log.
     let cut = folder.path().join("cut");
     copy(&before, &cut);
     fs::copy(path.join("commits.log"), cut.join("commits.log")).unwrap();
@@ -101,13 +101,13 @@ fn a_commit_whose_renames_were_cut_short_is_finished_on_opening() {
             }
         }
     }
-    assert_eq!(voxels_of(&MapReader::open(&cut, 1 << 20).unwrap()), committed, "read beside nobody");
+    assert_eq!(voxels_of(&MapReader::open(&cut, 1 << 20).unwrap()), committed, "read without a writer");
     let mapper = open(&cut).unwrap();
     assert_eq!((voxels_of(&mapper), mapper.scan_number()), (committed, 4));
 }
 
 #[test]
-fn one_writer_at_a_time_and_readers_beside_it() {
+fn one_writer_and_several_readers() {
     let folder = TempDir::new().unwrap();
     let path = map(&folder);
     let writer = open(&path).unwrap();
@@ -118,7 +118,7 @@ fn one_writer_at_a_time_and_readers_beside_it() {
 }
 
 #[test]
-fn a_reader_sees_one_flush_whole_however_often_the_map_is_flushed_meanwhile() {
+fn a_reader_sees_one_flush_during_later_flushes() {
     let folder = TempDir::new().unwrap();
     let path = map(&folder);
     let mut writer = open(&path).unwrap();
@@ -140,7 +140,7 @@ fn a_reader_sees_one_flush_whole_however_often_the_map_is_flushed_meanwhile() {
     writer.insert_scan(&random_scan(&mut Random(50), [0.0; 3], 30)).unwrap();
     writer.flush().unwrap();
     let kept = walk(&path).into_iter().filter(|path| path.to_string_lossy().contains(".bin.flush"));
-    assert_eq!(kept.count(), 0, "nobody reads any more");
+    assert_eq!(kept.count(), 0, "no reader is left");
     assert_eq!(MapReader::open(&path, 0).unwrap().digest().unwrap(), writer.digest().unwrap());
 }
 
@@ -151,12 +151,12 @@ fn kept_bytes(map: &Path) -> u64 {
 }
 
 #[test]
-fn a_reader_that_stays_keeps_one_version_of_the_tables_that_it_sees() {
+fn a_long_running_reader_keeps_one_version_of_its_tables() {
     let folder = TempDir::new().unwrap();
     let path = map(&folder);
     let mut writer = open(&path).unwrap();
     let mut insert = |seed: u64| {
-        // The robot moves on, so that tiles come that the reader has never seen.
+        // The robot moves, so that new tiles appear that the reader has never seen.
         let x = 0.2 * seed as f64;
         writer.insert_scan(&random_scan(&mut Random(seed), [x, 0.0, 0.0], 30)).unwrap();
         writer.flush().unwrap();
@@ -173,8 +173,8 @@ fn a_reader_that_stays_keeps_one_version_of_the_tables_that_it_sees() {
         let readers_bytes = seen_bytes + later.as_ref().map_or(0, |later| later.disk_bytes().unwrap().0);
         let kept = kept_bytes(&path);
         assert!(kept <= readers_bytes, "after {seed} flushes: {kept} bytes kept, {readers_bytes} seen");
-        let told = voxtile::operations::kept_bytes(&path).unwrap();
-        assert_eq!((told.reader_bytes, told.snapshot_bytes), (kept, 0));
+        let kept_by = voxtile::operations::kept_bytes(&path).unwrap();
+        assert_eq!((kept_by.reader_bytes, kept_by.snapshot_bytes), (kept, 0));
     }
     assert_eq!(reader.digest().unwrap(), digest);
     assert!(kept_bytes(&path) > 0);
@@ -184,7 +184,7 @@ fn a_reader_that_stays_keeps_one_version_of_the_tables_that_it_sees() {
     let now = reader.digest().unwrap();
     insert(31);
     assert!(kept_bytes(&path) <= reader.disk_bytes().unwrap().0);
-    assert_eq!(reader.digest().unwrap(), now, "beside a writer that has seen it refreshed");
+    assert_eq!(reader.digest().unwrap(), now, "with a writer that knows of the refresh");
     reader.refresh().unwrap();
     insert(32);
     drop(reader);
@@ -194,7 +194,7 @@ fn a_reader_that_stays_keeps_one_version_of_the_tables_that_it_sees() {
 
 #[test]
 #[cfg(unix)]
-fn a_lock_that_is_taken_away_or_taken_by_a_stranger_lets_no_two_write() {
+fn a_removed_or_foreign_lock_never_allows_two_writers() {
     use std::os::unix::fs::PermissionsExt;
     let folder = TempDir::new().unwrap();
     let path = map(&folder);
@@ -203,13 +203,13 @@ fn a_lock_that_is_taken_away_or_taken_by_a_stranger_lets_no_two_write() {
     let scan = |seed| random_scan(&mut Random(seed), [0.0; 3], 10);
     first.insert_scan(&scan(1)).unwrap();
     first.flush().unwrap();
-    // Who may read the map may not open what keeps writers out, and so cannot lock it.
+    // Read-only users must not be able to open the lock file, because they could lock it.
     let mode = fs::metadata(&lock).unwrap().permissions().mode();
     assert_eq!(mode & !(mode << 1) & 0o044, 0, "{mode:o}");
     fs::remove_file(&lock).unwrap();
     let mut second = open(&path).unwrap();
     second.insert_scan(&scan(2)).unwrap();
-    // Refused here already if a tile has to go.
+    // Already fails here if a tile must be evicted.
     let _ = first.insert_scan(&scan(3));
     assert!(matches!(first.flush(), Err(Error::LockLost { .. })));
     second.flush().unwrap();
@@ -217,11 +217,11 @@ fn a_lock_that_is_taken_away_or_taken_by_a_stranger_lets_no_two_write() {
     assert!(matches!(first.flush(), Err(Error::LockLost { .. })));
     drop((first, second));
     assert_eq!(open(&path).unwrap().digest().unwrap(), digest);
-    // One that others may read, as earlier versions made it.
+    // A lock file that others may read, as earlier versions created it.
     fs::set_permissions(&lock, fs::Permissions::from_mode(0o664)).unwrap();
     drop(open(&path).unwrap());
     assert_eq!(fs::metadata(&lock).unwrap().permissions().mode() & 0o777, 0o660);
-    // What is no file is named, found and moved away.
+    // A lock that is not a file is reported and moved away.
     fs::remove_file(&lock).unwrap();
     fs::create_dir(&lock).unwrap();
     assert!(message_of(open(&path)).contains("writer.lock"));
@@ -233,7 +233,7 @@ fn a_lock_that_is_taken_away_or_taken_by_a_stranger_lets_no_two_write() {
 }
 
 #[test]
-fn a_folder_in_place_of_an_octree_stops_nobody() {
+fn a_folder_in_place_of_an_octree_is_moved_away() {
     let folder = TempDir::new().unwrap();
     let path = map(&folder);
     let mut writer = open(&path).unwrap();
@@ -244,7 +244,7 @@ fn a_folder_in_place_of_an_octree_stops_nobody() {
     for octree in &octrees {
         fs::remove_file(octree).unwrap();
         fs::create_dir(octree).unwrap();
-        fs::write(octree.join("note"), "a stranger's").unwrap();
+        fs::write(octree.join("note"), "a foreign file").unwrap();
     }
     for seed in 2..4 {
         writer.insert_scan(&scan(seed)).unwrap();
@@ -260,7 +260,7 @@ fn a_folder_in_place_of_an_octree_stops_nobody() {
 }
 
 #[test]
-fn other_parameters_are_refused_with_both_values() {
+fn different_parameters_are_errors_with_both_values() {
     let folder = TempDir::new().unwrap();
     let path = map(&folder);
     let other = |resolution_m, tile_size_m| MapConfig::new(resolution_m, tile_size_m).unwrap();
@@ -278,7 +278,7 @@ fn other_parameters_are_refused_with_both_values() {
 }
 
 #[test]
-fn damage_is_named_when_read_and_a_damaged_tile_is_never_overwritten() {
+fn damage_is_reported_and_never_overwritten() {
     let folder = TempDir::new().unwrap();
     let path = map(&folder);
     let tile = TileIndex::new(0, 0, 0);
@@ -298,8 +298,8 @@ fn damage_is_named_when_read_and_a_damaged_tile_is_never_overwritten() {
         let error = reader.tile(tile).unwrap_err();
         assert!(matches!(&error, Error::Damaged { tile: Some(named), .. } if *named == tile), "{error:#}");
         assert!(error.to_string().contains("tile_0_0_0"), "{error:#}");
-        assert!(reader.tile(TileIndex::new(-1, 0, 0)).unwrap().is_some(), "the others go on working");
-        // A scan that touches it is refused as a whole, and the file stays.
+        assert!(reader.tile(TileIndex::new(-1, 0, 0)).unwrap().is_some(), "other tiles can be read");
+        // A scan that touches the damaged tile fails as a whole, and the file is kept.
         let mut mapper = open(&path).unwrap();
         let before = mapper.scan_number();
         assert!(mapper.insert_scan(&random_scan(&mut Random(3), [0.0; 3], 30)).is_err());
@@ -341,11 +341,11 @@ fn a_stray_tile_folder_is_neither_read_nor_overwritten() {
 }
 
 #[test]
-fn a_map_of_the_seeds_own_format_opens_and_is_adopted_on_the_first_write() {
+fn a_map_of_the_original_format_is_converted_on_the_first_write() {
     let folder = TempDir::new().unwrap();
     let path = map(&folder);
     let voxels = voxels_of(&MapReader::open(&path, 1 << 20).unwrap());
-    // Take from it all that is ours, and the order of the entries.
+    // Remove all voxtile extensions and the order of the entries.
     fs::remove_file(path.join("commits.log")).unwrap();
     let metadata = r#"{"version": "1.0", "resolution": 0.1, "tile_size": 3.2, "bounds": {"min": [0,0,0], "max": [0,0,0]}}"#;
     fs::write(path.join("metadata.json"), metadata).unwrap();
@@ -369,7 +369,7 @@ fn a_map_of_the_seeds_own_format_opens_and_is_adopted_on_the_first_write() {
 }
 
 #[test]
-fn inputs_with_long_names_and_many_skipped_scans_leave_a_map_that_opens() {
+fn inputs_with_long_names_and_many_skipped_scans() {
     let folder = TempDir::new().unwrap();
     let path = folder.path().join("map");
     let mut mapper =
@@ -387,7 +387,7 @@ fn inputs_with_long_names_and_many_skipped_scans_leave_a_map_that_opens() {
     begin(60, None);
     mapper.flush().unwrap();
     drop(mapper);
-    // As much as earlier versions read.
+    // Earlier versions read at most this much.
     assert!(fs::metadata(path.join("metadata.json")).unwrap().len() < 1 << 20);
     let mut mapper = open(&path).unwrap();
     let inputs = mapper.inputs();
@@ -419,22 +419,22 @@ fn a_map_whose_metadata_has_grown_beyond_a_mebibyte_opens_and_its_next_flush_cut
     assert!((100..300).contains(&inputs.len()) && inputs.last().unwrap().name.starts_with("299 x"));
 }
 
-/// What a file manager leaves, and a name that no list of names shows.
+/// A file of a file manager, and a name that is not valid UTF-8.
 #[test]
 #[cfg(target_os = "linux")]
-fn somebody_elses_file_in_the_folder_of_a_removed_tile_stops_nobody() {
+fn a_foreign_file_in_the_folder_of_a_removed_tile_is_kept() {
     use std::os::unix::ffi::OsStrExt;
     let tile = TileIndex::new(0, 0, 0);
     for name in [&b".DS_Store"[..], b"na\xefve"] {
         let folder = TempDir::new().unwrap();
         let path = map(&folder);
         let stray = path.join("tile_0_0_0").join(std::ffi::OsStr::from_bytes(name));
-        fs::write(&stray, "a stranger's").unwrap();
+        fs::write(&stray, "a foreign file").unwrap();
         let mut store = TileStore::open(UnsyncedDisk::shared(), &path).unwrap();
         store.remove(tile).unwrap();
         store.commit(store.metadata().clone(), store.commits().scan_number).unwrap();
         drop(store);
-        // The first opening ends the removal, the later ones look at what is left.
+        // The first writer completes the removal; later ones find the remaining file.
         for seed in 60..63 {
             let mut mapper = open(&path).unwrap();
             mapper.insert_scan(&random_scan(&mut Random(seed), [100.0, 0.0, 0.0], 10)).unwrap();
@@ -449,12 +449,12 @@ fn somebody_elses_file_in_the_folder_of_a_removed_tile_stops_nobody() {
         assert!(mapper.tile(tile).unwrap().is_some());
         drop(mapper);
         assert!(verify(&path, |_| (), |_, _| ()).unwrap().is_whole());
-        assert_eq!(fs::read(&stray).unwrap(), b"a stranger's");
+        assert_eq!(fs::read(&stray).unwrap(), b"a foreign file");
     }
 }
 
 #[test]
-fn octree_files_are_what_the_octree_of_the_table_gives() {
+fn octree_files_equal_the_octree_of_the_table() {
     let folder = TempDir::new().unwrap();
     let path = map(&folder);
     let reader = MapReader::open(&path, 1 << 20).unwrap();
@@ -468,9 +468,9 @@ fn octree_files_are_what_the_octree_of_the_table_gives() {
     }
 }
 
-/// The digest is stable: that of a map in the repository, and of the same city mapped again today.
+/// The digest is stable: the map in the repository has that of a rebuilt map of the same city.
 #[test]
-fn the_example_in_the_repository_has_the_digest_that_its_city_gives() {
+fn the_example_map_has_the_digest_of_its_rebuilt_city() {
     let golden = "a6c7d4295b7b4c7095b24eac4ea6227dfb799ad759fa1b4428543507e5ac7b7b";
     let example_folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("map_tiles_example");
     let example = MapReader::open(&example_folder, 1 << 20).unwrap();

@@ -7,7 +7,7 @@ use voxtile::integrity::repair;
 use voxtile::operations::delete_snapshot;
 use voxtile::{Digest, MapReader, Mapper, OutOfCoreTileMapper, Result, Storage};
 
-/// A map of a few tiles with a snapshot that sees tables of its own.
+/// A map of a few tiles with a snapshot that needs older tables.
 fn small(storage: Storage) -> FaultyDisk {
     let disk = FaultyDisk::new(Fault::None);
     let mut mapper = OutOfCoreTileMapper::create(at(&disk), config().with_storage(storage)).unwrap();
@@ -27,8 +27,8 @@ fn digests(disk: &FaultyDisk) -> Result<[Digest; 2]> {
     Ok([digest_of(disk, None)?, digest_of(disk, Some("s"))?])
 }
 
-/// A scan far from all tiles, flushed.
-fn go_on(disk: &FaultyDisk, storage: Storage) -> Result<()> {
+/// Inserts and flushes a scan far from all tiles.
+fn continue_map(disk: &FaultyDisk, storage: Storage) -> Result<()> {
     let mut mapper = OutOfCoreTileMapper::open(at(disk), config().with_storage(storage))?;
     mapper.insert_scan(&random_scan(&mut Random(9), [300.0, 0.0, 0.0], 5))?;
     mapper.flush()
@@ -39,7 +39,7 @@ fn is_index(path: &Path) -> bool {
 }
 
 #[test]
-fn a_file_that_cannot_be_read_is_a_finding_and_mapping_goes_on_and_all_else_is_repaired() {
+fn an_unreadable_file_is_reported_and_everything_else_is_repaired() {
     for storage in [Storage::OctoMap, Storage::Compact] {
         let whole = small(storage);
         let before = digests(&whole).unwrap();
@@ -50,10 +50,10 @@ fn a_file_that_cannot_be_read_is_a_finding_and_mapping_goes_on_and_all_else_is_r
             let found = damage_in(&disk);
             assert!(found.contains(path) && found.len() == 1, "{what}: {found:?}");
             if !is_index(path) {
-                go_on(&disk, storage).unwrap_or_else(|error| panic!("{what}: {error:#}"));
+                continue_map(&disk, storage).unwrap_or_else(|error| panic!("{what}: {error:#}"));
             }
             if path.ends_with("s") {
-                // What it sees stays, and it can be deleted.
+                // The content of the snapshot is unchanged, and the snapshot can be deleted.
                 let deleted = disk.clone();
                 deleted.mend();
                 assert_eq!(digests(&deleted).unwrap()[1], before[1], "{what}");
@@ -77,7 +77,7 @@ fn a_file_that_cannot_be_read_is_a_finding_and_mapping_goes_on_and_all_else_is_r
             } else {
                 assert!(!repair.is_complete(), "{what}");
             }
-            // Nothing was deleted.
+            // No file was deleted.
             disk.mend();
             let is_in_quarantine = |path: &PathBuf| path.starts_with(map().join("quarantine"));
             assert!(disk.files().keys().any(is_in_quarantine), "{what}");
@@ -86,7 +86,7 @@ fn a_file_that_cannot_be_read_is_a_finding_and_mapping_goes_on_and_all_else_is_r
 }
 
 #[test]
-fn a_file_on_which_every_operation_fails_stops_nothing_but_itself() {
+fn a_file_on_which_every_operation_fails_affects_no_other_file() {
     let whole = small(Storage::OctoMap);
     let before = digests(&whole).unwrap();
     for path in whole.files().keys().filter(|path| !path.ends_with("writer.lock")) {
@@ -95,13 +95,13 @@ fn a_file_on_which_every_operation_fails_stops_nothing_but_itself() {
         disk.break_path(path);
         let found = damage_in(&disk);
         assert!(found.contains(path), "{what}: {found:?}");
-        match go_on(&disk, Storage::OctoMap) {
+        match continue_map(&disk, Storage::OctoMap) {
             Ok(()) => assert!(!is_index(path), "{what}"),
             Err(error) => {
                 assert!(is_index(path) && format!("{error:#}").contains(&what), "{what}: {error:#}")
             }
         }
-        // A repair does what it can, or says which file stops it; nothing is lost.
+        // A repair either succeeds or names the file that stops it; nothing is lost.
         if let Err(error) = repair(at(&disk), |_| (), |_, _| ()) {
             assert!(format!("{error:#}").contains(&what), "{what}: {error:#}");
         }
@@ -116,16 +116,16 @@ fn a_file_on_which_every_operation_fails_stops_nothing_but_itself() {
             disk.break_path(folder);
             let what = folder.display().to_string();
             assert!(!damage_in(&disk).is_empty(), "{what}");
-            go_on(&disk, Storage::OctoMap).unwrap_or_else(|error| panic!("{what}: {error:#}"));
+            continue_map(&disk, Storage::OctoMap).unwrap_or_else(|error| panic!("{what}: {error:#}"));
             disk.mend();
             assert_eq!(digests(&disk).unwrap()[1], before[1], "{what}");
         }
     }
 }
 
-/// What can be read of a list of scans before a bad sector stays the list.
+/// Records before a bad sector of the list of scans are kept.
 #[test]
-fn a_bad_sector_of_the_list_of_scans_leaves_those_before_it() {
+fn a_bad_sector_of_the_list_of_scans_keeps_records_before_it() {
     let path = map().join("scans.bin");
     for storage in [Storage::OctoMap, Storage::Compact] {
         for disk in [small(storage), small(storage).without_links()] {
@@ -145,7 +145,7 @@ fn a_bad_sector_of_the_list_of_scans_leaves_those_before_it() {
                 path.starts_with(map().join("quarantine")) && bytes == list
             };
             assert!(disk.files().into_iter().any(is_kept));
-            go_on(&disk, storage).unwrap();
+            continue_map(&disk, storage).unwrap();
             assert_eq!(numbers(), [1, 2, 5]);
         }
     }

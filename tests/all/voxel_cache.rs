@@ -11,7 +11,7 @@ use voxtile::{InMemoryMapper, InsertMode, MapConfig, MapPath, MapView, Mapper, O
 use voxtile::{MapQueries, VoxelCacheConfig, VoxelCacheMode};
 use voxtile_simulation::Survey;
 
-/// Every mode, with caches that hold nothing, little, and what they like.
+/// Every mode, with caches that hold nothing, little, and any number of voxels.
 fn modes() -> Vec<VoxelCacheMode> {
     let shapes =
         [(1, Some(1)), (2, Some(64)), (4, None)].map(|(tau, buckets)| VoxelCacheConfig::new(tau, buckets));
@@ -25,7 +25,8 @@ fn config() -> MapConfig {
     MapConfig::new(0.1, 1.6).unwrap().with_range(0.5, 3.0)
 }
 
-/// The largest log-odds of the known voxels of every node of a depth, by the lowest voxel's index over the node's size.
+/// Returns the maximum log-odds of the known voxels in every node of a depth, by the lowest voxel's index over the
+/// node's size.
 fn maxima(reference: &ReferenceMap, depth: u8) -> BTreeMap<VoxelIndex, f32> {
     let mut maxima = BTreeMap::new();
     for (voxel, &(bits, _)) in &reference.voxels {
@@ -36,13 +37,13 @@ fn maxima(reference: &ReferenceMap, depth: u8) -> BTreeMap<VoxelIndex, f32> {
     maxima
 }
 
-/// Asks a mapper for some nodes of a depth.
+/// Compares some nodes of a depth with the naive maxima.
 fn assert_coarse_answers(mapper: &impl Mapper, reference: &ReferenceMap, depth: u8, step: usize) {
     for (node, max) in maxima(reference, depth).into_iter().step_by(step) {
         let point_m = mapper.config().grid.center_m(node.map(|index| index << (16 - depth)));
         let answer = mapper.occupancy_at_depth(point_m, depth).unwrap().probability();
         if depth == 16 {
-            // The voxel itself, as exact as it is.
+            // At the finest depth, the exact voxel.
             let exact = f64::from_bits(reference.voxels[&node].0);
             assert_eq!(answer, Some(voxtile::maths::sigmoid(exact)), "voxel {node:?}");
             continue;
@@ -51,7 +52,7 @@ fn assert_coarse_answers(mapper: &impl Mapper, reference: &ReferenceMap, depth: 
     }
 }
 
-/// A seeded drive with coarse queries on the way.
+/// Inserts a seeded drive with coarse queries in between.
 fn drive(mapper: &mut impl Mapper, reference: &mut ReferenceMap, seed: u64) {
     let mut random = Random(seed);
     for step in 0..6 {
@@ -125,7 +126,7 @@ fn the_map_of_a_street_is_the_same_with_any_octree() {
     }
 }
 
-/// One random life of a map with little room, beside the naive one.
+/// Runs one random life of a map with little memory, and compares it with the naive one.
 fn live(seed: u64, mode: VoxelCacheMode) {
     let folder = memory_folder();
     let path = folder.path().join("map");
@@ -178,11 +179,11 @@ fn any_life_of_a_map_has_the_naive_maxima_at_every_moment() {
     }
 }
 
-/// A cache as the paper's section 4.2 tells it, for the voxels of one tile.
+/// A cache as in section 4.2 of the paper, for the voxels of one tile.
 #[derive(Default)]
 struct NaiveCache {
     buckets: BTreeMap<u64, Vec<MortonCode>>,
-    /// What was put in or changed since the octree was last brought up to date.
+    /// Counts since the last update of the octree.
     counts: VoxelCacheCounts,
 }
 
@@ -292,7 +293,7 @@ fn a_cache_without_a_size_holds_what_the_scans_of_its_tile_repeat() {
     }
 }
 
-/// Mappers may be handed from thread to thread, and end in any.
+/// Mappers can be moved to another thread and dropped there.
 #[test]
 fn a_mapper_with_a_worker_moves_between_threads() {
     let mode = VoxelCacheMode::Parallel(VoxelCacheConfig::new(1, 1));

@@ -1,4 +1,4 @@
-//! Scans whose updates alone are more than the memory that there is.
+//! Scans whose updates exceed the memory limit.
 
 use std::path::{Path, PathBuf};
 use testkit::faulty_disk::{Fault, FaultyDisk, Unsynced};
@@ -10,7 +10,7 @@ use voxtile::{
     OutOfCoreTileMapper, Queries, Scan, Storage,
 };
 
-/// From masts here and there: every ray goes far, through many tiles.
+/// Scans from scattered masts: long rays through many tiles.
 fn scans() -> Vec<Scan> {
     let mut random = Random(11);
     let masts = [0.0, 0.0, 9.0, 0.0, -7.0, 9.0];
@@ -31,7 +31,7 @@ fn configs() -> impl Iterator<Item = MapConfig> {
 }
 
 #[test]
-fn a_scan_of_more_updates_than_memory_is_taken_whole() {
+fn a_scan_with_more_updates_than_memory_is_inserted_completely() {
     let scans = scans();
     for config in configs() {
         let mut expected = InMemoryMapper::new(config.clone()).unwrap();
@@ -68,13 +68,13 @@ fn a_scan_of_more_updates_than_memory_is_taken_whole() {
     }
 }
 
-/// How many operations are tried.
+/// Number of operations that are tested.
 const POINTS: u64 = 24;
 
-/// A disk that refuses once, at any operation: the scan is undone, and goes the next time; a crash opens as of the last
-/// flush, and what waited in files is gone.
+/// The disk fails once at any operation: the scan is undone and can be repeated. After a crash the map is at the last
+/// flush, without the updates that waited in files.
 #[test]
-fn a_wide_scan_that_the_disk_refuses_is_undone() {
+fn a_wide_scan_that_fails_is_undone() {
     let scans = &scans()[..4];
     let config = MapConfig::new(0.4, 6.4).unwrap();
     let tight = config.clone().with_tight_memory_bytes(5_000);
@@ -128,7 +128,7 @@ fn a_wide_scan_that_the_disk_refuses_is_undone() {
             let waits = |path: &PathBuf| path.ends_with("updates.next");
             let bytes: usize =
                 disk.files().iter().filter(|(path, _)| waits(path)).map(|(_, bytes)| bytes.len()).sum();
-            assert_eq!(mapper.statistics().spilled_bytes, bytes as u64, "of a scan that is not in the map");
+            assert_eq!(mapper.statistics().spilled_bytes, bytes as u64, "bytes of a failed scan");
             assert_eq!(mapper.digest().unwrap(), digests[1], "refused at {at}");
             mapper.insert_scan(&scans[2]).unwrap();
         }
@@ -139,10 +139,10 @@ fn a_wide_scan_that_the_disk_refuses_is_undone() {
     assert!(refusals > POINTS as usize / 4, "{refusals} scans were refused");
 }
 
-/// What is known of a tile takes memory, too. A scan that touches more tiles than there is room to know of is refused
-/// as a whole, and is no reason to refuse the next one.
+/// The index of tiles takes memory, too. A scan that touches more tiles than fit is an error, and the next one
+/// succeeds.
 #[test]
-fn a_scan_of_more_tiles_than_memory_can_know_of_is_refused_and_the_map_goes_on() {
+fn a_scan_of_too_many_tiles_is_an_error_and_the_next_one_succeeds() {
     let folder = memory_folder();
     let config = MapConfig::new(0.1, 0.2).unwrap();
     let mut expected = InMemoryMapper::new(config.clone()).unwrap();
@@ -162,7 +162,7 @@ fn a_scan_of_more_tiles_than_memory_can_know_of_is_refused_and_the_map_goes_on()
     assert_eq!(mapper.statistics().spilled_bytes, 0);
 }
 
-/// New tiles are made while there is room, and long level rays make each much larger than its updates are.
+/// New tiles are created while memory lasts, and long level rays make each tile much larger than its updates.
 #[test]
 fn many_new_tiles_at_once_stay_within_the_limit() {
     const LIMIT_BYTES: u64 = 96 << 20;
@@ -180,7 +180,8 @@ fn many_new_tiles_at_once_stay_within_the_limit() {
     let statistics = mapper.statistics();
     let memory = statistics.memory;
     assert!(statistics.cached_tiles > 500 && memory.write_buffer > 0, "{statistics:?}");
-    // Three eighths wait for tiles in the compact form. The last tiles that were made may be beyond.
+    // Three eighths of the limit are reserved for tiles in the compact form. The last created tiles may exceed the
+    // limit.
     let beyond = (memory.bytes() + LIMIT_BYTES / 8 * 3).saturating_sub(LIMIT_BYTES);
     assert!(beyond < 14 << 20, "{beyond} bytes beyond: {memory:?}");
 }

@@ -6,8 +6,8 @@ use voxtile::operations::{Part, Prefer, clear, crop, merge};
 use voxtile::space::Aabb;
 use voxtile::{Error, MapConfig, MapPath, MapQueries, MapReader};
 
-/// A box around the voxels of [`random_voxels`]: bounds between voxels and on their borders and centers, some beyond
-/// all.
+/// A random box around the voxels of [`random_voxels`]: bounds between voxels, on their borders and centers, and beyond
+/// all of them.
 fn random_box(random: &mut Random) -> Aabb {
     let center = [[0.0, -35.0, 16_383.0][random.below(3) as usize], 1.5, -1.0];
     let mut bound = |center: f64| match random.below(5) {
@@ -34,7 +34,7 @@ fn naive(config: &MapConfig, voxels: &Voxels, part: &Part) -> Voxels {
 }
 
 #[test]
-fn crop_and_clear_are_filters_and_what_is_cut_apart_is_the_whole_again() {
+fn crop_and_clear_are_filters_and_crops_merge_to_the_whole() {
     let (mut cut_through, mut removed, mut untouched) = (0, 0, 0);
     for seed in 0..80 {
         let mut random = Random(seed);
@@ -81,7 +81,7 @@ fn crop_and_clear_are_filters_and_what_is_cut_apart_is_the_whole_again() {
 }
 
 #[test]
-fn a_part_keeps_the_number_of_scans_and_no_identity() {
+fn a_crop_keeps_the_scan_number_and_gets_a_new_id() {
     let (disk, mut random) = (disk(), Random(1));
     let config = config(&mut random);
     write_map(&disk, &path("whole"), &config, &random_voxels(&mut random, 50));
@@ -95,7 +95,7 @@ fn a_part_keeps_the_number_of_scans_and_no_identity() {
 }
 
 #[test]
-fn a_box_that_is_none_is_refused() {
+fn an_empty_box_is_an_error() {
     let (disk, mut random) = (disk(), Random(1));
     write_map(&disk, &path("whole"), &config(&mut random), &random_voxels(&mut random, 50));
     for region in
@@ -112,7 +112,7 @@ fn a_box_that_is_none_is_refused() {
 }
 
 #[test]
-fn no_map_is_made_inside_of_another() {
+fn a_map_cannot_be_created_inside_another() {
     let mut random = Random(7);
     let (disk, config) = (disk(), config(&mut random));
     write_map(&disk, &path("whole"), &config, &random_voxels(&mut random, 50));

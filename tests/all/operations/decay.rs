@@ -21,7 +21,7 @@ fn naive(voxels: &Voxels, halflife: f64, scans: u64, forget_below: f64) -> Voxel
     for (&voxel, &(bits, count)) in voxels {
         let before = f64::from_bits(bits);
         let mut after = before * factor;
-        // What was not 0 stays apart from 0, on its side, as f32 too.
+        // Log-odds other than 0 keep their sign, also as `f32`.
         let least = f64::from(f32::MIN_POSITIVE);
         if after.abs() < least && before != 0.0 {
             after = least.min(before.abs()) * before.signum();
@@ -34,7 +34,7 @@ fn naive(voxels: &Voxels, halflife: f64, scans: u64, forget_below: f64) -> Voxel
 }
 
 #[test]
-fn log_odds_fade_by_the_rule_and_counts_stay() {
+fn log_odds_decay_by_the_rule_and_counts_are_unchanged() {
     let (mut forgotten, mut removed) = (0, 0);
     for seed in 0..60 {
         let mut random = Random(seed);
@@ -59,7 +59,7 @@ fn log_odds_fade_by_the_rule_and_counts_stay() {
 }
 
 #[test]
-fn what_is_free_stays_free_however_much_has_faded() {
+fn free_voxels_stay_free_after_any_decay() {
     let disk = disk();
     let voxels = Voxels::from([([0, 0, 0], ((-2.0_f64).to_bits(), 5)), ([9, 0, 0], (3.0_f64.to_bits(), 5))]);
     write_map(&disk, &path("map"), &MapConfig::new(0.5, 2.5).unwrap(), &voxels);
@@ -89,7 +89,7 @@ fn insert(mapper: &mut OutOfCoreTileMapper, random: &mut Random, scans: usize) {
 }
 
 #[test]
-fn the_scans_since_the_last_time_count_once() {
+fn only_scans_since_the_last_decay_count() {
     let (disk, mapper) = mapped(6);
     let config = mapper.config().clone();
     assert!(matches!(decay(&disk, &Decay::new(4.0)), Err(Error::Locked { .. })));
@@ -100,8 +100,8 @@ fn the_scans_since_the_last_time_count_once() {
     assert_eq!(once, naive(&before, 4.0, 6, 0.0));
     let files = disk.files();
     assert_eq!(decay(&disk, &Decay::new(4.0)).unwrap().scans, 0);
-    assert_eq!(disk.files(), files, "nothing came since");
-    // Mapping goes on, in several flushes, which the number outlives.
+    assert_eq!(disk.files(), files, "no scans since the last decay");
+    // Inserts continue in several flushes, which must not reset the scan number of the last decay.
     let mut mapper = OutOfCoreTileMapper::open(MapPath::on(disk.shared(), path("map")), config).unwrap();
     insert(&mut mapper, &mut Random(9), 2);
     mapper.begin_input("more").unwrap();
@@ -115,7 +115,7 @@ fn the_scans_since_the_last_time_count_once() {
 }
 
 #[test]
-fn a_snapshot_does_not_fade_and_a_revert_brings_back_what_has() {
+fn snapshots_do_not_decay_and_a_revert_restores_log_odds() {
     let (disk, mapper) = mapped(6);
     drop(mapper);
     let name = SnapshotName::new("before").unwrap();
@@ -133,7 +133,7 @@ fn a_snapshot_does_not_fade_and_a_revert_brings_back_what_has() {
 }
 
 #[test]
-fn a_map_that_was_put_together_from_its_tiles_does_not_fade_twice() {
+fn a_map_repaired_from_its_tiles_does_not_decay_twice() {
     let (disk, mapper) = mapped(6);
     drop(mapper);
     decay(&disk, &Decay::new(4.0)).unwrap();
@@ -146,7 +146,7 @@ fn a_map_that_was_put_together_from_its_tiles_does_not_fade_twice() {
 }
 
 #[test]
-fn a_rule_that_makes_no_sense_is_refused() {
+fn invalid_rules_are_errors() {
     let (disk, _) = mapped(1);
     for rule in [
         Decay::new(0.0),

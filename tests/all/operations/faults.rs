@@ -27,7 +27,7 @@ fn two_maps(storage: Storage) -> FaultyDisk {
     disk.copy()
 }
 
-/// What is done to a map, again after a failure.
+/// An operation that can be repeated after a failure.
 type Work = fn(&FaultyDisk) -> Result<()>;
 
 fn region() -> Aabb {
@@ -49,13 +49,13 @@ fn make_shard(disk: &FaultyDisk) -> Result<()> {
     operations::make_shard(&open(disk, &path("a"))?, path("out"), ID, |_, _| {}).map(drop)
 }
 
-/// Makes a map that is not durable and moves it to its place, as a task does.
+/// Writes a map without syncs and moves it to its place, as a task of a distributed build does.
 fn move_shard(disk: &FaultyDisk) -> Result<()> {
     disk.take(&path("local"));
     let made = make_local(disk).and_then(|()| {
         operations::move_shard(MapPath::on(disk.shared(), path("local")), path("out"), ID, |_, _| {})
     });
-    // A task's folder goes with the task.
+    // A task removes its folder at the end.
     disk.take(&path("local"));
     disk.take(&path("local.unfinished"));
     made.map(drop)
@@ -71,7 +71,7 @@ fn make_local(disk: &FaultyDisk) -> Result<()> {
     mapper.flush()
 }
 
-/// The same where the map is a part of another.
+/// The same for a crop of another map.
 fn move_crop(disk: &FaultyDisk) -> Result<()> {
     disk.take(&path("local"));
     let crop = open(disk, &path("a"))
@@ -84,10 +84,10 @@ fn move_crop(disk: &FaultyDisk) -> Result<()> {
     made.map(drop)
 }
 
-/// A disk with two pieces of `a`.
-fn two_pieces(storage: Storage) -> FaultyDisk {
+/// A disk with two shards of `a`.
+fn two_shards(storage: Storage) -> FaultyDisk {
     let disk = two_maps(storage);
-    // Between tiles.
+    // A border between tiles.
     let west = Aabb { min: [-100.0; 3], max: [3.2, 100.0, 100.0] };
     for (name, part) in [("inside", Part::Inside(west)), ("outside", Part::Outside(west))] {
         operations::crop(&open(&disk, &path("a")).unwrap(), &part, path("crop"), |_, _| {}).unwrap();
@@ -98,15 +98,15 @@ fn two_pieces(storage: Storage) -> FaultyDisk {
 }
 
 fn join(disk: &FaultyDisk) -> Result<()> {
-    let pieces = ["inside", "outside"].map(|name| MapPath::on(disk.shared(), path(name)));
-    operations::join(&pieces, path("out"), |_, _| {}).map(drop)
+    let shards = ["inside", "outside"].map(|name| MapPath::on(disk.shared(), path(name)));
+    operations::join(&shards, path("out"), |_, _| {}).map(drop)
 }
 
-/// Puts the tiles of one map into the other, unless that is done.
-fn adopt(disk: &FaultyDisk) -> Result<()> {
+/// Replaces the tiles of one map by those of the other, unless that is already done.
+fn replace_tiles(disk: &FaultyDisk) -> Result<()> {
     const OF_FLUSH: u64 = 2;
     if open(disk, &path("a"))?.flush_number() > OF_FLUSH {
-        // What a commit has left to do is done by the next who writes.
+        // The next writer completes a commit.
         return TileStore::open(disk.shared(), &path("a")).map(drop);
     }
     let map = MapPath::on(disk.shared(), path("a"));
@@ -128,7 +128,7 @@ fn a_map_with_kept_scans(storage: Storage) -> FaultyDisk {
     disk.copy()
 }
 
-/// With room for one tile, so that others are written before the end.
+/// Memory for one tile, so that tiles are written before the end.
 fn rebuild(disk: &FaultyDisk) -> Result<()> {
     let map = open(disk, &path("a"))?;
     let config = MapConfig::new(0.2, 3.2)?.with_range(0.0, 3.0).with_storage(map.config().storage);
@@ -150,7 +150,7 @@ fn decay(disk: &FaultyDisk) -> Result<()> {
     .map(drop)
 }
 
-/// The digest of a map, `None` if there is none; of a damaged one there is none either, and that is a failure.
+/// Returns the digest of a map, or `None` if there is no map. Panics if the map is damaged.
 fn digest(disk: &FaultyDisk, name: &str) -> Option<voxtile::Digest> {
     match MapReader::open(MapPath::on(disk.shared(), path(name)), 0) {
         Ok(reader) => Some(reader.digest().unwrap_or_else(|error| panic!("{name}: {error:#}"))),
@@ -159,14 +159,13 @@ fn digest(disk: &FaultyDisk, name: &str) -> Option<voxtile::Digest> {
     }
 }
 
-/// The map that `work` changes or makes is as before or as after, whatever fails and wherever the power goes; and the
-/// same work, done again, ends as if nothing had happened.
+/// Checks that `work` is atomic under faults and power cuts, and that repeating it succeeds.
 fn check(storage: Storage, name: &'static str, work: Work) {
     check_from(two_maps(storage), name, work);
 }
 
 fn check_from(start: FaultyDisk, name: &'static str, work: Work) {
-    // A map of the original format goes on being adopted the next time.
+    // A map of the original format is converted by the repeated call.
     let is_own = start.files().contains_key(&path("a").join("commits.log"));
     let job = Job::new(start, path(name), work, move |disk| digest(disk, name));
     let job = if is_own { job.tidy() } else { job };
@@ -177,19 +176,19 @@ fn check_from(start: FaultyDisk, name: &'static str, work: Work) {
 }
 
 #[test]
-fn a_merge_is_there_whole_or_not_at_all() {
+fn a_merge_is_atomic() {
     check(Storage::OctoMap, "out", merge);
     check(Storage::Compact, "out", merge);
 }
 
 #[test]
-fn a_piece_is_there_whole_or_not_at_all() {
+fn a_shard_is_atomic() {
     check(Storage::OctoMap, "out", make_shard);
     check(Storage::Compact, "out", make_shard);
 }
 
 #[test]
-fn a_piece_that_is_moved_is_there_whole_and_durable_or_not_at_all() {
+fn a_move_of_a_shard_is_atomic_and_durable() {
     for storage in [Storage::OctoMap, Storage::Compact] {
         check(storage, "out", move_shard);
         check(storage, "out", move_crop);
@@ -197,21 +196,21 @@ fn a_piece_that_is_moved_is_there_whole_and_durable_or_not_at_all() {
 }
 
 #[test]
-fn pieces_are_one_map_or_as_they_were() {
-    check_from(two_pieces(Storage::OctoMap), "out", join);
-    check_from(two_pieces(Storage::Compact), "out", join);
-    check_from(two_pieces(Storage::Compact).without_links(), "out", join);
+fn a_join_is_atomic() {
+    check_from(two_shards(Storage::OctoMap), "out", join);
+    check_from(two_shards(Storage::Compact), "out", join);
+    check_from(two_shards(Storage::Compact).without_links(), "out", join);
 }
 
 #[test]
-fn a_map_of_kept_scans_is_there_whole_or_not_at_all() {
+fn a_rebuild_is_atomic() {
     check_from(a_map_with_kept_scans(Storage::OctoMap), "out", rebuild);
     check_from(a_map_with_kept_scans(Storage::Compact), "out", rebuild);
 }
 
-/// A request to stop leaves nothing behind, and no map that could be taken for the one that was asked for.
+/// A stop leaves no files, and no partial map.
 #[test]
-fn a_map_of_kept_scans_that_is_given_up_is_not_there() {
+fn a_stopped_rebuild_leaves_no_map() {
     let disk = a_map_with_kept_scans(Storage::Compact);
     let map = open(&disk, &path("a")).unwrap();
     let (stop, output) = (Stop::default(), MapPath::on(disk.shared(), path("out")));
@@ -232,24 +231,24 @@ fn a_map_of_kept_scans_that_is_given_up_is_not_there() {
 }
 
 #[test]
-fn a_crop_is_there_whole_or_not_at_all() {
+fn a_crop_is_atomic() {
     check(Storage::OctoMap, "out", crop);
 }
 
 #[test]
-fn tiles_of_parts_are_all_in_the_map_or_none() {
-    check(Storage::OctoMap, "a", adopt);
-    check(Storage::Compact, "a", adopt);
+fn a_replacement_of_tiles_is_atomic() {
+    check(Storage::OctoMap, "a", replace_tiles);
+    check(Storage::Compact, "a", replace_tiles);
 }
 
 #[test]
-fn a_part_is_cleared_whole_or_not_at_all() {
+fn a_clear_is_atomic() {
     check(Storage::OctoMap, "a", clear);
     check(Storage::Compact, "a", clear);
 }
 
 #[test]
-fn evidence_fades_whole_or_not_at_all_and_once() {
+fn a_decay_is_atomic_and_applied_once() {
     check(Storage::OctoMap, "a", decay);
     check(Storage::Compact, "a", decay);
 }
@@ -262,14 +261,14 @@ fn foreign() -> FaultyDisk {
 }
 
 #[test]
-fn maps_of_the_seeds_own_format_are_cut_and_cleared_too() {
+fn maps_of_the_original_format_are_cropped_and_cleared() {
     check_from(foreign(), "a", clear);
     let disk = foreign();
     crop(&disk).unwrap();
     clear(&disk).unwrap();
-    // Both have gone to the same voxels, and only one of them is a new map.
+    // Both results have the same voxels, but only one is a new map.
     assert_eq!(digest(&disk, "out"), digest(&disk, "a"));
     disk.take(&path("out"));
-    // `a` is voxtile's own by now, `b` is not.
+    // `a` has been converted to voxtile's format, `b` has not.
     assert!(merge(&disk).unwrap_err().to_string().contains("original format"));
 }

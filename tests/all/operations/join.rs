@@ -27,7 +27,7 @@ fn damage(disk: &FaultyDisk, map: &Path) -> Vec<String> {
     found
 }
 
-/// The files of tiles.
+/// Returns the files of tiles.
 fn tiles(disk: &FaultyDisk, map: &Path) -> Vec<(PathBuf, Vec<u8>)> {
     let is_of_tile = |file: &Path| {
         file.parent()
@@ -39,7 +39,7 @@ fn tiles(disk: &FaultyDisk, map: &Path) -> Vec<(PathBuf, Vec<u8>)> {
 }
 
 #[test]
-fn pieces_become_the_map_that_a_merge_makes_of_them() {
+fn joined_shards_equal_a_merge_of_them() {
     let mut joined_pieces = 0;
     for seed in 0..60 {
         let mut random = Random(seed);
@@ -68,7 +68,7 @@ fn pieces_become_the_map_that_a_merge_makes_of_them() {
         assert_eq!(read_map(&disk, &path("joined")), voxels, "seed {seed}");
         assert_eq!(damage(&disk, &path("joined")), Vec::<String>::new(), "seed {seed}");
         assert_eq!((written.tiles, written.voxels), (whole.tile_indices().len() as u64, voxels.len() as u64));
-        // Nothing but the id tells them from each other, and the map needs no piece.
+        // The shards differ only by the id, and the joined map does not need them.
         make_shard(&whole, path("same"), ID, |_, _| {}).unwrap();
         assert_eq!(tiles(&disk, &path("joined")), tiles(&disk, &path("same")), "seed {seed}");
         pieces.iter().for_each(|piece| disk.take(piece));
@@ -88,7 +88,7 @@ fn one_map(storage: Storage) -> FaultyDisk {
 }
 
 #[test]
-fn any_wrong_byte_of_a_map_is_found_before_it_is_a_piece() {
+fn any_damaged_byte_of_a_map_is_found_before_it_becomes_a_shard() {
     for storage in [Storage::OctoMap, Storage::Compact] {
         let disk = one_map(storage);
         for (file, bytes) in tiles(&disk, &path("map")) {
@@ -112,7 +112,7 @@ fn any_wrong_byte_of_a_map_is_found_before_it_is_a_piece() {
 }
 
 #[test]
-fn a_piece_without_a_file_or_with_a_shorter_one_is_named_and_there_is_no_map() {
+fn a_shard_with_a_missing_or_truncated_file_is_an_error_without_output() {
     for storage in [Storage::OctoMap, Storage::Compact] {
         let disk = one_map(storage);
         let piece = piece(&disk, &path("map"), ID).unwrap();
@@ -139,12 +139,12 @@ fn move_shard(disk: &FaultyDisk, map: &Path, id: [u8; 16]) -> Result<PathBuf> {
 }
 
 #[test]
-fn a_map_that_is_moved_is_the_piece_that_a_copy_is() {
+fn a_moved_map_equals_a_copied_shard() {
     for storage in [Storage::OctoMap, Storage::Compact] {
         let disk = one_map(storage);
         let copy = piece(&disk, &path("map"), ID).unwrap();
         let files = tiles(&disk, &copy);
-        // It has another id, so that it is copied, too.
+        // This map has another id, so it is copied, too.
         let moved = move_shard(&disk, &path("map"), ID).unwrap();
         assert_eq!(tiles(&disk, &moved), files);
         assert_eq!(open(&disk, &moved).unwrap().metadata().ext.as_ref().unwrap().map_id, "07".repeat(16));
@@ -162,7 +162,7 @@ fn a_map_that_is_moved_is_the_piece_that_a_copy_is() {
 }
 
 #[test]
-fn a_map_without_a_file_or_with_a_shorter_one_is_named_and_not_moved() {
+fn a_map_with_a_missing_or_truncated_file_is_not_moved() {
     for storage in [Storage::OctoMap, Storage::Compact] {
         let disk = one_map(storage);
         let map = piece(&disk, &path("map"), ID).unwrap();
@@ -184,7 +184,7 @@ fn a_map_without_a_file_or_with_a_shorter_one_is_named_and_not_moved() {
 }
 
 #[test]
-fn pieces_that_do_not_go_together_are_no_map() {
+fn incompatible_shards_are_errors() {
     let disk = disk();
     let voxels = Voxels::from([([0, 0, 0], (0.85_f64.to_bits(), 1))]);
     let config = MapConfig::new(0.5, 2.5).unwrap();

@@ -1,16 +1,16 @@
-/// Tiles of parts in a map against a naive map; what does not go together is refused.
+/// Replacement of tiles compared with a naive map; incompatible parts are errors.
 mod adopt;
-/// Crop and clear against filters, and what crop cuts apart put together again.
+/// Crop and clear compared with filters; crops merged to the whole.
 mod cut;
-/// Decay against the rule, voxel by voxel; exactly once.
+/// Decay compared with the rule, voxel by voxel; applied once.
 mod decay;
-/// Every operation fails once and the power goes at every one: the map is as before, or as after.
+/// Faults and power cuts at every operation: each call is atomic.
 mod faults;
-/// Pieces joined against merged ones; what is damaged or does not fit is no map.
+/// Joined shards compared with merged maps; damaged or incompatible shards are errors.
 mod join;
-/// New maps from tables: there is none, or the whole one.
+/// Atomic creation of maps from tables.
 mod map_writer;
-/// Merge against a naive one on random maps.
+/// Merge compared with a naive merge of random maps.
 mod merge;
-/// Maps of any voxels, written and read back.
+/// Maps of random voxels, written and read back.
 mod random_maps;
