@@ -16,7 +16,9 @@ ROOT = HERE.parent.parent
 COMMENT = {".rs": re.compile(r"(?:^|\s)//[/!]?\s?(.*)"), ".ts": re.compile(r"(?:^|\s)//\s?(.*)"),
            ".py": re.compile(r"(?:^|\s)#\s?(.*)"), ".sh": re.compile(r"(?:^|\s)#\s?(.*)")}
 STRING = re.compile(r'"((?:[^"\\]|\\.)*)"')
-SKIPPED = ("crates/view/page/dist/", "fuzz/corpus/", "tests/data/", "docs/measurements/", "tools/words/")
+# Not rewritten yet.
+PENDING = ("crates/bucket/", "crates/ros2/", "crates/share", "tools/")
+SKIPPED = (*PENDING, "crates/view/page/dist/", "fuzz/corpus/", "tests/data/", "docs/measurements/", "tools/words/")
 
 
 def patterns():
