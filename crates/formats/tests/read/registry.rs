@@ -109,5 +109,9 @@ fn documents_list_all_formats() {
         .collect();
     assert_eq!(listed, names);
     let help = repository("python/python/voxtile/files.py").split_whitespace().collect::<Vec<_>>().join(" ");
-    assert!(help.contains(&format!("does not identify it: {}", formats.names(" "))), "{}", formats.names(" "));
+    assert!(
+        help.contains(&format!("does not identify it: {}", formats.names(" "))),
+        "{}",
+        formats.names(" ")
+    );
 }

@@ -57,7 +57,7 @@ impl ZenohNode {
         let session = session.map_err(|error| anyhow!("--transport zenoh: no session: {error}"))?;
         if session.info().routers_zid().wait().next().is_none() {
             log::warn!(
-                "no router of Zenoh answers yet ({}); the node looks for it on: ros2 run rmw_zenoh_cpp rmw_zenohd",
+                "no Zenoh router answers yet ({}); the node keeps trying; start one with: ros2 run rmw_zenoh_cpp rmw_zenohd",
                 args.zenoh_config
                     .as_ref()
                     .map_or_else(|| args.zenoh_router.join(" "), |path| path.display().to_string())
