@@ -61,7 +61,7 @@ impl LocalMap {
         self.check_position(position)?;
         check_resolution(self.resolution_m(), archive)?;
         if !(radius_m >= 0.0 && radius_m.is_finite()) {
-            return Err(Error::argument("radius", format!("{radius_m} m must be a length of at least 0")));
+            return Err(Error::argument("radius", format!("must be at least 0 m, but is {radius_m} m")));
         }
         let found = self.occupied_around(archive, position, radius_m)?;
         self.position = Some(position);

@@ -171,7 +171,7 @@ impl LocalMap {
     /// Returns the voxel of a sensor position.
     pub(super) fn check_position(&self, position: Point) -> Result<VoxelIndex> {
         self.voxel_of(position).ok_or_else(|| {
-            let reason = format!("{position:?} m must be finite and in the range of voxel indices");
+            let reason = format!("must be finite and in the range of voxel indices, but is {position:?} m");
             Error::argument("scan origin", reason)
         })
     }

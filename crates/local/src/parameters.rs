@@ -92,8 +92,8 @@ impl LocalParameters {
     ///
     /// If a value is NaN, a range is negative, or thresholds are outside the clamps or in the wrong order.
     pub fn validated(self, resolution_m: f64) -> Result<Self> {
-        let wrong = |argument: &str, value: f64, right: &str| {
-            Err(Error::argument(argument, format!("{value} must be {right}")))
+        let wrong = |argument: &str, value: f64, wanted: &str| {
+            Err(Error::argument(argument, format!("must be {wanted}, but is {value}")))
         };
         self.log_odds.validated()?;
         let LogOdds { min, max, .. } = self.log_odds;
@@ -122,8 +122,8 @@ impl LocalParameters {
         }
         let radius_m = self.inflation_radius_m;
         if !(radius_m >= 0.0 && radius_m / resolution_m <= MAX_RADIUS_VOXELS) {
-            let right = format!("a length from 0 m to {} m, 24 voxels", MAX_RADIUS_VOXELS * resolution_m);
-            return wrong("inflation radius", radius_m, &right);
+            let wanted = format!("a length from 0 m to {} m, 24 voxels", MAX_RADIUS_VOXELS * resolution_m);
+            return wrong("inflation radius", radius_m, &wanted);
         }
         if self.max_voxels == Some(0) || self.work_per_update == 0 {
             return wrong("max voxels or work per update", 0.0, "at least 1");
