@@ -268,7 +268,7 @@ impl LocalView {
         }
     }
 
-    /// Returns the bytes of memory on the heap, including the reference counts.
+    /// Returns the bytes of memory on the heap. Pages that views share are counted in full.
     pub(super) fn bytes(&self) -> usize {
         hash_table_bytes::<(VoxelIndex, Arc<PageView>)>(self.pages.capacity())
             + self.pages.values().map(|page| page.bytes()).sum::<usize>()
