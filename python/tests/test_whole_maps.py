@@ -96,7 +96,7 @@ def test_build_and_command_resume_each_other(tmp_path: Path, scans: Path, room: 
     options = {"resolution": 0.25, "max_range": 4.0}
     voxtile.build(scans, whole, resolution=0.25, max_range=4.0)
     voxtile.build(scans, ours, count=2, resolution=0.25, max_range=4.0)
-    with pytest.raises(errors.ExistsError, match="use .resume. to go on"):
+    with pytest.raises(errors.ExistsError, match="use .resume. to continue"):
         voxtile.build(scans, ours)
     with pytest.raises(errors.ArgumentError, match=".append. .again."):
         voxtile.build(scans, ours, append=True)
@@ -200,7 +200,7 @@ def test_export_and_files_of_octomap(city: Path, tmp_path: Path) -> None:
         assert np.array_equal(ours.occupancy(at), theirs.occupancy(at))
         assert not theirs.writable
     for needs_a_folder in (voxtile.verify, voxtile.repair, voxtile.snapshots):
-        with pytest.raises(errors.ArgumentError, match="city.ot: is a file of OctoMap"):
+        with pytest.raises(errors.ArgumentError, match="city.ot: is an OctoMap file"):
             needs_a_folder(tmp_path / "city.ot")
     meshes = [tmp_path / "plain.glb", tmp_path / "quantized.glb"]
     for mesh, quantize in zip(meshes, [False, True], strict=True):
