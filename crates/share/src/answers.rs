@@ -5,11 +5,11 @@ use std::time::Duration;
 use voxtile::FormatError;
 use voxtile::space::{TileIndex, VoxelIndex};
 
-/// Up to so many tiles of a range get one digest each.
+/// Largest number of tiles in a range for which each tile gets its own digest.
 const MAX_SINGLE_TILES: usize = 1024;
-/// Digests for a range of more tiles.
+/// Number of digests for a range with more tiles.
 const GROUPS: usize = 64;
-/// So many tiles that digests are made of count as one byte more: a short answer may be about very many.
+/// Number of digested tiles that costs as much as one byte of an answer: a short answer may cover many tiles.
 const TILES_PER_BYTE: usize = 4;
 
 impl Sender {
@@ -17,7 +17,7 @@ impl Sender {
     ///
     /// # Errors
     ///
-    /// Bytes that are not a request; the sender is unchanged then.
+    /// Bytes that are not a valid request; the sender is unchanged.
     pub fn answer(
         &mut self,
         from: ReceiverId,
@@ -36,7 +36,7 @@ impl Sender {
             Request::Missing { epoch: requested, sequences } if requested == epoch => self.repair(&sequences),
             Request::Digests { epoch: requested, range } if requested == epoch => self.digests(range),
             Request::Content { epoch: requested, ranges } if requested == epoch => self.content(&ranges),
-            // The request is to an earlier life of the sender.
+            // The request refers to an earlier epoch of the sender.
             _ => vec![self.status(0)],
         };
         let bytes = packets.iter().map(|packet| packet.len() as u64).sum();
@@ -45,7 +45,7 @@ impl Sender {
         Ok(packets.into_iter().map(|bytes| Outgoing { to: Some(from), bytes }).collect())
     }
 
-    /// Adds the voxels of lost packets to the next frame. Returns a status if packets cannot be repaired.
+    /// Adds the voxels of lost packets to the next frame. Returns a status if some packets cannot be repaired.
     fn repair(&mut self, sequences: &[u64]) -> Vec<Vec<u8>> {
         let mut is_known = true;
         for &sequence in sequences {
@@ -66,7 +66,7 @@ impl Sender {
         let mut begin = first;
         let groups: Vec<&[TileIndex]> = tiles.chunks(group).collect();
         for (number, group) in groups.iter().enumerate() {
-            // The last entry extends to the end of the range, the others to their last tile.
+            // The last entry ends at the end of the range, the others end at their last tile.
             let end = group.last().filter(|_| number + 1 < groups.len()).copied().unwrap_or(last);
             entries.push(self.entry(begin, end));
             begin = after(end);
@@ -74,7 +74,7 @@ impl Sender {
         if entries.is_empty() {
             entries.push(self.entry(first, last));
         }
-        // 13 to 32 bytes each.
+        // An entry takes 13 to 32 bytes.
         let per_packet = (self.config.max_packet_bytes - 64) / 32;
         let header = self.header();
         let mut packets = Vec::new();
@@ -100,9 +100,9 @@ impl Sender {
                 if packets.len() >= self.config.packets_per_answer {
                     return packets;
                 }
-                // As many as fit into a packet, and one more to tell whether there are more.
-                let most = super::codec::MAX_VOXELS_PER_PACKET + 1;
-                let voxels: Vec<VoxelIndex> = self.sent.in_range(range).take(most).collect();
+                // One voxel more than fits into a packet, to detect whether more voxels follow.
+                let limit = super::codec::MAX_VOXELS_PER_PACKET + 1;
+                let voxels: Vec<VoxelIndex> = self.sent.in_range(range).take(limit).collect();
                 let grid = *self.grid();
                 let end_of = |taken: &[VoxelIndex]| match taken.last() {
                     Some(&last) if taken.len() < voxels.len() => super::set::position_of(&grid, last),
@@ -127,7 +127,7 @@ impl Sender {
     }
 }
 
-/// The next tile in the order of a set.
+/// Returns the next tile in the order of a set.
 pub(super) fn after(tile: TileIndex) -> TileIndex {
     super::set_range::SetPosition { tile, code: super::set_range::LAST_CODE }.next().tile
 }

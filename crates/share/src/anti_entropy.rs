@@ -6,8 +6,8 @@ use super::set_range::SetRange;
 use std::time::Duration;
 use voxtile::space::TileIndex;
 
-/// Anti-entropy: what a receiver still has to request until its layer equals the set. It requests digests of tiles, and
-/// the voxels where these differ.
+/// Anti-entropy of a receiver: the ranges to request until its layer equals the sender's set. It requests digests of
+/// tiles, then the voxels of the tiles that differ.
 #[derive(Clone, Debug, Default)]
 pub(super) struct AntiEntropy {
     digests: IntervalSet,
@@ -18,21 +18,21 @@ pub(super) struct AntiEntropy {
 #[derive(Clone, Debug)]
 struct Outstanding {
     at: Duration,
-    /// When the last answer arrived.
+    /// Time of the last answer.
     answered_at: Duration,
-    /// Answers so far.
+    /// Number of answers so far.
     packets: usize,
-    /// The requested ranges that are not answered yet.
+    /// Requested ranges without an answer.
     rest: IntervalSet,
 }
 
-/// Most ranges in one request for voxels.
+/// Maximum number of ranges in one request for voxels.
 const RANGES_PER_REQUEST: usize = 20;
-/// Number of answers after which the next request is sent; a sender's default limit per request.
+/// Number of answers after which the next request is sent: the default limit per request of a sender.
 const PACKETS_PER_REQUEST: usize = 16;
 
 impl AntiEntropy {
-    /// Upper bound of the bytes of memory.
+    /// Upper bound on the memory, in bytes.
     pub(super) const MAX_BYTES: usize = 3 * IntervalSet::MAX_BYTES;
 
     pub(super) fn is_done(&self) -> bool {
@@ -45,7 +45,7 @@ impl AntiEntropy {
         if layer.is_empty() { &mut self.content } else { &mut self.digests }.put(SetRange::ALL);
     }
 
-    /// Takes digests; returns the ranges in which the sender has no voxels.
+    /// Processes digests. Returns the ranges in which the sender has no voxels.
     pub(super) fn take_digests(
         &mut self,
         first: TileIndex,
@@ -82,7 +82,7 @@ impl AntiEntropy {
         empty
     }
 
-    /// Adds a range to be requested.
+    /// Adds a range whose voxels are requested.
     pub(super) fn request_content(&mut self, range: SetRange) {
         self.content.put(range);
     }
@@ -92,7 +92,7 @@ impl AntiEntropy {
         self.mark_received(range, now);
     }
 
-    /// Removes a range that was answered; returns whether any of it was requested.
+    /// Removes an answered range. Returns whether any part of it was requested.
     fn mark_received(&mut self, range: SetRange, now: Duration) -> bool {
         let was_requested = self.digests.remove(range) | self.content.remove(range);
         if let Some(request) = &mut self.outstanding {
@@ -103,7 +103,8 @@ impl AntiEntropy {
         was_requested
     }
 
-    /// The next request, if it is due: after the answers to the previous one, or when these stop coming.
+    /// Returns the next request if it is due: once the previous request is answered, or after no answer arrived for
+    /// `patience`.
     pub(super) fn poll(
         &mut self,
         epoch: u32,
@@ -118,7 +119,7 @@ impl AntiEntropy {
                 return None;
             }
         }
-        // Digests are not requested while there may be no room for the ranges that differ.
+        // Request no digests while the ranges that differ might not fit into `content`.
         let digests = if self.content.is_half_full() { None } else { self.digests.iter().next() };
         let (request, rest) = if let Some(range) = digests {
             (Request::Digests { epoch, range }, vec![range])
@@ -135,7 +136,7 @@ impl AntiEntropy {
     }
 }
 
-/// Up to so many voxels, content costs as little as further digests.
+/// Largest number of voxels whose content costs no more than further digests.
 const FEW_VOXELS: u64 = 256;
 
 fn is_single(layer: &VoxelSet, range: SetRange) -> bool {

@@ -3,24 +3,24 @@ use super::set_range::{SetPosition, SetRange};
 use std::collections::BTreeMap;
 use voxtile::space::{BrickCode, BrickMask, Grid, MortonCode, TileIndex, VoxelIndex, add_to_mask};
 
-/// A brick of a tile, in the order of a set.
+/// Tile and brick; sorts in the order of a set.
 pub(super) type BrickPlace = (TileIndex, BrickCode);
 
-/// The voxels of a part of a set, as bricks: as many as come in a packet. None by default.
+/// Voxels of a content packet, as bricks. Empty by default.
 #[derive(Default)]
 pub(super) struct Content(BTreeMap<BrickPlace, BrickMask>);
 
-/// A brick that differs from a set.
+/// Brick that differs between a content packet and a set.
 pub(super) struct Difference {
     pub(super) place: BrickPlace,
-    /// The right voxels.
+    /// Voxels of the brick in the packet.
     pub(super) after: BrickMask,
-    /// The voxels that differ.
+    /// Voxels that differ.
     pub(super) differing: BrickMask,
 }
 
 impl Content {
-    /// The bricks of some voxels; `None` if one lies outside the range.
+    /// Groups voxels by brick. Returns `None` if a voxel is outside the range.
     pub(super) fn new(grid: &Grid, range: SetRange, voxels: &[VoxelIndex]) -> Option<Self> {
         let mut bricks = BTreeMap::new();
         for &voxel in voxels {
@@ -35,13 +35,13 @@ impl Content {
         Some(Self(bricks))
     }
 
-    /// The bricks of a range that differ from a set, from `first` on, in order, at most `most`.
+    /// Returns the bricks of a range that differ from a set, in order, starting at `from`: at most `limit`.
     pub(super) fn differences(
         &self,
         set: &VoxelSet,
         from: BrickPlace,
         range: SetRange,
-        most: usize,
+        limit: usize,
     ) -> Vec<Difference> {
         let last = brick_at(range.last);
         if from > last {
@@ -50,7 +50,7 @@ impl Content {
         let mut theirs = self.0.range(from..=last).map(|(&place, &mask)| (place, mask)).peekable();
         let mut own = set.bricks_between(from, last).peekable();
         let mut found = Vec::new();
-        while found.len() < most {
+        while found.len() < limit {
             let places =
                 own.peek().map(|(place, _)| *place).into_iter().chain(theirs.peek().map(|next| next.0));
             let Some(place) = places.min() else { break };
@@ -66,12 +66,12 @@ impl Content {
     }
 }
 
-/// The brick that holds a position.
+/// Returns the brick of a position.
 pub(super) fn brick_at(position: SetPosition) -> BrickPlace {
     (position.tile, MortonCode(position.code).brick())
 }
 
-/// The voxels of a brick that lie in a range.
+/// Returns the mask of a brick's voxels in a range.
 fn mask_inside(range: SetRange, (tile, brick): BrickPlace) -> BrickMask {
     let contains = |place| range.contains(SetPosition { tile, code: brick.voxel(place).0 });
     if contains(0) && contains(511) {

@@ -1,18 +1,18 @@
 use super::set_range::{SetPosition, SetRange};
 use std::collections::BTreeMap;
 
-/// Disjoint ranges of a set that are still to be processed. Their number is limited: beyond it, ranges are merged or
-/// not removed, which only costs bytes on the link.
+/// Disjoint ranges that are still to be requested. Their number is limited: at the limit, ranges are merged or not
+/// removed, which only costs bandwidth.
 #[derive(Clone, Debug, Default)]
 pub(super) struct IntervalSet {
-    /// First and last position of each.
+    /// Last position of each range, by its first position.
     ranges: BTreeMap<SetPosition, SetPosition>,
 }
 
 const MAX_RANGES: usize = 2048;
 
 impl IntervalSet {
-    /// Upper bound of the bytes of memory: a node has room for 11 ranges and holds at least five.
+    /// Upper bound on the memory, in bytes: a B-tree node has space for 11 ranges and holds at least five.
     pub(super) const MAX_BYTES: usize = MAX_RANGES / 5 * 11 * size_of::<SetRange>() * 5 / 4;
 
     pub(super) fn is_empty(&self) -> bool {
@@ -30,7 +30,7 @@ impl IntervalSet {
     /// Adds a range; adjacent ranges are not merged.
     pub(super) fn put(&mut self, part: SetRange) {
         self.remove(part);
-        // Some of it may still be here, if a split was not possible for lack of room.
+        // Part of the range may remain, if the limit prevented a split.
         if self.overlapping(part).next().is_some() {
             return;
         }
@@ -43,15 +43,15 @@ impl IntervalSet {
         if self.ranges.len() < MAX_RANGES {
             self.ranges.insert(part.first, part.last);
         } else if let Some((_, last)) = self.ranges.pop_first() {
-            // It lies before all others.
+            // The new range is before all others: extend the first one back to it.
             self.ranges.insert(part.first, last);
         }
     }
 
-    /// Removes a range; returns whether any of it was in the set.
+    /// Removes a range. Returns whether any part of it was in the set.
     pub(super) fn remove(&mut self, part: SetRange) -> bool {
-        let there: Vec<SetRange> = self.overlapping(part).collect();
-        for &range in &there {
+        let overlapping: Vec<SetRange> = self.overlapping(part).collect();
+        for &range in &overlapping {
             let is_split = range.first < part.first && part.last < range.last;
             if is_split && self.ranges.len() >= MAX_RANGES {
                 continue;
@@ -64,10 +64,10 @@ impl IntervalSet {
                 self.ranges.insert(part.last.next(), range.last);
             }
         }
-        !there.is_empty()
+        !overlapping.is_empty()
     }
 
-    /// The ranges that overlap a range, in order.
+    /// Returns the ranges that overlap a range, in order.
     fn overlapping(&self, range: SetRange) -> impl Iterator<Item = SetRange> {
         let begin = match self.ranges.range(..=range.first).next_back() {
             Some((&first, &last)) if last >= range.first => first,
@@ -97,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_put_in_and_taken_away_is_as_in_a_plain_list() {
+    fn put_and_remove_match_a_plain_list() {
         for seed in 0..100 {
             let mut random = Random::of(seed, &[]);
             let (mut ranges, mut plain) = (IntervalSet::default(), [false; 50]);
@@ -123,10 +123,10 @@ mod tests {
     }
 
     #[test]
-    fn there_never_are_too_many_and_none_is_lost() {
+    fn the_number_of_ranges_is_limited_and_no_position_is_lost() {
         let mut ranges = IntervalSet::default();
         ranges.put(range(0, 1 << 40));
-        // Every second position is removed: far more pieces than the limit.
+        // Removing every second position needs far more ranges than the limit.
         (0..3 * MAX_RANGES as u64).for_each(|k| {
             assert!(ranges.remove(range(2 * k, 2 * k)));
         });

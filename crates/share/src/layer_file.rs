@@ -5,15 +5,15 @@ use std::io::{self, Read, Write};
 use voxtile::space::{Grid, VoxelIndex};
 use voxtile::{DecodeError, FormatError};
 
-/// The first bytes of a layer in a file.
+/// First bytes of a layer file.
 const LABEL: &[u8; 16] = b"voxtile-layer-1\n";
 
-/// Most bytes of a packet of a layer.
+/// Maximum size of a packet in a layer file, in bytes.
 const MAX_PACKET_BYTES: usize = 60_000;
-/// Voxels per packet: far fewer bytes than that.
+/// Voxels per packet. They usually take far less than the maximum size.
 const VOXELS_PER_PACKET: usize = MAX_VOXELS_PER_PACKET / 4;
 
-/// Writes a layer: label, resolution and tile size, packets of content with their lengths, an empty one, and the
+/// Writes a layer: label, resolution, tile size, packets of content with their lengths, an empty packet, and the
 /// digest.
 ///
 /// # Errors
@@ -36,7 +36,7 @@ pub fn write_layer(layer: &mut VoxelSet, out: &mut impl Write) -> io::Result<()>
     out.write_all(&layer.digest().to_bytes())
 }
 
-/// Writes voxels in one packet, or in as many as they need.
+/// Writes voxels in one packet, or in several if they do not fit.
 fn write_some(voxels: &[VoxelIndex], out: &mut impl Write) -> io::Result<()> {
     let header = Header { epoch: 0, sequence: 0 };
     let packet = Packet::Content { header, range: SetRange::ALL, voxels: voxels.to_vec() };
@@ -55,16 +55,17 @@ fn write_some(voxels: &[VoxelIndex], out: &mut impl Write) -> io::Result<()> {
     }
 }
 
-/// Reads a layer of at most `max_voxels`.
+/// Reads a layer of at most `max_voxels` voxels.
 ///
 /// # Errors
 ///
-/// Bytes that [`write_layer`] does not write, a wrong digest, too many voxels, errors of `input`.
+/// Bytes that are not a layer file, a wrong digest, too many voxels, errors of `input`.
 pub fn read_layer(input: &mut impl Read, max_voxels: u64) -> Result<VoxelSet, DecodeError> {
     read_layer_within(input, max_voxels, usize::MAX)
 }
 
-/// [`read_layer`] with a memory limit; it may be exceeded by a packet's size.
+/// Reads a layer with a memory limit in bytes, like [`read_layer`]. The limit may be exceeded by the size of one
+/// packet.
 ///
 /// # Errors
 ///
@@ -77,7 +78,7 @@ pub fn read_layer_within(
     let mut label = [0; 16];
     input.read_exact(&mut label)?;
     if label != *LABEL {
-        return Err(FormatError::at_offset(0, "this is no layer that voxtile has written").into());
+        return Err(FormatError::at_offset(0, "this is not a voxtile layer file").into());
     }
     let mut lengths_m = [0.0; 2];
     for length_m in &mut lengths_m {
@@ -102,15 +103,14 @@ pub fn read_layer_within(
         }
         put_all(&mut layer, &voxels, max_voxels, offset)?;
         if layer.memory_bytes() > max_bytes {
-            let reason =
-                format!("a layer of more than the {max_bytes} bytes of memory that there are for it");
+            let reason = format!("the layer exceeds its memory limit of {max_bytes} bytes");
             return Err(FormatError::at_offset(offset, reason).into());
         }
     }
     let mut digest = [0; 32];
     input.read_exact(&mut digest)?;
     if layer.digest().to_bytes() != digest {
-        return Err(FormatError::at_offset(offset, "the digest is not that of the voxels").into());
+        return Err(FormatError::at_offset(offset, "the digest does not match the voxels").into());
     }
     Ok(layer)
 }
@@ -118,7 +118,7 @@ pub fn read_layer_within(
 fn content_of(bytes: &[u8]) -> Result<Vec<VoxelIndex>, FormatError> {
     match Packet::decode(bytes)? {
         Packet::Content { voxels, .. } => Ok(voxels),
-        _ => Err(FormatError::at_offset(0, "a layer holds packets of content only")),
+        _ => Err(FormatError::at_offset(0, "a layer file contains a packet that is not content")),
     }
 }
 
@@ -127,7 +127,7 @@ fn put_all(layer: &mut VoxelSet, voxels: &[VoxelIndex], max: u64, offset: u64) -
         layer.put(voxel, true);
     }
     if layer.len() > max {
-        return Err(FormatError::at_offset(offset, format!("more than {max} voxels in a layer")));
+        return Err(FormatError::at_offset(offset, format!("the layer has more than {max} voxels")));
     }
     Ok(())
 }

@@ -2,13 +2,13 @@ use super::receiver_config::ReceiverConfig;
 use super::set::VoxelSet;
 use voxtile::space::{VoxelBox, VoxelIndex};
 
-/// Limits of a layer.
+/// Limits of a layer on region, voxels, tiles and memory.
 #[derive(Clone, Debug)]
 pub(super) struct LayerLimits {
     region: Option<VoxelBox>,
     max_voxels: u64,
     max_tiles: usize,
-    /// Bytes of memory of the layer alone.
+    /// Memory limit of the layer alone, in bytes.
     pub(super) bytes: usize,
 }
 
@@ -18,7 +18,7 @@ impl LayerLimits {
         Self { region, max_voxels, max_tiles, bytes }
     }
 
-    /// Adds a voxel to a layer or removes it; `false` if that would exceed the limits.
+    /// Adds or removes a voxel. Returns `false` and leaves the layer unchanged if the voxel is beyond the limits.
     pub(super) fn put(&self, layer: &mut VoxelSet, voxel: VoxelIndex, is_in: bool) -> bool {
         let is_inside = || self.region.as_ref().is_none_or(|region| region.contains(voxel));
         let is_allowed =

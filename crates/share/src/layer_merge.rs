@@ -12,23 +12,23 @@ use voxtile::{Error, Result};
 pub struct LayerMergeReport {
     /// Voxels of the layer.
     pub voxels: u64,
-    /// Of these, voxels that are already occupied in the archive; they are left unchanged.
+    /// Voxels that are already occupied in the archive and are left unchanged.
     pub known: u64,
     /// Voxels that received a hit.
     pub hits: u64,
 }
 
-/// Voxels per batch: a tile may hold a billion.
+/// Voxels per batch. A tile may hold a billion voxels.
 const VOXELS_AT_A_TIME: usize = 1 << 16;
 
-/// Merges a layer into an archive: every voxel of the layer that is not occupied in the archive gets one hit, in
-/// batches per tile. So the archive's own scans weigh more, and merging the same layer again changes only voxels that
-/// one hit did not make occupied.
+/// Merges a layer into an archive: each voxel of the layer that is not occupied in the archive gets one hit. The
+/// archive's own scans therefore weigh more, and merging the same layer again changes only the voxels that are still
+/// not occupied after one hit.
 ///
 /// # Errors
 ///
-/// An archive with another grid, or whose sensor model needs intensities; a tile that cannot be read or written. What
-/// was merged before an error stays.
+/// An archive with another resolution or with a sensor model that needs intensities; a tile that cannot be read or
+/// written. After an error, the voxels merged so far remain in the archive.
 pub fn merge_layer(layer: &VoxelSet, mapper: &mut impl Mapper) -> Result<LayerMergeReport> {
     if mapper.config().grid.resolution_m().to_bits() != layer.grid().resolution_m().to_bits() {
         let reason = format!(

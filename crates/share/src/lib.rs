@@ -1,9 +1,10 @@
-//! Map sharing: the voxels that one robot finds occupied reach the others exactly.
+//! Sharing of maps between robots: one robot's occupied voxels reach the others exactly, even over a lossy link.
 //!
-//! A sender has a set of voxels: the occupied ones of its archive or local map. A receiver keeps a layer per robot.
-//! Packets may be lost, late, repeated or out of order; the layer converges to the sender's set. After La, Kang and
-//! Lee, "A robust, task-agnostic and fully-scalable voxel mapping system for large scale environments", section V-C,
-//! which sends newly occupied voxels and nothing more; `docs/sharing.md` has the protocol and its bytes.
+//! A sender holds a set of voxels: the occupied voxels of its archive or local map. A receiver keeps a copy of the set
+//! per robot, called a layer. Packets may be lost, delayed, duplicated or reordered; the layer still converges to the
+//! sender's set. The method follows La, Kang and Lee, "A robust, task-agnostic and fully-scalable voxel mapping system
+//! for large scale environments", section V-C, which sends only newly occupied voxels. `docs/sharing.md` specifies the
+//! protocol and the packet format.
 //!
 //! ```text
 //! mapper -> MapWatch -> Sender: buffer, frames, ring -> packets -> Receiver -> VoxelSet (a layer) -> query::United, merge
@@ -11,7 +12,7 @@
 //!                              +---- requests: status, missing, digests, content <----+
 //! ```
 //!
-//! Nothing here knows a transport or a clock: packets are bytes, and the caller passes the time.
+//! The crate needs neither a transport nor a clock: packets are bytes, and the caller passes the current time.
 //!
 //! ```
 //! use std::time::Duration;

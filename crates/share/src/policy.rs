@@ -1,12 +1,13 @@
-/// The voxels that a frame holds: the three policies of the paper's figure 4. Anti-entropy repairs what a policy loses.
+/// Choice of the voxels in a frame: the three policies of the paper's figure 4. Anti-entropy repairs what a policy
+/// misses.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ExportPolicy {
-    /// What changed since the last frame. The fewest bytes.
+    /// Voxels that changed since the last frame. Needs the fewest bytes.
     #[default]
     LastFrame,
-    /// What changed in the last so many frames, at least 1: for links without a back channel.
+    /// Voxels that changed in the last frames, at least 1. For links without a back channel.
     Ring(usize),
-    /// The whole set, every time.
+    /// The whole set in every frame.
     Everything,
 }

@@ -1,11 +1,11 @@
 use super::set_range::{SetPosition, SetRange};
 use std::collections::BTreeMap;
 
-/// The versions of ranges of a set: for ranges that were replaced as a whole, the packet of that content. Where ranges
-/// overlap, the latest counts.
+/// Versions of ranges that were replaced as a whole. A version is the number of the packet with that content. Where
+/// ranges overlap, the latest version applies.
 #[derive(Clone, Debug, Default)]
 pub(super) struct RangeVersions {
-    /// Disjoint ranges by their first position: the last position, and the packet.
+    /// Last position and version of each range, by its first position. The ranges are disjoint.
     parts: BTreeMap<SetPosition, (SetPosition, u64)>,
 }
 
@@ -14,18 +14,18 @@ impl RangeVersions {
         self.parts.len()
     }
 
-    /// The earliest version.
+    /// Returns the earliest version.
     pub(super) fn oldest(&self) -> Option<u64> {
         self.parts.values().map(|(_, as_of)| *as_of).min()
     }
 
-    /// Whether a position has this version or a later one.
+    /// Returns whether a position has version `sequence` or a later one.
     pub(super) fn is_as_of(&self, position: SetPosition, sequence: u64) -> bool {
         let before = self.parts.range(..=position).next_back();
         before.is_some_and(|(_, (last, as_of))| position <= *last && *as_of >= sequence)
     }
 
-    /// The parts of a range without this version or a later one.
+    /// Returns the parts of a range without version `sequence` or a later one.
     pub(super) fn gaps(&self, range: SetRange, sequence: u64) -> Vec<SetRange> {
         let mut gaps = Vec::new();
         let mut begin = range.first;
@@ -45,7 +45,7 @@ impl RangeVersions {
         gaps
     }
 
-    /// Sets the version of a range.
+    /// Sets the version of a range, except where it already has a later version.
     pub(super) fn note(&mut self, range: SetRange, as_of: u64) {
         let gaps = self.gaps(range, as_of);
         let older: Vec<(SetRange, u64)> =
@@ -62,7 +62,7 @@ impl RangeVersions {
         gaps.into_iter().for_each(|gap| self.insert(gap, as_of));
     }
 
-    /// Inserts a range where there is none, merged with adjacent ranges of the same version.
+    /// Inserts a range that overlaps no other, and merges it with adjacent ranges of the same version.
     fn insert(&mut self, mut part: SetRange, as_of: u64) {
         let before = self.parts.range(..part.first).next_back();
         if let Some((&first, &(last, version))) = before
@@ -81,12 +81,12 @@ impl RangeVersions {
         self.parts.insert(part.first, (part.last, as_of));
     }
 
-    /// Removes ranges with this version or an earlier one.
+    /// Removes the ranges of version `sequence` and of earlier versions.
     pub(super) fn forget_up_to(&mut self, sequence: u64) {
         self.parts.retain(|_, (_, as_of)| *as_of > sequence);
     }
 
-    /// The ranges that overlap a range, in order.
+    /// Returns the ranges that overlap a range, in order.
     fn overlapping(&self, range: SetRange) -> impl Iterator<Item = (SetRange, u64)> {
         let begin = match self.parts.range(..=range.first).next_back() {
             Some((&first, (last, _))) if *last >= range.first => first,
@@ -103,7 +103,7 @@ mod tests {
     use voxtile::space::TileIndex;
     use voxtile_simulation::Random;
 
-    /// Positions of a small world: two tiles of 20 codes at the ends of a tile's codes.
+    /// Returns a position of a small set: two tiles with 20 codes each, half of them at each end of a tile's codes.
     fn position(number: u64) -> SetPosition {
         let (tile, code) = (TileIndex::new(0, 0, (number / 20) as i32), number % 20);
         let code = if code < 10 { code } else { super::super::set_range::LAST_CODE - (19 - code) };
@@ -111,11 +111,11 @@ mod tests {
     }
 
     #[test]
-    fn every_position_has_the_latest_version_of_the_ranges_over_it() {
+    fn every_position_has_the_latest_version_of_its_ranges() {
         for seed in 0..50 {
             let mut random = Random::of(seed, &[]);
             let mut parts = RangeVersions::default();
-            // Positions between 9 and 10 of a tile count as 9: ranges begin and end at existing positions.
+            // Positions between 9 and 10 of a tile need no entry: ranges begin and end at numbered positions.
             let mut plain = vec![None::<u64>; 40];
             for step in 0..60 {
                 let mut ends = [random.below(40), random.below(40)];
@@ -152,12 +152,12 @@ mod tests {
     }
 
     #[test]
-    fn parts_one_behind_the_other_are_one() {
+    fn adjacent_ranges_of_one_version_are_merged() {
         let mut parts = RangeVersions::default();
         for k in (0..10).rev().chain(12..19).chain(10..12).chain(20..30) {
             parts.note(SetRange { first: position(k), last: position(k) }, 7);
         }
-        // Between 9 and 10 there are positions without a version; 19 has none.
+        // The positions between 9 and 10 and position 19 have no version.
         assert_eq!(parts.len(), 3);
         parts.note(SetRange::ALL, 7);
         parts.note(SetRange::ALL, 8);

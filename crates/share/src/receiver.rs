@@ -12,47 +12,47 @@ use std::time::Duration;
 use voxtile::FormatError;
 use voxtile::space::{Grid, TileIndex};
 
-/// Receives the packets of one robot and keeps a layer: its set of voxels. The owner calls [`Receiver::poll`] a few
-/// times a second.
+/// Receiver of one robot's packets. It keeps that robot's set of voxels as a layer. Call [`Receiver::poll`] a few times
+/// a second.
 #[derive(Clone, Debug)]
 pub struct Receiver {
     config: ReceiverConfig,
     pub(super) limits: LayerLimits,
     pub(super) layer: Option<VoxelSet>,
     pub(super) stream: Option<Stream>,
-    /// Bytes of memory for the versions of voxels.
+    /// Memory for the versions of voxels, in bytes.
     pub(super) version_bytes: usize,
     anti_entropy: AntiEntropy,
     pub(super) counts: ReceiverCounts,
     nonce: Nonce,
-    /// Since when packets have come that need a status to explain them.
+    /// Arrival of the first packet with an unexpected epoch or number; `None` after a status has confirmed the sender.
     unexplained_since: Option<Duration>,
     request_missing_at: Duration,
-    /// The layer was equal to the sender's set as of this packet.
+    /// Number of the packet as of which the layer was equal to the sender's set.
     pub(super) equal_as_of: Option<u64>,
     pub(super) is_over_limit: bool,
-    /// A status to be compared with the layer, and the earliest time for that.
+    /// Status to compare with the layer at `compare_at` or later.
     to_compare: Option<Status>,
     compare_at: Duration,
-    /// The last refused grid.
+    /// Grid that was refused last.
     refused_grid: Option<Grid>,
 }
 
-/// After so long without an answer a sender is believed: there may be no way back to it.
+/// Time after which a status is accepted without an answer: the link may have no back channel.
 const ONE_WAY: Duration = Duration::from_secs(5);
-/// Time before the first repeated request for a packet: its voxels come with a frame.
+/// Time before a lost packet is requested again. Its voxels arrive in the next frame.
 const RETRY: Duration = Duration::from_millis(1500);
-/// Time between two comparisons, per voxel and per tile of the layer: some twenty times the cost of a comparison.
+/// Time between two comparisons, per voxel and per tile of the layer: about twenty times the cost of a comparison.
 const COMPARE_NS_PER_VOXEL: u64 = 100;
-const COMPARE_NS_A_TILE: u64 = 2000;
+const COMPARE_NS_PER_TILE: u64 = 2000;
 
 impl Receiver {
-    /// A receiver without a layer.
+    /// Creates a receiver without a layer.
     pub fn new(config: ReceiverConfig) -> Self {
         Self::started(config, None)
     }
 
-    /// A receiver that continues with the layer of an earlier one.
+    /// Creates a receiver that continues with an existing layer.
     pub fn with_layer(config: ReceiverConfig, layer: VoxelSet) -> Self {
         Self::started(config, Some(layer))
     }
@@ -82,57 +82,58 @@ impl Receiver {
         receiver
     }
 
-    /// The robot's voxels so far; `None` before any packet was accepted.
+    /// Returns the robot's voxels so far; `None` before a status was accepted.
     pub fn layer(&self) -> Option<&VoxelSet> {
         self.layer.as_ref()
     }
 
-    /// The layer, for its digests.
+    /// Returns the layer mutably, to compute its digests.
     pub fn layer_mut(&mut self) -> Option<&mut VoxelSet> {
         self.layer.as_mut()
     }
 
-    /// Ends the receiver and returns its layer.
+    /// Consumes the receiver and returns its layer.
     pub fn into_layer(self) -> Option<VoxelSet> {
         self.layer
     }
 
-    /// Counts so far.
+    /// Returns the counts so far.
     pub fn counts(&self) -> ReceiverCounts {
         self.counts
     }
 
-    /// Number of lost packets.
+    /// Returns the number of packets that are still missing.
     pub fn missing_packets(&self) -> usize {
         self.stream.as_ref().map_or(0, Stream::missing)
     }
 
-    /// Whether the layer was found equal to the sender's set, and nothing came since.
+    /// Returns whether the layer was equal to the sender's set at the last known packet.
     pub fn is_converged(&self) -> bool {
         let Some(stream) = &self.stream else { return false };
         stream.is_complete() && self.equal_as_of == Some(stream.highest) && self.unexplained_since.is_none()
     }
 
-    /// Epoch and number of the packet as of which the layer was last found equal to the sender's set.
+    /// Returns epoch and number of the packet as of which the layer was last equal to the sender's set.
     pub fn equal_as_of(&self) -> Option<(u32, u64)> {
         Some((self.stream.as_ref()?.epoch, self.equal_as_of?))
     }
 
-    /// Whether voxels were refused: then the layer cannot become equal and is not compared any more.
+    /// Returns whether voxels were refused or removed because of a limit. Such a layer cannot become equal, and
+    /// anti-entropy stops.
     pub fn is_over_limit(&self) -> bool {
         self.is_over_limit
     }
 
-    /// The grid of the robot's voxels, if it was refused.
+    /// Returns the grid of the robot's voxels if it was refused.
     pub fn refused_grid(&self) -> Option<&Grid> {
         self.refused_grid.as_ref()
     }
 
-    /// Takes the bytes of a packet.
+    /// Processes the bytes of a packet.
     ///
     /// # Errors
     ///
-    /// Bytes that are not a packet; the layer is unchanged.
+    /// Bytes that are not a valid packet; the layer is unchanged.
     pub fn take(&mut self, bytes: &[u8], now: Duration) -> Result<(), FormatError> {
         self.counts.bytes += bytes.len() as u64;
         let taken = Packet::decode(bytes).and_then(|packet| self.take_packet(packet, now));
@@ -161,7 +162,7 @@ impl Receiver {
             Packet::Content { range, voxels, .. } => {
                 let Some(layer) = &self.layer else { return Ok(()) };
                 let content = Content::new(layer.grid(), range, &voxels)
-                    .ok_or_else(|| FormatError::at_offset(0, "content with voxels outside of its range"))?;
+                    .ok_or_else(|| FormatError::at_offset(0, "the content has voxels outside its range"))?;
                 self.take_content(sequence, range, &content, &mut Work::of_a_packet(), now);
             }
             Packet::Digests { first, entries, .. } => self.take_digests(sequence, first, &entries, now),
@@ -173,7 +174,7 @@ impl Receiver {
     fn take_changes(&mut self, sequence: u64, repaired: &[u64], updates: &[Update], now: Duration) {
         let (Some(stream), Some(layer)) = (&mut self.stream, &mut self.layer) else { return };
         for &repaired in repaired {
-            stream.is_repaired(repaired);
+            stream.mark_repaired(repaired);
         }
         if !stream.arrive(sequence, now, self.config.patience) {
             self.counts.repeated += 1;
@@ -191,7 +192,7 @@ impl Receiver {
         stream.versions.note(sequence, updates.iter().map(|update| update.voxel));
     }
 
-    /// Replaces a range of the layer by a packet's content, except for voxels changed after that packet's version.
+    /// Replaces a range of the layer with a packet's content, except for voxels that a later packet changed.
     fn take_content(
         &mut self,
         as_of: u64,
@@ -216,7 +217,7 @@ impl Receiver {
         let Some(layer) = &mut self.layer else { return };
         let mut work = Work::of_a_packet();
         for range in self.anti_entropy.take_digests(first, entries, layer, now) {
-            // Requested until it is done: the packet may exceed the work limit.
+            // Request the range until it is done: its removal may exceed the work limit.
             self.anti_entropy.request_content(range);
             self.take_content(as_of, range, &Content::default(), &mut work, now);
         }
@@ -224,22 +225,24 @@ impl Receiver {
 
     fn take_status(&mut self, status: &Status, now: Duration) {
         let Header { epoch, sequence } = status.header;
-        let asked_at = self.nonce.take(status.nonce);
+        let requested_at = self.nonce.take(status.nonce);
         let Some(stream) = self.stream.as_mut().filter(|stream| stream.can_be(epoch, sequence)) else {
             let is_one_way = self.unexplained_since.is_some_and(|since| now >= since + ONE_WAY);
             self.counts.unconfirmed += 1;
             self.unexplained_since.get_or_insert(now);
-            if asked_at.is_some() || (is_one_way && status.nonce == 0) {
-                self.adopt(status, now);
+            if requested_at.is_some() || (is_one_way && status.nonce == 0) {
+                self.restart(status, now);
             }
             return;
         };
-        // If the sender's status does not reach these numbers, someone forged them.
-        if sequence < stream.highest && asked_at.is_some_and(|asked_at| stream.highest_at < asked_at) {
-            self.adopt(status, now);
+        // If the answer to a later request has a smaller number, the highest number was forged.
+        if sequence < stream.highest
+            && requested_at.is_some_and(|requested_at| stream.highest_at < requested_at)
+        {
+            self.restart(status, now);
             return;
         }
-        if asked_at.is_some() {
+        if requested_at.is_some() {
             self.unexplained_since = None;
         }
         stream.reach(sequence, now, self.config.patience);
@@ -247,11 +250,11 @@ impl Receiver {
         self.compare(status, is_lost, now);
     }
 
-    /// Starts anew with a sender's status.
-    fn adopt(&mut self, status: &Status, now: Duration) {
-        // The farthest voxels must have coordinates, too.
-        let has_places = |grid: &Grid| grid.center_m([i32::MIN; 3]).iter().all(|k| k.is_finite());
-        let grid = Grid::new(status.resolution_m, status.tile_size_m).ok().filter(has_places);
+    /// Starts a new stream from a sender's status.
+    fn restart(&mut self, status: &Status, now: Duration) {
+        // The farthest voxels must have finite coordinates, too.
+        let has_coordinates = |grid: &Grid| grid.center_m([i32::MIN; 3]).iter().all(|k| k.is_finite());
+        let grid = Grid::new(status.resolution_m, status.tile_size_m).ok().filter(has_coordinates);
         let Some(grid) = grid.filter(|grid| self.config.grid.is_none_or(|accepted| accepted == *grid)) else {
             self.refused_grid = grid.or(self.refused_grid);
             self.counts.refused_grids += 1;
@@ -268,8 +271,8 @@ impl Receiver {
         self.compare(status, false, now);
     }
 
-    /// Compares the layer with a status once all packets before it are here; starts anti-entropy if they differ. The
-    /// cost grows with voxels and tiles, so the comparison may be delayed.
+    /// Compares the layer with a status once all earlier packets have arrived; starts anti-entropy if they differ. The
+    /// comparison may be delayed, because its cost grows with voxels and tiles.
     fn compare(&mut self, status: &Status, is_lost: bool, now: Duration) {
         let (Some(stream), Some(layer)) = (&self.stream, &mut self.layer) else { return };
         let can_compare = stream.is_complete() && stream.highest == status.header.sequence;
@@ -278,7 +281,7 @@ impl Receiver {
             self.to_compare = Some(*status);
         } else if can_compare {
             let wait_ns = COMPARE_NS_PER_VOXEL.saturating_mul(layer.len())
-                + COMPARE_NS_A_TILE.saturating_mul(layer.tile_count() as u64);
+                + COMPARE_NS_PER_TILE.saturating_mul(layer.tile_count() as u64);
             self.compare_at = now + Duration::from_nanos(wait_ns);
             let is_equal = layer.len() == status.voxels && layer.digest().to_bytes() == status.digest;
             self.equal_as_of = is_equal.then_some(stream.highest);
@@ -294,7 +297,7 @@ impl Receiver {
         }
     }
 
-    /// Requests to send to the robot now.
+    /// Returns the requests to send to the robot now.
     pub fn poll(&mut self, now: Duration) -> Vec<Vec<u8>> {
         if now >= self.compare_at
             && let Some(status) = self.to_compare.take()

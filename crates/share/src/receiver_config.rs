@@ -1,30 +1,31 @@
 use std::time::Duration;
 use voxtile::space::{Grid, VoxelBox};
 
-/// What a receiver accepts, and how it requests packets.
+/// Limits of a receiver, and the settings of its requests.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct ReceiverConfig {
-    /// The only grid that is accepted; `None` for any. Default: any.
+    /// The only accepted grid; `None` accepts any grid. Default: any.
     pub grid: Option<Grid>,
-    /// Most bytes of memory of a receiver in total. Default: 512 MiB.
-    /// [`VoxelSet::memory_bytes`](super::VoxelSet::memory_bytes) gives the cost of a voxel: 3 bytes in a wall, up to
-    /// 1300 if it is alone in its tile.
+    /// Maximum total memory of the receiver, in bytes. Default: 512 MiB.
+    /// [`VoxelSet::memory_bytes`](super::VoxelSet::memory_bytes) describes the cost of a voxel: 3 bytes in a wall, up
+    /// to 1300 bytes if it is alone in its tile.
     pub memory_bytes: usize,
-    /// Most voxels of a robot. Default: 2^26.
+    /// Maximum number of voxels of the robot. Default: 2^26.
     pub max_voxels: u64,
-    /// Most tiles of a robot. Default: 2^17.
+    /// Maximum number of tiles of the robot. Default: 2^17.
     pub max_tiles: usize,
-    /// Voxels outside are refused; `None` for no limit. Default: none.
+    /// Region outside of which voxels are refused; `None` for no region. Default: none.
     pub region: Option<VoxelBox>,
-    /// Whether to send requests. Without them a receiver only listens. Default: yes.
+    /// Whether to send requests. Without requests, a receiver only listens. Default: true.
     pub sends_requests: bool,
     /// How long to wait for late packets. Default: 0.3 s.
     pub patience: Duration,
-    /// Time between two requests of a kind. A request has at most 1200 bytes, so this limits their rate. Default: 0.2
-    /// s.
+    /// Time between two requests of a kind. It limits the bytes per second, because a request has at most 1200 bytes.
+    /// Default: 0.2 s.
     pub request_interval: Duration,
-    /// Seed of the nonces that tell answers from old or forged packets; others should not be able to guess it.
+    /// Seed of the nonces, which distinguish answers from old or forged packets. Choose a seed that others cannot
+    /// guess.
     pub nonce_seed: u64,
 }
 
@@ -68,6 +69,6 @@ pub struct ReceiverCounts {
     pub asks: u64,
     /// Bytes of these requests.
     pub ask_bytes: u64,
-    /// How often anti-entropy was started.
+    /// Number of times that anti-entropy was started.
     pub catch_ups: u64,
 }

@@ -3,24 +3,25 @@ use super::receiver::Receiver;
 use super::set::VoxelSet;
 use super::stream::Stream;
 
-/// The part of a receiver's memory for versions of voxels: one over this.
+/// Share of a receiver's memory for the versions of voxels: one over this number.
 const VERSIONS_PART: usize = 8;
 
 impl Receiver {
-    /// With less memory, not even small layers have room.
+    /// Minimum memory of a receiver, in bytes. With less, even small layers do not fit.
     pub(super) const MIN_BYTES: usize = 4 << 20;
 
-    /// Upper bound of the bytes of memory: the layer, and the full size of versions and outstanding requests.
+    /// Returns an upper bound on the memory, in bytes: the layer, plus the maximum size of versions and outstanding
+    /// requests.
     pub fn memory_bytes(&self) -> usize {
-        self.layer.as_ref().map_or(0, VoxelSet::memory_bytes) + self.bytes_beside_the_layer()
+        self.layer.as_ref().map_or(0, VoxelSet::memory_bytes) + self.bytes_without_layer()
     }
 
-    /// Sets the limit; what exceeds it already stays.
+    /// Sets the memory limit. Existing voxels beyond the limit are kept.
     pub(super) fn set_memory_bytes(&mut self, bytes: usize) {
-        self.limits.bytes = bytes.saturating_sub(self.bytes_beside_the_layer());
+        self.limits.bytes = bytes.saturating_sub(self.bytes_without_layer());
     }
 
-    /// Sizes the versions by the memory that the receiver may count on.
+    /// Sets the maximum size of the versions from the receiver's guaranteed memory.
     pub(super) fn set_part_bytes(&mut self, bytes: usize) {
         self.version_bytes = bytes / VERSIONS_PART;
         if let Some(stream) = &mut self.stream {
@@ -28,20 +29,20 @@ impl Receiver {
         }
     }
 
-    /// Removes voxels from the end of the layer until it takes at most so many bytes.
+    /// Removes voxels from the end of the layer until the receiver takes at most `bytes`.
     pub(super) fn cut_to_bytes(&mut self, bytes: usize) {
-        let for_layer = bytes.saturating_sub(self.bytes_beside_the_layer());
+        let for_layer = bytes.saturating_sub(self.bytes_without_layer());
         let cut = self.layer.as_mut().map_or(0, |layer| layer.cut_to_bytes(for_layer));
         self.counts.cut_voxels += cut;
         if cut > 0 {
             self.is_over_limit = true;
-            // It was equal before.
+            // The layer may have been equal before.
             self.equal_as_of = None;
         }
     }
 
-    fn bytes_beside_the_layer(&self) -> usize {
-        // Before the robot's first status there is nothing else.
+    fn bytes_without_layer(&self) -> usize {
+        // Versions and requests exist only after the robot's first status.
         let remembered = self
             .stream
             .as_ref()
@@ -58,7 +59,7 @@ mod tests {
     use voxtile::space::Grid;
 
     #[test]
-    fn a_layer_that_was_cut_is_not_equal_any_more() {
+    fn a_cut_layer_is_no_longer_converged() {
         let mut sender = Sender::new(Grid::new(0.1, 10.0).unwrap(), 1, SenderConfig::default()).unwrap();
         let mut receiver = Receiver::new(ReceiverConfig::default());
         (0..100).for_each(|k| sender.put([8 * k, 0, 0], true));

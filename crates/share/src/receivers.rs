@@ -7,9 +7,9 @@ use voxtile::{Error, FormatError, Result};
 
 /// Receivers of several robots under one memory limit.
 ///
-/// While memory is free, any receiver may take it. Once none is free, every robot is entitled to an equal share of the
-/// limit: a robot below its share may grow up to it, and the robot that exceeds its share most loses as many voxels,
-/// from the end of its layer. So nobody loses memory below the share.
+/// A receiver may use any free memory. If none is free, every robot is entitled to an equal share of the limit: a robot
+/// below its share may grow up to it, and the robot that exceeds its share most loses voxels from the end of its layer.
+/// No robot is cut below its share.
 #[derive(Clone, Debug)]
 pub struct Receivers<K> {
     memory_bytes: usize,
@@ -25,18 +25,18 @@ impl<K> IntoIterator for Receivers<K> {
     }
 }
 
-/// What one packet can add before voxels are removed: voxels each alone in its tile.
+/// Maximum memory that one packet can add before voxels are removed: each voxel is alone in its tile.
 const PACKET_BYTES: usize = super::codec::MAX_VOXELS_PER_PACKET * VoxelSet::MAX_BYTES_PER_VOXEL;
 
 impl<K: Ord + Clone> Receivers<K> {
-    /// Least memory limit, in bytes.
+    /// Minimum memory limit, in bytes.
     pub const MIN_BYTES: usize = 64 << 20;
 
-    /// No receivers yet, and a limit on their total memory.
+    /// Creates an empty collection with a limit on its total memory, in bytes.
     ///
     /// # Errors
     ///
-    /// Less than [`Receivers::MIN_BYTES`].
+    /// A limit below [`Receivers::MIN_BYTES`].
     pub fn new(memory_bytes: usize) -> Result<Self> {
         if memory_bytes < Self::MIN_BYTES {
             let reason = format!("{memory_bytes} bytes; at least {} are needed", Self::MIN_BYTES);
@@ -45,40 +45,41 @@ impl<K: Ord + Clone> Receivers<K> {
         Ok(Self { memory_bytes, robots: BTreeMap::new() })
     }
 
-    /// Adds a receiver for a robot, with the layer of an earlier one if there is one. Its limit is what the others
-    /// leave; if that is too little, the largest layers shrink. A robot has no share before its first status.
+    /// Adds a receiver for a robot, optionally with an existing layer. It may use the memory that the others leave; if
+    /// that is too little, the largest layers shrink. A robot without a layer has no share before its first status.
     pub fn insert(&mut self, robot: K, config: ReceiverConfig, layer: Option<VoxelSet>) {
         self.robots.insert(robot, Receiver::started(config, layer));
         self.share_out();
     }
 
-    /// Gives every robot the same share.
+    /// Gives every robot an equal share of the memory.
     fn share_out(&mut self) {
         let part = self.part_bytes();
         self.robots.values_mut().for_each(|receiver| receiver.set_part_bytes(part));
         self.make_room();
     }
 
-    /// Robots that have sent a status or have a layer.
+    /// Returns the number of robots that have sent a status or have a layer.
     pub fn known(&self) -> usize {
         self.robots.values().filter(|receiver| receiver.layer().is_some()).count()
     }
 
-    /// Whether there is a share for one more robot.
+    /// Returns whether the memory suffices for the share of one more robot.
     pub fn has_room(&self) -> bool {
         self.for_all() / (self.known() + 1) >= Receiver::MIN_BYTES
     }
 
-    /// Removes a robot, and returns its receiver.
+    /// Removes a robot and returns its receiver.
     pub fn remove(&mut self, robot: &K) -> Option<Receiver> {
         self.robots.remove(robot)
     }
 
-    /// Takes the bytes of a robot's packet. Packets of robots that were not added, or that have no share, are ignored.
+    /// Processes the bytes of a robot's packet. Packets of robots that were not added, or that have no share, are
+    /// ignored.
     ///
     /// # Errors
     ///
-    /// Bytes that are not a packet; the layer is unchanged.
+    /// Bytes that are not a valid packet; the layer is unchanged.
     pub fn take(&mut self, robot: &K, bytes: &[u8], now: Duration) -> std::result::Result<(), FormatError> {
         let (all, part) = (self.memory_bytes(), self.part_bytes());
         let for_all = self.for_all();
@@ -99,7 +100,7 @@ impl<K: Ord + Clone> Receivers<K> {
         taken
     }
 
-    /// Shrinks the layers that exceed their share most, until the limit is kept.
+    /// Shrinks the layers that exceed their share most, until the total is within the limit.
     fn make_room(&mut self) {
         let part = self.part_bytes();
         loop {
@@ -116,17 +117,17 @@ impl<K: Ord + Clone> Receivers<K> {
         }
     }
 
-    /// Upper bound of the bytes of memory of all receivers.
+    /// Returns an upper bound on the memory of all receivers, in bytes.
     pub fn memory_bytes(&self) -> usize {
         self.robots.values().map(Receiver::memory_bytes).sum()
     }
 
-    /// The share of each robot, whatever the others do.
+    /// Returns the guaranteed share of each robot, in bytes.
     pub fn part_bytes(&self) -> usize {
         self.for_all() / self.known().max(1)
     }
 
-    /// Free bytes, beyond what a packet may need.
+    /// Returns the free memory in bytes, without the reserve for one packet.
     pub fn free_bytes(&self) -> usize {
         self.for_all().saturating_sub(self.memory_bytes())
     }
@@ -135,32 +136,32 @@ impl<K: Ord + Clone> Receivers<K> {
         self.memory_bytes - PACKET_BYTES
     }
 
-    /// Number of robots.
+    /// Returns the number of robots.
     pub fn len(&self) -> usize {
         self.robots.len()
     }
 
-    /// Whether there are none.
+    /// Returns whether there are no robots.
     pub fn is_empty(&self) -> bool {
         self.robots.is_empty()
     }
 
-    /// A robot's receiver.
+    /// Returns a robot's receiver.
     pub fn get(&self, robot: &K) -> Option<&Receiver> {
         self.robots.get(robot)
     }
 
-    /// The same, mutably, for its requests and for digests of its layer.
+    /// Returns a robot's receiver mutably, for its requests and the digests of its layer.
     pub fn get_mut(&mut self, robot: &K) -> Option<&mut Receiver> {
         self.robots.get_mut(robot)
     }
 
-    /// All receivers, by robot.
+    /// Returns all receivers, ordered by robot.
     pub fn iter(&self) -> impl Iterator<Item = (&K, &Receiver)> {
         self.robots.iter()
     }
 
-    /// The same, mutably, for their requests and for digests of their layers.
+    /// Returns all receivers mutably, for their requests and the digests of their layers.
     pub fn iter_mut(&mut self) -> impl Iterator<Item = (&K, &mut Receiver)> {
         self.robots.iter_mut()
     }

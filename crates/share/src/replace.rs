@@ -3,12 +3,12 @@ use super::receiver::Receiver;
 use super::set_range::{SetPosition, SetRange};
 use voxtile::space::{BrickCode, is_in_mask, places};
 
-/// Most voxels that one packet may change. The rest of a larger packet is requested again.
+/// Maximum number of voxels that one packet may change. The rest of a larger packet is requested again.
 const MAX_CHANGES: usize = 1 << 20;
-/// Bricks that are compared at a time.
+/// Number of bricks that are compared at a time.
 const BRICKS_AT_A_TIME: usize = 1024;
 
-/// How many voxels a packet may still change.
+/// Number of voxels that a packet may still change.
 pub(super) struct Work(usize);
 
 impl Work {
@@ -18,8 +18,8 @@ impl Work {
 }
 
 impl Receiver {
-    /// Replaces a range of the layer by a packet's content, except for voxels with later versions. Returns the range
-    /// that exceeded the work limit, if any.
+    /// Replaces a range of the layer with a packet's content, except for voxels with later versions. Returns the part
+    /// of the range that is done: the whole range, unless the work limit was reached first.
     pub(super) fn replace(
         &mut self,
         as_of: u64,

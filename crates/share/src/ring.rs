@@ -1,20 +1,20 @@
 use std::collections::VecDeque;
 use voxtile::space::VoxelIndex;
 
-/// The voxels of recent packets and frames in a ring buffer.
+/// Ring buffer of the voxels of recent packets and frames.
 #[derive(Clone, Debug)]
 pub(super) struct Ring {
-    /// Packets with consecutive numbers.
+    /// Voxels of packets with consecutive numbers.
     packets: VecDeque<Vec<VoxelIndex>>,
-    /// Number of the first packet; of the next one if there is none.
+    /// Number of the first packet, or of the next packet if the ring is empty.
     first: u64,
-    /// The first packet of each frame, ascending.
+    /// Number of the first packet of each frame, ascending.
     frames: VecDeque<u64>,
     voxels: usize,
     max_packets: usize,
 }
 
-/// Most voxels that a ring holds.
+/// Maximum number of voxels in a ring.
 const MAX_VOXELS: usize = 1 << 20;
 
 impl Ring {
@@ -26,12 +26,12 @@ impl Ring {
         self.frames.push_back(self.next());
     }
 
-    /// Number of the next packet.
+    /// Returns the number of the next packet.
     pub(super) fn next(&self) -> u64 {
         self.first + self.packets.len() as u64
     }
 
-    /// Number of the oldest packet here.
+    /// Returns the number of the oldest packet in the ring.
     pub(super) fn oldest(&self) -> u64 {
         self.first
     }
@@ -43,7 +43,7 @@ impl Ring {
             self.voxels -= self.packets.pop_front().map_or(0, |packet| packet.len());
             self.first += 1;
         }
-        // A frame that began before the ring is known from the ring's start on.
+        // Drop frames without packets in the ring. The first remaining frame may have lost its first packets.
         while self.frames.get(1).is_some_and(|&second| second <= self.first) {
             self.frames.pop_front();
         }
@@ -54,7 +54,7 @@ impl Ring {
         self.packets.get(place).map(Vec::as_slice)
     }
 
-    /// The voxels of the last so many frames.
+    /// Returns the voxels of the last `frames` frames.
     pub(super) fn last_frames(&self, frames: usize) -> impl Iterator<Item = VoxelIndex> {
         let begin = self.frames.len().saturating_sub(frames);
         let from = self.frames.get(begin).map_or(self.next(), |&first| first.max(self.first));

@@ -2,7 +2,7 @@ use voxtile::RayConfig;
 use voxtile::scan::{MAX_RAY_STEPS, Scan};
 use voxtile::space::{Grid, LAST_VOXEL_INDEX, Point, TileBox, VoxelIndex};
 
-/// A box around the tiles that a scan may change; `None` if its origin has no voxel.
+/// Returns a box around the tiles that a scan may change; `None` if the origin has no voxel index.
 pub(super) fn tiles_of_scan(scan: &Scan, grid: &Grid, rays: &RayConfig) -> Option<TileBox> {
     let ends = Ends::new(scan.origin, grid, rays)?;
     let (mut low, mut high) = (ends.start, ends.start);
@@ -10,18 +10,18 @@ pub(super) fn tiles_of_scan(scan: &Scan, grid: &Grid, rays: &RayConfig) -> Optio
         low = std::array::from_fn(|k| low[k].min(end[k]));
         high = std::array::from_fn(|k| high[k].max(end[k]));
     }
-    // One voxel more, for rounding.
+    // One extra voxel on each side, for rounding.
     let low = low.map(|k| k.saturating_sub(1));
     let high = high.map(|k| k.saturating_add(1).min(LAST_VOXEL_INDEX));
     Some(TileBox::new(grid.tile_of_voxel(low), grid.tile_of_voxel(high)))
 }
 
-/// Tells where rays from an origin end.
+/// Computes the ends of rays from one origin.
 struct Ends<'a> {
     grid: &'a Grid,
     origin: Point,
     start: VoxelIndex,
-    /// Where a ray to any point is cut, and where one without a return is.
+    /// Maximum length in metres of a ray with a return, and of a ray without.
     cuts_m: [f64; 2],
 }
 
@@ -33,16 +33,16 @@ impl<'a> Ends<'a> {
         Some(Self { grid, origin, start, cuts_m })
     }
 
-    /// The last voxel of the ray to a point, or of a longer one; `None` if the map has skipped the point.
+    /// Returns the last voxel of the ray to a point, or of a longer ray; `None` if the map skips the point.
     ///
-    /// A point without a voxel of its own counts, too: its ray may be cut where there is one.
+    /// The point itself may have no voxel index: the end of the cut ray may have one.
     fn farthest(&self, point: Point) -> Option<VoxelIndex> {
         let offset: Point = std::array::from_fn(|k| point[k] - self.origin[k]);
         let length_m = offset.iter().map(|d| d * d).sum::<f64>().sqrt();
         if !length_m.is_finite() {
             return None;
         }
-        // The longer ray first: what is told apart here is only whether there can be such a ray.
+        // The longer ray first, because an upper bound suffices here.
         self.cuts_m.iter().find_map(|&cut_m| {
             let end = if length_m > cut_m { self.at(offset, cut_m / length_m) } else { point };
             self.grid.voxel_of(end).filter(|&last| self.steps_to(last) <= MAX_RAY_STEPS)

@@ -2,20 +2,20 @@ use rustc_hash::{FxHashMap, FxHashSet};
 use std::time::Duration;
 use voxtile::space::VoxelIndex;
 
-/// Changes and repairs that are buffered for the next frame.
+/// Changes and repairs for the next frame.
 #[derive(Clone, Debug, Default)]
 pub(super) struct SendBuffer {
-    /// Voxels that differ from what was last sent, and their new state.
+    /// New state of the voxels that differ from the state sent last.
     changed: FxHashMap<VoxelIndex, bool>,
-    /// Voxels of lost packets, to be sent again.
+    /// Voxels of lost packets, to send again.
     resent: FxHashSet<VoxelIndex>,
-    /// The packets that these repair.
+    /// Numbers of the lost packets.
     repaired: Vec<u64>,
-    /// When the first of these came.
+    /// Time when the buffer was first seen with a change.
     since: Option<Duration>,
 }
 
-/// Most packets that one frame repairs; receivers request others again.
+/// Maximum number of packets that one frame repairs. Receivers request the others again.
 const MAX_REPAIRED: usize = 64;
 
 impl SendBuffer {
@@ -27,7 +27,7 @@ impl SendBuffer {
         self.changed.is_empty() && self.resent.is_empty()
     }
 
-    /// Sets a voxel's state; `was_sent` is the state that receivers know.
+    /// Sets a voxel's state. `was_sent` is the state that was sent last.
     pub(super) fn put(&mut self, voxel: VoxelIndex, is_in: bool, was_sent: bool) {
         if is_in == was_sent {
             self.changed.remove(&voxel);
@@ -44,7 +44,7 @@ impl SendBuffer {
         }
     }
 
-    /// The age of the oldest change.
+    /// Returns the age of the oldest change.
     pub(super) fn waited(&mut self, now: Duration) -> Duration {
         if self.is_empty() {
             self.since = None;
@@ -53,7 +53,8 @@ impl SendBuffer {
         now.saturating_sub(*self.since.get_or_insert(now))
     }
 
-    /// Empties the buffer: changed voxels, voxels to be sent again, and the packets that these repair.
+    /// Empties the buffer. Returns the changed voxels, the voxels to send again, and the numbers of the packets that
+    /// these repair.
     pub(super) fn take(&mut self) -> (FxHashMap<VoxelIndex, bool>, FxHashSet<VoxelIndex>, Vec<u64>) {
         let Self { changed, resent, repaired, .. } = std::mem::take(self);
         (changed, resent, repaired)

@@ -12,63 +12,64 @@ use voxtile::{Error, Result};
 /// Identifies the receiver that sent a request; any number unique to it.
 pub type ReceiverId = u64;
 
-/// A packet to be sent.
+/// A packet to send.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Outgoing {
-    /// The receiver; `None` for all.
+    /// The receiver; `None` for all receivers.
     pub to: Option<ReceiverId>,
     /// The packet's bytes.
     pub bytes: Vec<u8>,
 }
 
-/// Shares a set of voxels. Bytes in, bytes out; the owner calls [`Sender::poll`] a few times a second.
+/// Sender of a set of voxels. It consumes requests and produces packets as bytes. Call [`Sender::poll`] a few times a
+/// second.
 #[derive(Clone, Debug)]
 pub struct Sender {
     pub(super) config: SenderConfig,
     epoch: u32,
-    /// The present set.
+    /// The current set.
     wanted: VoxelSet,
-    /// The set as sent: what receivers have once they have every packet.
+    /// The set as sent: the layer of a receiver that has every packet.
     pub(super) sent: VoxelSet,
     pub(super) send_buffer: SendBuffer,
     pub(super) ring: Ring,
     pub(super) counts: SenderCounts,
     next_status: Duration,
-    /// As of the last status.
+    /// Number of the last packet at the time of the last status.
     status_sequence: Option<u64>,
-    /// How many voxels the last packet had room for.
+    /// Estimated number of voxels that fit into a packet.
     voxels_per_packet: usize,
     pub(super) token_bucket: TokenBucket,
 }
 
-/// With more changes in the buffer a frame is sent before its time.
+/// Number of buffered changes at which a frame is sent early.
 const MAX_BUFFERED: usize = 1 << 18;
 
 impl Sender {
-    /// A sender with an empty set. The epoch must differ at each start of the robot.
+    /// Creates a sender with an empty set. The epoch must differ at each start of the robot.
     ///
     /// # Errors
     ///
-    /// A configuration that is wrong.
+    /// An invalid configuration.
     pub fn new(grid: Grid, epoch: u32, config: SenderConfig) -> Result<Self> {
         Self::with_set(VoxelSet::new(grid), epoch, config)
     }
 
-    /// A sender of a given set, which receivers fetch by requests.
+    /// Creates a sender of an existing set, which receivers fetch by requests.
     ///
     /// # Errors
     ///
-    /// A configuration that is wrong.
+    /// An invalid configuration.
     pub fn with_set(set: VoxelSet, epoch: u32, config: SenderConfig) -> Result<Self> {
         if !(256..=60_000).contains(&config.max_packet_bytes) {
-            let reason = format!("{} bytes; 256 to 60000 are possible", config.max_packet_bytes);
+            let reason = format!("{} bytes; use 256 to 60000 bytes", config.max_packet_bytes);
             return Err(Error::argument("packet size", reason));
         }
         if config.ring_packets == 0
             || config.packets_per_answer == 0
             || config.policy == ExportPolicy::Ring(0)
         {
-            return Err(Error::argument("ring, packets an answer", "0 is too few; give at least 1"));
+            return Err(Error::argument("ring, packets per answer", "0 is too small; use at least 1"));
         }
         Ok(Self {
             ring: Ring::new(config.ring_packets),
@@ -85,27 +86,27 @@ impl Sender {
         })
     }
 
-    /// The grid of the set.
+    /// Returns the grid of the set.
     pub fn grid(&self) -> &Grid {
         self.sent.grid()
     }
 
-    /// Counts so far.
+    /// Returns the counts so far.
     pub fn counts(&self) -> SenderCounts {
         self.counts
     }
 
-    /// The set as sent: what receivers have once they have every packet.
+    /// The set as sent: the layer of a receiver that has every packet.
     pub fn sent(&mut self) -> &mut VoxelSet {
         &mut self.sent
     }
 
-    /// Whether nothing is buffered for a frame.
+    /// Returns whether no changes are buffered for a frame.
     pub fn is_idle(&self) -> bool {
         self.send_buffer.is_empty()
     }
 
-    /// Whether a voxel is in the set.
+    /// Returns whether a voxel is in the set.
     pub fn contains(&self, voxel: VoxelIndex) -> bool {
         self.wanted.contains(voxel)
     }
@@ -117,7 +118,7 @@ impl Sender {
         }
     }
 
-    /// Sets the voxels of a brick of a tile.
+    /// Replaces the voxels of a brick in a tile.
     pub fn put_brick(&mut self, tile: TileIndex, brick: BrickCode, mask: BrickMask) {
         let before = self.wanted.brick(tile, brick);
         if before == mask {
@@ -132,7 +133,7 @@ impl Sender {
         self.wanted.put_brick(tile, brick, mask);
     }
 
-    /// The packets to send now: a frame if it is due, a status if it is due.
+    /// Returns the packets to send now: a frame and a status, if they are due.
     pub fn poll(&mut self, now: Duration) -> Vec<Outgoing> {
         let waited = self.send_buffer.waited(now);
         let is_due = !self.send_buffer.is_empty()
@@ -150,7 +151,7 @@ impl Sender {
         out
     }
 
-    /// Sends what is buffered at once: before a sender ends.
+    /// Returns packets with all buffered changes and a status, without waiting. Use it before a sender ends.
     pub fn flush(&mut self, now: Duration) -> Vec<Outgoing> {
         let mut out = if self.send_buffer.is_empty() { Vec::new() } else { self.frame() };
         self.next_status = now;
@@ -158,13 +159,13 @@ impl Sender {
         out
     }
 
-    /// Epoch and number of the last packet of changes, 0 for none: the value of
-    /// [`Receiver::equal_as_of`](super::Receiver::equal_as_of) once a receiver has everything.
+    /// Returns epoch and number of the last packet of changes; the number is 0 before the first packet. A receiver that
+    /// has everything returns the same from [`Receiver::equal_as_of`](super::Receiver::equal_as_of).
     pub fn last_packet(&self) -> (u32, u64) {
         (self.epoch, self.last_sequence())
     }
 
-    /// Number of the last packet of changes, 0 for none.
+    /// Returns the number of the last packet of changes; 0 before the first packet.
     fn last_sequence(&self) -> u64 {
         self.ring.next() - 1
     }
@@ -197,7 +198,7 @@ impl Sender {
         let mut voxels: Vec<VoxelIndex> = changed.into_keys().chain(resent.iter().copied()).collect();
         self.counts.updates_again += resent.len() as u64;
         match self.config.policy {
-            // A frame of repairs only holds nothing more, or the repair of a lost repair would grow each time.
+            // A frame with only repairs gets no other voxels. Otherwise, each repair of a lost repair would be larger.
             _ if !has_changes => {}
             ExportPolicy::LastFrame => {}
             ExportPolicy::Ring(frames) => voxels.extend(self.ring.last_frames(frames - 1)),
@@ -208,7 +209,7 @@ impl Sender {
         self.packets_of(voxels, &repaired)
     }
 
-    /// Encodes the present state of voxels in as many packets as needed; voxels that are close together share a packet.
+    /// Encodes the current state of voxels in as many packets as needed. Voxels that are close together share a packet.
     fn packets_of(&mut self, mut voxels: Vec<VoxelIndex>, repaired: &[u64]) -> Vec<Outgoing> {
         voxels.sort_by_cached_key(|&voxel| along_curve(voxel));
         voxels.dedup();
@@ -235,20 +236,20 @@ impl Sender {
         out
     }
 
-    /// A packet of as many items as fit into it, at least one.
+    /// Encodes a packet with as many items as fit, at least one. Returns the packet and the number of items.
     pub(super) fn fit<T>(&mut self, items: &[T], packet: impl Fn(&[T]) -> Packet) -> (Vec<u8>, usize) {
         let limit = self.config.max_packet_bytes;
         let mut count = self.voxels_per_packet.clamp(1, MAX_VOXELS_PER_PACKET).min(items.len());
         loop {
             match packet(&items[..count]).encode() {
                 Ok(bytes) if bytes.len() <= limit || count <= 1 => {
-                    // For the next packet: about as many as would have filled this one.
+                    // Estimate for the next packet: the number of items that would have filled this one.
                     self.voxels_per_packet =
                         (count * (limit - limit / 64) / bytes.len().max(limit / 8)).max(1);
                     return (bytes, count);
                 }
                 Ok(bytes) => count = (count * (limit - limit / 64) / bytes.len()).clamp(1, count - 1),
-                // Too far apart for one packet; a single voxel is not, except at the very end of all indices.
+                // The items are too far apart for one packet. A single item fails only at the end of the index range.
                 Err(_) if count > 1 => count /= 2,
                 Err(_) => return (Vec::new(), 1),
             }
@@ -256,7 +257,7 @@ impl Sender {
     }
 }
 
-/// The position on the Morton curve through all voxel indices.
+/// Returns the position of a voxel on the Morton curve through all voxel indices.
 fn along_curve(voxel: VoxelIndex) -> (u64, u64) {
     let part = |shift: u32| {
         let [x, y, z] = voxel.map(|k| ((k as u32 ^ 1 << 31) >> shift) as u16);

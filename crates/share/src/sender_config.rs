@@ -1,25 +1,26 @@
 use super::ExportPolicy;
 use std::time::Duration;
 
-/// How a sender sends.
+/// Configuration of a sender.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct SenderConfig {
-    /// Which voxels a frame holds. Default: those that changed since the last frame.
+    /// Policy that chooses the voxels of a frame. Default: the voxels that changed since the last frame.
     pub policy: ExportPolicy,
-    /// How long a change may wait for its frame. Longer means fewer bytes: nearby voxels share a packet, and changes
-    /// that revert are not sent. Default: 1 s.
+    /// Maximum delay of a change before its frame is sent. A longer delay needs fewer bytes: nearby voxels share a
+    /// packet, and changes that revert are not sent. Default: 1 s.
     pub latency: Duration,
-    /// Most bytes of a packet, 256 to 60000. Default: 1200, which fits into a datagram nearly anywhere.
+    /// Maximum size of a packet in bytes, 256 to 60000. Default: 1200, which fits into a datagram on almost any link.
     pub max_packet_bytes: usize,
-    /// Time between two statuses, by which receivers notice what they lack; four times as long while nothing changes.
+    /// Time between two statuses, which let receivers detect lost packets; four times as long while nothing changes.
     /// Default: 2 s.
     pub status_interval: Duration,
-    /// Packets whose voxels are kept for repairs, at least 1; a million voxels at most. Default: 1024.
+    /// Number of packets whose voxels are kept for repairs, at least 1. At most a million voxels are kept. Default:
+    /// 1024.
     pub ring_packets: usize,
-    /// Most packets in answer to one request. Default: 16.
+    /// Maximum number of packets in the answer to one request. Default: 16.
     pub packets_per_answer: usize,
-    /// Most bytes per second of all answers together; requests beyond it are ignored. Default: 256 KiB.
+    /// Maximum rate of all answers together, in bytes per second. Requests beyond it are ignored. Default: 256 KiB.
     pub answer_bytes_per_s: u64,
 }
 
@@ -41,22 +42,22 @@ impl Default for SenderConfig {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 #[non_exhaustive]
 pub struct SenderCounts {
-    /// Frames.
+    /// Frames sent.
     pub frames: u64,
-    /// Packets of changes.
+    /// Packets of changes sent.
     pub packets: u64,
-    /// Bytes of these.
+    /// Bytes of these packets.
     pub packet_bytes: u64,
-    /// Voxels in these.
+    /// Voxels in these packets.
     pub updates: u64,
-    /// Voxels of these that were sent again.
+    /// Voxels in these packets that were sent again.
     pub updates_again: u64,
-    /// Bytes of statuses to all.
+    /// Bytes of statuses that were broadcast.
     pub status_bytes: u64,
     /// Requests received.
     pub asks: u64,
     /// Bytes of answers.
     pub answer_bytes: u64,
-    /// Requests refused because there were too many.
+    /// Requests that were ignored because of the rate limit.
     pub refused_asks: u64,
 }

@@ -6,15 +6,15 @@ use voxtile::space::{
     VoxelKey, is_in_mask, places,
 };
 
-/// A set of voxels by tile, with digests: what a sender shares and a receiver mirrors.
+/// Set of voxels, grouped by tile, with digests. A sender shares a set, and a receiver mirrors it.
 #[derive(Clone, Debug)]
 pub struct VoxelSet {
     grid: Grid,
     pub(super) tiles: BTreeMap<TileIndex, TileVoxels>,
-    /// Bricks of all tiles.
+    /// Number of bricks in all tiles.
     pub(super) bricks: usize,
     len: u64,
-    /// `None` after a change.
+    /// Cached digest; `None` after a change.
     digest: Option<Digest>,
 }
 
@@ -23,47 +23,47 @@ pub struct VoxelSet {
 pub(super) struct TileVoxels {
     pub(super) bricks: BTreeMap<BrickCode, BrickMask>,
     len: u64,
-    /// `None` after a change.
+    /// Cached digest; `None` after a change.
     digest: Option<[u8; 32]>,
 }
 
 const LABEL: &[u8] = b"voxtile-set-1";
 
-/// Bytes of Morton codes that are hashed at a time.
+/// Number of bytes of Morton codes that are hashed at a time.
 const CODES_AT_A_TIME: usize = 16 << 10;
 
 impl VoxelSet {
-    /// An empty set of voxels of a grid.
+    /// Creates an empty set of voxels of a grid.
     pub fn new(grid: Grid) -> Self {
         Self { grid, tiles: BTreeMap::new(), bricks: 0, len: 0, digest: None }
     }
 
-    /// The grid of the voxels and tiles.
+    /// Returns the grid of the voxels and tiles.
     pub fn grid(&self) -> &Grid {
         &self.grid
     }
 
-    /// Number of voxels.
+    /// Returns the number of voxels.
     pub fn len(&self) -> u64 {
         self.len
     }
 
-    /// Whether there are none.
+    /// Returns whether the set is empty.
     pub fn is_empty(&self) -> bool {
         self.len == 0
     }
 
-    /// Number of tiles that hold voxels.
+    /// Returns the number of tiles that hold voxels.
     pub fn tile_count(&self) -> usize {
         self.tiles.len()
     }
 
-    /// The tiles that hold voxels, in order.
+    /// Returns the tiles that hold voxels, in order.
     pub fn tiles(&self) -> impl Iterator<Item = TileIndex> {
         self.tiles.keys().copied()
     }
 
-    /// Whether a voxel is in the set.
+    /// Returns whether a voxel is in the set.
     pub fn contains(&self, voxel: VoxelIndex) -> bool {
         let code = VoxelKey::from_index(voxel).morton();
         let tile = self.tiles.get(&self.grid.tile_of_voxel(voxel));
@@ -71,8 +71,8 @@ impl VoxelSet {
             .is_some_and(|mask| is_in_mask(mask, code.place_in_brick()))
     }
 
-    /// Adds a voxel or removes it; returns whether that changed the set. No set holds an index above
-    /// [`LAST_VOXEL_INDEX`].
+    /// Adds or removes a voxel. Returns whether the set changed. A voxel with an index above [`LAST_VOXEL_INDEX`] is
+    /// ignored.
     pub fn put(&mut self, voxel: VoxelIndex, is_in: bool) -> bool {
         if voxel.iter().any(|&k| k > LAST_VOXEL_INDEX) {
             return false;
@@ -89,12 +89,12 @@ impl VoxelSet {
         true
     }
 
-    /// The voxels of a brick of a tile.
+    /// Returns the voxels of a brick in a tile.
     pub fn brick(&self, tile: TileIndex, brick: BrickCode) -> BrickMask {
         self.tiles.get(&tile).and_then(|tile| tile.bricks.get(&brick)).copied().unwrap_or([0; 8])
     }
 
-    /// The bricks from one to another, both included, in order.
+    /// Returns the bricks between `from` and `last`, both included, in order.
     pub(super) fn bricks_between(
         &self,
         from: (TileIndex, BrickCode),
@@ -109,7 +109,7 @@ impl VoxelSet {
         })
     }
 
-    /// Replaces the voxels of a brick of a tile.
+    /// Replaces the voxels of a brick in a tile.
     pub(super) fn put_brick(&mut self, tile: TileIndex, brick: BrickCode, mask: BrickMask) {
         let of_tile = self.tiles.entry(tile).or_default();
         let count = |mask: &BrickMask| mask.iter().map(|word| u64::from(word.count_ones())).sum::<u64>();
@@ -129,12 +129,12 @@ impl VoxelSet {
         }
     }
 
-    /// The voxels in order.
+    /// Returns the voxels in order.
     pub fn iter(&self) -> impl Iterator<Item = VoxelIndex> {
         self.in_range(SetRange::ALL)
     }
 
-    /// The voxels of a range, in order.
+    /// Returns the voxels of a range, in order.
     pub fn in_range(&self, range: SetRange) -> impl Iterator<Item = VoxelIndex> {
         let tiles = range.is_valid().then(|| self.tiles.range(range.first.tile..=range.last.tile));
         tiles.into_iter().flatten().flat_map(move |(&index, tile)| {
@@ -153,7 +153,7 @@ impl VoxelSet {
         })
     }
 
-    /// The voxels in a box. The cost depends on the tiles and voxels that exist, not on the size of the box.
+    /// Returns the voxels in a box. The cost depends on the existing tiles and voxels, not on the size of the box.
     pub(super) fn in_box(&self, voxels: &VoxelBox) -> impl Iterator<Item = VoxelIndex> {
         let last = voxels.end.map(|end| end.saturating_sub(1));
         let (first, last) = (self.grid.tile_of_voxel(voxels.min), self.grid.tile_of_voxel(last));
@@ -173,18 +173,19 @@ impl VoxelSet {
         })
     }
 
-    /// The position of a voxel in the order of the set.
+    /// Returns the position of a voxel in the order of the set.
     pub fn position_of(&self, voxel: VoxelIndex) -> SetPosition {
         position_of(&self.grid, voxel)
     }
 
-    /// BLAKE3 over the sorted Morton codes of a tile's voxels, six bytes each, little-endian; `None` for an empty tile.
+    /// Returns the digest of a tile: BLAKE3 over the sorted Morton codes of its voxels, six bytes each, little-endian.
+    /// Returns `None` for an empty tile.
     pub fn digest_of_tile(&mut self, tile: TileIndex) -> Option<[u8; 32]> {
         self.tiles.get_mut(&tile).map(TileVoxels::digest)
     }
 
-    /// BLAKE3 over "voxtile-set-1", the bits of resolution and tile size, and each tile's index and digest, in order:
-    /// equal for equal sets. It is kept until the set changes: a sender tells it to anyone who asks.
+    /// Returns the digest of the set: BLAKE3 over "voxtile-set-1", the bits of resolution and tile size, and each
+    /// tile's index and digest, in order. Equal sets have equal digests. The digest is cached until the set changes.
     pub fn digest(&mut self) -> Digest {
         if let Some(digest) = self.digest {
             return digest;
@@ -197,7 +198,8 @@ impl VoxelSet {
         *self.digest.insert(Digest::from_bytes(*hasher.finalize().as_bytes()))
     }
 
-    /// The number of voxels of some tiles, and the first eight bytes of BLAKE3 over these tiles' indices and digests.
+    /// Returns the number of voxels in the tiles between `first` and `last`, and the first eight bytes of BLAKE3 over
+    /// the indices and digests of these tiles.
     pub(super) fn short_digest(&mut self, first: TileIndex, last: TileIndex) -> (u64, [u8; 8]) {
         let mut hasher = blake3::Hasher::new();
         let voxels = self.add_tiles(&mut hasher, first, last);
@@ -220,7 +222,7 @@ impl VoxelSet {
         voxels
     }
 
-    /// The tiles from one to another, both included, that hold voxels.
+    /// Returns the tiles that hold voxels between `first` and `last`, both included.
     pub(super) fn tiles_between(&self, first: TileIndex, last: TileIndex) -> Vec<TileIndex> {
         if first > last {
             Vec::new()
@@ -229,23 +231,23 @@ impl VoxelSet {
         }
     }
 
-    /// Whether more than one tile from one to another, both included, holds voxels.
+    /// Returns whether more than one tile between `first` and `last`, both included, holds voxels.
     pub(super) fn has_several_tiles(&self, first: TileIndex, last: TileIndex) -> bool {
         first < last && self.tiles.range(first..=last).nth(1).is_some()
     }
 
-    /// Number of voxels of a tile.
+    /// Returns the number of voxels of a tile.
     pub fn voxels_of_tile(&self, tile: TileIndex) -> u64 {
         self.tiles.get(&tile).map_or(0, |tile| tile.len)
     }
 
-    /// Whether a tile holds voxels.
+    /// Returns whether a tile holds voxels.
     pub fn has_tile(&self, tile: TileIndex) -> bool {
         self.tiles.contains_key(&tile)
     }
 }
 
-/// Equal sets of equal grids.
+/// Sets are equal if they have the same grid and the same voxels.
 impl PartialEq for VoxelSet {
     fn eq(&self, other: &Self) -> bool {
         let bricks = |set: &Self| {
@@ -259,7 +261,7 @@ impl TileVoxels {
     fn digest(&mut self) -> [u8; 32] {
         *self.digest.get_or_insert_with(|| {
             let mut hasher = blake3::Hasher::new();
-            // Many bricks at a time: the hash is several times faster on long inputs.
+            // Hash many bricks at a time, because the hash is several times faster on long inputs.
             let mut codes = Vec::with_capacity(CODES_AT_A_TIME + 6 * BRICK_VOXELS);
             for (brick, mask) in &self.bricks {
                 codes.extend(places(*mask).flat_map(|place| {
@@ -293,12 +295,12 @@ mod tests {
             assert!(set.put([100 * k, 0, 0], true));
             let digest = set.digest();
             assert_ne!(digest, empty);
-            // Whatever is kept is told, and nothing is added up anew.
-            let kept = Digest::from_bytes([7; 32]);
-            set.digest = Some(kept);
-            assert_eq!(set.digest(), kept);
+            // The cached digest is returned without a new computation.
+            let cached = Digest::from_bytes([7; 32]);
+            set.digest = Some(cached);
+            assert_eq!(set.digest(), cached);
             assert!(!set.put([100 * k, 0, 0], true), "no change");
-            assert_eq!(set.digest(), kept);
+            assert_eq!(set.digest(), cached);
             assert!(set.put([7, 7, 7], true) && set.put([7, 7, 7], false));
             assert_eq!(set.digest(), digest);
         }

@@ -1,36 +1,36 @@
 use super::set::{TileVoxels, VoxelSet};
 use voxtile::space::{BrickCode, BrickMask, TileIndex};
 
-/// Most bytes that the allocator adds to an allocation.
+/// Maximum number of bytes that the allocator adds to an allocation.
 const ALLOCATION: usize = 16;
 
-/// Bytes of a B-tree node of the standard library: 11 entries, 12 child pointers, one parent pointer.
+/// Size in bytes of a B-tree node of the standard library: 11 entries, 12 child pointers, one parent pointer.
 const fn node_bytes<K, V>() -> usize {
     11 * (size_of::<K>() + size_of::<V>()) + 12 * size_of::<usize>() + 16 + ALLOCATION
 }
 
-/// A node of the bricks of a tile.
+/// Size of a node of bricks, in bytes.
 const BRICK_NODE: usize = node_bytes::<BrickCode, BrickMask>();
-/// A node of the tiles.
+/// Size of a node of tiles, in bytes.
 const TILE_NODE: usize = node_bytes::<TileIndex, TileVoxels>();
-/// Fewest entries of a node, except for the first of a map.
+/// Minimum number of entries in a node, except for the root.
 const ENTRIES: usize = 5;
 
 impl VoxelSet {
-    /// Most bytes of memory of a voxel: one that is alone in its tile.
+    /// Maximum memory of a voxel, in bytes: the voxel is alone in its tile.
     pub(super) const MAX_BYTES_PER_VOXEL: usize =
         TILE_NODE.div_ceil(ENTRIES) + BRICK_NODE + BRICK_NODE / ENTRIES;
 
-    /// Upper bound of the bytes of memory on the heap, with nodes as empty as they may be. Isolated voxels count 190
-    /// bytes each within a tile, of which 120 to 150 are used, and 1300 bytes if alone in a tile.
+    /// Returns an upper bound on the heap memory in bytes, for nodes with the fewest entries. An isolated voxel counts
+    /// as 190 bytes, of which 120 to 150 are used, or as 1300 bytes if it is alone in its tile.
     pub fn memory_bytes(&self) -> usize {
         let nodes_of_bricks = self.tiles.len() + self.bricks / ENTRIES;
         let nodes_of_tiles = self.tiles.len().div_ceil(ENTRIES);
         nodes_of_bricks * BRICK_NODE + nodes_of_tiles * TILE_NODE
     }
 
-    /// Removes the last voxels, brick by brick, until the rest takes at most so many bytes. Returns how many were
-    /// removed.
+    /// Removes the last voxels, brick by brick, until the rest takes at most `bytes`. Returns the number of removed
+    /// voxels.
     pub(super) fn cut_to_bytes(&mut self, bytes: usize) -> u64 {
         let before = self.len();
         while self.memory_bytes() > bytes {

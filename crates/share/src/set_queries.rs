@@ -4,8 +4,8 @@ use voxtile::query::brick_of;
 use voxtile::query::occupied_set::OccupiedSet;
 use voxtile::space::{BrickCode, Grid, VoxelBox, VoxelIndex};
 
-/// The voxels of a layer are occupied, and nothing is known of others. A robot's own map
-/// [`United`](voxtile::query::United) with the layers of other robots knows both.
+/// The voxels of a layer are occupied, and all others are unknown. [`United`](voxtile::query::United) answers queries
+/// from a robot's own map and the layers of other robots.
 impl OccupiedSet for VoxelSet {
     fn grid_of_set(&self) -> Grid {
         *self.grid()

@@ -3,13 +3,13 @@ use voxtile::space::TileIndex;
 /// A position in the order of a set: by tile (x, then y, then z), then by the Morton code of the voxel's key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct SetPosition {
-    /// Which tile.
+    /// Tile of the voxel.
     pub tile: TileIndex,
-    /// Morton code of 48 bits.
+    /// Morton code of the key, 48 bits.
     pub code: u64,
 }
 
-/// The positions from a first to a last one, inclusive.
+/// Range of positions, both ends included.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SetRange {
     /// The first position.
@@ -22,7 +22,7 @@ pub struct SetRange {
 pub(super) const LAST_CODE: u64 = (1 << 48) - 1;
 
 impl SetPosition {
-    /// The next position.
+    /// Returns the next position.
     pub(super) fn next(self) -> Self {
         if self.code < LAST_CODE {
             return Self { code: self.code + 1, ..self };
@@ -36,7 +36,7 @@ impl SetPosition {
         Self { tile, code: 0 }
     }
 
-    /// The previous position; there must be one.
+    /// Returns the previous position, which must exist.
     pub(super) fn before(self) -> Self {
         if self.code > 0 {
             return Self { code: self.code - 1, ..self };
@@ -52,13 +52,13 @@ impl SetPosition {
 }
 
 impl SetRange {
-    /// Everything.
+    /// All positions.
     pub const ALL: Self = Self {
         first: SetPosition { tile: TileIndex::new(i32::MIN, i32::MIN, i32::MIN), code: 0 },
         last: SetPosition { tile: TileIndex::new(i32::MAX, i32::MAX, i32::MAX), code: LAST_CODE },
     };
 
-    /// The positions of the tiles from a first to a last one, inclusive.
+    /// Returns the range of the tiles between `first` and `last`, both included.
     pub fn of_tiles(first: TileIndex, last: TileIndex) -> Self {
         Self {
             first: SetPosition { tile: first, code: 0 },
@@ -66,12 +66,12 @@ impl SetRange {
         }
     }
 
-    /// Whether a position lies in the range.
+    /// Returns whether a position is in the range.
     pub fn contains(&self, position: SetPosition) -> bool {
         self.first <= position && position <= self.last
     }
 
-    /// Whether the last position is not before the first.
+    /// Returns whether the codes are valid and the last position is not before the first.
     pub fn is_valid(&self) -> bool {
         self.first <= self.last && self.first.code <= LAST_CODE && self.last.code <= LAST_CODE
     }

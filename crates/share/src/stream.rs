@@ -2,15 +2,15 @@ use super::voxel_versions::VoxelVersions;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// The state of a sender's packets at a receiver, for one epoch.
+/// State of a sender's packets at a receiver, for one epoch.
 #[derive(Clone, Debug)]
 pub(super) struct Stream {
     pub(super) epoch: u32,
-    /// The last packet known to have been sent.
+    /// Number of the last packet known to have been sent.
     pub(super) highest: u64,
-    /// When that became known.
+    /// Time when this number became known.
     pub(super) highest_at: Duration,
-    /// Lost packets up to it.
+    /// Missing packets up to `highest`.
     missing: BTreeMap<u64, Missing>,
     pub(super) versions: VoxelVersions,
 }
@@ -21,30 +21,31 @@ struct Missing {
     requests: u32,
 }
 
-/// How far a packet number may be from the last one. Beyond it the receiver requests a status.
+/// Maximum distance of a packet number from the last one. Beyond it, the receiver requests a status.
 pub(super) const WINDOW: u64 = 4096;
 
-/// Upper bound of the bytes for missing packets: a node has room for 11 and holds at least five.
+/// Upper bound on the memory of missing packets, in bytes: a B-tree node has space for 11 packets and holds at least
+/// five.
 const MISSING_BYTES: usize = WINDOW as usize / 5 * 11 * size_of::<(u64, Missing)>() * 5 / 4;
 
 impl Stream {
-    /// Upper bound of the bytes of memory, with so many for versions.
+    /// Returns an upper bound on the memory in bytes, with `version_bytes` for versions.
     pub(super) fn max_bytes(version_bytes: usize) -> usize {
         VoxelVersions::max_bytes(version_bytes) + MISSING_BYTES
     }
 
-    /// A stream after a packet that the sender has confirmed.
+    /// Creates a stream that starts after a packet confirmed by the sender.
     pub(super) fn new(epoch: u32, sequence: u64, now: Duration, version_bytes: usize) -> Self {
         let versions = VoxelVersions::new(sequence, version_bytes);
         Self { epoch, highest: sequence, highest_at: now, missing: BTreeMap::new(), versions }
     }
 
-    /// Whether a packet may belong to this stream.
+    /// Returns whether a packet may belong to this stream.
     pub(super) fn can_be(&self, epoch: u32, sequence: u64) -> bool {
         epoch == self.epoch && sequence.abs_diff(self.highest) <= WINDOW
     }
 
-    /// Learns that packets up to one were sent; those in between are missing.
+    /// Records that the packets up to `sequence` were sent; those that have not arrived are missing.
     pub(super) fn reach(&mut self, sequence: u64, now: Duration, patience: Duration) {
         if sequence <= self.highest {
             return;
@@ -58,18 +59,18 @@ impl Stream {
         }
     }
 
-    /// Learns that a packet arrived; `false` if it is a duplicate or too late.
+    /// Records the arrival of a packet. Returns `false` if it is a duplicate or too late.
     pub(super) fn arrive(&mut self, sequence: u64, now: Duration, patience: Duration) -> bool {
         self.reach(sequence, now, patience);
         self.missing.remove(&sequence).is_some() && sequence > self.versions.forgotten()
     }
 
-    /// Learns that other packets have repaired a packet.
-    pub(super) fn is_repaired(&mut self, sequence: u64) {
+    /// Records that other packets have repaired a packet.
+    pub(super) fn mark_repaired(&mut self, sequence: u64) {
         self.missing.remove(&sequence);
     }
 
-    /// Gives up missing packets before one; returns whether there were any.
+    /// Gives up the missing packets before `oldest`. Returns whether there were any.
     pub(super) fn give_up_before(&mut self, oldest: u64) -> bool {
         let kept = self.missing.split_off(&oldest);
         let given_up = std::mem::replace(&mut self.missing, kept);
@@ -84,12 +85,13 @@ impl Stream {
         self.missing.len()
     }
 
-    /// Packets to request now, the oldest first, and whether one of them was requested often in vain.
-    pub(super) fn due(&mut self, now: Duration, most: usize, retry: Duration) -> (Vec<u64>, bool) {
+    /// Returns the packets to request now, the oldest first and at most `limit`, and whether one of them was requested
+    /// three times before.
+    pub(super) fn due(&mut self, now: Duration, limit: usize, retry: Duration) -> (Vec<u64>, bool) {
         let mut due = Vec::new();
         let mut is_hopeless = false;
         for (&sequence, missing) in
-            self.missing.iter_mut().filter(|(_, missing)| missing.request_at <= now).take(most)
+            self.missing.iter_mut().filter(|(_, missing)| missing.request_at <= now).take(limit)
         {
             missing.requests = (missing.requests + 1).min(16);
             missing.request_at = now + retry * 2_u32.pow((missing.requests - 1).min(3));

@@ -1,19 +1,20 @@
 use std::time::Duration;
 
-/// Limits the rate of answers: a token bucket that holds the bytes of one second. An answer may take more than there
-/// is; the next one waits until that is made up for.
+/// Token bucket that limits the rate of answers. It holds at most the bytes of one second. An answer may exceed the
+/// tokens in the bucket; the next answer then waits until the deficit is refilled.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct TokenBucket {
-    /// In bytes times nanoseconds: requests may come faster than bytes. Negative if more was taken than there was.
+    /// In bytes times nanoseconds, because requests may arrive in less time than the refill of a byte takes. Negative
+    /// after an answer that exceeded the tokens.
     tokens: i128,
     at: Duration,
 }
 
-/// Tokens of a byte.
+/// Number of tokens per byte.
 const BYTE: i128 = 1_000_000_000;
 
 impl TokenBucket {
-    /// Refills the bucket; returns whether it holds anything.
+    /// Refills the bucket. Returns whether it holds any tokens.
     pub(super) fn refill(&mut self, bytes_per_s: u64, now: Duration) -> bool {
         let rate = i128::from(bytes_per_s);
         let passed_ns = i128::try_from(now.saturating_sub(self.at).as_nanos()).unwrap_or(i128::MAX);

@@ -4,18 +4,18 @@ use super::set_range::SetRange;
 use std::collections::{HashMap, VecDeque};
 use voxtile::space::{Grid, VoxelIndex};
 
-/// The version of each recently changed voxel: the packet that changed it last. A late packet must not undo a later
-/// one.
+/// Versions of recently changed voxels: for each voxel, the packet that changed it last. With them, a late packet does
+/// not undo a later packet.
 ///
-/// Packets older than the oldest version kept are refused.
+/// Packets older than the oldest kept version are refused.
 #[derive(Clone, Debug)]
 pub(super) struct VoxelVersions {
-    /// Hashed with a seed, because others choose the voxels.
+    /// Version of each voxel. The hash has a random seed, because other robots choose the voxels.
     last: HashMap<VoxelIndex, u64>,
-    /// Packets and their voxels, in the order of arrival.
+    /// Voxels with their packets, in the order of arrival.
     noted: VecDeque<(u64, VoxelIndex)>,
     max_voxels: usize,
-    /// The latest of these packets.
+    /// Highest number of these packets.
     newest: u64,
     /// Versions of ranges that were replaced as a whole.
     parts: RangeVersions,
@@ -23,32 +23,33 @@ pub(super) struct VoxelVersions {
     forgotten: u64,
 }
 
-/// Most versions of voxels: a minute of a dense lidar.
+/// Maximum number of voxel versions: a minute of a dense lidar.
 const MAX_VOXELS: usize = 1 << 18;
-/// Fewest versions of voxels: those of a packet.
+/// Minimum number of voxel versions, enough for a usual packet.
 const MIN_VOXELS: usize = 1 << 12;
-/// Most versions of ranges.
+/// Maximum number of range versions.
 const MAX_PARTS: usize = 4096;
 
-/// Most bytes per voxel: in a table and a queue that just doubled.
+/// Maximum number of bytes per voxel: table and queue have both just doubled.
 const BYTES_PER_VOXEL: usize =
     (size_of::<(VoxelIndex, u64)>() + 1) * 16 / 7 + 2 * size_of::<(u64, VoxelIndex)>();
-/// Upper bound of the bytes of all ranges: a node has room for 11 and holds at least five.
+/// Upper bound on the memory of all range versions, in bytes: a B-tree node has space for 11 ranges and holds at least
+/// five.
 const BYTES_OF_PARTS: usize = MAX_PARTS / 5 * 11 * 2 * size_of::<SetRange>();
 
 impl VoxelVersions {
-    /// The versions of a stream after packet `forgotten`, in at most so many bytes.
+    /// Creates the versions of a stream that starts after packet `forgotten`, with a memory limit of `bytes`.
     pub(super) fn new(forgotten: u64, bytes: usize) -> Self {
         let (last, noted, parts) = (HashMap::new(), VecDeque::new(), RangeVersions::default());
         Self { last, noted, max_voxels: voxels_of(bytes), newest: forgotten, parts, forgotten }
     }
 
-    /// Upper bound of the bytes of memory for a limit of `bytes`.
+    /// Returns an upper bound on the memory in bytes, for a limit of `bytes`.
     pub(super) fn max_bytes(bytes: usize) -> usize {
         voxels_of(bytes) * BYTES_PER_VOXEL + BYTES_OF_PARTS
     }
 
-    /// Changes the limit.
+    /// Changes the memory limit.
     pub(super) fn set_bytes(&mut self, bytes: usize) {
         let before = std::mem::replace(&mut self.max_voxels, voxels_of(bytes));
         if self.max_voxels < before {
@@ -62,25 +63,25 @@ impl VoxelVersions {
         self.forgotten
     }
 
-    /// Whether a later packet has changed a voxel.
+    /// Returns whether a later packet has changed a voxel.
     pub(super) fn is_later(&self, grid: &Grid, voxel: VoxelIndex, sequence: u64) -> bool {
-        // A range includes the packet of its version.
+        // The content of a range includes the packet of its version.
         self.was_changed_after(voxel, sequence) || self.parts.is_as_of(position_of(grid, voxel), sequence)
     }
 
-    /// Whether a later packet has changed a voxel by itself, not with a range.
+    /// Returns whether a later packet of changes has changed a voxel. Replaced ranges do not count.
     pub(super) fn was_changed_after(&self, voxel: VoxelIndex, sequence: u64) -> bool {
         self.newest > sequence && self.last.get(&voxel).is_some_and(|&version| version > sequence)
     }
 
-    /// The parts of a range that were not replaced as of this packet or a later one.
+    /// Returns the parts of a range that were not replaced as of packet `as_of` or a later one.
     pub(super) fn not_replaced(&self, range: SetRange, as_of: u64) -> Vec<SetRange> {
         self.parts.gaps(range, as_of)
     }
 
-    /// Sets the version of a packet's voxels.
+    /// Records a packet as the version of its voxels.
     pub(super) fn note(&mut self, sequence: u64, voxels: impl ExactSizeIterator<Item = VoxelIndex>) {
-        // First, so that the limit is never exceeded.
+        // Forget old versions first, so that the limit is never exceeded.
         self.forget_all_but(self.max_voxels.saturating_sub(voxels.len()));
         self.newest = self.newest.max(sequence);
         for voxel in voxels {
@@ -96,7 +97,7 @@ impl VoxelVersions {
         }
     }
 
-    /// Sets the version of a range of the set.
+    /// Records the version of a range that was replaced.
     pub(super) fn note_part(&mut self, range: SetRange, as_of: u64) {
         self.parts.note(range, as_of);
         while self.parts.len() > MAX_PARTS

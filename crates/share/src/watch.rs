@@ -10,14 +10,14 @@ use voxtile::space::{BrickMask, Grid, TileIndex, VoxelIndex};
 use voxtile::{Error, Result};
 use voxtile_local::{LocalMap, LocalReport, LocalState, LocalView};
 
-/// Passes an archive's occupied voxels, those of at least a threshold probability, to a sender.
+/// Passes an archive's occupied voxels to a sender: the voxels of at least a threshold probability.
 #[derive(Clone, Copy, Debug)]
 pub struct MapWatch {
     threshold_log_odds: f64,
 }
 
 impl MapWatch {
-    /// A watch with this threshold.
+    /// Creates a watch with a threshold probability.
     ///
     /// # Errors
     ///
@@ -29,7 +29,7 @@ impl MapWatch {
         Ok(Self { threshold_log_odds: logit(threshold) })
     }
 
-    /// Passes the whole map: once, before the first scan.
+    /// Passes the whole map. Call it once, before the first scan.
     ///
     /// # Errors
     ///
@@ -39,7 +39,7 @@ impl MapWatch {
         view.tile_indices().into_iter().try_for_each(|tile| self.take_tile(view, tile, sender))
     }
 
-    /// Passes the tiles that the scan may have changed; the map has just taken it.
+    /// Passes the tiles that a scan may have changed. Call it after the map has inserted the scan.
     ///
     /// # Errors
     ///
@@ -71,24 +71,24 @@ fn check_grid(grid: &Grid, sender: &Sender) -> Result<()> {
     if grid == sender.grid() {
         return Ok(());
     }
-    let reason = format!("voxels and tiles of the map and of the sender differ: {grid}, {}", sender.grid());
+    let reason = format!("the map has {grid}, but the sender has {}", sender.grid());
     Err(Error::argument("grid", reason))
 }
 
-/// Passes a local map's occupied voxels to a sender. A voxel that leaves the map by age stays in the set; one that rays
-/// found free leaves the set.
+/// Passes a local map's occupied voxels to a sender. A voxel that leaves the map by age remains in the set; a voxel
+/// that rays have cleared leaves the set.
 #[derive(Clone, Debug)]
 pub struct LocalWatch {
     seen: Option<Arc<LocalView>>,
 }
 
 impl LocalWatch {
-    /// A watch before the first scan.
+    /// Creates a watch that has seen no scan.
     pub fn new() -> Self {
         Self { seen: None }
     }
 
-    /// Passes the changes of a scan that the map has just taken, before its parameters are set anew.
+    /// Passes the changes of a scan. Call it after the map has inserted the scan, and before its parameters change.
     ///
     /// # Errors
     ///

@@ -1,15 +1,16 @@
 use super::context::Contexts;
 use voxtile::FormatError;
 
-/// Writes or reads the bits of a packet, each in a context that predicts its probability.
+/// Writer or reader of a packet's bits, each in a context that predicts its probability.
 ///
-/// A writer writes `bit` and returns it; a reader ignores it and returns what it read. So both share one tree walk.
+/// A writer writes `bit` and returns it. A reader ignores `bit` and returns the bit that it read. This way, both share
+/// one tree walk.
 pub(super) trait Bits {
     fn bit(&mut self, context: usize, bit: bool) -> Result<bool, FormatError>;
 }
 
-/// A binary arithmetic coder: each bit narrows an interval of 32 bits in proportion to its probability. Bytes are
-/// written once both ends agree on them.
+/// Binary arithmetic encoder: each bit narrows a 32-bit interval in proportion to the bit's probability. A byte is
+/// written once both ends of the interval agree on it.
 pub(super) struct BitWriter {
     contexts: Contexts,
     low: u32,
@@ -22,9 +23,9 @@ impl BitWriter {
         Self { contexts: Contexts::new(), low: 0, high: u32::MAX, bytes: Vec::new() }
     }
 
-    /// Finishes and returns the bytes. A reader assumes zeros behind them.
+    /// Finishes and returns the bytes. A reader continues with zeros after the last byte.
     pub(super) fn finish(mut self) -> Vec<u8> {
-        // The shortest number in the interval.
+        // Write the shortest number in the interval.
         for bits in [0, 8, 16, 24] {
             let mask = if bits == 0 { 0 } else { u32::MAX << (32 - bits) };
             let rounded = u64::from(self.low) + u64::from(!mask);
@@ -79,7 +80,7 @@ impl<'a> BitReader<'a> {
         self.position += 1;
     }
 
-    /// Whether all bytes were used, as after a writer's output.
+    /// Returns whether all bytes were read.
     pub(super) fn is_used_up(&self) -> bool {
         self.position >= self.bytes.len()
     }
@@ -99,7 +100,7 @@ impl Bits for BitReader<'_> {
             self.low <<= 8;
             self.high = self.high << 8 | 255;
             self.shift();
-            // A writer omits at most the zeros that fill the last interval.
+            // After valid output, the reader is at most four bytes past the end.
             if self.position > self.bytes.len() + 4 {
                 return Err(FormatError::at_offset(
                     self.bytes.len() as u64,
@@ -111,7 +112,7 @@ impl Bits for BitReader<'_> {
     }
 }
 
-/// The last number of the subinterval for 1.
+/// Returns the last number of the subinterval for bit 1.
 fn middle(low: u32, high: u32, probability: u32) -> u32 {
     low + ((u64::from(high - low) * u64::from(probability)) >> 16) as u32
 }

@@ -1,6 +1,6 @@
 use voxtile::FormatError;
 
-/// Reads consecutive numbers; errors have the offset.
+/// Reader of consecutive numbers. Its errors report the offset.
 pub(super) struct Reader<'a> {
     bytes: &'a [u8],
     position: usize,
@@ -8,7 +8,7 @@ pub(super) struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    /// `offset` is the offset of the bytes for errors.
+    /// `offset` is the position of `bytes` in the packet, for errors.
     pub(super) fn new(bytes: &'a [u8], offset: u64) -> Self {
         Self { bytes, position: 0, offset }
     }
@@ -35,7 +35,7 @@ impl<'a> Reader<'a> {
         self.array::<1>().map(|[byte]| byte)
     }
 
-    /// A varint of seven bits per byte, the lowest first.
+    /// Reads a varint of seven bits per byte, lowest bits first.
     pub(super) fn number(&mut self) -> Result<u64, FormatError> {
         let mut number = 0_u64;
         for shift in (0..64).step_by(7) {
@@ -52,14 +52,14 @@ impl<'a> Reader<'a> {
         Err(self.error("a number of more than 64 bits"))
     }
 
-    /// A varint with the sign in the lowest bit.
+    /// Reads a varint with the sign in the lowest bit.
     pub(super) fn signed(&mut self) -> Result<i64, FormatError> {
         let number = self.number()?;
         Ok((number >> 1) as i64 ^ -((number & 1) as i64))
     }
 
     pub(super) fn end(&self) -> Result<(), FormatError> {
-        if self.rest().is_empty() { Ok(()) } else { Err(self.error("there are bytes behind the end")) }
+        if self.rest().is_empty() { Ok(()) } else { Err(self.error("unexpected bytes after the end")) }
     }
 }
 

@@ -1,12 +1,12 @@
-//! Packets: voxels to bytes and back. Knows no transport, and no state but that of the present packet.
+//! Encoding and decoding of packets. A packet needs no state of other packets.
 //!
 //! ```text
 //! updates -> octree, level by level -> bits with their contexts -> arithmetic coder -> bytes
 //!            voxel_tree                context, prior              bit_coder          packet, request
 //! ```
 //!
-//! Each packet can be decoded by itself, so a lost packet costs only its own content. Input is untrusted: no number in
-//! a packet sets the size of an allocation, and the number of voxels is limited.
+//! Since each packet can be decoded by itself, a lost packet costs only its own content. Input is untrusted: no number
+//! in a packet sets the size of an allocation, and the number of voxels is limited.
 
 mod bit_coder;
 mod bytes;
@@ -23,5 +23,5 @@ pub use prior::count_contexts;
 pub use request::{MAX_LISTED, Request};
 pub use voxel_tree::{Update, decode_updates, encode_updates};
 
-/// Most voxels in a packet; more are refused. A packet of 1200 bytes could encode far more.
+/// Maximum number of voxels in a packet; packets with more are refused. A packet of 1200 bytes could encode far more.
 pub const MAX_VOXELS_PER_PACKET: usize = 1 << 14;

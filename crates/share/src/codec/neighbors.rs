@@ -1,24 +1,24 @@
-/// Bits of x in a Morton code; those of y and z are one and two higher.
+/// Bits of x in a Morton code. The bits of y and z are one and two positions higher.
 const X_BITS: u64 = 0x1249_2492_4924_9249;
 
-/// Positions of a node's face neighbours among the nodes of its level: for each axis the one below and the one above.
+/// Indices of a node's face neighbours in the list of its level: for each axis, the lower and the upper neighbour.
 pub(super) struct Faces(pub(super) [[Option<usize>; 2]; 3]);
 
 impl Faces {
-    /// `nodes` are Morton codes of `levels` levels, ascending.
+    /// `nodes` are the Morton codes of a level in ascending order; each has `levels` levels.
     pub(super) fn of(nodes: &[u64], number: usize, levels: u32) -> Self {
         let code = nodes[number];
         Self(std::array::from_fn(|axis| {
             let find = |neighbor: Option<u64>| nodes.binary_search(&neighbor?).ok();
-            let [below, above] = beside(code, axis, levels);
+            let [below, above] = axis_neighbors(code, axis, levels);
             let others = code & !(X_BITS << axis);
             [find(below.map(|part| part | others)), find(above.map(|part| part | others))]
         }))
     }
 }
 
-/// A code's bits of one axis, decremented and incremented; `None` outside the cube.
-fn beside(code: u64, axis: usize, levels: u32) -> [Option<u64>; 2] {
+/// Returns a code's bits of one axis, decremented and incremented; `None` outside the cube.
+fn axis_neighbors(code: u64, axis: usize, levels: u32) -> [Option<u64>; 2] {
     let axis_bits = (X_BITS << axis) & ((1 << (3 * levels)) - 1);
     let part = code & axis_bits;
     let below = (part != 0).then(|| part.wrapping_sub(1) & axis_bits);
@@ -26,10 +26,10 @@ fn beside(code: u64, axis: usize, levels: u32) -> [Option<u64>; 2] {
     [below, above]
 }
 
-/// The codes of the up to 26 cells around one.
+/// Returns the codes of the up to 26 cells around a cell.
 pub(super) fn around(code: u64, levels: u32) -> impl Iterator<Item = u64> {
     let parts: [[Option<u64>; 3]; 3] = std::array::from_fn(|axis| {
-        let [below, above] = beside(code, axis, levels);
+        let [below, above] = axis_neighbors(code, axis, levels);
         [below, Some(code & (X_BITS << axis)), above]
     });
     (0..27).filter(|&cell| cell != 13).filter_map(move |cell: usize| {
@@ -42,7 +42,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn cells_around_are_those_of_plain_coordinates() {
+    fn cells_around_match_plain_coordinates() {
         let code = |[x, y, z]: [i64; 3]| {
             (0..3).map(|k| ((x >> k & 1) | (y >> k & 1) << 1 | (z >> k & 1) << 2) << (3 * k)).sum::<i64>()
                 as u64

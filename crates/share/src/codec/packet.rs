@@ -4,7 +4,7 @@ use crate::set_range::{SetPosition, SetRange};
 use voxtile::space::{TileIndex, VoxelIndex};
 use voxtile::{FormatError, Result};
 
-/// The first byte of every packet and request. Other versions are refused.
+/// Version of the format: the first byte of every packet and request. Other versions are refused.
 pub const VERSION: u8 = 1;
 
 /// A packet of a sender.
@@ -14,25 +14,25 @@ pub enum Packet {
     Changes {
         /// Epoch and sequence number.
         header: Header,
-        /// Earlier packets that this packet's frame repairs: it holds the present state of their voxels.
+        /// Earlier packets that this packet's frame repairs: the frame has the current state of their voxels.
         repaired: Vec<u64>,
-        /// The voxels, without duplicates.
+        /// The updates, one per voxel.
         updates: Vec<Update>,
     },
-    /// Exactly the voxels of a range of the set.
+    /// All voxels in a range of the set.
     Content {
         /// As of which packet.
         header: Header,
         /// The range.
         range: SetRange,
-        /// Its voxels, without duplicates.
+        /// The voxels, without duplicates.
         voxels: Vec<VoxelIndex>,
     },
-    /// Digests of the tiles from a first one on.
+    /// Digests of consecutive tiles.
     Digests {
         /// As of which packet.
         header: Header,
-        /// Where the first entry begins.
+        /// First tile of the first entry.
         first: TileIndex,
         /// Consecutive entries.
         entries: Vec<DigestEntry>,
@@ -41,21 +41,21 @@ pub enum Packet {
     Status(Status),
 }
 
-/// The sender's epoch and a packet number.
+/// Epoch of the sender and a packet number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Header {
-    /// A different number for each start of the sender.
+    /// Number that differs for each start of the sender.
     pub epoch: u32,
-    /// For changes: the packet's number, from 1. Otherwise: the last packet of changes before it.
+    /// For changes, the number of the packet, from 1. For other packets, the number of the last packet of changes.
     pub sequence: u64,
 }
 
 /// Digest of consecutive tiles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DigestEntry {
-    /// The last tile; the first one follows the previous entry.
+    /// Last tile. The first tile follows the last tile of the previous entry.
     pub last: TileIndex,
-    /// Voxels in these tiles.
+    /// Number of voxels in these tiles.
     pub voxels: u64,
     /// The first eight bytes of BLAKE3 over these tiles' indices and digests.
     pub digest: [u8; 8],
@@ -66,17 +66,17 @@ pub struct DigestEntry {
 pub struct Status {
     /// As of which packet.
     pub header: Header,
-    /// The nonce of the request; 0 if there was none.
+    /// Nonce of the request; 0 without a request.
     pub nonce: u64,
-    /// The first packet that can still be repaired.
+    /// Number of the first packet that can still be repaired.
     pub oldest: u64,
     /// Edge of a voxel in metres.
     pub resolution_m: f64,
     /// Edge of a tile in metres.
     pub tile_size_m: f64,
-    /// Voxels in the set.
+    /// Number of voxels in the set.
     pub voxels: u64,
-    /// The digest of the set.
+    /// Digest of the set.
     pub digest: [u8; 32],
 }
 
@@ -85,11 +85,11 @@ const CONTENT: u8 = 2;
 const DIGESTS: u8 = 3;
 const STATUS: u8 = 4;
 
-/// Most repaired packets that one packet lists.
+/// Maximum number of repaired packets that one packet lists.
 pub(crate) const MAX_REPAIRED: usize = 256;
 
 impl Packet {
-    /// The packet's bytes.
+    /// Encodes the packet.
     ///
     /// # Errors
     ///
@@ -133,7 +133,7 @@ impl Packet {
     ///
     /// # Errors
     ///
-    /// Another version, damage, and what no sender writes.
+    /// Another version, or bytes that are damaged or not a valid packet.
     pub fn decode(bytes: &[u8]) -> std::result::Result<Self, FormatError> {
         let mut reader = unseal(bytes)?;
         let kind = reader.byte()?;
@@ -143,11 +143,11 @@ impl Packet {
             CONTENT => read_content(&mut reader, header),
             DIGESTS => read_digests(&mut reader, header),
             STATUS => read_status(&mut reader, header),
-            other => Err(reader.error(format!("there are no packets of kind {other}"))),
+            other => Err(reader.error(format!("unknown packet kind {other}"))),
         }
     }
 
-    /// The epoch and the packet number.
+    /// Returns the epoch and the packet number.
     pub fn header(&self) -> Header {
         match self {
             Self::Changes { header, .. } | Self::Content { header, .. } | Self::Digests { header, .. } => {
@@ -158,21 +158,22 @@ impl Packet {
     }
 }
 
-/// Adds the checksum.
+/// Appends the checksum.
 pub(super) fn seal(bytes: &mut Vec<u8>) {
     bytes.extend(crc32fast::hash(bytes).to_le_bytes());
 }
 
-/// Checks version and checksum; returns a reader of what is between.
+/// Checks version and checksum. Returns a reader of the bytes between them.
 pub(super) fn unseal(bytes: &[u8]) -> std::result::Result<Reader<'_>, FormatError> {
     let Some((content, checksum)) = bytes.split_last_chunk::<4>() else {
         return Err(FormatError::at_offset(0, "the packet is too short"));
     };
-    // First, because another version may have its checksum elsewhere.
+    // Check the version first: another version may have its checksum elsewhere.
     match content.first() {
         Some(&VERSION) => {}
         Some(other) => {
-            let reason = format!("version {other} of packets is unknown; this is version {VERSION}");
+            let reason =
+                format!("packet version {other} is not supported; this program uses version {VERSION}");
             return Err(FormatError::at_offset(0, reason));
         }
         None => return Err(FormatError::at_offset(0, "the packet is too short")),
@@ -210,7 +211,7 @@ pub(super) fn put_range(bytes: &mut Vec<u8>, range: SetRange) {
     put_tile(bytes, TileIndex::default(), range.first.tile);
     put_number(bytes, range.first.code);
     put_tile(bytes, range.first.tile, range.last.tile);
-    // Often the range ends with its last tile.
+    // A range often ends with its last tile, which gives a 0.
     put_number(bytes, super::super::set_range::LAST_CODE - range.last.code);
 }
 
@@ -228,11 +229,11 @@ pub(super) fn read_range(reader: &mut Reader<'_>) -> std::result::Result<SetRang
 
 fn read_changes(reader: &mut Reader<'_>, header: Header) -> std::result::Result<Packet, FormatError> {
     if header.sequence == 0 {
-        return Err(reader.error("packets of changes are numbered from 1"));
+        return Err(reader.error("the packet has number 0; packets of changes are numbered from 1"));
     }
     let count = reader.number()?;
     if count > MAX_REPAIRED as u64 {
-        return Err(reader.error(format!("{count} repaired packets, at most {MAX_REPAIRED}")));
+        return Err(reader.error(format!("{count} repaired packets; the maximum is {MAX_REPAIRED}")));
     }
     let mut repaired = Vec::new();
     for _ in 0..count {
@@ -247,7 +248,7 @@ fn read_content(reader: &mut Reader<'_>, header: Header) -> std::result::Result<
     let range = read_range(reader)?;
     let updates = decode_updates(reader.rest(), reader.offset())?;
     if updates.iter().any(|update| !update.is_in) {
-        return Err(reader.error("content with voxels that go"));
+        return Err(reader.error("a packet of content removes voxels"));
     }
     Ok(Packet::Content { header, range, voxels: updates.into_iter().map(|update| update.voxel).collect() })
 }
@@ -258,7 +259,7 @@ fn read_digests(reader: &mut Reader<'_>, header: Header) -> std::result::Result<
     while !reader.rest().is_empty() {
         let last = read_tile(reader, before)?;
         if last < before || (last == before && !entries.is_empty()) {
-            return Err(reader.error("digests of tiles that are not in order"));
+            return Err(reader.error("the tiles of the digests are not in order"));
         }
         entries.push(DigestEntry { last, voxels: reader.number()?, digest: reader.array()? });
         before = last;

@@ -3,13 +3,14 @@ use super::context::CONTEXTS;
 use super::voxel_tree::{Cube, Update};
 use voxtile::{FormatError, Result};
 
-/// Probability of a 1 in each context before a packet's own bits are known, in 1/256; 0 if the context never occurred.
+/// Initial probability of a 1 in each context, in 1/256; 0 for a context that never occurred.
 ///
-/// Counted in packets of lidar scans of a hall, of a street and by hand; `docs/sharing.md` says how, and what it gains
-/// for scans that were not counted. Part of the format: another table needs another version.
+/// The probabilities are counted in packets of lidar scans of a hall, of a street and from a hand-held sensor.
+/// `docs/sharing.md` describes the count and the gain on other scans. The table is part of the format: another table
+/// needs another version.
 pub(super) static PRIOR: &[u8; CONTEXTS] = include_bytes!("prior.bin");
 
-/// Counts zeros and ones in each context of a packet of these updates: the source of the prior.
+/// Counts the zeros and ones in each context of a packet of these updates, to compute the prior.
 ///
 /// # Errors
 ///

@@ -3,33 +3,33 @@ use super::packet::{VERSION, put_range, read_range, seal, unseal};
 use crate::set_range::SetRange;
 use voxtile::FormatError;
 
-/// A request of a receiver to a sender.
+/// A request from a receiver to a sender.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Request {
-    /// Its status. Only an answer to this request repeats the nonce.
+    /// Request for the sender's status. Only the answer to this request repeats the nonce.
     Status {
         /// Any number but 0.
         nonce: u64,
     },
-    /// The present voxels of lost packets.
+    /// Request for the current state of the voxels of lost packets.
     Missing {
         /// The sender's epoch.
         epoch: u32,
-        /// Their numbers, ascending.
+        /// Numbers of the lost packets, ascending.
         sequences: Vec<u64>,
     },
-    /// Digests of tiles.
+    /// Request for digests of tiles.
     Digests {
-        /// Of whose set.
+        /// The sender's epoch.
         epoch: u32,
-        /// Of whole tiles.
+        /// Range of whole tiles.
         range: SetRange,
     },
-    /// The voxels of parts of the set.
+    /// Request for the voxels of ranges of the set.
     Content {
-        /// Of whose set.
+        /// The sender's epoch.
         epoch: u32,
-        /// Which parts.
+        /// Ranges of the set.
         ranges: Vec<SetRange>,
     },
 }
@@ -39,11 +39,11 @@ const MISSING: u8 = 18;
 const DIGESTS: u8 = 19;
 const CONTENT: u8 = 20;
 
-/// Most packets or ranges in one request.
+/// Maximum number of packets or ranges in one request.
 pub const MAX_LISTED: usize = 64;
 
 impl Request {
-    /// The bytes of the request, at most 1200.
+    /// Encodes the request, in at most 1200 bytes.
     pub fn encode(&self) -> Vec<u8> {
         let mut bytes = vec![VERSION];
         match self {
@@ -79,7 +79,7 @@ impl Request {
     ///
     /// # Errors
     ///
-    /// Another version, damage, and what no receiver writes.
+    /// Another version, or bytes that are damaged or not a valid request.
     pub fn decode(bytes: &[u8]) -> Result<Self, FormatError> {
         let mut reader = unseal(bytes)?;
         let kind = reader.byte()?;
@@ -106,7 +106,7 @@ impl Request {
                 }
                 Self::Content { epoch, ranges }
             }
-            other => return Err(reader.error(format!("there are no asks of kind {other}"))),
+            other => return Err(reader.error(format!("unknown request kind {other}"))),
         };
         reader.end()?;
         Ok(request)

@@ -6,63 +6,63 @@ use super::neighbors::{Faces, around};
 use voxtile::space::{LAST_VOXEL_INDEX, VoxelIndex};
 use voxtile::{Error, FormatError, Result};
 
-/// A voxel that is added to a set or removed from it.
+/// Voxel that is added to a set or removed from it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Update {
-    /// Which voxel.
+    /// Index of the voxel.
     pub voxel: VoxelIndex,
-    /// Whether it is added.
+    /// Whether the voxel is added.
     pub is_in: bool,
 }
 
-/// Most levels of a packet's octree above the voxels: its cube has an edge of at most 2 to this power.
+/// Maximum number of octree levels above the voxels: the cube of a packet has an edge of at most 2^20 voxels.
 const MAX_LEVELS: u32 = 20;
 
-/// The voxels of a packet in their cube, by Morton code, and whether each is added.
+/// Voxels of a packet in their bounding cube: the Morton code of each, and whether it is added.
 pub(super) struct Cube {
     origin: VoxelIndex,
     levels: u32,
     voxels: Vec<(u64, bool)>,
 }
 
-/// In the first byte: all voxels are added.
-const ALL_COME: u8 = 1;
-const ALL_GO: u8 = 2;
+/// Modes in the first byte: all voxels are added, all are removed, or some of each.
+const ALL_ADDED: u8 = 1;
+const ALL_REMOVED: u8 = 2;
 const MIXED: u8 = 3;
 
-/// Encodes distinct voxels, in any order; see `docs/sharing.md`.
+/// Encodes distinct voxels, given in any order. `docs/sharing.md` specifies the format.
 ///
 /// # Errors
 ///
-/// More than [`MAX_VOXELS_PER_PACKET`] voxels, voxels that are a million voxels apart, or an index above
+/// More than [`MAX_VOXELS_PER_PACKET`] voxels, voxels about a million or more voxels apart, or an index above
 /// [`LAST_VOXEL_INDEX`].
 pub fn encode_updates(updates: &[Update]) -> Result<Vec<u8>> {
     if updates.is_empty() {
         return Ok(vec![0]);
     }
     let cube = Cube::of(updates)?;
-    let coming = updates.iter().filter(|update| update.is_in).count();
-    let mode = match coming {
-        0 => ALL_GO,
-        _ if coming == updates.len() => ALL_COME,
+    let added = updates.iter().filter(|update| update.is_in).count();
+    let mode = match added {
+        0 => ALL_REMOVED,
+        _ if added == updates.len() => ALL_ADDED,
         _ => MIXED,
     };
     let mut bytes = vec![mode << 5 | cube.levels as u8];
-    // The lower corner is a brick's.
+    // The lower corner is the corner of a brick: a multiple of 8.
     cube.origin.iter().for_each(|k| put_signed(&mut bytes, i64::from(k >> 3)));
     let mut writer = BitWriter::new();
     let walked = walk(&mut writer, cube.levels, mode == MIXED, &cube.voxels);
-    debug_assert!(walked.is_ok(), "a writer refuses nothing");
+    debug_assert!(walked.is_ok(), "writing cannot fail");
     bytes.extend(writer.finish());
     Ok(bytes)
 }
 
-/// Decodes the voxels of [`encode_updates`]; `offset` is the offset of the bytes in their packet, for errors.
+/// Decodes the bytes of [`encode_updates`]. `offset` is the position of the bytes in their packet, for errors.
 ///
 /// # Errors
 ///
-/// What no encoder writes, such as more than [`MAX_VOXELS_PER_PACKET`] voxels or an index above [`LAST_VOXEL_INDEX`].
-/// Decoded voxels can always be encoded again.
+/// Bytes that are not valid updates, more than [`MAX_VOXELS_PER_PACKET`] voxels, or an index above
+/// [`LAST_VOXEL_INDEX`]. Decoded voxels can always be encoded again.
 pub fn decode_updates(bytes: &[u8], offset: u64) -> std::result::Result<Vec<Update>, FormatError> {
     let mut reader = Reader::new(bytes, offset);
     let first = reader.byte()?;
@@ -70,25 +70,24 @@ pub fn decode_updates(bytes: &[u8], offset: u64) -> std::result::Result<Vec<Upda
     if first == 0 && reader.rest().is_empty() {
         return Ok(Vec::new());
     }
-    if !(ALL_COME..=MIXED).contains(&mode) || levels > MAX_LEVELS {
-        return Err(reader.error(format!("no octree of voxels begins with {first}")));
+    if !(ALL_ADDED..=MIXED).contains(&mode) || levels > MAX_LEVELS {
+        return Err(reader.error(format!("invalid first byte {first} of an octree")));
     }
     let mut origin = [0_i32; 3];
     for k in &mut origin {
         let corner = reader.signed()?.checked_mul(8).and_then(|corner| i32::try_from(corner).ok());
-        *k = corner.ok_or_else(|| reader.error("the voxels lie outside of all indices"))?;
+        *k = corner.ok_or_else(|| reader.error("the voxel indices are out of range"))?;
     }
     let mut bits = BitReader::new(reader.rest());
     let voxels = walk(&mut bits, levels, mode == MIXED, &[])?;
     if !bits.is_used_up() {
-        return Err(reader.error("there are bytes behind the last voxel"));
+        return Err(reader.error("unexpected bytes after the last voxel"));
     }
     let update = |(code, is_in): (u64, bool)| {
-        let is_in = if mode == MIXED { is_in } else { mode == ALL_COME };
-        // The cube may exceed the range of indices, its voxels may not.
-        let voxel = voxel_in(origin, gather(code)).ok_or_else(|| {
-            reader.error(format!("a voxel behind the last one, which has index {LAST_VOXEL_INDEX}"))
-        })?;
+        let is_in = if mode == MIXED { is_in } else { mode == ALL_ADDED };
+        // The cube may exceed the range of indices, but its voxels must not.
+        let voxel = voxel_in(origin, gather(code))
+            .ok_or_else(|| reader.error(format!("a voxel index above the maximum of {LAST_VOXEL_INDEX}")))?;
         Ok(Update { voxel, is_in })
     };
     voxels.into_iter().map(update).collect()
@@ -97,7 +96,7 @@ pub fn decode_updates(bytes: &[u8], offset: u64) -> std::result::Result<Vec<Upda
 impl Cube {
     pub(super) fn of(updates: &[Update]) -> Result<Self> {
         if updates.len() > MAX_VOXELS_PER_PACKET {
-            let reason = format!("{} voxels, at most {MAX_VOXELS_PER_PACKET}", updates.len());
+            let reason = format!("{} voxels; the maximum is {MAX_VOXELS_PER_PACKET}", updates.len());
             return Err(Error::argument("voxels of a packet", reason));
         }
         let corner = |pick: fn(i32, i32) -> i32, from: i32| {
@@ -111,13 +110,13 @@ impl Cube {
         let extent = (0..3).map(|k| i64::from(last[k]) - i64::from(origin[k])).max().unwrap_or(0);
         let levels = 64 - extent.leading_zeros();
         if last.iter().any(|&k| k > LAST_VOXEL_INDEX) {
-            let reason = format!("{last:?} is behind the last one, which has index {LAST_VOXEL_INDEX}");
+            let reason = format!("{last:?} is above the maximum index of {LAST_VOXEL_INDEX}");
             return Err(Error::argument("voxels of a packet", reason));
         }
         if levels > MAX_LEVELS {
             return Err(Error::argument(
                 "voxels of a packet",
-                "they are a million voxels apart; send less at a time",
+                "they are a million voxels apart or more; use several packets",
             ));
         }
         let place = |update: &Update| {
@@ -135,8 +134,8 @@ impl Cube {
     }
 }
 
-/// Walks the octree of a cube level by level, each in Morton order: one bit per child, then one bit per voxel if some
-/// are added and some removed. Returns the voxels; `known` are those to be written.
+/// Codes the octree of a cube level by level, each level in Morton order: one bit per child, then one bit per voxel if
+/// `is_mixed`. Returns the voxels. `known` has the voxels to write; a reader passes none.
 fn walk(
     bits: &mut impl Bits,
     levels: u32,
@@ -147,7 +146,7 @@ fn walk(
     for level in (0..levels).rev() {
         let mut children = Vec::with_capacity(2 * nodes.len());
         let mut masks = Vec::with_capacity(nodes.len());
-        // For a writer: the voxels behind those of the nodes so far.
+        // For a writer: the voxels of the remaining nodes.
         let mut rest = known;
         for number in 0..nodes.len() {
             let wanted = take_mask(&mut rest, nodes[number], level);
@@ -167,7 +166,7 @@ fn walk(
     code_directions(bits, levels, is_mixed, &nodes, known)
 }
 
-/// The children of a node that hold voxels, for a writer.
+/// For a writer: returns the children of a node that hold voxels, and skips these voxels in `rest`.
 fn take_mask(rest: &mut &[(u64, bool)], node: u64, level: u32) -> u8 {
     let mut mask = 0;
     while let Some((code, _)) = rest.first()
@@ -188,7 +187,7 @@ fn code_children(
 ) -> std::result::Result<u8, FormatError> {
     let mut mask = 0_u8;
     for child in 0..8 {
-        // A node has at least one child.
+        // A node has at least one child, so the last bit may be implied.
         let is_certain = child == 7 && mask == 0;
         let context = child_context(level, child, faces, masks, mask);
         let bit = is_certain || bits.bit(context.number(), wanted >> child & 1 == 1)?;
@@ -228,26 +227,26 @@ fn code_directions(
     known: &[(u64, bool)],
 ) -> std::result::Result<Vec<(u64, bool)>, FormatError> {
     let mut voxels: Vec<(u64, bool)> = Vec::with_capacity(codes.len());
-    let mut before = 2;
+    let mut previous = 2;
     for (number, &code) in codes.iter().enumerate() {
         let mut is_in = true;
         if is_mixed {
-            let (mut coming, mut going) = (0, 0);
+            let (mut added, mut removed) = (0, 0);
             for neighbor in around(code, levels).filter(|&neighbor| neighbor < code) {
                 if let Ok(place) = voxels.binary_search_by_key(&neighbor, |(code, _)| *code) {
-                    *(if voxels[place].1 { &mut coming } else { &mut going }) += 1;
+                    *(if voxels[place].1 { &mut added } else { &mut removed }) += 1;
                 }
             }
             let wanted = known.get(number).is_some_and(|(_, is_in)| *is_in);
-            is_in = bits.bit(direction_context(before, coming, going), wanted)?;
-            before = usize::from(is_in);
+            is_in = bits.bit(direction_context(previous, added, removed), wanted)?;
+            previous = usize::from(is_in);
         }
         voxels.push((code, is_in));
     }
     Ok(voxels)
 }
 
-/// The voxel at a place of a cube, if its index is valid.
+/// Returns the voxel at a position in a cube; `None` if its index is out of range.
 fn voxel_in(origin: VoxelIndex, local: [u32; 3]) -> Option<VoxelIndex> {
     let mut voxel = origin;
     for (k, local) in voxel.iter_mut().zip(local) {

@@ -7,7 +7,7 @@ use voxtile_share::codec::{
 };
 use voxtile_share::{SetPosition, SetRange, VoxelSet, read_layer, write_layer};
 
-/// Voxels here and there, some together, around any origin.
+/// Generates scattered or dense voxels around any origin.
 fn updates() -> impl Strategy<Value = Vec<Update>> {
     let origin = prop_oneof![Just([0; 3]), Just([-70_000, 3, 2_000_000_000]), any::<[i32; 3]>()]
         .prop_map(|origin: [i32; 3]| origin.map(|k| k.clamp(i32::MIN, i32::MAX - (1 << 21))));
@@ -28,7 +28,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(200))]
 
     #[test]
-    fn updates_come_back(updates in updates(), direction in 0..3) {
+    fn updates_survive_encoding(updates in updates(), direction in 0..3) {
         let is_in = |update: &Update| match direction { 0 => true, 1 => false, _ => update.is_in };
         let updates: Vec<Update> = updates.iter().map(|u| Update { is_in: is_in(u), ..*u }).collect();
         let bytes = encode_updates(&updates).unwrap();
@@ -38,10 +38,10 @@ proptest! {
     }
 
     #[test]
-    fn any_bytes_are_read_or_refused(bytes in prop::collection::vec(any::<u8>(), 0..400)) {
+    fn any_bytes_are_decoded_or_refused(bytes in prop::collection::vec(any::<u8>(), 0..400)) {
         if let Ok(updates) = decode_updates(&bytes, 0) {
             prop_assert!(updates.len() <= MAX_VOXELS_PER_PACKET);
-            // Whatever was read can be written and read again.
+            // Decoded updates can be encoded and decoded again.
             let again = decode_updates(&encode_updates(&updates).unwrap(), 0).unwrap();
             prop_assert_eq!(sorted(&again), sorted(&updates));
         }
@@ -63,7 +63,7 @@ fn position(x: i32, y: i32, z: i32, code: u64) -> SetPosition {
 }
 
 #[test]
-fn packets_and_asks_come_back() {
+fn packets_and_requests_survive_encoding() {
     let header = Header { epoch: u32::MAX, sequence: u64::MAX };
     let range =
         SetRange { first: position(-5, 0, 7, 1 << 40), last: position(i32::MAX, -3, 2, (1 << 48) - 1) };
@@ -87,19 +87,19 @@ fn packets_and_asks_come_back() {
     for packet in packets {
         assert_eq!(Packet::decode(&packet.encode().unwrap()).unwrap(), packet);
     }
-    let asks = [
+    let requests = [
         Request::Status { nonce: 77 },
         Request::Missing { epoch: 3, sequences: vec![1, 2, 500, u64::MAX] },
         Request::Digests { epoch: 3, range: SetRange::ALL },
         Request::Content { epoch: 3, ranges: vec![range, SetRange::ALL] },
     ];
-    for ask in asks {
-        assert_eq!(Request::decode(&ask.encode()).unwrap(), ask);
+    for request in requests {
+        assert_eq!(Request::decode(&request.encode()).unwrap(), request);
     }
 }
 
 #[test]
-fn another_version_is_refused_by_its_name() {
+fn another_version_is_refused_and_named() {
     let mut bytes = Request::Status { nonce: 1 }.encode();
     bytes[0] = VERSION + 1;
     let error = Packet::decode(&bytes).unwrap_err().to_string();
@@ -116,7 +116,7 @@ fn too_many_voxels_are_refused_on_both_sides() {
     assert_eq!(decode_updates(&bytes, 0).unwrap().len(), 25 * 25 * 25);
     assert!(bytes.len() < 200, "{} bytes for a solid cube", bytes.len());
     assert!(encode_updates(&cube(26)).is_err());
-    // A cube of 2^20 voxels an edge, every one of them there: a reader stops early.
+    // A full cube with an edge of 2^20 voxels: the decoder stops early.
     let hostile = [[1 << 5 | 20, 0, 0, 0].as_slice(), &[0; 1000]].concat();
     let error = decode_updates(&hostile, 0).unwrap_err().to_string();
     assert!(error.contains("more than"), "{error}");
@@ -130,9 +130,9 @@ fn voxels_too_far_apart_are_refused() {
     assert!(encode_updates(&end).is_err());
 }
 
-/// What is decoded can be written, up to the ends of all indices.
+/// Checks voxels up to the ends of the index range.
 #[test]
-fn a_voxel_that_cannot_be_written_is_not_read() {
+fn every_decoded_voxel_can_be_encoded() {
     let last = LAST_VOXEL_INDEX;
     for voxel in [[last; 3], [2_147_483_632, 0, 0], [last - (1 << 20), 0, i32::MIN], [i32::MIN; 3]] {
         let updates = [Update { voxel, is_in: true }];
@@ -142,10 +142,10 @@ fn a_voxel_that_cannot_be_written_is_not_read() {
         let mut file = Vec::new();
         write_layer(&mut set, &mut file).unwrap();
         assert!(read_layer(&mut &file[..], 10).unwrap() == set);
-        // A point has this voxel: it can become part of a map.
+        // The center of the voxel has the same index, so the voxel can become part of a map.
         assert_eq!(set.grid().voxel_of(set.grid().center_m(voxel)), Some(voxel));
     }
-    // All voxels of the last brick: those of index 2^31 - 1 are none.
+    // All voxels of the last brick, of which those with index 2^31 - 1 are invalid.
     let brick = [1 << 5 | 3, 254, 255, 255, 255, 1, 0, 0];
     for bits in [[0; 8], [255; 8]] {
         let Ok(updates) = decode_updates(&[&brick[..], &bits].concat(), 0) else { continue };
@@ -155,7 +155,7 @@ fn a_voxel_that_cannot_be_written_is_not_read() {
 }
 
 #[test]
-fn a_street_takes_about_a_byte_a_voxel() {
+fn two_planes_take_less_than_a_bit_per_voxel() {
     // A floor with a wall.
     let floor = (0..40).flat_map(|x| (0..40).map(move |y| [x, y, 100]));
     let wall = (0..40).flat_map(|x| (101..125).map(move |z| [x, 39, z]));
@@ -165,7 +165,7 @@ fn a_street_takes_about_a_byte_a_voxel() {
 }
 
 #[test]
-fn contexts_are_counted_one_a_bit() {
+fn one_context_is_counted_per_bit() {
     let mut counts = vec![[0; 2]; CONTEXTS];
     count_contexts(&[Update { voxel: [8, 8, 8], is_in: true }], &mut counts).unwrap();
     assert_eq!(counts.iter().flatten().sum::<u64>(), 0, "one voxel at a corner of its brick needs no bit");

@@ -1,4 +1,4 @@
-//! Memory that really is full: what is counted, and what the process takes.
+//! Compares the counted memory with the memory of the process while hostile robots fill it.
 
 use super::memory::{EPOCH, config, grid};
 use std::time::Duration;
@@ -6,20 +6,21 @@ use voxtile_share::codec::{Header, Packet, Request, Status, Update};
 use voxtile_share::{Receivers, Sender, SenderConfig};
 use voxtile_simulation::Random;
 
-/// Large enough for what is set aside for a packet to be less than a tenth.
+/// Large enough that the reserve for one packet is less than a tenth of it.
 const MEMORY: usize = 256 << 20;
 const HOSTILE: u8 = 6;
 const HONEST: u8 = 0;
-/// Voxels along an edge of a packet, each alone in its tile: nothing takes more memory a byte.
+/// Number of voxels along the edge of a packet's cube. Each voxel is alone in its tile, which takes the most memory per
+/// byte of a packet.
 const EDGE: i32 = 12;
-/// Set in the process that does the work.
+/// Environment variable of the child process, in which the test runs.
 const IS_ALONE: &str = "VOXTILE_IS_ALONE";
 
-/// Robots that answer as one has to, and fill the memory.
+/// Robot that answers status requests correctly and fills the memory.
 struct Hostile {
     random: Random,
     sequence: u64,
-    /// Where their latest voxels begin.
+    /// Corners of its cubes.
     corners: Vec<[i32; 3]>,
 }
 
@@ -31,11 +32,11 @@ impl Hostile {
         Packet::Status(status).encode().unwrap()
     }
 
-    /// Voxels that come, mostly, or some that came before and go, which leaves holes in memory.
+    /// Returns a packet that adds a cube of voxels, or sometimes removes an earlier cube, which leaves holes in memory.
     fn changes(&mut self) -> Vec<u8> {
         self.sequence += 1;
-        let goes = self.corners.len() > 4 && self.random.chance(0.2);
-        let corner = if goes {
+        let is_removal = self.corners.len() > 4 && self.random.chance(0.2);
+        let corner = if is_removal {
             self.corners.swap_remove(self.random.below(self.corners.len() as u64) as usize)
         } else {
             let corner = std::array::from_fn(|_| self.random.below(1 << 30) as i32 - (1 << 29));
@@ -45,13 +46,13 @@ impl Hostile {
         let voxel = |k: i32| [k % EDGE, k / EDGE % EDGE, k / EDGE / EDGE].map(|k| 101 * k);
         let voxels =
             (0..EDGE * EDGE * EDGE).map(|k| std::array::from_fn(|axis| corner[axis] + voxel(k)[axis]));
-        let updates = voxels.map(|voxel| Update { voxel, is_in: !goes }).collect();
+        let updates = voxels.map(|voxel| Update { voxel, is_in: !is_removal }).collect();
         let header = Header { epoch: EPOCH, sequence: self.sequence };
         Packet::Changes { header, repaired: Vec::new(), updates }.encode().unwrap()
     }
 }
 
-/// Bytes of memory of this process, by a key of the system's.
+/// Returns a memory size of this process, in bytes. `key` is a key of `/proc/self/status`.
 #[cfg(target_os = "linux")]
 fn own_bytes(key: &str) -> usize {
     let status = std::fs::read_to_string("/proc/self/status").unwrap();
@@ -59,7 +60,7 @@ fn own_bytes(key: &str) -> usize {
     line.split_whitespace().nth(1).unwrap().parse::<usize>().unwrap() << 10
 }
 
-/// Fills the memory, and returns the most bytes that were counted.
+/// Fills the memory. Returns the maximum of the counted bytes.
 fn fill() -> usize {
     let mut receivers = Receivers::new(MEMORY).unwrap();
     let mut honest = Sender::new(grid(), 1, SenderConfig::default()).unwrap();
@@ -71,7 +72,7 @@ fn fill() -> usize {
     let mut fullest = 0;
     for step in 0..80 {
         let now = Duration::from_millis(100 * step);
-        // It comes when everything is taken.
+        // The honest robot is added when the memory is full.
         if step == 35 {
             receivers.insert(HONEST, config(77), None);
         }
@@ -80,8 +81,8 @@ fn fill() -> usize {
             (0..400).for_each(|k| honest.put([k % 40, y, k / 40], true));
         }
         if let Some(receiver) = receivers.get_mut(&HONEST) {
-            let asks = receiver.poll(now);
-            let answers = asks.iter().flat_map(|ask| honest.answer(1, ask, now).unwrap());
+            let requests = receiver.poll(now);
+            let answers = requests.iter().flat_map(|request| honest.answer(1, request, now).unwrap());
             let packets: Vec<_> = answers.collect();
             for packet in packets.into_iter().chain(honest.poll(now)) {
                 receivers.take(&HONEST, &packet.bytes, now).unwrap();
@@ -89,8 +90,8 @@ fn fill() -> usize {
         }
         for (robot, hostile) in &mut hostile {
             let mut packets = Vec::new();
-            for ask in receivers.get_mut(robot).unwrap().poll(now) {
-                if let Request::Status { nonce } = Request::decode(&ask).unwrap() {
+            for request in receivers.get_mut(robot).unwrap().poll(now) {
+                if let Request::Status { nonce } = Request::decode(&request).unwrap() {
                     packets.push(hostile.status(nonce));
                 }
             }
@@ -107,25 +108,26 @@ fn fill() -> usize {
     assert!(receiver.is_converged() && !receiver.is_over_limit(), "{:?}", receiver.counts());
     assert!(receiver.layer().unwrap() == &*honest.sent());
     let cut: u64 = receivers.iter().map(|(_, receiver)| receiver.counts().cut_voxels).sum();
-    assert!(cut > 0, "nobody made room");
+    assert!(cut > 0, "no layer was cut");
     fullest
 }
 
-/// Nine tenths of the limit are counted and never more than all of it, while an honest robot's layer becomes equal; and
-/// the process takes what is counted, as nodes are fuller than they may be: no more, and more than half of it.
+/// The counted memory reaches nine tenths of the limit and never exceeds the limit, while an honest robot's layer
+/// becomes equal. The process takes more than half of the counted memory, and no more than all of it: nodes are fuller
+/// than the count assumes.
 ///
-/// In a process of its own, where nobody else takes memory.
+/// The test runs in its own process, so that other tests take no memory there.
 #[test]
-fn hostile_robots_fill_the_memory_and_it_holds() {
+fn hostile_robots_do_not_exceed_the_memory_limit() {
     if std::env::var_os(IS_ALONE).is_none() {
         let (_, module) = module_path!().split_once("::").unwrap();
-        let name = format!("{module}::hostile_robots_fill_the_memory_and_it_holds");
+        let name = format!("{module}::hostile_robots_do_not_exceed_the_memory_limit");
         let mut alone = std::process::Command::new(std::env::current_exe().unwrap());
         let output = alone.args(["--exact", &name, "--nocapture"]).env(IS_ALONE, "1").output().unwrap();
-        let said = String::from_utf8_lossy(&output.stdout);
-        assert!(output.status.success(), "{said}{}", String::from_utf8_lossy(&output.stderr));
-        assert!(said.contains("1 passed"), "{said}");
-        return print!("{said}");
+        let stdout = String::from_utf8_lossy(&output.stdout);
+        assert!(output.status.success(), "{stdout}{}", String::from_utf8_lossy(&output.stderr));
+        assert!(stdout.contains("1 passed"), "{stdout}");
+        return print!("{stdout}");
     }
     #[cfg(target_os = "linux")]
     let before = own_bytes("VmRSS:");
@@ -135,7 +137,7 @@ fn hostile_robots_fill_the_memory_and_it_holds() {
     {
         let taken = own_bytes("VmHWM:") - before;
         println!("{counted} bytes counted, {taken} taken");
-        // Packets on their way, and what the allocator has free.
+        // Allow for packets in transit and free memory of the allocator.
         assert!(taken < counted + (16 << 20), "{counted} bytes counted, {taken} taken");
         assert!(taken > counted / 2, "{counted} bytes counted, {taken} taken");
     }

@@ -29,7 +29,7 @@ fn occupied(map: &InMemoryMapper, threshold: f64) -> BTreeSet<VoxelIndex> {
 }
 
 #[test]
-fn what_a_watch_tells_is_what_is_occupied_after_every_scan() {
+fn a_watch_sends_the_occupied_voxels_after_every_scan() {
     for (seed, threshold) in [(1, 0.5), (2, 0.6), (3, 0.9)] {
         let mut random = Random(seed);
         let mut map = InMemoryMapper::new(config()).unwrap();
@@ -52,9 +52,9 @@ fn what_a_watch_tells_is_what_is_occupied_after_every_scan() {
     assert!(MapWatch::new(0.5).unwrap().take_all(&map, &mut other).is_err());
 }
 
-/// A voxel that is seen once, and rays far beyond it until it is free.
+/// A voxel is hit once. Then rays pass it until it is free.
 #[test]
-fn what_rays_without_a_return_have_cleared_leaves_the_set() {
+fn voxels_cleared_by_rays_without_a_return_leave_the_set() {
     let origin = [0.05; 3];
     let ahead = [[1.0, 0.0, 0.0], [-1.0, -1.0, 0.5]];
     let is_no_return = |k: usize| no_return(origin, ahead[k]).unwrap();
@@ -66,7 +66,7 @@ fn what_rays_without_a_return_have_cleared_leaves_the_set() {
             let mut map = InMemoryMapper::new(config).unwrap();
             let (mut sender, watch) = (sender(), MapWatch::new(0.5).unwrap());
             let seen: [f64; 3] = std::array::from_fn(|axis| origin[axis] + 4.0 * ahead[k][axis]);
-            // Rays of points beyond the no-return range that are returns are as long as they are.
+            // Rays with a return keep their length, even beyond the no-return range.
             let near = [[0.45, 0.05, 0.05], [0.05, 12.05, 0.05]];
             let mut take = |far: [f64; 3]| {
                 let scan = Scan { origin, points: [near.to_vec(), vec![far]].concat(), intensities: None };
@@ -83,10 +83,10 @@ fn what_rays_without_a_return_have_cleared_leaves_the_set() {
     }
 }
 
-/// Voxels that leave by age, while rays of points that the map skips pass them.
+/// A voxel leaves the map by age, while the rays of skipped points pass it.
 #[test]
-fn rays_that_a_local_map_does_not_cast_clear_nothing_of_what_is_shared() {
-    // The map skips voxels near the end of all indices.
+fn rays_of_skipped_points_do_not_clear_shared_voxels() {
+    // The map skips voxels near the end of the index range.
     let end = (f64::from(i32::MAX) - 4100.5) * 0.1;
     let cases = [
         ("beyond the input range", [0.05; 3], [8.05, 0.05, 0.05], [12.05, 0.05, 0.05], "beyond"),
@@ -110,7 +110,7 @@ fn rays_that_a_local_map_does_not_cast_clear_nothing_of_what_is_shared() {
         let mut later = *map.parameters();
         later.min_input_range_m = 1.0;
         map.set_parameters(later).unwrap();
-        // As many new voxels as the map holds, away from those rays.
+        // As many new voxels as the map can hold, away from these rays.
         let others =
             (0..20).map(|k| std::array::from_fn(|axis| origin[axis] + [-2.0, 2.0, 0.1 * f64::from(k)][axis]));
         let points: Vec<_> = others.chain([past; 4]).collect();
@@ -129,7 +129,7 @@ fn rays_that_a_local_map_does_not_cast_clear_nothing_of_what_is_shared() {
 }
 
 #[test]
-fn a_local_map_shares_what_it_finds_occupied_and_forgets_nothing_for_its_age() {
+fn a_local_map_shares_occupied_voxels_and_keeps_those_forgotten_by_age() {
     for limit in [None, Some(150)] {
         let mut random = Random(5);
         let mut map = LocalMap::new(0.1, LocalParameters::local_mapping().with_max_voxels(limit)).unwrap();
@@ -138,7 +138,7 @@ fn a_local_map_shares_what_it_finds_occupied_and_forgets_nothing_for_its_age() {
         let (mut forgotten, mut left) = (0, 0);
         let mut before = BTreeSet::new();
         for number in 0..20 {
-            // Five points that are seen once, and then three times rays that pass through them.
+            // Five points are hit once. Then the rays of three scans pass them.
             let cycle = f64::from(number / 4);
             let farther = if number % 4 == 0 { 1.0 } else { 2.0 };
             let seen = (0..5).map(|k| [2.05 + 0.1 * cycle, 0.3 * f64::from(k), 0.35].map(|x| farther * x));
@@ -176,20 +176,20 @@ fn layer(voxels: impl IntoIterator<Item = VoxelIndex>) -> VoxelSet {
 }
 
 #[test]
-fn a_merged_layer_is_occupied_and_merging_it_again_changes_nothing() {
+fn merging_a_layer_again_changes_only_voxels_that_are_still_free() {
     let mut random = Random(9);
     let mut map = InMemoryMapper::new(config()).unwrap();
     let scan = Scan { origin: [0.0; 3], points: vec![[2.05, 0.05, 0.05]; 5], intensities: None };
     (0..4).for_each(|_| {
         map.insert_scan(&scan).unwrap();
     });
-    // One voxel that the map has seen free four times, one that it has seen occupied, others.
+    // One voxel that is free in the map after four scans, one that is occupied, and new voxels.
     let new = (0..200).map(|_| std::array::from_fn(|_| 30 + random.below(40) as i32));
     let layer = layer(new.chain([[10, 0, 0], [20, 0, 0]]));
     let report = merge_layer(&layer, &mut map).unwrap();
     assert_eq!((report.voxels, report.known, report.hits), (layer.len(), 1, layer.len() - 1));
     let now = occupied(&map, 0.5);
-    assert_eq!(now.len() as u64, layer.len() - 1, "what was seen free four times is free");
+    assert_eq!(now.len() as u64, layer.len() - 1, "the voxel that was free in four scans is still free");
     let digest = map.digest().unwrap();
     let again = merge_layer(&layer, &mut map).unwrap();
     assert_eq!(again.hits, 1);
@@ -199,7 +199,7 @@ fn a_merged_layer_is_occupied_and_merging_it_again_changes_nothing() {
 }
 
 #[test]
-fn questions_are_answered_from_all_maps_together() {
+fn a_union_answers_queries_from_all_maps() {
     let mut random = Random(11);
     let mut map = InMemoryMapper::new(config()).unwrap();
     for _ in 0..3 {
@@ -221,7 +221,7 @@ fn questions_are_answered_from_all_maps_together() {
         let hit = all.cast_segment(from, to, UnknownAs::Free).unwrap().map(|hit| hit.voxel);
         hits += usize::from(hit.is_some());
         assert!(hit.is_none_or(is_occupied));
-        // No smaller step along the segment finds anything before the hit.
+        // Small steps along the segment find no occupied voxel before the hit.
         for step in 0..1000 {
             let at = std::array::from_fn(|k| from[k] + (to[k] - from[k]) * f64::from(step) / 1000.0);
             let voxel = grid.voxel_of(at).unwrap();
@@ -253,10 +253,10 @@ fn questions_are_answered_from_all_maps_together() {
 }
 
 #[test]
-fn a_layer_comes_back_from_its_file_and_damage_is_told() {
+fn a_layer_file_is_read_back_and_damage_is_detected() {
     let mut random = Random(21);
     let many = (0..9000).map(|_| std::array::from_fn(|_| random.below(90) as i32 - 45));
-    // Far apart: more than one packet of them.
+    // These voxels are too far apart for one packet.
     let far = [[-2_000_000_000, 5, 7], [2_000_000_000, 0, -9]];
     for voxels in [Vec::new(), vec![[1, 2, 3]], many.chain(far).collect()] {
         let mut layer = layer(voxels);
@@ -276,9 +276,9 @@ fn a_layer_comes_back_from_its_file_and_damage_is_told() {
     }
 }
 
-/// A sphere of any size asks for no more than what is there, and one that is none is refused.
+/// The query visits only existing voxels, for a sphere of any size. An invalid sphere is refused.
 #[test]
-fn a_collision_takes_no_longer_in_a_larger_sphere() {
+fn a_collision_query_accepts_any_finite_sphere() {
     let map = InMemoryMapper::new(config()).unwrap();
     let far = layer([[1_000_000, -5, 7], [i32::MAX - 1, i32::MIN, 0]]);
     let all = United::new(&[&map, &far]).unwrap();
@@ -295,6 +295,6 @@ fn a_collision_takes_no_longer_in_a_larger_sphere() {
         assert!(collision([0.0; 3], radius_m, UnknownAs::Free).is_err(), "{radius_m}");
     }
     assert!(collision([f64::NAN; 3], 1.0, UnknownAs::Free).is_err());
-    // Where unknown is an obstacle, its first voxel ends the query; a map that is asked for too many says so.
+    // If unknown space is an obstacle, a query over too many voxels is an error.
     assert!(collision([0.0; 3], 1e9, UnknownAs::Obstacle).is_err());
 }

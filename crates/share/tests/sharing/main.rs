@@ -1,14 +1,14 @@
-//! The set of a sender arrives at receivers, whatever the link does.
+//! Tests of sharing: receivers get the set of a sender over unreliable links.
 
-/// Bytes of packets against plain ones, and hostile ones.
+/// Encoding of packets, and hostile bytes.
 mod codec;
-/// Memory that hostile robots fill, counted and measured.
+/// Memory filled by hostile robots, counted and measured.
 mod full_memory;
-/// Folding, unions, watches.
+/// Merging of layers, unions, watches.
 mod layers;
-/// Receivers under one limit of memory, and the work a packet makes.
+/// Receivers with a shared memory limit, and the cost of a packet.
 mod memory;
-/// Random lives of a sender and receivers over a bad link: equal sets at the end.
+/// Random changes over bad links: the sets are equal at the end.
 mod random_lives;
-/// What hostile packets may not do.
+/// Limits on the effect of hostile packets.
 mod trust;

@@ -19,7 +19,7 @@ pub(super) fn config(seed: u64) -> ReceiverConfig {
     config
 }
 
-/// A robot that answers as one has to and sends, apart from that, whatever may take most memory and work.
+/// Robot that answers status requests correctly and sends packets that need much memory and work.
 struct Hostile {
     random: Random,
     sequence: u64,
@@ -42,7 +42,8 @@ impl Hostile {
         })
     }
 
-    /// Voxels that lie alone: each in its tile, each in its brick, in a solid cube, or at the ends of all indices.
+    /// Returns voxels that are alone in their tiles, alone in their bricks, in a solid cube, or at the ends of the
+    /// index range.
     fn voxels(&mut self) -> Vec<VoxelIndex> {
         let count = self.random.below(4000) as i32;
         let far = |random: &mut Random, spread: i32| random.below(spread as u64) as i32 - spread / 2;
@@ -68,7 +69,7 @@ impl Hostile {
     fn packet(&mut self) -> Packet {
         let voxels = self.voxels();
         self.sequence += self.random.below(3);
-        // Whatever empties a layer is rare, so that layers fill up.
+        // Packets that empty a layer are rare, so that layers fill up.
         match self.random.below(60) {
             0..44 => {
                 self.sequence += 1;
@@ -88,14 +89,13 @@ impl Hostile {
     }
 }
 
-/// Whatever comes: all receivers together keep to their memory, and a robot that stays below its part has an equal
-/// layer.
+/// All receivers together never exceed the memory limit, and a robot below its share has an equal layer.
 #[test]
-fn hostile_robots_take_no_more_than_the_limit_and_nothing_from_others() {
+fn hostile_robots_stay_within_the_limit_and_take_nothing_from_others() {
     const MEMORY: usize = Receivers::<u8>::MIN_BYTES;
     for seed in 0..2 {
         let mut receivers = Receivers::new(MEMORY).unwrap();
-        // But for what a packet may take.
+        // The limit without the reserve for one packet.
         let all = receivers.free_bytes();
         (0..3).for_each(|robot| receivers.insert(robot, config(seed + u64::from(robot)), None));
         let mut honest = Sender::new(grid(), 1, SenderConfig::default()).unwrap();
@@ -113,15 +113,15 @@ fn hostile_robots_take_no_more_than_the_limit_and_nothing_from_others() {
             for packet in honest.poll(now) {
                 receivers.take(&0, &packet.bytes, now).unwrap();
             }
-            for ask in receivers.get_mut(&0).unwrap().poll(now) {
-                for packet in honest.answer(1, &ask, now).unwrap() {
+            for request in receivers.get_mut(&0).unwrap().poll(now) {
+                for packet in honest.answer(1, &request, now).unwrap() {
                     receivers.take(&0, &packet.bytes, now).unwrap();
                 }
             }
             for (robot, hostile) in &mut hostile {
                 let mut packets: Vec<Packet> = (0..5).map(|_| hostile.packet()).collect();
-                for ask in receivers.get_mut(robot).unwrap().poll(now) {
-                    if let Request::Status { nonce } = Request::decode(&ask).unwrap() {
+                for request in receivers.get_mut(robot).unwrap().poll(now) {
+                    if let Request::Status { nonce } = Request::decode(&request).unwrap() {
                         packets.push(hostile.status(nonce));
                     }
                 }
@@ -140,9 +140,9 @@ fn hostile_robots_take_no_more_than_the_limit_and_nothing_from_others() {
     }
 }
 
-/// Who came first and took all gives up what is beyond its part once somebody else needs it.
+/// The first robot takes all memory. It loses memory beyond its share when the second robot needs it.
 #[test]
-fn who_has_most_makes_room_for_who_comes_later() {
+fn the_largest_layer_shrinks_for_a_new_robot() {
     let mut receivers = Receivers::new(Receivers::<u8>::MIN_BYTES).unwrap();
     let mut senders =
         [0_u8, 1].map(|robot| (robot, Sender::new(grid(), 1, SenderConfig::default()).unwrap()));
@@ -155,8 +155,8 @@ fn who_has_most_makes_room_for_who_comes_later() {
             for packet in sender.poll(now) {
                 receivers.take(robot, &packet.bytes, now).unwrap();
             }
-            for ask in receivers.get_mut(robot).unwrap().poll(now) {
-                for packet in sender.answer(1, &ask, now).unwrap() {
+            for request in receivers.get_mut(robot).unwrap().poll(now) {
+                for packet in sender.answer(1, &request, now).unwrap() {
                     receivers.take(robot, &packet.bytes, now).unwrap();
                 }
             }
@@ -165,17 +165,17 @@ fn who_has_most_makes_room_for_who_comes_later() {
     let (first, second) = (receivers.get(&0).unwrap(), receivers.get(&1).unwrap());
     assert!(second.is_converged() && second.layer().unwrap().len() == 30_000, "{:?}", second.counts());
     assert!(first.is_over_limit() && first.counts().cut_voxels > 0, "{:?}", first.counts());
-    // No more than was needed.
+    // No more was cut than needed.
     let all = receivers.memory_bytes();
     assert!(first.memory_bytes() >= receivers.part_bytes() && all > 2 * receivers.part_bytes() - (1 << 20));
 }
 
-/// A receiver that a sender has confirmed, as of packet 0.
+/// Returns a receiver that a sender has confirmed as of packet 0.
 fn confirmed(now: Duration) -> Receiver {
     let mut receiver = Receiver::new(config(5));
     let mut sender = Sender::new(grid(), EPOCH, SenderConfig::default()).unwrap();
-    for ask in receiver.poll(now) {
-        for packet in sender.answer(1, &ask, now).unwrap() {
+    for request in receiver.poll(now) {
+        for packet in sender.answer(1, &request, now).unwrap() {
             receiver.take(&packet.bytes, now).unwrap();
         }
     }
@@ -190,9 +190,9 @@ fn header(sequence: u64) -> Header {
     Header { epoch: EPOCH, sequence }
 }
 
-/// Thousands of parts of content, apart from each other, make no later packet dearer.
+/// Thousands of separate ranges of content do not slow down later packets.
 #[test]
-fn what_a_packet_costs_does_not_grow_with_the_packets_before() {
+fn the_cost_of_a_packet_does_not_grow_with_earlier_packets() {
     let now = Duration::from_secs(1);
     let changes = |sequence| {
         let voxels = (0..24).flat_map(|x| (0..24).flat_map(move |y| (0..24).map(move |z| [x, y, z])));
@@ -221,9 +221,9 @@ fn what_a_packet_costs_does_not_grow_with_the_packets_before() {
     assert!(after < 5 * alone, "{after:?} after 4096 parts, {alone:?} without");
 }
 
-/// More goes at once than one packet may change: it goes in several.
+/// The removal exceeds the limit of one packet, so it takes several packets.
 #[test]
-fn a_set_that_begins_anew_empties_a_large_layer() {
+fn a_restarted_sender_empties_a_large_layer() {
     let mut layer = VoxelSet::new(grid());
     let edge = 130;
     for voxel in (0..edge * edge * edge).map(|k| [k % edge, k / edge % edge, k / edge / edge]) {
@@ -239,8 +239,8 @@ fn a_set_that_begins_anew_empties_a_large_layer() {
         for packet in sender.poll(now) {
             receiver.take(&packet.bytes, now).unwrap();
         }
-        for ask in receiver.poll(now) {
-            for packet in sender.answer(1, &ask, now).unwrap() {
+        for request in receiver.poll(now) {
+            for packet in sender.answer(1, &request, now).unwrap() {
                 receiver.take(&packet.bytes, now).unwrap();
             }
         }

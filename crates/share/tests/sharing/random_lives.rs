@@ -5,12 +5,12 @@ use voxtile::space::{Grid, VoxelIndex};
 use voxtile_share::{ExportPolicy, Receiver, ReceiverConfig, Sender, SenderConfig};
 use voxtile_simulation::Random;
 
-/// A sender, receivers and what is between them, in steps of 50 ms.
+/// A sender, receivers and the links between them, simulated in steps of 50 ms.
 struct World {
     random: Random,
     sender: Sender,
     epoch: u32,
-    /// What the sender was told, plainly.
+    /// Expected set of the sender.
     model: BTreeSet<VoxelIndex>,
     receivers: Vec<End>,
     now: Duration,
@@ -54,7 +54,7 @@ impl World {
         Self { random, sender, epoch: 1, model: BTreeSet::new(), receivers, now: Duration::ZERO }
     }
 
-    /// Voxels on a plane that bends, mostly near the last one.
+    /// Adds or removes random voxels of a bent plane.
     fn change(&mut self, count: u64) {
         for _ in 0..count {
             let x = self.random.below(300) as i32 - 150;
@@ -78,8 +78,8 @@ impl World {
             self.receivers.iter_mut().for_each(|end| end.down.send(&outgoing.bytes, self.now));
         }
         for (number, end) in self.receivers.iter_mut().enumerate() {
-            for ask in end.up.arrived(self.now) {
-                for outgoing in self.sender.answer(number as u64, &ask, self.now).unwrap() {
+            for request in end.up.arrived(self.now) {
+                for outgoing in self.sender.answer(number as u64, &request, self.now).unwrap() {
                     assert_eq!(outgoing.to, Some(number as u64));
                     assert!(outgoing.bytes.len() <= 300);
                     end.down.send(&outgoing.bytes, self.now);
@@ -88,9 +88,9 @@ impl World {
             for packet in end.down.arrived(self.now) {
                 end.receiver.take(&packet, self.now).unwrap();
             }
-            for ask in end.receiver.poll(self.now) {
-                assert!(ask.len() <= 1200);
-                end.up.send(&ask, self.now);
+            for request in end.receiver.poll(self.now) {
+                assert!(request.len() <= 1200);
+                end.up.send(&request, self.now);
             }
         }
     }
@@ -101,11 +101,11 @@ impl World {
         self.sender.is_idle() && self.receivers.iter().all(is_equal)
     }
 
-    /// Goes on until the sets are equal, and says how long that took.
+    /// Runs until the sets are equal. Returns the elapsed time.
     fn settle(&mut self) -> Duration {
         let begin = self.now;
         while !self.is_converged() {
-            assert!(self.now < begin + Duration::from_secs(120), "no end: {:?}", self.states());
+            assert!(self.now < begin + Duration::from_secs(120), "not converged: {:?}", self.states());
             self.step();
         }
         self.check();
@@ -116,10 +116,10 @@ impl World {
         self.receivers.iter().map(|end| format!("{:?}", end.receiver.counts())).collect()
     }
 
-    /// Against plain sets, voxel by voxel and by digest.
+    /// Compares all sets with the expected set, by voxels and by digest.
     fn check(&mut self) {
         let sent: BTreeSet<VoxelIndex> = self.sender.sent().iter().collect();
-        // Not shown: there are thousands.
+        // Without `assert_eq!`, which would print thousands of voxels.
         assert!(sent == self.model);
         let digest = self.sender.sent().digest();
         for end in &mut self.receivers {
@@ -144,7 +144,7 @@ fn receiver_config(seed: u64) -> ReceiverConfig {
 }
 
 #[test]
-fn sets_are_equal_after_loss_repetition_delay_and_disorder() {
+fn sets_are_equal_after_loss_duplication_delay_and_reordering() {
     for seed in 0..12 {
         let policy =
             [ExportPolicy::LastFrame, ExportPolicy::Ring(3), ExportPolicy::Everything][seed as usize % 3];
@@ -159,7 +159,7 @@ fn sets_are_equal_after_loss_repetition_delay_and_disorder() {
 }
 
 #[test]
-fn sets_are_equal_after_a_link_was_cut_for_longer_than_the_ring_lasts() {
+fn sets_are_equal_after_an_outage_longer_than_the_ring() {
     for seed in 20..26 {
         let mut world = World::new(seed, 2, ExportPolicy::LastFrame);
         for step in 0..300 {
@@ -175,7 +175,7 @@ fn sets_are_equal_after_a_link_was_cut_for_longer_than_the_ring_lasts() {
 }
 
 #[test]
-fn a_sender_that_begins_anew_is_recognised() {
+fn a_restarted_sender_is_recognised() {
     for seed in 30..36 {
         let mut world = World::new(seed, 2, ExportPolicy::LastFrame);
         for step in 0..300 {
@@ -190,14 +190,14 @@ fn a_sender_that_begins_anew_is_recognised() {
 }
 
 #[test]
-fn a_receiver_that_begins_anew_with_its_layer_asks_only_for_what_it_lacks() {
+fn a_restarted_receiver_with_a_layer_requests_only_differences() {
     let mut world = World::new(40, 1, ExportPolicy::LastFrame);
     for _ in 0..200 {
         world.change(40);
         world.step();
     }
     world.settle();
-    // One place far from the others changes while nobody listens.
+    // A distant voxel changes while no receiver is running.
     let layer = world.receivers[0].receiver.layer().unwrap().clone();
     world.model.insert([1000, 0, 0]);
     world.sender.put([1000, 0, 0], true);
@@ -211,7 +211,7 @@ fn a_receiver_that_begins_anew_with_its_layer_asks_only_for_what_it_lacks() {
     let answers = world.sender.counts().answer_bytes - answers_before;
     let tiles = world.sender.sent().tile_count() as u64;
     assert!(answers < 300 + 40 * tiles, "{answers} bytes for one voxel and {tiles} digests");
-    // From nothing it takes more.
+    // A receiver without a layer needs more bytes.
     world.receivers[0] = End { receiver: Receiver::new(receiver_config(98)), down: link(3), up: link(4) };
     world.settle();
     assert!(world.sender.counts().answer_bytes - answers_before - answers > answers);
@@ -239,7 +239,7 @@ fn thousands_of_tiles_are_compared_in_groups() {
 }
 
 #[test]
-fn who_only_listens_has_all_that_came() {
+fn a_receiver_without_requests_gets_the_later_voxels() {
     let mut config = receiver_config(1);
     config.sends_requests = false;
     let mut sender = Sender::new(grid(), 5, sender_config(ExportPolicy::LastFrame)).unwrap();
@@ -252,7 +252,7 @@ fn who_only_listens_has_all_that_came() {
             receiver.take(&outgoing.bytes, now).unwrap();
         }
     }
-    // Nothing of the first seconds, in which the sender was not yet believed.
+    // The voxels of the first seconds are missing, because the sender was not accepted yet.
     let layer = receiver.layer().unwrap();
     assert!(layer.len() > 200 && layer.contains([390, 0, 0]), "{}", layer.len());
 }

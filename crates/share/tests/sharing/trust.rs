@@ -7,7 +7,7 @@ fn grid() -> Grid {
     Grid::new(0.1, 10.0).unwrap()
 }
 
-/// A sender and a receiver with nothing between them.
+/// A sender and a receiver with a perfect link.
 struct Pair {
     sender: Sender,
     receiver: Receiver,
@@ -26,15 +26,15 @@ impl Pair {
             for packet in self.sender.poll(self.now) {
                 let _ = self.receiver.take(&packet.bytes, self.now);
             }
-            for ask in self.receiver.poll(self.now) {
-                for packet in self.sender.answer(1, &ask, self.now).unwrap() {
+            for request in self.receiver.poll(self.now) {
+                for packet in self.sender.answer(1, &request, self.now).unwrap() {
                     let _ = self.receiver.take(&packet.bytes, self.now);
                 }
             }
         }
     }
 
-    fn invent(&mut self, packet: &Packet) {
+    fn inject(&mut self, packet: &Packet) {
         self.receiver.take(&packet.encode().unwrap(), self.now).unwrap();
     }
 }
@@ -45,14 +45,14 @@ fn changes(epoch: u32, sequence: u64) -> Packet {
 }
 
 #[test]
-fn a_huge_number_does_not_mute_a_robot() {
+fn forged_packet_numbers_do_not_block_a_robot() {
     for (epoch, sequence) in [(77, u64::MAX), (77, 1 << 40), (77, 3000), (78, 1), (0, u64::MAX)] {
         let mut pair = Pair::new(ReceiverConfig::default());
         pair.sender.put([1, 2, 3], true);
         pair.run(5);
         assert!(pair.receiver.is_converged());
         for _ in 0..3 {
-            pair.invent(&changes(epoch, sequence));
+            pair.inject(&changes(epoch, sequence));
             let status = Status {
                 header: Header { epoch, sequence },
                 nonce: 0,
@@ -62,7 +62,7 @@ fn a_huge_number_does_not_mute_a_robot() {
                 voxels: 0,
                 digest: [0; 32],
             };
-            pair.invent(&Packet::Status(status));
+            pair.inject(&Packet::Status(status));
         }
         pair.sender.put([4, 5, 6], true);
         pair.run(40);
@@ -94,13 +94,13 @@ fn voxels_beyond_the_limits_are_refused_and_counted() {
         assert_eq!((layer.len(), pair.receiver.is_over_limit()), (2, true));
         let counts = pair.receiver.counts();
         assert!(counts.refused_voxels >= 3);
-        // It is not asked for over and over again.
+        // The refused voxels are not requested again and again.
         assert!(counts.asks < 5, "{counts:?}");
     }
 }
 
 #[test]
-fn a_map_of_other_voxels_is_refused() {
+fn another_grid_is_refused() {
     let mut config = ReceiverConfig::default();
     config.grid = Some(Grid::new(0.2, 10.0).unwrap());
     let mut pair = Pair::new(config);
@@ -111,22 +111,22 @@ fn a_map_of_other_voxels_is_refused() {
 }
 
 #[test]
-fn asks_beyond_the_allowance_are_not_answered() {
+fn requests_beyond_the_rate_limit_are_not_answered() {
     let mut pair = Pair::new(ReceiverConfig::default());
     (0..20_000).for_each(|n| pair.sender.put([n * 7 % 1000, n * 13 % 500, n / 100], true));
     pair.run(10);
-    let ask = Request::Content { epoch: 77, ranges: vec![SetRange::ALL; 60] };
+    let request = Request::Content { epoch: 77, ranges: vec![SetRange::ALL; 60] };
     let now = pair.now;
     let answered: usize = (0..1000)
-        .flat_map(|_| pair.sender.answer(2, &ask.encode(), now).unwrap())
+        .flat_map(|_| pair.sender.answer(2, &request.encode(), now).unwrap())
         .map(|packet| packet.bytes.len())
         .sum();
-    // A second's worth, and the answer that went over it.
+    // The bytes of one second, and the answer that exceeded them.
     assert!(answered <= (256 << 10) + 16 * 1200, "{answered} bytes at once");
     assert!(pair.sender.counts().refused_asks > 900);
 }
 
-/// Every tenth of a millisecond, or with a pause: what is answered is what the allowance is, no less and no more.
+/// At any rate of requests, the answers use the allowed rate, no less and no more.
 #[test]
 fn a_flood_of_requests_is_answered_at_the_allowed_rate() {
     const PER_SECOND: u64 = 256 << 10;
@@ -135,24 +135,24 @@ fn a_flood_of_requests_is_answered_at_the_allowed_rate() {
         let mut sender = Sender::new(grid(), 77, SenderConfig::default()).unwrap();
         (0..20_000).for_each(|n| sender.put([n * 7 % 1000, n * 13 % 500, n / 100], true));
         sender.flush(Duration::ZERO);
-        let ask = Request::Content { epoch: 77, ranges: vec![SetRange::ALL; 60] }.encode();
+        let request = Request::Content { epoch: 77, ranges: vec![SetRange::ALL; 60] }.encode();
         let mut bytes = 0;
         for n in 0..2_000_000 / interval_us {
             let now = Duration::from_secs(10) + Duration::from_micros(n * interval_us);
             bytes += sender
-                .answer(2, &ask, now)
+                .answer(2, &request, now)
                 .unwrap()
                 .iter()
                 .map(|packet| packet.bytes.len() as u64)
                 .sum::<u64>();
         }
-        // The bucket was full, and two seconds follow.
+        // The bucket was full, so three seconds of the rate were available.
         let range = 3 * PER_SECOND - ANSWER..=3 * PER_SECOND + ANSWER;
         assert!(range.contains(&bytes), "{bytes} bytes, one request per {interval_us} us");
     }
 }
 
-/// Digests of all tiles are a short answer that takes long.
+/// Digests of all tiles are a short answer that needs much work.
 #[test]
 fn digests_of_very_many_tiles_are_answered_less_often() {
     let answered = |tiles: i32| {
@@ -160,12 +160,12 @@ fn digests_of_very_many_tiles_are_answered_less_often() {
         (0..tiles).for_each(|n| sender.put([n % 200 * 100, n / 200 * 100, 0], true));
         sender.flush(Duration::ZERO);
         assert_eq!(sender.sent().tile_count(), tiles as usize);
-        let ask = Request::Digests { epoch: 77, range: SetRange::ALL }.encode();
+        let request = Request::Digests { epoch: 77, range: SetRange::ALL }.encode();
         let now = Duration::from_secs(10);
-        (0..1000).filter(|_| !sender.answer(2, &ask, now).unwrap().is_empty()).count()
+        (0..1000).filter(|_| !sender.answer(2, &request, now).unwrap().is_empty()).count()
     };
     let (few, many) = (answered(2000), answered(40_000));
     assert!(few > 100, "{few}");
-    // 10 kB each, beside what is sent.
+    // Each request costs 10 kB in addition to the bytes sent.
     assert!((15..=27).contains(&many), "{many}");
 }
