@@ -188,7 +188,7 @@ def check(port):
     threading.Thread(target=files.serve_forever, daemon=True).start()
     web = f"http://127.0.0.1:{files.server_port}/maps/city"
     assert voxtile("digest", web, port=port) == digest
-    assert "can be read and not written to" in voxtile("push", MAP, web, port=port, fails=True)
+    assert "cannot be written to" in voxtile("push", MAP, web, port=port, fails=True)
 
     # An object that is changed, cut or missing is named.
     name = next(key for key in keys if "/objects/" in key)

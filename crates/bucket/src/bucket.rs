@@ -4,7 +4,7 @@ use super::manifest::{MANIFEST, Manifest};
 use super::object_name::{OBJECTS, ObjectName};
 use super::pending::Pending;
 use super::remote_store::remote_store;
-use super::request::{Failure, PROGRESS_BYTES, Request, retried};
+use super::request::{Failure, PROGRESS_BYTES, Request, retry};
 use super::store_health::StoreHealth;
 use bytes::Bytes;
 use futures_util::TryStreamExt;
@@ -18,85 +18,86 @@ use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 use voxtile::{Error, Result};
 
-/// A place for one map in an object store.
+/// Location of one map in an object store.
 ///
-/// Its calls wait for the network. What fails for a reason that may pass is tried again. A request that makes no progress
-/// for a [`timeout`](Bucket::with_timeout) fails with [`Error::NoAnswer`]: progress is 16 KiB more of an object, or the
-/// answer. An attempt without progress for half of the timeout is ended and begun again; an object that is fetched
-/// continues at the byte reached. An upload has twice as much time. 20 attempts in a row that get no further are the
-/// last, 4 where the server was never reached. A wait of 8 seconds, or a quarter of the timeout, is reported as a warning of the crate `log`. Every error
-/// names its object.
+/// Calls block on the network and retry temporary failures. A request that makes no progress for a
+/// [`timeout`](Bucket::with_timeout) fails with [`Error::NoAnswer`]. Progress is an answer, or 16 KiB more of an
+/// object. An attempt without progress for half of the timeout is aborted and retried; a download continues at the byte
+/// reached. An upload has twice as much time. A request fails after 20 attempts in a row without progress, or after 4
+/// if the server was never reached. A wait of 8 seconds, or of a quarter of the timeout, is logged as a warning of the
+/// crate `log`. Every error names its object.
 #[derive(Clone, Debug)]
 pub struct Bucket {
-    /// As the user wrote it, for messages.
+    /// URL as given by the user, for messages.
     url: String,
     store: Arc<dyn ObjectStore>,
     prefix: Key,
     can_write: bool,
-    /// Whether the store's client counts what it sends.
+    /// Whether the store's client counts the bytes that it sends.
     counts_sent: bool,
     health: Arc<StoreHealth>,
     timeout: Duration,
     stop: Arc<AtomicBool>,
 }
 
-/// A manifest and what tells it from its successor.
+/// A manifest, and the version of its object.
 pub(super) struct FoundManifest {
     pub(super) manifest: Manifest,
     pub(super) version: UpdateVersion,
 }
 
-/// An object that is there, as a file below the bucket's URL.
+/// An object, seen as a file below the bucket's URL.
 pub(super) struct StoredObject {
-    /// Its name below the URL; its own, where the URL is that of the object.
+    /// Name below the URL; the object's own name if the URL is that of the object.
     pub(super) name: String,
     pub(super) is_url: bool,
     pub(super) bytes: u64,
     pub(super) key: Key,
     pub(super) e_tag: Option<String>,
-    /// When it was put, in seconds of Unix time; 0 where the store does not tell.
+    /// Modification time in seconds of Unix time; 0 if the store does not report it.
     pub(super) modified_s: i64,
 }
 
-/// The environment variable with the bound on a request without progress, in seconds.
+/// Environment variable of the timeout of requests, in seconds.
 const TIMEOUT_VARIABLE: &str = "VOXTILE_BUCKET_TIMEOUT";
 
-/// The bounds of that bound.
+/// Valid timeouts, in seconds.
 const TIMEOUTS_S: std::ops::RangeInclusive<f64> = 0.1..=86_400.0;
 
-/// Of a store that does not count what it is sent, an object has the timeout for each such part.
+/// For a store that does not count the bytes it sends, an upload has one timeout per this number of bytes.
 const UNCOUNTED_BYTES: u64 = 1 << 20;
 
-/// What helps where an object is lost or damaged.
-pub(super) const SEND_AGAIN: &str = "send all of the map again with `voxtile push --resend`";
+/// Remedy for a lost or damaged object, for messages.
+pub(super) const SEND_AGAIN: &str = "send the whole map again with `voxtile push --resend`";
 
-/// The longest manifest or page that is read.
+/// Maximum size of a manifest or page, in bytes.
 const MAX_LIST_BYTES: u64 = 1 << 28;
 
 impl Bucket {
-    /// How long a request may remain without progress, unless something else is asked for.
+    /// Default [timeout](Bucket::with_timeout) of a request without progress.
     pub const DEFAULT_TIMEOUT: Duration = Duration::from_secs(60);
 
-    /// The bucket and prefix of a URL: `s3://BUCKET/MAP`, `gs://BUCKET/MAP`, `az://CONTAINER/MAP`, and for reading
-    /// `https://HOST/MAP`. Keys, region and endpoint come from the environment, by the names that each store's own
-    /// tools use: `AWS_ACCESS_KEY_ID`, `AWS_REGION`, `AWS_ENDPOINT_URL`, `GOOGLE_SERVICE_ACCOUNT`,
+    /// Opens the bucket and prefix of a URL: `s3://BUCKET/MAP`, `gs://BUCKET/MAP`, `az://CONTAINER/MAP`, or
+    /// `https://HOST/MAP`, which is read-only. Keys, region and endpoint are read from the environment variables of
+    /// each store's own tools: `AWS_ACCESS_KEY_ID`, `AWS_REGION`, `AWS_ENDPOINT_URL`, `GOOGLE_SERVICE_ACCOUNT`,
     /// `AZURE_STORAGE_ACCOUNT_NAME` and so on. `VOXTILE_BUCKET_TIMEOUT` is the [timeout](Bucket::with_timeout) in
     /// seconds.
     ///
     /// # Errors
     ///
-    /// [`Error::InvalidArgument`] for another URL, or if the environment lacks something.
+    /// [`Error::InvalidArgument`] for an invalid URL, or if an environment variable is missing or invalid.
     pub fn open(url: &str) -> Result<Self> {
         let wrong = |reason: String| Error::argument(url, reason);
-        let no_bucket =
-            || wrong("is no URL of a bucket; these begin with s3://, gs://, az:// or https://".to_owned());
+        let no_bucket = || wrong("not the URL of a bucket; use s3://, gs://, az:// or https://".to_owned());
         let (scheme, rest) = url.split_once("://").ok_or_else(no_bucket)?;
         let (host, prefix) = rest.split_once('/').unwrap_or((rest, ""));
         if host.is_empty() {
-            return Err(wrong(format!("names no bucket; write {scheme}://BUCKET/MAP")));
+            return Err(wrong(format!("the URL has no bucket; use {scheme}://BUCKET/MAP")));
         }
         if rest.contains(['?', '#']) {
-            return Err(wrong("has a query or a fragment; give keys by the environment".to_owned()));
+            return Err(wrong(
+                "the URL has a query or a fragment; set keys in environment variables".to_owned(),
+            ));
         }
         let root = format!("{scheme}://{host}");
         let store = remote_store(url, scheme, &root)?.ok_or_else(no_bucket)?;
@@ -107,12 +108,12 @@ impl Bucket {
         Ok(Self { can_write, counts_sent: true, ..Self::new(store, prefix, url) }.with_timeout(timeout))
     }
 
-    /// A place below a prefix of any object store; `url` is what messages call it. The store should not retry by itself.
-    /// How much of an object it has sent is not known: instead, an object to be put has the timeout for each MiB.
+    /// Creates a bucket from any object store and a prefix. `url` is its name in messages. The store should not retry
+    /// by itself. The progress of its uploads is unknown, so an upload has one timeout per MiB.
     ///
     /// # Errors
     ///
-    /// [`Error::InvalidArgument`] for a prefix that no object has.
+    /// [`Error::InvalidArgument`] for a prefix that is not a valid path of an object.
     pub fn on(store: Arc<dyn ObjectStore>, prefix: &str, url: &str) -> Result<Self> {
         let prefix = Key::parse(prefix).map_err(|error| Error::argument(url, error.to_string()))?;
         Ok(Self::new(store, prefix, url))
@@ -131,56 +132,57 @@ impl Bucket {
         }
     }
 
-    /// Fails requests that remain without progress for so long; from 0.1 s to a day. Put what a slow link needs for
-    /// 32 KiB.
+    /// Sets the timeout of a request without progress, from 0.1 s to a day. On a slow link, use at least the transfer
+    /// time of 32 KiB.
     pub fn with_timeout(mut self, timeout: Duration) -> Self {
-        let [least, most] = [*TIMEOUTS_S.start(), *TIMEOUTS_S.end()].map(Duration::from_secs_f64);
-        self.timeout = timeout.clamp(least, most);
+        let [min, max] = [*TIMEOUTS_S.start(), *TIMEOUTS_S.end()].map(Duration::from_secs_f64);
+        self.timeout = timeout.clamp(min, max);
         self
     }
 
-    /// Fails all waits with [`Error::Stopped`] once the flag is set; it is looked at ten times a second.
+    /// Sets a flag that stops all waits with [`Error::Stopped`]. It is checked ten times a second.
     pub fn with_stop(mut self, stop: Arc<AtomicBool>) -> Self {
         self.stop = stop;
         self
     }
 
-    /// Its URL.
+    /// Returns the URL.
     pub fn url(&self) -> &str {
         &self.url
     }
 
-    /// Its URL as a path, as errors name it.
+    /// Returns the URL as a path, for errors.
     pub(super) fn path(&self) -> &Path {
         Path::new(&self.url)
     }
 
     /// # Errors
     ///
-    /// [`Error::InvalidArgument`] if it can only be read.
+    /// [`Error::InvalidArgument`] if the bucket is read-only.
     pub(super) fn check_can_write(&self) -> Result<()> {
         if self.can_write {
             return Ok(());
         }
-        let reason = "can be read and not written to: a web server keeps no two writers apart; push to s3://, gs:// or az://";
+        let reason = "cannot be written to: a web server does not prevent concurrent writes; \
+                      push to s3://, gs:// or az://";
         Err(Error::argument(&self.url, reason))
     }
 
-    /// The manifest; `None` if there is none.
+    /// Reads the manifest; `None` if there is none.
     pub(super) fn manifest(&self) -> Result<Option<FoundManifest>> {
         let Some((bytes, version)) = self.manifest_bytes()? else { return Ok(None) };
-        let manifest = Manifest::from_bytes(&bytes).map_err(|reason| self.is_no_manifest(&reason))?;
+        let manifest = Manifest::from_bytes(&bytes).map_err(|reason| self.manifest_error(&reason))?;
         Ok(Some(FoundManifest { manifest, version }))
     }
 
-    /// The manifest for who puts another in its place: one that is damaged is only told from its successor. What a
-    /// later version has written is not damaged.
+    /// Reads the manifest for a push that replaces it. A damaged manifest gives only its version. A manifest of a later
+    /// version of voxtile is an error.
     pub(super) fn replaceable_manifest(&self) -> Result<Option<(Option<Manifest>, UpdateVersion)>> {
         let Some((bytes, version)) = self.manifest_bytes()? else { return Ok(None) };
         match Manifest::from_bytes(&bytes) {
-            Err(reason) if Manifest::is_of_later_version(&bytes) => Err(self.is_no_manifest(&reason)),
+            Err(reason) if Manifest::is_of_later_version(&bytes) => Err(self.manifest_error(&reason)),
             Err(reason) => {
-                log::warn!("{}: {reason}; it is replaced", self.path().join(MANIFEST).display());
+                log::warn!("{}: {reason}; the push replaces it", self.path().join(MANIFEST).display());
                 Ok(Some((None, version)))
             }
             Ok(manifest) => Ok(Some((Some(manifest), version))),
@@ -195,17 +197,17 @@ impl Bucket {
         }
     }
 
-    fn is_no_manifest(&self, reason: &str) -> Error {
+    fn manifest_error(&self, reason: &str) -> Error {
         let reason = format!("{}: {reason}", self.key(MANIFEST));
         let error = io::Error::new(io::ErrorKind::InvalidData, reason);
         Error::io(&self.path().join(MANIFEST), "read", error)
     }
 
-    /// Puts a manifest in place of the one that was found, if that is still there.
+    /// Replaces the manifest that was found, if it is unchanged in the store.
     ///
     /// # Errors
     ///
-    /// One of the kind `AlreadyExists` if it is not; a store that refuses.
+    /// An error of kind `AlreadyExists` if it has changed; a store that refuses the request.
     pub(super) fn replace_manifest(&self, manifest: &Manifest, found: Option<UpdateVersion>) -> Result<()> {
         let (store, key) = (self.store.clone(), self.key(MANIFEST));
         let failed = |error| Error::io(&self.path().join(MANIFEST), "write", error);
@@ -220,8 +222,9 @@ impl Bucket {
                     Ok(_) => return Ok(true),
                     Err(failure) => failure,
                 };
-                // The state there decides: an attempt whose answer was lost finds what it has put itself.
-                let now = request.ask(get_once(&request, &store, &key, MAX_LIST_BYTES)).await;
+                // The state in the store decides: if the answer to an attempt was lost, the attempt finds its own
+                // manifest.
+                let now = request.query(get_once(&request, &store, &key, MAX_LIST_BYTES)).await;
                 let is_unchanged = match now {
                     Ok((now, _)) if now == content => return Ok(true),
                     Ok((_, version)) => Some(found.as_ref() == Some(&version)),
@@ -230,7 +233,7 @@ impl Bucket {
                 };
                 match (is_unchanged, failure) {
                     (Some(false), _) => return Ok(false),
-                    // A conflict with an attempt of ours that the store has not finished, or whose answer was lost.
+                    // A conflict with an own attempt that the store has not finished, or whose answer was lost.
                     (
                         _,
                         Failure::Refused(
@@ -249,22 +252,22 @@ impl Bucket {
         }
     }
 
-    /// The error of a push that another one came before.
+    /// Returns the error of a push that another push has overtaken.
     pub(super) fn overtaken(&self) -> Error {
-        let reason = "another push came first, and its state stays; push again to go on from there";
+        let reason = "another push came first, and its state is kept; push again";
         let error = io::Error::new(io::ErrorKind::AlreadyExists, reason);
         Error::io(&self.path().join(MANIFEST), "replace", error)
     }
 
-    /// Begins to fetch an object, whose content is compared with its name.
-    pub(super) fn fetch(&self, name: ObjectName, most_bytes: u64) -> Pending<Bytes> {
+    /// Starts to fetch an object, and compares its content with its name.
+    pub(super) fn fetch(&self, name: ObjectName, max_bytes: u64) -> Pending<Bytes> {
         let (store, key) = (self.store.clone(), self.key(&name.key()));
         self.pending("GET", &name.key(), move |request| async move {
-            fetch_whole(&request, &store, &key, name, most_bytes).await
+            fetch_whole(&request, &store, &key, name, max_bytes).await
         })
     }
 
-    /// Begins to fetch some bytes of an object. Nothing tells here whether they are the right ones.
+    /// Starts to fetch a range of bytes of an object, without a check of its content.
     pub(super) fn fetch_bytes(&self, name: ObjectName, range: Range<u64>) -> Pending<Bytes> {
         let (store, key) = (self.store.clone(), self.key(&name.key()));
         self.pending("GET", &name.key(), move |request| async move {
@@ -272,19 +275,21 @@ impl Bucket {
         })
     }
 
-    /// Reads a list of files.
+    /// Fetches a page of the file list.
     pub(super) fn fetch_list(&self, name: ObjectName) -> io::Result<Bytes> {
         self.fetch(name, MAX_LIST_BYTES).wait()
     }
 
-    /// Begins to put an object; `false` if that is there already, of which the store is asked before where `asks`.
-    pub(super) fn put(&self, name: ObjectName, content: Bytes, asks: bool) -> Pending<bool> {
+    /// Starts to upload an object. The result is `false` if the object already exists, which is only checked if
+    /// `checks_existing`.
+    pub(super) fn put(&self, name: ObjectName, content: Bytes, checks_existing: bool) -> Pending<bool> {
         let (store, key) = (self.store.clone(), self.key(&name.key()));
         self.pending_put(&name.key(), content.len() as u64, move |request| async move {
-            // A name is of one content, and an object is there whole or not at all. Who may not ask may put.
-            if asks
-                && let Ok(there) = request.ask(async { Ok(store.head(&key).await?) }).await
-                && there.size == content.len() as u64
+            // A name identifies its content, and an object exists as a whole or not at all. If the check is not
+            // permitted, the upload may still be.
+            if checks_existing
+                && let Ok(existing) = request.query(async { Ok(store.head(&key).await?) }).await
+                && existing.size == content.len() as u64
             {
                 return Ok(false);
             }
@@ -298,26 +303,26 @@ impl Bucket {
         })
     }
 
-    /// When the manifest was put, and the objects put before then.
+    /// Lists the objects that are older than the manifest.
     pub(super) fn objects_before_manifest(&self) -> io::Result<Vec<ObjectName>> {
         let (store, key, folder) = (self.store.clone(), self.key(MANIFEST), self.key(OBJECTS));
         self.pending("LIST", OBJECTS, move |request| async move {
             let list = || async {
                 let manifest = store.head(&key).await?;
                 let listed = store.list(Some(&folder)).try_filter_map(|object| {
-                    request.moved(BYTES_OF_ENTRY);
+                    request.add_bytes(BYTES_OF_ENTRY);
                     let is_older = object.last_modified < manifest.last_modified;
                     let name = object.location.filename().and_then(ObjectName::from_digits);
                     std::future::ready(Ok(name.filter(|_| is_older)))
                 });
                 Ok(listed.try_collect().await?)
             };
-            retried(&request, list).await
+            retry(&request, list).await
         })
         .wait()
     }
 
-    /// Begins to remove an object; one that is not there is removed.
+    /// Starts to remove an object. An object that does not exist counts as removed.
     pub(super) fn remove(&self, name: ObjectName) -> Pending<()> {
         let (store, key) = (self.store.clone(), self.key(&name.key()));
         self.pending("DELETE", &name.key(), move |request| async move {
@@ -327,37 +332,38 @@ impl Bucket {
                     Err(error) => Err(error.into()),
                 }
             };
-            retried(&request, delete).await
+            retry(&request, delete).await
         })
     }
 
-    /// Whether a map is there. `is_stopped` is asked ten times a second.
+    /// Returns whether the bucket has a map. `is_stopped` is checked ten times a second.
     ///
     /// # Errors
     ///
-    /// A store that refuses or does not answer; [`Error::Stopped`].
+    /// A store that refuses the request or does not answer; [`Error::Stopped`].
     pub fn has_map(&self, is_stopped: &dyn Fn() -> bool) -> Result<bool> {
         let (store, key, prefix) = (self.store.clone(), self.key(MANIFEST), self.prefix.clone());
-        let asked = self.pending("HEAD", MANIFEST, move |request| async move {
-            match retried(&request, || async { Ok(store.head(&key).await?) }).await {
+        let pending = self.pending("HEAD", MANIFEST, move |request| async move {
+            match retry(&request, || async { Ok(store.head(&key).await?) }).await {
                 Ok(_) => Ok(true),
                 Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(false),
                 Err(error) => {
-                    // Where nothing may be listed, stores do not say that an object is missing. A file is no map.
+                    // Without the permission to list objects, stores do not report that an object is missing. A file at
+                    // the URL is not a map.
                     let is_file = error.kind() == io::ErrorKind::PermissionDenied
                         && !prefix.as_ref().is_empty()
-                        && retried(&request, || async { Ok(store.head(&prefix).await?) })
+                        && retry(&request, || async { Ok(store.head(&prefix).await?) })
                             .await
                             .is_ok_and(|file| file.size > 0);
                     if is_file { Ok(false) } else { Err(error) }
                 }
             }
         });
-        let answer = asked.wait_unless(is_stopped).ok_or(Error::Stopped)?;
-        answer.map_err(|error| Error::io(self.path(), "look for a map in", error))
+        let answer = pending.wait_unless(is_stopped).ok_or(Error::Stopped)?;
+        answer.map_err(|error| Error::io(self.path(), "look for a map", error))
     }
 
-    /// Begins to list the object of the URL itself, or those below it, by name.
+    /// Starts to list the object of the URL itself, or the objects below it, ordered by name.
     pub(super) fn objects_below(&self) -> Pending<Vec<StoredObject>> {
         let (store, prefix) = (self.store.clone(), self.prefix.clone());
         self.pending("LIST", "", move |request| async move {
@@ -369,7 +375,7 @@ impl Bucket {
                 key: meta.location,
                 e_tag: meta.e_tag,
             };
-            match retried(&request, || async { Ok(store.head(&prefix).await?) }).await {
+            match retry(&request, || async { Ok(store.head(&prefix).await?) }).await {
                 Ok(meta) if meta.size > 0 => {
                     let name = prefix.filename().unwrap_or_default().to_owned();
                     return Ok(vec![object(meta, name, true)]);
@@ -380,22 +386,22 @@ impl Bucket {
             }
             let list = || async {
                 let listed = store.list(Some(&prefix)).try_filter_map(|meta| {
-                    request.moved(BYTES_OF_ENTRY);
+                    request.add_bytes(BYTES_OF_ENTRY);
                     let name: Option<Key> = meta.location.prefix_match(&prefix).map(|parts| parts.collect());
-                    // Some tools put an empty object where a folder would be.
+                    // Some tools create an empty object for a folder.
                     let is_file = meta.size > 0 || meta.location.extension().is_some();
                     let name = name.filter(|name| is_file && !name.as_ref().is_empty());
                     std::future::ready(Ok(name.map(|name| object(meta, name.as_ref().to_owned(), false))))
                 });
                 Ok(listed.try_collect::<Vec<_>>().await?)
             };
-            let mut objects = retried(&request, list).await?;
+            let mut objects = retry(&request, list).await?;
             objects.sort_by(|a, b| a.name.cmp(&b.name));
             Ok(objects)
         })
     }
 
-    /// Begins to fetch an object into a file, as it was when it was listed.
+    /// Starts to fetch an object into a file. An object that changed since it was listed is an error.
     pub(super) fn fetch_file(&self, object: StoredObject, to: PathBuf) -> Pending<()> {
         let store = self.store.clone();
         let request = Request::new("GET", object.key.clone(), self.timeout, self.health.clone());
@@ -407,7 +413,7 @@ impl Bucket {
     fn get_manifest(&self) -> Pending<(Bytes, UpdateVersion)> {
         let (store, key) = (self.store.clone(), self.key(MANIFEST));
         self.pending("GET", MANIFEST, move |request| async move {
-            retried(&request, || get_once(&request, &store, &key, MAX_LIST_BYTES)).await
+            retry(&request, || get_once(&request, &store, &key, MAX_LIST_BYTES)).await
         })
     }
 
@@ -416,18 +422,18 @@ impl Bucket {
         self.prefix.parts().chain(name.parts()).collect()
     }
 
-    /// Begins a request about an object, or about all below the prefix.
+    /// Starts a request for an object, or for all objects below a prefix.
     fn pending<T: Send + 'static, F: Future<Output = io::Result<T>> + Send + 'static>(
         &self,
         verb: &'static str,
         name: &str,
         request: impl FnOnce(Arc<Request>) -> F,
     ) -> Pending<T> {
-        let about = Request::new(verb, self.key(name), self.timeout, self.health.clone());
-        Pending::begin(about, self.stop.clone(), request)
+        let state = Request::new(verb, self.key(name), self.timeout, self.health.clone());
+        Pending::begin(state, self.stop.clone(), request)
     }
 
-    /// Begins to put an object of so many bytes.
+    /// Starts to upload an object of `bytes` bytes.
     fn pending_put<T: Send + 'static, F: Future<Output = io::Result<T>> + Send + 'static>(
         &self,
         name: &str,
@@ -436,15 +442,15 @@ impl Bucket {
     ) -> Pending<T> {
         let times = if self.counts_sent { 1 } else { bytes.div_ceil(UNCOUNTED_BYTES).max(1) };
         let timeout = self.timeout.saturating_mul(u32::try_from(times).unwrap_or(u32::MAX));
-        let about = Request::new("PUT", self.key(name), timeout, self.health.clone());
-        Pending::begin(about, self.stop.clone(), request)
+        let state = Request::new("PUT", self.key(name), timeout, self.health.clone());
+        Pending::begin(state, self.stop.clone(), request)
     }
 }
 
-/// What an entry of a list counts as: of a list that arrives page by page, each page is progress.
+/// Bytes of progress per entry of a list, so that each page of a long list is progress.
 const BYTES_OF_ENTRY: u64 = PROGRESS_BYTES;
 
-/// The bound that the environment sets.
+/// Reads the timeout from the environment.
 fn timeout_of_environment() -> Result<Duration> {
     let Some(text) = std::env::var_os(TIMEOUT_VARIABLE) else { return Ok(Bucket::DEFAULT_TIMEOUT) };
     let seconds = text.to_str().and_then(|text| text.trim().parse().ok());
@@ -453,7 +459,7 @@ fn timeout_of_environment() -> Result<Duration> {
         None => Err(Error::argument(
             TIMEOUT_VARIABLE,
             format!(
-                "is {}; give seconds from {} to {}",
+                "{} is not a number of seconds from {} to {}",
                 text.display(),
                 TIMEOUTS_S.start(),
                 TIMEOUTS_S.end()
@@ -462,8 +468,8 @@ fn timeout_of_environment() -> Result<Duration> {
     }
 }
 
-/// The refusal of an object store, which names the object.
-pub(super) fn refused(key: &Key, error: &object_store::Error) -> io::Error {
+/// Returns an error of an object store that names the object.
+pub(super) fn object_error(key: &Key, error: &object_store::Error) -> io::Error {
     let kind = match error {
         object_store::Error::NotFound { .. } => io::ErrorKind::NotFound,
         object_store::Error::PermissionDenied { .. } | object_store::Error::Unauthenticated { .. } => {
@@ -471,22 +477,22 @@ pub(super) fn refused(key: &Key, error: &object_store::Error) -> io::Error {
         }
         _ => io::ErrorKind::Other,
     };
-    io::Error::new(kind, format!("object {key}: {}", told(error)))
+    io::Error::new(kind, format!("object {key}: {}", error_text(error)))
 }
 
-/// An object that is missing is no file that is missing: the map does name it.
+/// Replaces a `NotFound` error by one of another kind: the object is missing, but the map has the file.
 pub(super) fn missing_object(error: io::Error) -> io::Error {
     if error.kind() != io::ErrorKind::NotFound {
         return error;
     }
     let reason = format!(
-        "{error}; if the map was pushed with --prune meanwhile, open it again; else {SEND_AGAIN} from its folder"
+        "{error}; if another push used --prune, open the map again; otherwise {SEND_AGAIN} from its folder"
     );
     io::Error::other(reason)
 }
 
-/// An error with its causes, on one line.
-pub(super) fn told(error: &object_store::Error) -> String {
+/// Returns an error with its causes, on one line.
+pub(super) fn error_text(error: &object_store::Error) -> String {
     let mut text = error.to_string();
     let mut cause = std::error::Error::source(error);
     while let Some(error) = cause {
@@ -496,11 +502,11 @@ pub(super) fn told(error: &object_store::Error) -> String {
         }
         cause = error.source();
     }
-    // Without keys the stores' clients ask the machines of their clouds, which are not there elsewhere.
+    // Without keys, the clients query the metadata servers of their clouds, which do not exist elsewhere.
     if text.contains("169.254.169.254") || text.contains("metadata.google.internal") {
         let keys = "AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY (s3), GOOGLE_SERVICE_ACCOUNT (gs), \
                     AZURE_STORAGE_ACCOUNT_NAME and AZURE_STORAGE_ACCOUNT_KEY (az)";
-        text = format!("no keys: set {keys} in the environment; without them this was tried: {text}");
+        text = format!("no keys: set {keys} in the environment; without keys, the client failed: {text}");
     }
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }

@@ -13,37 +13,37 @@ use voxtile::scratch::Scratch;
 use voxtile::store::{Disk, DiskLock, DiskRead, DiskWrite, EntryKind, MapPath, ReaderWatch};
 use voxtile::{Error, Result};
 
-/// A map in a bucket as files that can be read and not written, as of the push that was the last when it was opened.
+/// A map in a bucket as a read-only disk. It shows the last push at the time it was opened.
 ///
-/// Whoever walks over tiles gets the next ones fetched meanwhile, several at a time.
+/// While a reader visits tiles, the next tiles are prefetched, several at a time.
 #[derive(Debug)]
 pub struct BucketDisk {
     bucket: Bucket,
-    /// What stands before every path.
+    /// Prefix of every path.
     root: PathBuf,
     list: FileList,
-    /// Of the manifest.
+    /// Version of the manifest.
     version: UpdateVersion,
     ahead: Mutex<Ahead>,
 }
 
-/// Files that were asked for and not opened yet.
+/// Files that were requested but not opened yet.
 #[derive(Debug)]
 struct Ahead {
     files: LruCache<String, (u64, Pending<Bytes>)>,
     bytes: u64,
 }
 
-/// Files that may be asked for ahead, and their bytes.
+/// Number of files that a reader prefetches, and maximum size of all prefetched files in bytes.
 const FILES_AHEAD: usize = 16;
 const BYTES_AHEAD: u64 = 2 * PART_BYTES;
 
 impl BucketDisk {
-    /// Reads the manifest of the map in a bucket.
+    /// Opens the map in a bucket, and reads its manifest.
     ///
     /// # Errors
     ///
-    /// [`Error::NoMap`] if there is none; a store that refuses.
+    /// [`Error::NoMap`] if there is no map; a store that refuses the request.
     pub fn open(bucket: Bucket) -> Result<Self> {
         let found = bucket.manifest()?.ok_or_else(|| Error::NoMap { path: bucket.path().to_owned() })?;
         Ok(Self {
@@ -55,13 +55,13 @@ impl BucketDisk {
         })
     }
 
-    /// Where the map is, for [`MapReader`](voxtile::MapReader) and all that takes a path of a map.
+    /// Returns the map's path, for [`MapReader`](voxtile::MapReader) and other functions that take the path of a map.
     pub fn into_map_path(self) -> MapPath {
         let root = self.root.clone();
         MapPath::on(Arc::new(self), root)
     }
 
-    /// The path of a file in the map, with `/` between names; `None` if it is no path below the map's.
+    /// Returns the path of a file inside the map, with `/` between names; `None` if the path is outside the map.
     fn path_in_map(&self, path: &Path) -> Option<String> {
         let names = path.strip_prefix(&self.root).ok()?.iter();
         names.map(|name| name.to_str()).collect::<Option<Vec<_>>>().map(|names| names.join("/"))
@@ -86,18 +86,18 @@ impl Ahead {
         Some(pending)
     }
 
-    /// Asks for a file, if another thread has not done so.
-    fn ask(&mut self, name: String, bytes: u64, fetch: impl FnOnce() -> Pending<Bytes>) {
+    /// Requests a file, unless another thread has already requested it.
+    fn request(&mut self, name: String, bytes: u64, fetch: impl FnOnce() -> Pending<Bytes>) {
         if self.files.contains(&name) {
             return;
         }
-        self.make_room(bytes);
+        self.free_space(bytes);
         self.files.put(name, (bytes, fetch()));
         self.bytes += bytes;
     }
 
-    /// Makes room for a file; those asked for longest ago, which nobody wanted, go.
-    fn make_room(&mut self, bytes: u64) {
+    /// Frees space for a file: drops the oldest requests that no reader has used.
+    fn free_space(&mut self, bytes: u64) {
         while (self.files.len() >= 2 * FILES_AHEAD || self.bytes + bytes > BYTES_AHEAD)
             && let Some((_, (dropped, _))) = self.files.pop_lru()
         {
@@ -107,8 +107,7 @@ impl Ahead {
 }
 
 fn read_only<T>() -> io::Result<T> {
-    let reason =
-        "a map in a bucket can be read and not changed; `voxtile pull` it, change it, `voxtile push` it";
+    let reason = "a map in a bucket is read-only; `voxtile pull` it, change it, `voxtile push` it";
     Err(io::Error::new(io::ErrorKind::ReadOnlyFilesystem, reason))
 }
 
@@ -165,7 +164,7 @@ impl Disk for BucketDisk {
     }
 
     fn newer(&self) -> io::Result<Option<Arc<dyn Disk>>> {
-        // An `Error::NoAnswer` stays what it is: `Error::io` takes it out again.
+        // `Error::io` extracts an `Error::NoAnswer` from this error again.
         let newer = Self::open(self.bucket.clone()).map_err(io::Error::other)?;
         Ok((newer.version != self.version).then(|| Arc::new(newer) as Arc<dyn Disk>))
     }
@@ -181,7 +180,7 @@ impl Disk for BucketDisk {
         }
         let Ok(Some(file)) = self.list.file(&name) else { return };
         let &[part] = &file.parts[..] else { return };
-        self.ahead().ask(name, file.bytes, || self.bucket.fetch(part, PART_BYTES));
+        self.ahead().request(name, file.bytes, || self.bucket.fetch(part, PART_BYTES));
     }
 
     fn watch(&self, _: &Path) -> io::Result<Box<dyn ReaderWatch>> {
@@ -236,11 +235,11 @@ mod tests {
     use object_store::memory::InMemory;
 
     #[test]
-    fn a_file_that_two_threads_ask_for_is_counted_once() {
+    fn a_file_that_two_threads_request_is_counted_once() {
         let bucket = Bucket::on(Arc::new(InMemory::new()), "map", "s3://test/map").unwrap();
         let mut ahead = Ahead { files: LruCache::unbounded(), bytes: 0 };
         for name in ["a", "b", "a"] {
-            ahead.ask(name.to_owned(), 10, || bucket.fetch(ObjectName::of(b""), 10));
+            ahead.request(name.to_owned(), 10, || bucket.fetch(ObjectName::of(b""), 10));
         }
         assert_eq!((ahead.files.len(), ahead.bytes), (2, 20));
         for name in ["a", "b"] {

@@ -1,4 +1,4 @@
-use super::bucket::{SEND_AGAIN, refused, told};
+use super::bucket::{SEND_AGAIN, error_text, object_error};
 use super::object_name::ObjectName;
 use super::request::{Failure, Request};
 use bytes::Bytes;
@@ -8,32 +8,32 @@ use object_store::{GetOptions, GetRange, GetResult, ObjectStore, UpdateVersion};
 use std::io;
 use std::ops::Range;
 
-/// How often content is fetched that is not what its name says: a proxy may have cut it off.
+/// Maximum number of downloads of an object whose content does not match its name: a proxy may have truncated it.
 const FETCHES: usize = 3;
 
-/// Fetches an object whole, and compares it with its name. After a break it continues at the byte reached: the name
-/// tells whether both parts belong together.
+/// Fetches a whole object and compares it with its name. After a broken connection, it continues at the byte reached:
+/// the name detects parts that do not belong together.
 pub(super) async fn fetch_whole(
     request: &Request,
     store: &dyn ObjectStore,
     key: &Key,
     name: ObjectName,
-    most_bytes: u64,
+    max_bytes: u64,
 ) -> io::Result<Bytes> {
     for _ in 0..FETCHES {
-        let mut fetch = Fetch { most_bytes, ..Fetch::new(None) };
+        let mut fetch = Fetch { max_bytes, ..Fetch::new(None) };
         fetch.run(request, store, key).await?;
-        // Hashing is work, though short compared with the way over the network.
+        // Hashing on the network thread is short compared with the download.
         if ObjectName::of(&fetch.content) == name {
             return Ok(fetch.content.into());
         }
     }
-    let reason = format!("object {key}: its content is not what its name says; {SEND_AGAIN}");
+    let reason = format!("object {key}: its content does not match its name; {SEND_AGAIN}");
     Err(io::Error::new(io::ErrorKind::InvalidData, reason))
 }
 
-/// Fetches some bytes of an object. After a break it continues at the byte reached: an object of this name never
-/// changes, and checksums in the file tell whether it is damaged.
+/// Fetches a range of bytes of an object. After a broken connection, it continues at the byte reached: an object never
+/// changes under its name, and checksums in the file detect damage.
 pub(super) async fn fetch_bytes(
     request: &Request,
     store: &dyn ObjectStore,
@@ -45,45 +45,45 @@ pub(super) async fn fetch_bytes(
     Ok(fetch.content.into())
 }
 
-/// Makes one attempt to get an object whole, with its version.
+/// Makes one attempt to fetch a whole object with its version.
 pub(super) async fn get_once(
     request: &Request,
     store: &dyn ObjectStore,
     key: &Key,
-    most_bytes: u64,
+    max_bytes: u64,
 ) -> Result<(Bytes, UpdateVersion), Failure> {
     let found = store.get_opts(key, GetOptions::default()).await?;
     let version = UpdateVersion { e_tag: found.meta.e_tag.clone(), version: found.meta.version.clone() };
     let mut content = Vec::new();
-    receive(request, key, found, most_bytes, &mut content).await?;
+    receive(request, key, found, max_bytes, &mut content).await?;
     Ok((content.into(), version))
 }
 
-/// An object, or a part of one, that is being fetched.
+/// Download of an object, or of a range of it.
 struct Fetch {
-    /// All of the object if there is none.
+    /// Range to fetch; `None` for the whole object.
     range: Option<Range<u64>>,
-    most_bytes: u64,
+    max_bytes: u64,
     content: Vec<u8>,
-    /// Where the object or the part ends, once that is known.
+    /// End of the object or range, once it is known.
     end: Option<u64>,
     can_continue: bool,
 }
 
 impl Fetch {
     fn new(range: Option<Range<u64>>) -> Self {
-        let most_bytes = range.as_ref().map_or(u64::MAX, |range| range.end.saturating_sub(range.start));
-        Self { range, most_bytes, content: Vec::new(), end: None, can_continue: true }
+        let max_bytes = range.as_ref().map_or(u64::MAX, |range| range.end.saturating_sub(range.start));
+        Self { range, max_bytes, content: Vec::new(), end: None, can_continue: true }
     }
 
     async fn run(&mut self, request: &Request, store: &dyn ObjectStore, key: &Key) -> io::Result<()> {
         loop {
             let kept = self.content.len() as u64;
-            match request.attempt(kept, self.go_on(request, store, key)).await {
+            match request.attempt(kept, self.fetch_rest(request, store, key)).await {
                 Ok(()) => return Ok(()),
                 Err(Failure::Broken(error) | Failure::Refused(error)) if ignores_ranges(&error) => {
                     if kept == 0 {
-                        return Err(refused(key, &error));
+                        return Err(object_error(key, &error));
                     }
                     self.can_continue = false;
                 }
@@ -95,7 +95,12 @@ impl Fetch {
         }
     }
 
-    async fn go_on(&mut self, request: &Request, store: &dyn ObjectStore, key: &Key) -> Result<(), Failure> {
+    async fn fetch_rest(
+        &mut self,
+        request: &Request,
+        store: &dyn ObjectStore,
+        key: &Key,
+    ) -> Result<(), Failure> {
         let begin = self.range.as_ref().map_or(0, |range| range.start);
         let at = begin + self.content.len() as u64;
         let range = match (&self.range, self.end) {
@@ -109,36 +114,37 @@ impl Fetch {
         let options = GetOptions { range: range.map(GetRange::Bounded), ..GetOptions::default() };
         let found = store.get_opts(key, options).await?;
         self.end = Some(found.range.end);
-        receive(request, key, found, self.most_bytes, &mut self.content).await
+        receive(request, key, found, self.max_bytes, &mut self.content).await
     }
 }
 
-/// Whether a server has only whole files.
+/// Returns whether a server supports only whole objects.
 pub(super) fn ignores_ranges(error: &object_store::Error) -> bool {
-    // The stores' clients do not all have a variant for it.
-    matches!(error, object_store::Error::NotSupported { .. }) || told(error).contains("non-partial response")
+    // Not all clients have a variant for this error.
+    matches!(error, object_store::Error::NotSupported { .. })
+        || error_text(error).contains("non-partial response")
 }
 
-/// Appends what an answer brings, if that is not too much.
+/// Appends the content of an answer, up to `max_bytes`.
 async fn receive(
     request: &Request,
     key: &Key,
     found: GetResult,
-    most_bytes: u64,
+    max_bytes: u64,
     content: &mut Vec<u8>,
 ) -> Result<(), Failure> {
-    let useless = |reason| Failure::Useless(io::Error::new(io::ErrorKind::InvalidData, reason));
+    let fatal = |reason| Failure::Fatal(io::Error::new(io::ErrorKind::InvalidData, reason));
     let bytes = content.len() as u64 + found.range.end.saturating_sub(found.range.start);
-    if bytes > most_bytes {
-        return Err(useless(format!("object {key}: {bytes} bytes, and at most {most_bytes} belong there")));
+    if bytes > max_bytes {
+        return Err(fatal(format!("object {key}: {bytes} bytes, but the maximum is {max_bytes}")));
     }
-    // A server may send more than it said.
+    // A server may send more than it announced.
     let mut stream = found.into_stream();
     while let Some(chunk) = stream.try_next().await? {
         content.extend_from_slice(&chunk);
-        request.moved(chunk.len() as u64);
-        if content.len() as u64 > most_bytes {
-            return Err(useless(format!("object {key}: more than the {most_bytes} bytes that belong there")));
+        request.add_bytes(chunk.len() as u64);
+        if content.len() as u64 > max_bytes {
+            return Err(fatal(format!("object {key}: more than the maximum of {max_bytes} bytes")));
         }
     }
     Ok(())

@@ -11,7 +11,8 @@ use object_store::{ClientConfigKey, ClientOptions};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Makes clients that count what they send: the clients of `object_store` do not report how far an object is.
+/// Connector whose clients count the bytes that they send: the clients of `object_store` do not report the progress of
+/// an upload.
 #[derive(Debug, Default)]
 pub(super) struct CountingConnector;
 
@@ -27,7 +28,7 @@ impl HttpConnector for CountingConnector {
     }
 }
 
-/// The client with those options that the environment can set, but for HTTP/2.
+/// Builds a client with the options that the environment can set, except for HTTP/2.
 fn builder_of(
     options: &ClientOptions,
 ) -> Result<reqwest::ClientBuilder, Box<dyn std::error::Error + Send + Sync>> {
@@ -68,8 +69,8 @@ fn builder_of(
     if let Some(timeout) = duration(ClientConfigKey::PoolIdleTimeout)? {
         builder = builder.pool_idle_timeout(timeout);
     }
-    if let Some(most) = text(ClientConfigKey::PoolMaxIdlePerHost) {
-        builder = builder.pool_max_idle_per_host(most.parse()?);
+    if let Some(max_idle) = text(ClientConfigKey::PoolMaxIdlePerHost) {
+        builder = builder.pool_max_idle_per_host(max_idle.parse()?);
     }
     let connecting = duration(ClientConfigKey::ConnectTimeout)?.unwrap_or(Duration::from_secs(5));
     Ok(builder.connect_timeout(connecting))
@@ -84,8 +85,8 @@ impl HttpService for CountingClient {
         Box::pin(async move {
             let counted = REQUEST.try_with(Arc::clone).ok();
             if let (Some(counted), Some(server)) = (&counted, request.uri().authority()) {
-                // Without the name and password that an address may have.
-                counted.asks(server.as_str().rsplit('@').next().unwrap_or_default().to_owned());
+                // Without a user name and password.
+                counted.set_server(server.as_str().rsplit('@').next().unwrap_or_default().to_owned());
             }
             let for_body = counted.clone();
             let request = reqwest::Request::try_from(request.map(|body| body_of(body, for_body)));
@@ -93,7 +94,7 @@ impl HttpService for CountingClient {
             let response =
                 self.0.execute(request).await.map_err(|error| failed(error, counted.as_deref()))?;
             if let Some(counted) = &counted {
-                counted.answered(response.status().as_u16());
+                counted.set_status(response.status().as_u16());
             }
             let response = hyper::Response::<reqwest::Body>::from(response);
             Ok(response.map(|body| HttpResponseBody::new(body.map_err(|error| failed(error, None)))))
@@ -101,7 +102,7 @@ impl HttpService for CountingClient {
     }
 }
 
-/// The body of a request. Content is handed over in slices, each of which is noted when it is taken.
+/// Returns the body of a request. The content is sent in slices, and each slice is counted when it is sent.
 fn body_of(body: HttpRequestBody, counted: Option<Arc<Request>>) -> reqwest::Body {
     if let Some(bytes) = body.as_bytes() {
         return bytes.clone().into();
@@ -111,7 +112,7 @@ fn body_of(body: HttpRequestBody, counted: Option<Arc<Request>>) -> reqwest::Bod
         stream::iter(std::iter::from_fn(move || {
             let slice = bytes.split_to(bytes.len().min(PROGRESS_BYTES as usize));
             (!slice.is_empty()).then(|| {
-                counted.iter().for_each(|request| request.moved(slice.len() as u64));
+                counted.iter().for_each(|request| request.add_bytes(slice.len() as u64));
                 Ok::<_, HttpError>(slice)
             })
         }))
@@ -130,8 +131,8 @@ fn failed(error: reqwest::Error, counted: Option<&Request>) -> HttpError {
         HttpErrorKind::Interrupted
     };
     if let (true, Some(counted)) = (error.is_connect(), counted) {
-        counted.is_unreachable();
+        counted.set_unreachable();
     }
-    // The object is named elsewhere.
+    // The caller adds the name of the object.
     HttpError::new(kind, error.without_url())
 }

@@ -9,7 +9,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use voxtile::space::TileIndex;
 use voxtile::store::tile_of_folder;
 
-/// The files of a map in a bucket, by their paths. The pages of tiles that were asked for last stay in memory.
+/// Files of a map in a bucket, by path. The most recently used pages of tiles are cached.
 #[derive(Debug)]
 pub(super) struct FileList {
     bucket: Bucket,
@@ -18,7 +18,7 @@ pub(super) struct FileList {
     pages: Mutex<LruCache<String, Arc<Files>>>,
 }
 
-/// Pages in memory: a few hundred kilobytes each.
+/// Maximum number of cached pages, of a few hundred kilobytes each.
 const PAGES: NonZeroUsize = NonZeroUsize::new(64).unwrap();
 
 impl FileList {
@@ -27,7 +27,7 @@ impl FileList {
         Self { bucket, files, page_names: pages, pages: Mutex::new(LruCache::new(PAGES)) }
     }
 
-    /// A file; `None` if the map has none with this path.
+    /// Returns a file; `None` if the map has no file with this path.
     pub(super) fn file(&self, path: &str) -> io::Result<Option<StoredFile>> {
         match path.split_once('/').and_then(|(folder, _)| tile_of_folder(folder)) {
             Some(tile) => Ok(self.page_of(tile)?.and_then(|page| page.get(path).cloned())),
@@ -35,7 +35,8 @@ impl FileList {
         }
     }
 
-    /// The names in a folder, which is empty for the map's own; none if there is no such folder.
+    /// Returns the names in a folder; "" is the folder of the map. The result is empty for a folder that does not
+    /// exist.
     pub(super) fn names_in(&self, folder: &str) -> io::Result<BTreeSet<String>> {
         let below = |files: &Files| -> Vec<String> {
             let paths = files.keys().filter_map(|path| match folder {
@@ -57,17 +58,17 @@ impl FileList {
         Ok(names)
     }
 
-    /// The names of all pages.
+    /// Returns the names of all pages.
     pub(super) fn page_names(&self) -> impl Iterator<Item = &str> {
         self.page_names.keys().map(String::as_str)
     }
 
-    /// Whether a page is this object.
+    /// Returns whether a page is stored as this object.
     pub(super) fn has_page(&self, name: &str, object: ObjectName) -> bool {
         self.page_names.get(name) == Some(&object)
     }
 
-    /// The files that belong to no tile.
+    /// Returns the files that belong to no tile.
     pub(super) fn own_files(&self) -> &Files {
         &self.files
     }
@@ -76,7 +77,7 @@ impl FileList {
         self.page(&Manifest::page_of(tile))
     }
 
-    /// A page; `None` if the map has none of this name.
+    /// Returns a page; `None` if the map has no page with this name.
     pub(super) fn page(&self, name: &str) -> io::Result<Option<Arc<Files>>> {
         let Some(object) = self.page_names.get(name) else { return Ok(None) };
         if let Some(page) = self.pages.lock().unwrap_or_else(PoisonError::into_inner).get(name) {

@@ -6,8 +6,8 @@ use std::path::Path;
 use voxtile::store::{Disk, EntryKind};
 use voxtile::{Error, Result};
 
-/// The states of a map, by the checksums of their manifests, that were pushed from its folder or pulled into it: what
-/// the folder builds on. They are in a file there, which goes along wherever the folder is moved or copied.
+/// States of a map that were pushed from its folder or pulled into it, by the checksums of their manifests. The folder
+/// builds on these states. They are stored in a file in the folder, so that a moved or copied folder keeps them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct KnownStates(Vec<KnownState>);
 
@@ -15,23 +15,22 @@ pub(super) struct KnownStates(Vec<KnownState>);
 struct KnownState {
     flush_number: u64,
     name: ObjectName,
-    /// Whether it was in a bucket; else a push was about to put it there.
-    was_there: bool,
+    /// Whether the state was in a bucket. Otherwise, a push was about to write it.
+    was_in_bucket: bool,
 }
 
-/// The file's name in the folder of the map, and that of its successor.
+/// Name of the file in the map's folder, and of the temporary file that replaces it.
 pub(super) const BUCKET_STATES: &str = "bucket_states";
 pub(super) const BUCKET_STATES_NEXT: &str = "bucket_states.next";
 
-/// The oldest go.
+/// Maximum number of states; the oldest are dropped.
 const MAX_STATES: usize = 256;
 
-/// More than so many states have.
+/// Maximum size of the file that is read, in bytes: more than the maximum number of states needs.
 const MAX_BYTES: u64 = 1 << 16;
 
 impl KnownStates {
-    /// The states that a folder knows; `None` if no voxtile that notes them has pushed or pulled it. A line that is
-    /// none counts for nothing.
+    /// Reads the states of a folder; `None` if the file does not exist. Invalid lines are ignored.
     pub(super) fn read(disk: &dyn Disk, folder: &Path) -> Result<Option<Self>> {
         let path = folder.join(BUCKET_STATES);
         let failed = |error| Error::io(&path, "read", error);
@@ -44,24 +43,24 @@ impl KnownStates {
         Ok(Some(Self(text.lines().filter_map(KnownState::of_line).collect())))
     }
 
-    /// Whether the folder builds on a state.
-    pub(super) fn name(&self, state: ObjectName) -> bool {
+    /// Returns whether the folder builds on a state.
+    pub(super) fn contains(&self, state: ObjectName) -> bool {
         self.0.iter().any(|known| known.name == state)
     }
 
-    /// Whether the state as of a flush was in a bucket.
-    pub(super) fn were_there(&self, flush_number: u64) -> bool {
-        self.0.iter().any(|known| known.was_there && known.flush_number == flush_number)
+    /// Returns whether the state of a flush was in a bucket.
+    pub(super) fn was_in_bucket(&self, flush_number: u64) -> bool {
+        self.0.iter().any(|known| known.was_in_bucket && known.flush_number == flush_number)
     }
 
-    /// Notes a state as the newest.
-    pub(super) fn note(&mut self, manifest: &Manifest, name: ObjectName, was_there: bool) {
+    /// Adds a state as the newest.
+    pub(super) fn add(&mut self, manifest: &Manifest, name: ObjectName, was_in_bucket: bool) {
         self.0.retain(|known| known.name != name);
-        self.0.push(KnownState { flush_number: manifest.flush_number, name, was_there });
+        self.0.push(KnownState { flush_number: manifest.flush_number, name, was_in_bucket });
         self.0.drain(..self.0.len().saturating_sub(MAX_STATES));
     }
 
-    /// Writes them, durably, as a whole.
+    /// Writes the states durably and atomically.
     pub(super) fn write(&self, disk: &dyn Disk, folder: &Path) -> Result<()> {
         let [path, next] = [BUCKET_STATES, BUCKET_STATES_NEXT].map(|name| folder.join(name));
         let write = || -> io::Result<()> {
@@ -74,7 +73,7 @@ impl KnownStates {
             disk.sync_folder(folder)
         };
         write().map_err(|error| {
-            // Written anew by the next attempt, which may never come.
+            // The next attempt would overwrite it, but there may be none.
             let _ = disk.remove_file(&next);
             Error::io(&path, "write", error)
         })
@@ -82,8 +81,8 @@ impl KnownStates {
 
     fn to_text(&self) -> String {
         let mut text = String::new();
-        for KnownState { flush_number, name, was_there } in &self.0 {
-            let how = if *was_there { THERE } else { OFFERED };
+        for KnownState { flush_number, name, was_in_bucket } in &self.0 {
+            let how = if *was_in_bucket { THERE } else { OFFERED };
             let _ = writeln!(text, "{how} {flush_number} {name}");
         }
         text
@@ -96,14 +95,14 @@ const OFFERED: &str = "offered";
 impl KnownState {
     fn of_line(line: &str) -> Option<Self> {
         let mut words = line.split(' ');
-        let was_there = match words.next()? {
+        let was_in_bucket = match words.next()? {
             THERE => true,
             OFFERED => false,
             _ => return None,
         };
         let flush_number = words.next()?.parse().ok()?;
         let name = ObjectName::from_digits(words.next()?)?;
-        words.next().is_none().then_some(Self { flush_number, name, was_there })
+        words.next().is_none().then_some(Self { flush_number, name, was_in_bucket })
     }
 }
 
@@ -117,27 +116,27 @@ mod tests {
     }
 
     #[test]
-    fn what_is_noted_is_read_again_and_the_newest_stay() {
+    fn states_are_read_back_and_the_newest_are_kept() {
         let folder = tempfile::tempdir().unwrap();
         assert_eq!(KnownStates::read(&FsDisk, folder.path()).unwrap(), None);
         let mut states = KnownStates::default();
         for number in 0..300 {
             let (manifest, name) = state(number);
-            states.note(&manifest, name, number % 2 == 0);
+            states.add(&manifest, name, number % 2 == 0);
         }
         states.write(&FsDisk, folder.path()).unwrap();
         let read = KnownStates::read(&FsDisk, folder.path()).unwrap().unwrap();
         assert_eq!(read, states);
-        assert!(!read.name(state(43).1) && read.name(state(44).1) && read.name(state(299).1));
-        assert!(read.were_there(298) && !read.were_there(299));
+        assert!(!read.contains(state(43).1) && read.contains(state(44).1) && read.contains(state(299).1));
+        assert!(read.was_in_bucket(298) && !read.was_in_bucket(299));
     }
 
     #[test]
-    fn a_line_that_is_none_counts_for_nothing() {
+    fn invalid_lines_are_ignored() {
         let folder = tempfile::tempdir().unwrap();
         let (manifest, name) = state(7);
         let mut wanted = KnownStates::default();
-        wanted.note(&manifest, name, true);
+        wanted.add(&manifest, name, true);
         let good = wanted.to_text();
         let text = format!("there\nthere x {name}\nsomewhere 7 {name}\n{good}there 7 {name} 1\nthere 7 12\n");
         std::fs::write(folder.path().join(BUCKET_STATES), text.as_bytes()).unwrap();

@@ -1,26 +1,26 @@
-//! Maps that lie in a bucket of an object store: `s3://`, `gs://`, `az://`, and `https://` for reading.
+//! Maps in the buckets of object stores: `s3://`, `gs://`, `az://`, and read-only `https://`.
 //!
 //! ```text
-//! push  map folder -> files as of a flush -> parts, named by content -> pages -> manifest, put last
-//! read  manifest -> BucketDisk, a `Disk` that reads only -> MapReader and all that takes one
-//! fetch objects below a URL -> files in a temporary folder -> what reads scans
-//! pull  manifest -> MAP.unfinished, files whose content is there are kept -> MAP
+//! push  map folder -> files of a flush -> parts, named by content -> pages -> manifest, written last
+//! read  manifest -> BucketDisk, a read-only `Disk` -> MapReader
+//! fetch objects below a URL -> files in a temporary folder -> readers of scans
+//! pull  manifest -> MAP.unfinished, which keeps files that are already complete -> MAP
 //! ```
 //!
 //! | module | content |
 //! |---|---|
-//! | `bucket` | [`Bucket`]: gets and puts objects; every error names its object |
-//! | `request`, `store_health` | one request: its attempts, its progress, the bound on it, reports of a long wait |
-//! | `pending` | a request that goes on while others are made |
-//! | `content` | content of objects, continued after a break |
-//! | `remote_store`, `counting_client` | the stores of URLs, and a client that counts what it sends |
-//! | `object_name` | objects are named by the BLAKE3 of their content |
-//! | `manifest` | the one object that changes: which files the map has, by pages of tiles |
-//! | `file_list` | the list of files, with the pages that were asked for |
-//! | `bucket_disk`, `part_reader` | a map in a bucket as files that can be read |
-//! | `fetched_files`, `file_fetch` | scans and other files of any bucket, for what reads files |
-//! | `known_states` | what a folder builds on: the states that were pushed from it or pulled into it |
-//! | `push`, `sender`, `prune`, `pull` | maps to buckets and back |
+//! | `bucket` | [`Bucket`]: reads and writes objects; every error names its object |
+//! | `request`, `store_health` | one request: attempts, progress, timeout, reports of a long wait |
+//! | `pending` | a request that runs concurrently with others |
+//! | `content` | downloads of objects, continued after a broken connection |
+//! | `remote_store`, `counting_client` | stores by URL, and an HTTP client that counts the bytes it sends |
+//! | `object_name` | names of objects: the BLAKE3 of their content |
+//! | `manifest` | the only object that changes: the files of the map, and the pages of tile files |
+//! | `file_list` | the list of files, with a cache of pages |
+//! | `bucket_disk`, `part_reader` | a map in a bucket as a read-only disk |
+//! | `fetched_files`, `file_fetch` | downloads of scans and other files |
+//! | `known_states` | the states of a map that were pushed from its folder or pulled into it |
+//! | `push`, `sender`, `prune`, `pull` | transfer of maps to buckets and back |
 //!
 //! `docs/format.md` describes the objects.
 
@@ -44,7 +44,7 @@ mod request;
 mod sender;
 mod store_health;
 
-/// The crate of [`Bucket::on`], in the version that voxtile uses.
+/// The crate of the stores for [`Bucket::on`], in the version that voxtile uses.
 pub use ::object_store;
 pub use bucket::Bucket;
 pub use bucket_disk::BucketDisk;

@@ -5,23 +5,23 @@ use std::collections::BTreeMap;
 use voxtile::space::TileIndex;
 use voxtile::store::{FileVersion, tile_of_folder};
 
-/// What a map in a bucket consists of: the one object that changes, `manifest.json`.
+/// The manifest of a map in a bucket, `manifest.json`: the only object that changes. It lists all files of the map.
 #[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
 pub(super) struct Manifest {
     pub(super) format: String,
     pub(super) version: u32,
-    /// The map's id; none for a map of the original format.
+    /// Id of the map; `None` for a map of the original format.
     pub(super) map_id: Option<String>,
     pub(super) flush_number: u64,
     pub(super) scan_number: u64,
     pub(super) tiles: u64,
-    /// Bytes of all files.
+    /// Total size of all files, in bytes.
     pub(super) bytes: u64,
-    /// The files that belong to no tile, by their paths.
+    /// Files that belong to no tile, by path.
     pub(super) files: Files,
-    /// The objects that list the files of tiles, by the names of pages.
+    /// Objects that list the files of tiles, by the name of the page.
     pub(super) pages: BTreeMap<String, ObjectName>,
-    /// BLAKE3 of all the others, as JSON without blanks; set where it is written.
+    /// BLAKE3 of the other fields, as JSON without whitespace. Set when the manifest is written.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) checksum: Option<ObjectName>,
 }
@@ -29,11 +29,11 @@ pub(super) struct Manifest {
 /// Files by their paths in the folder of the map.
 pub(super) type Files = BTreeMap<String, StoredFile>;
 
-/// A file of a map: parts of [`PART_BYTES`], the last one shorter.
+/// A file of a map. Its parts have [`PART_BYTES`] each; the last part is shorter.
 #[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
 pub(super) struct StoredFile {
     pub(super) bytes: u64,
-    /// What the log says of a tile's file.
+    /// CRC-32 of a tile's file in the map's log.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) crc32: Option<u32>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -41,10 +41,10 @@ pub(super) struct StoredFile {
     pub(super) parts: Vec<ObjectName>,
 }
 
-/// The name of the manifest below the map's prefix.
+/// Name of the manifest below the map's prefix.
 pub(super) const MANIFEST: &str = "manifest.json";
 
-/// Bytes of a part. A file that grows at its end has all its parts but the last as before.
+/// Size of a part, in bytes. When a file grows at its end, all parts but the last are unchanged.
 pub(super) const PART_BYTES: u64 = 16 << 20;
 
 /// Tiles along an edge of a page. A drive changes few pages.
@@ -54,7 +54,7 @@ const FORMAT: &str = "voxtile bucket";
 const VERSION: u32 = 1;
 
 impl Manifest {
-    /// Of a map as of a flush, without files yet.
+    /// Creates the manifest of a map at a flush, without files.
     pub(super) fn new(map_id: Option<String>, flush_number: u64, scan_number: u64) -> Self {
         Self {
             format: FORMAT.to_owned(),
@@ -70,17 +70,17 @@ impl Manifest {
         }
     }
 
-    /// The object's content.
+    /// Encodes the manifest with its checksum.
     pub(super) fn to_bytes(&self) -> serde_json::Result<Vec<u8>> {
         serde_json::to_vec_pretty(&Self { checksum: Some(self.computed_checksum()?), ..self.clone() })
     }
 
-    /// What tells this state of the map from all others.
+    /// Returns the checksum, which identifies this state of the map.
     pub(super) fn computed_checksum(&self) -> serde_json::Result<ObjectName> {
         Ok(ObjectName::of(&serde_json::to_vec(&Self { checksum: None, ..self.clone() })?))
     }
 
-    /// Reads a manifest; an error says what is wrong with it.
+    /// Decodes a manifest. The error describes the problem.
     pub(super) fn from_bytes(bytes: &[u8]) -> Result<Self, String> {
         let mut manifest: Self = serde_json::from_slice(bytes).map_err(|error| error.to_string())?;
         if manifest.format != FORMAT {
@@ -98,7 +98,7 @@ impl Manifest {
         Ok(manifest)
     }
 
-    /// Whether a later version of voxtile wrote what this one cannot read.
+    /// Returns whether these bytes are a manifest of a later version of voxtile.
     pub(super) fn is_of_later_version(bytes: &[u8]) -> bool {
         let found: serde_json::Result<serde_json::Value> = serde_json::from_slice(bytes);
         found.is_ok_and(|found| {
@@ -107,28 +107,28 @@ impl Manifest {
         })
     }
 
-    /// The page that lists the files of a tile.
+    /// Returns the name of the page that lists the files of a tile.
     pub(super) fn page_of(tile: TileIndex) -> String {
         let [x, y, z] = [tile.x, tile.y, tile.z].map(|number| number.div_euclid(PAGE_TILES));
         format!("{x}_{y}_{z}")
     }
 }
 
-/// Reads a page, which lists files of tiles.
+/// Decodes a page, which lists files of tiles.
 pub(super) fn page_from_bytes(name: &str, bytes: &[u8]) -> Result<Files, String> {
     let files: Files = serde_json::from_slice(bytes).map_err(|error| error.to_string())?;
     check_files(&files)?;
     for path in files.keys() {
         let tile = path.split_once('/').and_then(|(folder, _)| tile_of_folder(folder));
         if tile.is_none_or(|tile| Manifest::page_of(tile) != name) {
-            return Err(format!("it lists {path:?}, which is no file of a tile of the page {name}"));
+            return Err(format!("it lists {path:?}, which is not a tile file of page {name}"));
         }
     }
     Ok(files)
 }
 
 impl StoredFile {
-    /// Whether it is this version of a tile's file.
+    /// Returns whether this is the given version of a tile's file.
     pub(super) fn is_version(&self, version: FileVersion) -> bool {
         self.bytes == version.checksum.bytes
             && self.crc32 == Some(version.checksum.crc)
@@ -136,11 +136,11 @@ impl StoredFile {
     }
 }
 
-/// Whoever can write to the bucket chooses these paths: each must stay inside of the map's folder.
+/// Checks the paths, which are untrusted input: each must be inside the map's folder.
 fn check_files(files: &Files) -> Result<(), String> {
     for (path, file) in files {
         if !is_path_in_map(path) {
-            return Err(format!("it lists {path:?}, which is no file of a map"));
+            return Err(format!("it lists {path:?}, which is not a file of a map"));
         }
         if file.parts.len() as u64 != file.bytes.div_ceil(PART_BYTES) {
             let (parts, bytes) = (file.parts.len(), file.bytes);
@@ -150,7 +150,7 @@ fn check_files(files: &Files) -> Result<(), String> {
     Ok(())
 }
 
-/// One or two plain names.
+/// Returns whether a path has one or two plain names.
 fn is_path_in_map(path: &str) -> bool {
     let is_name = |name: &str| {
         let is_letter = |letter: u8| letter.is_ascii_alphanumeric() || b"._-".contains(&letter);
@@ -183,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_manifest_is_told() {
+    fn invalid_manifests_are_refused() {
         let good = Manifest::new(None, 3, 7);
         let text = String::from_utf8(good.to_bytes().unwrap()).unwrap();
         assert_eq!(Manifest::from_bytes(text.as_bytes()), Ok(good));

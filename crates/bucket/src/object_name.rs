@@ -1,26 +1,26 @@
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::fmt;
 
-/// The name of an object: the BLAKE3 of its content, 64 hexadecimal digits.
+/// Name of an object: the BLAKE3 of its content, as 64 hexadecimal digits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) struct ObjectName(blake3::Hash);
 
-/// The folder of all objects but the manifest.
+/// Folder of all objects except the manifest.
 pub(super) const OBJECTS: &str = "objects";
 
 impl ObjectName {
-    /// The name of an object with this content.
+    /// Returns the name of an object with this content.
     pub(super) fn of(content: &[u8]) -> Self {
         Self(blake3::hash(content))
     }
 
-    /// The name that such digits spell; `None` for any other text.
+    /// Parses the digits of a name; `None` for any other text.
     pub(super) fn from_digits(digits: &str) -> Option<Self> {
         let name = Self(blake3::Hash::from_hex(digits).ok()?);
         (name.to_string() == digits).then_some(name)
     }
 
-    /// Where it is below the map's prefix.
+    /// Returns the key of the object below the map's prefix.
     pub(super) fn key(self) -> String {
         format!("{OBJECTS}/{self}")
     }

@@ -5,19 +5,19 @@ use bytes::{Buf, Bytes};
 use std::io::{self, Read};
 use voxtile::store::DiskRead;
 
-/// A file in a bucket, read part by part. The part after the one that is read is on its way already.
+/// Reader of a file in a bucket, part by part. While a part is read, the next part is fetched.
 pub(super) struct PartReader {
     bucket: Bucket,
     file: StoredFile,
-    /// Number of the part to be asked for next.
+    /// Number of the next part to request.
     next: usize,
-    coming: Option<Pending<Bytes>>,
-    /// What is left of the part that is read.
+    pending: Option<Pending<Bytes>>,
+    /// Rest of the current part.
     part: Bytes,
 }
 
 impl PartReader {
-    /// Begins at an offset; `first` is the answer for the part there, if it was asked for before.
+    /// Starts at an offset. `first` is the pending request for the first part, if it was already sent.
     pub(super) fn new(
         bucket: Bucket,
         file: StoredFile,
@@ -25,10 +25,10 @@ impl PartReader {
         first: Option<Pending<Bytes>>,
     ) -> io::Result<Self> {
         let next = usize::try_from(offset / PART_BYTES).unwrap_or(usize::MAX);
-        let mut reader = Self { bucket, file, next, coming: None, part: Bytes::new() };
+        let mut reader = Self { bucket, file, next, pending: None, part: Bytes::new() };
         match first {
-            Some(first) => (reader.coming, reader.next) = (Some(first), next.saturating_add(1)),
-            None => reader.ask(),
+            Some(first) => (reader.pending, reader.next) = (Some(first), next.saturating_add(1)),
+            None => reader.request_next(),
         }
         let mut before = offset % PART_BYTES;
         while before > 0 && reader.take_part()? {
@@ -39,25 +39,24 @@ impl PartReader {
         Ok(reader)
     }
 
-    /// Asks for the next part, if there is one.
-    fn ask(&mut self) {
+    /// Requests the next part, if there is one.
+    fn request_next(&mut self) {
         let name = self.file.parts.get(self.next).copied();
-        self.coming = name.map(|name| self.bucket.fetch(name, PART_BYTES));
+        self.pending = name.map(|name| self.bucket.fetch(name, PART_BYTES));
         self.next = self.next.saturating_add(1);
     }
 
-    /// Takes the part that was asked for; `false` at the end of the file.
+    /// Waits for the requested part. Returns `false` at the end of the file.
     fn take_part(&mut self) -> io::Result<bool> {
-        let (number, Some(coming)) = (self.next - 1, self.coming.take()) else { return Ok(false) };
-        self.part = coming.wait().map_err(missing_object)?;
+        let (number, Some(pending)) = (self.next - 1, self.pending.take()) else { return Ok(false) };
+        self.part = pending.wait().map_err(missing_object)?;
         let wanted = (self.file.bytes - number as u64 * PART_BYTES).min(PART_BYTES);
         if self.part.len() as u64 != wanted {
             let (found, name) = (self.part.len(), self.file.parts.get(number).map(|name| name.key()));
-            let reason =
-                format!("object {}: {found} bytes, and {wanted} belong there", name.unwrap_or_default());
+            let reason = format!("object {}: {found} bytes instead of {wanted}", name.unwrap_or_default());
             return Err(io::Error::new(io::ErrorKind::InvalidData, reason));
         }
-        self.ask();
+        self.request_next();
         Ok(true)
     }
 }

@@ -9,22 +9,22 @@ use tokio::runtime::Runtime;
 use tokio::task::AbortHandle;
 use voxtile::Error;
 
-/// What a request will answer, while others are made.
+/// A request that runs concurrently with others, and its future answer.
 pub(super) struct Pending<T> {
     answer: Receiver<io::Result<T>>,
     request: Arc<Request>,
     stop: Arc<AtomicBool>,
-    /// Ends the request.
+    /// Aborts the request.
     task: Option<AbortHandle>,
 }
 
-/// How often a wait looks whether it is to stop.
-const LOOK_EVERY: Duration = Duration::from_millis(100);
+/// Interval at which a wait checks whether to stop.
+const STOP_CHECK_INTERVAL: Duration = Duration::from_millis(100);
 
 impl<T: Send + 'static> Pending<T> {
-    /// Begins a request on threads of its own, so that the caller may be on any thread, even one of another runtime.
+    /// Starts a request on separate threads, so that the caller may be on any thread, even one of another runtime.
     pub(super) fn begin<F: Future<Output = io::Result<T>> + Send + 'static>(
-        about: Arc<Request>,
+        state: Arc<Request>,
         stop: Arc<AtomicBool>,
         request: impl FnOnce(Arc<Request>) -> F,
     ) -> Self {
@@ -36,34 +36,34 @@ impl<T: Send + 'static> Pending<T> {
         let (out, answer) = sync_channel(1);
         let task = match RUNTIME.get_or_init(new) {
             Ok(runtime) => {
-                let request = REQUEST.scope(about.clone(), request(about.clone()));
+                let request = REQUEST.scope(state.clone(), request(state.clone()));
                 Some(runtime.spawn(async move { out.send(request.await) }).abort_handle())
             }
             Err(error) => {
-                let reason = format!("no threads for the network: {error}");
+                let reason = format!("cannot start the network threads: {error}");
                 let _ = out.send(Err(io::Error::other(reason)));
                 None
             }
         };
-        Self { answer, request: about, stop, task }
+        Self { answer, request: state, stop, task }
     }
 }
 
 impl<T> Pending<T> {
-    /// Waits for the answer, and reports a long wait.
+    /// Waits for the answer. Logs a long wait.
     ///
     /// # Errors
     ///
-    /// Those of the request; [`Error::Stopped`] inside if the bucket's flag is set.
+    /// Errors of the request; [`Error::Stopped`] as the cause if the bucket's stop flag is set.
     pub(super) fn wait(self) -> io::Result<T> {
         self.wait_unless(&|| false).unwrap_or_else(|| Err(io::Error::other(Error::Stopped)))
     }
 
-    /// Waits for the answer; `None` if that is to stop before it comes. Nothing of the request goes on then.
+    /// Waits for the answer. Returns `None` if stopped before the answer arrives; the request is aborted then.
     pub(super) fn wait_unless(self, is_stopped: &dyn Fn() -> bool) -> Option<io::Result<T>> {
         let (since, mut report_at) = (Instant::now(), self.request.first_report());
         while !is_stopped() && !self.stop.load(Ordering::Relaxed) {
-            match self.answer.recv_timeout(LOOK_EVERY) {
+            match self.answer.recv_timeout(STOP_CHECK_INTERVAL) {
                 Ok(answer) => return Some(answer),
                 Err(RecvTimeoutError::Timeout) if since.elapsed() < report_at => {}
                 Err(RecvTimeoutError::Timeout) => {
@@ -71,20 +71,20 @@ impl<T> Pending<T> {
                     report_at *= 2;
                 }
                 Err(RecvTimeoutError::Disconnected) => {
-                    return Some(Err(io::Error::other("the request was given up")));
+                    return Some(Err(io::Error::other("the request was aborted")));
                 }
             }
         }
-        self.give_up();
+        self.abort();
         None
     }
 
-    /// Ends the request, and waits until nothing of it goes on.
-    pub(super) fn give_up(self) {
+    /// Aborts the request, and waits until it has ended.
+    pub(super) fn abort(self) {
         if let Some(task) = &self.task {
             task.abort();
         }
-        // An answer after all, or the end of who would have sent one.
+        // Receives a late answer, or an error once the task has ended.
         let _ = self.answer.recv();
     }
 }

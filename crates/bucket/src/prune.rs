@@ -7,18 +7,18 @@ use std::collections::VecDeque;
 use std::io;
 use voxtile::{Error, Result};
 
-/// Objects that are removed at a time.
+/// Maximum number of concurrent removals.
 const MAX_IN_FLIGHT: usize = 16;
 
-/// Removes the objects that a manifest does not name, which the caller has put; returns how many.
+/// Removes the objects that a manifest does not name, and returns their number. The caller has written the manifest.
 ///
-/// Objects that are newer than the manifest stay: another push may be about to name them. If it names older ones that
-/// go now, it has read an older manifest and loses to this one.
+/// Objects newer than the manifest are kept, because another push may be about to name them. If that push also names
+/// older objects that are removed here, it has read an older manifest, so its own manifest is refused.
 pub(super) fn prune(bucket: &Bucket, manifest: Manifest) -> Result<u64> {
     let failed = |error: io::Error| Error::io(bucket.path(), "prune", error);
     let named = named_by(bucket, &manifest).map_err(failed)?;
     let found = bucket.objects_before_manifest().map_err(failed)?;
-    // Only what this push has put is known: is it still there?
+    // Prune only if the manifest in the bucket is still that of this push.
     let now = bucket.manifest()?.map(|found| found.manifest);
     if now.as_ref() != Some(&manifest) {
         return Err(Error::Changed { path: bucket.path().to_owned() });
@@ -37,7 +37,7 @@ pub(super) fn prune(bucket: &Bucket, manifest: Manifest) -> Result<u64> {
     Ok(removed)
 }
 
-/// All objects that a manifest names.
+/// Returns all objects that a manifest names.
 fn named_by(bucket: &Bucket, manifest: &Manifest) -> io::Result<FxHashSet<ObjectName>> {
     let mut named: FxHashSet<_> = manifest.pages.values().copied().collect();
     let list = FileList::new(bucket.clone(), manifest.clone());

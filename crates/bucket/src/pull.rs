@@ -16,37 +16,38 @@ use voxtile::store::{
 };
 use voxtile::{Error, Result};
 
-/// What a pull did.
+/// Counts of a pull.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Pulled {
     /// Number of the flush that was pulled.
     pub flush_number: u64,
-    /// Tiles of the map.
+    /// Number of tiles in the map.
     pub tiles: u64,
-    /// Files of the map.
+    /// Number of files in the map.
     pub files: u64,
-    /// Files that were fetched; the others were there.
+    /// Number of fetched files; the others existed already.
     pub files_fetched: u64,
-    /// Their bytes.
+    /// Bytes of the fetched files.
     pub bytes_fetched: u64,
     /// Bytes of all files.
     pub bytes: u64,
 }
 
-/// Files of which the first part is on its way, beside the one that is written.
+/// Maximum number of files whose first part is requested before they are written.
 const MAX_IN_FLIGHT: usize = 8;
 
-/// Makes a map in a folder of the one in a bucket. It grows in `MAP.unfinished` and gets its name at the end; what an
-/// interrupted pull has fetched is not fetched again. `progress` hears of bytes done and of all bytes.
+/// Downloads a map from a bucket into a folder. The map is assembled in `MAP.unfinished` and renamed at the end. A
+/// later pull reuses the files of an interrupted one. `progress` receives the bytes done and the bytes of all files.
 ///
-/// With `replaces` there may be an earlier state of the map in the folder: files that are as they were are taken from
-/// there, and in the end the two change places at once. It must not have been changed since it was pushed or pulled.
+/// With `replaces`, the folder may contain an earlier state of the map. Unchanged files are taken from it, and the two
+/// folders are exchanged at the end, atomically if the file system supports it. The earlier state must not have changed
+/// since it was pushed or pulled.
 ///
 /// # Errors
 ///
-/// [`Error::NoMap`] if there is none in the bucket; [`Error::Mismatch`] if the folder has another map, or a state of this
-/// one that was in no bucket; [`Error::AlreadyExists`] if there is something in the folder, and no earlier state of this
-/// map is to be replaced; an object that is missing or damaged, named; a disk that refuses.
+/// [`Error::NoMap`] if the bucket has no map; [`Error::Mismatch`] if the folder has another map, or a state of this map
+/// that was in no bucket; [`Error::AlreadyExists`] if the folder has other content, or if a state of this map is not to
+/// be replaced; an object that is missing or damaged, which the error names; an error of the disk.
 pub fn pull(
     bucket: &Bucket,
     folder: impl AsRef<Path>,
@@ -58,9 +59,9 @@ pub fn pull(
     let manifest = found.manifest;
     let (disk, unfinished) = (FsDisk, staging_folder(folder)?);
     let earlier = Earlier::find(&disk, bucket, folder, &manifest, replaces)?;
-    begin(&disk, &unfinished)?;
+    begin_folder(&disk, &unfinished)?;
     let lock = WriterLock::take(&disk, &Layout::new(&unfinished))?;
-    check_is_of_map(&disk, &unfinished)?;
+    check_only_map_files(&disk, &unfinished)?;
     let pulled = Pulled { flush_number: manifest.flush_number, tiles: manifest.tiles, ..Pulled::default() };
     let all_bytes = manifest.bytes;
     let known = known_with(bucket, &manifest, earlier.as_ref())?;
@@ -75,15 +76,15 @@ pub fn pull(
         progress,
         all_bytes,
     };
-    pull.take_all(&list)?;
+    pull.fetch_all(&list)?;
     let Pull { pulled, earlier, .. } = pull;
     known.write(&disk, &unfinished)?;
-    take_place(&disk, &unfinished, folder, earlier.is_some())?;
+    swap_in(&disk, &unfinished, folder, earlier.is_some())?;
     drop(lock);
     Ok(pulled)
 }
 
-/// The state of the map that is replaced.
+/// The earlier state of the map, which is replaced.
 struct Earlier {
     store: TileStore,
     known: KnownStates,
@@ -91,7 +92,7 @@ struct Earlier {
 }
 
 impl Earlier {
-    /// The map in a folder; `None` if there is nothing.
+    /// Finds the map in a folder; `None` if the folder is empty or does not exist.
     fn find(
         disk: &FsDisk,
         bucket: &Bucket,
@@ -109,7 +110,7 @@ impl Earlier {
         }
         let path = folder.to_owned();
         if !replaces {
-            let hint = "choose a folder that does not exist yet; or replace an earlier state of the map with `replace`";
+            let hint = "choose a folder that does not exist yet, or replace an earlier state of the map with --replace";
             return Err(Error::AlreadyExists { path, hint });
         }
         let lock = WriterLock::take(disk, &Layout::new(folder))?;
@@ -123,18 +124,21 @@ impl Earlier {
         }
         if store.commits().flush_number > manifest.flush_number {
             let found = store.commits().flush_number.to_string();
-            let wanted = format!("at most {} as the bucket; push it", manifest.flush_number);
+            let wanted = format!(
+                "at most {} (the last flush in the bucket); push this folder first",
+                manifest.flush_number
+            );
             return Err(Error::Mismatch { path, what: "flush", found, wanted });
         }
         let known = KnownStates::read(&**store.disk(), folder)?;
-        check_was_there(bucket, &store, known.as_ref(), manifest)?;
-        // Now, and not after everything was fetched.
-        check_is_of_map(&FsDisk, folder)?;
+        check_was_in_bucket(bucket, &store, known.as_ref(), manifest)?;
+        // Check this before the download.
+        check_only_map_files(&FsDisk, folder)?;
         Ok(Some(Self { store, known: known.unwrap_or_default(), _lock: lock }))
     }
 
-    /// Where a file is that is as it was, by what the log says.
-    fn place_of(&self, path: &str, file: &StoredFile) -> Option<PathBuf> {
+    /// Returns the path of a file that is unchanged according to the log.
+    fn unchanged_file(&self, path: &str, file: &StoredFile) -> Option<PathBuf> {
         let place = self.store.folder().join(path);
         let (folder, name) = path.split_once('/')?;
         let version = self.store.tiles().version(tile_of_folder(folder)?)?;
@@ -151,9 +155,9 @@ impl Earlier {
     }
 }
 
-/// What a folder has and no bucket ever had is not replaced: it may be the only copy. Where nobody has noted what was
-/// in a bucket, as earlier versions did not, the flush alone tells.
-fn check_was_there(
+/// Checks that the folder's state was in a bucket: otherwise it may be the only copy. Without a file of known states,
+/// as in earlier versions, the state is accepted.
+fn check_was_in_bucket(
     bucket: &Bucket,
     store: &TileStore,
     known: Option<&KnownStates>,
@@ -161,22 +165,22 @@ fn check_was_there(
 ) -> Result<()> {
     let flush_number = store.commits().flush_number;
     let Some(known) = known else { return Ok(()) };
-    if known.were_there(flush_number) || known.name(name_of(bucket, manifest)?) {
+    if known.was_in_bucket(flush_number) || known.contains(name_of(bucket, manifest)?) {
         return Ok(());
     }
     let path = store.folder().to_owned();
     let wanted = format!(
-        "one that was in a bucket, and the bucket's {} lacks what was mapped since; push it, or where that is refused, \
-         pull into a new folder and `voxtile merge` the two",
+        "one that was in a bucket: the bucket's flush {} lacks later changes of this folder. Push the folder; if \
+         the push is refused, pull into a new folder and `voxtile merge` both",
         manifest.flush_number
     );
     Err(Error::Mismatch { path, what: "flush", found: flush_number.to_string(), wanted })
 }
 
-/// What the folder builds on with this state in it.
+/// Returns the known states of the folder, including the state that is pulled.
 fn known_with(bucket: &Bucket, manifest: &Manifest, earlier: Option<&Earlier>) -> Result<KnownStates> {
     let mut known = earlier.map(|earlier| earlier.known.clone()).unwrap_or_default();
-    known.note(manifest, name_of(bucket, manifest)?, true);
+    known.add(manifest, name_of(bucket, manifest)?, true);
     Ok(known)
 }
 
@@ -184,13 +188,13 @@ fn name_of(bucket: &Bucket, manifest: &Manifest) -> Result<ObjectName> {
     manifest.computed_checksum().map_err(|error| Error::io(bucket.path(), "read", error.into()))
 }
 
-/// A pull that goes on.
+/// A pull in progress.
 struct Pull<'a, P> {
     bucket: &'a Bucket,
     disk: FsDisk,
     folder: &'a Path,
     earlier: Option<Earlier>,
-    /// Files that are to be written, in order.
+    /// Files to write, in order.
     in_flight: VecDeque<(PathBuf, StoredFile, Option<Pending<Bytes>>)>,
     pulled: Pulled,
     progress: P,
@@ -198,16 +202,16 @@ struct Pull<'a, P> {
 }
 
 impl<P: FnMut(u64, u64)> Pull<'_, P> {
-    /// Takes all files, page by page, and those last that tell what there is.
-    fn take_all(&mut self, list: &FileList) -> Result<()> {
+    /// Fetches all files, page by page. The files that list the others are last.
+    fn fetch_all(&mut self, list: &FileList) -> Result<()> {
         let failed = |error| Error::io(self.bucket.path(), "read", error);
         let mut folders = BTreeSet::new();
         for name in list.page_names() {
             let page = list.page(name).map_err(failed)?;
             let files = page.iter().flat_map(|page| page.iter());
-            folders.extend(self.take_files(files)?);
+            folders.extend(self.fetch_files(files)?);
         }
-        folders.extend(self.take_files(list.own_files().iter())?);
+        folders.extend(self.fetch_files(list.own_files().iter())?);
         for folder in SUBFOLDERS.map(str::to_owned).into_iter().chain(list_folders(&self.disk, self.folder)?)
         {
             let path = self.folder.join(&folder);
@@ -218,8 +222,8 @@ impl<P: FnMut(u64, u64)> Pull<'_, P> {
         self.disk.sync_folder(self.folder).map_err(|error| Error::io(self.folder, "sync", error))
     }
 
-    /// Takes files, durably; returns the folders that they are in.
-    fn take_files<'b>(
+    /// Fetches files durably. Returns their folders.
+    fn fetch_files<'b>(
         &mut self,
         files: impl Iterator<Item = (&'b String, &'b StoredFile)>,
     ) -> Result<BTreeSet<String>> {
@@ -234,14 +238,14 @@ impl<P: FnMut(u64, u64)> Pull<'_, P> {
             self.begin_file(path, &place, file)?;
             paths.insert(place);
             while self.in_flight.len() > MAX_IN_FLIGHT {
-                self.end_file()?;
+                self.finish_file()?;
             }
         }
         while !self.in_flight.is_empty() {
-            self.end_file()?;
+            self.finish_file()?;
         }
         for folder in &folders {
-            // Of a pull of another push.
+            // Remove files from an interrupted pull of another push.
             let folder = self.folder.join(folder);
             for name in list(&self.disk, &folder)? {
                 let path = folder.join(name);
@@ -260,18 +264,18 @@ impl<P: FnMut(u64, u64)> Pull<'_, P> {
         Ok(folders)
     }
 
-    /// Takes a file that is there already, or asks for its first part.
+    /// Reuses an existing file, or requests its first part.
     fn begin_file(&mut self, path: &str, place: &Path, file: &StoredFile) -> Result<()> {
         self.pulled.files += 1;
         self.pulled.bytes += file.bytes;
         (self.progress)(self.pulled.bytes, self.all_bytes);
-        if self.is_there(place, file)? {
+        if self.has_content(place, file)? {
             return Ok(());
         }
-        if let Some(earlier) = self.earlier.as_ref().and_then(|earlier| earlier.place_of(path, file)) {
+        if let Some(earlier) = self.earlier.as_ref().and_then(|earlier| earlier.unchanged_file(path, file)) {
             let _ = self.disk.remove_file(place);
-            // What the log says of a file does not tell whether it was damaged since.
-            let is_whole = self.is_there(&earlier, file).unwrap_or(false);
+            // The log does not show whether the file was damaged later.
+            let is_whole = self.has_content(&earlier, file).unwrap_or(false);
             if is_whole
                 && self.disk.link(&earlier, place).is_ok()
                 && self.kind(place)? == Some(EntryKind::File(file.bytes))
@@ -284,8 +288,8 @@ impl<P: FnMut(u64, u64)> Pull<'_, P> {
         Ok(())
     }
 
-    /// Writes the file that was asked for first.
-    fn end_file(&mut self) -> Result<()> {
+    /// Writes the file that was requested first.
+    fn finish_file(&mut self) -> Result<()> {
         let Some((place, file, first)) = self.in_flight.pop_front() else { return Ok(()) };
         self.pulled.files_fetched += 1;
         self.pulled.bytes_fetched += file.bytes;
@@ -295,8 +299,8 @@ impl<P: FnMut(u64, u64)> Pull<'_, P> {
         io::copy(&mut input, &mut out).and_then(|_| out.flush()).map_err(failed)
     }
 
-    /// Whether a file is there with the right content, as an interrupted pull has fetched it.
-    fn is_there(&self, place: &Path, file: &StoredFile) -> Result<bool> {
+    /// Returns whether a file exists with the right content, as fetched by an interrupted pull.
+    fn has_content(&self, place: &Path, file: &StoredFile) -> Result<bool> {
         if self.kind(place)? != Some(EntryKind::File(file.bytes)) {
             return Ok(false);
         }
@@ -324,19 +328,19 @@ impl<P: FnMut(u64, u64)> Pull<'_, P> {
     }
 }
 
-/// Folders of a map beside those of tiles.
+/// Folders of a map, except for those of tiles.
 const SUBFOLDERS: [&str; 2] = [KEPT_SCANS, SNAPSHOTS];
 
-/// Makes the folder in which the map grows.
-fn begin(disk: &FsDisk, unfinished: &Path) -> Result<()> {
+/// Creates the folder in which the map is assembled.
+fn begin_folder(disk: &FsDisk, unfinished: &Path) -> Result<()> {
     match disk.kind(unfinished).map_err(|error| Error::io(unfinished, "look at", error))? {
-        Some(EntryKind::Folder) => check_is_of_map(disk, unfinished),
+        Some(EntryKind::Folder) => check_only_map_files(disk, unfinished),
         _ => disk.create_folder(unfinished).map_err(|error| Error::io(unfinished, "create", error)),
     }
 }
 
-/// Nothing is taken into a map, or removed, that is not of one.
-fn check_is_of_map(disk: &FsDisk, folder: &Path) -> Result<()> {
+/// Checks that a folder has only files and folders of a map: no other files are replaced or removed.
+fn check_only_map_files(disk: &FsDisk, folder: &Path) -> Result<()> {
     for name in list(disk, folder)? {
         let path = folder.join(&name);
         let kind = disk.kind(&path).map_err(|error| Error::io(&path, "look at", error))?;
@@ -347,7 +351,7 @@ fn check_is_of_map(disk: &FsDisk, folder: &Path) -> Result<()> {
             _ => false,
         };
         if !is_of_map {
-            let hint = "it is in the way of a map that is to be made or replaced; move it away";
+            let hint = "it is not part of a map; move it away";
             return Err(Error::AlreadyExists { path, hint });
         }
     }
@@ -365,8 +369,8 @@ const OWN_FILES: [&str; 8] = [
     BUCKET_STATES_NEXT,
 ];
 
-/// Gives the map that was pulled its name, durably.
-fn take_place(disk: &FsDisk, unfinished: &Path, folder: &Path, replaces: bool) -> Result<()> {
+/// Gives the pulled map its name, durably.
+fn swap_in(disk: &FsDisk, unfinished: &Path, folder: &Path, replaces: bool) -> Result<()> {
     let parent = match folder.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
@@ -381,7 +385,7 @@ fn take_place(disk: &FsDisk, unfinished: &Path, folder: &Path, replaces: bool) -
         rename(unfinished, folder)?;
         return sync();
     }
-    check_is_of_map(disk, folder)?;
+    check_only_map_files(disk, folder)?;
     let replaced = match disk.exchange(unfinished, folder) {
         Ok(()) => unfinished.to_owned(),
         Err(error)
@@ -405,14 +409,14 @@ fn list(disk: &FsDisk, folder: &Path) -> Result<Vec<String>> {
     disk.list(folder).map_err(|error| Error::io(folder, "list", error))
 }
 
-/// The names of the folders in a map.
+/// Returns the names of the folders in a map.
 fn list_folders(disk: &FsDisk, folder: &Path) -> Result<Vec<String>> {
     let mut names = list(disk, folder)?;
     names.retain(|name| SUBFOLDERS.contains(&&**name) || tile_of_folder(name).is_some());
     Ok(names)
 }
 
-/// Removes a folder with the files in it.
+/// Removes a folder and its files.
 fn remove_folder(disk: &FsDisk, folder: &Path) -> Result<()> {
     for name in list(disk, folder)? {
         let path = folder.join(name);

@@ -17,51 +17,51 @@ use voxtile::store::{
 };
 use voxtile::{Error, FormatError, Result};
 
-/// How to [`push`].
+/// Options of [`push`].
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PushOptions {
-    /// Remove the objects that no manifest names any more. Whoever reads an earlier state of the map has to open it
-    /// anew.
+    /// Remove the objects that the new manifest does not name. Readers of an earlier state of the map must open it
+    /// again.
     pub prunes: bool,
-    /// Replace whatever earlier state of the same map is there, also one that the folder does not build on: what that
-    /// has and the folder lacks is lost.
+    /// Replace any earlier state of the same map in the bucket, even a state that the folder does not build on. Changes
+    /// that only that state has are lost.
     pub replaces: bool,
-    /// Send everything, also what is there by its name or by the last manifest: objects there that were lost or damaged
-    /// are whole then, and a manifest that cannot be read is replaced, whatever map it was of.
+    /// Upload everything, including objects that already exist. This repairs lost or damaged objects. A damaged
+    /// manifest is replaced, even that of another map.
     pub resends: bool,
 }
 
-/// What a push did.
+/// Counts of a push.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Pushed {
     /// Number of the flush that was pushed.
     pub flush_number: u64,
-    /// Tiles of the map.
+    /// Number of tiles in the map.
     pub tiles: u64,
-    /// Tiles of which something was sent.
+    /// Number of tiles with uploaded objects.
     pub tiles_sent: u64,
-    /// Objects that were sent, the manifest left out.
+    /// Number of uploaded objects, without the manifest.
     pub objects_sent: u64,
-    /// Their bytes.
+    /// Bytes of the uploaded objects.
     pub bytes_sent: u64,
-    /// Bytes of all files of the map.
+    /// Bytes of all files in the map.
     pub bytes: u64,
-    /// Objects that were removed.
+    /// Number of removed objects.
     pub objects_pruned: u64,
 }
 
-/// How often a push begins again because a writer flushed the map meanwhile. What was sent stays sent.
+/// Maximum number of attempts if a writer flushes the map during the push. Uploaded objects are kept.
 const ATTEMPTS: usize = 20;
 
-/// Copies the last flush of a map into a bucket, beside a writer too. Only tiles that changed since the last push are
-/// sent, several at a time, and the manifest last: readers of the bucket see one push whole, or the one before.
-/// `progress` hears of tiles done and of all tiles.
+/// Uploads the last flush of a map to a bucket, even while a writer is active. Only tiles that changed since the last
+/// push are uploaded, several at a time. The manifest is written last, so that readers of the bucket see complete
+/// pushes. `progress` receives the tiles done and the number of all tiles.
 ///
 /// # Errors
 ///
-/// [`Error::Mismatch`] if another map is there, a later state of this one, or a state that it does not build on: a copy
-/// of the map went another way and was pushed. A map that cannot be read or is damaged; a store that refuses; another
-/// push that came first, whose state then stays.
+/// [`Error::Mismatch`] if the bucket has another map, a later state of this map, or a state that the folder does not
+/// build on: another copy of the map was changed and pushed. A map that cannot be read or is damaged; a store that
+/// refuses the request; another push that came first, whose state is kept.
 pub fn push(
     map: impl Into<MapPath>,
     bucket: &Bucket,
@@ -79,7 +79,7 @@ pub fn push(
         manifest = push.send_map(&map, &mut progress);
     }
     let manifest = manifest.map_err(|error| match error {
-        // Another question would wait as long.
+        // Another request would wait as long.
         Error::NoAnswer { .. } | Error::Stopped => error,
         error => push.overtaken().unwrap_or(error),
     })?;
@@ -101,19 +101,19 @@ pub fn push(
     Ok(pushed)
 }
 
-/// A push that goes on.
+/// A push in progress.
 struct Push<'a> {
     bucket: &'a Bucket,
-    /// The manifest that was there, and what tells it from its successor.
+    /// The manifest found in the bucket, and its version.
     before: Option<Manifest>,
     version: Option<UpdateVersion>,
-    /// What the folder builds on, if that is known.
+    /// States that the folder builds on; `None` if unknown.
     known: Option<KnownStates>,
     replaces: bool,
-    /// Its files; none where nothing that is there is believed.
+    /// Files of that manifest; `None` if everything is uploaded again.
     list: Option<FileList>,
     sender: Sender<'a>,
-    /// Files of tiles that an earlier attempt has sent.
+    /// Tile files uploaded by an earlier attempt.
     sent: FxHashMap<String, StoredFile>,
 }
 
@@ -127,16 +127,16 @@ impl<'a> Push<'a> {
             bucket.manifest()?.map(|found| (Some(found.manifest), found.version)).unzip()
         };
         let before = before.flatten();
-        let believed = before.clone().filter(|_| !options.resends);
-        let list = believed.map(|before| FileList::new(bucket.clone(), before));
+        let trusted = before.clone().filter(|_| !options.resends);
+        let list = trusted.map(|before| FileList::new(bucket.clone(), before));
         let mut sender = Sender::new(bucket, !options.resends);
-        sender.note(list.iter().flat_map(|list| list.own_files().values()));
+        sender.add_existing(list.iter().flat_map(|list| list.own_files().values()));
         let sent = FxHashMap::default();
         let replaces = options.replaces;
         Ok(Self { bucket, before, version, known, replaces, list, sender, sent })
     }
 
-    /// Sends what the bucket lacks of the map's last flush; the manifest that names all of it.
+    /// Uploads the missing objects of the map's last flush. Returns the manifest of this flush.
     fn send_map(&mut self, map: &MapPath, progress: &mut impl FnMut(u64, u64)) -> Result<Manifest> {
         let (disk, folder) = map.clone().into_parts();
         let store = TileStore::open_read_only(disk, &folder)?;
@@ -161,7 +161,7 @@ impl<'a> Push<'a> {
             let object = self.send_page(&name, &page)?;
             manifest.pages.insert(name, object);
         }
-        self.sender.begin(None);
+        self.sender.set_tile(None);
         let files = store.committed_files(&snapshots).map_err(|error| unless_changed(&store, error))?;
         for file in files {
             let path = file.path.clone();
@@ -173,13 +173,13 @@ impl<'a> Push<'a> {
         Ok(manifest)
     }
 
-    /// Why a push may have failed: another one came first, and removed what this one builds on.
+    /// Returns an error if another push came first, which may have removed objects that this push builds on.
     fn overtaken(&self) -> Option<Error> {
         let now = self.bucket.manifest().ok()?.map(|found| found.version);
         (now != self.version).then(|| self.bucket.overtaken())
     }
 
-    /// Neither another map nor a later state of this one is replaced.
+    /// Checks that the bucket has no other map, no later state of this map, and no diverged state.
     fn check_is_later(&self, manifest: &Manifest, folder: &Path) -> Result<()> {
         let Some(before) = &self.before else { return Ok(()) };
         let path = self.bucket.path().to_owned();
@@ -191,19 +191,17 @@ impl<'a> Push<'a> {
         }
         if before.flush_number > manifest.flush_number {
             let found = before.flush_number.to_string();
-            let wanted = format!("at most {} as {}", manifest.flush_number, folder.display());
+            let wanted =
+                format!("at most {} (the last flush of {})", manifest.flush_number, folder.display());
             return Err(Error::Mismatch { path, what: "flush", found, wanted });
         }
-        // A push that was interrupted behind its last step finds itself there: that is told when all is known.
+        // An interrupted push may have written this same manifest: `check_is_same_or_later` compares it once all files
+        // are known.
         let may_be_same = before.flush_number == manifest.flush_number;
-        if self.builds_on(before)? || may_be_same {
-            Ok(())
-        } else {
-            Err(self.went_another_way(before, folder))
-        }
+        if self.builds_on(before)? || may_be_same { Ok(()) } else { Err(self.diverged(before, folder)) }
     }
 
-    /// Of two states of one flush that differ, one went another way.
+    /// Refuses two different states of the same flush: one of the copies has diverged.
     fn check_is_same_or_later(&self, manifest: &Manifest, folder: &Path) -> Result<()> {
         match &self.before {
             Some(before)
@@ -212,23 +210,23 @@ impl<'a> Push<'a> {
                     && !(self.known.is_some() && self.builds_on(before)?)
                     && !self.replaces =>
             {
-                Err(self.went_another_way(before, folder))
+                Err(self.diverged(before, folder))
             }
             _ => Ok(()),
         }
     }
 
-    /// Whether the folder builds on what is there. Where nobody has noted it, as earlier versions did not, it is
-    /// believed.
+    /// Returns whether the folder builds on the state in the bucket. Without a file of known states, as in earlier
+    /// versions, this is assumed.
     fn builds_on(&self, before: &Manifest) -> Result<bool> {
         let Some(known) = &self.known else { return Ok(true) };
-        Ok(self.replaces || known.name(self.name_of(before)?))
+        Ok(self.replaces || known.contains(self.name_of(before)?))
     }
 
-    fn went_another_way(&self, before: &Manifest, folder: &Path) -> Error {
+    fn diverged(&self, before: &Manifest, folder: &Path) -> Error {
         let wanted = format!(
-            "one that {} builds on: a copy of the map went another way and was pushed; pull that into a new folder and \
-             `voxtile merge` the two, or push with --replace, and what is there alone is lost",
+            "one that {} builds on: another copy of the map was changed and pushed. Pull that state into a \
+             new folder and `voxtile merge` both, or discard it with --replace",
             folder.display()
         );
         let found = before.flush_number.to_string();
@@ -240,38 +238,38 @@ impl<'a> Push<'a> {
         manifest.computed_checksum().map_err(failed)
     }
 
-    /// Puts the manifest, and notes in the folder that this state is there. It is noted as offered before: whoever is
-    /// interrupted in between finds on the next push what they know.
+    /// Writes the manifest, and records in the folder that the bucket has this state. Before the upload, the state is
+    /// recorded as offered: after an interruption, the next push recognizes it.
     fn put(&mut self, map: &MapPath, manifest: &Manifest) -> Result<()> {
         let name = self.name_of(manifest)?;
         if self.before.as_ref() != Some(manifest) {
-            self.note(map, manifest, name, false);
+            self.record(map, manifest, name, false);
             self.bucket.replace_manifest(manifest, self.version.take())?;
         }
-        self.note(map, manifest, name, true);
+        self.record(map, manifest, name, true);
         Ok(())
     }
 
-    /// A folder that may only be read is pushed all the same.
-    fn note(&mut self, map: &MapPath, manifest: &Manifest, name: ObjectName, was_there: bool) {
+    /// Records a state in the folder. A failure is only logged, so that a read-only folder can be pushed.
+    fn record(&mut self, map: &MapPath, manifest: &Manifest, name: ObjectName, was_in_bucket: bool) {
         let (disk, folder) = map.clone().into_parts();
         let mut known = self.known.clone().unwrap_or_default();
-        known.note(manifest, name, was_there);
+        known.add(manifest, name, was_in_bucket);
         match known.write(&*disk, &folder) {
             Ok(()) => self.known = Some(known),
-            Err(error) => log::warn!("{error:#}; the folder does not know that it was pushed"),
+            Err(error) => log::warn!("{error:#}; the push is not recorded in the folder"),
         }
     }
 
-    /// The files that a page lists by now.
+    /// Returns the files that a page in the bucket lists.
     fn page_before(&mut self, name: &str) -> Result<Files> {
         let Some(list) = &self.list else { return Ok(Files::new()) };
         let page = list.page(name).map_err(|error| Error::io(self.bucket.path(), "read", error))?;
-        self.sender.note(page.iter().flat_map(|page| page.values()));
+        self.sender.add_existing(page.iter().flat_map(|page| page.values()));
         Ok(page.map_or_else(Files::new, |page| (*page).clone()))
     }
 
-    /// Sends what is new of a tile, and adds its files to the page.
+    /// Uploads the changed files of a tile, and adds all its files to the page.
     fn send_tile(
         &mut self,
         store: &TileStore,
@@ -280,7 +278,7 @@ impl<'a> Push<'a> {
         before: &Files,
         page: &mut Files,
     ) -> Result<()> {
-        self.sender.begin(Some(tile));
+        self.sender.set_tile(Some(tile));
         for file in store.committed_files_of(tile, snapshots)? {
             let path = file.path.clone();
             let known = match &file.content {
@@ -299,21 +297,21 @@ impl<'a> Push<'a> {
         Ok(())
     }
 
-    /// Sends a page.
+    /// Uploads a page.
     fn send_page(&mut self, name: &str, page: &Files) -> Result<ObjectName> {
         let failed = |error| Error::io(self.bucket.path(), "write", error);
         let content = serde_json::to_vec(page).map_err(|error| failed(error.into()))?;
-        // What no reader would take is not sent.
+        // Do not upload a page that readers would refuse.
         page_from_bytes(name, &content).map_err(|reason| failed(io::Error::other(reason)))?;
         let object = ObjectName::of(&content);
         if self.list.as_ref().is_some_and(|list| list.has_page(name, object)) {
             return Ok(object);
         }
-        self.sender.begin(None);
+        self.sender.set_tile(None);
         self.sender.send(content.into())
     }
 
-    /// Sends the parts of a file that the bucket lacks.
+    /// Uploads the missing parts of a file.
     fn send_file(
         &mut self,
         store: &TileStore,
@@ -346,29 +344,29 @@ impl<'a> Push<'a> {
     }
 }
 
-/// Why a file that the log names is not there, or is another one: a flush came in between, or it is damaged.
+/// Returns the error for a file that is missing or does not match the log: a flush in the meantime, or damage.
 fn not_found(store: &TileStore, path: &str, tile: Option<TileIndex>) -> Error {
     let folder = store.folder();
     let now = TileStore::open_read_only(store.disk().clone(), folder);
     if now.is_ok_and(|now| now.commits().flush_number == store.commits().flush_number) {
-        let reason = "the file is missing or not the one that commits.log names; `voxtile verify` says more";
+        let reason = "the file is missing, or is not the version that commits.log names";
         return FormatError::at_offset(0, reason).in_map(&folder.join(path), tile);
     }
     Error::Changed { path: folder.to_owned() }
 }
 
-/// Why files of kept scans cannot be sent: a flush came in between, or they are damaged.
+/// Returns the error for kept scans that cannot be uploaded: a flush in the meantime, or damage.
 fn unless_changed(store: &TileStore, error: Error) -> Error {
     let Error::Damaged { path, tile, mut cause } = error else { return error };
     let now = TileStore::open_read_only(store.disk().clone(), store.folder());
     if now.is_ok_and(|now| now.commits().flush_number != store.commits().flush_number) {
         return Error::Changed { path: store.folder().to_owned() };
     }
-    cause.reason.push_str("; nothing was pushed: repair the map, and push again");
+    cause.reason.push_str("; nothing was pushed: repair the map and push again");
     Error::Damaged { path, tile, cause }
 }
 
-/// The tiles that the map or a snapshot of it sees, by the pages that list their files.
+/// Groups the tiles of the map and of its snapshots by page.
 fn pages_of(store: &TileStore, snapshots: &[Snapshot]) -> BTreeMap<String, BTreeSet<TileIndex>> {
     let mut pages: BTreeMap<String, BTreeSet<TileIndex>> = BTreeMap::new();
     let of_snapshots = snapshots.iter().flat_map(|snapshot| snapshot.commits.tiles.tiles());

@@ -8,18 +8,18 @@ use std::sync::Arc;
 use std::time::Duration;
 use voxtile::{Error, Result};
 
-/// The bound on a whole request with its content. Requests that make no progress end earlier (`Request`); one that does
-/// may take its time, as a server that sends a file whole has to.
+/// Timeout of a whole request with its content. `Request` ends requests without progress earlier; a request with
+/// progress may take long, such as the download of a whole file.
 const WHOLE: &str = "1 day";
 
-/// The store of a URL, by its scheme and its first part; `None` for a scheme of no store.
+/// Returns the store of a URL, by its scheme and root; `None` for an unknown scheme.
 ///
 /// # Errors
 ///
-/// [`Error::InvalidArgument`] if the environment lacks something.
+/// [`Error::InvalidArgument`] if an environment variable is missing or invalid.
 pub(super) fn remote_store(url: &str, scheme: &str, root: &str) -> Result<Option<Arc<dyn ObjectStore>>> {
     choose_tls();
-    let refused = |error: object_store::Error| Error::argument(url, super::bucket::told(&error));
+    let refused = |error: object_store::Error| Error::argument(url, super::bucket::error_text(&error));
     Ok(Some(match scheme {
         "s3" => Arc::new(amazon(root).build().map_err(refused)?),
         "gs" => Arc::new(google(root).build().map_err(refused)?),
@@ -29,14 +29,14 @@ pub(super) fn remote_store(url: &str, scheme: &str, root: &str) -> Result<Option
     }))
 }
 
-/// Of the two libraries that could encrypt, the one that the rest of voxtile has.
+/// Chooses the cryptography library of rustls that the rest of voxtile uses.
 fn choose_tls() {
-    // Whoever has chosen one before keeps it.
+    // An earlier choice of the program is kept.
     let _ = rustls::crypto::ring::default_provider().install_default();
 }
 
 fn amazon(root: &str) -> AmazonS3Builder {
-    // Whoever names an endpoint without TLS means it: a server of their own.
+    // An endpoint without TLS is allowed if the user sets one, such as a local server.
     let endpoint = ["AWS_ENDPOINT_URL_S3", "AWS_ENDPOINT_URL", "AWS_ENDPOINT"];
     let endpoint = endpoint.iter().find_map(|name| std::env::var(name).ok());
     let mut builder = AmazonS3Builder::from_env()
@@ -81,12 +81,12 @@ fn web(root: &str, is_plain: bool) -> HttpBuilder {
     builder.with_config(ClientConfigKey::Timeout, WHOLE)
 }
 
-/// What fails is tried again by `Request`, which keeps what came before and knows the bound.
+/// Disables the retries of the client: `Request` retries, keeps the bytes received, and has the timeout.
 fn no_retries() -> RetryConfig {
     RetryConfig { max_retries: 0, retry_timeout: Duration::ZERO, ..RetryConfig::default() }
 }
 
-/// The environment's own bound counts.
+/// Returns whether a variable is set. A timeout of the environment has priority.
 fn is_set(name: &str) -> bool {
     std::env::var_os(name).is_some()
 }
@@ -95,7 +95,7 @@ fn is_set(name: &str) -> bool {
 mod tests {
     use super::*;
 
-    /// A part of 16 MiB takes longer than the client's own 30 seconds where eight share a slow link.
+    /// With eight downloads on a slow link, a part of 16 MiB takes longer than the client's default timeout of 30 s.
     #[test]
     fn all_clients_wait_for_slow_links() {
         let (amazon, google, azure) = (amazon("s3://robots"), google("gs://robots"), azure("az://robots"));

@@ -1,4 +1,4 @@
-use super::bucket::{refused, told};
+use super::bucket::{error_text, object_error};
 use super::store_health::StoreHealth;
 use object_store::client::HttpError;
 use object_store::path::Path as Key;
@@ -12,14 +12,14 @@ use std::time::{Duration, Instant};
 use tokio::time::{sleep, timeout_at};
 use voxtile::{Error, Unanswered};
 
-/// One request to a store with all its attempts: how far it is, and how long it may remain without progress.
+/// One request to a store with all its attempts. It tracks progress and enforces the timeout.
 ///
-/// An attempt in which fewer than [`PROGRESS_BYTES`] move for half of the limit is ended and begun again. The request
-/// fails if such idle times add up to the limit before an attempt gets further than all earlier ones: bytes that are sent
-/// again are neither idle time nor progress.
+/// An attempt in which fewer than [`PROGRESS_BYTES`] are transferred for half of the limit is aborted and retried. The
+/// request fails if these idle times add up to the limit before an attempt gets further than all earlier ones. Bytes
+/// that are sent again count neither as idle time nor as progress.
 ///
-/// An upload has twice as much time, the whole limit for an attempt: bytes count as sent once the connection has taken
-/// them, and on a slow link they may wait in its buffers for long.
+/// An upload has twice as much time: the whole limit per attempt. Bytes count as sent once the connection has accepted
+/// them, and on a slow link they may remain in its buffers for long.
 #[derive(Debug)]
 pub(super) struct Request {
     verb: &'static str,
@@ -33,54 +33,55 @@ pub(super) struct Request {
 #[derive(Debug)]
 struct State {
     attempts: u32,
-    /// Attempts in a row that got no farther than an earlier one.
-    fruitless: u32,
-    /// Bytes of the object that have been received, or sent by this attempt.
+    /// Number of attempts in a row without progress.
+    stalled: u32,
+    /// Bytes of the object received so far, or sent by this attempt.
     moved: u64,
-    /// The farthest that an attempt has got, in steps of progress.
+    /// Maximum of `moved` over all attempts, in steps of [`PROGRESS_BYTES`].
     farthest: u64,
-    /// `moved` and the time when this attempt began or last moved enough.
-    mark: (u64, Instant),
-    /// How long earlier attempts and the pauses between them were idle since the last progress.
+    /// `moved` and the time at the last progress or at the start of this attempt.
+    last_progress: (u64, Instant),
+    /// Idle time of earlier attempts and the pauses between them since the last progress.
     idle: Duration,
-    /// The server that the last attempt asked.
+    /// Server of the last attempt.
     address: Option<String>,
-    /// What the server answered to the last attempt.
+    /// HTTP status of the last answer.
     status: Option<u16>,
-    /// Whether the last attempt found no server.
+    /// Whether the last attempt could not connect to a server.
     is_unreachable: bool,
     last_failure: Option<String>,
 }
 
-/// Why an attempt failed.
+/// Reason for the failure of an attempt.
 pub(super) enum Failure {
-    /// The connection broke, or the store cannot answer now.
+    /// The connection broke, or the store is temporarily unavailable.
     Broken(object_store::Error),
-    /// The store would refuse another attempt, too.
+    /// The store would refuse another attempt too.
     Refused(object_store::Error),
-    /// Something other than the store makes another attempt useless.
-    Useless(io::Error),
-    /// Nothing moved.
+    /// Another attempt cannot help, for a reason outside the store.
+    Fatal(io::Error),
+    /// No bytes were transferred.
     Silent,
 }
 
-/// Fewer bytes are no progress: a server that drips a few bytes a second would hold a request for days.
+/// Number of bytes that count as progress. With fewer, a server that sends a few bytes a second could hold a request
+/// for days.
 pub(super) const PROGRESS_BYTES: u64 = 16 << 10;
 
-/// Attempts in a row that get no farther than an earlier one.
-const MAX_FRUITLESS: u32 = 20;
+/// Maximum number of attempts in a row without progress.
+const MAX_STALLED: u32 = 20;
 
-/// The same while the store has never answered: a wrong address is found in seconds.
+/// Maximum number of attempts while the store has never answered, so that a wrong address is reported within seconds.
 const MAX_UNREACHABLE: u32 = 4;
 
 const FIRST_PAUSE: Duration = Duration::from_millis(50);
 const LONGEST_PAUSE: Duration = Duration::from_secs(5);
 
-/// A wait is reported after so long, or a quarter of the limit.
+/// Time after which a wait is reported, or a quarter of the limit if that is less.
 const FIRST_REPORT: Duration = Duration::from_secs(8);
 
 tokio::task_local! {
-    /// The request that a task makes, for the client that counts what is sent.
+    /// Request of the current task, for the client that counts the bytes sent.
     pub(super) static REQUEST: Arc<Request>;
 }
 
@@ -95,10 +96,10 @@ impl Request {
         let now = Instant::now();
         let state = State {
             attempts: 0,
-            fruitless: 0,
+            stalled: 0,
             moved: 0,
             farthest: 0,
-            mark: (0, now),
+            last_progress: (0, now),
             idle: Duration::ZERO,
             address: None,
             status: None,
@@ -108,7 +109,7 @@ impl Request {
         Arc::new(Self { verb, key, limit, health, began: now, state: Mutex::new(state) })
     }
 
-    /// Makes an attempt, which continues after the bytes that are kept of earlier ones.
+    /// Makes an attempt, which continues after `kept` bytes of earlier attempts.
     pub(super) async fn attempt<T>(
         &self,
         kept: u64,
@@ -117,18 +118,18 @@ impl Request {
         self.state.lock().attempts += 1;
         let outcome = self.run(kept, attempt).await;
         if outcome.is_ok() {
-            // A long file takes several ranges.
+            // A large file needs several ranges, each with its own attempts.
             self.state.lock().attempts = 0;
         }
         outcome
     }
 
-    /// Asks the store on the way, within the same bound.
-    pub(super) async fn ask<T>(
+    /// Runs another query within the same limits.
+    pub(super) async fn query<T>(
         &self,
-        question: impl Future<Output = Result<T, Failure>>,
+        query: impl Future<Output = Result<T, Failure>>,
     ) -> Result<T, Failure> {
-        self.run(0, question).await
+        self.run(0, query).await
     }
 
     async fn run<T>(
@@ -140,7 +141,7 @@ impl Request {
         let outcome = self.bounded(attempt).await;
         if outcome.is_err() {
             let mut state = self.state.lock();
-            let idle = state.mark.1.elapsed();
+            let idle = state.last_progress.1.elapsed();
             state.idle += if self.is_upload() { idle / 2 } else { idle };
         }
         outcome
@@ -152,12 +153,12 @@ impl Request {
             let deadline = self.deadline();
             match timeout_at(deadline.into(), &mut attempt).await {
                 Ok(Err(Failure::Broken(error))) => {
-                    self.health.note(self.is_answer(&error));
+                    self.health.record(self.is_answer(&error));
                     let is_final = self.is_final(&error);
                     return Err(if is_final { Failure::Refused(error) } else { Failure::Broken(error) });
                 }
                 Ok(outcome) => {
-                    self.health.note(true);
+                    self.health.record(true);
                     return outcome;
                 }
                 Err(_) if self.deadline() > deadline => {}
@@ -170,68 +171,68 @@ impl Request {
     ///
     /// # Errors
     ///
-    /// The failure, if another attempt would not help; [`Error::NoAnswer`] inside if the bound is reached.
+    /// The failure, if another attempt cannot help; [`Error::NoAnswer`] as the cause at the limit.
     pub(super) async fn retry_after(&self, failure: Failure) -> io::Result<()> {
         let reason = match failure {
-            Failure::Useless(error) => return Err(error),
-            Failure::Refused(error) => return Err(refused(&self.key, &error)),
-            Failure::Broken(error) => told(&error),
+            Failure::Fatal(error) => return Err(error),
+            Failure::Refused(error) => return Err(object_error(&self.key, &error)),
+            Failure::Broken(error) => error_text(&error),
             Failure::Silent => "the server does not answer".to_owned(),
         };
         let pause = {
             let mut state = self.state.lock();
-            state.fruitless += 1;
+            state.stalled += 1;
             let lacks_keys = reason.starts_with("no keys");
-            let most = match (state.is_unreachable && !self.health.has_answered()) || lacks_keys {
+            let max_attempts = match (state.is_unreachable && !self.health.has_answered()) || lacks_keys {
                 true => MAX_UNREACHABLE,
-                false => MAX_FRUITLESS,
+                false => MAX_STALLED,
             };
-            let doublings = state.fruitless.saturating_sub(1).min(16);
+            let doublings = state.stalled.saturating_sub(1).min(16);
             let pause = FIRST_PAUSE.saturating_mul(1 << doublings).min(LONGEST_PAUSE);
             state.idle += pause;
             let is_over = state.idle >= self.limit;
             state.last_failure = Some(reason.clone());
-            if is_over || state.fruitless >= most { None } else { Some(pause) }
+            if is_over || state.stalled >= max_attempts { None } else { Some(pause) }
         };
         let Some(pause) = pause else { return Err(self.no_answer(reason)) };
-        log::info!("{self}: {reason}; tried again in {pause:?}");
+        log::info!("{self}: {reason}; retry in {pause:?}");
         sleep(pause).await;
         Ok(())
     }
 
-    /// Notes bytes that were sent or received.
-    pub(super) fn moved(&self, bytes: u64) {
+    /// Adds bytes that were sent or received.
+    pub(super) fn add_bytes(&self, bytes: u64) {
         let mut state = self.state.lock();
         state.moved += bytes;
-        if state.moved >= state.mark.0 + PROGRESS_BYTES {
-            state.mark = (state.moved, Instant::now());
+        if state.moved >= state.last_progress.0 + PROGRESS_BYTES {
+            state.last_progress = (state.moved, Instant::now());
         }
         if state.moved >= state.farthest + PROGRESS_BYTES {
-            (state.farthest, state.idle, state.fruitless) = (state.moved, Duration::ZERO, 0);
+            (state.farthest, state.idle, state.stalled) = (state.moved, Duration::ZERO, 0);
         }
     }
 
-    /// Notes the server that is asked.
-    pub(super) fn asks(&self, address: String) {
+    /// Records the server of the attempt.
+    pub(super) fn set_server(&self, address: String) {
         self.state.lock().address = Some(address);
     }
 
-    /// Notes the status of an answer.
-    pub(super) fn answered(&self, status: u16) {
+    /// Records the status of an answer.
+    pub(super) fn set_status(&self, status: u16) {
         self.state.lock().status = Some(status);
     }
 
-    /// Notes that no connection could be made.
-    pub(super) fn is_unreachable(&self) {
+    /// Records that no connection could be made.
+    pub(super) fn set_unreachable(&self) {
         self.state.lock().is_unreachable = true;
     }
 
-    /// How long a thread waits before it reports what it waits for.
+    /// Returns the time after which a waiting thread logs its first report.
     pub(super) fn first_report(&self) -> Duration {
         FIRST_REPORT.min(self.limit / 4)
     }
 
-    /// Reports what is waited for.
+    /// Logs a wait for this request, unless another wait was just reported.
     pub(super) fn report(&self, waited: Duration) {
         if self.health.may_report() {
             log::warn!("waiting for {:.1} s: {self}", waited.as_secs_f64());
@@ -240,35 +241,35 @@ impl Request {
 
     fn begin(&self, kept: u64) {
         let mut state = self.state.lock();
-        (state.moved, state.mark) = (kept, (kept, Instant::now()));
+        (state.moved, state.last_progress) = (kept, (kept, Instant::now()));
         (state.status, state.is_unreachable) = (None, false);
     }
 
-    /// When this attempt ends unless there is progress before.
+    /// Returns the time when this attempt ends if there is no further progress.
     fn deadline(&self) -> Instant {
         let state = self.state.lock();
-        let most = (self.limit / 2).min(self.limit.saturating_sub(state.idle));
-        state.mark.1 + if self.is_upload() { 2 * most } else { most }
+        let remaining = (self.limit / 2).min(self.limit.saturating_sub(state.idle));
+        state.last_progress.1 + if self.is_upload() { 2 * remaining } else { remaining }
     }
 
     fn is_upload(&self) -> bool {
         self.verb == "PUT"
     }
 
-    /// Whether an error is the answer of a store, and not one of the way there.
+    /// Returns whether an error is an answer of the store, not a failure of the connection.
     fn is_answer(&self, error: &object_store::Error) -> bool {
         self.state.lock().status.is_some() || !matches!(error, object_store::Error::Generic { .. })
     }
 
-    /// Whether the same request would be refused again.
+    /// Returns whether the store would refuse the same request again.
     fn is_final(&self, error: &object_store::Error) -> bool {
         match error {
-            // The status was a refusal, and its text was cut off.
+            // The answer was truncated, so its status is not final.
             object_store::Error::Generic { source, .. } if is_cut_off(&**source) => false,
             object_store::Error::Generic { .. } => {
-                // 408 and 429 ask for another attempt. A store without HTTP says so of a range in words.
+                // 408 and 429 permit another attempt. Stores without HTTP report an invalid range only in the text.
                 matches!(self.state.lock().status, Some(300..=407 | 409..=428 | 430..=499))
-                    || told(error).contains("but object was only")
+                    || error_text(error).contains("but object was only")
             }
             object_store::Error::JoinError { .. } => false,
             _ => true,
@@ -292,13 +293,13 @@ impl Request {
     }
 }
 
-/// Whether a connection broke before an answer was complete.
+/// Returns whether the connection broke before an answer was complete.
 fn is_cut_off(error: &(dyn std::error::Error + 'static)) -> bool {
     std::iter::successors(Some(error), |error| error.source()).any(|error| error.is::<HttpError>())
 }
 
-/// Makes attempts from the beginning until one succeeds, or another would not help.
-pub(super) async fn retried<T, F: Future<Output = Result<T, Failure>>>(
+/// Makes attempts from the beginning until one succeeds, or another cannot help.
+pub(super) async fn retry<T, F: Future<Output = Result<T, Failure>>>(
     request: &Request,
     attempt: impl Fn() -> F,
 ) -> io::Result<T> {
@@ -310,22 +311,22 @@ pub(super) async fn retried<T, F: Future<Output = Result<T, Failure>>>(
     }
 }
 
-/// What is asked of which server, how far it is, and what happened last.
+/// Shows the request, the server, the progress and the last failure.
 impl fmt::Display for Request {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let state = self.state.lock();
         write!(f, "{}: {} {}", self.health.url(), self.verb, self.key)?;
         if let Some(address) = &state.address {
-            write!(f, " of {address}")?;
+            write!(f, " at {address}")?;
         }
         let (since, limit) = (self.began.elapsed().as_secs_f64(), self.limit.as_secs_f64());
-        write!(f, ", begun {since:.1} s ago, attempt {}", state.attempts.max(1))?;
+        write!(f, ", started {since:.1} s ago, attempt {}", state.attempts.max(1))?;
         if matches!(self.verb, "GET" | "PUT") {
             write!(f, ", {} bytes", state.moved)?;
         }
-        write!(f, ", given up after {limit} s without progress")?;
+        write!(f, ", fails after {limit} s without progress")?;
         match &state.last_failure {
-            Some(failure) => write!(f, "; the attempt before failed: {failure}"),
+            Some(failure) => write!(f, "; the previous attempt failed: {failure}"),
             None => Ok(()),
         }
     }

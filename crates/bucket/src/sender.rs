@@ -10,72 +10,72 @@ use std::path::Path;
 use voxtile::space::TileIndex;
 use voxtile::{Error, Result};
 
-/// Sends objects that a bucket lacks, several at a time.
+/// Uploads the objects that a bucket lacks, several at a time.
 pub(super) struct Sender<'a> {
     bucket: &'a Bucket,
-    /// Objects that are there, or on their way.
+    /// Objects that exist in the bucket or are being uploaded.
     known: FxHashSet<ObjectName>,
-    in_flight: VecDeque<OnItsWay>,
-    /// Whether the bucket may have objects that no manifest names.
-    asks: bool,
-    /// Objects in a row that were asked for and not there.
+    in_flight: VecDeque<InFlight>,
+    /// Whether to check for existing objects that no manifest names.
+    checks_existing: bool,
+    /// Number of objects that were checked in a row and did not exist.
     missing: usize,
-    /// The tile whose objects come next.
+    /// Tile of the next objects.
     tile: Option<TileIndex>,
     sent: Sent,
 }
 
-/// What was sent, beside what was there.
+/// Counts of uploads.
 #[derive(Default)]
 pub(super) struct Sent {
     pub(super) objects: u64,
     pub(super) bytes: u64,
-    /// Tiles of which something was sent.
+    /// Tiles with uploaded objects.
     pub(super) tiles: FxHashSet<TileIndex>,
 }
 
-struct OnItsWay {
+struct InFlight {
     pending: Pending<bool>,
     bytes: u64,
     tile: Option<TileIndex>,
-    was_asked_for: bool,
+    was_checked: bool,
 }
 
-/// Parts on their way at a time: with 16 MiB a part at most, 128 MiB of memory.
+/// Maximum number of concurrent uploads. With parts of up to 16 MiB, they take up to 128 MiB of memory.
 const MAX_IN_FLIGHT: usize = 8;
 
-/// A push that was interrupted has left objects behind, in the order in which they are sent again. After so many that
-/// are not there, small ones are sent without a question: it takes as long as they do.
+/// Number of checks in a row without an existing object after which small objects are uploaded without a check. An
+/// interrupted push leaves objects in the order of upload, and a check takes as long as a small upload.
 const MAX_MISSING: usize = 32;
 
-/// Objects from here on are always asked for.
+/// Size in bytes from which objects are always checked.
 const LARGE_BYTES: usize = 1 << 20;
 
 impl<'a> Sender<'a> {
-    /// `asks` for objects before it sends them: they may have been left by a push that was interrupted.
-    pub(super) fn new(bucket: &'a Bucket, asks: bool) -> Self {
+    /// `checks_existing` enables checks for existing objects, which an interrupted push may have left.
+    pub(super) fn new(bucket: &'a Bucket, checks_existing: bool) -> Self {
         Self {
             bucket,
             known: FxHashSet::default(),
             in_flight: VecDeque::new(),
-            asks,
+            checks_existing,
             missing: 0,
             tile: None,
             sent: Sent::default(),
         }
     }
 
-    /// What comes next is of this tile.
-    pub(super) fn begin(&mut self, tile: Option<TileIndex>) {
+    /// Sets the tile of the next objects.
+    pub(super) fn set_tile(&mut self, tile: Option<TileIndex>) {
         self.tile = tile;
     }
 
-    /// Notes objects that are there.
-    pub(super) fn note<'b>(&mut self, files: impl Iterator<Item = &'b StoredFile>) {
+    /// Adds objects that exist in the bucket.
+    pub(super) fn add_existing<'b>(&mut self, files: impl Iterator<Item = &'b StoredFile>) {
         self.known.extend(files.flat_map(|file| &file.parts));
     }
 
-    /// Sends the parts of a file that are not there; an error of reading names `path`.
+    /// Uploads the missing parts of a file. A read error names `path`.
     pub(super) fn send_file(&mut self, path: &Path, input: &mut impl Read) -> Result<StoredFile> {
         let mut file = StoredFile { bytes: 0, crc32: None, scan_number: None, parts: Vec::new() };
         loop {
@@ -90,37 +90,38 @@ impl<'a> Sender<'a> {
         }
     }
 
-    /// Sends an object, if it is not there.
+    /// Uploads an object if it is missing.
     pub(super) fn send(&mut self, content: Bytes) -> Result<ObjectName> {
         let name = ObjectName::of(&content);
         if self.known.insert(name) {
             self.wait_until(MAX_IN_FLIGHT - 1)?;
-            let was_asked_for = self.asks && (content.len() >= LARGE_BYTES || self.missing < MAX_MISSING);
+            let was_checked =
+                self.checks_existing && (content.len() >= LARGE_BYTES || self.missing < MAX_MISSING);
             let bytes = content.len() as u64;
-            let pending = self.bucket.put(name, content, was_asked_for);
-            self.in_flight.push_back(OnItsWay { pending, bytes, tile: self.tile, was_asked_for });
+            let pending = self.bucket.put(name, content, was_checked);
+            self.in_flight.push_back(InFlight { pending, bytes, tile: self.tile, was_checked });
         }
         Ok(name)
     }
 
-    /// Waits until everything is there.
+    /// Waits for all uploads.
     pub(super) fn finish(&mut self) -> Result<()> {
         self.wait_until(0)
     }
 
-    /// What was sent until [`finish`](Self::finish).
+    /// Returns the counts of uploads, complete after [`finish`](Self::finish).
     pub(super) fn sent(&self) -> &Sent {
         &self.sent
     }
 
     fn wait_until(&mut self, in_flight: usize) -> Result<()> {
         while self.in_flight.len() > in_flight
-            && let Some(OnItsWay { pending, bytes, tile, was_asked_for }) = self.in_flight.pop_front()
+            && let Some(InFlight { pending, bytes, tile, was_checked }) = self.in_flight.pop_front()
         {
             let answer: io::Result<bool> = pending.wait();
             let is_sent = answer.map_err(|error| Error::io(self.bucket.path(), "write", error))?;
             if is_sent {
-                self.missing += usize::from(was_asked_for);
+                self.missing += usize::from(was_checked);
                 self.sent.objects += 1;
                 self.sent.bytes += bytes;
                 self.sent.tiles.extend(tile);

@@ -50,7 +50,7 @@ fn a_put_without_a_response_is_reported_and_fails() {
     assert!(Duration::from_secs(2) <= took && took < Duration::from_secs(20), "{took:?}");
     let waiting =
         text_out.lines().find(|line| line.contains("waiting for")).unwrap_or_else(|| panic!("{text_out}"));
-    for part in [URL, "PUT maps/city/objects/", &server.address.to_string(), "attempt 1", "begun"] {
+    for part in [URL, "PUT maps/city/objects/", &server.address.to_string(), "attempt 1", "started"] {
         assert!(waiting.contains(part), "{part}: {waiting}");
     }
     let error: serde_json::Value = serde_json::from_str(&out).unwrap();
